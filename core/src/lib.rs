@@ -1,0 +1,48 @@
+//! Suture's engine: it reads a triangle soup, builds its topology in star-complete chunks, repairs what is broken as a sparse
+//! edit against the original, writes the result once and judges the written bytes.
+//!
+//! It knows no daemon and no store. The two entry points are [`inspect`] and [`repair`].
+
+pub mod error;
+pub mod report;
+pub mod settings;
+
+pub use error::{Error, ErrorClass};
+pub use report::Report;
+pub use settings::{Limits, Profile};
+
+use std::path::Path;
+
+/// Where the work on one file stands; cheap to call, called from worker threads.
+pub trait Progress: Sync {
+    /// `stage` has `done` of `total` units (triangles unless the stage says otherwise) behind it.
+    fn at(&self, stage: &'static str, done: u64, total: u64);
+    /// `true` asks the work to end as soon as it can, without output.
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
+
+/// No one is watching.
+pub struct Quiet;
+
+impl Progress for Quiet {
+    fn at(&self, _: &'static str, _: u64, _: u64) {}
+}
+
+/// Diagnoses `input` and writes nothing.
+pub fn inspect(input: &Path, _profile: &Profile, _limits: &Limits, _progress: &dyn Progress) -> error::Result<Report> {
+    Err(Error::Unreadable { path: input.into(), reason: "not built yet".into() })
+}
+
+/// Repairs `input` into `output`, which must not exist: the caller owns a temporary name and publishes it. The output is synced
+/// to disk before this returns. A file that is good as it comes is copied byte for byte.
+pub fn repair(
+    input: &Path,
+    _output: &Path,
+    _profile: &Profile,
+    _limits: &Limits,
+    _progress: &dyn Progress,
+) -> error::Result<Report> {
+    Err(Error::Unreadable { path: input.into(), reason: "not built yet".into() })
+}

@@ -1,0 +1,259 @@
+//! The report: what was found, what was done, and the verdict on the bytes written. Documented in `core/REPORT.md`.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use crate::settings::{Limits, Profile};
+
+/// Version of the report's JSON layout; raised when a field changes its meaning or goes away.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// Everything there is to say about one file.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Report {
+    /// [`SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// Engine version that wrote it.
+    pub engine_version: String,
+    /// `inspect` or `repair`.
+    pub task: Task,
+    /// What came of it.
+    pub outcome: Outcome,
+    /// The file read.
+    pub input: FileFacts,
+    /// The file written, `None` when nothing was (inspection, or no triangle left).
+    pub output: Option<FileFacts>,
+    /// Settings that decide the result.
+    pub profile: Profile,
+    /// Settings that do not.
+    pub limits: Limits,
+    /// Defects of the input.
+    pub before: Defects,
+    /// Defects of the output, counted on the bytes written; of a clean file that was copied: those of the input.
+    pub after: Option<Defects>,
+    /// Tolerances derived from the model.
+    pub tolerances: Tolerances,
+    /// What was done, in order.
+    pub repairs: Vec<Repair>,
+    /// Boundary loops that were left open, and why (at most 1000 listed).
+    pub loops_left: Vec<LoopLeft>,
+    /// The edit in numbers.
+    pub edit: EditSummary,
+    /// The edit itself, when asked for.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub edit_records: Option<EditRecords>,
+    /// What the written bytes (for an inspection: the read ones) are.
+    pub verdict: Verdict,
+    /// Seconds by stage, in order.
+    pub stages: Vec<Stage>,
+    /// Where the time went and what it cost.
+    pub cost: Cost,
+}
+
+/// Which of the two entry points wrote a report.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Task {
+    Inspect,
+    Repair,
+}
+
+/// What came of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// Good as it came; the output, if any, is byte for byte the input.
+    Clean,
+    /// Repaired, and good.
+    Repaired,
+    /// Good, but the repair changed the part beyond the profile's limits: a person must look.
+    NeedsReview,
+    /// Not good under the profile (for an inspection: the input is not).
+    NotGood,
+}
+
+impl Outcome {
+    /// May it reach `out/`?
+    pub fn is_good(self) -> bool {
+        matches!(self, Self::Clean | Self::Repaired)
+    }
+}
+
+/// A mesh file's identity and format.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct FileFacts {
+    pub path: PathBuf,
+    pub bytes: u64,
+    /// BLAKE3 of the whole file, hexadecimal.
+    pub blake3: String,
+    pub format: Format,
+    /// Triangle records in the file, non-finite and degenerate ones included.
+    pub triangles: u64,
+    /// What is odd about the file itself, in the reader's words; empty for a flawless file.
+    pub findings: Vec<String>,
+}
+
+/// Mesh file formats that are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Format {
+    BinaryStl,
+    AsciiStl,
+}
+
+/// Counts after the exact weld. Definitions: `core/DEFECTS.md`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Defects {
+    /// Triangles with finite coordinates.
+    pub triangles: u64,
+    /// Triangles with a NaN or infinite coordinate; in no other count.
+    pub nonfinite: u64,
+    /// Distinct positions.
+    pub vertices: u64,
+    /// Distinct positions used by a triangle with three distinct vertices.
+    pub vertices_used: u64,
+    pub edges: u64,
+    /// Triangles with a repeated vertex; left out of the topology.
+    pub degenerate_index: u64,
+    /// Triangles of three distinct, exactly collinear vertices; kept in the topology.
+    pub degenerate_area: u64,
+    /// Triangles with the vertex set and the direction of an earlier one.
+    pub duplicates_same: u64,
+    /// Triangles with the vertex set of an earlier one, none of them in the same direction.
+    pub duplicates_opposite: u64,
+    pub boundary_edges: u64,
+    /// Connected sets of boundary edges.
+    pub boundary_loops: u64,
+    /// Edges of more than two triangles.
+    pub nonmanifold_edges: u64,
+    /// Vertices on a non-manifold edge, or whose triangles form more than one fan.
+    pub nonmanifold_vertices: u64,
+    /// Two-triangle edges used twice in the same direction.
+    pub inconsistent_edges: u64,
+    /// Edges not used equally often in each direction.
+    pub unbalanced_edges: u64,
+    /// Sets of triangles connected through edges.
+    pub components: u64,
+    /// Closed, coherent components of negative volume that are no cavity.
+    pub inverted_components: u64,
+    /// Closed components of positive volume inside no other body.
+    pub bodies: u64,
+    /// Closed components of negative volume inside a body.
+    pub cavities: u64,
+    /// Closed components of positive volume inside another body (swallowed).
+    pub nested_positive: u64,
+    /// Boundary vertices inside a boundary edge of another triangle, within the weld tolerance (T-junctions).
+    pub noncommon_vertices: u64,
+    /// Boundary vertices within the weld tolerance of another boundary vertex.
+    pub weldable_vertices: u64,
+    /// Smallest and largest coordinates; `None` without a finite triangle.
+    pub bounds: Option<[[f32; 3]; 2]>,
+    pub area: f64,
+    /// Signed volume; means something only where closed and oriented.
+    pub volume: f64,
+    /// V − E + F, where the surface is closed and manifold.
+    pub euler: Option<i64>,
+    /// Counts that stopped at a bound are "at least"; their field names.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub at_least: Vec<String>,
+}
+
+/// Lengths derived from the model, in its units.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Tolerances {
+    /// Diagonal of the bounding box.
+    pub diagonal: f64,
+    /// Boundary vertices closer than this may be welded.
+    pub weld: f64,
+    /// How `weld` was chosen.
+    pub weld_reason: String,
+}
+
+/// One kind of repair that did something.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Repair {
+    /// `exact_weld`, `tolerance_weld`, `degenerate`, `duplicate`, `surplus`, `t_junction`, `zip`, `fill`, `orient`, `outward`, …
+    pub name: String,
+    /// How often.
+    pub count: u64,
+    /// In words, with the method or the bound that mattered.
+    pub note: String,
+    pub seconds: f64,
+}
+
+/// A boundary loop that stayed open.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct LoopLeft {
+    /// A point on it.
+    pub at: [f32; 3],
+    pub edges: u64,
+    pub perimeter: f64,
+    pub reason: String,
+}
+
+/// The edit in numbers. Every record of the output is an untouched input record, a replaced one or an added one.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct EditSummary {
+    /// Input records that stand in the output byte for byte, in order.
+    pub untouched: u64,
+    /// Input records left out.
+    pub deleted: u64,
+    /// Input records whose winding was reversed.
+    pub flipped: u64,
+    /// Input records with a moved vertex.
+    pub moved: u64,
+    /// New records, at the end of the file.
+    pub added: u64,
+    /// Largest distance any vertex moved.
+    pub max_move: f64,
+}
+
+/// The edit, record by record. Ids are input record numbers from 0.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct EditRecords {
+    /// Inclusive ranges of records left out.
+    pub deleted: Vec<[u32; 2]>,
+    /// Inclusive ranges of records reversed.
+    pub flipped: Vec<[u32; 2]>,
+    /// Records with moved vertices and their new corners.
+    pub moved: Vec<(u32, [[f32; 3]; 3])>,
+    /// New records' corners, in file order.
+    pub added: Vec<[[f32; 3]; 3]>,
+}
+
+/// What a file is, judged on its bytes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// Everything that this version checks holds.
+    pub good: bool,
+    /// One line for people, e.g. `closed, manifold, oriented; self-intersection unchecked`.
+    pub statement: String,
+    pub closed: bool,
+    pub manifold: bool,
+    pub oriented: bool,
+    /// Why it is not good, or why it needs review.
+    pub reasons: Vec<String>,
+    /// What was not checked.
+    pub unchecked: Vec<String>,
+}
+
+/// One stage's share of the time.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Stage {
+    pub name: String,
+    pub seconds: f64,
+}
+
+/// What the work cost.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Cost {
+    pub wall_seconds: f64,
+    /// User and system time of the process.
+    pub cpu_seconds: f64,
+    pub triangles_per_second: f64,
+    /// Largest resident set of the process, mapped file pages included.
+    pub peak_resident_bytes: u64,
+    /// Largest anonymous memory of the process, sampled at the stage borders.
+    pub peak_anonymous_bytes: u64,
+}

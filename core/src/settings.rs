@@ -1,0 +1,105 @@
+//! What decides the result ([`Profile`]) kept apart from what only decides how it is computed ([`Limits`]).
+//!
+//! Same input and same profile give the same output bytes, whatever the limits.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+/// What a repair may do, and what its result must satisfy. Lengths written `…_relative` are fractions of the bounding box's
+/// diagonal; `…_mm` are in the file's units, which STL users take for millimetres.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Profile {
+    /// Name shown in reports.
+    pub name: String,
+    /// Boundary vertices closer than this fraction of the diagonal are one vertex. Never below what f32 can tell apart at the
+    /// model's coordinates, never above [`Profile::weld_max_edge_share`] of the edges around. 0 switches the weld off.
+    pub weld_relative: f64,
+    /// Upper bound of the weld tolerance as a share of the shortest edge at either vertex.
+    pub weld_max_edge_share: f64,
+    /// Gaps are zipped while they are narrower than this share of the rim's edges. 0 switches zipping off.
+    pub gap_edge_share: f64,
+    /// Loops of more boundary edges than this are reported, not filled.
+    pub max_hole_edges: u32,
+    /// Loops longer than this fraction of the diagonal are reported, not filled.
+    pub max_hole_perimeter_relative: f64,
+    /// Fill holes at all.
+    pub fill_holes: bool,
+    /// Largest change of the enclosed volume, as a fraction, between a closed part of the input and the output; beyond it the
+    /// result needs review.
+    pub max_volume_change: f64,
+    /// Largest growth or shrinkage of the bounding box on any side, as a fraction of the diagonal.
+    pub max_box_change_relative: f64,
+    /// Bodies (components that enclose volume) the repair may lose without review.
+    pub max_bodies_lost: u32,
+    /// Components of fewer triangles than this, with less than a millionth of the model's area, that stay open after all
+    /// repairs are dropped as debris (0: never).
+    pub debris_triangles: u32,
+}
+
+impl Default for Profile {
+    fn default() -> Self {
+        Self {
+            name: "default".into(),
+            weld_relative: 1e-5,
+            weld_max_edge_share: 0.25,
+            gap_edge_share: 0.35,
+            max_hole_edges: 20_000,
+            max_hole_perimeter_relative: 8.0,
+            fill_holes: true,
+            max_volume_change: 0.25,
+            max_box_change_relative: 1e-3,
+            max_bodies_lost: 0,
+            debris_triangles: 4,
+        }
+    }
+}
+
+impl Profile {
+    /// The profiles that come with the product, by name: `default`; `scan` (larger holes, wider gaps, for scanned surfaces);
+    /// `cautious` (welds and drops surplus triangles, but closes nothing).
+    pub fn built_in(name: &str) -> Option<Self> {
+        let base = Self { name: name.into(), ..Self::default() };
+        match name {
+            "default" => Some(base),
+            "scan" => {
+                Some(Self { max_hole_edges: 100_000, gap_edge_share: 0.5, max_volume_change: 1.0, debris_triangles: 100, ..base })
+            }
+            "cautious" => Some(Self { fill_holes: false, gap_edge_share: 0.0, max_volume_change: 0.02, ..base }),
+            _ => None,
+        }
+    }
+
+    /// Names [`Profile::built_in`] knows.
+    pub const BUILT_IN: [&str; 3] = ["default", "scan", "cautious"];
+}
+
+/// What the machine may spend. Never changes a result: too little is an error, not another output.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Limits {
+    /// Bytes of memory the system cannot reclaim (anonymous memory and dirty file pages).
+    pub memory_bytes: u64,
+    /// Worker threads.
+    pub threads: usize,
+    /// Triangles in a chunk on average; the default fits the tables of a chunk into an L2 cache.
+    pub chunk_triangles: u32,
+    /// Folder for spool files (ASCII input, spilled lists); `None`: the output's folder.
+    pub spool: Option<PathBuf>,
+    /// List every record of the edit in the report (may be as large as the mesh).
+    pub list_edit: bool,
+}
+
+impl Default for Limits {
+    /// 1 GiB, all processors, chunks of 32 k triangles.
+    fn default() -> Self {
+        Self {
+            memory_bytes: 1 << 30,
+            threads: std::thread::available_parallelism().map_or(1, usize::from),
+            chunk_triangles: 32 * 1024,
+            spool: None,
+            list_edit: false,
+        }
+    }
+}

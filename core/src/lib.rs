@@ -4,6 +4,8 @@
 //! It knows no daemon and no store. The two entry points are [`inspect`] and [`repair`].
 
 pub mod error;
+pub mod read;
+pub mod record;
 pub mod report;
 pub mod settings;
 

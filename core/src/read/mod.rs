@@ -1,0 +1,213 @@
+//! A mesh file as an array of [`Record`]s.
+//!
+//! Binary STL is mapped and read where it lies. Text STL is parsed once, in parallel, into a nameless spool file of the same
+//! records, which is mapped in its place. So the rest of the engine sees one thing: `&[Record]` in input order, backed by pages
+//! the system can drop at any time.
+//!
+//! What is odd about a file never stops the reading as long as its triangles are certain: it becomes a [`Finding`]. What is no
+//! mesh is refused with the reason a person needs ("a PNG picture").
+
+mod binary;
+mod foreign;
+mod sniff;
+
+use std::fs::{File, Metadata, OpenOptions};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+
+use memmap2::Mmap;
+
+use crate::Progress;
+use crate::error::{Error, Result};
+use crate::record::Record;
+use crate::report::Format;
+use crate::settings::Limits;
+
+/// Bytes of a binary STL before its count.
+pub const HEADER_BYTES: usize = 80;
+/// Bytes of a binary STL before its first record.
+pub const PREFIX_BYTES: usize = HEADER_BYTES + 4;
+/// Most triangles a binary STL's count can hold, hence the most we read.
+pub const MAX_TRIANGLES: u64 = u32::MAX as u64;
+
+/// Something odd about the file itself (not about its mesh).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Finding {
+    /// One line for people.
+    pub text: String,
+    /// `true`: common slicers read the file all the same, and read the same mesh. `false`: some of them refuse it or read
+    /// something else, so a file that is otherwise clean is worth rewriting.
+    pub harmless: bool,
+}
+
+impl Finding {
+    fn flaw(text: impl Into<String>) -> Self {
+        Self { text: text.into(), harmless: false }
+    }
+}
+
+/// Why a file was not read, before it is joined with the file's name.
+#[derive(Debug, PartialEq, Eq)]
+enum Rejection {
+    /// No mesh, or damaged beyond reading.
+    Unreadable(String),
+    /// More triangles than a binary STL can count.
+    TooMany(u64),
+}
+
+impl Rejection {
+    fn at(self, path: &Path) -> Error {
+        match self {
+            Self::Unreadable(reason) => Error::Unreadable { path: path.to_owned(), reason },
+            Self::TooMany(triangles) => Error::Refused {
+                path: path.to_owned(),
+                reason: format!("{triangles} triangles"),
+                advice: format!("an STL holds at most {MAX_TRIANGLES}: split it"),
+            },
+        }
+    }
+}
+
+/// What tells one state of a file from the next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Identity {
+    device: u64,
+    inode: u64,
+    size: u64,
+    modified: (i64, i64),
+    changed: (i64, i64),
+}
+
+impl Identity {
+    fn of(metadata: &Metadata) -> Self {
+        Self {
+            device: metadata.dev(),
+            inode: metadata.ino(),
+            size: metadata.size(),
+            modified: (metadata.mtime(), metadata.mtime_nsec()),
+            changed: (metadata.ctime(), metadata.ctime_nsec()),
+        }
+    }
+}
+
+/// Where the records of an open file lie.
+#[derive(Debug)]
+enum Source {
+    /// In the input itself, this many after its prefix.
+    InPlace(usize),
+}
+
+/// An open mesh file. Its pages are mapped: if someone truncates the file meanwhile, touching them raises SIGBUS, so that the
+/// process that opens foreign files should be one that may die.
+#[derive(Debug)]
+pub struct MeshFile {
+    path: PathBuf,
+    identity: Identity,
+    input: Mmap,
+    source: Source,
+    format: Format,
+    findings: Vec<Finding>,
+    header: [u8; HEADER_BYTES],
+}
+
+impl MeshFile {
+    /// Opens `path` and makes its records available. A text STL is parsed on the current rayon pool into a nameless file in
+    /// `spool`; its progress is reported in bytes as stage `read`.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`] for what is no mesh or holds no triangle, [`Error::Refused`] beyond [`MAX_TRIANGLES`],
+    /// [`Error::Io`] where opening, mapping or spooling fails.
+    pub fn open(path: &Path, _spool: &Path, _limits: &Limits, _progress: &dyn Progress) -> Result<Self> {
+        let (file, identity) = open_regular(path)?;
+        if identity.size == 0 {
+            return Err(Rejection::Unreadable("empty file".into()).at(path));
+        }
+        // SAFETY: the map is read-only and private to this value. Another process changing the file can change the bytes seen
+        // (all of them plain numbers, valid in every state; `check_unchanged` finds out) or, by truncating it, end this process
+        // with SIGBUS, which its supervisor expects.
+        let input = unsafe { Mmap::map(&file) }.map_err(Error::io(path, "mapping"))?;
+        match sniff::sniff(&input).map_err(|rejection| rejection.at(path))? {
+            sniff::Kind::Binary(layout) => Ok(Self {
+                path: path.to_owned(),
+                identity,
+                header: binary::safe_header(binary::header(&input)),
+                source: Source::InPlace(layout.triangles),
+                input,
+                format: Format::BinaryStl,
+                findings: layout.findings,
+            }),
+        }
+    }
+
+    /// The triangles in input order, those with NaN or infinite coordinates included.
+    pub fn records(&self) -> &[Record] {
+        match &self.source {
+            Source::InPlace(triangles) => binary::records(&self.input, *triangles),
+        }
+    }
+
+    /// What the file was read as.
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
+    /// What is odd about the file; empty for a flawless one.
+    pub fn findings(&self) -> &[Finding] {
+        &self.findings
+    }
+
+    /// No finding that common readers stumble over: if its mesh is good, too, the file may be passed on as it is.
+    pub fn is_flawless(&self) -> bool {
+        self.findings.iter().all(|finding| finding.harmless)
+    }
+
+    /// The 80 bytes an output begins with: the input's own, changed only where they begin with `solid`.
+    pub fn output_header(&self) -> [u8; HEADER_BYTES] {
+        self.header
+    }
+
+    /// The whole input as it stands on disk, for hashing and copying.
+    pub fn bytes(&self) -> &[u8] {
+        &self.input
+    }
+
+    /// Size of the input in bytes.
+    pub fn byte_len(&self) -> u64 {
+        self.identity.size
+    }
+
+    /// The path it was opened by.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Fails if the path no longer leads to the file as it was when it was opened.
+    ///
+    /// # Errors
+    /// [`Error::Changed`] if device, inode, size, mtime or ctime differ or the file is gone; [`Error::Io`] if they cannot be
+    /// read.
+    pub fn check_unchanged(&self) -> Result<()> {
+        match std::fs::metadata(&self.path) {
+            Ok(metadata) if Identity::of(&metadata) == self.identity => Ok(()),
+            Ok(_) => Err(Error::Changed { path: self.path.clone() }),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Err(Error::Changed { path: self.path.clone() }),
+            Err(error) => Err(Error::io(&self.path, "checking")(error)),
+        }
+    }
+}
+
+/// Opens a regular file without ever waiting for one: a named pipe would block an ordinary open until someone writes to it.
+fn open_regular(path: &Path) -> Result<(File, Identity)> {
+    let no_wait = rustix::fs::OFlags::NONBLOCK.bits() as i32;
+    let file = OpenOptions::new().read(true).custom_flags(no_wait).open(path).map_err(Error::io(path, "opening"))?;
+    let metadata = file.metadata().map_err(Error::io(path, "opening"))?;
+    let reason = match metadata.file_type() {
+        kind if kind.is_file() => return Ok((file, Identity::of(&metadata))),
+        kind if kind.is_dir() => "a folder",
+        _ => "a pipe or device, not a file",
+    };
+    Err(Rejection::Unreadable(reason.into()).at(path))
+}
+
+#[cfg(test)]
+mod tests;

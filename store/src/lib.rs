@@ -1,1 +1,21 @@
-//! Durable job state.
+//! Durable job state: what is known about every dropped file, kept so that a power cut loses nothing that was acknowledged.
+//!
+//! * [`job`] is the pure state machine: which event may follow which state, who is to blame, when to try again. No I/O.
+//! * [`store`] is the [`JobStore`] trait, what a queue must promise; [`MemoryStore`] is its model, [`SledStore`] the embedded
+//!   default. A shared queue can stand in: claims are fenced by tokens, transitions are compare-and-set, submission is
+//!   idempotent.
+//! * [`crash`] holds the crash points that the tests of store and daemon kill the process at.
+//!
+//! The store is the index, the file system is the evidence: it never says more than what the files can confirm.
+
+pub mod crash;
+pub mod id;
+pub mod job;
+pub mod path;
+pub mod store;
+
+pub use crash::crash_point;
+pub use id::{Attempt, Clock, Epoch, Hash, JobId, Seq, SystemClock, Time, Token};
+pub use job::{Ending, Job, Kind, Publication, Source, State, Step};
+pub use path::RelPath;
+pub use store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted};

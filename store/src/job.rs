@@ -1,0 +1,495 @@
+//! The job state machine: what may happen to a dropped file, in which order, and who is to blame. Pure: no I/O, no clock.
+//!
+//! ```text
+//!  Noticed                                        (a format that is not ours: left where it is)
+//!
+//!  Queued ──claim──► Running ──intend──► Publishing ──placed──► Published ──finished──► Ended
+//!    ▲ ▲                │ │                 ▲  │
+//!    │ └──died, back────┘ └─condemned─► Concluded (result known, no worker needed, names not yet chosen)
+//!    └───retry (operator)── Ended (not good), Cancelled
+//! ```
+//! What the outside world owes a job follows from its state alone ([`Job::duty`]), so that recovery after a crash is the same
+//! code as normal work.
+//!
+//! **Blame.** An attempt is counted when it is claimed, before its worker starts, and is never taken back. It is *charged* to
+//! the file when the worker died of the file: a signal of its own making, the time limit, the memory limit. The second charge
+//! quarantines. A kill from outside is never charged. When the daemon dies, its running jobs are interrupted; after the second
+//! such death a job is a *suspect* and must run alone; a file that was alone in [`DEATHS_ALONE`] deaths of the daemon, or in
+//! charges and deaths alone together reached three, is quarantined. A death for which there is a witness that the file was
+//! innocent (its worker outlived the daemon) leaves no mark.
+
+use serde::{Deserialize, Serialize};
+
+use crate::id::{Attempt, Epoch, Hash, JobId, Seq, Time, Token};
+use crate::path::RelPath;
+
+mod step;
+pub use step::{Event, Illegal};
+
+/// Charged attempts after which a file is quarantined.
+pub const CHARGES: u32 = 2;
+/// Deaths of the daemon, with this file the only one running, after which it is quarantined.
+pub const DEATHS_ALONE: u32 = 3;
+/// Deaths of the daemon, in company or not, after which a file must run alone.
+pub const DEATHS_TO_SUSPECT: u32 = 2;
+/// How often an error of the environment is tried again.
+pub const ENVIRONMENT_RETRIES: u32 = 5;
+/// Kills from outside after which the next start waits; they never end a job.
+pub const KILLS_FREE: u32 = 3;
+/// First pause after an error of the environment; doubles each time.
+pub const BACKOFF_MS: u64 = 30_000;
+/// Longest pause.
+pub const BACKOFF_CAP_MS: u64 = 30 * 60_000;
+
+/// The dropped file, as it was when it came to rest.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Source {
+    /// Name of the hot folder in the daemon's settings.
+    pub folder: String,
+    /// Below the folder's `in/`.
+    pub path: RelPath,
+    pub dev: u64,
+    pub ino: u64,
+    /// Bytes.
+    pub size: u64,
+    /// Nanoseconds since 1970.
+    pub mtime_ns: i64,
+    /// Profile to repair it with.
+    pub profile: String,
+}
+
+/// Part of a hot folder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Area {
+    In,
+    Done,
+    Failed,
+    Quarantine,
+}
+
+/// Result of a job: it is on disk, and nothing more will be done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Ending {
+    /// Good as it came.
+    Clean,
+    /// Repaired, and good.
+    Repaired,
+    /// Repaired, but a person must look.
+    NeedsReview,
+    /// Not good under the profile after all repairs.
+    NotGood,
+    /// No mesh we can read.
+    Unreadable,
+    /// Beyond a stated limit.
+    Refused,
+    /// The world around the file failed too often.
+    Environment,
+    /// It killed its worker, or the daemon, too often.
+    Quarantined,
+}
+
+impl Ending {
+    /// Where the original goes.
+    pub fn area(self) -> Area {
+        match self {
+            Self::Clean | Self::Repaired => Area::Done,
+            Self::NeedsReview | Self::NotGood | Self::Unreadable | Self::Refused | Self::Environment => Area::Failed,
+            Self::Quarantined => Area::Quarantine,
+        }
+    }
+
+    /// Does its result belong into `out/`?
+    pub fn is_good(self) -> bool {
+        self.area() == Area::Done
+    }
+
+    /// Reached without a result of the engine: there is nothing that running again after lost files would bring back.
+    fn is_condemned(self) -> bool {
+        matches!(self, Self::Quarantined | Self::Environment)
+    }
+}
+
+/// The intent: which files a finished job leaves, under which names. Durable before the first of them is moved.
+///
+/// A good result stands in `out/`, any other (the best attempt) in the area of its ending. Report and receipt take their names
+/// from the output's, or from the original's where there is no output.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Publication {
+    pub ending: Ending,
+    /// One line for people; empty when there is nothing to add. Cut to [`MAX_REASON`] bytes.
+    pub reason: String,
+    /// The repaired mesh.
+    pub output: Option<RelPath>,
+    pub output_hash: Option<Hash>,
+    pub report_hash: Option<Hash>,
+    /// Name of the original in the area of the ending; `None` where originals stay in `in/`.
+    pub original: Option<RelPath>,
+}
+
+/// Longest reason kept, in bytes.
+pub const MAX_REASON: usize = 200;
+
+/// Cuts `text` to one line of at most [`MAX_REASON`] bytes.
+pub fn one_line(text: &str) -> String {
+    let clean: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    clean.get(..clean.floor_char_boundary(MAX_REASON)).unwrap_or_default().to_owned()
+}
+
+/// Why a job was cancelled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Withdrawal {
+    /// An operator said so. The file stays where it is, and is not taken again until a retry.
+    Operator,
+    /// The file changed; what it became is a new drop with a job of its own.
+    Changed,
+    /// The file is gone.
+    Vanished,
+}
+
+/// Who works on a job, and in which life of the daemon.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Hold {
+    pub attempt: Attempt,
+    pub epoch: Epoch,
+    pub token: Token,
+    /// Nothing else may run meanwhile: this job is suspected of killing the daemon.
+    pub alone: bool,
+}
+
+/// Where a job stands.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum State {
+    /// A file of a format that is not repaired: left where it is, named once. `reason` says what it is.
+    Noticed { reason: String },
+    /// Waiting to be claimed; not before `not_before`, if there is one.
+    Queued { not_before: Option<Time> },
+    /// Claimed: a worker runs, or is about to, or has just ended. `cancel`: an operator wants it stopped.
+    Running { hold: Hold, cancel: bool },
+    /// The result is known and needs no worker; its names are not chosen yet.
+    Concluded { hold: Hold, ending: Ending, reason: String },
+    /// The intent is durable; files are being put in place.
+    Publishing { hold: Hold, publication: Publication },
+    /// The result is in place; the original has still to be moved.
+    Published { hold: Hold, publication: Publication },
+    /// Result and original are in place.
+    Ended { publication: Publication },
+    /// Taken back.
+    Cancelled { why: Withdrawal },
+}
+
+/// [`State`] without its data, endings told apart: what lists and counters show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    Noticed,
+    /// Queued, and may be claimed.
+    Queued,
+    /// Queued, after a pause.
+    Waiting,
+    /// Queued, but must run alone.
+    Suspect,
+    Running,
+    Concluded,
+    Publishing,
+    Published,
+    Done,
+    Failed,
+    NeedsReview,
+    Quarantined,
+    Cancelled,
+}
+
+impl Kind {
+    /// All of them, in the order of a job's life.
+    pub const ALL: [Self; 13] = [
+        Self::Noticed,
+        Self::Queued,
+        Self::Waiting,
+        Self::Suspect,
+        Self::Running,
+        Self::Concluded,
+        Self::Publishing,
+        Self::Published,
+        Self::Done,
+        Self::Failed,
+        Self::NeedsReview,
+        Self::Quarantined,
+        Self::Cancelled,
+    ];
+
+    /// The word for it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Noticed => "noticed",
+            Self::Queued => "queued",
+            Self::Waiting => "waiting",
+            Self::Suspect => "suspect",
+            Self::Running => "running",
+            Self::Concluded => "concluded",
+            Self::Publishing => "publishing",
+            Self::Published => "published",
+            Self::Done => "done",
+            Self::Failed => "failed",
+            Self::NeedsReview => "needs_review",
+            Self::Quarantined => "quarantined",
+            Self::Cancelled => "cancelled",
+        }
+    }
+
+    /// Is there something left to do without anyone asking for it?
+    pub fn is_live(self) -> bool {
+        self.is_queued() || self.is_held()
+    }
+
+    /// Waiting for a claim.
+    pub fn is_queued(self) -> bool {
+        matches!(self, Self::Queued | Self::Waiting | Self::Suspect)
+    }
+
+    /// Under a claim.
+    pub fn is_held(self) -> bool {
+        matches!(self, Self::Running | Self::Concluded | Self::Publishing | Self::Published)
+    }
+}
+
+impl std::fmt::Display for Kind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// What counts against a file. Reset by an operator's retry.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Blame {
+    /// Attempts whose worker died of the file.
+    pub charges: u32,
+    /// Deaths of the daemon while it ran.
+    pub deaths: u32,
+    /// Those of them in which nothing else ran.
+    pub deaths_alone: u32,
+    /// Errors of the environment.
+    pub environment: u32,
+    /// Kills from outside. They are counted only so that a start after many of them waits.
+    pub kills: u32,
+}
+
+impl Blame {
+    /// Must it run alone?
+    pub fn is_suspect(&self) -> bool {
+        self.deaths >= DEATHS_TO_SUSPECT
+    }
+
+    /// Has it killed too often?
+    pub fn is_condemned(&self) -> bool {
+        self.charges >= CHARGES || self.charges.saturating_add(self.deaths_alone) >= DEATHS_ALONE
+    }
+}
+
+/// How a worker process died.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Death {
+    /// By a signal of its own making (SIGSEGV, SIGBUS, SIGABRT …).
+    Signal(i32),
+    /// It ended with a code that is none of its protocol's (a panic).
+    Exit(i32),
+    /// It reached its time limit.
+    TimeLimit,
+    /// It reached its memory limit.
+    MemoryLimit,
+    /// It was killed from outside (SIGKILL, SIGTERM), not by one of our limits.
+    Killed(i32),
+}
+
+impl Death {
+    /// Did the worker die of the file?
+    pub fn is_charged(self) -> bool {
+        !matches!(self, Self::Killed(_))
+    }
+}
+
+impl std::fmt::Display for Death {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Signal(signal) => write!(f, "its worker died of signal {signal}"),
+            Self::Exit(code) => write!(f, "its worker ended with code {code}"),
+            Self::TimeLimit => f.write_str("its worker reached the time limit"),
+            Self::MemoryLimit => f.write_str("its worker reached the memory limit"),
+            Self::Killed(signal) => write!(f, "its worker was killed from outside with signal {signal}"),
+        }
+    }
+}
+
+/// What the holder of a claim reports. Each is legal only in the state it belongs to, and only with the claim's token.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// The worker died.
+    Died(Death),
+    /// The world around the file failed (I/O, space, permission): try again later.
+    Environment { reason: String },
+    /// Stopping: the job goes back into the queue at no cost.
+    HandBack,
+    /// The worker was stopped as the operator asked, and the file is back in its place.
+    Cancelled,
+    /// The file is not the one that was submitted any more.
+    Withdrawn(Withdrawal),
+    /// The names of the result; the files are durable under temporary ones. Said again while publishing, it replaces the
+    /// earlier intent (a name was taken meanwhile).
+    Intend(Publication),
+    /// The files of the intent are in place, durably.
+    Placed,
+    /// The original will go to another name than intended, since that one was taken meanwhile.
+    Redirect { original: RelPath },
+    /// The original is in its place, durably.
+    Finished,
+    /// The intended files are neither in place nor under their temporary names: the work must be done again.
+    Lost,
+}
+
+/// What the outside world owes a job now.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Duty {
+    /// Nothing until it is claimed.
+    Queue,
+    /// Run a worker on it.
+    Run,
+    /// Stop its worker, put the file back, report [`Step::Cancelled`].
+    Stop,
+    /// Write the report, choose the names, report [`Step::Intend`].
+    Intend,
+    /// Put the files in place, report [`Step::Placed`] (or [`Step::Lost`]).
+    Place,
+    /// Move the original, report [`Step::Finished`].
+    MoveOriginal,
+    /// Nothing any more.
+    Rest,
+}
+
+/// All that is known of one dropped file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Job {
+    pub id: JobId,
+    pub source: Source,
+    /// Where the original is while no claim holds it, if it is not at its source (after a retry of a failed job).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moved_to: Option<(Area, RelPath)>,
+    pub state: State,
+    /// Attempts so far.
+    pub attempts: Attempt,
+    pub blame: Blame,
+    /// Token of the last claim, whose work folder may still be there.
+    pub work: Option<Token>,
+    /// Why the last attempt came back; for people.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub note: String,
+    pub submitted: Time,
+    pub changed: Time,
+    /// The transition that made it what it is.
+    pub seq: Seq,
+}
+
+impl Job {
+    /// A file that was just found, to be repaired.
+    pub fn queued(id: JobId, source: Source, now: Time) -> Self {
+        Self::new(id, source, State::Queued { not_before: None }, now)
+    }
+
+    /// A file that was just found, of a format that is left alone.
+    pub fn noticed(id: JobId, source: Source, reason: &str, now: Time) -> Self {
+        Self::new(id, source, State::Noticed { reason: one_line(reason) }, now)
+    }
+
+    fn new(id: JobId, source: Source, state: State, now: Time) -> Self {
+        Self {
+            id,
+            source,
+            moved_to: None,
+            state,
+            attempts: Attempt(0),
+            blame: Blame::default(),
+            work: None,
+            note: String::new(),
+            submitted: now,
+            changed: now,
+            seq: Seq(0),
+        }
+    }
+
+    /// The state without its data.
+    pub fn kind(&self) -> Kind {
+        match &self.state {
+            State::Noticed { .. } => Kind::Noticed,
+            State::Queued { not_before: Some(_) } => Kind::Waiting,
+            State::Queued { not_before: None } if self.blame.is_suspect() => Kind::Suspect,
+            State::Queued { not_before: None } => Kind::Queued,
+            State::Running { .. } => Kind::Running,
+            State::Concluded { .. } => Kind::Concluded,
+            State::Publishing { .. } => Kind::Publishing,
+            State::Published { .. } => Kind::Published,
+            State::Ended { publication } => match publication.ending {
+                Ending::Clean | Ending::Repaired => Kind::Done,
+                Ending::NeedsReview => Kind::NeedsReview,
+                Ending::Quarantined => Kind::Quarantined,
+                Ending::NotGood | Ending::Unreadable | Ending::Refused | Ending::Environment => Kind::Failed,
+            },
+            State::Cancelled { .. } => Kind::Cancelled,
+        }
+    }
+
+    /// The claim on it, if there is one.
+    pub fn hold(&self) -> Option<&Hold> {
+        match &self.state {
+            State::Running { hold, .. }
+            | State::Concluded { hold, .. }
+            | State::Publishing { hold, .. }
+            | State::Published { hold, .. } => Some(hold),
+            State::Noticed { .. } | State::Queued { .. } | State::Ended { .. } | State::Cancelled { .. } => None,
+        }
+    }
+
+    /// What is to be done for it.
+    pub fn duty(&self) -> Duty {
+        match &self.state {
+            State::Queued { .. } => Duty::Queue,
+            State::Running { cancel: false, .. } => Duty::Run,
+            State::Running { cancel: true, .. } => Duty::Stop,
+            State::Concluded { .. } => Duty::Intend,
+            State::Publishing { .. } => Duty::Place,
+            State::Published { .. } => Duty::MoveOriginal,
+            State::Noticed { .. } | State::Ended { .. } | State::Cancelled { .. } => Duty::Rest,
+        }
+    }
+
+    /// May it be claimed at `now`? A pause that ends later than the longest pause from now was set by a clock that has jumped;
+    /// it is over.
+    pub fn is_due(&self, now: Time) -> bool {
+        match self.state {
+            State::Queued { not_before: None } => true,
+            State::Queued { not_before: Some(then) } => then <= now || then > now.plus_ms(BACKOFF_CAP_MS),
+            _ => false,
+        }
+    }
+
+    /// Where the original is while no claim holds it: area and path in it.
+    pub fn original(&self) -> (Area, &RelPath) {
+        match (&self.state, &self.moved_to) {
+            (State::Ended { publication: Publication { ending, original: Some(original), .. } }, _) => (ending.area(), original),
+            (_, Some((area, path))) => (*area, path),
+            (_, None) => (Area::In, &self.source.path),
+        }
+    }
+
+    /// Is the same file, seen in `in/` again, this job's? Not when the job's own original was moved away (someone moved it
+    /// back: a new drop), or when the job ended because the file went.
+    pub fn answers_for_source(&self) -> bool {
+        match &self.state {
+            State::Ended { publication } => publication.original.is_none(),
+            State::Cancelled { why } => *why == Withdrawal::Operator && self.moved_to.is_none(),
+            _ => self.moved_to.is_none(),
+        }
+    }
+}

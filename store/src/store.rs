@@ -1,0 +1,223 @@
+//! What a durable job queue must promise.
+
+use std::path::PathBuf;
+
+use crate::id::{Epoch, JobId, Seq, Token};
+use crate::job::{Illegal, Job, Kind, Source, Step};
+
+/// A durable job queue. A returned `Ok` means that the change survives a crash of process or machine; an `Err` that it did not
+/// happen or, for [`StoreError::Backend`], [`StoreError::Io`] and [`StoreError::Poisoned`] only, that this is unknown until the
+/// store is opened again. Calls may come from any thread; calls at the same time share the cost of becoming durable.
+pub trait JobStore: Send + Sync {
+    /// Takes found files in, all of them in one durable step where possible. Idempotent: a file that a job answers for already
+    /// gets that job's number. Answers in the order of `found`.
+    ///
+    /// # Errors
+    /// [`StoreError::TooLong`] names a file whose path, folder or profile does not fit a record; nothing is taken in then.
+    fn submit(&self, found: &[Submission]) -> Result<Vec<Submitted>, StoreError>;
+
+    /// Claims the oldest job that `want` allows, counting the attempt. `None` when there is none. With `want.suspects` only
+    /// jobs that must run alone are given; the caller sees to it that nothing else runs.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn claim(&self, want: &Filter) -> Result<Option<Claim>, StoreError>;
+
+    /// Does the claim still hold, and does anyone want it stopped? Extends the claim where claims expire.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError>;
+
+    /// Makes the next transition durable, and returns the job after it: its duty says what to do next, its hold whether the
+    /// claim goes on.
+    ///
+    /// # Errors
+    /// [`StoreError::Illegal`] when the claim is void ([`Illegal::Fenced`]) or the step does not belong to the state.
+    fn advance(&self, claim: &Claim, step: Step) -> Result<Job, StoreError>;
+
+    /// An operator's wish.
+    ///
+    /// # Errors
+    /// [`StoreError::Unknown`], or [`StoreError::Illegal`] when it is too late for it.
+    fn control(&self, id: JobId, wish: Control) -> Result<Job, StoreError>;
+
+    /// Takes back the claims of a daemon that died. Running jobs are interrupted: each is afterwards queued, cancelled, or
+    /// concluded (quarantined). Jobs whose result was on its way come with a new claim, and their duty is to be done.
+    /// `innocent` is asked once for each running job: `true` where there is evidence that the file did not kill the daemon.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn recover(&self, innocent: &dyn Fn(&Job) -> bool) -> Result<Vec<Recovered>, StoreError>;
+
+    /// One job.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn get(&self, id: JobId) -> Result<Option<Job>, StoreError>;
+
+    /// Jobs by number, ascending.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn list(&self, query: &Query) -> Result<Vec<Job>, StoreError>;
+
+    /// How many jobs there are of each kind, in the order of [`Kind::ALL`].
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError>;
+}
+
+/// A file that was found.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Submission {
+    pub source: Source,
+    /// `Some`: not a format that is repaired; what it is instead. It is recorded and left where it is.
+    pub foreign: Option<String>,
+}
+
+/// What became of a submission.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Submitted {
+    pub id: JobId,
+    /// `false`: the job was there already.
+    pub new: bool,
+}
+
+/// Which jobs to claim.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Filter {
+    /// Smallest and largest size of the source in bytes, both included.
+    pub size: (u64, u64),
+    /// `false`: only jobs that may run beside others. `true`: only jobs that must run alone.
+    pub suspects: bool,
+}
+
+impl Default for Filter {
+    /// Any size, beside others.
+    fn default() -> Self {
+        Self { size: (0, u64::MAX), suspects: false }
+    }
+}
+
+/// The right to work on a job, until it ends, is handed back, or the daemon dies.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Claim {
+    pub id: JobId,
+    pub token: Token,
+    /// The job as it was claimed.
+    pub job: Job,
+}
+
+/// State of a claim.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lease {
+    /// Go on.
+    Held,
+    /// An operator wants the job stopped.
+    Cancel,
+    /// Someone else has the job, or no one; stop and touch nothing.
+    Lost,
+}
+
+/// An operator's wish.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Control {
+    /// Try again: a job that ended without a good result, was cancelled, or waits. Its blame is forgotten.
+    Retry,
+    /// Stop: a queued job at once, a running one as soon as its worker is stopped.
+    Cancel,
+    /// Drop a noticed file that is gone.
+    Forget,
+}
+
+/// A job whose daemon died.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Recovered {
+    /// After recovery; [`Job::work`] still names the work folder of the claim that is void now.
+    pub job: Job,
+    /// The token of the claim that is void now.
+    pub void: Token,
+    /// The new claim, when there is something to finish.
+    pub claim: Option<Claim>,
+}
+
+/// Which jobs to list.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Query {
+    /// Of these kinds; empty: of any.
+    pub kinds: Vec<Kind>,
+    /// With a larger number than this.
+    pub after: JobId,
+    /// At most so many; 0: all.
+    pub limit: usize,
+}
+
+/// What can go wrong with a store.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// Another daemon owns the state folder.
+    #[error("{} is owned by another daemon{}", path.display(), pid.map(|pid| format!(" (process {pid})")).unwrap_or_default())]
+    Locked { path: PathBuf, pid: Option<u32> },
+
+    /// A file of the state folder could not be read or written.
+    #[error("{}: {action} failed: {source}", path.display())]
+    Io { path: PathBuf, action: &'static str, source: std::io::Error },
+
+    /// The database failed.
+    #[error("the job database failed: {0}")]
+    Backend(#[source] sled::Error),
+
+    /// An earlier error left the database in doubt; it must be opened again.
+    #[error("the job database must be opened again after an error: {reason}")]
+    Poisoned { reason: String },
+
+    /// A record is damaged: its checksum, its version or its content is wrong.
+    #[error("the job database holds a damaged record ({what}): {reason}")]
+    Corrupt { what: String, reason: String },
+
+    /// The database was written by a newer version of this program.
+    #[error("the job database has version {found}; this program knows versions up to {known}")]
+    Newer { found: u16, known: u16 },
+
+    /// The database opens, but lacks transitions that were acknowledged.
+    #[error(
+        "{}: the job database went back in time: it ends at epoch {}, transition {}, but epoch {}, transition {} were reached; {advice}",
+        path.display(), found.0, found.1, reached.0, reached.1
+    )]
+    RolledBack { path: PathBuf, found: (Epoch, Seq), reached: (Epoch, Seq), advice: String },
+
+    /// The database does not open, and no older state of it would be the truth.
+    #[error("{}: the job database is damaged: {reason}; {advice}", path.display())]
+    Unusable { path: PathBuf, reason: String, advice: String },
+
+    /// There is no such job.
+    #[error("there is no job {0}")]
+    Unknown(JobId),
+
+    /// The transition is not possible.
+    #[error("job {id}: {source}")]
+    Illegal { id: JobId, source: Illegal },
+
+    /// Does not fit a record.
+    #[error("{what} is too long to be recorded")]
+    TooLong { what: String },
+}
+
+impl StoreError {
+    /// The process's exit code for it: 73 when another daemon owns the state folder, 75 when the store cannot be used (trying
+    /// again may help), 2 for what only this call got wrong.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Locked { .. } => 73,
+            Self::Unknown(_) | Self::Illegal { .. } | Self::TooLong { .. } => 2,
+            _ => 75,
+        }
+    }
+
+    /// Was only this call wrong, so that the store itself is sound?
+    pub fn is_callers(&self) -> bool {
+        self.exit_code() == 2
+    }
+}

@@ -4,6 +4,7 @@
 //! It knows no daemon and no store. The two entry points are [`inspect`] and [`repair`].
 
 pub mod error;
+pub mod fill;
 pub mod read;
 pub mod record;
 pub mod report;

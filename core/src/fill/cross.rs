@@ -1,0 +1,175 @@
+//! How two triangles meet, decided exactly.
+//!
+//! Two triangles may meet in what they share (a vertex, an edge; sharing is by equal position) and they may touch: in a
+//! point, or edge along edge. They *cross* when they meet along a segment that is inside at least one of them (so also when an
+//! edge of one lies in the face of the other), and *overlap* when they are coplanar and share an area.
+//!
+//! Triangles in different planes meet in a part of the line common to both planes; each cuts an interval out of it. The ends
+//! of these intervals lie on edges, and the order of an end on edge e and one on edge f is the sign of one determinant of the
+//! four end points (the idea of Guigue & Devillers, "Fast and Robust Triangle-Triangle Overlap Test Using Orientation
+//! Predicates", JGT 8(1), 2003), so no coordinate of an intersection is ever computed.
+
+use super::exact::{Point, side, turn};
+
+/// A triangle by the positions of its corners.
+pub type Triangle = [Point; 3];
+
+/// How two triangles meet beyond the corners they share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Contact {
+    /// Not at all.
+    Apart,
+    /// In a point, or edge along edge.
+    Touch,
+    /// Along a segment inside at least one of them.
+    Cross,
+    /// Coplanar, in an area.
+    Overlap,
+}
+
+impl Contact {
+    /// Is it a self-intersection of a mesh that has both?
+    pub fn is_crossing(self) -> bool {
+        matches!(self, Self::Cross | Self::Overlap)
+    }
+}
+
+/// The contact of two triangles; exact for all finite coordinates. A triangle of zero area meets nothing.
+pub fn triangles_cross(a: &Triangle, b: &Triangle) -> Contact {
+    for k in 0..3 {
+        let range = |t: &Triangle| (t[0][k].min(t[1][k]).min(t[2][k]), t[0][k].max(t[1][k]).max(t[2][k]));
+        let ((a_lo, a_hi), (b_lo, b_hi)) = (range(a), range(b));
+        if a_hi < b_lo || b_hi < a_lo {
+            return Contact::Apart;
+        }
+    }
+    let shared = a.iter().filter(|p| b.contains(p)).count();
+    let of_b = b.map(|p| if a.contains(&p) { 0 } else { side(&a[0], &a[1], &a[2], &p) });
+    if one_sided(of_b) {
+        return Contact::Apart;
+    }
+    if of_b == [0; 3] {
+        return coplanar(a, b, shared);
+    }
+    if shared >= 2 {
+        return Contact::Apart;
+    }
+    let of_a = a.map(|p| if b.contains(&p) { 0 } else { side(&b[0], &b[1], &b[2], &p) });
+    // All zero although b is not in a's plane: b has no area.
+    if one_sided(of_a) || of_a == [0; 3] {
+        return Contact::Apart;
+    }
+    on_common_line(&Cut::new(a, of_a), &Cut::new(b, of_b), shared)
+}
+
+fn one_sided(signs: [i8; 3]) -> bool {
+    signs.iter().all(|&s| s > 0) || signs.iter().all(|&s| s < 0)
+}
+
+/// The interval that a triangle cuts out of the line common to both planes.
+struct Cut<'a> {
+    /// Edges on which the interval's two ends lie, each from the lower to the higher side of the other plane.
+    ends: [[&'a Point; 2]; 2],
+    /// The interval is one point: a corner.
+    point: bool,
+    /// The interval is an edge of the triangle.
+    edge: bool,
+}
+
+impl<'a> Cut<'a> {
+    /// `signs`: sides of the other triangle's plane on which the corners lie; neither all equal nor all zero.
+    fn new(t: &'a Triangle, signs: [i8; 3]) -> Self {
+        let count = |s: i8| signs.iter().filter(|&&x| x == s).count();
+        // The corner whose two edges hold the two ends.
+        let alone = if count(1) == 1 {
+            1
+        } else if count(-1) == 1 {
+            -1
+        } else {
+            0
+        };
+        let apex = signs.iter().position(|&s| s == alone).unwrap_or(0);
+        let end = |other: usize| if signs[apex] > signs[other] { [&t[other], &t[apex]] } else { [&t[apex], &t[other]] };
+        Self { ends: [end((apex + 1) % 3), end((apex + 2) % 3)], point: alone == 0, edge: count(0) == 2 }
+    }
+}
+
+fn on_common_line(a: &Cut<'_>, b: &Cut<'_>, shared: usize) -> Contact {
+    // Lines through the ends lie in different planes and cross the common line upwards, so the sign of the determinant says
+    // which end comes first, the same way round for all pairs.
+    let mut order = [0_i8; 4];
+    for (k, o) in order.iter_mut().enumerate() {
+        let (e, f) = (a.ends[k / 2], b.ends[k % 2]);
+        *o = side(e[0], e[1], f[0], f[1]);
+    }
+    let (below, above) = (order.iter().any(|&o| o < 0), order.iter().any(|&o| o > 0));
+    if below != above && !order.contains(&0) {
+        return Contact::Apart;
+    }
+    if a.point || b.point || !(below && above) {
+        return if shared > 0 { Contact::Apart } else { Contact::Touch };
+    }
+    if a.edge && b.edge { Contact::Touch } else { Contact::Cross }
+}
+
+/// Both in one plane, or `a` without area.
+fn coplanar(a: &Triangle, b: &Triangle, shared: usize) -> Contact {
+    // Looking down an axis along which `a` shows an area keeps what is in its plane apart.
+    let Some(axis) = (0..3).find(|&k| turn(&a[0], &a[1], &a[2], k) != 0) else { return Contact::Apart };
+    let (of_a, of_b) = (turn(&a[0], &a[1], &a[2], axis), turn(&b[0], &b[1], &b[2], axis));
+    if of_b == 0 {
+        return Contact::Apart;
+    }
+    if shared == 3 {
+        return Contact::Overlap;
+    }
+    // Convex polygons are apart, or only touch, exactly when an edge of one has the other beyond, or beyond or on it.
+    let mut deepest = 1;
+    for (x, y, sense) in [(a, b, of_a), (b, a, of_b)] {
+        for k in 0..3 {
+            let inner = y.iter().map(|p| sense * turn(&x[k], &x[(k + 1) % 3], p, axis)).max();
+            deepest = deepest.min(inner.unwrap_or(0));
+        }
+    }
+    match (deepest, shared) {
+        (1, _) => Contact::Overlap,
+        (0, 0) => Contact::Touch,
+        (0, 1) if along_each_other(a, b, axis) => Contact::Touch,
+        _ => Contact::Apart,
+    }
+}
+
+/// Coplanar triangles with one common corner and disjoint interiors: do edges from that corner run along each other?
+fn along_each_other(a: &Triangle, b: &Triangle, axis: usize) -> bool {
+    let Some((i, j)) = (0..3).find_map(|i| b.iter().position(|q| *q == a[i]).map(|j| (i, j))) else { return false };
+    let apex = &a[i];
+    let ahead = |p: &Point, q: &Point| (0..3).any(|k| (p[k] > apex[k] && q[k] > apex[k]) || (p[k] < apex[k] && q[k] < apex[k]));
+    (1..3).any(|s| {
+        let p = &a[(i + s) % 3];
+        (1..3).any(|t| {
+            let q = &b[(j + t) % 3];
+            turn(apex, p, q, axis) == 0 && ahead(p, q)
+        })
+    })
+}
+
+/// Does the segment pass through the inside of the triangle, or along it? Touching (an end in the plane, a point of the
+/// triangle's border) is not passing. Exact.
+pub fn segment_pierces(a: &Point, b: &Point, t: &Triangle) -> bool {
+    for k in 0..3 {
+        let (lo, hi) = (t[0][k].min(t[1][k]).min(t[2][k]), t[0][k].max(t[1][k]).max(t[2][k]));
+        if a[k].max(b[k]) < lo || a[k].min(b[k]) > hi {
+            return false;
+        }
+    }
+    let (at_a, at_b) = (side(&t[0], &t[1], &t[2], a), side(&t[0], &t[1], &t[2], b));
+    if at_a != 0 || at_b != 0 {
+        let turns = || [0, 1, 2].map(|k| side(a, b, &t[k], &t[(k + 1) % 3]));
+        return at_a * at_b < 0 && one_sided(turns());
+    }
+    let Some(axis) = (0..3).find(|&k| turn(&t[0], &t[1], &t[2], k) != 0) else { return false };
+    let sense = turn(&t[0], &t[1], &t[2], axis);
+    let beyond = |k: usize| [a, b].iter().all(|p| sense * turn(&t[k], &t[(k + 1) % 3], p, axis) <= 0);
+    let across = t.map(|p| turn(a, b, &p, axis));
+    !(0..3).any(beyond) && across.contains(&1) && across.contains(&-1)
+}

@@ -1,0 +1,196 @@
+//! Closing one boundary loop with triangles between its vertices.
+//!
+//! A loop of n vertices takes n − 2 triangles and no new vertex: a triangulated polygon. Four ways are tried, and the first
+//! patch that stands the exact tests of [`Rim::accepts`] wins: the triangle itself; a constrained Delaunay triangulation in
+//! the plane of a nearly planar loop ([`planar`]); the minimum-weight triangulation by dynamic programming for loops of some
+//! hundred vertices ([`minweight`]); an advancing front beyond ([`front`]). Floating point only ever ranks patches; whether one
+//! is valid is decided with exact predicates, and every ranking uses + − × ÷ √ alone, so results are the same everywhere.
+
+pub mod cross;
+pub mod exact;
+mod planar;
+pub mod tree;
+
+use cross::{Contact, triangles_cross};
+use exact::{Point, collinear};
+use tree::{SelfCrossing, self_crossing};
+
+/// A boundary loop and what its patch must respect.
+pub struct Rim<'a> {
+    /// Distinct finite positions, in the direction in which the patch traverses the loop: rim edge i runs from vertex i to
+    /// vertex i + 1 (the last one back to 0).
+    pub points: &'a [Point],
+    /// For each rim edge the third corner of the mesh's triangle on its other side, where known; may be shorter than the loop.
+    /// The patch then never folds back flat onto these triangles, and bends little against them.
+    pub apexes: &'a [Option<Point>],
+    /// Is the chord between these two vertices (smaller index first) an edge of the mesh already? Never asked of rim edges.
+    pub forbidden: &'a dyn Fn(u32, u32) -> bool,
+}
+
+/// Bounds of the methods. They decide results, so they are part of what makes a repair repeatable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FillSettings {
+    /// A loop is nearly planar when the root mean square of its vertices' distances from its plane is at most this share of the
+    /// square root of the area that it encloses in projection. (A circle of radius r: 0.02 allows 0.035 r.)
+    pub planar_deviation: f64,
+    /// Largest loop for the minimum-weight triangulation: O(n³) time, O(n²) memory.
+    pub minimum_weight_vertices: usize,
+    /// Largest loop at all.
+    pub max_vertices: usize,
+}
+
+impl Default for FillSettings {
+    fn default() -> Self {
+        Self { planar_deviation: 0.02, minimum_weight_vertices: 300, max_vertices: 100_000 }
+    }
+}
+
+/// How a patch was made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// The loop has three vertices.
+    Triangle,
+    /// Constrained Delaunay triangulation in the loop's plane.
+    Planar,
+}
+
+impl Method {
+    /// Name for reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Triangle => "triangle",
+            Self::Planar => "planar",
+        }
+    }
+}
+
+/// Triangles that close a loop.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Patch {
+    /// Vertex indices; each triangle begins with its smallest, and they are sorted.
+    pub triangles: Vec<[u32; 3]>,
+    pub method: Method,
+}
+
+/// Why a loop was not closed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Unfillable {
+    /// Fewer than three vertices, a position that occurs twice, or a coordinate that is not finite.
+    #[error("not a loop of distinct finite vertices")]
+    NotALoop,
+    /// All vertices lie exactly on one line: any triangle would have zero area. Split the neighbours instead.
+    #[error("all vertices lie on one line")]
+    Collinear,
+    /// More vertices than the settings allow.
+    #[error("more vertices than the settings allow")]
+    TooLarge,
+    /// Every patch tried crosses itself.
+    #[error("every patch tried crosses itself")]
+    CrossesItself,
+    /// Chords that are edges of the mesh already, or the triangles around the loop, leave no patch that was tried.
+    #[error("edges or triangles of the mesh around are in the way of every patch tried")]
+    Blocked,
+}
+
+/// Closes one loop. Deterministic; see the methods for their cost.
+pub fn triangulate(rim: &Rim<'_>, settings: &FillSettings) -> Result<Patch, Unfillable> {
+    if !rim.is_loop() {
+        return Err(Unfillable::NotALoop);
+    }
+    if rim.len() > settings.max_vertices {
+        return Err(Unfillable::TooLarge);
+    }
+    if rim.on_one_line() {
+        return Err(Unfillable::Collinear);
+    }
+    if rim.len() == 3 {
+        let only = [0, 1, 2];
+        return if rim.admits(only) {
+            Ok(Patch { triangles: vec![only], method: Method::Triangle })
+        } else {
+            Err(Unfillable::Blocked)
+        };
+    }
+    if let Some(triangles) = planar::triangulate(rim, settings.planar_deviation)
+        && rim.accepts(&triangles, true).is_ok()
+    {
+        return Ok(patch(triangles, Method::Planar));
+    }
+    Err(Unfillable::Blocked)
+}
+
+fn patch(mut triangles: Vec<[u32; 3]>, method: Method) -> Patch {
+    for t in &mut triangles {
+        let first = (0..3).min_by_key(|&k| t[k]).unwrap_or(0);
+        t.rotate_left(first);
+    }
+    triangles.sort_unstable();
+    Patch { triangles, method }
+}
+
+impl Rim<'_> {
+    fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    fn is_loop(&self) -> bool {
+        let mut sorted: Vec<Point> = self.points.iter().map(|p| p.map(|x| x + 0.0)).collect();
+        sorted.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])).then(a[2].total_cmp(&b[2])));
+        self.len() >= 3
+            && u32::try_from(self.len()).is_ok()
+            && sorted.iter().flatten().all(|x| x.is_finite())
+            && sorted.windows(2).all(|w| w[0] != w[1])
+    }
+
+    fn on_one_line(&self) -> bool {
+        self.points.iter().skip(2).all(|p| collinear(&self.points[0], &self.points[1], p))
+    }
+
+    fn corners(&self, t: [u32; 3]) -> [Point; 3] {
+        t.map(|v| self.points[v as usize])
+    }
+
+    /// The rim edge from `a` to `b`, by its number.
+    fn rim_edge(&self, a: u32, b: u32) -> Option<usize> {
+        let (a, b) = (a as usize, b as usize);
+        (b == (a + 1) % self.len()).then_some(a)
+    }
+
+    /// May the patch have an edge between `a` and `b`?
+    fn allows(&self, a: u32, b: u32) -> bool {
+        self.rim_edge(a, b).is_some() || self.rim_edge(b, a).is_some() || !(self.forbidden)(a.min(b), a.max(b))
+    }
+
+    /// Has the triangle an area, and is it not folded flat onto the mesh's triangle beyond one of its rim edges?
+    fn admits(&self, t: [u32; 3]) -> bool {
+        let corners = self.corners(t);
+        !collinear(&corners[0], &corners[1], &corners[2])
+            && (0..3).all(|k| {
+                let (a, b) = (t[k], t[(k + 1) % 3]);
+                let beyond = self.rim_edge(a, b).and_then(|i| self.apexes.get(i).copied().flatten());
+                beyond.is_none_or(|apex| triangles_cross(&corners, &[corners[(k + 1) % 3], corners[k], apex]) != Contact::Overlap)
+            })
+    }
+
+    /// Is this triangulation of the polygon valid: only admissible triangles and allowed chords, and nothing crosses or folds
+    /// onto itself? `graph`: it is known to be a graph over a plane, which cannot cross itself.
+    fn accepts(&self, triangles: &[[u32; 3]], graph: bool) -> Result<(), Unfillable> {
+        let chords_allowed = |t: &[u32; 3]| (0..3).all(|k| self.allows(t[k], t[(k + 1) % 3]));
+        if !triangles.iter().all(|t| self.admits(*t) && chords_allowed(t)) {
+            return Err(Unfillable::Blocked);
+        }
+        if !graph {
+            let solid: Vec<_> = triangles.iter().map(|t| self.corners(*t)).collect();
+            // Enough for any patch but one great fan after the other; a bound by count, so the same everywhere.
+            match self_crossing(&solid, 2_000_000 + 500 * solid.len() as u64) {
+                SelfCrossing::None => {}
+                SelfCrossing::Pair(..) => return Err(Unfillable::CrossesItself),
+                SelfCrossing::Undecided => return Err(Unfillable::TooLarge),
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,233 @@
+//! Every patch is checked by code of its own: integer arithmetic and brute force, nothing of the module under test.
+
+use proptest::prelude::*;
+
+use super::*;
+
+/// Positions on a grid of integers, so that i128 arithmetic is exact and degenerate situations are frequent.
+type Grid = [i32; 3];
+
+fn float(points: &[Grid]) -> Vec<Point> {
+    points.iter().map(|p| p.map(|x| x as f32)).collect()
+}
+
+fn sub(a: [i128; 3], b: [i128; 3]) -> [i128; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn cross(a: [i128; 3], b: [i128; 3]) -> [i128; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn dot(a: [i128; 3], b: [i128; 3]) -> i128 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// A point as numerators over one denominator.
+#[derive(Clone, Copy, PartialEq)]
+struct Ratio([i128; 3], i128);
+
+/// The part of a polygon where `f` (a linear function, given as normal and offset) is not negative: Sutherland & Hodgman.
+fn clip(polygon: &[Ratio], normal: [i128; 3], origin: [i128; 3]) -> Vec<Ratio> {
+    let value = |p: &Ratio| dot(normal, [0, 1, 2].map(|k| p.0[k] - origin[k] * p.1));
+    let mut kept = Vec::new();
+    for (i, p) in polygon.iter().enumerate() {
+        let q = &polygon[(i + 1) % polygon.len()];
+        let (a, b) = (value(p), value(q));
+        if a >= 0 {
+            kept.push(*p);
+        }
+        if a.signum() * b.signum() < 0 {
+            // The point p + t (q − p) with t = a·q₁ / (a·q₁ − b·p₁): values are scaled by the denominators.
+            let (s, t) = (a * q.1, b * p.1);
+            let mut r = Ratio([0, 1, 2].map(|k| s * q.0[k] * p.1 - t * p.0[k] * q.1), (s - t) * p.1 * q.1);
+            let common = r.0.iter().fold(r.1, |g, &x| gcd(g, x)) * r.1.signum();
+            r = Ratio(r.0.map(|x| x / common), r.1 / common);
+            kept.push(r);
+        }
+    }
+    kept
+}
+
+fn gcd(a: i128, b: i128) -> i128 {
+    if b == 0 { a.abs() } else { gcd(b, a % b) }
+}
+
+/// Contact of two triangles of positive area, by clipping one to the plane and the sides of the other in rational numbers.
+fn contact(a: &[Grid; 3], b: &[Grid; 3]) -> Contact {
+    let (a, b) = (a.map(|p| p.map(i128::from)), b.map(|p| p.map(i128::from)));
+    let shared: Vec<_> = a.iter().filter(|p| b.contains(p)).map(|p| Ratio(*p, 1)).collect();
+    if shared.len() == 3 {
+        return Contact::Overlap;
+    }
+    let normal = cross(sub(b[1], b[0]), sub(b[2], b[0]));
+    let mut common: Vec<Ratio> = a.iter().map(|p| Ratio(*p, 1)).collect();
+    common = clip(&clip(&common, normal, b[0]), normal.map(|x| -x), b[0]);
+    for k in 0..3 {
+        common = clip(&common, cross(normal, sub(b[(k + 1) % 3], b[k])), b[k]);
+    }
+    let mut distinct: Vec<Ratio> = Vec::new();
+    for p in common {
+        if !distinct.contains(&p) {
+            distinct.push(p);
+        }
+    }
+    let from_first = |p: &Ratio| [0, 1, 2].map(|k| p.0[k] * distinct[0].1 - distinct[0].0[k] * p.1);
+    match distinct.len() {
+        0 => Contact::Apart,
+        1 => {
+            if shared.contains(&distinct[0]) {
+                Contact::Apart
+            } else {
+                Contact::Touch
+            }
+        }
+        _ if distinct.iter().any(|p| cross(from_first(&distinct[1]), from_first(p)) != [0; 3]) => Contact::Overlap,
+        _ if shared.len() == 2 && distinct.iter().all(|p| shared.contains(p)) => Contact::Apart,
+        _ => {
+            let on_edge = |t: &[[i128; 3]; 3]| {
+                (0..3).any(|k| {
+                    let along = sub(t[(k + 1) % 3], t[k]);
+                    distinct.iter().all(|p| cross(along, [0, 1, 2].map(|c| p.0[c] - t[k][c] * p.1)) == [0; 3])
+                })
+            };
+            if on_edge(&a) && on_edge(&b) { Contact::Touch } else { Contact::Cross }
+        }
+    }
+}
+
+fn area_is_zero(t: &[Grid; 3]) -> bool {
+    let t = t.map(|p| p.map(i128::from));
+    cross(sub(t[1], t[0]), sub(t[2], t[0])) == [0; 3]
+}
+
+/// All that a patch promises.
+fn check(points: &[Grid], apexes: &[Option<Grid>], forbidden: &dyn Fn(u32, u32) -> bool, patch: &Patch) {
+    let n = points.len() as u32;
+    assert_eq!(patch.triangles.len() as u32, n - 2, "{patch:?}");
+    // Directed edges: each rim edge once and forwards, each chord once each way. With n − 2 triangles on n vertices and one
+    // connected piece that is a disc: V − E + F = n − (2n − 3) + (n − 2) = 1.
+    let mut edges: Vec<(u32, u32)> = patch.triangles.iter().flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]).collect();
+    edges.sort_unstable();
+    assert!(edges.windows(2).all(|w| w[0] != w[1]), "an edge is used twice in one direction");
+    for i in 0..n {
+        assert!(edges.binary_search(&(i, (i + 1) % n)).is_ok(), "rim edge {i} is missing");
+    }
+    let mut chords = 0;
+    for &(a, b) in edges.iter().filter(|(a, b)| (a + 1) % n != *b) {
+        assert!(edges.binary_search(&(b, a)).is_ok(), "chord {a}-{b} has one side");
+        assert!(!forbidden(a.min(b), a.max(b)), "chord {a}-{b} is forbidden");
+        chords += 1;
+    }
+    assert_eq!(chords, 2 * (n - 3));
+    let mut reached = vec![false; patch.triangles.len()];
+    let mut stack = vec![0];
+    while let Some(i) = stack.pop() {
+        if !std::mem::replace(&mut reached[i], true) {
+            let shares = |t: &[u32; 3]| patch.triangles[i].iter().filter(|v| t.contains(v)).count() == 2;
+            stack.extend(patch.triangles.iter().enumerate().filter(|(_, t)| shares(t)).map(|(j, _)| j));
+        }
+    }
+    assert!(reached.iter().all(|&r| r), "the patch is in pieces");
+    let corners: Vec<[Grid; 3]> = patch.triangles.iter().map(|t| t.map(|v| points[v as usize])).collect();
+    for (i, a) in corners.iter().enumerate() {
+        assert!(!area_is_zero(a), "triangle {:?} has no area", patch.triangles[i]);
+        for (j, b) in corners.iter().enumerate().skip(i + 1) {
+            let met = contact(a, b);
+            assert!(!met.is_crossing(), "{:?} and {:?}: {met:?}", patch.triangles[i], patch.triangles[j]);
+        }
+        for k in 0..3 {
+            let (a, b) = (patch.triangles[i][k], patch.triangles[i][(k + 1) % 3]);
+            if (a + 1) % n == b
+                && let Some(Some(apex)) = apexes.get(a as usize)
+            {
+                let beyond = [points[b as usize], points[a as usize], *apex];
+                assert!(area_is_zero(&beyond) || contact(&corners[i], &beyond) != Contact::Overlap, "folded onto the mesh");
+            }
+        }
+    }
+}
+
+fn fill(points: &[Grid], apexes: &[Option<Grid>], forbidden: &dyn Fn(u32, u32) -> bool) -> Result<Patch, Unfillable> {
+    let apex_positions: Vec<_> = apexes.iter().map(|a| a.map(|p| p.map(|x| x as f32))).collect();
+    let rim = Rim { points: &float(points), apexes: &apex_positions, forbidden };
+    let result = triangulate(&rim, &FillSettings::default());
+    if let Ok(patch) = &result {
+        check(points, apexes, forbidden, patch);
+    }
+    result
+}
+
+fn free(_: u32, _: u32) -> bool {
+    false
+}
+
+#[test]
+fn three_vertices_are_one_triangle_or_a_needle() {
+    let patch = fill(&[[0, 0, 0], [4, 0, 0], [0, 4, 0]], &[], &free).unwrap();
+    assert_eq!((patch.triangles, patch.method), (vec![[0, 1, 2]], Method::Triangle));
+    assert_eq!(fill(&[[0, 0, 0], [4, 4, 4], [1, 1, 1]], &[], &free), Err(Unfillable::Collinear));
+    assert_eq!(fill(&[[0, 0, 0], [4, 4, 4], [1, 1, 1], [2, 2, 2]], &[], &free), Err(Unfillable::Collinear));
+}
+
+#[test]
+fn what_is_no_loop_is_refused() {
+    assert_eq!(fill(&[[0, 0, 0], [4, 0, 0]], &[], &free), Err(Unfillable::NotALoop));
+    assert_eq!(fill(&[[0, 0, 0], [4, 0, 0], [4, 4, 0], [4, 0, 0]], &[], &free), Err(Unfillable::NotALoop));
+    let rim = Rim { points: &[[0.0; 3], [1.0, f32::NAN, 0.0], [0.0, 1.0, 0.0]], apexes: &[], forbidden: &free };
+    assert_eq!(triangulate(&rim, &FillSettings::default()), Err(Unfillable::NotALoop));
+    // −0.0 is 0.0 to every reader of the file.
+    let rim = Rim { points: &[[0.0; 3], [1.0, 0.0, 0.0], [-0.0, 0.0, -0.0]], apexes: &[], forbidden: &free };
+    assert_eq!(triangulate(&rim, &FillSettings::default()), Err(Unfillable::NotALoop));
+}
+
+/// An L with vertices in the middle of its sides, as T-junction splits leave them: no triangle may lie along a side.
+#[test]
+fn runs_along_a_side_give_no_flat_triangle() {
+    let l = [[0, 0, 5], [2, 0, 5], [4, 0, 5], [4, 1, 5], [4, 2, 5], [2, 2, 5], [2, 3, 5], [2, 4, 5], [0, 4, 5], [0, 2, 5]];
+    assert_eq!(fill(&l, &[], &free).unwrap().method, Method::Planar);
+    // The same in a slanted plane, where no projection keeps angles.
+    let slanted = l.map(|[x, y, _]| [x + 2 * y, 3 * x - y, x + 7 * y]);
+    assert_eq!(fill(&slanted, &[], &free).unwrap().method, Method::Planar);
+}
+
+#[test]
+fn a_square_takes_the_diagonal_that_is_free() {
+    let square = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]];
+    for taken in [(0, 2), (1, 3)] {
+        let patch = fill(&square, &[], &|a, b| (a, b) == taken).unwrap();
+        assert_eq!(patch.method, Method::Planar);
+    }
+    assert_eq!(fill(&square, &[], &|_, _| true), Err(Unfillable::Blocked));
+}
+
+/// The outline of a flat sheet: any patch in its plane would lie on the sheet.
+#[test]
+fn a_patch_never_lies_flat_on_the_triangle_beside_it() {
+    let apexes = [Some([1, 1, 0]); 3];
+    assert_eq!(fill(&[[0, 0, 0], [9, 0, 0], [0, 9, 0]], &apexes, &free), Err(Unfillable::Blocked));
+    let outside = [Some([1, -5, 0]), Some([9, 9, 0]), Some([-5, 1, 0])];
+    assert!(fill(&[[0, 0, 0], [9, 0, 0], [0, 9, 0]], &outside, &free).is_ok());
+}
+
+proptest! {
+    #[test]
+    fn triangle_contacts_are_those_of_rational_clipping(
+        p in prop::collection::vec(prop::array::uniform3(0_i32..5), 6),
+        flat in 0_u8..4,
+        shared in 0_usize..3,
+    ) {
+        let mut p = p;
+        for q in &mut p {
+            if flat == 0 { q[2] = 0 } else if flat == 1 { q[2] = q[0] + 2 * q[1] }
+        }
+        for s in 0..shared { p[5 - s] = p[s] }
+        let (a, b) = ([p[0], p[1], p[2]], [p[3], p[4], p[5]]);
+        prop_assume!(!area_is_zero(&a) && !area_is_zero(&b));
+        let f = |t: [Grid; 3]| t.map(|p| p.map(|x| x as f32));
+        let expected = contact(&a, &b);
+        for (x, y) in [(a, b), (b, a), ([a[1], a[2], a[0]], [b[2], b[1], b[0]])] {
+            prop_assert_eq!(triangles_cross(&f(x), &f(y)), expected);
+        }
+    }
+}

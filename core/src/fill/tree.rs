@@ -1,0 +1,95 @@
+//! Does a set of triangles cross itself? An own binary box tree over the triangles, walked against itself.
+
+use super::cross::{Triangle, triangles_cross};
+
+/// What [`self_crossing`] found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SelfCrossing {
+    /// No two triangles cross or overlap.
+    None,
+    /// These two do (the first pair in the tree's order).
+    Pair(usize, usize),
+    /// More pairs of boxes meet than the bound allows to look at.
+    Undecided,
+}
+
+const LEAF: usize = 4;
+
+struct Node {
+    lo: [f32; 3],
+    hi: [f32; 3],
+    /// Range in the order of triangles.
+    start: usize,
+    end: usize,
+    /// Children, none (0) for a leaf.
+    left: usize,
+    right: usize,
+}
+
+fn bounds(triangles: &[Triangle], of: &[u32]) -> ([f32; 3], [f32; 3]) {
+    let corners = || of.iter().flat_map(|&t| &triangles[t as usize]);
+    let lo = [0, 1, 2].map(|k| corners().map(|p| p[k]).fold(f32::INFINITY, f32::min));
+    let hi = [0, 1, 2].map(|k| corners().map(|p| p[k]).fold(f32::NEG_INFINITY, f32::max));
+    (lo, hi)
+}
+
+fn build(triangles: &[Triangle], order: &mut [u32]) -> Vec<Node> {
+    let (lo, hi) = bounds(triangles, order);
+    let mut nodes = vec![Node { lo, hi, start: 0, end: order.len(), left: 0, right: 0 }];
+    let mut next = 0;
+    while let Some(node) = nodes.get(next) {
+        let (start, end) = (node.start, node.end);
+        if end - start > LEAF {
+            let extent = |k: usize| f64::from(node.hi[k]) - f64::from(node.lo[k]);
+            let axis = if extent(0) >= extent(1) && extent(0) >= extent(2) { 0 } else { 1 + usize::from(extent(2) > extent(1)) };
+            let middle = |t: u32| triangles[t as usize].iter().map(|p| f64::from(p[axis])).sum::<f64>();
+            let half = (end - start) / 2;
+            order[start..end].select_nth_unstable_by(half, |&s, &t| middle(s).total_cmp(&middle(t)).then(s.cmp(&t)));
+            for (start, end) in [(start, start + half), (start + half, end)] {
+                let (lo, hi) = bounds(triangles, &order[start..end]);
+                nodes.push(Node { lo, hi, start, end, left: 0, right: 0 });
+            }
+            let last = nodes.len() - 1;
+            nodes[next].left = last - 1;
+            nodes[next].right = last;
+        }
+        next += 1;
+    }
+    nodes
+}
+
+/// Looks for two triangles that cross or overlap, beyond the corners they share (by position); looks at no more than
+/// `max_pairs` pairs. O(n log n) for surfaces without fans of very many triangles.
+pub fn self_crossing(triangles: &[Triangle], max_pairs: u64) -> SelfCrossing {
+    let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
+    let nodes = build(triangles, &mut order);
+    let mut looked_at = 0_u64;
+    let mut stack = vec![(0, 0)];
+    while let Some((i, j)) = stack.pop() {
+        let (a, b) = (&nodes[i], &nodes[j]);
+        if (0..3).any(|k| a.hi[k] < b.lo[k] || b.hi[k] < a.lo[k]) {
+            continue;
+        }
+        if i == j && a.left != 0 {
+            stack.extend([(a.left, a.left), (a.left, a.right), (a.right, a.right)]);
+        } else if a.left != 0 && (b.left == 0 || a.end - a.start >= b.end - b.start) {
+            stack.extend([(a.left, j), (a.right, j)]);
+        } else if b.left != 0 {
+            stack.extend([(i, b.left), (i, b.right)]);
+        } else {
+            for (x, &s) in order[a.start..a.end].iter().enumerate() {
+                let from = if i == j { a.start + x + 1 } else { b.start };
+                for &t in &order[from..b.end] {
+                    looked_at += 1;
+                    if triangles_cross(&triangles[s as usize], &triangles[t as usize]).is_crossing() {
+                        return SelfCrossing::Pair(s.min(t) as usize, s.max(t) as usize);
+                    }
+                }
+            }
+            if looked_at > max_pairs {
+                return SelfCrossing::Undecided;
+            }
+        }
+    }
+    SelfCrossing::None
+}

@@ -1,0 +1,34 @@
+//! What the process tells its caller.
+
+use std::process::ExitCode;
+
+/// Exit statuses, the better before the worse; of several files, the worst counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Exit {
+    /// Good under the profile.
+    Good,
+    /// Done, but not good.
+    NotGood,
+    /// Unreadable or refused input, wrong usage.
+    Refused,
+    /// Stopped by a signal.
+    Interrupted,
+}
+
+impl Exit {
+    /// 130 as shells report SIGINT.
+    pub(crate) fn code(self) -> u8 {
+        match self {
+            Self::Good => 0,
+            Self::NotGood => 1,
+            Self::Refused => 2,
+            Self::Interrupted => 130,
+        }
+    }
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit.code())
+    }
+}

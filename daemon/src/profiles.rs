@@ -1,0 +1,78 @@
+//! Finding a repair profile: by name, or in a TOML file.
+
+use std::path::Path;
+
+use suture_core::Profile;
+
+/// Reads a profile file. Unknown settings are errors, with their line; the name is the file's unless it gives one.
+///
+/// # Errors
+/// A line or more for people.
+pub(crate) fn from_file(path: &Path) -> Result<Profile, String> {
+    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: cannot read the profile: {e}", path.display()))?;
+    let mut profile: Profile = toml::from_str(&text).map_err(|e| format!("{}: {}", path.display(), e.to_string().trim_end()))?;
+    check(&profile).map_err(|e| format!("{}: {e}", path.display()))?;
+    if profile.name == Profile::default().name {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        profile.name = if stem.starts_with('.') { "folder".into() } else { stem.into_owned() };
+    }
+    Ok(profile)
+}
+
+/// A built-in name, or else a file.
+///
+/// # Errors
+/// A line or more for people.
+pub(crate) fn from_name_or_file(text: &str) -> Result<Profile, String> {
+    if let Some(profile) = Profile::built_in(text) {
+        return Ok(profile);
+    }
+    let path = Path::new(text);
+    if path.exists() {
+        return from_file(path);
+    }
+    Err(format!("there is no profile `{text}`: neither a file nor one of {}", Profile::BUILT_IN.join(", ")))
+}
+
+/// Are the numbers ones that mean something?
+///
+/// # Errors
+/// A line naming the setting.
+pub(crate) fn check(profile: &Profile) -> Result<(), String> {
+    let fractions = [
+        ("weld_relative", profile.weld_relative),
+        ("weld_max_edge_share", profile.weld_max_edge_share),
+        ("gap_edge_share", profile.gap_edge_share),
+        ("max_hole_perimeter_relative", profile.max_hole_perimeter_relative),
+        ("max_volume_change", profile.max_volume_change),
+        ("max_box_change_relative", profile.max_box_change_relative),
+    ];
+    match fractions.iter().find(|(_, value)| !value.is_finite() || *value < 0.0) {
+        Some((name, value)) => Err(format!("`{name}` must be a number from 0 up, not {value}")),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_profile_file_is_strict_and_named_after_itself() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("resin.toml");
+        std::fs::write(&path, "max_hole_edges = 7\n").unwrap();
+        let profile = from_name_or_file(path.to_str().unwrap()).unwrap();
+        assert_eq!((profile.name.as_str(), profile.max_hole_edges), ("resin", 7));
+        std::fs::write(&path, "\nmax_hole_edgse = 7\n").unwrap();
+        let error = from_file(&path).unwrap_err();
+        assert!(error.contains("line 2") && error.contains("max_hole_edgse"), "{error}");
+        std::fs::write(&path, "weld_relative = -1.0\n").unwrap();
+        assert!(from_file(&path).unwrap_err().contains("weld_relative"));
+    }
+
+    #[test]
+    fn an_unknown_name_says_what_there_is() {
+        assert!(from_name_or_file("cautios").unwrap_err().contains("cautious"));
+    }
+}

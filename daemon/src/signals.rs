@@ -1,0 +1,34 @@
+//! Ctrl-C and SIGTERM: how many there have been.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use signal_hook::consts::{SIGINT, SIGTERM};
+
+/// Set by the first signal to stop; the second ends the process at once (workers die with it).
+#[derive(Clone, Default)]
+pub(crate) struct Stop(Arc<AtomicBool>);
+
+/// Exit status after a second signal: as of a process ended by SIGINT.
+const AT_ONCE: i32 = 130;
+
+impl Stop {
+    /// Starts listening.
+    ///
+    /// # Errors
+    /// When the handlers cannot be set.
+    pub(crate) fn listen() -> std::io::Result<Self> {
+        let stop = Self::default();
+        for signal in [SIGINT, SIGTERM] {
+            // In this order: the first signal finds the flag unset, and only sets it.
+            signal_hook::flag::register_conditional_shutdown(signal, AT_ONCE, Arc::clone(&stop.0))?;
+            signal_hook::flag::register(signal, Arc::clone(&stop.0))?;
+        }
+        Ok(stop)
+    }
+
+    /// Has there been a signal?
+    pub(crate) fn asked(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}

@@ -1,0 +1,302 @@
+//! The supervisor's side of a worker process: starts it with limits, speaks the protocol, and says what it died of.
+//!
+//! The engine maps files that others may truncate, and works on whatever people drop: SIGBUS, a stack overflow, an abort for
+//! want of memory or an endless loop must cost one file, never the daemon, and must be one clear line, never a core dump.
+//!
+//! The kernel's parent-death signal follows the *thread* that started the child: whoever owns a [`Worker`] must keep the thread
+//! alive that spawned it.
+
+use std::collections::VecDeque;
+use std::io::{self, BufRead, BufReader, Read, Write};
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use crossbeam::channel::{Receiver, RecvTimeoutError, unbounded};
+use rustix::process::{Pid, Resource, Rlimit, Signal};
+use suture_core::{ErrorClass, Report};
+
+use crate::protocol::{Message, Request};
+
+/// How often a waiting supervisor looks whether it should stop.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+/// Lines of a worker's standard error that are kept for the post mortem.
+const TAIL_LINES: usize = 12;
+
+/// What came of one request.
+#[derive(Debug)]
+pub(crate) enum Ended {
+    /// An answer: the report.
+    Done(Box<Report>),
+    /// An answer: the engine's error, in words that name the file.
+    Failed { class: ErrorClass, message: String },
+    /// No answer: the worker died, or was killed for exceeding a limit.
+    Died(Death),
+    /// The caller wanted it stopped; the worker is gone, and nothing is the file's fault.
+    Stopped,
+}
+
+/// Why a worker died without an answer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Death {
+    pub cause: Cause,
+    /// The last thing it said, if anything.
+    pub last_words: String,
+}
+
+/// What killed a worker.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Cause {
+    /// A signal of its own making: SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL, SIGSYS, SIGTRAP.
+    Fault(i32),
+    /// It ended by itself without an answer (an internal error).
+    Internal(i32),
+    /// It asked for more memory than its limit, or the kernel was out of memory.
+    Memory,
+    /// It took longer than it was given.
+    Time(Duration),
+    /// Someone else killed it.
+    Killed(i32),
+}
+
+impl Death {
+    /// Is the file to blame? An operator's kill never is its fault.
+    pub(crate) fn blames_file(&self) -> bool {
+        !matches!(self.cause, Cause::Killed(_))
+    }
+
+    /// One line for people, without the file's name.
+    pub(crate) fn line(&self) -> String {
+        let base = match self.cause {
+            Cause::Fault(signal) if signal == Signal::BUS.as_raw() => {
+                "the file could not be read to its end while it was mapped (SIGBUS: it was cut short meanwhile, or its disk failed)"
+                    .to_owned()
+            }
+            Cause::Fault(signal) => format!("the worker crashed on it ({}); a defect in Suture, please report it", name_of(signal)),
+            Cause::Internal(_) => "the worker ended in an internal error on it; a defect in Suture, please report it".to_owned(),
+            Cause::Memory => "the work needed more memory than its budget allows; a larger --memory may let it through".to_owned(),
+            Cause::Time(limit) => {
+                format!("stopped at its time limit of {}", crate::units::show_seconds(limit.as_secs_f64()))
+            }
+            Cause::Killed(signal) => format!("the worker was killed from outside ({}); the file is not to blame", name_of(signal)),
+        };
+        match (&self.cause, self.last_words.is_empty()) {
+            (Cause::Fault(_) | Cause::Internal(_), false) => format!("{base}: {}", self.last_words),
+            _ => base,
+        }
+    }
+}
+
+fn name_of(signal: i32) -> String {
+    match signal {
+        3 => "SIGQUIT".into(),
+        4 => "SIGILL".into(),
+        5 => "SIGTRAP".into(),
+        6 => "SIGABRT".into(),
+        7 => "SIGBUS".into(),
+        8 => "SIGFPE".into(),
+        9 => "SIGKILL".into(),
+        11 => "SIGSEGV".into(),
+        15 => "SIGTERM".into(),
+        31 => "SIGSYS".into(),
+        other => format!("signal {other}"),
+    }
+}
+
+/// A running worker process. Dropping it kills it and waits for its end.
+pub(crate) struct Worker {
+    child: Child,
+    stdin: Option<ChildStdin>,
+    messages: Receiver<Message>,
+    tail: Arc<Mutex<VecDeque<String>>>,
+    readers: Vec<JoinHandle<()>>,
+    oom_kills: u64,
+}
+
+impl Worker {
+    /// Starts a worker that may hold `memory` bytes by its own count, with headroom for what it does not count.
+    ///
+    /// # Errors
+    /// When the process cannot be started.
+    pub(crate) fn spawn(memory: u64, threads: usize) -> io::Result<Self> {
+        // The engine keeps to its budget by its own count; the limit only catches what escapes it. Stacks, allocator slack and
+        // code are not in that count.
+        let data = memory.saturating_add(memory / 4).saturating_add(256 << 20).saturating_add(threads as u64 * (8 << 20));
+        let parent = rustix::process::getpid();
+        // The running binary itself, even when a newer one has taken its name meanwhile.
+        let mut command = Command::new("/proc/self/exe");
+        command.arg0("suture").arg("worker");
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
+        // SAFETY: between fork and exec only async-signal-safe calls are made: plain system calls that neither allocate nor lock.
+        unsafe {
+            command.pre_exec(move || {
+                rustix::process::set_parent_process_death_signal(Some(Signal::KILL))?;
+                if rustix::process::getppid() != Some(parent) {
+                    // The parent died before the line above could take effect.
+                    return Err(io::ErrorKind::BrokenPipe.into());
+                }
+                let none = Rlimit { current: Some(0), maximum: Some(0) };
+                rustix::process::setrlimit(Resource::Core, none)?;
+                rustix::process::setrlimit(Resource::Data, Rlimit { current: Some(data), maximum: Some(data) })?;
+                Ok(())
+            });
+        }
+        let mut child = command.spawn()?;
+        let (sender, messages) = unbounded();
+        let tail = Arc::new(Mutex::new(VecDeque::new()));
+        let mut readers = Vec::new();
+        if let Some(stdout) = child.stdout.take() {
+            readers.push(std::thread::spawn(move || {
+                for line in BufReader::new(stdout).split(b'\n') {
+                    let Ok(Ok(message)) = line.map(|line| serde_json::from_slice(&line)) else { break };
+                    if sender.send(message).is_err() {
+                        break;
+                    }
+                }
+            }));
+        }
+        if let Some(stderr) = child.stderr.take() {
+            let tail = Arc::clone(&tail);
+            readers.push(std::thread::spawn(move || keep_tail(stderr, &tail)));
+        }
+        let stdin = child.stdin.take();
+        Ok(Self { child, stdin, messages, tail, readers, oom_kills: oom_kills() })
+    }
+
+    /// Works on one request, at most `limit` long, until `stop` says so. After anything but an answer the worker is gone
+    /// ([`Worker::run`] must not be called again).
+    pub(crate) fn run(
+        &mut self,
+        request: &Request,
+        limit: Option<Duration>,
+        stop: &dyn Fn() -> bool,
+        on_progress: &mut dyn FnMut(&str, u64, u64),
+    ) -> Ended {
+        let start = Instant::now();
+        self.oom_kills = oom_kills();
+        if !self.send(request) {
+            return Ended::Died(self.post_mortem());
+        }
+        loop {
+            match self.messages.recv_timeout(LOOK_EVERY) {
+                Ok(Message::Progress { stage, done, total }) => on_progress(&stage, done, total),
+                Ok(Message::Done(report)) => return Ended::Done(report),
+                Ok(Message::Failed { class, message }) => return Ended::Failed { class, message },
+                Err(RecvTimeoutError::Disconnected) => return Ended::Died(self.post_mortem()),
+                Err(RecvTimeoutError::Timeout) => {}
+            }
+            if stop() {
+                self.kill();
+                return Ended::Stopped;
+            }
+            if let Some(limit) = limit.filter(|limit| start.elapsed() >= *limit) {
+                self.kill();
+                return Ended::Died(Death { cause: Cause::Time(limit), last_words: String::new() });
+            }
+        }
+    }
+
+    fn send(&mut self, request: &Request) -> bool {
+        let Some(stdin) = &mut self.stdin else { return false };
+        let Ok(mut line) = serde_json::to_vec(request) else { return false };
+        line.push(b'\n');
+        stdin.write_all(&line).and_then(|()| stdin.flush()).is_ok()
+    }
+
+    /// Kills the worker and whatever it started, and waits for the end.
+    fn kill(&mut self) -> Option<ExitStatus> {
+        self.stdin = None;
+        if let Some(group) = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw) {
+            // Gone already: nothing to kill.
+            let _ = rustix::process::kill_process_group(group, Signal::KILL);
+        }
+        let status = self.child.wait().ok();
+        for reader in self.readers.drain(..) {
+            let _ = reader.join();
+        }
+        status
+    }
+
+    /// The worker closed its output (or its input) unasked: finds out why.
+    fn post_mortem(&mut self) -> Death {
+        // A worker that is alive but speaks nonsense, or is slow to die, gets a moment to show its own end.
+        let patience = Instant::now() + Duration::from_secs(2);
+        let status = loop {
+            match self.child.try_wait() {
+                Ok(Some(status)) => break Some(status),
+                Ok(None) if Instant::now() < patience => std::thread::sleep(Duration::from_millis(2)),
+                _ => break None,
+            }
+        };
+        let oom = oom_kills() > self.oom_kills;
+        self.kill();
+        let lines = self.tail.lock().unwrap_or_else(PoisonError::into_inner);
+        let out_of_memory = lines.iter().any(|line| line.starts_with("memory allocation of "));
+        let last_words = lines.back().cloned().unwrap_or_default();
+        let last_words = lines.iter().find(|line| line.contains("panicked at")).map_or(last_words, |head| {
+            let after = lines.iter().skip_while(|line| *line != head).nth(1).cloned().unwrap_or_default();
+            format!("{head} {after}")
+        });
+        let cause = match status.map(|status| (status.signal(), status.code())) {
+            _ if out_of_memory => Cause::Memory,
+            Some((Some(9), _)) if oom => Cause::Memory,
+            Some((Some(signal @ (4..=8 | 11 | 31)), _)) => Cause::Fault(signal),
+            Some((Some(signal), _)) => Cause::Killed(signal),
+            Some((None, code)) => Cause::Internal(code.unwrap_or(-1)),
+            None => Cause::Internal(-1),
+        };
+        Death { cause, last_words }
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+/// Passes a worker's log on and keeps its end.
+fn keep_tail(stderr: impl Read, tail: &Mutex<VecDeque<String>>) {
+    for line in BufReader::new(stderr).split(b'\n') {
+        let Ok(line) = line else { break };
+        let line = String::from_utf8_lossy(&line).trim().chars().take(500).collect::<String>();
+        if line.is_empty() {
+            continue;
+        }
+        tracing::debug!(target: "suture::worker", "{line}");
+        let mut tail = tail.lock().unwrap_or_else(PoisonError::into_inner);
+        tail.push_back(line);
+        if tail.len() > TAIL_LINES {
+            tail.pop_front();
+        }
+    }
+}
+
+/// How often the kernel has killed for want of memory since it started. SIGKILL alone does not tell an operator from it.
+fn oom_kills() -> u64 {
+    let text = std::fs::read_to_string("/proc/vmstat").unwrap_or_default();
+    text.lines().find_map(|line| line.strip_prefix("oom_kill ")).and_then(|n| n.trim().parse().ok()).unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_operators_kill_is_not_the_files_fault() {
+        let death = |cause| Death { cause, last_words: String::new() };
+        assert!(!death(Cause::Killed(9)).blames_file());
+        assert!(!death(Cause::Killed(15)).blames_file());
+        for cause in [Cause::Fault(11), Cause::Internal(101), Cause::Memory, Cause::Time(Duration::from_secs(1))] {
+            assert!(death(cause).blames_file());
+        }
+    }
+
+    #[test]
+    fn a_bus_error_speaks_of_the_file_not_of_signals_first() {
+        let death = Death { cause: Cause::Fault(7), last_words: "noise".into() };
+        assert!(death.line().starts_with("the file could not be read"));
+    }
+}

@@ -1,0 +1,226 @@
+//! A report as a table for the terminal: what was wrong before and after, what was done, the verdict, what it cost. A clean file
+//! says so in one line.
+
+use std::fmt::Write as _;
+
+use suture_core::Report;
+use suture_core::report::{Defects, Format, Outcome, Task};
+
+use crate::units::{show_count, show_seconds, show_size};
+
+/// Boundary loops listed before the table refers to the report.
+const LOOPS_SHOWN: usize = 5;
+
+/// A row's name and where to find its count.
+type Row = (&'static str, fn(&Defects) -> u64);
+
+/// The defects in the order of the table; rows that are zero on both sides are left out.
+const ROWS: [Row; 16] = [
+    ("non-finite triangles", |d| d.nonfinite),
+    ("degenerate (two equal corners)", |d| d.degenerate_index),
+    ("degenerate (no area)", |d| d.degenerate_area),
+    ("duplicate triangles", |d| d.duplicates_same),
+    ("opposite duplicates", |d| d.duplicates_opposite),
+    ("boundary edges", |d| d.boundary_edges),
+    ("boundary loops", |d| d.boundary_loops),
+    ("vertices to weld", |d| d.weldable_vertices),
+    ("T-junctions", |d| d.noncommon_vertices),
+    ("non-manifold edges", |d| d.nonmanifold_edges),
+    ("non-manifold vertices", |d| d.nonmanifold_vertices),
+    ("disagreeing edges", |d| d.inconsistent_edges),
+    ("inside-out components", |d| d.inverted_components),
+    ("swallowed bodies", |d| d.nested_positive),
+    ("components", |d| d.components),
+    ("bodies", |d| d.bodies),
+];
+/// Rows from here on describe; they are no defects, and shown only beside some.
+const FIRST_DESCRIPTION: usize = 14;
+
+/// The whole table, with a final newline.
+pub(crate) fn render(report: &Report) -> String {
+    let mut out = String::new();
+    let name = report.input.path.display().to_string();
+    if report.outcome == Outcome::Clean && report.input.findings.is_empty() {
+        let copied = if report.output.is_some() { ", copied byte for byte" } else { "" };
+        line(&mut out, format_args!("{name}: clean{copied} ({}; {}; {})", size(report), report.verdict.statement, rate(report)));
+        return out;
+    }
+    line(&mut out, format_args!("{name}: {} ({})", headline(report), size(report)));
+    for finding in &report.input.findings {
+        item(&mut out, "file", finding);
+    }
+    defects(&mut out, report);
+    for repair in &report.repairs {
+        let times = if repair.count == 1 { String::new() } else { format!(" × {}", show_count(repair.count)) };
+        let note = if repair.note.is_empty() { String::new() } else { format!(": {}", repair.note) };
+        item(&mut out, "done", &format!("{}{times}{note}", repair.name.replace('_', " ")));
+    }
+    for left in report.loops_left.iter().take(LOOPS_SHOWN) {
+        let [x, y, z] = left.at;
+        item(&mut out, "left", &format!("loop of {} edges at ({x}, {y}, {z}): {}", show_count(left.edges), left.reason));
+    }
+    if report.loops_left.len() > LOOPS_SHOWN {
+        item(&mut out, "left", &format!("{} more loops, listed in the report", report.loops_left.len() - LOOPS_SHOWN));
+    }
+    if report.task == Task::Repair && report.outcome != Outcome::Clean {
+        item(&mut out, "edit", &edit(report));
+    }
+    let judged = if report.verdict.good { "good" } else { "not good" };
+    item(&mut out, "verdict", &format!("{judged}: {}", report.verdict.statement));
+    for reason in &report.verdict.reasons {
+        item(&mut out, "", reason);
+    }
+    item(&mut out, "cost", &rate(report));
+    if let Some(output) = &report.output {
+        item(&mut out, "wrote", &format!("{} ({})", output.path.display(), show_size(output.bytes)));
+    }
+    out
+}
+
+fn headline(report: &Report) -> &'static str {
+    match (report.task, report.outcome) {
+        (_, Outcome::Clean) => "clean",
+        (_, Outcome::Repaired) => "repaired",
+        (_, Outcome::NeedsReview) => "NEEDS REVIEW: repaired, but changed more than the profile allows",
+        (Task::Inspect, Outcome::NotGood) => "NOT GOOD",
+        (Task::Repair, Outcome::NotGood) => "NOT GOOD after repair",
+    }
+}
+
+fn size(report: &Report) -> String {
+    let format = match report.input.format {
+        Format::BinaryStl => "binary STL",
+        Format::AsciiStl => "ASCII STL",
+    };
+    format!("{} triangles, {}, {format}", show_count(report.input.triangles), show_size(report.input.bytes))
+}
+
+fn rate(report: &Report) -> String {
+    let cost = &report.cost;
+    let speed = if cost.triangles_per_second.is_finite() { cost.triangles_per_second.max(0.0) as u64 } else { 0 };
+    format!(
+        "{}, {} triangles/s, peak {} ({} with mapped files)",
+        show_seconds(cost.wall_seconds),
+        show_count(speed),
+        show_size(cost.peak_anonymous_bytes),
+        show_size(cost.peak_resident_bytes)
+    )
+}
+
+fn edit(report: &Report) -> String {
+    let e = &report.edit;
+    let mut parts = vec![format!("{} triangles untouched", show_count(e.untouched))];
+    for (count, what) in [(e.deleted, "deleted"), (e.flipped, "flipped"), (e.moved, "moved"), (e.added, "added")] {
+        if count > 0 {
+            parts.push(format!("{} {what}", show_count(count)));
+        }
+    }
+    if e.max_move > 0.0 {
+        parts.push(format!("largest move {:.3e}", e.max_move));
+    }
+    parts.join(", ")
+}
+
+fn defects(out: &mut String, report: &Report) {
+    let after = report.after.as_ref().filter(|_| report.task == Task::Repair);
+    let differs = |of: fn(&Defects) -> u64| after.is_some_and(|after| of(after) != of(&report.before));
+    let rows: Vec<&Row> = ROWS
+        .iter()
+        .enumerate()
+        .filter(|(i, (_, of))| if *i < FIRST_DESCRIPTION { of(&report.before) > 0 || differs(*of) } else { differs(*of) })
+        .map(|(_, row)| row)
+        .collect();
+    if rows.is_empty() {
+        return;
+    }
+    let width = rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
+    match after {
+        Some(after) => {
+            line(out, format_args!("  {:width$}  {:>14} {:>14}", "", "before", "after"));
+            for (name, of) in rows {
+                let (before, after) = (show_count(of(&report.before)), show_count(of(after)));
+                line(out, format_args!("  {name:width$}  {before:>14} {after:>14}"));
+            }
+        }
+        None => {
+            for (name, of) in rows {
+                line(out, format_args!("  {name:width$}  {:>14}", show_count(of(&report.before))));
+            }
+        }
+    }
+}
+
+fn item(out: &mut String, label: &str, text: &str) {
+    line(out, format_args!("  {label:<8}{text}"));
+}
+
+fn line(out: &mut String, text: std::fmt::Arguments) {
+    // Writing to a string cannot fail.
+    let _ = writeln!(out, "{text}");
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use suture_core::report::{Cost, EditSummary, FileFacts, Repair, SCHEMA_VERSION, Tolerances, Verdict};
+    use suture_core::{Limits, Profile};
+
+    pub(crate) fn sample(outcome: Outcome) -> Report {
+        let facts = FileFacts {
+            path: "part.stl".into(),
+            bytes: 684,
+            blake3: String::new(),
+            format: Format::BinaryStl,
+            triangles: 12,
+            findings: vec![],
+        };
+        Report {
+            schema_version: SCHEMA_VERSION,
+            engine_version: "0".into(),
+            task: Task::Repair,
+            outcome,
+            input: facts.clone(),
+            output: Some(facts),
+            profile: Profile::default(),
+            limits: Limits::default(),
+            before: Defects::default(),
+            after: Some(Defects::default()),
+            tolerances: Tolerances::default(),
+            repairs: vec![],
+            loops_left: vec![],
+            edit: EditSummary::default(),
+            edit_records: None,
+            verdict: Verdict {
+                good: outcome.is_good(),
+                statement: "closed, manifold, oriented".into(),
+                closed: true,
+                manifold: true,
+                oriented: true,
+                reasons: vec![],
+                unchecked: vec![],
+            },
+            stages: vec![],
+            cost: Cost::default(),
+        }
+    }
+
+    #[test]
+    fn a_clean_file_is_one_line() {
+        let text = render(&sample(Outcome::Clean));
+        assert_eq!(text.lines().count(), 1, "{text}");
+        assert!(text.starts_with("part.stl: clean, copied byte for byte (12 triangles, 684 B, binary STL; closed"), "{text}");
+    }
+
+    #[test]
+    fn only_what_was_wrong_or_changed_has_a_row() {
+        let mut report = sample(Outcome::Repaired);
+        report.before.boundary_edges = 3;
+        report.before.components = 2;
+        report.after = Some(Defects { components: 2, ..Defects::default() });
+        report.repairs.push(Repair { name: "fill".into(), count: 1, note: "one hole".into(), seconds: 0.0 });
+        let text = render(&report);
+        assert!(text.contains("boundary edges"), "{text}");
+        assert!(!text.contains("duplicate") && !text.contains("components"), "{text}");
+        assert!(text.contains("done    fill: one hole"), "{text}");
+    }
+}

@@ -1,0 +1,98 @@
+//! Sizes and times as people write and read them.
+
+/// Splits `text` into its number and its unit.
+fn split(text: &str) -> Option<(f64, &str)> {
+    let text = text.trim();
+    let end = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());
+    let (number, unit) = text.split_at(end);
+    let number: f64 = number.parse().ok()?;
+    Some((number, unit.trim()))
+}
+
+/// Bytes from `1GiB`, `512 MiB`, `2G` (binary), `1.5GB` (decimal), `4096`.
+///
+/// # Errors
+/// A line for people when the text is no size, or is zero.
+pub(crate) fn parse_size(text: &str) -> Result<u64, String> {
+    let bad = || format!("`{text}` is not a size (try 512MiB or 2GiB)");
+    let (number, unit) = split(text).ok_or_else(bad)?;
+    let factor: f64 = match unit.to_ascii_lowercase().as_str() {
+        "" | "b" => 1.0,
+        "k" | "kib" => 1024.0,
+        "m" | "mib" => 1024.0 * 1024.0,
+        "g" | "gib" => 1024.0 * 1024.0 * 1024.0,
+        "t" | "tib" => 1024.0 * 1024.0 * 1024.0 * 1024.0,
+        "kb" => 1e3,
+        "mb" => 1e6,
+        "gb" => 1e9,
+        "tb" => 1e12,
+        _ => return Err(bad()),
+    };
+    let bytes = number * factor;
+    if !(1.0..9e18).contains(&bytes) {
+        return Err(bad());
+    }
+    // In range, as just checked.
+    Ok(bytes as u64)
+}
+
+/// `617.0 KB`, `1.2 GB`: decimal, as file managers show it.
+pub(crate) fn show_size(bytes: u64) -> String {
+    const UNITS: [&str; 5] = ["B", "KB", "MB", "GB", "TB"];
+    let (mut value, mut unit) = (bytes as f64, 0);
+    while value >= 999.95 && unit + 1 < UNITS.len() {
+        value /= 1000.0;
+        unit += 1;
+    }
+    let name = UNITS.get(unit).copied().unwrap_or("B");
+    if unit == 0 { format!("{bytes} B") } else { format!("{value:.1} {name}") }
+}
+
+/// `0.04 s`, `3.2 s`, `2 min 05 s`, `1 h 03 min`.
+pub(crate) fn show_seconds(seconds: f64) -> String {
+    let whole = seconds.round().max(0.0) as u64;
+    match whole {
+        0..10 => format!("{seconds:.2} s"),
+        10..60 => format!("{seconds:.1} s"),
+        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
+        _ => format!("{} h {:02} min", whole / 3600, whole / 60 % 60),
+    }
+}
+
+/// `12 345 678`: thousands apart by a thin gap that every terminal can show.
+pub(crate) fn show_count(count: u64) -> String {
+    let digits = count.to_string();
+    let mut out = String::with_capacity(digits.len() + digits.len() / 3);
+    for (i, c) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push(' ');
+        }
+        out.push(c);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_as_people_write_them() {
+        assert_eq!(parse_size("1GiB"), Ok(1 << 30));
+        assert_eq!(parse_size(" 512 MiB"), Ok(512 << 20));
+        assert_eq!(parse_size("1.5GB"), Ok(1_500_000_000));
+        assert_eq!(parse_size("4096"), Ok(4096));
+        for bad in ["", "GiB", "-1", "0", "1 parsec", "1e99", "nan"] {
+            assert!(parse_size(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn figures_as_people_read_them() {
+        assert_eq!(show_size(84), "84 B");
+        assert_eq!(show_size(999_999), "1.0 MB");
+        assert_eq!(show_count(1_234_567), "1 234 567");
+        assert_eq!(show_count(999), "999");
+        assert_eq!(show_seconds(125.0), "2 min 05 s");
+    }
+}

@@ -1,0 +1,130 @@
+//! The worker's side: `suture worker`, started by the supervisor, never by hand. It takes requests until its input ends.
+
+use std::io::{self, BufRead, Write};
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use suture_core::report::Task;
+use suture_core::{Error, Progress, Report};
+
+use crate::fsx;
+use crate::protocol::{Message, Request};
+
+/// Progress is told at most this often.
+const PROGRESS_EVERY: Duration = Duration::from_millis(100);
+
+/// Answers requests until standard input ends.
+///
+/// # Errors
+/// When the supervisor is gone, or speaks another protocol.
+pub(crate) fn serve() -> io::Result<()> {
+    for line in io::stdin().lock().lines() {
+        let request: Request = serde_json::from_str(&line?)?;
+        // The peak of this file, not of the process's life; a kernel that refuses leaves the report with the latter.
+        let _ = std::fs::write("/proc/self/clear_refs", "5");
+        say(&answer(&request))?;
+    }
+    Ok(())
+}
+
+fn say(message: &Message) -> io::Result<()> {
+    let mut line = serde_json::to_vec(message)?;
+    line.push(b'\n');
+    let mut out = io::stdout().lock();
+    out.write_all(&line)?;
+    out.flush()
+}
+
+fn answer(request: &Request) -> Message {
+    #[cfg(feature = "crash-points")]
+    hook::act(request);
+    match work(request) {
+        Ok(report) => Message::Done(Box::new(report)),
+        Err(error) => Message::Failed { class: error.class(), message: named(&error, request) },
+    }
+}
+
+/// The error's line, with the file's own name instead of the claimed or temporary one.
+fn named(error: &Error, request: &Request) -> String {
+    let mut line = error.to_string();
+    line = line.replace(&*request.input.display().to_string(), &request.shown_input);
+    if let (Some(output), Some(shown)) = (&request.output, &request.shown_output) {
+        line = line.replace(&*output.display().to_string(), shown);
+    }
+    line
+}
+
+fn work(request: &Request) -> suture_core::error::Result<Report> {
+    let teller = Teller { last: Mutex::new(Instant::now()) };
+    let Request { input, profile, limits, .. } = request;
+    let mut report = match (request.task, &request.output) {
+        (Task::Repair, Some(output)) => suture_core::repair(input, output, profile, limits, &teller)?,
+        _ => suture_core::inspect(input, profile, limits, &teller)?,
+    };
+    report.input.path = request.shown_input.clone().into();
+    if let (Some(facts), Some(shown)) = (&mut report.output, &request.shown_output) {
+        facts.path = shown.clone().into();
+    }
+    // The spool folder is a temporary name too, and no one else's business.
+    report.limits.spool = None;
+    if let Some(path) = &request.report {
+        fsx::write_new_json(path, &report).map_err(|source| Error::Io {
+            path: path.clone(),
+            action: "writing the report",
+            source,
+        })?;
+        report.edit_records = None;
+    }
+    Ok(report)
+}
+
+/// Tells the supervisor where the work stands.
+struct Teller {
+    last: Mutex<Instant>,
+}
+
+impl Progress for Teller {
+    fn at(&self, stage: &'static str, done: u64, total: u64) {
+        // Another thread is telling: this one has nothing newer to add.
+        let Ok(mut last) = self.last.try_lock() else { return };
+        if last.elapsed() >= PROGRESS_EVERY {
+            *last = Instant::now();
+            // A supervisor that is gone is noticed at the end of the work, and kills us before.
+            let _ = say(&Message::Progress { stage: stage.into(), done, total });
+        }
+    }
+}
+
+/// Faults on demand, for the tests of the supervisor and of the daemon: a build with the feature `crash-points` looks for
+/// `!abort!`, `!segv!`, `!hang!`, `!memory!`, `!panic!` or `!slow!` in the input's name.
+#[cfg(feature = "crash-points")]
+mod hook {
+    use std::time::Duration;
+
+    use crate::protocol::Request;
+
+    pub(super) fn act(request: &Request) {
+        let name = &request.shown_input;
+        if name.contains("!abort!") {
+            std::process::abort();
+        }
+        if name.contains("!segv!") {
+            let _ = rustix::process::kill_process(rustix::process::getpid(), rustix::process::Signal::SEGV);
+        }
+        if name.contains("!panic!") {
+            panic!("asked to by {name}");
+        }
+        if name.contains("!memory!") {
+            let mut hog: Vec<Vec<u8>> = Vec::new();
+            loop {
+                hog.push(vec![1; 16 << 20]);
+            }
+        }
+        if name.contains("!hang!") {
+            std::thread::sleep(Duration::from_secs(3600));
+        }
+        if name.contains("!slow!") {
+            std::thread::sleep(Duration::from_millis(300));
+        }
+    }
+}

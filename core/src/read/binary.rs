@@ -74,7 +74,10 @@ pub(super) fn mismatched(bytes: &[u8]) -> Option<Result<Layout, Rejection>> {
             if !look_like_triangles(all, Normals::Checked) {
                 return None;
             }
-            findings.push(Finding::flaw(format!("cut off: header says {declared} triangles, file holds {}", all.len())));
+            findings.push(Finding::flaw(format!(
+                "header says {declared} triangles, file holds {}: cut off or miscounted",
+                all.len()
+            )));
             all.len()
         }
         _ => {
@@ -93,7 +96,7 @@ pub(super) fn mismatched(bytes: &[u8]) -> Option<Result<Layout, Rejection>> {
         }
     };
     if !rest.is_empty() {
-        let what = if announced > all.len() && declared != u32::MAX { "a triangle cut off" } else { "trailing" };
+        let what = if announced > all.len() && declared != u32::MAX { "a triangle that is cut off" } else { "trailing" };
         findings.push(Finding::flaw(format!(
             "{} {} after the last whole triangle ({what}), ignored",
             rest.len(),

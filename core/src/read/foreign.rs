@@ -41,6 +41,7 @@ pub(super) fn describe(bytes: &[u8]) -> String {
     match name {
         Some(name) => format!("{name}, not an STL mesh"),
         None if super::binary::is_blank(bytes) => "nothing but zero bytes".into(),
+        None if holds(head, b"facet normal") => "text STL with control characters among its first facets: damaged".into(),
         None if bytes.len() < 84 + 50 => format!("only {} bytes, too few for a single triangle", bytes.len()),
         None if is_text(head) => "text, but not of an STL: no \"solid\" with facets".into(),
         None => {
@@ -97,6 +98,11 @@ fn is_hex_dump_line(line: &[u8]) -> bool {
     offset || groups.all(|group| matches!(group.len(), 0 | 2 | 4 | 8) && group.iter().all(u8::is_ascii_hexdigit))
 }
 
+/// Does `text` hold `word` in any case?
+pub(super) fn holds(text: &[u8], word: &[u8]) -> bool {
+    text.windows(word.len()).any(|window| window.eq_ignore_ascii_case(word))
+}
+
 /// No control character but white space.
 pub(super) fn is_text(bytes: &[u8]) -> bool {
     bytes.iter().all(|&byte| byte >= b' ' || byte.is_ascii_whitespace() || byte == 0x0b)
@@ -128,6 +134,7 @@ mod tests {
         assert_eq!(describe(&[0; 500]), "nothing but zero bytes");
         assert_eq!(describe(&[1, 2, 3]), "only 3 bytes, too few for a single triangle");
         assert!(describe("a letter to a friend\n".repeat(50).as_bytes()).starts_with("text, but not of an STL"));
+        assert!(describe(b"solid a\nfacet normal 0 0 1\x10").contains("damaged"));
         assert!(describe(&[7; 500]).starts_with("neither text nor binary STL"));
     }
 }

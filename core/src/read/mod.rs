@@ -8,8 +8,11 @@
 //! mesh is refused with the reason a person needs ("a PNG picture").
 
 mod binary;
+mod facets;
 mod foreign;
+mod number;
 mod sniff;
+mod text;
 
 use std::fs::{File, Metadata, OpenOptions};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
@@ -95,6 +98,8 @@ impl Identity {
 enum Source {
     /// In the input itself, this many after its prefix.
     InPlace(usize),
+    /// All of a spool.
+    Spooled(Mmap),
 }
 
 /// An open mesh file. Its pages are mapped: if someone truncates the file meanwhile, touching them raises SIGBUS, so that the
@@ -117,7 +122,7 @@ impl MeshFile {
     /// # Errors
     /// [`Error::Unreadable`] for what is no mesh or holds no triangle, [`Error::Refused`] beyond [`MAX_TRIANGLES`],
     /// [`Error::Io`] where opening, mapping or spooling fails.
-    pub fn open(path: &Path, _spool: &Path, _limits: &Limits, _progress: &dyn Progress) -> Result<Self> {
+    pub fn open(path: &Path, spool: &Path, limits: &Limits, progress: &dyn Progress) -> Result<Self> {
         let (file, identity) = open_regular(path)?;
         if identity.size == 0 {
             return Err(Rejection::Unreadable("empty file".into()).at(path));
@@ -136,6 +141,21 @@ impl MeshFile {
                 format: Format::BinaryStl,
                 findings: layout.findings,
             }),
+            sniff::Kind::Text(sniff::Text { start, mut findings }) => {
+                // Advice; without it reading ahead is only less bold.
+                let _ = input.advise(memmap2::Advice::Sequential);
+                let parsed = text::read(&input, start, &text::Context { path, spool, limits, progress, window: text::WINDOW })?;
+                findings.extend(parsed.findings);
+                Ok(Self {
+                    path: path.to_owned(),
+                    identity,
+                    header: parsed.header,
+                    source: Source::Spooled(parsed.spool),
+                    input,
+                    format: Format::AsciiStl,
+                    findings,
+                })
+            }
         }
     }
 
@@ -143,6 +163,7 @@ impl MeshFile {
     pub fn records(&self) -> &[Record] {
         match &self.source {
             Source::InPlace(triangles) => binary::records(&self.input, *triangles),
+            Source::Spooled(spool) => spool.as_chunks().0,
         }
     }
 

@@ -1,5 +1,8 @@
 //! Whole files through [`MeshFile::open`], each built here from a few triangles.
 
+mod damage;
+mod text;
+
 use std::io::Write;
 
 use super::*;
@@ -94,7 +97,7 @@ fn a_file_cut_in_mid_record_keeps_its_whole_triangles() {
     let bytes = binary_file(b"", 4, &tetrahedron(), b"");
     let file = open(&bytes[..bytes.len() - 20]).unwrap();
     assert_eq!(file.records(), &tetrahedron()[..3]);
-    assert!(texts(&file)[0].contains("cut off: header says 4 triangles, file holds 3"));
+    assert!(texts(&file)[0].contains("header says 4 triangles, file holds 3: cut off"));
     assert!(texts(&file)[1].starts_with("30 bytes after the last whole triangle"));
 }
 

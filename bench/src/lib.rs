@@ -5,5 +5,6 @@
 
 pub mod counts;
 pub mod generate;
+pub mod judge;
 
 pub use counts::Counts;

@@ -1,0 +1,94 @@
+//! An independent judge of mesh files: plain sorting, no code of the engine's, so that it can be trusted about both sides of a
+//! comparison.
+//!
+//! Vertices are identified by exact f32 coordinates (−0.0 = 0.0), as a slicer does; nothing is tolerated, nothing merged.
+//! Triangles with a coordinate that is no number are dropped and counted; triangles with a repeated vertex are counted and left
+//! out of everything else. Self-intersection is not looked for.
+//!
+//! O(n log n) time, about 100 bytes of memory a triangle.
+
+mod exact;
+mod kept;
+mod stl;
+mod topology;
+
+use std::path::Path;
+
+use crate::Counts;
+
+pub use kept::{Kept, kept_in_order};
+pub use stl::{Error, Result};
+
+/// What a mesh file holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Judgement {
+    pub counts: Counts,
+    /// Triangles with a NaN or infinite coordinate.
+    pub nonfinite: u64,
+    /// Distinct positions.
+    pub vertices: u64,
+    /// Signed volume about the centre of the bounding box, in cubic units of the file. Means something only where closed and
+    /// oriented.
+    pub volume: f64,
+    /// Closed, coherent components of positive volume.
+    pub positive_bodies: u64,
+    /// Closed, coherent components of negative volume: cavities, or bodies inside out.
+    pub negative_bodies: u64,
+}
+
+impl Judgement {
+    /// Closed, manifold and consistently oriented: what a slicer needs at least.
+    pub fn sound(&self) -> bool {
+        self.counts.closed() && self.counts.manifold() && self.counts.oriented()
+    }
+}
+
+/// Judges a binary STL.
+///
+/// # Errors
+/// When the file cannot be read, or is no binary STL whose length is what its count says.
+pub fn judge(path: &Path) -> Result<Judgement> {
+    Ok(topology::judge(stl::Soup::read(path)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::generate::{self, Case};
+
+    /// The generators predict, the judge finds; neither knows how the other counts.
+    #[test]
+    fn finds_in_every_generated_file_what_was_put_there() {
+        let folder = tempfile::tempdir().unwrap();
+        for case in Case::ALL {
+            for (triangles, seed) in [(512, 1), (3_000, 2), (20_000, 3)] {
+                let path = folder.path().join("a.stl");
+                let truth = generate::write_file(case, triangles, seed, &path).unwrap();
+                let found = judge(&path).unwrap();
+                assert_eq!(found.counts, truth.counts, "{case}, {triangles} triangles, seed {seed}");
+                assert_eq!(found.nonfinite, 0);
+            }
+        }
+    }
+
+    #[test]
+    fn a_clean_file_encloses_the_volume_of_the_truth() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.stl");
+        let truth = generate::write_file(Case::Clean, 20_000, 1, &path).unwrap();
+        let found = judge(&path).unwrap();
+        assert!(found.sound() && found.positive_bodies == 1);
+        assert!((found.volume / truth.volume - 1.0).abs() < 1e-9, "{} {}", found.volume, truth.volume);
+    }
+
+    #[test]
+    fn files_that_are_no_binary_stl_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.stl");
+        for bytes in [&b""[..], b"solid a\nendsolid a\n", &[0; 85], &[1; 84]] {
+            std::fs::write(&path, bytes).unwrap();
+            assert!(matches!(judge(&path), Err(Error::Format { .. })));
+        }
+        assert!(matches!(judge(&folder.path().join("absent")), Err(Error::Io { .. })));
+    }
+}

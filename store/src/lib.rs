@@ -11,11 +11,19 @@
 pub mod crash;
 pub mod id;
 pub mod job;
+mod memory;
 pub mod path;
+mod queue;
+mod record;
+mod sled_store;
 pub mod store;
+#[cfg(any(test, feature = "testkit"))]
+pub mod testkit;
 
 pub use crash::crash_point;
 pub use id::{Attempt, Clock, Epoch, Hash, JobId, Seq, SystemClock, Time, Token};
 pub use job::{Ending, Job, Kind, Publication, Source, State, Step};
+pub use memory::MemoryStore;
 pub use path::RelPath;
+pub use sled_store::{Opening, SledStore};
 pub use store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted};

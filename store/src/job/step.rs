@@ -127,7 +127,13 @@ impl Job {
             (State::Running { .. }, Step::HandBack | Step::Cancelled) => State::Cancelled { why: Withdrawal::Operator },
             (State::Running { .. }, Step::Withdrawn(why)) => State::Cancelled { why: *why },
             // A result that is there is not thrown away because a cancel came late.
-            (State::Running { .. } | State::Publishing { .. }, Step::Intend(publication)) => publishing(hold, publication),
+            (State::Running { .. }, Step::Intend(publication)) => publishing(hold, publication),
+            // Another name may be chosen, but not another result.
+            (State::Publishing { publication: earlier, .. }, Step::Intend(publication))
+                if (publication.ending, publication.output_hash) == (earlier.ending, earlier.output_hash) =>
+            {
+                publishing(hold, publication)
+            }
             (State::Concluded { ending, .. }, Step::Intend(publication)) if publication.ending == ending => {
                 publishing(hold, publication)
             }

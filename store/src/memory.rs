@@ -1,0 +1,144 @@
+//! The store's model: the same queue over tables in memory. For tests, and for runs that need not outlive the process.
+
+use std::collections::BTreeMap;
+use std::ops::Bound;
+use std::sync::{Arc, RwLock};
+
+use crate::id::{Clock, Epoch, JobId, Seq, SystemClock};
+use crate::job::{Job, Kind, Step};
+use crate::queue::{Put, Queue, Table, Tables, Visit};
+use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted};
+
+/// A [`JobStore`] that forgets everything when it is dropped.
+pub struct MemoryStore {
+    queue: Queue<Memory>,
+    clock: Arc<dyn Clock>,
+}
+
+impl Default for MemoryStore {
+    fn default() -> Self {
+        Self::new(Arc::new(SystemClock))
+    }
+}
+
+impl MemoryStore {
+    /// An empty store in its first epoch.
+    pub fn new(clock: Arc<dyn Clock>) -> Self {
+        Self::over(Memory::default(), clock)
+    }
+
+    /// What another daemon finds after this one died: the same jobs, in the next epoch.
+    pub fn restarted(self) -> Self {
+        Self::over(self.queue.into_tables(), self.clock)
+    }
+
+    fn over(tables: Memory, clock: Arc<dyn Clock>) -> Self {
+        // Opening fails only over damaged records or failing I/O; memory has neither.
+        match Queue::open(tables, Arc::clone(&clock)) {
+            Ok(queue) => Self { queue, clock },
+            Err(error) => unreachable!("tables in memory cannot be damaged: {error}"),
+        }
+    }
+}
+
+type Entries = BTreeMap<(Table, Vec<u8>), Vec<u8>>;
+
+#[derive(Default)]
+struct Memory(RwLock<Entries>);
+
+impl Tables for Memory {
+    fn get(&self, table: Table, key: &[u8]) -> Result<Option<Vec<u8>>, StoreError> {
+        let entries = self.0.read().unwrap_or_else(std::sync::PoisonError::into_inner);
+        Ok(entries.get(&(table, key.to_vec())).cloned())
+    }
+
+    fn scan(&self, table: Table, from: &[u8], to: &[u8], each: Visit<'_>) -> Result<(), StoreError> {
+        let entries = self.0.read().unwrap_or_else(std::sync::PoisonError::into_inner);
+        for ((here, key), value) in entries.range((Bound::Included((table, from.to_vec())), Bound::Unbounded)) {
+            if *here != table || (!to.is_empty() && key.as_slice() >= to) || !each(key, value)? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn write(&self, puts: Vec<Put>, _: Seq) -> Result<(), StoreError> {
+        let mut entries = self.0.write().unwrap_or_else(std::sync::PoisonError::into_inner);
+        for Put { table, key, value } in puts {
+            match value {
+                Some(value) => entries.insert((table, key), value),
+                None => entries.remove(&(table, key)),
+            };
+        }
+        Ok(())
+    }
+
+    fn settle(&self, _: (Epoch, Seq)) -> Result<(), StoreError> {
+        Ok(())
+    }
+
+    fn sound(&self) -> Result<(), StoreError> {
+        Ok(())
+    }
+}
+
+impl JobStore for MemoryStore {
+    fn submit(&self, found: &[Submission]) -> Result<Vec<Submitted>, StoreError> {
+        self.queue.submit(found)
+    }
+
+    fn claim(&self, want: &Filter) -> Result<Option<Claim>, StoreError> {
+        self.queue.claim(want)
+    }
+
+    fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError> {
+        self.queue.heartbeat(claim)
+    }
+
+    fn advance(&self, claim: &Claim, step: Step) -> Result<Job, StoreError> {
+        self.queue.advance(claim, step)
+    }
+
+    fn control(&self, id: JobId, wish: Control) -> Result<Job, StoreError> {
+        self.queue.control(id, wish)
+    }
+
+    fn recover(&self, innocent: &dyn Fn(&Job) -> bool) -> Result<Vec<Recovered>, StoreError> {
+        self.queue.recover(innocent)
+    }
+
+    fn get(&self, id: JobId) -> Result<Option<Job>, StoreError> {
+        self.queue.get(id)
+    }
+
+    fn list(&self, query: &Query) -> Result<Vec<Job>, StoreError> {
+        self.queue.list(query)
+    }
+
+    fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {
+        self.queue.counts()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testkit::{Subject, conformance};
+
+    struct Model(Option<MemoryStore>);
+
+    impl Subject for Model {
+        fn store(&self) -> &dyn JobStore {
+            self.0.as_ref().unwrap()
+        }
+
+        fn restart(&mut self) {
+            self.0 = self.0.take().map(MemoryStore::restarted);
+        }
+    }
+
+    #[test]
+    fn conforms() {
+        conformance(&|clock| Box::new(Model(Some(MemoryStore::new(clock)))));
+    }
+}

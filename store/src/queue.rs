@@ -1,0 +1,447 @@
+//! The queue's logic over four ordered tables, shared by every store that is embedded in the daemon.
+//!
+//! | table    | key                                                                     | value                     |
+//! |----------|-------------------------------------------------------------------------|---------------------------|
+//! | meta     | `head`                                                                  | [`Head`]                  |
+//! | jobs     | job number                                                              | the [`Job`]               |
+//! | by_state | kind, then what that kind is searched by (see [`index`])                | nothing                   |
+//! | by_key   | identity of the file: device, inode, size, mtime, folder, path          | number of its latest job  |
+//!
+//! Numbers in keys are big-endian. The job, its index entries and the head change in one transaction of the tables. One lock
+//! orders the transitions; becoming durable happens outside of it, so that transitions of several threads share one sync.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard};
+
+use serde::{Deserialize, Serialize};
+
+use crate::crash_point;
+use crate::id::{Clock, Epoch, JobId, Seq, Token};
+use crate::job::{Event, Illegal, Job, Kind, Source, State, Step};
+use crate::record;
+use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted};
+
+mod index;
+
+/// Longest folder or profile name, as it stands in a record.
+const MAX_NAME: usize = 100;
+/// Jobs taken in by one transaction of the tables.
+const SUBMIT_CHUNK: usize = 1000;
+const HEAD: &[u8] = b"head";
+
+/// One of the four tables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Table {
+    Meta,
+    Jobs,
+    ByState,
+    ByKey,
+}
+
+/// A change of one entry; without a value the entry goes.
+#[derive(Debug)]
+pub(crate) struct Put {
+    pub(crate) table: Table,
+    pub(crate) key: Vec<u8>,
+    pub(crate) value: Option<Vec<u8>>,
+}
+
+/// Ordered tables. A write is visible at once and durable after [`Tables::settle`].
+pub(crate) trait Tables: Send + Sync {
+    fn get(&self, table: Table, key: &[u8]) -> Result<Option<Vec<u8>>, StoreError>;
+    /// Entries from `from` on, `to` not included (no bound when empty), in order, until `each` says `false`.
+    fn scan(&self, table: Table, from: &[u8], to: &[u8], each: Visit<'_>) -> Result<(), StoreError>;
+    /// All of `puts`, or none.
+    fn write(&self, puts: Vec<Put>, seq: Seq) -> Result<(), StoreError>;
+    /// Returns when every write up to `seq` is durable.
+    fn settle(&self, at: (Epoch, Seq)) -> Result<(), StoreError>;
+    /// Fails when an earlier error left the tables in doubt.
+    fn sound(&self) -> Result<(), StoreError>;
+}
+
+/// Sees a key and its value; `false` ends the scan.
+pub(crate) type Visit<'a> = &'a mut dyn FnMut(&[u8], &[u8]) -> Result<bool, StoreError>;
+
+/// What there is one of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Head {
+    pub(crate) epoch: Epoch,
+    pub(crate) seq: Seq,
+    pub(crate) last_job: JobId,
+}
+
+struct Inner {
+    head: Head,
+    counts: BTreeMap<Kind, u64>,
+}
+
+/// The queue over `T`.
+pub(crate) struct Queue<T> {
+    tables: T,
+    inner: Mutex<Inner>,
+    clock: Arc<dyn Clock>,
+}
+
+/// The head of `tables`, `None` when they are empty.
+pub(crate) fn read_head(tables: &dyn Tables) -> Result<Option<Head>, StoreError> {
+    let Some(bytes) = tables.get(Table::Meta, HEAD)? else {
+        let mut empty = true;
+        tables.scan(Table::Jobs, &[], &[], &mut |_, _| {
+            empty = false;
+            Ok(false)
+        })?;
+        return if empty { Ok(None) } else { Err(record::corrupt("meta/head", "it is missing")) };
+    };
+    record::decode(Table::Meta, HEAD, &bytes).map(Some)
+}
+
+impl<T: Tables> Queue<T> {
+    /// Begins a new epoch, durably, after checking every job that is not at rest.
+    pub(crate) fn open(tables: T, clock: Arc<dyn Clock>) -> Result<Self, StoreError> {
+        let mut head = read_head(&tables)?.unwrap_or_default();
+        head.epoch.0 += 1;
+        head.seq.0 += 1;
+        let counts = index::count(&tables)?;
+        let queue = Self { tables, inner: Mutex::new(Inner { head, counts }), clock };
+        for kind in Kind::ALL.into_iter().filter(|kind| kind.is_live()) {
+            for id in index::ids(&queue.tables, kind)? {
+                let job = queue.job(id)?.ok_or_else(|| record::corrupt(&format!("job {id}"), "it is missing"))?;
+                if job.kind() != kind {
+                    return Err(record::corrupt(&format!("job {id}"), "its state and the index disagree"));
+                }
+            }
+        }
+        crash_point("store.open.checked");
+        queue.tables.write(vec![head_put(&head)?], head.seq)?;
+        crash_point("store.open.epoch");
+        queue.tables.settle((head.epoch, head.seq))?;
+        crash_point("store.open.done");
+        Ok(queue)
+    }
+
+    pub(crate) fn tables(&self) -> &T {
+        &self.tables
+    }
+
+    pub(crate) fn into_tables(self) -> T {
+        self.tables
+    }
+
+    pub(crate) fn epoch(&self) -> Epoch {
+        self.lock().head.epoch
+    }
+
+    /// Where the queue stands: what a later opening must not fall behind, once settled.
+    pub(crate) fn reached(&self) -> (Epoch, Seq) {
+        let head = self.lock().head;
+        (head.epoch, head.seq)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Inner> {
+        // The guarded values change only after a write succeeded, by plain assignments: a panic elsewhere leaves them whole.
+        self.inner.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+
+    fn job(&self, id: JobId) -> Result<Option<Job>, StoreError> {
+        let key = id.0.to_be_bytes();
+        let bytes = self.tables.get(Table::Jobs, &key)?;
+        let job: Option<Job> = bytes.map(|bytes| record::decode(Table::Jobs, &key, &bytes)).transpose()?;
+        match &job {
+            Some(job) if job.id != id => Err(record::corrupt(&format!("job {id}"), "it is another job's")),
+            _ => Ok(job),
+        }
+    }
+
+    fn known(&self, id: JobId) -> Result<Job, StoreError> {
+        self.job(id)?.ok_or(StoreError::Unknown(id))
+    }
+
+    /// Makes the changes `from → to` (and `more`) durable. `head` is the head they leave.
+    fn commit(
+        &self,
+        mut inner: MutexGuard<'_, Inner>,
+        head: Head,
+        changes: &[(Option<&Job>, &Job)],
+        more: Vec<Put>,
+    ) -> Result<(), StoreError> {
+        let mut puts = more;
+        let mut counts = inner.counts.clone();
+        for (from, to) in changes {
+            let old = from.map(index::key);
+            let new = index::key(to);
+            if let Some(old) = old.filter(|old| *old != new) {
+                puts.push(Put { table: Table::ByState, key: old, value: None });
+            }
+            puts.push(Put { table: Table::ByState, key: new, value: Some(Vec::new()) });
+            let key = to.id.0.to_be_bytes().to_vec();
+            let value = record::encode(Table::Jobs, &key, to)?;
+            puts.push(Put { table: Table::Jobs, key, value: Some(value) });
+            if let Some(from) = from {
+                let count = counts.entry(from.kind()).or_default();
+                *count = count.saturating_sub(1);
+            }
+            *counts.entry(to.kind()).or_default() += 1;
+        }
+        puts.push(head_put(&head)?);
+        self.tables.write(puts, head.seq)?;
+        *inner = Inner { head, counts };
+        drop(inner);
+        crash_point("store.commit.written");
+        Ok(())
+    }
+
+    /// One event of one job, durable when this returns. `event` learns the head, whose number is that of the transition.
+    fn transition(&self, id: JobId, event: impl FnOnce(&Job, &Head) -> Result<Event, Illegal>) -> Result<Job, StoreError> {
+        self.tables.sound()?;
+        let now = self.clock.now();
+        let inner = self.lock();
+        let before = self.known(id)?;
+        let mut head = inner.head;
+        head.seq.0 += 1;
+        let after = event(&before, &head).and_then(|event| before.after(&event, now));
+        let mut after = after.map_err(|source| StoreError::Illegal { id, source })?;
+        after.seq = head.seq;
+        self.commit(inner, head, &[(Some(&before), &after)], Vec::new())?;
+        self.settle(head)?;
+        Ok(after)
+    }
+
+    fn settle(&self, head: Head) -> Result<(), StoreError> {
+        self.tables.settle((head.epoch, head.seq))?;
+        crash_point("store.commit.durable");
+        Ok(())
+    }
+
+    /// Takes in one chunk; answers and head in return.
+    fn submit_chunk(&self, found: &[Submission], answers: &mut Vec<Submitted>) -> Result<Option<Head>, StoreError> {
+        let now = self.clock.now();
+        let inner = self.lock();
+        let mut head = inner.head;
+        let mut jobs: Vec<Job> = Vec::new();
+        let mut keys = BTreeMap::new();
+        for submission in found {
+            let key = identity(&submission.source);
+            if let Some(id) = keys.get(&key).copied().map_or_else(|| self.answering(&key), |id| Ok(Some(id)))? {
+                answers.push(Submitted { id, new: false });
+                continue;
+            }
+            head.seq.0 += 1;
+            head.last_job.0 += 1;
+            let id = head.last_job;
+            let source = submission.source.clone();
+            let mut job = match &submission.foreign {
+                None => Job::queued(id, source, now),
+                Some(what) => Job::noticed(id, source, what, now),
+            };
+            job.seq = head.seq;
+            jobs.push(job);
+            keys.insert(key, id);
+            answers.push(Submitted { id, new: true });
+        }
+        if jobs.is_empty() {
+            return Ok(None);
+        }
+        let mut puts = Vec::with_capacity(4 * jobs.len());
+        for (key, id) in keys {
+            let value = record::encode(Table::ByKey, &key, &id)?;
+            puts.push(Put { table: Table::ByKey, key, value: Some(value) });
+        }
+        let changes: Vec<_> = jobs.iter().map(|job| (None, job)).collect();
+        self.commit(inner, head, &changes, puts)?;
+        Ok(Some(head))
+    }
+
+    /// The job that answers for the file with this identity already.
+    fn answering(&self, key: &[u8]) -> Result<Option<JobId>, StoreError> {
+        let Some(bytes) = self.tables.get(Table::ByKey, key)? else { return Ok(None) };
+        let id: JobId = record::decode(Table::ByKey, key, &bytes)?;
+        Ok(self.job(id)?.filter(Job::answers_for_source).map(|job| job.id))
+    }
+
+    /// Jobs under a claim of an earlier epoch.
+    fn orphans(&self, epoch: Epoch) -> Result<Vec<Job>, StoreError> {
+        let mut orphans = Vec::new();
+        for kind in Kind::ALL.into_iter().filter(|kind| kind.is_held()) {
+            for id in index::ids(&self.tables, kind)? {
+                let job = self.known(id)?;
+                if job.hold().is_some_and(|hold| hold.epoch < epoch) {
+                    orphans.push(job);
+                }
+            }
+        }
+        orphans.sort_by_key(|job| job.id);
+        Ok(orphans)
+    }
+}
+
+impl<T: Tables> JobStore for Queue<T> {
+    fn submit(&self, found: &[Submission]) -> Result<Vec<Submitted>, StoreError> {
+        self.tables.sound()?;
+        for submission in found {
+            fits("the folder's name", &submission.source.folder)?;
+            fits("the profile's name", &submission.source.profile)?;
+        }
+        let mut answers = Vec::with_capacity(found.len());
+        let mut last = None;
+        for chunk in found.chunks(SUBMIT_CHUNK) {
+            last = self.submit_chunk(chunk, &mut answers)?.or(last);
+        }
+        // What was known already may be another thread's, not yet durable: settle in any case.
+        let head = last.unwrap_or_else(|| self.lock().head);
+        self.settle(head)?;
+        Ok(answers)
+    }
+
+    fn claim(&self, want: &Filter) -> Result<Option<Claim>, StoreError> {
+        self.tables.sound()?;
+        let now = self.clock.now();
+        let inner = self.lock();
+        let Some(id) = index::first_due(&self.tables, want, now)? else { return Ok(None) };
+        let before = self.known(id)?;
+        let mut head = inner.head;
+        head.seq.0 += 1;
+        let token = Token(head.seq.0);
+        let event = Event::Claim { epoch: head.epoch, token };
+        let mut job = before.after(&event, now).map_err(|source| StoreError::Illegal { id, source })?;
+        job.seq = head.seq;
+        self.commit(inner, head, &[(Some(&before), &job)], Vec::new())?;
+        self.settle(head)?;
+        Ok(Some(Claim { id, token, job }))
+    }
+
+    fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError> {
+        let epoch = self.epoch();
+        let job = self.known(claim.id)?;
+        Ok(match (job.hold(), &job.state) {
+            (Some(hold), _) if hold.token != claim.token || hold.epoch != epoch => Lease::Lost,
+            (Some(_), State::Running { cancel: true, .. }) => Lease::Cancel,
+            (Some(_), _) => Lease::Held,
+            (None, _) => Lease::Lost,
+        })
+    }
+
+    fn advance(&self, claim: &Claim, step: Step) -> Result<Job, StoreError> {
+        self.transition(claim.id, |job, head| match job.hold() {
+            Some(hold) if hold.epoch == head.epoch => Ok(Event::Step { token: claim.token, step }),
+            _ => Err(Illegal::Fenced),
+        })
+    }
+
+    fn control(&self, id: JobId, wish: Control) -> Result<Job, StoreError> {
+        self.transition(id, |_, _| {
+            Ok(match wish {
+                Control::Retry => Event::Retry,
+                Control::Cancel => Event::Cancel,
+                Control::Forget => Event::Forget,
+            })
+        })
+    }
+
+    fn recover(&self, innocent: &dyn Fn(&Job) -> bool) -> Result<Vec<Recovered>, StoreError> {
+        self.tables.sound()?;
+        let now = self.clock.now();
+        // The witness may look at files and call back: not under the lock. No one else can touch what an earlier epoch holds,
+        // but for an operator's cancel, which is why the jobs are read again below.
+        let suspects = self.orphans(self.epoch())?;
+        let running = |job: &Job| matches!(job.state, State::Running { .. });
+        let alone = suspects.iter().filter(|job| running(job)).count() == 1;
+        let cleared: Vec<JobId> = suspects.iter().filter(|job| running(job) && innocent(job)).map(|job| job.id).collect();
+
+        let inner = self.lock();
+        let mut head = inner.head;
+        let orphans = self.orphans(head.epoch)?;
+        let mut recovered = Vec::with_capacity(orphans.len());
+        for job in &orphans {
+            recovered.push(take_back(job, &mut head, alone, cleared.contains(&job.id), now)?);
+        }
+        if recovered.is_empty() {
+            return Ok(recovered);
+        }
+        // All in one transaction: whether a job was alone can only be told while none of them is taken back yet.
+        let changes: Vec<_> = orphans.iter().zip(&recovered).map(|(from, to)| (Some(from), &to.job)).collect();
+        self.commit(inner, head, &changes, Vec::new())?;
+        self.settle(head)?;
+        Ok(recovered)
+    }
+
+    fn get(&self, id: JobId) -> Result<Option<Job>, StoreError> {
+        self.job(id)
+    }
+
+    fn list(&self, query: &Query) -> Result<Vec<Job>, StoreError> {
+        let limit = if query.limit == 0 { usize::MAX } else { query.limit };
+        let mut jobs = Vec::new();
+        if query.kinds.is_empty() {
+            let from = query.after.0.saturating_add(1).to_be_bytes();
+            self.tables.scan(Table::Jobs, &from, &[], &mut |key, value| {
+                jobs.push(record::decode(Table::Jobs, key, value)?);
+                Ok(jobs.len() < limit)
+            })?;
+            return Ok(jobs);
+        }
+        let mut ids = Vec::new();
+        for kind in &query.kinds {
+            ids.extend(index::ids(&self.tables, *kind)?.into_iter().filter(|id| *id > query.after));
+        }
+        ids.sort_unstable();
+        ids.dedup();
+        for id in ids {
+            // A job may have moved on since the index was read.
+            let job = self.known(id)?;
+            if query.kinds.contains(&job.kind()) {
+                jobs.push(job);
+                if jobs.len() == limit {
+                    break;
+                }
+            }
+        }
+        Ok(jobs)
+    }
+
+    fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {
+        let inner = self.lock();
+        Ok(Kind::ALL.into_iter().map(|kind| (kind, inner.counts.get(&kind).copied().unwrap_or(0))).collect())
+    }
+}
+
+/// One orphan after the death of its daemon; counts on in `head`.
+fn take_back(job: &Job, head: &mut Head, alone: bool, innocent: bool, now: crate::id::Time) -> Result<Recovered, StoreError> {
+    let illegal = |source| StoreError::Illegal { id: job.id, source };
+    let void = job.hold().map(|hold| hold.token).unwrap_or_default();
+    head.seq.0 += 1;
+    let mut after = match job.state {
+        State::Running { .. } => job.after(&Event::Interrupted { alone, innocent }, now).map_err(illegal)?,
+        _ => job.clone(),
+    };
+    let token = Token(head.seq.0);
+    let held = after.hold().is_some();
+    if held {
+        after = after.after(&Event::Reclaim { epoch: head.epoch, token }, now).map_err(illegal)?;
+    }
+    after.seq = head.seq;
+    let claim = held.then(|| Claim { id: job.id, token, job: after.clone() });
+    Ok(Recovered { job: after, void, claim })
+}
+
+fn head_put(head: &Head) -> Result<Put, StoreError> {
+    Ok(Put { table: Table::Meta, key: HEAD.to_vec(), value: Some(record::encode(Table::Meta, HEAD, head)?) })
+}
+
+fn fits(what: &str, name: &str) -> Result<(), StoreError> {
+    let length = serde_json::to_string(name).map_or(usize::MAX, |text| text.len());
+    if length > MAX_NAME { Err(StoreError::TooLong { what: format!("{what} {name:?}") }) } else { Ok(()) }
+}
+
+/// What makes a dropped file that file. The profile is not part of it: a changed setting does not make a new drop.
+fn identity(source: &Source) -> Vec<u8> {
+    let folder = source.folder.as_bytes();
+    let mut key = Vec::with_capacity(40 + folder.len() + source.path.as_bytes().len());
+    for number in [source.dev, source.ino, source.size] {
+        key.extend_from_slice(&number.to_be_bytes());
+    }
+    key.extend_from_slice(&source.mtime_ns.to_be_bytes());
+    key.extend_from_slice(&(folder.len() as u64).to_be_bytes());
+    key.extend_from_slice(folder);
+    key.extend_from_slice(source.path.as_bytes());
+    key
+}

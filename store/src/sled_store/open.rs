@@ -1,0 +1,145 @@
+//! Opening the database: what may have been left by a crash is cleared away, what is damaged is examined on a copy, and nothing is
+//! accepted that lacks an acknowledged transition.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::Opening;
+use super::files::{self, Mark, io};
+use super::tables::SledTables;
+use crate::crash_point;
+use crate::id::{Clock, Epoch, Seq};
+use crate::queue::{Queue, read_head};
+use crate::store::StoreError;
+
+/// The queue in `state`, whose lock is held, in a new epoch.
+pub(super) fn queue(state: &Path, clock: &Arc<dyn Clock>) -> Result<(Queue<SledTables>, Opening), StoreError> {
+    let mut opening = Opening::default();
+    let mark = prepare(state)?;
+    let dir = state.join("db");
+    opening.torn_snapshots = files::remove_torn(&dir)?;
+    if opening.torn_snapshots > 0 {
+        tracing::warn!(count = opening.torn_snapshots, "removed torn snapshots that a crash had left in the job database");
+    }
+    crash_point("store.open.cleared");
+    let tables = match patiently(state, &dir) {
+        Ok(tables) => tables,
+        Err(error) if is_damage(&error) => {
+            let aside = state.join(format!("corrupt-{}", clock.now()));
+            set_aside(state, mark, &error, &aside)?;
+            tracing::warn!(%error, aside = %aside.display(), "the job database was damaged and has been restored without its snapshot");
+            opening.set_aside = Some(aside);
+            patiently(state, &dir)?
+        }
+        Err(error) => return Err(error),
+    };
+    check(state, &tables, mark)?;
+    if mark == Mark::Damaged {
+        tracing::warn!("SEQ was damaged; the job database itself is sound, and SEQ is written anew");
+    }
+    let queue = Queue::open(tables, Arc::clone(clock))?;
+    files::sync_dir(state)?;
+    opening.epoch = queue.epoch();
+    Ok((queue, opening))
+}
+
+/// Makes the folder fit for sled: an examination that a crash cut short is ended, and a first `SEQ` says that nothing was
+/// acknowledged yet, before there is a database.
+fn prepare(state: &Path) -> Result<Mark, StoreError> {
+    let (dir, trial) = (state.join("db"), state.join("db.trial"));
+    if trial.exists() {
+        if dir.exists() {
+            std::fs::remove_dir_all(&trial).map_err(io(&trial, "removing"))?;
+        } else {
+            // The database is moved away only after the copy was found good.
+            std::fs::rename(&trial, &dir).map_err(io(&trial, "renaming"))?;
+        }
+    }
+    let mark = files::read_mark(state)?;
+    if mark == Mark::Missing && !dir.exists() {
+        files::write_mark(state, Epoch(0), Seq(0))?;
+        return Ok(Mark::Reached(Epoch(0), Seq(0)));
+    }
+    Ok(mark)
+}
+
+/// Opens; the lock of handles that were just dropped may take a moment to go.
+fn patiently(state: &Path, dir: &Path) -> Result<SledTables, StoreError> {
+    let mut tries = 40;
+    loop {
+        match SledTables::open(state, dir) {
+            Err(StoreError::Backend(sled::Error::Io(error))) if tries > 0 && error.kind() == std::io::ErrorKind::WouldBlock => {
+                tries -= 1;
+                std::thread::sleep(Duration::from_millis(25));
+            }
+            other => return other,
+        }
+    }
+}
+
+/// Is it the database that is wrong, not the world around it?
+fn is_damage(error: &StoreError) -> bool {
+    match error {
+        StoreError::Backend(sled::Error::Io(error)) => {
+            matches!(
+                error.kind(),
+                std::io::ErrorKind::UnexpectedEof | std::io::ErrorKind::InvalidData | std::io::ErrorKind::Other
+            )
+        }
+        StoreError::Backend(_) => true,
+        _ => false,
+    }
+}
+
+/// Refuses a database that is behind `mark`.
+fn check(state: &Path, tables: &SledTables, mark: Mark) -> Result<(), StoreError> {
+    let head = read_head(tables)?.unwrap_or_default();
+    match mark {
+        Mark::Reached(epoch, seq) if (head.epoch, head.seq) < (epoch, seq) || head.epoch < epoch || head.seq < seq => {
+            Err(StoreError::RolledBack {
+                path: state.to_owned(),
+                found: (head.epoch, head.seq),
+                reached: (epoch, seq),
+                advice: advice(state),
+            })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Replaces the damaged database by what its log says without the snapshot, if that is not behind `mark`; or by nothing, when
+/// nothing was ever acknowledged. The damaged one is kept as `aside`.
+fn set_aside(state: &Path, mark: Mark, damage: &StoreError, aside: &Path) -> Result<(), StoreError> {
+    let (dir, trial) = (state.join("db"), state.join("db.trial"));
+    let unusable = |reason: String| StoreError::Unusable { path: state.to_owned(), reason, advice: advice(state) };
+    if mark == Mark::Reached(Epoch(0), Seq(0)) {
+        std::fs::rename(&dir, aside).map_err(io(&dir, "setting aside"))?;
+        return files::sync_dir(state);
+    }
+    if !matches!(mark, Mark::Reached(..)) {
+        return Err(unusable(format!(
+            "{damage}; SEQ, which would tell whether an older state is the latest, is gone or damaged"
+        )));
+    }
+    files::copy_dir(&dir, &trial, files::is_snapshot)?;
+    let examined = SledTables::open(state, &trial).and_then(|tables| check(state, &tables, mark));
+    if let Err(error) = examined {
+        std::fs::remove_dir_all(&trial).map_err(io(&trial, "removing"))?;
+        return Err(unusable(format!("{damage}; without its snapshot: {error}")));
+    }
+    files::sync_all(&trial)?;
+    std::fs::rename(&dir, aside).map_err(io(&dir, "setting aside"))?;
+    crash_point("store.open.aside");
+    std::fs::rename(&trial, &dir).map_err(io(&trial, "renaming"))?;
+    files::sync_dir(state)
+}
+
+/// How to go on without the database.
+fn advice(state: &Path) -> String {
+    format!(
+        "no mesh is lost: originals are in the hot folders, and each result has its receipt beside it. To begin anew, move {} away \
+         and start again; files that still stand in in/ are then taken as new",
+        state.display()
+    )
+}

@@ -1,0 +1,228 @@
+//! The four tables as sled trees, and the one place where they become durable.
+
+use std::fs::File;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::{Condvar, Mutex, MutexGuard};
+
+use sled::transaction::{TransactionError, TransactionResult, Transactional};
+
+use super::files::{self, io};
+use crate::crash_point;
+use crate::id::{Epoch, Seq};
+use crate::queue::{Put, Table, Tables, Visit};
+use crate::store::StoreError;
+
+/// Transitions between two marks in `SEQ`.
+const MARK_EVERY: u64 = 64;
+
+pub(super) struct SledTables {
+    state: PathBuf,
+    dir: PathBuf,
+    db: sled::Db,
+    meta: sled::Tree,
+    jobs: sled::Tree,
+    by_state: sled::Tree,
+    by_key: sled::Tree,
+    /// Our own handle of the database file: the only way to a real sync.
+    file: File,
+    progress: Mutex<Progress>,
+    synced: Condvar,
+}
+
+#[derive(Default)]
+struct Progress {
+    written: Seq,
+    durable: Seq,
+    marked: Option<Seq>,
+    /// A thread is syncing for all who wait.
+    syncing: bool,
+    poisoned: Option<String>,
+}
+
+/// Runs `act` of sled, which may panic over damaged files; that is an error like any other.
+fn guarded<T>(act: impl FnOnce() -> Result<T, StoreError>) -> Result<T, StoreError> {
+    catch_unwind(AssertUnwindSafe(act)).unwrap_or_else(|panic| {
+        let text = panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
+        let what = text.unwrap_or("no message").to_owned();
+        Err(StoreError::Backend(sled::Error::ReportableBug(format!("it panicked: {what}"))))
+    })
+}
+
+impl SledTables {
+    /// Opens the database in `dir`; its marks go to `state`.
+    pub(super) fn open(state: &Path, dir: &Path) -> Result<Self, StoreError> {
+        guarded(|| {
+            let db = sled::Config::new()
+                .path(dir)
+                .cache_capacity(64 << 20)
+                .segment_size(64 << 10)
+                .flush_every_ms(Some(200))
+                .mode(sled::Mode::LowSpace)
+                .open()
+                .map_err(StoreError::Backend)?;
+            crash_point("store.open.sled");
+            let tree = |name: &str| db.open_tree(name).map_err(StoreError::Backend);
+            let (meta, jobs, by_state, by_key) = (tree("meta")?, tree("jobs")?, tree("by_state")?, tree("by_key")?);
+            let path = dir.join("db");
+            let file = File::open(&path).map_err(io(&path, "opening the database file"))?;
+            Ok(Self {
+                state: state.to_owned(),
+                dir: dir.to_owned(),
+                db,
+                meta,
+                jobs,
+                by_state,
+                by_key,
+                file,
+                progress: Mutex::default(),
+                synced: Condvar::new(),
+            })
+        })
+    }
+
+    #[cfg(test)]
+    pub(super) fn raw_jobs(&self) -> &sled::Tree {
+        &self.jobs
+    }
+
+    fn tree(&self, table: Table) -> &sled::Tree {
+        match table {
+            Table::Meta => &self.meta,
+            Table::Jobs => &self.jobs,
+            Table::ByState => &self.by_state,
+            Table::ByKey => &self.by_key,
+        }
+    }
+
+    fn progress(&self) -> MutexGuard<'_, Progress> {
+        // Plain values, set by assignments: whole even if a thread panicked while it held the lock.
+        self.progress.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+
+    /// Remembers that the database is in doubt, and why.
+    pub(super) fn poison(&self, error: StoreError) -> StoreError {
+        tracing::error!(%error, "the job database must be opened again");
+        self.progress().poisoned.get_or_insert_with(|| error.to_string());
+        error
+    }
+
+    /// Makes everything written durable.
+    fn sync(&self) -> Result<(), StoreError> {
+        guarded(|| {
+            self.db.flush().map_err(StoreError::Backend)?;
+            crash_point("store.sync.flushed");
+            self.file.sync_data().map_err(io(&self.dir.join("db"), "syncing the database file"))?;
+            crash_point("store.sync.synced");
+            Ok(())
+        })
+    }
+
+    /// Notes in `SEQ` that everything up to `at` is durable.
+    pub(super) fn note(&self, at: (Epoch, Seq)) -> Result<(), StoreError> {
+        self.sound()?;
+        self.sync()?;
+        self.mark(at)
+    }
+
+    fn mark(&self, (epoch, seq): (Epoch, Seq)) -> Result<(), StoreError> {
+        // sled replaces its snapshots by renaming; now and then these names are made durable, too.
+        files::sync_dir(&self.dir)?;
+        files::write_mark(&self.state, epoch, seq)?;
+        self.progress().marked = Some(seq);
+        Ok(())
+    }
+
+    /// One thread's turn to sync for all: `target` was written before the sync began.
+    fn lead(&self, epoch: Epoch, target: Seq, marked: Option<Seq>) -> Result<(), StoreError> {
+        self.sync()?;
+        if marked.is_none_or(|marked| target.0 >= marked.0 + MARK_EVERY) {
+            self.mark((epoch, target))?;
+        }
+        Ok(())
+    }
+}
+
+impl Tables for SledTables {
+    fn get(&self, table: Table, key: &[u8]) -> Result<Option<Vec<u8>>, StoreError> {
+        let read = guarded(|| self.tree(table).get(key).map_err(StoreError::Backend));
+        Ok(read.map_err(|error| self.poison(error))?.map(|value| value.to_vec()))
+    }
+
+    fn scan(&self, table: Table, from: &[u8], to: &[u8], each: Visit<'_>) -> Result<(), StoreError> {
+        let tree = self.tree(table);
+        let entries = if to.is_empty() { tree.range(from..) } else { tree.range(from..to) };
+        let mut entries = entries;
+        while let Some(entry) =
+            guarded(|| entries.next().transpose().map_err(StoreError::Backend)).map_err(|error| self.poison(error))?
+        {
+            if !each(&entry.0, &entry.1)? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn write(&self, puts: Vec<Put>, seq: Seq) -> Result<(), StoreError> {
+        self.sound()?;
+        let trees = (&self.meta, &self.jobs, &self.by_state, &self.by_key);
+        let written = guarded(|| {
+            let result: TransactionResult<(), ()> = trees.transaction(|(meta, jobs, by_state, by_key)| {
+                for put in &puts {
+                    let tree = match put.table {
+                        Table::Meta => meta,
+                        Table::Jobs => jobs,
+                        Table::ByState => by_state,
+                        Table::ByKey => by_key,
+                    };
+                    match &put.value {
+                        Some(value) => tree.insert(put.key.as_slice(), value.as_slice())?,
+                        None => tree.remove(put.key.as_slice())?,
+                    };
+                }
+                Ok(())
+            });
+            result.map_err(|error| match error {
+                TransactionError::Storage(error) => StoreError::Backend(error),
+                TransactionError::Abort(()) => StoreError::Poisoned { reason: "a transaction was aborted".into() },
+            })
+        });
+        written.map_err(|error| self.poison(error))?;
+        self.progress().written = seq;
+        Ok(())
+    }
+
+    fn settle(&self, (epoch, seq): (Epoch, Seq)) -> Result<(), StoreError> {
+        let mut progress = self.progress();
+        loop {
+            if progress.durable >= seq {
+                return Ok(());
+            }
+            if let Some(reason) = &progress.poisoned {
+                return Err(StoreError::Poisoned { reason: reason.clone() });
+            }
+            if progress.syncing {
+                progress = self.synced.wait(progress).unwrap_or_else(std::sync::PoisonError::into_inner);
+                continue;
+            }
+            progress.syncing = true;
+            let (target, marked) = (progress.written, progress.marked);
+            drop(progress);
+            let led = self.lead(epoch, target, marked).map_err(|error| self.poison(error));
+            progress = self.progress();
+            progress.syncing = false;
+            if led.is_ok() {
+                progress.durable = target;
+            }
+            self.synced.notify_all();
+            led?;
+        }
+    }
+
+    fn sound(&self) -> Result<(), StoreError> {
+        match &self.progress().poisoned {
+            Some(reason) => Err(StoreError::Poisoned { reason: reason.clone() }),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! The faults the store is built against, each by name.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::files::{self, Mark};
+use super::*;
+use crate::id::Seq;
+use crate::testkit::{Subject, conformance, dropped};
+
+struct OnDisk {
+    state: tempfile::TempDir,
+    clock: Arc<dyn Clock>,
+    store: Option<SledStore>,
+}
+
+impl Subject for OnDisk {
+    fn store(&self) -> &dyn JobStore {
+        self.store.as_ref().unwrap()
+    }
+
+    fn restart(&mut self) {
+        drop(self.store.take());
+        self.store = Some(SledStore::open_with(self.state.path(), Arc::clone(&self.clock)).unwrap());
+    }
+}
+
+#[test]
+fn conforms() {
+    conformance(&|clock| {
+        let state = tempfile::tempdir().unwrap();
+        let store = Some(SledStore::open_with(state.path(), Arc::clone(&clock)).unwrap());
+        Box::new(OnDisk { state, clock, store })
+    });
+}
+
+fn submit(store: &SledStore, name: &str) -> JobId {
+    store.submit(&[dropped(name, 84).unwrap()]).unwrap()[0].id
+}
+
+/// F4: a kill while sled wrote its snapshot.
+#[test]
+fn a_torn_snapshot_does_not_keep_the_store_shut() {
+    let state = tempfile::tempdir().unwrap();
+    let id = submit(&SledStore::open(state.path()).unwrap(), "part.stl");
+    std::fs::write(state.path().join("db/snap.FFFFFFFFFFFFFFF0.generating"), b"torn").unwrap();
+    let store = SledStore::open(state.path()).unwrap();
+    assert_eq!(store.opening().torn_snapshots, 1);
+    assert_eq!(store.opening().set_aside, None);
+    assert!(store.get(id).unwrap().is_some());
+}
+
+/// F16: two daemons, one state folder.
+#[test]
+fn a_second_daemon_is_told_who_owns_the_store() {
+    let state = tempfile::tempdir().unwrap();
+    let first = SledStore::open(state.path()).unwrap();
+    let second = SledStore::open(state.path()).err().unwrap();
+    assert!(matches!(second, StoreError::Locked { pid: Some(pid), .. } if pid == std::process::id()), "{second:?}");
+    assert_eq!(second.exit_code(), 73);
+    assert!(second.to_string().contains(&std::process::id().to_string()));
+    drop(first);
+    assert_eq!(SledStore::open(state.path()).unwrap().opening().epoch, Epoch(2));
+}
+
+/// F5: a record that the database hands out damaged.
+#[test]
+fn a_flipped_bit_is_an_error_not_another_value() {
+    let state = tempfile::tempdir().unwrap();
+    let store = SledStore::open(state.path()).unwrap();
+    let id = submit(&store, "part.stl");
+    let whole = store.get(id).unwrap().unwrap();
+    let key = id.0.to_be_bytes();
+    let Live::Open(queue) = &*store.live.read().unwrap() else { panic!("it is open") };
+    let jobs = queue.tables().raw_jobs();
+    let bytes = jobs.get(key).unwrap().unwrap().to_vec();
+    for bit in 0..bytes.len() * 8 {
+        let mut damaged = bytes.clone();
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        jobs.insert(key, damaged).unwrap();
+        assert!(matches!(queue.get(id), Err(StoreError::Corrupt { .. })), "bit {bit}");
+    }
+    jobs.insert(key, &bytes[..5]).unwrap();
+    assert!(matches!(queue.get(id), Err(StoreError::Corrupt { .. })));
+    jobs.insert(2_u64.to_be_bytes(), bytes.clone()).unwrap();
+    assert!(matches!(queue.get(JobId(2)), Err(StoreError::Corrupt { .. })), "under another job's key");
+    jobs.insert(key, bytes).unwrap();
+    assert_eq!(queue.get(id).unwrap(), Some(whole));
+}
+
+/// F5: the database opens, but an acknowledged transition is not in it.
+#[test]
+fn a_store_that_went_back_in_time_is_refused() {
+    let state = tempfile::tempdir().unwrap();
+    submit(&SledStore::open(state.path()).unwrap(), "a.stl");
+    let older = state.path().join("older");
+    files::copy_dir(&state.path().join("db"), &older, |_| false).unwrap();
+    submit(&SledStore::open(state.path()).unwrap(), "b.stl");
+    std::fs::remove_dir_all(state.path().join("db")).unwrap();
+    std::fs::rename(&older, state.path().join("db")).unwrap();
+    let error = SledStore::open(state.path()).err().unwrap();
+    assert!(matches!(error, StoreError::RolledBack { found: (Epoch(1), _), reached: (Epoch(2), _), .. }), "{error:?}");
+    assert_eq!(error.exit_code(), 75);
+    // The same without any database.
+    std::fs::remove_dir_all(state.path().join("db")).unwrap();
+    let error = SledStore::open(state.path()).err().unwrap();
+    assert!(matches!(error, StoreError::RolledBack { found: (Epoch(0), Seq(0)), .. }), "{error:?}");
+}
+
+/// F6: the whole state folder is gone: a new store, without complaint.
+#[test]
+fn an_empty_folder_is_a_new_store() {
+    let state = tempfile::tempdir().unwrap();
+    let path = state.path().join("deep/state");
+    submit(&SledStore::open(&path).unwrap(), "a.stl");
+    std::fs::remove_dir_all(&path).unwrap();
+    let store = SledStore::open(&path).unwrap();
+    assert_eq!(store.opening().epoch, Epoch(1));
+    assert_eq!(submit(&store, "a.stl"), JobId(1));
+}
+
+#[test]
+fn shutdown_notes_how_far_it_got() {
+    let state = tempfile::tempdir().unwrap();
+    let store = SledStore::open(state.path()).unwrap();
+    assert_eq!(files::read_mark(state.path()).unwrap(), Mark::Reached(Epoch(1), Seq(1)));
+    submit(&store, "a.stl");
+    assert_eq!(files::read_mark(state.path()).unwrap(), Mark::Reached(Epoch(1), Seq(1)), "only now and then");
+    drop(store);
+    assert_eq!(files::read_mark(state.path()).unwrap(), Mark::Reached(Epoch(1), Seq(2)));
+}
+
+fn snapshots(state: &Path) -> Vec<PathBuf> {
+    files::list(&state.join("db")).unwrap().into_iter().filter(|path| files::is_snapshot(path)).collect()
+}
+
+/// F5: the snapshot is damaged, the log is whole: everything comes back.
+#[test]
+fn a_damaged_snapshot_is_made_anew_from_the_log() {
+    let state = tempfile::tempdir().unwrap();
+    for name in ["a.stl", "b.stl", "c.stl"] {
+        // Each opening writes a snapshot of what the one before left.
+        submit(&SledStore::open(state.path()).unwrap(), name);
+    }
+    let snapshots = snapshots(state.path());
+    assert!(!snapshots.is_empty());
+    for path in &snapshots {
+        let mut bytes = std::fs::read(path).unwrap();
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 0xff;
+        std::fs::write(path, bytes).unwrap();
+    }
+    let store = SledStore::open(state.path()).unwrap();
+    let aside = store.opening().set_aside.unwrap();
+    assert!(aside.join("db").exists(), "the damaged one is kept");
+    assert_eq!(store.list(&Query::default()).unwrap().len(), 3);
+    assert_eq!(store.opening().epoch, Epoch(4));
+    drop(store);
+    assert_eq!(SledStore::open(state.path()).unwrap().opening().set_aside, None);
+}
+
+/// F5: the log is cut: what is left is older than what was acknowledged, and is refused, as often as it is asked.
+#[test]
+fn a_cut_log_is_refused_and_left_as_it_is() {
+    let state = tempfile::tempdir().unwrap();
+    let store = SledStore::open(state.path()).unwrap();
+    let found: Vec<_> = (0..500).map(|at| dropped(&format!("{at}.stl"), at).unwrap()).collect();
+    store.submit(&found).unwrap();
+    drop(store);
+    drop(SledStore::open(state.path()).unwrap());
+    let log = state.path().join("db/db");
+    let length = std::fs::metadata(&log).unwrap().len();
+    File::options().write(true).open(&log).unwrap().set_len(length / 2).unwrap();
+    for _ in 0..2 {
+        let before = files::list(&state.path().join("db")).unwrap();
+        let error = SledStore::open(state.path()).err().unwrap();
+        assert!(matches!(error, StoreError::Unusable { .. } | StoreError::RolledBack { .. }), "{error:?}");
+        assert_eq!(error.exit_code(), 75);
+        assert!(error.to_string().contains("To begin anew"), "{error}");
+        assert_eq!(files::list(&state.path().join("db")).unwrap(), before);
+    }
+}
+
+#[test]
+fn reopening_begins_a_new_epoch_and_keeps_everything() {
+    let state = tempfile::tempdir().unwrap();
+    let store = SledStore::open(state.path()).unwrap();
+    let id = submit(&store, "part.stl");
+    let claim = store.claim(&Filter::default()).unwrap().unwrap();
+    {
+        let Live::Open(queue) = &*store.live.read().unwrap() else { panic!("it is open") };
+        queue.tables().poison(StoreError::Poisoned { reason: "no space left".into() });
+    }
+    let refused = store.advance(&claim, Step::HandBack).unwrap_err();
+    assert!(matches!(&refused, StoreError::Poisoned { reason } if reason.contains("no space left")), "{refused:?}");
+    assert!(matches!(store.claim(&Filter::default()), Err(StoreError::Poisoned { .. })));
+    assert!(store.get(id).unwrap().is_some(), "reading goes on");
+    store.reopen().unwrap();
+    assert_eq!(store.opening().epoch, Epoch(2));
+    assert_eq!(store.heartbeat(&claim).unwrap(), Lease::Lost);
+    let recovered = store.recover(&|_| true).unwrap();
+    assert_eq!(recovered[0].void, claim.token);
+    assert_eq!(store.claim(&Filter::default()).unwrap().unwrap().id, id);
+}

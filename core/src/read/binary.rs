@@ -64,7 +64,7 @@ pub(super) fn mismatched(bytes: &[u8]) -> Option<Result<Layout, Rejection>> {
     let triangles = match declared {
         0 | u32::MAX => {
             if !look_like_triangles(all, Normals::Checked) {
-                return (declared == 0 && is_blank(body)).then(|| Err(no_triangles()));
+                return (declared == 0 && is_blank(body.get(..1 << 20).unwrap_or(body))).then(|| Err(no_triangles()));
             }
             findings
                 .push(Finding::flaw(format!("header leaves the count open ({declared}), file holds {} triangles", all.len())));
@@ -86,7 +86,7 @@ pub(super) fn mismatched(bytes: &[u8]) -> Option<Result<Layout, Rejection>> {
             if !look_like_triangles(counted, Normals::Ignored) {
                 return None;
             }
-            if beyond.is_empty() || is_blank(beyond.as_flattened()) || !look_like_triangles(beyond, Normals::Checked) {
+            if beyond.is_empty() || !look_like_triangles(beyond, Normals::Checked) {
                 let trailing = body.len() - counted.as_flattened().len();
                 findings.push(Finding::flaw(format!("{trailing} {} after the last triangle, ignored", bytes_word(trailing))));
                 return Some(within_bounds(counted.len(), findings));
@@ -109,7 +109,7 @@ pub(super) fn mismatched(bytes: &[u8]) -> Option<Result<Layout, Rejection>> {
 pub(super) fn within_bounds(triangles: usize, findings: Vec<Finding>) -> Result<Layout, Rejection> {
     match triangles as u64 {
         0 => Err(no_triangles()),
-        many if many > MAX_TRIANGLES => Err(Rejection::TooMany(many)),
+        many if many > MAX_TRIANGLES => Err(Rejection::TooMany),
         _ => Ok(Layout { triangles, findings }),
     }
 }

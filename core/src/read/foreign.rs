@@ -40,7 +40,7 @@ pub(super) fn describe(bytes: &[u8]) -> String {
     let name = beginning(head).or_else(|| riff(head)).or_else(|| bitmap(head, bytes.len())).or_else(|| text(head));
     match name {
         Some(name) => format!("{name}, not an STL mesh"),
-        None if super::binary::is_blank(bytes) => "nothing but zero bytes".into(),
+        None if super::binary::is_blank(bytes.get(..1 << 20).unwrap_or(bytes)) => "nothing but zero bytes".into(),
         None if holds(head, b"facet normal") => "text STL with control characters among its first facets: damaged".into(),
         None if bytes.len() < 84 + 50 => format!("only {} bytes, too few for a single triangle", bytes.len()),
         None if is_text(head) => "text, but not of an STL: no \"solid\" with facets".into(),

@@ -18,7 +18,7 @@ use std::fs::{File, Metadata, OpenOptions};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
-use memmap2::Mmap;
+use memmap2::{Mmap, MmapOptions};
 
 use crate::Progress;
 use crate::error::{Error, Result};
@@ -55,17 +55,17 @@ enum Rejection {
     /// No mesh, or damaged beyond reading.
     Unreadable(String),
     /// More triangles than a binary STL can count.
-    TooMany(u64),
+    TooMany,
 }
 
 impl Rejection {
     fn at(self, path: &Path) -> Error {
         match self {
             Self::Unreadable(reason) => Error::Unreadable { path: path.to_owned(), reason },
-            Self::TooMany(triangles) => Error::Refused {
+            Self::TooMany => Error::Refused {
                 path: path.to_owned(),
-                reason: format!("{triangles} triangles"),
-                advice: format!("an STL holds at most {MAX_TRIANGLES}: split it"),
+                reason: format!("more than {MAX_TRIANGLES} triangles"),
+                advice: "split it, for no binary STL can count them".into(),
             },
         }
     }
@@ -117,20 +117,23 @@ pub struct MeshFile {
 
 impl MeshFile {
     /// Opens `path` and makes its records available. A text STL is parsed on the current rayon pool into a nameless file in
-    /// `spool`; its progress is reported in bytes as stage `read`.
+    /// `spool`, which should not be a memory file system; its progress is reported in bytes as stage `read`.
     ///
     /// # Errors
     /// [`Error::Unreadable`] for what is no mesh or holds no triangle, [`Error::Refused`] beyond [`MAX_TRIANGLES`],
-    /// [`Error::Io`] where opening, mapping or spooling fails.
+    /// [`Error::Io`] where opening, mapping or spooling fails, or with [`std::io::ErrorKind::Interrupted`] when `progress`
+    /// cancels.
     pub fn open(path: &Path, spool: &Path, limits: &Limits, progress: &dyn Progress) -> Result<Self> {
         let (file, identity) = open_regular(path)?;
         if identity.size == 0 {
             return Err(Rejection::Unreadable("empty file".into()).at(path));
         }
+        // As long as the identity says, whatever happened in between.
+        let length = usize::try_from(identity.size).map_err(|_| Rejection::TooMany.at(path))?;
         // SAFETY: the map is read-only and private to this value. Another process changing the file can change the bytes seen
         // (all of them plain numbers, valid in every state; `check_unchanged` finds out) or, by truncating it, end this process
         // with SIGBUS, which its supervisor expects.
-        let input = unsafe { Mmap::map(&file) }.map_err(Error::io(path, "mapping"))?;
+        let input = unsafe { MmapOptions::new().len(length).map(&file) }.map_err(Error::io(path, "mapping"))?;
         match sniff::sniff(&input).map_err(|rejection| rejection.at(path))? {
             sniff::Kind::Binary(layout) => Ok(Self {
                 path: path.to_owned(),
@@ -144,7 +147,7 @@ impl MeshFile {
             sniff::Kind::Text(sniff::Text { start, mut findings }) => {
                 // Advice; without it reading ahead is only less bold.
                 let _ = input.advise(memmap2::Advice::Sequential);
-                let parsed = text::read(&input, start, &text::Context { path, spool, limits, progress, window: text::WINDOW })?;
+                let parsed = text::read(&input, start, &text::Context { path, spool, limits, progress })?;
                 findings.extend(parsed.findings);
                 Ok(Self {
                     path: path.to_owned(),

@@ -138,8 +138,22 @@ fn more_triangles_than_a_count_holds_are_refused() {
     let layout = binary::within_bounds(MAX_TRIANGLES as usize + 1, Vec::new());
     let error = layout.unwrap_err().at(Path::new("huge.stl"));
     assert_eq!(error.class(), ErrorClass::Refused);
-    assert!(error.to_string().contains("4294967296 triangles"), "{error}");
+    assert!(error.to_string().contains("more than 4294967295 triangles"), "{error}");
     assert!(binary::within_bounds(MAX_TRIANGLES as usize, Vec::new()).is_ok());
+}
+
+#[test]
+fn lengths_beyond_32_bits_are_no_limit() {
+    // 50 times this count overflows a u32 by a little. The file is sparse: it takes no space.
+    let count = 85_899_346;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("part.stl");
+    let mut out = File::create(&path).unwrap();
+    out.write_all(&binary_file(b"", count, &[], b"")).unwrap();
+    out.set_len(PREFIX_BYTES as u64 + 50 * u64::from(count)).unwrap();
+    let file = MeshFile::open(&path, folder.path(), &Limits::default(), &crate::Quiet).unwrap();
+    assert_eq!(file.records().len(), count as usize);
+    assert!(file.is_flawless());
 }
 
 #[test]

@@ -20,8 +20,8 @@ use crate::settings::Limits;
 
 /// Text parsed at a time by one thread.
 pub(super) const WINDOW: usize = 1 << 20;
-/// A window grows to this many times its length to reach the next facet; beyond that the text is no mesh.
-const LONGEST: usize = 8;
+/// A window grows up to this to reach the next facet; beyond that the text is no mesh.
+const LONGEST: usize = 8 * WINDOW;
 /// Most of the spool that may be dirty.
 const DIRTY_STEP: u64 = 32 << 20;
 
@@ -40,7 +40,6 @@ pub(super) struct Context<'a> {
     pub(super) spool: &'a Path,
     pub(super) limits: &'a Limits,
     pub(super) progress: &'a dyn Progress,
-    pub(super) window: usize,
 }
 
 /// Parses `text` from byte `start` on.
@@ -48,10 +47,10 @@ pub(super) fn read(text: &[u8], start: usize, context: &Context<'_>) -> Result<P
     let reject = |rejection: Rejection| rejection.at(context.path);
     let mut spool = Spool::new(context)?;
     let mut tally = Tally::default();
-    let mut windows = Windows { text, at: start, size: context.window };
+    let mut windows = Windows { text, at: start };
     let mut parsed: Vec<Vec<Record>> = Vec::new();
     loop {
-        let batch = windows.batch(rayon::current_num_threads() * 2 * context.window).map_err(reject)?;
+        let batch = windows.batch(rayon::current_num_threads() * 2 * WINDOW).map_err(reject)?;
         // The previous batch is written while this one is parsed.
         let (written, pieces) = rayon::join(
             || spool.append(&parsed),
@@ -86,7 +85,6 @@ struct Piece<'a> {
 struct Windows<'a> {
     text: &'a [u8],
     at: usize,
-    size: usize,
 }
 
 impl<'a> Windows<'a> {
@@ -95,12 +93,11 @@ impl<'a> Windows<'a> {
         let from = self.at;
         let mut pieces = Vec::new();
         while self.at < self.text.len() && self.at - from < bytes {
-            let limit = self.at.saturating_add(self.size.saturating_mul(LONGEST));
-            let end = match facets::next_facet(self.text, self.at.saturating_add(self.size), limit) {
+            let limit = self.at.saturating_add(LONGEST);
+            let end = match facets::next_facet(self.text, self.at.saturating_add(WINDOW), limit) {
                 Some(end) => end,
                 None if limit < self.text.len() => {
-                    let megabytes = (self.size * LONGEST) >> 20;
-                    let reason = format!("more than {megabytes} MiB of text without a new facet, from byte {} on", self.at);
+                    let reason = format!("{} MiB of text without a new facet, from byte {} on", LONGEST >> 20, self.at);
                     return Err(Rejection::Unreadable(reason));
                 }
                 None => self.text.len(),
@@ -135,7 +132,7 @@ impl<'a> Spool<'a> {
         for records in pieces {
             self.records += records.len() as u64;
             if self.records > MAX_TRIANGLES {
-                return Err(Rejection::TooMany(self.records).at(self.path));
+                return Err(Rejection::TooMany.at(self.path));
             }
             // In steps, for a single piece may exceed the limit.
             for part in records.as_flattened().chunks(1 << 20) {

@@ -4,6 +4,7 @@ mod damage;
 mod text;
 
 use std::io::Write;
+use std::os::unix::fs::PermissionsExt;
 
 use super::*;
 use crate::error::ErrorClass;
@@ -125,6 +126,29 @@ fn noise_is_not_taken_for_triangles() {
 }
 
 #[test]
+fn a_wrong_count_needs_normals_that_make_sense() {
+    let with_normal =
+        |n: [f32; 3]| tetrahedron().iter().map(|r| crate::record::assemble(n, crate::record::corners(r), 0)).collect();
+    let askew: Vec<Record> = with_normal([3.0, 4.0, -5.0]);
+    for count in [0, 5, u32::MAX] {
+        assert!(reason(&binary_file(b"", count, &askew, b"")).starts_with("neither text nor binary"), "count {count}");
+    }
+    // A count that is met is evidence enough, with or without something behind the triangles.
+    for tail in [b"".as_slice(), b"tail"] {
+        assert_eq!(open(&binary_file(b"", 4, &askew, tail)).unwrap().records(), askew);
+    }
+    // No normals, and normals as long as the triangle is large.
+    let none: Vec<Record> = with_normal([0.0; 3]);
+    let long: Vec<Record> = tetrahedron()
+        .iter()
+        .map(|r| crate::record::assemble(crate::record::normal(r).map(|x| x * 7.0), crate::record::corners(r), 0))
+        .collect();
+    for records in [none, long] {
+        assert_eq!(open(&binary_file(b"", 5, &records, b"")).unwrap().records(), records);
+    }
+}
+
+#[test]
 fn triangles_that_are_not_numbers_stay() {
     let mut records = tetrahedron();
     records[2] = encode([[f32::NAN, 0.0, 0.0], [1.0, f32::INFINITY, 0.0], [0.0; 3]], 0);
@@ -168,6 +192,11 @@ fn a_change_underneath_is_noticed() {
     let flipped: Vec<Record> = tetrahedron().iter().map(flip).collect();
     std::thread::sleep(std::time::Duration::from_millis(20));
     std::fs::write(&path, binary_file(b"", 4, &flipped, b"")).unwrap();
+    assert_eq!(file.check_unchanged().unwrap_err().class(), ErrorClass::Changed);
+    // Another mode: only ctime tells.
+    let file = open();
+    std::thread::sleep(std::time::Duration::from_millis(20));
+    std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o640)).unwrap();
     assert_eq!(file.check_unchanged().unwrap_err().class(), ErrorClass::Changed);
     // Replaced by another file of the same content, and gone.
     let file = open();

@@ -159,7 +159,8 @@ fn judge(tally: &Tally, records: u64) -> std::result::Result<(), Rejection> {
     if tally.separators == POINT | COMMA {
         Err(Rejection::Unreadable("decimal commas and decimal points are mixed".into()))
     } else if tally.damaged > records / 2 && tally.damaged > 0 {
-        let reason = format!("{} coordinates that are no numbers, the first at byte {damage}", tally.damaged);
+        let vertices = vertices_word(tally.damaged);
+        let reason = format!("{vertices} with coordinates that are no numbers, the first at byte {damage}");
         Err(Rejection::Unreadable(reason))
     } else if records == 0 {
         Err(binary::no_triangles())

@@ -166,14 +166,17 @@ fn numbers_that_are_none_stay_as_nan() {
     }
     let named = plain.replacen("1.0", "blah", 1);
     assert!(texts(&open(named.as_bytes()).unwrap())[0].ends_with(&format!("the first at byte {}", first + 6)));
-    assert!(reason(plain.replace("0.0", "zero").as_bytes()).contains("coordinates that are no numbers"));
+    // Half of the four facets may be damaged, not more. The first three have their first vertex at the origin.
+    let damaged = |facets| plain.replacen("vertex 0.0 0.0 0.0", "vertex x y z", facets);
+    assert_eq!(open(damaged(2).as_bytes()).unwrap().records().len(), 4);
+    assert!(reason(damaged(3).as_bytes()).starts_with("3 vertices with coordinates that are no numbers"));
 }
 
 #[test]
 fn commas_and_points_do_not_mix() {
     let text = tetrahedron_text().replacen("1.0", "1,0", 1);
     assert_eq!(reason(text.as_bytes()), "decimal commas and decimal points are mixed");
-    assert_eq!(reason(tetrahedron_text().replace("1.0 ", "1,234.5 ").as_bytes()).split(' ').nth(1), Some("coordinates"));
+    assert!(reason(tetrahedron_text().replace("1.0", "1,234.5").as_bytes()).contains("that are no numbers"));
 }
 
 #[test]

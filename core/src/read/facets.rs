@@ -1,8 +1,8 @@
-//! The grammar of text STL, as a stream of tokens: line breaks mean nothing except at the end of a solid's name, keywords may be in
-//! any case, and what is no keyword is passed over (some writers put colours or comments between facets).
+//! The grammar of text STL, as a stream of tokens: line breaks mean nothing except at the end of a solid's name, keywords may be
+//! in any case, and what is no keyword is passed over (some writers put colours or comments between facets).
 //!
-//! One rule makes the text divisible: the words `facet normal` begin a facet wherever they stand, be it in the middle of a name or of
-//! an unfinished facet. So a file may be cut before any of them, and parsing the pieces gives what parsing the whole would.
+//! One rule makes the text divisible: the words `facet normal` begin a facet wherever they stand, be it in the middle of a name
+//! or of an unfinished facet. So a file may be cut before any of them, and parsing the pieces gives what parsing the whole would.
 
 use super::number::{is_blank, number};
 use crate::record::{self, Point, Record};
@@ -82,7 +82,7 @@ pub(super) fn next_facet(text: &[u8], from: usize, until: usize) -> Option<usize
     None
 }
 
-/// The triangles of `text`, which begins at byte `base` of the file, at its beginning or with a facet. `last`: nothing follows it.
+/// The triangles of `text`, which stands at byte `base` and begins with the file or with a facet. `last`: nothing follows it.
 pub(super) fn parse(text: &[u8], base: u64, last: bool) -> (Vec<Record>, Tally) {
     // A facet takes some 250 bytes; a generous guess saves regrowth.
     let records = Vec::with_capacity(text.len() / 160);

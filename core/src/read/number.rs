@@ -1,9 +1,9 @@
 //! Decimal text to the nearest `f32`, in every spelling that C, Fortran and spreadsheet writers put into an STL.
 //!
-//! Based on: W. D. Clinger, "How to read floating point numbers accurately", PLDI 1990: up to 2^53 digits' worth of integer times or
-//! divided by a power of ten up to 10^22 is one correctly rounded `f64` operation. Rounding that once more to `f32` is right unless
-//! the `f64` lies exactly half-way between two `f32`, since every such half-way point is an `f64` and rounding is monotone;
-//! those few, and everything longer, go to the standard library.
+//! Based on: W. D. Clinger, "How to read floating point numbers accurately", PLDI 1990: an integer up to 2^53 times or divided by
+//! a power of ten up to 10^22 is one correctly rounded `f64` operation. Rounding that once more to `f32` is right unless the
+//! `f64` lies exactly half-way between two `f32`, since every such half-way point is an `f64` and rounding is monotone; those
+//! few, and everything longer, go to the standard library.
 
 /// Seen in a number: a decimal point.
 pub(super) const POINT: u8 = 1;
@@ -221,7 +221,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn agrees_with_the_standard_library(whole in "[-+]?[0-9]{0,12}", fraction in "(\\.[0-9]{0,14})?", e in "([eE][-+]?[0-9]{1,3})?") {
+        fn agrees_with_the_standard_library(
+            whole in "[-+]?[0-9]{0,12}", fraction in "(\\.[0-9]{0,14})?", e in "([eE][-+]?[0-9]{1,3})?",
+        ) {
             let text = format!("{whole}{fraction}{e}");
             prop_assert_eq!(value(&text).map(f32::to_bits), text.parse::<f32>().ok().map(f32::to_bits), "{}", text);
         }

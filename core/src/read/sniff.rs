@@ -24,8 +24,8 @@ pub(super) struct Text {
     pub(super) findings: Vec<Finding>,
 }
 
-/// Decides what the bytes are. In order: a binary file whose count fits its length; a text with facets; a binary file with another
-/// count whose records look like triangles; a stranger, named.
+/// Decides what the bytes are. In order: a binary file whose count fits its length; a text with facets; a binary file with
+/// another count whose records look like triangles; a stranger, named.
 pub(super) fn sniff(bytes: &[u8]) -> Result<Kind, Rejection> {
     if let Some(layout) = binary::exact(bytes) {
         return layout.map(Kind::Binary);

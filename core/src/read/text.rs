@@ -1,7 +1,7 @@
 //! Text STL into a spool of records: cut before facets into windows of about a megabyte, parsed in parallel, written in order.
 //!
-//! Memory: the windows of a batch and the batch before it, so some megabytes for each thread, whatever the file's length; the spool's
-//! dirty pages are written back step by step, since the kernel would otherwise keep as many of them as fit a share of all memory.
+//! Memory: the records of a batch and of the batch before it, so some megabytes for each thread, whatever the file's length; the
+//! spool's dirty pages are written back step by step, since the kernel would otherwise let a share of all memory fill with them.
 
 use std::fs::File;
 use std::io::Write;

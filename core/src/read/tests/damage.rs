@@ -100,11 +100,14 @@ proptest! {
     /// The rule that lets threads share a text: cut before any `facet normal`, the pieces give what the whole gives.
     #[test]
     fn text_may_be_cut_before_any_facet(
-        words in prop::collection::vec(0usize..20, 0..120), cuts in prop::collection::vec(any::<bool>(), 120), last: bool,
+        words in prop::collection::vec(0usize..20, 0..120),
+        cuts in prop::collection::vec(any::<bool>(), 120),
+        last: bool,
     ) {
         const WORDS: [&str; 20] = [
-            "facet", "normal", "facet normal", "FACET\nNormal", "facet normal 0 0 1 outer loop", "vertex", "vertex 1 2 3", "vertex 1,5 x",
-            "1.5", "endloop", "loop", "endfacet", "end", "solid", "solid name", "endsolid", "\n", "\r", "end facet", "nofacet normal",
+            "facet", "normal", "facet normal", "FACET\nNormal", "facet normal 0 0 1 outer loop", "vertex", "vertex 1 2 3",
+            "vertex 1,5 x", "1.5", "endloop", "loop", "endfacet", "end", "solid", "solid name", "endsolid", "\n", "\r",
+            "end facet", "nofacet normal",
         ];
         let text = words.iter().flat_map(|&word| [WORDS[word], " "]).collect::<String>();
         let text = text.as_bytes();

@@ -8,11 +8,16 @@
 
 pub mod cross;
 pub mod exact;
+mod front;
+mod minweight;
 mod planar;
 pub mod tree;
 
-use cross::{Contact, triangles_cross};
-use exact::{Point, collinear};
+use cross::{Contact, Triangle, triangles_cross};
+use exact::{Point, at, collinear};
+use front::Order;
+use glam::DVec3;
+use minweight::Weight;
 use tree::{SelfCrossing, self_crossing};
 
 /// A boundary loop and what its patch must respect.
@@ -52,6 +57,14 @@ pub enum Method {
     Triangle,
     /// Constrained Delaunay triangulation in the loop's plane.
     Planar,
+    /// Dynamic programming for the least bend, then the least area.
+    MinimumWeight,
+    /// Dynamic programming for the least area.
+    LeastArea,
+    /// Ear clipping, with the last vertices by minimum weight.
+    Front,
+    /// As planar, for a loop far from planar that is a simple polygon in projection.
+    Projected,
 }
 
 impl Method {
@@ -60,6 +73,10 @@ impl Method {
         match self {
             Self::Triangle => "triangle",
             Self::Planar => "planar",
+            Self::MinimumWeight => "minimum_weight",
+            Self::LeastArea => "least_area",
+            Self::Front => "front",
+            Self::Projected => "projected",
         }
     }
 }
@@ -111,12 +128,79 @@ pub fn triangulate(rim: &Rim<'_>, settings: &FillSettings) -> Result<Patch, Unfi
             Err(Unfillable::Blocked)
         };
     }
-    if let Some(triangles) = planar::triangulate(rim, settings.planar_deviation)
-        && rim.accepts(&triangles, true).is_ok()
-    {
-        return Ok(patch(triangles, Method::Planar));
+    let small = rim.len() <= settings.minimum_weight_vertices;
+    let methods: &[Method] = if small {
+        &[Method::Planar, Method::MinimumWeight, Method::LeastArea, Method::Projected, Method::Front]
+    } else {
+        &[Method::Planar, Method::Front, Method::Projected]
+    };
+    let mut reason = Unfillable::Blocked;
+    for &method in methods {
+        let made = match method {
+            Method::Triangle => Err(Unfillable::Blocked),
+            Method::Planar => by_projection(rim, settings.planar_deviation),
+            Method::Projected => by_projection(rim, f64::INFINITY),
+            Method::MinimumWeight => by_weight(rim, Weight::Bend),
+            Method::LeastArea => by_weight(rim, Weight::Area),
+            Method::Front => by_front(rim, settings.minimum_weight_vertices),
+        };
+        match made {
+            Ok(triangles) => return Ok(patch(triangles, method)),
+            // What a patch that was made came to grief on says more than that another could not be made.
+            Err(Unfillable::Blocked) => {}
+            Err(other) => reason = other,
+        }
     }
-    Err(Unfillable::Blocked)
+    Err(reason)
+}
+
+fn by_projection(rim: &Rim<'_>, max_deviation: f64) -> Result<Vec<[u32; 3]>, Unfillable> {
+    let triangles = planar::triangulate(rim, max_deviation).ok_or(Unfillable::Blocked)?;
+    rim.accepts(&triangles, true)?;
+    Ok(triangles)
+}
+
+/// The best patch; where it crosses itself, again without the larger of two triangles that cross, some times.
+fn by_weight(rim: &Rim<'_>, weight: Weight) -> Result<Vec<[u32; 3]>, Unfillable> {
+    let mut banned = Vec::new();
+    loop {
+        let triangles = minweight::triangulate(rim, weight, &banned)?;
+        let crossing = match rim.accepts(&triangles, false) {
+            Ok(()) => return Ok(triangles),
+            Err(Fault::Crossing(i, j)) if banned.len() < 600 / rim.len() => [triangles[i], triangles[j]],
+            Err(fault) => return Err(fault.into()),
+        };
+        banned.push(if rim.area(crossing[0]) > rim.area(crossing[1]) { crossing[0] } else { crossing[1] });
+    }
+}
+
+fn by_front(rim: &Rim<'_>, max_rest: usize) -> Result<Vec<[u32; 3]>, Unfillable> {
+    let attempt = |order| {
+        let triangles = front::triangulate(rim, order, max_rest)?;
+        rim.accepts(&triangles, false)?;
+        Ok(triangles)
+    };
+    attempt(Order::Chord).or_else(|_: Unfillable| attempt(Order::Angle))
+}
+
+/// What is wrong with a triangulation.
+enum Fault {
+    /// A triangle or chord that the rim does not admit.
+    Inadmissible,
+    /// Two triangles cross.
+    Crossing(usize, usize),
+    /// Too crowded to tell.
+    Undecided,
+}
+
+impl From<Fault> for Unfillable {
+    fn from(fault: Fault) -> Self {
+        match fault {
+            Fault::Inadmissible => Self::Blocked,
+            Fault::Crossing(..) => Self::CrossesItself,
+            Fault::Undecided => Self::TooLarge,
+        }
+    }
 }
 
 fn patch(mut triangles: Vec<[u32; 3]>, method: Method) -> Patch {
@@ -150,6 +234,25 @@ impl Rim<'_> {
         t.map(|v| self.points[v as usize])
     }
 
+    fn area(&self, t: [u32; 3]) -> f64 {
+        let [a, b, c] = self.corners(t).map(|p| at(&p));
+        0.5 * (b - a).cross(c - a).length()
+    }
+
+    /// The mesh's triangle beyond rim edge `i`, as the mesh turns it.
+    fn neighbour(&self, i: usize) -> Option<Triangle> {
+        let apex = self.apexes.get(i).copied().flatten()?;
+        Some([self.points[(i + 1) % self.len()], self.points[i], apex])
+    }
+
+    /// Its unit normal; zero where there is none.
+    fn normal_beyond(&self, i: usize) -> DVec3 {
+        self.neighbour(i).map_or(DVec3::ZERO, |t| {
+            let [a, b, c] = t.map(|p| at(&p));
+            (b - a).cross(c - a).normalize_or_zero()
+        })
+    }
+
     /// The rim edge from `a` to `b`, by its number.
     fn rim_edge(&self, a: u32, b: u32) -> Option<usize> {
         let (a, b) = (a as usize, b as usize);
@@ -166,26 +269,25 @@ impl Rim<'_> {
         let corners = self.corners(t);
         !collinear(&corners[0], &corners[1], &corners[2])
             && (0..3).all(|k| {
-                let (a, b) = (t[k], t[(k + 1) % 3]);
-                let beyond = self.rim_edge(a, b).and_then(|i| self.apexes.get(i).copied().flatten());
-                beyond.is_none_or(|apex| triangles_cross(&corners, &[corners[(k + 1) % 3], corners[k], apex]) != Contact::Overlap)
+                let neighbour = self.rim_edge(t[k], t[(k + 1) % 3]).and_then(|i| self.neighbour(i));
+                neighbour.is_none_or(|beyond| triangles_cross(&corners, &beyond) != Contact::Overlap)
             })
     }
 
     /// Is this triangulation of the polygon valid: only admissible triangles and allowed chords, and nothing crosses or folds
     /// onto itself? `graph`: it is known to be a graph over a plane, which cannot cross itself.
-    fn accepts(&self, triangles: &[[u32; 3]], graph: bool) -> Result<(), Unfillable> {
+    fn accepts(&self, triangles: &[[u32; 3]], graph: bool) -> Result<(), Fault> {
         let chords_allowed = |t: &[u32; 3]| (0..3).all(|k| self.allows(t[k], t[(k + 1) % 3]));
         if !triangles.iter().all(|t| self.admits(*t) && chords_allowed(t)) {
-            return Err(Unfillable::Blocked);
+            return Err(Fault::Inadmissible);
         }
         if !graph {
             let solid: Vec<_> = triangles.iter().map(|t| self.corners(*t)).collect();
             // Enough for any patch but one great fan after the other; a bound by count, so the same everywhere.
             match self_crossing(&solid, 2_000_000 + 500 * solid.len() as u64) {
                 SelfCrossing::None => {}
-                SelfCrossing::Pair(..) => return Err(Unfillable::CrossesItself),
-                SelfCrossing::Undecided => return Err(Unfillable::TooLarge),
+                SelfCrossing::Pair(i, j) => return Err(Fault::Crossing(i, j)),
+                SelfCrossing::Undecided => return Err(Fault::Undecided),
             }
         }
         Ok(())

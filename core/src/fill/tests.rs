@@ -231,3 +231,131 @@ proptest! {
         }
     }
 }
+
+/// A saddle: the corners of a cube's faces in turn. Far from planar.
+#[test]
+fn a_loop_in_space_is_filled_by_minimum_weight() {
+    let saddle = [[0, 0, 0], [4, 0, 4], [4, 4, 0], [0, 4, 4]];
+    assert_eq!(fill(&saddle, &[], &free).unwrap().method, Method::MinimumWeight);
+}
+
+/// Half a cube is missing: six rim vertices, and the mesh's triangles of the other half around. The other half of the cube
+/// bends by 90° at most; any patch that cuts through would bend more somewhere.
+#[test]
+fn the_least_bend_continues_what_is_around() {
+    let rim = [[0, 0, 8], [8, 0, 8], [8, 0, 0], [8, 8, 0], [0, 8, 0], [0, 8, 8]];
+    // The rim bounds the faces x = 0, y = 0 and z = 0, which are there; x = 8, y = 8 and z = 8 meet in (8, 8, 8), which is not.
+    let apexes = [[0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0]].map(Some);
+    let patch = fill(&rim, &apexes, &free).unwrap();
+    assert_eq!(patch.triangles.len(), 4);
+}
+
+/// A zero-width slit that opens in the middle of one side only: a, b, c collinear with d beside them.
+#[test]
+fn a_slit_with_a_vertex_off_its_line_is_filled() {
+    fill(&[[0, 0, 0], [3, 0, 0], [6, 0, 0], [9, 0, 0], [4, 1, 0]], &[], &free).unwrap();
+    fill(&[[0, 0, 0], [1, 1, 1], [7, 7, 7], [8, 8, 8], [3, 4, 5], [1, 2, 2]], &[], &free).unwrap();
+}
+
+/// A spike that comes back on itself: both sides of it can only be joined to the one vertex off its line, and these triangles
+/// lie on each other.
+#[test]
+fn a_spike_that_lies_on_itself_is_left_open() {
+    let spike = [[0, 0, 0], [9, 9, 9], [8, 8, 8], [7, 7, 7], [3, 4, 5], [1, 1, 1]];
+    assert_eq!(fill(&spike, &[], &free), Err(Unfillable::CrossesItself));
+}
+
+/// Directions around the origin, counter-clockwise, no two alike.
+fn star(points: Vec<[i32; 2]>) -> Vec<[i32; 2]> {
+    let mut points: Vec<_> = points.into_iter().filter(|p| *p != [0, 0]).collect();
+    let upper = |p: &[i32; 2]| p[1] > 0 || (p[1] == 0 && p[0] > 0);
+    let turn = |a: &[i32; 2], b: &[i32; 2]| a[0] * b[1] - a[1] * b[0];
+    points.sort_by(|a, b| upper(b).cmp(&upper(a)).then(0.cmp(&turn(a, b))));
+    points.dedup_by(|b, a| upper(a) == upper(b) && turn(a, b) == 0);
+    points
+}
+
+/// A star-shaped polygon around the origin: every gap between neighbouring directions is below 180°.
+fn star_loop(max: usize) -> impl Strategy<Value = Vec<[i32; 2]>> {
+    prop::collection::vec(prop::array::uniform2(-30_i32..31), 3..max).prop_map(star).prop_filter("origin outside", |p| {
+        p.len() > 2 && (0..p.len()).all(|i| p[i][0] * p[(i + 1) % p.len()][1] - p[i][1] * p[(i + 1) % p.len()][0] > 0)
+    })
+}
+
+/// Doubles the coordinates and puts the middle into every second edge.
+fn with_runs(points: Vec<Grid>) -> Vec<Grid> {
+    let n = points.len();
+    let middle = |i: usize| [0, 1, 2].map(|k| points[i][k] + points[(i + 1) % n][k]);
+    (0..n).flat_map(|i| std::iter::once(points[i].map(|x| 2 * x)).chain((i % 2 == 0).then(|| middle(i)))).collect()
+}
+
+fn without_repeats(mut points: Vec<Grid>) -> Vec<Grid> {
+    let mut seen = std::collections::BTreeSet::new();
+    points.retain(|p| seen.insert(*p));
+    points
+}
+
+/// About one chord in `one_in`.
+fn some(seed: u32, one_in: u32) -> impl Fn(u32, u32) -> bool {
+    move |a, b| {
+        (a.wrapping_mul(0x9E37_79B1) ^ b.wrapping_mul(0x85EB_CA6B) ^ seed).wrapping_mul(0xC2B2_AE35) >> 8 & 0xFFFF
+            < 0x10000 / one_in
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(192))]
+
+    #[test]
+    fn planar_loops_are_filled_in_their_plane(p in star_loop(40), slant in prop::array::uniform2(-2_i32..3), runs in any::<bool>()) {
+        let mut p: Vec<Grid> = p.into_iter().map(|[x, y]| [x + slant[1] * y, y, slant[0] * x + slant[1] * y]).collect();
+        if runs { p = with_runs(p) }
+        let patch = fill(&p, &[], &free).unwrap();
+        prop_assert!(matches!(patch.method, Method::Planar | Method::Triangle));
+    }
+
+    #[test]
+    fn hilly_loops_are_filled(p in star_loop(24), heights in prop::collection::vec(-9_i32..10, 24), runs in any::<bool>()) {
+        let mut p: Vec<Grid> = p.into_iter().zip(heights).map(|([x, y], z)| [x, y, z]).collect();
+        if runs { p = with_runs(p) }
+        fill(&p, &[], &free).unwrap();
+    }
+
+    #[test]
+    fn whatever_is_filled_is_valid(
+        p in prop::collection::vec(prop::array::uniform3(-9_i32..10), 3..14),
+        apexes in prop::collection::vec(prop::option::of(prop::array::uniform3(-9_i32..10)), 0..14),
+        runs in any::<bool>(),
+        flat in any::<bool>(),
+        (seed, one_in) in (any::<u32>(), 1_u32..9),
+    ) {
+        let mut p = without_repeats(p);
+        if flat {
+            p.iter_mut().for_each(|q| q[2] = 0);
+            p = without_repeats(p);
+        }
+        if runs { p = without_repeats(with_runs(p)) }
+        prop_assume!(p.len() > 2);
+        let _ = fill(&p, &apexes, &some(seed, one_in));
+        let _ = fill(&p, &[], &free);
+    }
+
+    /// The front is the way for large loops; small ones find its mistakes sooner.
+    #[test]
+    fn what_the_front_fills_is_valid(
+        p in prop_oneof![
+            star_loop(60).prop_map(|p| p.into_iter().map(|[x, y]| [x, y, (x * y) % 7]).collect()),
+            prop::collection::vec(prop::array::uniform3(-9_i32..10), 3..12).prop_map(without_repeats),
+        ],
+        runs in any::<bool>(),
+        (seed, one_in) in (any::<u32>(), 1_u32..9),
+    ) {
+        let p = if runs { without_repeats(with_runs(p)) } else { p };
+        prop_assume!(p.len() > 2);
+        let forbidden = some(seed, one_in);
+        let rim = Rim { points: &float(&p), apexes: &[], forbidden: &forbidden };
+        if let Ok(triangles) = by_front(&rim, 300) {
+            check(&p, &[], &forbidden, &patch(triangles, Method::Front));
+        }
+    }
+}

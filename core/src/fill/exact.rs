@@ -19,6 +19,10 @@ fn sign(x: f64) -> i8 {
 /// Sign of det(b−a, c−a, d−a): +1 when d lies on the side that the normal of (a, b, c) points to, 0 when the four are coplanar.
 pub fn side(a: &Point, b: &Point, c: &Point, d: &Point) -> i8 {
     let coord = |p: &Point| Coord3D { x: p[0], y: p[1], z: p[2] };
+    // Neighbours have corners in common; the predicate would find out only in its last, slowest stage.
+    if d == a || d == b || d == c || c == a || c == b {
+        return 0;
+    }
     // `robust` counts the other side as positive.
     -sign(orient3d(coord(a), coord(b), coord(c), coord(d)))
 }

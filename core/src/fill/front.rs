@@ -2,19 +2,18 @@
 //! the minimum-weight triangulation.
 //!
 //! An ear is clipped when it is convex as seen along the surface around (the mesh's triangles beyond the rim, the ears already
-//! clipped), holds no other vertex of the front, and crosses neither front, ears nor the mesh's triangles along the rim. The box
-//! tree for these questions is a segment tree over the loop's order: the leaf of a vertex holds the front edge that starts
-//! there, and from the time the vertex is clipped its ear. About O(n log n) for loops that do not crowd.
+//! clipped), holds no other vertex of the front, and crosses neither front, ears nor the mesh's triangles along the rim. In the
+//! box tree for these questions a vertex stands for the front edge that starts there, and for its ear once it is clipped. About O(n log n) for loops that do not crowd.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use std::ops::ControlFlow;
 
 use glam::DVec3;
 
+use super::boxes::{Box3, Boxes, around, join};
 use super::cross::{Triangle, segment_pierces, triangles_cross};
 use super::exact::{Point, at};
-use super::minweight::{self, Weight};
+use super::minweight::{self, Choice, Weight};
 use super::planar::directed_area;
 use super::{Rim, Unfillable};
 
@@ -30,24 +29,11 @@ pub(super) enum Order {
 /// The front stops at this many vertices and leaves them to the minimum-weight triangulation.
 const REST: usize = 100;
 
+/// Ears looked at for each vertex, before the front gives up. A loop that goes well needs about four.
+const WORK: usize = 32;
+
 /// How much a bend of 1 − cos = 1 against the triangles beside an ear puts it back.
 const BEND_WEIGHT: f64 = 4.0;
-
-type Box3 = (Point, Point);
-
-const EMPTY: Box3 = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-
-fn join(a: &Box3, b: &Box3) -> Box3 {
-    ([0, 1, 2].map(|k| a.0[k].min(b.0[k])), [0, 1, 2].map(|k| a.1[k].max(b.1[k])))
-}
-
-fn meet(a: &Box3, b: &Box3) -> bool {
-    (0..3).all(|k| a.0[k] <= b.1[k] && b.0[k] <= a.1[k])
-}
-
-fn around(points: &[Point]) -> Box3 {
-    points.iter().fold(EMPTY, |b, p| join(&b, &(*p, *p)))
-}
 
 struct Front<'a> {
     rim: &'a Rim<'a>,
@@ -62,9 +48,8 @@ struct Front<'a> {
     beyond: Vec<(DVec3, Option<u32>)>,
     /// Normal where nothing is known about the triangles around.
     overall: DVec3,
-    /// Segment tree of boxes: leaf of vertex v at `leaves + v`.
-    boxes: Vec<Box3>,
-    leaves: usize,
+    /// For each vertex: its front edge or its ear, and the mesh's triangle beyond its rim edge.
+    boxes: Boxes,
     /// Number of vertices on the front.
     left: usize,
     /// Changes whenever a vertex's ear does; an older entry of the heap is void.
@@ -89,7 +74,6 @@ pub(super) fn triangulate(rim: &Rim<'_>, order: Order, max_rest: usize) -> Resul
 impl<'a> Front<'a> {
     fn new(rim: &'a Rim<'a>, order: Order) -> Self {
         let n = rim.len();
-        let leaves = n.next_power_of_two();
         let mut front = Self {
             rim,
             order,
@@ -99,19 +83,13 @@ impl<'a> Front<'a> {
             ear: vec![None; n],
             beyond: (0..n).map(|v| (rim.normal_beyond(v), None)).collect(),
             overall: directed_area(rim.points).normalize_or_zero(),
-            boxes: vec![EMPTY; 2 * leaves],
-            leaves,
+            boxes: Boxes::new(std::iter::empty()),
             left: n,
             version: vec![0; n],
             heap: BinaryHeap::new(),
             relaxed: false,
         };
-        for v in 0..n {
-            front.boxes[leaves + v] = front.leaf_box(v);
-        }
-        for node in (1..leaves).rev() {
-            front.boxes[node] = join(&front.boxes[2 * node], &front.boxes[2 * node + 1]);
-        }
+        front.boxes = Boxes::new((0..n).map(|v| front.leaf_box(v)));
         front
     }
 
@@ -121,33 +99,24 @@ impl<'a> Front<'a> {
         self.rim.neighbour(v).map_or(held, |t| join(&held, &around(&t)))
     }
 
-    fn update_box(&mut self, v: usize) {
-        let mut node = self.leaves + v;
-        self.boxes[node] = self.leaf_box(v);
-        while node > 1 {
-            node /= 2;
-            self.boxes[node] = join(&self.boxes[2 * node], &self.boxes[2 * node + 1]);
-        }
-    }
-
     /// Clips ears until `target` vertices are left, or none can be clipped.
     fn advance(&mut self, target: usize) {
-        // Ears looked at; a count that depends on the loop alone.
-        let mut budget = 64 * self.rim.len();
+        // Ears looked at; a bound by count, so that it depends on the loop alone.
+        let mut budget = WORK * self.rim.len();
         let mut progress = true;
-        while self.left > target {
-            if self.heap.is_empty() {
-                if !progress && self.relaxed {
-                    return;
-                }
-                // What was in an ear's way may be gone; if nothing changed, be less choosy for one ear.
-                self.relaxed = !progress;
-                progress = false;
-                for v in 0..self.rim.len() {
-                    self.push(v as u32);
-                }
+        while self.left > target && (progress || !self.relaxed) {
+            // What was in an ear's way may be gone by now; if no ear could be clipped, be less choosy for a while.
+            self.relaxed = !progress;
+            progress = false;
+            self.heap.clear();
+            for v in 0..self.rim.len() {
+                self.push(v as u32);
             }
-            while let Some(Reverse((_, v, version))) = self.heap.pop() {
+            budget = budget.saturating_sub(self.left);
+            let enough = if self.relaxed { (self.left - self.left.div_ceil(8)).max(target) } else { target };
+            while self.left > enough
+                && let Some(Reverse((_, v, version))) = self.heap.pop()
+            {
                 if version != self.version[v as usize] || self.ear[v as usize].is_some() {
                     continue;
                 }
@@ -158,11 +127,6 @@ impl<'a> Front<'a> {
                 if self.may_clip(v) {
                     self.clip(v);
                     progress = true;
-                    if self.relaxed {
-                        self.relaxed = false;
-                        self.heap.clear();
-                    }
-                    break;
                 }
             }
         }
@@ -204,9 +168,9 @@ impl<'a> Front<'a> {
         }
         let corners = self.rim.corners(ear);
         let holder = (!self.relaxed).then(|| Holder::new(ear.map(|c| self.positions[c as usize])));
-        self.near(&around(&corners), |i| {
+        !self.boxes.any_near(&around(&corners), |i| {
             let crosses = |t: &Triangle| triangles_cross(&corners, t).is_crossing();
-            let blocked = self.rim.neighbour(i).is_some_and(|t| crosses(&t))
+            self.rim.neighbour(i).is_some_and(|t| crosses(&t))
                 || match self.ear[i] {
                     Some(other) => crosses(&self.rim.corners(other)),
                     None => {
@@ -215,25 +179,8 @@ impl<'a> Front<'a> {
                             |x: usize| !ear.contains(&(x as u32)) && holder.as_ref().is_some_and(|h| h.holds(self.positions[x]));
                         inside(i) || inside(end) || segment_pierces(&self.rim.points[i], &self.rim.points[end], &corners)
                     }
-                };
-            if blocked { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        })
-        .is_continue()
-    }
-
-    /// Visits the leaves whose boxes meet `what`.
-    fn near(&self, what: &Box3, mut visit: impl FnMut(usize) -> ControlFlow<()>) -> ControlFlow<()> {
-        let mut stack = vec![1];
-        while let Some(node) = stack.pop() {
-            if meet(&self.boxes[node], what) {
-                if node >= self.leaves {
-                    visit(node - self.leaves)?;
-                } else {
-                    stack.extend([2 * node, 2 * node + 1]);
                 }
-            }
-        }
-        ControlFlow::Continue(())
+        })
     }
 
     fn clip(&mut self, v: u32) {
@@ -245,8 +192,9 @@ impl<'a> Front<'a> {
         self.prev[n] = p as u32;
         self.beyond[p] = (normal.normalize_or_zero(), Some(v));
         self.left -= 1;
-        self.update_box(c);
-        self.update_box(p);
+        for v in [c, p] {
+            self.boxes.set(v, self.leaf_box(v));
+        }
         self.push(p as u32);
         self.push(n as u32);
     }
@@ -262,7 +210,7 @@ impl<'a> Front<'a> {
         let apexes: Vec<_> = vertices.iter().map(apex).collect();
         let forbidden = |a: u32, b: u32| (self.rim.forbidden)(vertices[a as usize], vertices[b as usize]);
         let rest = Rim { points: &points, apexes: &apexes, forbidden: &forbidden };
-        let triangles = minweight::triangulate(&rest, Weight::Bend, &[])?;
+        let triangles = minweight::triangulate(&rest, Weight::Bend, Choice::Free(&[]))?;
         Ok(triangles.into_iter().map(|t| t.map(|v| vertices[v as usize])).collect())
     }
 }

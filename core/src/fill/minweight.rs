@@ -5,11 +5,13 @@
 //! the area. As there, the best triangulation of a part is taken to be the one that the whole will use, which is not exact for
 //! bends. Bends count in steps, so that a flatter patch by a hair does not outweigh one half as large.
 //!
-//! Triangles that a rim edge or a neighbouring triangle of the mesh passes through are left out from the start: no patch that
-//! has one can be valid. O(n³) time, O(n²) memory.
+//! A patch may come out crossing itself. A thorough second run leaves out every triangle that a rim edge or a neighbouring
+//! triangle of the mesh passes through: no valid patch has one. That costs five to ten times the first run, nearly all of it
+//! in exact predicates. O(n³) time, O(n²) memory.
 
 use glam::DVec3;
 
+use super::boxes::{Boxes, around, join};
 use super::cross::{Triangle, segment_pierces, triangles_cross};
 use super::exact::{at, collinear};
 use super::{Rim, Unfillable};
@@ -56,11 +58,20 @@ fn bend(a: DVec3, b: DVec3) -> u32 {
     if a == DVec3::ZERO || b == DVec3::ZERO { 0 } else { ((1.0 - a.dot(b)) * BEND_STEPS) as u32 }
 }
 
-/// The best triangulation without the triangles in `banned` (corners ascending).
+/// Which triangles may be used.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Choice<'a> {
+    /// All that have an area and are not folded flat onto the mesh.
+    Any,
+    /// Only those through which neither rim nor neighbouring triangles pass, and that are not listed (corners ascending).
+    Free(&'a [[u32; 3]]),
+}
+
+/// The best triangulation.
 ///
 /// Where there is none the error says what stood against it: [`Unfillable::Blocked`] if the mesh around had a part in it,
 /// [`Unfillable::CrossesItself`] if the loop alone did.
-pub(super) fn triangulate(rim: &Rim<'_>, weight: Weight, banned: &[[u32; 3]]) -> Result<Vec<[u32; 3]>, Unfillable> {
+pub(super) fn triangulate(rim: &Rim<'_>, weight: Weight, choice: Choice<'_>) -> Result<Vec<[u32; 3]>, Unfillable> {
     let n = rim.len();
     // parts[i][k - i - 1] is the part beyond (i, k).
     let parts = (0..n.saturating_sub(1)).map(|i| {
@@ -71,9 +82,13 @@ pub(super) fn triangulate(rim: &Rim<'_>, weight: Weight, banned: &[[u32; 3]]) ->
     let mut table = Table {
         rim,
         weight,
-        banned,
+        choice,
         positions: rim.points.iter().map(at).collect(),
         parts: parts.collect(),
+        boxes: Boxes::new((0..n).map(|i| {
+            let edge = around(&[rim.points[i], rim.points[(i + 1) % n]]);
+            rim.neighbour(i).map_or(edge, |t| join(&edge, &around(&t)))
+        })),
         mesh_in_the_way: false,
     };
     for span in 2..n {
@@ -89,9 +104,11 @@ pub(super) fn triangulate(rim: &Rim<'_>, weight: Weight, banned: &[[u32; 3]]) ->
 struct Table<'a> {
     rim: &'a Rim<'a>,
     weight: Weight,
-    banned: &'a [[u32; 3]],
+    choice: Choice<'a>,
     positions: Vec<DVec3>,
     parts: Vec<Vec<Part>>,
+    /// For each rim edge: the edge and the mesh's triangle beyond.
+    boxes: Boxes,
     /// A chord or triangle was refused because of the mesh around.
     mesh_in_the_way: bool,
 }
@@ -120,25 +137,39 @@ impl Table<'_> {
                 part.bend = part.bend.max(bend(part.normal, other));
             }
             let triangle = [i as u32, m as u32, k as u32];
-            if part.before(&best, self.weight) && !self.banned.contains(&triangle) && self.is_free(triangle) {
+            if part.before(&best, self.weight) && self.may_use(triangle) {
                 best = part;
             }
         }
         best
     }
 
-    /// May a patch have this triangle, as far as rim and neighbouring triangles alone can tell?
-    fn is_free(&mut self, triangle: [u32; 3]) -> bool {
+    fn may_use(&mut self, triangle: [u32; 3]) -> bool {
         let rim = self.rim;
         let corners = rim.corners(triangle);
-        let edge = |i: usize| (&rim.points[i], &rim.points[(i + 1) % rim.len()]);
-        if collinear(&corners[0], &corners[1], &corners[2])
-            || (0..rim.len()).any(|i| segment_pierces(edge(i).0, edge(i).1, &corners))
-        {
+        if collinear(&corners[0], &corners[1], &corners[2]) {
             return false;
         }
-        let meets = |t: Triangle| triangles_cross(&corners, &t).is_crossing();
-        if (0..rim.len()).any(|i| rim.neighbour(i).is_some_and(meets)) {
+        if !rim.admits(triangle) {
+            self.mesh_in_the_way = true;
+            return false;
+        }
+        match self.choice {
+            Choice::Any => true,
+            Choice::Free(banned) => !banned.contains(&triangle) && self.is_free(&corners),
+        }
+    }
+
+    /// May a valid patch have this triangle, as far as rim and neighbouring triangles alone can tell?
+    fn is_free(&mut self, corners: &Triangle) -> bool {
+        let rim = self.rim;
+        let next = |i: usize| (i + 1) % rim.len();
+        let bounds = around(corners);
+        if self.boxes.any_near(&bounds, |i| segment_pierces(&rim.points[i], &rim.points[next(i)], corners)) {
+            return false;
+        }
+        let meets = |t: Triangle| triangles_cross(corners, &t).is_crossing();
+        if self.boxes.any_near(&bounds, |i| rim.neighbour(i).is_some_and(meets)) {
             self.mesh_in_the_way = true;
             return false;
         }

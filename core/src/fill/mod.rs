@@ -6,6 +6,7 @@
 //! hundred vertices ([`minweight`]); an advancing front beyond ([`front`]). Floating point only ever ranks patches; whether one
 //! is valid is decided with exact predicates, and every ranking uses + − × ÷ √ alone, so results are the same everywhere.
 
+mod boxes;
 pub mod cross;
 pub mod exact;
 mod front;
@@ -13,11 +14,12 @@ mod minweight;
 mod planar;
 pub mod tree;
 
+use boxes::{Boxes, EMPTY, around};
 use cross::{Contact, Triangle, triangles_cross};
 use exact::{Point, at, collinear};
 use front::Order;
 use glam::DVec3;
-use minweight::Weight;
+use minweight::{Choice, Weight};
 use tree::{SelfCrossing, self_crossing};
 
 /// A boundary loop and what its patch must respect.
@@ -26,7 +28,7 @@ pub struct Rim<'a> {
     /// vertex i + 1 (the last one back to 0).
     pub points: &'a [Point],
     /// For each rim edge the third corner of the mesh's triangle on its other side, where known; may be shorter than the loop.
-    /// The patch then never folds back flat onto these triangles, and bends little against them.
+    /// The patch then crosses none of these triangles, does not fold back flat onto them, and bends little against them.
     pub apexes: &'a [Option<Point>],
     /// Is the chord between these two vertices (smaller index first) an edge of the mesh already? Never asked of rim edges.
     pub forbidden: &'a dyn Fn(u32, u32) -> bool,
@@ -98,8 +100,8 @@ pub enum Unfillable {
     /// All vertices lie exactly on one line: any triangle would have zero area. Split the neighbours instead.
     #[error("all vertices lie on one line")]
     Collinear,
-    /// More vertices than the settings allow.
-    #[error("more vertices than the settings allow")]
+    /// More vertices than the settings allow, or too many for the methods that were left to try.
+    #[error("too many vertices")]
     TooLarge,
     /// Every patch tried crosses itself.
     #[error("every patch tried crosses itself")]
@@ -160,19 +162,27 @@ fn by_projection(rim: &Rim<'_>, max_deviation: f64) -> Result<Vec<[u32; 3]>, Unf
     Ok(triangles)
 }
 
-/// The best patch; where it crosses itself, again without the larger of two triangles that cross, some times.
+/// The best patch; where it is not valid, the best of free triangles; where that crosses itself, again without the larger of
+/// two triangles that cross, some times.
 fn by_weight(rim: &Rim<'_>, weight: Weight) -> Result<Vec<[u32; 3]>, Unfillable> {
+    let triangles = minweight::triangulate(rim, weight, Choice::Any)?;
+    if rim.accepts(&triangles, false).is_ok() {
+        return Ok(triangles);
+    }
     let mut banned = Vec::new();
     loop {
-        let triangles = minweight::triangulate(rim, weight, &banned)?;
+        let triangles = minweight::triangulate(rim, weight, Choice::Free(&banned))?;
         let crossing = match rim.accepts(&triangles, false) {
             Ok(()) => return Ok(triangles),
-            Err(Fault::Crossing(i, j)) if banned.len() < 600 / rim.len() => [triangles[i], triangles[j]],
+            Err(Fault::Crossing(i, j)) if banned.len() < BAN_WORK / rim.len() => [triangles[i], triangles[j]],
             Err(fault) => return Err(fault.into()),
         };
         banned.push(if rim.area(crossing[0]) > rim.area(crossing[1]) { crossing[0] } else { crossing[1] });
     }
 }
+
+/// A loop of n vertices is triangulated anew up to this / n times.
+const BAN_WORK: usize = 600;
 
 fn by_front(rim: &Rim<'_>, max_rest: usize) -> Result<Vec<[u32; 3]>, Unfillable> {
     let attempt = |order| {
@@ -274,11 +284,19 @@ impl Rim<'_> {
             })
     }
 
-    /// Is this triangulation of the polygon valid: only admissible triangles and allowed chords, and nothing crosses or folds
-    /// onto itself? `graph`: it is known to be a graph over a plane, which cannot cross itself.
+    /// Is this triangulation of the polygon valid: every triangle with an area and clear of the mesh's triangles along the rim,
+    /// every chord allowed, and nothing crosses or folds onto itself? `graph`: it is known to be a graph over a plane, which cannot cross itself.
     fn accepts(&self, triangles: &[[u32; 3]], graph: bool) -> Result<(), Fault> {
-        let chords_allowed = |t: &[u32; 3]| (0..3).all(|k| self.allows(t[k], t[(k + 1) % 3]));
-        if !triangles.iter().all(|t| self.admits(*t) && chords_allowed(t)) {
+        let neighbours =
+            Boxes::new((0..self.apexes.len().min(self.len())).map(|i| self.neighbour(i).map_or(EMPTY, |t| around(&t))));
+        let admissible = |t: &[u32; 3]| {
+            let corners = self.corners(*t);
+            let meets = |i: usize| self.neighbour(i).is_some_and(|other| triangles_cross(&corners, &other).is_crossing());
+            !collinear(&corners[0], &corners[1], &corners[2])
+                && (0..3).all(|k| self.allows(t[k], t[(k + 1) % 3]))
+                && !neighbours.any_near(&around(&corners), meets)
+        };
+        if !triangles.iter().all(admissible) {
             return Err(Fault::Inadmissible);
         }
         if !graph {

@@ -4,6 +4,7 @@
 ///
 /// Triangles with a repeated vertex are counted in `degenerate_index` and take part in nothing else.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "compare", derive(serde::Serialize, serde::Deserialize))]
 pub struct Counts {
     /// Triangles with finite coordinates.
     pub triangles: u64,

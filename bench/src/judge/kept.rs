@@ -4,12 +4,31 @@ use std::path::Path;
 
 use super::stl::{RECORD, Records, Result};
 
+/// What makes two records the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Same {
+    /// All 50 bytes.
+    Record,
+    /// The 36 bytes of the corners: another program may write its own normals and attributes.
+    Corners,
+}
+
+impl Same {
+    fn part(self, record: &[u8; RECORD]) -> &[u8] {
+        match self {
+            Self::Record => record,
+            Self::Corners => &record[12..48],
+        }
+    }
+}
+
 /// How much of an input survived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "compare", derive(serde::Serialize, serde::Deserialize))]
 pub struct Kept {
     /// Records of the input.
     pub of: u64,
-    /// Those that stand in the output, normal and attribute included, in the same order.
+    /// Those that stand in the output, in the same order.
     pub in_order: u64,
 }
 
@@ -27,8 +46,8 @@ impl Kept {
 ///
 /// # Errors
 /// As [`super::judge`], for either file.
-pub fn kept_in_order(input: &Path, output: &Path) -> Result<Kept> {
-    let (before, after) = (hashes(input)?, hashes(output)?);
+pub fn kept_in_order(input: &Path, output: &Path, same: Same) -> Result<Kept> {
+    let (before, after) = (hashes(input, same)?, hashes(output, same)?);
     let mut pairs = Vec::with_capacity(before.len().min(after.len()));
     let mut left = before.iter().peekable();
     for &(hash, position) in &after {
@@ -43,16 +62,16 @@ pub fn kept_in_order(input: &Path, output: &Path) -> Result<Kept> {
 }
 
 /// Every record's hash and number, sorted.
-fn hashes(path: &Path) -> Result<Vec<(u64, u32)>> {
+fn hashes(path: &Path, same: Same) -> Result<Vec<(u64, u32)>> {
     let records = Records::open(path)?;
     let mut list = Vec::with_capacity(records.count as usize);
-    records.for_each(|index, record| list.push((hash(record), index)))?;
+    records.for_each(|index, record| list.push((hash(same.part(record)), index)))?;
     list.sort_unstable();
     Ok(list)
 }
 
 /// Eight bytes at a time through the MurmurHash3 finaliser.
-fn hash(record: &[u8; RECORD]) -> u64 {
+fn hash(record: &[u8]) -> u64 {
     let mut state = 0u64;
     for chunk in record.chunks(8) {
         let mut bytes = [0; 8];
@@ -112,7 +131,19 @@ mod tests {
             [(&[1, 2, 2, 3, 4][..], 5), (&[1, 2, 3, 4], 4), (&[2, 2, 2, 2], 2), (&[4, 1, 2, 2, 3], 4), (&[9, 8], 0), (&[], 0)]
         {
             let output = file(folder.path(), "out", records);
-            assert_eq!(kept_in_order(&input, &output).unwrap(), Kept { of: 5, in_order: kept }, "{records:?}");
+            assert_eq!(kept_in_order(&input, &output, Same::Record).unwrap(), Kept { of: 5, in_order: kept }, "{records:?}");
         }
+    }
+
+    #[test]
+    fn corners_survive_a_change_of_attributes() {
+        let folder = tempfile::tempdir().unwrap();
+        let input = file(folder.path(), "in", &[1, 2, 3]);
+        let mut bytes = std::fs::read(&input).unwrap();
+        bytes[84 + 49] = 9;
+        let output = folder.path().join("out");
+        std::fs::write(&output, bytes).unwrap();
+        assert_eq!(kept_in_order(&input, &output, Same::Record).unwrap().in_order, 2);
+        assert_eq!(kept_in_order(&input, &output, Same::Corners).unwrap().in_order, 3);
     }
 }

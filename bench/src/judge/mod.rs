@@ -16,11 +16,12 @@ use std::path::Path;
 
 use crate::Counts;
 
-pub use kept::{Kept, kept_in_order};
+pub use kept::{Kept, Same, kept_in_order};
 pub use stl::{Error, Result};
 
 /// What a mesh file holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "compare", derive(serde::Serialize, serde::Deserialize))]
 pub struct Judgement {
     pub counts: Counts,
     /// Triangles with a NaN or infinite coordinate.

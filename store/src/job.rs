@@ -24,6 +24,9 @@ use crate::id::{Attempt, Epoch, Hash, JobId, Seq, Time, Token};
 use crate::path::RelPath;
 
 mod step;
+#[cfg(test)]
+mod tests;
+
 pub use step::{Event, Illegal};
 
 /// Charged attempts after which a file is quarantined.
@@ -131,9 +134,15 @@ pub struct Publication {
 /// Longest reason kept, in bytes.
 pub const MAX_REASON: usize = 200;
 
-/// Cuts `text` to one line of at most [`MAX_REASON`] bytes.
+/// Cuts `text` to one line of at most [`MAX_REASON`] bytes, in characters that a record need not escape.
 pub fn one_line(text: &str) -> String {
-    let clean: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let plain = |c: char| match c {
+        '"' => '\'',
+        '\\' => '/',
+        c if c.is_control() => ' ',
+        c => c,
+    };
+    let clean: String = text.chars().map(plain).collect();
     clean.get(..clean.floor_char_boundary(MAX_REASON)).unwrap_or_default().to_owned()
 }
 

@@ -1,7 +1,8 @@
 //! Paths relative to a hot folder's parts (`in/`, `out/`, `failed/` …), as bytes: a file's name need not be UTF-8.
 //!
 //! In records and messages a path is text in which `%`, `"`, `\`, control characters and every byte that is not part of valid
-//! UTF-8 stand as `%XX`. The text is reversible, prints on one line, and JSON adds nothing to it.
+//! UTF-8 stand as `%XX`; where that makes it longer than two digits for every byte (a name in another encoding), it is `%%` and
+//! those digits. The text is reversible, prints on one line, and JSON adds nothing to it.
 
 use std::ffi::OsStr;
 use std::fmt::{self, Write as _};
@@ -11,7 +12,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 /// Longest path in its text form, in bytes. Four of them, with everything else a job holds, stay below a record's 4 KiB; a
 /// single name of 255 bytes, none of them valid UTF-8, fits.
-pub const MAX_TEXT: usize = 800;
+pub const MAX_TEXT: usize = 640;
 
 /// A relative path without `.`, `..`, empty parts or NUL.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -76,16 +77,24 @@ impl RelPath {
 
     fn from_text(text: &str) -> Result<Self, PathError> {
         let mut bytes = Vec::with_capacity(text.len());
-        let mut rest = text.bytes();
-        while let Some(byte) = rest.next() {
-            if byte != b'%' {
-                bytes.push(byte);
-                continue;
-            }
-            let mut digit = || rest.next().and_then(|b| char::from(b).to_digit(16)).and_then(|d| u8::try_from(d).ok());
-            match (digit(), digit()) {
-                (Some(high), Some(low)) => bytes.push(high << 4 | low),
-                _ => return Err(PathError::BadEscape),
+        let (mut rest, all_digits) = match text.strip_prefix("%%") {
+            Some(digits) => (digits.bytes(), true),
+            None => (text.bytes(), false),
+        };
+        while rest.len() > 0 {
+            let escaped = all_digits || {
+                let byte = rest.next().unwrap_or_default();
+                if byte != b'%' {
+                    bytes.push(byte);
+                }
+                byte == b'%'
+            };
+            if escaped {
+                let mut digit = || rest.next().and_then(|b| char::from(b).to_digit(16)).and_then(|d| u8::try_from(d).ok());
+                match (digit(), digit()) {
+                    (Some(high), Some(low)) => bytes.push(high << 4 | low),
+                    _ => return Err(PathError::BadEscape),
+                }
             }
         }
         Self::new(bytes)
@@ -114,17 +123,22 @@ fn os_name(bytes: &[u8]) -> PathBuf {
 
 impl fmt::Display for RelPath {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut text = String::with_capacity(self.0.len() + 2);
         for chunk in self.0.utf8_chunks() {
             for c in chunk.valid().chars() {
                 if c.is_control() || matches!(c, '%' | '"' | '\\') {
-                    c.encode_utf8(&mut [0; 4]).bytes().try_for_each(|byte| write!(f, "%{byte:02X}"))?;
+                    c.encode_utf8(&mut [0; 4]).bytes().try_for_each(|byte| write!(text, "%{byte:02X}"))?;
                 } else {
-                    f.write_char(c)?;
+                    text.push(c);
                 }
             }
-            chunk.invalid().iter().try_for_each(|byte| write!(f, "%{byte:02X}"))?;
+            chunk.invalid().iter().try_for_each(|byte| write!(text, "%{byte:02X}"))?;
         }
-        Ok(())
+        if text.len() <= 2 * self.0.len() + 2 {
+            return f.pad(&text);
+        }
+        f.write_str("%%")?;
+        self.0.iter().try_for_each(|byte| write!(f, "{byte:02X}"))
     }
 }
 
@@ -167,6 +181,13 @@ mod tests {
     fn hostile_names_are_one_line_of_text() {
         let path = RelPath::new(*b"a\nb\"\\50%\xff.stl").unwrap();
         assert_eq!(path.to_string(), "a%0Ab%22%5C50%25%FF.stl");
+        // "ÄÖÜ" in Latin-1: no byte of it is UTF-8.
+        let path = RelPath::new(*b"\xc4\xd6\xdc").unwrap();
+        assert_eq!(path.to_string(), "%%C4D6DC");
+        assert_eq!(RelPath::from_text("%%C4D6DC"), Ok(path));
+        for wrong in ["%", "%4", "%zz", "%%4", "%%zz"] {
+            assert_eq!(RelPath::from_text(wrong), Err(PathError::BadEscape), "{wrong}");
+        }
     }
 
     #[test]

@@ -24,7 +24,7 @@ use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, St
 mod index;
 
 /// Longest folder or profile name, as it stands in a record.
-const MAX_NAME: usize = 100;
+pub(crate) const MAX_NAME: usize = 64;
 /// Jobs taken in by one transaction of the tables.
 const SUBMIT_CHUNK: usize = 1000;
 const HEAD: &[u8] = b"head";

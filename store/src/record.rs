@@ -77,3 +77,73 @@ fn name(table: Table, key: &[u8]) -> String {
         Table::ByKey => "by_key".to_owned(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::id::{Attempt, Epoch, Hash, JobId, Seq, Time, Token};
+    use crate::job::{Area, Blame, Ending, Hold, Job, MAX_REASON, Publication, Source, State, one_line};
+    use crate::path::{MAX_TEXT, RelPath};
+
+    /// Everything a job can hold, as long as it can be: no transition can fail for want of room.
+    #[test]
+    fn the_largest_job_fits() {
+        let path = RelPath::new("p".repeat(MAX_TEXT)).unwrap();
+        let name = "n".repeat(crate::queue::MAX_NAME - 2);
+        let reason = one_line(&"\"".repeat(2 * MAX_REASON));
+        let source = Source {
+            folder: name.clone(),
+            path: path.clone(),
+            dev: u64::MAX,
+            ino: u64::MAX,
+            size: u64::MAX,
+            mtime_ns: i64::MIN,
+            profile: name,
+        };
+        let hold = Hold { attempt: Attempt(u32::MAX), epoch: Epoch(u64::MAX), token: Token(u64::MAX), alone: false };
+        let publication = Publication {
+            ending: Ending::Quarantined,
+            reason: reason.clone(),
+            output: Some(path.clone()),
+            output_hash: Some(Hash([0xff; 32])),
+            report_hash: Some(Hash([0xff; 32])),
+            original: Some(path.clone()),
+        };
+        let number = u32::MAX;
+        let blame = Blame { charges: number, deaths: number, deaths_alone: number, environment: number, kills: number };
+        let mut job = Job::queued(JobId(u64::MAX), source, Time(u64::MAX));
+        job.moved_to = Some((Area::Quarantine, path));
+        job.state = State::Publishing { hold, publication };
+        job.attempts = Attempt(number);
+        job.blame = blame;
+        job.work = Some(Token(u64::MAX));
+        job.note = reason;
+        job.seq = Seq(u64::MAX);
+        let key = job.id.0.to_be_bytes();
+        let bytes = encode(Table::Jobs, &key, &job).unwrap();
+        assert_eq!(decode::<Job>(Table::Jobs, &key, &bytes).unwrap(), job);
+    }
+
+    #[test]
+    fn records_of_another_time_or_place_are_told_apart() {
+        let bytes = encode(Table::Meta, b"head", &7_u32).unwrap();
+        assert_eq!(decode::<u32>(Table::Meta, b"head", &bytes).unwrap(), 7);
+        let damaged = |result: Result<u32, StoreError>| assert!(matches!(result, Err(StoreError::Corrupt { .. })), "{result:?}");
+        damaged(decode(Table::Meta, b"tail", &bytes));
+        damaged(decode(Table::ByKey, b"head", &bytes));
+        damaged(decode(Table::Meta, b"head", b""));
+        // A record of a later version, whole in itself.
+        let mut later = bytes;
+        later[5] = 2;
+        let crc = checksum(Table::Meta, b"head", 2, b"7");
+        later[6..10].copy_from_slice(&crc.to_be_bytes());
+        let result = decode::<u32>(Table::Meta, b"head", &later);
+        assert!(matches!(result, Err(StoreError::Newer { found: 2, known: SCHEMA })), "{result:?}");
+    }
+
+    #[test]
+    fn what_is_too_long_is_refused() {
+        let text = "x".repeat(MAX);
+        assert!(matches!(encode(Table::Meta, b"head", &text), Err(StoreError::TooLong { .. })));
+    }
+}

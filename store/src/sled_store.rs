@@ -37,6 +37,8 @@ use crate::queue::Queue;
 use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted};
 
 mod files;
+#[cfg(test)]
+mod kill_tests;
 mod open;
 mod tables;
 #[cfg(test)]

@@ -126,8 +126,10 @@ impl Job {
             (State::Running { cancel: false, .. }, Step::HandBack) => NOW,
             (State::Running { .. }, Step::HandBack | Step::Cancelled) => State::Cancelled { why: Withdrawal::Operator },
             (State::Running { .. }, Step::Withdrawn(why)) => State::Cancelled { why: *why },
-            // A result that is there is not thrown away because a cancel came late.
-            (State::Running { .. }, Step::Intend(publication)) => publishing(hold, publication),
+            // A result that is there is not thrown away because a cancel came late. Who is condemned, the machine says.
+            (State::Running { .. }, Step::Intend(publication)) if !publication.ending.is_condemned() => {
+                publishing(hold, publication)
+            }
             // Another name may be chosen, but not another result.
             (State::Publishing { publication: earlier, .. }, Step::Intend(publication))
                 if (publication.ending, publication.output_hash) == (earlier.ending, earlier.output_hash) =>

@@ -62,7 +62,7 @@ struct Front<'a> {
 /// Closes the loop; what the front leaves, up to `max_rest` vertices, goes to the minimum-weight triangulation.
 pub(super) fn triangulate(rim: &Rim<'_>, order: Order, max_rest: usize) -> Result<Vec<[u32; 3]>, Unfillable> {
     let mut front = Front::new(rim, order);
-    front.advance(if rim.len() > REST { REST } else { 3 });
+    front.advance(if rim.len() > REST { REST.min(max_rest).max(3) } else { 3 });
     if front.left > max_rest.max(3) {
         return Err(Unfillable::TooLarge);
     }

@@ -12,6 +12,7 @@ pub mod exact;
 mod front;
 mod minweight;
 mod planar;
+mod search;
 pub mod tree;
 
 use boxes::{Boxes, EMPTY, around};
@@ -67,6 +68,8 @@ pub enum Method {
     Front,
     /// As planar, for a loop far from planar that is a simple polygon in projection.
     Projected,
+    /// Any valid triangulation of a small loop.
+    Search,
 }
 
 impl Method {
@@ -79,6 +82,7 @@ impl Method {
             Self::LeastArea => "least_area",
             Self::Front => "front",
             Self::Projected => "projected",
+            Self::Search => "search",
         }
     }
 }
@@ -131,10 +135,12 @@ pub fn triangulate(rim: &Rim<'_>, settings: &FillSettings) -> Result<Patch, Unfi
         };
     }
     let small = rim.len() <= settings.minimum_weight_vertices;
-    let methods: &[Method] = if small {
-        &[Method::Planar, Method::MinimumWeight, Method::LeastArea, Method::Projected, Method::Front]
-    } else {
-        &[Method::Planar, Method::Front, Method::Projected]
+    let methods: &[Method] = match rim.len() {
+        ..=SEARCH_VERTICES if small => {
+            &[Method::Planar, Method::MinimumWeight, Method::LeastArea, Method::Projected, Method::Front, Method::Search]
+        }
+        _ if small => &[Method::Planar, Method::MinimumWeight, Method::LeastArea, Method::Projected, Method::Front],
+        _ => &[Method::Planar, Method::Front, Method::Projected],
     };
     let mut reason = Unfillable::Blocked;
     for &method in methods {
@@ -145,6 +151,7 @@ pub fn triangulate(rim: &Rim<'_>, settings: &FillSettings) -> Result<Patch, Unfi
             Method::MinimumWeight => by_weight(rim, Weight::Bend),
             Method::LeastArea => by_weight(rim, Weight::Area),
             Method::Front => by_front(rim, settings.minimum_weight_vertices),
+            Method::Search => by_search(rim),
         };
         match made {
             Ok(triangles) => return Ok(patch(triangles, method)),
@@ -192,6 +199,16 @@ fn by_front(rim: &Rim<'_>, max_rest: usize) -> Result<Vec<[u32; 3]>, Unfillable>
     };
     attempt(Order::Chord).or_else(|_: Unfillable| attempt(Order::Angle))
 }
+
+fn by_search(rim: &Rim<'_>) -> Result<Vec<[u32; 3]>, Unfillable> {
+    // Why nothing was found the other methods say better.
+    let triangles = search::triangulate(rim).ok_or(Unfillable::Blocked)?;
+    rim.accepts(&triangles, false)?;
+    Ok(triangles)
+}
+
+/// Largest loop that is searched for any valid triangulation at all.
+const SEARCH_VERTICES: usize = 24;
 
 /// What is wrong with a triangulation.
 enum Fault {

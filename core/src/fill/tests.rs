@@ -295,6 +295,20 @@ fn without_repeats(mut points: Vec<Grid>) -> Vec<Grid> {
     points
 }
 
+/// All triangulations of the part of a polygon beyond the chord (i, k).
+fn all_triangulations(i: u32, k: u32) -> Vec<Vec<[u32; 3]>> {
+    if k == i + 1 {
+        return vec![Vec::new()];
+    }
+    let mut all = Vec::new();
+    for m in i + 1..k {
+        for left in all_triangulations(i, m) {
+            all.extend(all_triangulations(m, k).into_iter().map(|right| [&left[..], &right, &[[i, m, k]]].concat()));
+        }
+    }
+    all
+}
+
 /// About one chord in `one_in`.
 fn some(seed: u32, one_in: u32) -> impl Fn(u32, u32) -> bool {
     move |a, b| {
@@ -338,6 +352,26 @@ proptest! {
         prop_assume!(p.len() > 2);
         let _ = fill(&p, &apexes, &some(seed, one_in));
         let _ = fill(&p, &[], &free);
+    }
+
+    /// On a coarse grid, with rim and mesh in the way everywhere: a patch is found whenever there is one.
+    #[test]
+    fn a_small_loop_is_filled_if_it_can_be(
+        p in prop::collection::vec(prop::array::uniform3(0_i32..4), 4..8).prop_map(without_repeats),
+        (seed, one_in) in (any::<u32>(), 2_u32..99),
+    ) {
+        prop_assume!(p.len() > 3);
+        let forbidden = some(seed, one_in);
+        let valid = |patch: &Vec<[u32; 3]>| {
+            let corners: Vec<[Grid; 3]> = patch.iter().map(|t| t.map(|v| p[v as usize])).collect();
+            let n = p.len() as u32;
+            let allowed = |a: u32, b: u32| b == a + 1 || (a, b) == (0, n - 1) || !forbidden(a, b);
+            patch.iter().all(|t| allowed(t[0], t[1]) && allowed(t[1], t[2]) && allowed(t[0], t[2]))
+                && corners.iter().all(|c| !area_is_zero(c))
+                && (0..corners.len()).all(|i| (0..i).all(|j| !contact(&corners[i], &corners[j]).is_crossing()))
+        };
+        let possible = all_triangulations(0, p.len() as u32 - 1).iter().any(valid);
+        prop_assert_eq!(fill(&p, &[], &forbidden).is_ok(), possible);
     }
 
     /// The front is the way for large loops; small ones find its mistakes sooner.

@@ -9,6 +9,7 @@
 mod boxes;
 pub mod cross;
 pub mod exact;
+mod flips;
 mod front;
 mod minweight;
 mod planar;
@@ -18,6 +19,7 @@ pub mod tree;
 use boxes::{Boxes, EMPTY, around};
 use cross::{Contact, Triangle, triangles_cross};
 use exact::{Point, at, collinear};
+use flips::Flips;
 use front::Order;
 use glam::DVec3;
 use minweight::{Choice, Weight};
@@ -165,8 +167,21 @@ pub fn triangulate(rim: &Rim<'_>, settings: &FillSettings) -> Result<Patch, Unfi
 
 fn by_projection(rim: &Rim<'_>, max_deviation: f64) -> Result<Vec<[u32; 3]>, Unfillable> {
     let triangles = planar::triangulate(rim, max_deviation).ok_or(Unfillable::Blocked)?;
+    // What is nearly planar is as smooth as it gets.
+    if max_deviation == f64::INFINITY
+        && let Some(smooth) = smoothed(rim, &triangles)
+    {
+        return Ok(smooth);
+    }
     rim.accepts(&triangles, true)?;
     Ok(triangles)
+}
+
+/// The patch with fewer sharp bends, if that is valid.
+fn smoothed(rim: &Rim<'_>, triangles: &[[u32; 3]]) -> Option<Vec<[u32; 3]>> {
+    let mut mesh = Flips::new(rim, triangles.to_vec());
+    mesh.smooth();
+    rim.accepts(mesh.triangles(), false).is_ok().then(|| mesh.into_triangles())
 }
 
 /// The best patch; where it is not valid, the best of free triangles; where that crosses itself, again without the larger of
@@ -194,6 +209,9 @@ const BAN_WORK: usize = 600;
 fn by_front(rim: &Rim<'_>, max_rest: usize) -> Result<Vec<[u32; 3]>, Unfillable> {
     let attempt = |order| {
         let triangles = front::triangulate(rim, order, max_rest)?;
+        if let Some(smooth) = smoothed(rim, &triangles) {
+            return Ok(smooth);
+        }
         rim.accepts(&triangles, false)?;
         Ok(triangles)
     };

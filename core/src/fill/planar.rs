@@ -12,6 +12,7 @@ use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
 use super::Rim;
 use super::exact::{Point, at, turn};
+use super::flips::Flips;
 
 /// A loop's directed area: half of Σ pᵢ × pᵢ₊₁, taken about the first vertex.
 pub(super) fn directed_area(points: &[Point]) -> DVec3 {
@@ -42,9 +43,18 @@ pub(super) fn triangulate(rim: &Rim<'_>, max_deviation: f64) -> Option<Vec<[u32;
         return None;
     }
     let axis = (0..3).fold(0, |best, k| if area[k].abs() > area[best].abs() { k } else { best });
-    let mut mesh = Flips::new(rim, axis, area[axis] > 0.0, delaunay(rim.points, axis, area[axis] > 0.0)?)?;
-    mesh.improve();
-    mesh.avoid_forbidden().then_some(mesh.triangles)
+    let forward = area[axis] > 0.0;
+    let turns_right_way = |t: [u32; 3]| {
+        let [a, b, c] = rim.corners(t);
+        turn(&a, &b, &c, axis) == if forward { 1 } else { -1 }
+    };
+    let mut mesh = Flips::new(rim, delaunay(rim.points, axis, forward)?);
+    if !mesh.triangles().iter().all(|t| turns_right_way(*t)) {
+        return None;
+    }
+    mesh.improve(turns_right_way, |mesh, edge| mesh.around(edge).is_some_and(|a| not_delaunay(rim.points, a.quad)));
+    mesh.avoid_forbidden(turns_right_way);
+    mesh.is_allowed().then(|| mesh.into_triangles())
 }
 
 /// Constrained Delaunay triangulation of the projection along `axis` (seen from its negative end unless `forward`), if that is
@@ -84,116 +94,6 @@ fn delaunay(points: &[Point], axis: usize, forward: bool) -> Option<Vec<[u32; 3]
         }
     }
     (triangles.len() == n - 2).then_some(triangles)
-}
-
-const NONE: u32 = u32::MAX;
-
-/// A triangulated polygon whose edges can be flipped.
-struct Flips<'a> {
-    rim: &'a Rim<'a>,
-    axis: usize,
-    sense: i8,
-    triangles: Vec<[u32; 3]>,
-    /// The triangle across the edge from corner k to corner k + 1.
-    across: Vec<[u32; 3]>,
-}
-
-impl<'a> Flips<'a> {
-    fn new(rim: &'a Rim<'a>, axis: usize, forward: bool, triangles: Vec<[u32; 3]>) -> Option<Self> {
-        let mut sides: Vec<(u32, u32, usize, usize)> = Vec::with_capacity(3 * triangles.len());
-        for (i, t) in triangles.iter().enumerate() {
-            sides.extend((0..3).map(|k| (t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3]), i, k)));
-        }
-        sides.sort_unstable();
-        let mut across = vec![[NONE; 3]; triangles.len()];
-        for pair in sides.windows(2) {
-            let ((a, b, i, k), (c, d, j, l)) = (pair[0], pair[1]);
-            if (a, b) == (c, d) {
-                across[i][k] = j as u32;
-                across[j][l] = i as u32;
-            }
-        }
-        let mesh = Self { rim, axis, sense: if forward { 1 } else { -1 }, triangles, across };
-        mesh.triangles.iter().all(|t| mesh.turns_right_way(*t)).then_some(mesh)
-    }
-
-    fn turns_right_way(&self, t: [u32; 3]) -> bool {
-        let [a, b, c] = self.rim.corners(t);
-        self.sense * turn(&a, &b, &c, self.axis) > 0
-    }
-
-    /// The quadrilateral around the edge from corner `k` of triangle `i`: the edge (a, b), then the corners across it on the
-    /// side of `i` and on the other.
-    fn around(&self, i: usize, k: usize) -> Option<(usize, usize, [u32; 4])> {
-        let j = self.across[i][k];
-        if j == NONE {
-            return None;
-        }
-        let j = j as usize;
-        let l = self.across[j].iter().position(|&x| x as usize == i)?;
-        let t = self.triangles[i];
-        Some((j, l, [t[k], t[(k + 1) % 3], t[(k + 2) % 3], self.triangles[j][(l + 2) % 3]]))
-    }
-
-    /// Replaces the edge from corner `k` of `i` by the other diagonal, if both new triangles turn the right way and the diagonal
-    /// is allowed.
-    fn flip(&mut self, i: usize, k: usize) -> bool {
-        let Some((j, l, [a, b, c, d])) = self.around(i, k) else { return false };
-        let (new_i, new_j) = ([c, a, d], [d, b, c]);
-        if !self.turns_right_way(new_i) || !self.turns_right_way(new_j) || !self.rim.allows(c, d) {
-            return false;
-        }
-        let (bc, ca) = (self.across[i][(k + 1) % 3], self.across[i][(k + 2) % 3]);
-        let (ad, db) = (self.across[j][(l + 1) % 3], self.across[j][(l + 2) % 3]);
-        self.triangles[i] = new_i;
-        self.triangles[j] = new_j;
-        self.across[i] = [ca, ad, j as u32];
-        self.across[j] = [db, bc, i as u32];
-        self.relink(ad, j, i);
-        self.relink(bc, i, j);
-        true
-    }
-
-    fn relink(&mut self, t: u32, from: usize, to: usize) {
-        if let Some(slots) = self.across.get_mut(t as usize) {
-            for s in slots.iter_mut().filter(|s| **s as usize == from) {
-                *s = to as u32;
-            }
-        }
-    }
-
-    /// Lawson's flips towards the Delaunay triangulation as measured in space, a bounded number of them (what is not planar
-    /// need not settle).
-    fn improve(&mut self) {
-        let mut budget = 16 * self.triangles.len();
-        let mut stack: Vec<u32> = (0..self.triangles.len() as u32).rev().collect();
-        while let Some(i) = stack.pop().map(|i| i as usize) {
-            for k in 0..3 {
-                let Some((j, _, quad)) = self.around(i, k) else { continue };
-                if budget > 0 && not_delaunay(self.rim.points, quad) && self.flip(i, k) {
-                    budget -= 1;
-                    stack.extend([i as u32, j as u32]);
-                    break;
-                }
-            }
-        }
-    }
-
-    /// Flips forbidden chords away; `false` where one remains.
-    fn avoid_forbidden(&mut self) -> bool {
-        let allowed = |mesh: &Self, i: usize, k: usize| {
-            let t = mesh.triangles[i];
-            mesh.rim.allows(t[k], t[(k + 1) % 3])
-        };
-        for i in 0..self.triangles.len() {
-            for k in 0..3 {
-                if !allowed(self, i, k) {
-                    self.flip(i, k);
-                }
-            }
-        }
-        (0..self.triangles.len()).all(|i| (0..3).all(|k| allowed(self, i, k)))
-    }
 }
 
 /// Do the angles opposite the edge (a, b) of the two triangles exceed 180° together, clearly (sin(α + β) < 0)?

@@ -1,14 +1,16 @@
 //! The command line: what can be said, with help for each word of it. Meaning is given in the modules named after the commands.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::units::parse_size;
+use crate::units::{parse_duration, parse_size};
 
 /// Unattended repair of triangle meshes for 3D printing.
 ///
-/// Exit status: 0 good under the profile; 1 done, but a file is not good; 2 unreadable or refused input, or wrong usage.
+/// Exit status: 0 good under the profile; 1 done, but a file is not good; 2 unreadable or refused input, or wrong usage;
+/// 73 the folder is served by another daemon; 75 the job store cannot be used, try again.
 #[derive(Debug, Parser)]
 #[command(name = "suture", version, max_term_width = 100, disable_help_subcommand = true)]
 pub(crate) struct Cli {
@@ -22,10 +24,31 @@ pub(crate) enum Command {
     Repair(RepairArgs),
     /// Diagnose files and write nothing
     Inspect(InspectArgs),
+    /// Serve a hot folder: repair whatever is dropped into DIR/in
+    #[command(long_about = WATCH_HELP)]
+    Watch(WatchArgs),
+    /// See and steer the jobs of a hot folder, whether or not its daemon runs
+    Jobs(JobsArgs),
+    /// Make a hot folder of small broken meshes, repair them, and show what happened
+    Demo,
     /// Work on requests from standard input (started by the supervisor)
     #[command(hide = true)]
     Worker,
 }
+
+const WATCH_HELP: &str = "\
+Serve a hot folder: repair whatever is dropped into DIR/in.
+
+Needs no configuration. These folders are made under DIR:
+  in/          drop files here; a sub-folder's name chooses the profile (default, scan, cautious, or one of your own)
+  out/         results, and only printable ones; a clean file appears here too
+  done/        originals of what is in out/
+  failed/      originals of what could not be made good, each with its report and the best attempt
+  quarantine/  files that crash or hang the repair
+  .suture/     work in progress and the job store; leave it alone
+
+Nothing is ever overwritten: a second part.stl becomes part~2.stl. Ctrl-C or SIGTERM stops taking files and finishes those in
+work; a second one stops at once, and the files are taken up again at the next start.";
 
 /// What the machine may spend; never changes a result.
 #[derive(Args, Debug, Clone)]
@@ -94,6 +117,68 @@ pub(crate) struct InspectArgs {
     pub json: bool,
 }
 
+#[derive(Args, Debug)]
+pub(crate) struct WatchArgs {
+    /// Hot folder to serve; made when missing
+    #[arg(value_name = "DIR", required_unless_present = "config", conflicts_with = "config")]
+    pub dir: Option<PathBuf>,
+    /// Configuration file (TOML) instead of a folder
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Work until everything in in/ is finished, then end: 0 if all is good, 1 if not
+    #[arg(long)]
+    pub once: bool,
+    /// Memory all workers together may hold, e.g. 2GiB [default: 1GiB]
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    pub memory: Option<u64>,
+    /// Small files worked on at a time [default: 2]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub workers: Option<u16>,
+    /// Threads for one large file [default: all processors]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// How long a file must be at rest before it is taken, e.g. 5s
+    #[arg(long, value_name = "TIME", value_parser = parse_duration)]
+    pub settle: Option<Duration>,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct JobsArgs {
+    /// The hot folder
+    #[arg(long, value_name = "DIR", default_value = ".", global = true)]
+    pub dir: PathBuf,
+    /// Print JSON
+    #[arg(long, global = true)]
+    pub json: bool,
+    #[command(subcommand)]
+    pub command: JobsCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum JobsCommand {
+    /// List jobs, the newest last
+    List {
+        /// Only jobs in this state, e.g. queued, running, failed
+        #[arg(long, value_name = "STATE")]
+        state: Option<String>,
+    },
+    /// Show one job and its report
+    Show {
+        #[arg(value_name = "ID")]
+        id: u64,
+    },
+    /// Work on a failed, cancelled or quarantined file once more
+    Retry {
+        #[arg(value_name = "ID")]
+        id: u64,
+    },
+    /// Give a waiting job up; its file stays where it is
+    Cancel {
+        #[arg(value_name = "ID")]
+        id: u64,
+    },
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -102,5 +187,12 @@ mod tests {
     #[test]
     fn the_command_line_is_well_formed() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn watch_takes_a_folder_or_a_configuration_but_one_of_them() {
+        assert!(Cli::try_parse_from(["suture", "watch"]).is_err());
+        assert!(Cli::try_parse_from(["suture", "watch", "d", "--config", "c"]).is_err());
+        assert!(Cli::try_parse_from(["suture", "watch", "--config", "c", "--once"]).is_ok());
     }
 }

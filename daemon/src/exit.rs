@@ -11,17 +11,23 @@ pub(crate) enum Exit {
     NotGood,
     /// Unreadable or refused input, wrong usage.
     Refused,
+    /// The state directory is owned by another daemon.
+    Owned,
+    /// The store cannot be used; try again.
+    TryAgain,
     /// Stopped by a signal.
     Interrupted,
 }
 
 impl Exit {
-    /// 130 as shells report SIGINT.
+    /// `sysexits` where they fit: 73 cannot create, 75 temporary failure; 130 as shells report SIGINT.
     pub(crate) fn code(self) -> u8 {
         match self {
             Self::Good => 0,
             Self::NotGood => 1,
             Self::Refused => 2,
+            Self::Owned => 73,
+            Self::TryAgain => 75,
             Self::Interrupted => 130,
         }
     }

@@ -22,13 +22,28 @@ pub(crate) struct Identity {
     pub dev: u64,
     pub ino: u64,
     pub size: u64,
-    pub mtime_ns: i128,
-    pub ctime_ns: i128,
+    pub mtime_ns: i64,
+    pub ctime_ns: i64,
+}
+
+impl Identity {
+    /// Of the name itself: a symbolic link is not followed.
+    ///
+    /// # Errors
+    /// As `lstat`.
+    pub(crate) fn of(path: &Path) -> io::Result<Self> {
+        Ok(Self::from(&std::fs::symlink_metadata(path)?))
+    }
+
+    /// The same file with the same content, as far as can be told when it was renamed in between.
+    pub(crate) fn same_content(&self, other: &Self) -> bool {
+        (self.dev, self.ino, self.size, self.mtime_ns) == (other.dev, other.ino, other.size, other.mtime_ns)
+    }
 }
 
 impl From<&std::fs::Metadata> for Identity {
     fn from(m: &std::fs::Metadata) -> Self {
-        let ns = |seconds: i64, nanos: i64| i128::from(seconds) * 1_000_000_000 + i128::from(nanos);
+        let ns = |seconds: i64, nanos: i64| seconds.saturating_mul(1_000_000_000).saturating_add(nanos);
         Self {
             dev: m.dev(),
             ino: m.ino(),
@@ -79,6 +94,16 @@ pub(crate) fn temporary_in(folder: &Path) -> PathBuf {
     folder.join(format!(".suture-{}-{n}.tmp", std::process::id()))
 }
 
+/// Writes a new file whole and synced; an existing one is an error.
+///
+/// # Errors
+/// As `open`, `write` and `fsync`.
+pub(crate) fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
+    file.write_all(bytes)?;
+    file.sync_all()
+}
+
 /// Writes `value` as JSON, with a final newline, into a new synced file.
 ///
 /// # Errors
@@ -100,6 +125,16 @@ pub(crate) fn remove_if_there(path: &Path) -> io::Result<()> {
         Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
         _ => Ok(()),
     }
+}
+
+/// BLAKE3 of a file's bytes, hexadecimal. Reads, never maps: the file may be cut short meanwhile.
+///
+/// # Errors
+/// As `open` and `read`.
+pub(crate) fn hash(path: &Path) -> io::Result<String> {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(File::open(path)?)?;
+    Ok(hasher.finalize().to_hex().to_string())
 }
 
 /// Gives a new file its folder's group and the mode of any new file here, whatever its maker's taste.
@@ -129,24 +164,88 @@ fn umask() -> u32 {
     })
 }
 
-/// `part.stl`, `part~2.stl`, `part~3.stl`, …: the `n`-th name for a file, `n` from 1, with `suffix` appended; cut to what a
-/// name may be long.
-pub(crate) fn versioned(name: &OsStr, n: u32, suffix: &str) -> OsString {
+/// Does the folder lie on a network or user-space file system, whose changes the kernel does not tell us of?
+pub(crate) fn needs_polling(folder: &Path) -> bool {
+    // NFS, SMB, SMB2, CIFS, FUSE, 9P, Ceph, AFS, Lustre, GPFS (`linux/magic.h` and the file systems' own headers).
+    const NETWORK: [u32; 10] =
+        [0x6969, 0x517B, 0xFE53_4D42, 0xFF53_4D42, 0x6573_5546, 0x0102_1997, 0x00C3_6400, 0x5346_414F, 0x0BD0_0BD0, 0x4750_4653];
+    // The field's type differs between platforms; the magic numbers are 32 bits wide.
+    rustix::fs::statfs(folder).is_ok_and(|fs| NETWORK.contains(&(fs.f_type as u32)))
+}
+
+/// `part.stl`, `part~2.stl`, `part~3.stl`, …: the `n`-th name for a file, `n` from 1, cut so that `reserve` more bytes fit into
+/// what a name may be long.
+pub(crate) fn versioned(name: &OsStr, n: u32, reserve: usize) -> OsString {
     let path = Path::new(name);
     let stem = path.file_stem().unwrap_or(name).as_bytes();
     let tilde = if n > 1 { format!("~{n}") } else { String::new() };
     let extension = path.extension().map_or_else(Vec::new, |e| [b".", e.as_bytes()].concat());
-    let room = NAME_MAX.saturating_sub(tilde.len() + extension.len() + suffix.len());
+    let room = NAME_MAX.saturating_sub(tilde.len() + extension.len() + reserve);
     let mut end = stem.len().min(room);
     // Cut between characters where it is text.
     while end < stem.len() && end > 0 && stem.get(end).is_some_and(|b| b & 0xC0 == 0x80) {
         end -= 1;
     }
     let stem = stem.get(..end).unwrap_or(stem);
-    OsString::from_vec([stem, tilde.as_bytes(), &extension, suffix.as_bytes()].concat())
+    OsString::from_vec([stem, tilde.as_bytes(), &extension].concat())
 }
 
 /// Is there anything of that name, be it a dangling link?
 pub(crate) fn exists(path: &Path) -> bool {
     std::fs::symlink_metadata(path).is_ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn renaming_never_replaces() {
+        let dir = tempfile::tempdir().unwrap();
+        let (a, b) = (dir.path().join("a"), dir.path().join("b"));
+        write_new(&a, b"new").unwrap();
+        write_new(&b, b"old").unwrap();
+        assert_eq!(rename_new(&a, &b).unwrap_err().kind(), io::ErrorKind::AlreadyExists);
+        assert_eq!(std::fs::read(&b).unwrap(), b"old");
+        std::fs::remove_file(&b).unwrap();
+        rename_new(&a, &b).unwrap();
+        assert_eq!(std::fs::read(&b).unwrap(), b"new");
+        assert!(!exists(&a));
+    }
+
+    #[test]
+    fn names_count_up_and_fit() {
+        assert_eq!(versioned(OsStr::new("part.stl"), 1, 12), "part.stl");
+        assert_eq!(versioned(OsStr::new("part.stl"), 2, 12), "part~2.stl");
+        assert_eq!(versioned(OsStr::new("part.STL"), 3, 12), "part~3.STL");
+        assert_eq!(versioned(OsStr::new("part"), 2, 0), "part~2");
+        let long = OsString::from(format!("{}.stl", "ä".repeat(125)));
+        let cut = versioned(&long, 12, 20);
+        assert!(cut.len() + 20 <= NAME_MAX);
+        assert!(cut.to_str().unwrap().ends_with("ä~12.stl"), "cut between characters, extension kept");
+        let odd = OsString::from_vec([vec![0xE9; 251], b".stl".to_vec()].concat());
+        assert_eq!(versioned(&odd, 2, 0).len(), NAME_MAX);
+    }
+
+    #[test]
+    fn a_new_file_is_as_readable_as_its_neighbours() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a");
+        write_new(&path, b"x").unwrap();
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o600)).unwrap();
+        fit_in(&path, dir.path()).unwrap();
+        assert_eq!(std::fs::metadata(&path).unwrap().mode() & 0o777, 0o644 & !umask());
+    }
+
+    #[test]
+    fn identity_survives_a_rename_but_not_a_write() {
+        let dir = tempfile::tempdir().unwrap();
+        let (a, b) = (dir.path().join("a"), dir.path().join("b"));
+        write_new(&a, b"x").unwrap();
+        let before = Identity::of(&a).unwrap();
+        rename_new(&a, &b).unwrap();
+        assert!(before.same_content(&Identity::of(&b).unwrap()));
+        std::fs::write(&b, b"longer").unwrap();
+        assert!(!before.same_content(&Identity::of(&b).unwrap()));
+    }
 }

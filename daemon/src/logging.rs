@@ -13,6 +13,6 @@ pub(crate) fn start(level: &str) {
     let _ = if std::io::stderr().is_terminal() {
         log.with_target(false).compact().try_init()
     } else {
-        log.json().flatten_event(true).with_current_span(false).with_span_list(false).try_init()
+        log.json().flatten_event(true).with_current_span(true).with_span_list(false).try_init()
     };
 }

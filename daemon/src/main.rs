@@ -1,17 +1,29 @@
 //! Suture: unattended, out-of-core repair of triangle meshes for 3D printing. This is the binary: the command line, the hot
 //! folders and their daemon, and the worker processes in which the engine runs.
 
+mod attempt;
 mod cli;
+mod config;
+mod control;
+mod demo;
 mod exit;
+mod folder;
 mod fsx;
+mod jobs;
 mod logging;
 mod profiles;
 mod protocol;
+mod publish;
+mod receipt;
+mod scan;
+mod schedule;
+mod settle;
 mod signals;
 mod single;
 mod supervise;
 mod table;
 mod units;
+mod watch;
 mod worker;
 
 use std::process::ExitCode;
@@ -23,7 +35,12 @@ use exit::Exit;
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    logging::start("warn");
+    logging::start(match cli.command {
+        Command::Watch(_) => "info",
+        // It shows results, good or bad, by itself.
+        Command::Demo => "error",
+        _ => "warn",
+    });
     let exit = match &cli.command {
         Command::Repair(args) => single::repair(args),
         Command::Inspect(args) => single::inspect(args),
@@ -34,6 +51,9 @@ fn main() -> ExitCode {
                 Exit::Refused
             }
         },
+        Command::Watch(args) => watch::run(args),
+        Command::Jobs(args) => jobs::run(args),
+        Command::Demo => demo::run(),
     };
     exit.into()
 }

@@ -4,6 +4,9 @@ use std::path::Path;
 
 use suture_core::Profile;
 
+/// Settings that a folder of `in/` may carry for itself.
+pub(crate) const FOLDER_FILE: &str = ".suture.toml";
+
 /// Reads a profile file. Unknown settings are errors, with their line; the name is the file's unless it gives one.
 ///
 /// # Errors

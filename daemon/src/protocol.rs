@@ -24,6 +24,9 @@ pub(crate) struct Request {
     /// [`Message::Done`] then leaves those records out.
     #[serde(with = "path_bytes::option")]
     pub report: Option<PathBuf>,
+    /// A file to leave behind when the supervisor dies during this work: the work did not kill it.
+    #[serde(with = "path_bytes::option")]
+    pub witness: Option<PathBuf>,
     /// The input's name as people know it.
     pub shown_input: String,
     /// The output's name as people will know it.
@@ -107,6 +110,7 @@ mod tests {
             input: odd.clone(),
             output: Some(odd.clone()),
             report: None,
+            witness: None,
             shown_input: "x".into(),
             shown_output: None,
             profile: Profile::default(),

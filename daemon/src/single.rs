@@ -13,6 +13,7 @@ use crate::cli::{InspectArgs, RepairArgs};
 use crate::exit::Exit;
 use crate::fsx::{self, Identity};
 use crate::protocol::Request;
+use crate::receipt::REPORT;
 use crate::signals::Stop;
 use crate::supervise::{Cause, Ended, Worker};
 use crate::{profiles, table};
@@ -125,7 +126,7 @@ impl Plan {
     /// The name the result is to have, `n` being the attempt to find a free one.
     fn target(&self, input: &Path, n: u32) -> PathBuf {
         if self.folder {
-            self.output.join(fsx::versioned(input.file_name().unwrap_or_default(), n, ""))
+            self.output.join(fsx::versioned(input.file_name().unwrap_or_default(), n, 0))
         } else {
             self.output.clone()
         }
@@ -171,6 +172,7 @@ impl Run {
             input: input.to_owned(),
             output: None,
             report: None,
+            witness: None,
             shown_input: input.display().to_string(),
             shown_output: None,
             profile: profile.clone(),
@@ -186,7 +188,9 @@ impl Run {
         let output = fsx::temporary_in(folder);
         let report = plan.report.as_deref().map(|path| {
             let path = if path.is_dir() {
-                path.join(fsx::versioned(input.file_name().unwrap_or_default(), 1, ".report.json"))
+                let mut name = fsx::versioned(input.file_name().unwrap_or_default(), 1, REPORT.len());
+                name.push(REPORT);
+                path.join(name)
             } else {
                 path.to_owned()
             };
@@ -197,6 +201,7 @@ impl Run {
             input: input.to_owned(),
             output: Some(output.clone()),
             report: report.as_ref().map(|(temporary, _)| temporary.clone()),
+            witness: None,
             shown_input: input.display().to_string(),
             shown_output: Some(target.display().to_string()),
             profile: plan.profile.clone(),

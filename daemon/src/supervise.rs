@@ -127,12 +127,12 @@ impl Worker {
         let parent = rustix::process::getpid();
         // The running binary itself, even when a newer one has taken its name meanwhile.
         let mut command = Command::new("/proc/self/exe");
-        command.arg0("suture").arg("worker");
+        command.arg0("suture").arg("worker").env("RUST_BACKTRACE", "0");
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
         // SAFETY: between fork and exec only async-signal-safe calls are made: plain system calls that neither allocate nor lock.
         unsafe {
             command.pre_exec(move || {
-                rustix::process::set_parent_process_death_signal(Some(Signal::KILL))?;
+                rustix::process::set_parent_process_death_signal(Some(Signal::TERM))?;
                 if rustix::process::getppid() != Some(parent) {
                     // The parent died before the line above could take effect.
                     return Err(io::ErrorKind::BrokenPipe.into());
@@ -163,6 +163,16 @@ impl Worker {
         }
         let stdin = child.stdin.take();
         Ok(Self { child, stdin, messages, tail, readers, oom_kills: oom_kills() })
+    }
+
+    /// The process's id.
+    pub(crate) fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Is it there, waiting for a request?
+    pub(crate) fn is_alive(&mut self) -> bool {
+        matches!(self.child.try_wait(), Ok(None))
     }
 
     /// Works on one request, at most `limit` long, until `stop` says so. After anything but an answer the worker is gone

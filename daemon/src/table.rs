@@ -77,6 +77,21 @@ pub(crate) fn render(report: &Report) -> String {
     out
 }
 
+/// One line of what was wrong and what was done, for lists.
+pub(crate) fn summary(report: &Report) -> (String, String) {
+    let wrong: Vec<String> = ROWS
+        .iter()
+        .take(FIRST_DESCRIPTION)
+        .filter(|(_, of)| of(&report.before) > 0)
+        .map(|(name, of)| format!("{} {name}", show_count(of(&report.before))))
+        .chain(report.input.findings.iter().cloned())
+        .collect();
+    let done: Vec<String> =
+        report.repairs.iter().map(|repair| format!("{} × {}", repair.name.replace('_', " "), show_count(repair.count))).collect();
+    let or = |list: Vec<String>, none: &str| if list.is_empty() { none.to_owned() } else { list.join(", ") };
+    (or(wrong, "nothing"), or(done, if report.outcome == Outcome::Clean { "copied byte for byte" } else { "nothing" }))
+}
+
 fn headline(report: &Report) -> &'static str {
     match (report.task, report.outcome) {
         (_, Outcome::Clean) => "clean",
@@ -222,5 +237,7 @@ pub(crate) mod tests {
         assert!(text.contains("boundary edges"), "{text}");
         assert!(!text.contains("duplicate") && !text.contains("components"), "{text}");
         assert!(text.contains("done    fill: one hole"), "{text}");
+        let (wrong, done) = summary(&report);
+        assert_eq!((wrong.as_str(), done.as_str()), ("3 boundary edges", "fill × 1"));
     }
 }

@@ -1,4 +1,6 @@
-//! Sizes and times as people write and read them.
+//! Sizes and durations as people write them: `512MiB`, `1.5 GB`, `5s`, `2m`, `300ms`; a bare number is bytes or seconds.
+
+use std::time::Duration;
 
 /// Splits `text` into its number and its unit.
 fn split(text: &str) -> Option<(f64, &str)> {
@@ -34,6 +36,23 @@ pub(crate) fn parse_size(text: &str) -> Result<u64, String> {
     }
     // In range, as just checked.
     Ok(bytes as u64)
+}
+
+/// A duration from `5s`, `300ms`, `2m`, `1h`, `10` (seconds).
+///
+/// # Errors
+/// A line for people when the text is no duration.
+pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
+    let bad = || format!("`{text}` is not a duration (try 5s, 300ms or 2m)");
+    let (number, unit) = split(text).ok_or_else(bad)?;
+    let factor = match unit {
+        "ms" => 1e-3,
+        "" | "s" => 1.0,
+        "m" | "min" => 60.0,
+        "h" => 3600.0,
+        _ => return Err(bad()),
+    };
+    Duration::try_from_secs_f64(number * factor).map_err(|_| bad())
 }
 
 /// `617.0 KB`, `1.2 GB`: decimal, as file managers show it.
@@ -84,6 +103,16 @@ mod tests {
         assert_eq!(parse_size("4096"), Ok(4096));
         for bad in ["", "GiB", "-1", "0", "1 parsec", "1e99", "nan"] {
             assert!(parse_size(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn durations_as_people_write_them() {
+        assert_eq!(parse_duration("300ms"), Ok(Duration::from_millis(300)));
+        assert_eq!(parse_duration("2m"), Ok(Duration::from_secs(120)));
+        assert_eq!(parse_duration("10"), Ok(Duration::from_secs(10)));
+        for bad in ["", "s", "-5s", "5 weeks"] {
+            assert!(parse_duration(bad).is_err(), "{bad}");
         }
     }
 

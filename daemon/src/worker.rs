@@ -18,11 +18,15 @@ const PROGRESS_EVERY: Duration = Duration::from_millis(100);
 /// # Errors
 /// When the supervisor is gone, or speaks another protocol.
 pub(crate) fn serve() -> io::Result<()> {
+    orphan::listen()?;
     for line in io::stdin().lock().lines() {
         let request: Request = serde_json::from_str(&line?)?;
+        orphan::work_begins(request.witness.as_deref());
         // The peak of this file, not of the process's life; a kernel that refuses leaves the report with the latter.
         let _ = std::fs::write("/proc/self/clear_refs", "5");
-        say(&answer(&request))?;
+        let answer = answer(&request);
+        orphan::work_begins(None);
+        say(&answer)?;
     }
     Ok(())
 }
@@ -95,8 +99,51 @@ impl Progress for Teller {
     }
 }
 
+/// The end of a worker whose supervisor died: the system sends SIGTERM then. Before it ends, it leaves a file that says that its
+/// work outlived the supervisor, so that the work is not suspected of having killed it. An operator's SIGTERM just ends it.
+mod orphan {
+    use std::ffi::CString;
+    use std::io;
+    use std::os::unix::ffi::OsStrExt;
+    use std::path::Path;
+    use std::ptr::null_mut;
+    use std::sync::atomic::{AtomicPtr, Ordering};
+
+    use rustix::fs::{Mode, OFlags};
+    use signal_hook::consts::SIGTERM;
+
+    /// The name to leave: from `CString::into_raw`, or null. A name is never freed while the handler might read it: it is leaked,
+    /// some hundred bytes a file for a process that serves some hundred files.
+    static WITNESS: AtomicPtr<std::ffi::c_char> = AtomicPtr::new(null_mut());
+
+    pub(super) fn work_begins(witness: Option<&Path>) {
+        let name = witness.and_then(|path| CString::new(path.as_os_str().as_bytes()).ok());
+        WITNESS.store(name.map_or(null_mut(), CString::into_raw), Ordering::SeqCst);
+    }
+
+    pub(super) fn listen() -> io::Result<()> {
+        let parent = rustix::process::getppid();
+        let end = move || {
+            let name = WITNESS.load(Ordering::SeqCst);
+            if !name.is_null() && rustix::process::getppid() != parent {
+                // SAFETY: not null, so it came from `CString::into_raw`, ends with a NUL, and is never freed.
+                let name = unsafe { std::ffi::CStr::from_ptr(name) };
+                let flags = OFlags::CREATE | OFlags::WRONLY | OFlags::CLOEXEC;
+                // Without the file, the work is suspected, as it would be without this handler.
+                let _ = rustix::fs::open(name, flags, Mode::RUSR | Mode::WUSR);
+            }
+            // Ends the process as the signal would have.
+            let _ = signal_hook::low_level::emulate_default_handler(SIGTERM);
+        };
+        // SAFETY: the handler only loads an atomic, makes plain system calls (getppid, open, and those of the default action),
+        // and neither allocates nor locks.
+        unsafe { signal_hook::low_level::register(SIGTERM, end) }?;
+        Ok(())
+    }
+}
+
 /// Faults on demand, for the tests of the supervisor and of the daemon: a build with the feature `crash-points` looks for
-/// `!abort!`, `!segv!`, `!hang!`, `!memory!`, `!panic!` or `!slow!` in the input's name.
+/// `!abort!`, `!segv!`, `!hang!`, `!kill-daemon!`, `!memory!`, `!panic!` or `!slow!` in the input's name.
 #[cfg(feature = "crash-points")]
 mod hook {
     use std::time::Duration;
@@ -109,7 +156,16 @@ mod hook {
             std::process::abort();
         }
         if name.contains("!segv!") {
-            let _ = rustix::process::kill_process(rustix::process::getpid(), rustix::process::Signal::SEGV);
+            // The first finds the handler that tells stack overflows, which then steps aside.
+            for _ in 0..2 {
+                let _ = rustix::process::kill_process(rustix::process::getpid(), rustix::process::Signal::SEGV);
+            }
+        }
+        if name.contains("!kill-daemon!")
+            && let Some(parent) = rustix::process::getppid()
+        {
+            let _ = rustix::process::kill_process(parent, rustix::process::Signal::KILL);
+            std::process::abort();
         }
         if name.contains("!panic!") {
             panic!("asked to by {name}");

@@ -1,0 +1,169 @@
+//! How `suture jobs` reaches the jobs: through a socket in the hot folder while its daemon runs (the store has one owner), else
+//! by opening the store. Either way the same [`Wish`] gets the same [`Answer`].
+
+use std::io::{self, BufRead, BufReader, Read, Write};
+use std::os::fd::AsRawFd;
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use suture_store::{Control, Job, JobId, JobStore, Query, StoreError};
+
+use crate::attempt::Context;
+
+/// A request is one line of at most this many bytes.
+const LONGEST_WISH: u64 = 4096;
+/// How long either side waits for the other.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// How often the daemon looks whether someone knocks.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+
+/// What an operator wants.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Wish {
+    List,
+    Show(JobId),
+    Retry(JobId),
+    Cancel(JobId),
+}
+
+/// What comes of it.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Answer {
+    Jobs(Vec<Job>),
+    Failed { line: String, exit_code: u8 },
+}
+
+/// Does what is wished.
+pub(crate) fn answer(store: &dyn JobStore, wish: &Wish) -> Answer {
+    let result = match wish {
+        Wish::List => store.list(&Query::default()),
+        Wish::Show(id) => store.get(*id).and_then(|job| job.map(|job| vec![job]).ok_or(StoreError::Unknown(*id))),
+        Wish::Retry(id) => store.control(*id, Control::Retry).map(|job| vec![job]),
+        Wish::Cancel(id) => store.control(*id, Control::Cancel).map(|job| vec![job]),
+    };
+    match result {
+        Ok(jobs) => Answer::Jobs(jobs),
+        Err(error) => Answer::Failed { line: error.to_string(), exit_code: error.exit_code() },
+    }
+}
+
+fn socket(root: &Path) -> PathBuf {
+    root.join(".suture").join("control.sock")
+}
+
+/// A socket's address is at most 107 bytes long, a folder's name is not: the address goes by way of an open folder.
+fn short<T>(path: &Path, use_it: impl FnOnce(&Path) -> io::Result<T>) -> io::Result<T> {
+    let folder = std::fs::File::open(crate::fsx::folder_of(path))?;
+    let name = path.file_name().unwrap_or_default();
+    use_it(&Path::new("/proc/self/fd").join(folder.as_raw_fd().to_string()).join(name))
+}
+
+/// The daemon's side for one hot folder.
+pub(crate) struct Door {
+    listener: UnixListener,
+    path: PathBuf,
+}
+
+impl Door {
+    /// Opens the socket. The folder's lock is held, so that one that is there already was left by a daemon that died.
+    ///
+    /// # Errors
+    /// As `bind`.
+    pub(crate) fn open(root: &Path) -> io::Result<Self> {
+        let path = socket(root);
+        crate::fsx::remove_if_there(&path)?;
+        let listener = short(&path, |path| UnixListener::bind(path))?;
+        listener.set_nonblocking(true)?;
+        Ok(Self { listener, path })
+    }
+
+    /// Serves whoever knocks until `end`.
+    pub(crate) fn serve(&self, context: &Context, end: &dyn Fn() -> bool) {
+        while !end() {
+            match self.listener.accept() {
+                Ok((stream, _)) => {
+                    if let Err(error) = serve_one(context, stream) {
+                        tracing::debug!(%error, "A request on the control socket was not understood.");
+                    }
+                }
+                Err(_) => std::thread::sleep(LOOK_EVERY),
+            }
+        }
+    }
+}
+
+impl Drop for Door {
+    fn drop(&mut self) {
+        // A left-over socket is recognised by nobody answering.
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
+
+fn serve_one(context: &Context, stream: UnixStream) -> io::Result<()> {
+    stream.set_nonblocking(false)?;
+    stream.set_read_timeout(Some(PATIENCE))?;
+    stream.set_write_timeout(Some(PATIENCE))?;
+    let mut line = String::new();
+    BufReader::new((&stream).take(LONGEST_WISH)).read_line(&mut line)?;
+    let wish: Wish = serde_json::from_str(&line)?;
+    let answer = answer(&*context.store, &wish);
+    if let (Wish::Retry(id) | Wish::Cancel(id), Answer::Jobs(_)) = (&wish, &answer) {
+        tracing::info!(job = id.0, ?wish, "An operator's wish.");
+        context.schedule.news();
+    }
+    let mut out = io::BufWriter::new(&stream);
+    serde_json::to_writer(&mut out, &answer)?;
+    out.flush()
+}
+
+/// Asks the daemon of a hot folder; `None` when none answers.
+///
+/// # Errors
+/// When one does, but not in a way that can be understood.
+pub(crate) fn ask(root: &Path, wish: &Wish) -> io::Result<Option<Answer>> {
+    let Ok(mut stream) = short(&socket(root), |path| UnixStream::connect(path)) else { return Ok(None) };
+    stream.set_read_timeout(Some(PATIENCE))?;
+    stream.set_write_timeout(Some(PATIENCE))?;
+    let mut line = serde_json::to_vec(wish)?;
+    line.push(b'\n');
+    stream.write_all(&line)?;
+    Ok(Some(serde_json::from_reader(BufReader::new(stream))?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+    use suture_store::{MemoryStore, RelPath, Source, Submission, SystemClock};
+
+    #[test]
+    fn wishes_are_answered_or_refused_with_a_code() {
+        let store = MemoryStore::new(Arc::new(SystemClock));
+        let source = Source {
+            folder: "hot".into(),
+            path: RelPath::new(*b"a.stl").unwrap(),
+            dev: 1,
+            ino: 2,
+            size: 3,
+            mtime_ns: 4,
+            profile: "default".into(),
+        };
+        store.submit(&[Submission { source, foreign: None }]).unwrap();
+        let id = JobId(1);
+        assert!(matches!(answer(&store, &Wish::List), Answer::Jobs(jobs) if jobs.len() == 1 && jobs[0].id == id));
+        assert!(matches!(answer(&store, &Wish::Show(JobId(9))), Answer::Failed { exit_code: 2, .. }));
+        assert!(matches!(answer(&store, &Wish::Cancel(id)), Answer::Jobs(_)));
+        assert!(matches!(answer(&store, &Wish::Cancel(id)), Answer::Failed { exit_code: 2, .. }), "it is cancelled already");
+    }
+
+    #[test]
+    fn no_daemon_no_answer() {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::create_dir(dir.path().join(".suture")).unwrap();
+        assert!(ask(dir.path(), &Wish::List).unwrap().is_none());
+    }
+}

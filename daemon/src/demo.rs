@@ -1,0 +1,156 @@
+//! `suture demo`: a hot folder of small broken meshes, served by the real daemon, and what came of each file. Run again, it drops
+//! the same files again: nothing is overwritten, so the second `holes.stl` becomes `holes~2.stl`.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use suture_bench::generate::{Case, write_file};
+use suture_core::Report;
+use suture_store::{Job, JobId, State};
+
+use crate::config::Config;
+use crate::control::{Answer, Wish};
+use crate::exit::Exit;
+use crate::signals::Stop;
+use crate::{fsx, jobs, table, watch};
+
+/// What is dropped, in this order, with about so many triangles each.
+const CASES: [Case; 10] = [
+    Case::Clean,
+    Case::Holes,
+    Case::Cracks,
+    Case::Gaps,
+    Case::Duplicates,
+    Case::Degenerate,
+    Case::Flipped,
+    Case::InsideOut,
+    Case::Shuffled,
+    Case::Mixed,
+];
+const TRIANGLES: u64 = 5_000;
+const SEED: u64 = 1;
+/// A file that no one can repair, so that one sees where those go.
+const NO_MESH: (&str, &[u8]) = ("holiday.stl", b"\x89PNG\r\n\x1a\nthis is a picture with the wrong name");
+
+/// Makes the folder, drops the files, serves them, tells.
+pub(crate) fn run() -> Exit {
+    match demo() {
+        Ok(exit) => exit,
+        Err(line) => {
+            eprintln!("suture: {line}");
+            Exit::Refused
+        }
+    }
+}
+
+fn demo() -> Result<Exit, String> {
+    let dir = folder()?;
+    let shown = dir.display();
+    let stop = Stop::listen().map_err(|e| format!("cannot listen for signals: {e}"))?;
+    let before = known_jobs(&dir)?.iter().map(|job| job.id).max().unwrap_or(JobId(0));
+    say(format_args!("Dropping {} small meshes into {shown}/in and serving them, as `suture watch` would.\n", CASES.len() + 1));
+    drop_files(&dir.join("in"))?;
+    let mut config = Config::for_folder(&dir);
+    // Nobody writes slowly here.
+    config.settle = Some(Duration::from_millis(100));
+    let exit = watch::serve(config, true, &stop);
+    if !matches!(exit, Exit::Good | Exit::NotGood) {
+        return Ok(exit);
+    }
+    let mut jobs = known_jobs(&dir)?;
+    jobs.retain(|job| job.id > before);
+    jobs.iter().for_each(|job| tell(&dir, job));
+    farewell(&dir, jobs.iter().find(|job| job.source.path.name() == b"mixed.stl").map_or(1, |job| job.id.0));
+    Ok(Exit::Good)
+}
+
+fn farewell(dir: &Path, id: u64) {
+    let shown = dir.display();
+    let lines = [
+        (format!("{shown}/out"), "the results, each with a report and a receipt"),
+        (format!("{shown}/done"), "the originals of those"),
+        (format!("{shown}/failed"), "what could not be made good, with the reason"),
+        (String::new(), ""),
+        (format!("suture jobs list --dir {shown}"), "what became of every file"),
+        (format!("suture jobs show {id} --dir {shown}"), "one of them in full"),
+        ("suture repair YOUR.stl -o repaired.stl".into(), "one file"),
+        (format!("suture watch {shown}"), "serve the folder; drop STL files into its in/, end with Ctrl-C"),
+    ];
+    let width = lines.iter().map(|(what, _)| what.chars().count()).max().unwrap_or(0);
+    say(format_args!("\nWhere things are"));
+    for (what, why) in &lines {
+        if what.is_empty() {
+            say(format_args!("\nWhat to type next (`suture` stands for `cargo run --release --` until it is installed)"));
+        } else {
+            say(format_args!("  {what:<width$}  {why}"));
+        }
+    }
+}
+
+/// `./demo` where that can be made or was made by us before, else a temporary folder that stays.
+fn folder() -> Result<PathBuf, String> {
+    let here = PathBuf::from("demo");
+    let ours = here.join(".suture").is_dir();
+    if ours || (!fsx::exists(&here) && std::fs::create_dir(&here).is_ok()) {
+        let probe = fsx::temporary_in(&here);
+        if fsx::write_new(&probe, b"").is_ok() && fsx::remove_if_there(&probe).is_ok() {
+            return Ok(here);
+        }
+    }
+    let made = tempfile::Builder::new().prefix("suture-demo-").tempdir();
+    made.map(tempfile::TempDir::keep).map_err(|e| format!("no folder for the demo can be made: {e}"))
+}
+
+/// Writes each file under a hidden name and renames it into place, as a careful program would.
+fn drop_files(inbox: &Path) -> Result<(), String> {
+    let failed = |path: &Path, e: &dyn std::fmt::Display| format!("{}: cannot be written: {e}", path.display());
+    std::fs::create_dir_all(inbox).map_err(|e| failed(inbox, &e))?;
+    let place = |temporary: &Path, name: &str| {
+        let target = inbox.join(name);
+        // One that waits from an interrupted demo is as good.
+        match fsx::rename_new(temporary, &target) {
+            Err(e) if e.kind() != std::io::ErrorKind::AlreadyExists => Err(failed(&target, &e)),
+            _ => fsx::remove_if_there(temporary).map_err(|e| failed(temporary, &e)),
+        }
+    };
+    for case in CASES {
+        let temporary = fsx::temporary_in(inbox);
+        write_file(case, TRIANGLES, SEED, &temporary).map_err(|e| failed(&temporary, &e))?;
+        place(&temporary, &format!("{}.stl", case.name().replace('_', "-")))?;
+    }
+    let temporary = fsx::temporary_in(inbox);
+    fsx::write_new(&temporary, NO_MESH.1).map_err(|e| failed(&temporary, &e))?;
+    place(&temporary, NO_MESH.0)
+}
+
+fn known_jobs(dir: &Path) -> Result<Vec<Job>, String> {
+    if !dir.join(".suture").is_dir() {
+        return Ok(Vec::new());
+    }
+    match jobs::reach(dir, &Wish::List) {
+        Ok(Answer::Jobs(jobs)) => Ok(jobs),
+        Ok(Answer::Failed { line, .. }) | Err((line, _)) => Err(line),
+    }
+}
+
+fn tell(dir: &Path, job: &Job) {
+    let name = job.source.path.to_string();
+    let State::Ended { publication } = &job.state else {
+        return say(format_args!("{name:<16} {}", job.kind()));
+    };
+    let report = jobs::report_path(dir, job).and_then(|path| std::fs::read(path).ok());
+    let Some(report) = report.and_then(|bytes| serde_json::from_slice::<Report>(&bytes).ok()) else {
+        say(format_args!("{name:<16} {}\n{:16} reason  {}", job.kind(), "", publication.reason));
+        return;
+    };
+    let (wrong, done) = table::summary(&report);
+    let state = if publication.ending.is_good() { "good" } else { job.kind().name() };
+    say(format_args!("{name:<16} {state}: {}", report.verdict.statement));
+    say(format_args!("{:16} wrong   {wrong}\n{:16} done    {done}", "", ""));
+}
+
+fn say(text: std::fmt::Arguments) {
+    // A reader that has gone away has seen enough.
+    let _ = writeln!(std::io::stdout(), "{text}");
+}

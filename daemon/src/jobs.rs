@@ -1,0 +1,173 @@
+//! `suture jobs`: what became of every dropped file, and what an operator may want of it.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use suture_core::Report;
+use suture_store::job::Area;
+use suture_store::{Job, JobId, SledStore, State};
+
+use crate::cli::{JobsArgs, JobsCommand};
+use crate::config::default_state;
+use crate::control::{Answer, Wish, answer, ask};
+use crate::exit::Exit;
+use crate::receipt::REPORT;
+use crate::table;
+
+/// Does what the command line asks.
+pub(crate) fn run(args: &JobsArgs) -> Exit {
+    let wish = match &args.command {
+        JobsCommand::List { .. } => Wish::List,
+        JobsCommand::Show { id } => Wish::Show(JobId(*id)),
+        JobsCommand::Retry { id } => Wish::Retry(JobId(*id)),
+        JobsCommand::Cancel { id } => Wish::Cancel(JobId(*id)),
+    };
+    let mut jobs = match reach(&args.dir, &wish) {
+        Ok(Answer::Jobs(jobs)) => jobs,
+        Ok(Answer::Failed { line, exit_code }) => return fail(&line, exit_code),
+        Err((line, exit)) => return fail(&line, exit.code()),
+    };
+    if let JobsCommand::List { state: Some(state) } = &args.command {
+        jobs.retain(|job| job.kind().name() == state.replace('-', "_"));
+    }
+    let mut text = String::new();
+    for job in &jobs {
+        if args.json {
+            text += &serde_json::to_string(&Shown::new(job)).unwrap_or_default();
+            text.push('\n');
+        } else {
+            text += &match args.command {
+                JobsCommand::Show { .. } => show(&args.dir, job),
+                _ => line(job),
+            };
+        }
+    }
+    if jobs.is_empty() && !args.json {
+        text = "no jobs\n".into();
+    }
+    // A reader that has gone away has seen enough.
+    let _ = std::io::stdout().write_all(text.as_bytes());
+    Exit::Good
+}
+
+fn fail(line: &str, code: u8) -> Exit {
+    eprintln!("suture: {line}");
+    match code {
+        73 => Exit::Owned,
+        75 => Exit::TryAgain,
+        _ => Exit::Refused,
+    }
+}
+
+/// Through the running daemon, or through the store itself.
+pub(crate) fn reach(dir: &Path, wish: &Wish) -> Result<Answer, (String, Exit)> {
+    let refuse = |line: String| (line, Exit::Refused);
+    if !dir.join(".suture").is_dir() {
+        return Err(refuse(format!("{}: is no hot folder (try --dir DIR)", dir.display())));
+    }
+    if let Some(answer) = ask(dir, wish).map_err(|e| refuse(format!("the daemon's answer cannot be understood: {e}")))? {
+        return Ok(answer);
+    }
+    let state = state_of(dir);
+    if !state.is_dir() {
+        return Ok(Answer::Jobs(Vec::new()));
+    }
+    let store = SledStore::open(&state)
+        .map_err(|error| (error.to_string(), if error.exit_code() == 73 { Exit::Owned } else { Exit::TryAgain }))?;
+    Ok(answer(&store, wish))
+}
+
+fn state_of(dir: &Path) -> PathBuf {
+    use std::os::unix::ffi::OsStringExt;
+    match std::fs::read(dir.join(".suture").join("state-path")) {
+        Ok(path) => std::ffi::OsString::from_vec(path).into(),
+        Err(_) => default_state(dir),
+    }
+}
+
+/// A job with what its state implies.
+#[derive(serde::Serialize)]
+struct Shown<'a> {
+    kind: &'static str,
+    #[serde(flatten)]
+    job: &'a Job,
+}
+
+impl<'a> Shown<'a> {
+    fn new(job: &'a Job) -> Self {
+        Self { kind: job.kind().name(), job }
+    }
+}
+
+/// What there is to add to a job's state.
+fn note(job: &Job) -> String {
+    match &job.state {
+        State::Noticed { reason } => reason.clone(),
+        State::Ended { publication } => match (&publication.output, publication.reason.is_empty()) {
+            (Some(output), true) => {
+                format!("→ {}/{output}", if publication.ending.is_good() { "out" } else { area(publication.ending.area()) })
+            }
+            _ => publication.reason.clone(),
+        },
+        State::Cancelled { why } => match why {
+            suture_store::job::Withdrawal::Operator => "by an operator".into(),
+            suture_store::job::Withdrawal::Changed => "the file changed; it is a new job".into(),
+            suture_store::job::Withdrawal::Vanished => "the file is gone".into(),
+        },
+        _ => job.note.clone(),
+    }
+}
+
+fn area(area: Area) -> &'static str {
+    match area {
+        Area::In => "in",
+        Area::Done => "done",
+        Area::Failed => "failed",
+        Area::Quarantine => "quarantine",
+    }
+}
+
+fn line(job: &Job) -> String {
+    let source = job.source.path.to_string();
+    format!("{:>6}  {:<12} {:<32} {}\n", job.id.0, job.kind().name(), source, note(job)).trim_end().to_owned() + "\n"
+}
+
+fn show(dir: &Path, job: &Job) -> String {
+    let (place, path) = job.original();
+    let mut text = format!(
+        "job {}: {} in {}\n  file      {}/{path}\n  profile   {}\n  attempts  {}\n",
+        job.id,
+        job.kind(),
+        job.source.folder,
+        area(place),
+        job.source.profile,
+        job.attempts
+    );
+    let note = note(job);
+    if !note.is_empty() {
+        text += &format!("  note      {note}\n");
+    }
+    if let Some(path) = report_path(dir, job) {
+        text += &format!("  report    {}\n", path.display());
+        if let Ok(bytes) = std::fs::read(&path)
+            && let Ok(report) = serde_json::from_slice::<Report>(&bytes)
+        {
+            text.push('\n');
+            text += &table::render(&report);
+        }
+    }
+    text
+}
+
+/// Where the report of a finished job is.
+pub(crate) fn report_path(dir: &Path, job: &Job) -> Option<PathBuf> {
+    let State::Ended { publication } = &job.state else { return None };
+    let (folder, base) = if publication.ending.is_good() {
+        ("out", publication.output.as_ref()?)
+    } else {
+        (area(publication.ending.area()), publication.original.as_ref()?)
+    };
+    let mut name = dir.join(folder).join(base.to_path()).into_os_string();
+    name.push(REPORT);
+    Some(name.into())
+}

@@ -1,0 +1,75 @@
+//! The small files that stand beside a result: the receipt (which job made it, from what, into what), and the report of a file
+//! for which the engine has none to give. With them the file system alone tells what was done, whatever becomes of the store.
+
+use serde::Serialize;
+use suture_core::report::SCHEMA_VERSION;
+use suture_store::{Ending, Hash, Job};
+
+/// Appended to the result's name.
+pub(crate) const RECEIPT: &str = ".suture.json";
+/// Appended to the result's name.
+pub(crate) const REPORT: &str = ".report.json";
+
+/// What a job left.
+#[derive(Debug, Serialize)]
+pub(crate) struct Receipt<'a> {
+    pub receipt_version: u32,
+    pub job: u64,
+    pub attempt: u32,
+    pub epoch: u64,
+    pub engine_version: &'a str,
+    pub ending: Ending,
+    #[serde(skip_serializing_if = "str::is_empty")]
+    pub reason: &'a str,
+    /// Name of the hot folder, and of the file below its `in/`.
+    pub folder: &'a str,
+    pub source: String,
+    pub source_bytes: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub source_blake3: Option<Hash>,
+    pub profile: &'a str,
+    /// Name of the result: below `out/` when it is good, else beside this receipt.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub output: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub output_blake3: Option<Hash>,
+    pub report_blake3: Option<Hash>,
+}
+
+/// The report of a file that never got as far as the engine's own: unreadable, refused, put off for good, or quarantined.
+#[derive(Debug, Serialize)]
+pub(crate) struct NoReport<'a> {
+    schema_version: u32,
+    engine_version: &'static str,
+    task: &'static str,
+    /// `unreadable`, `refused`, `environment` or `quarantined`.
+    outcome: Ending,
+    input: NoReportInput,
+    reason: &'a str,
+    attempts: u32,
+    /// Attempts in which the worker died of the file, and deaths of the daemon beside it.
+    worker_deaths: u32,
+    daemon_deaths: u32,
+}
+
+#[derive(Debug, Serialize)]
+struct NoReportInput {
+    path: String,
+    bytes: u64,
+}
+
+impl<'a> NoReport<'a> {
+    pub(crate) fn new(job: &Job, shown: String, ending: Ending, reason: &'a str) -> Self {
+        Self {
+            schema_version: SCHEMA_VERSION,
+            engine_version: env!("CARGO_PKG_VERSION"),
+            task: "repair",
+            outcome: ending,
+            input: NoReportInput { path: shown, bytes: job.source.size },
+            reason,
+            attempts: job.attempts.0,
+            worker_deaths: job.blame.charges,
+            daemon_deaths: job.blame.deaths,
+        }
+    }
+}

@@ -1,0 +1,310 @@
+//! The reconciler of one hot folder: it compares what lies in `in/` with what is known of it. Reading the folder is the only
+//! truth; a hint from the system only makes it happen sooner (and says that a name was renamed into place).
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{FileType, Metadata};
+use std::io;
+use std::os::unix::fs::FileTypeExt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use suture_store::{JobId, RelPath, Source, Submission};
+
+use crate::config::Config;
+use crate::folder::{Folder, NameKind, name_kind};
+use crate::fsx::Identity;
+use crate::profiles;
+use crate::settle::{Look, Rest, Settling, length_fits};
+
+/// Sub-folders are searched to this depth.
+const DEPTH: usize = 8;
+
+/// What is known of one name in `in/`.
+#[derive(Debug)]
+enum Entry {
+    /// Being watched until it rests. `foreign`: what it is, when it is no mesh.
+    Settling { state: Settling, foreign: Option<String> },
+    /// A job answers for it.
+    Submitted { id: JobId, identity: Identity, foreign: bool },
+    /// It cannot become a job; said once.
+    Unrecordable { identity: Identity },
+}
+
+/// Looks after one hot folder's `in/`.
+pub(crate) struct Reconciler {
+    folder: Arc<Folder>,
+    config: Arc<Config>,
+    rest: Rest,
+    entries: BTreeMap<PathBuf, Entry>,
+    /// Sub-folders whose unknown profile was named in the log.
+    warned: BTreeSet<String>,
+}
+
+impl Reconciler {
+    pub(crate) fn new(folder: Arc<Folder>, config: Arc<Config>, rest: Rest) -> Self {
+        Self { folder, config, rest, entries: BTreeMap::new(), warned: BTreeSet::new() }
+    }
+
+    /// Reads the folder. Files that are new or changed begin to settle; names that are gone are forgotten, and the jobs of
+    /// those that were only noticed are returned. O(names).
+    ///
+    /// # Errors
+    /// When `in/` cannot be read: nothing is forgotten then, since a mount that is gone is not an empty folder.
+    pub(crate) fn scan(&mut self, now: Instant) -> io::Result<Vec<JobId>> {
+        let mut found = BTreeMap::new();
+        walk(&self.folder.inbox(), Path::new(""), DEPTH, &mut found)?;
+        let mut gone = Vec::new();
+        self.entries.retain(|path, entry| {
+            let stays = found.contains_key(path);
+            if let (false, Entry::Submitted { id, foreign: true, .. }) = (stays, entry) {
+                gone.push(*id);
+            }
+            stays
+        });
+        for (path, (identity, foreign)) in found {
+            let known = match self.entries.get(&path) {
+                // Its identity is looked at where it settles.
+                Some(Entry::Settling { .. }) => true,
+                // A claim's hard link changes ctime, which says nothing here.
+                Some(Entry::Submitted { identity: old, .. } | Entry::Unrecordable { identity: old }) => {
+                    old.same_content(&identity)
+                }
+                None => false,
+            };
+            if !known {
+                self.entries.insert(path, Entry::Settling { state: Settling::new(identity, now), foreign });
+            }
+        }
+        Ok(gone)
+    }
+
+    /// The system says that these names (absolute) were renamed into place.
+    pub(crate) fn came_whole(&mut self, paths: &[PathBuf]) {
+        let inbox = self.folder.inbox();
+        for path in paths {
+            if let Ok(path) = path.strip_prefix(&inbox)
+                && let Some(Entry::Settling { state, .. }) = self.entries.get_mut(path)
+            {
+                state.came_whole();
+            }
+        }
+    }
+
+    /// Looks at everything that is settling; returns what has come to rest.
+    pub(crate) fn look(&mut self, now: Instant) -> Vec<(PathBuf, Submission)> {
+        let inbox = self.folder.inbox();
+        let mut ready = Vec::new();
+        for (path, entry) in &mut self.entries {
+            let Entry::Settling { state, foreign } = entry else { continue };
+            let full = inbox.join(path);
+            // A name that is gone is the next scan's business.
+            let Ok(identity) = Identity::of(&full) else { continue };
+            let rests = match state.look(identity, now, self.rest) {
+                Look::Wait => false,
+                Look::IfLengthFits => foreign.is_some() || length_fits(&full).unwrap_or(false),
+                Look::Ready => true,
+            };
+            if rests {
+                ready.push((path.clone(), *state.identity(), foreign.clone()));
+            }
+        }
+        let mut submissions = Vec::new();
+        for (path, identity, foreign) in ready {
+            match RelPath::from_path(&path) {
+                Ok(name) => {
+                    let source = self.source(name, &identity);
+                    submissions.push((path, Submission { source, foreign }));
+                }
+                Err(error) => self.give_up(&path, identity, &error.to_string()),
+            }
+        }
+        submissions
+    }
+
+    /// A job answers for a file now. `new`: it was not known before.
+    pub(crate) fn submitted(&mut self, path: &Path, submission: &Submission, id: JobId) {
+        if let Some(entry) = self.entries.get_mut(path)
+            && let Entry::Settling { state, foreign } = entry
+        {
+            let identity = *state.identity();
+            if identity.size == submission.source.size && identity.mtime_ns == submission.source.mtime_ns {
+                *entry = Entry::Submitted { id, identity, foreign: foreign.is_some() };
+            }
+        }
+    }
+
+    /// The store cannot hold a record of this file; it stays where it is, and is named once.
+    pub(crate) fn refused(&mut self, path: &Path, reason: &str) {
+        if let Some(Entry::Settling { state, .. }) = self.entries.get(path) {
+            let identity = *state.identity();
+            self.give_up(path, identity, reason);
+        }
+    }
+
+    fn give_up(&mut self, path: &Path, identity: Identity, reason: &str) {
+        tracing::warn!(folder = %self.folder.name, file = %path.display(), reason, "A file cannot be taken and stays where it is.");
+        self.entries.insert(path.to_owned(), Entry::Unrecordable { identity });
+    }
+
+    /// A job ended: should its name be seen again, it is a new drop.
+    pub(crate) fn ended(&mut self, path: &Path) {
+        self.entries.remove(path);
+    }
+
+    /// Is anything on its way to rest?
+    pub(crate) fn is_settling(&self) -> bool {
+        self.entries.values().any(|entry| matches!(entry, Entry::Settling { .. }))
+    }
+
+    fn source(&mut self, path: RelPath, identity: &Identity) -> Source {
+        let profile = self.profile_name(&path);
+        Source {
+            folder: self.folder.name.clone(),
+            path,
+            dev: identity.dev,
+            ino: identity.ino,
+            size: identity.size,
+            mtime_ns: identity.mtime_ns,
+            profile,
+        }
+    }
+
+    /// A sub-folder's name is the profile's, if there is one of that name.
+    fn profile_name(&mut self, path: &RelPath) -> String {
+        let default = self.folder.profile.clone();
+        let Some(name) = Folder::profile_folder(path) else { return default };
+        if self.config.profile(&name).is_some() {
+            return name;
+        }
+        let own = self.folder.inbox().join(&name).join(profiles::FOLDER_FILE);
+        if !own.exists() && self.warned.insert(name.clone()) {
+            tracing::warn!(folder = %self.folder.name, sub_folder = name, profile = default, "No profile has this sub-folder's name.");
+        }
+        default
+    }
+}
+
+/// Everything in a folder and below that is neither a folder nor temporary; what is no regular mesh file comes with words for
+/// what it is.
+fn walk(root: &Path, below: &Path, depth: usize, found: &mut BTreeMap<PathBuf, (Identity, Option<String>)>) -> io::Result<()> {
+    for entry in std::fs::read_dir(root.join(below))? {
+        let Ok(entry) = entry else { continue };
+        let name = entry.file_name();
+        let kind = name_kind(&name);
+        if kind == NameKind::Ignored {
+            continue;
+        }
+        // Gone between the two calls: not there. Not followed, if it is a link.
+        let Ok(meta) = entry.metadata() else { continue };
+        let path = below.join(&name);
+        if meta.is_dir() {
+            if depth > 0 {
+                // A sub-folder that cannot be read does not hide the others.
+                if let Err(error) = walk(root, &path, depth - 1, found) {
+                    tracing::warn!(sub_folder = %path.display(), %error, "A sub-folder cannot be read.");
+                }
+            }
+            continue;
+        }
+        found.insert(path, (Identity::from(&meta), what_else(&meta, kind, &name.to_string_lossy())));
+    }
+    Ok(())
+}
+
+/// Words for what is no mesh.
+fn what_else(meta: &Metadata, kind: NameKind, name: &str) -> Option<String> {
+    let special = |t: FileType| {
+        let words = [
+            (t.is_symlink(), "a symbolic link, which is not followed"),
+            (t.is_fifo(), "a pipe"),
+            (t.is_socket(), "a socket"),
+            (t.is_block_device() || t.is_char_device(), "a device"),
+        ];
+        words.iter().find(|(is, _)| *is).map(|(_, words)| (*words).to_owned())
+    };
+    if let Some(words) = special(meta.file_type()) {
+        return Some(words);
+    }
+    (kind == NameKind::Foreign).then(|| match name.rsplit_once('.') {
+        Some((_, extension)) => format!("a .{} file; only STL is repaired", extension.to_ascii_lowercase()),
+        None => "a file of unknown format; only STL is repaired".into(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::FolderConfig;
+    use std::time::Duration;
+
+    fn reconciler(root: &Path) -> Reconciler {
+        let config = Config::for_folder(root);
+        let folder = Folder::open(&FolderConfig { name: "hot".into(), path: root.into(), profile: "default".into() }).unwrap();
+        Reconciler::new(Arc::new(folder), Arc::new(config), Rest { settle: Duration::from_secs(1) })
+    }
+
+    /// Three looks, a second apart each.
+    fn settle(r: &mut Reconciler, start: Instant) -> Vec<(PathBuf, Submission)> {
+        r.scan(start).unwrap();
+        let mut all = Vec::new();
+        for s in 1..=3 {
+            all.extend(r.look(start + Duration::from_secs(s)));
+        }
+        all
+    }
+
+    fn mesh(path: &Path) {
+        std::fs::write(path, [0; 84]).unwrap();
+    }
+
+    #[test]
+    fn meshes_settle_foreign_files_are_noticed_links_are_not_followed() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut r = reconciler(dir.path());
+        let inbox = dir.path().join("in");
+        std::fs::create_dir(inbox.join("scan")).unwrap();
+        mesh(&inbox.join("a.stl"));
+        mesh(&inbox.join("scan/B.STL"));
+        mesh(&inbox.join(".hidden.stl"));
+        std::fs::write(inbox.join("x.obj"), "v").unwrap();
+        std::os::unix::fs::symlink("/etc/passwd", inbox.join("link.stl")).unwrap();
+        let found = settle(&mut r, Instant::now());
+        let said: BTreeMap<String, (String, Option<String>)> =
+            found.into_iter().map(|(path, s)| (path.display().to_string(), (s.source.profile, s.foreign))).collect();
+        assert_eq!(said.keys().collect::<Vec<_>>(), ["a.stl", "link.stl", "scan/B.STL", "x.obj"]);
+        assert_eq!(said["a.stl"], ("default".into(), None));
+        assert_eq!(said["scan/B.STL"], ("scan".into(), None));
+        assert!(said["link.stl"].1.as_ref().unwrap().contains("symbolic link"));
+        assert!(said["x.obj"].1.as_ref().unwrap().contains(".obj"));
+    }
+
+    #[test]
+    fn a_file_is_submitted_once_until_it_changes() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut r = reconciler(dir.path());
+        let path = dir.path().join("in/a.stl");
+        mesh(&path);
+        let start = Instant::now();
+        let first = settle(&mut r, start);
+        assert_eq!(first.len(), 2, "offered until it is submitted");
+        r.submitted(&first[0].0, &first[0].1, JobId(1));
+        assert!(settle(&mut r, start + Duration::from_secs(10)).is_empty());
+        assert!(!r.is_settling());
+        std::fs::remove_file(&path).unwrap();
+        std::fs::write(&path, [0; 85]).unwrap();
+        r.scan(start + Duration::from_secs(20)).unwrap();
+        assert!(r.is_settling());
+    }
+
+    #[test]
+    fn a_folder_that_is_gone_is_not_empty() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut r = reconciler(dir.path());
+        mesh(&dir.path().join("in/a.stl"));
+        r.scan(Instant::now()).unwrap();
+        std::fs::rename(dir.path().join("in"), dir.path().join("gone")).unwrap();
+        assert!(r.scan(Instant::now()).is_err());
+        assert!(r.is_settling(), "nothing is forgotten");
+    }
+}

@@ -1,0 +1,506 @@
+//! The daemon: `suture watch`. One thread looks after the folders ([`crate::scan`]), as many as there are workers bring jobs
+//! through ([`crate::attempt`]), one a folder answers `suture jobs` ([`crate::control`]).
+//!
+//! A *life* begins with the store's recovery and ends with a signal, with the end of all work (`--once`), or with an error of the
+//! store; after the last the store is opened again and the next life begins.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, unbounded};
+use notify::event::{EventKind, ModifyKind, RenameMode};
+use notify::{RecursiveMode, Watcher};
+use suture_store::job::Kind;
+use suture_store::{Control, JobStore, Query, SledStore, StoreError, crash_point};
+
+use crate::attempt::{Context, Event, Slot, WITNESS, remove_work};
+use crate::cli::WatchArgs;
+use crate::config::{Config, default_state};
+use crate::control::Door;
+use crate::exit::Exit;
+use crate::folder::{Folder, FolderError};
+use crate::fsx;
+use crate::scan::Reconciler;
+use crate::schedule::{Schedule, Turn};
+use crate::settle::Rest;
+use crate::signals::Stop;
+
+/// Full scans, where the system tells of changes and where it does not.
+const RESCAN: Duration = Duration::from_secs(60);
+const RESCAN_POLLED: Duration = Duration::from_secs(10);
+/// Hints within this time are one.
+const SCAN_AT_MOST_EVERY: Duration = Duration::from_millis(50);
+/// Free space is looked at this often.
+const DISK_EVERY: Duration = Duration::from_secs(5);
+/// The store is opened again so often in a row before the process gives up.
+const REOPENINGS: u32 = 3;
+/// A worker's word that it outlived the daemon is believed so many attempts long.
+const WITNESS_BELIEVED: u32 = 30;
+
+/// Runs the daemon to its end.
+pub(crate) fn run(args: &WatchArgs) -> Exit {
+    let refuse = |line: &str| {
+        eprintln!("suture: {line}");
+        Exit::Refused
+    };
+    let config = match Config::from_args(args) {
+        Ok(config) => config,
+        Err(line) => return refuse(&line),
+    };
+    let stop = match Stop::listen() {
+        Ok(stop) => stop,
+        Err(error) => return refuse(&format!("cannot listen for signals: {error}")),
+    };
+    serve(config, args.once, &stop)
+}
+
+/// The same for a configuration at hand.
+pub(crate) fn serve(config: Config, once: bool, stop: &Stop) -> Exit {
+    let mut folders = Vec::new();
+    for folder in &config.folders {
+        match Folder::open(folder) {
+            Ok(folder) => folders.push(Arc::new(folder)),
+            Err(error) => {
+                eprintln!("suture: {error}");
+                return match error {
+                    FolderError::Owned { .. } => Exit::Owned,
+                    FolderError::Io { .. } => Exit::Refused,
+                };
+            }
+        }
+    }
+    let store = match SledStore::open(&config.state) {
+        Ok(store) => Arc::new(store),
+        Err(error) => return store_failed(&error),
+    };
+    note_state(&config, &folders);
+    let mut daemon = Daemon { config: Arc::new(config), folders, store, once, stop: stop.clone() };
+    daemon.run()
+}
+
+fn store_failed(error: &StoreError) -> Exit {
+    eprintln!("suture: {error}");
+    match error.exit_code() {
+        73 => Exit::Owned,
+        _ => Exit::TryAgain,
+    }
+}
+
+/// Tells `suture jobs` where the store is, if it is not where it would look.
+fn note_state(config: &Config, folders: &[Arc<Folder>]) {
+    for folder in folders {
+        let note = folder.root.join(".suture").join("state-path");
+        let state = std::path::absolute(&config.state).unwrap_or_else(|_| config.state.clone());
+        let result = if state == default_state(&folder.root) {
+            fsx::remove_if_there(&note)
+        } else {
+            std::fs::write(&note, state.as_os_str().as_encoded_bytes())
+        };
+        if let Err(error) = result {
+            tracing::warn!(%error, file = %note.display(), "The place of the job store could not be noted.");
+        }
+    }
+}
+
+struct Daemon {
+    config: Arc<Config>,
+    folders: Vec<Arc<Folder>>,
+    store: Arc<SledStore>,
+    once: bool,
+    stop: Stop,
+}
+
+/// How a life ended.
+enum End {
+    /// By a signal, or because all work is done.
+    Rest { not_good: bool },
+    /// The store failed.
+    Store(StoreError),
+}
+
+impl Daemon {
+    fn run(&mut self) -> Exit {
+        let mut reopenings = 0;
+        loop {
+            let born = Instant::now();
+            match self.live() {
+                End::Rest { not_good: true } if self.once => return Exit::NotGood,
+                End::Rest { .. } => return Exit::Good,
+                End::Store(error) => {
+                    tracing::error!(%error, "The job store failed.");
+                    // Lives that last are a different matter than one that cannot begin.
+                    reopenings = if born.elapsed() > Duration::from_secs(60) { 1 } else { reopenings + 1 };
+                    if reopenings > REOPENINGS || self.stop.asked() {
+                        return store_failed(&error);
+                    }
+                    std::thread::sleep(Duration::from_secs(1) * reopenings);
+                    if let Err(error) = self.store.reopen() {
+                        return store_failed(&error);
+                    }
+                }
+            }
+        }
+    }
+
+    fn live(&self) -> End {
+        let (events, inbox) = unbounded();
+        let context = Context {
+            store: Arc::clone(&self.store) as Arc<dyn JobStore>,
+            folders: self.folders.clone(),
+            config: Arc::clone(&self.config),
+            schedule: Schedule::new(),
+            events: events.clone(),
+            once: self.once,
+            halt: AtomicBool::new(false),
+            not_good: AtomicBool::new(false),
+            failed: Mutex::new(None),
+        };
+        if let Err(error) = recover(&context) {
+            return End::Store(error);
+        }
+        let mut keeper = Keeper::new(&context, events, inbox, &self.stop);
+        let ended = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            let slots: Vec<_> = (0..self.config.workers).map(|_| scope.spawn(|| Slot::new(&context).run())).collect();
+            for folder in &self.folders {
+                let (context, ended) = (&context, &ended);
+                scope.spawn(move || match Door::open(&folder.root) {
+                    Ok(door) => door.serve(context, &|| ended.load(Ordering::Relaxed)),
+                    Err(error) => tracing::warn!(%error, "`suture jobs` cannot reach this daemon."),
+                });
+            }
+            if let Err(error) = keeper.keep() {
+                context.fail(error);
+            }
+            context.schedule.stop();
+            let deadline = Instant::now() + self.config.drain;
+            while slots.iter().any(|slot| !slot.is_finished()) {
+                if Instant::now() >= deadline && !context.halt.swap(true, Ordering::Relaxed) {
+                    tracing::warn!("The time to finish running jobs is over; they go back into the queue.");
+                }
+                std::thread::sleep(Duration::from_millis(10));
+            }
+            ended.store(true, Ordering::Relaxed);
+        });
+        let failed = context.failed.lock().map_or_else(|poisoned| poisoned.into_inner().take(), |mut failed| failed.take());
+        match failed {
+            Some(error) => End::Store(error),
+            None => End::Rest { not_good: context.not_good.load(Ordering::Relaxed) },
+        }
+    }
+}
+
+/// Takes up what an earlier life left, and clears its work folders away.
+fn recover(context: &Context) -> Result<(), StoreError> {
+    let folder = |name: &str| context.folders.iter().find(|folder| folder.name == name);
+    let innocent = |job: &suture_store::Job| {
+        let witness = job.work.and_then(|work| Some(folder(&job.source.folder)?.work(work).join(WITNESS)));
+        witness.is_some_and(|witness| fsx::exists(&witness)) && job.attempts.0 <= WITNESS_BELIEVED
+    };
+    let recovered = context.store.recover(&innocent)?;
+    crash_point("daemon.recovered");
+    if !recovered.is_empty() {
+        tracing::info!(jobs = recovered.len(), "The daemon ended without finishing; its jobs go on.");
+    }
+    let mut slot = Slot::new(context);
+    for found in recovered {
+        if let Some(claim) = found.claim {
+            slot.finish(&claim, found.job, Turn::Suspect);
+        }
+        if context.failed.lock().is_ok_and(|failed| failed.is_some()) {
+            return Ok(());
+        }
+    }
+    let held: Vec<_> = context
+        .store
+        .list(&Query { kinds: vec![Kind::Running, Kind::Concluded, Kind::Publishing, Kind::Published], ..Query::default() })?
+        .iter()
+        .filter_map(|job| job.work.map(|token| token.to_string()))
+        .collect();
+    for folder in &context.folders {
+        // Without jobs under claim, every folder in there is a left-over.
+        for entry in std::fs::read_dir(folder.work_root()).into_iter().flatten().flatten() {
+            if !held.iter().any(|token| entry.file_name().to_str() == Some(token)) {
+                remove_work(&entry.path());
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The thread that looks after the folders.
+struct Keeper<'a> {
+    context: &'a Context,
+    inbox: Receiver<Event>,
+    stop: &'a Stop,
+    folders: Vec<Kept>,
+    /// Keeps telling of changes as long as it lives.
+    _watchers: Vec<notify::RecommendedWatcher>,
+    disk_looked: Option<Instant>,
+}
+
+/// A folder under the keeper's eyes.
+struct Kept {
+    folder: Arc<Folder>,
+    reconciler: Reconciler,
+    rest: Rest,
+    rescan: Duration,
+    scanned: Option<Instant>,
+    looked: Instant,
+    dirty: bool,
+    unavailable: bool,
+    /// Files that were only noticed, and are gone.
+    gone: Vec<suture_store::JobId>,
+}
+
+impl<'a> Keeper<'a> {
+    fn new(context: &'a Context, events: Sender<Event>, inbox: Receiver<Event>, stop: &'a Stop) -> Self {
+        let mut watchers = Vec::new();
+        let mut folders = Vec::new();
+        for folder in &context.folders {
+            let mut polled = fsx::needs_polling(&folder.inbox());
+            if !polled {
+                match watcher(&folder.inbox(), events.clone()) {
+                    Ok(watcher) => watchers.push(watcher),
+                    Err(error) => {
+                        tracing::warn!(folder = %folder.root.display(), %error, "The system does not tell of changes; polling.");
+                        polled = true;
+                    }
+                }
+            }
+            let default = Rest::by_default(polled, context.once);
+            let rest = context.config.settle.map_or(default, |settle| Rest { settle });
+            let rescan = context.config.rescan.unwrap_or(if polled { RESCAN_POLLED } else { RESCAN });
+            tracing::info!(folder = %folder.root.display(), polled, "Serving a hot folder.");
+            folders.push(Kept {
+                folder: Arc::clone(folder),
+                reconciler: Reconciler::new(Arc::clone(folder), Arc::clone(&context.config), rest),
+                rest,
+                rescan,
+                scanned: None,
+                looked: Instant::now(),
+                dirty: true,
+                unavailable: false,
+                gone: Vec::new(),
+            });
+        }
+        Self { context, inbox, stop, folders, _watchers: watchers, disk_looked: None }
+    }
+
+    /// Keeps the folders until there is a reason to end.
+    fn keep(&mut self) -> Result<(), StoreError> {
+        self.forget_noticed()?;
+        loop {
+            if self.stop.asked() {
+                tracing::info!("Stopping: running jobs are finished, nothing new is taken.");
+                return Ok(());
+            }
+            if self.context.failed.lock().is_ok_and(|failed| failed.is_some()) {
+                return Ok(());
+            }
+            let now = Instant::now();
+            self.look_at_disk(now);
+            for kept in &mut self.folders {
+                kept.turn(self.context, now)?;
+            }
+            if self.context.once && self.is_finished()? {
+                return Ok(());
+            }
+            self.listen();
+        }
+    }
+
+    /// Waits for the next thing to do, and takes in what was heard.
+    fn listen(&mut self) {
+        let settling = self.folders.iter().filter(|kept| kept.reconciler.is_settling());
+        let pause = settling.map(|kept| kept.rest.look_every()).min().unwrap_or(Duration::from_millis(200));
+        let wait =
+            if self.folders.iter().any(|kept| kept.dirty) { SCAN_AT_MOST_EVERY } else { pause.min(Duration::from_millis(200)) };
+        let mut next = self.inbox.recv_timeout(wait);
+        loop {
+            match next {
+                Ok(Event::Hint { renamed }) => {
+                    for kept in &mut self.folders {
+                        kept.hint(&renamed);
+                    }
+                }
+                Ok(Event::Ended { folder, path }) => {
+                    if let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == folder) {
+                        kept.reconciler.ended(&path);
+                        kept.dirty = true;
+                    }
+                }
+                Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => return,
+            }
+            next = self.inbox.try_recv().map_err(|_| RecvTimeoutError::Timeout);
+        }
+    }
+
+    /// With `--once`: is everything that came to rest finished?
+    fn is_finished(&self) -> Result<bool, StoreError> {
+        let folders_rest = self.folders.iter().all(|kept| !kept.dirty && (kept.unavailable || !kept.reconciler.is_settling()));
+        if !folders_rest || !self.inbox.is_empty() || self.context.schedule.busy() > 0 {
+            return Ok(false);
+        }
+        let counts = self.context.store.counts()?;
+        let of = |wanted: fn(Kind) -> bool| counts.iter().filter(|(kind, _)| wanted(*kind)).map(|(_, n)| n).sum::<u64>();
+        if of(|kind| matches!(kind, Kind::Queued | Kind::Suspect)) > 0 {
+            return Ok(false);
+        }
+        let waiting = of(Kind::is_live);
+        if waiting > 0 || self.folders.iter().any(|kept| kept.unavailable) {
+            tracing::warn!(
+                jobs = waiting,
+                "Some work is left for the next run: jobs that wait after errors, or folders out of reach."
+            );
+            self.context.not_good.store(true, Ordering::Relaxed);
+        }
+        Ok(true)
+    }
+
+    /// Files that were noticed in an earlier life and are gone now.
+    fn forget_noticed(&self) -> Result<(), StoreError> {
+        for job in self.context.store.list(&Query { kinds: vec![Kind::Noticed], ..Query::default() })? {
+            if let Some(kept) = self.folders.iter().find(|kept| kept.folder.name == job.source.folder)
+                && kept.folder.inbox().is_dir()
+                && !fsx::exists(&kept.folder.inbox().join(job.source.path.to_path()))
+            {
+                forget(self.context, job.id)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes nothing new while the disk is nearly full: a result needs room, and a half-full night is better than a broken one.
+    fn look_at_disk(&mut self, now: Instant) {
+        if self.disk_looked.is_some_and(|then| now.duration_since(then) < DISK_EVERY) {
+            return;
+        }
+        let first = self.disk_looked.is_none();
+        self.disk_looked = Some(now);
+        let reserve = self.context.config.reserve;
+        let free = |root: &Path| rustix::fs::statvfs(root).map_or(u64::MAX, |fs| fs.f_bavail.saturating_mul(fs.f_frsize));
+        let full = self.folders.iter().find(|kept| free(&kept.folder.root) < reserve);
+        if self.context.schedule.pause(full.is_some()) != full.is_some() || (first && full.is_some()) {
+            match full {
+                Some(kept) => {
+                    let folder = kept.folder.root.display();
+                    tracing::warn!(%folder, reserve = crate::units::show_size(reserve), "The disk is nearly full; nothing new is taken.");
+                }
+                None => tracing::info!("There is room on the disk again."),
+            }
+        }
+    }
+}
+
+impl Kept {
+    fn hint(&mut self, renamed: &[PathBuf]) {
+        self.dirty = true;
+        let inbox = self.folder.inbox();
+        if renamed.iter().any(|path| path.starts_with(&inbox)) {
+            // The name may be new: it must be known before it can count.
+            self.scan(Instant::now());
+            self.reconciler.came_whole(renamed);
+            self.looked = Instant::now().checked_sub(self.rest.look_every()).unwrap_or(self.looked);
+        }
+    }
+
+    fn scan(&mut self, now: Instant) {
+        match self.reconciler.scan(now) {
+            Ok(gone) => {
+                if std::mem::take(&mut self.unavailable) {
+                    tracing::info!(folder = %self.folder.root.display(), "The folder is back.");
+                }
+                self.gone.extend(gone);
+            }
+            Err(error) => {
+                if !std::mem::replace(&mut self.unavailable, true) {
+                    tracing::error!(folder = %self.folder.root.display(), %error, "The folder cannot be read; the others go on.");
+                }
+            }
+        }
+    }
+
+    /// Scans and looks, as far as either is due.
+    fn turn(&mut self, context: &Context, now: Instant) -> Result<(), StoreError> {
+        let since = self.scanned.map(|then| now.duration_since(then));
+        let due = since.is_none_or(|since| since >= self.rescan || (self.dirty && since >= SCAN_AT_MOST_EVERY));
+        if due {
+            self.scanned = Some(now);
+            self.dirty = false;
+            self.scan(now);
+        }
+        for id in self.gone.drain(..) {
+            forget(context, id)?;
+        }
+        if now.duration_since(self.looked) < self.rest.look_every() {
+            return Ok(());
+        }
+        self.looked = now;
+        let ready = self.reconciler.look(now);
+        if ready.is_empty() {
+            return Ok(());
+        }
+        let (paths, found): (Vec<_>, Vec<_>) = ready.into_iter().unzip();
+        match context.store.submit(&found) {
+            Ok(submitted) => {
+                crash_point("daemon.submitted");
+                for ((path, submission), answer) in paths.iter().zip(&found).zip(submitted) {
+                    if let (Some(what), true) = (&submission.foreign, answer.new) {
+                        tracing::info!(job = answer.id.0, file = %submission.source.path, what, "Left where it is.");
+                    }
+                    self.reconciler.submitted(path, submission, answer.id);
+                }
+            }
+            Err(StoreError::TooLong { .. }) => {
+                // One by one, to find out which.
+                for (path, submission) in paths.iter().zip(&found) {
+                    match context.store.submit(std::slice::from_ref(submission)) {
+                        Ok(answer) => {
+                            for answer in answer {
+                                self.reconciler.submitted(path, submission, answer.id);
+                            }
+                        }
+                        Err(error) if error.is_callers() => self.reconciler.refused(path, &error.to_string()),
+                        Err(error) => return Err(error),
+                    }
+                }
+            }
+            Err(error) => return Err(error),
+        }
+        context.schedule.news();
+        Ok(())
+    }
+}
+
+fn forget(context: &Context, id: suture_store::JobId) -> Result<(), StoreError> {
+    match context.store.control(id, Control::Forget) {
+        Err(error) if !error.is_callers() => Err(error),
+        // An operator was faster.
+        _ => Ok(()),
+    }
+}
+
+/// Passes on that something happened, and which names were renamed into place.
+fn watcher(inbox: &Path, events: Sender<Event>) -> notify::Result<notify::RecommendedWatcher> {
+    let mut watcher = notify::recommended_watcher(move |event: notify::Result<notify::Event>| {
+        let hint = match event {
+            Ok(event) if matches!(event.kind, EventKind::Access(_)) => return,
+            Ok(event) => match event.kind {
+                EventKind::Modify(ModifyKind::Name(RenameMode::To)) => Event::Hint { renamed: event.paths },
+                EventKind::Modify(ModifyKind::Name(RenameMode::Both)) => {
+                    Event::Hint { renamed: event.paths.into_iter().skip(1).collect() }
+                }
+                _ => Event::Hint { renamed: Vec::new() },
+            },
+            // Lost events and the like: look for oneself.
+            Err(_) => Event::Hint { renamed: Vec::new() },
+        };
+        // The daemon is ending.
+        let _ = events.send(hint);
+    })?;
+    watcher.watch(inbox, RecursiveMode::Recursive)?;
+    Ok(watcher)
+}

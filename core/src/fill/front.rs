@@ -11,6 +11,7 @@ use std::collections::BinaryHeap;
 use glam::DVec3;
 
 use super::boxes::{Box3, Boxes, around, join};
+use super::clear::Clearance;
 use super::cross::{Triangle, segment_pierces, triangles_cross};
 use super::exact::{Point, at};
 use super::minweight::{self, Choice, Weight};
@@ -66,7 +67,8 @@ pub(super) fn triangulate(rim: &Rim<'_>, order: Order, max_rest: usize) -> Resul
     if front.left > max_rest.max(3) {
         return Err(Unfillable::TooLarge);
     }
-    let mut triangles = front.rest()?;
+    // With more room the minimum-weight triangulation might have done it alone.
+    let mut triangles = front.rest().map_err(|_| Unfillable::TooLarge)?;
     triangles.extend(front.ear.iter().flatten());
     Ok(triangles)
 }
@@ -210,7 +212,7 @@ impl<'a> Front<'a> {
         let apexes: Vec<_> = vertices.iter().map(apex).collect();
         let forbidden = |a: u32, b: u32| (self.rim.forbidden)(vertices[a as usize], vertices[b as usize]);
         let rest = Rim { points: &points, apexes: &apexes, forbidden: &forbidden };
-        let triangles = minweight::triangulate(&rest, Weight::Bend, Choice::Free(&[]))?;
+        let triangles = minweight::triangulate(&rest, Weight::Bend, Choice::Clear(&mut Clearance::new(&rest), &[]))?;
         Ok(triangles.into_iter().map(|t| t.map(|v| vertices[v as usize])).collect())
     }
 }

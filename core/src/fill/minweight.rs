@@ -11,8 +11,7 @@
 
 use glam::DVec3;
 
-use super::boxes::{Boxes, around, join};
-use super::cross::{Triangle, segment_pierces, triangles_cross};
+use super::clear::Clearance;
 use super::exact::{at, collinear};
 use super::{Rim, Unfillable};
 
@@ -59,19 +58,18 @@ fn bend(a: DVec3, b: DVec3) -> u32 {
 }
 
 /// Which triangles may be used.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Choice<'a> {
+pub(super) enum Choice<'a, 'b> {
     /// All that have an area and are not folded flat onto the mesh.
     Any,
     /// Only those through which neither rim nor neighbouring triangles pass, and that are not listed (corners ascending).
-    Free(&'a [[u32; 3]]),
+    Clear(&'a mut Clearance<'b>, &'a [[u32; 3]]),
 }
 
 /// The best triangulation.
 ///
 /// Where there is none the error says what stood against it: [`Unfillable::Blocked`] if the mesh around had a part in it,
 /// [`Unfillable::CrossesItself`] if the loop alone did.
-pub(super) fn triangulate(rim: &Rim<'_>, weight: Weight, choice: Choice<'_>) -> Result<Vec<[u32; 3]>, Unfillable> {
+pub(super) fn triangulate(rim: &Rim<'_>, weight: Weight, choice: Choice<'_, '_>) -> Result<Vec<[u32; 3]>, Unfillable> {
     let n = rim.len();
     // parts[i][k - i - 1] is the part beyond (i, k).
     let parts = (0..n.saturating_sub(1)).map(|i| {
@@ -85,10 +83,6 @@ pub(super) fn triangulate(rim: &Rim<'_>, weight: Weight, choice: Choice<'_>) -> 
         choice,
         positions: rim.points.iter().map(at).collect(),
         parts: parts.collect(),
-        boxes: Boxes::new((0..n).map(|i| {
-            let edge = around(&[rim.points[i], rim.points[(i + 1) % n]]);
-            rim.neighbour(i).map_or(edge, |t| join(&edge, &around(&t)))
-        })),
         mesh_in_the_way: false,
     };
     for span in 2..n {
@@ -101,19 +95,17 @@ pub(super) fn triangulate(rim: &Rim<'_>, weight: Weight, choice: Choice<'_>) -> 
     collect(&table.parts, n).ok_or(reason)
 }
 
-struct Table<'a> {
+struct Table<'a, 'b> {
     rim: &'a Rim<'a>,
     weight: Weight,
-    choice: Choice<'a>,
+    choice: Choice<'a, 'b>,
     positions: Vec<DVec3>,
     parts: Vec<Vec<Part>>,
-    /// For each rim edge: the edge and the mesh's triangle beyond.
-    boxes: Boxes,
     /// A chord or triangle was refused because of the mesh around.
     mesh_in_the_way: bool,
 }
 
-impl Table<'_> {
+impl Table<'_, '_> {
     fn best_part(&mut self, i: usize, k: usize) -> Part {
         let mut best = Part::NONE;
         if !self.rim.allows(i as u32, k as u32) {
@@ -145,35 +137,22 @@ impl Table<'_> {
     }
 
     fn may_use(&mut self, triangle: [u32; 3]) -> bool {
-        let rim = self.rim;
-        let corners = rim.corners(triangle);
-        if collinear(&corners[0], &corners[1], &corners[2]) {
-            return false;
+        match &mut self.choice {
+            Choice::Clear(clearance, banned) => {
+                let clear = clearance.is_clear(triangle);
+                self.mesh_in_the_way |= clearance.mesh_in_the_way;
+                clear && !banned.contains(&triangle)
+            }
+            Choice::Any => {
+                let [a, b, c] = self.rim.corners(triangle);
+                if collinear(&a, &b, &c) {
+                    return false;
+                }
+                let admitted = self.rim.admits(triangle);
+                self.mesh_in_the_way |= !admitted;
+                admitted
+            }
         }
-        if !rim.admits(triangle) {
-            self.mesh_in_the_way = true;
-            return false;
-        }
-        match self.choice {
-            Choice::Any => true,
-            Choice::Free(banned) => !banned.contains(&triangle) && self.is_free(&corners),
-        }
-    }
-
-    /// May a valid patch have this triangle, as far as rim and neighbouring triangles alone can tell?
-    fn is_free(&mut self, corners: &Triangle) -> bool {
-        let rim = self.rim;
-        let next = |i: usize| (i + 1) % rim.len();
-        let bounds = around(corners);
-        if self.boxes.any_near(&bounds, |i| segment_pierces(&rim.points[i], &rim.points[next(i)], corners)) {
-            return false;
-        }
-        let meets = |t: Triangle| triangles_cross(corners, &t).is_crossing();
-        if self.boxes.any_near(&bounds, |i| rim.neighbour(i).is_some_and(meets)) {
-            self.mesh_in_the_way = true;
-            return false;
-        }
-        true
     }
 }
 

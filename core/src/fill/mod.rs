@@ -1,12 +1,16 @@
 //! Closing one boundary loop with triangles between its vertices.
 //!
-//! A loop of n vertices takes n − 2 triangles and no new vertex: a triangulated polygon. Four ways are tried, and the first
-//! patch that stands the exact tests of [`Rim::accepts`] wins: the triangle itself; a constrained Delaunay triangulation in
-//! the plane of a nearly planar loop ([`planar`]); the minimum-weight triangulation by dynamic programming for loops of some
-//! hundred vertices ([`minweight`]); an advancing front beyond ([`front`]). Floating point only ever ranks patches; whether one
-//! is valid is decided with exact predicates, and every ranking uses + − × ÷ √ alone, so results are the same everywhere.
+//! A loop of n vertices takes n − 2 triangles and no new vertex: a triangulated polygon. The first patch that stands the exact
+//! tests of `Rim::accepts` wins. Tried are, in this order: the triangle itself; a constrained Delaunay triangulation in the
+//! plane of a nearly planar loop (`planar`); for loops of some hundred vertices the minimum-weight triangulation by dynamic
+//! programming (`minweight`), for larger ones an advancing front (`front`); where these cross themselves, another weight, the
+//! projection of a loop that is not planar, for small loops the front, and at last, for very small ones, any patch (`search`).
+//!
+//! Floating point only ever ranks patches; whether one is valid is decided with exact predicates. Every ranking uses
+//! + − × ÷ √ alone and every bound of work is a count, so results are the same everywhere.
 
 mod boxes;
+mod clear;
 pub mod cross;
 pub mod exact;
 mod flips;
@@ -17,6 +21,7 @@ mod search;
 pub mod tree;
 
 use boxes::{Boxes, EMPTY, around};
+use clear::Clearance;
 use cross::{Contact, Triangle, triangles_cross};
 use exact::{Point, at, collinear};
 use flips::Flips;
@@ -117,7 +122,12 @@ pub enum Unfillable {
     Blocked,
 }
 
-/// Closes one loop. Deterministic; see the methods for their cost.
+/// Closes one loop.
+///
+/// For each patch returned holds, exactly: it is a disc with the loop as its border; no triangle has zero area; no chord is
+/// forbidden; it neither crosses nor overlaps itself, nor any of the mesh's triangles along the rim (other triangles of the mesh
+/// are the caller's to test). Time: O(n log n) if nearly planar, O(n³) up to [`FillSettings::minimum_weight_vertices`], about
+/// O(n log n) beyond.
 pub fn triangulate(rim: &Rim<'_>, settings: &FillSettings) -> Result<Patch, Unfillable> {
     if !rim.is_loop() {
         return Err(Unfillable::NotALoop);
@@ -136,30 +146,33 @@ pub fn triangulate(rim: &Rim<'_>, settings: &FillSettings) -> Result<Patch, Unfi
             Err(Unfillable::Blocked)
         };
     }
+    by_methods(rim, settings)
+}
+
+/// Tries what there is for more than three vertices.
+fn by_methods(rim: &Rim<'_>, settings: &FillSettings) -> Result<Patch, Unfillable> {
+    const SMALL: [Method; 6] =
+        [Method::Planar, Method::MinimumWeight, Method::LeastArea, Method::Projected, Method::Front, Method::Search];
+    const LARGE: [Method; 3] = [Method::Planar, Method::Front, Method::Projected];
     let small = rim.len() <= settings.minimum_weight_vertices;
-    let methods: &[Method] = match rim.len() {
-        ..=SEARCH_VERTICES if small => {
-            &[Method::Planar, Method::MinimumWeight, Method::LeastArea, Method::Projected, Method::Front, Method::Search]
-        }
-        _ if small => &[Method::Planar, Method::MinimumWeight, Method::LeastArea, Method::Projected, Method::Front],
-        _ => &[Method::Planar, Method::Front, Method::Projected],
-    };
+    let mut clearance = Clearance::new(rim);
     let mut reason = Unfillable::Blocked;
-    for &method in methods {
+    for &method in if small { &SMALL[..] } else { &LARGE[..] } {
         let made = match method {
-            Method::Triangle => Err(Unfillable::Blocked),
             Method::Planar => by_projection(rim, settings.planar_deviation),
             Method::Projected => by_projection(rim, f64::INFINITY),
-            Method::MinimumWeight => by_weight(rim, Weight::Bend),
-            Method::LeastArea => by_weight(rim, Weight::Area),
+            Method::MinimumWeight => by_weight(rim, Weight::Bend, &mut clearance),
+            Method::LeastArea => by_weight(rim, Weight::Area, &mut clearance),
             Method::Front => by_front(rim, settings.minimum_weight_vertices),
-            Method::Search => by_search(rim),
+            Method::Search if rim.len() <= SEARCH_VERTICES => by_search(rim, &mut clearance),
+            Method::Search | Method::Triangle => Err(Unfillable::Blocked),
         };
         match made {
             Ok(triangles) => return Ok(patch(triangles, method)),
-            // What a patch that was made came to grief on says more than that another could not be made.
-            Err(Unfillable::Blocked) => {}
-            Err(other) => reason = other,
+            // What a patch that was made came to grief on says more than that another could not be made; the first method says
+            // it best, and none says of a small loop that it is too large.
+            Err(other) if reason == Unfillable::Blocked && !(small && other == Unfillable::TooLarge) => reason = other,
+            Err(_) => {}
         }
     }
     Err(reason)
@@ -184,16 +197,16 @@ fn smoothed(rim: &Rim<'_>, triangles: &[[u32; 3]]) -> Option<Vec<[u32; 3]>> {
     rim.accepts(mesh.triangles(), false).is_ok().then(|| mesh.into_triangles())
 }
 
-/// The best patch; where it is not valid, the best of free triangles; where that crosses itself, again without the larger of
+/// The best patch; where it is not valid, the best of clear triangles; where that crosses itself, again without the larger of
 /// two triangles that cross, some times.
-fn by_weight(rim: &Rim<'_>, weight: Weight) -> Result<Vec<[u32; 3]>, Unfillable> {
+fn by_weight(rim: &Rim<'_>, weight: Weight, clearance: &mut Clearance<'_>) -> Result<Vec<[u32; 3]>, Unfillable> {
     let triangles = minweight::triangulate(rim, weight, Choice::Any)?;
     if rim.accepts(&triangles, false).is_ok() {
         return Ok(triangles);
     }
     let mut banned = Vec::new();
     loop {
-        let triangles = minweight::triangulate(rim, weight, Choice::Free(&banned))?;
+        let triangles = minweight::triangulate(rim, weight, Choice::Clear(clearance, &banned))?;
         let crossing = match rim.accepts(&triangles, false) {
             Ok(()) => return Ok(triangles),
             Err(Fault::Crossing(i, j)) if banned.len() < BAN_WORK / rim.len() => [triangles[i], triangles[j]],
@@ -218,9 +231,9 @@ fn by_front(rim: &Rim<'_>, max_rest: usize) -> Result<Vec<[u32; 3]>, Unfillable>
     attempt(Order::Chord).or_else(|_: Unfillable| attempt(Order::Angle))
 }
 
-fn by_search(rim: &Rim<'_>) -> Result<Vec<[u32; 3]>, Unfillable> {
+fn by_search(rim: &Rim<'_>, clearance: &mut Clearance<'_>) -> Result<Vec<[u32; 3]>, Unfillable> {
     // Why nothing was found the other methods say better.
-    let triangles = search::triangulate(rim).ok_or(Unfillable::Blocked)?;
+    let triangles = search::triangulate(rim, clearance).ok_or(Unfillable::Blocked)?;
     rim.accepts(&triangles, false)?;
     Ok(triangles)
 }

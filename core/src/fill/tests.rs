@@ -250,6 +250,35 @@ fn the_least_bend_continues_what_is_around() {
     assert_eq!(patch.triangles.len(), 4);
 }
 
+/// Beyond the minimum-weight triangulation's limit: a rim that goes up and down five times.
+#[test]
+fn a_large_loop_is_filled_by_the_front() {
+    let at = |i: i32| {
+        let t = f64::from(i) / 400.0 * std::f64::consts::TAU;
+        [500.0 * t.cos(), 500.0 * t.sin(), 100.0 * (5.0 * t).sin()].map(|x| x.round() as i32)
+    };
+    let rim: Vec<Grid> = (0..400).map(at).collect();
+    assert_eq!(fill(&rim, &[], &free).unwrap().method, Method::Front);
+    // The mesh around goes straight down from the rim.
+    let apexes: Vec<Option<Grid>> = rim.iter().map(|p| Some([p[0], p[1], p[2] - 9])).collect();
+    assert_eq!(fill(&rim, &apexes, &free).unwrap().method, Method::Front);
+}
+
+/// A trefoil knot bounds no disc at all: whatever patch is made crosses itself.
+#[test]
+fn a_knot_is_left_open() {
+    // Six sticks are enough for a trefoil; these come from its usual parametrisation, rounded.
+    for n in [12, 40] {
+        let at = |i: i32| {
+            let t = f64::from(i) / f64::from(n) * std::f64::consts::TAU;
+            let radius = 500.0 + 200.0 * (3.0 * t).cos();
+            [radius * (2.0 * t).cos(), radius * (2.0 * t).sin(), 200.0 * (3.0 * t).sin()].map(|x| x as i32)
+        };
+        let knot: Vec<Grid> = (0..n).map(at).collect();
+        assert_eq!(fill(&knot, &[], &free), Err(Unfillable::CrossesItself));
+    }
+}
+
 /// A zero-width slit that opens in the middle of one side only: a, b, c collinear with d beside them.
 #[test]
 fn a_slit_with_a_vertex_off_its_line_is_filled() {
@@ -381,15 +410,35 @@ proptest! {
             star_loop(60).prop_map(|p| p.into_iter().map(|[x, y]| [x, y, (x * y) % 7]).collect()),
             prop::collection::vec(prop::array::uniform3(-9_i32..10), 3..12).prop_map(without_repeats),
         ],
+        apexes in prop::collection::vec(prop::option::of(prop::array::uniform3(-9_i32..10)), 0..9),
         runs in any::<bool>(),
         (seed, one_in) in (any::<u32>(), 1_u32..9),
     ) {
         let p = if runs { without_repeats(with_runs(p)) } else { p };
         prop_assume!(p.len() > 2);
         let forbidden = some(seed, one_in);
-        let rim = Rim { points: &float(&p), apexes: &[], forbidden: &forbidden };
+        let beyond: Vec<_> = apexes.iter().map(|a| a.map(|p| p.map(|x| x as f32))).collect();
+        let rim = Rim { points: &float(&p), apexes: &beyond, forbidden: &forbidden };
         if let Ok(triangles) = by_front(&rim, 300) {
-            check(&p, &[], &forbidden, &patch(triangles, Method::Front));
+            check(&p, &apexes, &forbidden, &patch(triangles, Method::Front));
+        }
+    }
+
+    #[test]
+    fn crossings_in_a_set_are_found(
+        p in prop::collection::vec((prop::array::uniform3(-20_i32..20), prop::array::uniform3(prop::array::uniform3(0_i32..7))), 1..40),
+    ) {
+        let soup: Vec<[Grid; 3]> = p
+            .iter()
+            .map(|(at, t)| t.map(|q| [0, 1, 2].map(|k| at[k] + q[k])))
+            .filter(|t| !area_is_zero(t))
+            .collect();
+        let positions: Vec<Triangle> = soup.iter().map(|t| t.map(|p| p.map(|x| x as f32))).collect();
+        let crosses = |i: usize, j: usize| contact(&soup[i], &soup[j]).is_crossing();
+        match self_crossing(&positions, u64::MAX) {
+            SelfCrossing::None => prop_assert!((0..soup.len()).all(|i| (0..i).all(|j| !crosses(i, j)))),
+            SelfCrossing::Pair(i, j) => prop_assert!(crosses(i, j)),
+            SelfCrossing::Undecided => prop_assert!(false),
         }
     }
 }

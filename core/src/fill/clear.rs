@@ -1,0 +1,72 @@
+//! Which triangles a valid patch may have at all, as far as the loop and the mesh around it can tell.
+
+use super::Rim;
+use super::boxes::{Boxes, around, join};
+use super::cross::{segment_pierces, triangles_cross};
+use super::exact::collinear;
+
+/// Triangles looked at for one loop; beyond, none is known to be clear.
+const WORK: u32 = 1_000_000;
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Known {
+    Nothing,
+    Clear,
+    Not,
+}
+
+/// The triangles between a loop's vertices through which neither rim nor neighbouring triangles of the mesh pass: no valid
+/// patch has another. Each is looked at once, however many triangulations ask.
+pub(super) struct Clearance<'a> {
+    rim: &'a Rim<'a>,
+    /// For each rim edge: the edge and the mesh's triangle beyond.
+    boxes: Boxes,
+    /// By the rank of the triangle among all.
+    known: Vec<Known>,
+    work: u32,
+    /// A triangle was refused because of the mesh.
+    pub(super) mesh_in_the_way: bool,
+}
+
+impl<'a> Clearance<'a> {
+    pub(super) fn new(rim: &'a Rim<'a>) -> Self {
+        let n = rim.len();
+        let boxes = Boxes::new((0..n).map(|i| {
+            let edge = around(&[rim.points[i], rim.points[(i + 1) % n]]);
+            rim.neighbour(i).map_or(edge, |t| join(&edge, &around(&t)))
+        }));
+        Self { rim, boxes, known: Vec::new(), work: WORK, mesh_in_the_way: false }
+    }
+
+    /// Corners ascending.
+    pub(super) fn is_clear(&mut self, triangle: [u32; 3]) -> bool {
+        let n = self.rim.len();
+        if self.known.is_empty() {
+            self.known = vec![Known::Nothing; n * (n - 1) * (n - 2) / 6];
+        }
+        let [i, m, k] = triangle.map(|v| v as usize);
+        // The combinatorial number system: each set of three has its own number, without gaps.
+        let rank = i + m * m.saturating_sub(1) / 2 + k * k.saturating_sub(1) * k.saturating_sub(2) / 6;
+        if self.known[rank] == Known::Nothing && self.work > 0 {
+            self.work -= 1;
+            self.known[rank] = if self.look(triangle) { Known::Clear } else { Known::Not };
+        }
+        self.known[rank] == Known::Clear
+    }
+
+    fn look(&mut self, triangle: [u32; 3]) -> bool {
+        let rim = self.rim;
+        let corners = rim.corners(triangle);
+        let bounds = around(&corners);
+        let next = |i: usize| (i + 1) % rim.len();
+        if collinear(&corners[0], &corners[1], &corners[2])
+            || self.boxes.any_near(&bounds, |i| segment_pierces(&rim.points[i], &rim.points[next(i)], &corners))
+        {
+            return false;
+        }
+        let meets = |i: usize| rim.neighbour(i).is_some_and(|t| triangles_cross(&corners, &t).is_crossing());
+        let meets_mesh = self.boxes.any_near(&bounds, meets);
+        self.mesh_in_the_way |= meets_mesh;
+        !meets_mesh
+    }
+}

@@ -3,12 +3,23 @@
 //!
 //! It knows no daemon and no store. The two entry points are [`inspect`] and [`repair`].
 
+mod bodies;
+mod boxes;
+mod chunk;
+mod defects;
 pub mod error;
 pub mod fill;
+mod members;
+mod parallel;
+mod plan;
 pub mod read;
 pub mod record;
 pub mod report;
 pub mod settings;
+mod shop;
+mod sums;
+mod survey;
+mod weld;
 
 pub use error::{Error, ErrorClass};
 pub use report::Report;

@@ -1,0 +1,198 @@
+//! Which closed components lie inside which: exact winding numbers by vertical rays.
+//!
+//! For each closed component whose box lies inside another's, a ray runs upwards from a point of one of its triangles. Crossings
+//! of every other component are counted with their sign by exact predicates and half-open rules, so that a ray through an edge or a
+//! vertex counts once. The sum of integers does not depend on the order, so triangles are visited chunk by chunk.
+
+use robust::{Coord, Coord3D};
+
+use crate::boxes::BoxTree;
+use crate::record;
+use crate::shop::Shop;
+use crate::shop::components::{Component, Components, Reversed, Sample};
+use crate::sums::Bounds;
+use crate::survey::Survey;
+
+/// What lies around a component.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Surroundings {
+    /// Components that wind around it, with their winding numbers, ascending.
+    pub(crate) around: Vec<(u32, i32)>,
+}
+
+impl Surroundings {
+    pub(crate) fn winding(&self) -> i32 {
+        self.around.iter().map(|(_, w)| w).sum()
+    }
+}
+
+/// A ray upwards from a point of a component.
+struct Ray {
+    component: u32,
+    from: [f64; 3],
+    /// Closed components whose boxes hold this component's box, ascending.
+    candidates: Vec<u32>,
+}
+
+/// The surroundings of every component; empty for open ones and for those in no other's box. Reads the file once more when at
+/// least one box lies in another.
+pub(crate) fn surroundings(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed: &Reversed) -> Vec<Surroundings> {
+    let mut all = vec![Surroundings::default(); components.list.len()];
+    let rays = rays(survey, shop, &components.list);
+    if rays.is_empty() {
+        return all;
+    }
+    let mut asked = vec![false; components.list.len()];
+    rays.iter().flat_map(|r| &r.candidates).for_each(|c| asked[*c as usize] = true);
+    let grid = Grid::new(&rays);
+
+    let mut counts = vec![0i32; rays.iter().map(|r| r.candidates.len()).sum()];
+    let is_asked = |patch: u32| asked[components.of_patch[patch as usize] as usize];
+    let per_chunk = survey.visit_sound(is_asked, Vec::new, |hits: &mut Vec<(u32, i32)>, triangle, patch| {
+        let corners = record::corners(&survey.records[triangle as usize]);
+        let sign = if reversed.patches[patch as usize] { -1 } else { 1 };
+        grid.cross(&rays, &corners, components.of_patch[patch as usize], &mut |at, w| hits.push((at, sign * w)));
+    });
+    per_chunk.into_iter().flatten().for_each(|(at, w)| counts[at as usize] += w);
+    for t in shop.living() {
+        let component = components.of_triangle[t as usize];
+        if asked[component as usize] {
+            let sign = if reversed.triangles[t as usize] { -1 } else { 1 };
+            grid.cross(&rays, &shop.points(t), component, &mut |at, w| counts[at as usize] += sign * w);
+        }
+    }
+    let mut at = 0;
+    for ray in &rays {
+        let found = &counts[at..at + ray.candidates.len()];
+        at += ray.candidates.len();
+        all[ray.component as usize].around =
+            ray.candidates.iter().zip(found).filter(|(_, w)| **w != 0).map(|(c, w)| (*c, *w)).collect();
+    }
+    all
+}
+
+/// A ray for each closed component whose box lies in another closed component's.
+fn rays(survey: &Survey<'_>, shop: &Shop, list: &[Component]) -> Vec<Ray> {
+    let closed: Vec<u32> = (0..list.len() as u32).filter(|c| !list[*c as usize].open).collect();
+    if closed.len() < 2 {
+        return Vec::new();
+    }
+    let boxes: Vec<Bounds> = closed.iter().map(|c| list[*c as usize].bounds).collect();
+    let tree = BoxTree::new(&boxes);
+    let mut found = Vec::new();
+    let mut rays = Vec::new();
+    for (i, component) in closed.iter().enumerate() {
+        tree.meeting(&boxes[i], &mut found);
+        let candidates: Vec<u32> =
+            found.iter().filter(|j| **j != i as u32 && boxes[**j as usize].contains(&boxes[i])).map(|j| closed[*j as usize]).collect();
+        if !candidates.is_empty() {
+            let corners = match list[*component as usize].sample {
+                Sample::Shop(t) => shop.points(t),
+                Sample::File(t) => record::corners(&survey.records[t as usize]),
+            };
+            rays.push(Ray { component: *component, from: inner_point(&corners), candidates });
+        }
+    }
+    rays
+}
+
+/// A point of a triangle, of no symmetry, so that it does not fall on grid lines that models are built on.
+fn inner_point(corners: &[[f32; 3]; 3]) -> [f64; 3] {
+    const WEIGHTS: [f64; 3] = [0.318_309_89, 0.367_879_44, 0.313_810_67];
+    std::array::from_fn(|k| (0..3).map(|i| WEIGHTS[i] * f64::from(corners[i][k])).sum())
+}
+
+/// Rays by their place seen from above, in a grid of square cells.
+struct Grid {
+    lo: [f64; 2],
+    per_unit: [f64; 2],
+    side: usize,
+    /// Rays by cell, and where each cell's begin.
+    starts: Vec<u32>,
+    order: Vec<u32>,
+    /// Where each ray's candidates begin in the table of counts.
+    bases: Vec<u32>,
+}
+
+impl Grid {
+    fn new(rays: &[Ray]) -> Self {
+        let side = ((rays.len() as f64).sqrt() as usize).clamp(1, 1024);
+        let (mut lo, mut hi) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for ray in rays {
+            for k in 0..2 {
+                lo[k] = lo[k].min(ray.from[k]);
+                hi[k] = hi[k].max(ray.from[k]);
+            }
+        }
+        let per_unit = std::array::from_fn(|k| if hi[k] > lo[k] { side as f64 / (hi[k] - lo[k]) } else { 0.0 });
+        let mut grid = Self { lo, per_unit, side, starts: vec![0; side * side + 1], order: Vec::new(), bases: Vec::new() };
+        let cells: Vec<usize> = rays.iter().map(|r| grid.cell(1, r.from[1]) * side + grid.cell(0, r.from[0])).collect();
+        cells.iter().for_each(|c| grid.starts[c + 1] += 1);
+        (0..side * side).for_each(|c| grid.starts[c + 1] += grid.starts[c]);
+        grid.order = (0..rays.len() as u32).collect();
+        grid.order.sort_by_key(|r| cells[*r as usize]);
+        let mut base = 0;
+        for ray in rays {
+            grid.bases.push(base);
+            base += ray.candidates.len() as u32;
+        }
+        grid
+    }
+
+    fn cell(&self, axis: usize, x: f64) -> usize {
+        (((x - self.lo[axis]) * self.per_unit[axis]) as usize).min(self.side - 1)
+    }
+
+    /// Reports `(place in the table of counts, signed crossing)` for every ray that asks for `component` and meets the triangle.
+    fn cross(&self, rays: &[Ray], corners: &[[f32; 3]; 3], component: u32, hit: &mut dyn FnMut(u32, i32)) {
+        let span = |k: usize| {
+            let x = corners.map(|c| f64::from(c[k]));
+            (x[0].min(x[1]).min(x[2]), x[0].max(x[1]).max(x[2]))
+        };
+        let ((x0, x1), (y0, y1)) = (span(0), span(1));
+        // Beyond the grid on the low side a coordinate would be cast to cell 0 all the same.
+        if x1 < self.lo[0] || y1 < self.lo[1] {
+            return;
+        }
+        for row in self.cell(1, y0)..=self.cell(1, y1) {
+            let cells = row * self.side + self.cell(0, x0)..=row * self.side + self.cell(0, x1);
+            for r in &self.order[self.starts[*cells.start()] as usize..self.starts[cells.end() + 1] as usize] {
+                let ray = &rays[*r as usize];
+                if let Ok(i) = ray.candidates.binary_search(&component) {
+                    let w = crossing(corners, ray.from);
+                    if w != 0 {
+                        hit(self.bases[*r as usize] + i as u32, w);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// How the ray upwards from `p` crosses a triangle: 1 from inside to outside, −1 from outside to inside, 0 not at all. A point on
+/// the triangle's plane does not cross it.
+fn crossing(corners: &[[f32; 3]; 3], p: [f64; 3]) -> i32 {
+    let q = corners.map(|c| c.map(f64::from));
+    if q.iter().all(|c| c[2] < p[2]) {
+        return 0;
+    }
+    let mut winding = 0;
+    for k in 0..3 {
+        let (a, b) = (q[k], q[(k + 1) % 3]);
+        let flat = |v: [f64; 3]| Coord { x: v[0], y: v[1] };
+        let from = Coord { x: p[0], y: p[1] };
+        // Half-open in y, strict in x: an edge shared by two triangles is decided alike for both.
+        if a[1] <= p[1] && b[1] > p[1] && robust::orient2d(flat(a), flat(b), from) > 0.0 {
+            winding += 1;
+        } else if b[1] <= p[1] && a[1] > p[1] && robust::orient2d(flat(b), flat(a), from) > 0.0 {
+            winding -= 1;
+        }
+    }
+    if winding == 0 {
+        return 0;
+    }
+    let at = |v: [f64; 3]| Coord3D { x: v[0], y: v[1], z: v[2] };
+    // Positive when p lies below the plane of three corners that run counter-clockwise seen from above.
+    let below = robust::orient3d(at(q[0]), at(q[1]), at(q[2]), at(p));
+    if below * f64::from(winding) > 0.0 { winding } else { 0 }
+}

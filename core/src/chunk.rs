@@ -1,0 +1,397 @@
+//! The exact topology of one chunk: which vertices at home there have a sound star, and which sound surface hangs together.
+//!
+//! A chunk sees every triangle around each vertex at home in it, so it decides those vertices' stars exactly and alone. A vertex
+//! is **sound** when its triangles form one closed fan, coherently oriented: every directed edge that leaves it comes back exactly
+//! once, in one cycle of at least three. Anything else (boundary, non-manifold edge, disagreement, several fans, duplicates, a
+//! collinear triangle) makes it **unsound**, and all its triangles are reported to the workshop, which sorts out what is wrong.
+//! Sound vertices that share a triangle belong to one **patch**: a coherent piece of surface.
+//!
+//! Tables are laid out to stay in an L2 cache at 32 k triangles a chunk; a worker keeps them from chunk to chunk.
+
+use crate::members::Members;
+use crate::plan::{ChunkId, HomeBox, Plan};
+use crate::record::{self, Record};
+use crate::sums::{Bounds, Extent, Measure};
+use crate::weld::Weld;
+
+/// No vertex, patch or triangle.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// A triangle that goes to the workshop, and which of its corners are unsound here (bit k: corner k).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Suspect {
+    pub(crate) triangle: u32,
+    pub(crate) unsound: u8,
+}
+
+/// A triangle that more than one chunk sees, or that is a suspect, with the patch of its sound corners at home here.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Link {
+    pub(crate) triangle: u32,
+    /// Number of the patch within the chunk.
+    pub(crate) patch: u32,
+}
+
+/// What is summed over a patch: its triangles with three sound corners, all at home in one chunk.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Patch {
+    pub(crate) triangles: u64,
+    pub(crate) extent: Extent,
+    /// Of its sound vertices.
+    pub(crate) bounds: Bounds,
+    /// Smallest member with a sound corner in it.
+    pub(crate) first: u32,
+}
+
+/// The patch of each member in list order.
+#[derive(Clone, Debug)]
+pub(crate) enum Labels {
+    /// All members with a sound corner belong to patch 0 of the chunk.
+    One,
+    /// Run-coded: count, then patch + 1 (0: none).
+    Runs(Vec<u8>),
+}
+
+/// What one chunk contributes.
+#[derive(Debug)]
+pub(crate) struct ChunkTopology {
+    pub(crate) suspects: Vec<Suspect>,
+    pub(crate) links: Vec<Link>,
+    pub(crate) patches: Vec<Patch>,
+    pub(crate) labels: Labels,
+    /// Positions at home here.
+    pub(crate) vertices: u64,
+    /// Those used by a triangle with three distinct vertices.
+    pub(crate) vertices_used: u64,
+}
+
+/// The tables of one worker, used again from chunk to chunk.
+#[derive(Default)]
+pub(crate) struct Scratch {
+    vertices: Weld,
+    home: Vec<bool>,
+    /// Members: record number and vertices; a triangle with a repeated vertex has `NONE` first.
+    numbers: Vec<u32>,
+    triangles: Vec<[u32; 3]>,
+    /// Vertex → its part of `around` starts here.
+    starts: Vec<u32>,
+    /// (next, previous) corner of each triangle around a vertex.
+    around: Vec<[u32; 2]>,
+    sound: Vec<bool>,
+    collinear: Vec<u32>,
+    parents: Vec<u32>,
+    patch_of: Vec<u32>,
+}
+
+/// Bytes that one worker needs for a chunk of `members` triangles, at most.
+pub(crate) fn scratch_bytes(members: u64) -> u64 {
+    // Slots 2 × 16 × 3, numbers 4, triangles 12, around 24, per vertex (up to three a triangle) 12 + 1 + 4 + 1 + 4 + 4.
+    members * (96 + 4 + 12 + 24 + 3 * 26)
+}
+
+impl Scratch {
+    /// Decides everything that can be decided inside `chunk`. O(members).
+    pub(crate) fn solve(&mut self, records: &[Record], plan: &Plan, members: &Members, chunk: ChunkId, measure: &Measure) -> ChunkTopology {
+        self.weld(records, members, chunk, plan.home_box(chunk));
+        self.mark_collinear(measure);
+        self.judge_stars();
+        self.unite_patches();
+        self.collect(measure)
+    }
+
+    /// Numbers the vertices of all members.
+    fn weld(&mut self, records: &[Record], members: &Members, chunk: ChunkId, cell: HomeBox) {
+        self.numbers.clear();
+        self.triangles.clear();
+        let expected: usize = members.runs(chunk).map(|(_, count)| count as usize).sum();
+        // Half a vertex a triangle is the rule; a soup has three, and grows the table.
+        self.vertices.reset(expected * 3 / 4);
+        self.numbers.reserve(expected);
+        self.triangles.reserve(expected);
+        for (first, count) in members.runs(chunk) {
+            let run = &records[first as usize..(first + count) as usize];
+            for (i, record) in run.iter().enumerate() {
+                let [a, b, c] = record::corners(record).map(|p| self.vertices.vertex(p));
+                self.numbers.push(first + i as u32);
+                self.triangles.push(if a == b || b == c || c == a { [NONE, a, b] } else { [a, b, c] });
+            }
+        }
+        self.home.clear();
+        self.home.extend(self.vertices.positions().iter().map(|p| cell.holds(*p)));
+    }
+
+    /// Exactly collinear triangles: their vertices are unsound, so that the workshop sees the neighbours they must be closed with.
+    fn mark_collinear(&mut self, measure: &Measure) {
+        self.collinear.clear();
+        for (i, t) in self.triangles.iter().enumerate() {
+            if t[0] != NONE {
+                let corners = t.map(|v| self.vertices.positions()[v as usize]);
+                if is_collinear(&corners, measure.triangle(&corners).1) {
+                    self.collinear.push(i as u32);
+                }
+            }
+        }
+    }
+
+    /// Gathers the triangles around each home vertex and tests whether they are one closed coherent fan.
+    fn judge_stars(&mut self) {
+        let vertices = self.home.len();
+        self.starts.clear();
+        self.starts.resize(vertices + 2, 0);
+        for t in self.triangles.iter().filter(|t| t[0] != NONE) {
+            for v in t {
+                // Away vertices have incomplete stars: not kept.
+                self.starts[*v as usize + 2] += u32::from(self.home[*v as usize]);
+            }
+        }
+        for v in 0..vertices {
+            self.starts[v + 2] += self.starts[v + 1];
+        }
+        let total = self.starts[vertices + 1] as usize;
+        self.around.clear();
+        self.around.resize(total, [0; 2]);
+        for t in self.triangles.iter().filter(|t| t[0] != NONE) {
+            for (k, v) in t.iter().enumerate() {
+                if self.home[*v as usize] {
+                    let at = &mut self.starts[*v as usize + 1];
+                    self.around[*at as usize] = [t[(k + 1) % 3], t[(k + 2) % 3]];
+                    *at += 1;
+                }
+            }
+        }
+        self.sound.clear();
+        self.sound.resize(vertices, false);
+        for v in 0..vertices {
+            if self.home[v] {
+                self.sound[v] = is_closed_fan(&mut self.around[self.starts[v] as usize..self.starts[v + 1] as usize]);
+            }
+        }
+        for i in &self.collinear {
+            for v in self.triangles[*i as usize] {
+                self.sound[v as usize] = false;
+            }
+        }
+    }
+
+    /// Union of sound home vertices that share a triangle; `patch_of` numbers the unions by first appearance.
+    fn unite_patches(&mut self) {
+        self.parents.clear();
+        self.parents.extend(0..self.home.len() as u32);
+        for t in self.triangles.iter().filter(|t| t[0] != NONE) {
+            let sound = t.map(|v| self.sound[v as usize]);
+            if sound[0] && sound[1] {
+                unite(&mut self.parents, t[0], t[1]);
+            }
+            if sound[2] && (sound[0] || sound[1]) {
+                unite(&mut self.parents, t[2], if sound[0] { t[0] } else { t[1] });
+            }
+        }
+    }
+
+    fn collect(&mut self, measure: &Measure) -> ChunkTopology {
+        let mut out = ChunkTopology {
+            suspects: Vec::new(),
+            links: Vec::new(),
+            patches: Vec::new(),
+            labels: Labels::One,
+            vertices: self.home.iter().filter(|h| **h).count() as u64,
+            vertices_used: (0..self.home.len()).filter(|v| self.starts[*v] != self.starts[*v + 1]).count() as u64,
+        };
+        self.number_patches(&mut out.patches);
+        let mut labels = LabelWriter::default();
+        for (i, t) in self.triangles.iter().enumerate() {
+            let triangle = self.numbers[i];
+            if t[0] == NONE {
+                out.suspects.push(Suspect { triangle, unsound: 0 });
+                labels.push(NONE);
+                continue;
+            }
+            let (mut unsound, mut away, mut patch) = (0u8, false, NONE);
+            for (k, v) in t.iter().map(|v| *v as usize).enumerate() {
+                if !self.home[v] {
+                    away = true;
+                } else if !self.sound[v] {
+                    unsound |= 1 << k;
+                } else {
+                    patch = self.patch_of[v];
+                }
+            }
+            labels.push(patch);
+            if unsound != 0 {
+                out.suspects.push(Suspect { triangle, unsound });
+            }
+            if patch == NONE {
+                continue;
+            }
+            let sums = &mut out.patches[patch as usize];
+            sums.first = sums.first.min(triangle);
+            if unsound != 0 || away {
+                out.links.push(Link { triangle, patch });
+            } else {
+                sums.triangles += 1;
+                sums.extent += measure.triangle(&t.map(|v| self.vertices.positions()[v as usize])).0;
+            }
+        }
+        if out.patches.len() > 1 {
+            out.labels = Labels::Runs(labels.finish());
+        }
+        out
+    }
+
+    fn number_patches(&mut self, patches: &mut Vec<Patch>) {
+        self.patch_of.clear();
+        self.patch_of.resize(self.home.len(), NONE);
+        for v in 0..self.home.len() as u32 {
+            if !self.sound[v as usize] {
+                continue;
+            }
+            let root = find(&mut self.parents, v) as usize;
+            if self.patch_of[root] == NONE {
+                self.patch_of[root] = patches.len() as u32;
+                patches.push(Patch { triangles: 0, extent: Extent::default(), bounds: Bounds::EMPTY, first: NONE });
+            }
+            self.patch_of[v as usize] = self.patch_of[root];
+            patches[self.patch_of[root] as usize].bounds.include(&[self.vertices.positions()[v as usize]]);
+        }
+    }
+}
+
+/// Whether the (next, previous) pairs around a vertex form a single cycle of at least three in which no corner stands twice: each
+/// triangle's previous corner is exactly one other's next. Reorders the pairs.
+#[inline]
+fn is_closed_fan(around: &mut [[u32; 2]]) -> bool {
+    let n = around.len();
+    if !(3..=LONG_FAN).contains(&n) {
+        return n > LONG_FAN && long_fan_is_closed(around);
+    }
+    let first = around[0][0];
+    for i in 1..n {
+        let wanted = around[i - 1][1];
+        let mut found = 0;
+        // The whole rest is looked through: a second match is an edge of more than two triangles.
+        let mut matches = 0;
+        for (j, t) in around.iter().enumerate().skip(i) {
+            if t[0] == wanted {
+                found = j;
+                matches += 1;
+            }
+        }
+        if matches != 1 || wanted == first {
+            return false;
+        }
+        around.swap(i, found);
+    }
+    around[n - 1][1] == first
+}
+
+/// Fans of more triangles are tested by sorting, since the walk takes quadratic time.
+const LONG_FAN: usize = 24;
+
+#[cold]
+fn long_fan_is_closed(around: &mut [[u32; 2]]) -> bool {
+    around.sort_unstable();
+    if around.windows(2).any(|w| w[0][0] == w[1][0]) {
+        return false;
+    }
+    let start = around[0][0];
+    let mut at = start;
+    for step in 1..=around.len() {
+        match around.binary_search_by_key(&at, |t| t[0]) {
+            Ok(i) => at = around[i][1],
+            Err(_) => return false,
+        }
+        if at == start {
+            return step == around.len();
+        }
+    }
+    false
+}
+
+/// Exactly collinear (or coincident) corners; `normal` is the f64 cross product, used to rule out nearly all triangles at once.
+#[inline]
+pub(crate) fn is_collinear(corners: &[[f32; 3]; 3], normal: [f64; 3]) -> bool {
+    // The products' rounding is below 2⁻⁵⁰ of their size, and a difference of f32 values is rounded once.
+    let [a, b, c] = corners.map(|p| p.map(f64::from));
+    let size: f64 = (0..3).map(|k| (b[k] - a[k]).abs().max((c[k] - a[k]).abs())).fold(0.0, f64::max);
+    if normal.iter().any(|n| n.abs() > 8e-15 * size * size) {
+        return false;
+    }
+    is_collinear_exact(&a, &b, &c)
+}
+
+#[cold]
+fn is_collinear_exact(a: &[f64; 3], b: &[f64; 3], c: &[f64; 3]) -> bool {
+    [[0, 1], [1, 2], [2, 0]].iter().all(|[x, y]| {
+        let p = |v: &[f64; 3]| robust::Coord { x: v[*x], y: v[*y] };
+        robust::orient2d(p(a), p(b), p(c)) == 0.0
+    })
+}
+
+/// Root of `v`, halving the path.
+#[inline]
+pub(crate) fn find(parents: &mut [u32], mut v: u32) -> u32 {
+    while parents[v as usize] != v {
+        let up = parents[parents[v as usize] as usize];
+        parents[v as usize] = up;
+        v = up;
+    }
+    v
+}
+
+/// The smaller root wins, so that the result does not depend on the order of unions.
+#[inline]
+pub(crate) fn unite(parents: &mut [u32], a: u32, b: u32) {
+    let (a, b) = (find(parents, a), find(parents, b));
+    parents[a.max(b) as usize] = a.min(b);
+}
+
+#[derive(Default)]
+struct LabelWriter {
+    bytes: Vec<u8>,
+    patch: u32,
+    count: u64,
+}
+
+impl LabelWriter {
+    #[inline]
+    fn push(&mut self, patch: u32) {
+        if patch != self.patch {
+            self.flush();
+            self.patch = patch;
+        }
+        self.count += 1;
+    }
+
+    fn flush(&mut self) {
+        if self.count > 0 {
+            crate::members::put_varint(&mut self.bytes, self.count);
+            crate::members::put_varint(&mut self.bytes, u64::from(self.patch.wrapping_add(1)));
+        }
+        self.count = 0;
+    }
+
+    fn finish(mut self) -> Vec<u8> {
+        self.flush();
+        self.bytes.shrink_to_fit();
+        self.bytes
+    }
+}
+
+impl Labels {
+    /// The patch of each member in list order, [`NONE`] where it has none; for [`Labels::One`] always patch 0.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = u32> + '_ {
+        let mut rest: &[u8] = match self {
+            Self::One => &[],
+            Self::Runs(bytes) => bytes,
+        };
+        let (mut left, mut patch) = if matches!(self, Self::One) { (u64::MAX, 0) } else { (0, NONE) };
+        std::iter::from_fn(move || {
+            if left == 0 {
+                left = crate::members::take_varint(&mut rest)?;
+                patch = (crate::members::take_varint(&mut rest)? as u32).wrapping_sub(1);
+            }
+            left -= 1;
+            Some(patch)
+        })
+    }
+}

@@ -1,0 +1,191 @@
+//! The chunk plan: a kd tree over sampled triangles whose leaves are the chunks.
+//!
+//! A position is *at home* in exactly one leaf, found by comparing raw f32 coordinates with the tree's planes. A plane is chosen
+//! among three axes and five quantiles where it cuts the fewest sampled triangles, so that flat sheets are not sliced along their
+//! noise. Where the planes lie depends on the number of chunks asked for, and nothing else may depend on that.
+
+use crate::record::{self, Record};
+
+/// A chunk, numbered by its place among the leaves of the tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct ChunkId(pub(crate) u32);
+
+/// A closed box of positions; never holds NaN or infinite ones.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HomeBox {
+    lo: [f32; 3],
+    hi: [f32; 3],
+}
+
+impl HomeBox {
+    const ALL: Self = Self { lo: [-f32::MAX; 3], hi: [f32::MAX; 3] };
+
+    /// Comparisons written so that NaN is outside.
+    #[inline]
+    pub(crate) fn holds(&self, p: [f32; 3]) -> bool {
+        (0..3).all(|k| (p[k] >= self.lo[k]) & (p[k] <= self.hi[k]))
+    }
+}
+
+/// Samples a leaf should see; more do not make better planes.
+const SAMPLES_PER_CHUNK: u64 = 64;
+
+/// Heap-ordered kd tree: node 1 is the root, node `i` has children `2i` and `2i + 1`.
+#[derive(Debug)]
+pub(crate) struct Plan {
+    /// Plane of each inner node: axis and the smallest coordinate of the upper side.
+    planes: Vec<(u8, f32)>,
+    boxes: Vec<HomeBox>,
+    depth: u32,
+}
+
+impl Plan {
+    /// A plan of about `records.len() / chunk_triangles` chunks, a power of two. O(n / chunk_triangles) time and memory.
+    pub(crate) fn new(records: &[Record], chunk_triangles: u32) -> Self {
+        let wanted = records.len() as u64 / u64::from(chunk_triangles.max(1));
+        let depth = (wanted.max(1) as f64).log2().round() as u32;
+        let chunks = 1usize << depth;
+        let mut plan = Self { planes: vec![(0, 0.0); chunks], boxes: vec![HomeBox::ALL; chunks], depth };
+        if depth > 0 {
+            let mut samples = sample(records, chunks as u64 * SAMPLES_PER_CHUNK);
+            plan.split(1, &mut samples, HomeBox::ALL);
+        }
+        plan
+    }
+
+    fn split(&mut self, node: usize, samples: &mut [Sample], cell: HomeBox) {
+        let chunks = self.planes.len();
+        if node >= chunks {
+            self.boxes[node - chunks] = cell;
+            return;
+        }
+        let (axis, at) = best_plane(samples, &cell);
+        self.planes[node] = (axis as u8, at);
+        let (mut below, mut above) = (cell, cell);
+        below.hi[axis] = at.next_down();
+        above.lo[axis] = at;
+        let middle = partition(samples, |s| s.middle(axis) < at);
+        let (left, right) = samples.split_at_mut(middle);
+        self.split(2 * node, left, below);
+        self.split(2 * node + 1, right, above);
+    }
+
+    pub(crate) fn chunks(&self) -> usize {
+        self.boxes.len()
+    }
+
+    pub(crate) fn home_box(&self, chunk: ChunkId) -> HomeBox {
+        self.boxes[chunk.0 as usize]
+    }
+
+    /// The chunk where a finite position is at home. O(log chunks).
+    #[inline]
+    pub(crate) fn home(&self, p: [f32; 3]) -> ChunkId {
+        let mut node = 1usize;
+        for _ in 0..self.depth {
+            let (axis, at) = self.planes[node];
+            node = 2 * node + usize::from(p[usize::from(axis)] >= at);
+        }
+        ChunkId((node - self.planes.len()) as u32)
+    }
+}
+
+/// The extent of one sampled triangle.
+#[derive(Clone, Copy)]
+struct Sample {
+    lo: [f32; 3],
+    hi: [f32; 3],
+}
+
+impl Sample {
+    fn middle(&self, axis: usize) -> f32 {
+        // Halved first: the sum of two large finite values is infinite.
+        self.lo[axis] * 0.5 + self.hi[axis] * 0.5
+    }
+}
+
+/// `wanted` finite triangles, evenly spread over the file.
+fn sample(records: &[Record], wanted: u64) -> Vec<Sample> {
+    let n = records.len() as u64;
+    let step = (n / wanted.max(1)).max(1);
+    (0..n)
+        .step_by(step as usize)
+        .filter_map(|t| {
+            let c = record::corners(&records[t as usize]);
+            c.iter().flatten().all(|x| x.is_finite()).then(|| Sample {
+                lo: std::array::from_fn(|k| c[0][k].min(c[1][k]).min(c[2][k])),
+                hi: std::array::from_fn(|k| c[0][k].max(c[1][k]).max(c[2][k])),
+            })
+        })
+        .collect()
+}
+
+/// The plane, inside `cell`, that cuts the fewest samples; slightly prefers the middle.
+fn best_plane(samples: &mut [Sample], cell: &HomeBox) -> (usize, f32) {
+    const QUANTILES: [f64; 5] = [0.42, 0.46, 0.5, 0.54, 0.58];
+    let mut best: Option<(f64, usize, f32)> = None;
+    for axis in 0..3 {
+        let mut middles: Vec<f32> = samples.iter().map(|s| s.middle(axis)).collect();
+        middles.sort_unstable_by(f32::total_cmp);
+        for q in QUANTILES {
+            let Some(&at) = middles.get((middles.len() as f64 * q) as usize) else { continue };
+            if !(at > cell.lo[axis] && at <= cell.hi[axis]) {
+                continue;
+            }
+            let below = middles.partition_point(|m| *m < at) as f64 / middles.len() as f64;
+            let cut = samples.iter().filter(|s| s.lo[axis] < at && s.hi[axis] >= at).count() as f64;
+            let cost = cut / samples.len() as f64 + 0.4 * (below - 0.5).abs().powf(1.5);
+            if best.is_none_or(|(c, ..)| cost < c) {
+                best = Some((cost, axis, at));
+            }
+        }
+    }
+    // Nothing to go by (no samples, or all in one place): the upper side stays empty.
+    best.map_or((0, cell.hi[0]), |(_, axis, at)| (axis, at))
+}
+
+/// Moves what satisfies `first` to the front and returns how many that are.
+fn partition<T>(items: &mut [T], first: impl Fn(&T) -> bool) -> usize {
+    let mut n = 0;
+    for i in 0..items.len() {
+        if first(&items[i]) {
+            items.swap(n, i);
+            n += 1;
+        }
+    }
+    n
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn soup(points: &[[f32; 9]]) -> Vec<Record> {
+        points.iter().map(|p| record::encode([[p[0], p[1], p[2]], [p[3], p[4], p[5]], [p[6], p[7], p[8]]], 0)).collect()
+    }
+
+    proptest! {
+        /// Home is a partition: the leaf that `home` names is the only one whose box holds the position.
+        #[test]
+        fn every_position_has_one_home(points in prop::collection::vec(prop::array::uniform9(-100f32..100.0), 1..200),
+                                       probes in prop::collection::vec(prop::array::uniform3(-150f32..150.0), 20)) {
+            let records = soup(&points);
+            let plan = Plan::new(&records, 4);
+            let corners = points.iter().map(|p| [p[0], p[1], p[2]]);
+            for p in probes.into_iter().chain(corners) {
+                let homes: Vec<usize> = (0..plan.chunks()).filter(|c| plan.boxes[*c].holds(p)).collect();
+                prop_assert_eq!(&homes, &vec![plan.home(p).0 as usize]);
+            }
+        }
+    }
+
+    #[test]
+    fn no_box_holds_what_is_not_finite() {
+        let records = soup(&[[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]; 64]);
+        let plan = Plan::new(&records, 8);
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            assert!(plan.boxes.iter().all(|b| !b.holds([0.0, bad, 0.0])));
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! Components: patches of sound surface and triangles of the workshop that hang together through edges.
+
+use super::edges::Edges;
+use super::{Shop, Vertex};
+use crate::chunk::{self, NONE};
+use crate::sums::{Bounds, Extent};
+use crate::survey::Survey;
+
+/// Which pieces of surface are reversed, against how they stand in the shop or in the file.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Reversed {
+    /// By patch.
+    pub(crate) patches: Vec<bool>,
+    /// By triangle of the shop.
+    pub(crate) triangles: Vec<bool>,
+}
+
+impl Reversed {
+    pub(crate) fn none(survey: &Survey<'_>, shop: &Shop) -> Self {
+        Self { patches: vec![false; survey.patches.len()], triangles: vec![false; shop.triangles.len()] }
+    }
+}
+
+/// One connected piece of surface.
+#[derive(Clone, Debug)]
+pub(crate) struct Component {
+    pub(crate) triangles: u64,
+    /// With its pieces turned as [`Reversed`] says.
+    pub(crate) extent: Extent,
+    pub(crate) bounds: Bounds,
+    /// It has a boundary edge, or one that is not used equally often in both directions.
+    pub(crate) open: bool,
+    /// A triangle of it: the smallest of the shop, or else of the file.
+    pub(crate) sample: Sample,
+}
+
+/// Where to find a triangle of a component.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Sample {
+    Shop(u32),
+    File(u32),
+}
+
+/// All components, and who belongs to which.
+pub(crate) struct Components {
+    pub(crate) list: Vec<Component>,
+    pub(crate) of_patch: Vec<u32>,
+    /// [`NONE`] for what is dead or degenerate.
+    pub(crate) of_triangle: Vec<u32>,
+}
+
+/// How far a component reaches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Through {
+    /// Through every edge, as the report counts.
+    EveryEdge,
+    /// Not through non-manifold edges: bodies that touch along an edge stay apart.
+    ManifoldEdges,
+}
+
+impl Components {
+    /// O(patches + shop). Components are numbered by their first patch, then by their first triangle in the shop.
+    pub(crate) fn of(survey: &Survey<'_>, shop: &Shop, edges: &Edges, reversed: &Reversed, through: Through) -> Self {
+        let patches = survey.patches.len() as u32;
+        let mut parents: Vec<u32> = (0..patches + shop.triangles.len() as u32).collect();
+        for t in shop.living() {
+            let patch = shop.triangles[t as usize].patch;
+            if patch != NONE {
+                chunk::unite(&mut parents, patch, patches + t);
+            }
+        }
+        for edge in edges.iter().filter(|e| through == Through::EveryEdge || !e.is_nonmanifold()) {
+            for pair in edge.uses.windows(2) {
+                chunk::unite(&mut parents, patches + pair[0].triangle, patches + pair[1].triangle);
+            }
+        }
+        let mut all = Self { list: Vec::new(), of_patch: vec![NONE; patches as usize], of_triangle: vec![NONE; shop.triangles.len()] };
+        let mut numbers = vec![NONE; parents.len()];
+        for p in 0..patches {
+            let sum = &survey.patches[p as usize];
+            let c = all.number(&mut numbers, chunk::find(&mut parents, p), Sample::File(sum.first));
+            all.of_patch[p as usize] = c;
+            let into = &mut all.list[c as usize];
+            into.triangles += sum.triangles;
+            into.bounds.add(&sum.bounds);
+            into.extent += turned(sum.extent, reversed.patches[p as usize]);
+        }
+        for t in shop.living() {
+            let c = all.number(&mut numbers, chunk::find(&mut parents, patches + t), Sample::Shop(t));
+            all.of_triangle[t as usize] = c;
+            let points = shop.points(t);
+            let into = &mut all.list[c as usize];
+            into.triangles += 1;
+            into.bounds.include(&points);
+            into.extent += turned(survey.measure.triangle(&points).0, reversed.triangles[t as usize]);
+        }
+        for edge in edges.iter().filter(|e| is_open(e, reversed)) {
+            for used in edge.uses {
+                all.list[all.of_triangle[used.triangle as usize] as usize].open = true;
+            }
+        }
+        all
+    }
+
+    fn number(&mut self, numbers: &mut [u32], root: u32, sample: Sample) -> u32 {
+        let number = &mut numbers[root as usize];
+        if *number == NONE {
+            *number = self.list.len() as u32;
+            self.list.push(Component { triangles: 0, extent: Extent::default(), bounds: Bounds::EMPTY, open: false, sample });
+        }
+        *number
+    }
+}
+
+fn is_open(edge: &super::edges::Edge<'_>, reversed: &Reversed) -> bool {
+    let forward = edge.uses.iter().filter(|u| u.forward != reversed.triangles[u.triangle as usize]).count();
+    forward * 2 != edge.uses.len()
+}
+
+pub(crate) fn turned(extent: Extent, reversed: bool) -> Extent {
+    if reversed { Extent { volume: -extent.volume, ..extent } } else { extent }
+}
+
+/// Connected sets of boundary edges.
+pub(crate) fn boundary_loops(shop: &Shop, edges: &Edges) -> u64 {
+    let mut parents: Vec<Vertex> = (0..shop.positions.len() as u32).collect();
+    let mut on_boundary = vec![false; shop.positions.len()];
+    for edge in edges.iter().filter(|e| e.is_boundary()) {
+        on_boundary[edge.low as usize] = true;
+        on_boundary[edge.high as usize] = true;
+        chunk::unite(&mut parents, edge.low, edge.high);
+    }
+    (0..parents.len()).filter(|v| on_boundary[*v] && parents[*v] == *v as u32).count() as u64
+}
+
+/// Vertices on a non-manifold edge, or with more than one fan. A fan hangs together through two-triangle edges.
+pub(crate) fn nonmanifold_vertices(shop: &Shop, edges: &Edges) -> Vec<Vertex> {
+    let mut bad = vec![false; shop.positions.len()];
+    let mut parents: Vec<u32> = (0..shop.triangles.len() as u32 * 3).collect();
+    let corner = |t: u32, v: Vertex| t * 3 + shop.triangles[t as usize].v.iter().position(|w| *w == v).unwrap_or(0) as u32;
+    for edge in edges.iter() {
+        if edge.is_nonmanifold() {
+            bad[edge.low as usize] = true;
+            bad[edge.high as usize] = true;
+        } else if let [a, b] = edge.uses {
+            for v in [edge.low, edge.high] {
+                chunk::unite(&mut parents, corner(a.triangle, v), corner(b.triangle, v));
+            }
+        }
+    }
+    (0..shop.positions.len() as u32)
+        .filter(|v| {
+            if !shop.complete[*v as usize] {
+                return false;
+            }
+            let mut fans = shop.star(*v).map(|(t, k)| chunk::find(&mut parents, t * 3 + k as u32));
+            bad[*v as usize] || fans.next().is_some_and(|first| fans.any(|f| f != first))
+        })
+        .collect()
+}

@@ -1,0 +1,110 @@
+//! The edges of the workshop that have a complete end, with all their triangles.
+
+use super::{Shop, Vertex};
+
+/// A triangle's use of an edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Use {
+    pub(crate) triangle: u32,
+    /// The triangle runs from the edge's `low` end to its `high` end.
+    pub(crate) forward: bool,
+}
+
+/// An edge: its ends, smaller number first, and all its triangles, ascending.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Edge<'a> {
+    pub(crate) low: Vertex,
+    pub(crate) high: Vertex,
+    pub(crate) uses: &'a [Use],
+}
+
+impl Edge<'_> {
+    pub(crate) fn is_boundary(&self) -> bool {
+        self.uses.len() == 1
+    }
+
+    pub(crate) fn is_nonmanifold(&self) -> bool {
+        self.uses.len() > 2
+    }
+
+    /// Two triangles that run through it in the same direction.
+    pub(crate) fn is_inconsistent(&self) -> bool {
+        self.uses.len() == 2 && self.uses[0].forward == self.uses[1].forward
+    }
+
+    /// Not used equally often in both directions.
+    pub(crate) fn is_unbalanced(&self) -> bool {
+        self.uses.iter().filter(|u| u.forward).count() * 2 != self.uses.len()
+    }
+
+    /// Start and end in the direction of `used`.
+    pub(crate) fn directed(&self, used: &Use) -> (Vertex, Vertex) {
+        if used.forward { (self.low, self.high) } else { (self.high, self.low) }
+    }
+}
+
+/// All edges with a complete end, sorted by ends; one flat table.
+pub(crate) struct Edges {
+    ends: Vec<(Vertex, Vertex)>,
+    starts: Vec<u32>,
+    uses: Vec<Use>,
+}
+
+impl Edges {
+    /// O(n log n) in the half-edges around one vertex, O(n) in the workshop.
+    pub(crate) fn of(shop: &Shop) -> Self {
+        // Counting sort by the low end, then each vertex's few edges by comparison.
+        let mut starts = vec![0u32; shop.positions.len() + 1];
+        let halves = |shop: &Shop, visit: &mut dyn FnMut(Vertex, Vertex, Use)| {
+            for t in shop.living() {
+                let v = shop.triangles[t as usize].v;
+                for k in 0..3 {
+                    let (a, b) = (v[k], v[(k + 1) % 3]);
+                    if shop.complete[a as usize] || shop.complete[b as usize] {
+                        visit(a.min(b), a.max(b), Use { triangle: t, forward: a < b });
+                    }
+                }
+            }
+        };
+        halves(shop, &mut |low, _, _| starts[low as usize + 1] += 1);
+        for v in 1..starts.len() {
+            starts[v] += starts[v - 1];
+        }
+        let mut at = starts.clone();
+        let mut table = vec![(0, Use { triangle: 0, forward: false }); *starts.last().unwrap_or(&0) as usize];
+        halves(shop, &mut |low, high, used| {
+            table[at[low as usize] as usize] = (high, used);
+            at[low as usize] += 1;
+        });
+        let mut edges = Self { ends: Vec::with_capacity(table.len() / 2), starts: vec![0], uses: Vec::with_capacity(table.len()) };
+        for low in 0..shop.positions.len() {
+            let part = &mut table[starts[low] as usize..starts[low + 1] as usize];
+            part.sort_unstable_by_key(|(high, used)| (*high, used.triangle));
+            for group in part.chunk_by(|a, b| a.0 == b.0) {
+                edges.ends.push((low as Vertex, group[0].0));
+                edges.uses.extend(group.iter().map(|g| g.1));
+                edges.starts.push(edges.uses.len() as u32);
+            }
+        }
+        edges
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    pub(crate) fn get(&self, i: usize) -> Edge<'_> {
+        let (low, high) = self.ends[i];
+        Edge { low, high, uses: &self.uses[self.starts[i] as usize..self.starts[i + 1] as usize] }
+    }
+
+    /// In order of (low, high).
+    pub(crate) fn iter(&self) -> impl Iterator<Item = Edge<'_>> {
+        (0..self.len()).map(|i| self.get(i))
+    }
+
+    /// The edge between two vertices, if it has a complete end and a triangle.
+    pub(crate) fn between(&self, a: Vertex, b: Vertex) -> Option<Edge<'_>> {
+        self.ends.binary_search(&(a.min(b), a.max(b))).ok().map(|i| self.get(i))
+    }
+}

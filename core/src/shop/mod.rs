@@ -1,0 +1,166 @@
+//! The workshop: all triangles around unsound vertices, as a small mesh in memory that repairs can change.
+//!
+//! Its **complete** vertices have their whole star here (the unsound ones, and what was fetched on request); the others are its
+//! frontier and stay as they are. An edge with a complete end therefore has all its triangles here. Vertices and triangles are
+//! numbered by the input's order, so nothing that is done here depends on how the file was cut into chunks.
+
+pub(crate) mod components;
+pub(crate) mod edges;
+pub(crate) mod near;
+
+use crate::chunk::NONE;
+use crate::record::{self, Record};
+use crate::survey::Survey;
+use crate::weld::Weld;
+
+/// A vertex of the workshop.
+pub(crate) type Vertex = u32;
+
+/// Where a triangle comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Origin {
+    /// This record of the input.
+    Input(u32),
+    /// A part of this record; takes its attribute.
+    Part(u32),
+    /// Closes a hole.
+    Patch,
+}
+
+/// A triangle of the workshop.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Triangle {
+    pub(crate) v: [Vertex; 3],
+    pub(crate) origin: Origin,
+    /// The patch of sound surface it continues coherently, or [`NONE`].
+    pub(crate) patch: u32,
+    pub(crate) alive: bool,
+}
+
+/// The mesh under repair.
+pub(crate) struct Shop {
+    pub(crate) positions: Vec<[f32; 3]>,
+    /// The whole star is here.
+    pub(crate) complete: Vec<bool>,
+    pub(crate) triangles: Vec<Triangle>,
+    /// First corner (3 · triangle + k) of each vertex, and the next one of the same vertex: a list for each star.
+    heads: Vec<u32>,
+    nexts: Vec<u32>,
+}
+
+/// Bytes a workshop needs for each suspect, tables of the repairs included, measured on a soup (three vertices a triangle).
+pub(crate) const BYTES_PER_SUSPECT: u64 = 320;
+
+impl Shop {
+    /// Gathers the suspects of `survey`. O(suspects).
+    pub(crate) fn gather(survey: &Survey<'_>) -> Self {
+        let mut weld = Weld::default();
+        weld.reset(survey.suspects.len());
+        let mut triangles = Vec::with_capacity(survey.suspects.len());
+        let mut complete = Vec::new();
+        for (suspect, patch) in survey.suspects.iter().zip(&survey.suspect_patches) {
+            let v = corners(survey.records, suspect.triangle).map(|p| weld.vertex(p));
+            complete.resize(weld.positions().len(), false);
+            for (k, vertex) in v.iter().enumerate() {
+                complete[*vertex as usize] |= suspect.unsound >> k & 1 == 1;
+            }
+            triangles.push(Triangle { v, origin: Origin::Input(suspect.triangle), patch: *patch, alive: true });
+        }
+        let mut shop = Self { heads: Vec::new(), nexts: Vec::new(), positions: weld.into_positions(), complete, triangles };
+        shop.relink();
+        shop
+    }
+
+    /// Builds the star lists anew, dropping what is dead. Lists run from the last triangle to the first.
+    pub(crate) fn relink(&mut self) {
+        self.heads.clear();
+        self.heads.resize(self.positions.len(), NONE);
+        self.nexts.clear();
+        self.nexts.resize(self.triangles.len() * 3, NONE);
+        for t in 0..self.triangles.len() {
+            if self.triangles[t].alive {
+                self.link(t);
+            }
+        }
+    }
+
+    fn link(&mut self, t: usize) {
+        for (k, v) in self.triangles[t].v.iter().enumerate() {
+            let corner = t * 3 + k;
+            self.nexts[corner] = self.heads[*v as usize];
+            self.heads[*v as usize] = corner as u32;
+        }
+    }
+
+    /// Adds a triangle and returns its number.
+    pub(crate) fn add(&mut self, v: [Vertex; 3], origin: Origin, patch: u32) -> u32 {
+        let t = self.triangles.len();
+        self.triangles.push(Triangle { v, origin, patch, alive: true });
+        self.nexts.extend([NONE; 3]);
+        self.link(t);
+        t as u32
+    }
+
+    pub(crate) fn kill(&mut self, t: u32) {
+        self.triangles[t as usize].alive = false;
+    }
+
+    pub(crate) fn points(&self, t: u32) -> [[f32; 3]; 3] {
+        self.triangles[t as usize].v.map(|v| self.positions[v as usize])
+    }
+
+    /// Living triangles with three distinct vertices, by number.
+    pub(crate) fn living(&self) -> impl Iterator<Item = u32> + '_ {
+        (0..self.triangles.len() as u32).filter(|t| {
+            let t = &self.triangles[*t as usize];
+            t.alive && !has_repeated(t.v)
+        })
+    }
+
+    /// Living triangles around `v`, each with the number of `v`'s corner.
+    pub(crate) fn star(&self, v: Vertex) -> impl Iterator<Item = (u32, usize)> + '_ {
+        let mut corner = self.heads[v as usize];
+        std::iter::from_fn(move || {
+            while corner != NONE {
+                let at = corner;
+                corner = self.nexts[at as usize];
+                let triangle = &self.triangles[(at / 3) as usize];
+                if triangle.alive && !has_repeated(triangle.v) {
+                    return Some((at / 3, (at % 3) as usize));
+                }
+            }
+            None
+        })
+    }
+
+    /// Whether a living triangle holds the edge `a`–`b`. Looks from the end `a`, which must be complete to be sure.
+    pub(crate) fn has_edge(&self, a: Vertex, b: Vertex) -> bool {
+        self.star(a).any(|(t, _)| self.triangles[t as usize].v.contains(&b))
+    }
+
+    /// Shortest edge around `v`.
+    pub(crate) fn shortest_edge(&self, v: Vertex) -> f64 {
+        let ends = self.star(v).flat_map(|(t, k)| {
+            let corners = self.triangles[t as usize].v;
+            [corners[(k + 1) % 3], corners[(k + 2) % 3]]
+        });
+        ends.map(|w| self.distance(v, w)).fold(f64::INFINITY, f64::min)
+    }
+
+    pub(crate) fn distance(&self, a: Vertex, b: Vertex) -> f64 {
+        distance(self.positions[a as usize], self.positions[b as usize])
+    }
+}
+
+/// Distance of two positions, in f64.
+pub(crate) fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
+    (0..3).map(|k| (f64::from(a[k]) - f64::from(b[k])).powi(2)).sum::<f64>().sqrt()
+}
+
+pub(crate) fn has_repeated(v: [Vertex; 3]) -> bool {
+    v[0] == v[1] || v[1] == v[2] || v[2] == v[0]
+}
+
+pub(crate) fn corners(records: &[Record], t: u32) -> [[f32; 3]; 3] {
+    record::corners(&records[t as usize])
+}

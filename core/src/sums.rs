@@ -1,0 +1,144 @@
+//! Sums that do not depend on the order of their terms: bounding boxes, and exact accumulators of area and volume.
+
+/// Axis-parallel box of finite positions; −0.0 and 0.0 are one value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Bounds {
+    pub(crate) lo: [f32; 3],
+    pub(crate) hi: [f32; 3],
+}
+
+impl Bounds {
+    pub(crate) const EMPTY: Self = Self { lo: [f32::INFINITY; 3], hi: [f32::NEG_INFINITY; 3] };
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.lo[0] > self.hi[0]
+    }
+
+    #[inline]
+    pub(crate) fn include(&mut self, points: &[[f32; 3]]) {
+        for p in points {
+            for k in 0..3 {
+                self.lo[k] = if p[k] < self.lo[k] { p[k] } else { self.lo[k] };
+                self.hi[k] = if p[k] > self.hi[k] { p[k] } else { self.hi[k] };
+            }
+        }
+    }
+
+    pub(crate) fn add(&mut self, other: &Self) {
+        if !other.is_empty() {
+            self.include(&[other.lo, other.hi]);
+        }
+    }
+
+    pub(crate) fn contains(&self, other: &Self) -> bool {
+        (0..3).all(|k| self.lo[k] <= other.lo[k] && self.hi[k] >= other.hi[k])
+    }
+
+    /// Length of the diagonal; 0 of an empty box.
+    pub(crate) fn diagonal(&self) -> f64 {
+        if self.is_empty() {
+            return 0.0;
+        }
+        (0..3).map(|k| (f64::from(self.hi[k]) - f64::from(self.lo[k])).powi(2)).sum::<f64>().sqrt()
+    }
+
+    /// The largest coordinate by size; 0 of an empty box.
+    pub(crate) fn largest_coordinate(&self) -> f32 {
+        if self.is_empty() { 0.0 } else { (0..3).map(|k| self.lo[k].abs().max(self.hi[k].abs())).fold(0.0, f32::max) }
+    }
+
+    /// −0.0 becomes 0.0, so that the box does not tell which of the two came last.
+    pub(crate) fn normalised(self) -> Self {
+        Self { lo: self.lo.map(|x| x + 0.0), hi: self.hi.map(|x| x + 0.0) }
+    }
+}
+
+/// How area and volume are turned into integers: terms are taken relative to the middle of the model, in units of 2⁻⁸⁸ of the
+/// cube of its size, so that 2³² of them cannot overflow 128 bits. The sums are exact, so their order does not matter.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Measure {
+    middle: [f64; 3],
+    to_area: f64,
+    to_volume: f64,
+}
+
+/// Area and volume in units of a [`Measure`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Extent {
+    /// Twice the area.
+    pub(crate) area: i128,
+    /// Six times the signed volume of the cone to the middle.
+    pub(crate) volume: i128,
+}
+
+impl std::ops::AddAssign for Extent {
+    fn add_assign(&mut self, other: Self) {
+        self.area += other.area;
+        self.volume += other.volume;
+    }
+}
+
+impl Measure {
+    pub(crate) fn new(bounds: &Bounds) -> Self {
+        let middle = if bounds.is_empty() {
+            [0.0; 3]
+        } else {
+            std::array::from_fn(|k| (f64::from(bounds.lo[k]) + f64::from(bounds.hi[k])) / 2.0)
+        };
+        // A power of two above the diagonal, so that scaling rounds nothing.
+        let size = bounds.diagonal().max(f64::from(f32::MIN_POSITIVE));
+        let exponent = (size.to_bits() >> 52) as i32 - 1022;
+        Self { middle, to_area: power_of_two(88 - 2 * exponent), to_volume: power_of_two(88 - 3 * exponent) }
+    }
+
+    /// One triangle's terms, and its normal (twice the area long) in f64.
+    #[inline]
+    pub(crate) fn triangle(&self, corners: &[[f32; 3]; 3]) -> (Extent, [f64; 3]) {
+        let [a, b, c] = corners.map(|p| [f64::from(p[0]), f64::from(p[1]), f64::from(p[2])]);
+        let u = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
+        let v = [c[0] - a[0], c[1] - a[1], c[2] - a[2]];
+        let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+        let area = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
+        let m = self.middle;
+        let volume = (a[0] - m[0]) * n[0] + (a[1] - m[1]) * n[1] + (a[2] - m[2]) * n[2];
+        (Extent { area: (area * self.to_area) as i128, volume: (volume * self.to_volume) as i128 }, n)
+    }
+
+    /// Area in the model's units squared.
+    pub(crate) fn area(&self, sum: Extent) -> f64 {
+        sum.area as f64 / self.to_area / 2.0
+    }
+
+    /// Signed volume in the model's units cubed.
+    pub(crate) fn volume(&self, sum: Extent) -> f64 {
+        sum.volume as f64 / self.to_volume / 6.0
+    }
+}
+
+/// 2^e as f64, also where the exponent leaves the normal range of the intermediate steps.
+fn power_of_two(e: i32) -> f64 {
+    2f64.powi(e.clamp(-1000, 1000))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_unit_cube_has_volume_one_and_area_six_wherever_it_stands() {
+        for offset in [0.0f32, 1000.0] {
+            let p = |x: u8| std::array::from_fn(|k| offset + f32::from(x >> k & 1));
+            // Corner numbers are bits x, y, z; each face as two triangles seen from outside.
+            let quads = [[0u8, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+            let triangles: Vec<[[f32; 3]; 3]> =
+                quads.iter().flat_map(|q| [[p(q[0]), p(q[1]), p(q[2])], [p(q[0]), p(q[2]), p(q[3])]]).collect();
+            let mut bounds = Bounds::EMPTY;
+            triangles.iter().for_each(|t| bounds.include(t));
+            let measure = Measure::new(&bounds);
+            let mut sum = Extent::default();
+            triangles.iter().for_each(|t| sum += measure.triangle(t).0);
+            assert!((measure.volume(sum) - 1.0).abs() < 1e-9, "{}", measure.volume(sum));
+            assert!((measure.area(sum) - 6.0).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,257 @@
+//! The topology of a whole file: chunks solved in parallel, then merged over the triangles they share.
+//!
+//! What comes out does not depend on the chunks: the suspects (all triangles around unsound vertices), and the patches of sound
+//! surface, numbered by their smallest triangle. Everything global is proportional to the seams and the defects, not to the file.
+
+use std::path::Path;
+
+use crate::chunk::{self, ChunkTopology, Labels, Link, NONE, Patch, Scratch, Suspect};
+use crate::error::{Error, Result};
+use crate::members::Members;
+use crate::plan::{ChunkId, Plan};
+use crate::record::{self, Record};
+use crate::settings::Limits;
+use crate::sums::{Bounds, Measure};
+use crate::{Progress, parallel};
+
+/// Topology of the sound part of a file, and the list of what is not sound.
+#[derive(Debug)]
+pub(crate) struct Survey<'a> {
+    pub(crate) records: &'a [Record],
+    pub(crate) measure: Measure,
+    pub(crate) bounds: Bounds,
+    /// Triangles of the workshop, ascending, each once.
+    pub(crate) suspects: Vec<Suspect>,
+    /// The patch of each suspect's sound corners, or [`NONE`].
+    pub(crate) suspect_patches: Vec<u32>,
+    /// Patches by ascending smallest triangle. Sums leave the suspects out.
+    pub(crate) patches: Vec<Patch>,
+    /// Runs of triangles with non-finite coordinates.
+    pub(crate) nonfinite: Vec<(u32, u32)>,
+    /// Distinct positions, and those used by a triangle with three distinct vertices.
+    pub(crate) vertices: u64,
+    pub(crate) vertices_used: u64,
+    plan: Plan,
+    members: Members,
+    labels: Vec<Labels>,
+    /// First entry of each chunk in `merged`.
+    bases: Vec<u32>,
+    /// Chunk's patch → merged patch.
+    merged: Vec<u32>,
+    threads: usize,
+}
+
+/// Stage name under which the survey reports progress.
+const STAGE: &str = "topology";
+
+impl<'a> Survey<'a> {
+    /// Reads `records` twice (once to plan, once by chunks). Refuses when tables would not fit `limits.memory_bytes`.
+    pub(crate) fn new(path: &Path, records: &'a [Record], limits: &Limits, progress: &dyn Progress) -> Result<Self> {
+        let span = tracing::debug_span!("plan").entered();
+        let plan = Plan::new(records, limits.chunk_triangles);
+        let mut members = Members::gather(records, &plan, limits.threads);
+        drop(span);
+        let bounds = members.bounds.normalised();
+        let measure = Measure::new(&bounds);
+        refuse_if_too_large(path, &plan, &members, limits)?;
+
+        let _span = tracing::debug_span!("chunks", count = plan.chunks()).entered();
+        let done = std::sync::atomic::AtomicU64::new(0);
+        let mut chunks = parallel::map_with(limits.threads, plan.chunks(), Scratch::default, |scratch, c| {
+            let topology = scratch.solve(records, &plan, &members, ChunkId(c as u32), &measure);
+            let before = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            progress.at(STAGE, (before + 1) * records.len() as u64 / plan.chunks() as u64, records.len() as u64);
+            topology
+        });
+        let merge = Merge::of(records, &measure, &mut chunks);
+        Ok(Self {
+            records,
+            measure,
+            bounds,
+            suspects: merge.suspects,
+            suspect_patches: merge.suspect_patches,
+            patches: merge.patches,
+            nonfinite: std::mem::take(&mut members.nonfinite),
+            vertices: chunks.iter().map(|c| c.vertices).sum(),
+            vertices_used: chunks.iter().map(|c| c.vertices_used).sum(),
+            plan,
+            members,
+            labels: chunks.into_iter().map(|c| c.labels).collect(),
+            bases: merge.bases,
+            merged: merge.merged,
+            threads: limits.threads,
+        })
+    }
+
+    /// Triangles with finite coordinates.
+    pub(crate) fn triangles(&self) -> u64 {
+        self.records.len() as u64 - self.nonfinite.iter().map(|r| u64::from(r.1)).sum::<u64>()
+    }
+
+    /// Visits every triangle with three sound corners whose patch is `wanted`, exactly once, with its patch: chunks in parallel,
+    /// results in chunk order (which the plan decides: only sums of integers and sets may be made of them).
+    pub(crate) fn visit_sound<R: Send>(
+        &self,
+        wanted: impl Fn(u32) -> bool + Sync,
+        make: impl Fn() -> R + Sync,
+        visit: impl Fn(&mut R, u32, u32) + Sync,
+    ) -> Vec<R> {
+        parallel::map(self.threads, self.plan.chunks(), |c| {
+            let mut result = make();
+            let patches = &self.merged[self.bases[c] as usize..self.bases[c + 1] as usize];
+            if !patches.iter().any(|p| wanted(*p)) {
+                return result;
+            }
+            let chunk = ChunkId(c as u32);
+            let cell = self.plan.home_box(chunk);
+            let mut suspects = self.suspects.as_slice();
+            for (triangle, patch) in self.members.triangles(chunk).zip(self.labels[c].iter()) {
+                if patch == NONE || !wanted(patches[patch as usize]) {
+                    continue;
+                }
+                let skip = suspects.partition_point(|s| s.triangle < triangle);
+                suspects = &suspects[skip..];
+                if suspects.first().is_some_and(|s| s.triangle == triangle) {
+                    continue;
+                }
+                // A sound triangle has a label in every chunk that sees it; the lowest of them visits it.
+                let corners = record::corners(&self.records[triangle as usize]);
+                if corners.iter().all(|p| cell.holds(*p)) || corners.iter().all(|p| self.plan.home(*p) >= chunk) {
+                    visit(&mut result, triangle, patches[patch as usize]);
+                }
+            }
+            result
+        })
+    }
+
+    /// All triangles with a corner at one of `positions`, ascending: the complete stars of these vertices. Reads the chunks
+    /// where they are at home.
+    pub(crate) fn stars_of(&self, positions: &std::collections::HashSet<[u32; 3]>) -> Vec<u32> {
+        let mut homes: Vec<ChunkId> = positions.iter().map(|p| self.plan.home(p.map(f32::from_bits))).collect();
+        homes.sort_unstable();
+        homes.dedup();
+        let found = parallel::map(self.threads, homes.len(), |i| {
+            let inside = |t: &u32| record::corners(&self.records[*t as usize]).iter().any(|p| positions.contains(&key(*p)));
+            self.members.triangles(homes[i]).filter(inside).collect::<Vec<u32>>()
+        });
+        let mut all: Vec<u32> = found.into_iter().flatten().collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    /// Bytes held.
+    pub(crate) fn heap_bytes(&self) -> usize {
+        let labels: usize = self.labels.iter().map(|l| if let Labels::Runs(b) = l { b.capacity() } else { 0 }).sum();
+        self.members.heap_bytes() + labels + self.suspects.len() * 12 + self.patches.len() * size_of::<Patch>() + self.merged.len() * 4
+    }
+}
+
+/// A position as a map key: exact, −0.0 and 0.0 being one.
+pub(crate) fn key(p: [f32; 3]) -> [u32; 3] {
+    p.map(|x| (x + 0.0).to_bits())
+}
+
+fn refuse_if_too_large(path: &Path, plan: &Plan, members: &Members, limits: &Limits) -> Result<()> {
+    let largest = (0..plan.chunks()).map(|c| members.runs(ChunkId(c as u32)).map(|r| u64::from(r.1)).sum::<u64>()).max().unwrap_or(0);
+    let need = members.heap_bytes() as u64 + chunk::scratch_bytes(largest) * limits.threads as u64;
+    if need > limits.memory_bytes {
+        return Err(Error::Refused {
+            path: path.into(),
+            reason: format!("the largest chunk holds {largest} triangles, which needs {} MiB of memory", need.div_ceil(1 << 20)),
+            advice: format!("the budget is {} MiB: raise --memory", limits.memory_bytes >> 20),
+        });
+    }
+    Ok(())
+}
+
+struct Merge {
+    suspects: Vec<Suspect>,
+    suspect_patches: Vec<u32>,
+    patches: Vec<Patch>,
+    bases: Vec<u32>,
+    merged: Vec<u32>,
+}
+
+impl Merge {
+    /// Unites patches that share a triangle and adds up what the chunks left to it. O(seam + suspects + patches), sorted.
+    fn of(records: &[Record], measure: &Measure, chunks: &mut [ChunkTopology]) -> Self {
+        let _span = tracing::debug_span!("merge").entered();
+        let mut bases = vec![0u32];
+        let mut sums: Vec<Patch> = Vec::new();
+        let mut links: Vec<Link> = Vec::new();
+        let mut suspects: Vec<Suspect> = Vec::new();
+        for chunk in chunks {
+            let base = sums.len() as u32;
+            sums.append(&mut chunk.patches);
+            links.extend(chunk.links.drain(..).map(|l| Link { patch: base + l.patch, ..l }));
+            chunk.links = Vec::new();
+            suspects.append(&mut chunk.suspects);
+            bases.push(sums.len() as u32);
+        }
+        suspects.sort_unstable();
+        suspects.dedup_by(|b, a| {
+            let same = a.triangle == b.triangle;
+            a.unsound |= if same { b.unsound } else { 0 };
+            same
+        });
+        links.sort_unstable_by_key(|l| l.triangle);
+        let mut parents: Vec<u32> = (0..sums.len() as u32).collect();
+        for pair in links.windows(2) {
+            if pair[0].triangle == pair[1].triangle {
+                chunk::unite(&mut parents, pair[0].patch, pair[1].patch);
+            }
+        }
+        links.dedup_by_key(|l| l.triangle);
+        let suspect_raw = take_shared(records, measure, &links, &suspects, &mut sums);
+        let (patches, merged) = number(&mut parents, sums);
+        let suspect_patches = suspect_raw.into_iter().map(|p| if p == NONE { NONE } else { merged[p as usize] }).collect();
+        Self { suspects, suspect_patches, patches, bases, merged }
+    }
+}
+
+/// Adds the shared triangles that are no suspects to their patches; returns the patch of each suspect.
+fn take_shared(records: &[Record], measure: &Measure, links: &[Link], suspects: &[Suspect], sums: &mut [Patch]) -> Vec<u32> {
+    let mut patches = vec![NONE; suspects.len()];
+    let mut s = 0;
+    for link in links {
+        while s < suspects.len() && suspects[s].triangle < link.triangle {
+            s += 1;
+        }
+        if s < suspects.len() && suspects[s].triangle == link.triangle {
+            patches[s] = link.patch;
+        } else {
+            let sum = &mut sums[link.patch as usize];
+            sum.triangles += 1;
+            sum.extent += measure.triangle(&record::corners(&records[link.triangle as usize])).0;
+        }
+    }
+    patches
+}
+
+/// Folds united patches into one each and numbers them by their smallest triangle.
+fn number(parents: &mut [u32], sums: Vec<Patch>) -> (Vec<Patch>, Vec<u32>) {
+    let mut merged = vec![NONE; sums.len()];
+    let mut patches: Vec<Patch> = Vec::new();
+    for (raw, sum) in sums.into_iter().enumerate() {
+        // The root is the smallest of its union, so it comes first.
+        let root = chunk::find(parents, raw as u32) as usize;
+        if root == raw {
+            merged[raw] = patches.len() as u32;
+            patches.push(sum);
+        } else {
+            merged[raw] = merged[root];
+            let into = &mut patches[merged[root] as usize];
+            into.triangles += sum.triangles;
+            into.extent += sum.extent;
+            into.bounds.add(&sum.bounds);
+            into.first = into.first.min(sum.first);
+        }
+    }
+    let mut order: Vec<u32> = (0..patches.len() as u32).collect();
+    order.sort_unstable_by_key(|p| patches[*p as usize].first);
+    let mut rank = vec![0; order.len()];
+    order.iter().enumerate().for_each(|(r, p)| rank[*p as usize] = r as u32);
+    merged.iter_mut().for_each(|m| *m = rank[*m as usize]);
+    (order.into_iter().map(|p| patches[p as usize]).collect(), merged)
+}

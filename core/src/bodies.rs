@@ -86,10 +86,8 @@ fn rays(survey: &Survey<'_>, shop: &Shop, list: &[Component]) -> Vec<Ray> {
         let candidates: Vec<u32> =
             found.iter().filter(|j| **j != i as u32 && boxes[**j as usize].contains(&boxes[i])).map(|j| closed[*j as usize]).collect();
         if !candidates.is_empty() {
-            let corners = match list[*component as usize].sample {
-                Sample::Shop(t) => shop.points(t),
-                Sample::File(t) => record::corners(&survey.records[t as usize]),
-            };
+            let Sample { record, in_shop } = list[*component as usize].sample;
+            let corners = in_shop.map_or_else(|| record::corners(&survey.records[record as usize]), |t| shop.points(t));
             rays.push(Ray { component: *component, from: inner_point(&corners), candidates });
         }
     }

@@ -6,7 +6,9 @@
 mod bodies;
 mod boxes;
 mod chunk;
+mod cost;
 mod defects;
+mod engine;
 pub mod error;
 pub mod fill;
 mod members;
@@ -19,6 +21,7 @@ pub mod settings;
 mod shop;
 mod sums;
 mod survey;
+mod verdict;
 mod weld;
 
 pub use error::{Error, ErrorClass};
@@ -45,8 +48,11 @@ impl Progress for Quiet {
 }
 
 /// Diagnoses `input` and writes nothing.
-pub fn inspect(input: &Path, _profile: &Profile, _limits: &Limits, _progress: &dyn Progress) -> error::Result<Report> {
-    Err(Error::Unreadable { path: input.into(), reason: "not built yet".into() })
+///
+/// # Errors
+/// [`Error`]; nothing was written in any case.
+pub fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> error::Result<Report> {
+    engine::inspect(input, profile, limits, progress)
 }
 
 /// Repairs `input` into `output`, which must not exist: the caller owns a temporary name and publishes it. The output is synced

@@ -30,15 +30,15 @@ pub(crate) struct Component {
     pub(crate) bounds: Bounds,
     /// It has a boundary edge, or one that is not used equally often in both directions.
     pub(crate) open: bool,
-    /// A triangle of it: the smallest of the shop, or else of the file.
+    /// Its smallest triangle in the file's order, new ones last.
     pub(crate) sample: Sample,
 }
 
-/// Where to find a triangle of a component.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Sample {
-    Shop(u32),
-    File(u32),
+/// A triangle of a component: its place in the file (past the end for a new one) and, if it is in the shop, its number there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Sample {
+    pub(crate) record: u32,
+    pub(crate) in_shop: Option<u32>,
 }
 
 /// All components, and who belongs to which.
@@ -78,7 +78,7 @@ impl Components {
         let mut numbers = vec![NONE; parents.len()];
         for p in 0..patches {
             let sum = &survey.patches[p as usize];
-            let c = all.number(&mut numbers, chunk::find(&mut parents, p), Sample::File(sum.first));
+            let c = all.number(&mut numbers, chunk::find(&mut parents, p), Sample { record: sum.first, in_shop: None });
             all.of_patch[p as usize] = c;
             let into = &mut all.list[c as usize];
             into.triangles += sum.triangles;
@@ -86,7 +86,7 @@ impl Components {
             into.extent += turned(sum.extent, reversed.patches[p as usize]);
         }
         for t in shop.living() {
-            let c = all.number(&mut numbers, chunk::find(&mut parents, patches + t), Sample::Shop(t));
+            let c = all.number(&mut numbers, chunk::find(&mut parents, patches + t), shop_sample(shop, t));
             all.of_triangle[t as usize] = c;
             let points = shop.points(t);
             let into = &mut all.list[c as usize];
@@ -108,8 +108,18 @@ impl Components {
             *number = self.list.len() as u32;
             self.list.push(Component { triangles: 0, extent: Extent::default(), bounds: Bounds::EMPTY, open: false, sample });
         }
+        let component = &mut self.list[*number as usize];
+        component.sample = component.sample.min(sample);
         *number
     }
+}
+
+fn shop_sample(shop: &Shop, t: u32) -> Sample {
+    let record = match shop.triangles[t as usize].origin {
+        super::Origin::Input(record) | super::Origin::Part(record) => record,
+        super::Origin::Patch => NONE,
+    };
+    Sample { record, in_shop: Some(t) }
 }
 
 fn is_open(edge: &super::edges::Edge<'_>, reversed: &Reversed) -> bool {

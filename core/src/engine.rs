@@ -1,0 +1,172 @@
+//! The way of one file through the engine: read → survey → workshop → repair → edit → emit → survey again → report.
+
+use std::path::Path;
+use std::time::Instant;
+
+use crate::error::{Error, Result};
+use crate::read::MeshFile;
+use crate::report::{Cost, Defects, EditSummary, FileFacts, Outcome, Report, SCHEMA_VERSION, Stage, Task, Tolerances};
+use crate::settings::{Limits, Profile};
+use crate::shop::edges::Edges;
+use crate::shop::near::Tolerance;
+use crate::shop::{self, Shop};
+use crate::survey::Survey;
+use crate::{Progress, cost, defects, verdict};
+
+/// What is spent by stage while a file is worked on.
+pub(crate) struct Clock {
+    start: Instant,
+    lap: Instant,
+    stages: Vec<Stage>,
+    peak_anonymous_bytes: u64,
+}
+
+impl Clock {
+    fn start() -> Self {
+        let now = Instant::now();
+        Self { start: now, lap: now, stages: Vec::new(), peak_anonymous_bytes: 0 }
+    }
+
+    /// Ends the stage that ran until now.
+    pub(crate) fn lap(&mut self, name: &str) {
+        let seconds = self.lap.elapsed().as_secs_f64();
+        self.lap = Instant::now();
+        self.peak_anonymous_bytes = self.peak_anonymous_bytes.max(cost::anonymous_bytes());
+        tracing::debug!(stage = name, seconds, "Stage done.");
+        self.stages.push(Stage { name: name.into(), seconds });
+    }
+
+    fn cost(&self, triangles: u64) -> Cost {
+        let wall_seconds = self.start.elapsed().as_secs_f64();
+        Cost {
+            wall_seconds,
+            cpu_seconds: cost::cpu_seconds(),
+            triangles_per_second: triangles as f64 / wall_seconds.max(1e-9),
+            peak_resident_bytes: cost::peak_resident_bytes(),
+            peak_anonymous_bytes: self.peak_anonymous_bytes,
+        }
+    }
+}
+
+/// The survey of a file, its untouched workshop and its defects.
+pub(crate) struct Diagnosis<'a> {
+    pub(crate) survey: Survey<'a>,
+    pub(crate) shop: Shop,
+    pub(crate) edges: Edges,
+    pub(crate) tolerance: Tolerance,
+    pub(crate) defects: Defects,
+}
+
+impl<'a> Diagnosis<'a> {
+    pub(crate) fn of(path: &Path, records: &'a [crate::record::Record], profile: &Profile, limits: &Limits, progress: &dyn Progress) -> Result<Self> {
+        let survey = Survey::new(path, records, limits, progress)?;
+        let need = survey.heap_bytes() as u64 + survey.suspects.len() as u64 * shop::BYTES_PER_SUSPECT;
+        if need > limits.memory_bytes {
+            return Err(Error::Refused {
+                path: path.into(),
+                reason: format!("{} triangles lie at defects, which needs {} MiB of memory", survey.suspects.len(), need.div_ceil(1 << 20)),
+                advice: format!("the budget is {} MiB: raise --memory", limits.memory_bytes >> 20),
+            });
+        }
+        let shop = Shop::gather(&survey);
+        let edges = Edges::of(&shop);
+        let tolerance = tolerance(&survey, profile);
+        let defects = defects::count(&survey, &shop, &edges, &tolerance);
+        Ok(Self { survey, shop, edges, tolerance, defects })
+    }
+}
+
+/// Never below what f32 tells apart at the model's coordinates: four steps of the largest one.
+fn tolerance(survey: &Survey<'_>, profile: &Profile) -> Tolerance {
+    if profile.weld_relative <= 0.0 {
+        return Tolerance { weld: 0.0, edge_share: 0.0 };
+    }
+    let largest = survey.bounds.largest_coordinate();
+    let step = f64::from(largest.next_up()) - f64::from(largest);
+    Tolerance { weld: (profile.weld_relative * survey.bounds.diagonal()).max(4.0 * step), edge_share: profile.weld_max_edge_share }
+}
+
+/// Diagnoses `input` and writes nothing.
+///
+/// # Errors
+/// [`Error::Unreadable`], [`Error::Refused`], [`Error::Io`], [`Error::Changed`].
+pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> Result<Report> {
+    let mut clock = Clock::start();
+    let mesh = open(input, input.parent(), limits, progress)?;
+    clock.lap("read");
+    let diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
+    clock.lap("topology");
+    let facts = facts(&mesh, limits);
+    clock.lap("hash");
+    mesh.check_unchanged()?;
+    let verdict = verdict::judge(&diagnosis.defects, &flaws(&mesh));
+    Ok(Report {
+        schema_version: SCHEMA_VERSION,
+        engine_version: env!("CARGO_PKG_VERSION").into(),
+        task: Task::Inspect,
+        outcome: if verdict.good { Outcome::Clean } else { Outcome::NotGood },
+        input: facts,
+        output: None,
+        profile: profile.clone(),
+        limits: limits.clone(),
+        tolerances: tolerances(&diagnosis),
+        before: diagnosis.defects,
+        after: None,
+        repairs: Vec::new(),
+        loops_left: Vec::new(),
+        edit: EditSummary::default(),
+        edit_records: None,
+        verdict,
+        cost: clock.cost(mesh.records().len() as u64),
+        stages: clock.stages,
+    })
+}
+
+/// Opens a mesh file with the spool where the limits say, or beside `default`.
+pub(crate) fn open(input: &Path, default: Option<&Path>, limits: &Limits, progress: &dyn Progress) -> Result<MeshFile> {
+    let temporary = std::env::temp_dir();
+    let spool = limits.spool.as_deref().or(default.filter(|p| !p.as_os_str().is_empty())).unwrap_or(&temporary);
+    in_pool(limits, || MeshFile::open(input, spool, limits, progress))
+}
+
+/// Runs `work` on a rayon pool of as many threads as the limits allow.
+pub(crate) fn in_pool<R: Send>(limits: &Limits, work: impl FnOnce() -> R + Send) -> R {
+    match rayon::ThreadPoolBuilder::new().num_threads(limits.threads).build() {
+        Ok(pool) => pool.install(work),
+        // No threads to be had: the caller's own will do.
+        Err(_) => work(),
+    }
+}
+
+/// What makes the file itself less than flawless.
+pub(crate) fn flaws(mesh: &MeshFile) -> Vec<String> {
+    mesh.findings().iter().filter(|f| !f.harmless).map(|f| f.text.clone()).collect()
+}
+
+pub(crate) fn facts(mesh: &MeshFile, limits: &Limits) -> FileFacts {
+    FileFacts {
+        path: mesh.path().into(),
+        bytes: mesh.byte_len(),
+        blake3: hash(mesh.bytes(), limits),
+        format: mesh.format(),
+        triangles: mesh.records().len() as u64,
+        findings: mesh.findings().iter().map(|f| f.text.clone()).collect(),
+    }
+}
+
+fn hash(bytes: &[u8], limits: &Limits) -> String {
+    in_pool(limits, || blake3::Hasher::new().update_rayon(bytes).finalize().to_hex().to_string())
+}
+
+pub(crate) fn tolerances(diagnosis: &Diagnosis<'_>) -> Tolerances {
+    let Tolerance { weld, edge_share } = diagnosis.tolerance;
+    Tolerances {
+        diagonal: diagnosis.survey.bounds.diagonal(),
+        weld,
+        weld_reason: if weld > 0.0 {
+            format!("a share of the diagonal, at least four f32 steps of the largest coordinate, at most {edge_share} of the shortest edge at a vertex")
+        } else {
+            "switched off by the profile".into()
+        },
+    }
+}

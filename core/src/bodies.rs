@@ -57,8 +57,7 @@ pub(crate) fn surroundings(survey: &Survey<'_>, shop: &Shop, components: &Compon
     for t in shop.living() {
         let component = components.of_triangle[t as usize];
         if asked[component as usize] {
-            let sign = if reversed.triangles[t as usize] { -1 } else { 1 };
-            grid.cross(&rays, &shop.points(t), component, &mut |at, w| counts[at as usize] += sign * w);
+            grid.cross(&rays, &shop.points(t), component, &mut |at, w| counts[at as usize] += w);
         }
     }
     let mut at = 0;

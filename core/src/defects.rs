@@ -12,7 +12,7 @@ use crate::survey::Survey;
 
 /// All counts of one file. The workshop must be as gathered.
 pub(crate) fn count(survey: &Survey<'_>, shop: &Shop, edges: &Edges, tolerance: &Tolerance) -> Defects {
-    let reversed = Reversed::none(survey, shop);
+    let reversed = Reversed::none(survey);
     let components = Components::of(survey, shop, edges, &reversed, Through::EveryEdge);
     let degenerate_index = shop.triangles.len() as u64 - shop.living().count() as u64;
     let (duplicates_same, duplicates_opposite) = duplicates(shop);

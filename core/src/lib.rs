@@ -18,6 +18,7 @@ pub mod read;
 pub mod record;
 pub mod report;
 pub mod settings;
+mod repair;
 mod shop;
 mod sums;
 mod survey;

@@ -3,6 +3,7 @@
 //! What comes out does not depend on the chunks: the suspects (all triangles around unsound vertices), and the patches of sound
 //! surface, numbered by their smallest triangle. Everything global is proportional to the seams and the defects, not to the file.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use crate::chunk::{self, ChunkTopology, Labels, Link, NONE, Patch, Scratch, Suspect};
@@ -11,7 +12,7 @@ use crate::members::Members;
 use crate::plan::{ChunkId, Plan};
 use crate::record::{self, Record};
 use crate::settings::Limits;
-use crate::sums::{Bounds, Measure};
+use crate::sums::{Bounds, Extent, Measure};
 use crate::{Progress, parallel};
 
 /// Topology of the sound part of a file, and the list of what is not sound.
@@ -124,20 +125,39 @@ impl<'a> Survey<'a> {
         })
     }
 
-    /// All triangles with a corner at one of `positions`, ascending: the complete stars of these vertices. Reads the chunks
-    /// where they are at home.
-    pub(crate) fn stars_of(&self, positions: &std::collections::HashSet<[u32; 3]>) -> Vec<u32> {
-        let mut homes: Vec<ChunkId> = positions.iter().map(|p| self.plan.home(p.map(f32::from_bits))).collect();
+    /// Makes suspects of all triangles around the sound vertices at `positions` (not empty), and returns the new ones, ascending.
+    /// Reads the chunks where the vertices are at home.
+    pub(crate) fn promote(&mut self, positions: &[[f32; 3]]) -> Vec<(Suspect, u32)> {
+        let wanted: HashSet<[u32; 3]> = positions.iter().map(|p| key(*p)).collect();
+        let mut homes: Vec<ChunkId> = positions.iter().map(|p| self.plan.home(*p)).collect();
         homes.sort_unstable();
         homes.dedup();
         let found = parallel::map(self.threads, homes.len(), |i| {
-            let inside = |t: &u32| record::corners(&self.records[*t as usize]).iter().any(|p| positions.contains(&key(*p)));
-            self.members.triangles(homes[i]).filter(inside).collect::<Vec<u32>>()
+            let c = homes[i].0 as usize;
+            let merged = &self.merged[self.bases[c] as usize..self.bases[c + 1] as usize];
+            let members = self.members.triangles(homes[i]).zip(self.labels[c].iter());
+            members
+                .filter_map(|(triangle, patch)| {
+                    let corners = record::corners(&self.records[triangle as usize]);
+                    let unsound = (0..3).filter(|k| wanted.contains(&key(corners[*k]))).fold(0, |mask, k| mask | 1 << k);
+                    (unsound != 0).then(|| (Suspect { triangle, unsound }, if patch == NONE { NONE } else { merged[patch as usize] }))
+                })
+                .collect::<Vec<_>>()
         });
-        let mut all: Vec<u32> = found.into_iter().flatten().collect();
+        let mut new: Vec<(Suspect, u32)> = found.into_iter().flatten().collect();
+        new.sort_unstable();
+        new.dedup_by_key(|(s, _)| s.triangle);
+        new.retain(|(s, _)| self.suspects.binary_search_by_key(&s.triangle, |t| t.triangle).is_err());
+        for (suspect, patch) in &new {
+            let sum = &mut self.patches[*patch as usize];
+            let extent = self.measure.triangle(&record::corners(&self.records[suspect.triangle as usize])).0;
+            sum.triangles -= 1;
+            sum.extent += Extent { area: -extent.area, volume: -extent.volume };
+        }
+        let mut all: Vec<(Suspect, u32)> = self.suspects.iter().copied().zip(self.suspect_patches.iter().copied()).chain(new.iter().copied()).collect();
         all.sort_unstable();
-        all.dedup();
-        all
+        (self.suspects, self.suspect_patches) = all.into_iter().unzip();
+        new
     }
 
     /// Bytes held.
@@ -148,7 +168,7 @@ impl<'a> Survey<'a> {
 }
 
 /// A position as a map key: exact, −0.0 and 0.0 being one.
-pub(crate) fn key(p: [f32; 3]) -> [u32; 3] {
+fn key(p: [f32; 3]) -> [u32; 3] {
     p.map(|x| (x + 0.0).to_bits())
 }
 

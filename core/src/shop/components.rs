@@ -6,18 +6,15 @@ use crate::chunk::{self, NONE};
 use crate::sums::{Bounds, Extent};
 use crate::survey::Survey;
 
-/// Which pieces of surface are reversed, against how they stand in the shop or in the file.
+/// Which patches of sound surface are reversed, against how they stand in the file. Triangles of the shop are turned in place.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Reversed {
-    /// By patch.
     pub(crate) patches: Vec<bool>,
-    /// By triangle of the shop.
-    pub(crate) triangles: Vec<bool>,
 }
 
 impl Reversed {
-    pub(crate) fn none(survey: &Survey<'_>, shop: &Shop) -> Self {
-        Self { patches: vec![false; survey.patches.len()], triangles: vec![false; shop.triangles.len()] }
+    pub(crate) fn none(survey: &Survey<'_>) -> Self {
+        Self { patches: vec![false; survey.patches.len()] }
     }
 }
 
@@ -86,15 +83,15 @@ impl Components {
             into.extent += turned(sum.extent, reversed.patches[p as usize]);
         }
         for t in shop.living() {
-            let c = all.number(&mut numbers, chunk::find(&mut parents, patches + t), shop_sample(shop, t));
+            let c = all.number(&mut numbers, chunk::find(&mut parents, patches + t), Sample { record: shop.record(t), in_shop: Some(t) });
             all.of_triangle[t as usize] = c;
             let points = shop.points(t);
             let into = &mut all.list[c as usize];
             into.triangles += 1;
             into.bounds.include(&points);
-            into.extent += turned(survey.measure.triangle(&points).0, reversed.triangles[t as usize]);
+            into.extent += survey.measure.triangle(&points).0;
         }
-        for edge in edges.iter().filter(|e| is_open(e, reversed)) {
+        for edge in edges.iter().filter(|e| e.is_unbalanced()) {
             for used in edge.uses {
                 all.list[all.of_triangle[used.triangle as usize] as usize].open = true;
             }
@@ -114,20 +111,8 @@ impl Components {
     }
 }
 
-fn shop_sample(shop: &Shop, t: u32) -> Sample {
-    let record = match shop.triangles[t as usize].origin {
-        super::Origin::Input(record) | super::Origin::Part(record) => record,
-        super::Origin::Patch => NONE,
-    };
-    Sample { record, in_shop: Some(t) }
-}
 
-fn is_open(edge: &super::edges::Edge<'_>, reversed: &Reversed) -> bool {
-    let forward = edge.uses.iter().filter(|u| u.forward != reversed.triangles[u.triangle as usize]).count();
-    forward * 2 != edge.uses.len()
-}
-
-pub(crate) fn turned(extent: Extent, reversed: bool) -> Extent {
+fn turned(extent: Extent, reversed: bool) -> Extent {
     if reversed { Extent { volume: -extent.volume, ..extent } } else { extent }
 }
 

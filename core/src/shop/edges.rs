@@ -105,6 +105,11 @@ impl Edges {
 
     /// The edge between two vertices, if it has a complete end and a triangle.
     pub(crate) fn between(&self, a: Vertex, b: Vertex) -> Option<Edge<'_>> {
-        self.ends.binary_search(&(a.min(b), a.max(b))).ok().map(|i| self.get(i))
+        self.number(a, b).map(|i| self.get(i as usize))
+    }
+
+    /// Its number.
+    pub(crate) fn number(&self, a: Vertex, b: Vertex) -> Option<u32> {
+        self.ends.binary_search(&(a.min(b), a.max(b))).ok().map(|i| i as u32)
     }
 }

@@ -8,7 +8,9 @@ pub(crate) mod components;
 pub(crate) mod edges;
 pub(crate) mod near;
 
-use crate::chunk::NONE;
+use std::collections::HashMap;
+
+use crate::chunk::{NONE, Suspect};
 use crate::record::{self, Record};
 use crate::survey::Survey;
 use crate::weld::Weld;
@@ -71,6 +73,25 @@ impl Shop {
         shop
     }
 
+    /// Takes in what [`Survey::promote`] has found for some of its incomplete vertices, which become complete.
+    pub(crate) fn extend(&mut self, survey: &Survey<'_>, new: &[(Suspect, u32)], completed: &[Vertex]) {
+        let mut known: HashMap<[u32; 3], Vertex> =
+            self.positions.iter().enumerate().map(|(v, p)| (p.map(f32::to_bits), v as Vertex)).collect();
+        for (suspect, patch) in new {
+            let v = corners(survey.records, suspect.triangle).map(|p| {
+                let position = p.map(|x| x + 0.0);
+                *known.entry(position.map(f32::to_bits)).or_insert_with(|| {
+                    self.positions.push(position);
+                    self.complete.push(false);
+                    self.positions.len() as Vertex - 1
+                })
+            });
+            self.triangles.push(Triangle { v, origin: Origin::Input(suspect.triangle), patch: *patch, alive: true });
+        }
+        completed.iter().for_each(|v| self.complete[*v as usize] = true);
+        self.relink();
+    }
+
     /// Builds the star lists anew, dropping what is dead. Lists run from the last triangle to the first.
     pub(crate) fn relink(&mut self) {
         self.heads.clear();
@@ -107,6 +128,14 @@ impl Shop {
 
     pub(crate) fn points(&self, t: u32) -> [[f32; 3]; 3] {
         self.triangles[t as usize].v.map(|v| self.positions[v as usize])
+    }
+
+    /// The record `t` comes from; past all records for a new triangle.
+    pub(crate) fn record(&self, t: u32) -> u32 {
+        match self.triangles[t as usize].origin {
+            Origin::Input(record) | Origin::Part(record) => record,
+            Origin::Patch => NONE,
+        }
     }
 
     /// Living triangles with three distinct vertices, by number.

@@ -126,6 +126,11 @@ fn project(p: [f32; 3], a: [f32; 3], b: [f32; 3]) -> (f64, f64) {
     (at, off.sqrt())
 }
 
+/// Distance of `p` from the segment a–b.
+pub(crate) fn distance_to_line(p: [f32; 3], a: [f32; 3], b: [f32; 3]) -> f64 {
+    project(p, a, b).1
+}
+
 /// The box around some points, wider by `by` on all sides.
 fn around(points: &[[f32; 3]], by: f64) -> Bounds {
     let mut b = Bounds::EMPTY;

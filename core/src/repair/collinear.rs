@@ -1,0 +1,72 @@
+//! Triangles of no area on three distinct vertices: removed, and the T-junction they covered closed (METHODS A1, C3).
+//!
+//! Such a triangle lies along its longest edge, with the third vertex inside it. Every other triangle at the long edge is split at
+//! that vertex, which closes the surface without moving anything; dropping the triangle alone would open it.
+
+use crate::defects;
+use crate::shop::{Origin, Shop};
+use crate::survey::Survey;
+
+/// Removes collinear triangles; returns how many.
+pub(super) fn remove(survey: &Survey<'_>, shop: &mut Shop) -> u64 {
+    let mut left: Vec<u32> = shop.living().filter(|t| defects::is_collinear(survey, shop, *t)).collect();
+    let mut removed = 0;
+    // Each round takes those whose neighbours are not collinear themselves; a chain unravels from its end.
+    while !left.is_empty() {
+        let before = left.len();
+        left.retain(|t| !try_remove(survey, shop, *t, false));
+        if left.len() == before {
+            // A knot of collinear triangles only: any one may go first.
+            let t = left.remove(0);
+            try_remove(survey, shop, t, true);
+        }
+        removed += (before - left.len()) as u64;
+    }
+    removed
+}
+
+/// Removes `t` unless a triangle at its long edge is collinear, too, and `force` is off.
+fn try_remove(survey: &Survey<'_>, shop: &mut Shop, t: u32, force: bool) -> bool {
+    if !shop.triangles[t as usize].alive {
+        return true;
+    }
+    let v = shop.triangles[t as usize].v;
+    let length = |k: usize| shop.distance(v[k], v[(k + 1) % 3]);
+    let long = (1..3).fold(0, |best, k| if length(k) > length(best) { k } else { best });
+    let (a, b, middle) = (v[long], v[(long + 1) % 3], v[(long + 2) % 3]);
+    let others: Vec<u32> =
+        shop.star(a).map(|(o, _)| o).filter(|o| *o != t && shop.triangles[*o as usize].v.contains(&b)).collect();
+    if !force && others.iter().any(|o| defects::is_collinear(survey, shop, *o)) {
+        return false;
+    }
+    shop.kill(t);
+    for o in others {
+        split(shop, o, [a, b], &[middle]);
+    }
+    true
+}
+
+/// Splits triangle `t` at vertices on its edge between `ends`, given in order from `ends[0]` to `ends[1]`, into a fan from the
+/// opposite corner. Vertices that are the opposite corner are left out.
+pub(super) fn split(shop: &mut Shop, t: u32, ends: [u32; 2], at: &[u32]) {
+    let triangle = shop.triangles[t as usize];
+    let Some(k) = (0..3).find(|k| !ends.contains(&triangle.v[*k])) else { return };
+    let (apex, from, to) = (triangle.v[k], triangle.v[(k + 1) % 3], triangle.v[(k + 2) % 3]);
+    let mut stops: Vec<u32> = at.iter().copied().filter(|v| *v != apex).collect();
+    if from == ends[1] {
+        stops.reverse();
+    }
+    if stops.is_empty() {
+        return;
+    }
+    shop.kill(t);
+    let origin = match triangle.origin {
+        Origin::Input(record) | Origin::Part(record) => Origin::Part(record),
+        Origin::Patch => Origin::Patch,
+    };
+    let mut last = from;
+    for next in stops.into_iter().chain([to]) {
+        shop.add([apex, last, next], origin, triangle.patch);
+        last = next;
+    }
+}

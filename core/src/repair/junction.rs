@@ -1,0 +1,45 @@
+//! Non-common vertices (T-junctions): the triangle whose edge a vertex lies on is split there (METHODS C3, S1's rule, which keeps
+//! every position).
+
+use super::collinear;
+use crate::shop::Shop;
+use crate::shop::edges::Edges;
+use crate::shop::near::{self, OnEdge, Tolerance};
+
+/// Splits boundary edges at the vertices that lie on them; returns how many vertices that were.
+pub(super) fn split_edges(shop: &mut Shop, tolerance: &Tolerance) -> u64 {
+    let edges = Edges::of(shop);
+    let on = near::noncommon_vertices(shop, &edges, tolerance);
+    let mut count = 0;
+    for group in on.chunk_by(|a, b| a.edge == b.edge) {
+        let edge = edges.get(group[0].edge as usize);
+        let t = edge.uses[0].triangle;
+        if !shop.triangles[t as usize].alive {
+            continue;
+        }
+        let stops: Vec<u32> = admissible(shop, t, [edge.low, edge.high], group);
+        count += stops.len() as u64;
+        collinear::split(shop, t, [edge.low, edge.high], &stops);
+    }
+    count
+}
+
+/// The vertices that may be joined to the opposite corner: the triangle is high enough not to be turned over, and the new edge
+/// does not exist yet.
+fn admissible(shop: &Shop, t: u32, ends: [u32; 2], group: &[OnEdge]) -> Vec<u32> {
+    let Some(apex) = shop.triangles[t as usize].v.into_iter().find(|v| !ends.contains(v)) else { return Vec::new() };
+    let height = near::distance_to_line(
+        shop.positions[apex as usize],
+        shop.positions[ends[0] as usize],
+        shop.positions[ends[1] as usize],
+    );
+    let mut stops: Vec<u32> = Vec::new();
+    let mut last_at = f64::NEG_INFINITY;
+    for on in group {
+        if on.distance * 4.0 < height && on.at > last_at && !shop.has_edge(on.vertex, apex) {
+            stops.push(on.vertex);
+            last_at = on.at;
+        }
+    }
+    stops
+}

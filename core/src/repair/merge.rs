@@ -1,0 +1,123 @@
+//! Merging of boundary vertices that lie within the weld tolerance of each other (METHODS C2, C3; tolerance weld as in
+//! ALGORITHMS 2.3: connected components of the ε-graph, bounded in extent).
+//!
+//! A merge that would leave a new non-manifold edge is taken back.
+
+use crate::chunk;
+use crate::shop::edges::Edges;
+use crate::shop::near::{self, Tolerance};
+use crate::shop::{Shop, Vertex};
+
+/// What the weld did.
+#[derive(Debug, Default)]
+pub(super) struct Welded {
+    pub(super) vertices: u64,
+    pub(super) taken_back: u64,
+}
+
+/// How often clusters that made a defect are taken out and the rest tried again.
+const ATTEMPTS: usize = 4;
+
+/// Welds boundary vertices. O(n log n) in the boundary.
+pub(super) fn weld(shop: &mut Shop, tolerance: &Tolerance) -> Welded {
+    let edges = Edges::of(shop);
+    let mut clusters = clusters(shop, &near::close_pairs(shop, &edges, tolerance), tolerance.weld);
+    let mut result = Welded::default();
+    let before = shop.triangles.clone();
+    for _ in 0..ATTEMPTS {
+        if clusters.is_empty() {
+            return result;
+        }
+        let target = targets(shop, &clusters);
+        for triangle in &mut shop.triangles {
+            triangle.v = triangle.v.map(|v| target[v as usize]);
+        }
+        super::duplicates::drop_repeated(shop);
+        shop.relink();
+        super::duplicates::drop_duplicates(shop);
+        let bad = newly_nonmanifold(shop, &edges, &clusters, &target);
+        if !bad.iter().any(|b| *b) {
+            result.vertices = clusters.iter().map(|c| c.len() as u64 - 1).sum();
+            return result;
+        }
+        shop.triangles.clone_from(&before);
+        shop.relink();
+        result.taken_back += bad.iter().filter(|b| **b).count() as u64;
+        let mut bad = bad.into_iter();
+        clusters.retain(|_| !bad.next().unwrap_or(false));
+    }
+    result
+}
+
+/// Connected components of the pairs. One wider than four tolerances is cut up greedily, in order of vertex number.
+fn clusters(shop: &Shop, pairs: &[(Vertex, Vertex)], tolerance: f64) -> Vec<Vec<Vertex>> {
+    let mut vertices: Vec<Vertex> = pairs.iter().flat_map(|(a, b)| [*a, *b]).collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    let number = |v: Vertex| vertices.binary_search(&v).unwrap_or(0) as u32;
+    let mut parents: Vec<u32> = (0..vertices.len() as u32).collect();
+    for (a, b) in pairs {
+        chunk::unite(&mut parents, number(*a), number(*b));
+    }
+    let mut by_root: Vec<(u32, Vertex)> = (0..vertices.len() as u32).map(|i| (chunk::find(&mut parents, i), vertices[i as usize])).collect();
+    by_root.sort_unstable();
+    let mut all = Vec::new();
+    for group in by_root.chunk_by(|a, b| a.0 == b.0) {
+        let mut rest: Vec<Vertex> = group.iter().map(|g| g.1).collect();
+        while let Some(first) = rest.first().copied() {
+            // A component that hangs together within the bound is taken whole: its first vertex then reaches all of it.
+            let (near, far): (Vec<Vertex>, Vec<Vertex>) = rest.iter().partition(|v| shop.distance(first, **v) <= 2.0 * tolerance);
+            if near.len() > 1 && !share_a_triangle(shop, &near) {
+                all.push(near);
+                rest = far;
+            } else {
+                rest.remove(0);
+            }
+        }
+    }
+    all.sort_unstable();
+    all
+}
+
+/// Two of them are corners of one triangle, which would lose its area.
+fn share_a_triangle(shop: &Shop, cluster: &[Vertex]) -> bool {
+    cluster.iter().any(|v| {
+        shop.star(*v).any(|(t, _)| shop.triangles[t as usize].v.iter().filter(|w| cluster.binary_search(w).is_ok()).count() > 1)
+    })
+}
+
+/// Where each vertex goes: to the one of its cluster with most triangles, the smallest of equals.
+fn targets(shop: &Shop, clusters: &[Vec<Vertex>]) -> Vec<Vertex> {
+    let mut target: Vec<Vertex> = (0..shop.positions.len() as u32).collect();
+    for cluster in clusters {
+        let chosen = cluster.iter().copied().min_by_key(|v| (std::cmp::Reverse(shop.star(*v).count()), *v)).unwrap_or(0);
+        cluster.iter().for_each(|v| target[*v as usize] = chosen);
+    }
+    target
+}
+
+/// Clusters at an edge of more than two triangles that was not one before.
+fn newly_nonmanifold(shop: &Shop, before: &Edges, clusters: &[Vec<Vertex>], target: &[Vertex]) -> Vec<bool> {
+    let mut cluster_of = vec![chunk::NONE; target.len()];
+    for (i, cluster) in clusters.iter().enumerate() {
+        cluster.iter().for_each(|v| cluster_of[*v as usize] = i as u32);
+    }
+    let mut old: Vec<(Vertex, Vertex)> = before
+        .iter()
+        .filter(|e| e.is_nonmanifold())
+        .map(|e| (target[e.low as usize], target[e.high as usize]))
+        .map(|(a, b)| (a.min(b), a.max(b)))
+        .collect();
+    old.sort_unstable();
+    let mut bad = vec![false; clusters.len()];
+    for edge in Edges::of(shop).iter().filter(|e| e.is_nonmanifold()) {
+        if old.binary_search(&(edge.low, edge.high)).is_err() {
+            for v in [edge.low, edge.high] {
+                if let Some(b) = bad.get_mut(cluster_of[v as usize] as usize) {
+                    *b = true;
+                }
+            }
+        }
+    }
+    bad
+}

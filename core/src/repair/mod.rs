@@ -1,0 +1,122 @@
+//! All repairs of one file, in their order, on its workshop. What comes out is an edit against the input.
+//!
+//! Weld and splits change stars, so components, orientation and loops come after them; the surface is filled before it is decided
+//! what is outward, since the signed volume of an open surface depends on the origin.
+
+mod close;
+mod collinear;
+mod duplicates;
+mod junction;
+mod loops;
+mod merge;
+mod orient;
+mod surplus;
+
+use std::time::Instant;
+
+use crate::engine::Diagnosis;
+use crate::report::{LoopLeft, Repair};
+use crate::settings::Profile;
+use crate::shop::Shop;
+use crate::shop::components::Reversed;
+use crate::shop::edges::Edges;
+
+/// What the repairs did; the mesh itself is in the diagnosis' shop.
+pub(crate) struct Repaired {
+    pub(crate) reversed: Reversed,
+    pub(crate) repairs: Vec<Repair>,
+    pub(crate) loops_left: Vec<LoopLeft>,
+}
+
+/// Rounds of weld, split and clean-up: each round can uncover work for the next. A count, so that results do not depend on time.
+const ROUNDS: usize = 4;
+
+/// Repairs what the profile allows.
+pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile) -> Repaired {
+    let mut log = Log::default();
+    let mut reversed = Reversed::none(&diagnosis.survey);
+    complete_at_seams(diagnosis);
+    let Diagnosis { survey, shop, tolerance, .. } = diagnosis;
+    for _ in 0..ROUNDS {
+        let mut changes = clean(survey, shop, &mut log);
+        changes += log.time("tolerance_weld", "boundary vertices within the weld tolerance, moved to the one with most triangles", || {
+            let welded = merge::weld(shop, tolerance);
+            if welded.taken_back > 0 {
+                tracing::info!(clusters = welded.taken_back, "Welds taken back, since they made an edge of more than two triangles.");
+            }
+            welded.vertices
+        });
+        changes += clean(survey, shop, &mut log);
+        changes += log.time("t_junction", "vertices inside a neighbour's edge, which was split there", || junction::split_edges(shop, tolerance));
+        if changes == 0 {
+            break;
+        }
+    }
+    log.time("orient", "triangles turned to agree with their neighbours", || orient::make_coherent(survey, shop, &mut reversed).triangles);
+    let diagonal = survey.bounds.diagonal();
+    let mut loops_left = Vec::new();
+    let mut methods = String::new();
+    log.time("fill", "", || {
+        let closed = close::fill_loops(shop, profile, diagonal);
+        loops_left = closed.left;
+        let parts: Vec<String> = closed.by_method.iter().map(|(name, count)| format!("{count} {name}")).collect();
+        methods = format!("loops closed: {}", parts.join(", "));
+        closed.loops
+    });
+    log.note("fill", methods);
+    log.time("outward", "components that were inside out", || orient::make_outward(survey, shop, &mut reversed).0);
+    Repaired { reversed, repairs: log.repairs, loops_left }
+}
+
+/// Fetches the stars that the removal of surplus surface may need.
+fn complete_at_seams(diagnosis: &mut Diagnosis<'_>) {
+    let wanted = surplus::wanted_stars(&diagnosis.shop, &diagnosis.edges);
+    if !wanted.is_empty() {
+        let positions: Vec<[f32; 3]> = wanted.iter().map(|v| diagnosis.shop.positions[*v as usize]).collect();
+        let new = diagnosis.survey.promote(&positions);
+        diagnosis.shop.extend(&diagnosis.survey, &new, &wanted);
+        diagnosis.edges = Edges::of(&diagnosis.shop);
+    }
+}
+
+/// Removes what is not surface: repeated vertices, duplicates, triangles of no area, surplus sheets.
+fn clean(survey: &crate::survey::Survey<'_>, shop: &mut Shop, log: &mut Log) -> u64 {
+    let mut changes = log.time("degenerate", "triangles without area removed, their T-junctions closed", || {
+        duplicates::drop_repeated(shop) + collinear::remove(survey, shop)
+    });
+    changes += log.time("duplicate", "triangles on the vertices of another one", || duplicates::drop_duplicates(shop));
+    changes += log.time("surplus", "triangles of sheets that hang from a closed surface or cross a body", || surplus::remove(survey, shop));
+    changes
+}
+
+/// What was done, by name, in order of first use.
+#[derive(Default)]
+struct Log {
+    repairs: Vec<Repair>,
+}
+
+impl Log {
+    /// Times `work`, which returns how much it did, and adds it up under `name`.
+    fn time(&mut self, name: &str, note: &str, work: impl FnOnce() -> u64) -> u64 {
+        let span = tracing::debug_span!("repair", name).entered();
+        let start = Instant::now();
+        let count = work();
+        drop(span);
+        let seconds = start.elapsed().as_secs_f64();
+        match self.repairs.iter_mut().find(|r| r.name == name) {
+            Some(repair) => {
+                repair.count += count;
+                repair.seconds += seconds;
+            }
+            None if count > 0 => self.repairs.push(Repair { name: name.into(), count, note: note.into(), seconds }),
+            None => {}
+        }
+        count
+    }
+
+    fn note(&mut self, name: &str, note: String) {
+        if let Some(repair) = self.repairs.iter_mut().find(|r| r.name == name) {
+            repair.note = note;
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! Coherent orientation over shared edges, then outward by enclosed volume, cavities inward (METHODS A9).
+
+use crate::bodies;
+use crate::chunk::NONE;
+use crate::shop::Shop;
+use crate::shop::components::{Components, Reversed, Through};
+use crate::shop::edges::Edges;
+use crate::survey::Survey;
+
+/// Union-find with the parity of each node against its root.
+struct Parity {
+    parents: Vec<u32>,
+    odd: Vec<bool>,
+}
+
+impl Parity {
+    fn new(nodes: usize) -> Self {
+        Self { parents: (0..nodes as u32).collect(), odd: vec![false; nodes] }
+    }
+
+    /// Root and parity against it. The path is made flat.
+    fn find(&mut self, node: u32) -> (u32, bool) {
+        let (mut root, mut odd) = (node, false);
+        while self.parents[root as usize] != root {
+            odd ^= self.odd[root as usize];
+            root = self.parents[root as usize];
+        }
+        let (mut at, mut rest) = (node, odd);
+        while self.parents[at as usize] != root && at != root {
+            let (up, own) = (self.parents[at as usize], self.odd[at as usize]);
+            self.parents[at as usize] = root;
+            self.odd[at as usize] = rest;
+            rest ^= own;
+            at = up;
+        }
+        (root, odd)
+    }
+
+    /// Says that two nodes agree, or not; `false` if that contradicts what was said before.
+    fn relate(&mut self, a: u32, b: u32, disagree: bool) -> bool {
+        let ((ra, pa), (rb, pb)) = (self.find(a), self.find(b));
+        let odd = pa ^ pb ^ disagree;
+        if ra == rb {
+            return !odd;
+        }
+        self.parents[ra.max(rb) as usize] = ra.min(rb);
+        self.odd[ra.max(rb) as usize] = odd;
+        true
+    }
+}
+
+/// What was turned.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Turned {
+    pub(super) triangles: u64,
+    /// Edges that no orientation satisfies (a Möbius strip has one).
+    pub(super) contradictions: u64,
+}
+
+/// Makes two-triangle edges agree: in each connected surface the smaller part is turned, of equal parts the one with the later
+/// triangle. O(patches + workshop).
+pub(super) fn make_coherent(survey: &Survey<'_>, shop: &mut Shop, reversed: &mut Reversed) -> Turned {
+    let edges = Edges::of(shop);
+    let patches = survey.patches.len() as u32;
+    let mut parity = Parity::new(survey.patches.len() + shop.triangles.len());
+    for t in shop.living() {
+        let patch = shop.triangles[t as usize].patch;
+        if patch != NONE {
+            parity.relate(patch, patches + t, false);
+        }
+    }
+    let mut turned = Turned::default();
+    for edge in edges.iter() {
+        if let [a, b] = edge.uses
+            && !parity.relate(patches + a.triangle, patches + b.triangle, edge.is_inconsistent())
+        {
+            turned.contradictions += 1;
+        }
+    }
+    // Triangles on each side of each root, and the smallest record there.
+    let nodes: Vec<(u32, u64, u32)> = (0..patches)
+        .map(|p| (p, survey.patches[p as usize].triangles, survey.patches[p as usize].first))
+        .chain(shop.living().map(|t| (patches + t, 1, shop.record(t))))
+        .collect();
+    let mut sides = vec![[(0u64, NONE); 2]; parity.parents.len()];
+    for (node, triangles, record) in &nodes {
+        let (root, odd) = parity.find(*node);
+        let side = &mut sides[root as usize][usize::from(odd)];
+        side.0 += triangles;
+        side.1 = side.1.min(*record);
+    }
+    for (node, triangles, _) in nodes {
+        let (root, odd) = parity.find(node);
+        let [even_side, odd_side] = sides[root as usize];
+        let odd_wins = odd_side.0 > even_side.0 || (odd_side.0 == even_side.0 && odd_side.1 < even_side.1);
+        if odd != odd_wins {
+            turned.triangles += triangles;
+            turn(survey, shop, reversed, node);
+        }
+    }
+    turned
+}
+
+/// Turns a node of the parity structure: a patch or a triangle of the workshop.
+fn turn(survey: &Survey<'_>, shop: &mut Shop, reversed: &mut Reversed, node: u32) {
+    match node.checked_sub(survey.patches.len() as u32) {
+        None => reversed.patches[node as usize] ^= true,
+        Some(t) => shop.triangles[t as usize].v.swap(1, 2),
+    }
+}
+
+/// Turns closed components inside out where they enclose negative volume and are no cavity; returns (components, triangles).
+pub(super) fn make_outward(survey: &Survey<'_>, shop: &mut Shop, reversed: &mut Reversed) -> (u64, u64) {
+    let edges = Edges::of(shop);
+    // Bodies that touch along an edge are turned each for itself.
+    let components = Components::of(survey, shop, &edges, reversed, Through::ManifoldEdges);
+    if components.list.iter().all(|c| c.open || c.extent.volume >= 0) {
+        return (0, 0);
+    }
+    let inverted = inverted(survey, shop, &components, reversed);
+    let (mut count, mut triangles) = (0, 0);
+    for (component, _) in components.list.iter().zip(&inverted).filter(|(_, i)| **i) {
+        count += 1;
+        triangles += component.triangles;
+    }
+    for (p, component) in components.of_patch.iter().enumerate() {
+        reversed.patches[p] ^= inverted[*component as usize];
+    }
+    for (t, component) in components.of_triangle.iter().enumerate() {
+        if *component != NONE && inverted[*component as usize] {
+            shop.triangles[t].v.swap(1, 2);
+        }
+    }
+    (count, triangles)
+}
+
+/// Which components are inside out: from the outside in, one of negative volume that no body winds around. One that was coherent
+/// with an inverted component around it (of opposite sign: its cavity) is turned along.
+fn inverted(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed: &Reversed) -> Vec<bool> {
+    let list = &components.list;
+    let around = bodies::surroundings(survey, shop, components, reversed);
+    let sign = |c: u32| list[c as usize].extent.volume.signum();
+    // What lies in fewer components is decided first.
+    let mut order: Vec<u32> = (0..list.len() as u32).filter(|c| !list[*c as usize].open).collect();
+    order.sort_by_key(|c| around[*c as usize].around.len());
+    let mut inverted = vec![false; list.len()];
+    for c in order {
+        let outer = &around[c as usize].around;
+        // The component directly around: itself inside most others.
+        let direct = outer.iter().map(|o| o.0).max_by_key(|o| (around[*o as usize].around.len(), std::cmp::Reverse(*o)));
+        let along = direct.is_some_and(|o| inverted[o as usize] && sign(o) == -sign(c));
+        let winding: i32 = outer.iter().map(|(o, w)| if inverted[*o as usize] { -w } else { *w }).sum();
+        let volume = if along { -sign(c) } else { sign(c) };
+        inverted[c as usize] = along ^ (volume < 0 && winding < 1);
+    }
+    inverted
+}

@@ -1,0 +1,128 @@
+//! Surplus surface at non-manifold edges (METHODS A3).
+//!
+//! The surface is cut at its non-manifold edges into sheets. A sheet is surplus when the rest is balanced at all its non-manifold
+//! edges without it: a fin that hangs from a sound surface by one side, or a wall across a body. Smallest area goes first, and the
+//! rest is judged anew. Where as many triangles run one way as the other (bodies that touch along an edge) nothing is surplus.
+
+use crate::chunk::NONE;
+use crate::shop::{Shop, Vertex};
+use crate::shop::components::{Components, Reversed, Through};
+use crate::shop::edges::Edges;
+use crate::survey::Survey;
+
+/// A sheet that ends at non-manifold edges.
+struct Sheet {
+    /// Twice its area, in the survey's units.
+    area: i128,
+    triangles: Vec<u32>,
+    /// Its non-manifold edges, each as often as it is used.
+    seams: Vec<u32>,
+    /// It has a boundary edge.
+    free: bool,
+    /// It reaches beyond what the workshop may change.
+    anchored: bool,
+}
+
+/// Removes surplus sheets; returns how many triangles.
+pub(super) fn remove(survey: &Survey<'_>, shop: &mut Shop) -> u64 {
+    let edges = Edges::of(shop);
+    if !edges.iter().any(|e| e.is_nonmanifold()) {
+        return 0;
+    }
+    let mut sheets = sheets(survey, shop, &edges);
+    let mut order: Vec<usize> = (0..sheets.len()).filter(|s| !sheets[*s].anchored && !sheets[*s].seams.is_empty()).collect();
+    order.sort_by_key(|s| (sheets[*s].area, sheets[*s].triangles.first().copied()));
+    // Uses of each edge that are left, in either direction.
+    let mut uses: Vec<[u32; 2]> = edges
+        .iter()
+        .map(|e| {
+            let forward = e.uses.iter().filter(|u| u.forward).count() as u32;
+            [forward, e.uses.len() as u32 - forward]
+        })
+        .collect();
+    let mut removed = 0;
+    for s in order {
+        let sheet = &mut sheets[s];
+        let mut without = Vec::new();
+        for t in &sheet.triangles {
+            without.extend(nonmanifold_uses(shop, &edges, *t));
+        }
+        if is_surplus(sheet, &uses, &without) {
+            without.iter().for_each(|(e, forward)| uses[*e as usize][usize::from(!forward)] -= 1);
+            sheet.triangles.iter().for_each(|t| shop.kill(*t));
+            removed += sheet.triangles.len() as u64;
+            sheet.triangles.clear();
+        }
+    }
+    removed
+}
+
+/// Is the surface closed at all the sheet's seams without it, and is something wrong with it there?
+fn is_surplus(sheet: &Sheet, uses: &[[u32; 2]], without: &[(u32, bool)]) -> bool {
+    let mut seams = sheet.seams.clone();
+    seams.sort_unstable();
+    seams.dedup();
+    let mut wrong = sheet.free;
+    for e in seams {
+        let [forward, backward] = uses[e as usize];
+        let own = |f: bool| without.iter().filter(|w| **w == (e, f)).count() as u32;
+        let (left_forward, left_backward) = (forward - own(true), backward - own(false));
+        if left_forward != left_backward || left_forward == 0 {
+            return false;
+        }
+        wrong |= forward != backward;
+    }
+    wrong
+}
+
+/// The triangle's edges of more than two triangles, and the direction in which it runs through them.
+fn nonmanifold_uses(shop: &Shop, edges: &Edges, t: u32) -> Vec<(u32, bool)> {
+    let v = shop.triangles[t as usize].v;
+    (0..3)
+        .filter_map(|k| {
+            let (a, b) = (v[k], v[(k + 1) % 3]);
+            let e = edges.number(a, b)?;
+            edges.get(e as usize).is_nonmanifold().then_some((e, a < b))
+        })
+        .collect()
+}
+
+fn sheets(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> Vec<Sheet> {
+    let parts = Components::of(survey, shop, edges, &Reversed::none(survey), Through::ManifoldEdges);
+    let mut sheets: Vec<Sheet> = parts
+        .list
+        .iter()
+        .map(|c| Sheet { area: c.extent.area, triangles: Vec::new(), seams: Vec::new(), free: false, anchored: false })
+        .collect();
+    for (p, component) in parts.of_patch.iter().enumerate() {
+        sheets[*component as usize].anchored |= survey.patches[p].triangles > 0;
+    }
+    for t in shop.living() {
+        let component = parts.of_triangle[t as usize];
+        if component != NONE {
+            let sheet = &mut sheets[component as usize];
+            sheet.triangles.push(t);
+            sheet.seams.extend(nonmanifold_uses(shop, edges, t).iter().map(|u| u.0));
+            // Beyond an incomplete vertex the surface goes on outside the workshop.
+            sheet.anchored |= shop.triangles[t as usize].v.iter().filter(|v| !shop.complete[**v as usize]).count() > 1;
+        }
+    }
+    for edge in edges.iter().filter(|e| e.is_boundary()) {
+        sheets[parts.of_triangle[edge.uses[0].triangle as usize] as usize].free = true;
+    }
+    sheets
+}
+
+/// Incomplete vertices of triangles at non-manifold edges: their stars are needed before anything is removed there.
+pub(super) fn wanted_stars(shop: &Shop, edges: &Edges) -> Vec<Vertex> {
+    let mut wanted: Vec<Vertex> = edges
+        .iter()
+        .filter(|e| e.is_nonmanifold())
+        .flat_map(|e| e.uses)
+        .flat_map(|u| shop.triangles[u.triangle as usize].v)
+        .filter(|v| !shop.complete[*v as usize])
+        .collect();
+    wanted.sort_unstable();
+    wanted.dedup();
+    wanted
+}

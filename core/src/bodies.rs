@@ -82,8 +82,11 @@ fn rays(survey: &Survey<'_>, shop: &Shop, list: &[Component]) -> Vec<Ray> {
     let mut rays = Vec::new();
     for (i, component) in closed.iter().enumerate() {
         tree.meeting(&boxes[i], &mut found);
-        let candidates: Vec<u32> =
-            found.iter().filter(|j| **j != i as u32 && boxes[**j as usize].contains(&boxes[i])).map(|j| closed[*j as usize]).collect();
+        let candidates: Vec<u32> = found
+            .iter()
+            .filter(|j| **j != i as u32 && boxes[**j as usize].contains(&boxes[i]))
+            .map(|j| closed[*j as usize])
+            .collect();
         if !candidates.is_empty() {
             let Sample { record, in_shop } = list[*component as usize].sample;
             let corners = in_shop.map_or_else(|| record::corners(&survey.records[record as usize]), |t| shop.points(t));
@@ -95,7 +98,7 @@ fn rays(survey: &Survey<'_>, shop: &Shop, list: &[Component]) -> Vec<Ray> {
 
 /// A point of a triangle, of no symmetry, so that it does not fall on grid lines that models are built on.
 fn inner_point(corners: &[[f32; 3]; 3]) -> [f64; 3] {
-    const WEIGHTS: [f64; 3] = [0.318_309_89, 0.367_879_44, 0.313_810_67];
+    const WEIGHTS: [f64; 3] = [0.318_411, 0.367_778, 0.313_811];
     std::array::from_fn(|k| (0..3).map(|i| WEIGHTS[i] * f64::from(corners[i][k])).sum())
 }
 

@@ -91,7 +91,14 @@ pub(crate) fn scratch_bytes(members: u64) -> u64 {
 
 impl Scratch {
     /// Decides everything that can be decided inside `chunk`. O(members).
-    pub(crate) fn solve(&mut self, records: &[Record], plan: &Plan, members: &Members, chunk: ChunkId, measure: &Measure) -> ChunkTopology {
+    pub(crate) fn solve(
+        &mut self,
+        records: &[Record],
+        plan: &Plan,
+        members: &Members,
+        chunk: ChunkId,
+        measure: &Measure,
+    ) -> ChunkTopology {
         self.weld(records, members, chunk, plan.home_box(chunk));
         self.mark_collinear(measure);
         self.judge_stars();

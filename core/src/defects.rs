@@ -18,15 +18,14 @@ pub(crate) fn count(survey: &Survey<'_>, shop: &Shop, edges: &Edges, tolerance: 
     let (duplicates_same, duplicates_opposite) = duplicates(shop);
     let uses: usize = edges.iter().map(|e| e.uses.len()).sum();
     let topology = survey.triangles() - degenerate_index;
-    let total = survey
-        .patches
-        .iter()
-        .map(|p| p.extent)
-        .chain(shop.living().map(|t| survey.measure.triangle(&shop.points(t)).0))
-        .fold(Extent::default(), |mut sum, e| {
-            sum += e;
-            sum
-        });
+    let total =
+        survey.patches.iter().map(|p| p.extent).chain(shop.living().map(|t| survey.measure.triangle(&shop.points(t)).0)).fold(
+            Extent::default(),
+            |mut sum, e| {
+                sum += e;
+                sum
+            },
+        );
     let mut defects = Defects {
         triangles: survey.triangles(),
         nonfinite: survey.records.len() as u64 - survey.triangles(),

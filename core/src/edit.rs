@@ -34,7 +34,8 @@ impl Edit {
     /// reversed patches.
     pub(crate) fn of(survey: &Survey<'_>, shop: &Shop, reversed: &Reversed) -> Self {
         let mut edit = Self::default();
-        edit.changes.extend(survey.nonfinite.iter().flat_map(|(first, count)| *first..*first + *count).map(|t| (t, Change::Delete)));
+        edit.changes
+            .extend(survey.nonfinite.iter().flat_map(|(first, count)| *first..*first + *count).map(|t| (t, Change::Delete)));
         for (i, triangle) in shop.triangles.iter().enumerate() {
             let points = || shop.points(i as u32);
             match triangle.origin {
@@ -89,11 +90,6 @@ impl Edit {
             (first..first + count).for_each(|t| self.flipped[t as usize / 64] |= 1 << (t % 64));
             self.flips += u64::from(count);
         }
-    }
-
-    /// Nothing changes.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.changes.is_empty() && self.added.is_empty() && self.flips == 0
     }
 
     /// Records in the output.

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
+use crate::edit::Edit;
 use crate::error::{Error, Result};
 use crate::read::MeshFile;
 use crate::report::{Cost, Defects, EditSummary, FileFacts, Outcome, Report, SCHEMA_VERSION, Stage, Task, Tolerances};
@@ -11,7 +12,7 @@ use crate::shop::edges::Edges;
 use crate::shop::near::Tolerance;
 use crate::shop::{self, Shop};
 use crate::survey::Survey;
-use crate::{Progress, cost, defects, verdict};
+use crate::{Progress, cost, defects, emit, repairs, verdict};
 
 /// What is spent by stage while a file is worked on.
 pub(crate) struct Clock {
@@ -58,13 +59,23 @@ pub(crate) struct Diagnosis<'a> {
 }
 
 impl<'a> Diagnosis<'a> {
-    pub(crate) fn of(path: &Path, records: &'a [crate::record::Record], profile: &Profile, limits: &Limits, progress: &dyn Progress) -> Result<Self> {
+    pub(crate) fn of(
+        path: &Path,
+        records: &'a [crate::record::Record],
+        profile: &Profile,
+        limits: &Limits,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let survey = Survey::new(path, records, limits, progress)?;
         let need = survey.heap_bytes() as u64 + survey.suspects.len() as u64 * shop::BYTES_PER_SUSPECT;
         if need > limits.memory_bytes {
             return Err(Error::Refused {
                 path: path.into(),
-                reason: format!("{} triangles lie at defects, which needs {} MiB of memory", survey.suspects.len(), need.div_ceil(1 << 20)),
+                reason: format!(
+                    "{} triangles lie at defects, which needs {} MiB of memory",
+                    survey.suspects.len(),
+                    need.div_ceil(1 << 20)
+                ),
                 advice: format!("the budget is {} MiB: raise --memory", limits.memory_bytes >> 20),
             });
         }
@@ -83,7 +94,10 @@ fn tolerance(survey: &Survey<'_>, profile: &Profile) -> Tolerance {
     }
     let largest = survey.bounds.largest_coordinate();
     let step = f64::from(largest.next_up()) - f64::from(largest);
-    Tolerance { weld: (profile.weld_relative * survey.bounds.diagonal()).max(4.0 * step), edge_share: profile.weld_max_edge_share }
+    Tolerance {
+        weld: (profile.weld_relative * survey.bounds.diagonal()).max(4.0 * step),
+        edge_share: profile.weld_max_edge_share,
+    }
 }
 
 /// Diagnoses `input` and writes nothing.
@@ -120,6 +134,108 @@ pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress
         cost: clock.cost(mesh.records().len() as u64),
         stages: clock.stages,
     })
+}
+
+/// Repairs `input` into the new file `output`.
+///
+/// # Errors
+/// [`Error::Unreadable`], [`Error::Refused`], [`Error::Io`], [`Error::Changed`].
+pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> Result<Report> {
+    let mut clock = Clock::start();
+    let mesh = open(input, output.parent(), limits, progress)?;
+    clock.lap("read");
+    let mut diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
+    clock.lap("topology");
+    let before = diagnosis.defects.clone();
+    let mut report = Report {
+        schema_version: SCHEMA_VERSION,
+        engine_version: env!("CARGO_PKG_VERSION").into(),
+        task: Task::Repair,
+        outcome: Outcome::Clean,
+        input: facts(&mesh, limits),
+        output: None,
+        profile: profile.clone(),
+        limits: limits.clone(),
+        tolerances: tolerances(&diagnosis),
+        verdict: verdict::judge(&before, &flaws(&mesh)),
+        before,
+        after: None,
+        repairs: Vec::new(),
+        loops_left: Vec::new(),
+        edit: EditSummary::default(),
+        edit_records: None,
+        stages: Vec::new(),
+        cost: Cost::default(),
+    };
+    clock.lap("hash");
+    let edit = if report.verdict.good {
+        emit::copy(&mesh, output)?;
+        clock.lap("emit");
+        Edit::default()
+    } else {
+        let repaired = repairs::run(&mut diagnosis, profile);
+        clock.lap("repair");
+        let edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &repaired.reversed);
+        report.repairs = repaired.repairs;
+        report.loops_left = repaired.loops_left;
+        // The survey of the input is not needed any more; its memory is, for that of the output.
+        drop(diagnosis);
+        emit::write(&mesh, &edit, output)?;
+        clock.lap("emit");
+        edit
+    };
+    report.edit = edit.summary(mesh.records().len());
+    report.edit_records = limits.list_edit.then(|| edit.listed());
+    drop(edit);
+    verify(&mut report, &mesh, output, limits, progress, &mut clock)?;
+    mesh.check_unchanged()?;
+    report.cost = clock.cost(mesh.records().len() as u64);
+    report.stages = clock.stages;
+    Ok(report)
+}
+
+/// Reads the written file again and judges it. A copy of a good file is compared by its hash instead.
+fn verify(
+    report: &mut Report,
+    input: &MeshFile,
+    output: &Path,
+    limits: &Limits,
+    progress: &dyn Progress,
+    clock: &mut Clock,
+) -> Result<()> {
+    let written = match open(output, output.parent(), limits, progress) {
+        // Nothing was left to write: there is no mesh to judge.
+        Err(Error::Unreadable { .. }) if report.edit.untouched + report.edit.added == 0 => {
+            report.outcome = Outcome::NotGood;
+            report.verdict.good = false;
+            report.verdict.reasons.push("no triangle was left after the repair".into());
+            return Ok(());
+        }
+        other => other?,
+    };
+    let facts = facts(&written, limits);
+    if report.verdict.good {
+        if facts.blake3 != report.input.blake3 {
+            return Err(Error::Changed { path: input.path().into() });
+        }
+        report.output = Some(facts);
+        clock.lap("verify");
+        return Ok(());
+    }
+    let diagnosis = Diagnosis::of(output, written.records(), &report.profile, limits, progress)?;
+    report.verdict = verdict::judge(&diagnosis.defects, &flaws(&written));
+    report.outcome = if report.verdict.good { Outcome::Repaired } else { Outcome::NotGood };
+    if report.verdict.good {
+        let concerns = verdict::review(&report.before, &diagnosis.defects, &report.profile);
+        if !concerns.is_empty() {
+            report.outcome = Outcome::NeedsReview;
+            report.verdict.reasons = concerns;
+        }
+    }
+    report.after = Some(diagnosis.defects);
+    report.output = Some(facts);
+    clock.lap("verify");
+    Ok(())
 }
 
 /// Opens a mesh file with the spool where the limits say, or beside `default`.
@@ -164,7 +280,9 @@ pub(crate) fn tolerances(diagnosis: &Diagnosis<'_>) -> Tolerances {
         diagonal: diagnosis.survey.bounds.diagonal(),
         weld,
         weld_reason: if weld > 0.0 {
-            format!("a share of the diagonal, at least four f32 steps of the largest coordinate, at most {edge_share} of the shortest edge at a vertex")
+            format!(
+                "a share of the diagonal, at least four f32 steps of the largest coordinate, at most {edge_share} of the shortest edge at a vertex"
+            )
         } else {
             "switched off by the profile".into()
         },

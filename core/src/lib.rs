@@ -8,6 +8,8 @@ mod boxes;
 mod chunk;
 mod cost;
 mod defects;
+mod edit;
+mod emit;
 mod engine;
 pub mod error;
 pub mod fill;
@@ -16,9 +18,9 @@ mod parallel;
 mod plan;
 pub mod read;
 pub mod record;
+mod repairs;
 pub mod report;
 pub mod settings;
-mod repair;
 mod shop;
 mod sums;
 mod survey;
@@ -58,12 +60,9 @@ pub fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress: &dyn 
 
 /// Repairs `input` into `output`, which must not exist: the caller owns a temporary name and publishes it. The output is synced
 /// to disk before this returns. A file that is good as it comes is copied byte for byte.
-pub fn repair(
-    input: &Path,
-    _output: &Path,
-    _profile: &Profile,
-    _limits: &Limits,
-    _progress: &dyn Progress,
-) -> error::Result<Report> {
-    Err(Error::Unreadable { path: input.into(), reason: "not built yet".into() })
+///
+/// # Errors
+/// [`Error`]; what then stands at `output` is incomplete and to be removed.
+pub fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> error::Result<Report> {
+    engine::repair(input, output, profile, limits, progress)
 }

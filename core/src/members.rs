@@ -111,11 +111,6 @@ impl Members {
         self.runs(chunk).flat_map(|(first, count)| first..first + count)
     }
 
-    /// Triangles with non-finite coordinates.
-    pub(crate) fn nonfinite_count(&self) -> u64 {
-        self.nonfinite.iter().map(|r| u64::from(r.1)).sum()
-    }
-
     /// Bytes held.
     pub(crate) fn heap_bytes(&self) -> usize {
         let lists: usize = self.lists.iter().flatten().map(|l| l.bytes.capacity() + size_of::<RunList>()).sum();

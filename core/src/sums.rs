@@ -17,9 +17,9 @@ impl Bounds {
     #[inline]
     pub(crate) fn include(&mut self, points: &[[f32; 3]]) {
         for p in points {
-            for k in 0..3 {
-                self.lo[k] = if p[k] < self.lo[k] { p[k] } else { self.lo[k] };
-                self.hi[k] = if p[k] > self.hi[k] { p[k] } else { self.hi[k] };
+            for ((lo, hi), x) in self.lo.iter_mut().zip(&mut self.hi).zip(p) {
+                *lo = if x < lo { *x } else { *lo };
+                *hi = if x > hi { *x } else { *hi };
             }
         }
     }

@@ -140,7 +140,8 @@ impl<'a> Survey<'a> {
                 .filter_map(|(triangle, patch)| {
                     let corners = record::corners(&self.records[triangle as usize]);
                     let unsound = (0..3).filter(|k| wanted.contains(&key(corners[*k]))).fold(0, |mask, k| mask | 1 << k);
-                    (unsound != 0).then(|| (Suspect { triangle, unsound }, if patch == NONE { NONE } else { merged[patch as usize] }))
+                    (unsound != 0)
+                        .then(|| (Suspect { triangle, unsound }, if patch == NONE { NONE } else { merged[patch as usize] }))
                 })
                 .collect::<Vec<_>>()
         });
@@ -154,7 +155,8 @@ impl<'a> Survey<'a> {
             sum.triangles -= 1;
             sum.extent += Extent { area: -extent.area, volume: -extent.volume };
         }
-        let mut all: Vec<(Suspect, u32)> = self.suspects.iter().copied().zip(self.suspect_patches.iter().copied()).chain(new.iter().copied()).collect();
+        let mut all: Vec<(Suspect, u32)> =
+            self.suspects.iter().copied().zip(self.suspect_patches.iter().copied()).chain(new.iter().copied()).collect();
         all.sort_unstable();
         (self.suspects, self.suspect_patches) = all.into_iter().unzip();
         new
@@ -163,7 +165,11 @@ impl<'a> Survey<'a> {
     /// Bytes held.
     pub(crate) fn heap_bytes(&self) -> usize {
         let labels: usize = self.labels.iter().map(|l| if let Labels::Runs(b) = l { b.capacity() } else { 0 }).sum();
-        self.members.heap_bytes() + labels + self.suspects.len() * 12 + self.patches.len() * size_of::<Patch>() + self.merged.len() * 4
+        self.members.heap_bytes()
+            + labels
+            + self.suspects.len() * 12
+            + self.patches.len() * size_of::<Patch>()
+            + self.merged.len() * 4
     }
 }
 
@@ -173,7 +179,8 @@ fn key(p: [f32; 3]) -> [u32; 3] {
 }
 
 fn refuse_if_too_large(path: &Path, plan: &Plan, members: &Members, limits: &Limits) -> Result<()> {
-    let largest = (0..plan.chunks()).map(|c| members.runs(ChunkId(c as u32)).map(|r| u64::from(r.1)).sum::<u64>()).max().unwrap_or(0);
+    let largest =
+        (0..plan.chunks()).map(|c| members.runs(ChunkId(c as u32)).map(|r| u64::from(r.1)).sum::<u64>()).max().unwrap_or(0);
     let need = members.heap_bytes() as u64 + chunk::scratch_bytes(largest) * limits.threads as u64;
     if need > limits.memory_bytes {
         return Err(Error::Refused {

@@ -1,6 +1,7 @@
 //! The verdict: what counts of defects say about a file.
 
 use crate::report::{Defects, Verdict};
+use crate::settings::Profile;
 
 /// What no version yet checks is called unchecked, never assumed.
 const UNCHECKED: &str = "self-intersection";
@@ -32,14 +33,11 @@ pub(crate) fn judge(defects: &Defects, flaws: &[String]) -> Verdict {
         reasons.push("the enclosed volume is not positive".into());
     }
     let good = reasons.is_empty() && closed && manifold && oriented;
-    let words: Vec<&str> = [
-        (closed, "closed", "open"),
-        (manifold, "manifold", "not manifold"),
-        (oriented, "oriented", "not oriented"),
-    ]
-    .iter()
-    .map(|(holds, yes, no)| if *holds { *yes } else { *no })
-    .collect();
+    let words: Vec<&str> =
+        [(closed, "closed", "open"), (manifold, "manifold", "not manifold"), (oriented, "oriented", "not oriented")]
+            .iter()
+            .map(|(holds, yes, no)| if *holds { *yes } else { *no })
+            .collect();
     Verdict {
         good,
         statement: format!("{}; {UNCHECKED} unchecked", words.join(", ")),
@@ -49,4 +47,31 @@ pub(crate) fn judge(defects: &Defects, flaws: &[String]) -> Verdict {
         reasons,
         unchecked: vec![UNCHECKED.into()],
     }
+}
+
+/// What a good result has changed beyond the profile's limits, in words; empty when a person need not look.
+pub(crate) fn review(before: &Defects, after: &Defects, profile: &Profile) -> Vec<String> {
+    let mut concerns = Vec::new();
+    // The volume of an open or incoherent surface depends on the origin, and duplicates count twice: only what enclosed a volume
+    // once can be compared.
+    let enclosed = before.boundary_edges + before.unbalanced_edges + before.nonmanifold_edges + before.inverted_components == 0;
+    if enclosed && before.volume > 0.0 {
+        let change = (after.volume - before.volume).abs() / before.volume;
+        if change > profile.max_volume_change {
+            concerns.push(format!("the volume changed by {:.1} %, from {} to {}", change * 100.0, before.volume, after.volume));
+        }
+    }
+    if let (Some(old), Some(new)) = (before.bounds, after.bounds) {
+        let diagonal = (0..3).map(|k| (f64::from(old[1][k]) - f64::from(old[0][k])).powi(2)).sum::<f64>().sqrt();
+        let moved = old.as_flattened().iter().zip(new.as_flattened()).map(|(a, b)| (f64::from(*a) - f64::from(*b)).abs());
+        let most = moved.fold(0.0, f64::max);
+        if most > profile.max_box_change_relative * diagonal {
+            concerns.push(format!("the bounding box moved by {most}"));
+        }
+    }
+    let lost = before.bodies.saturating_sub(after.bodies + after.nested_positive);
+    if lost > u64::from(profile.max_bodies_lost) {
+        concerns.push(format!("{lost} of {} bodies were lost", before.bodies));
+    }
+    concerns
 }

@@ -108,6 +108,7 @@ enum Source {
 pub struct MeshFile {
     path: PathBuf,
     identity: Identity,
+    file: File,
     input: Mmap,
     source: Source,
     format: Format,
@@ -138,6 +139,7 @@ impl MeshFile {
             sniff::Kind::Binary(layout) => Ok(Self {
                 path: path.to_owned(),
                 identity,
+                file,
                 header: binary::safe_header(binary::header(&input)),
                 source: Source::InPlace(layout.triangles),
                 input,
@@ -152,6 +154,7 @@ impl MeshFile {
                 Ok(Self {
                     path: path.to_owned(),
                     identity,
+                    file,
                     header: parsed.header,
                     source: Source::Spooled(parsed.spool),
                     input,
@@ -193,6 +196,13 @@ impl MeshFile {
     /// The whole input as it stands on disk, for hashing and copying.
     pub fn bytes(&self) -> &[u8] {
         &self.input
+    }
+
+    /// The open input and the place in it where `part` of [`MeshFile::bytes`] or of the records lies, if it does: for copies that
+    /// never leave the kernel.
+    pub(crate) fn locate(&self, part: &[u8]) -> Option<(&File, u64)> {
+        let offset = (part.as_ptr() as usize).checked_sub(self.input.as_ptr() as usize)?;
+        (offset + part.len() <= self.input.len()).then_some((&self.file, offset as u64))
     }
 
     /// Size of the input in bytes.

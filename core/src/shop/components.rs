@@ -71,7 +71,8 @@ impl Components {
                 chunk::unite(&mut parents, patches + pair[0].triangle, patches + pair[1].triangle);
             }
         }
-        let mut all = Self { list: Vec::new(), of_patch: vec![NONE; patches as usize], of_triangle: vec![NONE; shop.triangles.len()] };
+        let mut all =
+            Self { list: Vec::new(), of_patch: vec![NONE; patches as usize], of_triangle: vec![NONE; shop.triangles.len()] };
         let mut numbers = vec![NONE; parents.len()];
         for p in 0..patches {
             let sum = &survey.patches[p as usize];
@@ -83,7 +84,11 @@ impl Components {
             into.extent += turned(sum.extent, reversed.patches[p as usize]);
         }
         for t in shop.living() {
-            let c = all.number(&mut numbers, chunk::find(&mut parents, patches + t), Sample { record: shop.record(t), in_shop: Some(t) });
+            let c = all.number(
+                &mut numbers,
+                chunk::find(&mut parents, patches + t),
+                Sample { record: shop.record(t), in_shop: Some(t) },
+            );
             all.of_triangle[t as usize] = c;
             let points = shop.points(t);
             let into = &mut all.list[c as usize];
@@ -110,7 +115,6 @@ impl Components {
         *number
     }
 }
-
 
 fn turned(extent: Extent, reversed: bool) -> Extent {
     if reversed { Extent { volume: -extent.volume, ..extent } } else { extent }

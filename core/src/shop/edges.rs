@@ -76,7 +76,8 @@ impl Edges {
             table[at[low as usize] as usize] = (high, used);
             at[low as usize] += 1;
         });
-        let mut edges = Self { ends: Vec::with_capacity(table.len() / 2), starts: vec![0], uses: Vec::with_capacity(table.len()) };
+        let mut edges =
+            Self { ends: Vec::with_capacity(table.len() / 2), starts: vec![0], uses: Vec::with_capacity(table.len()) };
         for low in 0..shop.positions.len() {
             let part = &mut table[starts[low] as usize..starts[low + 1] as usize];
             part.sort_unstable_by_key(|(high, used)| (*high, used.triangle));

@@ -59,7 +59,8 @@ fn clusters(shop: &Shop, pairs: &[(Vertex, Vertex)], tolerance: f64) -> Vec<Vec<
     for (a, b) in pairs {
         chunk::unite(&mut parents, number(*a), number(*b));
     }
-    let mut by_root: Vec<(u32, Vertex)> = (0..vertices.len() as u32).map(|i| (chunk::find(&mut parents, i), vertices[i as usize])).collect();
+    let mut by_root: Vec<(u32, Vertex)> =
+        (0..vertices.len() as u32).map(|i| (chunk::find(&mut parents, i), vertices[i as usize])).collect();
     by_root.sort_unstable();
     let mut all = Vec::new();
     for group in by_root.chunk_by(|a, b| a.0 == b.0) {

@@ -5,9 +5,9 @@
 //! rest is judged anew. Where as many triangles run one way as the other (bodies that touch along an edge) nothing is surplus.
 
 use crate::chunk::NONE;
-use crate::shop::{Shop, Vertex};
 use crate::shop::components::{Components, Reversed, Through};
 use crate::shop::edges::Edges;
+use crate::shop::{Shop, Vertex};
 use crate::survey::Survey;
 
 /// A sheet that ends at non-manifold edges.

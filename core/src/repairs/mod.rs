@@ -39,20 +39,31 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile) -> Repaired 
     let Diagnosis { survey, shop, tolerance, .. } = diagnosis;
     for _ in 0..ROUNDS {
         let mut changes = clean(survey, shop, &mut log);
-        changes += log.time("tolerance_weld", "boundary vertices within the weld tolerance, moved to the one with most triangles", || {
-            let welded = merge::weld(shop, tolerance);
-            if welded.taken_back > 0 {
-                tracing::info!(clusters = welded.taken_back, "Welds taken back, since they made an edge of more than two triangles.");
-            }
-            welded.vertices
-        });
+        changes += log.time(
+            "tolerance_weld",
+            "boundary vertices within the weld tolerance, moved to the one with most triangles",
+            || {
+                let welded = merge::weld(shop, tolerance);
+                if welded.taken_back > 0 {
+                    tracing::info!(
+                        clusters = welded.taken_back,
+                        "Welds taken back, since they made an edge of more than two triangles."
+                    );
+                }
+                welded.vertices
+            },
+        );
         changes += clean(survey, shop, &mut log);
-        changes += log.time("t_junction", "vertices inside a neighbour's edge, which was split there", || junction::split_edges(shop, tolerance));
+        changes += log.time("t_junction", "vertices inside a neighbour's edge, which was split there", || {
+            junction::split_edges(shop, tolerance)
+        });
         if changes == 0 {
             break;
         }
     }
-    log.time("orient", "triangles turned to agree with their neighbours", || orient::make_coherent(survey, shop, &mut reversed).triangles);
+    log.time("orient", "triangles turned to agree with their neighbours", || {
+        orient::make_coherent(survey, shop, &mut reversed).triangles
+    });
     let diagonal = survey.bounds.diagonal();
     let mut loops_left = Vec::new();
     let mut methods = String::new();
@@ -85,7 +96,8 @@ fn clean(survey: &crate::survey::Survey<'_>, shop: &mut Shop, log: &mut Log) -> 
         duplicates::drop_repeated(shop) + collinear::remove(survey, shop)
     });
     changes += log.time("duplicate", "triangles on the vertices of another one", || duplicates::drop_duplicates(shop));
-    changes += log.time("surplus", "triangles of sheets that hang from a closed surface or cross a body", || surplus::remove(survey, shop));
+    changes += log
+        .time("surplus", "triangles of sheets that hang from a closed surface or cross a body", || surplus::remove(survey, shop));
     changes
 }
 

@@ -28,11 +28,8 @@ pub(super) fn split_edges(shop: &mut Shop, tolerance: &Tolerance) -> u64 {
 /// does not exist yet.
 fn admissible(shop: &Shop, t: u32, ends: [u32; 2], group: &[OnEdge]) -> Vec<u32> {
     let Some(apex) = shop.triangles[t as usize].v.into_iter().find(|v| !ends.contains(v)) else { return Vec::new() };
-    let height = near::distance_to_line(
-        shop.positions[apex as usize],
-        shop.positions[ends[0] as usize],
-        shop.positions[ends[1] as usize],
-    );
+    let height =
+        near::distance_to_line(shop.positions[apex as usize], shop.positions[ends[0] as usize], shop.positions[ends[1] as usize]);
     let mut stops: Vec<u32> = Vec::new();
     let mut last_at = f64::NEG_INFINITY;
     for on in group {

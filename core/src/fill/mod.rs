@@ -299,7 +299,7 @@ impl Rim<'_> {
 
     /// The mesh's triangle beyond rim edge `i`, as the mesh turns it.
     fn neighbour(&self, i: usize) -> Option<Triangle> {
-        let apex = self.apexes.get(i).copied().flatten()?;
+        let apex = self.apexes.get(i).copied().flatten().filter(|a| a.iter().all(|x| x.is_finite()))?;
         Some([self.points[(i + 1) % self.len()], self.points[i], apex])
     }
 

@@ -79,3 +79,39 @@ impl Boxes {
         self.near(what, |v| if test(v) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }).is_break()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn some_box() -> impl Strategy<Value = Box3> {
+        prop::array::uniform2(prop::array::uniform3(-9_i8..10)).prop_map(|p| around(&p.map(|q| q.map(f32::from))))
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_near_is_found_after_changes(
+            items in prop::collection::vec(some_box(), 1..40),
+            changes in prop::collection::vec((any::<prop::sample::Index>(), some_box()), 0..40),
+            what in some_box(),
+        ) {
+            let mut items = items;
+            let mut boxes = Boxes::new(items.iter().copied());
+            for (i, item) in changes {
+                let i = i.index(items.len());
+                items[i] = item;
+                boxes.set(i, item);
+            }
+            let mut found = Vec::new();
+            let end = boxes.near(&what, |i| {
+                found.push(i);
+                ControlFlow::Continue(())
+            });
+            found.sort_unstable();
+            let apart = |b: &Box3| (0..3).any(|k| b.1[k] < what.0[k] || b.0[k] > what.1[k]);
+            prop_assert!(end.is_continue());
+            prop_assert_eq!(found, (0..items.len()).filter(|&i| !apart(&items[i])).collect::<Vec<_>>());
+        }
+    }
+}

@@ -15,6 +15,12 @@ enum Known {
     Not,
 }
 
+/// Number of a set of three, given ascending, in the combinatorial number system: those below k fill C(k, 3) places.
+fn rank(triangle: [u32; 3]) -> usize {
+    let [i, m, k] = triangle.map(|v| v as usize);
+    i + m * m.saturating_sub(1) / 2 + k * k.saturating_sub(1) * k.saturating_sub(2) / 6
+}
+
 /// The triangles between a loop's vertices through which neither rim nor neighbouring triangles of the mesh pass: no valid
 /// patch has another. Each is looked at once, however many triangulations ask.
 pub(super) struct Clearance<'a> {
@@ -44,9 +50,7 @@ impl<'a> Clearance<'a> {
         if self.known.is_empty() {
             self.known = vec![Known::Nothing; n * (n - 1) * (n - 2) / 6];
         }
-        let [i, m, k] = triangle.map(|v| v as usize);
-        // The combinatorial number system: each set of three has its own number, without gaps.
-        let rank = i + m * m.saturating_sub(1) / 2 + k * k.saturating_sub(1) * k.saturating_sub(2) / 6;
+        let rank = rank(triangle);
         if self.known[rank] == Known::Nothing && self.work > 0 {
             self.work -= 1;
             self.known[rank] = if self.look(triangle) { Known::Clear } else { Known::Not };
@@ -68,5 +72,17 @@ impl<'a> Clearance<'a> {
         let meets_mesh = self.boxes.any_near(&bounds, meets);
         self.mesh_in_the_way |= meets_mesh;
         !meets_mesh
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rank;
+
+    #[test]
+    fn every_triangle_has_its_own_place_and_no_place_is_empty() {
+        let all = (2..9).flat_map(|k| (1..k).flat_map(move |m| (0..m).map(move |i| [i, m, k])));
+        let ranks: Vec<usize> = all.map(rank).collect();
+        assert_eq!(ranks, (0..9 * 8 * 7 / 6).collect::<Vec<_>>());
     }
 }

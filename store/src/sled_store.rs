@@ -63,8 +63,8 @@ pub struct SledStore {
     clock: Arc<dyn Clock>,
     live: RwLock<Live>,
     opening: Mutex<Opening>,
-    /// Dropped last: the folder is ours until every handle is gone.
-    _lock: File,
+    /// The folder is ours until every handle of the database is gone.
+    lock: File,
 }
 
 enum Live {
@@ -96,7 +96,7 @@ impl SledStore {
             clock,
             live: RwLock::new(Live::Open(Box::new(queue))),
             opening: Mutex::new(opening),
-            _lock: lock,
+            lock,
         })
     }
 
@@ -143,6 +143,10 @@ impl Drop for SledStore {
             tracing::warn!(%error, "the store could not note how far it got; nothing acknowledged is lost");
         }
         *live = Live::Closed("it was closed".into());
+        // Closing the file would do, but for a child that was started just now and has not let go of it yet.
+        if let Err(error) = self.lock.unlock() {
+            tracing::warn!(%error, "the lock of the store could not be released; it ends with the process");
+        }
     }
 }
 

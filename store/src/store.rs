@@ -167,7 +167,7 @@ pub enum StoreError {
 
     /// The database failed.
     #[error("the job database failed: {0}")]
-    Backend(#[source] sled::Error),
+    Backend(#[source] Box<dyn std::error::Error + Send + Sync>),
 
     /// An earlier error left the database in doubt; it must be opened again.
     #[error("the job database must be opened again after an error: {reason}")]

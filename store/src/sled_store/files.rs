@@ -3,6 +3,7 @@
 use std::fs::{File, TryLockError};
 use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use crate::id::{Epoch, Seq};
 use crate::store::StoreError;
@@ -18,7 +19,7 @@ pub(super) fn lock(state: &Path) -> Result<File, StoreError> {
     let path = state.join("LOCK");
     let mut file =
         File::options().read(true).write(true).create(true).truncate(false).open(&path).map_err(io(&path, "opening the lock"))?;
-    match file.try_lock() {
+    match try_patiently(&file) {
         Ok(()) => {
             // Always the same length, in one write: who reads it meanwhile sees a number.
             let text = format!("{:>10}\n", std::process::id());
@@ -33,6 +34,17 @@ pub(super) fn lock(state: &Path) -> Result<File, StoreError> {
         }
         Err(TryLockError::Error(source)) => Err(StoreError::Io { path, action: "locking", source }),
     }
+}
+
+/// A daemon that died while it started a worker holds the lock until that child has become the worker: a moment.
+fn try_patiently(file: &File) -> Result<(), TryLockError> {
+    for _ in 0..20 {
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(20)),
+            other => return other,
+        }
+    }
+    file.try_lock()
 }
 
 /// How far the store got, as `SEQ` says.

@@ -153,6 +153,30 @@ fn whatever_was_acknowledged_survives_a_kill() {
     assert!(lines > 0 && in_opening > 0, "the kills missed what they were aimed at");
 }
 
+/// A kill while the database is made: nothing was acknowledged, so that a torn one may be set aside, but it must open.
+#[test]
+fn a_store_that_was_never_finished_opens() {
+    let folder = tempfile::tempdir().unwrap();
+    for kill in 0..30 {
+        let state = folder.path().join(kill.to_string());
+        let mut said = Said::new();
+        let mut child = start(&state).spawn().unwrap();
+        let mut ears = ears(&mut child);
+        // From before the folder is there until the store is open, which the victim says.
+        while !state.exists() && child.try_wait().unwrap().is_none() {
+            std::thread::yield_now();
+        }
+        std::thread::sleep(Duration::from_micros(kill * 500));
+        child.kill().unwrap();
+        listen(&mut ears, usize::MAX, &mut said);
+        child.wait().unwrap();
+        let store = SledStore::open(&state).unwrap();
+        let jobs = store.list(&Query::default()).unwrap();
+        assert!(jobs.len() >= said.len(), "{} of {} jobs after kill {kill}", jobs.len(), said.len());
+        assert!(said.is_empty() || store.opening().set_aside.is_none());
+    }
+}
+
 /// F1 for the store: every crash point that an ordinary run passes, the first and a later time, on one state after another.
 #[cfg(feature = "crash-points")]
 #[test]

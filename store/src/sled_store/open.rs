@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use super::Opening;
 use super::files::{self, Mark, io};
-use super::tables::SledTables;
+use super::tables::{self, SledTables};
 use crate::crash_point;
 use crate::id::{Clock, Epoch, Seq};
 use crate::queue::{Queue, read_head};
@@ -64,31 +64,32 @@ fn prepare(state: &Path) -> Result<Mark, StoreError> {
     Ok(mark)
 }
 
-/// Opens; the lock of handles that were just dropped may take a moment to go.
+/// Opens; the lock of handles that were just dropped, or that a child of a daemon that died has not let go of yet, may take a
+/// moment to go.
 fn patiently(state: &Path, dir: &Path) -> Result<SledTables, StoreError> {
-    let mut tries = 40;
-    loop {
+    for _ in 0..40 {
         match SledTables::open(state, dir) {
-            Err(StoreError::Backend(sled::Error::Io(error))) if tries > 0 && error.kind() == std::io::ErrorKind::WouldBlock => {
-                tries -= 1;
-                std::thread::sleep(Duration::from_millis(25));
-            }
+            Err(error) if is_held(&error) => std::thread::sleep(Duration::from_millis(25)),
             other => return other,
         }
     }
+    SledTables::open(state, dir)
+}
+
+/// Does someone else hold sled's own lock? sled 0.34.7 tells only by its words.
+fn is_held(error: &StoreError) -> bool {
+    matches!(tables::cause(error), Some(sled::Error::Io(error)) if error.to_string().starts_with("could not acquire lock"))
 }
 
 /// Is it the database that is wrong, not the world around it?
 fn is_damage(error: &StoreError) -> bool {
-    match error {
-        StoreError::Backend(sled::Error::Io(error)) => {
-            matches!(
-                error.kind(),
-                std::io::ErrorKind::UnexpectedEof | std::io::ErrorKind::InvalidData | std::io::ErrorKind::Other
-            )
+    use std::io::ErrorKind;
+    match tables::cause(error) {
+        _ if is_held(error) => false,
+        Some(sled::Error::Io(error)) => {
+            matches!(error.kind(), ErrorKind::UnexpectedEof | ErrorKind::InvalidData | ErrorKind::Other)
         }
-        StoreError::Backend(_) => true,
-        _ => false,
+        other => other.is_some(),
     }
 }
 

@@ -40,12 +40,24 @@ struct Progress {
     poisoned: Option<String>,
 }
 
+fn failed(error: sled::Error) -> StoreError {
+    StoreError::Backend(Box::new(error))
+}
+
+/// The error of sled behind `error`.
+pub(super) fn cause(error: &StoreError) -> Option<&sled::Error> {
+    match error {
+        StoreError::Backend(error) => error.downcast_ref(),
+        _ => None,
+    }
+}
+
 /// Runs `act` of sled, which may panic over damaged files; that is an error like any other.
 fn guarded<T>(act: impl FnOnce() -> Result<T, StoreError>) -> Result<T, StoreError> {
     catch_unwind(AssertUnwindSafe(act)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
         let what = text.unwrap_or("no message").to_owned();
-        Err(StoreError::Backend(sled::Error::ReportableBug(format!("it panicked: {what}"))))
+        Err(failed(sled::Error::ReportableBug(format!("it panicked: {what}"))))
     })
 }
 
@@ -60,9 +72,9 @@ impl SledTables {
                 .flush_every_ms(Some(200))
                 .mode(sled::Mode::LowSpace)
                 .open()
-                .map_err(StoreError::Backend)?;
+                .map_err(failed)?;
             crash_point("store.open.sled");
-            let tree = |name: &str| db.open_tree(name).map_err(StoreError::Backend);
+            let tree = |name: &str| db.open_tree(name).map_err(failed);
             let (meta, jobs, by_state, by_key) = (tree("meta")?, tree("jobs")?, tree("by_state")?, tree("by_key")?);
             let path = dir.join("db");
             let file = File::open(&path).map_err(io(&path, "opening the database file"))?;
@@ -110,7 +122,7 @@ impl SledTables {
     /// Makes everything written durable.
     fn sync(&self) -> Result<(), StoreError> {
         guarded(|| {
-            self.db.flush().map_err(StoreError::Backend)?;
+            self.db.flush().map_err(failed)?;
             crash_point("store.sync.flushed");
             self.file.sync_data().map_err(io(&self.dir.join("db"), "syncing the database file"))?;
             crash_point("store.sync.synced");
@@ -145,7 +157,7 @@ impl SledTables {
 
 impl Tables for SledTables {
     fn get(&self, table: Table, key: &[u8]) -> Result<Option<Vec<u8>>, StoreError> {
-        let read = guarded(|| self.tree(table).get(key).map_err(StoreError::Backend));
+        let read = guarded(|| self.tree(table).get(key).map_err(failed));
         Ok(read.map_err(|error| self.poison(error))?.map(|value| value.to_vec()))
     }
 
@@ -153,9 +165,7 @@ impl Tables for SledTables {
         let tree = self.tree(table);
         let entries = if to.is_empty() { tree.range(from..) } else { tree.range(from..to) };
         let mut entries = entries;
-        while let Some(entry) =
-            guarded(|| entries.next().transpose().map_err(StoreError::Backend)).map_err(|error| self.poison(error))?
-        {
+        while let Some(entry) = guarded(|| entries.next().transpose().map_err(failed)).map_err(|error| self.poison(error))? {
             if !each(&entry.0, &entry.1)? {
                 break;
             }
@@ -183,7 +193,7 @@ impl Tables for SledTables {
                 Ok(())
             });
             result.map_err(|error| match error {
-                TransactionError::Storage(error) => StoreError::Backend(error),
+                TransactionError::Storage(error) => failed(error),
                 TransactionError::Abort(()) => StoreError::Poisoned { reason: "a transaction was aborted".into() },
             })
         });

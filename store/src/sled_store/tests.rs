@@ -63,6 +63,27 @@ fn a_second_daemon_is_told_who_owns_the_store() {
     assert_eq!(SledStore::open(state.path()).unwrap().opening().epoch, Epoch(2));
 }
 
+/// A child of a daemon that died may hold sled's lock for a moment. That is no damage, and passes.
+#[test]
+fn a_database_that_is_held_is_not_taken_for_damaged() {
+    let state = tempfile::tempdir().unwrap();
+    let id = submit(&SledStore::open(state.path()).unwrap(), "part.stl");
+    let held = File::open(state.path().join("db/db")).unwrap();
+    held.lock().unwrap();
+    let error = SledStore::open(state.path()).err().unwrap();
+    assert!(error.to_string().contains("could not acquire lock"), "{error}");
+    assert_eq!(error.exit_code(), 75);
+    let store = std::thread::scope(|scope| {
+        scope.spawn(|| {
+            std::thread::sleep(std::time::Duration::from_millis(100));
+            held.unlock().unwrap();
+        });
+        SledStore::open(state.path()).unwrap()
+    });
+    assert_eq!(store.opening().set_aside, None);
+    assert!(store.get(id).unwrap().is_some());
+}
+
 /// F5: a record that the database hands out damaged.
 #[test]
 fn a_flipped_bit_is_an_error_not_another_value() {
@@ -105,6 +126,33 @@ fn a_store_that_went_back_in_time_is_refused() {
     std::fs::remove_dir_all(state.path().join("db")).unwrap();
     let error = SledStore::open(state.path()).err().unwrap();
     assert!(matches!(error, StoreError::RolledBack { found: (Epoch(0), Seq(0)), .. }), "{error:?}");
+}
+
+/// A kill while the first database was made: `SEQ` says that nothing was acknowledged, so that beginning anew loses nothing.
+#[test]
+fn a_database_that_never_was_is_set_aside() {
+    let state = tempfile::tempdir().unwrap();
+    drop(SledStore::open(state.path()).unwrap());
+    files::write_mark(state.path(), Epoch(0), Seq(0)).unwrap();
+    std::fs::write(state.path().join("db/snap.FFFFFFFFFFFFFFF0"), b"no snapshot").unwrap();
+    let store = SledStore::open(state.path()).unwrap();
+    assert_eq!(store.opening().epoch, Epoch(1));
+    assert!(store.opening().set_aside.unwrap().join("snap.FFFFFFFFFFFFFFF0").exists());
+}
+
+/// A crash between the two renames that put a restored database in the place of a damaged one.
+#[test]
+fn a_restored_database_is_found_where_the_crash_left_it() {
+    let state = tempfile::tempdir().unwrap();
+    let id = submit(&SledStore::open(state.path()).unwrap(), "part.stl");
+    std::fs::rename(state.path().join("db"), state.path().join("db.trial")).unwrap();
+    let store = SledStore::open(state.path()).unwrap();
+    assert!(store.get(id).unwrap().is_some());
+    drop(store);
+    // Earlier, it is only an unfinished copy.
+    std::fs::create_dir(state.path().join("db.trial")).unwrap();
+    assert!(SledStore::open(state.path()).unwrap().get(id).unwrap().is_some());
+    assert!(!state.path().join("db.trial").exists());
 }
 
 /// F6: the whole state folder is gone: a new store, without complaint.

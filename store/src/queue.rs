@@ -344,7 +344,10 @@ impl<T: Tables> JobStore for Queue<T> {
         // but for an operator's cancel, which is why the jobs are read again below.
         let suspects = self.orphans(self.epoch())?;
         let running = |job: &Job| matches!(job.state, State::Running { .. });
-        let alone = suspects.iter().filter(|job| running(job)).count() == 1;
+        let one_ran = suspects.iter().filter(|job| running(job)).count() == 1;
+        // What was being published is company, too, unless the job was claimed to run alone: that a publication is stuck must not
+        // save a file that kills the daemon again and again.
+        let alone = |job: &Job| one_ran && (suspects.len() == 1 || job.hold().is_some_and(|hold| hold.alone));
         let cleared: Vec<JobId> = suspects.iter().filter(|job| running(job) && innocent(job)).map(|job| job.id).collect();
 
         let inner = self.lock();
@@ -352,7 +355,7 @@ impl<T: Tables> JobStore for Queue<T> {
         let orphans = self.orphans(head.epoch)?;
         let mut recovered = Vec::with_capacity(orphans.len());
         for job in &orphans {
-            recovered.push(take_back(job, &mut head, alone, cleared.contains(&job.id), now)?);
+            recovered.push(take_back(job, &mut head, alone(job), cleared.contains(&job.id), now)?);
         }
         if recovered.is_empty() {
             return Ok(recovered);

@@ -364,6 +364,18 @@ fn death_of_the_daemon(subject: &mut dyn Subject, _: &ManualClock) -> Result<(),
     assert_eq!(job(store, stopped)?.kind(), Kind::Cancelled);
     assert_eq!(job(store, waiting)?.attempts, Attempt(0));
     assert_eq!(store.recover(&no_one_is_innocent)?, [], "once is enough");
+    // Who ran while another's result was on its way was not alone.
+    for id in [innocent, guilty] {
+        let claim = claim_any(store)?;
+        assert_eq!(claim.id, id);
+        if id == innocent {
+            store.advance(&claim, Step::Intend(result_of(&claim.job, Ending::Clean)))?;
+        }
+    }
+    subject.restart();
+    assert_eq!(subject.store().recover(&no_one_is_innocent)?.len(), 2);
+    let blame = job(subject.store(), guilty)?.blame;
+    assert_eq!((blame.deaths, blame.deaths_alone), (2, 0));
     Ok(())
 }
 

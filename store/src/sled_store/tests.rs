@@ -250,3 +250,45 @@ fn reopening_begins_a_new_epoch_and_keeps_everything() {
     assert_eq!(recovered[0].void, claim.token);
     assert_eq!(store.claim(&Filter::default()).unwrap().unwrap().id, id);
 }
+
+/// F5: damage anywhere in the files. Either everything is there as it was, or the store says that it cannot be trusted.
+#[test]
+fn damage_on_disk_is_never_silent() {
+    let folder = tempfile::tempdir().unwrap();
+    let sound = folder.path().join("sound");
+    let store = SledStore::open(&sound).unwrap();
+    let found: Vec<_> = (0..100).map(|at| dropped(&format!("{at}.stl"), at).unwrap()).collect();
+    store.submit(&found).unwrap();
+    let jobs = store.list(&Query::default()).unwrap();
+    drop(store);
+    drop(SledStore::open(&sound).unwrap());
+    let (mut whole, mut refused) = (0, 0);
+    for file in files::list(&sound.join("db")).unwrap().into_iter().filter(|path| path.is_file()) {
+        let bytes = std::fs::read(&file).unwrap();
+        let name = file.file_name().unwrap();
+        let step = (bytes.len() / FLIPS).max(1);
+        for at in (0..bytes.len()).step_by(step) {
+            let state = folder.path().join("state");
+            files::copy_dir(&sound, &state, |_| false).unwrap();
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 0x10;
+            std::fs::write(state.join("db").join(name), damaged).unwrap();
+            let opened = SledStore::open(&state).and_then(|store| store.list(&Query::default()));
+            match opened {
+                Ok(found) => {
+                    assert_eq!(found, jobs, "{name:?} at {at}");
+                    whole += 1;
+                }
+                Err(error) => {
+                    assert_eq!(error.exit_code(), 75, "{name:?} at {at}: {error}");
+                    refused += 1;
+                }
+            }
+            std::fs::remove_dir_all(&state).unwrap();
+        }
+    }
+    assert!(whole > 0 && refused > 0, "{whole} came back whole, {refused} were refused");
+}
+
+/// Places in each file that are damaged in turn.
+const FLIPS: usize = 12;

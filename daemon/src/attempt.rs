@@ -22,6 +22,7 @@ use crate::protocol::Request;
 use crate::publish::{CLAIMED, Conclusion, Desk, OUTPUT, PublishError, is_source};
 use crate::schedule::{Schedule, Turn};
 use crate::supervise::{Cause, Death, Ended, Worker};
+use crate::units::show_size;
 
 /// Left by a worker that outlived the daemon: the file it worked on did not kill it.
 pub(crate) const WITNESS: &str = "outlived";
@@ -202,7 +203,7 @@ impl<'a> Slot<'a> {
     fn attempt(&mut self, desk: &Desk, job: &Job, turn: Turn) -> Result<Option<Job>, PublishError> {
         let context = self.context;
         let work = desk.folder.work(desk.claim.token);
-        let step = match claim_file(desk.folder, job, &work) {
+        let step = match claim_file(desk.folder, job, &work, context.config.reserve) {
             Err(why) => why.into(),
             Ok(claimed) => {
                 crash_point("daemon.linked");
@@ -359,7 +360,7 @@ impl From<Unclaimed> for Step {
 
 /// Puts the dropped file into the attempt's folder: a hard link, which keeps it even if its name goes meanwhile; where that
 /// cannot be, a copy. The dropped name stays, so that whatever happens to the attempt's folder, the file is where it was.
-fn claim_file(folder: &Folder, job: &Job, work: &Path) -> Result<Claimed, Unclaimed> {
+fn claim_file(folder: &Folder, job: &Job, work: &Path, reserve: u64) -> Result<Claimed, Unclaimed> {
     let (area, path) = job.original();
     let source = folder.area(area).join(path.to_path());
     let environment = |what: &str, error: &std::io::Error| Unclaimed::Environment(format!("{what}: {error}"));
@@ -369,7 +370,13 @@ fn claim_file(folder: &Folder, job: &Job, work: &Path) -> Result<Claimed, Unclai
         Ok(found) if is_source(&found, job) => Ok(found),
         Ok(_) => Err(Unclaimed::Withdrawn(Withdrawal::Changed)),
     };
-    look(&source)?;
+    let size = look(&source)?.size;
+    // Room for the result, for what the engine puts aside, and a reserve; a large file must not fill the disk half way.
+    let (needed, free) = (size.saturating_mul(3).saturating_add(reserve), fsx::free_space(&folder.root));
+    if free < needed {
+        let (needed, free) = (show_size(needed), show_size(free));
+        return Err(Unclaimed::Environment(format!("the disk has {free} free; this file needs {needed} to be safe")));
+    }
     std::fs::create_dir_all(work).map_err(|e| environment("the work folder cannot be made", &e))?;
     let claimed = work.join(CLAIMED);
     if std::fs::hard_link(&source, &claimed).is_ok() {

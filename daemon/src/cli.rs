@@ -7,12 +7,19 @@ use clap::{Args, Parser, Subcommand};
 
 use crate::units::{parse_duration, parse_size};
 
+/// A build for crash tests says so, lest it be installed.
+const VERSION: &str = if cfg!(feature = "crash-points") {
+    concat!(env!("CARGO_PKG_VERSION"), " with crash points")
+} else {
+    env!("CARGO_PKG_VERSION")
+};
+
 /// Unattended repair of triangle meshes for 3D printing.
 ///
 /// Exit status: 0 good under the profile; 1 done, but a file is not good; 2 unreadable or refused input, or wrong usage;
 /// 73 the folder is served by another daemon; 75 the job store cannot be used, try again.
 #[derive(Debug, Parser)]
-#[command(name = "suture", version, max_term_width = 100, disable_help_subcommand = true)]
+#[command(name = "suture", version = VERSION, max_term_width = 100, disable_help_subcommand = true)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub command: Command,

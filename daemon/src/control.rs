@@ -16,8 +16,8 @@ use crate::attempt::Context;
 const LONGEST_WISH: u64 = 4096;
 /// How long either side waits for the other.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// How often the daemon looks whether someone knocks.
-const LOOK_EVERY: Duration = Duration::from_millis(50);
+/// Pause after a knock that could not be answered.
+const AFTER_ERROR: Duration = Duration::from_millis(100);
 
 /// What an operator wants.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -77,20 +77,20 @@ impl Door {
         let path = socket(root);
         crate::fsx::remove_if_there(&path)?;
         let listener = short(&path, |path| UnixListener::bind(path))?;
-        listener.set_nonblocking(true)?;
         Ok(Self { listener, path })
     }
 
-    /// Serves whoever knocks until `end`.
+    /// Serves whoever knocks until `end`, which is looked at after each knock: [`knock`] then.
     pub(crate) fn serve(&self, context: &Context, end: &dyn Fn() -> bool) {
         while !end() {
             match self.listener.accept() {
+                Ok(_) if end() => return,
                 Ok((stream, _)) => {
                     if let Err(error) = serve_one(context, stream) {
                         tracing::debug!(%error, "A request on the control socket was not understood.");
                     }
                 }
-                Err(_) => std::thread::sleep(LOOK_EVERY),
+                Err(_) => std::thread::sleep(AFTER_ERROR),
             }
         }
     }
@@ -104,7 +104,6 @@ impl Drop for Door {
 }
 
 fn serve_one(context: &Context, stream: UnixStream) -> io::Result<()> {
-    stream.set_nonblocking(false)?;
     stream.set_read_timeout(Some(PATIENCE))?;
     stream.set_write_timeout(Some(PATIENCE))?;
     let mut line = String::new();
@@ -118,6 +117,11 @@ fn serve_one(context: &Context, stream: UnixStream) -> io::Result<()> {
     let mut out = io::BufWriter::new(&stream);
     serde_json::to_writer(&mut out, &answer)?;
     out.flush()
+}
+
+/// Wakes whoever serves the socket of a hot folder; no matter if no one does.
+pub(crate) fn knock(root: &Path) {
+    let _ = short(&socket(root), |path| UnixStream::connect(path));
 }
 
 /// Asks the daemon of a hot folder; `None` when none answers.

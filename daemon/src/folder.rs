@@ -4,6 +4,7 @@ use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
 use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use suture_store::job::Area;
 use suture_store::{RelPath, Token};
@@ -59,15 +60,22 @@ impl Folder {
             .write(true)
             .open(&path)
             .map_err(io(&path, "cannot be opened"))?;
-        match lock.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => {
-                let mut text = String::new();
-                // A lock without a readable pid is a lock all the same.
-                let _ = lock.read_to_string(&mut text);
-                return Err(FolderError::Owned { root, pid: text.trim().parse().ok() });
+        let asked = Instant::now();
+        loop {
+            match lock.try_lock() {
+                Ok(()) => break,
+                Err(TryLockError::WouldBlock) => {
+                    let mut text = String::new();
+                    // A lock without a readable pid is a lock all the same.
+                    let _ = lock.rewind().and_then(|()| lock.read_to_string(&mut text));
+                    let pid = text.trim().parse().ok();
+                    if !is_fading(pid, asked) {
+                        return Err(FolderError::Owned { root, pid });
+                    }
+                    std::thread::sleep(Duration::from_millis(10));
+                }
+                Err(TryLockError::Error(source)) => return Err(io(&path, "cannot be locked")(source)),
             }
-            Err(TryLockError::Error(source)) => return Err(io(&path, "cannot be locked")(source)),
         }
         let pid = format!("{}\n", std::process::id());
         lock.set_len(0)
@@ -114,6 +122,14 @@ impl Folder {
         let first = parts.next()?.as_os_str().to_string_lossy().into_owned();
         parts.next().is_some().then_some(first)
     }
+}
+
+/// Is a lock's owner dead, and the lock about to go? A daemon that is killed just as it starts a worker leaves the lock to that
+/// process for the moment before it notices.
+pub(crate) fn is_fading(pid: Option<u32>, asked: Instant) -> bool {
+    let pid = pid.and_then(|pid| i32::try_from(pid).ok()).and_then(rustix::process::Pid::from_raw);
+    let dead = pid.is_some_and(|pid| rustix::process::test_kill_process(pid) == Err(rustix::io::Errno::SRCH));
+    dead && asked.elapsed() < Duration::from_secs(2)
 }
 
 /// What a name in `in/` is.

@@ -104,6 +104,14 @@ pub(crate) fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
     file.sync_all()
 }
 
+/// Makes an empty file that need not survive the machine.
+///
+/// # Errors
+/// As `open`.
+pub(crate) fn touch(path: &Path) -> io::Result<()> {
+    OpenOptions::new().write(true).create(true).truncate(false).open(path).map(drop)
+}
+
 /// Writes `value` as JSON, with a final newline, into a new synced file.
 ///
 /// # Errors
@@ -162,6 +170,11 @@ fn umask() -> u32 {
         let mask = status.lines().find_map(|line| line.strip_prefix("Umask:"));
         mask.and_then(|mask| u32::from_str_radix(mask.trim(), 8).ok()).unwrap_or(0o022)
     })
+}
+
+/// Bytes that may still be written to a folder's file system; boundless where it does not say.
+pub(crate) fn free_space(folder: &Path) -> u64 {
+    rustix::fs::statvfs(folder).map_or(u64::MAX, |fs| fs.f_bavail.saturating_mul(fs.f_frsize))
 }
 
 /// Does the folder lie on a network or user-space file system, whose changes the kernel does not tell us of?

@@ -103,6 +103,7 @@ impl<'a> Shown<'a> {
 fn note(job: &Job) -> String {
     match &job.state {
         State::Noticed { reason } => reason.clone(),
+        State::Running { cancel: true, .. } => "being stopped".into(),
         State::Ended { publication } => match (&publication.output, publication.reason.is_empty()) {
             (Some(output), true) => {
                 format!("→ {}/{output}", if publication.ending.is_good() { "out" } else { area(publication.ending.area()) })

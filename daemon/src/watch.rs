@@ -18,9 +18,9 @@ use suture_store::{Control, JobStore, Query, SledStore, StoreError, crash_point}
 use crate::attempt::{Context, Event, Slot, WITNESS, remove_work};
 use crate::cli::WatchArgs;
 use crate::config::{Config, default_state};
-use crate::control::Door;
+use crate::control::{Door, knock};
 use crate::exit::Exit;
-use crate::folder::{Folder, FolderError};
+use crate::folder::{Folder, FolderError, is_fading};
 use crate::fsx;
 use crate::scan::Reconciler;
 use crate::schedule::{Schedule, Turn};
@@ -32,6 +32,9 @@ const RESCAN: Duration = Duration::from_secs(60);
 const RESCAN_POLLED: Duration = Duration::from_secs(10);
 /// Hints within this time are one.
 const SCAN_AT_MOST_EVERY: Duration = Duration::from_millis(50);
+/// How often the keeper looks about when nothing happens: for signals, and with `--once` for the end of all work.
+const IDLE: Duration = Duration::from_millis(200);
+const IDLE_ONCE: Duration = Duration::from_millis(20);
 /// Free space is looked at this often.
 const DISK_EVERY: Duration = Duration::from_secs(5);
 /// The store is opened again so often in a row before the process gives up.
@@ -71,9 +74,13 @@ pub(crate) fn serve(config: Config, once: bool, stop: &Stop) -> Exit {
             }
         }
     }
-    let store = match SledStore::open(&config.state) {
-        Ok(store) => Arc::new(store),
-        Err(error) => return store_failed(&error),
+    let asked = Instant::now();
+    let store = loop {
+        match SledStore::open(&config.state) {
+            Ok(store) => break Arc::new(store),
+            Err(StoreError::Locked { pid, .. }) if is_fading(pid, asked) => std::thread::sleep(Duration::from_millis(10)),
+            Err(error) => return store_failed(&error),
+        }
     };
     note_state(&config, &folders);
     let mut daemon = Daemon { config: Arc::new(config), folders, store, once, stop: stop.clone() };
@@ -183,6 +190,7 @@ impl Daemon {
                 std::thread::sleep(Duration::from_millis(10));
             }
             ended.store(true, Ordering::Relaxed);
+            self.folders.iter().for_each(|folder| knock(&folder.root));
         });
         let failed = context.failed.lock().map_or_else(|poisoned| poisoned.into_inner().take(), |mut failed| failed.take());
         match failed {
@@ -315,9 +323,10 @@ impl<'a> Keeper<'a> {
     /// Waits for the next thing to do, and takes in what was heard.
     fn listen(&mut self) {
         let settling = self.folders.iter().filter(|kept| kept.reconciler.is_settling());
-        let pause = settling.map(|kept| kept.rest.look_every()).min().unwrap_or(Duration::from_millis(200));
-        let wait =
-            if self.folders.iter().any(|kept| kept.dirty) { SCAN_AT_MOST_EVERY } else { pause.min(Duration::from_millis(200)) };
+        let looks = settling.map(|kept| kept.rest.look_every());
+        let scan = self.folders.iter().any(|kept| kept.dirty).then_some(SCAN_AT_MOST_EVERY);
+        let idle = if self.context.once { IDLE_ONCE } else { IDLE };
+        let wait = looks.chain(scan).min().unwrap_or(idle).min(idle);
         let mut next = self.inbox.recv_timeout(wait);
         loop {
             match next {
@@ -381,8 +390,7 @@ impl<'a> Keeper<'a> {
         let first = self.disk_looked.is_none();
         self.disk_looked = Some(now);
         let reserve = self.context.config.reserve;
-        let free = |root: &Path| rustix::fs::statvfs(root).map_or(u64::MAX, |fs| fs.f_bavail.saturating_mul(fs.f_frsize));
-        let full = self.folders.iter().find(|kept| free(&kept.folder.root) < reserve);
+        let full = self.folders.iter().find(|kept| fsx::free_space(&kept.folder.root) < reserve);
         if self.context.schedule.pause(full.is_some()) != full.is_some() || (first && full.is_some()) {
             match full {
                 Some(kept) => {

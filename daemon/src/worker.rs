@@ -26,6 +26,10 @@ pub(crate) fn serve() -> io::Result<()> {
         let _ = std::fs::write("/proc/self/clear_refs", "5");
         let answer = answer(&request);
         orphan::work_begins(None);
+        if let Some(witness) = &request.witness {
+            // Not synced: a machine that goes down takes this word with it, and the file stays a suspect.
+            let _ = fsx::touch(witness);
+        }
         say(&answer)?;
     }
     Ok(())
@@ -100,7 +104,8 @@ impl Progress for Teller {
 }
 
 /// The end of a worker whose supervisor died: the system sends SIGTERM then. Before it ends, it leaves a file that says that its
-/// work outlived the supervisor, so that the work is not suspected of having killed it. An operator's SIGTERM just ends it.
+/// work outlived the supervisor, so that the work is not suspected of having killed it. (An operator's SIGTERM leaves the file too;
+/// the supervisor, being alive, pays no attention to it.)
 mod orphan {
     use std::ffi::CString;
     use std::io;
@@ -122,10 +127,9 @@ mod orphan {
     }
 
     pub(super) fn listen() -> io::Result<()> {
-        let parent = rustix::process::getppid();
-        let end = move || {
+        let end = || {
             let name = WITNESS.load(Ordering::SeqCst);
-            if !name.is_null() && rustix::process::getppid() != parent {
+            if !name.is_null() {
                 // SAFETY: not null, so it came from `CString::into_raw`, ends with a NUL, and is never freed.
                 let name = unsafe { std::ffi::CStr::from_ptr(name) };
                 let flags = OFlags::CREATE | OFlags::WRONLY | OFlags::CLOEXEC;
@@ -135,7 +139,7 @@ mod orphan {
             // Ends the process as the signal would have.
             let _ = signal_hook::low_level::emulate_default_handler(SIGTERM);
         };
-        // SAFETY: the handler only loads an atomic, makes plain system calls (getppid, open, and those of the default action),
+        // SAFETY: the handler only loads an atomic, makes plain system calls (open, and those of the default action),
         // and neither allocates nor locks.
         unsafe { signal_hook::low_level::register(SIGTERM, end) }?;
         Ok(())

@@ -88,7 +88,12 @@ impl SledStore {
     /// # Errors
     /// As [`SledStore::open`].
     pub fn open_with(state: &Path, clock: Arc<dyn Clock>) -> Result<Self, StoreError> {
-        std::fs::create_dir_all(state).map_err(files::io(state, "making the folder"))?;
+        if !state.exists() {
+            std::fs::create_dir_all(state).map_err(files::io(state, "making the folder"))?;
+            if let Some(parent) = state.parent().filter(|parent| !parent.as_os_str().is_empty()) {
+                files::sync_dir(parent)?;
+            }
+        }
         let lock = files::lock(state)?;
         let (queue, opening) = open::queue(state, &clock)?;
         Ok(Self {

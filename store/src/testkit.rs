@@ -379,7 +379,7 @@ fn death_of_the_daemon(subject: &mut dyn Subject, _: &ManualClock) -> Result<(),
     Ok(())
 }
 
-fn suspects_run_alone(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), StoreError> {
+fn suspects_run_alone(subject: &mut dyn Subject, clock: &ManualClock) -> Result<(), StoreError> {
     let store = subject.store();
     let (poison, bystander) = (submit_one(store, "poison.stl", 84)?, submit_one(store, "bystander.stl", 84)?);
     for _ in 0..2 {
@@ -392,6 +392,11 @@ fn suspects_run_alone(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), 
     assert_eq!(job(store, poison)?.kind(), Kind::Suspect);
     assert_eq!(store.claim(&Filter::default())?, None, "suspects do not run beside others");
     let suspects = Filter { suspects: true, ..Filter::default() };
+    // Not even after a pause.
+    let claim = store.claim(&suspects)?.ok_or(StoreError::Unknown(poison))?;
+    store.advance(&claim, Step::Environment { reason: "no space left".into() })?;
+    clock.pass(BACKOFF_CAP_MS);
+    assert_eq!(store.claim(&Filter::default())?, None, "nor after a pause");
     for death in 1..=3 {
         let store = subject.store();
         let claim = store.claim(&suspects)?.ok_or(StoreError::Unknown(poison))?;

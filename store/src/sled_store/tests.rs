@@ -168,14 +168,19 @@ fn an_empty_folder_is_a_new_store() {
 }
 
 #[test]
-fn shutdown_notes_how_far_it_got() {
+fn now_and_then_and_at_shutdown_it_notes_how_far_it_got() {
     let state = tempfile::tempdir().unwrap();
     let store = SledStore::open(state.path()).unwrap();
     assert_eq!(files::read_mark(state.path()).unwrap(), Mark::Reached(Epoch(1), Seq(1)));
     submit(&store, "a.stl");
     assert_eq!(files::read_mark(state.path()).unwrap(), Mark::Reached(Epoch(1), Seq(1)), "only now and then");
+    for at in 0..63 {
+        submit(&store, &format!("{at}.stl"));
+    }
+    assert_eq!(files::read_mark(state.path()).unwrap(), Mark::Reached(Epoch(1), Seq(65)), "after 64");
+    submit(&store, "b.stl");
     drop(store);
-    assert_eq!(files::read_mark(state.path()).unwrap(), Mark::Reached(Epoch(1), Seq(2)));
+    assert_eq!(files::read_mark(state.path()).unwrap(), Mark::Reached(Epoch(1), Seq(66)));
 }
 
 fn snapshots(state: &Path) -> Vec<PathBuf> {

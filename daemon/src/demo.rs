@@ -148,6 +148,9 @@ fn tell(dir: &Path, job: &Job) {
     let state = if publication.ending.is_good() { "good" } else { job.kind().name() };
     say(format_args!("{name:<16} {state}: {}", report.verdict.statement));
     say(format_args!("{:16} wrong   {wrong}\n{:16} done    {done}", "", ""));
+    for reason in &report.verdict.reasons {
+        say(format_args!("{:16} why     {reason}", ""));
+    }
 }
 
 fn say(text: std::fmt::Arguments) {

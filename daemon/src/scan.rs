@@ -46,6 +46,14 @@ impl Reconciler {
         Self { folder, config, rest, entries: BTreeMap::new(), warned: BTreeSet::new() }
     }
 
+    /// A job of an earlier life answers for this file already: it need not settle again, and when the job ends while the folder
+    /// is being read, it is not taken for a new drop.
+    pub(crate) fn known(&mut self, source: &Source, id: JobId) {
+        let Source { dev, ino, size, mtime_ns, .. } = *source;
+        let identity = Identity { dev, ino, size, mtime_ns, ctime_ns: 0 };
+        self.entries.insert(source.path.to_path(), Entry::Submitted { id, identity, foreign: false });
+    }
+
     /// Reads the folder. Files that are new or changed begin to settle; names that are gone are forgotten, and the jobs of
     /// those that were only noticed are returned. O(names).
     ///
@@ -295,6 +303,20 @@ mod tests {
         std::fs::write(&path, [0; 85]).unwrap();
         r.scan(start + Duration::from_secs(20)).unwrap();
         assert!(r.is_settling());
+    }
+
+    #[test]
+    fn a_job_of_an_earlier_life_answers_for_its_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut r = reconciler(dir.path());
+        mesh(&dir.path().join("in/a.stl"));
+        let found = settle(&mut r, Instant::now());
+        let mut next = Reconciler::new(Arc::clone(&r.folder), Arc::clone(&r.config), r.rest);
+        next.known(&found[0].1.source, JobId(1));
+        assert!(settle(&mut next, Instant::now()).is_empty());
+        std::fs::write(dir.path().join("in/a.stl"), [0; 85]).unwrap();
+        next.scan(Instant::now()).unwrap();
+        assert!(next.is_settling(), "another content is another drop");
     }
 
     #[test]

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, unbounded};
 use notify::event::{EventKind, ModifyKind, RenameMode};
 use notify::{RecursiveMode, Watcher};
-use suture_store::job::Kind;
+use suture_store::job::{Area, Kind};
 use suture_store::{Control, JobStore, Query, SledStore, StoreError, crash_point};
 
 use crate::attempt::{Context, Event, Slot, WITNESS, remove_work};
@@ -299,6 +299,7 @@ impl<'a> Keeper<'a> {
 
     /// Keeps the folders until there is a reason to end.
     fn keep(&mut self) -> Result<(), StoreError> {
+        self.remember_live()?;
         self.forget_noticed()?;
         loop {
             if self.stop.asked() {
@@ -367,6 +368,19 @@ impl<'a> Keeper<'a> {
             self.context.not_good.store(true, Ordering::Relaxed);
         }
         Ok(true)
+    }
+
+    /// Jobs of an earlier life whose files still wait in `in/`.
+    fn remember_live(&mut self) -> Result<(), StoreError> {
+        let kinds = Kind::ALL.into_iter().filter(|kind| kind.is_live()).collect();
+        for job in self.context.store.list(&Query { kinds, ..Query::default() })? {
+            if let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == job.source.folder)
+                && job.original().0 == Area::In
+            {
+                kept.reconciler.known(&job.source, job.id);
+            }
+        }
+        Ok(())
     }
 
     /// Files that were noticed in an earlier life and are gone now.

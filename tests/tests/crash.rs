@@ -1,0 +1,194 @@
+//! The daemon killed at every step of its protocol, at pairs of steps, and at random: whatever happens, each dropped file ends in
+//! exactly one place with exactly one result, the same as without the kill, and no file is blamed.
+//!
+//! `SUTURE_EXHAUSTIVE=1` tries every pair of steps and the full number of random kills.
+
+use std::collections::BTreeMap;
+use std::os::unix::process::ExitStatusExt;
+use std::process::Child;
+use std::time::{Duration, Instant};
+
+use suture_bench::generate::Case;
+use suture_tests::binary::with_crash_points;
+use suture_tests::hot::{Hot, Tree, mesh};
+
+const PARTS: [&str; 4] = ["out", "done", "failed", "quarantine"];
+
+fn exhaustive() -> bool {
+    std::env::var_os("SUTURE_EXHAUSTIVE").is_some()
+}
+
+/// Everything that is to be the same with and without kills: names of all files, and the meshes' bytes. Reports and receipts
+/// tell of times and attempts.
+fn state(hot: &Hot) -> BTreeMap<&'static str, Tree> {
+    let mut parts: BTreeMap<_, _> = PARTS.iter().chain(&["in"]).map(|part| (*part, hot.tree(part))).collect();
+    for (name, bytes) in parts.values_mut().flatten() {
+        if name.ends_with(".json") {
+            serde_json::from_slice::<serde_json::Value>(bytes).unwrap_or_else(|e| panic!("{name} is not whole: {e}"));
+            bytes.clear();
+        }
+    }
+    parts
+}
+
+/// Nothing is left over, nothing is open, and no file is blamed.
+fn assert_at_rest(hot: &Hot, what: &str) {
+    assert_eq!(hot.tree(".suture/work"), Tree::new(), "{what}: left-overs");
+    for job in hot.jobs() {
+        let kind = job["kind"].as_str().expect("a kind");
+        assert!(matches!(kind, "done" | "failed" | "needs_review"), "{what}: {job}");
+        assert_eq!(job["blame"]["charges"], 0, "{what}: {job}");
+    }
+}
+
+/// One file that is repaired, in a sub-folder; one that cannot be read.
+fn drop_two(hot: &Hot) {
+    hot.put("scan/holes.stl", &mesh(Case::Holes, 1));
+    hot.put("picture.stl", b"\x89PNG\r\n\x1a\nendsolid");
+}
+
+fn drop_one(hot: &Hot) {
+    hot.put("part.stl", &mesh(Case::Clean, 1));
+}
+
+/// The state after a run without kills, and the number of crash points it passes.
+fn reference(put: fn(&Hot)) -> (BTreeMap<&'static str, Tree>, u64) {
+    let hot = Hot::new(with_crash_points());
+    put(&hot);
+    let trace = hot.path().join("trace");
+    let status = hot.watch(&["--once"]).env("SUTURE_CRASH_TRACE", &trace).status().expect("the daemon starts");
+    assert!(status.code().is_some_and(|code| code < 2), "{status}");
+    let trace = std::fs::read_to_string(trace).expect("a trace");
+    for point in
+        ["submitted", "claimed", "linked", "worked", "result_durable", "intent_durable", "report_placed", "done", "swept"]
+    {
+        assert!(trace.contains(&format!("daemon.{point}\n")), "no run passes {point}");
+    }
+    assert_at_rest(&hot, "reference");
+    (state(&hot), trace.lines().count() as u64)
+}
+
+/// Works through `cases` on two threads, as the machine has little else to do while the daemon syncs.
+fn on_two_threads<T: Sync>(cases: &[T], run: impl Fn(&T) + Sync) {
+    let next = std::sync::atomic::AtomicUsize::new(0);
+    std::thread::scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(|| {
+                while let Some(case) = cases.get(next.fetch_add(1, std::sync::atomic::Ordering::Relaxed)) {
+                    run(case);
+                }
+            });
+        }
+    });
+}
+
+fn was_killed(status: std::process::ExitStatus) -> bool {
+    status.signal() == Some(9)
+}
+
+#[test]
+fn killed_at_every_step() {
+    let (expected, passes) = reference(drop_two);
+    let steps: Vec<u64> = (1..=passes).collect();
+    on_two_threads(&steps, |&step| {
+        let hot = Hot::new(with_crash_points());
+        drop_two(&hot);
+        let what = format!("killed at pass {step} of {passes}");
+        let killed = was_killed(hot.once(Some(step)));
+        // The order of two jobs is not the same in every run; the last passes may not be reached.
+        assert!(killed || step + 8 > passes, "{what}: was not");
+        assert!(hot.once(None).code().is_some_and(|code| code < 2), "{what}: the next run fails");
+        assert_eq!(state(&hot), expected, "{what}");
+        assert_at_rest(&hot, &what);
+    });
+}
+
+#[test]
+fn killed_at_pairs_of_steps() {
+    let (expected, passes) = reference(drop_one);
+    let pairs: Vec<(u64, u64)> = (1..=passes)
+        .flat_map(|first| (1..=passes).map(move |second| (first, second)))
+        .filter(|(first, second)| exhaustive() || (first * 5 + second * 3) % 11 == 0)
+        .collect();
+    on_two_threads(&pairs, |&(first, second)| {
+        let hot = Hot::new(with_crash_points());
+        drop_one(&hot);
+        let what = format!("killed at pass {first}, then at pass {second}");
+        for step in [first, second] {
+            // A run that has less to do than that many passes ends by itself.
+            hot.once(Some(step));
+        }
+        assert_eq!(hot.once(None).code(), Some(0), "{what}: the last run fails");
+        assert_eq!(state(&hot), expected, "{what}");
+        assert_at_rest(&hot, &what);
+    });
+}
+
+/// A small generator of numbers (xorshift), so that a failing run can be repeated from its seed.
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, bound: u64) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0 % bound
+    }
+}
+
+fn kill(pid: u32) {
+    let pid = rustix::process::Pid::from_raw(pid.cast_signed()).expect("a process number");
+    // It may have ended by itself.
+    let _ = rustix::process::kill_process(pid, rustix::process::Signal::KILL);
+}
+
+/// Worker processes of a daemon.
+fn workers(daemon: &Child) -> Vec<u32> {
+    let tasks = std::fs::read_dir(format!("/proc/{}/task", daemon.id())).into_iter().flatten().flatten();
+    tasks
+        .filter_map(|task| std::fs::read_to_string(task.path().join("children")).ok())
+        .flat_map(|list| list.split_whitespace().filter_map(|pid| pid.parse().ok()).collect::<Vec<u32>>())
+        .collect()
+}
+
+/// Files that take a third of a second each, while the daemon and its workers are killed again and again.
+#[test]
+fn killed_at_random() {
+    let (files, kills) = if exhaustive() { (40, 50) } else { (10, 8) };
+    let mut dice = Dice(0x5EED);
+    let hot = Hot::new(with_crash_points());
+    let originals: BTreeMap<String, Vec<u8>> = (0..files).map(|i| (format!("part{i}!slow!.stl"), mesh(Case::Clean, i))).collect();
+    for (name, bytes) in &originals {
+        hot.put(name, bytes);
+    }
+    let deadline = Instant::now() + Duration::from_secs(300);
+    let (mut daemons_left, mut workers_left) = (kills, kills);
+    let mut daemon = hot.start();
+    while hot.tree("done").len() < originals.len() || daemons_left + workers_left > 0 {
+        assert!(Instant::now() < deadline, "{} of {} files are done", hot.tree("done").len(), originals.len());
+        std::thread::sleep(Duration::from_millis(dice.below(400)));
+        if let Some(status) = daemon.try_wait().unwrap() {
+            panic!("the daemon ended by itself: {status}");
+        }
+        if daemons_left > 0 && dice.below(2) == 0 {
+            daemons_left -= 1;
+            kill(daemon.id());
+            daemon.wait().unwrap();
+            daemon = hot.start();
+        } else if workers_left > 0 {
+            workers_left -= 1;
+            let running = workers(&daemon);
+            if let Some(pid) = running.get(dice.below(running.len().max(1) as u64) as usize) {
+                kill(*pid);
+            }
+        }
+    }
+    let pid = rustix::process::Pid::from_raw(daemon.id().cast_signed()).unwrap();
+    rustix::process::kill_process(pid, rustix::process::Signal::TERM).unwrap();
+    assert_eq!(daemon.wait().unwrap().code(), Some(0));
+    assert_eq!(hot.tree("done"), originals);
+    let out: Tree = hot.tree("out").into_iter().filter(|(name, _)| !name.ends_with(".json")).collect();
+    assert_eq!(out, originals, "clean files appear byte for byte, once each");
+    assert_eq!(hot.jobs().len(), originals.len());
+    assert_at_rest(&hot, "random kills");
+}

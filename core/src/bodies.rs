@@ -48,7 +48,7 @@ pub(crate) fn surroundings(survey: &Survey<'_>, shop: &Shop, components: &Compon
 
     let mut counts = vec![0i32; rays.iter().map(|r| r.candidates.len()).sum()];
     let is_asked = |patch: u32| asked[components.of_patch[patch as usize] as usize];
-    let per_chunk = survey.visit_sound(is_asked, Vec::new, |hits: &mut Vec<(u32, i32)>, triangle, patch| {
+    let per_chunk = survey.visit_sound(is_asked, |corners| grid.may_meet(corners), Vec::new, |hits: &mut Vec<(u32, i32)>, triangle, patch| {
         let corners = record::corners(&survey.records[triangle as usize]);
         let sign = if reversed.patches[patch as usize] { -1 } else { 1 };
         grid.cross(&rays, &corners, components.of_patch[patch as usize], &mut |at, w| hits.push((at, sign * w)));
@@ -116,7 +116,8 @@ struct Grid {
 
 impl Grid {
     fn new(rays: &[Ray]) -> Self {
-        let side = ((rays.len() as f64).sqrt() as usize).clamp(1, 1024);
+        // Several cells a ray, so that most small triangles are over with at the first look.
+        let side = ((rays.len() as f64).sqrt() as usize * 8).clamp(1, 1024);
         let (mut lo, mut hi) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for ray in rays {
             for k in 0..2 {
@@ -143,20 +144,28 @@ impl Grid {
         (((x - self.lo[axis]) * self.per_unit[axis]) as usize).min(self.side - 1)
     }
 
-    /// Reports `(place in the table of counts, signed crossing)` for every ray that asks for `component` and meets the triangle.
-    fn cross(&self, rays: &[Ray], corners: &[[f32; 3]; 3], component: u32, hit: &mut dyn FnMut(u32, i32)) {
+    /// The rays in the cells under a triangle, row by row.
+    fn under(&self, corners: &[[f32; 3]; 3]) -> impl Iterator<Item = &[u32]> {
         let span = |k: usize| {
             let x = corners.map(|c| f64::from(c[k]));
-            (x[0].min(x[1]).min(x[2]), x[0].max(x[1]).max(x[2]))
+            (self.cell(k, x[0].min(x[1]).min(x[2])), self.cell(k, x[0].max(x[1]).max(x[2])))
         };
         let ((x0, x1), (y0, y1)) = (span(0), span(1));
-        // Beyond the grid on the low side a coordinate would be cast to cell 0 all the same.
-        if x1 < self.lo[0] || y1 < self.lo[1] {
-            return;
-        }
-        for row in self.cell(1, y0)..=self.cell(1, y1) {
-            let cells = row * self.side + self.cell(0, x0)..=row * self.side + self.cell(0, x1);
-            for r in &self.order[self.starts[*cells.start()] as usize..self.starts[cells.end() + 1] as usize] {
+        (y0..=y1).map(move |row| {
+            let row = row * self.side;
+            &self.order[self.starts[row + x0] as usize..self.starts[row + x1 + 1] as usize]
+        })
+    }
+
+    /// Is there a ray in the cells under the triangle?
+    fn may_meet(&self, corners: &[[f32; 3]; 3]) -> bool {
+        self.under(corners).any(|row| !row.is_empty())
+    }
+
+    /// Reports `(place in the table of counts, signed crossing)` for every ray that asks for `component` and meets the triangle.
+    fn cross(&self, rays: &[Ray], corners: &[[f32; 3]; 3], component: u32, hit: &mut dyn FnMut(u32, i32)) {
+        for row in self.under(corners) {
+            for r in row {
                 let ray = &rays[*r as usize];
                 if let Ok(i) = ray.candidates.binary_search(&component) {
                     let w = crossing(corners, ray.from);

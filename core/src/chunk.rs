@@ -80,8 +80,14 @@ pub(crate) struct Scratch {
     sound: Vec<bool>,
     collinear: Vec<u32>,
     parents: Vec<u32>,
-    patch_of: Vec<u32>,
+    /// Patch of a sound home vertex, [`UNSOUND`] or [`AWAY`].
+    states: Vec<u32>,
 }
+
+/// State of a vertex at home here whose star is not sound.
+const UNSOUND: u32 = NONE - 1;
+/// State of a vertex at home elsewhere.
+const AWAY: u32 = NONE - 2;
 
 /// Bytes that one worker needs for a chunk of `members` triangles, at most.
 pub(crate) fn scratch_bytes(members: u64) -> u64 {
@@ -100,19 +106,20 @@ impl Scratch {
         measure: &Measure,
     ) -> ChunkTopology {
         self.weld(records, members, chunk, plan.home_box(chunk));
-        self.mark_collinear(measure);
+        self.mark_collinear();
         self.judge_stars();
         self.unite_patches();
         self.collect(measure)
     }
 
     /// Numbers the vertices of all members.
+    #[inline(never)]
     fn weld(&mut self, records: &[Record], members: &Members, chunk: ChunkId, cell: HomeBox) {
         self.numbers.clear();
         self.triangles.clear();
         let expected: usize = members.runs(chunk).map(|(_, count)| count as usize).sum();
         // Half a vertex a triangle is the rule; a soup has three, and grows the table.
-        self.vertices.reset(expected * 3 / 4);
+        self.vertices.reset(expected / 2);
         self.numbers.reserve(expected);
         self.triangles.reserve(expected);
         for (first, count) in members.runs(chunk) {
@@ -128,12 +135,14 @@ impl Scratch {
     }
 
     /// Exactly collinear triangles: their vertices are unsound, so that the workshop sees the neighbours they must be closed with.
-    fn mark_collinear(&mut self, measure: &Measure) {
+    #[inline(never)]
+    fn mark_collinear(&mut self) {
         self.collinear.clear();
+        let positions = self.vertices.positions();
         for (i, t) in self.triangles.iter().enumerate() {
             if t[0] != NONE {
-                let corners = t.map(|v| self.vertices.positions()[v as usize]);
-                if is_collinear(&corners, measure.triangle(&corners).1) {
+                let [a, b, c] = t.map(|v| &positions[v as usize]);
+                if is_collinear(a, b, c) {
                     self.collinear.push(i as u32);
                 }
             }
@@ -141,6 +150,7 @@ impl Scratch {
     }
 
     /// Gathers the triangles around each home vertex and tests whether they are one closed coherent fan.
+    #[inline(never)]
     fn judge_stars(&mut self) {
         let vertices = self.home.len();
         self.starts.clear();
@@ -180,7 +190,8 @@ impl Scratch {
         }
     }
 
-    /// Union of sound home vertices that share a triangle; `patch_of` numbers the unions by first appearance.
+    /// Union of sound home vertices that share a triangle.
+    #[inline(never)]
     fn unite_patches(&mut self) {
         self.parents.clear();
         self.parents.extend(0..self.home.len() as u32);
@@ -195,6 +206,7 @@ impl Scratch {
         }
     }
 
+    #[inline(never)]
     fn collect(&mut self, measure: &Measure) -> ChunkTopology {
         let mut out = ChunkTopology {
             suspects: Vec::new(),
@@ -214,13 +226,11 @@ impl Scratch {
                 continue;
             }
             let (mut unsound, mut away, mut patch) = (0u8, false, NONE);
-            for (k, v) in t.iter().map(|v| *v as usize).enumerate() {
-                if !self.home[v] {
-                    away = true;
-                } else if !self.sound[v] {
-                    unsound |= 1 << k;
-                } else {
-                    patch = self.patch_of[v];
+            for (k, v) in t.iter().enumerate() {
+                match self.states[*v as usize] {
+                    AWAY => away = true,
+                    UNSOUND => unsound |= 1 << k,
+                    of => patch = of,
                 }
             }
             labels.push(patch);
@@ -236,7 +246,7 @@ impl Scratch {
                 out.links.push(Link { triangle, patch });
             } else {
                 sums.triangles += 1;
-                sums.extent += measure.triangle(&t.map(|v| self.vertices.positions()[v as usize])).0;
+                sums.extent += measure.triangle(&t.map(|v| self.vertices.positions()[v as usize]));
             }
         }
         if out.patches.len() > 1 {
@@ -245,54 +255,71 @@ impl Scratch {
         out
     }
 
+    #[inline(never)]
     fn number_patches(&mut self, patches: &mut Vec<Patch>) {
-        self.patch_of.clear();
-        self.patch_of.resize(self.home.len(), NONE);
-        for v in 0..self.home.len() as u32 {
-            if !self.sound[v as usize] {
+        self.states.clear();
+        self.states.extend(self.home.iter().map(|home| if *home { UNSOUND } else { AWAY }));
+        let positions = self.vertices.positions();
+        for v in 0..self.home.len() {
+            if !self.sound[v] {
                 continue;
             }
-            let root = find(&mut self.parents, v) as usize;
-            if self.patch_of[root] == NONE {
-                self.patch_of[root] = patches.len() as u32;
+            // The root is the smallest of its union, so it has been numbered before all others.
+            let root = find(&mut self.parents, v as u32) as usize;
+            if root == v {
+                self.states[v] = patches.len() as u32;
                 patches.push(Patch { triangles: 0, extent: Extent::default(), bounds: Bounds::EMPTY, first: NONE });
             }
-            self.patch_of[v as usize] = self.patch_of[root];
-            patches[self.patch_of[root] as usize].bounds.include(&[self.vertices.positions()[v as usize]]);
+            self.states[v] = self.states[root];
+            patches[self.states[root] as usize].bounds.include(&[positions[v]]);
         }
     }
 }
 
 /// Whether the (next, previous) pairs around a vertex form a single cycle of at least three in which no corner stands twice: each
-/// triangle's previous corner is exactly one other's next. Reorders the pairs.
+/// triangle's previous corner is exactly one other's next. May reorder the pairs.
 #[inline]
 fn is_closed_fan(around: &mut [[u32; 2]]) -> bool {
-    let n = around.len();
-    if !(3..=LONG_FAN).contains(&n) {
-        return n > LONG_FAN && long_fan_is_closed(around);
+    match around.len() {
+        0..3 => false,
+        3..=SHORT_FAN => short_fan_is_closed(around),
+        _ => long_fan_is_closed(around),
     }
-    let first = around[0][0];
-    for i in 1..n {
-        let wanted = around[i - 1][1];
-        let mut found = 0;
-        // The whole rest is looked through: a second match is an edge of more than two triangles.
-        let mut matches = 0;
-        for (j, t) in around.iter().enumerate().skip(i) {
-            if t[0] == wanted {
-                found = j;
-                matches += 1;
-            }
-        }
-        if matches != 1 || wanted == first {
-            return false;
-        }
-        around.swap(i, found);
-    }
-    around[n - 1][1] == first
 }
 
-/// Fans of more triangles are tested by sorting, since the walk takes quadratic time.
-const LONG_FAN: usize = 24;
+/// Compares each previous corner with all next ones at once.
+#[inline]
+fn short_fan_is_closed(around: &[[u32; 2]]) -> bool {
+    let mut next = [NONE; SHORT_FAN];
+    for (n, t) in next.iter_mut().zip(around) {
+        *n = t[0];
+    }
+    let (mut after, mut seen) = ([0u8; SHORT_FAN], 0u32);
+    for (successor, t) in after.iter_mut().zip(around) {
+        let equal = (0..SHORT_FAN).fold(0u32, |mask, j| mask | u32::from(next[j] == t[1]) << j);
+        // None: a boundary. Two: an edge of more than two triangles.
+        if !equal.is_power_of_two() {
+            return false;
+        }
+        *successor = equal.trailing_zeros() as u8;
+        seen |= equal;
+    }
+    if seen + 1 != 1 << around.len() {
+        return false;
+    }
+    // A permutation; it is one cycle when the way back to the start takes all steps.
+    let mut at = 0;
+    for _ in 1..around.len() {
+        at = after[usize::from(at)];
+        if at == 0 {
+            return false;
+        }
+    }
+    true
+}
+
+/// Most triangles of a fan that is tested by comparing all with all; longer ones are sorted.
+const SHORT_FAN: usize = 8;
 
 #[cold]
 fn long_fan_is_closed(around: &mut [[u32; 2]]) -> bool {
@@ -314,22 +341,22 @@ fn long_fan_is_closed(around: &mut [[u32; 2]]) -> bool {
     false
 }
 
-/// Exactly collinear (or coincident) corners; `normal` is the f64 cross product, used to rule out nearly all triangles at once.
+/// Exactly collinear (or coincident) corners. Nearly all triangles are told apart by their normal in f32: with differences and
+/// products rounded to 2⁻²⁴ each, its error is below 2⁻²¹ of the product of the two sides. What over- or underflows does not pass and
+/// is decided exactly. (Written without arrays, which would be stored and loaded again in other widths.)
 #[inline]
-pub(crate) fn is_collinear(corners: &[[f32; 3]; 3], normal: [f64; 3]) -> bool {
-    // The products' rounding is below 2⁻⁵⁰ of their size, and a difference of f32 values is rounded once.
-    let [a, b, c] = corners.map(|p| p.map(f64::from));
-    let size: f64 = (0..3).map(|k| (b[k] - a[k]).abs().max((c[k] - a[k]).abs())).fold(0.0, f64::max);
-    if normal.iter().any(|n| n.abs() > 8e-15 * size * size) {
-        return false;
-    }
-    is_collinear_exact(&a, &b, &c)
+pub(crate) fn is_collinear(a: &[f32; 3], b: &[f32; 3], c: &[f32; 3]) -> bool {
+    let (ux, uy, uz) = (b[0] - a[0], b[1] - a[1], b[2] - a[2]);
+    let (vx, vy, vz) = (c[0] - a[0], c[1] - a[1], c[2] - a[2]);
+    let (nx, ny, nz) = (uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx);
+    let bound = (ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz) * 1e-12;
+    !(nx * nx + ny * ny + nz * nz > bound && bound > f32::MIN_POSITIVE) && is_collinear_exact(a, b, c)
 }
 
 #[cold]
-fn is_collinear_exact(a: &[f64; 3], b: &[f64; 3], c: &[f64; 3]) -> bool {
+fn is_collinear_exact(a: &[f32; 3], b: &[f32; 3], c: &[f32; 3]) -> bool {
     [[0, 1], [1, 2], [2, 0]].iter().all(|[x, y]| {
-        let p = |v: &[f64; 3]| robust::Coord { x: v[*x], y: v[*y] };
+        let p = |v: &[f32; 3]| robust::Coord { x: f64::from(v[*x]), y: f64::from(v[*y]) };
         robust::orient2d(p(a), p(b), p(c)) == 0.0
     })
 }

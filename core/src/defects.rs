@@ -1,7 +1,6 @@
 //! Counts the defects of a mesh from its survey and its untouched workshop. Definitions: `core/DEFECTS.md`.
 
 use crate::bodies;
-use crate::chunk;
 use crate::report::Defects;
 use crate::shop::Shop;
 use crate::shop::components::{self, Components, Reversed, Through};
@@ -19,7 +18,7 @@ pub(crate) fn count(survey: &Survey<'_>, shop: &Shop, edges: &Edges, tolerance: 
     let uses: usize = edges.iter().map(|e| e.uses.len()).sum();
     let topology = survey.triangles() - degenerate_index;
     let total =
-        survey.patches.iter().map(|p| p.extent).chain(shop.living().map(|t| survey.measure.triangle(&shop.points(t)).0)).fold(
+        survey.patches.iter().map(|p| p.extent).chain(shop.living().map(|t| survey.measure.triangle(&shop.points(t)))).fold(
             Extent::default(),
             |mut sum, e| {
                 sum += e;
@@ -34,7 +33,7 @@ pub(crate) fn count(survey: &Survey<'_>, shop: &Shop, edges: &Edges, tolerance: 
         // Edges without a complete end have two triangles each.
         edges: edges.len() as u64 + (3 * topology - uses as u64) / 2,
         degenerate_index,
-        degenerate_area: shop.living().filter(|t| is_collinear(survey, shop, *t)).count() as u64,
+        degenerate_area: shop.living().filter(|t| shop.is_collinear(*t)).count() as u64,
         duplicates_same,
         duplicates_opposite,
         boundary_edges: edges.iter().filter(|e| e.is_boundary()).count() as u64,
@@ -70,11 +69,6 @@ fn count_bodies(survey: &Survey<'_>, shop: &Shop, components: &Components, rever
             _ => {}
         }
     }
-}
-
-pub(crate) fn is_collinear(survey: &Survey<'_>, shop: &Shop, t: u32) -> bool {
-    let points = shop.points(t);
-    chunk::is_collinear(&points, survey.measure.triangle(&points).1)
 }
 
 /// Living triangles by vertex set: (sorted vertices, number), sorted.

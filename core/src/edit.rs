@@ -79,6 +79,7 @@ impl Edit {
     fn flip_patches(&mut self, survey: &Survey<'_>, reversed: &Reversed) {
         let runs = survey.visit_sound(
             |patch| reversed.patches[patch as usize],
+            |_| true,
             Vec::<(u32, u32)>::new,
             |runs, triangle, _| match runs.last_mut() {
                 Some((first, count)) if *first + *count == triangle => *count += 1,

@@ -58,6 +58,7 @@ impl Bounds {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Measure {
     middle: [f64; 3],
+    /// To units of 2⁻⁴⁰; [`whole`] takes 48 more bits.
     to_area: f64,
     to_volume: f64,
 }
@@ -88,12 +89,12 @@ impl Measure {
         // A power of two above the diagonal, so that scaling rounds nothing.
         let size = bounds.diagonal().max(f64::from(f32::MIN_POSITIVE));
         let exponent = (size.to_bits() >> 52) as i32 - 1022;
-        Self { middle, to_area: power_of_two(88 - 2 * exponent), to_volume: power_of_two(88 - 3 * exponent) }
+        Self { middle, to_area: power_of_two(40 - 2 * exponent), to_volume: power_of_two(40 - 3 * exponent) }
     }
 
-    /// One triangle's terms, and its normal (twice the area long) in f64.
+    /// One triangle's terms.
     #[inline]
-    pub(crate) fn triangle(&self, corners: &[[f32; 3]; 3]) -> (Extent, [f64; 3]) {
+    pub(crate) fn triangle(&self, corners: &[[f32; 3]; 3]) -> Extent {
         let [a, b, c] = corners.map(|p| [f64::from(p[0]), f64::from(p[1]), f64::from(p[2])]);
         let u = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
         let v = [c[0] - a[0], c[1] - a[1], c[2] - a[2]];
@@ -101,18 +102,29 @@ impl Measure {
         let area = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
         let m = self.middle;
         let volume = (a[0] - m[0]) * n[0] + (a[1] - m[1]) * n[1] + (a[2] - m[2]) * n[2];
-        (Extent { area: (area * self.to_area) as i128, volume: (volume * self.to_volume) as i128 }, n)
+        Extent { area: whole(area * self.to_area), volume: whole(volume * self.to_volume) }
     }
 
     /// Area in the model's units squared.
     pub(crate) fn area(&self, sum: Extent) -> f64 {
-        sum.area as f64 / self.to_area / 2.0
+        sum.area as f64 / FRACTION / self.to_area / 2.0
     }
 
     /// Signed volume in the model's units cubed.
     pub(crate) fn volume(&self, sum: Extent) -> f64 {
-        sum.volume as f64 / self.to_volume / 6.0
+        sum.volume as f64 / FRACTION / self.to_volume / 6.0
     }
+}
+
+/// Bits that [`whole`] keeps below the point.
+const FRACTION: f64 = (1u64 << 48) as f64;
+
+/// `x` in units of 2⁻⁴⁸, towards zero; exact but for what is below that. Two conversions to 64 bits are far cheaper than one to 128.
+#[inline]
+fn whole(x: f64) -> i128 {
+    let high = x as i64;
+    let low = ((x - high as f64) * FRACTION) as i64;
+    (i128::from(high) << 48) + i128::from(low)
 }
 
 /// 2^e as f64, also where the exponent leaves the normal range of the intermediate steps.
@@ -136,7 +148,7 @@ mod tests {
             triangles.iter().for_each(|t| bounds.include(t));
             let measure = Measure::new(&bounds);
             let mut sum = Extent::default();
-            triangles.iter().for_each(|t| sum += measure.triangle(t).0);
+            triangles.iter().for_each(|t| sum += measure.triangle(t));
             assert!((measure.volume(sum) - 1.0).abs() < 1e-9, "{}", measure.volume(sum));
             assert!((measure.area(sum) - 6.0).abs() < 1e-9);
         }

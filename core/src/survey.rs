@@ -3,7 +3,6 @@
 //! What comes out does not depend on the chunks: the suspects (all triangles around unsound vertices), and the patches of sound
 //! surface, numbered by their smallest triangle. Everything global is proportional to the seams and the defects, not to the file.
 
-use std::collections::HashSet;
 use std::path::Path;
 
 use crate::chunk::{self, ChunkTopology, Labels, Link, NONE, Patch, Scratch, Suspect};
@@ -13,6 +12,7 @@ use crate::plan::{ChunkId, Plan};
 use crate::record::{self, Record};
 use crate::settings::Limits;
 use crate::sums::{Bounds, Extent, Measure};
+use crate::weld::Weld;
 use crate::{Progress, parallel};
 
 /// Topology of the sound part of a file, and the list of what is not sound.
@@ -89,11 +89,13 @@ impl<'a> Survey<'a> {
         self.records.len() as u64 - self.nonfinite.iter().map(|r| u64::from(r.1)).sum::<u64>()
     }
 
-    /// Visits every triangle with three sound corners whose patch is `wanted`, exactly once, with its patch: chunks in parallel,
-    /// results in chunk order (which the plan decides: only sums of integers and sets may be made of them).
+    /// Visits every triangle with three sound corners whose patch is `wanted` and that `passes`, exactly once, with its patch: chunks
+    /// in parallel, results in chunk order (which the plan decides: only sums of integers and sets may be made of them).
+    /// `passes` is asked first, since it may be cheaper than finding out whose turn it is.
     pub(crate) fn visit_sound<R: Send>(
         &self,
         wanted: impl Fn(u32) -> bool + Sync,
+        passes: impl Fn(&[[f32; 3]; 3]) -> bool + Sync,
         make: impl Fn() -> R + Sync,
         visit: impl Fn(&mut R, u32, u32) + Sync,
     ) -> Vec<R> {
@@ -105,18 +107,15 @@ impl<'a> Survey<'a> {
             }
             let chunk = ChunkId(c as u32);
             let cell = self.plan.home_box(chunk);
-            let mut suspects = self.suspects.as_slice();
             for (triangle, patch) in self.members.triangles(chunk).zip(self.labels[c].iter()) {
                 if patch == NONE || !wanted(patches[patch as usize]) {
                     continue;
                 }
-                let skip = suspects.partition_point(|s| s.triangle < triangle);
-                suspects = &suspects[skip..];
-                if suspects.first().is_some_and(|s| s.triangle == triangle) {
+                let corners = record::corners(&self.records[triangle as usize]);
+                if !passes(&corners) || self.suspects.binary_search_by_key(&triangle, |s| s.triangle).is_ok() {
                     continue;
                 }
                 // A sound triangle has a label in every chunk that sees it; the lowest of them visits it.
-                let corners = record::corners(&self.records[triangle as usize]);
                 if corners.iter().all(|p| cell.holds(*p)) || corners.iter().all(|p| self.plan.home(*p) >= chunk) {
                     visit(&mut result, triangle, patches[patch as usize]);
                 }
@@ -128,7 +127,11 @@ impl<'a> Survey<'a> {
     /// Makes suspects of all triangles around the sound vertices at `positions` (not empty), and returns the new ones, ascending.
     /// Reads the chunks where the vertices are at home.
     pub(crate) fn promote(&mut self, positions: &[[f32; 3]]) -> Vec<(Suspect, u32)> {
-        let wanted: HashSet<[u32; 3]> = positions.iter().map(|p| key(*p)).collect();
+        let mut wanted = Weld::default();
+        wanted.reset(positions.len() * 8);
+        positions.iter().for_each(|p| {
+            wanted.vertex(*p);
+        });
         let mut homes: Vec<ChunkId> = positions.iter().map(|p| self.plan.home(*p)).collect();
         homes.sort_unstable();
         homes.dedup();
@@ -139,7 +142,7 @@ impl<'a> Survey<'a> {
             members
                 .filter_map(|(triangle, patch)| {
                     let corners = record::corners(&self.records[triangle as usize]);
-                    let unsound = (0..3).filter(|k| wanted.contains(&key(corners[*k]))).fold(0, |mask, k| mask | 1 << k);
+                    let unsound = (0..3).filter(|k| wanted.find(corners[*k]).is_some()).fold(0, |mask, k| mask | 1 << k);
                     (unsound != 0)
                         .then(|| (Suspect { triangle, unsound }, if patch == NONE { NONE } else { merged[patch as usize] }))
                 })
@@ -151,7 +154,7 @@ impl<'a> Survey<'a> {
         new.retain(|(s, _)| self.suspects.binary_search_by_key(&s.triangle, |t| t.triangle).is_err());
         for (suspect, patch) in &new {
             let sum = &mut self.patches[*patch as usize];
-            let extent = self.measure.triangle(&record::corners(&self.records[suspect.triangle as usize])).0;
+            let extent = self.measure.triangle(&record::corners(&self.records[suspect.triangle as usize]));
             sum.triangles -= 1;
             sum.extent += Extent { area: -extent.area, volume: -extent.volume };
         }
@@ -171,11 +174,6 @@ impl<'a> Survey<'a> {
             + self.patches.len() * size_of::<Patch>()
             + self.merged.len() * 4
     }
-}
-
-/// A position as a map key: exact, −0.0 and 0.0 being one.
-fn key(p: [f32; 3]) -> [u32; 3] {
-    p.map(|x| (x + 0.0).to_bits())
 }
 
 fn refuse_if_too_large(path: &Path, plan: &Plan, members: &Members, limits: &Limits) -> Result<()> {
@@ -250,7 +248,7 @@ fn take_shared(records: &[Record], measure: &Measure, links: &[Link], suspects: 
         } else {
             let sum = &mut sums[link.patch as usize];
             sum.triangles += 1;
-            sum.extent += measure.triangle(&record::corners(&records[link.triangle as usize])).0;
+            sum.extent += measure.triangle(&record::corners(&records[link.triangle as usize]));
         }
     }
     patches

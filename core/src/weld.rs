@@ -42,6 +42,24 @@ impl Weld {
         }
     }
 
+    /// The vertex at a position, if there is one.
+    #[inline]
+    pub(crate) fn find(&self, p: [f32; 3]) -> Option<u32> {
+        let position = [p[0] + 0.0, p[1] + 0.0, p[2] + 0.0];
+        let mask = self.slots.len() - 1;
+        let mut at = slot_of(position, self.slots.len());
+        loop {
+            let slot = self.slots[at];
+            if slot.vertex == u32::MAX {
+                return None;
+            }
+            if slot.position == position {
+                return Some(slot.vertex);
+            }
+            at = (at + 1) & mask;
+        }
+    }
+
     #[inline]
     fn insert(&mut self, at: usize, position: [f32; 3]) -> u32 {
         let vertex = self.positions.len() as u32;

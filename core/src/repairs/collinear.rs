@@ -3,22 +3,20 @@
 //! Such a triangle lies along its longest edge, with the third vertex inside it. Every other triangle at the long edge is split at
 //! that vertex, which closes the surface without moving anything; dropping the triangle alone would open it.
 
-use crate::defects;
 use crate::shop::{Origin, Shop};
-use crate::survey::Survey;
 
 /// Removes collinear triangles; returns how many.
-pub(super) fn remove(survey: &Survey<'_>, shop: &mut Shop) -> u64 {
-    let mut left: Vec<u32> = shop.living().filter(|t| defects::is_collinear(survey, shop, *t)).collect();
+pub(super) fn remove(shop: &mut Shop) -> u64 {
+    let mut left: Vec<u32> = shop.living().filter(|t| shop.is_collinear(*t)).collect();
     let mut removed = 0;
     // Each round takes those whose neighbours are not collinear themselves; a chain unravels from its end.
     while !left.is_empty() {
         let before = left.len();
-        left.retain(|t| !try_remove(survey, shop, *t, false));
+        left.retain(|t| !try_remove(shop, *t, false));
         if left.len() == before {
             // A knot of collinear triangles only: any one may go first.
             let t = left.remove(0);
-            try_remove(survey, shop, t, true);
+            try_remove(shop, t, true);
         }
         removed += (before - left.len()) as u64;
     }
@@ -26,7 +24,7 @@ pub(super) fn remove(survey: &Survey<'_>, shop: &mut Shop) -> u64 {
 }
 
 /// Removes `t` unless a triangle at its long edge is collinear, too, and `force` is off.
-fn try_remove(survey: &Survey<'_>, shop: &mut Shop, t: u32, force: bool) -> bool {
+fn try_remove(shop: &mut Shop, t: u32, force: bool) -> bool {
     if !shop.triangles[t as usize].alive {
         return true;
     }
@@ -36,7 +34,7 @@ fn try_remove(survey: &Survey<'_>, shop: &mut Shop, t: u32, force: bool) -> bool
     let (a, b, middle) = (v[long], v[(long + 1) % 3], v[(long + 2) % 3]);
     let others: Vec<u32> =
         shop.star(a).map(|(o, _)| o).filter(|o| *o != t && shop.triangles[*o as usize].v.contains(&b)).collect();
-    if !force && others.iter().any(|o| defects::is_collinear(survey, shop, *o)) {
+    if !force && others.iter().any(|o| shop.is_collinear(*o)) {
         return false;
     }
     shop.kill(t);

@@ -93,7 +93,7 @@ fn complete_at_seams(diagnosis: &mut Diagnosis<'_>) {
 /// Removes what is not surface: repeated vertices, duplicates, triangles of no area, surplus sheets.
 fn clean(survey: &crate::survey::Survey<'_>, shop: &mut Shop, log: &mut Log) -> u64 {
     let mut changes = log.time("degenerate", "triangles without area removed, their T-junctions closed", || {
-        duplicates::drop_repeated(shop) + collinear::remove(survey, shop)
+        duplicates::drop_repeated(shop) + collinear::remove(shop)
     });
     changes += log.time("duplicate", "triangles on the vertices of another one", || duplicates::drop_duplicates(shop));
     changes += log

@@ -94,7 +94,7 @@ impl Components {
             let into = &mut all.list[c as usize];
             into.triangles += 1;
             into.bounds.include(&points);
-            into.extent += survey.measure.triangle(&points).0;
+            into.extent += survey.measure.triangle(&points);
         }
         for edge in edges.iter().filter(|e| e.is_unbalanced()) {
             for used in edge.uses {

@@ -10,7 +10,7 @@ pub(crate) mod near;
 
 use std::collections::HashMap;
 
-use crate::chunk::{NONE, Suspect};
+use crate::chunk::{self, NONE, Suspect};
 use crate::record::{self, Record};
 use crate::survey::Survey;
 use crate::weld::Weld;
@@ -128,6 +128,12 @@ impl Shop {
 
     pub(crate) fn points(&self, t: u32) -> [[f32; 3]; 3] {
         self.triangles[t as usize].v.map(|v| self.positions[v as usize])
+    }
+
+    /// Exactly collinear corners.
+    pub(crate) fn is_collinear(&self, t: u32) -> bool {
+        let [a, b, c] = self.points(t);
+        chunk::is_collinear(&a, &b, &c)
     }
 
     /// The record `t` comes from; past all records for a new triangle.

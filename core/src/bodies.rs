@@ -48,11 +48,16 @@ pub(crate) fn surroundings(survey: &Survey<'_>, shop: &Shop, components: &Compon
 
     let mut counts = vec![0i32; rays.iter().map(|r| r.candidates.len()).sum()];
     let is_asked = |patch: u32| asked[components.of_patch[patch as usize] as usize];
-    let per_chunk = survey.visit_sound(is_asked, |corners| grid.may_meet(corners), Vec::new, |hits: &mut Vec<(u32, i32)>, triangle, patch| {
-        let corners = record::corners(&survey.records[triangle as usize]);
-        let sign = if reversed.patches[patch as usize] { -1 } else { 1 };
-        grid.cross(&rays, &corners, components.of_patch[patch as usize], &mut |at, w| hits.push((at, sign * w)));
-    });
+    let per_chunk = survey.visit_sound(
+        is_asked,
+        |corners| grid.may_meet(corners),
+        Vec::new,
+        |hits: &mut Vec<(u32, i32)>, triangle, patch| {
+            let corners = record::corners(&survey.records[triangle as usize]);
+            let sign = if reversed.patches[patch as usize] { -1 } else { 1 };
+            grid.cross(&rays, &corners, components.of_patch[patch as usize], &mut |at, w| hits.push((at, sign * w)));
+        },
+    );
     per_chunk.into_iter().flatten().for_each(|(at, w)| counts[at as usize] += w);
     for t in shop.living() {
         let component = components.of_triangle[t as usize];

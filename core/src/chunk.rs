@@ -122,16 +122,32 @@ impl Scratch {
         self.vertices.reset(expected / 2);
         self.numbers.reserve(expected);
         self.triangles.reserve(expected);
+        // A triangle mostly shares vertices with the one before it: comparing is cheaper than looking up.
+        let mut last = [(NONE, [0f32; 3]); 3];
         for (first, count) in members.runs(chunk) {
             let run = &records[first as usize..(first + count) as usize];
             for (i, record) in run.iter().enumerate() {
-                let [a, b, c] = record::corners(record).map(|p| self.vertices.vertex(p));
+                let [p, q, r] = record::corners(record);
+                let a = self.vertex_near(p, &last);
+                let b = self.vertex_near(q, &last);
+                let c = self.vertex_near(r, &last);
+                last = [(a, p), (b, q), (c, r)];
                 self.numbers.push(first + i as u32);
                 self.triangles.push(if a == b || b == c || c == a { [NONE, a, b] } else { [a, b, c] });
             }
         }
         self.home.clear();
         self.home.extend(self.vertices.positions().iter().map(|p| cell.holds(*p)));
+    }
+
+    /// The vertex at `p`, which may be one of the `last` three.
+    #[inline]
+    fn vertex_near(&mut self, p: [f32; 3], last: &[(u32, [f32; 3]); 3]) -> u32 {
+        let same = |q: &[f32; 3]| (p[0] == q[0]) & (p[1] == q[1]) & (p[2] == q[2]);
+        match last.iter().find(|(vertex, q)| same(q) && *vertex != NONE) {
+            Some((vertex, _)) => *vertex,
+            None => self.vertices.vertex(p),
+        }
     }
 
     /// Exactly collinear triangles: their vertices are unsound, so that the workshop sees the neighbours they must be closed with.

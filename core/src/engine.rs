@@ -173,7 +173,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
         clock.lap("emit");
         Edit::default()
     } else {
-        let repaired = repairs::run(&mut diagnosis, profile);
+        let repaired = repairs::run(&mut diagnosis, profile, limits.threads);
         clock.lap("repair");
         let edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &repaired.reversed);
         report.repairs = repaired.repairs;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::loops::{self, Loop};
 use crate::chunk::NONE;
 use crate::fill::{self, FillSettings, Rim};
+use crate::parallel;
 use crate::report::LoopLeft;
 use crate::settings::Profile;
 use crate::shop::edges::Edges;
@@ -21,12 +22,19 @@ pub(super) struct Closed {
 /// Longest list of open loops in a report.
 const LISTED: usize = 1000;
 
-/// Fills every loop that the profile admits, in order; later ones see the edges of earlier ones.
-pub(super) fn fill_loops(shop: &mut Shop, profile: &Profile, diagonal: f64) -> Closed {
+/// Fills every loop that the profile admits. Patches are found in parallel and put in in the loops' order; one that meets an edge
+/// that an earlier one has made is found anew, so that the result does not depend on the threads.
+pub(super) fn fill_loops(shop: &mut Shop, profile: &Profile, diagonal: f64, threads: usize) -> Closed {
     let edges = Edges::of(shop);
+    let rims = loops::find(shop, &edges);
+    let patches = parallel::map(threads, rims.len(), |i| fill(shop, &rims[i], profile, diagonal));
     let mut closed = Closed::default();
-    for rim in loops::find(shop, &edges) {
-        match fill(shop, &rim, profile, diagonal) {
+    for (rim, patch) in rims.iter().zip(patches) {
+        let patch = match patch {
+            Ok(patch) if meets_new_edge(shop, rim, &patch) => fill(shop, rim, profile, diagonal),
+            other => other,
+        };
+        match patch {
             Ok(patch) => {
                 for t in patch.triangles {
                     shop.add(t.map(|i| rim.vertices[i as usize]), Origin::Patch, NONE);
@@ -44,6 +52,17 @@ pub(super) fn fill_loops(shop: &mut Shop, profile: &Profile, diagonal: f64) -> C
         }
     }
     closed
+}
+
+/// A chord of the patch is an edge of the mesh by now.
+fn meets_new_edge(shop: &Shop, rim: &Loop, patch: &fill::Patch) -> bool {
+    let n = rim.vertices.len() as u32;
+    patch.triangles.iter().any(|t| {
+        (0..3).any(|k| {
+            let (i, j) = (t[k], t[(k + 1) % 3]);
+            j != (i + 1) % n && shop.has_edge(rim.vertices[i as usize], rim.vertices[j as usize])
+        })
+    })
 }
 
 fn fill(shop: &Shop, rim: &Loop, profile: &Profile, diagonal: f64) -> Result<fill::Patch, String> {

@@ -32,7 +32,7 @@ pub(crate) struct Repaired {
 const ROUNDS: usize = 4;
 
 /// Repairs what the profile allows.
-pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile) -> Repaired {
+pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usize) -> Repaired {
     let mut log = Log::default();
     let mut reversed = Reversed::none(&diagnosis.survey);
     complete_at_seams(diagnosis);
@@ -68,7 +68,7 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile) -> Repaired 
     let mut loops_left = Vec::new();
     let mut methods = String::new();
     log.time("fill", "", || {
-        let closed = close::fill_loops(shop, profile, diagonal);
+        let closed = close::fill_loops(shop, profile, diagonal, threads);
         loops_left = closed.left;
         let parts: Vec<String> = closed.by_method.iter().map(|(name, count)| format!("{count} {name}")).collect();
         methods = format!("loops closed: {}", parts.join(", "));

@@ -1,5 +1,6 @@
 //! The binary under test, built by the test itself: a binary that happens to lie about may be anyone's.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
@@ -7,35 +8,53 @@ use std::sync::OnceLock;
 /// Tries to get hold of a build before another test's build takes its place.
 const TRIES: u32 = 10;
 
-/// The `suture` binary with crash points, in a place of its own.
+/// A built binary, copied into a folder of its own, where no other build can replace it.
+type Caught = OnceLock<(tempfile::TempDir, PathBuf)>;
+
+/// The `suture` binary as users build it.
+///
+/// # Panics
+/// When it cannot be built: no test means anything then.
+pub fn suture() -> &'static Path {
+    static BUILT: Caught = OnceLock::new();
+    &BUILT.get_or_init(|| catch(&[], false)).1
+}
+
+/// The `suture` binary with crash points.
 ///
 /// # Panics
 /// When it cannot be built: no test means anything then.
 pub fn with_crash_points() -> &'static Path {
-    static BUILT: OnceLock<(tempfile::TempDir, PathBuf)> = OnceLock::new();
-    &BUILT
-        .get_or_init(|| {
-            let dir = tempfile::tempdir().expect("a temporary folder");
-            let copy = dir.path().join("suture");
-            // Builds with other features leave their result under the same name: look which one was caught.
-            let caught = (0..TRIES).any(|_| {
-                std::fs::copy(build(&["--features", "crash-points"]), &copy).expect("the built binary can be copied");
-                let version = Command::new(&copy).arg("--version").output().expect("the built binary runs");
-                String::from_utf8_lossy(&version.stdout).contains("crash points")
-            });
-            assert!(caught, "no build with crash points could be got hold of");
-            (dir, copy)
-        })
-        .1
+    static BUILT: Caught = OnceLock::new();
+    &BUILT.get_or_init(|| catch(&["--features", "crash-points"], true)).1
 }
 
-/// Builds the binary and returns where cargo says it is.
+fn catch(options: &[&str], crash_points: bool) -> (tempfile::TempDir, PathBuf) {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let copy = dir.path().join("suture");
+    // Builds with other features leave their result under the same name: look which one was caught.
+    let caught = (0..TRIES).any(|_| {
+        std::fs::copy(build(options), &copy).expect("the built binary can be copied");
+        let version = Command::new(&copy).arg("--version").output().expect("the built binary runs");
+        String::from_utf8_lossy(&version.stdout).contains("crash points") == crash_points
+    });
+    assert!(caught, "no build of suture with {options:?} could be got hold of");
+    (dir, copy)
+}
+
+/// Builds the binary from these sources, in the profile and the target folder of the tests, and returns where cargo says it is.
+/// When nothing has changed, that takes a fraction of a second.
 fn build(options: &[&str]) -> PathBuf {
+    let (target, profile) = target_and_profile();
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let output = Command::new(cargo)
-        .args(["build", "--quiet", "--package", "suture", "--message-format", "json"])
+        .args(["build", "--quiet", "--package", "suture", "--bin", "suture", "--message-format", "json-render-diagnostics"])
+        .arg("--target-dir")
+        .arg(target)
+        .arg("--profile")
+        .arg(profile)
         .args(options)
-        .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(".."))
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
         .output()
         .expect("cargo can be started");
     assert!(output.status.success(), "suture does not build: {}", String::from_utf8_lossy(&output.stderr));
@@ -46,4 +65,14 @@ fn build(options: &[&str]) -> PathBuf {
         .filter_map(|message| message.get("executable")?.as_str().map(PathBuf::from))
         .next_back()
         .expect("cargo names the binary it built")
+}
+
+/// Where the tests were built, and in which profile: cargo puts them into `TARGET/PROFILE/deps/`, where the profile `dev` is called
+/// `debug`.
+fn target_and_profile() -> (PathBuf, OsString) {
+    let test = std::env::current_exe().expect("a program knows its own place");
+    let folder = test.ancestors().nth(2).expect("tests lie in a folder of their profile");
+    let profile = folder.file_name().expect("the folder has a name");
+    let profile = if profile == "debug" { "dev".into() } else { profile.to_owned() };
+    (folder.parent().expect("the folder lies in the target folder").to_owned(), profile)
 }

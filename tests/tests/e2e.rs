@@ -1,0 +1,12 @@
+//! The built binary, end to end. Outputs are judged by `suture_bench::judge`, never by the engine that wrote them.
+
+#[cfg(test)]
+mod e2e {
+    mod cases;
+    mod files;
+    mod malformed;
+    mod memory;
+    mod same_bytes;
+    mod soups;
+    mod watch;
+}

@@ -1,0 +1,231 @@
+//! What `repair` and `inspect` do with files as files: codes, names, what passes through, what is never touched.
+
+use std::time::Duration;
+
+use suture_bench::generate::Case;
+use suture_bench::judge::judge;
+use suture_tests::{Place, Ran, stl};
+
+/// Exit code 2 and one line of complaint, which holds these words.
+fn assert_refused(ran: &Ran, words: &[&str]) {
+    let line = ran.stderr();
+    assert_eq!(ran.code(), 2, "{line}");
+    assert!(line.ends_with('\n') && line.lines().count() == 1, "not one line: {line:?}");
+    for word in words {
+        assert!(line.contains(word), "{line:?} does not say {word:?}");
+    }
+}
+
+#[test]
+fn clean_file_is_copied_byte_for_byte() {
+    let place = Place::new();
+    let (input, _) = place.generate(Case::Clean, 2_000, 1);
+    let report = place.repair("clean.stl", "out.stl", &[]).expect(0).report();
+    assert_eq!(place.read("out.stl"), std::fs::read(input).unwrap());
+    assert_eq!(report["outcome"], "clean");
+    assert_eq!(report["output"]["blake3"], report["input"]["blake3"]);
+    assert_eq!(report["edit"]["untouched"], report["input"]["triangles"]);
+}
+
+#[test]
+fn inspect_writes_nothing_and_tells_good_from_bad() {
+    let place = Place::new();
+    place.generate(Case::Clean, 600, 1);
+    place.generate(Case::Holes, 600, 1);
+    let before = place.names("");
+    let report = place.inspect("clean.stl", &[]).expect(0).report();
+    assert_eq!((&report["task"], &report["outcome"]), (&"inspect".into(), &"clean".into()));
+    let report = place.inspect("holes.stl", &[]).expect(1).report();
+    assert_eq!((&report["outcome"], &report["verdict"]["closed"]), (&"not_good".into(), &false.into()));
+    assert!(report["output"].is_null() && report["after"].is_null());
+    assert_eq!(place.names(""), before);
+}
+
+#[test]
+fn without_json_a_table_is_printed() {
+    let place = Place::new();
+    place.generate(Case::Holes, 600, 1);
+    let table = place.suture(["inspect", "holes.stl"]).expect(1).stdout();
+    assert!(table.contains("holes.stl") && table.contains("boundary"), "{table}");
+    assert!(serde_json::from_str::<serde_json::Value>(&table).is_err());
+}
+
+#[test]
+fn input_keeps_its_bytes_and_its_times() {
+    let place = Place::new();
+    let (input, _) = place.generate(Case::Mixed, 6_000, 1);
+    let long_ago = std::time::SystemTime::UNIX_EPOCH + Duration::from_secs(1_000_000_000);
+    std::fs::File::options().write(true).open(&input).unwrap().set_modified(long_ago).unwrap();
+    let before = std::fs::read(&input).unwrap();
+    assert!(place.repair("mixed.stl", "out.stl", &[]).code() < 2);
+    place.inspect("mixed.stl", &[]).expect(1);
+    assert_eq!(std::fs::read(&input).unwrap(), before);
+    assert_eq!(std::fs::metadata(&input).unwrap().modified().unwrap(), long_ago);
+    assert_eq!(place.names(""), ["mixed.stl", "out.stl"], "nothing temporary is left");
+}
+
+#[test]
+fn nothing_is_overwritten() {
+    let place = Place::new();
+    let (input, _) = place.generate(Case::Holes, 600, 1);
+    let before = std::fs::read(&input).unwrap();
+    place.put("out.stl", b"mine");
+    place.put("report.json", b"mine, too");
+    assert_refused(&place.repair("holes.stl", "out.stl", &[]), &["out.stl", "exists"]);
+    assert_refused(
+        &place.suture(["repair", "holes.stl", "-o", "new.stl", "--report", "report.json"]),
+        &["report.json", "exists"],
+    );
+    assert_refused(&place.suture(["repair", "holes.stl", "-o", "holes.stl", "--force"]), &["holes.stl", "never"]);
+    std::fs::hard_link(&input, place.at("same.stl")).unwrap();
+    assert_refused(&place.suture(["repair", "holes.stl", "-o", "same.stl", "--force"]), &["same.stl", "never"]);
+    assert_eq!(place.read("out.stl"), b"mine");
+    assert_eq!(place.read("report.json"), b"mine, too");
+    assert_eq!(std::fs::read(&input).unwrap(), before);
+    assert_eq!(place.names(""), ["holes.stl", "out.stl", "report.json", "same.stl"]);
+}
+
+#[test]
+fn output_is_replaced_when_that_is_asked_for() {
+    let place = Place::new();
+    place.generate(Case::Holes, 600, 1);
+    place.put("out.stl", b"mine");
+    place.repair("holes.stl", "out.stl", &["--force"]).expect(0);
+    assert!(judge(&place.at("out.stl")).unwrap().sound());
+}
+
+#[test]
+fn several_files_go_into_a_folder_under_names_of_their_own() {
+    let place = Place::new();
+    for (name, seed) in [("a/part.stl", 1), ("b/part.stl", 2)] {
+        let mut bytes = Vec::new();
+        suture_bench::generate::write(Case::Holes, 600, seed, &mut bytes).unwrap();
+        place.put(name, &bytes);
+    }
+    place.put("c/picture.stl", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR");
+    std::fs::create_dir(place.at("out")).unwrap();
+    let inputs = ["repair", "a/part.stl", "c/picture.stl", "b/part.stl", "-o"];
+    // The worst of the files decides; the others are done all the same.
+    place.suture(inputs.iter().chain(&["out"])).expect(2);
+    assert_eq!(place.names("out"), ["part.stl", "part~2.stl"]);
+    assert!(judge(&place.at("out/part.stl")).unwrap().sound() && judge(&place.at("out/part~2.stl")).unwrap().sound());
+    assert_ne!(place.read("out/part.stl"), place.read("out/part~2.stl"));
+    assert_refused(&place.suture(inputs.iter().chain(&["nowhere.stl"])), &["nowhere.stl", "folder"]);
+}
+
+#[test]
+fn what_is_no_mesh_is_refused_in_one_line() {
+    let place = Place::new();
+    let cube = "# a cube\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n";
+    let strangers: [(&str, &[u8], &str); 6] = [
+        ("picture.stl", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x01\0\0\0\x01\0\x08\x06\0\0\0", "PNG"),
+        ("empty.stl", b"", "empty"),
+        ("obj.stl", cube.as_bytes(), "OBJ"),
+        ("page.stl", b"<!DOCTYPE html><html><body>Not found</body></html>", "web page"),
+        ("zeros.stl", &[0; 4096], "no triangles"),
+        ("letter.stl", b"Dear customer,\nplease find attached the part that you asked for, as STL, in millimetres, ready to be printed.\nYours faithfully, the workshop in the back yard\n", "solid"),
+    ];
+    for (name, bytes, word) in strangers {
+        place.put(name, bytes);
+        assert_refused(&place.suture(["repair", name, "-o", "out.stl"]), &[name, word]);
+        assert_refused(&place.suture(["inspect", name]), &[name, word]);
+    }
+    assert_refused(&place.suture(["repair", "absent.stl", "-o", "out.stl"]), &["absent.stl"]);
+    assert_refused(&place.suture(["repair", ".", "-o", "out.stl"]), &["folder"]);
+    assert!(!place.at("out.stl").exists());
+    assert_eq!(place.names("").len(), strangers.len(), "nothing temporary is left");
+}
+
+#[test]
+fn wrong_usage_is_code_2() {
+    let place = Place::new();
+    place.generate(Case::Holes, 600, 1);
+    for arguments in [
+        &["repair", "holes.stl"][..],
+        &["mend", "holes.stl"],
+        &["repair", "holes.stl", "-o", "out.stl", "--memory", "much"],
+        &["repair", "holes.stl", "-o", "out.stl", "--threads", "0"],
+        &["repair", "holes.stl", "-o", "out.stl", "--profile", "unheard-of"],
+        &["repair", "holes.stl", "-o", "no/such/folder/out.stl"],
+    ] {
+        let ran = place.suture(arguments).expect(2);
+        assert!(!ran.stderr().is_empty(), "{arguments:?}");
+    }
+    assert_eq!(place.names(""), ["holes.stl"]);
+}
+
+/// A box without one of its sides' triangles and with one turned, each record with an attribute and a normal of its own.
+#[test]
+fn attributes_normals_and_header_of_the_untouched_pass_through() {
+    let place = Place::new();
+    let mut header = [0xa5; 80];
+    header[..10].copy_from_slice(b"COLOR=\x01\x02\x03\xff");
+    let mut records: Vec<_> = (0u16..)
+        .zip(stl::cuboid([0.0; 3], [10.0, 20.0, 30.0]))
+        .map(|(k, t)| stl::record([f32::from(k), -0.0, f32::NAN], &t, 0x8000 | k))
+        .collect();
+    records.remove(5);
+    let [normal, a, b, c] = stl::numbers(&records[2]);
+    records[2] = stl::record(normal, &[a, c, b], 0x8002);
+    place.put("in.stl", &stl::file(&header, &records));
+    let report = place.repair("in.stl", "out.stl", &["--list-edit"]).expect(0).report();
+    let out = place.read("out.stl");
+    assert_eq!(out[..80], header);
+    let new = stl::records(&out);
+    for (k, old) in records.iter().enumerate().filter(|(k, _)| *k != 2) {
+        assert_eq!(&new[k], old, "record {k}");
+    }
+    // The turned one: its corners change, its colour stays.
+    assert_eq!(stl::corners(&new[2]), [a, b, c]);
+    assert_eq!(stl::attribute(&new[2]), 0x8002);
+    assert_eq!(new.len(), 12);
+    assert_eq!((stl::attribute(&new[11]), stl::numbers(&new[11])[0]), (0, stl::unit_normal(&stl::corners(&new[11]))));
+    assert_eq!(report["edit"]["untouched"], 10);
+    assert!(judge(&place.at("out.stl")).unwrap().sound());
+}
+
+#[test]
+fn output_has_the_mode_of_an_ordinary_file() {
+    use std::os::unix::fs::PermissionsExt;
+    let place = Place::new();
+    place.generate(Case::Holes, 600, 1);
+    place.repair("holes.stl", "out.stl", &["--report", "report.json"]).expect(0);
+    let ordinary = std::fs::metadata(place.put("ordinary", b"")).unwrap().permissions().mode();
+    for name in ["out.stl", "report.json"] {
+        assert_eq!(std::fs::metadata(place.at(name)).unwrap().permissions().mode(), ordinary, "{name}");
+    }
+}
+
+#[test]
+fn report_says_all_it_promises() {
+    let place = Place::new();
+    place.generate(Case::Mixed, 6_000, 1);
+    let ran = place.repair("mixed.stl", "out.stl", &["--report", "report.json", "--threads", "2", "--memory", "256MiB"]);
+    let report: serde_json::Value = serde_json::from_slice(&place.read("report.json")).unwrap();
+    assert_eq!(ran.report(), report, "what is printed is what is written");
+    let text = |field: &str| report.pointer(field).and_then(|v| v.as_str()).unwrap_or_else(|| panic!("{field}")).to_owned();
+    let number = |field: &str| report.pointer(field).and_then(|v| v.as_f64()).unwrap_or_else(|| panic!("{field}"));
+    assert_eq!(number("/schema_version"), 1.0);
+    assert_eq!(text("/task"), "repair");
+    assert_eq!(text("/input/path"), "mixed.stl");
+    assert_eq!(text("/output/path"), "out.stl");
+    assert_eq!(text("/input/format"), "binary_stl");
+    assert_eq!(text("/profile/name"), "default");
+    assert_eq!((number("/limits/threads"), number("/limits/memory_bytes")), (2.0, f64::from(256 << 20)));
+    assert_eq!(number("/output/bytes") as usize, place.read("out.stl").len());
+    assert_eq!(text("/output/blake3").len(), 64);
+    assert!(number("/tolerances/weld") > 0.0 && !text("/tolerances/weld_reason").is_empty());
+    let unchecked = report["verdict"]["unchecked"].as_array().unwrap();
+    assert_eq!(unchecked, &["self-intersection"]);
+    let repairs: Vec<_> = report["repairs"].as_array().unwrap().iter().map(|r| r["name"].as_str().unwrap()).collect();
+    for name in ["degenerate", "duplicate", "fill", "orient"] {
+        assert!(repairs.contains(&name), "{repairs:?}");
+    }
+    assert!(report["repairs"].as_array().unwrap().iter().all(|r| r["count"].as_u64().unwrap() > 0));
+    let stages: Vec<_> = report["stages"].as_array().unwrap().iter().map(|s| s["name"].as_str().unwrap()).collect();
+    assert!(stages.contains(&"topology") && stages.contains(&"verify"), "{stages:?}");
+    for field in ["wall_seconds", "cpu_seconds", "triangles_per_second", "peak_resident_bytes", "peak_anonymous_bytes"] {
+        assert!(number(&format!("/cost/{field}")) > 0.0, "{field}");
+    }
+    assert!(report["edit_records"].is_null(), "listed only on request");
+}

@@ -1,0 +1,172 @@
+//! The hot folder, worked through once: each dropped file ends in exactly one place.
+
+use serde_json::Value;
+use suture_bench::generate::{Case, write};
+use suture_bench::judge::judge;
+use suture_tests::{Place, Ran};
+
+fn mesh(case: Case, seed: u64) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    write(case, 600, seed, &mut bytes).unwrap();
+    bytes
+}
+
+fn once(place: &Place) -> Ran {
+    place.suture(["watch", "hot", "--once", "--settle", "50ms"])
+}
+
+/// `suture jobs list --json`, by the name of the dropped file.
+fn jobs(place: &Place) -> Vec<(String, Value)> {
+    let listed = place.suture(["jobs", "list", "--json", "--dir", "hot"]).expect(0).stdout();
+    let mut jobs: Vec<_> = listed
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).unwrap())
+        .map(|job| (job["source"]["path"].as_str().unwrap_or_else(|| panic!("{job}")).to_owned(), job))
+        .collect();
+    jobs.sort_by(|a, b| a.0.cmp(&b.0));
+    jobs
+}
+
+/// Meshes among names: results and originals come with reports and receipts.
+fn meshes(names: &[String]) -> Vec<&str> {
+    names.iter().map(String::as_str).filter(|name| !name.ends_with(".json")).collect()
+}
+
+#[test]
+fn each_file_ends_in_its_place() {
+    let place = Place::new();
+    let (clean, holes, touching) = (mesh(Case::Clean, 1), mesh(Case::Holes, 1), mesh(Case::Touching, 1));
+    place.put("hot/in/clean.stl", &clean);
+    place.put("hot/in/holes.STL", &holes);
+    place.put("hot/in/scan/holes.stl", &holes);
+    place.put("hot/in/touching.stl", &touching);
+    place.put("hot/in/picture.stl", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR");
+    let left = ["copying.stl.part", "download.stl.crdownload", "x.tmp", ".hidden.stl", "~$part.stl", "notes.txt", "part.obj"];
+    for name in left {
+        place.put(&format!("hot/in/{name}"), &holes);
+    }
+    let ran = once(&place).expect(1);
+
+    assert_eq!(meshes(&place.names("hot/out")), ["clean.stl", "holes.STL", "scan/holes.stl"]);
+    assert_eq!(place.read("hot/out/clean.stl"), clean, "a clean file is passed on byte for byte");
+    assert!(judge(&place.at("hot/out/holes.STL")).unwrap().sound());
+    assert!(judge(&place.at("hot/out/scan/holes.stl")).unwrap().sound());
+    assert_eq!(meshes(&place.names("hot/done")), ["clean.stl", "holes.STL", "scan/holes.stl"]);
+    assert_eq!(place.read("hot/done/holes.STL"), holes, "originals are kept");
+
+    let failed = place.names("hot/failed");
+    assert!(
+        ["picture.stl", "picture.stl.report.json", "touching.stl", "touching.stl.report.json"]
+            .iter()
+            .all(|name| failed.iter().any(|there| there == name)),
+        "{failed:?}"
+    );
+    assert_eq!(place.read("hot/failed/touching.stl"), touching);
+    assert!(failed.iter().any(|name| name.starts_with("touching") && name.contains("best")), "the best attempt: {failed:?}");
+    let report: Value = serde_json::from_slice(&place.read("hot/failed/touching.stl.report.json")).unwrap();
+    assert_eq!((&report["outcome"], &report["verdict"]["manifold"]), (&"not_good".into(), &false.into()));
+    let report: Value = serde_json::from_slice(&place.read("hot/failed/picture.stl.report.json")).unwrap();
+    assert!(report["reason"].as_str().unwrap().contains("PNG"), "{report}");
+    assert!(place.names("hot/quarantine").is_empty());
+
+    let mut waiting = left.map(str::to_owned);
+    waiting.sort();
+    assert_eq!(place.names("hot/in"), waiting, "what is no mesh, or not finished, stays");
+
+    let kinds: Vec<_> = jobs(&place).into_iter().map(|(name, job)| (name, job["kind"].as_str().unwrap().to_owned())).collect();
+    let expected = [
+        ("clean.stl", "done"),
+        ("holes.STL", "done"),
+        ("notes.txt", "noticed"),
+        ("part.obj", "noticed"),
+        ("picture.stl", "failed"),
+        ("scan/holes.stl", "done"),
+        ("touching.stl", "failed"),
+    ];
+    assert_eq!(kinds, expected.map(|(name, kind)| (name.to_owned(), kind.to_owned())));
+    assert_eq!(ran.stderr().matches("part.obj").count(), 1, "named once: {}", ran.stderr());
+}
+
+#[test]
+fn good_files_alone_are_code_0_and_results_have_reports_and_receipts() {
+    let place = Place::new();
+    place.put("hot/in/holes.stl", &mesh(Case::Holes, 1));
+    once(&place).expect(0);
+    assert_eq!(place.names("hot/out"), ["holes.stl", "holes.stl.report.json", "holes.stl.suture.json"]);
+    assert_eq!(place.names("hot/in"), [""; 0]);
+    let report: Value = serde_json::from_slice(&place.read("hot/out/holes.stl.report.json")).unwrap();
+    let receipt: Value = serde_json::from_slice(&place.read("hot/out/holes.stl.suture.json")).unwrap();
+    assert_eq!(report["outcome"], "repaired");
+    assert_eq!(receipt["output_blake3"], report["output"]["blake3"]);
+    assert_eq!(receipt["source_blake3"], report["input"]["blake3"]);
+}
+
+#[test]
+fn names_that_are_taken_are_left_alone() {
+    let place = Place::new();
+    let (first, second) = (mesh(Case::Holes, 1), mesh(Case::Holes, 2));
+    place.put("hot/out/part.stl", b"someone else's");
+    place.put("hot/in/part.stl", &first);
+    once(&place).expect(0);
+    place.put("hot/in/part.stl", &second);
+    once(&place).expect(0);
+    assert_eq!(meshes(&place.names("hot/out")), ["part.stl", "part~2.stl", "part~3.stl"]);
+    assert_eq!(place.read("hot/out/part.stl"), b"someone else's");
+    let done = place.names("hot/done");
+    let originals: Vec<_> = meshes(&done).iter().map(|name| place.read(&format!("hot/done/{name}"))).collect();
+    assert_eq!(originals.len(), 2);
+    assert!(originals.contains(&first) && originals.contains(&second));
+}
+
+/// Each name gets its own result, also when contents are equal.
+#[test]
+fn equal_contents_are_results_of_their_own() {
+    let place = Place::new();
+    let holes = mesh(Case::Holes, 1);
+    place.put("hot/in/a.stl", &holes);
+    place.put("hot/in/b.stl", &holes);
+    once(&place).expect(0);
+    assert_eq!(meshes(&place.names("hot/out")), ["a.stl", "b.stl"]);
+    assert_eq!(place.read("hot/out/a.stl"), place.read("hot/out/b.stl"));
+    assert_eq!(jobs(&place).len(), 2);
+}
+
+#[test]
+fn result_is_what_repair_writes() {
+    let place = Place::new();
+    let mixed = mesh(Case::Mixed, 3);
+    place.put("mixed.stl", &mixed);
+    place.put("hot/in/mixed.stl", &mixed);
+    place.repair("mixed.stl", "out.stl", &[]).expect(0);
+    once(&place).expect(0);
+    assert_eq!(place.read("hot/out/mixed.stl"), place.read("out.stl"));
+}
+
+#[test]
+fn sub_folder_names_the_profile() {
+    let place = Place::new();
+    let holes = mesh(Case::Holes, 1);
+    place.put("hot/in/cautious/holes.stl", &holes);
+    place.put("hot/in/order 7/holes.stl", &holes);
+    // The cautious profile closes nothing.
+    once(&place).expect(1);
+    assert_eq!(meshes(&place.names("hot/out")), ["order 7/holes.stl"]);
+    assert!(place.names("hot/failed").iter().any(|name| name == "cautious/holes.stl"));
+    let profiles: Vec<_> = jobs(&place).into_iter().map(|(name, job)| (name, job["source"]["profile"].clone())).collect();
+    assert_eq!(profiles, [("cautious/holes.stl".into(), "cautious".into()), ("order 7/holes.stl".into(), "default".into())]);
+}
+
+#[test]
+fn folder_in_use_is_code_73() {
+    let place = Place::new();
+    place.put("hot/in/notes.txt", b"");
+    let mut daemon = place.command().args(["watch", "hot"]).spawn().unwrap();
+    // Its jobs can be listed from the moment it serves the folder.
+    let serving = (0..600).any(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        place.at("hot/out").is_dir() && place.suture(["watch", "hot", "--once"]).code() == 73
+    });
+    rustix::process::kill_process(rustix::process::Pid::from_child(&daemon), rustix::process::Signal::TERM).unwrap();
+    let status = daemon.wait().unwrap();
+    assert!(serving && status.code() == Some(0), "{status}");
+}

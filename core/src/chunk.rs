@@ -275,8 +275,7 @@ impl Scratch {
     fn number_patches(&mut self, patches: &mut Vec<Patch>) {
         self.states.clear();
         self.states.extend(self.home.iter().map(|home| if *home { UNSOUND } else { AWAY }));
-        let positions = self.vertices.positions();
-        for v in 0..self.home.len() {
+        for (v, position) in self.vertices.positions().iter().enumerate() {
             if !self.sound[v] {
                 continue;
             }
@@ -287,7 +286,7 @@ impl Scratch {
                 patches.push(Patch { triangles: 0, extent: Extent::default(), bounds: Bounds::EMPTY, first: NONE });
             }
             self.states[v] = self.states[root];
-            patches[self.states[root] as usize].bounds.include(&[positions[v]]);
+            patches[self.states[root] as usize].bounds.include(&[*position]);
         }
     }
 }

@@ -203,7 +203,7 @@ impl<'a> Slot<'a> {
     fn attempt(&mut self, desk: &Desk, job: &Job, turn: Turn) -> Result<Option<Job>, PublishError> {
         let context = self.context;
         let work = desk.folder.work(desk.claim.token);
-        let step = match claim_file(desk.folder, job, &work, context.config.reserve) {
+        let step = match claim_file(desk.folder, job, &work) {
             Err(why) => why.into(),
             Ok(claimed) => {
                 crash_point("daemon.linked");
@@ -360,7 +360,7 @@ impl From<Unclaimed> for Step {
 
 /// Puts the dropped file into the attempt's folder: a hard link, which keeps it even if its name goes meanwhile; where that
 /// cannot be, a copy. The dropped name stays, so that whatever happens to the attempt's folder, the file is where it was.
-fn claim_file(folder: &Folder, job: &Job, work: &Path, reserve: u64) -> Result<Claimed, Unclaimed> {
+fn claim_file(folder: &Folder, job: &Job, work: &Path) -> Result<Claimed, Unclaimed> {
     let (area, path) = job.original();
     let source = folder.area(area).join(path.to_path());
     let environment = |what: &str, error: &std::io::Error| Unclaimed::Environment(format!("{what}: {error}"));
@@ -371,11 +371,11 @@ fn claim_file(folder: &Folder, job: &Job, work: &Path, reserve: u64) -> Result<C
         Ok(_) => Err(Unclaimed::Withdrawn(Withdrawal::Changed)),
     };
     let size = look(&source)?.size;
-    // Room for the result, for what the engine puts aside, and a reserve; a large file must not fill the disk half way.
-    let (needed, free) = (size.saturating_mul(3).saturating_add(reserve), fsx::free_space(&folder.root));
+    // Room for the result and for what the engine puts aside: a large file must not fill the disk half way.
+    let (needed, free) = (size.saturating_mul(3), fsx::free_space(&folder.root, 0));
     if free < needed {
         let (needed, free) = (show_size(needed), show_size(free));
-        return Err(Unclaimed::Environment(format!("the disk has {free} free; this file needs {needed} to be safe")));
+        return Err(Unclaimed::Environment(format!("the disk has room for {free} more; this file may need {needed}")));
     }
     std::fs::create_dir_all(work).map_err(|e| environment("the work folder cannot be made", &e))?;
     let claimed = work.join(CLAIMED);

@@ -172,9 +172,12 @@ fn umask() -> u32 {
     })
 }
 
-/// Bytes that may still be written to a folder's file system; boundless where it does not say.
-pub(crate) fn free_space(folder: &Path) -> u64 {
-    rustix::fs::statvfs(folder).map_or(u64::MAX, |fs| fs.f_bavail.saturating_mul(fs.f_frsize))
+/// Bytes that may still be written to a folder's file system when `reserve` bytes, but at most a twentieth of it, are to stay
+/// free; boundless where the file system does not say.
+pub(crate) fn free_space(folder: &Path, reserve: u64) -> u64 {
+    let Ok(fs) = rustix::fs::statvfs(folder) else { return u64::MAX };
+    let reserve = reserve.min(fs.f_blocks.saturating_mul(fs.f_frsize) / 20);
+    fs.f_bavail.saturating_mul(fs.f_frsize).saturating_sub(reserve)
 }
 
 /// Does the folder lie on a network or user-space file system, whose changes the kernel does not tell us of?

@@ -148,7 +148,8 @@ fn show(dir: &Path, job: &Job) -> String {
     if !note.is_empty() {
         text += &format!("  note      {note}\n");
     }
-    if let Some(path) = report_path(dir, job) {
+    // With several folders to a store, it may be in another one.
+    if let Some(path) = report_path(dir, job).filter(|path| path.exists()) {
         text += &format!("  report    {}\n", path.display());
         if let Ok(bytes) = std::fs::read(&path)
             && let Ok(report) = serde_json::from_slice::<Report>(&bytes)

@@ -147,6 +147,11 @@ impl Schedule {
         before
     }
 
+    /// Is nothing given out for now?
+    pub(crate) fn is_paused(&self) -> bool {
+        self.lock().paused
+    }
+
     /// Gives nothing out any more.
     pub(crate) fn stop(&self) {
         self.lock().stop = true;

@@ -20,6 +20,8 @@ use crate::{profiles, table};
 
 /// Work that is done sooner shows no progress bar.
 const BAR_AFTER: Duration = Duration::from_secs(1);
+/// Free names (`part~2.stl`, …) are looked for this far.
+const MAX_VERSIONS: u32 = 100_000;
 
 /// Repairs every input and prints what was done.
 pub(crate) fn repair(args: &RepairArgs) -> Exit {
@@ -182,7 +184,9 @@ impl Run {
     }
 
     fn repair(&mut self, input: &Path, plan: &Plan) -> Result<Report, Failure> {
-        let target = plan.target(input, 1);
+        // The report names the result before it is placed: begin with a name that looks free.
+        let first = if plan.folder { (1..MAX_VERSIONS).find(|n| !fsx::exists(&plan.target(input, *n))).unwrap_or(1) } else { 1 };
+        let target = plan.target(input, first);
         plan.check(input, &target)?;
         let folder = fsx::folder_of(&target);
         let output = fsx::temporary_in(folder);
@@ -209,13 +213,13 @@ impl Run {
         };
         let result = self.work(&request).and_then(|mut done| {
             if fsx::exists(&output) {
-                let placed = place(&output, |n| plan.target(input, n), plan.folder, plan.force)?;
+                let placed = place(&output, first, |n| plan.target(input, n), plan.folder, plan.force)?;
                 if let Some(facts) = &mut done.output {
                     facts.path = placed;
                 }
             }
             if let Some((temporary, path)) = &report {
-                place(temporary, |_| path.clone(), false, plan.force)?;
+                place(temporary, 1, |_| path.clone(), false, plan.force)?;
             }
             Ok(done)
         });
@@ -287,9 +291,9 @@ impl Run {
     }
 }
 
-/// Gives a finished temporary file its name, whole and durable; with `versions` the first free one of several.
-fn place(temporary: &Path, name: impl Fn(u32) -> PathBuf, versions: bool, force: bool) -> Result<PathBuf, Failure> {
-    for n in 1.. {
+/// Gives a finished temporary file its name, whole and durable; with `versions` the first free one from the `first` on.
+fn place(temporary: &Path, first: u32, name: impl Fn(u32) -> PathBuf, versions: bool, force: bool) -> Result<PathBuf, Failure> {
+    for n in first..MAX_VERSIONS {
         let target = name(n);
         let folder = fsx::folder_of(&target);
         let placed = fsx::fit_in(temporary, folder).and_then(|()| {

@@ -356,14 +356,14 @@ impl<'a> Keeper<'a> {
         }
         let counts = self.context.store.counts()?;
         let of = |wanted: fn(Kind) -> bool| counts.iter().filter(|(kind, _)| wanted(*kind)).map(|(_, n)| n).sum::<u64>();
-        if of(|kind| matches!(kind, Kind::Queued | Kind::Suspect)) > 0 {
+        if of(|kind| matches!(kind, Kind::Queued | Kind::Suspect)) > 0 && !self.context.schedule.is_paused() {
             return Ok(false);
         }
         let waiting = of(Kind::is_live);
         if waiting > 0 || self.folders.iter().any(|kept| kept.unavailable) {
             tracing::warn!(
                 jobs = waiting,
-                "Some work is left for the next run: jobs that wait after errors, or folders out of reach."
+                "Some work is left for the next run: jobs that wait after errors, a full disk, or folders out of reach."
             );
             self.context.not_good.store(true, Ordering::Relaxed);
         }
@@ -404,12 +404,12 @@ impl<'a> Keeper<'a> {
         let first = self.disk_looked.is_none();
         self.disk_looked = Some(now);
         let reserve = self.context.config.reserve;
-        let full = self.folders.iter().find(|kept| fsx::free_space(&kept.folder.root) < reserve);
+        let full = self.folders.iter().find(|kept| fsx::free_space(&kept.folder.root, reserve) == 0);
         if self.context.schedule.pause(full.is_some()) != full.is_some() || (first && full.is_some()) {
             match full {
                 Some(kept) => {
                     let folder = kept.folder.root.display();
-                    tracing::warn!(%folder, reserve = crate::units::show_size(reserve), "The disk is nearly full; nothing new is taken.");
+                    tracing::warn!(%folder, "The disk is nearly full; nothing new is taken.");
                 }
                 None => tracing::info!("There is room on the disk again."),
             }

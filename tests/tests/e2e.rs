@@ -4,6 +4,7 @@
 mod e2e {
     mod cases;
     mod files;
+    mod interrupted;
     mod malformed;
     mod memory;
     mod same_bytes;

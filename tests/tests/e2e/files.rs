@@ -85,6 +85,35 @@ fn nothing_is_overwritten() {
     assert_eq!(place.names(""), ["holes.stl", "out.stl", "report.json", "same.stl"]);
 }
 
+/// A link that leads nowhere is a name that is taken, too; an input may be behind one.
+#[test]
+fn links_are_names() {
+    let place = Place::new();
+    place.generate(Case::Holes, 600, 1);
+    std::os::unix::fs::symlink("nowhere.stl", place.at("out.stl")).unwrap();
+    std::os::unix::fs::symlink("holes.stl", place.at("in.stl")).unwrap();
+    assert_refused(&place.repair("holes.stl", "out.stl", &[]), &["out.stl", "exists"]);
+    place.repair("in.stl", "repaired.stl", &[]).expect(0);
+    assert_refused(&place.suture(["repair", "holes.stl", "-o", "in.stl", "--force"]), &["in.stl", "never"]);
+    assert!(!place.at("nowhere.stl").exists());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn names_need_not_be_utf_8() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let place = Place::new();
+    let (input, _) = place.generate(Case::Holes, 600, 1);
+    let [odd, out] = [&b"K\xf6rper 1.stl"[..], b"K\xf6rper 2.stl"].map(OsStr::from_bytes);
+    std::fs::rename(input, place.at("").join(odd)).unwrap();
+    let [repair, o, report] = ["repair", "-o", "--report"].map(OsStr::new);
+    place.suture([repair, odd, o, out, report, OsStr::new("report.json")]).expect(0);
+    let report: serde_json::Value = serde_json::from_slice(&place.read("report.json")).unwrap();
+    assert_eq!(report["input"]["path"], "K\u{fffd}rper 1.stl");
+    assert!(judge(&place.at("").join(out)).unwrap().sound());
+}
+
 #[test]
 fn output_is_replaced_when_that_is_asked_for() {
     let place = Place::new();

@@ -33,9 +33,10 @@ pub struct Profile {
     pub max_box_change_relative: f64,
     /// Bodies (components that enclose volume) the repair may lose without review.
     pub max_bodies_lost: u32,
-    /// Components of fewer triangles than this, with less than a millionth of the model's area, that stay open after all
-    /// repairs are dropped as debris (0: never).
+    /// Components of fewer triangles than this that stay open after weld and splits are dropped as debris (0: never) ...
     pub debris_triangles: u32,
+    /// ... if they have at most this share of the model's area.
+    pub debris_area_share: f64,
 }
 
 impl Default for Profile {
@@ -52,6 +53,7 @@ impl Default for Profile {
             max_box_change_relative: 1e-3,
             max_bodies_lost: 0,
             debris_triangles: 4,
+            debris_area_share: 1e-3,
         }
     }
 }

@@ -107,7 +107,12 @@ impl Measure {
 
     /// Area in the model's units squared.
     pub(crate) fn area(&self, sum: Extent) -> f64 {
-        sum.area as f64 / FRACTION / self.to_area / 2.0
+        self.area_of(sum.area)
+    }
+
+    /// The same of [`Extent::area`] alone.
+    pub(crate) fn area_of(&self, twice: i128) -> f64 {
+        twice as f64 / FRACTION / self.to_area / 2.0
     }
 
     /// Signed volume in the model's units cubed.

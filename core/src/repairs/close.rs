@@ -2,14 +2,17 @@
 
 use std::collections::BTreeMap;
 
+use super::islands;
 use super::loops::{self, Loop};
 use crate::chunk::NONE;
-use crate::fill::{self, FillSettings, Rim};
+use crate::fill::{self, FillSettings, Rim, Unfillable};
 use crate::parallel;
 use crate::report::LoopLeft;
 use crate::settings::Profile;
+use crate::shop::components::{Components, Reversed, Through};
 use crate::shop::edges::Edges;
 use crate::shop::{Origin, Shop};
+use crate::survey::Survey;
 
 /// What was closed, by method, and what was not.
 #[derive(Debug, Default)]
@@ -22,36 +25,81 @@ pub(super) struct Closed {
 /// Longest list of open loops in a report.
 const LISTED: usize = 1000;
 
+/// A patch that lies flat on the triangles around its loop is put in only below this share of its component's area: it closes a
+/// notch, while a flat sheet would become a body of no thickness.
+const MAX_FLAT_SHARE: f64 = 0.1;
+/// And only for loops of at most so many edges.
+const MAX_FLAT_EDGES: usize = 64;
+
 /// Fills every loop that the profile admits. Patches are found in parallel and put in in the loops' order; one that meets an edge
 /// that an earlier one has made is found anew, so that the result does not depend on the threads.
-pub(super) fn fill_loops(shop: &mut Shop, profile: &Profile, diagonal: f64, threads: usize) -> Closed {
-    let edges = Edges::of(shop);
-    let rims = loops::find(shop, &edges);
-    let patches = parallel::map(threads, rims.len(), |i| fill(shop, &rims[i], profile, diagonal));
+pub(super) fn fill_loops(survey: &Survey<'_>, shop: &mut Shop, profile: &Profile, threads: usize) -> Closed {
+    let bridges = if profile.fill_holes { islands::bridge(survey, shop) } else { Vec::new() };
+    let rims = loops::find(shop, &Edges::of(shop));
+    let diagonal = survey.bounds.diagonal();
+    let patches = parallel::map(threads, rims.len(), |i| fill(shop, &rims[i], profile, diagonal, Neighbours::Heeded));
     let mut closed = Closed::default();
+    let mut open: Vec<(&Loop, NotFilled)> = Vec::new();
     for (rim, patch) in rims.iter().zip(patches) {
         let patch = match patch {
-            Ok(patch) if meets_new_edge(shop, rim, &patch) => fill(shop, rim, profile, diagonal),
+            Ok(patch) if meets_new_edge(shop, rim, &patch) => fill(shop, rim, profile, diagonal, Neighbours::Heeded),
             other => other,
         };
         match patch {
-            Ok(patch) => {
-                for t in patch.triangles {
-                    shop.add(t.map(|i| rim.vertices[i as usize]), Origin::Patch, NONE);
+            Ok(patch) => closed.put_in(shop, rim, &patch, patch.method.name()),
+            Err(reason) => open.push((rim, reason)),
+        }
+    }
+    if !open.is_empty() {
+        let components = Components::of(survey, shop, &Edges::of(shop), &Reversed::none(survey), Through::EveryEdge);
+        for (rim, reason) in open {
+            let area = components.list[components.of_triangle[rim.triangles[0] as usize] as usize].extent.area as f64;
+            let flat = match reason {
+                NotFilled::Method(Unfillable::Blocked | Unfillable::CrossesItself) if rim.vertices.len() <= MAX_FLAT_EDGES => {
+                    fill(shop, rim, profile, diagonal, Neighbours::Ignored)
+                        .ok()
+                        .filter(|p| twice_area(survey, shop, rim, p) <= area * MAX_FLAT_SHARE)
                 }
-                closed.loops += 1;
-                *closed.by_method.entry(patch.method.name()).or_default() += 1;
+                _ => None,
+            };
+            match flat {
+                Some(patch) => closed.put_in(shop, rim, &patch, "flat on its neighbours"),
+                None => {
+                    closed.leave(shop, rim, reason);
+                    // What joined an island to this rim leads nowhere now.
+                    rim.triangles.iter().filter(|t| bridges.binary_search(t).is_ok()).for_each(|t| shop.kill(*t));
+                }
             }
-            Err(reason) if closed.left.len() < LISTED => closed.left.push(LoopLeft {
-                at: shop.positions[rim.vertices[0] as usize],
-                edges: rim.vertices.len() as u64,
-                perimeter: rim.perimeter(shop),
-                reason,
-            }),
-            Err(_) => {}
         }
     }
     closed
+}
+
+/// Twice the area of a patch, in the survey's units.
+fn twice_area(survey: &Survey<'_>, shop: &Shop, rim: &Loop, patch: &fill::Patch) -> f64 {
+    let corners = |t: &[u32; 3]| t.map(|i| shop.positions[rim.vertices[i as usize] as usize]);
+    patch.triangles.iter().map(|t| survey.measure.triangle(&corners(t)).area).sum::<i128>() as f64
+}
+
+impl Closed {
+    fn put_in(&mut self, shop: &mut Shop, rim: &Loop, patch: &fill::Patch, how: &'static str) {
+        for t in &patch.triangles {
+            shop.add(t.map(|i| rim.vertices[i as usize]), Origin::Patch, NONE);
+        }
+        self.loops += 1;
+        *self.by_method.entry(how).or_default() += 1;
+    }
+
+    fn leave(&mut self, shop: &Shop, rim: &Loop, reason: NotFilled) {
+        if self.left.len() < LISTED {
+            self.left.push(LoopLeft {
+                at: shop.positions[rim.vertices[0] as usize],
+                edges: rim.vertices.len() as u64,
+                perimeter: rim.perimeter(shop),
+                reason: reason.to_string(),
+            });
+        }
+    }
 }
 
 /// A chord of the patch is an edge of the mesh by now.
@@ -65,30 +113,45 @@ fn meets_new_edge(shop: &Shop, rim: &Loop, patch: &fill::Patch) -> bool {
     })
 }
 
-fn fill(shop: &Shop, rim: &Loop, profile: &Profile, diagonal: f64) -> Result<fill::Patch, String> {
+/// Why a loop stays open.
+#[derive(Debug, thiserror::Error)]
+enum NotFilled {
+    #[error("{0}")]
+    Profile(String),
+    #[error(transparent)]
+    Method(#[from] Unfillable),
+}
+
+/// Whether a patch must not lie on the triangles around its loop.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Neighbours {
+    Heeded,
+    Ignored,
+}
+
+fn fill(shop: &Shop, rim: &Loop, profile: &Profile, diagonal: f64, neighbours: Neighbours) -> Result<fill::Patch, NotFilled> {
     if !profile.fill_holes {
-        return Err("the profile fills no holes".into());
+        return Err(NotFilled::Profile("the profile fills no holes".into()));
     }
     let n = rim.vertices.len();
     if n as u64 > u64::from(profile.max_hole_edges) {
-        return Err(format!("more than the profile's {} edges", profile.max_hole_edges));
+        return Err(NotFilled::Profile(format!("more than the profile's {} edges", profile.max_hole_edges)));
     }
     let bound = profile.max_hole_perimeter_relative * diagonal;
     if rim.perimeter(shop) > bound {
-        return Err(format!("longer than the profile's {bound:.3}"));
+        return Err(NotFilled::Profile(format!("longer than the profile's {bound:.3}")));
     }
     let points = rim.points(shop);
-    let apexes: Vec<_> = (0..n)
-        .map(|i| {
-            let ends = [rim.vertices[i], rim.vertices[(i + 1) % n]];
-            let apex = shop.triangles[rim.triangles[i] as usize].v.into_iter().find(|v| !ends.contains(v));
-            apex.map(|v| shop.positions[v as usize])
-        })
-        .collect();
+    let apex = |i: usize| {
+        let ends = [rim.vertices[i], rim.vertices[(i + 1) % n]];
+        let apex = shop.triangles[rim.triangles[i] as usize].v.into_iter().find(|v| !ends.contains(v));
+        apex.map(|v| shop.positions[v as usize])
+    };
+    let apexes: Vec<_> = if neighbours == Neighbours::Heeded { (0..n).map(apex).collect() } else { Vec::new() };
     let forbidden = |i: u32, j: u32| {
         let (a, b) = (rim.vertices[i as usize], rim.vertices[j as usize]);
         if shop.complete[a as usize] { shop.has_edge(a, b) } else { shop.has_edge(b, a) }
     };
     let settings = FillSettings { max_vertices: profile.max_hole_edges as usize, ..FillSettings::default() };
-    fill::triangulate(&Rim { points: &points, apexes: &apexes, forbidden: &forbidden }, &settings).map_err(|e| e.to_string())
+    Ok(fill::triangulate(&Rim { points: &points, apexes: &apexes, forbidden: &forbidden }, &settings)?)
 }

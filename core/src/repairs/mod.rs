@@ -5,12 +5,15 @@
 
 mod close;
 mod collinear;
+mod debris;
 mod duplicates;
+mod islands;
 mod junction;
 mod loops;
 mod merge;
 mod orient;
 mod surplus;
+mod zip;
 
 use std::time::Instant;
 
@@ -61,14 +64,18 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
             break;
         }
     }
+    log.time("zip", "vertices merged with the one that faces them across a narrow gap", || {
+        zip::zip(shop, profile.gap_edge_share)
+    });
+    clean(survey, shop, &mut log);
+    log.time("debris", "triangles of open specks dropped", || debris::drop(survey, shop, profile));
     log.time("orient", "triangles turned to agree with their neighbours", || {
         orient::make_coherent(survey, shop, &mut reversed).triangles
     });
-    let diagonal = survey.bounds.diagonal();
     let mut loops_left = Vec::new();
     let mut methods = String::new();
     log.time("fill", "", || {
-        let closed = close::fill_loops(shop, profile, diagonal, threads);
+        let closed = close::fill_loops(survey, shop, profile, threads);
         loops_left = closed.left;
         let parts: Vec<String> = closed.by_method.iter().map(|(name, count)| format!("{count} {name}")).collect();
         methods = format!("loops closed: {}", parts.join(", "));

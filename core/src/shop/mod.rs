@@ -126,6 +126,18 @@ impl Shop {
         self.triangles[t as usize].alive = false;
     }
 
+    /// Lets all triangles of `go` use `stay` instead.
+    pub(crate) fn merge(&mut self, stay: Vertex, go: Vertex) {
+        let mut corner = std::mem::replace(&mut self.heads[go as usize], NONE);
+        while corner != NONE {
+            let at = corner as usize;
+            corner = self.nexts[at];
+            self.triangles[at / 3].v[at % 3] = stay;
+            self.nexts[at] = self.heads[stay as usize];
+            self.heads[stay as usize] = at as u32;
+        }
+    }
+
     pub(crate) fn points(&self, t: u32) -> [[f32; 3]; 3] {
         self.triangles[t as usize].v.map(|v| self.positions[v as usize])
     }

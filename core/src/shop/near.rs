@@ -53,6 +53,30 @@ pub(crate) fn close_pairs(shop: &Shop, edges: &Edges, tolerance: &Tolerance) -> 
     pairs
 }
 
+/// For each of some vertices the nearest of the others within both reaches that it shares no triangle with, by place in `vertices`;
+/// of equally near ones the first.
+pub(crate) fn nearest_apart(shop: &Shop, vertices: &[Vertex], reach: &[f64]) -> Vec<Option<usize>> {
+    let boxes: Vec<Bounds> = vertices.iter().map(|v| around(&[shop.positions[*v as usize]], 0.0)).collect();
+    if boxes.is_empty() {
+        return Vec::new();
+    }
+    let tree = BoxTree::new(&boxes);
+    let mut found = Vec::new();
+    let mut nearest = Vec::with_capacity(vertices.len());
+    for (i, v) in vertices.iter().enumerate() {
+        tree.meeting(&around(&[shop.positions[*v as usize]], reach[i]), &mut found);
+        let mut best: Option<(f64, usize)> = None;
+        for j in found.iter().map(|j| *j as usize).filter(|j| *j != i) {
+            let away = shop.distance(*v, vertices[j]);
+            if away <= reach[i].min(reach[j]) && best.is_none_or(|(d, _)| away < d) && !shop.has_edge(*v, vertices[j]) {
+                best = Some((away, j));
+            }
+        }
+        nearest.push(best.map(|(_, j)| j));
+    }
+    nearest
+}
+
 /// Boundary vertices within tolerance of another one.
 pub(crate) fn weldable_vertices(shop: &Shop, edges: &Edges, tolerance: &Tolerance) -> Vec<Vertex> {
     let mut all: Vec<Vertex> = close_pairs(shop, edges, tolerance).into_iter().flat_map(|(a, b)| [a, b]).collect();

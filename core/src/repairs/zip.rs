@@ -1,0 +1,108 @@
+//! Small gaps zipped: vertices that face each other across a narrow gap become one (METHODS C2, C4, basic).
+//!
+//! Two boundary vertices face each other when each is the other's nearest within a share of the edges around them, and the surfaces
+//! they end point at each other. (The rims of a thin shell lie as near, but point the same way: they are left alone.) A merge that
+//! would turn a triangle over, flatten it, or make an edge of more than two triangles is left out.
+
+use crate::shop::edges::{Edge, Edges};
+use crate::shop::{Shop, Vertex, near};
+
+/// Facing: cosine between the directions in which the two surfaces end, at most.
+const FACING: f64 = -0.5;
+/// A moved triangle's normal keeps at least this cosine to what it was.
+const STEADY: f64 = 0.7;
+
+/// Zips gaps narrower than `share` of the shortest edges at their vertices; returns how many vertices were merged into another.
+pub(super) fn zip(shop: &mut Shop, share: f64) -> u64 {
+    if share <= 0.0 {
+        return 0;
+    }
+    let edges = Edges::of(shop);
+    let vertices = near::boundary_vertices(&edges);
+    let outward = ends(shop, &edges);
+    let reach: Vec<f64> = vertices.iter().map(|v| shop.shortest_edge(*v) * share).collect();
+    let nearest = near::nearest_apart(shop, &vertices, &reach);
+    let mut pairs: Vec<(f64, Vertex, Vertex)> = Vec::new();
+    for (i, found) in nearest.iter().enumerate() {
+        // Mutual, and each pair once.
+        if let Some(j) = found.filter(|j| *j > i && nearest[*j] == Some(i)) {
+            let (v, w) = (vertices[i], vertices[j]);
+            if cosine(outward[v as usize], outward[w as usize]) < FACING {
+                pairs.push((shop.distance(v, w), v, w));
+            }
+        }
+    }
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    let mut merged = 0;
+    for (_, v, w) in pairs {
+        let (stay, go) = if shop.star(w).count() > shop.star(v).count() { (w, v) } else { (v, w) };
+        if may_merge(shop, stay, go) {
+            shop.merge(stay, go);
+            merged += 1;
+        }
+    }
+    merged
+}
+
+/// For each boundary vertex the direction in which its surface ends: away from the triangles, across their boundary edges.
+fn ends(shop: &Shop, edges: &Edges) -> Vec<[f64; 3]> {
+    let mut all = vec![[0.0; 3]; shop.positions.len()];
+    for edge in edges.iter().filter(Edge::is_boundary) {
+        let t = edge.uses[0].triangle;
+        let Some(apex) = shop.triangles[t as usize].v.into_iter().find(|v| *v != edge.low && *v != edge.high) else { continue };
+        let along = vector(shop, edge.low, edge.high);
+        let from_apex = vector(shop, apex, edge.low);
+        let part = dot(from_apex, along) / dot(along, along).max(f64::MIN_POSITIVE);
+        for v in [edge.low, edge.high] {
+            for k in 0..3 {
+                all[v as usize][k] += from_apex[k] - part * along[k];
+            }
+        }
+    }
+    all
+}
+
+/// Would the mesh stay as sound as it is?
+fn may_merge(shop: &Shop, stay: Vertex, go: Vertex) -> bool {
+    let corners = |t: u32| shop.triangles[t as usize].v;
+    if shop.star(go).any(|(t, _)| corners(t).contains(&stay)) {
+        return false;
+    }
+    let mut neighbours: Vec<Vertex> = shop.star(go).flat_map(|(t, _)| corners(t)).filter(|x| *x != go).collect();
+    neighbours.sort_unstable();
+    neighbours.dedup();
+    let uses = |v: Vertex, x: Vertex| shop.star(v).filter(|(t, _)| corners(*t).contains(&x)).count();
+    // An edge that both have becomes one.
+    let manifold = neighbours.iter().all(|x| {
+        let shared = uses(stay, *x);
+        shared == 0 || shared + uses(go, *x) <= 2
+    });
+    manifold
+        && shop.star(go).all(|(t, k)| {
+            let before = shop.points(t);
+            let mut after = before;
+            after[k] = shop.positions[stay as usize];
+            cosine(normal(before), normal(after)) >= STEADY
+        })
+}
+
+fn vector(shop: &Shop, from: Vertex, to: Vertex) -> [f64; 3] {
+    let (a, b) = (shop.positions[from as usize], shop.positions[to as usize]);
+    std::array::from_fn(|k| f64::from(b[k]) - f64::from(a[k]))
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn normal([a, b, c]: [[f32; 3]; 3]) -> [f64; 3] {
+    let u: [f64; 3] = std::array::from_fn(|k| f64::from(b[k]) - f64::from(a[k]));
+    let v: [f64; 3] = std::array::from_fn(|k| f64::from(c[k]) - f64::from(a[k]));
+    [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+}
+
+/// 0 where one has no length.
+fn cosine(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let length = (dot(a, a) * dot(b, b)).sqrt();
+    if length > 0.0 { dot(a, b) / length } else { 0.0 }
+}

@@ -261,6 +261,9 @@ struct Kept {
     unavailable: bool,
     /// Files that were only noticed, and are gone.
     gone: Vec<suture_store::JobId>,
+    /// Names that were renamed into place since the last scan.
+    renamed: Vec<PathBuf>,
+    scan_takes: Duration,
 }
 
 impl<'a> Keeper<'a> {
@@ -292,6 +295,8 @@ impl<'a> Keeper<'a> {
                 dirty: true,
                 unavailable: false,
                 gone: Vec::new(),
+                renamed: Vec::new(),
+                scan_takes: Duration::ZERO,
             });
         }
         Self { context, inbox, stop, folders, _watchers: watchers, disk_looked: None }
@@ -325,7 +330,7 @@ impl<'a> Keeper<'a> {
     fn listen(&mut self) {
         let settling = self.folders.iter().filter(|kept| kept.reconciler.is_settling());
         let looks = settling.map(|kept| kept.rest.look_every());
-        let scan = self.folders.iter().any(|kept| kept.dirty).then_some(SCAN_AT_MOST_EVERY);
+        let scan = self.folders.iter().filter(|kept| kept.dirty).map(Kept::scan_at_most_every);
         let idle = if self.context.once { IDLE_ONCE } else { IDLE };
         let wait = looks.chain(scan).min().unwrap_or(idle).min(idle);
         let mut next = self.inbox.recv_timeout(wait);
@@ -421,12 +426,13 @@ impl Kept {
     fn hint(&mut self, renamed: &[PathBuf]) {
         self.dirty = true;
         let inbox = self.folder.inbox();
-        if renamed.iter().any(|path| path.starts_with(&inbox)) {
-            // The name may be new: it must be known before it can count.
-            self.scan(Instant::now());
-            self.reconciler.came_whole(renamed);
-            self.looked = Instant::now().checked_sub(self.rest.look_every()).unwrap_or(self.looked);
-        }
+        self.renamed.extend(renamed.iter().filter(|path| path.starts_with(&inbox)).cloned());
+    }
+
+    /// The shortest time between two scans: ten times what one takes, so that a full folder in which much happens is not read
+    /// again and again.
+    fn scan_at_most_every(&self) -> Duration {
+        SCAN_AT_MOST_EVERY.max(self.scan_takes * 10)
     }
 
     fn scan(&mut self, now: Instant) {
@@ -448,11 +454,17 @@ impl Kept {
     /// Scans and looks, as far as either is due.
     fn turn(&mut self, context: &Context, now: Instant) -> Result<(), StoreError> {
         let since = self.scanned.map(|then| now.duration_since(then));
-        let due = since.is_none_or(|since| since >= self.rescan || (self.dirty && since >= SCAN_AT_MOST_EVERY));
+        let due = since.is_none_or(|since| since >= self.rescan || (self.dirty && since >= self.scan_at_most_every()));
         if due {
             self.scanned = Some(now);
             self.dirty = false;
             self.scan(now);
+            self.scan_takes = now.elapsed();
+            if !self.renamed.is_empty() {
+                // Known now, so that it can count; and to be looked at at once.
+                self.reconciler.came_whole(&std::mem::take(&mut self.renamed));
+                self.looked = now.checked_sub(self.rest.look_every()).unwrap_or(self.looked);
+            }
         }
         for id in self.gone.drain(..) {
             forget(context, id)?;

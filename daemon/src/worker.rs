@@ -168,6 +168,8 @@ mod hook {
         if name.contains("!kill-daemon!")
             && let Some(parent) = rustix::process::getppid()
         {
+            // Both at once: no one is left to testify.
+            super::orphan::work_begins(None);
             let _ = rustix::process::kill_process(parent, rustix::process::Signal::KILL);
             std::process::abort();
         }

@@ -49,6 +49,20 @@ impl Hot {
         command
     }
 
+    /// The daemon over it by a configuration with these lines, working once through what is there; not yet started.
+    ///
+    /// # Panics
+    /// When the configuration cannot be written.
+    pub fn configured(&self, lines: &str) -> Command {
+        let file = self.path().join("suture.toml");
+        let text = format!("{lines}\n[[folders]]\npath = {:?}\n", self.path());
+        std::fs::write(&file, text).expect("the configuration can be written");
+        let mut command = Command::new(&self.binary);
+        command.args(["watch", "--once", "--config"]).arg(file);
+        command.env("SUTURE_LOG", "off").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+        command
+    }
+
     /// Runs the daemon until everything is done, or it is killed at the `pass`-th crash point if one is given.
     ///
     /// # Panics

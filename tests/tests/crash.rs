@@ -192,3 +192,38 @@ fn killed_at_random() {
     assert_eq!(hot.jobs().len(), originals.len());
     assert_at_rest(&hot, "random kills");
 }
+
+/// Files that abort their worker, hang in it, eat its memory, or take the daemon with them: each is quarantined after a few
+/// attempts, and the others are repaired.
+#[test]
+fn killers_are_quarantined_and_the_others_go_on() {
+    let hot = Hot::new(with_crash_points());
+    let killers = ["a!abort!.stl", "b!hang!.stl", "c!memory!.stl", "d!kill-daemon!.stl", "e!panic!.stl"];
+    let originals: Tree = killers.iter().map(|name| ((*name).to_owned(), mesh(Case::Holes, 1))).collect();
+    for (name, bytes) in &originals {
+        hot.put(name, bytes);
+    }
+    hot.put("part.stl", &mesh(Case::Holes, 2));
+    let lines = "settle = \"30ms\"\nmemory = \"64MiB\"\ntime_limit = { base = \"1s\", per_gib = \"1s\" }";
+    let mut daemon_deaths = 0;
+    loop {
+        let status = hot.configured(lines).status().unwrap();
+        if !was_killed(status) {
+            assert_eq!(status.code(), Some(1), "not everything is good");
+            break;
+        }
+        daemon_deaths += 1;
+        assert!(daemon_deaths <= 5, "a file may take the daemon with it twice in company, and three times alone");
+    }
+    assert!(daemon_deaths >= 3, "it did not try");
+    let quarantine: Tree = hot.tree("quarantine").into_iter().filter(|(name, _)| !name.ends_with(".json")).collect();
+    assert_eq!(quarantine, originals, "the files themselves are kept");
+    assert_eq!(hot.tree("out").keys().collect::<Vec<_>>(), ["part.stl", "part.stl.report.json", "part.stl.suture.json"]);
+    for name in killers {
+        let report = &hot.tree("quarantine")[&format!("{name}.report.json")];
+        let report: serde_json::Value = serde_json::from_slice(report).unwrap();
+        assert_eq!(report["outcome"], "quarantined", "{report}");
+        assert!(report["attempts"].as_u64().is_some_and(|attempts| attempts <= 7), "{report}");
+        assert!(report["reason"].as_str().is_some_and(|reason| !reason.is_empty()), "{report}");
+    }
+}

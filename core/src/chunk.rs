@@ -44,16 +44,17 @@ pub(crate) struct Patch {
 }
 
 /// The patch of each member in list order.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) enum Labels {
     /// All members with a sound corner belong to patch 0 of the chunk.
+    #[default]
     One,
     /// Run-coded: count, then patch + 1 (0: none).
     Runs(Vec<u8>),
 }
 
 /// What one chunk contributes.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct ChunkTopology {
     pub(crate) suspects: Vec<Suspect>,
     pub(crate) links: Vec<Link>,

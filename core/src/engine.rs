@@ -8,9 +8,9 @@ use crate::error::{Error, Result};
 use crate::read::MeshFile;
 use crate::report::{Cost, Defects, EditSummary, FileFacts, Outcome, Report, SCHEMA_VERSION, Stage, Task, Tolerances};
 use crate::settings::{Limits, Profile};
+use crate::shop::Shop;
 use crate::shop::edges::Edges;
 use crate::shop::near::Tolerance;
-use crate::shop::{self, Shop};
 use crate::survey::Survey;
 use crate::{Progress, cost, defects, emit, repairs, verdict};
 
@@ -18,6 +18,7 @@ use crate::{Progress, cost, defects, emit, repairs, verdict};
 pub(crate) struct Clock {
     start: Instant,
     lap: Instant,
+    cpu_seconds_before: f64,
     stages: Vec<Stage>,
     peak_anonymous_bytes: u64,
 }
@@ -25,7 +26,7 @@ pub(crate) struct Clock {
 impl Clock {
     fn start() -> Self {
         let now = Instant::now();
-        Self { start: now, lap: now, stages: Vec::new(), peak_anonymous_bytes: 0 }
+        Self { start: now, lap: now, cpu_seconds_before: cost::cpu_seconds(), stages: Vec::new(), peak_anonymous_bytes: 0 }
     }
 
     /// Ends the stage that ran until now.
@@ -41,7 +42,7 @@ impl Clock {
         let wall_seconds = self.start.elapsed().as_secs_f64();
         Cost {
             wall_seconds,
-            cpu_seconds: cost::cpu_seconds(),
+            cpu_seconds: cost::cpu_seconds() - self.cpu_seconds_before,
             triangles_per_second: triangles as f64 / wall_seconds.max(1e-9),
             peak_resident_bytes: cost::peak_resident_bytes(),
             peak_anonymous_bytes: self.peak_anonymous_bytes,
@@ -67,18 +68,6 @@ impl<'a> Diagnosis<'a> {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let survey = Survey::new(path, records, limits, progress)?;
-        let need = survey.heap_bytes() as u64 + survey.suspects.len() as u64 * shop::BYTES_PER_SUSPECT;
-        if need > limits.memory_bytes {
-            return Err(Error::Refused {
-                path: path.into(),
-                reason: format!(
-                    "{} triangles lie at defects, which needs {} MiB of memory",
-                    survey.suspects.len(),
-                    need.div_ceil(1 << 20)
-                ),
-                advice: format!("the budget is {} MiB: raise --memory", limits.memory_bytes >> 20),
-            });
-        }
         let shop = Shop::gather(&survey);
         let edges = Edges::of(&shop);
         let tolerance = tolerance(&survey, profile);

@@ -30,7 +30,8 @@ pub struct Report {
     pub limits: Limits,
     /// Defects of the input.
     pub before: Defects,
-    /// Defects of the output, counted on the bytes written; of a clean file that was copied: those of the input.
+    /// Defects of the output, counted on the bytes written; `None` for an inspection and for a clean file, whose copy is compared by its
+    /// hash.
     pub after: Option<Defects>,
     /// Tolerances derived from the model.
     pub tolerances: Tolerances,
@@ -249,7 +250,7 @@ pub struct Stage {
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Cost {
     pub wall_seconds: f64,
-    /// User and system time of the process.
+    /// User and system time of the process during this work.
     pub cpu_seconds: f64,
     pub triangles_per_second: f64,
     /// Largest resident set of the process, mapped file pages included.

@@ -4,6 +4,7 @@
 //! surface, numbered by their smallest triangle. Everything global is proportional to the seams and the defects, not to the file.
 
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::chunk::{self, ChunkTopology, Labels, Link, NONE, Patch, Scratch, Suspect};
 use crate::error::{Error, Result};
@@ -13,7 +14,7 @@ use crate::record::{self, Record};
 use crate::settings::Limits;
 use crate::sums::{Bounds, Extent, Measure};
 use crate::weld::Weld;
-use crate::{Progress, parallel};
+use crate::{Progress, parallel, shop};
 
 /// Topology of the sound part of a file, and the list of what is not sound.
 #[derive(Debug)]
@@ -57,13 +58,31 @@ impl<'a> Survey<'a> {
         refuse_if_too_large(path, &plan, &members, limits)?;
 
         let _span = tracing::debug_span!("chunks", count = plan.chunks()).entered();
-        let done = std::sync::atomic::AtomicU64::new(0);
+        let (done, suspects) = (AtomicU64::new(0), AtomicU64::new(0));
+        let room = limits.memory_bytes.saturating_sub(members.heap_bytes() as u64) / shop::BYTES_PER_SUSPECT;
         let mut chunks = parallel::map_with(limits.threads, plan.chunks(), Scratch::default, |scratch, c| {
+            // Once it is clear that the workshop will not fit, the rest need not be known.
+            if progress.cancelled() || suspects.load(Ordering::Relaxed) > room {
+                return ChunkTopology::default();
+            }
             let topology = scratch.solve(records, &plan, &members, ChunkId(c as u32), &measure);
-            let before = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-            progress.at(STAGE, (before + 1) * records.len() as u64 / plan.chunks() as u64, records.len() as u64);
+            suspects.fetch_add(topology.suspects.len() as u64, Ordering::Relaxed);
+            let chunks_done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            progress.at(STAGE, chunks_done * records.len() as u64 / plan.chunks() as u64, records.len() as u64);
             topology
         });
+        if progress.cancelled() {
+            return Err(Error::io(path, STAGE)(std::io::ErrorKind::Interrupted.into()));
+        }
+        let suspects = suspects.into_inner();
+        if suspects > room {
+            let need = (members.heap_bytes() as u64 + suspects * shop::BYTES_PER_SUSPECT).div_ceil(1 << 20);
+            return Err(Error::Refused {
+                path: path.into(),
+                reason: format!("at least {suspects} triangles lie at defects, which needs {need} MiB of memory or more"),
+                advice: format!("the budget is {} MiB: raise --memory", limits.memory_bytes >> 20),
+            });
+        }
         let merge = Merge::of(records, &measure, &mut chunks);
         Ok(Self {
             records,
@@ -163,16 +182,6 @@ impl<'a> Survey<'a> {
         all.sort_unstable();
         (self.suspects, self.suspect_patches) = all.into_iter().unzip();
         new
-    }
-
-    /// Bytes held.
-    pub(crate) fn heap_bytes(&self) -> usize {
-        let labels: usize = self.labels.iter().map(|l| if let Labels::Runs(b) = l { b.capacity() } else { 0 }).sum();
-        self.members.heap_bytes()
-            + labels
-            + self.suspects.len() * 12
-            + self.patches.len() * size_of::<Patch>()
-            + self.merged.len() * 4
     }
 }
 

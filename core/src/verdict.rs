@@ -26,6 +26,9 @@ pub(crate) fn judge(defects: &Defects, flaws: &[String]) -> Verdict {
     say(defects.nonmanifold_edges, "non-manifold edges");
     say(defects.nonmanifold_vertices, "non-manifold vertices");
     say(defects.inconsistent_edges, "edges whose triangles disagree");
+    if defects.boundary_edges + defects.inconsistent_edges == 0 {
+        say(defects.unbalanced_edges, "edges not used equally often in both directions");
+    }
     say(defects.inverted_components, "components inside out");
     if defects.triangles == defects.degenerate_index {
         reasons.push("no triangle with three distinct vertices".into());

@@ -105,9 +105,9 @@ impl Rim {
 fn join(shop: &Shop, outer: &[Vertex], inner: &[Vertex]) -> Option<(Vec<Vertex>, [[Vertex; 3]; 2])> {
     let (n, m) = (outer.len(), inner.len());
     let mut best: Option<(f64, usize, usize)> = None;
-    for i in 0..n {
-        for j in 0..m {
-            let away = shop.distance(outer[i], inner[j]);
+    for (i, v) in outer.iter().enumerate() {
+        for (j, w) in inner.iter().enumerate() {
+            let away = shop.distance(*v, *w);
             if best.is_none_or(|(d, ..)| away < d) {
                 best = Some((away, i, j));
             }

@@ -69,9 +69,15 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
     });
     clean(survey, shop, &mut log);
     log.time("debris", "triangles of open specks dropped", || debris::drop(survey, shop, profile));
+    let mut contradictions = 0;
     log.time("orient", "triangles turned to agree with their neighbours", || {
-        orient::make_coherent(survey, shop, &mut reversed).triangles
+        let turned = orient::make_coherent(survey, shop, &mut reversed);
+        contradictions = turned.contradictions;
+        turned.triangles
     });
+    if contradictions > 0 {
+        tracing::info!(edges = contradictions, "No orientation satisfies all edges: a surface is one-sided.");
+    }
     let mut loops_left = Vec::new();
     let mut methods = String::new();
     log.time("fill", "", || {

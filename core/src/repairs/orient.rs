@@ -112,8 +112,8 @@ fn turn(survey: &Survey<'_>, shop: &mut Shop, reversed: &mut Reversed, node: u32
 /// Turns closed components inside out where they enclose negative volume and are no cavity; returns (components, triangles).
 pub(super) fn make_outward(survey: &Survey<'_>, shop: &mut Shop, reversed: &mut Reversed) -> (u64, u64) {
     let edges = Edges::of(shop);
-    // Bodies that touch along an edge are turned each for itself.
-    let components = Components::of(survey, shop, &edges, reversed, Through::ManifoldEdges);
+    let sheets = Components::of(survey, shop, &edges, reversed, Through::ManifoldEdges);
+    let components = Components::of(survey, shop, &edges, reversed, Through::OpenSheets(&sheets));
     if components.list.iter().all(|c| c.open || c.extent.volume >= 0) {
         return (0, 0);
     }

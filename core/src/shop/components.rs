@@ -1,6 +1,6 @@
 //! Components: patches of sound surface and triangles of the workshop that hang together through edges.
 
-use super::edges::Edges;
+use super::edges::{Edge, Edges, Use};
 use super::{Shop, Vertex};
 use crate::chunk::{self, NONE};
 use crate::sums::{Bounds, Extent};
@@ -25,7 +25,7 @@ pub(crate) struct Component {
     /// With its pieces turned as [`Reversed`] says.
     pub(crate) extent: Extent,
     pub(crate) bounds: Bounds,
-    /// It has a boundary edge, or one that is not used equally often in both directions.
+    /// It has an edge that it does not itself use equally often in both directions; a boundary edge above all.
     pub(crate) open: bool,
     /// Its smallest triangle in the file's order, new ones last.
     pub(crate) sample: Sample,
@@ -47,17 +47,33 @@ pub(crate) struct Components {
 }
 
 /// How far a component reaches.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Through {
+#[derive(Clone, Copy)]
+pub(crate) enum Through<'a> {
     /// Through every edge, as the report counts.
     EveryEdge,
-    /// Not through non-manifold edges: bodies that touch along an edge stay apart.
+    /// Not through non-manifold edges: the sheets between them.
     ManifoldEdges,
+    /// Through non-manifold edges only between sheets (as given) that are open by themselves: bodies that touch along an edge stay
+    /// apart, and what is closed only together stays together.
+    OpenSheets(&'a Components),
+}
+
+impl Through<'_> {
+    /// Does a component reach through this edge to this triangle?
+    fn reaches(self, edge: &Edge<'_>, triangle: u32) -> bool {
+        match self {
+            Self::EveryEdge => true,
+            Self::ManifoldEdges => !edge.is_nonmanifold(),
+            Self::OpenSheets(sheets) => {
+                !edge.is_nonmanifold() || sheets.list[sheets.of_triangle[triangle as usize] as usize].open
+            }
+        }
+    }
 }
 
 impl Components {
     /// O(patches + shop). Components are numbered by their first patch, then by their first triangle in the shop.
-    pub(crate) fn of(survey: &Survey<'_>, shop: &Shop, edges: &Edges, reversed: &Reversed, through: Through) -> Self {
+    pub(crate) fn of(survey: &Survey<'_>, shop: &Shop, edges: &Edges, reversed: &Reversed, through: Through<'_>) -> Self {
         let patches = survey.patches.len() as u32;
         let mut parents: Vec<u32> = (0..patches + shop.triangles.len() as u32).collect();
         for t in shop.living() {
@@ -66,9 +82,10 @@ impl Components {
                 chunk::unite(&mut parents, patch, patches + t);
             }
         }
-        for edge in edges.iter().filter(|e| through == Through::EveryEdge || !e.is_nonmanifold()) {
-            for pair in edge.uses.windows(2) {
-                chunk::unite(&mut parents, patches + pair[0].triangle, patches + pair[1].triangle);
+        for edge in edges.iter() {
+            let mut reached = edge.uses.iter().filter(|u| through.reaches(&edge, u.triangle));
+            if let Some(first) = reached.next() {
+                reached.for_each(|u| chunk::unite(&mut parents, patches + first.triangle, patches + u.triangle));
             }
         }
         let mut all =
@@ -96,9 +113,13 @@ impl Components {
             into.bounds.include(&points);
             into.extent += survey.measure.triangle(&points);
         }
-        for edge in edges.iter().filter(|e| e.is_unbalanced()) {
+        for edge in edges.iter().filter(|e| e.is_nonmanifold() || e.is_unbalanced()) {
             for used in edge.uses {
-                all.list[all.of_triangle[used.triangle as usize] as usize].open = true;
+                let component = all.of_triangle[used.triangle as usize];
+                let own = |u: &&Use| all.of_triangle[u.triangle as usize] == component;
+                let forward = edge.uses.iter().filter(own).filter(|u| u.forward).count();
+                let balanced = forward * 2 == edge.uses.iter().filter(own).count();
+                all.list[component as usize].open |= !balanced;
             }
         }
         all

@@ -15,18 +15,24 @@ fn at_work(place: &Place) -> (Child, Pid) {
     let mut command = place.command();
     command.args(["repair", "mixed.stl", "-o", "out.stl", "--report", "report.json", "--threads", "1"]);
     command.stdout(Stdio::null()).stderr(File::create(place.at("stderr")).unwrap());
-    let child = command.spawn().unwrap();
-    let (pid, start) = (child.id(), Instant::now());
-    loop {
-        assert!(start.elapsed() < Duration::from_secs(60), "no worker maps the file");
-        let children = std::fs::read_to_string(format!("/proc/{pid}/task/{pid}/children")).unwrap();
-        let mapped =
-            |worker: &str| std::fs::read_to_string(format!("/proc/{worker}/maps")).is_ok_and(|maps| maps.contains("mixed.stl"));
-        if let Some(worker) = children.split_whitespace().find(|worker| mapped(worker)) {
-            return (child, Pid::from_raw(worker.parse().unwrap()).unwrap());
+    let mut child = command.spawn().unwrap();
+    let start = Instant::now();
+    while start.elapsed() < Duration::from_secs(60) {
+        if let Some(worker) = worker_of(child.id(), "mixed.stl") {
+            return (child, worker);
         }
         std::thread::sleep(Duration::from_millis(1));
     }
+    child.kill().unwrap();
+    panic!("no worker has mapped the file: {}", child.wait().unwrap());
+}
+
+/// The child of a process that has mapped a file of this name.
+fn worker_of(process: u32, name: &str) -> Option<Pid> {
+    let children = std::fs::read_to_string(format!("/proc/{process}/task/{process}/children")).unwrap_or_default();
+    let mapped = |child: &&str| std::fs::read_to_string(format!("/proc/{child}/maps")).is_ok_and(|maps| maps.contains(name));
+    let worker = children.split_whitespace().find(mapped)?;
+    Pid::from_raw(worker.parse().ok()?)
 }
 
 /// Waits for the end, which must be code 2 or 130 with one line of these words, and nothing in the folder but the input.

@@ -1,6 +1,7 @@
-//! Makes broken meshes, judges meshes, and compares Suture with pymeshlab.
+//! Makes broken meshes, judges and draws meshes, and compares Suture with pymeshlab.
 
 mod compare;
+mod picture;
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -41,6 +42,8 @@ enum Task {
         #[arg(long, requires = "reference")]
         json: bool,
     },
+    /// Draw binary STL files side by side into a PNG: the outside grey, the inside orange.
+    Picture(picture::Options),
     /// Measure suture and two pymeshlab pipelines over generated files, and write RESULTS.md and results.json.
     Compare(Compare),
 }
@@ -82,6 +85,7 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().task {
         Task::Generate { case, triangles, out, seed } => generate_file(case, triangles, &out, seed),
         Task::Judge { file, reference, json } => judge_file(&file, reference.as_deref(), json),
+        Task::Picture(options) => picture::draw(&options).map(|()| ExitCode::SUCCESS),
         Task::Compare(choices) => compare_all(choices),
     };
     done.unwrap_or_else(|error| {

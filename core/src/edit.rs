@@ -175,7 +175,7 @@ impl Edit {
         }
         flips.sort_unstable();
         flips.iter().for_each(|t| extend_ranges(&mut all.flipped, *t));
-        all.added = self.added.iter().map(record::corners).collect();
+        all.added = self.added.iter().map(|r| (record::corners(r), record::attribute(r))).collect();
         all
     }
 }

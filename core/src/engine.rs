@@ -11,6 +11,7 @@ use crate::settings::{Limits, Profile};
 use crate::shop::Shop;
 use crate::shop::edges::Edges;
 use crate::shop::near::Tolerance;
+use crate::sums::Bounds;
 use crate::survey::Survey;
 use crate::{Progress, cost, defects, emit, repairs, verdict};
 
@@ -74,6 +75,14 @@ impl<'a> Diagnosis<'a> {
         let defects = defects::count(&survey, &shop, &edges, &tolerance);
         Ok(Self { survey, shop, edges, tolerance, defects })
     }
+
+    /// The box of all triangles that have an area.
+    fn surface_bounds(&self) -> Bounds {
+        let mut bounds = Bounds::EMPTY;
+        self.survey.patches.iter().for_each(|p| bounds.add(&p.bounds));
+        self.shop.living().filter(|t| !self.shop.is_collinear(*t)).for_each(|t| bounds.include(&self.shop.points(t)));
+        bounds.normalised()
+    }
 }
 
 /// Never below what f32 tells apart at the model's coordinates: four steps of the largest one.
@@ -136,6 +145,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     let mut diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
     clock.lap("topology");
     let before = diagnosis.defects.clone();
+    let surface = diagnosis.surface_bounds();
     let mut report = Report {
         schema_version: SCHEMA_VERSION,
         engine_version: env!("CARGO_PKG_VERSION").into(),
@@ -176,7 +186,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     report.edit = edit.summary(mesh.records().len());
     report.edit_records = limits.list_edit.then(|| edit.listed());
     drop(edit);
-    verify(&mut report, &mesh, output, limits, progress, &mut clock)?;
+    verify(&mut report, &mesh, &surface, output, limits, progress, &mut clock)?;
     mesh.check_unchanged()?;
     report.cost = clock.cost(mesh.records().len() as u64);
     report.stages = clock.stages;
@@ -187,6 +197,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
 fn verify(
     report: &mut Report,
     input: &MeshFile,
+    surface: &Bounds,
     output: &Path,
     limits: &Limits,
     progress: &dyn Progress,
@@ -215,7 +226,7 @@ fn verify(
     report.verdict = verdict::judge(&diagnosis.defects, &flaws(&written));
     report.outcome = if report.verdict.good { Outcome::Repaired } else { Outcome::NotGood };
     if report.verdict.good {
-        let concerns = verdict::review(&report.before, &diagnosis.defects, &report.profile);
+        let concerns = verdict::review(&report.before, surface, &diagnosis.defects, &report.profile);
         if !concerns.is_empty() {
             report.outcome = Outcome::NeedsReview;
             report.verdict.reasons = concerns;

@@ -1,8 +1,8 @@
 //! The report: what was found, what was done, and the verdict on the bytes written. Documented in `core/REPORT.md`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 
 use crate::settings::{Limits, Profile};
 
@@ -84,6 +84,8 @@ impl Outcome {
 /// A mesh file's identity and format.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FileFacts {
+    /// What is not UTF-8 in it is replaced when the report is written: names of files may be any bytes, JSON may not.
+    #[serde(serialize_with = "lossy")]
     pub path: PathBuf,
     pub bytes: u64,
     /// BLAKE3 of the whole file, hexadecimal.
@@ -93,6 +95,10 @@ pub struct FileFacts {
     pub triangles: u64,
     /// What is odd about the file itself, in the reader's words; empty for a flawless file.
     pub findings: Vec<String>,
+}
+
+fn lossy<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&path.to_string_lossy())
 }
 
 /// Mesh file formats that are read.
@@ -219,8 +225,8 @@ pub struct EditRecords {
     pub flipped: Vec<[u32; 2]>,
     /// Records with moved vertices and their new corners.
     pub moved: Vec<(u32, [[f32; 3]; 3])>,
-    /// New records' corners, in file order.
-    pub added: Vec<[[f32; 3]; 3]>,
+    /// New records, in file order: corners and attribute word.
+    pub added: Vec<([[f32; 3]; 3], u16)>,
 }
 
 /// What a file is, judged on its bytes.

@@ -29,7 +29,8 @@ pub struct Profile {
     /// Largest change of the enclosed volume, as a fraction, between a closed part of the input and the output; beyond it the
     /// result needs review.
     pub max_volume_change: f64,
-    /// Largest growth or shrinkage of the bounding box on any side, as a fraction of the diagonal.
+    /// Largest growth or shrinkage of the bounding box on any side, as a fraction of the diagonal. (Triangles without area do not
+    /// count; a fin that stood out does.)
     pub max_box_change_relative: f64,
     /// Bodies (components that enclose volume) the repair may lose without review.
     pub max_bodies_lost: u32,
@@ -50,7 +51,7 @@ impl Default for Profile {
             max_hole_perimeter_relative: 8.0,
             fill_holes: true,
             max_volume_change: 0.25,
-            max_box_change_relative: 1e-3,
+            max_box_change_relative: 0.02,
             max_bodies_lost: 0,
             debris_triangles: 4,
             debris_area_share: 1e-3,

@@ -2,6 +2,7 @@
 
 use crate::report::{Defects, Verdict};
 use crate::settings::Profile;
+use crate::sums::Bounds;
 
 /// What no version yet checks is called unchecked, never assumed.
 const UNCHECKED: &str = "self-intersection";
@@ -52,8 +53,9 @@ pub(crate) fn judge(defects: &Defects, flaws: &[String]) -> Verdict {
     }
 }
 
-/// What a good result has changed beyond the profile's limits, in words; empty when a person need not look.
-pub(crate) fn review(before: &Defects, after: &Defects, profile: &Profile) -> Vec<String> {
+/// What a good result has changed beyond the profile's limits, in words; empty when a person need not look. `surface`: the box of the
+/// input's surface, triangles of no area left out.
+pub(crate) fn review(before: &Defects, surface: &Bounds, after: &Defects, profile: &Profile) -> Vec<String> {
     let mut concerns = Vec::new();
     // The volume of an open or incoherent surface depends on the origin, and duplicates count twice: only what enclosed a volume
     // once can be compared.
@@ -64,11 +66,10 @@ pub(crate) fn review(before: &Defects, after: &Defects, profile: &Profile) -> Ve
             concerns.push(format!("the volume changed by {:.1} %, from {} to {}", change * 100.0, before.volume, after.volume));
         }
     }
-    if let (Some(old), Some(new)) = (before.bounds, after.bounds) {
-        let diagonal = (0..3).map(|k| (f64::from(old[1][k]) - f64::from(old[0][k])).powi(2)).sum::<f64>().sqrt();
-        let moved = old.as_flattened().iter().zip(new.as_flattened()).map(|(a, b)| (f64::from(*a) - f64::from(*b)).abs());
-        let most = moved.fold(0.0, f64::max);
-        if most > profile.max_box_change_relative * diagonal {
+    if let Some([lo, hi]) = after.bounds {
+        let pairs = surface.lo.iter().zip(lo).chain(surface.hi.iter().zip(hi));
+        let most = pairs.map(|(a, b)| (f64::from(*a) - f64::from(b)).abs()).fold(0.0, f64::max);
+        if most > profile.max_box_change_relative * surface.diagonal() {
             concerns.push(format!("the bounding box moved by {most}"));
         }
     }

@@ -9,8 +9,8 @@ use crate::stl::{self, Record, Triangle};
 pub struct Edit {
     /// For each input record.
     pub changes: Vec<Change>,
-    /// Corners of new records.
-    pub added: Vec<Triangle>,
+    /// Corners and attributes of new records.
+    pub added: Vec<(Triangle, u16)>,
 }
 
 /// What became of an input record.
@@ -42,7 +42,8 @@ impl Edit {
             }
         }
         list("moved").iter().for_each(|m| note(m[0].as_u64().expect("a number"), Change::Moved(triangle(&m[1]))));
-        let added = list("added").iter().map(triangle).collect();
+        let attribute = |a: &Value| a[1].as_u64().and_then(|n| u16::try_from(n).ok()).expect("an attribute word");
+        let added = list("added").iter().map(|a| (triangle(&a[0]), attribute(a))).collect();
         Self { changes, added }
     }
 
@@ -58,7 +59,7 @@ impl Edit {
         ]
     }
 
-    /// The records that the edit makes of `input`. New triangles have their own normals, and no attribute.
+    /// The records that the edit makes of `input`. New triangles have their own normals.
     ///
     /// # Panics
     /// When the edit is of another input.
@@ -70,7 +71,7 @@ impl Edit {
             Change::Flipped => Some(flipped(record)),
             Change::Moved(to) => Some(stl::record(stl::unit_normal(to), to, stl::attribute(record))),
         });
-        kept.chain(self.added.iter().map(|t| stl::record(stl::unit_normal(t), t, 0))).collect()
+        kept.chain(self.added.iter().map(|(t, attribute)| stl::record(stl::unit_normal(t), t, *attribute))).collect()
     }
 }
 

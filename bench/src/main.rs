@@ -55,6 +55,9 @@ struct Compare {
     sizes: Vec<u64>,
     #[arg(long, value_delimiter = ',', default_value = "clean,holes,duplicates,flipped,soup,mixed")]
     cases: Vec<Case>,
+    /// Measure a case only up to this size, as CASE:TRIANGLES (a soup takes plain pymeshlab quadratic time).
+    #[arg(long, value_delimiter = ',', value_parser = case_and_size)]
+    up_to: Vec<(Case, u64)>,
     /// Runs of every program over every file, in alternation.
     #[arg(long, default_value_t = 3)]
     runs: usize,
@@ -94,6 +97,11 @@ fn main() -> ExitCode {
     })
 }
 
+fn case_and_size(text: &str) -> Result<(Case, u64), String> {
+    let (case, size) = text.split_once(':').ok_or("expected CASE:TRIANGLES")?;
+    Ok((case.parse().map_err(|e| format!("{e}"))?, size.parse().map_err(|e| format!("{e}"))?))
+}
+
 fn generate_file(case: Case, triangles: u64, out: &Path, seed: u64) -> Result<ExitCode, Box<dyn Error>> {
     let truth = generate::write_file(case, triangles, seed, out)?;
     println!("{:#?}\ninjected: {:#?}\nvolume: {}", truth.counts, truth.injected, truth.volume);
@@ -125,6 +133,7 @@ fn compare_all(choices: Compare) -> Result<ExitCode, Box<dyn Error>> {
     let options = Options {
         sizes: choices.sizes,
         cases: choices.cases,
+        up_to: choices.up_to,
         sides: choices.sides,
         runs: choices.runs,
         seed: choices.seed,

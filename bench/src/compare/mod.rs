@@ -60,6 +60,8 @@ impl Error {
 pub(crate) struct Options {
     pub(crate) sizes: Vec<u64>,
     pub(crate) cases: Vec<Case>,
+    /// Largest size of some cases.
+    pub(crate) up_to: Vec<(Case, u64)>,
     pub(crate) sides: Vec<Side>,
     pub(crate) runs: usize,
     pub(crate) seed: u64,
@@ -160,7 +162,8 @@ pub(crate) fn compare(options: &Options) -> Result<PathBuf, Error> {
     let machine = Machine::describe(folder.path(), programs.versions());
     let mut results = Results { command: options.command.clone(), machine, trials: Vec::new() };
     for &size in &options.sizes {
-        for &case in &options.cases {
+        let fits = |case: Case| options.up_to.iter().all(|(bounded, most)| *bounded != case || size <= *most);
+        for &case in options.cases.iter().filter(|case| fits(**case)) {
             let input = folder.path().join(format!("{case}-{size}.stl"));
             eprintln!("{case}, {size} triangles");
             let truth = generate::write_file(case, size, options.seed, &input)?;

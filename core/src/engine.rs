@@ -226,7 +226,11 @@ fn verify(
     report.verdict = verdict::judge(&diagnosis.defects, &flaws(&written));
     report.outcome = if report.verdict.good { Outcome::Repaired } else { Outcome::NotGood };
     if report.verdict.good {
-        let concerns = verdict::review(&report.before, surface, &diagnosis.defects, &report.profile);
+        let mut concerns = verdict::review(&report.before, surface, &diagnosis.defects, &report.profile);
+        if report.before.boundary_edges > 0 {
+            // What was closed had to be guessed: nobody knows what stood in the part that is missing.
+            concerns.extend(input.findings().iter().filter(|f| f.loss).map(|f| format!("a part is missing: {}", f.text)));
+        }
         if !concerns.is_empty() {
             report.outcome = Outcome::NeedsReview;
             report.verdict.reasons = concerns;

@@ -92,6 +92,7 @@ struct Plan {
     output: PathBuf,
     folder: bool,
     report: Option<PathBuf>,
+    inputs: Vec<PathBuf>,
     force: bool,
 }
 
@@ -109,20 +110,26 @@ impl Plan {
         if !folder && !fsx::folder_of(&output).is_dir() {
             return Err(format!("{}: its folder does not exist", output.display()));
         }
-        let report = args.report.clone();
-        if let Some(report) = &report {
-            let taken = fsx::exists(report);
-            if args.inputs.len() > 1 && !report.is_dir() {
+        let plan = Self { profile, output, folder, report: args.report.clone(), inputs: args.inputs.clone(), force: args.force };
+        if !folder {
+            plan.check(&plan.output)?;
+        }
+        if let Some(report) = &plan.report {
+            let several = args.inputs.len() > 1;
+            if several && !report.is_dir() {
                 return Err(format!("{}: with several inputs --report must be an existing folder", report.display()));
             }
-            if args.inputs.len() == 1 && report.is_dir() {
+            if !several && report.is_dir() {
                 return Err(format!("{}: is a folder; name a file for the report", report.display()));
             }
-            if args.inputs.len() == 1 && taken && !args.force {
-                return Err(format!("{}: exists already; choose another name or add --force", report.display()));
+            if !several {
+                plan.check(report)?;
+            }
+            if !folder && same_name(report, &plan.output) {
+                return Err(format!("{}: cannot be both the result and the report", report.display()));
             }
         }
-        Ok(Self { profile, output, folder, report, force: args.force })
+        Ok(plan)
     }
 
     /// The name the result is to have, `n` being the attempt to find a free one.
@@ -134,24 +141,39 @@ impl Plan {
         }
     }
 
-    /// Is this name one we may take?
-    fn check(&self, input: &Path, target: &Path) -> Result<(), Failure> {
-        let refused = |line: String| Err(Failure::new(ErrorClass::Refused, line));
-        let same = |a: &std::fs::Metadata, b: &std::fs::Metadata| {
-            let (a, b) = (Identity::from(a), Identity::from(b));
-            (a.dev, a.ino) == (b.dev, b.ino)
+    /// Is this a name that something may be written to? Never an input, by whatever name, nor anything but a regular file; an existing
+    /// file only by force, or in a folder, where the next free name is taken.
+    fn check(&self, target: &Path) -> Result<(), String> {
+        let Ok(there) = std::fs::metadata(target) else {
+            // A link that leads nowhere would be replaced, too.
+            let dangling = fsx::exists(target) && !self.force;
+            return if dangling {
+                Err(format!("{}: exists already; choose another name or add --force", target.display()))
+            } else {
+                Ok(())
+            };
         };
-        if let (Ok(a), Ok(b)) = (std::fs::metadata(input), std::fs::metadata(target))
-            && same(&a, &b)
-            && !self.folder
-        {
-            return refused(format!("{}: is the input itself; an input is never overwritten", target.display()));
+        let id = |m: &std::fs::Metadata| {
+            let identity = Identity::from(m);
+            (identity.dev, identity.ino)
+        };
+        if self.inputs.iter().any(|input| std::fs::metadata(input).is_ok_and(|m| id(&m) == id(&there))) {
+            return Err(format!("{}: is an input itself; an input is never overwritten", target.display()));
         }
-        if !self.folder && !self.force && fsx::exists(target) {
-            return refused(format!("{}: exists already; choose another name or add --force", target.display()));
+        if !there.is_file() {
+            return Err(format!("{}: is no regular file, and is not replaced", target.display()));
+        }
+        if !self.force {
+            return Err(format!("{}: exists already; choose another name or add --force", target.display()));
         }
         Ok(())
     }
+}
+
+/// Whether two paths name one file, which need not exist.
+fn same_name(a: &Path, b: &Path) -> bool {
+    let whole = |p: &Path| (fsx::folder_of(p).canonicalize().ok(), p.file_name().map(ToOwned::to_owned));
+    whole(a) == whole(b)
 }
 
 /// What all inputs share.
@@ -187,7 +209,10 @@ impl Run {
         // The report names the result before it is placed: begin with a name that looks free.
         let first = if plan.folder { (1..MAX_VERSIONS).find(|n| !fsx::exists(&plan.target(input, *n))).unwrap_or(1) } else { 1 };
         let target = plan.target(input, first);
-        plan.check(input, &target)?;
+        let refused = |line| Failure::new(ErrorClass::Refused, line);
+        if !plan.folder {
+            plan.check(&target).map_err(refused)?;
+        }
         let folder = fsx::folder_of(&target);
         let output = fsx::temporary_in(folder);
         let report = plan.report.as_deref().map(|path| {
@@ -198,8 +223,9 @@ impl Run {
             } else {
                 path.to_owned()
             };
-            (fsx::temporary_in(fsx::folder_of(&path)), path)
+            plan.check(&path).map_err(refused).map(|()| (fsx::temporary_in(fsx::folder_of(&path)), path))
         });
+        let report = report.transpose()?;
         let request = Request {
             task: Task::Repair,
             input: input.to_owned(),

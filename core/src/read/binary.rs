@@ -74,10 +74,8 @@ pub(super) fn mismatched(bytes: &[u8]) -> Option<Result<Layout, Rejection>> {
             if !look_like_triangles(all, Normals::Checked) {
                 return None;
             }
-            findings.push(Finding::flaw(format!(
-                "header says {declared} triangles, file holds {}: cut off or miscounted",
-                all.len()
-            )));
+            let text = format!("header says {declared} triangles, file holds {}: cut off or miscounted", all.len());
+            findings.push(if announced - all.len() > 1 { Finding::loss(text) } else { Finding::flaw(text) });
             all.len()
         }
         _ => {

@@ -41,11 +41,18 @@ pub struct Finding {
     /// `true`: common slicers read the file all the same, and read the same mesh. `false`: some of them refuse it or read
     /// something else, so a file that is otherwise clean is worth rewriting.
     pub harmless: bool,
+    /// More than one triangle that the file announces is not there, or nobody knows how many: if the mesh is open, too, a part of
+    /// it is lost.
+    pub loss: bool,
 }
 
 impl Finding {
     fn flaw(text: impl Into<String>) -> Self {
-        Self { text: text.into(), harmless: false }
+        Self { text: text.into(), harmless: false, loss: false }
+    }
+
+    fn loss(text: impl Into<String>) -> Self {
+        Self { loss: true, ..Self::flaw(text) }
     }
 }
 

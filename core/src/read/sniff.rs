@@ -81,5 +81,5 @@ fn findings(bytes: &[u8], body: &[u8], mark: bool) -> Vec<Finding> {
         (has(b'\r') && has(b'\n'), true, "lines end in CR LF"),
         (has(b'\t'), true, "tabs between words"),
     ];
-    all.into_iter().filter(|(found, ..)| *found).map(|(_, harmless, text)| Finding { text: text.into(), harmless }).collect()
+    all.into_iter().filter(|(found, ..)| *found).map(|(_, harmless, text)| Finding { harmless, ..Finding::flaw(text) }).collect()
 }

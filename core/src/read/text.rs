@@ -179,7 +179,6 @@ fn findings(tally: &Tally) -> Vec<Finding> {
     };
     flaw(tally.upper_case, &|| "keywords not in lower case".into());
     flaw(tally.separators == COMMA, &|| "decimal commas, read as points".into());
-    flaw(tally.cut_off, &|| "cut off within a facet, which was left out".into());
     flaw(tally.solids == 0, &|| "does not begin with \"solid\"".into());
     flaw(tally.ends < tally.solids, &|| match tally.solids {
         1 => "no endsolid".into(),
@@ -198,7 +197,10 @@ fn findings(tally: &Tally) -> Vec<Finding> {
         let names: Vec<_> = tally.names.iter().map(|name| String::from_utf8_lossy(name)).collect();
         let more = if tally.solids > names.len() as u64 { ", …" } else { "" };
         let text = format!("{} solids ({}{more}), read as one mesh", tally.solids, names.join(", "));
-        found.push(Finding { text, harmless: true });
+        found.push(Finding { harmless: true, ..Finding::flaw(text) });
+    }
+    if tally.cut_off {
+        found.push(Finding::loss("cut off within a facet, which was left out"));
     }
     found
 }

@@ -86,9 +86,16 @@ fn link(shop: &Shop, edges: &Edges, rims: &[Rim]) -> Vec<u32> {
     next
 }
 
+/// Where more fans than this meet, their edges are paired as they come: comparing all with all would take quadratic time, and no order
+/// makes surface of such a vertex.
+const MAX_FANS: usize = 64;
+
 /// Pairs the edges into and out of a vertex where several fans meet: each way in goes out along another fan, the one at the
 /// smallest angle first; along its own fan only if nothing else is left.
 fn across(shop: &Shop, edges: &Edges, rims: &[Rim], v: Vertex, incoming: &[u32], outgoing: &[u32]) -> Vec<(u32, u32)> {
+    if incoming.len() > MAX_FANS {
+        return incoming.iter().copied().zip(outgoing.iter().copied()).collect();
+    }
     let fans = fans(shop, edges, v);
     let fan = |rim: u32| fans.iter().find(|(t, _)| *t == rims[rim as usize].triangle).map_or(chunk::NONE, |(_, f)| *f);
     let mut pairs: Vec<(bool, f64, u32, u32)> = Vec::new();

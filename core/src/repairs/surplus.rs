@@ -15,8 +15,8 @@ struct Sheet {
     /// Twice its area, in the survey's units.
     area: i128,
     triangles: Vec<u32>,
-    /// Its non-manifold edges, each as often as it is used.
-    seams: Vec<u32>,
+    /// Its non-manifold edges, each as often as it is used and in which direction.
+    seams: Vec<(u32, bool)>,
     /// It has a boundary edge.
     free: bool,
     /// It reaches beyond what the workshop may change.
@@ -43,30 +43,23 @@ pub(super) fn remove(survey: &Survey<'_>, shop: &mut Shop) -> u64 {
     let mut removed = 0;
     for s in order {
         let sheet = &mut sheets[s];
-        let mut without = Vec::new();
-        for t in &sheet.triangles {
-            without.extend(nonmanifold_uses(shop, &edges, *t));
-        }
-        if is_surplus(sheet, &uses, &without) {
-            without.iter().for_each(|(e, forward)| uses[*e as usize][usize::from(!forward)] -= 1);
+        sheet.seams.sort_unstable();
+        if is_surplus(sheet.free, &uses, &sheet.seams) {
+            sheet.seams.iter().for_each(|(e, forward)| uses[*e as usize][usize::from(!forward)] -= 1);
             sheet.triangles.iter().for_each(|t| shop.kill(*t));
             removed += sheet.triangles.len() as u64;
-            sheet.triangles.clear();
         }
     }
     removed
 }
 
-/// Is the surface closed at all the sheet's seams without it, and is something wrong with it there?
-fn is_surplus(sheet: &Sheet, uses: &[[u32; 2]], without: &[(u32, bool)]) -> bool {
-    let mut seams = sheet.seams.clone();
-    seams.sort_unstable();
-    seams.dedup();
-    let mut wrong = sheet.free;
-    for e in seams {
-        let [forward, backward] = uses[e as usize];
-        let own = |f: bool| without.iter().filter(|w| **w == (e, f)).count() as u32;
-        let (left_forward, left_backward) = (forward - own(true), backward - own(false));
+/// Is the surface closed at all the sheet's seams without it, and is something wrong with it there? `own`: its uses of them, sorted.
+fn is_surplus(free: bool, uses: &[[u32; 2]], own: &[(u32, bool)]) -> bool {
+    let mut wrong = free;
+    for seam in own.chunk_by(|a, b| a.0 == b.0) {
+        let [forward, backward] = uses[seam[0].0 as usize];
+        let own_forward = seam.iter().filter(|s| s.1).count() as u32;
+        let (left_forward, left_backward) = (forward - own_forward, backward - (seam.len() as u32 - own_forward));
         if left_forward != left_backward || left_forward == 0 {
             return false;
         }
@@ -102,7 +95,7 @@ fn sheets(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> Vec<Sheet> {
         if component != NONE {
             let sheet = &mut sheets[component as usize];
             sheet.triangles.push(t);
-            sheet.seams.extend(nonmanifold_uses(shop, edges, t).iter().map(|u| u.0));
+            sheet.seams.extend(nonmanifold_uses(shop, edges, t));
             // Beyond an incomplete vertex the surface goes on outside the workshop.
             sheet.anchored |= shop.triangles[t as usize].v.iter().filter(|v| !shop.complete[**v as usize]).count() > 1;
         }

@@ -1,6 +1,6 @@
 //! Components: patches of sound surface and triangles of the workshop that hang together through edges.
 
-use super::edges::{Edge, Edges, Use};
+use super::edges::{Edge, Edges};
 use super::{Shop, Vertex};
 use crate::chunk::{self, NONE};
 use crate::sums::{Bounds, Extent};
@@ -114,12 +114,12 @@ impl Components {
             into.extent += survey.measure.triangle(&points);
         }
         for edge in edges.iter().filter(|e| e.is_nonmanifold() || e.is_unbalanced()) {
-            for used in edge.uses {
-                let component = all.of_triangle[used.triangle as usize];
-                let own = |u: &&Use| all.of_triangle[u.triangle as usize] == component;
-                let forward = edge.uses.iter().filter(own).filter(|u| u.forward).count();
-                let balanced = forward * 2 == edge.uses.iter().filter(own).count();
-                all.list[component as usize].open |= !balanced;
+            // Each component's own uses, forward less backward.
+            let mut own: Vec<(u32, i64)> =
+                edge.uses.iter().map(|u| (all.of_triangle[u.triangle as usize], if u.forward { 1 } else { -1 })).collect();
+            own.sort_unstable();
+            for group in own.chunk_by(|a, b| a.0 == b.0) {
+                all.list[group[0].0 as usize].open |= group.iter().map(|g| g.1).sum::<i64>() != 0;
             }
         }
         all

@@ -258,3 +258,16 @@ fn report_says_all_it_promises() {
     }
     assert!(report["edit_records"].is_null(), "listed only on request");
 }
+
+#[test]
+fn a_report_replaces_neither_input_nor_result() {
+    let place = Place::new();
+    place.generate(Case::Holes, 2000, 1);
+    let input = place.read("holes.stl");
+    for options in [["--report", "holes.stl"], ["--report", "out.stl"]] {
+        let ran = place.suture(["repair", "holes.stl", "-o", "out.stl", "--force"].into_iter().chain(options)).expect(2);
+        assert_eq!(ran.stderr().lines().count(), 1, "{}", ran.stderr());
+        assert_eq!(place.read("holes.stl"), input);
+        assert!(!place.at("out.stl").exists());
+    }
+}

@@ -107,6 +107,17 @@ fn cut_off_within_a_record() {
 }
 
 #[test]
+fn a_part_is_missing() {
+    let whole = stl::file(b"a box", &records(&solid_box()));
+    // A count that is wrong on a closed mesh loses nothing; four of twelve triangles do.
+    let place = Place::new();
+    place.put("in.stl", &whole[..whole.len() - 200]);
+    let report = place.repair("in.stl", "out.stl", &[]).expect(1).report();
+    assert_eq!(report["outcome"], "needs_review");
+    assert!(report["verdict"]["reasons"].to_string().contains("a part is missing"));
+}
+
+#[test]
 fn coordinates_that_are_no_numbers() {
     let mut all = records(&solid_box());
     for (at, bad) in [(3, f32::NAN), (7, f32::INFINITY), (14, f32::NEG_INFINITY)] {
@@ -271,7 +282,12 @@ fn text_cut_off_within_a_facet() {
     let text = stl::text("box", &solid_box());
     // After the last facet's second vertex.
     let end = text.rfind("vertex").unwrap();
-    open_box_in(&text.as_bytes()[..end], &["cut off"]);
+    let place = Place::new();
+    place.put("in.stl", &text.as_bytes()[..end]);
+    // Closed, but nobody knows what else is missing.
+    let report = place.repair("in.stl", "out.stl", &[]).expect(1).report();
+    assert_eq!(report["outcome"], "needs_review");
+    assert!(report["verdict"]["reasons"][0].as_str().unwrap().contains("cut off"));
 }
 
 #[test]

@@ -31,7 +31,7 @@ pub(crate) fn from_name_or_file(text: &str) -> Result<Profile, String> {
         return Ok(profile);
     }
     let path = Path::new(text);
-    if path.exists() {
+    if path.is_file() {
         return from_file(path);
     }
     Err(format!("there is no profile `{text}`: neither a file nor one of {}", Profile::BUILT_IN.join(", ")))
@@ -49,6 +49,7 @@ pub(crate) fn check(profile: &Profile) -> Result<(), String> {
         ("max_hole_perimeter_relative", profile.max_hole_perimeter_relative),
         ("max_volume_change", profile.max_volume_change),
         ("max_box_change_relative", profile.max_box_change_relative),
+        ("debris_area_share", profile.debris_area_share),
     ];
     match fractions.iter().find(|(_, value)| !value.is_finite() || *value < 0.0) {
         Some((name, value)) => Err(format!("`{name}` must be a number from 0 up, not {value}")),

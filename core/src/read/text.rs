@@ -172,6 +172,9 @@ fn judge(tally: &Tally, records: u64) -> std::result::Result<(), Rejection> {
 /// What is odd about a text's grammar.
 fn findings(tally: &Tally) -> Vec<Finding> {
     let mut found = Vec::new();
+    if tally.cut_off {
+        found.push(Finding::loss("cut off within a facet, which was left out"));
+    }
     let mut flaw = |happened: bool, text: &dyn Fn() -> String| {
         if happened {
             found.push(Finding::flaw(text()));
@@ -198,9 +201,6 @@ fn findings(tally: &Tally) -> Vec<Finding> {
         let more = if tally.solids > names.len() as u64 { ", …" } else { "" };
         let text = format!("{} solids ({}{more}), read as one mesh", tally.solids, names.join(", "));
         found.push(Finding { harmless: true, ..Finding::flaw(text) });
-    }
-    if tally.cut_off {
-        found.push(Finding::loss("cut off within a facet, which was left out"));
     }
     found
 }

@@ -445,3 +445,54 @@ impl Labels {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// (next, previous) pairs of `n` triangles around a vertex, corners numbered from `from`, in an order that is not the cycle's.
+    fn fan(n: u32, from: u32) -> Vec<[u32; 2]> {
+        (0..n).map(|i| i * 7 % n).map(|i| [from + i, from + (i + 1) % n]).collect()
+    }
+
+    /// On both sides of the border between the two ways of testing, which is at eight.
+    const SIZES: [u32; 4] = [3, 8, 9, 30];
+
+    #[test]
+    fn a_closed_fan_is_sound() {
+        for n in SIZES {
+            assert!(is_closed_fan(&mut fan(n, 0)), "{n}");
+        }
+        assert!(!is_closed_fan(&mut fan(2, 0)), "two triangles back to back enclose nothing");
+    }
+
+    #[test]
+    fn a_fan_with_one_fault_is_not() {
+        for n in SIZES {
+            // A gap.
+            let mut missing = fan(n, 0);
+            missing.pop();
+            assert!(!is_closed_fan(&mut missing), "missing of {n}");
+            // An edge of three triangles.
+            let mut doubled = fan(n, 0);
+            doubled.push(doubled[1]);
+            assert!(!is_closed_fan(&mut doubled), "doubled of {n}");
+            // Two edges whose triangles disagree.
+            let mut turned = fan(n, 0);
+            turned[1].reverse();
+            assert!(!is_closed_fan(&mut turned), "reversed of {n}");
+        }
+    }
+
+    #[test]
+    fn two_cycles_through_one_vertex_are_not() {
+        // Each triangle has exactly one after it, but it is two fans (a bow-tie): only counting the steps tells.
+        for (n, m) in [(3, 3), (4, 4), (3, 6), (15, 15)] {
+            let mut both = [fan(n, 0), fan(m, n)].concat();
+            assert!(!is_closed_fan(&mut both), "{n} and {m}");
+        }
+        // Both cycles go through corner 0: an edge of four triangles.
+        let mut shared = [fan(5, 0), fan(5, 5).iter().map(|t| t.map(|v| if v == 5 { 0 } else { v })).collect()].concat();
+        assert!(!is_closed_fan(&mut shared));
+    }
+}

@@ -193,3 +193,85 @@ fn extend_ranges(ranges: &mut Vec<[u32; 2]>, t: u32) {
         _ => ranges.push([t, t]),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::testing::{Corners, cube, diagnose, plate, records, written};
+
+    const HERE: Corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    const THERE: Corners = [[5.0; 3], [6.0, 5.0, 5.0], [5.0, 6.0, 5.0]];
+
+    #[test]
+    fn turned_twice_is_untouched() {
+        // An open plate: all of it is in the workshop.
+        let records = records(&plate(2, |_, _| true));
+        let mut d = diagnose(&records);
+        let none = Reversed::none(&d.survey);
+        for flipped in [1, 0] {
+            d.shop.triangles[3].v.swap(1, 2);
+            let summary = Edit::of(&d.survey, &d.shop, &none).summary(records.len());
+            assert_eq!((summary.flipped, summary.untouched), (flipped, 8 - flipped));
+        }
+        assert_eq!(written(&Edit::of(&d.survey, &d.shop, &none), &records), records);
+    }
+
+    #[test]
+    fn a_moved_vertex_moves_the_triangles_around_it() {
+        let records = records(&plate(2, |_, _| true));
+        let mut d = diagnose(&records);
+        let middle = d.shop.positions.iter().position(|p| *p == [1.0, 1.0, 0.0]).unwrap();
+        d.shop.positions[middle] = [1.0, 1.0, 0.5];
+        let edit = Edit::of(&d.survey, &d.shop, &Reversed::none(&d.survey));
+        let summary = edit.summary(records.len());
+        // Six of eight triangles meet in the middle of the plate.
+        assert_eq!((summary.moved, summary.untouched, summary.max_move), (6, 2, 0.5));
+    }
+
+    #[test]
+    fn a_reversed_patch_flips_its_records() {
+        let records = records(&cube());
+        let d = diagnose(&records);
+        let edit = Edit::of(&d.survey, &d.shop, &Reversed { patches: vec![true] });
+        assert_eq!(written(&edit, &records), records.iter().map(record::flip).collect::<Vec<_>>());
+        assert_eq!(edit.listed().flipped, [[0, 11]]);
+    }
+
+    proptest! {
+        /// The walk gives record by record what the edit says of it, and the summary and the list count the same.
+        #[test]
+        fn walking_does_what_the_edit_says(fates in prop::collection::vec(0u8..5, 0..200), added in 0usize..3) {
+            let input = records(&vec![HERE; fates.len()]);
+            let [moved, new] = [record::encode(THERE, 0), record::encode(THERE, 7)];
+            let mut edit = Edit { flipped: vec![0; fates.len().div_ceil(64)], added: vec![new; added], ..Edit::default() };
+            let mut want = Vec::new();
+            for (t, fate) in fates.iter().enumerate() {
+                let before = input[t];
+                match fate {
+                    0 => want.push(before),
+                    1 => edit.changes.push((t as u32, Change::Delete)),
+                    2 => edit.changes.push((t as u32, Change::Flip)),
+                    3 => edit.changes.push((t as u32, Change::Move(Box::new(moved)))),
+                    // Of a reversed patch.
+                    _ => edit.flipped[t / 64] |= 1 << (t % 64),
+                }
+                match fate {
+                    2 | 4 => want.push(record::flip(&before)),
+                    3 => want.push(moved),
+                    _ => {}
+                }
+            }
+            want.extend(vec![new; added]);
+            edit.deletions = fates.iter().filter(|f| **f == 1).count() as u64;
+            edit.flips = fates.iter().filter(|f| **f == 2 || **f == 4).count() as u64;
+            prop_assert_eq!(edit.output_records(input.len()), want.len() as u64);
+            prop_assert_eq!(edit.summary(input.len()).untouched, fates.iter().filter(|f| **f == 0).count() as u64);
+            let listed = |ranges: &[[u32; 2]]| ranges.iter().map(|[a, b]| u64::from(b - a + 1)).sum::<u64>();
+            prop_assert_eq!(listed(&edit.listed().deleted), edit.deletions);
+            prop_assert_eq!(listed(&edit.listed().flipped), edit.flips);
+            prop_assert_eq!(written(&edit, &input), want);
+        }
+    }
+}

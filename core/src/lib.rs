@@ -24,6 +24,8 @@ pub mod settings;
 mod shop;
 mod sums;
 mod survey;
+#[cfg(test)]
+mod testing;
 mod verdict;
 mod weld;
 

@@ -289,3 +289,57 @@ fn number(parents: &mut [u32], sums: Vec<Patch>) -> (Vec<Patch>, Vec<u32>) {
     merged.iter_mut().for_each(|m| *m = rank[*m as usize]);
     (order.into_iter().map(|p| patches[p as usize]).collect(), merged)
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::Quiet;
+    use crate::testing::{Corners, cuboid, records};
+
+    /// What a survey says that must not depend on its chunks.
+    fn surveyed(records: &[Record], chunk_triangles: u32) -> impl PartialEq + std::fmt::Debug {
+        let limits = Limits { threads: 1, chunk_triangles, ..Limits::default() };
+        let survey = Survey::new(Path::new("test"), records, &limits, &Quiet).unwrap();
+        let patches: Vec<_> = survey.patches.iter().map(|p| (p.first, p.triangles, p.extent, p.bounds)).collect();
+        (survey.suspects, survey.suspect_patches, patches, survey.nonfinite, survey.vertices, survey.vertices_used)
+    }
+
+    /// Unit cubes on a grid, which touch and overlap, and stray triangles: sound and unsound stars side by side.
+    fn soup() -> impl Strategy<Value = Vec<Corners>> {
+        let cubes = prop::collection::vec(prop::array::uniform3(0u8..4), 0..5);
+        let coordinate = prop_oneof![60 => (0u8..5).prop_map(f32::from), 1 => Just(f32::NAN)];
+        let strays = prop::collection::vec(prop::array::uniform3(prop::array::uniform3(coordinate)), 0..8);
+        (cubes, strays)
+            .prop_map(|(cubes, strays)| {
+                let cube = |at: &[u8; 3]| cuboid(at.map(f32::from), at.map(|x| f32::from(x + 1)));
+                cubes.iter().flat_map(cube).chain(strays).collect::<Vec<_>>()
+            })
+            .prop_shuffle()
+    }
+
+    proptest! {
+        /// Chunks only divide the work: however small, they find what one chunk of everything finds.
+        #[test]
+        fn chunks_do_not_show_in_the_result(triangles in soup()) {
+            let records = records(&triangles);
+            let whole = surveyed(&records, u32::MAX);
+            for chunk_triangles in [1, 2, 7] {
+                prop_assert_eq!(&surveyed(&records, chunk_triangles), &whole);
+            }
+        }
+    }
+
+    #[test]
+    fn a_cube_is_one_patch_and_no_suspect() {
+        let records = records(&cuboid([0.0; 3], [2.0; 3]));
+        for chunk_triangles in [1, u32::MAX] {
+            let limits = Limits { threads: 1, chunk_triangles, ..Limits::default() };
+            let survey = Survey::new(Path::new("test"), &records, &limits, &Quiet).unwrap();
+            assert!(survey.suspects.is_empty());
+            assert_eq!((survey.patches.len(), survey.patches[0].triangles, survey.vertices), (1, 12, 8));
+            assert!((survey.measure.volume(survey.patches[0].extent) - 8.0).abs() < 1e-9);
+        }
+    }
+}

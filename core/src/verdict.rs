@@ -79,3 +79,79 @@ pub(crate) fn review(before: &Defects, surface: &Bounds, after: &Defects, profil
     }
     concerns
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The counts of a unit cube.
+    fn cube() -> Defects {
+        Defects { triangles: 12, bodies: 1, volume: 1.0, bounds: Some([[0.0; 3], [1.0; 3]]), ..Defects::default() }
+    }
+
+    const BOX: Bounds = Bounds { lo: [0.0; 3], hi: [1.0; 3] };
+
+    #[test]
+    fn a_cube_is_good_and_never_called_free_of_self_intersection() {
+        let verdict = judge(&cube(), &[]);
+        assert!(verdict.good && verdict.reasons.is_empty());
+        assert_eq!(verdict.statement, "closed, manifold, oriented; self-intersection unchecked");
+        assert_eq!(verdict.unchecked, ["self-intersection"]);
+    }
+
+    #[test]
+    fn each_defect_alone_is_a_reason_and_the_only_one() {
+        type Break = fn(&mut Defects);
+        let cases: [(Break, &str); 14] = [
+            (|d| d.nonfinite = 1, "NaN"),
+            (|d| d.degenerate_index = 1, "repeated vertex"),
+            (|d| d.degenerate_area = 1, "no area"),
+            (|d| d.duplicates_same = 1, "duplicate"),
+            (|d| d.duplicates_opposite = 1, "back to back"),
+            (|d| d.boundary_edges = 1, "boundary edges"),
+            (|d| d.nonmanifold_edges = 1, "non-manifold edges"),
+            (|d| d.nonmanifold_vertices = 1, "non-manifold vertices"),
+            (|d| d.inconsistent_edges = 1, "disagree"),
+            (|d| d.unbalanced_edges = 1, "both directions"),
+            (|d| d.inverted_components = 1, "inside out"),
+            (|d| d.volume = 0.0, "volume is not positive"),
+            (|d| d.volume = -1.0, "volume is not positive"),
+            (|d| *d = Defects::default(), "no triangle"),
+        ];
+        for (damage, words) in cases {
+            let mut defects = cube();
+            damage(&mut defects);
+            let verdict = judge(&defects, &[]);
+            assert!(!verdict.good, "{words}");
+            assert!(verdict.reasons.len() == 1 && verdict.reasons[0].contains(words), "{words}: {:?}", verdict.reasons);
+        }
+        let verdict = judge(&cube(), &["cut short".into()]);
+        assert!(!verdict.good && verdict.closed && verdict.reasons == ["cut short"], "what is wrong with the file itself counts");
+    }
+
+    #[test]
+    fn review_begins_beyond_the_limits() {
+        let profile =
+            Profile { max_volume_change: 0.25, max_box_change_relative: 0.25, max_bodies_lost: 1, ..Profile::default() };
+        let concerns = |before: Defects, after: Defects| review(&before, &BOX, &after, &profile).len();
+        // The volume may change by just a quarter either way.
+        for (volume, count) in [(1.25, 0), (0.75, 0), (1.26, 1), (0.74, 1)] {
+            assert_eq!(concerns(cube(), Defects { volume, ..cube() }), count, "volume {volume}");
+        }
+        // A quarter of the diagonal is 0.433.
+        for (x, count) in [(1.43, 0), (1.44, 1), (0.57, 0), (0.56, 1)] {
+            assert_eq!(concerns(cube(), Defects { bounds: Some([[0.0; 3], [x, 1.0, 1.0]]), ..cube() }), count, "side {x}");
+        }
+        for (bodies, nested_positive, count) in [(2, 0, 0), (1, 0, 1), (1, 1, 0)] {
+            assert_eq!(concerns(Defects { bodies: 3, ..cube() }, Defects { bodies, nested_positive, ..cube() }), count);
+        }
+    }
+
+    #[test]
+    fn the_volume_of_what_enclosed_none_is_not_compared() {
+        let open = Defects { boundary_edges: 3, volume: 0.1, ..cube() };
+        assert!(review(&open, &BOX, &cube(), &Profile::default()).is_empty());
+        let inside_out = Defects { inverted_components: 1, volume: -1.0, ..cube() };
+        assert!(review(&inside_out, &BOX, &cube(), &Profile::default()).is_empty());
+    }
+}

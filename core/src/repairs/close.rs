@@ -155,3 +155,37 @@ fn fill(shop: &Shop, rim: &Loop, profile: &Profile, diagonal: f64, neighbours: N
     let settings = FillSettings { max_vertices: profile.max_hole_edges as usize, ..FillSettings::default() };
     Ok(fill::triangulate(&Rim { points: &points, apexes: &apexes, forbidden: &forbidden }, &settings)?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{After, after, cube};
+
+    /// A cube without its top.
+    fn filled(profile: &Profile) -> After<Closed> {
+        let mut open = cube();
+        open.drain(2..4);
+        after(&open, |d, _| fill_loops(&d.survey, &mut d.shop, profile, 1))
+    }
+
+    #[test]
+    fn an_open_cube_is_closed() {
+        let got = filled(&Profile::default());
+        assert_eq!((got.result.loops, got.result.left.len(), got.untouched), (1, 0, 10));
+        assert!(got.verdict.good && (got.defects.volume - 1.0).abs() < 1e-9, "{:?}", got.verdict);
+    }
+
+    #[test]
+    fn what_the_profile_does_not_admit_is_left_and_said() {
+        // The loop has four edges of length 1; the diagonal is 1.73.
+        let few_edges = Profile { max_hole_edges: 3, ..Profile::default() };
+        let short = Profile { max_hole_perimeter_relative: 2.0, ..Profile::default() };
+        let none = Profile { fill_holes: false, ..Profile::default() };
+        for (profile, words) in [(few_edges, "3 edges"), (short, "longer"), (none, "fills no holes")] {
+            let got = filled(&profile);
+            assert_eq!((got.result.loops, got.result.left.len(), got.defects.boundary_edges), (0, 1, 4));
+            assert!(got.result.left[0].reason.contains(words), "{}", got.result.left[0].reason);
+            assert_eq!((got.result.left[0].edges, got.result.left[0].perimeter), (4, 4.0));
+        }
+    }
+}

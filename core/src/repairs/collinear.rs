@@ -68,3 +68,25 @@ pub(super) fn split(shop: &mut Shop, t: u32, ends: [u32; 2], at: &[u32]) {
         last = next;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{after, cube};
+
+    #[test]
+    fn a_cap_over_a_t_junction_goes_and_the_neighbour_is_split() {
+        // The first triangle is split in the middle of its long edge, its neighbour is not, and a triangle of no area joins them.
+        let mut mesh = cube();
+        let [a, b, c] = mesh.remove(0);
+        let m = [0, 1, 2].map(|k| (a[k] + c[k]) / 2.0);
+        mesh.extend([[a, b, m], [m, b, c], [a, m, c]]);
+        let got = after(&mesh, |d, _| {
+            assert_eq!((d.defects.degenerate_area, d.defects.boundary_edges), (1, 0), "closed by the cap");
+            remove(&mut d.shop)
+        });
+        // One goes, one becomes two.
+        assert_eq!((got.result, got.defects.triangles), (1, 14));
+        assert!(got.verdict.good && (got.defects.volume - 1.0).abs() < 1e-9, "{:?}", got.verdict);
+    }
+}

@@ -24,3 +24,22 @@ pub(super) fn drop(survey: &Survey<'_>, shop: &mut Shop, profile: &Profile) -> u
     doomed.iter().for_each(|t| shop.kill(*t));
     doomed.len() as u64
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::settings::Profile;
+    use crate::testing::{after, cube};
+
+    #[test]
+    fn a_speck_goes_but_not_a_large_triangle() {
+        let dropped = |size: f32, profile: &Profile| {
+            let speck = [[5.0, 0.0, 0.0], [5.0 + size, 0.0, 0.0], [5.0, size, 0.0]];
+            after(&[cube(), vec![speck]].concat(), |d, _| super::drop(&d.survey, &mut d.shop, profile))
+        };
+        // The cube's area is 6, so the bound is 0.006 and a little; a speck has size² / 2.
+        let got = dropped(0.1, &Profile::default());
+        assert!(got.result == 1 && got.verdict.good && got.untouched == 12, "{:?}", got.verdict);
+        assert_eq!(dropped(0.2, &Profile::default()).result, 0, "it has an area that counts");
+        assert_eq!(dropped(0.1, &Profile { debris_triangles: 0, ..Profile::default() }).result, 0, "switched off");
+    }
+}

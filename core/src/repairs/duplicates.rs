@@ -116,3 +116,50 @@ fn surplus_of(pair: &Pair, place: Place) -> Vec<u32> {
     };
     all().filter(|t| Some(*t) != stays).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{after, cube, cuboid, reversed};
+
+    #[test]
+    fn of_a_reversed_copy_the_one_that_fits_stays() {
+        // The wrong one comes first: the order in the file does not decide.
+        let doubled = [reversed(&cube()[..1]), cube()].concat();
+        let got = after(&doubled, |d, _| drop_duplicates(&mut d.shop));
+        assert_eq!((got.result, got.untouched), (1, 12));
+        assert!(got.verdict.good, "{:?}", got.verdict);
+    }
+
+    #[test]
+    fn a_wall_of_no_thickness_inside_a_body_goes() {
+        // Two cubes that touch: both have the face between them, in opposite directions.
+        let cubes = [cube(), cuboid([1.0, 0.0, 0.0], [2.0, 1.0, 1.0])].concat();
+        let got = after(&cubes, |d, _| drop_duplicates(&mut d.shop));
+        assert_eq!(got.result, 4);
+        assert!(got.verdict.good && (got.defects.volume - 2.0).abs() < 1e-9, "{:?}", got.defects);
+    }
+
+    #[test]
+    fn of_a_surface_with_both_sides_one_stays() {
+        let both = [cube(), reversed(&cube())].concat();
+        let got = after(&both, |d, _| drop_duplicates(&mut d.shop));
+        assert_eq!(got.result, 12);
+        assert!(got.verdict.good, "{:?}", got.verdict);
+    }
+
+    #[test]
+    fn two_triangles_on_their_own_enclose_nothing() {
+        let alone = [&cube()[..1], &reversed(&cube()[..1])].concat();
+        let got = after(&alone, |d, _| drop_duplicates(&mut d.shop));
+        assert_eq!((got.result, got.defects.triangles), (2, 0));
+    }
+
+    #[test]
+    fn of_equal_copies_the_first_stays() {
+        let twice = [cube(), cube()].concat();
+        let got = after(&twice, |d, _| drop_duplicates(&mut d.shop));
+        assert_eq!((got.result, got.untouched), (12, 12));
+        assert!(got.verdict.good);
+    }
+}

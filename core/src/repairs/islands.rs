@@ -154,3 +154,22 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 fn length(a: [f64; 3]) -> f64 {
     dot(a, a).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{after, plate, shifted};
+
+    #[test]
+    fn an_island_is_joined_to_the_hole_around_it() {
+        let ring = plate(6, |x, y| !(1..5).contains(&x) || !(1..5).contains(&y));
+        let island = plate(6, |x, y| (2..4).contains(&x) && (2..4).contains(&y));
+        let got = after(&[ring.clone(), island.clone()].concat(), |d, _| bridge(&d.survey, &mut d.shop).len());
+        // Outer rim, and one loop of hole and island.
+        assert_eq!((got.result, got.defects.components, got.defects.boundary_loops), (2, 1, 2));
+        assert_eq!((got.defects.nonmanifold_edges, got.defects.inconsistent_edges), (0, 0));
+        // Beside the ring it is in no hole.
+        let apart = [ring, shifted(&island, [10.0, 0.0, 0.0])].concat();
+        assert_eq!(after(&apart, |d, _| bridge(&d.survey, &mut d.shop).len()).result, 0);
+    }
+}

@@ -40,3 +40,24 @@ fn admissible(shop: &Shop, t: u32, ends: [u32; 2], group: &[OnEdge]) -> Vec<u32>
     }
     stops
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{after, cube};
+
+    #[test]
+    fn a_vertex_in_the_middle_of_a_neighbours_edge_splits_the_neighbour() {
+        let mut mesh = cube();
+        let [a, b, c] = mesh.remove(0);
+        let m = [0, 1, 2].map(|k| (a[k] + c[k]) / 2.0);
+        mesh.extend([[a, b, m], [m, b, c]]);
+        let got = after(&mesh, |d, _| {
+            assert_eq!((d.defects.boundary_edges, d.defects.noncommon_vertices), (3, 1));
+            split_edges(&mut d.shop, &d.tolerance)
+        });
+        // No vertex moved: only the neighbour is replaced.
+        assert_eq!((got.result, got.untouched, got.defects.triangles), (1, 12, 14));
+        assert!(got.verdict.good, "{:?}", got.verdict);
+    }
+}

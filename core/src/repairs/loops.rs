@@ -163,3 +163,50 @@ fn from_smallest(rims: &[Rim]) -> Loop {
     let turned: Vec<Rim> = rims[first..].iter().chain(&rims[..first]).copied().collect();
     Loop { vertices: turned.iter().map(|r| r.from).collect(), triangles: turned.iter().map(|r| r.triangle).collect() }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::close;
+    use super::*;
+    use crate::settings::Profile;
+    use crate::testing::{Corners, after, diagnose, plate, records};
+
+    /// Two square holes that meet in the middle of the plate.
+    fn pinched() -> Vec<Corners> {
+        plate(4, |x, y| !(x == y && (1..3).contains(&x)))
+    }
+
+    #[test]
+    fn two_holes_that_meet_in_a_vertex_are_two_loops() {
+        let records = records(&pinched());
+        let d = diagnose(&records);
+        let mut edges: Vec<usize> = find(&d.shop, &d.edges).iter().map(|l| l.vertices.len()).collect();
+        edges.sort_unstable();
+        assert_eq!(edges, [4, 4, 16], "and the rim of the plate");
+    }
+
+    #[test]
+    fn a_loop_runs_against_the_triangles_beyond_it() {
+        let records = records(&pinched());
+        let d = diagnose(&records);
+        for rim in find(&d.shop, &d.edges) {
+            let n = rim.vertices.len();
+            for i in 0..n {
+                let (from, to) = (rim.vertices[i], rim.vertices[(i + 1) % n]);
+                let v = d.shop.triangles[rim.triangles[i] as usize].v;
+                assert!((0..3).any(|k| (v[k], v[(k + 1) % 3]) == (to, from)));
+            }
+        }
+    }
+
+    #[test]
+    fn filled_they_leave_one_fan_at_the_vertex() {
+        // The plate's own rim, of 16 edges, stays open.
+        let profile = Profile { max_hole_edges: 4, ..Profile::default() };
+        let got = after(&pinched(), |d, _| {
+            assert_eq!(d.defects.nonmanifold_vertices, 1, "a bow-tie");
+            close::fill_loops(&d.survey, &mut d.shop, &profile, 1).loops
+        });
+        assert_eq!((got.result, got.defects.nonmanifold_vertices, got.defects.boundary_loops), (2, 0, 1));
+    }
+}

@@ -122,3 +122,45 @@ fn newly_nonmanifold(shop: &Shop, before: &Edges, clusters: &[Vec<Vertex>], targ
     }
     bad
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Corners, after, cube, shifted};
+
+    #[test]
+    fn the_jittered_corners_of_a_soup_become_one_vertex_each() {
+        // Each triangle a little elsewhere, within the tolerance of 1.7e-5: no two share a vertex.
+        let soup: Vec<Corners> = cube().iter().zip(0u8..).flat_map(|(t, i)| shifted(&[*t], [f32::from(i) * 1e-6; 3])).collect();
+        let got = after(&soup, |d, _| {
+            assert_eq!(d.defects.vertices, 36);
+            weld(&mut d.shop, &d.tolerance)
+        });
+        assert_eq!((got.result.vertices, got.result.taken_back, got.defects.vertices), (28, 0, 8));
+        assert!(got.verdict.good, "{:?}", got.verdict);
+    }
+
+    #[test]
+    fn two_vertices_of_one_triangle_are_never_merged() {
+        // The first triangle's short edge is bridged by other triangles' tips, each within reach of the next.
+        let tip = |i: u8| {
+            let (x, y) = (f32::from(i) / 4.0, 10.0 * f32::from(i));
+            [[x, 0.0, 0.0], [x, y, 1.0], [x, y, 9.0]]
+        };
+        let mesh = [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, -9.0, 0.0]], tip(1), tip(2), tip(3)];
+        let got = after(&mesh, |d, _| weld(&mut d.shop, &Tolerance { weld: 1.0, edge_share: 0.25 }));
+        // Four in a row, but not the fifth: both ends of the edge are left.
+        assert_eq!(got.result.vertices, 3);
+        assert_eq!((got.defects.triangles, got.defects.degenerate_index), (4, 0));
+    }
+
+    #[test]
+    fn a_weld_that_makes_an_edge_of_three_triangles_is_taken_back() {
+        let (a, b) = ([0.0; 3], [1.0, 0.0, 0.0]);
+        let near = |p: [f32; 3]| [p[0], p[1], 1e-6];
+        let mesh = [[a, b, [0.0, 1.0, 0.0]], [b, a, [0.0, -1.0, 0.0]], [near(a), near(b), [0.0, 0.0, 1.0]]];
+        let got = after(&mesh, |d, _| weld(&mut d.shop, &d.tolerance));
+        assert_eq!((got.result.vertices, got.result.taken_back), (0, 2));
+        assert_eq!((got.defects.nonmanifold_edges, got.untouched), (0, 3));
+    }
+}

@@ -155,3 +155,48 @@ fn inverted(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed:
     }
     inverted
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{After, Corners, after, cube, cuboid, reversed};
+
+    fn outward(triangles: &[Corners]) -> After<(u64, u64)> {
+        after(triangles, |d, turned| make_outward(&d.survey, &mut d.shop, turned))
+    }
+
+    #[test]
+    fn a_flipped_face_is_turned_back() {
+        let mut mesh = cube();
+        mesh[5] = reversed(&mesh[5..6])[0];
+        let got = after(&mesh, |d, turned| make_coherent(&d.survey, &mut d.shop, turned));
+        assert_eq!((got.result.triangles, got.result.contradictions, got.untouched), (1, 0, 11));
+        assert!(got.verdict.good, "{:?}", got.verdict);
+    }
+
+    #[test]
+    fn of_everything_inside_out_the_cavity_comes_to_point_inward() {
+        // The cavity's surface by itself is the right way round, so that only its surroundings tell.
+        let got = outward(&[reversed(&cuboid([0.0; 3], [3.0; 3])), cuboid([1.0; 3], [2.0; 3])].concat());
+        assert_eq!(got.result, (2, 24));
+        assert_eq!((got.defects.bodies, got.defects.cavities), (1, 1));
+        assert!(got.verdict.good && (got.defects.volume - 26.0).abs() < 1e-9, "{:?}", got.verdict);
+    }
+
+    #[test]
+    fn an_outer_shell_alone_inside_out_is_turned_alone() {
+        let got = outward(&[reversed(&cuboid([0.0; 3], [3.0; 3])), reversed(&cuboid([1.0; 3], [2.0; 3]))].concat());
+        assert_eq!((got.result, got.untouched), ((1, 12), 12));
+        assert!(got.verdict.good && (got.defects.volume - 26.0).abs() < 1e-9, "{:?}", got.verdict);
+    }
+
+    #[test]
+    fn sheets_between_balanced_seams_are_left_as_they_are() {
+        // Two cubes that share a wall: each sheet ends at the wall's rim and is open by itself, so its own volume says nothing.
+        for at in [0.0, -100.0] {
+            let right = cuboid([at + 1.0, 0.0, 0.0], [at + 2.0, 1.0, 1.0]);
+            let got = outward(&[cuboid([at, 0.0, 0.0], [at + 1.0, 1.0, 1.0]), right].concat());
+            assert_eq!((got.result, got.untouched), ((0, 0), 24));
+        }
+    }
+}

@@ -119,3 +119,41 @@ pub(super) fn wanted_stars(shop: &Shop, edges: &Edges) -> Vec<Vertex> {
     wanted.dedup();
     wanted
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::complete_at_seams;
+    use crate::testing::{After, Corners, after, cube, cuboid};
+
+    fn removed(triangles: &[Corners]) -> After<u64> {
+        after(triangles, |d, _| {
+            complete_at_seams(d);
+            super::remove(&d.survey, &mut d.shop)
+        })
+    }
+
+    #[test]
+    fn a_fin_on_a_cube_goes() {
+        let mut mesh = cube();
+        mesh.insert(0, [[0.0; 3], [1.0, 0.0, 0.0], [0.5, -1.0, -1.0]]);
+        let got = removed(&mesh);
+        assert_eq!(got.result, 1);
+        assert!(got.verdict.good, "{:?}", got.verdict);
+    }
+
+    #[test]
+    fn two_cubes_that_share_an_edge_stay() {
+        // As many triangles run one way as the other: either could be kept, so neither goes.
+        let got = removed(&[cube(), cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 1.0])].concat());
+        assert_eq!((got.result, got.untouched), (0, 24));
+    }
+
+    #[test]
+    fn a_wall_across_a_box_goes() {
+        // The two halves of the box would be closed with the wall, too, but only one of them the right way round.
+        let (left, right) = (cube(), cuboid([1.0, 0.0, 0.0], [2.0, 1.0, 1.0]));
+        let got = removed(&[&left[..], &right[..8], &right[10..]].concat());
+        assert_eq!(got.result, 2);
+        assert!(got.verdict.good && (got.defects.volume - 2.0).abs() < 1e-9, "{:?}", got.verdict);
+    }
+}

@@ -106,3 +106,35 @@ fn cosine(a: [f64; 3], b: [f64; 3]) -> f64 {
     let length = (dot(a, a) * dot(b, b)).sqrt();
     if length > 0.0 { dot(a, b) / length } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Corners, after, plate, reversed, shifted};
+
+    /// A plate cut along its middle line, where the right side stands this far off at three vertices.
+    fn slit(gap: f32) -> Vec<Corners> {
+        let open = |p: [f32; 3]| if p[0] == 2.0 && (1.0..=3.0).contains(&p[1]) { [2.0 + gap, p[1], p[2]] } else { p };
+        let right = plate(4, |x, _| x >= 2).into_iter().map(|t| t.map(open));
+        plate(4, |x, _| x < 2).into_iter().chain(right).collect()
+    }
+
+    #[test]
+    fn rims_that_face_each_other_across_a_narrow_gap_are_joined() {
+        let zipped = |gap: f32, share: f64| after(&slit(gap), |d, _| zip(&mut d.shop, share));
+        let got = zipped(0.125, 0.35);
+        // Only the rim of the plate is left.
+        assert_eq!((got.result, got.defects.boundary_loops, got.defects.boundary_edges), (3, 1, 16));
+        assert_eq!(got.defects.nonmanifold_edges + got.defects.inconsistent_edges, 0);
+        assert_eq!(zipped(0.5, 0.35).result, 0, "too wide");
+        assert_eq!(zipped(0.125, 0.0).result, 0, "switched off");
+    }
+
+    #[test]
+    fn the_rims_of_a_thin_shell_are_left_alone() {
+        // As near as above, but both surfaces end in the same direction.
+        let bottom = reversed(&plate(2, |_, _| true));
+        let top = shifted(&plate(2, |_, _| true), [0.0, 0.0, 0.125]);
+        assert_eq!(after(&[bottom, top].concat(), |d, _| zip(&mut d.shop, 0.35)).result, 0);
+    }
+}

@@ -178,3 +178,46 @@ pub(crate) fn nonmanifold_vertices(shop: &Shop, edges: &Edges) -> Vec<Vertex> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Corners, cube, cuboid, diagnose, plate, records};
+
+    /// Components through every edge, between sheets, and by [`Through::OpenSheets`]: how many, and how many of them open.
+    fn counted(triangles: &[Corners]) -> [(usize, usize); 3] {
+        let records = records(triangles);
+        let d = diagnose(&records);
+        let of = |through| Components::of(&d.survey, &d.shop, &d.edges, &Reversed::none(&d.survey), through);
+        let sheets = of(Through::ManifoldEdges);
+        [of(Through::EveryEdge), of(Through::ManifoldEdges), of(Through::OpenSheets(&sheets))]
+            .map(|c| (c.list.len(), c.list.iter().filter(|c| c.open).count()))
+    }
+
+    #[test]
+    fn cubes_that_share_an_edge_are_apart_but_for_the_report() {
+        let cubes = [cube(), cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 1.0])].concat();
+        assert_eq!(counted(&cubes), [(1, 0), (2, 0), (2, 0)]);
+    }
+
+    #[test]
+    fn what_is_closed_only_together_stays_together() {
+        // A double box: the two shells are open at the wall between them, and only one of them has the wall.
+        let (left, right) = (cube(), cuboid([1.0, 0.0, 0.0], [2.0, 1.0, 1.0]));
+        let double = [&left[..], &right[..8], &right[10..]].concat();
+        assert_eq!(counted(&double), [(1, 1), (3, 3), (1, 1)]);
+    }
+
+    #[test]
+    fn a_ring_has_two_boundary_loops_and_a_pinched_plate_one_bad_vertex() {
+        let ring = records(&plate(3, |x, y| (x, y) != (1, 1)));
+        let d = diagnose(&ring);
+        assert_eq!(boundary_loops(&d.shop, &d.edges), 2);
+        assert!(nonmanifold_vertices(&d.shop, &d.edges).is_empty());
+        // Two squares that touch in one corner: two fans there.
+        let pinched = records(&plate(2, |x, y| x == y));
+        let d = diagnose(&pinched);
+        let bad: Vec<[f32; 3]> = nonmanifold_vertices(&d.shop, &d.edges).iter().map(|v| d.shop.positions[*v as usize]).collect();
+        assert_eq!(bad, [[1.0, 1.0, 0.0]]);
+    }
+}

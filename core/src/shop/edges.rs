@@ -114,3 +114,35 @@ impl Edges {
         self.ends.binary_search(&(a.min(b), a.max(b))).ok().map(|i| i as u32)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::testing::{diagnose, plate, records, reversed};
+
+    #[test]
+    fn a_square_has_four_boundary_edges_and_a_diagonal() {
+        let records = records(&plate(1, |_, _| true));
+        let edges = diagnose(&records).edges;
+        assert_eq!(edges.len(), 5);
+        assert_eq!(edges.iter().filter(|e| e.is_boundary() && e.is_unbalanced()).count(), 4);
+        let diagonal = edges.iter().find(|e| e.uses.len() == 2).unwrap();
+        assert!(!diagonal.is_inconsistent() && !diagonal.is_unbalanced() && !diagonal.is_nonmanifold());
+        // Its two triangles run through it in opposite directions, and it is found from either end.
+        let [a, b] = [diagonal.uses[0], diagonal.uses[1]].map(|u| diagonal.directed(&u));
+        assert_eq!(a, (b.1, b.0));
+        assert_eq!(edges.number(diagonal.high, diagonal.low), edges.number(diagonal.low, diagonal.high));
+    }
+
+    #[test]
+    fn a_turned_triangle_disagrees_and_a_third_makes_the_edge_nonmanifold() {
+        let mut square = plate(1, |_, _| true);
+        square[1] = reversed(&square[1..])[0];
+        let turned = records(&square);
+        assert_eq!(diagnose(&turned).edges.iter().filter(|e| e.is_inconsistent() && e.is_unbalanced()).count(), 1);
+        square.push([[0.0; 3], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+        let three = records(&square);
+        let edges = diagnose(&three).edges;
+        // Three uses are no longer a disagreement of two.
+        assert_eq!(edges.iter().filter(|e| e.is_nonmanifold() && !e.is_inconsistent()).count(), 1);
+    }
+}

@@ -165,3 +165,41 @@ fn around(points: &[[f32; 3]], by: f64) -> Bounds {
         hi: b.hi.map(|x| ((f64::from(x) + by) as f32).next_up()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Corners, diagnose, records};
+
+    /// A large triangle with its long edge on the x axis from 0 to 10, below it.
+    const BELOW: Corners = [[0.0; 3], [5.0, -10.0, 0.0], [10.0, 0.0, 0.0]];
+
+    fn on_edge(tip: [f32; 3], weld: f64) -> Vec<OnEdge> {
+        let records = records(&[BELOW, [tip, [12.0, 10.0, 0.0], [-2.0, 10.0, 0.0]]]);
+        let d = diagnose(&records);
+        noncommon_vertices(&d.shop, &d.edges, &Tolerance { weld, edge_share: 0.25 })
+    }
+
+    #[test]
+    fn a_vertex_near_the_inside_of_an_edge_is_on_it() {
+        let found = on_edge([2.5, 0.5, 0.0], 0.5);
+        assert_eq!(found.len(), 1);
+        assert_eq!((found[0].at, found[0].distance), (0.25, 0.5));
+        assert!(on_edge([2.5, 0.5, 0.0], 0.4).is_empty(), "too far");
+        assert!(on_edge([0.4, 0.0, 0.0], 0.5).is_empty(), "so near to the end, it is a matter of welding");
+    }
+
+    #[test]
+    fn vertices_are_close_by_the_tolerance_and_by_the_edges_around() {
+        let pairs = |size: f32, weld: f64| {
+            let small: Corners = [[0.0, 0.1, 0.0], [-size, size, 0.0], [0.0, size, 0.0]];
+            let records = records(&[BELOW, small]);
+            let d = diagnose(&records);
+            close_pairs(&d.shop, &d.edges, &Tolerance { weld, edge_share: 0.25 }).len()
+        };
+        assert_eq!(pairs(5.0, 0.2), 1);
+        assert_eq!(pairs(5.0, 0.05), 0, "beyond the tolerance");
+        assert_eq!(pairs(0.3, 0.2), 0, "a small feature is not welded away: its edges are 0.2 long");
+        assert_eq!(pairs(5.0, 0.0), 0, "switched off");
+    }
+}

@@ -1,0 +1,90 @@
+//! Small meshes for the tests, and the way of one repair from triangles to what would be written.
+
+use std::path::Path;
+
+use crate::Quiet;
+use crate::edit::{Edit, Step};
+use crate::engine::Diagnosis;
+use crate::record::{self, Record};
+use crate::report::{Defects, Verdict};
+use crate::settings::{Limits, Profile};
+use crate::shop::components::Reversed;
+
+/// A triangle by its positions.
+pub(crate) type Corners = [[f32; 3]; 3];
+
+pub(crate) fn records(triangles: &[Corners]) -> Vec<Record> {
+    triangles.iter().map(|t| record::encode(*t, 0)).collect()
+}
+
+/// Twelve triangles seen from outside: two each for low z, high z, low y, high y, low x, high x.
+pub(crate) fn cuboid(lo: [f32; 3], hi: [f32; 3]) -> Vec<Corners> {
+    // Corner numbers are bits x, y, z.
+    let p = |n: usize| std::array::from_fn(|k| if n >> k & 1 == 1 { hi[k] } else { lo[k] });
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    quads.iter().flat_map(|q| [[p(q[0]), p(q[1]), p(q[2])], [p(q[0]), p(q[2]), p(q[3])]]).collect()
+}
+
+/// The cube from the origin to (1, 1, 1).
+pub(crate) fn cube() -> Vec<Corners> {
+    cuboid([0.0; 3], [1.0; 3])
+}
+
+/// The unit squares (x, y) of a side × side grid at z = 0 that `keep` wants, facing up, two triangles each.
+pub(crate) fn plate(side: u8, keep: impl Fn(u8, u8) -> bool) -> Vec<Corners> {
+    let p = |x: u8, y: u8| [f32::from(x), f32::from(y), 0.0];
+    (0..side)
+        .flat_map(|x| (0..side).map(move |y| (x, y)))
+        .filter(|(x, y)| keep(*x, *y))
+        .flat_map(|(x, y)| [[p(x, y), p(x + 1, y), p(x + 1, y + 1)], [p(x, y), p(x + 1, y + 1), p(x, y + 1)]])
+        .collect()
+}
+
+/// The same triangles by this much farther on.
+pub(crate) fn shifted(triangles: &[Corners], by: [f32; 3]) -> Vec<Corners> {
+    triangles.iter().map(|t| t.map(|p| std::array::from_fn(|k| p[k] + by[k]))).collect()
+}
+
+/// The same triangles seen from the other side.
+pub(crate) fn reversed(triangles: &[Corners]) -> Vec<Corners> {
+    triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect()
+}
+
+pub(crate) fn diagnose(records: &[Record]) -> Diagnosis<'_> {
+    let limits = Limits { threads: 1, ..Limits::default() };
+    Diagnosis::of(Path::new("test"), records, &Profile::default(), &limits, &Quiet).unwrap()
+}
+
+/// What a repair returned, and what its edit makes of the file.
+pub(crate) struct After<R> {
+    pub(crate) result: R,
+    pub(crate) defects: Defects,
+    pub(crate) verdict: Verdict,
+    pub(crate) untouched: u64,
+}
+
+/// Runs one repair on these triangles, writes its edit and counts again, as the engine does.
+pub(crate) fn after<R>(triangles: &[Corners], repair: impl FnOnce(&mut Diagnosis<'_>, &mut Reversed) -> R) -> After<R> {
+    let input = records(triangles);
+    let mut diagnosis = diagnose(&input);
+    let mut turned = Reversed::none(&diagnosis.survey);
+    let result = repair(&mut diagnosis, &mut turned);
+    let edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &turned);
+    let defects = diagnose(&written(&edit, &input)).defects;
+    let verdict = crate::verdict::judge(&defects, &[]);
+    After { result, defects, verdict, untouched: edit.summary(input.len()).untouched }
+}
+
+/// The records that an edit makes of the input.
+pub(crate) fn written(edit: &Edit, input: &[Record]) -> Vec<Record> {
+    let mut output = Vec::new();
+    let walked: Result<(), ()> = edit.walk(input, |step| {
+        match step {
+            Step::Untouched(run) => output.extend_from_slice(run),
+            Step::Changed(record) => output.push(*record),
+        }
+        Ok(())
+    });
+    walked.unwrap();
+    output
+}

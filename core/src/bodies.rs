@@ -162,9 +162,14 @@ impl Grid {
         })
     }
 
-    /// Is there a ray in the cells under the triangle?
+    /// Is there a ray in the cells under the triangle? Asked of every triangle, so one cell is the case to be fast in.
+    #[inline]
     fn may_meet(&self, corners: &[[f32; 3]; 3]) -> bool {
-        self.under(corners).any(|row| !row.is_empty())
+        let cell = |k: usize, x: f32| self.cell(k, f64::from(x));
+        let low = |k: usize| corners[0][k].min(corners[1][k]).min(corners[2][k]);
+        let high = |k: usize| corners[0][k].max(corners[1][k]).max(corners[2][k]);
+        let (x0, x1, y0, y1) = (cell(0, low(0)), cell(0, high(0)), cell(1, low(1)), cell(1, high(1)));
+        (y0..=y1).any(|row| self.starts[row * self.side + x0] != self.starts[row * self.side + x1 + 1])
     }
 
     /// Reports `(place in the table of counts, signed crossing)` for every ray that asks for `component` and meets the triangle.
@@ -221,7 +226,7 @@ mod tests {
         let records = records(triangles);
         let d = diagnose(&records);
         let none = Reversed::none(&d.survey);
-        let components = Components::of(&d.survey, &d.shop, &d.edges, &none, Through::EveryEdge);
+        let components = Components::of(&d.survey, &d.shop, &crate::shop::edges::Edges::of(&d.shop), &none, Through::EveryEdge);
         surroundings(&d.survey, &d.shop, &components, &none).into_iter().map(|s| s.around).collect()
     }
 

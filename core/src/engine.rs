@@ -55,7 +55,6 @@ impl Clock {
 pub(crate) struct Diagnosis<'a> {
     pub(crate) survey: Survey<'a>,
     pub(crate) shop: Shop,
-    pub(crate) edges: Edges,
     pub(crate) tolerance: Tolerance,
     pub(crate) defects: Defects,
 }
@@ -73,7 +72,7 @@ impl<'a> Diagnosis<'a> {
         let edges = Edges::of(&shop);
         let tolerance = tolerance(&survey, profile);
         let defects = defects::count(&survey, &shop, &edges, &tolerance);
-        Ok(Self { survey, shop, edges, tolerance, defects })
+        Ok(Self { survey, shop, tolerance, defects })
     }
 
     /// The box of all triangles that have an area.
@@ -108,7 +107,7 @@ pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress
     clock.lap("read");
     let diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
     clock.lap("topology");
-    let facts = facts(&mesh, limits);
+    let facts = facts(&mesh, hash(mesh.bytes(), limits));
     clock.lap("hash");
     mesh.check_unchanged()?;
     let verdict = verdict::judge(&diagnosis.defects, &flaws(&mesh));
@@ -151,7 +150,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
         engine_version: env!("CARGO_PKG_VERSION").into(),
         task: Task::Repair,
         outcome: Outcome::Clean,
-        input: facts(&mesh, limits),
+        input: facts(&mesh, String::new()),
         output: None,
         profile: profile.clone(),
         limits: limits.clone(),
@@ -166,9 +165,8 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
         stages: Vec::new(),
         cost: Cost::default(),
     };
-    clock.lap("hash");
     let edit = if report.verdict.good {
-        emit::copy(&mesh, output)?;
+        report.input.blake3 = hash_beside(&mesh, limits, || emit::copy(&mesh, output))?;
         clock.lap("emit");
         Edit::default()
     } else {
@@ -179,7 +177,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
         report.loops_left = repaired.loops_left;
         // The survey of the input is not needed any more; its memory is, for that of the output.
         drop(diagnosis);
-        emit::write(&mesh, &edit, output)?;
+        report.input.blake3 = hash_beside(&mesh, limits, || emit::write(&mesh, &edit, output))?;
         clock.lap("emit");
         edit
     };
@@ -213,7 +211,7 @@ fn verify(
         }
         other => other?,
     };
-    let facts = facts(&written, limits);
+    let facts = facts(&written, hash(written.bytes(), limits));
     if report.verdict.good {
         if facts.blake3 != report.input.blake3 {
             return Err(Error::Changed { path: input.path().into() });
@@ -263,15 +261,29 @@ pub(crate) fn flaws(mesh: &MeshFile) -> Vec<String> {
     mesh.findings().iter().filter(|f| !f.harmless).map(|f| f.text.clone()).collect()
 }
 
-pub(crate) fn facts(mesh: &MeshFile, limits: &Limits) -> FileFacts {
+fn facts(mesh: &MeshFile, blake3: String) -> FileFacts {
     FileFacts {
         path: mesh.path().into(),
         bytes: mesh.byte_len(),
-        blake3: hash(mesh.bytes(), limits),
+        blake3,
         format: mesh.format(),
         triangles: mesh.records().len() as u64,
         findings: mesh.findings().iter().map(|f| f.text.clone()).collect(),
     }
+}
+
+/// Hashes the input while `write`, which keeps one thread busy at most, is under way; before it where there is but one thread.
+fn hash_beside(mesh: &MeshFile, limits: &Limits, write: impl FnOnce() -> Result<()>) -> Result<String> {
+    if limits.threads < 2 {
+        let hash = hash(mesh.bytes(), limits);
+        return write().map(|()| hash);
+    }
+    std::thread::scope(|scope| {
+        let hashing = scope.spawn(|| blake3::hash(mesh.bytes()).to_hex().to_string());
+        let written = write();
+        let hash = hashing.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        written.map(|()| hash)
+    })
 }
 
 fn hash(bytes: &[u8], limits: &Limits) -> String {

@@ -180,7 +180,7 @@ mod tests {
     fn two_holes_that_meet_in_a_vertex_are_two_loops() {
         let records = records(&pinched());
         let d = diagnose(&records);
-        let mut edges: Vec<usize> = find(&d.shop, &d.edges).iter().map(|l| l.vertices.len()).collect();
+        let mut edges: Vec<usize> = find(&d.shop, &Edges::of(&d.shop)).iter().map(|l| l.vertices.len()).collect();
         edges.sort_unstable();
         assert_eq!(edges, [4, 4, 16], "and the rim of the plate");
     }
@@ -189,7 +189,7 @@ mod tests {
     fn a_loop_runs_against_the_triangles_beyond_it() {
         let records = records(&pinched());
         let d = diagnose(&records);
-        for rim in find(&d.shop, &d.edges) {
+        for rim in find(&d.shop, &Edges::of(&d.shop)) {
             let n = rim.vertices.len();
             for i in 0..n {
                 let (from, to) = (rim.vertices[i], rim.vertices[(i + 1) % n]);

@@ -34,10 +34,15 @@ pub(crate) struct Repaired {
 /// Rounds of weld, split and clean-up: each round can uncover work for the next. A count, so that results do not depend on time.
 const ROUNDS: usize = 4;
 
+const DEGENERATE: &str = "triangles without area removed, their T-junctions closed";
+const DUPLICATE: &str = "triangles on the vertices of another one";
+
 /// Repairs what the profile allows.
 pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usize) -> Repaired {
     let mut log = Log::default();
     let mut reversed = Reversed::none(&diagnosis.survey);
+    log.time("degenerate", DEGENERATE, || duplicates::drop_repeated(&mut diagnosis.shop));
+    log.time("duplicate", DUPLICATE, || duplicates::drop_duplicates(&mut diagnosis.shop));
     complete_at_seams(diagnosis);
     let Diagnosis { survey, shop, tolerance, .. } = diagnosis;
     for _ in 0..ROUNDS {
@@ -92,23 +97,22 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
     Repaired { reversed, repairs: log.repairs, loops_left }
 }
 
-/// Fetches the stars that the removal of surplus surface may need.
+/// Fetches the stars that the removal of surplus surface may need. Duplicates are gone by then: they make non-manifold edges of no
+/// interest.
 fn complete_at_seams(diagnosis: &mut Diagnosis<'_>) {
-    let wanted = surplus::wanted_stars(&diagnosis.shop, &diagnosis.edges);
+    let Diagnosis { survey, shop, .. } = diagnosis;
+    let wanted = surplus::wanted_stars(survey, shop, &Edges::of(shop));
     if !wanted.is_empty() {
-        let positions: Vec<[f32; 3]> = wanted.iter().map(|v| diagnosis.shop.positions[*v as usize]).collect();
-        let new = diagnosis.survey.promote(&positions);
-        diagnosis.shop.extend(&diagnosis.survey, &new, &wanted);
-        diagnosis.edges = Edges::of(&diagnosis.shop);
+        let positions: Vec<[f32; 3]> = wanted.iter().map(|v| shop.positions[*v as usize]).collect();
+        let new = survey.promote(&positions);
+        shop.extend(survey, &new, &wanted);
     }
 }
 
 /// Removes what is not surface: repeated vertices, duplicates, triangles of no area, surplus sheets.
 fn clean(survey: &crate::survey::Survey<'_>, shop: &mut Shop, log: &mut Log) -> u64 {
-    let mut changes = log.time("degenerate", "triangles without area removed, their T-junctions closed", || {
-        duplicates::drop_repeated(shop) + collinear::remove(shop)
-    });
-    changes += log.time("duplicate", "triangles on the vertices of another one", || duplicates::drop_duplicates(shop));
+    let mut changes = log.time("degenerate", DEGENERATE, || duplicates::drop_repeated(shop) + collinear::remove(shop));
+    changes += log.time("duplicate", DUPLICATE, || duplicates::drop_duplicates(shop));
     changes += log
         .time("surplus", "triangles of sheets that hang from a closed surface or cross a body", || surplus::remove(survey, shop));
     changes

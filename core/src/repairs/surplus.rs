@@ -106,12 +106,21 @@ fn sheets(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> Vec<Sheet> {
     sheets
 }
 
-/// Incomplete vertices of triangles at non-manifold edges: their stars are needed before anything is removed there.
-pub(super) fn wanted_stars(shop: &Shop, edges: &Edges) -> Vec<Vertex> {
+/// Incomplete vertices of sheets that might be removed: their stars are needed before. A sheet that goes on into sound surface stays.
+pub(super) fn wanted_stars(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> Vec<Vertex> {
+    if !edges.iter().any(|e| e.is_nonmanifold()) {
+        return Vec::new();
+    }
+    let sheets = Components::of(survey, shop, edges, &Reversed::none(survey), Through::ManifoldEdges);
+    let mut goes_on = vec![false; sheets.list.len()];
+    for (p, component) in sheets.of_patch.iter().enumerate() {
+        goes_on[*component as usize] |= survey.patches[p].triangles > 0;
+    }
     let mut wanted: Vec<Vertex> = edges
         .iter()
         .filter(|e| e.is_nonmanifold())
         .flat_map(|e| e.uses)
+        .filter(|u| !goes_on[sheets.of_triangle[u.triangle as usize] as usize])
         .flat_map(|u| shop.triangles[u.triangle as usize].v)
         .filter(|v| !shop.complete[*v as usize])
         .collect();

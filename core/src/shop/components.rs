@@ -188,7 +188,7 @@ mod tests {
     fn counted(triangles: &[Corners]) -> [(usize, usize); 3] {
         let records = records(triangles);
         let d = diagnose(&records);
-        let of = |through| Components::of(&d.survey, &d.shop, &d.edges, &Reversed::none(&d.survey), through);
+        let of = |through| Components::of(&d.survey, &d.shop, &Edges::of(&d.shop), &Reversed::none(&d.survey), through);
         let sheets = of(Through::ManifoldEdges);
         [of(Through::EveryEdge), of(Through::ManifoldEdges), of(Through::OpenSheets(&sheets))]
             .map(|c| (c.list.len(), c.list.iter().filter(|c| c.open).count()))
@@ -212,12 +212,13 @@ mod tests {
     fn a_ring_has_two_boundary_loops_and_a_pinched_plate_one_bad_vertex() {
         let ring = records(&plate(3, |x, y| (x, y) != (1, 1)));
         let d = diagnose(&ring);
-        assert_eq!(boundary_loops(&d.shop, &d.edges), 2);
-        assert!(nonmanifold_vertices(&d.shop, &d.edges).is_empty());
+        assert_eq!(boundary_loops(&d.shop, &Edges::of(&d.shop)), 2);
+        assert!(nonmanifold_vertices(&d.shop, &Edges::of(&d.shop)).is_empty());
         // Two squares that touch in one corner: two fans there.
         let pinched = records(&plate(2, |x, y| x == y));
         let d = diagnose(&pinched);
-        let bad: Vec<[f32; 3]> = nonmanifold_vertices(&d.shop, &d.edges).iter().map(|v| d.shop.positions[*v as usize]).collect();
+        let bad: Vec<[f32; 3]> =
+            nonmanifold_vertices(&d.shop, &Edges::of(&d.shop)).iter().map(|v| d.shop.positions[*v as usize]).collect();
         assert_eq!(bad, [[1.0, 1.0, 0.0]]);
     }
 }

@@ -122,7 +122,7 @@ mod tests {
     #[test]
     fn a_square_has_four_boundary_edges_and_a_diagonal() {
         let records = records(&plate(1, |_, _| true));
-        let edges = diagnose(&records).edges;
+        let edges = Edges::of(&diagnose(&records).shop);
         assert_eq!(edges.len(), 5);
         assert_eq!(edges.iter().filter(|e| e.is_boundary() && e.is_unbalanced()).count(), 4);
         let diagonal = edges.iter().find(|e| e.uses.len() == 2).unwrap();
@@ -138,10 +138,10 @@ mod tests {
         let mut square = plate(1, |_, _| true);
         square[1] = reversed(&square[1..])[0];
         let turned = records(&square);
-        assert_eq!(diagnose(&turned).edges.iter().filter(|e| e.is_inconsistent() && e.is_unbalanced()).count(), 1);
+        assert_eq!(Edges::of(&diagnose(&turned).shop).iter().filter(|e| e.is_inconsistent() && e.is_unbalanced()).count(), 1);
         square.push([[0.0; 3], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
         let three = records(&square);
-        let edges = diagnose(&three).edges;
+        let edges = Edges::of(&diagnose(&three).shop);
         // Three uses are no longer a disagreement of two.
         assert_eq!(edges.iter().filter(|e| e.is_nonmanifold() && !e.is_inconsistent()).count(), 1);
     }

@@ -177,7 +177,7 @@ mod tests {
     fn on_edge(tip: [f32; 3], weld: f64) -> Vec<OnEdge> {
         let records = records(&[BELOW, [tip, [12.0, 10.0, 0.0], [-2.0, 10.0, 0.0]]]);
         let d = diagnose(&records);
-        noncommon_vertices(&d.shop, &d.edges, &Tolerance { weld, edge_share: 0.25 })
+        noncommon_vertices(&d.shop, &Edges::of(&d.shop), &Tolerance { weld, edge_share: 0.25 })
     }
 
     #[test]
@@ -195,7 +195,7 @@ mod tests {
             let small: Corners = [[0.0, 0.1, 0.0], [-size, size, 0.0], [0.0, size, 0.0]];
             let records = records(&[BELOW, small]);
             let d = diagnose(&records);
-            close_pairs(&d.shop, &d.edges, &Tolerance { weld, edge_share: 0.25 }).len()
+            close_pairs(&d.shop, &Edges::of(&d.shop), &Tolerance { weld, edge_share: 0.25 }).len()
         };
         assert_eq!(pairs(5.0, 0.2), 1);
         assert_eq!(pairs(5.0, 0.05), 0, "beyond the tolerance");

@@ -117,6 +117,7 @@ impl Edges {
 
 #[cfg(test)]
 mod tests {
+    use super::Edges;
     use crate::testing::{diagnose, plate, records, reversed};
 
     #[test]

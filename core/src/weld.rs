@@ -27,34 +27,28 @@ impl Weld {
     /// The vertex at a finite position.
     #[inline]
     pub(crate) fn vertex(&mut self, p: [f32; 3]) -> u32 {
-        let position = [p[0] + 0.0, p[1] + 0.0, p[2] + 0.0];
-        let mask = self.slots.len() - 1;
-        let mut at = slot_of(position, self.slots.len());
-        loop {
-            let slot = self.slots[at];
-            if slot.vertex == u32::MAX {
-                return self.insert(at, position);
-            }
-            if slot.position == position {
-                return slot.vertex;
-            }
-            at = (at + 1) & mask;
-        }
+        let position = normalised(p);
+        self.probe(position).unwrap_or_else(|free| self.insert(free, position))
     }
 
     /// The vertex at a position, if there is one.
     #[inline]
     pub(crate) fn find(&self, p: [f32; 3]) -> Option<u32> {
-        let position = [p[0] + 0.0, p[1] + 0.0, p[2] + 0.0];
+        self.probe(normalised(p)).ok()
+    }
+
+    /// The vertex at a normalised position, or the slot where it would go.
+    #[inline]
+    fn probe(&self, position: [f32; 3]) -> Result<u32, usize> {
         let mask = self.slots.len() - 1;
         let mut at = slot_of(position, self.slots.len());
         loop {
             let slot = self.slots[at];
             if slot.vertex == u32::MAX {
-                return None;
+                return Err(at);
             }
             if slot.position == position {
-                return Some(slot.vertex);
+                return Ok(slot.vertex);
             }
             at = (at + 1) & mask;
         }
@@ -94,6 +88,12 @@ impl Weld {
     pub(crate) fn into_positions(self) -> Vec<[f32; 3]> {
         self.positions
     }
+}
+
+/// −0.0 becomes 0.0.
+#[inline]
+fn normalised(p: [f32; 3]) -> [f32; 3] {
+    [p[0] + 0.0, p[1] + 0.0, p[2] + 0.0]
 }
 
 /// Place of a position in a table of `size` slots, a power of two of at least 2.

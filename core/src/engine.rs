@@ -107,30 +107,39 @@ pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress
     clock.lap("read");
     let diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
     clock.lap("topology");
-    let facts = facts(&mesh, hash(mesh.bytes(), limits));
+    let blake3 = hash(mesh.bytes(), limits);
     clock.lap("hash");
     mesh.check_unchanged()?;
-    let verdict = verdict::judge(&diagnosis.defects, &flaws(&mesh));
-    Ok(Report {
+    let mut report = report(Task::Inspect, &mesh, &diagnosis, profile, limits);
+    report.input.blake3 = blake3;
+    report.outcome = if report.verdict.good { Outcome::Clean } else { Outcome::NotGood };
+    report.cost = clock.cost(mesh.records().len() as u64);
+    report.stages = clock.stages;
+    Ok(report)
+}
+
+/// What there is to say about an input before anything is done; its hash, outcome and cost are still to come.
+fn report(task: Task, mesh: &MeshFile, diagnosis: &Diagnosis<'_>, profile: &Profile, limits: &Limits) -> Report {
+    Report {
         schema_version: SCHEMA_VERSION,
         engine_version: env!("CARGO_PKG_VERSION").into(),
-        task: Task::Inspect,
-        outcome: if verdict.good { Outcome::Clean } else { Outcome::NotGood },
-        input: facts,
+        task,
+        outcome: Outcome::Clean,
+        input: facts(mesh, String::new()),
         output: None,
         profile: profile.clone(),
         limits: limits.clone(),
-        tolerances: tolerances(&diagnosis),
-        before: diagnosis.defects,
+        tolerances: tolerances(diagnosis),
+        before: diagnosis.defects.clone(),
         after: None,
         repairs: Vec::new(),
         loops_left: Vec::new(),
         edit: EditSummary::default(),
         edit_records: None,
-        verdict,
-        cost: clock.cost(mesh.records().len() as u64),
-        stages: clock.stages,
-    })
+        verdict: verdict::judge(&diagnosis.defects, &flaws(mesh)),
+        stages: Vec::new(),
+        cost: Cost::default(),
+    }
 }
 
 /// Repairs `input` into the new file `output`.
@@ -143,28 +152,8 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     clock.lap("read");
     let mut diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
     clock.lap("topology");
-    let before = diagnosis.defects.clone();
     let surface = diagnosis.surface_bounds();
-    let mut report = Report {
-        schema_version: SCHEMA_VERSION,
-        engine_version: env!("CARGO_PKG_VERSION").into(),
-        task: Task::Repair,
-        outcome: Outcome::Clean,
-        input: facts(&mesh, String::new()),
-        output: None,
-        profile: profile.clone(),
-        limits: limits.clone(),
-        tolerances: tolerances(&diagnosis),
-        verdict: verdict::judge(&before, &flaws(&mesh)),
-        before,
-        after: None,
-        repairs: Vec::new(),
-        loops_left: Vec::new(),
-        edit: EditSummary::default(),
-        edit_records: None,
-        stages: Vec::new(),
-        cost: Cost::default(),
-    };
+    let mut report = report(Task::Repair, &mesh, &diagnosis, profile, limits);
     let edit = if report.verdict.good {
         report.input.blake3 = hash_beside(&mesh, limits, || emit::copy(&mesh, output))?;
         clock.lap("emit");

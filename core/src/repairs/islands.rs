@@ -3,6 +3,8 @@
 //! Filled each for itself, the hole would be closed underneath the island and the island become a body of nearly no thickness. Two
 //! triangles between the nearest vertices of both rims make one simple loop of them, which is then filled like any other.
 
+use glam::DVec3;
+
 use super::loops::{self, Loop};
 use crate::boxes::BoxTree;
 use crate::shop::components::{Components, Reversed, Through};
@@ -21,9 +23,9 @@ struct Rim {
     vertices: Vec<Vertex>,
     component: u32,
     bounds: Bounds,
-    centre: [f64; 3],
+    centre: DVec3,
     /// Newell's normal: twice the enclosed area long.
-    normal: [f64; 3],
+    normal: DVec3,
 }
 
 /// Joins every island to the smallest hole around it; returns the new triangles.
@@ -44,10 +46,10 @@ pub(super) fn bridge(survey: &Survey<'_>, shop: &mut Shop) -> Vec<u32> {
             hole.component != island.component
                 // An island is smaller than the rest of what it belongs to, and than the hole.
                 && area < components.list[hole.component as usize].extent.area
-                && survey.measure.area_of(area) < length(hole.normal) / 2.0
+                && survey.measure.area_of(area) < hole.normal.length() / 2.0
                 && hole.surrounds(island, shop)
         });
-        if let Some(hole) = around.min_by(|a, b| length(rims[*a].normal).total_cmp(&length(rims[*b].normal))) {
+        if let Some(hole) = around.min_by(|a, b| rims[*a].normal.length().total_cmp(&rims[*b].normal.length())) {
             pairs.push((hole, i));
         }
     }
@@ -65,37 +67,32 @@ pub(super) fn bridge(survey: &Survey<'_>, shop: &mut Shop) -> Vec<u32> {
 
 impl Rim {
     fn new(shop: &Shop, components: &Components, rim: &Loop) -> Self {
-        let points: Vec<[f64; 3]> = rim.points(shop).iter().map(|p| p.map(f64::from)).collect();
+        let points: Vec<DVec3> = rim.vertices.iter().map(|v| shop.place(*v)).collect();
         let mut bounds = Bounds::EMPTY;
         bounds.include(&rim.points(shop));
         let n = points.len();
-        let centre = std::array::from_fn(|k| points.iter().map(|p| p[k]).sum::<f64>() / n as f64);
-        let mut normal = [0.0; 3];
-        for i in 0..n {
-            let (a, b) = (minus(points[i], centre), minus(points[(i + 1) % n], centre));
-            let c = cross(a, b);
-            (0..3).for_each(|k| normal[k] += c[k]);
-        }
+        let centre = points.iter().sum::<DVec3>() / n as f64;
+        let normal = (0..n).map(|i| (points[i] - centre).cross(points[(i + 1) % n] - centre)).sum();
         let component = components.of_triangle[rim.triangles[0] as usize];
         Self { vertices: rim.vertices.clone(), component, bounds, centre, normal }
     }
 
     /// Does the other rim run the other way round, near this one's plane and inside it?
     fn surrounds(&self, other: &Self, shop: &Shop) -> bool {
-        let size = length(self.normal);
-        if size == 0.0 || dot(self.normal, other.normal) > OPPOSITE * size * length(other.normal) {
+        let size = self.normal.length();
+        if size == 0.0 || self.normal.dot(other.normal) > OPPOSITE * size * other.normal.length() {
             return false;
         }
         let off_plane = MAX_OFF_PLANE * (size / 2.0).sqrt();
         // Seen along the axis nearest to the normal.
         let axis = (1..3).fold(0, |best, k| if self.normal[k].abs() > self.normal[best].abs() { k } else { best });
         let flat = |v: Vertex| {
-            let p = shop.positions[v as usize].map(f64::from);
+            let p = shop.place(v);
             [p[(axis + 1) % 3], p[(axis + 2) % 3]]
         };
         let polygon: Vec<[f64; 2]> = self.vertices.iter().map(|v| flat(*v)).collect();
         other.vertices.iter().all(|v| {
-            let away = dot(minus(shop.positions[*v as usize].map(f64::from), self.centre), self.normal).abs() / size;
+            let away = (shop.place(*v) - self.centre).dot(self.normal).abs() / size;
             away <= off_plane && is_inside(&polygon, flat(*v))
         })
     }
@@ -137,22 +134,6 @@ fn is_inside(polygon: &[[f64; 2]], p: [f64; 2]) -> bool {
         let crosses = (a[1] > p[1]) != (b[1] > p[1]) && p[0] < (b[0] - a[0]) * (p[1] - a[1]) / (b[1] - a[1]) + a[0];
         inside ^ crosses
     })
-}
-
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|k| a[k] - b[k])
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn length(a: [f64; 3]) -> f64 {
-    dot(a, a).sqrt()
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 use crate::chunk;
 use crate::fill::exact::Point;
 use crate::shop::edges::Edges;
-use crate::shop::{Shop, Vertex};
+use crate::shop::{self, Shop, Vertex};
 
 /// A simple boundary loop.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -101,7 +101,7 @@ fn across(shop: &Shop, edges: &Edges, rims: &[Rim], v: Vertex, incoming: &[u32],
     let mut pairs: Vec<(bool, f64, u32, u32)> = Vec::new();
     for i in incoming {
         for o in outgoing {
-            let cosine = cosine(shop, v, rims[*i as usize].from, rims[*o as usize].to);
+            let cosine = shop::cosine(shop.vector(v, rims[*i as usize].from), shop.vector(v, rims[*o as usize].to));
             pairs.push((fan(*i) == fan(*o), -cosine, *i, *o));
         }
     }
@@ -129,16 +129,6 @@ fn fans(shop: &Shop, edges: &Edges, v: Vertex) -> Vec<(u32, u32)> {
         }
     }
     (0..star.len() as u32).map(|i| (star[i as usize], star[chunk::find(&mut parents, i) as usize])).collect()
-}
-
-/// Cosine of the angle at `v` between two neighbours.
-fn cosine(shop: &Shop, v: Vertex, a: Vertex, b: Vertex) -> f64 {
-    let at = |w: Vertex| -> [f64; 3] {
-        std::array::from_fn(|k| f64::from(shop.positions[w as usize][k]) - f64::from(shop.positions[v as usize][k]))
-    };
-    let (p, q) = (at(a), at(b));
-    let dot = |x: [f64; 3], y: [f64; 3]| x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
-    dot(p, q) / (dot(p, p) * dot(q, q)).sqrt().max(f64::MIN_POSITIVE)
 }
 
 /// Cuts a way of consecutive edges wherever it comes back to a vertex. What does not close is left out.

@@ -4,8 +4,10 @@
 //! they end point at each other. (The rims of a thin shell lie as near, but point the same way: they are left alone.) A merge that
 //! would turn a triangle over, flatten it, or make an edge of more than two triangles is left out.
 
+use glam::DVec3;
+
 use crate::shop::edges::{Edge, Edges};
-use crate::shop::{Shop, Vertex, near};
+use crate::shop::{self, Shop, Vertex, near};
 
 /// Facing: cosine between the directions in which the two surfaces end, at most.
 const FACING: f64 = -0.5;
@@ -27,7 +29,7 @@ pub(super) fn zip(shop: &mut Shop, share: f64) -> u64 {
         // Mutual, and each pair once.
         if let Some(j) = found.filter(|j| *j > i && nearest[*j] == Some(i)) {
             let (v, w) = (vertices[i], vertices[j]);
-            if cosine(outward[v as usize], outward[w as usize]) < FACING {
+            if shop::cosine(outward[v as usize], outward[w as usize]) < FACING {
                 pairs.push((shop.distance(v, w), v, w));
             }
         }
@@ -45,18 +47,16 @@ pub(super) fn zip(shop: &mut Shop, share: f64) -> u64 {
 }
 
 /// For each boundary vertex the direction in which its surface ends: away from the triangles, across their boundary edges.
-fn ends(shop: &Shop, edges: &Edges) -> Vec<[f64; 3]> {
-    let mut all = vec![[0.0; 3]; shop.positions.len()];
+fn ends(shop: &Shop, edges: &Edges) -> Vec<DVec3> {
+    let mut all = vec![DVec3::ZERO; shop.positions.len()];
     for edge in edges.iter().filter(Edge::is_boundary) {
         let t = edge.uses[0].triangle;
         let Some(apex) = shop.triangles[t as usize].v.into_iter().find(|v| *v != edge.low && *v != edge.high) else { continue };
-        let along = vector(shop, edge.low, edge.high);
-        let from_apex = vector(shop, apex, edge.low);
-        let part = dot(from_apex, along) / dot(along, along).max(f64::MIN_POSITIVE);
+        let along = shop.vector(edge.low, edge.high);
+        let from_apex = shop.vector(apex, edge.low);
+        let part = from_apex.dot(along) / along.dot(along).max(f64::MIN_POSITIVE);
         for v in [edge.low, edge.high] {
-            for k in 0..3 {
-                all[v as usize][k] += from_apex[k] - part * along[k];
-            }
+            all[v as usize] += from_apex - part * along;
         }
     }
     all
@@ -82,29 +82,13 @@ fn may_merge(shop: &Shop, stay: Vertex, go: Vertex) -> bool {
             let before = shop.points(t);
             let mut after = before;
             after[k] = shop.positions[stay as usize];
-            cosine(normal(before), normal(after)) >= STEADY
+            shop::cosine(normal(before), normal(after)) >= STEADY
         })
 }
 
-fn vector(shop: &Shop, from: Vertex, to: Vertex) -> [f64; 3] {
-    let (a, b) = (shop.positions[from as usize], shop.positions[to as usize]);
-    std::array::from_fn(|k| f64::from(b[k]) - f64::from(a[k]))
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn normal([a, b, c]: [[f32; 3]; 3]) -> [f64; 3] {
-    let u: [f64; 3] = std::array::from_fn(|k| f64::from(b[k]) - f64::from(a[k]));
-    let v: [f64; 3] = std::array::from_fn(|k| f64::from(c[k]) - f64::from(a[k]));
-    [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
-}
-
-/// 0 where one has no length.
-fn cosine(a: [f64; 3], b: [f64; 3]) -> f64 {
-    let length = (dot(a, a) * dot(b, b)).sqrt();
-    if length > 0.0 { dot(a, b) / length } else { 0.0 }
+fn normal(corners: [[f32; 3]; 3]) -> DVec3 {
+    let [a, b, c] = corners.map(shop::place);
+    (b - a).cross(c - a)
 }
 
 #[cfg(test)]

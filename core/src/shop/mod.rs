@@ -10,6 +10,8 @@ pub(crate) mod near;
 
 use std::collections::HashMap;
 
+use glam::DVec3;
+
 use crate::chunk::{self, NONE, Suspect};
 use crate::record::{self, Record};
 use crate::survey::Survey;
@@ -194,9 +196,30 @@ impl Shop {
         ends.map(|w| self.distance(v, w)).fold(f64::INFINITY, f64::min)
     }
 
+    /// A position in f64.
+    pub(crate) fn place(&self, v: Vertex) -> DVec3 {
+        place(self.positions[v as usize])
+    }
+
+    /// The way from one vertex to another.
+    pub(crate) fn vector(&self, from: Vertex, to: Vertex) -> DVec3 {
+        self.place(to) - self.place(from)
+    }
+
     pub(crate) fn distance(&self, a: Vertex, b: Vertex) -> f64 {
         distance(self.positions[a as usize], self.positions[b as usize])
     }
+}
+
+/// A position in f64.
+pub(crate) fn place(p: [f32; 3]) -> DVec3 {
+    DVec3::from_array(p.map(f64::from))
+}
+
+/// Cosine of the angle between two vectors; 0 where one has no length.
+pub(crate) fn cosine(a: DVec3, b: DVec3) -> f64 {
+    let length = (a.dot(a) * b.dot(b)).sqrt();
+    if length > 0.0 { a.dot(b) / length } else { 0.0 }
 }
 
 /// Distance of two positions, in f64.

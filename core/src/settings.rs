@@ -38,6 +38,8 @@ pub struct Profile {
     pub debris_triangles: u32,
     /// ... if they have at most this share of the model's area.
     pub debris_area_share: f64,
+    /// Look for triangles that cross or overlap each other, in the input and in the output; without, the verdict calls it unchecked.
+    pub check_self_intersections: bool,
 }
 
 impl Default for Profile {
@@ -55,6 +57,7 @@ impl Default for Profile {
             max_bodies_lost: 0,
             debris_triangles: 4,
             debris_area_share: 1e-3,
+            check_self_intersections: true,
         }
     }
 }

@@ -1,14 +1,16 @@
-"""IN OUT: what someone who knows pymeshlab well writes to have any broken print file repaired unattended.
+"""What someone who knows pymeshlab well writes to have any broken print file repaired unattended.
 
 Close vertices are merged with a tolerance relative to the model; folded faces and T-vertices are removed; then rounds of
 non-manifold repair and hole closing (any hole size, no self-intersecting patches) until the surface is closed and two-manifold,
 at most three; borders that do not quite meet are snapped in the first. At last the faces are oriented coherently and, where the
-enclosed volume is negative, all turned round. A filter that refuses the mesh is named on standard error and skipped.
+enclosed volume is negative, all turned round. A filter that refuses the mesh is named on standard error and skipped. With
+--self-intersections the result's self-intersecting faces are selected before it is saved, which is how pymeshlab finds them.
 """
 
 import sys
 
 import pymeshlab
+from shared import run
 
 MERGE_WITHIN_DIAGONAL = 1e-5
 SNAP_WITHIN_EDGE = 0.05
@@ -59,17 +61,33 @@ class Repair:
         if self.meshes.current_mesh().face_number() and self.meshes.get_geometric_measures().get("mesh_volume", 1) < 0:
             self.apply("meshing_invert_face_orientation", forceflip=True)
 
+    def self_intersecting(self):
+        self.apply("compute_selection_by_self_intersections_per_face")
+        return self.meshes.current_mesh().selected_face_number()
 
-source, target = sys.argv[1:3]
-repair = Repair(source)
-repair.weld()
-repair.drop_bad_faces()
-for attempt in range(ROUNDS):
-    repair.make_manifold()
-    if attempt == 0:
-        repair.apply("meshing_snap_mismatched_borders", edgedistratio=SNAP_WITHIN_EDGE)
-    repair.close()
-    if repair.is_done():
-        break
-repair.orient()
-repair.meshes.save_current_mesh(target, binary=True)
+
+def repair(source, target, stages, self_intersections):
+    work = Repair(source)
+    stages.end("load")
+    work.weld()
+    stages.end("weld")
+    work.drop_bad_faces()
+    stages.end("bad faces")
+    for attempt in range(ROUNDS):
+        work.make_manifold()
+        if attempt == 0:
+            work.apply("meshing_snap_mismatched_borders", edgedistratio=SNAP_WITHIN_EDGE)
+        work.close()
+        if work.is_done():
+            break
+    stages.end("rounds of closing")
+    work.orient()
+    stages.end("orient")
+    if self_intersections:
+        stages.facts["self-intersecting"] = work.self_intersecting()
+        stages.end("self-intersections")
+    work.meshes.save_current_mesh(target, binary=True)
+    stages.end("save")
+
+
+run(repair, "self-intersections")

@@ -1,7 +1,7 @@
 //! Generators of broken meshes with a known truth, and an independent judge of mesh files.
 //!
 //! The generators ([`generate`]) and the judge ([`judge`]) need nothing but the standard library; they share no code with the
-//! engine, so that neither can hide a fault of the other. The comparison with pymeshlab is in the binary.
+//! engine, so that neither can hide a fault of the other. The comparison with other tools is in the binary.
 
 pub mod counts;
 pub mod generate;

@@ -1,4 +1,4 @@
-//! Makes broken meshes, judges and draws meshes, and compares Suture with pymeshlab.
+//! Makes broken meshes, judges and draws meshes, and compares Suture with its peers.
 
 mod compare;
 mod picture;
@@ -9,12 +9,12 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
-use compare::{Judged, Options, Side};
+use compare::{Cache, Judged, Options, Side};
 use suture_bench::generate::{self, Case};
 use suture_bench::judge::{self, Judgement, Same};
 
 #[derive(Parser)]
-#[command(about = "Makes broken meshes, judges meshes, and compares Suture with pymeshlab.")]
+#[command(about = "Makes broken meshes, judges meshes, and compares Suture with its peers.")]
 struct Arguments {
     #[command(subcommand)]
     task: Task,
@@ -44,44 +44,95 @@ enum Task {
     },
     /// Draw binary STL files side by side into a PNG: the outside grey, the inside orange.
     Picture(picture::Options),
-    /// Measure suture and two pymeshlab pipelines over generated files, and write RESULTS.md and results.json.
-    Compare(Compare),
+    /// Run suture and its peers over files, keep every run in `results/`, and publish what is there.
+    Compare(Box<Compare>),
+    /// Make RESULTS.md, the plots and the README's table from the raw runs that are kept.
+    Publish(Publish),
 }
 
 #[derive(Args)]
 struct Compare {
+    /// Which programs; `all`, or names (an unknown name lists them).
+    #[arg(long, value_delimiter = ',', default_value = "all")]
+    peers: Vec<Peer>,
     /// About how many triangles.
     #[arg(long, value_delimiter = ',', default_value = "100000,1000000,10000000")]
     sizes: Vec<u64>,
-    #[arg(long, value_delimiter = ',', default_value = "clean,holes,duplicates,flipped,soup,mixed")]
+    #[arg(long, value_delimiter = ',', default_value = "mixed,clean")]
     cases: Vec<Case>,
-    /// Measure a case only up to this size, as CASE:TRIANGLES (a soup takes plain pymeshlab quadratic time).
-    #[arg(long, value_delimiter = ',', value_parser = case_and_size)]
+    /// Binary STL files from elsewhere, instead of generated ones.
+    #[arg(long, num_args = 1.., conflicts_with_all = ["sizes", "cases"])]
+    files: Vec<PathBuf>,
+    /// For each size and case a folder of so many small files, that one process works through.
+    #[arg(long, value_name = "FILES", default_value_t = 1)]
+    many: u64,
+    /// Measure a case only up to this size (a soup takes plain pymeshlab quadratic time).
+    #[arg(long, value_name = "CASE:TRIANGLES", value_delimiter = ',', value_parser = name_and_size::<Case>)]
     up_to: Vec<(Case, u64)>,
+    /// Measure a program up to this size, instead of where it is usually left out for its time or memory.
+    #[arg(long, value_name = "PEER:TRIANGLES", value_delimiter = ',', value_parser = name_and_size::<Side>)]
+    peer_up_to: Vec<(Side, u64)>,
+    /// State of the page cache at the start of a run: warm, cold.
+    #[arg(long, value_delimiter = ',', default_value = "warm")]
+    cache: Vec<Cache>,
+    /// Threads that suture is told to use, one way to run for each.
+    #[arg(long, value_delimiter = ',')]
+    threads: Vec<u16>,
+    /// Memory that suture is told to use, such as 768MiB.
+    #[arg(long)]
+    memory: Option<String>,
+    /// Run every process in a memory cgroup of so many MiB (usually needs root).
+    #[arg(long, value_name = "MIB")]
+    cgroup: Option<u64>,
     /// Runs of every program over every file, in alternation.
     #[arg(long, default_value_t = 3)]
     runs: usize,
-    /// Which programs.
-    #[arg(long, value_delimiter = ',', default_value = "suture,plain,competent")]
-    sides: Vec<Side>,
+    /// A program that has run over a file is not run over it again if that would take it more than so many seconds in all.
+    #[arg(long, value_name = "SECONDS", default_value_t = 300)]
+    patience: u64,
+    /// Seconds after which a process is killed; it then sits out the other runs over that file.
+    #[arg(long, default_value_t = 900)]
+    limit: u64,
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// The page to write instead of this crate's RESULTS.md.
+    /// Judge outputs of inputs up to this size.
+    #[arg(long, value_name = "TRIANGLES", default_value_t = 12_000_000)]
+    judge_up_to: u64,
+    /// Name of the raw file, `NAME.jsonl`. One of this name is replaced, unless it is resumed.
+    #[arg(long, default_value = "compare")]
+    name: String,
+    /// Go on where the raw file ends: what is in it is not run again.
     #[arg(long)]
-    out: Option<PathBuf>,
-    /// Where to make inputs and outputs (ten times the largest file's 50 bytes a triangle is ample); the system's temporary
-    /// folder otherwise.
+    resume: bool,
+    /// The folder of raw files, instead of this crate's `results`. Page and plots are then put there, too.
+    #[arg(long, value_name = "DIR")]
+    results: Option<PathBuf>,
+    /// Where to make inputs and outputs (three times the largest file's 50 bytes a triangle is ample); the system's temporary folder
+    /// otherwise.
     #[arg(long)]
     folder: Option<PathBuf>,
-    /// Leave the generated inputs where they are.
-    #[arg(long)]
-    keep_inputs: bool,
     /// Measure this binary instead of building one.
     #[arg(long)]
     suture: Option<PathBuf>,
-    /// Seconds after which a process is killed; its side then sits out the other runs over that file.
-    #[arg(long, default_value_t = 900)]
-    limit: u64,
+}
+
+#[derive(Args)]
+struct Publish {
+    /// The folder of raw files, instead of this crate's `results`. Page and plots are then put there, too.
+    #[arg(long, value_name = "DIR")]
+    results: Option<PathBuf>,
+}
+
+/// One program, or all.
+#[derive(Clone)]
+struct Peer(Vec<Side>);
+
+impl std::str::FromStr for Peer {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        if name == "all" { Ok(Self(Side::ALL.into())) } else { name.parse().map(|side| Self(vec![side])) }
+    }
 }
 
 fn main() -> ExitCode {
@@ -89,7 +140,8 @@ fn main() -> ExitCode {
         Task::Generate { case, triangles, out, seed } => generate_file(case, triangles, &out, seed),
         Task::Judge { file, reference, json } => judge_file(&file, reference.as_deref(), json),
         Task::Picture(options) => picture::draw(&options).map(|()| ExitCode::SUCCESS),
-        Task::Compare(choices) => compare_all(choices),
+        Task::Compare(choices) => compare_all(*choices),
+        Task::Publish(choices) => publish(choices.results.as_deref()).map(|()| ExitCode::SUCCESS),
     };
     done.unwrap_or_else(|error| {
         eprintln!("suture-bench: {error}");
@@ -97,9 +149,9 @@ fn main() -> ExitCode {
     })
 }
 
-fn case_and_size(text: &str) -> Result<(Case, u64), String> {
-    let (case, size) = text.split_once(':').ok_or("expected CASE:TRIANGLES")?;
-    Ok((case.parse().map_err(|e| format!("{e}"))?, size.parse().map_err(|e| format!("{e}"))?))
+fn name_and_size<T: std::str::FromStr<Err: std::fmt::Display>>(text: &str) -> Result<(T, u64), String> {
+    let (name, size) = text.split_once(':').ok_or("expected NAME:TRIANGLES")?;
+    Ok((name.parse().map_err(|e: T::Err| e.to_string())?, size.parse().map_err(|e| format!("{e}"))?))
 }
 
 fn generate_file(case: Case, triangles: u64, out: &Path, seed: u64) -> Result<ExitCode, Box<dyn Error>> {
@@ -129,21 +181,53 @@ fn judge_file(file: &Path, reference: Option<&Path>, json: bool) -> Result<ExitC
 }
 
 fn compare_all(choices: Compare) -> Result<ExitCode, Box<dyn Error>> {
-    let words: Vec<_> = std::env::args().skip(1).collect();
+    let words: Vec<_> = std::env::args().skip(1).map(without_place).collect();
+    let folder = choices.results.clone().unwrap_or_else(compare::results);
+    let elsewhere = !choices.files.is_empty();
     let options = Options {
-        sizes: choices.sizes,
+        sizes: if elsewhere { Vec::new() } else { choices.sizes },
         cases: choices.cases,
+        files: choices.files,
+        many: choices.many,
         up_to: choices.up_to,
-        sides: choices.sides,
+        side_up_to: choices.peer_up_to,
+        sides: choices.peers.into_iter().flat_map(|peer| peer.0).collect(),
+        caches: choices.cache,
+        threads: choices.threads,
+        memory: choices.memory,
+        cgroup: choices.cgroup.map(|mebibytes| mebibytes << 20),
         runs: choices.runs,
+        patience: Duration::from_secs(choices.patience),
         seed: choices.seed,
-        out: choices.out,
+        raw: folder.join(format!("{}.jsonl", choices.name)),
+        resume: choices.resume,
         folder: choices.folder,
-        keep_inputs: choices.keep_inputs,
+        judge_up_to: choices.judge_up_to,
         suture: choices.suture,
         limit: Duration::from_secs(choices.limit),
         command: format!("cargo run --release -p suture-bench -- {}", words.join(" ")),
     };
-    println!("results are in {}", compare::compare(&options)?.display());
+    compare::compare(&options)?;
+    publish(choices.results.as_deref())?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// A word of the command line as it is published: of an absolute path only the name, since the rest is this machine's own.
+fn without_place(word: String) -> String {
+    let path = Path::new(&word);
+    match path.file_name() {
+        Some(name) if path.is_absolute() => name.to_string_lossy().into_owned(),
+        _ => word,
+    }
+}
+
+/// Publishes this crate's raw runs, or others where they are.
+fn publish(results: Option<&Path>) -> Result<(), Box<dyn Error>> {
+    let into = results.unwrap_or(compare::home());
+    match results {
+        Some(raw) => compare::publish(raw, into, None)?,
+        None => compare::publish(&compare::results(), into, Some(&compare::home().join("../README.md")))?,
+    }
+    println!("results are in {}", into.join("RESULTS.md").display());
+    Ok(())
 }

@@ -1,11 +1,17 @@
 //! The machine and the versions that a figure belongs to.
 
+use std::fs::File;
+use std::io::{self, Write};
 use std::path::Path;
 use std::process::Command;
+use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-use super::sides::{home, said};
+use super::cache;
+use super::home;
+use super::programs::said;
+use super::record::Cache;
 
 /// Where a comparison ran.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -18,12 +24,22 @@ pub(crate) struct Machine {
     pub(crate) file_system: String,
     /// Runnable processes over the last minute, when the comparison began: of an idle machine near 0.
     pub(crate) load: String,
-    /// Compiler, commit, rivals.
+    /// Bytes a second that a new file is written at, synced, and read at, once dropped from the page cache.
+    #[serde(default)]
+    pub(crate) disk: Option<DiskRate>,
+    /// Compiler, commit, peers.
     pub(crate) versions: Vec<String>,
 }
 
+/// How fast the disk is under the files, in bytes a second.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(crate) struct DiskRate {
+    pub(crate) write: f64,
+    pub(crate) read: f64,
+}
+
 impl Machine {
-    pub(super) fn describe(folder: &Path, rivals: Vec<String>) -> Self {
+    pub(super) fn describe(folder: &Path, peers: Vec<String>) -> Self {
         let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
         let field = |text: &str, name: &str| {
             let line = text.lines().find(|line| line.starts_with(name));
@@ -37,7 +53,7 @@ impl Machine {
             let changed = git(&["status", "--porcelain", "--untracked-files=no"]).is_some_and(|changes| !changes.is_empty());
             versions.push(format!("suture at commit {commit}{}", if changed { ", changed" } else { "" }));
         }
-        versions.extend(rivals);
+        versions.extend(peers);
         Self {
             processor: field(&read("/proc/cpuinfo"), "model name").unwrap_or_else(|| "unknown".into()),
             processors: std::thread::available_parallelism().map_or(1, usize::from),
@@ -45,9 +61,38 @@ impl Machine {
             kernel: format!("Linux {}", read("/proc/sys/kernel/osrelease").trim()),
             file_system: file_system(&read("/proc/mounts"), folder),
             load: read("/proc/loadavg").split_whitespace().next().unwrap_or("unknown").into(),
+            disk: disk_rate(folder).ok(),
             versions,
         }
     }
+}
+
+/// Writes and reads 512 MB that no file system can squeeze.
+fn disk_rate(folder: &Path) -> io::Result<DiskRate> {
+    const BLOCK: usize = 1 << 20;
+    const BLOCKS: usize = 512;
+    let path = folder.join("disk");
+    let rate = |begin: Instant| (BLOCK * BLOCKS) as f64 / begin.elapsed().as_secs_f64();
+    let mut state = 1u64;
+    let mut noise = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 56) as u8
+    };
+    let mut block: Vec<u8> = (0..BLOCK).map(|_| noise()).collect();
+    let begin = Instant::now();
+    let mut file = File::create(&path)?;
+    for number in 0..BLOCKS {
+        block[number] ^= 0x55;
+        file.write_all(&block)?;
+    }
+    file.sync_all()?;
+    let write = rate(begin);
+    cache::bring(Cache::Cold, [path.as_path()].into_iter())?;
+    let begin = Instant::now();
+    io::copy(&mut File::open(&path)?, &mut io::sink())?;
+    let read = rate(begin);
+    std::fs::remove_file(&path)?;
+    Ok(DiskRate { write, read })
 }
 
 /// The type of the deepest mount above `folder`.

@@ -1,29 +1,37 @@
-//! Suture and pymeshlab over the same generated files: whole processes in alternation, outputs synced, both judged alike.
+//! Suture and its peers over the same files: whole processes in alternation, outputs synced, all judged alike.
 //!
-//! Every run starts with its input in the page cache and everything else written back. The outputs of the first run of each side
-//! are judged, by another process, so that the memory that needs is not counted against a child of this one. Results are written
-//! after every input: a long comparison that is stopped leaves what it has.
+//! Every run starts with its input brought into the page cache, or out of it, and everything else written back. Rounds go through
+//! all programs, forwards and backwards by turns, so that no program always follows the same one. The outputs of the first run of
+//! each side are judged, by another process, so that the memory that needs is not counted against a child of this one. Every run is
+//! in the journal ([`record`]) before the next begins: a comparison that is stopped can be resumed. Pages and plots are made from
+//! journals alone ([`publish`]).
 
+mod book;
+mod cache;
+mod cgroup;
 mod child;
 mod machine;
+mod page;
+mod plot;
+mod programs;
+mod record;
 mod sides;
-mod table;
+mod statistics;
+mod trial;
 
-use std::collections::BTreeMap;
-use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::process::Command;
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
-use serde::{Deserialize, Serialize};
-use suture_bench::Counts;
-use suture_bench::generate::{self, Case, Truth};
-use suture_bench::judge::{Judgement, Kept};
+use suture_bench::generate::{self, Case};
 
 pub(crate) use child::Cost;
 pub(crate) use machine::Machine;
+pub(crate) use record::{Cache, Judged};
+
 pub(crate) use sides::Side;
+
+use record::{Journal, Line, Session, Way};
 
 /// Why a comparison ended.
 #[derive(Debug, thiserror::Error)]
@@ -34,18 +42,24 @@ pub(crate) enum Error {
     /// Cargo said why above.
     #[error("suture could not be built; `--suture PATH` names another binary")]
     Build,
-    /// `python3 -m venv` does not work.
-    #[error("pymeshlab needs Python: install python3 with its venv module, or measure suture alone with `--sides suture`")]
-    NoPython,
-    /// pip said why above.
-    #[error("pymeshlab {version} could not be installed; without it, measure suture alone with `--sides suture`")]
-    NoPymeshlab { version: String },
+    /// A group could not be made.
+    #[error("a memory cgroup cannot be made, for which root's rights are usual: {0}")]
+    Cgroup(io::Error),
     /// An input could not be made.
     #[error(transparent)]
     Generate(#[from] generate::Error),
-    /// Results could not be written as JSON.
+    /// A record could not be written as JSON.
     #[error(transparent)]
     Json(#[from] serde_json::Error),
+    /// A raw file holds something else.
+    #[error("{}, line {line}: {source}", path.display())]
+    Line { path: PathBuf, line: usize, source: serde_json::Error },
+    /// There is nothing to publish.
+    #[error("there are no raw runs (*.jsonl) in {}", .0.display())]
+    NoRuns(PathBuf),
+    /// A plot could not be drawn.
+    #[error("drawing {}: {reason}", path.display())]
+    Plot { path: PathBuf, reason: String },
 }
 
 impl Error {
@@ -60,16 +74,34 @@ impl Error {
 pub(crate) struct Options {
     pub(crate) sizes: Vec<u64>,
     pub(crate) cases: Vec<Case>,
+    /// Files from elsewhere, instead of generated ones.
+    pub(crate) files: Vec<PathBuf>,
+    /// Generate a folder of so many files for each size and case.
+    pub(crate) many: u64,
     /// Largest size of some cases.
     pub(crate) up_to: Vec<(Case, u64)>,
+    /// Largest size of some sides, instead of their own.
+    pub(crate) side_up_to: Vec<(Side, u64)>,
     pub(crate) sides: Vec<Side>,
+    pub(crate) caches: Vec<Cache>,
+    /// `--threads` of suture; empty: not said.
+    pub(crate) threads: Vec<u16>,
+    /// `--memory` of suture.
+    pub(crate) memory: Option<String>,
+    /// Run every process in a memory cgroup of so many bytes.
+    pub(crate) cgroup: Option<u64>,
     pub(crate) runs: usize,
+    /// A way whose runs over an input would take longer than this in all is not run again.
+    pub(crate) patience: Duration,
     pub(crate) seed: u64,
-    /// The published page; `results.json` is written beside it.
-    pub(crate) out: Option<PathBuf>,
+    /// The raw file.
+    pub(crate) raw: PathBuf,
+    /// Go on where the raw file ends.
+    pub(crate) resume: bool,
     /// Where inputs and outputs are made; the system's temporary folder otherwise.
     pub(crate) folder: Option<PathBuf>,
-    pub(crate) keep_inputs: bool,
+    /// Judge outputs of inputs up to this size.
+    pub(crate) judge_up_to: u64,
     /// A binary to measure instead of the one built now.
     pub(crate) suture: Option<PathBuf>,
     /// A process that takes longer is killed, and its side sits out the other runs of that input.
@@ -78,177 +110,94 @@ pub(crate) struct Options {
     pub(crate) command: String,
 }
 
-/// Everything that was measured.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct Results {
-    pub(crate) command: String,
-    pub(crate) machine: Machine,
-    pub(crate) trials: Vec<Trial>,
-}
-
-/// One input and all that ran over it.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct Trial {
-    pub(crate) case: String,
-    /// The size asked for.
-    pub(crate) size: u64,
-    pub(crate) seed: u64,
-    pub(crate) bytes: u64,
-    /// What is wrong with the input.
-    pub(crate) counts: Counts,
-    pub(crate) injected: BTreeMap<String, u64>,
-    /// Volume of the sound model.
-    pub(crate) volume: f64,
-    pub(crate) runs: Vec<Run>,
-    pub(crate) outcomes: Vec<Outcome>,
-}
-
-/// One process.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct Run {
-    pub(crate) side: Side,
-    /// From 0; runs of equal number are a pair.
-    pub(crate) run: usize,
-    pub(crate) cost: Cost,
-}
-
-/// What a side made of an input.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct Outcome {
-    pub(crate) side: Side,
-    /// `None` when there was nothing to judge, for which [`Outcome::reason`] has the reason.
-    pub(crate) judged: Option<Judged>,
-    pub(crate) reason: String,
-}
-
-/// The judge's word on an output.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct Judged {
-    pub(crate) judgement: Judgement,
-    /// Records of the input that stand in the output byte for byte, in order.
-    pub(crate) records: Kept,
-    /// The same by the 36 bytes of their corners alone.
-    pub(crate) corners: Kept,
-}
-
-impl Trial {
-    /// Closed, manifold, oriented, and of the model's volume within a hundredth.
-    pub(crate) fn is_good(&self, judged: &Judged) -> bool {
-        judged.judgement.sound() && (judged.judgement.volume / self.volume - 1.0).abs() <= 0.01
+impl Options {
+    /// All ways to run: suture's sides by threads and memory, every side by state of the cache.
+    fn ways(&self) -> Vec<Way> {
+        let mut ways = Vec::new();
+        for &side in &self.sides {
+            let threads: Vec<_> = match self.threads.is_empty() || !side.is_suture() {
+                true => vec![None],
+                false => self.threads.iter().copied().map(Some).collect(),
+            };
+            for &cache in &self.caches {
+                for &threads in &threads {
+                    let memory = self.memory.clone().filter(|_| side.is_suture());
+                    ways.push(Way { side, cache, threads, memory, cgroup: self.cgroup });
+                }
+            }
+        }
+        ways.sort_unstable();
+        ways.dedup();
+        ways
     }
 
-    /// The costs of one side, in order of runs.
-    pub(crate) fn costs(&self, side: Side) -> impl Iterator<Item = (usize, &Cost)> {
-        self.runs.iter().filter(move |run| run.side == side).map(|run| (run.run, &run.cost))
+    /// Is `side` measured on a mesh of `triangles`?
+    fn reaches(&self, side: Side, triangles: u64) -> bool {
+        let said = self.side_up_to.iter().find(|(other, _)| *other == side).map(|(_, most)| *most);
+        triangles <= said.unwrap_or(side.facts().most_triangles)
     }
 }
 
-/// Runs the comparison and writes its results; returns where the page is.
+/// Runs the comparison and keeps its raw runs.
 ///
 /// # Errors
-/// When a program is missing, or the system fails. A program that fails over an input is a result.
-pub(crate) fn compare(options: &Options) -> Result<PathBuf, Error> {
-    let mut sides = options.sides.clone();
-    sides.extend([Side::Copy, Side::CopySynced]);
-    if sides.contains(&Side::Suture) {
-        sides.push(Side::Inspect);
-    }
-    sides.sort_unstable();
-    sides.dedup();
-    let programs = sides::Programs::prepare(&sides, options.suture.clone())?;
+/// When suture cannot be built, or the system fails. A program that is missing, or fails over an input, is a result.
+pub(crate) fn compare(options: &Options) -> Result<(), Error> {
+    let programs = programs::Programs::prepare(&options.sides, options.suture.clone())?;
     let parent = options.folder.clone().unwrap_or_else(std::env::temp_dir);
     let folder = tempfile::Builder::new().prefix("suture-bench-").tempdir_in(&parent).map_err(Error::io("making a folder"))?;
-    let page = options.out.clone().unwrap_or_else(|| sides::home().join("RESULTS.md"));
+    let mut journal = Journal::open(&options.raw, options.resume)?;
     let machine = Machine::describe(folder.path(), programs.versions());
-    let mut results = Results { command: options.command.clone(), machine, trials: Vec::new() };
+    let began = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    journal.write(Line::Session(Session { began, command: options.command.clone(), machine }))?;
+    let mut sides = options.sides.clone();
+    for &side in &options.sides {
+        if let Some(reason) = programs.lack(side) {
+            eprintln!("{} is left out: {reason}", side.facts().name);
+            journal.write(Line::Skipped { side, reason })?;
+            sides.retain(|other| *other != side);
+        }
+    }
+    let options = Options { sides, ..options.clone() };
+    let mut trial = trial::Trials::new(&options, programs, journal, folder.path())?;
+    for file in &options.files {
+        trial.foreign(file)?;
+    }
     for &size in &options.sizes {
         let fits = |case: Case| options.up_to.iter().all(|(bounded, most)| *bounded != case || size <= *most);
         for &case in options.cases.iter().filter(|case| fits(**case)) {
-            let input = folder.path().join(format!("{case}-{size}.stl"));
-            eprintln!("{case}, {size} triangles");
-            let truth = generate::write_file(case, size, options.seed, &input)?;
-            results.trials.push(trial(options, &sides, &programs, &input, size, truth)?);
-            write(&results, &page)?;
-            if !options.keep_inputs {
-                std::fs::remove_file(&input).map_err(Error::io("removing an input"))?;
-            }
+            trial.generated(case, size)?;
         }
     }
-    if options.keep_inputs {
-        println!("the inputs are in {}", folder.keep().display());
-    }
-    Ok(page)
-}
-
-/// All runs over one input, and the verdicts on their outputs.
-fn trial(
-    options: &Options,
-    sides: &[Side],
-    programs: &sides::Programs,
-    input: &Path,
-    size: u64,
-    truth: Truth,
-) -> Result<Trial, Error> {
-    let mut trial = Trial {
-        case: truth.case.name().into(),
-        size,
-        seed: truth.seed,
-        bytes: std::fs::metadata(input).map_err(Error::io("looking at an input"))?.len(),
-        counts: truth.counts,
-        injected: truth.injected.into_iter().map(|(name, count)| (name.into(), count)).collect(),
-        volume: truth.volume,
-        runs: Vec::new(),
-        outcomes: Vec::new(),
-    };
-    let output = input.with_extension("out.stl");
-    for run in 0..options.runs {
-        for &side in sides {
-            if trial.costs(side).any(|(_, cost)| !cost.exited) {
-                continue;
-            }
-            warm(input)?;
-            let command = programs.command(side, input, &output);
-            let target = (side != Side::Inspect).then_some(output.as_path());
-            let cost = child::measure(command, target, side.synced(), options.limit)?;
-            eprintln!("  {:10} {:>9.3} s wall {:>9.3} s CPU  {}", side.name(), cost.wall_seconds, cost.cpu_seconds, cost.end);
-            if run == 0 && side.repairs() {
-                trial.outcomes.push(outcome(side, input, &output, &cost)?);
-            }
-            trial.runs.push(Run { side, run, cost });
-            if output.exists() {
-                std::fs::remove_file(&output).map_err(Error::io("removing an output"))?;
-            }
-        }
-    }
-    Ok(trial)
-}
-
-/// Brings a file into the page cache.
-fn warm(path: &Path) -> Result<(), Error> {
-    let mut file = File::open(path).map_err(Error::io("opening an input"))?;
-    io::copy(&mut file, &mut io::sink()).map_err(Error::io("reading an input"))?;
     Ok(())
 }
 
-/// Has an output judged by another process of this program.
-fn outcome(side: Side, input: &Path, output: &Path, cost: &Cost) -> Result<Outcome, Error> {
-    let nothing = |reason: String| Ok(Outcome { side, judged: None, reason });
-    if !cost.exited || cost.output_bytes.is_none() {
-        return nothing(cost.end.clone());
-    }
-    let program = std::env::current_exe().map_err(Error::io("finding this program"))?;
-    let judged = Command::new(program).arg("judge").arg(output).arg("--json").arg("--reference").arg(input).output();
-    let judged = judged.map_err(Error::io("starting the judge"))?;
-    match serde_json::from_slice(&judged.stdout) {
-        Ok(judged) => Ok(Outcome { side, judged: Some(judged), reason: String::new() }),
-        Err(_) => nothing(String::from_utf8_lossy(&judged.stderr).trim().into()),
-    }
+/// The folder of this crate.
+pub(crate) fn home() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Writes the page and the numbers beside it.
-fn write(results: &Results, page: &Path) -> Result<(), Error> {
-    let numbers = page.with_file_name("results.json");
-    std::fs::write(page, table::page(results)).map_err(Error::io(format!("writing {}", page.display())))?;
-    let text = serde_json::to_string_pretty(results)? + "\n";
-    std::fs::write(&numbers, text).map_err(Error::io(format!("writing {}", numbers.display())))
+/// Where raw runs are kept, unless told otherwise.
+pub(crate) fn results() -> PathBuf {
+    home().join("results")
+}
+
+/// Makes the page (`RESULTS.md`), the plots and the README's table from the raw runs of `raw`, into the folder `into`.
+///
+/// # Errors
+/// When there are no raw runs, or something cannot be read or written.
+pub(crate) fn publish(raw: &Path, into: &Path, readme: Option<&Path>) -> Result<(), Error> {
+    let book = book::Book::load(raw)?;
+    let plots = into.join("plots");
+    std::fs::create_dir_all(&plots).map_err(Error::io("making the folder of plots"))?;
+    let drawn = plot::draw(&book, &plots)?;
+    let write = |path: &Path, text: String| std::fs::write(path, text).map_err(Error::io(format!("writing {}", path.display())));
+    write(&into.join("RESULTS.md"), page::page(&book, &drawn))?;
+    if let Some(readme) = readme {
+        let text = std::fs::read_to_string(readme).map_err(Error::io(format!("reading {}", readme.display())))?;
+        if let Some(text) = page::put_in(&text, &page::short(&book)) {
+            write(readme, text)?;
+        }
+    }
+    Ok(())
 }

@@ -1,166 +1,247 @@
-//! The programs that are compared: Suture as this very workspace builds it, and pymeshlab in an environment of its own.
+//! What is compared, and what is to be known about each: how it is called, its licence, how far it goes.
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use serde::{Deserialize, Serialize};
 
-use super::Error;
-
-/// What runs over an input, in the order in which they take their turns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
+/// A program with its settings, in the order in which they take their turns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub(crate) enum Side {
+    /// `cp`.
+    Cp,
+    /// `cp`, and the copy synced.
+    CpSynced,
     /// `suture repair`.
     Suture,
-    /// `pipelines/plain.py`.
-    Plain,
-    /// `pipelines/competent.py`.
-    Competent,
-    /// `suture inspect`: topology alone, no output.
+    /// `suture repair --no-self-intersections`.
+    SutureNoSi,
+    /// `suture inspect`.
     Inspect,
-    /// `cp`.
-    Copy,
-    /// `cp`, and the copy synced.
-    CopySynced,
+    /// `suture inspect --no-self-intersections`: topology alone.
+    InspectNoSi,
+    PymeshlabPlain,
+    PymeshlabPlainSi,
+    PymeshlabCompetent,
+    PymeshlabCompetentSi,
+    Meshlib,
+    /// Self-collision of a loaded mesh.
+    MeshlibDetect,
+    Pymeshfix,
+    Admesh,
+    Trimesh,
+    Manifold3d,
 }
 
+/// Whose program it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Program {
+    Copy,
+    /// With these arguments after the task.
+    Suture,
+    /// A script of `pipelines/` that needs a Python package.
+    Python {
+        script: &'static str,
+        package: &'static str,
+    },
+    Admesh,
+}
+
+/// What is to be known about a side.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Facts {
+    pub(crate) name: &'static str,
+    pub(crate) program: Program,
+    /// Given to the program.
+    pub(crate) flag: Option<&'static str>,
+    /// The largest mesh it is measured on unless told otherwise: beyond, it takes many minutes or more memory than is there.
+    pub(crate) most_triangles: u64,
+    /// It writes an output.
+    pub(crate) writes: bool,
+    /// Its output is judged.
+    pub(crate) judged: bool,
+    /// What it is, for the published page.
+    pub(crate) about: &'static str,
+}
+
+const COPY: Facts = Facts {
+    name: "cp",
+    program: Program::Copy,
+    flag: None,
+    most_triangles: u64::MAX,
+    writes: true,
+    judged: false,
+    about: "`cp`, left in the page cache",
+};
+
+const SUTURE: Facts = Facts {
+    name: "suture",
+    program: Program::Suture,
+    judged: true,
+    about: "`suture repair`, with its search for self-intersections before and after",
+    ..COPY
+};
+
+const PLAIN: Facts = Facts {
+    name: "pymeshlab-plain",
+    program: Program::Python { script: "plain.py", package: "pymeshlab" },
+    most_triangles: 12_000_000,
+    about: "pymeshlab, the usual filters with their defaults",
+    ..SUTURE
+};
+
+const COMPETENT: Facts = Facts {
+    name: "pymeshlab-competent",
+    program: Program::Python { script: "competent.py", package: "pymeshlab" },
+    about: "pymeshlab as someone who knows it well would use it",
+    ..PLAIN
+};
+
+/// What pymeshlab's scripts and suture are told.
+const PYMESHLAB_SI: Option<&str> = Some("--self-intersections");
+pub(super) const NO_SI: &str = "--no-self-intersections";
+
 impl Side {
-    /// Its column's heading.
-    pub(crate) fn name(self) -> &'static str {
+    pub(crate) const ALL: [Self; 16] = [
+        Self::Cp,
+        Self::CpSynced,
+        Self::Suture,
+        Self::SutureNoSi,
+        Self::Inspect,
+        Self::InspectNoSi,
+        Self::PymeshlabPlain,
+        Self::PymeshlabPlainSi,
+        Self::PymeshlabCompetent,
+        Self::PymeshlabCompetentSi,
+        Self::Meshlib,
+        Self::MeshlibDetect,
+        Self::Pymeshfix,
+        Self::Admesh,
+        Self::Trimesh,
+        Self::Manifold3d,
+    ];
+
+    pub(crate) fn facts(self) -> Facts {
         match self {
-            Self::Suture => "suture",
-            Self::Plain => "plain",
-            Self::Competent => "competent",
-            Self::Inspect => "inspect",
-            Self::Copy => "cp",
-            Self::CopySynced => "cp, synced",
+            Self::Cp => COPY,
+            Self::CpSynced => Facts { name: "cp-synced", about: "`cp IN OUT && sync OUT`", ..COPY },
+            Self::Suture => SUTURE,
+            Self::SutureNoSi => Facts {
+                name: "suture-no-si",
+                flag: Some(NO_SI),
+                about: "`suture repair --no-self-intersections`: topology alone is looked at",
+                ..SUTURE
+            },
+            Self::Inspect => {
+                Facts { name: "inspect", writes: false, judged: false, about: "`suture inspect`, which writes nothing", ..SUTURE }
+            }
+            Self::InspectNoSi => Facts {
+                name: "inspect-no-si",
+                flag: Some(NO_SI),
+                about: "`suture inspect --no-self-intersections`",
+                ..Self::Inspect.facts()
+            },
+            Self::PymeshlabPlain => PLAIN,
+            Self::PymeshlabPlainSi => Facts {
+                name: "pymeshlab-plain-si",
+                flag: PYMESHLAB_SI,
+                about: "the same, and its selection of self-intersecting faces once, on the result",
+                ..PLAIN
+            },
+            Self::PymeshlabCompetent => COMPETENT,
+            Self::PymeshlabCompetentSi => Facts {
+                name: "pymeshlab-competent-si",
+                flag: PYMESHLAB_SI,
+                about: "the same, and its selection of self-intersecting faces once, on the result",
+                ..COMPETENT
+            },
+            Self::Meshlib => Facts {
+                name: "meshlib",
+                program: Program::Python { script: "meshlib_repair.py", package: "meshlib" },
+                about: "MeshLib: load, find self-collisions, fill holes, save",
+                ..PLAIN
+            },
+            Self::MeshlibDetect => Facts {
+                name: "meshlib-detect",
+                program: Program::Python { script: "meshlib_detect.py", package: "meshlib" },
+                writes: false,
+                judged: false,
+                about: "MeshLib: load and `findSelfCollidingTriangles`, which is also timed by itself",
+                ..PLAIN
+            },
+            Self::Pymeshfix => Facts {
+                name: "pymeshfix",
+                program: Program::Python { script: "meshfix.py", package: "pymeshfix" },
+                most_triangles: 1_100_000,
+                about: "MeshFix: fill all boundaries, clean; keeps the largest body and removes what crosses itself",
+                ..PLAIN
+            },
+            Self::Admesh => Facts {
+                name: "admesh",
+                program: Program::Admesh,
+                most_triangles: 1_100_000,
+                about: "the command line, all its checks",
+                ..PLAIN
+            },
+            Self::Trimesh => Facts {
+                name: "trimesh",
+                program: Program::Python { script: "trimesh_repair.py", package: "trimesh" },
+                most_triangles: 110_000,
+                about: "`trimesh.repair`",
+                ..PLAIN
+            },
+            Self::Manifold3d => Facts {
+                name: "manifold3d",
+                program: Program::Python { script: "manifold_repair.py", package: "manifold3d" },
+                about: "merge vertices, make a manifold; refuses what is not nearly one",
+                ..PLAIN
+            },
         }
     }
 
-    /// It repairs: its output is judged.
-    pub(crate) fn repairs(self) -> bool {
-        matches!(self, Self::Suture | Self::Plain | Self::Competent)
-    }
-
-    pub(super) fn needs_pymeshlab(self) -> bool {
-        matches!(self, Self::Plain | Self::Competent)
-    }
-
-    pub(super) fn needs_suture(self) -> bool {
-        matches!(self, Self::Suture | Self::Inspect)
+    pub(crate) fn is_suture(self) -> bool {
+        self.facts().program == Program::Suture
     }
 
     /// Its output is on the disk before its time ends.
     pub(super) fn synced(self) -> bool {
-        self != Self::Copy
+        self != Self::Cp && self.facts().writes
+    }
+
+    /// Exit code 1 is an answer: done, but the mesh is not good.
+    pub(crate) fn may_exit_1(self) -> bool {
+        self.is_suture()
     }
 }
+
+/// Licences of the peers. Each is installed by the command and runs as a process of its own; no part of any is in Suture.
+pub(crate) const LICENCES: [(&str, &str); 6] = [
+    ("pymeshlab", "GPL-3.0"),
+    ("meshlib", "free for non-commercial use only"),
+    ("pymeshfix", "GPL-3.0"),
+    ("admesh", "GPL-2.0 or later"),
+    ("trimesh", "MIT"),
+    ("manifold3d", "Apache-2.0"),
+];
 
 impl std::str::FromStr for Side {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        let sides = [Self::Suture, Self::Plain, Self::Competent];
-        sides.into_iter().find(|side| side.name() == name).ok_or_else(|| "the sides are suture, plain, competent".into())
+        let found = Self::ALL.into_iter().find(|side| side.facts().name == name);
+        found.ok_or_else(|| format!("the peers are {}", Self::ALL.map(|side| side.facts().name).join(", ")))
     }
 }
 
-/// Where the programs are.
-pub(super) struct Programs {
-    suture: Option<PathBuf>,
-    python: Option<PathBuf>,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-impl Programs {
-    /// Builds and installs what `sides` need. `suture` stands in for the built binary.
-    pub(super) fn prepare(sides: &[Side], suture: Option<PathBuf>) -> Result<Self, Error> {
-        let wanted = |need: fn(Side) -> bool| sides.iter().any(|&side| need(side));
-        let suture = match suture {
-            _ if !wanted(Side::needs_suture) => None,
-            Some(path) => Some(path),
-            None => Some(build_suture()?),
-        };
-        let python = wanted(Side::needs_pymeshlab).then(install_pymeshlab).transpose()?;
-        Ok(Self { suture, python })
-    }
-
-    /// The command of `side` over `input`.
-    pub(super) fn command(&self, side: Side, input: &Path, output: &Path) -> Command {
-        let mut command = Command::new(match side {
-            Side::Suture | Side::Inspect => self.suture.as_deref().unwrap_or(Path::new("suture")),
-            Side::Plain | Side::Competent => self.python.as_deref().unwrap_or(Path::new("python3")),
-            Side::Copy | Side::CopySynced => Path::new("cp"),
-        });
-        match side {
-            Side::Suture => command.arg("repair").arg(input).arg("-o").arg(output),
-            Side::Inspect => command.arg("inspect").arg(input),
-            Side::Plain => command.arg(home().join("pipelines/plain.py")).args([input, output]),
-            Side::Competent => command.arg(home().join("pipelines/competent.py")).args([input, output]),
-            Side::Copy | Side::CopySynced => command.args([input, output]),
-        };
-        command
-    }
-
-    /// `name version` of every rival.
-    pub(super) fn versions(&self) -> Vec<String> {
-        let mut versions = Vec::new();
-        if let Some(python) = &self.python {
-            versions.extend(said(Command::new(python).arg("--version")));
-            let script = "import importlib.metadata as m; print('pymeshlab', m.version('pymeshlab'))";
-            versions.extend(said(Command::new(python).args(["-c", script])));
+    #[test]
+    fn a_name_reads_back_and_is_the_one_in_raw_runs() {
+        for side in Side::ALL {
+            let name = side.facts().name;
+            assert_eq!(name.parse::<Side>(), Ok(side));
+            assert_eq!(serde_json::to_string(&side).unwrap(), format!("\"{name}\""));
         }
-        versions
+        assert!("nothing".parse::<Side>().unwrap_err().contains("pymeshfix"));
     }
-}
-
-/// What a command prints, if it succeeds.
-pub(super) fn said(command: &mut Command) -> Option<String> {
-    let output = command.output().ok().filter(|output| output.status.success())?;
-    Some(String::from_utf8_lossy(&output.stdout).trim().into())
-}
-
-/// The folder of this crate.
-pub(super) fn home() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-/// Builds the release binary now, so that no older one is measured, and takes its place from cargo's own word.
-fn build_suture() -> Result<PathBuf, Error> {
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let mut command = Command::new(cargo);
-    command.args(["build", "--release", "--package", "suture", "--message-format", "json-render-diagnostics"]);
-    let output = command
-        .current_dir(home())
-        .stderr(std::process::Stdio::inherit())
-        .output()
-        .map_err(Error::io("starting cargo to build suture"))?;
-    let messages = String::from_utf8_lossy(&output.stdout);
-    let built = messages.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok()).find_map(|message| {
-        let is_suture = message["target"]["name"] == "suture" && message["target"]["kind"][0] == "bin";
-        message["executable"].as_str().filter(|_| is_suture).map(PathBuf::from)
-    });
-    built.filter(|_| output.status.success()).ok_or(Error::Build)
-}
-
-/// Makes `.venv` with the pinned pymeshlab, unless it is there.
-fn install_pymeshlab() -> Result<PathBuf, Error> {
-    let folder = home().join(".venv");
-    let python = folder.join("bin/python");
-    let requirements = home().join("pipelines/requirements.txt");
-    let text = std::fs::read_to_string(&requirements).map_err(Error::io("reading pipelines/requirements.txt"))?;
-    let pinned = text.lines().find_map(|line| line.strip_prefix("pymeshlab==")).unwrap_or_default().trim();
-    let script = "import importlib.metadata as m, pymeshlab; print(m.version('pymeshlab'))";
-    let installed = || said(Command::new(&python).args(["-c", script])).is_some_and(|version| version == pinned);
-    if installed() {
-        return Ok(python);
-    }
-    eprintln!("installing pymeshlab {pinned} into {}", folder.display());
-    let made = Command::new("python3").args(["-m", "venv", "--clear"]).arg(&folder).status();
-    if !made.is_ok_and(|status| status.success()) {
-        return Err(Error::NoPython);
-    }
-    let pip = Command::new(&python).args(["-m", "pip", "install", "--quiet", "--requirement"]).arg(&requirements).status();
-    if !pip.is_ok_and(|status| status.success()) || !installed() {
-        return Err(Error::NoPymeshlab { version: pinned.into() });
-    }
-    Ok(python)
 }

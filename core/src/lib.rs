@@ -13,6 +13,9 @@ mod emit;
 mod engine;
 pub mod error;
 pub mod fill;
+// The survey is about to ask for it.
+#[allow(dead_code)]
+mod intersect;
 mod members;
 mod parallel;
 mod plan;

@@ -18,7 +18,12 @@ pub(crate) struct HomeBox {
 }
 
 impl HomeBox {
-    const ALL: Self = Self { lo: [-f32::MAX; 3], hi: [f32::MAX; 3] };
+    pub(crate) const ALL: Self = Self { lo: [-f32::MAX; 3], hi: [f32::MAX; 3] };
+
+    /// Lowest and highest position.
+    pub(crate) fn ends(&self) -> ([f32; 3], [f32; 3]) {
+        (self.lo, self.hi)
+    }
 
     /// Comparisons written so that NaN is outside.
     #[inline]

@@ -9,7 +9,7 @@
 //! four end points (the idea of Guigue & Devillers, "Fast and Robust Triangle-Triangle Overlap Test Using Orientation
 //! Predicates", JGT 8(1), 2003), so no coordinate of an intersection is ever computed.
 
-use super::exact::{Point, side, turn};
+use super::exact::{Plane, Point, side, turn};
 
 /// A triangle by the positions of its corners.
 pub type Triangle = [Point; 3];
@@ -36,6 +36,18 @@ impl Contact {
 
 /// The contact of two triangles; exact for all finite coordinates. A triangle of zero area meets nothing.
 pub fn triangles_cross(a: &Triangle, b: &Triangle) -> Contact {
+    meet(a, b, true)
+}
+
+/// The same where it does not matter whether two triangles touch or are apart, which is often known sooner: never
+/// [`Contact::Touch`] from one test only.
+pub(crate) fn self_intersection(a: &Triangle, b: &Triangle) -> Option<Contact> {
+    let contact = meet(a, b, false);
+    contact.is_crossing().then_some(contact)
+}
+
+/// `touching`: tell [`Contact::Touch`] from [`Contact::Apart`].
+fn meet(a: &Triangle, b: &Triangle, touching: bool) -> Contact {
     for k in 0..3 {
         let range = |t: &Triangle| (t[0][k].min(t[1][k]).min(t[2][k]), t[0][k].max(t[1][k]).max(t[2][k]));
         let ((a_lo, a_hi), (b_lo, b_hi)) = (range(a), range(b));
@@ -43,9 +55,8 @@ pub fn triangles_cross(a: &Triangle, b: &Triangle) -> Contact {
             return Contact::Apart;
         }
     }
-    let shared = a.iter().filter(|p| b.contains(p)).count();
-    let of_b = b.map(|p| if a.contains(&p) { 0 } else { side(&a[0], &a[1], &a[2], &p) });
-    if one_sided(of_b) {
+    let (of_b, shared) = sides_of(a, b);
+    if one_sided(of_b) || (!touching && in_a_point(of_b)) {
         return Contact::Apart;
     }
     if of_b == [0; 3] {
@@ -54,12 +65,31 @@ pub fn triangles_cross(a: &Triangle, b: &Triangle) -> Contact {
     if shared >= 2 {
         return Contact::Apart;
     }
-    let of_a = a.map(|p| if b.contains(&p) { 0 } else { side(&b[0], &b[1], &b[2], &p) });
+    let (of_a, _) = sides_of(b, a);
     // All zero although b is not in a's plane: b has no area.
-    if one_sided(of_a) || of_a == [0; 3] {
+    if one_sided(of_a) || of_a == [0; 3] || (!touching && in_a_point(of_a)) {
         return Contact::Apart;
     }
     on_common_line(&Cut::new(a, of_a), &Cut::new(b, of_b), shared)
+}
+
+/// The sides of `a`'s plane on which the corners of `b` lie, and how many corners both have.
+fn sides_of(a: &Triangle, b: &Triangle) -> ([i8; 3], usize) {
+    let plane = Plane::new(&a[0], &a[1], &a[2]);
+    let mut shared = 0;
+    let sides = b.map(|p| {
+        if a.contains(&p) {
+            shared += 1;
+            return 0;
+        }
+        plane.side(&p)
+    });
+    (sides, shared)
+}
+
+/// One corner in the plane, the others on one side of it.
+fn in_a_point(signs: [i8; 3]) -> bool {
+    signs.iter().filter(|&&s| s == 0).count() == 1 && signs.iter().sum::<i8>().abs() == 2
 }
 
 fn one_sided(signs: [i8; 3]) -> bool {

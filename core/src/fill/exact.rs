@@ -1,7 +1,10 @@
-//! Exact signs on f32 positions. Every f32 is a f64, and the adaptive predicates of `robust` (after Shewchuk 1997) neither
-//! overflow nor underflow on f32 input (products of three differences stay within 2^±450), so these signs are exact.
+//! Exact signs on f32 positions. Every f32 is a f64, in which no product of three differences over- or underflows (they stay within
+//! 2^±450). A sign is taken from floating point where the rounding error cannot change it, from 128-bit integers where the
+//! differences span few enough bits (nearly always, and then a zero costs little more than another sign), and from the adaptive
+//! predicates of `robust` otherwise. Error bounds and predicates after Shewchuk, "Adaptive Precision Floating-Point Arithmetic and
+//! Fast Robust Geometric Predicates", Discrete & Computational Geometry 18 (1997).
 
-use glam::DVec3;
+use glam::{DVec3, Vec3Swizzles};
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
 /// A position as it stands in the file.
@@ -18,18 +21,89 @@ fn sign(x: f64) -> i8 {
 
 /// Sign of det(b−a, c−a, d−a): +1 when d lies on the side that the normal of (a, b, c) points to, 0 when the four are coplanar.
 pub fn side(a: &Point, b: &Point, c: &Point, d: &Point) -> i8 {
-    let coord = |p: &Point| Coord3D { x: p[0], y: p[1], z: p[2] };
-    // Neighbours have corners in common; the predicate would find out only in its last, slowest stage.
-    if d == a || d == b || d == c || c == a || c == b {
-        return 0;
+    Plane::new(a, b, c).side(d)
+}
+
+/// The plane of three positions, prepared for asking about several others. Has no sides when the three are collinear.
+pub(super) struct Plane<'a> {
+    corners: [&'a Point; 3],
+    /// Twice the triangle's area along its normal, rounded.
+    normal: DVec3,
+    /// The same with all products positive: what the rounding errors are measured by.
+    magnitude: DVec3,
+}
+
+impl<'a> Plane<'a> {
+    pub(super) fn new(a: &'a Point, b: &'a Point, c: &'a Point) -> Self {
+        let (u, v) = (at(b) - at(a), at(c) - at(a));
+        let (p, q) = (u.yzx() * v.zxy(), u.zxy() * v.yzx());
+        Self { corners: [a, b, c], normal: p - q, magnitude: p.abs() + q.abs() }
     }
-    // `robust` counts the other side as positive.
-    -sign(orient3d(coord(a), coord(b), coord(c), coord(d)))
+
+    /// The side on which `d` lies, as [`side`] says it.
+    pub(super) fn side(&self, d: &Point) -> i8 {
+        let w = at(d) - at(self.corners[0]);
+        let (value, magnitude) = (self.normal.dot(w), self.magnitude.dot(w.abs()));
+        // Nothing underflows: without magnitude, all three products are zero.
+        if value.abs() > 8e-16 * magnitude || magnitude == 0.0 { sign(value) } else { self.side_exact(d) }
+    }
+
+    #[cold]
+    fn side_exact(&self, d: &Point) -> i8 {
+        let [a, b, c] = self.corners;
+        // Neighbours have corners in common; the predicate would find out only in its last, slowest stage.
+        if d == a || d == b || d == c {
+            return 0;
+        }
+        let differences = [b, c, d].map(|p| [0, 1, 2].map(|k| (p[k], a[k])));
+        // 41 bits each: products of three and the sum of six such fit 127.
+        if let Some([[ux, uy, uz], [vx, vy, vz], [wx, wy, wz]]) = integers(differences, 41) {
+            let minor = |a: i64, b: i64, c: i64, d: i64| i128::from(a) * i128::from(d) - i128::from(b) * i128::from(c);
+            let (x, y, z) = (minor(uy, uz, vy, vz), minor(uz, ux, vz, vx), minor(ux, uy, vx, vy));
+            return (x * i128::from(wx) + y * i128::from(wy) + z * i128::from(wz)).signum() as i8;
+        }
+        let coord = |p: &Point| Coord3D { x: p[0], y: p[1], z: p[2] };
+        // `robust` counts the other side as positive.
+        -sign(orient3d(coord(a), coord(b), coord(c), coord(d)))
+    }
+}
+
+/// Differences of pairs as integers of at most `bits` bits and a sign, in a common unit that is a power of two; `None` where they
+/// do not fit, or where f64 does not hold a difference exactly.
+fn integers<const M: usize, const N: usize>(pairs: [[(f32, f32); M]; N], bits: u64) -> Option<[[i64; M]; N]> {
+    let differences = pairs.map(|row| row.map(|(x, y)| f64::from(x) - f64::from(y)));
+    let largest = differences.as_flattened().iter().fold(0.0_f64, |m, d| m.max(d.abs()));
+    // Its leading bit becomes bit `bits − 1`. A difference of f32 is zero or a normal f64, and so is the unit.
+    let unit = f64::from_bits((2 * 1023 + bits - 1).saturating_sub(largest.to_bits() >> 52) << 52);
+    let mut out = [[0_i64; M]; N];
+    let mut fits = true;
+    for ((out, pair), difference) in out.as_flattened_mut().iter_mut().zip(pairs.as_flattened()).zip(differences.as_flattened()) {
+        let (x, y) = (f64::from(pair.0), f64::from(pair.1));
+        // What rounding took from the difference (Knuth's two-sum).
+        let y_seen = x - difference;
+        let lost = (x - (difference + y_seen)) + (y_seen - y);
+        let scaled = difference * unit;
+        *out = scaled as i64;
+        fits &= (lost == 0.0) & (*out as f64 == scaled);
+    }
+    fits.then_some(out)
 }
 
 /// Sign of the component along `axis` of the normal of (a, b, c): how the triangle turns when one looks down that axis.
 pub fn turn(a: &Point, b: &Point, c: &Point, axis: usize) -> i8 {
-    let coord = |p: &Point| Coord { x: p[(axis + 1) % 3], y: p[(axis + 2) % 3] };
+    let (x, y) = ((axis + 1) % 3, (axis + 2) % 3);
+    let d = |p: &Point, k: usize| f64::from(p[k]) - f64::from(a[k]);
+    let (p, q) = (d(b, x) * d(c, y), d(b, y) * d(c, x));
+    let (value, magnitude) = (p - q, p.abs() + q.abs());
+    if value.abs() > 4e-16 * magnitude || magnitude == 0.0 { sign(value) } else { turn_exact([a, b, c], x, y) }
+}
+
+#[cold]
+fn turn_exact([a, b, c]: [&Point; 3], x: usize, y: usize) -> i8 {
+    if let Some([[ux, uy], [vx, vy]]) = integers([b, c].map(|p| [(p[x], a[x]), (p[y], a[y])]), 60) {
+        return (i128::from(ux) * i128::from(vy) - i128::from(uy) * i128::from(vx)).signum() as i8;
+    }
+    let coord = |p: &Point| Coord { x: p[x], y: p[y] };
     sign(orient2d(coord(a), coord(b), coord(c)))
 }
 

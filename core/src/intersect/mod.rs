@@ -1,0 +1,231 @@
+//! The pairs of triangles of one chunk that intersect, decided exactly.
+//!
+//! A mesh intersects itself where two of its triangles meet beyond what they share, along a segment inside one of them or in
+//! an area ([`Contact::is_crossing`]). What a chunk sees of the mesh is all triangles with a corner in its cell, and *visitors*, whose
+//! box meets the cell without a corner in it. Every pair is **owned** by one cell, which decides it, so results do not depend on how
+//! space was cut:
+//!
+//! * a pair that shares vertices by the cell where the lexicographically smallest of them is at home: all triangles around it are
+//!   members there;
+//! * a pair that shares none by the cell of the lowest corner of the overlap of their boxes: that point lies in both boxes, so
+//!   both triangles are there, as members or visitors.
+//!
+//! In the order of the work: [`stars`] certifies vertices none of whose triangles can meet, [`tree`] finds pairs of overlapping
+//! boxes, [`narrow`] separates what is clearly apart, and what is left is decided by exact predicates.
+//!
+//! Work can be quadratic in the size of a defect (a thousand copies of one triangle are half a million pairs), so pairs are
+//! counted. A pair counts when its boxes overlap and it shares no vertex, or the smallest vertex it shares is not certified: a
+//! property of the mesh. The owner counts it.
+
+mod narrow;
+mod stars;
+#[cfg(test)]
+mod tests;
+mod tree;
+
+use crate::chunk::NONE;
+use crate::fill::cross::{Contact, self_intersection};
+use crate::plan::HomeBox;
+use stars::Stars;
+use tree::{Forest, Row, Visit, Walk, bits};
+
+/// What one cell sees of a mesh. All coordinates are finite, −0.0 does not occur.
+pub(crate) struct Region<'a> {
+    pub(crate) positions: &'a [[f32; 3]],
+    /// Members in input order, then visitors. A triangle with a repeated vertex has [`NONE`] first and is left out.
+    pub(crate) triangles: &'a [[u32; 3]],
+    /// The exactly collinear ones, ascending; left out too.
+    pub(crate) left_out: &'a [u32],
+    /// Which vertices are at home in the cell.
+    pub(crate) home: &'a [bool],
+    /// Which of those have a closed, coherent fan around them, without collinear triangles.
+    pub(crate) sound: &'a [bool],
+    pub(crate) cell: HomeBox,
+}
+
+impl Region<'_> {
+    #[inline(always)]
+    fn corners(&self, t: [u32; 3]) -> [[f32; 3]; 3] {
+        t.map(|v| self.positions[v as usize])
+    }
+
+    /// The triangles that are not left out, with their numbers.
+    #[inline]
+    fn solid_triangles(&self) -> impl Iterator<Item = (u32, [u32; 3])> {
+        let mut left_out = self.left_out.iter().copied();
+        let mut next = left_out.next().unwrap_or(NONE);
+        self.triangles.iter().enumerate().filter_map(move |(i, t)| {
+            if i as u32 == next {
+                next = left_out.next().unwrap_or(NONE);
+                return None;
+            }
+            (t[0] != NONE).then_some((i as u32, *t))
+        })
+    }
+}
+
+/// What is known of a vertex.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum State {
+    /// At home in another cell.
+    Away,
+    /// At home here, and no two triangles around it meet beyond what they share.
+    Certified,
+    /// At home here, and nothing is known.
+    Open,
+}
+
+/// How far a search came.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Tested {
+    /// Pairs that were counted; if not `complete`, more than the allowance.
+    pub(crate) pairs: u64,
+    /// All pairs were decided.
+    pub(crate) complete: bool,
+}
+
+/// Finds the self-intersections of one region after the other, and keeps its memory.
+#[derive(Default)]
+pub(crate) struct Finder {
+    stars: Stars,
+    states: Vec<State>,
+    forest: Forest,
+    waiting: Vec<[u32; 2]>,
+    by_vertex: Vec<(u32, u32)>,
+}
+
+/// Pairs that wait until they are separated four at a time.
+const WAITING: usize = 256;
+
+impl Finder {
+    /// Calls `found` for each self-intersecting pair that the region's cell owns, once, the smaller number first; in an order that
+    /// depends on the region. Ends early when it has counted more than `allowance` pairs.
+    ///
+    /// O(n log n) besides the pairs of overlapping boxes, of which those around a certified vertex and around a vertex of more
+    /// than 256 triangles that is at home elsewhere cost nothing.
+    pub(crate) fn pairs(&mut self, region: &Region<'_>, allowance: u64, mut found: impl FnMut(u32, u32, Contact)) -> Tested {
+        self.stars.look(region);
+        self.states.clear();
+        self.states.extend((0..region.positions.len()).map(|v| match (region.home[v], region.sound[v]) {
+            (false, _) => State::Away,
+            (true, true) if self.stars.is_certified(v) => State::Certified,
+            _ => State::Open,
+        }));
+        self.forest.build(region, &self.stars, &self.states);
+        self.waiting.clear();
+        let mut search =
+            Search { region, states: &self.states, waiting: &mut self.waiting, counted: 0, allowance, found: &mut found };
+        let complete = Walk::new(&self.forest, &mut search).all() && search.around_hubs(&self.forest, &mut self.by_vertex);
+        search.separate();
+        Tested { pairs: search.counted, complete: complete && search.counted <= allowance }
+    }
+}
+
+/// What becomes of overlapping boxes.
+struct Search<'a, F> {
+    region: &'a Region<'a>,
+    states: &'a [State],
+    waiting: &'a mut Vec<[u32; 2]>,
+    counted: u64,
+    allowance: u64,
+    found: &'a mut F,
+}
+
+impl<F: FnMut(u32, u32, Contact)> Visit for Search<'_, F> {
+    #[inline]
+    fn visit(&mut self, rows: &[Row], row: usize, first: usize, lanes: u32, sharing: u32) -> bool {
+        let one = &rows[row];
+        for j in bits(lanes & !sharing) {
+            let other = &rows[first + j];
+            if one.owns_lowest_corner(other) && one.same_plane(other) {
+                self.counted += 1;
+                self.waiting.push([one.triangle, other.triangle]);
+            }
+        }
+        // A vertex that both have and that is not open is away, so the pair is not owned here, or certified, so it is apart.
+        if one.is_open() {
+            for j in bits(lanes & sharing) {
+                self.sharing(one.triangle, rows[first + j].triangle, NONE);
+            }
+        }
+        if self.waiting.len() >= WAITING {
+            self.separate();
+        }
+        self.counted <= self.allowance
+    }
+}
+
+impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
+    /// A pair of overlapping boxes with vertices in common. With `only`, nothing is done if another vertex is the smallest.
+    fn sharing(&mut self, i: u32, j: u32, only: u32) {
+        let [s, t] = [i, j].map(|i| self.region.triangles[i as usize]);
+        let shared = || s.iter().filter(|v| t.contains(v));
+        let position = |v: u32| self.region.positions[v as usize];
+        let smallest = shared().copied().reduce(|u, v| if position(v) < position(u) { v } else { u });
+        let Some(smallest) = smallest.filter(|v| only == NONE || *v == only) else { return };
+        if self.states[smallest as usize] != State::Open {
+            return;
+        }
+        self.counted += 1;
+        if !shared().any(|v| self.states[*v as usize] == State::Certified) {
+            self.decide(i, j);
+        }
+    }
+
+    /// The pairs within each hub's tree whose smallest vertex is not the hub. That vertex is open; the hub is certified, or
+    /// away and larger.
+    fn around_hubs(&mut self, forest: &Forest, by_vertex: &mut Vec<(u32, u32)>) -> bool {
+        for tree in forest.trees.iter().filter(|t| t.hub != NONE) {
+            by_vertex.clear();
+            for row in tree.rows.clone() {
+                for v in self.region.triangles[forest.rows[row].triangle as usize] {
+                    let smaller = self.region.positions[v as usize] < self.region.positions[tree.hub as usize];
+                    if smaller && self.states[v as usize] == State::Open {
+                        by_vertex.push((v, row as u32));
+                    }
+                }
+            }
+            by_vertex.sort_unstable();
+            for around in by_vertex.chunk_by(|a, b| a.0 == b.0) {
+                for (k, (v, row)) in around.iter().enumerate() {
+                    let one = &forest.rows[*row as usize];
+                    for (_, other) in &around[k + 1..] {
+                        let other = &forest.rows[*other as usize];
+                        if one.overlaps(other) {
+                            self.sharing(one.triangle, other.triangle, *v);
+                        }
+                    }
+                    if self.counted > self.allowance {
+                        return false;
+                    }
+                }
+            }
+        }
+        true
+    }
+
+    /// Decides the waiting pairs, none of which share a vertex.
+    #[inline(never)]
+    fn separate(&mut self) {
+        let waiting = std::mem::take(self.waiting);
+        for four in waiting.chunks(4) {
+            let pair = |k: usize| four[k.min(four.len() - 1)].map(|i| self.region.corners(self.region.triangles[i as usize]));
+            let apart = narrow::apart([pair(0), pair(1), pair(2), pair(3)]);
+            for (k, [i, j]) in four.iter().enumerate() {
+                if apart >> k & 1 == 0 {
+                    self.decide(*i, *j);
+                }
+            }
+        }
+        *self.waiting = waiting;
+        self.waiting.clear();
+    }
+
+    /// Exactly.
+    fn decide(&mut self, i: u32, j: u32) {
+        let [a, b] = [i, j].map(|i| self.region.corners(self.region.triangles[i as usize]));
+        if let Some(contact) = self_intersection(&a, &b) {
+            (self.found)(i.min(j), i.max(j), contact);
+        }
+    }
+}

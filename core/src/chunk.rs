@@ -10,9 +10,10 @@
 
 use crate::members::Members;
 use crate::plan::{ChunkId, HomeBox, Plan};
-use crate::record::{self, Record};
-use crate::sums::{Bounds, Extent, Measure};
-use crate::weld::Weld;
+use crate::record::{self, Point, Record};
+use crate::star::{self, Ring, Stars};
+use crate::sums::{Batch, Bounds, Extent, Measure};
+use crate::weld::{self, Weld};
 
 /// No vertex, patch or triangle.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -66,34 +67,35 @@ pub(crate) struct ChunkTopology {
     pub(crate) vertices_used: u64,
 }
 
+/// Triangles that are welded at once.
+const BATCH: usize = weld::BATCH / 3;
+
 /// The tables of one worker, used again from chunk to chunk.
 #[derive(Default)]
 pub(crate) struct Scratch {
     vertices: Weld,
-    home: Vec<bool>,
     /// Members: record number and vertices; a triangle with a repeated vertex has `NONE` first.
     numbers: Vec<u32>,
     triangles: Vec<[u32; 3]>,
-    /// Vertex → its part of `around` starts here.
-    starts: Vec<u32>,
-    /// (next, previous) corner of each triangle around a vertex.
-    around: Vec<[u32; 2]>,
-    sound: Vec<bool>,
+    /// Members with three distinct, exactly collinear vertices.
     collinear: Vec<u32>,
-    parents: Vec<u32>,
+    stars: Stars,
     /// Patch of a sound home vertex, [`UNSOUND`] or [`AWAY`].
     states: Vec<u32>,
+    parents: Vec<u32>,
 }
 
 /// State of a vertex at home here whose star is not sound.
 const UNSOUND: u32 = NONE - 1;
 /// State of a vertex at home elsewhere.
 const AWAY: u32 = NONE - 2;
+/// State of a sound vertex before patches are numbered. Smaller than the others, as the numbers are.
+const SOUND: u32 = 0;
 
 /// Bytes that one worker needs for a chunk of `members` triangles, at most.
 pub(crate) fn scratch_bytes(members: u64) -> u64 {
-    // Slots 2 × 16 × 3, numbers 4, triangles 12, around 24, per vertex (up to three a triangle) 12 + 1 + 4 + 1 + 4 + 4.
-    members * (96 + 4 + 12 + 24 + 3 * 26)
+    // A triangle has up to three vertices: slots 16 × 3, doubled when full, positions 12, states 4, parents 4; numbers 4, triangles 12.
+    members * (3 * (96 + 12 + 4 + 4 + star::BYTES_PER_VERTEX) + 4 + 12 + star::BYTES_PER_TRIANGLE)
 }
 
 impl Scratch {
@@ -106,255 +108,238 @@ impl Scratch {
         chunk: ChunkId,
         measure: &Measure,
     ) -> ChunkTopology {
-        self.weld(records, members, chunk, plan.home_box(chunk));
-        self.mark_collinear();
-        self.judge_stars();
-        self.unite_patches();
+        self.weld(records, members, chunk);
+        self.judge_stars(plan.home_box(chunk));
         self.collect(measure)
     }
 
     /// Numbers the vertices of all members.
     #[inline(never)]
-    fn weld(&mut self, records: &[Record], members: &Members, chunk: ChunkId, cell: HomeBox) {
+    fn weld(&mut self, records: &[Record], members: &Members, chunk: ChunkId) {
         self.numbers.clear();
         self.triangles.clear();
+        self.collinear.clear();
         let expected: usize = members.runs(chunk).map(|(_, count)| count as usize).sum();
         // Half a vertex a triangle is the rule; a soup has three, and grows the table.
         self.vertices.reset(expected / 2);
         self.numbers.reserve(expected);
         self.triangles.reserve(expected);
-        // A triangle mostly shares vertices with the one before it: comparing is cheaper than looking up.
-        let mut last = [(NONE, [0f32; 3]); 3];
+        let mut corners = [[[0f32; 3]; 3]; BATCH];
         for (first, count) in members.runs(chunk) {
-            let run = &records[first as usize..(first + count) as usize];
-            for (i, record) in run.iter().enumerate() {
-                let [p, q, r] = record::corners(record);
-                let a = self.vertex_near(p, &last);
-                let b = self.vertex_near(q, &last);
-                let c = self.vertex_near(r, &last);
-                last = [(a, p), (b, q), (c, r)];
-                self.numbers.push(first + i as u32);
-                self.triangles.push(if a == b || b == c || c == a { [NONE, a, b] } else { [a, b, c] });
+            let (mut number, run) = (first, &records[first as usize..(first + count) as usize]);
+            for part in run.chunks(BATCH) {
+                for (corners, record) in corners.iter_mut().zip(part) {
+                    *corners = record::corners(record);
+                }
+                self.numbers.extend((number..).take(part.len()));
+                self.take(&corners[..part.len()]);
+                number += part.len() as u32;
             }
         }
-        self.home.clear();
-        self.home.extend(self.vertices.positions().iter().map(|p| cell.holds(*p)));
     }
 
-    /// The vertex at `p`, which may be one of the `last` three.
-    #[inline]
-    fn vertex_near(&mut self, p: [f32; 3], last: &[(u32, [f32; 3]); 3]) -> u32 {
-        let same = |q: &[f32; 3]| (p[0] == q[0]) & (p[1] == q[1]) & (p[2] == q[2]);
-        match last.iter().find(|(vertex, q)| same(q) && *vertex != NONE) {
-            Some((vertex, _)) => *vertex,
-            None => self.vertices.vertex(p),
+    /// Takes in the next members, at most [`BATCH`].
+    #[inline(always)]
+    fn take(&mut self, corners: &[[Point; 3]]) {
+        let mut triangles = [[NONE; 3]; BATCH];
+        self.vertices.vertices(corners.as_flattened(), triangles.as_flattened_mut());
+        for (t, [p, q, r]) in triangles.into_iter().zip(corners) {
+            let [a, b, c] = t;
+            let repeated = (a == b) | (b == c) | (c == a);
+            if !repeated && is_collinear(p, q, r) {
+                self.collinear.push(self.triangles.len() as u32);
+            }
+            self.triangles.push(if repeated { [NONE, a, b] } else { t });
         }
     }
 
-    /// Exactly collinear triangles: their vertices are unsound, so that the workshop sees the neighbours they must be closed with.
+    /// Tests whether the triangles around each home vertex are one closed coherent fan, and puts those that are sound into patches.
     #[inline(never)]
-    fn mark_collinear(&mut self) {
-        self.collinear.clear();
+    fn judge_stars(&mut self, cell: HomeBox) {
         let positions = self.vertices.positions();
-        for (i, t) in self.triangles.iter().enumerate() {
-            if t[0] != NONE {
-                let [a, b, c] = t.map(|v| &positions[v as usize]);
-                if is_collinear(a, b, c) {
-                    self.collinear.push(i as u32);
-                }
-            }
+        self.stars.gather(positions.len(), &self.triangles);
+        self.states.clear();
+        self.states.extend(positions.iter().map(|p| if cell.holds(*p) { SOUND } else { AWAY }));
+        // The workshop must see the neighbours that a collinear triangle is to be closed with.
+        for v in self.collinear.iter().flat_map(|i| self.triangles[*i as usize]) {
+            let state = &mut self.states[v as usize];
+            *state = if *state == SOUND { UNSOUND } else { *state };
         }
-    }
-
-    /// Gathers the triangles around each home vertex and tests whether they are one closed coherent fan.
-    #[inline(never)]
-    fn judge_stars(&mut self) {
-        let vertices = self.home.len();
-        self.starts.clear();
-        self.starts.resize(vertices + 2, 0);
-        for t in self.triangles.iter().filter(|t| t[0] != NONE) {
-            for v in t {
-                // Away vertices have incomplete stars: not kept.
-                self.starts[*v as usize + 2] += u32::from(self.home[*v as usize]);
-            }
-        }
-        for v in 0..vertices {
-            self.starts[v + 2] += self.starts[v + 1];
-        }
-        let total = self.starts[vertices + 1] as usize;
-        self.around.clear();
-        self.around.resize(total, [0; 2]);
-        for t in self.triangles.iter().filter(|t| t[0] != NONE) {
-            for (k, v) in t.iter().enumerate() {
-                if self.home[*v as usize] {
-                    let at = &mut self.starts[*v as usize + 1];
-                    self.around[*at as usize] = [t[(k + 1) % 3], t[(k + 2) % 3]];
-                    *at += 1;
-                }
-            }
-        }
-        self.sound.clear();
-        self.sound.resize(vertices, false);
-        for v in 0..vertices {
-            if self.home[v] {
-                self.sound[v] = is_closed_fan(&mut self.around[self.starts[v] as usize..self.starts[v + 1] as usize]);
-            }
-        }
-        for i in &self.collinear {
-            for v in self.triangles[*i as usize] {
-                self.sound[v as usize] = false;
-            }
-        }
-    }
-
-    /// Union of sound home vertices that share a triangle.
-    #[inline(never)]
-    fn unite_patches(&mut self) {
         self.parents.clear();
-        self.parents.extend(0..self.home.len() as u32);
+        self.parents.extend(0..positions.len() as u32);
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            let roots = unsafe { self.judge_avx2() };
+            return self.unite_patches(roots);
+        }
+        let roots = self.judge(Ring::places);
+        self.unite_patches(roots);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,bmi1,bmi2")]
+    fn judge_avx2(&mut self) -> usize {
+        self.judge(|ring, corner| ring.places_avx2(corner))
+    }
+
+    /// Tests stars by ascending vertex. A sound one is put with an older sound neighbour, one in its first triangle if that will do;
+    /// what is left without makes a root, and mostly there is only one. Returns their number.
+    #[inline(always)]
+    fn judge(&mut self, places: impl Fn(&Ring, u32) -> u32 + Copy) -> usize {
+        let (states, parents) = (&mut self.states[..], &mut self.parents[..]);
+        let mut roots = 0;
+        for v in 0..states.len().min(parents.len()) {
+            if states[v] != SOUND {
+                continue;
+            }
+            if !self.stars.is_closed_fan(v, places) {
+                states[v] = UNSOUND;
+                continue;
+            }
+            let (next, previous) = self.stars.around(v);
+            let older = |w: &&u32| **w < v as u32 && states[**w as usize] == SOUND;
+            match previous.first().filter(older).or_else(|| next.iter().find(older)) {
+                Some(w) => parents[v] = parents[*w as usize],
+                None => roots += 1,
+            }
+        }
+        roots
+    }
+
+    /// Unites the patches of sound home vertices that share a triangle, of which there are `roots` as yet.
+    #[inline(never)]
+    fn unite_patches(&mut self, mut roots: usize) {
         for t in self.triangles.iter().filter(|t| t[0] != NONE) {
-            let sound = t.map(|v| self.sound[v as usize]);
+            if roots <= 1 {
+                return;
+            }
+            let parent = self.parents[t[0] as usize];
+            if (self.parents[t[1] as usize] == parent) & (self.parents[t[2] as usize] == parent) {
+                continue;
+            }
+            let sound = t.map(|v| self.states[v as usize] == SOUND);
             if sound[0] && sound[1] {
-                unite(&mut self.parents, t[0], t[1]);
+                roots -= usize::from(unite(&mut self.parents, t[0], t[1]));
             }
             if sound[2] && (sound[0] || sound[1]) {
-                unite(&mut self.parents, t[2], if sound[0] { t[0] } else { t[1] });
+                roots -= usize::from(unite(&mut self.parents, t[2], if sound[0] { t[0] } else { t[1] }));
             }
         }
     }
 
     #[inline(never)]
     fn collect(&mut self, measure: &Measure) -> ChunkTopology {
+        let home = || self.states.iter().enumerate().filter(|(_, state)| **state != AWAY);
         let mut out = ChunkTopology {
             suspects: Vec::new(),
             links: Vec::new(),
             patches: Vec::new(),
             labels: Labels::One,
-            vertices: self.home.iter().filter(|h| **h).count() as u64,
-            vertices_used: (0..self.home.len()).filter(|v| self.starts[*v] != self.starts[*v + 1]).count() as u64,
+            vertices: home().count() as u64,
+            vertices_used: home().filter(|(v, _)| self.stars.count(*v) > 0).count() as u64,
         };
         self.number_patches(&mut out.patches);
         let mut labels = LabelWriter::default();
-        for (i, t) in self.triangles.iter().enumerate() {
-            let triangle = self.numbers[i];
+        let mut sum = Sum::new(measure, self.vertices.positions());
+        for (t, number) in self.triangles.iter().zip(&self.numbers) {
+            let triangle = *number;
             if t[0] == NONE {
                 out.suspects.push(Suspect { triangle, unsound: 0 });
                 labels.push(NONE);
                 continue;
             }
-            let (mut unsound, mut away, mut patch) = (0u8, false, NONE);
-            for (k, v) in t.iter().enumerate() {
-                match self.states[*v as usize] {
-                    AWAY => away = true,
-                    UNSOUND => unsound |= 1 << k,
-                    of => patch = of,
-                }
+            let states = [self.states[t[0] as usize], self.states[t[1] as usize], self.states[t[2] as usize]];
+            if states.iter().all(|s| *s < AWAY) {
+                labels.push(states[0]);
+                sum.add(states[0], triangle, *t, &mut out.patches);
+                continue;
             }
+            let unsound = (0..3).fold(0, |mask, k| mask | u8::from(states[k] == UNSOUND) << k);
+            let patch = states.into_iter().rfind(|s| *s < AWAY).unwrap_or(NONE);
             labels.push(patch);
             if unsound != 0 {
                 out.suspects.push(Suspect { triangle, unsound });
             }
-            if patch == NONE {
-                continue;
-            }
-            let sums = &mut out.patches[patch as usize];
-            sums.first = sums.first.min(triangle);
-            if unsound != 0 || away {
+            if patch != NONE {
+                let first = &mut out.patches[patch as usize].first;
+                *first = triangle.min(*first);
                 out.links.push(Link { triangle, patch });
-            } else {
-                sums.triangles += 1;
-                sums.extent += measure.triangle(&t.map(|v| self.vertices.positions()[v as usize]));
             }
         }
+        sum.flush(&mut out.patches);
         if out.patches.len() > 1 {
             out.labels = Labels::Runs(labels.finish());
         }
         out
     }
 
+    /// Numbers the patches by their first vertices.
     #[inline(never)]
     fn number_patches(&mut self, patches: &mut Vec<Patch>) {
-        self.states.clear();
-        self.states.extend(self.home.iter().map(|home| if *home { UNSOUND } else { AWAY }));
+        let mut bounds = Bounds::EMPTY;
+        let mut patch = NONE;
         for (v, position) in self.vertices.positions().iter().enumerate() {
-            if !self.sound[v] {
+            if self.states[v] != SOUND {
                 continue;
             }
-            // The root is the smallest of its union, so it has been numbered before all others.
-            let root = find(&mut self.parents, v as u32) as usize;
-            if root == v {
-                self.states[v] = patches.len() as u32;
+            // Never younger than the vertex, so it has its number already.
+            let parent = self.parents[v] as usize;
+            self.states[v] = if parent == v { patches.len() as u32 } else { self.states[parent] };
+            if parent == v {
                 patches.push(Patch { triangles: 0, extent: Extent::default(), bounds: Bounds::EMPTY, first: NONE });
             }
-            self.states[v] = self.states[root];
-            patches[self.states[root] as usize].bounds.include(&[*position]);
+            if self.states[v] != patch {
+                if patch != NONE {
+                    patches[patch as usize].bounds.add(&bounds);
+                }
+                (patch, bounds) = (self.states[v], Bounds::EMPTY);
+            }
+            bounds.include(&[*position]);
+        }
+        if patch != NONE {
+            patches[patch as usize].bounds.add(&bounds);
         }
     }
 }
 
-/// Whether the (next, previous) pairs around a vertex form a single cycle of at least three in which no corner stands twice: each
-/// triangle's previous corner is exactly one other's next. May reorder the pairs.
-#[inline]
-fn is_closed_fan(around: &mut [[u32; 2]]) -> bool {
-    match around.len() {
-        0..3 => false,
-        3..=SHORT_FAN => short_fan_is_closed(around),
-        _ => long_fan_is_closed(around),
-    }
+/// Adds triangles up for the patch that the last of them belonged to.
+struct Sum<'a> {
+    measure: &'a Measure,
+    positions: &'a [Point],
+    patch: u32,
+    first: u32,
+    triangles: u64,
+    batch: Batch,
 }
 
-/// Compares each previous corner with all next ones at once.
-#[inline]
-fn short_fan_is_closed(around: &[[u32; 2]]) -> bool {
-    let mut next = [NONE; SHORT_FAN];
-    for (n, t) in next.iter_mut().zip(around) {
-        *n = t[0];
+impl<'a> Sum<'a> {
+    fn new(measure: &'a Measure, positions: &'a [Point]) -> Self {
+        Self { measure, positions, patch: NONE, first: NONE, triangles: 0, batch: Batch::default() }
     }
-    let (mut after, mut seen) = ([0u8; SHORT_FAN], 0u32);
-    for (successor, t) in after.iter_mut().zip(around) {
-        let equal = (0..SHORT_FAN).fold(0u32, |mask, j| mask | u32::from(next[j] == t[1]) << j);
-        // None: a boundary. Two: an edge of more than two triangles.
-        if !equal.is_power_of_two() {
-            return false;
-        }
-        *successor = equal.trailing_zeros() as u8;
-        seen |= equal;
-    }
-    if seen + 1 != 1 << around.len() {
-        return false;
-    }
-    // A permutation; it is one cycle when the way back to the start takes all steps.
-    let mut at = 0;
-    for _ in 1..around.len() {
-        at = after[usize::from(at)];
-        if at == 0 {
-            return false;
-        }
-    }
-    true
-}
 
-/// Most triangles of a fan that is tested by comparing all with all; longer ones are sorted.
-const SHORT_FAN: usize = 8;
+    #[inline(always)]
+    fn add(&mut self, patch: u32, triangle: u32, vertices: [u32; 3], patches: &mut [Patch]) {
+        if self.patch != patch || self.batch.is_full() {
+            self.flush(patches);
+            self.patch = patch;
+        }
+        self.first = self.first.min(triangle);
+        self.triangles += 1;
+        let corner = |k: usize| &self.positions[vertices[k] as usize];
+        self.batch.push([corner(0), corner(1), corner(2)]);
+    }
 
-#[cold]
-fn long_fan_is_closed(around: &mut [[u32; 2]]) -> bool {
-    around.sort_unstable();
-    if around.windows(2).any(|w| w[0][0] == w[1][0]) {
-        return false;
-    }
-    let start = around[0][0];
-    let mut at = start;
-    for step in 1..=around.len() {
-        match around.binary_search_by_key(&at, |t| t[0]) {
-            Ok(i) => at = around[i][1],
-            Err(_) => return false,
+    #[inline(never)]
+    fn flush(&mut self, patches: &mut [Patch]) {
+        if self.triangles > 0 {
+            let sums = &mut patches[self.patch as usize];
+            sums.first = sums.first.min(self.first);
+            sums.triangles += self.triangles;
+            sums.extent += self.measure.batch(&mut self.batch);
         }
-        if at == start {
-            return step == around.len();
-        }
+        (self.first, self.triangles) = (NONE, 0);
     }
-    false
 }
 
 /// Exactly collinear (or coincident) corners. Nearly all triangles are told apart by their normal in f32: with differences and
@@ -388,11 +373,12 @@ pub(crate) fn find(parents: &mut [u32], mut v: u32) -> u32 {
     v
 }
 
-/// The smaller root wins, so that the result does not depend on the order of unions.
+/// The smaller root wins, so that the result does not depend on the order of unions. Says whether there were two.
 #[inline]
-pub(crate) fn unite(parents: &mut [u32], a: u32, b: u32) {
+pub(crate) fn unite(parents: &mut [u32], a: u32, b: u32) -> bool {
     let (a, b) = (find(parents, a), find(parents, b));
     parents[a.max(b) as usize] = a.min(b);
+    a != b
 }
 
 #[derive(Default)]
@@ -443,56 +429,5 @@ impl Labels {
             left -= 1;
             Some(patch)
         })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// (next, previous) pairs of `n` triangles around a vertex, corners numbered from `from`, in an order that is not the cycle's.
-    fn fan(n: u32, from: u32) -> Vec<[u32; 2]> {
-        (0..n).map(|i| i * 7 % n).map(|i| [from + i, from + (i + 1) % n]).collect()
-    }
-
-    /// On both sides of the border between the two ways of testing, which is at eight.
-    const SIZES: [u32; 4] = [3, 8, 9, 30];
-
-    #[test]
-    fn a_closed_fan_is_sound() {
-        for n in SIZES {
-            assert!(is_closed_fan(&mut fan(n, 0)), "{n}");
-        }
-        assert!(!is_closed_fan(&mut fan(2, 0)), "two triangles back to back enclose nothing");
-    }
-
-    #[test]
-    fn a_fan_with_one_fault_is_not() {
-        for n in SIZES {
-            // A gap.
-            let mut missing = fan(n, 0);
-            missing.pop();
-            assert!(!is_closed_fan(&mut missing), "missing of {n}");
-            // An edge of three triangles.
-            let mut doubled = fan(n, 0);
-            doubled.push(doubled[1]);
-            assert!(!is_closed_fan(&mut doubled), "doubled of {n}");
-            // Two edges whose triangles disagree.
-            let mut turned = fan(n, 0);
-            turned[1].reverse();
-            assert!(!is_closed_fan(&mut turned), "reversed of {n}");
-        }
-    }
-
-    #[test]
-    fn two_cycles_through_one_vertex_are_not() {
-        // Each triangle has exactly one after it, but it is two fans (a bow-tie): only counting the steps tells.
-        for (n, m) in [(3, 3), (4, 4), (3, 6), (15, 15)] {
-            let mut both = [fan(n, 0), fan(m, n)].concat();
-            assert!(!is_closed_fan(&mut both), "{n} and {m}");
-        }
-        // Both cycles go through corner 0: an edge of four triangles.
-        let mut shared = [fan(5, 0), fan(5, 5).iter().map(|t| t.map(|v| if v == 5 { 0 } else { v })).collect()].concat();
-        assert!(!is_closed_fan(&mut shared));
     }
 }

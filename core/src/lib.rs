@@ -25,6 +25,7 @@ mod repairs;
 pub mod report;
 pub mod settings;
 mod shop;
+mod star;
 mod sums;
 mod survey;
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! Sums that do not depend on the order of their terms: bounding boxes, and exact accumulators of area and volume.
 
+use crate::record::Point;
+
 /// Axis-parallel box of finite positions; −0.0 and 0.0 are one value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Bounds {
@@ -95,14 +97,71 @@ impl Measure {
     /// One triangle's terms.
     #[inline]
     pub(crate) fn triangle(&self, corners: &[[f32; 3]; 3]) -> Extent {
-        let [a, b, c] = corners.map(|p| [f64::from(p[0]), f64::from(p[1]), f64::from(p[2])]);
+        let [a, b, c] = corners.map(|p| p.map(f64::from));
+        let (area, volume) = self.terms(a, b, c);
+        Extent { area: whole(area), volume: whole(volume) }
+    }
+
+    /// The terms of all triangles of `batch`, which is emptied.
+    pub(crate) fn batch(&self, batch: &mut Batch) -> Extent {
+        let full = std::mem::take(&mut batch.len);
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") {
+            batch.corners[full..].fill([[0.0; 3]; 3]);
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.sum_avx2(&batch.corners) };
+        }
+        batch.corners[..full].iter().fold(Extent::default(), |mut sum, corners| {
+            sum += self.triangle(corners);
+            sum
+        })
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn sum_avx2(&self, corners: &[[Point; 3]; Batch::LEN]) -> Extent {
+        self.sum_by_lanes(corners)
+    }
+
+    /// The sum of [`Measure::triangle`], as the compiler can make vector instructions of it: whole and fractional parts are integers
+    /// below 2⁴¹ and 2⁴⁸, so that f64 adds a lane of them exactly. Where there is no instruction for `trunc`, it is slower.
+    #[inline(always)]
+    fn sum_by_lanes(&self, corners: &[[Point; 3]; Batch::LEN]) -> Extent {
+        let mut sums = [[0f64; LANES]; 4];
+        for group in corners.as_chunks::<LANES>().0 {
+            let mut p = [[[0f64; LANES]; 3]; 3];
+            for i in 0..3 {
+                for k in 0..3 {
+                    for l in 0..LANES {
+                        p[i][k][l] = f64::from(group[l][i][k]);
+                    }
+                }
+            }
+            for l in 0..LANES {
+                let [a, b, c] = [0, 1, 2].map(|i| [p[i][0][l], p[i][1][l], p[i][2][l]]);
+                let (area, volume) = self.terms(a, b, c);
+                for (i, x) in [area, volume].into_iter().enumerate() {
+                    let high = x.trunc();
+                    sums[2 * i][l] += high;
+                    sums[2 * i + 1][l] += ((x - high) * FRACTION).trunc();
+                }
+            }
+        }
+        let [area, area_low, volume, volume_low] = sums.map(|lanes| lanes.iter().map(|x| *x as i64).sum::<i64>());
+        let whole = |high: i64, low: i64| (i128::from(high) << 48) + i128::from(low);
+        Extent { area: whole(area, area_low), volume: whole(volume, volume_low) }
+    }
+
+    /// Twice the area, and six times the volume, in units of 1.
+    #[inline(always)]
+    fn terms(&self, a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> (f64, f64) {
         let u = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
         let v = [c[0] - a[0], c[1] - a[1], c[2] - a[2]];
         let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
         let area = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
         let m = self.middle;
         let volume = (a[0] - m[0]) * n[0] + (a[1] - m[1]) * n[1] + (a[2] - m[2]) * n[2];
-        Extent { area: whole(area * self.to_area), volume: whole(volume * self.to_volume) }
+        (area * self.to_area, volume * self.to_volume)
     }
 
     /// Area in the model's units squared.
@@ -120,6 +179,40 @@ impl Measure {
         sum.volume as f64 / FRACTION / self.to_volume / 6.0
     }
 }
+
+/// A few triangles to be summed at once.
+pub(crate) struct Batch {
+    corners: [[Point; 3]; Self::LEN],
+    len: usize,
+}
+
+impl Default for Batch {
+    fn default() -> Self {
+        Self { corners: [[[0.0; 3]; 3]; Self::LEN], len: 0 }
+    }
+}
+
+impl Batch {
+    const LEN: usize = 32;
+
+    #[inline]
+    pub(crate) fn is_full(&self) -> bool {
+        self.len == Self::LEN
+    }
+
+    /// Must not be full.
+    #[inline(always)]
+    pub(crate) fn push(&mut self, corners: [&Point; 3]) {
+        let place = &mut self.corners[self.len];
+        for k in 0..3 {
+            place[k] = *corners[k];
+        }
+        self.len += 1;
+    }
+}
+
+/// Triangles computed side by side.
+const LANES: usize = 4;
 
 /// Bits that [`whole`] keeps below the point.
 const FRACTION: f64 = (1u64 << 48) as f64;
@@ -139,6 +232,8 @@ fn power_of_two(e: i32) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     #[test]
@@ -156,6 +251,34 @@ mod tests {
             triangles.iter().for_each(|t| sum += measure.triangle(t));
             assert!((measure.volume(sum) - 1.0).abs() < 1e-9, "{}", measure.volume(sum));
             assert!((measure.area(sum) - 6.0).abs() < 1e-9);
+        }
+    }
+
+    proptest! {
+        /// Many at once are the sum of each, to the last bit, for models of any size and place.
+        #[test]
+        fn a_batch_is_the_sum_of_its_triangles(
+            triangles in prop::collection::vec(prop::array::uniform3(prop::array::uniform3(-1f32..1.0)), 1..=Batch::LEN),
+            exponent in -40i32..40,
+            offset in -100f32..100.0,
+        ) {
+            let place = |p: Point| p.map(|x| (x + offset) * 2f32.powi(exponent));
+            let triangles: Vec<[Point; 3]> = triangles.into_iter().map(|t| t.map(place)).collect();
+            let mut bounds = Bounds::EMPTY;
+            triangles.iter().for_each(|t| bounds.include(t));
+            let measure = Measure::new(&bounds);
+            let (mut batch, mut want) = (Batch::default(), Extent::default());
+            for round in 0..2 {
+                // Again with half of them: what the batch held before is gone.
+                let some = &triangles[..triangles.len() >> round];
+                some.iter().for_each(|t| batch.push([&t[0], &t[1], &t[2]]));
+                want = some.iter().fold(Extent::default(), |mut sum, t| {
+                    sum += measure.triangle(t);
+                    sum
+                });
+                prop_assert_eq!(measure.batch(&mut batch), want);
+            }
+            prop_assert!(want.area >= 0);
         }
     }
 }

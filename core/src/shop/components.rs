@@ -85,7 +85,9 @@ impl Components {
         for edge in edges.iter() {
             let mut reached = edge.uses.iter().filter(|u| through.reaches(&edge, u.triangle));
             if let Some(first) = reached.next() {
-                reached.for_each(|u| chunk::unite(&mut parents, patches + first.triangle, patches + u.triangle));
+                reached.for_each(|u| {
+                    chunk::unite(&mut parents, patches + first.triangle, patches + u.triangle);
+                });
             }
         }
         let mut all =

@@ -8,9 +8,9 @@
 //!
 //! Tables are laid out to stay in an L2 cache at 32 k triangles a chunk; a worker keeps them from chunk to chunk.
 
-use crate::members::Members;
-use crate::plan::{ChunkId, HomeBox, Plan};
-use crate::record::{self, Point, Record};
+use crate::plan::HomeBox;
+use crate::record::Point;
+use crate::source::{Seen, Source, Triangle};
 use crate::star::{self, Ring, Stars};
 use crate::sums::{Batch, Bounds, Extent, Measure};
 use crate::weld::{self, Weld};
@@ -99,43 +99,38 @@ pub(crate) fn scratch_bytes(members: u64) -> u64 {
 }
 
 impl Scratch {
-    /// Decides everything that can be decided inside `chunk`. O(members).
-    pub(crate) fn solve(
-        &mut self,
-        records: &[Record],
-        plan: &Plan,
-        members: &Members,
-        chunk: ChunkId,
-        measure: &Measure,
-    ) -> ChunkTopology {
-        self.weld(records, members, chunk);
-        self.judge_stars(plan.home_box(chunk));
+    /// Decides everything that can be decided inside the chunk of this cell. O(members).
+    pub(crate) fn solve(&mut self, seen: &Seen<'_>, cell: HomeBox, measure: &Measure) -> ChunkTopology {
+        match seen {
+            Seen::Mapped(source) => self.weld(source),
+            Seen::Spooled(source) => self.weld(source),
+        }
+        self.judge_stars(cell);
         self.collect(measure)
     }
 
     /// Numbers the vertices of all members.
     #[inline(never)]
-    fn weld(&mut self, records: &[Record], members: &Members, chunk: ChunkId) {
+    fn weld(&mut self, source: &impl Source) {
         self.numbers.clear();
         self.triangles.clear();
         self.collinear.clear();
-        let expected: usize = members.runs(chunk).map(|(_, count)| count as usize).sum();
+        let expected = source.count();
         // Half a vertex a triangle is the rule; a soup has three, and grows the table.
         self.vertices.reset(expected / 2);
         self.numbers.reserve(expected);
         self.triangles.reserve(expected);
-        let mut corners = [[[0f32; 3]; 3]; BATCH];
-        for (first, count) in members.runs(chunk) {
-            let (mut number, run) = (first, &records[first as usize..(first + count) as usize]);
-            for part in run.chunks(BATCH) {
-                for (corners, record) in corners.iter_mut().zip(part) {
-                    *corners = record::corners(record);
-                }
-                self.numbers.extend((number..).take(part.len()));
-                self.take(&corners[..part.len()]);
-                number += part.len() as u32;
+        let (mut corners, mut filled) = ([[[0f32; 3]; 3]; BATCH], 0);
+        source.for_each(|number, triangle| {
+            self.numbers.push(number);
+            corners[filled] = triangle.corners();
+            filled += 1;
+            if filled == BATCH {
+                self.take(&corners);
+                filled = 0;
             }
-        }
+        });
+        self.take(&corners[..filled]);
     }
 
     /// Takes in the next members, at most [`BATCH`].

@@ -4,22 +4,21 @@ use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::os::fd::AsFd;
 use std::path::Path;
-use std::thread::JoinHandle;
 
-use crossbeam::channel::{Sender, bounded};
-
+use crate::behind::WriteBehind;
 use crate::edit::{Edit, Step};
 use crate::error::{Error, Result};
 use crate::read::MeshFile;
 use crate::record::Record;
+use crate::settings::Limits;
 
 /// Untouched runs of at least this many bytes are copied inside the kernel.
 const KERNEL_COPY_BYTES: usize = 256 << 10;
-/// Written behind so much, the pages are pushed to the disk, so that dirty pages do not pile up against the memory budget.
-const WRITE_BEHIND_BYTES: usize = 32 << 20;
+/// Copied inside the kernel at a time, between two looks at how far the disk is behind.
+const COPY_BYTES: usize = 1 << 20;
 
 /// Writes `mesh` with `edit` to the new file `output` and syncs it.
-pub(crate) fn write(mesh: &MeshFile, edit: &Edit, output: &Path) -> Result<()> {
+pub(crate) fn write(mesh: &MeshFile, edit: &Edit, output: &Path, limits: &Limits) -> Result<()> {
     let records = mesh.records();
     let count = edit.output_records(records.len());
     let count = u32::try_from(count).map_err(|_| Error::Refused {
@@ -27,7 +26,7 @@ pub(crate) fn write(mesh: &MeshFile, edit: &Edit, output: &Path) -> Result<()> {
         reason: format!("the result has {count} triangles"),
         advice: "an STL can hold 4294967295: split the file".into(),
     })?;
-    let mut sink = Sink::create(mesh, output)?;
+    let mut sink = Sink::create(mesh, output, limits)?;
     sink.put(&mesh.output_header())?;
     sink.put(&count.to_le_bytes())?;
     edit.walk(records, |step| match step {
@@ -38,8 +37,8 @@ pub(crate) fn write(mesh: &MeshFile, edit: &Edit, output: &Path) -> Result<()> {
 }
 
 /// Copies the input byte for byte to the new file `output` and syncs it.
-pub(crate) fn copy(mesh: &MeshFile, output: &Path) -> Result<()> {
-    let mut sink = Sink::create(mesh, output)?;
+pub(crate) fn copy(mesh: &MeshFile, output: &Path, limits: &Limits) -> Result<()> {
+    let mut sink = Sink::create(mesh, output, limits)?;
     sink.put_bytes(mesh.bytes())?;
     sink.finish()
 }
@@ -52,18 +51,17 @@ struct Sink<'a> {
     kernel_copies: bool,
     file: File,
     buffer: Vec<u8>,
-    /// Bytes written since the disk was last asked to take them.
-    unsynced: usize,
-    syncer: Option<Syncer>,
+    behind: WriteBehind,
 }
 
 impl<'a> Sink<'a> {
     const BUFFER_BYTES: usize = 1 << 20;
 
-    fn create(mesh: &'a MeshFile, path: &'a Path) -> Result<Self> {
+    fn create(mesh: &'a MeshFile, path: &'a Path, limits: &Limits) -> Result<Self> {
         let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(Error::io(path, "creating"))?;
         let buffer = Vec::with_capacity(Self::BUFFER_BYTES);
-        Ok(Self { mesh, path, kernel_copies: true, file, buffer, unsynced: 0, syncer: None })
+        let behind = WriteBehind::new(&file, limits).map_err(Error::io(path, "creating"))?;
+        Ok(Self { mesh, path, kernel_copies: true, file, buffer, behind })
     }
 
     fn put(&mut self, bytes: &[u8]) -> Result<()> {
@@ -83,7 +81,7 @@ impl<'a> Sink<'a> {
             return self.put(bytes);
         }
         self.flush()?;
-        for part in bytes.chunks(WRITE_BEHIND_BYTES) {
+        for part in bytes.chunks(COPY_BYTES) {
             self.copy_large(part).map_err(Error::io(self.path, "writing"))?;
             self.account(part.len())?;
         }
@@ -110,55 +108,13 @@ impl<'a> Sink<'a> {
         self.account(written)
     }
 
-    /// Asks the disk to take what was written, every so often.
-    fn account(&mut self, written: usize) -> Result<()> {
-        self.unsynced += written;
-        if self.unsynced >= WRITE_BEHIND_BYTES {
-            self.unsynced = 0;
-            if self.syncer.is_none() {
-                self.syncer = Some(Syncer::start(&self.file).map_err(Error::io(self.path, "syncing"))?);
-            }
-            if let Some(syncer) = &self.syncer {
-                syncer.request();
-            }
-        }
-        Ok(())
+    fn account(&self, written: usize) -> Result<()> {
+        self.behind.wrote(written as u64).map_err(Error::io(self.path, "syncing"))
     }
 
     fn finish(mut self) -> Result<()> {
         self.flush()?;
-        if let Some(syncer) = self.syncer.take() {
-            syncer.finish().map_err(Error::io(self.path, "syncing"))?;
-        }
+        self.behind.finish().map_err(Error::io(self.path, "syncing"))?;
         self.file.sync_all().map_err(Error::io(self.path, "syncing"))
-    }
-}
-
-/// Pushes written pages to the disk while more are being written. At most one request waits, so that no more than about three
-/// requests' worth of pages is dirty at any time.
-struct Syncer {
-    requests: Sender<()>,
-    thread: JoinHandle<std::io::Result<()>>,
-}
-
-impl Syncer {
-    fn start(file: &File) -> std::io::Result<Self> {
-        let file = file.try_clone()?;
-        let (requests, todo) = bounded(1);
-        let thread = std::thread::Builder::new()
-            .name("write-behind".into())
-            .spawn(move || todo.iter().try_for_each(|()| file.sync_data()))?;
-        Ok(Self { requests, thread })
-    }
-
-    /// Waits while another request is waiting.
-    fn request(&self) {
-        // The thread ends early only on an error, which `finish` returns.
-        let _ = self.requests.send(());
-    }
-
-    fn finish(self) -> std::io::Result<()> {
-        drop(self.requests);
-        self.thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     }
 }

@@ -103,7 +103,8 @@ fn tolerance(survey: &Survey<'_>, profile: &Profile) -> Tolerance {
 /// [`Error::Unreadable`], [`Error::Refused`], [`Error::Io`], [`Error::Changed`].
 pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> Result<Report> {
     let mut clock = Clock::start();
-    let mesh = open(input, input.parent(), limits, progress)?;
+    let limits = &limits.spooling_beside(input);
+    let mesh = open(input, limits, progress)?;
     clock.lap("read");
     let diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
     clock.lap("topology");
@@ -148,14 +149,15 @@ fn report(task: Task, mesh: &MeshFile, diagnosis: &Diagnosis<'_>, profile: &Prof
 /// [`Error::Unreadable`], [`Error::Refused`], [`Error::Io`], [`Error::Changed`].
 pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> Result<Report> {
     let mut clock = Clock::start();
-    let mesh = open(input, output.parent(), limits, progress)?;
+    let limits = &limits.spooling_beside(output);
+    let mesh = open(input, limits, progress)?;
     clock.lap("read");
     let mut diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
     clock.lap("topology");
     let surface = diagnosis.surface_bounds();
     let mut report = report(Task::Repair, &mesh, &diagnosis, profile, limits);
     let edit = if report.verdict.good {
-        report.input.blake3 = hash_beside(&mesh, limits, || emit::copy(&mesh, output))?;
+        report.input.blake3 = hash_beside(&mesh, limits, || emit::copy(&mesh, output, limits))?;
         clock.lap("emit");
         Edit::default()
     } else {
@@ -166,7 +168,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
         report.loops_left = repaired.loops_left;
         // The survey of the input is not needed any more; its memory is, for that of the output.
         drop(diagnosis);
-        report.input.blake3 = hash_beside(&mesh, limits, || emit::write(&mesh, &edit, output))?;
+        report.input.blake3 = hash_beside(&mesh, limits, || emit::write(&mesh, &edit, output, limits))?;
         clock.lap("emit");
         edit
     };
@@ -190,7 +192,7 @@ fn verify(
     progress: &dyn Progress,
     clock: &mut Clock,
 ) -> Result<()> {
-    let written = match open(output, output.parent(), limits, progress) {
+    let written = match open(output, limits, progress) {
         // Nothing was left to write: there is no mesh to judge.
         Err(Error::Unreadable { .. }) if report.edit.untouched + report.edit.added == 0 => {
             report.outcome = Outcome::NotGood;
@@ -229,11 +231,9 @@ fn verify(
     Ok(())
 }
 
-/// Opens a mesh file with the spool where the limits say, or beside `default`.
-pub(crate) fn open(input: &Path, default: Option<&Path>, limits: &Limits, progress: &dyn Progress) -> Result<MeshFile> {
-    let temporary = std::env::temp_dir();
-    let spool = limits.spool.as_deref().or(default.filter(|p| !p.as_os_str().is_empty())).unwrap_or(&temporary);
-    in_pool(limits, || MeshFile::open(input, spool, limits, progress))
+/// Opens a mesh file.
+pub(crate) fn open(input: &Path, limits: &Limits, progress: &dyn Progress) -> Result<MeshFile> {
+    in_pool(limits, || MeshFile::open(input, &limits.spool_folder(), limits, progress))
 }
 
 /// Runs `work` on a rayon pool of as many threads as the limits allow.

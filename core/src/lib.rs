@@ -3,6 +3,7 @@
 //!
 //! It knows no daemon and no store. The two entry points are [`inspect`] and [`repair`].
 
+mod behind;
 mod bodies;
 mod boxes;
 mod chunk;
@@ -16,6 +17,7 @@ pub mod fill;
 // The survey is about to ask for it.
 #[allow(dead_code)]
 mod intersect;
+mod machine;
 mod members;
 mod parallel;
 mod plan;
@@ -25,6 +27,8 @@ mod repairs;
 pub mod report;
 pub mod settings;
 mod shop;
+mod source;
+mod spool;
 mod star;
 mod sums;
 mod survey;

@@ -1,26 +1,40 @@
-//! Which triangles each chunk sees: every triangle with a corner at home there, as run-coded lists in ascending order.
+//! Which triangles each chunk sees: every triangle with a corner at home there, in ascending order.
 //!
-//! One pass over the records. A coherent file stays inside the current chunk's box for long stretches, so a list costs about
-//! 0.02 bytes a triangle; a shuffled one costs up to 2.
+//! One pass over the records makes run-coded lists. A coherent file stays inside the current chunk's box for long stretches, so a list
+//! costs about 0.02 bytes a triangle; a shuffled one costs up to 2. Where lists would not do (they would take too much memory, or lead all
+//! over a file that is larger than the page cache), the same pass copies the triangles into a [`Spool`] instead.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::error::Result;
 use crate::plan::{ChunkId, Plan};
 use crate::record::{self, Record};
+use crate::settings::{Limits, Spill};
+use crate::source::{Mapped, Seen, Spooled};
+use crate::spool::{self, Loaded, Spool, Unsorted};
 use crate::sums::Bounds;
+use crate::{machine, parallel};
 
-/// The member lists of all chunks, and what the same pass learns about the whole file.
+/// Who sees what, and what the same pass learns about the whole file.
 #[derive(Debug)]
 pub(crate) struct Members {
-    /// `lists[chunk][piece]`: pieces are consecutive stretches of the file.
-    lists: Vec<Vec<RunList>>,
+    kept: Kept,
     /// Runs of triangles with a NaN or infinite coordinate: first and count.
     pub(crate) nonfinite: Vec<(u32, u32)>,
     pub(crate) bounds: Bounds,
 }
 
+#[derive(Debug)]
+enum Kept {
+    /// `lists[chunk][piece]`: pieces are consecutive stretches of the file.
+    Lists(Vec<Vec<RunList>>),
+    Spool(Spool),
+}
+
 /// Ascending runs of triangle numbers, as variable-length integers: `distance from the end of the previous run << 1 | longer`,
 /// followed by `length − 2` when the run is longer than one.
 #[derive(Clone, Debug, Default)]
-struct RunList {
+pub(crate) struct RunList {
     bytes: Vec<u8>,
     end: u32,
 }
@@ -35,7 +49,7 @@ impl RunList {
         self.end = first + count;
     }
 
-    fn runs(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
+    pub(crate) fn runs(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
         let (mut rest, mut end) = (self.bytes.as_slice(), 0u32);
         std::iter::from_fn(move || {
             let gap = take_varint(&mut rest)?;
@@ -70,100 +84,280 @@ pub(crate) fn take_varint(bytes: &mut &[u8]) -> Option<u64> {
     }
 }
 
-/// What one piece of the file yields.
-struct Piece {
+/// Takes down who sees what in one stretch of the file.
+trait Take {
+    /// Triangles that are members of this chunk alone.
+    fn take_run(&mut self, chunk: ChunkId, first: u32, run: &[Record]);
+    /// A triangle that is a member of all `chunks`, which are distinct.
+    fn take(&mut self, chunks: &[ChunkId], number: u32, record: &Record);
+    /// Is it of no use to go on?
+    fn given_up(&self) -> bool;
+}
+
+/// Lists of one piece.
+struct Lists<'a> {
     lists: Vec<RunList>,
+    /// Bytes not yet counted in `held`.
+    uncounted: usize,
+    /// Bytes in the lists of all pieces, and how many there may be.
+    held: &'a AtomicU64,
+    most: u64,
+}
+
+impl Lists<'_> {
+    fn push(&mut self, chunk: ChunkId, first: u32, count: u32) {
+        let list = &mut self.lists[chunk.0 as usize];
+        let before = list.bytes.len();
+        list.push(first, count);
+        self.uncounted += list.bytes.len() - before;
+        if self.uncounted >= 64 << 10 {
+            self.held.fetch_add(self.uncounted as u64, Ordering::Relaxed);
+            self.uncounted = 0;
+        }
+    }
+}
+
+impl Take for Lists<'_> {
+    fn take_run(&mut self, chunk: ChunkId, first: u32, run: &[Record]) {
+        self.push(chunk, first, run.len() as u32);
+    }
+
+    fn take(&mut self, chunks: &[ChunkId], number: u32, _: &Record) {
+        chunks.iter().for_each(|chunk| self.push(*chunk, number, 1));
+    }
+
+    fn given_up(&self) -> bool {
+        // While a list grows, it takes up to three times its bytes.
+        self.held.load(Ordering::Relaxed) * 3 > self.most
+    }
+}
+
+impl Take for spool::Writer<'_> {
+    fn take_run(&mut self, chunk: ChunkId, first: u32, run: &[Record]) {
+        self.take_run(chunk, first, run);
+    }
+
+    fn take(&mut self, chunks: &[ChunkId], number: u32, record: &Record) {
+        self.take(chunks, number, record);
+    }
+
+    fn given_up(&self) -> bool {
+        self.has_failed()
+    }
+}
+
+/// What is learnt in passing.
+struct Passing {
     nonfinite: Vec<(u32, u32)>,
     bounds: Bounds,
 }
 
 impl Members {
-    /// Reads all records once, on `threads` threads.
-    pub(crate) fn gather(records: &[Record], plan: &Plan, threads: usize) -> Self {
+    /// Reads all records once, or twice if lists turn out to take too much memory.
+    ///
+    /// # Errors
+    /// Where spooling fails.
+    pub(crate) fn gather(records: &[Record], plan: &Plan, limits: &Limits) -> Result<Self> {
+        let layout = |least| spool::Layout::new(records.len(), plan, least, limits);
+        let (spill, most) = match limits.spill {
+            Spill::Always => (Some(layout(3)), u64::MAX),
+            Spill::Never => (None, u64::MAX),
+            Spill::Auto => {
+                let layout = layout(0);
+                let too_large = || size_of_val(records) as u64 > machine::page_cache_room(limits);
+                (Some(layout).filter(|l| is_scattered(records, plan, l) && too_large()), limits.memory_bytes / 4)
+            }
+        };
+        match spill {
+            Some(layout) => Self::spool(records, plan, layout, limits),
+            None => match Self::list(records, plan, limits.threads, most) {
+                Some(members) => Ok(members),
+                None => Self::spool(records, plan, layout(0), limits),
+            },
+        }
+    }
+
+    /// `None` if the lists would take more than `most` bytes.
+    fn list(records: &[Record], plan: &Plan, threads: usize, most: u64) -> Option<Self> {
         // More pieces than threads only even out the load: lists of all pieces together say the same for any number of pieces.
         let pieces = if records.len() < 1 << 16 { 1 } else { threads * 4 };
-        let size = records.len().div_ceil(pieces).max(1);
-        let results = crate::parallel::map(threads, records.len().div_ceil(size), |piece| {
-            let from = piece * size;
-            gather_piece(&records[from..records.len().min(from + size)], from as u32, plan)
+        let held = AtomicU64::new(0);
+        let results = in_pieces(records, threads, pieces, |piece, offset| {
+            let mut lists = Lists { lists: vec![RunList::default(); plan.chunks()], uncounted: 0, held: &held, most };
+            let passing = gather_piece(piece, offset, plan, &mut lists);
+            (!lists.given_up()).then(|| {
+                lists.lists.iter_mut().for_each(|l| l.bytes.shrink_to_fit());
+                (lists.lists, passing)
+            })
         });
-        let mut members = Self { lists: vec![Vec::new(); plan.chunks()], nonfinite: Vec::new(), bounds: Bounds::EMPTY };
-        for piece in results {
-            for (chunk, mut list) in piece.lists.into_iter().enumerate() {
-                if !list.bytes.is_empty() {
-                    list.bytes.shrink_to_fit();
-                    members.lists[chunk].push(list);
-                }
-            }
-            members.nonfinite.extend(piece.nonfinite);
-            members.bounds.add(&piece.bounds);
+        let mut all = vec![Vec::new(); plan.chunks()];
+        let mut members = Self { kept: Kept::Lists(Vec::new()), nonfinite: Vec::new(), bounds: Bounds::EMPTY };
+        for result in results {
+            let (lists, passing) = result?;
+            members.add(passing);
+            let filled = lists.into_iter().zip(&mut all).filter(|(list, _)| !list.bytes.is_empty());
+            filled.for_each(|(list, of_chunk)| of_chunk.push(list));
         }
-        members
+        members.kept = Kept::Lists(all);
+        Some(members)
     }
 
-    /// Runs of the triangles that `chunk` sees: first and count, ascending.
-    pub(crate) fn runs(&self, chunk: ChunkId) -> impl Iterator<Item = (u32, u32)> + '_ {
-        self.lists[chunk.0 as usize].iter().flat_map(RunList::runs)
+    fn spool(records: &[Record], plan: &Plan, layout: spool::Layout, limits: &Limits) -> Result<Self> {
+        let spool = Unsorted::new(layout, limits)?;
+        // One piece a thread: every piece ends with extents that are not full.
+        let results = in_pieces(records, limits.threads, limits.threads, |piece, offset| {
+            let mut writer = spool.writer(plan.chunks());
+            let passing = gather_piece(piece, offset, plan, &mut writer);
+            (writer.finish(), passing)
+        });
+        let mut nothing = Self { kept: Kept::Lists(Vec::new()), nonfinite: Vec::new(), bounds: Bounds::EMPTY };
+        let parts = results
+            .into_iter()
+            .map(|(part, passing)| {
+                nothing.add(passing);
+                part
+            })
+            .collect();
+        Ok(Self { kept: Kept::Spool(spool.sorted(parts, plan.chunks())?), ..nothing })
     }
 
-    /// Triangle numbers that `chunk` sees, ascending.
-    pub(crate) fn triangles(&self, chunk: ChunkId) -> impl Iterator<Item = u32> + '_ {
-        self.runs(chunk).flat_map(|(first, count)| first..first + count)
+    fn add(&mut self, passing: Passing) {
+        self.nonfinite.extend(passing.nonfinite);
+        self.bounds.add(&passing.bounds);
     }
 
-    /// Bytes held.
-    pub(crate) fn heap_bytes(&self) -> usize {
-        let lists: usize = self.lists.iter().flatten().map(|l| l.bytes.capacity() + size_of::<RunList>()).sum();
-        lists + self.nonfinite.capacity() * 8
+    /// Does `work` on every wanted chunk with what it sees; results by chunk. Each thread makes one `scratch`.
+    pub(crate) fn each<S, R: Send>(
+        &self,
+        (records, plan): (&[Record], &Plan),
+        threads: usize,
+        wanted: impl Fn(ChunkId) -> bool + Sync,
+        scratch: impl Fn() -> S + Sync,
+        work: impl Fn(&mut S, ChunkId, &Seen<'_>) -> R + Sync,
+    ) -> Vec<R> {
+        match &self.kept {
+            Kept::Lists(lists) => {
+                let chunks: Vec<ChunkId> = (0..lists.len() as u32).map(ChunkId).filter(|c| wanted(*c)).collect();
+                parallel::map_with(threads, chunks.len(), scratch, |scratch, i| {
+                    let seen = Seen::Mapped(Mapped { records, lists: &lists[chunks[i].0 as usize] });
+                    work(scratch, chunks[i], &seen)
+                })
+            }
+            Kept::Spool(spool) => {
+                let buckets: Vec<usize> = (0..spool.buckets()).filter(|b| spool.chunks(*b).any(&wanted)).collect();
+                let scratch = || (scratch(), Loaded::default());
+                let results = parallel::map_with(threads, buckets.len(), scratch, |(scratch, loaded), i| {
+                    spool.load(plan, buckets[i], loaded);
+                    let chunks = spool.chunks(buckets[i]).filter(|c| wanted(*c));
+                    chunks
+                        .map(|chunk| work(scratch, chunk, &Seen::Spooled(Spooled { entries: loaded.members(chunk) })))
+                        .collect::<Vec<R>>()
+                });
+                results.into_iter().flatten().collect()
+            }
+        }
+    }
+
+    /// How many triangles `chunk` sees.
+    pub(crate) fn count(&self, chunk: ChunkId) -> u64 {
+        match &self.kept {
+            Kept::Lists(lists) => lists[chunk.0 as usize].iter().flat_map(RunList::runs).map(|(_, count)| u64::from(count)).sum(),
+            Kept::Spool(spool) => spool.members(chunk),
+        }
+    }
+
+    /// Bytes held, with what [`Self::each`] takes on so many threads.
+    pub(crate) fn heap_bytes(&self, threads: usize) -> u64 {
+        let kept = match &self.kept {
+            Kept::Lists(lists) => {
+                let pieces = lists.iter().flatten().map(|l| l.bytes.capacity() + size_of::<RunList>()).sum::<usize>();
+                (pieces + lists.len() * size_of::<Vec<RunList>>()) as u64
+            }
+            Kept::Spool(spool) => spool.heap_bytes() as u64 + spool.loaded_bytes(threads),
+        };
+        kept + self.nonfinite.capacity() as u64 * 8
     }
 }
 
-fn gather_piece(records: &[Record], offset: u32, plan: &Plan) -> Piece {
-    let mut piece = Piece { lists: vec![RunList::default(); plan.chunks()], nonfinite: Vec::new(), bounds: Bounds::EMPTY };
+/// `work(piece, number of its first record)` on `pieces` stretches of the file, results in their order.
+fn in_pieces<R: Send>(records: &[Record], threads: usize, pieces: usize, work: impl Fn(&[Record], u32) -> R + Sync) -> Vec<R> {
+    let size = records.len().div_ceil(pieces.max(1)).max(1);
+    parallel::map(threads, records.len().div_ceil(size), |piece| {
+        let from = piece * size;
+        work(&records[from..records.len().min(from + size)], from as u32)
+    })
+}
+
+/// Stretches of the file that are looked at to find out how scattered its triangles are, and triangles in each.
+const STRETCHES: usize = 256;
+const STRETCH: usize = 64;
+
+/// Do neighbours in the file lie in different buckets more often than in one of a page of triangles? (Chunks would not do: rows of a grid
+/// cross many of them, but the next chunks continue where these end.)
+fn is_scattered(records: &[Record], plan: &Plan, layout: &spool::Layout) -> bool {
+    let step = (records.len() / STRETCHES).max(STRETCH);
+    let (mut changes, mut looked_at) = (0, 0);
+    for stretch in records.chunks(step) {
+        let mut last = None;
+        for record in stretch.iter().take(STRETCH).filter(|r| record::all_finite(r)) {
+            let bucket = layout.bucket(plan.home(record::corners(record)[0]));
+            changes += usize::from(last.is_some_and(|l| l != bucket));
+            looked_at += 1;
+            last = Some(bucket);
+        }
+    }
+    changes * STRETCH > looked_at
+}
+
+fn gather_piece(records: &[Record], offset: u32, plan: &Plan, take: &mut impl Take) -> Passing {
+    let mut passing = Passing { nonfinite: Vec::new(), bounds: Bounds::EMPTY };
     let mut current = ChunkId(0);
     let mut cell = plan.home_box(current);
     let mut run_start = 0;
-    let close = |piece: &mut Piece, chunk: ChunkId, from: usize, to: usize| {
-        if to > from {
-            piece.lists[chunk.0 as usize].push(offset + from as u32, (to - from) as u32);
-        }
-    };
     for (i, record) in records.iter().enumerate() {
         let corners = record::corners(record);
         if cell.holds(corners[0]) && cell.holds(corners[1]) && cell.holds(corners[2]) {
-            piece.bounds.include(&corners);
+            passing.bounds.include(&corners);
             continue;
         }
-        close(&mut piece, current, run_start, i);
+        if i > run_start {
+            take.take_run(current, offset + run_start as u32, &records[run_start..i]);
+        }
         run_start = i + 1;
+        if take.given_up() {
+            return passing;
+        }
+        let number = offset + i as u32;
         if !corners.iter().flatten().all(|x| x.is_finite()) {
-            match piece.nonfinite.last_mut() {
-                Some((first, count)) if *first + *count == offset + i as u32 => *count += 1,
-                _ => piece.nonfinite.push((offset + i as u32, 1)),
+            match passing.nonfinite.last_mut() {
+                Some((first, count)) if *first + *count == number => *count += 1,
+                _ => passing.nonfinite.push((number, 1)),
             }
             continue;
         }
-        piece.bounds.include(&corners);
-        let homes = corners.map(|p| plan.home(p));
-        if homes[0] == homes[1] && homes[0] == homes[2] {
-            current = homes[0];
-            cell = plan.home_box(current);
-            run_start = i;
-            continue;
-        }
-        for k in 0..3 {
-            if !homes[..k].contains(&homes[k]) {
-                piece.lists[homes[k].0 as usize].push(offset + i as u32, 1);
+        passing.bounds.include(&corners);
+        let [a, b, c] = corners.map(|p| plan.home(p));
+        match (b == a, c == a, c == b) {
+            (true, true, _) => {
+                current = a;
+                cell = plan.home_box(current);
+                run_start = i;
             }
+            (true, false, _) | (false, false, true) => take.take(&[a, c], number, record),
+            (false, true, _) => take.take(&[a, b], number, record),
+            (false, false, false) => take.take(&[a, b, c], number, record),
         }
     }
-    close(&mut piece, current, run_start, records.len());
-    piece
+    if records.len() > run_start {
+        take.take_run(current, offset + run_start as u32, &records[run_start..]);
+    }
+    passing
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::source::{Source, Triangle};
     use proptest::prelude::*;
 
     proptest! {
@@ -178,26 +372,53 @@ mod tests {
             prop_assert_eq!(list.runs().collect::<Vec<_>>(), want);
         }
 
-        /// A chunk sees exactly the finite triangles with a corner at home there, whatever the chunk size.
+        /// A chunk sees exactly the finite triangles with a corner at home there, in order, by lists and by spool, whatever the sizes.
         #[test]
         fn members_are_the_triangles_with_a_corner_at_home(
             points in prop::collection::vec(prop::array::uniform9(prop_oneof![9 => -4f32..4.0, 1 => Just(f32::NAN)]), 1..120),
             chunk in 1u32..40,
+            threads in 1usize..4,
         ) {
             let records: Vec<Record> =
                 points.iter().map(|p| record::encode([[p[0], p[1], p[2]], [p[3], p[4], p[5]], [p[6], p[7], p[8]]], 0)).collect();
             let plan = Plan::new(&records, chunk);
-            let members = Members::gather(&records, &plan, 2);
-            for c in 0..plan.chunks() {
-                let c = ChunkId(c as u32);
-                let want: Vec<u32> = (0..records.len() as u32)
-                    .filter(|t| {
-                        let corners = record::corners(&records[*t as usize]);
-                        corners.iter().flatten().all(|x| x.is_finite()) && corners.iter().any(|p| plan.home(*p) == c)
-                    })
-                    .collect();
-                prop_assert_eq!(members.triangles(c).collect::<Vec<_>>(), want);
+            let want: Vec<Vec<(u32, [[f32; 3]; 3])>> = (0..plan.chunks() as u32)
+                .map(|c| {
+                    let numbered = (0..).zip(records.iter().map(record::corners));
+                    let finite = numbered.filter(|(t, _)| record::all_finite(&records[*t as usize]));
+                    finite.filter(|(_, corners)| corners.iter().any(|p| plan.home(*p) == ChunkId(c))).collect()
+                })
+                .collect();
+            for spill in [Spill::Never, Spill::Auto, Spill::Always] {
+                // So small a budget that buffers overflow, and lists are given up.
+                let limits = Limits { threads, spill, memory_bytes: 0, ..Limits::default() };
+                let members = Members::gather(&records, &plan, &limits).unwrap();
+                let wanted = |c: ChunkId| c.0 % 3 != 1;
+                let seen = members.each((&records, &plan), threads, wanted, || (), |(), chunk, seen| {
+                    let mut all = Vec::new();
+                    seen.for_each(|number, triangle| all.push((number, triangle.corners())));
+                    assert_eq!((all.len(), all.len() as u64), (seen.count(), members.count(chunk)));
+                    (chunk, all)
+                });
+                let wanted: Vec<_> = (0..).map(ChunkId).zip(want.clone()).filter(|(c, _)| wanted(*c)).collect();
+                prop_assert_eq!(seen, wanted);
             }
+        }
+    }
+
+    #[test]
+    fn neighbours_all_over_the_place_are_scattered_rows_are_not() {
+        let at = |i: usize| {
+            let [x, y] = [(i % 1000) as f32, (i / 1000) as f32];
+            record::encode([[x, y, 0.0], [x + 1.0, y, 0.0], [x, y + 1.0, 0.0]], 0)
+        };
+        let rows: Vec<Record> = (0..10_000).map(at).collect();
+        // 7919 is prime: a permutation.
+        let mixed: Vec<Record> = (0..10_000).map(|i| at(i * 7919 % 10_000)).collect();
+        for (records, scattered) in [(rows, false), (mixed, true)] {
+            let plan = Plan::new(&records, 40);
+            let layout = spool::Layout::new(records.len(), &plan, 3, &Limits::default());
+            assert_eq!(is_scattered(&records, &plan, &layout), scattered);
         }
     }
 }

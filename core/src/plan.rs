@@ -83,6 +83,24 @@ impl Plan {
         self.boxes[chunk.0 as usize]
     }
 
+    /// The chunk where a finite position is at home if it is one of the 2^`levels` chunks of the subtree with this number, counted among
+    /// those of its size.
+    #[inline]
+    pub(crate) fn home_below(&self, levels: u32, subtree: usize, p: [f32; 3]) -> Option<ChunkId> {
+        // The first leaf lies at all lower ends of the subtree's cell, the last one at all upper ends.
+        let (first, last) = (subtree << levels, ((subtree + 1) << levels) - 1);
+        let cell = HomeBox { lo: self.boxes[first].lo, hi: self.boxes[last].hi };
+        if !cell.holds(p) {
+            return None;
+        }
+        let mut node = (self.planes.len() >> levels) + subtree;
+        for _ in 0..levels {
+            let (axis, at) = self.planes[node];
+            node = 2 * node + usize::from(p[usize::from(axis)] >= at);
+        }
+        Some(ChunkId((node - self.planes.len()) as u32))
+    }
+
     /// The chunk where a finite position is at home. O(log chunks).
     #[inline]
     pub(crate) fn home(&self, p: [f32; 3]) -> ChunkId {
@@ -181,6 +199,10 @@ mod tests {
             for p in probes.into_iter().chain(corners) {
                 let homes: Vec<usize> = (0..plan.chunks()).filter(|c| plan.boxes[*c].holds(p)).collect();
                 prop_assert_eq!(&homes, &vec![plan.home(p).0 as usize]);
+                for levels in 0..=plan.depth {
+                    let found: Vec<_> = (0..plan.chunks() >> levels).filter_map(|s| plan.home_below(levels, s, p)).collect();
+                    prop_assert_eq!(found, vec![plan.home(p)], "through subtrees of {} levels", levels);
+                }
             }
         }
     }

@@ -2,7 +2,7 @@
 //!
 //! Same input and same profile give the same output bytes, whatever the limits.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
@@ -91,10 +91,25 @@ pub struct Limits {
     pub threads: usize,
     /// Triangles in a chunk on average; the default fits the tables of a chunk into an L2 cache.
     pub chunk_triangles: u32,
-    /// Folder for spool files (ASCII input, spilled lists); `None`: the output's folder.
+    /// Folder for spool files (text input, triangles sorted by place); `None`: the output's folder.
     pub spool: Option<PathBuf>,
+    /// Whether triangles are sorted by place into a spool file first.
+    pub spill: Spill,
     /// List every record of the edit in the report (may be as large as the mesh).
     pub list_edit: bool,
+}
+
+/// When triangles are sorted by place into a spool file before their topology is worked out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Spill {
+    /// If their order in the file has nothing to do with their place and the file is larger than what can stay in the page cache,
+    /// or lists of them would take too much of the budget.
+    #[default]
+    Auto,
+    /// For tests.
+    Always,
+    Never,
 }
 
 impl Default for Limits {
@@ -105,7 +120,21 @@ impl Default for Limits {
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             chunk_triangles: 32 * 1024,
             spool: None,
+            spill: Spill::Auto,
             list_edit: false,
         }
+    }
+}
+
+impl Limits {
+    /// These limits, with spools beside `file` unless they go elsewhere already.
+    pub(crate) fn spooling_beside(&self, file: &Path) -> Self {
+        let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        Self { spool: Some(self.spool.clone().unwrap_or_else(|| folder.to_owned())), ..self.clone() }
+    }
+
+    /// Where spools go.
+    pub(crate) fn spool_folder(&self) -> PathBuf {
+        self.spool.clone().unwrap_or_else(std::env::temp_dir)
     }
 }

@@ -12,9 +12,10 @@ use crate::members::Members;
 use crate::plan::{ChunkId, Plan};
 use crate::record::{self, Record};
 use crate::settings::Limits;
+use crate::source::{Source, Triangle};
 use crate::sums::{Bounds, Extent, Measure};
 use crate::weld::Weld;
-use crate::{Progress, parallel, shop};
+use crate::{Progress, shop};
 
 /// Topology of the sound part of a file, and the list of what is not sound.
 #[derive(Debug)]
@@ -51,7 +52,7 @@ impl<'a> Survey<'a> {
     pub(crate) fn new(path: &Path, records: &'a [Record], limits: &Limits, progress: &dyn Progress) -> Result<Self> {
         let span = tracing::debug_span!("plan").entered();
         let plan = Plan::new(records, limits.chunk_triangles);
-        let mut members = Members::gather(records, &plan, limits.threads);
+        let mut members = Members::gather(records, &plan, limits)?;
         drop(span);
         let bounds = members.bounds.normalised();
         let measure = Measure::new(&bounds);
@@ -59,24 +60,30 @@ impl<'a> Survey<'a> {
 
         let _span = tracing::debug_span!("chunks", count = plan.chunks()).entered();
         let (done, suspects) = (AtomicU64::new(0), AtomicU64::new(0));
-        let room = limits.memory_bytes.saturating_sub(members.heap_bytes() as u64) / shop::BYTES_PER_SUSPECT;
-        let mut chunks = parallel::map_with(limits.threads, plan.chunks(), Scratch::default, |scratch, c| {
-            // Once it is clear that the workshop will not fit, the rest need not be known.
-            if progress.cancelled() || suspects.load(Ordering::Relaxed) > room {
-                return ChunkTopology::default();
-            }
-            let topology = scratch.solve(records, &plan, &members, ChunkId(c as u32), &measure);
-            suspects.fetch_add(topology.suspects.len() as u64, Ordering::Relaxed);
-            let chunks_done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            progress.at(STAGE, chunks_done * records.len() as u64 / plan.chunks() as u64, records.len() as u64);
-            topology
-        });
+        let room = limits.memory_bytes.saturating_sub(members.heap_bytes(limits.threads)) / shop::BYTES_PER_SUSPECT;
+        let mut chunks = members.each(
+            (records, &plan),
+            limits.threads,
+            |_| true,
+            Scratch::default,
+            |scratch, chunk, seen| {
+                // Once it is clear that the workshop will not fit, the rest need not be known.
+                if progress.cancelled() || suspects.load(Ordering::Relaxed) > room {
+                    return ChunkTopology::default();
+                }
+                let topology = scratch.solve(seen, plan.home_box(chunk), &measure);
+                suspects.fetch_add(topology.suspects.len() as u64, Ordering::Relaxed);
+                let chunks_done = done.fetch_add(1, Ordering::Relaxed) + 1;
+                progress.at(STAGE, chunks_done * records.len() as u64 / plan.chunks() as u64, records.len() as u64);
+                topology
+            },
+        );
         if progress.cancelled() {
             return Err(Error::io(path, STAGE)(std::io::ErrorKind::Interrupted.into()));
         }
         let suspects = suspects.into_inner();
         if suspects > room {
-            let need = (members.heap_bytes() as u64 + suspects * shop::BYTES_PER_SUSPECT).div_ceil(1 << 20);
+            let need = (members.heap_bytes(limits.threads) + suspects * shop::BYTES_PER_SUSPECT).div_ceil(1 << 20);
             return Err(Error::Refused {
                 path: path.into(),
                 reason: format!("at least {suspects} triangles lie at defects, which needs {need} MiB of memory or more"),
@@ -108,6 +115,12 @@ impl<'a> Survey<'a> {
         self.records.len() as u64 - self.nonfinite.iter().map(|r| u64::from(r.1)).sum::<u64>()
     }
 
+    /// Merged patches of a chunk, by the chunk's own numbers.
+    fn patches_of(&self, chunk: ChunkId) -> &[u32] {
+        let c = chunk.0 as usize;
+        &self.merged[self.bases[c] as usize..self.bases[c + 1] as usize]
+    }
+
     /// Visits every triangle with three sound corners whose patch is `wanted` and that `passes`, exactly once, with its patch: chunks
     /// in parallel, results in chunk order (which the plan decides: only sums of integers and sets may be made of them).
     /// `passes` is asked first, since it may be cheaper than finding out whose turn it is.
@@ -118,29 +131,34 @@ impl<'a> Survey<'a> {
         make: impl Fn() -> R + Sync,
         visit: impl Fn(&mut R, u32, u32) + Sync,
     ) -> Vec<R> {
-        parallel::map(self.threads, self.plan.chunks(), |c| {
-            let mut result = make();
-            let patches = &self.merged[self.bases[c] as usize..self.bases[c + 1] as usize];
-            if !patches.iter().any(|p| wanted(*p)) {
-                return result;
-            }
-            let chunk = ChunkId(c as u32);
-            let cell = self.plan.home_box(chunk);
-            for (triangle, patch) in self.members.triangles(chunk).zip(self.labels[c].iter()) {
-                if patch == NONE || !wanted(patches[patch as usize]) {
-                    continue;
-                }
-                let corners = record::corners(&self.records[triangle as usize]);
-                if !passes(&corners) || self.suspects.binary_search_by_key(&triangle, |s| s.triangle).is_ok() {
-                    continue;
-                }
-                // A sound triangle has a label in every chunk that sees it; the lowest of them visits it.
-                if corners.iter().all(|p| cell.holds(*p)) || corners.iter().all(|p| self.plan.home(*p) >= chunk) {
-                    visit(&mut result, triangle, patches[patch as usize]);
-                }
-            }
-            result
-        })
+        let is_wanted = |chunk: ChunkId| self.patches_of(chunk).iter().any(|p| wanted(*p));
+        self.members.each(
+            (self.records, &self.plan),
+            self.threads,
+            is_wanted,
+            || (),
+            |(), chunk, seen| {
+                let mut result = make();
+                let patches = self.patches_of(chunk);
+                let cell = self.plan.home_box(chunk);
+                let mut labels = self.labels[chunk.0 as usize].iter();
+                seen.for_each(|triangle, place| {
+                    let patch = labels.next().unwrap_or(NONE);
+                    if patch == NONE || !wanted(patches[patch as usize]) {
+                        return;
+                    }
+                    let corners = place.corners();
+                    if !passes(&corners) || self.suspects.binary_search_by_key(&triangle, |s| s.triangle).is_ok() {
+                        return;
+                    }
+                    // A sound triangle has a label in every chunk that sees it; the lowest of them visits it.
+                    if corners.iter().all(|p| cell.holds(*p)) || corners.iter().all(|p| self.plan.home(*p) >= chunk) {
+                        visit(&mut result, triangle, patches[patch as usize]);
+                    }
+                });
+                result
+            },
+        )
     }
 
     /// Makes suspects of all triangles around the sound vertices at `positions` (not empty), and returns the new ones, ascending.
@@ -154,19 +172,27 @@ impl<'a> Survey<'a> {
         let mut homes: Vec<ChunkId> = positions.iter().map(|p| self.plan.home(*p)).collect();
         homes.sort_unstable();
         homes.dedup();
-        let found = parallel::map(self.threads, homes.len(), |i| {
-            let c = homes[i].0 as usize;
-            let merged = &self.merged[self.bases[c] as usize..self.bases[c + 1] as usize];
-            let members = self.members.triangles(homes[i]).zip(self.labels[c].iter());
-            members
-                .filter_map(|(triangle, patch)| {
-                    let corners = record::corners(&self.records[triangle as usize]);
+        let is_home = |chunk| homes.binary_search(&chunk).is_ok();
+        let found = self.members.each(
+            (self.records, &self.plan),
+            self.threads,
+            is_home,
+            || (),
+            |(), chunk, seen| {
+                let patches = self.patches_of(chunk);
+                let mut labels = self.labels[chunk.0 as usize].iter();
+                let mut found = Vec::new();
+                seen.for_each(|triangle, place| {
+                    let patch = labels.next().unwrap_or(NONE);
+                    let corners = place.corners();
                     let unsound = (0..3).filter(|k| wanted.find(corners[*k]).is_some()).fold(0, |mask, k| mask | 1 << k);
-                    (unsound != 0)
-                        .then(|| (Suspect { triangle, unsound }, if patch == NONE { NONE } else { merged[patch as usize] }))
-                })
-                .collect::<Vec<_>>()
-        });
+                    if unsound != 0 {
+                        found.push((Suspect { triangle, unsound }, if patch == NONE { NONE } else { patches[patch as usize] }));
+                    }
+                });
+                found
+            },
+        );
         let mut new: Vec<(Suspect, u32)> = found.into_iter().flatten().collect();
         new.sort_unstable();
         new.dedup_by_key(|(s, _)| s.triangle);
@@ -186,9 +212,8 @@ impl<'a> Survey<'a> {
 }
 
 fn refuse_if_too_large(path: &Path, plan: &Plan, members: &Members, limits: &Limits) -> Result<()> {
-    let largest =
-        (0..plan.chunks()).map(|c| members.runs(ChunkId(c as u32)).map(|r| u64::from(r.1)).sum::<u64>()).max().unwrap_or(0);
-    let need = members.heap_bytes() as u64 + chunk::scratch_bytes(largest) * limits.threads as u64;
+    let largest = (0..plan.chunks()).map(|c| members.count(ChunkId(c as u32))).max().unwrap_or(0);
+    let need = members.heap_bytes(limits.threads) + chunk::scratch_bytes(largest) * limits.threads as u64;
     if need > limits.memory_bytes {
         return Err(Error::Refused {
             path: path.into(),
@@ -296,11 +321,12 @@ mod tests {
 
     use super::*;
     use crate::Quiet;
+    use crate::settings::Spill;
     use crate::testing::{Corners, cuboid, records};
 
     /// What a survey says that must not depend on its chunks.
-    fn surveyed(records: &[Record], chunk_triangles: u32) -> impl PartialEq + std::fmt::Debug {
-        let limits = Limits { threads: 1, chunk_triangles, ..Limits::default() };
+    fn surveyed(records: &[Record], chunk_triangles: u32, spill: Spill) -> impl PartialEq + std::fmt::Debug {
+        let limits = Limits { threads: 1, chunk_triangles, spill, ..Limits::default() };
         let survey = Survey::new(Path::new("test"), records, &limits, &Quiet).unwrap();
         let patches: Vec<_> = survey.patches.iter().map(|p| (p.first, p.triangles, p.extent, p.bounds)).collect();
         (survey.suspects, survey.suspect_patches, patches, survey.nonfinite, survey.vertices, survey.vertices_used)
@@ -320,13 +346,15 @@ mod tests {
     }
 
     proptest! {
-        /// Chunks only divide the work: however small, they find what one chunk of everything finds.
+        /// Chunks and spools only divide the work: however small, they find what one chunk of everything finds.
         #[test]
         fn chunks_do_not_show_in_the_result(triangles in soup()) {
             let records = records(&triangles);
-            let whole = surveyed(&records, u32::MAX);
+            let whole = surveyed(&records, u32::MAX, Spill::Never);
             for chunk_triangles in [1, 2, 7] {
-                prop_assert_eq!(&surveyed(&records, chunk_triangles), &whole);
+                for spill in [Spill::Never, Spill::Always] {
+                    prop_assert_eq!(&surveyed(&records, chunk_triangles, spill), &whole);
+                }
             }
         }
     }

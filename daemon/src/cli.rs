@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::units::{parse_duration, parse_size};
 
@@ -69,6 +69,17 @@ pub(crate) struct Spend {
     /// Triangles in a chunk
     #[arg(long, value_name = "N", hide = true, value_parser = clap::value_parser!(u32).range(1..))]
     pub chunk_triangles: Option<u32>,
+    /// Sort triangles by place into a file first: always, never, or where it helps
+    #[arg(long, value_enum, hide = true, default_value = "auto")]
+    pub spill: Spill,
+}
+
+/// As the engine's own, for the command line.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum Spill {
+    Auto,
+    Always,
+    Never,
 }
 
 impl Spend {
@@ -78,6 +89,11 @@ impl Spend {
         limits.memory_bytes = self.memory.unwrap_or(limits.memory_bytes);
         limits.threads = self.threads.map_or(limits.threads, usize::from);
         limits.chunk_triangles = self.chunk_triangles.unwrap_or(limits.chunk_triangles);
+        limits.spill = match self.spill {
+            Spill::Auto => suture_core::settings::Spill::Auto,
+            Spill::Always => suture_core::settings::Spill::Always,
+            Spill::Never => suture_core::settings::Spill::Never,
+        };
         limits
     }
 }

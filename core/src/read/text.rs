@@ -14,6 +14,7 @@ use super::facets::{self, Tally};
 use super::number::{COMMA, POINT};
 use super::{Finding, HEADER_BYTES, MAX_TRIANGLES, Rejection, binary};
 use crate::Progress;
+use crate::behind::WriteBehind;
 use crate::error::{Error, Result};
 use crate::record::Record;
 use crate::settings::Limits;
@@ -22,8 +23,6 @@ use crate::settings::Limits;
 pub(super) const WINDOW: usize = 1 << 20;
 /// A window grows up to this to reach the next facet; beyond that the text is no mesh.
 const LONGEST: usize = 8 * WINDOW;
-/// Most of the spool that may be dirty.
-const DIRTY_STEP: u64 = 32 << 20;
 
 /// A text file's triangles.
 #[derive(Debug)]
@@ -115,17 +114,15 @@ struct Spool<'a> {
     folder: &'a Path,
     path: &'a Path,
     file: File,
+    behind: WriteBehind,
     records: u64,
-    /// Bytes written since the last write-back, and how many there may be.
-    dirty: u64,
-    dirty_limit: u64,
 }
 
 impl<'a> Spool<'a> {
     fn new(context: &Context<'a>) -> Result<Self> {
         let file = tempfile::tempfile_in(context.spool).map_err(Error::io(context.spool, "making a spool file"))?;
-        let dirty_limit = (context.limits.memory_bytes / 16).clamp(1 << 20, DIRTY_STEP);
-        Ok(Self { folder: context.spool, path: context.path, file, records: 0, dirty: 0, dirty_limit })
+        let behind = WriteBehind::new(&file, context.limits).map_err(Error::io(context.spool, "making a spool file"))?;
+        Ok(Self { folder: context.spool, path: context.path, file, behind, records: 0 })
     }
 
     fn append(&mut self, pieces: &[Vec<Record>]) -> Result<()> {
@@ -134,20 +131,17 @@ impl<'a> Spool<'a> {
             if self.records > MAX_TRIANGLES {
                 return Err(Rejection::TooMany.at(self.path));
             }
-            // In steps, for a single piece may exceed the limit.
+            // In parts, for a single piece may be more than may be dirty.
             for part in records.as_flattened().chunks(1 << 20) {
                 self.file.write_all(part).map_err(Error::io(self.folder, "spooling"))?;
-                self.dirty += part.len() as u64;
-                if self.dirty >= self.dirty_limit {
-                    self.file.sync_data().map_err(Error::io(self.folder, "spooling"))?;
-                    self.dirty = 0;
-                }
+                self.behind.wrote(part.len() as u64).map_err(Error::io(self.folder, "spooling"))?;
             }
         }
         Ok(())
     }
 
     fn map(self) -> Result<Mmap> {
+        self.behind.finish().map_err(Error::io(self.folder, "spooling"))?;
         // SAFETY: the file has no name and this was its only handle that writes: nobody changes or truncates it.
         unsafe { Mmap::map(&self.file) }.map_err(Error::io(self.folder, "mapping"))
     }

@@ -1,4 +1,4 @@
-//! Promise 1: chunk size, threads and memory never change the output.
+//! Promise 1: chunk size, threads, memory and spilling never change the output.
 
 use serde_json::Value;
 use suture_bench::generate::Case;
@@ -18,18 +18,19 @@ fn same_bytes(case: Case) {
     let place = Place::new();
     place.generate(case, 20_000, 7);
     let input = format!("{case}.stl");
-    let run = |chunk: &str, threads: &str, memory: &str| {
-        let options = ["--chunk-triangles", chunk, "--threads", threads, "--memory", memory, "--list-edit", "--force"];
+    let run = |chunk: &str, threads: &str, memory: &str, spill: &str| {
+        let limits = ["--chunk-triangles", chunk, "--threads", threads, "--memory", memory, "--spill", spill];
+        let options = [&limits[..], &["--list-edit", "--force"]].concat();
         let report = place.repair(&input, "out.stl", &[&options[..], &["--report", "report.json"]].concat()).expect(0);
         drop(report);
         (result_of(&serde_json::from_slice(&place.read("report.json")).unwrap()), place.read("out.stl"))
     };
-    let first = run("100000", "1", "1GiB");
+    let first = run("100000", "1", "1GiB", "never");
     for chunk in ["64", "1000", "100000"] {
         for threads in ["1", "2"] {
-            for memory in ["64MiB", "200MiB", "1GiB"] {
-                let other = run(chunk, threads, memory);
-                let what = format!("{case}: chunks of {chunk}, {threads} threads, {memory}");
+            for (memory, spill) in [("64MiB", "auto"), ("64MiB", "always"), ("1GiB", "always"), ("1GiB", "never")] {
+                let other = run(chunk, threads, memory, spill);
+                let what = format!("{case}: chunks of {chunk}, {threads} threads, {memory}, spill {spill}");
                 assert!(other.1 == first.1, "{what}: other bytes");
                 assert_eq!(other.0, first.0, "{what}");
             }

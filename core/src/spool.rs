@@ -1,0 +1,304 @@
+//! Triangles sorted by place through a file without a name, for inputs whose order has nothing to do with where triangles lie.
+//!
+//! Each chunk of such an input has its triangles all over the map, so a map larger than the page cache would be read from the disk
+//! once for every few chunks. Instead, the pass that finds out who sees what appends every triangle, as its number and its corners, to
+//! the **bucket** where it is at home: a subtree of the plan. When a bucket's turn comes, it is read in one go and sorted into its chunks
+//! in memory. A file sorted by chunks would need a buffer for each; with buckets, what the buffers take and what loaded buckets take
+//! are balanced, and both grow with the square root of the input only.
+//!
+//! 40 bytes are written and read once a triangle (more where one lies across buckets). Entries are in ascending order of their numbers
+//! within each bucket, so a chunk sees what it would see in the map, in the same order.
+
+use std::fs::File;
+use std::io;
+use std::os::unix::fs::FileExt;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use memmap2::{Advice, Mmap};
+
+use crate::behind::WriteBehind;
+use crate::error::{Error, Result};
+use crate::plan::{ChunkId, Plan};
+use crate::record::{Point, Record};
+use crate::settings::Limits;
+
+/// A triangle's number and its corners, bytes 12 to 48 of its record.
+pub(crate) type Entry = [u8; ENTRY];
+
+const ENTRY: usize = 40;
+
+#[inline(always)]
+pub(crate) fn number(entry: &Entry) -> u32 {
+    u32::from_le_bytes([entry[0], entry[1], entry[2], entry[3]])
+}
+
+#[inline(always)]
+pub(crate) fn corners(entry: &Entry) -> [Point; 3] {
+    let float = |at: usize| f32::from_le_bytes([entry[at], entry[at + 1], entry[at + 2], entry[at + 3]]);
+    let point = |at: usize| [float(at), float(at + 4), float(at + 8)];
+    [point(4), point(16), point(28)]
+}
+
+/// How a spool is cut.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Layout {
+    /// A bucket holds 2^shift chunks.
+    shift: u32,
+    /// Entries collected before they are written.
+    buffer: usize,
+}
+
+/// Buffers of less than this make the disk seek more than it reads.
+const SMALLEST_BUFFER: u64 = 4 << 10;
+const LARGEST_BUFFER: u64 = 256 << 10;
+
+impl Layout {
+    /// For so many triangles: an eighth of the budget each for the buffers of all threads and for their loaded buckets, with at least
+    /// 2^`least` buckets.
+    pub(crate) fn new(triangles: usize, plan: &Plan, least: u32, limits: &Limits) -> Self {
+        let share = limits.memory_bytes / 8 / limits.threads.max(1) as u64;
+        let bytes = triangles as u64 * ENTRY as u64;
+        let buckets = bytes.div_ceil(share.max(1 << 20)).max(1 << least).next_power_of_two().min(plan.chunks() as u64);
+        let buffer = (share / buckets).clamp(SMALLEST_BUFFER, LARGEST_BUFFER) / ENTRY as u64;
+        Self { shift: (plan.chunks() as u64 / buckets).trailing_zeros(), buffer: buffer as usize }
+    }
+
+    pub(crate) fn bucket(&self, chunk: ChunkId) -> usize {
+        chunk.0 as usize >> self.shift
+    }
+
+    /// Memory that the writers of all threads take, in bytes.
+    pub(crate) fn writers_bytes(&self, plan: &Plan, threads: usize) -> u64 {
+        ((plan.chunks() >> self.shift) * self.buffer * ENTRY + plan.chunks() * 4) as u64 * threads as u64
+    }
+}
+
+/// A stretch of the spool that belongs to one bucket.
+#[derive(Clone, Copy, Debug)]
+struct Extent {
+    at: u64,
+    entries: usize,
+}
+
+/// A spool that is being written, by several writers at a time.
+pub(crate) struct Unsorted {
+    layout: Layout,
+    folder: PathBuf,
+    file: File,
+    behind: WriteBehind,
+    /// Where the next extent goes: the file grows at its end only.
+    end: AtomicU64,
+}
+
+impl Unsorted {
+    pub(crate) fn new(layout: Layout, limits: &Limits) -> Result<Self> {
+        let folder = limits.spool_folder();
+        let file = tempfile::tempfile_in(&folder).map_err(Error::io(&folder, "making a spool file"))?;
+        let behind = WriteBehind::new(&file, limits).map_err(Error::io(&folder, "making a spool file"))?;
+        Ok(Self { layout, folder, file, behind, end: AtomicU64::new(0) })
+    }
+
+    /// A writer for one stretch of the input.
+    pub(crate) fn writer(&self, chunks: usize) -> Writer<'_> {
+        let buckets = chunks >> self.layout.shift;
+        Writer {
+            spool: self,
+            buffers: vec![Vec::new(); buckets],
+            extents: vec![Vec::new(); buckets],
+            members: vec![0; chunks],
+            failed: None,
+        }
+    }
+
+    /// Joins what was written for consecutive stretches of the input.
+    pub(crate) fn sorted(self, parts: Vec<Part>, chunks: usize) -> Result<Spool> {
+        let failed = Error::io(&self.folder, "spooling");
+        let mut extents = vec![Vec::new(); chunks >> self.layout.shift];
+        let mut members = vec![0u32; chunks];
+        for part in parts {
+            let part = match part.0 {
+                Ok(part) => part,
+                Err(error) => return Err(failed(error)),
+            };
+            extents.iter_mut().zip(part.extents).for_each(|(all, more)| all.extend(more));
+            members.iter_mut().zip(part.members).for_each(|(all, more)| *all += more);
+        }
+        // SAFETY: the file has no name and nobody writes to it any more: no one changes or truncates it.
+        let map = || self.behind.finish().and_then(|()| unsafe { Mmap::map(&self.file) });
+        let map = if self.end.into_inner() > 0 { Some(map().map_err(failed)?) } else { None };
+        Ok(Spool { map, extents, members, shift: self.layout.shift })
+    }
+}
+
+/// Appends the triangles of one stretch of the input to their buckets.
+pub(crate) struct Writer<'a> {
+    spool: &'a Unsorted,
+    buffers: Vec<Vec<u8>>,
+    extents: Vec<Vec<Extent>>,
+    members: Vec<u32>,
+    failed: Option<io::Error>,
+}
+
+/// What a writer leaves behind.
+pub(crate) struct Part(io::Result<PartSpooled>);
+
+struct PartSpooled {
+    extents: Vec<Vec<Extent>>,
+    members: Vec<u32>,
+}
+
+impl Writer<'_> {
+    /// Triangles that are members of this chunk alone.
+    pub(crate) fn take_run(&mut self, chunk: ChunkId, first: u32, run: &[Record]) {
+        self.members[chunk.0 as usize] += run.len() as u32;
+        let bucket = self.spool.layout.bucket(chunk);
+        for (i, record) in run.iter().enumerate() {
+            self.put(bucket, first + i as u32, record);
+        }
+    }
+
+    /// A triangle that is a member of all `chunks`, which are distinct.
+    pub(crate) fn take(&mut self, chunks: &[ChunkId], number: u32, record: &Record) {
+        let layout = self.spool.layout;
+        for (k, chunk) in chunks.iter().enumerate() {
+            self.members[chunk.0 as usize] += 1;
+            let own = layout.bucket(*chunk);
+            if !chunks[..k].iter().any(|c| layout.bucket(*c) == own) {
+                self.put(own, number, record);
+            }
+        }
+    }
+
+    #[inline]
+    fn put(&mut self, bucket: usize, number: u32, record: &Record) {
+        let full = self.spool.layout.buffer * ENTRY;
+        let buffer = &mut self.buffers[bucket];
+        if buffer.capacity() == 0 {
+            buffer.reserve_exact(full);
+        }
+        buffer.extend_from_slice(&number.to_le_bytes());
+        buffer.extend_from_slice(&record[12..48]);
+        if buffer.len() >= full {
+            self.flush(bucket);
+        }
+    }
+
+    fn flush(&mut self, bucket: usize) {
+        let buffer = &mut self.buffers[bucket];
+        let bytes = buffer.len() as u64;
+        if self.failed.is_none() && bytes > 0 {
+            let at = self.spool.end.fetch_add(bytes, Ordering::Relaxed);
+            let written = self.spool.file.write_all_at(buffer, at).and_then(|()| self.spool.behind.wrote(bytes));
+            self.failed = written.err();
+            self.extents[bucket].push(Extent { at, entries: buffer.len() / ENTRY });
+        }
+        buffer.clear();
+    }
+
+    /// A write has failed; nothing more is taken.
+    pub(crate) fn has_failed(&self) -> bool {
+        self.failed.is_some()
+    }
+
+    pub(crate) fn finish(mut self) -> Part {
+        (0..self.buffers.len()).for_each(|bucket| self.flush(bucket));
+        Part(match self.failed {
+            Some(error) => Err(error),
+            None => Ok(PartSpooled { extents: self.extents, members: self.members }),
+        })
+    }
+}
+
+/// Triangles in buckets, each in ascending order.
+#[derive(Debug)]
+pub(crate) struct Spool {
+    /// `None` if there is nothing in it.
+    map: Option<Mmap>,
+    /// Of each bucket, in the order of the triangles.
+    extents: Vec<Vec<Extent>>,
+    /// Members of each chunk.
+    members: Vec<u32>,
+    shift: u32,
+}
+
+/// One bucket, sorted into its chunks. Keeps its memory from bucket to bucket.
+#[derive(Default)]
+pub(crate) struct Loaded {
+    entries: Vec<Entry>,
+    /// The bucket's first chunk, and where each chunk's entries begin.
+    first: usize,
+    starts: Vec<usize>,
+}
+
+impl Loaded {
+    /// Members of a chunk of the bucket.
+    pub(crate) fn members(&self, chunk: ChunkId) -> &[Entry] {
+        let at = chunk.0 as usize - self.first;
+        &self.entries[self.starts[at]..self.starts[at + 1]]
+    }
+}
+
+impl Spool {
+    pub(crate) fn buckets(&self) -> usize {
+        self.extents.len()
+    }
+
+    /// The chunks of a bucket.
+    pub(crate) fn chunks(&self, bucket: usize) -> impl Iterator<Item = ChunkId> + use<> {
+        (bucket << self.shift..(bucket + 1) << self.shift).map(|c| ChunkId(c as u32))
+    }
+
+    /// Members of `chunk`.
+    pub(crate) fn members(&self, chunk: ChunkId) -> u64 {
+        u64::from(self.members[chunk.0 as usize])
+    }
+
+    /// Memory that loading takes when each thread holds one of the largest buckets, in bytes.
+    pub(crate) fn loaded_bytes(&self, threads: usize) -> u64 {
+        let mut buckets: Vec<u64> = self.members.chunks(1 << self.shift).map(|m| m.iter().map(|n| u64::from(*n)).sum()).collect();
+        buckets.sort_unstable_by(|a, b| b.cmp(a));
+        buckets.iter().take(threads).sum::<u64>() * ENTRY as u64
+    }
+
+    /// Bytes held.
+    pub(crate) fn heap_bytes(&self) -> usize {
+        self.extents.iter().map(|e| e.capacity() * size_of::<Extent>() + 24).sum::<usize>() + self.members.len() * 4
+    }
+
+    /// Reads a bucket. O(its entries × depth of a bucket in the plan).
+    pub(crate) fn load(&self, plan: &Plan, bucket: usize, into: &mut Loaded) {
+        let chunks = bucket << self.shift..(bucket + 1) << self.shift;
+        into.first = chunks.start;
+        into.starts.clear();
+        into.starts.push(0);
+        let mut end = 0;
+        for count in &self.members[chunks] {
+            end += *count as usize;
+            into.starts.push(end);
+        }
+        into.entries.clear();
+        into.entries.resize(end, [0; ENTRY]);
+        let mut next = into.starts.clone();
+        let Some(map) = &self.map else { return };
+        // Advice, so that the disk is asked for all of them at once; without it the reading is only slower.
+        for extent in &self.extents[bucket] {
+            let _ = map.advise_range(Advice::WillNeed, extent.at as usize, extent.entries * ENTRY);
+        }
+        for extent in &self.extents[bucket] {
+            let at = extent.at as usize;
+            for entry in map[at..at + extent.entries * ENTRY].as_chunks::<ENTRY>().0 {
+                let homes = corners(entry).map(|p| plan.home_below(self.shift, bucket, p));
+                for k in 0..3 {
+                    if let Some(home) = homes[k]
+                        && !homes[..k].contains(&homes[k])
+                    {
+                        let at = &mut next[home.0 as usize - into.first];
+                        into.entries[*at] = *entry;
+                        *at += 1;
+                    }
+                }
+            }
+        }
+    }
+}

@@ -14,7 +14,8 @@ use crossbeam::channel::{Sender, bounded};
 
 use crate::settings::Limits;
 
-/// Most that is written between two pushes.
+/// What is written between two pushes, a share of the budget between these.
+const SMALLEST_STEP: u64 = 64 << 10;
 const LARGEST_STEP: u64 = 32 << 20;
 
 /// Pushes what is written to one file. Several threads may write.
@@ -61,7 +62,7 @@ impl WriteBehind {
 
 /// Bytes written between two pushes.
 fn step(limits: &Limits) -> u64 {
-    (limits.memory_bytes / 16).clamp(1 << 20, LARGEST_STEP)
+    (limits.memory_bytes / 16).clamp(SMALLEST_STEP, LARGEST_STEP)
 }
 
 /// Most dirty pages that one [`WriteBehind`] leaves, in bytes.
@@ -107,7 +108,7 @@ mod tests {
             file.write_all(&part).unwrap();
             behind.wrote(part.len() as u64).unwrap();
         }
-        assert!(behind.syncer.lock().unwrap().is_some(), "6 MB in steps of one");
+        assert!(behind.syncer.lock().unwrap().is_some(), "6 MB in small steps");
         behind.finish().unwrap();
         assert_eq!(file.metadata().unwrap().len(), 20 * part.len() as u64);
     }

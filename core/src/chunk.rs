@@ -8,8 +8,10 @@
 //!
 //! Tables are laid out to stay in an L2 cache at 32 k triangles a chunk; a worker keeps them from chunk to chunk.
 
+use crate::budget::{Budget, Purpose};
 use crate::plan::HomeBox;
 use crate::record::Point;
+use crate::shop;
 use crate::source::{Seen, Source, Triangle};
 use crate::star::{self, Ring, Stars};
 use crate::sums::{Batch, Bounds, Extent, Measure};
@@ -69,6 +71,31 @@ pub(crate) struct ChunkTopology {
 
 /// Triangles that are welded at once.
 const BATCH: usize = weld::BATCH / 3;
+
+/// Bytes that a patch takes until the file is judged: here, merged, and as a component.
+const BYTES_PER_PATCH: u64 = 3 * size_of::<Patch>() as u64 + 160;
+
+impl ChunkTopology {
+    /// Counts what it takes now and will take once it is merged.
+    pub(crate) fn take(&self, budget: &Budget) {
+        let labels = match &self.labels {
+            Labels::One => 0,
+            Labels::Runs(bytes) => bytes.capacity() as u64,
+        };
+        // Links and suspects are copied when they are merged; for suspects, the workshop's share counts that, too.
+        let links = 2 * size_of::<Link>() as u64 * self.links.capacity() as u64;
+        let fixed = size_of::<Self>() as u64;
+        budget.take(Purpose::Surface, fixed + labels + links + self.patches.capacity() as u64 * BYTES_PER_PATCH);
+        budget.take(Purpose::Defects, self.suspects.len() as u64 * shop::BYTES_PER_SUSPECT);
+    }
+
+    /// Gives back what growing left over.
+    fn shrink(&mut self) {
+        self.suspects.shrink_to_fit();
+        self.links.shrink_to_fit();
+        self.patches.shrink_to_fit();
+    }
+}
 
 /// The tables of one worker, used again from chunk to chunk.
 #[derive(Default)]
@@ -266,6 +293,7 @@ impl Scratch {
         if out.patches.len() > 1 {
             out.labels = Labels::Runs(labels.finish());
         }
+        out.shrink();
         out
     }
 

@@ -1,5 +1,7 @@
 //! The sparse edit: which input records leave, turn or change, and what is added. Everything else is untouched.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use crate::record::{self, Record};
 use crate::report::{EditRecords, EditSummary};
 use crate::shop::components::Reversed;
@@ -14,6 +16,10 @@ pub(crate) enum Change {
     /// The same triangle with moved vertices.
     Move(Box<Record>),
 }
+
+/// Bytes that a triangle to be deleted for its coordinates takes: its run in the lists that are found and merged, and its change, in a list
+/// that may grow once more.
+pub(crate) const BYTES_PER_NONFINITE: u64 = 4 * 8 + 3 * size_of::<(u32, Change)>() as u64;
 
 /// An edit against the input.
 #[derive(Debug, Default)]
@@ -34,6 +40,7 @@ impl Edit {
     /// reversed patches.
     pub(crate) fn of(survey: &Survey<'_>, shop: &Shop, reversed: &Reversed) -> Self {
         let mut edit = Self::default();
+        edit.changes.reserve_exact(survey.nonfinite.iter().map(|r| r.1 as usize).sum());
         edit.changes
             .extend(survey.nonfinite.iter().flat_map(|(first, count)| *first..*first + *count).map(|t| (t, Change::Delete)));
         for (i, triangle) in shop.triangles.iter().enumerate() {
@@ -77,20 +84,18 @@ impl Edit {
     }
 
     fn flip_patches(&mut self, survey: &Survey<'_>, reversed: &Reversed) {
-        let runs = survey.visit_sound(
+        let bits: Vec<AtomicU64> = std::iter::repeat_with(AtomicU64::default).take(survey.records.len().div_ceil(64)).collect();
+        let flips = survey.visit_sound(
             |patch| reversed.patches[patch as usize],
             |_| true,
-            Vec::<(u32, u32)>::new,
-            |runs, triangle, _| match runs.last_mut() {
-                Some((first, count)) if *first + *count == triangle => *count += 1,
-                _ => runs.push((triangle, 1)),
+            || 0,
+            |flips: &mut u64, triangle, _| {
+                bits[triangle as usize / 64].fetch_or(1 << (triangle % 64), Ordering::Relaxed);
+                *flips += 1;
             },
         );
-        self.flipped = vec![0; survey.records.len().div_ceil(64)];
-        for (first, count) in runs.into_iter().flatten() {
-            (first..first + count).for_each(|t| self.flipped[t as usize / 64] |= 1 << (t % 64));
-            self.flips += u64::from(count);
-        }
+        self.flipped = bits.into_iter().map(AtomicU64::into_inner).collect();
+        self.flips += flips.into_iter().sum::<u64>();
     }
 
     /// Records in the output.

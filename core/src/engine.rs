@@ -5,15 +5,16 @@ use std::time::Instant;
 
 use crate::edit::Edit;
 use crate::error::{Error, Result};
-use crate::read::MeshFile;
+use crate::read::{MeshFile, PREFIX_BYTES};
 use crate::report::{Cost, Defects, EditSummary, FileFacts, Outcome, Report, SCHEMA_VERSION, Stage, Task, Tolerances};
-use crate::settings::{Limits, Profile};
+use crate::settings::{Limits, Profile, folder_of};
 use crate::shop::Shop;
 use crate::shop::edges::Edges;
 use crate::shop::near::Tolerance;
+use crate::space::{self, Need};
 use crate::sums::Bounds;
 use crate::survey::Survey;
-use crate::{Progress, cost, defects, emit, repairs, verdict};
+use crate::{Progress, cost, defects, emit, members, repairs, verdict};
 
 /// What is spent by stage while a file is worked on.
 pub(crate) struct Clock {
@@ -106,6 +107,7 @@ pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress
     let limits = &limits.spooling_beside(input);
     let mesh = open(input, limits, progress)?;
     clock.lap("read");
+    space::check(input, &[spool_need(&mesh, limits)])?;
     let diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
     clock.lap("topology");
     let blake3 = hash(mesh.bytes(), limits);
@@ -152,6 +154,9 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     let limits = &limits.spooling_beside(output);
     let mesh = open(input, limits, progress)?;
     clock.lap("read");
+    // The output is as large as its input but for what is added; what the input spools is gone by then, but the output spools as much.
+    let bytes = (PREFIX_BYTES + size_of_val(mesh.records())) as u64;
+    space::check(input, &[Need { folder: folder_of(output).into(), bytes, what: "the output" }, spool_need(&mesh, limits)])?;
     let mut diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
     clock.lap("topology");
     let surface = diagnosis.surface_bounds();
@@ -180,6 +185,15 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     report.cost = clock.cost(mesh.records().len() as u64);
     report.stages = clock.stages;
     Ok(report)
+}
+
+/// What working out the topology of `mesh` spools.
+fn spool_need(mesh: &MeshFile, limits: &Limits) -> Need {
+    Need {
+        folder: limits.spool_folder(),
+        bytes: members::spool_bytes(mesh.records(), limits),
+        what: "sorting triangles by place",
+    }
 }
 
 /// Reads the written file again and judges it. A copy of a good file is compared by its hash instead.

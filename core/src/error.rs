@@ -30,6 +30,10 @@ pub enum Error {
     #[error("{}: refused: {reason}; {advice}", path.display())]
     Refused { path: PathBuf, reason: String, advice: String },
 
+    /// The disk has too little room for what would be written; nothing was.
+    #[error("{}: refused: {reason}; {advice}", path.display())]
+    NoSpace { path: PathBuf, reason: String, advice: String },
+
     /// Reading, writing or mapping failed.
     #[error("{}: {action} failed: {source}", path.display())]
     Io { path: PathBuf, action: &'static str, source: std::io::Error },
@@ -50,7 +54,7 @@ impl Error {
         match self {
             Self::Unreadable { .. } => ErrorClass::Unreadable,
             Self::Refused { .. } => ErrorClass::Refused,
-            Self::Io { .. } => ErrorClass::Environment,
+            Self::NoSpace { .. } | Self::Io { .. } => ErrorClass::Environment,
             Self::Changed { .. } => ErrorClass::Changed,
         }
     }

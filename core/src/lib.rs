@@ -6,6 +6,7 @@
 mod behind;
 mod bodies;
 mod boxes;
+mod budget;
 mod chunk;
 mod cost;
 mod defects;
@@ -28,6 +29,7 @@ pub mod report;
 pub mod settings;
 mod shop;
 mod source;
+mod space;
 mod spool;
 mod star;
 mod sums;

@@ -4,6 +4,7 @@
 //! costs about 0.02 bytes a triangle; a shuffled one costs up to 2. Where lists would not do (they would take too much memory, or lead all
 //! over a file that is larger than the page cache), the same pass copies the triangles into a [`Spool`] instead.
 
+use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::Result;
@@ -157,24 +158,14 @@ impl Members {
     ///
     /// # Errors
     /// Where spooling fails.
-    pub(crate) fn gather(records: &[Record], plan: &Plan, limits: &Limits) -> Result<Self> {
-        let layout = |least| spool::Layout::new(records.len(), plan, least, limits);
-        let (spill, most) = match limits.spill {
-            Spill::Always => (Some(layout(3)), u64::MAX),
-            Spill::Never => (None, u64::MAX),
-            Spill::Auto => {
-                let layout = layout(0);
-                let too_large = || size_of_val(records) as u64 > machine::page_cache_room(limits);
-                (Some(layout).filter(|l| is_scattered(records, plan, l) && too_large()), limits.memory_bytes / 4)
-            }
-        };
-        match spill {
-            Some(layout) => Self::spool(records, plan, layout, limits),
-            None => match Self::list(records, plan, limits.threads, most) {
-                Some(members) => Ok(members),
-                None => Self::spool(records, plan, layout(0), limits),
-            },
+    pub(crate) fn gather(path: &Path, records: &[Record], plan: &Plan, limits: &Limits) -> Result<Self> {
+        let most = if limits.spill == Spill::Never { u64::MAX } else { limits.memory_bytes / 4 };
+        if spool_bytes(records, limits) == 0
+            && let Some(members) = Self::list(records, plan, limits.threads, most)
+        {
+            return Ok(members);
         }
+        Self::spool(path, records, plan, limits)
     }
 
     /// `None` if the lists would take more than `most` bytes.
@@ -202,8 +193,8 @@ impl Members {
         Some(members)
     }
 
-    fn spool(records: &[Record], plan: &Plan, layout: spool::Layout, limits: &Limits) -> Result<Self> {
-        let spool = Unsorted::new(layout, limits)?;
+    fn spool(path: &Path, records: &[Record], plan: &Plan, limits: &Limits) -> Result<Self> {
+        let spool = Unsorted::new(path, spool::Layout::new(records.len(), plan, limits), plan, limits)?;
         // One piece a thread: every piece ends with extents that are not full.
         let results = in_pieces(records, limits.threads, limits.threads, |piece, offset| {
             let mut writer = spool.writer(plan.chunks());
@@ -288,22 +279,34 @@ fn in_pieces<R: Send>(records: &[Record], threads: usize, pieces: usize, work: i
     })
 }
 
+/// What will be spooled to find out who sees what, in bytes; 0 if lists will do, as far as can be told beforehand.
+pub(crate) fn spool_bytes(records: &[Record], limits: &Limits) -> u64 {
+    let spooled = match limits.spill {
+        Spill::Always => true,
+        Spill::Never => false,
+        Spill::Auto => size_of_val(records) as u64 > machine::page_cache_room(limits) && is_scattered(records),
+    };
+    // Some triangles lie across buckets.
+    if spooled { (records.len() * size_of::<spool::Entry>()) as u64 / 20 * 21 } else { 0 }
+}
+
 /// Stretches of the file that are looked at to find out how scattered its triangles are, and triangles in each.
 const STRETCHES: usize = 256;
 const STRETCH: usize = 64;
 
-/// Do neighbours in the file lie in different buckets more often than in one of a page of triangles? (Chunks would not do: rows of a grid
-/// cross many of them, but the next chunks continue where these end.)
-fn is_scattered(records: &[Record], plan: &Plan, layout: &spool::Layout) -> bool {
+/// Do neighbours in the file lie far from each other (in different parts of some hundred) more often than once in a page of triangles?
+/// (Whether they lie in the same chunk would not tell: rows of a grid cross many of them, but the next chunks continue where these end.)
+fn is_scattered(records: &[Record]) -> bool {
+    let parts = Plan::new(records, (records.len() / STRETCHES).try_into().unwrap_or(u32::MAX));
     let step = (records.len() / STRETCHES).max(STRETCH);
     let (mut changes, mut looked_at) = (0, 0);
     for stretch in records.chunks(step) {
         let mut last = None;
         for record in stretch.iter().take(STRETCH).filter(|r| record::all_finite(r)) {
-            let bucket = layout.bucket(plan.home(record::corners(record)[0]));
-            changes += usize::from(last.is_some_and(|l| l != bucket));
+            let part = parts.home(record::corners(record)[0]);
+            changes += usize::from(last.is_some_and(|l| l != part));
             looked_at += 1;
-            last = Some(bucket);
+            last = Some(part);
         }
     }
     changes * STRETCH > looked_at
@@ -390,9 +393,8 @@ mod tests {
                 })
                 .collect();
             for spill in [Spill::Never, Spill::Auto, Spill::Always] {
-                // So small a budget that buffers overflow, and lists are given up.
-                let limits = Limits { threads, spill, memory_bytes: 0, ..Limits::default() };
-                let members = Members::gather(&records, &plan, &limits).unwrap();
+                let limits = Limits { threads, spill, ..Limits::default() };
+                let members = Members::gather(Path::new("test"), &records, &plan, &limits).unwrap();
                 let wanted = |c: ChunkId| c.0 % 3 != 1;
                 let seen = members.each((&records, &plan), threads, wanted, || (), |(), chunk, seen| {
                     let mut all = Vec::new();
@@ -409,16 +411,28 @@ mod tests {
     #[test]
     fn neighbours_all_over_the_place_are_scattered_rows_are_not() {
         let at = |i: usize| {
-            let [x, y] = [(i % 1000) as f32, (i / 1000) as f32];
+            let [x, y] = [(i % 4000) as f32, (i / 4000) as f32];
             record::encode([[x, y, 0.0], [x + 1.0, y, 0.0], [x, y + 1.0, 0.0]], 0)
         };
-        let rows: Vec<Record> = (0..10_000).map(at).collect();
+        let rows: Vec<Record> = (0..40_000).map(at).collect();
         // 7919 is prime: a permutation.
-        let mixed: Vec<Record> = (0..10_000).map(|i| at(i * 7919 % 10_000)).collect();
-        for (records, scattered) in [(rows, false), (mixed, true)] {
-            let plan = Plan::new(&records, 40);
-            let layout = spool::Layout::new(records.len(), &plan, 3, &Limits::default());
-            assert_eq!(is_scattered(&records, &plan, &layout), scattered);
-        }
+        let mixed: Vec<Record> = (0..40_000).map(|i| at(i * 7919 % 40_000)).collect();
+        assert!(!is_scattered(&rows));
+        assert!(is_scattered(&mixed));
+    }
+
+    #[test]
+    fn lists_that_take_too_much_are_given_up_for_a_spool() {
+        let at = |i: u32| [(i * 7919 % 300) as f32, (i * 7919 % 90_000 / 300) as f32];
+        let corners = |[x, y]: [f32; 2]| [[x, y, 0.0], [x + 1.0, y, 0.0], [x, y + 1.0, 0.0]];
+        let records: Vec<Record> = (0..90_000).map(|i| record::encode(corners(at(i)), 0)).collect();
+        let plan = Plan::new(&records, 1000);
+        let limits = Limits { threads: 2, memory_bytes: 5 << 18, ..Limits::default() };
+        let gathered = |spill| Members::gather(Path::new("test"), &records, &plan, &Limits { spill, ..limits.clone() }).unwrap();
+        let (lists, spooled) = (gathered(Spill::Never), gathered(Spill::Auto));
+        assert!(matches!(&lists.kept, Kept::Lists(_)) && lists.heap_bytes(2) * 3 > limits.memory_bytes / 4);
+        assert!(matches!(&spooled.kept, Kept::Spool(_)));
+        let counts = |m: &Members| (0..plan.chunks() as u32).map(|c| m.count(ChunkId(c))).collect::<Vec<_>>();
+        assert_eq!(counts(&lists), counts(&spooled));
     }
 }

@@ -79,6 +79,11 @@ impl Plan {
         self.boxes.len()
     }
 
+    /// Bytes held.
+    pub(crate) fn heap_bytes(&self) -> u64 {
+        (self.chunks() * (size_of::<(u8, f32)>() + size_of::<HomeBox>())) as u64
+    }
+
     pub(crate) fn home_box(&self, chunk: ChunkId) -> HomeBox {
         self.boxes[chunk.0 as usize]
     }

@@ -129,12 +129,16 @@ impl Default for Limits {
 impl Limits {
     /// These limits, with spools beside `file` unless they go elsewhere already.
     pub(crate) fn spooling_beside(&self, file: &Path) -> Self {
-        let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        Self { spool: Some(self.spool.clone().unwrap_or_else(|| folder.to_owned())), ..self.clone() }
+        Self { spool: Some(self.spool.clone().unwrap_or_else(|| folder_of(file).to_owned())), ..self.clone() }
     }
 
     /// Where spools go.
     pub(crate) fn spool_folder(&self) -> PathBuf {
         self.spool.clone().unwrap_or_else(std::env::temp_dir)
     }
+}
+
+/// The folder that holds `file`.
+pub(crate) fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

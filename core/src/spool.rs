@@ -12,12 +12,13 @@
 use std::fs::File;
 use std::io;
 use std::os::unix::fs::FileExt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use memmap2::{Advice, Mmap};
 
-use crate::behind::WriteBehind;
+use crate::behind::{self, WriteBehind};
+use crate::budget::{Budget, Purpose};
 use crate::error::{Error, Result};
 use crate::plan::{ChunkId, Plan};
 use crate::record::{Point, Record};
@@ -52,14 +53,15 @@ pub(crate) struct Layout {
 /// Buffers of less than this make the disk seek more than it reads.
 const SMALLEST_BUFFER: u64 = 4 << 10;
 const LARGEST_BUFFER: u64 = 256 << 10;
+/// Buckets there are at least, so that all threads find work.
+const FEWEST_BUCKETS: u64 = 16;
 
 impl Layout {
-    /// For so many triangles: an eighth of the budget each for the buffers of all threads and for their loaded buckets, with at least
-    /// 2^`least` buckets.
-    pub(crate) fn new(triangles: usize, plan: &Plan, least: u32, limits: &Limits) -> Self {
+    /// For so many triangles: an eighth of the budget each for the buffers of all threads and for their loaded buckets.
+    pub(crate) fn new(triangles: usize, plan: &Plan, limits: &Limits) -> Self {
         let share = limits.memory_bytes / 8 / limits.threads.max(1) as u64;
         let bytes = triangles as u64 * ENTRY as u64;
-        let buckets = bytes.div_ceil(share.max(1 << 20)).max(1 << least).next_power_of_two().min(plan.chunks() as u64);
+        let buckets = bytes.div_ceil(share.max(1 << 20)).max(FEWEST_BUCKETS).next_power_of_two().min(plan.chunks() as u64);
         let buffer = (share / buckets).clamp(SMALLEST_BUFFER, LARGEST_BUFFER) / ENTRY as u64;
         Self { shift: (plan.chunks() as u64 / buckets).trailing_zeros(), buffer: buffer as usize }
     }
@@ -69,7 +71,7 @@ impl Layout {
     }
 
     /// Memory that the writers of all threads take, in bytes.
-    pub(crate) fn writers_bytes(&self, plan: &Plan, threads: usize) -> u64 {
+    fn writers_bytes(&self, plan: &Plan, threads: usize) -> u64 {
         ((plan.chunks() >> self.shift) * self.buffer * ENTRY + plan.chunks() * 4) as u64 * threads as u64
     }
 }
@@ -92,7 +94,11 @@ pub(crate) struct Unsorted {
 }
 
 impl Unsorted {
-    pub(crate) fn new(layout: Layout, limits: &Limits) -> Result<Self> {
+    /// Refuses the work on `path` if the writers, or the pages they make dirty, do not fit the budget.
+    pub(crate) fn new(path: &Path, layout: Layout, plan: &Plan, limits: &Limits) -> Result<Self> {
+        let budget = Budget::new(limits.memory_bytes);
+        budget.take(Purpose::Tables, layout.writers_bytes(plan, limits.threads) + behind::most_dirty(limits));
+        budget.check(path, || "its triangles have to be sorted by place".into())?;
         let folder = limits.spool_folder();
         let file = tempfile::tempfile_in(&folder).map_err(Error::io(&folder, "making a spool file"))?;
         let behind = WriteBehind::new(&file, limits).map_err(Error::io(&folder, "making a spool file"))?;
@@ -124,8 +130,9 @@ impl Unsorted {
             extents.iter_mut().zip(part.extents).for_each(|(all, more)| all.extend(more));
             members.iter_mut().zip(part.members).for_each(|(all, more)| *all += more);
         }
+        // Synced, so that no dirty pages are left to count against what comes next.
         // SAFETY: the file has no name and nobody writes to it any more: no one changes or truncates it.
-        let map = || self.behind.finish().and_then(|()| unsafe { Mmap::map(&self.file) });
+        let map = || self.behind.finish().and_then(|()| self.file.sync_data()).and_then(|()| unsafe { Mmap::map(&self.file) });
         let map = if self.end.into_inner() > 0 { Some(map().map_err(failed)?) } else { None };
         Ok(Spool { map, extents, members, shift: self.layout.shift })
     }
@@ -299,6 +306,55 @@ impl Spool {
                     }
                 }
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record;
+
+    /// A plate of many triangles in an order that has nothing to do with their place, cut into extents of three triangles.
+    #[test]
+    fn buckets_give_back_what_was_written_in_its_order() {
+        let at = |i: usize| {
+            let [x, y] = [(i * 7919 % 1000 % 40) as f32, (i * 7919 % 1000 / 40) as f32];
+            record::encode([[x, y, 0.0], [x + 1.0, y, 0.0], [x, y + 1.0, 0.0]], i as u16)
+        };
+        let records: Vec<Record> = (0..1000).map(at).collect();
+        let plan = Plan::new(&records, 8);
+        for (shift, buffer) in [(0, 3), (3, 3), (2, 1), (7, 1000)] {
+            let limits = Limits::default();
+            let spool = Unsorted::new(Path::new("test"), Layout { shift, buffer }, &plan, &limits).unwrap();
+            // Two stretches, the second one written first.
+            let homes = |r: &Record| {
+                let mut homes: Vec<ChunkId> = record::corners(r).iter().map(|p| plan.home(*p)).collect();
+                homes.sort_unstable();
+                homes.dedup();
+                homes
+            };
+            let write = |range: std::ops::Range<usize>| {
+                let mut writer = spool.writer(plan.chunks());
+                range.for_each(|i| writer.take(&homes(&records[i]), i as u32, &records[i]));
+                writer.finish()
+            };
+            let second = write(400..1000);
+            let first = write(0..400);
+            let spool = spool.sorted(vec![first, second], plan.chunks()).unwrap();
+            let mut loaded = Loaded::default();
+            let mut found = 0;
+            for bucket in 0..spool.buckets() {
+                spool.load(&plan, bucket, &mut loaded);
+                for chunk in spool.chunks(bucket) {
+                    let want: Vec<usize> = (0..1000).filter(|i| homes(&records[*i]).contains(&chunk)).collect();
+                    let got: Vec<usize> = loaded.members(chunk).iter().map(|e| number(e) as usize).collect();
+                    assert_eq!(got, want, "{shift} {buffer}");
+                    assert!(loaded.members(chunk).iter().zip(want).all(|(e, i)| corners(e) == record::corners(&records[i])));
+                    found += got.len() as u64;
+                }
+            }
+            assert!(found >= 1000 && spool.loaded_bytes(spool.buckets()) == found * ENTRY as u64);
         }
     }
 }

@@ -6,6 +6,7 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use crate::budget::{Budget, Purpose};
 use crate::chunk::{self, ChunkTopology, Labels, Link, NONE, Patch, Scratch, Suspect};
 use crate::error::{Error, Result};
 use crate::members::Members;
@@ -15,7 +16,7 @@ use crate::settings::Limits;
 use crate::source::{Source, Triangle};
 use crate::sums::{Bounds, Extent, Measure};
 use crate::weld::Weld;
-use crate::{Progress, shop};
+use crate::{Progress, edit};
 
 /// Topology of the sound part of a file, and the list of what is not sound.
 #[derive(Debug)]
@@ -44,6 +45,9 @@ pub(crate) struct Survey<'a> {
     threads: usize,
 }
 
+/// Most triangles a workshop can number the corners of, with room for what repairs add.
+const MOST_SUSPECTS: u64 = 1 << 30;
+
 /// Stage name under which the survey reports progress.
 const STAGE: &str = "topology";
 
@@ -52,27 +56,28 @@ impl<'a> Survey<'a> {
     pub(crate) fn new(path: &Path, records: &'a [Record], limits: &Limits, progress: &dyn Progress) -> Result<Self> {
         let span = tracing::debug_span!("plan").entered();
         let plan = Plan::new(records, limits.chunk_triangles);
-        let mut members = Members::gather(records, &plan, limits)?;
+        let mut members = Members::gather(path, records, &plan, limits)?;
         drop(span);
         let bounds = members.bounds.normalised();
         let measure = Measure::new(&bounds);
-        refuse_if_too_large(path, &plan, &members, limits)?;
+        let budget = Budget::new(limits.memory_bytes);
+        take_tables(path, &budget, &plan, &members, limits)?;
 
         let _span = tracing::debug_span!("chunks", count = plan.chunks()).entered();
         let (done, suspects) = (AtomicU64::new(0), AtomicU64::new(0));
-        let room = limits.memory_bytes.saturating_sub(members.heap_bytes(limits.threads)) / shop::BYTES_PER_SUSPECT;
         let mut chunks = members.each(
             (records, &plan),
             limits.threads,
             |_| true,
             Scratch::default,
             |scratch, chunk, seen| {
-                // Once it is clear that the workshop will not fit, the rest need not be known.
-                if progress.cancelled() || suspects.load(Ordering::Relaxed) > room {
+                // Once it is clear that there is too much to keep, the rest need not be known.
+                if progress.cancelled() || budget.is_exceeded() {
                     return ChunkTopology::default();
                 }
                 let topology = scratch.solve(seen, plan.home_box(chunk), &measure);
                 suspects.fetch_add(topology.suspects.len() as u64, Ordering::Relaxed);
+                topology.take(&budget);
                 let chunks_done = done.fetch_add(1, Ordering::Relaxed) + 1;
                 progress.at(STAGE, chunks_done * records.len() as u64 / plan.chunks() as u64, records.len() as u64);
                 topology
@@ -82,12 +87,12 @@ impl<'a> Survey<'a> {
             return Err(Error::io(path, STAGE)(std::io::ErrorKind::Interrupted.into()));
         }
         let suspects = suspects.into_inner();
-        if suspects > room {
-            let need = (members.heap_bytes(limits.threads) + suspects * shop::BYTES_PER_SUSPECT).div_ceil(1 << 20);
+        budget.check(path, || format!("at least {suspects} triangles lie at defects"))?;
+        if suspects > MOST_SUSPECTS {
             return Err(Error::Refused {
                 path: path.into(),
-                reason: format!("at least {suspects} triangles lie at defects, which needs {need} MiB of memory or more"),
-                advice: format!("the budget is {} MiB: raise --memory", limits.memory_bytes >> 20),
+                reason: format!("{suspects} triangles lie at defects"),
+                advice: format!("at most {MOST_SUSPECTS} can be worked on: split the file"),
             });
         }
         let merge = Merge::of(records, &measure, &mut chunks);
@@ -211,17 +216,18 @@ impl<'a> Survey<'a> {
     }
 }
 
-fn refuse_if_too_large(path: &Path, plan: &Plan, members: &Members, limits: &Limits) -> Result<()> {
-    let largest = (0..plan.chunks()).map(|c| members.count(ChunkId(c as u32))).max().unwrap_or(0);
-    let need = members.heap_bytes(limits.threads) + chunk::scratch_bytes(largest) * limits.threads as u64;
-    if need > limits.memory_bytes {
-        return Err(Error::Refused {
-            path: path.into(),
-            reason: format!("the largest chunk holds {largest} triangles, which needs {} MiB of memory", need.div_ceil(1 << 20)),
-            advice: format!("the budget is {} MiB: raise --memory", limits.memory_bytes >> 20),
-        });
-    }
-    Ok(())
+/// Takes what is known to be needed before the chunks are solved.
+fn take_tables(path: &Path, budget: &Budget, plan: &Plan, members: &Members, limits: &Limits) -> Result<()> {
+    let mut counts: Vec<u64> = (0..plan.chunks()).map(|c| members.count(ChunkId(c as u32))).collect();
+    counts.sort_unstable_by(|a, b| b.cmp(a));
+    // A thread's tables are as large as its largest chunk, and no two threads work on the same one.
+    let scratch = counts.iter().take(limits.threads).map(|n| chunk::scratch_bytes(*n)).sum::<u64>();
+    budget.take(Purpose::Tables, scratch + members.heap_bytes(limits.threads) + plan.heap_bytes());
+    let largest = counts.first().copied().unwrap_or(0);
+    budget.check(path, || format!("the largest chunk holds {largest} triangles"))?;
+    let nonfinite: u64 = members.nonfinite.iter().map(|r| u64::from(r.1)).sum();
+    budget.take(Purpose::Defects, nonfinite * edit::BYTES_PER_NONFINITE);
+    budget.check(path, || format!("{nonfinite} triangles have coordinates that are no finite numbers"))
 }
 
 struct Merge {

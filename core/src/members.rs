@@ -128,9 +128,13 @@ impl Take for Lists<'_> {
     }
 
     fn given_up(&self) -> bool {
-        // While a list grows, it takes up to three times its bytes.
-        self.held.load(Ordering::Relaxed) * 3 > self.most
+        is_too_much(self.held, self.most)
     }
+}
+
+/// While a list grows, it takes up to three times its bytes.
+fn is_too_much(held: &AtomicU64, most: u64) -> bool {
+    held.load(Ordering::Relaxed).saturating_mul(3) > most
 }
 
 impl Take for spool::Writer<'_> {
@@ -176,15 +180,16 @@ impl Members {
         let results = in_pieces(records, threads, pieces, |piece, offset| {
             let mut lists = Lists { lists: vec![RunList::default(); plan.chunks()], uncounted: 0, held: &held, most };
             let passing = gather_piece(piece, offset, plan, &mut lists);
-            (!lists.given_up()).then(|| {
-                lists.lists.iter_mut().for_each(|l| l.bytes.shrink_to_fit());
-                (lists.lists, passing)
-            })
+            held.fetch_add(lists.uncounted as u64, Ordering::Relaxed);
+            lists.lists.iter_mut().for_each(|l| l.bytes.shrink_to_fit());
+            (lists.lists, passing)
         });
+        if is_too_much(&held, most) {
+            return None;
+        }
         let mut all = vec![Vec::new(); plan.chunks()];
         let mut members = Self { kept: Kept::Lists(Vec::new()), nonfinite: Vec::new(), bounds: Bounds::EMPTY };
-        for result in results {
-            let (lists, passing) = result?;
+        for (lists, passing) in results {
             members.add(passing);
             let filled = lists.into_iter().zip(&mut all).filter(|(list, _)| !list.bytes.is_empty());
             filled.for_each(|(list, of_chunk)| of_chunk.push(list));
@@ -409,11 +414,8 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_all_over_the_place_are_scattered_rows_are_not() {
-        let at = |i: usize| {
-            let [x, y] = [(i % 4000) as f32, (i / 4000) as f32];
-            record::encode([[x, y, 0.0], [x + 1.0, y, 0.0], [x, y + 1.0, 0.0]], 0)
-        };
+    fn neighbours_all_over_the_place_are_scattered_a_row_is_not() {
+        let at = |i: usize| record::encode([[i as f32, 0.0, 0.0], [i as f32 + 1.0, 0.0, 0.0], [i as f32, 1.0, 0.0]], 0);
         let rows: Vec<Record> = (0..40_000).map(at).collect();
         // 7919 is prime: a permutation.
         let mixed: Vec<Record> = (0..40_000).map(|i| at(i * 7919 % 40_000)).collect();

@@ -9,6 +9,8 @@
 //! Tables are laid out to stay in an L2 cache at 32 k triangles a chunk; a worker keeps them from chunk to chunk.
 
 use crate::budget::{Budget, Purpose};
+use crate::crossings::Crossings;
+use crate::intersect::{self, Finder, Region};
 use crate::plan::HomeBox;
 use crate::record::Point;
 use crate::shop;
@@ -67,6 +69,8 @@ pub(crate) struct ChunkTopology {
     pub(crate) vertices: u64,
     /// Those used by a triangle with three distinct vertices.
     pub(crate) vertices_used: u64,
+    /// Self-intersections that this chunk owns; empty if they were not looked for.
+    pub(crate) crossings: Crossings,
 }
 
 /// Triangles that are welded at once.
@@ -85,7 +89,8 @@ impl ChunkTopology {
         // Links and suspects are copied when they are merged; for suspects, the workshop's share counts that, too.
         let links = 2 * size_of::<Link>() as u64 * self.links.capacity() as u64;
         let fixed = size_of::<Self>() as u64;
-        budget.take(Purpose::Surface, fixed + labels + links + self.patches.capacity() as u64 * BYTES_PER_PATCH);
+        let across = 2 * self.crossings.heap_bytes();
+        budget.take(Purpose::Surface, fixed + labels + links + across + self.patches.capacity() as u64 * BYTES_PER_PATCH);
         budget.take(Purpose::Defects, self.suspects.len() as u64 * shop::BYTES_PER_SUSPECT);
     }
 
@@ -110,6 +115,12 @@ pub(crate) struct Scratch {
     /// Patch of a sound home vertex, [`UNSOUND`] or [`AWAY`].
     states: Vec<u32>,
     parents: Vec<u32>,
+    /// By vertex, for the search for self-intersections: at home here; sound.
+    home: Vec<bool>,
+    sound: Vec<bool>,
+    finder: Finder,
+    /// Members, then visitors, that are in a self-intersection, a bit each.
+    hit: Vec<u64>,
 }
 
 /// State of a vertex at home here whose star is not sound.
@@ -122,7 +133,7 @@ const SOUND: u32 = 0;
 /// Bytes that one worker needs for a chunk of `members` triangles, at most.
 pub(crate) fn scratch_bytes(members: u64) -> u64 {
     // A triangle has up to three vertices: slots 16 × 3, doubled when full, positions 12, states 4, parents 4; numbers 4, triangles 12.
-    members * (3 * (96 + 12 + 4 + 4 + star::BYTES_PER_VERTEX) + 4 + 12 + star::BYTES_PER_TRIANGLE)
+    members * (3 * (96 + 12 + 4 + 4 + star::BYTES_PER_VERTEX) + 4 + 12 + star::BYTES_PER_TRIANGLE + intersect::BYTES_PER_TRIANGLE)
 }
 
 impl Scratch {
@@ -134,6 +145,58 @@ impl Scratch {
         }
         self.judge_stars(cell);
         self.collect(measure)
+    }
+
+    /// Finds the self-intersections that the chunk owns, after it was solved; counts little more than `allowance` pairs. The
+    /// `visitors` are added to its triangles.
+    pub(crate) fn cross(
+        &mut self,
+        visitors: impl Iterator<Item = (u32, [Point; 3])>,
+        cell: HomeBox,
+        allowance: u64,
+    ) -> Crossings {
+        for (number, corners) in visitors {
+            self.numbers.push(number);
+            self.take(&[corners]);
+        }
+        // No visitor has a corner at home here.
+        self.states.resize(self.vertices.positions().len(), AWAY);
+        self.home.clear();
+        self.home.extend(self.states.iter().map(|s| *s != AWAY));
+        self.sound.clear();
+        self.sound.extend(self.states.iter().map(|s| *s < AWAY));
+        let region = Region {
+            positions: self.vertices.positions(),
+            triangles: &self.triangles,
+            left_out: &self.collinear,
+            home: &self.home,
+            sound: &self.sound,
+            cell,
+        };
+        self.hit.clear();
+        self.hit.resize(self.triangles.len().div_ceil(64), 0);
+        let mut crossings = Crossings::default();
+        let tested = self.finder.pairs(&region, allowance, |i, j, contact| {
+            crossings.add(self.numbers[i as usize], self.numbers[j as usize], contact);
+            for t in [i, j] {
+                self.hit[t as usize / 64] |= 1 << (t % 64);
+            }
+        });
+        let (mut inner, mut across) = (0, Vec::new());
+        for (word, bits) in self.hit.iter().enumerate() {
+            let mut rest = *bits;
+            while rest != 0 {
+                let t = word * 64 + rest.trailing_zeros() as usize;
+                rest &= rest - 1;
+                if self.triangles[t].iter().all(|v| self.home[*v as usize]) {
+                    inner += 1;
+                } else {
+                    across.push(self.numbers[t]);
+                }
+            }
+        }
+        crossings.close(tested.pairs, inner, across);
+        crossings
     }
 
     /// Numbers the vertices of all members.
@@ -255,6 +318,7 @@ impl Scratch {
         let home = || self.states.iter().enumerate().filter(|(_, state)| **state != AWAY);
         let mut out = ChunkTopology {
             suspects: Vec::new(),
+            crossings: Crossings::default(),
             links: Vec::new(),
             patches: Vec::new(),
             labels: Labels::One,

@@ -43,6 +43,7 @@ pub(crate) fn count(survey: &Survey<'_>, shop: &Shop, edges: &Edges, tolerance: 
         inconsistent_edges: edges.iter().filter(|e| e.is_inconsistent()).count() as u64,
         unbalanced_edges: edges.iter().filter(|e| e.is_unbalanced()).count() as u64,
         components: components.list.len() as u64,
+        self_intersections: survey.self_intersections.clone(),
         bounds: (!survey.bounds.is_empty()).then_some([survey.bounds.lo, survey.bounds.hi]),
         area: survey.measure.area(total),
         volume: survey.measure.volume(total),

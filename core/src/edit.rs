@@ -98,6 +98,11 @@ impl Edit {
         self.flips += flips.into_iter().sum::<u64>();
     }
 
+    /// Every record stays untouched, and none is added.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.changes.is_empty() && self.flips == 0 && self.added.is_empty()
+    }
+
     /// Records in the output.
     pub(crate) fn output_records(&self, input_records: usize) -> u64 {
         input_records as u64 - self.deletions + self.added.len() as u64

@@ -68,7 +68,7 @@ impl<'a> Diagnosis<'a> {
         limits: &Limits,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let survey = Survey::new(path, records, limits, progress)?;
+        let survey = Survey::new(path, records, profile.check_self_intersections, limits, progress)?;
         let shop = Shop::gather(&survey);
         let edges = Edges::of(&shop);
         let tolerance = tolerance(&survey, profile);
@@ -161,26 +161,32 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     clock.lap("topology");
     let surface = diagnosis.surface_bounds();
     let mut report = report(Task::Repair, &mesh, &diagnosis, profile, limits);
-    let edit = if report.verdict.good {
-        report.input.blake3 = hash_beside(&mesh, limits, || emit::copy(&mesh, output, limits))?;
-        clock.lap("emit");
-        Edit::default()
-    } else {
+    let mut edit = Edit::default();
+    if !report.verdict.good {
         let repaired = repairs::run(&mut diagnosis, profile, limits.threads);
         clock.lap("repair");
-        let edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &repaired.reversed);
+        edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &repaired.reversed);
         report.repairs = repaired.repairs;
         report.loops_left = repaired.loops_left;
-        // The survey of the input is not needed any more; its memory is, for that of the output.
-        drop(diagnosis);
-        report.input.blake3 = hash_beside(&mesh, limits, || emit::write(&mesh, &edit, output, limits))?;
-        clock.lap("emit");
-        edit
-    };
+    }
+    // The survey of the input is not needed any more; its memory is, for that of the output.
+    drop(diagnosis);
+    // Good as it came, or nothing in it could be repaired.
+    let same = edit.is_empty() && flaws(&mesh).is_empty();
+    report.input.blake3 = hash_beside(&mesh, limits, || match same {
+        true => emit::copy(&mesh, output, limits),
+        false => emit::write(&mesh, &edit, output, limits),
+    })?;
+    clock.lap("emit");
     report.edit = edit.summary(mesh.records().len());
     report.edit_records = limits.list_edit.then(|| edit.listed());
     drop(edit);
-    verify(&mut report, &mesh, &surface, output, limits, progress, &mut clock)?;
+    if same {
+        confirm_copy(&mut report, &mesh, output, limits, progress)?;
+    } else {
+        verify(&mut report, &mesh, &surface, output, limits, progress)?;
+    }
+    clock.lap("verify");
     mesh.check_unchanged()?;
     report.cost = clock.cost(mesh.records().len() as u64);
     report.stages = clock.stages;
@@ -196,7 +202,19 @@ fn spool_need(mesh: &MeshFile, limits: &Limits) -> Need {
     }
 }
 
-/// Reads the written file again and judges it. A copy of a good file is compared by its hash instead.
+/// The written file should be the input, byte for byte: its hash is compared, and what was found in the input holds.
+fn confirm_copy(report: &mut Report, input: &MeshFile, output: &Path, limits: &Limits, progress: &dyn Progress) -> Result<()> {
+    let written = open(output, limits, progress)?;
+    let facts = facts(&written, hash(written.bytes(), limits));
+    if facts.blake3 != report.input.blake3 {
+        return Err(Error::Changed { path: input.path().into() });
+    }
+    report.outcome = if report.verdict.good { Outcome::Clean } else { Outcome::NotGood };
+    report.output = Some(facts);
+    Ok(())
+}
+
+/// Reads the written file again and judges it.
 fn verify(
     report: &mut Report,
     input: &MeshFile,
@@ -204,7 +222,6 @@ fn verify(
     output: &Path,
     limits: &Limits,
     progress: &dyn Progress,
-    clock: &mut Clock,
 ) -> Result<()> {
     let written = match open(output, limits, progress) {
         // Nothing was left to write: there is no mesh to judge.
@@ -217,14 +234,6 @@ fn verify(
         other => other?,
     };
     let facts = facts(&written, hash(written.bytes(), limits));
-    if report.verdict.good {
-        if facts.blake3 != report.input.blake3 {
-            return Err(Error::Changed { path: input.path().into() });
-        }
-        report.output = Some(facts);
-        clock.lap("verify");
-        return Ok(());
-    }
     let diagnosis = Diagnosis::of(output, written.records(), &report.profile, limits, progress)?;
     report.verdict = verdict::judge(&diagnosis.defects, &flaws(&written));
     report.outcome = if report.verdict.good { Outcome::Repaired } else { Outcome::NotGood };
@@ -241,7 +250,6 @@ fn verify(
     }
     report.after = Some(diagnosis.defects);
     report.output = Some(facts);
-    clock.lap("verify");
     Ok(())
 }
 

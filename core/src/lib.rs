@@ -9,14 +9,13 @@ mod boxes;
 mod budget;
 mod chunk;
 mod cost;
+mod crossings;
 mod defects;
 mod edit;
 mod emit;
 mod engine;
 pub mod error;
 pub mod fill;
-// The survey is about to ask for it.
-#[allow(dead_code)]
 mod intersect;
 mod machine;
 mod members;

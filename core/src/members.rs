@@ -20,6 +20,9 @@ use crate::{machine, parallel};
 #[derive(Debug)]
 pub(crate) struct Members {
     kept: Kept,
+    /// Of each chunk, in pieces: its visitors, triangles whose box meets the chunk's cell with no corner at home there. Self-intersections
+    /// need them; without those, there are no lists. Only long triangles visit, so they are listed even where the rest is spooled.
+    visitors: Vec<Vec<RunList>>,
     /// Runs of triangles with a NaN or infinite coordinate: first and count.
     pub(crate) nonfinite: Vec<(u32, u32)>,
     pub(crate) bounds: Bounds,
@@ -153,33 +156,35 @@ impl Take for spool::Writer<'_> {
 
 /// What is learnt in passing.
 struct Passing {
+    /// By chunk; no lists if nobody wants them.
+    visitors: Vec<RunList>,
     nonfinite: Vec<(u32, u32)>,
     bounds: Bounds,
 }
 
 impl Members {
-    /// Reads all records once, or twice if lists turn out to take too much memory.
+    /// Reads all records once, or twice if lists turn out to take too much memory. Lists visitors only if asked to.
     ///
     /// # Errors
     /// Where spooling fails.
-    pub(crate) fn gather(path: &Path, records: &[Record], plan: &Plan, limits: &Limits) -> Result<Self> {
+    pub(crate) fn gather(path: &Path, records: &[Record], plan: &Plan, visitors: bool, limits: &Limits) -> Result<Self> {
         let most = if limits.spill == Spill::Never { u64::MAX } else { limits.memory_bytes / 4 };
         if spool_bytes(records, limits) == 0
-            && let Some(members) = Self::list(records, plan, limits.threads, most)
+            && let Some(members) = Self::list(records, plan, visitors, limits.threads, most)
         {
             return Ok(members);
         }
-        Self::spool(path, records, plan, limits)
+        Self::spool(path, records, plan, visitors, limits)
     }
 
     /// `None` if the lists would take more than `most` bytes.
-    fn list(records: &[Record], plan: &Plan, threads: usize, most: u64) -> Option<Self> {
+    fn list(records: &[Record], plan: &Plan, visitors: bool, threads: usize, most: u64) -> Option<Self> {
         // More pieces than threads only even out the load: lists of all pieces together say the same for any number of pieces.
         let pieces = if records.len() < 1 << 16 { 1 } else { threads * 4 };
         let held = AtomicU64::new(0);
         let results = in_pieces(records, threads, pieces, |piece, offset| {
             let mut lists = Lists { lists: vec![RunList::default(); plan.chunks()], uncounted: 0, held: &held, most };
-            let passing = gather_piece(piece, offset, plan, &mut lists);
+            let passing = gather_piece(piece, offset, plan, visitors, &mut lists);
             held.fetch_add(lists.uncounted as u64, Ordering::Relaxed);
             lists.lists.iter_mut().for_each(|l| l.bytes.shrink_to_fit());
             (lists.lists, passing)
@@ -188,7 +193,7 @@ impl Members {
             return None;
         }
         let mut all = vec![Vec::new(); plan.chunks()];
-        let mut members = Self { kept: Kept::Lists(Vec::new()), nonfinite: Vec::new(), bounds: Bounds::EMPTY };
+        let mut members = Self::nothing(plan);
         for (lists, passing) in results {
             members.add(passing);
             let filled = lists.into_iter().zip(&mut all).filter(|(list, _)| !list.bytes.is_empty());
@@ -198,26 +203,34 @@ impl Members {
         Some(members)
     }
 
-    fn spool(path: &Path, records: &[Record], plan: &Plan, limits: &Limits) -> Result<Self> {
+    fn spool(path: &Path, records: &[Record], plan: &Plan, visitors: bool, limits: &Limits) -> Result<Self> {
         let spool = Unsorted::new(path, spool::Layout::new(records.len(), plan, limits), plan, limits)?;
         // One piece a thread: every piece ends with extents that are not full.
         let results = in_pieces(records, limits.threads, limits.threads, |piece, offset| {
             let mut writer = spool.writer(plan.chunks());
-            let passing = gather_piece(piece, offset, plan, &mut writer);
+            let passing = gather_piece(piece, offset, plan, visitors, &mut writer);
             (writer.finish(), passing)
         });
-        let mut nothing = Self { kept: Kept::Lists(Vec::new()), nonfinite: Vec::new(), bounds: Bounds::EMPTY };
+        let mut members = Self::nothing(plan);
         let parts = results
             .into_iter()
             .map(|(part, passing)| {
-                nothing.add(passing);
+                members.add(passing);
                 part
             })
             .collect();
-        Ok(Self { kept: Kept::Spool(spool.sorted(parts, plan.chunks())?), ..nothing })
+        members.kept = Kept::Spool(spool.sorted(parts, plan.chunks())?);
+        Ok(members)
+    }
+
+    fn nothing(plan: &Plan) -> Self {
+        let visitors = vec![Vec::new(); plan.chunks()];
+        Self { kept: Kept::Lists(Vec::new()), visitors, nonfinite: Vec::new(), bounds: Bounds::EMPTY }
     }
 
     fn add(&mut self, passing: Passing) {
+        let filled = passing.visitors.into_iter().zip(&mut self.visitors).filter(|(list, _)| !list.bytes.is_empty());
+        filled.for_each(|(list, of_chunk)| of_chunk.push(list));
         self.nonfinite.extend(passing.nonfinite);
         self.bounds.add(&passing.bounds);
     }
@@ -254,6 +267,11 @@ impl Members {
         }
     }
 
+    /// Numbers of the chunk's visitors, ascending.
+    pub(crate) fn visitors(&self, chunk: ChunkId) -> impl Iterator<Item = u32> + '_ {
+        self.visitors[chunk.0 as usize].iter().flat_map(RunList::runs).flat_map(|(first, count)| first..first + count)
+    }
+
     /// How many triangles `chunk` sees.
     pub(crate) fn count(&self, chunk: ChunkId) -> u64 {
         match &self.kept {
@@ -271,7 +289,8 @@ impl Members {
             }
             Kept::Spool(spool) => spool.heap_bytes() as u64 + spool.loaded_bytes(threads),
         };
-        kept + self.nonfinite.capacity() as u64 * 8
+        let visitors: usize = self.visitors.iter().flatten().map(|l| l.bytes.capacity() + size_of::<RunList>()).sum();
+        kept + visitors as u64 + self.nonfinite.capacity() as u64 * 8
     }
 }
 
@@ -317,8 +336,9 @@ fn is_scattered(records: &[Record]) -> bool {
     changes * STRETCH > looked_at
 }
 
-fn gather_piece(records: &[Record], offset: u32, plan: &Plan, take: &mut impl Take) -> Passing {
-    let mut passing = Passing { nonfinite: Vec::new(), bounds: Bounds::EMPTY };
+fn gather_piece(records: &[Record], offset: u32, plan: &Plan, visitors: bool, take: &mut impl Take) -> Passing {
+    let lists = if visitors { plan.chunks() } else { 0 };
+    let mut passing = Passing { visitors: vec![RunList::default(); lists], nonfinite: Vec::new(), bounds: Bounds::EMPTY };
     let mut current = ChunkId(0);
     let mut cell = plan.home_box(current);
     let mut run_start = 0;
@@ -355,7 +375,17 @@ fn gather_piece(records: &[Record], offset: u32, plan: &Plan, take: &mut impl Ta
             (false, true, _) => take.take(&[a, b], number, record),
             (false, false, false) => take.take(&[a, b, c], number, record),
         }
+        if visitors && !(a == b && a == c) {
+            let mut spread = Bounds::EMPTY;
+            spread.include(&corners);
+            plan.meeting(spread.lo, spread.hi, &mut |chunk| {
+                if ![a, b, c].contains(&chunk) {
+                    passing.visitors[chunk.0 as usize].push(number, 1);
+                }
+            });
+        }
     }
+    passing.visitors.iter_mut().for_each(|list| list.bytes.shrink_to_fit());
     if records.len() > run_start {
         take.take_run(current, offset + run_start as u32, &records[run_start..]);
     }
@@ -380,7 +410,8 @@ mod tests {
             prop_assert_eq!(list.runs().collect::<Vec<_>>(), want);
         }
 
-        /// A chunk sees exactly the finite triangles with a corner at home there, in order, by lists and by spool, whatever the sizes.
+        /// A chunk sees exactly the finite triangles with a corner at home there, in order, by lists and by spool, whatever the sizes;
+        /// its visitors are those of the others whose box meets its cell.
         #[test]
         fn members_are_the_triangles_with_a_corner_at_home(
             points in prop::collection::vec(prop::array::uniform9(prop_oneof![9 => -4f32..4.0, 1 => Just(f32::NAN)]), 1..120),
@@ -399,7 +430,7 @@ mod tests {
                 .collect();
             for spill in [Spill::Never, Spill::Auto, Spill::Always] {
                 let limits = Limits { threads, spill, ..Limits::default() };
-                let members = Members::gather(Path::new("test"), &records, &plan, &limits).unwrap();
+                let members = Members::gather(Path::new("test"), &records, &plan, true, &limits).unwrap();
                 let wanted = |c: ChunkId| c.0 % 3 != 1;
                 let seen = members.each((&records, &plan), threads, wanted, || (), |(), chunk, seen| {
                     let mut all = Vec::new();
@@ -409,6 +440,17 @@ mod tests {
                 });
                 let wanted: Vec<_> = (0..).map(ChunkId).zip(want.clone()).filter(|(c, _)| wanted(*c)).collect();
                 prop_assert_eq!(seen, wanted);
+                for (c, of_chunk) in (0..).map(ChunkId).zip(&want) {
+                    let mut visitors = Vec::new();
+                    for (t, record) in (0..).zip(&records).filter(|(_, r)| record::all_finite(r)) {
+                        let mut spread = Bounds::EMPTY;
+                        spread.include(&record::corners(record));
+                        if plan.home_box(c).meets(&spread) && of_chunk.iter().all(|(member, _)| *member != t) {
+                            visitors.push(t);
+                        }
+                    }
+                    prop_assert_eq!(members.visitors(c).collect::<Vec<u32>>(), visitors);
+                }
             }
         }
     }
@@ -430,7 +472,8 @@ mod tests {
         let records: Vec<Record> = (0..90_000).map(|i| record::encode(corners(at(i)), 0)).collect();
         let plan = Plan::new(&records, 1000);
         let limits = Limits { threads: 2, memory_bytes: 5 << 18, ..Limits::default() };
-        let gathered = |spill| Members::gather(Path::new("test"), &records, &plan, &Limits { spill, ..limits.clone() }).unwrap();
+        let gathered =
+            |spill| Members::gather(Path::new("test"), &records, &plan, false, &Limits { spill, ..limits.clone() }).unwrap();
         let (lists, spooled) = (gathered(Spill::Never), gathered(Spill::Auto));
         assert!(matches!(&lists.kept, Kept::Lists(_)) && lists.heap_bytes(2) * 3 > limits.memory_bytes / 4);
         assert!(matches!(&spooled.kept, Kept::Spool(_)));

@@ -20,6 +20,12 @@ pub(crate) struct HomeBox {
 impl HomeBox {
     pub(crate) const ALL: Self = Self { lo: [-f32::MAX; 3], hi: [f32::MAX; 3] };
 
+    /// Is there a position in both boxes?
+    #[cfg(test)]
+    pub(crate) fn meets(&self, other: &crate::sums::Bounds) -> bool {
+        (0..3).all(|k| self.lo[k] <= other.hi[k] && self.hi[k] >= other.lo[k])
+    }
+
     /// Lowest and highest position.
     pub(crate) fn ends(&self) -> ([f32; 3], [f32; 3]) {
         (self.lo, self.hi)
@@ -106,6 +112,25 @@ impl Plan {
         Some(ChunkId((node - self.planes.len()) as u32))
     }
 
+    /// All chunks whose cells the closed box from `lo` to `hi` meets, in order. O(log chunks) for each.
+    pub(crate) fn meeting(&self, lo: [f32; 3], hi: [f32; 3], visit: &mut impl FnMut(ChunkId)) {
+        self.descend(1, lo, hi, visit);
+    }
+
+    fn descend(&self, node: usize, lo: [f32; 3], hi: [f32; 3], visit: &mut impl FnMut(ChunkId)) {
+        let Some((axis, at)) = self.planes.get(node) else {
+            visit(ChunkId((node - self.planes.len()) as u32));
+            return;
+        };
+        let axis = usize::from(*axis);
+        if lo[axis] < *at {
+            self.descend(2 * node, lo, hi, visit);
+        }
+        if hi[axis] >= *at {
+            self.descend(2 * node + 1, lo, hi, visit);
+        }
+    }
+
     /// The chunk where a finite position is at home. O(log chunks).
     #[inline]
     pub(crate) fn home(&self, p: [f32; 3]) -> ChunkId {
@@ -187,6 +212,7 @@ fn partition<T>(items: &mut [T], first: impl Fn(&T) -> bool) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sums::Bounds;
     use proptest::prelude::*;
 
     fn soup(points: &[[f32; 9]]) -> Vec<Record> {
@@ -209,6 +235,20 @@ mod tests {
                     prop_assert_eq!(found, vec![plan.home(p)], "through subtrees of {} levels", levels);
                 }
             }
+        }
+    }
+
+    proptest! {
+        /// The cells that a box meets are those whose own boxes it meets.
+        #[test]
+        fn a_box_meets_the_cells_that_share_a_point_with_it(points in prop::collection::vec(prop::array::uniform9(-100f32..100.0), 1..200),
+                                                             a in prop::array::uniform3(-150f32..150.0), b in prop::array::uniform3(-150f32..150.0)) {
+            let plan = Plan::new(&soup(&points), 4);
+            let (lo, hi) = (std::array::from_fn(|k| a[k].min(b[k])), std::array::from_fn(|k| a[k].max(b[k])));
+            let mut met = Vec::new();
+            plan.meeting(lo, hi, &mut |c| met.push(c.0 as usize));
+            let wanted: Vec<usize> = (0..plan.chunks()).filter(|c| plan.boxes[*c].meets(&Bounds { lo, hi })).collect();
+            prop_assert_eq!(met, wanted);
         }
     }
 

@@ -30,7 +30,7 @@ pub struct Report {
     pub limits: Limits,
     /// Defects of the input.
     pub before: Defects,
-    /// Defects of the output, counted on the bytes written; `None` for an inspection and for a clean file, whose copy is compared by its
+    /// Defects of the output, counted on the bytes written; `None` for an inspection and for a copy of the input, which is compared by its
     /// hash.
     pub after: Option<Defects>,
     /// Tolerances derived from the model.
@@ -154,6 +154,9 @@ pub struct Defects {
     pub noncommon_vertices: u64,
     /// Boundary vertices within the weld tolerance of another boundary vertex.
     pub weldable_vertices: u64,
+    /// Triangles that cross or overlap each other; `None` when they were not looked for.
+    #[serde(default)]
+    pub self_intersections: Option<SelfIntersections>,
     /// Smallest and largest coordinates; `None` without a finite triangle.
     pub bounds: Option<[[f32; 3]; 2]>,
     pub area: f64,
@@ -164,6 +167,29 @@ pub struct Defects {
     /// Counts that stopped at a bound are "at least"; their field names.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub at_least: Vec<String>,
+}
+
+/// Triangles that meet in more than a point, or edge along edge, beyond the corners they share. Exact.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SelfIntersections {
+    /// Triangles in at least one pair.
+    pub triangles: u64,
+    /// Pairs that cross: they meet along a segment inside at least one of them.
+    pub crossing_pairs: u64,
+    /// Pairs that overlap: they lie in one plane and share an area.
+    pub overlapping_pairs: u64,
+    /// The pairs with the smallest record numbers, at most 100.
+    pub listed: Vec<[u32; 2]>,
+    /// More pairs of triangles come close to each other than are looked at: nothing was counted.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub given_up: bool,
+}
+
+impl SelfIntersections {
+    /// Everything was looked at, and nothing found.
+    pub fn is_free(&self) -> bool {
+        self.triangles == 0 && !self.given_up
+    }
 }
 
 /// Lengths derived from the model, in its units.
@@ -234,11 +260,14 @@ pub struct EditRecords {
 pub struct Verdict {
     /// Everything that this version checks holds.
     pub good: bool,
-    /// One line for people, e.g. `closed, manifold, oriented; self-intersection unchecked`.
+    /// One line for people, e.g. `closed, manifold, oriented, free of self-intersection`.
     pub statement: String,
     pub closed: bool,
     pub manifold: bool,
     pub oriented: bool,
+    /// `None` when it was not checked.
+    #[serde(default)]
+    pub free_of_self_intersection: Option<bool>,
     /// Why it is not good, or why it needs review.
     pub reasons: Vec<String>,
     /// What was not checked.

@@ -8,10 +8,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::budget::{Budget, Purpose};
 use crate::chunk::{self, ChunkTopology, Labels, Link, NONE, Patch, Scratch, Suspect};
+use crate::crossings::{self, Crossings};
 use crate::error::{Error, Result};
 use crate::members::Members;
 use crate::plan::{ChunkId, Plan};
 use crate::record::{self, Record};
+use crate::report::SelfIntersections;
 use crate::settings::Limits;
 use crate::source::{Source, Triangle};
 use crate::sums::{Bounds, Extent, Measure};
@@ -32,6 +34,8 @@ pub(crate) struct Survey<'a> {
     pub(crate) patches: Vec<Patch>,
     /// Runs of triangles with non-finite coordinates.
     pub(crate) nonfinite: Vec<(u32, u32)>,
+    /// `None` if they were not looked for.
+    pub(crate) self_intersections: Option<SelfIntersections>,
     /// Distinct positions, and those used by a triangle with three distinct vertices.
     pub(crate) vertices: u64,
     pub(crate) vertices_used: u64,
@@ -52,11 +56,18 @@ const MOST_SUSPECTS: u64 = 1 << 30;
 const STAGE: &str = "topology";
 
 impl<'a> Survey<'a> {
-    /// Reads `records` twice (once to plan, once by chunks). Refuses when tables would not fit `limits.memory_bytes`.
-    pub(crate) fn new(path: &Path, records: &'a [Record], limits: &Limits, progress: &dyn Progress) -> Result<Self> {
+    /// Reads `records` twice (once to plan, once by chunks). Looks for self-intersections if asked to. Refuses
+    /// when tables would not fit `limits.memory_bytes`.
+    pub(crate) fn new(
+        path: &Path,
+        records: &'a [Record],
+        self_intersections: bool,
+        limits: &Limits,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let span = tracing::debug_span!("plan").entered();
         let plan = Plan::new(records, limits.chunk_triangles);
-        let mut members = Members::gather(path, records, &plan, limits)?;
+        let mut members = Members::gather(path, records, &plan, self_intersections, limits)?;
         drop(span);
         let bounds = members.bounds.normalised();
         let measure = Measure::new(&bounds);
@@ -64,7 +75,7 @@ impl<'a> Survey<'a> {
         take_tables(path, &budget, &plan, &members, limits)?;
 
         let _span = tracing::debug_span!("chunks", count = plan.chunks()).entered();
-        let (done, suspects) = (AtomicU64::new(0), AtomicU64::new(0));
+        let (done, suspects, tested) = (AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0));
         let mut chunks = members.each(
             (records, &plan),
             limits.threads,
@@ -75,7 +86,14 @@ impl<'a> Survey<'a> {
                 if progress.cancelled() || budget.is_exceeded() {
                     return ChunkTopology::default();
                 }
-                let topology = scratch.solve(seen, plan.home_box(chunk), &measure);
+                let cell = plan.home_box(chunk);
+                let mut topology = scratch.solve(seen, cell, &measure);
+                if self_intersections {
+                    let allowance = crossings::MOST_TESTED.saturating_sub(tested.load(Ordering::Relaxed));
+                    let visitors = members.visitors(chunk).map(|t| (t, record::corners(&records[t as usize])));
+                    topology.crossings = scratch.cross(visitors, cell, allowance);
+                    tested.fetch_add(topology.crossings.tested, Ordering::Relaxed);
+                }
                 suspects.fetch_add(topology.suspects.len() as u64, Ordering::Relaxed);
                 topology.take(&budget);
                 let chunks_done = done.fetch_add(1, Ordering::Relaxed) + 1;
@@ -104,6 +122,8 @@ impl<'a> Survey<'a> {
             suspect_patches: merge.suspect_patches,
             patches: merge.patches,
             nonfinite: std::mem::take(&mut members.nonfinite),
+            self_intersections: self_intersections
+                .then(|| Crossings::sum(chunks.iter_mut().map(|c| std::mem::take(&mut c.crossings)))),
             vertices: chunks.iter().map(|c| c.vertices).sum(),
             vertices_used: chunks.iter().map(|c| c.vertices_used).sum(),
             plan,
@@ -333,9 +353,10 @@ mod tests {
     /// What a survey says that must not depend on its chunks.
     fn surveyed(records: &[Record], chunk_triangles: u32, spill: Spill) -> impl PartialEq + std::fmt::Debug {
         let limits = Limits { threads: 1, chunk_triangles, spill, ..Limits::default() };
-        let survey = Survey::new(Path::new("test"), records, &limits, &Quiet).unwrap();
+        let survey = Survey::new(Path::new("test"), records, true, &limits, &Quiet).unwrap();
         let patches: Vec<_> = survey.patches.iter().map(|p| (p.first, p.triangles, p.extent, p.bounds)).collect();
-        (survey.suspects, survey.suspect_patches, patches, survey.nonfinite, survey.vertices, survey.vertices_used)
+        let found = (survey.suspects, survey.suspect_patches, patches, survey.nonfinite, survey.self_intersections);
+        (found, survey.vertices, survey.vertices_used)
     }
 
     /// Unit cubes on a grid, which touch and overlap, and stray triangles: sound and unsound stars side by side.
@@ -370,7 +391,7 @@ mod tests {
         let records = records(&cuboid([0.0; 3], [2.0; 3]));
         for chunk_triangles in [1, u32::MAX] {
             let limits = Limits { threads: 1, chunk_triangles, ..Limits::default() };
-            let survey = Survey::new(Path::new("test"), &records, &limits, &Quiet).unwrap();
+            let survey = Survey::new(Path::new("test"), &records, true, &limits, &Quiet).unwrap();
             assert!(survey.suspects.is_empty());
             assert_eq!((survey.patches.len(), survey.patches[0].triangles, survey.vertices), (1, 12, 8));
             assert!((survey.measure.volume(survey.patches[0].extent) - 8.0).abs() < 1e-9);

@@ -4,8 +4,8 @@ use crate::report::{Defects, Verdict};
 use crate::settings::Profile;
 use crate::sums::Bounds;
 
-/// What no version yet checks is called unchecked, never assumed.
-const UNCHECKED: &str = "self-intersection";
+/// What was not looked at is called unchecked, never assumed.
+const SELF_INTERSECTION: &str = "self-intersection";
 
 /// Judges a file by the defects counted on its bytes and by what is wrong with the file itself.
 pub(crate) fn judge(defects: &Defects, flaws: &[String]) -> Verdict {
@@ -31,25 +31,42 @@ pub(crate) fn judge(defects: &Defects, flaws: &[String]) -> Verdict {
         say(defects.unbalanced_edges, "edges not used equally often in both directions");
     }
     say(defects.inverted_components, "components inside out");
+    if let Some(found) = defects.self_intersections.as_ref().filter(|found| !found.is_free()) {
+        reasons.push(if found.given_up {
+            "too many triangles lie on top of each other to be compared pair by pair".into()
+        } else {
+            let (crossing, overlapping) = (found.crossing_pairs, found.overlapping_pairs);
+            format!("{} self-intersecting triangles ({crossing} crossing and {overlapping} overlapping pairs)", found.triangles)
+        });
+    }
     if defects.triangles == defects.degenerate_index {
         reasons.push("no triangle with three distinct vertices".into());
     } else if closed && oriented && defects.volume <= 0.0 {
         reasons.push("the enclosed volume is not positive".into());
     }
     let good = reasons.is_empty() && closed && manifold && oriented;
-    let words: Vec<&str> =
-        [(closed, "closed", "open"), (manifold, "manifold", "not manifold"), (oriented, "oriented", "not oriented")]
-            .iter()
-            .map(|(holds, yes, no)| if *holds { *yes } else { *no })
-            .collect();
+    let free = defects.self_intersections.as_ref().map(|found| found.is_free());
+    let words: Vec<&str> = [
+        (closed, "closed", "open"),
+        (manifold, "manifold", "not manifold"),
+        (oriented, "oriented", "not oriented"),
+        (free == Some(true), "free of self-intersection", "self-intersecting"),
+    ]
+    .iter()
+    .take(if free.is_some() { 4 } else { 3 })
+    .map(|(holds, yes, no)| if *holds { *yes } else { *no })
+    .collect();
+    let unchecked: Vec<String> = free.is_none().then(|| SELF_INTERSECTION.into()).into_iter().collect();
+    let rest: String = unchecked.iter().map(|what| format!("; {what} unchecked")).collect();
     Verdict {
         good,
-        statement: format!("{}; {UNCHECKED} unchecked", words.join(", ")),
+        statement: words.join(", ") + &rest,
         closed,
         manifold,
         oriented,
+        free_of_self_intersection: free,
         reasons,
-        unchecked: vec![UNCHECKED.into()],
+        unchecked,
     }
 }
 
@@ -83,26 +100,43 @@ pub(crate) fn review(before: &Defects, surface: &Bounds, after: &Defects, profil
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::SelfIntersections;
 
     /// The counts of a unit cube.
     fn cube() -> Defects {
-        Defects { triangles: 12, bodies: 1, volume: 1.0, bounds: Some([[0.0; 3], [1.0; 3]]), ..Defects::default() }
+        let self_intersections = Some(SelfIntersections::default());
+        Defects {
+            triangles: 12,
+            bodies: 1,
+            volume: 1.0,
+            bounds: Some([[0.0; 3], [1.0; 3]]),
+            self_intersections,
+            ..Defects::default()
+        }
     }
 
     const BOX: Bounds = Bounds { lo: [0.0; 3], hi: [1.0; 3] };
 
     #[test]
-    fn a_cube_is_good_and_never_called_free_of_self_intersection() {
+    fn a_cube_is_good_and_free_of_self_intersection() {
         let verdict = judge(&cube(), &[]);
+        assert!(verdict.good && verdict.reasons.is_empty() && verdict.unchecked.is_empty());
+        assert_eq!(verdict.statement, "closed, manifold, oriented, free of self-intersection");
+        assert_eq!(verdict.free_of_self_intersection, Some(true));
+    }
+
+    #[test]
+    fn what_was_not_looked_at_is_called_unchecked() {
+        let verdict = judge(&Defects { self_intersections: None, ..cube() }, &[]);
         assert!(verdict.good && verdict.reasons.is_empty());
         assert_eq!(verdict.statement, "closed, manifold, oriented; self-intersection unchecked");
-        assert_eq!(verdict.unchecked, ["self-intersection"]);
+        assert_eq!((verdict.free_of_self_intersection, verdict.unchecked), (None, vec!["self-intersection".to_string()]));
     }
 
     #[test]
     fn each_defect_alone_is_a_reason_and_the_only_one() {
         type Break = fn(&mut Defects);
-        let cases: [(Break, &str); 14] = [
+        let cases: [(Break, &str); 16] = [
             (|d| d.nonfinite = 1, "NaN"),
             (|d| d.degenerate_index = 1, "repeated vertex"),
             (|d| d.degenerate_area = 1, "no area"),
@@ -114,6 +148,8 @@ mod tests {
             (|d| d.inconsistent_edges = 1, "disagree"),
             (|d| d.unbalanced_edges = 1, "both directions"),
             (|d| d.inverted_components = 1, "inside out"),
+            (|d| d.self_intersections = Some(SelfIntersections { triangles: 2, ..Default::default() }), "self-intersecting"),
+            (|d| d.self_intersections = Some(SelfIntersections { given_up: true, ..Default::default() }), "pair by pair"),
             (|d| d.volume = 0.0, "volume is not positive"),
             (|d| d.volume = -1.0, "volume is not positive"),
             (|d| *d = Defects::default(), "no triangle"),

@@ -211,6 +211,7 @@ pub(crate) mod tests {
                 closed: true,
                 manifold: true,
                 oriented: true,
+                free_of_self_intersection: Some(true),
                 reasons: vec![],
                 unchecked: vec![],
             },

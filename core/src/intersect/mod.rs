@@ -94,6 +94,10 @@ pub(crate) struct Finder {
     by_vertex: Vec<(u32, u32)>,
 }
 
+/// Bytes that a [`Finder`] takes for each triangle of a region: two rows, two keys, a group and boxes of the tree, 32 + 32 + 16 + 4 + 64,
+/// and for up to three vertices each a view, a state and a turn.
+pub(crate) const BYTES_PER_TRIANGLE: u64 = 148 + 3 * (size_of::<stars::View>() as u64 + 3);
+
 /// Pairs that wait until they are separated four at a time.
 const WAITING: usize = 256;
 

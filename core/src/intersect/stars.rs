@@ -40,7 +40,7 @@ const LINE: Vec3 = Vec3::new(0.3247, 1.0, -0.7713);
 
 /// How a vertex is looked at.
 #[derive(Clone, Copy, Default)]
-struct View {
+pub(super) struct View {
     /// d, and the number of triangles around the vertex.
     along: Vec4,
     /// e, and the error that goes with an edge of length one.

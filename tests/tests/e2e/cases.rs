@@ -99,7 +99,7 @@ fn ends_good(case: Case) {
             }
             other => panic!("{what}: {other}"),
         }
-        assert_eq!(verdict["statement"], "closed, manifold, oriented; self-intersection unchecked", "{what}");
+        assert_eq!(verdict["statement"], "closed, manifold, oriented, free of self-intersection", "{what}");
         assert_eq!(verdict["good"], true, "{what}");
     }
 }

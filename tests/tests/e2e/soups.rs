@@ -142,7 +142,8 @@ fn holds(triangles: &[Triangle]) -> Result<(), TestCaseError> {
             let report = repaired(&output, &again, 1 << 20, 1);
             prop_assert!(report.outcome == Outcome::Clean && std::fs::read(&again).unwrap() == written, "not left alone");
         }
-        if report.outcome != Outcome::Clean {
+        // A copy stays text.
+        if report.after.is_some() {
             let (text, of_text) = (folder.path().join("text.stl"), folder.path().join("of_text.stl"));
             std::fs::write(&text, stl::text("soup", triangles)).unwrap();
             repaired(&text, &of_text, 64, 1);

@@ -13,7 +13,11 @@ pub(crate) fn peak_resident_bytes() -> u64 {
 
 /// Anonymous memory now.
 pub(crate) fn anonymous_bytes() -> u64 {
-    status_kilobytes("RssAnon:") * 1024
+    // `statm`, in pages, takes the system a tenth of the time of `status`; what is not shared with a file is anonymous.
+    let pages = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
+    let mut pages = pages.split_whitespace().skip(1).map(|n| n.parse::<u64>().unwrap_or(0));
+    let (resident, of_files) = (pages.next().unwrap_or(0), pages.next().unwrap_or(0));
+    resident.saturating_sub(of_files) * rustix::param::page_size() as u64
 }
 
 fn status_kilobytes(field: &str) -> u64 {

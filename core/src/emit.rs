@@ -17,7 +17,7 @@ const KERNEL_COPY_BYTES: usize = 256 << 10;
 /// Copied inside the kernel at a time, between two looks at how far the disk is behind.
 const COPY_BYTES: usize = 1 << 20;
 
-/// Writes `mesh` with `edit` to the new file `output` and syncs it.
+/// Writes `mesh` with `edit` to the new file `output` and syncs it, unless that is deferred.
 pub(crate) fn write(mesh: &MeshFile, edit: &Edit, output: &Path, limits: &Limits) -> Result<()> {
     let records = mesh.records();
     let count = edit.output_records(records.len());
@@ -33,14 +33,14 @@ pub(crate) fn write(mesh: &MeshFile, edit: &Edit, output: &Path, limits: &Limits
         Step::Untouched(run) => sink.put_run(run),
         Step::Changed(record) => sink.put(record),
     })?;
-    sink.finish()
+    sink.finish(limits)
 }
 
-/// Copies the input byte for byte to the new file `output` and syncs it.
+/// Copies the input byte for byte to the new file `output` and syncs it, unless that is deferred.
 pub(crate) fn copy(mesh: &MeshFile, output: &Path, limits: &Limits) -> Result<()> {
     let mut sink = Sink::create(mesh, output, limits)?;
     sink.put_bytes(mesh.bytes())?;
-    sink.finish()
+    sink.finish(limits)
 }
 
 /// The output file with a buffer for what is small.
@@ -58,8 +58,8 @@ impl<'a> Sink<'a> {
     const BUFFER_BYTES: usize = 1 << 20;
 
     fn create(mesh: &'a MeshFile, path: &'a Path, limits: &Limits) -> Result<Self> {
-        let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(Error::io(path, "creating"))?;
-        let buffer = Vec::with_capacity(Self::BUFFER_BYTES);
+        let file = create(path).map_err(Error::io(path, "creating"))?;
+        let buffer = Vec::with_capacity(Self::BUFFER_BYTES.min(mesh.bytes().len()));
         let behind = WriteBehind::new(&file, limits).map_err(Error::io(path, "creating"))?;
         Ok(Self { mesh, path, kernel_copies: true, file, buffer, behind })
     }
@@ -112,9 +112,24 @@ impl<'a> Sink<'a> {
         self.behind.wrote(written as u64).map_err(Error::io(self.path, "syncing"))
     }
 
-    fn finish(mut self) -> Result<()> {
+    fn finish(mut self, limits: &Limits) -> Result<()> {
         self.flush()?;
         self.behind.finish().map_err(Error::io(self.path, "syncing"))?;
-        self.file.sync_all().map_err(Error::io(self.path, "syncing"))
+        if limits.defer_sync { Ok(()) } else { self.file.sync_all().map_err(Error::io(self.path, "syncing")) }
     }
+}
+
+/// A new file; or the empty one without a name that the caller holds open.
+fn create(path: &Path) -> std::io::Result<File> {
+    let nameless = is_nameless(path);
+    let file = OpenOptions::new().write(true).create_new(!nameless).open(path)?;
+    if nameless && file.metadata()?.len() > 0 {
+        return Err(std::io::ErrorKind::AlreadyExists.into());
+    }
+    Ok(file)
+}
+
+/// Does the path lead to a file that a process holds open, rather than to a name in a folder?
+pub(crate) fn is_nameless(path: &Path) -> bool {
+    path.starts_with("/proc")
 }

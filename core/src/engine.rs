@@ -14,7 +14,10 @@ use crate::shop::near::Tolerance;
 use crate::space::{self, Need};
 use crate::sums::Bounds;
 use crate::survey::Survey;
-use crate::{Progress, cost, defects, emit, members, repairs, verdict};
+use crate::{Progress, cost, defects, emit, members, parallel, repairs, verdict};
+
+/// Fewer bytes are hashed by one thread: starting more would take longer.
+const HASHED_BY_ONE: usize = 1 << 20;
 
 /// What is spent by stage while a file is worked on.
 pub(crate) struct Clock {
@@ -156,7 +159,8 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     clock.lap("read");
     // The output is as large as its input but for what is added; what the input spools is gone by then, but the output spools as much.
     let bytes = (PREFIX_BYTES + size_of_val(mesh.records())) as u64;
-    space::check(input, &[Need { folder: folder_of(output).into(), bytes, what: "the output" }, spool_need(&mesh, limits)])?;
+    let folder = if emit::is_nameless(output) { limits.spool_folder() } else { folder_of(output).into() };
+    space::check(input, &[Need { folder, bytes, what: "the output" }, spool_need(&mesh, limits)])?;
     let mut diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
     clock.lap("topology");
     let surface = diagnosis.surface_bounds();
@@ -255,16 +259,7 @@ fn verify(
 
 /// Opens a mesh file.
 pub(crate) fn open(input: &Path, limits: &Limits, progress: &dyn Progress) -> Result<MeshFile> {
-    in_pool(limits, || MeshFile::open(input, &limits.spool_folder(), limits, progress))
-}
-
-/// Runs `work` on a rayon pool of as many threads as the limits allow.
-pub(crate) fn in_pool<R: Send>(limits: &Limits, work: impl FnOnce() -> R + Send) -> R {
-    match rayon::ThreadPoolBuilder::new().num_threads(limits.threads).build() {
-        Ok(pool) => pool.install(work),
-        // No threads to be had: the caller's own will do.
-        Err(_) => work(),
-    }
+    MeshFile::open(input, &limits.spool_folder(), limits, progress)
 }
 
 /// What makes the file itself less than flawless.
@@ -285,7 +280,7 @@ fn facts(mesh: &MeshFile, blake3: String) -> FileFacts {
 
 /// Hashes the input while `write`, which keeps one thread busy at most, is under way; before it where there is but one thread.
 fn hash_beside(mesh: &MeshFile, limits: &Limits, write: impl FnOnce() -> Result<()>) -> Result<String> {
-    if limits.threads < 2 {
+    if limits.threads < 2 || mesh.bytes().len() < HASHED_BY_ONE {
         let hash = hash(mesh.bytes(), limits);
         return write().map(|()| hash);
     }
@@ -298,7 +293,10 @@ fn hash_beside(mesh: &MeshFile, limits: &Limits, write: impl FnOnce() -> Result<
 }
 
 fn hash(bytes: &[u8], limits: &Limits) -> String {
-    in_pool(limits, || blake3::Hasher::new().update_rayon(bytes).finalize().to_hex().to_string())
+    if bytes.len() < HASHED_BY_ONE {
+        return blake3::hash(bytes).to_hex().to_string();
+    }
+    parallel::in_pool(limits.threads, || blake3::Hasher::new().update_rayon(bytes).finalize().to_hex().to_string())
 }
 
 pub(crate) fn tolerances(diagnosis: &Diagnosis<'_>) -> Tolerances {

@@ -69,8 +69,10 @@ pub fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress: &dyn 
     engine::inspect(input, profile, limits, progress)
 }
 
-/// Repairs `input` into `output`, which must not exist: the caller owns a temporary name and publishes it. The output is synced
-/// to disk before this returns. A file that is good as it comes is copied byte for byte.
+/// Repairs `input` into `output`, which must not exist: the caller owns a temporary name and publishes it. (Or it is an empty file
+/// without a name, which the caller holds open and knows by its path below `/proc`; then [`Limits::spool`] says where there is room.)
+/// The output is synced to disk before this returns, unless [`Limits::defer_sync`] says otherwise. A file that is good as it comes is
+/// copied byte for byte.
 ///
 /// # Errors
 /// [`Error`]; what then stands at `output` is incomplete and to be removed.

@@ -2,6 +2,15 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+/// Runs `work` on a rayon pool of so many threads.
+pub(crate) fn in_pool<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
+    match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
+        Ok(pool) => pool.install(work),
+        // No threads to be had: the caller's own will do.
+        Err(_) => work(),
+    }
+}
+
 /// `work(0..count)` on `threads` threads; `result[i]` is `work(i)`, whatever thread ran it.
 pub(crate) fn map<R: Send>(threads: usize, count: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
     map_with(threads, count, || (), |(), i| work(i))

@@ -97,6 +97,9 @@ pub struct Limits {
     pub spill: Spill,
     /// List every record of the edit in the report (may be as large as the mesh).
     pub list_edit: bool,
+    /// The caller syncs the output: among many small files it can wait for the disk once for several.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub defer_sync: bool,
 }
 
 /// When triangles are sorted by place into a spool file before their topology is worked out.
@@ -122,6 +125,7 @@ impl Default for Limits {
             spool: None,
             spill: Spill::Auto,
             list_edit: false,
+            defer_sync: false,
         }
     }
 }

@@ -112,6 +112,9 @@ pub(crate) struct RepairArgs {
     /// Profile: default, scan, cautious, or a TOML file of settings
     #[arg(long, value_name = "NAME|FILE", default_value = "default")]
     pub profile: String,
+    /// Do not look for self-intersections: faster, but the verdict then calls them unchecked
+    #[arg(long)]
+    pub no_self_intersections: bool,
     #[command(flatten)]
     pub spend: Spend,
     /// Print reports as JSON, one a line, instead of tables
@@ -133,6 +136,9 @@ pub(crate) struct InspectArgs {
     /// Profile: default, scan, cautious, or a TOML file of settings
     #[arg(long, value_name = "NAME|FILE", default_value = "default")]
     pub profile: String,
+    /// Do not look for self-intersections: faster, but the verdict then calls them unchecked
+    #[arg(long)]
+    pub no_self_intersections: bool,
     #[command(flatten)]
     pub spend: Spend,
     /// Print reports as JSON, one a line, instead of tables

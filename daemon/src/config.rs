@@ -13,7 +13,7 @@ use crate::profiles;
 use crate::units::{parse_duration, parse_size};
 
 /// A file as large as this is worked on alone, by all threads and with the whole memory.
-const LARGE: u64 = 64 << 20;
+pub(crate) const LARGE: u64 = 64 << 20;
 /// Free space below which nothing new is taken.
 const RESERVE: u64 = 256 << 20;
 

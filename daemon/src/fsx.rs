@@ -112,16 +112,19 @@ pub(crate) fn touch(path: &Path) -> io::Result<()> {
     OpenOptions::new().write(true).create(true).truncate(false).open(path).map(drop)
 }
 
-/// Writes `value` as JSON, with a final newline, into a new synced file.
+/// Writes `value` as JSON, with a final newline, into a new file; synced if `sync` says so. An empty file that is open elsewhere and
+/// known by a path below `/proc` is as good as a new one.
 ///
 /// # Errors
 /// As [`write_new`].
-pub(crate) fn write_new_json<T: Serialize>(path: &Path, value: &T) -> io::Result<()> {
-    let file = OpenOptions::new().write(true).create_new(true).open(path)?;
+pub(crate) fn write_new_json<T: Serialize>(path: &Path, value: &T, sync: bool) -> io::Result<()> {
+    let nameless = path.starts_with("/proc");
+    let file = OpenOptions::new().write(true).create_new(!nameless).open(path)?;
     let mut out = io::BufWriter::new(file);
     serde_json::to_writer_pretty(&mut out, value)?;
     out.write_all(b"\n")?;
-    out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()
+    let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
+    if sync { file.sync_all() } else { Ok(()) }
 }
 
 /// Removes a file that may be gone already.
@@ -150,14 +153,22 @@ pub(crate) fn hash(path: &Path) -> io::Result<String> {
 /// # Errors
 /// As `chmod`. A group we may not give is left as it is.
 pub(crate) fn fit_in(path: &Path, folder: &Path) -> io::Result<()> {
-    let (file, parent) = (std::fs::symlink_metadata(path)?, std::fs::metadata(folder)?);
-    if file.gid() != parent.gid() {
+    fit(&File::open(path)?, folder)
+}
+
+/// The same for an open file.
+///
+/// # Errors
+/// As `chmod`.
+pub(crate) fn fit(file: &File, folder: &Path) -> io::Result<()> {
+    let (now, parent) = (file.metadata()?, std::fs::metadata(folder)?);
+    if now.gid() != parent.gid() {
         // Not a member of that group, or a file system without owners.
-        let _ = rustix::fs::chown(path, None, Some(Gid::from_raw(parent.gid())));
+        let _ = rustix::fs::fchown(file, None, Some(Gid::from_raw(parent.gid())));
     }
     let mode = 0o644 & !umask();
-    if file.mode() & 0o7777 != mode {
-        std::fs::set_permissions(path, std::fs::Permissions::from_mode(mode))?;
+    if now.mode() & 0o7777 != mode {
+        file.set_permissions(std::fs::Permissions::from_mode(mode))?;
     }
     Ok(())
 }

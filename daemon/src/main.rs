@@ -2,15 +2,19 @@
 //! folders and their daemon, and the worker processes in which the engine runs.
 
 mod attempt;
+mod bar;
+mod batch;
 mod cli;
 mod config;
 mod control;
 mod demo;
+mod draft;
 mod exit;
 mod folder;
 mod fsx;
 mod jobs;
 mod logging;
+mod naming;
 mod profiles;
 mod protocol;
 mod publish;

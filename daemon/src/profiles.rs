@@ -37,6 +37,16 @@ pub(crate) fn from_name_or_file(text: &str) -> Result<Profile, String> {
     Err(format!("there is no profile `{text}`: neither a file nor one of {}", Profile::BUILT_IN.join(", ")))
 }
 
+/// The profile that a command line asks for: `name` as for [`from_name_or_file`], with what its switches turn off.
+///
+/// # Errors
+/// A line or more for people.
+pub(crate) fn of_command(name: &str, no_self_intersections: bool) -> Result<Profile, String> {
+    let mut profile = from_name_or_file(name)?;
+    profile.check_self_intersections &= !no_self_intersections;
+    Ok(profile)
+}
+
 /// Are the numbers ones that mean something?
 ///
 /// # Errors

@@ -367,7 +367,7 @@ fn hash_of(path: &Path) -> Result<Hash, PublishError> {
 }
 
 fn rewrite<T: Serialize>(path: &Path, value: &T) -> Result<(), PublishError> {
-    fsx::remove_if_there(path).and_then(|()| fsx::write_new_json(path, value)).map_err(io_at(path))
+    fsx::remove_if_there(path).and_then(|()| fsx::write_new_json(path, value, true)).map_err(io_at(path))
 }
 
 /// The first version of a name that is free; `reserve` bytes are left for what is appended to it.

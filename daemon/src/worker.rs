@@ -10,8 +10,10 @@ use suture_core::{Error, Progress, Report};
 use crate::fsx;
 use crate::protocol::{Message, Request};
 
-/// Progress is told at most this often.
+/// Progress is told at most this often, and at the beginning of a stage.
 const PROGRESS_EVERY: Duration = Duration::from_millis(100);
+/// Work that is done sooner says nothing.
+const FIRST_AFTER: Duration = Duration::from_millis(100);
 
 /// Answers requests until standard input ends.
 ///
@@ -63,7 +65,8 @@ fn named(error: &Error, request: &Request) -> String {
 }
 
 fn work(request: &Request) -> suture_core::error::Result<Report> {
-    let teller = Teller { last: Mutex::new(Instant::now()) };
+    let start = Instant::now();
+    let teller = Teller { start, last: Mutex::new((start, "")) };
     let Request { input, profile, limits, .. } = request;
     let mut report = match (request.task, &request.output) {
         (Task::Repair, Some(output)) => suture_core::repair(input, output, profile, limits, &teller)?,
@@ -75,8 +78,9 @@ fn work(request: &Request) -> suture_core::error::Result<Report> {
     }
     // The spool folder is a temporary name too, and no one else's business.
     report.limits.spool = None;
+    report.limits.defer_sync = false;
     if let Some(path) = &request.report {
-        fsx::write_new_json(path, &report).map_err(|source| Error::Io {
+        fsx::write_new_json(path, &report, !limits.defer_sync).map_err(|source| Error::Io {
             path: path.clone(),
             action: "writing the report",
             source,
@@ -88,15 +92,19 @@ fn work(request: &Request) -> suture_core::error::Result<Report> {
 
 /// Tells the supervisor where the work stands.
 struct Teller {
-    last: Mutex<Instant>,
+    start: Instant,
+    /// When it last did, and of which stage.
+    last: Mutex<(Instant, &'static str)>,
 }
 
 impl Progress for Teller {
     fn at(&self, stage: &'static str, done: u64, total: u64) {
         // Another thread is telling: this one has nothing newer to add.
         let Ok(mut last) = self.last.try_lock() else { return };
-        if last.elapsed() >= PROGRESS_EVERY {
-            *last = Instant::now();
+        let now = Instant::now();
+        let news = last.1 != stage || now - last.0 >= PROGRESS_EVERY;
+        if news && now - self.start >= FIRST_AFTER {
+            *last = (now, stage);
             // A supervisor that is gone is noticed at the end of the work, and kills us before.
             let _ = say(&Message::Progress { stage: stage.into(), done, total });
         }

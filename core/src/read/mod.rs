@@ -22,6 +22,7 @@ use memmap2::{Mmap, MmapOptions};
 
 use crate::Progress;
 use crate::error::{Error, Result};
+use crate::parallel;
 use crate::record::Record;
 use crate::report::Format;
 use crate::settings::Limits;
@@ -124,7 +125,7 @@ pub struct MeshFile {
 }
 
 impl MeshFile {
-    /// Opens `path` and makes its records available. A text STL is parsed on the current rayon pool into a nameless file in
+    /// Opens `path` and makes its records available. A text STL is parsed by the threads of `limits` into a nameless file in
     /// `spool`, which should not be a memory file system; its progress is reported in bytes as stage `read`.
     ///
     /// # Errors
@@ -156,7 +157,8 @@ impl MeshFile {
             sniff::Kind::Text(sniff::Text { start, mut findings }) => {
                 // Advice; without it reading ahead is only less bold.
                 let _ = input.advise(memmap2::Advice::Sequential);
-                let parsed = text::read(&input, start, &text::Context { path, spool, limits, progress })?;
+                let context = text::Context { path, spool, limits, progress };
+                let parsed = parallel::in_pool(limits.threads, || text::read(&input, start, &context))?;
                 findings.extend(parsed.findings);
                 Ok(Self {
                     path: path.to_owned(),

@@ -42,6 +42,22 @@ fn inspect_writes_nothing_and_tells_good_from_bad() {
 }
 
 #[test]
+fn a_search_that_is_not_wanted_is_called_unchecked() {
+    let place = Place::new();
+    place.generate(Case::Clean, 600, 1);
+    place.put("fast.toml", b"check_self_intersections = false\n");
+    for options in [&["--no-self-intersections"][..], &["--profile", "fast.toml"]] {
+        let inspected = place.inspect("clean.stl", options).expect(0).report();
+        let repaired = place.repair("clean.stl", "out.stl", &[options, &["--force"]].concat()).expect(0).report();
+        for report in [inspected, repaired] {
+            assert_eq!(report["profile"]["check_self_intersections"], false);
+            assert_eq!(report["verdict"]["unchecked"], serde_json::json!(["self-intersection"]));
+            assert!(report["verdict"]["statement"].as_str().unwrap().ends_with("self-intersection unchecked"));
+        }
+    }
+}
+
+#[test]
 fn without_json_a_table_is_printed() {
     let place = Place::new();
     place.generate(Case::Holes, 600, 1);

@@ -234,6 +234,8 @@ struct Teller<'a> {
     waiting: BTreeMap<usize, Outcome>,
     /// So many inputs, the first ones, have been told of.
     told: usize,
+    /// So many of them have a result.
+    done: usize,
     stopped: bool,
     worst: Exit,
 }
@@ -247,7 +249,7 @@ impl<'a> Teller<'a> {
             writes: order.naming.is_some(),
             intersections: order.profile.check_self_intersections,
         });
-        Self { order, sizes, bar, waiting: BTreeMap::new(), told: 0, stopped: false, worst: Exit::Good }
+        Self { order, sizes, bar, waiting: BTreeMap::new(), told: 0, done: 0, stopped: false, worst: Exit::Good }
     }
 
     /// Takes what comes until no one is left to send; returns those that need more memory, ascending.
@@ -274,7 +276,11 @@ impl<'a> Teller<'a> {
     fn tell_what_is_next(&mut self) {
         let mut folders = Vec::new();
         let mut placed = Vec::new();
-        while let Some(outcome) = self.waiting.remove(&(self.told + placed.len())) {
+        // After what was stopped nothing comes into place: what there is, is all that comes before.
+        while !self.stopped
+            && let Some(outcome) = self.waiting.remove(&(self.told + placed.len()))
+        {
+            self.stopped = outcome.as_ref().is_err_and(|failure| failure.stopped);
             placed.push(outcome.and_then(|finished| match &self.order.naming {
                 Some(naming) => finished.place(naming, &mut folders),
                 None => Ok(finished.report),
@@ -287,11 +293,11 @@ impl<'a> Teller<'a> {
             }
             let input = self.order.inputs.get(self.told).map(PathBuf::as_path).unwrap_or(Path::new(""));
             self.told += 1;
-            self.stopped |= result.as_ref().is_err_and(|failure| failure.stopped);
-            if self.stopped && self.order.inputs.len() > 1 && result.is_err() {
-                // One line for all of them is still to come.
+            if self.order.inputs.len() > 1 && result.as_ref().is_err_and(|failure| failure.stopped) {
+                // One line for all that were not done is still to come.
                 continue;
             }
+            self.done += usize::from(result.is_ok());
             let (text, complaint, exit) = tell(input, &result, self.order.json);
             self.bar.say(&text, complaint.as_deref());
             self.worst = self.worst.max(exit);
@@ -306,7 +312,7 @@ impl<'a> Teller<'a> {
             return self.worst;
         }
         if all > 1 {
-            eprintln!("suture: interrupted; nothing was written for what is not told of");
+            eprintln!("suture: interrupted; {} of {all} files are done, nothing was written of the others", self.done);
         }
         Exit::Interrupted
     }

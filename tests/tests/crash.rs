@@ -9,6 +9,7 @@ use std::process::Child;
 use std::time::{Duration, Instant};
 
 use suture_bench::generate::Case;
+use suture_tests::Place;
 use suture_tests::binary::with_crash_points;
 use suture_tests::hot::{Hot, Tree, mesh};
 
@@ -226,4 +227,30 @@ fn killers_are_quarantined_and_the_others_go_on() {
         assert!(report["attempts"].as_u64().is_some_and(|attempts| attempts <= 7), "{report}");
         assert!(report["reason"].as_str().is_some_and(|reason| !reason.is_empty()), "{report}");
     }
+}
+
+/// On the command line, too, a file that kills its worker costs itself only, wherever it stands among the others.
+#[test]
+fn killers_cost_themselves_only() {
+    let place = Place::new();
+    let names: Vec<String> = (0..30u64)
+        .map(|k| match k {
+            0 | 11 | 29 => format!("{k}!abort!.stl"),
+            12 => format!("{k}!panic!.stl"),
+            _ => format!("{k}.stl"),
+        })
+        .collect();
+    for (seed, name) in (0..).zip(&names) {
+        place.put(name, &mesh(Case::Holes, seed));
+    }
+    std::fs::create_dir(place.at("out")).expect("a folder for results");
+    let mut command = std::process::Command::new(with_crash_points());
+    command.current_dir(place.at("")).args(["repair", "--threads", "2", "-o", "out"]).args(&names).env("SUTURE_LOG", "off");
+    let output = command.output().expect("the binary starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.lines().count() == 4 && said.lines().all(|line| line.contains('!')), "{said}");
+    let mut good: Vec<_> = names.into_iter().filter(|name| !name.contains('!')).collect();
+    good.sort();
+    assert_eq!(place.names("out"), good);
 }

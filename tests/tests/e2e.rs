@@ -6,6 +6,7 @@ mod e2e {
     mod files;
     mod interrupted;
     mod malformed;
+    mod many;
     mod memory;
     mod same_bytes;
     mod soups;

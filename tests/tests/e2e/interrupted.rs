@@ -1,13 +1,15 @@
 //! A repair that is stopped, or whose file changes under it: one line, no output, nothing left behind.
 
 use std::fs::File;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, kill_process};
 use suture_bench::generate::Case;
-use suture_tests::Place;
+use suture_tests::hot::mesh;
+use suture_tests::{Place, stl};
 
 /// `suture repair` of a file large enough to be caught at work, and its worker, which has mapped it.
 fn at_work(place: &Place) -> (Child, Pid) {
@@ -27,12 +29,18 @@ fn at_work(place: &Place) -> (Child, Pid) {
     panic!("no worker has mapped the file: {}", child.wait().unwrap());
 }
 
+/// The children of all threads of a process.
+fn children_of(process: u32) -> Vec<Pid> {
+    let threads = std::fs::read_dir(format!("/proc/{process}/task")).into_iter().flatten().flatten();
+    let children = threads.filter_map(|thread| std::fs::read_to_string(thread.path().join("children")).ok());
+    let pids = |list: String| list.split_whitespace().filter_map(|pid| pid.parse().ok()).collect::<Vec<i32>>();
+    children.flat_map(pids).filter_map(Pid::from_raw).collect()
+}
+
 /// The child of a process that has mapped a file of this name.
 fn worker_of(process: u32, name: &str) -> Option<Pid> {
-    let children = std::fs::read_to_string(format!("/proc/{process}/task/{process}/children")).unwrap_or_default();
-    let mapped = |child: &&str| std::fs::read_to_string(format!("/proc/{child}/maps")).is_ok_and(|maps| maps.contains(name));
-    let worker = children.split_whitespace().find(mapped)?;
-    Pid::from_raw(worker.parse().ok()?)
+    let maps = |child: &Pid| std::fs::read_to_string(format!("/proc/{}/maps", child.as_raw_nonzero()));
+    children_of(process).into_iter().find(|child| maps(child).is_ok_and(|maps| maps.contains(name)))
 }
 
 /// Waits for the end, which must be code 2 or 130 with one line of these words, and nothing in the folder but the input.
@@ -67,19 +75,96 @@ fn by_the_death_of_the_worker() {
     assert_ends(&place, child, 2, "");
 }
 
-/// Only the name under which nothing is published may be left by a kill that no one can catch.
+/// What is in the making has no name: not even a kill that no one can catch leaves anything.
 #[test]
 fn by_a_kill() {
     let place = Place::new();
     let (mut child, worker) = at_work(&place);
     child.kill().unwrap();
     child.wait().unwrap();
+    assert_goes(worker);
+    assert_eq!(place.names(""), ["mixed.stl", "stderr"], "nothing is left");
+}
+
+fn assert_goes(worker: Pid) {
     let start = Instant::now();
     while is_there(worker) {
         assert!(start.elapsed() < Duration::from_secs(30), "the worker outlives the command");
         std::thread::sleep(Duration::from_millis(5));
     }
-    assert!(!place.at("out.stl").exists() && !place.at("report.json").exists());
+}
+
+/// From the first record to the last stage, by a signal and by a kill, of binary files and of text (which is spooled): either the whole
+/// result is there or nothing, and no process is left.
+#[test]
+fn at_any_moment() {
+    const MOMENTS: u32 = 8;
+    for text in [false, true] {
+        let place = Place::new();
+        place.generate(Case::Mixed, 200_000, 1);
+        if text {
+            let triangles: Vec<_> = stl::records(&place.read("mixed.stl")).iter().map(stl::corners).collect();
+            place.put("mixed.stl", stl::text("mixed", &triangles).as_bytes());
+        }
+        let start = Instant::now();
+        place.repair("mixed.stl", "whole.stl", &["--threads", "1"]).expect(0);
+        let (takes, whole) = (start.elapsed(), place.read("whole.stl"));
+        for k in 0..2 * MOMENTS {
+            let signal = if k % 2 == 0 { Signal::INT } else { Signal::KILL };
+            let mut command = place.command();
+            command.args(["repair", "mixed.stl", "-o", "out.stl", "--threads", "1"]).stdout(Stdio::null()).stderr(Stdio::null());
+            let mut child = command.spawn().unwrap();
+            std::thread::sleep(takes * (k / 2 + 1) / (MOMENTS + 1));
+            let workers = children_of(child.id());
+            kill_process(Pid::from_child(&child), signal).unwrap();
+            let status = child.wait().unwrap();
+            workers.into_iter().for_each(assert_goes);
+            if place.at("out.stl").exists() {
+                assert_eq!(place.read("out.stl"), whole, "moment {k}: whole or not at all");
+                std::fs::remove_file(place.at("out.stl")).unwrap();
+            } else {
+                assert_eq!(status.code(), (signal == Signal::INT).then_some(130), "moment {k}");
+            }
+            assert_eq!(place.names(""), ["mixed.stl", "whole.stl"], "moment {k}: something is left");
+        }
+    }
+}
+
+/// Of several files, those that are told of are there, whole; the others have left nothing.
+#[test]
+fn among_many_files() {
+    let place = Place::new();
+    let names: Vec<String> = (0..300).map(|k| format!("{k:03}.stl")).collect();
+    for (seed, name) in (0..).zip(&names) {
+        place.put(name, &mesh(Case::Mixed, seed));
+    }
+    for (signal, folder) in [(Signal::INT, "out-int"), (Signal::TERM, "out-term"), (Signal::KILL, "out-kill")] {
+        std::fs::create_dir(place.at(folder)).unwrap();
+        let mut command = place.command();
+        command.args(["repair", "--json", "-o", folder]).args(&names).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        let mut told = BufReader::new(child.stdout.take().unwrap()).lines();
+        let mut seen: Vec<String> = told.by_ref().take(5).map(Result::unwrap).collect();
+        let workers = children_of(child.id());
+        kill_process(Pid::from_child(&child), signal).unwrap();
+        seen.extend(told.map(Result::unwrap));
+        let output = child.wait_with_output().unwrap();
+        workers.into_iter().for_each(assert_goes);
+        let there = place.names(folder);
+        assert!((5..300).contains(&there.len()), "it was caught at work: {} files", there.len());
+        assert!(there.iter().eq(&names[..there.len()]), "in their order: {there:?}");
+        assert!(seen.len() <= there.len());
+        for line in &seen {
+            let report: serde_json::Value = serde_json::from_str(line).unwrap();
+            assert_eq!(report["output"]["bytes"], place.read(report["output"]["path"].as_str().unwrap()).len());
+        }
+        if signal != Signal::KILL {
+            assert_eq!(output.status.code(), Some(130));
+            assert_eq!(seen.len(), there.len(), "all that is there was told of");
+            let said = String::from_utf8_lossy(&output.stderr);
+            assert!(said.lines().count() == 1 && said.contains("interrupted"), "{said}");
+        }
+    }
 }
 
 #[test]

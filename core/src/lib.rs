@@ -16,6 +16,9 @@ mod emit;
 mod engine;
 pub mod error;
 pub mod fill;
+#[cfg(any(test, feature = "internals"))]
+#[doc(hidden)]
+pub mod internals;
 mod intersect;
 mod machine;
 mod members;

@@ -109,13 +109,8 @@ impl Book {
         self.spread(input, way, |cost| Some(cost.wall_seconds))
     }
 
-    /// How much more of something one way took than another, over the pairs of one round of one session.
-    pub(super) fn ratio(
-        &self,
-        input: &Input,
-        (slow, slow_value): (&Way, impl Fn(&Cost) -> Option<f64>),
-        (fast, fast_value): (&Way, impl Fn(&Cost) -> Option<f64>),
-    ) -> Option<Spread> {
+    /// How much longer one way took than another, over the pairs of one round of one session.
+    pub(super) fn wall_ratio(&self, input: &Input, slow: &Way, fast: &Way) -> Option<Spread> {
         self.chapters.iter().rev().find_map(|chapter| {
             let good = |way: &Way| -> Vec<&Run> {
                 chapter.runs(input).filter(|run| run.way == *way && did_its_work(input, run)).collect()
@@ -123,15 +118,41 @@ impl Book {
             let quick = good(fast);
             let pairs = good(slow).into_iter().filter_map(|run| {
                 let other = quick.iter().find(|other| other.round == run.round)?;
-                Some(slow_value(&run.cost)? / fast_value(&other.cost)?)
+                Some(run.cost.wall_seconds / other.cost.wall_seconds)
             });
             Spread::of(pairs)
         })
     }
 
-    pub(super) fn wall_ratio(&self, input: &Input, slow: &Way, fast: &Way) -> Option<Spread> {
-        let wall = |cost: &Cost| Some(cost.wall_seconds);
-        self.ratio(input, (slow, wall), (fast, wall))
+    /// Seconds that the search for self-intersections adds to `suture inspect`, seconds of MeshLib's call alone, and the ratio, over
+    /// the rounds of one session that have all three processes. Suture searches while it looks at the topology, so that there is no
+    /// stage to be timed.
+    pub(super) fn search(&self, input: &Input) -> Option<[Spread; 3]> {
+        self.chapters.iter().rev().find_map(|chapter| {
+            let good = |side: Side, round: usize| {
+                let mut runs = chapter.runs(input).filter(|run| run.way == Way::plain(side) && run.round == round);
+                runs.find(|run| did_its_work(input, run)).map(|run| &run.cost)
+            };
+            let rounds = (0..).map_while(|round| good(Side::MeshlibDetect, round).map(|theirs| (round, theirs)));
+            let pairs: Vec<_> = rounds
+                .filter_map(|(round, theirs)| {
+                    let with = good(Side::Inspect, round)?.wall_seconds;
+                    let ours = with - good(Side::InspectNoSi, round)?.wall_seconds;
+                    // A search shorter than the noise of two processes says nothing.
+                    (ours > 0.0).then_some((ours, search_seconds(theirs)?))
+                })
+                .collect();
+            let ours = Spread::of(pairs.iter().map(|pair| pair.0))?;
+            let theirs = Spread::of(pairs.iter().map(|pair| pair.1))?;
+            Some([ours, theirs, Spread::of(pairs.iter().map(|pair| pair.1 / pair.0))?])
+        })
+    }
+
+    /// A count that all runs of a side agree on.
+    pub(super) fn fact(&self, input: &Input, side: Side, name: &str) -> Option<u64> {
+        let runs = self.runs(input, &Way::plain(side));
+        let first = *runs.first()?.cost.facts.get(name)?;
+        runs.iter().all(|run| run.cost.facts.get(name) == Some(&first)).then_some(first)
     }
 
     /// What a side made of an input.
@@ -175,9 +196,8 @@ pub(super) fn did_its_work(input: &Input, run: &Run) -> bool {
 }
 
 /// Seconds of the search for self-intersections, by a process's own word.
-pub(super) fn search_seconds(cost: &Cost) -> Option<f64> {
-    let found = cost.stages.iter().filter(|stage| stage.name.replace('_', "-").contains("self-intersections"));
-    Spread::of(found.map(|stage| stage.seconds)).map(|spread| spread.median * spread.count as f64)
+fn search_seconds(cost: &Cost) -> Option<f64> {
+    cost.stages.iter().find(|stage| stage.name == "self-intersections").map(|stage| stage.seconds)
 }
 
 #[cfg(test)]
@@ -204,7 +224,7 @@ pub(super) mod tests {
                 exited: true,
                 code: Some(code),
                 output_bytes: (code < 2).then_some(84),
-                stages: vec![Stage { name: "self_intersections".into(), seconds: wall_seconds / 2.0 }],
+                stages: vec![Stage { name: "self-intersections".into(), seconds: wall_seconds / 2.0 }],
                 ..Cost::default()
             };
             let (command, way) = (side.facts().name.into(), Way::plain(side));
@@ -264,9 +284,13 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn the_search_is_found_by_its_name() {
+    fn the_search_is_what_it_adds() {
         let input = input("mixed", 1000);
-        let book = Book { chapters: vec![chapter(&input, &[(Side::Inspect, 3.0, 1)])] };
-        assert_eq!(book.spread(&input, &way(Side::Inspect), search_seconds).map(|spread| spread.median), Some(1.5));
+        // MeshLib's stage is half of its process.
+        let runs =
+            [(Side::Inspect, 3.0, 1), (Side::InspectNoSi, 2.0, 1), (Side::MeshlibDetect, 8.0, 0), (Side::MeshlibDetect, 9.0, 0)];
+        let book = Book { chapters: vec![chapter(&input, &runs)] };
+        let [ours, theirs, ratio] = book.search(&input).unwrap();
+        assert_eq!((ours.median, theirs.median, ratio.median, ratio.count), (1.0, 4.0, 4.0, 1));
     }
 }

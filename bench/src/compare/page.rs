@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::book::{Book, did_its_work, search_seconds};
+use super::book::{Book, did_its_work};
 use super::machine::Machine;
 use super::record::{Cache, Input, Judged, Outcome, Way, is_good};
 use super::sides::LICENCES;
@@ -148,6 +148,12 @@ fn of_input(book: &Book, input: &Input) -> String {
         ];
         let _ = writeln!(page, "| {} |", row.join(" | "));
     }
+    for way in book.ways(input) {
+        let held = book.spread(input, &way, |cost| cost.facts.get("cgroup peak bytes").map(|bytes| *bytes as f64 / 1e6));
+        if let Some(held) = held {
+            let _ = writeln!(page, "\n{}: the cgroup held at most {} MB, page cache included.", way.name(), number(held.most));
+        }
+    }
     if let Some(same) = book.sameness(input) {
         let files =
             if same.distinct == 1 { "one and the same file".into() } else { format!("{} different files", same.distinct) };
@@ -274,28 +280,27 @@ fn flat(book: &Book) -> String {
 fn searches(book: &Book) -> String {
     let mut rows = String::new();
     for input in book.inputs() {
-        let (ours, theirs) = (Way::plain(Side::Inspect), Way::plain(Side::MeshlibDetect));
-        let seconds = |way| book.spread(input, way, search_seconds);
-        if let (Some(mine), Some(other)) = (seconds(&ours), seconds(&theirs)) {
-            let ratio = book.ratio(input, (&theirs, search_seconds), (&ours, search_seconds));
-            let _ = writeln!(
-                rows,
-                "| {} | {} | {} | {} | {} | {} |",
-                input.case,
-                spaced(input.triangles),
-                range(mine),
-                range(other),
-                or_dash(ratio.map(range)),
-                mine.count.min(other.count)
-            );
-        }
+        let Some([ours, theirs, ratio]) = book.search(input) else { continue };
+        let count = |side| or_dash(book.fact(input, side, "pairs").map(spaced));
+        let row = [
+            input.case.clone(),
+            spaced(input.triangles),
+            range(ours),
+            range(theirs),
+            range(ratio),
+            ratio.count.to_string(),
+            count(Side::Inspect),
+            count(Side::MeshlibDetect),
+        ];
+        let _ = writeln!(rows, "| {} |", row.join(" | "));
     }
     if rows.is_empty() {
         return rows;
     }
-    let head = "| input | triangles | suture s | MeshLib s | ratio | pairs |\n|---|---:|---:|---:|---:|---:|\n";
-    let text = "The stage of `suture inspect` by its own report, beside the call of `findSelfCollidingTriangles` alone over a mesh that \
-                MeshLib has loaded; the same threads. Asked: a ratio of at least 4.";
+    let head = "| input | triangles | suture s | MeshLib s | ratio | rounds | pairs, suture | pairs, MeshLib |\n\
+                |---|---:|---:|---:|---:|---:|---:|---:|\n";
+    let text = "What the search adds to `suture inspect` (with it, less without it, in one round), beside the call of \
+                `findSelfCollidingTriangles` alone over a mesh that MeshLib has loaded; the same threads. Asked: a ratio of at least 4.";
     format!("\n## Self-intersections, the search alone\n\n{text}\n\n{head}{rows}")
 }
 

@@ -228,7 +228,9 @@ fn listen(text: &str) -> Said {
                 None => all.stages.push(stage),
             }
         }
-        for (name, count) in said.facts {
+        let count = |name: &str| said.before.as_ref().and_then(|before| before["self_intersections"][name].as_u64());
+        let pairs = count("crossing_pairs").zip(count("overlapping_pairs")).map(|(crossing, overlapping)| crossing + overlapping);
+        for (name, count) in said.facts.into_iter().chain(pairs.map(|pairs| ("pairs".into(), pairs))) {
             *all.facts.entry(name).or_insert(0) += count;
         }
         all.before = said.before;
@@ -294,11 +296,13 @@ mod tests {
     fn stages_of_several_files_are_summed_in_order() {
         let said = listen(
             "noise\n{\"stages\":[{\"name\":\"read\",\"seconds\":1.0},{\"name\":\"emit\",\"seconds\":2.0}]}\n\
-             {\"stages\":[{\"name\":\"emit\",\"seconds\":0.5}],\"facts\":{\"pairs\":3}}\n",
+             {\"stages\":[{\"name\":\"emit\",\"seconds\":0.5}],\"facts\":{\"pairs\":3}}\n\
+             {\"before\":{\"self_intersections\":{\"crossing_pairs\":2,\"overlapping_pairs\":1}}}\n\
+             {\"before\":{\"self_intersections\":null}}\n",
         );
         let stages: Vec<_> = said.stages.iter().map(|stage| (stage.name.as_str(), stage.seconds)).collect();
         assert_eq!(stages, [("read", 1.0), ("emit", 2.5)]);
-        assert_eq!(said.facts["pairs"], 3);
+        assert_eq!(said.facts["pairs"], 6);
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::io::Write;
 use std::os::fd::AsFd;
 use std::path::Path;
 
+use crate::Progress;
 use crate::behind::WriteBehind;
 use crate::edit::{Edit, Step};
 use crate::error::{Error, Result};
@@ -18,7 +19,7 @@ const KERNEL_COPY_BYTES: usize = 256 << 10;
 const COPY_BYTES: usize = 1 << 20;
 
 /// Writes `mesh` with `edit` to the new file `output` and syncs it, unless that is deferred.
-pub(crate) fn write(mesh: &MeshFile, edit: &Edit, output: &Path, limits: &Limits) -> Result<()> {
+pub(crate) fn write(mesh: &MeshFile, edit: &Edit, output: &Path, limits: &Limits, progress: &dyn Progress) -> Result<()> {
     let records = mesh.records();
     let count = edit.output_records(records.len());
     let count = u32::try_from(count).map_err(|_| Error::Refused {
@@ -26,7 +27,7 @@ pub(crate) fn write(mesh: &MeshFile, edit: &Edit, output: &Path, limits: &Limits
         reason: format!("the result has {count} triangles"),
         advice: "an STL can hold 4294967295: split the file".into(),
     })?;
-    let mut sink = Sink::create(mesh, output, limits)?;
+    let mut sink = Sink::create(mesh, output, limits, progress)?;
     sink.put(&mesh.output_header())?;
     sink.put(&count.to_le_bytes())?;
     edit.walk(records, |step| match step {
@@ -37,8 +38,8 @@ pub(crate) fn write(mesh: &MeshFile, edit: &Edit, output: &Path, limits: &Limits
 }
 
 /// Copies the input byte for byte to the new file `output` and syncs it, unless that is deferred.
-pub(crate) fn copy(mesh: &MeshFile, output: &Path, limits: &Limits) -> Result<()> {
-    let mut sink = Sink::create(mesh, output, limits)?;
+pub(crate) fn copy(mesh: &MeshFile, output: &Path, limits: &Limits, progress: &dyn Progress) -> Result<()> {
+    let mut sink = Sink::create(mesh, output, limits, progress)?;
     sink.put_bytes(mesh.bytes())?;
     sink.finish(limits)
 }
@@ -52,16 +53,19 @@ struct Sink<'a> {
     file: File,
     buffer: Vec<u8>,
     behind: WriteBehind,
+    /// Bytes so far.
+    written: u64,
+    progress: &'a dyn Progress,
 }
 
 impl<'a> Sink<'a> {
     const BUFFER_BYTES: usize = 1 << 20;
 
-    fn create(mesh: &'a MeshFile, path: &'a Path, limits: &Limits) -> Result<Self> {
+    fn create(mesh: &'a MeshFile, path: &'a Path, limits: &Limits, progress: &'a dyn Progress) -> Result<Self> {
         let file = create(path).map_err(Error::io(path, "creating"))?;
         let buffer = Vec::with_capacity(Self::BUFFER_BYTES.min(mesh.bytes().len()));
         let behind = WriteBehind::new(&file, limits).map_err(Error::io(path, "creating"))?;
-        Ok(Self { mesh, path, kernel_copies: true, file, buffer, behind })
+        Ok(Self { mesh, path, kernel_copies: true, file, buffer, behind, written: 0, progress })
     }
 
     fn put(&mut self, bytes: &[u8]) -> Result<()> {
@@ -108,7 +112,10 @@ impl<'a> Sink<'a> {
         self.account(written)
     }
 
-    fn account(&self, written: usize) -> Result<()> {
+    fn account(&mut self, written: usize) -> Result<()> {
+        self.written += written as u64;
+        let total = self.mesh.records().len() as u64;
+        self.progress.at("emit", (self.written / size_of::<Record>() as u64).min(total), total);
         self.behind.wrote(written as u64).map_err(Error::io(self.path, "syncing"))
     }
 

@@ -113,7 +113,7 @@ pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress
     space::check(input, &[spool_need(&mesh, limits)])?;
     let diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
     clock.lap("topology");
-    let blake3 = hash(mesh.bytes(), limits);
+    let blake3 = hash(&mesh, limits, progress);
     clock.lap("hash");
     mesh.check_unchanged()?;
     let mut report = report(Task::Inspect, &mesh, &diagnosis, profile, limits);
@@ -167,6 +167,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     let mut report = report(Task::Repair, &mesh, &diagnosis, profile, limits);
     let mut edit = Edit::default();
     if !report.verdict.good {
+        progress.at("repair", 0, mesh.records().len() as u64);
         let repaired = repairs::run(&mut diagnosis, profile, limits.threads);
         clock.lap("repair");
         edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &repaired.reversed);
@@ -178,8 +179,8 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     // Good as it came, or nothing in it could be repaired.
     let same = edit.is_empty() && flaws(&mesh).is_empty();
     report.input.blake3 = hash_beside(&mesh, limits, || match same {
-        true => emit::copy(&mesh, output, limits),
-        false => emit::write(&mesh, &edit, output, limits),
+        true => emit::copy(&mesh, output, limits, progress),
+        false => emit::write(&mesh, &edit, output, limits, progress),
     })?;
     clock.lap("emit");
     report.edit = edit.summary(mesh.records().len());
@@ -209,7 +210,7 @@ fn spool_need(mesh: &MeshFile, limits: &Limits) -> Need {
 /// The written file should be the input, byte for byte: its hash is compared, and what was found in the input holds.
 fn confirm_copy(report: &mut Report, input: &MeshFile, output: &Path, limits: &Limits, progress: &dyn Progress) -> Result<()> {
     let written = open(output, limits, progress)?;
-    let facts = facts(&written, hash(written.bytes(), limits));
+    let facts = facts(&written, hash(&written, limits, progress));
     if facts.blake3 != report.input.blake3 {
         return Err(Error::Changed { path: input.path().into() });
     }
@@ -237,7 +238,7 @@ fn verify(
         }
         other => other?,
     };
-    let facts = facts(&written, hash(written.bytes(), limits));
+    let facts = facts(&written, hash(&written, limits, progress));
     let diagnosis = Diagnosis::of(output, written.records(), &report.profile, limits, progress)?;
     report.verdict = verdict::judge(&diagnosis.defects, &flaws(&written));
     report.outcome = if report.verdict.good { Outcome::Repaired } else { Outcome::NotGood };
@@ -281,7 +282,7 @@ fn facts(mesh: &MeshFile, blake3: String) -> FileFacts {
 /// Hashes the input while `write`, which keeps one thread busy at most, is under way; before it where there is but one thread.
 fn hash_beside(mesh: &MeshFile, limits: &Limits, write: impl FnOnce() -> Result<()>) -> Result<String> {
     if limits.threads < 2 || mesh.bytes().len() < HASHED_BY_ONE {
-        let hash = hash(mesh.bytes(), limits);
+        let hash = blake3::hash(mesh.bytes()).to_hex().to_string();
         return write().map(|()| hash);
     }
     std::thread::scope(|scope| {
@@ -292,7 +293,9 @@ fn hash_beside(mesh: &MeshFile, limits: &Limits, write: impl FnOnce() -> Result<
     })
 }
 
-fn hash(bytes: &[u8], limits: &Limits) -> String {
+fn hash(mesh: &MeshFile, limits: &Limits, progress: &dyn Progress) -> String {
+    let bytes = mesh.bytes();
+    progress.at("hash", 0, mesh.records().len() as u64);
     if bytes.len() < HASHED_BY_ONE {
         return blake3::hash(bytes).to_hex().to_string();
     }

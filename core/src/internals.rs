@@ -141,7 +141,7 @@ impl Mesh {
 }
 
 fn gather(records: &[Record], plan: &Plan, limits: &Limits) -> Result<Members> {
-    Members::gather(Path::new("memory"), records, plan, true, limits)
+    Members::gather(Path::new("memory"), records, plan, true, limits, &crate::Quiet)
 }
 
 fn bounds(record: &Record) -> Bounds {

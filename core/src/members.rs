@@ -7,6 +7,7 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use crate::Progress;
 use crate::error::Result;
 use crate::plan::{ChunkId, Plan};
 use crate::record::{self, Record};
@@ -167,24 +168,32 @@ impl Members {
     ///
     /// # Errors
     /// Where spooling fails.
-    pub(crate) fn gather(path: &Path, records: &[Record], plan: &Plan, visitors: bool, limits: &Limits) -> Result<Self> {
+    pub(crate) fn gather(
+        path: &Path,
+        records: &[Record],
+        plan: &Plan,
+        visitors: bool,
+        limits: &Limits,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let told = || Told { progress, done: AtomicU64::new(0), total: records.len() as u64 };
         let most = if limits.spill == Spill::Never { u64::MAX } else { limits.memory_bytes / 4 };
         if spool_bytes(records, limits) == 0
-            && let Some(members) = Self::list(records, plan, visitors, limits.threads, most)
+            && let Some(members) = Self::list(records, plan, visitors, limits.threads, most, &told())
         {
             return Ok(members);
         }
-        Self::spool(path, records, plan, visitors, limits)
+        Self::spool(path, records, plan, visitors, limits, &told())
     }
 
     /// `None` if the lists would take more than `most` bytes.
-    fn list(records: &[Record], plan: &Plan, visitors: bool, threads: usize, most: u64) -> Option<Self> {
+    fn list(records: &[Record], plan: &Plan, visitors: bool, threads: usize, most: u64, told: &Told<'_>) -> Option<Self> {
         // More pieces than threads only even out the load: lists of all pieces together say the same for any number of pieces.
         let pieces = if records.len() < 1 << 16 { 1 } else { threads * 4 };
         let held = AtomicU64::new(0);
         let results = in_pieces(records, threads, pieces, |piece, offset| {
             let mut lists = Lists { lists: vec![RunList::default(); plan.chunks()], uncounted: 0, held: &held, most };
-            let passing = gather_piece(piece, offset, plan, visitors, &mut lists);
+            let passing = gather_piece(piece, offset, plan, visitors, &mut lists, told);
             held.fetch_add(lists.uncounted as u64, Ordering::Relaxed);
             lists.lists.iter_mut().for_each(|l| l.bytes.shrink_to_fit());
             (lists.lists, passing)
@@ -203,12 +212,12 @@ impl Members {
         Some(members)
     }
 
-    fn spool(path: &Path, records: &[Record], plan: &Plan, visitors: bool, limits: &Limits) -> Result<Self> {
+    fn spool(path: &Path, records: &[Record], plan: &Plan, visitors: bool, limits: &Limits, told: &Told<'_>) -> Result<Self> {
         let spool = Unsorted::new(path, spool::Layout::new(records.len(), plan, limits), plan, limits)?;
         // One piece a thread: every piece ends with extents that are not full.
         let results = in_pieces(records, limits.threads, limits.threads, |piece, offset| {
             let mut writer = spool.writer(plan.chunks());
-            let passing = gather_piece(piece, offset, plan, visitors, &mut writer);
+            let passing = gather_piece(piece, offset, plan, visitors, &mut writer, told);
             (writer.finish(), passing)
         });
         let mut members = Self::nothing(plan);
@@ -336,13 +345,33 @@ fn is_scattered(records: &[Record]) -> bool {
     changes * STRETCH > looked_at
 }
 
-fn gather_piece(records: &[Record], offset: u32, plan: &Plan, visitors: bool, take: &mut impl Take) -> Passing {
+/// Says how far the pass over the records is.
+struct Told<'a> {
+    progress: &'a dyn Progress,
+    done: AtomicU64,
+    total: u64,
+}
+
+impl Told<'_> {
+    /// Records between two words.
+    const EVERY: usize = 1 << 18;
+
+    fn step(&self) {
+        let done = self.done.fetch_add(Self::EVERY as u64, Ordering::Relaxed) + Self::EVERY as u64;
+        self.progress.at("plan", done.min(self.total), self.total);
+    }
+}
+
+fn gather_piece(records: &[Record], offset: u32, plan: &Plan, visitors: bool, take: &mut impl Take, told: &Told<'_>) -> Passing {
     let lists = if visitors { plan.chunks() } else { 0 };
     let mut passing = Passing { visitors: vec![RunList::default(); lists], nonfinite: Vec::new(), bounds: Bounds::EMPTY };
     let mut current = ChunkId(0);
     let mut cell = plan.home_box(current);
     let mut run_start = 0;
     for (i, record) in records.iter().enumerate() {
+        if (i + 1).is_multiple_of(Told::EVERY) {
+            told.step();
+        }
         let corners = record::corners(record);
         if cell.holds(corners[0]) && cell.holds(corners[1]) && cell.holds(corners[2]) {
             passing.bounds.include(&corners);
@@ -430,7 +459,7 @@ mod tests {
                 .collect();
             for spill in [Spill::Never, Spill::Auto, Spill::Always] {
                 let limits = Limits { threads, spill, ..Limits::default() };
-                let members = Members::gather(Path::new("test"), &records, &plan, true, &limits).unwrap();
+                let members = Members::gather(Path::new("test"), &records, &plan, true, &limits, &crate::Quiet).unwrap();
                 let wanted = |c: ChunkId| c.0 % 3 != 1;
                 let seen = members.each((&records, &plan), threads, wanted, || (), |(), chunk, seen| {
                     let mut all = Vec::new();
@@ -472,8 +501,10 @@ mod tests {
         let records: Vec<Record> = (0..90_000).map(|i| record::encode(corners(at(i)), 0)).collect();
         let plan = Plan::new(&records, 1000);
         let limits = Limits { threads: 2, memory_bytes: 5 << 18, ..Limits::default() };
-        let gathered =
-            |spill| Members::gather(Path::new("test"), &records, &plan, false, &Limits { spill, ..limits.clone() }).unwrap();
+        let gathered = |spill| {
+            Members::gather(Path::new("test"), &records, &plan, false, &Limits { spill, ..limits.clone() }, &crate::Quiet)
+                .unwrap()
+        };
         let (lists, spooled) = (gathered(Spill::Never), gathered(Spill::Auto));
         assert!(matches!(&lists.kept, Kept::Lists(_)) && lists.heap_bytes(2) * 3 > limits.memory_bytes / 4);
         assert!(matches!(&spooled.kept, Kept::Spool(_)));

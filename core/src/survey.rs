@@ -66,8 +66,9 @@ impl<'a> Survey<'a> {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let span = tracing::debug_span!("plan").entered();
+        progress.at("plan", 0, records.len() as u64);
         let plan = Plan::new(records, limits.chunk_triangles);
-        let mut members = Members::gather(path, records, &plan, self_intersections, limits)?;
+        let mut members = Members::gather(path, records, &plan, self_intersections, limits, progress)?;
         drop(span);
         let bounds = members.bounds.normalised();
         let measure = Measure::new(&bounds);

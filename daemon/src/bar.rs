@@ -20,12 +20,10 @@ const STEPS: f64 = 10_000.0;
 const FORESEEN: f64 = 0.02;
 
 /// Stages as the engine calls them, in order, with their shares of the time. What comes after `emit` is the second look, at the written
-/// file, with the same stages again.
-const FIRST_LOOK: [(&str, f64); 6] =
-    [("read", 4.0), ("plan", 10.0), ("topology", 25.0), (INTERSECTIONS, 45.0), ("repair", 8.0), (EMISSION, 18.0)];
-const SECOND_LOOK: [(&str, f64); 3] = [("plan", 10.0), ("topology", 25.0), (INTERSECTIONS, 20.0)];
+/// file, with the same stages again. (Self-intersections are looked for chunk by chunk, as part of the topology.)
+const FIRST_LOOK: [(&str, f64); 5] = [("read", 4.0), ("plan", 10.0), ("topology", 45.0), ("repair", 8.0), (EMISSION, 18.0)];
+const SECOND_LOOK: [(&str, f64); 3] = [("hash", 3.0), ("plan", 10.0), ("topology", 45.0)];
 const EMISSION: &str = "emit";
-const INTERSECTIONS: &str = "self-intersections";
 
 /// How far the work on one file is.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,8 +36,8 @@ struct Standing {
 }
 
 impl Standing {
-    /// `skips` names a stage that this work leaves out, `writes` whether there is a second look.
-    fn at(&mut self, stage: &str, done: u64, total: u64, writes: bool, skips: Option<&str>) {
+    /// `writes` says whether anything is written and looked at again.
+    fn at(&mut self, stage: &str, done: u64, total: u64, writes: bool) {
         self.second_look |= self.stage == EMISSION && stage != EMISSION;
         if stage != self.stage {
             self.stage = stage.to_owned();
@@ -47,9 +45,8 @@ impl Standing {
         if stage != "read" {
             self.triangles = self.triangles.max(total);
         }
-        let counts = |name: &str| (writes || !matches!(name, "repair" | EMISSION)) && skips != Some(name);
-        let first: Vec<_> = FIRST_LOOK.iter().filter(|(name, _)| counts(name)).collect();
-        let second: Vec<_> = SECOND_LOOK.iter().filter(|(name, _)| writes && counts(name)).collect();
+        let first: Vec<_> = FIRST_LOOK.iter().filter(|(name, _)| writes || !matches!(*name, "repair" | EMISSION)).collect();
+        let second: Vec<_> = SECOND_LOOK.iter().filter(|_| writes).collect();
         let all = || first.iter().chain(&second);
         let from = if self.second_look { first.len() } else { 0 };
         let Some(place) = all().skip(from).position(|(name, _)| *name == stage) else { return };
@@ -95,8 +92,6 @@ pub(crate) struct Scope {
     pub bytes: u64,
     /// A repair, not an inspection.
     pub writes: bool,
-    /// Self-intersections are looked for.
-    pub intersections: bool,
 }
 
 /// A progress bar for all inputs of a command.
@@ -129,10 +124,8 @@ impl Bar {
 
     /// As the engine tells it of the file that is worked on alone.
     pub(crate) fn at(&mut self, stage: &str, done: u64, total: u64) {
-        let Scope { writes, intersections, .. } = self.scope;
-        let skips = (!intersections).then_some(INTERSECTIONS);
         if let Some((_, _, standing)) = &mut self.alone {
-            standing.at(stage, done, total, writes, skips);
+            standing.at(stage, done, total, self.scope.writes);
         }
         self.show();
     }
@@ -211,26 +204,26 @@ mod tests {
         let mut last = 0.0;
         for (i, (stage, _)) in FIRST_LOOK.iter().chain(&SECOND_LOOK).enumerate() {
             for done in [0, 50, 100] {
-                standing.at(stage, done, 100, true, None);
+                standing.at(stage, done, 100, true);
                 assert!(standing.share >= last);
                 last = standing.share;
             }
             assert_eq!(standing.second_look, i >= FIRST_LOOK.len());
         }
         assert!((last - 1.0).abs() < 1e-9);
-        assert!(standing.message(2.0).starts_with("verification: self-intersections, 50 triangles/s, 0 s left"));
+        assert!(standing.message(2.0).starts_with("verification: topology, 50 triangles/s, 0 s left"));
     }
 
-    /// An inspection that skips the search ends with the topology, and no stage that is unknown makes it jump.
+    /// An inspection ends with the topology, and no stage that is unknown makes it jump.
     #[test]
     fn shares_are_of_what_is_to_be_done() {
         let mut standing = Standing::default();
-        standing.at("topology", 5, 10, false, Some(INTERSECTIONS));
+        standing.at("topology", 5, 10, false);
         let half = standing.share;
-        assert!((half - (4.0 + 10.0 + 12.5) / 39.0).abs() < 1e-9);
-        standing.at("unheard-of", 9, 10, false, Some(INTERSECTIONS));
+        assert!((half - (4.0 + 10.0 + 22.5) / 59.0).abs() < 1e-9);
+        standing.at("unheard-of", 9, 10, false);
         assert!((standing.share - half).abs() < 1e-9);
-        standing.at("topology", 10, 10, false, Some(INTERSECTIONS));
+        standing.at("topology", 10, 10, false);
         assert!((standing.share - 1.0).abs() < 1e-9);
         assert_eq!(standing.message(0.0), "topology, 0 s left");
     }

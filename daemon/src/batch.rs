@@ -243,12 +243,7 @@ struct Teller<'a> {
 impl<'a> Teller<'a> {
     fn new(order: &'a Order<'a>, entries: &[Entry]) -> Self {
         let sizes: Vec<u64> = entries.iter().map(|entry| entry.size).collect();
-        let bar = Bar::new(Scope {
-            files: sizes.len(),
-            bytes: sizes.iter().sum(),
-            writes: order.naming.is_some(),
-            intersections: order.profile.check_self_intersections,
-        });
+        let bar = Bar::new(Scope { files: sizes.len(), bytes: sizes.iter().sum(), writes: order.naming.is_some() });
         Self { order, sizes, bar, waiting: BTreeMap::new(), told: 0, done: 0, stopped: false, worst: Exit::Good }
     }
 

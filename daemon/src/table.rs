@@ -4,18 +4,19 @@
 use std::fmt::Write as _;
 
 use suture_core::Report;
-use suture_core::report::{Defects, Format, Outcome, Task};
+use suture_core::report::{Defects, Format, Outcome, SelfIntersections, Task};
 
 use crate::units::{show_count, show_seconds, show_size};
 
-/// Boundary loops listed before the table refers to the report.
+/// Boundary loops, and pairs that intersect, listed before the table refers to the report.
 const LOOPS_SHOWN: usize = 5;
+const PAIRS_SHOWN: usize = 3;
 
 /// A row's name and where to find its count.
 type Row = (&'static str, fn(&Defects) -> u64);
 
 /// The defects in the order of the table; rows that are zero on both sides are left out.
-const ROWS: [Row; 16] = [
+const ROWS: [Row; 19] = [
     ("non-finite triangles", |d| d.nonfinite),
     ("degenerate (two equal corners)", |d| d.degenerate_index),
     ("degenerate (no area)", |d| d.degenerate_area),
@@ -30,11 +31,25 @@ const ROWS: [Row; 16] = [
     ("disagreeing edges", |d| d.inconsistent_edges),
     ("inside-out components", |d| d.inverted_components),
     ("swallowed bodies", |d| d.nested_positive),
+    ("self-intersecting triangles", |d| found(d).map_or(0, |s| if s.given_up { TOO_MANY } else { s.triangles })),
+    ("pairs that cross", |d| found(d).map_or(0, |s| s.crossing_pairs)),
+    ("pairs that overlap", |d| found(d).map_or(0, |s| s.overlapping_pairs)),
     ("components", |d| d.components),
     ("bodies", |d| d.bodies),
 ];
 /// Rows from here on describe; they are no defects, and shown only beside some.
-const FIRST_DESCRIPTION: usize = 14;
+const FIRST_DESCRIPTION: usize = 17;
+/// Stands for a count that was given up.
+const TOO_MANY: u64 = u64::MAX;
+
+fn found(defects: &Defects) -> Option<&SelfIntersections> {
+    defects.self_intersections.as_ref()
+}
+
+/// A count for people.
+fn shown(count: u64) -> String {
+    if count == TOO_MANY { "too many".into() } else { show_count(count) }
+}
 
 /// The whole table, with a final newline.
 pub(crate) fn render(report: &Report) -> String {
@@ -62,6 +77,7 @@ pub(crate) fn render(report: &Report) -> String {
     if report.loops_left.len() > LOOPS_SHOWN {
         item(&mut out, "left", &format!("{} more loops, listed in the report", report.loops_left.len() - LOOPS_SHOWN));
     }
+    pairs_left(&mut out, report);
     if report.task == Task::Repair && report.outcome != Outcome::Clean {
         item(&mut out, "edit", &edit(report));
     }
@@ -83,13 +99,25 @@ pub(crate) fn summary(report: &Report) -> (String, String) {
         .iter()
         .take(FIRST_DESCRIPTION)
         .filter(|(_, of)| of(&report.before) > 0)
-        .map(|(name, of)| format!("{} {name}", show_count(of(&report.before))))
+        .map(|(name, of)| format!("{} {name}", shown(of(&report.before))))
         .chain(report.input.findings.iter().cloned())
         .collect();
     let done: Vec<String> =
         report.repairs.iter().map(|repair| format!("{} × {}", repair.name.replace('_', " "), show_count(repair.count))).collect();
     let or = |list: Vec<String>, none: &str| if list.is_empty() { none.to_owned() } else { list.join(", ") };
     (or(wrong, "nothing"), or(done, if report.outcome == Outcome::Clean { "copied byte for byte" } else { "nothing" }))
+}
+
+/// Triangles that still intersect, by their numbers in the file that was judged.
+fn pairs_left(out: &mut String, report: &Report) {
+    let Some(left) = found(report.after.as_ref().unwrap_or(&report.before)) else { return };
+    let all = left.crossing_pairs + left.overlapping_pairs;
+    let pairs: Vec<String> = left.listed.iter().take(PAIRS_SHOWN).map(|[a, b]| format!("{a} and {b}")).collect();
+    if !pairs.is_empty() {
+        let more = all.saturating_sub(pairs.len() as u64);
+        let rest = if more > 0 { format!(", and {} more pairs", show_count(more)) } else { String::new() };
+        item(out, "left", &format!("self-intersection of triangles {}{rest} (numbered from 0)", pairs.join(", ")));
+    }
 }
 
 fn headline(report: &Report) -> &'static str {
@@ -153,13 +181,13 @@ fn defects(out: &mut String, report: &Report) {
         Some(after) => {
             line(out, format_args!("  {:width$}  {:>14} {:>14}", "", "before", "after"));
             for (name, of) in rows {
-                let (before, after) = (show_count(of(&report.before)), show_count(of(after)));
+                let (before, after) = (shown(of(&report.before)), shown(of(after)));
                 line(out, format_args!("  {name:width$}  {before:>14} {after:>14}"));
             }
         }
         None => {
             for (name, of) in rows {
-                line(out, format_args!("  {name:width$}  {:>14}", show_count(of(&report.before))));
+                line(out, format_args!("  {name:width$}  {:>14}", shown(of(&report.before))));
             }
         }
     }
@@ -240,5 +268,29 @@ pub(crate) mod tests {
         assert!(text.contains("done    fill: one hole"), "{text}");
         let (wrong, done) = summary(&report);
         assert_eq!((wrong.as_str(), done.as_str()), ("3 boundary edges", "fill × 1"));
+    }
+
+    /// Counts before and after, and where the first that are left are; a search that was given up is no count.
+    #[test]
+    fn self_intersections_are_shown_before_and_after() {
+        let pairs = |n: u32| {
+            let listed = (0..n).map(|k| [k, k + 10]).collect();
+            let counts =
+                SelfIntersections { triangles: u64::from(2 * n), crossing_pairs: u64::from(n), listed, ..Default::default() };
+            Defects { self_intersections: Some(counts), ..Defects::default() }
+        };
+        let mut report = sample(Outcome::NotGood);
+        report.before = pairs(7);
+        report.after = Some(pairs(5));
+        let text = render(&report);
+        let row = text.lines().find(|line| line.contains("self-intersecting triangles")).unwrap();
+        assert!(row.split_whitespace().skip(2).eq(["14", "10"]), "{row}");
+        assert!(text.contains("pairs that cross") && !text.contains("pairs that overlap"), "{text}");
+        assert!(text.contains("triangles 0 and 10, 1 and 11, 2 and 12, and 2 more pairs"), "{text}");
+        if let Some(found) = &mut report.before.self_intersections {
+            *found = SelfIntersections { given_up: true, ..Default::default() };
+        }
+        assert!(render(&report).contains("too many"));
+        assert!(summary(&report).0.contains("too many self-intersecting triangles"));
     }
 }

@@ -10,5 +10,6 @@ mod e2e {
     mod memory;
     mod same_bytes;
     mod soups;
+    mod terminal;
     mod watch;
 }

@@ -70,7 +70,7 @@ impl Error {
 }
 
 /// What to compare.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Options {
     pub(crate) sizes: Vec<u64>,
     pub(crate) cases: Vec<Case>,
@@ -200,4 +200,39 @@ pub(crate) fn publish(raw: &Path, into: &Path, readme: Option<&Path>) -> Result<
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_suture_runs_once_for_each_number_of_threads() {
+        let options = Options {
+            sides: vec![Side::PymeshlabPlain, Side::Suture, Side::Suture],
+            caches: vec![Cache::Warm, Cache::Cold],
+            threads: vec![1, 2],
+            memory: Some("1GiB".into()),
+            ..Options::default()
+        };
+        let names: Vec<_> = options.ways().iter().map(Way::name).collect();
+        assert_eq!(
+            names,
+            [
+                "suture, 1 thread, --memory 1GiB",
+                "suture, 2 threads, --memory 1GiB",
+                "suture, cold, 1 thread, --memory 1GiB",
+                "suture, cold, 2 threads, --memory 1GiB",
+                "pymeshlab-plain",
+                "pymeshlab-plain, cold",
+            ]
+        );
+    }
+
+    #[test]
+    fn a_peer_has_its_largest_size_unless_told_otherwise() {
+        let options = Options { side_up_to: vec![(Side::Pymeshfix, 20)], ..Options::default() };
+        let reached = [(Side::Trimesh, 100_000), (Side::Trimesh, 1_000_000), (Side::Pymeshfix, 21), (Side::Suture, 1 << 40)];
+        assert_eq!(reached.map(|(side, size)| options.reaches(side, size)), [true, false, false, true]);
+    }
 }

@@ -36,18 +36,6 @@ impl Contact {
 
 /// The contact of two triangles; exact for all finite coordinates. A triangle of zero area meets nothing.
 pub fn triangles_cross(a: &Triangle, b: &Triangle) -> Contact {
-    meet(a, b, true)
-}
-
-/// The same where it does not matter whether two triangles touch or are apart, which is often known sooner: never
-/// [`Contact::Touch`] from one test only.
-pub(crate) fn self_intersection(a: &Triangle, b: &Triangle) -> Option<Contact> {
-    let contact = meet(a, b, false);
-    contact.is_crossing().then_some(contact)
-}
-
-/// `touching`: tell [`Contact::Touch`] from [`Contact::Apart`].
-fn meet(a: &Triangle, b: &Triangle, touching: bool) -> Contact {
     for k in 0..3 {
         let range = |t: &Triangle| (t[0][k].min(t[1][k]).min(t[2][k]), t[0][k].max(t[1][k]).max(t[2][k]));
         let ((a_lo, a_hi), (b_lo, b_hi)) = (range(a), range(b));
@@ -55,17 +43,31 @@ fn meet(a: &Triangle, b: &Triangle, touching: bool) -> Contact {
             return Contact::Apart;
         }
     }
-    let (of_b, shared) = sides_of(a, b);
+    meet(a, b, [a.map(|p| b.contains(&p)), b.map(|p| a.contains(&p))], true)
+}
+
+/// The same where it does not matter whether two triangles touch or are apart, which is often known sooner. Both have an area;
+/// `common`: which corners of the one are also corners of the other.
+pub(crate) fn self_intersection(a: &Triangle, b: &Triangle, common: [[bool; 3]; 2]) -> Option<Contact> {
+    let contact = if common[0] == [true; 3] { Contact::Overlap } else { meet(a, b, common, false) };
+    contact.is_crossing().then_some(contact)
+}
+
+/// `touching`: tell [`Contact::Touch`] from [`Contact::Apart`].
+#[inline]
+fn meet(a: &Triangle, b: &Triangle, common: [[bool; 3]; 2], touching: bool) -> Contact {
+    let shared = common[0].iter().filter(|c| **c).count();
+    let of_b = sides_of(a, b, common[1]);
     if one_sided(of_b) || (!touching && in_a_point(of_b)) {
         return Contact::Apart;
     }
     if of_b == [0; 3] {
-        return coplanar(a, b, shared);
+        return coplanar(a, b, shared, touching);
     }
     if shared >= 2 {
         return Contact::Apart;
     }
-    let (of_a, _) = sides_of(b, a);
+    let of_a = sides_of(b, a, common[0]);
     // All zero although b is not in a's plane: b has no area.
     if one_sided(of_a) || of_a == [0; 3] || (!touching && in_a_point(of_a)) {
         return Contact::Apart;
@@ -73,18 +75,12 @@ fn meet(a: &Triangle, b: &Triangle, touching: bool) -> Contact {
     on_common_line(&Cut::new(a, of_a), &Cut::new(b, of_b), shared)
 }
 
-/// The sides of `a`'s plane on which the corners of `b` lie, and how many corners both have.
-fn sides_of(a: &Triangle, b: &Triangle) -> ([i8; 3], usize) {
+/// The sides of `a`'s plane on which the corners of `b` lie, of which some are `common` to both.
+#[inline]
+fn sides_of(a: &Triangle, b: &Triangle, common: [bool; 3]) -> [i8; 3] {
     let plane = Plane::new(&a[0], &a[1], &a[2]);
-    let mut shared = 0;
-    let sides = b.map(|p| {
-        if a.contains(&p) {
-            shared += 1;
-            return 0;
-        }
-        plane.side(&p)
-    });
-    (sides, shared)
+    let side = |k: usize| if common[k] { 0 } else { plane.side(&b[k]) };
+    [side(0), side(1), side(2)]
 }
 
 /// One corner in the plane, the others on one side of it.
@@ -143,7 +139,7 @@ fn on_common_line(a: &Cut<'_>, b: &Cut<'_>, shared: usize) -> Contact {
 }
 
 /// Both in one plane, or `a` without area.
-fn coplanar(a: &Triangle, b: &Triangle, shared: usize) -> Contact {
+fn coplanar(a: &Triangle, b: &Triangle, shared: usize, touching: bool) -> Contact {
     // Looking down an axis along which `a` shows an area keeps what is in its plane apart.
     let Some(axis) = (0..3).find(|&k| turn(&a[0], &a[1], &a[2], k) != 0) else { return Contact::Apart };
     let (of_a, of_b) = (turn(&a[0], &a[1], &a[2], axis), turn(&b[0], &b[1], &b[2], axis));
@@ -159,6 +155,9 @@ fn coplanar(a: &Triangle, b: &Triangle, shared: usize) -> Contact {
         for k in 0..3 {
             let inner = y.iter().map(|p| sense * turn(&x[k], &x[(k + 1) % 3], p, axis)).max();
             deepest = deepest.min(inner.unwrap_or(0));
+            if deepest < 1 && !touching {
+                return Contact::Apart;
+            }
         }
     }
     match (deepest, shared) {

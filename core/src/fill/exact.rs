@@ -34,6 +34,7 @@ pub(super) struct Plane<'a> {
 }
 
 impl<'a> Plane<'a> {
+    #[inline]
     pub(super) fn new(a: &'a Point, b: &'a Point, c: &'a Point) -> Self {
         let (u, v) = (at(b) - at(a), at(c) - at(a));
         let (p, q) = (u.yzx() * v.zxy(), u.zxy() * v.yzx());
@@ -41,6 +42,7 @@ impl<'a> Plane<'a> {
     }
 
     /// The side on which `d` lies, as [`side`] says it.
+    #[inline]
     pub(super) fn side(&self, d: &Point) -> i8 {
         let w = at(d) - at(self.corners[0]);
         let (value, magnitude) = (self.normal.dot(w), self.magnitude.dot(w.abs()));

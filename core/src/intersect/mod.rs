@@ -26,6 +26,7 @@ mod tree;
 use crate::chunk::NONE;
 use crate::fill::cross::{Contact, self_intersection};
 use crate::plan::HomeBox;
+use narrow::Round;
 use stars::Stars;
 use tree::{Forest, Row, Visit, Walk, bits};
 
@@ -46,7 +47,8 @@ pub(crate) struct Region<'a> {
 impl Region<'_> {
     #[inline(always)]
     fn corners(&self, t: [u32; 3]) -> [[f32; 3]; 3] {
-        t.map(|v| self.positions[v as usize])
+        let [a, b, c] = t;
+        [self.positions[a as usize], self.positions[b as usize], self.positions[c as usize]]
     }
 
     /// The triangles that are not left out, with their numbers.
@@ -117,10 +119,18 @@ impl Finder {
         }));
         self.forest.build(region, &self.stars, &self.states);
         self.waiting.clear();
-        let mut search =
-            Search { region, states: &self.states, waiting: &mut self.waiting, counted: 0, allowance, found: &mut found };
-        let complete = Walk::new(&self.forest, &mut search).all() && search.around_hubs(&self.forest, &mut self.by_vertex);
+        let mut search = Search {
+            region,
+            states: &self.states,
+            rows: &self.forest.rows,
+            waiting: &mut self.waiting,
+            counted: 0,
+            allowance,
+            found: &mut found,
+        };
+        let walked = Walk::new(&self.forest, &mut search).all();
         search.separate();
+        let complete = walked && search.around_hubs(&self.forest, &mut self.by_vertex);
         Tested { pairs: search.counted, complete: complete && search.counted <= allowance }
     }
 }
@@ -129,6 +139,8 @@ impl Finder {
 struct Search<'a, F> {
     region: &'a Region<'a>,
     states: &'a [State],
+    rows: &'a [Row],
+    /// Rows that overlap, without a common vertex.
     waiting: &'a mut Vec<[u32; 2]>,
     counted: u64,
     allowance: u64,
@@ -137,19 +149,14 @@ struct Search<'a, F> {
 
 impl<F: FnMut(u32, u32, Contact)> Visit for Search<'_, F> {
     #[inline]
-    fn visit(&mut self, rows: &[Row], row: usize, first: usize, lanes: u32, sharing: u32) -> bool {
-        let one = &rows[row];
+    fn visit(&mut self, row: usize, first: usize, lanes: u32, sharing: u32) -> bool {
         for j in bits(lanes & !sharing) {
-            let other = &rows[first + j];
-            if one.owns_lowest_corner(other) && one.same_plane(other) {
-                self.counted += 1;
-                self.waiting.push([one.triangle, other.triangle]);
-            }
+            self.waiting.push([row as u32, (first + j) as u32]);
         }
         // A vertex that both have and that is not open is away, so the pair is not owned here, or certified, so it is apart.
-        if one.is_open() {
+        if lanes & sharing != 0 && self.rows[row].is_open() {
             for j in bits(lanes & sharing) {
-                self.sharing(one.triangle, rows[first + j].triangle, NONE);
+                self.sharing(self.rows[row].triangle, self.rows[first + j].triangle, NONE);
             }
         }
         if self.waiting.len() >= WAITING {
@@ -172,7 +179,8 @@ impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
         }
         self.counted += 1;
         if !shared().any(|v| self.states[*v as usize] == State::Certified) {
-            self.decide(i, j);
+            let common = [s.map(|v| t.contains(&v)), t.map(|v| s.contains(&v))];
+            self.decide(i, j, common);
         }
     }
 
@@ -208,27 +216,50 @@ impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
         true
     }
 
-    /// Decides the waiting pairs, none of which share a vertex.
+    /// Counts and decides those waiting pairs that are owned here; none of them shares a vertex. What stays after each round
+    /// closes up to fours.
     #[inline(never)]
     fn separate(&mut self) {
-        let waiting = std::mem::take(self.waiting);
-        for four in waiting.chunks(4) {
-            let pair = |k: usize| four[k.min(four.len() - 1)].map(|i| self.region.corners(self.region.triangles[i as usize]));
-            let apart = narrow::apart([pair(0), pair(1), pair(2), pair(3)]);
-            for (k, [i, j]) in four.iter().enumerate() {
-                if apart >> k & 1 == 0 {
-                    self.decide(*i, *j);
+        let mut waiting = std::mem::take(self.waiting);
+        let mut owned = 0;
+        for k in 0..waiting.len() {
+            let [one, other] = waiting[k].map(|row| &self.rows[row as usize]);
+            waiting[owned] = [one.triangle, other.triangle];
+            owned += usize::from(one.owns_lowest_corner(other) && one.same_plane(other));
+        }
+        waiting.truncate(owned);
+        self.counted += owned as u64;
+        for round in [Round::Planes, Round::Edges] {
+            let mut kept = 0;
+            for start in (0..waiting.len()).step_by(4) {
+                let end = waiting.len().min(start + 4);
+                let pair = |k: usize| {
+                    let [i, j] = waiting[(start + k).min(end - 1)];
+                    let [s, t] = [self.region.triangles[i as usize], self.region.triangles[j as usize]];
+                    [s[0], s[1], s[2], t[0], t[1], t[2]].map(|v| &self.region.positions[v as usize])
+                };
+                let apart = narrow::apart(&[pair(0), pair(1), pair(2), pair(3)], round);
+                for k in start..end {
+                    waiting[kept] = waiting[k];
+                    kept += usize::from(apart >> (k - start) & 1 == 0);
                 }
             }
+            waiting.truncate(kept);
+        }
+        for [i, j] in waiting.drain(..) {
+            self.decide(i, j, [[false; 3]; 2]);
         }
         *self.waiting = waiting;
-        self.waiting.clear();
     }
 
-    /// Exactly.
-    fn decide(&mut self, i: u32, j: u32) {
-        let [a, b] = [i, j].map(|i| self.region.corners(self.region.triangles[i as usize]));
-        if let Some(contact) = self_intersection(&a, &b) {
+    #[inline(always)]
+    fn corners(&self, i: u32) -> [[f32; 3]; 3] {
+        self.region.corners(self.region.triangles[i as usize])
+    }
+
+    /// Exactly. `common`: which corners of each are also corners of the other.
+    fn decide(&mut self, i: u32, j: u32, common: [[bool; 3]; 2]) {
+        if let Some(contact) = self_intersection(&self.corners(i), &self.corners(j), common) {
             (self.found)(i.min(j), i.max(j), contact);
         }
     }

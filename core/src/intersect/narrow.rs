@@ -7,6 +7,8 @@
 //! are asked for. Where something may have underflowed, the bound is no normal number, where something may have overflowed, it is
 //! large; neither passes.
 
+use std::ops::{Add, Sub};
+
 use glam::Vec4;
 
 /// 16ε.
@@ -25,19 +27,8 @@ struct Points {
 
 impl Points {
     #[inline(always)]
-    fn new(p: [[f32; 3]; 4]) -> Self {
-        let [x, y, z] = [0, 1, 2].map(|k| Vec4::new(p[0][k], p[1][k], p[2][k], p[3][k]));
-        Self { x, y, z }
-    }
-
-    #[inline(always)]
-    fn sub(self, o: Self) -> Self {
-        Self { x: self.x - o.x, y: self.y - o.y, z: self.z - o.z }
-    }
-
-    #[inline(always)]
-    fn add(self, o: Self) -> Self {
-        Self { x: self.x + o.x, y: self.y + o.y, z: self.z + o.z }
+    fn new(a: &[f32; 3], b: &[f32; 3], c: &[f32; 3], d: &[f32; 3]) -> Self {
+        Self { x: Vec4::new(a[0], b[0], c[0], d[0]), y: Vec4::new(a[1], b[1], c[1], d[1]), z: Vec4::new(a[2], b[2], c[2], d[2]) }
     }
 
     #[inline(always)]
@@ -56,9 +47,25 @@ impl Points {
     }
 }
 
-/// Four pairs, from the first corner of the first triangle of each.
+impl Add for Points {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Self { x: self.x + o.x, y: self.y + o.y, z: self.z + o.z }
+    }
+}
+
+impl Sub for Points {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, o: Self) -> Self {
+        Self { x: self.x - o.x, y: self.y - o.y, z: self.z - o.z }
+    }
+}
+
+/// Four pairs, from the first corner of the first triangle of each, which is left out.
 struct Pairs {
-    a: [Points; 3],
+    a: [Points; 2],
     b: [Points; 3],
     /// Largest coordinate times 16ε.
     error: Vec4,
@@ -68,42 +75,48 @@ impl Pairs {
     /// The pairs that this direction separates.
     #[inline(always)]
     fn separated(&self, w: Points) -> u32 {
-        let (a, b) = (self.a.map(|p| p.dot(w)), self.b.map(|p| p.dot(w)));
-        let low = |v: [Vec4; 3]| v[0].min(v[1]).min(v[2]);
-        let high = |v: [Vec4; 3]| v[0].max(v[1]).max(v[2]);
-        let gap = (low(b) - high(a)).max(low(a) - high(b));
+        let (p, q) = (self.a[0].dot(w), self.a[1].dot(w));
+        let (r, s, t) = (self.b[0].dot(w), self.b[1].dot(w), self.b[2].dot(w));
+        let (a_low, a_high) = (p.min(q).min(Vec4::ZERO), p.max(q).max(Vec4::ZERO));
+        let (b_low, b_high) = (r.min(s).min(t), r.max(s).max(t));
+        let gap = (b_low - a_high).max(a_low - b_high);
         let bound = (w.x.abs() + w.y.abs() + w.z.abs()) * self.error;
         (gap.cmpgt(bound) & bound.cmplt(Vec4::splat(LARGEST)) & bound.cmpgt(Vec4::splat(f32::MIN_POSITIVE))).bitmask()
     }
 }
 
+/// The corners of two triangles.
+pub(super) type Pair<'a> = [&'a [f32; 3]; 6];
+
+/// Which directions are tried.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Round {
+    /// From one middle to the other, and upright on either triangle: enough for nearly all pairs of a surface that bends.
+    Planes,
+    /// In the plane of either, upright on its edges: for triangles that lie nearly in one plane.
+    Edges,
+}
+
 /// Which of four pairs of triangles are certainly apart (bit k: pair k).
 #[inline]
-pub(super) fn apart(pairs: [[[[f32; 3]; 3]; 2]; 4]) -> u32 {
-    let corner = |side: usize, k: usize| Points::new(pairs.map(|p| p[side][k]));
-    let origin = corner(0, 0);
-    let a = [origin.sub(origin), corner(0, 1).sub(origin), corner(0, 2).sub(origin)];
-    let b = [0, 1, 2].map(|k| corner(1, k).sub(origin));
-    let largest = [a[1], a[2], b[0], b[1], b[2]].map(Points::largest);
-    let error = largest[0].max(largest[1]).max(largest[2]).max(largest[3]).max(largest[4]) * ERROR;
-    let pairs = Pairs { a, b, error };
-    // Between the middles; this is nearly always enough where neighbours bend away from each other.
-    let mut found = pairs.separated(b[0].add(b[1]).add(b[2]).sub(a[1]).sub(a[2]));
-    let normals = [&a, &b].map(|t| t[1].sub(t[0]).cross(t[2].sub(t[0])));
-    for normal in normals {
-        if found == 15 {
-            return found;
-        }
-        found |= pairs.separated(normal);
+pub(super) fn apart(p: &[Pair<'_>; 4], round: Round) -> u32 {
+    let corner = |k: usize| Points::new(p[0][k], p[1][k], p[2][k], p[3][k]);
+    let origin = corner(0);
+    let (u, v) = (corner(1) - origin, corner(2) - origin);
+    let (r, s, t) = (corner(3) - origin, corner(4) - origin, corner(5) - origin);
+    let largest = u.largest().max(v.largest()).max(r.largest()).max(s.largest()).max(t.largest());
+    let pairs = Pairs { a: [u, v], b: [r, s, t], error: largest * ERROR };
+    let (e, f) = (s - r, t - r);
+    let (m, n) = (u.cross(v), e.cross(f));
+    if round == Round::Planes {
+        return pairs.separated(r + s + t - u - v) | pairs.separated(m) | pairs.separated(n);
     }
-    // Upright planes on the edges, for triangles that lie nearly in one plane.
-    for (t, normal) in [(&a, normals[0]), (&b, normals[1])] {
-        for k in 0..3 {
-            if found == 15 {
-                return found;
-            }
-            found |= pairs.separated(t[(k + 1) % 3].sub(t[k]).cross(normal));
+    let mut found = pairs.separated(u.cross(m));
+    for w in [v.cross(m), (v - u).cross(m), e.cross(n), f.cross(n), (f - e).cross(n)] {
+        if found == 15 {
+            break;
         }
+        found |= pairs.separated(w);
     }
     found
 }

@@ -25,10 +25,11 @@
 //! are taken as 16ε, which leaves room for rounding the bounds. What may have underflowed is too small for the bound to be a
 //! normal number, and what overflowed is not finite: neither passes.
 //!
-//! d is the sum of the normals in the order in which the triangles are given, the mesh's; so the certificate is a property of the
-//! mesh, not of the chunk.
+//! d is the sum of the unit normals in the order in which the triangles are given, the mesh's; so the certificate is a property
+//! of the mesh, not of the chunk. (Correcting d by the normals it does not go with, as a perceptron does, certified few stars
+//! more and cost more than it saved.)
 
-use glam::{Mat4, Vec3, Vec4};
+use glam::{Mat4, Vec3, Vec4, Vec4Swizzles};
 
 use super::Region;
 
@@ -47,6 +48,18 @@ pub(super) struct View {
     line: Vec4,
 }
 
+impl View {
+    /// Sets e for d.
+    #[inline(always)]
+    fn set_line(&mut self) {
+        let along = self.along.truncate();
+        let size = along.abs().max_element();
+        // Below this, e could have underflowed.
+        let error = if size > 1e-30 { size * ERROR } else { f32::INFINITY };
+        self.line = along.cross(LINE).extend(error);
+    }
+}
+
 /// Reused from chunk to chunk.
 #[derive(Default)]
 pub(super) struct Stars {
@@ -58,34 +71,45 @@ pub(super) struct Stars {
 /// More than once round, or a sign that is not safe.
 const REFUSED: u8 = 3;
 
+/// The normal, of about unit length; any other vector would be as right.
+#[inline(always)]
+fn unit_normal(region: &Region<'_>, t: [u32; 3]) -> Vec3 {
+    let [a, b, c] = region.corners(t);
+    let [a, b, c] = [Vec3::from_array(a), Vec3::from_array(b), Vec3::from_array(c)];
+    let normal = (b - a).cross(c - a);
+    normal * (1.0 / normal.length())
+}
+
 impl Stars {
     /// Looks at all vertices of the region. O(triangles).
     pub(super) fn look(&mut self, region: &Region<'_>) {
         self.views.clear();
         self.views.resize(region.positions.len(), View::default());
         for (_, t) in region.solid_triangles() {
-            let [a, b, c] = region.corners(t).map(Vec3::from_array);
-            let normal = (b - a).cross(c - a).extend(1.0);
+            let normal = unit_normal(region, t).extend(1.0);
             for v in t {
                 self.views[v as usize].along += normal;
             }
         }
         for view in &mut self.views {
-            let along = view.along.truncate();
-            let size = along.abs().max_element();
-            // Below this, e could have underflowed.
-            let error = if size > 1e-30 { size * ERROR } else { f32::INFINITY };
-            view.line = along.cross(LINE).extend(error);
+            view.set_line();
         }
         self.turns.clear();
         self.turns.resize(region.positions.len(), 0);
         for (_, t) in region.solid_triangles() {
-            let (crossing, unsafe_signs) = sector_signs(region.corners(t), t.map(|v| self.views[v as usize]));
-            for (k, v) in t.iter().enumerate() {
-                let turns = &mut self.turns[*v as usize];
-                let more = if unsafe_signs >> k & 1 == 1 { REFUSED } else { (crossing >> k & 1) as u8 };
-                *turns = (*turns + more).min(REFUSED);
-            }
+            self.count_turns(region, t);
+        }
+    }
+
+    /// Adds a triangle to what its vertices see.
+    #[inline(always)]
+    fn count_turns(&mut self, region: &Region<'_>, t: [u32; 3]) {
+        let view = |k: usize| &self.views[t[k] as usize];
+        let (crossing, unsafe_signs) = sector_signs(&region.corners(t), [view(0), view(1), view(2)]);
+        for (k, v) in t.iter().enumerate() {
+            let turns = &mut self.turns[*v as usize];
+            let more = if unsafe_signs >> k & 1 == 1 { REFUSED } else { (crossing >> k & 1) as u8 };
+            *turns = (*turns + more).min(REFUSED);
         }
     }
 
@@ -104,28 +128,29 @@ impl Stars {
 
 /// For each corner of a triangle (bit k), seen as its view says: does its sector run across the half line, and is a sign unsafe?
 #[inline]
-fn sector_signs(corners: [[f32; 3]; 3], views: [View; 3]) -> (u32, u32) {
+fn sector_signs(corners: &[[f32; 3]; 3], views: [&View; 3]) -> (u32, u32) {
+    let [a, b, c] = corners;
     // One lane a corner.
-    let [x, y, z] = [0, 1, 2].map(|k| Vec4::new(corners[0][k], corners[1][k], corners[2][k], 0.0));
     let along = Mat4::from_cols(views[0].along, views[1].along, views[2].along, Vec4::ZERO).transpose();
     let line = Mat4::from_cols(views[0].line, views[1].line, views[2].line, Vec4::ZERO).transpose();
-    let next = [x, y, z].map(|p| Vec4::new(p.y, p.z, p.x, 0.0) - p);
-    let previous = [x, y, z].map(|p| Vec4::new(p.z, p.x, p.y, 0.0) - p);
+    let (x, y, z) = (Vec4::new(a[0], b[0], c[0], 0.0), Vec4::new(a[1], b[1], c[1], 0.0), Vec4::new(a[2], b[2], c[2], 0.0));
+    let next = [x.yzxw() - x, y.yzxw() - y, z.yzxw() - z];
+    let previous = [x.zxyw() - x, y.zxyw() - y, z.zxyw() - z];
     let normal = [
         next[1] * previous[2] - next[2] * previous[1],
         next[2] * previous[0] - next[0] * previous[2],
         next[0] * previous[1] - next[1] * previous[0],
     ];
-    let length = |e: [Vec4; 3]| e[0].abs() + e[1].abs() + e[2].abs();
-    let (next_length, previous_length) = (length(next), length(previous));
+    let length = |e: &[Vec4; 3]| e[0].abs() + e[1].abs() + e[2].abs();
+    let (next_length, previous_length) = (length(&next), length(&previous));
     let largest = Vec4::splat(f32::MAX);
     let smallest = Vec4::splat(f32::MIN_POSITIVE);
     let area = next_length * previous_length;
     let height = normal[0] * along.x_axis + normal[1] * along.y_axis + normal[2] * along.z_axis;
     let bound = area * line.w_axis;
     let upward = height.cmpgt(bound) & height.cmple(largest) & bound.cmpgt(smallest) & (area * ERROR).cmpgt(smallest);
-    let place = |e: [Vec4; 3]| e[0] * line.x_axis + e[1] * line.y_axis + e[2] * line.z_axis;
-    let (at_next, at_previous) = (place(next), place(previous));
+    let place = |e: &[Vec4; 3]| e[0] * line.x_axis + e[1] * line.y_axis + e[2] * line.z_axis;
+    let (at_next, at_previous) = (place(&next), place(&previous));
     let (next_bound, previous_bound) = (next_length * line.w_axis, previous_length * line.w_axis);
     let clear = |at: Vec4, bound: Vec4| at.abs().cmpgt(bound) & at.abs().cmple(largest) & bound.cmpgt(smallest);
     let safe = upward & clear(at_next, next_bound) & clear(at_previous, previous_bound);

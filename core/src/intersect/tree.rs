@@ -115,7 +115,8 @@ impl Node {
 
     #[inline(always)]
     fn lane(&self, i: usize) -> Bounds {
-        Bounds { lo: self.lo.map(|l| l[i]), hi: self.hi.map(|h| h[i]) }
+        let (lo, hi) = (&self.lo, &self.hi);
+        Bounds { lo: [lo[0][i], lo[1][i], lo[2][i]], hi: [hi[0][i], hi[1][i], hi[2][i]] }
     }
 
     fn set(&mut self, i: usize, bounds: &Bounds) {
@@ -127,14 +128,12 @@ impl Node {
 
     /// The box of all lanes.
     fn bounds(&self) -> Bounds {
-        let lo = self.lo.each_ref().map(|l| {
-            let [a, b] = halves(l);
-            a.min(b).min_element()
-        });
-        let hi = self.hi.each_ref().map(|h| {
-            let [a, b] = halves(h);
-            a.max(b).max_element()
-        });
+        let (mut lo, mut hi) = ([0.0; 3], [0.0; 3]);
+        for k in 0..3 {
+            let (begins, ends) = (halves(&self.lo[k]), halves(&self.hi[k]));
+            lo[k] = begins[0].min(begins[1]).min_element();
+            hi[k] = ends[0].max(ends[1]).max_element();
+        }
         Bounds { lo, hi }
     }
 }
@@ -225,36 +224,36 @@ impl Forest {
     #[inline(never)]
     fn collect(&mut self, region: &Region<'_>, states: &[State]) {
         let (cell_lo, cell_hi) = region.cell.ends();
-        let (cut_lo, cut_hi) = (cell_lo.map(f32::next_down), cell_hi.map(f32::next_up));
+        let four = |p: [f32; 3]| Vec4::new(p[0], p[1], p[2], 0.0);
+        let (cut_lo, cut_hi) = (four(cell_lo.map(f32::next_down)), four(cell_hi.map(f32::next_up)));
+        let (cell_lo, cell_hi) = (four(cell_lo), four(cell_hi));
         self.unsorted.clear();
         self.unsorted.reserve(region.triangles.len());
         for (i, t) in region.solid_triangles() {
             let [a, b, c] = region.corners(t);
-            let mut row = Row { triangle: i, ..Row::EMPTY };
-            let mut meets = true;
-            for k in 0..3 {
-                let (mut lo, mut hi) = (a[k].min(b[k]).min(c[k]), a[k].max(b[k]).max(c[k]));
-                meets &= (lo <= cell_hi[k]) & (hi >= cell_lo[k]);
-                row.flags |= u32::from(lo < cell_lo[k]) << k | u32::from(lo == hi) << (3 + k);
-                if lo == hi {
-                    (lo, hi) = (lo.next_down(), hi.next_up());
-                }
-                row.lo[k] = lo.max(cut_lo[k]);
-                row.hi[k] = hi.min(cut_hi[k]);
+            let (a, b, c) = (four(a), four(b), four(c));
+            let (mut lo, mut hi) = (a.min(b).min(c), a.max(b).max(c));
+            if !(lo.cmple(cell_hi) & hi.cmpge(cell_lo)).all() {
+                continue;
             }
+            let flat = lo.cmpeq(hi).bitmask() & 7;
+            let mut flags = (lo.cmplt(cell_lo).bitmask() & 7) | flat << 3;
+            for k in bits(flat) {
+                (lo[k], hi[k]) = (lo[k].next_down(), hi[k].next_up());
+            }
+            (lo, hi) = (lo.max(cut_lo), hi.min(cut_hi));
             if t.iter().any(|v| states[*v as usize] == State::Open) {
-                row.flags |= Row::OPEN;
+                flags |= Row::OPEN;
             }
-            if meets {
-                self.unsorted.push(row);
-            }
+            self.unsorted.push(Row { lo: lo.truncate().into(), triangle: i, hi: hi.truncate().into(), flags });
         }
     }
 
     /// Fills `keys` in the order of the curve.
     #[inline(never)]
     fn sort(&mut self) {
-        let middle = |row: &Row| -> [f32; 3] { std::array::from_fn(|k| row.lo[k] * 0.5 + row.hi[k] * 0.5) };
+        let at = |row: &Row, k: usize| row.lo[k] * 0.5 + row.hi[k] * 0.5;
+        let middle = |row: &Row| [at(row, 0), at(row, 1), at(row, 2)];
         let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
         for row in &self.unsorted {
             let m = middle(row);
@@ -270,8 +269,10 @@ impl Forest {
         self.keys.clear();
         self.keys.extend(self.unsorted.iter().enumerate().map(|(i, row)| {
             let m = middle(row);
-            let [x, y, z] = [0, 1, 2].map(|k| spread((((m[k] - lo[k]) * scale) as u32).min(255)));
-            let curve = x | y << 1 | z << 2;
+            let place = |k: usize| spread((((m[k] - lo[k]) * scale) as u32).min(255)) << k;
+            let extent = (row.hi[0] - row.lo[0]).max(row.hi[1] - row.lo[1]).max(row.hi[2] - row.lo[2]) * scale;
+            let class = u32::from(extent > 8.0) + u32::from(extent > 32.0) + u32::from(extent > 128.0);
+            let curve = (place(0) | place(1) | place(2)) >> 2 | class << 22;
             low[(curve & 4095) as usize] += 1;
             high[(curve >> 12) as usize] += 1;
             u64::from(curve) << 32 | i as u64
@@ -374,7 +375,7 @@ fn spread(x: u32) -> u32 {
 pub(super) trait Visit {
     /// `row` overlaps the rows from `first` on whose bits are set in `lanes`; those in `sharing` (and maybe others, which do not
     /// overlap) have a vertex in common with it. Returns `false` to end the walk.
-    fn visit(&mut self, rows: &[Row], row: usize, first: usize, lanes: u32, sharing: u32) -> bool;
+    fn visit(&mut self, row: usize, first: usize, lanes: u32, sharing: u32) -> bool;
 }
 
 /// A walk over a forest.
@@ -490,12 +491,13 @@ impl<'a, V: Visit> Walk<'a, V> {
         true
     }
 
-    fn between_leaves(&mut self, (a, b): (usize, usize), bounds: &Bounds, other_bounds: &Bounds) -> bool {
-        let (node, other) = (&self.forest.leaves[a], &self.forest.leaves[b]);
+    fn between_leaves(&mut self, (mut a, mut b): (usize, usize), bounds: &Bounds, other_bounds: &Bounds) -> bool {
+        let (mut node, mut other) = (&self.forest.leaves[a], &self.forest.leaves[b]);
         let mut lanes = node.overlapping(&other_bounds.lo, &other_bounds.hi);
-        let reach = other.overlapping(&bounds.lo, &bounds.hi);
-        if reach == 0 {
-            return true;
+        let others = other.overlapping(&bounds.lo, &bounds.hi);
+        // One by one those of the leaf that has fewer.
+        if others.count_ones() < lanes.count_ones() {
+            (a, b, node, other, lanes) = (b, a, other, node, others);
         }
         while lanes != 0 {
             let i = lanes.trailing_zeros() as usize;
@@ -513,7 +515,7 @@ impl<'a, V: Visit> Walk<'a, V> {
     #[inline]
     fn row(&mut self, row: usize, leaf: usize, lanes: u32) -> bool {
         let sharing = self.forest.corners[row / WIDTH].sharing(row % WIDTH, &self.forest.corners[leaf]);
-        self.visit.visit(&self.forest.rows, row, leaf * WIDTH, lanes, sharing)
+        self.visit.visit(row, leaf * WIDTH, lanes, sharing)
     }
 }
 

@@ -139,11 +139,35 @@ pub(crate) fn scratch_bytes(members: u64) -> u64 {
 impl Scratch {
     /// Decides everything that can be decided inside the chunk of this cell. O(members).
     pub(crate) fn solve(&mut self, seen: &Seen<'_>, cell: HomeBox, measure: &Measure) -> ChunkTopology {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("bmi2") {
+            // SAFETY: the processor has them.
+            return unsafe { self.solve_avx2(seen, cell, measure) };
+        }
+        self.solve_by(seen, cell, measure, Ring::places)
+    }
+
+    /// The same code with wider vectors.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,bmi1,bmi2")]
+    fn solve_avx2(&mut self, seen: &Seen<'_>, cell: HomeBox, measure: &Measure) -> ChunkTopology {
+        self.solve_by(seen, cell, measure, |ring, corner| ring.places_avx2(corner))
+    }
+
+    /// `places` tells where a corner stands in a ring.
+    #[inline(always)]
+    fn solve_by(
+        &mut self,
+        seen: &Seen<'_>,
+        cell: HomeBox,
+        measure: &Measure,
+        places: impl Fn(&Ring, u32) -> u32 + Copy,
+    ) -> ChunkTopology {
         match seen {
             Seen::Mapped(source) => self.weld(source),
             Seen::Spooled(source) => self.weld(source),
         }
-        self.judge_stars(cell);
+        self.judge_stars(cell, places);
         self.collect(measure)
     }
 
@@ -200,7 +224,7 @@ impl Scratch {
     }
 
     /// Numbers the vertices of all members.
-    #[inline(never)]
+    #[inline(always)]
     fn weld(&mut self, source: &impl Source) {
         self.numbers.clear();
         self.triangles.clear();
@@ -239,8 +263,8 @@ impl Scratch {
     }
 
     /// Tests whether the triangles around each home vertex are one closed coherent fan, and puts those that are sound into patches.
-    #[inline(never)]
-    fn judge_stars(&mut self, cell: HomeBox) {
+    #[inline(always)]
+    fn judge_stars(&mut self, cell: HomeBox, places: impl Fn(&Ring, u32) -> u32 + Copy) {
         let positions = self.vertices.positions();
         self.stars.gather(positions.len(), &self.triangles);
         self.states.clear();
@@ -252,20 +276,8 @@ impl Scratch {
         }
         self.parents.clear();
         self.parents.extend(0..positions.len() as u32);
-        #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            let roots = unsafe { self.judge_avx2() };
-            return self.unite_patches(roots);
-        }
-        let roots = self.judge(Ring::places);
+        let roots = self.judge(places);
         self.unite_patches(roots);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,bmi1,bmi2")]
-    fn judge_avx2(&mut self) -> usize {
-        self.judge(|ring, corner| ring.places_avx2(corner))
     }
 
     /// Tests stars by ascending vertex. A sound one is put with an older sound neighbour, one in its first triangle if that will do;
@@ -293,7 +305,7 @@ impl Scratch {
     }
 
     /// Unites the patches of sound home vertices that share a triangle, of which there are `roots` as yet.
-    #[inline(never)]
+    #[inline(always)]
     fn unite_patches(&mut self, mut roots: usize) {
         for t in self.triangles.iter().filter(|t| t[0] != NONE) {
             if roots <= 1 {
@@ -313,7 +325,7 @@ impl Scratch {
         }
     }
 
-    #[inline(never)]
+    #[inline(always)]
     fn collect(&mut self, measure: &Measure) -> ChunkTopology {
         let home = || self.states.iter().enumerate().filter(|(_, state)| **state != AWAY);
         let mut out = ChunkTopology {
@@ -362,7 +374,7 @@ impl Scratch {
     }
 
     /// Numbers the patches by their first vertices.
-    #[inline(never)]
+    #[inline(always)]
     fn number_patches(&mut self, patches: &mut Vec<Patch>) {
         let mut bounds = Bounds::EMPTY;
         let mut patch = NONE;
@@ -417,7 +429,7 @@ impl<'a> Sum<'a> {
         self.batch.push([corner(0), corner(1), corner(2)]);
     }
 
-    #[inline(never)]
+    #[inline(always)]
     fn flush(&mut self, patches: &mut [Patch]) {
         if self.triangles > 0 {
             let sums = &mut patches[self.patch as usize];

@@ -8,6 +8,7 @@ mod bodies;
 mod boxes;
 mod budget;
 mod chunk;
+mod columns;
 mod cost;
 mod crossings;
 mod defects;

@@ -8,6 +8,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::Progress;
+use crate::columns::{CellColumns, Columns, Extremes};
 use crate::error::Result;
 use crate::plan::{ChunkId, Plan};
 use crate::record::{self, Record};
@@ -366,17 +367,20 @@ fn gather_piece(records: &[Record], offset: u32, plan: &Plan, visitors: bool, ta
     let lists = if visitors { plan.chunks() } else { 0 };
     let mut passing = Passing { visitors: vec![RunList::default(); lists], nonfinite: Vec::new(), bounds: Bounds::EMPTY };
     let mut current = ChunkId(0);
-    let mut cell = plan.home_box(current);
+    let mut cell = CellColumns::of(&plan.home_box(current));
+    let mut extremes = Extremes::EMPTY;
     let mut run_start = 0;
     for (i, record) in records.iter().enumerate() {
         if (i + 1).is_multiple_of(Told::EVERY) {
             told.step();
         }
-        let corners = record::corners(record);
-        if cell.holds(corners[0]) && cell.holds(corners[1]) && cell.holds(corners[2]) {
-            passing.bounds.include(&corners);
+        record::prefetch_after(record);
+        let columns = Columns::of(record);
+        if cell.holds(&columns) {
+            extremes.include(&columns);
             continue;
         }
+        let corners = record::corners(record);
         if i > run_start {
             take.take_run(current, offset + run_start as u32, &records[run_start..i]);
         }
@@ -397,7 +401,7 @@ fn gather_piece(records: &[Record], offset: u32, plan: &Plan, visitors: bool, ta
         match (b == a, c == a, c == b) {
             (true, true, _) => {
                 current = a;
-                cell = plan.home_box(current);
+                cell = CellColumns::of(&plan.home_box(current));
                 run_start = i;
             }
             (true, false, _) | (false, false, true) => take.take(&[a, c], number, record),
@@ -418,6 +422,7 @@ fn gather_piece(records: &[Record], offset: u32, plan: &Plan, visitors: bool, ta
     if records.len() > run_start {
         take.take_run(current, offset + run_start as u32, &records[run_start..]);
     }
+    extremes.add_to(&mut passing.bounds);
     passing
 }
 

@@ -173,21 +173,40 @@ fn sample(records: &[Record], wanted: u64) -> Vec<Sample> {
         .collect()
 }
 
-/// The plane, inside `cell`, that cuts the fewest samples; slightly prefers the middle.
-fn best_plane(samples: &mut [Sample], cell: &HomeBox) -> (usize, f32) {
+/// The plane, inside `cell`, that cuts the fewest samples; slightly prefers the middle. O(samples).
+fn best_plane(samples: &[Sample], cell: &HomeBox) -> (usize, f32) {
     const QUANTILES: [f64; 5] = [0.42, 0.46, 0.5, 0.54, 0.58];
     let mut best: Option<(f64, usize, f32)> = None;
+    let mut middles = vec![0f32; samples.len()];
     for axis in 0..3 {
-        let mut middles: Vec<f32> = samples.iter().map(|s| s.middle(axis)).collect();
-        middles.sort_unstable_by(f32::total_cmp);
-        for q in QUANTILES {
-            let Some(&at) = middles.get((middles.len() as f64 * q) as usize) else { continue };
+        middles.iter_mut().zip(samples).for_each(|(m, s)| *m = s.middle(axis));
+        // Each is looked for behind the one before it only.
+        let (mut rest, mut passed) = (&mut middles[..], 0);
+        let planes = QUANTILES.map(|q| {
+            let rank = (samples.len() as f64 * q) as usize - passed;
+            if rank >= rest.len() {
+                return f32::NAN;
+            }
+            let (_, at, _) = rest.select_nth_unstable_by(rank, f32::total_cmp);
+            let at = *at;
+            rest = &mut std::mem::take(&mut rest)[rank..];
+            passed += rank;
+            at
+        });
+        let (mut cut, mut below) = ([0u32; QUANTILES.len()], [0u32; QUANTILES.len()]);
+        for s in samples {
+            let (lo, hi, middle) = (s.lo[axis], s.hi[axis], s.middle(axis));
+            for (k, at) in planes.iter().enumerate() {
+                cut[k] += u32::from((lo < *at) & (hi >= *at));
+                below[k] += u32::from(middle < *at);
+            }
+        }
+        for ((at, cut), below) in planes.into_iter().zip(cut).zip(below) {
             if !(at > cell.lo[axis] && at <= cell.hi[axis]) {
                 continue;
             }
-            let below = middles.partition_point(|m| *m < at) as f64 / middles.len() as f64;
-            let cut = samples.iter().filter(|s| s.lo[axis] < at && s.hi[axis] >= at).count() as f64;
-            let cost = cut / samples.len() as f64 + 0.4 * (below - 0.5).abs().powf(1.5);
+            let share = |n: u32| f64::from(n) / samples.len() as f64;
+            let cost = share(cut) + 0.4 * (share(below) - 0.5).abs().powf(1.5);
             if best.is_none_or(|(c, ..)| cost < c) {
                 best = Some((cost, axis, at));
             }

@@ -49,11 +49,12 @@ impl<'a> Source for Mapped<'a> {
         self.lists.iter().flat_map(RunList::runs).map(|(_, count)| count as usize).sum()
     }
 
-    #[inline]
+    #[inline(always)]
     fn for_each(&self, mut visit: impl FnMut(u32, &'a Record)) {
         for (first, count) in self.lists.iter().flat_map(RunList::runs) {
             let run = &self.records[first as usize..first as usize + count as usize];
             for (i, record) in run.iter().enumerate() {
+                record::prefetch_after(record);
                 visit(first + i as u32, record);
             }
         }
@@ -73,7 +74,7 @@ impl<'a> Source for Spooled<'a> {
         self.entries.len()
     }
 
-    #[inline]
+    #[inline(always)]
     fn for_each(&self, mut visit: impl FnMut(u32, &'a Entry)) {
         for entry in self.entries {
             visit(spool::number(entry), entry);
@@ -115,7 +116,7 @@ impl<'a> Source for Seen<'a> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn for_each(&self, mut visit: impl FnMut(u32, Either<'a>)) {
         match self {
             Self::Mapped(source) => source.for_each(|number, record| visit(number, Either::Record(record))),

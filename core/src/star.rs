@@ -37,7 +37,7 @@ pub(crate) const BYTES_PER_TRIANGLE: u64 = 3 * 2 * size_of::<u32>() as u64;
 
 impl Stars {
     /// Gathers the corners around each of `vertices` vertices, in the order of `triangles`; those that have `NONE` first are left out.
-    #[inline(never)]
+    #[inline(always)]
     pub(crate) fn gather(&mut self, vertices: usize, triangles: &[[u32; 3]]) {
         self.counts.clear();
         self.counts.resize(vertices, 0);

@@ -41,9 +41,13 @@ impl Bucket {
     }
 
     /// Takes a vertex in where there is room.
-    #[inline]
+    #[inline(always)]
     fn put(&mut self, p: Point, vertex: u32) -> bool {
-        let Some(k) = self.vertex.iter().position(|v| *v == NONE) else { return false };
+        // Counted, not looked for: which place it is cannot be foreseen.
+        let k = self.vertex.iter().map(|v| usize::from(*v != NONE)).sum::<usize>();
+        if k == LANES {
+            return false;
+        }
         (self.x[k], self.y[k], self.z[k], self.vertex[k]) = (p[0], p[1], p[2], vertex);
         true
     }
@@ -107,7 +111,7 @@ impl Weld {
     }
 
     /// Adds a vertex where [`Self::probe`] said, for which room was made.
-    #[inline]
+    #[inline(always)]
     fn insert(&mut self, bucket: usize, position: Point) -> u32 {
         let vertex = self.positions.len() as u32;
         self.buckets[bucket].put(position, vertex);

@@ -1,9 +1,10 @@
 //! Writes the output once: header, exact count, and the input as the edit leaves it.
 
 use std::fs::{File, OpenOptions};
-use std::io::Write;
+use std::io::{self, Write};
 use std::os::fd::AsFd;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::thread::JoinHandle;
 
 use crate::Progress;
 use crate::behind::WriteBehind;
@@ -18,8 +19,8 @@ const KERNEL_COPY_BYTES: usize = 256 << 10;
 /// Copied inside the kernel at a time, between two looks at how far the disk is behind.
 const COPY_BYTES: usize = 1 << 20;
 
-/// Writes `mesh` with `edit` to the new file `output` and syncs it, unless that is deferred.
-pub(crate) fn write(mesh: &MeshFile, edit: &Edit, output: &Path, limits: &Limits, progress: &dyn Progress) -> Result<()> {
+/// Writes `mesh` with `edit` to the new file `output` and begins to sync it, unless that is deferred.
+pub(crate) fn write(mesh: &MeshFile, edit: &Edit, output: &Path, limits: &Limits, progress: &dyn Progress) -> Result<Written> {
     let records = mesh.records();
     let count = edit.output_records(records.len());
     let count = u32::try_from(count).map_err(|_| Error::Refused {
@@ -37,8 +38,8 @@ pub(crate) fn write(mesh: &MeshFile, edit: &Edit, output: &Path, limits: &Limits
     sink.finish(limits)
 }
 
-/// Copies the input byte for byte to the new file `output` and syncs it, unless that is deferred.
-pub(crate) fn copy(mesh: &MeshFile, output: &Path, limits: &Limits, progress: &dyn Progress) -> Result<()> {
+/// Copies the input byte for byte to the new file `output` and begins to sync it, unless that is deferred.
+pub(crate) fn copy(mesh: &MeshFile, output: &Path, limits: &Limits, progress: &dyn Progress) -> Result<Written> {
     let mut sink = Sink::create(mesh, output, limits, progress)?;
     sink.put_bytes(mesh.bytes())?;
     sink.finish(limits)
@@ -93,7 +94,7 @@ impl<'a> Sink<'a> {
     }
 
     /// Copies inside the kernel where the bytes lie in the input file, and writes them otherwise.
-    fn copy_large(&mut self, mut bytes: &[u8]) -> std::io::Result<()> {
+    fn copy_large(&mut self, mut bytes: &[u8]) -> io::Result<()> {
         while self.kernel_copies && !bytes.is_empty() {
             let Some((input, mut offset)) = self.mesh.locate(bytes) else { break };
             match rustix::fs::copy_file_range(input.as_fd(), Some(&mut offset), self.file.as_fd(), None, bytes.len()) {
@@ -119,19 +120,60 @@ impl<'a> Sink<'a> {
         self.behind.wrote(written as u64).map_err(Error::io(self.path, "syncing"))
     }
 
-    fn finish(mut self, limits: &Limits) -> Result<()> {
+    fn finish(mut self, limits: &Limits) -> Result<Written> {
         self.flush()?;
-        self.behind.finish().map_err(Error::io(self.path, "syncing"))?;
-        if limits.defer_sync { Ok(()) } else { self.file.sync_all().map_err(Error::io(self.path, "syncing")) }
+        let Self { path, file, behind, .. } = self;
+        let deferred = limits.defer_sync;
+        let sync = move || {
+            behind.finish()?;
+            if deferred { Ok(()) } else { file.sync_all() }
+        };
+        let syncing = if limits.threads > 1 && self.mesh.bytes().len() >= SYNCED_BESIDE {
+            let thread = std::thread::Builder::new().name("sync".into()).spawn(sync);
+            Some(thread.map_err(Error::io(path, "syncing"))?)
+        } else {
+            sync().map_err(Error::io(path, "syncing"))?;
+            None
+        };
+        Ok(Written { path: path.into(), syncing })
+    }
+}
+
+/// Larger files are read again while the last of them goes to the disk.
+const SYNCED_BESIDE: usize = 8 << 20;
+
+/// A file that is written, but perhaps not yet on the disk.
+#[must_use]
+pub(crate) struct Written {
+    path: PathBuf,
+    syncing: Option<JoinHandle<io::Result<()>>>,
+}
+
+impl Written {
+    /// Waits until the disk has all of it, unless that is deferred.
+    pub(crate) fn durable(mut self) -> Result<()> {
+        self.wait().map_err(Error::io(&self.path, "syncing"))
+    }
+
+    fn wait(&mut self) -> io::Result<()> {
+        let thread = self.syncing.take();
+        thread.map_or(Ok(()), |thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+    }
+}
+
+impl Drop for Written {
+    fn drop(&mut self) {
+        // The file is given up because of another error.
+        let _ = self.wait();
     }
 }
 
 /// A new file; or the empty one without a name that the caller holds open.
-fn create(path: &Path) -> std::io::Result<File> {
+fn create(path: &Path) -> io::Result<File> {
     let nameless = is_nameless(path);
     let file = OpenOptions::new().write(true).create_new(!nameless).open(path)?;
     if nameless && file.metadata()?.len() > 0 {
-        return Err(std::io::ErrorKind::AlreadyExists.into());
+        return Err(io::ErrorKind::AlreadyExists.into());
     }
     Ok(file)
 }

@@ -178,10 +178,11 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     drop(diagnosis);
     // Good as it came, or nothing in it could be repaired.
     let same = edit.is_empty() && flaws(&mesh).is_empty();
-    report.input.blake3 = hash_beside(&mesh, limits, || match same {
+    let (hash, written) = hash_beside(&mesh, limits, || match same {
         true => emit::copy(&mesh, output, limits, progress),
         false => emit::write(&mesh, &edit, output, limits, progress),
     })?;
+    report.input.blake3 = hash;
     clock.lap("emit");
     report.edit = edit.summary(mesh.records().len());
     report.edit_records = limits.list_edit.then(|| edit.listed());
@@ -191,6 +192,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     } else {
         verify(&mut report, &mesh, &surface, output, limits, progress)?;
     }
+    written.durable()?;
     clock.lap("verify");
     mesh.check_unchanged()?;
     report.cost = clock.cost(mesh.records().len() as u64);
@@ -280,16 +282,16 @@ fn facts(mesh: &MeshFile, blake3: String) -> FileFacts {
 }
 
 /// Hashes the input while `write`, which keeps one thread busy at most, is under way; before it where there is but one thread.
-fn hash_beside(mesh: &MeshFile, limits: &Limits, write: impl FnOnce() -> Result<()>) -> Result<String> {
+fn hash_beside<R>(mesh: &MeshFile, limits: &Limits, write: impl FnOnce() -> Result<R>) -> Result<(String, R)> {
     if limits.threads < 2 || mesh.bytes().len() < HASHED_BY_ONE {
         let hash = blake3::hash(mesh.bytes()).to_hex().to_string();
-        return write().map(|()| hash);
+        return write().map(|written| (hash, written));
     }
     std::thread::scope(|scope| {
         let hashing = scope.spawn(|| blake3::hash(mesh.bytes()).to_hex().to_string());
         let written = write();
         let hash = hashing.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-        written.map(|()| hash)
+        written.map(|written| (hash, written))
     })
 }
 

@@ -144,28 +144,37 @@ impl Scratch {
             // SAFETY: the processor has them.
             return unsafe { self.solve_avx2(seen, cell, measure) };
         }
-        self.solve_by(seen, cell, measure, Ring::places)
+        self.solve_by(seen, cell, measure, Self::take, Ring::places)
     }
 
     /// The same code with wider vectors.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,bmi1,bmi2")]
     fn solve_avx2(&mut self, seen: &Seen<'_>, cell: HomeBox, measure: &Measure) -> ChunkTopology {
-        self.solve_by(seen, cell, measure, |ring, corner| ring.places_avx2(corner))
+        let take = |scratch: &mut Self, corners: &[[Point; 3]]| scratch.take_avx2(corners);
+        self.solve_by(seen, cell, measure, take, |ring, corner| ring.places_avx2(corner))
     }
 
-    /// `places` tells where a corner stands in a ring.
+    /// The same as [`Self::take`]: it is called from where the compiler does not see what the processor has.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,bmi1,bmi2")]
+    fn take_avx2(&mut self, corners: &[[Point; 3]]) {
+        self.take(corners);
+    }
+
+    /// `take` takes members in, `places` tells where a corner stands in a ring.
     #[inline(always)]
     fn solve_by(
         &mut self,
         seen: &Seen<'_>,
         cell: HomeBox,
         measure: &Measure,
+        take: impl Fn(&mut Self, &[[Point; 3]]),
         places: impl Fn(&Ring, u32) -> u32 + Copy,
     ) -> ChunkTopology {
         match seen {
-            Seen::Mapped(source) => self.weld(source),
-            Seen::Spooled(source) => self.weld(source),
+            Seen::Mapped(source) => self.weld(source, take),
+            Seen::Spooled(source) => self.weld(source, take),
         }
         self.judge_stars(cell, places);
         self.collect(measure)
@@ -225,7 +234,7 @@ impl Scratch {
 
     /// Numbers the vertices of all members.
     #[inline(always)]
-    fn weld(&mut self, source: &impl Source) {
+    fn weld(&mut self, source: &impl Source, take: impl Fn(&mut Self, &[[Point; 3]])) {
         self.numbers.clear();
         self.triangles.clear();
         self.collinear.clear();
@@ -240,11 +249,11 @@ impl Scratch {
             corners[filled] = triangle.corners();
             filled += 1;
             if filled == BATCH {
-                self.take(&corners);
+                take(self, &corners);
                 filled = 0;
             }
         });
-        self.take(&corners[..filled]);
+        take(self, &corners[..filled]);
     }
 
     /// Takes in the next members, at most [`BATCH`].

@@ -397,7 +397,7 @@ fn gather_piece(records: &[Record], offset: u32, plan: &Plan, visitors: bool, ta
             continue;
         }
         passing.bounds.include(&corners);
-        let [a, b, c] = corners.map(|p| plan.home(p));
+        let (a, b, c) = (plan.home(corners[0]), plan.home(corners[1]), plan.home(corners[2]));
         match (b == a, c == a, c == b) {
             (true, true, _) => {
                 current = a;

@@ -182,16 +182,11 @@ impl Scratch {
 
     /// Finds the self-intersections that the chunk owns, after it was solved; counts little more than `allowance` pairs. The
     /// `visitors` are added to its triangles.
-    pub(crate) fn cross(
-        &mut self,
-        visitors: impl Iterator<Item = (u32, [Point; 3])>,
-        cell: HomeBox,
-        allowance: u64,
-    ) -> Crossings {
-        for (number, corners) in visitors {
+    pub(crate) fn cross(&mut self, visitors: &Seen<'_>, cell: HomeBox, allowance: u64) -> Crossings {
+        visitors.for_each(|number, triangle| {
             self.numbers.push(number);
-            self.take(&[corners]);
-        }
+            self.take(&[triangle.corners()]);
+        });
         // No visitor has a corner at home here.
         self.states.resize(self.vertices.positions().len(), AWAY);
         self.home.clear();

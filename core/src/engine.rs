@@ -3,6 +3,9 @@
 use std::path::Path;
 use std::time::Instant;
 
+use blake3::Hasher;
+
+use crate::ahead::Guide;
 use crate::edit::Edit;
 use crate::error::{Error, Result};
 use crate::read::{MeshFile, PREFIX_BYTES};
@@ -204,7 +207,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
 fn spool_need(mesh: &MeshFile, limits: &Limits) -> Need {
     Need {
         folder: limits.spool_folder(),
-        bytes: members::spool_bytes(mesh.records(), limits),
+        bytes: members::spool_bytes(mesh.records(), &Guide::new(mesh.records().as_flattened(), limits), limits),
         what: "sorting triangles by place",
     }
 }
@@ -288,7 +291,7 @@ fn hash_beside<R>(mesh: &MeshFile, limits: &Limits, write: impl FnOnce() -> Resu
         return write().map(|written| (hash, written));
     }
     std::thread::scope(|scope| {
-        let hashing = scope.spawn(|| blake3::hash(mesh.bytes()).to_hex().to_string());
+        let hashing = scope.spawn(|| hash_blocks(mesh.bytes(), limits, Hasher::update));
         let written = write();
         let hash = hashing.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
         written.map(|written| (hash, written))
@@ -301,7 +304,15 @@ fn hash(mesh: &MeshFile, limits: &Limits, progress: &dyn Progress) -> String {
     if bytes.len() < HASHED_BY_ONE {
         return blake3::hash(bytes).to_hex().to_string();
     }
-    parallel::in_pool(limits.threads, || blake3::Hasher::new().update_rayon(bytes).finalize().to_hex().to_string())
+    parallel::in_pool(limits.threads, || hash_blocks(bytes, limits, Hasher::update_rayon))
+}
+
+fn hash_blocks(bytes: &[u8], limits: &Limits, update: for<'h> fn(&'h mut Hasher, &[u8]) -> &'h mut Hasher) -> String {
+    let mut hasher = Hasher::new();
+    for block in Guide::new(bytes, limits).blocks(bytes) {
+        update(&mut hasher, block);
+    }
+    hasher.finalize().to_hex().to_string()
 }
 
 pub(crate) fn tolerances(diagnosis: &Diagnosis<'_>) -> Tolerances {

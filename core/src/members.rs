@@ -8,23 +8,24 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::Progress;
+use crate::ahead::Guide;
 use crate::columns::{CellColumns, Columns, Extremes};
 use crate::error::Result;
+use crate::parallel;
 use crate::plan::{ChunkId, Plan};
 use crate::record::{self, Record};
 use crate::settings::{Limits, Spill};
 use crate::source::{Mapped, Seen, Spooled};
 use crate::spool::{self, Loaded, Spool, Unsorted};
 use crate::sums::Bounds;
-use crate::{machine, parallel};
 
 /// Who sees what, and what the same pass learns about the whole file.
+///
+/// A chunk's **visitors** are the triangles whose box meets its cell with no corner at home there. Self-intersections need them; where those
+/// are not looked for, there are none.
 #[derive(Debug)]
 pub(crate) struct Members {
     kept: Kept,
-    /// Of each chunk, in pieces: its visitors, triangles whose box meets the chunk's cell with no corner at home there. Self-intersections
-    /// need them; without those, there are no lists. Only long triangles visit, so they are listed even where the rest is spooled.
-    visitors: Vec<Vec<RunList>>,
     /// Runs of triangles with a NaN or infinite coordinate: first and count.
     pub(crate) nonfinite: Vec<(u32, u32)>,
     pub(crate) bounds: Bounds,
@@ -32,8 +33,11 @@ pub(crate) struct Members {
 
 #[derive(Debug)]
 enum Kept {
-    /// `lists[chunk][piece]`: pieces are consecutive stretches of the file.
-    Lists(Vec<Vec<RunList>>),
+    /// `members[chunk][piece]`: pieces are consecutive stretches of the file.
+    Lists {
+        members: Vec<Vec<RunList>>,
+        visitors: Vec<Vec<RunList>>,
+    },
     Spool(Spool),
 }
 
@@ -46,13 +50,16 @@ pub(crate) struct RunList {
 }
 
 impl RunList {
-    fn push(&mut self, first: u32, count: u32) {
+    /// Appends a run; returns how many bytes that took.
+    fn push(&mut self, first: u32, count: u32) -> usize {
+        let before = self.bytes.len();
         let gap = u64::from(first - self.end) << 1 | u64::from(count > 1);
         put_varint(&mut self.bytes, gap);
         if count > 1 {
             put_varint(&mut self.bytes, u64::from(count - 2));
         }
         self.end = first + count;
+        self.bytes.len() - before
     }
 
     pub(crate) fn runs(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
@@ -94,15 +101,16 @@ pub(crate) fn take_varint(bytes: &mut &[u8]) -> Option<u64> {
 trait Take {
     /// Triangles that are members of this chunk alone.
     fn take_run(&mut self, chunk: ChunkId, first: u32, run: &[Record]);
-    /// A triangle that is a member of all `chunks`, which are distinct.
-    fn take(&mut self, chunks: &[ChunkId], number: u32, record: &Record);
+    /// A triangle that is a member of all `members` and a visitor of all `visitors`, which are all distinct.
+    fn take(&mut self, members: &[ChunkId], visitors: &[ChunkId], number: u32, record: &Record);
     /// Is it of no use to go on?
     fn given_up(&self) -> bool;
 }
 
 /// Lists of one piece.
 struct Lists<'a> {
-    lists: Vec<RunList>,
+    members: Vec<RunList>,
+    visitors: Vec<RunList>,
     /// Bytes not yet counted in `held`.
     uncounted: usize,
     /// Bytes in the lists of all pieces, and how many there may be.
@@ -111,11 +119,8 @@ struct Lists<'a> {
 }
 
 impl Lists<'_> {
-    fn push(&mut self, chunk: ChunkId, first: u32, count: u32) {
-        let list = &mut self.lists[chunk.0 as usize];
-        let before = list.bytes.len();
-        list.push(first, count);
-        self.uncounted += list.bytes.len() - before;
+    fn count(&mut self, bytes: usize) {
+        self.uncounted += bytes;
         if self.uncounted >= 64 << 10 {
             self.held.fetch_add(self.uncounted as u64, Ordering::Relaxed);
             self.uncounted = 0;
@@ -125,11 +130,14 @@ impl Lists<'_> {
 
 impl Take for Lists<'_> {
     fn take_run(&mut self, chunk: ChunkId, first: u32, run: &[Record]) {
-        self.push(chunk, first, run.len() as u32);
+        let bytes = self.members[chunk.0 as usize].push(first, run.len() as u32);
+        self.count(bytes);
     }
 
-    fn take(&mut self, chunks: &[ChunkId], number: u32, _: &Record) {
-        chunks.iter().for_each(|chunk| self.push(*chunk, number, 1));
+    fn take(&mut self, members: &[ChunkId], visitors: &[ChunkId], number: u32, _: &Record) {
+        let bytes: usize = members.iter().map(|c| self.members[c.0 as usize].push(number, 1)).sum();
+        let more: usize = visitors.iter().map(|c| self.visitors[c.0 as usize].push(number, 1)).sum();
+        self.count(bytes + more);
     }
 
     fn given_up(&self) -> bool {
@@ -147,8 +155,8 @@ impl Take for spool::Writer<'_> {
         self.take_run(chunk, first, run);
     }
 
-    fn take(&mut self, chunks: &[ChunkId], number: u32, record: &Record) {
-        self.take(chunks, number, record);
+    fn take(&mut self, members: &[ChunkId], visitors: &[ChunkId], number: u32, record: &Record) {
+        self.take(members, visitors, number, record);
     }
 
     fn given_up(&self) -> bool {
@@ -158,10 +166,24 @@ impl Take for spool::Writer<'_> {
 
 /// What is learnt in passing.
 struct Passing {
-    /// By chunk; no lists if nobody wants them.
-    visitors: Vec<RunList>,
     nonfinite: Vec<(u32, u32)>,
     bounds: Bounds,
+}
+
+impl Passing {
+    const NOTHING: Self = Self { nonfinite: Vec::new(), bounds: Bounds::EMPTY };
+
+    fn note_nonfinite(&mut self, number: u32) {
+        match self.nonfinite.last_mut() {
+            Some((first, count)) if *first + *count == number => *count += 1,
+            _ => self.nonfinite.push((number, 1)),
+        }
+    }
+
+    fn add(&mut self, next: Self) {
+        self.nonfinite.extend(next.nonfinite);
+        self.bounds.add(&next.bounds);
+    }
 }
 
 impl Members {
@@ -171,7 +193,7 @@ impl Members {
     /// Where spooling fails.
     pub(crate) fn gather(
         path: &Path,
-        records: &[Record],
+        (records, guide): (&[Record], &Guide<'_>),
         plan: &Plan,
         visitors: bool,
         limits: &Limits,
@@ -179,87 +201,108 @@ impl Members {
     ) -> Result<Self> {
         let told = || Told { progress, done: AtomicU64::new(0), total: records.len() as u64 };
         let most = if limits.spill == Spill::Never { u64::MAX } else { limits.memory_bytes / 4 };
-        if spool_bytes(records, limits) == 0
-            && let Some(members) = Self::list(records, plan, visitors, limits.threads, most, &told())
+        if spool_bytes(records, guide, limits) == 0
+            && let Some(members) = Self::list((records, guide), plan, visitors, limits.threads, most, &told())
         {
             return Ok(members);
         }
-        Self::spool(path, records, plan, visitors, limits, &told())
+        Self::spool(path, (records, guide), plan, visitors, limits, &told())
     }
 
     /// `None` if the lists would take more than `most` bytes.
-    fn list(records: &[Record], plan: &Plan, visitors: bool, threads: usize, most: u64, told: &Told<'_>) -> Option<Self> {
+    fn list(
+        (records, guide): (&[Record], &Guide<'_>),
+        plan: &Plan,
+        visitors: bool,
+        threads: usize,
+        most: u64,
+        told: &Told<'_>,
+    ) -> Option<Self> {
         // More pieces than threads only even out the load: lists of all pieces together say the same for any number of pieces.
         let pieces = if records.len() < 1 << 16 { 1 } else { threads * 4 };
         let held = AtomicU64::new(0);
+        let empty = || vec![RunList::default(); plan.chunks()];
         let results = in_pieces(records, threads, pieces, |piece, offset| {
-            let mut lists = Lists { lists: vec![RunList::default(); plan.chunks()], uncounted: 0, held: &held, most };
-            let passing = gather_piece(piece, offset, plan, visitors, &mut lists, told);
+            let mut lists = Lists { members: empty(), visitors: empty(), uncounted: 0, held: &held, most };
+            let passing = gather_piece((piece, guide), offset, plan, visitors, &mut lists, told);
             held.fetch_add(lists.uncounted as u64, Ordering::Relaxed);
-            lists.lists.iter_mut().for_each(|l| l.bytes.shrink_to_fit());
-            (lists.lists, passing)
+            lists.members.iter_mut().chain(&mut lists.visitors).for_each(|l| l.bytes.shrink_to_fit());
+            (lists.members, lists.visitors, passing)
         });
         if is_too_much(&held, most) {
             return None;
         }
-        let mut all = vec![Vec::new(); plan.chunks()];
-        let mut members = Self::nothing(plan);
-        for (lists, passing) in results {
-            members.add(passing);
-            let filled = lists.into_iter().zip(&mut all).filter(|(list, _)| !list.bytes.is_empty());
-            filled.for_each(|(list, of_chunk)| of_chunk.push(list));
+        let (mut all, mut all_visitors) = (vec![Vec::new(); plan.chunks()], vec![Vec::new(); plan.chunks()]);
+        let mut passed = Passing::NOTHING;
+        for (members, visitors, passing) in results {
+            passed.add(passing);
+            for (lists, of_chunks) in [(members, &mut all), (visitors, &mut all_visitors)] {
+                let filled = lists.into_iter().zip(of_chunks).filter(|(list, _)| !list.bytes.is_empty());
+                filled.for_each(|(list, of_chunk)| of_chunk.push(list));
+            }
         }
-        members.kept = Kept::Lists(all);
-        Some(members)
+        Some(Self::of(Kept::Lists { members: all, visitors: all_visitors }, passed))
     }
 
-    fn spool(path: &Path, records: &[Record], plan: &Plan, visitors: bool, limits: &Limits, told: &Told<'_>) -> Result<Self> {
+    fn spool(
+        path: &Path,
+        (records, guide): (&[Record], &Guide<'_>),
+        plan: &Plan,
+        visitors: bool,
+        limits: &Limits,
+        told: &Told<'_>,
+    ) -> Result<Self> {
         let spool = Unsorted::new(path, spool::Layout::new(records.len(), plan, limits), plan, limits)?;
         // One piece a thread: every piece ends with extents that are not full.
         let results = in_pieces(records, limits.threads, limits.threads, |piece, offset| {
             let mut writer = spool.writer(plan.chunks());
-            let passing = gather_piece(piece, offset, plan, visitors, &mut writer, told);
+            let passing = gather_piece((piece, guide), offset, plan, visitors, &mut writer, told);
             (writer.finish(), passing)
         });
-        let mut members = Self::nothing(plan);
+        let mut passed = Passing::NOTHING;
         let parts = results
             .into_iter()
             .map(|(part, passing)| {
-                members.add(passing);
+                passed.add(passing);
                 part
             })
             .collect();
-        members.kept = Kept::Spool(spool.sorted(parts, plan.chunks())?);
-        Ok(members)
+        Ok(Self::of(Kept::Spool(spool.sorted(parts, plan.chunks())?), passed))
     }
 
-    fn nothing(plan: &Plan) -> Self {
-        let visitors = vec![Vec::new(); plan.chunks()];
-        Self { kept: Kept::Lists(Vec::new()), visitors, nonfinite: Vec::new(), bounds: Bounds::EMPTY }
+    fn of(kept: Kept, passing: Passing) -> Self {
+        Self { kept, nonfinite: passing.nonfinite, bounds: passing.bounds }
     }
 
-    fn add(&mut self, passing: Passing) {
-        let filled = passing.visitors.into_iter().zip(&mut self.visitors).filter(|(list, _)| !list.bytes.is_empty());
-        filled.for_each(|(list, of_chunk)| of_chunk.push(list));
-        self.nonfinite.extend(passing.nonfinite);
-        self.bounds.add(&passing.bounds);
-    }
-
-    /// Does `work` on every wanted chunk with what it sees; results by chunk. Each thread makes one `scratch`.
+    /// Does `work` on every wanted chunk with its members and its visitors; results by chunk. Each thread makes one `scratch`.
     pub(crate) fn each<S, R: Send>(
         &self,
-        (records, plan): (&[Record], &Plan),
+        (records, guide, plan): (&[Record], &Guide<'_>, &Plan),
         threads: usize,
         wanted: impl Fn(ChunkId) -> bool + Sync,
         scratch: impl Fn() -> S + Sync,
-        work: impl Fn(&mut S, ChunkId, &Seen<'_>) -> R + Sync,
+        work: impl Fn(&mut S, ChunkId, &Seen<'_>, &Seen<'_>) -> R + Sync,
     ) -> Vec<R> {
         match &self.kept {
-            Kept::Lists(lists) => {
-                let chunks: Vec<ChunkId> = (0..lists.len() as u32).map(ChunkId).filter(|c| wanted(*c)).collect();
+            Kept::Lists { members, visitors } => {
+                let chunks: Vec<ChunkId> = (0..members.len() as u32).map(ChunkId).filter(|c| wanted(*c)).collect();
+                let group = guide.group(members.len());
+                let ask = |group: &[ChunkId]| {
+                    let lists = group.iter().flat_map(|c| members[c.0 as usize].iter().chain(&visitors[c.0 as usize]));
+                    guide.ask_for(lists.flat_map(RunList::runs));
+                };
                 parallel::map_with(threads, chunks.len(), scratch, |scratch, i| {
-                    let seen = Seen::Mapped(Mapped { records, lists: &lists[chunks[i].0 as usize] });
-                    work(scratch, chunks[i], &seen)
+                    // Chunks are taken in order: this group was asked for by whoever began with the one before.
+                    if let Some(group) = group
+                        && i % group == 0
+                    {
+                        let mut groups = chunks[i..].chunks(group);
+                        let this = groups.next().filter(|_| i == 0);
+                        this.into_iter().chain(groups.next()).for_each(ask);
+                    }
+                    let seen = [members, visitors].map(|lists| Mapped { records, lists: &lists[chunks[i].0 as usize] });
+                    let [members, visitors] = seen.map(Seen::Mapped);
+                    work(scratch, chunks[i], &members, &visitors)
                 })
             }
             Kept::Spool(spool) => {
@@ -268,8 +311,9 @@ impl Members {
                 let results = parallel::map_with(threads, buckets.len(), scratch, |(scratch, loaded), i| {
                     spool.load(plan, buckets[i], loaded);
                     let chunks = spool.chunks(buckets[i]).filter(|c| wanted(*c));
+                    let seen = |entries| Seen::Spooled(Spooled { entries });
                     chunks
-                        .map(|chunk| work(scratch, chunk, &Seen::Spooled(Spooled { entries: loaded.members(chunk) })))
+                        .map(|chunk| work(scratch, chunk, &seen(loaded.members(chunk)), &seen(loaded.visitors(chunk))))
                         .collect::<Vec<R>>()
                 });
                 results.into_iter().flatten().collect()
@@ -277,30 +321,28 @@ impl Members {
         }
     }
 
-    /// Numbers of the chunk's visitors, ascending.
-    pub(crate) fn visitors(&self, chunk: ChunkId) -> impl Iterator<Item = u32> + '_ {
-        self.visitors[chunk.0 as usize].iter().flat_map(RunList::runs).flat_map(|(first, count)| first..first + count)
-    }
-
-    /// How many triangles `chunk` sees.
+    /// How many triangles `chunk` sees, visitors included.
     pub(crate) fn count(&self, chunk: ChunkId) -> u64 {
         match &self.kept {
-            Kept::Lists(lists) => lists[chunk.0 as usize].iter().flat_map(RunList::runs).map(|(_, count)| u64::from(count)).sum(),
-            Kept::Spool(spool) => spool.members(chunk),
+            Kept::Lists { members, visitors } => {
+                let lists = members[chunk.0 as usize].iter().chain(&visitors[chunk.0 as usize]);
+                lists.flat_map(RunList::runs).map(|(_, count)| u64::from(count)).sum()
+            }
+            Kept::Spool(spool) => spool.seen(chunk),
         }
     }
 
     /// Bytes held, with what [`Self::each`] takes on so many threads.
     pub(crate) fn heap_bytes(&self, threads: usize) -> u64 {
         let kept = match &self.kept {
-            Kept::Lists(lists) => {
-                let pieces = lists.iter().flatten().map(|l| l.bytes.capacity() + size_of::<RunList>()).sum::<usize>();
-                (pieces + lists.len() * size_of::<Vec<RunList>>()) as u64
+            Kept::Lists { members, visitors } => {
+                let both = || members.iter().chain(visitors);
+                let pieces = both().flatten().map(|l| l.bytes.capacity() + size_of::<RunList>()).sum::<usize>();
+                (pieces + both().count() * size_of::<Vec<RunList>>()) as u64
             }
             Kept::Spool(spool) => spool.heap_bytes() as u64 + spool.loaded_bytes(threads),
         };
-        let visitors: usize = self.visitors.iter().flatten().map(|l| l.bytes.capacity() + size_of::<RunList>()).sum();
-        kept + visitors as u64 + self.nonfinite.capacity() as u64 * 8
+        kept + self.nonfinite.capacity() as u64 * 8
     }
 }
 
@@ -314,11 +356,11 @@ fn in_pieces<R: Send>(records: &[Record], threads: usize, pieces: usize, work: i
 }
 
 /// What will be spooled to find out who sees what, in bytes; 0 if lists will do, as far as can be told beforehand.
-pub(crate) fn spool_bytes(records: &[Record], limits: &Limits) -> u64 {
+pub(crate) fn spool_bytes(records: &[Record], guide: &Guide<'_>, limits: &Limits) -> u64 {
     let spooled = match limits.spill {
         Spill::Always => true,
         Spill::Never => false,
-        Spill::Auto => size_of_val(records) as u64 > machine::page_cache_room(limits) && is_scattered(records),
+        Spill::Auto => guide.is_needed() && is_scattered(records, guide),
     };
     // Some triangles lie across buckets.
     if spooled { (records.len() * size_of::<spool::Entry>()) as u64 / 20 * 21 } else { 0 }
@@ -330,9 +372,10 @@ const STRETCH: usize = 64;
 
 /// Do neighbours in the file lie far from each other (in different parts of some hundred) more often than once in a page of triangles?
 /// (Whether they lie in the same chunk would not tell: rows of a grid cross many of them, but the next chunks continue where these end.)
-fn is_scattered(records: &[Record]) -> bool {
-    let parts = Plan::new(records, (records.len() / STRETCHES).try_into().unwrap_or(u32::MAX));
+fn is_scattered(records: &[Record], guide: &Guide<'_>) -> bool {
+    let parts = Plan::new(records, guide, (records.len() / STRETCHES).try_into().unwrap_or(u32::MAX));
     let step = (records.len() / STRETCHES).max(STRETCH);
+    guide.ask_for((0..records.len()).step_by(step).map(|first| (first as u32, STRETCH.min(records.len() - first) as u32)));
     let (mut changes, mut looked_at) = (0, 0);
     for stretch in records.chunks(step) {
         let mut last = None;
@@ -363,62 +406,67 @@ impl Told<'_> {
     }
 }
 
-fn gather_piece(records: &[Record], offset: u32, plan: &Plan, visitors: bool, take: &mut impl Take, told: &Told<'_>) -> Passing {
-    let lists = if visitors { plan.chunks() } else { 0 };
-    let mut passing = Passing { visitors: vec![RunList::default(); lists], nonfinite: Vec::new(), bounds: Bounds::EMPTY };
+fn gather_piece(
+    (records, guide): (&[Record], &Guide<'_>),
+    offset: u32,
+    plan: &Plan,
+    visitors: bool,
+    take: &mut impl Take,
+    told: &Told<'_>,
+) -> Passing {
+    let mut passing = Passing::NOTHING;
+    let mut visited = Vec::new();
     let mut current = ChunkId(0);
     let mut cell = CellColumns::of(&plan.home_box(current));
     let mut extremes = Extremes::EMPTY;
-    let mut run_start = 0;
-    for (i, record) in records.iter().enumerate() {
-        if (i + 1).is_multiple_of(Told::EVERY) {
-            told.step();
-        }
-        record::prefetch_after(record);
-        let columns = Columns::of(record);
-        if cell.holds(&columns) {
-            extremes.include(&columns);
-            continue;
-        }
-        let corners = record::corners(record);
-        if i > run_start {
-            take.take_run(current, offset + run_start as u32, &records[run_start..i]);
-        }
-        run_start = i + 1;
-        if take.given_up() {
-            return passing;
-        }
-        let number = offset + i as u32;
-        if !corners.iter().flatten().all(|x| x.is_finite()) {
-            match passing.nonfinite.last_mut() {
-                Some((first, count)) if *first + *count == number => *count += 1,
-                _ => passing.nonfinite.push((number, 1)),
+    let (mut run_start, mut block_start) = (0usize, 0usize);
+    for block in guide.blocks(records) {
+        for (i, record) in (block_start..).zip(block) {
+            if (i + 1).is_multiple_of(Told::EVERY) {
+                told.step();
             }
-            continue;
-        }
-        passing.bounds.include(&corners);
-        let (a, b, c) = (plan.home(corners[0]), plan.home(corners[1]), plan.home(corners[2]));
-        match (b == a, c == a, c == b) {
-            (true, true, _) => {
-                current = a;
+            record::prefetch_after(record);
+            let columns = Columns::of(record);
+            if cell.holds(&columns) {
+                extremes.include(&columns);
+                continue;
+            }
+            if i > run_start {
+                take.take_run(current, offset + run_start as u32, &records[run_start..i]);
+            }
+            run_start = i + 1;
+            if take.given_up() {
+                return passing;
+            }
+            let (number, corners) = (offset + i as u32, record::corners(record));
+            if !corners.iter().flatten().all(|x| x.is_finite()) {
+                passing.note_nonfinite(number);
+                continue;
+            }
+            passing.bounds.include(&corners);
+            let homes = [plan.home(corners[0]), plan.home(corners[1]), plan.home(corners[2])];
+            if homes[0] == homes[1] && homes[0] == homes[2] {
+                current = homes[0];
                 cell = CellColumns::of(&plan.home_box(current));
                 run_start = i;
+                continue;
             }
-            (true, false, _) | (false, false, true) => take.take(&[a, c], number, record),
-            (false, true, _) => take.take(&[a, b], number, record),
-            (false, false, false) => take.take(&[a, b, c], number, record),
+            visited.clear();
+            if visitors {
+                let mut spread = Bounds::EMPTY;
+                spread.include(&corners);
+                plan.meeting(spread.lo, spread.hi, &mut |chunk| {
+                    if !homes.contains(&chunk) {
+                        visited.push(chunk);
+                    }
+                });
+            }
+            let [a, b, c] = homes;
+            let distinct = if a == b || b == c { &[a, c][..] } else { &[a, b, c][..if a == c { 2 } else { 3 }] };
+            take.take(distinct, &visited, number, record);
         }
-        if visitors && !(a == b && a == c) {
-            let mut spread = Bounds::EMPTY;
-            spread.include(&corners);
-            plan.meeting(spread.lo, spread.hi, &mut |chunk| {
-                if ![a, b, c].contains(&chunk) {
-                    passing.visitors[chunk.0 as usize].push(number, 1);
-                }
-            });
-        }
+        block_start += block.len();
     }
-    passing.visitors.iter_mut().for_each(|list| list.bytes.shrink_to_fit());
     if records.len() > run_start {
         take.take_run(current, offset + run_start as u32, &records[run_start..]);
     }
@@ -454,7 +502,7 @@ mod tests {
         ) {
             let records: Vec<Record> =
                 points.iter().map(|p| record::encode([[p[0], p[1], p[2]], [p[3], p[4], p[5]], [p[6], p[7], p[8]]], 0)).collect();
-            let plan = Plan::new(&records, chunk);
+            let plan = Plan::new(&records, &Guide::NONE, chunk);
             let want: Vec<Vec<(u32, [[f32; 3]; 3])>> = (0..plan.chunks() as u32)
                 .map(|c| {
                     let numbered = (0..).zip(records.iter().map(record::corners));
@@ -464,27 +512,36 @@ mod tests {
                 .collect();
             for spill in [Spill::Never, Spill::Auto, Spill::Always] {
                 let limits = Limits { threads, spill, ..Limits::default() };
-                let members = Members::gather(Path::new("test"), &records, &plan, true, &limits, &crate::Quiet).unwrap();
+                let input = (&records[..], &Guide::NONE);
+                let members = Members::gather(Path::new("test"), input, &plan, true, &limits, &crate::Quiet).unwrap();
                 let wanted = |c: ChunkId| c.0 % 3 != 1;
-                let seen = members.each((&records, &plan), threads, wanted, || (), |(), chunk, seen| {
-                    let mut all = Vec::new();
-                    seen.for_each(|number, triangle| all.push((number, triangle.corners())));
-                    assert_eq!((all.len(), all.len() as u64), (seen.count(), members.count(chunk)));
-                    (chunk, all)
+                let seen = members.each((&records, &Guide::NONE, &plan), threads, wanted, || (), |(), chunk, seen, visitors| {
+                    let list = |source: &Seen<'_>| {
+                        let mut all = Vec::new();
+                        source.for_each(|number, triangle| all.push((number, triangle.corners())));
+                        assert_eq!(all.len(), source.count());
+                        all
+                    };
+                    assert_eq!((seen.count() + visitors.count()) as u64, members.count(chunk));
+                    (chunk, list(seen), list(visitors))
                 });
-                let wanted: Vec<_> = (0..).map(ChunkId).zip(want.clone()).filter(|(c, _)| wanted(*c)).collect();
-                prop_assert_eq!(seen, wanted);
-                for (c, of_chunk) in (0..).map(ChunkId).zip(&want) {
-                    let mut visitors = Vec::new();
-                    for (t, record) in (0..).zip(&records).filter(|(_, r)| record::all_finite(r)) {
-                        let mut spread = Bounds::EMPTY;
-                        spread.include(&record::corners(record));
-                        if plan.home_box(c).meets(&spread) && of_chunk.iter().all(|(member, _)| *member != t) {
-                            visitors.push(t);
+                let wanted: Vec<_> = (0..)
+                    .map(ChunkId)
+                    .zip(&want)
+                    .filter(|(c, _)| wanted(*c))
+                    .map(|(c, of_chunk)| {
+                        let mut visitors = Vec::new();
+                        for (t, record) in (0..).zip(&records).filter(|(_, r)| record::all_finite(r)) {
+                            let mut spread = Bounds::EMPTY;
+                            spread.include(&record::corners(record));
+                            if plan.home_box(c).meets(&spread) && of_chunk.iter().all(|(member, _)| *member != t) {
+                                visitors.push((t, record::corners(record)));
+                            }
                         }
-                    }
-                    prop_assert_eq!(members.visitors(c).collect::<Vec<u32>>(), visitors);
-                }
+                        (c, of_chunk.clone(), visitors)
+                    })
+                    .collect();
+                prop_assert_eq!(seen, wanted);
             }
         }
     }
@@ -495,8 +552,8 @@ mod tests {
         let rows: Vec<Record> = (0..40_000).map(at).collect();
         // 7919 is prime: a permutation.
         let mixed: Vec<Record> = (0..40_000).map(|i| at(i * 7919 % 40_000)).collect();
-        assert!(!is_scattered(&rows));
-        assert!(is_scattered(&mixed));
+        assert!(!is_scattered(&rows, &Guide::NONE));
+        assert!(is_scattered(&mixed, &Guide::NONE));
     }
 
     #[test]
@@ -504,14 +561,15 @@ mod tests {
         let at = |i: u32| [(i * 7919 % 300) as f32, (i * 7919 % 90_000 / 300) as f32];
         let corners = |[x, y]: [f32; 2]| [[x, y, 0.0], [x + 1.0, y, 0.0], [x, y + 1.0, 0.0]];
         let records: Vec<Record> = (0..90_000).map(|i| record::encode(corners(at(i)), 0)).collect();
-        let plan = Plan::new(&records, 1000);
+        let plan = Plan::new(&records, &Guide::NONE, 1000);
         let limits = Limits { threads: 2, memory_bytes: 5 << 18, ..Limits::default() };
         let gathered = |spill| {
-            Members::gather(Path::new("test"), &records, &plan, false, &Limits { spill, ..limits.clone() }, &crate::Quiet)
+            let (input, limits) = ((&records[..], &Guide::NONE), Limits { spill, ..limits.clone() });
+            Members::gather(Path::new("test"), input, &plan, false, &limits, &crate::Quiet)
                 .unwrap()
         };
         let (lists, spooled) = (gathered(Spill::Never), gathered(Spill::Auto));
-        assert!(matches!(&lists.kept, Kept::Lists(_)) && lists.heap_bytes(2) * 3 > limits.memory_bytes / 4);
+        assert!(matches!(&lists.kept, Kept::Lists { .. }) && lists.heap_bytes(2) * 3 > limits.memory_bytes / 4);
         assert!(matches!(&spooled.kept, Kept::Spool(_)));
         let counts = |m: &Members| (0..plan.chunks() as u32).map(|c| m.count(ChunkId(c))).collect::<Vec<_>>();
         assert_eq!(counts(&lists), counts(&spooled));

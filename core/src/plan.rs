@@ -4,6 +4,7 @@
 //! among three axes and five quantiles where it cuts the fewest sampled triangles, so that flat sheets are not sliced along their
 //! noise. Where the planes lie depends on the number of chunks asked for, and nothing else may depend on that.
 
+use crate::ahead::Guide;
 use crate::record::{self, Record};
 
 /// A chunk, numbered by its place among the leaves of the tree.
@@ -40,6 +41,8 @@ impl HomeBox {
 
 /// Samples a leaf should see; more do not make better planes.
 const SAMPLES_PER_CHUNK: u64 = 64;
+/// Samples that the disk is asked for together.
+const ASKED_AT_ONCE: usize = 8192;
 
 /// Heap-ordered kd tree: node 1 is the root, node `i` has children `2i` and `2i + 1`.
 #[derive(Debug)]
@@ -52,13 +55,13 @@ pub(crate) struct Plan {
 
 impl Plan {
     /// A plan of about `records.len() / chunk_triangles` chunks, a power of two. O(n / chunk_triangles) time and memory.
-    pub(crate) fn new(records: &[Record], chunk_triangles: u32) -> Self {
+    pub(crate) fn new(records: &[Record], guide: &Guide<'_>, chunk_triangles: u32) -> Self {
         let wanted = records.len() as u64 / u64::from(chunk_triangles.max(1));
         let depth = (wanted.max(1) as f64).log2().round() as u32;
         let chunks = 1usize << depth;
         let mut plan = Self { planes: vec![(0, 0.0); chunks], boxes: vec![HomeBox::ALL; chunks], depth };
         if depth > 0 {
-            let mut samples = sample(records, chunks as u64 * SAMPLES_PER_CHUNK);
+            let mut samples = sample(records, guide, chunks as u64);
             plan.split(1, &mut samples, HomeBox::ALL);
         }
         plan
@@ -112,6 +115,12 @@ impl Plan {
         Some(ChunkId((node - self.planes.len()) as u32))
     }
 
+    /// Those of the 2^`levels` chunks of a subtree (as for [`Self::home_below`]) whose cells a closed box meets that meets one of
+    /// them, in order.
+    pub(crate) fn meeting_below(&self, levels: u32, subtree: usize, lo: [f32; 3], hi: [f32; 3], visit: &mut impl FnMut(ChunkId)) {
+        self.descend((self.planes.len() >> levels) + subtree, lo, hi, visit);
+    }
+
     /// All chunks whose cells the closed box from `lo` to `hi` meets, in order. O(log chunks) for each.
     pub(crate) fn meeting(&self, lo: [f32; 3], hi: [f32; 3], visit: &mut impl FnMut(ChunkId)) {
         self.descend(1, lo, hi, visit);
@@ -157,20 +166,24 @@ impl Sample {
     }
 }
 
-/// `wanted` finite triangles, evenly spread over the file.
-fn sample(records: &[Record], wanted: u64) -> Vec<Sample> {
+/// Finite triangles for so many chunks, evenly spread over the file. Where each is a page to be read from the disk, there are fewer.
+fn sample(records: &[Record], guide: &Guide<'_>, chunks: u64) -> Vec<Sample> {
     let n = records.len() as u64;
+    let wanted = chunks * if guide.is_needed() { SAMPLES_PER_CHUNK / 4 } else { SAMPLES_PER_CHUNK };
     let step = (n / wanted.max(1)).max(1);
-    (0..n)
-        .step_by(step as usize)
-        .filter_map(|t| {
-            let c = record::corners(&records[t as usize]);
+    let numbers: Vec<u32> = (0..n).step_by(step as usize).map(|t| t as u32).collect();
+    let mut samples = Vec::with_capacity(numbers.len());
+    for part in numbers.chunks(ASKED_AT_ONCE) {
+        guide.ask_for(part.iter().map(|t| (*t, 1)));
+        samples.extend(part.iter().filter_map(|t| {
+            let c = record::corners(&records[*t as usize]);
             c.iter().flatten().all(|x| x.is_finite()).then(|| Sample {
                 lo: std::array::from_fn(|k| c[0][k].min(c[1][k]).min(c[2][k])),
                 hi: std::array::from_fn(|k| c[0][k].max(c[1][k]).max(c[2][k])),
             })
-        })
-        .collect()
+        }));
+    }
+    samples
 }
 
 /// The plane, inside `cell`, that cuts the fewest samples; slightly prefers the middle. O(samples).
@@ -244,7 +257,7 @@ mod tests {
         fn every_position_has_one_home(points in prop::collection::vec(prop::array::uniform9(-100f32..100.0), 1..200),
                                        probes in prop::collection::vec(prop::array::uniform3(-150f32..150.0), 20)) {
             let records = soup(&points);
-            let plan = Plan::new(&records, 4);
+            let plan = Plan::new(&records, &Guide::NONE, 4);
             let corners = points.iter().map(|p| [p[0], p[1], p[2]]);
             for p in probes.into_iter().chain(corners) {
                 let homes: Vec<usize> = (0..plan.chunks()).filter(|c| plan.boxes[*c].holds(p)).collect();
@@ -262,19 +275,26 @@ mod tests {
         #[test]
         fn a_box_meets_the_cells_that_share_a_point_with_it(points in prop::collection::vec(prop::array::uniform9(-100f32..100.0), 1..200),
                                                              a in prop::array::uniform3(-150f32..150.0), b in prop::array::uniform3(-150f32..150.0)) {
-            let plan = Plan::new(&soup(&points), 4);
+            let plan = Plan::new(&soup(&points), &Guide::NONE, 4);
             let (lo, hi) = (std::array::from_fn(|k| a[k].min(b[k])), std::array::from_fn(|k| a[k].max(b[k])));
             let mut met = Vec::new();
             plan.meeting(lo, hi, &mut |c| met.push(c.0 as usize));
             let wanted: Vec<usize> = (0..plan.chunks()).filter(|c| plan.boxes[*c].meets(&Bounds { lo, hi })).collect();
-            prop_assert_eq!(met, wanted);
+            prop_assert_eq!(&met, &wanted);
+            for levels in 0..=plan.depth {
+                let mut subtrees: Vec<usize> = wanted.iter().map(|c| c >> levels).collect();
+                subtrees.dedup();
+                met.clear();
+                subtrees.iter().for_each(|s| plan.meeting_below(levels, *s, lo, hi, &mut |c| met.push(c.0 as usize)));
+                prop_assert_eq!(&met, &wanted, "in subtrees of {} levels", levels);
+            }
         }
     }
 
     #[test]
     fn no_box_holds_what_is_not_finite() {
         let records = soup(&[[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]; 64]);
-        let plan = Plan::new(&records, 8);
+        let plan = Plan::new(&records, &Guide::NONE, 8);
         for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
             assert!(plan.boxes.iter().all(|b| !b.holds([0.0, bad, 0.0])));
         }

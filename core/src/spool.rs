@@ -23,6 +23,7 @@ use crate::error::{Error, Result};
 use crate::plan::{ChunkId, Plan};
 use crate::record::{Point, Record};
 use crate::settings::Limits;
+use crate::sums::Bounds;
 
 /// A triangle's number and its corners, bytes 12 to 48 of its record.
 pub(crate) type Entry = [u8; ENTRY];
@@ -72,7 +73,7 @@ impl Layout {
 
     /// Memory that the writers of all threads take, in bytes.
     fn writers_bytes(&self, plan: &Plan, threads: usize) -> u64 {
-        ((plan.chunks() >> self.shift) * self.buffer * ENTRY + plan.chunks() * 4) as u64 * threads as u64
+        ((plan.chunks() >> self.shift) * self.buffer * ENTRY + plan.chunks() * 8) as u64 * threads as u64
     }
 }
 
@@ -113,6 +114,7 @@ impl Unsorted {
             buffers: vec![Vec::new(); buckets],
             extents: vec![Vec::new(); buckets],
             members: vec![0; chunks],
+            visitors: vec![0; chunks],
             failed: None,
         }
     }
@@ -121,7 +123,7 @@ impl Unsorted {
     pub(crate) fn sorted(self, parts: Vec<Part>, chunks: usize) -> Result<Spool> {
         let failed = Error::io(&self.folder, "spooling");
         let mut extents = vec![Vec::new(); chunks >> self.layout.shift];
-        let mut members = vec![0u32; chunks];
+        let (mut members, mut visitors) = (vec![0u32; chunks], vec![0u32; chunks]);
         for part in parts {
             let part = match part.0 {
                 Ok(part) => part,
@@ -129,12 +131,13 @@ impl Unsorted {
             };
             extents.iter_mut().zip(part.extents).for_each(|(all, more)| all.extend(more));
             members.iter_mut().zip(part.members).for_each(|(all, more)| *all += more);
+            visitors.iter_mut().zip(part.visitors).for_each(|(all, more)| *all += more);
         }
         // Synced, so that no dirty pages are left to count against what comes next.
         // SAFETY: the file has no name and nobody writes to it any more: no one changes or truncates it.
         let map = || self.behind.finish().and_then(|()| self.file.sync_data()).and_then(|()| unsafe { Mmap::map(&self.file) });
         let map = if self.end.into_inner() > 0 { Some(map().map_err(failed)?) } else { None };
-        Ok(Spool { map, extents, members, shift: self.layout.shift })
+        Ok(Spool { map, extents, members, visitors, shift: self.layout.shift })
     }
 }
 
@@ -144,6 +147,7 @@ pub(crate) struct Writer<'a> {
     buffers: Vec<Vec<u8>>,
     extents: Vec<Vec<Extent>>,
     members: Vec<u32>,
+    visitors: Vec<u32>,
     failed: Option<io::Error>,
 }
 
@@ -153,6 +157,7 @@ pub(crate) struct Part(io::Result<PartSpooled>);
 struct PartSpooled {
     extents: Vec<Vec<Extent>>,
     members: Vec<u32>,
+    visitors: Vec<u32>,
 }
 
 impl Writer<'_> {
@@ -165,15 +170,23 @@ impl Writer<'_> {
         }
     }
 
-    /// A triangle that is a member of all `chunks`, which are distinct.
-    pub(crate) fn take(&mut self, chunks: &[ChunkId], number: u32, record: &Record) {
+    /// A triangle that is a member of all `members` and a visitor of all `visitors`, which are all distinct.
+    pub(crate) fn take(&mut self, members: &[ChunkId], visitors: &[ChunkId], number: u32, record: &Record) {
+        members.iter().for_each(|c| self.members[c.0 as usize] += 1);
+        visitors.iter().for_each(|c| self.visitors[c.0 as usize] += 1);
         let layout = self.spool.layout;
-        for (k, chunk) in chunks.iter().enumerate() {
-            self.members[chunk.0 as usize] += 1;
-            let own = layout.bucket(*chunk);
-            if !chunks[..k].iter().any(|c| layout.bucket(*c) == own) {
+        // Once for each bucket. Visited chunks come in order, those of a bucket together.
+        let (mut last, bucket) = (usize::MAX, |c: &ChunkId| layout.bucket(*c));
+        for (k, chunk) in members.iter().enumerate() {
+            if !members[..k].iter().any(|c| bucket(c) == bucket(chunk)) {
+                self.put(bucket(chunk), number, record);
+            }
+        }
+        for own in visitors.iter().map(bucket) {
+            if own != last && !members.iter().any(|c| bucket(c) == own) {
                 self.put(own, number, record);
             }
+            last = own;
         }
     }
 
@@ -212,7 +225,7 @@ impl Writer<'_> {
         (0..self.buffers.len()).for_each(|bucket| self.flush(bucket));
         Part(match self.failed {
             Some(error) => Err(error),
-            None => Ok(PartSpooled { extents: self.extents, members: self.members }),
+            None => Ok(PartSpooled { extents: self.extents, members: self.members, visitors: self.visitors }),
         })
     }
 }
@@ -224,8 +237,9 @@ pub(crate) struct Spool {
     map: Option<Mmap>,
     /// Of each bucket, in the order of the triangles.
     extents: Vec<Vec<Extent>>,
-    /// Members of each chunk.
+    /// How many members and visitors each chunk has.
     members: Vec<u32>,
+    visitors: Vec<u32>,
     shift: u32,
 }
 
@@ -233,7 +247,7 @@ pub(crate) struct Spool {
 #[derive(Default)]
 pub(crate) struct Loaded {
     entries: Vec<Entry>,
-    /// The bucket's first chunk, and where each chunk's entries begin.
+    /// The bucket's first chunk, and where each chunk's members and then its visitors begin.
     first: usize,
     starts: Vec<usize>,
 }
@@ -241,7 +255,15 @@ pub(crate) struct Loaded {
 impl Loaded {
     /// Members of a chunk of the bucket.
     pub(crate) fn members(&self, chunk: ChunkId) -> &[Entry] {
-        let at = chunk.0 as usize - self.first;
+        self.part(2 * (chunk.0 as usize - self.first))
+    }
+
+    /// Its visitors.
+    pub(crate) fn visitors(&self, chunk: ChunkId) -> &[Entry] {
+        self.part(2 * (chunk.0 as usize - self.first) + 1)
+    }
+
+    fn part(&self, at: usize) -> &[Entry] {
         &self.entries[self.starts[at]..self.starts[at + 1]]
     }
 }
@@ -256,21 +278,21 @@ impl Spool {
         (bucket << self.shift..(bucket + 1) << self.shift).map(|c| ChunkId(c as u32))
     }
 
-    /// Members of `chunk`.
-    pub(crate) fn members(&self, chunk: ChunkId) -> u64 {
-        u64::from(self.members[chunk.0 as usize])
+    /// Members of `chunk` and its visitors.
+    pub(crate) fn seen(&self, chunk: ChunkId) -> u64 {
+        u64::from(self.members[chunk.0 as usize]) + u64::from(self.visitors[chunk.0 as usize])
     }
 
     /// Memory that loading takes when each thread holds one of the largest buckets, in bytes.
     pub(crate) fn loaded_bytes(&self, threads: usize) -> u64 {
-        let mut buckets: Vec<u64> = self.members.chunks(1 << self.shift).map(|m| m.iter().map(|n| u64::from(*n)).sum()).collect();
+        let mut buckets: Vec<u64> = (0..self.buckets()).map(|b| self.chunks(b).map(|c| self.seen(c)).sum()).collect();
         buckets.sort_unstable_by(|a, b| b.cmp(a));
         buckets.iter().take(threads).sum::<u64>() * ENTRY as u64
     }
 
     /// Bytes held.
     pub(crate) fn heap_bytes(&self) -> usize {
-        self.extents.iter().map(|e| e.capacity() * size_of::<Extent>() + 24).sum::<usize>() + self.members.len() * 4
+        self.extents.iter().map(|e| e.capacity() * size_of::<Extent>() + 24).sum::<usize>() + self.members.len() * 8
     }
 
     /// Reads a bucket. O(its entries × depth of a bucket in the plan).
@@ -280,13 +302,14 @@ impl Spool {
         into.starts.clear();
         into.starts.push(0);
         let mut end = 0;
-        for count in &self.members[chunks] {
-            end += *count as usize;
+        for count in chunks.flat_map(|c| [self.members[c], self.visitors[c]]) {
+            end += count as usize;
             into.starts.push(end);
         }
         into.entries.clear();
         into.entries.resize(end, [0; ENTRY]);
         let mut next = into.starts.clone();
+        let visited = self.chunks(bucket).any(|c| self.visitors[c.0 as usize] > 0);
         let Some(map) = &self.map else { return };
         // Advice, so that the disk is asked for all of them at once; without it the reading is only slower.
         for extent in &self.extents[bucket] {
@@ -295,15 +318,35 @@ impl Spool {
         for extent in &self.extents[bucket] {
             let at = extent.at as usize;
             for entry in map[at..at + extent.entries * ENTRY].as_chunks::<ENTRY>().0 {
-                let homes = corners(entry).map(|p| plan.home_below(self.shift, bucket, p));
+                let corners = corners(entry);
+                let homes = corners.map(|p| plan.home_below(self.shift, bucket, p));
+                let mut put = |at: usize| {
+                    into.entries[next[at]] = *entry;
+                    next[at] += 1;
+                };
+                let part_of = |home: ChunkId| 2 * (home.0 as usize - into.first);
+                if let [Some(home), b, c] = homes
+                    && b == homes[0]
+                    && c == homes[0]
+                {
+                    put(part_of(home));
+                    continue;
+                }
                 for k in 0..3 {
                     if let Some(home) = homes[k]
                         && !homes[..k].contains(&homes[k])
                     {
-                        let at = &mut next[home.0 as usize - into.first];
-                        into.entries[*at] = *entry;
-                        *at += 1;
+                        put(part_of(home));
                     }
+                }
+                if visited {
+                    let mut spread = Bounds::EMPTY;
+                    spread.include(&corners);
+                    plan.meeting_below(self.shift, bucket, spread.lo, spread.hi, &mut |chunk| {
+                        if !homes.contains(&Some(chunk)) {
+                            put(part_of(chunk) + 1);
+                        }
+                    });
                 }
             }
         }
@@ -323,7 +366,7 @@ mod tests {
             record::encode([[x, y, 0.0], [x + 1.0, y, 0.0], [x, y + 1.0, 0.0]], i as u16)
         };
         let records: Vec<Record> = (0..1000).map(at).collect();
-        let plan = Plan::new(&records, 8);
+        let plan = Plan::new(&records, &crate::ahead::Guide::NONE, 8);
         for (shift, buffer) in [(0, 3), (3, 3), (2, 1), (7, 1000)] {
             let limits = Limits::default();
             let spool = Unsorted::new(Path::new("test"), Layout { shift, buffer }, &plan, &limits).unwrap();
@@ -336,7 +379,7 @@ mod tests {
             };
             let write = |range: std::ops::Range<usize>| {
                 let mut writer = spool.writer(plan.chunks());
-                range.for_each(|i| writer.take(&homes(&records[i]), i as u32, &records[i]));
+                range.for_each(|i| writer.take(&homes(&records[i]), &[], i as u32, &records[i]));
                 writer.finish()
             };
             let second = write(400..1000);

@@ -6,6 +6,7 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use crate::ahead::Guide;
 use crate::budget::{Budget, Purpose};
 use crate::chunk::{self, ChunkTopology, Labels, Link, NONE, Patch, Scratch, Suspect};
 use crate::crossings::{self, Crossings};
@@ -39,6 +40,7 @@ pub(crate) struct Survey<'a> {
     /// Distinct positions, and those used by a triangle with three distinct vertices.
     pub(crate) vertices: u64,
     pub(crate) vertices_used: u64,
+    guide: Guide<'a>,
     plan: Plan,
     members: Members,
     labels: Vec<Labels>,
@@ -67,8 +69,9 @@ impl<'a> Survey<'a> {
     ) -> Result<Self> {
         let span = tracing::debug_span!("plan").entered();
         progress.at("plan", 0, records.len() as u64);
-        let plan = Plan::new(records, limits.chunk_triangles);
-        let mut members = Members::gather(path, records, &plan, self_intersections, limits, progress)?;
+        let guide = Guide::new(records.as_flattened(), limits);
+        let plan = Plan::new(records, &guide, limits.chunk_triangles);
+        let mut members = Members::gather(path, (records, &guide), &plan, self_intersections, limits, progress)?;
         drop(span);
         let bounds = members.bounds.normalised();
         let measure = Measure::new(&bounds);
@@ -78,11 +81,11 @@ impl<'a> Survey<'a> {
         let _span = tracing::debug_span!("chunks", count = plan.chunks()).entered();
         let (done, suspects, tested) = (AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0));
         let mut chunks = members.each(
-            (records, &plan),
+            (records, &guide, &plan),
             limits.threads,
             |_| true,
             Scratch::default,
-            |scratch, chunk, seen| {
+            |scratch, chunk, seen, visitors| {
                 // Once it is clear that there is too much to keep, the rest need not be known.
                 if progress.cancelled() || budget.is_exceeded() {
                     return ChunkTopology::default();
@@ -91,7 +94,6 @@ impl<'a> Survey<'a> {
                 let mut topology = scratch.solve(seen, cell, &measure);
                 if self_intersections {
                     let allowance = crossings::MOST_TESTED.saturating_sub(tested.load(Ordering::Relaxed));
-                    let visitors = members.visitors(chunk).map(|t| (t, record::corners(&records[t as usize])));
                     topology.crossings = scratch.cross(visitors, cell, allowance);
                     tested.fetch_add(topology.crossings.tested, Ordering::Relaxed);
                 }
@@ -127,6 +129,7 @@ impl<'a> Survey<'a> {
                 .then(|| Crossings::sum(chunks.iter_mut().map(|c| std::mem::take(&mut c.crossings)))),
             vertices: chunks.iter().map(|c| c.vertices).sum(),
             vertices_used: chunks.iter().map(|c| c.vertices_used).sum(),
+            guide,
             plan,
             members,
             labels: chunks.into_iter().map(|c| c.labels).collect(),
@@ -159,11 +162,11 @@ impl<'a> Survey<'a> {
     ) -> Vec<R> {
         let is_wanted = |chunk: ChunkId| self.patches_of(chunk).iter().any(|p| wanted(*p));
         self.members.each(
-            (self.records, &self.plan),
+            (self.records, &self.guide, &self.plan),
             self.threads,
             is_wanted,
             || (),
-            |(), chunk, seen| {
+            |(), chunk, seen, _| {
                 let mut result = make();
                 let patches = self.patches_of(chunk);
                 let cell = self.plan.home_box(chunk);
@@ -200,11 +203,11 @@ impl<'a> Survey<'a> {
         homes.dedup();
         let is_home = |chunk| homes.binary_search(&chunk).is_ok();
         let found = self.members.each(
-            (self.records, &self.plan),
+            (self.records, &self.guide, &self.plan),
             self.threads,
             is_home,
             || (),
-            |(), chunk, seen| {
+            |(), chunk, seen, _| {
                 let patches = self.patches_of(chunk);
                 let mut labels = self.labels[chunk.0 as usize].iter();
                 let mut found = Vec::new();

@@ -136,7 +136,7 @@ fn whole(soup: &[Triangle]) -> (Pairs, Tested) {
 /// The pairs and the count of a mesh cut into cells of about `size` triangles.
 fn in_cells(soup: &[Triangle], size: u32) -> (Pairs, u64) {
     let records: Vec<record::Record> = soup.iter().map(|t| record::encode(*t, 0)).collect();
-    let plan = Plan::new(&records, size);
+    let plan = Plan::new(&records, &crate::ahead::Guide::NONE, size);
     let (mesh, mut finder) = (Mesh::new(soup), Finder::default());
     let (mut pairs, mut counted) = (Vec::new(), 0);
     for chunk in 0..plan.chunks() as u32 {

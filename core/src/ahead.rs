@@ -43,7 +43,7 @@ impl<'a> Guide<'a> {
     }
 
     /// For what is in memory, or will stay there.
-    #[cfg(test)]
+    #[cfg(any(test, feature = "internals"))]
     pub(crate) const NONE: Self = Self { bytes: &[], room: None };
 
     /// The map does not stay in the page cache.

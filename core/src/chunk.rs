@@ -33,11 +33,34 @@ pub(crate) struct Suspect {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Link {
     pub(crate) triangle: u32,
-    /// Number of the patch within the chunk.
-    pub(crate) patch: u32,
+    /// Number of the patch, within the chunk or later the file, and in the highest bit whether the triangle is in the patch's sums: it
+    /// is in those of the chunk where its first corner is at home, if that knows nothing against it.
+    patch: u32,
 }
 
-/// What is summed over a patch: its triangles with three sound corners, all at home in one chunk.
+/// The most patches that links can tell apart.
+pub(crate) const MOST_PATCHES: u64 = 1 << 31;
+
+impl Link {
+    fn new(triangle: u32, patch: u32, counted: bool) -> Self {
+        Self { triangle, patch: patch | u32::from(counted) << 31 }
+    }
+
+    pub(crate) fn patch(self) -> u32 {
+        self.patch & !(1 << 31)
+    }
+
+    pub(crate) fn is_counted(self) -> bool {
+        self.patch >> 31 == 1
+    }
+
+    /// The same with the patch's number raised by `base`.
+    pub(crate) fn raised(self, base: u32) -> Self {
+        Self { patch: self.patch + base, ..self }
+    }
+}
+
+/// What is summed over a patch: its triangles with three sound corners, until the merge also some whose other corners are not.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Patch {
     pub(crate) triangles: u64,
@@ -364,9 +387,14 @@ impl Scratch {
                 out.suspects.push(Suspect { triangle, unsound });
             }
             if patch != NONE {
-                let first = &mut out.patches[patch as usize].first;
-                *first = triangle.min(*first);
-                out.links.push(Link { triangle, patch });
+                let counted = unsound == 0 && states[0] != AWAY;
+                if counted {
+                    sum.add(patch, triangle, *t, &mut out.patches);
+                } else {
+                    let first = &mut out.patches[patch as usize].first;
+                    *first = triangle.min(*first);
+                }
+                out.links.push(Link::new(triangle, patch, counted));
             }
         }
         sum.flush(&mut out.patches);

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::record::{self, Record};
 use crate::report::{EditRecords, EditSummary};
 use crate::shop::components::Reversed;
-use crate::shop::{Origin, Shop, distance};
+use crate::shop::{ASKED_AT_ONCE, Origin, Shop, distance};
 use crate::survey::Survey;
 
 /// What happens to an input record that is not untouched.
@@ -44,6 +44,13 @@ impl Edit {
         edit.changes
             .extend(survey.nonfinite.iter().flat_map(|(first, count)| *first..*first + *count).map(|t| (t, Change::Delete)));
         for (i, triangle) in shop.triangles.iter().enumerate() {
+            if i % ASKED_AT_ONCE == 0 {
+                let soon = shop.triangles[i..].iter().take(ASKED_AT_ONCE);
+                survey.ask_for(soon.filter_map(|t| match t.origin {
+                    Origin::Input(record) | Origin::Part(record) => Some(record),
+                    Origin::Patch => None,
+                }));
+            }
             let points = || shop.points(i as u32);
             match triangle.origin {
                 Origin::Input(t) if triangle.alive => edit.compare(survey.records, t, points()),

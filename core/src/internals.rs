@@ -4,6 +4,7 @@
 use std::hint::black_box;
 use std::path::Path;
 
+use crate::ahead::Guide;
 use crate::boxes::BoxTree;
 use crate::chunk::Scratch;
 use crate::error::Result;
@@ -35,7 +36,7 @@ impl Mesh {
         let (records, _) = file.get(84..).unwrap_or_default().as_chunks::<50>();
         let records = records.to_vec();
         let limits = Limits { threads: 1, chunk_triangles, ..Limits::default() };
-        let plan = Plan::new(&records, chunk_triangles);
+        let plan = Plan::new(&records, &Guide::NONE, chunk_triangles);
         let members = gather(&records, &plan, &limits)?;
         let measure = Measure::new(&members.bounds);
         let boxes: Vec<_> = records.iter().map(bounds).collect();
@@ -50,7 +51,7 @@ impl Mesh {
 
     /// The kd tree; returns its chunks.
     pub fn plan(&self) -> usize {
-        Plan::new(&self.records, self.limits.chunk_triangles).chunks()
+        Plan::new(&self.records, &Guide::NONE, self.limits.chunk_triangles).chunks()
     }
 
     /// The run lists of all chunks, with visitors, written; returns their bytes.
@@ -84,11 +85,11 @@ impl Mesh {
     /// All that topology decides inside chunks: weld, stars, patches, sums; returns the vertices at home in them.
     pub fn solve(&self) -> u64 {
         let solved = self.members.each(
-            (&self.records, &self.plan),
+            (&self.records, &Guide::NONE, &self.plan),
             1,
             |_| true,
             Scratch::default,
-            |scratch, chunk, seen| scratch.solve(seen, self.plan.home_box(chunk), &self.measure).vertices,
+            |scratch, chunk, seen, _| scratch.solve(seen, self.plan.home_box(chunk), &self.measure).vertices,
         );
         solved.into_iter().sum()
     }
@@ -96,14 +97,13 @@ impl Mesh {
     /// The same, and the search for self-intersections; returns how many pairs of triangles it tested.
     pub fn solve_and_cross(&self) -> u64 {
         let tested = self.members.each(
-            (&self.records, &self.plan),
+            (&self.records, &Guide::NONE, &self.plan),
             1,
             |_| true,
             Scratch::default,
-            |scratch, chunk, seen| {
+            |scratch, chunk, seen, visitors| {
                 let cell = self.plan.home_box(chunk);
                 black_box(scratch.solve(seen, cell, &self.measure));
-                let visitors = self.members.visitors(chunk).map(|t| (t, corners(&self.records[t as usize])));
                 scratch.cross(visitors, cell, u64::MAX).tested
             },
         );
@@ -141,7 +141,7 @@ impl Mesh {
 }
 
 fn gather(records: &[Record], plan: &Plan, limits: &Limits) -> Result<Members> {
-    Members::gather(Path::new("memory"), records, plan, true, limits, &crate::Quiet)
+    Members::gather(Path::new("memory"), (records, &Guide::NONE), plan, true, limits, &crate::Quiet)
 }
 
 fn bounds(record: &Record) -> Bounds {

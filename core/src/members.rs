@@ -16,6 +16,7 @@ use crate::plan::{ChunkId, Plan};
 use crate::record::{self, Record};
 use crate::settings::{Limits, Spill};
 use crate::source::{Mapped, Seen, Spooled};
+use crate::space::{self, Need};
 use crate::spool::{self, Loaded, Spool, Unsorted};
 use crate::sums::Bounds;
 
@@ -252,6 +253,9 @@ impl Members {
         limits: &Limits,
         told: &Told<'_>,
     ) -> Result<Self> {
+        // Asked again, for the lists may have led here.
+        let need = Need { folder: limits.spool_folder(), bytes: entries_bytes(records), what: "sorting triangles by place" };
+        space::check(path, &[need])?;
         let spool = Unsorted::new(path, spool::Layout::new(records.len(), plan, limits), plan, limits)?;
         // One piece a thread: every piece ends with extents that are not full.
         let results = in_pieces(records, limits.threads, limits.threads, |piece, offset| {
@@ -362,8 +366,12 @@ pub(crate) fn spool_bytes(records: &[Record], guide: &Guide<'_>, limits: &Limits
         Spill::Never => false,
         Spill::Auto => guide.is_needed() && is_scattered(records, guide),
     };
-    // Some triangles lie across buckets.
-    if spooled { (records.len() * size_of::<spool::Entry>()) as u64 / 20 * 21 } else { 0 }
+    if spooled { entries_bytes(records) } else { 0 }
+}
+
+/// What a spool of these triangles takes, some of which lie across buckets.
+fn entries_bytes(records: &[Record]) -> u64 {
+    (records.len() * size_of::<spool::Entry>()) as u64 / 20 * 21
 }
 
 /// Stretches of the file that are looked at to find out how scattered its triangles are, and triangles in each.
@@ -565,8 +573,7 @@ mod tests {
         let limits = Limits { threads: 2, memory_bytes: 5 << 18, ..Limits::default() };
         let gathered = |spill| {
             let (input, limits) = ((&records[..], &Guide::NONE), Limits { spill, ..limits.clone() });
-            Members::gather(Path::new("test"), input, &plan, false, &limits, &crate::Quiet)
-                .unwrap()
+            Members::gather(Path::new("test"), input, &plan, false, &limits, &crate::Quiet).unwrap()
         };
         let (lists, spooled) = (gathered(Spill::Never), gathered(Spill::Auto));
         assert!(matches!(&lists.kept, Kept::Lists { .. }) && lists.heap_bytes(2) * 3 > limits.memory_bytes / 4);

@@ -6,6 +6,7 @@
 
 use crate::ahead::Guide;
 use crate::record::{self, Record};
+use crate::shop::ASKED_AT_ONCE;
 
 /// A chunk, numbered by its place among the leaves of the tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -41,8 +42,6 @@ impl HomeBox {
 
 /// Samples a leaf should see; more do not make better planes.
 const SAMPLES_PER_CHUNK: u64 = 64;
-/// Samples that the disk is asked for together.
-const ASKED_AT_ONCE: usize = 8192;
 
 /// Heap-ordered kd tree: node 1 is the root, node `i` has children `2i` and `2i + 1`.
 #[derive(Debug)]

@@ -74,6 +74,13 @@ pub(crate) struct Extent {
     pub(crate) volume: i128,
 }
 
+impl std::ops::SubAssign for Extent {
+    fn sub_assign(&mut self, other: Self) {
+        self.area -= other.area;
+        self.volume -= other.volume;
+    }
+}
+
 impl std::ops::AddAssign for Extent {
     fn add_assign(&mut self, other: Self) {
         self.area += other.area;

@@ -17,7 +17,7 @@ use crate::record::{self, Record};
 use crate::report::SelfIntersections;
 use crate::settings::Limits;
 use crate::source::{Source, Triangle};
-use crate::sums::{Bounds, Extent, Measure};
+use crate::sums::{Bounds, Measure};
 use crate::weld::Weld;
 use crate::{Progress, edit};
 
@@ -79,7 +79,7 @@ impl<'a> Survey<'a> {
         take_tables(path, &budget, &plan, &members, limits)?;
 
         let _span = tracing::debug_span!("chunks", count = plan.chunks()).entered();
-        let (done, suspects, tested) = (AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0));
+        let [done, suspects, patches, tested] = [const { AtomicU64::new(0) }; 4];
         let mut chunks = members.each(
             (records, &guide, &plan),
             limits.threads,
@@ -98,6 +98,7 @@ impl<'a> Survey<'a> {
                     tested.fetch_add(topology.crossings.tested, Ordering::Relaxed);
                 }
                 suspects.fetch_add(topology.suspects.len() as u64, Ordering::Relaxed);
+                patches.fetch_add(topology.patches.len() as u64, Ordering::Relaxed);
                 topology.take(&budget);
                 let chunks_done = done.fetch_add(1, Ordering::Relaxed) + 1;
                 progress.at(STAGE, chunks_done * records.len() as u64 / plan.chunks() as u64, records.len() as u64);
@@ -109,13 +110,8 @@ impl<'a> Survey<'a> {
         }
         let suspects = suspects.into_inner();
         budget.check(path, || format!("at least {suspects} triangles lie at defects"))?;
-        if suspects > MOST_SUSPECTS {
-            return Err(Error::Refused {
-                path: path.into(),
-                reason: format!("{suspects} triangles lie at defects"),
-                advice: format!("at most {MOST_SUSPECTS} can be worked on: split the file"),
-            });
-        }
+        refuse_more_than(path, MOST_SUSPECTS, suspects, "triangles lie at defects")?;
+        refuse_more_than(path, chunk::MOST_PATCHES, patches.into_inner(), "pieces of surface, counted by chunks, are there")?;
         let merge = Merge::of(records, &measure, &mut chunks);
         Ok(Self {
             records,
@@ -142,6 +138,11 @@ impl<'a> Survey<'a> {
     /// Triangles with finite coordinates.
     pub(crate) fn triangles(&self) -> u64 {
         self.records.len() as u64 - self.nonfinite.iter().map(|r| u64::from(r.1)).sum::<u64>()
+    }
+
+    /// Asks the disk for these records, which are about to be looked at.
+    pub(crate) fn ask_for(&self, numbers: impl Iterator<Item = u32>) {
+        self.guide.ask_for(numbers.map(|number| (number, 1)));
     }
 
     /// Merged patches of a chunk, by the chunk's own numbers.
@@ -230,7 +231,7 @@ impl<'a> Survey<'a> {
             let sum = &mut self.patches[*patch as usize];
             let extent = self.measure.triangle(&record::corners(&self.records[suspect.triangle as usize]));
             sum.triangles -= 1;
-            sum.extent += Extent { area: -extent.area, volume: -extent.volume };
+            sum.extent -= extent;
         }
         let mut all: Vec<(Suspect, u32)> =
             self.suspects.iter().copied().zip(self.suspect_patches.iter().copied()).chain(new.iter().copied()).collect();
@@ -238,6 +239,15 @@ impl<'a> Survey<'a> {
         (self.suspects, self.suspect_patches) = all.into_iter().unzip();
         new
     }
+}
+
+/// Refuses what could not be numbered.
+fn refuse_more_than(path: &Path, most: u64, there: u64, what: &str) -> Result<()> {
+    if there <= most {
+        return Ok(());
+    }
+    let advice = format!("at most {most} can be worked on: split the file");
+    Err(Error::Refused { path: path.into(), reason: format!("{there} {what}"), advice })
 }
 
 /// Takes what is known to be needed before the chunks are solved.
@@ -263,7 +273,7 @@ struct Merge {
 }
 
 impl Merge {
-    /// Unites patches that share a triangle and adds up what the chunks left to it. O(seam + suspects + patches), sorted.
+    /// Unites patches that share a triangle. O(seam + suspects + patches), sorted.
     fn of(records: &[Record], measure: &Measure, chunks: &mut [ChunkTopology]) -> Self {
         let _span = tracing::debug_span!("merge").entered();
         let mut bases = vec![0u32];
@@ -273,8 +283,7 @@ impl Merge {
         for chunk in chunks {
             let base = sums.len() as u32;
             sums.append(&mut chunk.patches);
-            links.extend(chunk.links.drain(..).map(|l| Link { patch: base + l.patch, ..l }));
-            chunk.links = Vec::new();
+            links.extend(std::mem::take(&mut chunk.links).into_iter().map(|l| l.raised(base)));
             suspects.append(&mut chunk.suspects);
             bases.push(sums.len() as u32);
         }
@@ -288,19 +297,24 @@ impl Merge {
         let mut parents: Vec<u32> = (0..sums.len() as u32).collect();
         for pair in links.windows(2) {
             if pair[0].triangle == pair[1].triangle {
-                chunk::unite(&mut parents, pair[0].patch, pair[1].patch);
+                chunk::unite(&mut parents, pair[0].patch(), pair[1].patch());
             }
         }
-        links.dedup_by_key(|l| l.triangle);
-        let suspect_raw = take_shared(records, measure, &links, &suspects, &mut sums);
+        let suspect_raw = take_out_suspects(records, measure, &links, &suspects, &mut sums);
         let (patches, merged) = number(&mut parents, sums);
         let suspect_patches = suspect_raw.into_iter().map(|p| if p == NONE { NONE } else { merged[p as usize] }).collect();
         Self { suspects, suspect_patches, patches, bases, merged }
     }
 }
 
-/// Adds the shared triangles that are no suspects to their patches; returns the patch of each suspect.
-fn take_shared(records: &[Record], measure: &Measure, links: &[Link], suspects: &[Suspect], sums: &mut [Patch]) -> Vec<u32> {
+/// Takes suspects out of the sums of chunks that knew nothing against them; returns the patch of each suspect.
+fn take_out_suspects(
+    records: &[Record],
+    measure: &Measure,
+    links: &[Link],
+    suspects: &[Suspect],
+    sums: &mut [Patch],
+) -> Vec<u32> {
     let mut patches = vec![NONE; suspects.len()];
     let mut s = 0;
     for link in links {
@@ -308,11 +322,12 @@ fn take_shared(records: &[Record], measure: &Measure, links: &[Link], suspects: 
             s += 1;
         }
         if s < suspects.len() && suspects[s].triangle == link.triangle {
-            patches[s] = link.patch;
-        } else {
-            let sum = &mut sums[link.patch as usize];
-            sum.triangles += 1;
-            sum.extent += measure.triangle(&record::corners(&records[link.triangle as usize]));
+            patches[s] = link.patch();
+            if link.is_counted() {
+                let sum = &mut sums[link.patch() as usize];
+                sum.triangles -= 1;
+                sum.extent -= measure.triangle(&record::corners(&records[link.triangle as usize]));
+            }
         }
     }
     patches

@@ -18,6 +18,7 @@ use crate::behind::WriteBehind;
 use crate::error::{Error, Result};
 use crate::record::Record;
 use crate::settings::Limits;
+use crate::space::{self, Need};
 
 /// Text parsed at a time by one thread.
 pub(super) const WINDOW: usize = 1 << 20;
@@ -44,6 +45,8 @@ pub(super) struct Context<'a> {
 /// Parses `text` from byte `start` on.
 pub(super) fn read(text: &[u8], start: usize, context: &Context<'_>) -> Result<Parsed> {
     let reject = |rejection: Rejection| rejection.at(context.path);
+    let bytes = expected_bytes(text, start).map_err(reject)?;
+    space::check(context.path, &[Need { folder: context.spool.into(), bytes, what: "the triangles of the text" }])?;
     let mut spool = Spool::new(context)?;
     let mut tally = Tally::default();
     let mut windows = Windows { text, at: start };
@@ -71,6 +74,17 @@ pub(super) fn read(text: &[u8], start: usize, context: &Context<'_>) -> Result<P
     }
     judge(&tally, spool.records).map_err(reject)?;
     Ok(Parsed { spool: spool.map()?, findings: findings(&tally), header: header(&tally) })
+}
+
+/// Bytes of records that a text will make, if it goes on as it begins.
+fn expected_bytes(text: &[u8], start: usize) -> std::result::Result<u64, Rejection> {
+    let first = Windows { text, at: start }.batch(1)?;
+    let (records, length) = first.first().map_or((0, 1), |piece| {
+        let (records, _) = facets::parse(piece.text, piece.at as u64, piece.last);
+        (records.len() as u64, piece.text.len().max(1) as u64)
+    });
+    let pieces = (text.len() - start) as u64 / length + 1;
+    Ok(records * size_of::<Record>() as u64 * pieces)
 }
 
 /// A piece of text that ends before a facet or with the file.

@@ -52,6 +52,9 @@ pub(crate) struct Shop {
     nexts: Vec<u32>,
 }
 
+/// Records that the disk is asked for together where the file does not stay in the page cache.
+pub(crate) const ASKED_AT_ONCE: usize = 8192;
+
 /// Bytes a workshop needs for each suspect, tables of the repairs included, measured on a soup (three vertices a triangle).
 pub(crate) const BYTES_PER_SUSPECT: u64 = 320;
 
@@ -62,7 +65,10 @@ impl Shop {
         weld.reset(survey.suspects.len());
         let mut triangles = Vec::with_capacity(survey.suspects.len());
         let mut complete = Vec::new();
-        for (suspect, patch) in survey.suspects.iter().zip(&survey.suspect_patches) {
+        for (i, (suspect, patch)) in survey.suspects.iter().zip(&survey.suspect_patches).enumerate() {
+            if i % ASKED_AT_ONCE == 0 {
+                survey.ask_for(survey.suspects[i..].iter().take(ASKED_AT_ONCE).map(|s| s.triangle));
+            }
             let v = corners(survey.records, suspect.triangle).map(|p| weld.vertex(p));
             complete.resize(weld.positions().len(), false);
             for (k, vertex) in v.iter().enumerate() {

@@ -89,7 +89,7 @@ mod tests {
             chunk in 1u32..20,
         ) {
             let records: Vec<Record> = points.iter().map(|p| record::assemble([f32::NAN; 3], *p, u16::MAX)).collect();
-            let plan = Plan::new(&records, chunk);
+            let plan = Plan::new(&records, &crate::ahead::Guide::NONE, chunk);
             for c in 0..plan.chunks() as u32 {
                 let home = plan.home_box(ChunkId(c));
                 let (cell, mut extremes) = (CellColumns::of(&home), Extremes::EMPTY);

@@ -22,6 +22,8 @@ use crate::protocol::{Message, Request};
 
 /// How often a waiting supervisor looks whether it should stop.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
+/// Kills by the kernel are counted anew before a request, but not more often: it takes as long as a small file's hash.
+const COUNT_EVERY: Duration = Duration::from_secs(1);
 /// Lines of a worker's standard error that are kept for the post mortem.
 const TAIL_LINES: usize = 12;
 
@@ -112,7 +114,8 @@ pub(crate) struct Worker {
     messages: Receiver<Message>,
     tail: Arc<Mutex<VecDeque<String>>>,
     readers: Vec<JoinHandle<()>>,
-    oom_kills: u64,
+    /// Kills for want of memory, as counted at that time.
+    oom_kills: (u64, Instant),
 }
 
 impl Worker {
@@ -162,7 +165,7 @@ impl Worker {
             readers.push(std::thread::spawn(move || keep_tail(stderr, &tail)));
         }
         let stdin = child.stdin.take();
-        Ok(Self { child, stdin, messages, tail, readers, oom_kills: oom_kills() })
+        Ok(Self { child, stdin, messages, tail, readers, oom_kills: (oom_kills(), Instant::now()) })
     }
 
     /// The process's id.
@@ -185,7 +188,9 @@ impl Worker {
         on_progress: &mut dyn FnMut(&str, u64, u64),
     ) -> Ended {
         let start = Instant::now();
-        self.oom_kills = oom_kills();
+        if start.duration_since(self.oom_kills.1) >= COUNT_EVERY {
+            self.oom_kills = (oom_kills(), start);
+        }
         if !self.send(request) {
             return Ended::Died(self.post_mortem());
         }
@@ -240,7 +245,7 @@ impl Worker {
                 _ => break None,
             }
         };
-        let oom = oom_kills() > self.oom_kills;
+        let oom = oom_kills() > self.oom_kills.0;
         self.kill();
         let lines = self.tail.lock().unwrap_or_else(PoisonError::into_inner);
         let out_of_memory = lines.iter().any(|line| line.starts_with("memory allocation of "));

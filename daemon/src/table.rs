@@ -115,8 +115,8 @@ fn pairs_left(out: &mut String, report: &Report) {
     let pairs: Vec<String> = left.listed.iter().take(PAIRS_SHOWN).map(|[a, b]| format!("{a} and {b}")).collect();
     if !pairs.is_empty() {
         let more = all.saturating_sub(pairs.len() as u64);
-        let rest = if more > 0 { format!(", and {} more pairs", show_count(more)) } else { String::new() };
-        item(out, "left", &format!("self-intersection of triangles {}{rest} (numbered from 0)", pairs.join(", ")));
+        let rest = if more > 0 { format!(", and {} more", show_count(more)) } else { String::new() };
+        item(out, "pairs", &format!("triangles {}{rest} (numbered from 0)", pairs.join(", ")));
     }
 }
 
@@ -286,7 +286,7 @@ pub(crate) mod tests {
         let row = text.lines().find(|line| line.contains("self-intersecting triangles")).unwrap();
         assert!(row.split_whitespace().skip(2).eq(["14", "10"]), "{row}");
         assert!(text.contains("pairs that cross") && !text.contains("pairs that overlap"), "{text}");
-        assert!(text.contains("triangles 0 and 10, 1 and 11, 2 and 12, and 2 more pairs"), "{text}");
+        assert!(text.contains("  pairs   triangles 0 and 10, 1 and 11, 2 and 12, and 2 more (numbered from 0)"), "{text}");
         if let Some(found) = &mut report.before.self_intersections {
             *found = SelfIntersections { given_up: true, ..Default::default() };
         }

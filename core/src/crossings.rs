@@ -10,9 +10,11 @@ use crate::report::SelfIntersections;
 /// Pairs that are listed: those with the smallest triangle numbers.
 pub(crate) const LISTED: usize = 100;
 
-/// Candidate pairs whose contact may be worked out in one file, lest a heap of coincident triangles takes forever. A count, so that it
-/// depends on the mesh alone.
-pub(crate) const MOST_TESTED: u64 = 1 << 33;
+/// Candidate pairs whose contact may be worked out in a file of so many triangles, lest a heap of coincident ones takes forever. A count, so
+/// that it depends on the mesh alone. Sound meshes have up to four a triangle, CAD parts with many touching faces ten (measured).
+pub(crate) fn most_tested(triangles: u64) -> u64 {
+    (1 << 30) + 16 * triangles
+}
 
 /// What one chunk, or the whole file, has found.
 #[derive(Debug, Default)]
@@ -61,8 +63,8 @@ impl Crossings {
         self.across = across;
     }
 
-    /// Adds up the chunks' parts; `None` if they gave up.
-    pub(crate) fn sum(parts: impl Iterator<Item = Self>) -> SelfIntersections {
+    /// Adds up the parts of the chunks, which gave up if they tested more than `most` pairs.
+    pub(crate) fn sum(parts: impl Iterator<Item = Self>, most: u64) -> SelfIntersections {
         let mut all = Self::default();
         for mut part in parts {
             all.tested += part.tested;
@@ -73,7 +75,7 @@ impl Crossings {
             all.pairs.append(&mut part.pairs);
             all.keep_smallest();
         }
-        if all.tested > MOST_TESTED {
+        if all.tested > most {
             // What was found until then depends on the order of the work.
             return SelfIntersections { given_up: true, ..SelfIntersections::default() };
         }
@@ -86,5 +88,39 @@ impl Crossings {
             listed: all.pairs,
             given_up: false,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn part(tested: u64, pairs: &[[u32; 2]], across: &[u32]) -> Crossings {
+        let mut part = Crossings::default();
+        pairs.iter().for_each(|[a, b]| part.add(*a, *b, Contact::Cross));
+        part.close(tested, 1, across.to_vec());
+        part
+    }
+
+    #[test]
+    fn a_triangle_across_a_seam_counts_once() {
+        let sum = Crossings::sum([part(5, &[[9, 2]], &[9]), part(5, &[[9, 4]], &[9])].into_iter(), 10);
+        assert_eq!((sum.triangles, sum.crossing_pairs, sum.given_up), (3, 2, false));
+        assert_eq!(sum.listed, [[2, 9], [4, 9]], "smaller numbers first");
+    }
+
+    #[test]
+    fn one_pair_too_many_and_nothing_is_counted() {
+        let sum = Crossings::sum([part(5, &[[9, 2]], &[]), part(6, &[], &[])].into_iter(), 10);
+        assert_eq!(sum, SelfIntersections { given_up: true, ..SelfIntersections::default() });
+        assert!(!sum.is_free());
+    }
+
+    #[test]
+    fn the_smallest_pairs_are_listed_however_many_there_are() {
+        let pairs: Vec<[u32; 2]> = (0..2000).rev().map(|i| [i, i + 5000]).collect();
+        let sum = Crossings::sum([part(0, &pairs[..700], &[]), part(0, &pairs[700..], &[])].into_iter(), 1);
+        assert_eq!(sum.listed, (0..LISTED as u32).map(|i| [i, i + 5000]).collect::<Vec<_>>());
+        assert_eq!(sum.crossing_pairs, 2000);
     }
 }

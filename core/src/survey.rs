@@ -78,6 +78,7 @@ impl<'a> Survey<'a> {
         let budget = Budget::new(limits.memory_bytes);
         take_tables(path, &budget, &plan, &members, limits)?;
 
+        let most_tested = crossings::most_tested(records.len() as u64);
         let _span = tracing::debug_span!("chunks", count = plan.chunks()).entered();
         let [done, suspects, patches, tested] = [const { AtomicU64::new(0) }; 4];
         let mut chunks = members.each(
@@ -93,7 +94,7 @@ impl<'a> Survey<'a> {
                 let cell = plan.home_box(chunk);
                 let mut topology = scratch.solve(seen, cell, &measure);
                 if self_intersections {
-                    let allowance = crossings::MOST_TESTED.saturating_sub(tested.load(Ordering::Relaxed));
+                    let allowance = most_tested.saturating_sub(tested.load(Ordering::Relaxed));
                     topology.crossings = scratch.cross(visitors, cell, allowance);
                     tested.fetch_add(topology.crossings.tested, Ordering::Relaxed);
                 }
@@ -122,7 +123,7 @@ impl<'a> Survey<'a> {
             patches: merge.patches,
             nonfinite: std::mem::take(&mut members.nonfinite),
             self_intersections: self_intersections
-                .then(|| Crossings::sum(chunks.iter_mut().map(|c| std::mem::take(&mut c.crossings)))),
+                .then(|| Crossings::sum(chunks.iter_mut().map(|c| std::mem::take(&mut c.crossings)), most_tested)),
             vertices: chunks.iter().map(|c| c.vertices).sum(),
             vertices_used: chunks.iter().map(|c| c.vertices_used).sum(),
             guide,

@@ -33,7 +33,7 @@ pub(crate) fn judge(defects: &Defects, flaws: &[String]) -> Verdict {
     say(defects.inverted_components, "components inside out");
     if let Some(found) = defects.self_intersections.as_ref().filter(|found| !found.is_free()) {
         reasons.push(if found.given_up {
-            "too many triangles lie on top of each other to be compared pair by pair".into()
+            "too many triangles come close to each other to be compared pair by pair".into()
         } else {
             let (crossing, overlapping) = (found.crossing_pairs, found.overlapping_pairs);
             format!("{} self-intersecting triangles ({crossing} crossing and {overlapping} overlapping pairs)", found.triangles)

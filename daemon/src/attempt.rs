@@ -297,7 +297,7 @@ impl<'a> Slot<'a> {
             return Ok(worker);
         }
         self.served = 1;
-        Worker::spawn(limits.memory_bytes, limits.threads)
+        Worker::spawn(limits.memory_bytes, limits.threads, !turn.is_alone())
     }
 }
 

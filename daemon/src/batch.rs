@@ -90,7 +90,7 @@ impl<'a> Batch<'a> {
         let bar = &mut self.teller.bar;
         bar.alone(&entry.input.display().to_string(), entry.size);
         let outcome = self.order.item(entry.input, entry.target.as_deref(), self.order.limits.clone()).and_then(|item| {
-            let report = item.work(&mut self.worker, self.stop, &mut |stage, done, total| bar.at(stage, done, total))?;
+            let report = item.work(&mut self.worker, false, self.stop, &mut |stage, done, total| bar.at(stage, done, total))?;
             Ok(Finished { report, item })
         });
         bar.done(entry.size);
@@ -210,7 +210,7 @@ impl<'a> Line<'a> {
         // A list of what was edited may be much larger than the mesh.
         let defer_sync = entry.target.is_some() && entry.size <= self.deferred && !self.limits.list_edit;
         let item = self.order.item(entry.input, entry.target.as_deref(), Limits { defer_sync, ..self.limits.clone() })?;
-        let report = item.work(worker, self.stop, &mut |_, _, _| {})?;
+        let report = item.work(worker, true, self.stop, &mut |_, _, _| {})?;
         Ok(Finished { report, item })
     }
 }

@@ -143,21 +143,22 @@ impl Order<'_> {
 }
 
 impl Item {
-    /// Runs the request in a worker of that memory and so many threads, which is started when there is none; it is there again
-    /// afterwards if it survived.
+    /// Runs the request in a worker of its memory and threads, which is started when there is none (for `many` small files, or for
+    /// one); it is there again afterwards if it survived.
     ///
     /// # Errors
     /// When the file has no result, for whatever reason.
     pub(crate) fn work(
         &self,
         worker: &mut Option<Worker>,
+        many: bool,
         stop: &Stop,
         on_progress: &mut dyn FnMut(&str, u64, u64),
     ) -> Result<Box<Report>, Failure> {
         let Request { limits, shown_input: shown, .. } = &self.request;
         let mut running = match worker.take() {
             Some(worker) => worker,
-            None => Worker::spawn(limits.memory_bytes, limits.threads)
+            None => Worker::spawn(limits.memory_bytes, limits.threads, many)
                 .map_err(|e| Failure::new(ErrorClass::Environment, format!("cannot start a worker process: {e}")))?,
         };
         let ended = running.run(&self.request, None, &|| stop.asked(), on_progress);

@@ -87,6 +87,19 @@ impl<'a> Guide<'a> {
         })
     }
 
+    /// For reading that goes straight on with gaps: asks for a block or two beyond `part`, a part of the map. `asked` is how far that was
+    /// done before, 0 to begin with.
+    pub(crate) fn keep_ahead(&self, asked: &mut usize, part: &[u8]) {
+        if self.is_needed() {
+            let start = (part.as_ptr() as usize).saturating_sub(self.bytes.as_ptr() as usize);
+            *asked = (*asked).max(start);
+            while *asked < (start + part.len() + BLOCK).min(self.bytes.len()) {
+                self.advise(*asked, *asked + BLOCK, Advice::WillNeed);
+                *asked += BLOCK;
+            }
+        }
+    }
+
     /// Only advice: without it the reading is slower.
     fn advise(&self, from: usize, to: usize, advice: Advice) {
         let to = to.min(self.bytes.len());
@@ -135,6 +148,10 @@ mod tests {
             assert!(got.concat() == records);
             let tail: Vec<u8> = guide.blocks(&bytes[bytes.len() - 7..]).flatten().copied().collect();
             assert_eq!(tail, [399_999u32 as u8; 7]);
+            let mut asked = 0;
+            guide.keep_ahead(&mut asked, &bytes[..100]);
+            guide.keep_ahead(&mut asked, &bytes[5000..6000]);
+            assert_eq!(asked, if room.is_some() { 2 * BLOCK } else { 0 }, "the block of the part, and one more");
             assert_eq!(guide.blocks(&records[..0]).map(<[Record]>::len).sum::<usize>(), 0);
         }
     }

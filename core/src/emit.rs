@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
 
 use crate::Progress;
+use crate::ahead::Guide;
 use crate::behind::WriteBehind;
 use crate::edit::{Edit, Step};
 use crate::error::{Error, Result};
@@ -54,6 +55,9 @@ struct Sink<'a> {
     file: File,
     buffer: Vec<u8>,
     behind: WriteBehind,
+    /// How the input is read where it is not copied inside the kernel, and how far that was asked for.
+    guide: Guide<'a>,
+    asked: usize,
     /// Bytes so far.
     written: u64,
     progress: &'a dyn Progress,
@@ -66,7 +70,8 @@ impl<'a> Sink<'a> {
         let file = create(path).map_err(Error::io(path, "creating"))?;
         let buffer = Vec::with_capacity(Self::BUFFER_BYTES.min(mesh.bytes().len()));
         let behind = WriteBehind::new(&file, limits).map_err(Error::io(path, "creating"))?;
-        Ok(Self { mesh, path, kernel_copies: true, file, buffer, behind, written: 0, progress })
+        let guide = Guide::new(mesh.records().as_flattened(), limits);
+        Ok(Self { mesh, path, kernel_copies: true, file, buffer, behind, guide, asked: 0, written: 0, progress })
     }
 
     fn put(&mut self, bytes: &[u8]) -> Result<()> {
@@ -78,7 +83,11 @@ impl<'a> Sink<'a> {
     }
 
     fn put_run(&mut self, run: &[Record]) -> Result<()> {
-        self.put_bytes(run.as_flattened())
+        let bytes = run.as_flattened();
+        if bytes.len() < KERNEL_COPY_BYTES {
+            self.guide.keep_ahead(&mut self.asked, bytes);
+        }
+        self.put_bytes(bytes)
     }
 
     fn put_bytes(&mut self, bytes: &[u8]) -> Result<()> {

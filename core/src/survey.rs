@@ -19,7 +19,7 @@ use crate::settings::Limits;
 use crate::source::{Source, Triangle};
 use crate::sums::{Bounds, Measure};
 use crate::weld::Weld;
-use crate::{Progress, edit};
+use crate::{Progress, behind, edit};
 
 /// Topology of the sound part of a file, and the list of what is not sound.
 #[derive(Debug)]
@@ -76,7 +76,7 @@ impl<'a> Survey<'a> {
         let bounds = members.bounds.normalised();
         let measure = Measure::new(&bounds);
         let budget = Budget::new(limits.memory_bytes);
-        take_tables(path, &budget, &plan, &members, limits)?;
+        take_tables(path, &budget, size_of_val(records) as u64, &plan, &members, limits)?;
 
         let most_tested = crossings::most_tested(records.len() as u64);
         let _span = tracing::debug_span!("chunks", count = plan.chunks()).entered();
@@ -252,12 +252,14 @@ fn refuse_more_than(path: &Path, most: u64, there: u64, what: &str) -> Result<()
 }
 
 /// Takes what is known to be needed before the chunks are solved.
-fn take_tables(path: &Path, budget: &Budget, plan: &Plan, members: &Members, limits: &Limits) -> Result<()> {
+fn take_tables(path: &Path, budget: &Budget, bytes: u64, plan: &Plan, members: &Members, limits: &Limits) -> Result<()> {
     let mut counts: Vec<u64> = (0..plan.chunks()).map(|c| members.count(ChunkId(c as u32))).collect();
     counts.sort_unstable_by(|a, b| b.cmp(a));
     // A thread's tables are as large as its largest chunk, and no two threads work on the same one.
     let scratch = counts.iter().take(limits.threads).map(|n| chunk::scratch_bytes(*n)).sum::<u64>();
-    budget.take(Purpose::Tables, scratch + members.heap_bytes(limits.threads) + plan.heap_bytes());
+    // Of the output, the end may still be on its way to the disk.
+    let dirty = behind::most_dirty(limits).min(bytes);
+    budget.take(Purpose::Tables, scratch + members.heap_bytes(limits.threads) + plan.heap_bytes() + dirty);
     let largest = counts.first().copied().unwrap_or(0);
     budget.check(path, || format!("the largest chunk holds {largest} triangles"))?;
     let nonfinite: u64 = members.nonfinite.iter().map(|r| u64::from(r.1)).sum();

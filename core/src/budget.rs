@@ -10,17 +10,19 @@ use crate::error::{Error, Result};
 pub(crate) enum Purpose {
     /// Lists, spools and the tables that chunks are solved in.
     Tables,
-    /// Triangles at defects.
-    Defects,
-    /// Pieces of sound surface, and the seams where chunks meet.
+    /// Pieces of sound surface.
     Surface,
+    /// What chunks know of triangles that others see, too. Given back before the workshop is made.
+    Seams,
+    /// Triangles at defects, in the workshop.
+    Defects,
 }
 
 /// The budget of one stage.
 #[derive(Debug)]
 pub(crate) struct Budget {
     limit: u64,
-    taken: [AtomicU64; 3],
+    taken: [AtomicU64; 4],
 }
 
 impl Budget {
@@ -33,8 +35,10 @@ impl Budget {
         self.taken[purpose as usize].fetch_add(bytes, Ordering::Relaxed);
     }
 
+    /// The most that is held at a time.
     fn total(&self) -> u64 {
-        self.taken.iter().fold(0, |sum, bytes| sum.saturating_add(bytes.load(Ordering::Relaxed)))
+        let [tables, surface, seams, defects] = [0, 1, 2, 3].map(|i: usize| self.taken[i].load(Ordering::Relaxed));
+        tables.saturating_add(surface).saturating_add(seams.max(defects))
     }
 
     pub(crate) fn is_exceeded(&self) -> bool {
@@ -47,11 +51,12 @@ impl Budget {
             return Ok(());
         }
         let mebibytes = |bytes: u64| bytes.div_ceil(1 << 20);
-        let [tables, defects, surface] = [0, 1, 2].map(|i| mebibytes(self.taken[i].load(Ordering::Relaxed)));
+        let [tables, surface, seams, defects] = [0, 1, 2, 3].map(|i: usize| mebibytes(self.taken[i].load(Ordering::Relaxed)));
         Err(Error::Refused {
             path: path.into(),
             reason: format!(
-                "{}, which needs at least {} MiB of memory ({tables} for tables, {defects} for defects, {surface} for pieces of surface and seams)",
+                "{}, which needs at least {} MiB of memory ({tables} for tables, {surface} for pieces of surface, then {seams} for seams \
+                 or {defects} for defects)",
                 what(),
                 mebibytes(self.total())
             ),
@@ -67,12 +72,14 @@ mod tests {
     #[test]
     fn a_refusal_says_what_it_was_for() {
         let budget = Budget::new(10 << 20);
-        budget.take(Purpose::Tables, 10 << 20);
+        budget.take(Purpose::Tables, 7 << 20);
+        budget.take(Purpose::Seams, 2 << 20);
+        budget.take(Purpose::Defects, 3 << 20);
         budget.check(Path::new("part.stl"), || unreachable!()).unwrap();
         budget.take(Purpose::Surface, 1);
         let error = budget.check(Path::new("part.stl"), || "a lot of it".into()).unwrap_err();
-        let line = "part.stl: refused: a lot of it, which needs at least 11 MiB of memory (10 for tables, 0 for defects, \
-            1 for pieces of surface and seams); the budget is 10 MiB: raise --memory";
+        let line = "part.stl: refused: a lot of it, which needs at least 11 MiB of memory (7 for tables, 1 for pieces of surface, \
+            then 2 for seams or 3 for defects); the budget is 10 MiB: raise --memory";
         assert_eq!(error.to_string(), line);
     }
 }

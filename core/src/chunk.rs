@@ -92,6 +92,8 @@ pub(crate) struct ChunkTopology {
     pub(crate) vertices: u64,
     /// Those used by a triangle with three distinct vertices.
     pub(crate) vertices_used: u64,
+    /// Positions at home here that suspects use.
+    pub(crate) suspect_vertices: u64,
     /// Self-intersections that this chunk owns; empty if they were not looked for.
     pub(crate) crossings: Crossings,
 }
@@ -109,12 +111,12 @@ impl ChunkTopology {
             Labels::One => 0,
             Labels::Runs(bytes) => bytes.capacity() as u64,
         };
-        // Links and suspects are copied when they are merged; for suspects, the workshop's share counts that, too.
-        let links = 2 * size_of::<Link>() as u64 * self.links.capacity() as u64;
         let fixed = size_of::<Self>() as u64;
-        let across = 2 * self.crossings.heap_bytes();
-        budget.take(Purpose::Surface, fixed + labels + links + across + self.patches.capacity() as u64 * BYTES_PER_PATCH);
-        budget.take(Purpose::Defects, self.suspects.len() as u64 * shop::BYTES_PER_SUSPECT);
+        budget.take(Purpose::Surface, fixed + labels + self.patches.capacity() as u64 * BYTES_PER_PATCH);
+        // Copied when they are merged; of suspects, one more list is kept.
+        let seams = size_of::<Link>() * self.links.capacity() + size_of::<Suspect>() * self.suspects.capacity();
+        budget.take(Purpose::Seams, 2 * (seams as u64 + self.crossings.heap_bytes()));
+        budget.take(Purpose::Defects, shop::bytes(self.suspects.len() as u64, self.suspect_vertices));
     }
 
     /// Gives back what growing left over.
@@ -352,6 +354,25 @@ impl Scratch {
         }
     }
 
+    /// Vertices at home here that these suspects use. O(members).
+    fn count_suspect_vertices(&mut self, suspects: &[Suspect]) -> u64 {
+        self.hit.clear();
+        self.hit.resize(self.states.len().div_ceil(64), 0);
+        let mut suspects = suspects.iter().map(|s| s.triangle).peekable();
+        for (t, number) in self.triangles.iter().zip(&self.numbers) {
+            if suspects.next_if_eq(number).is_none() {
+                if suspects.peek().is_none() {
+                    break;
+                }
+                continue;
+            }
+            for v in t.iter().map(|v| *v as usize).filter(|v| self.states.get(*v).is_some_and(|s| *s != AWAY)) {
+                self.hit[v / 64] |= 1 << (v % 64);
+            }
+        }
+        self.hit.iter().map(|word| u64::from(word.count_ones())).sum()
+    }
+
     #[inline(always)]
     fn collect(&mut self, measure: &Measure) -> ChunkTopology {
         let home = || self.states.iter().enumerate().filter(|(_, state)| **state != AWAY);
@@ -363,6 +384,7 @@ impl Scratch {
             labels: Labels::One,
             vertices: home().count() as u64,
             vertices_used: home().filter(|(v, _)| self.stars.count(*v) > 0).count() as u64,
+            suspect_vertices: 0,
         };
         self.number_patches(&mut out.patches);
         let mut labels = LabelWriter::default();
@@ -398,6 +420,7 @@ impl Scratch {
             }
         }
         sum.flush(&mut out.patches);
+        out.suspect_vertices = self.count_suspect_vertices(&out.suspects);
         if out.patches.len() > 1 {
             out.labels = Labels::Runs(labels.finish());
         }

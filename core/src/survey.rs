@@ -19,7 +19,7 @@ use crate::settings::Limits;
 use crate::source::{Source, Triangle};
 use crate::sums::{Bounds, Measure};
 use crate::weld::Weld;
-use crate::{Progress, behind, edit};
+use crate::{Progress, edit};
 
 /// Topology of the sound part of a file, and the list of what is not sound.
 #[derive(Debug)]
@@ -76,7 +76,7 @@ impl<'a> Survey<'a> {
         let bounds = members.bounds.normalised();
         let measure = Measure::new(&bounds);
         let budget = Budget::new(limits.memory_bytes);
-        take_tables(path, &budget, size_of_val(records) as u64, &plan, &members, limits)?;
+        take_tables(path, &budget, &plan, &members, limits)?;
 
         let most_tested = crossings::most_tested(records.len() as u64);
         let _span = tracing::debug_span!("chunks", count = plan.chunks()).entered();
@@ -109,10 +109,10 @@ impl<'a> Survey<'a> {
         if progress.cancelled() {
             return Err(Error::io(path, STAGE)(std::io::ErrorKind::Interrupted.into()));
         }
-        let suspects = suspects.into_inner();
-        budget.check(path, || format!("at least {suspects} triangles lie at defects"))?;
+        let (suspects, pieces) = (suspects.into_inner(), patches.into_inner());
+        budget.check(path, || format!("at least {suspects} triangles lie at defects, in {pieces} pieces of surface or more"))?;
         refuse_more_than(path, MOST_SUSPECTS, suspects, "triangles lie at defects")?;
-        refuse_more_than(path, chunk::MOST_PATCHES, patches.into_inner(), "pieces of surface, counted by chunks, are there")?;
+        refuse_more_than(path, chunk::MOST_PATCHES, pieces, "pieces of surface, counted by chunks, are there")?;
         let merge = Merge::of(records, &measure, &mut chunks);
         Ok(Self {
             records,
@@ -252,14 +252,12 @@ fn refuse_more_than(path: &Path, most: u64, there: u64, what: &str) -> Result<()
 }
 
 /// Takes what is known to be needed before the chunks are solved.
-fn take_tables(path: &Path, budget: &Budget, bytes: u64, plan: &Plan, members: &Members, limits: &Limits) -> Result<()> {
+fn take_tables(path: &Path, budget: &Budget, plan: &Plan, members: &Members, limits: &Limits) -> Result<()> {
     let mut counts: Vec<u64> = (0..plan.chunks()).map(|c| members.count(ChunkId(c as u32))).collect();
     counts.sort_unstable_by(|a, b| b.cmp(a));
     // A thread's tables are as large as its largest chunk, and no two threads work on the same one.
     let scratch = counts.iter().take(limits.threads).map(|n| chunk::scratch_bytes(*n)).sum::<u64>();
-    // Of the output, the end may still be on its way to the disk.
-    let dirty = behind::most_dirty(limits).min(bytes);
-    budget.take(Purpose::Tables, scratch + members.heap_bytes(limits.threads) + plan.heap_bytes() + dirty);
+    budget.take(Purpose::Tables, scratch + members.heap_bytes(limits.threads) + plan.heap_bytes());
     let largest = counts.first().copied().unwrap_or(0);
     budget.check(path, || format!("the largest chunk holds {largest} triangles"))?;
     let nonfinite: u64 = members.nonfinite.iter().map(|r| u64::from(r.1)).sum();
@@ -281,13 +279,13 @@ impl Merge {
         let _span = tracing::debug_span!("merge").entered();
         let mut bases = vec![0u32];
         let mut sums: Vec<Patch> = Vec::new();
-        let mut links: Vec<Link> = Vec::new();
-        let mut suspects: Vec<Suspect> = Vec::new();
+        let mut links: Vec<Link> = Vec::with_capacity(chunks.iter().map(|c| c.links.len()).sum());
+        let mut suspects: Vec<Suspect> = Vec::with_capacity(chunks.iter().map(|c| c.suspects.len()).sum());
         for chunk in chunks {
             let base = sums.len() as u32;
             sums.append(&mut chunk.patches);
             links.extend(std::mem::take(&mut chunk.links).into_iter().map(|l| l.raised(base)));
-            suspects.append(&mut chunk.suspects);
+            suspects.append(&mut std::mem::take(&mut chunk.suspects));
             bases.push(sums.len() as u32);
         }
         suspects.sort_unstable();

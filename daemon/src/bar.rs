@@ -4,6 +4,7 @@
 //! how long the stages after it will take: for that, their usual shares of the time are known here.
 
 use std::io::{IsTerminal, Write};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -72,6 +73,12 @@ impl Standing {
     }
 }
 
+/// A name with its end cut off if it would leave no room for the bar.
+fn short(name: &str) -> String {
+    const MOST: usize = 20;
+    if name.chars().count() <= MOST { name.to_owned() } else { name.chars().take(MOST - 1).chain(['…']).collect() }
+}
+
 /// The time that is left when `seconds` were needed for this share, in whole seconds.
 fn left(seconds: f64, share: f64) -> String {
     let left = (seconds * (1.0 - share) / share).ceil();
@@ -116,9 +123,11 @@ impl Bar {
     }
 
     /// Work on one file of `bytes` bytes begins, and on no other meanwhile.
-    pub(crate) fn alone(&mut self, name: &str, bytes: u64) {
+    pub(crate) fn alone(&mut self, input: &Path, bytes: u64) {
         self.alone = Some((Instant::now(), bytes, Standing::default()));
-        self.bar.set_prefix(if self.scope.files == 1 { name.to_owned() } else { String::new() });
+        if self.scope.files == 1 {
+            self.bar.set_prefix(short(&input.file_name().unwrap_or_default().to_string_lossy()));
+        }
         self.show();
     }
 
@@ -144,12 +153,13 @@ impl Bar {
         }
         if !self.shown {
             self.shown = true;
-            self.bar.set_draw_target(ProgressDrawTarget::stderr_with_hz(10));
             self.bar.set_length(STEPS as u64);
             // The template is a constant that parses; the plain style would do as well.
             if let Ok(style) = ProgressStyle::with_template("{prefix} {wide_bar} {percent:>3} %  {msg}") {
                 self.bar.set_style(style);
             }
+            // Last, for it draws.
+            self.bar.set_draw_target(ProgressDrawTarget::stderr_with_hz(10));
             self.bar.enable_steady_tick(TICK);
         }
         let (share, message) = self.standing();
@@ -226,6 +236,12 @@ mod tests {
         standing.at("topology", 10, 10, false);
         assert!((standing.share - 1.0).abs() < 1e-9);
         assert_eq!(standing.message(0.0), "topology, 0 s left");
+    }
+
+    #[test]
+    fn names_leave_room_for_the_bar() {
+        assert_eq!(short("part.stl"), "part.stl");
+        assert_eq!(short("Gehäuseoberteil-links.stl"), "Gehäuseoberteil-lin…");
     }
 
     #[test]

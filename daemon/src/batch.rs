@@ -88,7 +88,7 @@ impl<'a> Batch<'a> {
     fn alone(&mut self, index: usize) {
         let Some(entry) = self.entries.get(index) else { return };
         let bar = &mut self.teller.bar;
-        bar.alone(&entry.input.display().to_string(), entry.size);
+        bar.alone(entry.input, entry.size);
         let outcome = self.order.item(entry.input, entry.target.as_deref(), self.order.limits.clone()).and_then(|item| {
             let report = item.work(&mut self.worker, false, self.stop, &mut |stage, done, total| bar.at(stage, done, total))?;
             Ok(Finished { report, item })

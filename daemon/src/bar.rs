@@ -178,7 +178,8 @@ impl Bar {
         let mut text = format!("{} of {} files", show_count(self.files as u64), show_count(self.scope.files as u64));
         match alone {
             Some((_, _, standing)) => text += &format!(", {}", standing.stage),
-            None => text += &format!(", {:.0} files/s", self.files as f64 / seconds),
+            None if self.files as f64 >= seconds => text += &format!(", {:.0} files/s", self.files as f64 / seconds),
+            None => {}
         }
         if share >= FORESEEN {
             text += &format!(", {} left", left(seconds, share));

@@ -10,7 +10,7 @@
 
 use crate::budget::{Budget, Purpose};
 use crate::crossings::Crossings;
-use crate::intersect::{self, Finder, Region};
+use crate::intersect::{self, Finder, Region, Standing};
 use crate::plan::HomeBox;
 use crate::record::Point;
 use crate::shop;
@@ -140,9 +140,8 @@ pub(crate) struct Scratch {
     /// Patch of a sound home vertex, [`UNSOUND`] or [`AWAY`].
     states: Vec<u32>,
     parents: Vec<u32>,
-    /// By vertex, for the search for self-intersections: at home here; sound.
-    home: Vec<bool>,
-    sound: Vec<bool>,
+    /// By vertex, for the search for self-intersections.
+    standing: Vec<Standing>,
     finder: Finder,
     /// Members, then visitors, that are in a self-intersection, a bit each.
     hit: Vec<u64>,
@@ -212,18 +211,19 @@ impl Scratch {
             self.numbers.push(number);
             self.take(&[triangle.corners()]);
         });
+        self.standing.clear();
+        self.standing.extend(self.states.iter().map(|state| match *state {
+            AWAY => Standing::Away,
+            UNSOUND => Standing::Unsound,
+            _ => Standing::Sound,
+        }));
         // No visitor has a corner at home here.
-        self.states.resize(self.vertices.positions().len(), AWAY);
-        self.home.clear();
-        self.home.extend(self.states.iter().map(|s| *s != AWAY));
-        self.sound.clear();
-        self.sound.extend(self.states.iter().map(|s| *s < AWAY));
+        self.standing.resize(self.vertices.positions().len(), Standing::Away);
         let region = Region {
             positions: self.vertices.positions(),
             triangles: &self.triangles,
             left_out: &self.collinear,
-            home: &self.home,
-            sound: &self.sound,
+            standing: &self.standing,
             cell,
         };
         self.hit.clear();
@@ -236,19 +236,16 @@ impl Scratch {
             }
         });
         let (mut inner, mut across) = (0, Vec::new());
-        for (word, bits) in self.hit.iter().enumerate() {
-            let mut rest = *bits;
-            while rest != 0 {
-                let t = word * 64 + rest.trailing_zeros() as usize;
-                rest &= rest - 1;
-                if self.triangles[t].iter().all(|v| self.home[*v as usize]) {
+        for (word, hit) in self.hit.iter().enumerate() {
+            for t in intersect::bits(*hit).map(|bit| word * 64 + bit) {
+                if self.triangles[t].iter().all(|v| self.standing[*v as usize] != Standing::Away) {
                     inner += 1;
                 } else {
                     across.push(self.numbers[t]);
                 }
             }
         }
-        crossings.close(tested.pairs, inner, across);
+        crossings.close(tested, inner, across);
         crossings
     }
 

@@ -28,7 +28,9 @@ use crate::fill::cross::{Contact, self_intersection};
 use crate::plan::HomeBox;
 use narrow::Round;
 use stars::Stars;
-use tree::{Forest, Row, Visit, Walk, bits};
+use tree::{Forest, Row, Visit, Walk};
+
+pub(crate) use tree::bits;
 
 /// What one cell sees of a mesh. All coordinates are finite, −0.0 does not occur.
 pub(crate) struct Region<'a> {
@@ -37,11 +39,21 @@ pub(crate) struct Region<'a> {
     pub(crate) triangles: &'a [[u32; 3]],
     /// The exactly collinear ones, ascending; left out too.
     pub(crate) left_out: &'a [u32],
-    /// Which vertices are at home in the cell.
-    pub(crate) home: &'a [bool],
-    /// Which of those have a closed, coherent fan around them, without collinear triangles.
-    pub(crate) sound: &'a [bool],
+    /// By vertex.
+    pub(crate) standing: &'a [Standing],
     pub(crate) cell: HomeBox,
+}
+
+/// What a cell knows of a vertex.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub(crate) enum Standing {
+    /// At home in another cell.
+    Away,
+    /// At home here, and not sound.
+    Unsound,
+    /// At home here, in the middle of a closed, coherent fan without collinear triangles.
+    Sound,
 }
 
 impl Region<'_> {
@@ -77,15 +89,6 @@ enum State {
     Open,
 }
 
-/// How far a search came.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Tested {
-    /// Pairs that were counted; if not `complete`, more than the allowance.
-    pub(crate) pairs: u64,
-    /// All pairs were decided.
-    pub(crate) complete: bool,
-}
-
 /// Finds the self-intersections of one region after the other, and keeps its memory.
 #[derive(Default)]
 pub(crate) struct Finder {
@@ -105,17 +108,17 @@ const WAITING: usize = 256;
 
 impl Finder {
     /// Calls `found` for each self-intersecting pair that the region's cell owns, once, the smaller number first; in an order that
-    /// depends on the region. Ends early when it has counted more than `allowance` pairs.
+    /// depends on the region. Returns how many pairs were counted; if they are more than `allowance`, it ended early.
     ///
     /// O(n log n) besides the pairs of overlapping boxes, of which those around a certified vertex and around a vertex of more
     /// than 256 triangles that is at home elsewhere cost nothing.
-    pub(crate) fn pairs(&mut self, region: &Region<'_>, allowance: u64, mut found: impl FnMut(u32, u32, Contact)) -> Tested {
+    pub(crate) fn pairs(&mut self, region: &Region<'_>, allowance: u64, mut found: impl FnMut(u32, u32, Contact)) -> u64 {
         self.stars.look(region);
         self.states.clear();
-        self.states.extend((0..region.positions.len()).map(|v| match (region.home[v], region.sound[v]) {
-            (false, _) => State::Away,
-            (true, true) if self.stars.is_certified(v) => State::Certified,
-            _ => State::Open,
+        self.states.extend(region.standing.iter().enumerate().map(|(v, standing)| match standing {
+            Standing::Away => State::Away,
+            Standing::Sound if self.stars.is_certified(v) => State::Certified,
+            Standing::Sound | Standing::Unsound => State::Open,
         }));
         self.forest.build(region, &self.stars, &self.states);
         self.waiting.clear();
@@ -130,8 +133,10 @@ impl Finder {
         };
         let walked = Walk::new(&self.forest, &mut search).all();
         search.separate();
-        let complete = walked && search.around_hubs(&self.forest, &mut self.by_vertex);
-        Tested { pairs: search.counted, complete: complete && search.counted <= allowance }
+        if walked {
+            search.around_hubs(&self.forest, &mut self.by_vertex);
+        }
+        search.counted
     }
 }
 
@@ -186,7 +191,7 @@ impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
 
     /// The pairs within each hub's tree whose smallest vertex is not the hub. That vertex is open; the hub is certified, or
     /// away and larger.
-    fn around_hubs(&mut self, forest: &Forest, by_vertex: &mut Vec<(u32, u32)>) -> bool {
+    fn around_hubs(&mut self, forest: &Forest, by_vertex: &mut Vec<(u32, u32)>) {
         for tree in forest.trees.iter().filter(|t| t.hub != NONE) {
             by_vertex.clear();
             for row in tree.rows.clone() {
@@ -208,12 +213,11 @@ impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
                         }
                     }
                     if self.counted > self.allowance {
-                        return false;
+                        return;
                     }
                 }
             }
         }
-        true
     }
 
     /// Counts and decides those waiting pairs that are owned here; none of them shares a vertex. What stays after each round

@@ -523,8 +523,9 @@ impl<'a, V: Visit> Walk<'a, V> {
 type Place<'t> = (&'t Tree, usize, usize, &'t Bounds);
 
 /// The numbers of the bits that are set, ascending.
-#[inline]
-pub(super) fn bits(mut mask: u32) -> impl Iterator<Item = usize> {
+#[inline(always)]
+pub(crate) fn bits(mask: impl Into<u64>) -> impl Iterator<Item = usize> {
+    let mut mask = mask.into();
     std::iter::from_fn(move || {
         let bit = (mask != 0).then(|| mask.trailing_zeros() as usize);
         mask &= mask.wrapping_sub(1);

@@ -34,8 +34,8 @@ struct Ray {
     candidates: Vec<u32>,
 }
 
-/// The surroundings of every component; empty for open ones and for those in no other's box. Reads the file once more when at
-/// least one box lies in another.
+/// The surroundings of every component; empty for open ones and for those in no other's box. When at least one box lies in another,
+/// reads the chunks of the file once more that a ray may meet.
 pub(crate) fn surroundings(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed: &Reversed) -> Vec<Surroundings> {
     let mut all = vec![Surroundings::default(); components.list.len()];
     let rays = rays(survey, shop, &components.list);
@@ -50,15 +50,15 @@ pub(crate) fn surroundings(survey: &Survey<'_>, shop: &Shop, components: &Compon
     let is_asked = |patch: u32| asked[components.of_patch[patch as usize] as usize];
     let per_chunk = survey.visit_sound(
         is_asked,
-        |corners| grid.may_meet(corners),
-        Vec::new,
-        |hits: &mut Vec<(u32, i32)>, triangle, patch| {
+        |reach| Over::new(&rays, &grid, reach).map(|over| (over, Vec::new())),
+        |(over, _), corners| over.may_meet(&grid, corners),
+        |(_, hits): &mut (Over, Vec<(u32, i32)>), triangle, patch| {
             let corners = record::corners(&survey.records[triangle as usize]);
             let sign = if reversed.patches[patch as usize] { -1 } else { 1 };
             grid.cross(&rays, &corners, components.of_patch[patch as usize], &mut |at, w| hits.push((at, sign * w)));
         },
     );
-    per_chunk.into_iter().flatten().for_each(|(at, w)| counts[at as usize] += w);
+    per_chunk.into_iter().flat_map(|(_, hits)| hits).for_each(|(at, w)| counts[at as usize] += w);
     for t in shop.living() {
         let component = components.of_triangle[t as usize];
         if asked[component as usize] {
@@ -107,6 +107,58 @@ fn inner_point(corners: &[[f32; 3]; 3]) -> [f64; 3] {
     std::array::from_fn(|k| (0..3).map(|i| WEIGHTS[i] * f64::from(corners[i][k])).sum())
 }
 
+/// The rays that may meet what lies in some box.
+enum Over {
+    /// Few enough to be compared with each triangle: for each x and y, the largest f32 up to it and the smallest from it on.
+    Few(Vec<[[f32; 2]; 2]>),
+    Many,
+}
+
+impl Over {
+    /// More rays than these are looked up in the grid.
+    const FEW: usize = 4;
+
+    /// `None`: no ray meets the box.
+    fn new(rays: &[Ray], grid: &Grid, reach: &Bounds) -> Option<Self> {
+        if reach.is_empty() {
+            return None;
+        }
+        let inside = |ray: &&Ray| {
+            let within = |k: usize| f64::from(reach.lo[k]) <= ray.from[k] && ray.from[k] <= f64::from(reach.hi[k]);
+            within(0) && within(1) && ray.from[2] <= f64::from(reach.hi[2])
+        };
+        let mut few = Vec::new();
+        let corners = [reach.lo, reach.hi, reach.hi];
+        for ray in grid.under(&corners).flatten().map(|r| &rays[*r as usize]).filter(inside) {
+            if few.len() == Self::FEW {
+                return Some(Self::Many);
+            }
+            few.push([0, 1].map(|k| around(ray.from[k])));
+        }
+        (!few.is_empty()).then_some(Self::Few(few))
+    }
+
+    /// Asked of every triangle.
+    #[inline(always)]
+    fn may_meet(&self, grid: &Grid, corners: &[[f32; 3]; 3]) -> bool {
+        let low = |k: usize| corners[0][k].min(corners[1][k]).min(corners[2][k]);
+        let high = |k: usize| corners[0][k].max(corners[1][k]).max(corners[2][k]);
+        match self {
+            Self::Few(few) => {
+                let (lo, hi) = ([low(0), low(1)], [high(0), high(1)]);
+                few.iter().any(|[x, y]| (lo[0] <= x[0]) & (hi[0] >= x[1]) & (lo[1] <= y[0]) & (hi[1] >= y[1]))
+            }
+            Self::Many => grid.may_meet(corners),
+        }
+    }
+}
+
+/// The largest f32 that is not above `x`, and the smallest that is not below.
+fn around(x: f64) -> [f32; 2] {
+    let near = x as f32;
+    [if f64::from(near) > x { near.next_down() } else { near }, if f64::from(near) < x { near.next_up() } else { near }]
+}
+
 /// Rays by their place seen from above, in a grid of square cells.
 struct Grid {
     lo: [f64; 2],
@@ -149,7 +201,7 @@ impl Grid {
         (((x - self.lo[axis]) * self.per_unit[axis]) as usize).min(self.side - 1)
     }
 
-    /// The rays in the cells under a triangle, row by row.
+    /// The rays in the cells under the box of three corners, row by row.
     fn under(&self, corners: &[[f32; 3]; 3]) -> impl Iterator<Item = &[u32]> {
         let span = |k: usize| {
             let x = corners.map(|c| f64::from(c[k]));

@@ -88,6 +88,8 @@ pub(crate) struct ChunkTopology {
     pub(crate) links: Vec<Link>,
     pub(crate) patches: Vec<Patch>,
     pub(crate) labels: Labels,
+    /// The box of all triangles with a label that are no suspects here.
+    pub(crate) reach: Bounds,
     /// Positions at home here.
     pub(crate) vertices: u64,
     /// Those used by a triangle with three distinct vertices.
@@ -379,6 +381,7 @@ impl Scratch {
             links: Vec::new(),
             patches: Vec::new(),
             labels: Labels::One,
+            reach: Bounds::EMPTY,
             vertices: home().count() as u64,
             vertices_used: home().filter(|(v, _)| self.stars.count(*v) > 0).count() as u64,
             suspect_vertices: 0,
@@ -414,9 +417,13 @@ impl Scratch {
                     *first = triangle.min(*first);
                 }
                 out.links.push(Link::new(triangle, patch, counted));
+                if unsound == 0 {
+                    out.reach.include(&t.map(|v| self.vertices.positions()[v as usize]));
+                }
             }
         }
         sum.flush(&mut out.patches);
+        out.patches.iter().for_each(|p| out.reach.add(&p.bounds));
         out.suspect_vertices = self.count_suspect_vertices(&out.suspects);
         if out.patches.len() > 1 {
             out.labels = Labels::Runs(labels.finish());

@@ -94,8 +94,8 @@ impl Edit {
         let bits: Vec<AtomicU64> = std::iter::repeat_with(AtomicU64::default).take(survey.records.len().div_ceil(64)).collect();
         let flips = survey.visit_sound(
             |patch| reversed.patches[patch as usize],
-            |_| true,
-            || 0,
+            |_| Some(0),
+            |_, _| true,
             |flips: &mut u64, triangle, _| {
                 bits[triangle as usize / 64].fetch_or(1 << (triangle % 64), Ordering::Relaxed);
                 *flips += 1;

@@ -44,6 +44,8 @@ pub(crate) struct Survey<'a> {
     plan: Plan,
     members: Members,
     labels: Vec<Labels>,
+    /// By chunk, the box of all sound triangles that it sees.
+    reaches: Vec<Bounds>,
     /// First entry of each chunk in `merged`.
     bases: Vec<u32>,
     /// Chunk's patch → merged patch.
@@ -129,6 +131,7 @@ impl<'a> Survey<'a> {
             guide,
             plan,
             members,
+            reaches: chunks.iter().map(|c| c.reach).collect(),
             labels: chunks.into_iter().map(|c| c.labels).collect(),
             bases: merge.bases,
             merged: merge.merged,
@@ -153,23 +156,25 @@ impl<'a> Survey<'a> {
     }
 
     /// Visits every triangle with three sound corners whose patch is `wanted` and that `passes`, exactly once, with its patch: chunks
-    /// in parallel, results in chunk order (which the plan decides: only sums of integers and sets may be made of them).
+    /// in parallel, results in chunk order (which the plan decides: only sums of integers and sets may be made of them). `make` is
+    /// given the box of all sound triangles that a chunk sees, and says `None` if none of them is of interest.
     /// `passes` is asked first, since it may be cheaper than finding out whose turn it is.
     pub(crate) fn visit_sound<R: Send>(
         &self,
         wanted: impl Fn(u32) -> bool + Sync,
-        passes: impl Fn(&[[f32; 3]; 3]) -> bool + Sync,
-        make: impl Fn() -> R + Sync,
+        make: impl Fn(&Bounds) -> Option<R> + Sync,
+        passes: impl Fn(&R, &[[f32; 3]; 3]) -> bool + Sync,
         visit: impl Fn(&mut R, u32, u32) + Sync,
     ) -> Vec<R> {
-        let is_wanted = |chunk: ChunkId| self.patches_of(chunk).iter().any(|p| wanted(*p));
-        self.members.each(
+        let makes = |chunk: ChunkId| make(&self.reaches[chunk.0 as usize]);
+        let is_wanted = |chunk: ChunkId| self.patches_of(chunk).iter().any(|p| wanted(*p)) && makes(chunk).is_some();
+        let visited = self.members.each(
             (self.records, &self.guide, &self.plan),
             self.threads,
             is_wanted,
             || (),
             |(), chunk, seen, _| {
-                let mut result = make();
+                let mut result = makes(chunk)?;
                 let patches = self.patches_of(chunk);
                 let cell = self.plan.home_box(chunk);
                 let mut labels = self.labels[chunk.0 as usize].iter();
@@ -179,7 +184,7 @@ impl<'a> Survey<'a> {
                         return;
                     }
                     let corners = place.corners();
-                    if !passes(&corners) || self.suspects.binary_search_by_key(&triangle, |s| s.triangle).is_ok() {
+                    if !passes(&result, &corners) || self.suspects.binary_search_by_key(&triangle, |s| s.triangle).is_ok() {
                         return;
                     }
                     // A sound triangle has a label in every chunk that sees it; the lowest of them visits it.
@@ -187,9 +192,10 @@ impl<'a> Survey<'a> {
                         visit(&mut result, triangle, patches[patch as usize]);
                     }
                 });
-                result
+                Some(result)
             },
-        )
+        );
+        visited.into_iter().flatten().collect()
     }
 
     /// Makes suspects of all triangles around the sound vertices at `positions` (not empty), and returns the new ones, ascending.

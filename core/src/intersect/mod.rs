@@ -17,6 +17,7 @@
 //! counted. A pair counts when its boxes overlap and it shares no vertex, or the smallest vertex it shares is not certified: a
 //! property of the mesh. The owner counts it.
 
+mod lanes;
 mod narrow;
 mod stars;
 #[cfg(test)]
@@ -26,9 +27,10 @@ mod tree;
 use crate::chunk::NONE;
 use crate::fill::cross::{Contact, self_intersection};
 use crate::plan::HomeBox;
+use lanes::{Lanes, Pairs, Triangles, WIDTH};
 use narrow::Round;
 use stars::Stars;
-use tree::{Forest, Row, Visit, Walk};
+use tree::{Forest, Visit, Walk};
 
 pub(crate) use tree::bits;
 
@@ -63,6 +65,14 @@ impl Region<'_> {
         [self.positions[a as usize], self.positions[b as usize], self.positions[c as usize]]
     }
 
+    /// Exactly. `common`: which corners of each are also corners of the other.
+    fn decide(&self, i: u32, j: u32, common: [[bool; 3]; 2], found: &mut impl FnMut(u32, u32, Contact)) {
+        let [a, b] = [i, j].map(|i| self.corners(self.triangles[i as usize]));
+        if let Some(contact) = self_intersection(&a, &b, common) {
+            found(i.min(j), i.max(j), contact);
+        }
+    }
+
     /// The triangles that are not left out, with their numbers.
     #[inline]
     fn solid_triangles(&self) -> impl Iterator<Item = (u32, [u32; 3])> {
@@ -75,6 +85,35 @@ impl Region<'_> {
             }
             (t[0] != NONE).then_some((i as u32, *t))
         })
+    }
+}
+
+/// Up to sixteen triangles of a region, one batch after the other. Not a closure called for each, which would not be compiled for the
+/// processor that its caller is compiled for.
+struct Batch {
+    numbers: [u32; WIDTH],
+    count: usize,
+    triangles: Triangles,
+}
+
+impl Batch {
+    const EMPTY: Self = Self { numbers: [0; WIDTH], count: 0, triangles: Triangles::NONE };
+
+    /// Takes the next ones, if there are any.
+    #[inline(always)]
+    fn fill(&mut self, region: &Region<'_>, solid: &mut impl Iterator<Item = (u32, [u32; 3])>) -> bool {
+        self.count = 0;
+        for (number, t) in solid.take(WIDTH) {
+            self.numbers[self.count] = number;
+            self.triangles.set(self.count, &region.corners(t));
+            self.count += 1;
+        }
+        self.count > 0
+    }
+
+    #[inline(always)]
+    fn numbers(&self) -> &[u32] {
+        &self.numbers[..self.count]
     }
 }
 
@@ -95,16 +134,13 @@ pub(crate) struct Finder {
     stars: Stars,
     states: Vec<State>,
     forest: Forest,
-    waiting: Vec<[u32; 2]>,
+    waiting: Pairs,
     by_vertex: Vec<(u32, u32)>,
 }
 
-/// Bytes that a [`Finder`] takes for each triangle of a region: two rows, two keys, a group and boxes of the tree, 32 + 32 + 16 + 4 + 64,
-/// and for up to three vertices each a view, a state and a turn.
-pub(crate) const BYTES_PER_TRIANGLE: u64 = 148 + 3 * (size_of::<stars::View>() as u64 + 3);
-
-/// Pairs that wait until they are separated four at a time.
-const WAITING: usize = 256;
+/// Bytes that a [`Finder`] takes for each triangle of a region: its part of the tree, and for up to three vertices each a view, a
+/// standing, a state and a turn.
+pub(crate) const BYTES_PER_TRIANGLE: u64 = tree::BYTES_PER_TRIANGLE + 3 * (size_of::<stars::View>() as u64 + 3);
 
 impl Finder {
     /// Calls `found` for each self-intersecting pair that the region's cell owns, once, the smaller number first; in an order that
@@ -113,19 +149,12 @@ impl Finder {
     /// O(n log n) besides the pairs of overlapping boxes, of which those around a certified vertex and around a vertex of more
     /// than 256 triangles that is at home elsewhere cost nothing.
     pub(crate) fn pairs(&mut self, region: &Region<'_>, allowance: u64, mut found: impl FnMut(u32, u32, Contact)) -> u64 {
-        self.stars.look(region);
-        self.states.clear();
-        self.states.extend(region.standing.iter().enumerate().map(|(v, standing)| match standing {
-            Standing::Away => State::Away,
-            Standing::Sound if self.stars.is_certified(v) => State::Certified,
-            Standing::Sound | Standing::Unsound => State::Open,
-        }));
-        self.forest.build(region, &self.stars, &self.states);
+        self.prepare(region);
         self.waiting.clear();
         let mut search = Search {
             region,
             states: &self.states,
-            rows: &self.forest.rows,
+            forest: &self.forest,
             waiting: &mut self.waiting,
             counted: 0,
             allowance,
@@ -140,31 +169,73 @@ impl Finder {
     }
 }
 
+/// What comes before the walk, compiled for different processors. Sums and products are the same on all of them: in the same order,
+/// and none fused.
+impl Finder {
+    fn prepare(&mut self, region: &Region<'_>) {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") && is_x86_feature_detected!("avx512bw")
+            {
+                // SAFETY: the processor has what it is compiled for.
+                return unsafe { self.prepare_avx512(region) };
+            }
+            if is_x86_feature_detected!("avx2") {
+                // SAFETY: as above.
+                return unsafe { self.prepare_avx2(region) };
+            }
+        }
+        self.prepare_by(region);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512vl,avx512bw")]
+    fn prepare_avx512(&mut self, region: &Region<'_>) {
+        self.prepare_by(region);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn prepare_avx2(&mut self, region: &Region<'_>) {
+        self.prepare_by(region);
+    }
+
+    #[inline(always)]
+    fn prepare_by(&mut self, region: &Region<'_>) {
+        self.stars.look(region);
+        self.states.clear();
+        self.states.extend(region.standing.iter().enumerate().map(|(v, standing)| match standing {
+            Standing::Away => State::Away,
+            Standing::Sound if self.stars.is_certified(v) => State::Certified,
+            Standing::Sound | Standing::Unsound => State::Open,
+        }));
+        self.forest.build(region, &self.stars, &self.states);
+    }
+}
+
 /// What becomes of overlapping boxes.
 struct Search<'a, F> {
     region: &'a Region<'a>,
     states: &'a [State],
-    rows: &'a [Row],
+    forest: &'a Forest,
     /// Rows that overlap, without a common vertex.
-    waiting: &'a mut Vec<[u32; 2]>,
+    waiting: &'a mut Pairs,
     counted: u64,
     allowance: u64,
     found: &'a mut F,
 }
 
 impl<F: FnMut(u32, u32, Contact)> Visit for Search<'_, F> {
-    #[inline]
-    fn visit(&mut self, row: usize, first: usize, lanes: u32, sharing: u32) -> bool {
-        for j in bits(lanes & !sharing) {
-            self.waiting.push([row as u32, (first + j) as u32]);
+    #[inline(always)]
+    fn visit(&mut self, with: impl Lanes, row: usize, first: usize, lanes: u32, sharing: u32) -> bool {
+        if lanes & !sharing != 0 {
+            with.append(self.waiting, row as u32, first as u32, lanes & !sharing);
         }
         // A vertex that both have and that is not open is away, so the pair is not owned here, or certified, so it is apart.
-        if lanes & sharing != 0 && self.rows[row].is_open() {
-            for j in bits(lanes & sharing) {
-                self.sharing(self.rows[row].triangle, self.rows[first + j].triangle, NONE);
-            }
+        if lanes & sharing != 0 && self.forest.is_open(row) {
+            self.all_sharing(row, first, lanes & sharing);
         }
-        if self.waiting.len() >= WAITING {
+        if self.waiting.is_full() {
             self.separate();
         }
         self.counted <= self.allowance
@@ -172,6 +243,13 @@ impl<F: FnMut(u32, u32, Contact)> Visit for Search<'_, F> {
 }
 
 impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
+    #[inline(never)]
+    fn all_sharing(&mut self, row: usize, first: usize, lanes: u32) {
+        for j in bits(lanes) {
+            self.sharing(self.forest.triangle(row), self.forest.triangle(first + j), NONE);
+        }
+    }
+
     /// A pair of overlapping boxes with vertices in common. With `only`, nothing is done if another vertex is the smallest.
     fn sharing(&mut self, i: u32, j: u32, only: u32) {
         let [s, t] = [i, j].map(|i| self.region.triangles[i as usize]);
@@ -185,7 +263,7 @@ impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
         self.counted += 1;
         if !shared().any(|v| self.states[*v as usize] == State::Certified) {
             let common = [s.map(|v| t.contains(&v)), t.map(|v| s.contains(&v))];
-            self.decide(i, j, common);
+            self.region.decide(i, j, common, self.found);
         }
     }
 
@@ -195,7 +273,7 @@ impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
         for tree in forest.trees.iter().filter(|t| t.hub != NONE) {
             by_vertex.clear();
             for row in tree.rows.clone() {
-                for v in self.region.triangles[forest.rows[row].triangle as usize] {
+                for v in self.region.triangles[forest.triangle(row) as usize] {
                     let smaller = self.region.positions[v as usize] < self.region.positions[tree.hub as usize];
                     if smaller && self.states[v as usize] == State::Open {
                         by_vertex.push((v, row as u32));
@@ -205,11 +283,10 @@ impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
             by_vertex.sort_unstable();
             for around in by_vertex.chunk_by(|a, b| a.0 == b.0) {
                 for (k, (v, row)) in around.iter().enumerate() {
-                    let one = &forest.rows[*row as usize];
-                    for (_, other) in &around[k + 1..] {
-                        let other = &forest.rows[*other as usize];
-                        if one.overlaps(other) {
-                            self.sharing(one.triangle, other.triangle, *v);
+                    let row = *row as usize;
+                    for other in around[k + 1..].iter().map(|(_, row)| *row as usize) {
+                        if forest.overlap(row, other) {
+                            self.sharing(forest.triangle(row), forest.triangle(other), *v);
                         }
                     }
                     if self.counted > self.allowance {
@@ -224,47 +301,35 @@ impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
     /// closes up to fours.
     #[inline(never)]
     fn separate(&mut self) {
-        let mut waiting = std::mem::take(self.waiting);
-        let mut owned = 0;
-        for k in 0..waiting.len() {
-            let [one, other] = waiting[k].map(|row| &self.rows[row as usize]);
-            waiting[owned] = [one.triangle, other.triangle];
-            owned += usize::from(one.owns_lowest_corner(other) && one.same_plane(other));
+        let Self { region, forest, waiting, found, .. } = self;
+        let pairs = waiting.as_mut_slice();
+        let mut left = 0;
+        for k in 0..pairs.len() {
+            let [row, other] = pairs[k].map(|row| row as usize);
+            pairs[left] = [forest.triangle(row), forest.triangle(other)];
+            left += usize::from(forest.owns_pair(row, other));
         }
-        waiting.truncate(owned);
-        self.counted += owned as u64;
+        self.counted += left as u64;
         for round in [Round::Planes, Round::Edges] {
             let mut kept = 0;
-            for start in (0..waiting.len()).step_by(4) {
-                let end = waiting.len().min(start + 4);
+            for start in (0..left).step_by(4) {
+                let end = left.min(start + 4);
                 let pair = |k: usize| {
-                    let [i, j] = waiting[(start + k).min(end - 1)];
-                    let [s, t] = [self.region.triangles[i as usize], self.region.triangles[j as usize]];
-                    [s[0], s[1], s[2], t[0], t[1], t[2]].map(|v| &self.region.positions[v as usize])
+                    let [i, j] = pairs[(start + k).min(end - 1)];
+                    let [s, t] = [region.triangles[i as usize], region.triangles[j as usize]];
+                    [s[0], s[1], s[2], t[0], t[1], t[2]].map(|v| &region.positions[v as usize])
                 };
                 let apart = narrow::apart(&[pair(0), pair(1), pair(2), pair(3)], round);
                 for k in start..end {
-                    waiting[kept] = waiting[k];
+                    pairs[kept] = pairs[k];
                     kept += usize::from(apart >> (k - start) & 1 == 0);
                 }
             }
-            waiting.truncate(kept);
+            left = kept;
         }
-        for [i, j] in waiting.drain(..) {
-            self.decide(i, j, [[false; 3]; 2]);
+        for [i, j] in &pairs[..left] {
+            region.decide(*i, *j, [[false; 3]; 2], found);
         }
-        *self.waiting = waiting;
-    }
-
-    #[inline(always)]
-    fn corners(&self, i: u32) -> [[f32; 3]; 3] {
-        self.region.corners(self.region.triangles[i as usize])
-    }
-
-    /// Exactly. `common`: which corners of each are also corners of the other.
-    fn decide(&mut self, i: u32, j: u32, common: [[bool; 3]; 2]) {
-        if let Some(contact) = self_intersection(&self.corners(i), &self.corners(j), common) {
-            (self.found)(i.min(j), i.max(j), contact);
-        }
+        waiting.clear();
     }
 }

@@ -29,36 +29,17 @@
 //! of the mesh, not of the chunk. (Correcting d by the normals it does not go with, as a perceptron does, certified few stars
 //! more and cost more than it saved.)
 
-use glam::{Mat4, Vec3, Vec4, Vec4Swizzles};
-
-use super::Region;
+use super::lanes::{Line, Triangles, WIDTH};
+use super::{Batch, Region};
 
 /// 16ε.
 const ERROR: f32 = 1.0 / (1 << 20) as f32;
 
 /// Turns the view's line away from directions that meshes like: multiples of the axes, of diagonals, of a regular fan.
-const LINE: Vec3 = Vec3::new(0.3247, 1.0, -0.7713);
+const LINE: [f32; 3] = [0.3247, 1.0, -0.7713];
 
-/// How a vertex is looked at.
-#[derive(Clone, Copy, Default)]
-pub(super) struct View {
-    /// d, and the number of triangles around the vertex.
-    along: Vec4,
-    /// e, and the error that goes with an edge of length one.
-    line: Vec4,
-}
-
-impl View {
-    /// Sets e for d.
-    #[inline(always)]
-    fn set_line(&mut self) {
-        let along = self.along.truncate();
-        let size = along.abs().max_element();
-        // Below this, e could have underflowed.
-        let error = if size > 1e-30 { size * ERROR } else { f32::INFINITY };
-        self.line = along.cross(LINE).extend(error);
-    }
-}
+/// d of a vertex, and the number of triangles around it.
+pub(super) type View = [f32; 4];
 
 /// Reused from chunk to chunk.
 #[derive(Default)]
@@ -71,45 +52,58 @@ pub(super) struct Stars {
 /// More than once round, or a sign that is not safe.
 const REFUSED: u8 = 3;
 
-/// The normal, of about unit length; any other vector would be as right.
 #[inline(always)]
-fn unit_normal(region: &Region<'_>, t: [u32; 3]) -> Vec3 {
-    let [a, b, c] = region.corners(t);
-    let [a, b, c] = [Vec3::from_array(a), Vec3::from_array(b), Vec3::from_array(c)];
-    let normal = (b - a).cross(c - a);
-    normal * (1.0 / normal.length())
+fn minus(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+#[inline(always)]
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 impl Stars {
     /// Looks at all vertices of the region. O(triangles).
+    #[inline(always)]
     pub(super) fn look(&mut self, region: &Region<'_>) {
         self.views.clear();
         self.views.resize(region.positions.len(), View::default());
-        for (_, t) in region.solid_triangles() {
-            let normal = unit_normal(region, t).extend(1.0);
-            for v in t {
-                self.views[v as usize].along += normal;
+        let (mut batch, mut solid) = (Batch::EMPTY, region.solid_triangles());
+        while batch.fill(region, &mut solid) {
+            let normals = unit_normals(&batch.triangles);
+            for (i, number) in batch.numbers().iter().enumerate() {
+                let normal = [normals[0].0[i], normals[1].0[i], normals[2].0[i], 1.0];
+                for v in region.triangles[*number as usize] {
+                    let view = &mut self.views[v as usize];
+                    for k in 0..4 {
+                        view[k] += normal[k];
+                    }
+                }
             }
-        }
-        for view in &mut self.views {
-            view.set_line();
         }
         self.turns.clear();
         self.turns.resize(region.positions.len(), 0);
-        for (_, t) in region.solid_triangles() {
-            self.count_turns(region, t);
-        }
-    }
-
-    /// Adds a triangle to what its vertices see.
-    #[inline(always)]
-    fn count_turns(&mut self, region: &Region<'_>, t: [u32; 3]) {
-        let view = |k: usize| &self.views[t[k] as usize];
-        let (crossing, unsafe_signs) = sector_signs(&region.corners(t), [view(0), view(1), view(2)]);
-        for (k, v) in t.iter().enumerate() {
-            let turns = &mut self.turns[*v as usize];
-            let more = if unsafe_signs >> k & 1 == 1 { REFUSED } else { (crossing >> k & 1) as u8 };
-            *turns = (*turns + more).min(REFUSED);
+        let (mut views, mut solid) = (Triangles::NONE, region.solid_triangles());
+        while batch.fill(region, &mut solid) {
+            for (i, number) in batch.numbers().iter().enumerate() {
+                let along = region.triangles[*number as usize].map(|v| {
+                    let [x, y, z, _] = self.views[v as usize];
+                    [x, y, z]
+                });
+                views.set(i, &along);
+            }
+            let turns = sectors(&batch.triangles, &views);
+            for (i, number) in batch.numbers().iter().enumerate() {
+                for (v, more) in region.triangles[*number as usize].iter().zip(&turns) {
+                    let turns = &mut self.turns[*v as usize];
+                    *turns = (*turns + more[i] as u8).min(REFUSED);
+                }
+            }
         }
     }
 
@@ -122,38 +116,62 @@ impl Stars {
     /// Triangles around a vertex, exact below 2²⁴.
     #[inline]
     pub(super) fn degree(&self, vertex: usize) -> f32 {
-        self.views[vertex].along.w
+        self.views[vertex][3]
     }
 }
 
-/// For each corner of a triangle (bit k), seen as its view says: does its sector run across the half line, and is a sign unsafe?
-#[inline]
-fn sector_signs(corners: &[[f32; 3]; 3], views: [&View; 3]) -> (u32, u32) {
-    let [a, b, c] = corners;
-    // One lane a corner.
-    let along = Mat4::from_cols(views[0].along, views[1].along, views[2].along, Vec4::ZERO).transpose();
-    let line = Mat4::from_cols(views[0].line, views[1].line, views[2].line, Vec4::ZERO).transpose();
-    let (x, y, z) = (Vec4::new(a[0], b[0], c[0], 0.0), Vec4::new(a[1], b[1], c[1], 0.0), Vec4::new(a[2], b[2], c[2], 0.0));
-    let next = [x.yzxw() - x, y.yzxw() - y, z.yzxw() - z];
-    let previous = [x.zxyw() - x, y.zxyw() - y, z.zxyw() - z];
-    let normal = [
-        next[1] * previous[2] - next[2] * previous[1],
-        next[2] * previous[0] - next[0] * previous[2],
-        next[0] * previous[1] - next[1] * previous[0],
-    ];
-    let length = |e: &[Vec4; 3]| e[0].abs() + e[1].abs() + e[2].abs();
-    let (next_length, previous_length) = (length(&next), length(&previous));
-    let largest = Vec4::splat(f32::MAX);
-    let smallest = Vec4::splat(f32::MIN_POSITIVE);
+/// The normals, of about unit length; any other vectors would be as right.
+#[inline(always)]
+fn unit_normals(triangles: &Triangles) -> [Line; 3] {
+    let mut normals = [Line([0.0; WIDTH]); 3];
+    for i in 0..WIDTH {
+        let [a, b, c] = [triangles.corner(0, i), triangles.corner(1, i), triangles.corner(2, i)];
+        let normal = cross(minus(b, a), minus(c, a));
+        let scale = 1.0 / dot(normal, normal).sqrt();
+        for k in 0..3 {
+            normals[k].0[i] = normal[k] * scale;
+        }
+    }
+    normals
+}
+
+/// What each corner of a triangle, seen along its view, adds to the sectors across the half line: 1 if its own is, [`REFUSED`] if
+/// a sign is not safe.
+#[inline(always)]
+fn sectors(triangles: &Triangles, views: &Triangles) -> [[u32; WIDTH]; 3] {
+    let mut turns = [[0; WIDTH]; 3];
+    for (k, turns) in turns.iter_mut().enumerate() {
+        for (i, turns) in turns.iter_mut().enumerate() {
+            let at = triangles.corner(k, i);
+            *turns = sector(
+                minus(triangles.corner((k + 1) % 3, i), at),
+                minus(triangles.corner((k + 2) % 3, i), at),
+                views.corner(k, i),
+            );
+        }
+    }
+    turns
+}
+
+/// The same for one corner, from which the edges go to the next and the previous. Without branches, so that it is compiled to
+/// vectors.
+#[inline(always)]
+fn sector(next: [f32; 3], previous: [f32; 3], along: [f32; 3]) -> u32 {
+    let larger = |a: f32, b: f32| if a > b { a } else { b };
+    let size = larger(larger(along[0].abs(), along[1].abs()), along[2].abs());
+    // Below this, e could have underflowed.
+    let error = if size > 1e-30 { size * ERROR } else { f32::INFINITY };
+    let line = cross(along, LINE);
+    let length = |e: [f32; 3]| e[0].abs() + e[1].abs() + e[2].abs();
+    let (next_length, previous_length) = (length(next), length(previous));
     let area = next_length * previous_length;
-    let height = normal[0] * along.x_axis + normal[1] * along.y_axis + normal[2] * along.z_axis;
-    let bound = area * line.w_axis;
-    let upward = height.cmpgt(bound) & height.cmple(largest) & bound.cmpgt(smallest) & (area * ERROR).cmpgt(smallest);
-    let place = |e: &[Vec4; 3]| e[0] * line.x_axis + e[1] * line.y_axis + e[2] * line.z_axis;
-    let (at_next, at_previous) = (place(&next), place(&previous));
-    let (next_bound, previous_bound) = (next_length * line.w_axis, previous_length * line.w_axis);
-    let clear = |at: Vec4, bound: Vec4| at.abs().cmpgt(bound) & at.abs().cmple(largest) & bound.cmpgt(smallest);
-    let safe = upward & clear(at_next, next_bound) & clear(at_previous, previous_bound);
-    let crossing = at_next.cmplt(Vec4::ZERO) & at_previous.cmpgt(Vec4::ZERO);
-    (crossing.bitmask(), !safe.bitmask())
+    let height = dot(cross(next, previous), along);
+    let bound = area * error;
+    let smallest = f32::MIN_POSITIVE;
+    let upward = (height > bound) & (height <= f32::MAX) & (bound > smallest) & (area * ERROR > smallest);
+    let (at_next, at_previous) = (dot(next, line), dot(previous, line));
+    let clear = |at: f32, bound: f32| (at.abs() > bound) & (at.abs() <= f32::MAX) & (bound > smallest);
+    let safe = upward & clear(at_next, next_length * error) & clear(at_previous, previous_length * error);
+    let crossing = (at_next < 0.0) & (at_previous > 0.0);
+    if safe { u32::from(crossing) } else { u32::from(REFUSED) }
 }

@@ -1,8 +1,8 @@
 //! Boxes of triangles in a tree, and all pairs of them that overlap.
 //!
 //! Triangles are put in the order of a space-filling curve (Morton, "A computer oriented geodetic data base", IBM 1966) and taken
-//! eight at a time; eight such groups make a node, and so on: a tree without pointers, in which a box is compared with eight
-//! others at once. The tree is walked against itself, so that boxes of groups that are apart are compared once for all their
+//! sixteen at a time; sixteen such groups make a node, and so on: a tree without pointers, in which a box is compared with sixteen
+//! others at once ([`super::lanes`]). The tree is walked against itself, so that boxes of groups that are apart are compared once for all their
 //! triangles.
 //!
 //! Boxes overlap when `lo < hi` holds both ways on each axis, strictly: where one ends at the coordinate at which the other begins,
@@ -20,159 +20,77 @@
 
 use std::ops::Range;
 
-use glam::Vec4;
-
+use super::lanes::{self, Boxes, Corners, Lanes, Pairs, Triangles, WIDTH, max, min};
 use super::stars::Stars;
-use super::{Region, State};
+use super::{Batch, Region, State};
 use crate::chunk::NONE;
-
-/// Lanes of a node.
-pub(super) const WIDTH: usize = 8;
+use crate::plan::HomeBox;
 
 /// A vertex with more triangles is a hub.
 const HUB: f32 = 256.0;
 
-/// Enough for 2³² triangles.
-const LEVELS: usize = 12;
+/// Enough for 2³² triangles, and the crown.
+const LEVELS: usize = 10;
 
-/// A triangle with its box.
+/// In a row's flags, by axis: begins below the cell.
+const BELOW: u8 = 1;
+/// Has no extent.
+const FLAT: u8 = 1 << 3;
+/// Has a vertex at home here whose star is not certified.
+const OPEN: u8 = 1 << 6;
+
+/// Up to sixteen triangles. A **row** is a place in a leaf: sixteen times the leaf's number, and the lane.
 #[derive(Clone, Copy)]
-pub(super) struct Row {
-    pub(super) lo: [f32; 3],
-    pub(super) triangle: u32,
-    pub(super) hi: [f32; 3],
-    /// Bits 0 to 2: begins below the cell on that axis. Bits 3 to 5: has no extent on that axis. Bit 6: [`Row::OPEN`].
-    flags: u32,
+struct Leaf {
+    boxes: Boxes,
+    corners: Corners,
+    triangles: [u32; WIDTH],
+    /// [`BELOW`] and [`FLAT`], shifted by the axis, and [`OPEN`].
+    flags: [u8; WIDTH],
 }
 
-impl Row {
-    const EMPTY: Self = Self { lo: [f32::INFINITY; 3], triangle: NONE, hi: [f32::NEG_INFINITY; 3], flags: 0 };
-    const OPEN: u32 = 1 << 6;
+impl Leaf {
+    const EMPTY: Self = Self { boxes: Boxes::EMPTY, corners: Corners::NONE, triangles: [NONE; WIDTH], flags: [0; WIDTH] };
 
-    /// Has a vertex at home here whose star is not certified.
-    #[inline]
-    pub(super) fn is_open(&self) -> bool {
-        self.flags & Self::OPEN != 0
+    fn clear(&mut self, i: usize) {
+        self.boxes.set(i, [f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        self.corners.clear(i);
+        (self.triangles[i], self.flags[i]) = (NONE, 0);
     }
 
-    /// Is the lowest corner of the overlap of two boxes in the cell? Both meet it, so neither begins above it.
-    #[inline]
-    pub(super) fn owns_lowest_corner(&self, other: &Self) -> bool {
-        self.flags & other.flags & 7 == 0
-    }
-
-    /// Where both are flat on one axis, are they in one plane?
-    #[inline]
-    pub(super) fn same_plane(&self, other: &Self) -> bool {
-        // Both were widened or cut the same way.
-        let flat = (self.flags & other.flags) >> 3;
-        flat & 7 == 0 || (0..3).all(|k| flat >> k & 1 == 0 || self.lo[k] == other.lo[k])
-    }
-
-    #[inline]
-    pub(super) fn overlaps(&self, other: &Self) -> bool {
-        (0..3).all(|k| (self.lo[k] < other.hi[k]) & (other.lo[k] < self.hi[k]))
-    }
-}
-
-/// The corners of one box.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Bounds {
-    lo: [f32; 3],
-    hi: [f32; 3],
-}
-
-/// Eight boxes; missing ones overlap nothing.
-#[derive(Clone, Copy)]
-pub(super) struct Node {
-    lo: [[f32; WIDTH]; 3],
-    hi: [[f32; WIDTH]; 3],
-}
-
-/// Lanes as two vectors.
-#[inline(always)]
-fn halves(lanes: &[f32; WIDTH]) -> [Vec4; 2] {
-    let [a, b, c, d, e, f, g, h] = *lanes;
-    [Vec4::new(a, b, c, d), Vec4::new(e, f, g, h)]
-}
-
-impl Node {
-    const EMPTY: Self = Self { lo: [[f32::INFINITY; WIDTH]; 3], hi: [[f32::NEG_INFINITY; WIDTH]; 3] };
-
-    /// The lanes whose boxes overlap this one.
+    /// Sets the boxes, widened where they are flat and cut to the cell, and the flags that say so.
     #[inline(always)]
-    fn overlapping(&self, lo: &[f32; 3], hi: &[f32; 3]) -> u32 {
-        let mut found = [!0_u32; 2];
+    fn set_boxes(&mut self, triangles: &Triangles, cell: &HomeBox) {
+        let (cell_lo, cell_hi) = cell.ends();
         for k in 0..3 {
-            let (begins, ends) = (halves(&self.lo[k]), halves(&self.hi[k]));
-            for half in 0..2 {
-                let both = begins[half].cmplt(Vec4::splat(hi[k])) & ends[half].cmpgt(Vec4::splat(lo[k]));
-                found[half] &= both.bitmask();
+            let (lows, highs) = (&mut self.boxes.lo[k].0, &mut self.boxes.hi[k].0);
+            let mut any_flat = false;
+            for i in 0..WIDTH {
+                let (lo, hi) = triangles.ends(k, i);
+                self.flags[i] |= ((u8::from(lo < cell_lo[k]) * BELOW) | (u8::from(lo == hi) * FLAT)) << k;
+                any_flat |= lo == hi;
+                (lows[i], highs[i]) = (lo, hi);
             }
-        }
-        found[0] | found[1] << 4
-    }
-
-    #[inline(always)]
-    fn lane(&self, i: usize) -> Bounds {
-        let (lo, hi) = (&self.lo, &self.hi);
-        Bounds { lo: [lo[0][i], lo[1][i], lo[2][i]], hi: [hi[0][i], hi[1][i], hi[2][i]] }
-    }
-
-    fn set(&mut self, i: usize, bounds: &Bounds) {
-        for k in 0..3 {
-            self.lo[k][i] = bounds.lo[k];
-            self.hi[k][i] = bounds.hi[k];
-        }
-    }
-
-    /// The box of all lanes.
-    fn bounds(&self) -> Bounds {
-        let (mut lo, mut hi) = ([0.0; 3], [0.0; 3]);
-        for k in 0..3 {
-            let (begins, ends) = (halves(&self.lo[k]), halves(&self.hi[k]));
-            lo[k] = begins[0].min(begins[1]).min_element();
-            hi[k] = ends[0].max(ends[1]).max_element();
-        }
-        Bounds { lo, hi }
-    }
-}
-
-/// The vertices of the eight triangles of a leaf, as floats that are equal when the vertices are.
-#[derive(Clone, Copy)]
-struct Corners([[f32; WIDTH]; 3]);
-
-/// A normal float for each vertex below 2³¹ − 2²⁴; 0 stands for none.
-#[inline]
-fn vertex_float(vertex: u32) -> f32 {
-    f32::from_bits(vertex.wrapping_add(0x0080_0000))
-}
-
-impl Corners {
-    /// The lanes of `other` that have a vertex of lane `i`.
-    #[inline(always)]
-    fn sharing(&self, i: usize, other: &Self) -> u32 {
-        let mut found = [glam::BVec4A::default(); 2];
-        for mine in &self.0 {
-            let mine = Vec4::splat(mine[i]);
-            for theirs in &other.0 {
-                let theirs = halves(theirs);
-                for half in 0..2 {
-                    found[half] |= mine.cmpeq(theirs[half]);
+            if any_flat {
+                for (lo, hi) in lows.iter_mut().zip(highs.iter_mut()).filter(|(lo, hi)| lo == hi) {
+                    (*lo, *hi) = (lo.next_down(), hi.next_up());
                 }
             }
+            let (cut_lo, cut_hi) = (cell_lo[k].next_down(), cell_hi[k].next_up());
+            for i in 0..WIDTH {
+                (lows[i], highs[i]) = (max(lows[i], cut_lo), min(highs[i], cut_hi));
+            }
         }
-        found[0].bitmask() | found[1].bitmask() << 4
     }
 }
 
 /// A tree, the rows in it, and what its triangles have in common.
 #[derive(Clone, Debug)]
 pub(super) struct Tree {
-    /// Where each level starts: level 0 among the leaves, the others among the nodes.
+    /// Where each level starts: level 0 among the leaves, the others among the nodes. The highest, the **crown**, is one node
+    /// whose first lane is the box of all.
     starts: [u32; LEVELS],
-    height: usize,
-    bounds: Bounds,
+    crown: usize,
     pub(super) rows: Range<usize>,
     /// The hub that all its triangles have, or [`NONE`].
     pub(super) hub: u32,
@@ -181,31 +99,86 @@ pub(super) struct Tree {
 /// The trees of a region; memory is kept from one to the next.
 #[derive(Default)]
 pub(super) struct Forest {
-    /// Before sorting.
-    unsorted: Vec<Row>,
-    /// Place on the curve above the place in `unsorted`.
+    /// Place on the curve above the number of the triangle.
     keys: Vec<u64>,
     swap: Vec<u64>,
-    /// Tree of each row of `unsorted`, where there are hubs.
+    /// Tree of each triangle, where there are hubs.
     groups: Vec<u32>,
-    /// Each tree's are followed by empty ones, to a multiple of [`WIDTH`].
-    pub(super) rows: Vec<Row>,
-    leaves: Vec<Node>,
-    corners: Vec<Corners>,
-    nodes: Vec<Node>,
+    /// Those of one tree after those of another, and older ones; a tree's last one may have empty lanes.
+    leaves: Vec<Leaf>,
+    planted: usize,
+    nodes: Vec<Boxes>,
     /// Of the ordinary triangles, then of each hub.
     pub(super) trees: Vec<Tree>,
 }
 
+/// Bytes of a [`Forest`] for each triangle: two keys, a group, its part of a leaf and of the nodes.
+pub(super) const BYTES_PER_TRIANGLE: u64 =
+    (16 + 4 + size_of::<Leaf>() / WIDTH + size_of::<Boxes>().div_ceil(WIDTH * (WIDTH - 1))) as u64;
+
+/// Where on the curve a triangle comes. The order changes nothing but the time that the walk takes.
+struct Curve {
+    cell: HomeBox,
+    lo: [f32; 3],
+    /// Steps of the curve for a unit of length.
+    scale: f32,
+}
+
+impl Curve {
+    /// Through what the region sees of its cell.
+    fn new(region: &Region<'_>) -> Self {
+        let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        for p in region.positions {
+            for k in 0..3 {
+                (lo[k], hi[k]) = (min(lo[k], p[k]), max(hi[k], p[k]));
+            }
+        }
+        let (cell_lo, cell_hi) = region.cell.ends();
+        let lo = [0, 1, 2].map(|k| max(lo[k], cell_lo[k]));
+        let size = (0..3).map(|k| min(hi[k], cell_hi[k]) - lo[k]).fold(0.0, f32::max);
+        Self { cell: region.cell, lo, scale: 256.0 / size }
+    }
+
+    /// 24 bits for each triangle, those that are large for the cell apart, since they would widen the boxes of small ones; or
+    /// [`NONE`] for those that do not meet the cell.
+    #[inline(always)]
+    fn places(&self, triangles: &Triangles) -> [u32; WIDTH] {
+        let (cell_lo, cell_hi) = self.cell.ends();
+        let mut places = [0; WIDTH];
+        for (i, place) in places.iter_mut().enumerate() {
+            let (mut curve, mut extent, mut meets) = (0, 0.0, true);
+            for k in 0..3 {
+                let (lo, hi) = triangles.ends(k, i);
+                meets &= (lo <= cell_hi[k]) & (hi >= cell_lo[k]);
+                let (lo, hi) = (max(lo, cell_lo[k]), min(hi, cell_hi[k]));
+                // What is no number becomes zero.
+                let step = min(max((lo * 0.5 + hi * 0.5 - self.lo[k]) * self.scale, 0.0), 255.0);
+                curve |= spread(step as u32) << k;
+                extent = max(extent, hi - lo);
+            }
+            let extent = extent * self.scale;
+            let class = u32::from(extent > 8.0) + u32::from(extent > 32.0) + u32::from(extent > 128.0);
+            *place = if meets { curve >> 2 | class << 22 } else { NONE };
+        }
+        places
+    }
+}
+
+/// Eight bits, two zeros after each.
+#[inline(always)]
+fn spread(x: u32) -> u32 {
+    let x = (x | x << 8) & 0x0000_F00F;
+    let x = (x | x << 4) & 0x000C_30C3;
+    (x | x << 2) & 0x0024_9249
+}
+
 impl Forest {
     /// Arranges the triangles that meet the cell. O(triangles).
+    #[inline(always)]
     pub(super) fn build(&mut self, region: &Region<'_>, stars: &Stars, states: &[State]) {
-        self.collect(region, states);
-        self.sort();
+        self.collect(region);
         let hubs = self.group_by_hub(region, stars, states);
-        self.rows.clear();
-        self.leaves.clear();
-        self.corners.clear();
+        self.planted = 0;
         self.nodes.clear();
         self.trees.clear();
         let mut rest = 0..self.keys.len();
@@ -214,69 +187,28 @@ impl Forest {
             let count =
                 if hubs.len() == 1 { rest.len() } else { self.keys[rest.clone()].iter().take_while(|k| of_group(k)).count() };
             if count > 0 {
-                self.plant(region, rest.start..rest.start + count, *hub);
+                self.plant(region, states, rest.start..rest.start + count, *hub);
             }
             rest.start += count;
         }
     }
 
-    /// The rows of all triangles that are no line and meet the cell.
-    #[inline(never)]
-    fn collect(&mut self, region: &Region<'_>, states: &[State]) {
-        let (cell_lo, cell_hi) = region.cell.ends();
-        let four = |p: [f32; 3]| Vec4::new(p[0], p[1], p[2], 0.0);
-        let (cut_lo, cut_hi) = (four(cell_lo.map(f32::next_down)), four(cell_hi.map(f32::next_up)));
-        let (cell_lo, cell_hi) = (four(cell_lo), four(cell_hi));
-        self.unsorted.clear();
-        self.unsorted.reserve(region.triangles.len());
-        for (i, t) in region.solid_triangles() {
-            let [a, b, c] = region.corners(t);
-            let (a, b, c) = (four(a), four(b), four(c));
-            let (mut lo, mut hi) = (a.min(b).min(c), a.max(b).max(c));
-            if !(lo.cmple(cell_hi) & hi.cmpge(cell_lo)).all() {
-                continue;
-            }
-            let flat = lo.cmpeq(hi).bitmask() & 7;
-            let mut flags = (lo.cmplt(cell_lo).bitmask() & 7) | flat << 3;
-            for k in bits(flat) {
-                (lo[k], hi[k]) = (lo[k].next_down(), hi[k].next_up());
-            }
-            (lo, hi) = (lo.max(cut_lo), hi.min(cut_hi));
-            if t.iter().any(|v| states[*v as usize] == State::Open) {
-                flags |= Row::OPEN;
-            }
-            self.unsorted.push(Row { lo: lo.truncate().into(), triangle: i, hi: hi.truncate().into(), flags });
-        }
-    }
-
-    /// Fills `keys` in the order of the curve.
-    #[inline(never)]
-    fn sort(&mut self) {
-        let at = |row: &Row, k: usize| row.lo[k] * 0.5 + row.hi[k] * 0.5;
-        let middle = |row: &Row| [at(row, 0), at(row, 1), at(row, 2)];
-        let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-        for row in &self.unsorted {
-            let m = middle(row);
-            for k in 0..3 {
-                lo[k] = lo[k].min(m[k]);
-                hi[k] = hi[k].max(m[k]);
-            }
-        }
-        let size = (0..3).map(|k| hi[k] - lo[k]).fold(0.0, f32::max);
-        // Conversion to integers saturates, and takes NaN to zero.
-        let scale = 256.0 / size;
+    /// The `keys` of all triangles that are no line and meet the cell, in the order of the curve.
+    #[inline(always)]
+    fn collect(&mut self, region: &Region<'_>) {
+        let curve = Curve::new(region);
         let (mut low, mut high) = ([0_u32; 4096], [0_u32; 4096]);
         self.keys.clear();
-        self.keys.extend(self.unsorted.iter().enumerate().map(|(i, row)| {
-            let m = middle(row);
-            let place = |k: usize| spread((((m[k] - lo[k]) * scale) as u32).min(255)) << k;
-            let extent = (row.hi[0] - row.lo[0]).max(row.hi[1] - row.lo[1]).max(row.hi[2] - row.lo[2]) * scale;
-            let class = u32::from(extent > 8.0) + u32::from(extent > 32.0) + u32::from(extent > 128.0);
-            let curve = (place(0) | place(1) | place(2)) >> 2 | class << 22;
-            low[(curve & 4095) as usize] += 1;
-            high[(curve >> 12) as usize] += 1;
-            u64::from(curve) << 32 | i as u64
-        }));
+        self.keys.reserve(region.triangles.len());
+        let (mut batch, mut solid) = (Batch::EMPTY, region.solid_triangles());
+        while batch.fill(region, &mut solid) {
+            let places = curve.places(&batch.triangles);
+            for (triangle, place) in batch.numbers().iter().zip(places).filter(|(_, place)| *place != NONE) {
+                low[(place & 4095) as usize] += 1;
+                high[(place >> 12) as usize & 4095] += 1;
+                self.keys.push(u64::from(place) << 32 | u64::from(*triangle));
+            }
+        }
         self.swap.clear();
         self.swap.resize(self.keys.len(), 0);
         for (counts, shift) in [(&mut low, 32), (&mut high, 44)] {
@@ -302,12 +234,13 @@ impl Forest {
             return hubs;
         }
         self.groups.clear();
+        self.groups.resize(region.triangles.len(), 0);
         let mut starts = vec![0_u32; hubs.len() + 1];
-        for row in &self.unsorted {
+        for triangle in self.keys.iter().map(|key| *key as u32 as usize) {
             // The hub with the smallest number, which is position in `hubs`.
-            let group = region.triangles[row.triangle as usize].iter().filter_map(|v| hubs[1..].binary_search(v).ok()).min();
+            let group = region.triangles[triangle].iter().filter_map(|v| hubs[1..].binary_search(v).ok()).min();
             let group = group.map_or(0, |g| g + 1);
-            self.groups.push(group as u32);
+            self.groups[triangle] = group as u32;
             starts[group + 1] += 1;
         }
         for group in 0..hubs.len() {
@@ -323,84 +256,170 @@ impl Forest {
     }
 
     /// Builds the tree over some of `keys`, at least one.
-    #[inline(never)]
-    fn plant(&mut self, region: &Region<'_>, keys: Range<usize>, hub: u32) {
-        let first_row = self.rows.len();
+    #[inline(always)]
+    fn plant(&mut self, region: &Region<'_>, states: &[State], keys: Range<usize>, hub: u32) {
+        let rows = self.planted * WIDTH..self.planted * WIDTH + keys.len();
         let mut starts = [0; LEVELS];
-        starts[0] = self.leaves.len() as u32;
-        for eight in self.keys[keys.clone()].chunks(WIDTH) {
-            let (mut leaf, mut corners) = (Node::EMPTY, Corners([[0.0; WIDTH]; 3]));
-            for (i, key) in eight.iter().enumerate() {
-                let row = self.unsorted[*key as u32 as usize];
-                for k in 0..3 {
-                    leaf.lo[k][i] = row.lo[k];
-                    leaf.hi[k][i] = row.hi[k];
-                    corners.0[k][i] = vertex_float(region.triangles[row.triangle as usize][k]);
-                }
-                self.rows.push(row);
-            }
-            self.leaves.push(leaf);
-            self.corners.push(corners);
+        (starts[0], starts[1]) = (self.planted as u32, self.nodes.len() as u32);
+        let leaves = keys.len().div_ceil(WIDTH);
+        let first = self.planted;
+        self.planted += leaves;
+        if self.leaves.len() < self.planted {
+            self.leaves.resize(self.planted, Leaf::EMPTY);
         }
-        self.rows.resize(self.leaves.len() * WIDTH, Row::EMPTY);
-        let mut below = starts[0] as usize..self.leaves.len();
-        let mut height = 0;
-        while below.len() > 1 {
-            let start = self.nodes.len();
-            for first in below.clone().step_by(WIDTH) {
-                let mut node = Node::EMPTY;
-                for (i, child) in (first..below.end.min(first + WIDTH)).enumerate() {
-                    node.set(i, &if height == 0 { &self.leaves } else { &self.nodes }[child].bounds());
-                }
-                self.nodes.push(node);
+        self.nodes.resize(self.nodes.len() + leaves.div_ceil(WIDTH), Boxes::EMPTY);
+        let parents = &mut self.nodes[starts[1] as usize..];
+        let mut triangles = Triangles::NONE;
+        for ((number, leaf), keys) in self.leaves[first..].iter_mut().enumerate().zip(self.keys[keys].chunks(WIDTH)) {
+            for (i, key) in keys.iter().enumerate() {
+                let triangle = *key as u32;
+                let vertices = region.triangles[triangle as usize];
+                triangles.set(i, &region.corners(vertices));
+                leaf.corners.set(i, vertices);
+                leaf.triangles[i] = triangle;
+                let open = vertices.map(|v| states[v as usize] == State::Open);
+                leaf.flags[i] = u8::from(open[0] | open[1] | open[2]) * OPEN;
             }
-            height += 1;
-            starts[height] = start as u32;
-            below = start..self.nodes.len();
+            leaf.set_boxes(&triangles, &region.cell);
+            for i in keys.len()..WIDTH {
+                leaf.clear(i);
+            }
+            let (lo, hi) = leaf.boxes.bounds();
+            parents[number / WIDTH].set(number % WIDTH, lo, hi);
         }
-        let bounds = if height == 0 { &self.leaves } else { &self.nodes }[below.start].bounds();
-        self.trees.push(Tree { starts, height, bounds, rows: first_row..first_row + keys.len(), hub });
+        // Boxes in the level; where there is one only, it is the crown.
+        let (mut level, mut boxes) = (1, leaves);
+        while boxes > 1 {
+            boxes = boxes.div_ceil(WIDTH);
+            level += 1;
+            let (below, here) = (starts[level - 1] as usize, self.nodes.len());
+            starts[level] = here as u32;
+            self.nodes.resize(here + boxes.div_ceil(WIDTH), Boxes::EMPTY);
+            for i in 0..boxes {
+                let (lo, hi) = self.nodes[below + i].bounds();
+                self.nodes[here + i / WIDTH].set(i % WIDTH, lo, hi);
+            }
+        }
+        self.trees.push(Tree { starts, crown: level, rows, hub });
     }
 }
 
-/// Eight bits, two zeros after each.
-#[inline]
-fn spread(x: u32) -> u32 {
-    let x = (x | x << 8) & 0x0000_F00F;
-    let x = (x | x << 4) & 0x000C_30C3;
-    (x | x << 2) & 0x0024_9249
+/// What is asked about rows.
+impl Forest {
+    #[inline(always)]
+    fn lane(&self, row: usize) -> (&Leaf, usize) {
+        (&self.leaves[row / WIDTH], row % WIDTH)
+    }
+
+    #[inline(always)]
+    pub(super) fn triangle(&self, row: usize) -> u32 {
+        let (leaf, i) = self.lane(row);
+        leaf.triangles[i]
+    }
+
+    /// Has it a vertex at home here whose star is not certified?
+    #[inline(always)]
+    pub(super) fn is_open(&self, row: usize) -> bool {
+        let (leaf, i) = self.lane(row);
+        leaf.flags[i] & OPEN != 0
+    }
+
+    /// Of two rows that overlap: is the lowest corner of the overlap in the cell, and are they, where both are flat on one axis, in
+    /// one plane?
+    #[inline(always)]
+    pub(super) fn owns_pair(&self, row: usize, other: usize) -> bool {
+        let ((a, i), (b, j)) = (self.lane(row), self.lane(other));
+        let both = a.flags[i] & b.flags[j];
+        // Both meet the cell, so neither begins above it. What is flat was widened, or cut, the same way.
+        let same_plane = || bits(both >> 3 & 7).all(|k| a.boxes.lo(i)[k] == b.boxes.lo(j)[k]);
+        both & 7 == 0 && (both >> 3 & 7 == 0 || same_plane())
+    }
+
+    #[inline]
+    pub(super) fn overlap(&self, row: usize, other: usize) -> bool {
+        let ((a, i), (b, j)) = (self.lane(row), self.lane(other));
+        let begins_before = |a: [f32; 3], b: [f32; 3]| (0..3).all(|k| a[k] < b[k]);
+        begins_before(a.boxes.lo(i), b.boxes.hi(j)) && begins_before(b.boxes.lo(j), a.boxes.hi(i))
+    }
 }
 
 /// What is done with overlapping boxes.
 pub(super) trait Visit {
     /// `row` overlaps the rows from `first` on whose bits are set in `lanes`; those in `sharing` (and maybe others, which do not
     /// overlap) have a vertex in common with it. Returns `false` to end the walk.
-    fn visit(&mut self, row: usize, first: usize, lanes: u32, sharing: u32) -> bool;
+    fn visit(&mut self, with: impl Lanes, row: usize, first: usize, lanes: u32, sharing: u32) -> bool;
+}
+
+/// A node: number of the tree, level, number within the level.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct At {
+    tree: u32,
+    level: u32,
+    index: u32,
+}
+
+impl At {
+    #[inline(always)]
+    fn child(self, i: usize) -> Self {
+        Self { level: self.level - 1, index: self.index * WIDTH as u32 + i as u32, ..self }
+    }
 }
 
 /// A walk over a forest.
 pub(super) struct Walk<'a, V> {
     forest: &'a Forest,
+    /// Pairs of nodes whose boxes overlap, or a node and itself, that are yet to be looked into.
+    stack: Vec<[At; 2]>,
+    /// A leaf, and a row that is to be compared with it.
+    rows: Pairs,
     visit: &'a mut V,
 }
 
 impl<'a, V: Visit> Walk<'a, V> {
     pub(super) fn new(forest: &'a Forest, visit: &'a mut V) -> Self {
-        Self { forest, visit }
+        Self { forest, stack: Vec::new(), rows: Pairs::default(), visit }
     }
 
     /// All overlapping pairs within the tree of ordinary triangles and between trees, but not within that of a hub. `false` when
     /// it was ended.
     pub(super) fn all(&mut self) -> bool {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if let Some(lanes) = lanes::Sixteens::detect() {
+                // SAFETY: the processor has what it is compiled for.
+                return unsafe { self.all_avx512(lanes) };
+            }
+            if let Some(lanes) = lanes::Eights::detect() {
+                // SAFETY: as above.
+                return unsafe { self.all_avx2(lanes) };
+            }
+        }
+        self.all_by(lanes::Fours)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512bw,bmi1,popcnt")]
+    fn all_avx512(&mut self, lanes: lanes::Sixteens) -> bool {
+        self.all_by(lanes)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,bmi1")]
+    fn all_avx2(&mut self, lanes: lanes::Eights) -> bool {
+        self.all_by(lanes)
+    }
+
+    #[inline(always)]
+    fn all_by(&mut self, lanes: impl Lanes) -> bool {
         let trees = &self.forest.trees;
         for (i, tree) in trees.iter().enumerate() {
-            if tree.hub == NONE && !self.own(tree, tree.height, 0) {
-                return false;
-            }
-            for other in &trees[i + 1..] {
-                let (a, b) = (tree.bounds, other.bounds);
-                let apart = (0..3).any(|k| a.lo[k] >= b.hi[k] || b.lo[k] >= a.hi[k]);
-                if !apart && !self.between((tree, tree.height, 0, &a), (other, other.height, 0, &b)) {
+            for (j, other) in trees.iter().enumerate().skip(i) {
+                let [(a, bounds), (b, others)] = [(i, tree), (j, other)].map(|(i, tree)| {
+                    let crown = At { tree: i as u32, level: tree.crown as u32, index: 0 };
+                    (crown.child(0), self.boxes(crown))
+                });
+                let wanted = if i == j { tree.hub == NONE } else { lanes.overlapping(bounds, others, 0) & 1 != 0 };
+                if wanted && !self.below([a, b], lanes) {
                     return false;
                 }
             }
@@ -408,119 +427,90 @@ impl<'a, V: Visit> Walk<'a, V> {
         true
     }
 
-    #[inline]
-    fn node(&self, tree: &Tree, level: usize, index: usize) -> &'a Node {
-        let at = tree.starts[level] as usize + index;
-        if level == 0 { &self.forest.leaves[at] } else { &self.forest.nodes[at] }
+    /// The boxes of what is below a node.
+    #[inline(always)]
+    fn boxes(&self, at: At) -> &'a Boxes {
+        let index = self.forest.trees[at.tree as usize].starts[at.level as usize] as usize + at.index as usize;
+        if at.level == 0 { &self.forest.leaves[index].boxes } else { &self.forest.nodes[index] }
     }
 
-    /// Pairs within a node.
-    fn own(&mut self, tree: &Tree, level: usize, index: usize) -> bool {
-        if level == 0 {
-            return self.own_leaf(tree.starts[0] as usize + index);
-        }
-        let node = self.node(tree, level, index);
-        for i in 0..WIDTH {
-            let mine = node.lane(i);
-            if mine.lo[0] > mine.hi[0] {
-                break;
-            }
-            if !self.own(tree, level - 1, index * WIDTH + i) {
-                return false;
-            }
-            let mut lanes = node.overlapping(&mine.lo, &mine.hi) & (!1 << i);
-            while lanes != 0 {
-                let j = lanes.trailing_zeros() as usize;
-                lanes &= lanes - 1;
-                let (i, j, theirs) = (i + index * WIDTH, j + index * WIDTH, node.lane(j));
-                if !self.between((tree, level - 1, i, &mine), (tree, level - 1, j, &theirs)) {
+    /// The boxes among which a node's own is, and its lane.
+    #[inline(always)]
+    fn own_box(&self, at: At) -> (&'a Boxes, usize) {
+        let index = at.index as usize;
+        (self.boxes(At { level: at.level + 1, index: (index / WIDTH) as u32, ..at }), index % WIDTH)
+    }
+
+    /// Pairs of one triangle of each of two nodes, or of two of one.
+    #[inline(always)]
+    fn below(&mut self, pair: [At; 2], lanes: impl Lanes) -> bool {
+        self.stack.clear();
+        self.stack.push(pair);
+        while let Some([a, b]) = self.stack.pop() {
+            if a.level.max(b.level) == 0 {
+                self.leaves(a, b, lanes);
+                if self.rows.is_full() && !self.compare(lanes) {
                     return false;
+                }
+            } else if a == b {
+                let boxes = self.boxes(a);
+                for i in (0..WIDTH).take_while(|i| boxes.is_set(*i)) {
+                    self.stack.push([a.child(i); 2]);
+                    let later = lanes.overlapping(boxes, boxes, i) & (!1 << i);
+                    self.stack.extend(bits(later).map(|j| [a.child(i), a.child(j)]));
+                }
+            } else {
+                let (a, b) = if a.level < b.level { (b, a) } else { (a, b) };
+                let (boxes, (others, lane)) = (self.boxes(a), self.own_box(b));
+                for i in bits(lanes.overlapping(boxes, others, lane)) {
+                    if a.level > b.level {
+                        self.stack.push([a.child(i), b]);
+                    } else {
+                        let found = lanes.overlapping(self.boxes(b), boxes, i);
+                        self.stack.extend(bits(found).map(|j| [a.child(i), b.child(j)]));
+                    }
                 }
             }
         }
-        true
+        self.compare(lanes)
     }
 
-    fn own_leaf(&mut self, leaf: usize) -> bool {
-        let node = &self.forest.leaves[leaf];
-        for i in 0..WIDTH - 1 {
-            let mine = node.lane(i);
-            let lanes = node.overlapping(&mine.lo, &mine.hi) & (!1 << i);
-            if lanes != 0 && !self.row(leaf * WIDTH + i, leaf, lanes) {
+    /// Notes the rows of one leaf that are to be compared with another leaf, or with their own.
+    #[inline(always)]
+    fn leaves(&mut self, a: At, b: At, lanes: impl Lanes) {
+        let number = |at: At| self.forest.trees[at.tree as usize].starts[0] + at.index;
+        let (mut one, mut other) = (number(a), number(b));
+        let mut rows = !0 >> 16;
+        if one != other {
+            // One by one those of the leaf of which fewer meet the other's box.
+            let ((a_boxes, a_lane), (b_boxes, b_lane)) = (self.own_box(a), self.own_box(b));
+            rows = lanes.overlapping(&self.forest.leaves[one as usize].boxes, b_boxes, b_lane);
+            let others = lanes.overlapping(&self.forest.leaves[other as usize].boxes, a_boxes, a_lane);
+            if others.count_ones() < rows.count_ones() {
+                (one, other, rows) = (other, one, others);
+            }
+        }
+        lanes.append(&mut self.rows, other, one * WIDTH as u32, rows);
+    }
+
+    /// Compares the rows that were noted.
+    #[inline(always)]
+    fn compare(&mut self, lanes: impl Lanes) -> bool {
+        let leaves = &self.forest.leaves[..];
+        for [other, row] in self.rows.as_mut_slice().iter().map(|pair| pair.map(|x| x as usize)) {
+            let (leaf, i, theirs) = (&leaves[row / WIDTH], row % WIDTH, &leaves[other]);
+            // Within a leaf, those that come later.
+            let wanted = if other == row / WIDTH { !1 << i } else { !0 };
+            let found = lanes.overlapping(&theirs.boxes, &leaf.boxes, i) & wanted;
+            let sharing = lanes.sharing(&theirs.corners, &leaf.corners, i);
+            if found != 0 && !self.visit.visit(lanes, row, other * WIDTH, found, sharing) {
                 return false;
             }
         }
+        self.rows.clear();
         true
-    }
-
-    /// Pairs of one triangle of each of two nodes whose boxes overlap.
-    fn between(&mut self, a: Place<'_>, b: Place<'_>) -> bool {
-        if a.1 < b.1 {
-            return self.between(b, a);
-        }
-        let (tree, level, index, bounds) = a;
-        let (other, other_level, other_index, other_bounds) = b;
-        if level == 0 {
-            let leaves = (tree.starts[0] as usize + index, other.starts[0] as usize + other_index);
-            return self.between_leaves(leaves, bounds, other_bounds);
-        }
-        let node = self.node(tree, level, index);
-        let mut lanes = node.overlapping(&other_bounds.lo, &other_bounds.hi);
-        while lanes != 0 {
-            let i = lanes.trailing_zeros() as usize;
-            lanes &= lanes - 1;
-            let mine = node.lane(i);
-            let child = (tree, level - 1, index * WIDTH + i, &mine);
-            if level > other_level {
-                if !self.between(child, b) {
-                    return false;
-                }
-                continue;
-            }
-            let others = self.node(other, level, other_index);
-            let mut lanes = others.overlapping(&mine.lo, &mine.hi);
-            while lanes != 0 {
-                let j = lanes.trailing_zeros() as usize;
-                lanes &= lanes - 1;
-                let theirs = others.lane(j);
-                if !self.between(child, (other, level - 1, other_index * WIDTH + j, &theirs)) {
-                    return false;
-                }
-            }
-        }
-        true
-    }
-
-    fn between_leaves(&mut self, (mut a, mut b): (usize, usize), bounds: &Bounds, other_bounds: &Bounds) -> bool {
-        let (mut node, mut other) = (&self.forest.leaves[a], &self.forest.leaves[b]);
-        let mut lanes = node.overlapping(&other_bounds.lo, &other_bounds.hi);
-        let others = other.overlapping(&bounds.lo, &bounds.hi);
-        // One by one those of the leaf that has fewer.
-        if others.count_ones() < lanes.count_ones() {
-            (a, b, node, other, lanes) = (b, a, other, node, others);
-        }
-        while lanes != 0 {
-            let i = lanes.trailing_zeros() as usize;
-            lanes &= lanes - 1;
-            let mine = node.lane(i);
-            let found = other.overlapping(&mine.lo, &mine.hi);
-            if found != 0 && !self.row(a * WIDTH + i, b, found) {
-                return false;
-            }
-        }
-        true
-    }
-
-    /// A row and the lanes of a leaf that overlap it.
-    #[inline]
-    fn row(&mut self, row: usize, leaf: usize, lanes: u32) -> bool {
-        let sharing = self.forest.corners[row / WIDTH].sharing(row % WIDTH, &self.forest.corners[leaf]);
-        self.visit.visit(row, leaf * WIDTH, lanes, sharing)
     }
 }
-
-/// A node: tree, level, number within the level, box.
-type Place<'t> = (&'t Tree, usize, usize, &'t Bounds);
 
 /// The numbers of the bits that are set, ascending.
 #[inline(always)]

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use super::islands;
 use super::loops::{self, Loop};
+use super::work::Work;
 use crate::chunk::NONE;
 use crate::fill::{self, FillSettings, Rim, Unfillable};
 use crate::parallel;
 use crate::report::LoopLeft;
 use crate::settings::Profile;
 use crate::shop::components::{Components, Reversed, Through};
-use crate::shop::edges::Edges;
 use crate::shop::{Origin, Shop};
 use crate::survey::Survey;
 
@@ -33,41 +33,43 @@ const MAX_FLAT_EDGES: usize = 64;
 
 /// Fills every loop that the profile admits. Patches are found in parallel and put in in the loops' order; one that meets an edge
 /// that an earlier one has made is found anew, so that the result does not depend on the threads.
-pub(super) fn fill_loops(survey: &Survey<'_>, shop: &mut Shop, profile: &Profile, threads: usize) -> Closed {
-    let bridges = if profile.fill_holes { islands::bridge(survey, shop) } else { Vec::new() };
-    let rims = loops::find(shop, &Edges::of(shop));
+pub(super) fn fill_loops(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile, threads: usize) -> Closed {
+    let bridges = if profile.fill_holes { islands::bridge(survey, work) } else { Vec::new() };
+    let (shop, edges) = work.edges();
+    let rims = loops::find(shop, edges);
     let diagonal = survey.bounds.diagonal();
     let patches = parallel::map(threads, rims.len(), |i| fill(shop, &rims[i], profile, diagonal, Neighbours::Heeded));
     let mut closed = Closed::default();
     let mut open: Vec<(&Loop, NotFilled)> = Vec::new();
     for (rim, patch) in rims.iter().zip(patches) {
         let patch = match patch {
-            Ok(patch) if meets_new_edge(shop, rim, &patch) => fill(shop, rim, profile, diagonal, Neighbours::Heeded),
+            Ok(patch) if meets_new_edge(work, rim, &patch) => fill(work, rim, profile, diagonal, Neighbours::Heeded),
             other => other,
         };
         match patch {
-            Ok(patch) => closed.put_in(shop, rim, &patch, patch.method.name()),
+            Ok(patch) => closed.put_in(work, rim, &patch, patch.method.name()),
             Err(reason) => open.push((rim, reason)),
         }
     }
     if !open.is_empty() {
-        let components = Components::of(survey, shop, &Edges::of(shop), &Reversed::none(survey), Through::EveryEdge);
+        let (shop, edges) = work.edges();
+        let components = Components::of(survey, shop, edges, &Reversed::none(survey), Through::EveryEdge);
         for (rim, reason) in open {
             let area = components.list[components.of_triangle[rim.triangles[0] as usize] as usize].extent.area as f64;
             let flat = match reason {
                 NotFilled::Method(Unfillable::Blocked | Unfillable::CrossesItself) if rim.vertices.len() <= MAX_FLAT_EDGES => {
-                    fill(shop, rim, profile, diagonal, Neighbours::Ignored)
+                    fill(work, rim, profile, diagonal, Neighbours::Ignored)
                         .ok()
-                        .filter(|p| twice_area(survey, shop, rim, p) <= area * MAX_FLAT_SHARE)
+                        .filter(|p| twice_area(survey, work, rim, p) <= area * MAX_FLAT_SHARE)
                 }
                 _ => None,
             };
             match flat {
-                Some(patch) => closed.put_in(shop, rim, &patch, "flat on its neighbours"),
+                Some(patch) => closed.put_in(work, rim, &patch, "flat on its neighbours"),
                 None => {
-                    closed.leave(shop, rim, reason);
+                    closed.leave(work, rim, reason);
                     // What joined an island to this rim leads nowhere now.
-                    rim.triangles.iter().filter(|t| bridges.binary_search(t).is_ok()).for_each(|t| shop.kill(*t));
+                    rim.triangles.iter().filter(|t| bridges.binary_search(t).is_ok()).for_each(|t| work.kill(*t));
                 }
             }
         }
@@ -82,9 +84,9 @@ fn twice_area(survey: &Survey<'_>, shop: &Shop, rim: &Loop, patch: &fill::Patch)
 }
 
 impl Closed {
-    fn put_in(&mut self, shop: &mut Shop, rim: &Loop, patch: &fill::Patch, how: &'static str) {
+    fn put_in(&mut self, work: &mut Work<'_>, rim: &Loop, patch: &fill::Patch, how: &'static str) {
         for t in &patch.triangles {
-            shop.add(t.map(|i| rim.vertices[i as usize]), Origin::Patch, NONE);
+            work.add(t.map(|i| rim.vertices[i as usize]), Origin::Patch, NONE);
         }
         self.loops += 1;
         *self.by_method.entry(how).or_default() += 1;
@@ -165,7 +167,7 @@ mod tests {
     fn filled(profile: &Profile) -> After<Closed> {
         let mut open = cube();
         open.drain(2..4);
-        after(&open, |d, _| fill_loops(&d.survey, &mut d.shop, profile, 1))
+        after(&open, |d, _| fill_loops(&d.survey, &mut Work::new(&mut d.shop), profile, 1))
     }
 
     #[test]

@@ -3,11 +3,16 @@
 //! Such a triangle lies along its longest edge, with the third vertex inside it. Every other triangle at the long edge is split at
 //! that vertex, which closes the surface without moving anything; dropping the triangle alone would open it.
 
-use crate::shop::{Origin, Shop};
+use super::work::{Pass, Work};
+use crate::shop::Origin;
 
 /// Removes collinear triangles; returns how many.
-pub(super) fn remove(shop: &mut Shop) -> u64 {
-    let mut left: Vec<u32> = shop.living().filter(|t| shop.is_collinear(*t)).collect();
+pub(super) fn remove(shop: &mut Work<'_>) -> u64 {
+    // After a pass none is left, and only a new vertex makes one.
+    let mut left: Vec<u32> = match shop.changed_for(Pass::Collinear) {
+        None => shop.living().filter(|t| shop.is_collinear(*t)).collect(),
+        Some(changed) => changed.into_iter().filter(|t| shop.lives(*t) && shop.is_collinear(*t)).collect(),
+    };
     let mut removed = 0;
     // Each round takes those whose neighbours are not collinear themselves; a chain unravels from its end.
     while !left.is_empty() {
@@ -24,7 +29,7 @@ pub(super) fn remove(shop: &mut Shop) -> u64 {
 }
 
 /// Removes `t` unless a triangle at its long edge is collinear, too, and `force` is off.
-fn try_remove(shop: &mut Shop, t: u32, force: bool) -> bool {
+fn try_remove(shop: &mut Work<'_>, t: u32, force: bool) -> bool {
     if !shop.triangles[t as usize].alive {
         return true;
     }
@@ -46,7 +51,7 @@ fn try_remove(shop: &mut Shop, t: u32, force: bool) -> bool {
 
 /// Splits triangle `t` at vertices on its edge between `ends`, given in order from `ends[0]` to `ends[1]`, into a fan from the
 /// opposite corner. Vertices that are the opposite corner are left out.
-pub(super) fn split(shop: &mut Shop, t: u32, ends: [u32; 2], at: &[u32]) {
+pub(super) fn split(shop: &mut Work<'_>, t: u32, ends: [u32; 2], at: &[u32]) {
     let triangle = shop.triangles[t as usize];
     let Some(k) = (0..3).find(|k| !ends.contains(&triangle.v[*k])) else { return };
     let (apex, from, to) = (triangle.v[k], triangle.v[(k + 1) % 3], triangle.v[(k + 2) % 3]);
@@ -83,7 +88,7 @@ mod tests {
         mesh.extend([[a, b, m], [m, b, c], [a, m, c]]);
         let got = after(&mesh, |d, _| {
             assert_eq!((d.defects.degenerate_area, d.defects.boundary_edges), (1, 0), "closed by the cap");
-            remove(&mut d.shop)
+            remove(&mut Work::new(&mut d.shop))
         });
         // One goes, one becomes two.
         assert_eq!((got.result, got.defects.triangles), (1, 14));

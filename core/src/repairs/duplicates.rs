@@ -5,21 +5,22 @@
 //! thickness inside a body (the surface closes without it: all go), a surface exported with both sides (one side stays and is
 //! turned later), or two triangles on their own (nothing is enclosed: both go).
 
+use super::work::{Pass, Work};
 use crate::chunk;
 use crate::defects::{by_vertex_set, same_direction};
-use crate::shop::Shop;
 use crate::shop::edges::Edges;
+use crate::shop::{Shop, Vertex};
 
 /// Removes triangles with a repeated vertex. Their edges cancel out, so nothing opens.
-pub(super) fn drop_repeated(shop: &mut Shop) -> u64 {
-    let mut count = 0;
-    for triangle in &mut shop.triangles {
-        if triangle.alive && crate::shop::has_repeated(triangle.v) {
-            triangle.alive = false;
-            count += 1;
-        }
-    }
-    count
+pub(super) fn drop_repeated(work: &mut Work<'_>) -> u64 {
+    let changed = work.changed_for(Pass::Repeated);
+    let is_repeated = |t: &u32| work.triangles[*t as usize].alive && !work.lives(*t);
+    let doomed: Vec<u32> = match changed {
+        None => (0..work.triangles.len() as u32).filter(is_repeated).collect(),
+        Some(changed) => changed.into_iter().filter(is_repeated).collect(),
+    };
+    doomed.iter().for_each(|t| work.kill(*t));
+    doomed.len() as u64
 }
 
 /// Triangles on one vertex set in both directions.
@@ -44,13 +45,18 @@ enum Place {
 }
 
 /// Removes surplus triangles on the same three vertices; returns how many.
-pub(super) fn drop_duplicates(shop: &mut Shop) -> u64 {
+pub(super) fn drop_duplicates(work: &mut Work<'_>) -> u64 {
+    // Afterwards no two are on the same vertices, and only a new vertex makes another copy.
+    let candidates = match work.changed_for(Pass::Copies) {
+        None => by_vertex_set(work),
+        Some(changed) => copies_of(work, &changed),
+    };
     let mut doomed = Vec::new();
     let mut pairs: Vec<Pair> = Vec::new();
-    for group in by_vertex_set(shop).chunk_by(|a, b| a.0 == b.0).filter(|g| g.len() > 1) {
-        let first = shop.triangles[group[0].1 as usize].v;
+    for group in candidates.chunk_by(|a, b| a.0 == b.0).filter(|g| g.len() > 1) {
+        let first = work.triangles[group[0].1 as usize].v;
         let (forward, backward): (Vec<u32>, Vec<u32>) =
-            group.iter().map(|g| g.1).partition(|t| same_direction(first, shop.triangles[*t as usize].v));
+            group.iter().map(|g| g.1).partition(|t| same_direction(first, work.triangles[*t as usize].v));
         if backward.is_empty() {
             doomed.extend(&forward[1..]);
         } else {
@@ -58,14 +64,36 @@ pub(super) fn drop_duplicates(shop: &mut Shop) -> u64 {
         }
     }
     if !pairs.is_empty() {
-        doomed.extend(sort_out(shop, &mut pairs));
+        let (shop, edges) = work.edges();
+        doomed.extend(sort_out(shop, edges, &mut pairs));
     }
-    doomed.iter().for_each(|t| shop.kill(*t));
+    doomed.iter().for_each(|t| work.kill(*t));
     doomed.len() as u64
 }
 
-fn sort_out(shop: &Shop, pairs: &mut [Pair]) -> Vec<u32> {
-    let edges = Edges::of(shop);
+/// As [`by_vertex_set`], of all triangles on the vertices of a changed one. O(stars of the changed ones); of a triangle's three stars
+/// only as much is looked at as the smallest has.
+fn copies_of(shop: &Shop, changed: &[u32]) -> Vec<([Vertex; 3], u32)> {
+    let sorted = |t: u32| {
+        let mut v = shop.triangles[t as usize].v;
+        v.sort_unstable();
+        v
+    };
+    let mut sets: Vec<[Vertex; 3]> = changed.iter().filter(|t| shop.lives(**t)).map(|t| sorted(*t)).collect();
+    sets.sort_unstable();
+    sets.dedup();
+    let mut all = Vec::new();
+    for set in sets {
+        let mut stars = set.map(|v| shop.star(v));
+        let smallest = (0..3).cycle().find(|k| stars[*k].next().is_none()).unwrap_or(0);
+        let first = all.len();
+        all.extend(shop.star(set[smallest]).map(|(t, _)| (set, t)).filter(|(_, t)| sorted(*t) == set));
+        all[first..].sort_unstable();
+    }
+    all
+}
+
+fn sort_out(shop: &Shop, edges: &Edges, pairs: &mut [Pair]) -> Vec<u32> {
     let mut pair_of = vec![chunk::NONE; shop.triangles.len()];
     for (i, pair) in pairs.iter().enumerate() {
         pair.forward.iter().chain(&pair.backward).for_each(|t| pair_of[*t as usize] = i as u32);
@@ -126,7 +154,7 @@ mod tests {
     fn of_a_reversed_copy_the_one_that_fits_stays() {
         // The wrong one comes first: the order in the file does not decide.
         let doubled = [reversed(&cube()[..1]), cube()].concat();
-        let got = after(&doubled, |d, _| drop_duplicates(&mut d.shop));
+        let got = after(&doubled, |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
         assert_eq!((got.result, got.untouched), (1, 12));
         assert!(got.verdict.good, "{:?}", got.verdict);
     }
@@ -135,7 +163,7 @@ mod tests {
     fn a_wall_of_no_thickness_inside_a_body_goes() {
         // Two cubes that touch: both have the face between them, in opposite directions.
         let cubes = [cube(), cuboid([1.0, 0.0, 0.0], [2.0, 1.0, 1.0])].concat();
-        let got = after(&cubes, |d, _| drop_duplicates(&mut d.shop));
+        let got = after(&cubes, |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
         assert_eq!(got.result, 4);
         assert!(got.verdict.good && (got.defects.volume - 2.0).abs() < 1e-9, "{:?}", got.defects);
     }
@@ -143,7 +171,7 @@ mod tests {
     #[test]
     fn of_a_surface_with_both_sides_one_stays() {
         let both = [cube(), reversed(&cube())].concat();
-        let got = after(&both, |d, _| drop_duplicates(&mut d.shop));
+        let got = after(&both, |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
         assert_eq!(got.result, 12);
         assert!(got.verdict.good, "{:?}", got.verdict);
     }
@@ -151,14 +179,14 @@ mod tests {
     #[test]
     fn two_triangles_on_their_own_enclose_nothing() {
         let alone = [&cube()[..1], &reversed(&cube()[..1])].concat();
-        let got = after(&alone, |d, _| drop_duplicates(&mut d.shop));
+        let got = after(&alone, |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
         assert_eq!((got.result, got.defects.triangles), (2, 0));
     }
 
     #[test]
     fn of_equal_copies_the_first_stays() {
         let twice = [cube(), cube()].concat();
-        let got = after(&twice, |d, _| drop_duplicates(&mut d.shop));
+        let got = after(&twice, |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
         assert_eq!((got.result, got.untouched), (12, 12));
         assert!(got.verdict.good);
     }

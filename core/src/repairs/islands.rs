@@ -6,9 +6,9 @@
 use glam::DVec3;
 
 use super::loops::{self, Loop};
+use super::work::Work;
 use crate::boxes::BoxTree;
 use crate::shop::components::{Components, Reversed, Through};
-use crate::shop::edges::Edges;
 use crate::shop::{Origin, Shop, Vertex};
 use crate::sums::Bounds;
 use crate::survey::Survey;
@@ -29,10 +29,10 @@ struct Rim {
 }
 
 /// Joins every island to the smallest hole around it; returns the new triangles.
-pub(super) fn bridge(survey: &Survey<'_>, shop: &mut Shop) -> Vec<u32> {
-    let edges = Edges::of(shop);
-    let components = Components::of(survey, shop, &edges, &Reversed::none(survey), Through::EveryEdge);
-    let mut rims: Vec<Rim> = loops::find(shop, &edges).iter().map(|l| Rim::new(shop, &components, l)).collect();
+pub(super) fn bridge(survey: &Survey<'_>, work: &mut Work<'_>) -> Vec<u32> {
+    let (shop, edges) = work.edges();
+    let components = Components::of(survey, shop, edges, &Reversed::none(survey), Through::EveryEdge);
+    let mut rims: Vec<Rim> = loops::find(shop, edges).iter().map(|l| Rim::new(shop, &components, l)).collect();
     let mut loops_of = vec![0u32; components.list.len()];
     rims.iter().for_each(|r| loops_of[r.component as usize] += 1);
     let tree = BoxTree::new(&rims.iter().map(|r| r.bounds).collect::<Vec<_>>());
@@ -57,9 +57,9 @@ pub(super) fn bridge(survey: &Survey<'_>, shop: &mut Shop) -> Vec<u32> {
     for (hole, island) in pairs {
         let inner = std::mem::take(&mut rims[island].vertices);
         // An island in a hole that is an island's own is for another day: its rim has gone into another one.
-        if let Some((joined, triangles)) = join(shop, &rims[hole].vertices, &inner) {
+        if let Some((joined, triangles)) = join(work, &rims[hole].vertices, &inner) {
             rims[hole].vertices = joined;
-            bridges.extend(triangles.map(|t| shop.add(t, Origin::Patch, crate::chunk::NONE)));
+            bridges.extend(triangles.map(|t| work.add(t, Origin::Patch, crate::chunk::NONE)));
         }
     }
     bridges
@@ -145,12 +145,12 @@ mod tests {
     fn an_island_is_joined_to_the_hole_around_it() {
         let ring = plate(6, |x, y| !(1..5).contains(&x) || !(1..5).contains(&y));
         let island = plate(6, |x, y| (2..4).contains(&x) && (2..4).contains(&y));
-        let got = after(&[ring.clone(), island.clone()].concat(), |d, _| bridge(&d.survey, &mut d.shop).len());
+        let got = after(&[ring.clone(), island.clone()].concat(), |d, _| bridge(&d.survey, &mut Work::new(&mut d.shop)).len());
         // Outer rim, and one loop of hole and island.
         assert_eq!((got.result, got.defects.components, got.defects.boundary_loops), (2, 1, 2));
         assert_eq!((got.defects.nonmanifold_edges, got.defects.inconsistent_edges), (0, 0));
         // Beside the ring it is in no hole.
         let apart = [ring, shifted(&island, [10.0, 0.0, 0.0])].concat();
-        assert_eq!(after(&apart, |d, _| bridge(&d.survey, &mut d.shop).len()).result, 0);
+        assert_eq!(after(&apart, |d, _| bridge(&d.survey, &mut Work::new(&mut d.shop)).len()).result, 0);
     }
 }

@@ -2,24 +2,28 @@
 //! every position).
 
 use super::collinear;
+use super::work::Work;
 use crate::shop::Shop;
-use crate::shop::edges::Edges;
 use crate::shop::near::{self, OnEdge, Tolerance};
 
 /// Splits boundary edges at the vertices that lie on them; returns how many vertices that were.
-pub(super) fn split_edges(shop: &mut Shop, tolerance: &Tolerance) -> u64 {
-    let edges = Edges::of(shop);
-    let on = near::noncommon_vertices(shop, &edges, tolerance);
+pub(super) fn split_edges(work: &mut Work<'_>, tolerance: &Tolerance) -> u64 {
+    let (shop, edges) = work.edges();
+    let on = near::noncommon_vertices(shop, edges, tolerance);
+    if on.is_empty() {
+        return 0;
+    }
+    let edges = work.take_edges();
     let mut count = 0;
     for group in on.chunk_by(|a, b| a.edge == b.edge) {
         let edge = edges.get(group[0].edge as usize);
         let t = edge.uses[0].triangle;
-        if !shop.triangles[t as usize].alive {
+        if !work.triangles[t as usize].alive {
             continue;
         }
-        let stops: Vec<u32> = admissible(shop, t, [edge.low, edge.high], group);
+        let stops: Vec<u32> = admissible(work, t, [edge.low, edge.high], group);
         count += stops.len() as u64;
-        collinear::split(shop, t, [edge.low, edge.high], &stops);
+        collinear::split(work, t, [edge.low, edge.high], &stops);
     }
     count
 }
@@ -54,7 +58,7 @@ mod tests {
         mesh.extend([[a, b, m], [m, b, c]]);
         let got = after(&mesh, |d, _| {
             assert_eq!((d.defects.boundary_edges, d.defects.noncommon_vertices), (3, 1));
-            split_edges(&mut d.shop, &d.tolerance)
+            split_edges(&mut Work::new(&mut d.shop), &d.tolerance)
         });
         // No vertex moved: only the neighbour is replaced.
         assert_eq!((got.result, got.untouched, got.defects.triangles), (1, 12, 14));

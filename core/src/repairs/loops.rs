@@ -157,6 +157,7 @@ fn from_smallest(rims: &[Rim]) -> Loop {
 #[cfg(test)]
 mod tests {
     use super::super::close;
+    use super::super::work::Work;
     use super::*;
     use crate::settings::Profile;
     use crate::testing::{Corners, after, diagnose, plate, records};
@@ -195,7 +196,7 @@ mod tests {
         let profile = Profile { max_hole_edges: 4, ..Profile::default() };
         let got = after(&pinched(), |d, _| {
             assert_eq!(d.defects.nonmanifold_vertices, 1, "a bow-tie");
-            close::fill_loops(&d.survey, &mut d.shop, &profile, 1).loops
+            close::fill_loops(&d.survey, &mut Work::new(&mut d.shop), &profile, 1).loops
         });
         assert_eq!((got.result, got.defects.nonmanifold_vertices, got.defects.boundary_loops), (2, 0, 1));
     }

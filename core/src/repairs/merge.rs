@@ -3,6 +3,7 @@
 //!
 //! A merge that would leave a new non-manifold edge is taken back.
 
+use super::work::Work;
 use crate::chunk;
 use crate::shop::edges::Edges;
 use crate::shop::near::{self, Tolerance};
@@ -19,29 +20,30 @@ pub(super) struct Welded {
 const ATTEMPTS: usize = 4;
 
 /// Welds boundary vertices. O(n log n) in the boundary.
-pub(super) fn weld(shop: &mut Shop, tolerance: &Tolerance) -> Welded {
-    let edges = Edges::of(shop);
-    let mut clusters = clusters(shop, &near::close_pairs(shop, &edges, tolerance), tolerance.weld);
+pub(super) fn weld(work: &mut Work<'_>, tolerance: &Tolerance) -> Welded {
+    let (shop, edges) = work.edges();
+    let mut clusters = clusters(shop, &near::close_pairs(shop, edges, tolerance), tolerance.weld);
     let mut result = Welded::default();
-    let before = shop.triangles.clone();
+    if clusters.is_empty() {
+        return result;
+    }
+    let edges = work.take_edges();
+    let before = work.triangles.clone();
     for _ in 0..ATTEMPTS {
         if clusters.is_empty() {
             return result;
         }
-        let target = targets(shop, &clusters);
-        for triangle in &mut shop.triangles {
-            triangle.v = triangle.v.map(|v| target[v as usize]);
-        }
-        super::duplicates::drop_repeated(shop);
-        shop.relink();
-        super::duplicates::drop_duplicates(shop);
-        let bad = newly_nonmanifold(shop, &edges, &clusters, &target);
+        let target = targets(work, &clusters);
+        work.move_to(&target);
+        super::duplicates::drop_repeated(work);
+        work.relink();
+        super::duplicates::drop_duplicates(work);
+        let bad = newly_nonmanifold(work.edges().1, &edges, &clusters, &target);
         if !bad.iter().any(|b| *b) {
             result.vertices = clusters.iter().map(|c| c.len() as u64 - 1).sum();
             return result;
         }
-        shop.triangles.clone_from(&before);
-        shop.relink();
+        work.restore(&before);
         result.taken_back += bad.iter().filter(|b| **b).count() as u64;
         let mut bad = bad.into_iter();
         clusters.retain(|_| !bad.next().unwrap_or(false));
@@ -98,7 +100,7 @@ fn targets(shop: &Shop, clusters: &[Vec<Vertex>]) -> Vec<Vertex> {
 }
 
 /// Clusters at an edge of more than two triangles that was not one before.
-fn newly_nonmanifold(shop: &Shop, before: &Edges, clusters: &[Vec<Vertex>], target: &[Vertex]) -> Vec<bool> {
+fn newly_nonmanifold(now: &Edges, before: &Edges, clusters: &[Vec<Vertex>], target: &[Vertex]) -> Vec<bool> {
     let mut cluster_of = vec![chunk::NONE; target.len()];
     for (i, cluster) in clusters.iter().enumerate() {
         cluster.iter().for_each(|v| cluster_of[*v as usize] = i as u32);
@@ -111,7 +113,7 @@ fn newly_nonmanifold(shop: &Shop, before: &Edges, clusters: &[Vec<Vertex>], targ
         .collect();
     old.sort_unstable();
     let mut bad = vec![false; clusters.len()];
-    for edge in Edges::of(shop).iter().filter(|e| e.is_nonmanifold()) {
+    for edge in now.iter().filter(|e| e.is_nonmanifold()) {
         if old.binary_search(&(edge.low, edge.high)).is_err() {
             for v in [edge.low, edge.high] {
                 if let Some(b) = bad.get_mut(cluster_of[v as usize] as usize) {
@@ -134,7 +136,7 @@ mod tests {
         let soup: Vec<Corners> = cube().iter().zip(0u8..).flat_map(|(t, i)| shifted(&[*t], [f32::from(i) * 1e-6; 3])).collect();
         let got = after(&soup, |d, _| {
             assert_eq!(d.defects.vertices, 36);
-            weld(&mut d.shop, &d.tolerance)
+            weld(&mut Work::new(&mut d.shop), &d.tolerance)
         });
         assert_eq!((got.result.vertices, got.result.taken_back, got.defects.vertices), (28, 0, 8));
         assert!(got.verdict.good, "{:?}", got.verdict);
@@ -148,7 +150,7 @@ mod tests {
             [[x, 0.0, 0.0], [x, y, 1.0], [x, y, 9.0]]
         };
         let mesh = [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, -9.0, 0.0]], tip(1), tip(2), tip(3)];
-        let got = after(&mesh, |d, _| weld(&mut d.shop, &Tolerance { weld: 1.0, edge_share: 0.25 }));
+        let got = after(&mesh, |d, _| weld(&mut Work::new(&mut d.shop), &Tolerance { weld: 1.0, edge_share: 0.25 }));
         // Four in a row, but not the fifth: both ends of the edge are left.
         assert_eq!(got.result.vertices, 3);
         assert_eq!((got.defects.triangles, got.defects.degenerate_index), (4, 0));
@@ -159,7 +161,7 @@ mod tests {
         let (a, b) = ([0.0; 3], [1.0, 0.0, 0.0]);
         let near = |p: [f32; 3]| [p[0], p[1], 1e-6];
         let mesh = [[a, b, [0.0, 1.0, 0.0]], [b, a, [0.0, -1.0, 0.0]], [near(a), near(b), [0.0, 0.0, 1.0]]];
-        let got = after(&mesh, |d, _| weld(&mut d.shop, &d.tolerance));
+        let got = after(&mesh, |d, _| weld(&mut Work::new(&mut d.shop), &d.tolerance));
         assert_eq!((got.result.vertices, got.result.taken_back), (0, 2));
         assert_eq!((got.defects.nonmanifold_edges, got.untouched), (0, 3));
     }

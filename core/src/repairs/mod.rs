@@ -13,6 +13,7 @@ mod loops;
 mod merge;
 mod orient;
 mod surplus;
+mod work;
 mod zip;
 
 use std::time::Instant;
@@ -20,9 +21,9 @@ use std::time::Instant;
 use crate::engine::Diagnosis;
 use crate::report::{LoopLeft, Repair};
 use crate::settings::Profile;
-use crate::shop::Shop;
 use crate::shop::components::Reversed;
-use crate::shop::edges::Edges;
+use crate::survey::Survey;
+use work::Work;
 
 /// What the repairs did; the mesh itself is in the diagnosis' shop.
 pub(crate) struct Repaired {
@@ -41,10 +42,11 @@ const DUPLICATE: &str = "triangles on the vertices of another one";
 pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usize) -> Repaired {
     let mut log = Log::default();
     let mut reversed = Reversed::none(&diagnosis.survey);
-    log.time("degenerate", DEGENERATE, || duplicates::drop_repeated(&mut diagnosis.shop));
-    log.time("duplicate", DUPLICATE, || duplicates::drop_duplicates(&mut diagnosis.shop));
-    complete_at_seams(diagnosis);
     let Diagnosis { survey, shop, tolerance, .. } = diagnosis;
+    let shop = &mut Work::new(shop);
+    log.time("degenerate", DEGENERATE, || duplicates::drop_repeated(shop));
+    log.time("duplicate", DUPLICATE, || duplicates::drop_duplicates(shop));
+    complete_at_seams(survey, shop);
     for _ in 0..ROUNDS {
         let mut changes = clean(survey, shop, &mut log);
         changes += log.time(
@@ -99,18 +101,18 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
 
 /// Fetches the stars that the removal of surplus surface may need. Duplicates are gone by then: they make non-manifold edges of no
 /// interest.
-fn complete_at_seams(diagnosis: &mut Diagnosis<'_>) {
-    let Diagnosis { survey, shop, .. } = diagnosis;
-    let wanted = surplus::wanted_stars(survey, shop, &Edges::of(shop));
+fn complete_at_seams(survey: &mut Survey<'_>, work: &mut Work<'_>) {
+    let (shop, edges) = work.edges();
+    let wanted = surplus::wanted_stars(survey, shop, edges);
     if !wanted.is_empty() {
         let positions: Vec<[f32; 3]> = wanted.iter().map(|v| shop.positions[*v as usize]).collect();
         let new = survey.promote(&positions);
-        shop.extend(survey, &new, &wanted);
+        work.extend(survey, &new, &wanted);
     }
 }
 
 /// Removes what is not surface: repeated vertices, duplicates, triangles of no area, surplus sheets.
-fn clean(survey: &crate::survey::Survey<'_>, shop: &mut Shop, log: &mut Log) -> u64 {
+fn clean(survey: &Survey<'_>, shop: &mut Work<'_>, log: &mut Log) -> u64 {
     let mut changes = log.time("degenerate", DEGENERATE, || duplicates::drop_repeated(shop) + collinear::remove(shop));
     changes += log.time("duplicate", DUPLICATE, || duplicates::drop_duplicates(shop));
     changes += log

@@ -1,10 +1,10 @@
 //! Coherent orientation over shared edges, then outward by enclosed volume, cavities inward (METHODS A9).
 
+use super::work::Work;
 use crate::bodies;
 use crate::chunk::NONE;
 use crate::shop::Shop;
 use crate::shop::components::{Components, Reversed, Through};
-use crate::shop::edges::Edges;
 use crate::survey::Survey;
 
 /// Union-find with the parity of each node against its root.
@@ -59,8 +59,8 @@ pub(super) struct Turned {
 
 /// Makes two-triangle edges agree: in each connected surface the smaller part is turned, of equal parts the one with the later
 /// triangle. O(patches + workshop).
-pub(super) fn make_coherent(survey: &Survey<'_>, shop: &mut Shop, reversed: &mut Reversed) -> Turned {
-    let edges = Edges::of(shop);
+pub(super) fn make_coherent(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed) -> Turned {
+    let (shop, edges) = work.edges();
     let patches = survey.patches.len() as u32;
     let mut parity = Parity::new(survey.patches.len() + shop.triangles.len());
     for t in shop.living() {
@@ -95,25 +95,27 @@ pub(super) fn make_coherent(survey: &Survey<'_>, shop: &mut Shop, reversed: &mut
         let odd_wins = odd_side.0 > even_side.0 || (odd_side.0 == even_side.0 && odd_side.1 < even_side.1);
         if odd != odd_wins {
             turned.triangles += triangles;
-            turn(survey, shop, reversed, node);
+            turn(survey, work, reversed, node);
         }
     }
     turned
 }
 
 /// Turns a node of the parity structure: a patch or a triangle of the workshop.
-fn turn(survey: &Survey<'_>, shop: &mut Shop, reversed: &mut Reversed, node: u32) {
+fn turn(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed, node: u32) {
     match node.checked_sub(survey.patches.len() as u32) {
         None => reversed.patches[node as usize] ^= true,
-        Some(t) => shop.triangles[t as usize].v.swap(1, 2),
+        Some(t) => work.turn(t),
     }
 }
 
 /// Turns closed components inside out where they enclose negative volume and are no cavity; returns (components, triangles).
-pub(super) fn make_outward(survey: &Survey<'_>, shop: &mut Shop, reversed: &mut Reversed) -> (u64, u64) {
-    let edges = Edges::of(shop);
-    let sheets = Components::of(survey, shop, &edges, reversed, Through::ManifoldEdges);
-    let components = Components::of(survey, shop, &edges, reversed, Through::OpenSheets(&sheets));
+pub(super) fn make_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed) -> (u64, u64) {
+    let (shop, edges) = work.edges();
+    let mut components = Components::of(survey, shop, edges, reversed, Through::ManifoldEdges);
+    if edges.any_nonmanifold() {
+        components = Components::of(survey, shop, edges, reversed, Through::OpenSheets(&components));
+    }
     if components.list.iter().all(|c| c.open || c.extent.volume >= 0) {
         return (0, 0);
     }
@@ -128,7 +130,7 @@ pub(super) fn make_outward(survey: &Survey<'_>, shop: &mut Shop, reversed: &mut 
     }
     for (t, component) in components.of_triangle.iter().enumerate() {
         if *component != NONE && inverted[*component as usize] {
-            shop.triangles[t].v.swap(1, 2);
+            work.turn(t as u32);
         }
     }
     (count, triangles)
@@ -162,14 +164,14 @@ mod tests {
     use crate::testing::{After, Corners, after, cube, cuboid, reversed};
 
     fn outward(triangles: &[Corners]) -> After<(u64, u64)> {
-        after(triangles, |d, turned| make_outward(&d.survey, &mut d.shop, turned))
+        after(triangles, |d, turned| make_outward(&d.survey, &mut Work::new(&mut d.shop), turned))
     }
 
     #[test]
     fn a_flipped_face_is_turned_back() {
         let mut mesh = cube();
         mesh[5] = reversed(&mesh[5..6])[0];
-        let got = after(&mesh, |d, turned| make_coherent(&d.survey, &mut d.shop, turned));
+        let got = after(&mesh, |d, turned| make_coherent(&d.survey, &mut Work::new(&mut d.shop), turned));
         assert_eq!((got.result.triangles, got.result.contradictions, got.untouched), (1, 0, 11));
         assert!(got.verdict.good, "{:?}", got.verdict);
     }

@@ -4,6 +4,7 @@
 //! edges without it: a fin that hangs from a sound surface by one side, or a wall across a body. Smallest area goes first, and the
 //! rest is judged anew. Where as many triangles run one way as the other (bodies that touch along an edge) nothing is surplus.
 
+use super::work::Work;
 use crate::chunk::NONE;
 use crate::shop::components::{Components, Reversed, Through};
 use crate::shop::edges::Edges;
@@ -24,12 +25,12 @@ struct Sheet {
 }
 
 /// Removes surplus sheets; returns how many triangles.
-pub(super) fn remove(survey: &Survey<'_>, shop: &mut Shop) -> u64 {
-    let edges = Edges::of(shop);
-    if !edges.iter().any(|e| e.is_nonmanifold()) {
+pub(super) fn remove(survey: &Survey<'_>, work: &mut Work<'_>) -> u64 {
+    let (shop, edges) = work.edges();
+    if !edges.any_nonmanifold() {
         return 0;
     }
-    let mut sheets = sheets(survey, shop, &edges);
+    let mut sheets = sheets(survey, shop, edges);
     let mut order: Vec<usize> = (0..sheets.len()).filter(|s| !sheets[*s].anchored && !sheets[*s].seams.is_empty()).collect();
     order.sort_by_key(|s| (sheets[*s].area, sheets[*s].triangles.first().copied()));
     // Uses of each edge that are left, in either direction.
@@ -46,7 +47,7 @@ pub(super) fn remove(survey: &Survey<'_>, shop: &mut Shop) -> u64 {
         sheet.seams.sort_unstable();
         if is_surplus(sheet.free, &uses, &sheet.seams) {
             sheet.seams.iter().for_each(|(e, forward)| uses[*e as usize][usize::from(!forward)] -= 1);
-            sheet.triangles.iter().for_each(|t| shop.kill(*t));
+            sheet.triangles.iter().for_each(|t| work.kill(*t));
             removed += sheet.triangles.len() as u64;
         }
     }
@@ -108,7 +109,7 @@ fn sheets(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> Vec<Sheet> {
 
 /// Incomplete vertices of sheets that might be removed: their stars are needed before. A sheet that goes on into sound surface stays.
 pub(super) fn wanted_stars(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> Vec<Vertex> {
-    if !edges.iter().any(|e| e.is_nonmanifold()) {
+    if !edges.any_nonmanifold() {
         return Vec::new();
     }
     let sheets = Components::of(survey, shop, edges, &Reversed::none(survey), Through::ManifoldEdges);
@@ -132,12 +133,14 @@ pub(super) fn wanted_stars(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> V
 #[cfg(test)]
 mod tests {
     use super::super::complete_at_seams;
+    use super::Work;
     use crate::testing::{After, Corners, after, cube, cuboid};
 
     fn removed(triangles: &[Corners]) -> After<u64> {
         after(triangles, |d, _| {
-            complete_at_seams(d);
-            super::remove(&d.survey, &mut d.shop)
+            let work = &mut Work::new(&mut d.shop);
+            complete_at_seams(&mut d.survey, work);
+            super::remove(&d.survey, work)
         })
     }
 

@@ -6,6 +6,7 @@
 
 use glam::DVec3;
 
+use super::work::Work;
 use crate::shop::edges::{Edge, Edges};
 use crate::shop::{self, Shop, Vertex, near};
 
@@ -15,13 +16,13 @@ const FACING: f64 = -0.5;
 const STEADY: f64 = 0.7;
 
 /// Zips gaps narrower than `share` of the shortest edges at their vertices; returns how many vertices were merged into another.
-pub(super) fn zip(shop: &mut Shop, share: f64) -> u64 {
+pub(super) fn zip(work: &mut Work<'_>, share: f64) -> u64 {
     if share <= 0.0 {
         return 0;
     }
-    let edges = Edges::of(shop);
-    let vertices = near::boundary_vertices(&edges);
-    let outward = ends(shop, &edges);
+    let (shop, edges) = work.edges();
+    let vertices = near::boundary_vertices(edges);
+    let outward = ends(shop, edges);
     let reach: Vec<f64> = vertices.iter().map(|v| shop.shortest_edge(*v) * share).collect();
     let nearest = near::nearest_apart(shop, &vertices, &reach);
     let mut pairs: Vec<(f64, Vertex, Vertex)> = Vec::new();
@@ -37,9 +38,9 @@ pub(super) fn zip(shop: &mut Shop, share: f64) -> u64 {
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
     let mut merged = 0;
     for (_, v, w) in pairs {
-        let (stay, go) = if shop.star(w).count() > shop.star(v).count() { (w, v) } else { (v, w) };
-        if may_merge(shop, stay, go) {
-            shop.merge(stay, go);
+        let (stay, go) = if work.star(w).count() > work.star(v).count() { (w, v) } else { (v, w) };
+        if may_merge(work, stay, go) {
+            work.merge(stay, go);
             merged += 1;
         }
     }
@@ -105,7 +106,7 @@ mod tests {
 
     #[test]
     fn rims_that_face_each_other_across_a_narrow_gap_are_joined() {
-        let zipped = |gap: f32, share: f64| after(&slit(gap), |d, _| zip(&mut d.shop, share));
+        let zipped = |gap: f32, share: f64| after(&slit(gap), |d, _| zip(&mut Work::new(&mut d.shop), share));
         let got = zipped(0.125, 0.35);
         // Only the rim of the plate is left.
         assert_eq!((got.result, got.defects.boundary_loops, got.defects.boundary_edges), (3, 1, 16));
@@ -119,6 +120,6 @@ mod tests {
         // As near as above, but both surfaces end in the same direction.
         let bottom = reversed(&plate(2, |_, _| true));
         let top = shifted(&plate(2, |_, _| true), [0.0, 0.0, 0.125]);
-        assert_eq!(after(&[bottom, top].concat(), |d, _| zip(&mut d.shop, 0.35)).result, 0);
+        assert_eq!(after(&[bottom, top].concat(), |d, _| zip(&mut Work::new(&mut d.shop), 0.35)).result, 0);
     }
 }

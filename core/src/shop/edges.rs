@@ -48,6 +48,7 @@ pub(crate) struct Edges {
     ends: Vec<(Vertex, Vertex)>,
     starts: Vec<u32>,
     uses: Vec<Use>,
+    any_nonmanifold: bool,
 }
 
 impl Edges {
@@ -76,8 +77,12 @@ impl Edges {
             table[at[low as usize] as usize] = (high, used);
             at[low as usize] += 1;
         });
-        let mut edges =
-            Self { ends: Vec::with_capacity(table.len() / 2), starts: vec![0], uses: Vec::with_capacity(table.len()) };
+        let mut edges = Self {
+            ends: Vec::with_capacity(table.len() / 2),
+            starts: vec![0],
+            uses: Vec::with_capacity(table.len()),
+            any_nonmanifold: false,
+        };
         for low in 0..shop.positions.len() {
             let part = &mut table[starts[low] as usize..starts[low + 1] as usize];
             part.sort_unstable_by_key(|(high, used)| (*high, used.triangle));
@@ -85,6 +90,7 @@ impl Edges {
                 edges.ends.push((low as Vertex, group[0].0));
                 edges.uses.extend(group.iter().map(|g| g.1));
                 edges.starts.push(edges.uses.len() as u32);
+                edges.any_nonmanifold |= group.len() > 2;
             }
         }
         edges
@@ -92,6 +98,11 @@ impl Edges {
 
     pub(crate) fn len(&self) -> usize {
         self.ends.len()
+    }
+
+    /// Is there an edge of more than two triangles?
+    pub(crate) fn any_nonmanifold(&self) -> bool {
+        self.any_nonmanifold
     }
 
     pub(crate) fn get(&self, i: usize) -> Edge<'_> {

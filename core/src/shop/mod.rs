@@ -169,10 +169,13 @@ impl Shop {
 
     /// Living triangles with three distinct vertices, by number.
     pub(crate) fn living(&self) -> impl Iterator<Item = u32> + '_ {
-        (0..self.triangles.len() as u32).filter(|t| {
-            let t = &self.triangles[*t as usize];
-            t.alive && !has_repeated(t.v)
-        })
+        (0..self.triangles.len() as u32).filter(|t| self.lives(*t))
+    }
+
+    /// A living triangle with three distinct vertices.
+    pub(crate) fn lives(&self, t: u32) -> bool {
+        let t = &self.triangles[t as usize];
+        t.alive && !has_repeated(t.v)
     }
 
     /// Living triangles around `v`, each with the number of `v`'s corner.

@@ -1,0 +1,164 @@
+//! The workshop while it is repaired: changed by way of here only, so that what is known of it is known to be true.
+//!
+//! The edges are made when they are asked for and kept until something changes. What was changed is noted, so that a pass which
+//! has seen everything once looks only at what is new to it the next time.
+
+use std::ops::Deref;
+
+use crate::chunk::Suspect;
+use crate::shop::edges::Edges;
+use crate::shop::{Origin, Shop, Triangle, Vertex};
+use crate::survey::Survey;
+
+/// A pass that makes sure of something about every triangle, or every set of three vertices, which holds until one of the triangles
+/// gets another vertex.
+#[derive(Clone, Copy)]
+pub(super) enum Pass {
+    Repeated,
+    Collinear,
+    Copies,
+}
+
+/// The workshop under repair. Reading goes through to it; what changes it goes through here.
+pub(super) struct Work<'a> {
+    shop: &'a mut Shop,
+    edges: Option<Edges>,
+    /// Triangles as they were added or got another vertex.
+    changed: Vec<u32>,
+    /// How many of these each pass has seen; `None`: it has to look at everything.
+    seen: [Option<usize>; 3],
+}
+
+impl Deref for Work<'_> {
+    type Target = Shop;
+
+    fn deref(&self) -> &Shop {
+        self.shop
+    }
+}
+
+impl<'a> Work<'a> {
+    pub(super) fn new(shop: &'a mut Shop) -> Self {
+        Self { shop, edges: None, changed: Vec::new(), seen: [None; 3] }
+    }
+
+    /// The mesh with its edges. O(workshop) after a change, O(1) else.
+    pub(super) fn edges(&mut self) -> (&Shop, &Edges) {
+        let edges = self.edges.get_or_insert_with(|| Edges::of(self.shop));
+        (self.shop, edges)
+    }
+
+    /// The edges as they are now, to be kept while the mesh changes.
+    pub(super) fn take_edges(&mut self) -> Edges {
+        self.edges.take().unwrap_or_else(|| Edges::of(self.shop))
+    }
+
+    /// What may have changed since `pass` asked last, ascending, each once; `None`: it has to look at everything.
+    pub(super) fn changed_for(&mut self, pass: Pass) -> Option<Vec<u32>> {
+        let seen = self.seen[pass as usize].replace(self.changed.len())?;
+        let mut changed = self.changed[seen..].to_vec();
+        changed.sort_unstable();
+        changed.dedup();
+        Some(changed)
+    }
+
+    pub(super) fn kill(&mut self, t: u32) {
+        self.edges = None;
+        self.shop.kill(t);
+    }
+
+    /// Adds a triangle and returns its number.
+    pub(super) fn add(&mut self, v: [Vertex; 3], origin: Origin, patch: u32) -> u32 {
+        self.edges = None;
+        let t = self.shop.add(v, origin, patch);
+        self.changed.push(t);
+        t
+    }
+
+    /// Lets all triangles of `go` use `stay` instead.
+    pub(super) fn merge(&mut self, stay: Vertex, go: Vertex) {
+        self.edges = None;
+        self.changed.extend(self.shop.star(go).map(|(t, _)| t));
+        self.shop.merge(stay, go);
+    }
+
+    /// Turns a triangle over.
+    pub(super) fn turn(&mut self, t: u32) {
+        self.edges = None;
+        self.shop.triangles[t as usize].v.swap(1, 2);
+    }
+
+    /// Lets all triangles use `target[v]` instead of `v`. Their star lists are as they were until [`Self::relink`].
+    pub(super) fn move_to(&mut self, target: &[Vertex]) {
+        self.edges = None;
+        for (triangle, t) in self.shop.triangles.iter_mut().zip(0..) {
+            let v = triangle.v.map(|v| target[v as usize]);
+            if v != triangle.v {
+                triangle.v = v;
+                self.changed.push(t);
+            }
+        }
+    }
+
+    pub(super) fn relink(&mut self) {
+        self.shop.relink();
+    }
+
+    /// Puts all triangles back to what they were.
+    pub(super) fn restore(&mut self, before: &[Triangle]) {
+        self.edges = None;
+        self.seen = [None; 3];
+        self.shop.triangles.clear();
+        self.shop.triangles.extend_from_slice(before);
+        self.shop.relink();
+    }
+
+    /// Takes in what [`Survey::promote`] has found for some incomplete vertices, which become complete.
+    pub(super) fn extend(&mut self, survey: &Survey<'_>, new: &[(Suspect, u32)], completed: &[Vertex]) {
+        self.edges = None;
+        let first = self.shop.triangles.len() as u32;
+        self.shop.extend(survey, new, completed);
+        self.changed.extend(first..self.shop.triangles.len() as u32);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chunk::NONE;
+    use crate::testing::{diagnose, plate, records};
+
+    #[test]
+    fn a_pass_sees_everything_once_and_then_what_changed() {
+        let records = records(&plate(2, |_, _| true));
+        let mut d = diagnose(&records);
+        let mut work = Work::new(&mut d.shop);
+        assert_eq!(work.changed_for(Pass::Copies), None);
+        assert_eq!(work.changed_for(Pass::Copies), Some(vec![]));
+        let t = work.add([0, 1, 2], Origin::Patch, NONE);
+        assert_eq!(work.changed_for(Pass::Copies), Some(vec![t]));
+        assert_eq!(work.changed_for(Pass::Collinear), None, "each pass by itself");
+        let moved: Vec<u32> = work.star(3).map(|(t, _)| t).collect();
+        work.merge(0, 3);
+        assert_eq!(work.changed_for(Pass::Copies).map(|c| c.len()), Some(moved.len()));
+        let before = work.triangles.clone();
+        work.restore(&before);
+        assert_eq!(work.changed_for(Pass::Copies), None, "what was taken back has to be looked at anew");
+    }
+
+    #[test]
+    fn edges_are_those_of_the_mesh_as_it_is() {
+        let records = records(&plate(2, |_, _| true));
+        let mut d = diagnose(&records);
+        let mut work = Work::new(&mut d.shop);
+        let boundary = |work: &mut Work<'_>| work.edges().1.iter().filter(|e| e.is_boundary()).count();
+        assert_eq!(boundary(&mut work), 8);
+        work.kill(0);
+        // One of its edges was the rim's, the others are the rim's now.
+        assert_ne!(boundary(&mut work), 8);
+        let disagreeing = |work: &mut Work<'_>| work.edges().1.iter().filter(|e| e.is_inconsistent()).count();
+        assert_eq!(disagreeing(&mut work), 0);
+        work.turn(3);
+        assert_ne!(disagreeing(&mut work), 0);
+    }
+}

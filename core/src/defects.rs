@@ -1,6 +1,5 @@
 //! Counts the defects of a mesh from its survey and its untouched workshop. Definitions: `core/DEFECTS.md`.
 
-use crate::bodies;
 use crate::report::Defects;
 use crate::shop::Shop;
 use crate::shop::components::{self, Components, Reversed, Through};
@@ -8,13 +7,21 @@ use crate::shop::edges::Edges;
 use crate::shop::near::{self, Tolerance};
 use crate::sums::Extent;
 use crate::survey::Survey;
+use crate::{bodies, parallel, radix};
+
+/// Workshops of fewer triangles are counted by one thread: starting another would take longer.
+const COUNTED_BY_ONE: usize = 4096;
 
 /// All counts of one file. The workshop must be as gathered.
 pub(crate) fn count(survey: &Survey<'_>, shop: &Shop, edges: &Edges, tolerance: &Tolerance) -> Defects {
     let reversed = Reversed::none(survey);
-    let components = Components::of(survey, shop, edges, &reversed, Through::EveryEdge);
+    let threads = if shop.triangles.len() < COUNTED_BY_ONE { 1 } else { survey.threads() };
+    let (components, by_edges) = parallel::both(
+        threads,
+        || Components::of(survey, shop, edges, &reversed, Through::EveryEdge),
+        || count_by_edges(shop, edges, tolerance),
+    );
     let degenerate_index = shop.triangles.len() as u64 - shop.living().count() as u64;
-    let (duplicates_same, duplicates_opposite) = duplicates(shop);
     let uses: usize = edges.iter().map(|e| e.uses.len()).sum();
     let topology = survey.triangles() - degenerate_index;
     let total =
@@ -33,6 +40,24 @@ pub(crate) fn count(survey: &Survey<'_>, shop: &Shop, edges: &Edges, tolerance: 
         // Edges without a complete end have two triangles each.
         edges: edges.len() as u64 + (3 * topology - uses as u64) / 2,
         degenerate_index,
+        components: components.list.len() as u64,
+        self_intersections: survey.self_intersections.clone(),
+        bounds: (!survey.bounds.is_empty()).then_some([survey.bounds.lo, survey.bounds.hi]),
+        area: survey.measure.area(total),
+        volume: survey.measure.volume(total),
+        ..by_edges
+    };
+    if defects.boundary_edges + defects.nonmanifold_edges + defects.nonmanifold_vertices == 0 {
+        defects.euler = Some(defects.vertices_used as i64 - defects.edges as i64 + topology as i64);
+    }
+    count_bodies(survey, shop, &components, &reversed, &mut defects);
+    defects
+}
+
+/// What the workshop's edges and triangles tell without what hangs together beyond it.
+fn count_by_edges(shop: &Shop, edges: &Edges, tolerance: &Tolerance) -> Defects {
+    let (duplicates_same, duplicates_opposite) = duplicates(shop);
+    Defects {
         degenerate_area: shop.living().filter(|t| shop.is_collinear(*t)).count() as u64,
         duplicates_same,
         duplicates_opposite,
@@ -42,20 +67,10 @@ pub(crate) fn count(survey: &Survey<'_>, shop: &Shop, edges: &Edges, tolerance: 
         nonmanifold_vertices: components::nonmanifold_vertices(shop, edges).len() as u64,
         inconsistent_edges: edges.iter().filter(|e| e.is_inconsistent()).count() as u64,
         unbalanced_edges: edges.iter().filter(|e| e.is_unbalanced()).count() as u64,
-        components: components.list.len() as u64,
-        self_intersections: survey.self_intersections.clone(),
-        bounds: (!survey.bounds.is_empty()).then_some([survey.bounds.lo, survey.bounds.hi]),
-        area: survey.measure.area(total),
-        volume: survey.measure.volume(total),
         noncommon_vertices: near::noncommon_vertices(shop, edges, tolerance).len() as u64,
         weldable_vertices: near::weldable_vertices(shop, edges, tolerance).len() as u64,
         ..Defects::default()
-    };
-    if defects.boundary_edges + defects.nonmanifold_edges + defects.nonmanifold_vertices == 0 {
-        defects.euler = Some(defects.vertices_used as i64 - defects.edges as i64 + topology as i64);
     }
-    count_bodies(survey, shop, &components, &reversed, &mut defects);
-    defects
 }
 
 fn count_bodies(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed: &Reversed, defects: &mut Defects) {
@@ -82,7 +97,8 @@ pub(crate) fn by_vertex_set(shop: &Shop) -> Vec<([u32; 3], u32)> {
             (v, t)
         })
         .collect();
-    keys.sort_unstable();
+    radix::sort_by_number(&mut keys, |(v, _)| v[0]);
+    keys.chunk_by_mut(|a, b| a.0[0] == b.0[0]).for_each(<[_]>::sort_unstable);
     keys
 }
 

@@ -26,6 +26,7 @@ mod machine;
 mod members;
 mod parallel;
 mod plan;
+mod radix;
 pub mod read;
 pub mod record;
 mod repairs;

@@ -19,7 +19,7 @@ use crate::settings::Limits;
 use crate::source::{Source, Triangle};
 use crate::sums::{Bounds, Measure};
 use crate::weld::Weld;
-use crate::{Progress, edit};
+use crate::{Progress, edit, radix};
 
 /// Topology of the sound part of a file, and the list of what is not sound.
 #[derive(Debug)]
@@ -142,6 +142,11 @@ impl<'a> Survey<'a> {
     /// Triangles with finite coordinates.
     pub(crate) fn triangles(&self) -> u64 {
         self.records.len() as u64 - self.nonfinite.iter().map(|r| u64::from(r.1)).sum::<u64>()
+    }
+
+    /// Threads to work with.
+    pub(crate) fn threads(&self) -> usize {
+        self.threads
     }
 
     /// Asks the disk for these records, which are about to be looked at.
@@ -280,7 +285,7 @@ struct Merge {
 }
 
 impl Merge {
-    /// Unites patches that share a triangle. O(seam + suspects + patches), sorted.
+    /// Unites patches that share a triangle. O(seam + suspects), and the patches are sorted.
     fn of(records: &[Record], measure: &Measure, chunks: &mut [ChunkTopology]) -> Self {
         let _span = tracing::debug_span!("merge").entered();
         let mut bases = vec![0u32];
@@ -294,13 +299,13 @@ impl Merge {
             suspects.append(&mut std::mem::take(&mut chunk.suspects));
             bases.push(sums.len() as u32);
         }
-        suspects.sort_unstable();
+        radix::sort_by_number(&mut suspects, |s| s.triangle);
         suspects.dedup_by(|b, a| {
             let same = a.triangle == b.triangle;
             a.unsound |= if same { b.unsound } else { 0 };
             same
         });
-        links.sort_unstable_by_key(|l| l.triangle);
+        radix::sort_by_number(&mut links, |l| l.triangle);
         let mut parents: Vec<u32> = (0..sums.len() as u32).collect();
         for pair in links.windows(2) {
             if pair[0].triangle == pair[1].triangle {

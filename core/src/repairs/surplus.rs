@@ -69,18 +69,6 @@ fn is_surplus(free: bool, uses: &[[u32; 2]], own: &[(u32, bool)]) -> bool {
     wrong
 }
 
-/// The triangle's edges of more than two triangles, and the direction in which it runs through them.
-fn nonmanifold_uses(shop: &Shop, edges: &Edges, t: u32) -> Vec<(u32, bool)> {
-    let v = shop.triangles[t as usize].v;
-    (0..3)
-        .filter_map(|k| {
-            let (a, b) = (v[k], v[(k + 1) % 3]);
-            let e = edges.number(a, b)?;
-            edges.get(e as usize).is_nonmanifold().then_some((e, a < b))
-        })
-        .collect()
-}
-
 fn sheets(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> Vec<Sheet> {
     let parts = Components::of(survey, shop, edges, &Reversed::none(survey), Through::ManifoldEdges);
     let mut sheets: Vec<Sheet> = parts
@@ -96,9 +84,13 @@ fn sheets(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> Vec<Sheet> {
         if component != NONE {
             let sheet = &mut sheets[component as usize];
             sheet.triangles.push(t);
-            sheet.seams.extend(nonmanifold_uses(shop, edges, t));
             // Beyond an incomplete vertex the surface goes on outside the workshop.
             sheet.anchored |= shop.triangles[t as usize].v.iter().filter(|v| !shop.complete[**v as usize]).count() > 1;
+        }
+    }
+    for (edge, number) in edges.iter().zip(0..).filter(|(e, _)| e.is_nonmanifold()) {
+        for used in edge.uses {
+            sheets[parts.of_triangle[used.triangle as usize] as usize].seams.push((number, used.forward));
         }
     }
     for edge in edges.iter().filter(|e| e.is_boundary()) {

@@ -47,7 +47,7 @@ pub(crate) fn surroundings(survey: &Survey<'_>, shop: &Shop, components: &Compon
     let grid = Grid::new(&rays);
 
     let mut counts = vec![0i32; rays.iter().map(|r| r.candidates.len()).sum()];
-    let is_asked = |patch: u32| asked[components.of_patch[patch as usize] as usize];
+    let is_asked = |patch: u32| asked.get(components.of_patch[patch as usize] as usize) == Some(&true);
     let per_chunk = survey.visit_sound(
         is_asked,
         |reach| Over::new(&rays, &grid, reach).map(|over| (over, Vec::new())),

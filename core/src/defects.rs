@@ -23,7 +23,7 @@ pub(crate) fn count(survey: &Survey<'_>, shop: &Shop, edges: &Edges, tolerance: 
     );
     let degenerate_index = shop.triangles.len() as u64 - shop.living().count() as u64;
     let uses: usize = edges.iter().map(|e| e.uses.len()).sum();
-    let topology = survey.triangles() - degenerate_index;
+    let topology = survey.triangles - degenerate_index;
     let total =
         survey.patches.iter().map(|p| p.extent).chain(shop.living().map(|t| survey.measure.triangle(&shop.points(t)))).fold(
             Extent::default(),
@@ -33,8 +33,8 @@ pub(crate) fn count(survey: &Survey<'_>, shop: &Shop, edges: &Edges, tolerance: 
             },
         );
     let mut defects = Defects {
-        triangles: survey.triangles(),
-        nonfinite: survey.records.len() as u64 - survey.triangles(),
+        triangles: survey.triangles,
+        nonfinite: survey.nonfinite.iter().map(|r| u64::from(r.1)).sum(),
         vertices: survey.vertices,
         vertices_used: survey.vertices_used,
         // Edges without a complete end have two triangles each.

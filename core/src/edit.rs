@@ -110,13 +110,19 @@ impl Edit {
         self.changes.is_empty() && self.flips == 0 && self.added.is_empty()
     }
 
+    /// Input records that do not stay as they are.
+    pub(crate) fn gone(&self) -> u64 {
+        let moved = self.changes.iter().filter(|c| matches!(c.1, Change::Move(_))).count() as u64;
+        self.deletions + self.flips + moved
+    }
+
     /// Records in the output.
     pub(crate) fn output_records(&self, input_records: usize) -> u64 {
         input_records as u64 - self.deletions + self.added.len() as u64
     }
 
     /// Walks through the input in order: runs of untouched records, then what becomes of the one that follows.
-    pub(crate) fn walk<E>(&self, records: &[Record], mut step: impl FnMut(Step<'_>) -> Result<(), E>) -> Result<(), E> {
+    pub(crate) fn walk<'r, E>(&'r self, records: &'r [Record], mut step: impl FnMut(Step<'r>) -> Result<(), E>) -> Result<(), E> {
         let mut changes = self.changes.iter().peekable();
         let mut start = 0;
         let mut at = 0;
@@ -129,22 +135,20 @@ impl Edit {
             if next > start {
                 step(Step::Untouched(&records[start..next]))?;
             }
-            if next == next_change {
-                match changes.next().map(|c| &c.1) {
-                    Some(Change::Flip) => step(Step::Changed(&record::flip(&records[next])))?,
-                    Some(Change::Move(record)) => step(Step::Changed(record))?,
-                    Some(Change::Delete) | None => {}
-                }
-            } else {
-                step(Step::Changed(&record::flip(&records[next])))?;
-            }
+            let place = next as u32;
+            let flipped = || Step::Changed(place, record::flip(&records[next]));
+            step(match changes.next_if(|c| c.0 == place).map(|c| &c.1) {
+                Some(Change::Flip) | None => flipped(),
+                Some(Change::Move(record)) => Step::Changed(place, **record),
+                Some(Change::Delete) => Step::Deleted(place),
+            })?;
             at = next + 1;
             start = at;
         }
         if start < records.len() {
             step(Step::Untouched(&records[start..]))?;
         }
-        self.added.iter().try_for_each(|record| step(Step::Changed(record)))
+        self.added.iter().try_for_each(|record| step(Step::Added(record)))
     }
 
     /// The first record from `at` on whose patch is reversed, or past the end.
@@ -163,12 +167,12 @@ impl Edit {
     }
 
     pub(crate) fn summary(&self, input_records: usize) -> EditSummary {
-        let moved = self.changes.iter().filter(|c| matches!(c.1, Change::Move(_))).count() as u64;
+        let gone = self.gone();
         EditSummary {
-            untouched: input_records as u64 - self.deletions - self.flips - moved,
+            untouched: input_records as u64 - gone,
             deleted: self.deletions,
             flipped: self.flips,
-            moved,
+            moved: gone - self.deletions - self.flips,
             added: self.added.len() as u64,
             max_move: self.max_move,
         }
@@ -197,10 +201,13 @@ impl Edit {
     }
 }
 
-/// A stretch of the output.
+/// What becomes of the input's records, one stretch after the other, and then what is added.
 pub(crate) enum Step<'a> {
     Untouched(&'a [Record]),
-    Changed(&'a Record),
+    /// What stands in for the record of this number.
+    Changed(u32, Record),
+    Deleted(u32),
+    Added(&'a Record),
 }
 
 /// Adds the next number to inclusive ranges.

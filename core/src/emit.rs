@@ -34,7 +34,9 @@ pub(crate) fn write(mesh: &MeshFile, edit: &Edit, output: &Path, limits: &Limits
     sink.put(&count.to_le_bytes())?;
     edit.walk(records, |step| match step {
         Step::Untouched(run) => sink.put_run(run),
-        Step::Changed(record) => sink.put(record),
+        Step::Changed(_, record) => sink.put(&record),
+        Step::Deleted(_) => Ok(()),
+        Step::Added(record) => sink.put(record),
     })?;
     sink.finish(limits)
 }

@@ -17,7 +17,7 @@ use crate::shop::near::Tolerance;
 use crate::space::{self, Need};
 use crate::sums::Bounds;
 use crate::survey::Survey;
-use crate::{Progress, cost, defects, emit, members, parallel, repairs, verdict};
+use crate::{Progress, cost, defects, emit, members, parallel, readback, repairs, second, verdict};
 
 /// Fewer bytes are hashed by one thread: starting more would take longer.
 const HASHED_BY_ONE: usize = 1 << 20;
@@ -76,10 +76,15 @@ impl<'a> Diagnosis<'a> {
     ) -> Result<Self> {
         let survey = Survey::new(path, records, profile.check_self_intersections, limits, progress)?;
         let shop = Shop::gather(&survey);
+        Ok(Self::count(survey, shop, profile))
+    }
+
+    /// Of a workshop that is as gathered.
+    pub(crate) fn count(survey: Survey<'a>, shop: Shop, profile: &Profile) -> Self {
         let edges = Edges::of(&shop);
         let tolerance = tolerance(&survey, profile);
         let defects = defects::count(&survey, &shop, &edges, &tolerance);
-        Ok(Self { survey, shop, tolerance, defects })
+        Self { survey, shop, tolerance, defects }
     }
 
     /// The box of all triangles that have an area.
@@ -177,8 +182,8 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
         report.repairs = repaired.repairs;
         report.loops_left = repaired.loops_left;
     }
-    // The survey of the input is not needed any more; its memory is, for that of the output.
-    drop(diagnosis);
+    // Of the input's survey, the second look may go on; the memory of its workshop is needed for that of the output.
+    let survey = diagnosis.survey;
     // Good as it came, or nothing in it could be repaired.
     let same = edit.is_empty() && flaws(&mesh).is_empty();
     let (hash, written) = hash_beside(&mesh, limits, || match same {
@@ -189,11 +194,11 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     clock.lap("emit");
     report.edit = edit.summary(mesh.records().len());
     report.edit_records = limits.list_edit.then(|| edit.listed());
-    drop(edit);
     if same {
+        drop(survey);
         confirm_copy(&mut report, &mesh, output, limits, progress)?;
     } else {
-        verify(&mut report, &mesh, &surface, output, limits, progress)?;
+        verify(&mut report, &mesh, &surface, (survey, edit), output, limits, progress)?;
     }
     written.durable()?;
     clock.lap("verify");
@@ -229,6 +234,7 @@ fn verify(
     report: &mut Report,
     input: &MeshFile,
     surface: &Bounds,
+    known: (Survey<'_>, Edit),
     output: &Path,
     limits: &Limits,
     progress: &dyn Progress,
@@ -243,12 +249,12 @@ fn verify(
         }
         other => other?,
     };
-    let facts = facts(&written, hash(&written, limits, progress));
-    let diagnosis = Diagnosis::of(output, written.records(), &report.profile, limits, progress)?;
-    report.verdict = verdict::judge(&diagnosis.defects, &flaws(&written));
+    let (blake3, defects) = look_again(input, known, &written, &report.profile, limits, progress)?;
+    let facts = facts(&written, blake3);
+    report.verdict = verdict::judge(&defects, &flaws(&written));
     report.outcome = if report.verdict.good { Outcome::Repaired } else { Outcome::NotGood };
     if report.verdict.good {
-        let mut concerns = verdict::review(&report.before, surface, &diagnosis.defects, &report.profile);
+        let mut concerns = verdict::review(&report.before, surface, &defects, &report.profile);
         if report.before.boundary_edges > 0 {
             // What was closed had to be guessed: nobody knows what stood in the part that is missing.
             concerns.extend(input.findings().iter().filter(|f| f.loss).map(|f| format!("a part is missing: {}", f.text)));
@@ -258,9 +264,34 @@ fn verify(
             report.verdict.reasons = concerns;
         }
     }
-    report.after = Some(diagnosis.defects);
+    report.after = Some(defects);
     report.output = Some(facts);
     Ok(())
+}
+
+/// The hash and the defects of a written file: by its difference from the input, or, where that does not tell or is too large, by a survey
+/// of its own.
+fn look_again(
+    input: &MeshFile,
+    (survey, edit): (Survey<'_>, Edit),
+    written: &MeshFile,
+    profile: &Profile,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> Result<(String, Defects)> {
+    let blake3 = if second::is_worthwhile(edit.gone(), edit.added.len() as u64, input.records().len()) {
+        let (blake3, difference) = readback::compare(input.records(), &edit, written, limits, progress)?;
+        drop(edit);
+        if let Some((survey, shop)) = second::look(survey, &difference, limits) {
+            return Ok((blake3, Diagnosis::count(survey, shop, profile).defects));
+        }
+        blake3
+    } else {
+        drop((survey, edit));
+        hash(written, limits, progress)
+    };
+    let diagnosis = Diagnosis::of(written.path(), written.records(), profile, limits, progress)?;
+    Ok((blake3, diagnosis.defects))
 }
 
 /// Opens a mesh file.
@@ -287,7 +318,7 @@ fn facts(mesh: &MeshFile, blake3: String) -> FileFacts {
 /// Hashes the input while `write`, which keeps one thread busy at most, is under way; before it where there is but one thread.
 fn hash_beside<R>(mesh: &MeshFile, limits: &Limits, write: impl FnOnce() -> Result<R>) -> Result<(String, R)> {
     if limits.threads < 2 || mesh.bytes().len() < HASHED_BY_ONE {
-        let hash = blake3::hash(mesh.bytes()).to_hex().to_string();
+        let hash = hash_blocks(mesh.bytes(), limits, Hasher::update);
         return write().map(|written| (hash, written));
     }
     std::thread::scope(|scope| {
@@ -301,8 +332,8 @@ fn hash_beside<R>(mesh: &MeshFile, limits: &Limits, write: impl FnOnce() -> Resu
 fn hash(mesh: &MeshFile, limits: &Limits, progress: &dyn Progress) -> String {
     let bytes = mesh.bytes();
     progress.at("hash", 0, mesh.records().len() as u64);
-    if bytes.len() < HASHED_BY_ONE {
-        return blake3::hash(bytes).to_hex().to_string();
+    if limits.threads < 2 || bytes.len() < HASHED_BY_ONE {
+        return hash_blocks(bytes, limits, Hasher::update);
     }
     parallel::in_pool(limits.threads, || hash_blocks(bytes, limits, Hasher::update_rayon))
 }

@@ -18,6 +18,8 @@ mod emit;
 mod engine;
 pub mod error;
 pub mod fill;
+mod fresh;
+mod grid;
 #[cfg(any(test, feature = "internals"))]
 #[doc(hidden)]
 pub mod internals;
@@ -28,9 +30,11 @@ mod parallel;
 mod plan;
 mod radix;
 pub mod read;
+mod readback;
 pub mod record;
 mod repairs;
 pub mod report;
+mod second;
 pub mod settings;
 mod shop;
 mod source;

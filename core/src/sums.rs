@@ -18,6 +18,14 @@ impl Default for Bounds {
 impl Bounds {
     pub(crate) const EMPTY: Self = Self { lo: [f32::INFINITY; 3], hi: [f32::NEG_INFINITY; 3] };
 
+    /// Around some points.
+    #[inline(always)]
+    pub(crate) fn of(points: &[[f32; 3]]) -> Self {
+        let mut bounds = Self::EMPTY;
+        bounds.include(points);
+        bounds
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.lo[0] > self.hi[0]
     }

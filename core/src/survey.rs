@@ -9,14 +9,15 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::ahead::Guide;
 use crate::budget::{Budget, Purpose};
 use crate::chunk::{self, ChunkTopology, Labels, Link, NONE, Patch, Scratch, Suspect};
-use crate::crossings::{self, Crossings};
+use crate::crossings::{self, Crossings, Pair};
 use crate::error::{Error, Result};
+use crate::grid::Grid;
 use crate::members::Members;
-use crate::plan::{ChunkId, Plan};
+use crate::plan::{ChunkId, HomeBox, Plan};
 use crate::record::{self, Record};
 use crate::report::SelfIntersections;
 use crate::settings::Limits;
-use crate::source::{Source, Triangle};
+use crate::source::{Seen, Source, Triangle};
 use crate::sums::{Bounds, Measure};
 use crate::weld::Weld;
 use crate::{Progress, edit, radix};
@@ -35,8 +36,14 @@ pub(crate) struct Survey<'a> {
     pub(crate) patches: Vec<Patch>,
     /// Runs of triangles with non-finite coordinates.
     pub(crate) nonfinite: Vec<(u32, u32)>,
+    /// Triangles with finite coordinates.
+    pub(crate) triangles: u64,
     /// `None` if they were not looked for.
     pub(crate) self_intersections: Option<SelfIntersections>,
+    /// All of their pairs, unless there are too many to keep.
+    pub(crate) crossing_pairs: Option<Vec<Pair>>,
+    /// Sound vertices whose triangles were made suspects.
+    pub(crate) promoted: Vec<[f32; 3]>,
     /// Distinct positions, and those used by a triangle with three distinct vertices.
     pub(crate) vertices: u64,
     pub(crate) vertices_used: u64,
@@ -82,7 +89,7 @@ impl<'a> Survey<'a> {
 
         let most_tested = crossings::most_tested(records.len() as u64);
         let _span = tracing::debug_span!("chunks", count = plan.chunks()).entered();
-        let [done, suspects, patches, tested] = [const { AtomicU64::new(0) }; 4];
+        let [done, suspects, patches, tested, kept] = [const { AtomicU64::new(0) }; 5];
         let mut chunks = members.each(
             (records, &guide, &plan),
             limits.threads,
@@ -99,6 +106,7 @@ impl<'a> Survey<'a> {
                     let allowance = most_tested.saturating_sub(tested.load(Ordering::Relaxed));
                     topology.crossings = scratch.cross(visitors, cell, allowance);
                     tested.fetch_add(topology.crossings.tested, Ordering::Relaxed);
+                    topology.crossings.keep(&kept);
                 }
                 suspects.fetch_add(topology.suspects.len() as u64, Ordering::Relaxed);
                 patches.fetch_add(topology.patches.len() as u64, Ordering::Relaxed);
@@ -116,6 +124,13 @@ impl<'a> Survey<'a> {
         refuse_more_than(path, MOST_SUSPECTS, suspects, "triangles lie at defects")?;
         refuse_more_than(path, chunk::MOST_PATCHES, pieces, "pieces of surface, counted by chunks, are there")?;
         let merge = Merge::of(records, &measure, &mut chunks);
+        let (self_intersections, crossing_pairs) = if self_intersections {
+            let (summed, pairs) = Crossings::sum(chunks.iter_mut().map(|c| std::mem::take(&mut c.crossings)), most_tested);
+            (Some(summed), pairs)
+        } else {
+            (None, None)
+        };
+        let nonfinite = std::mem::take(&mut members.nonfinite);
         Ok(Self {
             records,
             measure,
@@ -123,9 +138,11 @@ impl<'a> Survey<'a> {
             suspects: merge.suspects,
             suspect_patches: merge.suspect_patches,
             patches: merge.patches,
-            nonfinite: std::mem::take(&mut members.nonfinite),
-            self_intersections: self_intersections
-                .then(|| Crossings::sum(chunks.iter_mut().map(|c| std::mem::take(&mut c.crossings)), most_tested)),
+            triangles: records.len() as u64 - nonfinite.iter().map(|r| u64::from(r.1)).sum::<u64>(),
+            nonfinite,
+            self_intersections,
+            crossing_pairs,
+            promoted: Vec::new(),
             vertices: chunks.iter().map(|c| c.vertices).sum(),
             vertices_used: chunks.iter().map(|c| c.vertices_used).sum(),
             guide,
@@ -137,11 +154,6 @@ impl<'a> Survey<'a> {
             merged: merge.merged,
             threads: limits.threads,
         })
-    }
-
-    /// Triangles with finite coordinates.
-    pub(crate) fn triangles(&self) -> u64 {
-        self.records.len() as u64 - self.nonfinite.iter().map(|r| u64::from(r.1)).sum::<u64>()
     }
 
     /// Threads to work with.
@@ -203,33 +215,57 @@ impl<'a> Survey<'a> {
         visited.into_iter().flatten().collect()
     }
 
-    /// Makes suspects of all triangles around the sound vertices at `positions` (not empty), and returns the new ones, ascending.
+    /// `work` on every chunk: its cell, its members, and its visitors, which there are if self-intersections were looked for. Results by
+    /// chunk, so only sums and sets may be made of them.
+    pub(crate) fn each_chunk<S, R: Send>(
+        &self,
+        scratch: impl Fn() -> S + Sync,
+        work: impl Fn(&mut S, HomeBox, [&Seen<'_>; 2]) -> R + Sync,
+    ) -> Vec<R> {
+        self.members.each(
+            (self.records, &self.guide, &self.plan),
+            self.threads,
+            |_| true,
+            scratch,
+            |scratch, chunk, members, visitors| work(scratch, self.plan.home_box(chunk), [members, visitors]),
+        )
+    }
+
+    /// Makes suspects of all triangles around the sound vertices at `positions`, and returns the new ones, ascending.
     /// Reads the chunks where the vertices are at home.
     pub(crate) fn promote(&mut self, positions: &[[f32; 3]]) -> Vec<(Suspect, u32)> {
+        self.promoted.extend(positions);
         let mut wanted = Weld::default();
         wanted.reset(positions.len() * 8);
         positions.iter().for_each(|p| {
             wanted.vertex(*p);
         });
-        let mut homes: Vec<ChunkId> = positions.iter().map(|p| self.plan.home(*p)).collect();
-        homes.sort_unstable();
-        homes.dedup();
-        let is_home = |chunk| homes.binary_search(&chunk).is_ok();
+        let mut by_home: Vec<(ChunkId, [f32; 3])> = positions.iter().map(|p| (self.plan.home(*p), *p)).collect();
+        by_home.sort_unstable_by_key(|(home, _)| *home);
+        let at_home = |chunk| {
+            let from = by_home.partition_point(|(home, _)| *home < chunk);
+            &by_home[from..from + by_home[from..].partition_point(|(home, _)| *home == chunk)]
+        };
         let found = self.members.each(
             (self.records, &self.guide, &self.plan),
             self.threads,
-            is_home,
-            || (),
-            |(), chunk, seen, _| {
+            |chunk| !at_home(chunk).is_empty(),
+            Grid::default,
+            |grid, chunk, seen, _| {
+                grid.mark(at_home(chunk).iter().map(|(_, p)| Bounds::of(&[*p])));
                 let patches = self.patches_of(chunk);
                 let mut labels = self.labels[chunk.0 as usize].iter();
                 let mut found = Vec::new();
                 seen.for_each(|triangle, place| {
                     let patch = labels.next().unwrap_or(NONE);
                     let corners = place.corners();
+                    if !grid.may_meet(&Bounds::of(&corners)) {
+                        return;
+                    }
                     let unsound = (0..3).filter(|k| wanted.find(corners[*k]).is_some()).fold(0, |mask, k| mask | 1 << k);
                     if unsound != 0 {
-                        found.push((Suspect { triangle, unsound }, if patch == NONE { NONE } else { patches[patch as usize] }));
+                        // Only suspects are in no patch, and those are known.
+                        found.push((Suspect { triangle, unsound }, patches.get(patch as usize).copied().unwrap_or(NONE)));
                     }
                 });
                 found
@@ -379,7 +415,7 @@ mod tests {
     use super::*;
     use crate::Quiet;
     use crate::settings::Spill;
-    use crate::testing::{Corners, cuboid, records};
+    use crate::testing::{cuboid, records, soup};
 
     /// What a survey says that must not depend on its chunks.
     fn surveyed(records: &[Record], chunk_triangles: u32, spill: Spill) -> impl PartialEq + std::fmt::Debug {
@@ -388,19 +424,6 @@ mod tests {
         let patches: Vec<_> = survey.patches.iter().map(|p| (p.first, p.triangles, p.extent, p.bounds)).collect();
         let found = (survey.suspects, survey.suspect_patches, patches, survey.nonfinite, survey.self_intersections);
         (found, survey.vertices, survey.vertices_used)
-    }
-
-    /// Unit cubes on a grid, which touch and overlap, and stray triangles: sound and unsound stars side by side.
-    fn soup() -> impl Strategy<Value = Vec<Corners>> {
-        let cubes = prop::collection::vec(prop::array::uniform3(0u8..4), 0..5);
-        let coordinate = prop_oneof![60 => (0u8..5).prop_map(f32::from), 1 => Just(f32::NAN)];
-        let strays = prop::collection::vec(prop::array::uniform3(prop::array::uniform3(coordinate)), 0..8);
-        (cubes, strays)
-            .prop_map(|(cubes, strays)| {
-                let cube = |at: &[u8; 3]| cuboid(at.map(f32::from), at.map(|x| f32::from(x + 1)));
-                cubes.iter().flat_map(cube).chain(strays).collect::<Vec<_>>()
-            })
-            .prop_shuffle()
     }
 
     proptest! {

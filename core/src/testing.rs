@@ -2,13 +2,17 @@
 
 use std::path::Path;
 
-use crate::Quiet;
+use proptest::prelude::*;
+
 use crate::edit::{Edit, Step};
 use crate::engine::Diagnosis;
+use crate::readback::Difference;
 use crate::record::{self, Record};
 use crate::report::{Defects, Verdict};
 use crate::settings::{Limits, Profile};
 use crate::shop::components::Reversed;
+use crate::survey::Survey;
+use crate::{Quiet, second};
 
 /// A triangle by its positions.
 pub(crate) type Corners = [[f32; 3]; 3];
@@ -71,8 +75,23 @@ pub(crate) fn after<R>(triangles: &[Corners], repair: impl FnOnce(&mut Diagnosis
     let result = repair(&mut diagnosis, &mut turned);
     let edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &turned);
     let defects = diagnose(&written(&edit, &input)).defects;
+    check_second_look(diagnosis.survey, &edit, &defects);
     let verdict = crate::verdict::judge(&defects, &[]);
     After { result, defects, verdict, untouched: edit.summary(input.len()).untouched }
+}
+
+/// The second look by the difference, if it comes to anything, must find what a look at everything finds. Says if it came to anything.
+pub(crate) fn check_second_look(survey: Survey<'_>, edit: &Edit, anew: &Defects) -> bool {
+    let difference = Difference::expected(survey.records, edit);
+    let Some((survey, shop)) = second::look(survey, &difference, &Limits::default()) else { return false };
+    let mut defects = Diagnosis::count(survey, shop, &Profile::default()).defects;
+    // Sums are rounded by the box they are taken in, which may be another.
+    for (got, want) in [(&mut defects.area, anew.area), (&mut defects.volume, anew.volume)] {
+        assert!((*got - want).abs() <= 1e-9 * (1.0 + want.abs()), "{got} instead of {want}");
+        *got = want;
+    }
+    assert_eq!(&defects, anew);
+    true
 }
 
 /// The records that an edit makes of the input.
@@ -81,10 +100,25 @@ pub(crate) fn written(edit: &Edit, input: &[Record]) -> Vec<Record> {
     let walked: Result<(), ()> = edit.walk(input, |step| {
         match step {
             Step::Untouched(run) => output.extend_from_slice(run),
-            Step::Changed(record) => output.push(*record),
+            Step::Changed(_, record) => output.push(record),
+            Step::Deleted(_) => {}
+            Step::Added(record) => output.push(*record),
         }
         Ok(())
     });
     walked.unwrap();
     output
+}
+
+/// Unit cubes on a grid, which touch and overlap, and stray triangles: sound and unsound stars side by side.
+pub(crate) fn soup() -> impl Strategy<Value = Vec<Corners>> {
+    let cubes = prop::collection::vec(prop::array::uniform3(0u8..4), 0..5);
+    let coordinate = prop_oneof![60 => (0u8..5).prop_map(f32::from), 1 => Just(f32::NAN)];
+    let strays = prop::collection::vec(prop::array::uniform3(prop::array::uniform3(coordinate)), 0..8);
+    (cubes, strays)
+        .prop_map(|(cubes, strays)| {
+            let cube = |at: &[u8; 3]| cuboid(at.map(f32::from), at.map(|x| f32::from(x + 1)));
+            cubes.iter().flat_map(cube).chain(strays).collect::<Vec<_>>()
+        })
+        .prop_shuffle()
 }

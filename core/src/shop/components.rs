@@ -93,7 +93,8 @@ impl Components {
         let mut all =
             Self { list: Vec::new(), of_patch: vec![NONE; patches as usize], of_triangle: vec![NONE; shop.triangles.len()] };
         let mut numbers = vec![NONE; parents.len()];
-        for p in 0..patches {
+        // After a second look, there may be nothing left of a patch.
+        for p in (0..patches).filter(|p| survey.patches[*p as usize].first != NONE) {
             let sum = &survey.patches[p as usize];
             let c = all.number(&mut numbers, chunk::find(&mut parents, p), Sample { record: sum.first, in_shop: None });
             all.of_patch[p as usize] = c;

@@ -41,6 +41,27 @@ pub(crate) struct Triangle {
     pub(crate) alive: bool,
 }
 
+impl Triangle {
+    /// The record it comes from; past all records for a new one.
+    pub(crate) fn record(&self) -> u32 {
+        match self.origin {
+            Origin::Input(record) | Origin::Part(record) => record,
+            Origin::Patch => NONE,
+        }
+    }
+}
+
+/// A triangle that a workshop is made with.
+pub(crate) struct Gathered {
+    /// Its record in the input.
+    pub(crate) place: u32,
+    pub(crate) corners: [[f32; 3]; 3],
+    /// Which of its vertices have their whole star here (bit k: corner k).
+    pub(crate) complete: u8,
+    /// The patch of its other corners, or [`NONE`].
+    pub(crate) patch: u32,
+}
+
 /// The mesh under repair.
 pub(crate) struct Shop {
     pub(crate) positions: Vec<[f32; 3]>,
@@ -64,20 +85,28 @@ pub(crate) fn bytes(triangles: u64, vertices: u64) -> u64 {
 impl Shop {
     /// Gathers the suspects of `survey`. O(suspects).
     pub(crate) fn gather(survey: &Survey<'_>) -> Self {
-        let mut weld = Weld::default();
-        weld.reset(survey.suspects.len());
-        let mut triangles = Vec::with_capacity(survey.suspects.len());
-        let mut complete = Vec::new();
-        for (i, (suspect, patch)) in survey.suspects.iter().zip(&survey.suspect_patches).enumerate() {
+        Self::of(survey.suspects.iter().zip(&survey.suspect_patches).enumerate().map(|(i, (suspect, patch))| {
             if i % ASKED_AT_ONCE == 0 {
                 survey.ask_for(survey.suspects[i..].iter().take(ASKED_AT_ONCE).map(|s| s.triangle));
             }
-            let v = corners(survey.records, suspect.triangle).map(|p| weld.vertex(p));
+            let corners = corners(survey.records, suspect.triangle);
+            Gathered { place: suspect.triangle, corners, complete: suspect.unsound, patch: *patch }
+        }))
+    }
+
+    /// A workshop of these triangles. O(n).
+    pub(crate) fn of(gathered: impl ExactSizeIterator<Item = Gathered>) -> Self {
+        let mut weld = Weld::default();
+        weld.reset(gathered.len());
+        let mut triangles = Vec::with_capacity(gathered.len());
+        let mut complete = Vec::new();
+        for one in gathered {
+            let v = one.corners.map(|p| weld.vertex(p));
             complete.resize(weld.positions().len(), false);
             for (k, vertex) in v.iter().enumerate() {
-                complete[*vertex as usize] |= suspect.unsound >> k & 1 == 1;
+                complete[*vertex as usize] |= one.complete >> k & 1 == 1;
             }
-            triangles.push(Triangle { v, origin: Origin::Input(suspect.triangle), patch: *patch, alive: true });
+            triangles.push(Triangle { v, origin: Origin::Input(one.place), patch: one.patch, alive: true });
         }
         let mut shop = Self { heads: Vec::new(), nexts: Vec::new(), positions: weld.into_positions(), complete, triangles };
         shop.relink();
@@ -161,10 +190,7 @@ impl Shop {
 
     /// The record `t` comes from; past all records for a new triangle.
     pub(crate) fn record(&self, t: u32) -> u32 {
-        match self.triangles[t as usize].origin {
-            Origin::Input(record) | Origin::Part(record) => record,
-            Origin::Patch => NONE,
-        }
+        self.triangles[t as usize].record()
     }
 
     /// Living triangles with three distinct vertices, by number.

@@ -1,0 +1,140 @@
+//! Self-intersections of a written file, where those of its input are known: pairs of untouched triangles are as they were, so only
+//! pairs with a fresh triangle are tested.
+//!
+//! Every fresh triangle is tested against everything whose box meets its own, chunk by chunk: the cell that has the lowest corner of the
+//! boxes' overlap owns the pair, and both triangles are there as members or visitors.
+
+use crate::boxes::BoxTree;
+use crate::chunk;
+use crate::crossings::{Crossings, Pair, most_tested};
+use crate::fill::cross::{Triangle as Corners, self_intersection};
+use crate::grid::Grid;
+use crate::plan::HomeBox;
+use crate::readback::Difference;
+use crate::record;
+use crate::report::SelfIntersections;
+use crate::source::{Seen, Source, Triangle};
+use crate::sums::Bounds;
+use crate::survey::Survey;
+
+/// All self-intersections of the written file, numbered as its records are; `None` if those of the input are not all known, or too many
+/// boxes meet. O(n) boxes are held against a grid of the fresh ones around.
+pub(crate) fn self_intersections(survey: &Survey<'_>, difference: &Difference) -> Option<SelfIntersections> {
+    let is_gone = |place: u32| difference.gone.binary_search(&place).is_ok();
+    let known = survey.crossing_pairs.as_ref()?.iter().filter(|pair| !pair.triangles.iter().any(|t| is_gone(*t)));
+    let fresh = Fresh::of(difference);
+    let per_chunk = survey.each_chunk(Search::default, |search, cell, seen| search.chunk(&fresh, &is_gone, cell, seen));
+    if per_chunk.iter().map(|found| found.tested).sum::<u64>() > most_tested(difference.written_records as u64) {
+        return None;
+    }
+    let mut pairs: Vec<Pair> = known.copied().chain(per_chunk.into_iter().flat_map(|found| found.pairs)).collect();
+    for pair in &mut pairs {
+        // The numbers keep their order.
+        pair.triangles = pair.triangles.map(|place| difference.number(place));
+        pair.triangles.sort_unstable();
+    }
+    Some(Crossings::of_pairs(pairs))
+}
+
+/// A triangle that has an area, with its box.
+struct Solid {
+    place: u32,
+    corners: Corners,
+    bounds: Bounds,
+}
+
+impl Solid {
+    fn of(place: u32, corners: Corners) -> Option<Self> {
+        let corners = corners.map(|p| p.map(|x| x + 0.0));
+        let [a, b, c] = &corners;
+        // Two equal corners are collinear with any third.
+        (!chunk::is_collinear(a, b, c)).then(|| Self { place, corners, bounds: Bounds::of(&corners) })
+    }
+}
+
+/// The fresh triangles that can intersect anything.
+struct Fresh {
+    all: Vec<Solid>,
+    tree: BoxTree,
+}
+
+impl Fresh {
+    fn of(difference: &Difference) -> Self {
+        let all: Vec<Solid> =
+            difference.fresh.iter().filter_map(|(place, record)| Solid::of(*place, record::corners(record))).collect();
+        let tree = BoxTree::new(&all.iter().map(|f| f.bounds).collect::<Vec<_>>());
+        Self { all, tree }
+    }
+}
+
+/// What a chunk found.
+#[derive(Default)]
+struct Found {
+    tested: u64,
+    pairs: Vec<Pair>,
+}
+
+/// A worker's lists, used again from chunk to chunk.
+#[derive(Default)]
+struct Search {
+    /// The fresh triangles whose boxes meet the cell.
+    here: Vec<u32>,
+    met: Vec<u32>,
+    grid: Grid,
+}
+
+impl Search {
+    fn chunk(&mut self, fresh: &Fresh, is_gone: &impl Fn(u32) -> bool, cell: HomeBox, seen: [&Seen<'_>; 2]) -> Found {
+        let mut found = Found::default();
+        if fresh.all.is_empty() {
+            return found;
+        }
+        let (lo, hi) = cell.ends();
+        fresh.tree.meeting(&Bounds { lo, hi }, &mut self.here);
+        if self.here.is_empty() {
+            return found;
+        }
+        let here: Vec<&Solid> = self.here.iter().map(|f| &fresh.all[*f as usize]).collect();
+        let boxes: Vec<Bounds> = here.iter().map(|f| f.bounds).collect();
+        let tree = BoxTree::new(&boxes);
+        for (i, one) in here.iter().enumerate() {
+            tree.meeting(&one.bounds, &mut self.met);
+            for other in self.met.iter().filter(|j| **j as usize > i) {
+                found.test(one, here[*other as usize], cell);
+            }
+        }
+        self.grid.mark(boxes.iter().copied());
+        for triangles in seen {
+            triangles.for_each(|place, triangle| {
+                let corners = triangle.corners();
+                let bounds = Bounds::of(&corners);
+                if !self.grid.may_meet(&bounds) {
+                    return;
+                }
+                tree.meeting(&bounds, &mut self.met);
+                if self.met.is_empty() || is_gone(place) {
+                    return;
+                }
+                if let Some(one) = Solid::of(place, corners) {
+                    self.met.iter().for_each(|f| found.test(here[*f as usize], &one, cell));
+                }
+            });
+        }
+        found
+    }
+}
+
+impl Found {
+    /// Decides a pair whose boxes meet, if the cell owns it.
+    fn test(&mut self, one: &Solid, other: &Solid, cell: HomeBox) {
+        let lowest = std::array::from_fn(|k| one.bounds.lo[k].max(other.bounds.lo[k]));
+        if !cell.holds(lowest) {
+            return;
+        }
+        self.tested += 1;
+        let common = [one.corners.map(|p| other.corners.contains(&p)), other.corners.map(|p| one.corners.contains(&p))];
+        if let Some(contact) = self_intersection(&one.corners, &other.corners, common) {
+            self.pairs.push(Pair { triangles: [one.place, other.place], contact });
+        }
+    }
+}

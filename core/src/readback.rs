@@ -1,0 +1,169 @@
+//! The written file read back and compared with what it should hold, byte by byte, while it is hashed.
+//!
+//! What is found equal to the input needs no second proof of what was proved of the input: the second look goes on from here
+//! ([`crate::second`]).
+
+use blake3::Hasher;
+
+use crate::ahead::Guide;
+use crate::edit::{Edit, Step};
+use crate::error::{Error, Result};
+use crate::read::{MeshFile, PREFIX_BYTES};
+use crate::record::Record;
+use crate::settings::Limits;
+use crate::{Progress, parallel};
+
+/// How a written file differs from its input. A triangle's **place** is the number of the input record that it is or stands in for; added
+/// ones have the places after all of these.
+#[derive(Debug, Default)]
+pub(crate) struct Difference {
+    /// Input records that the written file does not hold, ascending.
+    pub(crate) gone: Vec<u32>,
+    /// Those of them that nothing stands in for, ascending.
+    deleted: Vec<u32>,
+    /// What the written file holds besides untouched records of the input, by ascending place.
+    pub(crate) fresh: Vec<(u32, Record)>,
+    /// Records in the written file.
+    pub(crate) written_records: usize,
+}
+
+impl Difference {
+    /// As if the written file had been read back.
+    #[cfg(test)]
+    pub(crate) fn expected(input: &[Record], edit: &Edit) -> Self {
+        expect(input, edit).0
+    }
+
+    /// The number, in the written file, of the record at a place.
+    pub(crate) fn number(&self, place: u32) -> u32 {
+        place - self.deleted.partition_point(|d| *d < place) as u32
+    }
+}
+
+/// Bytes that are hashed and compared at a time: both read them while they are in a cache.
+const BLOCK_RECORDS: usize = (2 << 20) / size_of::<Record>();
+/// Fewer records are not worth starting threads for.
+const READ_BY_ONE: usize = 20_000;
+
+/// A stretch of the written file, and what it should be.
+struct Stretch<'a> {
+    first: usize,
+    expected: Expected<'a>,
+}
+
+enum Expected<'a> {
+    Input(&'a [Record]),
+    /// One of those that are not the input's.
+    Fresh(usize),
+}
+
+impl Stretch<'_> {
+    fn count(&self) -> usize {
+        match self.expected {
+            Expected::Input(run) => run.len(),
+            Expected::Fresh(_) => 1,
+        }
+    }
+}
+
+/// What the written file should hold, and how that differs from the input.
+fn expect<'a>(input: &'a [Record], edit: &'a Edit) -> (Difference, Vec<Stretch<'a>>) {
+    let mut found = Difference::default();
+    let mut stretches = Vec::new();
+    let walked: std::result::Result<(), std::convert::Infallible> = edit.walk(input, |step| {
+        let fresh = found.fresh.len();
+        let expected = match step {
+            Step::Untouched(run) => Expected::Input(run),
+            Step::Changed(place, record) => {
+                found.gone.push(place);
+                found.fresh.push((place, record));
+                Expected::Fresh(fresh)
+            }
+            Step::Deleted(place) => {
+                found.gone.push(place);
+                found.deleted.push(place);
+                return Ok(());
+            }
+            Step::Added(record) => {
+                let place = found.fresh.last().map_or(0, |(last, _)| last + 1).max(input.len() as u32);
+                found.fresh.push((place, *record));
+                Expected::Fresh(fresh)
+            }
+        };
+        let stretch = Stretch { first: found.written_records, expected };
+        found.written_records += stretch.count();
+        stretches.push(stretch);
+        Ok(())
+    });
+    let Ok(()) = walked;
+    (found, stretches)
+}
+
+/// Reads `written` back, which should be `input` as `edit` leaves it: its BLAKE3, and how it differs from the input.
+///
+/// # Errors
+/// [`Error::Io`] where it does not hold what was written.
+pub(crate) fn compare(
+    input: &[Record],
+    edit: &Edit,
+    written: &MeshFile,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> Result<(String, Difference)> {
+    let (records, bytes) = (written.records(), written.bytes());
+    let (found, stretches) = expect(input, edit);
+    let is_whole = found.written_records == records.len() && bytes.len() == PREFIX_BYTES + size_of_val(records);
+    let read = || hash_and_compare(input, &stretches, &found.fresh, written, limits, progress);
+    let (hash, equal) =
+        if limits.threads < 2 || records.len() < READ_BY_ONE { read() } else { parallel::in_pool(limits.threads, read) };
+    if !(is_whole && equal) {
+        let source = std::io::Error::other("the file does not hold what was written to it");
+        return Err(Error::io(written.path(), "reading back")(source));
+    }
+    Ok((hash, found))
+}
+
+fn hash_and_compare(
+    input: &[Record],
+    stretches: &[Stretch<'_>],
+    fresh: &[(u32, Record)],
+    written: &MeshFile,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> (String, bool) {
+    let (records, bytes) = (written.records(), written.bytes());
+    let input_guide = Guide::new(input.as_flattened(), limits);
+    let mut hasher = Hasher::new();
+    hasher.update(&bytes[..bytes.len().min(PREFIX_BYTES)]);
+    let (mut equal, mut stretch, mut first, mut asked) = (true, 0, 0, 0);
+    for block in Guide::new(records.as_flattened(), limits).blocks(records).flat_map(|block| block.chunks(BLOCK_RECORDS)) {
+        let mut compare = || {
+            let end = first + block.len();
+            while let Some(next) = stretches.get(stretch).filter(|s| s.first < end) {
+                let (from, to) = (next.first.max(first), (next.first + next.count()).min(end));
+                let there = &block[from - first..to - first];
+                equal &= match next.expected {
+                    Expected::Input(run) => {
+                        let run = &run[from - next.first..to - next.first];
+                        input_guide.keep_ahead(&mut asked, run.as_flattened());
+                        run == there
+                    }
+                    Expected::Fresh(i) => there == [fresh[i].1],
+                };
+                if next.first + next.count() > end {
+                    break;
+                }
+                stretch += 1;
+            }
+        };
+        if limits.threads < 2 || records.len() < READ_BY_ONE {
+            hasher.update(block.as_flattened());
+            compare();
+        } else {
+            rayon::join(|| hasher.update_rayon(block.as_flattened()), compare);
+        }
+        first += block.len();
+        progress.at("hash", first as u64, records.len() as u64);
+    }
+    (hasher.finalize().to_hex().to_string(), equal)
+}

@@ -1,0 +1,370 @@
+//! The second look at a file by its difference from the input.
+//!
+//! The written file was read back, and all but a few of its records are the input's, byte for byte ([`crate::readback`]). A vertex none of
+//! whose triangles came, went or changed has the star it had; the others are **disturbed**. All triangles around disturbed vertices
+//! and around those that were not sound before go to a new workshop, from the written records, where they are counted as any file's. What
+//! is left of the input's patches is sound as it was.
+//!
+//! What cannot be shown to hold in this way is looked at anew: [`look`] returns nothing then, and the file is surveyed as if nothing were
+//! known of it. Whether it comes to that depends on input and edit alone.
+
+use crate::chunk::{self, NONE, Suspect};
+use crate::fresh;
+use crate::readback::Difference;
+use crate::record;
+use crate::settings::Limits;
+use crate::shop::edges::Edges;
+use crate::shop::{self, Gathered, Shop, has_repeated};
+use crate::sums::Bounds;
+use crate::survey::Survey;
+use crate::weld::Weld;
+
+/// Is an edit so small against the file that looking at what it disturbs is less work than looking at everything?
+pub(crate) fn is_worthwhile(gone: u64, added: u64, input_records: usize) -> bool {
+    (gone + added) * 8 <= input_records as u64 && input_records as u64 + added < u64::from(NONE)
+}
+
+/// What the survey of the input and the `difference` say of the written file; `None` if that is not all there is to know. The survey is
+/// in terms of places; its records are still the input's, and none of those that are gone is looked at again.
+pub(crate) fn look<'a>(mut survey: Survey<'a>, difference: &Difference, limits: &Limits) -> Option<(Survey<'a>, Shop)> {
+    let _span = tracing::debug_span!("second look").entered();
+    let mut around = Disturbed::of(&survey, difference);
+    let new = around.newly();
+    if !new.is_empty() {
+        survey.promote(&new);
+    }
+    // As much as the workshop of a survey may take beside the rest.
+    if shop::bytes(survey.suspects.len() as u64, 3 * survey.suspects.len() as u64) > limits.memory_bytes / 2 {
+        return None;
+    }
+    let shop = around.gather(&survey, difference);
+    around.settle_patches(&mut survey, &shop)?;
+    let edges = Edges::of(&shop);
+    if !around.keep_patches_whole(&survey, &shop, &edges) {
+        return None;
+    }
+    let measured_in = survey.bounds;
+    around.count(&mut survey, &shop, difference);
+    // The volume of what is not closed depends on the middle of the box.
+    if survey.bounds != measured_in && edges.iter().any(|e| e.is_unbalanced()) {
+        return None;
+    }
+    if let Some(pairs) = survey.self_intersections.is_some().then(|| fresh::self_intersections(&survey, difference)) {
+        survey.self_intersections = Some(pairs?);
+    }
+    survey.crossing_pairs = None;
+    survey.nonfinite.clear();
+    Some((survey, shop))
+}
+
+/// The vertices whose stars are to be looked at again.
+struct Disturbed {
+    /// Those that were not sound first, then those that were.
+    vertices: Weld,
+    /// By vertex: it was sound, if it was there; a triangle of the input, or of the written file, has it; such a triangle with three
+    /// distinct vertices.
+    was_sound: Vec<bool>,
+    in_input: Vec<[bool; 2]>,
+    in_output: Vec<[bool; 2]>,
+    /// How many were known before this look, promoted ones included.
+    known: usize,
+    /// By triangle of the new workshop: the vertices of this table it has.
+    corners: Vec<[u32; 3]>,
+}
+
+impl Disturbed {
+    fn of(survey: &Survey<'_>, difference: &Difference) -> Self {
+        let mut vertices = Weld::default();
+        vertices.reset(survey.suspects.len() + 3 * (difference.gone.len() + difference.fresh.len()));
+        let corners = |suspect: &Suspect| record::corners(&survey.records[suspect.triangle as usize]);
+        for suspect in &survey.suspects {
+            for p in (0..3).filter(|k| suspect.unsound >> k & 1 == 1).map(|k| corners(suspect)[k]) {
+                vertices.vertex(p);
+            }
+        }
+        let known = vertices.positions().len();
+        let mut was_sound = vec![false; known];
+        survey.promoted.iter().filter_map(|p| vertices.find(*p)).for_each(|v| was_sound[v as usize] = true);
+        // Triangles with a repeated vertex are suspects, whatever their vertices are.
+        survey.suspects.iter().map(corners).filter(|c| !is_distinct(c)).flatten().for_each(|p| {
+            vertices.vertex(p);
+        });
+        for t in &difference.gone {
+            let record = &survey.records[*t as usize];
+            if record::all_finite(record) {
+                record::corners(record).into_iter().for_each(|p| {
+                    vertices.vertex(p);
+                });
+            }
+        }
+        for (_, record) in &difference.fresh {
+            record::corners(record).into_iter().for_each(|p| {
+                vertices.vertex(p);
+            });
+        }
+        let count = vertices.positions().len();
+        was_sound.resize(count, true);
+        let none = vec![[false; 2]; count];
+        Self { vertices, was_sound, in_input: none.clone(), in_output: none, known, corners: Vec::new() }
+    }
+
+    /// Those of which not all triangles are suspects yet.
+    fn newly(&self) -> Vec<[f32; 3]> {
+        self.vertices.positions()[self.known..].to_vec()
+    }
+
+    fn at(&self, corners: [[f32; 3]; 3]) -> [u32; 3] {
+        corners.map(|p| self.vertices.find(p).unwrap_or(NONE))
+    }
+
+    /// The triangles of the written file around these vertices, by place.
+    fn gather(&mut self, survey: &Survey<'_>, difference: &Difference) -> Shop {
+        let mut triangles = Vec::with_capacity(survey.suspects.len() + difference.fresh.len());
+        let mut fresh = difference.fresh.iter().peekable();
+        let mut gone = difference.gone.iter().peekable();
+        let mut add = |this: &mut Self, place: u32, corners: [[f32; 3]; 3], patch: u32| {
+            let at = this.at(corners);
+            note(&mut this.in_output, at, &corners);
+            // A sound corner that is left holds it to its patch.
+            let patch = if at.contains(&NONE) { patch } else { NONE };
+            let complete = (0..3).fold(0, |mask, k| mask | u8::from(at[k] != NONE) << k);
+            this.corners.push(at);
+            triangles.push(Gathered { place, corners, complete, patch });
+        };
+        for (i, (suspect, patch)) in survey.suspects.iter().zip(&survey.suspect_patches).enumerate() {
+            if i % shop::ASKED_AT_ONCE == 0 {
+                survey.ask_for(survey.suspects[i..].iter().take(shop::ASKED_AT_ONCE).map(|s| s.triangle));
+            }
+            let place = suspect.triangle;
+            let corners = record::corners(&survey.records[place as usize]);
+            let at = self.at(corners);
+            note(&mut self.in_input, at, &corners);
+            while let Some((place, record)) = fresh.next_if(|f| f.0 <= place) {
+                add(self, *place, record::corners(record), NONE);
+            }
+            while gone.next_if(|t| **t < place).is_some() {}
+            if gone.next_if_eq(&&place).is_none() {
+                add(self, place, corners, *patch);
+            }
+        }
+        fresh.for_each(|(place, record)| add(self, *place, record::corners(record), NONE));
+        Shop::of(triangles.into_iter())
+    }
+
+    /// Brings the patches up to date, whose disturbed vertices are no part of them any more. Fails if it is not known how far what is
+    /// left of a patch reaches, or where it begins.
+    fn settle_patches(&self, survey: &mut Survey<'_>, shop: &Shop) -> Option<()> {
+        let mut held = vec![false; self.was_sound.len()];
+        let mut is_left: Vec<bool> = survey.patches.iter().map(|p| p.triangles > 0).collect();
+        let mut begins = vec![false; survey.patches.len()];
+        for (t, corners) in shop.triangles.iter().zip(&self.corners).filter(|(t, _)| t.patch != NONE) {
+            is_left[t.patch as usize] = true;
+            begins[t.patch as usize] |= t.record() == survey.patches[t.patch as usize].first;
+            corners.iter().filter(|v| **v != NONE).for_each(|v| held[*v as usize] = true);
+        }
+        for (suspect, patch) in survey.suspects.iter().zip(&survey.suspect_patches).filter(|(_, patch)| **patch != NONE) {
+            let corners = record::corners(&survey.records[suspect.triangle as usize]);
+            for (p, v) in corners.iter().zip(self.at(corners)) {
+                let bounds = &survey.patches[*patch as usize].bounds;
+                let at_the_end = (0..3).any(|k| p[k] == bounds.lo[k] || p[k] == bounds.hi[k]);
+                if at_the_end && is_left[*patch as usize] && v != NONE && self.was_sound[v as usize] && !held[v as usize] {
+                    return None;
+                }
+            }
+        }
+        for (p, patch) in survey.patches.iter_mut().enumerate() {
+            if !is_left[p] {
+                patch.first = NONE;
+                patch.bounds = Bounds::EMPTY;
+            } else if !begins[p] && survey.suspects.binary_search_by_key(&patch.first, |s| s.triangle).is_ok() {
+                return None;
+            }
+        }
+        Some(())
+    }
+
+    /// Does what is left of every patch hang together, be it over the workshop?
+    ///
+    /// Of the vertices of a patch, those that are disturbed are taken out. What leads from one of the others to another through a set of disturbed ones that
+    /// hang together enters and leaves it at neighbours of the set. So if all neighbours of each such set hang together otherwise, everything does.
+    fn keep_patches_whole(&self, survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> bool {
+        if !self.was_sound.contains(&true) {
+            return true;
+        }
+        let mut sets: Vec<u32> = (0..self.was_sound.len() as u32).collect();
+        for suspect in &survey.suspects {
+            let corners = self.at(record::corners(&survey.records[suspect.triangle as usize]));
+            let mut were_sound = corners.into_iter().filter(|v| *v != NONE && self.was_sound[*v as usize]);
+            if let Some(first) = were_sound.next() {
+                were_sound.for_each(|v| {
+                    chunk::unite(&mut sets, first, v);
+                });
+            }
+        }
+        // Triangles hang together through edges, and around a vertex that is not disturbed.
+        let mut parents: Vec<u32> = (0..shop.triangles.len() as u32).collect();
+        for edge in edges.iter() {
+            edge.uses[1..].iter().for_each(|u| {
+                chunk::unite(&mut parents, edge.uses[0].triangle, u.triangle);
+            });
+        }
+        let mut around = vec![NONE; shop.positions.len()];
+        for (t, triangle) in shop.triangles.iter().enumerate().filter(|(_, t)| !has_repeated(t.v)) {
+            for v in triangle.v.iter().filter(|v| !shop.complete[**v as usize]) {
+                let first = &mut around[*v as usize];
+                if *first == NONE {
+                    *first = t as u32;
+                } else {
+                    chunk::unite(&mut parents, *first, t as u32);
+                }
+            }
+        }
+        let mut neighbours = vec![NONE; self.was_sound.len()];
+        for (t, corners) in self.corners.iter().enumerate().filter(|(t, _)| shop.triangles[*t].patch != NONE) {
+            let piece = chunk::find(&mut parents, t as u32);
+            for v in corners.iter().filter(|v| **v != NONE && self.was_sound[**v as usize]) {
+                let of_set = &mut neighbours[chunk::find(&mut sets, *v) as usize];
+                if *of_set == NONE {
+                    *of_set = piece;
+                } else if *of_set != piece {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    /// Counts triangles and vertices and the box around them.
+    fn count(&self, survey: &mut Survey<'_>, shop: &Shop, difference: &Difference) {
+        let have = |table: &[[bool; 2]], k: usize| table.iter().filter(|had| had[k]).count() as u64;
+        survey.triangles = difference.written_records as u64;
+        survey.vertices = survey.vertices - have(&self.in_input, 0) + have(&self.in_output, 0);
+        survey.vertices_used = survey.vertices_used - have(&self.in_input, 1) + have(&self.in_output, 1);
+        let mut bounds = Bounds::EMPTY;
+        survey.patches.iter().for_each(|p| bounds.add(&p.bounds));
+        bounds.include(&shop.positions);
+        survey.bounds = bounds.normalised();
+    }
+}
+
+/// Notes which vertices a triangle has, and whether it has three.
+fn note(table: &mut [[bool; 2]], at: [u32; 3], corners: &[[f32; 3]; 3]) {
+    let distinct = is_distinct(corners);
+    for v in at.into_iter().filter(|v| *v != NONE) {
+        table[v as usize][0] = true;
+        table[v as usize][1] |= distinct;
+    }
+}
+
+fn is_distinct(corners: &[[f32; 3]; 3]) -> bool {
+    (0..3).all(|k| corners[k] != corners[(k + 1) % 3])
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::edit::Edit;
+    use crate::repairs;
+    use crate::settings::Profile;
+    use crate::shop::components::Reversed;
+    use crate::testing::{Corners, check_second_look, cube, diagnose, plate, records, reversed, shifted, soup, written};
+
+    /// Does the second look come to anything after all repairs? What it comes to must be what a look at everything finds.
+    fn holds_after_repair(triangles: &[Corners]) -> bool {
+        let input = records(triangles);
+        let mut diagnosis = diagnose(&input);
+        let repaired = repairs::run(&mut diagnosis, &Profile::default(), 1);
+        let edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &repaired.reversed);
+        check_second_look(diagnosis.survey, &edit, &diagnose(&written(&edit, &input)).defects)
+    }
+
+    /// A closed box of many triangles, a grid of so many squares on each side.
+    fn block(side: u8) -> Vec<Corners> {
+        let face = plate(side, |_, _| true);
+        let end = f32::from(side);
+        let turned =
+            |turn: fn([f32; 3], f32) -> [f32; 3]| -> Vec<Corners> { face.iter().map(|t| t.map(|p| turn(p, end))).collect() };
+        [
+            turned(|[x, y, _], _| [y, x, 0.0]),
+            turned(|[x, y, _], end| [x, y, end]),
+            turned(|[x, y, _], _| [0.0, x, y]),
+            turned(|[x, y, _], end| [end, y, x]),
+            turned(|[x, y, _], _| [y, 0.0, x]),
+            turned(|[x, y, _], end| [x, end, y]),
+        ]
+        .map(|face| if face[0].iter().map(|p| p[2]).sum::<f32>() >= 0.0 { face } else { reversed(&face) })
+        .concat()
+    }
+
+    proptest! {
+        #[test]
+        fn the_difference_tells_what_a_look_at_everything_does(triangles in soup()) {
+            holds_after_repair(&triangles);
+        }
+
+        /// Triangles of a large body removed, doubled, turned and moved: most of it is as it was.
+        #[test]
+        fn small_defects_of_a_large_body_are_looked_at_by_themselves(
+            fates in prop::collection::vec((0usize..6 * 2 * 81, 0u8..5), 0..6),
+            neighbour in any::<bool>(),
+        ) {
+            let mut triangles = block(9);
+            let away = if neighbour { 9.0 } else { 12.0 };
+            triangles.extend(shifted(&block(9), [away, 0.0, 0.0]));
+            for (t, fate) in fates {
+                match fate {
+                    0 => triangles[t] = [[3.0; 3]; 3],
+                    1 => triangles.push(triangles[t]),
+                    2 => triangles[t].swap(0, 1),
+                    3 => triangles[t][0] = triangles[t][0].map(|x| x + 1e-4),
+                    _ => triangles.push([triangles[t][0], triangles[t][1], [4.5; 3]]),
+                }
+            }
+            holds_after_repair(&triangles);
+        }
+    }
+
+    /// Without repairs: any edit at all.
+    fn holds(triangles: &[Corners], kill: impl Fn(&Corners) -> bool) -> bool {
+        let input = records(triangles);
+        let mut d = diagnose(&input);
+        let all: Vec<[f32; 3]> = triangles.iter().filter(|t| kill(t)).flatten().copied().collect();
+        let new = d.survey.promote(&all);
+        let completed: Vec<u32> =
+            (0..d.shop.positions.len() as u32).filter(|v| all.contains(&d.shop.positions[*v as usize])).collect();
+        d.shop.extend(&d.survey, &new, &completed);
+        for t in 0..d.shop.triangles.len() as u32 {
+            if kill(&d.shop.points(t)) {
+                d.shop.kill(t);
+            }
+        }
+        let edit = Edit::of(&d.survey, &d.shop, &Reversed::none(&d.survey));
+        check_second_look(d.survey, &edit, &diagnose(&written(&edit, &input)).defects)
+    }
+
+    #[test]
+    fn a_hole_in_a_body_is_seen_without_looking_at_the_rest() {
+        assert!(holds(&block(9), |t| t.iter().all(|p| p[2] == 9.0 && p[0] > 3.5 && p[0] < 5.5 && p[1] > 3.5 && p[1] < 5.5)));
+    }
+
+    #[test]
+    fn a_surface_that_falls_apart_is_looked_at_as_a_whole() {
+        // All around the middle: two halves are left, each open, which were one patch.
+        let cut = |t: &Corners| t.iter().all(|p| p[0] >= 4.0 && p[0] <= 5.0);
+        assert!(!holds(&block(9), cut));
+    }
+
+    #[test]
+    fn what_leaves_the_end_of_a_body_is_not_guessed_at() {
+        // A corner is cut off: nobody knows how far the rest reaches.
+        assert!(!holds(&block(9), |t| t.iter().all(|p| p.iter().all(|x| *x >= 8.0))));
+    }
+
+    #[test]
+    fn a_body_that_vanishes_leaves_nothing() {
+        let far = shifted(&cube(), [3.0; 3]);
+        assert!(holds(&[block(9), far.clone()].concat(), |t| far.contains(t)));
+    }
+}

@@ -282,9 +282,10 @@ fn look_again(
     let blake3 = if second::is_worthwhile(edit.gone(), edit.added.len() as u64, input.records().len()) {
         let (blake3, difference) = readback::compare(input.records(), &edit, written, limits, progress)?;
         drop(edit);
-        if let Some((survey, shop)) = second::look(survey, &difference, limits) {
+        if let Some((survey, shop)) = second::look(survey, &difference) {
             return Ok((blake3, Diagnosis::count(survey, shop, profile).defects));
         }
+        tracing::debug!("The difference does not tell: the written file is surveyed.");
         blake3
     } else {
         drop((survey, edit));

@@ -167,3 +167,63 @@ fn hash_and_compare(
     }
     (hasher.finalize().to_hex().to_string(), equal)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::Quiet;
+    use crate::shop::components::Reversed;
+    use crate::testing::{Corners, cube, diagnose, plate, records, shifted, written};
+
+    fn open(path: &Path) -> MeshFile {
+        MeshFile::open(path, path.parent().unwrap(), &Limits::default(), &Quiet).unwrap()
+    }
+
+    /// Some thousand triangles, of which one goes, one turns, one moves and one comes: what is written is what is read back, and
+    /// every bit of it counts.
+    #[test]
+    fn one_bit_that_is_not_as_it_was_written_is_noticed() {
+        let triangles: Vec<Corners> = [plate(100, |_, _| true), shifted(&cube(), [0.0, 0.0, 2.0])].concat();
+        let input = records(&triangles);
+        let mut d = diagnose(&input);
+        let last = d.shop.triangles.len() - 1;
+        d.shop.kill(0);
+        d.shop.triangles[last].v.swap(1, 2);
+        let corner = d.shop.triangles[3].v[0];
+        d.shop.positions[corner as usize][2] += 0.25;
+        d.shop.add([0, 2, 5], crate::shop::Origin::Patch, crate::chunk::NONE);
+        let edit = Edit::of(&d.survey, &d.shop, &Reversed::none(&d.survey));
+        let output = written(&edit, &input);
+
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("part.stl");
+        let mut bytes = [&[0; 80][..], &(output.len() as u32).to_le_bytes(), output.as_flattened()].concat();
+        for threads in [1, 2] {
+            let limits = Limits { threads, ..Limits::default() };
+            let read = |bytes: &[u8]| {
+                std::fs::write(&path, bytes).unwrap();
+                compare(&input, &edit, &open(&path), &limits, &Quiet)
+            };
+            let (hash, found) = read(&bytes).unwrap();
+            assert_eq!(hash, blake3::hash(&bytes).to_hex().to_string());
+            assert_eq!(found.written_records, output.len());
+            let gone = found.gone.iter().map(|t| input[*t as usize]);
+            assert!(gone.clone().all(|record| !found.fresh.iter().any(|f| f.1 == record)) && gone.len() > 3);
+            for (place, record) in &found.fresh {
+                assert_eq!(output[found.number(*place) as usize], *record);
+            }
+            // In an untouched record, in a moved one (the attribute of the first one left that is not as it was), in the added one.
+            let moved = found.fresh.iter().map(|f| found.number(f.0) as usize).min().unwrap();
+            for record in [output.len() / 2, moved, output.len() - 1] {
+                let at = PREFIX_BYTES + record * 50 + 49;
+                bytes[at] ^= 1;
+                assert!(read(&bytes).is_err_and(|e| e.to_string().contains("reading back")));
+                bytes[at] ^= 1;
+            }
+            let shorter = [&[0; 80][..], &(output.len() as u32 - 1).to_le_bytes(), output[1..].as_flattened()].concat();
+            assert!(read(&shorter).is_err(), "a record is missing");
+        }
+    }
+}

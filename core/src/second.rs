@@ -12,7 +12,6 @@ use crate::chunk::{self, NONE, Suspect};
 use crate::fresh;
 use crate::readback::Difference;
 use crate::record;
-use crate::settings::Limits;
 use crate::shop::edges::Edges;
 use crate::shop::{self, Gathered, Shop, has_repeated};
 use crate::sums::Bounds;
@@ -24,17 +23,21 @@ pub(crate) fn is_worthwhile(gone: u64, added: u64, input_records: usize) -> bool
     (gone + added) * 8 <= input_records as u64 && input_records as u64 + added < u64::from(NONE)
 }
 
+/// Suspects that need no place in the budget: about 20 MB.
+const SUSPECTS_BESIDE: usize = 100_000;
+
 /// What the survey of the input and the `difference` say of the written file; `None` if that is not all there is to know. The survey is
 /// in terms of places; its records are still the input's, and none of those that are gone is looked at again.
-pub(crate) fn look<'a>(mut survey: Survey<'a>, difference: &Difference, limits: &Limits) -> Option<(Survey<'a>, Shop)> {
+pub(crate) fn look<'a>(mut survey: Survey<'a>, difference: &Difference) -> Option<(Survey<'a>, Shop)> {
     let _span = tracing::debug_span!("second look").entered();
     let mut around = Disturbed::of(&survey, difference);
     let new = around.newly();
+    let suspects = survey.suspects.len();
     if !new.is_empty() {
         survey.promote(&new);
     }
-    // As much as the workshop of a survey may take beside the rest.
-    if shop::bytes(survey.suspects.len() as u64, 3 * survey.suspects.len() as u64) > limits.memory_bytes / 2 {
+    // Counted without tables for repairs, so this takes no more than the budget held for the input's workshop, and little besides.
+    if survey.suspects.len() > suspects + suspects / 2 + SUSPECTS_BESIDE {
         return None;
     }
     let shop = around.gather(&survey, difference);
@@ -264,7 +267,6 @@ fn is_distinct(corners: &[[f32; 3]; 3]) -> bool {
 mod tests {
     use proptest::prelude::*;
 
-    use super::*;
     use crate::edit::Edit;
     use crate::repairs;
     use crate::settings::Profile;

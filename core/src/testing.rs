@@ -83,7 +83,7 @@ pub(crate) fn after<R>(triangles: &[Corners], repair: impl FnOnce(&mut Diagnosis
 /// The second look by the difference, if it comes to anything, must find what a look at everything finds. Says if it came to anything.
 pub(crate) fn check_second_look(survey: Survey<'_>, edit: &Edit, anew: &Defects) -> bool {
     let difference = Difference::expected(survey.records, edit);
-    let Some((survey, shop)) = second::look(survey, &difference, &Limits::default()) else { return false };
+    let Some((survey, shop)) = second::look(survey, &difference) else { return false };
     let mut defects = Diagnosis::count(survey, shop, &Profile::default()).defects;
     // Sums are rounded by the box they are taken in, which may be another.
     for (got, want) in [(&mut defects.area, anew.area), (&mut defects.volume, anew.volume)] {

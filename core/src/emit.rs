@@ -1,10 +1,12 @@
 //! Writes the output once: header, exact count, and the input as the edit leaves it.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, Write};
+use std::io::{self, IoSlice, Write};
 use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
+
+use rustix::io::Errno;
 
 use crate::Progress;
 use crate::ahead::Guide;
@@ -48,14 +50,31 @@ pub(crate) fn copy(mesh: &MeshFile, output: &Path, limits: &Limits, progress: &d
     sink.finish(limits)
 }
 
-/// The output file with a buffer for what is small.
+/// Runs shorter than this are copied to the others that wait: it takes longer to hand over one more piece.
+const COPIED_BYTES: usize = 1 << 10;
+/// So much waits to be written together, in so many pieces (the system takes 1024).
+const WAITING_BYTES: usize = 1 << 20;
+const WAITING_PIECES: usize = 512;
+
+/// A piece of the output that waits to be written.
+enum Piece<'a> {
+    /// Of the input, where it lies.
+    Run(&'a [u8]),
+    /// The next so many bytes of the sink's own.
+    Own(usize),
+}
+
+/// The output file, and what waits to be written to it.
 struct Sink<'a> {
     mesh: &'a MeshFile,
     path: &'a Path,
     /// Copies inside the kernel are not to be had between all file systems.
     kernel_copies: bool,
     file: File,
-    buffer: Vec<u8>,
+    waiting: Vec<Piece<'a>>,
+    waiting_bytes: usize,
+    /// What is small or not the input's.
+    own: Vec<u8>,
     behind: WriteBehind,
     /// How the input is read where it is not copied inside the kernel, and how far that was asked for.
     guide: Guide<'a>,
@@ -66,25 +85,37 @@ struct Sink<'a> {
 }
 
 impl<'a> Sink<'a> {
-    const BUFFER_BYTES: usize = 1 << 20;
-
     fn create(mesh: &'a MeshFile, path: &'a Path, limits: &Limits, progress: &'a dyn Progress) -> Result<Self> {
         let file = create(path).map_err(Error::io(path, "creating"))?;
-        let buffer = Vec::with_capacity(Self::BUFFER_BYTES.min(mesh.bytes().len()));
         let behind = WriteBehind::new(&file, limits).map_err(Error::io(path, "creating"))?;
         let guide = Guide::new(mesh.records().as_flattened(), limits);
-        Ok(Self { mesh, path, kernel_copies: true, file, buffer, behind, guide, asked: 0, written: 0, progress })
+        let (waiting, own) = (Vec::new(), Vec::new());
+        Ok(Self {
+            mesh,
+            path,
+            kernel_copies: true,
+            file,
+            waiting,
+            waiting_bytes: 0,
+            own,
+            behind,
+            guide,
+            asked: 0,
+            written: 0,
+            progress,
+        })
     }
 
     fn put(&mut self, bytes: &[u8]) -> Result<()> {
-        if self.buffer.len() + bytes.len() > Self::BUFFER_BYTES {
-            self.flush()?;
+        self.own.extend_from_slice(bytes);
+        match self.waiting.last_mut() {
+            Some(Piece::Own(count)) => *count += bytes.len(),
+            _ => self.waiting.push(Piece::Own(bytes.len())),
         }
-        self.buffer.extend_from_slice(bytes);
-        Ok(())
+        self.wait_for_more(bytes.len())
     }
 
-    fn put_run(&mut self, run: &[Record]) -> Result<()> {
+    fn put_run(&mut self, run: &'a [Record]) -> Result<()> {
         let bytes = run.as_flattened();
         if bytes.len() < KERNEL_COPY_BYTES {
             self.guide.keep_ahead(&mut self.asked, bytes);
@@ -92,16 +123,25 @@ impl<'a> Sink<'a> {
         self.put_bytes(bytes)
     }
 
-    fn put_bytes(&mut self, bytes: &[u8]) -> Result<()> {
-        if bytes.len() < KERNEL_COPY_BYTES {
+    fn put_bytes(&mut self, bytes: &'a [u8]) -> Result<()> {
+        if bytes.len() < COPIED_BYTES {
             return self.put(bytes);
+        }
+        if bytes.len() < KERNEL_COPY_BYTES {
+            self.waiting.push(Piece::Run(bytes));
+            return self.wait_for_more(bytes.len());
         }
         self.flush()?;
         for part in bytes.chunks(COPY_BYTES) {
-            self.copy_large(part).map_err(Error::io(self.path, "writing"))?;
+            self.copy_large(part).map_err(|e| self.failed(e))?;
             self.account(part.len())?;
         }
         Ok(())
+    }
+
+    fn wait_for_more(&mut self, bytes: usize) -> Result<()> {
+        self.waiting_bytes += bytes;
+        if self.waiting_bytes >= WAITING_BYTES || self.waiting.len() >= WAITING_PIECES { self.flush() } else { Ok(()) }
     }
 
     /// Copies inside the kernel where the bytes lie in the input file, and writes them otherwise.
@@ -117,11 +157,31 @@ impl<'a> Sink<'a> {
         self.file.write_all(bytes)
     }
 
+    /// Writes what waits, from where it lies.
     fn flush(&mut self) -> Result<()> {
-        self.file.write_all(&self.buffer).map_err(Error::io(self.path, "writing"))?;
-        let written = self.buffer.len();
-        self.buffer.clear();
+        let mut own = self.own.as_slice();
+        let mut pieces: Vec<IoSlice<'_>> = Vec::with_capacity(self.waiting.len());
+        pieces.extend(self.waiting.iter().map(|piece| match piece {
+            Piece::Run(bytes) => IoSlice::new(bytes),
+            Piece::Own(count) => {
+                let (bytes, rest) = own.split_at(*count);
+                own = rest;
+                IoSlice::new(bytes)
+            }
+        }));
+        write_all(&mut self.file, &mut pieces).map_err(|e| self.failed(e))?;
+        let written = std::mem::take(&mut self.waiting_bytes);
+        self.waiting.clear();
+        self.own.clear();
         self.account(written)
+    }
+
+    /// Memory that cannot be read is a part of the input that is not there any more.
+    fn failed(&self, error: io::Error) -> Error {
+        if error.raw_os_error() == Some(Errno::FAULT.raw_os_error()) {
+            return Error::Changed { path: self.mesh.path().into() };
+        }
+        Error::io(self.path, "writing")(error)
     }
 
     fn account(&mut self, written: usize) -> Result<()> {
@@ -148,6 +208,20 @@ impl<'a> Sink<'a> {
         };
         Ok(Written { path: path.into(), syncing })
     }
+}
+
+fn write_all(file: &mut File, mut pieces: &mut [IoSlice<'_>]) -> io::Result<()> {
+    // There may be nothing, and pieces of no bytes.
+    IoSlice::advance_slices(&mut pieces, 0);
+    while !pieces.is_empty() {
+        match file.write_vectored(pieces) {
+            Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
+            Ok(count) => IoSlice::advance_slices(&mut pieces, count),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
 }
 
 /// Larger files are read again while the last of them goes to the disk.

@@ -36,7 +36,12 @@ impl Grid {
     /// Bits along x, and ends along y and z. Monotonous in the box, so boxes that meet share a cell.
     #[inline(always)]
     fn place(&self, bounds: &Bounds) -> (u32, (usize, usize), (usize, usize)) {
-        let at = |x: f32, k: usize| (((x - self.lo[k]) * self.per_unit[k]) as i32).clamp(0, Self::SIDE as i32 - 1) as usize;
+        // Rounded to a whole number by the size of what is added; what is not a number becomes 0.
+        const WHOLE: f32 = (1 << 23) as f32;
+        let at = |x: f32, k: usize| {
+            let cell = ((x - self.lo[k]) * self.per_unit[k]).max(0.0).min((Self::SIDE - 1) as f32);
+            (cell + WHOLE).to_bits() as usize % Self::SIDE
+        };
         let ends = |k: usize| (at(bounds.lo[k], k), at(bounds.hi[k], k));
         let (x0, x1) = ends(0);
         ((u32::MAX << x0) & (u32::MAX >> (31 - x1)), ends(1), ends(2))
@@ -46,6 +51,11 @@ impl Grid {
     #[inline(always)]
     pub(crate) fn may_meet(&self, bounds: &Bounds) -> bool {
         let (bits, (y0, y1), (z0, z1)) = self.place(bounds);
+        if (y1 - y0) | (z1 - z0) <= 1 {
+            // Nearly all of them. Up to four rows, without asking how many.
+            let row = |y: usize, z: usize| self.rows[z * Self::SIDE + y];
+            return (row(y0, z0) | row(y1, z0) | row(y0, z1) | row(y1, z1)) & bits != 0;
+        }
         (z0..=z1).any(|z| self.rows[z * Self::SIDE + y0..=z * Self::SIDE + y1].iter().any(|row| row & bits != 0))
     }
 }

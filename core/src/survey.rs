@@ -11,7 +11,6 @@ use crate::budget::{Budget, Purpose};
 use crate::chunk::{self, ChunkTopology, Labels, Link, NONE, Patch, Scratch, Suspect};
 use crate::crossings::{self, Crossings, Pair};
 use crate::error::{Error, Result};
-use crate::grid::Grid;
 use crate::members::Members;
 use crate::plan::{ChunkId, HomeBox, Plan};
 use crate::record::{self, Record};
@@ -19,7 +18,7 @@ use crate::report::SelfIntersections;
 use crate::settings::Limits;
 use crate::source::{Seen, Source, Triangle};
 use crate::sums::{Bounds, Measure};
-use crate::weld::Weld;
+use crate::weld::{Sieve, Weld};
 use crate::{Progress, edit, radix};
 
 /// Topology of the sound part of a file, and the list of what is not sound.
@@ -250,16 +249,16 @@ impl<'a> Survey<'a> {
             (self.records, &self.guide, &self.plan),
             self.threads,
             |chunk| !at_home(chunk).is_empty(),
-            Grid::default,
-            |grid, chunk, seen, _| {
-                grid.mark(at_home(chunk).iter().map(|(_, p)| Bounds::of(&[*p])));
+            Sieve::default,
+            |sieve, chunk, seen, _| {
+                sieve.fill(at_home(chunk).iter().map(|(_, p)| *p));
                 let patches = self.patches_of(chunk);
                 let mut labels = self.labels[chunk.0 as usize].iter();
                 let mut found = Vec::new();
                 seen.for_each(|triangle, place| {
                     let patch = labels.next().unwrap_or(NONE);
                     let corners = place.corners();
-                    if !grid.may_meet(&Bounds::of(&corners)) {
+                    if !sieve.may_hold(&corners) {
                         return;
                     }
                     let unsound = (0..3).filter(|k| wanted.find(corners[*k]).is_some()).fold(0, |mask, k| mask | 1 << k);

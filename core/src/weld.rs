@@ -167,6 +167,42 @@ impl Weld {
 }
 
 /// −0.0 becomes 0.0.
+/// A set of positions that is asked often and seldom holds what is asked for: a bit for each hash.
+#[derive(Default)]
+pub(crate) struct Sieve {
+    bits: Vec<u64>,
+}
+
+impl Sieve {
+    /// Holds these positions from now on, and no others. Most that are asked for should not be among the first thousands.
+    pub(crate) fn fill(&mut self, positions: impl Iterator<Item = Point>) {
+        self.bits.clear();
+        self.bits.resize((1 << Self::BITS) / 64, 0);
+        positions.map(Self::place).for_each(|(word, bit)| self.bits[word] |= 1 << bit);
+    }
+
+    /// False only if none of the corners is held.
+    #[inline(always)]
+    pub(crate) fn may_hold(&self, corners: &[Point; 3]) -> bool {
+        let bit = |p: Point| {
+            let (word, bit) = Self::place(p);
+            self.bits[word] >> bit
+        };
+        (bit(corners[0]) | bit(corners[1]) | bit(corners[2])) & 1 == 1
+    }
+
+    /// 8 KiB: stays in the nearest cache.
+    const BITS: u32 = 16;
+
+    #[inline(always)]
+    fn place(p: Point) -> (usize, u32) {
+        let [x, y, z] = normalised(p).map(f32::to_bits);
+        let h = x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA77) ^ z.wrapping_mul(0xC2B2_AE3D);
+        let h = (h ^ h >> 15).wrapping_mul(0x2C1B_3C6D) >> (32 - Self::BITS);
+        (h as usize / 64, h % 64)
+    }
+}
+
 #[inline(always)]
 fn normalised(p: Point) -> Point {
     [p[0] + 0.0, p[1] + 0.0, p[2] + 0.0]
@@ -206,6 +242,11 @@ mod tests {
                 prop_assert_eq!(weld.vertex(position), want);
                 prop_assert_eq!(weld.find(p.map(f32::from)), Some(want));
             }
+            let mut sieve = Sieve::default();
+            sieve.fill(weld.positions().iter().copied());
+            let signed = |p: &[i8; 3]| p.map(|x| if x == 0 { -0.0 } else { f32::from(x) });
+            let all_held = points.iter().all(|p| sieve.may_hold(&[[9.0; 3], [9.0; 3], signed(p)]));
+            prop_assert!(all_held);
             prop_assert_eq!(weld.positions().len(), known.len());
             prop_assert!(weld.positions().iter().flatten().all(|x| x.to_bits() != (-0f32).to_bits()));
         }

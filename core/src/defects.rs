@@ -44,7 +44,7 @@ pub(crate) fn count(survey: &Survey<'_>, shop: &Shop, edges: &Edges, tolerance: 
         self_intersections: survey.self_intersections.clone(),
         bounds: (!survey.bounds.is_empty()).then_some([survey.bounds.lo, survey.bounds.hi]),
         area: survey.measure.area(total),
-        volume: survey.measure.volume(total),
+        volume: survey.measure.volume(total) + survey.volume_beside,
         ..by_edges
     };
     if defects.boundary_edges + defects.nonmanifold_edges + defects.nonmanifold_vertices == 0 {

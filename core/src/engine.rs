@@ -9,6 +9,7 @@ use crate::ahead::Guide;
 use crate::edit::Edit;
 use crate::error::{Error, Result};
 use crate::read::{MeshFile, PREFIX_BYTES};
+use crate::readback::Expectation;
 use crate::report::{Cost, Defects, EditSummary, FileFacts, Outcome, Report, SCHEMA_VERSION, Stage, Task, Tolerances};
 use crate::settings::{Limits, Profile, folder_of};
 use crate::shop::Shop;
@@ -17,7 +18,7 @@ use crate::shop::near::Tolerance;
 use crate::space::{self, Need};
 use crate::sums::Bounds;
 use crate::survey::Survey;
-use crate::{Progress, cost, defects, emit, members, parallel, readback, repairs, second, verdict};
+use crate::{Progress, cost, defects, emit, members, parallel, repairs, second, verdict};
 
 /// Fewer bytes are hashed by one thread: starting more would take longer.
 const HASHED_BY_ONE: usize = 1 << 20;
@@ -186,19 +187,29 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     let survey = diagnosis.survey;
     // Good as it came, or nothing in it could be repaired.
     let same = edit.is_empty() && flaws(&mesh).is_empty();
-    let (hash, written) = hash_beside(&mesh, limits, || match same {
+    let is_worthwhile = !same && second::is_worthwhile(edit.gone(), edit.added.len() as u64, mesh.records().len());
+    let expected = is_worthwhile.then(|| Expectation::of(mesh.records(), &edit));
+    let emit = || match same {
         true => emit::copy(&mesh, output, limits, progress),
         false => emit::write(&mesh, &edit, output, limits, progress),
-    })?;
+    };
+    // What the file will hold is looked at while it is written. It counts when the file was read back and does hold that.
+    let look = || {
+        let hash = hash_blocks(mesh.bytes(), limits, Hasher::update);
+        let looked = expected.as_ref().and_then(|expected| second::look(survey, &expected.difference));
+        (hash, looked.map(|(survey, shop)| Diagnosis::count(survey, shop, profile).defects))
+    };
+    let threads = if mesh.bytes().len() < HASHED_BY_ONE { 1 } else { limits.threads };
+    let (written, (hash, looked)) = parallel::both(threads, emit, look);
+    let written = written?;
     report.input.blake3 = hash;
     clock.lap("emit");
     report.edit = edit.summary(mesh.records().len());
     report.edit_records = limits.list_edit.then(|| edit.listed());
     if same {
-        drop(survey);
         confirm_copy(&mut report, &mesh, output, limits, progress)?;
     } else {
-        verify(&mut report, &mesh, &surface, (survey, edit), output, limits, progress)?;
+        verify(&mut report, &mesh, &surface, expected.map(|expected| (expected, looked)), output, limits, progress)?;
     }
     written.durable()?;
     clock.lap("verify");
@@ -234,7 +245,7 @@ fn verify(
     report: &mut Report,
     input: &MeshFile,
     surface: &Bounds,
-    known: (Survey<'_>, Edit),
+    known: Option<(Expectation<'_>, Option<Defects>)>,
     output: &Path,
     limits: &Limits,
     progress: &dyn Progress,
@@ -249,7 +260,7 @@ fn verify(
         }
         other => other?,
     };
-    let (blake3, defects) = look_again(input, known, &written, &report.profile, limits, progress)?;
+    let (blake3, defects) = look_again(known, &written, &report.profile, limits, progress)?;
     let facts = facts(&written, blake3);
     report.verdict = verdict::judge(&defects, &flaws(&written));
     report.outcome = if report.verdict.good { Outcome::Repaired } else { Outcome::NotGood };
@@ -269,27 +280,24 @@ fn verify(
     Ok(())
 }
 
-/// The hash and the defects of a written file: by its difference from the input, or, where that does not tell or is too large, by a survey
-/// of its own.
+/// The hash and the defects of a written file: what was `known` of it before, if it holds what it should, or else by a survey of its own.
 fn look_again(
-    input: &MeshFile,
-    (survey, edit): (Survey<'_>, Edit),
+    known: Option<(Expectation<'_>, Option<Defects>)>,
     written: &MeshFile,
     profile: &Profile,
     limits: &Limits,
     progress: &dyn Progress,
 ) -> Result<(String, Defects)> {
-    let blake3 = if second::is_worthwhile(edit.gone(), edit.added.len() as u64, input.records().len()) {
-        let (blake3, difference) = readback::compare(input.records(), &edit, written, limits, progress)?;
-        drop(edit);
-        if let Some((survey, shop)) = second::look(survey, &difference) {
-            return Ok((blake3, Diagnosis::count(survey, shop, profile).defects));
+    let blake3 = match known {
+        Some((expected, looked)) => {
+            let blake3 = expected.confirm(written, limits, progress)?;
+            if let Some(defects) = looked {
+                return Ok((blake3, defects));
+            }
+            tracing::debug!("The difference does not tell: the written file is surveyed.");
+            blake3
         }
-        tracing::debug!("The difference does not tell: the written file is surveyed.");
-        blake3
-    } else {
-        drop((survey, edit));
-        hash(written, limits, progress)
+        None => hash(written, limits, progress),
     };
     let diagnosis = Diagnosis::of(written.path(), written.records(), profile, limits, progress)?;
     Ok((blake3, diagnosis.defects))
@@ -314,20 +322,6 @@ fn facts(mesh: &MeshFile, blake3: String) -> FileFacts {
         triangles: mesh.records().len() as u64,
         findings: mesh.findings().iter().map(|f| f.text.clone()).collect(),
     }
-}
-
-/// Hashes the input while `write`, which keeps one thread busy at most, is under way; before it where there is but one thread.
-fn hash_beside<R>(mesh: &MeshFile, limits: &Limits, write: impl FnOnce() -> Result<R>) -> Result<(String, R)> {
-    if limits.threads < 2 || mesh.bytes().len() < HASHED_BY_ONE {
-        let hash = hash_blocks(mesh.bytes(), limits, Hasher::update);
-        return write().map(|written| (hash, written));
-    }
-    std::thread::scope(|scope| {
-        let hashing = scope.spawn(|| hash_blocks(mesh.bytes(), limits, Hasher::update));
-        let written = write();
-        let hash = hashing.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-        written.map(|written| (hash, written))
-    })
 }
 
 fn hash(mesh: &MeshFile, limits: &Limits, progress: &dyn Progress) -> String {

@@ -28,12 +28,6 @@ pub(crate) struct Difference {
 }
 
 impl Difference {
-    /// As if the written file had been read back.
-    #[cfg(test)]
-    pub(crate) fn expected(input: &[Record], edit: &Edit) -> Self {
-        expect(input, edit).0
-    }
-
     /// The number, in the written file, of the record at a place.
     pub(crate) fn number(&self, place: u32) -> u32 {
         place - self.deleted.partition_point(|d| *d < place) as u32
@@ -66,80 +60,75 @@ impl Stretch<'_> {
     }
 }
 
-/// What the written file should hold, and how that differs from the input.
-fn expect<'a>(input: &'a [Record], edit: &'a Edit) -> (Difference, Vec<Stretch<'a>>) {
-    let mut found = Difference::default();
-    let mut stretches = Vec::new();
-    let walked: std::result::Result<(), std::convert::Infallible> = edit.walk(input, |step| {
-        let fresh = found.fresh.len();
-        let expected = match step {
-            Step::Untouched(run) => Expected::Input(run),
-            Step::Changed(place, record) => {
-                found.gone.push(place);
-                found.fresh.push((place, record));
-                Expected::Fresh(fresh)
-            }
-            Step::Deleted(place) => {
-                found.gone.push(place);
-                found.deleted.push(place);
-                return Ok(());
-            }
-            Step::Added(record) => {
-                let place = found.fresh.last().map_or(0, |(last, _)| last + 1).max(input.len() as u32);
-                found.fresh.push((place, *record));
-                Expected::Fresh(fresh)
-            }
-        };
-        let stretch = Stretch { first: found.written_records, expected };
-        found.written_records += stretch.count();
-        stretches.push(stretch);
-        Ok(())
-    });
-    let Ok(()) = walked;
-    (found, stretches)
+/// What a written file should hold.
+pub(crate) struct Expectation<'a> {
+    pub(crate) difference: Difference,
+    input: &'a [Record],
+    stretches: Vec<Stretch<'a>>,
 }
 
-/// Reads `written` back, which should be `input` as `edit` leaves it: its BLAKE3, and how it differs from the input.
-///
-/// # Errors
-/// [`Error::Io`] where it does not hold what was written.
-pub(crate) fn compare(
-    input: &[Record],
-    edit: &Edit,
-    written: &MeshFile,
-    limits: &Limits,
-    progress: &dyn Progress,
-) -> Result<(String, Difference)> {
-    let (records, bytes) = (written.records(), written.bytes());
-    let (found, stretches) = expect(input, edit);
-    let is_whole = found.written_records == records.len() && bytes.len() == PREFIX_BYTES + size_of_val(records);
-    let read = || hash_and_compare(input, &stretches, &found.fresh, written, limits, progress);
-    let (hash, equal) =
-        if limits.threads < 2 || records.len() < READ_BY_ONE { read() } else { parallel::in_pool(limits.threads, read) };
-    if !(is_whole && equal) {
-        let source = std::io::Error::other("the file does not hold what was written to it");
-        return Err(Error::io(written.path(), "reading back")(source));
+impl<'a> Expectation<'a> {
+    /// The input as `edit` leaves it. O(edit), or one step a run of untouched records.
+    pub(crate) fn of(input: &'a [Record], edit: &'a Edit) -> Self {
+        let mut difference = Difference::default();
+        let mut stretches = Vec::new();
+        let walked: std::result::Result<(), std::convert::Infallible> = edit.walk(input, |step| {
+            let fresh = difference.fresh.len();
+            let expected = match step {
+                Step::Untouched(run) => Expected::Input(run),
+                Step::Changed(place, record) => {
+                    difference.gone.push(place);
+                    difference.fresh.push((place, record));
+                    Expected::Fresh(fresh)
+                }
+                Step::Deleted(place) => {
+                    difference.gone.push(place);
+                    difference.deleted.push(place);
+                    return Ok(());
+                }
+                Step::Added(record) => {
+                    let place = difference.fresh.last().map_or(0, |(last, _)| last + 1).max(input.len() as u32);
+                    difference.fresh.push((place, *record));
+                    Expected::Fresh(fresh)
+                }
+            };
+            let stretch = Stretch { first: difference.written_records, expected };
+            difference.written_records += stretch.count();
+            stretches.push(stretch);
+            Ok(())
+        });
+        let Ok(()) = walked;
+        Self { difference, input, stretches }
     }
-    Ok((hash, found))
+
+    /// Reads `written` back: its BLAKE3, if it holds what it should.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where it does not.
+    pub(crate) fn confirm(&self, written: &MeshFile, limits: &Limits, progress: &dyn Progress) -> Result<String> {
+        let (records, bytes) = (written.records(), written.bytes());
+        let is_whole = self.difference.written_records == records.len() && bytes.len() == PREFIX_BYTES + size_of_val(records);
+        let read = || hash_and_compare(self, written, limits, progress);
+        let (hash, equal) =
+            if limits.threads < 2 || records.len() < READ_BY_ONE { read() } else { parallel::in_pool(limits.threads, read) };
+        if !(is_whole && equal) {
+            let source = std::io::Error::other("the file does not hold what was written to it");
+            return Err(Error::io(written.path(), "reading back")(source));
+        }
+        Ok(hash)
+    }
 }
 
-fn hash_and_compare(
-    input: &[Record],
-    stretches: &[Stretch<'_>],
-    fresh: &[(u32, Record)],
-    written: &MeshFile,
-    limits: &Limits,
-    progress: &dyn Progress,
-) -> (String, bool) {
+fn hash_and_compare(expected: &Expectation<'_>, written: &MeshFile, limits: &Limits, progress: &dyn Progress) -> (String, bool) {
     let (records, bytes) = (written.records(), written.bytes());
-    let input_guide = Guide::new(input.as_flattened(), limits);
+    let input_guide = Guide::new(expected.input.as_flattened(), limits);
     let mut hasher = Hasher::new();
     hasher.update(&bytes[..bytes.len().min(PREFIX_BYTES)]);
     let (mut equal, mut stretch, mut first, mut asked) = (true, 0, 0, 0);
     for block in Guide::new(records.as_flattened(), limits).blocks(records).flat_map(|block| block.chunks(BLOCK_RECORDS)) {
         let mut compare = || {
             let end = first + block.len();
-            while let Some(next) = stretches.get(stretch).filter(|s| s.first < end) {
+            while let Some(next) = expected.stretches.get(stretch).filter(|s| s.first < end) {
                 let (from, to) = (next.first.max(first), (next.first + next.count()).min(end));
                 let there = &block[from - first..to - first];
                 equal &= match next.expected {
@@ -148,7 +137,7 @@ fn hash_and_compare(
                         input_guide.keep_ahead(&mut asked, run.as_flattened());
                         run == there
                     }
-                    Expected::Fresh(i) => there == [fresh[i].1],
+                    Expected::Fresh(i) => there == [expected.difference.fresh[i].1],
                 };
                 if next.first + next.count() > end {
                     break;
@@ -197,6 +186,7 @@ mod tests {
         let edit = Edit::of(&d.survey, &d.shop, &Reversed::none(&d.survey));
         let output = written(&edit, &input);
 
+        let expectation = Expectation::of(&input, &edit);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("part.stl");
         let mut bytes = [&[0; 80][..], &(output.len() as u32).to_le_bytes(), output.as_flattened()].concat();
@@ -204,10 +194,10 @@ mod tests {
             let limits = Limits { threads, ..Limits::default() };
             let read = |bytes: &[u8]| {
                 std::fs::write(&path, bytes).unwrap();
-                compare(&input, &edit, &open(&path), &limits, &Quiet)
+                expectation.confirm(&open(&path), &limits, &Quiet)
             };
-            let (hash, found) = read(&bytes).unwrap();
-            assert_eq!(hash, blake3::hash(&bytes).to_hex().to_string());
+            assert_eq!(read(&bytes).unwrap(), blake3::hash(&bytes).to_hex().to_string());
+            let found = &expectation.difference;
             assert_eq!(found.written_records, output.len());
             let gone = found.gone.iter().map(|t| input[*t as usize]);
             assert!(gone.clone().all(|record| !found.fresh.iter().any(|f| f.1 == record)) && gone.len() > 3);

@@ -1,12 +1,14 @@
 //! The second look at a file by its difference from the input.
 //!
-//! The written file was read back, and all but a few of its records are the input's, byte for byte ([`crate::readback`]). A vertex none of
+//! All but a few of its records are the input's, byte for byte, which is confirmed when it is read back ([`crate::readback`]). A vertex none of
 //! whose triangles came, went or changed has the star it had; the others are **disturbed**. All triangles around disturbed vertices
-//! and around those that were not sound before go to a new workshop, from the written records, where they are counted as any file's. What
+//! and around those that were not sound before go to a new workshop, from the records that are written, where they are counted as any file's. What
 //! is left of the input's patches is sound as it was.
 //!
 //! What cannot be shown to hold in this way is looked at anew: [`look`] returns nothing then, and the file is surveyed as if nothing were
 //! known of it. Whether it comes to that depends on input and edit alone.
+
+use glam::DVec3;
 
 use crate::chunk::{self, NONE, Suspect};
 use crate::fresh;
@@ -14,7 +16,7 @@ use crate::readback::Difference;
 use crate::record;
 use crate::shop::edges::Edges;
 use crate::shop::{self, Gathered, Shop, has_repeated};
-use crate::sums::Bounds;
+use crate::sums::{Bounds, Measure};
 use crate::survey::Survey;
 use crate::weld::Weld;
 
@@ -46,12 +48,9 @@ pub(crate) fn look<'a>(mut survey: Survey<'a>, difference: &Difference) -> Optio
     if !around.keep_patches_whole(&survey, &shop, &edges) {
         return None;
     }
-    let measured_in = survey.bounds;
     around.count(&mut survey, &shop, difference);
-    // The volume of what is not closed depends on the middle of the box.
-    if survey.bounds != measured_in && edges.iter().any(|e| e.is_unbalanced()) {
-        return None;
-    }
+    // The volume of what is not closed depends on the middle of the box, which may be another now.
+    survey.volume_beside = survey.measure.volume_seen_from(&Measure::new(&survey.bounds), vector_area(&shop, &edges));
     if let Some(pairs) = survey.self_intersections.is_some().then(|| fresh::self_intersections(&survey, difference)) {
         survey.self_intersections = Some(pairs?);
     }
@@ -248,6 +247,16 @@ impl Disturbed {
         bounds.include(&shop.positions);
         survey.bounds = bounds.normalised();
     }
+}
+
+/// The sum of the triangles' normals, each as long as its area: half the sum of a × b over the edges from a to b that bound the surface
+/// (Stokes). None for closed surfaces.
+fn vector_area(shop: &Shop, edges: &Edges) -> [f64; 3] {
+    let bounding = edges.iter().filter(|e| e.is_unbalanced()).map(|e| {
+        let net: f64 = e.uses.iter().map(|u| if u.forward { 1.0 } else { -1.0 }).sum();
+        net * shop.place(e.low).cross(shop.place(e.high)) / 2.0
+    });
+    bounding.sum::<DVec3>().to_array()
 }
 
 /// Notes which vertices a triangle has, and whether it has three.

@@ -115,6 +115,11 @@ impl Measure {
         Self { middle, to_area: power_of_two(40 - 2 * exponent), to_volume: power_of_two(40 - 3 * exponent) }
     }
 
+    /// How much the volume of a surface changes when it is taken from the middle of `other` instead, by the surface's vector area.
+    pub(crate) fn volume_seen_from(&self, other: &Self, vector_area: [f64; 3]) -> f64 {
+        (0..3).map(|k| (self.middle[k] - other.middle[k]) * vector_area[k] / 3.0).sum()
+    }
+
     /// One triangle's terms.
     #[inline]
     pub(crate) fn triangle(&self, corners: &[[f32; 3]; 3]) -> Extent {

@@ -41,6 +41,8 @@ pub(crate) struct Survey<'a> {
     pub(crate) self_intersections: Option<SelfIntersections>,
     /// All of their pairs, unless there are too many to keep.
     pub(crate) crossing_pairs: Option<Vec<Pair>>,
+    /// To be added to the volume in units of `measure`: not 0 only after a second look at what is open in another box.
+    pub(crate) volume_beside: f64,
     /// Sound vertices whose triangles were made suspects.
     pub(crate) promoted: Vec<[f32; 3]>,
     /// Distinct positions, and those used by a triangle with three distinct vertices.
@@ -141,6 +143,7 @@ impl<'a> Survey<'a> {
             nonfinite,
             self_intersections,
             crossing_pairs,
+            volume_beside: 0.0,
             promoted: Vec::new(),
             vertices: chunks.iter().map(|c| c.vertices).sum(),
             vertices_used: chunks.iter().map(|c| c.vertices_used).sum(),

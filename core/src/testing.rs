@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use crate::edit::{Edit, Step};
 use crate::engine::Diagnosis;
-use crate::readback::Difference;
+use crate::readback::Expectation;
 use crate::record::{self, Record};
 use crate::report::{Defects, Verdict};
 use crate::settings::{Limits, Profile};
@@ -82,7 +82,7 @@ pub(crate) fn after<R>(triangles: &[Corners], repair: impl FnOnce(&mut Diagnosis
 
 /// The second look by the difference, if it comes to anything, must find what a look at everything finds. Says if it came to anything.
 pub(crate) fn check_second_look(survey: Survey<'_>, edit: &Edit, anew: &Defects) -> bool {
-    let difference = Difference::expected(survey.records, edit);
+    let difference = Expectation::of(survey.records, edit).difference;
     let Some((survey, shop)) = second::look(survey, &difference) else { return false };
     let mut defects = Diagnosis::count(survey, shop, &Profile::default()).defects;
     // Sums are rounded by the box they are taken in, which may be another.

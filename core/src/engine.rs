@@ -88,6 +88,11 @@ impl<'a> Diagnosis<'a> {
         Self { survey, shop, tolerance, defects }
     }
 
+    /// Gives the memory of everything else back.
+    fn into_survey(self) -> Survey<'a> {
+        self.survey
+    }
+
     /// The box of all triangles that have an area.
     fn surface_bounds(&self) -> Bounds {
         let mut bounds = Bounds::EMPTY;
@@ -184,7 +189,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
         report.loops_left = repaired.loops_left;
     }
     // Of the input's survey, the second look may go on; the memory of its workshop is needed for that of the output.
-    let survey = diagnosis.survey;
+    let survey = diagnosis.into_survey();
     // Good as it came, or nothing in it could be repaired.
     let same = edit.is_empty() && flaws(&mesh).is_empty();
     let is_worthwhile = !same && second::is_worthwhile(edit.gone(), edit.added.len() as u64, mesh.records().len());

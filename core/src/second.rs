@@ -15,7 +15,7 @@ use crate::fresh;
 use crate::readback::Difference;
 use crate::record;
 use crate::shop::edges::Edges;
-use crate::shop::{self, Gathered, Shop, has_repeated};
+use crate::shop::{self, Gathering, Shop, has_repeated};
 use crate::sums::{Bounds, Measure};
 use crate::survey::Survey;
 use crate::weld::Weld;
@@ -51,6 +51,7 @@ pub(crate) fn look<'a>(mut survey: Survey<'a>, difference: &Difference) -> Optio
     around.count(&mut survey, &shop, difference);
     // The volume of what is not closed depends on the middle of the box, which may be another now.
     survey.volume_beside = survey.measure.volume_seen_from(&Measure::new(&survey.bounds), vector_area(&shop, &edges));
+    drop((around, edges));
     if let Some(pairs) = survey.self_intersections.is_some().then(|| fresh::self_intersections(&survey, difference)) {
         survey.self_intersections = Some(pairs?);
     }
@@ -121,7 +122,7 @@ impl Disturbed {
 
     /// The triangles of the written file around these vertices, by place.
     fn gather(&mut self, survey: &Survey<'_>, difference: &Difference) -> Shop {
-        let mut triangles = Vec::with_capacity(survey.suspects.len() + difference.fresh.len());
+        let mut gathering = Gathering::of(survey.suspects.len() + difference.fresh.len());
         let mut fresh = difference.fresh.iter().peekable();
         let mut gone = difference.gone.iter().peekable();
         let mut add = |this: &mut Self, place: u32, corners: [[f32; 3]; 3], patch: u32| {
@@ -131,7 +132,7 @@ impl Disturbed {
             let patch = if at.contains(&NONE) { patch } else { NONE };
             let complete = (0..3).fold(0, |mask, k| mask | u8::from(at[k] != NONE) << k);
             this.corners.push(at);
-            triangles.push(Gathered { place, corners, complete, patch });
+            gathering.add(place, corners, complete, patch);
         };
         for (i, (suspect, patch)) in survey.suspects.iter().zip(&survey.suspect_patches).enumerate() {
             if i % shop::ASKED_AT_ONCE == 0 {
@@ -150,7 +151,7 @@ impl Disturbed {
             }
         }
         fresh.for_each(|(place, record)| add(self, *place, record::corners(record), NONE));
-        Shop::of(triangles.into_iter())
+        gathering.finish()
     }
 
     /// Brings the patches up to date, whose disturbed vertices are no part of them any more. Fails if it is not known how far what is

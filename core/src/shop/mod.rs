@@ -51,15 +51,38 @@ impl Triangle {
     }
 }
 
-/// A triangle that a workshop is made with.
-pub(crate) struct Gathered {
-    /// Its record in the input.
-    pub(crate) place: u32,
-    pub(crate) corners: [[f32; 3]; 3],
-    /// Which of its vertices have their whole star here (bit k: corner k).
-    pub(crate) complete: u8,
-    /// The patch of its other corners, or [`NONE`].
-    pub(crate) patch: u32,
+/// A workshop that is being made.
+pub(crate) struct Gathering {
+    weld: Weld,
+    complete: Vec<bool>,
+    triangles: Vec<Triangle>,
+}
+
+impl Gathering {
+    /// Of about so many triangles.
+    pub(crate) fn of(triangles: usize) -> Self {
+        let mut weld = Weld::default();
+        weld.reset(triangles);
+        Self { weld, complete: Vec::new(), triangles: Vec::with_capacity(triangles) }
+    }
+
+    /// Adds the triangle that is or stands in for the record at `place`, of whose vertices some have their whole star here (bit k of
+    /// `complete`: corner k), and the others belong to `patch`, or [`NONE`].
+    pub(crate) fn add(&mut self, place: u32, corners: [[f32; 3]; 3], complete: u8, patch: u32) {
+        let v = corners.map(|p| self.weld.vertex(p));
+        self.complete.resize(self.weld.positions().len(), false);
+        for (k, vertex) in v.iter().enumerate() {
+            self.complete[*vertex as usize] |= complete >> k & 1 == 1;
+        }
+        self.triangles.push(Triangle { v, origin: Origin::Input(place), patch, alive: true });
+    }
+
+    pub(crate) fn finish(self) -> Shop {
+        let Self { weld, complete, triangles } = self;
+        let mut shop = Shop { heads: Vec::new(), nexts: Vec::new(), positions: weld.into_positions(), complete, triangles };
+        shop.relink();
+        shop
+    }
 }
 
 /// The mesh under repair.
@@ -85,32 +108,14 @@ pub(crate) fn bytes(triangles: u64, vertices: u64) -> u64 {
 impl Shop {
     /// Gathers the suspects of `survey`. O(suspects).
     pub(crate) fn gather(survey: &Survey<'_>) -> Self {
-        Self::of(survey.suspects.iter().zip(&survey.suspect_patches).enumerate().map(|(i, (suspect, patch))| {
+        let mut gathering = Gathering::of(survey.suspects.len());
+        for (i, (suspect, patch)) in survey.suspects.iter().zip(&survey.suspect_patches).enumerate() {
             if i % ASKED_AT_ONCE == 0 {
                 survey.ask_for(survey.suspects[i..].iter().take(ASKED_AT_ONCE).map(|s| s.triangle));
             }
-            let corners = corners(survey.records, suspect.triangle);
-            Gathered { place: suspect.triangle, corners, complete: suspect.unsound, patch: *patch }
-        }))
-    }
-
-    /// A workshop of these triangles. O(n).
-    pub(crate) fn of(gathered: impl ExactSizeIterator<Item = Gathered>) -> Self {
-        let mut weld = Weld::default();
-        weld.reset(gathered.len());
-        let mut triangles = Vec::with_capacity(gathered.len());
-        let mut complete = Vec::new();
-        for one in gathered {
-            let v = one.corners.map(|p| weld.vertex(p));
-            complete.resize(weld.positions().len(), false);
-            for (k, vertex) in v.iter().enumerate() {
-                complete[*vertex as usize] |= one.complete >> k & 1 == 1;
-            }
-            triangles.push(Triangle { v, origin: Origin::Input(one.place), patch: one.patch, alive: true });
+            gathering.add(suspect.triangle, corners(survey.records, suspect.triangle), suspect.unsound, *patch);
         }
-        let mut shop = Self { heads: Vec::new(), nexts: Vec::new(), positions: weld.into_positions(), complete, triangles };
-        shop.relink();
-        shop
+        gathering.finish()
     }
 
     /// Takes in what [`Survey::promote`] has found for some of its incomplete vertices, which become complete.

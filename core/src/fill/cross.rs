@@ -94,8 +94,9 @@ fn one_sided(signs: [i8; 3]) -> bool {
 
 /// The interval that a triangle cuts out of the line common to both planes.
 struct Cut<'a> {
-    /// Edges on which the interval's two ends lie, each from the lower to the higher side of the other plane.
-    ends: [[&'a Point; 2]; 2],
+    /// The corner of the two edges on which the interval's ends lie, and the other corners of these edges.
+    apex: &'a Point,
+    others: [&'a Point; 2],
     /// The interval is one point: a corner.
     point: bool,
     /// The interval is an edge of the triangle.
@@ -115,27 +116,132 @@ impl<'a> Cut<'a> {
             0
         };
         let apex = signs.iter().position(|&s| s == alone).unwrap_or(0);
-        let end = |other: usize| if signs[apex] > signs[other] { [&t[other], &t[apex]] } else { [&t[apex], &t[other]] };
-        Self { ends: [end((apex + 1) % 3), end((apex + 2) % 3)], point: alone == 0, edge: count(0) == 2 }
+        let others = [&t[(apex + 1) % 3], &t[(apex + 2) % 3]];
+        Self { apex: &t[apex], others, point: alone == 0, edge: count(0) == 2 }
     }
 }
 
 fn on_common_line(a: &Cut<'_>, b: &Cut<'_>, shared: usize) -> Contact {
-    // Lines through the ends lie in different planes and cross the common line upwards, so the sign of the determinant says
-    // which end comes first, the same way round for all pairs.
-    let mut order = [0_i8; 4];
-    for (k, o) in order.iter_mut().enumerate() {
-        let (e, f) = (a.ends[k / 2], b.ends[k % 2]);
-        *o = side(e[0], e[1], f[0], f[1]);
+    // Lines through the ends lie in different planes and cross the common line, so the sign of the determinant says which end
+    // comes first: the same way round for all pairs, as a's edges both begin at its apex, on one side of b's plane, and so do b's.
+    let (mut below, mut above, mut equal) = (false, false, false);
+    for e in a.others {
+        let plane = Plane::new(a.apex, e, b.apex);
+        for f in b.others {
+            let order = plane.side(f);
+            (below, above, equal) = (below | (order < 0), above | (order > 0), equal | (order == 0));
+        }
     }
-    let (below, above) = (order.iter().any(|&o| o < 0), order.iter().any(|&o| o > 0));
-    if below != above && !order.contains(&0) {
+    if below != above && !equal {
         return Contact::Apart;
     }
     if a.point || b.point || !(below && above) {
         return if shared > 0 { Contact::Apart } else { Contact::Touch };
     }
     if a.edge && b.edge { Contact::Touch } else { Contact::Cross }
+}
+
+/// What rounded arithmetic says of two triangles.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub(crate) enum Sure {
+    /// Nothing.
+    No,
+    /// [`Contact::Apart`].
+    Apart,
+    /// [`Contact::Cross`].
+    Cross,
+}
+
+/// The contact of two triangles without a common corner as [`triangles_cross`] finds it, as long as no sign that it takes is in doubt
+/// or zero. Without branches, so that a loop over many pairs can be compiled to vectors.
+#[inline(always)]
+pub(crate) fn sure(a: &Triangle, b: &Triangle) -> Sure {
+    let (of_b, of_a) = (Sides::new(a, b), Sides::new(b, a));
+    let one_sided = of_b.all_above | of_b.all_below | of_a.all_above | of_a.all_below;
+    // As in `on_common_line`; meaningless where a plane has all corners on one side, or a sign is in doubt.
+    let ((p, others), (q, [f, g])) = (of_a.alone(a), of_b.alone(b));
+    let (mut below, mut above, mut all_below, mut all_above) = (false, false, true, true);
+    for e in others {
+        let plane = Plane::new(&p, &e, &q);
+        for f in [f, g] {
+            let (order, error) = plane.rounded(&f);
+            below |= order < -error;
+            above |= order > error;
+            all_below &= order < -error;
+            all_above &= order > error;
+        }
+    }
+    let signs = of_a.sure & of_b.sure;
+    let apart = one_sided | (signs & (all_below | all_above));
+    let cross = signs & !one_sided & below & above;
+    if apart {
+        Sure::Apart
+    } else if cross {
+        Sure::Cross
+    } else {
+        Sure::No
+    }
+}
+
+/// The same for two triangles of which `a[0]` and `b[0]` are one common corner, and the others either are not common, or of `a` one is
+/// and `b[1]` and `b[2]` are the corner of the other triangle that is not. Without branches too.
+///
+/// Where the other corners are on different sides of the other's plane, each triangle cuts out of the common line what begins at
+/// the common corner o and goes to the opposite edge. As in `on_common_line`, the order of o on the edge from p, the corner of a above
+/// b's plane, and the end on the edge from q, that of b above a's plane, is the sign of −det(p, q, q′) from o on; the order of
+/// the end of a and of o is that of −det(p, p′, q). The first is the side of p, above, turned round if (o, q, q′) runs against b,
+/// the second the side of q, above, turned round if (o, p, p′) runs against a. They cross where these are different.
+#[inline(always)]
+pub(crate) fn sure_of_neighbours(a: &Triangle, b: &Triangle) -> Sure {
+    let (of_a, of_b) = (Plane::new(&b[0], &b[1], &b[2]), Plane::new(&a[0], &a[1], &a[2]));
+    let [(p, x), (q, y)] = [of_a.rounded(&a[1]), of_a.rounded(&a[2])];
+    let [(r, z), (s, w)] = [of_b.rounded(&b[1]), of_b.rounded(&b[2])];
+    let one_sided = ((p > x) & (q > y)) | ((p < -x) & (q < -y)) | ((r > z) & (s > w)) | ((r < -z) & (s < -w));
+    let signs = (p.abs() > x) & (q.abs() > y) & (r.abs() > z) & (s.abs() > w);
+    let cross = (p > 0.0) != (r > 0.0);
+    if one_sided | (signs & !cross) {
+        Sure::Apart
+    } else if signs {
+        Sure::Cross
+    } else {
+        Sure::No
+    }
+}
+
+/// The sides of one triangle's plane on which the corners of another lie, by rounded arithmetic.
+struct Sides {
+    above: [bool; 3],
+    all_above: bool,
+    all_below: bool,
+    /// None is in doubt or zero.
+    sure: bool,
+}
+
+impl Sides {
+    #[inline(always)]
+    fn new(a: &Triangle, b: &Triangle) -> Self {
+        let plane = Plane::new(&a[0], &a[1], &a[2]);
+        let [(p, x), (q, y), (r, z)] = [plane.rounded(&b[0]), plane.rounded(&b[1]), plane.rounded(&b[2])];
+        let all_above = (p > x) & (q > y) & (r > z);
+        let all_below = (p < -x) & (q < -y) & (r < -z);
+        let sure = (p.abs() > x) & (q.abs() > y) & (r.abs() > z);
+        Self { above: [p > 0.0, q > 0.0, r > 0.0], all_above, all_below, sure }
+    }
+
+    /// The corner that is alone on its side, and the others.
+    #[inline(always)]
+    fn alone(&self, t: &Triangle) -> (Point, [Point; 2]) {
+        let [p, q, r] = self.above;
+        let choose = |first: bool, a: &Point, b: &Point| {
+            let coordinate = |k: usize| if first { a[k] } else { b[k] };
+            [coordinate(0), coordinate(1), coordinate(2)]
+        };
+        let (first, second) = (q == r, p == r);
+        let apex = choose(first, &t[0], &choose(second, &t[1], &t[2]));
+        // Turned round so that the apex comes first.
+        (apex, [choose(first, &t[1], &choose(second, &t[2], &t[0])), choose(first, &t[2], &choose(second, &t[0], &t[1]))])
+    }
 }
 
 /// Both in one plane, or `a` without area.
@@ -153,8 +259,14 @@ fn coplanar(a: &Triangle, b: &Triangle, shared: usize, touching: bool) -> Contac
     let mut deepest = 1;
     for (x, y, sense) in [(a, b, of_a), (b, a, of_b)] {
         for k in 0..3 {
-            let inner = y.iter().map(|p| sense * turn(&x[k], &x[(k + 1) % 3], p, axis)).max();
-            deepest = deepest.min(inner.unwrap_or(0));
+            let mut inner = -1;
+            for p in y {
+                inner = inner.max(sense * turn(&x[k], &x[(k + 1) % 3], p, axis));
+                if inner == 1 {
+                    break;
+                }
+            }
+            deepest = deepest.min(inner);
             if deepest < 1 && !touching {
                 return Contact::Apart;
             }

@@ -4,6 +4,8 @@
 //! predicates of `robust` otherwise. Error bounds and predicates after Shewchuk, "Adaptive Precision Floating-Point Arithmetic and
 //! Fast Robust Geometric Predicates", Discrete & Computational Geometry 18 (1997).
 
+use std::cell::OnceCell;
+
 use glam::{DVec3, Vec3Swizzles};
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
@@ -11,8 +13,9 @@ use robust::{Coord, Coord3D, orient2d, orient3d};
 pub type Point = [f32; 3];
 
 /// The position in f64, for what only ranks.
+#[inline(always)]
 pub(super) fn at(p: &Point) -> DVec3 {
-    DVec3::from_array(p.map(f64::from))
+    DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))
 }
 
 fn sign(x: f64) -> i8 {
@@ -31,23 +34,33 @@ pub(super) struct Plane<'a> {
     normal: DVec3,
     /// The same with all products positive: what the rounding errors are measured by.
     magnitude: DVec3,
+    /// The normal as integers, in any unit; `None` if they do not fit. Three corners of one triangle often need it.
+    integer_normal: OnceCell<Option<[i128; 3]>>,
 }
 
 impl<'a> Plane<'a> {
-    #[inline]
+    #[inline(always)]
     pub(super) fn new(a: &'a Point, b: &'a Point, c: &'a Point) -> Self {
         let (u, v) = (at(b) - at(a), at(c) - at(a));
         let (p, q) = (u.yzx() * v.zxy(), u.zxy() * v.yzx());
-        Self { corners: [a, b, c], normal: p - q, magnitude: p.abs() + q.abs() }
+        Self { corners: [a, b, c], normal: p - q, magnitude: p.abs() + q.abs(), integer_normal: OnceCell::new() }
     }
 
     /// The side on which `d` lies, as [`side`] says it.
     #[inline]
     pub(super) fn side(&self, d: &Point) -> i8 {
-        let w = at(d) - at(self.corners[0]);
-        let (value, magnitude) = (self.normal.dot(w), self.magnitude.dot(w.abs()));
+        let (value, error) = self.rounded(d);
         // Nothing underflows: without magnitude, all three products are zero.
-        if value.abs() > 8e-16 * magnitude || magnitude == 0.0 { sign(value) } else { self.side_exact(d) }
+        if value.abs() > error || error == 0.0 { sign(value) } else { self.side_exact(d) }
+    }
+
+    /// The determinant whose sign is the side of `d`, rounded: if it is larger than the second number, its sign is right. No branches.
+    #[inline(always)]
+    pub(super) fn rounded(&self, d: &Point) -> (f64, f64) {
+        let w = at(d) - at(self.corners[0]);
+        // (7 + 56ε)ε of the magnitude with ε = 2⁻⁵³ (Shewchuk's bound A for orient3d, of which this is the order of operations), which
+        // is less than 7.8e-16; the product below is rounded by far less than what is left.
+        (self.normal.dot(w), 8e-16 * self.magnitude.dot(w.abs()))
     }
 
     #[cold]
@@ -57,11 +70,14 @@ impl<'a> Plane<'a> {
         if d == a || d == b || d == c {
             return 0;
         }
-        let differences = [b, c, d].map(|p| [0, 1, 2].map(|k| (p[k], a[k])));
-        // 41 bits each: products of three and the sum of six such fit 127.
-        if let Some([[ux, uy, uz], [vx, vy, vz], [wx, wy, wz]]) = integers(differences, 41) {
+        // 41 bits each: products of three and the sum of six such fit 127. Units need not be the same to tell the sign.
+        let from_a = |p: &Point| [0, 1, 2].map(|k| (p[k], a[k]));
+        let normal = self.integer_normal.get_or_init(|| {
+            let [[ux, uy, uz], [vx, vy, vz]] = integers([from_a(b), from_a(c)], 41)?;
             let minor = |a: i64, b: i64, c: i64, d: i64| i128::from(a) * i128::from(d) - i128::from(b) * i128::from(c);
-            let (x, y, z) = (minor(uy, uz, vy, vz), minor(uz, ux, vz, vx), minor(ux, uy, vx, vy));
+            Some([minor(uy, uz, vy, vz), minor(uz, ux, vz, vx), minor(ux, uy, vx, vy)])
+        });
+        if let Some(([x, y, z], [[wx, wy, wz]])) = normal.zip(integers([from_a(d)], 41)) {
             return (x * i128::from(wx) + y * i128::from(wy) + z * i128::from(wz)).signum() as i8;
         }
         let coord = |p: &Point| Coord3D { x: p[0], y: p[1], z: p[2] };

@@ -2,6 +2,7 @@
 
 use proptest::prelude::*;
 
+use super::cross::{Sure, sure, sure_of_neighbours};
 use super::*;
 
 /// Positions on a grid of integers, so that i128 arithmetic is exact and degenerate situations are frequent.
@@ -228,8 +229,45 @@ proptest! {
         let expected = contact(&a, &b);
         for (x, y) in [(a, b), (b, a), ([a[1], a[2], a[0]], [b[2], b[1], b[0]])] {
             prop_assert_eq!(triangles_cross(&f(x), &f(y)), expected);
+            let is_right = match rounded(&f(x), &f(y)) {
+                Sure::No => true,
+                Sure::Apart => !expected.is_crossing(),
+                Sure::Cross => expected == Contact::Cross,
+            };
+            prop_assert!(is_right);
         }
     }
+}
+
+/// What rounded arithmetic says of triangles with or without common corners.
+fn rounded(a: &[Point; 3], b: &[Point; 3]) -> Sure {
+    let Some(first) = a.iter().position(|p| b.contains(p)) else { return sure(a, b) };
+    let others: Vec<Point> = b.iter().filter(|p| !a.contains(p)).copied().collect();
+    match others[..] {
+        [] => Sure::No,
+        [p] => sure_of_neighbours(&[a[first], a[(first + 1) % 3], a[(first + 2) % 3]], &[a[first], p, p]),
+        [p, q, ..] => sure_of_neighbours(&[a[first], a[(first + 1) % 3], a[(first + 2) % 3]], &[a[first], p, q]),
+    }
+}
+
+/// Exact arithmetic is for what is in doubt only.
+#[test]
+fn most_contacts_are_sure_without_exact_arithmetic() {
+    let floor = [[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 8.0, 0.0]];
+    let upright = |x: f32, z: f32| [[x, 1.0, z - 2.0], [x, 5.0, z - 2.0], [x, 2.0, z + 2.0]];
+    assert_eq!(rounded(&floor, &upright(1.0, 0.0)), Sure::Cross);
+    assert_eq!(rounded(&floor, &upright(1.0, 3.0)), Sure::Apart);
+    assert_eq!(rounded(&floor, &upright(9.0, 0.0)), Sure::Apart);
+    // It touches the floor with a corner.
+    assert_eq!(rounded(&floor, &upright(1.0, 2.0)), Sure::No);
+    // From a corner of the floor through it, beside it, away from it, and from one of its edges.
+    let from_corner = |p: Point, q: Point| rounded(&floor, &[[0.0; 3], p, q]);
+    assert_eq!(from_corner([1.0, 1.0, -1.0], [1.0, 2.0, 1.0]), Sure::Cross);
+    assert_eq!(from_corner([1.0, -1.0, -1.0], [1.0, -2.0, 1.0]), Sure::Apart);
+    assert_eq!(from_corner([-1.0, -1.0, -1.0], [-1.0, -2.0, 1.0]), Sure::Apart);
+    assert_eq!(from_corner([1.0, 1.0, 1.0], [1.0, 2.0, 1.0]), Sure::Apart);
+    assert_eq!(from_corner([8.0, 0.0, 0.0], [1.0, 2.0, 1.0]), Sure::Apart);
+    assert_eq!(from_corner([8.0, 0.0, 0.0], [1.0, 2.0, 0.0]), Sure::No);
 }
 
 /// A saddle: the corners of a cube's faces in turn. Far from planar.

@@ -11,7 +11,7 @@
 //!   both triangles are there, as members or visitors.
 //!
 //! In the order of the work: [`stars`] certifies vertices none of whose triangles can meet, [`tree`] finds pairs of overlapping
-//! boxes, [`narrow`] separates what is clearly apart, and what is left is decided by exact predicates.
+//! boxes, [`narrow`] finds what is clearly apart or clearly crosses, and what is left is decided by exact predicates.
 //!
 //! Work can be quadratic in the size of a defect (a thousand copies of one triangle are half a million pairs), so pairs are
 //! counted. A pair counts when its boxes overlap and it shares no vertex, or the smallest vertex it shares is not certified: a
@@ -28,7 +28,7 @@ use crate::chunk::NONE;
 use crate::fill::cross::{Contact, self_intersection};
 use crate::plan::HomeBox;
 use lanes::{Lanes, Pairs, Triangles, WIDTH};
-use narrow::Round;
+use narrow::Neighbours;
 use stars::Stars;
 use tree::{Forest, Visit, Walk};
 
@@ -117,6 +117,9 @@ impl Batch {
     }
 }
 
+/// Pairs with common vertices that are gathered before they are decided.
+const NEIGHBOURS: usize = 128;
+
 /// What is known of a vertex.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum State {
@@ -135,6 +138,7 @@ pub(crate) struct Finder {
     states: Vec<State>,
     forest: Forest,
     waiting: Pairs,
+    neighbours: Vec<Neighbours>,
     by_vertex: Vec<(u32, u32)>,
 }
 
@@ -151,11 +155,13 @@ impl Finder {
     pub(crate) fn pairs(&mut self, region: &Region<'_>, allowance: u64, mut found: impl FnMut(u32, u32, Contact)) -> u64 {
         self.prepare(region);
         self.waiting.clear();
+        self.neighbours.clear();
         let mut search = Search {
             region,
             states: &self.states,
             forest: &self.forest,
             waiting: &mut self.waiting,
+            neighbours: &mut self.neighbours,
             counted: 0,
             allowance,
             found: &mut found,
@@ -165,6 +171,7 @@ impl Finder {
         if walked {
             search.around_hubs(&self.forest, &mut self.by_vertex);
         }
+        search.decide_neighbours();
         search.counted
     }
 }
@@ -213,6 +220,13 @@ impl Finder {
     }
 }
 
+/// Which vertices of each are also vertices of the other.
+#[inline(always)]
+fn common_vertices(s: [u32; 3], t: [u32; 3]) -> [[bool; 3]; 2] {
+    let among = |v: u32, t: [u32; 3]| (v == t[0]) | (v == t[1]) | (v == t[2]);
+    [[among(s[0], t), among(s[1], t), among(s[2], t)], [among(t[0], s), among(t[1], s), among(t[2], s)]]
+}
+
 /// What becomes of overlapping boxes.
 struct Search<'a, F> {
     region: &'a Region<'a>,
@@ -220,6 +234,8 @@ struct Search<'a, F> {
     forest: &'a Forest,
     /// Rows that overlap, without a common vertex.
     waiting: &'a mut Pairs,
+    /// Pairs with one or two common vertices.
+    neighbours: &'a mut Vec<Neighbours>,
     counted: u64,
     allowance: u64,
     found: &'a mut F,
@@ -253,18 +269,48 @@ impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
     /// A pair of overlapping boxes with vertices in common. With `only`, nothing is done if another vertex is the smallest.
     fn sharing(&mut self, i: u32, j: u32, only: u32) {
         let [s, t] = [i, j].map(|i| self.region.triangles[i as usize]);
-        let shared = || s.iter().filter(|v| t.contains(v));
+        let common = common_vertices(s, t);
         let position = |v: u32| self.region.positions[v as usize];
-        let smallest = shared().copied().reduce(|u, v| if position(v) < position(u) { v } else { u });
-        let Some(smallest) = smallest.filter(|v| only == NONE || *v == only) else { return };
-        if self.states[smallest as usize] != State::Open {
+        let (mut smallest, mut first, mut count, mut certified) = (NONE, 0, 0, false);
+        for k in (0..3).filter(|k| common[0][*k]) {
+            if count == 0 || position(s[k]) < position(smallest) {
+                (smallest, first) = (s[k], k);
+            }
+            certified |= self.states[s[k] as usize] == State::Certified;
+            count += 1;
+        }
+        if count == 0 || (only != NONE && smallest != only) || self.states[smallest as usize] != State::Open {
             return;
         }
         self.counted += 1;
-        if !shared().any(|v| self.states[*v as usize] == State::Certified) {
-            let common = [s.map(|v| t.contains(&v)), t.map(|v| s.contains(&v))];
-            self.region.decide(i, j, common, self.found);
+        if certified {
+            return;
         }
+        if count == 3 {
+            return self.region.decide(i, j, common, self.found);
+        }
+        let apart_from_s = |order: [usize; 3]| order.into_iter().find(|k| !common[1][*k]).map_or(NONE, |k| t[k]);
+        let (next, last) = (apart_from_s([0, 1, 2]), apart_from_s([2, 1, 0]));
+        let vertices = [[s[first], s[(first + 1) % 3], s[(first + 2) % 3]], [smallest, next, last]];
+        self.neighbours.push(Neighbours { triangles: [i, j], vertices });
+        if self.neighbours.len() == NEIGHBOURS {
+            self.decide_neighbours();
+        }
+    }
+
+    /// Decides the waiting pairs with one or two common vertices.
+    #[inline(never)]
+    fn decide_neighbours(&mut self) {
+        let Self { region, neighbours, found, .. } = self;
+        let [crossing, unsure] = narrow::sort_neighbours(region, neighbours);
+        for Neighbours { triangles: [i, j], .. } in &neighbours[..crossing] {
+            found(*i.min(j), *i.max(j), Contact::Cross);
+        }
+        for Neighbours { triangles: [i, j], .. } in &neighbours[crossing..crossing + unsure] {
+            let [s, t] = [i, j].map(|i| region.triangles[*i as usize]);
+            region.decide(*i, *j, common_vertices(s, t), found);
+        }
+        neighbours.clear();
     }
 
     /// The pairs within each hub's tree whose smallest vertex is not the hub. That vertex is open; the hub is certified, or
@@ -297,37 +343,23 @@ impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
         }
     }
 
-    /// Counts and decides those waiting pairs that are owned here; none of them shares a vertex. What stays after each round
-    /// closes up to fours.
+    /// Counts and decides those waiting pairs that are owned here; none of them shares a vertex.
     #[inline(never)]
     fn separate(&mut self) {
         let Self { region, forest, waiting, found, .. } = self;
         let pairs = waiting.as_mut_slice();
-        let mut left = 0;
+        let mut owned = 0;
         for k in 0..pairs.len() {
             let [row, other] = pairs[k].map(|row| row as usize);
-            pairs[left] = [forest.triangle(row), forest.triangle(other)];
-            left += usize::from(forest.owns_pair(row, other));
+            pairs[owned] = [forest.triangle(row), forest.triangle(other)];
+            owned += usize::from(forest.owns_pair(row, other));
         }
-        self.counted += left as u64;
-        for round in [Round::Planes, Round::Edges] {
-            let mut kept = 0;
-            for start in (0..left).step_by(4) {
-                let end = left.min(start + 4);
-                let pair = |k: usize| {
-                    let [i, j] = pairs[(start + k).min(end - 1)];
-                    let [s, t] = [region.triangles[i as usize], region.triangles[j as usize]];
-                    [s[0], s[1], s[2], t[0], t[1], t[2]].map(|v| &region.positions[v as usize])
-                };
-                let apart = narrow::apart(&[pair(0), pair(1), pair(2), pair(3)], round);
-                for k in start..end {
-                    pairs[kept] = pairs[k];
-                    kept += usize::from(apart >> (k - start) & 1 == 0);
-                }
-            }
-            left = kept;
+        self.counted += owned as u64;
+        let [crossing, unsure] = narrow::sort(region, &mut pairs[..owned]);
+        for [i, j] in &pairs[..crossing] {
+            found(*i.min(j), *i.max(j), Contact::Cross);
         }
-        for [i, j] in &pairs[..left] {
+        for [i, j] in &pairs[crossing..crossing + unsure] {
             region.decide(*i, *j, [[false; 3]; 2], found);
         }
         waiting.clear();

@@ -62,7 +62,7 @@ impl WriteBehind {
 
 /// Bytes written between two pushes.
 fn step(limits: &Limits) -> u64 {
-    (limits.memory_bytes / 16).clamp(SMALLEST_STEP, LARGEST_STEP)
+    (limits.memory_bytes / 64).clamp(SMALLEST_STEP, LARGEST_STEP)
 }
 
 /// Most dirty pages that one [`WriteBehind`] leaves, in bytes.

@@ -28,7 +28,7 @@ pub(crate) struct Edit {
     changes: Vec<(u32, Change)>,
     /// Records of reversed patches, a bit each; empty when there are none.
     flipped: Vec<u64>,
-    /// New records, for the end of the file.
+    /// New records. As many as can take the places of deleted ones, in order; the rest goes to the end of the file.
     pub(crate) added: Vec<Record>,
     flips: u64,
     deletions: u64,
@@ -121,9 +121,16 @@ impl Edit {
         input_records as u64 - self.deletions + self.added.len() as u64
     }
 
+    /// The first deleted record whose place nothing takes, if there is one: up to there, every record of the output stands where the
+    /// input's does. O(edit).
+    pub(crate) fn first_gap(&self) -> Option<u32> {
+        self.changes.iter().filter(|c| c.1 == Change::Delete).nth(self.added.len()).map(|c| c.0)
+    }
+
     /// Walks through the input in order: runs of untouched records, then what becomes of the one that follows.
-    pub(crate) fn walk<'r, E>(&'r self, records: &'r [Record], mut step: impl FnMut(Step<'r>) -> Result<(), E>) -> Result<(), E> {
+    pub(crate) fn walk<'r, 'e, E>(&'e self, records: &'r [Record], mut step: impl FnMut(Step<'r, 'e>) -> Result<(), E>) -> Result<(), E> {
         let mut changes = self.changes.iter().peekable();
+        let mut added = self.added.iter();
         let mut start = 0;
         let mut at = 0;
         while at < records.len() {
@@ -140,7 +147,7 @@ impl Edit {
             step(match changes.next_if(|c| c.0 == place).map(|c| &c.1) {
                 Some(Change::Flip) | None => flipped(),
                 Some(Change::Move(record)) => Step::Changed(place, **record),
-                Some(Change::Delete) => Step::Deleted(place),
+                Some(Change::Delete) => added.next().map_or(Step::Deleted(place), |record| Step::Changed(place, *record)),
             })?;
             at = next + 1;
             start = at;
@@ -148,7 +155,7 @@ impl Edit {
         if start < records.len() {
             step(Step::Untouched(&records[start..]))?;
         }
-        self.added.iter().try_for_each(|record| step(Step::Added(record)))
+        added.try_for_each(|record| step(Step::Added(record)))
     }
 
     /// The first record from `at` on whose patch is reversed, or past the end.
@@ -201,13 +208,13 @@ impl Edit {
     }
 }
 
-/// What becomes of the input's records, one stretch after the other, and then what is added.
-pub(crate) enum Step<'a> {
-    Untouched(&'a [Record]),
+/// What becomes of the input's records, one stretch after the other, and then what is added beyond their places.
+pub(crate) enum Step<'r, 'e> {
+    Untouched(&'r [Record]),
     /// What stands in for the record of this number.
     Changed(u32, Record),
     Deleted(u32),
-    Added(&'a Record),
+    Added(&'e Record),
 }
 
 /// Adds the next number to inclusive ranges.
@@ -270,7 +277,8 @@ mod tests {
             let input = records(&vec![HERE; fates.len()]);
             let [moved, new] = [record::encode(THERE, 0), record::encode(THERE, 7)];
             let mut edit = Edit { flipped: vec![0; fates.len().div_ceil(64)], added: vec![new; added], ..Edit::default() };
-            let mut want = Vec::new();
+            let (mut want, mut left) = (Vec::new(), added);
+            let mut gap = None;
             for (t, fate) in fates.iter().enumerate() {
                 let before = input[t];
                 match fate {
@@ -284,12 +292,18 @@ mod tests {
                 match fate {
                     2 | 4 => want.push(record::flip(&before)),
                     3 => want.push(moved),
+                    1 if left > 0 => {
+                        want.push(new);
+                        left -= 1;
+                    }
+                    1 if gap.is_none() => gap = Some(t as u32),
                     _ => {}
                 }
             }
-            want.extend(vec![new; added]);
+            want.extend(vec![new; left]);
             edit.deletions = fates.iter().filter(|f| **f == 1).count() as u64;
             edit.flips = fates.iter().filter(|f| **f == 2 || **f == 4).count() as u64;
+            prop_assert_eq!(edit.first_gap(), gap);
             prop_assert_eq!(edit.output_records(input.len()), want.len() as u64);
             prop_assert_eq!(edit.summary(input.len()).untouched, fates.iter().filter(|f| **f == 0).count() as u64);
             let listed = |ranges: &[[u32; 2]]| ranges.iter().map(|[a, b]| u64::from(b - a + 1)).sum::<u64>();

@@ -1,11 +1,17 @@
-//! Writes the output once: header, exact count, and the input as the edit leaves it.
+//! Writes the output: header, exact count, and the input as the edit leaves it.
+//!
+//! Nearly all of it is the input's bytes where they stood. So the input is copied, and hashed, while it is still being found out what is
+//! wrong with it and the disk has nothing else to do. Then only what differs is written over it; where more triangles go than come,
+//! everything behind the first gap is written once more.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, IoSlice, Write};
+use std::io::{self, IoSlice, Seek, SeekFrom, Write};
 use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
-use std::thread::JoinHandle;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::{JoinHandle, ScopedJoinHandle};
 
+use blake3::Hasher;
 use rustix::io::Errno;
 
 use crate::Progress;
@@ -13,41 +19,102 @@ use crate::ahead::Guide;
 use crate::behind::WriteBehind;
 use crate::edit::{Edit, Step};
 use crate::error::{Error, Result};
-use crate::read::MeshFile;
+use crate::read::{MeshFile, PREFIX_BYTES};
 use crate::record::Record;
 use crate::settings::Limits;
 
+/// Smaller files are not copied ahead: it takes longer to start a thread.
+const COPIED_AHEAD: usize = 1 << 20;
 /// Untouched runs of at least this many bytes are copied inside the kernel.
 const KERNEL_COPY_BYTES: usize = 256 << 10;
 /// Copied inside the kernel at a time, between two looks at how far the disk is behind.
 const COPY_BYTES: usize = 1 << 20;
 
-/// Writes `mesh` with `edit` to the new file `output` and begins to sync it, unless that is deferred.
-pub(crate) fn write(mesh: &MeshFile, edit: &Edit, output: &Path, limits: &Limits, progress: &dyn Progress) -> Result<Written> {
-    let records = mesh.records();
-    let count = edit.output_records(records.len());
-    let count = u32::try_from(count).map_err(|_| Error::Refused {
-        path: mesh.path().into(),
-        reason: format!("the result has {count} triangles"),
-        advice: "an STL can hold 4294967295: split the file".into(),
-    })?;
-    let mut sink = Sink::create(mesh, output, limits, progress)?;
-    sink.put(&mesh.output_header())?;
-    sink.put(&count.to_le_bytes())?;
-    edit.walk(records, |step| match step {
-        Step::Untouched(run) => sink.put_run(run),
-        Step::Changed(_, record) => sink.put(&record),
-        Step::Deleted(_) => Ok(()),
-        Step::Added(record) => sink.put(record),
-    })?;
-    sink.finish(limits)
+/// What a file is to hold.
+pub(crate) enum Content<'a> {
+    /// The input, byte for byte.
+    Input,
+    /// The input's triangles as the edit leaves them.
+    Edited(&'a Edit),
 }
 
-/// Copies the input byte for byte to the new file `output` and begins to sync it, unless that is deferred.
-pub(crate) fn copy(mesh: &MeshFile, output: &Path, limits: &Limits, progress: &dyn Progress) -> Result<Written> {
-    let mut sink = Sink::create(mesh, output, limits, progress)?;
-    sink.put_bytes(mesh.bytes())?;
-    sink.finish(limits)
+impl Content<'_> {
+    /// How many of its first bytes can be the input's, but for single records.
+    fn in_place(&self, mesh: &MeshFile) -> u64 {
+        match self {
+            Self::Input => u64::MAX,
+            Self::Edited(edit) => {
+                let records = edit.first_gap().map_or(mesh.records().len(), |gap| gap as usize);
+                (PREFIX_BYTES + records * size_of::<Record>()) as u64
+            }
+        }
+    }
+}
+
+/// What is known of the output while the input is copied to it.
+struct Wanted {
+    /// So many bytes of the input, at most.
+    bytes: AtomicU64,
+    /// Someone waits for them.
+    awaited: AtomicBool,
+    /// Nothing, after all.
+    given_up: AtomicBool,
+}
+
+/// Lets `work` make the new file `output` of `mesh`, which is copied to it meanwhile where there is a thread to spare.
+pub(crate) fn draft<R>(
+    mesh: &MeshFile,
+    output: &Path,
+    limits: &Limits,
+    progress: &dyn Progress,
+    work: impl FnOnce(Draft<'_, '_>) -> Result<R>,
+) -> Result<R> {
+    let wanted = Wanted { bytes: AtomicU64::new(u64::MAX), awaited: AtomicBool::new(false), given_up: AtomicBool::new(false) };
+    let stands_in_input = mesh.locate(mesh.records().as_flattened()).is_some();
+    let is_ahead = stands_in_input && limits.threads > 1 && mesh.bytes().len() >= COPIED_AHEAD;
+    std::thread::scope(|scope| {
+        let copy = || Sink::create(mesh, output, limits, progress)?.copy(limits, &wanted);
+        let start = || std::thread::Builder::new().name("copy".into()).spawn_scoped(scope, copy);
+        let copying = is_ahead.then(start).transpose().map_err(Error::io(output, "copying"))?;
+        work(Draft { mesh, output, limits, progress, wanted: &wanted, copying })
+    })
+}
+
+/// An output of which it is not known yet what it is to hold. One that is dropped is given up.
+pub(crate) struct Draft<'scope, 'a> {
+    mesh: &'a MeshFile,
+    output: &'a Path,
+    limits: &'a Limits,
+    progress: &'a dyn Progress,
+    wanted: &'a Wanted,
+    /// The copy so far, and the input's BLAKE3.
+    copying: Option<ScopedJoinHandle<'scope, Result<(Sink<'a>, String)>>>,
+}
+
+impl Drop for Draft<'_, '_> {
+    fn drop(&mut self) {
+        self.wanted.given_up.store(true, Ordering::Relaxed);
+    }
+}
+
+impl Draft<'_, '_> {
+    /// Makes it hold `content` and begins to sync it, unless that is deferred. Returns the BLAKE3 of the input as well.
+    pub(crate) fn finish(mut self, content: &Content<'_>) -> Result<(Written, String)> {
+        let Self { mesh, output, limits, progress, wanted, .. } = self;
+        self.wanted.awaited.store(true, Ordering::Relaxed);
+        let (mut sink, hash) = match self.copying.take() {
+            Some(copying) => {
+                wanted.bytes.fetch_min(content.in_place(mesh), Ordering::Relaxed);
+                copying.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?
+            }
+            None => {
+                wanted.bytes.store(0, Ordering::Relaxed);
+                Sink::create(mesh, output, limits, progress)?.copy(limits, wanted)?
+            }
+        };
+        sink.hold(content)?;
+        Ok((sink.finish(limits)?, hash))
+    }
 }
 
 /// Runs shorter than this are copied to the others that wait: it takes longer to hand over one more piece.
@@ -75,12 +142,14 @@ struct Sink<'a> {
     waiting_bytes: usize,
     /// What is small or not the input's.
     own: Vec<u8>,
+    /// Where in the output that goes which is put next.
+    at: u64,
+    /// So many bytes at the beginning are the input's already.
+    copied: u64,
     behind: WriteBehind,
     /// How the input is read where it is not copied inside the kernel, and how far that was asked for.
     guide: Guide<'a>,
     asked: usize,
-    /// Bytes so far.
-    written: u64,
     progress: &'a dyn Progress,
 }
 
@@ -89,20 +158,65 @@ impl<'a> Sink<'a> {
         let file = create(path).map_err(Error::io(path, "creating"))?;
         let behind = WriteBehind::new(&file, limits).map_err(Error::io(path, "creating"))?;
         let guide = Guide::new(mesh.records().as_flattened(), limits);
-        let (waiting, own) = (Vec::new(), Vec::new());
         Ok(Self {
             mesh,
             path,
             kernel_copies: true,
             file,
-            waiting,
+            waiting: Vec::new(),
             waiting_bytes: 0,
-            own,
+            own: Vec::new(),
+            at: 0,
+            copied: 0,
             behind,
             guide,
             asked: 0,
-            written: 0,
             progress,
+        })
+    }
+
+    /// Copies as many bytes of the input as are wanted, and hashes all of it.
+    fn copy(mut self, limits: &Limits, wanted: &Wanted) -> Result<(Self, String)> {
+        let mut hasher = Hasher::new();
+        let bytes = self.mesh.bytes();
+        let mut hashed = 0;
+        for block in Guide::new(bytes, limits).blocks(bytes).flat_map(|block| block.chunks(COPY_BYTES)) {
+            if wanted.given_up.load(Ordering::Relaxed) {
+                break;
+            }
+            let left = wanted.bytes.load(Ordering::Relaxed).saturating_sub(hashed);
+            if left > 0 {
+                self.put_bytes(&block[..block.len().min(usize::try_from(left).unwrap_or(usize::MAX))])?;
+            }
+            hasher.update(block);
+            hashed += block.len() as u64;
+            if wanted.awaited.load(Ordering::Relaxed) {
+                self.tell(hashed);
+            }
+        }
+        self.flush()?;
+        self.copied = std::mem::take(&mut self.at);
+        self.file.rewind().map_err(|e| self.failed(e))?;
+        Ok((self, hasher.finalize().to_hex().to_string()))
+    }
+
+    /// Writes what is not there yet.
+    fn hold(&mut self, content: &Content<'_>) -> Result<()> {
+        let records = self.mesh.records();
+        let Content::Edited(edit) = content else { return self.put_input(self.mesh.bytes()) };
+        let count = edit.output_records(records.len());
+        let count = u32::try_from(count).map_err(|_| Error::Refused {
+            path: self.mesh.path().into(),
+            reason: format!("the result has {count} triangles"),
+            advice: "an STL can hold 4294967295: split the file".into(),
+        })?;
+        self.put(&self.mesh.output_header())?;
+        self.put(&count.to_le_bytes())?;
+        edit.walk(records, |step| match step {
+            Step::Untouched(run) => self.put_input(run.as_flattened()),
+            Step::Changed(_, record) => self.put(&record),
+            Step::Deleted(_) => Ok(()),
+            Step::Added(record) => self.put(record),
         })
     }
 
@@ -115,8 +229,18 @@ impl<'a> Sink<'a> {
         self.wait_for_more(bytes.len())
     }
 
-    fn put_run(&mut self, run: &'a [Record]) -> Result<()> {
-        let bytes = run.as_flattened();
+    /// Puts what may be there already.
+    fn put_input(&mut self, mut bytes: &'a [u8]) -> Result<()> {
+        if bytes.len() >= COPIED_BYTES && self.mesh.locate(bytes).is_some_and(|(_, offset)| offset == self.at) {
+            let there = bytes.len().min(usize::try_from(self.copied.saturating_sub(self.at)).unwrap_or(usize::MAX));
+            if there > 0 {
+                self.flush()?;
+                self.at += there as u64;
+                bytes = &bytes[there..];
+                self.file.seek(SeekFrom::Start(self.at)).map_err(|e| self.failed(e))?;
+                self.tell(self.at);
+            }
+        }
         if bytes.len() < KERNEL_COPY_BYTES {
             self.guide.keep_ahead(&mut self.asked, bytes);
         }
@@ -134,12 +258,14 @@ impl<'a> Sink<'a> {
         self.flush()?;
         for part in bytes.chunks(COPY_BYTES) {
             self.copy_large(part).map_err(|e| self.failed(e))?;
+            self.at += part.len() as u64;
             self.account(part.len())?;
         }
         Ok(())
     }
 
     fn wait_for_more(&mut self, bytes: usize) -> Result<()> {
+        self.at += bytes as u64;
         self.waiting_bytes += bytes;
         if self.waiting_bytes >= WAITING_BYTES || self.waiting.len() >= WAITING_PIECES { self.flush() } else { Ok(()) }
     }
@@ -185,14 +311,19 @@ impl<'a> Sink<'a> {
     }
 
     fn account(&mut self, written: usize) -> Result<()> {
-        self.written += written as u64;
-        let total = self.mesh.records().len() as u64;
-        self.progress.at("emit", (self.written / size_of::<Record>() as u64).min(total), total);
         self.behind.wrote(written as u64).map_err(Error::io(self.path, "syncing"))
+    }
+
+    fn tell(&self, bytes: u64) {
+        let total = self.mesh.records().len() as u64;
+        self.progress.at("emit", (bytes / size_of::<Record>() as u64).min(total), total);
     }
 
     fn finish(mut self, limits: &Limits) -> Result<Written> {
         self.flush()?;
+        if self.copied > self.at {
+            self.file.set_len(self.at).map_err(|e| self.failed(e))?;
+        }
         let Self { path, file, behind, .. } = self;
         let deferred = limits.defer_sync;
         let sync = move || {

@@ -7,6 +7,7 @@ use blake3::Hasher;
 
 use crate::ahead::Guide;
 use crate::edit::Edit;
+use crate::emit::{Content, Draft};
 use crate::error::{Error, Result};
 use crate::read::{MeshFile, PREFIX_BYTES};
 use crate::readback::Expectation;
@@ -175,10 +176,28 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     let bytes = (PREFIX_BYTES + size_of_val(mesh.records())) as u64;
     let folder = if emit::is_nameless(output) { limits.spool_folder() } else { folder_of(output).into() };
     space::check(input, &[Need { folder, bytes, what: "the output" }, spool_need(&mesh, limits)])?;
-    let mut diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
+    emit::draft(&mesh, output, limits, progress, |draft| {
+        let mut report = mend(draft, &mesh, output, profile, limits, progress, &mut clock)?;
+        report.cost = clock.cost(mesh.records().len() as u64);
+        report.stages = clock.stages;
+        Ok(report)
+    })
+}
+
+/// Makes `draft` the repaired `mesh` and judges what then stands at `output`; cost and stages are still to come.
+fn mend(
+    draft: Draft<'_, '_>,
+    mesh: &MeshFile,
+    output: &Path,
+    profile: &Profile,
+    limits: &Limits,
+    progress: &dyn Progress,
+    clock: &mut Clock,
+) -> Result<Report> {
+    let mut diagnosis = Diagnosis::of(mesh.path(), mesh.records(), profile, limits, progress)?;
     clock.lap("topology");
     let surface = diagnosis.surface_bounds();
-    let mut report = report(Task::Repair, &mesh, &diagnosis, profile, limits);
+    let mut report = report(Task::Repair, mesh, &diagnosis, profile, limits);
     let mut edit = Edit::default();
     if !report.verdict.good {
         progress.at("repair", 0, mesh.records().len() as u64);
@@ -191,36 +210,30 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     // Of the input's survey, the second look may go on; the memory of its workshop is needed for that of the output.
     let survey = diagnosis.into_survey();
     // Good as it came, or nothing in it could be repaired.
-    let same = edit.is_empty() && flaws(&mesh).is_empty();
+    let same = edit.is_empty() && flaws(mesh).is_empty();
     let is_worthwhile = !same && second::is_worthwhile(edit.gone(), edit.added.len() as u64, mesh.records().len());
     let expected = is_worthwhile.then(|| Expectation::of(mesh.records(), &edit));
-    let emit = || match same {
-        true => emit::copy(&mesh, output, limits, progress),
-        false => emit::write(&mesh, &edit, output, limits, progress),
-    };
+    let emit = || draft.finish(&if same { Content::Input } else { Content::Edited(&edit) });
     // What the file will hold is looked at while it is written. It counts when the file was read back and does hold that.
     let look = || {
-        let hash = hash_blocks(mesh.bytes(), limits, Hasher::update);
         let looked = expected.as_ref().and_then(|expected| second::look(survey, &expected.difference));
-        (hash, looked.map(|(survey, shop)| Diagnosis::count(survey, shop, profile).defects))
+        looked.map(|(survey, shop)| Diagnosis::count(survey, shop, profile).defects)
     };
     let threads = if mesh.bytes().len() < HASHED_BY_ONE { 1 } else { limits.threads };
-    let (written, (hash, looked)) = parallel::both(threads, emit, look);
-    let written = written?;
+    let (written, looked) = parallel::both(threads, emit, look);
+    let (written, hash) = written?;
     report.input.blake3 = hash;
     clock.lap("emit");
     report.edit = edit.summary(mesh.records().len());
     report.edit_records = limits.list_edit.then(|| edit.listed());
     if same {
-        confirm_copy(&mut report, &mesh, output, limits, progress)?;
+        confirm_copy(&mut report, mesh, output, limits, progress)?;
     } else {
-        verify(&mut report, &mesh, &surface, expected.map(|expected| (expected, looked)), output, limits, progress)?;
+        verify(&mut report, mesh, &surface, expected.map(|expected| (expected, looked)), output, limits, progress)?;
     }
     written.durable()?;
     clock.lap("verify");
     mesh.check_unchanged()?;
-    report.cost = clock.cost(mesh.records().len() as u64);
-    report.stages = clock.stages;
     Ok(report)
 }
 

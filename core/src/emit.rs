@@ -11,10 +11,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{JoinHandle, ScopedJoinHandle};
 
-use blake3::Hasher;
+use blake3::hazmat::ChainingValue;
 use rustix::io::Errno;
 
-use crate::Progress;
 use crate::ahead::Guide;
 use crate::behind::WriteBehind;
 use crate::edit::{Edit, Step};
@@ -22,13 +21,14 @@ use crate::error::{Error, Result};
 use crate::read::{MeshFile, PREFIX_BYTES};
 use crate::record::Record;
 use crate::settings::Limits;
+use crate::{Progress, digest};
 
 /// Smaller files are not copied ahead: it takes longer to start a thread.
 const COPIED_AHEAD: usize = 1 << 20;
 /// Untouched runs of at least this many bytes are copied inside the kernel.
 const KERNEL_COPY_BYTES: usize = 256 << 10;
-/// Copied inside the kernel at a time, between two looks at how far the disk is behind.
-const COPY_BYTES: usize = 1 << 20;
+/// Copied inside the kernel at a time, between two looks at how far the disk is behind; whole blocks of a digest.
+const COPY_BYTES: usize = 16 * digest::BLOCK;
 
 /// What a file is to hold.
 pub(crate) enum Content<'a> {
@@ -70,8 +70,7 @@ pub(crate) fn draft<R>(
     work: impl FnOnce(Draft<'_, '_>) -> Result<R>,
 ) -> Result<R> {
     let wanted = Wanted { bytes: AtomicU64::new(u64::MAX), awaited: AtomicBool::new(false), given_up: AtomicBool::new(false) };
-    let stands_in_input = mesh.locate(mesh.records().as_flattened()).is_some();
-    let is_ahead = stands_in_input && limits.threads > 1 && mesh.bytes().len() >= COPIED_AHEAD;
+    let is_ahead = mesh.is_in_place() && limits.threads > 1 && mesh.bytes().len() >= COPIED_AHEAD;
     std::thread::scope(|scope| {
         let copy = || Sink::create(mesh, output, limits, progress)?.copy(limits, &wanted);
         let start = || std::thread::Builder::new().name("copy".into()).spawn_scoped(scope, copy);
@@ -87,8 +86,8 @@ pub(crate) struct Draft<'scope, 'a> {
     limits: &'a Limits,
     progress: &'a dyn Progress,
     wanted: &'a Wanted,
-    /// The copy so far, and the input's BLAKE3.
-    copying: Option<ScopedJoinHandle<'scope, Result<(Sink<'a>, String)>>>,
+    /// The copy so far, and the digest of the input.
+    copying: Option<ScopedJoinHandle<'scope, Result<(Sink<'a>, Vec<ChainingValue>)>>>,
 }
 
 impl Drop for Draft<'_, '_> {
@@ -98,11 +97,11 @@ impl Drop for Draft<'_, '_> {
 }
 
 impl Draft<'_, '_> {
-    /// Makes it hold `content` and begins to sync it, unless that is deferred. Returns the BLAKE3 of the input as well.
-    pub(crate) fn finish(mut self, content: &Content<'_>) -> Result<(Written, String)> {
+    /// Makes it hold `content` and begins to sync it, unless that is deferred. Returns the digest of the input, block by block, as well.
+    pub(crate) fn finish(mut self, content: &Content<'_>) -> Result<(Written, Vec<ChainingValue>)> {
         let Self { mesh, output, limits, progress, wanted, .. } = self;
         self.wanted.awaited.store(true, Ordering::Relaxed);
-        let (mut sink, hash) = match self.copying.take() {
+        let (mut sink, digest) = match self.copying.take() {
             Some(copying) => {
                 wanted.bytes.fetch_min(content.in_place(mesh), Ordering::Relaxed);
                 copying.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?
@@ -113,7 +112,7 @@ impl Draft<'_, '_> {
             }
         };
         sink.hold(content)?;
-        Ok((sink.finish(limits)?, hash))
+        Ok((sink.finish(limits)?, digest))
     }
 }
 
@@ -175,10 +174,10 @@ impl<'a> Sink<'a> {
         })
     }
 
-    /// Copies as many bytes of the input as are wanted, and hashes all of it.
-    fn copy(mut self, limits: &Limits, wanted: &Wanted) -> Result<(Self, String)> {
-        let mut hasher = Hasher::new();
+    /// Copies as many bytes of the input as are wanted, and digests all of it.
+    fn copy(mut self, limits: &Limits, wanted: &Wanted) -> Result<(Self, Vec<ChainingValue>)> {
         let bytes = self.mesh.bytes();
+        let mut digest = Vec::with_capacity(bytes.len().div_ceil(digest::BLOCK));
         let mut hashed = 0;
         for block in Guide::new(bytes, limits).blocks(bytes).flat_map(|block| block.chunks(COPY_BYTES)) {
             if wanted.given_up.load(Ordering::Relaxed) {
@@ -188,7 +187,7 @@ impl<'a> Sink<'a> {
             if left > 0 {
                 self.put_bytes(&block[..block.len().min(usize::try_from(left).unwrap_or(usize::MAX))])?;
             }
-            hasher.update(block);
+            digest.extend(block.chunks(digest::BLOCK).zip(digest.len()..).map(|(block, number)| digest::value(number, block)));
             hashed += block.len() as u64;
             if wanted.awaited.load(Ordering::Relaxed) {
                 self.tell(hashed);
@@ -197,7 +196,7 @@ impl<'a> Sink<'a> {
         self.flush()?;
         self.copied = std::mem::take(&mut self.at);
         self.file.rewind().map_err(|e| self.failed(e))?;
-        Ok((self, hasher.finalize().to_hex().to_string()))
+        Ok((self, digest))
     }
 
     /// Writes what is not there yet.

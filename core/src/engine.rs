@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use blake3::Hasher;
+use blake3::hazmat::ChainingValue;
 
 use crate::ahead::Guide;
 use crate::edit::Edit;
@@ -19,7 +20,7 @@ use crate::shop::near::Tolerance;
 use crate::space::{self, Need};
 use crate::sums::Bounds;
 use crate::survey::Survey;
-use crate::{Progress, cost, defects, emit, members, parallel, repairs, second, verdict};
+use crate::{Progress, cost, defects, digest, emit, members, parallel, repairs, second, verdict};
 
 /// Fewer bytes are hashed by one thread: starting more would take longer.
 const HASHED_BY_ONE: usize = 1 << 20;
@@ -221,15 +222,19 @@ fn mend(
     };
     let threads = if mesh.bytes().len() < HASHED_BY_ONE { 1 } else { limits.threads };
     let (written, looked) = parallel::both(threads, emit, look);
-    let (written, hash) = written?;
-    report.input.blake3 = hash;
+    let (written, mut digest) = written?;
+    report.input.blake3 = digest::hash(mesh.bytes(), &digest);
+    if !mesh.is_in_place() {
+        // Of a text.
+        digest.clear();
+    }
     clock.lap("emit");
     report.edit = edit.summary(mesh.records().len());
     report.edit_records = limits.list_edit.then(|| edit.listed());
     if same {
         confirm_copy(&mut report, mesh, output, limits, progress)?;
     } else {
-        verify(&mut report, mesh, &surface, expected.map(|expected| (expected, looked)), output, limits, progress)?;
+        verify(&mut report, mesh, &surface, expected.map(|expected| (expected, digest, looked)), output, limits, progress)?;
     }
     written.durable()?;
     clock.lap("verify");
@@ -263,7 +268,7 @@ fn verify(
     report: &mut Report,
     input: &MeshFile,
     surface: &Bounds,
-    known: Option<(Expectation<'_>, Option<Defects>)>,
+    known: Option<(Expectation<'_>, Vec<ChainingValue>, Option<Defects>)>,
     output: &Path,
     limits: &Limits,
     progress: &dyn Progress,
@@ -300,15 +305,15 @@ fn verify(
 
 /// The hash and the defects of a written file: what was `known` of it before, if it holds what it should, or else by a survey of its own.
 fn look_again(
-    known: Option<(Expectation<'_>, Option<Defects>)>,
+    known: Option<(Expectation<'_>, Vec<ChainingValue>, Option<Defects>)>,
     written: &MeshFile,
     profile: &Profile,
     limits: &Limits,
     progress: &dyn Progress,
 ) -> Result<(String, Defects)> {
     let blake3 = match known {
-        Some((expected, looked)) => {
-            let blake3 = expected.confirm(written, limits, progress)?;
+        Some((expected, digest, looked)) => {
+            let blake3 = expected.confirm(written, &digest, limits, progress)?;
             if let Some(defects) = looked {
                 return Ok((blake3, defects));
             }

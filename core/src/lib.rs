@@ -13,6 +13,7 @@ mod columns;
 mod cost;
 mod crossings;
 mod defects;
+mod digest;
 mod edit;
 mod emit;
 mod engine;

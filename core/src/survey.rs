@@ -19,7 +19,7 @@ use crate::settings::Limits;
 use crate::source::{Seen, Source, Triangle};
 use crate::sums::{Bounds, Measure};
 use crate::weld::{Sieve, Weld};
-use crate::{Progress, edit, radix};
+use crate::{Progress, behind, digest, edit, radix};
 
 /// Topology of the sound part of a file, and the list of what is not sound.
 #[derive(Debug)]
@@ -86,6 +86,8 @@ impl<'a> Survey<'a> {
         let bounds = members.bounds.normalised();
         let measure = Measure::new(&bounds);
         let budget = Budget::new(limits.memory_bytes);
+        // A copy of the file and its digest may be in the making.
+        budget.take(Purpose::Tables, behind::most_dirty(limits) + digest::heap_bytes(size_of_val(records) as u64));
         take_tables(path, &budget, &plan, &members, limits)?;
 
         let most_tested = crossings::most_tested(records.len() as u64);

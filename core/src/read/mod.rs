@@ -182,6 +182,11 @@ impl MeshFile {
         }
     }
 
+    /// The records stand in the input as they will in an output, after the prefix.
+    pub(crate) fn is_in_place(&self) -> bool {
+        matches!(self.source, Source::InPlace(_))
+    }
+
     /// What the file was read as.
     pub fn format(&self) -> Format {
         self.format

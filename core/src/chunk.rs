@@ -16,7 +16,7 @@ use crate::record::Point;
 use crate::shop;
 use crate::source::{Seen, Source, Triangle};
 use crate::star::{self, Ring, Stars};
-use crate::sums::{Batch, Bounds, Extent, Measure};
+use crate::sums::{Bounds, Extent, Measure};
 use crate::weld::{self, Weld};
 
 /// No vertex, patch or triangle.
@@ -198,12 +198,12 @@ impl Scratch {
         take: impl Fn(&mut Self, &[[Point; 3]]),
         places: impl Fn(&Ring, u32) -> u32 + Copy,
     ) -> ChunkTopology {
-        match seen {
-            Seen::Mapped(source) => self.weld(source, take),
-            Seen::Spooled(source) => self.weld(source, take),
-        }
+        let total = match seen {
+            Seen::Mapped(source) => self.weld(source, measure, take),
+            Seen::Spooled(source) => self.weld(source, measure, take),
+        };
         self.judge_stars(cell, places);
-        self.collect(measure)
+        self.collect(measure, total)
     }
 
     /// Finds the self-intersections that the chunk owns, after it was solved; counts little more than `allowance` pairs. The
@@ -251,9 +251,9 @@ impl Scratch {
         crossings
     }
 
-    /// Numbers the vertices of all members.
+    /// Numbers the vertices of all members; returns the sum over them.
     #[inline(always)]
-    fn weld(&mut self, source: &impl Source, take: impl Fn(&mut Self, &[[Point; 3]])) {
+    fn weld(&mut self, source: &impl Source, measure: &Measure, take: impl Fn(&mut Self, &[[Point; 3]])) -> Extent {
         self.numbers.clear();
         self.triangles.clear();
         self.collinear.clear();
@@ -262,17 +262,20 @@ impl Scratch {
         self.vertices.reset(expected / 2);
         self.numbers.reserve(expected);
         self.triangles.reserve(expected);
-        let (mut corners, mut filled) = ([[[0f32; 3]; 3]; BATCH], 0);
+        let (mut corners, mut filled, mut total) = ([[[0f32; 3]; 3]; BATCH], 0, Extent::default());
         source.for_each(|number, triangle| {
             self.numbers.push(number);
             corners[filled] = triangle.corners();
             filled += 1;
             if filled == BATCH {
                 take(self, &corners);
+                total += measure.sum(&corners);
                 filled = 0;
             }
         });
         take(self, &corners[..filled]);
+        total += measure.sum(&corners[..filled]);
+        total
     }
 
     /// Takes in the next members, at most [`BATCH`].
@@ -372,8 +375,9 @@ impl Scratch {
         self.hit.iter().map(|word| u64::from(word.count_ones())).sum()
     }
 
+    /// `total` is the sum over all members.
     #[inline(always)]
-    fn collect(&mut self, measure: &Measure) -> ChunkTopology {
+    fn collect(&mut self, measure: &Measure, total: Extent) -> ChunkTopology {
         let home = || self.states.iter().enumerate().filter(|(_, state)| **state != AWAY);
         let mut out = ChunkTopology {
             suspects: Vec::new(),
@@ -386,12 +390,13 @@ impl Scratch {
             vertices_used: home().filter(|(v, _)| self.stars.count(*v) > 0).count() as u64,
             suspect_vertices: 0,
         };
-        self.number_patches(&mut out.patches);
+        let largest = self.number_patches(&mut out.patches);
         let mut labels = LabelWriter::default();
-        let mut sum = Sum::new(measure, self.vertices.positions());
+        let mut sum = Sum::new(measure, self.vertices.positions(), largest);
         for (t, number) in self.triangles.iter().zip(&self.numbers) {
             let triangle = *number;
             if t[0] == NONE {
+                // Of no area.
                 out.suspects.push(Suspect { triangle, unsound: 0 });
                 labels.push(NONE);
                 continue;
@@ -408,8 +413,11 @@ impl Scratch {
             if unsound != 0 {
                 out.suspects.push(Suspect { triangle, unsound });
             }
+            let counted = patch != NONE && unsound == 0 && states[0] != AWAY;
+            if !counted {
+                sum.leave(*t);
+            }
             if patch != NONE {
-                let counted = unsound == 0 && states[0] != AWAY;
                 if counted {
                     sum.add(patch, triangle, *t, &mut out.patches);
                 } else {
@@ -422,7 +430,7 @@ impl Scratch {
                 }
             }
         }
-        sum.flush(&mut out.patches);
+        sum.finish(total, &mut out.patches);
         out.patches.iter().for_each(|p| out.reach.add(&p.bounds));
         out.suspect_vertices = self.count_suspect_vertices(&out.suspects);
         if out.patches.len() > 1 {
@@ -432,11 +440,12 @@ impl Scratch {
         out
     }
 
-    /// Numbers the patches by their first vertices.
+    /// Numbers the patches by their first vertices, and returns the one of most vertices.
     #[inline(always)]
-    fn number_patches(&mut self, patches: &mut Vec<Patch>) {
+    fn number_patches(&mut self, patches: &mut Vec<Patch>) -> u32 {
         let mut bounds = Bounds::EMPTY;
         let mut patch = NONE;
+        let (mut sizes, mut run): (Vec<usize>, usize) = (Vec::new(), 0);
         for (v, position) in self.vertices.positions().iter().enumerate() {
             if self.states[v] != SOUND {
                 continue;
@@ -446,57 +455,123 @@ impl Scratch {
             self.states[v] = if parent == v { patches.len() as u32 } else { self.states[parent] };
             if parent == v {
                 patches.push(Patch { triangles: 0, extent: Extent::default(), bounds: Bounds::EMPTY, first: NONE });
+                sizes.push(0);
             }
             if self.states[v] != patch {
                 if patch != NONE {
                     patches[patch as usize].bounds.add(&bounds);
+                    sizes[patch as usize] += run;
                 }
-                (patch, bounds) = (self.states[v], Bounds::EMPTY);
+                (patch, bounds, run) = (self.states[v], Bounds::EMPTY, 0);
             }
             bounds.include(&[*position]);
+            run += 1;
         }
         if patch != NONE {
             patches[patch as usize].bounds.add(&bounds);
+            sizes[patch as usize] += run;
         }
+        sizes.iter().zip(0..).max_by_key(|(size, _)| **size).map_or(NONE, |(_, patch)| patch)
     }
 }
 
-/// Adds triangles up for the patch that the last of them belonged to.
+/// Adds triangles up for the patch that the last of them belonged to. Those of the largest patch are only counted: the sum over all of
+/// the chunk is known, and sums are exact, so theirs is what the others leave.
 struct Sum<'a> {
     measure: &'a Measure,
     positions: &'a [Point],
+    /// [`NONE`] if there is none.
+    largest: u32,
     patch: u32,
     first: u32,
     triangles: u64,
-    batch: Batch,
+    of_patch: Batch,
+    of_none: Batch,
+    /// Of what is not the largest patch's.
+    others: Extent,
 }
 
 impl<'a> Sum<'a> {
-    fn new(measure: &'a Measure, positions: &'a [Point]) -> Self {
-        Self { measure, positions, patch: NONE, first: NONE, triangles: 0, batch: Batch::default() }
+    fn new(measure: &'a Measure, positions: &'a [Point], largest: u32) -> Self {
+        let (of_patch, of_none) = (Batch::default(), Batch::default());
+        Self { measure, positions, largest, patch: NONE, first: NONE, triangles: 0, of_patch, of_none, others: Extent::default() }
     }
 
     #[inline(always)]
     fn add(&mut self, patch: u32, triangle: u32, vertices: [u32; 3], patches: &mut [Patch]) {
-        if self.patch != patch || self.batch.is_full() {
+        if self.patch != patch || self.of_patch.is_full() {
             self.flush(patches);
             self.patch = patch;
         }
         self.first = self.first.min(triangle);
         self.triangles += 1;
-        let corner = |k: usize| &self.positions[vertices[k] as usize];
-        self.batch.push([corner(0), corner(1), corner(2)]);
+        if patch != self.largest {
+            self.of_patch.push(vertices.map(|v| self.positions[v as usize]));
+        }
+    }
+
+    /// Leaves a triangle out.
+    #[inline(always)]
+    fn leave(&mut self, vertices: [u32; 3]) {
+        if self.of_none.is_full() {
+            self.others += self.of_none.take(self.measure);
+        }
+        self.of_none.push(vertices.map(|v| self.positions[v as usize]));
     }
 
     #[inline(always)]
     fn flush(&mut self, patches: &mut [Patch]) {
         if self.triangles > 0 {
+            let extent = self.of_patch.take(self.measure);
+            self.others += extent;
             let sums = &mut patches[self.patch as usize];
             sums.first = sums.first.min(self.first);
             sums.triangles += self.triangles;
-            sums.extent += self.measure.batch(&mut self.batch);
+            sums.extent += extent;
         }
         (self.first, self.triangles) = (NONE, 0);
+    }
+
+    /// The sum over all members being `total`.
+    fn finish(mut self, mut total: Extent, patches: &mut [Patch]) {
+        self.flush(patches);
+        self.others += self.of_none.take(self.measure);
+        total -= self.others;
+        if let Some(largest) = patches.get_mut(self.largest as usize) {
+            largest.extent = total;
+        }
+    }
+}
+
+/// Some triangles that are summed at once.
+struct Batch {
+    corners: [[Point; 3]; Self::LEN],
+    filled: usize,
+}
+
+impl Default for Batch {
+    fn default() -> Self {
+        Self { corners: [[[0.0; 3]; 3]; Self::LEN], filled: 0 }
+    }
+}
+
+impl Batch {
+    const LEN: usize = 32;
+
+    #[inline(always)]
+    fn is_full(&self) -> bool {
+        self.filled == Self::LEN
+    }
+
+    /// Must not be full.
+    #[inline(always)]
+    fn push(&mut self, corners: [Point; 3]) {
+        self.corners[self.filled] = corners;
+        self.filled += 1;
+    }
+
+    fn take(&mut self, measure: &Measure) -> Extent {
+        measure.sum(&self.corners[..std::mem::take(&mut self.filled)])
     }
 }
 

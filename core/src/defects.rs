@@ -34,7 +34,7 @@ pub(crate) fn count(survey: &Survey<'_>, shop: &Shop, edges: &Edges, tolerance: 
         );
     let mut defects = Defects {
         triangles: survey.triangles,
-        nonfinite: survey.nonfinite.iter().map(|r| u64::from(r.1)).sum(),
+        nonfinite: survey.nonfinite.iter().map(|run| u64::from(run.1)).sum(),
         vertices: survey.vertices,
         vertices_used: survey.vertices_used,
         // Edges without a complete end have two triangles each.

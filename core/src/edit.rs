@@ -128,7 +128,11 @@ impl Edit {
     }
 
     /// Walks through the input in order: runs of untouched records, then what becomes of the one that follows.
-    pub(crate) fn walk<'r, 'e, E>(&'e self, records: &'r [Record], mut step: impl FnMut(Step<'r, 'e>) -> Result<(), E>) -> Result<(), E> {
+    pub(crate) fn walk<'r, 'e, E>(
+        &'e self,
+        records: &'r [Record],
+        mut step: impl FnMut(Step<'r, 'e>) -> Result<(), E>,
+    ) -> Result<(), E> {
         let mut changes = self.changes.iter().peekable();
         let mut added = self.added.iter();
         let mut start = 0;

@@ -12,7 +12,7 @@ use crate::members::Members;
 use crate::plan::{ChunkId, Plan};
 use crate::record::{Record, corners};
 use crate::settings::Limits;
-use crate::sums::{Batch, Bounds, Measure};
+use crate::sums::{Bounds, Measure};
 use crate::weld::{BATCH, Weld};
 
 /// A mesh, and what a survey knows of it before its kernels run.
@@ -112,15 +112,12 @@ impl Mesh {
 
     /// Exact sums of area and volume; returns the volume.
     pub fn measure(&self) -> f64 {
-        let (mut batch, mut volume) = (Batch::default(), 0);
-        for record in &self.records {
-            let [a, b, c] = corners(record);
-            batch.push([&a, &b, &c]);
-            if batch.is_full() {
-                volume += self.measure.batch(&mut batch).volume;
-            }
+        let mut volume = 0;
+        for part in self.records.chunks(16) {
+            let mut batch = [[[0.0; 3]; 3]; 16];
+            batch.iter_mut().zip(part).for_each(|(place, record)| *place = corners(record));
+            volume += self.measure.sum(&batch).volume;
         }
-        volume += self.measure.batch(&mut batch).volume;
         volume as f64
     }
 

@@ -1,9 +1,9 @@
 //! The second look at a file by its difference from the input.
 //!
-//! All but a few of its records are the input's, byte for byte, which is confirmed when it is read back ([`crate::readback`]). A vertex none of
-//! whose triangles came, went or changed has the star it had; the others are **disturbed**. All triangles around disturbed vertices
-//! and around those that were not sound before go to a new workshop, from the records that are written, where they are counted as any file's. What
-//! is left of the input's patches is sound as it was.
+//! All but a few of its records are the input's, byte for byte, which is confirmed when it is read back ([`crate::readback`]). A
+//! vertex none of whose triangles came, went or changed has the star it had; the others are **disturbed**. All triangles around
+//! disturbed vertices and around those that were not sound before go to a new workshop, from the records that are written, where
+//! they are counted as any file's. What is left of the input's patches is sound as it was.
 //!
 //! What cannot be shown to hold in this way is looked at anew: [`look`] returns nothing then, and the file is surveyed as if nothing were
 //! known of it. Whether it comes to that depends on input and edit alone.
@@ -45,7 +45,7 @@ pub(crate) fn look<'a>(mut survey: Survey<'a>, difference: &Difference) -> Optio
     let shop = around.gather(&survey, difference);
     around.settle_patches(&mut survey, &shop)?;
     let edges = Edges::of(&shop);
-    if !around.keep_patches_whole(&survey, &shop, &edges) {
+    if !around.keep_patches_whole(&shop, &edges) {
         return None;
     }
     around.count(&mut survey, &shop, difference);
@@ -71,8 +71,9 @@ struct Disturbed {
     in_output: Vec<[bool; 2]>,
     /// How many were known before this look, promoted ones included.
     known: usize,
-    /// By triangle of the new workshop: the vertices of this table it has.
-    corners: Vec<[u32; 3]>,
+    /// By suspect of the input, and by triangle of the new workshop: the vertices of this table it has.
+    of_suspects: Vec<[u32; 3]>,
+    of_triangles: Vec<[u32; 3]>,
 }
 
 impl Disturbed {
@@ -108,7 +109,15 @@ impl Disturbed {
         let count = vertices.positions().len();
         was_sound.resize(count, true);
         let none = vec![[false; 2]; count];
-        Self { vertices, was_sound, in_input: none.clone(), in_output: none, known, corners: Vec::new() }
+        Self {
+            vertices,
+            was_sound,
+            in_input: none.clone(),
+            in_output: none,
+            known,
+            of_suspects: Vec::new(),
+            of_triangles: Vec::new(),
+        }
     }
 
     /// Those of which not all triangles are suspects yet.
@@ -131,7 +140,7 @@ impl Disturbed {
             // A sound corner that is left holds it to its patch.
             let patch = if at.contains(&NONE) { patch } else { NONE };
             let complete = (0..3).fold(0, |mask, k| mask | u8::from(at[k] != NONE) << k);
-            this.corners.push(at);
+            this.of_triangles.push(at);
             gathering.add(place, corners, complete, patch);
         };
         for (i, (suspect, patch)) in survey.suspects.iter().zip(&survey.suspect_patches).enumerate() {
@@ -142,6 +151,7 @@ impl Disturbed {
             let corners = record::corners(&survey.records[place as usize]);
             let at = self.at(corners);
             note(&mut self.in_input, at, &corners);
+            self.of_suspects.push(at);
             while let Some((place, record)) = fresh.next_if(|f| f.0 <= place) {
                 add(self, *place, record::corners(record), NONE);
             }
@@ -160,17 +170,17 @@ impl Disturbed {
         let mut held = vec![false; self.was_sound.len()];
         let mut is_left: Vec<bool> = survey.patches.iter().map(|p| p.triangles > 0).collect();
         let mut begins = vec![false; survey.patches.len()];
-        for (t, corners) in shop.triangles.iter().zip(&self.corners).filter(|(t, _)| t.patch != NONE) {
+        for (t, corners) in shop.triangles.iter().zip(&self.of_triangles).filter(|(t, _)| t.patch != NONE) {
             is_left[t.patch as usize] = true;
             begins[t.patch as usize] |= t.record() == survey.patches[t.patch as usize].first;
             corners.iter().filter(|v| **v != NONE).for_each(|v| held[*v as usize] = true);
         }
-        for (suspect, patch) in survey.suspects.iter().zip(&survey.suspect_patches).filter(|(_, patch)| **patch != NONE) {
-            let corners = record::corners(&survey.records[suspect.triangle as usize]);
-            for (p, v) in corners.iter().zip(self.at(corners)) {
+        for (at, patch) in self.of_suspects.iter().zip(&survey.suspect_patches).filter(|(_, patch)| **patch != NONE) {
+            for v in at.iter().filter(|v| **v != NONE) {
+                let p = self.vertices.positions()[*v as usize];
                 let bounds = &survey.patches[*patch as usize].bounds;
                 let at_the_end = (0..3).any(|k| p[k] == bounds.lo[k] || p[k] == bounds.hi[k]);
-                if at_the_end && is_left[*patch as usize] && v != NONE && self.was_sound[v as usize] && !held[v as usize] {
+                if at_the_end && is_left[*patch as usize] && self.was_sound[*v as usize] && !held[*v as usize] {
                     return None;
                 }
             }
@@ -188,16 +198,16 @@ impl Disturbed {
 
     /// Does what is left of every patch hang together, be it over the workshop?
     ///
-    /// Of the vertices of a patch, those that are disturbed are taken out. What leads from one of the others to another through a set of disturbed ones that
-    /// hang together enters and leaves it at neighbours of the set. So if all neighbours of each such set hang together otherwise, everything does.
-    fn keep_patches_whole(&self, survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> bool {
+    /// Of the vertices of a patch, those that are disturbed are taken out. What leads from one of the others to another through a set
+    /// of disturbed ones that hang together enters and leaves it at neighbours of the set. So if all neighbours of each such set hang
+    /// together otherwise, everything does.
+    fn keep_patches_whole(&self, shop: &Shop, edges: &Edges) -> bool {
         if !self.was_sound.contains(&true) {
             return true;
         }
         let mut sets: Vec<u32> = (0..self.was_sound.len() as u32).collect();
-        for suspect in &survey.suspects {
-            let corners = self.at(record::corners(&survey.records[suspect.triangle as usize]));
-            let mut were_sound = corners.into_iter().filter(|v| *v != NONE && self.was_sound[*v as usize]);
+        for at in &self.of_suspects {
+            let mut were_sound = at.iter().copied().filter(|v| *v != NONE && self.was_sound[*v as usize]);
             if let Some(first) = were_sound.next() {
                 were_sound.for_each(|v| {
                     chunk::unite(&mut sets, first, v);
@@ -223,7 +233,7 @@ impl Disturbed {
             }
         }
         let mut neighbours = vec![NONE; self.was_sound.len()];
-        for (t, corners) in self.corners.iter().enumerate().filter(|(t, _)| shop.triangles[*t].patch != NONE) {
+        for (t, corners) in self.of_triangles.iter().enumerate().filter(|(t, _)| shop.triangles[*t].patch != NONE) {
             let piece = chunk::find(&mut parents, t as u32);
             for v in corners.iter().filter(|v| **v != NONE && self.was_sound[**v as usize]) {
                 let of_set = &mut neighbours[chunk::find(&mut sets, *v) as usize];

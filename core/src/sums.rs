@@ -128,54 +128,91 @@ impl Measure {
         Extent { area: whole(area), volume: whole(volume) }
     }
 
-    /// The terms of all triangles of `batch`, which is emptied.
-    pub(crate) fn batch(&self, batch: &mut Batch) -> Extent {
-        let full = std::mem::take(&mut batch.len);
-        #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
-            batch.corners[full..].fill([[0.0; 3]; 3]);
-            // SAFETY: the processor has AVX2.
-            return unsafe { self.sum_avx2(&batch.corners) };
+    /// The sum of [`Measure::triangle`] over some triangles.
+    #[inline]
+    pub(crate) fn sum(&self, triangles: &[[Point; 3]]) -> Extent {
+        let mut sum = Extent::default();
+        for part in triangles.chunks(MOST_AT_ONCE) {
+            #[cfg(target_arch = "x86_64")]
+            if is_x86_feature_detected!("avx2") {
+                // SAFETY: the processor has AVX2.
+                sum += unsafe { self.sum_avx2(part) };
+                continue;
+            }
+            part.iter().for_each(|corners| sum += self.triangle(corners));
         }
-        batch.corners[..full].iter().fold(Extent::default(), |mut sum, corners| {
-            sum += self.triangle(corners);
-            sum
-        })
+        sum
     }
 
+    /// The same by lanes of four: whole and fractional parts are integers below 2⁴¹ and 2⁴⁸, so that f64 adds a lane of
+    /// [`MOST_AT_ONCE`] exactly.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn sum_avx2(&self, corners: &[[Point; 3]; Batch::LEN]) -> Extent {
-        self.sum_by_lanes(corners)
+    fn sum_avx2(&self, triangles: &[[Point; 3]]) -> Extent {
+        use std::arch::x86_64::_mm256_setzero_pd;
+        let (groups, rest) = triangles.as_chunks::<LANES>();
+        let mut sums = [_mm256_setzero_pd(); 4];
+        for group in groups {
+            self.add_lanes(group, &mut sums);
+        }
+        if !rest.is_empty() {
+            let mut group = [[[0.0; 3]; 3]; LANES];
+            group[..rest.len()].copy_from_slice(rest);
+            self.add_lanes(&group, &mut sums);
+        }
+        let mut totals = [0i128; 4];
+        for (total, lanes) in totals.iter_mut().zip(sums) {
+            let mut of_lanes = [0f64; LANES];
+            // SAFETY: there is room for four.
+            unsafe { std::arch::x86_64::_mm256_storeu_pd(of_lanes.as_mut_ptr(), lanes) };
+            *total = i128::from(of_lanes.iter().map(|x| *x as i64).sum::<i64>());
+        }
+        let [area, area_low, volume, volume_low] = totals;
+        Extent { area: (area << 48) + area_low, volume: (volume << 48) + volume_low }
     }
 
-    /// The sum of [`Measure::triangle`], as the compiler can make vector instructions of it: whole and fractional parts are integers
-    /// below 2⁴¹ and 2⁴⁸, so that f64 adds a lane of them exactly. Where there is no instruction for `trunc`, it is slower.
-    #[inline(always)]
-    fn sum_by_lanes(&self, corners: &[[Point; 3]; Batch::LEN]) -> Extent {
-        let mut sums = [[0f64; LANES]; 4];
-        for group in corners.as_chunks::<LANES>().0 {
-            let mut p = [[[0f64; LANES]; 3]; 3];
-            for i in 0..3 {
-                for k in 0..3 {
-                    for l in 0..LANES {
-                        p[i][k][l] = f64::from(group[l][i][k]);
-                    }
-                }
-            }
-            for l in 0..LANES {
-                let [a, b, c] = [0, 1, 2].map(|i| [p[i][0][l], p[i][1][l], p[i][2][l]]);
-                let (area, volume) = self.terms(a, b, c);
-                for (i, x) in [area, volume].into_iter().enumerate() {
-                    let high = x.trunc();
-                    sums[2 * i][l] += high;
-                    sums[2 * i + 1][l] += ((x - high) * FRACTION).trunc();
-                }
-            }
-        }
-        let [area, area_low, volume, volume_low] = sums.map(|lanes| lanes.iter().map(|x| *x as i64).sum::<i64>());
-        let whole = |high: i64, low: i64| (i128::from(high) << 48) + i128::from(low);
-        Extent { area: whole(area, area_low), volume: whole(volume, volume_low) }
+    /// Adds the whole and the fractional parts of areas, then of volumes: [`Measure::terms`] and [`whole`], operation by operation.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn add_lanes(&self, group: &[[Point; 3]; LANES], sums: &mut [std::arch::x86_64::__m256d; 4]) {
+        use std::arch::x86_64::{
+            __m256d, _MM_FROUND_NO_EXC, _MM_FROUND_TO_ZERO, _MM_TRANSPOSE4_PS, _mm_loadu_ps, _mm_set_ps, _mm256_add_pd,
+            _mm256_cvtps_pd, _mm256_mul_pd, _mm256_round_pd, _mm256_set1_pd, _mm256_sqrt_pd, _mm256_sub_pd,
+        };
+        let add = |a, b| _mm256_add_pd(a, b);
+        let sub = |a, b| _mm256_sub_pd(a, b);
+        let mul = |a, b| _mm256_mul_pd(a, b);
+        let trunc = |a| _mm256_round_pd::<{ _MM_FROUND_TO_ZERO | _MM_FROUND_NO_EXC }>(a);
+        let row = |l: usize, from: usize| {
+            let four = &group[l].as_flattened()[from..from + 4];
+            // SAFETY: it reads these four floats.
+            unsafe { _mm_loadu_ps(four.as_ptr()) }
+        };
+        // Four and four of the nine coordinates of each triangle side by side, and the last one.
+        let (mut ax, mut ay, mut az, mut bx) = (row(0, 0), row(1, 0), row(2, 0), row(3, 0));
+        _MM_TRANSPOSE4_PS(&mut ax, &mut ay, &mut az, &mut bx);
+        let (mut by, mut bz, mut cx, mut cy) = (row(0, 4), row(1, 4), row(2, 4), row(3, 4));
+        _MM_TRANSPOSE4_PS(&mut by, &mut bz, &mut cx, &mut cy);
+        let cz = _mm_set_ps(group[3][2][2], group[2][2][2], group[1][2][2], group[0][2][2]);
+        let wide = |x| _mm256_cvtps_pd(x);
+        let (ax, ay, az) = (wide(ax), wide(ay), wide(az));
+        let (ux, uy, uz) = (sub(wide(bx), ax), sub(wide(by), ay), sub(wide(bz), az));
+        let (vx, vy, vz) = (sub(wide(cx), ax), sub(wide(cy), ay), sub(wide(cz), az));
+        let nx = sub(mul(uy, vz), mul(uz, vy));
+        let ny = sub(mul(uz, vx), mul(ux, vz));
+        let nz = sub(mul(ux, vy), mul(uy, vx));
+        let area = _mm256_sqrt_pd(add(add(mul(nx, nx), mul(ny, ny)), mul(nz, nz)));
+        let from = |x: __m256d, k: usize| sub(x, _mm256_set1_pd(self.middle[k]));
+        let volume = add(add(mul(from(ax, 0), nx), mul(from(ay, 1), ny)), mul(from(az, 2), nz));
+        let area = mul(area, _mm256_set1_pd(self.to_area));
+        let volume = mul(volume, _mm256_set1_pd(self.to_volume));
+        let (area_whole, volume_whole) = (trunc(area), trunc(volume));
+        let fraction = _mm256_set1_pd(FRACTION);
+        sums[0] = add(sums[0], area_whole);
+        sums[1] = add(sums[1], trunc(mul(sub(area, area_whole), fraction)));
+        sums[2] = add(sums[2], volume_whole);
+        sums[3] = add(sums[3], trunc(mul(sub(volume, volume_whole), fraction)));
     }
 
     /// Twice the area, and six times the volume, in units of 1.
@@ -206,39 +243,10 @@ impl Measure {
     }
 }
 
-/// A few triangles to be summed at once.
-pub(crate) struct Batch {
-    corners: [[Point; 3]; Self::LEN],
-    len: usize,
-}
-
-impl Default for Batch {
-    fn default() -> Self {
-        Self { corners: [[[0.0; 3]; 3]; Self::LEN], len: 0 }
-    }
-}
-
-impl Batch {
-    const LEN: usize = 32;
-
-    #[inline]
-    pub(crate) fn is_full(&self) -> bool {
-        self.len == Self::LEN
-    }
-
-    /// Must not be full.
-    #[inline(always)]
-    pub(crate) fn push(&mut self, corners: [&Point; 3]) {
-        let place = &mut self.corners[self.len];
-        for k in 0..3 {
-            place[k] = *corners[k];
-        }
-        self.len += 1;
-    }
-}
-
 /// Triangles computed side by side.
 const LANES: usize = 4;
+/// 32 for each lane.
+const MOST_AT_ONCE: usize = 32 * LANES;
 
 /// Bits that [`whole`] keeps below the point.
 const FRACTION: f64 = (1u64 << 48) as f64;
@@ -283,8 +291,8 @@ mod tests {
     proptest! {
         /// Many at once are the sum of each, to the last bit, for models of any size and place.
         #[test]
-        fn a_batch_is_the_sum_of_its_triangles(
-            triangles in prop::collection::vec(prop::array::uniform3(prop::array::uniform3(-1f32..1.0)), 1..=Batch::LEN),
+        fn many_are_the_sum_of_each(
+            triangles in prop::collection::vec(prop::array::uniform3(prop::array::uniform3(-1f32..1.0)), 0..2 * MOST_AT_ONCE),
             exponent in -40i32..40,
             offset in -100f32..100.0,
         ) {
@@ -293,17 +301,9 @@ mod tests {
             let mut bounds = Bounds::EMPTY;
             triangles.iter().for_each(|t| bounds.include(t));
             let measure = Measure::new(&bounds);
-            let (mut batch, mut want) = (Batch::default(), Extent::default());
-            for round in 0..2 {
-                // Again with half of them: what the batch held before is gone.
-                let some = &triangles[..triangles.len() >> round];
-                some.iter().for_each(|t| batch.push([&t[0], &t[1], &t[2]]));
-                want = some.iter().fold(Extent::default(), |mut sum, t| {
-                    sum += measure.triangle(t);
-                    sum
-                });
-                prop_assert_eq!(measure.batch(&mut batch), want);
-            }
+            let mut want = Extent::default();
+            triangles.iter().for_each(|t| want += measure.triangle(t));
+            prop_assert_eq!(measure.sum(&triangles), want);
             prop_assert!(want.area >= 0);
         }
     }

@@ -141,7 +141,7 @@ impl<'a> Survey<'a> {
             suspects: merge.suspects,
             suspect_patches: merge.suspect_patches,
             patches: merge.patches,
-            triangles: records.len() as u64 - nonfinite.iter().map(|r| u64::from(r.1)).sum::<u64>(),
+            triangles: records.len() as u64 - count_of(&nonfinite),
             nonfinite,
             self_intersections,
             crossing_pairs,
@@ -293,6 +293,11 @@ impl<'a> Survey<'a> {
     }
 }
 
+/// Triangles in runs of them.
+fn count_of(runs: &[(u32, u32)]) -> u64 {
+    runs.iter().map(|run| u64::from(run.1)).sum()
+}
+
 /// Refuses what could not be numbered.
 fn refuse_more_than(path: &Path, most: u64, there: u64, what: &str) -> Result<()> {
     if there <= most {
@@ -311,7 +316,7 @@ fn take_tables(path: &Path, budget: &Budget, plan: &Plan, members: &Members, lim
     budget.take(Purpose::Tables, scratch + members.heap_bytes(limits.threads) + plan.heap_bytes());
     let largest = counts.first().copied().unwrap_or(0);
     budget.check(path, || format!("the largest chunk holds {largest} triangles"))?;
-    let nonfinite: u64 = members.nonfinite.iter().map(|r| u64::from(r.1)).sum();
+    let nonfinite = count_of(&members.nonfinite);
     budget.take(Purpose::Defects, nonfinite * edit::BYTES_PER_NONFINITE);
     budget.check(path, || format!("{nonfinite} triangles have coordinates that are no finite numbers"))
 }

@@ -10,6 +10,9 @@ use blake3::hazmat::{ChainingValue, HasherExt, Mode, merge_subtrees_non_root, me
 /// A power of two, so that a block is a subtree; large enough for all lanes, and so small that few blocks of a repaired file changed.
 pub(crate) const BLOCK: usize = 64 << 10;
 
+/// The values of a file's blocks.
+pub(crate) type Digest = Vec<ChainingValue>;
+
 /// Bytes that the values of a file's blocks take.
 pub(crate) fn heap_bytes(file_bytes: u64) -> u64 {
     file_bytes.div_ceil(BLOCK as u64) * size_of::<ChainingValue>() as u64
@@ -56,7 +59,7 @@ mod tests {
 
     #[test]
     fn it_is_the_hash_of_the_whole() {
-        let bytes: Vec<u8> = (0..9 * BLOCK + 1).map(|i| (i * i >> 7) as u8).collect();
+        let bytes: Vec<u8> = (0..9 * BLOCK + 1).map(|i| ((i * i) >> 7) as u8).collect();
         for blocks in 0..=9 {
             for length in [blocks * BLOCK, (blocks * BLOCK).saturating_sub(1), blocks * BLOCK + 1] {
                 let file = &bytes[..length];

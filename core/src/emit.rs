@@ -11,11 +11,11 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{JoinHandle, ScopedJoinHandle};
 
-use blake3::hazmat::ChainingValue;
 use rustix::io::Errno;
 
 use crate::ahead::Guide;
 use crate::behind::WriteBehind;
+use crate::digest::Digest;
 use crate::edit::{Edit, Step};
 use crate::error::{Error, Result};
 use crate::read::{MeshFile, PREFIX_BYTES};
@@ -87,7 +87,7 @@ pub(crate) struct Draft<'scope, 'a> {
     progress: &'a dyn Progress,
     wanted: &'a Wanted,
     /// The copy so far, and the digest of the input.
-    copying: Option<ScopedJoinHandle<'scope, Result<(Sink<'a>, Vec<ChainingValue>)>>>,
+    copying: Option<ScopedJoinHandle<'scope, Result<(Sink<'a>, Digest)>>>,
 }
 
 impl Drop for Draft<'_, '_> {
@@ -98,7 +98,7 @@ impl Drop for Draft<'_, '_> {
 
 impl Draft<'_, '_> {
     /// Makes it hold `content` and begins to sync it, unless that is deferred. Returns the digest of the input, block by block, as well.
-    pub(crate) fn finish(mut self, content: &Content<'_>) -> Result<(Written, Vec<ChainingValue>)> {
+    pub(crate) fn finish(mut self, content: &Content<'_>) -> Result<(Written, Digest)> {
         let Self { mesh, output, limits, progress, wanted, .. } = self;
         self.wanted.awaited.store(true, Ordering::Relaxed);
         let (mut sink, digest) = match self.copying.take() {
@@ -175,7 +175,7 @@ impl<'a> Sink<'a> {
     }
 
     /// Copies as many bytes of the input as are wanted, and digests all of it.
-    fn copy(mut self, limits: &Limits, wanted: &Wanted) -> Result<(Self, Vec<ChainingValue>)> {
+    fn copy(mut self, limits: &Limits, wanted: &Wanted) -> Result<(Self, Digest)> {
         let bytes = self.mesh.bytes();
         let mut digest = Vec::with_capacity(bytes.len().div_ceil(digest::BLOCK));
         let mut hashed = 0;

@@ -4,9 +4,9 @@ use std::path::Path;
 use std::time::Instant;
 
 use blake3::Hasher;
-use blake3::hazmat::ChainingValue;
 
 use crate::ahead::Guide;
+use crate::digest::Digest;
 use crate::edit::Edit;
 use crate::emit::{Content, Draft};
 use crate::error::{Error, Result};
@@ -268,7 +268,7 @@ fn verify(
     report: &mut Report,
     input: &MeshFile,
     surface: &Bounds,
-    known: Option<(Expectation<'_>, Vec<ChainingValue>, Option<Defects>)>,
+    known: Option<(Expectation<'_>, Digest, Option<Defects>)>,
     output: &Path,
     limits: &Limits,
     progress: &dyn Progress,
@@ -305,7 +305,7 @@ fn verify(
 
 /// The hash and the defects of a written file: what was `known` of it before, if it holds what it should, or else by a survey of its own.
 fn look_again(
-    known: Option<(Expectation<'_>, Vec<ChainingValue>, Option<Defects>)>,
+    known: Option<(Expectation<'_>, Digest, Option<Defects>)>,
     written: &MeshFile,
     profile: &Profile,
     limits: &Limits,

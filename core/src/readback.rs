@@ -7,6 +7,7 @@ use blake3::hazmat::ChainingValue;
 use rayon::prelude::*;
 
 use crate::ahead::Guide;
+use crate::digest::Digest;
 use crate::edit::{Edit, Step};
 use crate::error::{Error, Result};
 use crate::read::{MeshFile, PREFIX_BYTES};
@@ -139,13 +140,7 @@ impl<'a> Expectation<'a> {
     }
 
     /// The digest of a file that holds what it should, `None` if it does not.
-    fn read(
-        &self,
-        written: &MeshFile,
-        digest: &[ChainingValue],
-        limits: &Limits,
-        progress: &dyn Progress,
-    ) -> Option<Vec<ChainingValue>> {
+    fn read(&self, written: &MeshFile, digest: &[ChainingValue], limits: &Limits, progress: &dyn Progress) -> Option<Digest> {
         let bytes = written.bytes();
         let input_guide = Guide::new(self.input.as_flattened(), limits);
         let value = |number: usize, block: &[u8]| match (self.compare(number * digest::BLOCK, block), digest.get(number)) {

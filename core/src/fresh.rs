@@ -7,7 +7,7 @@
 use crate::boxes::BoxTree;
 use crate::chunk;
 use crate::crossings::{Crossings, Pair, most_tested};
-use crate::fill::cross::{Triangle as Corners, self_intersection};
+use crate::fill::cross::{Triangle as Corners, common, self_intersection};
 use crate::grid::Grid;
 use crate::plan::HomeBox;
 use crate::readback::Difference;
@@ -132,8 +132,7 @@ impl Found {
             return;
         }
         self.tested += 1;
-        let common = [one.corners.map(|p| other.corners.contains(&p)), other.corners.map(|p| one.corners.contains(&p))];
-        if let Some(contact) = self_intersection(&one.corners, &other.corners, common) {
+        if let Some(contact) = self_intersection(&one.corners, &other.corners, common(&one.corners, &other.corners)) {
             self.pairs.push(Pair { triangles: [one.place, other.place], contact });
         }
     }

@@ -59,19 +59,25 @@ impl Edit {
         ]
     }
 
-    /// The records that the edit makes of `input`. New triangles have their own normals.
+    /// The records that the edit makes of `input`. New triangles have their own normals; the first of them take the places of deleted
+    /// ones.
     ///
     /// # Panics
     /// When the edit is of another input.
     pub fn apply(&self, input: &[Record]) -> Vec<Record> {
         assert_eq!(input.len(), self.changes.len());
-        let kept = input.iter().zip(&self.changes).filter_map(|(record, change)| match change {
-            Change::Untouched => Some(*record),
-            Change::Deleted => None,
-            Change::Flipped => Some(flipped(record)),
-            Change::Moved(to) => Some(stl::record(stl::unit_normal(to), to, stl::attribute(record))),
-        });
-        kept.chain(self.added.iter().map(|(t, attribute)| stl::record(stl::unit_normal(t), t, *attribute))).collect()
+        let mut added = self.added.iter().map(|(t, attribute)| stl::record(stl::unit_normal(t), t, *attribute));
+        let mut output = Vec::new();
+        for (record, change) in input.iter().zip(&self.changes) {
+            match change {
+                Change::Untouched => output.push(*record),
+                Change::Deleted => output.extend(added.next()),
+                Change::Flipped => output.push(flipped(record)),
+                Change::Moved(to) => output.push(stl::record(stl::unit_normal(to), to, stl::attribute(record))),
+            }
+        }
+        output.extend(added);
+        output
     }
 }
 

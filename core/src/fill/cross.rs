@@ -43,11 +43,16 @@ pub fn triangles_cross(a: &Triangle, b: &Triangle) -> Contact {
             return Contact::Apart;
         }
     }
-    meet(a, b, [a.map(|p| b.contains(&p)), b.map(|p| a.contains(&p))], true)
+    meet(a, b, common(a, b), true)
+}
+
+/// Which corners of the one are also corners of the other, both ways.
+pub(crate) fn common(a: &Triangle, b: &Triangle) -> [[bool; 3]; 2] {
+    [a.map(|p| b.contains(&p)), b.map(|p| a.contains(&p))]
 }
 
 /// The same where it does not matter whether two triangles touch or are apart, which is often known sooner. Both have an area;
-/// `common`: which corners of the one are also corners of the other.
+/// `common` as [`common`] finds it.
 pub(crate) fn self_intersection(a: &Triangle, b: &Triangle, common: [[bool; 3]; 2]) -> Option<Contact> {
     let contact = if common[0] == [true; 3] { Contact::Overlap } else { meet(a, b, common, false) };
     contact.is_crossing().then_some(contact)

@@ -22,7 +22,7 @@ pub mod tree;
 
 use boxes::{Boxes, EMPTY, around};
 use clear::Clearance;
-use cross::{Contact, Triangle, self_intersection, triangles_cross};
+use cross::{Contact, Triangle, common, self_intersection, triangles_cross};
 use exact::{Point, at, collinear};
 use flips::Flips;
 use front::Order;
@@ -333,17 +333,15 @@ impl Rim<'_> {
     }
 
     /// Is this triangulation of the polygon valid: every triangle with an area and clear of the mesh's triangles along the rim,
-    /// every chord allowed, and nothing crosses or folds onto itself? `graph`: it is known to be a graph over a plane, which cannot cross itself.
+    /// every chord allowed, and nothing crosses or folds onto itself? `graph`: it is known to be a graph over a plane, which cannot
+    /// cross itself.
     fn accepts(&self, triangles: &[[u32; 3]], graph: bool) -> Result<(), Fault> {
         let neighbours =
             Boxes::new((0..self.apexes.len().min(self.len())).map(|i| self.neighbour(i).map_or(EMPTY, |t| around(&t))));
         let admissible = |t: &[u32; 3]| {
             let corners = self.corners(*t);
             // Whether neighbours touch or are apart does not matter, and is what takes longest to tell.
-            let crosses = |other: Triangle| {
-                let common = [corners.map(|p| other.contains(&p)), other.map(|p| corners.contains(&p))];
-                self_intersection(&corners, &other, common).is_some()
-            };
+            let crosses = |other: Triangle| self_intersection(&corners, &other, common(&corners, &other)).is_some();
             let meets = |i: usize| self.neighbour(i).is_some_and(crosses);
             !collinear(&corners[0], &corners[1], &corners[2])
                 && (0..3).all(|k| self.allows(t[k], t[(k + 1) % 3]))

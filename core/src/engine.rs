@@ -212,7 +212,10 @@ fn mend(
     let survey = diagnosis.into_survey();
     // Good as it came, or nothing in it could be repaired.
     let same = edit.is_empty() && flaws(mesh).is_empty();
-    let is_worthwhile = !same && second::is_worthwhile(edit.gone(), edit.added.len() as u64, mesh.records().len());
+    let (gone, added) = (edit.gone(), edit.added.len() as u64);
+    let is_worthwhile = !same
+        && second::is_worthwhile(gone, added, mesh.records().len())
+        && second::bytes(survey.suspects.len() as u64, gone + added) <= limits.memory_bytes;
     let expected = is_worthwhile.then(|| Expectation::of(mesh.records(), &edit));
     let emit = || draft.finish(&if same { Content::Input } else { Content::Edited(&edit) });
     // What the file will hold is looked at while it is written. It counts when the file was read back and does hold that.

@@ -6,7 +6,7 @@
 //! they are counted as any file's. What is left of the input's patches is sound as it was.
 //!
 //! What cannot be shown to hold in this way is looked at anew: [`look`] returns nothing then, and the file is surveyed as if nothing were
-//! known of it. Whether it comes to that depends on input and edit alone.
+//! known of it. What is found is the same.
 
 use glam::DVec3;
 
@@ -25,6 +25,11 @@ pub(crate) fn is_worthwhile(gone: u64, added: u64, input_records: usize) -> bool
     (gone + added) * 8 <= input_records as u64 && input_records as u64 + added < u64::from(NONE)
 }
 
+/// Bytes that a look takes where an edit of so many records was made among so many suspects: measured at defects here and there.
+pub(crate) fn bytes(suspects: u64, changed: u64) -> u64 {
+    256 * (suspects + changed)
+}
+
 /// Suspects that need no place in the budget: about 20 MB.
 const SUSPECTS_BESIDE: usize = 100_000;
 
@@ -38,12 +43,14 @@ pub(crate) fn look<'a>(mut survey: Survey<'a>, difference: &Difference) -> Optio
     if !new.is_empty() {
         survey.promote(&new);
     }
-    // Counted without tables for repairs, so this takes no more than the budget held for the input's workshop, and little besides.
+    // So many were not counted with.
     if survey.suspects.len() > suspects + suspects / 2 + SUSPECTS_BESIDE {
         return None;
     }
     let shop = around.gather(&survey, difference);
     around.settle_patches(&mut survey, &shop)?;
+    // Not needed any more, and the edges take much.
+    around.vertices = Weld::default();
     let edges = Edges::of(&shop);
     if !around.keep_patches_whole(&shop, &edges) {
         return None;

@@ -25,9 +25,10 @@ pub(crate) fn is_worthwhile(gone: u64, added: u64, input_records: usize) -> bool
     (gone + added) * 8 <= input_records as u64 && input_records as u64 + added < u64::from(NONE)
 }
 
-/// Bytes that a look takes where an edit of so many records was made among so many suspects: measured at defects here and there.
+/// Bytes that a look takes where an edit of so many records was made among so many suspects: measured at defects here and there, with all
+/// that is kept of the input.
 pub(crate) fn bytes(suspects: u64, changed: u64) -> u64 {
-    256 * (suspects + changed)
+    320 * (suspects + changed)
 }
 
 /// Suspects that need no place in the budget: about 20 MB.

@@ -43,12 +43,14 @@ impl Content<'_> {
     fn in_place(&self, mesh: &MeshFile) -> u64 {
         match self {
             Self::Input => u64::MAX,
-            Self::Edited(edit) => {
-                let records = edit.first_gap().map_or(mesh.records().len(), |gap| gap as usize);
-                (PREFIX_BYTES + records * size_of::<Record>()) as u64
-            }
+            Self::Edited(edit) => end_of(edit.first_gap().map_or(mesh.records().len(), |gap| gap as usize)),
         }
     }
+}
+
+/// Where so many records end in a file.
+fn end_of(records: usize) -> u64 {
+    (PREFIX_BYTES + records * size_of::<Record>()) as u64
 }
 
 /// What is known of the output while the input is copied to it.
@@ -69,7 +71,9 @@ pub(crate) fn draft<R>(
     progress: &dyn Progress,
     work: impl FnOnce(Draft<'_, '_>) -> Result<R>,
 ) -> Result<R> {
-    let wanted = Wanted { bytes: AtomicU64::new(u64::MAX), awaited: AtomicBool::new(false), given_up: AtomicBool::new(false) };
+    // What stands behind the records is copied only with a file that may turn out to be good as it is.
+    let bytes = if mesh.is_flawless() { u64::MAX } else { end_of(mesh.records().len()) };
+    let wanted = Wanted { bytes: AtomicU64::new(bytes), awaited: AtomicBool::new(false), given_up: AtomicBool::new(false) };
     let is_ahead = mesh.is_in_place() && limits.threads > 1 && mesh.bytes().len() >= COPIED_AHEAD;
     std::thread::scope(|scope| {
         let copy = || Sink::create(mesh, output, limits, progress)?.copy(limits, &wanted);
@@ -396,4 +400,32 @@ fn create(path: &Path) -> io::Result<File> {
 /// Does the path lead to a file that a process holds open, rather than to a name in a folder?
 pub(crate) fn is_nameless(path: &Path) -> bool {
     path.starts_with("/proc")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Quiet;
+    use crate::testing::{plate, records};
+
+    #[test]
+    fn what_stands_behind_the_records_is_not_copied_ahead() {
+        let folder = tempfile::tempdir().unwrap();
+        let (input, output) = (folder.path().join("part.stl"), folder.path().join("out.stl"));
+        let records = records(&plate(110, |_, _| true));
+        let mesh = [&[0; 80][..], &(records.len() as u32).to_le_bytes(), records.as_flattened()].concat();
+        let limits = Limits { threads: 2, ..Limits::default() };
+        for (behind, whole) in [(vec![], mesh.len()), (vec![7; 3 << 20], mesh.len())] {
+            std::fs::write(&input, [&mesh[..], &behind].concat()).unwrap();
+            let file = MeshFile::open(&input, folder.path(), &limits, &Quiet).unwrap();
+            let written = draft(&file, &output, &limits, &Quiet, |draft| {
+                while !draft.copying.as_ref().unwrap().is_finished() {
+                    std::thread::yield_now();
+                }
+                Ok(std::fs::metadata(&output).unwrap().len())
+            });
+            assert_eq!(written.unwrap(), whole as u64);
+            std::fs::remove_file(&output).unwrap();
+        }
+    }
 }

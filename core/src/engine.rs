@@ -178,7 +178,12 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     let folder = if emit::is_nameless(output) { limits.spool_folder() } else { folder_of(output).into() };
     space::check(input, &[Need { folder, bytes, what: "the output" }, spool_need(&mesh, limits)])?;
     emit::draft(&mesh, output, limits, progress, |draft| {
-        let mut report = mend(draft, &mesh, output, profile, limits, progress, &mut clock)?;
+        let mended = mend(draft, &mesh, output, profile, limits, progress, &mut clock);
+        // What was copied before the input changed is not what is read back: nothing is wrong with the disk.
+        let mut report = mended.map_err(|error| match error {
+            Error::Io { .. } if !progress.cancelled() => mesh.check_unchanged().err().unwrap_or(error),
+            other => other,
+        })?;
         report.cost = clock.cost(mesh.records().len() as u64);
         report.stages = clock.stages;
         Ok(report)
@@ -379,5 +384,49 @@ pub(crate) fn tolerances(diagnosis: &Diagnosis<'_>) -> Tolerances {
         } else {
             "switched off by the profile".into()
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::fs::FileExt;
+
+    use super::*;
+    use crate::read::PREFIX_BYTES;
+    use crate::testing::{plate, records};
+
+    /// Changes a byte of the file as soon as a stage begins.
+    struct Meddler<'a> {
+        file: &'a Path,
+        stage: &'a str,
+    }
+
+    impl Progress for Meddler<'_> {
+        fn at(&self, stage: &'static str, _: u64, _: u64) {
+            if stage == self.stage {
+                let file = std::fs::OpenOptions::new().write(true).open(self.file).unwrap();
+                file.write_all_at(&[7], (PREFIX_BYTES + 50 * 12_345 + 49) as u64).unwrap();
+            }
+        }
+    }
+
+    /// An open plate of more than 1 MiB, so that two threads copy it ahead.
+    #[test]
+    fn an_input_that_changes_is_said_to_have_changed() {
+        let folder = tempfile::tempdir().unwrap();
+        let input = folder.path().join("part.stl");
+        let records = records(&plate(110, |x, y| (x, y) != (50, 50)));
+        for threads in [1, 2] {
+            for stage in ["topology", "repair", "hash"] {
+                std::fs::write(&input, [&[0; 80][..], &(records.len() as u32).to_le_bytes(), records.as_flattened()].concat())
+                    .unwrap();
+                // The clock of the file system is coarse.
+                std::thread::sleep(std::time::Duration::from_millis(20));
+                let limits = Limits { threads, ..Limits::default() };
+                let output = folder.path().join(format!("{stage}-{threads}.stl"));
+                let result = repair(&input, &output, &Profile::default(), &limits, &Meddler { file: &input, stage });
+                assert!(matches!(result, Err(Error::Changed { .. })), "{threads} threads, {stage}: {result:?}");
+            }
+        }
     }
 }

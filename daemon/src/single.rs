@@ -214,7 +214,9 @@ impl Finished {
                 folders.push(folder.to_owned());
             }
         };
-        if let Some((draft, target)) = self.item.output.filter(|(draft, _)| draft.is_written()) {
+        // Where no triangle was left, the draft is no mesh, and the report knows of no output.
+        let is_mesh = self.report.output.is_some();
+        if let Some((draft, target)) = self.item.output.filter(|(draft, _)| is_mesh && draft.is_written()) {
             let placed = place_result(&draft, target, &self.item.request.input, naming)?;
             note(&placed);
             if let Some(facts) = &mut self.report.output {

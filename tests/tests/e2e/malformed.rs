@@ -173,6 +173,7 @@ fn nothing_but_unusable_triangles() {
         place.put("in.stl", &stl::file(b"nothing much", records));
         let ran = place.repair("in.stl", "out.stl", &[]).expect(1);
         assert_eq!(ran.report()["outcome"], "not_good");
+        assert!(ran.report()["output"].is_null() && !place.at("out.stl").exists(), "no mesh is left, so none is written");
         place.inspect("in.stl", &[]).expect(1);
     }
 }

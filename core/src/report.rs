@@ -236,7 +236,7 @@ pub struct EditSummary {
     pub flipped: u64,
     /// Input records with a moved vertex.
     pub moved: u64,
-    /// New records, at the end of the file.
+    /// New records: in the places of those left out as far as these go, then at the end of the file.
     pub added: u64,
     /// Largest distance any vertex moved.
     pub max_move: f64,

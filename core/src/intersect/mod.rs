@@ -302,7 +302,7 @@ impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
     #[inline(never)]
     fn decide_neighbours(&mut self) {
         let Self { region, neighbours, found, .. } = self;
-        let [crossing, unsure] = narrow::sort_neighbours(region, neighbours);
+        let [crossing, unsure] = narrow::sort(region, neighbours);
         for Neighbours { triangles: [i, j], .. } in &neighbours[..crossing] {
             found(*i.min(j), *i.max(j), Contact::Cross);
         }

@@ -22,9 +22,15 @@ const ERROR: f32 = 1.0 / (1 << 20) as f32;
 /// A bound below this comes from sums of products below 2¹²⁷.
 const LARGEST: f32 = (1_u128 << 107) as f32;
 
-/// Sorts pairs of triangles without a common vertex: to the front those that cross, then those of which nothing is sure; the rest are
-/// apart. Returns how many there are of the first kind and of the second.
-pub(super) fn sort(region: &Region<'_>, pairs: &mut [[u32; 2]]) -> [usize; 2] {
+/// Pairs of triangles of one kind.
+pub(super) trait Sort: Sized {
+    /// As [`sort`], with whatever vectors the caller is compiled for; to be inlined there.
+    fn sort(region: &Region<'_>, pairs: &mut [Self]) -> [usize; 2];
+}
+
+/// Sorts pairs: to the front those that cross, then those of which nothing is sure; the rest are apart. Returns how many there are of the
+/// first kind and of the second.
+pub(super) fn sort<P: Sort>(region: &Region<'_>, pairs: &mut [P]) -> [usize; 2] {
     #[cfg(target_arch = "x86_64")]
     {
         if has_avx512() {
@@ -36,54 +42,57 @@ pub(super) fn sort(region: &Region<'_>, pairs: &mut [[u32; 2]]) -> [usize; 2] {
             return unsafe { sort_avx2(region, pairs) };
         }
     }
-    sort_by(region, pairs)
+    P::sort(region, pairs)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl,avx512bw")]
-fn sort_avx512(region: &Region<'_>, pairs: &mut [[u32; 2]]) -> [usize; 2] {
-    sort_by(region, pairs)
+fn sort_avx512<P: Sort>(region: &Region<'_>, pairs: &mut [P]) -> [usize; 2] {
+    P::sort(region, pairs)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn sort_avx2(region: &Region<'_>, pairs: &mut [[u32; 2]]) -> [usize; 2] {
-    sort_by(region, pairs)
+fn sort_avx2<P: Sort>(region: &Region<'_>, pairs: &mut [P]) -> [usize; 2] {
+    P::sort(region, pairs)
 }
 
-#[inline(always)]
-fn sort_by(region: &Region<'_>, pairs: &mut [[u32; 2]]) -> [usize; 2] {
-    let mut block = Block::EMPTY;
-    let mut left = 0;
-    for start in (0..pairs.len()).step_by(WIDTH) {
-        let count = block.fill(region, &pairs[start..]);
-        for (i, apart) in block.apart_by_planes().into_iter().enumerate().take(count) {
-            pairs[left] = pairs[start + i];
-            left += usize::from(!apart);
-        }
-    }
-    let end = std::mem::take(&mut left);
-    for start in (0..end).step_by(WIDTH) {
-        let count = block.fill(region, &pairs[start..end]);
-        for (i, apart) in block.apart_by_edges().into_iter().enumerate().take(count) {
-            pairs[left] = pairs[start + i];
-            left += usize::from(!apart);
-        }
-    }
-    let end = std::mem::take(&mut left);
-    let mut crossing = 0;
-    for start in (0..end).step_by(WIDTH) {
-        let count = block.fill(region, &pairs[start..end]);
-        for (i, sure) in block.sure().into_iter().enumerate().take(count) {
-            pairs[left] = pairs[start + i];
-            if sure == Sure::Cross {
-                pairs.swap(left, crossing);
-                crossing += 1;
+/// Without a common vertex.
+impl Sort for [u32; 2] {
+    #[inline(always)]
+    fn sort(region: &Region<'_>, pairs: &mut [Self]) -> [usize; 2] {
+        let mut block = Block::EMPTY;
+        let mut left = 0;
+        for start in (0..pairs.len()).step_by(WIDTH) {
+            let count = block.fill(region, &pairs[start..]);
+            for (i, apart) in block.apart_by_planes().into_iter().enumerate().take(count) {
+                pairs[left] = pairs[start + i];
+                left += usize::from(!apart);
             }
-            left += usize::from(sure != Sure::Apart);
         }
+        let end = std::mem::take(&mut left);
+        for start in (0..end).step_by(WIDTH) {
+            let count = block.fill(region, &pairs[start..end]);
+            for (i, apart) in block.apart_by_edges().into_iter().enumerate().take(count) {
+                pairs[left] = pairs[start + i];
+                left += usize::from(!apart);
+            }
+        }
+        let end = std::mem::take(&mut left);
+        let mut crossing = 0;
+        for start in (0..end).step_by(WIDTH) {
+            let count = block.fill(region, &pairs[start..end]);
+            for (i, sure) in block.sure().into_iter().enumerate().take(count) {
+                pairs[left] = pairs[start + i];
+                if sure == Sure::Cross {
+                    pairs.swap(left, crossing);
+                    crossing += 1;
+                }
+                left += usize::from(sure != Sure::Apart);
+            }
+        }
+        [crossing, left - crossing]
     }
-    [crossing, left - crossing]
 }
 
 /// A pair of triangles with one or two common vertices.
@@ -95,53 +104,27 @@ pub(super) struct Neighbours {
     pub(super) vertices: [[u32; 3]; 2],
 }
 
-/// As [`sort`], for pairs with one or two common vertices.
-pub(super) fn sort_neighbours(region: &Region<'_>, pairs: &mut [Neighbours]) -> [usize; 2] {
-    #[cfg(target_arch = "x86_64")]
-    {
-        if has_avx512() {
-            // SAFETY: the processor has what it is compiled for.
-            return unsafe { sort_neighbours_avx512(region, pairs) };
-        }
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: as above.
-            return unsafe { sort_neighbours_avx2(region, pairs) };
-        }
-    }
-    sort_neighbours_by(region, pairs)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512vl,avx512bw")]
-fn sort_neighbours_avx512(region: &Region<'_>, pairs: &mut [Neighbours]) -> [usize; 2] {
-    sort_neighbours_by(region, pairs)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn sort_neighbours_avx2(region: &Region<'_>, pairs: &mut [Neighbours]) -> [usize; 2] {
-    sort_neighbours_by(region, pairs)
-}
-
-#[inline(always)]
-fn sort_neighbours_by(region: &Region<'_>, pairs: &mut [Neighbours]) -> [usize; 2] {
-    let mut block = Block::EMPTY;
-    let (mut left, mut crossing) = (0, 0);
-    for start in (0..pairs.len()).step_by(WIDTH) {
-        let count = (pairs.len() - start).min(WIDTH);
-        for (i, pair) in pairs[start..start + count].iter().enumerate() {
-            block.set(i, pair.vertices.map(|t| region.corners(t)));
-        }
-        for (i, sure) in block.sure_of_neighbours().into_iter().enumerate().take(count) {
-            pairs[left] = pairs[start + i];
-            if sure == Sure::Cross {
-                pairs.swap(left, crossing);
-                crossing += 1;
+impl Sort for Neighbours {
+    #[inline(always)]
+    fn sort(region: &Region<'_>, pairs: &mut [Self]) -> [usize; 2] {
+        let mut block = Block::EMPTY;
+        let (mut left, mut crossing) = (0, 0);
+        for start in (0..pairs.len()).step_by(WIDTH) {
+            let count = (pairs.len() - start).min(WIDTH);
+            for (i, pair) in pairs[start..start + count].iter().enumerate() {
+                block.set(i, pair.vertices.map(|t| region.corners(t)));
             }
-            left += usize::from(sure != Sure::Apart);
+            for (i, sure) in block.sure_of_neighbours().into_iter().enumerate().take(count) {
+                pairs[left] = pairs[start + i];
+                if sure == Sure::Cross {
+                    pairs.swap(left, crossing);
+                    crossing += 1;
+                }
+                left += usize::from(sure != Sure::Apart);
+            }
         }
+        [crossing, left - crossing]
     }
-    [crossing, left - crossing]
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -305,7 +288,7 @@ mod tests {
                 prop_assert!(!contact(*pair).is_crossing());
             }
             let mut narrow = all.clone();
-            prop_assert_eq!(sort_by(&region, &mut narrow), [crossing, unsure]);
+            prop_assert_eq!(<[u32; 2]>::sort(&region, &mut narrow), [crossing, unsure]);
             prop_assert_eq!(&narrow[..crossing + unsure], &pairs[..]);
             #[cfg(target_arch = "x86_64")]
             if is_x86_feature_detected!("avx2") {

@@ -1,5 +1,6 @@
 //! The way of one file through the engine: read → survey → workshop → repair → edit → emit → survey again → report.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
@@ -12,7 +13,7 @@ use crate::emit::{Content, Draft};
 use crate::error::{Error, Result};
 use crate::read::{MeshFile, PREFIX_BYTES};
 use crate::readback::Expectation;
-use crate::report::{Cost, Defects, EditSummary, FileFacts, Outcome, Report, SCHEMA_VERSION, Stage, Task, Tolerances};
+use crate::report::{BoundaryLoops, Cost, Defects, EditSummary, FileFacts, Outcome, Report, SCHEMA_VERSION, Stage, Task, Tolerances};
 use crate::settings::{Limits, Profile, folder_of};
 use crate::shop::Shop;
 use crate::shop::edges::Edges;
@@ -20,7 +21,7 @@ use crate::shop::near::Tolerance;
 use crate::space::{self, Need};
 use crate::sums::Bounds;
 use crate::survey::Survey;
-use crate::{Progress, cost, defects, digest, emit, members, parallel, repairs, second, verdict};
+use crate::{Progress, cost, defects, digest, emit, holes, members, parallel, repairs, second, verdict};
 
 /// Fewer bytes are hashed by one thread: starting more would take longer.
 const HASHED_BY_ONE: usize = 1 << 20;
@@ -154,6 +155,7 @@ fn report(task: Task, mesh: &MeshFile, diagnosis: &Diagnosis<'_>, profile: &Prof
         tolerances: tolerances(diagnosis),
         before: diagnosis.defects.clone(),
         after: None,
+        loops: loops(diagnosis, profile),
         repairs: Vec::new(),
         loops_left: Vec::new(),
         edit: EditSummary::default(),
@@ -162,6 +164,22 @@ fn report(task: Task, mesh: &MeshFile, diagnosis: &Diagnosis<'_>, profile: &Prof
         stages: Vec::new(),
         cost: Cost::default(),
     }
+}
+
+/// Boundary loops that are listed in a report.
+const LOOPS_LISTED: usize = 1000;
+
+/// The boundary loops of a workshop as it was gathered.
+fn loops(diagnosis: &Diagnosis<'_>, profile: &Profile) -> BoundaryLoops {
+    if diagnosis.defects.boundary_edges == 0 {
+        return BoundaryLoops::default();
+    }
+    let edges = Edges::of(&diagnosis.shop);
+    let mut listed = holes::classify(&diagnosis.shop, &edges, &diagnosis.tolerance, profile.gap_edge_share);
+    let mut classes = BTreeMap::new();
+    listed.iter().for_each(|l| *classes.entry(l.class).or_default() += 1);
+    listed.truncate(LOOPS_LISTED);
+    BoundaryLoops { classes, listed }
 }
 
 /// Repairs `input` into the new file `output`.

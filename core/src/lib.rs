@@ -21,6 +21,7 @@ pub mod error;
 pub mod fill;
 mod fresh;
 mod grid;
+mod holes;
 #[cfg(any(test, feature = "internals"))]
 #[doc(hidden)]
 pub mod internals;

@@ -35,6 +35,9 @@ pub struct Report {
     pub after: Option<Defects>,
     /// Tolerances derived from the model.
     pub tolerances: Tolerances,
+    /// Boundary loops of the input, by what kind of opening they are.
+    #[serde(default)]
+    pub loops: BoundaryLoops,
     /// What was done, in order.
     pub repairs: Vec<Repair>,
     /// Boundary loops that were left open, and why (at most 1000 listed).
@@ -213,6 +216,81 @@ pub struct Repair {
     /// In words, with the method or the bound that mattered.
     pub note: String,
     pub seconds: f64,
+}
+
+/// What kind of opening a boundary loop is (core/DEFECTS.md).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LoopClass {
+    /// No opening: vertices of one side lie on the edges of the other (T-junctions).
+    Crack,
+    /// Narrow, with sides that run alike.
+    Gap,
+    /// Narrow, with sides that do not run alike.
+    Misaligned,
+    /// Meets another loop in a vertex.
+    Nested,
+    /// One of the two rims of a missing ring, both in about one plane.
+    AnnularCoplanar,
+    /// One of the two rims of a missing ring, in planes one above the other.
+    AnnularParallel,
+    /// A hole with a piece of surface in it, or the rim of that piece.
+    Island,
+    /// A slit when seen along an axis, though not flat.
+    Machining,
+    /// None of these.
+    Simple,
+}
+
+impl LoopClass {
+    /// In words, for one or several.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Crack => "crack",
+            Self::Gap => "gap",
+            Self::Misaligned => "misaligned",
+            Self::Nested => "nested",
+            Self::AnnularCoplanar => "annular, coplanar",
+            Self::AnnularParallel => "annular, parallel",
+            Self::Island => "island",
+            Self::Machining => "machining direction",
+            Self::Simple => "simple",
+        }
+    }
+}
+
+/// A boundary loop as it was found, before any repair. Lengths in the model's units.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BoundaryLoop {
+    pub class: LoopClass,
+    /// The rule that decided the class, with its measure.
+    pub rule: String,
+    /// A vertex on it.
+    pub at: [f32; 3],
+    pub vertices: u64,
+    pub perimeter: f64,
+    /// Of its projection along the direction in which that is largest.
+    pub area: f64,
+    /// Largest distance of a vertex from the plane that fits best.
+    pub off_plane: f64,
+    /// Of a narrow loop: the largest distance between its sides.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub width: Option<f64>,
+    /// How much it differs from the loop it belongs to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub characteristic_distance: Option<f64>,
+    /// The loop it belongs to, by place in the list of all: the other side, the other rim, or the hole around an island.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub partner: Option<u32>,
+}
+
+/// The boundary loops of the input.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BoundaryLoops {
+    /// How many of each class; classes without a loop are left out.
+    pub classes: std::collections::BTreeMap<LoopClass, u64>,
+    /// The first thousand, by their first vertex in the file.
+    pub listed: Vec<BoundaryLoop>,
 }
 
 /// A boundary loop that stayed open.

@@ -65,6 +65,7 @@ pub(crate) fn render(report: &Report) -> String {
         item(&mut out, "file", finding);
     }
     defects(&mut out, report);
+    loops(&mut out, report);
     for repair in &report.repairs {
         let times = if repair.count == 1 { String::new() } else { format!(" × {}", show_count(repair.count)) };
         let note = if repair.note.is_empty() { String::new() } else { format!(": {}", repair.note) };
@@ -91,6 +92,23 @@ pub(crate) fn render(report: &Report) -> String {
         item(&mut out, "wrote", &format!("{} ({})", output.path.display(), show_size(output.bytes)));
     }
     out
+}
+
+/// The kinds of the input's boundary loops; for an inspection also the first of them.
+fn loops(out: &mut String, report: &Report) {
+    let loops = &report.loops;
+    if loops.listed.is_empty() {
+        return;
+    }
+    let classes: Vec<String> = loops.classes.iter().map(|(class, n)| format!("{} {}", show_count(*n), class.name())).collect();
+    item(out, "loops", &classes.join(", "));
+    if report.task == Task::Inspect {
+        for l in loops.listed.iter().take(LOOPS_SHOWN) {
+            let [x, y, z] = l.at;
+            let what = format!("{} of {} edges at ({x}, {y}, {z}): {}", l.class.name(), show_count(l.vertices), l.rule);
+            item(out, "loop", &what);
+        }
+    }
 }
 
 /// One line of what was wrong and what was done, for lists.
@@ -205,7 +223,7 @@ fn line(out: &mut String, text: std::fmt::Arguments) {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use suture_core::report::{Cost, EditSummary, FileFacts, Repair, SCHEMA_VERSION, Tolerances, Verdict};
+    use suture_core::report::{BoundaryLoops, Cost, EditSummary, FileFacts, Repair, SCHEMA_VERSION, Tolerances, Verdict};
     use suture_core::{Limits, Profile};
 
     pub(crate) fn sample(outcome: Outcome) -> Report {
@@ -230,6 +248,7 @@ pub(crate) mod tests {
             after: Some(Defects::default()),
             tolerances: Tolerances::default(),
             repairs: vec![],
+            loops: BoundaryLoops::default(),
             loops_left: vec![],
             edit: EditSummary::default(),
             edit_records: None,

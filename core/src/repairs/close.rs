@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use super::islands;
-use super::loops::{self, Loop};
 use super::work::Work;
 use crate::chunk::NONE;
 use crate::fill::{self, FillSettings, Rim, Unfillable};
+use crate::holes::loops::{self, Loop};
 use crate::parallel;
 use crate::report::LoopLeft;
 use crate::settings::Profile;
@@ -161,7 +161,7 @@ fn fill(shop: &Shop, rim: &Loop, profile: &Profile, diagonal: f64, neighbours: N
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{After, after, cube};
+    use crate::testing::{After, after, cube, plate};
 
     /// A cube without its top.
     fn filled(profile: &Profile) -> After<Closed> {
@@ -189,5 +189,17 @@ mod tests {
             assert!(got.result.left[0].reason.contains(words), "{}", got.result.left[0].reason);
             assert_eq!((got.result.left[0].edges, got.result.left[0].perimeter), (4, 4.0));
         }
+    }
+
+    #[test]
+    fn holes_that_meet_in_a_vertex_leave_one_fan_there() {
+        let pinched = plate(4, |x, y| !(x == y && (1..3).contains(&x)));
+        // The plate's own rim, of 16 edges, stays open.
+        let profile = Profile { max_hole_edges: 4, ..Profile::default() };
+        let got = after(&pinched, |d, _| {
+            assert_eq!(d.defects.nonmanifold_vertices, 1, "a bow-tie");
+            fill_loops(&d.survey, &mut Work::new(&mut d.shop), &profile, 1).loops
+        });
+        assert_eq!((got.result, got.defects.nonmanifold_vertices, got.defects.boundary_loops), (2, 0, 1));
     }
 }

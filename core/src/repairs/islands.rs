@@ -5,9 +5,9 @@
 
 use glam::DVec3;
 
-use super::loops::{self, Loop};
 use super::work::Work;
 use crate::boxes::BoxTree;
+use crate::holes::loops::{self, Loop};
 use crate::shop::components::{Components, Reversed, Through};
 use crate::shop::{Origin, Shop, Vertex};
 use crate::sums::Bounds;

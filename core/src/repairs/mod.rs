@@ -9,7 +9,6 @@ mod debris;
 mod duplicates;
 mod islands;
 mod junction;
-mod loops;
 mod merge;
 mod orient;
 mod surplus;

@@ -16,7 +16,7 @@ pub(crate) struct Tolerance {
 
 impl Tolerance {
     /// What holds at `v`.
-    fn at(&self, shop: &Shop, v: Vertex) -> f64 {
+    pub(crate) fn at(&self, shop: &Shop, v: Vertex) -> f64 {
         self.weld.min(shop.shortest_edge(v) * self.edge_share)
     }
 }
@@ -156,7 +156,7 @@ pub(crate) fn distance_to_line(p: [f32; 3], a: [f32; 3], b: [f32; 3]) -> f64 {
 }
 
 /// The box around some points, wider by `by` on all sides.
-fn around(points: &[[f32; 3]], by: f64) -> Bounds {
+pub(crate) fn around(points: &[[f32; 3]], by: f64) -> Bounds {
     let mut b = Bounds::EMPTY;
     b.include(points);
     // Rounded outward, so that nothing is missed.

@@ -1,0 +1,98 @@
+//! Boundary loops recognised for what they are, before any is closed (METHODS C, after the source S0 §4.3).
+//!
+//! All loops are classified first, by a stated order: a loop whose sides touch is a crack, one whose sides lie near each other a gap, or
+//! misaligned where they do not run alike; loops that meet in a vertex are nested; two that bound one missing ring are annular; a loop
+//! inside another's opening makes both an island's; one that is flat when seen along an axis was lost to machining; the rest is
+//! simple. Each rule's measure goes to the report beside the class.
+
+pub(crate) mod loops;
+mod pairs;
+mod shape;
+mod sides;
+#[cfg(test)]
+mod tests;
+
+use crate::report::{BoundaryLoop, LoopClass};
+use crate::shop::edges::Edges;
+use crate::shop::near::Tolerance;
+use crate::shop::{Shop, Vertex};
+use shape::Shape;
+
+/// Smallest share of a loop's projected area, seen along an axis, in that of a circle of its perimeter: below, it is a slit from there.
+const MACHINING_SHARE: f64 = 0.02;
+/// A loop is flat if it rises so little above its plane, measured by the plane's smaller extent.
+const FLAT: f64 = 0.05;
+
+/// All boundary loops with their classes, by smallest vertex; partners are places in this list. `gap_share`: a gap is narrower than this
+/// share of the edges beside it; 0: nothing is a gap. O(n log n) in the boundary.
+pub(crate) fn classify(shop: &Shop, edges: &Edges, tolerance: &Tolerance, gap_share: f64) -> Vec<BoundaryLoop> {
+    let loops = loops::find(shop, edges);
+    let shapes: Vec<Shape> = loops.iter().map(|l| Shape::of(&l.vertices.iter().map(|v| shop.place(*v)).collect::<Vec<_>>())).collect();
+    let sides = sides::measure(shop, edges, &loops, tolerance, gap_share);
+    let several = vertices_of_several(edges);
+    let mut classes: Vec<Option<(LoopClass, String)>> = loops
+        .iter()
+        .zip(&sides)
+        .map(|(rim, sides)| {
+            sides.class().or_else(|| {
+                let touching = rim.vertices.iter().filter(|v| several.binary_search(v).is_ok()).count();
+                (touching > 0).then(|| (LoopClass::Nested, format!("it meets another loop in {touching} vertices")))
+            })
+        })
+        .collect();
+    let mut partners: Vec<Option<u32>> = sides.iter().map(|s| s.partner).collect();
+    let free: Vec<u32> = (0..loops.len() as u32).filter(|i| classes[*i as usize].is_none()).collect();
+    let mut distances: Vec<Option<f64>> = vec![None; loops.len()];
+    for pair in pairs::find(&free, &shapes) {
+        let [outer, inner] = pair.loops.map(|i| i as usize);
+        for (i, other) in [(outer, inner), (inner, outer)] {
+            // An island's hole keeps what it was found to be first.
+            if classes[i].is_none() {
+                classes[i] = Some((pair.class, pair.rule.clone()));
+                distances[i] = Some(pair.characteristic_distance);
+                partners[i] = (pair.class != LoopClass::Island || i == inner).then_some(other as u32);
+            }
+        }
+    }
+    (0..loops.len())
+        .map(|i| {
+            let (class, rule) = classes[i].take().or_else(|| machining(&shapes[i])).unwrap_or_else(|| {
+                (LoopClass::Simple, "no other rule holds".into())
+            });
+            BoundaryLoop {
+                class,
+                rule,
+                at: shop.positions[loops[i].vertices[0] as usize],
+                vertices: loops[i].vertices.len() as u64,
+                perimeter: shapes[i].perimeter,
+                area: shapes[i].area(),
+                off_plane: shapes[i].off_plane,
+                width: sides[i].width,
+                characteristic_distance: distances[i],
+                partner: partners[i],
+            }
+        })
+        .collect()
+}
+
+/// A loop that is a slit when seen along Z, X or Y, though it is not flat (METHODS C7).
+fn machining(shape: &Shape) -> Option<(LoopClass, String)> {
+    if shape.off_plane <= FLAT * shape.extents[1] {
+        return None;
+    }
+    let circle = shape.perimeter * shape.perimeter / (4.0 * std::f64::consts::PI);
+    let seen = |axis: usize| shape.vector_area[axis].abs() / circle;
+    // Of equal ones the first.
+    let axis = [2, 0, 1].into_iter().min_by(|a, b| seen(*a).total_cmp(&seen(*b)))?;
+    (seen(axis) < MACHINING_SHARE).then(|| {
+        let name = ["X", "Y", "Z"][axis];
+        (LoopClass::Machining, format!("seen along {name}, its area is {:.4} of a circle's, below {MACHINING_SHARE}", seen(axis)))
+    })
+}
+
+/// Vertices of more than two boundary edges, ascending.
+fn vertices_of_several(edges: &Edges) -> Vec<Vertex> {
+    let mut ends: Vec<Vertex> = edges.iter().filter(|e| e.is_boundary()).flat_map(|e| [e.low, e.high]).collect();
+    ends.sort_unstable();
+    ends.chunk_by(|a, b| a == b).filter(|same| same.len() > 2).map(|same| same[0]).collect()
+}

@@ -1,0 +1,115 @@
+//! Two loops that belong together: the rims of a missing ring, or a hole and an island in it (METHODS C5, D; source S3).
+//!
+//! A patch over a missing ring leaves one rim and arrives at the other, so that the loops, each in its patch's direction, run opposite
+//! ways round the same axis. Two holes side by side in one surface run the same way round. That is told before anything is measured.
+
+use glam::DVec3;
+
+use super::shape::Shape;
+use crate::boxes::BoxTree;
+use crate::report::LoopClass;
+use crate::sums::Bounds;
+
+/// Cosine between the vector areas of loops that belong together, at most.
+const OPPOSITE: f64 = -0.5;
+/// Loops of a ring differ by less than this (S3): see [`characteristic_distance`].
+const ANNULAR: f64 = 0.15;
+/// Rims of a ring are no farther apart than so many radii of the larger one.
+const FARTHEST: f64 = 3.0;
+/// An island lies no farther from the plane of its hole than this share of the hole's size.
+const OFF_PLANE: f64 = 0.5;
+/// Points of a loop that distances are measured from, at most.
+const MOST_POINTS: usize = 2048;
+
+/// Two loops by number, the larger first.
+pub(super) struct Pair {
+    pub(super) loops: [u32; 2],
+    pub(super) class: LoopClass,
+    pub(super) rule: String,
+    pub(super) characteristic_distance: f64,
+}
+
+/// The pairs among `free` loops: rings first, then islands, each in the loops' order.
+pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
+    if free.len() < 2 {
+        return Vec::new();
+    }
+    let shape = |place: usize| &shapes[free[place] as usize];
+    let tree = BoxTree::new(&(0..free.len()).map(|i| bounds(shape(i), 0.0)).collect::<Vec<_>>());
+    let mut found = Vec::new();
+    let nearest: Vec<Option<usize>> = (0..free.len())
+        .map(|i| {
+            tree.meeting(&bounds(shape(i), FARTHEST * shape(i).radius()), &mut found);
+            let others = found.iter().map(|j| *j as usize).filter(|j| *j != i);
+            others.map(|j| (distance(shape(i), shape(j)), j)).min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(_, j)| j)
+        })
+        .collect();
+    let mut pairs = Vec::new();
+    let mut taken = vec![false; free.len()];
+    for (i, j) in nearest.iter().enumerate().filter_map(|(i, j)| j.filter(|j| *j > i && nearest[*j] == Some(i)).map(|j| (i, j))) {
+        if let Some((class, apart)) = ring(shape(i), shape(j)) {
+            (taken[i], taken[j]) = (true, true);
+            let kind = if class == LoopClass::AnnularCoplanar { "one plane" } else { "two planes" };
+            let rule = format!("faces the loop nearest to it, in {kind}; their characteristic distance {apart:.4} is below {ANNULAR}");
+            let larger_first = if shape(j).radius() > shape(i).radius() { [j, i] } else { [i, j] };
+            pairs.push(Pair { loops: larger_first.map(|i| free[i]), class, rule, characteristic_distance: apart });
+        }
+    }
+    for inner in (0..free.len()).filter(|i| !taken[*i]) {
+        tree.meeting(&bounds(shape(inner), 0.0), &mut found);
+        let around = found.iter().map(|j| *j as usize).filter(|j| *j != inner && !taken[*j] && holds_island(shape(*j), shape(inner)));
+        if let Some(outer) = around.min_by(|a, b| shape(*a).radius().total_cmp(&shape(*b).radius()).then(a.cmp(b))) {
+            pairs.push(Pair {
+                loops: [outer, inner].map(|i| free[i]),
+                class: LoopClass::Island,
+                rule: "one lies inside the other's opening and runs the other way round".into(),
+                characteristic_distance: characteristic_distance(shape(outer), shape(inner)),
+            });
+        }
+    }
+    pairs
+}
+
+/// The class and characteristic distance of two loops that bound a missing ring.
+fn ring(a: &Shape, b: &Shape) -> Option<(LoopClass, f64)> {
+    let apart = characteristic_distance(a, b);
+    if !face(a, b) || apart >= ANNULAR || !a.surrounds(b.centre) || !b.surrounds(a.centre) {
+        return None;
+    }
+    let height = (a.centre - b.centre).dot(a.normal).abs();
+    let class = if height <= (a.radius() - b.radius()).abs() { LoopClass::AnnularCoplanar } else { LoopClass::AnnularParallel };
+    Some((class, apart))
+}
+
+fn holds_island(outer: &Shape, inner: &Shape) -> bool {
+    face(outer, inner)
+        && outer.radius() > inner.radius()
+        && (inner.centre - outer.centre).dot(outer.normal).abs() <= OFF_PLANE * outer.area().sqrt()
+        && outer.surrounds(inner.centre)
+}
+
+/// Run opposite ways round.
+fn face(a: &Shape, b: &Shape) -> bool {
+    crate::shop::cosine(a.vector_area, b.vector_area) <= OPPOSITE
+}
+
+/// How much two loops differ: by their extents, as a share of the larger one, and by the directions of their planes. (The formula of S3 is
+/// lost. The cube lets the paper's threshold lie where one loop is about half the other: rings are closer in size, islands are not.)
+fn characteristic_distance(a: &Shape, b: &Shape) -> f64 {
+    let size = a.radius().max(b.radius()).max(f64::MIN_POSITIVE);
+    let extents = (DVec3::from_array(a.extents) - DVec3::from_array(b.extents)).length() / size;
+    extents * extents * extents + 1.0 - a.normal.dot(b.normal).abs()
+}
+
+/// Between the nearest of their vertices, or of every few if there are very many.
+fn distance(a: &Shape, b: &Shape) -> f64 {
+    let some = |shape: &Shape| -> Vec<DVec3> { shape.points.iter().step_by(shape.points.len().div_ceil(MOST_POINTS)).copied().collect() };
+    let others = some(b);
+    let to_others = |p: &DVec3| others.iter().map(|q| p.distance_squared(*q)).fold(f64::INFINITY, f64::min);
+    some(a).iter().map(to_others).fold(f64::INFINITY, f64::min).sqrt()
+}
+
+fn bounds(shape: &Shape, by: f64) -> Bounds {
+    let points: Vec<[f32; 3]> = shape.points.iter().map(|p| p.as_vec3().to_array()).collect();
+    crate::shop::near::around(&points, by)
+}

@@ -1,0 +1,115 @@
+//! Small surfaces whose openings are of a known kind.
+
+use super::*;
+use crate::report::LoopClass::{AnnularCoplanar, AnnularParallel, Crack, Gap, Island, Machining, Misaligned, Nested, Simple};
+use crate::testing::{Corners, diagnose, plate, records};
+
+/// Classes and partners of a surface's loops but for the `longest`, which is the rim of the sheet itself, if asked to leave it out.
+fn classes(triangles: &[Corners], leave_longest: bool) -> Vec<LoopClass> {
+    let records = records(triangles);
+    let d = diagnose(&records);
+    let mut all = classify(&d.shop, &Edges::of(&d.shop), &d.tolerance, 0.35);
+    for (i, l) in all.iter().enumerate() {
+        if let Some(partner) = l.partner {
+            assert_ne!(partner as usize, i);
+        }
+    }
+    if leave_longest {
+        let longest = (0..all.len()).max_by(|a, b| all[*a].perimeter.total_cmp(&all[*b].perimeter)).unwrap();
+        all.remove(longest);
+    }
+    all.iter().map(|l| l.class).collect()
+}
+
+/// A plate whose points are moved.
+fn moved(side: u8, keep: impl Fn(u8, u8) -> bool, to: impl Fn([f32; 3]) -> [f32; 3]) -> Vec<Corners> {
+    plate(side, keep).iter().map(|t| t.map(&to)).collect()
+}
+
+/// A plate of 12 × 12 with a slit along x = 6, the points of whose right side are moved, but for the slit's ends.
+fn slit(to: impl Fn([f32; 3]) -> [f32; 3]) -> Vec<Corners> {
+    plate(12, |_, _| true)
+        .into_iter()
+        .map(|t| {
+            let right = t.iter().any(|p| p[0] > 6.0);
+            t.map(|p| if right && p[0] == 6.0 && p[1] > 2.0 && p[1] < 10.0 { to(p) } else { p })
+        })
+        .collect()
+}
+
+#[test]
+fn a_slit_whose_sides_run_alike_is_a_gap() {
+    assert_eq!(classes(&slit(|[x, y, z]| [x + 0.2, y, z]), true), [Gap]);
+    assert_eq!(classes(&slit(|[x, y, z]| [x + 0.1, y + 0.4, z]), true), [Gap], "and its vertices need not face each other");
+}
+
+#[test]
+fn a_slit_whose_sides_do_not_is_misaligned() {
+    let jagged = |[x, y, _]: [f32; 3]| [x + 0.1, y, if y as u8 % 2 == 0 { 0.25 } else { -0.25 }];
+    assert_eq!(classes(&slit(jagged), true), [Misaligned]);
+}
+
+#[test]
+fn a_slit_too_wide_for_its_edges_is_none_of_these() {
+    assert_eq!(classes(&slit(|[x, y, z]| [x + 0.5, y, z]), true), [Simple]);
+}
+
+#[test]
+fn a_vertex_on_a_neighbours_edge_is_a_crack() {
+    let mut triangles = plate(6, |_, _| true);
+    // The edge from (3, 3) to (4, 4), split on one side only.
+    let at = triangles.iter().position(|t| t[0] == [3.0, 3.0, 0.0] && t[1][0] == 4.0 && t[1][1] == 3.0).unwrap();
+    let [a, b, c] = triangles[at];
+    let middle = [3.5, 3.5, 0.0];
+    triangles[at] = [a, b, middle];
+    triangles.push([middle, b, c]);
+    assert_eq!(classes(&triangles, true), [Crack]);
+}
+
+#[test]
+fn holes_side_by_side_are_simple_and_such_that_meet_are_nested() {
+    let apart = |x: u8, y: u8| !((2..4).contains(&y) && ((2..4).contains(&x) || (5..7).contains(&x)));
+    assert_eq!(classes(&plate(9, apart), true), [Simple, Simple]);
+    let meeting = |x: u8, y: u8| !(((2..4).contains(&x) && (2..4).contains(&y)) || ((4..6).contains(&x) && (4..6).contains(&y)));
+    assert_eq!(classes(&plate(9, meeting), true), [Nested, Nested]);
+}
+
+#[test]
+fn a_ring_missing_from_a_plate_is_annular_and_a_speck_in_a_hole_an_island() {
+    let around = |x: u8, y: u8| x.abs_diff(8).max(y.abs_diff(8));
+    assert_eq!(classes(&plate(17, |x, y| !(4..6).contains(&around(x, y))), true), [AnnularCoplanar, AnnularCoplanar]);
+    assert_eq!(classes(&plate(17, |x, y| !(1..6).contains(&around(x, y))), true), [Island, Island]);
+}
+
+/// A tube of radius 4 around z, 24 facets around, `rings` of which are there.
+fn tube(rings: impl Fn(u8) -> bool) -> Vec<Corners> {
+    let at = |i: u8, z: u8| {
+        let turn = std::f32::consts::TAU * f32::from(i % 24) / 24.0;
+        [4.0 * turn.cos(), 4.0 * turn.sin(), f32::from(z)]
+    };
+    (0..20)
+        .filter(|z| rings(*z))
+        .flat_map(|z| (0..24).map(move |i| (i, z)))
+        .flat_map(|(i, z)| [[at(i, z), at(i + 1, z), at(i + 1, z + 1)], [at(i, z), at(i + 1, z + 1), at(i, z + 1)]])
+        .collect()
+}
+
+#[test]
+fn a_ring_missing_from_a_tube_is_annular() {
+    for gap in 1..8 {
+        let found = classes(&tube(|z| !(6..6 + gap).contains(&z)), false);
+        // The ends of the tube face each other as well, but each has a nearer rim.
+        assert_eq!(found.iter().filter(|c| **c == AnnularParallel).count(), 2, "{gap} missing: {found:?}");
+    }
+}
+
+#[test]
+fn a_slit_seen_from_above_that_is_open_from_the_side_is_machining() {
+    // Across a roof: straight along y = 6, up and down with |x − 6|, wider than a gap.
+    let roof = |[x, y, _]: [f32; 3]| [x, y, 3.0 - (x - 6.0).abs() / 2.0];
+    let hole = |x: u8, y: u8| y == 5 && (3..9).contains(&x);
+    let found = classes(&moved(12, |x, y| !hole(x, y), roof), true);
+    assert_eq!(found, [Simple], "open seen from above");
+    let upright = |p: [f32; 3]| { let [x, y, z] = roof(p); [x, z, (y - 5.5) * (x - 6.0) * 0.5] };
+    assert_eq!(classes(&moved(12, |x, y| !hole(x, y), upright), true), [Machining]);
+}

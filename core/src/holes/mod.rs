@@ -12,10 +12,13 @@ mod sides;
 #[cfg(test)]
 mod tests;
 
+use glam::DVec3;
+
 use crate::report::{BoundaryLoop, LoopClass};
 use crate::shop::edges::Edges;
 use crate::shop::near::Tolerance;
 use crate::shop::{Shop, Vertex};
+use loops::Loop;
 use shape::Shape;
 
 /// Smallest share of a loop's projected area, seen along an axis, in that of a circle of its perimeter: below, it is a slit from there.
@@ -27,7 +30,7 @@ const FLAT: f64 = 0.05;
 /// share of the edges beside it; 0: nothing is a gap. O(n log n) in the boundary.
 pub(crate) fn classify(shop: &Shop, edges: &Edges, tolerance: &Tolerance, gap_share: f64) -> Vec<BoundaryLoop> {
     let loops = loops::find(shop, edges);
-    let shapes: Vec<Shape> = loops.iter().map(|l| Shape::of(&l.vertices.iter().map(|v| shop.place(*v)).collect::<Vec<_>>())).collect();
+    let shapes: Vec<Shape> = loops.iter().map(|rim| shape_of(shop, rim)).collect();
     let sides = sides::measure(shop, edges, &loops, tolerance, gap_share);
     let several = vertices_of_several(edges);
     let mut classes: Vec<Option<(LoopClass, String)>> = loops
@@ -73,6 +76,15 @@ pub(crate) fn classify(shop: &Shop, edges: &Edges, tolerance: &Tolerance, gap_sh
             }
         })
         .collect()
+}
+
+fn shape_of(shop: &Shop, rim: &Loop) -> Shape {
+    let points: Vec<DVec3> = rim.vertices.iter().map(|v| shop.place(*v)).collect();
+    let normals = rim.triangles.iter().map(|t| {
+        let [a, b, c] = shop.triangles[*t as usize].v;
+        shop.vector(a, b).cross(shop.vector(a, c))
+    });
+    Shape::of(&points, normals)
 }
 
 /// A loop that is a slit when seen along Z, X or Y, though it is not flat (METHODS C7).

@@ -1,7 +1,9 @@
 //! Two loops that belong together: the rims of a missing ring, or a hole and an island in it (METHODS C5, D; source S3).
 //!
 //! A patch over a missing ring leaves one rim and arrives at the other, so that the loops, each in its patch's direction, run opposite
-//! ways round the same axis. Two holes side by side in one surface run the same way round. That is told before anything is measured.
+//! ways round the same axis, while two holes side by side in one surface run the same way round. Rims in two planes look at each other;
+//! the two ends of a tube look away. Of rims in one plane, the outer one is a hole in the surface and the inner one the rim of a piece;
+//! a plate's own rim around a hole in the plate is the other way about.
 
 use glam::DVec3;
 
@@ -76,13 +78,22 @@ fn ring(a: &Shape, b: &Shape) -> Option<(LoopClass, f64)> {
     if !face(a, b) || apart >= ANNULAR || !a.surrounds(b.centre) || !b.surrounds(a.centre) {
         return None;
     }
-    let height = (a.centre - b.centre).dot(a.normal).abs();
-    let class = if height <= (a.radius() - b.radius()).abs() { LoopClass::AnnularCoplanar } else { LoopClass::AnnularParallel };
-    Some((class, apart))
+    let way = b.centre - a.centre;
+    if way.dot(a.normal).abs() <= (a.radius() - b.radius()).abs() {
+        let (outer, inner) = if a.radius() < b.radius() { (b, a) } else { (a, b) };
+        return is_hole_around(outer, inner).then_some((LoopClass::AnnularCoplanar, apart));
+    }
+    (a.vector_area.dot(way) > 0.0 && b.vector_area.dot(way) < 0.0).then_some((LoopClass::AnnularParallel, apart))
+}
+
+/// The one is a hole in a surface, the other the rim of a piece.
+fn is_hole_around(outer: &Shape, inner: &Shape) -> bool {
+    outer.continues > 0.0 && inner.continues < 0.0
 }
 
 fn holds_island(outer: &Shape, inner: &Shape) -> bool {
     face(outer, inner)
+        && is_hole_around(outer, inner)
         && outer.radius() > inner.radius()
         && (inner.centre - outer.centre).dot(outer.normal).abs() <= OFF_PLANE * outer.area().sqrt()
         && outer.surrounds(inner.centre)

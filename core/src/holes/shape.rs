@@ -16,11 +16,14 @@ pub(super) struct Shape {
     pub(super) vector_area: DVec3,
     /// Largest distance of a vertex from the plane.
     pub(super) off_plane: f64,
+    /// Whether a flat patch would continue the surface (towards 1: the loop is a hole in it) or lie on it (towards −1: the loop is the rim of
+    /// a piece). Near 0, it would stand on it.
+    pub(super) continues: f64,
 }
 
 impl Shape {
-    /// Of the vertices in order. O(vertices).
-    pub(super) fn of(points: &[DVec3]) -> Self {
+    /// Of the vertices in order; `normals` are those of the triangle beside each edge. O(vertices).
+    pub(super) fn of(points: &[DVec3], normals: impl Iterator<Item = DVec3>) -> Self {
         let edges = || (0..points.len()).map(|i| (points[i], points[(i + 1) % points.len()]));
         let perimeter: f64 = edges().map(|(a, b)| a.distance(b)).sum();
         let length = perimeter.max(f64::MIN_POSITIVE);
@@ -41,7 +44,9 @@ impl Shape {
         let normal = if axes[2].1.dot(vector_area) < 0.0 { -axes[2].1 } else { axes[2].1 };
         let off_plane = points.iter().map(|p| (*p - centre).dot(normal).abs()).fold(0.0, f64::max);
         let extents = axes.map(|(moment, _)| moment.max(0.0).sqrt());
-        Self { points: points.to_vec(), perimeter, centre, normal, extents, vector_area, off_plane }
+        let beside: DVec3 = edges().zip(normals).map(|((a, b), n)| n.normalize_or_zero() * a.distance(b)).sum();
+        let continues = beside.dot(vector_area.normalize_or_zero()) / length;
+        Self { points: points.to_vec(), perimeter, centre, normal, extents, vector_area, off_plane, continues }
     }
 
     /// Area of the loop as projected to where it is largest.
@@ -121,7 +126,8 @@ mod tests {
     #[test]
     fn the_plane_of_a_flat_loop_is_found_however_it_is_sampled() {
         let (points, normal) = ellipse(400, [2.0, 1.0]);
-        let shape = Shape::of(&points);
+        let shape = Shape::of(&points, std::iter::repeat(normal));
+        assert!((shape.continues - 1.0).abs() < 1e-9);
         assert!(shape.normal.dot(normal) > 1.0 - 1e-9, "{:?}", shape.normal);
         assert!(shape.centre.distance(DVec3::new(5.0, 6.0, 7.0)) < 1e-3, "{:?}", shape.centre);
         assert!(shape.off_plane < 1e-9);
@@ -134,7 +140,7 @@ mod tests {
     #[test]
     fn inside_is_inside_the_projection() {
         let (points, normal) = ellipse(50, [2.0, 1.0]);
-        let shape = Shape::of(&points);
+        let shape = Shape::of(&points, std::iter::empty());
         assert!(shape.surrounds(shape.centre + normal * 9.0));
         assert!(!shape.surrounds(shape.centre + DVec3::Y * 1.1));
     }

@@ -13,7 +13,9 @@ use crate::emit::{Content, Draft};
 use crate::error::{Error, Result};
 use crate::read::{MeshFile, PREFIX_BYTES};
 use crate::readback::Expectation;
-use crate::report::{BoundaryLoops, Cost, Defects, EditSummary, FileFacts, Outcome, Report, SCHEMA_VERSION, Stage, Task, Tolerances};
+use crate::report::{
+    BoundaryLoops, Cost, Defects, EditSummary, FileFacts, Outcome, Report, SCHEMA_VERSION, Stage, Task, Tolerances,
+};
 use crate::settings::{Limits, Profile, folder_of};
 use crate::shop::Shop;
 use crate::shop::edges::Edges;

@@ -23,6 +23,8 @@ use shape::Shape;
 
 /// Smallest share of a loop's projected area, seen along an axis, in that of a circle of its perimeter: below, it is a slit from there.
 const MACHINING_SHARE: f64 = 0.02;
+/// And largest share of its area that way, where it is largest: rounder loops are open to some side, and only folded by their symmetry.
+const SLENDER_SHARE: f64 = 0.25;
 /// A loop is flat if it rises so little above its plane, measured by the plane's smaller extent.
 const FLAT: f64 = 0.05;
 
@@ -59,9 +61,10 @@ pub(crate) fn classify(shop: &Shop, edges: &Edges, tolerance: &Tolerance, gap_sh
     }
     (0..loops.len())
         .map(|i| {
-            let (class, rule) = classes[i].take().or_else(|| machining(&shapes[i])).unwrap_or_else(|| {
-                (LoopClass::Simple, "no other rule holds".into())
-            });
+            let (class, rule) = classes[i]
+                .take()
+                .or_else(|| machining(&shapes[i]))
+                .unwrap_or_else(|| (LoopClass::Simple, "no other rule holds".into()));
             BoundaryLoop {
                 class,
                 rule,
@@ -87,12 +90,12 @@ fn shape_of(shop: &Shop, rim: &Loop) -> Shape {
     Shape::of(&points, normals)
 }
 
-/// A loop that is a slit when seen along Z, X or Y, though it is not flat (METHODS C7).
+/// A slender loop that folds back on itself when seen along Z, X or Y, though it is not flat (METHODS C7).
 fn machining(shape: &Shape) -> Option<(LoopClass, String)> {
-    if shape.off_plane <= FLAT * shape.extents[1] {
+    let circle = shape.perimeter * shape.perimeter / (4.0 * std::f64::consts::PI);
+    if shape.off_plane <= FLAT * shape.extents[1] || shape.area() >= SLENDER_SHARE * circle {
         return None;
     }
-    let circle = shape.perimeter * shape.perimeter / (4.0 * std::f64::consts::PI);
     let seen = |axis: usize| shape.vector_area[axis].abs() / circle;
     // Of equal ones the first.
     let axis = [2, 0, 1].into_iter().min_by(|a, b| seen(*a).total_cmp(&seen(*b)))?;

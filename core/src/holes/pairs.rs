@@ -42,8 +42,12 @@ pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
     let nearest: Vec<Option<usize>> = (0..free.len())
         .map(|i| {
             tree.meeting(&bounds(shape(i), FARTHEST * shape(i).radius()), &mut found);
-            let others = found.iter().map(|j| *j as usize).filter(|j| *j != i);
-            others.map(|j| (distance(shape(i), shape(j)), j)).min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(_, j)| j)
+            // Only of those that it can be a ring with: what else lies near is no reason to leave one open.
+            let others = found.iter().map(|j| *j as usize).filter(|j| *j != i && ring(shape(i), shape(*j)).is_some());
+            others
+                .map(|j| (distance(shape(i), shape(j)), j))
+                .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+                .map(|(_, j)| j)
         })
         .collect();
     let mut pairs = Vec::new();
@@ -52,14 +56,16 @@ pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
         if let Some((class, apart)) = ring(shape(i), shape(j)) {
             (taken[i], taken[j]) = (true, true);
             let kind = if class == LoopClass::AnnularCoplanar { "one plane" } else { "two planes" };
-            let rule = format!("faces the loop nearest to it, in {kind}; their characteristic distance {apart:.4} is below {ANNULAR}");
+            let rule =
+                format!("faces the loop nearest to it, in {kind}; their characteristic distance {apart:.4} is below {ANNULAR}");
             let larger_first = if shape(j).radius() > shape(i).radius() { [j, i] } else { [i, j] };
             pairs.push(Pair { loops: larger_first.map(|i| free[i]), class, rule, characteristic_distance: apart });
         }
     }
     for inner in (0..free.len()).filter(|i| !taken[*i]) {
         tree.meeting(&bounds(shape(inner), 0.0), &mut found);
-        let around = found.iter().map(|j| *j as usize).filter(|j| *j != inner && !taken[*j] && holds_island(shape(*j), shape(inner)));
+        let around =
+            found.iter().map(|j| *j as usize).filter(|j| *j != inner && !taken[*j] && holds_island(shape(*j), shape(inner)));
         if let Some(outer) = around.min_by(|a, b| shape(*a).radius().total_cmp(&shape(*b).radius()).then(a.cmp(b))) {
             pairs.push(Pair {
                 loops: [outer, inner].map(|i| free[i]),
@@ -114,7 +120,9 @@ fn characteristic_distance(a: &Shape, b: &Shape) -> f64 {
 
 /// Between the nearest of their vertices, or of every few if there are very many.
 fn distance(a: &Shape, b: &Shape) -> f64 {
-    let some = |shape: &Shape| -> Vec<DVec3> { shape.points.iter().step_by(shape.points.len().div_ceil(MOST_POINTS)).copied().collect() };
+    let some = |shape: &Shape| -> Vec<DVec3> {
+        shape.points.iter().step_by(shape.points.len().div_ceil(MOST_POINTS)).copied().collect()
+    };
     let others = some(b);
     let to_others = |p: &DVec3| others.iter().map(|q| p.distance_squared(*q)).fold(f64::INFINITY, f64::min);
     some(a).iter().map(to_others).fold(f64::INFINITY, f64::min).sqrt()

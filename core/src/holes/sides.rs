@@ -43,7 +43,9 @@ impl Sides {
         Some(if touching == inner {
             (LoopClass::Crack, format!("all {inner} vertices between its ends lie within the weld tolerance of the other side"))
         } else if *unevenness > UNEVEN {
-            let rule = format!("{across} of {inner} vertices lie within {width:.4} of the other side, which does not run alike: {unevenness:.2} over {UNEVEN}");
+            let rule = format!(
+                "{across} of {inner} vertices lie within {width:.4} of the other side, which does not run alike: {unevenness:.2} over {UNEVEN}"
+            );
             (LoopClass::Misaligned, rule)
         } else {
             (LoopClass::Gap, format!("{across} of {inner} vertices lie within {share} of their edges of the other side"))

@@ -98,18 +98,19 @@ fn tube(rings: impl Fn(u8) -> bool) -> Vec<Corners> {
 fn a_ring_missing_from_a_tube_is_annular() {
     for gap in 1..8 {
         let found = classes(&tube(|z| !(6..6 + gap).contains(&z)), false);
-        // The ends of the tube face each other as well, but each has a nearer rim.
+        // The ends of the tube look away from each other.
         assert_eq!(found.iter().filter(|c| **c == AnnularParallel).count(), 2, "{gap} missing: {found:?}");
     }
 }
 
 #[test]
-fn a_slit_seen_from_above_that_is_open_from_the_side_is_machining() {
-    // Across a roof: straight along y = 6, up and down with |x − 6|, wider than a gap.
-    let roof = |[x, y, _]: [f32; 3]| [x, y, 3.0 - (x - 6.0).abs() / 2.0];
-    let hole = |x: u8, y: u8| y == 5 && (3..9).contains(&x);
-    let found = classes(&moved(12, |x, y| !hole(x, y), roof), true);
-    assert_eq!(found, [Simple], "open seen from above");
-    let upright = |p: [f32; 3]| { let [x, y, z] = roof(p); [x, z, (y - 5.5) * (x - 6.0) * 0.5] };
-    assert_eq!(classes(&moved(12, |x, y| !hole(x, y), upright), true), [Machining]);
+fn a_slender_loop_that_folds_back_along_an_axis_is_machining() {
+    let bent = |rows: std::ops::Range<u8>, to: fn(f32, f32) -> f32| {
+        let hole = |x: u8, y: u8| (2..10).contains(&x) && rows.contains(&y);
+        classes(&moved(12, |x, y| !hole(x, y), |[x, y, _]| [x, y, to(x - 6.0, y - 6.0)]), true)
+    };
+    let roof = |x: f32, _: f32| -x.abs();
+    assert_eq!(bent(5..6, roof), [Machining], "seen along the ridge, it goes up one side and down again");
+    assert_eq!(bent(3..9, roof), [Simple], "a wide one does so as well, but is open to the top");
+    assert_eq!(bent(5..6, |x, _| x), [Simple], "flat, however it leans");
 }

@@ -1,6 +1,5 @@
 //! The way of one file through the engine: read → survey → workshop → repair → edit → emit → survey again → report.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
@@ -23,7 +22,7 @@ use crate::shop::near::Tolerance;
 use crate::space::{self, Need};
 use crate::sums::Bounds;
 use crate::survey::Survey;
-use crate::{Progress, cost, defects, digest, emit, holes, members, parallel, repairs, second, verdict};
+use crate::{Progress, cost, defects, digest, emit, members, parallel, repairs, second, verdict};
 
 /// Fewer bytes are hashed by one thread: starting more would take longer.
 const HASHED_BY_ONE: usize = 1 << 20;
@@ -130,13 +129,14 @@ pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress
     let mesh = open(input, limits, progress)?;
     clock.lap("read");
     space::check(input, &[spool_need(&mesh, limits)])?;
-    let diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
+    let mut diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
     clock.lap("topology");
     let blake3 = hash(&mesh, limits, progress);
     clock.lap("hash");
     mesh.check_unchanged()?;
     let mut report = report(Task::Inspect, &mesh, &diagnosis, profile, limits);
     report.input.blake3 = blake3;
+    report.loops = repairs::recognise(&mut diagnosis, profile);
     report.outcome = if report.verdict.good { Outcome::Clean } else { Outcome::NotGood };
     report.cost = clock.cost(mesh.records().len() as u64);
     report.stages = clock.stages;
@@ -157,7 +157,7 @@ fn report(task: Task, mesh: &MeshFile, diagnosis: &Diagnosis<'_>, profile: &Prof
         tolerances: tolerances(diagnosis),
         before: diagnosis.defects.clone(),
         after: None,
-        loops: loops(diagnosis, profile),
+        loops: BoundaryLoops::default(),
         repairs: Vec::new(),
         loops_left: Vec::new(),
         edit: EditSummary::default(),
@@ -166,22 +166,6 @@ fn report(task: Task, mesh: &MeshFile, diagnosis: &Diagnosis<'_>, profile: &Prof
         stages: Vec::new(),
         cost: Cost::default(),
     }
-}
-
-/// Boundary loops that are listed in a report.
-const LOOPS_LISTED: usize = 1000;
-
-/// The boundary loops of a workshop as it was gathered.
-fn loops(diagnosis: &Diagnosis<'_>, profile: &Profile) -> BoundaryLoops {
-    if diagnosis.defects.boundary_edges == 0 {
-        return BoundaryLoops::default();
-    }
-    let edges = Edges::of(&diagnosis.shop);
-    let mut listed = holes::classify(&diagnosis.shop, &edges, &diagnosis.tolerance, profile.gap_edge_share);
-    let mut classes = BTreeMap::new();
-    listed.iter().for_each(|l| *classes.entry(l.class).or_default() += 1);
-    listed.truncate(LOOPS_LISTED);
-    BoundaryLoops { classes, listed }
 }
 
 /// Repairs `input` into the new file `output`.
@@ -230,6 +214,7 @@ fn mend(
         let repaired = repairs::run(&mut diagnosis, profile, limits.threads);
         clock.lap("repair");
         edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &repaired.reversed);
+        report.loops = repaired.loops;
         report.repairs = repaired.repairs;
         report.loops_left = repaired.loops_left;
     }

@@ -12,9 +12,11 @@ mod sides;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 
-use crate::report::{BoundaryLoop, LoopClass};
+use crate::report::{BoundaryLoop, BoundaryLoops, LoopClass};
 use crate::shop::edges::Edges;
 use crate::shop::near::Tolerance;
 use crate::shop::{Shop, Vertex};
@@ -28,12 +30,24 @@ const SLENDER_SHARE: f64 = 0.25;
 /// A loop is flat if it rises so little above its plane, measured by the plane's smaller extent.
 const FLAT: f64 = 0.05;
 
+/// Loops that are listed in a report.
+const LISTED: usize = 1000;
+
+/// The loops of a workshop for the report.
+pub(crate) fn report(shop: &Shop, edges: &Edges, tolerance: &Tolerance, gap_share: f64) -> BoundaryLoops {
+    let mut listed = classify(shop, edges, tolerance, gap_share);
+    let mut classes = BTreeMap::new();
+    listed.iter().for_each(|l| *classes.entry(l.class).or_default() += 1);
+    listed.truncate(LISTED);
+    BoundaryLoops { classes, listed }
+}
+
 /// All boundary loops with their classes, by smallest vertex; partners are places in this list. `gap_share`: a gap is narrower than this
 /// share of the edges beside it; 0: nothing is a gap. O(n log n) in the boundary.
 pub(crate) fn classify(shop: &Shop, edges: &Edges, tolerance: &Tolerance, gap_share: f64) -> Vec<BoundaryLoop> {
     let loops = loops::find(shop, edges);
     let shapes: Vec<Shape> = loops.iter().map(|rim| shape_of(shop, rim)).collect();
-    let sides = sides::measure(shop, edges, &loops, tolerance, gap_share);
+    let sides = sides::measure(shop, &loops, tolerance, gap_share);
     let several = vertices_of_several(edges);
     let mut classes: Vec<Option<(LoopClass, String)>> = loops
         .iter()

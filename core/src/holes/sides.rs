@@ -8,7 +8,6 @@ use glam::DVec3;
 use super::loops::Loop;
 use crate::boxes::BoxTree;
 use crate::report::LoopClass;
-use crate::shop::edges::Edges;
 use crate::shop::near::{self, Tolerance};
 use crate::shop::{self, Shop};
 use crate::sums::Bounds;
@@ -17,39 +16,83 @@ use crate::sums::Bounds;
 const AGAINST: f64 = -0.5;
 /// So many of its vertices, of five, must have a side across to make a loop narrow.
 const OF_FIVE: usize = 4;
-/// Sides do not run alike if the way across changes from vertex to vertex by more than this share of itself.
-const UNEVEN: f64 = 0.3;
+/// A side that does not run alike is looked for so many times as far as one that does.
+const WIDER: f64 = 1.6;
+/// Sides do not run alike beyond this [`Sides::unevenness`]: between what noise of a twentieth of an edge does to a parallel side, and what
+/// a shift of a seventh does, each way by chance.
+const UNEVEN: f64 = 0.42;
 
 /// What lies across a loop.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sides {
-    /// Vertices that are no ends, and those of them with a side across, and within the weld tolerance of it.
+    /// Vertices that are no ends; those of them with a side across; within the share of their edges that a gap may have; and within the weld
+    /// tolerance.
     inner: usize,
     across: usize,
+    near: usize,
     touching: usize,
+    share: f64,
     /// Largest distance of a side across; `None` unless the loop is narrow.
     pub(super) width: Option<f64>,
-    /// Mean change of the way across from one vertex to the next, as a share of its length.
+    /// How the way across changes from one vertex to the next: in the surface as a share of its length, and twice what it rises or falls as
+    /// a share of the edges, since rough surfaces are rough that way.
     unevenness: f64,
     /// The other loop on which most of what is across lies, if it is not this one.
     pub(super) partner: Option<u32>,
-    share: f64,
 }
 
 impl Sides {
     pub(super) fn class(&self) -> Option<(LoopClass, String)> {
         let width = self.width?;
-        let Self { inner, across, touching, unevenness, share, .. } = self;
-        Some(if touching == inner {
-            (LoopClass::Crack, format!("all {inner} vertices between its ends lie within the weld tolerance of the other side"))
-        } else if *unevenness > UNEVEN {
+        let Self { inner, across, near, touching, share, unevenness, .. } = self;
+        if touching == inner {
+            let rule = format!("all {inner} vertices between its ends lie within the weld tolerance of the other side");
+            return Some((LoopClass::Crack, rule));
+        }
+        if *unevenness > UNEVEN {
             let rule = format!(
-                "{across} of {inner} vertices lie within {width:.4} of the other side, which does not run alike: {unevenness:.2} over {UNEVEN}"
+                "{across} of {inner} vertices lie within {width:.4} of the other side, which does not run alike: {unevenness:.2}, above {UNEVEN}"
             );
-            (LoopClass::Misaligned, rule)
-        } else {
-            (LoopClass::Gap, format!("{across} of {inner} vertices lie within {share} of their edges of the other side"))
+            return Some((LoopClass::Misaligned, rule));
+        }
+        most(*near, *inner).then(|| {
+            let rule =
+                format!("{near} of {inner} vertices lie within {share} of their edges of the other side, which runs alike");
+            (LoopClass::Gap, rule)
         })
+    }
+}
+
+fn most(some: usize, all: usize) -> bool {
+    all > 0 && 5 * some >= OF_FIVE * all
+}
+
+/// The way across from vertex to vertex.
+#[derive(Default)]
+struct Ways {
+    before: Option<DVec3>,
+    /// Sums over the steps: of what changes in the surface, of the way's length there, of what rises or falls, of the edges.
+    changed: f64,
+    length: f64,
+    risen: f64,
+    along: f64,
+}
+
+impl Ways {
+    fn step(&mut self, way: DVec3, normal: DVec3, edge: f64) {
+        if let Some(before) = self.before.replace(way) {
+            let change = way - before;
+            let rise = change.dot(normal);
+            self.changed += (change - normal * rise).length();
+            self.length += (way - normal * way.dot(normal)).length();
+            self.risen += rise.abs();
+            self.along += edge;
+        }
+    }
+
+    fn unevenness(&self) -> f64 {
+        let share = |a: f64, b: f64| if b > 0.0 { a / b } else { 0.0 };
+        share(self.changed, self.length) + 2.0 * share(self.risen, self.along)
     }
 }
 
@@ -60,7 +103,7 @@ struct Segment {
 }
 
 /// Of every loop. O(n log n) in all their vertices.
-pub(super) fn measure(shop: &Shop, edges: &Edges, loops: &[Loop], tolerance: &Tolerance, share: f64) -> Vec<Sides> {
+pub(super) fn measure(shop: &Shop, loops: &[Loop], tolerance: &Tolerance, share: f64) -> Vec<Sides> {
     let segments: Vec<Segment> = loops
         .iter()
         .zip(0..)
@@ -74,27 +117,28 @@ pub(super) fn measure(shop: &Shop, edges: &Edges, loops: &[Loop], tolerance: &To
         return Vec::new();
     }
     let tree = BoxTree::new(&boxes);
-    let _ = edges;
     let mut found = Vec::new();
     loops
         .iter()
         .zip(0..)
         .map(|(rim, number)| {
             let mut sides = Sides { share, ..Sides::default() };
-            let (mut width, mut change, mut length): (f64, f64, f64) = (0.0, 0.0, 0.0);
+            let mut ways = Ways::default();
+            let mut width: f64 = 0.0;
             let mut others: Vec<u32> = Vec::new();
-            let mut before: Option<DVec3> = None;
             let n = rim.vertices.len();
             for i in 0..n {
-                let [previous, v, next] = [(i + n - 1) % n, i, (i + 1) % n].map(|k| rim.vertices[k]);
+                let before = (i + n - 1) % n;
+                let [previous, v, next] = [before, i, (i + 1) % n].map(|k| rim.vertices[k]);
                 let (coming, going) = (shop.vector(previous, v), shop.vector(v, next));
                 if coming.dot(going) < 0.0 {
-                    before = None;
+                    ways.before = None;
                     continue;
                 }
                 sides.inner += 1;
                 let touching = tolerance.at(shop, v);
-                let reach = touching.max(share * coming.length().min(going.length()));
+                let near = touching.max(share * coming.length().min(going.length()));
+                let reach = touching.max(WIDER * share * 0.5 * (coming.length() + going.length()));
                 tree.meeting(&near::around(&[shop.positions[v as usize]], reach), &mut found);
                 let across = found
                     .iter()
@@ -105,31 +149,35 @@ pub(super) fn measure(shop: &Shop, edges: &Edges, loops: &[Loop], tolerance: &To
                     .min_by(|a, b| a.0.length().total_cmp(&b.0.length()))
                     .filter(|(way, _)| way.length() <= reach);
                 let Some((way, of_loop)) = across else {
-                    before = None;
+                    ways.before = None;
                     continue;
                 };
                 sides.across += 1;
+                sides.near += usize::from(way.length() <= near);
                 sides.touching += usize::from(way.length() <= touching);
                 width = width.max(way.length());
                 if of_loop != number {
                     others.push(of_loop);
                 }
-                if let Some(before) = before {
-                    change += before.distance(way);
-                    length += 0.5 * (before.length() + way.length());
-                }
-                before = Some(way);
+                let normal = [before, i].map(|k| normal_of(shop, rim.triangles[k])).into_iter().sum::<DVec3>();
+                ways.step(way, normal.normalize_or_zero(), coming.length());
             }
-            sides.width = (sides.inner > 0 && 5 * sides.across >= OF_FIVE * sides.inner).then_some(width);
-            sides.unevenness = if length > 0.0 { change / length } else { 0.0 };
+            sides.width = most(sides.across, sides.inner).then_some(width);
+            sides.unevenness = ways.unevenness();
             if 2 * others.len() > sides.across {
                 others.sort_unstable();
                 let most = others.chunk_by(|a, b| a == b).max_by_key(|same| (same.len(), std::cmp::Reverse(same[0])));
-                sides.partner = most.map(|same| same[0]).filter(|_| sides.width.is_some());
+                sides.partner = most.map(|same| same[0]).filter(|_| sides.class().is_some());
             }
             sides
         })
         .collect()
+}
+
+/// Unit normal of a triangle; zero if it has no area.
+fn normal_of(shop: &Shop, t: u32) -> DVec3 {
+    let [a, b, c] = shop.triangles[t as usize].v;
+    shop.vector(a, b).cross(shop.vector(a, c)).normalize_or_zero()
 }
 
 /// From a vertex to the nearest point of a segment.

@@ -18,9 +18,11 @@ mod zip;
 use std::time::Instant;
 
 use crate::engine::Diagnosis;
-use crate::report::{LoopLeft, Repair};
+use crate::holes;
+use crate::report::{BoundaryLoops, LoopLeft, Repair};
 use crate::settings::Profile;
 use crate::shop::components::Reversed;
+use crate::shop::near::Tolerance;
 use crate::survey::Survey;
 use work::Work;
 
@@ -28,6 +30,8 @@ use work::Work;
 pub(crate) struct Repaired {
     pub(crate) reversed: Reversed,
     pub(crate) repairs: Vec<Repair>,
+    /// The boundary loops as they were recognised, before any was closed.
+    pub(crate) loops: BoundaryLoops,
     pub(crate) loops_left: Vec<LoopLeft>,
 }
 
@@ -43,26 +47,11 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
     let mut reversed = Reversed::none(&diagnosis.survey);
     let Diagnosis { survey, shop, tolerance, .. } = diagnosis;
     let shop = &mut Work::new(shop);
-    log.time("degenerate", DEGENERATE, || duplicates::drop_repeated(shop));
-    log.time("duplicate", DUPLICATE, || duplicates::drop_duplicates(shop));
-    complete_at_seams(survey, shop);
+    prepare(survey, shop, &mut log);
+    let mut loops = None;
     for _ in 0..ROUNDS {
-        let mut changes = clean(survey, shop, &mut log);
-        changes += log.time(
-            "tolerance_weld",
-            "boundary vertices within the weld tolerance, moved to the one with most triangles",
-            || {
-                let welded = merge::weld(shop, tolerance);
-                if welded.taken_back > 0 {
-                    tracing::info!(
-                        clusters = welded.taken_back,
-                        "Welds taken back, since they made an edge of more than two triangles."
-                    );
-                }
-                welded.vertices
-            },
-        );
-        changes += clean(survey, shop, &mut log);
+        let mut changes = weld(survey, shop, tolerance, &mut log);
+        loops.get_or_insert_with(|| report_loops(shop, tolerance, profile));
         changes += log.time("t_junction", "vertices inside a neighbour's edge, which was split there", || {
             junction::split_edges(shop, tolerance)
         });
@@ -95,7 +84,47 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
     });
     log.note("fill", methods);
     log.time("outward", "components that were inside out", || orient::make_outward(survey, shop, &mut reversed).0);
-    Repaired { reversed, repairs: log.repairs, loops_left }
+    Repaired { reversed, repairs: log.repairs, loops: loops.unwrap_or_default(), loops_left }
+}
+
+/// The boundary loops of a workshop, with their kinds. They are what is left when surplus surface is gone and vertices within the weld
+/// tolerance are one, which the workshop is brought to.
+pub(crate) fn recognise(diagnosis: &mut Diagnosis<'_>, profile: &Profile) -> BoundaryLoops {
+    let Diagnosis { survey, shop, tolerance, defects } = diagnosis;
+    if defects.boundary_edges == 0 {
+        return BoundaryLoops::default();
+    }
+    let shop = &mut Work::new(shop);
+    let mut log = Log::default();
+    prepare(survey, shop, &mut log);
+    weld(survey, shop, tolerance, &mut log);
+    report_loops(shop, tolerance, profile)
+}
+
+fn report_loops(work: &mut Work<'_>, tolerance: &Tolerance, profile: &Profile) -> BoundaryLoops {
+    let (shop, edges) = work.edges();
+    holes::report(shop, edges, tolerance, profile.gap_edge_share)
+}
+
+/// Drops what is no surface of its own, and fetches what the removal of the rest may need.
+fn prepare(survey: &mut Survey<'_>, shop: &mut Work<'_>, log: &mut Log) {
+    log.time("degenerate", DEGENERATE, || duplicates::drop_repeated(shop));
+    log.time("duplicate", DUPLICATE, || duplicates::drop_duplicates(shop));
+    complete_at_seams(survey, shop);
+}
+
+/// Cleans up, makes vertices within tolerance one, and cleans up after that.
+fn weld(survey: &Survey<'_>, shop: &mut Work<'_>, tolerance: &Tolerance, log: &mut Log) -> u64 {
+    const NOTE: &str = "boundary vertices within the weld tolerance, moved to the one with most triangles";
+    let mut changes = clean(survey, shop, log);
+    changes += log.time("tolerance_weld", NOTE, || {
+        let welded = merge::weld(shop, tolerance);
+        if welded.taken_back > 0 {
+            tracing::info!(clusters = welded.taken_back, "Welds taken back, since they made an edge of more than two triangles.");
+        }
+        welded.vertices
+    });
+    changes + clean(survey, shop, log)
 }
 
 /// Fetches the stars that the removal of surplus surface may need. Duplicates are gone by then: they make non-manifold edges of no

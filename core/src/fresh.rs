@@ -22,18 +22,33 @@ use crate::survey::Survey;
 pub(crate) fn self_intersections(survey: &Survey<'_>, difference: &Difference) -> Option<SelfIntersections> {
     let is_gone = |place: u32| difference.gone.binary_search(&place).is_ok();
     let known = survey.crossing_pairs.as_ref()?.iter().filter(|pair| !pair.triangles.iter().any(|t| is_gone(*t)));
-    let fresh = Fresh::of(difference);
-    let per_chunk = survey.each_chunk(Search::default, |search, cell, seen| search.chunk(&fresh, &is_gone, cell, seen));
-    if per_chunk.iter().map(|found| found.tested).sum::<u64>() > most_tested(difference.written_records as u64) {
-        return None;
-    }
-    let mut pairs: Vec<Pair> = known.copied().chain(per_chunk.into_iter().flat_map(|found| found.pairs)).collect();
+    let fresh = difference.fresh.iter().map(|(place, record)| (*place, record::corners(record)));
+    let new = met_by(survey, fresh, std::iter::empty(), is_gone, difference.written_records as u64)?;
+    let mut pairs: Vec<Pair> = known.copied().chain(new).collect();
     for pair in &mut pairs {
         // The numbers keep their order.
         pair.triangles = pair.triangles.map(|place| difference.number(place));
         pair.triangles.sort_unstable();
     }
     Some(Crossings::of_pairs(pairs))
+}
+
+/// All pairs in which one of the `fresh` triangles crosses or overlaps another of them, one of those `beside`, or one of the input that is not
+/// gone; `None` if too many boxes meet for a file of so many triangles. Triangles go by numbers that no other one has. O(n) boxes where a
+/// chunk holds a fresh one are held against a grid of these.
+pub(crate) fn met_by(
+    survey: &Survey<'_>,
+    fresh: impl Iterator<Item = (u32, Corners)>,
+    beside: impl Iterator<Item = (u32, Corners)>,
+    is_gone: impl Fn(u32) -> bool + Sync,
+    triangles: u64,
+) -> Option<Vec<Pair>> {
+    let [fresh, beside] = [Solids::of(fresh), Solids::of(beside)];
+    let per_chunk = survey.each_chunk(Search::default, |search, cell, seen| search.chunk(&fresh, &beside, &is_gone, cell, seen));
+    if per_chunk.iter().map(|found| found.tested).sum::<u64>() > most_tested(triangles) {
+        return None;
+    }
+    Some(per_chunk.into_iter().flat_map(|found| found.pairs).collect())
 }
 
 /// A triangle that has an area, with its box.
@@ -52,18 +67,26 @@ impl Solid {
     }
 }
 
-/// The fresh triangles that can intersect anything.
-struct Fresh {
+/// Triangles that can intersect anything.
+struct Solids {
     all: Vec<Solid>,
     tree: BoxTree,
 }
 
-impl Fresh {
-    fn of(difference: &Difference) -> Self {
-        let all: Vec<Solid> =
-            difference.fresh.iter().filter_map(|(place, record)| Solid::of(*place, record::corners(record))).collect();
+impl Solids {
+    fn of(triangles: impl Iterator<Item = (u32, Corners)>) -> Self {
+        let all: Vec<Solid> = triangles.filter_map(|(place, corners)| Solid::of(place, corners)).collect();
         let tree = BoxTree::new(&all.iter().map(|f| f.bounds).collect::<Vec<_>>());
         Self { all, tree }
+    }
+
+    /// Those whose boxes meet `wanted`.
+    fn meeting<'s>(&'s self, wanted: &Bounds, found: &mut Vec<u32>) -> Vec<&'s Solid> {
+        found.clear();
+        if !self.all.is_empty() {
+            self.tree.meeting(wanted, found);
+        }
+        found.iter().map(|f| &self.all[*f as usize]).collect()
     }
 }
 
@@ -77,30 +100,34 @@ struct Found {
 /// A worker's lists, used again from chunk to chunk.
 #[derive(Default)]
 struct Search {
-    /// The fresh triangles whose boxes meet the cell.
-    here: Vec<u32>,
     met: Vec<u32>,
     grid: Grid,
 }
 
 impl Search {
-    fn chunk(&mut self, fresh: &Fresh, is_gone: &impl Fn(u32) -> bool, cell: HomeBox, seen: [&Seen<'_>; 2]) -> Found {
+    fn chunk(
+        &mut self,
+        fresh: &Solids,
+        beside: &Solids,
+        is_gone: &impl Fn(u32) -> bool,
+        cell: HomeBox,
+        seen: [&Seen<'_>; 2],
+    ) -> Found {
         let mut found = Found::default();
-        if fresh.all.is_empty() {
-            return found;
-        }
         let (lo, hi) = cell.ends();
-        fresh.tree.meeting(&Bounds { lo, hi }, &mut self.here);
-        if self.here.is_empty() {
+        let here = fresh.meeting(&Bounds { lo, hi }, &mut self.met);
+        if here.is_empty() {
             return found;
         }
-        let here: Vec<&Solid> = self.here.iter().map(|f| &fresh.all[*f as usize]).collect();
         let boxes: Vec<Bounds> = here.iter().map(|f| f.bounds).collect();
         let tree = BoxTree::new(&boxes);
         for (i, one) in here.iter().enumerate() {
             tree.meeting(&one.bounds, &mut self.met);
             for other in self.met.iter().filter(|j| **j as usize > i) {
                 found.test(one, here[*other as usize], cell);
+            }
+            for other in beside.meeting(&one.bounds, &mut self.met) {
+                found.test(one, other, cell);
             }
         }
         self.grid.mark(boxes.iter().copied());

@@ -26,6 +26,8 @@ pub struct Profile {
     pub max_hole_perimeter_relative: f64,
     /// Fill holes at all.
     pub fill_holes: bool,
+    /// How patches that have room for vertices of their own are shaped.
+    pub patch_shape: PatchShape,
     /// Largest change of the enclosed volume, as a fraction, between a closed part of the input and the output; beyond it the
     /// result needs review.
     pub max_volume_change: f64,
@@ -42,6 +44,19 @@ pub struct Profile {
     pub check_self_intersections: bool,
 }
 
+/// How a patch is shaped.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PatchShape {
+    /// Not at all: triangles between the vertices of the rim.
+    Flat,
+    /// Refined, then fair: position, tangent and curvature continue the surface around (tri-Laplacian).
+    #[default]
+    Fair,
+    /// Refined, then moved onto a triharmonic radial basis function that continues the surface around.
+    Rbf,
+}
+
 impl Default for Profile {
     fn default() -> Self {
         Self {
@@ -52,6 +67,7 @@ impl Default for Profile {
             max_hole_edges: 20_000,
             max_hole_perimeter_relative: 8.0,
             fill_holes: true,
+            patch_shape: PatchShape::Fair,
             max_volume_change: 0.25,
             max_box_change_relative: 0.02,
             max_bodies_lost: 0,

@@ -239,6 +239,23 @@ impl<'a> Survey<'a> {
     /// Reads the chunks where the vertices are at home.
     pub(crate) fn promote(&mut self, positions: &[[f32; 3]]) -> Vec<(Suspect, u32)> {
         self.promoted.extend(positions);
+        let new = self.beyond_the_workshop(positions);
+        for (suspect, patch) in &new {
+            let sum = &mut self.patches[*patch as usize];
+            let extent = self.measure.triangle(&record::corners(&self.records[suspect.triangle as usize]));
+            sum.triangles -= 1;
+            sum.extent -= extent;
+        }
+        let mut all: Vec<(Suspect, u32)> =
+            self.suspects.iter().copied().zip(self.suspect_patches.iter().copied()).chain(new.iter().copied()).collect();
+        all.sort_unstable();
+        (self.suspects, self.suspect_patches) = all.into_iter().unzip();
+        new
+    }
+
+    /// The triangles around sound vertices at `positions` that are no suspects, ascending, each with the corners that are there and
+    /// the patch it belongs to. Reads the chunks where the vertices are at home.
+    pub(crate) fn beyond_the_workshop(&self, positions: &[[f32; 3]]) -> Vec<(Suspect, u32)> {
         let mut wanted = Weld::default();
         wanted.reset(positions.len() * 8);
         positions.iter().for_each(|p| {
@@ -275,21 +292,11 @@ impl<'a> Survey<'a> {
                 found
             },
         );
-        let mut new: Vec<(Suspect, u32)> = found.into_iter().flatten().collect();
-        new.sort_unstable();
-        new.dedup_by_key(|(s, _)| s.triangle);
-        new.retain(|(s, _)| self.suspects.binary_search_by_key(&s.triangle, |t| t.triangle).is_err());
-        for (suspect, patch) in &new {
-            let sum = &mut self.patches[*patch as usize];
-            let extent = self.measure.triangle(&record::corners(&self.records[suspect.triangle as usize]));
-            sum.triangles -= 1;
-            sum.extent -= extent;
-        }
-        let mut all: Vec<(Suspect, u32)> =
-            self.suspects.iter().copied().zip(self.suspect_patches.iter().copied()).chain(new.iter().copied()).collect();
+        let mut all: Vec<(Suspect, u32)> = found.into_iter().flatten().collect();
         all.sort_unstable();
-        (self.suspects, self.suspect_patches) = all.into_iter().unzip();
-        new
+        all.dedup_by_key(|(s, _)| s.triangle);
+        all.retain(|(s, _)| self.suspects.binary_search_by_key(&s.triangle, |t| t.triangle).is_err());
+        all
     }
 }
 

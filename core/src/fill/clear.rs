@@ -69,7 +69,7 @@ impl<'a> Clearance<'a> {
             return false;
         }
         let meets = |i: usize| rim.neighbour(i).is_some_and(|t| triangles_cross(&corners, &t).is_crossing());
-        let meets_mesh = self.boxes.any_near(&bounds, meets);
+        let meets_mesh = self.boxes.any_near(&bounds, meets) || rim.meets_obstacle(&corners);
         self.mesh_in_the_way |= meets_mesh;
         !meets_mesh
     }

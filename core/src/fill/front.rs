@@ -169,6 +169,9 @@ impl<'a> Front<'a> {
             return false;
         }
         let corners = self.rim.corners(ear);
+        if self.rim.meets_obstacle(&corners) {
+            return false;
+        }
         let holder = (!self.relaxed).then(|| Holder::new(ear.map(|c| self.positions[c as usize])));
         !self.boxes.any_near(&around(&corners), |i| {
             let crosses = |t: &Triangle| triangles_cross(&corners, t).is_crossing();
@@ -211,7 +214,7 @@ impl<'a> Front<'a> {
         };
         let apexes: Vec<_> = vertices.iter().map(apex).collect();
         let forbidden = |a: u32, b: u32| (self.rim.forbidden)(vertices[a as usize], vertices[b as usize]);
-        let rest = Rim { points: &points, apexes: &apexes, forbidden: &forbidden };
+        let rest = Rim { points: &points, apexes: &apexes, obstacles: self.rim.obstacles, forbidden: &forbidden };
         let triangles = minweight::triangulate(&rest, Weight::Bend, Choice::Clear(&mut Clearance::new(&rest), &[]))?;
         Ok(triangles.into_iter().map(|t| t.map(|v| vertices[v as usize])).collect())
     }

@@ -38,6 +38,8 @@ pub struct Rim<'a> {
     /// For each rim edge the third corner of the mesh's triangle on its other side, where known; may be shorter than the loop.
     /// The patch then crosses none of these triangles, does not fold back flat onto them, and bends little against them.
     pub apexes: &'a [Option<Point>],
+    /// Other triangles of the mesh that the patch must not cross.
+    pub obstacles: &'a [Triangle],
     /// Is the chord between these two vertices (smaller index first) an edge of the mesh already? Never asked of rim edges.
     pub forbidden: &'a dyn Fn(u32, u32) -> bool,
 }
@@ -332,7 +334,11 @@ impl Rim<'_> {
             })
     }
 
-    /// Is this triangulation of the polygon valid: every triangle with an area and clear of the mesh's triangles along the rim,
+    fn meets_obstacle(&self, corners: &Triangle) -> bool {
+        self.obstacles.iter().any(|other| triangles_cross(corners, other).is_crossing())
+    }
+
+    /// Is this triangulation of the polygon valid: every triangle with an area and clear of the obstacles and the mesh's triangles along the rim,
     /// every chord allowed, and nothing crosses or folds onto itself? `graph`: it is known to be a graph over a plane, which cannot
     /// cross itself.
     fn accepts(&self, triangles: &[[u32; 3]], graph: bool) -> Result<(), Fault> {
@@ -346,6 +352,7 @@ impl Rim<'_> {
             !collinear(&corners[0], &corners[1], &corners[2])
                 && (0..3).all(|k| self.allows(t[k], t[(k + 1) % 3]))
                 && !neighbours.any_near(&around(&corners), meets)
+                && !self.meets_obstacle(&corners)
         };
         if !triangles.iter().all(admissible) {
             return Err(Fault::Inadmissible);

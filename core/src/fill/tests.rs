@@ -151,7 +151,7 @@ fn check(points: &[Grid], apexes: &[Option<Grid>], forbidden: &dyn Fn(u32, u32) 
 
 fn fill(points: &[Grid], apexes: &[Option<Grid>], forbidden: &dyn Fn(u32, u32) -> bool) -> Result<Patch, Unfillable> {
     let apex_positions: Vec<_> = apexes.iter().map(|a| a.map(|p| p.map(|x| x as f32))).collect();
-    let rim = Rim { points: &float(points), apexes: &apex_positions, forbidden };
+    let rim = Rim { points: &float(points), apexes: &apex_positions, obstacles: &[], forbidden };
     let result = triangulate(&rim, &FillSettings::default());
     if let Ok(patch) = &result {
         check(points, apexes, forbidden, patch);
@@ -175,10 +175,10 @@ fn three_vertices_are_one_triangle_or_a_needle() {
 fn what_is_no_loop_is_refused() {
     assert_eq!(fill(&[[0, 0, 0], [4, 0, 0]], &[], &free), Err(Unfillable::NotALoop));
     assert_eq!(fill(&[[0, 0, 0], [4, 0, 0], [4, 4, 0], [4, 0, 0]], &[], &free), Err(Unfillable::NotALoop));
-    let rim = Rim { points: &[[0.0; 3], [1.0, f32::NAN, 0.0], [0.0, 1.0, 0.0]], apexes: &[], forbidden: &free };
+    let rim = Rim { points: &[[0.0; 3], [1.0, f32::NAN, 0.0], [0.0, 1.0, 0.0]], apexes: &[], obstacles: &[], forbidden: &free };
     assert_eq!(triangulate(&rim, &FillSettings::default()), Err(Unfillable::NotALoop));
     // −0.0 is 0.0 to every reader of the file.
-    let rim = Rim { points: &[[0.0; 3], [1.0, 0.0, 0.0], [-0.0, 0.0, -0.0]], apexes: &[], forbidden: &free };
+    let rim = Rim { points: &[[0.0; 3], [1.0, 0.0, 0.0], [-0.0, 0.0, -0.0]], apexes: &[], obstacles: &[], forbidden: &free };
     assert_eq!(triangulate(&rim, &FillSettings::default()), Err(Unfillable::NotALoop));
 }
 
@@ -456,7 +456,7 @@ proptest! {
         prop_assume!(p.len() > 2);
         let forbidden = some(seed, one_in);
         let beyond: Vec<_> = apexes.iter().map(|a| a.map(|p| p.map(|x| x as f32))).collect();
-        let rim = Rim { points: &float(&p), apexes: &beyond, forbidden: &forbidden };
+        let rim = Rim { points: &float(&p), apexes: &beyond, obstacles: &[], forbidden: &forbidden };
         if let Ok(triangles) = by_front(&rim, 300) {
             check(&p, &apexes, &forbidden, &patch(triangles, Method::Front));
         }

@@ -1,24 +1,26 @@
-//! Closes boundary loops by triangulations between their vertices (METHODS C8, basic).
+//! Closes boundary loops (METHODS C8): by a triangulation between their vertices, which is then shaped to continue the surface, where it has
+//! room for that, and revoked where it crosses anything.
 
 use std::collections::BTreeMap;
 
-use super::islands;
 use super::work::Work;
+use super::{guard, islands, smooth};
 use crate::chunk::NONE;
-use crate::fill::{self, FillSettings, Rim, Unfillable};
+use crate::fill::{self, FillSettings, Rim, Unfillable, cross};
 use crate::holes::loops::{self, Loop};
 use crate::parallel;
 use crate::report::LoopLeft;
-use crate::settings::Profile;
+use crate::settings::{PatchShape, Profile};
+use crate::shape::{Method, ShapeSettings};
 use crate::shop::components::{Components, Reversed, Through};
-use crate::shop::{Origin, Shop};
+use crate::shop::{Origin, Shop, Vertex};
 use crate::survey::Survey;
 
 /// What was closed, by method, and what was not.
 #[derive(Debug, Default)]
 pub(super) struct Closed {
     pub(super) loops: u64,
-    pub(super) by_method: BTreeMap<&'static str, u64>,
+    pub(super) by_method: BTreeMap<String, u64>,
     pub(super) left: Vec<LoopLeft>,
 }
 
@@ -31,50 +33,223 @@ const MAX_FLAT_SHARE: f64 = 0.1;
 /// And only for loops of at most so many edges.
 const MAX_FLAT_EDGES: usize = 64;
 
+/// A patch that crosses anything is made anew by the next method, or around what it crosses, so many times, and is revoked then.
+const GUARD_ROUNDS: usize = 4;
+
+/// A patch that is in the workshop.
+#[derive(Debug)]
+pub(super) struct Placed {
+    /// The loop it closes, by number.
+    rim: u32,
+    method: &'static str,
+    /// Its triangles are consecutive.
+    pub(super) first: u32,
+    pub(super) count: u32,
+    /// Of a patch that was shaped: the triangles that it was shaped from.
+    pub(super) coarse: Vec<[Vertex; 3]>,
+    /// What it came to grief on.
+    obstacles: Vec<cross::Triangle>,
+}
+
+impl Placed {
+    pub(super) fn triangles(&self) -> impl Iterator<Item = u32> + use<> {
+        self.first..self.first + self.count
+    }
+
+    pub(super) fn holds(&self, t: u32) -> bool {
+        (self.first..self.first + self.count).contains(&t)
+    }
+
+    /// Puts these triangles in, in place of those that were.
+    fn replace(&mut self, work: &mut Work<'_>, triangles: &[[Vertex; 3]]) {
+        self.triangles().for_each(|t| work.kill(t));
+        (self.first, self.count) = (work.triangles.len() as u32, triangles.len() as u32);
+        triangles.iter().for_each(|v| {
+            work.add(*v, Origin::Patch, NONE);
+        });
+    }
+}
+
 /// Fills every loop that the profile admits. Patches are found in parallel and put in in the loops' order; one that meets an edge
 /// that an earlier one has made is found anew, so that the result does not depend on the threads.
 pub(super) fn fill_loops(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile, threads: usize) -> Closed {
     let bridges = if profile.fill_holes { islands::bridge(survey, work) } else { Vec::new() };
     let (shop, edges) = work.edges();
     let rims = loops::find(shop, edges);
-    let diagonal = survey.bounds.diagonal();
-    let patches = parallel::map(threads, rims.len(), |i| fill(shop, &rims[i], profile, diagonal, Neighbours::Heeded));
-    let mut closed = Closed::default();
-    let mut open: Vec<(&Loop, NotFilled)> = Vec::new();
-    for (rim, patch) in rims.iter().zip(patches) {
-        let patch = match patch {
-            Ok(patch) if meets_new_edge(work, rim, &patch) => fill(work, rim, profile, diagonal, Neighbours::Heeded),
-            other => other,
-        };
-        match patch {
-            Ok(patch) => closed.put_in(work, rim, &patch, patch.method.name()),
-            Err(reason) => open.push((rim, reason)),
+    let mut closing = Closing { profile, diagonal: survey.bounds.diagonal(), rims, placed: Vec::new(), open: Vec::new() };
+    closing.triangulate(work, threads);
+    closing.close_flat(survey, work);
+    if let Some(settings) = shape_settings(profile) {
+        smooth::smooth(survey, work, &mut closing.placed, &settings, threads);
+    }
+    if profile.check_self_intersections {
+        closing.guard(survey, work);
+    }
+    closing.finish(work, &bridges)
+}
+
+fn shape_settings(profile: &Profile) -> Option<ShapeSettings> {
+    let method = match profile.patch_shape {
+        PatchShape::Flat => return None,
+        PatchShape::Fair => Method::TriLaplacian,
+        PatchShape::Rbf => Method::Rbf,
+    };
+    Some(ShapeSettings { method, ..ShapeSettings::default() })
+}
+
+/// The loops of a workshop while they are closed.
+struct Closing<'p> {
+    profile: &'p Profile,
+    diagonal: f64,
+    rims: Vec<Loop>,
+    placed: Vec<Placed>,
+    /// Loops, by number, and why they are not closed.
+    open: Vec<(u32, NotFilled)>,
+}
+
+impl Closing<'_> {
+    fn triangulate(&mut self, work: &mut Work<'_>, threads: usize) {
+        let shop: &Shop = work;
+        let patches = parallel::map(threads, self.rims.len(), |i| self.fill(shop, i as u32, Neighbours::Heeded, &[]));
+        for (rim, patch) in (0..).zip(patches) {
+            let patch = match patch {
+                Ok(patch) if meets_new_edge(work, self.rim(rim), &patch) => self.fill(work, rim, Neighbours::Heeded, &[]),
+                other => other,
+            };
+            match patch {
+                Ok(patch) => self.put_in(work, rim, &patch, patch.method.name()),
+                Err(reason) => self.open.push((rim, reason)),
+            }
         }
     }
-    if !open.is_empty() {
+
+    /// Small loops for which nothing else was found are closed flat on the triangles around.
+    fn close_flat(&mut self, survey: &Survey<'_>, work: &mut Work<'_>) {
+        if self.open.is_empty() {
+            return;
+        }
         let (shop, edges) = work.edges();
         let components = Components::of(survey, shop, edges, &Reversed::none(survey), Through::EveryEdge);
-        for (rim, reason) in open {
-            let area = components.list[components.of_triangle[rim.triangles[0] as usize] as usize].extent.area as f64;
+        for (rim, reason) in std::mem::take(&mut self.open) {
+            let loop_ = self.rim(rim);
+            let area = components.list[components.of_triangle[loop_.triangles[0] as usize] as usize].extent.area as f64;
             let flat = match reason {
-                NotFilled::Method(Unfillable::Blocked | Unfillable::CrossesItself) if rim.vertices.len() <= MAX_FLAT_EDGES => {
-                    fill(work, rim, profile, diagonal, Neighbours::Ignored)
-                        .ok()
-                        .filter(|p| twice_area(survey, work, rim, p) <= area * MAX_FLAT_SHARE)
-                }
+                NotFilled::Method(Unfillable::Blocked | Unfillable::CrossesItself) if loop_.vertices.len() <= MAX_FLAT_EDGES => self
+                    .fill(work, rim, Neighbours::Ignored, &[])
+                    .ok()
+                    .filter(|p| twice_area(survey, work, loop_, p) <= area * MAX_FLAT_SHARE),
                 _ => None,
             };
             match flat {
-                Some(patch) => closed.put_in(work, rim, &patch, "flat on its neighbours"),
-                None => {
-                    closed.leave(work, rim, reason);
-                    // What joined an island to this rim leads nowhere now.
-                    rim.triangles.iter().filter(|t| bridges.binary_search(t).is_ok()).for_each(|t| work.kill(*t));
+                Some(patch) => self.put_in(work, rim, &patch, FLAT),
+                None => self.open.push((rim, reason)),
+            }
+        }
+    }
+
+    /// Steps back where a patch crosses anything: from the shape to the triangulation it came from, to another one around what it
+    /// crosses, to none.
+    fn guard(&mut self, survey: &Survey<'_>, work: &mut Work<'_>) {
+        let mut is_new = vec![true; self.placed.len()];
+        for round in 0..=GUARD_ROUNDS {
+            let mut patch_of = vec![None; work.triangles.len()];
+            for (i, patch) in (0..).zip(&self.placed) {
+                patch.triangles().for_each(|t| patch_of[t as usize] = Some(i));
+            }
+            let Some(crossed) = guard::crossed(survey, work, &patch_of, |patch| is_new[patch as usize]) else { return };
+            if crossed.is_empty() {
+                return;
+            }
+            is_new.fill(false);
+            for (i, obstacles) in crossed {
+                is_new[i as usize] = true;
+                if !self.step_back(work, i as usize, obstacles, round < GUARD_ROUNDS) {
+                    self.open.push((self.placed[i as usize].rim, NotFilled::Crosses));
                 }
             }
         }
     }
-    closed
+
+    /// Replaces a patch by the next one that may do, or by none.
+    fn step_back(&mut self, work: &mut Work<'_>, i: usize, obstacles: Vec<cross::Triangle>, again: bool) -> bool {
+        let rim = self.placed[i].rim;
+        let mut triangles = std::mem::take(&mut self.placed[i].coarse);
+        self.placed[i].obstacles.extend(obstacles);
+        self.placed[i].replace(work, &[]);
+        if triangles.is_empty() && again && self.placed[i].method != FLAT {
+            if let Ok(patch) = self.fill(work, rim, Neighbours::Heeded, &self.placed[i].obstacles) {
+                self.placed[i].method = patch.method.name();
+                triangles = patch.triangles.iter().map(|t| t.map(|v| self.rim(rim).vertices[v as usize])).collect();
+            }
+        }
+        self.placed[i].replace(work, &triangles);
+        !triangles.is_empty()
+    }
+
+    fn rim(&self, rim: u32) -> &Loop {
+        &self.rims[rim as usize]
+    }
+
+    fn put_in(&mut self, work: &mut Work<'_>, rim: u32, patch: &fill::Patch, method: &'static str) {
+        let triangles: Vec<[Vertex; 3]> = patch.triangles.iter().map(|t| t.map(|i| self.rim(rim).vertices[i as usize])).collect();
+        let mut placed = Placed { rim, method, first: 0, count: 0, coarse: Vec::new(), obstacles: Vec::new() };
+        placed.replace(work, &triangles);
+        self.placed.push(placed);
+    }
+
+    fn finish(mut self, work: &mut Work<'_>, bridges: &[u32]) -> Closed {
+        let mut closed = Closed::default();
+        for patch in self.placed.iter().filter(|p| p.count > 0) {
+            closed.loops += 1;
+            let shaped = if patch.coarse.is_empty() { "" } else { ", shaped" };
+            *closed.by_method.entry(format!("{}{shaped}", patch.method)).or_default() += 1;
+        }
+        self.open.sort_by_key(|(rim, _)| *rim);
+        for (rim, reason) in &self.open {
+            let rim = self.rim(*rim);
+            if closed.left.len() < LISTED {
+                closed.left.push(LoopLeft {
+                    at: work.positions[rim.vertices[0] as usize],
+                    edges: rim.vertices.len() as u64,
+                    perimeter: rim.perimeter(work),
+                    reason: reason.to_string(),
+                });
+            }
+            // What joined an island to this rim leads nowhere now.
+            rim.triangles.iter().filter(|t| bridges.binary_search(t).is_ok()).for_each(|t| work.kill(*t));
+        }
+        closed
+    }
+
+    /// A triangulation of a loop that crosses none of the `obstacles`.
+    fn fill(&self, shop: &Shop, rim: u32, neighbours: Neighbours, obstacles: &[cross::Triangle]) -> Result<fill::Patch, NotFilled> {
+    let (profile, rim) = (self.profile, self.rim(rim));
+    if !profile.fill_holes {
+        return Err(NotFilled::Profile("the profile fills no holes".into()));
+    }
+    let n = rim.vertices.len();
+    if n as u64 > u64::from(profile.max_hole_edges) {
+        return Err(NotFilled::Profile(format!("more than the profile's {} edges", profile.max_hole_edges)));
+    }
+    let bound = profile.max_hole_perimeter_relative * self.diagonal;
+    if rim.perimeter(shop) > bound {
+        return Err(NotFilled::Profile(format!("longer than the profile's {bound:.3}")));
+    }
+    let points = rim.points(shop);
+    let apex = |i: usize| {
+        let ends = [rim.vertices[i], rim.vertices[(i + 1) % n]];
+        let apex = shop.triangles[rim.triangles[i] as usize].v.into_iter().find(|v| !ends.contains(v));
+        apex.map(|v| shop.positions[v as usize])
+    };
+    let apexes: Vec<_> = if neighbours == Neighbours::Heeded { (0..n).map(apex).collect() } else { Vec::new() };
+    let forbidden = |i: u32, j: u32| {
+        let (a, b) = (rim.vertices[i as usize], rim.vertices[j as usize]);
+        if shop.complete[a as usize] { shop.has_edge(a, b) } else { shop.has_edge(b, a) }
+    };
+    let settings = FillSettings { max_vertices: profile.max_hole_edges as usize, ..FillSettings::default() };
+    Ok(fill::triangulate(&Rim { points: &points, apexes: &apexes, obstacles, forbidden: &forbidden }, &settings)?)
+}
+
 }
 
 /// Twice the area of a patch, in the survey's units.
@@ -83,26 +258,8 @@ fn twice_area(survey: &Survey<'_>, shop: &Shop, rim: &Loop, patch: &fill::Patch)
     patch.triangles.iter().map(|t| survey.measure.triangle(&corners(t)).area).sum::<i128>() as f64
 }
 
-impl Closed {
-    fn put_in(&mut self, work: &mut Work<'_>, rim: &Loop, patch: &fill::Patch, how: &'static str) {
-        for t in &patch.triangles {
-            work.add(t.map(|i| rim.vertices[i as usize]), Origin::Patch, NONE);
-        }
-        self.loops += 1;
-        *self.by_method.entry(how).or_default() += 1;
-    }
-
-    fn leave(&mut self, shop: &Shop, rim: &Loop, reason: NotFilled) {
-        if self.left.len() < LISTED {
-            self.left.push(LoopLeft {
-                at: shop.positions[rim.vertices[0] as usize],
-                edges: rim.vertices.len() as u64,
-                perimeter: rim.perimeter(shop),
-                reason: reason.to_string(),
-            });
-        }
-    }
-}
+/// Name of the method that closes a small loop on the triangles around it.
+const FLAT: &str = "flat on its neighbours";
 
 /// A chord of the patch is an edge of the mesh by now.
 fn meets_new_edge(shop: &Shop, rim: &Loop, patch: &fill::Patch) -> bool {
@@ -120,6 +277,8 @@ fn meets_new_edge(shop: &Shop, rim: &Loop, patch: &fill::Patch) -> bool {
 enum NotFilled {
     #[error("{0}")]
     Profile(String),
+    #[error("every patch tried crosses the surface around")]
+    Crosses,
     #[error(transparent)]
     Method(#[from] Unfillable),
 }
@@ -129,33 +288,6 @@ enum NotFilled {
 enum Neighbours {
     Heeded,
     Ignored,
-}
-
-fn fill(shop: &Shop, rim: &Loop, profile: &Profile, diagonal: f64, neighbours: Neighbours) -> Result<fill::Patch, NotFilled> {
-    if !profile.fill_holes {
-        return Err(NotFilled::Profile("the profile fills no holes".into()));
-    }
-    let n = rim.vertices.len();
-    if n as u64 > u64::from(profile.max_hole_edges) {
-        return Err(NotFilled::Profile(format!("more than the profile's {} edges", profile.max_hole_edges)));
-    }
-    let bound = profile.max_hole_perimeter_relative * diagonal;
-    if rim.perimeter(shop) > bound {
-        return Err(NotFilled::Profile(format!("longer than the profile's {bound:.3}")));
-    }
-    let points = rim.points(shop);
-    let apex = |i: usize| {
-        let ends = [rim.vertices[i], rim.vertices[(i + 1) % n]];
-        let apex = shop.triangles[rim.triangles[i] as usize].v.into_iter().find(|v| !ends.contains(v));
-        apex.map(|v| shop.positions[v as usize])
-    };
-    let apexes: Vec<_> = if neighbours == Neighbours::Heeded { (0..n).map(apex).collect() } else { Vec::new() };
-    let forbidden = |i: u32, j: u32| {
-        let (a, b) = (rim.vertices[i as usize], rim.vertices[j as usize]);
-        if shop.complete[a as usize] { shop.has_edge(a, b) } else { shop.has_edge(b, a) }
-    };
-    let settings = FillSettings { max_vertices: profile.max_hole_edges as usize, ..FillSettings::default() };
-    Ok(fill::triangulate(&Rim { points: &points, apexes: &apexes, forbidden: &forbidden }, &settings)?)
 }
 
 #[cfg(test)]

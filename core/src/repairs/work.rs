@@ -75,6 +75,12 @@ impl<'a> Work<'a> {
         t
     }
 
+    /// Adds a vertex where none is, and returns its number.
+    pub(super) fn add_vertex(&mut self, position: [f32; 3]) -> Vertex {
+        self.edges = None;
+        self.shop.add_vertex(position)
+    }
+
     /// Lets all triangles of `go` use `stay` instead.
     pub(super) fn merge(&mut self, stay: Vertex, go: Vertex) {
         self.edges = None;

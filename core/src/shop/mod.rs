@@ -167,6 +167,14 @@ impl Shop {
         t as u32
     }
 
+    /// Adds a vertex where none is, and returns its number. Its star is what will be added to it.
+    pub(crate) fn add_vertex(&mut self, position: [f32; 3]) -> Vertex {
+        self.positions.push(position);
+        self.complete.push(true);
+        self.heads.push(NONE);
+        self.positions.len() as Vertex - 1
+    }
+
     pub(crate) fn kill(&mut self, t: u32) {
         self.triangles[t as usize].alive = false;
     }

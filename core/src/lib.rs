@@ -54,7 +54,7 @@ mod weld;
 
 pub use error::{Error, ErrorClass};
 pub use report::Report;
-pub use settings::{Limits, Profile};
+pub use settings::{Limits, PatchShape, Profile};
 
 use std::path::Path;
 

@@ -91,8 +91,8 @@ pub(super) fn fill_loops(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Pro
 fn shape_settings(profile: &Profile) -> Option<ShapeSettings> {
     let method = match profile.patch_shape {
         PatchShape::Flat => return None,
-        PatchShape::Fair => Method::TriLaplacian,
-        PatchShape::Rbf => Method::Rbf,
+        PatchShape::Fair => Method::Fair,
+        PatchShape::Rbf => Method::Fair,
     };
     Some(ShapeSettings { method, ..ShapeSettings::default() })
 }
@@ -134,10 +134,11 @@ impl Closing<'_> {
             let loop_ = self.rim(rim);
             let area = components.list[components.of_triangle[loop_.triangles[0] as usize] as usize].extent.area as f64;
             let flat = match reason {
-                NotFilled::Method(Unfillable::Blocked | Unfillable::CrossesItself) if loop_.vertices.len() <= MAX_FLAT_EDGES => self
-                    .fill(work, rim, Neighbours::Ignored, &[])
-                    .ok()
-                    .filter(|p| twice_area(survey, work, loop_, p) <= area * MAX_FLAT_SHARE),
+                NotFilled::Method(Unfillable::Blocked | Unfillable::CrossesItself) if loop_.vertices.len() <= MAX_FLAT_EDGES => {
+                    self.fill(work, rim, Neighbours::Ignored, &[])
+                        .ok()
+                        .filter(|p| twice_area(survey, work, loop_, p) <= area * MAX_FLAT_SHARE)
+                }
                 _ => None,
             };
             match flat {
@@ -222,34 +223,39 @@ impl Closing<'_> {
     }
 
     /// A triangulation of a loop that crosses none of the `obstacles`.
-    fn fill(&self, shop: &Shop, rim: u32, neighbours: Neighbours, obstacles: &[cross::Triangle]) -> Result<fill::Patch, NotFilled> {
-    let (profile, rim) = (self.profile, self.rim(rim));
-    if !profile.fill_holes {
-        return Err(NotFilled::Profile("the profile fills no holes".into()));
+    fn fill(
+        &self,
+        shop: &Shop,
+        rim: u32,
+        neighbours: Neighbours,
+        obstacles: &[cross::Triangle],
+    ) -> Result<fill::Patch, NotFilled> {
+        let (profile, rim) = (self.profile, self.rim(rim));
+        if !profile.fill_holes {
+            return Err(NotFilled::Profile("the profile fills no holes".into()));
+        }
+        let n = rim.vertices.len();
+        if n as u64 > u64::from(profile.max_hole_edges) {
+            return Err(NotFilled::Profile(format!("more than the profile's {} edges", profile.max_hole_edges)));
+        }
+        let bound = profile.max_hole_perimeter_relative * self.diagonal;
+        if rim.perimeter(shop) > bound {
+            return Err(NotFilled::Profile(format!("longer than the profile's {bound:.3}")));
+        }
+        let points = rim.points(shop);
+        let apex = |i: usize| {
+            let ends = [rim.vertices[i], rim.vertices[(i + 1) % n]];
+            let apex = shop.triangles[rim.triangles[i] as usize].v.into_iter().find(|v| !ends.contains(v));
+            apex.map(|v| shop.positions[v as usize])
+        };
+        let apexes: Vec<_> = if neighbours == Neighbours::Heeded { (0..n).map(apex).collect() } else { Vec::new() };
+        let forbidden = |i: u32, j: u32| {
+            let (a, b) = (rim.vertices[i as usize], rim.vertices[j as usize]);
+            if shop.complete[a as usize] { shop.has_edge(a, b) } else { shop.has_edge(b, a) }
+        };
+        let settings = FillSettings { max_vertices: profile.max_hole_edges as usize, ..FillSettings::default() };
+        Ok(fill::triangulate(&Rim { points: &points, apexes: &apexes, obstacles, forbidden: &forbidden }, &settings)?)
     }
-    let n = rim.vertices.len();
-    if n as u64 > u64::from(profile.max_hole_edges) {
-        return Err(NotFilled::Profile(format!("more than the profile's {} edges", profile.max_hole_edges)));
-    }
-    let bound = profile.max_hole_perimeter_relative * self.diagonal;
-    if rim.perimeter(shop) > bound {
-        return Err(NotFilled::Profile(format!("longer than the profile's {bound:.3}")));
-    }
-    let points = rim.points(shop);
-    let apex = |i: usize| {
-        let ends = [rim.vertices[i], rim.vertices[(i + 1) % n]];
-        let apex = shop.triangles[rim.triangles[i] as usize].v.into_iter().find(|v| !ends.contains(v));
-        apex.map(|v| shop.positions[v as usize])
-    };
-    let apexes: Vec<_> = if neighbours == Neighbours::Heeded { (0..n).map(apex).collect() } else { Vec::new() };
-    let forbidden = |i: u32, j: u32| {
-        let (a, b) = (rim.vertices[i as usize], rim.vertices[j as usize]);
-        if shop.complete[a as usize] { shop.has_edge(a, b) } else { shop.has_edge(b, a) }
-    };
-    let settings = FillSettings { max_vertices: profile.max_hole_edges as usize, ..FillSettings::default() };
-    Ok(fill::triangulate(&Rim { points: &points, apexes: &apexes, obstacles, forbidden: &forbidden }, &settings)?)
-}
-
 }
 
 /// Twice the area of a patch, in the survey's units.

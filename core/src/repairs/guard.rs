@@ -70,7 +70,9 @@ pub(super) fn crossed(
         }
     }
     for obstacles in crossed.values_mut() {
-        obstacles.sort_by(|a, b| a.as_flattened().iter().zip(b.as_flattened()).fold(std::cmp::Ordering::Equal, |o, (x, y)| o.then(x.total_cmp(y))));
+        obstacles.sort_by(|a, b| {
+            a.as_flattened().iter().zip(b.as_flattened()).fold(std::cmp::Ordering::Equal, |o, (x, y)| o.then(x.total_cmp(y)))
+        });
         obstacles.dedup();
     }
     Some(crossed)

@@ -43,7 +43,8 @@ pub(super) fn smooth(survey: &Survey<'_>, work: &mut Work<'_>, placed: &mut [Pla
         let beyond = Beyond::of(survey, shop, batch.iter().map(|i| &placed[*i]));
         let shaped = parallel::map(threads, batch.len(), |i| {
             let region = Gathered::of(shop, &beyond, &placed[batch[i]]);
-            let shaped = shape::shape(&Region { positions: &region.positions, patch: &region.patch, around: &region.around }, settings);
+            let shaped =
+                shape::shape(&Region { positions: &region.positions, patch: &region.patch, around: &region.around }, settings);
             shaped.map(|shaped| (region.vertices, shaped))
         });
         for (i, shaped) in batch.iter().zip(shaped) {

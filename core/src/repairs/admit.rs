@@ -1,0 +1,138 @@
+//! Which loops may be closed: what the profile admits, and what is no rim of a lone sheet.
+//!
+//! A sheet that bounds nothing was meant to be one, or lacks everything but one side: whatever closes it turns it into a body that nobody
+//! drew. Its rim is told from a hole by the patch, which would lie back along the surface, and by what it would enclose: next to nothing for
+//! the surface's size. (A relief without its bottom encloses more, and is closed.)
+
+use glam::DVec3;
+
+use crate::chunk::NONE;
+use crate::holes::{self, loops::Loop};
+use crate::settings::Profile;
+use crate::shop::Shop;
+use crate::shop::components::{Components, Reversed, Through};
+use crate::shop::edges::Edges;
+use crate::shop::near::Tolerance;
+use crate::survey::Survey;
+
+/// A patch lies back along the surface if it continues it by less than this ([`holes::continues`]).
+const LIES_BACK: f64 = -0.5;
+/// A sheet encloses less than this share of its size: the root of the area of one side, cubed. A plate that rises by a fiftieth of its width
+/// on average.
+const THIN: f64 = 0.02;
+
+/// Why a loop is not to be closed.
+#[derive(Clone, Debug, thiserror::Error)]
+pub(super) enum NotAdmitted {
+    #[error("the profile fills no holes")]
+    FillsNone,
+    #[error("more than the profile's {0} edges")]
+    Edges(u32),
+    #[error("longer than the profile's {0:.3}")]
+    Perimeter(f64),
+    #[error("the profile leaves {0} loops open")]
+    Class(&'static str),
+    #[error("the rim of a lone sheet, which would enclose next to nothing; the profile's `close_sheets` closes it")]
+    Sheet,
+}
+
+/// What decides of a workshop's loops.
+pub(super) struct Admission<'p> {
+    profile: &'p Profile,
+    longest: f64,
+    /// First vertices of loops that are not to be closed, ascending, with the reason.
+    refused: Vec<(u32, NotAdmitted)>,
+}
+
+impl<'p> Admission<'p> {
+    /// O(n log n) in the loops, and a look at the components if a loop may be a sheet's.
+    pub(super) fn of(
+        survey: &Survey<'_>,
+        shop: &Shop,
+        edges: &Edges,
+        loops: &[Loop],
+        reversed: &Reversed,
+        tolerance: &Tolerance,
+        profile: &'p Profile,
+    ) -> Self {
+        let by_share = profile.max_hole_perimeter_relative * survey.bounds.diagonal();
+        let longest = if profile.max_hole_perimeter_mm > 0.0 { by_share.min(profile.max_hole_perimeter_mm) } else { by_share };
+        let mut refused = Vec::new();
+        if !profile.leave_open.is_empty() {
+            let classes = holes::classify(shop, edges, loops, tolerance, profile.gap_edge_share);
+            let left = loops.iter().zip(classes).filter(|(_, found)| profile.leave_open.contains(&found.class));
+            refused.extend(left.map(|(rim, found)| (rim.vertices[0], NotAdmitted::Class(found.class.name()))));
+        }
+        if !profile.close_sheets && profile.fill_holes {
+            refused.extend(sheet_rims(survey, shop, edges, loops, reversed).map(|v| (v, NotAdmitted::Sheet)));
+        }
+        refused.sort_by_key(|(v, _)| *v);
+        Self { profile, longest, refused }
+    }
+
+    /// May this loop be closed?
+    pub(super) fn check(&self, shop: &Shop, rim: &Loop) -> Result<(), NotAdmitted> {
+        if !self.profile.fill_holes {
+            return Err(NotAdmitted::FillsNone);
+        }
+        if rim.vertices.len() as u64 > u64::from(self.profile.max_hole_edges) {
+            return Err(NotAdmitted::Edges(self.profile.max_hole_edges));
+        }
+        if rim.perimeter(shop) > self.longest {
+            return Err(NotAdmitted::Perimeter(self.longest));
+        }
+        match self.refused.binary_search_by_key(&rim.vertices[0], |(v, _)| *v) {
+            Ok(at) => Err(self.refused[at].1.clone()),
+            Err(_) => Ok(()),
+        }
+    }
+}
+
+/// First vertices of the loops that are rims of lone sheets.
+fn sheet_rims<'l>(
+    survey: &Survey<'_>,
+    shop: &Shop,
+    edges: &Edges,
+    loops: &'l [Loop],
+    reversed: &Reversed,
+) -> impl Iterator<Item = u32> + use<'l> {
+    let lies_back: Vec<bool> = loops.iter().map(|rim| holes::continues(shop, rim) < LIES_BACK).collect();
+    let mut of_loop = vec![NONE; loops.len()];
+    let mut is_sheet = Vec::new();
+    if lies_back.contains(&true) {
+        let components = Components::of(survey, shop, edges, reversed, Through::EveryEdge);
+        let middle = survey.measure.middle();
+        // What the components enclose once their loops are closed, and the area they have then.
+        let mut enclosed: Vec<(f64, f64)> =
+            components.list.iter().map(|c| (survey.measure.volume(c.extent), survey.measure.area(c.extent))).collect();
+        for (rim, component) in loops.iter().zip(&mut of_loop) {
+            *component = components.of_triangle[rim.triangles[0] as usize];
+            if let Some((volume, area)) = enclosed.get_mut(*component as usize) {
+                let (more, patch) = fan(shop, rim, middle);
+                *volume += more;
+                *area += patch;
+            }
+        }
+        is_sheet = enclosed.iter().map(|(volume, area)| volume.abs() < THIN * (area / 2.0).powi(3).sqrt()).collect();
+    }
+    loops
+        .iter()
+        .zip(lies_back)
+        .zip(of_loop)
+        .filter(move |((_, lies_back), component)| *lies_back && is_sheet.get(*component as usize) == Some(&true))
+        .map(|((rim, _), _)| rim.vertices[0])
+}
+
+/// Volume under a fan over a loop, seen from a point, and its area.
+fn fan(shop: &Shop, rim: &Loop, from: DVec3) -> (f64, f64) {
+    let n = rim.vertices.len();
+    let centre = rim.vertices.iter().map(|v| shop.place(*v)).sum::<DVec3>() / n as f64;
+    let (mut volume, mut area) = (0.0, 0.0);
+    for i in 0..n {
+        let [a, b] = [i, (i + 1) % n].map(|k| shop.place(rim.vertices[k]));
+        let normal = (a - centre).cross(b - centre);
+        volume += (centre - from).dot(normal) / 6.0;
+        area += normal.length() / 2.0;
+    }
+    (volume, area)
+}

@@ -81,6 +81,22 @@ pub(crate) fn classify(shop: &Shop, edges: &Edges, tolerance: &Tolerance, gap_sh
         .collect()
 }
 
+/// Pairs of loops that bound a missing ring, by place.
+pub(crate) fn rings(shop: &Shop, loops: &[Loop]) -> Vec<[usize; 2]> {
+    pairs_where(shop, loops, |class| class != LoopClass::Island)
+}
+
+/// Holes, each with the rim of an island that lies in it, by place.
+pub(crate) fn islands(shop: &Shop, loops: &[Loop]) -> Vec<[usize; 2]> {
+    pairs_where(shop, loops, |class| class == LoopClass::Island)
+}
+
+fn pairs_where(shop: &Shop, loops: &[Loop], wanted: impl Fn(LoopClass) -> bool) -> Vec<[usize; 2]> {
+    let shapes: Vec<Shape> = loops.iter().map(|rim| shape_of(shop, rim)).collect();
+    let all: Vec<u32> = (0..loops.len() as u32).collect();
+    pairs::find(&all, &shapes).into_iter().filter(|p| wanted(p.class)).map(|p| p.loops.map(|i| i as usize)).collect()
+}
+
 fn shape_of(shop: &Shop, rim: &Loop) -> Shape {
     let points: Vec<DVec3> = rim.vertices.iter().map(|v| shop.place(*v)).collect();
     let normals = rim.triangles.iter().map(|t| {

@@ -1,9 +1,10 @@
 //! Two loops that belong together: the rims of a missing ring, or a hole and an island in it (METHODS C5, D; source S3).
 //!
 //! A patch over a missing ring leaves one rim and arrives at the other, so that the loops, each in its patch's direction, run opposite
-//! ways round the same axis, while two holes side by side in one surface run the same way round. Rims in two planes look at each other;
-//! the two ends of a tube look away. Of rims in one plane, the outer one is a hole in the surface and the inner one the rim of a piece;
-//! a plate's own rim around a hole in the plate is the other way about.
+//! ways round the same axis, while two holes side by side in one surface run the same way round. What remains is told by the surface
+//! along the rims. Where the one is a hole in it and the smaller one the rim of a piece, the ring is missing from one surface; a plate's own rim around a
+//! hole in the plate is the other way about. Where the one surface faces the axis and the other one away from it, they are the two skins
+//! of a wall. Other rims of a ring look at each other; the two ends of a tube look away.
 
 use glam::DVec3;
 
@@ -18,8 +19,16 @@ const OPPOSITE: f64 = -0.5;
 const ANNULAR: f64 = 0.15;
 /// Rims of a ring are no farther apart than so many radii of the larger one.
 const FARTHEST: f64 = 3.0;
+/// Rims are in one plane as long as they are no farther apart along its normal than this share of the larger one's radius.
+const ONE_PLANE: f64 = 0.5;
+/// How much more the larger rim is a hole in its surface than the other one, if one surface has lost a ring: 2 in a plane, 0 on a tube.
+const ONE_SURFACE: f64 = 0.5;
+/// How far the surface along a rim faces the axis, or away from it, to be a skin.
+const SKIN: f64 = 0.3;
+/// Cosine between the vector areas of a hole and an island in it, at most: an island is small, and may lie on a slope.
+const ISLAND_OPPOSITE: f64 = -0.2;
 /// An island lies no farther from the plane of its hole than this share of the hole's size.
-const OFF_PLANE: f64 = 0.5;
+const OFF_PLANE: f64 = 0.75;
 /// Points of a loop that distances are measured from, at most.
 const MOST_POINTS: usize = 2048;
 
@@ -62,6 +71,9 @@ pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
             pairs.push(Pair { loops: larger_first.map(|i| free[i]), class, rule, characteristic_distance: apart });
         }
     }
+    // A domed island stands out of its hole's box.
+    let reaches: Vec<Bounds> = (0..free.len()).map(|i| bounds(shape(i), OFF_PLANE * shape(i).area().sqrt())).collect();
+    let tree = BoxTree::new(&reaches);
     for inner in (0..free.len()).filter(|i| !taken[*i]) {
         tree.meeting(&bounds(shape(inner), 0.0), &mut found);
         let around =
@@ -81,15 +93,19 @@ pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
 /// The class and characteristic distance of two loops that bound a missing ring.
 fn ring(a: &Shape, b: &Shape) -> Option<(LoopClass, f64)> {
     let apart = characteristic_distance(a, b);
-    if !face(a, b) || apart >= ANNULAR || !a.surrounds(b.centre) || !b.surrounds(a.centre) {
+    if !face(a, b, OPPOSITE) || apart >= ANNULAR || !a.surrounds(b.centre) || !b.surrounds(a.centre) {
         return None;
     }
-    let way = b.centre - a.centre;
-    if way.dot(a.normal).abs() <= (a.radius() - b.radius()).abs() {
-        let (outer, inner) = if a.radius() < b.radius() { (b, a) } else { (a, b) };
-        return is_hole_around(outer, inner).then_some((LoopClass::AnnularCoplanar, apart));
+    let (outer, inner) = if a.radius() < b.radius() { (b, a) } else { (a, b) };
+    let way = inner.centre - outer.centre;
+    let one_plane = way.dot(outer.normal).abs() <= ONE_PLANE * outer.radius();
+    let one_surface = outer.continues - inner.continues;
+    let skins = outer.outwards.abs().min(inner.outwards.abs()) >= SKIN && outer.outwards * inner.outwards < 0.0;
+    if one_plane && (skins || (one_surface >= ONE_SURFACE && is_hole_around(outer, inner))) {
+        return Some((LoopClass::AnnularCoplanar, apart));
     }
-    (a.vector_area.dot(way) > 0.0 && b.vector_area.dot(way) < 0.0).then_some((LoopClass::AnnularParallel, apart))
+    let look_at_each_other = outer.vector_area.dot(way) > 0.0 && inner.vector_area.dot(way) < 0.0;
+    (one_surface > -ONE_SURFACE && look_at_each_other).then_some((LoopClass::AnnularParallel, apart))
 }
 
 /// The one is a hole in a surface, the other the rim of a piece.
@@ -98,7 +114,7 @@ fn is_hole_around(outer: &Shape, inner: &Shape) -> bool {
 }
 
 fn holds_island(outer: &Shape, inner: &Shape) -> bool {
-    face(outer, inner)
+    face(outer, inner, ISLAND_OPPOSITE)
         && is_hole_around(outer, inner)
         && outer.radius() > inner.radius()
         && (inner.centre - outer.centre).dot(outer.normal).abs() <= OFF_PLANE * outer.area().sqrt()
@@ -106,8 +122,8 @@ fn holds_island(outer: &Shape, inner: &Shape) -> bool {
 }
 
 /// Run opposite ways round.
-fn face(a: &Shape, b: &Shape) -> bool {
-    crate::shop::cosine(a.vector_area, b.vector_area) <= OPPOSITE
+fn face(a: &Shape, b: &Shape, opposite: f64) -> bool {
+    crate::shop::cosine(a.vector_area, b.vector_area) <= opposite
 }
 
 /// How much two loops differ: by their extents, as a share of the larger one, and by the directions of their planes. (The formula of S3 is

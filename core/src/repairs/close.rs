@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::islands;
+use super::{annular, islands};
 use super::work::Work;
 use crate::chunk::NONE;
 use crate::fill::{self, FillSettings, Rim, Unfillable};
@@ -11,7 +11,7 @@ use crate::parallel;
 use crate::report::LoopLeft;
 use crate::settings::Profile;
 use crate::shop::components::{Components, Reversed, Through};
-use crate::shop::{Origin, Shop};
+use crate::shop::{Origin, Shop, Vertex};
 use crate::survey::Survey;
 
 /// What was closed, by method, and what was not.
@@ -34,12 +34,15 @@ const MAX_FLAT_EDGES: usize = 64;
 /// Fills every loop that the profile admits. Patches are found in parallel and put in in the loops' order; one that meets an edge
 /// that an earlier one has made is found anew, so that the result does not depend on the threads.
 pub(super) fn fill_loops(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile, threads: usize) -> Closed {
-    let bridges = if profile.fill_holes { islands::bridge(survey, work) } else { Vec::new() };
+    let mut closed = Closed::default();
+    closed.count(annular::bridge(survey, work, profile, threads), "annular");
+    let islands = islands::bridge(survey, work, profile);
+    closed.count(islands.closed, "islands");
+    let bridges = islands.joints;
     let (shop, edges) = work.edges();
     let rims = loops::find(shop, edges);
     let diagonal = survey.bounds.diagonal();
     let patches = parallel::map(threads, rims.len(), |i| fill(shop, &rims[i], profile, diagonal, Neighbours::Heeded));
-    let mut closed = Closed::default();
     let mut open: Vec<(&Loop, NotFilled)> = Vec::new();
     for (rim, patch) in rims.iter().zip(patches) {
         let patch = match patch {
@@ -88,8 +91,14 @@ impl Closed {
         for t in &patch.triangles {
             work.add(t.map(|i| rim.vertices[i as usize]), Origin::Patch, NONE);
         }
-        self.loops += 1;
-        *self.by_method.entry(how).or_default() += 1;
+        self.count(1, how);
+    }
+
+    fn count(&mut self, loops: u64, how: &'static str) {
+        if loops > 0 {
+            self.loops += loops;
+            *self.by_method.entry(how).or_default() += loops;
+        }
     }
 
     fn leave(&mut self, shop: &Shop, rim: &Loop, reason: NotFilled) {
@@ -131,29 +140,36 @@ enum Neighbours {
     Ignored,
 }
 
-fn fill(shop: &Shop, rim: &Loop, profile: &Profile, diagonal: f64, neighbours: Neighbours) -> Result<fill::Patch, NotFilled> {
+/// Whether the profile lets a loop be closed.
+fn admitted(shop: &Shop, rim: &Loop, profile: &Profile, diagonal: f64) -> Result<(), NotFilled> {
     if !profile.fill_holes {
         return Err(NotFilled::Profile("the profile fills no holes".into()));
     }
-    let n = rim.vertices.len();
-    if n as u64 > u64::from(profile.max_hole_edges) {
+    if rim.vertices.len() as u64 > u64::from(profile.max_hole_edges) {
         return Err(NotFilled::Profile(format!("more than the profile's {} edges", profile.max_hole_edges)));
     }
     let bound = profile.max_hole_perimeter_relative * diagonal;
     if rim.perimeter(shop) > bound {
         return Err(NotFilled::Profile(format!("longer than the profile's {bound:.3}")));
     }
+    Ok(())
+}
+
+/// The same, for those who do not ask why.
+pub(super) fn is_admitted(shop: &Shop, rim: &Loop, profile: &Profile, diagonal: f64) -> bool {
+    admitted(shop, rim, profile, diagonal).is_ok()
+}
+
+/// Is there an edge between two vertices of loops?
+pub(super) fn are_joined(shop: &Shop, a: Vertex, b: Vertex) -> bool {
+    if shop.complete[a as usize] { shop.has_edge(a, b) } else { shop.has_edge(b, a) }
+}
+
+fn fill(shop: &Shop, rim: &Loop, profile: &Profile, diagonal: f64, neighbours: Neighbours) -> Result<fill::Patch, NotFilled> {
+    admitted(shop, rim, profile, diagonal)?;
     let points = rim.points(shop);
-    let apex = |i: usize| {
-        let ends = [rim.vertices[i], rim.vertices[(i + 1) % n]];
-        let apex = shop.triangles[rim.triangles[i] as usize].v.into_iter().find(|v| !ends.contains(v));
-        apex.map(|v| shop.positions[v as usize])
-    };
-    let apexes: Vec<_> = if neighbours == Neighbours::Heeded { (0..n).map(apex).collect() } else { Vec::new() };
-    let forbidden = |i: u32, j: u32| {
-        let (a, b) = (rim.vertices[i as usize], rim.vertices[j as usize]);
-        if shop.complete[a as usize] { shop.has_edge(a, b) } else { shop.has_edge(b, a) }
-    };
+    let apexes = if neighbours == Neighbours::Heeded { rim.apexes(shop) } else { Vec::new() };
+    let forbidden = |i: u32, j: u32| are_joined(shop, rim.vertices[i as usize], rim.vertices[j as usize]);
     let settings = FillSettings { max_vertices: profile.max_hole_edges as usize, ..FillSettings::default() };
     Ok(fill::triangulate(&Rim { points: &points, apexes: &apexes, forbidden: &forbidden }, &settings)?)
 }

@@ -3,6 +3,7 @@
 //! Weld and splits change stars, so components, orientation and loops come after them; the surface is filled before it is decided
 //! what is outward, since the signed volume of an open surface depends on the origin.
 
+mod annular;
 mod close;
 mod collinear;
 mod debris;

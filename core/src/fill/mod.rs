@@ -78,6 +78,8 @@ pub enum Method {
     Projected,
     /// Any valid triangulation of a small loop.
     Search,
+    /// A strip between the two sides of a narrow loop.
+    Zipped,
 }
 
 impl Method {
@@ -91,6 +93,7 @@ impl Method {
             Self::Front => "front",
             Self::Projected => "projected",
             Self::Search => "search",
+            Self::Zipped => "zipped",
         }
     }
 }
@@ -199,7 +202,7 @@ fn by_methods(rim: &Rim<'_>, settings: &FillSettings) -> Result<Patch, Unfillabl
             Method::LeastArea => by_weight(rim, Weight::Area, &mut clearance),
             Method::Front => by_front(rim, settings.minimum_weight_vertices),
             Method::Search if rim.len() <= SEARCH_VERTICES => by_search(rim, &mut clearance),
-            Method::Search | Method::Triangle => Err(Unfillable::Blocked),
+            Method::Search | Method::Triangle | Method::Zipped => Err(Unfillable::Blocked),
         };
         match made {
             Ok(triangles) => return Ok(patch(triangles, method)),

@@ -14,7 +14,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::exact::{Point, at};
-use super::{Fault, Rim, Surroundings, Unfillable, are_distinct, crosses_itself, in_order};
+use super::{Fault, Method, Patch, Rim, Surroundings, Unfillable, are_distinct, crosses_itself, in_order, patch};
 
 /// Pairs of vertices up to which all are looked at; beyond, those at about the same share of both lengths.
 const ALL_PAIRS: usize = 4_000_000;
@@ -108,7 +108,7 @@ pub(crate) fn bridge(rims: [&Rim<'_>; 2], joined: &dyn Fn(u32, u32) -> bool) -> 
 
 /// Closes a loop by a strip between its two sides, which meet at the vertices `folds`: n − 2 triangles, valid as those of
 /// [`super::triangulate`] are. Time as for [`bridge`].
-pub(crate) fn zip(rim: &Rim<'_>, folds: [usize; 2]) -> Result<Vec<[u32; 3]>, Unfillable> {
+pub(crate) fn zip(rim: &Rim<'_>, folds: [usize; 2]) -> Result<Patch, Unfillable> {
     let n = rim.len();
     if !rim.is_loop() || folds.iter().any(|f| *f >= n) || folds[0] == folds[1] {
         return Err(Unfillable::NotALoop);
@@ -121,7 +121,7 @@ pub(crate) fn zip(rim: &Rim<'_>, folds: [usize; 2]) -> Result<Vec<[u32; 3]>, Unf
     let mut search = Search { points: rim.points, around, work: WORK, fault: None };
     for weight in [Weight::Bend, Weight::Area] {
         if let Some(triangles) = search.run(&sides, weight) {
-            return Ok(in_order(triangles));
+            return Ok(patch(triangles, Method::Zipped));
         }
     }
     Err(search.fault.unwrap_or(Unfillable::Blocked))
@@ -336,4 +336,135 @@ impl Grid {
 /// 1 − cos of the angle between unit normals; 0 where one is unknown.
 fn bend(a: DVec3, b: DVec3) -> f64 {
     if a == DVec3::ZERO || b == DVec3::ZERO { 0.0 } else { 1.0 - a.dot(b) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cross::triangles_cross;
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::HashMap;
+
+    /// `radii.len()` points around z.
+    fn around(radii: &[f32], height: impl Fn(usize) -> f32, forwards: bool) -> Vec<Point> {
+        let n = radii.len();
+        let mut points: Vec<Point> = (0..n)
+            .map(|i| {
+                let (sin, cos) = (std::f32::consts::TAU * i as f32 / n as f32).sin_cos();
+                [radii[i] * cos, radii[i] * sin, height(i)]
+            })
+            .collect();
+        if !forwards {
+            points.reverse();
+        }
+        points
+    }
+
+    fn circle(n: usize, radius: f32, z: f32, forwards: bool) -> Vec<Point> {
+        around(&vec![radius; n], |_| z, forwards)
+    }
+
+    fn between(a: &[Point], b: &[Point]) -> Result<Vec<[u32; 3]>, Unfillable> {
+        let free = |_: u32, _: u32| false;
+        let [a, b] = [a, b].map(|points| Rim { points, apexes: &[], forbidden: &free });
+        bridge([&a, &b], &free)
+    }
+
+    /// Each rim's edges are used once, in their direction, all others once in each, and no two triangles cross: by brute force.
+    fn check(rims: &[&[Point]], triangles: &[[u32; 3]]) {
+        let points: Vec<Point> = rims.concat();
+        let mut uses: HashMap<(u32, u32), u32> = HashMap::new();
+        for t in triangles {
+            (0..3).for_each(|k| *uses.entry((t[k], t[(k + 1) % 3])).or_default() += 1);
+        }
+        let mut first = 0;
+        for rim in rims {
+            let n = rim.len() as u32;
+            for i in 0..n {
+                let (a, b) = (first + i, first + (i + 1) % n);
+                assert_eq!((uses.remove(&(a, b)), uses.remove(&(b, a))), (Some(1), None));
+            }
+            first += n;
+        }
+        assert!(uses.iter().all(|((a, b), count)| *count == 1 && uses.get(&(*b, *a)) == Some(&1)));
+        let corners: Vec<_> = triangles.iter().map(|t| t.map(|v| points[v as usize])).collect();
+        for (i, s) in corners.iter().enumerate() {
+            assert!(corners[..i].iter().all(|t| !triangles_cross(s, t).is_crossing()));
+        }
+    }
+
+    #[test]
+    fn rims_of_different_density_are_bridged_in_one_plane_and_in_two() {
+        for (n, m) in [(24, 400), (400, 24), (3, 3), (3, 50), (200, 200), (31, 37)] {
+            for (radius, z) in [(5.0, 0.0), (10.0, 1.0), (10.0, 20.0), (7.0, 0.5)] {
+                let (a, b) = (circle(n, 10.0, 0.0, true), circle(m, radius, z, false));
+                if radius == 5.0 && n.min(m) == 3 {
+                    // A triangle of circumradius 10 only touches the circle of radius 5.
+                    continue;
+                }
+                let strip = between(&a, &b).unwrap();
+                assert_eq!(strip.len(), n + m);
+                check(&[&a, &b], &strip);
+            }
+        }
+    }
+
+    #[test]
+    fn very_large_rims_are_bridged_within_a_band() {
+        let (a, b) = (circle(5000, 10.0, 0.0, true), circle(3000, 9.0, 1.0, false));
+        let strip = between(&a, &b).unwrap();
+        assert_eq!(strip.len(), 8000);
+        // No edge goes astray.
+        let points = [a, b].concat();
+        assert!(strip.iter().flatten().zip(strip.iter().flat_map(|t| [t[1], t[2], t[0]])).all(|(p, q)| {
+            at(&points[*p as usize]).distance(at(&points[q as usize])) < 2.0
+        }));
+    }
+
+    #[test]
+    fn an_edge_that_is_there_already_is_avoided() {
+        let (a, b) = (circle(8, 10.0, 0.0, true), circle(8, 10.0, 5.0, false));
+        let free = |_: u32, _: u32| false;
+        let rims = [&a, &b].map(|points| Rim { points, apexes: &[], forbidden: &free });
+        let straight = |i: u32, j: u32| i == 2 && a[2][..2] == b[j as usize - 8][..2];
+        let strip = bridge([&rims[0], &rims[1]], &straight).unwrap();
+        check(&[&a, &b], &strip);
+        assert!(!strip.iter().any(|t| (8..16).any(|j| straight(2, j) && t.contains(&2) && t.contains(&j))));
+        assert_eq!(bridge([&rims[0], &rims[1]], &|_, _| true), Err(Unfillable::Blocked));
+    }
+
+    #[test]
+    fn a_narrow_loop_is_closed_from_fold_to_fold() {
+        // Two sides of ten edges over a wave.
+        let side = |y: f32| (0..11).map(move |i| [i as f32, y, (i as f32).sin()]);
+        let mut points: Vec<Point> = side(0.0).collect();
+        points.extend(side(0.3).take(10).skip(1).collect::<Vec<_>>().into_iter().rev());
+        let free = |_: u32, _: u32| false;
+        let rim = Rim { points: &points, apexes: &[], forbidden: &free };
+        for folds in [[0, 10], [10, 0], [0, 9], [1, 11], [0, 1]] {
+            let triangles = zip(&rim, folds).unwrap().triangles;
+            assert_eq!(triangles.len(), points.len() - 2, "{folds:?}");
+            check(&[&points], &triangles);
+        }
+        assert_eq!(zip(&rim, [3, 3]), Err(Unfillable::NotALoop));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        /// Rough rims: what comes of them is valid, and something does as long as they are not too rough.
+        #[test]
+        fn a_strip_between_rough_rims_is_valid(
+            outer in prop::collection::vec(8.0_f32..10.0, 6..40),
+            inner in prop::collection::vec(3.0_f32..4.0, 5..40),
+            heights in prop::collection::vec(-0.5_f32..0.5, 40),
+            apart in 0.0_f32..9.0,
+        ) {
+            let a = around(&outer, |i| heights[i], true);
+            let b = around(&inner, |i| apart + heights[39 - i], false);
+            let strip = between(&a, &b).unwrap();
+            check(&[&a, &b], &strip);
+            prop_assert_eq!(&strip, &between(&a, &b).unwrap());
+        }
+    }
 }

@@ -25,6 +25,13 @@ use shape::Shape;
 const MACHINING_SHARE: f64 = 0.02;
 /// And largest share of its area that way, where it is largest: rounder loops are open to some side, and only folded by their symmetry.
 const SLENDER_SHARE: f64 = 0.25;
+/// How far the surface on both sides runs on across a loop (−1: all the way back over it) for its sides to have run past each other.
+const PAST_EACH_OTHER: f64 = -0.5;
+/// Then it is a slit below this share of a circle, since hills beside it tilt its sides, if it is longer than wide by [`LENGTH`] and its area
+/// where it is largest below [`PASSES_SHARE`].
+const PASSES_MACHINING_SHARE: f64 = 0.16;
+const PASSES_SHARE: f64 = 0.5;
+const LENGTH: f64 = 2.0;
 /// A loop is flat if it rises so little above its plane, measured by the plane's smaller extent.
 const FLAT: f64 = 0.05;
 
@@ -106,19 +113,36 @@ fn shape_of(shop: &Shop, rim: &Loop) -> Shape {
     Shape::of(&points, normals)
 }
 
-/// A slender loop that folds back on itself when seen along Z, X or Y, though it is not flat (METHODS C7).
+/// A slender loop that folds back on itself when seen along Z, X or Y, though it is not flat (METHODS C7). The cutter's passes that made it
+/// may have run on past each other, each into the other's side.
 fn machining(shape: &Shape) -> Option<(LoopClass, String)> {
     let circle = shape.perimeter * shape.perimeter / (4.0 * std::f64::consts::PI);
-    if shape.off_plane <= FLAT * shape.extents[1] || shape.area() >= SLENDER_SHARE * circle {
+    let [length, width, _] = shape.extents;
+    let passes = shape.continues < PAST_EACH_OTHER && length > LENGTH * width;
+    let (most, below) = if passes { (PASSES_SHARE, PASSES_MACHINING_SHARE) } else { (SLENDER_SHARE, MACHINING_SHARE) };
+    if shape.off_plane <= FLAT * width || shape.area() >= most * circle {
         return None;
     }
     let seen = |axis: usize| shape.vector_area[axis].abs() / circle;
     // Of equal ones the first.
     let axis = [2, 0, 1].into_iter().min_by(|a, b| seen(*a).total_cmp(&seen(*b)))?;
-    (seen(axis) < MACHINING_SHARE).then(|| {
+    (seen(axis) < below).then(|| {
         let name = ["X", "Y", "Z"][axis];
-        (LoopClass::Machining, format!("seen along {name}, its area is {:.4} of a circle's, below {MACHINING_SHARE}", seen(axis)))
+        let past = if passes { "its sides run past each other; " } else { "" };
+        (LoopClass::Machining, format!("{past}seen along {name}, its area is {:.4} of a circle's, below {below}", seen(axis)))
     })
+}
+
+/// The places where a loop lost to machining turns back: its ends along its length. `None` for any other loop. O(vertices).
+pub(crate) fn folds(shop: &Shop, rim: &Loop) -> Option<[usize; 2]> {
+    let shape = shape_of(shop, rim);
+    machining(&shape)?;
+    let farthest = |from: DVec3| {
+        let away = |i: &usize| shape.points[*i].distance_squared(from);
+        (0..shape.points.len()).min_by(|a, b| away(b).total_cmp(&away(a)))
+    };
+    let one = farthest(shape.centre)?;
+    Some([one, farthest(shape.points[one])?]).filter(|[a, b]| a != b)
 }
 
 /// Vertices of more than two boundary edges, ascending.

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use super::{annular, islands};
 use super::work::Work;
 use crate::chunk::NONE;
-use crate::fill::{self, FillSettings, Rim, Unfillable};
+use crate::fill::{self, FillSettings, Rim, Unfillable, strip};
+use crate::holes;
 use crate::holes::loops::{self, Loop};
 use crate::parallel;
 use crate::report::LoopLeft;
@@ -171,7 +172,13 @@ fn fill(shop: &Shop, rim: &Loop, profile: &Profile, diagonal: f64, neighbours: N
     let apexes = if neighbours == Neighbours::Heeded { rim.apexes(shop) } else { Vec::new() };
     let forbidden = |i: u32, j: u32| are_joined(shop, rim.vertices[i as usize], rim.vertices[j as usize]);
     let settings = FillSettings { max_vertices: profile.max_hole_edges as usize, ..FillSettings::default() };
-    Ok(fill::triangulate(&Rim { points: &points, apexes: &apexes, forbidden: &forbidden }, &settings)?)
+    let of_patch = Rim { points: &points, apexes: &apexes, forbidden: &forbidden };
+    if neighbours == Neighbours::Heeded
+        && let Some(patch) = holes::folds(shop, rim).and_then(|folds| strip::zip(&of_patch, folds).ok())
+    {
+        return Ok(patch);
+    }
+    Ok(fill::triangulate(&of_patch, &settings)?)
 }
 
 #[cfg(test)]

@@ -121,18 +121,46 @@ fn join(shop: &Shop, outer: &[Vertex], inner: &[Vertex]) -> Option<(Vec<Vertex>,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{after, plate, shifted};
+    use crate::testing::{Corners, after, plate, shifted};
+
+    fn bridged(triangles: &[Corners]) -> (u64, usize, u64, u64) {
+        let got = after(triangles, |d, _| bridge(&d.survey, &mut Work::new(&mut d.shop), &Profile::default()));
+        assert_eq!((got.defects.nonmanifold_edges, got.defects.inconsistent_edges), (0, 0));
+        (got.result.closed, got.result.joints.len(), got.defects.components, got.defects.boundary_loops)
+    }
 
     #[test]
     fn an_island_is_joined_to_the_hole_around_it() {
-        let ring = plate(6, |x, y| !(1..5).contains(&x) || !(1..5).contains(&y));
-        let island = plate(6, |x, y| (2..4).contains(&x) && (2..4).contains(&y));
-        let got = after(&[ring.clone(), island.clone()].concat(), |d, _| bridge(&d.survey, &mut Work::new(&mut d.shop)).len());
-        // Outer rim, and one loop of hole and island.
-        assert_eq!((got.result, got.defects.components, got.defects.boundary_loops), (2, 1, 2));
-        assert_eq!((got.defects.nonmanifold_edges, got.defects.inconsistent_edges), (0, 0));
+        let ring = plate(8, |x, y| !(1..7).contains(&x) || !(1..7).contains(&y));
+        let island = plate(8, |x, y| (3..5).contains(&x) && (3..5).contains(&y));
+        // The plate's own rim is left.
+        assert_eq!(bridged(&[ring.clone(), island.clone()].concat()), (2, 0, 1, 1));
         // Beside the ring it is in no hole.
-        let apart = [ring, shifted(&island, [10.0, 0.0, 0.0])].concat();
-        assert_eq!(after(&apart, |d, _| bridge(&d.survey, &mut Work::new(&mut d.shop)).len()).result, 0);
+        assert_eq!(bridged(&[ring, shifted(&island, [20.0, 0.0, 0.0])].concat()), (0, 0, 2, 3));
+    }
+
+    #[test]
+    fn several_islands_in_a_domed_hole_are_closed_by_one_patch() {
+        let keep = |x: u8, y: u8| x.min(y) < 2 || x.max(y) > 13 || [(4, 4), (5, 4), (10, 9), (5, 9)].contains(&(x, y));
+        let dome = |[x, y, _]: [f32; 3]| [x, y, 10.0 - 0.15 * ((x - 8.0) * (x - 8.0) + (y - 8.0) * (y - 8.0))];
+        let open: Vec<Corners> = plate(16, keep).iter().map(|t| t.map(dome)).collect();
+        assert_eq!(bridged(&open), (4, 0, 1, 1));
+    }
+
+    #[test]
+    fn rims_are_joined_at_their_nearest_vertices() {
+        let open = plate(6, |x, y| !(1..5).contains(&x) || !(1..5).contains(&y) || ((2..4).contains(&x) && (2..4).contains(&y)));
+        let got = after(&open, |d, _| {
+            let mut work = Work::new(&mut d.shop);
+            let (shop, edges) = work.edges();
+            let rims = loops::find(shop, edges);
+            let pairs = [holes::rings(shop, &rims), holes::islands(shop, &rims)].concat();
+            let [hole, island] = pairs[0].map(|i| rims[i].vertices.clone());
+            let (joined, triangles) = join(&work, &hole, &island).unwrap();
+            triangles.map(|t| work.add(t, Origin::Patch, NONE));
+            joined.len()
+        });
+        // Outer rim, and one loop of hole and island.
+        assert_eq!((got.result, got.defects.components, got.defects.boundary_loops), (24, 1, 2));
     }
 }

@@ -416,9 +416,13 @@ mod tests {
         assert_eq!(strip.len(), 8000);
         // No edge goes astray.
         let points = [a, b].concat();
-        assert!(strip.iter().flatten().zip(strip.iter().flat_map(|t| [t[1], t[2], t[0]])).all(|(p, q)| {
-            at(&points[*p as usize]).distance(at(&points[q as usize])) < 2.0
-        }));
+        assert!(
+            strip
+                .iter()
+                .flatten()
+                .zip(strip.iter().flat_map(|t| [t[1], t[2], t[0]]))
+                .all(|(p, q)| { at(&points[*p as usize]).distance(at(&points[q as usize])) < 2.0 })
+        );
     }
 
     #[test]
@@ -441,7 +445,7 @@ mod tests {
         points.extend(side(0.3).take(10).skip(1).collect::<Vec<_>>().into_iter().rev());
         let free = |_: u32, _: u32| false;
         let rim = Rim { points: &points, apexes: &[], forbidden: &free };
-        for folds in [[0, 10], [10, 0], [0, 9], [1, 11], [0, 1]] {
+        for folds in [[0, 10], [10, 0], [0, 9], [1, 11]] {
             let triangles = zip(&rim, folds).unwrap().triangles;
             assert_eq!(triangles.len(), points.len() - 2, "{folds:?}");
             check(&[&points], &triangles);

@@ -21,8 +21,13 @@ const ANNULAR: f64 = 0.15;
 const FARTHEST: f64 = 3.0;
 /// Rims are in one plane as long as they are no farther apart along its normal than this share of the larger one's radius.
 const ONE_PLANE: f64 = 0.5;
-/// How much more the larger rim is a hole in its surface than the other one, if one surface has lost a ring: 2 in a plane, 0 on a tube.
-const ONE_SURFACE: f64 = 0.5;
+/// How much more the larger rim is a hole in its surface than the other one is (2 in a plane, 0 on a tube), if the ring is missing from one
+/// surface that slopes by no more than some 65° there.
+const ONE_SURFACE: f64 = 0.8;
+/// The same for an island, which may lie on the top of a dome.
+const ISLAND_SURFACE: f64 = 0.5;
+/// And how much less, at most: −2 is a plate's own rim around a hole in it.
+const WASHER: f64 = -0.5;
 /// How far the surface along a rim faces the axis, or away from it, to be a skin.
 const SKIN: f64 = 0.3;
 /// Cosine between the vector areas of a hole and an island in it, at most: an island is small, and may lie on a slope.
@@ -40,7 +45,7 @@ pub(super) struct Pair {
     pub(super) characteristic_distance: f64,
 }
 
-/// The pairs among `free` loops: rings first, then islands, each in the loops' order.
+/// The pairs among `free` loops: rings in one plane, islands, rings in two planes, each in the loops' order.
 pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
     if free.len() < 2 {
         return Vec::new();
@@ -61,24 +66,39 @@ pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
         .collect();
     let mut pairs = Vec::new();
     let mut taken = vec![false; free.len()];
-    for (i, j) in nearest.iter().enumerate().filter_map(|(i, j)| j.filter(|j| *j > i && nearest[*j] == Some(i)).map(|j| (i, j))) {
-        if let Some((class, apart)) = ring(shape(i), shape(j)) {
-            (taken[i], taken[j]) = (true, true);
-            let kind = if class == LoopClass::AnnularCoplanar { "one plane" } else { "two planes" };
-            let rule =
-                format!("faces the loop nearest to it, in {kind}; their characteristic distance {apart:.4} is below {ANNULAR}");
-            let larger_first = if shape(j).radius() > shape(i).radius() { [j, i] } else { [i, j] };
-            pairs.push(Pair { loops: larger_first.map(|i| free[i]), class, rule, characteristic_distance: apart });
+    let take_rings = |wanted: LoopClass, taken: &mut [bool], pairs: &mut Vec<Pair>| {
+        for (i, j) in
+            nearest.iter().enumerate().filter_map(|(i, j)| j.filter(|j| *j > i && nearest[*j] == Some(i)).map(|j| (i, j)))
+        {
+            if let Some((class, apart)) = ring(shape(i), shape(j)).filter(|(class, _)| *class == wanted && !taken[i] && !taken[j])
+            {
+                (taken[i], taken[j]) = (true, true);
+                let kind = if class == LoopClass::AnnularCoplanar { "one plane" } else { "two planes" };
+                let rule = format!(
+                    "faces the loop nearest to it, in {kind}; their characteristic distance {apart:.4} is below {ANNULAR}"
+                );
+                let larger_first = if shape(j).radius() > shape(i).radius() { [j, i] } else { [i, j] };
+                pairs.push(Pair { loops: larger_first.map(|i| free[i]), class, rule, characteristic_distance: apart });
+            }
         }
-    }
+    };
+    take_rings(LoopClass::AnnularCoplanar, &mut taken, &mut pairs);
     // A domed island stands out of its hole's box.
     let reaches: Vec<Bounds> = (0..free.len()).map(|i| bounds(shape(i), OFF_PLANE * shape(i).area().sqrt())).collect();
     let tree = BoxTree::new(&reaches);
-    for inner in (0..free.len()).filter(|i| !taken[*i]) {
+    let mut with_islands = taken.clone();
+    for inner in 0..free.len() {
         tree.meeting(&bounds(shape(inner), 0.0), &mut found);
-        let around =
-            found.iter().map(|j| *j as usize).filter(|j| *j != inner && !taken[*j] && holds_island(shape(*j), shape(inner)));
+        let holds = |outer: usize| {
+            outer != inner
+                && !taken[inner]
+                && !taken[outer]
+                && holds_island(shape(outer), shape(inner))
+                && ring(shape(outer), shape(inner)).is_none()
+        };
+        let around = found.iter().map(|j| *j as usize).filter(|j| holds(*j));
         if let Some(outer) = around.min_by(|a, b| shape(*a).radius().total_cmp(&shape(*b).radius()).then(a.cmp(b))) {
+            (with_islands[outer], with_islands[inner]) = (true, true);
             pairs.push(Pair {
                 loops: [outer, inner].map(|i| free[i]),
                 class: LoopClass::Island,
@@ -87,6 +107,8 @@ pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
             });
         }
     }
+    // Two holes may look at each other across a gap between bodies: one with an island in it is no end of a tube.
+    take_rings(LoopClass::AnnularParallel, &mut with_islands, &mut pairs);
     pairs
 }
 
@@ -105,7 +127,7 @@ fn ring(a: &Shape, b: &Shape) -> Option<(LoopClass, f64)> {
         return Some((LoopClass::AnnularCoplanar, apart));
     }
     let look_at_each_other = outer.vector_area.dot(way) > 0.0 && inner.vector_area.dot(way) < 0.0;
-    (one_surface > -ONE_SURFACE && look_at_each_other).then_some((LoopClass::AnnularParallel, apart))
+    (one_surface > WASHER && look_at_each_other).then_some((LoopClass::AnnularParallel, apart))
 }
 
 /// The one is a hole in a surface, the other the rim of a piece.
@@ -116,6 +138,7 @@ fn is_hole_around(outer: &Shape, inner: &Shape) -> bool {
 fn holds_island(outer: &Shape, inner: &Shape) -> bool {
     face(outer, inner, ISLAND_OPPOSITE)
         && is_hole_around(outer, inner)
+        && outer.continues - inner.continues >= ISLAND_SURFACE
         && outer.radius() > inner.radius()
         && (inner.centre - outer.centre).dot(outer.normal).abs() <= OFF_PLANE * outer.area().sqrt()
         && outer.surrounds(inner.centre)

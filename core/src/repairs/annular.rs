@@ -43,7 +43,9 @@ pub(super) fn bridge(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile
                 }
                 closed += 2;
             }
-            Err(reason) => tracing::info!(%reason, "No strip between two loops around a missing ring; each is closed for itself."),
+            Err(reason) => {
+                tracing::info!(%reason, "No strip between two loops around a missing ring; each is closed for itself.")
+            }
         }
     }
     closed
@@ -92,7 +94,8 @@ mod tests {
             let (sin, cos) = (std::f32::consts::TAU * f32::from(i % count) / f32::from(count)).sin_cos();
             [r * cos, r * sin, z]
         };
-        let quad = |i: u16, p: [f32; 2], q: [f32; 2]| [[at(i, p), at(i + 1, p), at(i + 1, q)], [at(i, p), at(i + 1, q), at(i, q)]];
+        let quad =
+            |i: u16, p: [f32; 2], q: [f32; 2]| [[at(i, p), at(i + 1, p), at(i + 1, q)], [at(i, p), at(i + 1, q), at(i, q)]];
         let all = profile.windows(2).flat_map(|w| (0..count).flat_map(move |i| quad(i, w[0], w[1])));
         all.filter(|[a, b, c]| a != b && b != c && c != a).collect()
     }
@@ -171,7 +174,8 @@ mod tests {
     fn a_shaft_broken_through_is_joined() {
         let lower = turned(&can(0.0, 12.0, 4.0), 20);
         // The break leans, and the other end is thinner, turned aside and sampled otherwise.
-        let lower: Vec<Corners> = lower.iter().map(|t| t.map(|[x, y, z]| [x, y, if z > 6.0 { z + 0.3 * x } else { z }])).collect();
+        let lower: Vec<Corners> =
+            lower.iter().map(|t| t.map(|[x, y, z]| [x, y, if z > 6.0 { z + 0.3 * x } else { z }])).collect();
         let upper = turned(&lid(15.0, 25.0, 3.3), 33);
         let upper: Vec<Corners> = upper.iter().map(|t| t.map(|[x, y, z]| [x + 0.1 * z - 1.0, y + 0.4, z])).collect();
         let got = closed(&[lower, upper].concat());
@@ -196,7 +200,8 @@ mod tests {
     #[test]
     fn what_the_profile_does_not_admit_is_not_bridged() {
         let open = [turned(&can(0.0, 5.0, 4.0), 24), turned(&lid(6.0, 10.0, 4.0), 30)].concat();
-        for profile in [Profile { max_hole_edges: 29, ..Profile::default() }, Profile { fill_holes: false, ..Profile::default() }] {
+        for profile in [Profile { max_hole_edges: 29, ..Profile::default() }, Profile { fill_holes: false, ..Profile::default() }]
+        {
             let got = after(&open, |d, _| bridge(&d.survey, &mut Work::new(&mut d.shop), &profile, 1));
             assert_eq!((got.result, got.defects.boundary_loops), (0, 2));
         }

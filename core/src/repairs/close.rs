@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::{annular, islands};
 use super::work::Work;
+use super::{annular, islands};
 use crate::chunk::NONE;
 use crate::fill::{self, FillSettings, Rim, Unfillable, strip};
 use crate::holes;

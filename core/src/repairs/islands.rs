@@ -157,7 +157,9 @@ mod tests {
             let pairs = [holes::rings(shop, &rims), holes::islands(shop, &rims)].concat();
             let [hole, island] = pairs[0].map(|i| rims[i].vertices.clone());
             let (joined, triangles) = join(&work, &hole, &island).unwrap();
-            triangles.map(|t| work.add(t, Origin::Patch, NONE));
+            triangles.into_iter().for_each(|t| {
+                work.add(t, Origin::Patch, NONE);
+            });
             joined.len()
         });
         // Outer rim, and one loop of hole and island.

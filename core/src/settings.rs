@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::report::LoopClass;
+
 /// What a repair may do, and what its result must satisfy. Lengths written `…_relative` are fractions of the bounding box's
 /// diagonal; `…_mm` are in the file's units, which STL users take for millimetres.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -24,6 +26,14 @@ pub struct Profile {
     pub max_hole_edges: u32,
     /// Loops longer than this fraction of the diagonal are reported, not filled.
     pub max_hole_perimeter_relative: f64,
+    /// Loops longer than this are reported, not filled; 0: no such bound.
+    pub max_hole_perimeter_mm: f64,
+    /// Gaps wider than this are not zipped; 0: no such bound.
+    pub max_gap_mm: f64,
+    /// Kinds of loops that stay open.
+    pub leave_open: Vec<LoopClass>,
+    /// Close the rims of lone sheets, too, which become bodies of hardly any thickness.
+    pub close_sheets: bool,
     /// Fill holes at all.
     pub fill_holes: bool,
     /// How patches that have room for vertices of their own are shaped.
@@ -66,6 +76,10 @@ impl Default for Profile {
             gap_edge_share: 0.35,
             max_hole_edges: 20_000,
             max_hole_perimeter_relative: 8.0,
+            max_hole_perimeter_mm: 0.0,
+            max_gap_mm: 0.0,
+            leave_open: Vec::new(),
+            close_sheets: false,
             fill_holes: true,
             patch_shape: PatchShape::Fair,
             max_volume_change: 0.25,

@@ -120,6 +120,11 @@ impl Measure {
         (0..3).map(|k| (self.middle[k] - other.middle[k]) * vector_area[k] / 3.0).sum()
     }
 
+    /// Where volumes are measured from.
+    pub(crate) fn middle(&self) -> glam::DVec3 {
+        glam::DVec3::from_array(self.middle)
+    }
+
     /// One triangle's terms.
     #[inline]
     pub(crate) fn triangle(&self, corners: &[[f32; 3]; 3]) -> Extent {

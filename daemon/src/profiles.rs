@@ -57,6 +57,8 @@ pub(crate) fn check(profile: &Profile) -> Result<(), String> {
         ("weld_max_edge_share", profile.weld_max_edge_share),
         ("gap_edge_share", profile.gap_edge_share),
         ("max_hole_perimeter_relative", profile.max_hole_perimeter_relative),
+        ("max_hole_perimeter_mm", profile.max_hole_perimeter_mm),
+        ("max_gap_mm", profile.max_gap_mm),
         ("max_volume_change", profile.max_volume_change),
         ("max_box_change_relative", profile.max_box_change_relative),
         ("debris_area_share", profile.debris_area_share),

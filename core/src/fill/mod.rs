@@ -18,6 +18,7 @@ mod front;
 mod minweight;
 mod planar;
 mod search;
+pub(crate) mod strip;
 pub mod tree;
 
 use boxes::{Boxes, EMPTY, around};
@@ -79,6 +80,8 @@ pub enum Method {
     Projected,
     /// Any valid triangulation of a small loop.
     Search,
+    /// A strip between the two sides of a narrow loop.
+    Zipped,
 }
 
 impl Method {
@@ -92,6 +95,7 @@ impl Method {
             Self::Front => "front",
             Self::Projected => "projected",
             Self::Search => "search",
+            Self::Zipped => "zipped",
         }
     }
 }
@@ -151,6 +155,39 @@ pub fn triangulate(rim: &Rim<'_>, settings: &FillSettings) -> Result<Patch, Unfi
     by_methods(rim, settings)
 }
 
+/// Closes a loop around others, the rims of islands in it, which run the other way round: triangles over the vertices of all, one loop
+/// after the other. `joined`: is there an edge of the mesh between vertices of two loops already?
+///
+/// Valid as a patch of [`triangulate`] is, but for its topology: a disc with a hole for each island. O(n log n), or what [`strip::bridge`] takes
+/// for the only one.
+pub(crate) fn around_islands(rims: &[&Rim<'_>], joined: &dyn Fn(u32, u32) -> bool) -> Result<Vec<[u32; 3]>, Unfillable> {
+    let points: Vec<Point> = rims.iter().flat_map(|rim| rim.points).copied().collect();
+    let sizes: Vec<usize> = rims.iter().map(|rim| rim.len()).collect();
+    if sizes.iter().any(|size| *size < 3) || u32::try_from(points.len()).is_err() || !are_distinct(&points) {
+        return Err(Unfillable::NotALoop);
+    }
+    let owners: Vec<(usize, u32)> =
+        sizes.iter().enumerate().flat_map(|(rim, size)| (0..*size as u32).map(move |i| (rim, i))).collect();
+    let allows = |a: u32, b: u32| {
+        let ((rim, i), (other, j)) = (owners[a as usize], owners[b as usize]);
+        if rim == other { rims[rim].allows(i, j) } else { !joined(a.min(b), a.max(b)) }
+    };
+    let beyond = rims.iter().flat_map(|rim| (0..rim.len()).map(|i| rim.neighbour(i))).collect();
+    let around = Surroundings::new(&points, beyond, &allows);
+    let checked = |triangles: Vec<[u32; 3]>| {
+        if !triangles.iter().all(|t| around.admits(t)) {
+            return Err(Fault::Inadmissible);
+        }
+        crosses_itself(&points, &triangles).map(|()| in_order(triangles))
+    };
+    match (planar::between(&points, &sizes).map(checked), rims) {
+        (Some(Ok(triangles)), _) => Ok(triangles),
+        (_, [outer, inner]) => strip::bridge([outer, inner], joined),
+        (Some(Err(fault)), _) => Err(fault.into()),
+        (None, _) => Err(Unfillable::Blocked),
+    }
+}
+
 /// Tries what there is for more than three vertices.
 fn by_methods(rim: &Rim<'_>, settings: &FillSettings) -> Result<Patch, Unfillable> {
     const SMALL: [Method; 6] =
@@ -167,7 +204,7 @@ fn by_methods(rim: &Rim<'_>, settings: &FillSettings) -> Result<Patch, Unfillabl
             Method::LeastArea => by_weight(rim, Weight::Area, &mut clearance),
             Method::Front => by_front(rim, settings.minimum_weight_vertices),
             Method::Search if rim.len() <= SEARCH_VERTICES => by_search(rim, &mut clearance),
-            Method::Search | Method::Triangle => Err(Unfillable::Blocked),
+            Method::Search | Method::Triangle | Method::Zipped => Err(Unfillable::Blocked),
         };
         match made {
             Ok(triangles) => return Ok(patch(triangles, method)),
@@ -263,13 +300,18 @@ impl From<Fault> for Unfillable {
     }
 }
 
-fn patch(mut triangles: Vec<[u32; 3]>, method: Method) -> Patch {
+fn patch(triangles: Vec<[u32; 3]>, method: Method) -> Patch {
+    Patch { triangles: in_order(triangles), method }
+}
+
+/// Each from its smallest vertex, and sorted.
+fn in_order(mut triangles: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
     for t in &mut triangles {
         let first = (0..3).min_by_key(|&k| t[k]).unwrap_or(0);
         t.rotate_left(first);
     }
     triangles.sort_unstable();
-    Patch { triangles, method }
+    triangles
 }
 
 impl Rim<'_> {
@@ -278,12 +320,7 @@ impl Rim<'_> {
     }
 
     fn is_loop(&self) -> bool {
-        let mut sorted: Vec<Point> = self.points.iter().map(|p| p.map(|x| x + 0.0)).collect();
-        sorted.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])).then(a[2].total_cmp(&b[2])));
-        self.len() >= 3
-            && u32::try_from(self.len()).is_ok()
-            && sorted.iter().flatten().all(|x| x.is_finite())
-            && sorted.windows(2).all(|w| w[0] != w[1])
+        self.len() >= 3 && u32::try_from(self.len()).is_ok() && are_distinct(self.points)
     }
 
     fn on_one_line(&self) -> bool {
@@ -342,31 +379,58 @@ impl Rim<'_> {
     /// every chord allowed, and nothing crosses or folds onto itself? `graph`: it is known to be a graph over a plane, which cannot
     /// cross itself.
     fn accepts(&self, triangles: &[[u32; 3]], graph: bool) -> Result<(), Fault> {
-        let neighbours =
-            Boxes::new((0..self.apexes.len().min(self.len())).map(|i| self.neighbour(i).map_or(EMPTY, |t| around(&t))));
-        let admissible = |t: &[u32; 3]| {
-            let corners = self.corners(*t);
-            // Whether neighbours touch or are apart does not matter, and is what takes longest to tell.
-            let crosses = |other: Triangle| self_intersection(&corners, &other, common(&corners, &other)).is_some();
-            let meets = |i: usize| self.neighbour(i).is_some_and(crosses);
-            !collinear(&corners[0], &corners[1], &corners[2])
-                && (0..3).all(|k| self.allows(t[k], t[(k + 1) % 3]))
-                && !neighbours.any_near(&around(&corners), meets)
-                && !self.meets_obstacle(&corners)
-        };
-        if !triangles.iter().all(admissible) {
+        let beyond = (0..self.apexes.len().min(self.len())).map(|i| self.neighbour(i)).collect();
+        let allows = |a: u32, b: u32| self.allows(a, b);
+        let around = Surroundings::new(self.points, beyond, &allows);
+        if !triangles.iter().all(|t| around.admits(t) && !self.meets_obstacle(&self.corners(*t))) {
             return Err(Fault::Inadmissible);
         }
-        if !graph {
-            let solid: Vec<_> = triangles.iter().map(|t| self.corners(*t)).collect();
-            // Enough for any patch but one great fan after the other; a bound by count, so the same everywhere.
-            match self_crossing(&solid, 2_000_000 + 500 * solid.len() as u64) {
-                SelfCrossing::None => {}
-                SelfCrossing::Pair(i, j) => return Err(Fault::Crossing(i, j)),
-                SelfCrossing::Undecided => return Err(Fault::Undecided),
-            }
-        }
-        Ok(())
+        if graph { Ok(()) } else { crosses_itself(self.points, triangles) }
+    }
+}
+
+/// What a patch between one rim or several must respect.
+struct Surroundings<'a> {
+    points: &'a [Point],
+    /// The mesh's triangles along the rims.
+    beyond: Vec<Option<Triangle>>,
+    boxes: Boxes,
+    /// May the patch have an edge between two vertices?
+    allows: &'a dyn Fn(u32, u32) -> bool,
+}
+
+impl<'a> Surroundings<'a> {
+    fn new(points: &'a [Point], beyond: Vec<Option<Triangle>>, allows: &'a dyn Fn(u32, u32) -> bool) -> Self {
+        let boxes = Boxes::new(beyond.iter().map(|t| t.map_or(EMPTY, |t| around(&t))));
+        Self { points, beyond, boxes, allows }
+    }
+
+    /// Has the triangle an area, is it clear of the mesh's triangles, and are its edges allowed? Exact.
+    fn admits(&self, t: &[u32; 3]) -> bool {
+        let corners = t.map(|v| self.points[v as usize]);
+        // Whether neighbours touch or are apart does not matter, and is what takes longest to tell.
+        let crosses = |other: Triangle| self_intersection(&corners, &other, common(&corners, &other)).is_some();
+        !collinear(&corners[0], &corners[1], &corners[2])
+            && (0..3).all(|k| (self.allows)(t[k], t[(k + 1) % 3]))
+            && !self.boxes.any_near(&around(&corners), |i| self.beyond[i].is_some_and(crosses))
+    }
+}
+
+/// Are all positions finite, and no two of them equal?
+fn are_distinct(points: &[Point]) -> bool {
+    let mut sorted: Vec<Point> = points.iter().map(|p| p.map(|x| x + 0.0)).collect();
+    sorted.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])).then(a[2].total_cmp(&b[2])));
+    sorted.iter().flatten().all(|x| x.is_finite()) && sorted.windows(2).all(|w| w[0] != w[1])
+}
+
+/// Does any triangle cross another or fold onto it? Each has an area. Exact.
+fn crosses_itself(points: &[Point], triangles: &[[u32; 3]]) -> Result<(), Fault> {
+    let solid: Vec<Triangle> = triangles.iter().map(|t| t.map(|v| points[v as usize])).collect();
+    // Enough for any patch but one great fan after the other; a bound by count, so the same everywhere.
+    match self_crossing(&solid, 2_000_000 + 500 * solid.len() as u64) {
+        SelfCrossing::None => Ok(()),
+        SelfCrossing::Pair(i, j) => Err(Fault::Crossing(i, j)),
+        SelfCrossing::Undecided => Err(Fault::Undecided),
     }
 }
 

@@ -64,25 +64,61 @@ fn delaunay(points: &[Point], axis: usize, forward: bool) -> Option<Vec<[u32; 3]
     let scale = f64::from(1 << 20);
     let (u, v) = if forward { ((axis + 1) % 3, (axis + 2) % 3) } else { ((axis + 2) % 3, (axis + 1) % 3) };
     let projected = points.iter().map(|p| Point2::new(f64::from(p[u]) * scale, f64::from(p[v]) * scale)).collect();
+    constrained(projected, &[points.len()])
+}
+
+/// Constrained Delaunay triangulation of what lies between a loop and others inside it, in the plane that their directed areas face, if they
+/// are simple polygons there that have it on their left. `points`: those of one loop after the other; `sizes`: how many each has. The
+/// projection is rounded, so that nothing is known of the triangles in space. O(n log n).
+pub(super) fn between(points: &[Point], sizes: &[usize]) -> Option<Vec<[u32; 3]>> {
+    let mut rest = points;
+    let mut area = DVec3::ZERO;
+    for size in sizes {
+        let (rim, others) = rest.split_at_checked(*size)?;
+        area += directed_area(rim);
+        rest = others;
+    }
+    let size = area.length().sqrt();
+    if size == 0.0 || !size.is_finite() {
+        return None;
+    }
+    let normal = area.normalize();
+    let u = normal.any_orthonormal_vector() / size;
+    let v = normal.cross(u);
+    let origin = points.first().map(at)?;
+    let projected = points.iter().map(|p| at(p) - origin).map(|p| Point2::new(p.dot(u), p.dot(v))).collect();
+    constrained(projected, sizes)
+}
+
+/// Constrained Delaunay triangulation of what loops have on their left, if they bound one region.
+fn constrained(points: Vec<Point2<f64>>, sizes: &[usize]) -> Option<Vec<[u32; 3]>> {
     let n = points.len();
+    let mut next: Vec<usize> = (1..=n).collect();
+    let mut end = 0;
+    for size in sizes {
+        end += size;
+        next[end - 1] = end - size;
+    }
     let mut conflicts = 0;
-    let edges = (0..n).map(|i| [i, (i + 1) % n]).collect();
-    let cdt = ConstrainedDelaunayTriangulation::<Point2<f64>>::try_bulk_load_cdt(projected, edges, |_| conflicts += 1).ok()?;
+    let edges = next.iter().enumerate().map(|(i, j)| [i, *j]).collect();
+    let cdt = ConstrainedDelaunayTriangulation::<Point2<f64>>::try_bulk_load_cdt(points, edges, |_| conflicts += 1).ok()?;
     if conflicts > 0 || cdt.num_vertices() != n || cdt.num_constraints() != n {
         return None;
     }
     let vertex = FixedVertexHandle::from_index;
     let first = cdt.get_edge_from_neighbors(vertex(0), vertex(1)).filter(|e| e.is_constraint_edge())?;
     let mut seen = vec![false; cdt.num_all_faces()];
-    let mut triangles = Vec::with_capacity(n - 2);
+    // A loop more takes two triangles more than its vertices.
+    let count = n + 2 * sizes.len() - 4;
+    let mut triangles = Vec::with_capacity(count);
     let mut stack = vec![first.face().as_inner()?];
     seen[stack[0].index()] = true;
     while let Some(face) = stack.pop() {
         triangles.push(face.vertices().map(|v| v.index() as u32));
         for edge in face.adjacent_edges() {
             if edge.is_constraint_edge() {
-                // The rim must have the inside on its left everywhere.
-                if (edge.from().index() + 1) % n != edge.to().index() {
+                // A rim must have the inside on its left everywhere.
+                if next[edge.from().index()] != edge.to().index() {
                     return None;
                 }
             } else {
@@ -93,7 +129,7 @@ fn delaunay(points: &[Point], axis: usize, forward: bool) -> Option<Vec<[u32; 3]
             }
         }
     }
-    (triangles.len() == n - 2).then_some(triangles)
+    (triangles.len() == count).then_some(triangles)
 }
 
 /// Do the angles opposite the edge (a, b) of the two triangles exceed 180° together, clearly (sin(α + β) < 0)?

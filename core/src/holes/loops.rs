@@ -23,6 +23,17 @@ impl Loop {
         self.vertices.iter().map(|v| shop.positions[*v as usize]).collect()
     }
 
+    /// For each edge, the third corner of the triangle on its other side.
+    pub(crate) fn apexes(&self, shop: &Shop) -> Vec<Option<Point>> {
+        let n = self.vertices.len();
+        let apex = |i: usize| {
+            let ends = [self.vertices[i], self.vertices[(i + 1) % n]];
+            let apex = shop.triangles[self.triangles[i] as usize].v.into_iter().find(|v| !ends.contains(v));
+            apex.map(|v| shop.positions[v as usize])
+        };
+        (0..n).map(apex).collect()
+    }
+
     pub(crate) fn perimeter(&self, shop: &Shop) -> f64 {
         let n = self.vertices.len();
         (0..n).map(|i| shop.distance(self.vertices[i], self.vertices[(i + 1) % n])).sum()

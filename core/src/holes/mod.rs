@@ -27,6 +27,13 @@ use shape::Shape;
 const MACHINING_SHARE: f64 = 0.02;
 /// And largest share of its area that way, where it is largest: rounder loops are open to some side, and only folded by their symmetry.
 const SLENDER_SHARE: f64 = 0.25;
+/// How far the surface on both sides runs on across a loop (−1: all the way back over it) for its sides to have run past each other.
+const PAST_EACH_OTHER: f64 = -0.5;
+/// Then it is a slit below this share of a circle, since hills beside it tilt its sides, if it is longer than wide by [`LENGTH`] and its area
+/// where it is largest below [`PASSES_SHARE`].
+const PASSES_MACHINING_SHARE: f64 = 0.16;
+const PASSES_SHARE: f64 = 0.5;
+const LENGTH: f64 = 2.0;
 /// A loop is flat if it rises so little above its plane, measured by the plane's smaller extent.
 const FLAT: f64 = 0.05;
 
@@ -35,19 +42,19 @@ const LISTED: usize = 1000;
 
 /// The loops of a workshop for the report.
 pub(crate) fn report(shop: &Shop, edges: &Edges, tolerance: &Tolerance, gap_share: f64) -> BoundaryLoops {
-    let mut listed = classify(shop, edges, tolerance, gap_share);
+    let loops = loops::find(shop, edges);
+    let mut listed = classify(shop, edges, &loops, tolerance, gap_share);
     let mut classes = BTreeMap::new();
     listed.iter().for_each(|l| *classes.entry(l.class).or_default() += 1);
     listed.truncate(LISTED);
     BoundaryLoops { classes, listed }
 }
 
-/// All boundary loops with their classes, by smallest vertex; partners are places in this list. `gap_share`: a gap is narrower than this
+/// What kinds of openings these boundary loops are, in their order; partners are places in it. `gap_share`: a gap is narrower than this
 /// share of the edges beside it; 0: nothing is a gap. O(n log n) in the boundary.
-pub(crate) fn classify(shop: &Shop, edges: &Edges, tolerance: &Tolerance, gap_share: f64) -> Vec<BoundaryLoop> {
-    let loops = loops::find(shop, edges);
+pub(crate) fn classify(shop: &Shop, edges: &Edges, loops: &[Loop], tolerance: &Tolerance, gap_share: f64) -> Vec<BoundaryLoop> {
     let shapes: Vec<Shape> = loops.iter().map(|rim| shape_of(shop, rim)).collect();
-    let sides = sides::measure(shop, &loops, tolerance, gap_share);
+    let sides = sides::measure(shop, loops, tolerance, gap_share);
     let several = vertices_of_several(edges);
     let mut classes: Vec<Option<(LoopClass, String)>> = loops
         .iter()
@@ -95,6 +102,32 @@ pub(crate) fn classify(shop: &Shop, edges: &Edges, tolerance: &Tolerance, gap_sh
         .collect()
 }
 
+/// Loops that belong together, by place.
+#[derive(Debug, Default)]
+pub(crate) struct Partners {
+    /// The rims of missing rings.
+    pub(crate) rings: Vec<[usize; 2]>,
+    /// Holes, each with the rim of an island that lies in it.
+    pub(crate) islands: Vec<[usize; 2]>,
+}
+
+/// The partners among some loops. O(n log n) in their vertices.
+pub(crate) fn partners(shop: &Shop, loops: &[Loop]) -> Partners {
+    let shapes: Vec<Shape> = loops.iter().map(|rim| shape_of(shop, rim)).collect();
+    let all: Vec<u32> = (0..loops.len() as u32).collect();
+    let mut partners = Partners::default();
+    for pair in pairs::find(&all, &shapes) {
+        let kind = if pair.class == LoopClass::Island { &mut partners.islands } else { &mut partners.rings };
+        kind.push(pair.loops.map(|i| i as usize));
+    }
+    partners
+}
+
+/// Whether a flat patch would continue the surface (1), stand on it (0), or lie back along it (−1).
+pub(crate) fn continues(shop: &Shop, rim: &Loop) -> f64 {
+    shape_of(shop, rim).continues
+}
+
 fn shape_of(shop: &Shop, rim: &Loop) -> Shape {
     let points: Vec<DVec3> = rim.vertices.iter().map(|v| shop.place(*v)).collect();
     let normals = rim.triangles.iter().map(|t| {
@@ -104,19 +137,36 @@ fn shape_of(shop: &Shop, rim: &Loop) -> Shape {
     Shape::of(&points, normals)
 }
 
-/// A slender loop that folds back on itself when seen along Z, X or Y, though it is not flat (METHODS C7).
+/// A slender loop that folds back on itself when seen along Z, X or Y, though it is not flat (METHODS C7). The cutter's passes that made it
+/// may have run on past each other, each into the other's side.
 fn machining(shape: &Shape) -> Option<(LoopClass, String)> {
     let circle = shape.perimeter * shape.perimeter / (4.0 * std::f64::consts::PI);
-    if shape.off_plane <= FLAT * shape.extents[1] || shape.area() >= SLENDER_SHARE * circle {
+    let [length, width, _] = shape.extents;
+    let passes = shape.continues < PAST_EACH_OTHER && length > LENGTH * width;
+    let (most, below) = if passes { (PASSES_SHARE, PASSES_MACHINING_SHARE) } else { (SLENDER_SHARE, MACHINING_SHARE) };
+    if shape.off_plane <= FLAT * width || shape.area() >= most * circle {
         return None;
     }
     let seen = |axis: usize| shape.vector_area[axis].abs() / circle;
     // Of equal ones the first.
     let axis = [2, 0, 1].into_iter().min_by(|a, b| seen(*a).total_cmp(&seen(*b)))?;
-    (seen(axis) < MACHINING_SHARE).then(|| {
+    (seen(axis) < below).then(|| {
         let name = ["X", "Y", "Z"][axis];
-        (LoopClass::Machining, format!("seen along {name}, its area is {:.4} of a circle's, below {MACHINING_SHARE}", seen(axis)))
+        let past = if passes { "its sides run past each other; " } else { "" };
+        (LoopClass::Machining, format!("{past}seen along {name}, its area is {:.4} of a circle's, below {below}", seen(axis)))
     })
+}
+
+/// The places where a loop lost to machining turns back: its ends along its length. `None` for any other loop. O(vertices).
+pub(crate) fn folds(shop: &Shop, rim: &Loop) -> Option<[usize; 2]> {
+    let shape = shape_of(shop, rim);
+    machining(&shape)?;
+    let farthest = |from: DVec3| {
+        let away = |i: &usize| shape.points[*i].distance_squared(from);
+        (0..shape.points.len()).min_by(|a, b| away(b).total_cmp(&away(a)))
+    };
+    let one = farthest(shape.centre)?;
+    Some([one, farthest(shape.points[one])?]).filter(|[a, b]| a != b)
 }
 
 /// Vertices of more than two boundary edges, ascending.

@@ -1,9 +1,10 @@
 //! Two loops that belong together: the rims of a missing ring, or a hole and an island in it (METHODS C5, D; source S3).
 //!
 //! A patch over a missing ring leaves one rim and arrives at the other, so that the loops, each in its patch's direction, run opposite
-//! ways round the same axis, while two holes side by side in one surface run the same way round. Rims in two planes look at each other;
-//! the two ends of a tube look away. Of rims in one plane, the outer one is a hole in the surface and the inner one the rim of a piece;
-//! a plate's own rim around a hole in the plate is the other way about.
+//! ways round the same axis, while two holes side by side in one surface run the same way round. What remains is told by the surface
+//! along the rims. Where the one is a hole in it and the smaller one the rim of a piece, the ring is missing from one surface; a plate's own rim around a
+//! hole in the plate is the other way about. Where the one surface faces the axis and the other one away from it, they are the two skins
+//! of a wall. Other rims of a ring look at each other; the two ends of a tube look away.
 
 use glam::DVec3;
 
@@ -18,8 +19,21 @@ const OPPOSITE: f64 = -0.5;
 const ANNULAR: f64 = 0.15;
 /// Rims of a ring are no farther apart than so many radii of the larger one.
 const FARTHEST: f64 = 3.0;
+/// Rims are in one plane as long as they are no farther apart along its normal than this share of the larger one's radius.
+const ONE_PLANE: f64 = 0.5;
+/// How much more the larger rim is a hole in its surface than the other one is (2 in a plane, 0 on a tube), if the ring is missing from one
+/// surface that slopes by no more than some 65° there.
+const ONE_SURFACE: f64 = 0.8;
+/// The same for an island, which may lie on the top of a dome.
+const ISLAND_SURFACE: f64 = 0.5;
+/// And how much less, at most: −2 is a plate's own rim around a hole in it.
+const WASHER: f64 = -0.5;
+/// How far the surface along a rim faces the axis, or away from it, to be a skin.
+const SKIN: f64 = 0.3;
+/// Cosine between the vector areas of a hole and an island in it, at most: an island is small, and may lie on a slope.
+const ISLAND_OPPOSITE: f64 = -0.2;
 /// An island lies no farther from the plane of its hole than this share of the hole's size.
-const OFF_PLANE: f64 = 0.5;
+const OFF_PLANE: f64 = 0.75;
 /// Points of a loop that distances are measured from, at most.
 const MOST_POINTS: usize = 2048;
 
@@ -31,7 +45,7 @@ pub(super) struct Pair {
     pub(super) characteristic_distance: f64,
 }
 
-/// The pairs among `free` loops: rings first, then islands, each in the loops' order.
+/// The pairs among `free` loops: rings in one plane, islands, rings in two planes, each in the loops' order.
 pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
     if free.len() < 2 {
         return Vec::new();
@@ -52,21 +66,39 @@ pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
         .collect();
     let mut pairs = Vec::new();
     let mut taken = vec![false; free.len()];
-    for (i, j) in nearest.iter().enumerate().filter_map(|(i, j)| j.filter(|j| *j > i && nearest[*j] == Some(i)).map(|j| (i, j))) {
-        if let Some((class, apart)) = ring(shape(i), shape(j)) {
-            (taken[i], taken[j]) = (true, true);
-            let kind = if class == LoopClass::AnnularCoplanar { "one plane" } else { "two planes" };
-            let rule =
-                format!("faces the loop nearest to it, in {kind}; their characteristic distance {apart:.4} is below {ANNULAR}");
-            let larger_first = if shape(j).radius() > shape(i).radius() { [j, i] } else { [i, j] };
-            pairs.push(Pair { loops: larger_first.map(|i| free[i]), class, rule, characteristic_distance: apart });
+    let take_rings = |wanted: LoopClass, taken: &mut [bool], pairs: &mut Vec<Pair>| {
+        for (i, j) in
+            nearest.iter().enumerate().filter_map(|(i, j)| j.filter(|j| *j > i && nearest[*j] == Some(i)).map(|j| (i, j)))
+        {
+            if let Some((class, apart)) = ring(shape(i), shape(j)).filter(|(class, _)| *class == wanted && !taken[i] && !taken[j])
+            {
+                (taken[i], taken[j]) = (true, true);
+                let kind = if class == LoopClass::AnnularCoplanar { "one plane" } else { "two planes" };
+                let rule = format!(
+                    "faces the loop nearest to it, in {kind}; their characteristic distance {apart:.4} is below {ANNULAR}"
+                );
+                let larger_first = if shape(j).radius() > shape(i).radius() { [j, i] } else { [i, j] };
+                pairs.push(Pair { loops: larger_first.map(|i| free[i]), class, rule, characteristic_distance: apart });
+            }
         }
-    }
-    for inner in (0..free.len()).filter(|i| !taken[*i]) {
+    };
+    take_rings(LoopClass::AnnularCoplanar, &mut taken, &mut pairs);
+    // A domed island stands out of its hole's box.
+    let reaches: Vec<Bounds> = (0..free.len()).map(|i| bounds(shape(i), OFF_PLANE * shape(i).area().sqrt())).collect();
+    let tree = BoxTree::new(&reaches);
+    let mut with_islands = taken.clone();
+    for inner in 0..free.len() {
         tree.meeting(&bounds(shape(inner), 0.0), &mut found);
-        let around =
-            found.iter().map(|j| *j as usize).filter(|j| *j != inner && !taken[*j] && holds_island(shape(*j), shape(inner)));
+        let holds = |outer: usize| {
+            outer != inner
+                && !taken[inner]
+                && !taken[outer]
+                && holds_island(shape(outer), shape(inner))
+                && ring(shape(outer), shape(inner)).is_none()
+        };
+        let around = found.iter().map(|j| *j as usize).filter(|j| holds(*j));
         if let Some(outer) = around.min_by(|a, b| shape(*a).radius().total_cmp(&shape(*b).radius()).then(a.cmp(b))) {
+            (with_islands[outer], with_islands[inner]) = (true, true);
             pairs.push(Pair {
                 loops: [outer, inner].map(|i| free[i]),
                 class: LoopClass::Island,
@@ -75,21 +107,27 @@ pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
             });
         }
     }
+    // Two holes may look at each other across a gap between bodies: one with an island in it is no end of a tube.
+    take_rings(LoopClass::AnnularParallel, &mut with_islands, &mut pairs);
     pairs
 }
 
 /// The class and characteristic distance of two loops that bound a missing ring.
 fn ring(a: &Shape, b: &Shape) -> Option<(LoopClass, f64)> {
     let apart = characteristic_distance(a, b);
-    if !face(a, b) || apart >= ANNULAR || !a.surrounds(b.centre) || !b.surrounds(a.centre) {
+    if !face(a, b, OPPOSITE) || apart >= ANNULAR || !a.surrounds(b.centre) || !b.surrounds(a.centre) {
         return None;
     }
-    let way = b.centre - a.centre;
-    if way.dot(a.normal).abs() <= (a.radius() - b.radius()).abs() {
-        let (outer, inner) = if a.radius() < b.radius() { (b, a) } else { (a, b) };
-        return is_hole_around(outer, inner).then_some((LoopClass::AnnularCoplanar, apart));
+    let (outer, inner) = if a.radius() < b.radius() { (b, a) } else { (a, b) };
+    let way = inner.centre - outer.centre;
+    let one_plane = way.dot(outer.normal).abs() <= ONE_PLANE * outer.radius();
+    let one_surface = outer.continues - inner.continues;
+    let skins = outer.outwards.abs().min(inner.outwards.abs()) >= SKIN && outer.outwards * inner.outwards < 0.0;
+    if one_plane && (skins || (one_surface >= ONE_SURFACE && is_hole_around(outer, inner))) {
+        return Some((LoopClass::AnnularCoplanar, apart));
     }
-    (a.vector_area.dot(way) > 0.0 && b.vector_area.dot(way) < 0.0).then_some((LoopClass::AnnularParallel, apart))
+    let look_at_each_other = outer.vector_area.dot(way) > 0.0 && inner.vector_area.dot(way) < 0.0;
+    (one_surface > WASHER && look_at_each_other).then_some((LoopClass::AnnularParallel, apart))
 }
 
 /// The one is a hole in a surface, the other the rim of a piece.
@@ -98,16 +136,17 @@ fn is_hole_around(outer: &Shape, inner: &Shape) -> bool {
 }
 
 fn holds_island(outer: &Shape, inner: &Shape) -> bool {
-    face(outer, inner)
+    face(outer, inner, ISLAND_OPPOSITE)
         && is_hole_around(outer, inner)
+        && outer.continues - inner.continues >= ISLAND_SURFACE
         && outer.radius() > inner.radius()
         && (inner.centre - outer.centre).dot(outer.normal).abs() <= OFF_PLANE * outer.area().sqrt()
         && outer.surrounds(inner.centre)
 }
 
 /// Run opposite ways round.
-fn face(a: &Shape, b: &Shape) -> bool {
-    crate::shop::cosine(a.vector_area, b.vector_area) <= OPPOSITE
+fn face(a: &Shape, b: &Shape, opposite: f64) -> bool {
+    crate::shop::cosine(a.vector_area, b.vector_area) <= opposite
 }
 
 /// How much two loops differ: by their extents, as a share of the larger one, and by the directions of their planes. (The formula of S3 is

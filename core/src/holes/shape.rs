@@ -19,6 +19,8 @@ pub(super) struct Shape {
     /// Whether a flat patch would continue the surface (towards 1: the loop is a hole in it) or lie on it (towards −1: the loop is the rim of
     /// a piece). Near 0, it would stand on it.
     pub(super) continues: f64,
+    /// Whether the surface along the loop faces away from the loop's axis (towards 1) or to it (towards −1).
+    pub(super) outwards: f64,
 }
 
 impl Shape {
@@ -44,9 +46,15 @@ impl Shape {
         let normal = if axes[2].1.dot(vector_area) < 0.0 { -axes[2].1 } else { axes[2].1 };
         let off_plane = points.iter().map(|p| (*p - centre).dot(normal).abs()).fold(0.0, f64::max);
         let extents = axes.map(|(moment, _)| moment.max(0.0).sqrt());
-        let beside: DVec3 = edges().zip(normals).map(|((a, b), n)| n.normalize_or_zero() * a.distance(b)).sum();
-        let continues = beside.dot(vector_area.normalize_or_zero()) / length;
-        Self { points: points.to_vec(), perimeter, centre, normal, extents, vector_area, off_plane, continues }
+        let axis = vector_area.normalize_or_zero();
+        let (mut continues, mut outwards) = (0.0, 0.0);
+        for ((a, b), beside) in edges().zip(normals) {
+            let beside = beside.normalize_or_zero() * (a.distance(b) / length);
+            let from_centre = (a + b) * 0.5 - centre;
+            continues += beside.dot(axis);
+            outwards += beside.dot((from_centre - axis * from_centre.dot(axis)).normalize_or_zero());
+        }
+        Self { points: points.to_vec(), perimeter, centre, normal, extents, vector_area, off_plane, continues, outwards }
     }
 
     /// Area of the loop as projected to where it is largest.

@@ -8,7 +8,8 @@ use crate::testing::{Corners, diagnose, plate, records};
 fn classes(triangles: &[Corners], leave_longest: bool) -> Vec<LoopClass> {
     let records = records(triangles);
     let d = diagnose(&records);
-    let mut all = classify(&d.shop, &Edges::of(&d.shop), &d.tolerance, 0.35);
+    let edges = Edges::of(&d.shop);
+    let mut all = classify(&d.shop, &edges, &loops::find(&d.shop, &edges), &d.tolerance, 0.35);
     for (i, l) in all.iter().enumerate() {
         if let Some(partner) = l.partner {
             assert_ne!(partner as usize, i);
@@ -113,4 +114,39 @@ fn a_slender_loop_that_folds_back_along_an_axis_is_machining() {
     assert_eq!(bent(5..6, roof), [Machining], "seen along the ridge, it goes up one side and down again");
     assert_eq!(bent(3..9, roof), [Simple], "a wide one does so as well, but is open to the top");
     assert_eq!(bent(5..6, |x, _| x), [Simple], "flat, however it leans");
+}
+
+/// A slit along x = 6 whose sides run past each other, `by` so much to both sides, and down.
+fn crossed(by: f32) -> Vec<Corners> {
+    let right = slit(|[x, y, _]| [x - by, y, -by]);
+    let left = |t: &Corners| t.iter().all(|p| p[0] <= 6.0) && t.iter().all(|p| p[2] == 0.0);
+    let down = |p: [f32; 3]| if p[0] == 6.0 && p[1] > 2.0 && p[1] < 10.0 { [6.0 + by, p[1], -by] } else { p };
+    right.into_iter().map(|t| if left(&t) { t.map(down) } else { t }).collect()
+}
+
+#[test]
+fn a_loop_whose_sides_run_past_each_other_is_machining_and_folds_at_its_ends() {
+    let triangles = crossed(0.5);
+    assert_eq!(classes(&triangles, true), [Machining]);
+    let records = records(&triangles);
+    let d = diagnose(&records);
+    let found: Vec<_> = loops::find(&d.shop, &Edges::of(&d.shop))
+        .iter()
+        .filter_map(|rim| folds(&d.shop, rim).map(|ends| ends.map(|i| d.shop.positions[rim.vertices[i] as usize])))
+        .collect();
+    let mut ends = found[0];
+    ends.sort_by(|a, b| a[1].total_cmp(&b[1]));
+    assert_eq!((found.len(), ends), (1, [[6.0, 2.0, 0.0], [6.0, 10.0, 0.0]]));
+}
+
+#[test]
+fn holes_of_two_bodies_with_islands_that_look_at_each_other_are_no_ring() {
+    // Two domes face to face, each with a hole and an island in it.
+    let keep = |x: u8, y: u8| x.min(y) < 2 || x.max(y) > 13 || [(7, 7), (8, 7), (7, 8), (8, 8)].contains(&(x, y));
+    let dome = |[x, y, _]: [f32; 3]| [x, y, -0.1 * ((x - 8.0) * (x - 8.0) + (y - 8.0) * (y - 8.0))];
+    let one = moved(16, keep, dome);
+    // Turned half around the x axis, above.
+    let other: Vec<Corners> = one.iter().map(|t| t.map(|[x, y, z]| [x, 16.0 - y, 3.0 - z])).collect();
+    let found = classes(&[one, other].concat(), false);
+    assert_eq!(found.iter().filter(|c| **c == Island).count(), 4, "{found:?}");
 }

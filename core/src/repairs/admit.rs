@@ -72,6 +72,17 @@ impl<'p> Admission<'p> {
 
     /// May this loop be closed?
     pub(super) fn check(&self, shop: &Shop, rim: &Loop) -> Result<(), NotAdmitted> {
+        self.check_limits(shop, rim)?;
+        self.refusal(rim).map_or(Ok(()), |reason| Err(reason.clone()))
+    }
+
+    /// The same together with another loop: a sheet that is joined to something is lone no more.
+    pub(super) fn check_joined(&self, shop: &Shop, rim: &Loop) -> Result<(), NotAdmitted> {
+        self.check_limits(shop, rim)?;
+        self.refusal(rim).filter(|reason| !matches!(reason, NotAdmitted::Sheet)).map_or(Ok(()), |reason| Err(reason.clone()))
+    }
+
+    fn check_limits(&self, shop: &Shop, rim: &Loop) -> Result<(), NotAdmitted> {
         if !self.profile.fill_holes {
             return Err(NotAdmitted::FillsNone);
         }
@@ -81,10 +92,12 @@ impl<'p> Admission<'p> {
         if rim.perimeter(shop) > self.longest {
             return Err(NotAdmitted::Perimeter(self.longest));
         }
-        match self.refused.binary_search_by_key(&rim.vertices[0], |(v, _)| *v) {
-            Ok(at) => Err(self.refused[at].1.clone()),
-            Err(_) => Ok(()),
-        }
+        Ok(())
+    }
+
+    fn refusal(&self, rim: &Loop) -> Option<&NotAdmitted> {
+        let at = self.refused.binary_search_by_key(&rim.vertices[0], |(v, _)| *v).ok()?;
+        Some(&self.refused[at].1)
     }
 }
 

@@ -3,16 +3,21 @@
 
 use std::collections::BTreeMap;
 
+use super::admit::{Admission, NotAdmitted};
 use super::work::Work;
-use super::{guard, islands, smooth};
+use super::{annular, guard, islands, smooth};
 use crate::chunk::NONE;
-use crate::fill::{self, FillSettings, Rim, Unfillable, cross};
-use crate::holes::loops::{self, Loop};
+use crate::fill::{self, FillSettings, Rim, Unfillable, cross, strip};
+use crate::holes::{
+    self,
+    loops::{self, Loop},
+};
 use crate::parallel;
 use crate::report::LoopLeft;
 use crate::settings::{PatchShape, Profile};
 use crate::shape::{Method, ShapeSettings};
 use crate::shop::components::{Components, Reversed, Through};
+use crate::shop::near::Tolerance;
 use crate::shop::{Origin, Shop, Vertex};
 use crate::survey::Survey;
 
@@ -39,8 +44,8 @@ const GUARD_ROUNDS: usize = 4;
 /// A patch that is in the workshop.
 #[derive(Debug)]
 pub(super) struct Placed {
-    /// The loop it closes, by number.
-    rim: u32,
+    /// The loops it closes, by number.
+    rims: Vec<u32>,
     method: &'static str,
     /// Its triangles are consecutive.
     pub(super) first: u32,
@@ -60,6 +65,12 @@ impl Placed {
         (self.first..self.first + self.count).contains(&t)
     }
 
+    fn put_in(work: &mut Work<'_>, rims: Vec<u32>, triangles: &[[Vertex; 3]], method: &'static str) -> Self {
+        let mut placed = Self { rims, method, first: 0, count: 0, coarse: Vec::new(), obstacles: Vec::new() };
+        placed.replace(work, triangles);
+        placed
+    }
+
     /// Puts these triangles in, in place of those that were.
     fn replace(&mut self, work: &mut Work<'_>, triangles: &[[Vertex; 3]]) {
         self.triangles().for_each(|t| work.kill(t));
@@ -72,12 +83,22 @@ impl Placed {
 
 /// Fills every loop that the profile admits. Patches are found in parallel and put in in the loops' order; one that meets an edge
 /// that an earlier one has made is found anew, so that the result does not depend on the threads.
-pub(super) fn fill_loops(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile, threads: usize) -> Closed {
-    let bridges = if profile.fill_holes { islands::bridge(survey, work) } else { Vec::new() };
+pub(super) fn fill_loops(
+    survey: &Survey<'_>,
+    work: &mut Work<'_>,
+    reversed: &Reversed,
+    tolerance: &Tolerance,
+    profile: &Profile,
+    threads: usize,
+) -> Closed {
     let (shop, edges) = work.edges();
     let rims = loops::find(shop, edges);
-    let mut closing = Closing { profile, diagonal: survey.bounds.diagonal(), rims, placed: Vec::new(), open: Vec::new() };
-    closing.triangulate(work, threads);
+    let admission = Admission::of(survey, shop, edges, &rims, reversed, tolerance, profile);
+    let max_edges = profile.max_hole_edges as usize;
+    let mut closing =
+        Closing { admission, max_edges, rims: Vec::new(), placed: Vec::new(), open: Vec::new(), joints: Vec::new() };
+    let first = closing.close_together(survey, work, rims, threads);
+    closing.triangulate(work, first, threads);
     closing.close_flat(survey, work);
     if let Some(settings) = shape_settings(profile) {
         smooth::smooth(survey, work, &mut closing.placed, &settings, threads);
@@ -85,7 +106,7 @@ pub(super) fn fill_loops(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Pro
     if profile.check_self_intersections {
         closing.guard(survey, work);
     }
-    closing.finish(work, &bridges)
+    closing.finish(work)
 }
 
 fn shape_settings(profile: &Profile) -> Option<ShapeSettings> {
@@ -99,19 +120,60 @@ fn shape_settings(profile: &Profile) -> Option<ShapeSettings> {
 
 /// The loops of a workshop while they are closed.
 struct Closing<'p> {
-    profile: &'p Profile,
-    diagonal: f64,
+    admission: Admission<'p>,
+    max_edges: usize,
     rims: Vec<Loop>,
     placed: Vec<Placed>,
     /// Loops, by number, and why they are not closed.
     open: Vec<(u32, NotFilled)>,
+    /// Triangles that join the rims of islands to those of their holes, ascending.
+    joints: Vec<u32>,
 }
 
 impl Closing<'_> {
-    fn triangulate(&mut self, work: &mut Work<'_>, threads: usize) {
+    /// Closes the rims of missing rings, and holes with islands, each by one patch. Takes in the loops: those from the number that it returns
+    /// on are still to be closed.
+    fn close_together(&mut self, survey: &Survey<'_>, work: &mut Work<'_>, rims: Vec<Loop>, threads: usize) -> usize {
+        let partners = holes::partners(work, &rims);
+        let admits = |shop: &Shop, rim: &Loop| self.admission.check_joined(shop, rim).is_ok();
+        let rings = partners.rings.into_iter().map(|pair| pair.map(|i| &rims[i]));
+        let rings: Vec<[&Loop; 2]> = rings.filter(|pair| pair.iter().all(|rim| admits(work, rim))).collect();
+        let groups = islands::groups(survey, work, &rims, &partners.islands);
+        let groups: Vec<Vec<&Loop>> = groups
+            .iter()
+            .map(|group| group.iter().map(|i| &rims[*i]).collect::<Vec<_>>())
+            .filter(|group| self.admission.check(work, group[0]).is_ok() && group[1..].iter().all(|rim| admits(work, rim)))
+            .collect();
+        if rings.is_empty() && groups.is_empty() {
+            self.rims = rims;
+            return 0;
+        }
+        let (mut done, mut placed) = (Vec::new(), Vec::new());
+        let mut place = |work: &mut Work<'_>, group: &[&Loop], triangles: &[[Vertex; 3]], method| {
+            let numbers = (done.len() as u32..).take(group.len()).collect();
+            done.extend(group.iter().map(|rim| (*rim).clone()));
+            placed.push(Placed::put_in(work, numbers, triangles, method));
+        };
+        annular::bridge(work, &rings, threads, |work, i, triangles| place(work, &rings[i], triangles, "annular"));
+        for group in &groups {
+            match islands::patch(work, group) {
+                Some(triangles) => place(work, group, &triangles, "islands"),
+                None => self.joints.extend(islands::join_all(work, group)),
+            }
+        }
+        let first = done.len();
+        let (shop, edges) = work.edges();
+        done.extend(loops::find(shop, edges));
+        (self.rims, self.placed) = (done, placed);
+        first
+    }
+
+    /// Closes the loops from number `first` on, each for itself.
+    fn triangulate(&mut self, work: &mut Work<'_>, first: usize, threads: usize) {
         let shop: &Shop = work;
-        let patches = parallel::map(threads, self.rims.len(), |i| self.fill(shop, i as u32, Neighbours::Heeded, &[]));
-        for (rim, patch) in (0..).zip(patches) {
+        let patches =
+            parallel::map(threads, self.rims.len() - first, |i| self.fill(shop, (first + i) as u32, Neighbours::Heeded, &[]));
+        for (rim, patch) in (first as u32..).zip(patches) {
             let patch = match patch {
                 Ok(patch) if meets_new_edge(work, self.rim(rim), &patch) => self.fill(work, rim, Neighbours::Heeded, &[]),
                 other => other,
@@ -165,7 +227,8 @@ impl Closing<'_> {
             for (i, obstacles) in crossed {
                 is_new[i as usize] = true;
                 if !self.step_back(work, i as usize, obstacles, round < GUARD_ROUNDS) {
-                    self.open.push((self.placed[i as usize].rim, NotFilled::Crosses));
+                    let rims = self.placed[i as usize].rims.clone();
+                    self.open.extend(rims.into_iter().map(|rim| (rim, NotFilled::Crosses)));
                 }
             }
         }
@@ -173,15 +236,15 @@ impl Closing<'_> {
 
     /// Replaces a patch by the next one that may do, or by none.
     fn step_back(&mut self, work: &mut Work<'_>, i: usize, obstacles: Vec<cross::Triangle>, again: bool) -> bool {
-        let rim = self.placed[i].rim;
         let mut triangles = std::mem::take(&mut self.placed[i].coarse);
         self.placed[i].obstacles.extend(obstacles);
         self.placed[i].replace(work, &[]);
-        if triangles.is_empty() && again && self.placed[i].method != FLAT {
-            if let Ok(patch) = self.fill(work, rim, Neighbours::Heeded, &self.placed[i].obstacles) {
-                self.placed[i].method = patch.method.name();
-                triangles = patch.triangles.iter().map(|t| t.map(|v| self.rim(rim).vertices[v as usize])).collect();
-            }
+        if let ([rim], true, true) =
+            (self.placed[i].rims.as_slice(), triangles.is_empty() && again, self.placed[i].method != FLAT)
+            && let Ok(patch) = self.fill(work, *rim, Neighbours::Heeded, &self.placed[i].obstacles)
+        {
+            triangles = of_workshop(self.rim(*rim), &patch);
+            self.placed[i].method = patch.method.name();
         }
         self.placed[i].replace(work, &triangles);
         !triangles.is_empty()
@@ -192,18 +255,17 @@ impl Closing<'_> {
     }
 
     fn put_in(&mut self, work: &mut Work<'_>, rim: u32, patch: &fill::Patch, method: &'static str) {
-        let triangles: Vec<[Vertex; 3]> = patch.triangles.iter().map(|t| t.map(|i| self.rim(rim).vertices[i as usize])).collect();
-        let mut placed = Placed { rim, method, first: 0, count: 0, coarse: Vec::new(), obstacles: Vec::new() };
-        placed.replace(work, &triangles);
-        self.placed.push(placed);
+        let triangles = of_workshop(self.rim(rim), patch);
+        self.placed.push(Placed::put_in(work, vec![rim], &triangles, method));
     }
 
-    fn finish(mut self, work: &mut Work<'_>, bridges: &[u32]) -> Closed {
+    fn finish(mut self, work: &mut Work<'_>) -> Closed {
         let mut closed = Closed::default();
         for patch in self.placed.iter().filter(|p| p.count > 0) {
-            closed.loops += 1;
+            let loops = patch.rims.len() as u64;
+            closed.loops += loops;
             let shaped = if patch.coarse.is_empty() { "" } else { ", shaped" };
-            *closed.by_method.entry(format!("{}{shaped}", patch.method)).or_default() += 1;
+            *closed.by_method.entry(format!("{}{shaped}", patch.method)).or_default() += loops;
         }
         self.open.sort_by_key(|(rim, _)| *rim);
         for (rim, reason) in &self.open {
@@ -217,7 +279,7 @@ impl Closing<'_> {
                 });
             }
             // What joined an island to this rim leads nowhere now.
-            rim.triangles.iter().filter(|t| bridges.binary_search(t).is_ok()).for_each(|t| work.kill(*t));
+            rim.triangles.iter().filter(|t| self.joints.binary_search(t).is_ok()).for_each(|t| work.kill(*t));
         }
         closed
     }
@@ -230,32 +292,30 @@ impl Closing<'_> {
         neighbours: Neighbours,
         obstacles: &[cross::Triangle],
     ) -> Result<fill::Patch, NotFilled> {
-        let (profile, rim) = (self.profile, self.rim(rim));
-        if !profile.fill_holes {
-            return Err(NotFilled::Profile("the profile fills no holes".into()));
-        }
-        let n = rim.vertices.len();
-        if n as u64 > u64::from(profile.max_hole_edges) {
-            return Err(NotFilled::Profile(format!("more than the profile's {} edges", profile.max_hole_edges)));
-        }
-        let bound = profile.max_hole_perimeter_relative * self.diagonal;
-        if rim.perimeter(shop) > bound {
-            return Err(NotFilled::Profile(format!("longer than the profile's {bound:.3}")));
-        }
+        let rim = self.rim(rim);
+        self.admission.check(shop, rim)?;
         let points = rim.points(shop);
-        let apex = |i: usize| {
-            let ends = [rim.vertices[i], rim.vertices[(i + 1) % n]];
-            let apex = shop.triangles[rim.triangles[i] as usize].v.into_iter().find(|v| !ends.contains(v));
-            apex.map(|v| shop.positions[v as usize])
-        };
-        let apexes: Vec<_> = if neighbours == Neighbours::Heeded { (0..n).map(apex).collect() } else { Vec::new() };
-        let forbidden = |i: u32, j: u32| {
-            let (a, b) = (rim.vertices[i as usize], rim.vertices[j as usize]);
-            if shop.complete[a as usize] { shop.has_edge(a, b) } else { shop.has_edge(b, a) }
-        };
-        let settings = FillSettings { max_vertices: profile.max_hole_edges as usize, ..FillSettings::default() };
-        Ok(fill::triangulate(&Rim { points: &points, apexes: &apexes, obstacles, forbidden: &forbidden }, &settings)?)
+        let apexes = if neighbours == Neighbours::Heeded { rim.apexes(shop) } else { Vec::new() };
+        let forbidden = |i: u32, j: u32| are_joined(shop, rim.vertices[i as usize], rim.vertices[j as usize]);
+        let settings = FillSettings { max_vertices: self.max_edges, ..FillSettings::default() };
+        let of_patch = Rim { points: &points, apexes: &apexes, obstacles, forbidden: &forbidden };
+        if neighbours == Neighbours::Heeded
+            && let Some(patch) = holes::folds(shop, rim).and_then(|folds| strip::zip(&of_patch, folds).ok())
+        {
+            return Ok(patch);
+        }
+        Ok(fill::triangulate(&of_patch, &settings)?)
     }
+}
+
+/// The triangles of a patch by the vertices of the workshop.
+fn of_workshop(rim: &Loop, patch: &fill::Patch) -> Vec<[Vertex; 3]> {
+    patch.triangles.iter().map(|t| t.map(|i| rim.vertices[i as usize])).collect()
+}
+
+/// Is there an edge between two vertices of loops?
+pub(super) fn are_joined(shop: &Shop, a: Vertex, b: Vertex) -> bool {
+    if shop.complete[a as usize] { shop.has_edge(a, b) } else { shop.has_edge(b, a) }
 }
 
 /// Twice the area of a patch, in the survey's units.
@@ -281,8 +341,8 @@ fn meets_new_edge(shop: &Shop, rim: &Loop, patch: &fill::Patch) -> bool {
 /// Why a loop stays open.
 #[derive(Debug, thiserror::Error)]
 enum NotFilled {
-    #[error("{0}")]
-    Profile(String),
+    #[error(transparent)]
+    NotAdmitted(#[from] NotAdmitted),
     #[error("every patch tried crosses the surface around")]
     Crosses,
     #[error(transparent)]
@@ -296,6 +356,13 @@ enum Neighbours {
     Ignored,
 }
 
+/// All of it on a diagnosis, for tests.
+#[cfg(test)]
+pub(super) fn fill(d: &mut crate::engine::Diagnosis<'_>, profile: &Profile) -> Closed {
+    let unturned = Reversed::none(&d.survey);
+    fill_loops(&d.survey, &mut Work::new(&mut d.shop), &unturned, &d.tolerance, profile, 1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -305,7 +372,7 @@ mod tests {
     fn filled(profile: &Profile) -> After<Closed> {
         let mut open = cube();
         open.drain(2..4);
-        after(&open, |d, _| fill_loops(&d.survey, &mut Work::new(&mut d.shop), profile, 1))
+        after(&open, |d, _| fill(d, profile))
     }
 
     #[test]
@@ -336,7 +403,7 @@ mod tests {
         let profile = Profile { max_hole_edges: 4, ..Profile::default() };
         let got = after(&pinched, |d, _| {
             assert_eq!(d.defects.nonmanifold_vertices, 1, "a bow-tie");
-            fill_loops(&d.survey, &mut Work::new(&mut d.shop), &profile, 1).loops
+            fill(d, &profile).loops
         });
         assert_eq!((got.result, got.defects.nonmanifold_vertices, got.defects.boundary_loops), (2, 0, 1));
     }

@@ -1,101 +1,72 @@
 //! Islands: a loose piece of surface inside a hole is joined to the hole's rim, so that one patch closes both (METHODS C1).
 //!
-//! Filled each for itself, the hole would be closed underneath the island and the island become a body of nearly no thickness. Two
-//! triangles between the nearest vertices of both rims make one simple loop of them, which is then filled like any other.
+//! Filled each for itself, the hole would be closed underneath the island and the island become a body of nearly no thickness. One patch is
+//! laid between the hole's rim and those of all its islands. Where that is not to be had, two triangles between the nearest vertices of two
+//! rims make one simple loop of them, which is then filled like any other.
 
-use glam::DVec3;
+use std::collections::BTreeMap;
 
+use super::close::are_joined;
 use super::work::Work;
-use crate::boxes::BoxTree;
-use crate::holes::loops::{self, Loop};
+use crate::chunk::NONE;
+use crate::fill::exact::Point;
+use crate::fill::{self, Rim};
+use crate::holes::loops::Loop;
 use crate::shop::components::{Components, Reversed, Through};
 use crate::shop::{Origin, Shop, Vertex};
-use crate::sums::Bounds;
 use crate::survey::Survey;
 
-/// Rims run opposite ways round when seen from outside: cosine between their normals, at most.
-const OPPOSITE: f64 = -0.5;
-/// An island's vertices lie no farther from the plane of the hole than this share of the hole's size (the root of its area).
-const MAX_OFF_PLANE: f64 = 0.5;
-
-/// A loop with its plane.
-struct Rim {
-    vertices: Vec<Vertex>,
-    component: u32,
-    bounds: Bounds,
-    centre: DVec3,
-    /// Newell's normal: twice the enclosed area long.
-    normal: DVec3,
-}
-
-/// Joins every island to the smallest hole around it; returns the new triangles.
-pub(super) fn bridge(survey: &Survey<'_>, work: &mut Work<'_>) -> Vec<u32> {
+/// Holes, each with its islands, of some pairs of loops that look like one and the other. O(workshop) if there are any.
+pub(super) fn groups(survey: &Survey<'_>, work: &mut Work<'_>, rims: &[Loop], pairs: &[[usize; 2]]) -> Vec<Vec<usize>> {
+    if pairs.is_empty() {
+        return Vec::new();
+    }
     let (shop, edges) = work.edges();
     let components = Components::of(survey, shop, edges, &Reversed::none(survey), Through::EveryEdge);
-    let mut rims: Vec<Rim> = loops::find(shop, edges).iter().map(|l| Rim::new(shop, &components, l)).collect();
+    let component = |rim: usize| components.of_triangle[rims[rim].triangles[0] as usize];
     let mut loops_of = vec![0u32; components.list.len()];
-    rims.iter().for_each(|r| loops_of[r.component as usize] += 1);
-    let tree = BoxTree::new(&rims.iter().map(|r| r.bounds).collect::<Vec<_>>());
-    let mut found = Vec::new();
-    let mut pairs: Vec<(usize, usize)> = Vec::new();
-    for (i, island) in rims.iter().enumerate().filter(|(_, r)| loops_of[r.component as usize] == 1) {
-        tree.meeting(&island.bounds, &mut found);
-        let area = components.list[island.component as usize].extent.area;
-        let around = found.iter().map(|j| *j as usize).filter(|j| {
-            let hole = &rims[*j];
-            hole.component != island.component
-                // An island is smaller than the rest of what it belongs to, and than the hole.
-                && area < components.list[hole.component as usize].extent.area
-                && survey.measure.area_of(area) < hole.normal.length() / 2.0
-                && hole.surrounds(island, shop)
-        });
-        if let Some(hole) = around.min_by(|a, b| rims[*a].normal.length().total_cmp(&rims[*b].normal.length())) {
-            pairs.push((hole, i));
+    (0..rims.len()).for_each(|rim| loops_of[component(rim) as usize] += 1);
+    let mut inside: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for [hole, island] in pairs.iter().copied() {
+        let [of_hole, of_island] = [hole, island].map(|rim| component(rim) as usize);
+        let area = components.list[of_island].extent.area;
+        // An island has no other rim, and is smaller than the rest of what it belongs to. (A hole's component may be an island no more.)
+        if loops_of[of_island] == 1 && of_hole != of_island && area < components.list[of_hole].extent.area {
+            inside.entry(hole).or_insert_with(|| vec![hole]).push(island);
         }
     }
-    let mut bridges = Vec::new();
-    for (hole, island) in pairs {
-        let inner = std::mem::take(&mut rims[island].vertices);
-        // An island in a hole that is an island's own is for another day: its rim has gone into another one.
-        if let Some((joined, triangles)) = join(work, &rims[hole].vertices, &inner) {
-            rims[hole].vertices = joined;
-            bridges.extend(triangles.map(|t| work.add(t, Origin::Patch, crate::chunk::NONE)));
-        }
-    }
-    bridges
+    inside.into_values().collect()
 }
 
-impl Rim {
-    fn new(shop: &Shop, components: &Components, rim: &Loop) -> Self {
-        let points: Vec<DVec3> = rim.vertices.iter().map(|v| shop.place(*v)).collect();
-        let mut bounds = Bounds::EMPTY;
-        bounds.include(&rim.points(shop));
-        let n = points.len();
-        let centre = points.iter().sum::<DVec3>() / n as f64;
-        let normal = (0..n).map(|i| (points[i] - centre).cross(points[(i + 1) % n] - centre)).sum();
-        let component = components.of_triangle[rim.triangles[0] as usize];
-        Self { vertices: rim.vertices.clone(), component, bounds, centre, normal }
-    }
-
-    /// Does the other rim run the other way round, near this one's plane and inside it?
-    fn surrounds(&self, other: &Self, shop: &Shop) -> bool {
-        let size = self.normal.length();
-        if size == 0.0 || self.normal.dot(other.normal) > OPPOSITE * size * other.normal.length() {
-            return false;
+/// Joins the rims of islands to that of their hole, the first of a group, by two triangles each, which are put in; returns them.
+pub(super) fn join_all(work: &mut Work<'_>, group: &[&Loop]) -> Vec<u32> {
+    let mut outer = group[0].vertices.clone();
+    let mut joints = Vec::new();
+    for island in &group[1..] {
+        if let Some((joined, triangles)) = join(work, &outer, &island.vertices) {
+            outer = joined;
+            joints.extend(triangles.map(|t| work.add(t, Origin::Patch, NONE)));
         }
-        let off_plane = MAX_OFF_PLANE * (size / 2.0).sqrt();
-        // Seen along the axis nearest to the normal.
-        let axis = (1..3).fold(0, |best, k| if self.normal[k].abs() > self.normal[best].abs() { k } else { best });
-        let flat = |v: Vertex| {
-            let p = shop.place(v);
-            [p[(axis + 1) % 3], p[(axis + 2) % 3]]
-        };
-        let polygon: Vec<[f64; 2]> = self.vertices.iter().map(|v| flat(*v)).collect();
-        other.vertices.iter().all(|v| {
-            let away = (shop.place(*v) - self.centre).dot(self.normal).abs() / size;
-            away <= off_plane && is_inside(&polygon, flat(*v))
-        })
     }
+    joints
+}
+
+/// One patch between a hole's rim and those of its islands.
+pub(super) fn patch(shop: &Shop, group: &[&Loop]) -> Option<Vec<[Vertex; 3]>> {
+    let vertices: Vec<Vertex> = group.iter().flat_map(|rim| rim.vertices.iter().copied()).collect();
+    let shapes: Vec<(Vec<Point>, Vec<Option<Point>>)> = group.iter().map(|rim| (rim.points(shop), rim.apexes(shop))).collect();
+    let chords: Vec<_> = group
+        .iter()
+        .map(|rim| move |i: u32, j: u32| are_joined(shop, rim.vertices[i as usize], rim.vertices[j as usize]))
+        .collect();
+    let rims: Vec<Rim<'_>> = shapes
+        .iter()
+        .zip(&chords)
+        .map(|((points, apexes), forbidden)| Rim { points, apexes, obstacles: &[], forbidden })
+        .collect();
+    let joined = |i: u32, j: u32| are_joined(shop, vertices[i as usize], vertices[j as usize]);
+    let patch = fill::around_islands(&rims.iter().collect::<Vec<_>>(), &joined).ok()?;
+    Some(patch.into_iter().map(|t| t.map(|i| vertices[i as usize])).collect())
 }
 
 /// Joins two rims at their nearest vertices: the loop that is left, and the two triangles.
@@ -126,31 +97,58 @@ fn join(shop: &Shop, outer: &[Vertex], inner: &[Vertex]) -> Option<(Vec<Vertex>,
     Some((way.collect(), triangles))
 }
 
-/// Whether a point lies in a polygon, by crossings of a ray; half-open, so that a vertex counts once.
-fn is_inside(polygon: &[[f64; 2]], p: [f64; 2]) -> bool {
-    let n = polygon.len();
-    (0..n).fold(false, |inside, i| {
-        let (a, b) = (polygon[i], polygon[(i + 1) % n]);
-        let crosses = (a[1] > p[1]) != (b[1] > p[1]) && p[0] < (b[0] - a[0]) * (p[1] - a[1]) / (b[1] - a[1]) + a[0];
-        inside ^ crosses
-    })
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::close;
     use super::*;
-    use crate::testing::{after, plate, shifted};
+    use crate::holes::{self, loops};
+    use crate::settings::Profile;
+    use crate::testing::{Corners, after, plate, shifted};
+
+    /// Loops closed together with islands, and components and loops that are left, if all but the longest are closed.
+    fn bridged(triangles: &[Corners]) -> (u64, u64, u64) {
+        let rim_stays = Profile { max_hole_perimeter_mm: 31.0, ..Profile::default() };
+        let got = after(triangles, |d, _| close::fill(d, &rim_stays));
+        assert_eq!((got.defects.nonmanifold_edges, got.defects.inconsistent_edges), (0, 0));
+        let islands = got.result.by_method.iter().filter(|(name, _)| name.starts_with("islands")).map(|(_, n)| n).sum();
+        (islands, got.defects.components, got.defects.boundary_loops)
+    }
 
     #[test]
     fn an_island_is_joined_to_the_hole_around_it() {
-        let ring = plate(6, |x, y| !(1..5).contains(&x) || !(1..5).contains(&y));
-        let island = plate(6, |x, y| (2..4).contains(&x) && (2..4).contains(&y));
-        let got = after(&[ring.clone(), island.clone()].concat(), |d, _| bridge(&d.survey, &mut Work::new(&mut d.shop)).len());
-        // Outer rim, and one loop of hole and island.
-        assert_eq!((got.result, got.defects.components, got.defects.boundary_loops), (2, 1, 2));
-        assert_eq!((got.defects.nonmanifold_edges, got.defects.inconsistent_edges), (0, 0));
+        let ring = plate(8, |x, y| !(1..7).contains(&x) || !(1..7).contains(&y));
+        let island = plate(8, |x, y| (3..5).contains(&x) && (3..5).contains(&y));
+        // The plate's own rim is left.
+        assert_eq!(bridged(&[ring.clone(), island.clone()].concat()), (2, 1, 1));
         // Beside the ring it is in no hole.
-        let apart = [ring, shifted(&island, [10.0, 0.0, 0.0])].concat();
-        assert_eq!(after(&apart, |d, _| bridge(&d.survey, &mut Work::new(&mut d.shop)).len()).result, 0);
+        assert_eq!(bridged(&[ring, shifted(&island, [20.0, 0.0, 0.0])].concat()), (0, 2, 3));
+    }
+
+    #[test]
+    fn several_islands_in_a_domed_hole_are_closed_by_one_patch() {
+        let keep = |x: u8, y: u8| x.min(y) < 2 || x.max(y) > 13 || [(4, 4), (5, 4), (10, 9), (5, 9)].contains(&(x, y));
+        let dome = |[x, y, _]: [f32; 3]| [x, y, 10.0 - 0.15 * ((x - 8.0) * (x - 8.0) + (y - 8.0) * (y - 8.0))];
+        let open: Vec<Corners> = plate(16, keep).iter().map(|t| t.map(dome)).collect();
+        assert_eq!(bridged(&open), (4, 1, 1));
+    }
+
+    #[test]
+    fn rims_are_joined_at_their_nearest_vertices() {
+        let open = plate(6, |x, y| !(1..5).contains(&x) || !(1..5).contains(&y) || ((2..4).contains(&x) && (2..4).contains(&y)));
+        let got = after(&open, |d, _| {
+            let mut work = Work::new(&mut d.shop);
+            let (shop, edges) = work.edges();
+            let rims = loops::find(shop, edges);
+            let holes::Partners { rings, islands } = holes::partners(shop, &rims);
+            let pairs = [rings, islands].concat();
+            let [hole, island] = pairs[0].map(|i| rims[i].vertices.clone());
+            let (joined, triangles) = join(&work, &hole, &island).unwrap();
+            triangles.into_iter().for_each(|t| {
+                work.add(t, Origin::Patch, NONE);
+            });
+            joined.len()
+        });
+        // Outer rim, and one loop of hole and island.
+        assert_eq!((got.result, got.defects.components, got.defects.boundary_loops), (24, 1, 2));
     }
 }

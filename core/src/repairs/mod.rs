@@ -3,6 +3,8 @@
 //! Weld and splits change stars, so components, orientation and loops come after them; the surface is filled before it is decided
 //! what is outward, since the signed volume of an open surface depends on the origin.
 
+mod admit;
+mod annular;
 mod close;
 mod collinear;
 mod debris;
@@ -61,9 +63,7 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
             break;
         }
     }
-    log.time("zip", "vertices merged with the one that faces them across a narrow gap", || {
-        zip::zip(shop, profile.gap_edge_share)
-    });
+    log.time("zip", "vertices merged with the one that faces them across a narrow gap", || zip::zip(shop, profile));
     clean(survey, shop, &mut log);
     log.time("debris", "triangles of open specks dropped", || debris::drop(survey, shop, profile));
     let mut contradictions = 0;
@@ -78,7 +78,7 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
     let mut loops_left = Vec::new();
     let mut methods = String::new();
     log.time("fill", "", || {
-        let closed = close::fill_loops(survey, shop, profile, threads);
+        let closed = close::fill_loops(survey, shop, &reversed, tolerance, profile, threads);
         loops_left = closed.left;
         let parts: Vec<String> = closed.by_method.iter().map(|(name, count)| format!("{count} {name}")).collect();
         methods = format!("loops closed: {}", parts.join(", "));

@@ -7,6 +7,8 @@
 use glam::DVec3;
 
 use super::work::Work;
+use crate::report::LoopClass;
+use crate::settings::Profile;
 use crate::shop::edges::{Edge, Edges};
 use crate::shop::{self, Shop, Vertex, near};
 
@@ -15,15 +17,17 @@ const FACING: f64 = -0.5;
 /// A moved triangle's normal keeps at least this cosine to what it was.
 const STEADY: f64 = 0.7;
 
-/// Zips gaps narrower than `share` of the shortest edges at their vertices; returns how many vertices were merged into another.
-pub(super) fn zip(work: &mut Work<'_>, share: f64) -> u64 {
-    if share <= 0.0 {
+/// Zips gaps narrower than the profile's share of the shortest edges at their vertices; returns how many vertices were merged into another.
+pub(super) fn zip(work: &mut Work<'_>, profile: &Profile) -> u64 {
+    let share = profile.gap_edge_share;
+    if share <= 0.0 || profile.leave_open.contains(&LoopClass::Gap) {
         return 0;
     }
+    let widest = if profile.max_gap_mm > 0.0 { profile.max_gap_mm } else { f64::INFINITY };
     let (shop, edges) = work.edges();
     let vertices = near::boundary_vertices(edges);
     let outward = ends(shop, edges);
-    let reach: Vec<f64> = vertices.iter().map(|v| shop.shortest_edge(*v) * share).collect();
+    let reach: Vec<f64> = vertices.iter().map(|v| (shop.shortest_edge(*v) * share).min(widest)).collect();
     let nearest = near::nearest_apart(shop, &vertices, &reach);
     let mut pairs: Vec<(f64, Vertex, Vertex)> = Vec::new();
     for (i, found) in nearest.iter().enumerate() {
@@ -106,7 +110,10 @@ mod tests {
 
     #[test]
     fn rims_that_face_each_other_across_a_narrow_gap_are_joined() {
-        let zipped = |gap: f32, share: f64| after(&slit(gap), |d, _| zip(&mut Work::new(&mut d.shop), share));
+        let zipped = |gap: f32, share: f64| {
+            let profile = Profile { gap_edge_share: share, ..Profile::default() };
+            after(&slit(gap), |d, _| zip(&mut Work::new(&mut d.shop), &profile))
+        };
         let got = zipped(0.125, 0.35);
         // Only the rim of the plate is left.
         assert_eq!((got.result, got.defects.boundary_loops, got.defects.boundary_edges), (3, 1, 16));
@@ -120,6 +127,6 @@ mod tests {
         // As near as above, but both surfaces end in the same direction.
         let bottom = reversed(&plate(2, |_, _| true));
         let top = shifted(&plate(2, |_, _| true), [0.0, 0.0, 0.125]);
-        assert_eq!(after(&[bottom, top].concat(), |d, _| zip(&mut Work::new(&mut d.shop), 0.35)).result, 0);
+        assert_eq!(after(&[bottom, top].concat(), |d, _| zip(&mut Work::new(&mut d.shop), &Profile::default())).result, 0);
     }
 }

@@ -147,7 +147,7 @@ impl Case {
                 t.iter().find(|&&v| v != a && v != b).map(|&v| self.positions[v as usize])
             })
             .collect();
-        let rim = Rim { points: &points, apexes: &apexes, forbidden: &|_, _| false };
+        let rim = Rim { points: &points, apexes: &apexes, obstacles: &[], forbidden: &|_, _| false };
         let patch = triangulate(&rim, &FillSettings::default()).unwrap();
         patch.triangles.iter().map(|t| t.map(|v| self.rims[0][v as usize])).collect()
     }

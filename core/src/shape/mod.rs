@@ -2,12 +2,15 @@
 //! on across the rim.
 //!
 //! `fill` closes a hole with triangles between its rim's vertices. Here such a patch, be it a disc, an annulus between two rims or any
-//! other piece, is refined (`refine`), made smooth (`fair`, or `rbf`), rounded to f32 and tested exactly (`check`). Nothing is known of
+//! other piece, is refined (`refine`), made smooth (`fair`, or `rbf`) on both
+//! sides of a crease that goes through (`crease`), rounded to f32 and tested exactly (`check`). Nothing is known of
 //! where it comes from. Floating point ranks and places; whether the result is valid is decided with exact predicates. Every bound of
 //! work is a count, all arithmetic is + − × ÷ √ in a fixed order: the same bits everywhere.
 
 mod check;
+mod crease;
 mod fair;
+mod rbf;
 mod refine;
 mod sheet;
 mod sparse;
@@ -19,7 +22,7 @@ use glam::DVec3;
 use crate::fill::exact::{Point, at};
 use fair::{Energy, solve};
 use refine::refine;
-use sheet::{Sheet, edges};
+use sheet::Sheet;
 
 /// What a patch is shaped from, in one numbering of vertices. Positions are finite, and no two of the same piece are equal.
 #[derive(Clone, Copy, Debug)]
@@ -37,19 +40,21 @@ pub(crate) struct Region<'a> {
 pub(crate) enum Method {
     /// Least change of curvature.
     Fair,
+    /// On an implicit surface through the surroundings, which has no creases: where one goes through the patch, as [`Method::Fair`].
+    Implicit,
 }
 
 /// Bounds of the methods. They decide results.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ShapeSettings {
     pub(crate) method: Method,
-    /// New vertices, at most; a patch that would need more gets longer edges.
+    /// New vertices, at most; a patch that would need more gets longer edges. 5,000 take about a second.
     pub(crate) max_vertices: usize,
 }
 
 impl Default for ShapeSettings {
     fn default() -> Self {
-        Self { method: Method::Fair, max_vertices: 10_000 }
+        Self { method: Method::Fair, max_vertices: 5_000 }
     }
 }
 
@@ -87,14 +92,10 @@ pub(crate) enum Unshaped {
     Crosses,
 }
 
-/// Below this cosine between normals, about 40°, an edge is a crease.
-const CREASE: f64 = 0.766;
-/// And below this, 60°, a coarse patch does not continue what is across the rim.
-const TURN: f64 = 0.5;
 /// Passes of the smoothing, each on the surface of the one before.
 const PASSES: usize = 4;
 /// It has settled when vertices move less than this share of the rim's radius, root mean square.
-const SETTLED: f64 = 1e-4;
+const SETTLED: f64 = 4e-3;
 
 /// Refines a coarse patch and makes it continue the surface around. O(n^1.5) for n vertices and triangles altogether.
 ///
@@ -105,7 +106,15 @@ pub(crate) fn shape(region: &Region<'_>, settings: &ShapeSettings) -> Result<Sha
         return Err(Unshaped::NothingToAdd);
     }
     let mut sheet = Sheet::new(region).ok_or(Unshaped::NotASurface)?;
-    let sharp = creases(&sheet)?;
+    if refine::is_fine(&sheet) {
+        return Err(Unshaped::NothingToAdd);
+    }
+    let crease::Creases { mut sharp, through } = crease::find(&sheet)?;
+    let divided;
+    if let Some(ends) = through {
+        divided = crease::with_edge(region, &sheet, ends.map(|e| e.0)).ok_or(Unshaped::Creased)?;
+        sheet = Sheet::new(&Region { patch: &divided, ..*region }).ok_or(Unshaped::NotASurface)?;
+    }
     let rim = sheet.on_rim.iter().filter(|on| **on).count() as f64;
     let most = settings.max_vertices.min((50.0 * rim * rim.sqrt()) as usize);
     let needed = vertices_needed(&sheet);
@@ -115,8 +124,18 @@ pub(crate) fn shape(region: &Region<'_>, settings: &ShapeSettings) -> Result<Sha
             *scale *= coarser;
         }
     }
+    if let Some(ends) = through
+        && !crease::carry_on(&mut sheet, ends)
+    {
+        return Err(Unshaped::Creased);
+    }
+    sharp.resize(sheet.held, true);
     if refine(&mut sheet, most) == 0 {
         return Err(Unshaped::NothingToAdd);
+    }
+    if settings.method == Method::Implicit && through.is_none() {
+        implicit(&mut sheet)?;
+        return finish(&sheet, region);
     }
     let coarse = sheet.points.clone();
     for energy in [Energy::Curvature, Energy::Plate] {
@@ -144,7 +163,7 @@ fn is_fine(region: &Region<'_>) -> bool {
         .fold(f64::INFINITY, f64::min);
     region.patch.iter().map(corners).all(|t| {
         let centre = (t[0] + t[1] + t[2]) / 3.0;
-        t.iter().any(|p| 2.0 * p.distance_squared(centre) <= least)
+        t.iter().any(|p| refine::DENSITY * refine::DENSITY * p.distance_squared(centre) <= least)
     })
 }
 
@@ -156,54 +175,6 @@ fn vertices_needed(sheet: &Sheet<'_>) -> f64 {
         sheet.normal(*t).length() / (3.0_f64.sqrt() * scale * scale)
     };
     sheet.triangles.iter().map(each).sum()
-}
-
-/// Which vertices curvature does not go across; an error where creases end at the rim.
-fn creases(sheet: &Sheet<'_>) -> Result<Vec<bool>, Unshaped> {
-    let mut sharp = vec![false; sheet.fixed];
-    let all: Vec<[u32; 3]> = sheet.all().collect();
-    // The patch's own triangles bend as they like, but where the whole rim turns, it is a lid.
-    let patch = sheet.triangles.len();
-    let mut sides: Vec<([u32; 2], usize)> = Vec::with_capacity(3 * all.len());
-    for (i, t) in all.iter().enumerate() {
-        sides.extend(edges(*t).map(|e| (sheet::sorted(e), i)));
-    }
-    sides.sort_unstable();
-    let normals: Vec<DVec3> = all.iter().map(|t| sheet.normal(*t).normalize_or_zero()).collect();
-    let (mut turn, mut length) = (0.0, 0.0);
-    let mut ends = vec![0_u32; sheet.fixed];
-    for same in sides.chunk_by(|a, b| a.0 == b.0) {
-        let [(edge, i), (_, j)] = *same else { continue };
-        let cosine = normals[i].dot(normals[j]);
-        match (i < patch, j < patch) {
-            (true, true) => {}
-            (false, false) => {
-                if cosine < CREASE && normals[i] != DVec3::ZERO && normals[j] != DVec3::ZERO {
-                    for v in edge {
-                        sharp[v as usize] = true;
-                        ends[v as usize] += 1;
-                    }
-                }
-            }
-            _ => {
-                let [a, b] = edge.map(|v| sheet.points[v as usize]);
-                turn += cosine * a.distance(b);
-                length += a.distance(b);
-                if cosine < TURN {
-                    for v in edge {
-                        sharp[v as usize] = true;
-                    }
-                }
-            }
-        }
-    }
-    if turn < TURN * length {
-        return Err(Unshaped::RimIsEdge);
-    }
-    if (0..sheet.fixed).any(|v| sheet.on_rim[v] && ends[v] > 0) {
-        return Err(Unshaped::Creased);
-    }
-    Ok(sharp)
 }
 
 /// Places the new vertices.
@@ -223,6 +194,16 @@ fn fair(sheet: &mut Sheet<'_>, sharp: &[bool], energy: Energy) -> Result<(), Uns
         sheet.relax();
     }
     Ok(())
+}
+
+/// Likewise, onto an implicit surface.
+fn implicit(sheet: &mut Sheet<'_>) -> Result<(), Unshaped> {
+    let smooth = vec![false; sheet.points.len()];
+    solve(sheet, &smooth, Energy::Membrane).ok_or(Unshaped::Unsolved)?;
+    sheet.relax();
+    rbf::project(sheet).ok_or(Unshaped::Unsolved)?;
+    sheet.relax();
+    if within(sheet) { Ok(()) } else { Err(Unshaped::TooFar) }
 }
 
 /// Is everything within the rim's box grown by half its diagonal?

@@ -14,6 +14,8 @@ const FLIPS: usize = 16;
 pub(super) struct Sheet<'a> {
     pub(super) points: Vec<DVec3>,
     pub(super) fixed: usize,
+    /// Vertices below this stay, too: those beyond the region's are on creases.
+    pub(super) held: usize,
     pub(super) triangles: Vec<[u32; 3]>,
     /// The triangle across the edge from corner k to corner k + 1; [`NONE`] across the rim.
     across: Vec<[u32; 3]>,
@@ -88,6 +90,7 @@ impl<'a> Sheet<'a> {
         let mut sheet = Self {
             points: region.positions.iter().map(|p| (at(p) - centre) / unit).collect(),
             fixed: region.positions.len(),
+            held: region.positions.len(),
             triangles: region.patch.to_vec(),
             across,
             around: region.around,
@@ -206,6 +209,15 @@ impl<'a> Sheet<'a> {
         }
     }
 
+    pub(super) fn across(&self) -> &[[u32; 3]] {
+        &self.across
+    }
+
+    /// Do the surroundings have this edge?
+    pub(super) fn is_taken(&self, a: u32, b: u32) -> bool {
+        self.taken.binary_search(&sorted([a, b])).is_ok()
+    }
+
     /// The triangle across an edge.
     fn beyond(&self, i: usize, k: usize) -> Option<usize> {
         let j = self.across[i][k];
@@ -214,7 +226,7 @@ impl<'a> Sheet<'a> {
 
     /// Is there an edge between the two already, in the surroundings or in the patch? `i` is a triangle at `c`.
     fn linked(&self, i: usize, c: u32, d: u32) -> bool {
-        if self.taken.binary_search(&sorted([c, d])).is_ok() {
+        if self.is_taken(c, d) {
             return true;
         }
         // Round the vertex one way, then, if that ends at the rim, the other.
@@ -276,15 +288,14 @@ impl<'a> Sheet<'a> {
         // The sine of the sum of both angles.
         let ((cos_c, sin_c), (cos_d, sin_d)) = (angle(pc), angle(pd));
         let size = (cos_c * cos_c + sin_c * sin_c).sqrt() * (cos_d * cos_d + sin_d * sin_d).sqrt();
-        if !(sin_c * cos_d + cos_c * sin_d < -1e-9 * size) {
+        let obtuse = sin_c * cos_d + cos_c * sin_d < -1e-9 * size;
+        if !obtuse {
             return None;
         }
         let (new_i, new_j) = ([c, a, d], [d, b, c]);
         let up = self.normal(t) + self.normal(u);
-        if !(self.normal(new_i).dot(up) > 0.0 && self.normal(new_j).dot(up) > 0.0)
-            || self.creases.binary_search(&sorted([a, b])).is_ok()
-            || self.linked(i, c, d)
-        {
+        let convex = self.normal(new_i).dot(up) > 0.0 && self.normal(new_j).dot(up) > 0.0;
+        if !convex || self.creases.binary_search(&sorted([a, b])).is_ok() || self.linked(i, c, d) {
             return None;
         }
         let (bc, ca) = (self.across[i][(k + 1) % 3], self.across[i][(k + 2) % 3]);
@@ -305,4 +316,4 @@ impl<'a> Sheet<'a> {
 }
 
 /// The smallest edge length at the rim as a share of the rim's own edges.
-const RIM_SHARE: f64 = 0.5;
+const RIM_SHARE: f64 = 0.25;

@@ -174,7 +174,8 @@ impl Factor {
                 next[i] += 1;
             }
             // What cancels down to rounding errors says nothing.
-            if !(pivot > 1e-14 * own) {
+            let positive = pivot > 1e-14 * own;
+            if !positive {
                 return false;
             }
             self.diagonal[k as usize] = pivot;
@@ -249,9 +250,6 @@ fn dissected(matrix: &Rows, points: &[DVec3]) -> Vec<u32> {
         let middle = start + half + beyond.len();
         here[half..half + beyond.len()].copy_from_slice(&beyond);
         here[half + beyond.len()..].copy_from_slice(&between);
-        for &i in &here[..half] {
-            part[i as usize] = 0;
-        }
         // A set that is one dense block cannot be parted.
         if !beyond.is_empty() {
             ranges.push((start, start + half));

@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
+use super::sheet::edges;
 use super::*;
 use crate::fill::{FillSettings, Rim, triangulate};
 
@@ -20,7 +21,11 @@ enum Surface {
     Plane,
     /// Of radius 1 along y.
     Cylinder,
+    /// Two planes that meet along y.
+    Roof,
 }
+
+const SLOPE: f64 = 0.7;
 
 const TUBE: f64 = 0.4;
 
@@ -52,6 +57,7 @@ impl Surface {
             Self::Saddle => DVec3::new(p.x, p.y, 0.5 * (p.x * p.x - p.y * p.y)),
             Self::Plane => DVec3::new(p.x, p.y, 0.0),
             Self::Cylinder => DVec3::new(p.x.sin(), p.y, p.x.cos()),
+            Self::Roof => DVec3::new(p.x, p.y, -SLOPE * p.x.abs()),
         }
     }
 
@@ -72,6 +78,10 @@ impl Surface {
             Self::Cylinder => {
                 let r = DVec3::new(p.x, 0.0, p.z);
                 (r.length() - 1.0, r.normalize())
+            }
+            Self::Roof => {
+                let n = DVec3::new(SLOPE * p.x.signum(), 0.0, 1.0).normalize();
+                (n.dot(p), n)
             }
         }
     }
@@ -98,11 +108,19 @@ impl Noise {
 
 impl Case {
     /// A round hole of `radius`, in a mesh of edges of about `edge` that are jittered, its rim sampled `sampling` times as coarsely.
-    fn round(surface: Surface, radius: f64, edge: f64, sampling: f64, outer: f64) -> Self {
+    fn round(surface: Surface, radius: f64, edge: f64, sampling: f64) -> Self {
+        Self::rough(surface, radius, edge, sampling, 0.0)
+    }
+
+    /// The same with each vertex off by `rough` edges.
+    fn rough(surface: Surface, radius: f64, edge: f64, sampling: f64, rough: f64) -> Self {
+        let outer = radius + 6.0 * edge;
         let count = ((2.0 * std::f64::consts::PI * radius / (edge * sampling)).round() as usize).max(4);
+        // A roof's ridge has vertices of the rim at its ends.
+        let (count, turn) = if surface == Surface::Roof { (count.next_multiple_of(4), 0.0) } else { (count, 0.3) };
         let circle: Vec<DVec2> = (0..count)
             .map(|i| {
-                let angle = (i as f64 + 0.3) * 2.0 * std::f64::consts::PI / count as f64;
+                let angle = (i as f64 + turn) * 2.0 * std::f64::consts::PI / count as f64;
                 DVec2::new(radius * angle.cos(), radius * angle.sin())
             })
             .collect();
@@ -113,7 +131,14 @@ impl Case {
         for j in -rows..=rows {
             for i in -rows * 2..=rows * 2 {
                 let p = DVec2::new((f64::from(i) + 0.5 * f64::from(j.rem_euclid(2))) * edge, f64::from(j) * step);
-                let p = p + DVec2::new(noise.next(), noise.next()) * (0.2 * edge);
+                let mut p = p + DVec2::new(noise.next(), noise.next()) * (0.2 * edge);
+                if surface == Surface::Roof && p.x.abs() < 0.6 * edge {
+                    // One of each row comes to lie on the ridge.
+                    if i != 0 {
+                        continue;
+                    }
+                    p = DVec2::new(0.0, f64::from(j) * step);
+                }
                 let apart =
                     (0..count).map(|k| segment_distance(p, circle[k], circle[(k + 1) % count])).fold(f64::INFINITY, f64::min);
                 if p.length() < outer && !inside(p, &circle) && apart > 0.6 * edge * sampling.clamp(0.7, 1.0) {
@@ -134,7 +159,11 @@ impl Case {
                 !inside(middle, &circle)
             })
             .collect();
-        let positions = plane.iter().map(|p| surface.at(*p)).map(|p| [p.x as f32, p.y as f32, p.z as f32]).collect();
+        let positions = plane
+            .iter()
+            .map(|p| surface.at(*p) + DVec3::new(noise.next(), noise.next(), noise.next()) * (rough * edge))
+            .map(|p| [p.x as f32, p.y as f32, p.z as f32])
+            .collect();
         Self { surface, positions, around, rims: vec![(0..count as u32).collect()] }
     }
 
@@ -218,24 +247,25 @@ fn write_stl(path: &std::path::Path, triangles: impl Iterator<Item = [Point; 3]>
 
 const SURFACES: [Surface; 4] = [Surface::Sphere, Surface::TorusOutside, Surface::TorusInside, Surface::Saddle];
 
-/// Writes the cases as STL and ours beside them, for comparison with other programs: `SHAPE_CASES=folder`.
+/// Writes the cases as STL and ours beside them, for comparison with other programs, to the folder `SHAPE_CASES`. `SHAPE_ROUGH`: how far
+/// vertices are off the surface, as a share of the edges.
 #[test]
 #[ignore = "writes files for a comparison"]
 fn write_cases() {
-    let folder = std::path::PathBuf::from(std::env::var("SHAPE_CASES").unwrap_or_else(|_| "/tmp/shape_cmp/cases".into()));
+    let folder = std::env::var_os("SHAPE_CASES").map_or_else(|| std::env::temp_dir().join("shape_cases"), Into::into);
     std::fs::create_dir_all(&folder).unwrap();
-    println!("surface share sampling rim added far chord2 normal ms");
+    let rough: f64 = std::env::var("SHAPE_ROUGH").map_or(0.0, |value| value.parse().unwrap());
     for surface in SURFACES {
         for share in [0.05, 0.1, 0.2, 0.4] {
             for sampling in [0.5, 1.0, 4.0] {
                 let radius = share * surface.size();
                 let edge = (0.05 * surface.size()).min(radius / 4.0);
-                let case = Case::round(surface, radius, edge, sampling, radius + 6.0 * edge);
+                let case = Case::rough(surface, radius, edge, sampling, rough);
                 let name = format!("{}_{share}_{sampling}", surface.name());
                 let position = |v: u32| case.positions[v as usize];
                 write_stl(&folder.join(format!("{name}.stl")), case.around.iter().map(|t| t.map(position)));
                 let patch = case.coarse();
-                for method in [Method::Fair] {
+                for method in [Method::Fair, Method::Implicit] {
                     let settings = ShapeSettings { method, ..ShapeSettings::default() };
                     let start = std::time::Instant::now();
                     let shaped = case.shaped(&patch, &settings);
@@ -265,5 +295,233 @@ fn write_cases() {
                 }
             }
         }
+    }
+}
+
+/// A cylinder of radius 1 with a ring missing, bridged straight across.
+fn bridged(count: usize, gap: f64, edge: f64) -> (Case, Vec<[u32; 3]>) {
+    let mut positions = Vec::new();
+    let mut noise = Noise(7);
+    let mut around = Vec::new();
+    let rows = 6;
+    let angle = 2.0 * std::f64::consts::PI / count as f64;
+    for side in [1.0, -1.0] {
+        let base = positions.len() as u32;
+        for j in 0..rows {
+            for i in 0..count {
+                let jitter = if j == 0 { 0.0 } else { 0.1 };
+                let u = (i as f64 + 0.5 * f64::from(j % 2) + jitter * noise.next()) * angle;
+                let v = side * (0.5 * gap + edge * (f64::from(j) + jitter * noise.next()));
+                let p = Surface::Cylinder.at(DVec2::new(u, v));
+                positions.push([p.x as f32, p.y as f32, p.z as f32]);
+            }
+        }
+        for j in 0..rows - 1 {
+            for i in 0..count as u32 {
+                let n = count as u32;
+                let (a, b) = (base + j * n + i, base + j * n + (i + 1) % n);
+                let (c, d) = (a + n, b + n);
+                let two = if j % 2 == 0 { [[a, b, c], [c, b, d]] } else { [[a, b, d], [a, d, c]] };
+                around.extend(two.map(|[a, b, c]| if side > 0.0 { [a, b, c] } else { [a, c, b] }));
+            }
+        }
+    }
+    let (n, other) = (count as u32, (rows as usize * count) as u32);
+    let patch = (0..n)
+        .flat_map(|i| {
+            let (a, b) = (i, (i + 1) % n);
+            [[a, other + a, b], [other + a, other + b, b]]
+        })
+        .collect();
+    let case = Case { surface: Surface::Cylinder, positions, around, rims: vec![(0..n).collect(), (other..other + n).collect()] };
+    (case, patch)
+}
+
+#[test]
+fn two_rims_are_joined_by_what_continues_both() {
+    let edge = 2.0 * std::f64::consts::PI / 200.0;
+    let (case, patch) = bridged(200, 4.0 * edge, edge);
+    let shaped = case.shaped(&patch, &ShapeSettings::default()).unwrap();
+    let (far, tilt) = case.errors(&shaped);
+    assert!(shaped.added.len() > 300 && far < 0.1 * edge * edge / 8.0 && tilt < 0.5, "{far} {tilt}");
+}
+
+#[test]
+fn position_tangent_and_curvature_go_on_however_the_rim_is_sampled() {
+    for surface in SURFACES {
+        for (share, sampling) in [(0.05, 1.0), (0.2, 0.5), (0.2, 4.0), (0.4, 0.5), (0.4, 1.0), (0.4, 4.0)] {
+            let radius = share * surface.size();
+            let edge = (0.05 * surface.size()).min(radius / 4.0);
+            let case = Case::round(surface, radius, edge, sampling);
+            let shaped = case.shaped(&case.coarse(), &ShapeSettings::default()).unwrap();
+            let (far, tilt) = case.errors(&shaped);
+            let chord = edge * edge / 8.0 / surface.size();
+            assert!(far < 2.0 * chord && tilt < 2.0, "{surface:?} {share} {sampling}: {far} of {chord}, {tilt}");
+        }
+    }
+}
+
+#[test]
+fn the_implicit_surface_goes_on_too() {
+    for surface in SURFACES {
+        let radius = 0.2 * surface.size();
+        let case = Case::round(surface, radius, radius / 4.0, 1.0);
+        let settings = ShapeSettings { method: Method::Implicit, ..ShapeSettings::default() };
+        let (far, tilt) = case.errors(&case.shaped(&case.coarse(), &settings).unwrap());
+        assert!(far < radius * radius / 64.0 / surface.size() && tilt < 2.0, "{surface:?}: {far}, {tilt}");
+    }
+}
+
+#[test]
+fn noise_does_not_grow() {
+    for surface in SURFACES {
+        let radius = 0.3 * surface.size();
+        let case = Case::rough(surface, radius, radius / 6.0, 1.0, 0.02);
+        let shaped = case.shaped(&case.coarse(), &ShapeSettings::default()).unwrap();
+        let (far, _) = case.errors(&shaped);
+        assert!(far < 0.1 * radius / 6.0, "{surface:?}: {far}");
+    }
+}
+
+#[test]
+fn what_is_flat_stays_flat() {
+    for sampling in [0.5, 1.0, 4.0] {
+        let case = Case::round(Surface::Plane, 1.0, 0.2, sampling);
+        let shaped = case.shaped(&case.coarse(), &ShapeSettings::default()).unwrap();
+        let (far, tilt) = case.errors(&shaped);
+        assert!(far < 1e-6 && tilt < 1e-4 && shaped.added.iter().all(|p| p[0] * p[0] + p[1] * p[1] < 1.0), "{far} {tilt}");
+    }
+}
+
+#[test]
+fn a_ridge_goes_on_through_the_hole() {
+    for sampling in [0.5, 1.0, 2.0] {
+        let case = Case::round(Surface::Roof, 1.0, 0.2, sampling);
+        let shaped = case.shaped(&case.coarse(), &ShapeSettings::default()).unwrap();
+        let (far, _) = case.errors(&shaped);
+        let on_ridge = shaped.added.iter().filter(|p| p[0].abs() < 1e-6).count();
+        assert!(far < 1e-6 && on_ridge > 4, "{sampling}: {far}, {on_ridge}");
+    }
+}
+
+/// A cube of 6 x 6 squares a side; `keep` by the middle of each triangle.
+fn cube(keep: impl Fn(DVec3) -> bool) -> (Vec<Point>, Vec<[u32; 3]>) {
+    let n = 6;
+    let mut positions: Vec<Point> = Vec::new();
+    let mut triangles = Vec::new();
+    for axis in 0..3 {
+        for side in [0, n] {
+            let mut number = |i: i32, j: i32| {
+                let mut p = [0.0; 3];
+                (p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]) = (side as f32, i as f32, j as f32);
+                positions.iter().position(|q| *q == p).unwrap_or_else(|| {
+                    positions.push(p);
+                    positions.len() - 1
+                }) as u32
+            };
+            for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+                let [a, b, c, d] = [number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)];
+                for [a, b, c] in [[a, b, c], [a, c, d]] {
+                    triangles.push(if side == 0 { [a, c, b] } else { [a, b, c] });
+                }
+            }
+        }
+    }
+    triangles.retain(|t| keep(t.iter().map(|&v| at(&positions[v as usize])).sum::<DVec3>() / 3.0));
+    (positions, triangles)
+}
+
+/// A fan over the only border: good enough for what is to be refused.
+fn closed_by_fan(triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
+    let all: Vec<[u32; 2]> = triangles.iter().flat_map(|t| edges(*t)).collect();
+    let border: Vec<[u32; 2]> = all.iter().filter(|[a, b]| !all.contains(&[*b, *a])).copied().collect();
+    let first = border[0][0];
+    border.iter().filter(|e| !e.contains(&first)).map(|[a, b]| [first, *b, *a]).collect()
+}
+
+#[test]
+fn a_lid_and_a_corner_are_not_made_round() {
+    let (positions, around) = cube(|p| p.z < 6.0);
+    let patch = closed_by_fan(&around);
+    let region = Region { positions: &positions, patch: &patch, around: &around };
+    assert_eq!(shape(&region, &ShapeSettings::default()), Err(Unshaped::RimIsEdge));
+    let (positions, around) = cube(|p| !(p.x > 4.0 && p.y > 4.0 && p.z > 4.0));
+    let patch = closed_by_fan(&around);
+    let region = Region { positions: &positions, patch: &patch, around: &around };
+    let refused = shape(&region, &ShapeSettings::default()).unwrap_err();
+    assert!(matches!(refused, Unshaped::Creased | Unshaped::RimIsEdge), "{refused}");
+}
+
+#[test]
+fn nothing_is_added_to_what_is_fine() {
+    for count in 3..5 {
+        let edge = 0.1;
+        let radius = edge / (2.0 * (std::f64::consts::PI / f64::from(count)).sin());
+        let case = Case::round(Surface::Sphere, radius, edge, 2.0 * std::f64::consts::PI * radius / edge / f64::from(count));
+        assert_eq!(case.shaped(&case.coarse(), &ShapeSettings::default()), Err(Unshaped::NothingToAdd));
+    }
+}
+
+#[test]
+fn a_bound_makes_the_patch_coarser() {
+    let case = Case::round(Surface::Sphere, 0.4, 0.03, 1.0);
+    let free = case.shaped(&case.coarse(), &ShapeSettings::default()).unwrap();
+    let settings = ShapeSettings { max_vertices: 60, ..ShapeSettings::default() };
+    let bounded = case.shaped(&case.coarse(), &settings).unwrap();
+    assert!(free.added.len() > 400 && bounded.added.len() <= 60, "{} {}", free.added.len(), bounded.added.len());
+    assert!(case.errors(&bounded).0 < 0.01);
+}
+
+#[test]
+fn without_any_surroundings_the_patch_is_what_it_was_or_a_membrane() {
+    let case = Case::round(Surface::Sphere, 0.4, 0.05, 1.0);
+    let patch = case.coarse();
+    let region = Region { positions: &case.positions, patch: &patch, around: &[] };
+    if let Ok(shaped) = shape(&region, &ShapeSettings::default()) {
+        assert!(shaped.added.iter().all(|p| p[2] > 0.5 && p[2] < 1.1));
+    }
+}
+
+/// Prints what a patch costs.
+#[test]
+#[ignore = "measures time"]
+fn costs() {
+    let time = |name: &str, case: &Case, patch: &[[u32; 3]], method: Method| {
+        let settings = ShapeSettings { method, ..ShapeSettings::default() };
+        let (positions, around, patch) = case.cut(patch);
+        let region = Region { positions: &positions, patch: &patch, around: &around };
+        // Of this thread, so that other work on the machine does not count.
+        let spent = || -> f64 {
+            let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap();
+            text.split(' ').next().unwrap().parse::<f64>().unwrap() * 1e-6
+        };
+        let start = spent();
+        let mut rounds = 0;
+        let mut shaped = shape(&region, &settings);
+        while rounds < 2 || spent() - start < 200.0 {
+            shaped = shape(&region, &settings);
+            rounds += 1;
+        }
+        let each = (spent() - start) / f64::from(rounds + 1);
+        println!(
+            "{name} {method:?}: rim {}, added {:?}, {each:.3} ms",
+            case.rims.iter().map(Vec::len).sum::<usize>(),
+            shaped.map(|s| s.added.len())
+        );
+    };
+    for count in [4.0, 6.0, 8.0, 12.0, 20.0, 40.0, 80.0, 200.0, 350.0] {
+        let edge = 2.0 * std::f64::consts::PI * 0.3 / count;
+        let case = Case::round(Surface::Sphere, 0.3, edge, 1.0);
+        let patch = case.coarse();
+        time("disc", &case, &patch, Method::Fair);
+        if count < 100.0 {
+            time("disc", &case, &patch, Method::Implicit);
+        }
+    }
+    for gap in [4.0, 5.0] {
+        let edge = 2.0 * std::f64::consts::PI / 200.0;
+        let (case, patch) = bridged(200, gap * edge, edge);
+        time("bridge", &case, &patch, Method::Fair);
+        time("bridge", &case, &patch, Method::Implicit);
     }
 }

@@ -15,6 +15,9 @@ use crate::fill::{FillSettings, Rim, triangulate};
 const CREASE: f64 = 0.766;
 /// And below this, 60°, a coarse patch does not continue what is across the rim.
 const TURN: f64 = 0.5;
+/// A crease that bends less than [`TURN`] is a line only if it goes on within this cosine, 45°, beyond its first edge: rough surfaces have
+/// single edges as sharp.
+const ON: f64 = 0.7;
 /// Two ends face each other when both point along the line between them within this cosine, 45°.
 const FACING: f64 = 0.7;
 
@@ -38,7 +41,8 @@ pub(super) fn find(sheet: &Sheet<'_>) -> Result<Creases, Unshaped> {
     sides.sort_unstable();
     let normals: Vec<DVec3> = all.iter().map(|t| sheet.normal(*t).normalize_or_zero()).collect();
     let (mut turn, mut length) = (0.0, 0.0);
-    let mut ends: Vec<(u32, DVec3)> = Vec::new();
+    // Creases in both directions, by their ends, and whether they are sharp enough to count for themselves.
+    let mut lines: Vec<([u32; 2], bool)> = Vec::new();
     for same in sides.chunk_by(|a, b| a.0 == b.0) {
         let [(edge, i), (_, j)] = *same else { continue };
         let cosine = normals[i].dot(normals[j]);
@@ -49,12 +53,9 @@ pub(super) fn find(sheet: &Sheet<'_>) -> Result<Creases, Unshaped> {
             (true, true) => {}
             (false, false) => {
                 if known && cosine < CREASE {
-                    for (v, w) in [(edge[0], b), (edge[1], a)] {
-                        sharp[v as usize] = true;
-                        if sheet.on_rim[v as usize] {
-                            ends.push((v, (sheet.points[v as usize] - w).normalize_or_zero()));
-                        }
-                    }
+                    let [v, w] = edge;
+                    lines.extend([([v, w], cosine < TURN), ([w, v], cosine < TURN)]);
+                    (sharp[v as usize], sharp[w as usize]) = (true, true);
                 }
             }
             _ => {
@@ -71,6 +72,17 @@ pub(super) fn find(sheet: &Sheet<'_>) -> Result<Creases, Unshaped> {
     if turn < TURN * length {
         return Err(Unshaped::RimIsEdge);
     }
+    lines.sort_unstable();
+    let way = |[v, w]: [u32; 2]| (sheet.points[w as usize] - sheet.points[v as usize]).normalize_or_zero();
+    let goes_on = |[v, w]: [u32; 2]| {
+        let from = lines.partition_point(|(line, _)| line[0] < w);
+        lines[from..].iter().take_while(|(line, _)| line[0] == w).any(|(line, _)| line[1] != v && way(*line).dot(way([v, w])) > ON)
+    };
+    let ends: Vec<(u32, DVec3)> = lines
+        .iter()
+        .filter(|(line, strong)| sheet.on_rim[line[0] as usize] && (*strong || goes_on(*line)))
+        .map(|([v, w], _)| (*v, way([*w, *v])))
+        .collect();
     let through = match *ends {
         [] => None,
         [a, b] if a.0 != b.0 => {
@@ -112,7 +124,7 @@ pub(super) fn with_edge(region: &Region<'_>, sheet: &Sheet<'_>, [a, b]: [u32; 2]
             .collect();
         let forbidden = |x: u32, y: u32| sheet.is_taken(part[x as usize], part[y as usize]);
         let made =
-            triangulate(&Rim { points: &points, apexes: &apexes, forbidden: &forbidden }, &FillSettings::default()).ok()?;
+            triangulate(&Rim { points: &points, apexes: &apexes, obstacles: &[], forbidden: &forbidden }, &FillSettings::default()).ok()?;
         patch.extend(made.triangles.iter().map(|t| t.map(|v| part[v as usize])));
     }
     Some(patch)

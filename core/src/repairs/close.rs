@@ -4,8 +4,9 @@
 use std::collections::BTreeMap;
 
 use super::admit::{Admission, NotAdmitted};
+use super::guard::{self, Obstacle};
 use super::work::Work;
-use super::{annular, guard, islands, smooth};
+use super::{annular, islands, smooth};
 use crate::chunk::NONE;
 use crate::fill::{self, FillSettings, Rim, Unfillable, cross, strip};
 use crate::holes::{
@@ -39,7 +40,7 @@ const MAX_FLAT_SHARE: f64 = 0.1;
 const MAX_FLAT_EDGES: usize = 64;
 
 /// A patch that crosses anything is made anew by the next method, or around what it crosses, so many times, and is revoked then.
-const GUARD_ROUNDS: usize = 4;
+const GUARD_ROUNDS: usize = 6;
 
 /// A patch that is in the workshop.
 #[derive(Debug)]
@@ -53,7 +54,9 @@ pub(super) struct Placed {
     /// Of a patch that was shaped: the triangles that it was shaped from.
     pub(super) coarse: Vec<[Vertex; 3]>,
     /// What it came to grief on.
-    obstacles: Vec<cross::Triangle>,
+    obstacles: Vec<Obstacle>,
+    /// Nothing else was found than a patch that crosses bodies which run into this one already.
+    across: bool,
 }
 
 impl Placed {
@@ -66,7 +69,7 @@ impl Placed {
     }
 
     fn put_in(work: &mut Work<'_>, rims: Vec<u32>, triangles: &[[Vertex; 3]], method: &'static str) -> Self {
-        let mut placed = Self { rims, method, first: 0, count: 0, coarse: Vec::new(), obstacles: Vec::new() };
+        let mut placed = Self { rims, method, first: 0, count: 0, coarse: Vec::new(), obstacles: Vec::new(), across: false };
         placed.replace(work, triangles);
         placed
     }
@@ -211,7 +214,8 @@ impl Closing<'_> {
     }
 
     /// Steps back where a patch crosses anything: from the shape to the triangulation it came from, to another one around what it
-    /// crosses, to none.
+    /// crosses, to one that crosses only bodies that the loop's own runs into already, to none. (What is closed for itself and runs into others is a solid
+    /// still, which an open one is not.)
     fn guard(&mut self, survey: &Survey<'_>, work: &mut Work<'_>) {
         let mut is_new = vec![true; self.placed.len()];
         for round in 0..=GUARD_ROUNDS {
@@ -220,32 +224,53 @@ impl Closing<'_> {
                 patch.triangles().for_each(|t| patch_of[t as usize] = Some(i));
             }
             let Some(crossed) = guard::crossed(survey, work, &patch_of, |patch| is_new[patch as usize]) else { return };
-            if crossed.is_empty() {
-                return;
-            }
             is_new.fill(false);
-            for (i, obstacles) in crossed {
-                is_new[i as usize] = true;
-                if !self.step_back(work, i as usize, obstacles, round < GUARD_ROUNDS) {
-                    let rims = self.placed[i as usize].rims.clone();
+            for (i, mut obstacles) in crossed {
+                let i = i as usize;
+                if self.placed[i].across {
+                    obstacles.retain(|obstacle| !obstacle.met_already);
+                }
+                if obstacles.is_empty() {
+                    continue;
+                }
+                is_new[i] = true;
+                if !self.step_back(work, i, obstacles, round < GUARD_ROUNDS) {
+                    let rims = self.placed[i].rims.clone();
                     self.open.extend(rims.into_iter().map(|rim| (rim, NotFilled::Crosses)));
                 }
+            }
+            if !is_new.contains(&true) {
+                return;
             }
         }
     }
 
     /// Replaces a patch by the next one that may do, or by none.
-    fn step_back(&mut self, work: &mut Work<'_>, i: usize, obstacles: Vec<cross::Triangle>, again: bool) -> bool {
-        let mut triangles = std::mem::take(&mut self.placed[i].coarse);
+    fn step_back(&mut self, work: &mut Work<'_>, i: usize, obstacles: Vec<Obstacle>, again: bool) -> bool {
+        let is_solid_still = obstacles.iter().all(|obstacle| obstacle.met_already);
+        let coarse = std::mem::take(&mut self.placed[i].coarse);
+        let last: Vec<[Vertex; 3]> = self.placed[i].triangles().map(|t| work.triangles[t as usize].v).collect();
         self.placed[i].obstacles.extend(obstacles);
         self.placed[i].replace(work, &[]);
-        if let ([rim], true, true) =
-            (self.placed[i].rims.as_slice(), triangles.is_empty() && again, self.placed[i].method != FLAT)
-            && let Ok(patch) = self.fill(work, *rim, Neighbours::Heeded, &self.placed[i].obstacles)
-        {
-            triangles = of_workshop(self.rim(*rim), &patch);
-            self.placed[i].method = patch.method.name();
-        }
+        let triangles = if !coarse.is_empty() {
+            coarse
+        } else if let (&[rim], true) = (self.placed[i].rims.as_slice(), self.placed[i].method != FLAT) {
+            let tries: &[bool] = if again { &[false, true] } else { &[true] };
+            let made = tries.iter().find_map(|across| {
+                let heeded = self.placed[i].obstacles.iter().filter(|obstacle| !across || !obstacle.met_already);
+                let heeded: Vec<cross::Triangle> = heeded.map(|obstacle| obstacle.corners).collect();
+                self.fill(work, rim, Neighbours::Heeded, &heeded).ok().map(|patch| (patch, *across))
+            });
+            made.map_or_else(Vec::new, |(patch, across)| {
+                (self.placed[i].method, self.placed[i].across) = (patch.method.name(), across);
+                of_workshop(self.rim(rim), &patch)
+            })
+        } else if is_solid_still {
+            self.placed[i].across = true;
+            last
+        } else {
+            Vec::new()
+        };
         self.placed[i].replace(work, &triangles);
         !triangles.is_empty()
     }
@@ -264,7 +289,11 @@ impl Closing<'_> {
         for patch in self.placed.iter().filter(|p| p.count > 0) {
             let loops = patch.rims.len() as u64;
             closed.loops += loops;
-            let shaped = if patch.coarse.is_empty() { "" } else { ", shaped" };
+            let shaped = match patch {
+                _ if !patch.coarse.is_empty() => " (shaped)",
+                _ if patch.across => " (across a body met already)",
+                _ => "",
+            };
             *closed.by_method.entry(format!("{}{shaped}", patch.method)).or_default() += loops;
         }
         self.open.sort_by_key(|(rim, _)| *rim);

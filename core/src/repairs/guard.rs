@@ -6,22 +6,32 @@
 use std::collections::BTreeMap;
 
 use super::work::Work;
+use crate::chunk::NONE;
 use crate::fill::cross::Triangle as Corners;
 use crate::fresh;
 use crate::record;
+use crate::shop::components::{Components, Reversed, Through};
 use crate::shop::{Origin, Shop};
 use crate::survey::Survey;
 
+/// A triangle that a patch crosses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Obstacle {
+    pub(super) corners: Corners,
+    /// It belongs to a body that the one whose loop the patch closes runs into already.
+    pub(super) met_already: bool,
+}
+
 /// For each patch that crosses something what it crosses. `patch_of`: the patch that a triangle of the workshop belongs to; `is_new`: whether
 /// a patch is to be tested against everything, and not only against such ones. `None` if that is too much work to tell, or the file holds
-/// too many triangles to number them. O(boxes around new patches).
+/// too many triangles to number them. O(boxes around new patches), and a look at the components if anything is crossed.
 pub(super) fn crossed(
     survey: &Survey<'_>,
-    work: &Work<'_>,
+    work: &mut Work<'_>,
     patch_of: &[Option<u32>],
     is_new: impl Fn(u32) -> bool,
-) -> Option<BTreeMap<u32, Vec<Corners>>> {
-    let shop: &Shop = work;
+) -> Option<BTreeMap<u32, Vec<Obstacle>>> {
+    let (shop, edges) = work.edges();
     let records = survey.records.len() as u32;
     records.checked_add(shop.triangles.len() as u32)?;
     let patch = |t: u32| patch_of[t as usize];
@@ -52,30 +62,86 @@ pub(super) fn crossed(
         |place| gone.binary_search(&place).is_ok(),
         u64::from(records) + shop.triangles.len() as u64,
     )?;
-    let corners = |number: u32| match number.checked_sub(records) {
-        Some(t) => shop.points(t),
-        None => record::corners(&survey.records[number as usize]),
-    };
-    let mut crossed: BTreeMap<u32, Vec<Corners>> = BTreeMap::new();
+    let owner = |number: u32| number.checked_sub(records).and_then(patch);
+    // The patch to blame with one of its triangles, and what that crosses.
+    let mut blamed: Vec<(u32, u32, u32)> = Vec::new();
     for pair in pairs {
         let [a, b] = pair.triangles;
-        let owner = |number: u32| number.checked_sub(records).and_then(patch);
         match (owner(a), owner(b)) {
-            (Some(p), Some(q)) if p > q => crossed.entry(p).or_default().push(corners(b)),
-            (Some(p), Some(q)) if p < q => crossed.entry(q).or_default().push(corners(a)),
+            (Some(p), Some(q)) if p > q => blamed.push((p, a, b)),
+            (Some(p), Some(q)) if p < q => blamed.push((q, b, a)),
             // What was accepted crosses neither itself nor its rim.
             (Some(_), Some(_)) | (None, None) => {}
-            (Some(p), None) => crossed.entry(p).or_default().push(corners(b)),
-            (None, Some(q)) => crossed.entry(q).or_default().push(corners(a)),
+            (Some(p), None) => blamed.push((p, a, b)),
+            (None, Some(q)) => blamed.push((q, b, a)),
         }
     }
-    for obstacles in crossed.values_mut() {
-        obstacles.sort_by(|a, b| {
-            a.as_flattened().iter().zip(b.as_flattened()).fold(std::cmp::Ordering::Equal, |o, (x, y)| o.then(x.total_cmp(y)))
-        });
-        obstacles.dedup();
+    if blamed.is_empty() {
+        return Some(BTreeMap::new());
+    }
+    blamed.sort_unstable();
+    let components = Components::of(survey, shop, edges, &Reversed::none(survey), Through::EveryEdge);
+    let met = survey.crossing_pairs.as_deref().unwrap_or_default();
+    let others = blamed.iter().map(|(_, _, other)| *other).filter(|other| *other < records);
+    let of_record = components_of_records(survey, shop, &components, others.chain(met.iter().flat_map(|pair| pair.triangles)));
+    let mut met: Vec<[u32; 2]> = met
+        .iter()
+        .filter_map(|pair| Some([*of_record.get(&pair.triangles[0])?, *of_record.get(&pair.triangles[1])?]))
+        .flat_map(|[a, b]| [[a, b], [b, a]])
+        .filter(|[a, b]| a != b)
+        .collect();
+    met.sort_unstable();
+    met.dedup();
+    let component = |number: u32| match number.checked_sub(records) {
+        Some(t) => Some(components.of_triangle[t as usize]),
+        None => of_record.get(&number).copied(),
+    };
+    let mut crossed: BTreeMap<u32, Vec<Obstacle>> = BTreeMap::new();
+    for (patch, of_patch, other) in blamed {
+        let corners = match other.checked_sub(records) {
+            Some(t) => shop.points(t),
+            None => record::corners(&survey.records[other as usize]),
+        };
+        let of_both = component(of_patch).zip(component(other));
+        let obstacle = Obstacle { corners, met_already: of_both.is_some_and(|(a, b)| met.binary_search(&[a, b]).is_ok()) };
+        let all = crossed.entry(patch).or_default();
+        if !all.contains(&obstacle) {
+            all.push(obstacle);
+        }
     }
     Some(crossed)
+}
+
+/// The components of some records that are as they were. Reads the chunks where those are that are not in the workshop.
+fn components_of_records(
+    survey: &Survey<'_>,
+    shop: &Shop,
+    components: &Components,
+    records: impl Iterator<Item = u32>,
+) -> BTreeMap<u32, u32> {
+    let mut wanted: Vec<u32> = records.collect();
+    wanted.sort_unstable();
+    wanted.dedup();
+    let is_wanted = |record: u32| wanted.binary_search(&record).is_ok();
+    let mut found = BTreeMap::new();
+    for (t, triangle) in shop.triangles.iter().enumerate() {
+        if let Origin::Input(record) = triangle.origin
+            && is_wanted(record)
+        {
+            found.insert(record, components.of_triangle[t]);
+        }
+    }
+    let positions: Vec<[f32; 3]> = wanted
+        .iter()
+        .filter(|record| !found.contains_key(record))
+        .map(|record| record::corners(&survey.records[*record as usize])[0].map(|x| x + 0.0))
+        .collect();
+    if !positions.is_empty() {
+        let around = survey.beyond_the_workshop(&positions);
+        let around = around.iter().filter(|(suspect, patch)| is_wanted(suspect.triangle) && *patch != NONE);
+        found.extend(around.map(|(suspect, patch)| (suspect.triangle, components.of_patch[*patch as usize])));
+    }
+    found
 }
 
 /// Comparing as numbers, whichever way round.

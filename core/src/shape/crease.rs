@@ -76,7 +76,10 @@ pub(super) fn find(sheet: &Sheet<'_>) -> Result<Creases, Unshaped> {
     let way = |[v, w]: [u32; 2]| (sheet.points[w as usize] - sheet.points[v as usize]).normalize_or_zero();
     let goes_on = |[v, w]: [u32; 2]| {
         let from = lines.partition_point(|(line, _)| line[0] < w);
-        lines[from..].iter().take_while(|(line, _)| line[0] == w).any(|(line, _)| line[1] != v && way(*line).dot(way([v, w])) > ON)
+        lines[from..]
+            .iter()
+            .take_while(|(line, _)| line[0] == w)
+            .any(|(line, _)| line[1] != v && way(*line).dot(way([v, w])) > ON)
     };
     let ends: Vec<(u32, DVec3)> = lines
         .iter()
@@ -123,8 +126,11 @@ pub(super) fn with_edge(region: &Region<'_>, sheet: &Sheet<'_>, [a, b]: [u32; 2]
             })
             .collect();
         let forbidden = |x: u32, y: u32| sheet.is_taken(part[x as usize], part[y as usize]);
-        let made =
-            triangulate(&Rim { points: &points, apexes: &apexes, obstacles: &[], forbidden: &forbidden }, &FillSettings::default()).ok()?;
+        let made = triangulate(
+            &Rim { points: &points, apexes: &apexes, obstacles: &[], forbidden: &forbidden },
+            &FillSettings::default(),
+        )
+        .ok()?;
         patch.extend(made.triangles.iter().map(|t| t.map(|v| part[v as usize])));
     }
     Some(patch)

@@ -395,7 +395,8 @@ pub(super) fn fill(d: &mut crate::engine::Diagnosis<'_>, profile: &Profile) -> C
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{After, after, cube, plate};
+    use crate::report::LoopClass;
+    use crate::testing::{After, Corners, after, cube, cuboid, plate};
 
     /// A cube without its top.
     fn filled(profile: &Profile) -> After<Closed> {
@@ -435,5 +436,82 @@ mod tests {
             fill(d, &profile).loops
         });
         assert_eq!((got.result, got.defects.nonmanifold_vertices, got.defects.boundary_loops), (2, 0, 1));
+    }
+
+    /// A globe of radius 10 without its cap: rows of 7.5° from the pole, 48 columns.
+    fn open_globe() -> Vec<Corners> {
+        let at = |i: u8, j: u8| {
+            let (polar, turn) = (f32::from(i) * std::f32::consts::PI / 24.0, f32::from(j % 48) * std::f32::consts::TAU / 48.0);
+            if i == 24 {
+                return [0.0, 0.0, -10.0];
+            }
+            [10.0 * polar.sin() * turn.cos(), 10.0 * polar.sin() * turn.sin(), 10.0 * polar.cos()]
+        };
+        let quad = |i, j| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]];
+        let all = (4..24).flat_map(|i| (0..48).flat_map(move |j| quad(i, j)));
+        all.filter(|[a, b, c]| a != b && b != c && c != a).collect()
+    }
+
+    #[test]
+    fn a_patch_continues_the_globe() {
+        let got = after(&open_globe(), |d, _| {
+            let closed = fill(d, &Profile::default());
+            let new: Vec<f64> = d.shop.positions.iter().map(|p| crate::shop::place(*p).length()).collect();
+            (closed, new.into_iter().map(|r| (r - 10.0).abs()).fold(0.0, f64::max))
+        });
+        assert!(got.verdict.good, "{:?}", got.verdict);
+        assert_eq!(got.result.0.by_method, BTreeMap::from([("planar (shaped)".into(), 1)]));
+        // A flat cap would leave 1.3 of height out; the facets of the globe leave 0.021.
+        assert!(got.result.1 < 0.03, "{}", got.result.1);
+        let flat = Profile { patch_shape: PatchShape::Flat, ..Profile::default() };
+        let got = after(&open_globe(), |d, _| fill(d, &flat));
+        assert_eq!(got.result.by_method, BTreeMap::from([("planar".into(), 1)]));
+    }
+
+    #[test]
+    fn a_shape_that_crosses_another_body_is_given_up_for_a_patch_that_does_not() {
+        // The cap's plane is at 8.66, the globe ends at 10.
+        let needle = cuboid([-0.1, -0.1, 9.5], [0.1, 0.1, 12.0]);
+        let got = after(&[open_globe(), needle].concat(), |d, _| fill(d, &Profile::default()));
+        assert_eq!(got.result.by_method, BTreeMap::from([("planar".into(), 1)]));
+        assert!(got.verdict.good, "{:?}", got.verdict);
+    }
+
+    #[test]
+    fn a_loop_that_every_patch_would_close_through_another_body_stays_open() {
+        let needle = cuboid([-0.1, -0.1, 5.0], [0.1, 0.1, 12.0]);
+        let got = after(&[open_globe(), needle].concat(), |d, _| fill(d, &Profile::default()));
+        assert_eq!((got.result.loops, got.result.left.len(), got.defects.boundary_loops), (0, 1, 1));
+        assert!(got.result.left[0].reason.contains("crosses the surface around"), "{}", got.result.left[0].reason);
+        assert_eq!(got.defects.self_intersections.as_ref().map(|si| si.triangles), Some(0));
+    }
+
+    #[test]
+    fn bodies_that_cross_already_are_closed_all_the_same() {
+        let needle = cuboid([-0.1, -0.1, -12.0], [0.1, 0.1, 12.0]);
+        let got = after(&[open_globe(), needle].concat(), |d, _| fill(d, &Profile::default()));
+        assert_eq!(got.result.by_method, BTreeMap::from([("planar (across a body met already)".into(), 1)]));
+        assert_eq!(got.defects.boundary_edges, 0);
+    }
+
+    #[test]
+    fn the_rim_of_a_lone_sheet_stays_open_unless_asked() {
+        let hole = |x: u8, y: u8| !((2..4).contains(&x) && (2..4).contains(&y));
+        let got = after(&plate(6, hole), |d, _| fill(d, &Profile::default()));
+        assert_eq!((got.result.loops, got.defects.boundary_edges), (1, 24), "the hole is none");
+        assert!(got.result.left[0].reason.contains("lone sheet"), "{}", got.result.left[0].reason);
+        // A relief encloses something. (Without the two corners that would lie in the plane of its rim.)
+        let hill: Vec<Corners> = plate(6, |x, y| x.abs_diff(y) < 5)
+            .iter()
+            .map(|t| t.map(|[x, y, _]| [x, y, x * (6.0 - x) * y * (6.0 - y) / 40.0]))
+            .collect();
+        assert_eq!(after(&hill, |d, _| fill(d, &Profile::default())).defects.boundary_edges, 0);
+    }
+
+    #[test]
+    fn a_profile_leaves_a_kind_of_loop_open() {
+        let profile = Profile { leave_open: vec![LoopClass::Simple], ..Profile::default() };
+        let got = filled(&profile);
+        assert_eq!(got.result.left[0].reason, "the profile leaves simple loops open");
     }
 }

@@ -129,7 +129,7 @@ mod tests {
         let keep = |x: u8, y: u8| x.min(y) < 2 || x.max(y) > 13 || [(4, 4), (5, 4), (10, 9), (5, 9)].contains(&(x, y));
         let dome = |[x, y, _]: [f32; 3]| [x, y, 10.0 - 0.15 * ((x - 8.0) * (x - 8.0) + (y - 8.0) * (y - 8.0))];
         let open: Vec<Corners> = plate(16, keep).iter().map(|t| t.map(dome)).collect();
-        assert_eq!(bridged(&open, 63.0), (4, 1, 1));
+        assert_eq!(bridged(&open, 90.0), (4, 1, 1));
     }
 
     #[test]

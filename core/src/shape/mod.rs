@@ -81,6 +81,9 @@ pub(crate) enum Unshaped {
     /// The rim is an edge of the surface: a lid is missing, which does not continue what is around.
     #[error("the rim is an edge of the surface")]
     RimIsEdge,
+    /// Most of what is next to the rim is sharp: the surface around says nothing of curvature.
+    #[error("the surface around does not tell how it is curved")]
+    Uncurved,
     /// The equations could not be solved reliably.
     #[error("the equations could not be solved")]
     Unsolved,
@@ -110,6 +113,9 @@ pub(crate) fn shape(region: &Region<'_>, settings: &ShapeSettings) -> Result<Sha
         return Err(Unshaped::NothingToAdd);
     }
     let crease::Creases { mut sharp, through } = crease::find(&sheet)?;
+    if !tells_curvature(&sheet, region, &sharp) {
+        return Err(Unshaped::Uncurved);
+    }
     let divided;
     if let Some(ends) = through {
         divided = crease::with_edge(region, &sheet, ends.map(|e| e.0)).ok_or(Unshaped::Creased)?;
@@ -150,6 +156,16 @@ pub(crate) fn shape(region: &Region<'_>, settings: &ShapeSettings) -> Result<Sha
         }
     }
     Err(Unshaped::Crosses)
+}
+
+/// Are at least half of the vertices next to the rim on smooth surface?
+fn tells_curvature(sheet: &Sheet<'_>, region: &Region<'_>, sharp: &[bool]) -> bool {
+    let is_on_rim = |v: &u32| sheet.on_rim[*v as usize];
+    let beside = region.around.iter().filter(|t| t.iter().any(is_on_rim)).flatten().filter(|v| !is_on_rim(v));
+    let mut next: Vec<u32> = beside.copied().collect();
+    next.sort_unstable();
+    next.dedup();
+    2 * next.iter().filter(|v| !sharp[**v as usize]).count() >= next.len()
 }
 
 /// Cheap: is no triangle large enough to be divided, whatever the scale?

@@ -46,7 +46,7 @@ fn a_slit_whose_sides_run_alike_is_a_gap() {
 
 #[test]
 fn a_slit_whose_sides_do_not_is_misaligned() {
-    let jagged = |[x, y, _]: [f32; 3]| [x + 0.1, y, if y as u8 % 2 == 0 { 0.25 } else { -0.25 }];
+    let jagged = |[x, y, _]: [f32; 3]| [x + 0.1, y, if (y as u8).is_multiple_of(2) { 0.25 } else { -0.25 }];
     assert_eq!(classes(&slit(jagged), true), [Misaligned]);
 }
 

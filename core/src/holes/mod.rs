@@ -29,10 +29,11 @@ const MACHINING_SHARE: f64 = 0.02;
 const SLENDER_SHARE: f64 = 0.25;
 /// How far the surface on both sides runs on across a loop (−1: all the way back over it) for its sides to have run past each other.
 const PAST_EACH_OTHER: f64 = -0.5;
-/// Then it is a slit below this share of a circle, since hills beside it tilt its sides, if it is longer than wide by [`LENGTH`] and its area
-/// where it is largest below [`PASSES_SHARE`].
+/// Then it is a slit below this share of a circle, since hills beside it tilt its sides, if its area where it is largest is below
+/// [`PASSES_SHARE`].
 const PASSES_MACHINING_SHARE: f64 = 0.16;
 const PASSES_SHARE: f64 = 0.5;
+/// A slit is longer than wide by this.
 const LENGTH: f64 = 2.0;
 /// A loop is flat if it rises so little above its plane, measured by the plane's smaller extent.
 const FLAT: f64 = 0.05;
@@ -142,7 +143,10 @@ fn shape_of(shop: &Shop, rim: &Loop) -> Shape {
 fn machining(shape: &Shape) -> Option<(LoopClass, String)> {
     let circle = shape.perimeter * shape.perimeter / (4.0 * std::f64::consts::PI);
     let [length, width, _] = shape.extents;
-    let passes = shape.continues < PAST_EACH_OTHER && length > LENGTH * width;
+    if length <= LENGTH * width {
+        return None;
+    }
+    let passes = shape.continues < PAST_EACH_OTHER;
     let (most, below) = if passes { (PASSES_SHARE, PASSES_MACHINING_SHARE) } else { (SLENDER_SHARE, MACHINING_SHARE) };
     if shape.off_plane <= FLAT * width || shape.area() >= most * circle {
         return None;

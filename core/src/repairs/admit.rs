@@ -17,6 +17,8 @@ use crate::survey::Survey;
 
 /// A patch lies back along the surface if it continues it by less than this ([`holes::continues`]).
 const LIES_BACK: f64 = -0.5;
+/// And if it is at least this share of the surface: the patch of a sheet is about as large as the sheet.
+const LARGE: f64 = 0.25;
 /// A sheet encloses less than this share of its size: the root of the area of one side, cubed. A plate that rises by a fiftieth of its width
 /// on average.
 const THIN: f64 = 0.02;
@@ -78,8 +80,17 @@ impl<'p> Admission<'p> {
 
     /// The same together with another loop: a sheet that is joined to something is lone no more.
     pub(super) fn check_joined(&self, shop: &Shop, rim: &Loop) -> Result<(), NotAdmitted> {
-        self.check_limits(shop, rim)?;
-        self.refusal(rim).filter(|reason| !matches!(reason, NotAdmitted::Sheet)).map_or(Ok(()), |reason| Err(reason.clone()))
+        if self.is_sheet(rim) { self.check_limits(shop, rim) } else { self.check(shop, rim) }
+    }
+
+    /// Is it the rim of a lone sheet?
+    pub(super) fn is_sheet(&self, rim: &Loop) -> bool {
+        matches!(self.refusal(rim), Some(NotAdmitted::Sheet))
+    }
+
+    /// This sheet is lone no more.
+    pub(super) fn joined(&mut self, rim: &Loop) {
+        self.refused.retain(|(v, _)| *v != rim.vertices[0]);
     }
 
     fn check_limits(&self, shop: &Shop, rim: &Loop) -> Result<(), NotAdmitted> {
@@ -109,7 +120,7 @@ fn sheet_rims<'l>(
     loops: &'l [Loop],
     reversed: &Reversed,
 ) -> impl Iterator<Item = u32> + use<'l> {
-    let lies_back: Vec<bool> = loops.iter().map(|rim| holes::continues(shop, rim) < LIES_BACK).collect();
+    let mut lies_back: Vec<bool> = loops.iter().map(|rim| holes::continues(shop, rim) < LIES_BACK).collect();
     let mut of_loop = vec![NONE; loops.len()];
     let mut is_sheet = Vec::new();
     if lies_back.contains(&true) {
@@ -118,10 +129,11 @@ fn sheet_rims<'l>(
         // What the components enclose once their loops are closed, and the area they have then.
         let mut enclosed: Vec<(f64, f64)> =
             components.list.iter().map(|c| (survey.measure.volume(c.extent), survey.measure.area(c.extent))).collect();
-        for (rim, component) in loops.iter().zip(&mut of_loop) {
+        for ((rim, component), lies_back) in loops.iter().zip(&mut of_loop).zip(&mut lies_back) {
             *component = components.of_triangle[rim.triangles[0] as usize];
             if let Some((volume, area)) = enclosed.get_mut(*component as usize) {
                 let (more, patch) = fan(shop, rim, middle);
+                *lies_back &= patch >= LARGE * survey.measure.area(components.list[*component as usize].extent);
                 *volume += more;
                 *area += patch;
             }

@@ -141,7 +141,7 @@ impl Closing<'_> {
         let admits = |shop: &Shop, rim: &Loop| self.admission.check_joined(shop, rim).is_ok();
         let rings = partners.rings.into_iter().map(|pair| pair.map(|i| &rims[i]));
         let rings: Vec<[&Loop; 2]> = rings.filter(|pair| pair.iter().all(|rim| admits(work, rim))).collect();
-        let groups = islands::groups(survey, work, &rims, &partners.islands);
+        let groups = islands::groups(survey, work, &rims, &partners.islands, |rim| self.admission.is_sheet(rim));
         let groups: Vec<Vec<&Loop>> = groups
             .iter()
             .map(|group| group.iter().map(|i| &rims[*i]).collect::<Vec<_>>())
@@ -161,7 +161,10 @@ impl Closing<'_> {
         for group in &groups {
             match islands::patch(work, group) {
                 Some(triangles) => place(work, group, &triangles, "islands"),
-                None => self.joints.extend(islands::join_all(work, group)),
+                None => {
+                    self.joints.extend(islands::join_all(work, group));
+                    group[1..].iter().for_each(|island| self.admission.joined(island));
+                }
             }
         }
         let first = done.len();
@@ -235,12 +238,26 @@ impl Closing<'_> {
                 }
                 is_new[i] = true;
                 if !self.step_back(work, i, obstacles, round < GUARD_ROUNDS) {
-                    let rims = self.placed[i].rims.clone();
-                    self.open.extend(rims.into_iter().map(|rim| (rim, NotFilled::Crosses)));
+                    self.revoke(work, i, &mut is_new);
                 }
             }
             if !is_new.contains(&true) {
                 return;
+            }
+        }
+    }
+
+    /// Gives a patch up. Loops that it closed together are closed each for itself, where that is admitted.
+    fn revoke(&mut self, work: &mut Work<'_>, i: usize, is_new: &mut Vec<bool>) {
+        let rims = self.placed[i].rims.clone();
+        for rim in &rims {
+            match self.fill(work, *rim, Neighbours::Heeded, &[]) {
+                Ok(patch) if rims.len() > 1 => {
+                    self.put_in(work, *rim, &patch, patch.method.name());
+                    is_new.push(true);
+                }
+                Err(reason @ NotFilled::NotAdmitted(_)) => self.open.push((*rim, reason)),
+                _ => self.open.push((*rim, NotFilled::Crosses)),
             }
         }
     }

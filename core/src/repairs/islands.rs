@@ -8,17 +8,27 @@ use std::collections::BTreeMap;
 
 use super::close::are_joined;
 use super::work::Work;
+use crate::boxes::BoxTree;
 use crate::chunk::NONE;
 use crate::fill::exact::Point;
 use crate::fill::{self, Rim};
 use crate::holes::loops::Loop;
 use crate::shop::components::{Components, Reversed, Through};
 use crate::shop::{Origin, Shop, Vertex};
+use crate::sums::Bounds;
 use crate::survey::Survey;
 
-/// Holes, each with its islands, of some pairs of loops that look like one and the other. O(workshop) if there are any.
-pub(super) fn groups(survey: &Survey<'_>, work: &mut Work<'_>, rims: &[Loop], pairs: &[[usize; 2]]) -> Vec<Vec<usize>> {
-    if pairs.is_empty() {
+/// Holes, each with its islands: some pairs of loops look like one and the other; a lone sheet that none of them holds lies in the smallest
+/// hole whose box holds its middle. O(workshop) if there are any.
+pub(super) fn groups(
+    survey: &Survey<'_>,
+    work: &mut Work<'_>,
+    rims: &[Loop],
+    pairs: &[[usize; 2]],
+    is_sheet: impl Fn(&Loop) -> bool,
+) -> Vec<Vec<usize>> {
+    let sheets: Vec<usize> = (0..rims.len()).filter(|i| is_sheet(&rims[*i])).collect();
+    if pairs.is_empty() && sheets.is_empty() {
         return Vec::new();
     }
     let (shop, edges) = work.edges();
@@ -27,7 +37,23 @@ pub(super) fn groups(survey: &Survey<'_>, work: &mut Work<'_>, rims: &[Loop], pa
     let mut loops_of = vec![0u32; components.list.len()];
     (0..rims.len()).for_each(|rim| loops_of[component(rim) as usize] += 1);
     let mut inside: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for [hole, island] in pairs.iter().copied() {
+    let bounds: Vec<Bounds> = rims.iter().map(|rim| Bounds::of(&rim.points(shop))).collect();
+    let tree = BoxTree::new(&bounds);
+    let mut found = Vec::new();
+    let mut pairs = pairs.to_vec();
+    for sheet in sheets {
+        if pairs.iter().any(|[_, island]| *island == sheet) {
+            continue;
+        }
+        let Bounds { lo, hi } = bounds[sheet];
+        let middle: [f32; 3] = std::array::from_fn(|k| 0.5 * lo[k] + 0.5 * hi[k]);
+        tree.meeting(&Bounds { lo: middle, hi: middle }, &mut found);
+        let length = rims[sheet].perimeter(shop);
+        let around = found.iter().map(|hole| *hole as usize).filter(|hole| !is_sheet(&rims[*hole]));
+        let around = around.map(|hole| (rims[hole].perimeter(shop), hole)).filter(|(perimeter, _)| *perimeter > length);
+        pairs.extend(around.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(_, hole)| [hole, sheet]));
+    }
+    for [hole, island] in pairs {
         let [of_hole, of_island] = [hole, island].map(|rim| component(rim) as usize);
         let area = components.list[of_island].extent.area;
         // An island has no other rim, and is smaller than the rest of what it belongs to. (A hole's component may be an island no more.)

@@ -146,7 +146,7 @@ pub fn triangulate(rim: &Rim<'_>, settings: &FillSettings) -> Result<Patch, Unfi
     }
     if rim.len() == 3 {
         let only = [0, 1, 2];
-        return if rim.admits(only) {
+        return if rim.admits(only) && !rim.meets_obstacle(&rim.corners(only)) {
             Ok(Patch { triangles: vec![only], method: Method::Triangle })
         } else {
             Err(Unfillable::Blocked)
@@ -327,7 +327,7 @@ impl Rim<'_> {
         self.points.iter().skip(2).all(|p| collinear(&self.points[0], &self.points[1], p))
     }
 
-    fn corners(&self, t: [u32; 3]) -> [Point; 3] {
+    pub(crate) fn corners(&self, t: [u32; 3]) -> [Point; 3] {
         t.map(|v| self.points[v as usize])
     }
 
@@ -371,7 +371,7 @@ impl Rim<'_> {
             })
     }
 
-    fn meets_obstacle(&self, corners: &Triangle) -> bool {
+    pub(crate) fn meets_obstacle(&self, corners: &Triangle) -> bool {
         self.obstacles.iter().any(|other| triangles_cross(corners, other).is_crossing())
     }
 

@@ -16,6 +16,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
+use crate::parallel;
 use crate::report::{BoundaryLoop, BoundaryLoops, LoopClass};
 use crate::shop::edges::Edges;
 use crate::shop::near::Tolerance;
@@ -33,6 +34,8 @@ const PAST_EACH_OTHER: f64 = -0.5;
 /// [`PASSES_SHARE`].
 const PASSES_MACHINING_SHARE: f64 = 0.16;
 const PASSES_SHARE: f64 = 0.5;
+/// Loops of fewer vertices are not zipped: there is nothing between their folds.
+const FEWEST_FOLDED: usize = 6;
 /// A slit is longer than wide by this.
 const LENGTH: f64 = 2.0;
 /// A loop is flat if it rises so little above its plane, measured by the plane's smaller extent.
@@ -112,21 +115,30 @@ pub(crate) struct Partners {
     pub(crate) islands: Vec<[usize; 2]>,
 }
 
-/// The partners among some loops. O(n log n) in their vertices.
-pub(crate) fn partners(shop: &Shop, loops: &[Loop]) -> Partners {
-    let shapes: Vec<Shape> = loops.iter().map(|rim| shape_of(shop, rim)).collect();
-    let all: Vec<u32> = (0..loops.len() as u32).collect();
-    let mut partners = Partners::default();
-    for pair in pairs::find(&all, &shapes) {
-        let kind = if pair.class == LoopClass::Island { &mut partners.islands } else { &mut partners.rings };
-        kind.push(pair.loops.map(|i| i as usize));
-    }
-    partners
-}
+/// The shapes of some loops, to be asked several things.
+pub(crate) struct Shapes(Vec<Shape>);
 
-/// Whether a flat patch would continue the surface (1), stand on it (0), or lie back along it (−1).
-pub(crate) fn continues(shop: &Shop, rim: &Loop) -> f64 {
-    shape_of(shop, rim).continues
+impl Shapes {
+    /// O(vertices).
+    pub(crate) fn of(shop: &Shop, loops: &[Loop], threads: usize) -> Self {
+        Self(parallel::map(threads, loops.len(), |i| shape_of(shop, &loops[i])))
+    }
+
+    /// The partners among the loops. O(n log n) in their vertices.
+    pub(crate) fn partners(&self) -> Partners {
+        let all: Vec<u32> = (0..self.0.len() as u32).collect();
+        let mut partners = Partners::default();
+        for pair in pairs::find(&all, &self.0) {
+            let kind = if pair.class == LoopClass::Island { &mut partners.islands } else { &mut partners.rings };
+            kind.push(pair.loops.map(|i| i as usize));
+        }
+        partners
+    }
+
+    /// For each loop: would a flat patch continue the surface (1), stand on it (0), or lie back along it (−1)?
+    pub(crate) fn continues(&self) -> impl Iterator<Item = f64> + '_ {
+        self.0.iter().map(|shape| shape.continues)
+    }
 }
 
 fn shape_of(shop: &Shop, rim: &Loop) -> Shape {
@@ -163,6 +175,9 @@ fn machining(shape: &Shape) -> Option<(LoopClass, String)> {
 
 /// The places where a loop lost to machining turns back: its ends along its length. `None` for any other loop. O(vertices).
 pub(crate) fn folds(shop: &Shop, rim: &Loop) -> Option<[usize; 2]> {
+    if rim.vertices.len() < FEWEST_FOLDED {
+        return None;
+    }
     let shape = shape_of(shop, rim);
     machining(&shape)?;
     let farthest = |from: DVec3| {

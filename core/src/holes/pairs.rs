@@ -28,6 +28,9 @@ const ONE_SURFACE: f64 = 0.8;
 const ISLAND_SURFACE: f64 = 0.5;
 /// And how much less, at most: −2 is a plate's own rim around a hole in it.
 const WASHER: f64 = -0.5;
+/// How much both rims' surfaces go on across them, together, at most: holes in two bodies that face each other come to 2, the ends of a
+/// tube to 0.
+const FACING_HOLES: f64 = 1.0;
 /// How far the surface along a rim faces the axis, or away from it, to be a skin.
 const SKIN: f64 = 0.3;
 /// Cosine between the vector areas of a hole and an island in it, at most: an island is small, and may lie on a slope.
@@ -127,7 +130,8 @@ fn ring(a: &Shape, b: &Shape) -> Option<(LoopClass, f64)> {
         return Some((LoopClass::AnnularCoplanar, apart));
     }
     let look_at_each_other = outer.vector_area.dot(way) > 0.0 && inner.vector_area.dot(way) < 0.0;
-    (one_surface > WASHER && look_at_each_other).then_some((LoopClass::AnnularParallel, apart))
+    let holes = outer.continues + inner.continues > FACING_HOLES;
+    (one_surface > WASHER && look_at_each_other && !holes).then_some((LoopClass::AnnularParallel, apart))
 }
 
 /// The one is a hole in a surface, the other the rim of a piece.

@@ -92,10 +92,12 @@ fn principal_axes(mut a: [[f64; 3]; 3]) -> [(f64, DVec3); 3] {
     let mut axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     // Converges quadratically; after so many sweeps nothing is left to turn.
     for _ in 0..12 {
+        let mut turned = false;
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            if a[p][q] == 0.0 {
+            if a[p][q].abs() <= f64::EPSILON * 0.25 * (a[p][p].abs() + a[q][q].abs()) {
                 continue;
             }
+            turned = true;
             let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
             let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
             let c = 1.0 / (t * t + 1.0).sqrt();
@@ -109,6 +111,9 @@ fn principal_axes(mut a: [[f64; 3]; 3]) -> [(f64, DVec3); 3] {
             for row in &mut axes {
                 (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
             }
+        }
+        if !turned {
+            break;
         }
     }
     let mut all = [0, 1, 2].map(|k| (a[k][k], DVec3::new(axes[0][k], axes[1][k], axes[2][k])));

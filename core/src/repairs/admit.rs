@@ -6,8 +6,9 @@
 
 use glam::DVec3;
 
+use super::work::Work;
 use crate::chunk::NONE;
-use crate::holes::{self, loops::Loop};
+use crate::holes::{self, Shapes, loops::Loop};
 use crate::settings::Profile;
 use crate::shop::Shop;
 use crate::shop::components::{Components, Reversed, Through};
@@ -15,7 +16,7 @@ use crate::shop::edges::Edges;
 use crate::shop::near::Tolerance;
 use crate::survey::Survey;
 
-/// A patch lies back along the surface if it continues it by less than this ([`holes::continues`]).
+/// A patch lies back along the surface if it continues it by less than this ([`Shapes::continues`]).
 const LIES_BACK: f64 = -0.5;
 /// And if it is at least this share of the surface: the patch of a sheet is about as large as the sheet.
 const LARGE: f64 = 0.25;
@@ -50,13 +51,14 @@ impl<'p> Admission<'p> {
     /// O(n log n) in the loops, and a look at the components if a loop may be a sheet's.
     pub(super) fn of(
         survey: &Survey<'_>,
-        shop: &Shop,
-        edges: &Edges,
+        work: &mut Work<'_>,
         loops: &[Loop],
+        shapes: &Shapes,
         reversed: &Reversed,
         tolerance: &Tolerance,
         profile: &'p Profile,
     ) -> Self {
+        let (shop, edges) = work.edges();
         let by_share = profile.max_hole_perimeter_relative * survey.bounds.diagonal();
         let longest = if profile.max_hole_perimeter_mm > 0.0 { by_share.min(profile.max_hole_perimeter_mm) } else { by_share };
         let mut refused = Vec::new();
@@ -66,7 +68,7 @@ impl<'p> Admission<'p> {
             refused.extend(left.map(|(rim, found)| (rim.vertices[0], NotAdmitted::Class(found.class.name()))));
         }
         if !profile.close_sheets && profile.fill_holes {
-            refused.extend(sheet_rims(survey, shop, edges, loops, reversed).map(|v| (v, NotAdmitted::Sheet)));
+            refused.extend(sheet_rims(survey, shop, edges, loops, shapes, reversed).map(|v| (v, NotAdmitted::Sheet)));
         }
         refused.sort_by_key(|(v, _)| *v);
         Self { profile, longest, refused }
@@ -118,9 +120,10 @@ fn sheet_rims<'l>(
     shop: &Shop,
     edges: &Edges,
     loops: &'l [Loop],
+    shapes: &Shapes,
     reversed: &Reversed,
 ) -> impl Iterator<Item = u32> + use<'l> {
-    let mut lies_back: Vec<bool> = loops.iter().map(|rim| holes::continues(shop, rim) < LIES_BACK).collect();
+    let mut lies_back: Vec<bool> = shapes.continues().map(|continues| continues < LIES_BACK).collect();
     let mut of_loop = vec![NONE; loops.len()];
     let mut is_sheet = Vec::new();
     if lies_back.contains(&true) {

@@ -10,7 +10,7 @@ use super::{annular, islands, smooth};
 use crate::chunk::NONE;
 use crate::fill::{self, FillSettings, Rim, Unfillable, cross, strip};
 use crate::holes::{
-    self,
+    self, Shapes,
     loops::{self, Loop},
 };
 use crate::parallel;
@@ -39,8 +39,14 @@ const MAX_FLAT_SHARE: f64 = 0.1;
 /// And only for loops of at most so many edges.
 const MAX_FLAT_EDGES: usize = 64;
 
-/// A patch that crosses anything is made anew by the next method, or around what it crosses, so many times, and is revoked then.
-const GUARD_ROUNDS: usize = 6;
+/// A patch that crosses anything is made anew by the next method, or around what it crosses, so many times, and is revoked then: one of
+/// many vertices, which takes long, fewer times than a small one.
+const GUARD_ROUNDS: (usize, usize) = (2, 6);
+/// Vertices of a small one, at most.
+const SMALL: usize = 64;
+
+/// No patch is looked for around more triangles than this: what is so much in the way leaves no room.
+const MAX_OBSTACLES: usize = 256;
 
 /// A patch that is in the workshop.
 #[derive(Debug)]
@@ -96,11 +102,12 @@ pub(super) fn fill_loops(
 ) -> Closed {
     let (shop, edges) = work.edges();
     let rims = loops::find(shop, edges);
-    let admission = Admission::of(survey, shop, edges, &rims, reversed, tolerance, profile);
+    let shapes = Shapes::of(shop, &rims, threads);
+    let admission = Admission::of(survey, work, &rims, &shapes, reversed, tolerance, profile);
     let max_edges = profile.max_hole_edges as usize;
     let mut closing =
         Closing { admission, max_edges, rims: Vec::new(), placed: Vec::new(), open: Vec::new(), joints: Vec::new() };
-    let first = closing.close_together(survey, work, rims, threads);
+    let first = closing.close_together(survey, work, rims, &shapes, threads);
     closing.triangulate(work, first, threads);
     closing.close_flat(survey, work);
     if let Some(settings) = shape_settings(profile) {
@@ -136,8 +143,15 @@ struct Closing<'p> {
 impl Closing<'_> {
     /// Closes the rims of missing rings, and holes with islands, each by one patch. Takes in the loops: those from the number that it returns
     /// on are still to be closed.
-    fn close_together(&mut self, survey: &Survey<'_>, work: &mut Work<'_>, rims: Vec<Loop>, threads: usize) -> usize {
-        let partners = holes::partners(work, &rims);
+    fn close_together(
+        &mut self,
+        survey: &Survey<'_>,
+        work: &mut Work<'_>,
+        rims: Vec<Loop>,
+        shapes: &Shapes,
+        threads: usize,
+    ) -> usize {
+        let partners = shapes.partners();
         let admits = |shop: &Shop, rim: &Loop| self.admission.check_joined(shop, rim).is_ok();
         let rings = partners.rings.into_iter().map(|pair| pair.map(|i| &rims[i]));
         let rings: Vec<[&Loop; 2]> = rings.filter(|pair| pair.iter().all(|rim| admits(work, rim))).collect();
@@ -221,7 +235,7 @@ impl Closing<'_> {
     /// still, which an open one is not.)
     fn guard(&mut self, survey: &Survey<'_>, work: &mut Work<'_>) {
         let mut is_new = vec![true; self.placed.len()];
-        for round in 0..=GUARD_ROUNDS {
+        for round in 0..=GUARD_ROUNDS.1 {
             let mut patch_of = vec![None; work.triangles.len()];
             for (i, patch) in (0..).zip(&self.placed) {
                 patch.triangles().for_each(|t| patch_of[t as usize] = Some(i));
@@ -237,7 +251,7 @@ impl Closing<'_> {
                     continue;
                 }
                 is_new[i] = true;
-                if !self.step_back(work, i, obstacles, round < GUARD_ROUNDS) {
+                if !self.step_back(work, i, obstacles, round < guard_rounds(&self.placed[i], &self.rims)) {
                     self.revoke(work, i, &mut is_new);
                 }
             }
@@ -265,24 +279,28 @@ impl Closing<'_> {
     /// Replaces a patch by the next one that may do, or by none.
     fn step_back(&mut self, work: &mut Work<'_>, i: usize, obstacles: Vec<Obstacle>, again: bool) -> bool {
         let is_solid_still = obstacles.iter().all(|obstacle| obstacle.met_already);
-        let coarse = std::mem::take(&mut self.placed[i].coarse);
+        // What is put in in the last round would not be tested any more.
+        let coarse = if again { std::mem::take(&mut self.placed[i].coarse) } else { Vec::new() };
+        self.placed[i].coarse = Vec::new();
         let last: Vec<[Vertex; 3]> = self.placed[i].triangles().map(|t| work.triangles[t as usize].v).collect();
         self.placed[i].obstacles.extend(obstacles);
         self.placed[i].replace(work, &[]);
         let triangles = if !coarse.is_empty() {
             coarse
-        } else if let (&[rim], true) = (self.placed[i].rims.as_slice(), self.placed[i].method != FLAT) {
-            let tries: &[bool] = if again { &[false, true] } else { &[true] };
-            let made = tries.iter().find_map(|across| {
+        } else if let (&[rim], true, true) = (self.placed[i].rims.as_slice(), self.placed[i].method != FLAT, again) {
+            let made = [false, true].into_iter().find_map(|across| {
                 let heeded = self.placed[i].obstacles.iter().filter(|obstacle| !across || !obstacle.met_already);
                 let heeded: Vec<cross::Triangle> = heeded.map(|obstacle| obstacle.corners).collect();
-                self.fill(work, rim, Neighbours::Heeded, &heeded).ok().map(|patch| (patch, *across))
+                if heeded.len() > MAX_OBSTACLES {
+                    return None;
+                }
+                self.fill(work, rim, Neighbours::Heeded, &heeded).ok().map(|patch| (patch, across))
             });
             made.map_or_else(Vec::new, |(patch, across)| {
                 (self.placed[i].method, self.placed[i].across) = (patch.method.name(), across);
                 of_workshop(self.rim(rim), &patch)
             })
-        } else if is_solid_still {
+        } else if is_solid_still && again {
             self.placed[i].across = true;
             last
         } else {
@@ -347,11 +365,17 @@ impl Closing<'_> {
         let of_patch = Rim { points: &points, apexes: &apexes, obstacles, forbidden: &forbidden };
         if neighbours == Neighbours::Heeded
             && let Some(patch) = holes::folds(shop, rim).and_then(|folds| strip::zip(&of_patch, folds).ok())
+            && !patch.triangles.iter().any(|t| of_patch.meets_obstacle(&of_patch.corners(*t)))
         {
             return Ok(patch);
         }
         Ok(fill::triangulate(&of_patch, &settings)?)
     }
+}
+
+fn guard_rounds(patch: &Placed, rims: &[Loop]) -> usize {
+    let vertices: usize = patch.rims.iter().map(|rim| rims[*rim as usize].vertices.len()).sum();
+    if vertices > SMALL { GUARD_ROUNDS.0 } else { GUARD_ROUNDS.1 }
 }
 
 /// The triangles of a patch by the vertices of the workshop.

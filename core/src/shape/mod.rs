@@ -222,13 +222,13 @@ fn implicit(sheet: &mut Sheet<'_>) -> Result<(), Unshaped> {
     if within(sheet) { Ok(()) } else { Err(Unshaped::TooFar) }
 }
 
-/// Is everything within the rim's box grown by half its diagonal?
+/// Is everything within the rim's box grown by a quarter of its diagonal?
 fn within(sheet: &Sheet<'_>) -> bool {
     let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for (p, _) in sheet.points.iter().zip(&sheet.on_rim).filter(|(_, on)| **on) {
         (lo, hi) = (lo.min(*p), hi.max(*p));
     }
-    let room = DVec3::splat(0.5 * (hi - lo).length());
+    let room = DVec3::splat(0.25 * (hi - lo).length());
     sheet.points[sheet.fixed..].iter().all(|p| p.cmpge(lo - room).all() && p.cmple(hi + room).all())
 }
 

@@ -5,7 +5,7 @@ use super::boxes::{Boxes, around, join};
 use super::cross::{segment_pierces, triangles_cross};
 use super::exact::collinear;
 
-/// Triangles looked at for one loop; beyond, none is known to be clear.
+/// Triangles looked at for one loop, divided by how many obstacles each is held against; beyond, none is known to be clear.
 const WORK: u32 = 1_000_000;
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -41,7 +41,7 @@ impl<'a> Clearance<'a> {
             let edge = around(&[rim.points[i], rim.points[(i + 1) % n]]);
             rim.neighbour(i).map_or(edge, |t| join(&edge, &around(&t)))
         }));
-        Self { rim, boxes, known: Vec::new(), work: WORK, mesh_in_the_way: false }
+        Self { rim, boxes, known: Vec::new(), work: WORK / (1 + rim.obstacles.len() as u32), mesh_in_the_way: false }
     }
 
     /// Corners ascending.

@@ -41,12 +41,12 @@ const MAX_FLAT_EDGES: usize = 64;
 
 /// A patch that crosses anything is made anew by the next method, or around what it crosses, so many times, and is revoked then: one of
 /// many vertices, which takes long, fewer times than a small one.
-const GUARD_ROUNDS: (usize, usize) = (2, 6);
+const GUARD_ROUNDS: (usize, usize) = (2, 4);
 /// Vertices of a small one, at most.
 const SMALL: usize = 64;
 
 /// No patch is looked for around more triangles than this: what is so much in the way leaves no room.
-const MAX_OBSTACLES: usize = 256;
+const MAX_OBSTACLES: usize = 48;
 
 /// A patch that is in the workshop.
 #[derive(Debug)]
@@ -288,18 +288,26 @@ impl Closing<'_> {
         let triangles = if !coarse.is_empty() {
             coarse
         } else if let (&[rim], true, true) = (self.placed[i].rims.as_slice(), self.placed[i].method != FLAT, again) {
-            let made = [false, true].into_iter().find_map(|across| {
+            let tries: &[bool] = if self.rim(rim).vertices.len() > SMALL { &[false] } else { &[false, true] };
+            let made = tries.iter().find_map(|across| {
                 let heeded = self.placed[i].obstacles.iter().filter(|obstacle| !across || !obstacle.met_already);
                 let heeded: Vec<cross::Triangle> = heeded.map(|obstacle| obstacle.corners).collect();
                 if heeded.len() > MAX_OBSTACLES {
                     return None;
                 }
-                self.fill(work, rim, Neighbours::Heeded, &heeded).ok().map(|patch| (patch, across))
+                self.fill(work, rim, Neighbours::Heeded, &heeded).ok().map(|patch| (patch, *across))
             });
-            made.map_or_else(Vec::new, |(patch, across)| {
-                (self.placed[i].method, self.placed[i].across) = (patch.method.name(), across);
-                of_workshop(self.rim(rim), &patch)
-            })
+            match made {
+                Some((patch, across)) => {
+                    (self.placed[i].method, self.placed[i].across) = (patch.method.name(), across);
+                    of_workshop(self.rim(rim), &patch)
+                }
+                None if is_solid_still => {
+                    self.placed[i].across = true;
+                    last
+                }
+                None => Vec::new(),
+            }
         } else if is_solid_still && again {
             self.placed[i].across = true;
             last
@@ -525,6 +533,25 @@ mod tests {
         assert_eq!((got.result.loops, got.result.left.len(), got.defects.boundary_loops), (0, 1, 1));
         assert!(got.result.left[0].reason.contains("crosses the surface around"), "{}", got.result.left[0].reason);
         assert_eq!(got.defects.self_intersections.as_ref().map(|si| si.triangles), Some(0));
+    }
+
+    #[test]
+    fn a_single_triangle_is_held_against_other_bodies_too() {
+        let mut open = cube();
+        open.remove(2);
+        let needle = cuboid([0.6, 0.2, 0.9], [0.7, 0.3, 1.1]);
+        let got = after(&[open, needle].concat(), |d, _| fill(d, &Profile::default()));
+        assert_eq!((got.result.loops, got.defects.boundary_loops), (0, 1), "{:?}", got.result);
+    }
+
+    #[test]
+    fn holes_of_two_bodies_that_face_each_other_are_closed_each() {
+        // Turned over around the x axis, above the other.
+        let other: Vec<Corners> = open_globe().iter().map(|t| t.map(|[x, y, z]| [x, -y, 24.0 - z])).collect();
+        let got = after(&[open_globe(), other].concat(), |d, _| fill(d, &Profile::default()));
+        assert_eq!(got.result.by_method, BTreeMap::from([("planar (shaped)".into(), 2)]));
+        assert_eq!(got.defects.components, 2);
+        assert!(got.verdict.good, "{:?}", got.verdict);
     }
 
     #[test]

@@ -66,6 +66,18 @@ def weld(corners):
     return points[first], numbers.reshape(-1, 3)
 
 
+def edge_around_holes(corners):
+    """Median length of the edges that have one end on the border of a mesh."""
+    points, triangles = weld(corners)
+    edges = numpy.sort(numpy.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    edges, uses = numpy.unique(edges, axis=0, return_counts=True)
+    on_border = numpy.zeros(len(points), bool)
+    on_border[edges[uses == 1]] = True
+    beside = edges[on_border[edges].sum(axis=1) == 1]
+    ends = points[beside].astype(numpy.float64)
+    return float(numpy.median(numpy.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)))
+
+
 def write_corners(path, corners):
     """Writes n × 3 × 3 coordinates as binary STL, normals left to be computed by whoever reads them."""
     records = numpy.zeros(len(corners), RECORD)

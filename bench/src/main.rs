@@ -1,6 +1,8 @@
 //! Makes broken meshes, judges and draws meshes, and compares Suture with its peers.
 
 mod compare;
+mod holes;
+mod mesh;
 mod picture;
 
 use std::error::Error;
@@ -46,6 +48,15 @@ enum Task {
     Picture(picture::Options),
     /// Run suture and its peers over files, keep every run in `results/`, and publish what is there.
     Compare(Box<Compare>),
+    /// Cut holes into surfaces that are known everywhere, have suture and its peers close them, and publish how far off they are.
+    Shape(Closing),
+    /// Have suture and its peers repair those STL files of a folder that have holes, and publish what came out.
+    Close {
+        /// A folder of STL files.
+        folder: PathBuf,
+        #[command(flatten)]
+        options: Closing,
+    },
     /// Make RESULTS.md, the plots and the README's table from the raw runs that are kept.
     Publish(Publish),
 }
@@ -117,6 +128,19 @@ struct Compare {
 }
 
 #[derive(Args)]
+struct Closing {
+    /// The folder of raw files, instead of this crate's `results`. Page and plots are then put there, too.
+    #[arg(long, value_name = "DIR")]
+    results: Option<PathBuf>,
+    /// Measure this binary instead of building one.
+    #[arg(long)]
+    suture: Option<PathBuf>,
+    /// Seconds after which a process is killed.
+    #[arg(long, default_value_t = 300)]
+    limit: u64,
+}
+
+#[derive(Args)]
 struct Publish {
     /// The folder of raw files, instead of this crate's `results`. Page and plots are then put there, too.
     #[arg(long, value_name = "DIR")]
@@ -141,6 +165,8 @@ fn main() -> ExitCode {
         Task::Judge { file, reference, json } => judge_file(&file, reference.as_deref(), json),
         Task::Picture(options) => picture::draw(&options).map(|()| ExitCode::SUCCESS),
         Task::Compare(choices) => compare_all(*choices),
+        Task::Shape(choices) => closing(choices, "shape", compare::closing::shapes),
+        Task::Close { folder, options } => close_files(&folder, options),
         Task::Publish(choices) => publish(choices.results.as_deref()).map(|()| ExitCode::SUCCESS),
     };
     done.unwrap_or_else(|error| {
@@ -180,8 +206,39 @@ fn judge_file(file: &Path, reference: Option<&Path>, json: bool) -> Result<ExitC
     Ok(ExitCode::from(u8::from(!judgement.sound())))
 }
 
-fn compare_all(choices: Compare) -> Result<ExitCode, Box<dyn Error>> {
+/// Makes the raw file `name`, then the page.
+fn closing(
+    choices: Closing,
+    name: &str,
+    run: impl FnOnce(&compare::closing::Options) -> Result<(), compare::Error>,
+) -> Result<ExitCode, Box<dyn Error>> {
+    let folder = choices.results.clone().unwrap_or_else(compare::results);
+    run(&compare::closing::Options {
+        raw: folder.join(format!("{name}.jsonl")),
+        suture: choices.suture,
+        limit: Duration::from_secs(choices.limit),
+        command: command(),
+    })?;
+    publish(choices.results.as_deref())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Over all STL files of a folder, in the order of their names.
+fn close_files(folder: &Path, choices: Closing) -> Result<ExitCode, Box<dyn Error>> {
+    let entries = std::fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
+    files.retain(|path| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("stl")));
+    files.sort();
+    closing(choices, "closing", |options| compare::closing::files(options, &files))
+}
+
+/// The command line as it is published.
+fn command() -> String {
     let words: Vec<_> = std::env::args().skip(1).map(without_place).collect();
+    format!("cargo run --release -p suture-bench -- {}", words.join(" "))
+}
+
+fn compare_all(choices: Compare) -> Result<ExitCode, Box<dyn Error>> {
     let folder = choices.results.clone().unwrap_or_else(compare::results);
     let elsewhere = !choices.files.is_empty();
     let options = Options {
@@ -205,7 +262,7 @@ fn compare_all(choices: Compare) -> Result<ExitCode, Box<dyn Error>> {
         judge_up_to: choices.judge_up_to,
         suture: choices.suture,
         limit: Duration::from_secs(choices.limit),
-        command: format!("cargo run --release -p suture-bench -- {}", words.join(" ")),
+        command: command(),
     };
     compare::compare(&options)?;
     publish(choices.results.as_deref())?;

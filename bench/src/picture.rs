@@ -8,15 +8,17 @@
 
 use std::error::Error;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::Args;
 
+use crate::mesh::{Point, Vector, cross, dot, minus, read, unit};
+
 /// What to draw.
 #[derive(Args)]
 pub(crate) struct Options {
-    /// Binary STL files, side by side, and the PNG to write.
+    /// STL files, side by side, and the PNG to write.
     #[arg(required = true, num_args = 2.., value_names = ["IN", "OUT.png"])]
     files: Vec<PathBuf>,
     /// Pixels of each panel.
@@ -68,7 +70,7 @@ impl<const N: usize> FromStr for Numbers<N> {
 /// Draws the files and writes the picture.
 ///
 /// # Errors
-/// When a file cannot be read as binary STL, or the picture cannot be written.
+/// When a file cannot be read as STL, or the picture cannot be written.
 pub(crate) fn draw(options: &Options) -> Result<(), Box<dyn Error>> {
     let Some((out, inputs)) = options.files.split_last() else { return Err("no files".into()) };
     let meshes = inputs.iter().map(|path| read(path)).collect::<Result<Vec<_>, _>>()?;
@@ -85,39 +87,6 @@ pub(crate) fn draw(options: &Options) -> Result<(), Box<dyn Error>> {
     }
     fs::write(out, png(whole, height, &pixels)).map_err(|e| format!("{}: {e}", out.display()))?;
     Ok(())
-}
-
-type Point = [f32; 3];
-type Vector = [f64; 3];
-
-/// The finite triangles of a binary STL whose length is what its count says.
-fn read(path: &Path) -> Result<Vec<[Point; 3]>, String> {
-    let bytes = fs::read(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    let count = bytes.get(80..).and_then(|rest| rest.first_chunk()).map(|c| u32::from_le_bytes(*c) as usize);
-    let body = bytes.get(84..).unwrap_or_default();
-    if count.is_none_or(|count| body.len() != count * 50) {
-        return Err(format!("{}: no binary STL, or its length is not what its count says", path.display()));
-    }
-    let number = |record: &[u8], at: usize| f32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]]);
-    let corners = |record: &[u8]| std::array::from_fn(|c| std::array::from_fn(|k| number(record, 12 + 12 * c + 4 * k)));
-    Ok(body.chunks_exact(50).map(corners).filter(|t: &[Point; 3]| t.as_flattened().iter().all(|x| x.is_finite())).collect())
-}
-
-fn minus(a: Vector, b: Vector) -> Vector {
-    std::array::from_fn(|k| a[k] - b[k])
-}
-
-fn dot(a: Vector, b: Vector) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: Vector, b: Vector) -> Vector {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn unit(a: Vector) -> Vector {
-    let length = dot(a, a).sqrt().max(f64::MIN_POSITIVE);
-    a.map(|x| x / length)
 }
 
 /// Samples along a pixel's side.

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use suture_bench::generate::Case;
 
+use super::closing::{Closed, Shaped};
 use super::record::{Input, Line, Outcome, Run, Session, Way, read};
 use super::statistics::Spread;
 use super::{Cost, Error, Side};
@@ -29,6 +30,14 @@ impl Chapter {
         self.lines
             .iter()
             .filter_map(|line| if let Line::Skipped { side, reason } = line { Some((*side, reason.as_str())) } else { None })
+    }
+
+    pub(super) fn shaped(&self) -> impl Iterator<Item = &Shaped> {
+        self.lines.iter().filter_map(|line| if let Line::Shaped(shaped) = line { Some(shaped) } else { None })
+    }
+
+    pub(super) fn closed(&self) -> impl Iterator<Item = &Closed> {
+        self.lines.iter().filter_map(|line| if let Line::Closed(closed) = line { Some(closed) } else { None })
     }
 
     fn runs<'a, 'i>(&'a self, input: &'i Input) -> impl Iterator<Item = &'a Run> + use<'a, 'i> {

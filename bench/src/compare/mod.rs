@@ -10,8 +10,10 @@ mod book;
 mod cache;
 mod cgroup;
 mod child;
+pub(crate) mod closing;
 mod machine;
 mod page;
+mod page_closing;
 mod plot;
 mod programs;
 mod record;
@@ -57,6 +59,9 @@ pub(crate) enum Error {
     /// There is nothing to publish.
     #[error("there are no raw runs (*.jsonl) in {}", .0.display())]
     NoRuns(PathBuf),
+    /// A mesh could not be read or written.
+    #[error("{0}")]
+    Mesh(String),
     /// A plot could not be drawn.
     #[error("drawing {}: {reason}", path.display())]
     Plot { path: PathBuf, reason: String },

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use super::book::{Book, did_its_work};
 use super::machine::Machine;
+use super::page_closing;
 use super::record::{Cache, Input, Judged, Outcome, Way, is_good};
 use super::sides::LICENCES;
 use super::statistics::{Spread, number, short as short_number, spaced};
@@ -35,6 +36,8 @@ pub(super) fn page(book: &Book, plots: &[(String, String)]) -> String {
     page += &targets(book);
     page += &flat(book);
     page += &searches(book);
+    page += &page_closing::shapes(book);
+    page += &page_closing::files(book);
     for input in book.inputs() {
         page += &of_input(book, input);
     }

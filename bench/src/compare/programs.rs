@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use super::record::{Input, Way};
+use super::record::Way;
 use super::sides::{NO_SI, Program, Side};
 use super::{Error, home};
 
@@ -58,15 +58,15 @@ impl Programs {
         }
     }
 
-    /// The command of a way over an input, one file or all in a folder.
-    pub(super) fn command(&self, way: &Way, about: &Input, input: &Path, output: &Path) -> Command {
+    /// The command of a way over an input, which is one file, or a folder of several.
+    pub(super) fn command(&self, way: &Way, files: u64, input: &Path, output: &Path) -> Command {
         let facts = way.side.facts();
         let all = || std::fs::read_dir(input).into_iter().flatten().flatten().map(|entry| entry.path());
         let mut command;
         match facts.program {
             Program::Copy => {
                 command = Command::new("cp");
-                if about.files == 1 {
+                if files == 1 {
                     command.arg(input)
                 } else {
                     command.arg("-r").arg(input)
@@ -76,7 +76,7 @@ impl Programs {
             Program::Suture => {
                 command = Command::new(self.suture.as_deref().unwrap_or(Path::new("suture")));
                 command.arg(if facts.writes { "repair" } else { "inspect" });
-                if about.files == 1 {
+                if files == 1 {
                     command.arg(input)
                 } else {
                     command.args(all())
@@ -93,8 +93,8 @@ impl Programs {
                 }
             }
             Program::Python { script, .. } => {
-                command = Command::new(self.python.as_deref().unwrap_or(Path::new("python3")));
-                command.arg(home().join("pipelines").join(script)).args([input, output]).args(facts.flag);
+                command = self.script(script);
+                command.args([input, output]).args(facts.flag);
             }
             Program::Admesh => {
                 command = Command::new("admesh");
@@ -103,6 +103,13 @@ impl Programs {
                 command.args(["-e", "-n", "-u", "-f", "-d", "-v"]).arg(target).arg(input);
             }
         }
+        command
+    }
+
+    /// A script of `pipelines/`, its arguments still to be given.
+    pub(super) fn script(&self, name: &str) -> Command {
+        let mut command = Command::new(self.python.as_deref().unwrap_or(Path::new("python3")));
+        command.arg(home().join("pipelines").join(name));
         command
     }
 

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use suture_bench::Counts;
 use suture_bench::judge::{Judgement, Kept};
 
+use super::closing::{Closed, Shaped};
 use super::{Cost, Error, Machine, Side};
 
 /// A line of a raw file.
@@ -20,6 +21,8 @@ pub(crate) enum Line {
     Input(Input),
     Run(Run),
     Outcome(Outcome),
+    Shaped(Shaped),
+    Closed(Closed),
     /// Something was left out, and why.
     Skipped {
         side: Side,

@@ -140,7 +140,7 @@ impl<'a> Trials<'a> {
         let paths = files(path);
         let cached = cache::bring(way.cache, paths.iter().map(PathBuf::as_path));
         let cached_share = cached.map_err(Error::io("filling or emptying the page cache"))?;
-        let command = self.programs.command(way, input, path, &output);
+        let command = self.programs.command(way, input.files, path, &output);
         let words = worded(&command, path, &output);
         let command = match &self.group {
             Some(group) => group.hold(&command),

@@ -1,0 +1,257 @@
+//! How well holes are closed: in surfaces that are known everywhere ([`shapes`]), and in real files ([`files`]).
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::{Duration, SystemTime};
+
+use serde::{Deserialize, Serialize};
+use suture_bench::Counts;
+use suture_bench::judge;
+
+use super::programs::Programs;
+use super::record::{Journal, Line, Session, Way};
+use super::{Error, Machine, Side, child};
+use crate::holes::{self, Change, Hole, Measured, Surface};
+use crate::mesh;
+
+/// What one program made of one hole in a known surface.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct Shaped {
+    /// [`Surface::name`].
+    pub(crate) surface: String,
+    #[serde(flatten)]
+    pub(crate) hole: Hole,
+    /// Of the mesh around.
+    pub(crate) chord_error: f64,
+    pub(crate) tool: Shaper,
+    /// `None`: there is no patch.
+    pub(crate) measured: Option<Measured>,
+}
+
+/// A program with its settings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Shaper {
+    Suture,
+    /// With the profile's `patch_shape = "implicit"`.
+    SutureImplicit,
+    Pymeshlab,
+    Meshlib,
+    MeshlibArea,
+    MeshlibEqual,
+    MeshlibEqualArea,
+}
+
+impl Shaper {
+    const ALL: [Self; 7] = [
+        Self::Suture,
+        Self::SutureImplicit,
+        Self::Pymeshlab,
+        Self::Meshlib,
+        Self::MeshlibArea,
+        Self::MeshlibEqual,
+        Self::MeshlibEqualArea,
+    ];
+
+    pub(super) fn is_meshlib(self) -> bool {
+        !matches!(self, Self::Suture | Self::SutureImplicit | Self::Pymeshlab)
+    }
+
+    /// One process that closes the holes of all files in a folder.
+    fn command(self, programs: &Programs, folder: &Path, from: &Path, to: &Path) -> Result<Command, Error> {
+        let meshlib = |flags: &[&str]| {
+            let mut command = programs.script("close_meshlib.py");
+            command.args([from, to]).args(flags);
+            command
+        };
+        Ok(match self {
+            Self::Suture => programs.command(&Way::plain(Side::Suture), 2, from, to),
+            Self::SutureImplicit => {
+                let profile = folder.join("implicit.toml");
+                std::fs::write(&profile, "patch_shape = \"implicit\"\n").map_err(Error::io("writing a profile"))?;
+                let mut command = programs.command(&Way::plain(Side::Suture), 2, from, to);
+                command.arg("--profile").arg(profile);
+                command
+            }
+            Self::Pymeshlab => {
+                let mut command = programs.script("close_pymeshlab.py");
+                command.args([from, to]);
+                command
+            }
+            Self::Meshlib => meshlib(&[]),
+            Self::MeshlibArea => meshlib(&["--area"]),
+            Self::MeshlibEqual => meshlib(&["--equal"]),
+            Self::MeshlibEqualArea => meshlib(&["--equal", "--area"]),
+        })
+    }
+}
+
+/// What one program made of one real file.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct Closed {
+    /// Its name.
+    pub(crate) file: String,
+    pub(crate) side: Side,
+    pub(crate) before: Found,
+    /// `None`: it wrote nothing that can be read.
+    pub(crate) after: Option<Found>,
+    pub(crate) change: Option<Change>,
+    /// How the process ended.
+    pub(crate) end: String,
+    pub(crate) seconds: f64,
+    /// Of suture: loops that its report names as left open, each with the rule that kept it so.
+    pub(crate) named_open: Option<u64>,
+}
+
+/// What is wrong with a file.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(crate) struct Found {
+    /// By the judge.
+    pub(crate) counts: Counts,
+    /// Pairs of triangles that cross or overlap, by `suture inspect`; `None` when it could not look.
+    pub(crate) pairs: Option<u64>,
+}
+
+/// Where and how, of either comparison.
+pub(crate) struct Options {
+    /// The raw file.
+    pub(crate) raw: PathBuf,
+    /// A binary instead of the one built now.
+    pub(crate) suture: Option<PathBuf>,
+    /// A process that takes longer is killed.
+    pub(crate) limit: Duration,
+    /// The command line, to be published.
+    pub(crate) command: String,
+}
+
+/// The programs that are there, a folder to work in, and a journal that begins with this session.
+struct Bench {
+    programs: Programs,
+    folder: tempfile::TempDir,
+    journal: Journal,
+}
+
+impl Bench {
+    fn open(options: &Options) -> Result<Self, Error> {
+        let sides = [Side::Suture, Side::PymeshlabCompetent, Side::Meshlib];
+        let programs = Programs::prepare(&sides, options.suture.clone())?;
+        let folder = tempfile::tempdir().map_err(Error::io("making a folder"))?;
+        let mut journal = Journal::open(&options.raw, false)?;
+        let machine = Machine::describe(folder.path(), programs.versions());
+        let began = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
+        journal.write(Line::Session(Session { began, command: options.command.clone(), machine }))?;
+        for side in sides {
+            if let Some(reason) = programs.lack(side) {
+                eprintln!("{} is left out: {reason}", side.facts().name);
+                journal.write(Line::Skipped { side, reason })?;
+            }
+        }
+        Ok(Self { programs, folder, journal })
+    }
+
+    fn has(&self, side: Side) -> bool {
+        self.programs.lack(side).is_none()
+    }
+
+    /// The judge's word on a binary STL, and the engine's on what crosses itself, which the judge does not look at.
+    fn look(&self, file: &Path) -> Option<Found> {
+        let counts = judge::judge(file).ok()?.counts;
+        let report = said_whatever(&mut self.programs.command(&Way::plain(Side::Inspect), 1, file, Path::new("")));
+        let crossing = &report["before"]["self_intersections"];
+        let pairs = ["crossing_pairs", "overlapping_pairs"].map(|name| crossing[name].as_u64());
+        Some(Found { counts, pairs: pairs.into_iter().sum() })
+    }
+}
+
+/// The JSON that a command prints, whatever its exit code.
+fn said_whatever(command: &mut Command) -> serde_json::Value {
+    let printed = command.stderr(std::process::Stdio::null()).output().map(|output| output.stdout).unwrap_or_default();
+    serde_json::from_slice(&printed).unwrap_or_default()
+}
+
+/// Cuts holes into known surfaces, has every program close them, and keeps how far off each patch is.
+///
+/// # Errors
+/// When suture cannot be built, or the system fails.
+pub(crate) fn shapes(options: &Options) -> Result<(), Error> {
+    let mut bench = Bench::open(options)?;
+    let folder = bench.folder.path().to_owned();
+    let inputs = folder.join("in");
+    std::fs::create_dir(&inputs).map_err(Error::io("making a folder of inputs"))?;
+    let mut cases = Vec::new();
+    for surface in Surface::ALL {
+        for hole in Hole::all() {
+            let (triangles, path) = (holes::with_hole(surface, hole), inputs.join(format!("{:02}.stl", cases.len())));
+            mesh::write(&path, &triangles).map_err(Error::Mesh)?;
+            cases.push((surface, hole, triangles));
+        }
+    }
+    for tool in Shaper::ALL {
+        let side = if tool.is_meshlib() { Side::Meshlib } else { Side::PymeshlabCompetent };
+        if !matches!(tool, Shaper::Suture | Shaper::SutureImplicit) && !bench.has(side) {
+            continue;
+        }
+        eprintln!("{tool:?}");
+        let outputs = folder.join(format!("{tool:?}"));
+        std::fs::create_dir(&outputs).map_err(Error::io("making a folder of outputs"))?;
+        let command = tool.command(&bench.programs, &folder, &inputs, &outputs)?;
+        let ended = child::measure(command, None, false, options.limit)?;
+        if !ended.cost.complaint.is_empty() {
+            eprintln!("{}", ended.cost.complaint);
+        }
+        for (number, (surface, hole, before)) in cases.iter().enumerate() {
+            let measured = holes::measure_file(*surface, before, &outputs.join(format!("{number:02}.stl")));
+            let (surface, chord_error) = (*surface, hole.chord_error(*surface));
+            bench.journal.write(Line::Shaped(Shaped {
+                surface: surface.name().into(),
+                hole: *hole,
+                chord_error,
+                tool,
+                measured,
+            }))?;
+        }
+    }
+    Ok(())
+}
+
+/// Has every program repair those of `files` that have boundary edges, and keeps what came out.
+///
+/// # Errors
+/// When suture cannot be built, or the system fails. A file that is no STL is named and left out.
+pub(crate) fn files(options: &Options, files: &[PathBuf]) -> Result<(), Error> {
+    let mut bench = Bench::open(options)?;
+    let (input, output) = (bench.folder.path().join("in.stl"), bench.folder.path().join("out.stl"));
+    for path in files {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        // All are given the same finite triangles in the same binary format.
+        let triangles = match mesh::read(path) {
+            Ok(triangles) => triangles,
+            Err(_) => {
+                eprintln!("{name} is no STL");
+                continue;
+            }
+        };
+        mesh::write(&input, &triangles).map_err(Error::Mesh)?;
+        let open = judge::judge(&input).is_ok_and(|found| found.counts.boundary_edges > 0);
+        let Some(before) = open.then(|| bench.look(&input)).flatten() else { continue };
+        eprintln!("{name}, {} triangles", triangles.len());
+        for side in [Side::Suture, Side::PymeshlabCompetent, Side::Meshlib] {
+            if !bench.has(side) {
+                continue;
+            }
+            let command = bench.programs.command(&Way::plain(side), 1, &input, &output);
+            let ended = child::measure(command, Some(&output), false, options.limit)?;
+            let report: serde_json::Value = serde_json::from_str(&ended.said).unwrap_or_default();
+            let named_open = report["loops_left"].as_array().map(|loops| loops.len() as u64);
+            let made = mesh::read(&output).ok();
+            let change = made.map(|made| holes::change(&triangles, &made));
+            let after = bench.look(&output);
+            let (file, end, seconds) = (name.clone(), ended.cost.end, ended.cost.wall_seconds);
+            bench.journal.write(Line::Closed(Closed { file, side, before, after, change, end, seconds, named_open }))?;
+            if output.exists() {
+                std::fs::remove_file(&output).map_err(Error::io("removing an output"))?;
+            }
+        }
+    }
+    Ok(())
+}

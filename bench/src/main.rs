@@ -54,6 +54,9 @@ enum Task {
     Close {
         /// A folder of STL files.
         folder: PathBuf,
+        /// Go on where the raw file ends.
+        #[arg(long)]
+        resume: bool,
         #[command(flatten)]
         options: Closing,
     },
@@ -165,8 +168,8 @@ fn main() -> ExitCode {
         Task::Judge { file, reference, json } => judge_file(&file, reference.as_deref(), json),
         Task::Picture(options) => picture::draw(&options).map(|()| ExitCode::SUCCESS),
         Task::Compare(choices) => compare_all(*choices),
-        Task::Shape(choices) => closing(choices, "shape", compare::closing::shapes),
-        Task::Close { folder, options } => close_files(&folder, options),
+        Task::Shape(choices) => closing(choices, "shape", false, compare::closing::shapes),
+        Task::Close { folder, resume, options } => close_files(&folder, resume, options),
         Task::Publish(choices) => publish(choices.results.as_deref()).map(|()| ExitCode::SUCCESS),
     };
     done.unwrap_or_else(|error| {
@@ -210,12 +213,14 @@ fn judge_file(file: &Path, reference: Option<&Path>, json: bool) -> Result<ExitC
 fn closing(
     choices: Closing,
     name: &str,
+    resume: bool,
     run: impl FnOnce(&compare::closing::Options) -> Result<(), compare::Error>,
 ) -> Result<ExitCode, Box<dyn Error>> {
     let folder = choices.results.clone().unwrap_or_else(compare::results);
     run(&compare::closing::Options {
         raw: folder.join(format!("{name}.jsonl")),
         suture: choices.suture,
+        resume,
         limit: Duration::from_secs(choices.limit),
         command: command(),
     })?;
@@ -224,12 +229,12 @@ fn closing(
 }
 
 /// Over all STL files of a folder, in the order of their names.
-fn close_files(folder: &Path, choices: Closing) -> Result<ExitCode, Box<dyn Error>> {
+fn close_files(folder: &Path, resume: bool, choices: Closing) -> Result<ExitCode, Box<dyn Error>> {
     let entries = std::fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
     files.retain(|path| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("stl")));
     files.sort();
-    closing(choices, "closing", |options| compare::closing::files(options, &files))
+    closing(choices, "closing", resume, |options| compare::closing::files(options, &files))
 }
 
 /// The command line as it is published.

@@ -118,6 +118,8 @@ pub(crate) struct Options {
     pub(crate) raw: PathBuf,
     /// A binary instead of the one built now.
     pub(crate) suture: Option<PathBuf>,
+    /// Go on where the raw file ends.
+    pub(crate) resume: bool,
     /// A process that takes longer is killed.
     pub(crate) limit: Duration,
     /// The command line, to be published.
@@ -136,7 +138,7 @@ impl Bench {
         let sides = [Side::Suture, Side::PymeshlabCompetent, Side::Meshlib];
         let programs = Programs::prepare(&sides, options.suture.clone())?;
         let folder = tempfile::tempdir().map_err(Error::io("making a folder"))?;
-        let mut journal = Journal::open(&options.raw, false)?;
+        let mut journal = Journal::open(&options.raw, options.resume)?;
         let machine = Machine::describe(folder.path(), programs.versions());
         let began = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
         journal.write(Line::Session(Session { began, command: options.command.clone(), machine }))?;
@@ -223,6 +225,14 @@ pub(crate) fn files(options: &Options, files: &[PathBuf]) -> Result<(), Error> {
     let (input, output) = (bench.folder.path().join("in.stl"), bench.folder.path().join("out.stl"));
     for path in files {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let is_done = |side: Side| {
+            bench.journal.lines.iter().any(|line| matches!(line, Line::Closed(done) if done.file == name && done.side == side))
+        };
+        let sides = [Side::Suture, Side::PymeshlabCompetent, Side::Meshlib];
+        let due: Vec<_> = sides.into_iter().filter(|&side| bench.has(side) && !is_done(side)).collect();
+        if due.is_empty() {
+            continue;
+        }
         // All are given the same finite triangles in the same binary format.
         let triangles = match mesh::read(path) {
             Ok(triangles) => triangles,
@@ -235,10 +245,7 @@ pub(crate) fn files(options: &Options, files: &[PathBuf]) -> Result<(), Error> {
         let open = judge::judge(&input).is_ok_and(|found| found.counts.boundary_edges > 0);
         let Some(before) = open.then(|| bench.look(&input)).flatten() else { continue };
         eprintln!("{name}, {} triangles", triangles.len());
-        for side in [Side::Suture, Side::PymeshlabCompetent, Side::Meshlib] {
-            if !bench.has(side) {
-                continue;
-            }
+        for side in due {
             let command = bench.programs.command(&Way::plain(side), 1, &input, &output);
             let ended = child::measure(command, Some(&output), false, options.limit)?;
             let report: serde_json::Value = serde_json::from_str(&ended.said).unwrap_or_default();

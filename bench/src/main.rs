@@ -219,6 +219,7 @@ fn closing(
     let folder = choices.results.clone().unwrap_or_else(compare::results);
     run(&compare::closing::Options {
         raw: folder.join(format!("{name}.jsonl")),
+        plots: choices.results.as_deref().unwrap_or(compare::home()).join("plots"),
         suture: choices.suture,
         resume,
         limit: Duration::from_secs(choices.limit),

@@ -67,6 +67,13 @@ impl<const N: usize> FromStr for Numbers<N> {
     }
 }
 
+impl Options {
+    /// Of files with all their edges, to be put into a page.
+    pub(crate) fn for_page(files: Vec<PathBuf>, eye: [f64; 2], at: Option<[f64; 4]>) -> Self {
+        Self { files, size: Size(340, 300), boundary: true, edges: true, eye: Numbers(eye), at: at.map(Numbers) }
+    }
+}
+
 /// Draws the files and writes the picture.
 ///
 /// # Errors

@@ -12,7 +12,7 @@ use super::programs::Programs;
 use super::record::{Journal, Line, Session, Way};
 use super::{Error, Machine, Side, child};
 use crate::holes::{self, Change, Hole, Measured, Surface};
-use crate::mesh;
+use crate::{mesh, picture};
 
 /// What one program made of one hole in a known surface.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -116,6 +116,8 @@ pub(crate) struct Found {
 pub(crate) struct Options {
     /// The raw file.
     pub(crate) raw: PathBuf,
+    /// Where pictures go.
+    pub(crate) plots: PathBuf,
     /// A binary instead of the one built now.
     pub(crate) suture: Option<PathBuf>,
     /// Go on where the raw file ends.
@@ -188,6 +190,9 @@ pub(crate) fn shapes(options: &Options) -> Result<(), Error> {
             cases.push((surface, hole, triangles));
         }
     }
+    let bowl = inputs.join(BOWL);
+    mesh::write(&bowl, &holes::bowl()).map_err(Error::Mesh)?;
+    let mut drawn = Drawn { hole: vec![PathBuf::new()], bowl: vec![bowl], meshlib: f64::INFINITY };
     for tool in Shaper::ALL {
         let side = if tool.is_meshlib() { Side::Meshlib } else { Side::PymeshlabCompetent };
         if !matches!(tool, Shaper::Suture | Shaper::SutureImplicit) && !bench.has(side) {
@@ -202,7 +207,11 @@ pub(crate) fn shapes(options: &Options) -> Result<(), Error> {
             eprintln!("{}", ended.cost.complaint);
         }
         for (number, (surface, hole, before)) in cases.iter().enumerate() {
-            let measured = holes::measure_file(*surface, before, &outputs.join(format!("{number:02}.stl")));
+            let file = outputs.join(format!("{number:02}.stl"));
+            let measured = holes::measure_file(*surface, before, &file);
+            if (*surface, *hole) == PICTURED {
+                drawn.add(tool, &inputs, &file, measured.and_then(|measured| measured.vertices));
+            }
             let (surface, chord_error) = (*surface, hole.chord_error(*surface));
             bench.journal.write(Line::Shaped(Shaped {
                 surface: surface.name().into(),
@@ -213,7 +222,57 @@ pub(crate) fn shapes(options: &Options) -> Result<(), Error> {
             }))?;
         }
     }
-    Ok(())
+    drawn.draw(&options.plots)
+}
+
+/// The hole that pictures show.
+const PICTURED: (Surface, Hole) = (Surface::Sphere, Hole { share: 0.4, sampling: 1.0 });
+const BOWL: &str = "bowl.stl";
+/// The pictures, for the page.
+pub(super) const PICTURES: [&str; 2] = ["hole.png", "bowl.png"];
+
+/// Files of the two pictures: before, and as pymeshlab, MeshLib at its best and Suture closed it.
+struct Drawn {
+    hole: Vec<PathBuf>,
+    bowl: Vec<PathBuf>,
+    /// How far off MeshLib's best patch is.
+    meshlib: f64,
+}
+
+impl Drawn {
+    fn add(&mut self, tool: Shaper, inputs: &Path, file: &Path, far: Option<f64>) {
+        let name = file.file_name().unwrap_or_default();
+        self.hole[0] = inputs.join(name);
+        self.hole.resize(4, PathBuf::new());
+        self.bowl.resize(4, PathBuf::new());
+        let place = match tool {
+            Shaper::Pymeshlab => 1,
+            Shaper::Suture => 3,
+            Shaper::SutureImplicit => return,
+            _ if far.is_some_and(|far| far < self.meshlib) => {
+                self.meshlib = far.unwrap_or(self.meshlib);
+                2
+            }
+            _ => return,
+        };
+        self.hole[place] = file.into();
+        self.bowl[place] = file.with_file_name(BOWL);
+    }
+
+    fn draw(mut self, plots: &Path) -> Result<(), Error> {
+        std::fs::create_dir_all(plots).map_err(Error::io("making the folder of plots"))?;
+        let around_hole = Some([0.0, 0.0, 0.85, 0.62]);
+        for (files, name, eye, at) in
+            [(&mut self.hole, PICTURES[0], [-60.0, 12.0], around_hole), (&mut self.bowl, PICTURES[1], [-60.0, 40.0], None)]
+        {
+            // A program that is not there, or failed, has no panel.
+            files.retain(|file| file.exists());
+            files.push(plots.join(name));
+            let options = picture::Options::for_page(std::mem::take(files), eye, at);
+            picture::draw(&options).map_err(|error| Error::Mesh(error.to_string()))?;
+        }
+        Ok(())
+    }
 }
 
 /// Has every program repair those of `files` that have boundary edges, and keeps what came out.

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::Side;
 use super::book::Book;
-use super::closing::{Closed, Shaped, Shaper};
+use super::closing::{Closed, PICTURES, Shaped, Shaper};
 use super::statistics::{Spread, spaced};
 
 /// The last file that has what is asked for.
@@ -103,7 +103,14 @@ pub(super) fn shapes(book: &Book) -> String {
                 angle between vertex normals along the rim and the surface's, in degrees: at most 2.";
     let head = "| surface, hole | suture | suture, implicit | MeshLib, best | pymeshlab | bound | normals, suture | normals, MeshLib |\n\
                 |---|---|---|---|---|---|---|---|\n";
-    format!("\n## The shape of patches\n\n{text}\n\n{head}{rows}\nAll of it holds of Suture in {kept} of {all} holes.\n")
+    let [hole, bowl] = PICTURES.map(|name| format!("plots/{name}"));
+    format!(
+        "\n## The shape of patches\n\n{text}\n\n{head}{rows}\nAll of it holds of Suture in {kept} of {all} holes.\n\n\
+         ![The sphere's hole of 40 %: open, and closed by pymeshlab, MeshLib and Suture]({hole})\n\n\
+         *The sphere's hole of 40 %: open, and closed by pymeshlab, MeshLib (its best setting) and Suture*\n\n\
+         ![A bowl of two skins without its rim: open, and closed by pymeshlab, MeshLib and Suture]({bowl})\n\n\
+         *A bowl of two skins without its rim: open, capped by pymeshlab and MeshLib, bridged by Suture*\n"
+    )
 }
 
 /// What became of real files with holes.

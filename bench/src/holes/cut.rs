@@ -42,6 +42,26 @@ impl Hole {
 
 type Place = [f64; 2];
 
+/// A bowl of two skins, radii 1 and 0.85, whose rim is missing: two loops of unlike density that bound one wall.
+pub(crate) fn bowl() -> Vec<Triangle> {
+    let mut triangles = Vec::new();
+    for (radius, around, inside) in [(1.0, 96, false), (0.85, 72, true)] {
+        let rows = around / 4;
+        let at = |row: usize, i: usize| -> Point {
+            let (down, turn) = (row as f64 / rows as f64 * 0.5, (i % around) as f64 / around as f64 * 2.0);
+            let [(sin, cos), (y, x)] = [down, turn].map(|halves| (halves * std::f64::consts::PI).sin_cos());
+            [radius * sin * x, radius * sin * y, -radius * cos].map(|x| x as f32)
+        };
+        for (row, i) in (0..rows).flat_map(|row| (0..around).map(move |i| (row, i))) {
+            let (a, b, c, d) = (at(row, i), at(row, i + 1), at(row + 1, i + 1), at(row + 1, i));
+            // The first row is a fan around the lowest point.
+            let quad = [[a, d, c], [a, c, b]].into_iter().take(if row == 0 { 1 } else { 2 });
+            triangles.extend(quad.map(|[a, b, c]| if inside { [a, c, b] } else { [a, b, c] }));
+        }
+    }
+    triangles
+}
+
 /// Numbers that look random, the same everywhere (Knuth's linear congruence, upper bits).
 struct Noise(u64);
 
@@ -231,6 +251,16 @@ mod tests {
     use super::*;
     use crate::mesh::{wide, write};
     use suture_bench::judge;
+
+    #[test]
+    fn the_bowl_has_two_skins_and_two_loops() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.stl");
+        write(&path, &bowl()).unwrap();
+        let counts = judge::judge(&path).unwrap().counts;
+        assert_eq!((counts.components, counts.boundary_loops, counts.boundary_edges), (2, 2, 96 + 72));
+        assert!(counts.manifold() && counts.inconsistent_edges == 0 && counts.degenerate_area == 0);
+    }
 
     #[test]
     fn each_is_one_body_with_one_hole_and_true_around_it() {

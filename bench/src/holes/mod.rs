@@ -10,7 +10,7 @@ use std::path::Path;
 
 use crate::mesh::{self, Triangle};
 
-pub(crate) use cut::{Hole, mesh as with_hole};
+pub(crate) use cut::{Hole, bowl, mesh as with_hole};
 pub(crate) use measure::Measured;
 pub(crate) use surface::Surface;
 

@@ -68,9 +68,9 @@ impl<const N: usize> FromStr for Numbers<N> {
 }
 
 impl Options {
-    /// Of files with all their edges, to be put into a page.
+    /// For a page: near by with all edges, a whole body without them.
     pub(crate) fn for_page(files: Vec<PathBuf>, eye: [f64; 2], at: Option<[f64; 4]>) -> Self {
-        Self { files, size: Size(340, 300), boundary: true, edges: true, eye: Numbers(eye), at: at.map(Numbers) }
+        Self { files, size: Size(340, 300), boundary: true, edges: at.is_some(), eye: Numbers(eye), at: at.map(Numbers) }
     }
 }
 

@@ -56,7 +56,7 @@ pub(crate) fn bowl() -> Vec<Triangle> {
             let (a, b, c, d) = (at(row, i), at(row, i + 1), at(row + 1, i + 1), at(row + 1, i));
             // The first row is a fan around the lowest point.
             let quad = [[a, d, c], [a, c, b]].into_iter().take(if row == 0 { 1 } else { 2 });
-            triangles.extend(quad.map(|[a, b, c]| if inside { [a, c, b] } else { [a, b, c] }));
+            triangles.extend(quad.map(|[a, b, c]| if inside { [a, b, c] } else { [a, c, b] }));
         }
     }
     triangles
@@ -257,7 +257,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.stl");
         write(&path, &bowl()).unwrap();
-        let counts = judge::judge(&path).unwrap().counts;
+        let found = judge::judge(&path).unwrap();
+        let counts = found.counts;
+        assert!(found.volume > 0.0);
         assert_eq!((counts.components, counts.boundary_loops, counts.boundary_edges), (2, 2, 96 + 72));
         assert!(counts.manifold() && counts.inconsistent_edges == 0 && counts.degenerate_area == 0);
     }

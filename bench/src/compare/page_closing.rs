@@ -137,7 +137,7 @@ pub(super) fn files(book: &Book) -> String {
     let head = "| | files | written | closed | closed and manifold | files with new pairs | new pairs | pairs gone | kept | taken | added |\n\
                 |---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
     let left = format!(
-        "Of the {} files that Suture left open, its report names the open loops, and the rule that kept each so, in {named}.",
+        "Of the {} files that Suture left open, its report names at least one open loop, with the rule that kept it so, in {named}.",
         open.len()
     );
     format!("\n## Closing real files\n\n{text}\n\n{head}{rows}\n{left}\n")

@@ -4,7 +4,7 @@ use super::Rim;
 use super::exact::at;
 use glam::DVec3;
 
-const NONE: u32 = u32::MAX;
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// Flips for each triangle, at most. What is not planar need not settle by itself.
 const WORK: usize = 16;
@@ -14,17 +14,61 @@ const BEND_STEPS: f64 = 32.0;
 
 /// An edge: from corner k of a triangle to corner k + 1.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Edge {
-    triangle: usize,
-    k: usize,
+pub(crate) struct Edge {
+    pub(crate) triangle: usize,
+    pub(crate) k: usize,
 }
 
-/// The two triangles on an edge.
-pub(super) struct Around {
+/// Two triangles on an edge, among triangles that know which one is across each edge (from corner k to corner k + 1; [`NONE`]: none).
+pub(crate) struct Hinge {
+    edge: Edge,
     /// The edge as seen from the triangle on its other side.
-    other: Edge,
+    pub(crate) other: Edge,
     /// The ends of the edge, then the corners opposite to it in the edge's triangle and in the other.
-    pub(super) quad: [u32; 4],
+    pub(crate) quad: [u32; 4],
+}
+
+impl Hinge {
+    /// `None` where nothing is across.
+    pub(crate) fn at(triangles: &[[u32; 3]], across: &[[u32; 3]], edge: Edge) -> Option<Self> {
+        let Edge { triangle: i, k } = edge;
+        let j = across[i][k];
+        if j == NONE {
+            return None;
+        }
+        let j = j as usize;
+        let l = across[j].iter().position(|&x| x as usize == i)?;
+        let t = triangles[i];
+        let quad = [t[k], t[(k + 1) % 3], t[(k + 2) % 3], triangles[j][(l + 2) % 3]];
+        Some(Self { edge, other: Edge { triangle: j, k: l }, quad })
+    }
+
+    /// The two triangles on the other diagonal.
+    pub(crate) fn flipped(&self) -> [[u32; 3]; 2] {
+        let [a, b, c, d] = self.quad;
+        [[c, a, d], [d, b, c]]
+    }
+
+    /// Puts them in place of the two.
+    pub(crate) fn flip(&self, triangles: &mut [[u32; 3]], across: &mut [[u32; 3]]) {
+        let (Edge { triangle: i, k }, Edge { triangle: j, k: l }) = (self.edge, self.other);
+        let (bc, ca) = (across[i][(k + 1) % 3], across[i][(k + 2) % 3]);
+        let (ad, db) = (across[j][(l + 1) % 3], across[j][(l + 2) % 3]);
+        [triangles[i], triangles[j]] = self.flipped();
+        across[i] = [ca, ad, j as u32];
+        across[j] = [db, bc, i as u32];
+        relink(across, ad, j, i);
+        relink(across, bc, i, j);
+    }
+}
+
+/// Triangle `t`, if it is one, has `to` across where it had `from`.
+pub(crate) fn relink(across: &mut [[u32; 3]], t: u32, from: usize, to: usize) {
+    if let Some(slots) = across.get_mut(t as usize) {
+        for s in slots.iter_mut().filter(|s| **s as usize == from) {
+            *s = to as u32;
+        }
+    }
 }
 
 /// A triangulated polygon whose edges can be flipped.
@@ -62,44 +106,19 @@ impl<'a> Flips<'a> {
     }
 
     /// What is on both sides of an edge; `None` on the rim.
-    pub(super) fn around(&self, edge: Edge) -> Option<Around> {
-        let Edge { triangle: i, k } = edge;
-        let j = self.across[i][k];
-        if j == NONE {
-            return None;
-        }
-        let j = j as usize;
-        let l = self.across[j].iter().position(|&x| x as usize == i)?;
-        let t = self.triangles[i];
-        let quad = [t[k], t[(k + 1) % 3], t[(k + 2) % 3], self.triangles[j][(l + 2) % 3]];
-        Some(Around { other: Edge { triangle: j, k: l }, quad })
+    pub(super) fn around(&self, edge: Edge) -> Option<Hinge> {
+        Hinge::at(&self.triangles, &self.across, edge)
     }
 
     /// Flips the edge, if both new triangles are legal and the diagonal is allowed; gives the other triangle changed.
     fn flip(&mut self, edge: Edge, legal: impl Fn([u32; 3]) -> bool) -> Option<usize> {
-        let Around { other: Edge { triangle: j, k: l }, quad: [a, b, c, d] } = self.around(edge)?;
-        let Edge { triangle: i, k } = edge;
-        let (new_i, new_j) = ([c, a, d], [d, b, c]);
-        if !legal(new_i) || !legal(new_j) || !self.rim.allows(c, d) {
+        let hinge = self.around(edge)?;
+        let [_, _, c, d] = hinge.quad;
+        if !hinge.flipped().into_iter().all(legal) || !self.rim.allows(c, d) {
             return None;
         }
-        let (bc, ca) = (self.across[i][(k + 1) % 3], self.across[i][(k + 2) % 3]);
-        let (ad, db) = (self.across[j][(l + 1) % 3], self.across[j][(l + 2) % 3]);
-        self.triangles[i] = new_i;
-        self.triangles[j] = new_j;
-        self.across[i] = [ca, ad, j as u32];
-        self.across[j] = [db, bc, i as u32];
-        self.relink(ad, j, i);
-        self.relink(bc, i, j);
-        Some(j)
-    }
-
-    fn relink(&mut self, t: u32, from: usize, to: usize) {
-        if let Some(slots) = self.across.get_mut(t as usize) {
-            for s in slots.iter_mut().filter(|s| **s as usize == from) {
-                *s = to as u32;
-            }
-        }
+        hinge.flip(&mut self.triangles, &mut self.across);
+        Some(hinge.other.triangle)
     }
 
     /// Flips wherever `better` says so and it is legal, until nothing changes or the bound is reached.
@@ -128,7 +147,7 @@ impl<'a> Flips<'a> {
     }
 
     fn smoother(&self, edge: Edge) -> bool {
-        let Some(Around { other, quad: [a, b, c, d] }) = self.around(edge) else { return false };
+        let Some(Hinge { other, quad: [a, b, c, d], .. }) = self.around(edge) else { return false };
         let [pa, pb, pc, pd] = [a, b, c, d].map(|v| at(&self.rim.points[v as usize]));
         let normal = |p: DVec3, q: DVec3, r: DVec3| (q - p).cross(r - p).normalize_or_zero();
         let beyond = |e: Edge, step: usize| self.normal_beyond(Edge { triangle: e.triangle, k: (e.k + step) % 3 });

@@ -13,7 +13,7 @@ mod boxes;
 mod clear;
 pub mod cross;
 pub mod exact;
-mod flips;
+pub(crate) mod flips;
 mod front;
 mod minweight;
 mod planar;

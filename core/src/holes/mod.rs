@@ -143,11 +143,7 @@ impl Shapes {
 
 fn shape_of(shop: &Shop, rim: &Loop) -> Shape {
     let points: Vec<DVec3> = rim.vertices.iter().map(|v| shop.place(*v)).collect();
-    let normals = rim.triangles.iter().map(|t| {
-        let [a, b, c] = shop.triangles[*t as usize].v;
-        shop.vector(a, b).cross(shop.vector(a, c))
-    });
-    Shape::of(&points, normals)
+    Shape::of(&points, rim.triangles.iter().map(|t| shop.normal(*t)))
 }
 
 /// A slender loop that folds back on itself when seen along Z, X or Y, though it is not flat (METHODS C7). The cutter's passes that made it

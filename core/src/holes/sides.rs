@@ -159,7 +159,7 @@ pub(super) fn measure(shop: &Shop, loops: &[Loop], tolerance: &Tolerance, share:
                 if of_loop != number {
                     others.push(of_loop);
                 }
-                let normal = [before, i].map(|k| normal_of(shop, rim.triangles[k])).into_iter().sum::<DVec3>();
+                let normal = [before, i].map(|k| shop.normal(rim.triangles[k]).normalize_or_zero()).into_iter().sum::<DVec3>();
                 ways.step(way, normal.normalize_or_zero(), coming.length());
             }
             sides.width = most(sides.across, sides.inner).then_some(width);
@@ -172,12 +172,6 @@ pub(super) fn measure(shop: &Shop, loops: &[Loop], tolerance: &Tolerance, share:
             sides
         })
         .collect()
-}
-
-/// Unit normal of a triangle; zero if it has no area.
-fn normal_of(shop: &Shop, t: u32) -> DVec3 {
-    let [a, b, c] = shop.triangles[t as usize].v;
-    shop.vector(a, b).cross(shop.vector(a, c)).normalize_or_zero()
 }
 
 /// From a vertex to the nearest point of a segment.

@@ -90,9 +90,11 @@ impl<'p> Admission<'p> {
         matches!(self.refusal(rim), Some(NotAdmitted::Sheet))
     }
 
-    /// This sheet is lone no more.
-    pub(super) fn joined(&mut self, rim: &Loop) {
-        self.refused.retain(|(v, _)| *v != rim.vertices[0]);
+    /// These sheets are lone no more.
+    pub(super) fn joined(&mut self, rims: &[&Loop]) {
+        let mut firsts: Vec<u32> = rims.iter().map(|rim| rim.vertices[0]).collect();
+        firsts.sort_unstable();
+        self.refused.retain(|(v, _)| firsts.binary_search(v).is_err());
     }
 
     fn check_limits(&self, shop: &Shop, rim: &Loop) -> Result<(), NotAdmitted> {

@@ -2,7 +2,7 @@
 //!
 //! Closed each for itself, a tube that has lost a ring would become two bodies, and the mouth of a vessel without its rim be shut.
 
-use super::close::are_joined;
+use super::close::{are_joined, concatenated};
 use super::work::Work;
 use crate::fill::exact::Point;
 use crate::fill::{Rim, Unfillable, strip};
@@ -50,10 +50,6 @@ fn between(shop: &Shop, pair: &[&Loop; 2]) -> Result<Vec<[u32; 3]>, Unfillable> 
 
 fn rim<'a>((points, apexes): &'a (Vec<Point>, Vec<Option<Point>>), forbidden: &'a dyn Fn(u32, u32) -> bool) -> Rim<'a> {
     Rim { points, apexes, obstacles: &[], forbidden }
-}
-
-fn concatenated(pair: &[&Loop; 2]) -> Vec<Vertex> {
-    pair.iter().flat_map(|rim| rim.vertices.iter().copied()).collect()
 }
 
 /// An edge between the two loops is one of the mesh by now.

@@ -172,15 +172,17 @@ impl Closing<'_> {
             placed.push(Placed::put_in(work, numbers, triangles, method));
         };
         annular::bridge(work, &rings, threads, |work, i, triangles| place(work, &rings[i], triangles, "annular"));
+        let mut joined = Vec::new();
         for group in &groups {
             match islands::patch(work, group) {
                 Some(triangles) => place(work, group, &triangles, "islands"),
                 None => {
                     self.joints.extend(islands::join_all(work, group));
-                    group[1..].iter().for_each(|island| self.admission.joined(island));
+                    joined.extend_from_slice(&group[1..]);
                 }
             }
         }
+        self.admission.joined(&joined);
         let first = done.len();
         let (shop, edges) = work.edges();
         done.extend(loops::find(shop, edges));
@@ -264,14 +266,18 @@ impl Closing<'_> {
     /// Gives a patch up. Loops that it closed together are closed each for itself, where that is admitted.
     fn revoke(&mut self, work: &mut Work<'_>, i: usize, is_new: &mut Vec<bool>) {
         let rims = self.placed[i].rims.clone();
-        for rim in &rims {
-            match self.fill(work, *rim, Neighbours::Heeded, &[]) {
-                Ok(patch) if rims.len() > 1 => {
-                    self.put_in(work, *rim, &patch, patch.method.name());
+        if let [rim] = rims[..] {
+            self.open.push((rim, NotFilled::Crosses));
+            return;
+        }
+        for rim in rims {
+            match self.fill(work, rim, Neighbours::Heeded, &[]) {
+                Ok(patch) => {
+                    self.put_in(work, rim, &patch, patch.method.name());
                     is_new.push(true);
                 }
-                Err(reason @ NotFilled::NotAdmitted(_)) => self.open.push((*rim, reason)),
-                _ => self.open.push((*rim, NotFilled::Crosses)),
+                Err(reason @ NotFilled::NotAdmitted(_)) => self.open.push((rim, reason)),
+                Err(_) => self.open.push((rim, NotFilled::Crosses)),
             }
         }
     }
@@ -389,6 +395,11 @@ fn guard_rounds(patch: &Placed, rims: &[Loop]) -> usize {
 /// The triangles of a patch by the vertices of the workshop.
 fn of_workshop(rim: &Loop, patch: &fill::Patch) -> Vec<[Vertex; 3]> {
     patch.triangles.iter().map(|t| t.map(|i| rim.vertices[i as usize])).collect()
+}
+
+/// The vertices of some loops, one loop after the other.
+pub(super) fn concatenated(group: &[&Loop]) -> Vec<Vertex> {
+    group.iter().flat_map(|rim| rim.vertices.iter().copied()).collect()
 }
 
 /// Is there an edge between two vertices of loops?

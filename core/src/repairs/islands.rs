@@ -4,9 +4,9 @@
 //! laid between the hole's rim and those of all its islands. Where that is not to be had, two triangles between the nearest vertices of two
 //! rims make one simple loop of them, which is then filled like any other.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::close::are_joined;
+use super::close::{are_joined, concatenated};
 use super::work::Work;
 use crate::boxes::BoxTree;
 use crate::chunk::NONE;
@@ -40,11 +40,9 @@ pub(super) fn groups(
     let bounds: Vec<Bounds> = rims.iter().map(|rim| Bounds::of(&rim.points(shop))).collect();
     let tree = BoxTree::new(&bounds);
     let mut found = Vec::new();
+    let known: BTreeSet<usize> = pairs.iter().map(|[_, island]| *island).collect();
     let mut pairs = pairs.to_vec();
-    for sheet in sheets {
-        if pairs.iter().any(|[_, island]| *island == sheet) {
-            continue;
-        }
+    for sheet in sheets.into_iter().filter(|sheet| !known.contains(sheet)) {
         let Bounds { lo, hi } = bounds[sheet];
         let middle: [f32; 3] = std::array::from_fn(|k| 0.5 * lo[k] + 0.5 * hi[k]);
         tree.meeting(&Bounds { lo: middle, hi: middle }, &mut found);
@@ -79,7 +77,7 @@ pub(super) fn join_all(work: &mut Work<'_>, group: &[&Loop]) -> Vec<u32> {
 
 /// One patch between a hole's rim and those of its islands.
 pub(super) fn patch(shop: &Shop, group: &[&Loop]) -> Option<Vec<[Vertex; 3]>> {
-    let vertices: Vec<Vertex> = group.iter().flat_map(|rim| rim.vertices.iter().copied()).collect();
+    let vertices = concatenated(group);
     let shapes: Vec<(Vec<Point>, Vec<Option<Point>>)> = group.iter().map(|rim| (rim.points(shop), rim.apexes(shop))).collect();
     let chords: Vec<_> = group
         .iter()

@@ -13,7 +13,7 @@ use crate::chunk::NONE;
 use crate::fill::exact::Point;
 use crate::parallel;
 use crate::record;
-use crate::shape::{self, Region, ShapeSettings, Shaped};
+use crate::shape::{self, Region, ShapeSettings, Shaped, edges, sorted};
 use crate::shop::{Origin, Shop, Vertex};
 use crate::survey::Survey;
 
@@ -60,7 +60,7 @@ pub(super) fn smooth(survey: &Survey<'_>, work: &mut Work<'_>, placed: &mut [Pla
 fn has_room(shop: &Shop, patch: &Placed) -> bool {
     let mut around: HashMap<Vertex, (f64, u32)> = HashMap::new();
     let triangles = || patch.triangles().map(|t| shop.triangles[t as usize].v);
-    let mut edges: Vec<[Vertex; 2]> = triangles().flat_map(|v| edges_of(&v)).collect();
+    let mut edges: Vec<[Vertex; 2]> = triangles().flat_map(edges).map(sorted).collect();
     edges.sort_unstable();
     let (inner, rim): (Vec<_>, Vec<_>) = edges.chunk_by(|a, b| a == b).partition(|same| same.len() > 1);
     for [a, b] in rim.iter().map(|same| same[0]) {
@@ -73,14 +73,6 @@ fn has_room(shop: &Shop, patch: &Placed) -> bool {
     }
     let usual = |v: Vertex| around.get(&v).map_or(f64::INFINITY, |(sum, count)| sum / f64::from(*count));
     inner.iter().map(|same| same[0]).any(|[a, b]| shop.distance(a, b) > ROOMY * 0.5 * (usual(a) + usual(b)))
-}
-
-/// Each with its smaller end first.
-fn edges_of(v: &[Vertex; 3]) -> [[Vertex; 2]; 3] {
-    [0, 1, 2].map(|k| {
-        let (a, b) = (v[k], v[(k + 1) % 3]);
-        [a.min(b), a.max(b)]
-    })
 }
 
 /// Triangles that are not in the workshop, around vertices that are: where each has its corners, by vertex.
@@ -172,14 +164,14 @@ impl Gathered {
 /// Replaces the coarse patch, if no edge of the new one is there already.
 fn put_in(work: &mut Work<'_>, patch: &mut Placed, mut vertices: Vec<Vertex>, shaped: &Shaped) {
     let coarse: Vec<[Vertex; 3]> = patch.triangles().map(|t| work.triangles[t as usize].v).collect();
-    let mut own: Vec<[Vertex; 2]> = coarse.iter().flat_map(edges_of).collect();
+    let mut own: Vec<[Vertex; 2]> = coarse.iter().flat_map(|v| edges(*v)).map(sorted).collect();
     own.sort_unstable();
     let of_workshop = |v: u32| vertices.get(v as usize).copied().unwrap_or(NONE);
     let is_there = |[a, b]: [Vertex; 2]| {
         // Of the coarse patch's, the rim's are the surface's as well, and the others go.
         a != NONE && b != NONE && own.binary_search(&[a, b]).is_err() && work.has_edge(a, b)
     };
-    if shaped.triangles.iter().flat_map(|t| edges_of(&t.map(of_workshop))).any(is_there) {
+    if shaped.triangles.iter().flat_map(|t| edges(t.map(of_workshop))).map(sorted).any(is_there) {
         return;
     }
     patch.triangles().for_each(|t| work.kill(t));

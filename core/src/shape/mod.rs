@@ -23,6 +23,7 @@ use crate::fill::exact::{Point, at};
 use fair::{Energy, solve};
 use refine::refine;
 use sheet::Sheet;
+pub(crate) use sheet::{edges, sorted};
 
 /// What a patch is shaped from, in one numbering of vertices. Positions are finite, and no two of the same piece are equal.
 #[derive(Clone, Copy, Debug)]

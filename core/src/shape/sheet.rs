@@ -4,8 +4,9 @@ use glam::DVec3;
 
 use super::Region;
 use crate::fill::exact::at;
+use crate::fill::flips::{Edge, Hinge, relink};
 
-pub(super) const NONE: u32 = u32::MAX;
+pub(super) use crate::fill::flips::NONE;
 
 /// Flips for each triangle, at most: what is not planar need not settle by itself.
 const FLIPS: usize = 16;
@@ -32,11 +33,12 @@ pub(super) struct Sheet<'a> {
     pub(super) unit: f64,
 }
 
-pub(super) fn sorted([a, b]: [u32; 2]) -> [u32; 2] {
+/// An edge from its smaller end.
+pub(crate) fn sorted([a, b]: [u32; 2]) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 
-pub(super) fn edges(t: [u32; 3]) -> [[u32; 2]; 3] {
+pub(crate) fn edges(t: [u32; 3]) -> [[u32; 2]; 3] {
     [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]
 }
 
@@ -177,16 +179,13 @@ impl<'a> Sheet<'a> {
         self.triangles.extend([[b, c, v], [c, a, v]]);
         self.across[i] = [ab, j as u32, k as u32];
         self.across.extend([[bc, k as u32, i as u32], [ca, i as u32, j as u32]]);
-        self.relink(bc, i, j);
-        self.relink(ca, i, k);
+        relink(&mut self.across, bc, i, j);
+        relink(&mut self.across, ca, i, k);
     }
 
     /// Puts a vertex on the edge from corner k, if it is not on the rim: two triangles become four.
     pub(super) fn split_edge(&mut self, i: usize, k: usize, v: u32) -> bool {
-        let Some(j) = self.beyond(i, k) else { return false };
-        let Some(l) = self.across[j].iter().position(|&x| x as usize == i) else { return false };
-        let (t, u) = (self.triangles[i], self.triangles[j]);
-        let [a, b, c, d] = [t[k], t[(k + 1) % 3], t[(k + 2) % 3], u[(l + 2) % 3]];
+        let Some(Hinge { other: Edge { triangle: j, k: l }, quad: [a, b, c, d], .. }) = self.hinge(i, k) else { return false };
         let (bc, ca) = (self.across[i][(k + 1) % 3], self.across[i][(k + 2) % 3]);
         let (ad, db) = (self.across[j][(l + 1) % 3], self.across[j][(l + 2) % 3]);
         let (m, n) = (self.triangles.len(), self.triangles.len() + 1);
@@ -196,17 +195,9 @@ impl<'a> Sheet<'a> {
         self.across[i] = [j as u32, m as u32, ca];
         self.across[j] = [i as u32, ad, n as u32];
         self.across.extend([[n as u32, bc, i as u32], [m as u32, j as u32, db]]);
-        self.relink(bc, i, m);
-        self.relink(db, j, n);
+        relink(&mut self.across, bc, i, m);
+        relink(&mut self.across, db, j, n);
         true
-    }
-
-    fn relink(&mut self, t: u32, from: usize, to: usize) {
-        if let Some(slots) = self.across.get_mut(t as usize) {
-            for s in slots.iter_mut().filter(|s| **s as usize == from) {
-                *s = to as u32;
-            }
-        }
     }
 
     pub(super) fn across(&self) -> &[[u32; 3]] {
@@ -216,6 +207,10 @@ impl<'a> Sheet<'a> {
     /// Do the surroundings have this edge?
     pub(super) fn is_taken(&self, a: u32, b: u32) -> bool {
         self.taken.binary_search(&sorted([a, b])).is_ok()
+    }
+
+    fn hinge(&self, triangle: usize, k: usize) -> Option<Hinge> {
+        Hinge::at(&self.triangles, &self.across, Edge { triangle, k })
     }
 
     /// The triangle across an edge.
@@ -276,10 +271,8 @@ impl<'a> Sheet<'a> {
     }
 
     fn flip(&mut self, i: usize, k: usize) -> Option<usize> {
-        let j = self.beyond(i, k)?;
-        let l = self.across[j].iter().position(|&x| x as usize == i)?;
-        let (t, u) = (self.triangles[i], self.triangles[j]);
-        let [a, b, c, d] = [t[k], t[(k + 1) % 3], t[(k + 2) % 3], u[(l + 2) % 3]];
+        let hinge = self.hinge(i, k)?;
+        let ([a, b, c, d], j) = (hinge.quad, hinge.other.triangle);
         let [pa, pb, pc, pd] = [a, b, c, d].map(|v| self.points[v as usize]);
         let angle = |apex: DVec3| {
             let (p, q) = (pa - apex, pb - apex);
@@ -292,20 +285,12 @@ impl<'a> Sheet<'a> {
         if !obtuse {
             return None;
         }
-        let (new_i, new_j) = ([c, a, d], [d, b, c]);
-        let up = self.normal(t) + self.normal(u);
-        let convex = self.normal(new_i).dot(up) > 0.0 && self.normal(new_j).dot(up) > 0.0;
+        let up = self.normal(self.triangles[i]) + self.normal(self.triangles[j]);
+        let convex = hinge.flipped().into_iter().all(|t| self.normal(t).dot(up) > 0.0);
         if !convex || self.creases.binary_search(&sorted([a, b])).is_ok() || self.linked(i, c, d) {
             return None;
         }
-        let (bc, ca) = (self.across[i][(k + 1) % 3], self.across[i][(k + 2) % 3]);
-        let (ad, db) = (self.across[j][(l + 1) % 3], self.across[j][(l + 2) % 3]);
-        self.triangles[i] = new_i;
-        self.triangles[j] = new_j;
-        self.across[i] = [ca, ad, j as u32];
-        self.across[j] = [db, bc, i as u32];
-        self.relink(ad, j, i);
-        self.relink(bc, i, j);
+        hinge.flip(&mut self.triangles, &mut self.across);
         Some(j)
     }
 

@@ -34,10 +34,6 @@ impl Surface {
         if matches!(self, Self::TorusInside | Self::TorusOutside) { TUBE } else { 1.0 }
     }
 
-    fn name(self) -> String {
-        format!("{self:?}").to_lowercase()
-    }
-
     /// Where a point of the plane lies; lengths near the origin stay about the same.
     fn at(self, p: DVec2) -> DVec3 {
         match self {
@@ -233,70 +229,7 @@ fn inside(p: DVec2, polygon: &[DVec2]) -> bool {
     (0..n).all(|k| (polygon[(k + 1) % n] - polygon[k]).perp_dot(p - polygon[k]) >= 0.0)
 }
 
-fn write_stl(path: &std::path::Path, triangles: impl Iterator<Item = [Point; 3]>) {
-    let mut out = vec![0_u8; 80];
-    let triangles: Vec<_> = triangles.collect();
-    out.extend((triangles.len() as u32).to_le_bytes());
-    for t in triangles {
-        out.extend([0; 12]);
-        out.extend(t.iter().flatten().flat_map(|x| x.to_le_bytes()));
-        out.extend([0; 2]);
-    }
-    std::fs::write(path, out).unwrap();
-}
-
 const SURFACES: [Surface; 4] = [Surface::Sphere, Surface::TorusOutside, Surface::TorusInside, Surface::Saddle];
-
-/// Writes the cases as STL and ours beside them, for comparison with other programs, to the folder `SHAPE_CASES`. `SHAPE_ROUGH`: how far
-/// vertices are off the surface, as a share of the edges.
-#[test]
-#[ignore = "writes files for a comparison"]
-fn write_cases() {
-    let folder = std::env::var_os("SHAPE_CASES").map_or_else(|| std::env::temp_dir().join("shape_cases"), Into::into);
-    std::fs::create_dir_all(&folder).unwrap();
-    let rough: f64 = std::env::var("SHAPE_ROUGH").map_or(0.0, |value| value.parse().unwrap());
-    for surface in SURFACES {
-        for share in [0.05, 0.1, 0.2, 0.4] {
-            for sampling in [0.5, 1.0, 4.0] {
-                let radius = share * surface.size();
-                let edge = (0.05 * surface.size()).min(radius / 4.0);
-                let case = Case::rough(surface, radius, edge, sampling, rough);
-                let name = format!("{}_{share}_{sampling}", surface.name());
-                let position = |v: u32| case.positions[v as usize];
-                write_stl(&folder.join(format!("{name}.stl")), case.around.iter().map(|t| t.map(position)));
-                let patch = case.coarse();
-                for method in [Method::Fair, Method::Implicit] {
-                    let settings = ShapeSettings { method, ..ShapeSettings::default() };
-                    let start = std::time::Instant::now();
-                    let shaped = case.shaped(&patch, &settings);
-                    let took = start.elapsed().as_secs_f64() * 1e3;
-                    match shaped {
-                        Ok(shaped) => {
-                            let (far, tilt) = case.errors(&shaped);
-                            // Of the middle of an edge, for the largest curvature.
-                            let chord = edge * edge / 8.0 / surface.size();
-                            println!(
-                                "{name} {method:?} rim {} added {} far {far:.2e} 2chord {:.2e} normal {tilt:.2} ms {took:.2}",
-                                case.rims[0].len(),
-                                shaped.added.len(),
-                                2.0 * chord
-                            );
-                            let all = |v: u32| {
-                                *case
-                                    .positions
-                                    .get(v as usize)
-                                    .unwrap_or_else(|| &shaped.added[v as usize - case.positions.len()])
-                            };
-                            let path = folder.join(format!("{name}.{}.out.stl", format!("{method:?}").to_lowercase()));
-                            write_stl(&path, shaped.triangles.iter().chain(&case.around).map(|t| t.map(all)));
-                        }
-                        Err(error) => println!("{name} {method:?} {error}"),
-                    }
-                }
-            }
-        }
-    }
-}
 
 /// A cylinder of radius 1 with a ring missing, bridged straight across.
 fn bridged(count: usize, gap: f64, edge: f64) -> (Case, Vec<[u32; 3]>) {

@@ -257,6 +257,12 @@ impl Shop {
         self.place(to) - self.place(from)
     }
 
+    /// Normal of a triangle, twice its area long.
+    pub(crate) fn normal(&self, t: u32) -> DVec3 {
+        let [a, b, c] = self.triangles[t as usize].v;
+        self.vector(a, b).cross(self.vector(a, c))
+    }
+
     pub(crate) fn distance(&self, a: Vertex, b: Vertex) -> f64 {
         distance(self.positions[a as usize], self.positions[b as usize])
     }

@@ -188,6 +188,25 @@ pub(crate) fn around_islands(rims: &[&Rim<'_>], joined: &dyn Fn(u32, u32) -> boo
     }
 }
 
+/// Closes a loop that is in some places more than once, as it walks around islands that touch it: the copies of a place are one vertex of
+/// the mesh. Valid as a patch of [`triangulate`] is; no two chords lie between the same places. O(n³), and not for more vertices than
+/// [`FillSettings::minimum_weight_vertices`].
+pub(crate) fn pinched(rim: &Rim<'_>) -> Result<Vec<[u32; 3]>, Unfillable> {
+    if rim.len() > FillSettings::default().minimum_weight_vertices {
+        return Err(Unfillable::TooLarge);
+    }
+    let place = |i: u32| rim.points[i as usize].map(|x| (x + 0.0).to_bits());
+    let forbidden = |i: u32, j: u32| place(i) == place(j) || (rim.forbidden)(i, j);
+    let rim = &Rim { points: rim.points, apexes: rim.apexes, obstacles: rim.obstacles, forbidden: &forbidden };
+    let mut clearance = Clearance::new(rim);
+    let made = [Weight::Bend, Weight::Area].into_iter().find_map(|weight| by_weight(rim, weight, &mut clearance).ok());
+    let triangles = made.ok_or(Unfillable::Blocked)?;
+    let sides = triangles.iter().flat_map(|t| [0, 1, 2].map(|k| [place(t[k]), place(t[(k + 1) % 3])]));
+    let mut sides: Vec<_> = sides.collect();
+    sides.sort_unstable();
+    if sides.windows(2).any(|w| w[0] == w[1]) { Err(Unfillable::Blocked) } else { Ok(in_order(triangles)) }
+}
+
 /// Tries what there is for more than three vertices.
 fn by_methods(rim: &Rim<'_>, settings: &FillSettings) -> Result<Patch, Unfillable> {
     const SMALL: [Method; 6] =

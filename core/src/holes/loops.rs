@@ -2,11 +2,13 @@
 //!
 //! A boundary edge is used by one triangle; its patch uses it the other way round. Where several holes meet in a vertex, the way
 //! goes on to the fan that lies across the hole, so that filling joins all fans into one. A way that comes back to a vertex is
-//! cut there into simple loops.
+//! cut there into simple loops. A hole that reaches an edge where other surface meets goes on along that edge.
+
+use glam::DVec3;
 
 use crate::chunk;
 use crate::fill::exact::Point;
-use crate::shop::edges::Edges;
+use crate::shop::edges::{Edge, Edges, Use};
 use crate::shop::{self, Shop, Vertex};
 
 /// A simple boundary loop.
@@ -16,6 +18,10 @@ pub(crate) struct Loop {
     pub(crate) vertices: Vec<Vertex>,
     /// For each edge from a vertex to the next, the triangle on its other side.
     pub(crate) triangles: Vec<u32>,
+    /// Part of it runs along non-manifold edges, which lack a triangle.
+    pub(crate) branches: bool,
+    /// The way that it was cut from: loops of one way meet in vertices.
+    pub(crate) way: u32,
 }
 
 impl Loop {
@@ -34,36 +40,74 @@ impl Loop {
         (0..n).map(apex).collect()
     }
 
+    /// Its area as a vector (Newell's): the normal of a flat patch, times its area.
+    pub(crate) fn vector_area(&self, shop: &Shop) -> DVec3 {
+        let origin = shop.place(self.vertices[0]);
+        let way = self.vertices.windows(2).map(|w| (shop.place(w[0]) - origin).cross(shop.place(w[1]) - origin));
+        way.sum::<DVec3>() * 0.5
+    }
+
+    /// This loop with another one put in where they meet; `None` if they do not. What comes of it is in one vertex twice.
+    pub(crate) fn with(&self, other: &Loop) -> Option<Loop> {
+        let at = self.vertices.iter().position(|v| other.vertices.contains(v))?;
+        let from = other.vertices.iter().position(|v| *v == self.vertices[at])?;
+        let put_in = |own: &[u32], others: &[u32]| {
+            let turned = others[from..].iter().chain(&others[..from]);
+            own[..at].iter().chain(turned).chain(&own[at..]).copied().collect()
+        };
+        Some(Loop {
+            vertices: put_in(&self.vertices, &other.vertices),
+            triangles: put_in(&self.triangles, &other.triangles),
+            branches: self.branches || other.branches,
+            way: self.way,
+        })
+    }
+
     pub(crate) fn perimeter(&self, shop: &Shop) -> f64 {
         let n = self.vertices.len();
         (0..n).map(|i| shop.distance(self.vertices[i], self.vertices[(i + 1) % n])).sum()
     }
 }
 
-/// A boundary edge in the patch's direction.
+/// An edge that lacks a triangle, in the direction in which a patch would run through it.
 #[derive(Clone, Copy)]
 struct Rim {
     from: Vertex,
     to: Vertex,
+    /// The triangle on its other side.
     triangle: u32,
+    /// It has other triangles too, which are each other's neighbours.
+    branches: bool,
 }
 
-/// All boundary loops, by smallest vertex. Edges whose triangles do not agree around a vertex may leave open chains: these are in no
-/// loop. O(n log n) in the boundary.
+/// The boundary of a workshop.
+#[derive(Debug, Default)]
+pub(crate) struct Boundary {
+    /// All simple loops, by smallest vertex.
+    pub(crate) loops: Vec<Loop>,
+    /// The boundary edges that are in none, in runs, by first vertex: ways that end where the triangles around a vertex do not agree.
+    pub(crate) chains: Vec<Vec<Vertex>>,
+}
+
+/// All boundary loops, by smallest vertex. O(n log n) in the boundary and the non-manifold edges.
 pub(crate) fn find(shop: &Shop, edges: &Edges) -> Vec<Loop> {
-    let mut rims: Vec<Rim> = edges
-        .iter()
-        .filter(|e| e.is_boundary())
-        .map(|e| {
-            let (to, from) = e.directed(&e.uses[0]);
-            Rim { from, to, triangle: e.uses[0].triangle }
-        })
-        .collect();
+    boundary(shop, edges).loops
+}
+
+/// The boundary in loops, and what is in none. A boundary that runs into a non-manifold edge goes on along it, if that lacks a triangle
+/// too: where the triangles around agree on their directions, the edges that lack one are a cycle (the boundary of a boundary is
+/// nothing), and so every way closes. O(n log n) in the boundary and the non-manifold edges.
+pub(crate) fn boundary(shop: &Shop, edges: &Edges) -> Boundary {
+    let mut rims: Vec<Rim> = edges.iter().filter_map(|e| lacking(shop, &e)).collect();
     rims.sort_unstable_by_key(|r| (r.from, r.to));
     let next = link(shop, edges, &rims);
     let mut seen = vec![false; rims.len()];
-    let mut loops = Vec::new();
-    for start in 0..rims.len() {
+    let mut boundary = Boundary::default();
+    // A way that does not close is walked from its first edge.
+    let mut is_first = vec![true; rims.len()];
+    next.iter().filter(|n| **n != chunk::NONE).for_each(|n| is_first[*n as usize] = false);
+    let firsts = (0..rims.len()).filter(|r| is_first[*r]);
+    for start in firsts.chain(0..rims.len()) {
         let mut way: Vec<usize> = Vec::new();
         let mut at = start as u32;
         while at != chunk::NONE && !seen[at as usize] {
@@ -71,13 +115,79 @@ pub(crate) fn find(shop: &Shop, edges: &Edges) -> Vec<Loop> {
             way.push(at as usize);
             at = next[at as usize];
         }
-        cut_into_loops(&rims, &way, &mut loops);
+        cut_into_loops(&rims, start as u32, &way, &mut boundary);
     }
-    loops.sort_by(|a, b| a.vertices.cmp(&b.vertices));
-    loops
+    boundary.loops.sort_by(|a, b| a.vertices.cmp(&b.vertices));
+    boundary.chains.sort();
+    boundary
 }
 
-/// The edge after each edge.
+/// An edge as the rim of a patch, if it lacks one triangle: a boundary edge, or a non-manifold one used once more in one direction than
+/// in the other.
+fn lacking(shop: &Shop, edge: &Edge<'_>) -> Option<Rim> {
+    let used = match edge.uses {
+        [used] => *used,
+        uses if uses.len() % 2 == 1 => unpaired(shop, edge)?,
+        _ => return None,
+    };
+    let (to, from) = edge.directed(&used);
+    Some(Rim { from, to, triangle: used.triangle, branches: edge.uses.len() > 1 })
+}
+
+/// The triangle of a non-manifold edge that is left when the others are paired around it, each with the one that faces its back: two such
+/// bound the same piece of a solid. `None` if more than one is left, or the edge has no length.
+fn unpaired(shop: &Shop, edge: &Edge<'_>) -> Option<Use> {
+    let axis = (shop.place(edge.high) - shop.place(edge.low)).normalize_or_zero();
+    let u = axis.any_orthonormal_vector();
+    let w = axis.cross(u);
+    let mut around: Vec<(f64, Use)> = edge
+        .uses
+        .iter()
+        .map(|used| {
+            let ends = [edge.low, edge.high];
+            let apex = shop.triangles[used.triangle as usize].v.into_iter().find(|v| !ends.contains(v)).unwrap_or(edge.low);
+            let out = shop.place(apex) - shop.place(edge.low);
+            (turn(out.dot(u), out.dot(w)), *used)
+        })
+        .collect();
+    around.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.triangle.cmp(&b.1.triangle)));
+    // Seen along the edge, a triangle that runs through it forward has the solid before it, in the order of angles; the other kind behind.
+    // Twice around, so that a pair across the start is found.
+    let n = around.len();
+    let mut paired = vec![false; n];
+    let mut waiting: Vec<usize> = Vec::new();
+    for i in (0..2 * n).map(|i| i % n) {
+        if paired[i] {
+            continue;
+        }
+        if !around[i].1.forward {
+            if !waiting.contains(&i) {
+                waiting.push(i);
+            }
+        } else if let Some(other) = waiting.pop() {
+            (paired[i], paired[other]) = (true, true);
+        }
+    }
+    let mut left = (0..n).filter(|i| !paired[*i]);
+    left.next().filter(|_| left.next().is_none()).map(|i| around[i].1)
+}
+
+/// Grows with the angle of a direction, from 0 to 4 in one turn.
+fn turn(x: f64, y: f64) -> f64 {
+    let size = x.abs() + y.abs();
+    if size == 0.0 {
+        return 0.0;
+    }
+    let (x, y) = (x / size, y / size);
+    match (x >= 0.0, y >= 0.0) {
+        (true, true) => y,
+        (false, true) => 1.0 - x,
+        (false, false) => 2.0 - y,
+        (true, false) => 3.0 + x,
+    }
+}
+
+/// The edge after each edge. Boundary edges go on among themselves where as many run into a vertex as out of it.
 fn link(shop: &Shop, edges: &Edges, rims: &[Rim]) -> Vec<u32> {
     let mut next = vec![chunk::NONE; rims.len()];
     let mut incoming: Vec<u32> = (0..rims.len() as u32).collect();
@@ -88,10 +198,21 @@ fn link(shop: &Shop, edges: &Edges, rims: &[Rim]) -> Vec<u32> {
         let outgoing: Vec<u32> = (from..rims.len()).take_while(|r| rims[*r].from == v).map(|r| r as u32).collect();
         if let ([i], [o]) = (group, outgoing.as_slice()) {
             next[*i as usize] = *o;
-        } else {
-            for (i, o) in across(shop, edges, rims, v, group, &outgoing) {
+            continue;
+        }
+        let part = |all: &[u32]| all.iter().copied().partition(|r| !rims[*r as usize].branches);
+        let (into, into_branches): (Vec<u32>, Vec<u32>) = part(group);
+        let (out, out_branches): (Vec<u32>, Vec<u32>) = part(&outgoing);
+        let mut pair = |incoming: &[u32], outgoing: &[u32]| {
+            for (i, o) in across(shop, edges, rims, v, incoming, outgoing) {
                 next[i as usize] = o;
             }
+        };
+        if into.len() == out.len() {
+            pair(&into, &out);
+            pair(&into_branches, &out_branches);
+        } else {
+            pair(group, &outgoing);
         }
     }
     next
@@ -142,8 +263,9 @@ fn fans(shop: &Shop, edges: &Edges, v: Vertex) -> Vec<(u32, u32)> {
     (0..star.len() as u32).map(|i| (star[i as usize], star[chunk::find(&mut parents, i) as usize])).collect()
 }
 
-/// Cuts a way of consecutive edges wherever it comes back to a vertex. What does not close is left out.
-fn cut_into_loops(rims: &[Rim], way: &[usize], loops: &mut Vec<Loop>) {
+/// Cuts a way of consecutive edges wherever it comes back to a vertex. What does not close is chains. Of non-manifold edges alone nothing
+/// is made: nothing is missing there that a patch could restore.
+fn cut_into_loops(rims: &[Rim], number: u32, way: &[usize], boundary: &mut Boundary) {
     let mut open: Vec<Rim> = Vec::new();
     let mut place: std::collections::HashMap<Vertex, usize> = std::collections::HashMap::new();
     for rim in way.iter().map(|r| rims[*r]) {
@@ -154,15 +276,26 @@ fn cut_into_loops(rims: &[Rim], way: &[usize], loops: &mut Vec<Loop>) {
             closed.iter().for_each(|r| {
                 place.remove(&r.from);
             });
-            loops.push(from_smallest(&closed));
+            if closed.iter().any(|r| !r.branches) {
+                boundary.loops.push(from_smallest(&closed, number));
+            }
         }
+    }
+    for chain in open.chunk_by(|a, b| !a.branches && !b.branches).filter(|chain| !chain[0].branches) {
+        let last = chain.last().map(|r| r.to);
+        boundary.chains.push(chain.iter().map(|r| r.from).chain(last).collect());
     }
 }
 
-fn from_smallest(rims: &[Rim]) -> Loop {
+fn from_smallest(rims: &[Rim], way: u32) -> Loop {
     let first = (0..rims.len()).min_by_key(|i| rims[*i].from).unwrap_or(0);
     let turned: Vec<Rim> = rims[first..].iter().chain(&rims[..first]).copied().collect();
-    Loop { vertices: turned.iter().map(|r| r.from).collect(), triangles: turned.iter().map(|r| r.triangle).collect() }
+    Loop {
+        vertices: turned.iter().map(|r| r.from).collect(),
+        triangles: turned.iter().map(|r| r.triangle).collect(),
+        branches: turned.iter().any(|r| r.branches),
+        way,
+    }
 }
 
 #[cfg(test)]

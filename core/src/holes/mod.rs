@@ -64,6 +64,9 @@ pub(crate) fn classify(shop: &Shop, edges: &Edges, loops: &[Loop], tolerance: &T
         .iter()
         .zip(&sides)
         .map(|(rim, sides)| {
+            if rim.branches {
+                return Some((LoopClass::Simple, "it runs along non-manifold edges".into()));
+            }
             sides.class().or_else(|| {
                 let touching = rim.vertices.iter().filter(|v| several.binary_search(v).is_ok()).count();
                 (touching > 0).then(|| (LoopClass::Nested, format!("it meets another loop in {touching} vertices")))

@@ -11,7 +11,7 @@ use crate::chunk::NONE;
 use crate::fill::{self, FillSettings, Rim, Unfillable, cross, strip};
 use crate::holes::{
     self, Shapes,
-    loops::{self, Loop},
+    loops::{self, Boundary, Loop},
 };
 use crate::parallel;
 use crate::report::LoopLeft;
@@ -101,7 +101,7 @@ pub(super) fn fill_loops(
     threads: usize,
 ) -> Closed {
     let (shop, edges) = work.edges();
-    let rims = loops::find(shop, edges);
+    let Boundary { loops: rims, chains } = loops::boundary(shop, edges);
     let shapes = Shapes::of(shop, &rims, threads);
     let admission = Admission::of(survey, work, &rims, &shapes, reversed, tolerance, profile);
     let max_edges = profile.max_hole_edges as usize;
@@ -116,8 +116,20 @@ pub(super) fn fill_loops(
     if profile.check_self_intersections {
         closing.guard(survey, work);
     }
-    closing.finish(work)
+    let mut closed = closing.finish(work);
+    for chain in chains.iter().take(LISTED.saturating_sub(closed.left.len())) {
+        closed.left.push(LoopLeft {
+            at: work.positions[chain[0] as usize],
+            edges: chain.len() as u64 - 1,
+            perimeter: chain.windows(2).map(|w| work.distance(w[0], w[1])).sum(),
+            reason: NO_LOOP.into(),
+        });
+    }
+    closed
 }
+
+/// Why a chain of boundary edges stays open.
+const NO_LOOP: &str = "no loop, but a chain that ends where the triangles around disagree on their directions";
 
 fn shape_settings(profile: &Profile) -> Option<ShapeSettings> {
     let method = match profile.patch_shape {
@@ -153,15 +165,29 @@ impl Closing<'_> {
     ) -> usize {
         let partners = shapes.partners();
         let admits = |shop: &Shop, rim: &Loop| self.admission.check_joined(shop, rim).is_ok();
-        let rings = partners.rings.into_iter().map(|pair| pair.map(|i| &rims[i]));
+        let is_admitted = |shop: &Shop, group: &[&Loop]| {
+            self.admission.check(shop, group[0]).is_ok() && group[1..].iter().all(|rim| admits(shop, rim))
+        };
+        let mut taken = vec![false; rims.len()];
+        let mut touching = Vec::new();
+        for (numbers, way) in islands::touching(work, &rims) {
+            let group: Vec<&Loop> = numbers.iter().map(|i| &rims[*i]).collect();
+            if is_admitted(work, &group) && let Some(patch) = islands::patch_touching(work, &way) {
+                numbers.iter().for_each(|i| taken[*i] = true);
+                touching.push((group, patch));
+            }
+        }
+        let is_free = |numbers: &[usize]| numbers.iter().all(|i| !taken[*i]);
+        let rings = partners.rings.into_iter().filter(|pair| is_free(pair)).map(|pair| pair.map(|i| &rims[i]));
         let rings: Vec<[&Loop; 2]> = rings.filter(|pair| pair.iter().all(|rim| admits(work, rim))).collect();
         let groups = islands::groups(survey, work, &rims, &partners.islands, |rim| self.admission.is_sheet(rim));
         let groups: Vec<Vec<&Loop>> = groups
             .iter()
+            .filter(|group| is_free(group))
             .map(|group| group.iter().map(|i| &rims[*i]).collect::<Vec<_>>())
-            .filter(|group| self.admission.check(work, group[0]).is_ok() && group[1..].iter().all(|rim| admits(work, rim)))
+            .filter(|group| is_admitted(work, group))
             .collect();
-        if rings.is_empty() && groups.is_empty() {
+        if rings.is_empty() && groups.is_empty() && touching.is_empty() {
             self.rims = rims;
             return 0;
         }
@@ -171,6 +197,7 @@ impl Closing<'_> {
             done.extend(group.iter().map(|rim| (*rim).clone()));
             placed.push(Placed::put_in(work, numbers, triangles, method));
         };
+        touching.iter().for_each(|(group, patch)| place(work, group, patch, "islands"));
         annular::bridge(work, &rings, threads, |work, i, triangles| place(work, &rings[i], triangles, "annular"));
         let mut joined = Vec::new();
         for group in &groups {

@@ -1,10 +1,12 @@
 //! Islands: a loose piece of surface inside a hole is joined to the hole's rim, so that one patch closes both (METHODS C1).
 //!
 //! Filled each for itself, the hole would be closed underneath the island and the island become a body of nearly no thickness. One patch is
-//! laid between the hole's rim and those of all its islands. Where that is not to be had, two triangles between the nearest vertices of two
+//! laid between the hole's rim and those of all its islands; one that touches the rim in a vertex is walked around with it. Where that is not to be had, two triangles between the nearest vertices of two
 //! rims make one simple loop of them, which is then filled like any other.
 
 use std::collections::{BTreeMap, BTreeSet};
+
+use glam::DVec3;
 
 use super::close::{are_joined, concatenated};
 use super::work::Work;
@@ -60,6 +62,41 @@ pub(super) fn groups(
         }
     }
     inside.into_values().collect()
+}
+
+/// Holes with islands that touch their rims, or each other, in one vertex: the numbers of the loops, the hole's first, and the way around
+/// all of them. Of the loops that one way was cut into, the largest is the hole's, and those that turn against it are islands'.
+/// O(loops), and the square of what one way was cut into.
+pub(super) fn touching(shop: &Shop, rims: &[Loop]) -> Vec<(Vec<usize>, Loop)> {
+    let mut of_way: Vec<usize> = (0..rims.len()).collect();
+    of_way.sort_by_key(|i| rims[*i].way);
+    let mut groups = Vec::new();
+    for same in of_way.chunk_by(|a, b| rims[*a].way == rims[*b].way).filter(|same| (2..=MAX_TOUCHING).contains(&same.len())) {
+        let mut areas: Vec<(DVec3, usize)> = same.iter().map(|i| (rims[*i].vector_area(shop), *i)).collect();
+        areas.sort_by(|a, b| b.0.length().total_cmp(&a.0.length()).then(a.1.cmp(&b.1)));
+        let (of_hole, hole) = areas[0];
+        let mut left: Vec<usize> = areas[1..].iter().filter(|(area, _)| area.dot(of_hole) < 0.0).map(|(_, i)| *i).collect();
+        let (mut group, mut way) = (vec![hole], rims[hole].clone());
+        while let Some((at, longer)) = left.iter().enumerate().find_map(|(at, i)| Some((at, way.with(&rims[*i])?))) {
+            group.push(left.remove(at));
+            way = longer;
+        }
+        if group.len() > 1 {
+            groups.push((group, way));
+        }
+    }
+    groups
+}
+
+/// No way that was cut into more loops than this is looked at.
+const MAX_TOUCHING: usize = 64;
+
+/// One patch for a hole and the islands that touch its rim.
+pub(super) fn patch_touching(shop: &Shop, way: &Loop) -> Option<Vec<[Vertex; 3]>> {
+    let (points, apexes) = (way.points(shop), way.apexes(shop));
+    let forbidden = |i: u32, j: u32| are_joined(shop, way.vertices[i as usize], way.vertices[j as usize]);
+    let patch = fill::pinched(&Rim { points: &points, apexes: &apexes, obstacles: &[], forbidden: &forbidden }).ok()?;
+    Some(patch.into_iter().map(|t| t.map(|i| way.vertices[i as usize])).collect())
 }
 
 /// Joins the rims of islands to that of their hole, the first of a group, by two triangles each, which are put in; returns them.

@@ -301,7 +301,7 @@ fn from_smallest(rims: &[Rim], way: u32) -> Loop {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Corners, diagnose, plate, records};
+    use crate::testing::{Corners, cube, diagnose, plate, records, reversed, shifted};
 
     /// Two square holes that meet in the middle of the plate.
     fn pinched() -> Vec<Corners> {
@@ -329,5 +329,38 @@ mod tests {
                 assert!((0..3).any(|k| (v[k], v[(k + 1) % 3]) == (to, from)));
             }
         }
+    }
+
+    /// Two cubes that touch along an edge, one of them without a side there.
+    fn open_at_a_shared_edge() -> Vec<Corners> {
+        let open = cube().into_iter().filter(|t| !t.iter().all(|p| p[0] == 1.0));
+        open.chain(shifted(&cube(), [1.0, 1.0, 0.0])).collect()
+    }
+
+    #[test]
+    fn a_hole_goes_on_along_an_edge_where_another_body_touches() {
+        let records = records(&open_at_a_shared_edge());
+        let d = diagnose(&records);
+        let Boundary { loops, chains } = boundary(&d.shop, &Edges::of(&d.shop));
+        assert_eq!((loops.len(), loops[0].vertices.len(), loops[0].branches, chains.len()), (1, 4, true, 0));
+        // The triangle beyond the shared edge is the open cube's, not one of the two that close the other.
+        let other = |t: &u32| d.shop.points(*t).iter().all(|p| p[0] >= 1.0 && p[1] >= 1.0);
+        assert!(!loops[0].triangles.iter().any(other));
+    }
+
+    #[test]
+    fn what_is_in_no_loop_is_in_a_chain() {
+        let mut holed = plate(3, |x, y| (x, y) != (1, 1));
+        let beside = holed.iter().position(|t| t.iter().filter(|p| (1.0..=2.0).contains(&p[0]) && p[1] == 1.0).count() == 2);
+        let beside = beside.unwrap();
+        holed[beside] = reversed(&holed[beside..=beside])[0];
+        let records = records(&holed);
+        let d = diagnose(&records);
+        let edges = Edges::of(&d.shop);
+        let Boundary { loops, chains } = boundary(&d.shop, &edges);
+        let in_loops: usize = loops.iter().map(|l| l.vertices.len()).sum();
+        let in_chains: usize = chains.iter().map(|c| c.len() - 1).sum();
+        assert!(in_chains > 0, "{loops:?}");
+        assert_eq!(in_loops + in_chains, edges.iter().filter(|e| e.is_boundary()).count());
     }
 }

@@ -172,7 +172,9 @@ impl Closing<'_> {
         let mut touching = Vec::new();
         for (numbers, way) in islands::touching(work, &rims) {
             let group: Vec<&Loop> = numbers.iter().map(|i| &rims[*i]).collect();
-            if is_admitted(work, &group) && let Some(patch) = islands::patch_touching(work, &way) {
+            if is_admitted(work, &group)
+                && let Some(patch) = islands::patch_touching(work, &way)
+            {
                 numbers.iter().for_each(|i| taken[*i] = true);
                 touching.push((group, patch));
             }
@@ -619,5 +621,14 @@ mod tests {
         let profile = Profile { leave_open: vec![LoopClass::Simple], ..Profile::default() };
         let got = filled(&profile);
         assert_eq!(got.result.left[0].reason, "the profile leaves simple loops open");
+    }
+
+    #[test]
+    fn a_side_that_lacks_beside_another_body_is_closed() {
+        let open: Vec<Corners> = cube().into_iter().filter(|t| !t.iter().all(|p| p[0] == 1.0)).collect();
+        let got = after(&[open, crate::testing::shifted(&cube(), [1.0, 1.0, 0.0])].concat(), |d, _| fill(d, &Profile::default()));
+        // The bodies touch along an edge, as they are meant to.
+        assert_eq!((got.result.loops, got.defects.boundary_edges, got.defects.nonmanifold_edges), (1, 0, 1), "{:?}", got.result);
+        assert!((got.defects.volume - 2.0).abs() < 1e-9, "{}", got.defects.volume);
     }
 }

@@ -194,6 +194,15 @@ mod tests {
     }
 
     #[test]
+    fn an_island_that_touches_its_hole_in_a_vertex_is_closed_with_it() {
+        // A cell stands out into the hole; the next one along the diagonal is an island that touches it, and is touched by another.
+        let ring = |x: u8, y: u8| !(1..7).contains(&x) || !(1..7).contains(&y) || (x, y) == (1, 1);
+        let with = |islands: &[(u8, u8)]| plate(8, |x, y| ring(x, y) || islands.contains(&(x, y)));
+        assert_eq!(bridged(&with(&[(2, 2)]), 31.0), (2, 1, 1));
+        assert_eq!(bridged(&with(&[(2, 2), (3, 3)]), 31.0), (3, 1, 1));
+    }
+
+    #[test]
     fn rims_are_joined_at_their_nearest_vertices() {
         let open = plate(6, |x, y| !(1..5).contains(&x) || !(1..5).contains(&y) || ((2..4).contains(&x) && (2..4).contains(&y)));
         let got = after(&open, |d, _| {

@@ -63,6 +63,8 @@ pub(super) struct Placed {
     obstacles: Vec<Obstacle>,
     /// Nothing else was found than a patch that crosses bodies which run into this one already.
     across: bool,
+    /// A patch that does, with its method, while others are tried.
+    spare: Option<(&'static str, Vec<[Vertex; 3]>)>,
 }
 
 impl Placed {
@@ -75,7 +77,8 @@ impl Placed {
     }
 
     fn put_in(work: &mut Work<'_>, rims: Vec<u32>, triangles: &[[Vertex; 3]], method: &'static str) -> Self {
-        let mut placed = Self { rims, method, first: 0, count: 0, coarse: Vec::new(), obstacles: Vec::new(), across: false };
+        let mut placed =
+            Self { rims, method, first: 0, count: 0, coarse: Vec::new(), obstacles: Vec::new(), across: false, spare: None };
         placed.replace(work, triangles);
         placed
     }
@@ -262,8 +265,8 @@ impl Closing<'_> {
     }
 
     /// Steps back where a patch crosses anything: from the shape to the triangulation it came from, to another one around what it
-    /// crosses, to one that crosses only bodies that the loop's own runs into already, to none. (What is closed for itself and runs into others is a solid
-    /// still, which an open one is not.)
+    /// crosses, to the first one that crosses only bodies that the loop's own runs into already, to none. (What is closed for itself and runs
+    /// into others is a solid still, which an open one is not.)
     fn guard(&mut self, survey: &Survey<'_>, work: &mut Work<'_>) {
         let mut is_new = vec![true; self.placed.len()];
         for round in 0..=GUARD_ROUNDS.1 {
@@ -282,7 +285,7 @@ impl Closing<'_> {
                     continue;
                 }
                 is_new[i] = true;
-                if !self.step_back(work, i, obstacles, round < guard_rounds(&self.placed[i], &self.rims)) {
+                if !self.step_back(work, i, obstacles, round) {
                     self.revoke(work, i, &mut is_new);
                 }
             }
@@ -312,17 +315,21 @@ impl Closing<'_> {
     }
 
     /// Replaces a patch by the next one that may do, or by none.
-    fn step_back(&mut self, work: &mut Work<'_>, i: usize, obstacles: Vec<Obstacle>, again: bool) -> bool {
-        let is_solid_still = obstacles.iter().all(|obstacle| obstacle.met_already);
+    fn step_back(&mut self, work: &mut Work<'_>, i: usize, obstacles: Vec<Obstacle>, round: usize) -> bool {
+        let again = round < guard_rounds(&self.placed[i], &self.rims);
         // What is put in in the last round would not be tested any more.
         let coarse = if again { std::mem::take(&mut self.placed[i].coarse) } else { Vec::new() };
         self.placed[i].coarse = Vec::new();
-        let last: Vec<[Vertex; 3]> = self.placed[i].triangles().map(|t| work.triangles[t as usize].v).collect();
-        self.placed[i].obstacles.extend(obstacles);
-        self.placed[i].replace(work, &[]);
+        let patch = &mut self.placed[i];
+        if obstacles.iter().all(|obstacle| obstacle.met_already) && patch.spare.is_none() {
+            let last = patch.triangles().map(|t| work.triangles[t as usize].v).collect();
+            patch.spare = Some((patch.method, last));
+        }
+        patch.obstacles.extend(obstacles);
+        patch.replace(work, &[]);
         let triangles = if !coarse.is_empty() {
             coarse
-        } else if let (&[rim], true, true) = (self.placed[i].rims.as_slice(), self.placed[i].method != FLAT, again) {
+        } else if let (&[rim], true, true) = (patch.rims.as_slice(), patch.method != FLAT, again) {
             let tries: &[bool] = if self.rim(rim).vertices.len() > SMALL { &[false] } else { &[false, true] };
             let made = tries.iter().find_map(|across| {
                 let heeded = self.placed[i].obstacles.iter().filter(|obstacle| !across || !obstacle.met_already);
@@ -332,22 +339,23 @@ impl Closing<'_> {
                 }
                 self.fill(work, rim, Neighbours::Heeded, &heeded).ok().map(|patch| (patch, *across))
             });
-            match made {
-                Some((patch, across)) => {
-                    (self.placed[i].method, self.placed[i].across) = (patch.method.name(), across);
-                    of_workshop(self.rim(rim), &patch)
-                }
-                None if is_solid_still => {
-                    self.placed[i].across = true;
-                    last
-                }
-                None => Vec::new(),
-            }
-        } else if is_solid_still && again {
-            self.placed[i].across = true;
-            last
+            made.map_or_else(Vec::new, |(patch, across)| {
+                (self.placed[i].method, self.placed[i].across) = (patch.method.name(), across);
+                of_workshop(self.rim(rim), &patch)
+            })
         } else {
             Vec::new()
+        };
+        let triangles = match self.placed[i].spare.take() {
+            // It may run into what was put in since, which the next round shows.
+            Some((method, spare)) if triangles.is_empty() && round < GUARD_ROUNDS.1 => {
+                (self.placed[i].method, self.placed[i].across) = (method, true);
+                spare
+            }
+            spare => {
+                self.placed[i].spare = spare;
+                triangles
+            }
         };
         self.placed[i].replace(work, &triangles);
         !triangles.is_empty()

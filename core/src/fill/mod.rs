@@ -199,13 +199,19 @@ pub(crate) fn pinched(rim: &Rim<'_>) -> Result<Vec<[u32; 3]>, Unfillable> {
     let forbidden = |i: u32, j: u32| place(i) == place(j) || (rim.forbidden)(i, j);
     let rim = &Rim { points: rim.points, apexes: rim.apexes, obstacles: rim.obstacles, forbidden: &forbidden };
     let mut clearance = Clearance::new(rim);
-    let made = [Weight::Bend, Weight::Area].into_iter().find_map(|weight| by_weight(rim, weight, &mut clearance).ok());
-    let triangles = made.ok_or(Unfillable::Blocked)?;
+    let mut attempt = |weight| match rim.len() {
+        ..=PINCHED_THOROUGH => by_weight(rim, weight, &mut clearance).ok(),
+        _ => minweight::triangulate(rim, weight, Choice::Any).ok().filter(|made| rim.accepts(made, false).is_ok()),
+    };
+    let triangles = attempt(Weight::Bend).or_else(|| attempt(Weight::Area)).ok_or(Unfillable::Blocked)?;
     let sides = triangles.iter().flat_map(|t| [0, 1, 2].map(|k| [place(t[k]), place(t[(k + 1) % 3])]));
     let mut sides: Vec<_> = sides.collect();
     sides.sort_unstable();
     if sides.windows(2).any(|w| w[0] == w[1]) { Err(Unfillable::Blocked) } else { Ok(in_order(triangles)) }
 }
+
+/// No way of [`pinched`] of more vertices is triangulated from clear triangles only: there are other ways to close what it is made of.
+const PINCHED_THOROUGH: usize = 100;
 
 /// Tries what there is for more than three vertices.
 fn by_methods(rim: &Rim<'_>, settings: &FillSettings) -> Result<Patch, Unfillable> {

@@ -114,6 +114,8 @@ pub(crate) fn classify(shop: &Shop, edges: &Edges, loops: &[Loop], tolerance: &T
 pub(crate) struct Partners {
     /// The rims of missing rings.
     pub(crate) rings: Vec<[usize; 2]>,
+    /// The outer rim of a wall whose end is missing, and the rims of several bores in it.
+    pub(crate) bored: Vec<Vec<usize>>,
     /// Holes, each with the rim of an island that lies in it.
     pub(crate) islands: Vec<[usize; 2]>,
 }
@@ -131,9 +133,24 @@ impl Shapes {
     pub(crate) fn partners(&self) -> Partners {
         let all: Vec<u32> = (0..self.0.len() as u32).collect();
         let mut partners = Partners::default();
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        let mut group_of: BTreeMap<usize, usize> = BTreeMap::new();
         for pair in pairs::find(&all, &self.0) {
-            let kind = if pair.class == LoopClass::Island { &mut partners.islands } else { &mut partners.rings };
-            kind.push(pair.loops.map(|i| i as usize));
+            let [outer, inner] = pair.loops.map(|i| i as usize);
+            if pair.class == LoopClass::Island {
+                partners.islands.push([outer, inner]);
+            } else if let Some(group) = group_of.get(&outer) {
+                groups[*group].push(inner);
+            } else {
+                group_of.insert(outer, groups.len());
+                groups.push(vec![outer, inner]);
+            }
+        }
+        for group in groups {
+            match group[..] {
+                [outer, inner] => partners.rings.push([outer, inner]),
+                _ => partners.bored.push(group),
+            }
         }
         partners
     }

@@ -1,7 +1,8 @@
 //! Loops that are narrow: each vertex has another side of the hole near it (METHODS C2 to C4).
 //!
 //! A side across runs the other way, since both are traversed by one patch: so a neighbouring edge of the same chain is never taken for
-//! it. The ends of a slit, where the loop turns back, have no side across and are not asked for one.
+//! it. Nor is the other rim of a thin wall, where the surface ends in the same direction. The ends of a slit, where the loop turns back, have
+//! no side across and are not asked for one.
 
 use glam::DVec3;
 
@@ -14,6 +15,8 @@ use crate::sums::Bounds;
 
 /// Cosine between a chain and the side across it, at most.
 const AGAINST: f64 = -0.5;
+/// Cosine between the directions in which the surface ends at a vertex and at the side across it, at most; sides that touch may end in any.
+const ALIKE: f64 = 0.5;
 /// So many of its vertices, of five, must have a side across to make a loop narrow.
 const OF_FIVE: usize = 4;
 /// A side that does not run alike is looked for so many times as far as one that does.
@@ -100,6 +103,15 @@ impl Ways {
 struct Segment {
     of_loop: u32,
     ends: [shop::Vertex; 2],
+    triangle: u32,
+}
+
+impl Segment {
+    /// The direction in which the surface ends there, as long as the edge.
+    fn ahead(&self, shop: &Shop) -> DVec3 {
+        // The edge runs against its triangle.
+        shop.normal(self.triangle).normalize_or_zero().cross(shop.vector(self.ends[0], self.ends[1]))
+    }
 }
 
 /// Of every loop. O(n log n) in all their vertices.
@@ -109,7 +121,11 @@ pub(super) fn measure(shop: &Shop, loops: &[Loop], tolerance: &Tolerance, share:
         .zip(0..)
         .flat_map(|(rim, of_loop)| {
             let n = rim.vertices.len();
-            (0..n).map(move |i| Segment { of_loop, ends: [rim.vertices[i], rim.vertices[(i + 1) % n]] })
+            (0..n).map(move |i| Segment {
+                of_loop,
+                ends: [rim.vertices[i], rim.vertices[(i + 1) % n]],
+                triangle: rim.triangles[i],
+            })
         })
         .collect();
     let boxes: Vec<Bounds> = segments.iter().map(|s| Bounds::of(&s.ends.map(|v| shop.positions[v as usize]))).collect();
@@ -118,10 +134,13 @@ pub(super) fn measure(shop: &Shop, loops: &[Loop], tolerance: &Tolerance, share:
     }
     let tree = BoxTree::new(&boxes);
     let mut found = Vec::new();
+    let mut first = 0;
     loops
         .iter()
         .zip(0..)
         .map(|(rim, number)| {
+            let own = &segments[first..first + rim.vertices.len()];
+            first += own.len();
             let mut sides = Sides { share, ..Sides::default() };
             let mut ways = Ways::default();
             let mut width: f64 = 0.0;
@@ -140,12 +159,15 @@ pub(super) fn measure(shop: &Shop, loops: &[Loop], tolerance: &Tolerance, share:
                 let near = touching.max(share * coming.length().min(going.length()));
                 let reach = touching.max(WIDER * share * 0.5 * (coming.length() + going.length()));
                 tree.meeting(&near::around(&[shop.positions[v as usize]], reach), &mut found);
+                let ahead = own[before].ahead(shop) + own[i].ahead(shop);
                 let across = found
                     .iter()
                     .map(|s| &segments[*s as usize])
                     .filter(|s| !s.ends.contains(&v))
                     .filter(|s| shop::cosine(shop.vector(s.ends[0], s.ends[1]), coming + going) < AGAINST)
-                    .map(|s| (way_to(shop, v, s), s.of_loop))
+                    .map(|s| (way_to(shop, v, s), s))
+                    .filter(|(way, s)| way.length() <= touching || shop::cosine(ahead, s.ahead(shop)) <= ALIKE)
+                    .map(|(way, s)| (way, s.of_loop))
                     .min_by(|a, b| a.0.length().total_cmp(&b.0.length()))
                     .filter(|(way, _)| way.length() <= reach);
                 let Some((way, of_loop)) = across else {

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::report::LoopClass::{AnnularCoplanar, AnnularParallel, Crack, Gap, Island, Machining, Misaligned, Nested, Simple};
-use crate::testing::{Corners, diagnose, plate, records};
+use crate::testing::{Corners, diagnose, plate, records, reversed};
 
 /// Classes and partners of a surface's loops but for the `longest`, which is the rim of the sheet itself, if asked to leave it out.
 fn classes(triangles: &[Corners], leave_longest: bool) -> Vec<LoopClass> {
@@ -101,6 +101,97 @@ fn a_ring_missing_from_a_tube_is_annular() {
         let found = classes(&tube(|z| !(6..6 + gap).contains(&z)), false);
         // The ends of the tube look away from each other.
         assert_eq!(found.iter().filter(|c| **c == AnnularParallel).count(), 2, "{gap} missing: {found:?}");
+    }
+}
+
+/// The surface that a polyline of (radius, height) sweeps around the z axis, 24 facets around; seen from outside if it ascends. It stands at x.
+fn turned(profile: &[[f32; 2]], x: f32) -> Vec<Corners> {
+    let at = |i: u8, [r, z]: [f32; 2]| {
+        let (sin, cos) = (std::f32::consts::TAU * f32::from(i % 24) / 24.0).sin_cos();
+        [x + r * cos, r * sin, z]
+    };
+    let quad = |i: u8, p: [f32; 2], q: [f32; 2]| [[at(i, p), at(i + 1, p), at(i + 1, q)], [at(i, p), at(i + 1, q), at(i, q)]];
+    profile.windows(2).flat_map(|w| (0..24).flat_map(move |i| quad(i, w[0], w[1]))).collect()
+}
+
+#[test]
+fn a_ring_missing_from_a_bore_is_annular_and_a_bores_ends_are_not() {
+    let outside_in = |t: Vec<Corners>| reversed(&t);
+    assert_eq!(classes(&outside_in(tube(|z| z < 4)), false), [Simple, Simple], "a bore alone");
+    let found = classes(&outside_in(tube(|z| !(6..9).contains(&z))), false);
+    assert_eq!(found.iter().filter(|c| **c == AnnularParallel).count(), 2, "{found:?}");
+}
+
+#[test]
+fn the_missing_ends_of_a_wall_are_annular_however_thick_the_wall() {
+    for bore in [0.5, 1.0, 2.0, 3.5] {
+        let pipe = [turned(&[[4.0, 0.0], [4.0, 10.0]], 0.0), turned(&[[bore, 10.0], [bore, 0.0]], 0.0)].concat();
+        assert_eq!(classes(&pipe, false), [AnnularCoplanar; 4], "{bore}");
+    }
+    let two_bores = [
+        turned(&[[4.0, 0.0], [4.0, 10.0]], 0.0),
+        turned(&[[0.8, 10.0], [0.8, 0.0]], 2.0),
+        turned(&[[0.6, 10.0], [0.6, 0.0]], -2.0),
+    ];
+    assert_eq!(classes(&two_bores.concat(), false), [AnnularCoplanar; 6]);
+    // From outside to inside: material, room, material.
+    let in_each_other: Vec<Corners> = [[4.0, 1.0], [3.0, -1.0], [2.0, 1.0], [1.0, -1.0]]
+        .iter()
+        .flat_map(|[r, up]| turned(&[[*r, -5.0 * up], [*r, 5.0 * up]], 0.0))
+        .collect();
+    let records = records(&in_each_other);
+    let d = diagnose(&records);
+    let edges = Edges::of(&d.shop);
+    let all = classify(&d.shop, &edges, &loops::find(&d.shop, &edges), &d.tolerance, 0.35);
+    for l in &all {
+        let radii = [l.perimeter, all[l.partner.unwrap() as usize].perimeter].map(|p| (p / 6.27).round());
+        assert!([[4.0, 3.0], [3.0, 4.0], [2.0, 1.0], [1.0, 2.0]].contains(&radii), "{radii:?}");
+    }
+}
+
+#[test]
+fn the_inner_mouth_of_a_vessel_may_lie_deep() {
+    let vessel = |deep: f32| {
+        let inside = turned(&[[4.5, 9.0 - deep], [4.5, 1.0], [0.1, 1.0]], 0.0);
+        let all = classes(&[turned(&[[0.1, 0.0], [5.0, 0.0], [5.0, 9.0]], 0.0), inside].concat(), false);
+        all.iter().filter(|c| [AnnularCoplanar, AnnularParallel].contains(c)).count()
+    };
+    assert_eq!([0.0, 2.0, 3.5, 4.4].map(vessel), [2; 4]);
+    assert_eq!(vessel(5.5), 0, "two caps have less area");
+}
+
+/// A box of 12 × 12 without these cells of its top and bottom.
+fn perforated(height: f32, top: impl Fn(u8, u8) -> bool, bottom: impl Fn(u8, u8) -> bool) -> Vec<Corners> {
+    let upper = moved(12, |x, y| !top(x, y), |[x, y, _]| [x, y, height]);
+    let lower = reversed(&plate(12, |x, y| !bottom(x, y)));
+    let rim = (0..12u8).flat_map(|i| [[i, 0, i + 1, 0], [12, i, 12, i + 1], [12 - i, 12, 11 - i, 12], [0, 12 - i, 0, 11 - i]]);
+    let sides = rim.flat_map(|edge| {
+        let [ax, ay, bx, by] = edge.map(f32::from);
+        [[[ax, ay, 0.0], [bx, by, 0.0], [bx, by, height]], [[ax, ay, 0.0], [bx, by, height], [ax, ay, height]]]
+    });
+    upper.into_iter().chain(lower).chain(sides).collect()
+}
+
+#[test]
+fn holes_back_to_back_are_a_way_through_a_plate_and_two_holes_of_a_box() {
+    let square = |from: u8| move |x: u8, y: u8| (from..from + 6).contains(&x) && (from..from + 6).contains(&y);
+    for height in [0.01, 1.0, 2.5] {
+        assert_eq!(classes(&perforated(height, square(3), square(3)), false), [AnnularParallel; 2], "{height}");
+    }
+    for height in [4.0, 12.0] {
+        assert_eq!(classes(&perforated(height, square(3), square(3)), false), [Simple; 2], "{height}");
+    }
+    assert_eq!(classes(&perforated(1.0, square(3), square(5)), false), [Simple; 2], "the outlines do not agree");
+}
+
+#[test]
+fn holes_at_the_poles_of_a_ball_are_two() {
+    for north in [2_u8, 4, 7] {
+        let profile: Vec<[f32; 2]> = (north..=24 - north)
+            .map(|i| (std::f32::consts::PI * f32::from(i) / 24.0).sin_cos())
+            .map(|(sin, cos)| [10.0 * sin, -10.0 * cos])
+            .collect();
+        assert_eq!(classes(&turned(&profile, 0.0), false), [Simple; 2], "{north}");
     }
 }
 

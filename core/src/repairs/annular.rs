@@ -149,6 +149,56 @@ mod tests {
     }
 
     #[test]
+    fn a_thick_pipe_gets_its_ends() {
+        for (bore, segments) in [(1.0, 40), (0.3, 8), (1.8, 100)] {
+            let open = [turned(&[[4.0, 0.0], [4.0, 10.0]], 48), turned(&[[bore, 10.0], [bore, 0.0]], segments)].concat();
+            let volume = 10.0 * (16.0 * polygon(48) - f64::from(bore * bore) * polygon(segments));
+            assert_bridged(&closed(&open), 4, volume);
+        }
+    }
+
+    #[test]
+    fn the_ends_of_a_block_with_several_bores_are_closed_around_them() {
+        let at = |t: Vec<Corners>, x: f32| t.into_iter().map(move |t| t.map(|[a, b, c]| [a + x, b, c]));
+        let mut open = turned(&[[4.0, 0.0], [4.0, 10.0]], 48);
+        for (r, x) in [(0.8, 2.0), (1.2, -2.0)] {
+            open.extend(at(turned(&[[r, 10.0], [r, 0.0]], 24), x));
+        }
+        let volume = 10.0 * (16.0 * polygon(48) - (0.8 * 0.8 + 1.2 * 1.2) * polygon(24));
+        assert_bridged(&closed(&open), 6, volume);
+    }
+
+    #[test]
+    fn a_vessel_whose_inner_mouth_lies_deep_stays_one() {
+        let outside = turned(&[[0.0, 0.0], [5.0, 0.0], [5.0, 9.0]], 40);
+        let inside = turned(&[[4.5, 5.5], [4.5, 1.0], [0.0, 1.0]], 36);
+        // The frustum between the mouths is open to the top.
+        let frustum = 3.5 * (25.0 + 5.0 * 4.5 + 4.5 * 4.5) / 3.0;
+        let volume = (25.0 * 9.0 - 4.5 * 4.5 * 4.5 - frustum) * polygon(38);
+        assert_bridged(&closed(&[outside, inside].concat()), 2, volume);
+    }
+
+    #[test]
+    fn a_way_through_a_plate_gets_its_sides() {
+        let volume = |height: f64| height * (100.0 * polygon(48) - 9.0 * polygon(24));
+        for height in [0.01, 1.0, 2.5] {
+            let h = height as f32;
+            let rim = turned(&[[10.0, 0.0], [10.0, h]], 48);
+            let plate = |z: f32| -> Vec<Corners> {
+                let at = |i: u16, r: f32, n: u16| {
+                    let (sin, cos) = (std::f32::consts::TAU * f32::from(i % n) / f32::from(n)).sin_cos();
+                    [r * cos, r * sin, z]
+                };
+                let fine = (0..48).map(|i| [at(i, 10.0, 48), at(i + 1, 10.0, 48), at(i.div_ceil(2), 3.0, 24)]);
+                let coarse = (0..24).map(|i| [at(i + 1, 3.0, 24), at(i, 3.0, 24), at(2 * i + 1, 10.0, 48)]);
+                fine.chain(coarse).collect()
+            };
+            let open = [rim, plate(h), crate::testing::reversed(&plate(0.0))].concat();
+            assert_bridged(&closed(&open), 2, volume(height));
+        }
+    }
+
+    #[test]
     fn a_bump_that_lost_a_ring_is_one_again() {
         let base = turned(&[[0.0, 0.0], [10.0, 0.0], [10.0, 3.0], [6.0, 3.0]], 36);
         let top = turned(&[[4.5, 4.0], [2.0, 5.2], [0.0, 5.5]], 36);

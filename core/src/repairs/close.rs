@@ -186,11 +186,11 @@ impl Closing<'_> {
         let rings = partners.rings.into_iter().filter(|pair| is_free(pair)).map(|pair| pair.map(|i| &rims[i]));
         let rings: Vec<[&Loop; 2]> = rings.filter(|pair| pair.iter().all(|rim| admits(work, rim))).collect();
         let groups = islands::groups(survey, work, &rims, &partners.islands, |rim| self.admission.is_sheet(rim));
-        let groups: Vec<Vec<&Loop>> = groups
-            .iter()
-            .filter(|group| is_free(group))
-            .map(|group| group.iter().map(|i| &rims[*i]).collect::<Vec<_>>())
-            .filter(|group| is_admitted(work, group))
+        let groups = groups.iter().map(|group| ("islands", group)).chain(partners.bored.iter().map(|group| ("annular", group)));
+        let groups: Vec<(&str, Vec<&Loop>)> = groups
+            .filter(|(_, group)| is_free(group))
+            .map(|(method, group)| (method, group.iter().map(|i| &rims[*i]).collect::<Vec<_>>()))
+            .filter(|(_, group)| is_admitted(work, group))
             .collect();
         if rings.is_empty() && groups.is_empty() && touching.is_empty() {
             self.rims = rims;
@@ -205,9 +205,9 @@ impl Closing<'_> {
         touching.iter().for_each(|(group, patch)| place(work, group, patch, "islands"));
         annular::bridge(work, &rings, threads, |work, i, triangles| place(work, &rings[i], triangles, "annular"));
         let mut joined = Vec::new();
-        for group in &groups {
+        for (method, group) in &groups {
             match islands::patch(work, group) {
-                Some(triangles) => place(work, group, &triangles, "islands"),
+                Some(triangles) => place(work, group, &triangles, method),
                 None => {
                     self.joints.extend(islands::join_all(work, group));
                     joined.extend_from_slice(&group[1..]);

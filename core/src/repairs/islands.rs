@@ -209,7 +209,7 @@ mod tests {
             let mut work = Work::new(&mut d.shop);
             let (shop, edges) = work.edges();
             let rims = loops::find(shop, edges);
-            let holes::Partners { rings, islands } = holes::Shapes::of(shop, &rims, 1).partners();
+            let holes::Partners { rings, islands, .. } = holes::Shapes::of(shop, &rims, 1).partners();
             let pairs = [rings, islands].concat();
             let [hole, island] = pairs[0].map(|i| rims[i].vertices.clone());
             let (joined, triangles) = join(&work, &hole, &island).unwrap();

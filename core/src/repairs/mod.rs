@@ -63,7 +63,7 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
             break;
         }
     }
-    log.time("zip", "vertices merged with the one that faces them across a narrow gap", || zip::zip(shop, profile));
+    log.time("zip", "vertices merged with the one that faces them across a narrow gap", || zip::zip(shop, tolerance, profile));
     clean(survey, shop, &mut log);
     log.time("debris", "triangles of open specks dropped", || debris::drop(survey, shop, profile));
     let mut contradictions = 0;

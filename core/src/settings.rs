@@ -48,7 +48,7 @@ pub struct Profile {
     pub max_bodies_lost: u32,
     /// Components of fewer triangles than this that stay open after weld and splits are dropped as debris (0: never) ...
     pub debris_triangles: u32,
-    /// ... if they have at most this share of the model's area.
+    /// ... if they have at most this share of the model's area, and all of them together at most ten times that; else all are kept.
     pub debris_area_share: f64,
     /// Look for triangles that cross or overlap each other, in the input and in the output; without, the verdict calls it unchecked.
     pub check_self_intersections: bool,

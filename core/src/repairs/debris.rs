@@ -1,11 +1,18 @@
 //! Debris: specks of a few triangles that enclose nothing and hang on nothing.
+//!
+//! All of them go or none: many specks that together are much of the surface are no debris but what is left of it, whose holes are to be
+//! closed, and which of them to keep nobody could say.
 
 use super::work::Work;
 use crate::settings::Profile;
 use crate::shop::components::{Components, Reversed, Through};
 use crate::survey::Survey;
 
-/// Drops open components of fewer triangles and less area than the profile says; returns how many triangles.
+/// So many times the area that a single speck may have is what all specks together may have, at most: 1 % of the model's, by default.
+const TOGETHER: f64 = 10.0;
+
+/// Drops open components of fewer triangles and less area than the profile says, unless they are much of the surface together; returns how many
+/// triangles. O(workshop).
 pub(super) fn drop(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile) -> u64 {
     let (shop, edges) = work.edges();
     if !edges.iter().any(|e| e.is_boundary()) {
@@ -19,6 +26,16 @@ pub(super) fn drop(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile) 
         .iter()
         .map(|c| c.open && c.triangles < u64::from(profile.debris_triangles) && c.extent.area as f64 <= bound)
         .collect();
+    let together: i128 =
+        components.list.iter().zip(&is_debris).filter(|(_, is_debris)| **is_debris).map(|(c, _)| c.extent.area).sum();
+    if together as f64 > TOGETHER * bound {
+        tracing::info!(
+            specks = is_debris.iter().filter(|is_debris| **is_debris).count(),
+            share = together as f64 / total as f64,
+            "Specks kept: together they are too much of the surface to be debris."
+        );
+        return 0;
+    }
     let doomed: Vec<u32> = shop.living().filter(|t| is_debris[components.of_triangle[*t as usize] as usize]).collect();
     doomed.iter().for_each(|t| work.kill(*t));
     doomed.len() as u64
@@ -41,5 +58,19 @@ mod tests {
         assert!(got.result == 1 && got.verdict.good && got.untouched == 12, "{:?}", got.verdict);
         assert_eq!(dropped(0.2, &Profile::default()).result, 0, "it has an area that counts");
         assert_eq!(dropped(0.1, &Profile { debris_triangles: 0, ..Profile::default() }).result, 0, "switched off");
+    }
+
+    #[test]
+    fn specks_that_are_much_of_the_surface_together_stay() {
+        let dropped = |count: u8| {
+            let specks = (0..count).map(|i| {
+                let x = 5.0 + f32::from(i);
+                [[x, 0.0, 0.0], [x + 0.1, 0.0, 0.0], [x, 0.1, 0.0]]
+            });
+            let triangles = cube().into_iter().chain(specks).collect::<Vec<_>>();
+            after(&triangles, |d, _| super::drop(&d.survey, &mut Work::new(&mut d.shop), &Profile::default())).result
+        };
+        // Of an area of 0.005 each; the bound is 0.06 and a little.
+        assert_eq!([1, 12, 13].map(dropped), [1, 12, 0]);
     }
 }

@@ -65,7 +65,9 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
     }
     log.time("zip", "vertices merged with the one that faces them across a narrow gap", || zip::zip(shop, tolerance, profile));
     clean(survey, shop, &mut log);
-    log.time("debris", "triangles of open specks dropped", || debris::drop(survey, shop, profile));
+    log.time("debris", "triangles of open specks dropped, which together are next to nothing of the surface", || {
+        debris::drop(survey, shop, profile)
+    });
     let mut contradictions = 0;
     log.time("orient", "triangles turned to agree with their neighbours", || {
         let turned = orient::make_coherent(survey, shop, &mut reversed);

@@ -7,7 +7,7 @@
 //! * *One surface.* The larger loop is a hole in it and the smaller one the rim of a piece in that hole. (A plate's own rim around a hole in the
 //!   plate is the other way about.)
 //! * *A wall.* The surface along the larger loop faces away from the axis, that along the smaller one to it: outside and inside of a vessel, or of a
-//!   pipe. What lacks is the wall's end, however thick the wall; the smaller rim may lie deeper. One wall may hold several bores.
+//!   pipe. What lacks is the wall's end, however thick the wall; of a thin wall, the smaller rim may lie deep. One wall may hold several bores.
 //! * *A tube.* The rims look at each other from outside, or away from each other if the surface is that of a bore: the strip goes on from both.
 //!   The two ends of a tube, or of a bore, are the other way about.
 //! * *A way through.* Two holes back to back whose outlines agree, seen along their axis: the sides of what was drilled through a plate.
@@ -30,7 +30,8 @@ const OPPOSITE: f64 = -0.5;
 const ANNULAR: f64 = 0.15;
 /// Rims of a ring are no farther apart than so many radii of the larger one.
 const FARTHEST: f64 = 3.0;
-/// Rims are in one plane as long as they are no farther apart along its normal than this share of the larger one's radius.
+/// Rims are in one plane as long as they are no farther apart along its normal than this share of the larger one's radius. (Those of a ring of
+/// one surface besides no farther than they differ in radius.)
 const ONE_PLANE: f64 = 0.5;
 /// How much more the larger rim is a hole in its surface than the other one is (2 in a plane, 0 on a tube), if the ring is missing from one
 /// surface that slopes by no more than some 65° there.
@@ -44,6 +45,10 @@ const WASHER: f64 = -0.5;
 const FACING_HOLES: f64 = 1.0;
 /// How far the surface along a rim faces the axis, or away from it, to be a skin.
 const SKIN: f64 = 0.3;
+/// The same for the skins of a wall whose rims are not alike ...
+const CLEAR_SKIN: f64 = 0.7;
+/// ... and how far such a rim departs from its plane, at most, as a share of its radius.
+const CLEAR_RIM: f64 = 0.25;
 /// How far the surface goes on across each of two holes back to back, at least: plates may be bent a little.
 const HOLE: f64 = 0.7;
 /// Outlines of holes back to back agree as long as no vertex is farther from the other outline, seen along the axis, than this share of the
@@ -69,8 +74,10 @@ pub(super) struct Pair {
 enum Missing {
     /// The end of a wall; the areas of a strip and of two caps.
     Wall(f64, f64),
-    /// A ring of one surface, or of the floor of a groove.
-    OnePlane,
+    /// A ring of one surface.
+    OneSurface,
+    /// The floor of a groove: what lies between two skins that face each other.
+    Floor,
     /// A ring of a tube.
     Tube,
     /// The sides of a way through; the areas of a strip and of two caps.
@@ -95,6 +102,10 @@ impl Ring {
         matches!(self.missing, Missing::Wall(..))
     }
 
+    fn is_of_tube(&self) -> bool {
+        matches!(self.missing, Missing::Tube | Missing::Through(..))
+    }
+
     fn rule(&self) -> String {
         let planes = if self.one_plane { "one plane" } else { "two planes" };
         let less =
@@ -104,7 +115,7 @@ impl Ring {
                 "outside and inside of a wall whose end is missing, in {planes}: the surfaces face away from the axis and to it, and {}",
                 less(strip, caps)
             ),
-            Missing::OnePlane | Missing::Tube => format!(
+            Missing::OneSurface | Missing::Floor | Missing::Tube => format!(
                 "faces the loop nearest to it, in {planes}; their characteristic distance {:.4} is below {ANNULAR}",
                 self.apart
             ),
@@ -122,7 +133,7 @@ impl Ring {
     }
 }
 
-/// The pairs among `free` loops: rings in one plane, islands, rings in two planes, each in the loops' order. A wall with several bores is in
+/// The pairs among `free` loops: walls, rings of one surface, islands, rings of tubes and ways through, each in the loops' order. A wall with several bores is in
 /// several pairs, as is a hole with several islands.
 pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
     if free.len() < 2 {
@@ -134,12 +145,13 @@ pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
     let nearest: Vec<Option<(usize, Ring)>> = (0..free.len())
         .map(|i| {
             tree.meeting(&bounds(shape(i), FARTHEST * shape(i).radius()), &mut found);
-            // Only of those that it can be a ring with: what else lies near is no reason to leave one open. A wall's end before anything else: of
-            // pipes inside each other, that is where the material is.
+            // Only of those that it can be a ring with: what else lies near is no reason to leave one open. Of pipes inside each other, the
+            // ends of walls come before the rooms between them.
             let others = found.iter().map(|j| *j as usize).filter(|j| *j != i);
+            let is_floor = |ring: &Ring| ring.missing == Missing::Floor;
             others
                 .filter_map(|j| ring(shape(i), shape(j)).map(|ring| (distance(shape(i), shape(j)), j, ring)))
-                .min_by(|a, b| b.2.is_wall().cmp(&a.2.is_wall()).then(a.0.total_cmp(&b.0)).then(a.1.cmp(&b.1)))
+                .min_by(|a, b| is_floor(&a.2).cmp(&is_floor(&b.2)).then(a.0.total_cmp(&b.0)).then(a.1.cmp(&b.1)))
                 .map(|(_, j, ring)| (j, ring))
         })
         .collect();
@@ -150,17 +162,17 @@ pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
         (taken[outer], taken[inner]) = (true, true);
         pairs.push(ring.of(free[outer], free[inner]));
     }
-    let take_rings = |one_plane: bool, taken: &mut [bool], pairs: &mut Vec<Pair>| {
+    let take_rings = |of_tubes: bool, taken: &mut [bool], pairs: &mut Vec<Pair>| {
         let mutual = nearest.iter().enumerate().filter_map(|(i, found)| found.map(|(j, ring)| (i, j, ring)));
         for (i, j, ring) in mutual.filter(|(i, j, _)| j > i && nearest[*j].is_some_and(|(back, _)| back == *i)) {
-            if ring.one_plane == one_plane && !taken[i] && !taken[j] {
+            if ring.is_of_tube() == of_tubes && !taken[i] && !taken[j] {
                 (taken[i], taken[j]) = (true, true);
                 let [outer, inner] = larger_first(i, j);
                 pairs.push(ring.of(free[outer], free[inner]));
             }
         }
     };
-    take_rings(true, &mut taken, &mut pairs);
+    take_rings(false, &mut taken, &mut pairs);
     // A domed island stands out of its hole's box.
     let reaches: Vec<Bounds> = (0..free.len()).map(|i| bounds(shape(i), OFF_PLANE * shape(i).area().sqrt())).collect();
     let tree = BoxTree::new(&reaches);
@@ -186,11 +198,12 @@ pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
         }
     }
     // Two holes may look at each other across a gap between bodies: one with an island in it is no end of a tube.
-    take_rings(false, &mut with_islands, &mut pairs);
+    take_rings(true, &mut with_islands, &mut pairs);
     pairs
 }
 
-/// Outer and inner rims of walls, by place: each inner rim with the outer rim nearest to it, in the loops' order.
+/// Outer and inner rims of walls, by place: each inner rim with the outer rim nearest to it, if that has a wall's rim nearest, too. In the
+/// loops' order.
 fn walls<'s>(
     nearest: &[Option<(usize, Ring)>],
     shape: impl Fn(usize) -> &'s Shape,
@@ -201,6 +214,7 @@ fn walls<'s>(
         if let Some((j, ring)) = found.filter(|(_, ring)| ring.is_wall())
             && let [outer, inner] = larger_first(i, j)
             && inner == i
+            && nearest[outer].is_some_and(|(_, ring)| ring.is_wall())
         {
             of_outer.entry(outer).or_default().push((inner, ring));
         }
@@ -228,18 +242,24 @@ fn ring(a: &Shape, b: &Shape) -> Option<Ring> {
     let depth = way.dot(outer.normal).abs();
     let one_plane = depth <= ONE_PLANE * outer.radius();
     let ring = |missing| Some(Ring { missing, one_plane, apart });
-    let around_each_other = a.surrounds(b.centre) && b.surrounds(a.centre);
     let [strip, caps] = closings(outer, inner, depth);
-    if outer.outwards >= SKIN && inner.outwards <= -SKIN && strip < caps && (around_each_other || lies_inside(inner, outer)) {
+    let alike = apart < ANNULAR && a.surrounds(b.centre) && b.surrounds(a.centre);
+    let of_thick_wall = || one_plane && is_clear_skin(outer) && is_clear_skin(inner) && lies_inside(inner, outer);
+    if outer.outwards >= SKIN && inner.outwards <= -SKIN && strip < caps && (alike || of_thick_wall()) {
         return ring(Missing::Wall(strip, caps));
     }
-    if apart >= ANNULAR || !around_each_other {
+    if !alike {
         return None;
     }
     let one_surface = outer.continues - inner.continues;
     let skins = outer.outwards.abs().min(inner.outwards.abs()) >= SKIN && outer.outwards * inner.outwards < 0.0;
-    if one_plane && (skins || (one_surface >= ONE_SURFACE && is_hole_around(outer, inner))) {
-        return ring(Missing::OnePlane);
+    if one_plane && one_surface >= ONE_SURFACE && is_hole_around(outer, inner) {
+        // On a globe, a ring near the pole lies in a plane, one near the equator on a tube.
+        let one_plane = depth <= outer.radius() - inner.radius();
+        return Some(Ring { missing: Missing::OneSurface, one_plane, apart });
+    }
+    if one_plane && skins {
+        return ring(Missing::Floor);
     }
     let two_planes = |missing| Some(Ring { missing, one_plane: false, apart });
     let towards = [outer.vector_area.dot(way), -inner.vector_area.dot(way)];
@@ -254,6 +274,11 @@ fn ring(a: &Shape, b: &Shape) -> Option<Ring> {
     (back_to_back && are_holes && strip < caps && outlines_agree(outer, inner))
         .then(|| two_planes(Missing::Through(strip, caps)))
         .flatten()
+}
+
+/// Does a face end there that is to be recognised without another rim like it?
+fn is_clear_skin(shape: &Shape) -> bool {
+    shape.outwards.abs() >= CLEAR_SKIN && shape.off_plane <= CLEAR_RIM * shape.radius()
 }
 
 /// Areas of a strip between two loops so far apart along the axis, and of a cap on each: exact for circles about one axis.

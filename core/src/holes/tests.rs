@@ -158,6 +158,8 @@ fn the_inner_mouth_of_a_vessel_may_lie_deep() {
     };
     assert_eq!([0.0, 2.0, 3.5, 4.4].map(vessel), [2; 4]);
     assert_eq!(vessel(5.5), 0, "two caps have less area");
+    let narrow = [turned(&[[4.0, 0.0], [4.0, 10.0]], 0.0), turned(&[[1.5, 7.0], [1.5, 1.0], [0.1, 1.0]], 0.0)].concat();
+    assert_eq!(classes(&narrow, false)[..], [Simple; 4], "too deep for what differs so in size");
 }
 
 /// A box of 12 × 12 without these cells of its top and bottom.
@@ -182,6 +184,27 @@ fn holes_back_to_back_are_a_way_through_a_plate_and_two_holes_of_a_box() {
         assert_eq!(classes(&perforated(height, square(3), square(3)), false), [Simple; 2], "{height}");
     }
     assert_eq!(classes(&perforated(1.0, square(3), square(5)), false), [Simple; 2], "the outlines do not agree");
+}
+
+#[test]
+fn a_ring_missing_from_a_ball_lies_in_a_plane_near_the_pole_and_on_a_tube_near_the_equator() {
+    let belt = |rows: std::ops::Range<u8>| {
+        let at = |i: u8| {
+            let (sin, cos) = (std::f32::consts::PI * f32::from(i) / 24.0).sin_cos();
+            [if i % 24 == 0 { 0.0 } else { 10.0 * sin }, -10.0 * cos]
+        };
+        let profile: Vec<[f32; 2]> = (0..=24).map(at).collect();
+        let ball: Vec<Corners> = [&profile[..=usize::from(rows.start)], &profile[usize::from(rows.end)..]]
+            .iter()
+            .flat_map(|part| turned(part, 0.0))
+            .filter(|[a, b, c]| a != b && b != c && c != a)
+            .collect();
+        classes(&ball, false)
+    };
+    assert_eq!(belt(2..4), [AnnularCoplanar; 2]);
+    for rows in [7..9, 11..13, 17..19] {
+        assert_eq!(belt(rows), [AnnularParallel; 2]);
+    }
 }
 
 #[test]

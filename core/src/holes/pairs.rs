@@ -33,6 +33,8 @@ const FARTHEST: f64 = 3.0;
 /// Rims are in one plane as long as they are no farther apart along its normal than this share of the larger one's radius. (Those of a ring of
 /// one surface besides no farther than they differ in radius.)
 const ONE_PLANE: f64 = 0.5;
+/// Rims end at the same height if they are no farther apart so than this share of the larger one's radius.
+const LEVEL: f64 = 0.1;
 /// How much more the larger rim is a hole in its surface than the other one is (2 in a plane, 0 on a tube), if the ring is missing from one
 /// surface that slopes by no more than some 65° there.
 const ONE_SURFACE: f64 = 0.8;
@@ -89,6 +91,8 @@ enum Missing {
 struct Ring {
     missing: Missing,
     one_plane: bool,
+    /// The rims end at the same height.
+    level: bool,
     /// Characteristic distance.
     apart: f64,
 }
@@ -145,14 +149,15 @@ pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
     let nearest: Vec<Option<(usize, Ring)>> = (0..free.len())
         .map(|i| {
             tree.meeting(&bounds(shape(i), FARTHEST * shape(i).radius()), &mut found);
-            // Only of those that it can be a ring with: what else lies near is no reason to leave one open. Of pipes inside each other, the
-            // ends of walls come before the rooms between them.
+            // Only of those that it can be a ring with: what else lies near is no reason to leave one open.
             let others = found.iter().map(|j| *j as usize).filter(|j| *j != i);
-            let is_floor = |ring: &Ring| ring.missing == Missing::Floor;
-            others
-                .filter_map(|j| ring(shape(i), shape(j)).map(|ring| (distance(shape(i), shape(j)), j, ring)))
-                .min_by(|a, b| is_floor(&a.2).cmp(&is_floor(&b.2)).then(a.0.total_cmp(&b.0)).then(a.1.cmp(&b.1)))
-                .map(|(_, j, ring)| (j, ring))
+            let mut rings: Vec<(usize, Ring)> = others.filter_map(|j| Some((j, ring(shape(i), shape(j))?))).collect();
+            // Of pipes that end inside each other, the walls are closed, not the rooms between them, however narrow.
+            if rings.iter().any(|(_, ring)| ring.is_wall() && ring.level) {
+                rings.retain(|(_, ring)| ring.missing != Missing::Floor);
+            }
+            let by_distance = rings.into_iter().map(|(j, ring)| (distance(shape(i), shape(j)), j, ring));
+            by_distance.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(_, j, ring)| (j, ring))
         })
         .collect();
     let larger_first = |i: usize, j: usize| if shape(j).radius() > shape(i).radius() { [j, i] } else { [i, j] };
@@ -241,7 +246,8 @@ fn ring(a: &Shape, b: &Shape) -> Option<Ring> {
     let way = inner.centre - outer.centre;
     let depth = way.dot(outer.normal).abs();
     let one_plane = depth <= ONE_PLANE * outer.radius();
-    let ring = |missing| Some(Ring { missing, one_plane, apart });
+    let level = depth <= LEVEL * outer.radius();
+    let ring = |missing| Some(Ring { missing, one_plane, level, apart });
     let [strip, caps] = closings(outer, inner, depth);
     let alike = apart < ANNULAR && a.surrounds(b.centre) && b.surrounds(a.centre);
     let of_thick_wall = || one_plane && is_clear_skin(outer) && is_clear_skin(inner) && lies_inside(inner, outer);
@@ -256,12 +262,12 @@ fn ring(a: &Shape, b: &Shape) -> Option<Ring> {
     if one_plane && one_surface >= ONE_SURFACE && is_hole_around(outer, inner) {
         // On a globe, a ring near the pole lies in a plane, one near the equator on a tube.
         let one_plane = depth <= outer.radius() - inner.radius();
-        return Some(Ring { missing: Missing::OneSurface, one_plane, apart });
+        return Some(Ring { missing: Missing::OneSurface, one_plane, level, apart });
     }
     if one_plane && skins {
         return ring(Missing::Floor);
     }
-    let two_planes = |missing| Some(Ring { missing, one_plane: false, apart });
+    let two_planes = |missing| Some(Ring { missing, one_plane: false, level, apart });
     let towards = [outer.vector_area.dot(way), -inner.vector_area.dot(way)];
     let bore = outer.outwards <= -SKIN && inner.outwards <= -SKIN;
     let holes = outer.continues + inner.continues > FACING_HOLES;

@@ -193,7 +193,7 @@ fn a_ring_missing_from_a_ball_lies_in_a_plane_near_the_pole_and_on_a_tube_near_t
     let belt = |rows: std::ops::Range<u8>| {
         let at = |i: u8| {
             let (sin, cos) = (std::f32::consts::PI * f32::from(i) / 24.0).sin_cos();
-            [if i % 24 == 0 { 0.0 } else { 10.0 * sin }, -10.0 * cos]
+            [if i.is_multiple_of(24) { 0.0 } else { 10.0 * sin }, -10.0 * cos]
         };
         let profile: Vec<[f32; 2]> = (0..=24).map(at).collect();
         let ball: Vec<Corners> = [&profile[..=usize::from(rows.start)], &profile[usize::from(rows.end)..]]

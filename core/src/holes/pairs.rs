@@ -30,8 +30,7 @@ const OPPOSITE: f64 = -0.5;
 const ANNULAR: f64 = 0.15;
 /// Rims of a ring are no farther apart than so many radii of the larger one.
 const FARTHEST: f64 = 3.0;
-/// Rims are in one plane as long as they are no farther apart along its normal than this share of the larger one's radius. (Those of a ring of
-/// one surface besides no farther than they differ in radius.)
+/// Rims are in one plane as long as they are no farther apart along its normal than this share of the larger one's radius.
 const ONE_PLANE: f64 = 0.5;
 /// Rims end at the same height if they are no farther apart so than this share of the larger one's radius.
 const LEVEL: f64 = 0.1;
@@ -260,9 +259,7 @@ fn ring(a: &Shape, b: &Shape) -> Option<Ring> {
     let one_surface = outer.continues - inner.continues;
     let skins = outer.outwards.abs().min(inner.outwards.abs()) >= SKIN && outer.outwards * inner.outwards < 0.0;
     if one_plane && one_surface >= ONE_SURFACE && is_hole_around(outer, inner) {
-        // On a globe, a ring near the pole lies in a plane, one near the equator on a tube.
-        let one_plane = depth <= outer.radius() - inner.radius();
-        return Some(Ring { missing: Missing::OneSurface, one_plane, level, apart });
+        return ring(Missing::OneSurface);
     }
     if one_plane && skins {
         return ring(Missing::Floor);

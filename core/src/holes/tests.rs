@@ -189,27 +189,6 @@ fn holes_back_to_back_are_a_way_through_a_plate_and_two_holes_of_a_box() {
 }
 
 #[test]
-fn a_ring_missing_from_a_ball_lies_in_a_plane_near_the_pole_and_on_a_tube_near_the_equator() {
-    let belt = |rows: std::ops::Range<u8>| {
-        let at = |i: u8| {
-            let (sin, cos) = (std::f32::consts::PI * f32::from(i) / 24.0).sin_cos();
-            [if i.is_multiple_of(24) { 0.0 } else { 10.0 * sin }, -10.0 * cos]
-        };
-        let profile: Vec<[f32; 2]> = (0..=24).map(at).collect();
-        let ball: Vec<Corners> = [&profile[..=usize::from(rows.start)], &profile[usize::from(rows.end)..]]
-            .iter()
-            .flat_map(|part| turned(part, 0.0))
-            .filter(|[a, b, c]| a != b && b != c && c != a)
-            .collect();
-        classes(&ball, false)
-    };
-    assert_eq!(belt(2..4), [AnnularCoplanar; 2]);
-    for rows in [7..9, 11..13, 17..19] {
-        assert_eq!(belt(rows), [AnnularParallel; 2]);
-    }
-}
-
-#[test]
 fn holes_at_the_poles_of_a_ball_are_two() {
     for north in [2_u8, 4, 7] {
         let profile: Vec<[f32; 2]> = (north..=24 - north)

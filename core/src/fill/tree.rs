@@ -1,6 +1,6 @@
 //! Does a set of triangles cross itself? An own binary box tree over the triangles, walked against itself.
 
-use super::cross::{Triangle, triangles_cross};
+use super::cross::{Triangle, boxed_cross};
 
 /// What [`self_crossing`] found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,28 +26,42 @@ struct Node {
     right: usize,
 }
 
-fn bounds(triangles: &[Triangle], of: &[u32]) -> ([f32; 3], [f32; 3]) {
-    let corners = || of.iter().flat_map(|&t| &triangles[t as usize]);
-    let lo = [0, 1, 2].map(|k| corners().map(|p| p[k]).fold(f32::INFINITY, f32::min));
-    let hi = [0, 1, 2].map(|k| corners().map(|p| p[k]).fold(f32::NEG_INFINITY, f32::max));
-    (lo, hi)
+/// A triangle's box, and three times its middle.
+struct Leaf {
+    lo: [f32; 3],
+    hi: [f32; 3],
+    middle: [f64; 3],
 }
 
-fn build(triangles: &[Triangle], order: &mut [u32]) -> Vec<Node> {
-    let (lo, hi) = bounds(triangles, order);
-    let mut nodes = vec![Node { lo, hi, start: 0, end: order.len(), left: 0, right: 0 }];
+impl Leaf {
+    fn of(triangle: &Triangle) -> Self {
+        let of = |k: usize| triangle.iter().map(move |p| p[k]);
+        Self {
+            lo: [0, 1, 2].map(|k| of(k).fold(f32::INFINITY, f32::min)),
+            hi: [0, 1, 2].map(|k| of(k).fold(f32::NEG_INFINITY, f32::max)),
+            middle: [0, 1, 2].map(|k| of(k).map(f64::from).sum()),
+        }
+    }
+
+    fn meets(&self, other: &Self) -> bool {
+        (0..3).all(|k| self.lo[k] <= other.hi[k] && other.lo[k] <= self.hi[k])
+    }
+}
+
+fn build(leaves: &[Leaf], order: &mut [u32]) -> Vec<Node> {
+    let (start, end) = (0, order.len());
+    let mut nodes = vec![Node::over(leaves, order, start, end)];
     let mut next = 0;
     while let Some(node) = nodes.get(next) {
         let (start, end) = (node.start, node.end);
         if end - start > LEAF {
             let extent = |k: usize| f64::from(node.hi[k]) - f64::from(node.lo[k]);
             let axis = if extent(0) >= extent(1) && extent(0) >= extent(2) { 0 } else { 1 + usize::from(extent(2) > extent(1)) };
-            let middle = |t: u32| triangles[t as usize].iter().map(|p| f64::from(p[axis])).sum::<f64>();
+            let middle = |t: u32| leaves[t as usize].middle[axis];
             let half = (end - start) / 2;
             order[start..end].select_nth_unstable_by(half, |&s, &t| middle(s).total_cmp(&middle(t)).then(s.cmp(&t)));
             for (start, end) in [(start, start + half), (start + half, end)] {
-                let (lo, hi) = bounds(triangles, &order[start..end]);
-                nodes.push(Node { lo, hi, start, end, left: 0, right: 0 });
+                nodes.push(Node::over(leaves, order, start, end));
             }
             let last = nodes.len() - 1;
             nodes[next].left = last - 1;
@@ -56,6 +70,17 @@ fn build(triangles: &[Triangle], order: &mut [u32]) -> Vec<Node> {
         next += 1;
     }
     nodes
+}
+
+impl Node {
+    fn over(leaves: &[Leaf], order: &[u32], start: usize, end: usize) -> Self {
+        let mut node = Self { lo: [f32::INFINITY; 3], hi: [f32::NEG_INFINITY; 3], start, end, left: 0, right: 0 };
+        for leaf in order[start..end].iter().map(|t| &leaves[*t as usize]) {
+            node.lo = [0, 1, 2].map(|k| node.lo[k].min(leaf.lo[k]));
+            node.hi = [0, 1, 2].map(|k| node.hi[k].max(leaf.hi[k]));
+        }
+        node
+    }
 }
 
 /// Looks for two triangles that cross or overlap, beyond the corners they share (by position); looks at no more than
@@ -67,7 +92,8 @@ pub fn self_crossing(triangles: &[Triangle], max_pairs: u64) -> SelfCrossing {
 /// The same for the first `own` triangles among themselves and with the others, whatever these do among themselves.
 pub(crate) fn crossing_of_first(triangles: &[Triangle], own: usize, max_pairs: u64) -> SelfCrossing {
     let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
-    let nodes = build(triangles, &mut order);
+    let leaves: Vec<Leaf> = triangles.iter().map(Leaf::of).collect();
+    let nodes = build(&leaves, &mut order);
     let mut looked_at = 0_u64;
     let mut stack = vec![(0, 0)];
     while let Some((i, j)) = stack.pop() {
@@ -89,8 +115,9 @@ pub(crate) fn crossing_of_first(triangles: &[Triangle], own: usize, max_pairs: u
                         continue;
                     }
                     looked_at += 1;
-                    if triangles_cross(&triangles[s as usize], &triangles[t as usize]).is_crossing() {
-                        return SelfCrossing::Pair(s.min(t) as usize, s.max(t) as usize);
+                    let (s, t) = (s as usize, t as usize);
+                    if leaves[s].meets(&leaves[t]) && boxed_cross(&triangles[s], &triangles[t]) {
+                        return SelfCrossing::Pair(s.min(t), s.max(t));
                     }
                 }
             }

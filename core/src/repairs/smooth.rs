@@ -7,6 +7,8 @@
 
 use std::collections::HashMap;
 
+use glam::DVec3;
+
 use super::close::Placed;
 use super::work::Work;
 use crate::chunk::NONE;
@@ -23,9 +25,15 @@ const RIM_VERTICES_AT_ONCE: usize = 1 << 16;
 /// A patch has room for vertices of its own if one of its inner edges is so many times as long as the edges at its ends are on average.
 const ROOMY: f64 = 1.5;
 
+/// Vertices lie in a plane if they are off it by no more than this share of their coordinates: rounded to single precision, each is off by up to
+/// √3/2 times half of it, and so may be the plane.
+const FLAT: f64 = 2.0 * f32::EPSILON as f64;
+
 /// Shapes every patch that has room. One that cannot be shaped stays as it is.
 pub(super) fn smooth(survey: &Survey<'_>, work: &mut Work<'_>, placed: &mut [Placed], settings: &ShapeSettings, threads: usize) {
-    let roomy: Vec<usize> = (0..placed.len()).filter(|i| has_room(work, &placed[*i])).collect();
+    let shop: &Shop = work;
+    let wanted = parallel::map(threads, placed.len(), |i| is_wanted(shop, &placed[i]));
+    let roomy: Vec<usize> = (0..placed.len()).filter(|i| wanted[*i]).collect();
     let mut rest = roomy.as_slice();
     while !rest.is_empty() {
         let mut vertices = 0;
@@ -56,23 +64,99 @@ pub(super) fn smooth(survey: &Survey<'_>, work: &mut Work<'_>, placed: &mut [Pla
     }
 }
 
-/// Is one of its inner edges long for what is around?
-fn has_room(shop: &Shop, patch: &Placed) -> bool {
-    let mut around: HashMap<Vertex, (f64, u32)> = HashMap::new();
-    let triangles = || patch.triangles().map(|t| shop.triangles[t as usize].v);
-    let mut edges: Vec<[Vertex; 2]> = triangles().flat_map(edges).map(sorted).collect();
-    edges.sort_unstable();
-    let (inner, rim): (Vec<_>, Vec<_>) = edges.chunk_by(|a, b| a == b).partition(|same| same.len() > 1);
-    for [a, b] in rim.iter().map(|same| same[0]) {
-        let length = shop.distance(a, b);
-        for v in [a, b] {
-            let (sum, count) = around.entry(v).or_default();
-            *sum += length;
-            *count += 1;
-        }
+/// Is a patch to be shaped, as far as the triangles of the workshop tell?
+fn is_wanted(shop: &Shop, patch: &Placed) -> bool {
+    // One triangle has no inner edge.
+    patch.count > 1 && {
+        let edges = Edges::of(shop, patch);
+        edges.have_room(shop) && !edges.is_rim_an_edge(shop, patch) && !edges.lie_in_a_plane(shop, patch)
     }
-    let usual = |v: Vertex| around.get(&v).map_or(f64::INFINITY, |(sum, count)| sum / f64::from(*count));
-    inner.iter().map(|same| same[0]).any(|[a, b]| shop.distance(a, b) > ROOMY * 0.5 * (usual(a) + usual(b)))
+}
+
+/// The edges of a patch, smaller vertex first, each once.
+struct Edges {
+    inner: Vec<[Vertex; 2]>,
+    rim: Vec<[Vertex; 2]>,
+    /// Triangles of the patch at the rim's edges.
+    at_rim: Vec<u32>,
+}
+
+impl Edges {
+    fn of(shop: &Shop, patch: &Placed) -> Self {
+        let of_triangle = |t: u32| edges(shop.triangles[t as usize].v).map(|e| (sorted(e), t));
+        let mut all: Vec<([Vertex; 2], u32)> = patch.triangles().flat_map(of_triangle).collect();
+        all.sort_unstable();
+        let mut found = Self { inner: Vec::new(), rim: Vec::new(), at_rim: Vec::new() };
+        for same in all.chunk_by(|a, b| a.0 == b.0) {
+            match *same {
+                [(edge, t)] => {
+                    found.rim.push(edge);
+                    found.at_rim.push(t);
+                }
+                _ => found.inner.push(same[0].0),
+            }
+        }
+        found
+    }
+
+    /// Is an inner edge long for what is around?
+    fn have_room(&self, shop: &Shop) -> bool {
+        let mut ends: Vec<(Vertex, f64)> = Vec::with_capacity(2 * self.rim.len());
+        for &[a, b] in &self.rim {
+            let length = shop.distance(a, b);
+            ends.extend([(a, length), (b, length)]);
+        }
+        // Stable: the lengths at a vertex are summed in the edges' order.
+        ends.sort_by_key(|(v, _)| *v);
+        let usual = |v: Vertex| {
+            let from = ends.partition_point(|(w, _)| *w < v);
+            let here = ends[from..].iter().take_while(|(w, _)| *w == v);
+            let (sum, count) = here.fold((0.0, 0_u32), |(sum, count), (_, length)| (sum + length, count + 1));
+            if count == 0 { f64::INFINITY } else { sum / f64::from(count) }
+        };
+        self.inner.iter().any(|&[a, b]| shop.distance(a, b) > ROOMY * 0.5 * (usual(a) + usual(b)))
+    }
+
+    /// The triangle beyond each edge of the rim, if there is exactly one.
+    fn beyond<'s>(&'s self, shop: &'s Shop, patch: &'s Placed) -> impl Iterator<Item = Option<u32>> + 's {
+        self.rim.iter().map(|&[a, b]| {
+            let mut there =
+                shop.star(a).map(|(t, _)| t).filter(|t| !patch.holds(*t) && shop.triangles[*t as usize].v.contains(&b));
+            there.next().filter(|_| there.next().is_none())
+        })
+    }
+
+    /// Does the surface turn away at the rim? [`shape::shape`] would say so, too, after the rings around were fetched.
+    fn is_rim_an_edge(&self, shop: &Shop, patch: &Placed) -> bool {
+        let (mut turn, mut length) = (0.0, 0.0);
+        for ((&[a, b], &t), beyond) in self.rim.iter().zip(&self.at_rim).zip(self.beyond(shop, patch)) {
+            if let Some(beyond) = beyond {
+                let along = shop.distance(a, b);
+                turn += shop.normal(t).normalize_or_zero().dot(shop.normal(beyond).normalize_or_zero()) * along;
+                length += along;
+            }
+        }
+        shape::is_edge(turn, length)
+    }
+
+    /// Is the patch flat, and the triangles along its rim with it, as far as coordinates of single precision can tell? Then there is nothing to
+    /// continue but the plane.
+    fn lie_in_a_plane(&self, shop: &Shop, patch: &Placed) -> bool {
+        let normal: DVec3 = patch.triangles().map(|t| shop.normal(t)).sum();
+        let perimeter: f64 = self.rim.iter().map(|&[a, b]| shop.distance(a, b)).sum();
+        // Of a circle its radius, of a slit its width: how well the rim holds the plane.
+        let size = normal.length() / perimeter;
+        let centre = self.rim.iter().map(|e| shop.place(e[0]) + shop.place(e[1])).sum::<DVec3>() / (2 * self.rim.len()) as f64;
+        let normal = normal.normalize_or_zero();
+        let lies = |v: Vertex| {
+            let place = shop.place(v);
+            let away = place - centre;
+            let rounding = FLAT * place.abs().max(centre.abs()).max_element();
+            away.dot(normal).abs() <= rounding * (1.0 + away.length() / size)
+        };
+        let of_patch = patch.triangles().chain(self.beyond(shop, patch).flatten());
+        normal != DVec3::ZERO && of_patch.flat_map(|t| shop.triangles[t as usize].v).all(lies)
+    }
 }
 
 /// Triangles that are not in the workshop, around vertices that are: where each has its corners, by vertex.
@@ -182,4 +266,35 @@ fn put_in(work: &mut Work<'_>, patch: &mut Placed, mut vertices: Vec<Vertex>, sh
         work.add(t.map(|v| vertices[v as usize]), Origin::Patch, NONE);
     }
     patch.coarse = coarse;
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use crate::repairs::close;
+    use crate::settings::Profile;
+    use crate::testing::{Corners, after, plate};
+
+    /// How a hole of 8 by 8 squares in a plate of 16 by 16 is closed that lies askew, far from the origin, and is bent to a cylinder.
+    fn closed(curvature: f32) -> BTreeMap<String, u64> {
+        let is_there = |x: u8, y: u8| !((4..12).contains(&x) && (4..12).contains(&y));
+        let askew = |[x, y, _]: [f32; 3]| {
+            let z = curvature * (x - 8.0) * (x - 8.0) / 2.0;
+            [0.6 * x - 0.8 * z + 50.3, y / 1.7 - 20.1, 0.8 * x + 0.6 * z + 33.7]
+        };
+        let sheet: Vec<Corners> = plate(16, is_there).iter().map(|t| t.map(askew)).collect();
+        after(&sheet, |d, _| close::fill(d, &Profile::default())).result.by_method
+    }
+
+    #[test]
+    fn a_flat_surface_is_closed_by_the_plain_triangulation() {
+        assert_eq!(closed(0.0), BTreeMap::from([("planar".into(), 1)]));
+    }
+
+    #[test]
+    fn a_surface_that_is_bent_by_more_than_rounding_is_continued() {
+        // The hole's middle is 0.01 off its rim.
+        assert_eq!(closed(0.00125), BTreeMap::from([("planar (shaped)".into(), 1)]));
+    }
 }

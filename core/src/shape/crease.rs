@@ -14,7 +14,7 @@ use crate::fill::{FillSettings, Rim, triangulate};
 /// Below this cosine between normals, about 40°, an edge is a crease.
 const CREASE: f64 = 0.766;
 /// And below this, 60°, a coarse patch does not continue what is across the rim.
-const TURN: f64 = 0.5;
+pub(super) const TURN: f64 = 0.5;
 /// A crease that bends less than [`TURN`] is a line only if it goes on within this cosine, 45°, beyond its first edge: rough surfaces have
 /// single edges as sharp.
 const ON: f64 = 0.7;

@@ -101,6 +101,13 @@ const PASSES: usize = 4;
 /// It has settled when vertices move less than this share of the rim's radius, root mean square.
 const SETTLED: f64 = 4e-3;
 
+/// Is the rim an edge of the surface for certain, so that [`shape()`] fails with [`Unshaped::RimIsEdge`] at the latest? `turn`: the cosines between the
+/// normals on both sides of the rim's edges of two triangles, times the edges' lengths; `length`: that of these edges.
+pub(crate) fn is_edge(turn: f64, length: f64) -> bool {
+    // Other units, another rounding.
+    turn < (crease::TURN - 1e-6) * length
+}
+
 /// Refines a coarse patch and makes it continue the surface around. O(n^1.5) for n vertices and triangles altogether.
 ///
 /// # Errors

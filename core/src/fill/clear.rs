@@ -2,8 +2,8 @@
 
 use super::Rim;
 use super::boxes::{Boxes, around, join};
-use super::cross::{segment_pierces, triangles_cross};
-use super::exact::collinear;
+use super::cross::{do_cross, segment_pierces};
+use super::exact::{Plane, collinear};
 
 /// Triangles looked at for one loop, divided by how many obstacles each is held against; beyond, none is known to be clear.
 const WORK: u32 = 1_000_000;
@@ -63,12 +63,16 @@ impl<'a> Clearance<'a> {
         let corners = rim.corners(triangle);
         let bounds = around(&corners);
         let next = |i: usize| (i + 1) % rim.len();
-        if collinear(&corners[0], &corners[1], &corners[2])
-            || self.boxes.any_near(&bounds, |i| segment_pierces(&rim.points[i], &rim.points[next(i)], &corners))
-        {
+        // Most of what is near lies clearly on one side.
+        let plane = Plane::new(&corners[0], &corners[1], &corners[2]);
+        let pierces = |i: usize| {
+            let (a, b) = (rim.points[i], rim.points[next(i)]);
+            !plane.has_on_one_side(&[a, b]) && segment_pierces(&a, &b, &corners)
+        };
+        if collinear(&corners[0], &corners[1], &corners[2]) || self.boxes.any_near(&bounds, pierces) {
             return false;
         }
-        let meets = |i: usize| rim.neighbour(i).is_some_and(|t| triangles_cross(&corners, &t).is_crossing());
+        let meets = |i: usize| rim.neighbour(i).is_some_and(|t| !plane.has_on_one_side(&t) && do_cross(&corners, &t));
         let meets_mesh = self.boxes.any_near(&bounds, meets) || rim.meets_obstacle(&corners);
         self.mesh_in_the_way |= meets_mesh;
         !meets_mesh

@@ -36,17 +36,23 @@ impl Contact {
 
 /// The contact of two triangles; exact for all finite coordinates. A triangle of zero area meets nothing.
 pub fn triangles_cross(a: &Triangle, b: &Triangle) -> Contact {
-    for k in 0..3 {
-        let range = |t: &Triangle| (t[0][k].min(t[1][k]).min(t[2][k]), t[0][k].max(t[1][k]).max(t[2][k]));
-        let ((a_lo, a_hi), (b_lo, b_hi)) = (range(a), range(b));
-        if a_hi < b_lo || b_hi < a_lo {
-            return Contact::Apart;
-        }
-    }
-    meet(a, b, common(a, b), true)
+    if boxes_meet(a, b) { meet(a, b, common(a, b), true) } else { Contact::Apart }
 }
 
-/// Do two triangles whose boxes meet cross or overlap? As [`triangles_cross`] finds it, sooner.
+/// Do two triangles cross or overlap? As [`triangles_cross`] finds it, sooner.
+pub(crate) fn do_cross(a: &Triangle, b: &Triangle) -> bool {
+    boxes_meet(a, b) && boxed_cross(a, b)
+}
+
+fn boxes_meet(a: &Triangle, b: &Triangle) -> bool {
+    (0..3).all(|k| {
+        let range = |t: &Triangle| (t[0][k].min(t[1][k]).min(t[2][k]), t[0][k].max(t[1][k]).max(t[2][k]));
+        let ((a_lo, a_hi), (b_lo, b_hi)) = (range(a), range(b));
+        a_lo <= b_hi && b_lo <= a_hi
+    })
+}
+
+/// The same for two whose boxes meet.
 pub(crate) fn boxed_cross(a: &Triangle, b: &Triangle) -> bool {
     meet(a, b, common(a, b), false).is_crossing()
 }

@@ -63,6 +63,18 @@ impl<'a> Plane<'a> {
         (self.normal.dot(w), 8e-16 * self.magnitude.dot(w.abs()))
     }
 
+    /// Do all of these lie on one side of it for certain? What is in doubt does not.
+    #[inline]
+    pub(super) fn has_on_one_side(&self, points: &[Point]) -> bool {
+        let (mut above, mut below) = (true, true);
+        for point in points {
+            let (value, error) = self.rounded(point);
+            above &= value > error;
+            below &= value < -error;
+        }
+        above | below
+    }
+
     #[cold]
     fn side_exact(&self, d: &Point) -> i8 {
         let [a, b, c] = self.corners;

@@ -23,7 +23,7 @@ pub mod tree;
 
 use boxes::{Boxes, EMPTY, around};
 use clear::Clearance;
-use cross::{Contact, Triangle, common, self_intersection, triangles_cross};
+use cross::{Contact, Triangle, common, do_cross, self_intersection, triangles_cross};
 use exact::{Point, at, collinear};
 use flips::Flips;
 use front::Order;
@@ -397,7 +397,7 @@ impl Rim<'_> {
     }
 
     pub(crate) fn meets_obstacle(&self, corners: &Triangle) -> bool {
-        self.obstacles.iter().any(|other| triangles_cross(corners, other).is_crossing())
+        self.obstacles.iter().any(|other| do_cross(corners, other))
     }
 
     /// Is this triangulation of the polygon valid: every triangle with an area and clear of the obstacles and the mesh's triangles along the rim,

@@ -12,8 +12,6 @@ mod sides;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
-
 use glam::DVec3;
 
 use crate::parallel;
@@ -47,18 +45,28 @@ const LISTED: usize = 1000;
 /// The loops of a workshop for the report.
 pub(crate) fn report(shop: &Shop, edges: &Edges, tolerance: &Tolerance, gap_share: f64) -> BoundaryLoops {
     let loops = loops::find(shop, edges);
-    let mut listed = classify(shop, edges, &loops, tolerance, gap_share);
-    let mut classes = BTreeMap::new();
-    listed.iter().for_each(|l| *classes.entry(l.class).or_default() += 1);
-    listed.truncate(LISTED);
-    BoundaryLoops { classes, listed }
+    let mut all = BoundaryLoops::default();
+    for found in classify(shop, edges, &loops, tolerance, gap_share) {
+        *all.classes.entry(found.class).or_default() += 1;
+        if all.listed.len() < LISTED {
+            all.listed.push(found);
+        }
+    }
+    all
 }
 
 /// What kinds of openings these boundary loops are, in their order; partners are places in it. `gap_share`: a gap is narrower than this
 /// share of the edges beside it; 0: nothing is a gap. O(n log n) in the boundary.
-pub(crate) fn classify(shop: &Shop, edges: &Edges, loops: &[Loop], tolerance: &Tolerance, gap_share: f64) -> Vec<BoundaryLoop> {
-    let shapes: Vec<Shape> = loops.iter().map(|rim| shape_of(shop, rim)).collect();
+pub(crate) fn classify(
+    shop: &Shop,
+    edges: &Edges,
+    loops: &[Loop],
+    tolerance: &Tolerance,
+    gap_share: f64,
+) -> impl Iterator<Item = BoundaryLoop> {
+    // First, since it takes the most memory while it lasts.
     let sides = sides::measure(shop, loops, tolerance, gap_share);
+    let shapes: Vec<Shape> = loops.iter().map(|rim| shape_of(shop, rim)).collect();
     let several = vertices_of_several(edges);
     let mut classes: Vec<Option<(LoopClass, String)>> = loops
         .iter()
@@ -87,26 +95,24 @@ pub(crate) fn classify(shop: &Shop, edges: &Edges, loops: &[Loop], tolerance: &T
             }
         }
     }
-    (0..loops.len())
-        .map(|i| {
-            let (class, rule) = classes[i]
-                .take()
-                .or_else(|| machining(&shapes[i]))
-                .unwrap_or_else(|| (LoopClass::Simple, "no other rule holds".into()));
-            BoundaryLoop {
-                class,
-                rule,
-                at: shop.positions[loops[i].vertices[0] as usize],
-                vertices: loops[i].vertices.len() as u64,
-                perimeter: shapes[i].perimeter,
-                area: shapes[i].area(),
-                off_plane: shapes[i].off_plane,
-                width: sides[i].width,
-                characteristic_distance: distances[i],
-                partner: partners[i],
-            }
-        })
-        .collect()
+    (0..loops.len()).map(move |i| {
+        let (class, rule) = classes[i]
+            .take()
+            .or_else(|| machining(&shapes[i]))
+            .unwrap_or_else(|| (LoopClass::Simple, "no other rule holds".into()));
+        BoundaryLoop {
+            class,
+            rule,
+            at: shop.positions[loops[i].vertices[0] as usize],
+            vertices: loops[i].vertices.len() as u64,
+            perimeter: shapes[i].perimeter,
+            area: shapes[i].area(),
+            off_plane: shapes[i].off_plane,
+            width: sides[i].width,
+            characteristic_distance: distances[i],
+            partner: partners[i],
+        }
+    })
 }
 
 /// Loops that belong together, by place.

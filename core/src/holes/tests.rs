@@ -9,7 +9,7 @@ fn classes(triangles: &[Corners], leave_longest: bool) -> Vec<LoopClass> {
     let records = records(triangles);
     let d = diagnose(&records);
     let edges = Edges::of(&d.shop);
-    let mut all = classify(&d.shop, &edges, &loops::find(&d.shop, &edges), &d.tolerance, 0.35);
+    let mut all: Vec<_> = classify(&d.shop, &edges, &loops::find(&d.shop, &edges), &d.tolerance, 0.35).collect();
     for (i, l) in all.iter().enumerate() {
         if let Some(partner) = l.partner {
             assert_ne!(partner as usize, i);

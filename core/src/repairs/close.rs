@@ -110,7 +110,7 @@ pub(super) fn fill_loops(
     let max_edges = profile.max_hole_edges as usize;
     let mut closing =
         Closing { admission, max_edges, rims: Vec::new(), placed: Vec::new(), open: Vec::new(), joints: Vec::new() };
-    let first = closing.close_together(survey, work, rims, &shapes, threads);
+    let first = closing.close_together(survey, work, rims, shapes, threads);
     closing.triangulate(work, first, threads);
     closing.close_flat(survey, work);
     if let Some(settings) = shape_settings(profile) {
@@ -163,10 +163,11 @@ impl Closing<'_> {
         survey: &Survey<'_>,
         work: &mut Work<'_>,
         rims: Vec<Loop>,
-        shapes: &Shapes,
+        shapes: Shapes,
         threads: usize,
     ) -> usize {
         let partners = shapes.partners();
+        drop(shapes);
         let admits = |shop: &Shop, rim: &Loop| self.admission.check_joined(shop, rim).is_ok();
         let is_admitted = |shop: &Shop, group: &[&Loop]| {
             self.admission.check(shop, group[0]).is_ok() && group[1..].iter().all(|rim| admits(shop, rim))

@@ -3,7 +3,7 @@
 //! A patch was tested against itself and the triangles along its rim when it was made. Here all new triangles are held against everything
 //! else in their boxes, chunk by chunk, exactly ([`crate::fresh`]). Of two patches that cross, the later one is to blame.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use super::work::Work;
 use crate::chunk::NONE;
@@ -97,6 +97,7 @@ pub(super) fn crossed(
         None => of_record.get(&number).copied(),
     };
     let mut crossed: BTreeMap<u32, Vec<Obstacle>> = BTreeMap::new();
+    let mut known = HashSet::new();
     for (patch, of_patch, other) in blamed {
         let corners = match other.checked_sub(records) {
             Some(t) => shop.points(t),
@@ -104,9 +105,10 @@ pub(super) fn crossed(
         };
         let of_both = component(of_patch).zip(component(other));
         let obstacle = Obstacle { corners, met_already: of_both.is_some_and(|(a, b)| met.binary_search(&[a, b]).is_ok()) };
-        let all = crossed.entry(patch).or_default();
-        if !all.contains(&obstacle) {
-            all.push(obstacle);
+        // Zero has two signs in a record.
+        let bits = corners.map(|p| p.map(|x| (x + 0.0).to_bits()));
+        if known.insert((patch, bits, obstacle.met_already)) {
+            crossed.entry(patch).or_default().push(obstacle);
         }
     }
     Some(crossed)

@@ -12,6 +12,8 @@ mod sides;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 
 use crate::parallel;

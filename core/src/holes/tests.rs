@@ -142,7 +142,7 @@ fn the_missing_ends_of_a_wall_are_annular_however_thick_the_wall() {
     let records = records(&in_each_other);
     let d = diagnose(&records);
     let edges = Edges::of(&d.shop);
-    let all = classify(&d.shop, &edges, &loops::find(&d.shop, &edges), &d.tolerance, 0.35);
+    let all = classify(&d.shop, &edges, &loops::find(&d.shop, &edges), &d.tolerance, 0.35).collect::<Vec<_>>();
     for l in &all {
         let partner = &all[l.partner.unwrap() as usize];
         let [larger, smaller] = if l.perimeter > partner.perimeter { [l, partner] } else { [partner, l] };

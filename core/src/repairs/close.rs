@@ -172,38 +172,36 @@ impl Closing<'_> {
         let is_admitted = |shop: &Shop, group: &[&Loop]| {
             self.admission.check(shop, group[0]).is_ok() && group[1..].iter().all(|rim| admits(shop, rim))
         };
-        let mut taken = vec![false; rims.len()];
-        let mut touching = Vec::new();
-        for (numbers, way) in islands::touching(work, &rims) {
-            let group: Vec<&Loop> = numbers.iter().map(|i| &rims[*i]).collect();
-            if is_admitted(work, &group)
-                && let Some(patch) = islands::patch_touching(work, &way)
-            {
-                numbers.iter().for_each(|i| taken[*i] = true);
-                touching.push((group, patch));
-            }
-        }
-        let is_free = |numbers: &[usize]| numbers.iter().all(|i| !taken[*i]);
-        let rings = partners.rings.into_iter().filter(|pair| is_free(pair)).map(|pair| pair.map(|i| &rims[i]));
-        let rings: Vec<[&Loop; 2]> = rings.filter(|pair| pair.iter().all(|rim| admits(work, rim))).collect();
-        let groups = islands::groups(survey, work, &rims, &partners.islands, |rim| self.admission.is_sheet(rim));
-        let groups = groups.iter().map(|group| ("islands", group)).chain(partners.bored.iter().map(|group| ("annular", group)));
-        let groups: Vec<(&str, Vec<&Loop>)> = groups
-            .filter(|(_, group)| is_free(group))
-            .map(|(method, group)| (method, group.iter().map(|i| &rims[*i]).collect::<Vec<_>>()))
-            .filter(|(_, group)| is_admitted(work, group))
-            .collect();
-        if rings.is_empty() && groups.is_empty() && touching.is_empty() {
-            self.rims = rims;
-            return 0;
-        }
         let (mut done, mut placed) = (Vec::new(), Vec::new());
         let mut place = |work: &mut Work<'_>, group: &[&Loop], triangles: &[[Vertex; 3]], method| {
             let numbers = (done.len() as u32..).take(group.len()).collect();
             done.extend(group.iter().map(|rim| (*rim).clone()));
             placed.push(Placed::put_in(work, numbers, triangles, method));
         };
-        touching.iter().for_each(|(group, patch)| place(work, group, patch, "islands"));
+        let groups = islands::groups(survey, work, &rims, &partners.islands, |rim| self.admission.is_sheet(rim));
+        let mut taken = vec![false; rims.len()];
+        for (numbers, way) in islands::touching(work, &rims) {
+            let group: Vec<&Loop> = numbers.iter().map(|i| &rims[*i]).collect();
+            if is_admitted(work, &group)
+                && let Some(patch) = islands::patch_touching(work, &way)
+            {
+                place(work, &group, &patch, "islands");
+                numbers.iter().for_each(|i| taken[*i] = true);
+            }
+        }
+        let is_free = |numbers: &[usize]| numbers.iter().all(|i| !taken[*i]);
+        let rings = partners.rings.into_iter().filter(|pair| is_free(pair)).map(|pair| pair.map(|i| &rims[i]));
+        let rings: Vec<[&Loop; 2]> = rings.filter(|pair| pair.iter().all(|rim| admits(work, rim))).collect();
+        let groups = groups.iter().map(|group| ("islands", group)).chain(partners.bored.iter().map(|group| ("annular", group)));
+        let groups: Vec<(&str, Vec<&Loop>)> = groups
+            .filter(|(_, group)| is_free(group))
+            .map(|(method, group)| (method, group.iter().map(|i| &rims[*i]).collect::<Vec<_>>()))
+            .filter(|(_, group)| is_admitted(work, group))
+            .collect();
+        if rings.is_empty() && groups.is_empty() && !taken.contains(&true) {
+            self.rims = rims;
+            return 0;
+        }
         annular::bridge(work, &rings, threads, |work, i, triangles| place(work, &rings[i], triangles, "annular"));
         let mut joined = Vec::new();
         for (method, group) in &groups {

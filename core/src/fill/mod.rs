@@ -204,10 +204,14 @@ pub(crate) fn pinched(rim: &Rim<'_>) -> Result<Vec<[u32; 3]>, Unfillable> {
         _ => minweight::triangulate(rim, weight, Choice::Any).ok().filter(|made| rim.accepts(made, false).is_ok()),
     };
     let triangles = attempt(Weight::Bend).or_else(|| attempt(Weight::Area)).ok_or(Unfillable::Blocked)?;
-    let sides = triangles.iter().flat_map(|t| [0, 1, 2].map(|k| [place(t[k]), place(t[(k + 1) % 3])]));
-    let mut sides: Vec<_> = sides.collect();
+    if runs_once(&triangles, place) { Ok(in_order(triangles)) } else { Err(Unfillable::Blocked) }
+}
+
+/// Does no edge between two places have two triangles on one side?
+fn runs_once<P: Ord>(triangles: &[[u32; 3]], place: impl Fn(u32) -> P) -> bool {
+    let mut sides: Vec<[P; 2]> = triangles.iter().flat_map(|t| [0, 1, 2].map(|k| [place(t[k]), place(t[(k + 1) % 3])])).collect();
     sides.sort_unstable();
-    if sides.windows(2).any(|w| w[0] == w[1]) { Err(Unfillable::Blocked) } else { Ok(in_order(triangles)) }
+    sides.windows(2).all(|w| w[0] != w[1])
 }
 
 /// No way of [`pinched`] of more vertices is triangulated from clear triangles only: there are other ways to close what it is made of.

@@ -14,7 +14,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::exact::{Point, at};
-use super::{Fault, Method, Patch, Rim, Surroundings, Unfillable, are_distinct, crosses_itself, in_order, patch};
+use super::{Fault, Method, Patch, Rim, Surroundings, Unfillable, are_distinct, crosses_itself, in_order, patch, runs_once};
 
 /// Pairs of vertices up to which all are looked at; beyond, those at about the same share of both lengths.
 const ALL_PAIRS: usize = 4_000_000;
@@ -98,7 +98,8 @@ pub(crate) fn bridge(rims: [&Rim<'_>; 2], joined: &dyn Fn(u32, u32) -> bool) -> 
     for weight in [Weight::Bend, Weight::Area] {
         for (i, j) in [(i, j), other((i + n / 3) % n), other((i + 2 * n / 3) % n)] {
             let sides = [Side::along(a, 0, i, n, true), Side::along(b, second, j, m, false)];
-            if let Some(triangles) = search.run(&sides, weight) {
+            // Once around the one rim from a single vertex of the other, it would come back to the edge that it began with.
+            if let Some(triangles) = search.run(&sides, weight).filter(|triangles| runs_once(triangles, |v| v)) {
                 return Ok(in_order(triangles));
             }
         }
@@ -435,6 +436,18 @@ mod tests {
         check(&[&a, &b], &strip);
         assert!(!strip.iter().any(|t| (8..16).any(|j| straight(2, j) && t.contains(&2) && t.contains(&j))));
         assert_eq!(bridge([&rims[0], &rims[1]], &|_, _| true), Err(Unfillable::Blocked));
+    }
+
+    #[test]
+    fn a_strip_does_not_come_back_to_an_edge_that_it_has_run_through() {
+        // Two skins of a plate lack a triangle each; what stands beside leaves only edges at one vertex of each rim.
+        let upper: Vec<Point> = vec![[12.0, 0.0, 0.2], [13.0, 1.0, 0.2], [12.0, 1.0, 0.2]];
+        let lower: Vec<Point> = vec![[12.0, 1.0, 0.0], [13.0, 1.0, 0.0], [12.0, 0.0, 0.0]];
+        let free = |_: u32, _: u32| false;
+        let rims = [&upper, &lower].map(|points| Rim { points, apexes: &[], obstacles: &[], forbidden: &free });
+        check(&[&upper, &lower], &bridge([&rims[0], &rims[1]], &free).unwrap());
+        let left = [(0, 3), (1, 3), (2, 3), (1, 4), (1, 5)];
+        assert!(bridge([&rims[0], &rims[1]], &|i, j| !left.contains(&(i, j))).is_err());
     }
 
     #[test]

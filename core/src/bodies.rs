@@ -1,6 +1,6 @@
-//! Which closed components lie inside which: exact winding numbers by vertical rays.
+//! Which components lie inside which closed ones: exact winding numbers by vertical rays.
 //!
-//! For each closed component whose box lies inside another's, a ray runs upwards from a point of one of its triangles. Crossings
+//! For each component asked about whose box lies inside a closed one's, a ray runs upwards from a point of one of its triangles. Crossings
 //! of every other component are counted with their sign by exact predicates and half-open rules, so that a ray through an edge or a
 //! vertex counts once. The sum of integers does not depend on the order, so triangles are visited chunk by chunk.
 
@@ -34,11 +34,17 @@ struct Ray {
     candidates: Vec<u32>,
 }
 
-/// The surroundings of every component; empty for open ones and for those in no other's box. When at least one box lies in another,
-/// reads the chunks of the file once more that a ray may meet.
-pub(crate) fn surroundings(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed: &Reversed) -> Vec<Surroundings> {
+/// The surroundings of every component that is asked about; empty for others, and for those in no closed one's box. When at least one box
+/// lies in another, reads the chunks of the file once more that a ray may meet.
+pub(crate) fn surroundings(
+    survey: &Survey<'_>,
+    shop: &Shop,
+    components: &Components,
+    reversed: &Reversed,
+    asks: impl Fn(&Component) -> bool,
+) -> Vec<Surroundings> {
     let mut all = vec![Surroundings::default(); components.list.len()];
-    let rays = rays(survey, shop, &components.list);
+    let rays = rays(survey, shop, &components.list, asks);
     if rays.is_empty() {
         return all;
     }
@@ -75,27 +81,25 @@ pub(crate) fn surroundings(survey: &Survey<'_>, shop: &Shop, components: &Compon
     all
 }
 
-/// A ray for each closed component whose box lies in another closed component's.
-fn rays(survey: &Survey<'_>, shop: &Shop, list: &[Component]) -> Vec<Ray> {
+/// A ray for each component asked about whose box lies in a closed one's.
+fn rays(survey: &Survey<'_>, shop: &Shop, list: &[Component], asks: impl Fn(&Component) -> bool) -> Vec<Ray> {
     let closed: Vec<u32> = (0..list.len() as u32).filter(|c| !list[*c as usize].open).collect();
-    if closed.len() < 2 {
+    if closed.is_empty() || list.len() < 2 {
         return Vec::new();
     }
     let boxes: Vec<Bounds> = closed.iter().map(|c| list[*c as usize].bounds).collect();
     let tree = BoxTree::new(&boxes);
     let mut found = Vec::new();
     let mut rays = Vec::new();
-    for (i, component) in closed.iter().enumerate() {
-        tree.meeting(&boxes[i], &mut found);
-        let candidates: Vec<u32> = found
-            .iter()
-            .filter(|j| **j != i as u32 && boxes[**j as usize].contains(&boxes[i]))
-            .map(|j| closed[*j as usize])
-            .collect();
+    for (component, inner) in (0..).zip(list).filter(|(_, inner)| asks(inner)) {
+        tree.meeting(&inner.bounds, &mut found);
+        let around = found.iter().map(|j| closed[*j as usize]);
+        let candidates: Vec<u32> =
+            around.filter(|c| *c != component && list[*c as usize].bounds.contains(&inner.bounds)).collect();
         if !candidates.is_empty() {
-            let Sample { record, in_shop } = list[*component as usize].sample;
+            let Sample { record, in_shop } = inner.sample;
             let corners = in_shop.map_or_else(|| record::corners(&survey.records[record as usize]), |t| shop.points(t));
-            rays.push(Ray { component: *component, from: inner_point(&corners), candidates });
+            rays.push(Ray { component, from: inner_point(&corners), candidates });
         }
     }
     rays
@@ -279,7 +283,7 @@ mod tests {
         let d = diagnose(&records);
         let none = Reversed::none(&d.survey);
         let components = Components::of(&d.survey, &d.shop, &crate::shop::edges::Edges::of(&d.shop), &none, Through::EveryEdge);
-        surroundings(&d.survey, &d.shop, &components, &none).into_iter().map(|s| s.around).collect()
+        surroundings(&d.survey, &d.shop, &components, &none, |_| true).into_iter().map(|s| s.around).collect()
     }
 
     fn nested(size: u8) -> Vec<Corners> {

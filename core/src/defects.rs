@@ -74,7 +74,7 @@ fn count_by_edges(shop: &Shop, edges: &Edges, tolerance: &Tolerance) -> Defects 
 }
 
 fn count_bodies(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed: &Reversed, defects: &mut Defects) {
-    let around = bodies::surroundings(survey, shop, components, reversed);
+    let around = bodies::surroundings(survey, shop, components, reversed, |c| !c.open);
     for (component, around) in components.list.iter().zip(&around).filter(|(c, _)| !c.open) {
         let inside = around.winding() > 0;
         match component.extent.volume.signum() {

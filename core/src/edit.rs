@@ -28,6 +28,8 @@ pub(crate) struct Edit {
     changes: Vec<(u32, Change)>,
     /// Records of reversed patches, a bit each; empty when there are none.
     flipped: Vec<u64>,
+    /// And of patches that go.
+    dropped: Vec<u64>,
     /// New records. As many as can take the places of deleted ones, in order; the rest goes to the end of the file.
     pub(crate) added: Vec<Record>,
     flips: u64,
@@ -65,9 +67,12 @@ impl Edit {
         edit.changes.sort_unstable_by_key(|(t, _)| *t);
         edit.deletions = edit.changes.iter().filter(|c| c.1 == Change::Delete).count() as u64;
         edit.flips = edit.changes.iter().filter(|c| c.1 == Change::Flip).count() as u64;
-        if reversed.patches.iter().any(|r| *r) {
-            edit.flip_patches(survey, reversed);
-        }
+        let dropped = |patch: u32| reversed.dropped.get(patch as usize) == Some(&true);
+        let (flipped, flips) = records_of(survey, |patch| reversed.patches[patch as usize] && !dropped(patch));
+        let (gone, deletions) = records_of(survey, dropped);
+        (edit.flipped, edit.dropped) = (flipped, gone);
+        edit.flips += flips;
+        edit.deletions += deletions;
         edit
     }
 
@@ -90,24 +95,9 @@ impl Edit {
         self.changes.push((t, change));
     }
 
-    fn flip_patches(&mut self, survey: &Survey<'_>, reversed: &Reversed) {
-        let bits: Vec<AtomicU64> = std::iter::repeat_with(AtomicU64::default).take(survey.records.len().div_ceil(64)).collect();
-        let flips = survey.visit_sound(
-            |patch| reversed.patches[patch as usize],
-            |_| Some(0),
-            |_, _| true,
-            |flips: &mut u64, triangle, _| {
-                bits[triangle as usize / 64].fetch_or(1 << (triangle % 64), Ordering::Relaxed);
-                *flips += 1;
-            },
-        );
-        self.flipped = bits.into_iter().map(AtomicU64::into_inner).collect();
-        self.flips += flips.into_iter().sum::<u64>();
-    }
-
     /// Every record stays untouched, and none is added.
     pub(crate) fn is_empty(&self) -> bool {
-        self.changes.is_empty() && self.flips == 0 && self.added.is_empty()
+        self.changes.is_empty() && self.flips + self.deletions == 0 && self.added.is_empty()
     }
 
     /// Input records that do not stay as they are.
@@ -124,7 +114,14 @@ impl Edit {
     /// The first deleted record whose place nothing takes, if there is one: up to there, every record of the output stands where the
     /// input's does. O(edit).
     pub(crate) fn first_gap(&self) -> Option<u32> {
-        self.changes.iter().filter(|c| c.1 == Change::Delete).nth(self.added.len()).map(|c| c.0)
+        let deleted = self.changes.iter().filter(|c| c.1 == Change::Delete).map(|c| c.0);
+        if self.dropped.is_empty() {
+            return deleted.into_iter().nth(self.added.len());
+        }
+        let mut both: Vec<u32> = deleted.collect();
+        both.extend(ones(&self.dropped).take(self.added.len() + 1));
+        both.sort_unstable();
+        both.get(self.added.len()).copied()
     }
 
     /// Walks through the input in order: runs of untouched records, then what becomes of the one that follows.
@@ -139,7 +136,8 @@ impl Edit {
         let mut at = 0;
         while at < records.len() {
             let next_change = changes.peek().map_or(records.len(), |c| c.0 as usize);
-            let next = next_change.min(self.next_flipped(at));
+            let dropped = next_one(&self.dropped, at);
+            let next = next_change.min(next_one(&self.flipped, at)).min(dropped);
             if next >= records.len() {
                 break;
             }
@@ -149,9 +147,10 @@ impl Edit {
             let place = next as u32;
             let flipped = || Step::Changed(place, record::flip(&records[next]));
             step(match changes.next_if(|c| c.0 == place).map(|c| &c.1) {
-                Some(Change::Flip) | None => flipped(),
+                None if next != dropped => flipped(),
+                Some(Change::Flip) => flipped(),
                 Some(Change::Move(record)) => Step::Changed(place, **record),
-                Some(Change::Delete) => added.next().map_or(Step::Deleted(place), |record| Step::Changed(place, *record)),
+                Some(Change::Delete) | None => added.next().map_or(Step::Deleted(place), |record| Step::Changed(place, *record)),
             })?;
             at = next + 1;
             start = at;
@@ -160,21 +159,6 @@ impl Edit {
             step(Step::Untouched(&records[start..]))?;
         }
         added.try_for_each(|record| step(Step::Added(record)))
-    }
-
-    /// The first record from `at` on whose patch is reversed, or past the end.
-    fn next_flipped(&self, at: usize) -> usize {
-        let mut word = at / 64;
-        let mut mask = !0u64 << (at % 64);
-        while word < self.flipped.len() {
-            let bits = self.flipped[word] & mask;
-            if bits != 0 {
-                return word * 64 + bits.trailing_zeros() as usize;
-            }
-            word += 1;
-            mask = !0;
-        }
-        usize::MAX
     }
 
     pub(crate) fn summary(&self, input_records: usize) -> EditSummary {
@@ -192,20 +176,19 @@ impl Edit {
     /// The edit record by record.
     pub(crate) fn listed(&self) -> EditRecords {
         let mut all = EditRecords::default();
-        let mut flips: Vec<u32> = Vec::new();
+        let (mut flips, mut deleted): (Vec<u32>, Vec<u32>) = Default::default();
         for (t, change) in &self.changes {
             match change {
-                Change::Delete => extend_ranges(&mut all.deleted, *t),
+                Change::Delete => deleted.push(*t),
                 Change::Flip => flips.push(*t),
                 Change::Move(record) => all.moved.push((*t, record::corners(record))),
             }
         }
-        let mut at = self.next_flipped(0);
-        while at != usize::MAX {
-            flips.push(at as u32);
-            at = self.next_flipped(at + 1);
-        }
+        flips.extend(ones(&self.flipped));
         flips.sort_unstable();
+        deleted.extend(ones(&self.dropped));
+        deleted.sort_unstable();
+        deleted.iter().for_each(|t| extend_ranges(&mut all.deleted, *t));
         flips.iter().for_each(|t| extend_ranges(&mut all.flipped, *t));
         all.added = self.added.iter().map(|r| (record::corners(r), record::attribute(r))).collect();
         all
@@ -219,6 +202,45 @@ pub(crate) enum Step<'r, 'e> {
     Changed(u32, Record),
     Deleted(u32),
     Added(&'e Record),
+}
+
+/// The records of some patches, a bit each, and how many; no bits if there are none. One pass over them.
+fn records_of(survey: &Survey<'_>, wanted: impl Fn(u32) -> bool + Sync) -> (Vec<u64>, u64) {
+    if !(0..survey.patches.len() as u32).any(&wanted) {
+        return (Vec::new(), 0);
+    }
+    let bits: Vec<AtomicU64> = std::iter::repeat_with(AtomicU64::default).take(survey.records.len().div_ceil(64)).collect();
+    let counts = survey.visit_sound(
+        wanted,
+        |_| Some(0),
+        |_, _| true,
+        |count: &mut u64, triangle, _| {
+            bits[triangle as usize / 64].fetch_or(1 << (triangle % 64), Ordering::Relaxed);
+            *count += 1;
+        },
+    );
+    (bits.into_iter().map(AtomicU64::into_inner).collect(), counts.into_iter().sum())
+}
+
+/// The first bit that is set from `at` on, or past the end.
+fn next_one(bits: &[u64], at: usize) -> usize {
+    let mut word = at / 64;
+    let mut mask = !0u64 << (at % 64);
+    while word < bits.len() {
+        let found = bits[word] & mask;
+        if found != 0 {
+            return word * 64 + found.trailing_zeros() as usize;
+        }
+        word += 1;
+        mask = !0;
+    }
+    usize::MAX
+}
+
+/// All bits that are set.
+fn ones(bits: &[u64]) -> impl Iterator<Item = u32> + '_ {
+    let next = |at: usize| Some(next_one(bits, at)).filter(|one| *one != usize::MAX);
+    std::iter::successors(next(0), move |one| next(one + 1)).map(|one| one as u32)
 }
 
 /// Adds the next number to inclusive ranges.
@@ -269,7 +291,7 @@ mod tests {
     fn a_reversed_patch_flips_its_records() {
         let records = records(&cube());
         let d = diagnose(&records);
-        let edit = Edit::of(&d.survey, &d.shop, &Reversed { patches: vec![true] });
+        let edit = Edit::of(&d.survey, &d.shop, &Reversed { patches: vec![true], dropped: Vec::new() });
         assert_eq!(written(&edit, &records), records.iter().map(record::flip).collect::<Vec<_>>());
         assert_eq!(edit.listed().flipped, [[0, 11]]);
     }

@@ -12,10 +12,11 @@ use crate::emit::{Content, Draft};
 use crate::error::{Error, Result};
 use crate::read::{MeshFile, PREFIX_BYTES};
 use crate::readback::Expectation;
+use crate::repairs::Swallowed;
 use crate::report::{
     BoundaryLoops, Cost, Defects, EditSummary, FileFacts, Outcome, Report, SCHEMA_VERSION, Stage, Task, Tolerances,
 };
-use crate::settings::{Limits, Profile, folder_of};
+use crate::settings::{Bodies, Limits, Profile, folder_of};
 use crate::shop::Shop;
 use crate::shop::edges::Edges;
 use crate::shop::near::Tolerance;
@@ -209,7 +210,10 @@ fn mend(
     let surface = diagnosis.surface_bounds();
     let mut report = report(Task::Repair, mesh, &diagnosis, profile, limits);
     let mut edit = Edit::default();
-    if !report.verdict.good {
+    let mut swallowed = Swallowed::default();
+    // What lies in the material of others makes a file no less printable, but it does not belong there.
+    let swallows = profile.bodies == Bodies::Union && report.before.nested_positive > 0;
+    if !report.verdict.good || swallows {
         progress.at("repair", 0, mesh.records().len() as u64);
         let repaired = repairs::run(&mut diagnosis, profile, limits.threads);
         clock.lap("repair");
@@ -217,6 +221,7 @@ fn mend(
         report.loops = repaired.loops;
         report.repairs = repaired.repairs;
         report.loops_left = repaired.loops_left;
+        swallowed = repaired.swallowed;
     }
     // Of the input's survey, the second look may go on; the memory of its workshop is needed for that of the output.
     let survey = diagnosis.into_survey();
@@ -247,7 +252,15 @@ fn mend(
     if same {
         confirm_copy(&mut report, mesh, output, limits, progress)?;
     } else {
-        verify(&mut report, mesh, &surface, expected.map(|expected| (expected, digest, looked)), output, limits, progress)?;
+        verify(
+            &mut report,
+            mesh,
+            (&surface, &swallowed),
+            expected.map(|expected| (expected, digest, looked)),
+            output,
+            limits,
+            progress,
+        )?;
     }
     written.durable()?;
     clock.lap("verify");
@@ -276,11 +289,11 @@ fn confirm_copy(report: &mut Report, input: &MeshFile, output: &Path, limits: &L
     Ok(())
 }
 
-/// Reads the written file again and judges it.
+/// Reads the written file again and judges it, against the box of the input's surface and the bodies in it that lay in others.
 fn verify(
     report: &mut Report,
     input: &MeshFile,
-    surface: &Bounds,
+    (surface, swallowed): (&Bounds, &Swallowed),
     known: Option<(Expectation<'_>, Digest, Option<Defects>)>,
     output: &Path,
     limits: &Limits,
@@ -301,7 +314,7 @@ fn verify(
     report.verdict = verdict::judge(&defects, &flaws(&written));
     report.outcome = if report.verdict.good { Outcome::Repaired } else { Outcome::NotGood };
     if report.verdict.good {
-        let mut concerns = verdict::review(&report.before, surface, &defects, &report.profile);
+        let mut concerns = verdict::review(&report.before, surface, swallowed, &defects, &report.profile);
         if report.before.boundary_edges > 0 {
             // What was closed had to be guessed: nobody knows what stood in the part that is missing.
             concerns.extend(input.findings().iter().filter(|f| f.loss).map(|f| format!("a part is missing: {}", f.text)));

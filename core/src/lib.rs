@@ -53,7 +53,7 @@ mod weld;
 
 pub use error::{Error, ErrorClass};
 pub use report::Report;
-pub use settings::{Limits, PatchShape, Profile};
+pub use settings::{Bodies, Limits, PatchShape, Profile};
 
 use std::path::Path;
 

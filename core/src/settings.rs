@@ -50,8 +50,21 @@ pub struct Profile {
     pub debris_triangles: u32,
     /// ... if they have at most this share of the model's area, and all of them together at most ten times that; else all are kept.
     pub debris_area_share: f64,
+    /// What becomes of bodies inside others.
+    pub bodies: Bodies,
     /// Look for triangles that cross or overlap each other, in the input and in the output; without, the verdict calls it unchecked.
     pub check_self_intersections: bool,
+}
+
+/// What becomes of a body that lies inside another one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Bodies {
+    /// Only what separates material from air stays: bodies inside the material of others go; cavities, and what lies in them, stay.
+    #[default]
+    Union,
+    /// Everything stays.
+    Keep,
 }
 
 /// How a patch is shaped.
@@ -87,6 +100,7 @@ impl Default for Profile {
             max_bodies_lost: 0,
             debris_triangles: 4,
             debris_area_share: 1e-3,
+            bodies: Bodies::Union,
             check_self_intersections: true,
         }
     }

@@ -1,5 +1,6 @@
 //! The verdict: what counts of defects say about a file.
 
+use crate::repairs::Swallowed;
 use crate::report::{Defects, Verdict};
 use crate::settings::Profile;
 use crate::sums::Bounds;
@@ -71,16 +72,24 @@ pub(crate) fn judge(defects: &Defects, flaws: &[String]) -> Verdict {
 }
 
 /// What a good result has changed beyond the profile's limits, in words; empty when a person need not look. `surface`: the box of the
-/// input's surface, triangles of no area left out.
-pub(crate) fn review(before: &Defects, surface: &Bounds, after: &Defects, profile: &Profile) -> Vec<String> {
+/// input's surface, triangles of no area left out; `swallowed`: the bodies that lay in
+/// others, whose volume counted twice.
+pub(crate) fn review(
+    before: &Defects,
+    surface: &Bounds,
+    swallowed: &Swallowed,
+    after: &Defects,
+    profile: &Profile,
+) -> Vec<String> {
     let mut concerns = Vec::new();
     // The volume of an open or incoherent surface depends on the origin, and duplicates count twice: only what enclosed a volume
     // once can be compared.
     let enclosed = before.boundary_edges + before.unbalanced_edges + before.nonmanifold_edges + before.inverted_components == 0;
-    if enclosed && before.volume > 0.0 {
-        let change = (after.volume - before.volume).abs() / before.volume;
+    let volume = before.volume - swallowed.volume;
+    if enclosed && volume > 0.0 {
+        let change = (after.volume - volume).abs() / volume;
         if change > profile.max_volume_change {
-            concerns.push(format!("the volume changed by {:.1} %, from {} to {}", change * 100.0, before.volume, after.volume));
+            concerns.push(format!("the volume changed by {:.1} %, from {} to {}", change * 100.0, volume, after.volume));
         }
     }
     if let Some([lo, hi]) = after.bounds {
@@ -90,9 +99,10 @@ pub(crate) fn review(before: &Defects, surface: &Bounds, after: &Defects, profil
             concerns.push(format!("the bounding box moved by {most}"));
         }
     }
-    let lost = before.bodies.saturating_sub(after.bodies + after.nested_positive);
+    let all = before.bodies + before.nested_positive;
+    let lost = all.saturating_sub(after.bodies + after.nested_positive + swallowed.bodies);
     if lost > u64::from(profile.max_bodies_lost) {
-        concerns.push(format!("{lost} of {} bodies were lost", before.bodies));
+        concerns.push(format!("{lost} of {all} bodies were lost"));
     }
     concerns
 }
@@ -169,7 +179,7 @@ mod tests {
     fn review_begins_beyond_the_limits() {
         let profile =
             Profile { max_volume_change: 0.25, max_box_change_relative: 0.25, max_bodies_lost: 1, ..Profile::default() };
-        let concerns = |before: Defects, after: Defects| review(&before, &BOX, &after, &profile).len();
+        let concerns = |before: Defects, after: Defects| review(&before, &BOX, &Swallowed::default(), &after, &profile).len();
         // The volume may change by just a quarter either way.
         for (volume, count) in [(1.25, 0), (0.75, 0), (1.26, 1), (0.74, 1)] {
             assert_eq!(concerns(cube(), Defects { volume, ..cube() }), count, "volume {volume}");
@@ -186,8 +196,17 @@ mod tests {
     #[test]
     fn the_volume_of_what_enclosed_none_is_not_compared() {
         let open = Defects { boundary_edges: 3, volume: 0.1, ..cube() };
-        assert!(review(&open, &BOX, &cube(), &Profile::default()).is_empty());
+        assert!(review(&open, &BOX, &Swallowed::default(), &cube(), &Profile::default()).is_empty());
         let inside_out = Defects { inverted_components: 1, volume: -1.0, ..cube() };
-        assert!(review(&inside_out, &BOX, &cube(), &Profile::default()).is_empty());
+        assert!(review(&inside_out, &BOX, &Swallowed::default(), &cube(), &Profile::default()).is_empty());
+    }
+
+    #[test]
+    fn what_lay_in_others_is_neither_lost_nor_a_change_of_volume() {
+        let before = Defects { bodies: 1, nested_positive: 2, volume: 1.5, ..cube() };
+        let swallowed = Swallowed { bodies: 2, volume: 0.5, ..Swallowed::default() };
+        let concerns = |swallowed: &Swallowed| review(&before, &BOX, swallowed, &cube(), &Profile::default());
+        assert!(concerns(&swallowed).is_empty(), "{:?}", concerns(&swallowed));
+        assert_eq!(concerns(&Swallowed::default()).len(), 2, "the volume, and the bodies");
     }
 }

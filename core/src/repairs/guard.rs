@@ -115,7 +115,7 @@ pub(super) fn crossed(
 }
 
 /// The components of some records that are as they were. Reads the chunks where those are that are not in the workshop.
-fn components_of_records(
+pub(super) fn components_of_records(
     survey: &Survey<'_>,
     shop: &Shop,
     components: &Components,

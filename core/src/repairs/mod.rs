@@ -16,6 +16,7 @@ mod merge;
 mod orient;
 mod smooth;
 mod surplus;
+mod swallowed;
 mod work;
 mod zip;
 
@@ -28,6 +29,7 @@ use crate::settings::Profile;
 use crate::shop::components::Reversed;
 use crate::shop::near::Tolerance;
 use crate::survey::Survey;
+pub(crate) use swallowed::Swallowed;
 use work::Work;
 
 /// What the repairs did; the mesh itself is in the diagnosis' shop.
@@ -37,6 +39,7 @@ pub(crate) struct Repaired {
     /// The boundary loops as they were recognised, before any was closed.
     pub(crate) loops: BoundaryLoops,
     pub(crate) loops_left: Vec<LoopLeft>,
+    pub(crate) swallowed: Swallowed,
 }
 
 /// Rounds of weld, split and clean-up: each round can uncover work for the next. A count, so that results do not depend on time.
@@ -88,7 +91,16 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
     });
     log.note("fill", methods);
     log.time("outward", "components that were inside out", || orient::make_outward(survey, shop, &mut reversed).0);
-    Repaired { reversed, repairs: log.repairs, loops: loops.unwrap_or_default(), loops_left }
+    let mut swallowed = Swallowed::default();
+    log.time("swallowed", "", || {
+        swallowed = swallowed::remove(survey, shop, &reversed, profile);
+        swallowed.bodies + swallowed.sheets
+    });
+    let Swallowed { bodies, sheets, volume, patches } = &mut swallowed;
+    let note = format!("{bodies} bodies and {sheets} sheets in the material of others removed, of {volume:.4} units³ together");
+    log.note("swallowed", note);
+    reversed.dropped = std::mem::take(patches);
+    Repaired { reversed, repairs: log.repairs, loops: loops.unwrap_or_default(), loops_left, swallowed }
 }
 
 /// The boundary loops of a workshop, with their kinds. They are what is left when surplus surface is gone and vertices within the weld

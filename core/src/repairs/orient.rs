@@ -111,11 +111,8 @@ fn turn(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed, node:
 
 /// Turns closed components inside out where they enclose negative volume and are no cavity; returns (components, triangles).
 pub(super) fn make_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed) -> (u64, u64) {
-    let (shop, edges) = work.edges();
-    let mut components = Components::of(survey, shop, edges, reversed, Through::ManifoldEdges);
-    if edges.any_nonmanifold() {
-        components = Components::of(survey, shop, edges, reversed, Through::OpenSheets(&components));
-    }
+    let components = pieces(survey, work, reversed);
+    let shop: &Shop = work;
     if components.list.iter().all(|c| c.open || c.extent.volume >= 0) {
         return (0, 0);
     }
@@ -136,11 +133,22 @@ pub(super) fn make_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &
     (count, triangles)
 }
 
+/// The pieces of surface that stand for themselves: bodies that touch along an edge each for itself, what is closed only together, together.
+/// O(patches + workshop).
+pub(super) fn pieces(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reversed) -> Components {
+    let (shop, edges) = work.edges();
+    let components = Components::of(survey, shop, edges, reversed, Through::ManifoldEdges);
+    if !edges.any_nonmanifold() {
+        return components;
+    }
+    Components::of(survey, shop, edges, reversed, Through::OpenSheets(&components))
+}
+
 /// Which components are inside out: from the outside in, one of negative volume that no body winds around. One that was coherent
 /// with an inverted component around it (of opposite sign: its cavity) is turned along.
 fn inverted(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed: &Reversed) -> Vec<bool> {
     let list = &components.list;
-    let around = bodies::surroundings(survey, shop, components, reversed);
+    let around = bodies::surroundings(survey, shop, components, reversed, |c| !c.open);
     let sign = |c: u32| list[c as usize].extent.volume.signum();
     // What lies in fewer components is decided first.
     let mut order: Vec<u32> = (0..list.len() as u32).filter(|c| !list[*c as usize].open).collect();

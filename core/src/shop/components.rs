@@ -6,15 +6,18 @@ use crate::chunk::{self, NONE};
 use crate::sums::{Bounds, Extent};
 use crate::survey::Survey;
 
-/// Which patches of sound surface are reversed, against how they stand in the file. Triangles of the shop are turned in place.
+/// Which patches of sound surface are reversed, against how they stand in the file, and which go. Triangles of the shop are turned, or die, in
+/// place.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Reversed {
     pub(crate) patches: Vec<bool>,
+    /// Decided last, when nobody asks for components any more; empty: none.
+    pub(crate) dropped: Vec<bool>,
 }
 
 impl Reversed {
     pub(crate) fn none(survey: &Survey<'_>) -> Self {
-        Self { patches: vec![false; survey.patches.len()] }
+        Self { patches: vec![false; survey.patches.len()], dropped: Vec::new() }
     }
 }
 

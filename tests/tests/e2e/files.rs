@@ -287,3 +287,27 @@ fn a_report_replaces_neither_input_nor_result() {
         assert!(!place.at("out.stl").exists());
     }
 }
+
+/// A hollow box with a cube afloat in its cavity and one in its wall, which is material already.
+#[test]
+fn a_body_in_the_material_of_another_goes_unless_the_profile_keeps_it() {
+    let turned = |triangles: Vec<stl::Triangle>| triangles.into_iter().map(|[a, b, c]| [a, c, b]);
+    let hollow = stl::cuboid([0.0; 3], [9.0; 3]).into_iter().chain(turned(stl::cuboid([2.0; 3], [7.0; 3])));
+    let afloat = stl::cuboid([4.0; 3], [5.0; 3]);
+    let inside = stl::cuboid([0.5; 3], [1.5; 3]);
+    let place = Place::new();
+    let stays: Vec<stl::Triangle> = hollow.chain(afloat).collect();
+    let input = place.put("in.stl", &stl::mesh(&[stays.clone(), inside].concat()));
+    for limits in [&["--chunk-triangles", "4"][..], &[]] {
+        let report = place.repair("in.stl", "out.stl", &[limits, &["--json", "--force"]].concat()).expect(0).report();
+        assert_eq!((&report["outcome"], &report["before"]["nested_positive"]), (&"repaired".into(), &1.into()), "{report}");
+        assert_eq!((&report["after"]["bodies"], &report["after"]["cavities"]), (&2.into(), &1.into()));
+        assert!(report["repairs"][0]["note"].as_str().unwrap().contains("of 1.0000 units³"), "{report}");
+        assert_eq!(stl::records(&place.read("out.stl")), stl::records(&stl::mesh(&stays)));
+    }
+    place.put("keep.toml", b"bodies = \"keep\"\n");
+    let profile = place.at("keep.toml");
+    let kept = place.repair("in.stl", "kept.stl", &["--json", "--profile", profile.to_str().unwrap()]).expect(0).report();
+    assert_eq!(kept["outcome"], "clean");
+    assert_eq!(place.read("kept.stl"), std::fs::read(input).unwrap());
+}

@@ -115,6 +115,14 @@ mod tests {
     }
 
     #[test]
+    fn a_sheet_in_the_plane_of_a_rim_that_was_bridged_is_not_joined_to_it() {
+        let sheet: Vec<Corners> = plate(2, |_, _| true).iter().map(|t| t.map(|[x, y, _]| [x - 1.0, y - 1.0, 5.0])).collect();
+        let open = [turned(&can(0.0, 5.0, 4.0), 24), turned(&lid(6.0, 11.0, 4.0), 24), sheet].concat();
+        let got = closed(&open);
+        assert_eq!((closed_by(&got, "annular"), got.defects.nonmanifold_edges, got.defects.boundary_edges), (2, 0, 8));
+    }
+
+    #[test]
     fn a_tube_that_lost_a_ring_is_one_again() {
         for gap in [0.4, 1.0, 4.0, 8.0] {
             let open = [turned(&can(0.0, 5.0, 4.0), 24), turned(&lid(5.0 + gap, 10.0 + gap, 4.0), 24)].concat();

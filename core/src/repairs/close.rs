@@ -189,29 +189,33 @@ impl Closing<'_> {
                 numbers.iter().for_each(|i| taken[*i] = true);
             }
         }
-        let is_free = |numbers: &[usize]| numbers.iter().all(|i| !taken[*i]);
-        let rings = partners.rings.into_iter().filter(|pair| is_free(pair)).map(|pair| pair.map(|i| &rims[i]));
-        let rings: Vec<[&Loop; 2]> = rings.filter(|pair| pair.iter().all(|rim| admits(work, rim))).collect();
-        let groups = groups.iter().map(|group| ("islands", group)).chain(partners.bored.iter().map(|group| ("annular", group)));
-        let groups: Vec<(&str, Vec<&Loop>)> = groups
-            .filter(|(_, group)| is_free(group))
-            .map(|(method, group)| (method, group.iter().map(|i| &rims[*i]).collect::<Vec<_>>()))
-            .filter(|(_, group)| is_admitted(work, group))
-            .collect();
-        if rings.is_empty() && groups.is_empty() && !taken.contains(&true) {
-            self.rims = rims;
-            return 0;
-        }
-        annular::bridge(work, &rings, threads, |work, i, triangles| place(work, &rings[i], triangles, "annular"));
+        let is_free = |taken: &[bool], numbers: &[usize]| numbers.iter().all(|i| !taken[*i]);
+        let is_ring = |pair: &[usize; 2]| is_free(&taken, pair) && pair.iter().all(|i| admits(work, &rims[*i]));
+        let numbers: Vec<[usize; 2]> = partners.rings.into_iter().filter(is_ring).collect();
+        let rings: Vec<[&Loop; 2]> = numbers.iter().map(|pair| pair.map(|i| &rims[i])).collect();
+        annular::bridge(work, &rings, threads, |work, i, triangles| {
+            place(work, &rings[i], triangles, "annular");
+            numbers[i].iter().for_each(|i| taken[*i] = true);
+        });
         let mut joined = Vec::new();
-        for (method, group) in &groups {
-            match islands::patch(work, group) {
-                Some(triangles) => place(work, group, &triangles, method),
+        let groups = groups.iter().map(|group| ("islands", group)).chain(partners.bored.iter().map(|group| ("annular", group)));
+        for (method, numbers) in groups {
+            let group: Vec<&Loop> = numbers.iter().map(|i| &rims[*i]).collect();
+            if !is_free(&taken, numbers) || !is_admitted(work, &group) {
+                continue;
+            }
+            numbers.iter().for_each(|i| taken[*i] = true);
+            match islands::patch(work, &group) {
+                Some(triangles) => place(work, &group, &triangles, method),
                 None => {
-                    self.joints.extend(islands::join_all(work, group));
+                    self.joints.extend(islands::join_all(work, &group));
                     joined.extend_from_slice(&group[1..]);
                 }
             }
+        }
+        if !taken.contains(&true) {
+            self.rims = rims;
+            return 0;
         }
         self.admission.joined(&joined);
         let first = done.len();

@@ -1,7 +1,7 @@
 //! Closes boundary loops (METHODS C8): by a triangulation between their vertices, which is then shaped to continue the surface, where it has
 //! room for that, and revoked where it crosses anything.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::admit::{Admission, NotAdmitted};
 use super::guard::{self, Obstacle};
@@ -27,7 +27,8 @@ use crate::survey::Survey;
 pub(super) struct Closed {
     pub(super) loops: u64,
     pub(super) by_method: BTreeMap<String, u64>,
-    pub(super) left: Vec<LoopLeft>,
+    /// Each with its vertices.
+    pub(super) left: Vec<(Vec<Vertex>, LoopLeft)>,
 }
 
 /// Longest list of open loops in a report.
@@ -121,12 +122,13 @@ pub(super) fn fill_loops(
     }
     let mut closed = closing.finish(work);
     for chain in chains.iter().take(LISTED.saturating_sub(closed.left.len())) {
-        closed.left.push(LoopLeft {
+        let left = LoopLeft {
             at: work.positions[chain[0] as usize],
             edges: chain.len() as u64 - 1,
             perimeter: chain.windows(2).map(|w| work.distance(w[0], w[1])).sum(),
             reason: NO_LOOP.into(),
-        });
+        };
+        closed.left.push((chain.clone(), left));
     }
     closed
 }
@@ -386,20 +388,46 @@ impl Closing<'_> {
             *closed.by_method.entry(format!("{}{shaped}", patch.method)).or_default() += loops;
         }
         self.open.sort_by_key(|(rim, _)| *rim);
-        for (rim, reason) in &self.open {
+        for (rim, reason) in self.open.iter().take(LISTED) {
             let rim = self.rim(*rim);
-            if closed.left.len() < LISTED {
-                closed.left.push(LoopLeft {
+            closed.left.push((
+                rim.vertices.clone(),
+                LoopLeft {
                     at: work.positions[rim.vertices[0] as usize],
                     edges: rim.vertices.len() as u64,
                     perimeter: rim.perimeter(work),
                     reason: reason.to_string(),
-                });
-            }
-            // What joined an island to this rim leads nowhere now.
-            rim.triangles.iter().filter(|t| self.joints.binary_search(t).is_ok()).for_each(|t| work.kill(*t));
+                },
+            ));
         }
+        self.drop_idle_joints(work);
         closed
+    }
+
+    /// What joined an island to a rim that stays open leads nowhere, unless a patch was closed along it.
+    fn drop_idle_joints(&self, work: &mut Work<'_>) {
+        let of_open = self.open.iter().flat_map(|(rim, _)| &self.rim(*rim).triangles).copied();
+        let mut idle: BTreeSet<u32> = of_open.filter(|t| self.joints.binary_search(t).is_ok()).collect();
+        // The two triangles of a joint stay or go together.
+        loop {
+            let is_needed = |t: &u32| {
+                let v = work.triangles[*t as usize].v;
+                (0..3).any(|k| {
+                    work.star(v[k]).any(|(other, _)| {
+                        let triangle = &work.triangles[other as usize];
+                        triangle.v.contains(&v[(k + 1) % 3]) && triangle.origin == Origin::Patch && !idle.contains(&other)
+                    })
+                })
+            };
+            let needed: Vec<u32> = idle.iter().copied().filter(is_needed).collect();
+            if needed.is_empty() {
+                break;
+            }
+            needed.iter().for_each(|t| {
+                idle.remove(t);
+            });
+        }
+        idle.into_iter().for_each(|t| work.kill(t));
     }
 
     /// A triangulation of a loop that crosses none of the `obstacles`.
@@ -496,7 +524,8 @@ pub(super) fn fill(d: &mut crate::engine::Diagnosis<'_>, profile: &Profile) -> C
 mod tests {
     use super::*;
     use crate::report::LoopClass;
-    use crate::testing::{After, Corners, after, cube, cuboid, plate};
+    use crate::testing::{After, Corners, after, cube, cuboid, plate, reversed, shifted};
+    use proptest::prelude::*;
 
     /// A cube without its top.
     fn filled(profile: &Profile) -> After<Closed> {
@@ -521,8 +550,8 @@ mod tests {
         for (profile, words) in [(few_edges, "3 edges"), (short, "longer"), (none, "fills no holes")] {
             let got = filled(&profile);
             assert_eq!((got.result.loops, got.result.left.len(), got.defects.boundary_edges), (0, 1, 4));
-            assert!(got.result.left[0].reason.contains(words), "{}", got.result.left[0].reason);
-            assert_eq!((got.result.left[0].edges, got.result.left[0].perimeter), (4, 4.0));
+            assert!(got.result.left[0].1.reason.contains(words), "{}", got.result.left[0].1.reason);
+            assert_eq!((got.result.left[0].1.edges, got.result.left[0].1.perimeter), (4, 4.0));
         }
     }
 
@@ -582,7 +611,7 @@ mod tests {
         let needle = cuboid([-0.1, -0.1, 5.0], [0.1, 0.1, 12.0]);
         let got = after(&[open_globe(), needle].concat(), |d, _| fill(d, &Profile::default()));
         assert_eq!((got.result.loops, got.result.left.len(), got.defects.boundary_loops), (0, 1, 1));
-        assert!(got.result.left[0].reason.contains("crosses the surface around"), "{}", got.result.left[0].reason);
+        assert!(got.result.left[0].1.reason.contains("crosses the surface around"), "{}", got.result.left[0].1.reason);
         assert_eq!(got.defects.self_intersections.as_ref().map(|si| si.triangles), Some(0));
     }
 
@@ -618,7 +647,7 @@ mod tests {
         let hole = |x: u8, y: u8| !((2..4).contains(&x) && (2..4).contains(&y));
         let got = after(&plate(6, hole), |d, _| fill(d, &Profile::default()));
         assert_eq!((got.result.loops, got.defects.boundary_edges), (1, 24), "the hole is none");
-        assert!(got.result.left[0].reason.contains("lone sheet"), "{}", got.result.left[0].reason);
+        assert!(got.result.left[0].1.reason.contains("lone sheet"), "{}", got.result.left[0].1.reason);
         // A relief encloses something. (Without the two corners that would lie in the plane of its rim.)
         let hill: Vec<Corners> = plate(6, |x, y| x.abs_diff(y) < 5)
             .iter()
@@ -631,15 +660,36 @@ mod tests {
     fn a_profile_leaves_a_kind_of_loop_open() {
         let profile = Profile { leave_open: vec![LoopClass::Simple], ..Profile::default() };
         let got = filled(&profile);
-        assert_eq!(got.result.left[0].reason, "the profile leaves simple loops open");
+        assert_eq!(got.result.left[0].1.reason, "the profile leaves simple loops open");
     }
 
     #[test]
     fn a_side_that_lacks_beside_another_body_is_closed() {
         let open: Vec<Corners> = cube().into_iter().filter(|t| !t.iter().all(|p| p[0] == 1.0)).collect();
-        let got = after(&[open, crate::testing::shifted(&cube(), [1.0, 1.0, 0.0])].concat(), |d, _| fill(d, &Profile::default()));
+        let got = after(&[open, shifted(&cube(), [1.0, 1.0, 0.0])].concat(), |d, _| fill(d, &Profile::default()));
         // The bodies touch along an edge, as they are meant to.
         assert_eq!((got.result.loops, got.defects.boundary_edges, got.defects.nonmanifold_edges), (1, 0, 1), "{:?}", got.result);
         assert!((got.defects.volume - 2.0).abs() < 1e-9, "{}", got.defects.volume);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+
+        /// Two skins with holes, islands, and corners where these meet.
+        #[test]
+        fn what_stays_open_is_said_and_no_edge_becomes_nonmanifold(
+            gone in prop::collection::vec(any::<prop::sample::Index>(), 0..90),
+            apart in prop::sample::select(vec![0.05_f32, 0.5, 3.0]),
+        ) {
+            let top = plate(7, |_, _| true);
+            let bottom = reversed(&shifted(&top, [0.0, 0.0, -apart]));
+            let mut skins = [top, bottom].concat();
+            for at in gone {
+                skins.swap_remove(at.index(skins.len()));
+            }
+            let got = after(&skins, |d, _| fill(d, &Profile::default()));
+            let said: u64 = got.result.left.iter().map(|(_, left)| left.edges).sum();
+            prop_assert_eq!((got.defects.boundary_edges, got.defects.nonmanifold_edges), (said, 0), "{:?}", got.result);
+        }
     }
 }

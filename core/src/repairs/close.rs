@@ -27,8 +27,7 @@ use crate::survey::Survey;
 pub(super) struct Closed {
     pub(super) loops: u64,
     pub(super) by_method: BTreeMap<String, u64>,
-    /// Each with its vertices.
-    pub(super) left: Vec<(Vec<Vertex>, LoopLeft)>,
+    pub(super) left: Vec<LoopLeft>,
 }
 
 /// Longest list of open loops in a report.
@@ -122,13 +121,12 @@ pub(super) fn fill_loops(
     }
     let mut closed = closing.finish(work);
     for chain in chains.iter().take(LISTED.saturating_sub(closed.left.len())) {
-        let left = LoopLeft {
+        closed.left.push(LoopLeft {
             at: work.positions[chain[0] as usize],
             edges: chain.len() as u64 - 1,
             perimeter: chain.windows(2).map(|w| work.distance(w[0], w[1])).sum(),
             reason: NO_LOOP.into(),
-        };
-        closed.left.push((chain.clone(), left));
+        });
     }
     closed
 }
@@ -390,15 +388,12 @@ impl Closing<'_> {
         self.open.sort_by_key(|(rim, _)| *rim);
         for (rim, reason) in self.open.iter().take(LISTED) {
             let rim = self.rim(*rim);
-            closed.left.push((
-                rim.vertices.clone(),
-                LoopLeft {
-                    at: work.positions[rim.vertices[0] as usize],
-                    edges: rim.vertices.len() as u64,
-                    perimeter: rim.perimeter(work),
-                    reason: reason.to_string(),
-                },
-            ));
+            closed.left.push(LoopLeft {
+                at: work.positions[rim.vertices[0] as usize],
+                edges: rim.vertices.len() as u64,
+                perimeter: rim.perimeter(work),
+                reason: reason.to_string(),
+            });
         }
         self.drop_idle_joints(work);
         closed
@@ -550,8 +545,8 @@ mod tests {
         for (profile, words) in [(few_edges, "3 edges"), (short, "longer"), (none, "fills no holes")] {
             let got = filled(&profile);
             assert_eq!((got.result.loops, got.result.left.len(), got.defects.boundary_edges), (0, 1, 4));
-            assert!(got.result.left[0].1.reason.contains(words), "{}", got.result.left[0].1.reason);
-            assert_eq!((got.result.left[0].1.edges, got.result.left[0].1.perimeter), (4, 4.0));
+            assert!(got.result.left[0].reason.contains(words), "{}", got.result.left[0].reason);
+            assert_eq!((got.result.left[0].edges, got.result.left[0].perimeter), (4, 4.0));
         }
     }
 
@@ -611,7 +606,7 @@ mod tests {
         let needle = cuboid([-0.1, -0.1, 5.0], [0.1, 0.1, 12.0]);
         let got = after(&[open_globe(), needle].concat(), |d, _| fill(d, &Profile::default()));
         assert_eq!((got.result.loops, got.result.left.len(), got.defects.boundary_loops), (0, 1, 1));
-        assert!(got.result.left[0].1.reason.contains("crosses the surface around"), "{}", got.result.left[0].1.reason);
+        assert!(got.result.left[0].reason.contains("crosses the surface around"), "{}", got.result.left[0].reason);
         assert_eq!(got.defects.self_intersections.as_ref().map(|si| si.triangles), Some(0));
     }
 
@@ -647,7 +642,7 @@ mod tests {
         let hole = |x: u8, y: u8| !((2..4).contains(&x) && (2..4).contains(&y));
         let got = after(&plate(6, hole), |d, _| fill(d, &Profile::default()));
         assert_eq!((got.result.loops, got.defects.boundary_edges), (1, 24), "the hole is none");
-        assert!(got.result.left[0].1.reason.contains("lone sheet"), "{}", got.result.left[0].1.reason);
+        assert!(got.result.left[0].reason.contains("lone sheet"), "{}", got.result.left[0].reason);
         // A relief encloses something. (Without the two corners that would lie in the plane of its rim.)
         let hill: Vec<Corners> = plate(6, |x, y| x.abs_diff(y) < 5)
             .iter()
@@ -660,7 +655,7 @@ mod tests {
     fn a_profile_leaves_a_kind_of_loop_open() {
         let profile = Profile { leave_open: vec![LoopClass::Simple], ..Profile::default() };
         let got = filled(&profile);
-        assert_eq!(got.result.left[0].1.reason, "the profile leaves simple loops open");
+        assert_eq!(got.result.left[0].reason, "the profile leaves simple loops open");
     }
 
     #[test]
@@ -688,7 +683,7 @@ mod tests {
                 skins.swap_remove(at.index(skins.len()));
             }
             let got = after(&skins, |d, _| fill(d, &Profile::default()));
-            let said: u64 = got.result.left.iter().map(|(_, left)| left.edges).sum();
+            let said: u64 = got.result.left.iter().map(|left| left.edges).sum();
             prop_assert_eq!((got.defects.boundary_edges, got.defects.nonmanifold_edges), (said, 0), "{:?}", got.result);
         }
     }

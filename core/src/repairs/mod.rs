@@ -94,15 +94,12 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
     let mut swallowed = Swallowed::default();
     log.time("swallowed", "", || {
         swallowed = swallowed::remove(survey, shop, &reversed, profile);
-        swallowed.bodies + swallowed.sheets
+        swallowed.bodies
     });
-    // The rims of sheets that went with it.
-    loops_left.retain(|(way, _)| way.windows(2).any(|v| shop.has_edge(v[0], v[1])));
-    let Swallowed { bodies, sheets, volume, patches } = &mut swallowed;
-    let note = format!("{bodies} bodies and {sheets} sheets in the material of others removed, of {volume:.4} units³ together");
+    let Swallowed { bodies, volume, patches } = &mut swallowed;
+    let note = format!("bodies in the material of others removed: {bodies}, of {volume:.4} units³ together");
     log.note("swallowed", note);
     reversed.dropped = std::mem::take(patches);
-    let loops_left = loops_left.into_iter().map(|(_, left)| left).collect();
     Repaired { reversed, repairs: log.repairs, loops: loops.unwrap_or_default(), loops_left, swallowed }
 }
 

@@ -2,9 +2,11 @@
 
 use super::work::Work;
 use crate::bodies;
+use crate::boxes::BoxTree;
 use crate::chunk::NONE;
 use crate::shop::Shop;
 use crate::shop::components::{Components, Reversed, Through};
+use crate::sums::Bounds;
 use crate::survey::Survey;
 
 /// Union-find with the parity of each node against its root.
@@ -153,8 +155,16 @@ fn inverted(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed:
     // What lies in fewer components is decided first.
     let mut order: Vec<u32> = (0..list.len() as u32).filter(|c| !list[*c as usize].open).collect();
     order.sort_by_key(|c| around[*c as usize].around.len());
+    // Whose wall a piece inside an open one is, nobody knows.
+    let open: Vec<Bounds> = list.iter().filter(|c| c.open).map(|c| c.bounds).collect();
+    let tree = BoxTree::new(&open);
+    let mut met = Vec::new();
     let mut inverted = vec![false; list.len()];
     for c in order {
+        tree.meeting(&list[c as usize].bounds, &mut met);
+        if met.iter().any(|o| open[*o as usize].contains(&list[c as usize].bounds)) {
+            continue;
+        }
         let outer = &around[c as usize].around;
         // The component directly around: itself inside most others.
         let direct = outer.iter().map(|o| o.0).max_by_key(|o| (around[*o as usize].around.len(), std::cmp::Reverse(*o)));
@@ -169,7 +179,7 @@ fn inverted(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed:
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{After, Corners, after, cube, cuboid, reversed};
+    use crate::testing::{After, Corners, after, cube, cuboid, plate, reversed};
 
     fn outward(triangles: &[Corners]) -> After<(u64, u64)> {
         after(triangles, |d, turned| make_outward(&d.survey, &mut Work::new(&mut d.shop), turned))
@@ -198,6 +208,16 @@ mod tests {
         let got = outward(&[reversed(&cuboid([0.0; 3], [3.0; 3])), reversed(&cuboid([1.0; 3], [2.0; 3]))].concat());
         assert_eq!((got.result, got.untouched), ((1, 12), 12));
         assert!(got.verdict.good && (got.defects.volume - 26.0).abs() < 1e-9, "{:?}", got.verdict);
+    }
+
+    #[test]
+    fn a_cavity_in_a_body_that_is_open_is_not_turned() {
+        let mut body = cuboid([0.0; 3], [3.0; 3]);
+        body.pop();
+        let got = outward(&[body, reversed(&cuboid([1.0; 3], [2.0; 3]))].concat());
+        assert_eq!((got.result, got.untouched), ((0, 0), 23));
+        let got = outward(&[plate(3, |_, _| true), reversed(&cuboid([1.0; 3], [2.0; 3]))].concat());
+        assert_eq!(got.result, (1, 12), "it is not in the sheet's box");
     }
 
     #[test]

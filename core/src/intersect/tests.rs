@@ -59,7 +59,8 @@ impl Mesh {
         }
         let Some(start) = after.keys().next().copied() else { return false };
         let (mut at, mut steps) = (start, 0);
-        while let Some(next) = after.get(&at) {
+        // It may run into a ring that does not hold the start.
+        while let Some(next) = after.get(&at).filter(|_| steps < after.len()) {
             (at, steps) = (*next, steps + 1);
             if at == start {
                 break;

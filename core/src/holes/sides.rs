@@ -25,6 +25,9 @@ const WIDER: f64 = 1.6;
 /// a shift of a seventh does, each way by chance.
 const UNEVEN: f64 = 0.42;
 
+/// A slit too wide for a gap is none of these below this: its sides are parallel.
+const EVEN: f64 = 0.1;
+
 /// What lies across a loop.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sides {
@@ -58,10 +61,17 @@ impl Sides {
             );
             return Some((LoopClass::Misaligned, rule));
         }
-        most(*near, *inner).then(|| {
+        if most(*near, *inner) {
             let rule =
                 format!("{near} of {inner} vertices lie within {share} of their edges of the other side, which runs alike");
-            (LoopClass::Gap, rule)
+            return Some((LoopClass::Gap, rule));
+        }
+        // Too wide for a gap.
+        (*unevenness > EVEN).then(|| {
+            let rule = format!(
+                "{across} of {inner} vertices lie within {width:.4} of the other side, only {near} within {share} of their edges; it does not run alike: {unevenness:.2}, above {EVEN}"
+            );
+            (LoopClass::Misaligned, rule)
         })
     }
 }

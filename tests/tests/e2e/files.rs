@@ -299,7 +299,7 @@ fn a_body_in_the_material_of_another_goes_unless_the_profile_keeps_it() {
     let stays: Vec<stl::Triangle> = hollow.chain(afloat).collect();
     let input = place.put("in.stl", &stl::mesh(&[stays.clone(), inside].concat()));
     for limits in [&["--chunk-triangles", "4"][..], &[]] {
-        let report = place.repair("in.stl", "out.stl", &[limits, &["--json", "--force"]].concat()).expect(0).report();
+        let report = place.repair("in.stl", "out.stl", &[limits, &["--force"]].concat()).expect(0).report();
         assert_eq!((&report["outcome"], &report["before"]["nested_positive"]), (&"repaired".into(), &1.into()), "{report}");
         assert_eq!((&report["after"]["bodies"], &report["after"]["cavities"]), (&2.into(), &1.into()));
         assert!(report["repairs"][0]["note"].as_str().unwrap().contains("of 1.0000 units³"), "{report}");
@@ -307,7 +307,7 @@ fn a_body_in_the_material_of_another_goes_unless_the_profile_keeps_it() {
     }
     place.put("keep.toml", b"bodies = \"keep\"\n");
     let profile = place.at("keep.toml");
-    let kept = place.repair("in.stl", "kept.stl", &["--json", "--profile", profile.to_str().unwrap()]).expect(0).report();
+    let kept = place.repair("in.stl", "kept.stl", &["--profile", profile.to_str().unwrap()]).expect(0).report();
     assert_eq!(kept["outcome"], "clean");
     assert_eq!(place.read("kept.stl"), std::fs::read(input).unwrap());
 }

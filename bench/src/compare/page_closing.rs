@@ -134,8 +134,8 @@ pub(super) fn files(book: &Book) -> String {
                 *Taken* is the largest distance from the input to the output, *added* from the output to the input, as shares of the \
                 diagonal; the latter is for the greater part a matter of how wide the holes are. These are means over the files that were \
                 written, the worst file in brackets.";
-    let head = "| | files | written | closed | closed and manifold | files with new pairs | new pairs | pairs gone | kept | taken | added |\n\
-                |---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
+    let head = "| | files | written | closed | closed, no new pair | closed and manifold | closed, manifold, no pair at all | files with new pairs | new pairs | pairs gone | kept | taken | added |\n\
+                |---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
     let left = format!(
         "Of the {} files that Suture left open, its report names at least one open loop, with the rule that kept it so, in {named}.",
         open.len()
@@ -145,6 +145,10 @@ pub(super) fn files(book: &Book) -> String {
 
 fn is_closed(line: &Closed) -> bool {
     line.after.is_some_and(|after| after.counts.closed())
+}
+
+fn is_manifold(line: &Closed) -> bool {
+    line.after.is_some_and(|after| after.counts.manifold())
 }
 
 fn row(side: Side, lines: &[&Closed]) -> Vec<String> {
@@ -161,7 +165,9 @@ fn row(side: Side, lines: &[&Closed]) -> Vec<String> {
         lines.len().to_string(),
         count(&|line| line.after.is_some()),
         count(&|line| is_closed(line)),
-        count(&|line| is_closed(line) && line.after.is_some_and(|after| after.counts.manifold())),
+        count(&|line| is_closed(line) && new(line) <= 0),
+        count(&|line| is_closed(line) && is_manifold(line)),
+        count(&|line| is_closed(line) && is_manifold(line) && pairs(line).is_some_and(|(_, after)| after == 0)),
         count(&|line| new(line) > 0),
         sum(1),
         sum(-1),
@@ -217,9 +223,9 @@ mod tests {
             seconds: 1.0,
             named_open: Some(0),
         };
-        let lines = [line(Some(found(0, 7)), 1.0), line(Some(found(0, 1)), 0.9), line(Some(found(2, 5)), 0.8), line(None, 0.0)];
+        let lines = [line(Some(found(0, 7)), 1.0), line(Some(found(0, 0)), 0.9), line(Some(found(2, 5)), 0.8), line(None, 0.0)];
         let row = row(Side::Suture, &lines.iter().collect::<Vec<_>>());
-        assert_eq!(row[1..8], ["4", "3", "2", "2", "1", "2", "4"]);
-        assert_eq!(row[8..], ["90.000 % (80.00 %)", "0.100 % (0.10 %)", "2.000 % (2.00 %)"]);
+        assert_eq!(row[1..10], ["4", "3", "2", "1", "2", "1", "1", "2", "5"]);
+        assert_eq!(row[10..], ["90.000 % (80.00 %)", "0.100 % (0.10 %)", "2.000 % (2.00 %)"]);
     }
 }

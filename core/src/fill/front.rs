@@ -13,9 +13,9 @@ use glam::DVec3;
 use super::boxes::{Box3, Boxes, around, join};
 use super::clear::Clearance;
 use super::cross::{Triangle, segment_pierces, triangles_cross};
+use super::directed_area;
 use super::exact::{Point, at};
 use super::minweight::{self, Choice, Weight};
-use super::planar::directed_area;
 use super::{Rim, Unfillable};
 
 /// Which ear comes first.

@@ -29,6 +29,7 @@ use flips::Flips;
 use front::Order;
 use glam::DVec3;
 use minweight::{Choice, Weight};
+pub(crate) use planar::directed_area;
 use tree::{SelfCrossing, self_crossing};
 
 /// A boundary loop and what its patch must respect.

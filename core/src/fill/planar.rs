@@ -15,7 +15,7 @@ use super::exact::{Point, at, turn};
 use super::flips::Flips;
 
 /// A loop's directed area: half of Σ pᵢ × pᵢ₊₁, taken about the first vertex.
-pub(super) fn directed_area(points: &[Point]) -> DVec3 {
+pub(crate) fn directed_area(points: &[Point]) -> DVec3 {
     let Some(origin) = points.first().map(at) else { return DVec3::ZERO };
     points.windows(2).map(|w| (at(&w[0]) - origin).cross(at(&w[1]) - origin) * 0.5).sum()
 }

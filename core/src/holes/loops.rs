@@ -4,8 +4,6 @@
 //! goes on to the fan that lies across the hole, so that filling joins all fans into one. A way that comes back to a vertex is
 //! cut there into simple loops. A hole that reaches an edge where other surface meets goes on along that edge.
 
-use glam::DVec3;
-
 use crate::chunk;
 use crate::fill::exact::Point;
 use crate::shop::edges::{Edge, Edges, Use};
@@ -38,13 +36,6 @@ impl Loop {
             apex.map(|v| shop.positions[v as usize])
         };
         (0..n).map(apex).collect()
-    }
-
-    /// Its area as a vector (Newell's): the normal of a flat patch, times its area.
-    pub(crate) fn vector_area(&self, shop: &Shop) -> DVec3 {
-        let origin = shop.place(self.vertices[0]);
-        let way = self.vertices.windows(2).map(|w| (shop.place(w[0]) - origin).cross(shop.place(w[1]) - origin));
-        way.sum::<DVec3>() * 0.5
     }
 
     /// This loop with another one put in where they meet; `None` if they do not. What comes of it is in one vertex twice.

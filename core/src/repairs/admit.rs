@@ -9,6 +9,7 @@ use glam::DVec3;
 use super::work::Work;
 use crate::chunk::NONE;
 use crate::holes::{self, Shapes, loops::Loop};
+use crate::report::LoopClass;
 use crate::settings::Profile;
 use crate::shop::Shop;
 use crate::shop::components::{Components, Reversed, Through};
@@ -63,9 +64,8 @@ impl<'p> Admission<'p> {
         let longest = if profile.max_hole_perimeter_mm > 0.0 { by_share.min(profile.max_hole_perimeter_mm) } else { by_share };
         let mut refused = Vec::new();
         if !profile.leave_open.is_empty() {
-            let classes = holes::classify(shop, edges, loops, tolerance, profile.gap_edge_share);
-            let left = loops.iter().zip(classes).filter(|(_, found)| profile.leave_open.contains(&found.class));
-            refused.extend(left.map(|(rim, found)| (rim.vertices[0], NotAdmitted::Class(found.class.name()))));
+            let left = left_open(shop, edges, loops, tolerance, profile);
+            refused.extend(left.map(|(rim, class)| (rim.vertices[0], NotAdmitted::Class(class.name()))));
         }
         if !profile.close_sheets && profile.fill_holes {
             refused.extend(sheet_rims(survey, shop, edges, loops, shapes, reversed).map(|v| (v, NotAdmitted::Sheet)));
@@ -114,6 +114,18 @@ impl<'p> Admission<'p> {
         let at = self.refused.binary_search_by_key(&rim.vertices[0], |(v, _)| *v).ok()?;
         Some(&self.refused[at].1)
     }
+}
+
+/// Loops of kinds that the profile leaves open.
+pub(super) fn left_open<'l>(
+    shop: &Shop,
+    edges: &Edges,
+    loops: &'l [Loop],
+    tolerance: &Tolerance,
+    profile: &Profile,
+) -> impl Iterator<Item = (&'l Loop, LoopClass)> {
+    let classes = holes::classify(shop, edges, loops, tolerance, profile.gap_edge_share).map(|found| found.class);
+    loops.iter().zip(classes).filter(|(_, class)| profile.leave_open.contains(class))
 }
 
 /// First vertices of the loops that are rims of lone sheets.

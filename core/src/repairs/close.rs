@@ -121,14 +121,14 @@ pub(super) fn fill_loops(
     }
     let mut closed = closing.finish(work);
     for chain in chains.iter().take(LISTED.saturating_sub(closed.left.len())) {
-        closed.left.push(LoopLeft {
-            at: work.positions[chain[0] as usize],
-            edges: chain.len() as u64 - 1,
-            perimeter: chain.windows(2).map(|w| work.distance(w[0], w[1])).sum(),
-            reason: NO_LOOP.into(),
-        });
+        let length = chain.windows(2).map(|w| work.distance(w[0], w[1])).sum();
+        closed.left.push(left(work, chain[0], chain.len() - 1, length, &NO_LOOP));
     }
     closed
+}
+
+fn left(shop: &Shop, from: Vertex, edges: usize, perimeter: f64, reason: &dyn std::fmt::Display) -> LoopLeft {
+    LoopLeft { at: shop.positions[from as usize], edges: edges as u64, perimeter, reason: reason.to_string() }
 }
 
 /// Why a chain of boundary edges stays open.
@@ -388,12 +388,7 @@ impl Closing<'_> {
         self.open.sort_by_key(|(rim, _)| *rim);
         for (rim, reason) in self.open.iter().take(LISTED) {
             let rim = self.rim(*rim);
-            closed.left.push(LoopLeft {
-                at: work.positions[rim.vertices[0] as usize],
-                edges: rim.vertices.len() as u64,
-                perimeter: rim.perimeter(work),
-                reason: reason.to_string(),
-            });
+            closed.left.push(left(work, rim.vertices[0], rim.vertices.len(), rim.perimeter(work), reason));
         }
         self.drop_idle_joints(work);
         closed

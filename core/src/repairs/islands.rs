@@ -72,7 +72,7 @@ pub(super) fn touching(shop: &Shop, rims: &[Loop]) -> Vec<(Vec<usize>, Loop)> {
     of_way.sort_by_key(|i| rims[*i].way);
     let mut groups = Vec::new();
     for same in of_way.chunk_by(|a, b| rims[*a].way == rims[*b].way).filter(|same| (2..=MAX_TOUCHING).contains(&same.len())) {
-        let mut areas: Vec<(DVec3, usize)> = same.iter().map(|i| (rims[*i].vector_area(shop), *i)).collect();
+        let mut areas: Vec<(DVec3, usize)> = same.iter().map(|i| (fill::directed_area(&rims[*i].points(shop)), *i)).collect();
         areas.sort_by(|a, b| b.0.length().total_cmp(&a.0.length()).then(a.1.cmp(&b.1)));
         let (of_hole, hole) = areas[0];
         let mut left: Vec<usize> = areas[1..].iter().filter(|(area, _)| area.dot(of_hole) < 0.0).map(|(_, i)| *i).collect();

@@ -90,10 +90,18 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
         closed.loops
     });
     log.note("fill", methods);
-    log.time("outward", "components that were inside out", || orient::make_outward(survey, shop, &mut reversed).0);
+    let mut pieces = None;
+    log.time("outward", "components that were inside out", || {
+        let found = orient::pieces(survey, shop, &reversed);
+        let turned = orient::make_outward(survey, shop, &mut reversed, &found).0;
+        // Of what was turned, the volume is another now.
+        pieces = (turned == 0).then_some(found);
+        turned
+    });
     let mut swallowed = Swallowed::default();
     log.time("swallowed", "", || {
-        swallowed = swallowed::remove(survey, shop, &reversed, profile);
+        let pieces = pieces.unwrap_or_else(|| orient::pieces(survey, shop, &reversed));
+        swallowed = swallowed::remove(survey, shop, &reversed, &pieces, profile);
         swallowed.bodies
     });
     let Swallowed { bodies, volume, patches } = &mut swallowed;

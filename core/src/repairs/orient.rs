@@ -111,14 +111,18 @@ fn turn(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed, node:
     }
 }
 
-/// Turns closed components inside out where they enclose negative volume and are no cavity; returns (components, triangles).
-pub(super) fn make_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed) -> (u64, u64) {
-    let components = pieces(survey, work, reversed);
+/// Turns closed ones of all [`pieces`] inside out where they enclose negative volume and are no cavity; returns (pieces, triangles).
+pub(super) fn make_outward(
+    survey: &Survey<'_>,
+    work: &mut Work<'_>,
+    reversed: &mut Reversed,
+    components: &Components,
+) -> (u64, u64) {
     let shop: &Shop = work;
     if components.list.iter().all(|c| c.open || c.extent.volume >= 0) {
         return (0, 0);
     }
-    let inverted = inverted(survey, shop, &components, reversed);
+    let inverted = inverted(survey, shop, components, reversed);
     let (mut count, mut triangles) = (0, 0);
     for (component, _) in components.list.iter().zip(&inverted).filter(|(_, i)| **i) {
         count += 1;
@@ -182,7 +186,11 @@ mod tests {
     use crate::testing::{After, Corners, after, cube, cuboid, plate, reversed};
 
     fn outward(triangles: &[Corners]) -> After<(u64, u64)> {
-        after(triangles, |d, turned| make_outward(&d.survey, &mut Work::new(&mut d.shop), turned))
+        after(triangles, |d, turned| {
+            let work = &mut Work::new(&mut d.shop);
+            let pieces = pieces(&d.survey, work, turned);
+            make_outward(&d.survey, work, turned, &pieces)
+        })
     }
 
     #[test]

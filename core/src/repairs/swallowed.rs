@@ -10,7 +10,6 @@
 //! might be the wall of a cavity. A sheet in the material of a body stays: it may be the floor of a hole whose walls lack.
 
 use super::guard::components_of_records;
-use super::orient;
 use super::work::Work;
 use crate::bodies;
 use crate::boxes::BoxTree;
@@ -34,19 +33,25 @@ pub(crate) struct Swallowed {
 
 /// Removes what lies in the material of others and crosses nothing. Nothing is removed if it is not known what crosses what. Reads the
 /// chunks where pieces lie inside others' boxes.
-pub(super) fn remove(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reversed, profile: &Profile) -> Swallowed {
+/// `pieces`: as [`super::orient::pieces`] finds them.
+pub(super) fn remove(
+    survey: &Survey<'_>,
+    work: &mut Work<'_>,
+    reversed: &Reversed,
+    pieces: &Components,
+    profile: &Profile,
+) -> Swallowed {
     let mut swallowed = Swallowed::default();
     let Some(crossing_pairs) = survey.crossing_pairs.as_deref().filter(|_| profile.bodies == Bodies::Union) else {
         return swallowed;
     };
-    let pieces = orient::pieces(survey, work, reversed);
     let shop: &Shop = work;
-    let around = bodies::surroundings(survey, shop, &pieces, reversed, |piece| !piece.open);
+    let around = bodies::surroundings(survey, shop, pieces, reversed, |piece| !piece.open);
     if around.iter().all(|a| a.winding() < 1) {
         return swallowed;
     }
-    let crossing = crossing(survey, shop, &pieces, crossing_pairs.iter().map(|pair| pair.triangles));
-    let is_as_read = are_as_read(survey, shop, &pieces, reversed);
+    let crossing = crossing(survey, shop, pieces, crossing_pairs.iter().map(|pair| pair.triangles));
+    let is_as_read = are_as_read(survey, shop, pieces, reversed);
     let open: Vec<Bounds> = pieces.list.iter().filter(|piece| piece.open).map(|piece| piece.bounds).collect();
     let open = BoxTree::new(&open);
     let mut met = Vec::new();
@@ -126,7 +131,7 @@ fn crossing(survey: &Survey<'_>, shop: &Shop, pieces: &Components, pairs: impl I
 
 #[cfg(test)]
 mod tests {
-    use super::super::close;
+    use super::super::{close, orient};
     use super::*;
     use crate::testing::{After, Corners, after, cuboid, plate, reversed, shifted};
 
@@ -140,8 +145,10 @@ mod tests {
             let work = &mut Work::new(&mut d.shop);
             orient::make_coherent(&d.survey, work, turned);
             close::fill_loops(&d.survey, work, turned, &d.tolerance, &profile, 1);
-            orient::make_outward(&d.survey, work, turned);
-            let Swallowed { bodies, volume, patches } = remove(&d.survey, work, turned, &profile);
+            let pieces = orient::pieces(&d.survey, work, turned);
+            orient::make_outward(&d.survey, work, turned, &pieces);
+            let pieces = orient::pieces(&d.survey, work, turned);
+            let Swallowed { bodies, volume, patches } = remove(&d.survey, work, turned, &pieces, &profile);
             turned.dropped = patches;
             (bodies, volume)
         })

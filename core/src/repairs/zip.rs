@@ -9,9 +9,10 @@ use std::collections::BTreeSet;
 
 use glam::DVec3;
 
+use super::admit;
 use super::work::Work;
 use crate::chunk;
-use crate::holes::{self, loops};
+use crate::holes::loops;
 use crate::settings::Profile;
 use crate::shop::edges::{Edge, Edges};
 use crate::shop::near::Tolerance;
@@ -72,8 +73,7 @@ fn left_open(shop: &Shop, edges: &Edges, tolerance: &Tolerance, profile: &Profil
         return Vec::new();
     }
     let rims = loops::find(shop, edges);
-    let classes = holes::classify(shop, edges, &rims, tolerance, profile.gap_edge_share);
-    let left = rims.iter().zip(classes).filter(|(_, found)| profile.leave_open.contains(&found.class));
+    let left = admit::left_open(shop, edges, &rims, tolerance, profile);
     let mut vertices: Vec<Vertex> = left.flat_map(|(rim, _)| rim.vertices.iter().copied()).collect();
     vertices.sort_unstable();
     vertices.dedup();

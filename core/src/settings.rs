@@ -52,6 +52,10 @@ pub struct Profile {
     pub debris_area_share: f64,
     /// What becomes of bodies inside others.
     pub bodies: Bodies,
+    /// Take surfaces apart that share an edge or a vertex, so that each has positions of its own.
+    pub separate: bool,
+    /// How far a vertex may move for that, as a fraction of the diagonal; four steps of single precision are always allowed.
+    pub max_separation_relative: f64,
     /// Look for triangles that cross or overlap each other, in the input and in the output; without, the verdict calls it unchecked.
     pub check_self_intersections: bool,
 }
@@ -101,6 +105,8 @@ impl Default for Profile {
             debris_triangles: 4,
             debris_area_share: 1e-3,
             bodies: Bodies::Union,
+            separate: true,
+            max_separation_relative: 1e-4,
             check_self_intersections: true,
         }
     }

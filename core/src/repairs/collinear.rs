@@ -4,7 +4,6 @@
 //! that vertex, which closes the surface without moving anything; dropping the triangle alone would open it.
 
 use super::work::{Pass, Work};
-use crate::shop::Origin;
 
 /// Removes collinear triangles; returns how many.
 pub(super) fn remove(shop: &mut Work<'_>) -> u64 {
@@ -63,13 +62,9 @@ pub(super) fn split(shop: &mut Work<'_>, t: u32, ends: [u32; 2], at: &[u32]) {
         return;
     }
     shop.kill(t);
-    let origin = match triangle.origin {
-        Origin::Input(record) | Origin::Part(record) => Origin::Part(record),
-        Origin::Patch => Origin::Patch,
-    };
     let mut last = from;
     for next in stops.into_iter().chain([to]) {
-        shop.add([apex, last, next], origin, triangle.patch);
+        shop.add([apex, last, next], triangle.origin.of_part(), triangle.patch);
         last = next;
     }
 }

@@ -36,24 +36,7 @@ pub(super) fn crossed(
     records.checked_add(shop.triangles.len() as u32)?;
     let patch = |t: u32| patch_of[t as usize];
     let fresh = |t: &u32| patch(*t).is_some_and(&is_new);
-    let (mut gone, mut changed) = (Vec::new(), Vec::new());
-    for t in 0..shop.triangles.len() as u32 {
-        let (triangle, lives) = (&shop.triangles[t as usize], shop.lives(t));
-        let stays = match triangle.origin {
-            Origin::Input(place) => {
-                let stays = lives && same_corners(record::corners(&survey.records[place as usize]), shop.points(t));
-                if !stays {
-                    gone.push(place);
-                }
-                stays
-            }
-            Origin::Part(_) | Origin::Patch => false,
-        };
-        if lives && !stays {
-            changed.push(t);
-        }
-    }
-    gone.sort_unstable();
+    let Changes { gone, living: changed } = changes(survey, shop);
     let numbered = |t: &u32| (records + t, shop.points(*t));
     let pairs = fresh::met_by(
         survey,
@@ -112,6 +95,37 @@ pub(super) fn crossed(
         }
     }
     Some(crossed)
+}
+
+/// What of the file is no longer there as it was, and what is there instead.
+pub(super) struct Changes {
+    /// Records, ascending.
+    pub(super) gone: Vec<u32>,
+    /// Triangles of the workshop.
+    pub(super) living: Vec<u32>,
+}
+
+/// Triangles that were only turned have not changed. O(workshop log workshop).
+pub(super) fn changes(survey: &Survey<'_>, shop: &Shop) -> Changes {
+    let mut changes = Changes { gone: Vec::new(), living: Vec::new() };
+    for t in 0..shop.triangles.len() as u32 {
+        let (triangle, lives) = (&shop.triangles[t as usize], shop.lives(t));
+        let stays = match triangle.origin {
+            Origin::Input(place) => {
+                let stays = lives && same_corners(record::corners(&survey.records[place as usize]), shop.points(t));
+                if !stays {
+                    changes.gone.push(place);
+                }
+                stays
+            }
+            Origin::Part(_) | Origin::Patch => false,
+        };
+        if lives && !stays {
+            changes.living.push(t);
+        }
+    }
+    changes.gone.sort_unstable();
+    changes
 }
 
 /// The components of some records that are as they were. Reads the chunks where those are that are not in the workshop.

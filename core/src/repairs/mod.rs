@@ -5,6 +5,7 @@
 
 mod admit;
 mod annular;
+mod apart;
 mod close;
 mod collinear;
 mod debris;
@@ -107,6 +108,12 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
     let Swallowed { bodies, volume, patches } = &mut swallowed;
     let note = format!("bodies in the material of others removed: {bodies}, of {volume:.4} units³ together");
     log.note("swallowed", note);
+    let mut separated = apart::Separated::default();
+    log.time("separated", "", || {
+        separated = apart::separate(survey, shop, profile);
+        separated.vertices + separated.edges
+    });
+    log.note("separated", separated.to_string());
     reversed.dropped = std::mem::take(patches);
     Repaired { reversed, repairs: log.repairs, loops: loops.unwrap_or_default(), loops_left, swallowed }
 }

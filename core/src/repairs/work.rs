@@ -106,6 +106,13 @@ impl<'a> Work<'a> {
         }
     }
 
+    /// Lets one corner of a triangle be another vertex. Star lists are as they were until [`Self::relink`].
+    pub(super) fn assign(&mut self, t: u32, corner: usize, v: Vertex) {
+        self.edges = None;
+        self.shop.triangles[t as usize].v[corner] = v;
+        self.changed.push(t);
+    }
+
     pub(super) fn relink(&mut self) {
         self.shop.relink();
     }

@@ -7,6 +7,7 @@
 pub(crate) mod components;
 pub(crate) mod edges;
 pub(crate) mod near;
+pub(crate) mod wedges;
 
 use std::collections::HashMap;
 
@@ -29,6 +30,16 @@ pub(crate) enum Origin {
     Part(u32),
     /// Closes a hole.
     Patch,
+}
+
+impl Origin {
+    /// Where a part of the triangle comes from.
+    pub(crate) fn of_part(self) -> Self {
+        match self {
+            Self::Input(record) | Self::Part(record) => Self::Part(record),
+            Self::Patch => Self::Patch,
+        }
+    }
 }
 
 /// A triangle of the workshop.

@@ -135,13 +135,12 @@ each_case_ends_good! {
     islands: Islands,
 }
 
-/// Bodies that touch in a vertex are reported; to part them is a later version's work.
+/// Bodies that touch in a vertex are taken apart, unless the profile wants them as they are.
 #[test]
-fn touching_bodies_are_reported() {
+fn touching_bodies_are_taken_apart() {
     let (report, judged) = repaired(Case::Touching, 6_000, 1);
-    assert!(judged.counts.closed() && judged.counts.oriented() && !judged.counts.manifold());
-    assert_eq!(report["outcome"], "not_good");
-    assert_eq!(report["verdict"]["manifold"], false);
-    let reasons = report["verdict"]["reasons"].to_string();
-    assert!(reasons.contains("non-manifold vertices"), "{reasons}");
+    assert!(judged.sound(), "{judged:?}");
+    assert_eq!(report["outcome"], "repaired");
+    let repairs = report["repairs"].as_array().unwrap();
+    assert!(repairs.iter().any(|repair| repair["name"] == "separated" && repair["count"].as_u64() > Some(0)), "{repairs:?}");
 }

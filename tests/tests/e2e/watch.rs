@@ -32,14 +32,27 @@ fn meshes(names: &[String]) -> Vec<&str> {
     names.iter().map(String::as_str).filter(|name| !name.ends_with(".json")).collect()
 }
 
+/// A square, which can be no body.
+fn lone_sheet() -> Vec<u8> {
+    let corners: [[f32; 3]; 6] =
+        [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+    let mut bytes = [&[0; 80][..], &2_u32.to_le_bytes()].concat();
+    for triangle in corners.chunks_exact(3) {
+        bytes.extend([0; 12]);
+        bytes.extend(triangle.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
 #[test]
 fn each_file_ends_in_its_place() {
     let place = Place::new();
-    let (clean, holes, touching) = (mesh(Case::Clean, 1), mesh(Case::Holes, 1), mesh(Case::Touching, 1));
+    let (clean, holes, sheet) = (mesh(Case::Clean, 1), mesh(Case::Holes, 1), lone_sheet());
     place.put("hot/in/clean.stl", &clean);
     place.put("hot/in/holes.STL", &holes);
     place.put("hot/in/scan/holes.stl", &holes);
-    place.put("hot/in/touching.stl", &touching);
+    place.put("hot/in/sheet.stl", &sheet);
     place.put("hot/in/picture.stl", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR");
     let left = ["copying.stl.part", "download.stl.crdownload", "x.tmp", ".hidden.stl", "~$part.stl", "notes.txt", "part.obj"];
     for name in left {
@@ -56,15 +69,15 @@ fn each_file_ends_in_its_place() {
 
     let failed = place.names("hot/failed");
     assert!(
-        ["picture.stl", "picture.stl.report.json", "touching.stl", "touching.stl.report.json"]
+        ["picture.stl", "picture.stl.report.json", "sheet.stl", "sheet.stl.report.json"]
             .iter()
             .all(|name| failed.iter().any(|there| there == name)),
         "{failed:?}"
     );
-    assert_eq!(place.read("hot/failed/touching.stl"), touching);
-    assert!(failed.iter().any(|name| name.starts_with("touching") && name.contains("best")), "the best attempt: {failed:?}");
-    let report: Value = serde_json::from_slice(&place.read("hot/failed/touching.stl.report.json")).unwrap();
-    assert_eq!((&report["outcome"], &report["verdict"]["manifold"]), (&"not_good".into(), &false.into()));
+    assert_eq!(place.read("hot/failed/sheet.stl"), sheet);
+    assert!(failed.iter().any(|name| name.starts_with("sheet") && name.contains("best")), "the best attempt: {failed:?}");
+    let report: Value = serde_json::from_slice(&place.read("hot/failed/sheet.stl.report.json")).unwrap();
+    assert_eq!((&report["outcome"], &report["verdict"]["closed"]), (&"not_good".into(), &false.into()));
     let report: Value = serde_json::from_slice(&place.read("hot/failed/picture.stl.report.json")).unwrap();
     assert!(report["reason"].as_str().unwrap().contains("PNG"), "{report}");
     assert!(place.names("hot/quarantine").is_empty());
@@ -81,7 +94,7 @@ fn each_file_ends_in_its_place() {
         ("part.obj", "noticed"),
         ("picture.stl", "failed"),
         ("scan/holes.stl", "done"),
-        ("touching.stl", "failed"),
+        ("sheet.stl", "failed"),
     ];
     assert_eq!(kinds, expected.map(|(name, kind)| (name.to_owned(), kind.to_owned())));
     assert_eq!(ran.stderr().matches("part.obj").count(), 1, "named once: {}", ran.stderr());

@@ -1,0 +1,636 @@
+//! Surfaces that share an edge or a vertex, taken apart: what is read again is welded by position, so that each needs positions of its own.
+//!
+//! The triangles of an edge are paired by wedges of material ([`Wedges`]), so that the star of a vertex falls into fans, each the skin of one
+//! surface there. All fans of a vertex but one get a copy of it, as near as single precision and validity allow, first into their own material:
+//! along a chain of edges that two bodies share, one of them draws back. Where the two wedges of an edge have the same fans at both of its
+//! ends (a bridge that narrows to an edge and widens again), one of them gets a vertex in the middle of the edge, which draws back alone.
+//!
+//! A copy's place is valid if none of its triangles loses its area or comes to meet another one more than before, touching included. That is
+//! tested exactly, for the triangles around while places are tried, and for everything else once all copies have theirs; those that meet
+//! anything are tried anew from their next place on. Vertices with an edge that is open, incoherent or lies between triangles in one direction
+//! are left alone.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::fmt;
+
+use glam::DVec3;
+
+use super::guard::{self, Changes};
+use super::work::Work;
+use crate::chunk::{self, NONE};
+use crate::fill::cross::{Contact, Triangle as Corners, triangles_cross};
+use crate::fill::exact::{Point, at};
+use crate::settings::Profile;
+use crate::shop::components::nonmanifold_vertices;
+use crate::shop::edges::Edge;
+use crate::shop::wedges::{Half, Wedges};
+use crate::shop::{Shop, Triangle, Vertex};
+use crate::survey::Survey;
+use crate::{fresh, record};
+
+/// A copy moves by no more than this share of the shortest edge at it, so that no triangle comes near to turning over.
+const EDGE_SHARE: f64 = 0.125;
+
+/// A copy may always move by so many steps of the largest coordinate there, however small the profile's bound: what is far from the origin has
+/// no finer ones.
+const LEAST_STEPS: f64 = 4.0;
+
+/// How often copies that meet something are tried from their next place on, and then how often such are given up.
+const TRIED: usize = 6;
+const GIVEN_UP: usize = 6;
+
+/// Rounds of opening edges: a triangle with several such edges is divided at one of them in each.
+const OPENINGS: usize = 8;
+
+/// Pairs of triangles that may have to be compared for one place of a copy. A fan of more is left alone.
+const MOST_PAIRS: usize = 1 << 20;
+
+/// What was taken apart.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Separated {
+    /// Fans that got a copy of their vertex.
+    pub(super) vertices: u64,
+    /// Edges that got a vertex in their middle, for one wedge of theirs.
+    pub(super) edges: u64,
+    /// Vertices that still have several fans, or an edge of more than two triangles.
+    pub(super) left: u64,
+    /// How far a copy is from where it was made.
+    pub(super) farthest: f64,
+}
+
+impl fmt::Display for Separated {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { vertices, edges, left, farthest } = self;
+        write!(
+            f,
+            "surfaces that met given a vertex of their own: {vertices} at vertices, {edges} on edges, moved by at most {farthest:e}"
+        )?;
+        if *left > 0 {
+            write!(f, "; vertices where surfaces still meet: {left}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Takes surfaces apart at all vertices where that is possible. O(workshop) and a look at all boxes around what moves, if anything does.
+pub(super) fn separate(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile) -> Separated {
+    let (shop, edges) = work.edges();
+    let vertices = if profile.separate { nonmanifold_vertices(shop, edges) } else { Vec::new() };
+    if vertices.is_empty() {
+        return Separated::default();
+    }
+    let before = Before {
+        triangles: shop.triangles.clone(),
+        taken: shop.positions.iter().map(bits).collect(),
+        farthest: profile.max_separation_relative * survey.bounds.diagonal(),
+    };
+    let mut from = BTreeMap::new();
+    for round in 0..TRIED + GIVEN_UP {
+        let mut apart = Apart::new(work, &before, &from);
+        apart.part_vertices(survey, &vertices);
+        apart.open_edges();
+        let Some(blamed) = apart.blamed(survey) else { break };
+        let copies = std::mem::take(&mut apart.copies);
+        if blamed.is_empty() {
+            let (shop, edges) = work.edges();
+            let mut done = Separated { left: nonmanifold_vertices(shop, edges).len() as u64, ..Separated::default() };
+            for copy in copies {
+                *if copy.of.is_edge() { &mut done.edges } else { &mut done.vertices } += 1;
+                done.farthest = done.farthest.max(copy.away);
+            }
+            return done;
+        }
+        tracing::debug!(round, copies = blamed.len(), "Copies of vertices meet something.");
+        for copy in blamed {
+            let Copy { of, place, .. } = copies[copy];
+            from.insert(of, if round < TRIED { place + 1 } else { usize::MAX });
+        }
+        work.restore(&before.triangles);
+    }
+    work.restore(&before.triangles);
+    Separated { left: vertices.len() as u64, ..Separated::default() }
+}
+
+/// The workshop as it was.
+struct Before {
+    triangles: Vec<Triangle>,
+    /// Positions of its vertices.
+    taken: HashSet<[u32; 3]>,
+    /// How far the profile lets a copy go.
+    farthest: f64,
+}
+
+/// What a copy is made of, by numbers from before, so that they mean the same whatever else is copied: a vertex (twice) with the first triangle of
+/// a fan, or the ends of an edge with the two triangles of a wedge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Of {
+    ends: [Vertex; 2],
+    triangles: [u32; 2],
+}
+
+impl Of {
+    fn is_edge(&self) -> bool {
+        self.ends[0] != self.ends[1]
+    }
+}
+
+/// A new vertex.
+#[derive(Clone, Copy)]
+struct Copy {
+    of: Of,
+    /// Which of the places that were tried it has.
+    place: usize,
+    away: f64,
+}
+
+/// One way of taking everything apart.
+struct Apart<'w, 's, 'b> {
+    work: &'w mut Work<'s>,
+    before: &'b Before,
+    /// The first place to try for a copy, where it is not the first of all.
+    from: &'b BTreeMap<Of, usize>,
+    /// By number of the vertex, less `first`.
+    copies: Vec<Copy>,
+    first: Vertex,
+    /// Positions of the copies.
+    taken: HashSet<[u32; 3]>,
+    /// For each vertex from before its copies.
+    family: HashMap<Vertex, Vec<Vertex>>,
+    /// For each triangle that was added the one from before of which it is a part.
+    whole: Vec<u32>,
+}
+
+/// A triangle with a copy for a corner, and the triangle from before of which it is a part.
+type Moved = (u32, Corners);
+
+impl<'w, 's, 'b> Apart<'w, 's, 'b> {
+    fn new(work: &'w mut Work<'s>, before: &'b Before, from: &'b BTreeMap<Of, usize>) -> Self {
+        let first = work.positions.len() as Vertex;
+        let (taken, family) = (HashSet::new(), HashMap::new());
+        Self { work, before, from, copies: Vec::new(), first, taken, family, whole: Vec::new() }
+    }
+
+    /// Gives every fan of each of these vertices but one a vertex of its own, if there is a place for it. What stays is the surface that comes first
+    /// in the file, so that along an edge it is the same at both ends.
+    fn part_vertices(&mut self, survey: &Survey<'_>, vertices: &[Vertex]) {
+        let (shop, edges) = self.work.edges();
+        let wedges = Wedges::of(shop, edges);
+        let surfaces = surfaces(survey, shop, &wedges);
+        for v in vertices {
+            let Some(mut fans) = wedges.fans(self.work, *v) else { continue };
+            let rank = |fan: &Vec<Half>| {
+                fan.iter().map(|h| (surfaces[h.triangle as usize], self.work.record(h.triangle), h.triangle)).min()
+            };
+            fans.sort_by_cached_key(rank);
+            let mut there = fans.len();
+            for fan in fans.iter().skip(1).chain(fans.first()) {
+                if there > 1 && self.part(*v, fan) {
+                    there -= 1;
+                }
+            }
+        }
+        self.work.relink();
+    }
+
+    /// Gives a fan of `v` a vertex of its own; `false` if there is no place for it. Star lists stay as they were.
+    fn part(&mut self, v: Vertex, fan: &[Half]) -> bool {
+        let shop: &Shop = self.work;
+        let first = fan.iter().map(|h| h.triangle).min().unwrap_or(NONE);
+        let of = Of { ends: [v; 2], triangles: [first, NONE] };
+        let corners: Vec<Vertex> = fan.iter().flat_map(|h| shop.triangles[h.triangle as usize].v).collect();
+        let own: Vec<u32> = fan.iter().map(|h| h.triangle).collect();
+        let moved = |p: Point| -> Vec<Moved> {
+            let one = |h: &Half| {
+                let mut corners = shop.points(h.triangle);
+                corners[h.corner] = p;
+                (h.triangle, corners)
+            };
+            fan.iter().map(one).collect()
+        };
+        let Some((copy, position)) = self.place(of, shop.place(v), &corners, &own, moved) else { return false };
+        let new = self.add(copy, position);
+        self.family.entry(v).or_default().push(new);
+        fan.iter().for_each(|h| self.work.assign(h.triangle, h.corner, new));
+        true
+    }
+
+    /// Gives every wedge but one of each edge that still has several a vertex of its own in the middle, if there is a place for it.
+    fn open_edges(&mut self) {
+        for _ in 0..OPENINGS {
+            let crowded = self.crowded_edges();
+            let (mut again, made) = (false, self.copies.len());
+            for (ends, wedges) in crowded {
+                // Divided along another edge: its triangles are others now.
+                if wedges.iter().flatten().any(|h| !self.work.lives(h.triangle)) {
+                    again = true;
+                    continue;
+                }
+                let mut there = wedges.len();
+                for wedge in wedges.iter().skip(1).chain(wedges.first()) {
+                    if there > 1 && self.open(ends, wedge) {
+                        there -= 1;
+                    }
+                }
+            }
+            if !again || self.copies.len() == made {
+                return;
+            }
+        }
+    }
+
+    /// The edges of more than two triangles between vertices all of whose fans are closed, with their wedges in the file's order.
+    fn crowded_edges(&mut self) -> Vec<([Vertex; 2], Vec<[Half; 2]>)> {
+        let (shop, edges) = self.work.edges();
+        if !edges.any_nonmanifold() {
+            return Vec::new();
+        }
+        let wedges = Wedges::of(shop, edges);
+        let crowded =
+            edges.iter().filter(|e| e.is_nonmanifold() && [e.low, e.high].iter().all(|v| wedges.fans(shop, *v).is_some()));
+        let in_order = |edge: Edge<'_>| {
+            let forward = edge.uses.iter().filter(|u| u.forward);
+            let mut pairs: Vec<[Half; 2]> = forward
+                .filter_map(|u| {
+                    let half = Half::of(shop, &edge, u);
+                    Some([half, wedges.mate(half)?])
+                })
+                .collect();
+            pairs.sort_by_key(|pair| pair.map(|h| (shop.record(h.triangle), h.triangle)).into_iter().min());
+            ([edge.low, edge.high], pairs)
+        };
+        crowded.map(in_order).collect()
+    }
+
+    /// Divides the two triangles of a wedge at a new vertex; `false` if there is no place for it.
+    fn open(&mut self, ends: [Vertex; 2], wedge: &[Half; 2]) -> bool {
+        let shop: &Shop = self.work;
+        let mut wholes = wedge.map(|h| self.whole(h.triangle));
+        wholes.sort_unstable();
+        let mut from = ends.map(|v| self.original(v));
+        from.sort_unstable();
+        let of = Of { ends: from, triangles: wholes };
+        // The halves of each triangle, as places among its corners, 3 being the new vertex.
+        let parts = |h: &Half| {
+            let [a, b, c] = [0, 1, 2].map(|k| (h.corner + k) % 3);
+            [[a, 3, c], [3, b, c]]
+        };
+        let corners: Vec<Vertex> = wedge.iter().flat_map(|h| shop.triangles[h.triangle as usize].v).collect();
+        let own = wedge.map(|h| h.triangle);
+        let moved = |p: Point| -> Vec<Moved> {
+            let both = |h: &Half| {
+                let [a, b, c] = shop.points(h.triangle);
+                let whole = self.whole(h.triangle);
+                parts(h).map(|part| (whole, part.map(|k| [a, b, c, p][k])))
+            };
+            wedge.iter().flat_map(both).collect()
+        };
+        let middle = (shop.place(ends[0]) + shop.place(ends[1])) / 2.0;
+        let Some((copy, position)) = self.place(of, middle, &corners, &own, moved) else { return false };
+        let new = self.add(copy, position);
+        for h in wedge {
+            let Triangle { v: [a, b, c], origin, patch, .. } = self.work.triangles[h.triangle as usize];
+            let whole = self.whole(h.triangle);
+            self.work.kill(h.triangle);
+            for part in parts(h) {
+                self.work.add(part.map(|k| [a, b, c, new][k]), origin.of_part(), patch);
+                self.whole.push(whole);
+            }
+        }
+        true
+    }
+
+    /// The nearest valid place of a copy that is made at `middle`, of whose triangles these are all `corners`. It takes the place of its `own`
+    /// triangles; `moved`: what comes instead, where the copy has a certain position.
+    fn place(
+        &self,
+        of: Of,
+        middle: DVec3,
+        corners: &[Vertex],
+        own: &[u32],
+        moved: impl Fn(Point) -> Vec<Moved>,
+    ) -> Option<(Copy, Point)> {
+        let shop: &Shop = self.work;
+        let mut corners = corners.to_vec();
+        corners.sort_unstable();
+        corners.dedup();
+        let mut near: Vec<u32> = Vec::new();
+        for v in &corners {
+            let original = self.original(*v);
+            let copies = self.family.get(&original).into_iter().flatten();
+            near.extend(copies.chain([&original]).flat_map(|v| shop.star(*v)).map(|(t, _)| t));
+        }
+        near.sort_unstable();
+        near.dedup();
+        near.retain(|t| !own.contains(t));
+        if (near.len() + own.len()) * own.len() > MOST_PAIRS {
+            return None;
+        }
+        let points = || corners.iter().map(|v| shop.positions[*v as usize]);
+        let largest = points().flatten().map(f32::abs).fold(0.0, f32::max);
+        let step = f64::from(largest.next_up()) - f64::from(largest);
+        let lengths = points().map(|p| (at(&p) - middle).length()).filter(|length| *length > 0.0);
+        let most = self.before.farthest.max(LEAST_STEPS * step).min(EDGE_SHARE * lengths.fold(f64::INFINITY, f64::min));
+        let directions = directions(own.iter().map(|t| -shop.normal(*t).normalize_or_zero()));
+        let places = (0..).map(|k| step * f64::from(1_u32 << k)).take_while(|step| *step <= most).take(24);
+        let places =
+            places.flat_map(|step| directions.iter().map(move |d| (middle + *d * step).as_vec3().to_array().map(|x| x + 0.0)));
+        let tried = places.enumerate().skip(self.from.get(&of).copied().unwrap_or(0));
+        for (place, position) in tried {
+            if self.before.taken.contains(&bits(&position)) || self.taken.contains(&bits(&position)) {
+                continue;
+            }
+            if self.accepts(&moved(position), &near) {
+                return Some((Copy { of, place, away: (at(&position) - middle).length() }, position));
+            }
+        }
+        None
+    }
+
+    /// Do these triangles all have an area, and meet neither each other nor those `near` more than before?
+    fn accepts(&self, moved: &[Moved], near: &[u32]) -> bool {
+        let shop: &Shop = self.work;
+        moved.iter().enumerate().all(|(i, one)| {
+            let (_, [a, b, c]) = one;
+            !chunk::is_collinear(a, b, c)
+                && moved[..i].iter().all(|other| !self.meets(one, other))
+                && near.iter().all(|t| !self.meets(one, &(self.whole(*t), shop.points(*t))))
+        })
+    }
+
+    /// Do two triangles meet more than those from before did of which they are parts?
+    fn meets(&self, a: &Moved, b: &Moved) -> bool {
+        let now = badness(triangles_cross(&a.1, &b.1));
+        now > 0 && (a.0 == b.0 || now > badness(triangles_cross(&self.points_before(a.0), &self.points_before(b.0))))
+    }
+
+    fn points_before(&self, t: u32) -> Corners {
+        self.before.triangles[t as usize].v.map(|v| self.work.positions[v as usize])
+    }
+
+    fn add(&mut self, copy: Copy, position: Point) -> Vertex {
+        self.copies.push(copy);
+        self.taken.insert(bits(&position));
+        self.work.add_vertex(position)
+    }
+
+    /// The vertex from before of which `v` is a copy; itself in the middle of an edge.
+    fn original(&self, v: Vertex) -> Vertex {
+        match v.checked_sub(self.first).map(|copy| self.copies[copy as usize].of) {
+            Some(of) if !of.is_edge() => of.ends[0],
+            _ => v,
+        }
+    }
+
+    /// The triangle from before of which `t` is a part, or that it is.
+    fn whole(&self, t: u32) -> u32 {
+        t.checked_sub(self.before.triangles.len() as u32).map_or(t, |part| self.whole[part as usize])
+    }
+
+    /// The copies that cannot stay: a triangle of theirs crosses another one that it did not cross before, or another vertex of the file has their
+    /// position. `None` if that is too much work to tell.
+    fn blamed(&self, survey: &Survey<'_>) -> Option<BTreeSet<usize>> {
+        let mut blamed = BTreeSet::new();
+        if self.copies.is_empty() {
+            return Some(blamed);
+        }
+        let shop: &Shop = self.work;
+        let positions = &shop.positions[self.first as usize..];
+        let copy_at: HashMap<[u32; 3], usize> = positions.iter().map(bits).zip(0..).collect();
+        for (suspect, _) in survey.beyond_the_workshop(positions) {
+            let corners = record::corners(&survey.records[suspect.triangle as usize]).map(|p| p.map(|x| x + 0.0));
+            blamed.extend(corners.iter().filter_map(|p| copy_at.get(&bits(p))));
+        }
+        let records = survey.records.len() as u32;
+        records.checked_add(shop.triangles.len() as u32)?;
+        let Changes { gone, living } = guard::changes(survey, shop);
+        let copies = |t: u32| shop.triangles[t as usize].v.into_iter().filter_map(|v| v.checked_sub(self.first));
+        let has_copy = |t: &&u32| copies(**t).next().is_some();
+        let numbered = |t: &u32| (records + t, shop.points(*t));
+        let pairs = fresh::met_by(
+            survey,
+            living.iter().filter(has_copy).map(numbered),
+            living.iter().filter(|t| !has_copy(t)).map(numbered),
+            |place| gone.binary_search(&place).is_ok(),
+            u64::from(records) + shop.triangles.len() as u64,
+        )?;
+        for pair in pairs {
+            let in_shop = pair.triangles.map(|number| number.checked_sub(records));
+            let before = pair.triangles.map(|number| match number.checked_sub(records) {
+                Some(t) => self.points_before(self.whole(t)),
+                None => record::corners(&survey.records[number as usize]).map(|p| p.map(|x| x + 0.0)),
+            });
+            let of_one = matches!(in_shop, [Some(a), Some(b)] if self.whole(a) == self.whole(b));
+            if of_one || !triangles_cross(&before[0], &before[1]).is_crossing() {
+                blamed.extend(in_shop.into_iter().flatten().flat_map(copies).map(|copy| copy as usize));
+            }
+        }
+        Some(blamed)
+    }
+}
+
+/// For each triangle the first record of the surface that it is a part of, as surfaces go on through wedges. O(patches + workshop).
+fn surfaces(survey: &Survey<'_>, shop: &Shop, wedges: &Wedges) -> Vec<u32> {
+    let patches = survey.patches.len() as u32;
+    let mut parents: Vec<u32> = (0..patches + shop.triangles.len() as u32).collect();
+    for t in shop.living() {
+        let patch = shop.triangles[t as usize].patch;
+        if patch != NONE {
+            chunk::unite(&mut parents, patch, patches + t);
+        }
+        for mate in (0..3).filter_map(|corner| wedges.mate(Half { triangle: t, corner })) {
+            chunk::unite(&mut parents, patches + t, patches + mate.triangle);
+        }
+    }
+    let mut first = vec![NONE; parents.len()];
+    let records = survey.patches.iter().map(|p| p.first).zip(0..).chain(shop.living().map(|t| (shop.record(t), patches + t)));
+    for (record, node) in records {
+        let root = chunk::find(&mut parents, node) as usize;
+        first[root] = first[root].min(record);
+    }
+    (0..shop.triangles.len() as u32).map(|t| first[chunk::find(&mut parents, patches + t) as usize]).collect()
+}
+
+/// Ways to go from a vertex of surface with these unit normals, turned inward: first to the middle of the smallest ball around their ends, which
+/// leads away from all planes alike if any way leads into the material behind each of them; then the opposite way, along the axes, and between
+/// them. Of each the largest component is 1.
+fn directions(inward: impl Iterator<Item = DVec3>) -> Vec<DVec3> {
+    let inward: Vec<DVec3> = inward.collect();
+    let mut middle = inward.first().copied().unwrap_or(DVec3::ZERO);
+    // Bădoiu & Clarkson, "Smaller core-sets for balls", SODA 2003.
+    for k in 2..=64 {
+        let far = inward.iter().fold((0.0, middle), |far, n| {
+            let distance = (*n - middle).length_squared();
+            if distance > far.0 { (distance, *n) } else { far }
+        });
+        middle += (far.1 - middle) / f64::from(k);
+    }
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|d| [d, -d]);
+    let between = (0..8).map(|k| DVec3::from_array([0, 1, 2].map(|bit| if k >> bit & 1 == 1 { 1.0 } else { -1.0 })));
+    let largest = middle.abs().max_element();
+    let own = (largest > 1e-6).then(|| middle / largest).into_iter().flat_map(|d| [d, -d]);
+    own.chain(axes).chain(between).collect()
+}
+
+fn badness(contact: Contact) -> u8 {
+    match contact {
+        Contact::Apart => 0,
+        Contact::Touch => 1,
+        Contact::Cross | Contact::Overlap => 2,
+    }
+}
+
+fn bits(p: &Point) -> [u32; 3] {
+    p.map(f32::to_bits)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::Quiet;
+    use crate::edit::Edit;
+    use crate::engine::Diagnosis;
+    use crate::record::Record;
+    use crate::settings::Limits;
+    use crate::shop::components::Reversed;
+    use crate::testing::{After, Corners, after, cuboid, records, reversed, written};
+
+    fn separated(triangles: &[Corners]) -> After<Separated> {
+        after(triangles, |d, _| separate(&d.survey, &mut Work::new(&mut d.shop), &Profile::default()))
+    }
+
+    /// The skin of the unit cubes of a 4 × 4 × 4 grid whose bits are set. `diagonals`: which way the square faces are divided.
+    fn voxels(bits: u64, diagonals: u64) -> Vec<Corners> {
+        let is_filled = |at: [i32; 3]| at.iter().all(|x| (0..4).contains(x)) && bits >> (at[0] + 4 * at[1] + 16 * at[2]) & 1 == 1;
+        let mut mesh = Vec::new();
+        for n in 0..64 {
+            let at = [n % 4, n / 4 % 4, n / 16];
+            if !is_filled(at) {
+                continue;
+            }
+            let lo = at.map(|x| x as f32);
+            for (side, face) in cuboid(lo, lo.map(|x| x + 1.0)).chunks_exact(2).enumerate() {
+                let mut beyond = at;
+                beyond[2 - side / 2] += if side % 2 == 1 { 1 } else { -1 };
+                if !is_filled(beyond) {
+                    let [[a, b, c], [_, _, d]] = [face[0], face[1]];
+                    let turned = diagonals.rotate_left(n as u32 + 11 * side as u32) & 1 == 1;
+                    mesh.extend(if turned { [[b, c, d], [b, d, a]] } else { [[a, b, c], [a, c, d]] });
+                }
+            }
+        }
+        mesh
+    }
+
+    fn check(mesh: &[Corners]) -> Result<After<Separated>, TestCaseError> {
+        let got = separated(mesh);
+        let d = &got.defects;
+        let wrong = [
+            d.boundary_edges,
+            d.nonmanifold_edges,
+            d.nonmanifold_vertices,
+            d.unbalanced_edges,
+            d.degenerate_area,
+            got.result.left,
+        ];
+        prop_assert_eq!(wrong, [0; 6], "{:?}", got.result);
+        prop_assert!(d.self_intersections.as_ref().is_some_and(|found| found.is_free()), "{:?}", d.self_intersections);
+        Ok(got)
+    }
+
+    #[test]
+    fn of_two_cubes_at_an_edge_the_second_draws_back() {
+        let mesh = [cuboid([0.0; 3], [1.0; 3]), cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 1.0])].concat();
+        let got = separated(&mesh);
+        assert_eq!((got.result.vertices, got.result.edges, got.result.left), (2, 0, 0));
+        // All of the first one's triangles are as they were.
+        assert!(got.untouched >= 12 && got.verdict.good && got.defects.bodies == 2, "{:?}", got.verdict);
+        assert!((got.defects.bounds.unwrap(), got.result.farthest < 1e-6) == ([[0.0; 3], [2.0, 2.0, 1.0]], true));
+    }
+
+    #[test]
+    fn a_bridge_that_narrows_to_an_edge_is_opened_in_its_middle() {
+        // Two of four cubes, across from each other, between two slabs: whichever end of their edge, the two are one there.
+        let got = separated(&voxels(0x33 << 32 | 0x21 << 16 | 0x33, 0));
+        assert_eq!((got.result.vertices, got.result.edges, got.result.left), (0, 1, 0));
+        // With a way through between the two.
+        assert!(got.verdict.good && got.defects.bodies == 1 && got.defects.euler == Some(0), "{:?}", got.defects);
+    }
+
+    #[test]
+    fn cavities_that_meet_in_a_vertex_draw_back_from_each_other() {
+        let cavities = [cuboid([1.0; 3], [2.0; 3]), cuboid([2.0; 3], [3.0; 3])].concat();
+        let got = separated(&[cuboid([0.0; 3], [4.0; 3]), reversed(&cavities)].concat());
+        assert_eq!((got.result.vertices, got.result.edges, got.result.left), (1, 0, 0));
+        assert!(got.verdict.good && got.defects.cavities == 2, "{:?}", got.defects);
+    }
+
+    #[test]
+    fn what_a_profile_wants_to_stay_stays() {
+        let mesh = [cuboid([0.0; 3], [1.0; 3]), cuboid([1.0; 3], [2.0; 3])].concat();
+        let profile = Profile { separate: false, ..Profile::default() };
+        let got = after(&mesh, |d, _| separate(&d.survey, &mut Work::new(&mut d.shop), &profile));
+        assert_eq!((got.result, got.untouched), (Separated::default(), 24));
+    }
+
+    #[test]
+    fn a_vertex_beside_a_boundary_is_left_alone() {
+        let mut mesh = [cuboid([0.0; 3], [1.0; 3]), cuboid([1.0; 3], [2.0; 3])].concat();
+        let one = mesh.iter().position(|t| t.contains(&[1.0; 3])).unwrap();
+        mesh.remove(one);
+        let got = separated(&mesh);
+        assert_eq!((got.result, got.untouched), (Separated { left: 1, ..Separated::default() }, 23));
+    }
+
+    /// The records that come of a mesh that is looked at in chunks of so many triangles.
+    fn written_by(mesh: &[Corners], chunk_triangles: u32) -> Vec<Record> {
+        let input = records(mesh);
+        let limits = Limits { threads: 1, chunk_triangles, ..Limits::default() };
+        let mut d = Diagnosis::of(Path::new("test"), &input, &Profile::default(), &limits, &Quiet).unwrap();
+        separate(&d.survey, &mut Work::new(&mut d.shop), &Profile::default());
+        written(&Edit::of(&d.survey, &d.shop, &Reversed::none(&d.survey)), &input)
+    }
+
+    proptest! {
+        #[test]
+        fn chunks_do_not_show_in_the_result(bits in any::<u64>(), diagonals in any::<u64>()) {
+            let mesh = voxels(bits, diagonals);
+            let whole = written_by(&mesh, u32::MAX);
+            for chunk_triangles in [1, 7, 50] {
+                prop_assert!(written_by(&mesh, chunk_triangles) == whole);
+            }
+        }
+
+        /// Cubes of a grid touch in edges and vertices in all ways.
+        #[test]
+        fn any_cubes_of_a_grid_become_a_manifold(bits in any::<u64>(), more in any::<u64>(), diagonals in any::<u64>(), dense in 0..3) {
+            let bits = [bits, bits & more, bits | more][dense as usize];
+            prop_assume!(bits != 0);
+            let got = check(&voxels(bits, diagonals))?;
+            prop_assert!((got.defects.volume - f64::from(bits.count_ones())).abs() < 1e-3);
+            prop_assert!(got.result.farthest < 1e-5, "{:?}", got.result);
+        }
+
+        /// So do bodies whose faces lie anyhow, near the origin and far from it.
+        #[test]
+        fn any_bodies_that_touch_become_a_manifold(
+            bits in any::<u64>(),
+            diagonals in any::<u64>(),
+            moves in prop::collection::vec(-0.2_f32..0.2, 375),
+            offset in prop::sample::select(vec![0.0_f32, -1.5, 100.0, 10_000.0]),
+        ) {
+            prop_assume!(bits != 0);
+            let placed = |p: [f32; 3]| {
+                let n = p[0] as usize + 5 * p[1] as usize + 25 * p[2] as usize;
+                [0, 1, 2].map(|k| p[k] + moves[3 * n + k] + offset)
+            };
+            let mesh: Vec<Corners> = voxels(bits, diagonals).iter().map(|t| t.map(placed)).collect();
+            let is_free = after(&mesh, |d, _| d.defects.self_intersections.as_ref().is_some_and(|found| found.is_free())).result;
+            prop_assume!(is_free);
+            check(&mesh)?;
+        }
+    }
+}

@@ -7,8 +7,8 @@
 //!
 //! A copy's place is valid if none of its triangles loses its area or comes to meet another one more than before, touching included. That is
 //! tested exactly, for the triangles around while places are tried, and for everything else once all copies have theirs; those that meet
-//! anything are tried anew from their next place on. Vertices with an edge that is open, incoherent or lies between triangles in one direction
-//! are left alone.
+//! anything are tried anew from their next place on. Vertices with an edge that is open, incoherent or lies between triangles in one direction,
+//! and those whose fans cross each other, are left alone.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::fmt;
@@ -36,13 +36,14 @@ const EDGE_SHARE: f64 = 0.125;
 const LEAST_STEPS: f64 = 4.0;
 
 /// How often copies that meet something are tried from their next place on, and then how often such are given up.
-const TRIED: usize = 6;
-const GIVEN_UP: usize = 6;
+const TRIED: usize = 4;
+const GIVEN_UP: usize = 10;
 
 /// Rounds of opening edges: a triangle with several such edges is divided at one of them in each.
 const OPENINGS: usize = 8;
 
-/// Pairs of triangles that may have to be compared for one place of a copy. A fan of more is left alone.
+/// Pairs of triangles that are compared for one copy, at all places that are tried for it together, or around one vertex. Where it takes more,
+/// the vertex is left alone.
 const MOST_PAIRS: usize = 1 << 20;
 
 /// What was taken apart.
@@ -178,6 +179,9 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
         let surfaces = surfaces(survey, shop, &wedges);
         for v in vertices {
             let Some(mut fans) = wedges.fans(self.work, *v) else { continue };
+            if self.fans_cross(&fans) {
+                continue;
+            }
             let rank = |fan: &Vec<Half>| {
                 fan.iter().map(|h| (surfaces[h.triangle as usize], self.work.record(h.triangle), h.triangle)).min()
             };
@@ -190,6 +194,17 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
             }
         }
         self.work.relink();
+    }
+
+    /// Do triangles of different fans cross (or are there too many to tell)? What runs into each other there cannot be parted by moving the vertex;
+    /// what only lies on each other may be.
+    fn fans_cross(&self, fans: &[Vec<Half>]) -> bool {
+        let points = |h: &Half| self.points_before(h.triangle);
+        let meet = |a: &[Half], b: &[Half]| {
+            a.iter().any(|a| b.iter().any(|b| triangles_cross(&points(a), &points(b)) == Contact::Cross))
+        };
+        let all: usize = fans.iter().map(Vec::len).sum();
+        all * all > MOST_PAIRS || (1..fans.len()).any(|i| fans[..i].iter().any(|other| meet(other, &fans[i])))
     }
 
     /// Gives a fan of `v` a vertex of its own; `false` if there is no place for it. Star lists stay as they were.
@@ -322,9 +337,7 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
         near.sort_unstable();
         near.dedup();
         near.retain(|t| !own.contains(t));
-        if (near.len() + own.len()) * own.len() > MOST_PAIRS {
-            return None;
-        }
+        let most_places = MOST_PAIRS / ((near.len() + own.len()) * own.len());
         let points = || corners.iter().map(|v| shop.positions[*v as usize]);
         let largest = points().flatten().map(f32::abs).fold(0.0, f32::max);
         let step = f64::from(largest.next_up()) - f64::from(largest);
@@ -335,7 +348,7 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
         let places =
             places.flat_map(|step| directions.iter().map(move |d| (middle + *d * step).as_vec3().to_array().map(|x| x + 0.0)));
         let tried = places.enumerate().skip(self.from.get(&of).copied().unwrap_or(0));
-        for (place, position) in tried {
+        for (place, position) in tried.take(most_places) {
             if self.before.taken.contains(&bits(&position)) || self.taken.contains(&bits(&position)) {
                 continue;
             }
@@ -357,10 +370,15 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
         })
     }
 
-    /// Do two triangles meet more than those from before did of which they are parts?
+    /// Do two triangles meet more than those from before did of which they are parts? Where these lay on each other they may cross for the time being,
+    /// until all vertices between them have moved.
     fn meets(&self, a: &Moved, b: &Moved) -> bool {
-        let now = badness(triangles_cross(&a.1, &b.1));
-        now > 0 && (a.0 == b.0 || now > badness(triangles_cross(&self.points_before(a.0), &self.points_before(b.0))))
+        let now = triangles_cross(&a.1, &b.1);
+        if now == Contact::Apart || a.0 == b.0 {
+            return now != Contact::Apart;
+        }
+        let before = triangles_cross(&self.points_before(a.0), &self.points_before(b.0));
+        badness(now) > badness(before) && !before.is_crossing()
     }
 
     fn points_before(&self, t: u32) -> Corners {
@@ -420,7 +438,7 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
                 None => record::corners(&survey.records[number as usize]).map(|p| p.map(|x| x + 0.0)),
             });
             let of_one = matches!(in_shop, [Some(a), Some(b)] if self.whole(a) == self.whole(b));
-            if of_one || !triangles_cross(&before[0], &before[1]).is_crossing() {
+            if of_one || badness(pair.contact) > badness(triangles_cross(&before[0], &before[1])) {
                 blamed.extend(in_shop.into_iter().flatten().flat_map(copies).map(|copy| copy as usize));
             }
         }
@@ -471,11 +489,13 @@ fn directions(inward: impl Iterator<Item = DVec3>) -> Vec<DVec3> {
     own.chain(axes).chain(between).collect()
 }
 
+/// What lies on something can be lifted off it; what crosses it cannot.
 fn badness(contact: Contact) -> u8 {
     match contact {
         Contact::Apart => 0,
         Contact::Touch => 1,
-        Contact::Cross | Contact::Overlap => 2,
+        Contact::Overlap => 2,
+        Contact::Cross => 3,
     }
 }
 

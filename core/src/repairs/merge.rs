@@ -22,7 +22,13 @@ const ATTEMPTS: usize = 4;
 /// Welds boundary vertices. O(n log n) in the boundary.
 pub(super) fn weld(work: &mut Work<'_>, tolerance: &Tolerance) -> Welded {
     let (shop, edges) = work.edges();
-    let mut clusters = clusters(shop, &near::close_pairs(shop, edges, tolerance), tolerance.weld);
+    let pairs = near::close_pairs(shop, edges, tolerance);
+    weld_pairs(work, &pairs, tolerance.weld)
+}
+
+/// Welds pairs of boundary vertices, smaller number first, sorted, which lie within `tolerance` of each other.
+pub(super) fn weld_pairs(work: &mut Work<'_>, pairs: &[(Vertex, Vertex)], tolerance: f64) -> Welded {
+    let mut clusters = clusters(work, pairs, tolerance);
     let mut result = Welded::default();
     if clusters.is_empty() {
         return result;

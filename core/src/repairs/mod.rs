@@ -13,6 +13,8 @@ mod duplicates;
 mod guard;
 mod islands;
 mod junction;
+mod lap;
+mod layer;
 mod merge;
 mod orient;
 mod smooth;
@@ -55,7 +57,7 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
     let mut reversed = Reversed::none(&diagnosis.survey);
     let Diagnosis { survey, shop, tolerance, .. } = diagnosis;
     let shop = &mut Work::new(shop);
-    prepare(survey, shop, &mut log);
+    prepare(survey, shop, tolerance, &mut log);
     let mut loops = None;
     for _ in 0..ROUNDS {
         let mut changes = weld(survey, shop, tolerance, &mut log);
@@ -127,7 +129,7 @@ pub(crate) fn recognise(diagnosis: &mut Diagnosis<'_>, profile: &Profile) -> Bou
     }
     let shop = &mut Work::new(shop);
     let mut log = Log::default();
-    prepare(survey, shop, &mut log);
+    prepare(survey, shop, tolerance, &mut log);
     weld(survey, shop, tolerance, &mut log);
     report_loops(shop, tolerance, profile)
 }
@@ -138,9 +140,12 @@ fn report_loops(work: &mut Work<'_>, tolerance: &Tolerance, profile: &Profile) -
 }
 
 /// Drops what is no surface of its own, and fetches what the removal of the rest may need.
-fn prepare(survey: &mut Survey<'_>, shop: &mut Work<'_>, log: &mut Log) {
+fn prepare(survey: &mut Survey<'_>, shop: &mut Work<'_>, tolerance: &Tolerance, log: &mut Log) {
     log.time("degenerate", DEGENERATE, || duplicates::drop_repeated(shop));
     log.time("duplicate", DUPLICATE, || duplicates::drop_duplicates(shop));
+    log.time("lap", "triangles of surface that lay on another one, which faces the same way", || {
+        lap::cut_back(survey, shop, tolerance)
+    });
     complete_at_seams(survey, shop);
 }
 

@@ -1,0 +1,254 @@
+//! What lies on a surface: near it, and facing the same way. Pieces of surface as a set of triangles with the edges where each piece ends.
+//!
+//! Decided in f64 with + − × ÷ √ only, within a reach: it says what is meant to be one surface, not what crosses.
+
+use glam::DVec3;
+
+use crate::boxes::BoxTree;
+use crate::fill::cross::Triangle as Corners;
+use crate::shop::place;
+use crate::sums::Bounds;
+
+/// Two surfaces face the same way if the cosine between their normals is at least this: up to about 25°.
+const AGREE: f64 = 0.9;
+
+/// Where on a piece of surface something lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Place {
+    /// Within reach of where the piece ends.
+    Rim,
+    Inside,
+}
+
+/// A triangle of a piece, with its unit normal.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Facet {
+    pub(super) corners: [DVec3; 3],
+    pub(super) normal: DVec3,
+    pub(super) piece: u32,
+}
+
+impl Facet {
+    pub(super) fn of(corners: &Corners, piece: u32) -> Self {
+        let corners = corners.map(place);
+        let [a, b, c] = corners;
+        Self { corners, normal: (b - a).cross(c - a).normalize_or_zero(), piece }
+    }
+
+    pub(super) fn centre(&self) -> DVec3 {
+        let [a, b, c] = self.corners;
+        (a + b + c) / 3.0
+    }
+
+    /// The smallest of its heights.
+    pub(super) fn height(&self) -> f64 {
+        let [a, b, c] = self.corners;
+        let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a)).sqrt();
+        if longest > 0.0 { (b - a).cross(c - a).length() / longest } else { 0.0 }
+    }
+
+    /// Does a segment run over its inside, farther than `reach` from its edges, and nowhere there farther than that from its plane?
+    fn is_crossed_by(&self, [from, to]: [DVec3; 2], reach: f64) -> bool {
+        let (mut start, mut end) = (0.0, 1.0);
+        for k in 0..3 {
+            let (a, b) = (self.corners[k], self.corners[(k + 1) % 3]);
+            let inward = self.normal.cross(b - a).normalize_or_zero();
+            let [at_start, at_end] = [from, to].map(|p| (p - a).dot(inward) - reach);
+            if at_start <= 0.0 && at_end <= 0.0 {
+                return false;
+            }
+            let cut = at_start / (at_start - at_end);
+            if at_start < 0.0 {
+                start = cut.max(start);
+            } else if at_end < 0.0 {
+                end = cut.min(end);
+            }
+        }
+        start < end && [start, end].iter().all(|s| (from.lerp(to, *s) - self.corners[0]).dot(self.normal).abs() <= reach)
+    }
+}
+
+/// An edge where a piece ends, with the normal of its triangle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RimEdge {
+    pub(super) ends: [DVec3; 2],
+    pub(super) normal: DVec3,
+    pub(super) piece: u32,
+}
+
+impl RimEdge {
+    pub(super) fn middle(&self) -> DVec3 {
+        (self.ends[0] + self.ends[1]) / 2.0
+    }
+
+    /// Its point nearest to `p`.
+    pub(super) fn foot(&self, p: DVec3) -> DVec3 {
+        let [a, b] = self.ends;
+        let length = a.distance_squared(b);
+        if length > 0.0 { a.lerp(b, ((p - a).dot(b - a) / length).clamp(0.0, 1.0)) } else { a }
+    }
+}
+
+/// Pieces of surface that may be asked what lies on them.
+pub(super) struct Layer {
+    facets: Vec<Facet>,
+    tree: Option<BoxTree>,
+    pub(super) rims: Vec<RimEdge>,
+    rim_tree: Option<BoxTree>,
+}
+
+impl Layer {
+    /// O(n log n).
+    pub(super) fn new(facets: Vec<Facet>, rims: Vec<RimEdge>) -> Self {
+        let tree = |boxes: Vec<Bounds>| (!boxes.is_empty()).then(|| BoxTree::new(&boxes));
+        Self {
+            tree: tree(facets.iter().map(|f| around(&f.corners, 0.0)).collect()),
+            rim_tree: tree(rims.iter().map(|r| around(&r.ends, 0.0)).collect()),
+            facets,
+            rims,
+        }
+    }
+
+    /// On which pieces a point lies that faces along `normal`, and where on them; ascending, each once. `reach`: how near it must be to a
+    /// piece, at most `most`; 0: the piece is of no interest.
+    pub(super) fn under(&self, p: DVec3, normal: DVec3, most: f64, reach: impl Fn(u32) -> f64) -> Vec<(u32, Place)> {
+        let wanted = around(&[p], most);
+        let mut found = Vec::new();
+        let mut pieces: Vec<u32> = Vec::new();
+        if let Some(tree) = &self.tree {
+            tree.meeting(&wanted, &mut found);
+        }
+        for facet in found.iter().map(|f| &self.facets[*f as usize]) {
+            let reach = reach(facet.piece);
+            if reach > 0.0
+                && facet.normal.dot(normal) >= AGREE
+                && !pieces.contains(&facet.piece)
+                && p.distance_squared(nearest(p, &facet.corners)) <= reach * reach
+            {
+                pieces.push(facet.piece);
+            }
+        }
+        if pieces.is_empty() {
+            return Vec::new();
+        }
+        pieces.sort_unstable();
+        let near = self.rims_near(&wanted);
+        let is_rim = |piece: u32| {
+            let reach = reach(piece);
+            near.iter().any(|r| r.piece == piece && p.distance_squared(r.foot(p)) <= reach * reach)
+        };
+        pieces.into_iter().map(|piece| (piece, if is_rim(piece) { Place::Rim } else { Place::Inside })).collect()
+    }
+
+    /// Does a rim run over the inside of a triangle, facing the same way?
+    pub(super) fn ends_over(&self, facet: &Facet, reach: f64) -> bool {
+        let near = self.rims_near(&around(&facet.corners, reach));
+        near.iter().any(|r| r.normal.dot(facet.normal) >= AGREE && facet.is_crossed_by(r.ends, reach))
+    }
+
+    /// Rims in a box, in their order.
+    pub(super) fn rims_near(&self, wanted: &Bounds) -> Vec<&RimEdge> {
+        let mut found = Vec::new();
+        if let Some(tree) = &self.rim_tree {
+            tree.meeting(wanted, &mut found);
+        }
+        found.iter().map(|r| &self.rims[*r as usize]).collect()
+    }
+}
+
+/// The box around some points, wider by `by` on all sides, rounded outward.
+pub(super) fn around(points: &[DVec3], by: f64) -> Bounds {
+    let mut bounds = Bounds::EMPTY;
+    for p in points {
+        let lo = (*p - by).to_array().map(|x| (x as f32).next_down());
+        let hi = (*p + by).to_array().map(|x| (x as f32).next_up());
+        bounds.include(&[lo, hi]);
+    }
+    bounds
+}
+
+/// The point of a triangle nearest to `p` (Ericson, Real-Time Collision Detection, 2005, 5.1.5).
+fn nearest(p: DVec3, [a, b, c]: &[DVec3; 3]) -> DVec3 {
+    let (ab, ac, ap) = (*b - *a, *c - *a, p - *a);
+    let (d1, d2) = (ab.dot(ap), ac.dot(ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return *a;
+    }
+    let bp = p - *b;
+    let (d3, d4) = (ab.dot(bp), ac.dot(bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return *b;
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return *a + ab * (d1 / (d1 - d3));
+    }
+    let cp = p - *c;
+    let (d5, d6) = (ab.dot(cp), ac.dot(cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return *c;
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return *a + ac * (d2 / (d2 - d6));
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
+        return *b + (*c - *b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
+    }
+    let sum = va + vb + vc;
+    *a + ab * (vb / sum) + ac * (vc / sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// The lower left half of the unit square, facing up, which ends at its long side.
+    fn half() -> Layer {
+        let facet = Facet::of(&[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], 7);
+        let rim = RimEdge { ends: [facet.corners[1], facet.corners[2]], normal: DVec3::Z, piece: 7 };
+        Layer::new(vec![facet], vec![rim])
+    }
+
+    #[test]
+    fn a_point_lies_inside_at_the_rim_or_not_on_it() {
+        let layer = half();
+        let at = |x: f64, y: f64, z: f64, up: DVec3| layer.under(DVec3::new(x, y, z), up, 0.1, |_| 0.1);
+        assert_eq!(at(0.2, 0.2, 0.1, DVec3::Z), [(7, Place::Inside)]);
+        assert_eq!(at(0.5, 0.45, 0.0, DVec3::Z), [(7, Place::Rim)]);
+        assert_eq!(at(0.2, 0.2, 0.11, DVec3::Z), [], "too high");
+        assert_eq!(at(0.2, 0.2, 0.0, DVec3::NEG_Z), [], "it faces the other way");
+        assert!(layer.under(DVec3::splat(0.0), DVec3::Z, 0.1, |_| 0.0).is_empty(), "of no interest");
+    }
+
+    #[test]
+    fn a_rim_runs_over_a_triangle_or_along_it() {
+        let layer = half();
+        let over = |by: f64| {
+            let corners = [[0.5, 0.5], [1.5, 0.5], [0.5, 1.5]].map(|[x, y]| [(x - by) as f32, (y - by) as f32, 0.05]);
+            layer.ends_over(&Facet::of(&corners, 0), 0.1)
+        };
+        assert!(over(0.25));
+        assert!(!over(0.0), "it only touches the corner");
+        assert!(!over(-0.2), "it is beyond");
+        let along = Facet::of(&[[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]], 0);
+        assert!(!layer.ends_over(&along, 0.1), "its neighbour");
+    }
+
+    proptest! {
+        /// No point of the triangle is nearer than the one that is called the nearest.
+        #[test]
+        fn nearest_is_nearest(c in prop::array::uniform12(-4i8..5), at in prop::array::uniform2(0.0f64..1.0)) {
+            let v = |i: usize| DVec3::from_array([c[i], c[i + 1], c[i + 2]].map(f64::from));
+            let (p, corners) = (v(0), [v(3), v(6), v(9)]);
+            prop_assume!((corners[1] - corners[0]).cross(corners[2] - corners[0]) != DVec3::ZERO);
+            let found = nearest(p, &corners);
+            let [s, t] = if at[0] + at[1] > 1.0 { [1.0 - at[0], 1.0 - at[1]] } else { at };
+            let other = corners[0] + (corners[1] - corners[0]) * s + (corners[2] - corners[0]) * t;
+            prop_assert!(p.distance(found) <= p.distance(other) + 1e-9);
+        }
+    }
+}

@@ -6,7 +6,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::layer::{Facet, Layer, Place, RimEdge, around};
+use super::layer::{Facet, Layer, Place, Reach, RimEdge, around};
 use super::merge;
 use super::work::Work;
 use crate::boxes::BoxTree;
@@ -28,6 +28,10 @@ const ROUNDS: usize = 4;
 
 /// Pairs of pieces that are looked at in a round, at most: each is a pass over the surface where their boxes meet.
 const MOST_PAIRS: usize = 256;
+
+/// What is cut off must lie on the other piece with this share of its area: surfaces that only cross at a small angle, or large triangles that
+/// lap by little, do not.
+const OVERLAP: f64 = 0.5;
 
 /// Triangles that are looked at together, at most; where there are more, nothing is cut. By count, so that memory decides nothing.
 const MOST: usize = 1 << 19;
@@ -61,6 +65,14 @@ struct Member {
     place: Result<u32, u32>,
 }
 
+/// Two pieces, the smaller one first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Pair {
+    pieces: [u32; 2],
+    /// Each ends on the other; else one may lie on the other as a whole.
+    lap: bool,
+}
+
 /// What is to be cut off.
 struct Cut {
     triangles: Vec<Member>,
@@ -75,6 +87,8 @@ struct Pieces {
     rims: Vec<(RimEdge, f64)>,
     /// Diagonals of the boxes.
     sizes: Vec<f64>,
+    /// What is nearer than this to where a piece ends is a matter of welding.
+    weld: f64,
 }
 
 impl Pieces {
@@ -89,16 +103,21 @@ impl Pieces {
         let mut rims: Vec<_> = rims.collect();
         rims.sort_by_key(|(rim, _)| rim.piece);
         let sizes = components.list.iter().map(|c| c.bounds.diagonal()).collect();
-        Self { components, rims, sizes }
+        Self { components, rims, sizes, weld: tolerance.weld }
     }
 
     fn list(&self) -> &[Component] {
         &self.components.list
     }
 
-    /// How near two pieces lie on each other.
-    fn reach(&self, a: u32, b: u32) -> f64 {
-        LAP * (self.sizes[a as usize] + self.sizes[b as usize])
+    /// How near two pieces lie on each other, where a triangle of one is so high that it may do so within `most`.
+    fn reach(&self, a: u32, b: u32, most: f64) -> Reach {
+        self.reach_of(self.sizes[a as usize] + self.sizes[b as usize], most)
+    }
+
+    fn reach_of(&self, sizes: f64, most: f64) -> Reach {
+        let rim = (LAP * sizes).max(self.weld);
+        Reach { on: rim.min(most), rim }
     }
 
     /// For each piece that ends, the others in whose box it may do so; numbered as the pieces are.
@@ -113,7 +132,7 @@ impl Pieces {
         let tree = BoxTree::new(&boxes);
         let largest = self.sizes.iter().copied().fold(0.0, f64::max);
         for (a, near) in (0..).zip(&mut all).filter(|(a, _)| ends[*a as usize]) {
-            tree.meeting(&widened(&boxes[a as usize], LAP * (self.sizes[a as usize] + largest)), near);
+            tree.meeting(&widened(&boxes[a as usize], self.reach_of(self.sizes[a as usize] + largest, f64::INFINITY).rim), near);
             near.retain(|b| *b != a);
         }
         all
@@ -180,11 +199,11 @@ fn cuts(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) -> Vec<
     let mut taken = vec![false; pieces.list().len()];
     let mut cuts = Vec::new();
     for pair in pairs.into_iter().take(MOST_PAIRS) {
-        if pair.iter().any(|piece| taken[*piece as usize]) {
+        if pair.pieces.iter().any(|piece| taken[*piece as usize]) {
             continue;
         }
         if let Some(cut) = cut(survey, shop, edges, &pieces, pair, tolerance) {
-            pair.iter().for_each(|piece| taken[*piece as usize] = true);
+            pair.pieces.iter().for_each(|piece| taken[*piece as usize] = true);
             cuts.push(cut);
         }
     }
@@ -192,17 +211,17 @@ fn cuts(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) -> Vec<
 }
 
 /// Pairs of pieces of which each ends on the other, or one lies on the other with all of its ends; the smaller one first.
-fn lapping(survey: &Survey<'_>, shop: &Shop, pieces: &Pieces) -> Vec<[u32; 2]> {
+fn lapping(survey: &Survey<'_>, shop: &Shop, pieces: &Pieces) -> Vec<Pair> {
     let neighbours = pieces.neighbours();
     let largest = pieces.sizes.iter().copied().fold(0.0, f64::max);
     let mut is_wanted = vec![false; neighbours.len()];
     neighbours.iter().flatten().for_each(|b| is_wanted[*b as usize] = true);
-    let most = |(rim, share): &(RimEdge, f64)| share.min(LAP * (pieces.sizes[rim.piece as usize] + largest));
+    let most = |(rim, share): &(RimEdge, f64)| pieces.reach_of(pieces.sizes[rim.piece as usize] + largest, *share);
     let ends: Vec<&(RimEdge, f64)> = pieces.rims.iter().filter(|(r, _)| !neighbours[r.piece as usize].is_empty()).collect();
     if ends.is_empty() {
         return Vec::new();
     }
-    let boxes: Vec<Bounds> = ends.iter().map(|end| around(&[end.0.middle()], most(end))).collect();
+    let boxes: Vec<Bounds> = ends.iter().map(|end| around(&[end.0.middle()], most(end).on)).collect();
     let Some(near) = pieces.gather(survey, shop, |piece| is_wanted[piece as usize], &boxes) else { return Vec::new() };
     let facets = near.iter().map(|m| Facet::of(&m.corners, m.piece)).collect();
     let layer = Layer::new(facets, pieces.rims.iter().map(|(r, _)| *r).collect());
@@ -213,7 +232,7 @@ fn lapping(survey: &Survey<'_>, shop: &Shop, pieces: &Pieces) -> Vec<[u32; 2]> {
         let (rim, share) = end;
         edges[rim.piece as usize] += 1;
         let is_neighbour = |piece: u32| neighbours[rim.piece as usize].binary_search(&piece).is_ok();
-        let reach = |piece: u32| if is_neighbour(piece) { pieces.reach(rim.piece, piece).min(*share) } else { 0.0 };
+        let reach = |piece: u32| pieces.reach(rim.piece, piece, if is_neighbour(piece) { *share } else { 0.0 });
         for (piece, place) in layer.under(rim.middle(), rim.normal, most(end), reach) {
             let [inside, on] = counts.entry([rim.piece, piece]).or_default();
             *inside += usize::from(place == Place::Inside);
@@ -221,13 +240,14 @@ fn lapping(survey: &Survey<'_>, shop: &Shop, pieces: &Pieces) -> Vec<[u32; 2]> {
         }
     }
     let ends_inside = |a: u32, b: u32| counts.get(&[a, b]).is_some_and(|[inside, _]| *inside > 0);
-    let mut pairs: Vec<[u32; 2]> = Vec::new();
+    let mut pairs: Vec<Pair> = Vec::new();
     for ([a, b], [_, on]) in &counts {
         let is_covered = *on == edges[*a as usize];
-        if is_covered || (ends_inside(*a, *b) && ends_inside(*b, *a)) {
+        let lap = ends_inside(*a, *b) && ends_inside(*b, *a);
+        if is_covered || lap {
             // Of equal ones the first stays.
             let order = |piece: u32| (pieces.list()[piece as usize].extent.area, std::cmp::Reverse(piece));
-            pairs.push(if order(*a) < order(*b) { [*a, *b] } else { [*b, *a] });
+            pairs.push(Pair { pieces: if order(*a) < order(*b) { [*a, *b] } else { [*b, *a] }, lap });
         }
     }
     pairs.sort_unstable();
@@ -235,18 +255,12 @@ fn lapping(survey: &Survey<'_>, shop: &Shop, pieces: &Pieces) -> Vec<[u32; 2]> {
     pairs
 }
 
-/// What is to be cut off of a pair: of the first one, or of the second if nothing would be left of the first although it does not lie on the
-/// second as a whole.
-fn cut(
-    survey: &Survey<'_>,
-    shop: &Shop,
-    edges: &Edges,
-    pieces: &Pieces,
-    pair: [u32; 2],
-    tolerance: &Tolerance,
-) -> Option<Cut> {
+/// What is to be cut off of a pair: a piece that lies on the other one as a whole, or what laps, of the first one if something would be left of
+/// it.
+fn cut(survey: &Survey<'_>, shop: &Shop, edges: &Edges, pieces: &Pieces, pair: Pair, tolerance: &Tolerance) -> Option<Cut> {
+    let Pair { pieces: pair, lap } = pair;
     let [a, b] = pair;
-    let reach = pieces.reach(a, b);
+    let reach = pieces.reach(a, b, f64::INFINITY).rim;
     let [box_a, box_b] = pair.map(|piece| widened(&pieces.list()[piece as usize].bounds, reach));
     let both = overlap(&box_a, &box_b)?;
     let members = pieces.gather(survey, shop, |piece| pair.contains(&piece), &[both])?;
@@ -259,11 +273,15 @@ fn cut(
         let mine: Vec<&Member> = members.iter().filter(|m| m.piece == pair[cut]).collect();
         let facets: Vec<Facet> = mine.iter().map(|m| Facet::of(&m.corners, m.piece)).collect();
         let is_whole = mine.len() as u64 == pieces.list()[pair[cut] as usize].triangles;
-        if is_whole && mine.len() <= MOST_CUT && facets.iter().all(|f| on.covers(f)) {
+        if is_whole && mine.len() <= MOST_CUT && facets.iter().all(|f| on.covers(f)) && facets.iter().any(|f| on.meets(f)) {
             return Some(Cut { triangles: mine.into_iter().copied().collect(), join: None });
         }
-        let doomed: Vec<Member> = mine.iter().zip(&facets).filter(|(_, f)| on.meets(f)).map(|(m, _)| **m).collect();
-        if !doomed.is_empty() && doomed.len() <= MOST_CUT && (doomed.len() as u64) < pieces.list()[pair[cut] as usize].triangles {
+        let met: Vec<(&Member, &Facet)> = mine.into_iter().zip(&facets).filter(|(_, f)| on.meets(f)).collect();
+        let leaves_some = (met.len() as u64) < pieces.list()[pair[cut] as usize].triangles;
+        let area: f64 = met.iter().map(|(_, f)| f.area()).sum();
+        let overlapping: f64 = met.iter().map(|(_, f)| f.area() * on.share(f)).sum();
+        if lap && !met.is_empty() && met.len() <= MOST_CUT && leaves_some && overlapping >= OVERLAP * area {
+            let doomed = met.into_iter().map(|(member, _)| *member).collect();
             let boundary = boundary_vertices(edges);
             let of_piece = |piece: u32| {
                 let is_of = |v: &Vertex| shop.star(*v).any(|(t, _)| pieces.components.of_triangle[t as usize] == piece);
@@ -284,8 +302,8 @@ struct On<'l> {
 }
 
 impl On<'_> {
-    fn reach(&self, facet: &Facet) -> f64 {
-        self.reach.min(self.share * facet.height())
+    fn reach(&self, facet: &Facet) -> Reach {
+        Reach { on: self.reach.min(self.share * facet.height()), rim: self.reach }
     }
 
     fn places(&self, facet: &Facet) -> impl Iterator<Item = Option<Place>> {
@@ -299,6 +317,16 @@ impl On<'_> {
     /// Does all of a triangle lie on it?
     fn covers(&self, facet: &Facet) -> bool {
         self.places(facet).all(|place| place.is_some())
+    }
+
+    /// How much of a triangle lies on it, about.
+    fn share(&self, facet: &Facet) -> f64 {
+        let (mut on, mut all) = (0.0, 0.0);
+        self.places(facet).for_each(|place| {
+            all += 1.0;
+            on += if place.is_some() { 1.0 } else { 0.0 };
+        });
+        on / all
     }
 
     /// Does a part of a triangle lie on it, more than its edges on its rim?
@@ -320,8 +348,7 @@ impl Cut {
             let new = survey.promote(&wanted);
             work.extend(survey, &new, &[]);
             let by_position = numbered(work);
-            let completed: Vec<Vertex> =
-                wanted.iter().filter_map(|p| by_position.get(&p.map(f32::to_bits)).copied()).collect();
+            let completed: Vec<Vertex> = wanted.iter().filter_map(|p| by_position.get(&p.map(f32::to_bits)).copied()).collect();
             work.extend(survey, &[], &completed);
             let mut records: Vec<u32> = self.triangles.iter().filter_map(|m| m.place.ok()).collect();
             records.sort_unstable();

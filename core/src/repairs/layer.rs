@@ -20,6 +20,15 @@ pub(super) enum Place {
     Inside,
 }
 
+/// How near is near.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reach {
+    /// To a surface, so as to lie on it; 0: it is of no interest.
+    pub(super) on: f64,
+    /// To where it ends, so as to lie at its rim.
+    pub(super) rim: f64,
+}
+
 /// A triangle of a piece, with its unit normal.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Facet {
@@ -40,6 +49,11 @@ impl Facet {
         (a + b + c) / 3.0
     }
 
+    pub(super) fn area(&self) -> f64 {
+        let [a, b, c] = self.corners;
+        (b - a).cross(c - a).length() / 2.0
+    }
+
     /// The smallest of its heights.
     pub(super) fn height(&self) -> f64 {
         let [a, b, c] = self.corners;
@@ -47,13 +61,13 @@ impl Facet {
         if longest > 0.0 { (b - a).cross(c - a).length() / longest } else { 0.0 }
     }
 
-    /// Does a segment run over its inside, farther than `reach` from its edges, and nowhere there farther than that from its plane?
-    fn is_crossed_by(&self, [from, to]: [DVec3; 2], reach: f64) -> bool {
+    /// Does a segment run over its inside, farther than `rim` from its edges, and nowhere there farther than `reach` from its plane?
+    fn is_crossed_by(&self, [from, to]: [DVec3; 2], Reach { on: reach, rim }: Reach) -> bool {
         let (mut start, mut end) = (0.0, 1.0);
         for k in 0..3 {
             let (a, b) = (self.corners[k], self.corners[(k + 1) % 3]);
             let inward = self.normal.cross(b - a).normalize_or_zero();
-            let [at_start, at_end] = [from, to].map(|p| (p - a).dot(inward) - reach);
+            let [at_start, at_end] = [from, to].map(|p| (p - a).dot(inward) - rim);
             if at_start <= 0.0 && at_end <= 0.0 {
                 return false;
             }
@@ -110,16 +124,15 @@ impl Layer {
     }
 
     /// On which pieces a point lies that faces along `normal`, and where on them; ascending, each once. `reach`: how near it must be to a
-    /// piece, at most `most`; 0: the piece is of no interest.
-    pub(super) fn under(&self, p: DVec3, normal: DVec3, most: f64, reach: impl Fn(u32) -> f64) -> Vec<(u32, Place)> {
-        let wanted = around(&[p], most);
+    /// piece, at most `most`.
+    pub(super) fn under(&self, p: DVec3, normal: DVec3, most: Reach, reach: impl Fn(u32) -> Reach) -> Vec<(u32, Place)> {
         let mut found = Vec::new();
         let mut pieces: Vec<u32> = Vec::new();
         if let Some(tree) = &self.tree {
-            tree.meeting(&wanted, &mut found);
+            tree.meeting(&around(&[p], most.on), &mut found);
         }
         for facet in found.iter().map(|f| &self.facets[*f as usize]) {
-            let reach = reach(facet.piece);
+            let reach = reach(facet.piece).on;
             if reach > 0.0
                 && facet.normal.dot(normal) >= AGREE
                 && !pieces.contains(&facet.piece)
@@ -132,17 +145,17 @@ impl Layer {
             return Vec::new();
         }
         pieces.sort_unstable();
-        let near = self.rims_near(&wanted);
+        let near = self.rims_near(&around(&[p], most.rim));
         let is_rim = |piece: u32| {
-            let reach = reach(piece);
+            let reach = reach(piece).rim;
             near.iter().any(|r| r.piece == piece && p.distance_squared(r.foot(p)) <= reach * reach)
         };
         pieces.into_iter().map(|piece| (piece, if is_rim(piece) { Place::Rim } else { Place::Inside })).collect()
     }
 
     /// Does a rim run over the inside of a triangle, facing the same way?
-    pub(super) fn ends_over(&self, facet: &Facet, reach: f64) -> bool {
-        let near = self.rims_near(&around(&facet.corners, reach));
+    pub(super) fn ends_over(&self, facet: &Facet, reach: Reach) -> bool {
+        let near = self.rims_near(&around(&facet.corners, reach.on));
         near.iter().any(|r| r.normal.dot(facet.normal) >= AGREE && facet.is_crossed_by(r.ends, reach))
     }
 
@@ -206,6 +219,8 @@ mod tests {
 
     use super::*;
 
+    const NEAR: Reach = Reach { on: 0.1, rim: 0.1 };
+
     /// The lower left half of the unit square, facing up, which ends at its long side.
     fn half() -> Layer {
         let facet = Facet::of(&[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], 7);
@@ -216,12 +231,12 @@ mod tests {
     #[test]
     fn a_point_lies_inside_at_the_rim_or_not_on_it() {
         let layer = half();
-        let at = |x: f64, y: f64, z: f64, up: DVec3| layer.under(DVec3::new(x, y, z), up, 0.1, |_| 0.1);
+        let at = |x: f64, y: f64, z: f64, up: DVec3| layer.under(DVec3::new(x, y, z), up, NEAR, |_| NEAR);
         assert_eq!(at(0.2, 0.2, 0.1, DVec3::Z), [(7, Place::Inside)]);
         assert_eq!(at(0.5, 0.45, 0.0, DVec3::Z), [(7, Place::Rim)]);
         assert_eq!(at(0.2, 0.2, 0.11, DVec3::Z), [], "too high");
         assert_eq!(at(0.2, 0.2, 0.0, DVec3::NEG_Z), [], "it faces the other way");
-        assert!(layer.under(DVec3::splat(0.0), DVec3::Z, 0.1, |_| 0.0).is_empty(), "of no interest");
+        assert!(layer.under(DVec3::ZERO, DVec3::Z, NEAR, |_| Reach { on: 0.0, ..NEAR }).is_empty(), "of no interest");
     }
 
     #[test]
@@ -229,13 +244,13 @@ mod tests {
         let layer = half();
         let over = |by: f64| {
             let corners = [[0.5, 0.5], [1.5, 0.5], [0.5, 1.5]].map(|[x, y]| [(x - by) as f32, (y - by) as f32, 0.05]);
-            layer.ends_over(&Facet::of(&corners, 0), 0.1)
+            layer.ends_over(&Facet::of(&corners, 0), NEAR)
         };
         assert!(over(0.25));
         assert!(!over(0.0), "it only touches the corner");
         assert!(!over(-0.2), "it is beyond");
         let along = Facet::of(&[[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]], 0);
-        assert!(!layer.ends_over(&along, 0.1), "its neighbour");
+        assert!(!layer.ends_over(&along, NEAR), "its neighbour");
     }
 
     proptest! {

@@ -161,6 +161,7 @@ fn report(task: Task, mesh: &MeshFile, diagnosis: &Diagnosis<'_>, profile: &Prof
         loops: BoundaryLoops::default(),
         repairs: Vec::new(),
         loops_left: Vec::new(),
+        sheets_dropped: Vec::new(),
         edit: EditSummary::default(),
         edit_records: None,
         verdict: verdict::judge(&diagnosis.defects, &flaws(mesh)),
@@ -221,6 +222,7 @@ fn mend(
         report.loops = repaired.loops;
         report.repairs = repaired.repairs;
         report.loops_left = repaired.loops_left;
+        report.sheets_dropped = repaired.sheets;
         swallowed = repaired.swallowed;
     }
     // Of the input's survey, the second look may go on; the memory of its workshop is needed for that of the output.
@@ -315,6 +317,7 @@ fn verify(
     report.outcome = if report.verdict.good { Outcome::Repaired } else { Outcome::NotGood };
     if report.verdict.good {
         let mut concerns = verdict::review(&report.before, surface, swallowed, &defects, &report.profile);
+        concerns.extend(verdict::review_sheets(&report.before, &report.sheets_dropped, &report.profile));
         if report.before.boundary_edges > 0 {
             // What was closed had to be guessed: nobody knows what stood in the part that is missing.
             concerns.extend(input.findings().iter().filter(|f| f.loss).map(|f| format!("a part is missing: {}", f.text)));

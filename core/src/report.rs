@@ -42,6 +42,9 @@ pub struct Report {
     pub repairs: Vec<Repair>,
     /// Boundary loops that were left open, and why (at most 1000 listed).
     pub loops_left: Vec<LoopLeft>,
+    /// Open sheets that were dropped since they can be no part of a solid, the largest first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sheets_dropped: Vec<SheetDropped>,
     /// The edit in numbers.
     pub edit: EditSummary,
     /// The edit itself, when asked for.
@@ -301,6 +304,17 @@ pub struct LoopLeft {
     pub edges: u64,
     pub perimeter: f64,
     pub reason: String,
+}
+
+/// An open sheet that was dropped.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SheetDropped {
+    /// Lower and upper corner of its box.
+    pub bounds: [[f32; 3]; 2],
+    pub area: f64,
+    pub triangles: u64,
+    /// It crossed a body, or another sheet.
+    pub crosses: bool,
 }
 
 /// The edit in numbers. Every record of the output is an untouched input record, a replaced one or an added one.

@@ -50,6 +50,10 @@ pub struct Profile {
     pub debris_triangles: u32,
     /// ... if they have at most this share of the model's area, and all of them together at most ten times that; else all are kept.
     pub debris_area_share: f64,
+    /// What becomes of lone sheets, which bound nothing, beside bodies that do.
+    pub sheets: Sheets,
+    /// Sheets that are dropped may have this share of the model's area together without review.
+    pub max_sheets_share: f64,
     /// What becomes of bodies inside others.
     pub bodies: Bodies,
     /// Take surfaces apart that share an edge or a vertex, so that each has positions of its own.
@@ -68,6 +72,18 @@ pub enum Bodies {
     #[default]
     Union,
     /// Everything stays.
+    Keep,
+}
+
+/// What becomes of a lone sheet in a file that holds bodies as well.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sheets {
+    /// One that crosses a body or another sheet goes, since no solid can have it; others go if they are next to nothing
+    /// ([`Profile::debris_area_share`], all of them together).
+    #[default]
+    Drop,
+    /// All stay, and the file stays open.
     Keep,
 }
 
@@ -104,6 +120,8 @@ impl Default for Profile {
             max_bodies_lost: 0,
             debris_triangles: 4,
             debris_area_share: 1e-3,
+            sheets: Sheets::Drop,
+            max_sheets_share: 0.01,
             bodies: Bodies::Union,
             separate: true,
             max_separation_relative: 1e-4,
@@ -122,7 +140,9 @@ impl Profile {
             "scan" => {
                 Some(Self { max_hole_edges: 100_000, gap_edge_share: 0.5, max_volume_change: 1.0, debris_triangles: 100, ..base })
             }
-            "cautious" => Some(Self { fill_holes: false, gap_edge_share: 0.0, max_volume_change: 0.02, ..base }),
+            "cautious" => {
+                Some(Self { fill_holes: false, gap_edge_share: 0.0, sheets: Sheets::Keep, max_volume_change: 0.02, ..base })
+            }
             _ => None,
         }
     }

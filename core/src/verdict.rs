@@ -1,7 +1,7 @@
 //! The verdict: what counts of defects say about a file.
 
 use crate::repairs::Swallowed;
-use crate::report::{Defects, Verdict};
+use crate::report::{Defects, SheetDropped, Verdict};
 use crate::settings::Profile;
 use crate::sums::Bounds;
 
@@ -105,6 +105,16 @@ pub(crate) fn review(
         concerns.push(format!("{lost} of {all} bodies were lost"));
     }
     concerns
+}
+
+/// Whether a person should look at what was dropped of sheets: they may have been meant for walls.
+pub(crate) fn review_sheets(before: &Defects, dropped: &[SheetDropped], profile: &Profile) -> Option<String> {
+    let area: f64 = dropped.iter().map(|sheet| sheet.area).sum();
+    let [lo, hi] = dropped.first()?.bounds;
+    (area > profile.max_sheets_share * before.area).then(|| {
+        let (count, share) = (dropped.len(), area / before.area * 100.0);
+        format!("open sheets dropped that bound nothing, {count} of {share:.1} % of the area, the largest from {lo:?} to {hi:?}")
+    })
 }
 
 #[cfg(test)]

@@ -62,6 +62,7 @@ pub(crate) fn check(profile: &Profile) -> Result<(), String> {
         ("max_volume_change", profile.max_volume_change),
         ("max_box_change_relative", profile.max_box_change_relative),
         ("debris_area_share", profile.debris_area_share),
+        ("max_sheets_share", profile.max_sheets_share),
     ];
     match fractions.iter().find(|(_, value)| !value.is_finite() || *value < 0.0) {
         Some((name, value)) => Err(format!("`{name}` must be a number from 0 up, not {value}")),

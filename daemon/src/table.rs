@@ -250,6 +250,7 @@ pub(crate) mod tests {
             repairs: vec![],
             loops: BoundaryLoops::default(),
             loops_left: vec![],
+            sheets_dropped: vec![],
             edit: EditSummary::default(),
             edit_records: None,
             verdict: Verdict {

@@ -28,6 +28,18 @@ pub(super) struct Closed {
     pub(super) loops: u64,
     pub(super) by_method: BTreeMap<String, u64>,
     pub(super) left: Vec<LoopLeft>,
+    /// Of what was not closed, the rims of lone sheets.
+    pub(super) sheets: Vec<SheetRim>,
+}
+
+/// The rim of a lone sheet, which stays open.
+#[derive(Debug)]
+pub(super) struct SheetRim {
+    /// A triangle along it.
+    pub(super) triangle: u32,
+    pub(super) edges: usize,
+    /// Its place among the loops that are left, unless it comes after the last one listed.
+    pub(super) listed: Option<usize>,
 }
 
 /// Longest list of open loops in a report.
@@ -386,8 +398,15 @@ impl Closing<'_> {
             *closed.by_method.entry(format!("{}{shaped}", patch.method)).or_default() += loops;
         }
         self.open.sort_by_key(|(rim, _)| *rim);
-        for (rim, reason) in self.open.iter().take(LISTED) {
+        for (i, (rim, reason)) in self.open.iter().enumerate() {
             let rim = self.rim(*rim);
+            if matches!(reason, NotFilled::NotAdmitted(NotAdmitted::Sheet)) {
+                let listed = (i < LISTED).then_some(i);
+                closed.sheets.push(SheetRim { triangle: rim.triangles[0], edges: rim.vertices.len(), listed });
+            }
+            if i >= LISTED {
+                continue;
+            }
             closed.left.push(left(work, rim.vertices[0], rim.vertices.len(), rim.perimeter(work), reason));
         }
         self.drop_idle_joints(work);

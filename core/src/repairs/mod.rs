@@ -17,6 +17,7 @@ mod lap;
 mod layer;
 mod merge;
 mod orient;
+mod sheets;
 mod smooth;
 mod surplus;
 mod swallowed;
@@ -27,7 +28,7 @@ use std::time::Instant;
 
 use crate::engine::Diagnosis;
 use crate::holes;
-use crate::report::{BoundaryLoops, LoopLeft, Repair};
+use crate::report::{BoundaryLoops, LoopLeft, Repair, SheetDropped};
 use crate::settings::Profile;
 use crate::shop::components::Reversed;
 use crate::shop::near::Tolerance;
@@ -42,6 +43,7 @@ pub(crate) struct Repaired {
     /// The boundary loops as they were recognised, before any was closed.
     pub(crate) loops: BoundaryLoops,
     pub(crate) loops_left: Vec<LoopLeft>,
+    pub(crate) sheets: Vec<SheetDropped>,
     pub(crate) swallowed: Swallowed,
 }
 
@@ -84,15 +86,22 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
         tracing::info!(edges = contradictions, "No orientation satisfies all edges: a surface is one-sided.");
     }
     let mut loops_left = Vec::new();
+    let mut lone = Vec::new();
     let mut methods = String::new();
     log.time("fill", "", || {
         let closed = close::fill_loops(survey, shop, &reversed, tolerance, profile, threads);
         loops_left = closed.left;
+        lone = closed.sheets;
         let parts: Vec<String> = closed.by_method.iter().map(|(name, count)| format!("{count} {name}")).collect();
         methods = format!("loops closed: {}", parts.join(", "));
         closed.loops
     });
     log.note("fill", methods);
+    let mut sheets = Vec::new();
+    log.time("sheets", "open sheets dropped that can be no part of a solid, listed in `sheets_dropped`", || {
+        sheets = sheets::drop(survey, shop, &mut reversed, &lone, &mut loops_left, profile);
+        sheets.len() as u64
+    });
     let mut pieces = None;
     log.time("outward", "components that were inside out", || {
         let found = orient::pieces(survey, shop, &reversed);
@@ -104,10 +113,10 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
     let mut swallowed = Swallowed::default();
     log.time("swallowed", "", || {
         let pieces = pieces.unwrap_or_else(|| orient::pieces(survey, shop, &reversed));
-        swallowed = swallowed::remove(survey, shop, &reversed, &pieces, profile);
+        swallowed = swallowed::remove(survey, shop, &mut reversed, &pieces, profile);
         swallowed.bodies
     });
-    let Swallowed { bodies, volume, patches } = &mut swallowed;
+    let Swallowed { bodies, volume } = &swallowed;
     let note = format!("bodies in the material of others removed: {bodies}, of {volume:.4} units³ together");
     log.note("swallowed", note);
     let mut separated = apart::Separated::default();
@@ -116,8 +125,7 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
         separated.vertices + separated.edges
     });
     log.note("separated", separated.to_string());
-    reversed.dropped = std::mem::take(patches);
-    Repaired { reversed, repairs: log.repairs, loops: loops.unwrap_or_default(), loops_left, swallowed }
+    Repaired { reversed, repairs: log.repairs, loops: loops.unwrap_or_default(), loops_left, sheets, swallowed }
 }
 
 /// The boundary loops of a workshop, with their kinds. They are what is left when surplus surface is gone and vertices within the weld

@@ -129,7 +129,7 @@ pub(super) fn make_outward(
         triangles += component.triangles;
     }
     for (p, component) in components.of_patch.iter().enumerate() {
-        reversed.patches[p] ^= inverted[*component as usize];
+        reversed.patches[p] ^= inverted.get(*component as usize) == Some(&true);
     }
     for (t, component) in components.of_triangle.iter().enumerate() {
         if *component != NONE && inverted[*component as usize] {

@@ -27,8 +27,6 @@ pub(crate) struct Swallowed {
     pub(crate) bodies: u64,
     /// What the bodies enclose less their cavities, which lies in the bodies around them as well. In the file's units, cubed.
     pub(crate) volume: f64,
-    /// Which patches of sound surface go with them; empty: none.
-    pub(crate) patches: Vec<bool>,
 }
 
 /// Removes what lies in the material of others and crosses nothing. Nothing is removed if it is not known what crosses what. Reads the
@@ -37,7 +35,7 @@ pub(crate) struct Swallowed {
 pub(super) fn remove(
     survey: &Survey<'_>,
     work: &mut Work<'_>,
-    reversed: &Reversed,
+    reversed: &mut Reversed,
     pieces: &Components,
     profile: &Profile,
 ) -> Swallowed {
@@ -74,7 +72,7 @@ pub(super) fn remove(
         return swallowed;
     }
     let goes = |piece: &u32| *piece != NONE && is_swallowed[*piece as usize];
-    swallowed.patches = pieces.of_patch.iter().map(goes).collect();
+    reversed.dropped.iter_mut().zip(&pieces.of_patch).for_each(|(dropped, piece)| *dropped |= goes(piece));
     let doomed: Vec<u32> = shop.living().filter(|t| goes(&pieces.of_triangle[*t as usize])).collect();
     doomed.into_iter().for_each(|t| work.kill(t));
     swallowed
@@ -114,7 +112,12 @@ fn are_as_read(survey: &Survey<'_>, shop: &Shop, pieces: &Components, reversed: 
 }
 
 /// Which pieces cross another one.
-fn crossing(survey: &Survey<'_>, shop: &Shop, pieces: &Components, pairs: impl Iterator<Item = [u32; 2]> + Clone) -> Vec<bool> {
+pub(super) fn crossing(
+    survey: &Survey<'_>,
+    shop: &Shop,
+    pieces: &Components,
+    pairs: impl Iterator<Item = [u32; 2]> + Clone,
+) -> Vec<bool> {
     let mut crossing = vec![false; pieces.list.len()];
     let of_record = components_of_records(survey, shop, pieces, pairs.clone().flatten());
     for pair in pairs {
@@ -148,8 +151,7 @@ mod tests {
             let pieces = orient::pieces(&d.survey, work, turned);
             orient::make_outward(&d.survey, work, turned, &pieces);
             let pieces = orient::pieces(&d.survey, work, turned);
-            let Swallowed { bodies, volume, patches } = remove(&d.survey, work, turned, &pieces, &profile);
-            turned.dropped = patches;
+            let Swallowed { bodies, volume } = remove(&d.survey, work, turned, &pieces, &profile);
             (bodies, volume)
         })
     }

@@ -11,13 +11,12 @@ use crate::survey::Survey;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Reversed {
     pub(crate) patches: Vec<bool>,
-    /// Decided last, when nobody asks for components any more; empty: none.
     pub(crate) dropped: Vec<bool>,
 }
 
 impl Reversed {
     pub(crate) fn none(survey: &Survey<'_>) -> Self {
-        Self { patches: vec![false; survey.patches.len()], dropped: Vec::new() }
+        Self { patches: vec![false; survey.patches.len()], dropped: vec![false; survey.patches.len()] }
     }
 }
 
@@ -97,7 +96,7 @@ impl Components {
             Self { list: Vec::new(), of_patch: vec![NONE; patches as usize], of_triangle: vec![NONE; shop.triangles.len()] };
         let mut numbers = vec![NONE; parents.len()];
         // After a second look, there may be nothing left of a patch.
-        for p in (0..patches).filter(|p| survey.patches[*p as usize].first != NONE) {
+        for p in (0..patches).filter(|p| survey.patches[*p as usize].first != NONE && !reversed.dropped[*p as usize]) {
             let sum = &survey.patches[p as usize];
             let c = all.number(&mut numbers, chunk::find(&mut parents, p), Sample { record: sum.first, in_shop: None });
             all.of_patch[p as usize] = c;

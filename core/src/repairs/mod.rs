@@ -17,6 +17,7 @@ mod lap;
 mod layer;
 mod merge;
 mod orient;
+mod overrun;
 mod sheets;
 mod smooth;
 mod surplus;
@@ -73,6 +74,9 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
     }
     log.time("zip", "vertices merged with the one that faces them across a narrow gap", || zip::zip(shop, tolerance, profile));
     clean(survey, shop, &mut log);
+    log.time("overrun", "triangles of slits whose sides run past each other into the model, cut back", || {
+        overrun::cut_back(survey, shop)
+    });
     log.time("debris", "triangles of open specks dropped, which together are next to nothing of the surface", || {
         debris::drop(survey, shop, profile)
     });

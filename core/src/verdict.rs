@@ -219,4 +219,16 @@ mod tests {
         assert!(concerns(&swallowed).is_empty(), "{:?}", concerns(&swallowed));
         assert_eq!(concerns(&Swallowed::default()).len(), 2, "the volume, and the bodies");
     }
+
+    #[test]
+    fn dropped_sheets_need_review_beyond_a_share_of_the_area() {
+        let before = Defects { area: 600.0, ..cube() };
+        let concern = |area: f64| {
+            let sheet = SheetDropped { bounds: [[0.0; 3], [1.0; 3]], area, triangles: 2, crosses: true };
+            review_sheets(&before, &[sheet.clone(), sheet], &Profile { max_sheets_share: 0.25, ..Profile::default() })
+        };
+        assert_eq!(concern(75.0), None);
+        assert!(concern(75.1).is_some_and(|words| words.contains("2 of 25.0 %")));
+        assert_eq!(review_sheets(&before, &[], &Profile::default()), None);
+    }
 }

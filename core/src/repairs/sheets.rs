@@ -72,7 +72,7 @@ pub(super) fn drop(
     let closed: Vec<usize> =
         rims.iter().filter(|rim| goes(components.of_triangle[rim.triangle as usize])).filter_map(|rim| rim.listed).collect();
     let mut number = 0..;
-    left.retain(|_| !number.next().is_some_and(|i| closed.binary_search(&i).is_ok()));
+    left.retain(|_| number.next().is_none_or(|i| closed.binary_search(&i).is_err()));
     reversed.dropped.iter_mut().zip(&components.of_patch).for_each(|(dropped, c)| *dropped |= goes(*c));
     let doomed: Vec<u32> = shop.living().filter(|t| goes(components.of_triangle[*t as usize])).collect();
     doomed.into_iter().for_each(|t| work.kill(t));

@@ -214,7 +214,7 @@ mod tests {
     #[test]
     fn what_lay_in_others_is_neither_lost_nor_a_change_of_volume() {
         let before = Defects { bodies: 1, nested_positive: 2, volume: 1.5, ..cube() };
-        let swallowed = Swallowed { bodies: 2, volume: 0.5, ..Swallowed::default() };
+        let swallowed = Swallowed { bodies: 2, volume: 0.5 };
         let concerns = |swallowed: &Swallowed| review(&before, &BOX, swallowed, &cube(), &Profile::default());
         assert!(concerns(&swallowed).is_empty(), "{:?}", concerns(&swallowed));
         assert_eq!(concerns(&Swallowed::default()).len(), 2, "the volume, and the bodies");

@@ -246,7 +246,7 @@ impl Grid {
 
 /// How the ray upwards from `p` crosses a triangle: 1 from inside to outside, −1 from outside to inside, 0 not at all. A point on
 /// the triangle's plane does not cross it.
-fn crossing(corners: &[[f32; 3]; 3], p: [f64; 3]) -> i32 {
+pub(crate) fn crossing(corners: &[[f32; 3]; 3], p: [f64; 3]) -> i32 {
     let q = corners.map(|c| c.map(f64::from));
     if q.iter().all(|c| c[2] < p[2]) {
         return 0;

@@ -23,7 +23,7 @@ use crate::shop::near::Tolerance;
 use crate::space::{self, Need};
 use crate::sums::Bounds;
 use crate::survey::Survey;
-use crate::{Progress, cost, defects, digest, emit, members, parallel, repairs, second, verdict};
+use crate::{Progress, cost, defects, digest, emit, members, parallel, record, repairs, second, verdict};
 
 /// Fewer bytes are hashed by one thread: starting more would take longer.
 const HASHED_BY_ONE: usize = 1 << 20;
@@ -75,7 +75,7 @@ pub(crate) struct Diagnosis<'a> {
 impl<'a> Diagnosis<'a> {
     pub(crate) fn of(
         path: &Path,
-        records: &'a [crate::record::Record],
+        records: &'a [record::Record],
         profile: &Profile,
         limits: &Limits,
         progress: &dyn Progress,
@@ -162,9 +162,10 @@ fn report(task: Task, mesh: &MeshFile, diagnosis: &Diagnosis<'_>, profile: &Prof
         repairs: Vec::new(),
         loops_left: Vec::new(),
         sheets_dropped: Vec::new(),
+        wraps: Vec::new(),
         edit: EditSummary::default(),
         edit_records: None,
-        verdict: verdict::judge(&diagnosis.defects, &flaws(mesh)),
+        verdict: verdict::judge(&diagnosis.defects, &flaws(mesh)).under(profile.guarantee),
         stages: Vec::new(),
         cost: Cost::default(),
     }
@@ -219,10 +220,12 @@ fn mend(
         let repaired = repairs::run(&mut diagnosis, profile, limits.threads);
         clock.lap("repair");
         edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &repaired.reversed);
+        edit.added.extend(repaired.wrapped.iter().map(|corners| record::encode(*corners, 0)));
         report.loops = repaired.loops;
         report.repairs = repaired.repairs;
         report.loops_left = repaired.loops_left;
         report.sheets_dropped = repaired.sheets;
+        report.wraps = repaired.wraps;
         swallowed = repaired.swallowed;
     }
     // Of the input's survey, the second look may go on; the memory of its workshop is needed for that of the output.
@@ -313,11 +316,12 @@ fn verify(
     };
     let (blake3, defects) = look_again(known, &written, &report.profile, limits, progress)?;
     let facts = facts(&written, blake3);
-    report.verdict = verdict::judge(&defects, &flaws(&written));
+    report.verdict = verdict::judge(&defects, &flaws(&written)).under(report.profile.guarantee);
     report.outcome = if report.verdict.good { Outcome::Repaired } else { Outcome::NotGood };
     if report.verdict.good {
         let mut concerns = verdict::review(&report.before, surface, swallowed, &defects, &report.profile);
         concerns.extend(verdict::review_sheets(&report.before, &report.sheets_dropped, &report.profile));
+        concerns.extend(verdict::review_wraps(&report.wraps, &report.profile));
         if report.before.boundary_edges > 0 {
             // What was closed had to be guessed: nobody knows what stood in the part that is missing.
             concerns.extend(input.findings().iter().filter(|f| f.loss).map(|f| format!("a part is missing: {}", f.text)));

@@ -50,10 +50,11 @@ mod survey;
 mod testing;
 mod verdict;
 mod weld;
+mod wrap;
 
 pub use error::{Error, ErrorClass};
 pub use report::Report;
-pub use settings::{Bodies, Limits, PatchShape, Profile};
+pub use settings::{Bodies, Guarantee, Limits, PatchShape, Profile};
 
 use std::path::Path;
 

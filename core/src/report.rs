@@ -45,6 +45,9 @@ pub struct Report {
     /// Open sheets that were dropped since they can be no part of a solid, the largest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sheets_dropped: Vec<SheetDropped>,
+    /// Regions that no repair made a solid: replaced by a wrap, or left, the largest first (at most 1000 listed).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub wraps: Vec<Wrap>,
     /// The edit in numbers.
     pub edit: EditSummary,
     /// The edit itself, when asked for.
@@ -315,6 +318,33 @@ pub struct SheetDropped {
     pub triangles: u64,
     /// It crossed a body, or another sheet.
     pub crosses: bool,
+}
+
+/// A region that no repair made a solid. Lengths in the model's units.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Wrap {
+    /// Smallest and largest coordinates of what was there.
+    pub bounds: [[f32; 3]; 2],
+    /// Triangles that were there after all other repairs.
+    pub replaced: u64,
+    /// Triangles that replace them.
+    pub added: u64,
+    /// Of what was there.
+    pub area: f64,
+    /// The same as a fraction of the whole surface.
+    pub area_share: f64,
+    /// Edge of the lattice's cubes; 0 if there is no lattice for it.
+    pub cell: f64,
+    /// What the wrap encloses.
+    pub volume: f64,
+    /// Largest distance from the old surface to the new one, measured at some of its corners and middles; what had material on both sides is left
+    /// out.
+    pub moved: f64,
+    /// Largest distance from the new surface to the old one, likewise: where holes were wide.
+    pub new_ground: f64,
+    /// Why it was left as it is; `None`: it was replaced.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub left: Option<String>,
 }
 
 /// The edit in numbers. Every record of the output is an untouched input record, a replaced one or an added one.

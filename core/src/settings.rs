@@ -60,8 +60,31 @@ pub struct Profile {
     pub separate: bool,
     /// How far a vertex may move for that, as a fraction of the diagonal; four steps of single precision are always allowed.
     pub max_separation_relative: f64,
+    /// What is done about what no repair makes a solid.
+    pub guarantee: Guarantee,
+    /// Most of the surface's area that may be replaced by wraps, as a fraction. 1: all of it, since a wrap is named in the report and needs review
+    /// anyway beyond [`Profile::wrap_review_share`].
+    pub wrap_max_share: f64,
+    /// Farthest that surface may lie from the wrap that replaces it, as a fraction of the diagonal. What had material on both of its sides
+    /// does not count.
+    pub wrap_max_move: f64,
+    /// Beyond this fraction of the surface's area in wraps a result needs review.
+    pub wrap_review_share: f64,
     /// Look for triangles that cross or overlap each other, in the input and in the output; without, the verdict calls it unchecked.
     pub check_self_intersections: bool,
+}
+
+/// What is done about what no repair makes a solid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Guarantee {
+    /// Nothing, and only what passes every check is good: one that was not made is not enough.
+    Strict,
+    /// It is replaced by a surface around what it encloses.
+    #[default]
+    Wrap,
+    /// Nothing; what was not checked is said to be unchecked.
+    Off,
 }
 
 /// What becomes of a body that lies inside another one.
@@ -125,6 +148,10 @@ impl Default for Profile {
             bodies: Bodies::Union,
             separate: true,
             max_separation_relative: 1e-4,
+            guarantee: Guarantee::Wrap,
+            wrap_max_share: 1.0,
+            wrap_max_move: 0.05,
+            wrap_review_share: 0.01,
             check_self_intersections: true,
         }
     }
@@ -132,7 +159,7 @@ impl Default for Profile {
 
 impl Profile {
     /// The profiles that come with the product, by name: `default`; `scan` (larger holes, wider gaps, for scanned surfaces);
-    /// `cautious` (welds and drops surplus triangles, but closes nothing).
+    /// `cautious` (welds and drops surplus triangles, but closes and wraps nothing).
     pub fn built_in(name: &str) -> Option<Self> {
         let base = Self { name: name.into(), ..Self::default() };
         match name {
@@ -140,9 +167,14 @@ impl Profile {
             "scan" => {
                 Some(Self { max_hole_edges: 100_000, gap_edge_share: 0.5, max_volume_change: 1.0, debris_triangles: 100, ..base })
             }
-            "cautious" => {
-                Some(Self { fill_holes: false, gap_edge_share: 0.0, sheets: Sheets::Keep, max_volume_change: 0.02, ..base })
-            }
+            "cautious" => Some(Self {
+                fill_holes: false,
+                gap_edge_share: 0.0,
+                sheets: Sheets::Keep,
+                max_volume_change: 0.02,
+                guarantee: Guarantee::Strict,
+                ..base
+            }),
             _ => None,
         }
     }

@@ -1,8 +1,8 @@
 //! The verdict: what counts of defects say about a file.
 
 use crate::repairs::Swallowed;
-use crate::report::{Defects, SheetDropped, Verdict};
-use crate::settings::Profile;
+use crate::report::{Defects, SheetDropped, Verdict, Wrap};
+use crate::settings::{Guarantee, Profile};
 use crate::sums::Bounds;
 
 /// What was not looked at is called unchecked, never assumed.
@@ -69,6 +69,26 @@ pub(crate) fn judge(defects: &Defects, flaws: &[String]) -> Verdict {
         reasons,
         unchecked,
     }
+}
+
+impl Verdict {
+    /// The same, strictly: what was not checked is not good.
+    pub(crate) fn under(mut self, guarantee: Guarantee) -> Self {
+        if guarantee == Guarantee::Strict && self.good && !self.unchecked.is_empty() {
+            self.good = false;
+            self.reasons.push(format!("{} unchecked", self.unchecked.join(", ")));
+        }
+        self
+    }
+}
+
+/// What wraps have replaced beyond the profile's limit, in words.
+pub(crate) fn review_wraps(wraps: &[Wrap], profile: &Profile) -> Option<String> {
+    let done = || wraps.iter().filter(|wrap| wrap.left.is_none());
+    let share: f64 = done().map(|wrap| wrap.area_share).sum();
+    let moved = done().map(|wrap| wrap.moved).fold(0.0, f64::max);
+    (share > profile.wrap_review_share)
+        .then(|| format!("{:.1} % of the surface was replaced by wraps, and moved by up to {moved:.4}", share * 100.0))
 }
 
 /// What a good result has changed beyond the profile's limits, in words; empty when a person need not look. `surface`: the box of the

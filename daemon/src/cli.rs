@@ -76,6 +76,27 @@ pub(crate) struct Spend {
 
 /// As the engine's own, for the command line.
 #[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum Guarantee {
+    /// Leave it, and call only good what passed every check
+    Strict,
+    /// Replace it by a surface around what it encloses
+    Wrap,
+    /// Leave it
+    Off,
+}
+
+impl From<Guarantee> for suture_core::Guarantee {
+    fn from(guarantee: Guarantee) -> Self {
+        match guarantee {
+            Guarantee::Strict => Self::Strict,
+            Guarantee::Wrap => Self::Wrap,
+            Guarantee::Off => Self::Off,
+        }
+    }
+}
+
+/// As the engine's own, for the command line.
+#[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum Spill {
     Auto,
     Always,
@@ -115,6 +136,9 @@ pub(crate) struct RepairArgs {
     /// Do not look for self-intersections: faster, but the verdict then calls them unchecked
     #[arg(long)]
     pub no_self_intersections: bool,
+    /// What to do about what no repair makes a solid [default: the profile's, which is wrap but for cautious]
+    #[arg(long, value_enum)]
+    pub guarantee: Option<Guarantee>,
     #[command(flatten)]
     pub spend: Spend,
     /// Print reports as JSON, one a line, instead of tables

@@ -63,6 +63,9 @@ pub(crate) fn check(profile: &Profile) -> Result<(), String> {
         ("max_box_change_relative", profile.max_box_change_relative),
         ("debris_area_share", profile.debris_area_share),
         ("max_sheets_share", profile.max_sheets_share),
+        ("wrap_max_share", profile.wrap_max_share),
+        ("wrap_max_move", profile.wrap_max_move),
+        ("wrap_review_share", profile.wrap_review_share),
     ];
     match fractions.iter().find(|(_, value)| !value.is_finite() || *value < 0.0) {
         Some((name, value)) => Err(format!("`{name}` must be a number from 0 up, not {value}")),

@@ -19,7 +19,8 @@ use crate::{profiles, table};
 
 /// Repairs every input and prints what was done.
 pub(crate) fn repair(args: &RepairArgs) -> Exit {
-    let order = profiles::of_command(&args.profile, args.no_self_intersections).and_then(|profile| {
+    let order = profiles::of_command(&args.profile, args.no_self_intersections).and_then(|mut profile| {
+        profile.guarantee = args.guarantee.map_or(profile.guarantee, Into::into);
         let naming = Some(Naming::new(args)?);
         Ok(Order { inputs: &args.inputs, profile, limits: args.spend.limits(args.list_edit), naming, json: args.json })
     });

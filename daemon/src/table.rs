@@ -78,6 +78,7 @@ pub(crate) fn render(report: &Report) -> String {
     if report.loops_left.len() > LOOPS_SHOWN {
         item(&mut out, "left", &format!("{} more loops, listed in the report", report.loops_left.len() - LOOPS_SHOWN));
     }
+    wraps(&mut out, report);
     pairs_left(&mut out, report);
     if report.task == Task::Repair && report.outcome != Outcome::Clean {
         item(&mut out, "edit", &edit(report));
@@ -92,6 +93,25 @@ pub(crate) fn render(report: &Report) -> String {
         item(&mut out, "wrote", &format!("{} ({})", output.path.display(), show_size(output.bytes)));
     }
     out
+}
+
+/// The largest regions that were wrapped, or would have been.
+fn wraps(out: &mut String, report: &Report) {
+    for wrap in report.wraps.iter().take(LOOPS_SHOWN) {
+        let [lo, hi] = wrap.bounds;
+        let what = format!(
+            "{} triangles from {lo:?} to {hi:?}, {:.1} % of the surface",
+            show_count(wrap.replaced),
+            wrap.area_share * 100.0
+        );
+        match &wrap.left {
+            Some(reason) => item(out, "left", &format!("no solid: {what}: {reason}")),
+            None => item(out, "wrapped", &format!("{what}, moved by up to {:.4}", wrap.moved)),
+        }
+    }
+    if report.wraps.len() > LOOPS_SHOWN {
+        item(out, "", &format!("{} more regions, listed in the report", report.wraps.len() - LOOPS_SHOWN));
+    }
 }
 
 /// The kinds of the input's boundary loops; for an inspection also the first of them.
@@ -251,6 +271,7 @@ pub(crate) mod tests {
             loops: BoundaryLoops::default(),
             loops_left: vec![],
             sheets_dropped: vec![],
+            wraps: vec![],
             edit: EditSummary::default(),
             edit_records: None,
             verdict: Verdict {

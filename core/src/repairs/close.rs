@@ -30,6 +30,8 @@ pub(super) struct Closed {
     pub(super) left: Vec<LoopLeft>,
     /// Of what was not closed, the rims of lone sheets.
     pub(super) sheets: Vec<SheetRim>,
+    /// A vertex of each loop that was left open on purpose: it was not admitted.
+    pub(super) kept_open: Vec<[f32; 3]>,
 }
 
 /// The rim of a lone sheet, which stays open.
@@ -398,6 +400,8 @@ impl Closing<'_> {
             *closed.by_method.entry(format!("{}{shaped}", patch.method)).or_default() += loops;
         }
         self.open.sort_by_key(|(rim, _)| *rim);
+        let kept = self.open.iter().filter(|(_, reason)| matches!(reason, NotFilled::NotAdmitted(_)));
+        closed.kept_open = kept.map(|(rim, _)| work.positions[self.rim(*rim).vertices[0] as usize]).collect();
         for (i, (rim, reason)) in self.open.iter().enumerate() {
             let rim = self.rim(*rim);
             if matches!(reason, NotFilled::NotAdmitted(NotAdmitted::Sheet)) {

@@ -23,14 +23,15 @@ mod smooth;
 mod surplus;
 mod swallowed;
 mod work;
+mod wrap;
 mod zip;
 
 use std::time::Instant;
 
 use crate::engine::Diagnosis;
 use crate::holes;
-use crate::report::{BoundaryLoops, LoopLeft, Repair, SheetDropped};
-use crate::settings::Profile;
+use crate::report::{BoundaryLoops, LoopLeft, Repair, SheetDropped, Wrap};
+use crate::settings::{Guarantee, Profile};
 use crate::shop::components::Reversed;
 use crate::shop::near::Tolerance;
 use crate::survey::Survey;
@@ -46,6 +47,10 @@ pub(crate) struct Repaired {
     pub(crate) loops_left: Vec<LoopLeft>,
     pub(crate) sheets: Vec<SheetDropped>,
     pub(crate) swallowed: Swallowed,
+    /// What was replaced because nothing else made it a solid, or would have been.
+    pub(crate) wraps: Vec<Wrap>,
+    /// The triangles that replace it, which are not in the shop.
+    pub(crate) wrapped: Vec<[[f32; 3]; 3]>,
 }
 
 /// Rounds of weld, split and clean-up: each round can uncover work for the next. A count, so that results do not depend on time.
@@ -89,12 +94,12 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
     if contradictions > 0 {
         tracing::info!(edges = contradictions, "No orientation satisfies all edges: a surface is one-sided.");
     }
-    let mut loops_left = Vec::new();
+    let (mut loops_left, mut kept_open) = (Vec::new(), Vec::new());
     let mut lone = Vec::new();
     let mut methods = String::new();
     log.time("fill", "", || {
         let closed = close::fill_loops(survey, shop, &reversed, tolerance, profile, threads);
-        loops_left = closed.left;
+        (loops_left, kept_open) = (closed.left, closed.kept_open);
         lone = closed.sheets;
         let parts: Vec<String> = closed.by_method.iter().map(|(name, count)| format!("{count} {name}")).collect();
         methods = format!("loops closed: {}", parts.join(", "));
@@ -129,7 +134,25 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
         separated.vertices + separated.edges
     });
     log.note("separated", separated.to_string());
-    Repaired { reversed, repairs: log.repairs, loops: loops.unwrap_or_default(), loops_left, sheets, swallowed }
+    let mut wraps = wrap::Wraps::default();
+    if profile.guarantee == Guarantee::Wrap {
+        log.time("wrap", "regions that nothing else made a solid, replaced by a surface around what they enclose", || {
+            let pairs = if profile.check_self_intersections { wrap::crossing_pairs(survey, shop) } else { Some(Vec::new()) };
+            wraps = wrap::replace(survey, shop, &mut reversed, pairs.as_deref(), &kept_open, profile, threads);
+            wraps.regions
+        });
+        loops_left.retain(|left| !wraps.replaced(left.at));
+    }
+    Repaired {
+        reversed,
+        repairs: log.repairs,
+        loops: loops.unwrap_or_default(),
+        loops_left,
+        sheets,
+        swallowed,
+        wraps: wraps.listed,
+        wrapped: wraps.triangles,
+    }
 }
 
 /// The boundary loops of a workshop, with their kinds. They are what is left when surplus surface is gone and vertices within the weld

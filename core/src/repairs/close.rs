@@ -134,6 +134,9 @@ pub(super) fn fill_loops(
         closing.guard(survey, work);
     }
     let mut closed = closing.finish(work);
+    if !profile.fill_holes {
+        closed.kept_open.extend(chains.iter().map(|chain| work.positions[chain[0] as usize]));
+    }
     for chain in chains.iter().take(LISTED.saturating_sub(closed.left.len())) {
         let length = chain.windows(2).map(|w| work.distance(w[0], w[1])).sum();
         closed.left.push(left(work, chain[0], chain.len() - 1, length, &NO_LOOP));

@@ -307,7 +307,7 @@ impl Angle {
             im = hardly * side(t, from);
         } else if re < 0.0 && im.abs() < hardly {
             // Hardly off the triangle: which side it is decides by half a turn, and rays must agree with that.
-            im = im.abs().copysign(side(t, from));
+            im = im.abs().max(1e-9 * hardly) * side(t, from);
         }
         let size = re.abs() + im.abs();
         if size.is_nan() || size <= 0.0 {

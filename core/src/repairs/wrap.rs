@@ -92,7 +92,7 @@ pub(super) fn replace(
     threads: usize,
 ) -> Wraps {
     let pieces = orient::pieces(survey, work, reversed);
-    let mut groups = Groups::of(survey, work, reversed, &pieces, pairs, kept_open);
+    let mut groups = Groups::of(survey, work, &pieces, pairs, kept_open);
     let mut wraps = Wraps::default();
     if !groups.broken.contains(&true) {
         return wraps;
@@ -125,13 +125,12 @@ pub(super) fn replace(
         }
         met.into_iter().flatten().for_each(|[a, b]| groups.unite(a, b));
     }
-    apply(survey, work, reversed, &pieces, outcomes, &mut wraps);
+    apply(work, reversed, &pieces, outcomes, &mut wraps);
     wraps
 }
 
 /// Takes what was replaced away, and lists what was done.
 fn apply(
-    survey: &Survey<'_>,
     work: &mut Work<'_>,
     reversed: &mut Reversed,
     pieces: &Components,
@@ -159,7 +158,6 @@ fn apply(
     wraps.gone.dedup();
     doomed.into_iter().for_each(|t| work.kill(t));
     if pieces.of_patch.iter().any(|piece| goes(*piece)) {
-        reversed.dropped.resize(survey.patches.len(), false);
         reversed.dropped.iter_mut().zip(&pieces.of_patch).for_each(|(dropped, piece)| *dropped |= goes(*piece));
     }
 }
@@ -197,7 +195,6 @@ impl Groups {
     fn of(
         survey: &Survey<'_>,
         work: &mut Work<'_>,
-        reversed: &Reversed,
         pieces: &Components,
         pairs: Option<&[[u32; 2]]>,
         kept_open: &[[f32; 3]],
@@ -244,10 +241,6 @@ impl Groups {
                 (1..count as u32).for_each(|piece| groups.unite(0, piece));
                 groups.broken.fill(true);
             }
-        }
-        // What was swallowed is gone already.
-        for (piece, _) in pieces.of_patch.iter().zip(&reversed.dropped).filter(|(piece, gone)| **gone && **piece != NONE) {
-            groups.broken[*piece as usize] = false;
         }
         let mut kept: Vec<[u32; 3]> = kept_open.iter().copied().map(bits).collect();
         kept.sort_unstable();
@@ -507,8 +500,7 @@ impl Site<'_, '_> {
         let mut goes = vec![false; self.pieces.list.len()];
         accepted.iter().flat_map(|(group, _)| group.iter()).for_each(|piece| goes[*piece as usize] = true);
         let goes = |piece: u32| piece != NONE && goes[piece as usize];
-        let is_dropped = |patch: u32| self.reversed.dropped.get(patch as usize) == Some(&true);
-        let goes_with = |patch: u32| is_dropped(patch) || goes(self.pieces.of_patch[patch as usize]);
+        let goes_with = |patch: u32| self.reversed.dropped[patch as usize] || goes(self.pieces.of_patch[patch as usize]);
         let Changes { mut gone, living: changed } = guard::changes(self.survey, self.shop);
         gone.extend(self.shop.living().filter(|t| goes(self.pieces.of_triangle[*t as usize])).map(|t| self.shop.record(t)));
         let sound = self.survey.visit_sound(

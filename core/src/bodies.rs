@@ -26,11 +26,10 @@ impl Surroundings {
     }
 }
 
-/// A ray upwards from a point of a component.
+/// A ray upwards from a point.
 struct Ray {
-    component: u32,
     from: [f64; 3],
-    /// Closed components whose boxes hold this component's box, ascending.
+    /// Closed components whose crossings count, ascending.
     candidates: Vec<u32>,
 }
 
@@ -44,53 +43,87 @@ pub(crate) fn surroundings(
     asks: impl Fn(&Component) -> bool,
 ) -> Vec<Surroundings> {
     let mut all = vec![Surroundings::default(); components.list.len()];
-    let rays = rays(survey, shop, &components.list, asks);
+    let (of_rays, rays) = rays(survey, shop, &components.list, asks);
+    for (component, around) in of_rays.into_iter().zip(count(survey, shop, components, reversed, &rays)) {
+        all[component as usize].around = around;
+    }
+    all
+}
+
+/// How often all closed components together wind around each of some points, none of which may lie on a surface. Reads the chunks of the
+/// file that the rays may meet.
+pub(crate) fn windings(
+    survey: &Survey<'_>,
+    shop: &Shop,
+    components: &Components,
+    reversed: &Reversed,
+    points: &[[f64; 3]],
+) -> Vec<i32> {
+    let closed: Vec<u32> = (0..components.list.len() as u32).filter(|c| !components.list[*c as usize].open).collect();
+    let boxes: Vec<Bounds> = closed.iter().map(|c| components.list[*c as usize].bounds).collect();
+    let tree = BoxTree::new(&boxes);
+    let mut found = Vec::new();
+    let rays: Vec<Ray> = points
+        .iter()
+        .map(|from| {
+            let [lo, hi] = [0, 1].map(|side| from.map(|x| around(x)[side]));
+            // What the point is in is met by the box of the f32 around it.
+            tree.meeting(&Bounds { lo, hi }, &mut found);
+            found.sort_unstable();
+            Ray { from: *from, candidates: found.iter().map(|c| closed[*c as usize]).collect() }
+        })
+        .collect();
+    let counted = count(survey, shop, components, reversed, &rays);
+    counted.into_iter().map(|around| around.iter().map(|(_, w)| w).sum()).collect()
+}
+
+/// For each ray the components of its candidates that wind around where it begins, ascending.
+fn count(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed: &Reversed, rays: &[Ray]) -> Vec<Vec<(u32, i32)>> {
     if rays.is_empty() {
-        return all;
+        return Vec::new();
     }
     let mut asked = vec![false; components.list.len()];
     rays.iter().flat_map(|r| &r.candidates).for_each(|c| asked[*c as usize] = true);
-    let grid = Grid::new(&rays);
+    let grid = Grid::new(rays);
 
     let mut counts = vec![0i32; rays.iter().map(|r| r.candidates.len()).sum()];
     let is_asked = |patch: u32| asked.get(components.of_patch[patch as usize] as usize) == Some(&true);
     let per_chunk = survey.visit_sound(
         is_asked,
-        |reach| Over::new(&rays, &grid, reach).map(|over| (over, Vec::new())),
+        |reach| Over::new(rays, &grid, reach).map(|over| (over, Vec::new())),
         |(over, _), corners| over.may_meet(&grid, corners),
         |(_, hits): &mut (Over, Vec<(u32, i32)>), triangle, patch| {
             let corners = record::corners(&survey.records[triangle as usize]);
             let sign = if reversed.patches[patch as usize] { -1 } else { 1 };
-            grid.cross(&rays, &corners, components.of_patch[patch as usize], &mut |at, w| hits.push((at, sign * w)));
+            grid.cross(rays, &corners, components.of_patch[patch as usize], &mut |at, w| hits.push((at, sign * w)));
         },
     );
     per_chunk.into_iter().flat_map(|(_, hits)| hits).for_each(|(at, w)| counts[at as usize] += w);
     for t in shop.living() {
         let component = components.of_triangle[t as usize];
         if asked[component as usize] {
-            grid.cross(&rays, &shop.points(t), component, &mut |at, w| counts[at as usize] += w);
+            grid.cross(rays, &shop.points(t), component, &mut |at, w| counts[at as usize] += w);
         }
     }
     let mut at = 0;
-    for ray in &rays {
+    let around = |ray: &Ray| {
         let found = &counts[at..at + ray.candidates.len()];
         at += ray.candidates.len();
-        all[ray.component as usize].around =
-            ray.candidates.iter().zip(found).filter(|(_, w)| **w != 0).map(|(c, w)| (*c, *w)).collect();
-    }
-    all
+        ray.candidates.iter().zip(found).filter(|(_, w)| **w != 0).map(|(c, w)| (*c, *w)).collect()
+    };
+    rays.iter().map(around).collect()
 }
 
-/// A ray for each component asked about whose box lies in a closed one's.
-fn rays(survey: &Survey<'_>, shop: &Shop, list: &[Component], asks: impl Fn(&Component) -> bool) -> Vec<Ray> {
+/// The components asked about whose boxes lie in closed ones', ascending, and a ray for each.
+fn rays(survey: &Survey<'_>, shop: &Shop, list: &[Component], asks: impl Fn(&Component) -> bool) -> (Vec<u32>, Vec<Ray>) {
     let closed: Vec<u32> = (0..list.len() as u32).filter(|c| !list[*c as usize].open).collect();
     if closed.is_empty() || list.len() < 2 {
-        return Vec::new();
+        return Default::default();
     }
     let boxes: Vec<Bounds> = closed.iter().map(|c| list[*c as usize].bounds).collect();
     let tree = BoxTree::new(&boxes);
     let mut found = Vec::new();
-    let mut rays = Vec::new();
+    let (mut of_rays, mut rays) = (Vec::new(), Vec::new());
     for (component, inner) in (0..).zip(list).filter(|(_, inner)| asks(inner)) {
         tree.meeting(&inner.bounds, &mut found);
         let around = found.iter().map(|j| closed[*j as usize]);
@@ -99,10 +132,11 @@ fn rays(survey: &Survey<'_>, shop: &Shop, list: &[Component], asks: impl Fn(&Com
         if !candidates.is_empty() {
             let Sample { record, in_shop } = inner.sample;
             let corners = in_shop.map_or_else(|| record::corners(&survey.records[record as usize]), |t| shop.points(t));
-            rays.push(Ray { component, from: inner_point(&corners), candidates });
+            of_rays.push(component);
+            rays.push(Ray { from: inner_point(&corners), candidates });
         }
     }
-    rays
+    (of_rays, rays)
 }
 
 /// A point of a triangle, of no symmetry, so that it does not fall on grid lines that models are built on.

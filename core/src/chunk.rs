@@ -163,22 +163,22 @@ pub(crate) fn scratch_bytes(members: u64) -> u64 {
 }
 
 impl Scratch {
-    /// Decides everything that can be decided inside the chunk of this cell. O(members).
-    pub(crate) fn solve(&mut self, seen: &Seen<'_>, cell: HomeBox, measure: &Measure) -> ChunkTopology {
+    /// Decides everything that can be decided inside the chunk of this cell; the vertices at the positions `cut` count as unsound. O(members).
+    pub(crate) fn solve(&mut self, seen: &Seen<'_>, cell: HomeBox, measure: &Measure, cut: &[Point]) -> ChunkTopology {
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("bmi2") {
             // SAFETY: the processor has them.
-            return unsafe { self.solve_avx2(seen, cell, measure) };
+            return unsafe { self.solve_avx2(seen, cell, measure, cut) };
         }
-        self.solve_by(seen, cell, measure, Self::take, Ring::places)
+        self.solve_by(seen, cell, measure, cut, Self::take, Ring::places)
     }
 
     /// The same code with wider vectors.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,bmi1,bmi2")]
-    fn solve_avx2(&mut self, seen: &Seen<'_>, cell: HomeBox, measure: &Measure) -> ChunkTopology {
+    fn solve_avx2(&mut self, seen: &Seen<'_>, cell: HomeBox, measure: &Measure, cut: &[Point]) -> ChunkTopology {
         let take = |scratch: &mut Self, corners: &[[Point; 3]]| scratch.take_avx2(corners);
-        self.solve_by(seen, cell, measure, take, |ring, corner| ring.places_avx2(corner))
+        self.solve_by(seen, cell, measure, cut, take, |ring, corner| ring.places_avx2(corner))
     }
 
     /// The same as [`Self::take`]: it is called from where the compiler does not see what the processor has.
@@ -195,6 +195,7 @@ impl Scratch {
         seen: &Seen<'_>,
         cell: HomeBox,
         measure: &Measure,
+        cut: &[Point],
         take: impl Fn(&mut Self, &[[Point; 3]]),
         places: impl Fn(&Ring, u32) -> u32 + Copy,
     ) -> ChunkTopology {
@@ -202,7 +203,7 @@ impl Scratch {
             Seen::Mapped(source) => self.weld(source, measure, take),
             Seen::Spooled(source) => self.weld(source, measure, take),
         };
-        self.judge_stars(cell, places);
+        self.judge_stars(cell, cut, places);
         self.collect(measure, total)
     }
 
@@ -295,13 +296,14 @@ impl Scratch {
 
     /// Tests whether the triangles around each home vertex are one closed coherent fan, and puts those that are sound into patches.
     #[inline(always)]
-    fn judge_stars(&mut self, cell: HomeBox, places: impl Fn(&Ring, u32) -> u32 + Copy) {
+    fn judge_stars(&mut self, cell: HomeBox, cut: &[Point], places: impl Fn(&Ring, u32) -> u32 + Copy) {
         let positions = self.vertices.positions();
         self.stars.gather(positions.len(), &self.triangles);
         self.states.clear();
         self.states.extend(positions.iter().map(|p| if cell.holds(*p) { SOUND } else { AWAY }));
         // The workshop must see the neighbours that a collinear triangle is to be closed with.
-        for v in self.collinear.iter().flat_map(|i| self.triangles[*i as usize]) {
+        let of_collinear = self.collinear.iter().flat_map(|i| self.triangles[*i as usize]);
+        for v in of_collinear.chain(cut.iter().filter_map(|p| self.vertices.find(*p))) {
             let state = &mut self.states[v as usize];
             *state = if *state == SOUND { UNSOUND } else { *state };
         }

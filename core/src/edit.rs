@@ -67,7 +67,7 @@ impl Edit {
         edit.changes.sort_unstable_by_key(|(t, _)| *t);
         edit.deletions = edit.changes.iter().filter(|c| c.1 == Change::Delete).count() as u64;
         edit.flips = edit.changes.iter().filter(|c| c.1 == Change::Flip).count() as u64;
-        let dropped = |patch: u32| reversed.dropped.get(patch as usize) == Some(&true);
+        let dropped = |patch: u32| reversed.dropped[patch as usize];
         let (flipped, flips) = records_of(survey, |patch| reversed.patches[patch as usize] && !dropped(patch));
         let (gone, deletions) = records_of(survey, dropped);
         (edit.flipped, edit.dropped) = (flipped, gone);
@@ -205,7 +205,7 @@ pub(crate) enum Step<'r, 'e> {
 }
 
 /// The records of some patches, a bit each, and how many; no bits if there are none. One pass over them.
-fn records_of(survey: &Survey<'_>, wanted: impl Fn(u32) -> bool + Sync) -> (Vec<u64>, u64) {
+pub(crate) fn records_of(survey: &Survey<'_>, wanted: impl Fn(u32) -> bool + Sync) -> (Vec<u64>, u64) {
     if !(0..survey.patches.len() as u32).any(&wanted) {
         return (Vec::new(), 0);
     }
@@ -291,7 +291,7 @@ mod tests {
     fn a_reversed_patch_flips_its_records() {
         let records = records(&cube());
         let d = diagnose(&records);
-        let edit = Edit::of(&d.survey, &d.shop, &Reversed { patches: vec![true], dropped: Vec::new() });
+        let edit = Edit::of(&d.survey, &d.shop, &Reversed { patches: vec![true], dropped: vec![false] });
         assert_eq!(written(&edit, &records), records.iter().map(record::flip).collect::<Vec<_>>());
         assert_eq!(edit.listed().flipped, [[0, 11]]);
     }

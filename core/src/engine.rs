@@ -217,7 +217,7 @@ fn mend(
     let swallows = profile.bodies == Bodies::Union && report.before.nested_positive > 0;
     if !report.verdict.good || swallows {
         progress.at("repair", 0, mesh.records().len() as u64);
-        let repaired = repairs::run(&mut diagnosis, profile, limits.threads);
+        let repaired = repairs::run(&mut diagnosis, mesh.path(), profile, limits, progress)?;
         clock.lap("repair");
         edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &repaired.reversed);
         edit.added.extend(repaired.wrapped.iter().map(|corners| record::encode(*corners, 0)));

@@ -89,7 +89,7 @@ impl Mesh {
             1,
             |_| true,
             Scratch::default,
-            |scratch, chunk, seen, _| scratch.solve(seen, self.plan.home_box(chunk), &self.measure).vertices,
+            |scratch, chunk, seen, _| scratch.solve(seen, self.plan.home_box(chunk), &self.measure, &[]).vertices,
         );
         solved.into_iter().sum()
     }
@@ -103,7 +103,7 @@ impl Mesh {
             Scratch::default,
             |scratch, chunk, seen, visitors| {
                 let cell = self.plan.home_box(chunk);
-                black_box(scratch.solve(seen, cell, &self.measure));
+                black_box(scratch.solve(seen, cell, &self.measure, &[]));
                 scratch.cross(visitors, cell, u64::MAX).tested
             },
         );

@@ -4,6 +4,7 @@
 //! It knows no daemon and no store. The two entry points are [`inspect`] and [`repair`].
 
 mod ahead;
+mod arrange;
 mod behind;
 mod bodies;
 mod boxes;

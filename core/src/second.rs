@@ -293,6 +293,10 @@ fn is_distinct(corners: &[[f32; 3]; 3]) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
+    use crate::Quiet;
+    use crate::settings::Limits;
     use proptest::prelude::*;
 
     use crate::edit::Edit;
@@ -305,7 +309,8 @@ mod tests {
     fn holds_after_repair(triangles: &[Corners]) -> bool {
         let input = records(triangles);
         let mut diagnosis = diagnose(&input);
-        let repaired = repairs::run(&mut diagnosis, &Profile::default(), 1);
+        let limits = Limits { threads: 1, ..Limits::default() };
+        let repaired = repairs::run(&mut diagnosis, Path::new("test"), &Profile::default(), &limits, &Quiet).unwrap();
         let edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &repaired.reversed);
         check_second_look(diagnosis.survey, &edit, &diagnose(&written(&edit, &input)).defects)
     }

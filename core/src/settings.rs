@@ -54,7 +54,7 @@ pub struct Profile {
     pub sheets: Sheets,
     /// Sheets that are dropped may have this share of the model's area together without review.
     pub max_sheets_share: f64,
-    /// What becomes of bodies inside others.
+    /// What becomes of bodies inside others, or crossing others.
     pub bodies: Bodies,
     /// Take surfaces apart that share an edge or a vertex, so that each has positions of its own.
     pub separate: bool,
@@ -70,6 +70,8 @@ pub struct Profile {
     pub wrap_max_move: f64,
     /// Beyond this fraction of the surface's area in wraps a result needs review.
     pub wrap_review_share: f64,
+    /// Cut surfaces that cross each other or themselves, so that what is left is the surface of a solid.
+    pub resolve_crossings: bool,
     /// Look for triangles that cross or overlap each other, in the input and in the output; without, the verdict calls it unchecked.
     pub check_self_intersections: bool,
 }
@@ -87,11 +89,12 @@ pub enum Guarantee {
     Off,
 }
 
-/// What becomes of a body that lies inside another one.
+/// What becomes of bodies that lie inside others or cross them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Bodies {
-    /// Only what separates material from air stays: bodies inside the material of others go; cavities, and what lies in them, stay.
+    /// Only what separates material from air stays: bodies inside the material of others go, those that cross become one; cavities, and what lies
+    /// in them, stay.
     #[default]
     Union,
     /// Everything stays.
@@ -152,6 +155,7 @@ impl Default for Profile {
             wrap_max_share: 1.0,
             wrap_max_move: 0.05,
             wrap_review_share: 0.01,
+            resolve_crossings: true,
             check_self_intersections: true,
         }
     }

@@ -61,6 +61,14 @@ pub(crate) struct Survey<'a> {
     threads: usize,
 }
 
+/// What became of patches that were divided.
+pub(crate) struct Division {
+    /// The new suspects, ascending, with the patches they belonged to.
+    pub(crate) fetched: Vec<(Suspect, u32)>,
+    /// For each patch now the one that it was a part of.
+    pub(crate) divided_from: Vec<u32>,
+}
+
 /// Most triangles a workshop can number the corners of, with room for what repairs add.
 const MOST_SUSPECTS: u64 = 1 << 30;
 
@@ -104,7 +112,7 @@ impl<'a> Survey<'a> {
                     return ChunkTopology::default();
                 }
                 let cell = plan.home_box(chunk);
-                let mut topology = scratch.solve(seen, cell, &measure);
+                let mut topology = scratch.solve(seen, cell, &measure, &[]);
                 if self_intersections {
                     let allowance = most_tested.saturating_sub(tested.load(Ordering::Relaxed));
                     topology.crossings = scratch.cross(visitors, cell, allowance);
@@ -122,10 +130,7 @@ impl<'a> Survey<'a> {
         if progress.cancelled() {
             return Err(Error::io(path, STAGE)(std::io::ErrorKind::Interrupted.into()));
         }
-        let (suspects, pieces) = (suspects.into_inner(), patches.into_inner());
-        budget.check(path, || format!("at least {suspects} triangles lie at defects, in {pieces} pieces of surface or more"))?;
-        refuse_more_than(path, MOST_SUSPECTS, suspects, "triangles lie at defects")?;
-        refuse_more_than(path, chunk::MOST_PATCHES, pieces, "pieces of surface, counted by chunks, are there")?;
+        check(path, &budget, suspects.into_inner(), patches.into_inner())?;
         let merge = Merge::of(records, &measure, &mut chunks);
         let (self_intersections, crossing_pairs) = if self_intersections {
             let (summed, pairs) = Crossings::sum(chunks.iter_mut().map(|c| std::mem::take(&mut c.crossings)), most_tested);
@@ -158,6 +163,92 @@ impl<'a> Survey<'a> {
             merged: merge.merged,
             threads: limits.threads,
         })
+    }
+
+    /// Divides the surface at the sound vertices among `positions`: they count as unsound, so that their triangles become suspects, and
+    /// what hangs together only through them, or what was promoted before, becomes several patches. Solves every chunk again. Refuses when tables
+    /// would not fit `limits.memory_bytes`.
+    pub(crate) fn divide(
+        &mut self,
+        path: &Path,
+        positions: &[[f32; 3]],
+        limits: &Limits,
+        progress: &dyn Progress,
+    ) -> Result<Division> {
+        let _span = tracing::debug_span!("divide", positions = positions.len()).entered();
+        let budget = Budget::new(limits.memory_bytes);
+        budget.take(Purpose::Tables, behind::most_dirty(limits) + digest::heap_bytes(size_of_val(self.records) as u64));
+        take_tables(path, &budget, &self.plan, &self.members, limits)?;
+        let fetched = self.beyond_the_workshop(positions);
+        let cut: Vec<[f32; 3]> = self.promoted.iter().chain(positions).copied().collect();
+        let by_home = self.by_home(&cut);
+        let [suspects, patches] = [const { AtomicU64::new(0) }; 2];
+        let mut chunks = self.members.each(
+            (self.records, &self.guide, &self.plan),
+            self.threads,
+            |_| true,
+            Scratch::default,
+            |scratch, chunk, seen, _| {
+                if progress.cancelled() || budget.is_exceeded() {
+                    return ChunkTopology::default();
+                }
+                let cut: Vec<[f32; 3]> = at_home(&by_home, chunk).iter().map(|(_, p)| *p).collect();
+                let topology = scratch.solve(seen, self.plan.home_box(chunk), &self.measure, &cut);
+                suspects.fetch_add(topology.suspects.len() as u64, Ordering::Relaxed);
+                patches.fetch_add(topology.patches.len() as u64, Ordering::Relaxed);
+                topology.take(&budget);
+                topology
+            },
+        );
+        if progress.cancelled() {
+            return Err(Error::io(path, STAGE)(std::io::ErrorKind::Interrupted.into()));
+        }
+        check(path, &budget, suspects.into_inner(), patches.into_inner())?;
+        let mut unsound = Weld::default();
+        unsound.reset(self.suspects.len());
+        for suspect in &self.suspects {
+            let corners = record::corners(&self.records[suspect.triangle as usize]);
+            (0..3).filter(|k| suspect.unsound >> k & 1 == 1).for_each(|k| {
+                unsound.vertex(corners[k]);
+            });
+        }
+        let merge = Merge::of(self.records, &self.measure, &mut chunks);
+        let divided_from = self.patches_at(merge.patches.iter().map(|patch| patch.first));
+        self.promoted.extend(positions.iter().filter(|p| unsound.find(**p).is_none()));
+        self.suspects = merge.suspects;
+        self.suspect_patches = merge.suspect_patches;
+        self.patches = merge.patches;
+        self.bases = merge.bases;
+        self.merged = merge.merged;
+        self.reaches = chunks.iter().map(|c| c.reach).collect();
+        self.labels = chunks.into_iter().map(|c| c.labels).collect();
+        Ok(Division { fetched, divided_from })
+    }
+
+    /// The patches of some triangles with a sound corner.
+    fn patches_at(&self, triangles: impl Iterator<Item = u32>) -> Vec<u32> {
+        let triangles: Vec<u32> = triangles.collect();
+        let positions: Vec<[f32; 3]> =
+            triangles.iter().flat_map(|t| record::corners(&self.records[*t as usize])).map(|p| p.map(|x| x + 0.0)).collect();
+        // Around positions that are not sound there may be triangles of no patch, or of the workshop.
+        let around = self.beyond_the_workshop(&positions);
+        let patch = |t: u32| match self.suspects.binary_search_by_key(&t, |s| s.triangle) {
+            Ok(i) => self.suspect_patches[i],
+            Err(_) => around.binary_search_by_key(&t, |(s, _)| s.triangle).map_or(NONE, |i| around[i].1),
+        };
+        triangles.into_iter().map(patch).collect()
+    }
+
+    /// The patch of a suspect's sound corners, if it has any.
+    pub(crate) fn patch_of_suspect(&self, record: u32) -> u32 {
+        self.suspects.binary_search_by_key(&record, |s| s.triangle).map_or(NONE, |i| self.suspect_patches[i])
+    }
+
+    /// Positions with the chunks where they are at home, by chunk.
+    fn by_home(&self, positions: &[[f32; 3]]) -> Vec<(ChunkId, [f32; 3])> {
+        let mut by_home: Vec<(ChunkId, [f32; 3])> = positions.iter().map(|p| (self.plan.home(*p), *p)).collect();
+        by_home.sort_by_key(|(home, _)| *home);
+        by_home
     }
 
     /// Threads to work with.
@@ -261,12 +352,8 @@ impl<'a> Survey<'a> {
         positions.iter().for_each(|p| {
             wanted.vertex(*p);
         });
-        let mut by_home: Vec<(ChunkId, [f32; 3])> = positions.iter().map(|p| (self.plan.home(*p), *p)).collect();
-        by_home.sort_unstable_by_key(|(home, _)| *home);
-        let at_home = |chunk| {
-            let from = by_home.partition_point(|(home, _)| *home < chunk);
-            &by_home[from..from + by_home[from..].partition_point(|(home, _)| *home == chunk)]
-        };
+        let by_home = self.by_home(positions);
+        let at_home = |chunk| at_home(&by_home, chunk);
         let found = self.members.each(
             (self.records, &self.guide, &self.plan),
             self.threads,
@@ -298,6 +385,19 @@ impl<'a> Survey<'a> {
         all.retain(|(s, _)| self.suspects.binary_search_by_key(&s.triangle, |t| t.triangle).is_err());
         all
     }
+}
+
+/// Those of a chunk, of positions by chunk.
+fn at_home(by_home: &[(ChunkId, [f32; 3])], chunk: ChunkId) -> &[(ChunkId, [f32; 3])] {
+    let from = by_home.partition_point(|(home, _)| *home < chunk);
+    &by_home[from..from + by_home[from..].partition_point(|(home, _)| *home == chunk)]
+}
+
+/// Refuses what the chunks found to be too much to keep.
+fn check(path: &Path, budget: &Budget, suspects: u64, pieces: u64) -> Result<()> {
+    budget.check(path, || format!("at least {suspects} triangles lie at defects, in {pieces} pieces of surface or more"))?;
+    refuse_more_than(path, MOST_SUSPECTS, suspects, "triangles lie at defects")?;
+    refuse_more_than(path, chunk::MOST_PATCHES, pieces, "pieces of surface, counted by chunks, are there")
 }
 
 /// Triangles in runs of them.

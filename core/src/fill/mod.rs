@@ -156,6 +156,19 @@ pub fn triangulate(rim: &Rim<'_>, settings: &FillSettings) -> Result<Patch, Unfi
     by_methods(rim, settings)
 }
 
+/// Any triangulation of a loop: it may cross itself and everything else. `None` for what is no loop, too large or on one line.
+pub(crate) fn unchecked(rim: &Rim<'_>) -> Option<Patch> {
+    let most = FillSettings::default().minimum_weight_vertices;
+    if !rim.is_loop() || rim.on_one_line() || rim.len() > FillSettings::default().max_vertices {
+        return None;
+    }
+    if rim.len() <= most {
+        let triangles = minweight::triangulate(rim, Weight::Area, Choice::Any).ok()?;
+        return Some(patch(triangles, Method::LeastArea));
+    }
+    front::triangulate(rim, Order::Chord, most).ok().map(|triangles| patch(triangles, Method::Front))
+}
+
 /// Closes a loop around others, the rims of islands in it, which run the other way round: triangles over the vertices of all, one loop
 /// after the other. `joined`: is there an edge of the mesh between vertices of two loops already?
 ///

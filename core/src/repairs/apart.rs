@@ -15,18 +15,18 @@ use std::fmt;
 
 use glam::DVec3;
 
-use super::guard::{self, Changes};
+use super::overlay::Overlay;
 use super::work::Work;
 use crate::chunk::{self, NONE};
 use crate::fill::cross::{Contact, Triangle as Corners, triangles_cross};
 use crate::fill::exact::{Point, at};
+use crate::record;
 use crate::settings::Profile;
-use crate::shop::components::nonmanifold_vertices;
+use crate::shop::components::{Reversed, nonmanifold_vertices};
 use crate::shop::edges::Edge;
 use crate::shop::wedges::{Half, Wedges};
 use crate::shop::{Shop, Triangle, Vertex};
 use crate::survey::Survey;
-use crate::{fresh, record};
 
 /// A copy moves by no more than this share of the shortest edge at it, so that no triangle comes near to turning over.
 const EDGE_SHARE: f64 = 0.125;
@@ -74,7 +74,7 @@ impl fmt::Display for Separated {
 }
 
 /// Takes surfaces apart at all vertices where that is possible. O(workshop) and a look at all boxes around what moves, if anything does.
-pub(super) fn separate(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile) -> Separated {
+pub(super) fn separate(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reversed, profile: &Profile) -> Separated {
     let (shop, edges) = work.edges();
     let vertices = if profile.separate { nonmanifold_vertices(shop, edges) } else { Vec::new() };
     if vertices.is_empty() {
@@ -90,7 +90,7 @@ pub(super) fn separate(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profi
         let mut apart = Apart::new(work, &before, &from);
         apart.part_vertices(survey, &vertices);
         apart.open_edges();
-        let Some(blamed) = apart.blamed(survey) else { break };
+        let Some(blamed) = apart.blamed(survey, reversed) else { break };
         let copies = std::mem::take(&mut apart.copies);
         if blamed.is_empty() {
             let (shop, edges) = work.edges();
@@ -406,7 +406,7 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
 
     /// The copies that cannot stay: a triangle of theirs crosses another one that it did not cross before, or another vertex of the file has their
     /// position. `None` if that is too much work to tell.
-    fn blamed(&self, survey: &Survey<'_>) -> Option<BTreeSet<usize>> {
+    fn blamed(&self, survey: &Survey<'_>, reversed: &Reversed) -> Option<BTreeSet<usize>> {
         let mut blamed = BTreeSet::new();
         if self.copies.is_empty() {
             return Some(blamed);
@@ -418,22 +418,12 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
             let corners = record::corners(&survey.records[suspect.triangle as usize]).map(|p| p.map(|x| x + 0.0));
             blamed.extend(corners.iter().filter_map(|p| copy_at.get(&bits(p))));
         }
-        let records = survey.records.len() as u32;
-        records.checked_add(shop.triangles.len() as u32)?;
-        let Changes { gone, living } = guard::changes(survey, shop);
+        let overlay = Overlay::of(survey, shop, reversed)?;
         let copies = |t: u32| shop.triangles[t as usize].v.into_iter().filter_map(|v| v.checked_sub(self.first));
-        let has_copy = |t: &&u32| copies(**t).next().is_some();
-        let numbered = |t: &u32| (records + t, shop.points(*t));
-        let pairs = fresh::met_by(
-            survey,
-            living.iter().filter(has_copy).map(numbered),
-            living.iter().filter(|t| !has_copy(t)).map(numbered),
-            |place| gone.binary_search(&place).is_ok(),
-            u64::from(records) + shop.triangles.len() as u64,
-        )?;
+        let pairs = overlay.met_by(survey, shop, |t| copies(t).next().is_some())?;
         for pair in pairs {
-            let in_shop = pair.triangles.map(|number| number.checked_sub(records));
-            let before = pair.triangles.map(|number| match number.checked_sub(records) {
+            let in_shop = pair.triangles.map(|number| overlay.changed_of(number));
+            let before = pair.triangles.map(|number| match overlay.changed_of(number) {
                 Some(t) => self.points_before(self.whole(t)),
                 None => record::corners(&survey.records[number as usize]).map(|p| p.map(|x| x + 0.0)),
             });
@@ -519,7 +509,7 @@ mod tests {
     use crate::testing::{After, Corners, after, cuboid, records, reversed, written};
 
     fn separated(triangles: &[Corners]) -> After<Separated> {
-        after(triangles, |d, _| separate(&d.survey, &mut Work::new(&mut d.shop), &Profile::default()))
+        after(triangles, |d, turned| separate(&d.survey, &mut Work::new(&mut d.shop), turned, &Profile::default()))
     }
 
     /// The skin of the unit cubes of a 4 × 4 × 4 grid whose bits are set. `diagonals`: which way the square faces are divided.
@@ -592,7 +582,7 @@ mod tests {
     fn what_a_profile_wants_to_stay_stays() {
         let mesh = [cuboid([0.0; 3], [1.0; 3]), cuboid([1.0; 3], [2.0; 3])].concat();
         let profile = Profile { separate: false, ..Profile::default() };
-        let got = after(&mesh, |d, _| separate(&d.survey, &mut Work::new(&mut d.shop), &profile));
+        let got = after(&mesh, |d, turned| separate(&d.survey, &mut Work::new(&mut d.shop), turned, &profile));
         assert_eq!((got.result, got.untouched), (Separated::default(), 24));
     }
 
@@ -610,7 +600,8 @@ mod tests {
         let input = records(mesh);
         let limits = Limits { threads: 1, chunk_triangles, ..Limits::default() };
         let mut d = Diagnosis::of(Path::new("test"), &input, &Profile::default(), &limits, &Quiet).unwrap();
-        separate(&d.survey, &mut Work::new(&mut d.shop), &Profile::default());
+        let none = Reversed::none(&d.survey);
+        separate(&d.survey, &mut Work::new(&mut d.shop), &none, &Profile::default());
         written(&Edit::of(&d.survey, &d.shop, &Reversed::none(&d.survey)), &input)
     }
 

@@ -2,6 +2,7 @@
 //! room for that, and revoked where it crosses anything.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 use super::admit::{Admission, NotAdmitted};
 use super::guard::{self, Obstacle};
@@ -32,6 +33,9 @@ pub(super) struct Closed {
     pub(super) sheets: Vec<SheetRim>,
     /// A vertex of each loop that was left open on purpose: it was not admitted.
     pub(super) kept_open: Vec<[f32; 3]>,
+    /// Loops that nothing closes which crosses nothing: the triangles of patches that are to be cut along what they cross, and what to say of the
+    /// loops if that does not come about.
+    pub(super) across: Vec<(Range<u32>, LoopLeft)>,
 }
 
 /// The rim of a lone sheet, which stays open.
@@ -42,6 +46,17 @@ pub(super) struct SheetRim {
     pub(super) edges: usize,
     /// Its place among the loops that are left, unless it comes after the last one listed.
     pub(super) listed: Option<usize>,
+}
+
+/// Takes those patches back that are of surfaces which did not take part when crossings were resolved.
+pub(super) fn open_again(work: &mut Work<'_>, across: Vec<(Range<u32>, LoopLeft)>, taken_part: &[bool]) -> Vec<LoopLeft> {
+    let has_taken_part = |t: u32| taken_part.get(t as usize) == Some(&true);
+    let back = across.into_iter().filter(|(triangles, _)| !triangles.clone().any(has_taken_part));
+    back.map(|(triangles, left)| {
+        triangles.for_each(|t| work.kill(t));
+        left
+    })
+    .collect()
 }
 
 /// Longest list of open loops in a report.
@@ -77,6 +92,8 @@ pub(super) struct Placed {
     obstacles: Vec<Obstacle>,
     /// Nothing else was found than a patch that crosses bodies which run into this one already.
     across: bool,
+    /// It may cross anything, and is to be cut along that.
+    to_be_cut: bool,
     /// A patch that does, with its method, while others are tried.
     spare: Option<(&'static str, Vec<[Vertex; 3]>)>,
 }
@@ -91,8 +108,17 @@ impl Placed {
     }
 
     fn put_in(work: &mut Work<'_>, rims: Vec<u32>, triangles: &[[Vertex; 3]], method: &'static str) -> Self {
-        let mut placed =
-            Self { rims, method, first: 0, count: 0, coarse: Vec::new(), obstacles: Vec::new(), across: false, spare: None };
+        let mut placed = Self {
+            rims,
+            method,
+            first: 0,
+            count: 0,
+            coarse: Vec::new(),
+            obstacles: Vec::new(),
+            across: false,
+            to_be_cut: false,
+            spare: None,
+        };
         placed.replace(work, triangles);
         placed
     }
@@ -131,12 +157,17 @@ pub(super) fn fill_loops(
         smooth::smooth(survey, work, &mut closing.placed, &settings, threads);
     }
     if profile.check_self_intersections {
-        closing.guard(survey, work);
+        closing.guard(survey, work, reversed);
+    }
+    let mut across = Vec::new();
+    if profile.resolve_crossings && survey.crossing_pairs.is_some() {
+        across = closing.close_across(work);
     }
     let mut closed = closing.finish(work);
     if !profile.fill_holes {
         closed.kept_open.extend(chains.iter().map(|chain| work.positions[chain[0] as usize]));
     }
+    closed.across = across;
     for chain in chains.iter().take(LISTED.saturating_sub(closed.left.len())) {
         let length = chain.windows(2).map(|w| work.distance(w[0], w[1])).sum();
         closed.left.push(left(work, chain[0], chain.len() - 1, length, &NO_LOOP));
@@ -287,14 +318,14 @@ impl Closing<'_> {
     /// Steps back where a patch crosses anything: from the shape to the triangulation it came from, to another one around what it
     /// crosses, to the first one that crosses only bodies that the loop's own runs into already, to none. (What is closed for itself and runs
     /// into others is a solid still, which an open one is not.)
-    fn guard(&mut self, survey: &Survey<'_>, work: &mut Work<'_>) {
+    fn guard(&mut self, survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reversed) {
         let mut is_new = vec![true; self.placed.len()];
         for round in 0..=GUARD_ROUNDS.1 {
             let mut patch_of = vec![None; work.triangles.len()];
             for (i, patch) in (0..).zip(&self.placed) {
                 patch.triangles().for_each(|t| patch_of[t as usize] = Some(i));
             }
-            let Some(crossed) = guard::crossed(survey, work, &patch_of, |patch| is_new[patch as usize]) else { return };
+            let Some(crossed) = guard::crossed(survey, work, reversed, &patch_of, |patch| is_new[patch as usize]) else { return };
             is_new.fill(false);
             for (i, mut obstacles) in crossed {
                 let i = i as usize;
@@ -313,6 +344,45 @@ impl Closing<'_> {
                 return;
             }
         }
+    }
+
+    /// Closes what is left as if nothing were in the way, each by a patch that may cross anything, itself included. Returns the triangles
+    /// of each.
+    fn close_across(&mut self, work: &mut Work<'_>) -> Vec<(Range<u32>, LoopLeft)> {
+        let mut across = Vec::new();
+        for (rim, reason) in std::mem::take(&mut self.open) {
+            let patch = match reason {
+                NotFilled::NotAdmitted(_) => None,
+                NotFilled::Crosses | NotFilled::Method(_) => self.patch_across(work, rim),
+            };
+            let Some(patch) = patch else {
+                self.open.push((rim, reason));
+                continue;
+            };
+            let loop_ = self.rim(rim);
+            let left = left(work, loop_.vertices[0], loop_.vertices.len(), loop_.perimeter(work), &reason);
+            self.put_in(work, rim, &patch, patch.method.name());
+            if let Some(placed) = self.placed.last_mut() {
+                placed.to_be_cut = true;
+                across.push((placed.first..placed.first + placed.count, left));
+            }
+        }
+        across
+    }
+
+    /// A patch that does not cross itself, if there is one, else any.
+    fn patch_across(&self, shop: &Shop, rim: u32) -> Option<fill::Patch> {
+        let valid = self.fill(shop, rim, Neighbours::Heeded, &[]).or_else(|_| self.fill(shop, rim, Neighbours::Ignored, &[]));
+        if let Ok(patch) = valid {
+            return Some(patch);
+        }
+        let loop_ = self.rim(rim);
+        let points = loop_.points(shop);
+        let joined = |i: u32, j: u32| are_joined(shop, loop_.vertices[i as usize], loop_.vertices[j as usize]);
+        let any = |forbidden: &dyn Fn(u32, u32) -> bool| {
+            fill::unchecked(&Rim { points: &points, apexes: &[], obstacles: &[], forbidden })
+        };
+        any(&joined).or_else(|| any(&|_, _| false))
     }
 
     /// Gives a patch up. Loops that it closed together are closed each for itself, where that is admitted.
@@ -398,6 +468,7 @@ impl Closing<'_> {
             let shaped = match patch {
                 _ if !patch.coarse.is_empty() => " (shaped)",
                 _ if patch.across => " (across a body met already)",
+                _ if patch.to_be_cut => " (to be cut along what it crosses)",
                 _ => "",
             };
             *closed.by_method.entry(format!("{}{shaped}", patch.method)).or_default() += loops;

@@ -1,6 +1,6 @@
 //! Triangles with a repeated vertex, and several triangles on the same three vertices (METHODS A1, A2).
 //!
-//! Of copies in one direction the first stays. Where both directions occur, it is a question of what they are part of:
+//! Of copies in one direction the first stays, unless the surface is closed only with all of them. Where both directions occur, it is a question of what they are part of:
 //! a triangle doubled back to back in an otherwise sound surface (one of them fits its neighbours: it stays), a wall of no
 //! thickness inside a body (the surface closes without it: all go), a surface exported with both sides (one side stays and is
 //! turned later), or two triangles on their own (nothing is enclosed: both go).
@@ -51,21 +51,22 @@ pub(super) fn drop_duplicates(work: &mut Work<'_>) -> u64 {
         None => by_vertex_set(work),
         Some(changed) => copies_of(work, &changed),
     };
-    let mut doomed = Vec::new();
+    let (mut copies, mut doomed) = (Vec::new(), Vec::new());
     let mut pairs: Vec<Pair> = Vec::new();
     for group in candidates.chunk_by(|a, b| a.0 == b.0).filter(|g| g.len() > 1) {
         let first = work.triangles[group[0].1 as usize].v;
         let (forward, backward): (Vec<u32>, Vec<u32>) =
             group.iter().map(|g| g.1).partition(|t| same_direction(first, work.triangles[*t as usize].v));
         if backward.is_empty() {
-            doomed.extend(&forward[1..]);
+            copies.extend(&forward[1..]);
         } else {
             pairs.push(Pair { forward, backward, votes: 0 });
         }
     }
-    if !pairs.is_empty() {
+    if !pairs.is_empty() || !copies.is_empty() {
         let (shop, edges) = work.edges();
         doomed.extend(sort_out(shop, edges, &mut pairs));
+        doomed.extend(spare(shop, edges, &copies));
     }
     doomed.iter().for_each(|t| work.kill(*t));
     doomed.len() as u64
@@ -91,6 +92,34 @@ fn copies_of(shop: &Shop, changed: &[u32]) -> Vec<([Vertex; 3], u32)> {
         all[first..].sort_unstable();
     }
     all
+}
+
+/// Those of the copies without which the surface is no farther from closed. Where two bodies have part of their surface in common, each needs
+/// its own.
+fn spare(shop: &Shop, edges: &Edges, copies: &[u32]) -> Vec<u32> {
+    let mut uses: Vec<(u32, u32, i64)> = Vec::with_capacity(3 * copies.len());
+    for (i, t) in (0..).zip(copies) {
+        let v = shop.triangles[*t as usize].v;
+        for k in 0..3 {
+            let (a, b) = (v[k], v[(k + 1) % 3]);
+            uses.extend(edges.number(a, b).map(|edge| (edge, i, if a < b { 1 } else { -1 })));
+        }
+    }
+    uses.sort_unstable();
+    let mut parents: Vec<u32> = (0..copies.len() as u32).collect();
+    for around in uses.chunk_by(|a, b| a.0 == b.0) {
+        around.iter().for_each(|(_, i, _)| {
+            chunk::unite(&mut parents, around[0].1, *i);
+        });
+    }
+    // By set of copies that hang together: by how much more often its edges are used one way than the other without it, against now.
+    let mut worse = vec![0i64; copies.len()];
+    for around in uses.chunk_by(|a, b| a.0 == b.0) {
+        let now: i64 = edges.get(around[0].0 as usize).uses.iter().map(|u| if u.forward { 1 } else { -1 }).sum();
+        let without = now - around.iter().map(|(_, _, way)| way).sum::<i64>();
+        worse[chunk::find(&mut parents, around[0].1) as usize] += without.abs() - now.abs();
+    }
+    (0..).zip(copies).filter(|(i, _)| worse[chunk::find(&mut parents, *i) as usize] <= 0).map(|(_, t)| *t).collect()
 }
 
 fn sort_out(shop: &Shop, edges: &Edges, pairs: &mut [Pair]) -> Vec<u32> {
@@ -181,6 +210,17 @@ mod tests {
         let alone = [&cube()[..1], &reversed(&cube()[..1])].concat();
         let got = after(&alone, |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
         assert_eq!((got.result, got.defects.triangles), (2, 0));
+    }
+
+    #[test]
+    fn what_two_bodies_have_in_common_stays_with_both() {
+        // Two boxes with the same bottom, one of them higher.
+        let both = [cube(), cuboid([0.0; 3], [1.0, 1.0, 2.0])].concat();
+        let got = after(&both, |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
+        assert_eq!((got.result, got.defects.boundary_edges, got.defects.unbalanced_edges), (0, 0, 0));
+        // A triangle that stands there twice stays once.
+        let got = after(&[&both[..], &both[2..3]].concat(), |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
+        assert_eq!((got.result, got.defects.unbalanced_edges), (1, 0));
     }
 
     #[test]

@@ -5,10 +5,10 @@
 
 use std::collections::{BTreeMap, HashSet};
 
+use super::overlay::Overlay;
 use super::work::Work;
 use crate::chunk::NONE;
 use crate::fill::cross::Triangle as Corners;
-use crate::fresh;
 use crate::record;
 use crate::shop::components::{Components, Reversed, Through};
 use crate::shop::{Origin, Shop};
@@ -28,24 +28,15 @@ pub(super) struct Obstacle {
 pub(super) fn crossed(
     survey: &Survey<'_>,
     work: &mut Work<'_>,
+    reversed: &Reversed,
     patch_of: &[Option<u32>],
     is_new: impl Fn(u32) -> bool,
 ) -> Option<BTreeMap<u32, Vec<Obstacle>>> {
     let (shop, edges) = work.edges();
-    let records = survey.records.len() as u32;
-    records.checked_add(shop.triangles.len() as u32)?;
     let patch = |t: u32| patch_of[t as usize];
-    let fresh = |t: &u32| patch(*t).is_some_and(&is_new);
-    let Changes { gone, living: changed } = changes(survey, shop);
-    let numbered = |t: &u32| (records + t, shop.points(*t));
-    let pairs = fresh::met_by(
-        survey,
-        changed.iter().filter(|t| fresh(t)).map(numbered),
-        changed.iter().filter(|t| !fresh(t)).map(numbered),
-        |place| gone.binary_search(&place).is_ok(),
-        u64::from(records) + shop.triangles.len() as u64,
-    )?;
-    let owner = |number: u32| number.checked_sub(records).and_then(patch);
+    let overlay = Overlay::of(survey, shop, reversed)?;
+    let pairs = overlay.met_by(survey, shop, |t| patch(t).is_some_and(&is_new))?;
+    let owner = |number: u32| overlay.changed_of(number).and_then(patch);
     // The patch to blame with one of its triangles, and what that crosses.
     let mut blamed: Vec<(u32, u32, u32)> = Vec::new();
     for pair in pairs {
@@ -63,9 +54,9 @@ pub(super) fn crossed(
         return Some(BTreeMap::new());
     }
     blamed.sort_unstable();
-    let components = Components::of(survey, shop, edges, &Reversed::none(survey), Through::EveryEdge);
+    let components = Components::of(survey, shop, edges, reversed, Through::EveryEdge);
     let met = survey.crossing_pairs.as_deref().unwrap_or_default();
-    let others = blamed.iter().map(|(_, _, other)| *other).filter(|other| *other < records);
+    let others = blamed.iter().map(|(_, _, other)| *other).filter(|other| overlay.changed_of(*other).is_none());
     let of_record = components_of_records(survey, shop, &components, others.chain(met.iter().flat_map(|pair| pair.triangles)));
     let mut met: Vec<[u32; 2]> = met
         .iter()
@@ -75,14 +66,14 @@ pub(super) fn crossed(
         .collect();
     met.sort_unstable();
     met.dedup();
-    let component = |number: u32| match number.checked_sub(records) {
+    let component = |number: u32| match overlay.changed_of(number) {
         Some(t) => Some(components.of_triangle[t as usize]),
         None => of_record.get(&number).copied(),
     };
     let mut crossed: BTreeMap<u32, Vec<Obstacle>> = BTreeMap::new();
     let mut known = HashSet::new();
     for (patch, of_patch, other) in blamed {
-        let corners = match other.checked_sub(records) {
+        let corners = match overlay.changed_of(other) {
             Some(t) => shop.points(t),
             None => record::corners(&survey.records[other as usize]),
         };
@@ -95,37 +86,6 @@ pub(super) fn crossed(
         }
     }
     Some(crossed)
-}
-
-/// What of the file is no longer there as it was, and what is there instead.
-pub(super) struct Changes {
-    /// Records, ascending.
-    pub(super) gone: Vec<u32>,
-    /// Triangles of the workshop.
-    pub(super) living: Vec<u32>,
-}
-
-/// Triangles that were only turned have not changed. O(workshop log workshop).
-pub(super) fn changes(survey: &Survey<'_>, shop: &Shop) -> Changes {
-    let mut changes = Changes { gone: Vec::new(), living: Vec::new() };
-    for t in 0..shop.triangles.len() as u32 {
-        let (triangle, lives) = (&shop.triangles[t as usize], shop.lives(t));
-        let stays = match triangle.origin {
-            Origin::Input(place) => {
-                let stays = lives && same_corners(record::corners(&survey.records[place as usize]), shop.points(t));
-                if !stays {
-                    changes.gone.push(place);
-                }
-                stays
-            }
-            Origin::Part(_) | Origin::Patch => false,
-        };
-        if lives && !stays {
-            changes.living.push(t);
-        }
-    }
-    changes.gone.sort_unstable();
-    changes
 }
 
 /// The components of some records that are as they were. Reads the chunks where those are that are not in the workshop.
@@ -158,9 +118,4 @@ pub(super) fn components_of_records(
         found.extend(around.map(|(suspect, patch)| (suspect.triangle, components.of_patch[*patch as usize])));
     }
     found
-}
-
-/// Comparing as numbers, whichever way round.
-fn same_corners(a: Corners, b: Corners) -> bool {
-    a == b || [a[0], a[2], a[1]] == b
 }

@@ -17,7 +17,9 @@ mod lap;
 mod layer;
 mod merge;
 mod orient;
+mod overlay;
 mod overrun;
+mod resolve;
 mod sheets;
 mod smooth;
 mod surplus;
@@ -28,13 +30,18 @@ mod zip;
 
 use std::time::Instant;
 
+use crate::Progress;
+use crate::arrange::Rational;
 use crate::engine::Diagnosis;
+use crate::error::Result;
 use crate::holes;
 use crate::report::{BoundaryLoops, LoopLeft, Repair, SheetDropped, Wrap};
-use crate::settings::{Guarantee, Profile};
+use crate::settings::{Guarantee, Limits, Profile};
 use crate::shop::components::Reversed;
 use crate::shop::near::Tolerance;
 use crate::survey::Survey;
+use resolve::{Means, Resolved};
+use std::path::Path;
 pub(crate) use swallowed::Swallowed;
 use work::Work;
 
@@ -60,7 +67,17 @@ const DEGENERATE: &str = "triangles without area removed, their T-junctions clos
 const DUPLICATE: &str = "triangles on the vertices of another one";
 
 /// Repairs what the profile allows.
-pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usize) -> Repaired {
+///
+/// # Errors
+/// [`Error::Refused`] when there is not memory enough.
+pub(crate) fn run(
+    diagnosis: &mut Diagnosis<'_>,
+    path: &Path,
+    profile: &Profile,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> Result<Repaired> {
+    let threads = limits.threads;
     let mut log = Log::default();
     let mut reversed = Reversed::none(&diagnosis.survey);
     let Diagnosis { survey, shop, tolerance, .. } = diagnosis;
@@ -94,13 +111,14 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
     if contradictions > 0 {
         tracing::info!(edges = contradictions, "No orientation satisfies all edges: a surface is one-sided.");
     }
-    let (mut loops_left, mut kept_open) = (Vec::new(), Vec::new());
+    let (mut loops_left, mut kept_open, mut closed_across) = (Vec::new(), Vec::new(), Vec::new());
     let mut lone = Vec::new();
     let mut methods = String::new();
     log.time("fill", "", || {
         let closed = close::fill_loops(survey, shop, &reversed, tolerance, profile, threads);
         (loops_left, kept_open) = (closed.left, closed.kept_open);
         lone = closed.sheets;
+        closed_across = closed.across;
         let parts: Vec<String> = closed.by_method.iter().map(|(name, count)| format!("{count} {name}")).collect();
         methods = format!("loops closed: {}", parts.join(", "));
         closed.loops
@@ -119,6 +137,32 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
         pieces = (turned == 0).then_some(found);
         turned
     });
+    let mut resolved = Resolved::default();
+    if profile.resolve_crossings {
+        let across = !closed_across.is_empty();
+        log.try_time("resolve", "", || {
+            let means = Means { path, limits, progress };
+            resolved = resolve::resolve(&Rational, survey, shop, &mut reversed, profile, across, &means)?;
+            Ok(resolved.pairs)
+        })?;
+        // The surface may have been divided anew.
+        pieces = None;
+        let open = close::open_again(shop, closed_across, &resolved.taken_part);
+        log.take_back("fill", open.len() as u64);
+        loops_left.extend(open);
+    }
+    if resolved.pairs > 0 {
+        log.note(
+            "resolve",
+            format!(
+                "pairs of triangles that crossed; rounds: {}, vertices moved by at most {:e}, bodies that became part of others: {}, with {:.4} units³ of them",
+                resolved.rounds, resolved.displaced, resolved.bodies, resolved.volume
+            ),
+        );
+    }
+    for (failure, pieces) in &resolved.left {
+        log.say("crossings left", format!("of {pieces} pieces of surface: {failure}"));
+    }
     let mut swallowed = Swallowed::default();
     log.time("swallowed", "", || {
         let pieces = pieces.unwrap_or_else(|| orient::pieces(survey, shop, &reversed));
@@ -128,22 +172,27 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
     let Swallowed { bodies, volume } = &swallowed;
     let note = format!("bodies in the material of others removed: {bodies}, of {volume:.4} units³ together");
     log.note("swallowed", note);
+    swallowed.bodies += resolved.bodies;
+    swallowed.volume += resolved.volume;
     let mut separated = apart::Separated::default();
     log.time("separated", "", || {
-        separated = apart::separate(survey, shop, profile);
+        separated = apart::separate(survey, shop, &reversed, profile);
         separated.vertices + separated.edges
     });
     log.note("separated", separated.to_string());
     let mut wraps = wrap::Wraps::default();
-    if profile.guarantee == Guarantee::Wrap {
+    // What was resolved crosses nothing any more.
+    let may_cross = !profile.resolve_crossings || !resolved.left.is_empty();
+    if profile.guarantee == Guarantee::Wrap && (may_cross || wrap::is_broken(shop)) {
         log.time("wrap", "regions that nothing else made a solid, replaced by a surface around what they enclose", || {
-            let pairs = if profile.check_self_intersections { wrap::crossing_pairs(survey, shop) } else { Some(Vec::new()) };
+            let pairs =
+                if profile.check_self_intersections { wrap::crossing_pairs(survey, shop, &reversed) } else { Some(Vec::new()) };
             wraps = wrap::replace(survey, shop, &mut reversed, pairs.as_deref(), &kept_open, profile, threads);
             wraps.regions
         });
         loops_left.retain(|left| !wraps.replaced(left.at));
     }
-    Repaired {
+    Ok(Repaired {
         reversed,
         repairs: log.repairs,
         loops: loops.unwrap_or_default(),
@@ -152,7 +201,7 @@ pub(crate) fn run(diagnosis: &mut Diagnosis<'_>, profile: &Profile, threads: usi
         swallowed,
         wraps: wraps.listed,
         wrapped: wraps.triangles,
-    }
+    })
 }
 
 /// The boundary loops of a workshop, with their kinds. They are what is left when surplus surface is gone and vertices within the weld
@@ -228,9 +277,14 @@ struct Log {
 impl Log {
     /// Times `work`, which returns how much it did, and adds it up under `name`.
     fn time(&mut self, name: &str, note: &str, work: impl FnOnce() -> u64) -> u64 {
+        self.try_time(name, note, || Ok(work())).unwrap_or(0)
+    }
+
+    /// As [`Self::time`], of what may fail.
+    fn try_time(&mut self, name: &str, note: &str, work: impl FnOnce() -> Result<u64>) -> Result<u64> {
         let span = tracing::debug_span!("repair", name).entered();
         let start = Instant::now();
-        let count = work();
+        let count = work()?;
         drop(span);
         let seconds = start.elapsed().as_secs_f64();
         match self.repairs.iter_mut().find(|r| r.name == name) {
@@ -241,7 +295,20 @@ impl Log {
             None if count > 0 => self.repairs.push(Repair { name: name.into(), count, note: note.into(), seconds }),
             None => {}
         }
-        count
+        Ok(count)
+    }
+
+    /// Counts less of what was done.
+    fn take_back(&mut self, name: &str, count: u64) {
+        if let Some(repair) = self.repairs.iter_mut().find(|r| r.name == name) {
+            repair.count -= count;
+        }
+    }
+
+    /// Says something of a repair that has changed nothing.
+    fn say(&mut self, name: &str, note: String) {
+        tracing::info!(name, note, "A repair changed nothing.");
+        self.repairs.push(Repair { name: name.into(), count: 0, note, seconds: 0.0 });
     }
 
     fn note(&mut self, name: &str, note: String) {

@@ -5,7 +5,7 @@
 
 use std::ops::Deref;
 
-use crate::chunk::Suspect;
+use crate::chunk::{NONE, Suspect};
 use crate::shop::edges::Edges;
 use crate::shop::{Origin, Shop, Triangle, Vertex};
 use crate::survey::Survey;
@@ -124,6 +124,18 @@ impl<'a> Work<'a> {
         self.shop.triangles.clear();
         self.shop.triangles.extend_from_slice(before);
         self.shop.relink();
+    }
+
+    /// Gives each triangle that continues a patch the one it continues after a [`Survey::divide`].
+    pub(super) fn follow_division(&mut self, survey: &Survey<'_>) {
+        for triangle in &mut self.shop.triangles {
+            if triangle.patch != NONE {
+                triangle.patch = match triangle.origin {
+                    Origin::Input(record) | Origin::Part(record) => survey.patch_of_suspect(record),
+                    Origin::Patch => NONE,
+                };
+            }
+        }
     }
 
     /// Takes in what [`Survey::promote`] has found for some incomplete vertices, which become complete.

@@ -11,8 +11,9 @@
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-use super::guard::{self, Changes};
+use super::guard;
 use super::orient;
+use super::overlay::Overlay;
 use super::work::Work;
 use crate::chunk::{self, NONE};
 use crate::fresh;
@@ -62,19 +63,21 @@ impl Wraps {
     }
 }
 
+/// Is anything of the workshop no closed, coherent, manifold surface? O(workshop).
+pub(super) fn is_broken(work: &mut Work<'_>) -> bool {
+    let (shop, edges) = work.edges();
+    edges.iter().any(|edge| edge.uses.len() != 2 || edge.is_unbalanced())
+        || !components::nonmanifold_vertices(shop, edges).is_empty()
+}
+
 /// Pairs of triangles that cross or overlap as the workshop stands, by record, or past all records by triangle of the workshop. `None` if that
 /// is not known, as there are too many. Holds what changed against everything in the file.
-pub(super) fn crossing_pairs(survey: &Survey<'_>, shop: &Shop) -> Option<Vec<[u32; 2]>> {
-    let records = survey.records.len() as u32;
-    records.checked_add(shop.triangles.len() as u32)?;
-    let Changes { gone, living: changed } = guard::changes(survey, shop);
-    let is_gone = |record: u32| gone.binary_search(&record).is_ok();
+pub(super) fn crossing_pairs(survey: &Survey<'_>, shop: &Shop, reversed: &Reversed) -> Option<Vec<[u32; 2]>> {
+    let overlay = Overlay::of(survey, shop, reversed)?;
     let known = survey.crossing_pairs.as_ref()?.iter().map(|pair| pair.triangles);
-    let mut pairs: Vec<[u32; 2]> = known.filter(|pair| !pair.iter().any(|t| is_gone(*t))).collect();
-    if !changed.is_empty() {
-        let changed = changed.iter().map(|t| (records + t, shop.points(*t)));
-        let all = u64::from(records) + shop.triangles.len() as u64;
-        pairs.extend(fresh::met_by(survey, changed, std::iter::empty(), is_gone, all)?.iter().map(|pair| pair.triangles));
+    let mut pairs: Vec<[u32; 2]> = known.filter(|pair| !pair.iter().any(|t| overlay.is_gone(*t))).collect();
+    if !overlay.changed().is_empty() {
+        pairs.extend(overlay.met_by(survey, shop, |_| true)?.iter().map(|pair| pair.triangles));
     }
     Some(pairs)
 }
@@ -500,11 +503,11 @@ impl Site<'_, '_> {
         let mut goes = vec![false; self.pieces.list.len()];
         accepted.iter().flat_map(|(group, _)| group.iter()).for_each(|piece| goes[*piece as usize] = true);
         let goes = |piece: u32| piece != NONE && goes[piece as usize];
-        let goes_with = |patch: u32| self.reversed.dropped[patch as usize] || goes(self.pieces.of_patch[patch as usize]);
-        let Changes { mut gone, living: changed } = guard::changes(self.survey, self.shop);
-        gone.extend(self.shop.living().filter(|t| goes(self.pieces.of_triangle[*t as usize])).map(|t| self.shop.record(t)));
+        let overlay = Overlay::of(self.survey, self.shop, self.reversed)?;
+        let of_shop = self.shop.living().filter(|t| goes(self.pieces.of_triangle[*t as usize])).map(|t| self.shop.record(t));
+        let mut gone: Vec<u32> = of_shop.collect();
         let sound = self.survey.visit_sound(
-            goes_with,
+            |patch| goes(self.pieces.of_patch[patch as usize]),
             |_| Some(Vec::new()),
             |_, _| true,
             |list: &mut Vec<u32>, record, _| list.push(record),
@@ -521,12 +524,12 @@ impl Site<'_, '_> {
             all.extend((from..).zip(outcome.triangles.iter().copied()));
         }
         let piece_of_new = |number: u32| accepted[starts.partition_point(|s| *s <= number) - 1].0[0];
-        let beside = changed.iter().filter(|t| !goes(self.pieces.of_triangle[**t as usize]));
+        let beside = overlay.changed().iter().filter(|t| !goes(self.pieces.of_triangle[**t as usize]));
         let pairs = fresh::met_by(
             self.survey,
             all.iter().copied(),
             beside.map(|t| (records + t, self.shop.points(*t))),
-            |record| gone.binary_search(&record).is_ok(),
+            |record| overlay.is_gone(record) || gone.binary_search(&record).is_ok(),
             u64::from(first_new) + all.len() as u64,
         )?;
         let old = pairs.iter().flat_map(|pair| pair.triangles).filter(|number| *number < records);
@@ -563,7 +566,7 @@ impl Site<'_, '_> {
         let mut bounds = Bounds::EMPTY;
         accepted.iter().flat_map(|(_, outcome)| &outcome.triangles).for_each(|t| bounds.include(t));
         let touched = self.survey.visit_sound(
-            |patch| !goes_with(patch),
+            |patch| !self.reversed.dropped[patch as usize] && !goes(self.pieces.of_patch[patch as usize]),
             |reach| meet(reach, &bounds).then(Vec::new),
             |_, corners| corners.iter().any(|p| at(*p).is_some()),
             |list: &mut Vec<(u32, u32)>, record, patch| list.push((record, patch)),
@@ -625,7 +628,7 @@ mod tests {
         let mut d = Diagnosis::of(Path::new("test"), &input, profile, limits, &Quiet).unwrap();
         let mut reversed = Reversed::none(&d.survey);
         let work = &mut Work::new(&mut d.shop);
-        let pairs = crossing_pairs(&d.survey, work);
+        let pairs = crossing_pairs(&d.survey, work, &reversed);
         let wraps = replace(&d.survey, work, &mut reversed, pairs.as_deref(), kept_open, profile, limits.threads);
         let mut edit = Edit::of(&d.survey, &d.shop, &reversed);
         edit.added.extend(wraps.triangles.iter().map(|corners| record::encode(*corners, 0)));

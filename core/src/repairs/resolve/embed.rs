@@ -1,0 +1,248 @@
+//! What stays of the pieces, in f32.
+
+use std::collections::{BTreeSet, HashMap};
+
+use glam::DVec3;
+
+use super::super::work::Work;
+use super::super::{collinear, duplicates};
+use super::cut::Cut;
+use super::sides::Sides;
+use super::{Failure, State, Stuck, vertices};
+use crate::chunk::NONE;
+use crate::defects;
+use crate::shop::{Origin, Shop, Vertex};
+
+/// What becomes of a triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Fate {
+    Stays,
+    Turns,
+    Goes,
+    /// Nobody knows.
+    Unknown,
+}
+
+fn fate(front: Option<i32>, back: Option<i32>) -> Fate {
+    match (front, back) {
+        (Some(front), Some(back)) => match (front > 0, back > 0) {
+            (false, true) => Fate::Stays,
+            (true, false) => Fate::Turns,
+            _ => Fate::Goes,
+        },
+        _ => Fate::Unknown,
+    }
+}
+
+impl State<'_, '_, '_> {
+    /// Makes of the workshop what the windings say. Returns how far new vertices were moved.
+    pub(super) fn apply(&mut self, cut: &Cut, sides: &Sides, windings: &[Option<i32>]) -> Result<f64, Stuck> {
+        let of = |[front, back]: [u32; 2]| fate(windings[front as usize], windings[back as usize]);
+        let fates: Vec<Fate> = cut.arrangement.pieces.iter().map(|piece| of(piece.cells)).collect();
+        let unknown = cut.arrangement.pieces.iter().zip(&fates).filter(|(_, fate)| **fate == Fate::Unknown);
+        let triangles: Vec<u32> = unknown.map(|(piece, _)| cut.sources[piece.source as usize]).collect();
+        if !triangles.is_empty() {
+            return Err(Stuck { failure: Failure::Contradiction, triangles });
+        }
+        let (work, reversed) = (&mut *self.work, &mut *self.reversed);
+        for p in (0..sides.patches).filter(|p| self.clusters.holds_patch(*p)) {
+            match of(sides.of_patch(p)) {
+                Fate::Goes => reversed.dropped[p as usize] = true,
+                Fate::Turns => reversed.patches[p as usize] ^= true,
+                Fate::Stays | Fate::Unknown => {}
+            }
+        }
+        let living: Vec<u32> = work.living().filter(|t| cut.sources.binary_search(t).is_err()).collect();
+        for t in living {
+            match of(sides.of_triangle(t)) {
+                Fate::Goes => work.kill(t),
+                Fate::Turns => work.turn(t),
+                Fate::Stays | Fate::Unknown => {}
+            }
+        }
+        let whole = whole_sources(work, cut, &fates);
+        let mut new = Vec::new();
+        for (s, (t, whole)) in cut.sources.iter().zip(whole).enumerate() {
+            match whole {
+                Some(Fate::Stays | Fate::Unknown) => {}
+                Some(Fate::Turns) => work.turn(*t),
+                Some(Fate::Goes) => work.kill(*t),
+                None => {
+                    work.kill(*t);
+                    for (piece, fate) in cut.pieces(s).iter().zip(&fates[cut.range(s)]) {
+                        let [a, b, c] = piece.v;
+                        match fate {
+                            Fate::Stays => new.push((*t, [a, b, c])),
+                            Fate::Turns => new.push((*t, [a, c, b])),
+                            Fate::Goes | Fate::Unknown => {}
+                        }
+                    }
+                }
+            }
+        }
+        Ok(self.put_in(cut, &new))
+    }
+
+    /// Puts pieces of triangles into the workshop, their points rounded to f32, and takes out what comes to nothing by that. Returns how far
+    /// a point was moved.
+    fn put_in(&mut self, cut: &Cut, new: &[(u32, [u32; 3])]) -> f64 {
+        let mut displaced = 0f64;
+        let points: BTreeSet<u32> = new.iter().flat_map(|(_, v)| *v).filter(|point| !cut.vertices.contains_key(point)).collect();
+        let rounded = |point: u32| cut.arrangement.points[point as usize].map(|x| x as f32 + 0.0);
+        // There may be a vertex already, here or elsewhere in the file.
+        self.complete(points.iter().map(|point| rounded(*point)).collect());
+        let mut known = vertices(self.work);
+        let mut vertex_of: HashMap<u32, Vertex> = cut.vertices.clone();
+        for point in points {
+            let position = rounded(point);
+            let exact = DVec3::from_array(cut.arrangement.points[point as usize]);
+            displaced = displaced.max(exact.distance(DVec3::from_array(position.map(f64::from))));
+            let v = *known.entry(position.map(f32::to_bits)).or_insert_with(|| self.work.add_vertex(position));
+            vertex_of.insert(point, v);
+        }
+        let first = self.work.triangles.len() as u32;
+        for (t, points) in new {
+            let v = points.map(|point| vertex_of[&point]);
+            let origin = match self.work.triangles[*t as usize].origin {
+                Origin::Input(record) | Origin::Part(record) => Origin::Part(record),
+                Origin::Patch => Origin::Patch,
+            };
+            if v[0] != v[1] && v[1] != v[2] && v[2] != v[0] {
+                self.work.add(v, origin, NONE);
+                self.clusters.of_triangle.push(self.clusters.of_triangle[*t as usize]);
+            }
+        }
+        let added: Vec<u32> = (first..self.work.triangles.len() as u32).collect();
+        self.clean(&added);
+        displaced
+    }
+
+    /// Brings the new vertices of these triangles to a grid of this step. Returns how far one was moved.
+    pub(super) fn snap(&mut self, triangles: &BTreeSet<u32>, step: f64) -> f64 {
+        let snapped = |p: [f32; 3]| p.map(|x| ((f64::from(x) / step).round() * step) as f32 + 0.0);
+        let corners = triangles.iter().flat_map(|t| self.work.triangles[*t as usize].v);
+        let new: BTreeSet<Vertex> = corners.filter(|v| *v >= self.first_vertex && self.work.complete[*v as usize]).collect();
+        self.complete(new.iter().map(|v| snapped(self.work.positions[*v as usize])).collect());
+        let mut known = vertices(self.work);
+        let mut displaced = 0f64;
+        let mut moved: BTreeSet<u32> = BTreeSet::new();
+        for v in new {
+            let from = self.work.positions[v as usize];
+            let to = snapped(from);
+            if from == to {
+                continue;
+            }
+            displaced = displaced.max(crate::shop::distance(from, to));
+            moved.extend(self.work.star(v).map(|(t, _)| t));
+            let stays = *known.entry(to.map(f32::to_bits)).or_insert_with(|| self.work.add_vertex(to));
+            self.work.merge(stays, v);
+        }
+        let moved: Vec<u32> = moved.into_iter().collect();
+        self.clean(&moved);
+        displaced
+    }
+
+    /// Takes out what came to nothing: these triangles have new vertices.
+    fn clean(&mut self, changed: &[u32]) {
+        duplicates::drop_repeated(self.work);
+        cancel(self.work, changed);
+        let first = self.work.triangles.len() as u32;
+        collinear::remove(self.work);
+        duplicates::drop_repeated(self.work);
+        let split: Vec<u32> = (first..self.work.triangles.len() as u32).collect();
+        cancel(self.work, &split);
+        self.follow();
+    }
+}
+
+/// What becomes of each source that need not be cut: all of it alike, and nobody cut otherwise ends at a point in its middle or on its
+/// edges.
+fn whole_sources(shop: &Shop, cut: &Cut, fates: &[Fate]) -> Vec<Option<Fate>> {
+    let count = cut.sources.len();
+    let range = |s: usize| cut.range(s);
+    let corners = |s: usize| shop.triangles[cut.sources[s] as usize].v;
+    let is_corner = |s: usize, point: &u32| cut.vertices.get(point).is_some_and(|v| corners(s).contains(v));
+    let area = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).length();
+    let mut whole: Vec<Option<Fate>> = (0..count)
+        .map(|s| {
+            let fates = &fates[range(s)];
+            let Some(first) = fates.first() else { return Some(Fate::Goes) };
+            if fates.contains(&Fate::Unknown) {
+                return Some(Fate::Unknown);
+            }
+            if !fates.iter().all(|f| f == first) {
+                return None;
+            }
+            if *first == Fate::Goes {
+                return Some(Fate::Goes);
+            }
+            // Part of it may be another source's.
+            let place = |v: u32| DVec3::from_array(cut.arrangement.points[v as usize]);
+            let all: f64 = cut.pieces(s).iter().map(|piece| area(piece.v.map(place))).sum();
+            (all > (1.0 - 1e-9) * area(corners(s).map(|v| shop.place(v)))).then_some(*first)
+        })
+        .collect();
+    // Sources with a piece at each point that is not theirs alone.
+    let mut at: HashMap<u32, Vec<u32>> = HashMap::new();
+    for s in 0..count {
+        for piece in cut.pieces(s).iter().zip(&fates[range(s)]).filter(|(_, f)| **f != Fate::Goes).map(|(p, _)| p) {
+            for point in piece.v {
+                let sources = at.entry(point).or_default();
+                if sources.last() != Some(&(s as u32)) {
+                    sources.push(s as u32);
+                }
+            }
+        }
+    }
+    loop {
+        let mut changed = false;
+        for s in 0..count {
+            if !matches!(whole[s], Some(Fate::Stays | Fate::Turns)) || cut.pieces(s).len() == 1 {
+                continue;
+            }
+            let needed = |point: &u32| {
+                !is_corner(s, point)
+                    && at[point].iter().any(|o| {
+                        let o = *o as usize;
+                        is_corner(o, point) || !matches!(whole[o], Some(Fate::Stays | Fate::Turns))
+                    })
+            };
+            if cut.pieces(s).iter().flat_map(|piece| &piece.v).any(needed) {
+                whole[s] = None;
+                changed = true;
+            }
+        }
+        if !changed {
+            return whole;
+        }
+    }
+}
+
+/// Takes out triangles on the same three vertices that run against each other, two by two, and all but one of those that do not.
+fn cancel(work: &mut Work<'_>, added: &[u32]) {
+    for t in added {
+        if !work.lives(*t) {
+            continue;
+        }
+        let v = work.triangles[*t as usize].v;
+        let mut same: Vec<(u32, bool)> = work
+            .star(v[0])
+            .map(|(o, _)| o)
+            .filter(|o| work.triangles[*o as usize].v.iter().all(|w| v.contains(w)))
+            .map(|o| (o, defects::same_direction(v, work.triangles[o as usize].v)))
+            .collect();
+        same.sort_unstable();
+        let with = same.iter().filter(|(_, with)| *with).count();
+        let against = same.len() - with;
+        // Of those in the majority, the first ones stay.
+        let (majority, stay) = (with > against, with.abs_diff(against));
+        let mut left = stay;
+        for (o, with) in same {
+            if with == majority && left > 0 {
+                left -= 1;
+            } else {
+                work.kill(o);
+            }
+        }
+    }
+}

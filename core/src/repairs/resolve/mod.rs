@@ -1,0 +1,474 @@
+//! Crossings: bodies that cross each other, or themselves, become one (METHODS B3, B4).
+//!
+//! The triangles that cross something, and their neighbours, are cut along everything they meet ([`cut`], [`crate::arrange`]). Cells of space in
+//! front of and behind their pieces, the other triangles of the workshop and the patches of sound surface are one where these join
+//! ([`sides`]); behind each of them the winding number is larger by one than in front. One exact winding number a connected surface (`bodies`)
+//! makes all of them known. Material is where the winding number is positive (Jacobson et al. 2013; Zhou et al. 2016): what has it on one
+//! side only stays, so that a body inside out comes right and what lies inside of another one goes, whole patches as bits of the edit ([`embed`]).
+//!
+//! Where the surface was cut, new vertices are rounded to f32. Triangles that come to nothing by that leave every directed edge balanced, and
+//! what crosses after it is resolved in the next round, with what it crosses, from the f32 coordinates. Where that does not come to an end, the
+//! new vertices there are brought to a coarser grid, so that f32 has room between them (after Valque & Lazard, SGP 2025, and the
+//! iterated snap rounding of CGAL 6.1, which has 31 more bits). Rounds are counted, so that time decides nothing.
+//!
+//! Sheets that are open bound no material, and what crosses only them is left alone. Surfaces that cross each other, directly or by others, are a
+//! **cluster**: one that contradicts itself (it says two things about a cell), does not come to an end or would not be closed is left as
+//! it was, and the others are resolved without it.
+
+mod cut;
+mod embed;
+mod sides;
+#[cfg(test)]
+mod tests;
+
+use std::collections::{BTreeSet, HashMap};
+use std::path::Path;
+
+use self::cut::Cut;
+use self::sides::Sides;
+use super::orient;
+use super::overlay::Overlay;
+use super::work::Work;
+use crate::Progress;
+use crate::arrange::Arrange;
+use crate::chunk::{self, NONE};
+use crate::defects;
+use crate::error::Result;
+use crate::record;
+use crate::settings::{Bodies, Limits, Profile};
+use crate::shop::components::{Components, Reversed};
+use crate::shop::{Origin, Shop, Triangle, Vertex};
+use crate::sums::Extent;
+use crate::survey::{Division, Survey};
+
+/// What was resolved.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Resolved {
+    /// Pairs of triangles that crossed.
+    pub(super) pairs: u64,
+    pub(super) rounds: u32,
+    /// Farthest that a new vertex was moved to a place that f32 knows, or to the grid.
+    pub(super) displaced: f64,
+    /// Bodies that became part of others, and the volume that counted more than once.
+    pub(super) bodies: u64,
+    pub(super) volume: f64,
+    /// Why some surfaces were left as they were, and how many of them.
+    pub(super) left: Vec<(Failure, u64)>,
+    /// By triangle of the workshop, as far as it was there before: was its surface closed, and was it not left? Empty: no.
+    pub(super) taken_part: Vec<bool>,
+}
+
+impl Resolved {
+    fn too_many() -> Self {
+        Self { left: vec![(Failure::TooMany, 1)], ..Self::default() }
+    }
+}
+
+/// Why crossings are left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Failure {
+    NotArranged,
+    Endless,
+    Opened,
+    Contradiction,
+    TooMany,
+}
+
+impl std::fmt::Display for Failure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::NotArranged => "the triangles that cross could not be cut along each other",
+            Self::Endless => "in single precision, cut surfaces cross again and again",
+            Self::Opened => "the cut surface would not be closed",
+            Self::Contradiction => "the surfaces do not tell what is inside",
+            Self::TooMany => "too many triangles come close to each other",
+        })
+    }
+}
+
+/// Rounds of cutting and rounding before the first snap, between snaps, and after the last.
+const ROUNDS: u32 = 3;
+
+/// Grids that new vertices are snapped to, one after the other: their steps against the power of two above the largest coordinate.
+const GRIDS: [f64; 2] = [1.0 / 16_384.0, 1.0 / 4096.0];
+
+/// Times that everything is done anew without the clusters that failed.
+const ATTEMPTS: usize = 6;
+
+/// What it takes to look at the file again.
+pub(super) struct Means<'a> {
+    pub(super) path: &'a Path,
+    pub(super) limits: &'a Limits,
+    pub(super) progress: &'a dyn Progress,
+}
+
+/// Resolves the crossings of closed surfaces. `across`: were loops closed by patches that may cross anything? A pass over the file if anything
+/// crosses; the rest goes by what does.
+///
+/// # Errors
+/// [`Error::Refused`] when there is not memory enough.
+pub(super) fn resolve(
+    engine: &dyn Arrange,
+    survey: &mut Survey<'_>,
+    work: &mut Work<'_>,
+    reversed: &mut Reversed,
+    profile: &Profile,
+    across: bool,
+    means: &Means<'_>,
+) -> Result<Resolved> {
+    let no_copies = !work.edges().1.any_nonmanifold() || coincident(work).is_empty();
+    let Some(known) = survey.crossing_pairs.as_deref().filter(|known| across || !known.is_empty() || !no_copies) else {
+        return Ok(Resolved::default());
+    };
+    let Some(overlay) = Overlay::of(survey, work, reversed) else { return Ok(Resolved::too_many()) };
+    let known = known.iter().map(|pair| pair.triangles);
+    let mut pairs: Vec<[u32; 2]> = known.filter(|pair| !pair.iter().any(|record| overlay.is_gone(*record))).collect();
+    if !overlay.changed().is_empty() {
+        let Some(met) = overlay.met_by(survey, work, |_| true) else { return Ok(Resolved::too_many()) };
+        pairs.extend(met.iter().map(|pair| pair.triangles));
+    }
+    if pairs.is_empty() && no_copies {
+        return Ok(Resolved::default());
+    }
+    divide(survey, work, reversed, corners(survey, work, &overlay, &pairs), means)?;
+    let before = Before { triangles: work.triangles.clone(), reversed: reversed.clone() };
+    let mut left: Vec<Failure> = Vec::new();
+    let mut blocked: Vec<bool> = Vec::new();
+    let (mut bodies, mut volume) = (0, 0);
+    let mut state = State { survey, work, reversed, before, clusters: Clusters::default(), first_vertex: 0 };
+    for attempt in 0..=ATTEMPTS {
+        let pieces = orient::pieces(state.survey, state.work, state.reversed);
+        blocked.resize(pieces.list.len(), attempt == ATTEMPTS);
+        if attempt == 0 {
+            (bodies, volume) = measured(&pieces);
+        }
+        if attempt == ATTEMPTS {
+            blocked.fill(true);
+        }
+        state.clusters = Clusters::of(&pieces, &blocked);
+        state.first_vertex = state.work.positions.len() as Vertex;
+        let taken_part: Vec<bool> = (0..state.work.triangles.len() as u32).map(|t| state.clusters.holds(t)).collect();
+        match state.attempt(engine, &overlay, &pairs, profile, means.limits.threads) {
+            Ok(mut resolved) => {
+                let pieces = orient::pieces(state.survey, state.work, state.reversed);
+                let (bodies_now, volume_now) = measured(&pieces);
+                resolved.bodies = bodies.saturating_sub(bodies_now);
+                resolved.volume = state.survey.measure.volume(Extent { area: 0, volume: volume - volume_now });
+                resolved.left = counted(left);
+                resolved.taken_part = taken_part;
+                return Ok(resolved);
+            }
+            Err(Stuck { failure, triangles }) => {
+                let failed = state.clusters.pieces_of(&triangles);
+                state.restore();
+                left.extend(std::iter::repeat_n(failure, failed.len().max(1)));
+                if failed.is_empty() {
+                    blocked.fill(true);
+                }
+                failed.iter().for_each(|piece| blocked[*piece as usize] = true);
+            }
+        }
+    }
+    Ok(Resolved { left: counted(left), ..Resolved::default() })
+}
+
+/// The corners of the triangles of some pairs.
+fn corners(survey: &Survey<'_>, shop: &Shop, overlay: &Overlay, pairs: &[[u32; 2]]) -> Vec<[f32; 3]> {
+    let triangle = |number: &u32| match overlay.changed_of(*number) {
+        Some(t) => shop.points(t),
+        None => record::corners(&survey.records[*number as usize]).map(|p| p.map(|x| x + 0.0)),
+    };
+    let mut positions: Vec<[f32; 3]> = pairs.iter().flatten().flat_map(triangle).collect();
+    positions.sort_unstable_by_key(|p| p.map(f32::to_bits));
+    positions.dedup();
+    positions
+}
+
+/// Gathers the stars of the vertices at these positions into the workshop, so that sound surface on the two sides of what crosses is two
+/// patches.
+fn divide(
+    survey: &mut Survey<'_>,
+    work: &mut Work<'_>,
+    reversed: &mut Reversed,
+    positions: Vec<[f32; 3]>,
+    means: &Means<'_>,
+) -> Result<()> {
+    let Division { fetched, divided_from } = survey.divide(means.path, &positions, means.limits, means.progress)?;
+    let first = work.triangles.len();
+    work.extend(survey, &fetched, &[]);
+    let known = vertices(work);
+    let completed: Vec<Vertex> = positions.iter().filter_map(|p| known.get(&p.map(f32::to_bits)).copied()).collect();
+    work.extend(survey, &[], &completed);
+    for t in first as u32..work.triangles.len() as u32 {
+        join_in(work, reversed, t);
+    }
+    work.follow_division(survey);
+    let of = |all: &[bool]| divided_from.iter().map(|patch| all.get(*patch as usize) == Some(&true)).collect();
+    *reversed = Reversed { patches: of(&reversed.patches), dropped: of(&reversed.dropped) };
+    Ok(())
+}
+
+/// Does with a triangle that was fetched what was done with the patch that it belonged to.
+fn join_in(work: &mut Work<'_>, reversed: &Reversed, t: u32) {
+    let patch = work.triangles[t as usize].patch;
+    if patch == NONE {
+        return;
+    }
+    if reversed.dropped[patch as usize] {
+        work.kill(t);
+    } else if reversed.patches[patch as usize] {
+        work.turn(t);
+    }
+}
+
+fn counted(mut failures: Vec<Failure>) -> Vec<(Failure, u64)> {
+    failures.sort_unstable();
+    failures.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as u64)).collect()
+}
+
+/// Closed bodies, and what all that is closed encloses.
+fn measured(pieces: &Components) -> (u64, i128) {
+    let closed = || pieces.list.iter().filter(|piece| !piece.open);
+    let bodies = closed().filter(|piece| piece.extent.volume > 0).count() as u64;
+    (bodies, closed().map(|piece| piece.extent.volume).sum())
+}
+
+/// Why an attempt failed, and triangles of the surfaces that it failed with; none if that is not known.
+struct Stuck {
+    failure: Failure,
+    triangles: Vec<u32>,
+}
+
+impl Stuck {
+    fn with(failure: Failure) -> Self {
+        Self { failure, triangles: Vec::new() }
+    }
+}
+
+/// What everything was before.
+struct Before {
+    triangles: Vec<Triangle>,
+    reversed: Reversed,
+}
+
+/// Which triangles are of surfaces that take part: closed before anything was cut, and not blocked.
+#[derive(Default)]
+pub(super) struct Clusters {
+    /// By triangle of the workshop and by patch, the piece of surface that it was part of, or [`NONE`].
+    of_triangle: Vec<u32>,
+    of_patch: Vec<u32>,
+    takes_part: Vec<bool>,
+    /// Pieces that cross each other are united.
+    parents: Vec<u32>,
+}
+
+impl Clusters {
+    fn of(pieces: &Components, blocked: &[bool]) -> Self {
+        Self {
+            of_triangle: pieces.of_triangle.clone(),
+            of_patch: pieces.of_patch.clone(),
+            takes_part: pieces.list.iter().zip(blocked).map(|(piece, blocked)| !piece.open && !blocked).collect(),
+            parents: (0..pieces.list.len() as u32).collect(),
+        }
+    }
+
+    fn takes_part(&self, piece: u32) -> bool {
+        self.takes_part.get(piece as usize) == Some(&true)
+    }
+
+    pub(super) fn holds(&self, triangle: u32) -> bool {
+        self.takes_part(self.of_triangle[triangle as usize])
+    }
+
+    pub(super) fn holds_patch(&self, patch: u32) -> bool {
+        self.takes_part(self.of_patch[patch as usize])
+    }
+
+    /// All pieces that cross those of some triangles, and these, as far as they take part; ascending.
+    fn pieces_of(&mut self, triangles: &[u32]) -> Vec<u32> {
+        let pieces = triangles.iter().map(|t| self.of_triangle[*t as usize]).filter(|piece| *piece != NONE);
+        let roots: BTreeSet<u32> =
+            pieces.collect::<Vec<_>>().into_iter().map(|piece| chunk::find(&mut self.parents, piece)).collect();
+        let all = 0..self.parents.len() as u32;
+        all.filter(|piece| self.takes_part(*piece) && roots.contains(&chunk::find(&mut self.parents, *piece))).collect()
+    }
+}
+
+/// The file while it is resolved.
+pub(super) struct State<'a, 'r, 'w> {
+    survey: &'a mut Survey<'r>,
+    work: &'a mut Work<'w>,
+    reversed: &'a mut Reversed,
+    before: Before,
+    clusters: Clusters,
+    /// Vertices from here on are new ones.
+    first_vertex: Vertex,
+}
+
+impl State<'_, '_, '_> {
+    fn attempt(
+        &mut self,
+        engine: &dyn Arrange,
+        overlay: &Overlay,
+        pairs: &[[u32; 2]],
+        profile: &Profile,
+        threads: usize,
+    ) -> std::result::Result<Resolved, Stuck> {
+        let mut resolved = Resolved::default();
+        let first_triangle = self.work.triangles.len() as u32;
+        let too_many = || Stuck::with(Failure::TooMany);
+        let mut crossing = self.crossing(overlay, pairs, profile);
+        resolved.pairs = crossing.len() as u64;
+        let mut grids = GRIDS.iter();
+        while !crossing.is_empty() {
+            let triangles: BTreeSet<u32> = crossing.iter().flatten().copied().collect();
+            tracing::debug!(round = resolved.rounds, pairs = crossing.len(), triangles = triangles.len(), "Crossings.");
+            let mut first_new = self.work.triangles.len() as u32;
+            if resolved.rounds > 0 && resolved.rounds.is_multiple_of(ROUNDS) {
+                let failed = || Stuck { failure: Failure::Endless, triangles: triangles.iter().copied().collect() };
+                let step = grids.next().ok_or_else(failed)? * above(self.survey.bounds.largest_coordinate());
+                resolved.displaced = resolved.displaced.max(self.snap(&triangles, step));
+                // What was moved may cross anything.
+                first_new = first_triangle;
+            } else {
+                resolved.displaced = resolved.displaced.max(self.round(engine, &triangles, threads)?);
+            }
+            resolved.rounds += 1;
+            self.check_closed()?;
+            let overlay = Overlay::of(self.survey, self.work, self.reversed).ok_or_else(too_many)?;
+            let met = overlay.met_by(self.survey, self.work, |t| t >= first_new).ok_or_else(too_many)?;
+            let pairs: Vec<[u32; 2]> = met.iter().map(|pair| pair.triangles).collect();
+            crossing = self.crossing(&overlay, &pairs, profile);
+        }
+        Ok(resolved)
+    }
+
+    /// Cuts, decides and rounds once. Returns how far vertices were moved.
+    fn round(&mut self, engine: &dyn Arrange, crossing: &BTreeSet<u32>, threads: usize) -> std::result::Result<f64, Stuck> {
+        let clusters = &self.clusters;
+        let cut = Cut::of(engine, self.work, crossing, |t| clusters.holds(t), threads);
+        let cut = cut.ok_or_else(|| Stuck::with(Failure::NotArranged))?;
+        let sides = Sides::of(self.survey, self.work, &cut, &self.clusters);
+        let pieces = orient::pieces(self.survey, self.work, self.reversed);
+        let windings = sides.windings(self.survey, self.work, self.reversed, &cut, crossing, &self.clusters, &pieces);
+        self.apply(&cut, &sides, &windings)
+    }
+
+    /// The pairs of triangles that take part, in the workshop; where bodies are to be kept, only of one and the same.
+    fn crossing(&mut self, overlay: &Overlay, pairs: &[[u32; 2]], profile: &Profile) -> Vec<[u32; 2]> {
+        let mut crossing = self.in_shop(overlay, pairs);
+        crossing.extend(coincident(self.work));
+        crossing.retain(|pair| {
+            let [a, b] = pair.map(|t| self.clusters.of_triangle[t as usize]);
+            self.clusters.takes_part(a) && self.clusters.takes_part(b) && (profile.bodies == Bodies::Union || a == b)
+        });
+        for pair in &crossing {
+            let [a, b] = pair.map(|t| self.clusters.of_triangle[t as usize]);
+            chunk::unite(&mut self.clusters.parents, a, b);
+        }
+        crossing
+    }
+
+    /// Pairs of triangles as the workshop numbers them, where they are fetched to if need be, with all around them.
+    fn in_shop(&mut self, overlay: &Overlay, pairs: &[[u32; 2]]) -> Vec<[u32; 2]> {
+        self.complete(corners(self.survey, self.work, overlay, pairs));
+        let of_record: HashMap<u32, u32> = self
+            .work
+            .living()
+            .filter_map(|t| match self.work.triangles[t as usize].origin {
+                Origin::Input(record) => Some((record, t)),
+                Origin::Part(_) | Origin::Patch => None,
+            })
+            .collect();
+        let triangle = |number: u32| overlay.changed_of(number).or_else(|| of_record.get(&number).copied());
+        pairs.iter().filter_map(|[a, b]| Some([triangle(*a)?, triangle(*b)?])).collect()
+    }
+
+    /// Fetches the stars of the vertices at these positions that are not here.
+    fn complete(&mut self, mut positions: Vec<[f32; 3]>) {
+        let key = |p: &[f32; 3]| p.map(f32::to_bits);
+        positions.sort_unstable_by_key(key);
+        positions.dedup();
+        let known = vertices(self.work);
+        positions.retain(|p| known.get(&key(p)).is_none_or(|v| !self.work.complete[*v as usize]));
+        if positions.is_empty() {
+            return;
+        }
+        let first = self.work.triangles.len();
+        let new = self.survey.promote(&positions);
+        self.work.extend(self.survey, &new, &[]);
+        let known = vertices(self.work);
+        let completed: Vec<Vertex> = positions.iter().filter_map(|p| known.get(&key(p)).copied()).collect();
+        self.work.extend(self.survey, &[], &completed);
+        for t in first..self.work.triangles.len() {
+            let mut triangle = self.work.triangles[t];
+            let patch = triangle.patch;
+            self.clusters.of_triangle.push(if patch == NONE { NONE } else { self.clusters.of_patch[patch as usize] });
+            join_in(self.work, self.reversed, t as u32);
+            // They are no part of their patch any more, whatever becomes of the attempt.
+            if patch != NONE {
+                if self.before.reversed.patches[patch as usize] {
+                    triangle.v.swap(1, 2);
+                }
+                triangle.alive = !self.before.reversed.dropped[patch as usize];
+            }
+            self.before.triangles.push(triangle);
+        }
+    }
+
+    /// Triangles that came without a surface are of that of a neighbour.
+    fn follow(&mut self) {
+        for t in self.clusters.of_triangle.len()..self.work.triangles.len() {
+            let stars = self.work.triangles[t].v.into_iter().flat_map(|v| self.work.star(v)).map(|(o, _)| o as usize);
+            let known = stars.filter_map(|o| self.clusters.of_triangle.get(o).copied().filter(|piece| *piece != NONE));
+            let piece = known.min().unwrap_or(NONE);
+            self.clusters.of_triangle.push(piece);
+        }
+    }
+
+    /// Every edge of what takes part must be used as often in one direction as in the other.
+    fn check_closed(&mut self) -> std::result::Result<(), Stuck> {
+        let mut triangles = Vec::new();
+        let (_, edges) = self.work.edges();
+        for edge in edges.iter().filter(|edge| edge.uses.len() != 2 || edge.is_unbalanced()) {
+            let own = || edge.uses.iter().filter(|used| self.clusters.holds(used.triangle));
+            let balance: i64 = own().map(|used| if used.forward { 1 } else { -1 }).sum();
+            if balance != 0 {
+                triangles.extend(own().map(|used| used.triangle));
+            }
+        }
+        if triangles.is_empty() { Ok(()) } else { Err(Stuck { failure: Failure::Opened, triangles }) }
+    }
+
+    fn restore(&mut self) {
+        self.work.restore(&self.before.triangles);
+        self.reversed.clone_from(&self.before.reversed);
+    }
+}
+
+/// The power of two above a coordinate.
+fn above(coordinate: f32) -> f64 {
+    let mut power = 1.0f64;
+    let coordinate = f64::from(coordinate).max(f64::from(f32::MIN_POSITIVE));
+    while power <= coordinate {
+        power *= 2.0;
+    }
+    while power / 2.0 > coordinate {
+        power /= 2.0;
+    }
+    power
+}
+
+/// Triangles on the same three vertices, by twos: they are in no pair that crosses.
+fn coincident(shop: &Shop) -> Vec<[u32; 2]> {
+    let candidates = defects::by_vertex_set(shop);
+    let groups = candidates.chunk_by(|a, b| a.0 == b.0);
+    groups.flat_map(|group| group.windows(2).map(|two| [two[0].1, two[1].1])).collect()
+}
+
+/// Vertices by position: of several there, one that is used.
+fn vertices(shop: &Shop) -> HashMap<[u32; 3], Vertex> {
+    let used = shop.living().flat_map(|t| shop.triangles[t as usize].v);
+    let all = 0..shop.positions.len() as Vertex;
+    all.chain(used).map(|v| (shop.positions[v as usize].map(f32::to_bits), v)).collect()
+}

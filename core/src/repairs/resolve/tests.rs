@@ -1,0 +1,146 @@
+//! Small bodies that cross.
+
+use std::path::Path;
+
+use glam::DVec3;
+use proptest::prelude::*;
+
+use super::super::duplicates;
+use super::*;
+use crate::Quiet;
+use crate::arrange::Rational;
+use crate::settings::Limits;
+use crate::testing::{After, Corners, after, cube, cuboid, reversed, shifted};
+
+fn resolved_by(triangles: &[Corners], profile: &Profile) -> After<Resolved> {
+    after(triangles, |d, turned| {
+        let work = &mut Work::new(&mut d.shop);
+        duplicates::drop_duplicates(work);
+        let limits = Limits { threads: 1, ..Limits::default() };
+        let means = Means { path: Path::new("test"), limits: &limits, progress: &Quiet };
+        resolve(&Rational, &mut d.survey, work, turned, profile, false, &means).unwrap()
+    })
+}
+
+fn resolved(triangles: &[Corners]) -> After<Resolved> {
+    resolved_by(triangles, &Profile::default())
+}
+
+#[test]
+fn crossing_cubes_become_one_body() {
+    let both = [cube(), shifted(&cube(), [0.5, 0.625, 0.75])].concat();
+    let got = resolved(&both);
+    assert!(got.verdict.good, "{:?}", got.verdict);
+    assert_eq!((got.defects.components, got.result.bodies, got.result.rounds), (1, 1, 1));
+    let shared = 0.5 * 0.375 * 0.25;
+    assert!((got.defects.volume - (2.0 - shared)).abs() < 1e-9 && (got.result.volume - shared).abs() < 1e-9);
+    // Six faces are cut, of two triangles each; the others are as they were.
+    assert_eq!(got.untouched, 12);
+}
+
+#[test]
+fn bodies_that_are_to_be_kept_go_on_crossing_and_one_that_crosses_itself_does_not() {
+    let keep = Profile { bodies: Bodies::Keep, ..Profile::default() };
+    let both = [cube(), shifted(&cube(), [0.5, 0.625, 0.75])].concat();
+    assert_eq!(resolved_by(&both, &keep).untouched, 24);
+    // Joined by a bar that shares a face with each, and reaches from one to the other inside of both.
+    let mut bent = both.clone();
+    bent.retain(|t| !cube()[..2].contains(t));
+    bent.retain(|t| !shifted(&cube()[2..4], [0.5, 0.625, 0.75]).contains(t));
+    let [a, b] = [[0.0f32, 0.0, 0.0], [0.5, 0.625, 1.75]];
+    let square = |p: [f32; 3]| [[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]].map(|[x, y]| [p[0] + x, p[1] + y, p[2]]);
+    let (from, to) = (square(a), square(b));
+    for k in 0..4 {
+        let next = (k + 1) % 4;
+        bent.extend([[from[k], from[next], to[next]], [from[k], to[next], to[k]]]);
+    }
+    let got = resolved_by(&bent, &keep);
+    assert!(got.verdict.good && got.result.pairs > 0, "{:?}", got.verdict);
+}
+
+#[test]
+fn a_body_through_another_is_cut_where_they_meet_and_gone_between() {
+    let bar = cuboid([0.25, 0.25, -1.0], [0.5, 0.5, 2.0]);
+    let got = resolved(&[cube(), bar].concat());
+    assert!(got.verdict.good, "{:?}", got.verdict);
+    assert!((got.defects.volume - (1.0 + 2.0 / 16.0)).abs() < 1e-9, "{}", got.defects.volume);
+    // A hole, of a body inside out.
+    let got = resolved(&[cube(), reversed(&cuboid([0.25, 0.25, -1.0], [0.5, 0.5, 2.0]))].concat());
+    assert!(got.verdict.good, "{:?}", got.verdict);
+    assert!((got.defects.volume - (1.0 - 1.0 / 16.0)).abs() < 1e-9, "{}", got.defects.volume);
+}
+
+#[test]
+fn bodies_that_share_part_of_a_face_become_one() {
+    for at in [[1.0, 0.25, 0.25], [0.5, 0.0, 0.0], [1.0, 0.0, 0.5]] {
+        let got = resolved(&[cube(), shifted(&cube(), at)].concat());
+        assert!(got.verdict.good, "{at:?}: {:?}", got.verdict);
+        assert_eq!(got.defects.components, 1);
+        assert!((got.defects.volume - if at[0] == 1.0 { 2.0 } else { 1.5 }).abs() < 1e-9, "{at:?}: {}", got.defects.volume);
+    }
+}
+
+#[test]
+fn a_sheet_through_a_body_is_not_for_the_arrangement() {
+    let sheet = vec![[[-1.0, 0.5, 0.5], [2.0, 0.5, 0.5], [0.5, 3.0, 0.625]]];
+    let got = resolved(&[cube(), sheet].concat());
+    assert_eq!((got.result.pairs, got.untouched), (0, 13));
+}
+
+#[test]
+fn a_cavity_that_breaks_through_the_wall_opens_it() {
+    let cavity = reversed(&cuboid([0.25; 3], [0.75, 0.75, 1.5]));
+    let got = resolved(&[cube(), cavity].concat());
+    assert!(got.verdict.good, "{:?}", got.verdict);
+    assert!((got.defects.volume - (1.0 - 0.25 * 0.75)).abs() < 1e-9, "{}", got.defects.volume);
+}
+
+/// Boxes on a grid, some inside out, far from the origin or not.
+fn boxes() -> impl Strategy<Value = Vec<([u8; 3], [u8; 3])>> {
+    let corner = || prop::array::uniform3(0u8..4);
+    prop::collection::vec((corner(), corner()), 1..6)
+        .prop_map(|all| all.into_iter().map(|(at, size)| (at, size.map(|s| s % 3 + 1))).collect())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+
+    /// Of boxes on a grid, where everything coincides with everything, the cells that any of them holds are left.
+    #[test]
+    fn of_boxes_on_a_grid_their_union_is_left(boxes in boxes()) {
+        let solid = |at: &[u8; 3], size: &[u8; 3]| {
+            cuboid(at.map(f32::from), std::array::from_fn(|k| f32::from(at[k] + size[k])))
+        };
+        let mesh: Vec<Corners> = boxes.iter().flat_map(|(at, size)| solid(at, size)).collect();
+        let holds = |cell: [u8; 3]| {
+            boxes.iter().any(|(at, size)| (0..3).all(|k| at[k] <= cell[k] && cell[k] < at[k] + size[k]))
+        };
+        let cells = (0..512u32).filter(|n| holds([n % 8, n / 8 % 8, n / 64].map(|x| x as u8))).count();
+        let got = resolved(&mesh);
+        prop_assert!(got.defects.boundary_edges + got.defects.unbalanced_edges == 0, "{:?}", got.verdict);
+        prop_assert!(got.defects.self_intersections.as_ref().is_some_and(|s| s.is_free()), "{:?}", got.verdict);
+        // Bodies that cross nothing but lie in others are not this pass's.
+        if got.defects.nested_positive == 0 {
+            prop_assert!((got.defects.volume - cells as f64).abs() < 1e-6, "{} instead of {cells}", got.defects.volume);
+        }
+    }
+
+    /// Slanted tetrahedra and boxes: everything crosses, nothing coincides, and f32 has to round.
+    #[test]
+    fn of_slanted_bodies_a_closed_surface_is_left(
+        corners in prop::collection::vec(prop::array::uniform4(prop::array::uniform3(-8.0f32..8.0)), 1..6),
+        far in prop_oneof![Just(0.0f32), Just(1000.0)],
+    ) {
+        let tetrahedron = |[a, b, c, d]: [[f32; 3]; 4]| {
+            let place = |p: [f32; 3]| DVec3::from_array(p.map(f64::from));
+            let [o, x, y, z] = [a, b, c, d].map(place);
+            let faces = [[a, c, b], [a, b, d], [b, c, d], [c, a, d]];
+            if (x - o).cross(y - o).dot(z - o) > 0.0 { faces.to_vec() } else { reversed(&faces) }
+        };
+        let mesh: Vec<Corners> = corners.into_iter().flat_map(tetrahedron).collect();
+        let mesh = shifted(&mesh, [far; 3]);
+        let got = resolved(&mesh);
+        prop_assert!(got.defects.boundary_edges + got.defects.unbalanced_edges == 0, "{:?}", got.verdict);
+        prop_assert!(got.defects.self_intersections.as_ref().is_some_and(|s| s.is_free()), "{:?}", got.verdict);
+    }
+}

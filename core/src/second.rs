@@ -295,13 +295,12 @@ fn is_distinct(corners: &[[f32; 3]; 3]) -> bool {
 mod tests {
     use std::path::Path;
 
-    use crate::Quiet;
-    use crate::settings::Limits;
     use proptest::prelude::*;
 
+    use crate::Quiet;
     use crate::edit::Edit;
     use crate::repairs;
-    use crate::settings::Profile;
+    use crate::settings::{Guarantee, Limits, Profile};
     use crate::shop::components::Reversed;
     use crate::testing::{Corners, check_second_look, cube, diagnose, plate, records, reversed, shifted, soup, written};
 
@@ -310,7 +309,9 @@ mod tests {
         let input = records(triangles);
         let mut diagnosis = diagnose(&input);
         let limits = Limits { threads: 1, ..Limits::default() };
-        let repaired = repairs::run(&mut diagnosis, Path::new("test"), &Profile::default(), &limits, &Quiet).unwrap();
+        // A wrap takes long, and leaves next to nothing to look at by itself.
+        let profile = Profile { guarantee: Guarantee::Off, ..Profile::default() };
+        let repaired = repairs::run(&mut diagnosis, Path::new("test"), &profile, &limits, &Quiet).unwrap();
         let edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &repaired.reversed);
         check_second_look(diagnosis.survey, &edit, &diagnose(&written(&edit, &input)).defects)
     }

@@ -604,7 +604,9 @@ enum Neighbours {
 #[cfg(test)]
 pub(super) fn fill(d: &mut crate::engine::Diagnosis<'_>, profile: &Profile) -> Closed {
     let unturned = Reversed::none(&d.survey);
-    fill_loops(&d.survey, &mut Work::new(&mut d.shop), &unturned, &d.tolerance, profile, 1)
+    // What nothing closes without crossing something is another pass's then.
+    let profile = Profile { resolve_crossings: false, ..profile.clone() };
+    fill_loops(&d.survey, &mut Work::new(&mut d.shop), &unturned, &d.tolerance, &profile, 1)
 }
 
 #[cfg(test)]

@@ -163,7 +163,7 @@ impl Default for Profile {
 
 impl Profile {
     /// The profiles that come with the product, by name: `default`; `scan` (larger holes, wider gaps, for scanned surfaces);
-    /// `cautious` (welds and drops surplus triangles, but closes and wraps nothing).
+    /// `cautious` (welds and drops surplus triangles, but closes, cuts and wraps nothing).
     pub fn built_in(name: &str) -> Option<Self> {
         let base = Self { name: name.into(), ..Self::default() };
         match name {
@@ -175,6 +175,7 @@ impl Profile {
                 fill_holes: false,
                 gap_edge_share: 0.0,
                 sheets: Sheets::Keep,
+                resolve_crossings: false,
                 max_volume_change: 0.02,
                 guarantee: Guarantee::Strict,
                 ..base

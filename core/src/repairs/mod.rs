@@ -37,7 +37,7 @@ use crate::error::Result;
 use crate::holes;
 use crate::report::{BoundaryLoops, LoopLeft, Repair, SheetDropped, Wrap};
 use crate::settings::{Guarantee, Limits, Profile};
-use crate::shop::components::Reversed;
+use crate::shop::components::{Components, Reversed};
 use crate::shop::near::Tolerance;
 use crate::survey::Survey;
 use resolve::{Means, Resolved};
@@ -129,14 +129,7 @@ pub(crate) fn run(
         sheets = sheets::drop(survey, shop, &mut reversed, &lone, &mut loops_left, profile);
         sheets.len() as u64
     });
-    let mut pieces = None;
-    log.time("outward", "components that were inside out", || {
-        let found = orient::pieces(survey, shop, &reversed);
-        let turned = orient::make_outward(survey, shop, &mut reversed, &found).0;
-        // Of what was turned, the volume is another now.
-        pieces = (turned == 0).then_some(found);
-        turned
-    });
+    let mut pieces = outward(survey, shop, &mut reversed, &mut log);
     let mut resolved = Resolved::default();
     if profile.resolve_crossings {
         let across = !closed_across.is_empty();
@@ -145,11 +138,13 @@ pub(crate) fn run(
             resolved = resolve::resolve(&Rational, survey, shop, &mut reversed, profile, across, &means)?;
             Ok(resolved.pairs)
         })?;
-        // The surface may have been divided anew.
-        pieces = None;
         let open = close::open_again(shop, closed_across, &resolved.taken_part);
         log.take_back("fill", open.len() as u64);
         loops_left.extend(open);
+        if resolved.divided {
+            // What was cut off may stand for itself.
+            pieces = outward(survey, shop, &mut reversed, &mut log);
+        }
     }
     if resolved.pairs > 0 {
         log.note(
@@ -182,7 +177,7 @@ pub(crate) fn run(
     log.note("separated", separated.to_string());
     let mut wraps = wrap::Wraps::default();
     // What was resolved crosses nothing any more.
-    let may_cross = !profile.resolve_crossings || !resolved.left.is_empty();
+    let may_cross = !profile.resolve_crossings || !resolved.left.is_empty() || separated.edges > 0;
     if profile.guarantee == Guarantee::Wrap && (may_cross || wrap::is_broken(shop)) {
         log.time("wrap", "regions that nothing else made a solid, replaced by a surface around what they enclose", || {
             let pairs =
@@ -202,6 +197,19 @@ pub(crate) fn run(
         wraps: wraps.listed,
         wrapped: wraps.triangles,
     })
+}
+
+/// Turns what is inside out; the pieces of surface, if nothing was turned.
+fn outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed, log: &mut Log) -> Option<Components> {
+    let mut pieces = None;
+    log.time("outward", "components that were inside out", || {
+        let found = orient::pieces(survey, work, reversed);
+        let turned = orient::make_outward(survey, work, reversed, &found).0;
+        // Of what was turned, the volume is another now.
+        pieces = (turned == 0).then_some(found);
+        turned
+    });
+    pieces
 }
 
 /// The boundary loops of a workshop, with their kinds. They are what is left when surplus surface is gone and vertices within the weld

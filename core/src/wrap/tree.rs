@@ -10,8 +10,8 @@
 //! matter of the rims' edges only, however long the triangles of the surface are. Where rims have many edges, as in a soup, the surface is asked
 //! directly.
 //!
-//! **Deterministic.** The tree's shape depends on the triangles and their order alone, a query meets nodes in the tree's order, and all is
-//! + − × ÷ √ in f64, which IEEE 754 fixes. A solid angle is twice the argument of a complex number (van Oosterom & Strackee, IEEE Trans.
+//! **Deterministic.** The tree's shape depends on the triangles and their order alone, a query meets nodes in the tree's order, and all is done
+//! by + − × ÷ √ in f64, which IEEE 754 fixes. A solid angle is twice the argument of a complex number (van Oosterom & Strackee, IEEE Trans.
 //! Biomed. Eng. 30(2), 1983): the numbers of all near triangles are multiplied and the turns of the product counted, so that the angle itself
 //! is needed once a query, from a series of our own rather than from the platform's `atan2`.
 

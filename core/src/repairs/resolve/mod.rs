@@ -52,6 +52,8 @@ pub(super) struct Resolved {
     /// Bodies that became part of others, and the volume that counted more than once.
     pub(super) bodies: u64,
     pub(super) volume: f64,
+    /// The surface was looked at anew: patches have other numbers than before.
+    pub(super) divided: bool,
     /// Why some surfaces were left as they were, and how many of them.
     pub(super) left: Vec<(Failure, u64)>,
     /// By triangle of the workshop, as far as it was there before: was its surface closed, and was it not left? Empty: no.
@@ -156,6 +158,7 @@ pub(super) fn resolve(
                 resolved.volume = state.survey.measure.volume(Extent { area: 0, volume: volume - volume_now });
                 resolved.left = counted(left);
                 resolved.taken_part = taken_part;
+                resolved.divided = true;
                 return Ok(resolved);
             }
             Err(Stuck { failure, triangles }) => {
@@ -169,7 +172,7 @@ pub(super) fn resolve(
             }
         }
     }
-    Ok(Resolved { left: counted(left), ..Resolved::default() })
+    Ok(Resolved { left: counted(left), divided: true, ..Resolved::default() })
 }
 
 /// The corners of the triangles of some pairs.
@@ -349,8 +352,7 @@ impl State<'_, '_, '_> {
         let cut = Cut::of(engine, self.work, crossing, |t| clusters.holds(t), threads);
         let cut = cut.ok_or_else(|| Stuck::with(Failure::NotArranged))?;
         let sides = Sides::of(self.survey, self.work, &cut, &self.clusters);
-        let pieces = orient::pieces(self.survey, self.work, self.reversed);
-        let windings = sides.windings(self.survey, self.work, self.reversed, &cut, crossing, &self.clusters, &pieces);
+        let windings = sides.windings(self.survey, self.work, self.reversed, &cut, crossing, &self.clusters);
         self.apply(&cut, &sides, &windings)
     }
 

@@ -4,13 +4,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
+use super::super::orient;
 use super::super::work::Work;
 use super::Clusters;
 use super::cut::Cut;
 use crate::bodies;
 use crate::chunk::{self, NONE};
 use crate::shop::Shop;
-use crate::shop::components::{Components, Reversed};
+use crate::shop::components::Reversed;
 use crate::survey::Survey;
 
 /// The cells of space in front of and behind everything closed.
@@ -101,13 +102,14 @@ impl Sides {
     pub(super) fn windings(
         &self,
         survey: &Survey<'_>,
-        shop: &Shop,
+        work: &mut Work<'_>,
         reversed: &Reversed,
         cut: &Cut,
         crossing: &BTreeSet<u32>,
         clusters: &Clusters,
-        pieces: &Components,
     ) -> Vec<Option<i32>> {
+        let pieces = orient::pieces(survey, work, reversed);
+        let shop: &Shop = work;
         let mut parents = self.parents.clone();
         let roots: Vec<u32> = (0..parents.len() as u32).map(|node| chunk::find(&mut parents, node)).collect();
         let root = |node: u32| roots[node as usize];
@@ -150,7 +152,7 @@ impl Sides {
         let surface_at = |node: u32| surface_of.get(root(node) as usize).filter(|s| **s != NONE).map(|s| *s as usize);
         let samples = self.samples(shop, cut, crossing, clusters, surface_at);
         let points: Vec<[f64; 3]> = samples.iter().map(|sample| sample.point).collect();
-        let found = bodies::windings(survey, shop, pieces, reversed, &points);
+        let found = bodies::windings(survey, shop, &pieces, reversed, &points);
         let mut bases: Vec<Option<i32>> = vec![None; sound.len()];
         for (sample, winding) in samples.iter().zip(found) {
             if let Some(surface) = surface_at(sample.node).filter(|surface| sound[*surface]) {

@@ -59,9 +59,7 @@ pub(crate) fn windings(
     reversed: &Reversed,
     points: &[[f64; 3]],
 ) -> Vec<i32> {
-    let closed: Vec<u32> = (0..components.list.len() as u32).filter(|c| !components.list[*c as usize].open).collect();
-    let boxes: Vec<Bounds> = closed.iter().map(|c| components.list[*c as usize].bounds).collect();
-    let tree = BoxTree::new(&boxes);
+    let (closed, tree) = closed_ones(&components.list);
     let mut found = Vec::new();
     let rays: Vec<Ray> = points
         .iter()
@@ -114,14 +112,19 @@ fn count(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed: &R
     rays.iter().map(around).collect()
 }
 
+/// The closed components, ascending, and their boxes in that order.
+fn closed_ones(list: &[Component]) -> (Vec<u32>, BoxTree) {
+    let closed: Vec<u32> = (0..list.len() as u32).filter(|c| !list[*c as usize].open).collect();
+    let boxes: Vec<Bounds> = closed.iter().map(|c| list[*c as usize].bounds).collect();
+    (closed, BoxTree::new(&boxes))
+}
+
 /// The components asked about whose boxes lie in closed ones', ascending, and a ray for each.
 fn rays(survey: &Survey<'_>, shop: &Shop, list: &[Component], asks: impl Fn(&Component) -> bool) -> (Vec<u32>, Vec<Ray>) {
-    let closed: Vec<u32> = (0..list.len() as u32).filter(|c| !list[*c as usize].open).collect();
-    if closed.is_empty() || list.len() < 2 {
+    if list.len() < 2 || list.iter().all(|c| c.open) {
         return Default::default();
     }
-    let boxes: Vec<Bounds> = closed.iter().map(|c| list[*c as usize].bounds).collect();
-    let tree = BoxTree::new(&boxes);
+    let (closed, tree) = closed_ones(list);
     let mut found = Vec::new();
     let (mut of_rays, mut rays) = (Vec::new(), Vec::new());
     for (component, inner) in (0..).zip(list).filter(|(_, inner)| asks(inner)) {
@@ -139,10 +142,11 @@ fn rays(survey: &Survey<'_>, shop: &Shop, list: &[Component], asks: impl Fn(&Com
     (of_rays, rays)
 }
 
-/// A point of a triangle, of no symmetry, so that it does not fall on grid lines that models are built on.
+/// The weights of a triangle's corners in a point of it, of no symmetry, so that it does not fall on grid lines that models are built on.
+pub(crate) const INNER_POINT: [f64; 3] = [0.318_411, 0.367_778, 0.313_811];
+
 fn inner_point(corners: &[[f32; 3]; 3]) -> [f64; 3] {
-    const WEIGHTS: [f64; 3] = [0.318_411, 0.367_778, 0.313_811];
-    std::array::from_fn(|k| (0..3).map(|i| WEIGHTS[i] * f64::from(corners[i][k])).sum())
+    std::array::from_fn(|k| (0..3).map(|i| INNER_POINT[i] * f64::from(corners[i][k])).sum())
 }
 
 /// The rays that may meet what lies in some box.

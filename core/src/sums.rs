@@ -50,6 +50,13 @@ impl Bounds {
         (0..3).all(|k| self.lo[k] <= other.lo[k] && self.hi[k] >= other.hi[k])
     }
 
+    /// What two boxes have in common; `None` if they do not meet.
+    pub(crate) fn overlap(&self, other: &Self) -> Option<Self> {
+        let lo: [f32; 3] = std::array::from_fn(|k| self.lo[k].max(other.lo[k]));
+        let hi: [f32; 3] = std::array::from_fn(|k| self.hi[k].min(other.hi[k]));
+        (0..3).all(|k| lo[k] <= hi[k]).then_some(Self { lo, hi })
+    }
+
     /// Length of the diagonal; 0 of an empty box.
     pub(crate) fn diagonal(&self) -> f64 {
         if self.is_empty() {

@@ -25,7 +25,7 @@ use crate::settings::Profile;
 use crate::shop::components::{Reversed, nonmanifold_vertices};
 use crate::shop::edges::Edge;
 use crate::shop::wedges::{Half, Wedges};
-use crate::shop::{Shop, Triangle, Vertex};
+use crate::shop::{Shop, Triangle, Vertex, bits};
 use crate::survey::Survey;
 
 /// A copy moves by no more than this share of the shortest edge at it, so that no triangle comes near to turning over.
@@ -82,7 +82,7 @@ pub(super) fn separate(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reve
     }
     let before = Before {
         triangles: shop.triangles.clone(),
-        taken: shop.positions.iter().map(bits).collect(),
+        taken: shop.positions.iter().copied().map(bits).collect(),
         farthest: profile.max_separation_relative * survey.bounds.diagonal(),
     };
     let mut from = BTreeMap::new();
@@ -349,7 +349,7 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
             places.flat_map(|step| directions.iter().map(move |d| (middle + *d * step).as_vec3().to_array().map(|x| x + 0.0)));
         let tried = places.enumerate().skip(self.from.get(&of).copied().unwrap_or(0));
         for (place, position) in tried.take(most_places) {
-            if self.before.taken.contains(&bits(&position)) || self.taken.contains(&bits(&position)) {
+            if self.before.taken.contains(&bits(position)) || self.taken.contains(&bits(position)) {
                 continue;
             }
             if self.accepts(&moved(position), &near) {
@@ -387,7 +387,7 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
 
     fn add(&mut self, copy: Copy, position: Point) -> Vertex {
         self.copies.push(copy);
-        self.taken.insert(bits(&position));
+        self.taken.insert(bits(position));
         self.work.add_vertex(position)
     }
 
@@ -413,10 +413,10 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
         }
         let shop: &Shop = self.work;
         let positions = &shop.positions[self.first as usize..];
-        let copy_at: HashMap<[u32; 3], usize> = positions.iter().map(bits).zip(0..).collect();
+        let copy_at: HashMap<[u32; 3], usize> = positions.iter().copied().map(bits).zip(0..).collect();
         for (suspect, _) in survey.beyond_the_workshop(positions) {
             let corners = record::corners(&survey.records[suspect.triangle as usize]).map(|p| p.map(|x| x + 0.0));
-            blamed.extend(corners.iter().filter_map(|p| copy_at.get(&bits(p))));
+            blamed.extend(corners.iter().filter_map(|p| copy_at.get(&bits(*p))));
         }
         let overlay = Overlay::of(survey, shop, reversed)?;
         let copies = |t: u32| shop.triangles[t as usize].v.into_iter().filter_map(|v| v.checked_sub(self.first));
@@ -487,10 +487,6 @@ fn badness(contact: Contact) -> u8 {
         Contact::Overlap => 2,
         Contact::Cross => 3,
     }
-}
-
-fn bits(p: &Point) -> [u32; 3] {
-    p.map(f32::to_bits)
 }
 
 #[cfg(test)]

@@ -473,6 +473,7 @@ impl Closing<'_> {
             };
             *closed.by_method.entry(format!("{}{shaped}", patch.method)).or_default() += loops;
         }
+        self.drop_idle_joints(work);
         self.open.sort_by_key(|(rim, _)| *rim);
         let kept = self.open.iter().filter(|(_, reason)| matches!(reason, NotFilled::NotAdmitted(_)));
         closed.kept_open = kept.map(|(rim, _)| work.positions[self.rim(*rim).vertices[0] as usize]).collect();
@@ -480,14 +481,16 @@ impl Closing<'_> {
             let rim = self.rim(*rim);
             if matches!(reason, NotFilled::NotAdmitted(NotAdmitted::Sheet)) {
                 let listed = (i < LISTED).then_some(i);
-                closed.sheets.push(SheetRim { triangle: rim.triangles[0], edges: rim.vertices.len(), listed });
+                // Of an island's rim and its hole's together, some are joints, which are gone.
+                if let Some(triangle) = rim.triangles.iter().copied().find(|t| work.lives(*t)) {
+                    closed.sheets.push(SheetRim { triangle, edges: rim.vertices.len(), listed });
+                }
             }
             if i >= LISTED {
                 continue;
             }
             closed.left.push(left(work, rim.vertices[0], rim.vertices.len(), rim.perimeter(work), reason));
         }
-        self.drop_idle_joints(work);
         closed
     }
 

@@ -11,7 +11,7 @@ use crate::chunk::NONE;
 use crate::fill::cross::Triangle as Corners;
 use crate::record;
 use crate::shop::components::{Components, Reversed, Through};
-use crate::shop::{Origin, Shop};
+use crate::shop::{Origin, Shop, bits};
 use crate::survey::Survey;
 
 /// A triangle that a patch crosses.
@@ -73,15 +73,10 @@ pub(super) fn crossed(
     let mut crossed: BTreeMap<u32, Vec<Obstacle>> = BTreeMap::new();
     let mut known = HashSet::new();
     for (patch, of_patch, other) in blamed {
-        let corners = match overlay.changed_of(other) {
-            Some(t) => shop.points(t),
-            None => record::corners(&survey.records[other as usize]),
-        };
+        let corners = overlay.corners(survey, shop, other);
         let of_both = component(of_patch).zip(component(other));
         let obstacle = Obstacle { corners, met_already: of_both.is_some_and(|(a, b)| met.binary_search(&[a, b]).is_ok()) };
-        // Zero has two signs in a record.
-        let bits = corners.map(|p| p.map(|x| (x + 0.0).to_bits()));
-        if known.insert((patch, bits, obstacle.met_already)) {
+        if known.insert((patch, corners.map(bits), obstacle.met_already)) {
             crossed.entry(patch).or_default().push(obstacle);
         }
     }

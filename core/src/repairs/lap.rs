@@ -174,7 +174,7 @@ impl Pieces {
         let of_patch = &self.components.of_patch;
         let found = survey.visit_sound(
             |patch| is_wanted(of_patch[patch as usize]),
-            |reach| (overlap(reach, &everything).is_some()).then(Vec::new),
+            |reach| reach.overlap(&everything).map(|_| Vec::new()),
             |_, corners| meets(corners),
             |found: &mut Vec<(u32, u32)>, triangle, patch| found.push((triangle, patch)),
         );
@@ -191,7 +191,7 @@ impl Pieces {
 /// Cuts that can be made side by side: no piece takes part in two of them.
 fn cuts(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) -> Vec<Cut> {
     let (shop, edges) = work.edges();
-    if tolerance.edge_share <= 0.0 {
+    if tolerance.edge_share <= 0.0 || !edges.iter().any(|e| e.is_boundary()) {
         return Vec::new();
     }
     let pieces = Pieces::of(survey, shop, edges, tolerance);
@@ -262,7 +262,7 @@ fn cut(survey: &Survey<'_>, shop: &Shop, edges: &Edges, pieces: &Pieces, pair: P
     let [a, b] = pair;
     let reach = pieces.reach(a, b, f64::INFINITY).rim;
     let [box_a, box_b] = pair.map(|piece| widened(&pieces.list()[piece as usize].bounds, reach));
-    let both = overlap(&box_a, &box_b)?;
+    let both = box_a.overlap(&box_b)?;
     let members = pieces.gather(survey, shop, |piece| pair.contains(&piece), &[both])?;
     let layers = pair.map(|piece| {
         let facets = members.iter().filter(|m| m.piece == piece).map(|m| Facet::of(&m.corners, piece)).collect();
@@ -432,12 +432,6 @@ fn numbered(shop: &Shop) -> HashMap<[u32; 3], Vertex> {
 /// Wider on all sides, rounded outward.
 fn widened(b: &Bounds, by: f64) -> Bounds {
     around(&[shop::place(b.lo), shop::place(b.hi)], by)
-}
-
-/// What two boxes have in common.
-fn overlap(a: &Bounds, b: &Bounds) -> Option<Bounds> {
-    let common = Bounds { lo: std::array::from_fn(|k| a.lo[k].max(b.lo[k])), hi: std::array::from_fn(|k| a.hi[k].min(b.hi[k])) };
-    (0..3).all(|k| common.lo[k] <= common.hi[k]).then_some(common)
 }
 
 #[cfg(test)]

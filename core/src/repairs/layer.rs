@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use crate::boxes::BoxTree;
 use crate::fill::cross::Triangle as Corners;
-use crate::shop::place;
+use crate::shop::{place, square_distance};
 use crate::sums::Bounds;
 
 /// Two surfaces face the same way if the cosine between their normals is at least this: up to about 25°.
@@ -136,7 +136,7 @@ impl Layer {
             if reach > 0.0
                 && facet.normal.dot(normal) >= AGREE
                 && !pieces.contains(&facet.piece)
-                && p.distance_squared(nearest(p, &facet.corners)) <= reach * reach
+                && square_distance(p, facet.corners) <= reach * reach
             {
                 pieces.push(facet.piece);
             }
@@ -180,43 +180,8 @@ pub(super) fn around(points: &[DVec3], by: f64) -> Bounds {
     bounds
 }
 
-/// The point of a triangle nearest to `p` (Ericson, Real-Time Collision Detection, 2005, 5.1.5).
-fn nearest(p: DVec3, [a, b, c]: &[DVec3; 3]) -> DVec3 {
-    let (ab, ac, ap) = (*b - *a, *c - *a, p - *a);
-    let (d1, d2) = (ab.dot(ap), ac.dot(ap));
-    if d1 <= 0.0 && d2 <= 0.0 {
-        return *a;
-    }
-    let bp = p - *b;
-    let (d3, d4) = (ab.dot(bp), ac.dot(bp));
-    if d3 >= 0.0 && d4 <= d3 {
-        return *b;
-    }
-    let vc = d1 * d4 - d3 * d2;
-    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        return *a + ab * (d1 / (d1 - d3));
-    }
-    let cp = p - *c;
-    let (d5, d6) = (ab.dot(cp), ac.dot(cp));
-    if d6 >= 0.0 && d5 <= d6 {
-        return *c;
-    }
-    let vb = d5 * d2 - d1 * d6;
-    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        return *a + ac * (d2 / (d2 - d6));
-    }
-    let va = d3 * d6 - d5 * d4;
-    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
-        return *b + (*c - *b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
-    }
-    let sum = va + vb + vc;
-    *a + ab * (vb / sum) + ac * (vc / sum)
-}
-
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
-
     use super::*;
 
     const NEAR: Reach = Reach { on: 0.1, rim: 0.1 };
@@ -251,19 +216,5 @@ mod tests {
         assert!(!over(-0.2), "it is beyond");
         let along = Facet::of(&[[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]], 0);
         assert!(!layer.ends_over(&along, NEAR), "its neighbour");
-    }
-
-    proptest! {
-        /// No point of the triangle is nearer than the one that is called the nearest.
-        #[test]
-        fn nearest_is_nearest(c in prop::array::uniform12(-4i8..5), at in prop::array::uniform2(0.0f64..1.0)) {
-            let v = |i: usize| DVec3::from_array([c[i], c[i + 1], c[i + 2]].map(f64::from));
-            let (p, corners) = (v(0), [v(3), v(6), v(9)]);
-            prop_assume!((corners[1] - corners[0]).cross(corners[2] - corners[0]) != DVec3::ZERO);
-            let found = nearest(p, &corners);
-            let [s, t] = if at[0] + at[1] > 1.0 { [1.0 - at[0], 1.0 - at[1]] } else { at };
-            let other = corners[0] + (corners[1] - corners[0]) * s + (corners[2] - corners[0]) * t;
-            prop_assert!(p.distance(found) <= p.distance(other) + 1e-9);
-        }
     }
 }

@@ -28,6 +28,7 @@ mod work;
 mod wrap;
 mod zip;
 
+use std::path::Path;
 use std::time::Instant;
 
 use crate::Progress;
@@ -40,8 +41,8 @@ use crate::settings::{Guarantee, Limits, Profile};
 use crate::shop::components::{Components, Reversed};
 use crate::shop::near::Tolerance;
 use crate::survey::Survey;
+use overlay::Overlay;
 use resolve::{Means, Resolved};
-use std::path::Path;
 pub(crate) use swallowed::Swallowed;
 use work::Work;
 
@@ -180,8 +181,12 @@ pub(crate) fn run(
     let may_cross = !profile.resolve_crossings || !resolved.left.is_empty() || separated.edges > 0;
     if profile.guarantee == Guarantee::Wrap && (may_cross || wrap::is_broken(shop)) {
         log.time("wrap", "regions that nothing else made a solid, replaced by a surface around what they enclose", || {
-            let pairs =
-                if profile.check_self_intersections { wrap::crossing_pairs(survey, shop, &reversed) } else { Some(Vec::new()) };
+            let overlay = || Overlay::of(survey, shop, &reversed);
+            let pairs = if profile.check_self_intersections {
+                overlay().and_then(|overlay| overlay.crossing_pairs(survey, shop))
+            } else {
+                Some(Vec::new())
+            };
             wraps = wrap::replace(survey, shop, &mut reversed, pairs.as_deref(), &kept_open, profile, threads);
             wraps.regions
         });

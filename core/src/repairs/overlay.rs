@@ -70,6 +70,25 @@ impl Overlay {
         number.checked_sub(self.records)
     }
 
+    /// The corners of the triangle that a number stands for.
+    pub(super) fn corners(&self, survey: &Survey<'_>, shop: &Shop, number: u32) -> Corners {
+        match self.changed_of(number) {
+            Some(t) => shop.points(t),
+            None => record::corners(&survey.records[number as usize]).map(|p| p.map(|x| x + 0.0)),
+        }
+    }
+
+    /// All pairs that cross or overlap, by their numbers; `None` if those of the input are not known, or it is too much work to tell. Holds what
+    /// changed against everything in the file.
+    pub(super) fn crossing_pairs(&self, survey: &Survey<'_>, shop: &Shop) -> Option<Vec<[u32; 2]>> {
+        let known = survey.crossing_pairs.as_ref()?.iter().map(|pair| pair.triangles);
+        let mut pairs: Vec<[u32; 2]> = known.filter(|pair| !pair.iter().any(|record| self.is_gone(*record))).collect();
+        if !self.changed.is_empty() {
+            pairs.extend(self.met_by(survey, shop, |_| true)?.iter().map(|pair| pair.triangles));
+        }
+        Some(pairs)
+    }
+
     /// Which pairs with one of the changed triangles that are `fresh` cross or overlap, by their numbers; `None` if that is too much work to
     /// tell. O(boxes around them).
     pub(super) fn met_by(&self, survey: &Survey<'_>, shop: &Shop, fresh: impl Fn(u32) -> bool) -> Option<Vec<Pair>> {

@@ -22,7 +22,7 @@ use crate::record;
 use crate::report::Wrap;
 use crate::settings::Profile;
 use crate::shop::components::{self, Components, Reversed, Through};
-use crate::shop::{Shop, place};
+use crate::shop::{Shop, bits, place};
 use crate::sums::Bounds;
 use crate::survey::Survey;
 use crate::wrap::tree::{Corners, Tree};
@@ -70,19 +70,7 @@ pub(super) fn is_broken(work: &mut Work<'_>) -> bool {
         || !components::nonmanifold_vertices(shop, edges).is_empty()
 }
 
-/// Pairs of triangles that cross or overlap as the workshop stands, by record, or past all records by triangle of the workshop. `None` if that
-/// is not known, as there are too many. Holds what changed against everything in the file.
-pub(super) fn crossing_pairs(survey: &Survey<'_>, shop: &Shop, reversed: &Reversed) -> Option<Vec<[u32; 2]>> {
-    let overlay = Overlay::of(survey, shop, reversed)?;
-    let known = survey.crossing_pairs.as_ref()?.iter().map(|pair| pair.triangles);
-    let mut pairs: Vec<[u32; 2]> = known.filter(|pair| !pair.iter().any(|t| overlay.is_gone(*t))).collect();
-    if !overlay.changed().is_empty() {
-        pairs.extend(overlay.met_by(survey, shop, |_| true)?.iter().map(|pair| pair.triangles));
-    }
-    Some(pairs)
-}
-
-/// Replaces what is no solid, as far as the profile allows. `pairs`: as [`crossing_pairs`] finds them (empty if nobody looked for any);
+/// Replaces what is no solid, as far as the profile allows. `pairs`: as [`Overlay::crossing_pairs`] finds them (empty if nobody looked for any);
 /// `kept_open`: a vertex of each loop that was left open on purpose. Reads the chunks where groups have sound surface, and all for every round
 /// of wraps.
 pub(super) fn replace(
@@ -163,10 +151,6 @@ fn apply(
     if pieces.of_patch.iter().any(|piece| goes(*piece)) {
         reversed.dropped.iter_mut().zip(&pieces.of_patch).for_each(|(dropped, piece)| *dropped |= goes(*piece));
     }
-}
-
-fn bits(p: [f32; 3]) -> [u32; 3] {
-    p.map(|x| (x + 0.0).to_bits())
 }
 
 /// What came of a group.
@@ -567,7 +551,7 @@ impl Site<'_, '_> {
         accepted.iter().flat_map(|(_, outcome)| &outcome.triangles).for_each(|t| bounds.include(t));
         let touched = self.survey.visit_sound(
             |patch| !self.reversed.dropped[patch as usize] && !goes(self.pieces.of_patch[patch as usize]),
-            |reach| meet(reach, &bounds).then(Vec::new),
+            |reach| reach.overlap(&bounds).map(|_| Vec::new()),
             |_, corners| corners.iter().any(|p| at(*p).is_some()),
             |list: &mut Vec<(u32, u32)>, record, patch| list.push((record, patch)),
         );
@@ -580,10 +564,6 @@ impl Site<'_, '_> {
         met.dedup();
         Some(met)
     }
-}
-
-fn meet(a: &Bounds, b: &Bounds) -> bool {
-    (0..3).all(|k| a.lo[k] <= b.hi[k] && b.lo[k] <= a.hi[k])
 }
 
 /// How far a winding number is from 0, 1, 2, …
@@ -628,7 +608,7 @@ mod tests {
         let mut d = Diagnosis::of(Path::new("test"), &input, profile, limits, &Quiet).unwrap();
         let mut reversed = Reversed::none(&d.survey);
         let work = &mut Work::new(&mut d.shop);
-        let pairs = crossing_pairs(&d.survey, work, &reversed);
+        let pairs = Overlay::of(&d.survey, work, &reversed).and_then(|overlay| overlay.crossing_pairs(&d.survey, work));
         let wraps = replace(&d.survey, work, &mut reversed, pairs.as_deref(), kept_open, profile, limits.threads);
         let mut edit = Edit::of(&d.survey, &d.shop, &reversed);
         edit.added.extend(wraps.triangles.iter().map(|corners| record::encode(*corners, 0)));

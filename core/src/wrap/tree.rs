@@ -17,7 +17,7 @@
 
 use glam::DVec3;
 
-use crate::shop::place;
+use crate::shop::{place, square_distance};
 use crate::sums::Bounds;
 use crate::{bodies, chunk};
 
@@ -196,7 +196,7 @@ impl Tree {
         let node = &self.nodes[n];
         if node.count > 0 {
             for t in self.leaf(node) {
-                *best = best.min(square_distance(point, t));
+                *best = best.min(square_distance(point, t.map(place)));
             }
             return;
         }
@@ -432,25 +432,6 @@ fn square_to_box(p: DVec3, b: &Bounds) -> f64 {
     out.length_squared()
 }
 
-/// Squared distance of a point from a triangle (Ericson, Real-Time Collision Detection, 2005, 5.1.5: by the regions of its corners, edges
-/// and face).
-fn square_distance(p: DVec3, t: &Corners) -> f64 {
-    let [a, b, c] = t.map(place);
-    let to_edge = |a: DVec3, b: DVec3| {
-        let (d, q) = (b - a, p - a);
-        let share = if d.length_squared() > 0.0 { (q.dot(d) / d.length_squared()).clamp(0.0, 1.0) } else { 0.0 };
-        (q - d * share).length_squared()
-    };
-    let rim = to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a));
-    let normal = (b - a).cross(c - a);
-    let is_over = |a: DVec3, b: DVec3| normal.cross(b - a).dot(p - a) >= 0.0;
-    if normal.length_squared() > 0.0 && is_over(a, b) && is_over(b, c) && is_over(c, a) {
-        let height = normal.dot(p - a);
-        return rim.min(height * height / normal.length_squared());
-    }
-    rim
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -529,7 +510,7 @@ mod tests {
             let mut plain = Angle::default();
             triangles.iter().for_each(|t| plain.add(t, p));
             prop_assert!((tree.winding_number(p) - plain.turns()).abs() < 0.05 * (1.0 + triangles.len() as f64 / 20.0));
-            let nearest = triangles.iter().map(|t| square_distance(p, t)).fold(f64::INFINITY, f64::min).sqrt();
+            let nearest = triangles.iter().map(|t| square_distance(p, t.map(place))).fold(f64::INFINITY, f64::min).sqrt();
             prop_assert!((tree.distance(p) - nearest).abs() < 1e-9);
         }
     }

@@ -11,7 +11,7 @@ use super::sides::Sides;
 use super::{Failure, State, Stuck, vertices};
 use crate::chunk::NONE;
 use crate::defects;
-use crate::shop::{Origin, Shop, Vertex};
+use crate::shop::{Shop, Vertex, bits};
 
 /// What becomes of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,16 +97,13 @@ impl State<'_, '_, '_> {
             let position = rounded(point);
             let exact = DVec3::from_array(cut.arrangement.points[point as usize]);
             displaced = displaced.max(exact.distance(DVec3::from_array(position.map(f64::from))));
-            let v = *known.entry(position.map(f32::to_bits)).or_insert_with(|| self.work.add_vertex(position));
+            let v = *known.entry(bits(position)).or_insert_with(|| self.work.add_vertex(position));
             vertex_of.insert(point, v);
         }
         let first = self.work.triangles.len() as u32;
         for (t, points) in new {
             let v = points.map(|point| vertex_of[&point]);
-            let origin = match self.work.triangles[*t as usize].origin {
-                Origin::Input(record) | Origin::Part(record) => Origin::Part(record),
-                Origin::Patch => Origin::Patch,
-            };
+            let origin = self.work.triangles[*t as usize].origin.of_part();
             if v[0] != v[1] && v[1] != v[2] && v[2] != v[0] {
                 self.work.add(v, origin, NONE);
                 self.clusters.of_triangle.push(self.clusters.of_triangle[*t as usize]);
@@ -134,7 +131,7 @@ impl State<'_, '_, '_> {
             }
             displaced = displaced.max(crate::shop::distance(from, to));
             moved.extend(self.work.star(v).map(|(t, _)| t));
-            let stays = *known.entry(to.map(f32::to_bits)).or_insert_with(|| self.work.add_vertex(to));
+            let stays = *known.entry(bits(to)).or_insert_with(|| self.work.add_vertex(to));
             self.work.merge(stays, v);
         }
         let moved: Vec<u32> = moved.into_iter().collect();

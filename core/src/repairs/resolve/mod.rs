@@ -31,13 +31,12 @@ use super::overlay::Overlay;
 use super::work::Work;
 use crate::Progress;
 use crate::arrange::Arrange;
-use crate::chunk::{self, NONE};
+use crate::chunk::{self, NONE, Suspect};
 use crate::defects;
 use crate::error::Result;
-use crate::record;
 use crate::settings::{Bodies, Limits, Profile};
 use crate::shop::components::{Components, Reversed};
-use crate::shop::{Origin, Shop, Triangle, Vertex};
+use crate::shop::{Origin, Shop, Triangle, Vertex, bits};
 use crate::sums::Extent;
 use crate::survey::{Division, Survey};
 
@@ -119,16 +118,11 @@ pub(super) fn resolve(
     means: &Means<'_>,
 ) -> Result<Resolved> {
     let no_copies = !work.edges().1.any_nonmanifold() || coincident(work).is_empty();
-    let Some(known) = survey.crossing_pairs.as_deref().filter(|known| across || !known.is_empty() || !no_copies) else {
+    if survey.crossing_pairs.as_ref().is_none_or(|known| known.is_empty() && no_copies && !across) {
         return Ok(Resolved::default());
-    };
-    let Some(overlay) = Overlay::of(survey, work, reversed) else { return Ok(Resolved::too_many()) };
-    let known = known.iter().map(|pair| pair.triangles);
-    let mut pairs: Vec<[u32; 2]> = known.filter(|pair| !pair.iter().any(|record| overlay.is_gone(*record))).collect();
-    if !overlay.changed().is_empty() {
-        let Some(met) = overlay.met_by(survey, work, |_| true) else { return Ok(Resolved::too_many()) };
-        pairs.extend(met.iter().map(|pair| pair.triangles));
     }
+    let Some(overlay) = Overlay::of(survey, work, reversed) else { return Ok(Resolved::too_many()) };
+    let Some(pairs) = overlay.crossing_pairs(survey, work) else { return Ok(Resolved::too_many()) };
     if pairs.is_empty() && no_copies {
         return Ok(Resolved::default());
     }
@@ -138,28 +132,33 @@ pub(super) fn resolve(
     let mut blocked: Vec<bool> = Vec::new();
     let (mut bodies, mut volume) = (0, 0);
     let mut state = State { survey, work, reversed, before, clusters: Clusters::default(), first_vertex: 0 };
-    for attempt in 0..=ATTEMPTS {
+    let mut attempts = 0;
+    loop {
+        attempts += 1;
         let pieces = orient::pieces(state.survey, state.work, state.reversed);
-        blocked.resize(pieces.list.len(), attempt == ATTEMPTS);
-        if attempt == 0 {
+        blocked.resize(pieces.list.len(), false);
+        if attempts == 1 {
             (bodies, volume) = measured(&pieces);
         }
-        if attempt == ATTEMPTS {
+        if attempts > ATTEMPTS {
+            // With all of them blocked there is nothing to fail with.
             blocked.fill(true);
         }
         state.clusters = Clusters::of(&pieces, &blocked);
         state.first_vertex = state.work.positions.len() as Vertex;
         let taken_part: Vec<bool> = (0..state.work.triangles.len() as u32).map(|t| state.clusters.holds(t)).collect();
         match state.attempt(engine, &overlay, &pairs, profile, means.limits.threads) {
-            Ok(mut resolved) => {
+            Ok(resolved) => {
                 let pieces = orient::pieces(state.survey, state.work, state.reversed);
                 let (bodies_now, volume_now) = measured(&pieces);
-                resolved.bodies = bodies.saturating_sub(bodies_now);
-                resolved.volume = state.survey.measure.volume(Extent { area: 0, volume: volume - volume_now });
-                resolved.left = counted(left);
-                resolved.taken_part = taken_part;
-                resolved.divided = true;
-                return Ok(resolved);
+                return Ok(Resolved {
+                    bodies: bodies.saturating_sub(bodies_now),
+                    volume: state.survey.measure.volume(Extent { area: 0, volume: volume - volume_now }),
+                    left: counted(left),
+                    taken_part,
+                    divided: true,
+                    ..resolved
+                });
             }
             Err(Stuck { failure, triangles }) => {
                 let failed = state.clusters.pieces_of(&triangles);
@@ -172,19 +171,24 @@ pub(super) fn resolve(
             }
         }
     }
-    Ok(Resolved { left: counted(left), divided: true, ..Resolved::default() })
 }
 
-/// The corners of the triangles of some pairs.
+/// The corners of the triangles of some pairs, each once.
 fn corners(survey: &Survey<'_>, shop: &Shop, overlay: &Overlay, pairs: &[[u32; 2]]) -> Vec<[f32; 3]> {
-    let triangle = |number: &u32| match overlay.changed_of(*number) {
-        Some(t) => shop.points(t),
-        None => record::corners(&survey.records[*number as usize]).map(|p| p.map(|x| x + 0.0)),
-    };
-    let mut positions: Vec<[f32; 3]> = pairs.iter().flatten().flat_map(triangle).collect();
-    positions.sort_unstable_by_key(|p| p.map(f32::to_bits));
+    let mut positions: Vec<[f32; 3]> = pairs.iter().flatten().flat_map(|number| overlay.corners(survey, shop, *number)).collect();
+    positions.sort_unstable_by_key(|p| bits(*p));
     positions.dedup();
     positions
+}
+
+/// Takes triangles into the workshop, and marks the vertices at these positions as complete; returns the first of the triangles.
+fn take_in(survey: &Survey<'_>, work: &mut Work<'_>, new: &[(Suspect, u32)], positions: &[[f32; 3]]) -> u32 {
+    let first = work.triangles.len() as u32;
+    work.extend(survey, new, &[]);
+    let known = vertices(work);
+    let completed: Vec<Vertex> = positions.iter().filter_map(|p| known.get(&bits(*p)).copied()).collect();
+    work.extend(survey, &[], &completed);
+    first
 }
 
 /// Gathers the stars of the vertices at these positions into the workshop, so that sound surface on the two sides of what crosses is two
@@ -197,12 +201,8 @@ fn divide(
     means: &Means<'_>,
 ) -> Result<()> {
     let Division { fetched, divided_from } = survey.divide(means.path, &positions, means.limits, means.progress)?;
-    let first = work.triangles.len();
-    work.extend(survey, &fetched, &[]);
-    let known = vertices(work);
-    let completed: Vec<Vertex> = positions.iter().filter_map(|p| known.get(&p.map(f32::to_bits)).copied()).collect();
-    work.extend(survey, &[], &completed);
-    for t in first as u32..work.triangles.len() as u32 {
+    let first = take_in(survey, work, &fetched, &positions);
+    for t in first..work.triangles.len() as u32 {
         join_in(work, reversed, t);
     }
     work.follow_division(survey);
@@ -241,6 +241,8 @@ struct Stuck {
     failure: Failure,
     triangles: Vec<u32>,
 }
+
+type Tried<T> = std::result::Result<T, Stuck>;
 
 impl Stuck {
     fn with(failure: Failure) -> Self {
@@ -316,7 +318,7 @@ impl State<'_, '_, '_> {
         pairs: &[[u32; 2]],
         profile: &Profile,
         threads: usize,
-    ) -> std::result::Result<Resolved, Stuck> {
+    ) -> Tried<Resolved> {
         let mut resolved = Resolved::default();
         let first_triangle = self.work.triangles.len() as u32;
         let too_many = || Stuck::with(Failure::TooMany);
@@ -347,7 +349,7 @@ impl State<'_, '_, '_> {
     }
 
     /// Cuts, decides and rounds once. Returns how far vertices were moved.
-    fn round(&mut self, engine: &dyn Arrange, crossing: &BTreeSet<u32>, threads: usize) -> std::result::Result<f64, Stuck> {
+    fn round(&mut self, engine: &dyn Arrange, crossing: &BTreeSet<u32>, threads: usize) -> Tried<f64> {
         let clusters = &self.clusters;
         let cut = Cut::of(engine, self.work, crossing, |t| clusters.holds(t), threads);
         let cut = cut.ok_or_else(|| Stuck::with(Failure::NotArranged))?;
@@ -388,25 +390,20 @@ impl State<'_, '_, '_> {
 
     /// Fetches the stars of the vertices at these positions that are not here.
     fn complete(&mut self, mut positions: Vec<[f32; 3]>) {
-        let key = |p: &[f32; 3]| p.map(f32::to_bits);
-        positions.sort_unstable_by_key(key);
+        positions.sort_unstable_by_key(|p| bits(*p));
         positions.dedup();
         let known = vertices(self.work);
-        positions.retain(|p| known.get(&key(p)).is_none_or(|v| !self.work.complete[*v as usize]));
+        positions.retain(|p| known.get(&bits(*p)).is_none_or(|v| !self.work.complete[*v as usize]));
         if positions.is_empty() {
             return;
         }
-        let first = self.work.triangles.len();
         let new = self.survey.promote(&positions);
-        self.work.extend(self.survey, &new, &[]);
-        let known = vertices(self.work);
-        let completed: Vec<Vertex> = positions.iter().filter_map(|p| known.get(&key(p)).copied()).collect();
-        self.work.extend(self.survey, &[], &completed);
-        for t in first..self.work.triangles.len() {
-            let mut triangle = self.work.triangles[t];
+        let first = take_in(self.survey, self.work, &new, &positions);
+        for t in first..self.work.triangles.len() as u32 {
+            let mut triangle = self.work.triangles[t as usize];
             let patch = triangle.patch;
             self.clusters.of_triangle.push(if patch == NONE { NONE } else { self.clusters.of_patch[patch as usize] });
-            join_in(self.work, self.reversed, t as u32);
+            join_in(self.work, self.reversed, t);
             // They are no part of their patch any more, whatever becomes of the attempt.
             if patch != NONE {
                 if self.before.reversed.patches[patch as usize] {
@@ -429,7 +426,7 @@ impl State<'_, '_, '_> {
     }
 
     /// Every edge of what takes part must be used as often in one direction as in the other.
-    fn check_closed(&mut self) -> std::result::Result<(), Stuck> {
+    fn check_closed(&mut self) -> Tried<()> {
         let mut triangles = Vec::new();
         let (_, edges) = self.work.edges();
         for edge in edges.iter().filter(|edge| edge.uses.len() != 2 || edge.is_unbalanced()) {
@@ -472,5 +469,5 @@ fn coincident(shop: &Shop) -> Vec<[u32; 2]> {
 fn vertices(shop: &Shop) -> HashMap<[u32; 3], Vertex> {
     let used = shop.living().flat_map(|t| shop.triangles[t as usize].v);
     let all = 0..shop.positions.len() as Vertex;
-    all.chain(used).map(|v| (shop.positions[v as usize].map(f32::to_bits), v)).collect()
+    all.chain(used).map(|v| (bits(shop.positions[v as usize]), v)).collect()
 }

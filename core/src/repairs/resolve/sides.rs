@@ -8,7 +8,7 @@ use super::super::orient;
 use super::super::work::Work;
 use super::Clusters;
 use super::cut::Cut;
-use crate::bodies;
+use crate::bodies::{self, INNER_POINT};
 use crate::chunk::{self, NONE};
 use crate::shop::Shop;
 use crate::shop::components::Reversed;
@@ -229,12 +229,10 @@ struct Sample {
 
 /// Twice the area of a triangle, and a point in front of it, by so little that f32 knows nothing between.
 fn in_front(corners: [DVec3; 3]) -> (f64, [f64; 3]) {
-    // Of no symmetry, so that a ray does not run along what models are built of.
-    const WEIGHTS: [f64; 3] = [0.318_411, 0.367_778, 0.313_811];
     let [a, b, c] = corners;
     let normal = (b - a).cross(c - a);
     let area = normal.length();
-    let point = a * WEIGHTS[0] + b * WEIGHTS[1] + c * WEIGHTS[2];
+    let point = a * INNER_POINT[0] + b * INNER_POINT[1] + c * INNER_POINT[2];
     let largest = corners.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
     // 2⁻⁴⁰: far above what f64 rounds, far below what f32 can tell.
     (area, (point + normal / area.max(f64::MIN_POSITIVE) * (largest * 9.1e-13)).to_array())

@@ -142,4 +142,34 @@ mod tests {
         let got = dropped(&[tray, cuboid([3.0, 3.0, -1.0], [5.0, 5.0, 2.0])].concat(), &Profile::default());
         assert_eq!(got.result.0, []);
     }
+
+    /// Found by random soups: a rim and that of an island in it are closed together, but stay open since they enclose next to nothing, so that
+    /// what joined them goes, which the rim was named by.
+    #[test]
+    fn a_rim_that_was_joined_to_an_island_is_named_by_a_triangle_that_is_there() {
+        let mesh = [
+            [[0.0, 0.0, 0.0], [4.0, 1.0, 5.0], [0.0, 5.0, 5.0]],
+            [[2.0, 3.0, 3.0], [4.0, 3.0, 3.0], [0.0, 0.0, 1.0]],
+            [[0.0, 0.0, 5.0], [0.0, 1.0, 4.0], [5.0, 1.0, 4.0]],
+            [[4.0, 1.0, 5.0], [3.0, 3.0, 2.0], [0.0, 1.0, 0.0]],
+            [[0.0, 0.0, 5.0], [5.0, 1.0, 1.0], [0.0, 0.0, 2.0]],
+            [[0.0, 0.0, 1.0], [0.0, 5.0, 0.0], [2.0, 0.0, 4.0]],
+            [[5.0, 1.0, 4.0], [2.0, 2.0, 0.0], [0.0, 5.0, 0.0]],
+            [[0.0, 0.0, 3.0], [2.0, 0.0, 4.0], [2.0, 0.0, 2.0]],
+            [[2.0, 1.0, 3.0], [2.0, 2.0, 2.0], [1.0, 0.0, 1.0]],
+            [[0.0, 2.0, 0.0], [0.0, 0.0, 0.0], [0.0, 2.0, 3.0]],
+            [[0.0, 5.0, 5.0], [0.0, 1.0, 1.0], [2.0, 1.0, 3.0]],
+            [[0.0, 0.0, 0.0], [5.0, 1.0, 1.0], [1.0, 3.0, 2.0]],
+            [[0.0, 0.0, 2.0], [1.0, 3.0, 2.0], [2.0, 3.0, 3.0]],
+            [[0.0, 2.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 5.0]],
+            [[0.0, 0.0, 5.0], [4.0, 3.0, 3.0], [2.0, 2.0, 1.0]],
+        ];
+        let lives = after(&mesh, |d, turned| {
+            let work = &mut Work::new(&mut d.shop);
+            let closed = close::fill_loops(&d.survey, work, turned, &d.tolerance, &Profile::default(), 1);
+            let lives: Vec<bool> = closed.sheets.iter().map(|rim| work.lives(rim.triangle)).collect();
+            lives
+        });
+        assert!(!lives.result.is_empty() && lives.result.iter().all(|lives| *lives));
+    }
 }

@@ -14,8 +14,9 @@ use crate::read::{MeshFile, PREFIX_BYTES};
 use crate::readback::Expectation;
 use crate::repairs::Swallowed;
 use crate::report::{
-    BoundaryLoops, Cost, Defects, EditSummary, FileFacts, Outcome, Report, SCHEMA_VERSION, Stage, Task, Tolerances,
+    BoundaryLoops, Certificate, Cost, Defects, EditSummary, FileFacts, Outcome, Report, SCHEMA_VERSION, Stage, Task, Tolerances,
 };
+use crate::rules::Subject;
 use crate::settings::{Bodies, Limits, Profile, folder_of};
 use crate::shop::Shop;
 use crate::shop::edges::Edges;
@@ -23,7 +24,7 @@ use crate::shop::near::Tolerance;
 use crate::space::{self, Need};
 use crate::sums::Bounds;
 use crate::survey::Survey;
-use crate::{Progress, cost, defects, digest, emit, members, parallel, record, repairs, second, verdict};
+use crate::{Progress, certificate, cost, defects, digest, emit, members, parallel, record, repairs, second, verdict};
 
 /// Fewer bytes are hashed by one thread: starting more would take longer.
 const HASHED_BY_ONE: usize = 1 << 20;
@@ -137,6 +138,7 @@ pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress
     mesh.check_unchanged()?;
     let mut report = report(Task::Inspect, &mesh, &diagnosis, profile, limits);
     report.input.blake3 = blake3;
+    report.certificate = Some(certify(&report.input, &report.before, &flaws(&mesh)));
     report.loops = repairs::recognise(&mut diagnosis, profile);
     report.outcome = if report.verdict.good { Outcome::Clean } else { Outcome::NotGood };
     report.cost = clock.cost(mesh.records().len() as u64);
@@ -166,6 +168,7 @@ fn report(task: Task, mesh: &MeshFile, diagnosis: &Diagnosis<'_>, profile: &Prof
         edit: EditSummary::default(),
         edit_records: None,
         verdict: verdict::judge(&diagnosis.defects, &flaws(mesh)).under(profile.guarantee),
+        certificate: None,
         stages: Vec::new(),
         cost: Cost::default(),
     }
@@ -290,6 +293,7 @@ fn confirm_copy(report: &mut Report, input: &MeshFile, output: &Path, limits: &L
         return Err(Error::Changed { path: input.path().into() });
     }
     report.outcome = if report.verdict.good { Outcome::Clean } else { Outcome::NotGood };
+    report.certificate = Some(certify(&facts, &report.before, &flaws(&written)));
     report.output = Some(facts);
     Ok(())
 }
@@ -331,9 +335,15 @@ fn verify(
             report.verdict.reasons = concerns;
         }
     }
+    report.certificate = Some(certify(&facts, &defects, &flaws(&written)));
     report.after = Some(defects);
     report.output = Some(facts);
     Ok(())
+}
+
+/// The certificate of a file of these facts, counts and flaws.
+fn certify(facts: &FileFacts, defects: &Defects, flaws: &[String]) -> Certificate {
+    certificate::certify(facts, &Subject { defects, flaws })
 }
 
 /// The hash and the defects of a written file: what was `known` of it before, if it holds what it should, or else by a survey of its own.

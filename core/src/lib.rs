@@ -9,6 +9,7 @@ mod behind;
 mod bodies;
 mod boxes;
 mod budget;
+mod certificate;
 mod chunk;
 mod columns;
 mod cost;
@@ -37,6 +38,7 @@ mod readback;
 pub mod record;
 mod repairs;
 pub mod report;
+mod rules;
 mod second;
 pub mod settings;
 mod shape;
@@ -55,6 +57,7 @@ mod wrap;
 
 pub use error::{Error, ErrorClass};
 pub use report::Report;
+pub use rules::{RULES, Rule};
 pub use settings::{Bodies, Guarantee, Limits, PatchShape, Profile};
 
 use std::path::Path;

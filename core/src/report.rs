@@ -55,6 +55,9 @@ pub struct Report {
     pub edit_records: Option<EditRecords>,
     /// What the written bytes (for an inspection: the read ones) are.
     pub verdict: Verdict,
+    /// What every rule found in them; `None` where nothing was written.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub certificate: Option<Certificate>,
     /// Seconds by stage, in order.
     pub stages: Vec<Stage>,
     /// Where the time went and what it cost.
@@ -394,6 +397,45 @@ pub struct Verdict {
     pub reasons: Vec<String>,
     /// What was not checked.
     pub unchecked: Vec<String>,
+}
+
+/// What every rule found in the bytes of one file. The rules are listed in `core/REPORT.md`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Certificate {
+    /// Every rule was looked at, and passed.
+    pub printable: bool,
+    /// BLAKE3 of the whole file, hexadecimal.
+    pub blake3: String,
+    pub bytes: u64,
+    /// Triangle records in the file.
+    pub triangles: u64,
+    /// Names of the rules that were not passed, or not looked at.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub missing: Vec<String>,
+    /// Every rule, in the order of the table.
+    pub rules: Vec<RuleResult>,
+}
+
+/// What one rule found.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RuleResult {
+    /// Its name.
+    pub rule: String,
+    /// Raised when the rule counts anything else.
+    pub version: u32,
+    pub outcome: RuleOutcome,
+    /// What violates it; `None`: not looked at, or more than could be looked at.
+    pub count: Option<u64>,
+}
+
+/// Whether a file passes a rule.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RuleOutcome {
+    Passed,
+    Failed,
+    /// It was not looked at.
+    Unchecked,
 }
 
 /// One stage's share of the time.

@@ -1,52 +1,24 @@
 //! The verdict: what counts of defects say about a file.
 
 use crate::repairs::Swallowed;
-use crate::report::{Defects, SheetDropped, Verdict, Wrap};
+use crate::report::{Defects, RuleOutcome, SheetDropped, Verdict, Wrap};
+use crate::rules::{self, Aspect, Found, Subject};
 use crate::settings::{Guarantee, Profile};
 use crate::sums::Bounds;
 
 /// What was not looked at is called unchecked, never assumed.
 const SELF_INTERSECTION: &str = "self-intersection";
 
-/// Judges a file by the defects counted on its bytes and by what is wrong with the file itself.
+/// Judges a file by the defects counted on its bytes and by what is wrong with the file itself. All of it follows from the rules, as its
+/// certificate does.
 pub(crate) fn judge(defects: &Defects, flaws: &[String]) -> Verdict {
-    let closed = defects.triangles > defects.degenerate_index && defects.boundary_edges == 0;
-    let manifold = defects.nonmanifold_edges == 0 && defects.nonmanifold_vertices == 0;
-    let oriented = defects.inconsistent_edges == 0 && defects.unbalanced_edges == 0;
-    let mut reasons: Vec<String> = flaws.to_vec();
-    let mut say = |count: u64, what: &str| {
-        if count > 0 {
-            reasons.push(format!("{count} {what}"));
-        }
-    };
-    say(defects.nonfinite, "triangles with NaN or infinite coordinates");
-    say(defects.degenerate_index, "triangles with a repeated vertex");
-    say(defects.degenerate_area, "triangles of no area");
-    say(defects.duplicates_same, "duplicate triangles");
-    say(defects.duplicates_opposite, "pairs of triangles back to back");
-    say(defects.boundary_edges, "boundary edges");
-    say(defects.nonmanifold_edges, "non-manifold edges");
-    say(defects.nonmanifold_vertices, "non-manifold vertices");
-    say(defects.inconsistent_edges, "edges whose triangles disagree");
-    if defects.boundary_edges + defects.inconsistent_edges == 0 {
-        say(defects.unbalanced_edges, "edges not used equally often in both directions");
-    }
-    say(defects.inverted_components, "components inside out");
-    if let Some(found) = defects.self_intersections.as_ref().filter(|found| !found.is_free()) {
-        reasons.push(if found.given_up {
-            "too many triangles come close to each other to be compared pair by pair".into()
-        } else {
-            let (crossing, overlapping) = (found.crossing_pairs, found.overlapping_pairs);
-            format!("{} self-intersecting triangles ({crossing} crossing and {overlapping} overlapping pairs)", found.triangles)
-        });
-    }
-    if defects.triangles == defects.degenerate_index {
-        reasons.push("no triangle with three distinct vertices".into());
-    } else if closed && oriented && defects.volume <= 0.0 {
-        reasons.push("the enclosed volume is not positive".into());
-    }
-    let good = reasons.is_empty() && closed && manifold && oriented;
-    let free = defects.self_intersections.as_ref().map(|found| found.is_free());
+    let subject = Subject { defects, flaws };
+    let found = rules::look(&subject);
+    let outcomes = |aspect| found.iter().filter(move |found| found.rule.aspect == aspect).map(Found::outcome);
+    let [closed, manifold, oriented] =
+        [Aspect::Closed, Aspect::Manifold, Aspect::Oriented].map(|aspect| outcomes(aspect).all(|o| o == RuleOutcome::Passed));
+    let is_unchecked = outcomes(Aspect::FreeOfSelfIntersection).any(|o| o == RuleOutcome::Unchecked);
+    let free = (!is_unchecked).then(|| outcomes(Aspect::FreeOfSelfIntersection).all(|o| o == RuleOutcome::Passed));
     let words: Vec<&str> = [
         (closed, "closed", "open"),
         (manifold, "manifold", "not manifold"),
@@ -57,16 +29,16 @@ pub(crate) fn judge(defects: &Defects, flaws: &[String]) -> Verdict {
     .take(if free.is_some() { 4 } else { 3 })
     .map(|(holds, yes, no)| if *holds { *yes } else { *no })
     .collect();
-    let unchecked: Vec<String> = free.is_none().then(|| SELF_INTERSECTION.into()).into_iter().collect();
+    let unchecked: Vec<String> = is_unchecked.then(|| SELF_INTERSECTION.into()).into_iter().collect();
     let rest: String = unchecked.iter().map(|what| format!("; {what} unchecked")).collect();
     Verdict {
-        good,
+        good: found.iter().all(|found| found.outcome() != RuleOutcome::Failed),
         statement: words.join(", ") + &rest,
         closed,
         manifold,
         oriented,
         free_of_self_intersection: free,
-        reasons,
+        reasons: found.iter().flat_map(|found| found.reasons(&subject)).collect(),
         unchecked,
     }
 }

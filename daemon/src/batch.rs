@@ -293,7 +293,7 @@ impl<'a> Teller<'a> {
                 continue;
             }
             self.done += usize::from(result.is_ok());
-            let (text, complaint, exit) = tell(input, &result, self.order.json);
+            let (text, complaint, exit) = tell(input, &result, self.order);
             self.bar.say(&text, complaint.as_deref());
             self.worst = self.worst.max(exit);
         }

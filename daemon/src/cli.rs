@@ -163,6 +163,9 @@ pub(crate) struct InspectArgs {
     /// Do not look for self-intersections: faster, but the verdict then calls them unchecked
     #[arg(long)]
     pub no_self_intersections: bool,
+    /// Check the certificate in this report, as written by repair or inspect, against the bytes of IN as they are now
+    #[arg(long, value_name = "REPORT", conflicts_with_all = ["json", "profile", "no_self_intersections"])]
+    pub certificate: Option<PathBuf>,
     #[command(flatten)]
     pub spend: Spend,
     /// Print reports as JSON, one a line, instead of tables

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use suture_core::report::Task;
+use suture_core::report::{Certificate, Task};
 use suture_core::{ErrorClass, Limits, Profile, Report};
 
 use crate::batch::Batch;
@@ -22,21 +22,40 @@ pub(crate) fn repair(args: &RepairArgs) -> Exit {
     let order = profiles::of_command(&args.profile, args.no_self_intersections).and_then(|mut profile| {
         profile.guarantee = args.guarantee.map_or(profile.guarantee, Into::into);
         let naming = Some(Naming::new(args)?);
-        Ok(Order { inputs: &args.inputs, profile, limits: args.spend.limits(args.list_edit), naming, json: args.json })
+        let limits = args.spend.limits(args.list_edit);
+        Ok(Order { inputs: &args.inputs, profile, limits, naming, certificate: None, json: args.json })
     });
     carry_out(order)
 }
 
-/// Diagnoses every input.
+/// Diagnoses every input, or checks the certificate of one.
 pub(crate) fn inspect(args: &InspectArgs) -> Exit {
-    let order = profiles::of_command(&args.profile, args.no_self_intersections).map(|profile| Order {
-        inputs: &args.inputs,
-        profile,
-        limits: args.spend.limits(false),
-        naming: None,
-        json: args.json,
+    let certificate = args.certificate.as_deref().map(|report| match args.inputs.as_slice() {
+        [_] => certificate_in(report),
+        _ => Err("a certificate is of one file: name only that".into()),
+    });
+    let order = certificate.transpose().and_then(|certificate| {
+        let mut profile = profiles::of_command(&args.profile, args.no_self_intersections)?;
+        if let Some(certificate) = &certificate {
+            profile.check_self_intersections = certificate.covers_self_intersection();
+        }
+        let limits = args.spend.limits(false);
+        Ok(Order { inputs: &args.inputs, profile, limits, naming: None, certificate, json: args.json })
     });
     carry_out(order)
+}
+
+/// The certificate that stands in a report.
+fn certificate_in(report: &Path) -> Result<Certificate, String> {
+    #[derive(serde::Deserialize)]
+    struct Part {
+        certificate: Option<Certificate>,
+    }
+    let shown = report.display();
+    let file = std::fs::File::open(report).map_err(|e| format!("{shown}: cannot be read: {e}"))?;
+    // A report may list an edit as large as the mesh: it is passed over.
+    let part: Part = serde_json::from_reader(std::io::BufReader::new(file)).map_err(|e| format!("{shown}: is no report: {e}"))?;
+    part.certificate.ok_or_else(|| format!("{shown}: has no certificate in it"))
 }
 
 fn carry_out(order: Result<Order, String>) -> Exit {
@@ -81,6 +100,8 @@ pub(crate) struct Order<'a> {
     pub limits: Limits,
     /// Where results go; `None` for an inspection.
     pub naming: Option<Naming>,
+    /// What is said to be true of the input: that is checked, and nothing else told.
+    pub certificate: Option<Certificate>,
     pub json: bool,
 }
 
@@ -254,15 +275,19 @@ fn not_placed(path: &Path, error: &std::io::Error) -> Failure {
 }
 
 /// What is printed of one input, on standard output and on standard error, and what it means for the exit code.
-pub(crate) fn tell(input: &Path, result: &Result<Box<Report>, Failure>, json: bool) -> (String, Option<String>, Exit) {
-    match result {
-        Ok(report) => {
-            let text = if json { serde_json::to_string(&report).unwrap_or_default() + "\n" } else { table::render(report) };
+pub(crate) fn tell(input: &Path, result: &Result<Box<Report>, Failure>, order: &Order<'_>) -> (String, Option<String>, Exit) {
+    match (result, &order.certificate) {
+        (Ok(report), Some(certificate)) => {
+            let (text, exit) = check(input, certificate, report);
+            (text + "\n", None, exit)
+        }
+        (Ok(report), None) => {
+            let text = if order.json { serde_json::to_string(&report).unwrap_or_default() + "\n" } else { table::render(report) };
             (text, None, if report.outcome.is_good() { Exit::Good } else { Exit::NotGood })
         }
-        Err(failure) => {
+        (Err(failure), _) => {
             let line = format!("suture: {}", failure.line.replace('\n', " "));
-            let text = if json {
+            let text = if order.json {
                 let input = input.display().to_string();
                 format!("{}\n", serde_json::json!({ "input": input, "error": failure.line, "class": failure.class }))
             } else {
@@ -270,5 +295,50 @@ pub(crate) fn tell(input: &Path, result: &Result<Box<Report>, Failure>, json: bo
             };
             (text, Some(line), if failure.stopped { Exit::Interrupted } else { Exit::Refused })
         }
+    }
+}
+
+/// Whether `certificate` holds for the file that `report` is of, in one line; good only if it says that the file is printable.
+fn check(input: &Path, certificate: &Certificate, report: &Report) -> (String, Exit) {
+    let shown = input.display();
+    let contradictions =
+        report.certificate.as_ref().map_or(vec!["the file has none".into()], |now| certificate.contradictions(now));
+    let rules = certificate.rules.len();
+    if !contradictions.is_empty() {
+        return (format!("{shown}: the certificate does not hold: {}", contradictions.join("; ")), Exit::NotGood);
+    }
+    let of = format!("of these {} bytes with BLAKE3 {}", certificate.bytes, certificate.blake3);
+    if certificate.printable {
+        return (format!("{shown}: the certificate holds: printable, {rules} of {rules} rules passed, {of}"), Exit::Good);
+    }
+    let missing = &certificate.missing;
+    let passed = rules.saturating_sub(missing.len());
+    let line = format!("{shown}: not certified: {passed} of {rules} rules passed, {of}, but not {}", missing.join(", "));
+    (line, Exit::NotGood)
+}
+
+#[cfg(test)]
+mod tests {
+    use suture_core::report::Outcome;
+
+    use super::*;
+
+    /// One line each, and only what is certified and the same is good.
+    #[test]
+    fn a_certificate_holds_contradicts_or_certifies_nothing() {
+        let mut report = table::tests::sample(Outcome::Clean);
+        let certificate =
+            Certificate { printable: true, blake3: "ab".into(), bytes: 684, triangles: 12, missing: vec![], rules: vec![] };
+        assert_eq!(check(Path::new("a"), &certificate, &report).1, Exit::NotGood, "the file has none");
+        report.certificate = Some(certificate.clone());
+        let (text, exit) = check(Path::new("a"), &certificate, &report);
+        assert!(text.starts_with("a: the certificate holds: printable") && exit == Exit::Good, "{text}");
+        let other = Certificate { blake3: "cd".into(), ..certificate.clone() };
+        let (text, exit) = check(Path::new("a"), &other, &report);
+        assert!(text.contains("does not hold: these are not the bytes") && exit == Exit::NotGood, "{text}");
+        let open = Certificate { printable: false, ..certificate };
+        report.certificate = Some(open.clone());
+        let (text, exit) = check(Path::new("a"), &open, &report);
+        assert!(text.starts_with("a: not certified") && exit == Exit::NotGood, "{text}");
     }
 }

@@ -88,6 +88,9 @@ pub(crate) fn render(report: &Report) -> String {
     for reason in &report.verdict.reasons {
         item(&mut out, "", reason);
     }
+    if let Some(certificate) = report.certificate.as_ref().filter(|c| report.verdict.good && !c.printable) {
+        item(&mut out, "", &format!("not certified, for want of: {}", certificate.missing.join(", ")));
+    }
     item(&mut out, "cost", &rate(report));
     if let Some(output) = &report.output {
         item(&mut out, "wrote", &format!("{} ({})", output.path.display(), show_size(output.bytes)));
@@ -284,6 +287,7 @@ pub(crate) mod tests {
                 reasons: vec![],
                 unchecked: vec![],
             },
+            certificate: None,
             stages: vec![],
             cost: Cost::default(),
         }

@@ -57,6 +57,25 @@ fn a_search_that_is_not_wanted_is_called_unchecked() {
     }
 }
 
+/// The certificate of a result holds as long as its bytes do, and certifies nothing that was not looked at.
+#[test]
+fn a_certificate_can_be_checked_later() {
+    let place = Place::new();
+    place.generate(Case::Holes, 600, 1);
+    let check = ["inspect", "out.stl", "--certificate", "report.json"];
+    place.repair("holes.stl", "out.stl", &["--report", "report.json", "--no-self-intersections"]).expect(0);
+    assert!(place.suture(check).expect(1).stdout().contains("not certified: 14 of 15 rules passed"));
+    place.repair("holes.stl", "out.stl", &["--report", "report.json", "--force"]).expect(0);
+    let said = place.suture(check).expect(0).stdout();
+    assert!(said.starts_with("out.stl: the certificate holds: printable, 15 of 15") && said.lines().count() == 1, "{said}");
+    let mut bytes = place.read("out.stl");
+    bytes[84 + 50 * 7 + 48] ^= 1;
+    place.put("out.stl", &bytes);
+    assert!(place.suture(check).expect(1).stdout().contains("does not hold: these are not the bytes"));
+    place.suture(["inspect", "out.stl", "--certificate", "holes.stl"]).expect(2);
+    place.suture(["inspect", "out.stl", "holes.stl", "--certificate", "report.json"]).expect(2);
+}
+
 #[test]
 fn without_json_a_table_is_printed() {
     let place = Place::new();

@@ -3,10 +3,16 @@
 //! For each component asked about whose box lies inside a closed one's, a ray runs upwards from a point of one of its triangles. Crossings
 //! of every other component are counted with their sign by exact predicates and half-open rules, so that a ray through an edge or a
 //! vertex counts once. The sum of integers does not depend on the order, so triangles are visited chunk by chunk.
+//!
+//! [`obstructed`] casts rays along any axis in the same way, and asks only if they meet anything.
+
+use std::ops::Neg;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use robust::{Coord, Coord3D};
 
 use crate::boxes::BoxTree;
+use crate::chunk::NONE;
 use crate::record;
 use crate::shop::Shop;
 use crate::shop::components::{Component, Components, Reversed, Sample};
@@ -119,6 +125,78 @@ fn closed_ones(list: &[Component]) -> (Vec<u32>, BoxTree) {
     (closed, BoxTree::new(&boxes))
 }
 
+/// A direction along an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Direction {
+    pub(crate) axis: usize,
+    /// Towards smaller coordinates.
+    pub(crate) backward: bool,
+}
+
+impl Direction {
+    /// The coordinates of a point in a frame in which this is upwards. Exact, and even where coordinates are mirrored, an edge that two triangles
+    /// share is the same for both.
+    pub(crate) fn upright<T: Copy + Neg<Output = T>>(self, p: [T; 3]) -> [T; 3] {
+        let [x, y, z] = [1, 2, 0].map(|k| p[(self.axis + k) % 3]);
+        [x, y, if self.backward { -z } else { z }]
+    }
+
+    fn upright_box(self, of: &Bounds) -> Bounds {
+        let (mut lo, mut hi) = (self.upright(of.lo), self.upright(of.hi));
+        if self.backward {
+            (lo[2], hi[2]) = (hi[2], lo[2]);
+        }
+        Bounds { lo, hi }
+    }
+}
+
+/// Where a ray begins, and the component that does not stand in its way.
+pub(crate) struct Source {
+    pub(crate) from: [f64; 3],
+    pub(crate) component: u32,
+}
+
+/// Which rays meet another component on their way in a direction. Triangles of the workshop count if `counts` says so, all others do; one whose
+/// plane holds the ray, or where it begins, does not. O(triangles under rays), and reads the chunks of the file that the rays may meet.
+pub(crate) fn obstructed(
+    survey: &Survey<'_>,
+    shop: &Shop,
+    components: &Components,
+    direction: Direction,
+    sources: &[Source],
+    counts: impl Fn(u32) -> bool,
+) -> Vec<bool> {
+    if sources.is_empty() {
+        return Vec::new();
+    }
+    let rays: Vec<Ray> =
+        sources.iter().map(|source| Ray { from: direction.upright(source.from), candidates: Vec::new() }).collect();
+    let grid = Grid::new(&rays);
+    let met: Vec<AtomicBool> = sources.iter().map(|_| AtomicBool::new(false)).collect();
+    let meet = |corners: &[[f32; 3]; 3], component: u32| {
+        for r in grid.under(corners).flatten().map(|r| *r as usize) {
+            // Whoever meets it first: it is met.
+            if sources[r].component != component && !met[r].load(Relaxed) && crossing(corners, rays[r].from) != 0 {
+                met[r].store(true, Relaxed);
+            }
+        }
+    };
+    let upright = |corners: &[[f32; 3]; 3]| corners.map(|p| direction.upright(p));
+    survey.visit_sound(
+        |patch| components.of_patch[patch as usize] != NONE,
+        |reach| Over::new(&rays, &grid, &direction.upright_box(reach)),
+        |over, corners| over.may_meet(&grid, &upright(corners)),
+        |_, triangle, patch| {
+            let corners = record::corners(&survey.records[triangle as usize]);
+            meet(&upright(&corners), components.of_patch[patch as usize]);
+        },
+    );
+    for t in shop.living().filter(|t| counts(*t)) {
+        meet(&upright(&shop.points(t)), components.of_triangle[t as usize]);
+    }
+    met.into_iter().map(AtomicBool::into_inner).collect()
+}
+
 /// The components asked about whose boxes lie in closed ones', ascending, and a ray for each.
 fn rays(survey: &Survey<'_>, shop: &Shop, list: &[Component], asks: impl Fn(&Component) -> bool) -> (Vec<u32>, Vec<Ray>) {
     if list.len() < 2 || list.iter().all(|c| c.open) {
@@ -145,7 +223,8 @@ fn rays(survey: &Survey<'_>, shop: &Shop, list: &[Component], asks: impl Fn(&Com
 /// The weights of a triangle's corners in a point of it, of no symmetry, so that it does not fall on grid lines that models are built on.
 pub(crate) const INNER_POINT: [f64; 3] = [0.318_411, 0.367_778, 0.313_811];
 
-fn inner_point(corners: &[[f32; 3]; 3]) -> [f64; 3] {
+/// A point of a triangle.
+pub(crate) fn inner_point(corners: &[[f32; 3]; 3]) -> [f64; 3] {
     std::array::from_fn(|k| (0..3).map(|i| INNER_POINT[i] * f64::from(corners[i][k])).sum())
 }
 
@@ -196,7 +275,7 @@ impl Over {
 }
 
 /// The largest f32 that is not above `x`, and the smallest that is not below.
-fn around(x: f64) -> [f32; 2] {
+pub(crate) fn around(x: f64) -> [f32; 2] {
     let near = x as f32;
     [if f64::from(near) > x { near.next_down() } else { near }, if f64::from(near) < x { near.next_up() } else { near }]
 }
@@ -353,6 +432,32 @@ mod tests {
             if x * y * z > 0.0 { [a, b, c] } else { [a, c, b] }
         };
         signs.map(face).collect()
+    }
+
+    #[test]
+    fn each_direction_meets_what_lies_there_and_nothing_else() {
+        // Cubes of side 2 around the middle: one in each direction along the axes, each at another distance.
+        let middle = cuboid([-1.0; 3], [1.0; 3]);
+        for axis in 0..3 {
+            for backward in [false, true] {
+                let mut by = [0.0; 3];
+                by[axis] = if backward { -4.0 } else { 5.0 };
+                let mesh = [middle.clone(), crate::testing::shifted(&middle, by)].concat();
+                let records = records(&mesh);
+                let d = diagnose(&records);
+                let edges = crate::shop::edges::Edges::of(&d.shop);
+                let none = Reversed::none(&d.survey);
+                let components = Components::of(&d.survey, &d.shop, &edges, &none, Through::EveryEdge);
+                for (other, turned) in (0..3).flat_map(|k| [(k, false), (k, true)]) {
+                    let direction = Direction { axis: other, backward: turned };
+                    // On grid lines, where rays run through diagonals of faces.
+                    let source = |component| [Source { from: [0.0; 3], component }];
+                    let met = |component| obstructed(&d.survey, &d.shop, &components, direction, &source(component), |_| true);
+                    assert_eq!(met(0), [(other, turned) == (axis, backward)], "{direction:?}, towards {by:?}");
+                    assert_eq!(met(1), [true], "out of the cube that is not the ray's own");
+                }
+            }
+        }
     }
 
     #[test]

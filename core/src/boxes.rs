@@ -31,6 +31,18 @@ impl BoxTree {
         });
         found.sort_unstable();
     }
+
+    /// Does any box but this one meet `wanted`? O(log n) where few do, and where many do.
+    pub(crate) fn meets_another(&self, wanted: &Bounds, but: u32) -> bool {
+        let mut meets = false;
+        self.tree.aabb_traverse(aabb(wanted), |tree, node| {
+            let node = &tree.nodes[node as usize];
+            let first = node.first_index as usize;
+            meets |= tree.primitive_indices[first..first + node.prim_count as usize].iter().any(|i| *i != but);
+            !meets
+        });
+        meets
+    }
 }
 
 fn aabb(b: &Bounds) -> Aabb {
@@ -56,6 +68,7 @@ mod tests {
                 let meets = |b: &Bounds| (0..3).all(|k| b.lo[k] <= wanted.hi[k] && b.hi[k] >= wanted.lo[k]);
                 let want: Vec<u32> = (0..boxes.len() as u32).filter(|i| meets(&boxes[*i as usize])).collect();
                 prop_assert_eq!(&found, &want);
+                prop_assert_eq!(tree.meets_another(wanted, want[0]), want.len() > 1);
             }
         }
     }

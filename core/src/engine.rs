@@ -216,9 +216,13 @@ fn mend(
     let mut report = report(Task::Repair, mesh, &diagnosis, profile, limits);
     let mut edit = Edit::default();
     let mut swallowed = Swallowed::default();
-    // What lies in the material of others makes a file no less printable, but it does not belong there.
-    let swallows = profile.bodies == Bodies::Union && report.before.nested_positive > 0;
-    if !report.verdict.good || swallows {
+    // What lies in the material of others, or cannot be seen, makes a file no less printable, but it does not belong there.
+    let holds_more = match profile.bodies {
+        Bodies::Union => report.before.nested_positive > 0,
+        Bodies::Visible => report.before.components > 1,
+        Bodies::Keep => false,
+    };
+    if !report.verdict.good || holds_more {
         progress.at("repair", 0, mesh.records().len() as u64);
         let repaired = repairs::run(&mut diagnosis, mesh.path(), profile, limits, progress)?;
         clock.lap("repair");

@@ -321,6 +321,9 @@ pub struct SheetDropped {
     pub triangles: u64,
     /// It crossed a body, or another sheet.
     pub crosses: bool,
+    /// Other surface hid it in all directions.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub hidden: bool,
 }
 
 /// A region that no repair made a solid. Lengths in the model's units.

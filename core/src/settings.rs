@@ -99,6 +99,9 @@ pub enum Bodies {
     Union,
     /// Everything stays.
     Keep,
+    /// Those that cross become one, and then only what can be seen from outside along the axes stays: a piece of surface, closed or open, whose
+    /// largest triangle is hidden by other pieces in all six directions goes, cavities too. (After Yang et al. 2021, section 3.2.)
+    Visible,
 }
 
 /// What becomes of a lone sheet in a file that holds bodies as well.

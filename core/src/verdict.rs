@@ -216,7 +216,7 @@ mod tests {
     fn dropped_sheets_need_review_beyond_a_share_of_the_area() {
         let before = Defects { area: 600.0, ..cube() };
         let concern = |area: f64| {
-            let sheet = SheetDropped { bounds: [[0.0; 3], [1.0; 3]], area, triangles: 2, crosses: true };
+            let sheet = SheetDropped { bounds: [[0.0; 3], [1.0; 3]], area, triangles: 2, crosses: true, hidden: false };
             review_sheets(&before, &[sheet.clone(), sheet], &Profile { max_sheets_share: 0.25, ..Profile::default() })
         };
         assert_eq!(concern(75.0), None);

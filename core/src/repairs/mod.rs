@@ -24,6 +24,7 @@ mod sheets;
 mod smooth;
 mod surplus;
 mod swallowed;
+mod visible;
 mod work;
 mod wrap;
 mod zip;
@@ -160,16 +161,24 @@ pub(crate) fn run(
         log.say("crossings left", format!("of {pieces} pieces of surface: {failure}"));
     }
     let mut swallowed = Swallowed::default();
+    let mut hidden = visible::Hidden::default();
     log.time("swallowed", "", || {
-        let pieces = pieces.unwrap_or_else(|| orient::pieces(survey, shop, &reversed));
-        swallowed = swallowed::remove(survey, shop, &mut reversed, &pieces, profile);
+        let pieces = pieces.get_or_insert_with(|| orient::pieces(survey, shop, &reversed));
+        swallowed = swallowed::remove(survey, shop, &mut reversed, pieces, profile);
         swallowed.bodies
     });
+    log.time("hidden", "", || {
+        let pieces = pieces.get_or_insert_with(|| orient::pieces(survey, shop, &reversed));
+        hidden = visible::remove(survey, shop, &mut reversed, pieces, &mut loops_left, profile);
+        hidden.pieces
+    });
+    log.note("hidden", hidden.to_string());
+    sheets.append(&mut hidden.sheets);
     let Swallowed { bodies, volume } = &swallowed;
     let note = format!("bodies in the material of others removed: {bodies}, of {volume:.4} units³ together");
     log.note("swallowed", note);
-    swallowed.bodies += resolved.bodies;
-    swallowed.volume += resolved.volume;
+    swallowed.bodies += resolved.bodies + hidden.expected.bodies;
+    swallowed.volume += resolved.volume + hidden.expected.volume;
     let mut separated = apart::Separated::default();
     log.time("separated", "", || {
         separated = apart::separate(survey, shop, &reversed, profile);

@@ -63,8 +63,8 @@ pub(super) fn drop(
         .map(|c| {
             let (sheet, crosses) = (&components.list[c as usize], crossing[c as usize]);
             let bounds = sheet.bounds.normalised();
-            let area = survey.measure.area(sheet.extent);
-            (sheet.extent.area, SheetDropped { bounds: [bounds.lo, bounds.hi], area, triangles: sheet.triangles, crosses })
+            let (bounds, area) = ([bounds.lo, bounds.hi], survey.measure.area(sheet.extent));
+            (sheet.extent.area, SheetDropped { bounds, area, triangles: sheet.triangles, crosses, hidden: false })
         })
         .collect();
     // Stable: of equal ones the first in the file.
@@ -107,7 +107,8 @@ mod tests {
     fn a_sheet_that_enters_a_body_goes_and_is_named() {
         let mesh = [body(), entering()].concat();
         let got = dropped(&mesh, &Profile::default());
-        let sheet = SheetDropped { bounds: [[-2.0, 2.0, 0.0], [2.0, 6.0, 0.0]], area: 16.0, triangles: 32, crosses: true };
+        let sheet =
+            SheetDropped { bounds: [[-2.0, 2.0, 0.0], [2.0, 6.0, 0.0]], area: 16.0, triangles: 32, crosses: true, hidden: false };
         let (gone, left) = got.result;
         assert_eq!((gone, left, got.untouched), (vec![sheet], 0, 12));
         assert!(got.verdict.good, "{:?}", got.verdict);

@@ -71,15 +71,20 @@ pub(super) fn remove(
     if !is_swallowed.contains(&true) {
         return swallowed;
     }
-    let goes = |piece: &u32| *piece != NONE && is_swallowed[*piece as usize];
-    reversed.dropped.iter_mut().zip(&pieces.of_patch).for_each(|(dropped, piece)| *dropped |= goes(piece));
-    let doomed: Vec<u32> = shop.living().filter(|t| goes(&pieces.of_triangle[*t as usize])).collect();
-    doomed.into_iter().for_each(|t| work.kill(t));
+    take_away(work, reversed, pieces, &is_swallowed);
     swallowed
 }
 
+/// Removes whole pieces. O(patches + workshop).
+pub(super) fn take_away(work: &mut Work<'_>, reversed: &mut Reversed, pieces: &Components, goes: &[bool]) {
+    let goes = |piece: &u32| *piece != NONE && goes[*piece as usize];
+    reversed.dropped.iter_mut().zip(&pieces.of_patch).for_each(|(dropped, piece)| *dropped |= goes(piece));
+    let doomed: Vec<u32> = work.living().filter(|t| goes(&pieces.of_triangle[*t as usize])).collect();
+    doomed.into_iter().for_each(|t| work.kill(t));
+}
+
 /// Is there material on both sides of a closed piece outside of which the others wind so many times?
-fn lies_in_material(piece: &Component, outside: i32) -> bool {
+pub(super) fn lies_in_material(piece: &Component, outside: i32) -> bool {
     let inside = match piece.extent.volume.signum() {
         _ if piece.open => return false,
         1 => outside + 1,

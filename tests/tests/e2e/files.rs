@@ -330,3 +330,24 @@ fn a_body_in_the_material_of_another_goes_unless_the_profile_keeps_it() {
     assert_eq!(kept["outcome"], "clean");
     assert_eq!(place.read("kept.stl"), std::fs::read(input).unwrap());
 }
+
+/// A hollow box with a cube afloat in its cavity, and a cube beside it: of the first, only the skin can be seen.
+#[test]
+fn what_cannot_be_seen_goes_if_the_profile_says_so() {
+    let turned = |triangles: Vec<stl::Triangle>| triangles.into_iter().map(|[a, b, c]| [a, c, b]).collect::<Vec<_>>();
+    let seen = [stl::cuboid([0.0; 3], [9.0; 3]), stl::cuboid([20.0; 3], [21.0; 3])].concat();
+    let unseen = [turned(stl::cuboid([3.0; 3], [6.0; 3])), stl::cuboid([4.0; 3], [5.0; 3])].concat();
+    let place = Place::new();
+    place.put("in.stl", &stl::mesh(&[unseen, seen.clone()].concat()));
+    place.put("visible.toml", b"bodies = \"visible\"\n");
+    let profile = place.at("visible.toml");
+    for limits in [&["--chunk-triangles", "4"][..], &[]] {
+        let options = [limits, &["--profile", profile.to_str().unwrap(), "--force"]].concat();
+        let report = place.repair("in.stl", "out.stl", &options).expect(0).report();
+        assert_eq!((&report["outcome"], &report["after"]["bodies"]), (&"repaired".into(), &2.into()), "{report}");
+        let note = report["repairs"][0]["note"].as_str().unwrap();
+        assert!(note.contains("bodies: 1, of 1.0000") && note.contains("thereby: 1, of 27.0000"), "{note}");
+        assert_eq!(stl::records(&place.read("out.stl")), stl::records(&stl::mesh(&seen)));
+    }
+    assert_eq!(place.repair("in.stl", "kept.stl", &[]).expect(0).report()["outcome"], "clean");
+}

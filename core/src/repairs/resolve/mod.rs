@@ -364,7 +364,7 @@ impl State<'_, '_, '_> {
         crossing.extend(coincident(self.work));
         crossing.retain(|pair| {
             let [a, b] = pair.map(|t| self.clusters.of_triangle[t as usize]);
-            self.clusters.takes_part(a) && self.clusters.takes_part(b) && (profile.bodies == Bodies::Union || a == b)
+            self.clusters.takes_part(a) && self.clusters.takes_part(b) && (profile.bodies != Bodies::Keep || a == b)
         });
         for pair in &crossing {
             let [a, b] = pair.map(|t| self.clusters.of_triangle[t as usize]);

@@ -5,7 +5,6 @@
 //! joined to a surface that nobody cut: pieces on top of each other are made one, each knows the input it comes from, and cells are only
 //! told apart as far as the triangles tell.
 
-use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use manifold_rust::linalg::Vec3;
@@ -13,6 +12,7 @@ use manifold_rust::robust::cells::{self, VertTables};
 use manifold_rust::robust::intersection_graph::{self, EdgeKey, IntersectionGraph};
 
 use crate::chunk;
+use crate::fill::exact;
 use crate::parallel;
 
 /// A part of a triangle, or all of it.
@@ -57,12 +57,12 @@ impl Arrange for Rational {
         // A file that the engine cannot do keeps its crossings; it does not cost the others their worker.
         let cut = || parallel::in_pool(threads, || intersection_graph::build_graph(&soup, &[]));
         let graph = catch_unwind(AssertUnwindSafe(cut)).ok()?;
-        catch_unwind(AssertUnwindSafe(|| collect(&graph))).ok()
+        catch_unwind(AssertUnwindSafe(|| collect(&graph, triangles))).ok()
     }
 }
 
-fn collect(graph: &IntersectionGraph) -> Arrangement {
-    let mut pieces = flatten(graph);
+fn collect(graph: &IntersectionGraph, triangles: &[[[f32; 3]; 3]]) -> Arrangement {
+    let mut pieces = flatten(graph, triangles);
     let cells = number_cells(graph, &mut pieces);
     Arrangement { points: graph.verts_f64.iter().map(|p| [p.x, p.y, p.z]).collect(), pieces, cells }
 }
@@ -71,7 +71,7 @@ fn collect(graph: &IntersectionGraph) -> Arrangement {
 ///
 /// Two sources that lie in one plane and overlap have the same points and constraints where they do, but perhaps not the same triangles. A
 /// piece lies in another source if all its corners are points of that one, since it is convex and in its plane then.
-fn flatten(graph: &IntersectionGraph) -> Vec<Piece> {
+fn flatten(graph: &IntersectionGraph, triangles: &[[[f32; 3]; 3]]) -> Vec<Piece> {
     let mut sources: Vec<Vec<u32>> = vec![Vec::new(); graph.verts.len()];
     for piece in &graph.pieces {
         let source = piece.tri as u32;
@@ -82,8 +82,6 @@ fn flatten(graph: &IntersectionGraph) -> Vec<Piece> {
             }
         }
     }
-    // Any piece tells how its source faces.
-    let faces: HashMap<u32, [u32; 3]> = graph.pieces.iter().map(|piece| (piece.tri as u32, piece.vi)).collect();
     let mut pieces = Vec::with_capacity(graph.pieces.len());
     for piece in &graph.pieces {
         let source = piece.tri as u32;
@@ -92,23 +90,17 @@ fn flatten(graph: &IntersectionGraph) -> Vec<Piece> {
         if others().next().is_some_and(|first| *first < source) {
             continue;
         }
-        let step = 1 + others().map(|other| if agree(graph, piece.vi, faces[other]) { 1 } else { -1 }).sum::<i32>();
+        let agrees = |other: &u32| agree(&triangles[piece.tri], &triangles[*other as usize]);
+        let step = 1 + others().map(|other| if agrees(other) { 1 } else { -1 }).sum::<i32>();
         pieces.push(Piece { source, v: piece.vi, step, cells: [0; 2] });
     }
     pieces
 }
 
-/// Do two triangles of one plane face the same way? They come from different sources and may be small: their normals are far from
-/// perpendicular, so that f64 tells.
-fn agree(graph: &IntersectionGraph, a: [u32; 3], b: [u32; 3]) -> bool {
-    let normal = |v: [u32; 3]| {
-        let [p, q, r] = v.map(|v| {
-            let p = graph.verts_f64[v as usize];
-            glam::DVec3::new(p.x, p.y, p.z)
-        });
-        (q - p).cross(r - p).normalize_or_zero()
-    };
-    normal(a).dot(normal(b)) > 0.0
+/// Do two triangles of one plane face the same way? Exact: that of their shadows, along an axis in which they have any.
+fn agree(a: &[[f32; 3]; 3], b: &[[f32; 3]; 3]) -> bool {
+    let turn = |t: &[[f32; 3]; 3], axis: usize| exact::turn(&t[0], &t[1], &t[2], axis);
+    (0..3).any(|axis| turn(a, axis) * turn(b, axis) > 0)
 }
 
 /// Numbers the cells in front of and behind each piece. Around an edge, the space between two neighbouring pieces is one cell.
@@ -214,6 +206,18 @@ mod tests {
         // Both surfaces less what lies in the other: the box that both share has half of its surface from each.
         let [x, y, z] = [1.125, 1.25, 0.75];
         assert!((union_area(&both) - (48.0 - 2.0 * (x * y + y * z + z * x))).abs() < 1e-9);
+    }
+
+    #[test]
+    fn triangles_back_to_back_are_told_by_all_of_them() {
+        // Their difference is narrower than f64 can tell where they are.
+        let (one, other) = (
+            [[-0.5, 64.0, 0.0], [-0.25, 64.0, 9.0], [3e-16, 64.0, 0.0]],
+            [[-8e-16, 64.0, 0.0], [-0.25, 64.0, 9.0], [-0.5, 64.0, 0.0]],
+        );
+        let arrangement = arranged(&[one, other]);
+        let common = area(&arrangement, |piece| piece.step == 0);
+        assert!(arrangement.pieces.len() > 1 && (common - 2.25).abs() < 1e-9, "{common}: {:?}", arrangement.pieces);
     }
 
     #[test]

@@ -7,7 +7,7 @@
 use crate::boxes::BoxTree;
 use crate::chunk;
 use crate::crossings::{Crossings, Pair, most_tested};
-use crate::fill::cross::{Triangle as Corners, common, self_intersection};
+use crate::fill::cross::{self, Contact, Triangle as Corners, common};
 use crate::grid::Grid;
 use crate::plan::HomeBox;
 use crate::readback::Difference;
@@ -23,7 +23,7 @@ pub(crate) fn self_intersections(survey: &Survey<'_>, difference: &Difference) -
     let is_gone = |place: u32| difference.gone.binary_search(&place).is_ok();
     let known = survey.crossing_pairs.as_ref()?.iter().filter(|pair| !pair.triangles.iter().any(|t| is_gone(*t)));
     let fresh = difference.fresh.iter().map(|(place, record)| (*place, record::corners(record)));
-    let new = met_by(survey, fresh, std::iter::empty(), is_gone, difference.written_records as u64)?;
+    let new = met_by(survey, fresh, std::iter::empty(), is_gone, difference.written_records as u64, self_intersection)?;
     let mut pairs: Vec<Pair> = known.copied().chain(new).collect();
     for pair in &mut pairs {
         // The numbers keep their order.
@@ -33,8 +33,16 @@ pub(crate) fn self_intersections(survey: &Survey<'_>, difference: &Difference) -
     Some(Crossings::of_pairs(pairs))
 }
 
-/// All pairs in which one of the `fresh` triangles crosses or overlaps another of them, one of those `beside`, or one of the input that is not
-/// gone; `None` if too many boxes meet for a file of so many triangles. Triangles go by numbers that no other one has. O(n) boxes where a
+/// How two triangles with an area, whose boxes meet, meet in a way that is asked for.
+pub(crate) type Meets = fn(&Corners, &Corners) -> Option<Contact>;
+
+/// Crossing or overlapping, as [`Meets`].
+pub(crate) fn self_intersection(a: &Corners, b: &Corners) -> Option<Contact> {
+    cross::self_intersection(a, b, common(a, b))
+}
+
+/// All pairs in which one of the `fresh` triangles meets another of them, one of those `beside`, or one of the input that is not gone, in the
+/// way that is asked for; `None` if too many boxes meet for a file of so many triangles. Triangles go by numbers that no other one has. O(n) boxes where a
 /// chunk holds a fresh one are held against a grid of these.
 pub(crate) fn met_by(
     survey: &Survey<'_>,
@@ -42,9 +50,11 @@ pub(crate) fn met_by(
     beside: impl Iterator<Item = (u32, Corners)>,
     is_gone: impl Fn(u32) -> bool + Sync,
     triangles: u64,
+    meets: Meets,
 ) -> Option<Vec<Pair>> {
     let [fresh, beside] = [Solids::of(fresh), Solids::of(beside)];
-    let per_chunk = survey.each_chunk(Search::default, |search, cell, seen| search.chunk(&fresh, &beside, &is_gone, cell, seen));
+    let per_chunk =
+        survey.each_chunk(Search::default, |search, cell, seen| search.chunk(&fresh, &beside, &is_gone, (cell, meets), seen));
     if per_chunk.iter().map(|found| found.tested).sum::<u64>() > most_tested(triangles) {
         return None;
     }
@@ -110,7 +120,7 @@ impl Search {
         fresh: &Solids,
         beside: &Solids,
         is_gone: &impl Fn(u32) -> bool,
-        cell: HomeBox,
+        (cell, meets): (HomeBox, Meets),
         seen: [&Seen<'_>; 2],
     ) -> Found {
         let mut found = Found::default();
@@ -124,10 +134,10 @@ impl Search {
         for (i, one) in here.iter().enumerate() {
             tree.meeting(&one.bounds, &mut self.met);
             for other in self.met.iter().filter(|j| **j as usize > i) {
-                found.test(one, here[*other as usize], cell);
+                found.test(one, here[*other as usize], cell, meets);
             }
             for other in beside.meeting(&one.bounds, &mut self.met) {
-                found.test(one, other, cell);
+                found.test(one, other, cell, meets);
             }
         }
         self.grid.mark(boxes.iter().copied());
@@ -143,7 +153,7 @@ impl Search {
                     return;
                 }
                 if let Some(one) = Solid::of(place, corners) {
-                    self.met.iter().for_each(|f| found.test(here[*f as usize], &one, cell));
+                    self.met.iter().for_each(|f| found.test(here[*f as usize], &one, cell, meets));
                 }
             });
         }
@@ -153,13 +163,13 @@ impl Search {
 
 impl Found {
     /// Decides a pair whose boxes meet, if the cell owns it.
-    fn test(&mut self, one: &Solid, other: &Solid, cell: HomeBox) {
+    fn test(&mut self, one: &Solid, other: &Solid, cell: HomeBox, meets: Meets) {
         let lowest = std::array::from_fn(|k| one.bounds.lo[k].max(other.bounds.lo[k]));
         if !cell.holds(lowest) {
             return;
         }
         self.tested += 1;
-        if let Some(contact) = self_intersection(&one.corners, &other.corners, common(&one.corners, &other.corners)) {
+        if let Some(contact) = meets(&one.corners, &other.corners) {
             self.pairs.push(Pair { triangles: [one.place, other.place], contact });
         }
     }

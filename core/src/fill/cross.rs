@@ -9,7 +9,7 @@
 //! four end points (the idea of Guigue & Devillers, "Fast and Robust Triangle-Triangle Overlap Test Using Orientation
 //! Predicates", JGT 8(1), 2003), so no coordinate of an intersection is ever computed.
 
-use super::exact::{Plane, Point, side, turn};
+use super::exact::{Plane, Point, collinear, side, turn};
 
 /// A triangle by the positions of its corners.
 pub type Triangle = [Point; 3];
@@ -67,6 +67,31 @@ pub(crate) fn common(a: &Triangle, b: &Triangle) -> [[bool; 3]; 2] {
 pub(crate) fn self_intersection(a: &Triangle, b: &Triangle, common: [[bool; 3]; 2]) -> Option<Contact> {
     let contact = if common[0] == [true; 3] { Contact::Overlap } else { meet(a, b, common, false) };
     contact.is_crossing().then_some(contact)
+}
+
+/// Do two edges of two triangles, which are not the same edge, have a stretch in common? [`Contact::Touch`] is told if so: it is no
+/// self-intersection, but what is on the two sides of each of them may not be what it is without the other.
+pub(crate) fn edge_along_edge(a: &Triangle, b: &Triangle) -> Option<Contact> {
+    let edges = |t: &Triangle| [0, 1, 2].map(|k| [t[k], t[(k + 1) % 3]]);
+    let of_b = edges(b);
+    edges(a).iter().any(|e| of_b.iter().any(|f| have_a_stretch_in_common(e, f))).then_some(Contact::Touch)
+}
+
+fn have_a_stretch_in_common([a, b]: &[Point; 2], [c, d]: &[Point; 2]) -> bool {
+    let range = |p: &Point, q: &Point, k: usize| (p[k].min(q[k]), p[k].max(q[k]));
+    let (mut longest, mut length) = (0, 0.0);
+    for k in 0..3 {
+        let ((lo, hi), (other_lo, other_hi)) = (range(a, b, k), range(c, d, k));
+        if lo > other_hi || other_lo > hi {
+            return false;
+        }
+        if hi - lo > length {
+            (longest, length) = (k, hi - lo);
+        }
+    }
+    let ((lo, hi), (other_lo, other_hi)) = (range(a, b, longest), range(c, d, longest));
+    let is_same = (a == c && b == d) || (a == d && b == c);
+    lo.max(other_lo) < hi.min(other_hi) && !is_same && collinear(a, b, c) && collinear(a, b, d)
 }
 
 /// `touching`: tell [`Contact::Touch`] from [`Contact::Apart`].
@@ -329,4 +354,19 @@ pub fn segment_pierces(a: &Point, b: &Point, t: &Triangle) -> bool {
     let beyond = |k: usize| [a, b].iter().all(|p| sense * turn(&t[k], &t[(k + 1) % 3], p, axis) <= 0);
     let across = t.map(|p| turn(a, b, &p, axis));
     !(0..3).any(beyond) && across.contains(&1) && across.contains(&-1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edges_run_along_each_other_on_a_stretch_of_one_line() {
+        let one = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]];
+        let along = |from: f32, to: f32| edge_along_edge(&one, &[[from, 0.0, 0.0], [to, 0.0, 0.0], [1.0, 0.0, 3.0]]).is_some();
+        assert!(along(1.0, 3.0) && along(0.0, 1.0) && along(3.0, -1.0) && along(2.0, 1.0));
+        assert!(!along(2.0, 3.0), "they meet in a point");
+        assert!(!along(0.0, 2.0) && !along(2.0, 0.0), "the same edge");
+        assert!(edge_along_edge(&one, &[[1.0, 0.0, 1e-30], [3.0, 0.0, 0.0], [1.0, 0.0, 3.0]]).is_none(), "beside it");
+    }
 }

@@ -2,7 +2,7 @@
 
 use crate::crossings::Pair;
 use crate::edit;
-use crate::fill::cross::Triangle as Corners;
+use crate::fill::cross::{self, Triangle as Corners};
 use crate::fresh;
 use crate::record;
 use crate::shop::components::Reversed;
@@ -99,7 +99,28 @@ impl Overlay {
             self.changed.iter().filter(|t| !fresh(**t)).map(numbered),
             |place| self.is_gone(place),
             u64::from(self.records) + shop.triangles.len() as u64,
+            fresh::self_intersection,
         )
+    }
+
+    /// Which of these triangles of the workshop, ascending, have an edge that runs along an edge of another triangle without being the same, by
+    /// their numbers; `None` if that is too much work to tell. O(boxes around them).
+    pub(super) fn edges_along(&self, survey: &Survey<'_>, shop: &Shop, of: &[u32]) -> Option<Vec<[u32; 2]>> {
+        let as_read = |t: u32| match shop.triangles[t as usize].origin {
+            Origin::Input(record) if self.changed.binary_search(&t).is_err() => Some(record),
+            _ => None,
+        };
+        let mut asked: Vec<u32> = of.iter().filter_map(|t| as_read(*t)).collect();
+        asked.sort_unstable();
+        let found = fresh::met_by(
+            survey,
+            of.iter().map(|t| (as_read(*t).unwrap_or(self.number(*t)), shop.points(*t))),
+            self.changed.iter().filter(|t| of.binary_search(t).is_err()).map(|t| (self.number(*t), shop.points(*t))),
+            |place| self.is_gone(place) || asked.binary_search(&place).is_ok(),
+            u64::from(self.records) + shop.triangles.len() as u64,
+            cross::edge_along_edge,
+        )?;
+        Some(found.iter().map(|pair| pair.triangles).collect())
     }
 }
 

@@ -515,6 +515,7 @@ impl Site<'_, '_> {
             beside.map(|t| (records + t, self.shop.points(*t))),
             |record| overlay.is_gone(record) || gone.binary_search(&record).is_ok(),
             u64::from(first_new) + all.len() as u64,
+            fresh::self_intersection,
         )?;
         let old = pairs.iter().flat_map(|pair| pair.triangles).filter(|number| *number < records);
         let of_record = guard::components_of_records(self.survey, self.shop, self.pieces, old);

@@ -324,6 +324,7 @@ impl State<'_, '_, '_> {
         let too_many = || Stuck::with(Failure::TooMany);
         let mut crossing = self.crossing(overlay, pairs, profile);
         resolved.pairs = crossing.len() as u64;
+        let mut latest: Option<Overlay> = None;
         let mut grids = GRIDS.iter();
         while !crossing.is_empty() {
             let triangles: BTreeSet<u32> = crossing.iter().flatten().copied().collect();
@@ -336,7 +337,8 @@ impl State<'_, '_, '_> {
                 // What was moved may cross anything.
                 first_new = first_triangle;
             } else {
-                resolved.displaced = resolved.displaced.max(self.round(engine, &triangles, threads)?);
+                let along = self.with_edges_along(latest.as_ref().unwrap_or(overlay), &triangles).ok_or_else(too_many)?;
+                resolved.displaced = resolved.displaced.max(self.round(engine, &triangles, &along, threads)?);
             }
             resolved.rounds += 1;
             self.check_closed()?;
@@ -344,14 +346,34 @@ impl State<'_, '_, '_> {
             let met = overlay.met_by(self.survey, self.work, |t| t >= first_new).ok_or_else(too_many)?;
             let pairs: Vec<[u32; 2]> = met.iter().map(|pair| pair.triangles).collect();
             crossing = self.crossing(&overlay, &pairs, profile);
+            latest = Some(overlay);
         }
         Ok(resolved)
     }
 
+    /// These triangles, and with them those whose edges run along edges there: where surfaces pass through each other edge along edge, no two
+    /// triangles cross, and yet one side of the one is not one cell. `None` if that is too much work to tell.
+    fn with_edges_along(&mut self, overlay: &Overlay, crossing: &BTreeSet<u32>) -> Option<BTreeSet<u32>> {
+        let pieces: BTreeSet<u32> = crossing.iter().map(|t| self.clusters.of_triangle[*t as usize]).collect();
+        let (mut all, mut asked) = (crossing.clone(), BTreeSet::new());
+        loop {
+            let corners: BTreeSet<Vertex> = all.iter().flat_map(|t| self.work.triangles[*t as usize].v).collect();
+            let around: BTreeSet<u32> = corners.iter().flat_map(|v| self.work.star(*v)).map(|(t, _)| t).collect();
+            let new: Vec<u32> = around.into_iter().filter(|t| self.clusters.holds(*t) && asked.insert(*t)).collect();
+            if new.is_empty() {
+                return Some(all);
+            }
+            let pairs = overlay.edges_along(self.survey, self.work, &new)?;
+            let pairs = self.in_shop(overlay, &pairs);
+            let crosses = |t: &u32| pieces.contains(&self.clusters.of_triangle[*t as usize]);
+            all.extend(pairs.into_iter().filter(|pair| pair.iter().all(crosses)).flatten());
+        }
+    }
+
     /// Cuts, decides and rounds once. Returns how far vertices were moved.
-    fn round(&mut self, engine: &dyn Arrange, crossing: &BTreeSet<u32>, threads: usize) -> Tried<f64> {
+    fn round(&mut self, engine: &dyn Arrange, crossing: &BTreeSet<u32>, along: &BTreeSet<u32>, threads: usize) -> Tried<f64> {
         let clusters = &self.clusters;
-        let cut = Cut::of(engine, self.work, crossing, |t| clusters.holds(t), threads);
+        let cut = Cut::of(engine, self.work, along, |t| clusters.holds(t), threads);
         let cut = cut.ok_or_else(|| Stuck::with(Failure::NotArranged))?;
         let sides = Sides::of(self.survey, self.work, &cut, &self.clusters);
         let windings = sides.windings(self.survey, self.work, self.reversed, &cut, crossing, &self.clusters);

@@ -80,6 +80,22 @@ fn bodies_that_share_part_of_a_face_become_one() {
     }
 }
 
+/// A body over a triangle that goes round counterclockwise, from one height to another.
+fn prism(corners: [[f32; 2]; 3], heights: [f32; 2]) -> Vec<Corners> {
+    let [low, high] = heights.map(|z| corners.map(|[x, y]| [x, y, z]));
+    let sides = (0..3).map(|k| (k, (k + 1) % 3)).flat_map(|(i, j)| [[low[i], low[j], high[j]], [low[i], high[j], high[i]]]);
+    [high, [low[0], low[2], low[1]]].into_iter().chain(sides).collect()
+}
+
+#[test]
+fn a_surface_that_passes_through_another_edge_along_edge_is_on_both_of_its_sides() {
+    // One of its sides goes into the cube from an edge of the cube, the other one away from it; with the faces there both only touch.
+    let beside = prism([[1.0, 1.0], [0.5, -1.0], [3.0, -1.0]], [-1.0, 2.0]);
+    let got = resolved(&[cube(), beside].concat());
+    assert!(got.verdict.good && got.result.left.is_empty(), "{:?}, {:?}", got.verdict, got.result.left);
+    assert!((got.defects.volume - (1.0 + 7.5 - 0.125)).abs() < 1e-9, "{}", got.defects.volume);
+}
+
 #[test]
 fn a_sheet_through_a_body_is_not_for_the_arrangement() {
     let sheet = vec![[[-1.0, 0.5, 0.5], [2.0, 0.5, 0.5], [0.5, 3.0, 0.625]]];

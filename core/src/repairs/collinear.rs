@@ -38,12 +38,18 @@ fn try_remove(shop: &mut Work<'_>, t: u32, force: bool) -> bool {
     let (a, b, middle) = (v[long], v[(long + 1) % 3], v[(long + 2) % 3]);
     let others: Vec<u32> =
         shop.star(a).map(|(o, _)| o).filter(|o| *o != t && shop.triangles[*o as usize].v.contains(&b)).collect();
-    if !force && others.iter().any(|o| shop.is_collinear(*o)) {
+    // On the same three vertices: it goes, too, since nothing would be left for its long edge.
+    let lies_on_it = |shop: &Work<'_>, o: u32| shop.triangles[o as usize].v.contains(&middle);
+    if !force && others.iter().any(|o| !lies_on_it(shop, *o) && shop.is_collinear(*o)) {
         return false;
     }
     shop.kill(t);
     for o in others {
-        split(shop, o, [a, b], &[middle]);
+        if lies_on_it(shop, o) {
+            shop.kill(o);
+        } else {
+            split(shop, o, [a, b], &[middle]);
+        }
     }
     true
 }
@@ -73,6 +79,20 @@ pub(super) fn split(shop: &mut Work<'_>, t: u32, ends: [u32; 2], at: &[u32]) {
 mod tests {
     use super::*;
     use crate::testing::{after, cube};
+
+    #[test]
+    fn two_caps_back_to_back_go_together() {
+        // A cube all whose edges are used once each way, and two triangles of no area on one of its edges, which take nothing from that.
+        let mut mesh = cube();
+        let [a, b, _] = mesh[0];
+        let m = [0, 1, 2].map(|k| (a[k] + b[k]) / 2.0);
+        mesh.extend([[a, b, m], [b, a, m]]);
+        let got = after(&mesh, |_, _| ());
+        assert_eq!((got.defects.degenerate_area, got.defects.unbalanced_edges), (2, 0));
+        let got = after(&mesh, |d, _| remove(&mut Work::new(&mut d.shop)));
+        assert_eq!((got.result, got.defects.degenerate_area, got.defects.unbalanced_edges), (2, 0, 0));
+        assert!(got.verdict.good && (got.defects.volume - 1.0).abs() < 1e-9, "{:?}", got.verdict);
+    }
 
     #[test]
     fn a_cap_over_a_t_junction_goes_and_the_neighbour_is_split() {

@@ -65,6 +65,18 @@ pub(crate) fn windings(
     reversed: &Reversed,
     points: &[[f64; 3]],
 ) -> Vec<i32> {
+    let around = surfaces_around(survey, shop, components, reversed, points);
+    around.into_iter().map(|around| around.iter().map(|(_, w)| w).sum()).collect()
+}
+
+/// The closed components that wind around each of some points, ascending, with their winding numbers; as [`windings`] else.
+pub(crate) fn surfaces_around(
+    survey: &Survey<'_>,
+    shop: &Shop,
+    components: &Components,
+    reversed: &Reversed,
+    points: &[[f64; 3]],
+) -> Vec<Vec<(u32, i32)>> {
     let (closed, tree) = closed_ones(&components.list);
     let mut found = Vec::new();
     let rays: Vec<Ray> = points
@@ -77,8 +89,19 @@ pub(crate) fn windings(
             Ray { from: *from, candidates: found.iter().map(|c| closed[*c as usize]).collect() }
         })
         .collect();
-    let counted = count(survey, shop, components, reversed, &rays);
-    counted.into_iter().map(|around| around.iter().map(|(_, w)| w).sum()).collect()
+    count(survey, shop, components, reversed, &rays)
+}
+
+/// How often closed surfaces of these triangles together wind around each of some points, none of which may lie on one.
+pub(crate) fn windings_of(triangles: &[[[f32; 3]; 3]], points: &[[f64; 3]]) -> Vec<i32> {
+    let mut windings = vec![0; points.len()];
+    if triangles.is_empty() || points.is_empty() {
+        return windings;
+    }
+    let rays: Vec<Ray> = points.iter().map(|from| Ray { from: *from, candidates: vec![0] }).collect();
+    let grid = Grid::new(&rays);
+    triangles.iter().for_each(|corners| grid.cross(&rays, corners, 0, &mut |at, w| windings[at as usize] += w));
+    windings
 }
 
 /// For each ray the components of its candidates that wind around where it begins, ascending.

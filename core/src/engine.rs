@@ -14,7 +14,8 @@ use crate::read::{MeshFile, PREFIX_BYTES};
 use crate::readback::Expectation;
 use crate::repairs::Swallowed;
 use crate::report::{
-    BoundaryLoops, Certificate, Cost, Defects, EditSummary, FileFacts, Outcome, Report, SCHEMA_VERSION, Stage, Task, Tolerances,
+    BoundaryLoops, Certificate, Cost, Defects, EditSummary, FileFacts, Outcome, Regions, Report, SCHEMA_VERSION, Stage, Task,
+    Tolerances,
 };
 use crate::rules::Subject;
 use crate::settings::{Bodies, Limits, Profile, folder_of};
@@ -165,6 +166,8 @@ fn report(task: Task, mesh: &MeshFile, diagnosis: &Diagnosis<'_>, profile: &Prof
         loops_left: Vec::new(),
         sheets_dropped: Vec::new(),
         wraps: Vec::new(),
+        volumes: None,
+        regions: Regions::default(),
         edit: EditSummary::default(),
         edit_records: None,
         verdict: verdict::judge(&diagnosis.defects, &flaws(mesh)).under(profile.guarantee),
@@ -233,6 +236,8 @@ fn mend(
         report.loops_left = repaired.loops_left;
         report.sheets_dropped = repaired.sheets;
         report.wraps = repaired.wraps;
+        report.volumes = repaired.volumes;
+        report.regions = repaired.regions;
         swallowed = repaired.swallowed;
     }
     // Of the input's survey, the second look may go on; the memory of its workshop is needed for that of the output.
@@ -328,6 +333,7 @@ fn verify(
     report.outcome = if report.verdict.good { Outcome::Repaired } else { Outcome::NotGood };
     if report.verdict.good {
         let mut concerns = verdict::review(&report.before, surface, swallowed, &defects, &report.profile);
+        concerns.extend(report.volumes.iter().flat_map(|volumes| verdict::review_volumes(volumes, &report.profile)));
         concerns.extend(verdict::review_sheets(&report.before, &report.sheets_dropped, &report.profile));
         concerns.extend(verdict::review_wraps(&report.wraps, &report.profile));
         if report.before.boundary_edges > 0 {

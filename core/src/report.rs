@@ -48,6 +48,12 @@ pub struct Report {
     /// Regions that no repair made a solid: replaced by a wrap, or left, the largest first (at most 1000 listed).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub wraps: Vec<Wrap>,
+    /// What became of the volume of bodies; `None` where nothing was done that might have lost any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub volumes: Option<Volumes>,
+    /// Where something was cut, moved, replaced, dropped or left, and how far surface moved there.
+    #[serde(default, skip_serializing_if = "Regions::is_empty")]
+    pub regions: Regions,
     /// The edit in numbers.
     pub edit: EditSummary,
     /// The edit itself, when asked for.
@@ -351,6 +357,88 @@ pub struct Wrap {
     /// Why it was left as it is; `None`: it was replaced.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub left: Option<String>,
+}
+
+/// Whether bodies are still inside of the result: points in each are looked for there. In the file's units, cubed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Volumes {
+    /// Bodies that were looked for: the largest, at most 4096, each of more than a millionth of the volume of all.
+    pub bodies: u64,
+    /// Points in them.
+    pub points: u64,
+    /// What they enclose, each for itself: what several share counts for each.
+    pub volume: f64,
+    /// Of that, what is outside now, an estimate: of each body the share of its points that are.
+    pub outside: f64,
+    /// Bodies with no point inside.
+    pub lost: u64,
+    /// These, the largest first (at most 1000 listed).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub listed: Vec<BodyLost>,
+}
+
+/// A body that is not inside of the result.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BodyLost {
+    /// Smallest and largest coordinates of what was there.
+    pub bounds: [[f32; 3]; 2],
+    pub volume: f64,
+}
+
+/// Regions where the surface is not as it was.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Regions {
+    /// How many there are.
+    pub total: u64,
+    /// The largest of them by the diagonal of their boxes, at most 1000, the largest first.
+    pub listed: Vec<Region>,
+}
+
+impl Regions {
+    pub fn is_empty(&self) -> bool {
+        self.total == 0
+    }
+}
+
+/// Where something was done to what was no solid, or left undone. Lengths in the model's units.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Region {
+    /// What settled it.
+    pub rung: Rung,
+    /// Smallest and largest coordinates of what it was done to.
+    pub bounds: [[f32; 3]; 2],
+    /// Triangles that it was done to; where vertices were given to surfaces, vertices.
+    pub count: u64,
+    /// Rounds of cutting and rounding.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub rounds: u32,
+    /// Farthest that the surface moved.
+    pub moved: f64,
+    /// Why it was left.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+}
+
+fn is_zero(count: &u32) -> bool {
+    *count == 0
+}
+
+/// What settled a region, from the least intrusive to the most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Rung {
+    /// Surfaces that cross were cut along each other, and rounded to single precision.
+    Cut,
+    /// So they were, and on a coarser grid in the end.
+    Snapped,
+    /// Surfaces that shared a vertex or an edge were taken apart.
+    Separated,
+    /// It went: a lone sheet, or a body in the material of others.
+    Dropped,
+    /// It was replaced by a wrap.
+    Wrapped,
+    /// Nothing was done, or what was done was taken back.
+    Left,
 }
 
 /// The edit in numbers. Every record of the output is an untouched input record, a replaced one or an added one.

@@ -41,6 +41,9 @@ pub struct Profile {
     /// Largest change of the enclosed volume, as a fraction, between a closed part of the input and the output; beyond it the
     /// result needs review.
     pub max_volume_change: f64,
+    /// Largest change of the surface's area, as a fraction; beyond it the result needs review. What lies double or inside goes rightly, so that
+    /// only growth is bounded unless this is below 1.
+    pub max_area_change: f64,
     /// Largest growth or shrinkage of the bounding box on any side, as a fraction of the diagonal. (Triangles without area do not
     /// count; a fin that stood out does.)
     pub max_box_change_relative: f64,
@@ -145,6 +148,7 @@ impl Default for Profile {
             fill_holes: true,
             patch_shape: PatchShape::Fair,
             max_volume_change: 0.25,
+            max_area_change: 1.0,
             max_box_change_relative: 0.02,
             max_bodies_lost: 0,
             debris_triangles: 4,

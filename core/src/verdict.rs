@@ -1,7 +1,7 @@
 //! The verdict: what counts of defects say about a file.
 
 use crate::repairs::Swallowed;
-use crate::report::{Defects, RuleOutcome, SheetDropped, Verdict, Wrap};
+use crate::report::{Defects, RuleOutcome, SheetDropped, Verdict, Volumes, Wrap};
 use crate::rules::{self, Aspect, Found, Subject};
 use crate::settings::{Guarantee, Profile};
 use crate::sums::Bounds;
@@ -84,6 +84,12 @@ pub(crate) fn review(
             concerns.push(format!("the volume changed by {:.1} %, from {} to {}", change * 100.0, volume, after.volume));
         }
     }
+    if before.area > 0.0 {
+        let change = (after.area - before.area) / before.area;
+        if change.abs() > profile.max_area_change {
+            concerns.push(format!("the area changed by {:.1} %, from {} to {}", change * 100.0, before.area, after.area));
+        }
+    }
     if let Some([lo, hi]) = after.bounds {
         let pairs = surface.lo.iter().zip(lo).chain(surface.hi.iter().zip(hi));
         let most = pairs.map(|(a, b)| (f64::from(*a) - f64::from(b)).abs()).fold(0.0, f64::max);
@@ -95,6 +101,23 @@ pub(crate) fn review(
     let lost = all.saturating_sub(after.bodies + after.nested_positive + swallowed.bodies);
     if lost > u64::from(profile.max_bodies_lost) {
         concerns.push(format!("{lost} of {all} bodies were lost"));
+    }
+    concerns
+}
+
+/// What left the model of its bodies beyond the profile's limits, in words.
+pub(crate) fn review_volumes(volumes: &Volumes, profile: &Profile) -> Vec<String> {
+    let mut concerns = Vec::new();
+    if volumes.lost > u64::from(profile.max_bodies_lost) {
+        let largest = volumes.listed.first().map_or(String::new(), |body| {
+            let [lo, hi] = body.bounds;
+            format!(", the largest from {lo:?} to {hi:?} of {:.4} units³", body.volume)
+        });
+        concerns.push(format!("{} of {} bodies are not inside the result{largest}", volumes.lost, volumes.bodies));
+    }
+    if volumes.outside > profile.max_volume_change * volumes.volume {
+        let share = volumes.outside / volumes.volume * 100.0;
+        concerns.push(format!("about {share:.1} % of what the bodies enclosed is outside of the result"));
     }
     concerns
 }
@@ -206,10 +229,29 @@ mod tests {
     #[test]
     fn what_lay_in_others_is_neither_lost_nor_a_change_of_volume() {
         let before = Defects { bodies: 1, nested_positive: 2, volume: 1.5, ..cube() };
-        let swallowed = Swallowed { bodies: 2, volume: 0.5 };
+        let swallowed = Swallowed { bodies: 2, volume: 0.5, ..Swallowed::default() };
         let concerns = |swallowed: &Swallowed| review(&before, &BOX, swallowed, &cube(), &Profile::default());
         assert!(concerns(&swallowed).is_empty(), "{:?}", concerns(&swallowed));
         assert_eq!(concerns(&Swallowed::default()).len(), 2, "the volume, and the bodies");
+    }
+
+    #[test]
+    fn the_area_may_grow_by_as_much_as_the_profile_says() {
+        let profile = Profile { max_area_change: 0.25, ..Profile::default() };
+        let concerns = |area: f64| {
+            let before = Defects { area: 6.0, ..cube() };
+            review(&before, &BOX, &Swallowed::default(), &Defects { area, ..cube() }, &profile).len()
+        };
+        assert_eq!([7.5, 7.6, 4.5, 4.4].map(concerns), [0, 1, 0, 1]);
+    }
+
+    #[test]
+    fn bodies_that_left_the_model_need_review() {
+        let profile = Profile { max_volume_change: 0.25, max_bodies_lost: 1, ..Profile::default() };
+        let concerns = |lost: u64, outside: f64| {
+            review_volumes(&Volumes { bodies: 9, points: 9, volume: 4.0, outside, lost, listed: Vec::new() }, &profile).len()
+        };
+        assert_eq!([concerns(0, 0.0), concerns(1, 1.0), concerns(2, 1.0), concerns(0, 1.01)], [0, 0, 1, 1]);
     }
 
     #[test]

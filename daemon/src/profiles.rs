@@ -60,6 +60,7 @@ pub(crate) fn check(profile: &Profile) -> Result<(), String> {
         ("max_hole_perimeter_mm", profile.max_hole_perimeter_mm),
         ("max_gap_mm", profile.max_gap_mm),
         ("max_volume_change", profile.max_volume_change),
+        ("max_area_change", profile.max_area_change),
         ("max_box_change_relative", profile.max_box_change_relative),
         ("debris_area_share", profile.debris_area_share),
         ("max_sheets_share", profile.max_sheets_share),

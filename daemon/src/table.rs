@@ -246,7 +246,9 @@ fn line(out: &mut String, text: std::fmt::Arguments) {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use suture_core::report::{BoundaryLoops, Cost, EditSummary, FileFacts, Repair, SCHEMA_VERSION, Tolerances, Verdict};
+    use suture_core::report::{
+        BoundaryLoops, Cost, EditSummary, FileFacts, Regions, Repair, SCHEMA_VERSION, Tolerances, Verdict,
+    };
     use suture_core::{Limits, Profile};
 
     pub(crate) fn sample(outcome: Outcome) -> Report {
@@ -275,6 +277,8 @@ pub(crate) mod tests {
             loops_left: vec![],
             sheets_dropped: vec![],
             wraps: vec![],
+            volumes: None,
+            regions: Regions::default(),
             edit: EditSummary::default(),
             edit_records: None,
             verdict: Verdict {

@@ -16,16 +16,19 @@ use std::fmt;
 use glam::DVec3;
 
 use super::overlay::Overlay;
+use super::regions::Unsettled;
 use super::work::Work;
 use crate::chunk::{self, NONE};
 use crate::fill::cross::{Contact, Triangle as Corners, triangles_cross};
 use crate::fill::exact::{Point, at};
 use crate::record;
+use crate::report::{Region, Rung};
 use crate::settings::Profile;
 use crate::shop::components::{Reversed, nonmanifold_vertices};
 use crate::shop::edges::Edge;
 use crate::shop::wedges::{Half, Wedges};
 use crate::shop::{Shop, Triangle, Vertex, bits};
+use crate::sums::Bounds;
 use crate::survey::Survey;
 
 /// A copy moves by no more than this share of the shortest edge at it, so that no triangle comes near to turning over.
@@ -47,7 +50,7 @@ const OPENINGS: usize = 8;
 const MOST_PAIRS: usize = 1 << 20;
 
 /// What was taken apart.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Separated {
     /// Fans that got a copy of their vertex.
     pub(super) vertices: u64,
@@ -57,11 +60,29 @@ pub(super) struct Separated {
     pub(super) left: u64,
     /// How far a copy is from where it was made.
     pub(super) farthest: f64,
+    /// Where: copies that share triangles are in one.
+    pub(super) regions: Vec<Region>,
+    /// And where surfaces still meet: each vertex for itself.
+    pub(super) regions_left: Vec<Unsettled>,
+}
+
+impl Separated {
+    /// At these vertices surfaces still meet.
+    fn but(self, shop: &Shop, vertices: &[Vertex]) -> Self {
+        let one = |v: &Vertex| {
+            let at = shop.positions[*v as usize];
+            let reason = Some("surfaces that meet there could not be taken apart".into());
+            let region = Region { rung: Rung::Left, bounds: [at; 2], count: 1, rounds: 0, moved: 0.0, reason };
+            Unsettled { region, at }
+        };
+        let regions_left = vertices.iter().map(one).collect();
+        Self { left: vertices.len() as u64, regions_left, ..self }
+    }
 }
 
 impl fmt::Display for Separated {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { vertices, edges, left, farthest } = self;
+        let Self { vertices, edges, left, farthest, .. } = self;
         write!(
             f,
             "surfaces that met given a vertex of their own: {vertices} at vertices, {edges} on edges, moved by at most {farthest:e}"
@@ -92,9 +113,11 @@ pub(super) fn separate(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reve
         apart.open_edges();
         let Some(blamed) = apart.blamed(survey, reversed) else { break };
         let copies = std::mem::take(&mut apart.copies);
+        let first = apart.first;
         if blamed.is_empty() {
             let (shop, edges) = work.edges();
-            let mut done = Separated { left: nonmanifold_vertices(shop, edges).len() as u64, ..Separated::default() };
+            let mut done = Separated::default().but(shop, &nonmanifold_vertices(shop, edges));
+            done.regions = regions(shop, first, &copies);
             for copy in copies {
                 *if copy.of.is_edge() { &mut done.edges } else { &mut done.vertices } += 1;
                 done.farthest = done.farthest.max(copy.away);
@@ -109,7 +132,31 @@ pub(super) fn separate(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reve
         work.restore(&before.triangles);
     }
     work.restore(&before.triangles);
-    Separated { left: vertices.len() as u64, ..Separated::default() }
+    Separated::default().but(work, &vertices)
+}
+
+/// The copies of vertices, `first` the first of them, by what hangs together.
+fn regions(shop: &Shop, first: Vertex, copies: &[Copy]) -> Vec<Region> {
+    let mut parents: Vec<u32> = (0..copies.len() as u32).collect();
+    for copy in 0..copies.len() as u32 {
+        for (t, _) in shop.star(first + copy) {
+            let others = shop.triangles[t as usize].v.into_iter().filter_map(|v| v.checked_sub(first));
+            others.for_each(|other| {
+                chunk::unite(&mut parents, copy, other);
+            });
+        }
+    }
+    let mut all: BTreeMap<u32, (Bounds, u64, f64)> = BTreeMap::new();
+    for (copy, Copy { away, .. }) in (0..).zip(copies) {
+        let (bounds, count, moved) = all.entry(chunk::find(&mut parents, copy)).or_insert((Bounds::EMPTY, 0, 0.0));
+        bounds.include(&[shop.positions[(first + copy) as usize]]);
+        (*count, *moved) = (*count + 1, away.max(*moved));
+    }
+    let region = |(bounds, count, moved): (Bounds, u64, f64)| {
+        let Bounds { lo, hi } = bounds.normalised();
+        Region { rung: Rung::Separated, bounds: [lo, hi], count, rounds: 0, moved, reason: None }
+    };
+    all.into_values().map(region).collect()
 }
 
 /// The workshop as it was.
@@ -552,6 +599,9 @@ mod tests {
         let mesh = [cuboid([0.0; 3], [1.0; 3]), cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 1.0])].concat();
         let got = separated(&mesh);
         assert_eq!((got.result.vertices, got.result.edges, got.result.left), (2, 0, 0));
+        // Both ends of the edge are one region.
+        let regions: Vec<_> = got.result.regions.iter().map(|region| (region.rung, region.count, region.moved)).collect();
+        assert_eq!(regions, [(Rung::Separated, 2, got.result.farthest)]);
         // All of the first one's triangles are as they were.
         assert!(got.untouched >= 12 && got.verdict.good && got.defects.bodies == 2, "{:?}", got.verdict);
         assert!((got.defects.bounds.unwrap(), got.result.farthest < 1e-6) == ([[0.0; 3], [2.0, 2.0, 1.0]], true));
@@ -588,7 +638,8 @@ mod tests {
         let one = mesh.iter().position(|t| t.contains(&[1.0; 3])).unwrap();
         mesh.remove(one);
         let got = separated(&mesh);
-        assert_eq!((got.result, got.untouched), (Separated { left: 1, ..Separated::default() }, 23));
+        let Separated { vertices, edges, left, ref regions_left, .. } = got.result;
+        assert_eq!((vertices, edges, left, regions_left.len(), got.untouched), (0, 0, 1, 1, 23));
     }
 
     /// The records that come of a mesh that is looked at in chunks of so many triangles.

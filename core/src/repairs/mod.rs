@@ -19,6 +19,8 @@ mod merge;
 mod orient;
 mod overlay;
 mod overrun;
+mod probes;
+mod regions;
 mod resolve;
 mod sheets;
 mod smooth;
@@ -37,12 +39,13 @@ use crate::arrange::Rational;
 use crate::engine::Diagnosis;
 use crate::error::Result;
 use crate::holes;
-use crate::report::{BoundaryLoops, LoopLeft, Repair, SheetDropped, Wrap};
-use crate::settings::{Guarantee, Limits, Profile};
+use crate::report::{BoundaryLoops, LoopLeft, Region, Regions, Repair, SheetDropped, Volumes, Wrap};
+use crate::settings::{Bodies, Guarantee, Limits, Profile};
 use crate::shop::components::{Components, Reversed};
 use crate::shop::near::Tolerance;
 use crate::survey::Survey;
 use overlay::Overlay;
+use probes::Probes;
 use resolve::{Means, Resolved};
 pub(crate) use swallowed::Swallowed;
 use work::Work;
@@ -58,6 +61,9 @@ pub(crate) struct Repaired {
     pub(crate) swallowed: Swallowed,
     /// What was replaced because nothing else made it a solid, or would have been.
     pub(crate) wraps: Vec<Wrap>,
+    /// What became of the volume of bodies; `None` where nothing was done that might have lost any.
+    pub(crate) volumes: Option<Volumes>,
+    pub(crate) regions: Regions,
     /// The triangles that replace it, which are not in the shop.
     pub(crate) wrapped: Vec<[[f32; 3]; 3]>,
 }
@@ -82,7 +88,7 @@ pub(crate) fn run(
     let threads = limits.threads;
     let mut log = Log::default();
     let mut reversed = Reversed::none(&diagnosis.survey);
-    let Diagnosis { survey, shop, tolerance, .. } = diagnosis;
+    let Diagnosis { survey, shop, tolerance, defects } = diagnosis;
     let shop = &mut Work::new(shop);
     prepare(survey, shop, tolerance, &mut log);
     let mut loops = None;
@@ -132,6 +138,16 @@ pub(crate) fn run(
         sheets.len() as u64
     });
     let mut pieces = outward(survey, shop, &mut reversed, &mut log);
+    // All is closed that can be, and nothing is cut, removed or replaced yet.
+    let may_lose = !closed_across.is_empty()
+        || defects.nested_positive > 0
+        || profile.bodies == Bodies::Visible
+        || profile.check_self_intersections && survey.crossing_pairs.as_ref().is_none_or(|pairs| !pairs.is_empty())
+        || wrap::is_broken(shop);
+    let probes = may_lose.then_some(()).and_then(|()| {
+        let turned = pieces.is_none().then(|| orient::pieces(survey, shop, &reversed));
+        pieces.as_ref().or(turned.as_ref()).map(|pieces| Probes::of(survey, shop, &reversed, pieces))
+    });
     let mut resolved = Resolved::default();
     if profile.resolve_crossings {
         let across = !closed_across.is_empty();
@@ -174,7 +190,7 @@ pub(crate) fn run(
     });
     log.note("hidden", hidden.to_string());
     sheets.append(&mut hidden.sheets);
-    let Swallowed { bodies, volume } = &swallowed;
+    let Swallowed { bodies, volume, .. } = &swallowed;
     let note = format!("bodies in the material of others removed: {bodies}, of {volume:.4} units³ together");
     log.note("swallowed", note);
     swallowed.bodies += resolved.bodies + hidden.expected.bodies;
@@ -201,6 +217,17 @@ pub(crate) fn run(
         });
         loops_left.retain(|left| !wraps.replaced(left.at));
     }
+    let volumes = probes.map(|probes| {
+        let pieces = orient::pieces(survey, shop, &reversed);
+        probes.look_for(survey, shop, &reversed, &pieces, &wraps.triangles)
+    });
+    let mut all = std::mem::take(&mut resolved.regions);
+    all.append(&mut swallowed.regions);
+    all.append(&mut separated.regions);
+    all.extend(sheets.iter().map(Region::from));
+    let left = resolved.regions_left.into_iter().chain(separated.regions_left);
+    all.extend(left.filter(|left| !wraps.replaced(left.at)).map(|left| left.region));
+    all.extend(wraps.listed.iter().map(Region::from));
     Ok(Repaired {
         reversed,
         repairs: log.repairs,
@@ -209,6 +236,8 @@ pub(crate) fn run(
         sheets,
         swallowed,
         wraps: wraps.listed,
+        volumes,
+        regions: regions::told(all),
         wrapped: wraps.triangles,
     })
 }

@@ -15,6 +15,7 @@ use crate::bodies;
 use crate::boxes::BoxTree;
 use crate::chunk::NONE;
 use crate::record;
+use crate::report::{Region, Rung};
 use crate::settings::{Bodies, Profile};
 use crate::shop::components::{Component, Components, Reversed};
 use crate::shop::{Origin, Shop};
@@ -27,6 +28,8 @@ pub(crate) struct Swallowed {
     pub(crate) bodies: u64,
     /// What the bodies enclose less their cavities, which lies in the bodies around them as well. In the file's units, cubed.
     pub(crate) volume: f64,
+    /// Where they were.
+    pub(crate) regions: Vec<Region>,
 }
 
 /// Removes what lies in the material of others and crosses nothing. Nothing is removed if it is not known what crosses what. Reads the
@@ -67,6 +70,9 @@ pub(super) fn remove(
     for (piece, _) in pieces.list.iter().zip(&is_swallowed).filter(|(_, gone)| **gone) {
         swallowed.bodies += u64::from(piece.extent.volume > 0);
         swallowed.volume += survey.measure.volume(piece.extent);
+        let Bounds { lo, hi } = piece.bounds.normalised();
+        let (rung, bounds, count) = (Rung::Dropped, [lo, hi], piece.triangles);
+        swallowed.regions.push(Region { rung, bounds, count, rounds: 0, moved: 0.0, reason: None });
     }
     if !is_swallowed.contains(&true) {
         return swallowed;
@@ -156,7 +162,7 @@ mod tests {
             let pieces = orient::pieces(&d.survey, work, turned);
             orient::make_outward(&d.survey, work, turned, &pieces);
             let pieces = orient::pieces(&d.survey, work, turned);
-            let Swallowed { bodies, volume } = remove(&d.survey, work, turned, &pieces, &profile);
+            let Swallowed { bodies, volume, .. } = remove(&d.survey, work, turned, &pieces, &profile);
             (bodies, volume)
         })
     }

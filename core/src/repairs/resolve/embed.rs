@@ -88,6 +88,7 @@ impl State<'_, '_, '_> {
     fn put_in(&mut self, cut: &Cut, new: &[(u32, [u32; 3])]) -> f64 {
         let mut displaced = 0f64;
         let points: BTreeSet<u32> = new.iter().flat_map(|(_, v)| *v).filter(|point| !cut.vertices.contains_key(point)).collect();
+        let cut_from: HashMap<u32, u32> = new.iter().flat_map(|(t, v)| v.map(|point| (point, *t))).collect();
         let rounded = |point: u32| cut.arrangement.points[point as usize].map(|x| x as f32 + 0.0);
         // There may be a vertex already, here or elsewhere in the file.
         self.complete(points.iter().map(|point| rounded(*point)).collect());
@@ -96,7 +97,9 @@ impl State<'_, '_, '_> {
         for point in points {
             let position = rounded(point);
             let exact = DVec3::from_array(cut.arrangement.points[point as usize]);
-            displaced = displaced.max(exact.distance(DVec3::from_array(position.map(f64::from))));
+            let by = exact.distance(DVec3::from_array(position.map(f64::from)));
+            displaced = displaced.max(by);
+            self.track.moved(&self.clusters, cut_from[&point], by);
             let v = *known.entry(bits(position)).or_insert_with(|| self.work.add_vertex(position));
             vertex_of.insert(point, v);
         }
@@ -129,8 +132,12 @@ impl State<'_, '_, '_> {
             if from == to {
                 continue;
             }
-            displaced = displaced.max(crate::shop::distance(from, to));
-            moved.extend(self.work.star(v).map(|(t, _)| t));
+            let by = crate::shop::distance(from, to);
+            displaced = displaced.max(by);
+            for (t, _) in self.work.star(v) {
+                moved.insert(t);
+                self.track.moved(&self.clusters, t, by);
+            }
             let stays = *known.entry(bits(to)).or_insert_with(|| self.work.add_vertex(to));
             self.work.merge(stays, v);
         }

@@ -20,20 +20,24 @@ mod embed;
 mod sides;
 #[cfg(test)]
 mod tests;
+mod track;
 
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 
 use self::cut::Cut;
 use self::sides::Sides;
+use self::track::Track;
 use super::orient;
 use super::overlay::Overlay;
+use super::regions::Unsettled;
 use super::work::Work;
 use crate::Progress;
 use crate::arrange::Arrange;
 use crate::chunk::{self, NONE, Suspect};
 use crate::defects;
 use crate::error::Result;
+use crate::report::Region;
 use crate::settings::{Bodies, Limits, Profile};
 use crate::shop::components::{Components, Reversed};
 use crate::shop::{Origin, Shop, Triangle, Vertex, bits};
@@ -55,6 +59,9 @@ pub(super) struct Resolved {
     pub(super) divided: bool,
     /// Why some surfaces were left as they were, and how many of them.
     pub(super) left: Vec<(Failure, u64)>,
+    /// Each cluster that was resolved, and each that was left.
+    pub(super) regions: Vec<Region>,
+    pub(super) regions_left: Vec<Unsettled>,
     /// By triangle of the workshop, as far as it was there before: was its surface closed, and was it not left? Empty: no.
     pub(super) taken_part: Vec<bool>,
 }
@@ -129,9 +136,11 @@ pub(super) fn resolve(
     divide(survey, work, reversed, corners(survey, work, &overlay, &pairs), means)?;
     let before = Before { triangles: work.triangles.clone(), reversed: reversed.clone() };
     let mut left: Vec<Failure> = Vec::new();
+    let mut regions_left: Vec<Unsettled> = Vec::new();
     let mut blocked: Vec<bool> = Vec::new();
     let (mut bodies, mut volume) = (0, 0);
-    let mut state = State { survey, work, reversed, before, clusters: Clusters::default(), first_vertex: 0 };
+    let mut state =
+        State { survey, work, reversed, before, clusters: Clusters::default(), track: Track::default(), first_vertex: 0 };
     let mut attempts = 0;
     loop {
         attempts += 1;
@@ -155,6 +164,8 @@ pub(super) fn resolve(
                     bodies: bodies.saturating_sub(bodies_now),
                     volume: state.survey.measure.volume(Extent { area: 0, volume: volume - volume_now }),
                     left: counted(left),
+                    regions: state.track.regions(&mut state.clusters),
+                    regions_left,
                     taken_part,
                     divided: true,
                     ..resolved
@@ -163,6 +174,7 @@ pub(super) fn resolve(
             Err(Stuck { failure, triangles }) => {
                 let failed = state.clusters.pieces_of(&triangles);
                 state.restore();
+                regions_left.extend(state.unsettled(&failed, failure));
                 left.extend(std::iter::repeat_n(failure, failed.len().max(1)));
                 if failed.is_empty() {
                     blocked.fill(true);
@@ -306,6 +318,7 @@ pub(super) struct State<'a, 'r, 'w> {
     reversed: &'a mut Reversed,
     before: Before,
     clusters: Clusters,
+    track: Track,
     /// Vertices from here on are new ones.
     first_vertex: Vertex,
 }
@@ -320,6 +333,7 @@ impl State<'_, '_, '_> {
         threads: usize,
     ) -> Tried<Resolved> {
         let mut resolved = Resolved::default();
+        self.track = Track::default();
         let first_triangle = self.work.triangles.len() as u32;
         let too_many = || Stuck::with(Failure::TooMany);
         let mut crossing = self.crossing(overlay, pairs, profile);
@@ -330,7 +344,9 @@ impl State<'_, '_, '_> {
             let triangles: BTreeSet<u32> = crossing.iter().flatten().copied().collect();
             tracing::debug!(round = resolved.rounds, pairs = crossing.len(), triangles = triangles.len(), "Crossings.");
             let mut first_new = self.work.triangles.len() as u32;
-            if resolved.rounds > 0 && resolved.rounds.is_multiple_of(ROUNDS) {
+            let snaps = resolved.rounds > 0 && resolved.rounds.is_multiple_of(ROUNDS);
+            self.track.crossed(self.work, &self.clusters, &triangles, resolved.rounds + 1, snaps);
+            if snaps {
                 let failed = || Stuck { failure: Failure::Endless, triangles: triangles.iter().copied().collect() };
                 let step = grids.next().ok_or_else(failed)? * above(self.survey.bounds.largest_coordinate());
                 resolved.displaced = resolved.displaced.max(self.snap(&triangles, step));
@@ -459,6 +475,17 @@ impl State<'_, '_, '_> {
             }
         }
         if triangles.is_empty() { Ok(()) } else { Err(Stuck { failure: Failure::Opened, triangles }) }
+    }
+
+    /// What a cluster that is left, of these pieces, is told by, once all is as it was; `None` if nothing of it is known.
+    fn unsettled(&self, pieces: &[u32], failure: Failure) -> Option<Unsettled> {
+        let region = self.track.left(pieces, failure.to_string());
+        let own = |t: &u32| {
+            let piece = self.clusters.of_triangle.get(*t as usize).copied().unwrap_or(NONE);
+            if pieces.is_empty() { self.clusters.takes_part(piece) } else { pieces.binary_search(&piece).is_ok() }
+        };
+        let first = self.work.living().find(own)?;
+        (region.count > 0).then(|| Unsettled { region, at: self.work.points(first)[0] })
     }
 
     fn restore(&mut self) {

@@ -9,6 +9,7 @@ use super::super::duplicates;
 use super::*;
 use crate::Quiet;
 use crate::arrange::Rational;
+use crate::report::Rung;
 use crate::settings::Limits;
 use crate::testing::{After, Corners, after, cube, cuboid, reversed, shifted};
 
@@ -159,4 +160,15 @@ proptest! {
         prop_assert!(got.defects.boundary_edges + got.defects.unbalanced_edges == 0, "{:?}", got.verdict);
         prop_assert!(got.defects.self_intersections.as_ref().is_some_and(|s| s.is_free()), "{:?}", got.verdict);
     }
+}
+
+/// Bodies that cross each other are one region, others another.
+#[test]
+fn every_cluster_is_told_of() {
+    let both = [cube(), shifted(&cube(), [0.5, 0.625, 0.75])].concat();
+    let got = resolved(&[both.clone(), shifted(&both, [16.0, 0.0, 0.0])].concat()).result;
+    let bounds = |at: f32| [[at, 0.0, 0.0], [at + 1.5, 1.625, 1.75]];
+    let told: Vec<_> = got.regions.iter().map(|region| (region.rung, region.bounds, region.rounds, region.moved)).collect();
+    assert_eq!(told, [(Rung::Cut, bounds(0.0), 1, 0.0), (Rung::Cut, bounds(16.0), 1, 0.0)]);
+    assert!(got.regions.iter().all(|region| region.count > 3) && got.regions_left.is_empty());
 }

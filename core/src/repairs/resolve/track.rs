@@ -1,0 +1,89 @@
+//! What was done to each cluster, for the report.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::Clusters;
+use crate::chunk;
+use crate::report::{Region, Rung};
+use crate::shop::Shop;
+use crate::sums::Bounds;
+
+/// What was done to one piece of surface, or to several.
+#[derive(Clone, Copy)]
+struct Done {
+    /// Around its triangles that crossed something, in whatever round.
+    bounds: Bounds,
+    /// Those of the first round.
+    triangles: u64,
+    /// The last round in which any did.
+    rounds: u32,
+    snapped: bool,
+    moved: f64,
+}
+
+impl Done {
+    const NOTHING: Self = Self { bounds: Bounds::EMPTY, triangles: 0, rounds: 0, snapped: false, moved: 0.0 };
+
+    fn add(&mut self, other: &Self) {
+        self.bounds.add(&other.bounds);
+        self.triangles += other.triangles;
+        self.rounds = self.rounds.max(other.rounds);
+        self.snapped |= other.snapped;
+        self.moved = self.moved.max(other.moved);
+    }
+
+    fn region(&self, rung: Rung) -> Region {
+        let bounds = self.bounds.normalised();
+        Region {
+            rung,
+            bounds: [bounds.lo, bounds.hi],
+            count: self.triangles,
+            rounds: self.rounds,
+            moved: self.moved,
+            reason: None,
+        }
+    }
+}
+
+/// By piece, since clusters grow while they are resolved.
+#[derive(Default)]
+pub(super) struct Track(BTreeMap<u32, Done>);
+
+impl Track {
+    /// In this round (from 1 on) these triangles cross something, and are cut, or their vertices snapped to a grid.
+    pub(super) fn crossed(&mut self, shop: &Shop, clusters: &Clusters, triangles: &BTreeSet<u32>, round: u32, snapped: bool) {
+        for t in triangles {
+            let done = self.0.entry(clusters.of_triangle[*t as usize]).or_insert(Done::NOTHING);
+            done.bounds.include(&shop.points(*t));
+            done.triangles += u64::from(round == 1);
+            done.rounds = round;
+            done.snapped |= snapped;
+        }
+    }
+
+    /// A vertex of this triangle's piece was moved so far.
+    pub(super) fn moved(&mut self, clusters: &Clusters, triangle: u32, by: f64) {
+        let piece = clusters.of_triangle.get(triangle as usize);
+        if let Some(done) = piece.and_then(|piece| self.0.get_mut(piece)) {
+            done.moved = done.moved.max(by);
+        }
+    }
+
+    /// One region a cluster.
+    pub(super) fn regions(&self, clusters: &mut Clusters) -> Vec<Region> {
+        let mut by_cluster: BTreeMap<u32, Done> = BTreeMap::new();
+        for (piece, done) in &self.0 {
+            by_cluster.entry(chunk::find(&mut clusters.parents, *piece)).or_insert(Done::NOTHING).add(done);
+        }
+        let rung = |done: &Done| if done.snapped { Rung::Snapped } else { Rung::Cut };
+        by_cluster.values().map(|done| done.region(rung(done))).collect()
+    }
+
+    /// The region of some pieces that are left as they were: all, if there is none.
+    pub(super) fn left(&self, pieces: &[u32], reason: String) -> Region {
+        let mut all = Done::NOTHING;
+        let own = self.0.iter().filter(|(piece, _)| pieces.is_empty() || pieces.contains(piece));
+        own.for_each(|(_, done)| all.add(done));
+        Region { moved: 0.0, reason: Some(reason), ..all.region(Rung::Left) }
+    }
+}

@@ -59,6 +59,9 @@ pub struct Profile {
     pub max_sheets_share: f64,
     /// What becomes of bodies inside others, or crossing others.
     pub bodies: Bodies,
+    /// The rim of an open shape that stands on other surface, within this fraction of the diagonal, is let down into it before it is closed, so that
+    /// the two become one. 0, as it is unless asked for: never; a thousandth is meant for shapes that were drawn on others.
+    pub stack_gap_relative: f64,
     /// Take surfaces apart that share an edge or a vertex, so that each has positions of its own.
     pub separate: bool,
     /// How far a vertex may move for that, as a fraction of the diagonal; four steps of single precision are always allowed.
@@ -156,6 +159,7 @@ impl Default for Profile {
             sheets: Sheets::Drop,
             max_sheets_share: 0.01,
             bodies: Bodies::Union,
+            stack_gap_relative: 0.0,
             separate: true,
             max_separation_relative: 1e-4,
             guarantee: Guarantee::Wrap,

@@ -64,6 +64,7 @@ pub(crate) fn check(profile: &Profile) -> Result<(), String> {
         ("max_box_change_relative", profile.max_box_change_relative),
         ("debris_area_share", profile.debris_area_share),
         ("max_sheets_share", profile.max_sheets_share),
+        ("stack_gap_relative", profile.stack_gap_relative),
         ("wrap_max_share", profile.wrap_max_share),
         ("wrap_max_move", profile.wrap_max_move),
         ("wrap_review_share", profile.wrap_review_share),

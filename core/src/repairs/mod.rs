@@ -22,6 +22,7 @@ mod overrun;
 mod probes;
 mod regions;
 mod resolve;
+mod seat;
 mod sheets;
 mod smooth;
 mod surplus;
@@ -120,6 +121,11 @@ pub(crate) fn run(
         tracing::info!(edges = contradictions, "No orientation satisfies all edges: a surface is one-sided.");
     }
     let (mut loops_left, mut kept_open, mut closed_across) = (Vec::new(), Vec::new(), Vec::new());
+    let mut seated = 0;
+    log.time("seat", "rims of open shapes that stand on other surface, let down into it", || {
+        seated = seat::let_down(survey, shop, &reversed, profile);
+        seated
+    });
     let mut lone = Vec::new();
     let mut methods = String::new();
     log.time("fill", "", || {
@@ -150,7 +156,7 @@ pub(crate) fn run(
     });
     let mut resolved = Resolved::default();
     if profile.resolve_crossings {
-        let across = !closed_across.is_empty();
+        let across = seated > 0 || !closed_across.is_empty();
         log.try_time("resolve", "", || {
             let means = Means { path, limits, progress };
             resolved = resolve::resolve(&Rational, survey, shop, &mut reversed, profile, across, &means)?;

@@ -5,10 +5,11 @@
 //! along a chain of edges that two bodies share, one of them draws back. Where the two wedges of an edge have the same fans at both of its
 //! ends (a bridge that narrows to an edge and widens again), one of them gets a vertex in the middle of the edge, which draws back alone.
 //!
-//! A copy's place is valid if none of its triangles loses its area or comes to meet another one more than before, touching included. That is
-//! tested exactly, for the triangles around while places are tried, and for everything else once all copies have theirs; those that meet
-//! anything are tried anew from their next place on. Vertices with an edge that is open, incoherent or lies between triangles in one direction,
-//! and those whose fans cross each other, are left alone.
+//! A copy goes no farther than a share of the shortest edge at it; only where there is no place so near, as at the slivers that cutting in single
+//! precision leaves, may it go farther than these are wide. Its place is valid if none of its triangles loses its area or comes to meet another
+//! one more than before, touching included. That is tested exactly, for the triangles around while places are tried, and for everything else
+//! once all copies have theirs; those that meet anything are tried anew from their next place on. Vertices with an edge that is open, incoherent
+//! or lies between triangles in one direction, and those whose fans cross each other, are left alone.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::fmt;
@@ -31,12 +32,20 @@ use crate::shop::{Shop, Triangle, Vertex, bits};
 use crate::sums::Bounds;
 use crate::survey::Survey;
 
-/// A copy moves by no more than this share of the shortest edge at it, so that no triangle comes near to turning over.
+/// A copy moves by no more than this share of the shortest edge at it, if there is a place for it then, so that no triangle comes near to turning
+/// over.
 const EDGE_SHARE: f64 = 0.125;
 
 /// A copy may always move by so many steps of the largest coordinate there, however small the profile's bound: what is far from the origin has
 /// no finer ones.
 const LEAST_STEPS: f64 = 4.0;
+
+/// Where there is no place so near, a copy may move by so many steps however short the edges are, if the profile lets it: cutting in single
+/// precision leaves edges of a single step.
+const FREE_STEPS: f64 = 64.0;
+
+/// Then finer steps are tried, too, since smaller coordinates have them: down to this share of a step of the largest.
+const FINEST: f64 = 1.0 / 64.0;
 
 /// How often copies that meet something are tried from their next place on, and then how often such are given up.
 const TRIED: usize = 4;
@@ -388,22 +397,39 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
         let points = || corners.iter().map(|v| shop.positions[*v as usize]);
         let largest = points().flatten().map(f32::abs).fold(0.0, f32::max);
         let step = f64::from(largest.next_up()) - f64::from(largest);
-        let lengths = points().map(|p| (at(&p) - middle).length()).filter(|length| *length > 0.0);
-        let most = self.before.farthest.max(LEAST_STEPS * step).min(EDGE_SHARE * lengths.fold(f64::INFINITY, f64::min));
-        let directions = directions(own.iter().map(|t| -shop.normal(*t).normalize_or_zero()));
-        let places = (0..).map(|k| step * f64::from(1_u32 << k)).take_while(|step| *step <= most).take(24);
-        let places =
-            places.flat_map(|step| directions.iter().map(move |d| (middle + *d * step).as_vec3().to_array().map(|x| x + 0.0)));
-        let tried = places.enumerate().skip(self.from.get(&of).copied().unwrap_or(0));
+        let rays: Vec<DVec3> = points().map(|p| at(&p) - middle).filter(|ray| *ray != DVec3::ZERO).collect();
+        let room = EDGE_SHARE * rays.iter().map(|ray| ray.length()).fold(f64::INFINITY, f64::min);
+        let most = self.before.farthest.max(LEAST_STEPS * step);
+        let mut ways = directions(own.iter().map(|t| -shop.normal(*t).normalize_or_zero()));
+        let usual = ways.len();
+        ways.extend(sideways(&rays));
+        let all = &ways;
+        let places = |first: f64, most: f64, ways: usize| {
+            let steps = (0..30).map(move |k| first * f64::from(1_u32 << k)).take_while(move |step| *step <= most);
+            let ways = &all[..ways];
+            steps.flat_map(move |step| ways.iter().map(move |d| (middle + *d * step).as_vec3().to_array().map(|x| x + 0.0)))
+        };
+        let near_by = places(step, most.min(room), usual);
+        let farther = places(step * FINEST, most.min(room.max(FREE_STEPS * step)), ways.len());
+        let tried = near_by.chain(farther).enumerate().skip(self.from.get(&of).copied().unwrap_or(0));
+        let mut seen = HashSet::new();
         for (place, position) in tried.take(most_places) {
-            if self.before.taken.contains(&bits(position)) || self.taken.contains(&bits(position)) {
+            if !seen.insert(bits(position)) || self.before.taken.contains(&bits(position)) || self.taken.contains(&bits(position))
+            {
                 continue;
             }
-            if self.accepts(&moved(position), &near) {
-                return Some((Copy { of, place, away: (at(&position) - middle).length() }, position));
+            let (moved, away) = (moved(position), (at(&position) - middle).length());
+            if (away <= room || self.keep_facing(&moved)) && self.accepts(&moved, &near) {
+                return Some((Copy { of, place, away }, position));
             }
         }
         None
+    }
+
+    /// Do triangles that move farther than their edges are long face the way they did, taken together?
+    fn keep_facing(&self, moved: &[Moved]) -> bool {
+        let normal = |[a, b, c]: &Corners| (at(b) - at(a)).cross(at(c) - at(a));
+        moved.iter().map(|(whole, now)| normal(now).dot(normal(&self.points_before(*whole)))).sum::<f64>() > 0.0
     }
 
     /// Do these triangles all have an area, and meet neither each other nor those `near` more than before?
@@ -526,6 +552,20 @@ fn directions(inward: impl Iterator<Item = DVec3>) -> Vec<DVec3> {
     own.chain(axes).chain(between).collect()
 }
 
+/// More ways to go, where all of these are blocked: along the edges that end there, and between two axes. Of each the largest component is 1.
+fn sideways(edges: &[DVec3]) -> Vec<DVec3> {
+    let along = edges.iter().map(|edge| *edge / edge.abs().max_element());
+    let signs = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
+    let between = (0..3).flat_map(|k| {
+        signs.map(|(x, y)| {
+            let mut way = [0.0; 3];
+            (way[k], way[(k + 1) % 3]) = (x, y);
+            DVec3::from_array(way)
+        })
+    });
+    along.chain(between).collect()
+}
+
 /// What lies on something can be lifted off it; what crosses it cannot.
 fn badness(contact: Contact) -> u8 {
     match contact {
@@ -607,6 +647,20 @@ mod tests {
         assert!((got.defects.bounds.unwrap(), got.result.farthest < 1e-6) == ([[0.0; 3], [2.0, 2.0, 1.0]], true));
     }
 
+    /// The same mesh, every unit so many steps of single precision at this offset.
+    fn shrunk(mesh: &[Corners], steps: f32, offset: f32) -> Vec<Corners> {
+        let step = offset.next_up() - offset;
+        mesh.iter().map(|t| t.map(|p| p.map(|x| offset + x * steps * step))).collect()
+    }
+
+    #[test]
+    fn a_copy_may_go_farther_than_its_edges_are_long() {
+        let cubes = [cuboid([0.0; 3], [1.0; 3]), cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 1.0])].concat();
+        let got = separated(&shrunk(&cubes, 2.0, 1000.0));
+        assert_eq!((got.result.vertices, got.result.edges, got.result.left), (2, 0, 0));
+        assert!(got.verdict.good && got.defects.bodies == 2, "{:?}", got.verdict);
+    }
+
     #[test]
     fn a_bridge_that_narrows_to_an_edge_is_opened_in_its_middle() {
         // Two of four cubes, across from each other, between two slabs: whichever end of their edge, the two are one there.
@@ -670,6 +724,13 @@ mod tests {
             let got = check(&voxels(bits, diagonals))?;
             prop_assert!((got.defects.volume - f64::from(bits.count_ones())).abs() < 1e-3);
             prop_assert!(got.result.farthest < 1e-5, "{:?}", got.result);
+        }
+
+        /// So do cubes of a few steps of single precision.
+        #[test]
+        fn cubes_of_a_few_steps_become_a_manifold(bits in any::<u64>(), more in any::<u64>(), diagonals in any::<u64>(), steps in 2..9) {
+            prop_assume!(bits & more != 0);
+            check(&shrunk(&voxels(bits & more, diagonals), steps as f32, 1000.0))?;
         }
 
         /// So do bodies whose faces lie anyhow, near the origin and far from it.

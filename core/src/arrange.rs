@@ -9,6 +9,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use manifold_rust::linalg::Vec3;
 use manifold_rust::robust::cells::{self, VertTables};
+use manifold_rust::robust::exact::rational::{R3, r3_eq};
 use manifold_rust::robust::intersection_graph::{self, EdgeKey, IntersectionGraph};
 
 use crate::chunk;
@@ -34,6 +35,8 @@ pub(crate) struct Piece {
 pub(crate) struct Arrangement {
     /// Rounded to the nearest f64; where a corner of a triangle is, exactly that.
     pub(crate) points: Vec<[f64; 3]>,
+    /// Which of the points are exactly where they are said to be, in f32; others there are only very near.
+    pub(crate) exact: Vec<bool>,
     /// By source. No two of them lie on top of each other, and they meet along whole edges.
     pub(crate) pieces: Vec<Piece>,
     /// Numbers of cells are below this. What is one cell of space may have several, if only triangles that are not here show it.
@@ -64,7 +67,12 @@ impl Arrange for Rational {
 fn collect(graph: &IntersectionGraph, triangles: &[[[f32; 3]; 3]]) -> Arrangement {
     let mut pieces = flatten(graph, triangles);
     let cells = number_cells(graph, &mut pieces);
-    Arrangement { points: graph.verts_f64.iter().map(|p| [p.x, p.y, p.z]).collect(), pieces, cells }
+    let points: Vec<[f64; 3]> = graph.verts_f64.iter().map(|p| [p.x, p.y, p.z]).collect();
+    let is_exact = |(i, p): (usize, &[f64; 3])| {
+        p.iter().all(|x| f64::from(*x as f32) == *x) && r3_eq(&graph.verts[i], &R3::from_vec3(graph.verts_f64[i]))
+    };
+    let exact = points.iter().enumerate().map(is_exact).collect();
+    Arrangement { points, exact, pieces, cells }
 }
 
 /// The pieces with those on top of each other made one: of the first source.

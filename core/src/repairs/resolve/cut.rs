@@ -68,8 +68,8 @@ impl Cut {
             corners.map(|v| (shop.positions[v as usize].map(|x| f64::from(x).to_bits()), v)).collect();
         // −0.0 is no position of the workshop.
         let at = |p: &[f64; 3]| by_position.get(&p.map(|x| (x + 0.0).to_bits())).copied();
-        let vertices: HashMap<u32, Vertex> =
-            arrangement.points.iter().zip(0..).filter_map(|(p, point)| Some((point, at(p)?))).collect();
+        let exact = arrangement.points.iter().zip(&arrangement.exact).zip(0..).filter(|((_, exact), _)| **exact);
+        let vertices: HashMap<u32, Vertex> = exact.filter_map(|((p, _), point)| Some((point, at(p)?))).collect();
         let points = vertices.iter().map(|(point, v)| (*v, *point)).collect();
         let edges = |piece: &Piece| {
             let v = piece.v;

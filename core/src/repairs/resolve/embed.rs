@@ -8,7 +8,7 @@ use super::super::work::Work;
 use super::super::{collinear, duplicates};
 use super::cut::Cut;
 use super::sides::Sides;
-use super::{Failure, State, Stuck, vertices};
+use super::{Failure, State, Stuck, above, vertices};
 use crate::chunk::NONE;
 use crate::defects;
 use crate::shop::{Shop, Vertex, bits};
@@ -89,7 +89,8 @@ impl State<'_, '_, '_> {
         let mut displaced = 0f64;
         let points: BTreeSet<u32> = new.iter().flat_map(|(_, v)| *v).filter(|point| !cut.vertices.contains_key(point)).collect();
         let cut_from: HashMap<u32, u32> = new.iter().flat_map(|(t, v)| v.map(|point| (point, *t))).collect();
-        let rounded = |point: u32| cut.arrangement.points[point as usize].map(|x| x as f32 + 0.0);
+        let step = self.step;
+        let rounded = |point: u32| cut.arrangement.points[point as usize].map(|x| place_of(x, step));
         // There may be a vertex already, here or elsewhere in the file.
         self.complete(points.iter().map(|point| rounded(*point)).collect());
         let mut known = vertices(self.work);
@@ -157,6 +158,16 @@ impl State<'_, '_, '_> {
         cancel(self.work, &split);
         self.follow();
     }
+}
+
+/// The steps of f32 below a power of two, against it.
+const FINEST: f64 = 1.0 / 16_777_216.0;
+
+/// A coordinate in f32: what it is, if it has a place there, as in a plane along the axes, else the nearest multiple of a step that is none too fine
+/// for f32.
+fn place_of(x: f64, step: f64) -> f32 {
+    let nearest = x as f32;
+    if f64::from(nearest) == x { nearest + 0.0 } else { ((x / step).round() * step) as f32 + 0.0 }
 }
 
 /// What becomes of each source that need not be cut: all of it alike, and nobody cut otherwise ends at a point in its middle or on its

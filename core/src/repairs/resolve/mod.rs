@@ -7,7 +7,9 @@
 //! side only stays, so that a body inside out comes right and what lies inside of another one goes, whole patches as bits of the edit ([`embed`]).
 //!
 //! Where the surface was cut, new vertices are rounded to f32. Triangles that come to nothing by that leave every directed edge balanced, and
-//! what crosses after it is resolved in the next round, with what it crosses, from the f32 coordinates. Where that does not come to an end, the
+//! what crosses after it is resolved in the next round, with what it crosses, from the f32 coordinates. (Near zero f32 has places far closer to
+//! each other than elsewhere, which are of no use: no place is finer than those at the file's largest coordinate, but for what has its place
+//! exactly.) Where that does not come to an end, the
 //! new vertices there are brought to a coarser grid, so that f32 has room between them (after Valque & Lazard, SGP 2025, and the
 //! iterated snap rounding of CGAL 6.1, which has 31 more bits). Rounds are counted, so that time decides nothing.
 //!
@@ -94,11 +96,10 @@ impl std::fmt::Display for Failure {
     }
 }
 
-/// Rounds of cutting and rounding before the first snap, between snaps, and after the last.
-const ROUNDS: u32 = 3;
-
-/// Grids that new vertices are snapped to, one after the other: their steps against the power of two above the largest coordinate.
-const GRIDS: [f64; 2] = [1.0 / 16_384.0, 1.0 / 4096.0];
+/// Grids that new vertices are brought to, one after the other: their steps against the power of two above the largest coordinate, and rounds of
+/// cutting and rounding on each. The first is that of f32 there.
+const GRIDS: [(f64, u32); 5] =
+    [(1.0 / 16_777_216.0, 3), (1.0 / 1_048_576.0, 3), (1.0 / 131_072.0, 3), (1.0 / 16_384.0, 4), (1.0 / 4096.0, 6)];
 
 /// Times that everything is done anew without the clusters that failed.
 const ATTEMPTS: usize = 6;
@@ -339,22 +340,24 @@ impl State<'_, '_, '_> {
         let mut crossing = self.crossing(overlay, pairs, profile);
         resolved.pairs = crossing.len() as u64;
         let mut latest: Option<Overlay> = None;
-        let mut grids = GRIDS.iter();
+        let (mut grids, mut rounds_left) = (GRIDS.iter(), ROUNDS);
         while !crossing.is_empty() {
             let triangles: BTreeSet<u32> = crossing.iter().flatten().copied().collect();
             tracing::debug!(round = resolved.rounds, pairs = crossing.len(), triangles = triangles.len(), "Crossings.");
             let mut first_new = self.work.triangles.len() as u32;
-            let snaps = resolved.rounds > 0 && resolved.rounds.is_multiple_of(ROUNDS);
+            let snaps = rounds_left == 0;
             self.track.crossed(self.work, &self.clusters, &triangles, resolved.rounds + 1, snaps);
             if snaps {
                 let failed = || Stuck { failure: Failure::Endless, triangles: triangles.iter().copied().collect() };
                 let step = grids.next().ok_or_else(failed)? * above(self.survey.bounds.largest_coordinate());
+                rounds_left = if grids.len() == 0 { LAST_ROUNDS } else { ROUNDS };
                 resolved.displaced = resolved.displaced.max(self.snap(&triangles, step));
                 // What was moved may cross anything.
                 first_new = first_triangle;
             } else {
                 let along = self.with_edges_along(latest.as_ref().unwrap_or(overlay), &triangles).ok_or_else(too_many)?;
                 resolved.displaced = resolved.displaced.max(self.round(engine, &triangles, &along, threads)?);
+                rounds_left -= 1;
             }
             resolved.rounds += 1;
             self.check_closed()?;

@@ -8,7 +8,7 @@ use super::super::work::Work;
 use super::super::{collinear, duplicates};
 use super::cut::Cut;
 use super::sides::Sides;
-use super::{Failure, State, Stuck, above, vertices};
+use super::{Failure, State, Stuck, vertices};
 use crate::chunk::NONE;
 use crate::defects;
 use crate::shop::{Shop, Vertex, bits};
@@ -118,9 +118,17 @@ impl State<'_, '_, '_> {
         displaced
     }
 
-    /// Brings the new vertices of these triangles to a grid of this step. Returns how far one was moved.
-    pub(super) fn snap(&mut self, triangles: &BTreeSet<u32>, step: f64) -> f64 {
-        let snapped = |p: [f32; 3]| p.map(|x| ((f64::from(x) / step).round() * step) as f32 + 0.0);
+    /// Brings the new vertices of these triangles to the grid, but for coordinates that old ones have: planes along the axes stay planes. Returns how
+    /// far one was moved.
+    pub(super) fn snap(&mut self, triangles: &BTreeSet<u32>) -> f64 {
+        let all = triangles.iter().flat_map(|t| self.work.triangles[*t as usize].v);
+        let old: BTreeSet<Vertex> = all.filter(|v| *v < self.first_vertex).collect();
+        let planes: [BTreeSet<u32>; 3] =
+            std::array::from_fn(|k| old.iter().map(|v| self.work.positions[*v as usize][k].to_bits()).collect());
+        let step = self.step;
+        let snapped = |p: [f32; 3]| -> [f32; 3] {
+            std::array::from_fn(|k| if planes[k].contains(&p[k].to_bits()) { p[k] } else { on_grid(f64::from(p[k]), step) })
+        };
         let corners = triangles.iter().flat_map(|t| self.work.triangles[*t as usize].v);
         let new: BTreeSet<Vertex> = corners.filter(|v| *v >= self.first_vertex && self.work.complete[*v as usize]).collect();
         self.complete(new.iter().map(|v| snapped(self.work.positions[*v as usize])).collect());
@@ -160,14 +168,15 @@ impl State<'_, '_, '_> {
     }
 }
 
-/// The steps of f32 below a power of two, against it.
-const FINEST: f64 = 1.0 / 16_777_216.0;
-
-/// A coordinate in f32: what it is, if it has a place there, as in a plane along the axes, else the nearest multiple of a step that is none too fine
-/// for f32.
+/// A coordinate in f32: what it is, if it has a place there, as in a plane along the axes, else the nearest on the grid.
 fn place_of(x: f64, step: f64) -> f32 {
     let nearest = x as f32;
-    if f64::from(nearest) == x { nearest + 0.0 } else { ((x / step).round() * step) as f32 + 0.0 }
+    if f64::from(nearest) == x { nearest + 0.0 } else { on_grid(x, step) }
+}
+
+/// The nearest multiple of a power of two, which is not too small for f32 to have them.
+fn on_grid(x: f64, step: f64) -> f32 {
+    ((x / step).round() * step) as f32 + 0.0
 }
 
 /// What becomes of each source that need not be cut: all of it alike, and nobody cut otherwise ends at a point in its middle or on its

@@ -140,8 +140,16 @@ pub(super) fn resolve(
     let mut regions_left: Vec<Unsettled> = Vec::new();
     let mut blocked: Vec<bool> = Vec::new();
     let (mut bodies, mut volume) = (0, 0);
-    let mut state =
-        State { survey, work, reversed, before, clusters: Clusters::default(), track: Track::default(), first_vertex: 0 };
+    let mut state = State {
+        survey,
+        work,
+        reversed,
+        before,
+        clusters: Clusters::default(),
+        track: Track::default(),
+        first_vertex: 0,
+        step: 0.0,
+    };
     let mut attempts = 0;
     loop {
         attempts += 1;
@@ -322,6 +330,8 @@ pub(super) struct State<'a, 'r, 'w> {
     track: Track,
     /// Vertices from here on are new ones.
     first_vertex: Vertex,
+    /// The step of the grid that they are on now.
+    step: f64,
 }
 
 impl State<'_, '_, '_> {
@@ -340,7 +350,10 @@ impl State<'_, '_, '_> {
         let mut crossing = self.crossing(overlay, pairs, profile);
         resolved.pairs = crossing.len() as u64;
         let mut latest: Option<Overlay> = None;
-        let (mut grids, mut rounds_left) = (GRIDS.iter(), ROUNDS);
+        let largest = above(self.survey.bounds.largest_coordinate());
+        let mut grids = GRIDS.iter().map(|(share, rounds)| (share * largest, *rounds));
+        let mut rounds_left;
+        (self.step, rounds_left) = grids.next().unwrap_or_default();
         while !crossing.is_empty() {
             let triangles: BTreeSet<u32> = crossing.iter().flatten().copied().collect();
             tracing::debug!(round = resolved.rounds, pairs = crossing.len(), triangles = triangles.len(), "Crossings.");
@@ -349,9 +362,8 @@ impl State<'_, '_, '_> {
             self.track.crossed(self.work, &self.clusters, &triangles, resolved.rounds + 1, snaps);
             if snaps {
                 let failed = || Stuck { failure: Failure::Endless, triangles: triangles.iter().copied().collect() };
-                let step = grids.next().ok_or_else(failed)? * above(self.survey.bounds.largest_coordinate());
-                rounds_left = if grids.len() == 0 { LAST_ROUNDS } else { ROUNDS };
-                resolved.displaced = resolved.displaced.max(self.snap(&triangles, step));
+                (self.step, rounds_left) = grids.next().ok_or_else(failed)?;
+                resolved.displaced = resolved.displaced.max(self.snap(&triangles));
                 // What was moved may cross anything.
                 first_new = first_triangle;
             } else {

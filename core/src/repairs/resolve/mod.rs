@@ -96,13 +96,24 @@ impl std::fmt::Display for Failure {
     }
 }
 
-/// Grids that new vertices are brought to, one after the other: their steps against the power of two above the largest coordinate, and rounds of
-/// cutting and rounding on each. The first is that of f32 there.
-const GRIDS: [(f64, u32); 5] =
-    [(1.0 / 16_777_216.0, 3), (1.0 / 1_048_576.0, 3), (1.0 / 131_072.0, 3), (1.0 / 16_384.0, 4), (1.0 / 4096.0, 6)];
+/// How rounds follow each other. Which way comes to an end sooner cannot be told beforehand: the second one is tried where the first does not.
+struct Ladder {
+    /// Grids that new vertices are brought to, one after the other: their steps against the power of two above the largest coordinate. The first
+    /// is that of f32 there.
+    grids: &'static [f64],
+    /// Rounds of cutting and rounding from one grid to the next, and after the last.
+    rounds: u32,
+    /// New vertices stay on the grid that was reached; else they go to the finest one.
+    stays: bool,
+}
+
+const LADDERS: [Ladder; 2] = [
+    Ladder { grids: &[1.0 / 16_777_216.0, 1.0 / 131_072.0, 1.0 / 16_384.0, 1.0 / 4096.0], rounds: 4, stays: false },
+    Ladder { grids: &[1.0 / 16_777_216.0, 1.0 / 16_384.0, 1.0 / 8192.0, 1.0 / 4096.0, 1.0 / 2048.0], rounds: 4, stays: true },
+];
 
 /// Times that everything is done anew without the clusters that failed.
-const ATTEMPTS: usize = 6;
+const ATTEMPTS: usize = 8;
 
 /// What it takes to look at the file again.
 pub(super) struct Means<'a> {
@@ -151,6 +162,7 @@ pub(super) fn resolve(
         step: 0.0,
     };
     let mut attempts = 0;
+    let mut ladders = LADDERS.iter();
     loop {
         attempts += 1;
         let pieces = orient::pieces(state.survey, state.work, state.reversed);
@@ -165,7 +177,8 @@ pub(super) fn resolve(
         state.clusters = Clusters::of(&pieces, &blocked);
         state.first_vertex = state.work.positions.len() as Vertex;
         let taken_part: Vec<bool> = (0..state.work.triangles.len() as u32).map(|t| state.clusters.holds(t)).collect();
-        match state.attempt(engine, &overlay, &pairs, profile, means.limits.threads) {
+        let ladder = ladders.next().unwrap_or(&LADDERS[0]);
+        match state.attempt(engine, &overlay, &pairs, profile, ladder, means.limits.threads) {
             Ok(resolved) => {
                 let pieces = orient::pieces(state.survey, state.work, state.reversed);
                 let (bodies_now, volume_now) = measured(&pieces);
@@ -180,7 +193,9 @@ pub(super) fn resolve(
                     ..resolved
                 });
             }
+            Err(Stuck { failure: Failure::Endless | Failure::Opened, .. }) if ladders.len() > 0 => state.restore(),
             Err(Stuck { failure, triangles }) => {
+                ladders = LADDERS.iter();
                 let failed = state.clusters.pieces_of(&triangles);
                 state.restore();
                 regions_left.extend(state.unsettled(&failed, failure));
@@ -341,6 +356,7 @@ impl State<'_, '_, '_> {
         overlay: &Overlay,
         pairs: &[[u32; 2]],
         profile: &Profile,
+        ladder: &Ladder,
         threads: usize,
     ) -> Tried<Resolved> {
         let mut resolved = Resolved::default();
@@ -351,9 +367,10 @@ impl State<'_, '_, '_> {
         resolved.pairs = crossing.len() as u64;
         let mut latest: Option<Overlay> = None;
         let largest = above(self.survey.bounds.largest_coordinate());
-        let mut grids = GRIDS.iter().map(|(share, rounds)| (share * largest, *rounds));
-        let mut rounds_left;
-        (self.step, rounds_left) = grids.next().unwrap_or_default();
+        let mut grids = ladder.grids.iter().map(|share| share * largest);
+        let finest = grids.next().unwrap_or(0.0);
+        self.step = finest;
+        let mut rounds_left = ladder.rounds;
         while !crossing.is_empty() {
             let triangles: BTreeSet<u32> = crossing.iter().flatten().copied().collect();
             tracing::debug!(round = resolved.rounds, pairs = crossing.len(), triangles = triangles.len(), "Crossings.");
@@ -362,8 +379,12 @@ impl State<'_, '_, '_> {
             self.track.crossed(self.work, &self.clusters, &triangles, resolved.rounds + 1, snaps);
             if snaps {
                 let failed = || Stuck { failure: Failure::Endless, triangles: triangles.iter().copied().collect() };
-                (self.step, rounds_left) = grids.next().ok_or_else(failed)?;
+                self.step = grids.next().ok_or_else(failed)?;
+                rounds_left = ladder.rounds;
                 resolved.displaced = resolved.displaced.max(self.snap(&triangles));
+                if !ladder.stays {
+                    self.step = finest;
+                }
                 // What was moved may cross anything.
                 first_new = first_triangle;
             } else {

@@ -37,6 +37,8 @@ pub(crate) struct Arrangement {
     pub(crate) points: Vec<[f64; 3]>,
     /// Which of the points are exactly where they are said to be, in f32; others there are only very near.
     pub(crate) exact: Vec<bool>,
+    /// By triangle: part of it is a piece of an earlier one, too.
+    pub(crate) covered: Vec<bool>,
     /// By source. No two of them lie on top of each other, and they meet along whole edges.
     pub(crate) pieces: Vec<Piece>,
     /// Numbers of cells are below this. What is one cell of space may have several, if only triangles that are not here show it.
@@ -65,21 +67,21 @@ impl Arrange for Rational {
 }
 
 fn collect(graph: &IntersectionGraph, triangles: &[[[f32; 3]; 3]]) -> Arrangement {
-    let mut pieces = flatten(graph, triangles);
+    let (mut pieces, covered) = flatten(graph, triangles);
     let cells = number_cells(graph, &mut pieces);
     let points: Vec<[f64; 3]> = graph.verts_f64.iter().map(|p| [p.x, p.y, p.z]).collect();
     let is_exact = |(i, p): (usize, &[f64; 3])| {
         p.iter().all(|x| f64::from(*x as f32) == *x) && r3_eq(&graph.verts[i], &R3::from_vec3(graph.verts_f64[i]))
     };
     let exact = points.iter().enumerate().map(is_exact).collect();
-    Arrangement { points, exact, pieces, cells }
+    Arrangement { points, exact, covered, pieces, cells }
 }
 
-/// The pieces with those on top of each other made one: of the first source.
+/// The pieces with those on top of each other made one, of the first source; and which sources have lost any by that.
 ///
 /// Two sources that lie in one plane and overlap have the same points and constraints where they do, but perhaps not the same triangles. A
 /// piece lies in another source if all its corners are points of that one, since it is convex and in its plane then.
-fn flatten(graph: &IntersectionGraph, triangles: &[[[f32; 3]; 3]]) -> Vec<Piece> {
+fn flatten(graph: &IntersectionGraph, triangles: &[[[f32; 3]; 3]]) -> (Vec<Piece>, Vec<bool>) {
     let mut sources: Vec<Vec<u32>> = vec![Vec::new(); graph.verts.len()];
     for piece in &graph.pieces {
         let source = piece.tri as u32;
@@ -90,19 +92,21 @@ fn flatten(graph: &IntersectionGraph, triangles: &[[[f32; 3]; 3]]) -> Vec<Piece>
             }
         }
     }
+    let mut covered = vec![false; triangles.len()];
     let mut pieces = Vec::with_capacity(graph.pieces.len());
     for piece in &graph.pieces {
         let source = piece.tri as u32;
         let [a, b, c] = piece.vi.map(|v| &sources[v as usize]);
         let others = || a.iter().filter(|s| **s != source && b.binary_search(s).is_ok() && c.binary_search(s).is_ok());
         if others().next().is_some_and(|first| *first < source) {
+            covered[piece.tri] = true;
             continue;
         }
         let agrees = |other: &u32| agree(&triangles[piece.tri], &triangles[*other as usize]);
         let step = 1 + others().map(|other| if agrees(other) { 1 } else { -1 }).sum::<i32>();
         pieces.push(Piece { source, v: piece.vi, step, cells: [0; 2] });
     }
-    pieces
+    (pieces, covered)
 }
 
 /// Do two triangles of one plane face the same way? Exact: that of their shadows, along an axis in which they have any.

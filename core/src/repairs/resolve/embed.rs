@@ -179,14 +179,13 @@ fn on_grid(x: f64, step: f64) -> f32 {
     ((x / step).round() * step) as f32 + 0.0
 }
 
-/// What becomes of each source that need not be cut: all of it alike, and nobody cut otherwise ends at a point in its middle or on its
-/// edges.
+/// What becomes of each source that need not be cut: all of it alike, nothing else that stays has an edge in its middle, as a body that stands on it
+/// with an edge, and nobody cut otherwise ends at a point in its middle or on its edges.
 fn whole_sources(shop: &Shop, cut: &Cut, fates: &[Fate]) -> Vec<Option<Fate>> {
     let count = cut.sources.len();
     let range = |s: usize| cut.range(s);
     let corners = |s: usize| shop.triangles[cut.sources[s] as usize].v;
     let is_corner = |s: usize, point: &u32| cut.vertices.get(point).is_some_and(|v| corners(s).contains(v));
-    let area = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).length();
     let mut whole: Vec<Option<Fate>> = (0..count)
         .map(|s| {
             let fates = &fates[range(s)];
@@ -200,12 +199,23 @@ fn whole_sources(shop: &Shop, cut: &Cut, fates: &[Fate]) -> Vec<Option<Fate>> {
             if *first == Fate::Goes {
                 return Some(Fate::Goes);
             }
-            // Part of it may be another source's.
-            let place = |v: u32| DVec3::from_array(cut.arrangement.points[v as usize]);
-            let all: f64 = cut.pieces(s).iter().map(|piece| area(piece.v.map(place))).sum();
-            (all > (1.0 - 1e-9) * area(corners(s).map(|v| shop.place(v)))).then_some(*first)
+            (!cut.arrangement.covered[s]).then_some(*first)
         })
         .collect();
+    let edge = |v: [u32; 3], k: usize| (v[k].min(v[(k + 1) % 3]), v[k].max(v[(k + 1) % 3]));
+    let mut staying: Vec<((u32, u32), u32)> = Vec::new();
+    for s in 0..count {
+        for (piece, _) in cut.pieces(s).iter().zip(&fates[range(s)]).filter(|(_, f)| **f != Fate::Goes) {
+            staying.extend((0..3).map(|k| (edge(piece.v, k), s as u32)));
+        }
+    }
+    staying.sort_unstable();
+    for around in staying.chunk_by(|a, b| a.0 == b.0).filter(|around| around.len() > 2) {
+        // In the middle of a source, two of its pieces have the edge.
+        for own in around.chunk_by(|a, b| a.1 == b.1).filter(|own| own.len() == 2) {
+            whole[own[0].1 as usize] = None;
+        }
+    }
     // Sources with a piece at each point that is not theirs alone.
     let mut at: HashMap<u32, Vec<u32>> = HashMap::new();
     for s in 0..count {

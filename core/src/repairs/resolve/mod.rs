@@ -41,7 +41,7 @@ use crate::defects;
 use crate::error::Result;
 use crate::report::Region;
 use crate::settings::{Bodies, Limits, Profile};
-use crate::shop::components::{Components, Reversed};
+use crate::shop::components::{Component, Components, Reversed};
 use crate::shop::{Origin, Shop, Triangle, Vertex, bits};
 use crate::sums::Extent;
 use crate::survey::{Division, Survey};
@@ -96,21 +96,26 @@ impl std::fmt::Display for Failure {
     }
 }
 
-/// How rounds follow each other. Which way comes to an end sooner cannot be told beforehand: the second one is tried where the first does not.
+/// How rounds follow each other. Which way comes to an end sooner cannot be told beforehand: the next one is tried where one does not.
 struct Ladder {
-    /// Grids that new vertices are brought to, one after the other: their steps against the power of two above the largest coordinate. The first
-    /// is that of f32 there.
+    /// Grids that new vertices are brought to, one after the other: their steps against the power of two above the largest coordinate. 2⁻²⁴ is
+    /// that of f32 there.
     grids: &'static [f64],
     /// Rounds of cutting and rounding from one grid to the next, and after the last.
     rounds: u32,
-    /// New vertices stay on the grid that was reached; else they go to the finest one.
+    /// New vertices stay on the grid that was reached; else they go to the first one.
     stays: bool,
 }
 
-const LADDERS: [Ladder; 2] = [
+const LADDERS: [Ladder; 3] = [
     Ladder { grids: &[1.0 / 16_777_216.0, 1.0 / 131_072.0, 1.0 / 16_384.0, 1.0 / 4096.0], rounds: 4, stays: false },
-    Ladder { grids: &[1.0 / 16_777_216.0, 1.0 / 16_384.0, 1.0 / 8192.0, 1.0 / 4096.0, 1.0 / 2048.0], rounds: 4, stays: true },
+    Ladder { grids: &[1.0 / 131_072.0, 1.0 / 16_384.0, 1.0 / 4096.0], rounds: 6, stays: true },
+    Ladder { grids: &[1.0 / 16_384.0, 1.0 / 8192.0, 1.0 / 4096.0, 1.0 / 2048.0], rounds: 6, stays: true },
 ];
+
+/// Pairs may become more from round to round, but not more than so many times as many as at first, or as a few.
+const GROWTH: usize = 4;
+const FEW: usize = 1024;
 
 /// Times that everything is done anew without the clusters that failed.
 const ATTEMPTS: usize = 8;
@@ -182,6 +187,7 @@ pub(super) fn resolve(
             Ok(resolved) => {
                 let pieces = orient::pieces(state.survey, state.work, state.reversed);
                 let (bodies_now, volume_now) = measured(&pieces);
+                state.drop_specks(&pieces);
                 return Ok(Resolved {
                     bodies: bodies.saturating_sub(bodies_now),
                     volume: state.survey.measure.volume(Extent { area: 0, volume: volume - volume_now }),
@@ -365,14 +371,18 @@ impl State<'_, '_, '_> {
         let too_many = || Stuck::with(Failure::TooMany);
         let mut crossing = self.crossing(overlay, pairs, profile);
         resolved.pairs = crossing.len() as u64;
+        let most = crossing.len().max(FEW) * GROWTH;
         let mut latest: Option<Overlay> = None;
         let largest = above(self.survey.bounds.largest_coordinate());
         let mut grids = ladder.grids.iter().map(|share| share * largest);
-        let finest = grids.next().unwrap_or(0.0);
-        self.step = finest;
+        let first = grids.next().unwrap_or(0.0);
+        self.step = first;
         let mut rounds_left = ladder.rounds;
         while !crossing.is_empty() {
             let triangles: BTreeSet<u32> = crossing.iter().flatten().copied().collect();
+            if resolved.rounds > 0 && crossing.len() > most {
+                return Err(Stuck { failure: Failure::Endless, triangles: triangles.into_iter().collect() });
+            }
             tracing::debug!(round = resolved.rounds, pairs = crossing.len(), triangles = triangles.len(), "Crossings.");
             let mut first_new = self.work.triangles.len() as u32;
             let snaps = rounds_left == 0;
@@ -383,7 +393,7 @@ impl State<'_, '_, '_> {
                 rounds_left = ladder.rounds;
                 resolved.displaced = resolved.displaced.max(self.snap(&triangles));
                 if !ladder.stays {
-                    self.step = finest;
+                    self.step = first;
                 }
                 // What was moved may cross anything.
                 first_new = first_triangle;
@@ -397,7 +407,11 @@ impl State<'_, '_, '_> {
             let overlay = Overlay::of(self.survey, self.work, self.reversed).ok_or_else(too_many)?;
             let met = overlay.met_by(self.survey, self.work, |t| t >= first_new).ok_or_else(too_many)?;
             let pairs: Vec<[u32; 2]> = met.iter().map(|pair| pair.triangles).collect();
+            // What neither was cut nor moved crosses as it did.
+            let still = crossing.into_iter().filter(|pair| !snaps && pair.iter().all(|t| self.work.lives(*t)));
+            let still: Vec<[u32; 2]> = still.collect();
             crossing = self.crossing(&overlay, &pairs, profile);
+            crossing.extend(still);
             latest = Some(overlay);
         }
         Ok(resolved)
@@ -511,6 +525,22 @@ impl State<'_, '_, '_> {
             }
         }
         if triangles.is_empty() { Ok(()) } else { Err(Stuck { failure: Failure::Opened, triangles }) }
+    }
+
+    /// Drops closed surfaces of nothing but parts of triangles that are no thicker than what rounding moves: they are nothing but that.
+    fn drop_specks(&mut self, pieces: &Components) {
+        let measure = &self.survey.measure;
+        let finest = above(self.survey.bounds.largest_coordinate()) * LADDERS[0].grids[0];
+        let thin = |piece: &Component| measure.volume(piece.extent).abs() <= measure.area(piece.extent) * finest;
+        let mut is_speck: Vec<bool> = pieces.list.iter().map(|piece| !piece.open && thin(piece)).collect();
+        let as_read = |t: &u32| matches!(self.work.triangles[*t as usize].origin, Origin::Input(_));
+        let kept = self.work.living().filter(as_read).map(|t| pieces.of_triangle[t as usize]);
+        for piece in kept.chain(pieces.of_patch.iter().copied()).filter(|piece| *piece != NONE) {
+            is_speck[piece as usize] = false;
+        }
+        let goes = |t: u32| is_speck.get(pieces.of_triangle[t as usize] as usize) == Some(&true);
+        let specks: Vec<u32> = self.work.living().filter(|t| goes(*t)).collect();
+        specks.into_iter().for_each(|t| self.work.kill(t));
     }
 
     /// What a cluster that is left, of these pieces, is told by, once all is as it was; `None` if nothing of it is known.

@@ -98,6 +98,15 @@ fn a_surface_that_passes_through_another_edge_along_edge_is_on_both_of_its_sides
 }
 
 #[test]
+fn a_body_that_stands_on_another_with_an_edge_shares_that_edge() {
+    // Nothing of either goes, and yet they cross as long as the face has no edge there.
+    let standing = prism([[1.0, 0.5], [2.0, 0.25], [2.0, 0.75]], [0.25, 0.75]);
+    let got = resolved(&[cube(), standing].concat());
+    assert!(got.result.left.is_empty() && got.defects.self_intersections.is_some_and(|found| found.is_free()));
+    assert!(got.defects.nonmanifold_edges > 0 && (got.defects.volume - 1.125).abs() < 1e-9, "{}", got.defects.volume);
+}
+
+#[test]
 fn a_sheet_through_a_body_is_not_for_the_arrangement() {
     let sheet = vec![[[-1.0, 0.5, 0.5], [2.0, 0.5, 0.5], [0.5, 3.0, 0.625]]];
     let got = resolved(&[cube(), sheet].concat());

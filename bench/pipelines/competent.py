@@ -3,7 +3,8 @@
 Close vertices are merged with a tolerance relative to the model; folded faces and T-vertices are removed; then rounds of
 non-manifold repair and hole closing (any hole size, no self-intersecting patches) until the surface is closed and two-manifold,
 at most three; borders that do not quite meet are snapped in the first. At last the faces are oriented coherently and, where the
-enclosed volume is negative, all turned round. A filter that refuses the mesh is named on standard error and skipped. With
+enclosed volume is negative, all turned round. With --resolve there are up to three more rounds before that, in which self-intersecting
+faces are selected and deleted, and what that opens is repaired and closed as before. A filter that refuses the mesh is named on standard error and skipped. With
 --self-intersections the result's self-intersecting faces are selected before it is saved, which is how pymeshlab finds them.
 """
 
@@ -61,12 +62,25 @@ class Repair:
         if self.meshes.current_mesh().face_number() and self.meshes.get_geometric_measures().get("mesh_volume", 1) < 0:
             self.apply("meshing_invert_face_orientation", forceflip=True)
 
+    def resolve(self):
+        """Replaces the faces that cross others; is there still something to be done?"""
+        if self.self_intersecting() == 0:
+            return False
+        self.apply("meshing_remove_selected_faces")
+        self.apply("meshing_remove_unreferenced_vertices")
+        for _ in range(ROUNDS):
+            self.make_manifold()
+            self.close()
+            if self.is_done():
+                break
+        return True
+
     def self_intersecting(self):
         self.apply("compute_selection_by_self_intersections_per_face")
         return self.meshes.current_mesh().selected_face_number()
 
 
-def repair(source, target, stages, self_intersections):
+def repair(source, target, stages, self_intersections, resolve):
     work = Repair(source)
     stages.end("load")
     work.weld()
@@ -81,6 +95,11 @@ def repair(source, target, stages, self_intersections):
         if work.is_done():
             break
     stages.end("rounds of closing")
+    if resolve:
+        for _ in range(ROUNDS):
+            if not work.resolve():
+                break
+        stages.end("rounds of resolving")
     work.orient()
     stages.end("orient")
     if self_intersections:
@@ -90,4 +109,4 @@ def repair(source, target, stages, self_intersections):
     stages.end("save")
 
 
-run(repair, "self-intersections")
+run(repair, "self-intersections", "resolve")

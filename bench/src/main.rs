@@ -43,6 +43,9 @@ enum Task {
         /// Print one JSON object (needs a reference).
         #[arg(long, requires = "reference")]
         json: bool,
+        /// Look for self-intersections and for what is inside out, too, and say only what keeps the file from being printed.
+        #[arg(long, conflicts_with_all = ["reference", "json"])]
+        solid: bool,
     },
     /// Draw binary STL files side by side into a PNG: the outside grey, the inside orange.
     Picture(picture::Options),
@@ -57,6 +60,25 @@ enum Task {
         /// Go on where the raw file ends.
         #[arg(long)]
         resume: bool,
+        #[command(flatten)]
+        options: Closing,
+    },
+    /// Ask suture and its peers for a solid of every STL file of a folder, and publish what came out.
+    Solids {
+        /// A folder of STL files.
+        folder: PathBuf,
+        /// Which programs; what others made of the files already stays on the page.
+        #[arg(long, value_delimiter = ',', default_values_t = Side::SOLID)]
+        sides: Vec<Side>,
+        /// Leave larger files out.
+        #[arg(long, value_name = "MB", default_value_t = 60)]
+        up_to: u64,
+        /// Only so many files, the smallest ones.
+        #[arg(long, value_name = "FILES")]
+        smallest: Option<usize>,
+        /// Run what is in the raw file already, by the very same program.
+        #[arg(long)]
+        again: bool,
         #[command(flatten)]
         options: Closing,
     },
@@ -158,18 +180,23 @@ impl std::str::FromStr for Peer {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        if name == "all" { Ok(Self(Side::ALL.into())) } else { name.parse().map(|side| Self(vec![side])) }
+        let all = || Side::ALL.into_iter().filter(|side| !side.is_for_solids_alone()).collect();
+        if name == "all" { Ok(Self(all())) } else { name.parse().map(|side| Self(vec![side])) }
     }
 }
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().task {
         Task::Generate { case, triangles, out, seed } => generate_file(case, triangles, &out, seed),
-        Task::Judge { file, reference, json } => judge_file(&file, reference.as_deref(), json),
+        Task::Judge { file, solid: true, .. } => judge_solid(&file),
+        Task::Judge { file, reference, json, .. } => judge_file(&file, reference.as_deref(), json),
         Task::Picture(options) => picture::draw(&options).map(|()| ExitCode::SUCCESS),
         Task::Compare(choices) => compare_all(*choices),
         Task::Shape(choices) => closing(choices, "shape", false, compare::closing::shapes),
         Task::Close { folder, resume, options } => close_files(&folder, resume, options),
+        Task::Solids { folder, sides, up_to, smallest, again, options } => {
+            make_solids(&folder, &sides, up_to, smallest, again, options)
+        }
         Task::Publish(choices) => publish(choices.results.as_deref()).map(|()| ExitCode::SUCCESS),
     };
     done.unwrap_or_else(|error| {
@@ -209,6 +236,15 @@ fn judge_file(file: &Path, reference: Option<&Path>, json: bool) -> Result<ExitC
     Ok(ExitCode::from(u8::from(!judgement.sound())))
 }
 
+fn judge_solid(file: &Path) -> Result<ExitCode, Box<dyn Error>> {
+    let found = judge::solid(file)?;
+    match found.fault() {
+        Some(fault) => println!("not printable: {} ({} triangles cross or overlap)", fault.name(), found.meeting),
+        None => println!("printable"),
+    }
+    Ok(ExitCode::from(u8::from(found.fault().is_some())))
+}
+
 /// Makes the raw file `name`, then the page.
 fn closing(
     choices: Closing,
@@ -231,11 +267,34 @@ fn closing(
 
 /// Over all STL files of a folder, in the order of their names.
 fn close_files(folder: &Path, resume: bool, choices: Closing) -> Result<ExitCode, Box<dyn Error>> {
+    let files = stl_files(folder)?;
+    closing(choices, "closing", resume, |options| compare::closing::files(options, &files))
+}
+
+/// The STL files of a folder, by name.
+fn stl_files(folder: &Path) -> Result<Vec<PathBuf>, Box<dyn Error>> {
     let entries = std::fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
     files.retain(|path| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("stl")));
     files.sort();
-    closing(choices, "closing", resume, |options| compare::closing::files(options, &files))
+    Ok(files)
+}
+
+/// Over the STL files of a folder that are not too large, the smallest first: the raw file is always gone on with.
+fn make_solids(
+    folder: &Path,
+    sides: &[Side],
+    megabytes: u64,
+    smallest: Option<usize>,
+    again: bool,
+    choices: Closing,
+) -> Result<ExitCode, Box<dyn Error>> {
+    let size = |path: &PathBuf| path.metadata().map_or(u64::MAX, |facts| facts.len());
+    let mut files = stl_files(folder)?;
+    files.retain(|path| size(path) <= megabytes * 1_000_000);
+    files.sort_by_key(size);
+    files.truncate(smallest.unwrap_or(usize::MAX));
+    closing(choices, "solids", true, |options| compare::solids::solids(options, &files, sides, again))
 }
 
 /// The command line as it is published.

@@ -6,6 +6,7 @@ use suture_bench::generate::Case;
 
 use super::closing::{Closed, Shaped};
 use super::record::{Input, Line, Outcome, Run, Session, Way, read};
+use super::solids::Solved;
 use super::statistics::Spread;
 use super::{Cost, Error, Side};
 
@@ -38,6 +39,15 @@ impl Chapter {
 
     pub(super) fn closed(&self) -> impl Iterator<Item = &Closed> {
         self.lines.iter().filter_map(|line| if let Line::Closed(closed) = line { Some(closed) } else { None })
+    }
+
+    pub(super) fn solved(&self) -> impl Iterator<Item = &Solved> {
+        self.lines.iter().filter_map(|line| if let Line::Solved(solved) = line { Some(&**solved) } else { None })
+    }
+
+    #[cfg(test)]
+    pub(super) fn of(name: &str, lines: Vec<Line>) -> Self {
+        Self { name: name.into(), lines }
     }
 
     fn runs<'a, 'i>(&'a self, input: &'i Input) -> impl Iterator<Item = &'a Run> + use<'a, 'i> {

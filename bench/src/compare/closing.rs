@@ -128,23 +128,25 @@ pub(crate) struct Options {
     pub(crate) command: String,
 }
 
+/// Who closes holes.
+const SIDES: [Side; 3] = [Side::Suture, Side::PymeshlabCompetent, Side::Meshlib];
+
 /// The programs that are there, a folder to work in, and a journal that begins with this session.
-struct Bench {
-    programs: Programs,
-    folder: tempfile::TempDir,
-    journal: Journal,
+pub(super) struct Bench {
+    pub(super) programs: Programs,
+    pub(super) folder: tempfile::TempDir,
+    pub(super) journal: Journal,
 }
 
 impl Bench {
-    fn open(options: &Options) -> Result<Self, Error> {
-        let sides = [Side::Suture, Side::PymeshlabCompetent, Side::Meshlib];
-        let programs = Programs::prepare(&sides, options.suture.clone())?;
+    pub(super) fn open(options: &Options, sides: &[Side]) -> Result<Self, Error> {
+        let programs = Programs::prepare(sides, options.suture.clone())?;
         let folder = tempfile::tempdir().map_err(Error::io("making a folder"))?;
         let mut journal = Journal::open(&options.raw, options.resume)?;
         let machine = Machine::describe(folder.path(), programs.versions());
         let began = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
         journal.write(Line::Session(Session { began, command: options.command.clone(), machine }))?;
-        for side in sides {
+        for &side in sides {
             if let Some(reason) = programs.lack(side) {
                 eprintln!("{} is left out: {reason}", side.facts().name);
                 journal.write(Line::Skipped { side, reason })?;
@@ -153,7 +155,7 @@ impl Bench {
         Ok(Self { programs, folder, journal })
     }
 
-    fn has(&self, side: Side) -> bool {
+    pub(super) fn has(&self, side: Side) -> bool {
         self.programs.lack(side).is_none()
     }
 
@@ -178,7 +180,7 @@ fn said_whatever(command: &mut Command) -> serde_json::Value {
 /// # Errors
 /// When suture cannot be built, or the system fails.
 pub(crate) fn shapes(options: &Options) -> Result<(), Error> {
-    let mut bench = Bench::open(options)?;
+    let mut bench = Bench::open(options, &SIDES)?;
     let folder = bench.folder.path().to_owned();
     let inputs = folder.join("in");
     std::fs::create_dir(&inputs).map_err(Error::io("making a folder of inputs"))?;
@@ -280,15 +282,14 @@ impl Drawn {
 /// # Errors
 /// When suture cannot be built, or the system fails. A file that is no STL is named and left out.
 pub(crate) fn files(options: &Options, files: &[PathBuf]) -> Result<(), Error> {
-    let mut bench = Bench::open(options)?;
+    let mut bench = Bench::open(options, &SIDES)?;
     let (input, output) = (bench.folder.path().join("in.stl"), bench.folder.path().join("out.stl"));
     for path in files {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let is_done = |side: Side| {
             bench.journal.lines.iter().any(|line| matches!(line, Line::Closed(done) if done.file == name && done.side == side))
         };
-        let sides = [Side::Suture, Side::PymeshlabCompetent, Side::Meshlib];
-        let due: Vec<_> = sides.into_iter().filter(|&side| bench.has(side) && !is_done(side)).collect();
+        let due: Vec<_> = SIDES.into_iter().filter(|&side| bench.has(side) && !is_done(side)).collect();
         if due.is_empty() {
             continue;
         }

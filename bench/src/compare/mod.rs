@@ -14,10 +14,12 @@ pub(crate) mod closing;
 mod machine;
 mod page;
 mod page_closing;
+mod page_solids;
 mod plot;
 mod programs;
 mod record;
 mod sides;
+pub(crate) mod solids;
 mod statistics;
 mod trial;
 

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::book::{Book, did_its_work};
 use super::machine::Machine;
 use super::page_closing;
+use super::page_solids;
 use super::record::{Cache, Input, Judged, Outcome, Way, is_good};
 use super::sides::LICENCES;
 use super::statistics::{Spread, number, short as short_number, spaced};
@@ -38,6 +39,7 @@ pub(super) fn page(book: &Book, plots: &[(String, String)]) -> String {
     page += &searches(book);
     page += &page_closing::shapes(book);
     page += &page_closing::files(book);
+    page += &page_solids::solids(book);
     for input in book.inputs() {
         page += &of_input(book, input);
     }
@@ -51,7 +53,8 @@ fn peers(book: &Book) -> String {
     let mut page = String::from("\n## What ran\n\n| name | what it is | licence |\n|---|---|---|\n");
     let inputs = book.inputs();
     for side in Side::ALL {
-        let ran = inputs.iter().any(|input| book.ways(input).iter().any(|way| way.side == side));
+        let ran = book.chapters.iter().flat_map(|chapter| chapter.solved()).any(|line| line.side == side)
+            || inputs.iter().any(|input| book.ways(input).iter().any(|way| way.side == side));
         let name = side.facts().name;
         let licence = LICENCES.iter().find(|(peer, _)| name.starts_with(peer)).map_or("", |(_, licence)| licence);
         if ran {

@@ -23,16 +23,16 @@ const NAMES: i32 = 190;
 /// One colour a tool, whatever the plot; blues and greens are Suture's.
 fn colour(side: Side) -> RGBColor {
     match side {
-        Side::Suture | Side::Inspect => RGBColor(0, 90, 181),
+        Side::Suture | Side::SutureOff | Side::Inspect => RGBColor(0, 90, 181),
         Side::SutureNoSi | Side::InspectNoSi => RGBColor(0, 158, 142),
         Side::Cp | Side::CpSynced => RGBColor(120, 124, 132),
         Side::PymeshlabPlain | Side::PymeshlabPlainSi => RGBColor(230, 130, 0),
-        Side::PymeshlabCompetent | Side::PymeshlabCompetentSi => RGBColor(200, 60, 20),
-        Side::Meshlib | Side::MeshlibDetect => RGBColor(140, 60, 170),
+        Side::PymeshlabCompetent | Side::PymeshlabCompetentSi | Side::PymeshlabSolid => RGBColor(200, 60, 20),
+        Side::Meshlib | Side::MeshlibDetect | Side::MeshlibSolid => RGBColor(140, 60, 170),
         Side::Pymeshfix => RGBColor(190, 50, 120),
         Side::Admesh => RGBColor(110, 80, 40),
         Side::Trimesh => RGBColor(170, 150, 30),
-        Side::Manifold3d => RGBColor(90, 140, 60),
+        Side::Manifold3d | Side::Manifold3dUnion => RGBColor(90, 140, 60),
     }
 }
 

@@ -106,6 +106,24 @@ impl Programs {
         command
     }
 
+    /// What runs when `side` does: its version, and the hash of its binary or script, so that two that may differ have two names.
+    ///
+    /// # Errors
+    /// When the binary or the script cannot be read.
+    pub(super) fn identity(&self, side: Side) -> Result<String, Error> {
+        let (name, path) = match side.facts().program {
+            Program::Python { script, package } => {
+                let version = self.packages.get(package).map_or("", String::as_str);
+                (format!("{package} {version}"), home().join("pipelines").join(script))
+            }
+            Program::Suture => ("suture".into(), self.suture.clone().unwrap_or_else(|| "suture".into())),
+            Program::Admesh => return Ok(self.admesh.clone().unwrap_or_default()),
+            Program::Copy => return Ok("cp".into()),
+        };
+        let bytes = std::fs::read(&path).map_err(Error::io(format!("reading {}", path.display())))?;
+        Ok(format!("{name} {:.12}", blake3::hash(&bytes).to_hex()))
+    }
+
     /// A script of `pipelines/`, its arguments still to be given.
     pub(super) fn script(&self, name: &str) -> Command {
         let mut command = Command::new(self.python.as_deref().unwrap_or(Path::new("python3")));

@@ -10,6 +10,7 @@ use suture_bench::Counts;
 use suture_bench::judge::{Judgement, Kept};
 
 use super::closing::{Closed, Shaped};
+use super::solids::Solved;
 use super::{Cost, Error, Machine, Side};
 
 /// A line of a raw file.
@@ -23,6 +24,7 @@ pub(crate) enum Line {
     Outcome(Outcome),
     Shaped(Shaped),
     Closed(Closed),
+    Solved(Box<Solved>),
     /// Something was left out, and why.
     Skipped {
         side: Side,
@@ -195,6 +197,23 @@ impl Journal {
         Ok(Self { file: file.map_err(Error::io(action()))?, path: path.into(), lines })
     }
 
+    /// Drops those lines that `keep` says no to, in the file as well: all at once, so that it is never half of what it was.
+    pub(super) fn retain(&mut self, keep: impl Fn(&[Line]) -> Vec<bool>) -> Result<(), Error> {
+        let mut kept = keep(&self.lines).into_iter();
+        self.lines.retain(|_| kept.next().unwrap_or(true));
+        let mut text = String::new();
+        for line in &self.lines {
+            text += &serde_json::to_string(line)?;
+            text.push('\n');
+        }
+        let action = || format!("writing {}", self.path.display());
+        let fresh = self.path.with_extension("new");
+        std::fs::write(&fresh, text).map_err(Error::io(action()))?;
+        std::fs::rename(&fresh, &self.path).map_err(Error::io(action()))?;
+        self.file = File::options().append(true).open(&self.path).map_err(Error::io(action()))?;
+        Ok(())
+    }
+
     pub(super) fn write(&mut self, line: Line) -> Result<(), Error> {
         let text = serde_json::to_string(&line)? + "\n";
         self.lines.push(line);
@@ -253,6 +272,11 @@ mod tests {
         assert_eq!(journal.lines.len(), 1);
         journal.write(run(1)).unwrap();
         assert_eq!(read(&path).unwrap().len(), 2);
+        journal.retain(|lines| vec![false; lines.len() - 1]).unwrap();
+        journal.write(run(2)).unwrap();
+        let rounds: Vec<_> =
+            read(&path).unwrap().iter().map(|line| if let Line::Run(run) = line { run.round } else { 9 }).collect();
+        assert_eq!(rounds, [1, 2]);
         assert!(Journal::open(&path, false).unwrap().lines.is_empty());
         assert_eq!(read(&path).unwrap().len(), 0);
     }

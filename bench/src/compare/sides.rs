@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// A program with its settings, in the order in which they take their turns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Side {
     /// `cp`.
@@ -29,6 +29,14 @@ pub(crate) enum Side {
     Admesh,
     Trimesh,
     Manifold3d,
+    /// `suture repair --guarantee off`.
+    SutureOff,
+    /// As competent, and self-intersecting faces are replaced.
+    PymeshlabSolid,
+    /// MeshLib's own repairs, self-intersections included.
+    MeshlibSolid,
+    /// All parts united.
+    Manifold3dUnion,
 }
 
 /// Whose program it is.
@@ -100,7 +108,7 @@ const PYMESHLAB_SI: Option<&str> = Some("--self-intersections");
 pub(super) const NO_SI: &str = "--no-self-intersections";
 
 impl Side {
-    pub(crate) const ALL: [Self; 16] = [
+    pub(crate) const ALL: [Self; 20] = [
         Self::Cp,
         Self::CpSynced,
         Self::Suture,
@@ -117,7 +125,20 @@ impl Side {
         Self::Admesh,
         Self::Trimesh,
         Self::Manifold3d,
+        Self::SutureOff,
+        Self::PymeshlabSolid,
+        Self::MeshlibSolid,
+        Self::Manifold3dUnion,
     ];
+
+    /// Those that are asked for a solid from any file, each with the settings that get it furthest.
+    pub(crate) const SOLID: [Self; 6] =
+        [Self::Suture, Self::SutureOff, Self::PymeshlabSolid, Self::MeshlibSolid, Self::Pymeshfix, Self::Manifold3dUnion];
+
+    /// Measured only where solids are asked for: what comes out matters there, and not how fast.
+    pub(crate) fn is_for_solids_alone(self) -> bool {
+        matches!(self, Self::SutureOff | Self::PymeshlabSolid | Self::MeshlibSolid | Self::Manifold3dUnion)
+    }
 
     pub(crate) fn facts(self) -> Facts {
         match self {
@@ -194,6 +215,30 @@ impl Side {
                 about: "merge vertices, make a manifold; refuses what is not nearly one",
                 ..PLAIN
             },
+            Self::SutureOff => Facts {
+                name: "suture-off",
+                flag: Some("--guarantee=off"),
+                about: "`suture repair --guarantee off`: nothing is wrapped",
+                ..SUTURE
+            },
+            Self::PymeshlabSolid => Facts {
+                name: "pymeshlab-solid",
+                flag: Some("--resolve"),
+                about: "pymeshlab-competent, and then up to three rounds of deleting self-intersecting faces and closing what that opens",
+                ..COMPETENT
+            },
+            Self::MeshlibSolid => Facts {
+                name: "meshlib-solid",
+                program: Program::Python { script: "meshlib_solid.py", package: "meshlib" },
+                about: "MeshLib: unite close vertices, multiple edges, degenerate faces, holes, self-intersections cut and filled, holes",
+                ..PLAIN
+            },
+            Self::Manifold3dUnion => Facts {
+                name: "manifold3d-union",
+                flag: Some("--union"),
+                about: "the same, and all parts united",
+                ..Self::Manifold3d.facts()
+            },
         }
     }
 
@@ -221,6 +266,12 @@ pub(crate) const LICENCES: [(&str, &str); 6] = [
     ("trimesh", "MIT"),
     ("manifold3d", "Apache-2.0"),
 ];
+
+impl std::fmt::Display for Side {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.write_str(self.facts().name)
+    }
+}
 
 impl std::str::FromStr for Side {
     type Err = String;

@@ -44,13 +44,19 @@ impl Tree {
     }
 
     /// Infinite from an empty mesh. About O(log n) for a point that is near.
+    #[cfg(test)]
     pub(crate) fn distance(&self, p: Vector) -> f64 {
+        self.distance_above(p, 0.0)
+    }
+
+    /// The distance, if it is more than `floor`, else any number up to that: what is near enough is not looked for to the end.
+    fn distance_above(&self, p: Vector, floor: f64) -> f64 {
         let mut best = f64::INFINITY;
-        self.nearer(p, 0, 0, self.triangles.len(), &mut best);
+        self.nearer(p, floor, 0, 0, self.triangles.len(), &mut best);
         best
     }
 
-    fn nearer(&self, p: Vector, node: usize, from: usize, to: usize, best: &mut f64) {
+    fn nearer(&self, p: Vector, floor: f64, node: usize, from: usize, to: usize, best: &mut f64) {
         if to - from <= LEAF {
             for &t in &self.triangles[from..to] {
                 *best = best.min(to_triangle(p, t));
@@ -63,8 +69,8 @@ impl Tree {
             halves.swap(0, 1);
         }
         for (away, (node, from, to)) in halves {
-            if away < *best {
-                self.nearer(p, node, from, to, best);
+            if away < *best && *best > floor {
+                self.nearer(p, floor, node, from, to, best);
             }
         }
     }
@@ -97,7 +103,7 @@ fn to_segment(p: Vector, a: Vector, b: Vector) -> f64 {
 pub(crate) fn farthest(from: &[Triangle], to: &Tree) -> f64 {
     let middle = |t: &Triangle| std::array::from_fn(|k| t.iter().map(|p| f64::from(p[k])).sum::<f64>() / 3.0);
     let corners = from.as_flattened().iter().map(|&p| wide(p));
-    corners.chain(from.iter().map(middle)).map(|p| to.distance(p)).fold(0.0, f64::max)
+    corners.chain(from.iter().map(middle)).fold(0.0, |far, p| to.distance_above(p, far).max(far))
 }
 
 #[cfg(test)]

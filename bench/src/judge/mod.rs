@@ -3,12 +3,18 @@
 //!
 //! Vertices are identified by exact f32 coordinates (−0.0 = 0.0), as a slicer does; nothing is tolerated, nothing merged.
 //! Triangles with a coordinate that is no number are dropped and counted; triangles with a repeated vertex are counted and left
-//! out of everything else. Self-intersection is not looked for.
+//! out of everything else. [`judge`] does not look for self-intersections; [`solid`] does, and says whether a file can be printed.
+//! [`Bodies`] tells which bodies of a mesh are still in another one.
 //!
 //! O(n log n) time, about 100 bytes of memory a triangle.
 
+mod bodies;
+mod boxes;
 mod exact;
 mod kept;
+mod meet;
+mod shells;
+mod solid;
 mod stl;
 mod topology;
 
@@ -16,8 +22,13 @@ use std::path::Path;
 
 use crate::Counts;
 
+pub use bodies::{Bodies, Found as BodiesFound};
 pub use kept::{Kept, Same, kept_in_order};
+pub use solid::{Fault, Solid, solid};
 pub use stl::{Error, Result};
+
+/// Three corners.
+pub type Triangle = [[f32; 3]; 3];
 
 /// What a mesh file holds.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -46,6 +46,8 @@ pub(super) struct Records {
     path: PathBuf,
     reader: BufReader<File>,
     pub(super) count: u32,
+    /// The header begins with `solid`, as a text does: whoever goes by that word misreads the file.
+    pub(super) solid: bool,
 }
 
 impl Records {
@@ -71,7 +73,8 @@ impl Records {
         if count > Self::MOST {
             return Err(Error::TooMany { path: path.into(), triangles: count.into() });
         }
-        Ok(Self { path: path.into(), reader, count })
+        let solid = header[..5].eq_ignore_ascii_case(b"solid");
+        Ok(Self { path: path.into(), reader, count, solid })
     }
 
     /// Calls `each` with every record and its number.
@@ -86,6 +89,12 @@ impl Records {
 }
 
 impl Soup {
+    pub(super) fn of(triangles: &[super::Triangle]) -> Self {
+        let mut soup = Self { corners: Vec::with_capacity(3 * triangles.len()), nonfinite: 0 };
+        triangles.iter().for_each(|&triangle| soup.push(triangle));
+        soup
+    }
+
     pub(super) fn read(path: &Path) -> Result<Self> {
         let records = Records::open(path)?;
         let mut soup = Self { corners: Vec::with_capacity(3 * records.count as usize), nonfinite: 0 };

@@ -51,7 +51,25 @@ struct Mesh {
     faces: Vec<[u32; 3]>,
 }
 
+/// Triangles by the components that they belong to. Triangles with a repeated vertex are left out.
+pub(super) struct Components {
+    pub(super) triangles: Vec<[[f32; 3]; 3]>,
+    /// By triangle, the number of its component; numbers follow each other in the order of their first triangles.
+    pub(super) of: Vec<u32>,
+    /// By triangle: one of its edges is not used equally often in each direction.
+    pub(super) leaky: Vec<bool>,
+    /// By component: none of its triangles is leaky.
+    pub(super) sealed: Vec<bool>,
+    /// By component, the signed volume about the centre of the whole box.
+    pub(super) volumes: Vec<f64>,
+}
+
 pub(super) fn judge(soup: Soup) -> Judgement {
+    examine(soup).0
+}
+
+/// The judgement, and what it was made from.
+pub(super) fn examine(soup: Soup) -> (Judgement, Components) {
     let nonfinite = soup.nonfinite;
     let triangles = soup.corners.len() as u64 / 3;
     let mesh = weld(soup);
@@ -61,9 +79,14 @@ pub(super) fn judge(soup: Soup) -> Judgement {
     let uses = edge_uses(&mesh.faces);
     let (mut components, leaky) = edges(&mesh, &uses, &mut counts);
     counts.nonmanifold_vertices = fans(&mesh, &uses);
-    let (volume, positive_bodies, negative_bodies) = volumes(&mesh, &mut components, &leaky);
+    let components = volumes(&mesh, &mut components, leaky);
+    let volume = components.volumes.iter().sum();
+    let of_sign = |is: fn(f64) -> bool| {
+        components.sealed.iter().zip(&components.volumes).filter(|&(&sealed, &volume)| sealed && is(volume)).count() as u64
+    };
+    let (positive_bodies, negative_bodies) = (of_sign(|volume| volume > 0.0), of_sign(|volume| volume < 0.0));
     let vertices = mesh.positions.len() as u64;
-    Judgement { counts, nonfinite, vertices, volume, positive_bodies, negative_bodies }
+    (Judgement { counts, nonfinite, vertices, volume, positive_bodies, negative_bodies }, components)
 }
 
 impl Mesh {
@@ -178,8 +201,8 @@ fn fans(mesh: &Mesh, uses: &[Use]) -> u64 {
     nonmanifold.into_iter().filter(|&bad| bad).count() as u64
 }
 
-/// The signed volume about the centre of the box, and how many sealed components have a positive and a negative one.
-fn volumes(mesh: &Mesh, components: &mut Sets, leaky: &[bool]) -> (f64, u64, u64) {
+/// Gives every component a number, and finds its volume and whether it is sealed.
+fn volumes(mesh: &Mesh, sets: &mut Sets, leaky: Vec<bool>) -> Components {
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for position in &mesh.positions {
         for axis in 0..3 {
@@ -188,22 +211,27 @@ fn volumes(mesh: &Mesh, components: &mut Sets, leaky: &[bool]) -> (f64, u64, u64
         }
     }
     let centre: [f64; 3] = std::array::from_fn(|axis| (low[axis] + high[axis]) / 2.0);
-    let mut total = 0.0;
-    let mut parts = vec![0.0; mesh.faces.len()];
-    let mut sealed = vec![true; mesh.faces.len()];
-    for (index, face) in mesh.faces.iter().enumerate() {
-        let [a, b, c] = mesh.corners(face).map(|p| std::array::from_fn::<_, 3, _>(|axis| f64::from(p[axis]) - centre[axis]));
-        let volume =
-            (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])) / 6.0;
-        let root = components.of(index as u32) as usize;
-        total += volume;
-        parts[root] += volume;
-        sealed[root] &= !leaky[index];
+    let triangles: Vec<_> = mesh.faces.iter().map(|face| mesh.corners(face)).collect();
+    let mut found = Components { triangles, of: Vec::with_capacity(leaky.len()), leaky, sealed: Vec::new(), volumes: Vec::new() };
+    for (index, triangle) in found.triangles.iter().enumerate() {
+        // The smallest triangle names the set, so that it is met first.
+        let root = sets.of(index as u32) as usize;
+        let component = if root == index { found.volumes.len() as u32 } else { found.of[root] };
+        if root == index {
+            found.volumes.push(0.0);
+            found.sealed.push(true);
+        }
+        found.of.push(component);
+        found.volumes[component as usize] += volume_about(centre, *triangle);
+        found.sealed[component as usize] &= !found.leaky[index];
     }
-    let whole = |index: usize| components.0[index] == index as u32 && sealed[index];
-    let positive = (0..parts.len()).filter(|&i| whole(i) && parts[i] > 0.0).count() as u64;
-    let negative = (0..parts.len()).filter(|&i| whole(i) && parts[i] < 0.0).count() as u64;
-    (total, positive, negative)
+    found
+}
+
+/// Signed volume of the tetrahedron over a triangle.
+pub(super) fn volume_about(centre: [f64; 3], triangle: [[f32; 3]; 3]) -> f64 {
+    let [a, b, c] = triangle.map(|p| std::array::from_fn::<_, 3, _>(|axis| f64::from(p[axis]) - centre[axis]));
+    (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])) / 6.0
 }
 
 #[cfg(test)]

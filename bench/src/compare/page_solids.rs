@@ -16,7 +16,8 @@ Every STL file of a folder, given to all as the same binary STL. *Printable* is 
 bytes that were written (`src/judge/solid.rs`; it shares no code with Suture, and its signs are exact): vertices of equal coordinates
 are one, every edge has two triangles that agree on what is outside, every vertex one fan, no two triangles have a segment in common
 that is not an edge of both, nor an area, and no component is inside out. *Encloses* says of how many files some component encloses a
-volume, as it is or with its rims closed: of the others no solid can be made, and shares are of these. *Kept* is the share of a file's
+volume, as it is or with its rims closed: of the others no solid can be made, and shares are of these. *Spoilt* are files that were
+printable as they came, and are not any more. *Kept* is the share of a file's
 triangles that are in the output bit by bit, in the same direction. *Distance* is the largest one from the corners and middles of the
 triangles of either mesh to the other, as a share of the diagonal: filling a wide hole also counts. Both are means over what is
 printable, the worst file in brackets. *Bodies lost* is the number of files in which a closed component of more than a millionth
@@ -34,8 +35,8 @@ pub(super) fn solids(book: &Book) -> String {
         return String::new();
     }
     let mut page = format!("\n## Solids of real files\n\n{ABOUT}\n");
-    page += "| | files | encloses | written | printable | share | wrapped | needs review | over the time | bodies lost | kept | distance | seconds, median (most) |\n\
-             |---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
+    page += "| | files | encloses | written | printable | share | spoilt | wrapped | needs review | over the time | bodies lost | kept | distance | seconds, median (most) |\n\
+             |---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
     for side in Side::SOLID {
         let lines: Vec<_> = files.values().filter_map(|sides| sides.get(&side).copied()).collect();
         if !lines.is_empty() {
@@ -66,6 +67,7 @@ fn row(side: Side, lines: &[&Solved]) -> Vec<String> {
         count(&|line| line.after.is_some()).to_string(),
         count(&|line| line.is_printable()).to_string(),
         format!("{:.1} %", 100.0 * both as f64 / may.max(1) as f64),
+        count(&|line| line.before.is_none() && !line.is_printable()).to_string(),
         of_report(is_wrapped),
         of_report(|line| line.report.as_ref().is_some_and(|report| report.outcome == "needs_review")),
         count(&|line| line.end.starts_with("over")).to_string(),
@@ -233,7 +235,7 @@ mod tests {
         let page = solids(&book(vec![old, line("a", Side::Suture, Some(0), 0.8, 0.02)]));
         assert!(
             page.contains(
-                "| suture | 1 | 1 | 1 | 1 | 100.0 % | 0 | 0 | 0 | 0 (0) | 80.000 % (80.00 %) | 2.000 % (2.00 %) | 1.00 (1.00) |"
+                "| suture | 1 | 1 | 1 | 1 | 100.0 % | 0 | 0 | 0 | 0 | 0 (0) | 80.000 % (80.00 %) | 2.000 % (2.00 %) | 1.00 (1.00) |"
             ),
             "{page}"
         );

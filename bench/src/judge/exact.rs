@@ -31,6 +31,11 @@ pub(super) fn side(plane: [[f32; 3]; 3], point: [f32; 3]) -> i8 {
     if sum.abs() > 8.0 * f64::EPSILON * size {
         return sign(sum);
     }
+    // Most that are in the plane are one of the three points, or in a plane along two axes with them.
+    let same = |k: usize| plane.iter().all(|p| p[k] == point[k]);
+    if plane.contains(&point) || (0..3).any(same) {
+        return 0;
+    }
     // The same determinant, multiplied out: 24 products of three f32, each as two numbers that are exact together.
     let mut terms = [0.0; 48];
     let mut at = 0;

@@ -4,7 +4,8 @@ Close vertices are merged with a tolerance relative to the model; folded faces a
 non-manifold repair and hole closing (any hole size, no self-intersecting patches) until the surface is closed and two-manifold,
 at most three; borders that do not quite meet are snapped in the first. At last the faces are oriented coherently and, where the
 enclosed volume is negative, all turned round. With --resolve there are up to three more rounds before that, in which self-intersecting
-faces are selected and deleted, and what that opens is repaired and closed as before. A filter that refuses the mesh is named on standard error and skipped. With
+faces are selected and deleted, and what that opens is repaired and closed as before; a file that is closed, two-manifold and free of
+self-intersection as it comes is only oriented. A filter that refuses the mesh is named on standard error and skipped. With
 --self-intersections the result's self-intersecting faces are selected before it is saved, which is how pymeshlab finds them.
 """
 
@@ -57,6 +58,10 @@ class Repair:
         measures = self.meshes.get_topological_measures()
         return measures["boundary_edges"] == 0 and measures["is_mesh_two_manifold"]
 
+    def is_sound(self):
+        self.apply("meshing_remove_duplicate_vertices")
+        return self.is_done() and self.self_intersecting() == 0
+
     def orient(self):
         self.apply("meshing_re_orient_faces_coherently")
         if self.meshes.current_mesh().face_number() and self.meshes.get_geometric_measures().get("mesh_volume", 1) < 0:
@@ -83,6 +88,18 @@ class Repair:
 def repair(source, target, stages, self_intersections, resolve):
     work = Repair(source)
     stages.end("load")
+    if not (resolve and work.is_sound()):
+        make_solid(work, stages, resolve)
+    work.orient()
+    stages.end("orient")
+    if self_intersections:
+        stages.facts["self-intersecting"] = work.self_intersecting()
+        stages.end("self-intersections")
+    work.meshes.save_current_mesh(target, binary=True)
+    stages.end("save")
+
+
+def make_solid(work, stages, resolve):
     work.weld()
     stages.end("weld")
     work.drop_bad_faces()
@@ -100,13 +117,6 @@ def repair(source, target, stages, self_intersections, resolve):
             if not work.resolve():
                 break
         stages.end("rounds of resolving")
-    work.orient()
-    stages.end("orient")
-    if self_intersections:
-        stages.facts["self-intersecting"] = work.self_intersecting()
-        stages.end("self-intersections")
-    work.meshes.save_current_mesh(target, binary=True)
-    stages.end("save")
 
 
 run(repair, "self-intersections", "resolve")

@@ -17,10 +17,10 @@ bytes that were written (`src/judge/solid.rs`; it shares no code with Suture, an
 are one, every edge has two triangles that agree on what is outside, every vertex one fan, no two triangles have a segment in common
 that is not an edge of both, nor an area, and no component is inside out. *Encloses* says of how many files some component encloses a
 volume, as it is or with its rims closed: of the others no solid can be made, and shares are of these. *Spoilt* are files that were
-printable as they came, and are not any more. *Kept* is the share of a file's
-triangles that are in the output bit by bit, in the same direction. *Distance* is the largest one from the corners and middles of the
-triangles of either mesh to the other, as a share of the diagonal: filling a wide hole also counts. Both are means over what is
-printable, the worst file in brackets. *Bodies lost* is the number of files in which a closed component of more than a millionth
+printable as they came, and are not any more. *Kept* is the share of a file's triangles that are in the output bit by bit, in the same
+direction. *Distance* is the largest one from the corners and middles of the triangles of either mesh to the other, as a share of the
+diagonal: filling a wide hole also counts. Both are means over the files of which a side made something printable, the worst one in
+brackets: who gives up on hard files has better means, so that the sides are beside each other file by file below. *Bodies lost* is the number of files in which a closed component of more than a millionth
 of the volume of all is gone: none of up to five points that lie deep inside of it, and in no cavity, has a winding number other than
 zero in the output; in brackets files in which some of these points are outside. It is looked at in everything that was written.
 ";
@@ -174,6 +174,9 @@ fn named(files: &Files, side: Side) -> String {
     });
     text += &list("bodies lost", &|line| line.bodies.is_some_and(|bodies| bodies.lost > 0), &|line| {
         line.bodies.map_or(String::new(), |bodies| format!("{} of {}", bodies.lost, bodies.of))
+    });
+    text += &list("points of a body outside", &|line| line.bodies.is_some_and(|bodies| bodies.part > 0), &|line| {
+        line.bodies.map_or(String::new(), |bodies| format!("of {} of {} bodies", bodies.part, bodies.of))
     });
     text += &list(
         "certified, but not printable by the judge",

@@ -114,6 +114,17 @@ pub(crate) fn kept(before: &[Triangle], after: &[Triangle]) -> usize {
     faces.iter().filter(|face| there.contains(*face)).count()
 }
 
+/// Those of `triangles` that do not stand in `other` with exactly equal corners, in whatever direction. O(n).
+pub(crate) fn not_in(triangles: &[Triangle], other: &[Triangle]) -> Vec<Triangle> {
+    let key = |triangle: &Triangle| {
+        let mut corners = triangle.map(|p| p.map(|x| (x + 0.0).to_bits()));
+        corners.sort_unstable();
+        corners
+    };
+    let there: HashSet<_> = other.iter().map(key).collect();
+    triangles.iter().copied().filter(|triangle| !there.contains(&key(triangle))).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -136,6 +147,9 @@ mod tests {
     #[test]
     fn a_turned_triangle_is_kept_and_a_flipped_one_is_not() {
         let [a, b, c, d]: [Point; 4] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        assert_eq!(kept(&[[a, b, c], [a, c, d], [b, c, d]], &[[c, a, b], [a, d, c], [c, d, b]]), 2);
+        let (before, after) = ([[a, b, c], [a, c, d], [b, c, d]], [[c, a, b], [a, d, c], [c, d, b]]);
+        assert_eq!(kept(&before, &after), 2);
+        assert_eq!(not_in(&before, &after), Vec::<Triangle>::new());
+        assert_eq!(not_in(&before, &after[1..]), [before[0]]);
     }
 }

@@ -60,6 +60,9 @@ impl Tree {
         if to - from <= LEAF {
             for &t in &self.triangles[from..to] {
                 *best = best.min(to_triangle(p, t));
+                if *best <= floor {
+                    return;
+                }
             }
             return;
         }
@@ -103,7 +106,9 @@ fn to_segment(p: Vector, a: Vector, b: Vector) -> f64 {
 pub(crate) fn farthest(from: &[Triangle], to: &Tree) -> f64 {
     let middle = |t: &Triangle| std::array::from_fn(|k| t.iter().map(|p| f64::from(p[k])).sum::<f64>() / 3.0);
     let corners = from.as_flattened().iter().map(|&p| wide(p));
-    corners.chain(from.iter().map(middle)).fold(0.0, |far, p| to.distance_above(p, far).max(far))
+    let points: Vec<_> = corners.chain(from.iter().map(middle)).collect();
+    // A few from everywhere first: beside what is as far as these, the others need not be looked at closely.
+    points.iter().step_by(61).chain(&points).fold(0.0, |far, &p| to.distance_above(p, far).max(far))
 }
 
 #[cfg(test)]

@@ -41,7 +41,9 @@ pub(crate) fn change(before: &[Triangle], after: &[Triangle]) -> Change {
         }
     }
     let diagonal = mesh::length(mesh::minus(hi, lo)).max(f64::MIN_POSITIVE);
-    let far = |from: &[Triangle], to: &[Triangle]| distance::farthest(from, &distance::Tree::new(to)) / diagonal;
+    // What stands in both is nowhere far away.
+    let far =
+        |from: &[Triangle], to: &[Triangle]| distance::farthest(&mesh::not_in(from, to), &distance::Tree::new(to)) / diagonal;
     let kept = mesh::kept(before, after) as f64 / before.len().max(1) as f64;
     Change { kept, taken: far(before, after), added: far(after, before) }
 }

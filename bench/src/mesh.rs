@@ -34,12 +34,13 @@ pub(crate) fn wide(p: Point) -> Vector {
     p.map(f64::from)
 }
 
-/// The finite triangles of an STL, binary (its length is what its count says) or ASCII.
+/// The finite triangles of an STL, binary (it has as many whole records as its count says, less than another one behind them is left
+/// out) or ASCII.
 pub(crate) fn read(path: &Path) -> Result<Vec<Triangle>, String> {
     let bytes = fs::read(path).map_err(|e| format!("{}: {e}", path.display()))?;
     let count = bytes.get(80..).and_then(|rest| rest.first_chunk()).map(|c| u32::from_le_bytes(*c) as usize);
     let body = bytes.get(84..).unwrap_or_default();
-    let mut triangles = if count.is_some_and(|count| body.len() == count * 50) {
+    let mut triangles = if count.is_some_and(|count| body.len() == count * 50 || count > 0 && body.len() / 50 == count) {
         let number = |record: &[u8], at: usize| f32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]]);
         let corners = |record: &[u8]| std::array::from_fn(|c| std::array::from_fn(|k| number(record, 12 + 12 * c + 4 * k)));
         body.chunks_exact(50).map(corners).collect()
@@ -136,6 +137,11 @@ mod tests {
         let triangle: Triangle = [[0.0, 1.5, -2.0], [1e-7, 0.1, 3.0], [4.0, 5.0, 6.0]];
         write(&path, &[triangle, [[f32::NAN; 3]; 3]]).unwrap();
         assert_eq!(read(&path).unwrap(), [triangle]);
+        let bytes = fs::read(&path).unwrap();
+        fs::write(&path, [&bytes[..], &[7]].concat()).unwrap();
+        assert_eq!(read(&path).unwrap(), [triangle]);
+        fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
+        assert!(read(&path).is_err());
         let text =
             "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 1.5 -2\nVERTEX 1e-7 0.1 3\nvertex 4 5 6\nendloop\nendfacet\n";
         fs::write(&path, text).unwrap();

@@ -186,4 +186,20 @@ mod tests {
         work.turn(3);
         assert_ne!(disagreeing(&mut work), 0);
     }
+
+    #[test]
+    fn a_turned_triangle_is_at_the_right_corner_in_every_star() {
+        let records = records(&plate(2, |_, _| true));
+        let mut d = diagnose(&records);
+        let mut work = Work::new(&mut d.shop);
+        (0..work.triangles.len() as u32).for_each(|t| work.turn(t));
+        let [a, b] = [work.triangles[0].v[1], work.triangles[0].v[2]];
+        let all = |work: &Work<'_>, v| work.star(v).all(|(t, corner)| work.triangles[t as usize].v[corner] == v);
+        assert!((0..work.positions.len() as Vertex).all(|v| all(&work, v)));
+        // Whatever is merged into another one, nothing else is.
+        let before: Vec<_> = work.triangles.iter().map(|t| t.v.map(|v| if v == b { a } else { v })).collect();
+        work.merge(a, b);
+        assert_eq!(work.triangles.iter().map(|t| t.v).collect::<Vec<_>>(), before);
+        assert!(all(&work, a));
+    }
 }

@@ -102,9 +102,15 @@ pub(crate) struct Shop {
     /// The whole star is here.
     pub(crate) complete: Vec<bool>,
     pub(crate) triangles: Vec<Triangle>,
-    /// First corner (3 · triangle + k) of each vertex, and the next one of the same vertex: a list for each star.
+    /// First corner (3 · triangle + k) of each vertex, and the next one of the same vertex: a list for each star. A triangle that was turned over
+    /// since has the vertex at another corner.
     heads: Vec<u32>,
     nexts: Vec<u32>,
+}
+
+/// Which corner of a triangle is `vertex`, of which a star list says that it was `corner` when the list was made.
+fn corner_of(triangle: &[Vertex; 3], vertex: Vertex, corner: usize) -> usize {
+    triangle.iter().position(|v| *v == vertex).unwrap_or(corner % 3)
 }
 
 /// Records that the disk is asked for together where the file does not stay in the page cache.
@@ -196,7 +202,8 @@ impl Shop {
         while corner != NONE {
             let at = corner as usize;
             corner = self.nexts[at];
-            self.triangles[at / 3].v[at % 3] = stay;
+            let v = &mut self.triangles[at / 3].v;
+            v[corner_of(v, go, at)] = stay;
             self.nexts[at] = self.heads[stay as usize];
             self.heads[stay as usize] = at as u32;
         }
@@ -237,7 +244,7 @@ impl Shop {
                 corner = self.nexts[at as usize];
                 let triangle = &self.triangles[(at / 3) as usize];
                 if triangle.alive && !has_repeated(triangle.v) {
-                    return Some((at / 3, (at % 3) as usize));
+                    return Some((at / 3, corner_of(&triangle.v, v, at as usize)));
                 }
             }
             None

@@ -429,7 +429,7 @@ fn is_zero(count: &u32) -> bool {
 pub enum Rung {
     /// Surfaces that cross were cut along each other, and rounded to single precision.
     Cut,
-    /// So they were, and on a coarser grid in the end.
+    /// So they were, and what was nearly one there was made one: short edges, and vertices close to faces or edges.
     Snapped,
     /// Surfaces that shared a vertex or an edge were taken apart.
     Separated,

@@ -118,45 +118,8 @@ impl State<'_, '_, '_> {
         displaced
     }
 
-    /// Brings the new vertices of these triangles to the grid, but for coordinates that old ones have: planes along the axes stay planes. Returns how
-    /// far one was moved.
-    pub(super) fn snap(&mut self, triangles: &BTreeSet<u32>) -> f64 {
-        let all = triangles.iter().flat_map(|t| self.work.triangles[*t as usize].v);
-        let old: BTreeSet<Vertex> = all.filter(|v| *v < self.first_vertex).collect();
-        let planes: [BTreeSet<u32>; 3] =
-            std::array::from_fn(|k| old.iter().map(|v| self.work.positions[*v as usize][k].to_bits()).collect());
-        let step = self.step;
-        let snapped = |p: [f32; 3]| -> [f32; 3] {
-            std::array::from_fn(|k| if planes[k].contains(&p[k].to_bits()) { p[k] } else { on_grid(f64::from(p[k]), step) })
-        };
-        let corners = triangles.iter().flat_map(|t| self.work.triangles[*t as usize].v);
-        let new: BTreeSet<Vertex> = corners.filter(|v| *v >= self.first_vertex && self.work.complete[*v as usize]).collect();
-        self.complete(new.iter().map(|v| snapped(self.work.positions[*v as usize])).collect());
-        let mut known = vertices(self.work);
-        let mut displaced = 0f64;
-        let mut moved: BTreeSet<u32> = BTreeSet::new();
-        for v in new {
-            let from = self.work.positions[v as usize];
-            let to = snapped(from);
-            if from == to {
-                continue;
-            }
-            let by = crate::shop::distance(from, to);
-            displaced = displaced.max(by);
-            for (t, _) in self.work.star(v) {
-                moved.insert(t);
-                self.track.moved(&self.clusters, t, by);
-            }
-            let stays = *known.entry(bits(to)).or_insert_with(|| self.work.add_vertex(to));
-            self.work.merge(stays, v);
-        }
-        let moved: Vec<u32> = moved.into_iter().collect();
-        self.clean(&moved);
-        displaced
-    }
-
     /// Takes out what came to nothing: these triangles have new vertices.
-    fn clean(&mut self, changed: &[u32]) {
+    pub(super) fn clean(&mut self, changed: &[u32]) {
         duplicates::drop_repeated(self.work);
         cancel(self.work, changed);
         let first = self.work.triangles.len() as u32;

@@ -9,9 +9,9 @@
 //! Where the surface was cut, new vertices are rounded to f32. Triangles that come to nothing by that leave every directed edge balanced, and
 //! what crosses after it is resolved in the next round, with what it crosses, from the f32 coordinates. (Near zero f32 has places far closer to
 //! each other than elsewhere, which are of no use: no place is finer than those at the file's largest coordinate, but for what has its place
-//! exactly.) Where that does not come to an end, the
-//! new vertices there are brought to a coarser grid, so that f32 has room between them (after Valque & Lazard, SGP 2025, and the
-//! iterated snap rounding of CGAL 6.1, which has 31 more bits). Rounds are counted, so that time decides nothing.
+//! exactly.) Before each round, features that are nearly one there are made one ([`near`]), the nearer the sooner, so that f32 has room
+//! between those that are left (the iterated snap rounding of Valque & Lazard, SGP 2025, and CGAL 6.1 brings vertices to a coarser grid
+//! instead, with 31 more bits). Rounds are counted, so that time decides nothing.
 //!
 //! Sheets that are open bound no material, and what crosses only them is left alone. Surfaces that cross each other, directly or by others, are a
 //! **cluster**: one that contradicts itself (it says two things about a cell), does not come to an end or would not be closed is left as
@@ -19,12 +19,13 @@
 
 mod cut;
 mod embed;
+mod near;
 mod sides;
 #[cfg(test)]
 mod tests;
 mod track;
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::Path;
 
 use self::cut::Cut;
@@ -96,26 +97,20 @@ impl std::fmt::Display for Failure {
     }
 }
 
-/// How rounds follow each other. Which way comes to an end sooner cannot be told beforehand: the next one is tried where one does not.
-struct Ladder {
-    /// Grids that new vertices are brought to, one after the other: their steps against the power of two above the largest coordinate. 2⁻²⁴ is
-    /// that of f32 there.
-    grids: &'static [f64],
-    /// Rounds of cutting and rounding from one grid to the next, and after the last.
-    rounds: u32,
-    /// New vertices stay on the grid that was reached; else they go to the first one.
-    stays: bool,
-}
+/// The step of new vertices, against the power of two above the largest coordinate: that of f32 there.
+const FINEST: f64 = 1.0 / 16_777_216.0;
 
-const LADDERS: [Ladder; 3] = [
-    Ladder { grids: &[1.0 / 16_777_216.0, 1.0 / 131_072.0, 1.0 / 16_384.0, 1.0 / 4096.0], rounds: 4, stays: false },
-    Ladder { grids: &[1.0 / 131_072.0, 1.0 / 16_384.0, 1.0 / 4096.0], rounds: 6, stays: true },
-    Ladder { grids: &[1.0 / 16_384.0, 1.0 / 8192.0, 1.0 / 4096.0, 1.0 / 2048.0], rounds: 6, stays: true },
-];
+/// Rounds of cutting and rounding.
+const ROUNDS: u32 = 16;
 
 /// Pairs may become more from round to round, but not more than so many times as many as at first, or as a few.
 const GROWTH: usize = 4;
 const FEW: usize = 1024;
+
+/// What is nearer than so many steps of the finest grid, after the first round of cutting, is made one, and so many times farther after every
+/// other one; but nothing beyond this share of the power of two above the largest coordinate.
+const WIDER: f64 = 4.0;
+const WIDEST: f64 = 1.0 / 4096.0;
 
 /// Times that everything is done anew without the clusters that failed.
 const ATTEMPTS: usize = 8;
@@ -156,6 +151,7 @@ pub(super) fn resolve(
     let mut regions_left: Vec<Unsettled> = Vec::new();
     let mut blocked: Vec<bool> = Vec::new();
     let (mut bodies, mut volume) = (0, 0);
+    let largest = above(survey.bounds.largest_coordinate());
     let mut state = State {
         survey,
         work,
@@ -164,10 +160,9 @@ pub(super) fn resolve(
         clusters: Clusters::default(),
         track: Track::default(),
         first_vertex: 0,
-        step: 0.0,
+        step: largest * FINEST,
     };
     let mut attempts = 0;
-    let mut ladders = LADDERS.iter();
     loop {
         attempts += 1;
         let pieces = orient::pieces(state.survey, state.work, state.reversed);
@@ -182,8 +177,7 @@ pub(super) fn resolve(
         state.clusters = Clusters::of(&pieces, &blocked);
         state.first_vertex = state.work.positions.len() as Vertex;
         let taken_part: Vec<bool> = (0..state.work.triangles.len() as u32).map(|t| state.clusters.holds(t)).collect();
-        let ladder = ladders.next().unwrap_or(&LADDERS[0]);
-        match state.attempt(engine, &overlay, &pairs, profile, ladder, means.limits.threads) {
+        match state.attempt(engine, &overlay, &pairs, profile, means.limits.threads) {
             Ok(resolved) => {
                 let pieces = orient::pieces(state.survey, state.work, state.reversed);
                 let (bodies_now, volume_now) = measured(&pieces);
@@ -199,9 +193,7 @@ pub(super) fn resolve(
                     ..resolved
                 });
             }
-            Err(Stuck { failure: Failure::Endless | Failure::Opened, .. }) if ladders.len() > 0 => state.restore(),
             Err(Stuck { failure, triangles }) => {
-                ladders = LADDERS.iter();
                 let failed = state.clusters.pieces_of(&triangles);
                 state.restore();
                 regions_left.extend(state.unsettled(&failed, failure));
@@ -298,6 +290,12 @@ struct Before {
     reversed: Reversed,
 }
 
+/// Pairs of triangles of the workshop that cross, and what they were found with.
+struct Met {
+    crossing: Vec<[u32; 2]>,
+    overlay: Overlay,
+}
+
 /// Which triangles are of surfaces that take part: closed before anything was cut, and not blocked.
 #[derive(Default)]
 pub(super) struct Clusters {
@@ -351,7 +349,7 @@ pub(super) struct State<'a, 'r, 'w> {
     track: Track,
     /// Vertices from here on are new ones.
     first_vertex: Vertex,
-    /// The step of the grid that they are on now.
+    /// They are on a grid of this step, but for what is exact in f32.
     step: f64,
 }
 
@@ -362,59 +360,49 @@ impl State<'_, '_, '_> {
         overlay: &Overlay,
         pairs: &[[u32; 2]],
         profile: &Profile,
-        ladder: &Ladder,
         threads: usize,
     ) -> Tried<Resolved> {
         let mut resolved = Resolved::default();
         self.track = Track::default();
-        let first_triangle = self.work.triangles.len() as u32;
         let too_many = || Stuck::with(Failure::TooMany);
         let mut crossing = self.crossing(overlay, pairs, profile);
         resolved.pairs = crossing.len() as u64;
         let most = crossing.len().max(FEW) * GROWTH;
         let mut latest: Option<Overlay> = None;
-        let largest = above(self.survey.bounds.largest_coordinate());
-        let mut grids = ladder.grids.iter().map(|share| share * largest);
-        let first = grids.next().unwrap_or(0.0);
-        self.step = first;
-        let mut rounds_left = ladder.rounds;
+        let mut width = self.step;
         while !crossing.is_empty() {
             let triangles: BTreeSet<u32> = crossing.iter().flatten().copied().collect();
-            if resolved.rounds > 0 && crossing.len() > most {
+            if resolved.rounds == ROUNDS || resolved.rounds > 0 && crossing.len() > most {
                 return Err(Stuck { failure: Failure::Endless, triangles: triangles.into_iter().collect() });
             }
             tracing::debug!(round = resolved.rounds, pairs = crossing.len(), triangles = triangles.len(), "Crossings.");
-            let mut first_new = self.work.triangles.len() as u32;
-            let snaps = rounds_left == 0;
-            self.track.crossed(self.work, &self.clusters, &triangles, resolved.rounds + 1, snaps);
-            if snaps {
-                let failed = || Stuck { failure: Failure::Endless, triangles: triangles.iter().copied().collect() };
-                self.step = grids.next().ok_or_else(failed)?;
-                rounds_left = ladder.rounds;
-                resolved.displaced = resolved.displaced.max(self.snap(&triangles));
-                if !ladder.stays {
-                    self.step = first;
-                }
-                // What was moved may cross anything.
-                first_new = first_triangle;
-            } else {
-                let along = self.with_edges_along(latest.as_ref().unwrap_or(overlay), &triangles).ok_or_else(too_many)?;
-                resolved.displaced = resolved.displaced.max(self.round(engine, &triangles, &along, threads)?);
-                rounds_left -= 1;
-            }
             resolved.rounds += 1;
-            self.check_closed()?;
-            let overlay = Overlay::of(self.survey, self.work, self.reversed).ok_or_else(too_many)?;
-            let met = overlay.met_by(self.survey, self.work, |t| t >= first_new).ok_or_else(too_many)?;
-            let pairs: Vec<[u32; 2]> = met.iter().map(|pair| pair.triangles).collect();
-            // What neither was cut nor moved crosses as it did.
-            let still = crossing.into_iter().filter(|pair| !snaps && pair.iter().all(|t| self.work.lives(*t)));
-            let still: Vec<[u32; 2]> = still.collect();
-            crossing = self.crossing(&overlay, &pairs, profile);
-            crossing.extend(still);
-            latest = Some(overlay);
+            self.track.crossed(self.work, &self.clusters, &triangles, resolved.rounds);
+            let along = self.with_edges_along(latest.as_ref().unwrap_or(overlay), &triangles).ok_or_else(too_many)?;
+            let first_new = self.work.triangles.len() as u32;
+            resolved.displaced = resolved.displaced.max(self.round(engine, &triangles, &along, threads)?);
+            let met = self.met(crossing, profile, |t| t >= first_new)?;
+            width = (width * WIDER).min(self.step / FINEST * WIDEST);
+            let (met, drawn) = self.draw_near(met, width, profile)?;
+            resolved.displaced = resolved.displaced.max(drawn);
+            (crossing, latest) = (met.crossing, Some(met.overlay));
         }
         Ok(resolved)
+    }
+
+    /// What crosses now, after these triangles have changed: the pairs that did before, of which neither has, still do.
+    fn met(&mut self, before: Vec<[u32; 2]>, profile: &Profile, changed: impl Fn(u32) -> bool + Sync) -> Tried<Met> {
+        let too_many = || Stuck::with(Failure::TooMany);
+        self.check_closed()?;
+        let overlay = Overlay::of(self.survey, self.work, self.reversed).ok_or_else(too_many)?;
+        let met = overlay.met_by(self.survey, self.work, &changed).ok_or_else(too_many)?;
+        let pairs: Vec<[u32; 2]> = met.iter().map(|pair| pair.triangles).collect();
+        let mut crossing = self.crossing(&overlay, &pairs, profile);
+        crossing.extend(before.into_iter().filter(|pair| pair.iter().all(|t| self.work.lives(*t) && !changed(*t))));
+        crossing.iter_mut().for_each(|pair| pair.sort_unstable());
+        crossing.sort_unstable();
+        crossing.dedup();
+        Ok(Met { crossing, overlay })
     }
 
     /// These triangles, and with them those whose edges run along edges there: where surfaces pass through each other edge along edge, no two
@@ -503,13 +491,36 @@ impl State<'_, '_, '_> {
         }
     }
 
-    /// Triangles that came without a surface are of that of a neighbour.
+    /// Triangles that came without a surface are of that of the record that they are parts of; those of patches, of that of a neighbour.
     fn follow(&mut self) {
-        for t in self.clusters.of_triangle.len()..self.work.triangles.len() {
-            let stars = self.work.triangles[t].v.into_iter().flat_map(|v| self.work.star(v)).map(|(o, _)| o as usize);
-            let known = stars.filter_map(|o| self.clusters.of_triangle.get(o).copied().filter(|piece| *piece != NONE));
-            let piece = known.min().unwrap_or(NONE);
-            self.clusters.of_triangle.push(piece);
+        let first = self.clusters.of_triangle.len();
+        let all = self.work.triangles.len();
+        let mut left: Vec<usize> = (first..all).collect();
+        if left.is_empty() {
+            return;
+        }
+        let record = |t: usize| match self.work.triangles[t].origin {
+            Origin::Input(record) | Origin::Part(record) => Some(record),
+            Origin::Patch => None,
+        };
+        let wanted: HashSet<u32> = left.iter().filter_map(|t| record(*t)).collect();
+        let known = (0..first).filter_map(|t| Some((record(t).filter(|r| wanted.contains(r))?, self.clusters.of_triangle[t])));
+        let piece_of: HashMap<u32, u32> = known.filter(|(_, piece)| *piece != NONE).collect();
+        let pieces = left.iter().map(|t| record(*t).and_then(|r| piece_of.get(&r).copied()).unwrap_or(NONE));
+        self.clusters.of_triangle.extend(pieces.collect::<Vec<_>>());
+        loop {
+            let before = left.len();
+            left.retain(|t| {
+                let stars = self.work.triangles[*t].v.into_iter().flat_map(|v| self.work.star(v));
+                let known = stars.map(|(o, _)| self.clusters.of_triangle[o as usize]).filter(|piece| *piece != NONE);
+                if self.clusters.of_triangle[*t] == NONE {
+                    self.clusters.of_triangle[*t] = known.min().unwrap_or(NONE);
+                }
+                self.clusters.of_triangle[*t] == NONE
+            });
+            if left.is_empty() || left.len() == before {
+                return;
+            }
         }
     }
 
@@ -530,7 +541,7 @@ impl State<'_, '_, '_> {
     /// Drops closed surfaces of nothing but parts of triangles that are no thicker than what rounding moves: they are nothing but that.
     fn drop_specks(&mut self, pieces: &Components) {
         let measure = &self.survey.measure;
-        let finest = above(self.survey.bounds.largest_coordinate()) * LADDERS[0].grids[0];
+        let finest = self.step;
         let thin = |piece: &Component| measure.volume(piece.extent).abs() <= measure.area(piece.extent) * finest;
         let mut is_speck: Vec<bool> = pieces.list.iter().map(|piece| !piece.open && thin(piece)).collect();
         let as_read = |t: &u32| matches!(self.work.triangles[*t as usize].origin, Origin::Input(_));

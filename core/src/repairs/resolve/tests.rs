@@ -171,6 +171,34 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+
+    /// Two boxes wall to wall, but that the walls are some steps of f32 out of true, and divided otherwise.
+    #[test]
+    fn walls_that_nearly_lie_on_each_other_become_free_of_crossings(
+        steps in prop::array::uniform8(-3i32..=3),
+        y in 0u8..6,
+        z in 0u8..6,
+        far in prop_oneof![Just(1.0f32), Just(1000.0)],
+    ) {
+        let step = far.next_up() - far;
+        let [y, z] = [y, z].map(|k| f32::from(k) / 7.0 - 0.3);
+        let wall = |p: [f32; 3], corner: usize| -> [f32; 3] {
+            if p[0] == far { [far + step * steps[corner] as f32, p[1], p[2]] } else { p }
+        };
+        let which = |p: [f32; 3], first: usize, lo: [f32; 2]| first + usize::from(p[1] > lo[0]) + 2 * usize::from(p[2] > lo[1]);
+        let one: Vec<Corners> =
+            cuboid([far - 1.0, 0.0, 0.0], [far, 1.0, 1.0]).iter().map(|t| t.map(|p| wall(p, which(p, 0, [0.0; 2])))).collect();
+        let two = cuboid([far, y, z], [far + 1.0, y + 1.0, z + 1.0]);
+        let two: Vec<Corners> = two.iter().map(|t| t.map(|p| wall(p, which(p, 4, [y, z])))).collect();
+        let got = resolved(&[one, two].concat());
+        prop_assert!(got.defects.boundary_edges + got.defects.unbalanced_edges == 0, "{:?}", got.verdict);
+        prop_assert!(got.defects.self_intersections.as_ref().is_some_and(|s| s.is_free()), "{:?}", got.verdict);
+        prop_assert!((got.defects.volume - 2.0).abs() < 1e-5 * f64::from(far) && got.result.left.is_empty());
+    }
+}
+
 /// Bodies that cross each other are one region, others another.
 #[test]
 fn every_cluster_is_told_of() {

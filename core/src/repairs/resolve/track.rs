@@ -46,22 +46,30 @@ impl Done {
 }
 
 /// By piece, since clusters grow while they are resolved.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Track(BTreeMap<u32, Done>);
 
 impl Track {
-    /// In this round (from 1 on) these triangles cross something, and are cut, or their vertices snapped to a grid.
-    pub(super) fn crossed(&mut self, shop: &Shop, clusters: &Clusters, triangles: &BTreeSet<u32>, round: u32, snapped: bool) {
+    /// In this round (from 1 on) these triangles cross something, and are cut.
+    pub(super) fn crossed(&mut self, shop: &Shop, clusters: &Clusters, triangles: &BTreeSet<u32>, round: u32) {
         for t in triangles {
             let done = self.0.entry(clusters.of_triangle[*t as usize]).or_insert(Done::NOTHING);
             done.bounds.include(&shop.points(*t));
             done.triangles += u64::from(round == 1);
             done.rounds = round;
-            done.snapped |= snapped;
         }
     }
 
-    /// A vertex of this triangle's piece was moved so far.
+    /// Something of this triangle's piece was made one with what is so far away.
+    pub(super) fn snapped(&mut self, clusters: &Clusters, triangle: u32, by: f64) {
+        let piece = clusters.of_triangle.get(triangle as usize);
+        if let Some(done) = piece.and_then(|piece| self.0.get_mut(piece)) {
+            done.snapped = true;
+            done.moved = done.moved.max(by);
+        }
+    }
+
+    /// A vertex of this triangle's piece was rounded by so much.
     pub(super) fn moved(&mut self, clusters: &Clusters, triangle: u32, by: f64) {
         let piece = clusters.of_triangle.get(triangle as usize);
         if let Some(done) = piece.and_then(|piece| self.0.get_mut(piece)) {

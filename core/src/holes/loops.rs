@@ -4,6 +4,8 @@
 //! goes on to the fan that lies across the hole, so that filling joins all fans into one. A way that comes back to a vertex is
 //! cut there into simple loops. A hole that reaches an edge where other surface meets goes on along that edge.
 
+use std::collections::{BTreeMap, HashMap};
+
 use crate::chunk;
 use crate::fill::exact::Point;
 use crate::shop::edges::{Edge, Edges, Use};
@@ -258,7 +260,7 @@ fn fans(shop: &Shop, edges: &Edges, v: Vertex) -> Vec<(u32, u32)> {
 /// is made: nothing is missing there that a patch could restore.
 fn cut_into_loops(rims: &[Rim], number: u32, way: &[usize], boundary: &mut Boundary) {
     let mut open: Vec<Rim> = Vec::new();
-    let mut place: std::collections::HashMap<Vertex, usize> = std::collections::HashMap::new();
+    let mut place: HashMap<Vertex, usize> = HashMap::new();
     for rim in way.iter().map(|r| rims[*r]) {
         place.insert(rim.from, open.len());
         open.push(rim);
@@ -276,6 +278,46 @@ fn cut_into_loops(rims: &[Rim], number: u32, way: &[usize], boundary: &mut Bound
         let last = chain.last().map(|r| r.to);
         boundary.chains.push(chain.iter().map(|r| r.from).chain(last).collect());
     }
+}
+
+/// What is used less often than the other way round, apart from some loops: simple loops in the direction of what is lacking, whether one triangle
+/// is at their edges or several, and whatever their directions are. With triangles over all of these, every edge is used equally often in both
+/// directions. O(n log n) in the boundary and the non-manifold edges.
+pub(crate) fn unbalanced<'l>(edges: &Edges, apart_from: impl Iterator<Item = &'l Loop>) -> Vec<Vec<Vertex>> {
+    let mut ways: BTreeMap<Vertex, Vec<Vertex>> = BTreeMap::new();
+    for edge in edges.iter().filter(Edge::is_unbalanced) {
+        let forward = edge.uses.iter().filter(|used| used.forward).count();
+        let backward = edge.uses.len() - forward;
+        let (from, to) = if forward > backward { (edge.high, edge.low) } else { (edge.low, edge.high) };
+        ways.entry(from).or_default().extend(std::iter::repeat_n(to, forward.abs_diff(backward)));
+    }
+    for rim in apart_from {
+        let n = rim.vertices.len();
+        for [a, b] in (0..n).map(|i| [rim.vertices[i], rim.vertices[(i + 1) % n]]) {
+            if let Some(ends) = ways.get_mut(&a)
+                && let Some(place) = ends.iter().position(|end| *end == b)
+            {
+                ends.remove(place);
+            }
+        }
+    }
+    let mut loops = Vec::new();
+    let starts: Vec<Vertex> = ways.keys().copied().collect();
+    for start in starts {
+        let (mut way, mut places) = (vec![start], HashMap::from([(start, 0)]));
+        while let Some(next) = way.last().and_then(|at| ways.get_mut(at)?.pop()) {
+            if let Some(place) = places.get(&next).copied() {
+                loops.push(way[place..].to_vec());
+                way.drain(place + 1..).for_each(|v| {
+                    places.remove(&v);
+                });
+            } else {
+                places.insert(next, way.len());
+                way.push(next);
+            }
+        }
+    }
+    loops
 }
 
 fn from_smallest(rims: &[Rim], way: u32) -> Loop {
@@ -353,5 +395,37 @@ mod tests {
         let in_chains: usize = chains.iter().map(|c| c.len() - 1).sum();
         assert!(in_chains > 0, "{loops:?}");
         assert_eq!(in_loops + in_chains, edges.iter().filter(|e| e.is_boundary()).count());
+    }
+
+    #[test]
+    fn what_three_surfaces_leave_unbalanced_is_a_loop_in_the_direction_that_lacks() {
+        // A square across a cube, half way up: its rim lies on edges of the walls.
+        let lower = cube().into_iter().filter(|t| !t.iter().all(|p| p[2] == 1.0));
+        let upper = shifted(&cube(), [0.0, 0.0, 1.0]).into_iter().filter(|t| !t.iter().all(|p| p[2] == 1.0));
+        let across: Vec<Corners> = cube().into_iter().filter(|t| t.iter().all(|p| p[2] == 1.0)).collect();
+        let mesh: Vec<Corners> = lower.chain(upper).chain(across.clone()).collect();
+        let records = records(&mesh);
+        let d = diagnose(&records);
+        let edges = Edges::of(&d.shop);
+        assert!(find(&d.shop, &edges).is_empty(), "nothing is missing");
+        let loops = unbalanced(&edges, std::iter::empty());
+        let [rim] = &loops[..] else { panic!("{loops:?}") };
+        assert_eq!(rim.len(), 4);
+        // The square's own triangles run the other way.
+        let runs = |t: &Corners, from: Vertex, to: Vertex| {
+            let p = |v: Vertex| d.shop.positions[v as usize];
+            (0..3).any(|k| (t[k], t[(k + 1) % 3]) == (p(to), p(from)))
+        };
+        assert!((0..4).all(|i| across.iter().any(|t| runs(t, rim[i], rim[(i + 1) % 4]))));
+        // A loop that is to stay open is left out.
+        let open = records_of_open_cube();
+        let d = diagnose(&open);
+        let edges = Edges::of(&d.shop);
+        let rims = find(&d.shop, &edges);
+        assert_eq!((rims.len(), unbalanced(&edges, rims.iter()).len(), unbalanced(&edges, std::iter::empty()).len()), (1, 0, 1));
+    }
+
+    fn records_of_open_cube() -> Vec<crate::record::Record> {
+        records(&cube().into_iter().filter(|t| !t.iter().all(|p| p[2] == 1.0)).collect::<Vec<_>>())
     }
 }

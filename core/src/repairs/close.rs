@@ -9,6 +9,7 @@ use super::guard::{self, Obstacle};
 use super::work::Work;
 use super::{annular, islands, smooth};
 use crate::chunk::NONE;
+use crate::fill::exact::Point;
 use crate::fill::{self, FillSettings, Rim, Unfillable, cross, strip};
 use crate::holes::{
     self, Shapes,
@@ -163,11 +164,25 @@ pub(super) fn fill_loops(
     if profile.resolve_crossings && survey.crossing_pairs.is_some() {
         across = closing.close_across(work);
     }
+    let mut unclosed = Vec::new();
+    let balances = profile.resolve_crossings && profile.fill_holes && survey.crossing_pairs.is_some();
+    let first_balancing = across.len();
+    if balances {
+        unclosed = closing.balance(work, &mut across);
+    }
+    let balancing = (across.len() - first_balancing) as u64;
     let mut closed = closing.finish(work);
+    if balancing > 0 {
+        closed.loops += balancing;
+        *closed.by_method.entry(BALANCING.into()).or_insert(0) += balancing;
+    }
+    closed.left.extend(unclosed.into_iter().take(LISTED.saturating_sub(closed.left.len())));
     if !profile.fill_holes {
         closed.kept_open.extend(chains.iter().map(|chain| work.positions[chain[0] as usize]));
     }
     closed.across = across;
+    // Where edges were balanced, they are in the loops there.
+    let chains = if balances { &[] } else { &chains[..] };
     for chain in chains.iter().take(LISTED.saturating_sub(closed.left.len())) {
         let length = chain.windows(2).map(|w| work.distance(w[0], w[1])).sum();
         closed.left.push(left(work, chain[0], chain.len() - 1, length, &NO_LOOP));
@@ -181,6 +196,10 @@ fn left(shop: &Shop, from: Vertex, edges: usize, perimeter: f64, reason: &dyn st
 
 /// Why a chain of boundary edges stays open.
 const NO_LOOP: &str = "no loop, but a chain that ends where the triangles around disagree on their directions";
+/// And why a loop does along which edges are not used equally often in both directions.
+const UNBALANCED: &str = "along its edges, the triangles around disagree on their directions, or three surfaces meet";
+/// What is said of those that were closed.
+const BALANCING: &str = "where surfaces meet or disagree (to be cut along what they cross)";
 
 fn shape_settings(profile: &Profile) -> Option<ShapeSettings> {
     let method = match profile.patch_shape {
@@ -368,6 +387,31 @@ impl Closing<'_> {
             }
         }
         across
+    }
+
+    /// Closes whatever still lacks triangles on one side, as along an edge that three surfaces share: one that the patch then lies on, or that it
+    /// parts from the others, goes when all is cut along what it crosses. Loops that were left open stay open. Returns those that nothing closes.
+    fn balance(&self, work: &mut Work<'_>, across: &mut Vec<(Range<u32>, LoopLeft)>) -> Vec<LoopLeft> {
+        let open = self.open.iter().map(|(rim, _)| self.rim(*rim));
+        let ways = loops::unbalanced(work.edges().1, open);
+        let mut unclosed = Vec::new();
+        for way in ways {
+            let points: Vec<Point> = way.iter().map(|v| work.positions[*v as usize]).collect();
+            let n = way.len();
+            let perimeter = (0..n).map(|i| work.distance(way[i], way[(i + 1) % n])).sum();
+            let left = left(work, way[0], n, perimeter, &UNBALANCED);
+            let rim = Rim { points: &points, apexes: &[], obstacles: &[], forbidden: &|_, _| false };
+            let Some(patch) = fill::unchecked(&rim) else {
+                unclosed.push(left);
+                continue;
+            };
+            let first = work.triangles.len() as u32;
+            for triangle in &patch.triangles {
+                work.add(triangle.map(|i| way[i as usize]), Origin::Patch, NONE);
+            }
+            across.push((first..work.triangles.len() as u32, left));
+        }
+        unclosed
     }
 
     /// A patch that does not cross itself, if there is one, else any.

@@ -207,6 +207,10 @@ pub(crate) fn run(
         separated.vertices + separated.edges
     });
     log.note("separated", separated.to_string());
+    if separated.vertices + separated.edges > 0 {
+        // What hung on a body by an edge or a vertex stands for itself now.
+        outward(survey, shop, &mut reversed, &mut log);
+    }
     let mut wraps = wrap::Wraps::default();
     // What was resolved crosses nothing any more.
     let may_cross = !profile.resolve_crossings || !resolved.left.is_empty() || separated.edges > 0;

@@ -25,7 +25,7 @@ mod sides;
 mod tests;
 mod track;
 
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::Path;
 
 use self::cut::Cut;
@@ -101,11 +101,14 @@ impl std::fmt::Display for Failure {
 const FINEST: f64 = 1.0 / 16_777_216.0;
 
 /// Rounds of cutting and rounding.
-const ROUNDS: u32 = 16;
+const ROUNDS: u32 = 24;
 
 /// Pairs may become more from round to round, but not more than so many times as many as at first, or as a few.
 const GROWTH: usize = 4;
 const FEW: usize = 1024;
+
+/// What each triangle crosses, squared, of all triangles together: about as many points may the cuts have in common, at some hundred bytes each.
+const MOST_MEETINGS: u64 = 1 << 24;
 
 /// What is nearer than so many steps of the finest grid, after the first round of cutting, is made one, and so many times farther after every
 /// other one; but nothing beyond this share of the power of two above the largest coordinate.
@@ -375,6 +378,9 @@ impl State<'_, '_, '_> {
             if resolved.rounds == ROUNDS || resolved.rounds > 0 && crossing.len() > most {
                 return Err(Stuck { failure: Failure::Endless, triangles: triangles.into_iter().collect() });
             }
+            if let Some(worst) = beyond_reach(&crossing) {
+                return Err(Stuck { failure: Failure::TooMany, triangles: vec![worst] });
+            }
             tracing::debug!(round = resolved.rounds, pairs = crossing.len(), triangles = triangles.len(), "Crossings.");
             resolved.rounds += 1;
             self.track.crossed(self.work, &self.clusters, &triangles, resolved.rounds);
@@ -569,6 +575,15 @@ impl State<'_, '_, '_> {
         self.work.restore(&self.before.triangles);
         self.reversed.clone_from(&self.before.reversed);
     }
+}
+
+/// The triangle that crosses most others, if cutting these pairs would take more than there is room for.
+fn beyond_reach(crossing: &[[u32; 2]]) -> Option<u32> {
+    let mut met: BTreeMap<u32, u64> = BTreeMap::new();
+    crossing.iter().flatten().for_each(|t| *met.entry(*t).or_insert(0) += 1);
+    let meetings: u64 = met.values().map(|count| count * count).sum();
+    let worst = met.into_iter().max_by_key(|(t, count)| (*count, std::cmp::Reverse(*t)));
+    worst.filter(|_| meetings > MOST_MEETINGS).map(|(t, _)| t)
 }
 
 /// The power of two above a coordinate.

@@ -199,6 +199,15 @@ proptest! {
     }
 }
 
+/// Cutting four thousand triangles each of which crosses one and the same is within reach; as many that all cross each other are not.
+#[test]
+fn what_crosses_too_much_is_told_by_its_worst_triangle() {
+    let fan: Vec<[u32; 2]> = (1..4000).map(|t| [0, t]).collect();
+    assert_eq!(beyond_reach(&fan), None);
+    let all: Vec<[u32; 2]> = (0..300).flat_map(|a| (a + 1..300).map(move |b| [a, b])).chain([[7, 300]]).collect();
+    assert_eq!(beyond_reach(&all), Some(7));
+}
+
 /// Bodies that cross each other are one region, others another.
 #[test]
 fn every_cluster_is_told_of() {

@@ -7,9 +7,9 @@ use std::ops::Range;
 use super::admit::{Admission, NotAdmitted};
 use super::guard::{self, Obstacle};
 use super::work::Work;
-use super::{annular, islands, smooth};
+use super::{annular, collinear, islands, smooth};
 use crate::chunk::NONE;
-use crate::fill::exact::Point;
+use crate::fill::exact::{self, Point};
 use crate::fill::{self, FillSettings, Rim, Unfillable, cross, strip};
 use crate::holes::{
     self, Shapes,
@@ -160,17 +160,18 @@ pub(super) fn fill_loops(
     if profile.check_self_intersections {
         closing.guard(survey, work, reversed);
     }
+    let balances = profile.resolve_crossings && profile.fill_holes && survey.crossing_pairs.is_some();
+    let mut balancing = closing.close_slits(work, balances);
     let mut across = Vec::new();
     if profile.resolve_crossings && survey.crossing_pairs.is_some() {
         across = closing.close_across(work);
     }
     let mut unclosed = Vec::new();
-    let balances = profile.resolve_crossings && profile.fill_holes && survey.crossing_pairs.is_some();
     let first_balancing = across.len();
     if balances {
         unclosed = closing.balance(work, &mut across);
     }
-    let balancing = (across.len() - first_balancing) as u64;
+    balancing += (across.len() - first_balancing) as u64;
     let mut closed = closing.finish(work);
     if balancing > 0 {
         closed.loops += balancing;
@@ -365,6 +366,37 @@ impl Closing<'_> {
         }
     }
 
+    /// Closes loops on one line by triangles of no area: they go, and the triangles along them are split at the vertices that they lack. Returns
+    /// how many of these were no loops, but edges that lack a side, if they are to be balanced.
+    fn close_slits(&mut self, work: &mut Work<'_>, balances: bool) -> u64 {
+        let is_slit = |reason: &NotFilled| matches!(reason, NotFilled::Method(Unfillable::Collinear));
+        let (slits, open): (Vec<_>, Vec<_>) = std::mem::take(&mut self.open).into_iter().partition(|(_, reason)| is_slit(reason));
+        self.open = open;
+        for (rim, _) in slits {
+            let triangles = fan(self.rim(rim).vertices.len());
+            self.put_in(work, rim, &fill::Patch { triangles, method: fill::Method::Triangle }, SLIT);
+        }
+        let mut balanced = 0;
+        if balances {
+            for way in self.unbalanced(work) {
+                if is_on_one_line(work, &way) {
+                    balanced += 1;
+                    fan(way.len()).into_iter().for_each(|t| {
+                        work.add(t.map(|i| way[i as usize]), Origin::Patch, NONE);
+                    });
+                }
+            }
+        }
+        collinear::remove(work);
+        balanced
+    }
+
+    /// Loops of edges that lack a side, but for those that were left open.
+    fn unbalanced(&self, work: &mut Work<'_>) -> Vec<Vec<Vertex>> {
+        let open = self.open.iter().map(|(rim, _)| self.rim(*rim));
+        loops::unbalanced(work.edges().1, open)
+    }
+
     /// Closes what is left as if nothing were in the way, each by a patch that may cross anything, itself included. Returns the triangles
     /// of each.
     fn close_across(&mut self, work: &mut Work<'_>) -> Vec<(Range<u32>, LoopLeft)> {
@@ -392,10 +424,8 @@ impl Closing<'_> {
     /// Closes whatever still lacks triangles on one side, as along an edge that three surfaces share: one that the patch then lies on, or that it
     /// parts from the others, goes when all is cut along what it crosses. Loops that were left open stay open. Returns those that nothing closes.
     fn balance(&self, work: &mut Work<'_>, across: &mut Vec<(Range<u32>, LoopLeft)>) -> Vec<LoopLeft> {
-        let open = self.open.iter().map(|(rim, _)| self.rim(*rim));
-        let ways = loops::unbalanced(work.edges().1, open);
         let mut unclosed = Vec::new();
-        for way in ways {
+        for way in self.unbalanced(work) {
             let points: Vec<Point> = way.iter().map(|v| work.positions[*v as usize]).collect();
             let n = way.len();
             let perimeter = (0..n).map(|i| work.distance(way[i], way[(i + 1) % n])).sum();
@@ -599,6 +629,16 @@ fn of_workshop(rim: &Loop, patch: &fill::Patch) -> Vec<[Vertex; 3]> {
     patch.triangles.iter().map(|t| t.map(|i| rim.vertices[i as usize])).collect()
 }
 
+fn is_on_one_line(shop: &Shop, way: &[Vertex]) -> bool {
+    let [a, b] = [way[0], way[1]].map(|v| shop.positions[v as usize]);
+    way[2..].iter().all(|v| exact::collinear(&a, &b, &shop.positions[*v as usize]))
+}
+
+/// Triangles around the first vertex of a loop.
+fn fan(vertices: usize) -> Vec<[u32; 3]> {
+    (2..vertices as u32).map(|n| [0, n - 1, n]).collect()
+}
+
 /// The vertices of some loops, one loop after the other.
 pub(super) fn concatenated(group: &[&Loop]) -> Vec<Vertex> {
     group.iter().flat_map(|rim| rim.vertices.iter().copied()).collect()
@@ -614,6 +654,9 @@ fn twice_area(survey: &Survey<'_>, shop: &Shop, rim: &Loop, patch: &fill::Patch)
     let corners = |t: &[u32; 3]| t.map(|i| shop.positions[rim.vertices[i as usize] as usize]);
     patch.triangles.iter().map(|t| survey.measure.triangle(&corners(t)).area).sum::<i128>() as f64
 }
+
+/// Name of the method that closes a loop on one line.
+const SLIT: &str = "slit";
 
 /// Name of the method that closes a small loop on the triangles around it.
 const FLAT: &str = "flat on its neighbours";

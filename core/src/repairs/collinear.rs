@@ -17,14 +17,26 @@ pub(super) fn remove(shop: &mut Work<'_>) -> u64 {
     while !left.is_empty() {
         let before = left.len();
         left.retain(|t| !try_remove(shop, *t, false));
-        if left.len() == before {
-            // A knot of collinear triangles only: any one may go first.
-            let t = left.remove(0);
-            try_remove(shop, t, true);
-        }
         removed += (before - left.len()) as u64;
+        if left.len() == before {
+            // A knot of collinear triangles only. The longest goes first: what its neighbours there are split into is shorter than it, so that this ends.
+            let extent = |t: &u32| longest(shop, *t).1;
+            let Some(at) = (0..before).reduce(|a, b| if extent(&left[b]) > extent(&left[a]) { b } else { a }) else { break };
+            let t = left.remove(at);
+            let first = shop.triangles.len() as u32;
+            try_remove(shop, t, true);
+            left.extend((first..shop.triangles.len() as u32).filter(|t| shop.is_collinear(*t)));
+            removed += 1;
+        }
     }
     removed
+}
+
+/// Which edge of a triangle is its longest, from its corner of that number on, and how long it is.
+fn longest(shop: &Work<'_>, t: u32) -> (usize, f64) {
+    let v = shop.triangles[t as usize].v;
+    let length = |k: usize| shop.distance(v[k], v[(k + 1) % 3]);
+    (1..3).fold((0, length(0)), |best, k| if length(k) > best.1 { (k, length(k)) } else { best })
 }
 
 /// Removes `t` unless a triangle at its long edge is collinear, too, and `force` is off.
@@ -33,8 +45,7 @@ fn try_remove(shop: &mut Work<'_>, t: u32, force: bool) -> bool {
         return true;
     }
     let v = shop.triangles[t as usize].v;
-    let length = |k: usize| shop.distance(v[k], v[(k + 1) % 3]);
-    let long = (1..3).fold(0, |best, k| if length(k) > length(best) { k } else { best });
+    let (long, _) = longest(shop, t);
     let (a, b, middle) = (v[long], v[(long + 1) % 3], v[(long + 2) % 3]);
     let others: Vec<u32> =
         shop.star(a).map(|(o, _)| o).filter(|o| *o != t && shop.triangles[*o as usize].v.contains(&b)).collect();
@@ -79,6 +90,15 @@ pub(super) fn split(shop: &mut Work<'_>, t: u32, ends: [u32; 2], at: &[u32]) {
 mod tests {
     use super::*;
     use crate::testing::{after, cube};
+
+    #[test]
+    fn a_knot_of_nothing_but_triangles_of_no_area_goes() {
+        // A loop on one line closed twice, by different triangles: every edge is used once each way.
+        let [a, b, c, d] = [0.0, 3.0, 1.0, 2.0].map(|x| [x, 0.0, 0.0]);
+        let mesh = [[a, b, c], [a, c, d], [b, a, d], [b, d, c]];
+        let got = after(&mesh, |d, _| remove(&mut Work::new(&mut d.shop)));
+        assert_eq!(got.defects.triangles, 0);
+    }
 
     #[test]
     fn two_caps_back_to_back_go_together() {

@@ -45,6 +45,20 @@ impl BoxTree {
     }
 }
 
+/// How many pairs of boxes meet; if that is more than `most`, no less than one more. O(n log n), and what meets along x.
+pub(crate) fn meetings(mut boxes: Vec<Bounds>, most: u64) -> u64 {
+    boxes.sort_unstable_by(|a, b| a.lo[0].total_cmp(&b.lo[0]));
+    let mut count = 0;
+    for (i, a) in boxes.iter().enumerate() {
+        let along_x = boxes[i + 1..].iter().take_while(|b| b.lo[0] <= a.hi[0]);
+        count += along_x.filter(|b| (1..3).all(|k| a.lo[k] <= b.hi[k] && b.lo[k] <= a.hi[k])).count() as u64;
+        if count > most {
+            break;
+        }
+    }
+    count
+}
+
 fn aabb(b: &Bounds) -> Aabb {
     Aabb::new(Vec3A::from_array(b.lo), Vec3A::from_array(b.hi))
 }
@@ -62,6 +76,7 @@ mod tests {
                 .map(|(lo, size)| Bounds { lo: lo.map(f32::from), hi: std::array::from_fn(|k| f32::from(lo[k]) + f32::from(size[k])) })
                 .collect();
             let tree = BoxTree::new(&boxes);
+            let mut meeting = 0;
             let mut found = Vec::new();
             for wanted in &boxes {
                 tree.meeting(wanted, &mut found);
@@ -69,7 +84,9 @@ mod tests {
                 let want: Vec<u32> = (0..boxes.len() as u32).filter(|i| meets(&boxes[*i as usize])).collect();
                 prop_assert_eq!(&found, &want);
                 prop_assert_eq!(tree.meets_another(wanted, want[0]), want.len() > 1);
+                meeting += want.len() as u64 - 1;
             }
+            prop_assert_eq!(meetings(boxes, u64::MAX), meeting / 2);
         }
     }
 }

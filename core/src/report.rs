@@ -431,6 +431,8 @@ pub enum Rung {
     Cut,
     /// So they were, and what was nearly one there was made one: short edges, and vertices close to faces or edges.
     Snapped,
+    /// What kept crossing was taken out, and the small holes were closed.
+    Refilled,
     /// Surfaces that shared a vertex or an edge were taken apart.
     Separated,
     /// It went: a lone sheet, or a body in the material of others.

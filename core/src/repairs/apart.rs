@@ -65,9 +65,11 @@ pub(super) struct Separated {
     pub(super) vertices: u64,
     /// Edges that got a vertex in their middle, for one wedge of theirs.
     pub(super) edges: u64,
+    /// Fans that were closed without their vertex ([`super::unpin`]).
+    pub(super) removed: u64,
     /// Vertices that still have several fans, or an edge of more than two triangles.
     pub(super) left: u64,
-    /// How far a copy is from where it was made.
+    /// How far a copy is from where it was made, or a surface from where its vertex was.
     pub(super) farthest: f64,
     /// Where: copies that share triangles are in one.
     pub(super) regions: Vec<Region>,
@@ -76,6 +78,15 @@ pub(super) struct Separated {
 }
 
 impl Separated {
+    /// Some fans were closed without their vertex.
+    pub(super) fn closed(&mut self, work: &mut Work<'_>, mut regions: Vec<Region>) {
+        self.removed += regions.len() as u64;
+        self.farthest = regions.iter().fold(self.farthest, |farthest, region| farthest.max(region.moved));
+        self.regions.append(&mut regions);
+        let (shop, edges) = work.edges();
+        *self = std::mem::take(self).but(shop, &nonmanifold_vertices(shop, edges));
+    }
+
     /// At these vertices surfaces still meet.
     fn but(self, shop: &Shop, vertices: &[Vertex]) -> Self {
         let one = |v: &Vertex| {
@@ -91,11 +102,14 @@ impl Separated {
 
 impl fmt::Display for Separated {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { vertices, edges, left, farthest, .. } = self;
+        let Self { vertices, edges, removed, left, farthest, .. } = self;
         write!(
             f,
             "surfaces that met given a vertex of their own: {vertices} at vertices, {edges} on edges, moved by at most {farthest:e}"
         )?;
+        if *removed > 0 {
+            write!(f, "; closed without it: {removed}")?;
+        }
         if *left > 0 {
             write!(f, "; vertices where surfaces still meet: {left}")?;
         }

@@ -27,6 +27,7 @@ mod sheets;
 mod smooth;
 mod surplus;
 mod swallowed;
+mod unpin;
 mod visible;
 mod work;
 mod wrap;
@@ -204,10 +205,11 @@ pub(crate) fn run(
     let mut separated = apart::Separated::default();
     log.time("separated", "", || {
         separated = apart::separate(survey, shop, &reversed, profile);
-        separated.vertices + separated.edges
+        unpin::unpin(survey, shop, &reversed, profile, &mut separated);
+        separated.vertices + separated.edges + separated.removed
     });
     log.note("separated", separated.to_string());
-    if separated.vertices + separated.edges > 0 {
+    if separated.vertices + separated.edges + separated.removed > 0 {
         // What hung on a body by an edge or a vertex stands for itself now.
         outward(survey, shop, &mut reversed, &mut log);
     }

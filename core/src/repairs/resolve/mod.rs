@@ -20,6 +20,7 @@
 mod cut;
 mod embed;
 mod near;
+mod refill;
 mod sides;
 #[cfg(test)]
 mod tests;
@@ -29,6 +30,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::Path;
 
 use self::cut::Cut;
+pub(super) use self::refill::{Refill, refill_of};
 use self::sides::Sides;
 use self::track::Track;
 use super::orient;
@@ -37,6 +39,7 @@ use super::regions::Unsettled;
 use super::work::Work;
 use crate::Progress;
 use crate::arrange::Arrange;
+use crate::boxes;
 use crate::chunk::{self, NONE, Suspect};
 use crate::defects;
 use crate::error::Result;
@@ -44,7 +47,7 @@ use crate::report::Region;
 use crate::settings::{Bodies, Limits, Profile};
 use crate::shop::components::{Component, Components, Reversed};
 use crate::shop::{Origin, Shop, Triangle, Vertex, bits};
-use crate::sums::Extent;
+use crate::sums::{Bounds, Extent};
 use crate::survey::{Division, Survey};
 
 /// What was resolved.
@@ -107,13 +110,21 @@ const ROUNDS: u32 = 24;
 const GROWTH: usize = 4;
 const FEW: usize = 1024;
 
-/// What each triangle crosses, squared, of all triangles together: about as many points may the cuts have in common, at some hundred bytes each.
+/// Two triangles that cross a third one, where boxes around the cuts meet, of all triangles together: so many points may the cuts have in common, at
+/// some hundred bytes each.
 const MOST_MEETINGS: u64 = 1 << 24;
 
 /// What is nearer than so many steps of the finest grid, after the first round of cutting, is made one, and so many times farther after every
 /// other one; but nothing beyond this share of the power of two above the largest coordinate.
 const WIDER: f64 = 4.0;
 const WIDEST: f64 = 1.0 / 4096.0;
+
+/// Rounds after which what crosses is taken out, if it has not become half as much in the last one.
+const REFILL_AFTER: u32 = 2;
+
+/// And no patch in its place is farther away than this share of the power of two above the largest coordinate, nor than a width farther in each
+/// round.
+const FARTHEST: f64 = 1.0 / 256.0;
 
 /// Times that everything is done anew without the clusters that failed.
 const ATTEMPTS: usize = 8;
@@ -219,7 +230,7 @@ fn corners(survey: &Survey<'_>, shop: &Shop, overlay: &Overlay, pairs: &[[u32; 2
 }
 
 /// Takes triangles into the workshop, and marks the vertices at these positions as complete; returns the first of the triangles.
-fn take_in(survey: &Survey<'_>, work: &mut Work<'_>, new: &[(Suspect, u32)], positions: &[[f32; 3]]) -> u32 {
+pub(super) fn take_in(survey: &Survey<'_>, work: &mut Work<'_>, new: &[(Suspect, u32)], positions: &[[f32; 3]]) -> u32 {
     let first = work.triangles.len() as u32;
     work.extend(survey, new, &[]);
     let known = vertices(work);
@@ -249,7 +260,7 @@ fn divide(
 }
 
 /// Does with a triangle that was fetched what was done with the patch that it belonged to.
-fn join_in(work: &mut Work<'_>, reversed: &Reversed, t: u32) {
+pub(super) fn join_in(work: &mut Work<'_>, reversed: &Reversed, t: u32) {
     let patch = work.triangles[t as usize].patch;
     if patch == NONE {
         return;
@@ -372,25 +383,33 @@ impl State<'_, '_, '_> {
         resolved.pairs = crossing.len() as u64;
         let most = crossing.len().max(FEW) * GROWTH;
         let mut latest: Option<Overlay> = None;
-        let mut width = self.step;
+        // What is nearer is made one, and what is taken out has its patch within the limit.
+        let (mut width, mut limit) = (self.step, self.step * WIDER);
         while !crossing.is_empty() {
             let triangles: BTreeSet<u32> = crossing.iter().flatten().copied().collect();
             if resolved.rounds == ROUNDS || resolved.rounds > 0 && crossing.len() > most {
                 return Err(Stuck { failure: Failure::Endless, triangles: triangles.into_iter().collect() });
             }
-            if let Some(worst) = beyond_reach(&crossing) {
+            if let Some(worst) = beyond_reach(|t| Bounds::of(&self.work.points(t)), &crossing) {
                 return Err(Stuck { failure: Failure::TooMany, triangles: vec![worst] });
             }
             tracing::debug!(round = resolved.rounds, pairs = crossing.len(), triangles = triangles.len(), "Crossings.");
             resolved.rounds += 1;
             self.track.crossed(self.work, &self.clusters, &triangles, resolved.rounds);
+            let pairs_before = crossing.len();
             let along = self.with_edges_along(latest.as_ref().unwrap_or(overlay), &triangles).ok_or_else(too_many)?;
             let first_new = self.work.triangles.len() as u32;
             resolved.displaced = resolved.displaced.max(self.round(engine, &triangles, &along, threads)?);
             let met = self.met(crossing, profile, |t| t >= first_new)?;
             width = (width * WIDER).min(self.step / FINEST * WIDEST);
-            let (met, drawn) = self.draw_near(met, width, profile)?;
-            resolved.displaced = resolved.displaced.max(drawn);
+            limit = (limit * WIDER).min(self.step / FINEST * FARTHEST);
+            let (mut met, mut moved) = self.draw_near(met, width, profile)?;
+            if resolved.rounds >= REFILL_AFTER && 2 * met.crossing.len() >= pairs_before {
+                let refilled;
+                (met, refilled) = self.refill(met, limit, profile)?;
+                moved = moved.max(refilled);
+            }
+            resolved.displaced = resolved.displaced.max(moved);
             (crossing, latest) = (met.crossing, Some(met.overlay));
         }
         Ok(resolved)
@@ -577,13 +596,23 @@ impl State<'_, '_, '_> {
     }
 }
 
-/// The triangle that crosses most others, if cutting these pairs would take more than there is room for.
-fn beyond_reach(crossing: &[[u32; 2]]) -> Option<u32> {
-    let mut met: BTreeMap<u32, u64> = BTreeMap::new();
-    crossing.iter().flatten().for_each(|t| *met.entry(*t).or_insert(0) += 1);
-    let meetings: u64 = met.values().map(|count| count * count).sum();
-    let worst = met.into_iter().max_by_key(|(t, count)| (*count, std::cmp::Reverse(*t)));
-    worst.filter(|_| meetings > MOST_MEETINGS).map(|(t, _)| t)
+/// The triangle on which most others come close to each other, if cutting these pairs would take more than there is room for.
+fn beyond_reach(bounds: impl Fn(u32) -> Bounds, crossing: &[[u32; 2]]) -> Option<u32> {
+    let mut cuts: BTreeMap<u32, Vec<Bounds>> = BTreeMap::new();
+    for [a, b] in crossing {
+        let common = bounds(*a).overlap(&bounds(*b));
+        common.into_iter().for_each(|common| [a, b].iter().for_each(|t| cuts.entry(**t).or_default().push(common)));
+    }
+    let (mut all, mut worst) = (0, (0, NONE));
+    for (t, boxes) in cuts {
+        let meetings = boxes::meetings(boxes, MOST_MEETINGS);
+        worst = worst.max((meetings, t));
+        all += meetings;
+        if all > MOST_MEETINGS {
+            return Some(worst.1);
+        }
+    }
+    None
 }
 
 /// The power of two above a coordinate.

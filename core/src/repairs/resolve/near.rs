@@ -29,7 +29,7 @@ struct Changed {
 }
 
 /// The workshop before a pass.
-struct Before {
+pub(super) struct Before {
     triangles: Vec<Triangle>,
     parents: Vec<u32>,
     track: Track,
@@ -41,11 +41,7 @@ impl State<'_, '_, '_> {
         let (mut displaced, mut imprints) = (0f64, true);
         while !met.crossing.is_empty() {
             let region = self.around(&met.crossing);
-            let before = Before {
-                triangles: self.work.triangles.clone(),
-                parents: self.clusters.parents.clone(),
-                track: self.track.clone(),
-            };
+            let before = self.before_pass();
             let first_new = self.work.triangles.len() as u32;
             let mut changed = Changed::default();
             self.thin(&region, width, &mut changed);
@@ -78,7 +74,11 @@ impl State<'_, '_, '_> {
         around
     }
 
-    fn take_back(&mut self, before: Before) {
+    pub(super) fn before_pass(&self) -> Before {
+        Before { triangles: self.work.triangles.clone(), parents: self.clusters.parents.clone(), track: self.track.clone() }
+    }
+
+    pub(super) fn take_back(&mut self, before: Before) {
         // What was fetched meanwhile stays.
         let mut triangles = before.triangles;
         let count = triangles.len();
@@ -249,7 +249,7 @@ fn on_segment(a: DVec3, b: DVec3, p: DVec3) -> DVec3 {
 }
 
 /// The nearest point of a triangle.
-fn nearest(points: &[DVec3; 3], p: DVec3) -> DVec3 {
+pub(super) fn nearest(points: &[DVec3; 3], p: DVec3) -> DVec3 {
     let [a, b, c] = *points;
     let n = (b - a).cross(c - a);
     if [(a, b), (b, c), (c, a)].iter().all(|(u, v)| (*v - *u).cross(p - *u).dot(n) > 0.0) {

@@ -18,17 +18,19 @@ struct Done {
     /// The last round in which any did.
     rounds: u32,
     snapped: bool,
+    refilled: bool,
     moved: f64,
 }
 
 impl Done {
-    const NOTHING: Self = Self { bounds: Bounds::EMPTY, triangles: 0, rounds: 0, snapped: false, moved: 0.0 };
+    const NOTHING: Self = Self { bounds: Bounds::EMPTY, triangles: 0, rounds: 0, snapped: false, refilled: false, moved: 0.0 };
 
     fn add(&mut self, other: &Self) {
         self.bounds.add(&other.bounds);
         self.triangles += other.triangles;
         self.rounds = self.rounds.max(other.rounds);
         self.snapped |= other.snapped;
+        self.refilled |= other.refilled;
         self.moved = self.moved.max(other.moved);
     }
 
@@ -69,6 +71,15 @@ impl Track {
         }
     }
 
+    /// This triangle was taken out, and a patch came in its place that is so far away.
+    pub(super) fn refilled(&mut self, clusters: &Clusters, triangle: u32, by: f64) {
+        let piece = clusters.of_triangle.get(triangle as usize);
+        if let Some(done) = piece.and_then(|piece| self.0.get_mut(piece)) {
+            done.refilled = true;
+            done.moved = done.moved.max(by);
+        }
+    }
+
     /// A vertex of this triangle's piece was rounded by so much.
     pub(super) fn moved(&mut self, clusters: &Clusters, triangle: u32, by: f64) {
         let piece = clusters.of_triangle.get(triangle as usize);
@@ -83,7 +94,11 @@ impl Track {
         for (piece, done) in &self.0 {
             by_cluster.entry(chunk::find(&mut clusters.parents, *piece)).or_insert(Done::NOTHING).add(done);
         }
-        let rung = |done: &Done| if done.snapped { Rung::Snapped } else { Rung::Cut };
+        let rung = |done: &Done| match done {
+            Done { refilled: true, .. } => Rung::Refilled,
+            Done { snapped: true, .. } => Rung::Snapped,
+            _ => Rung::Cut,
+        };
         by_cluster.values().map(|done| done.region(rung(done))).collect()
     }
 

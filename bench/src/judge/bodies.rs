@@ -2,7 +2,7 @@
 //!
 //! A body is a sealed component (every edge is used equally often in each direction) of more than a millionth of the volume of all.
 //! Lines through its largest triangles give points that lie deep inside of it, where the winding number of all sealed components is
-//! not zero: there is material, and a cavity (a component inside out within another) has no such point. They are taken where nothing
+//! not zero: there is material, and a cavity (a component inside out within another, or within the box of an open one) has no such point. They are taken where nothing
 //! else is, as far as there are such places. A body is lost if none of its points has a winding number other than zero in the other
 //! mesh: exact where that is sealed, generalised and rounded else.
 
@@ -54,7 +54,12 @@ impl Bodies {
         let parts = &shells.components;
         let volume = |c: usize| if parts.sealed[c] { parts.volumes[c].abs() } else { 0.0 };
         let all: f64 = (0..parts.volumes.len()).map(volume).sum();
-        let mut bodies: Vec<_> = (0..parts.volumes.len()).filter(|&c| volume(c) > SHARE * all).collect();
+        let boxes = boxes(&shells);
+        // What is inside out and lies in the box of an open component is a cavity of it once that is closed, for all that anybody knows.
+        let within = |a: usize, b: usize| (0..3).all(|k| boxes[b].0[k] <= boxes[a].0[k] && boxes[a].1[k] <= boxes[b].1[k]);
+        let open: Vec<usize> = (0..parts.volumes.len()).filter(|&c| !parts.sealed[c]).collect();
+        let may_be_cavity = |c: usize| parts.volumes[c] < 0.0 && open.iter().any(|&o| within(c, o));
+        let mut bodies: Vec<_> = (0..parts.volumes.len()).filter(|&c| volume(c) > SHARE * all && !may_be_cavity(c)).collect();
         bodies.sort_by(|&a, &b| volume(b).total_cmp(&volume(a)).then(a.cmp(&b)));
         bodies.truncate(MOST);
         let largest = shells.largest_triangles(LINES);
@@ -116,19 +121,31 @@ fn inner_points(shells: &Shells, body: u32, triangles: &[u32]) -> Vec<Inner> {
     found.into_iter().take(POINTS).map(|(_, _, inner)| inner).collect()
 }
 
+/// The box of each component.
+fn boxes(shells: &Shells) -> Vec<([f64; 3], [f64; 3])> {
+    let parts = &shells.components;
+    let mut boxes = vec![([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]); parts.volumes.len()];
+    for (triangle, &component) in parts.triangles.iter().zip(&parts.of) {
+        let (lo, hi) = &mut boxes[component as usize];
+        for (k, x) in triangle.iter().flat_map(|corner| corner.map(f64::from).into_iter().enumerate()) {
+            lo[k] = lo[k].min(x);
+            hi[k] = hi[k].max(x);
+        }
+    }
+    boxes
+}
+
 /// Does any component enclose something? An open one is taken as if all its rims were closed by cones to one point near them, which
 /// have no volume about that point.
 fn encloses(shells: &Shells) -> bool {
     let parts = &shells.components;
     let count = parts.volumes.len();
-    let mut boxes = vec![([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]); count];
+    let boxes = boxes(shells);
     let mut rims = vec![([0.0; 3], 0.0); count];
     for (index, triangle) in parts.triangles.iter().enumerate() {
         let component = parts.of[index] as usize;
         for corner in triangle {
             for (k, x) in corner.map(f64::from).into_iter().enumerate() {
-                boxes[component].0[k] = boxes[component].0[k].min(x);
-                boxes[component].1[k] = boxes[component].1[k].max(x);
                 rims[component].0[k] += if parts.leaky[index] { x } else { 0.0 };
             }
             rims[component].1 += f64::from(u8::from(parts.leaky[index]));

@@ -10,6 +10,7 @@ mod close;
 mod collinear;
 mod debris;
 mod duplicates;
+mod facing;
 mod guard;
 mod islands;
 mod junction;
@@ -112,9 +113,16 @@ pub(crate) fn run(
     log.time("debris", "triangles of open specks dropped, which together are next to nothing of the surface", || {
         debris::drop(survey, shop, profile)
     });
+    let mut faced = facing::Faced::default();
+    if profile.resolve_crossings && survey.crossing_pairs.is_some() {
+        log.time("facing", "triangles turned that are seen from behind, or whose neighbours are", || {
+            faced = facing::face_outward(survey, shop, &mut reversed);
+            faced.triangles
+        });
+    }
     let mut contradictions = 0;
     log.time("orient", "triangles turned to agree with their neighbours", || {
-        let turned = orient::make_coherent(survey, shop, &mut reversed);
+        let turned = orient::make_coherent(survey, shop, &mut reversed, &faced.settled);
         contradictions = turned.contradictions;
         turned.triangles
     });

@@ -10,18 +10,18 @@ use crate::sums::Bounds;
 use crate::survey::Survey;
 
 /// Union-find with the parity of each node against its root.
-struct Parity {
+pub(super) struct Parity {
     parents: Vec<u32>,
     odd: Vec<bool>,
 }
 
 impl Parity {
-    fn new(nodes: usize) -> Self {
+    pub(super) fn new(nodes: usize) -> Self {
         Self { parents: (0..nodes as u32).collect(), odd: vec![false; nodes] }
     }
 
     /// Root and parity against it. The path is made flat.
-    fn find(&mut self, node: u32) -> (u32, bool) {
+    pub(super) fn find(&mut self, node: u32) -> (u32, bool) {
         let (mut root, mut odd) = (node, false);
         while self.parents[root as usize] != root {
             odd ^= self.odd[root as usize];
@@ -39,7 +39,7 @@ impl Parity {
     }
 
     /// Says that two nodes agree, or not; `false` if that contradicts what was said before.
-    fn relate(&mut self, a: u32, b: u32, disagree: bool) -> bool {
+    pub(super) fn relate(&mut self, a: u32, b: u32, disagree: bool) -> bool {
         let ((ra, pa), (rb, pb)) = (self.find(a), self.find(b));
         let odd = pa ^ pb ^ disagree;
         if ra == rb {
@@ -60,8 +60,8 @@ pub(super) struct Turned {
 }
 
 /// Makes two-triangle edges agree: in each connected surface the smaller part is turned, of equal parts the one with the later
-/// triangle. O(patches + workshop).
-pub(super) fn make_coherent(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed) -> Turned {
+/// triangle. What is `settled`, by triangle of the workshop, stays as it is. O(patches + workshop).
+pub(super) fn make_coherent(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed, settled: &[bool]) -> Turned {
     let (shop, edges) = work.edges();
     let patches = survey.patches.len() as u32;
     let mut parity = Parity::new(survey.patches.len() + shop.triangles.len());
@@ -74,6 +74,7 @@ pub(super) fn make_coherent(survey: &Survey<'_>, work: &mut Work<'_>, reversed: 
     let mut turned = Turned::default();
     for edge in edges.iter() {
         if let [a, b] = edge.uses
+            && settled.get(a.triangle as usize) != Some(&true)
             && !parity.relate(patches + a.triangle, patches + b.triangle, edge.is_inconsistent())
         {
             turned.contradictions += 1;
@@ -104,7 +105,7 @@ pub(super) fn make_coherent(survey: &Survey<'_>, work: &mut Work<'_>, reversed: 
 }
 
 /// Turns a node of the parity structure: a patch or a triangle of the workshop.
-fn turn(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed, node: u32) {
+pub(super) fn turn(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed, node: u32) {
     match node.checked_sub(survey.patches.len() as u32) {
         None => reversed.patches[node as usize] ^= true,
         Some(t) => work.turn(t),
@@ -197,7 +198,7 @@ mod tests {
     fn a_flipped_face_is_turned_back() {
         let mut mesh = cube();
         mesh[5] = reversed(&mesh[5..6])[0];
-        let got = after(&mesh, |d, turned| make_coherent(&d.survey, &mut Work::new(&mut d.shop), turned));
+        let got = after(&mesh, |d, turned| make_coherent(&d.survey, &mut Work::new(&mut d.shop), turned, &[]));
         assert_eq!((got.result.triangles, got.result.contradictions, got.untouched), (1, 0, 11));
         assert!(got.verdict.good, "{:?}", got.verdict);
     }

@@ -262,7 +262,7 @@ mod tests {
     fn seated_by(mesh: &[Corners], profile: &Profile) -> After<u64> {
         after(mesh, |d, turned| {
             let work = &mut Work::new(&mut d.shop);
-            orient::make_coherent(&d.survey, work, turned);
+            orient::make_coherent(&d.survey, work, turned, &[]);
             let seated = let_down(&d.survey, work, turned, profile);
             close::fill_loops(&d.survey, work, turned, &d.tolerance, profile, 1);
             let pieces = orient::pieces(&d.survey, work, turned);

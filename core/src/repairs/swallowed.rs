@@ -157,7 +157,7 @@ mod tests {
         let profile = Profile { bodies, ..Profile::default() };
         after(mesh, |d, turned| {
             let work = &mut Work::new(&mut d.shop);
-            orient::make_coherent(&d.survey, work, turned);
+            orient::make_coherent(&d.survey, work, turned, &[]);
             close::fill_loops(&d.survey, work, turned, &d.tolerance, &profile, 1);
             let pieces = orient::pieces(&d.survey, work, turned);
             orient::make_outward(&d.survey, work, turned, &pieces);

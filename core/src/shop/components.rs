@@ -55,6 +55,8 @@ pub(crate) enum Through<'a> {
     EveryEdge,
     /// Not through non-manifold edges: the sheets between them.
     ManifoldEdges,
+    /// Nor through edges whose two triangles disagree on their directions.
+    CoherentEdges,
     /// Through non-manifold edges only between sheets (as given) that are open by themselves: bodies that touch along an edge stay
     /// apart, and what is closed only together stays together.
     OpenSheets(&'a Components),
@@ -66,6 +68,7 @@ impl Through<'_> {
         match self {
             Self::EveryEdge => true,
             Self::ManifoldEdges => !edge.is_nonmanifold(),
+            Self::CoherentEdges => !edge.is_nonmanifold() && !edge.is_inconsistent(),
             Self::OpenSheets(sheets) => {
                 !edge.is_nonmanifold() || sheets.list[sheets.of_triangle[triangle as usize] as usize].open
             }

@@ -8,7 +8,7 @@ use super::super::work::Work;
 use super::super::{collinear, duplicates};
 use super::cut::Cut;
 use super::sides::Sides;
-use super::{Failure, State, Stuck, vertices};
+use super::{Failure, State, Stuck, Tried, vertices};
 use crate::chunk::NONE;
 use crate::defects;
 use crate::shop::{Shop, Vertex, bits};
@@ -36,13 +36,13 @@ fn fate(front: Option<i32>, back: Option<i32>) -> Fate {
 
 impl State<'_, '_, '_> {
     /// Makes of the workshop what the windings say. Returns how far new vertices were moved.
-    pub(super) fn apply(&mut self, cut: &Cut, sides: &Sides, windings: &[Option<i32>]) -> Result<f64, Stuck> {
+    pub(super) fn apply(&mut self, cut: &Cut, sides: &Sides, windings: &[Option<i32>]) -> Tried<f64> {
         let of = |[front, back]: [u32; 2]| fate(windings[front as usize], windings[back as usize]);
         let fates: Vec<Fate> = cut.arrangement.pieces.iter().map(|piece| of(piece.cells)).collect();
         let unknown = cut.arrangement.pieces.iter().zip(&fates).filter(|(_, fate)| **fate == Fate::Unknown);
         let triangles: Vec<u32> = unknown.map(|(piece, _)| cut.sources[piece.source as usize]).collect();
         if !triangles.is_empty() {
-            return Err(Stuck { failure: Failure::Contradiction, triangles });
+            return Err(Stuck { failure: Failure::Contradiction, triangles }.into());
         }
         let (work, reversed) = (&mut *self.work, &mut *self.reversed);
         for p in (0..sides.patches).filter(|p| self.clusters.holds_patch(*p)) {

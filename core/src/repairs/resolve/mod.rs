@@ -42,11 +42,11 @@ use crate::arrange::Arrange;
 use crate::boxes;
 use crate::chunk::{self, NONE, Suspect};
 use crate::defects;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::report::Region;
 use crate::settings::{Bodies, Limits, Profile};
 use crate::shop::components::{Component, Components, Reversed};
-use crate::shop::{Origin, Shop, Triangle, Vertex, bits};
+use crate::shop::{self, Origin, Shop, Triangle, Vertex, bits};
 use crate::sums::{Bounds, Extent};
 use crate::survey::{Division, Survey};
 
@@ -114,6 +114,10 @@ const FEW: usize = 1024;
 /// some hundred bytes each.
 const MOST_MEETINGS: u64 = 1 << 24;
 
+/// What cutting takes: for each of these meetings, and for each pair that crosses. (Measured: TODO)
+const BYTES_PER_MEETING: u64 = 80;
+const BYTES_PER_PAIR: u64 = 2048;
+
 /// What is nearer than so many steps of the finest grid, after the first round of cutting, is made one, and so many times farther after every
 /// other one; but nothing beyond this share of the power of two above the largest coordinate.
 const WIDER: f64 = 4.0;
@@ -125,6 +129,9 @@ const REFILL_AFTER: u32 = 2;
 /// And no patch in its place is farther away than this share of the power of two above the largest coordinate, nor than a width farther in each
 /// round.
 const FARTHEST: f64 = 1.0 / 256.0;
+
+/// A closed surface is a flake if it is no thicker than this share of the step of new vertices.
+const FLAKE: f64 = 1.0 / 16.0;
 
 /// Times that everything is done anew without the clusters that failed.
 const ATTEMPTS: usize = 8;
@@ -191,7 +198,7 @@ pub(super) fn resolve(
         state.clusters = Clusters::of(&pieces, &blocked);
         state.first_vertex = state.work.positions.len() as Vertex;
         let taken_part: Vec<bool> = (0..state.work.triangles.len() as u32).map(|t| state.clusters.holds(t)).collect();
-        match state.attempt(engine, &overlay, &pairs, profile, means.limits.threads) {
+        match state.attempt(engine, &overlay, &pairs, profile, means.limits) {
             Ok(resolved) => {
                 let pieces = orient::pieces(state.survey, state.work, state.reversed);
                 let (bodies_now, volume_now) = measured(&pieces);
@@ -207,7 +214,8 @@ pub(super) fn resolve(
                     ..resolved
                 });
             }
-            Err(Stuck { failure, triangles }) => {
+            Err(Halted::NoMemory { needed, triangles }) => return Err(refused(means, needed, triangles)),
+            Err(Halted::Stuck(Stuck { failure, triangles })) => {
                 let failed = state.clusters.pieces_of(&triangles);
                 state.restore();
                 regions_left.extend(state.unsettled(&failed, failure));
@@ -290,13 +298,29 @@ struct Stuck {
     triangles: Vec<u32>,
 }
 
-type Tried<T> = std::result::Result<T, Stuck>;
-
 impl Stuck {
     fn with(failure: Failure) -> Self {
         Self { failure, triangles: Vec::new() }
     }
 }
+
+/// Why an attempt ended before its time.
+enum Halted {
+    Stuck(Stuck),
+    /// It would have needed so many bytes.
+    NoMemory {
+        needed: u64,
+        triangles: usize,
+    },
+}
+
+impl From<Stuck> for Halted {
+    fn from(stuck: Stuck) -> Self {
+        Self::Stuck(stuck)
+    }
+}
+
+type Tried<T> = std::result::Result<T, Halted>;
 
 /// What everything was before.
 struct Before {
@@ -374,7 +398,7 @@ impl State<'_, '_, '_> {
         overlay: &Overlay,
         pairs: &[[u32; 2]],
         profile: &Profile,
-        threads: usize,
+        limits: &Limits,
     ) -> Tried<Resolved> {
         let mut resolved = Resolved::default();
         self.track = Track::default();
@@ -388,10 +412,15 @@ impl State<'_, '_, '_> {
         while !crossing.is_empty() {
             let triangles: BTreeSet<u32> = crossing.iter().flatten().copied().collect();
             if resolved.rounds == ROUNDS || resolved.rounds > 0 && crossing.len() > most {
-                return Err(Stuck { failure: Failure::Endless, triangles: triangles.into_iter().collect() });
+                return Err(Stuck { failure: Failure::Endless, triangles: triangles.into_iter().collect() }.into());
             }
-            if let Some(worst) = beyond_reach(|t| Bounds::of(&self.work.points(t)), &crossing) {
-                return Err(Stuck { failure: Failure::TooMany, triangles: vec![worst] });
+            let meetings = meetings(|t| Bounds::of(&self.work.points(t)), &crossing);
+            let meetings = meetings.map_err(|worst| Stuck { failure: Failure::TooMany, triangles: vec![worst] })?;
+            let needed = shop::bytes(self.work.triangles.len() as u64, self.work.positions.len() as u64)
+                + meetings * BYTES_PER_MEETING
+                + crossing.len() as u64 * BYTES_PER_PAIR;
+            if needed > limits.memory_bytes {
+                return Err(Halted::NoMemory { needed, triangles: triangles.len() });
             }
             tracing::debug!(round = resolved.rounds, pairs = crossing.len(), triangles = triangles.len(), "Crossings.");
             resolved.rounds += 1;
@@ -399,7 +428,7 @@ impl State<'_, '_, '_> {
             let pairs_before = crossing.len();
             let along = self.with_edges_along(latest.as_ref().unwrap_or(overlay), &triangles).ok_or_else(too_many)?;
             let first_new = self.work.triangles.len() as u32;
-            resolved.displaced = resolved.displaced.max(self.round(engine, &triangles, &along, threads)?);
+            resolved.displaced = resolved.displaced.max(self.round(engine, &triangles, &along, limits.threads)?);
             let met = self.met(crossing, profile, |t| t >= first_new)?;
             width = (width * WIDER).min(self.step / FINEST * WIDEST);
             limit = (limit * WIDER).min(self.step / FINEST * FARTHEST);
@@ -560,21 +589,31 @@ impl State<'_, '_, '_> {
                 triangles.extend(own().map(|used| used.triangle));
             }
         }
-        if triangles.is_empty() { Ok(()) } else { Err(Stuck { failure: Failure::Opened, triangles }) }
+        if triangles.is_empty() { Ok(()) } else { Err(Stuck { failure: Failure::Opened, triangles }.into()) }
     }
 
-    /// Drops closed surfaces of nothing but parts of triangles that are no thicker than what rounding moves: they are nothing but that.
+    /// Drops closed surfaces of nothing but parts of triangles that are no thicker than what rounding moves: they are nothing but that. So do those
+    /// with other triangles, too, that are far thinner: what was cut off one and is next to nothing.
     fn drop_specks(&mut self, pieces: &Components) {
         let measure = &self.survey.measure;
-        let finest = self.step;
-        let thin = |piece: &Component| measure.volume(piece.extent).abs() <= measure.area(piece.extent) * finest;
-        let mut is_speck: Vec<bool> = pieces.list.iter().map(|piece| !piece.open && thin(piece)).collect();
-        let as_read = |t: &u32| matches!(self.work.triangles[*t as usize].origin, Origin::Input(_));
-        let kept = self.work.living().filter(as_read).map(|t| pieces.of_triangle[t as usize]);
-        for piece in kept.chain(pieces.of_patch.iter().copied()).filter(|piece| *piece != NONE) {
-            is_speck[piece as usize] = false;
+        let thickness = |piece: &Component| measure.volume(piece.extent).abs() / measure.area(piece.extent);
+        let flakes = pieces.list.iter().map(|piece| !piece.open && thickness(piece) <= self.step * FLAKE);
+        let mut is_flake: Vec<bool> = flakes.collect();
+        let mut is_speck: Vec<bool> = pieces.list.iter().map(|piece| !piece.open && thickness(piece) <= self.step).collect();
+        let mut is_cut = vec![false; pieces.list.len()];
+        for t in self.work.living() {
+            let piece = pieces.of_triangle[t as usize] as usize;
+            let as_read = matches!(self.work.triangles[t as usize].origin, Origin::Input(_));
+            is_cut[piece] |= !as_read;
+            is_speck[piece] &= !as_read;
         }
-        let goes = |t: u32| is_speck.get(pieces.of_triangle[t as usize] as usize) == Some(&true);
+        for piece in pieces.of_patch.iter().filter(|piece| **piece != NONE) {
+            (is_flake[*piece as usize], is_speck[*piece as usize]) = (false, false);
+        }
+        let goes = |t: u32| {
+            let piece = pieces.of_triangle[t as usize] as usize;
+            is_speck[piece] || is_flake[piece] && is_cut[piece]
+        };
         let specks: Vec<u32> = self.work.living().filter(|t| goes(*t)).collect();
         specks.into_iter().for_each(|t| self.work.kill(t));
     }
@@ -596,8 +635,9 @@ impl State<'_, '_, '_> {
     }
 }
 
-/// The triangle on which most others come close to each other, if cutting these pairs would take more than there is room for.
-fn beyond_reach(bounds: impl Fn(u32) -> Bounds, crossing: &[[u32; 2]]) -> Option<u32> {
+/// How many points the cuts of these pairs may have in common, at most; if they are too many, the triangle on which most others come close to
+/// each other.
+fn meetings(bounds: impl Fn(u32) -> Bounds, crossing: &[[u32; 2]]) -> std::result::Result<u64, u32> {
     let mut cuts: BTreeMap<u32, Vec<Bounds>> = BTreeMap::new();
     for [a, b] in crossing {
         let common = bounds(*a).overlap(&bounds(*b));
@@ -609,10 +649,23 @@ fn beyond_reach(bounds: impl Fn(u32) -> Bounds, crossing: &[[u32; 2]]) -> Option
         worst = worst.max((meetings, t));
         all += meetings;
         if all > MOST_MEETINGS {
-            return Some(worst.1);
+            return Err(worst.1);
         }
     }
-    None
+    Ok(all)
+}
+
+/// What cutting so many triangles along each other needs, beside what there is.
+fn refused(means: &Means<'_>, needed: u64, triangles: usize) -> Error {
+    let mebibytes = |bytes: u64| bytes.div_ceil(1 << 20);
+    Error::Refused {
+        path: means.path.into(),
+        reason: format!("cutting {triangles} triangles along what they cross needs about {} MiB of memory", mebibytes(needed)),
+        advice: format!(
+            "the budget is {} MiB: raise --memory, or leave crossings (resolve_crossings)",
+            means.limits.memory_bytes >> 20
+        ),
+    }
 }
 
 /// The power of two above a coordinate.

@@ -205,9 +205,9 @@ fn what_crosses_too_much_is_told_by_its_worst_triangle() {
     let fan: Vec<[u32; 2]> = (1..40_000).map(|t| [0, t]).collect();
     let along = |t: u32| Bounds { lo: [t as f32, 0.0, 0.0], hi: [t as f32 + 0.5, 1.0, 1.0] };
     let below_all = |t: u32| if t == 0 { Bounds { lo: [0.0; 3], hi: [40_000.0, 1.0, 1.0] } } else { along(t) };
-    assert_eq!(beyond_reach(below_all, &fan), None);
+    assert_eq!(meetings(below_all, &fan), Ok(0));
     let all: Vec<[u32; 2]> = (0..400).flat_map(|a| (a + 1..400).map(move |b| [a, b])).chain([[7, 400]]).collect();
-    assert_eq!(beyond_reach(|_| Bounds { lo: [0.0; 3], hi: [1.0; 3] }, &all), Some(7));
+    assert_eq!(meetings(|_| Bounds { lo: [0.0; 3], hi: [1.0; 3] }, &all), Err(7));
 }
 
 /// Bodies that cross each other are one region, others another.

@@ -27,6 +27,30 @@ fn resolved(triangles: &[Corners]) -> After<Resolved> {
     resolved_by(triangles, &Profile::default())
 }
 
+/// A hundred cubes, each across the next: more memory than the budget is a refusal that says how much, and nothing is changed by a budget
+/// that is enough.
+#[test]
+fn what_would_take_more_memory_than_there_is_is_refused() {
+    let row: Vec<Corners> =
+        (0..100).flat_map(|k| shifted(&cube(), [0.75 * k as f32, 0.125 * (k % 3) as f32, 0.125 * (k % 2) as f32])).collect();
+    let with = |memory_bytes: u64| {
+        after(&row, |d, turned| {
+            let limits = Limits { threads: 1, memory_bytes, ..Limits::default() };
+            let means = Means { path: Path::new("test"), limits: &limits, progress: &Quiet };
+            let work = &mut Work::new(&mut d.shop);
+            resolve(&Rational, &mut d.survey, work, turned, &Profile::default(), false, &means).map(|resolved| resolved.pairs)
+        })
+    };
+    let most = Limits::default().memory_bytes;
+    let enough = with(most);
+    let pairs = enough.result.unwrap();
+    assert!(enough.verdict.good);
+    // The survey has its own budget, which is less than this.
+    let needed = pairs * BYTES_PER_PAIR;
+    let refused = with(needed).result.unwrap_err().to_string();
+    assert!(refused.contains("needs about") && refused.contains("MiB") && refused.contains("--memory"), "{refused}");
+}
+
 #[test]
 fn crossing_cubes_become_one_body() {
     let both = [cube(), shifted(&cube(), [0.5, 0.625, 0.75])].concat();

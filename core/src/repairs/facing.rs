@@ -20,7 +20,8 @@ use crate::shop::Shop;
 use crate::shop::components::{Components, Reversed, Through};
 use crate::survey::Survey;
 
-/// The smaller part of a sheet that disagrees with itself is just turned if it has no more triangles than this, or than this share of all.
+/// The smaller part of a sheet that disagrees with itself is just turned if it has no more triangles than this, or than this share of all. So is it
+/// everywhere if what is seen to be otherwise is less than this share of all surface.
 const FEW: u64 = 16;
 const SMALL: f64 = 0.01;
 
@@ -82,7 +83,8 @@ pub(super) fn face_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &
         (0..parts.list.len()).filter(|p| turned[*p]).for_each(|p| count[sheet_of[p] as usize] += parts.list[p].triangles);
         count
     };
-    for (sheet, count) in smaller(&odd_ones(&mut alone, &parts)).into_iter().enumerate() {
+    let by_neighbours = odd_ones(&mut alone, &parts);
+    for (sheet, count) in smaller(&by_neighbours).into_iter().enumerate() {
         looked_at[sheet] |= count > FEW && count as f64 > SMALL * sheets.list[sheet].triangles as f64;
     }
     let mut asked: Vec<u32> = (0..parts.list.len() as u32).filter(|p| looked_at[sheet_of[*p as usize] as usize]).collect();
@@ -92,6 +94,14 @@ pub(super) fn face_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &
     asked.sort_by_key(|p| (std::cmp::Reverse(parts.list[*p as usize].extent.area), parts.list[*p as usize].sample));
     asked.truncate(MOST);
     let seen = seen(survey, shop, reversed, &parts, &asked);
+    // Where hardly anything is seen otherwise than neighbours have it, they are to be followed everywhere.
+    let all: i128 = parts.list.iter().map(|part| part.extent.area).sum();
+    let is_contested =
+        |(part, sides): &(&u32, &Sides)| sides.is_behind().is_some_and(|behind| behind != by_neighbours[**part as usize]);
+    let contested = seen.iter().filter(is_contested).map(|(part, _)| parts.list[*part as usize].extent.area);
+    if (contested.sum::<i128>() as f64) < SMALL * all as f64 {
+        return Faced::default();
+    }
     let mut faces = Parity::new(parts.list.len());
     let mut known = vec![None; parts.list.len()];
     seen.iter().for_each(|(part, sides)| known[*part as usize] = sides.is_behind());

@@ -181,6 +181,7 @@ pub(super) fn resolve(
         before,
         clusters: Clusters::default(),
         track: Track::default(),
+        first_triangle: 0,
         first_vertex: 0,
         step: largest * FINEST,
     };
@@ -197,6 +198,7 @@ pub(super) fn resolve(
             blocked.fill(true);
         }
         state.clusters = Clusters::of(&pieces, &blocked);
+        state.first_triangle = state.work.triangles.len() as u32;
         state.first_vertex = state.work.positions.len() as Vertex;
         let taken_part: Vec<bool> = (0..state.work.triangles.len() as u32).map(|t| state.clusters.holds(t)).collect();
         match state.attempt(engine, &overlay, &pairs, profile, means.limits) {
@@ -386,6 +388,8 @@ pub(super) struct State<'a, 'r, 'w> {
     before: Before,
     clusters: Clusters,
     track: Track,
+    /// Triangles from here on are new ones, but for those that were fetched.
+    first_triangle: u32,
     /// Vertices from here on are new ones.
     first_vertex: Vertex,
     /// They are on a grid of this step, but for what is exact in f32.
@@ -605,7 +609,7 @@ impl State<'_, '_, '_> {
         for t in self.work.living() {
             let piece = pieces.of_triangle[t as usize] as usize;
             let as_read = matches!(self.work.triangles[t as usize].origin, Origin::Input(_));
-            is_cut[piece] |= !as_read;
+            is_cut[piece] |= !as_read && t >= self.first_triangle;
             is_speck[piece] &= !as_read;
         }
         for piece in pieces.of_patch.iter().filter(|piece| **piece != NONE) {

@@ -7,6 +7,7 @@
 //! meshes based on ray casting", JCGT 3(4), 2014, who cast them in all directions). What is seen from both sides alike, or from none, follows its
 //! neighbours. Edges between parts that are both right, and disagree, stay: no surface goes on there, and they are balanced later.
 
+use std::cmp::{Ordering, Reverse};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use robust::Coord;
@@ -16,8 +17,9 @@ use super::work::Work;
 use crate::bodies::{self, Direction, Source};
 use crate::chunk::NONE;
 use crate::record;
-use crate::shop::Shop;
-use crate::shop::components::{Components, Reversed, Through};
+use crate::shop::components::{Components, Reversed, Sample, Through};
+use crate::shop::edges::Edges;
+use crate::shop::{Shop, place};
 use crate::survey::Survey;
 
 /// The smaller part of a sheet that disagrees with itself is just turned if it has no more triangles than this, or than this share of all. So is it
@@ -54,111 +56,136 @@ pub(super) fn face_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &
     if !edges.iter().any(|edge| edge.is_unbalanced() && edge.uses.len() > 1) {
         return Faced::default();
     }
-    let parts = Components::of(survey, shop, edges, reversed, Through::CoherentEdges);
-    let sheets = Components::of(survey, shop, edges, reversed, Through::ManifoldEdges);
-    let mut sheet_of = vec![NONE; parts.list.len()];
-    let nodes = parts.of_patch.iter().zip(&sheets.of_patch).chain(parts.of_triangle.iter().zip(&sheets.of_triangle));
-    nodes.filter(|(part, _)| **part != NONE).for_each(|(part, sheet)| sheet_of[*part as usize] = *sheet);
-    // How many edges there are between parts that disagree there.
-    let mut between: BTreeMap<[u32; 2], u64> = BTreeMap::new();
-    let mut looked_at = vec![false; sheets.list.len()];
-    for edge in edges.iter().filter(|edge| edge.is_unbalanced() && edge.uses.len() > 1) {
-        let of = |k: usize| parts.of_triangle[edge.uses[k].triangle as usize];
-        if edge.uses.len() == 2 {
-            *between.entry([of(0).min(of(1)), of(0).max(of(1))]).or_insert(0) += 1;
-        } else {
-            edge.uses.iter().for_each(|used| looked_at[sheets.of_triangle[used.triangle as usize] as usize] = true);
-        }
-    }
-    let mut by_edges: Vec<([u32; 2], u64)> = between.into_iter().filter(|([a, b], _)| a != b).collect();
-    by_edges.sort_by_key(|(pair, count)| (std::cmp::Reverse(*count), *pair));
-    let links: Vec<[u32; 2]> = by_edges.into_iter().map(|(pair, _)| pair).collect();
+    let surface = Surface::of(survey, shop, edges, reversed);
+    let parts = &surface.parts.list;
     // What would be turned of each sheet if only neighbours counted.
-    let mut alone = Parity::new(parts.list.len());
-    links.iter().for_each(|[a, b]| {
-        alone.relate(*a, *b, true);
-    });
-    let smaller = |turned: &[bool]| {
-        let mut count = vec![0; sheets.list.len()];
-        (0..parts.list.len()).filter(|p| turned[*p]).for_each(|p| count[sheet_of[p] as usize] += parts.list[p].triangles);
-        count
-    };
-    let by_neighbours = odd_ones(&mut alone, &parts);
-    for (sheet, count) in smaller(&by_neighbours).into_iter().enumerate() {
-        looked_at[sheet] |= count > FEW && count as f64 > SMALL * sheets.list[sheet].triangles as f64;
-    }
-    let mut asked: Vec<u32> = (0..parts.list.len() as u32).filter(|p| looked_at[sheet_of[*p as usize] as usize]).collect();
+    let by_neighbours = surface.follow(&vec![None; parts.len()]);
+    let looked_at = surface.worth_a_look(&by_neighbours);
+    let is_asked = |p: u32| looked_at[surface.sheet_of[p as usize] as usize];
+    let mut asked: Vec<u32> = (0..parts.len() as u32).filter(|p| is_asked(*p)).collect();
     if asked.is_empty() {
         return Faced::default();
     }
-    asked.sort_by_key(|p| (std::cmp::Reverse(parts.list[*p as usize].extent.area), parts.list[*p as usize].sample));
+    asked.sort_by_key(|p| (Reverse(parts[*p as usize].extent.area), parts[*p as usize].sample));
     asked.truncate(MOST);
-    let seen = seen(survey, shop, reversed, &parts, &asked);
+    let seen = seen(survey, shop, reversed, &surface.parts, &asked);
     // Where hardly anything is seen otherwise than neighbours have it, they are to be followed everywhere.
-    let all: i128 = parts.list.iter().map(|part| part.extent.area).sum();
+    let all: i128 = parts.iter().map(|part| part.extent.area).sum();
     let is_contested =
         |(part, sides): &(&u32, &Sides)| sides.is_behind().is_some_and(|behind| behind != by_neighbours[**part as usize]);
-    let contested = seen.iter().filter(is_contested).map(|(part, _)| parts.list[*part as usize].extent.area);
+    let contested = seen.iter().filter(is_contested).map(|(part, _)| parts[*part as usize].extent.area);
     if (contested.sum::<i128>() as f64) < SMALL * all as f64 {
         return Faced::default();
     }
-    let mut faces = Parity::new(parts.list.len());
-    let mut known = vec![None; parts.list.len()];
+    let mut known = vec![None; parts.len()];
     seen.iter().for_each(|(part, sides)| known[*part as usize] = sides.is_behind());
-    for [a, b] in links {
-        // No two that are known depend on each other.
-        let [(ra, _), (rb, _)] = [a, b].map(|p| faces.find(p));
-        let [of_a, of_b] = [ra, rb].map(|root| known[root as usize].map(|_| root));
-        if ra == rb || of_a.is_some() && of_b.is_some() {
-            continue;
-        }
-        // What is known of a group is known of its root.
-        let own = [ra, rb].map(|root| known[root as usize]);
-        faces.relate(a, b, true);
-        let (root, _) = faces.find(ra);
-        let (from, is_behind) = match own {
-            [Some(is_behind), _] => (ra, is_behind),
-            [_, Some(is_behind)] => (rb, is_behind),
-            _ => continue,
-        };
-        known[root as usize] = Some(is_behind ^ faces.find(from).1);
-    }
-    let by_size = odd_ones(&mut faces, &parts);
-    let is_behind = |p: u32, faces: &mut Parity| {
-        let (root, odd) = faces.find(p);
-        known[root as usize].map_or(by_size[p as usize], |is_behind| is_behind ^ odd)
-    };
-    let turns: Vec<bool> =
-        (0..parts.list.len() as u32).map(|p| looked_at[sheet_of[p as usize] as usize] && is_behind(p, &mut faces)).collect();
+    let mut turns = surface.follow(&known);
+    (0..parts.len()).filter(|p| !is_asked(*p as u32)).for_each(|p| turns[p] = false);
     let is_settled = |sheet: &u32| looked_at.get(*sheet as usize) == Some(&true);
-    let mut faced = Faced { triangles: 0, settled: sheets.of_triangle.iter().map(is_settled).collect() };
-    let turned = |part: &u32| turns.get(*part as usize) == Some(&true);
-    faced.triangles = parts.list.iter().zip(&turns).filter(|(_, turns)| **turns).map(|(part, _)| part.triangles).sum();
-    let all = parts.of_patch.iter().chain(&parts.of_triangle).zip(0..).filter(|(part, _)| turned(part));
-    let all: Vec<u32> = all.map(|(_, node)| node).collect();
-    all.into_iter().for_each(|node| turn(survey, work, reversed, node));
-    faced
+    let settled = surface.sheets.of_triangle.iter().map(is_settled).collect();
+    let triangles = parts.iter().zip(&turns).filter(|(_, turns)| **turns).map(|(part, _)| part.triangles).sum();
+    let nodes = surface.parts.of_patch.iter().chain(&surface.parts.of_triangle).zip(0..);
+    let turned = nodes.filter(|(part, _)| turns.get(**part as usize) == Some(&true)).map(|(_, node)| node);
+    turned.for_each(|node| turn(survey, work, reversed, node));
+    Faced { triangles, settled }
 }
 
-/// Which parts are on the smaller side of what they are related to, of equal sides on that with the later triangle.
-fn odd_ones(parity: &mut Parity, parts: &Components) -> Vec<bool> {
-    let count = parts.list.len() as u32;
-    let mut sides: BTreeMap<u32, [(u64, Option<crate::shop::components::Sample>); 2]> = BTreeMap::new();
-    for p in 0..count {
-        let (root, odd) = parity.find(p);
-        let part = &parts.list[p as usize];
-        let side = &mut sides.entry(root).or_default()[usize::from(odd)];
-        side.0 += part.triangles;
-        side.1 = Some(side.1.map_or(part.sample, |first| first.min(part.sample)));
+/// The surface as parts that agree with themselves, and the sheets that they make up.
+struct Surface {
+    parts: Components,
+    sheets: Components,
+    /// By part.
+    sheet_of: Vec<u32>,
+    /// Parts of one sheet that disagree where they meet, those with the most such edges first.
+    links: Vec<[u32; 2]>,
+    /// By sheet: another one ends at it, or goes on from it, and faces the wrong way for that.
+    at_odds: Vec<bool>,
+}
+
+impl Surface {
+    fn of(survey: &Survey<'_>, shop: &Shop, edges: &Edges, reversed: &Reversed) -> Self {
+        let parts = Components::of(survey, shop, edges, reversed, Through::CoherentEdges);
+        let sheets = Components::of(survey, shop, edges, reversed, Through::ManifoldEdges);
+        let mut sheet_of = vec![NONE; parts.list.len()];
+        let nodes = parts.of_patch.iter().zip(&sheets.of_patch).chain(parts.of_triangle.iter().zip(&sheets.of_triangle));
+        nodes.filter(|(part, _)| **part != NONE).for_each(|(part, sheet)| sheet_of[*part as usize] = *sheet);
+        let mut between: HashMap<[u32; 2], u64> = HashMap::new();
+        let mut at_odds = vec![false; sheets.list.len()];
+        for edge in edges.iter().filter(|edge| edge.is_unbalanced()) {
+            match edge.uses {
+                [_] => {}
+                [a, b] => {
+                    let [a, b] = [a, b].map(|used| parts.of_triangle[used.triangle as usize]);
+                    *between.entry([a.min(b), a.max(b)]).or_insert(0) += 1;
+                }
+                uses => uses.iter().for_each(|used| at_odds[sheets.of_triangle[used.triangle as usize] as usize] = true),
+            }
+        }
+        let mut links: Vec<([u32; 2], u64)> = between.into_iter().filter(|([a, b], _)| a != b).collect();
+        // Of as many edges, what comes first in the file.
+        links.sort_by_key(|(pair, count)| {
+            let [a, b] = pair.map(|p| parts.list[p as usize].sample);
+            (Reverse(*count), a.min(b), a.max(b))
+        });
+        let links = links.into_iter().map(|(pair, _)| pair).collect();
+        Self { parts, sheets, sheet_of, links, at_odds }
     }
-    let odd_wins =
-        |[even, odd]: &[(u64, Option<crate::shop::components::Sample>); 2]| odd.0 > even.0 || odd.0 == even.0 && odd.1 < even.1;
-    (0..count)
-        .map(|p| {
+
+    /// By sheet: is it to be looked at? Those at odds with others, and those of which following neighbours turns much.
+    fn worth_a_look(&self, by_neighbours: &[bool]) -> Vec<bool> {
+        let mut turned = vec![0; self.sheets.list.len()];
+        let parts = self.parts.list.iter().zip(&self.sheet_of).zip(by_neighbours);
+        for ((part, sheet), _) in parts.filter(|(_, turns)| **turns) {
+            turned[*sheet as usize] += part.triangles;
+        }
+        let is_much = |count: u64, of: u64| count > FEW && count as f64 > SMALL * of as f64;
+        let sheets = self.sheets.list.iter().zip(&self.at_odds).zip(turned);
+        sheets.map(|((sheet, at_odds), count)| *at_odds || is_much(count, sheet.triangles)).collect()
+    }
+
+    /// By part: is it to be turned? So that what is known to be behind is, and what is not known agrees with its neighbours; between groups of
+    /// parts with nothing known, the smaller side is turned.
+    fn follow(&self, known: &[Option<bool>]) -> Vec<bool> {
+        let count = self.parts.list.len() as u32;
+        let mut parity = Parity::new(self.parts.list.len());
+        // By root of a group: is the root behind?
+        let mut behind = known.to_vec();
+        for [a, b] in &self.links {
+            let (ra, rb) = (parity.find(*a).0, parity.find(*b).0);
+            let (from, is_behind) = match [ra, rb].map(|root| behind[root as usize]) {
+                // No two that are known depend on each other.
+                [Some(_), Some(_)] => continue,
+                [Some(is_behind), None] => (ra, Some(is_behind)),
+                [None, is_behind] => (rb, is_behind),
+            };
+            parity.relate(*a, *b, true);
+            let (root, odd) = parity.find(from);
+            behind[root as usize] = is_behind.map(|is_behind| is_behind ^ odd);
+        }
+        let smaller = self.smaller_sides(&mut parity);
+        let is_turned = |p: u32| {
             let (root, odd) = parity.find(p);
-            odd != sides.get(&root).is_some_and(odd_wins)
-        })
-        .collect()
+            behind[root as usize].map_or(smaller[p as usize], |is_behind| is_behind ^ odd)
+        };
+        (0..count).map(is_turned).collect()
+    }
+
+    /// Which parts are on the smaller side of what they are related to, of equal sides on that with the later triangle.
+    fn smaller_sides(&self, parity: &mut Parity) -> Vec<bool> {
+        let of: Vec<(u32, bool)> = (0..self.parts.list.len() as u32).map(|p| parity.find(p)).collect();
+        let mut sides = vec![[(0, None::<Reverse<Sample>>); 2]; of.len()];
+        for (part, (root, odd)) in self.parts.list.iter().zip(&of) {
+            let (triangles, first) = &mut sides[*root as usize][usize::from(*odd)];
+            *triangles += part.triangles;
+            *first = (*first).max(Some(Reverse(part.sample)));
+        }
+        of.iter()
+            .map(|(root, odd)| {
+                let [even_side, odd_side] = sides[*root as usize];
+                *odd != (odd_side > even_side)
+            })
+            .collect()
+    }
 }
 
 /// Of how many points each side of a part is seen.
@@ -194,7 +221,7 @@ struct Point {
 
 impl Point {
     fn of(corners: [[f32; 3]; 3], record: u32) -> Self {
-        let [a, b, c] = corners.map(crate::shop::place);
+        let [a, b, c] = corners.map(place);
         let x = (u64::from(record) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let x = (x ^ x >> 32).wrapping_mul(0xd6e8_feb8_6659_fd93);
         let share = ((x >> 11) as f64 + 1.0) / (1u64 << 53) as f64;
@@ -206,7 +233,7 @@ impl Point {
             self.corners.as_flattened().iter().map(|x| x.to_bits()).lt(other.corners.as_flattened().iter().map(|x| x.to_bits()))
         };
         match self.priority.total_cmp(&other.priority).then(other.record.cmp(&self.record)) {
-            std::cmp::Ordering::Equal => by_place(),
+            Ordering::Equal => by_place(),
             order => order.is_gt(),
         }
     }

@@ -104,15 +104,12 @@ pub(crate) struct ChunkTopology {
 const BATCH: usize = weld::BATCH / 3;
 
 /// Bytes that a patch takes until the file is judged: here, merged, and as a component.
-const BYTES_PER_PATCH: u64 = 3 * size_of::<Patch>() as u64 + 160;
+pub(crate) const BYTES_PER_PATCH: u64 = 3 * size_of::<Patch>() as u64 + 160;
 
 impl ChunkTopology {
     /// Counts what it takes now and will take once it is merged.
     pub(crate) fn take(&self, budget: &Budget) {
-        let labels = match &self.labels {
-            Labels::One => 0,
-            Labels::Runs(bytes) => bytes.capacity() as u64,
-        };
+        let labels = self.labels.heap_bytes();
         let fixed = size_of::<Self>() as u64;
         budget.take(Purpose::Surface, fixed + labels + self.patches.capacity() as u64 * BYTES_PER_PATCH);
         // Copied when they are merged; of suspects, one more list is kept.
@@ -649,6 +646,13 @@ impl LabelWriter {
 }
 
 impl Labels {
+    pub(crate) fn heap_bytes(&self) -> u64 {
+        match self {
+            Self::One => 0,
+            Self::Runs(bytes) => bytes.capacity() as u64,
+        }
+    }
+
     /// The patch of each member in list order, [`NONE`] where it has none; for [`Labels::One`] always patch 0.
     pub(crate) fn iter(&self) -> impl Iterator<Item = u32> + '_ {
         let mut rest: &[u8] = match self {

@@ -31,6 +31,7 @@ mod intersect;
 mod machine;
 mod members;
 mod parallel;
+mod parts;
 mod plan;
 mod radix;
 pub mod read;

@@ -8,10 +8,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::ahead::Guide;
 use crate::budget::{Budget, Purpose};
-use crate::chunk::{self, ChunkTopology, Labels, Link, NONE, Patch, Scratch, Suspect};
+use crate::chunk::{self, ChunkTopology, Labels, NONE, Patch, Scratch, Suspect};
 use crate::crossings::{self, Crossings, Pair};
 use crate::error::{Error, Result};
 use crate::members::Members;
+use crate::parts::Parts;
 use crate::plan::{ChunkId, HomeBox, Plan};
 use crate::record::{self, Record};
 use crate::report::SelfIntersections;
@@ -19,7 +20,7 @@ use crate::settings::Limits;
 use crate::source::{Seen, Source, Triangle};
 use crate::sums::{Bounds, Measure};
 use crate::weld::{Sieve, Weld};
-use crate::{Progress, behind, digest, edit, radix};
+use crate::{Progress, behind, digest, edit};
 
 /// Topology of the sound part of a file, and the list of what is not sound.
 #[derive(Debug)]
@@ -54,10 +55,11 @@ pub(crate) struct Survey<'a> {
     labels: Vec<Labels>,
     /// By chunk, the box of all sound triangles that it sees.
     reaches: Vec<Bounds>,
-    /// First entry of each chunk in `merged`.
-    bases: Vec<u32>,
-    /// Chunk's patch → merged patch.
+    parts: Parts,
+    /// Part → patch.
     merged: Vec<u32>,
+    /// So many of the promoted vertices have divided the surface.
+    dividing: usize,
     threads: usize,
 }
 
@@ -131,7 +133,12 @@ impl<'a> Survey<'a> {
             return Err(Error::io(path, STAGE)(std::io::ErrorKind::Interrupted.into()));
         }
         check(path, &budget, suspects.into_inner(), patches.into_inner())?;
-        let merge = Merge::of(records, &measure, &mut chunks);
+        let span = tracing::debug_span!("merge").entered();
+        let mut fresh: Vec<(ChunkId, &mut ChunkTopology)> = (0..).map(ChunkId).zip(&mut chunks).collect();
+        let (parts, suspects) = Parts::none(plan.chunks()).renewed((records, &measure), Vec::new(), &mut fresh, |_| true);
+        let (patches, merged) = parts.united();
+        let suspect_patches = parts.patches_of(&suspects, &merged);
+        drop(span);
         let (self_intersections, crossing_pairs) = if self_intersections {
             let (summed, pairs) = Crossings::sum(chunks.iter_mut().map(|c| std::mem::take(&mut c.crossings)), most_tested);
             (Some(summed), pairs)
@@ -143,9 +150,9 @@ impl<'a> Survey<'a> {
             records,
             measure,
             bounds,
-            suspects: merge.suspects,
-            suspect_patches: merge.suspect_patches,
-            patches: merge.patches,
+            suspects,
+            suspect_patches,
+            patches,
             triangles: records.len() as u64 - count_of(&nonfinite),
             nonfinite,
             self_intersections,
@@ -159,15 +166,16 @@ impl<'a> Survey<'a> {
             members,
             reaches: chunks.iter().map(|c| c.reach).collect(),
             labels: chunks.into_iter().map(|c| c.labels).collect(),
-            bases: merge.bases,
-            merged: merge.merged,
+            parts,
+            merged,
+            dividing: 0,
             threads: limits.threads,
         })
     }
 
     /// Divides the surface at the sound vertices among `positions`: they count as unsound, so that their triangles become suspects, and
-    /// what hangs together only through them, or what was promoted before, becomes several patches. Solves every chunk again. Refuses when tables
-    /// would not fit `limits.memory_bytes`.
+    /// what hangs together only through them, or what was promoted before, becomes several patches. Solves the chunks again where they are at home,
+    /// and those that share triangles with these. Refuses when tables would not fit `limits.memory_bytes`.
     pub(crate) fn divide(
         &mut self,
         path: &Path,
@@ -180,24 +188,30 @@ impl<'a> Survey<'a> {
         budget.take(Purpose::Tables, behind::most_dirty(limits) + digest::heap_bytes(size_of_val(self.records) as u64));
         take_tables(path, &budget, &self.plan, &self.members, limits)?;
         let fetched = self.beyond_the_workshop(positions);
-        let cut: Vec<[f32; 3]> = self.promoted.iter().chain(positions).copied().collect();
-        let by_home = self.by_home(&cut);
-        let [suspects, patches] = [const { AtomicU64::new(0) }; 2];
-        let mut chunks = self.members.each(
+        let all: Vec<[f32; 3]> = self.promoted.iter().chain(positions).copied().collect();
+        let mut is_cut = vec![false; self.plan.chunks()];
+        all[self.dividing..].iter().for_each(|p| is_cut[self.plan.home(*p).0 as usize] = true);
+        let is_fresh = self.parts.with_neighbours(&is_cut);
+        let by_home = self.by_home(&all);
+        let kept = (0..self.plan.chunks()).filter(|c| !is_fresh[*c]);
+        self.parts.take(&budget, kept.clone().map(|c| &self.labels[c]), self.suspects.len() as u64);
+        let suspects = AtomicU64::new(self.suspects.len() as u64);
+        let patches = AtomicU64::new(kept.map(|c| self.parts.of_chunk(ChunkId(c as u32)).len() as u64).sum());
+        let mut solved = self.members.each(
             (self.records, &self.guide, &self.plan),
             self.threads,
-            |_| true,
+            |chunk| is_fresh[chunk.0 as usize],
             Scratch::default,
             |scratch, chunk, seen, _| {
                 if progress.cancelled() || budget.is_exceeded() {
-                    return ChunkTopology::default();
+                    return (chunk, ChunkTopology::default());
                 }
                 let cut: Vec<[f32; 3]> = at_home(&by_home, chunk).iter().map(|(_, p)| *p).collect();
                 let topology = scratch.solve(seen, self.plan.home_box(chunk), &self.measure, &cut);
                 suspects.fetch_add(topology.suspects.len() as u64, Ordering::Relaxed);
                 patches.fetch_add(topology.patches.len() as u64, Ordering::Relaxed);
                 topology.take(&budget);
-                topology
+                (chunk, topology)
             },
         );
         if progress.cancelled() {
@@ -212,16 +226,21 @@ impl<'a> Survey<'a> {
                 unsound.vertex(corners[k]);
             });
         }
-        let merge = Merge::of(self.records, &self.measure, &mut chunks);
-        let divided_from = self.patches_at(merge.patches.iter().map(|patch| patch.first));
+        let mut fresh: Vec<(ChunkId, &mut ChunkTopology)> =
+            solved.iter_mut().map(|(chunk, topology)| (*chunk, topology)).collect();
+        let known = (self.records, &self.measure);
+        let (parts, suspects) = self.parts.renewed(known, self.suspects.clone(), &mut fresh, |chunk| is_cut[chunk]);
+        let (patches, merged) = parts.united();
         self.promoted.extend(positions.iter().filter(|p| unsound.find(**p).is_none()));
-        self.suspects = merge.suspects;
-        self.suspect_patches = merge.suspect_patches;
-        self.patches = merge.patches;
-        self.bases = merge.bases;
-        self.merged = merge.merged;
-        self.reaches = chunks.iter().map(|c| c.reach).collect();
-        self.labels = chunks.into_iter().map(|c| c.labels).collect();
+        self.dividing = self.promoted.len();
+        // By what was true before.
+        let divided_from = self.patches_at(patches.iter().map(|patch| patch.first));
+        self.suspect_patches = parts.patches_of(&suspects, &merged);
+        (self.suspects, self.patches, self.merged, self.parts) = (suspects, patches, merged, parts);
+        for (chunk, topology) in solved {
+            self.reaches[chunk.0 as usize] = topology.reach;
+            self.labels[chunk.0 as usize] = topology.labels;
+        }
         Ok(Division { fetched, divided_from })
     }
 
@@ -263,8 +282,7 @@ impl<'a> Survey<'a> {
 
     /// Merged patches of a chunk, by the chunk's own numbers.
     fn patches_of(&self, chunk: ChunkId) -> &[u32] {
-        let c = chunk.0 as usize;
-        &self.merged[self.bases[c] as usize..self.bases[c + 1] as usize]
+        &self.merged[self.parts.of_chunk(chunk)]
     }
 
     /// Visits every triangle with three sound corners whose patch is `wanted` and that `passes`, exactly once, with its patch: chunks
@@ -428,102 +446,6 @@ fn take_tables(path: &Path, budget: &Budget, plan: &Plan, members: &Members, lim
     budget.check(path, || format!("{nonfinite} triangles have coordinates that are no finite numbers"))
 }
 
-struct Merge {
-    suspects: Vec<Suspect>,
-    suspect_patches: Vec<u32>,
-    patches: Vec<Patch>,
-    bases: Vec<u32>,
-    merged: Vec<u32>,
-}
-
-impl Merge {
-    /// Unites patches that share a triangle. O(seam + suspects), and the patches are sorted.
-    fn of(records: &[Record], measure: &Measure, chunks: &mut [ChunkTopology]) -> Self {
-        let _span = tracing::debug_span!("merge").entered();
-        let mut bases = vec![0u32];
-        let mut sums: Vec<Patch> = Vec::new();
-        let mut links: Vec<Link> = Vec::with_capacity(chunks.iter().map(|c| c.links.len()).sum());
-        let mut suspects: Vec<Suspect> = Vec::with_capacity(chunks.iter().map(|c| c.suspects.len()).sum());
-        for chunk in chunks {
-            let base = sums.len() as u32;
-            sums.append(&mut chunk.patches);
-            links.extend(std::mem::take(&mut chunk.links).into_iter().map(|l| l.raised(base)));
-            suspects.append(&mut std::mem::take(&mut chunk.suspects));
-            bases.push(sums.len() as u32);
-        }
-        radix::sort_by_number(&mut suspects, |s| s.triangle);
-        suspects.dedup_by(|b, a| {
-            let same = a.triangle == b.triangle;
-            a.unsound |= if same { b.unsound } else { 0 };
-            same
-        });
-        radix::sort_by_number(&mut links, |l| l.triangle);
-        let mut parents: Vec<u32> = (0..sums.len() as u32).collect();
-        for pair in links.windows(2) {
-            if pair[0].triangle == pair[1].triangle {
-                chunk::unite(&mut parents, pair[0].patch(), pair[1].patch());
-            }
-        }
-        let suspect_raw = take_out_suspects(records, measure, &links, &suspects, &mut sums);
-        let (patches, merged) = number(&mut parents, sums);
-        let suspect_patches = suspect_raw.into_iter().map(|p| if p == NONE { NONE } else { merged[p as usize] }).collect();
-        Self { suspects, suspect_patches, patches, bases, merged }
-    }
-}
-
-/// Takes suspects out of the sums of chunks that knew nothing against them; returns the patch of each suspect.
-fn take_out_suspects(
-    records: &[Record],
-    measure: &Measure,
-    links: &[Link],
-    suspects: &[Suspect],
-    sums: &mut [Patch],
-) -> Vec<u32> {
-    let mut patches = vec![NONE; suspects.len()];
-    let mut s = 0;
-    for link in links {
-        while s < suspects.len() && suspects[s].triangle < link.triangle {
-            s += 1;
-        }
-        if s < suspects.len() && suspects[s].triangle == link.triangle {
-            patches[s] = link.patch();
-            if link.is_counted() {
-                let sum = &mut sums[link.patch() as usize];
-                sum.triangles -= 1;
-                sum.extent -= measure.triangle(&record::corners(&records[link.triangle as usize]));
-            }
-        }
-    }
-    patches
-}
-
-/// Folds united patches into one each and numbers them by their smallest triangle.
-fn number(parents: &mut [u32], sums: Vec<Patch>) -> (Vec<Patch>, Vec<u32>) {
-    let mut merged = vec![NONE; sums.len()];
-    let mut patches: Vec<Patch> = Vec::new();
-    for (raw, sum) in sums.into_iter().enumerate() {
-        // The root is the smallest of its union, so it comes first.
-        let root = chunk::find(parents, raw as u32) as usize;
-        if root == raw {
-            merged[raw] = patches.len() as u32;
-            patches.push(sum);
-        } else {
-            merged[raw] = merged[root];
-            let into = &mut patches[merged[root] as usize];
-            into.triangles += sum.triangles;
-            into.extent += sum.extent;
-            into.bounds.add(&sum.bounds);
-            into.first = into.first.min(sum.first);
-        }
-    }
-    let mut order: Vec<u32> = (0..patches.len() as u32).collect();
-    order.sort_unstable_by_key(|p| patches[*p as usize].first);
-    let mut rank = vec![0; order.len()];
-    order.iter().enumerate().for_each(|(r, p)| rank[*p as usize] = r as u32);
-    merged.iter_mut().for_each(|m| *m = rank[*m as usize]);
-    (order.into_iter().map(|p| patches[p as usize]).collect(), merged)
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -552,6 +474,48 @@ mod tests {
                 for spill in [Spill::Never, Spill::Always] {
                     prop_assert_eq!(&surveyed(&records, chunk_triangles, spill), &whole);
                 }
+            }
+        }
+    }
+
+    /// What is known after the surface was divided at some corners, some others were promoted, and it was divided at others again.
+    fn divided(records: &[Record], chunk_triangles: u32, corners: &[Vec<usize>; 3]) -> impl PartialEq + std::fmt::Debug + use<> {
+        let limits = Limits { threads: 1, chunk_triangles, ..Limits::default() };
+        let path = Path::new("test");
+        let mut survey = Survey::new(path, records, true, &limits, &Quiet).unwrap();
+        let all: Vec<[f32; 3]> =
+            records.iter().map(record::corners).filter(|t| t.as_flattened().iter().all(|x| x.is_finite())).flatten().collect();
+        let [first, promoted, second] = corners.each_ref().map(|some| -> Vec<[f32; 3]> {
+            let mut some: Vec<[f32; 3]> = some.iter().map(|k| all[k % all.len()].map(|x| x + 0.0)).collect();
+            some.sort_by(|a, b| a.partial_cmp(b).unwrap());
+            some.dedup();
+            some
+        });
+        let mut divisions = Vec::new();
+        let mut divide = |survey: &mut Survey<'_>, positions: &[[f32; 3]]| {
+            let division = survey.divide(path, positions, &limits, &Quiet).unwrap();
+            divisions.push((division.fetched, division.divided_from));
+        };
+        divide(&mut survey, &first);
+        let sound: Vec<[f32; 3]> = promoted.into_iter().filter(|p| !first.contains(p)).collect();
+        let new = survey.promote(&sound);
+        divide(&mut survey, &second);
+        let patches: Vec<_> = survey.patches.iter().map(|p| (p.first, p.triangles, p.extent, p.bounds)).collect();
+        (divisions, new, survey.suspects, survey.suspect_patches, patches, survey.promoted)
+    }
+
+    proptest! {
+        /// Chunks that are not solved again when the surface is divided say what they would say.
+        #[test]
+        fn chunks_do_not_show_where_surface_is_divided(
+            triangles in soup(),
+            corners in std::array::from_fn::<_, 3, _>(|_| proptest::collection::vec(0usize..1000, 0..4)),
+        ) {
+            let records = records(&triangles);
+            prop_assume!(records.iter().any(|r| record::corners(r).as_flattened().iter().all(|x| x.is_finite())));
+            let whole = divided(&records, u32::MAX, &corners);
+            for chunk_triangles in [1, 2, 7] {
+                prop_assert_eq!(&divided(&records, chunk_triangles, &corners), &whole);
             }
         }
     }

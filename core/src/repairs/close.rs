@@ -394,7 +394,8 @@ impl Closing<'_> {
     /// Loops of edges that lack a side, but for those that were left open.
     fn unbalanced(&self, work: &mut Work<'_>) -> Vec<Vec<Vertex>> {
         let open = self.open.iter().map(|(rim, _)| self.rim(*rim));
-        loops::unbalanced(work.edges().1, open)
+        let (shop, edges) = work.edges();
+        loops::unbalanced(shop, edges, open)
     }
 
     /// Closes what is left as if nothing were in the way, each by a patch that may cross anything, itself included. Returns the triangles

@@ -419,6 +419,7 @@ impl State<'_, '_, '_> {
             if resolved.rounds == ROUNDS || resolved.rounds > 0 && crossing.len() > most {
                 return Err(Stuck { failure: Failure::Endless, triangles: triangles.into_iter().collect() }.into());
             }
+            tracing::debug!(round = resolved.rounds, pairs = crossing.len(), triangles = triangles.len(), "Crossings.");
             let meetings = meetings(|t| Bounds::of(&self.work.points(t)), &crossing);
             let meetings = meetings.map_err(|worst| Stuck { failure: Failure::TooMany, triangles: vec![worst] })?;
             let needed = shop::bytes(self.work.triangles.len() as u64, self.work.positions.len() as u64)
@@ -427,7 +428,6 @@ impl State<'_, '_, '_> {
             if needed > limits.memory_bytes {
                 return Err(Halted::NoMemory { needed, triangles: triangles.len() });
             }
-            tracing::debug!(round = resolved.rounds, pairs = crossing.len(), triangles = triangles.len(), "Crossings.");
             resolved.rounds += 1;
             self.track.crossed(self.work, &self.clusters, &triangles, resolved.rounds);
             let pairs_before = crossing.len();
@@ -435,6 +435,7 @@ impl State<'_, '_, '_> {
             let first_new = self.work.triangles.len() as u32;
             resolved.displaced = resolved.displaced.max(self.round(engine, &triangles, &along, limits.threads)?);
             let met = self.met(crossing, profile, |t| t >= first_new)?;
+            tracing::debug!(pairs = met.crossing.len(), "Cut.");
             width = (width * WIDER).min(self.step / FINEST * WIDEST);
             limit = (limit * WIDER).min(self.step / FINEST * FARTHEST);
             let (mut met, mut moved) = self.draw_near(met, width, profile)?;

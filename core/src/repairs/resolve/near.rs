@@ -51,6 +51,7 @@ impl State<'_, '_, '_> {
             let Changed { triangles, farthest } = changed;
             self.clean(&triangles.iter().copied().collect::<Vec<_>>());
             let now = self.met(met.crossing.clone(), profile, |t| t >= first_new || triangles.contains(&t))?;
+            tracing::debug!(imprints, pairs = now.crossing.len(), "Drawn near.");
             if now.crossing.len() < met.crossing.len() {
                 displaced = displaced.max(farthest);
                 met = now;

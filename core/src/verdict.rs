@@ -125,8 +125,10 @@ pub(crate) fn review_volumes(volumes: &Volumes, profile: &Profile) -> Vec<String
 /// Whether a person should look at what was dropped of sheets: they may have been meant for walls.
 pub(crate) fn review_sheets(before: &Defects, dropped: &[SheetDropped], profile: &Profile) -> Option<String> {
     let area: f64 = dropped.iter().map(|sheet| sheet.area).sum();
+    // Nothing tells against one that crosses nothing and is not hidden but that it is open.
+    let free: f64 = dropped.iter().filter(|sheet| !sheet.crosses && !sheet.hidden).map(|sheet| sheet.area).sum();
     let [lo, hi] = dropped.first()?.bounds;
-    (area > profile.max_sheets_share * before.area).then(|| {
+    (area > profile.max_sheets_share * before.area || free > profile.debris_area_share * before.area).then(|| {
         let (count, share) = (dropped.len(), area / before.area * 100.0);
         format!("open sheets dropped that bound nothing, {count} of {share:.1} % of the area, the largest from {lo:?} to {hi:?}")
     })
@@ -257,11 +259,15 @@ mod tests {
     #[test]
     fn dropped_sheets_need_review_beyond_a_share_of_the_area() {
         let before = Defects { area: 600.0, ..cube() };
-        let concern = |area: f64| {
-            let sheet = SheetDropped { bounds: [[0.0; 3], [1.0; 3]], area, triangles: 2, crosses: true, hidden: false };
-            review_sheets(&before, &[sheet.clone(), sheet], &Profile { max_sheets_share: 0.25, ..Profile::default() })
+        let dropped = |area: f64, crosses: bool| {
+            let sheet = SheetDropped { bounds: [[0.0; 3], [1.0; 3]], area, triangles: 2, crosses, hidden: false };
+            let profile = Profile { max_sheets_share: 0.25, debris_area_share: 0.125, ..Profile::default() };
+            review_sheets(&before, &[sheet.clone(), sheet], &profile)
         };
+        let concern = |area: f64| dropped(area, true);
         assert_eq!(concern(75.0), None);
+        assert_eq!(dropped(37.5, false), None, "next to nothing");
+        assert!(dropped(37.6, false).is_some(), "it crosses nothing");
         assert!(concern(75.1).is_some_and(|words| words.contains("2 of 25.0 %")));
         assert_eq!(review_sheets(&before, &[], &Profile::default()), None);
     }

@@ -4,7 +4,8 @@
 //! A sheet whose rim was not closed, since it would enclose next to nothing ([`super::admit`]), keeps a file from being a solid whatever else is
 //! in it. One that runs into a body or another sheet could not even be closed: it goes as a whole. (The part of it outside of a body may have
 //! been meant for a wall: the report names each with its box and area, and a person is asked to look at more than a small share of the
-//! model.) One that crosses nothing may be a wall that only was not joined, so that it goes only if it is next to nothing.
+//! model.) One that crosses nothing may be a wall that only was not joined: if it is more than next to nothing, it goes only where whatever is no
+//! solid is replaced by one ([`Guarantee::Wrap`]), and a person is asked to look.
 //!
 //! A file that holds no body, or in which the sheets have more area than the bodies, keeps them: they are what it is about.
 
@@ -13,7 +14,7 @@ use super::swallowed;
 use super::work::Work;
 use crate::chunk::NONE;
 use crate::report::{LoopLeft, SheetDropped};
-use crate::settings::{Profile, Sheets};
+use crate::settings::{Guarantee, Profile, Sheets};
 use crate::shop::components::{Components, Reversed, Through};
 use crate::survey::Survey;
 
@@ -57,7 +58,8 @@ pub(super) fn drop(
     let crossing = swallowed::crossing(survey, shop, &components, pairs.iter().map(|pair| pair.triangles));
     let next_to_nothing = profile.debris_area_share * area(&|_| true) as f64;
     let are_specks = area(&|c| is_sheet(c) && !crossing[c]) as f64 <= next_to_nothing;
-    let goes = |c: u32| c != NONE && is_sheet(c as usize) && (crossing[c as usize] || are_specks);
+    let all_go = are_specks || profile.guarantee == Guarantee::Wrap;
+    let goes = |c: u32| c != NONE && is_sheet(c as usize) && (crossing[c as usize] || all_go);
     let mut gone: Vec<(i128, SheetDropped)> = (0..components.list.len() as u32)
         .filter(|c| goes(*c))
         .map(|c| {
@@ -117,16 +119,19 @@ mod tests {
     }
 
     #[test]
-    fn sheets_that_cross_each_other_go_and_one_that_crosses_nothing_stays() {
+    fn sheets_that_cross_each_other_go_and_one_that_crosses_nothing_where_all_is_to_be_a_solid() {
         let upright = plate(4, |_, _| true).into_iter().map(|t| t.map(|[x, y, _]| [x + 10.3, 1.5, y - 1.7]));
         let upright = [shifted(&plate(4, |_, _| true), [10.0, 0.0, 0.0]), upright.collect()].concat();
         let got = dropped(&[body(), upright].concat(), &Profile::default());
         assert_eq!((got.result.0.len(), got.untouched), (2, 12));
         let beside = shifted(&entering(), [-4.0, 0.0, 0.0]);
-        assert_eq!(dropped(&[body(), beside.clone()].concat(), &Profile::default()).result.0, []);
+        let strict = Profile { guarantee: Guarantee::Strict, ..Profile::default() };
+        assert_eq!(dropped(&[body(), beside.clone()].concat(), &strict).result.0, []);
+        let got = dropped(&[body(), beside.clone()].concat(), &Profile::default());
+        assert!(!got.result.0[0].crosses && got.result.1 == 0 && got.verdict.good, "{:?}", got.verdict);
         // Next to nothing: below a thousandth of the area.
         let speck: Vec<Corners> = beside.iter().map(|t| t.map(|p| p.map(|x| x / 16.0))).collect();
-        let got = dropped(&[body(), shifted(&speck, [-4.0, 0.0, 0.0])].concat(), &Profile::default());
+        let got = dropped(&[body(), shifted(&speck, [-4.0, 0.0, 0.0])].concat(), &strict);
         assert!(got.result.0.len() == 1 && got.verdict.good, "{:?}", got.verdict);
     }
 

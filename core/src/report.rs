@@ -431,6 +431,8 @@ pub enum Rung {
     Cut,
     /// So they were, and what was nearly one there was made one: short edges, and vertices close to faces or edges.
     Snapped,
+    /// So they were, after bodies that shared surface but for rounding were grown by steps of single precision, each by others.
+    Spread,
     /// What kept crossing was taken out, and the small holes were closed.
     Refilled,
     /// Surfaces that shared a vertex or an edge were taken apart.

@@ -22,6 +22,7 @@ mod embed;
 mod near;
 mod refill;
 mod sides;
+mod spread;
 #[cfg(test)]
 mod tests;
 mod track;
@@ -32,6 +33,7 @@ use std::path::Path;
 use self::cut::Cut;
 pub(super) use self::refill::{Refill, refill_of};
 use self::sides::Sides;
+use self::spread::Level;
 use self::track::Track;
 use super::orient;
 use super::overlay::Overlay;
@@ -135,7 +137,7 @@ const FARTHEST: f64 = 1.0 / 256.0;
 const FLAKE: f64 = 1.0 / 16.0;
 
 /// Times that everything is done anew without the clusters that failed.
-const ATTEMPTS: usize = 8;
+const ATTEMPTS: usize = 12;
 
 /// What it takes to look at the file again.
 pub(super) struct Means<'a> {
@@ -172,6 +174,7 @@ pub(super) fn resolve(
     let mut left: Vec<Failure> = Vec::new();
     let mut regions_left: Vec<Unsettled> = Vec::new();
     let mut blocked: Vec<bool> = Vec::new();
+    let mut levels: Vec<Level> = Vec::new();
     let (mut bodies, mut volume) = (0, 0);
     let largest = above(survey.bounds.largest_coordinate());
     let mut state = State {
@@ -190,6 +193,7 @@ pub(super) fn resolve(
         attempts += 1;
         let pieces = orient::pieces(state.survey, state.work, state.reversed);
         blocked.resize(pieces.list.len(), false);
+        levels.resize(pieces.list.len(), Level::default());
         if attempts == 1 {
             (bodies, volume) = measured(&pieces);
         }
@@ -201,7 +205,7 @@ pub(super) fn resolve(
         state.first_triangle = state.work.triangles.len() as u32;
         state.first_vertex = state.work.positions.len() as Vertex;
         let taken_part: Vec<bool> = (0..state.work.triangles.len() as u32).map(|t| state.clusters.holds(t)).collect();
-        match state.attempt(engine, &overlay, &pairs, profile, means.limits) {
+        match state.attempt(engine, &overlay, &pairs, &levels, profile, means.limits) {
             Ok(resolved) => {
                 let pieces = orient::pieces(state.survey, state.work, state.reversed);
                 let (bodies_now, volume_now) = measured(&pieces);
@@ -221,6 +225,11 @@ pub(super) fn resolve(
             Err(Halted::Stuck(Stuck { failure, triangles })) => {
                 let failed = state.clusters.pieces_of(&triangles);
                 state.restore();
+                let again: Vec<(u32, Level)> = failed.iter().filter_map(|p| Some((*p, levels[*p as usize].next()?))).collect();
+                if failure == Failure::Endless && !again.is_empty() {
+                    again.into_iter().for_each(|(piece, level)| levels[piece as usize] = level);
+                    continue;
+                }
                 regions_left.extend(state.unsettled(&failed, failure));
                 left.extend(std::iter::repeat_n(failure, failed.len().max(1)));
                 if failed.is_empty() {
@@ -402,6 +411,7 @@ impl State<'_, '_, '_> {
         engine: &dyn Arrange,
         overlay: &Overlay,
         pairs: &[[u32; 2]],
+        levels: &[Level],
         profile: &Profile,
         limits: &Limits,
     ) -> Tried<Resolved> {
@@ -412,6 +422,10 @@ impl State<'_, '_, '_> {
         resolved.pairs = crossing.len() as u64;
         let most = crossing.len().max(FEW) * GROWTH;
         let mut latest: Option<Overlay> = None;
+        if let Some((met, moved)) = self.spread(&crossing, levels, profile)? {
+            resolved.displaced = moved;
+            (crossing, latest) = (met.crossing, Some(met.overlay));
+        }
         // What is nearer is made one, and what is taken out has its patch within the limit.
         let (mut width, mut limit) = (self.step, self.step * WIDER);
         while !crossing.is_empty() {
@@ -445,6 +459,16 @@ impl State<'_, '_, '_> {
                 moved = moved.max(refilled);
             }
             resolved.displaced = resolved.displaced.max(moved);
+            let is_impatient = |t: &u32| {
+                let piece = self.clusters.of_triangle[*t as usize];
+                levels.get(piece as usize) == Some(&Level::Impatient)
+            };
+            if resolved.rounds == 1 && met.crossing.len() >= pairs_before.max(FEW) {
+                let triangles: Vec<u32> = met.crossing.iter().flatten().copied().collect();
+                if triangles.iter().any(is_impatient) {
+                    return Err(Stuck { failure: Failure::Endless, triangles }.into());
+                }
+            }
             (crossing, latest) = (met.crossing, Some(met.overlay));
         }
         Ok(resolved)

@@ -244,3 +244,57 @@ fn every_cluster_is_told_of() {
     assert_eq!(told, [(Rung::Cut, bounds(0.0), 1, 0.0), (Rung::Cut, bounds(16.0), 1, 0.0)]);
     assert!(got.regions.iter().all(|region| region.count > 3) && got.regions_left.is_empty());
 }
+
+/// A cone that was cut off, with the same upper end as others, but for the corner that its fan of needles goes from.
+fn pot(sides: usize, corner: usize, [radius, depth]: [f64; 2]) -> Vec<[DVec3; 3]> {
+    let ring = |radius: f64, z: f64| -> Vec<DVec3> {
+        let angle = |k: usize| std::f64::consts::TAU * k as f64 / sides as f64;
+        (0..sides).map(|k| DVec3::new(radius * angle(k).cos(), radius * angle(k).sin(), z)).collect()
+    };
+    let (low, high) = (ring(radius, -depth), ring(1.0, 0.0));
+    let walls =
+        (0..sides).map(|i| (i, (i + 1) % sides)).flat_map(|(i, j)| [[low[i], low[j], high[j]], [low[i], high[j], high[i]]]);
+    let at = |i: usize| (i + corner) % sides;
+    let ends =
+        (1..sides - 1).flat_map(|i| [[high[at(0)], high[at(i)], high[at(i + 1)]], [low[at(0)], low[at(i + 1)], low[at(i)]]]);
+    walls.chain(ends).collect()
+}
+
+/// As in assemblies that were turned before they were written: their common planes are planes no more, and bodies with the same corners have
+/// different triangles there.
+#[test]
+fn bodies_whose_faces_lie_in_planes_that_f32_cannot_hold_are_spread_by_some_steps() {
+    let bodies: Vec<[DVec3; 3]> = (0..6).flat_map(|k| pot(60, 11 * k, [0.9 - 0.1 * k as f64, 0.5 + 0.2 * k as f64])).collect();
+    let turn = glam::DMat3::from_euler(glam::EulerRot::XYZ, 0.4, 0.7, 1.1);
+    let turned = |p: DVec3| (turn * p * 10.0 + DVec3::splat(50.0)).to_array().map(|x| x as f32);
+    let mesh: Vec<Corners> = bodies.into_iter().map(|t| t.map(turned)).collect();
+    let got = after(&mesh, |d, turned| {
+        let limits = Limits { threads: 1, ..Limits::default() };
+        let means = Means { path: Path::new("test"), limits: &limits, progress: &Quiet };
+        let (survey, work) = (&mut d.survey, &mut Work::new(&mut d.shop));
+        let overlay = Overlay::of(survey, work, turned).unwrap();
+        let pairs = overlay.crossing_pairs(survey, work).unwrap();
+        divide(survey, work, turned, corners(survey, work, &overlay, &pairs), &means).unwrap();
+        let pieces = orient::pieces(survey, work, turned);
+        let mut state = State {
+            clusters: Clusters::of(&pieces, &vec![false; pieces.list.len()]),
+            track: Track::default(),
+            first_triangle: work.triangles.len() as u32,
+            first_vertex: work.positions.len() as Vertex,
+            step: above(survey.bounds.largest_coordinate()) * FINEST,
+            before: Before { triangles: work.triangles.clone(), reversed: turned.clone() },
+            survey,
+            work,
+            reversed: turned,
+        };
+        let levels = vec![Level::Spread; pieces.list.len()];
+        let profile = Profile::default();
+        let Ok(resolved) = state.attempt(&Rational, &overlay, &pairs, &levels, &profile, &limits) else { panic!("resolved") };
+        let regions = state.track.regions(&mut state.clusters);
+        assert!(regions.iter().all(|region| region.rung == Rung::Spread) && regions.len() == 1, "{regions:?}");
+        resolved.displaced / state.step
+    });
+    assert!(got.verdict.good && got.defects.components == 1, "{:?}", got.verdict);
+    // Five bodies against the one that stays, out of up to three planes at once.
+    assert!(got.result > 8.0 && got.result <= 5.0 * 8.0 * 3.0 + 2.0, "{}", got.result);
+}

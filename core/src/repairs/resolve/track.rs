@@ -18,18 +18,21 @@ struct Done {
     /// The last round in which any did.
     rounds: u32,
     snapped: bool,
+    spread: bool,
     refilled: bool,
     moved: f64,
 }
 
 impl Done {
-    const NOTHING: Self = Self { bounds: Bounds::EMPTY, triangles: 0, rounds: 0, snapped: false, refilled: false, moved: 0.0 };
+    const NOTHING: Self =
+        Self { bounds: Bounds::EMPTY, triangles: 0, rounds: 0, snapped: false, spread: false, refilled: false, moved: 0.0 };
 
     fn add(&mut self, other: &Self) {
         self.bounds.add(&other.bounds);
         self.triangles += other.triangles;
         self.rounds = self.rounds.max(other.rounds);
         self.snapped |= other.snapped;
+        self.spread |= other.spread;
         self.refilled |= other.refilled;
         self.moved = self.moved.max(other.moved);
     }
@@ -71,6 +74,13 @@ impl Track {
         }
     }
 
+    /// This piece was grown by so much.
+    pub(super) fn spread(&mut self, piece: u32, by: f64) {
+        let done = self.0.entry(piece).or_insert(Done::NOTHING);
+        done.spread = true;
+        done.moved = done.moved.max(by);
+    }
+
     /// This triangle was taken out, and a patch came in its place that is so far away.
     pub(super) fn refilled(&mut self, clusters: &Clusters, triangle: u32, by: f64) {
         let piece = clusters.of_triangle.get(triangle as usize);
@@ -96,6 +106,7 @@ impl Track {
         }
         let rung = |done: &Done| match done {
             Done { refilled: true, .. } => Rung::Refilled,
+            Done { spread: true, .. } => Rung::Spread,
             Done { snapped: true, .. } => Rung::Snapped,
             _ => Rung::Cut,
         };

@@ -207,9 +207,8 @@ pub(super) fn resolve(
         let taken_part: Vec<bool> = (0..state.work.triangles.len() as u32).map(|t| state.clusters.holds(t)).collect();
         match state.attempt(engine, &overlay, &pairs, &levels, profile, means.limits) {
             Ok(resolved) => {
-                let pieces = orient::pieces(state.survey, state.work, state.reversed);
-                let (bodies_now, volume_now) = measured(&pieces);
-                state.drop_specks(&pieces);
+                state.drop_specks();
+                let (bodies_now, volume_now) = measured(&orient::pieces(state.survey, state.work, state.reversed));
                 return Ok(Resolved {
                     bodies: bodies.saturating_sub(bodies_now),
                     volume: state.survey.measure.volume(Extent { area: 0, volume: volume - volume_now }),
@@ -624,7 +623,8 @@ impl State<'_, '_, '_> {
 
     /// Drops closed surfaces of nothing but parts of triangles that are no thicker than what rounding moves: they are nothing but that. So do those
     /// with other triangles, too, that are far thinner: what was cut off one and is next to nothing.
-    fn drop_specks(&mut self, pieces: &Components) {
+    fn drop_specks(&mut self) {
+        let pieces = orient::pieces(self.survey, self.work, self.reversed);
         let measure = &self.survey.measure;
         let thickness = |piece: &Component| measure.volume(piece.extent).abs() / measure.area(piece.extent);
         let flakes = pieces.list.iter().map(|piece| !piece.open && thickness(piece) <= self.step * FLAKE);

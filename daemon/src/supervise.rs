@@ -84,7 +84,9 @@ impl Death {
             Cause::Internal(_) => "the worker ended in an internal error on it; a defect in Suture, please report it".to_owned(),
             Cause::Memory => "the work needed more memory than its budget allows; a larger --memory may let it through".to_owned(),
             Cause::Time(limit) => {
-                format!("stopped at its time limit of {}", crate::units::show_seconds(limit.as_secs_f64()))
+                let stage = if self.last_words.is_empty() { String::new() } else { format!(", {}", self.last_words) };
+                let limit = crate::units::show_seconds(limit.as_secs_f64());
+                format!("stopped at its time limit of {limit}{stage}; a larger `time_limit` may let it through")
             }
             Cause::Killed(signal) => format!("the worker was killed from outside ({}); the file is not to blame", name_of(signal)),
         };
@@ -92,6 +94,14 @@ impl Death {
             (Cause::Fault(_) | Cause::Internal(_), false) => format!("{base}: {}", self.last_words),
             _ => base,
         }
+    }
+}
+
+/// Where the work was when it was last heard of.
+fn how_far(stage: &str, done: u64, total: u64) -> String {
+    match (done * 100).checked_div(total) {
+        Some(percent @ 1..) => format!("with {percent} % of its stage `{stage}` done"),
+        _ => format!("in its stage `{stage}`"),
     }
 }
 
@@ -202,9 +212,13 @@ impl Worker {
         if !self.send(request) {
             return Ended::Died(self.post_mortem());
         }
+        let mut reached = String::new();
         loop {
             match self.messages.recv_timeout(LOOK_EVERY) {
-                Ok(Message::Progress { stage, done, total }) => on_progress(&stage, done, total),
+                Ok(Message::Progress { stage, done, total }) => {
+                    on_progress(&stage, done, total);
+                    reached = how_far(&stage, done, total);
+                }
                 Ok(Message::Done(report)) => return Ended::Done(report),
                 Ok(Message::Failed { class, message }) => return Ended::Failed { class, message },
                 Err(RecvTimeoutError::Disconnected) => return Ended::Died(self.post_mortem()),
@@ -216,7 +230,7 @@ impl Worker {
             }
             if let Some(limit) = limit.filter(|limit| start.elapsed() >= *limit) {
                 self.kill();
-                return Ended::Died(Death { cause: Cause::Time(limit), last_words: String::new() });
+                return Ended::Died(Death { cause: Cause::Time(limit), last_words: reached });
             }
         }
     }
@@ -315,6 +329,15 @@ mod tests {
         for cause in [Cause::Fault(11), Cause::Internal(101), Cause::Memory, Cause::Time(Duration::from_secs(1))] {
             assert!(death(cause).blames_file());
         }
+    }
+
+    #[test]
+    fn a_time_limit_says_how_far_the_work_was() {
+        let line = |last_words| Death { cause: Cause::Time(Duration::from_secs(120)), last_words }.line();
+        assert!(line(how_far("topology", 43, 100)).contains(", with 43 % of its stage `topology` done; a larger `time_limit`"));
+        assert!(line(how_far("repair", 0, 7)).contains(", in its stage `repair`; a larger"));
+        assert!(line(how_far("plan", 0, 0)).contains("in its stage `plan`"));
+        assert!(!line(String::new()).contains(','));
     }
 
     #[test]

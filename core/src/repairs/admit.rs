@@ -23,7 +23,7 @@ const LIES_BACK: f64 = -0.5;
 const LARGE: f64 = 0.25;
 /// A sheet encloses less than this share of its size: the root of the area of one side, cubed. A plate that rises by a fiftieth of its width
 /// on average.
-const THIN: f64 = 0.02;
+pub(super) const THIN: f64 = 0.02;
 
 /// Why a loop is not to be closed.
 #[derive(Clone, Debug, thiserror::Error)]

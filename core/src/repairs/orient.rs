@@ -1,5 +1,6 @@
 //! Coherent orientation over shared edges, then outward by enclosed volume, cavities inward (METHODS A9).
 
+use super::swallowed;
 use super::work::Work;
 use crate::bodies;
 use crate::boxes::BoxTree;
@@ -152,7 +153,8 @@ pub(super) fn pieces(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Revers
 }
 
 /// Which components are inside out: from the outside in, one of negative volume that no body winds around. One that was coherent
-/// with an inverted component around it (of opposite sign: its cavity) is turned along.
+/// with an inverted component around it (of opposite sign: its cavity) is turned along. One that passes through the wall of another one of the
+/// same sign is no cavity of that, wherever the point lies that tells what is around it: in a file that is inside out both are bodies.
 fn inverted(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed: &Reversed) -> Vec<bool> {
     let list = &components.list;
     let around = bodies::surroundings(survey, shop, components, reversed, |c| !c.open);
@@ -164,17 +166,20 @@ fn inverted(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed:
     let open: Vec<Bounds> = list.iter().filter(|c| c.open).map(|c| c.bounds).collect();
     let tree = BoxTree::new(&open);
     let mut met = Vec::new();
+    let pairs = survey.crossing_pairs.as_deref().unwrap_or_default().iter().map(|pair| pair.triangles);
+    let crossing = swallowed::crossing_pieces(survey, shop, components, pairs);
+    let passes_through = |c: u32, o: u32| sign(c) == sign(o) && crossing.binary_search(&[c.min(o), c.max(o)]).is_ok();
     let mut inverted = vec![false; list.len()];
     for c in order {
         tree.meeting(&list[c as usize].bounds, &mut met);
         if met.iter().any(|o| open[*o as usize].contains(&list[c as usize].bounds)) {
             continue;
         }
-        let outer = &around[c as usize].around;
+        let outer = || around[c as usize].around.iter().filter(|(o, _)| !passes_through(c, *o));
         // The component directly around: itself inside most others.
-        let direct = outer.iter().map(|o| o.0).max_by_key(|o| (around[*o as usize].around.len(), std::cmp::Reverse(*o)));
+        let direct = outer().map(|o| o.0).max_by_key(|o| (around[*o as usize].around.len(), std::cmp::Reverse(*o)));
         let along = direct.is_some_and(|o| inverted[o as usize] && sign(o) == -sign(c));
-        let winding: i32 = outer.iter().map(|(o, w)| if inverted[*o as usize] { -w } else { *w }).sum();
+        let winding: i32 = outer().map(|(o, w)| if inverted[*o as usize] { -w } else { *w }).sum();
         let volume = if along { -sign(c) } else { sign(c) };
         inverted[c as usize] = along ^ (volume < 0 && winding < 1);
     }
@@ -201,6 +206,17 @@ mod tests {
         let got = after(&mesh, |d, turned| make_coherent(&d.survey, &mut Work::new(&mut d.shop), turned, &[]));
         assert_eq!((got.result.triangles, got.result.contradictions, got.untouched), (1, 0, 11));
         assert!(got.verdict.good, "{:?}", got.verdict);
+    }
+
+    #[test]
+    fn of_everything_inside_out_what_passes_through_a_wall_is_a_body_wherever_it_begins() {
+        // The first triangle of the bar, which tells what is around it, is inside of the box, or outside.
+        for end in [0, 8] {
+            let mut bar = reversed(&cuboid([1.0; 3], [2.0, 2.0, 3.5]));
+            bar.rotate_left(end);
+            let got = outward(&[reversed(&cuboid([0.0; 3], [3.0; 3])), bar].concat());
+            assert_eq!(got.result, (2, 24));
+        }
     }
 
     #[test]

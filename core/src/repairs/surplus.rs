@@ -1,9 +1,13 @@
 //! Surplus surface at non-manifold edges (METHODS A3).
 //!
 //! The surface is cut at its non-manifold edges into sheets. A sheet is surplus when the rest is balanced at all its non-manifold
-//! edges without it: a fin that hangs from a sound surface by one side, or a wall across a body. Smallest area goes first, and the
+//! edges without it: a fin that hangs from a sound surface by one side, or a wall across a body. One that goes on at one of them, using it by
+//! twos, or that has a hole but encloses more than next to nothing, is no such thing, but a body that touches others there. Smallest area goes first, and the
 //! rest is judged anew. Where as many triangles run one way as the other (bodies that touch along an edge) nothing is surplus.
 
+use glam::DVec3;
+
+use super::admit;
 use super::work::Work;
 use crate::chunk::NONE;
 use crate::shop::components::{Components, Reversed, Through};
@@ -18,8 +22,8 @@ struct Sheet {
     triangles: Vec<u32>,
     /// Its non-manifold edges, each as often as it is used and in which direction.
     seams: Vec<(u32, bool)>,
-    /// It has a boundary edge.
-    free: bool,
+    /// Ends of its boundary edges, added up, and how many.
+    rim: (DVec3, f64),
     /// It reaches beyond what the workshop may change.
     anchored: bool,
 }
@@ -45,7 +49,8 @@ pub(super) fn remove(survey: &Survey<'_>, work: &mut Work<'_>) -> u64 {
     for s in order {
         let sheet = &mut sheets[s];
         sheet.seams.sort_unstable();
-        if is_surplus(sheet.free, &uses, &sheet.seams) {
+        let free = sheet.rim.1 > 0.0;
+        if is_surplus(free, &uses, &sheet.seams) && !(free && encloses(work, survey.measure.area_of(sheet.area), sheet)) {
             sheet.seams.iter().for_each(|(e, forward)| uses[*e as usize][usize::from(!forward)] -= 1);
             sheet.triangles.iter().for_each(|t| work.kill(*t));
             removed += sheet.triangles.len() as u64;
@@ -61,7 +66,7 @@ fn is_surplus(free: bool, uses: &[[u32; 2]], own: &[(u32, bool)]) -> bool {
         let [forward, backward] = uses[seam[0].0 as usize];
         let own_forward = seam.iter().filter(|s| s.1).count() as u32;
         let (left_forward, left_backward) = (forward - own_forward, backward - (seam.len() as u32 - own_forward));
-        if left_forward != left_backward || left_forward == 0 {
+        if left_forward != left_backward || left_forward == 0 || seam.len() % 2 == 0 {
             return false;
         }
         wrong |= forward != backward;
@@ -69,12 +74,28 @@ fn is_surplus(free: bool, uses: &[[u32; 2]], own: &[(u32, bool)]) -> bool {
     wrong
 }
 
+/// Would the sheet enclose more than next to nothing, if its hole were closed to its middle? By the same measure as for rims ([`admit::THIN`]).
+fn encloses(shop: &Shop, area: f64, sheet: &Sheet) -> bool {
+    let middle = sheet.rim.0 / sheet.rim.1;
+    let cones = sheet.triangles.iter().map(|t| {
+        let [a, b, c] = shop.triangles[*t as usize].v.map(|v| shop.place(v) - middle);
+        a.dot(b.cross(c)) / 6.0
+    });
+    cones.sum::<f64>().abs() > admit::THIN * (area / 2.0).powf(1.5)
+}
+
 fn sheets(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> Vec<Sheet> {
     let parts = Components::of(survey, shop, edges, &Reversed::none(survey), Through::ManifoldEdges);
     let mut sheets: Vec<Sheet> = parts
         .list
         .iter()
-        .map(|c| Sheet { area: c.extent.area, triangles: Vec::new(), seams: Vec::new(), free: false, anchored: false })
+        .map(|c| Sheet {
+            area: c.extent.area,
+            triangles: Vec::new(),
+            seams: Vec::new(),
+            rim: (DVec3::ZERO, 0.0),
+            anchored: false,
+        })
         .collect();
     for (p, component) in parts.of_patch.iter().enumerate() {
         sheets[*component as usize].anchored |= survey.patches[p].triangles > 0;
@@ -94,7 +115,9 @@ fn sheets(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> Vec<Sheet> {
         }
     }
     for edge in edges.iter().filter(|e| e.is_boundary()) {
-        sheets[parts.of_triangle[edge.uses[0].triangle as usize] as usize].free = true;
+        let rim = &mut sheets[parts.of_triangle[edge.uses[0].triangle as usize] as usize].rim;
+        rim.0 += shop.place(edge.low) + shop.place(edge.high);
+        rim.1 += 2.0;
     }
     sheets
 }
@@ -126,7 +149,7 @@ pub(super) fn wanted_stars(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> V
 mod tests {
     use super::super::complete_at_seams;
     use super::Work;
-    use crate::testing::{After, Corners, after, cube, cuboid};
+    use crate::testing::{After, Corners, after, cube, cuboid, reversed, shifted};
 
     fn removed(triangles: &[Corners]) -> After<u64> {
         after(triangles, |d, _| {
@@ -143,6 +166,19 @@ mod tests {
         let got = removed(&mesh);
         assert_eq!(got.result, 1);
         assert!(got.verdict.good, "{:?}", got.verdict);
+    }
+
+    #[test]
+    fn a_cube_between_two_others_stays_whatever_is_wrong_with_it() {
+        let cubes: Vec<Corners> = (0..3).flat_map(|k| shifted(&cube(), [k as f32, k as f32, 0.0])).collect();
+        for t in 12..24 {
+            let mut turned = cubes.clone();
+            turned[t] = reversed(&turned[t..=t])[0];
+            assert_eq!(removed(&turned).result, 0, "turned: {t}");
+            let mut open = cubes.clone();
+            open.remove(t);
+            assert_eq!(removed(&open).result, 0, "without {t}");
+        }
     }
 
     #[test]

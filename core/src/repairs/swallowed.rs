@@ -130,17 +130,29 @@ pub(super) fn crossing(
     pairs: impl Iterator<Item = [u32; 2]> + Clone,
 ) -> Vec<bool> {
     let mut crossing = vec![false; pieces.list.len()];
-    let of_record = components_of_records(survey, shop, pieces, pairs.clone().flatten());
-    for pair in pairs {
-        // What is gone crosses nothing any more.
-        if let [Some(a), Some(b)] = pair.map(|record| of_record.get(&record).copied().filter(|piece| *piece != NONE))
-            && a != b
-        {
-            crossing[a as usize] = true;
-            crossing[b as usize] = true;
-        }
-    }
+    let all = crossing_pieces(survey, shop, pieces, pairs);
+    all.into_iter().flatten().for_each(|piece| crossing[piece as usize] = true);
     crossing
+}
+
+/// The pieces that cross each other, by twos, the smaller number first; each once, ascending. A look at the chunks of what crosses.
+pub(super) fn crossing_pieces(
+    survey: &Survey<'_>,
+    shop: &Shop,
+    pieces: &Components,
+    pairs: impl Iterator<Item = [u32; 2]> + Clone,
+) -> Vec<[u32; 2]> {
+    let of_record = components_of_records(survey, shop, pieces, pairs.clone().flatten());
+    // What is gone crosses nothing any more.
+    let piece = |record: u32| of_record.get(&record).copied().filter(|piece| *piece != NONE);
+    let mut all: Vec<[u32; 2]> = pairs
+        .filter_map(|[a, b]| Some([piece(a)?, piece(b)?]))
+        .filter(|[a, b]| a != b)
+        .map(|[a, b]| [a.min(b), a.max(b)])
+        .collect();
+    all.sort_unstable();
+    all.dedup();
+    all
 }
 
 #[cfg(test)]

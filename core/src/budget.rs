@@ -35,6 +35,11 @@ impl Budget {
         self.taken[purpose as usize].fetch_add(bytes, Ordering::Relaxed);
     }
 
+    /// Notes that so many `bytes` of what was taken are free again.
+    pub(crate) fn give_back(&self, purpose: Purpose, bytes: u64) {
+        self.taken[purpose as usize].fetch_sub(bytes, Ordering::Relaxed);
+    }
+
     /// The most that is held at a time.
     fn total(&self) -> u64 {
         let [tables, surface, seams, defects] = [0, 1, 2, 3].map(|i: usize| self.taken[i].load(Ordering::Relaxed));
@@ -52,7 +57,7 @@ impl Budget {
         }
         let mebibytes = |bytes: u64| bytes.div_ceil(1 << 20);
         let [tables, surface, seams, defects] = [0, 1, 2, 3].map(|i: usize| mebibytes(self.taken[i].load(Ordering::Relaxed)));
-        Err(Error::Refused {
+        Err(Error::Starved {
             path: path.into(),
             reason: format!(
                 "{}, which needs at least {} MiB of memory ({tables} for tables, {surface} for pieces of surface, then {seams} for seams \
@@ -68,6 +73,7 @@ impl Budget {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::ErrorClass;
 
     #[test]
     fn a_refusal_says_what_it_was_for() {
@@ -78,8 +84,11 @@ mod tests {
         budget.check(Path::new("part.stl"), || unreachable!()).unwrap();
         budget.take(Purpose::Surface, 1);
         let error = budget.check(Path::new("part.stl"), || "a lot of it".into()).unwrap_err();
+        assert_eq!(error.class(), ErrorClass::Starved, "more memory would help");
         let line = "part.stl: refused: a lot of it, which needs at least 11 MiB of memory (7 for tables, 1 for pieces of surface, \
             then 2 for seams or 3 for defects); the budget is 10 MiB: raise --memory";
         assert_eq!(error.to_string(), line);
+        budget.give_back(Purpose::Tables, 1);
+        budget.check(Path::new("part.stl"), || unreachable!()).unwrap();
     }
 }

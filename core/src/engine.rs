@@ -1,4 +1,5 @@
-//! The way of one file through the engine: read → survey → workshop → repair → edit → emit → survey again → report.
+//! The way of one file through the engine: read → survey → workshop → repairs → edit → emit → read back → report. The output is surveyed
+//! as a whole only where the second look, at what changed, cannot tell.
 
 use std::path::Path;
 use std::time::Instant;
@@ -10,7 +11,7 @@ use crate::digest::Digest;
 use crate::edit::Edit;
 use crate::emit::{Content, Draft};
 use crate::error::{Error, Result};
-use crate::read::{MeshFile, PREFIX_BYTES};
+use crate::read::{Loss, MeshFile, PREFIX_BYTES};
 use crate::readback::Expectation;
 use crate::repairs::Swallowed;
 use crate::report::{
@@ -20,12 +21,12 @@ use crate::report::{
 use crate::rules::Subject;
 use crate::settings::{Bodies, Limits, Profile, folder_of};
 use crate::shop::Shop;
-use crate::shop::edges::Edges;
+use crate::shop::edges::{Edge, Edges};
 use crate::shop::near::Tolerance;
 use crate::space::{self, Need};
-use crate::sums::Bounds;
+use crate::sums::{Bounds, step_at};
 use crate::survey::Survey;
-use crate::{Progress, certificate, cost, defects, digest, emit, members, parallel, record, repairs, second, verdict};
+use crate::{Progress, certificate, cost, defects, digest, emit, finite, members, parallel, record, repairs, second, verdict};
 
 /// Fewer bytes are hashed by one thread: starting more would take longer.
 const HASHED_BY_ONE: usize = 1 << 20;
@@ -52,6 +53,13 @@ impl Clock {
         self.peak_anonymous_bytes = self.peak_anonymous_bytes.max(cost::anonymous_bytes());
         tracing::debug!(stage = name, seconds, "Stage done.");
         self.stages.push(Stage { name: name.into(), seconds });
+    }
+
+    /// Puts what was spent on `mesh` into its report, which is complete then and can be told to anyone.
+    fn close(self, mut report: Report, mesh: &MeshFile) -> Result<Report> {
+        report.cost = self.cost(mesh.records().len() as u64);
+        report.stages = self.stages;
+        finite::checked(mesh.path(), report)
     }
 
     fn cost(&self, triangles: u64) -> Cost {
@@ -84,14 +92,21 @@ impl<'a> Diagnosis<'a> {
     ) -> Result<Self> {
         let survey = Survey::new(path, records, profile.check_self_intersections, limits, progress)?;
         let shop = Shop::gather(&survey);
-        Ok(Self::count(survey, shop, profile))
+        let edges = Edges::of(&shop);
+        let boundary_edges = edges.iter().filter(Edge::is_boundary).count() as u64;
+        survey.take_boundary(path, boundary_edges, repairs::boundary_bytes(boundary_edges))?;
+        Ok(Self::counted(survey, shop, &edges, profile))
     }
 
     /// Of a workshop that is as gathered.
     pub(crate) fn count(survey: Survey<'a>, shop: Shop, profile: &Profile) -> Self {
         let edges = Edges::of(&shop);
+        Self::counted(survey, shop, &edges, profile)
+    }
+
+    fn counted(survey: Survey<'a>, shop: Shop, edges: &Edges, profile: &Profile) -> Self {
         let tolerance = tolerance(&survey, profile);
-        let defects = defects::count(&survey, &shop, &edges, &tolerance);
+        let defects = defects::count(&survey, &shop, edges, &tolerance);
         Self { survey, shop, tolerance, defects }
     }
 
@@ -114,20 +129,25 @@ fn tolerance(survey: &Survey<'_>, profile: &Profile) -> Tolerance {
     if profile.weld_relative <= 0.0 {
         return Tolerance { weld: 0.0, edge_share: 0.0 };
     }
-    let largest = survey.bounds.largest_coordinate();
-    let step = f64::from(largest.next_up()) - f64::from(largest);
+    let step = step_at(survey.bounds.largest_coordinate());
     Tolerance {
         weld: (profile.weld_relative * survey.bounds.diagonal()).max(4.0 * step),
         edge_share: profile.weld_max_edge_share,
     }
 }
 
+/// Refuses a profile that means nothing, before anything is done under it.
+fn validate(input: &Path, profile: &Profile) -> Result<()> {
+    profile.validate().map_err(|source| Error::Profile { path: input.into(), profile: profile.name.clone(), source })
+}
+
 /// Diagnoses `input` and writes nothing.
 ///
 /// # Errors
-/// [`Error::Unreadable`], [`Error::Refused`], [`Error::Io`], [`Error::Changed`].
+/// [`Error`], any of them; [`Error::Profile`] before the file is opened.
 pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> Result<Report> {
     let mut clock = Clock::start();
+    validate(input, profile)?;
     let limits = &limits.spooling_beside(input);
     let mesh = open(input, limits, progress)?;
     clock.lap("read");
@@ -142,9 +162,7 @@ pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress
     report.certificate = Some(certify(&report.input, &report.before, &flaws(&mesh)));
     report.loops = repairs::recognise(&mut diagnosis, profile);
     report.outcome = if report.verdict.good { Outcome::Clean } else { Outcome::NotGood };
-    report.cost = clock.cost(mesh.records().len() as u64);
-    report.stages = clock.stages;
-    Ok(report)
+    clock.close(report, &mesh)
 }
 
 /// What there is to say about an input before anything is done; its hash, outcome and cost are still to come.
@@ -180,9 +198,10 @@ fn report(task: Task, mesh: &MeshFile, diagnosis: &Diagnosis<'_>, profile: &Prof
 /// Repairs `input` into the new file `output`.
 ///
 /// # Errors
-/// [`Error::Unreadable`], [`Error::Refused`], [`Error::Io`], [`Error::Changed`].
+/// [`Error`], any of them; [`Error::Profile`] before the file is opened.
 pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> Result<Report> {
     let mut clock = Clock::start();
+    validate(input, profile)?;
     let limits = &limits.spooling_beside(output);
     let mesh = open(input, limits, progress)?;
     clock.lap("read");
@@ -193,13 +212,11 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     emit::draft(&mesh, output, limits, progress, |draft| {
         let mended = mend(draft, &mesh, output, profile, limits, progress, &mut clock);
         // What was copied before the input changed is not what is read back: nothing is wrong with the disk.
-        let mut report = mended.map_err(|error| match error {
+        let report = mended.map_err(|error| match error {
             Error::Io { .. } if !progress.cancelled() => mesh.check_unchanged().err().unwrap_or(error),
             other => other,
         })?;
-        report.cost = clock.cost(mesh.records().len() as u64);
-        report.stages = clock.stages;
-        Ok(report)
+        clock.close(report, &mesh)
     })
 }
 
@@ -336,10 +353,10 @@ fn verify(
         concerns.extend(report.volumes.iter().flat_map(|volumes| verdict::review_volumes(volumes, &report.profile)));
         concerns.extend(verdict::review_sheets(&report.before, &report.sheets_dropped, &report.profile));
         concerns.extend(verdict::review_wraps(&report.wraps, &report.profile));
-        if report.before.boundary_edges > 0 {
-            // What was closed had to be guessed: nobody knows what stood in the part that is missing.
-            concerns.extend(input.findings().iter().filter(|f| f.loss).map(|f| format!("a part is missing: {}", f.text)));
-        }
+        // What was closed had to be guessed: nobody knows what stood in the part that is missing.
+        let is_open = report.before.boundary_edges > 0;
+        let lost = input.findings().iter().filter(|f| f.loss == Loss::Certain || f.loss == Loss::IfOpen && is_open);
+        concerns.extend(lost.map(|f| format!("a part is missing: {}", f.text)));
         if !concerns.is_empty() {
             report.outcome = Outcome::NeedsReview;
             report.verdict.reasons = concerns;
@@ -433,45 +450,4 @@ pub(crate) fn tolerances(diagnosis: &Diagnosis<'_>) -> Tolerances {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::os::unix::fs::FileExt;
-
-    use super::*;
-    use crate::read::PREFIX_BYTES;
-    use crate::testing::{plate, records};
-
-    /// Changes a byte of the file as soon as a stage begins.
-    struct Meddler<'a> {
-        file: &'a Path,
-        stage: &'a str,
-    }
-
-    impl Progress for Meddler<'_> {
-        fn at(&self, stage: &'static str, _: u64, _: u64) {
-            if stage == self.stage {
-                let file = std::fs::OpenOptions::new().write(true).open(self.file).unwrap();
-                file.write_all_at(&[7], (PREFIX_BYTES + 50 * 12_345 + 49) as u64).unwrap();
-            }
-        }
-    }
-
-    /// An open plate of more than 1 MiB, so that two threads copy it ahead.
-    #[test]
-    fn an_input_that_changes_is_said_to_have_changed() {
-        let folder = tempfile::tempdir().unwrap();
-        let input = folder.path().join("part.stl");
-        let records = records(&plate(110, |x, y| (x, y) != (50, 50)));
-        for threads in [1, 2] {
-            for stage in ["topology", "repair", "hash"] {
-                std::fs::write(&input, [&[0; 80][..], &(records.len() as u32).to_le_bytes(), records.as_flattened()].concat())
-                    .unwrap();
-                // The clock of the file system is coarse.
-                std::thread::sleep(std::time::Duration::from_millis(20));
-                let limits = Limits { threads, ..Limits::default() };
-                let output = folder.path().join(format!("{stage}-{threads}.stl"));
-                let result = repair(&input, &output, &Profile::default(), &limits, &Meddler { file: &input, stage });
-                assert!(matches!(result, Err(Error::Changed { .. })), "{threads} threads, {stage}: {result:?}");
-            }
-        }
-    }
-}
+mod tests;

@@ -4,15 +4,19 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::ranges::ProfileError;
+
 /// Who can do something about an error; decides exit codes and whether a job is tried again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ErrorClass {
     /// The file is no mesh we can read. Trying again gives the same answer.
     Unreadable,
-    /// The file is readable, but beyond a stated limit (budget, counts). Trying again with the same settings gives the same
-    /// answer.
+    /// The file is readable, but beyond a stated limit that memory does not decide (counts, numbers, settings). Trying again with the
+    /// same settings gives the same answer.
     Refused,
+    /// The file needs more memory than the budget allows. Trying again with more memory may succeed.
+    Starved,
     /// The world around the file failed (I/O, space, permission). Trying again may help.
     Environment,
     /// The file changed while it was worked on. It must be looked at anew.
@@ -26,9 +30,17 @@ pub enum Error {
     #[error("{}: cannot be read as a mesh: {reason}", path.display())]
     Unreadable { path: PathBuf, reason: String },
 
-    /// Readable, but a stated bound refuses it; `advice` says which setting would let it through.
+    /// Readable, but a stated bound refuses it, and more memory would not help; `advice` says what would.
     #[error("{}: refused: {reason}; {advice}", path.display())]
     Refused { path: PathBuf, reason: String, advice: String },
+
+    /// Readable, but it needs more memory than the budget allows; `reason` and `advice` have the numbers.
+    #[error("{}: refused: {reason}; {advice}", path.display())]
+    Starved { path: PathBuf, reason: String, advice: String },
+
+    /// A setting of the profile has a value that means nothing. The file was not opened.
+    #[error("{}: refused: profile `{profile}`: {source}", path.display())]
+    Profile { path: PathBuf, profile: String, source: ProfileError },
 
     /// The disk has too little room for what would be written; nothing was.
     #[error("{}: refused: {reason}; {advice}", path.display())]
@@ -53,7 +65,8 @@ impl Error {
     pub fn class(&self) -> ErrorClass {
         match self {
             Self::Unreadable { .. } => ErrorClass::Unreadable,
-            Self::Refused { .. } => ErrorClass::Refused,
+            Self::Refused { .. } | Self::Profile { .. } => ErrorClass::Refused,
+            Self::Starved { .. } => ErrorClass::Starved,
             Self::NoSpace { .. } | Self::Io { .. } => ErrorClass::Environment,
             Self::Changed { .. } => ErrorClass::Changed,
         }
@@ -62,3 +75,21 @@ impl Error {
 
 /// The result of work on one file.
 pub type Result<T> = std::result::Result<T, Error>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A program that has more memory to give must know which refusals that would help.
+    #[test]
+    fn only_a_want_of_memory_is_starved() {
+        let (path, reason, advice) = (PathBuf::from("a.stl"), String::from("too much"), String::from("raise --memory"));
+        let starved = Error::Starved { path: path.clone(), reason: reason.clone(), advice: advice.clone() };
+        assert_eq!(starved.class(), ErrorClass::Starved);
+        assert_eq!(serde_json::to_string(&starved.class()).unwrap(), "\"starved\"");
+        assert_eq!(starved.to_string(), "a.stl: refused: too much; raise --memory");
+        let refused = Error::Refused { path: path.clone(), reason: reason.clone(), advice: advice.clone() };
+        assert_eq!(refused.class(), ErrorClass::Refused);
+        assert_eq!(Error::NoSpace { path, reason, advice }.class(), ErrorClass::Environment, "room on the disk is no memory");
+    }
+}

@@ -10,6 +10,7 @@ use crate::crossings::{Crossings, Pair, most_tested};
 use crate::fill::cross::{self, Contact, Triangle as Corners, common};
 use crate::grid::Grid;
 use crate::plan::HomeBox;
+use crate::position::canonical;
 use crate::readback::Difference;
 use crate::record;
 use crate::report::SelfIntersections;
@@ -70,7 +71,7 @@ struct Solid {
 
 impl Solid {
     fn of(place: u32, corners: Corners) -> Option<Self> {
-        let corners = corners.map(|p| p.map(|x| x + 0.0));
+        let corners = corners.map(canonical);
         let [a, b, c] = &corners;
         // Two equal corners are collinear with any third.
         (!chunk::is_collinear(a, b, c)).then(|| Self { place, corners, bounds: Bounds::of(&corners) })

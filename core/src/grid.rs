@@ -35,6 +35,7 @@ impl Grid {
 
     /// Bits along x, and ends along y and z. Monotonous in the box, so boxes that meet share a cell.
     #[inline(always)]
+    #[expect(clippy::disallowed_methods, reason = "the number of a cell, no position")]
     fn place(&self, bounds: &Bounds) -> (u32, (usize, usize), (usize, usize)) {
         // Rounded to a whole number by the size of what is added; what is not a number becomes 0.
         const WHOLE: f32 = (1 << 23) as f32;

@@ -3,6 +3,8 @@
 //!
 //! It knows no daemon and no store. The two entry points are [`inspect`] and [`repair`].
 
+#![cfg_attr(test, allow(clippy::disallowed_methods))]
+
 mod ahead;
 mod arrange;
 mod behind;
@@ -20,7 +22,10 @@ mod edit;
 mod emit;
 mod engine;
 pub mod error;
+#[cfg(test)]
+mod extremes;
 pub mod fill;
+mod finite;
 mod fresh;
 mod grid;
 mod holes;
@@ -33,7 +38,9 @@ mod members;
 mod parallel;
 mod parts;
 mod plan;
+mod position;
 mod radix;
+mod ranges;
 pub mod read;
 mod readback;
 pub mod record;
@@ -48,6 +55,7 @@ mod source;
 mod space;
 mod spool;
 mod star;
+mod steps;
 mod sums;
 mod survey;
 #[cfg(test)]
@@ -57,6 +65,8 @@ mod weld;
 mod wrap;
 
 pub use error::{Error, ErrorClass};
+pub use ranges::ProfileError;
+pub use read::{Access, ends_in_zeros};
 pub use report::Report;
 pub use rules::{RULES, Rule};
 pub use settings::{Bodies, Guarantee, Limits, PatchShape, Profile};

@@ -224,7 +224,7 @@ pub struct Tolerances {
 /// One kind of repair that did something.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Repair {
-    /// `exact_weld`, `tolerance_weld`, `degenerate`, `duplicate`, `surplus`, `t_junction`, `zip`, `fill`, `orient`, `outward`, …
+    /// One of the names that `core/REPORT.md` lists, as `degenerate`, `tolerance_weld`, `t_junction` or `fill`.
     pub name: String,
     /// How often.
     pub count: u64,
@@ -233,7 +233,7 @@ pub struct Repair {
     pub seconds: f64,
 }
 
-/// What kind of opening a boundary loop is (core/DEFECTS.md).
+/// What kind of opening a boundary loop is (`core/REPORT.md` has the rules).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LoopClass {
@@ -437,7 +437,7 @@ pub enum Rung {
     Refilled,
     /// Surfaces that shared a vertex or an edge were taken apart.
     Separated,
-    /// It went: a lone sheet, or a body in the material of others.
+    /// It went: a lone sheet, a body in the material of others, or dust that cutting left.
     Dropped,
     /// It was replaced by a wrap.
     Wrapped,

@@ -370,7 +370,7 @@ mod tests {
         let new = d.survey.promote(&all);
         let completed: Vec<u32> =
             (0..d.shop.positions.len() as u32).filter(|v| all.contains(&d.shop.positions[*v as usize])).collect();
-        d.shop.extend(&d.survey, &new, &completed);
+        d.shop.extend(&d.survey, &new, |_| completed);
         for t in 0..d.shop.triangles.len() as u32 {
             if kill(&d.shop.points(t)) {
                 d.shop.kill(t);

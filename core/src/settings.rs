@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::read::Access;
 use crate::report::LoopClass;
 
 /// What a repair may do, and what its result must satisfy. Lengths written `…_relative` are fractions of the bounding box's
@@ -218,6 +219,9 @@ pub struct Limits {
     /// The caller syncs the output: among many small files it can wait for the disk once for several.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub defer_sync: bool,
+    /// How the input and the written output are read. Only code that answers for it can choose a map, so that no file and no message can.
+    #[serde(skip)]
+    pub access: Access,
 }
 
 /// When triangles are sorted by place into a spool file before their topology is worked out.
@@ -244,6 +248,7 @@ impl Default for Limits {
             spill: Spill::Auto,
             list_edit: false,
             defer_sync: false,
+            access: Access::COPIED,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Sums that do not depend on the order of their terms: bounding boxes, and exact accumulators of area and volume.
 
+use crate::position::canonical;
 use crate::record::Point;
 
 /// Axis-parallel box of finite positions; −0.0 and 0.0 are one value.
@@ -72,8 +73,15 @@ impl Bounds {
 
     /// −0.0 becomes 0.0, so that the box does not tell which of the two came last.
     pub(crate) fn normalised(self) -> Self {
-        Self { lo: self.lo.map(|x| x + 0.0), hi: self.hi.map(|x| x + 0.0) }
+        Self { lo: canonical(self.lo), hi: canonical(self.hi) }
     }
+}
+
+/// What single precision can tell apart at a coordinate of this size. Always finite: beyond the largest number there is no next one, so the
+/// step below it is taken.
+pub(crate) fn step_at(coordinate: f32) -> f64 {
+    let size = coordinate.abs().min(f32::MAX.next_down());
+    f64::from(size.next_up()) - f64::from(size)
 }
 
 /// How area and volume are turned into integers: terms are taken relative to the middle of the model, in units of 2⁻⁸⁸ of the
@@ -297,6 +305,15 @@ mod tests {
             triangles.iter().for_each(|t| sum += measure.triangle(t));
             assert!((measure.volume(sum) - 1.0).abs() < 1e-9, "{}", measure.volume(sum));
             assert!((measure.area(sum) - 6.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_step_at_the_largest_number_is_finite() {
+        assert_eq!(step_at(1.0), 2f64.powi(-23));
+        assert_eq!(step_at(0.0), f64::from(f32::from_bits(1)));
+        for largest in [f32::MAX, -f32::MAX] {
+            assert_eq!(step_at(largest), 2f64.powi(104), "24 bits of a number just below 2^128");
         }
     }
 

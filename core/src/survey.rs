@@ -14,6 +14,7 @@ use crate::error::{Error, Result};
 use crate::members::Members;
 use crate::parts::Parts;
 use crate::plan::{ChunkId, HomeBox, Plan};
+use crate::position;
 use crate::record::{self, Record};
 use crate::report::SelfIntersections;
 use crate::settings::Limits;
@@ -60,6 +61,8 @@ pub(crate) struct Survey<'a> {
     merged: Vec<u32>,
     /// So many of the promoted vertices have divided the surface.
     dividing: usize,
+    /// What was counted while the chunks were solved, and is still held.
+    budget: Budget,
     threads: usize,
 }
 
@@ -98,7 +101,7 @@ impl<'a> Survey<'a> {
         let budget = Budget::new(limits.memory_bytes);
         // A copy of the file and its digest may be in the making.
         budget.take(Purpose::Tables, behind::most_dirty(limits) + digest::heap_bytes(size_of_val(records) as u64));
-        take_tables(path, &budget, &plan, &members, limits)?;
+        let scratch = take_tables(path, &budget, &plan, &members, limits)?;
 
         let most_tested = crossings::most_tested(records.len() as u64);
         let _span = tracing::debug_span!("chunks", count = plan.chunks()).entered();
@@ -133,6 +136,7 @@ impl<'a> Survey<'a> {
             return Err(Error::io(path, STAGE)(std::io::ErrorKind::Interrupted.into()));
         }
         check(path, &budget, suspects.into_inner(), patches.into_inner())?;
+        budget.give_back(Purpose::Tables, scratch);
         let span = tracing::debug_span!("merge").entered();
         let mut fresh: Vec<(ChunkId, &mut ChunkTopology)> = (0..).map(ChunkId).zip(&mut chunks).collect();
         let (parts, suspects) = Parts::none(plan.chunks()).renewed((records, &measure), Vec::new(), &mut fresh, |_| true);
@@ -169,6 +173,7 @@ impl<'a> Survey<'a> {
             parts,
             merged,
             dividing: 0,
+            budget,
             threads: limits.threads,
         })
     }
@@ -247,8 +252,7 @@ impl<'a> Survey<'a> {
     /// The patches of some triangles with a sound corner.
     fn patches_at(&self, triangles: impl Iterator<Item = u32>) -> Vec<u32> {
         let triangles: Vec<u32> = triangles.collect();
-        let positions: Vec<[f32; 3]> =
-            triangles.iter().flat_map(|t| record::corners(&self.records[*t as usize])).map(|p| p.map(|x| x + 0.0)).collect();
+        let positions: Vec<[f32; 3]> = triangles.iter().flat_map(|t| position::corners(&self.records[*t as usize])).collect();
         // Around positions that are not sound there may be triangles of no patch, or of the workshop.
         let around = self.beyond_the_workshop(&positions);
         let patch = |t: u32| match self.suspects.binary_search_by_key(&t, |s| s.triangle) {
@@ -268,6 +272,15 @@ impl<'a> Survey<'a> {
         let mut by_home: Vec<(ChunkId, [f32; 3])> = positions.iter().map(|p| (self.plan.home(*p), *p)).collect();
         by_home.sort_by_key(|(home, _)| *home);
         by_home
+    }
+
+    /// Refuses the work on `path` if what is to be known of so many edges of one triangle in the workshop, in `bytes`, does not fit the budget
+    /// beside what was counted while the chunks were solved.
+    pub(crate) fn take_boundary(&self, path: &Path, boundary_edges: u64, bytes: u64) -> Result<()> {
+        self.budget.take(Purpose::Defects, bytes);
+        self.budget.check(path, || {
+            format!("{} triangles lie at defects, with {boundary_edges} edges that only one triangle has", self.suspects.len())
+        })
     }
 
     /// Threads to work with.
@@ -432,8 +445,8 @@ fn refuse_more_than(path: &Path, most: u64, there: u64, what: &str) -> Result<()
     Err(Error::Refused { path: path.into(), reason: format!("{there} {what}"), advice })
 }
 
-/// Takes what is known to be needed before the chunks are solved.
-fn take_tables(path: &Path, budget: &Budget, plan: &Plan, members: &Members, limits: &Limits) -> Result<()> {
+/// Takes what is known to be needed before the chunks are solved; returns how much of it is free again once they are.
+fn take_tables(path: &Path, budget: &Budget, plan: &Plan, members: &Members, limits: &Limits) -> Result<u64> {
     let mut counts: Vec<u64> = (0..plan.chunks()).map(|c| members.count(ChunkId(c as u32))).collect();
     counts.sort_unstable_by(|a, b| b.cmp(a));
     // A thread's tables are as large as its largest chunk, and no two threads work on the same one.
@@ -443,7 +456,8 @@ fn take_tables(path: &Path, budget: &Budget, plan: &Plan, members: &Members, lim
     budget.check(path, || format!("the largest chunk holds {largest} triangles"))?;
     let nonfinite = count_of(&members.nonfinite);
     budget.take(Purpose::Defects, nonfinite * edit::BYTES_PER_NONFINITE);
-    budget.check(path, || format!("{nonfinite} triangles have coordinates that are no finite numbers"))
+    budget.check(path, || format!("{nonfinite} triangles have coordinates that are no finite numbers"))?;
+    Ok(scratch)
 }
 
 #[cfg(test)]
@@ -486,7 +500,7 @@ mod tests {
         let all: Vec<[f32; 3]> =
             records.iter().map(record::corners).filter(|t| t.as_flattened().iter().all(|x| x.is_finite())).flatten().collect();
         let [first, promoted, second] = corners.each_ref().map(|some| -> Vec<[f32; 3]> {
-            let mut some: Vec<[f32; 3]> = some.iter().map(|k| all[k % all.len()].map(|x| x + 0.0)).collect();
+            let mut some: Vec<[f32; 3]> = some.iter().map(|k| position::canonical(all[k % all.len()])).collect();
             some.sort_by(|a, b| a.partial_cmp(b).unwrap());
             some.dedup();
             some

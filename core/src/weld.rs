@@ -2,6 +2,7 @@
 
 use glam::Vec4;
 
+use crate::position::{bits, canonical};
 use crate::record::Point;
 
 /// Vertices by position, numbered from 0 by first appearance. A hash table of buckets of four positions, each a cache line, all
@@ -63,7 +64,7 @@ impl Weld {
     /// The vertex at a finite position.
     pub(crate) fn vertex(&mut self, p: Point) -> u32 {
         self.reserve(1);
-        let position = normalised(p);
+        let position = canonical(p);
         let bucket = self.bucket_of(position);
         self.probe(position, bucket).unwrap_or_else(|bucket| self.insert(bucket, position))
     }
@@ -75,11 +76,11 @@ impl Weld {
         self.reserve(points.len());
         let mut buckets = [0usize; BATCH];
         for (p, bucket) in points.iter().zip(&mut buckets) {
-            *bucket = self.bucket_of(normalised(*p));
+            *bucket = self.bucket_of(canonical(*p));
             prefetch(&self.buckets[*bucket]);
         }
         for ((p, bucket), vertex) in points.iter().zip(buckets).zip(vertices) {
-            let position = normalised(*p);
+            let position = canonical(*p);
             *vertex = match self.probe(position, bucket) {
                 Ok(vertex) => vertex,
                 Err(bucket) => self.insert(bucket, position),
@@ -90,11 +91,11 @@ impl Weld {
     /// The vertex at a position, if there is one.
     #[inline]
     pub(crate) fn find(&self, p: Point) -> Option<u32> {
-        let position = normalised(p);
+        let position = canonical(p);
         self.probe(position, self.bucket_of(position)).ok()
     }
 
-    /// The vertex at a normalised position, or the bucket where it would go. The search begins at the bucket it belongs in.
+    /// The vertex at a canonical position, or the bucket where it would go. The search begins at the bucket it belongs in.
     #[inline(always)]
     fn probe(&self, position: Point, mut at: usize) -> Result<u32, usize> {
         loop {
@@ -146,10 +147,10 @@ impl Weld {
         self.shift = 64 - size.trailing_zeros();
     }
 
-    /// Where the search for a normalised position begins.
+    /// Where the search for a canonical position begins.
     #[inline(always)]
     fn bucket_of(&self, p: Point) -> usize {
-        let (x, y, z) = (u64::from(p[0].to_bits()), u64::from(p[1].to_bits()), u64::from(p[2].to_bits()));
+        let [x, y, z] = bits(p).map(u64::from);
         let h = (x | y << 32).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ z.wrapping_mul(0xC2B2_AE3D_27D4_EB4F);
         let h = (h ^ h >> 32).wrapping_mul(0xD6E8_FEB8_6659_FD93);
         (h >> self.shift) as usize
@@ -166,7 +167,6 @@ impl Weld {
     }
 }
 
-/// −0.0 becomes 0.0.
 /// A set of positions that is asked often and seldom holds what is asked for: a bit for each hash.
 #[derive(Default)]
 pub(crate) struct Sieve {
@@ -196,16 +196,11 @@ impl Sieve {
 
     #[inline(always)]
     fn place(p: Point) -> (usize, u32) {
-        let [x, y, z] = normalised(p).map(f32::to_bits);
+        let [x, y, z] = bits(canonical(p));
         let h = x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA77) ^ z.wrapping_mul(0xC2B2_AE3D);
         let h = (h ^ h >> 15).wrapping_mul(0x2C1B_3C6D) >> (32 - Self::BITS);
         (h as usize / 64, h % 64)
     }
-}
-
-#[inline(always)]
-fn normalised(p: Point) -> Point {
-    [p[0] + 0.0, p[1] + 0.0, p[2] + 0.0]
 }
 
 /// Asks the processor for what will be read soon.

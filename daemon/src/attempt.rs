@@ -1,6 +1,7 @@
 //! One slot of the daemon: claims jobs, one after the other, and brings each as far as it goes. It owns a worker process, which
 //! serves many small files; a crash then costs the file that was being worked on, and a new process.
 
+use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::Mutex;
@@ -11,31 +12,28 @@ use crossbeam::channel::Sender;
 use suture_core::report::Task;
 use suture_core::{ErrorClass, Limits, Profile, Report};
 use suture_store::Lease;
-use suture_store::job::{Death as StoreDeath, Duty, Withdrawal};
+use suture_store::job::{Death as StoreDeath, Duty, Kind, Withdrawal};
 use suture_store::{Claim, Ending, Job, JobStore, State, Step, StoreError, crash_point};
 
+use crate::claim::{CLAIMED, Claimed, Unclaimed, claim};
 use crate::config::Config;
+use crate::create;
 use crate::folder::Folder;
-use crate::fsx::{self, Identity};
+use crate::fsx::Identity;
 use crate::profiles;
 use crate::protocol::Request;
-use crate::publish::{CLAIMED, Conclusion, Desk, OUTPUT, PublishError, is_source};
+use crate::publish::{Conclusion, Desk, OUTPUT, PublishError, discard};
 use crate::schedule::{Schedule, Turn};
 use crate::supervise::{Cause, Death, Ended, Worker};
-use crate::units::show_size;
 
 /// Left by a worker that outlived the daemon: the file it worked on did not kill it.
 pub(crate) const WITNESS: &str = "outlived";
+/// There while the daemon reads a worker's answer.
+pub(crate) const IN_HAND: &str = "in-hand";
 /// How often a running job asks whether anyone wants it stopped.
 const ASK_EVERY: Duration = Duration::from_millis(500);
 /// A worker process is replaced after so many files, so that nothing can pile up in it for months.
 const FILES_PER_WORKER: u32 = 500;
-/// Pauses between tries to bring a result into place while the folders cannot be written.
-const RETRY_FIRST: Duration = Duration::from_millis(200);
-const RETRY_LAST: Duration = Duration::from_secs(30);
-/// With `--once`, so many tries.
-const TRIES_ONCE: u32 = 5;
-
 /// What happened, for the thread that looks after the folders.
 #[derive(Debug)]
 pub(crate) enum Event {
@@ -56,7 +54,7 @@ pub(crate) struct Context {
     /// Running jobs are to be handed back now.
     pub halt: AtomicBool,
     /// A job ended not good, or could not be ended.
-    pub not_good: AtomicBool,
+    pub not_good: Arc<AtomicBool>,
     /// The store failed; every thread ends.
     pub failed: Mutex<Option<StoreError>>,
 }
@@ -75,6 +73,19 @@ impl Context {
         }
     }
 
+    /// Clears away what a parked job that was just given up had ready; `job` is the job as it was before.
+    pub(crate) fn sweep(&self, job: &Job) {
+        if let (Kind::Parked, Some(folder)) = (job.kind(), self.folder(job)) {
+            discard(folder, job);
+            remove_work(&folder.work(job.work_token()));
+        }
+    }
+
+    /// Has the store failed?
+    fn has_failed(&self) -> bool {
+        self.failed.lock().is_ok_and(|failed| failed.is_some())
+    }
+
     fn halted(&self) -> bool {
         self.halt.load(Ordering::Relaxed)
     }
@@ -85,11 +96,13 @@ pub(crate) struct Slot<'a> {
     context: &'a Context,
     worker: Option<Worker>,
     served: u32,
+    /// A file of the result in work is in its place.
+    committed: Cell<bool>,
 }
 
 impl<'a> Slot<'a> {
     pub(crate) fn new(context: &'a Context) -> Self {
-        Self { context, worker: None, served: 0 }
+        Self { context, worker: None, served: 0, committed: Cell::new(false) }
     }
 
     /// Works until the schedule says stop.
@@ -121,49 +134,50 @@ impl<'a> Slot<'a> {
         }
     }
 
-    /// Does what the job is owed until nothing is owed under this claim; the same after a crash as in normal work.
+    /// Does what the job is owed until nothing is owed under this claim; the same after a crash as in normal work. Nothing is tried
+    /// twice under one claim: what the world does not allow now is parked, or put back into the queue, with its reason.
     pub(crate) fn finish(&mut self, claim: &Claim, mut job: Job, turn: Turn) {
         let span = tracing::info_span!("job", job = job.id.0, file = %job.source.path);
         let _in_span = span.enter();
         let work = job.work.unwrap_or(claim.token);
-        let mut pause = RETRY_FIRST;
-        let mut tries = 0;
-        loop {
-            let next = match job.duty() {
-                Duty::Queue | Duty::Rest => break,
-                _ => self.step(claim, &job, turn),
+        while !matches!(job.duty(), Duty::Queue | Duty::Rest) {
+            let next = match self.step(claim, &job, turn) {
+                Err(PublishError::Store(error)) => Err(error),
+                Err(error) => self.put_off(claim, &job, &error),
+                Ok(next) => Ok(next),
             };
             match next {
                 Ok(Some(next)) => job = next,
                 // The claim is lost: someone else's job now.
                 Ok(None) => return,
-                Err(PublishError::Store(StoreError::Illegal { source, .. })) => {
+                Err(StoreError::Illegal { source, .. }) => {
                     tracing::warn!(reason = %source, "The job went another way meanwhile.");
                     return;
                 }
-                Err(PublishError::Store(error)) => return self.context.fail(error),
-                Err(error) => {
-                    tries += 1;
-                    if tries == 1 {
-                        tracing::error!(%error, "A result cannot be brought into place; trying until it can.");
-                    }
-                    if self.context.halted() || (self.context.once && tries >= TRIES_ONCE) {
-                        // Its state says what is to be done; the next start does it.
-                        tracing::error!(%error, "A result waits to be brought into place at the next start.");
-                        self.context.not_good.store(true, Ordering::Relaxed);
-                        return;
-                    }
-                    std::thread::sleep(pause);
-                    pause = (pause * 2).min(RETRY_LAST);
-                }
+                Err(error) => return self.context.fail(error),
             }
         }
         self.close(&job, work);
     }
 
+    /// The world does not allow the next step. A job whose result is known keeps it and is parked; any other goes back into the queue.
+    fn put_off(&self, claim: &Claim, job: &Job, error: &PublishError) -> Result<Option<Job>, StoreError> {
+        let reason = error.to_string();
+        let step = match (&job.state, error) {
+            (State::Running { .. }, PublishError::Folder(_)) => Step::Wait { reason },
+            (State::Running { .. }, _) => Step::Environment { reason },
+            (state, _) => Step::Park { reason, committed: self.committed.take() || matches!(state, State::Published { .. }) },
+        };
+        self.context.store.advance(claim, step).map(Some)
+    }
+
     fn close(&self, job: &Job, work: suture_store::Token) {
         tell(job);
         let Some(folder) = self.context.folder(job) else { return };
+        if job.kind() == Kind::Parked {
+            // Its result is in there.
+            return;
+        }
         remove_work(&folder.work(work));
         crash_point("daemon.swept");
         match &job.state {
@@ -179,15 +193,13 @@ impl<'a> Slot<'a> {
     fn step(&mut self, claim: &Claim, job: &Job, turn: Turn) -> Result<Option<Job>, PublishError> {
         let context = self.context;
         let Some(folder) = context.folder(job) else {
-            let reason = format!("the hot folder `{}` is not in the configuration", job.source.folder);
-            return match job.duty() {
-                Duty::Run | Duty::Stop => Ok(Some(context.store.advance(claim, Step::Environment { reason })?)),
-                _ => Ok(None),
-            };
+            return Err(PublishError::Folder(format!("the hot folder `{}` is not in the configuration", job.source.folder)));
         };
-        let desk = Desk { store: &*context.store, folder, claim };
+        // What is there, and what is missing, is believed of the right folder only.
+        folder.check().map_err(PublishError::Folder)?;
+        let desk = Desk::new(&*context.store, folder, claim, &self.committed);
         let next = match (job.duty(), &job.state) {
-            (Duty::Run, _) => return self.attempt(&desk, job, turn),
+            (Duty::Run, _) => return self.attempt(folder, claim, job, turn),
             (Duty::Stop, _) => context.store.advance(claim, Step::Cancelled)?,
             (Duty::Intend, State::Concluded { ending, reason, .. }) => {
                 desk.intend(job, &Conclusion::None { ending: *ending, reason: reason.clone() })?
@@ -200,16 +212,26 @@ impl<'a> Slot<'a> {
     }
 
     /// Lets a worker loose on the file, and says what came of it.
-    fn attempt(&mut self, desk: &Desk, job: &Job, turn: Turn) -> Result<Option<Job>, PublishError> {
+    fn attempt(&mut self, folder: &Folder, token: &Claim, job: &Job, turn: Turn) -> Result<Option<Job>, PublishError> {
         let context = self.context;
-        let work = desk.folder.work(desk.claim.token);
-        let step = match claim_file(desk.folder, job, &work) {
-            Err(why) => why.into(),
+        let work = folder.work(token.token);
+        let step = match claim(folder, job, &work) {
+            Err(Unclaimed::Withdrawn(why)) => {
+                // Of the right folder.
+                folder.check().map_err(PublishError::Folder)?;
+                Step::Withdrawn(why)
+            }
+            Err(Unclaimed::Environment(reason)) => Step::Environment { reason },
+            Err(Unclaimed::NoRoom(reason)) => Step::Wait { reason },
             Ok(claimed) => {
                 crash_point("daemon.linked");
-                match self.work(desk, job, &work, &claimed, turn) {
-                    Worked::Report(report) => match verify(&report, &work) {
-                        Ok(()) => return desk.intend(job, &Conclusion::Report(report)).map(Some),
+                let worked = self.work(folder, token, job, &claimed, turn);
+                let desk = Desk::new(&*context.store, folder, token, &self.committed);
+                match worked {
+                    Worked::Report { report, written } => match verify(&report, written.as_ref(), &work) {
+                        Ok(()) => {
+                            return desk.intend(job, &Conclusion::Report { report, ctime_ns: claimed.ctime_ns() }).map(Some);
+                        }
                         Err(reason) => Step::Environment { reason },
                     },
                     Worked::None(ending, reason) => return desk.intend(job, &Conclusion::None { ending, reason }).map(Some),
@@ -218,40 +240,29 @@ impl<'a> Slot<'a> {
                 }
             }
         };
-        Ok(Some(context.store.advance(desk.claim, step)?))
+        Ok(Some(context.store.advance(token, step)?))
     }
 
-    fn work(&mut self, desk: &Desk, job: &Job, work: &Path, claimed: &Claimed, turn: Turn) -> Worked {
+    fn work(&mut self, folder: &Folder, claim: &Claim, job: &Job, claimed: &Claimed, turn: Turn) -> Worked {
         let context = self.context;
-        let profile = match find_profile(&context.config, desk.folder, job) {
+        // A setting that a person has to mend, or a machine that has no process to give, is no try of the file's.
+        let profile = match find_profile(&context.config, folder, job) {
             Ok(profile) => profile,
-            Err(reason) => return Worked::Step(Step::Environment { reason }),
+            Err(reason) => return Worked::Step(Step::Wait { reason }),
         };
         let limits = limits(&context.config, turn);
         let mut worker = match self.worker(&limits, turn, job) {
             Ok(worker) => worker,
-            Err(error) => {
-                return Worked::Step(Step::Environment { reason: format!("a worker process cannot be started: {error}") });
-            }
+            Err(error) => return Worked::Step(Step::Wait { reason: format!("a worker process cannot be started: {error}") }),
         };
-        let request = Request {
-            task: Task::Repair,
-            input: work.join(CLAIMED),
-            output: Some(work.join(OUTPUT)),
-            report: None,
-            witness: Some(work.join(WITNESS)),
-            shown_input: desk.folder.inbox().join(job.source.path.to_path()).display().to_string(),
-            shown_output: None,
-            profile,
-            limits,
-        };
-        let asked = std::cell::Cell::new(Instant::now());
-        let lease = std::cell::Cell::new(Lease::Held);
+        let request = request(folder, claim, job, profile, limits);
+        let asked = Cell::new(Instant::now());
+        let lease = Cell::new(Lease::Held);
         let stop = || {
             if asked.get().elapsed() >= ASK_EVERY {
                 asked.set(Instant::now());
                 // A store that fails here fails at the next step too, and is dealt with there.
-                lease.set(context.store.heartbeat(desk.claim).unwrap_or(Lease::Held));
+                lease.set(context.store.heartbeat(claim).unwrap_or(Lease::Held));
             }
             lease.get() != Lease::Held || context.halted()
         };
@@ -259,31 +270,43 @@ impl<'a> Slot<'a> {
         tracing::debug!(worker = worker.pid(), attempt = job.attempts.0, "Work begins.");
         let ended = worker.run(&request, Some(limit), &stop, &mut |_, _, _| {});
         crash_point("daemon.worked");
-        if matches!(ended, Ended::Done(_) | Ended::Failed { .. }) && !turn.is_alone() {
+        if matches!(ended, Ended::Done { .. } | Ended::Failed { .. }) && !turn.is_alone() {
             self.worker = Some(worker);
         }
-        let changed = !claimed.is_unchanged();
+        let changed = match claimed.is_unchanged() {
+            Ok(unchanged) => !unchanged,
+            Err(error) => {
+                let reason = format!("the file cannot be looked at: {error}");
+                return if lease.get() == Lease::Lost { Worked::Lost } else { Worked::Step(Step::Environment { reason }) };
+            }
+        };
         match ended {
+            Ended::Stopped if context.has_failed() => {
+                // The daemon ends for reasons of its own: the next one is not to suspect the file. Without the mark it runs alone.
+                let _ = create::mark(&folder.work(claim.token).join(WITNESS));
+                Worked::Lost
+            }
             Ended::Stopped => match lease.get() {
                 Lease::Cancel => Worked::Step(Step::Cancelled),
                 Lease::Lost => Worked::Lost,
                 Lease::Held => Worked::Step(Step::HandBack),
             },
-            Ended::Died(death) if !changed || !matches!(death.cause, Cause::Fault(_)) => died(&death),
+            Ended::Died(death) if !changed || !matches!(death.cause, Cause::Fault(_)) => died(&death, turn),
             _ if changed => Worked::Step(Step::Withdrawn(Withdrawal::Changed)),
-            Ended::Done(report) => Worked::Report(report),
+            Ended::Done { report, written } => Worked::Report { report, written },
             Ended::Failed { class, message } => {
                 // Whoever reads it knows which file it is about.
                 let named = format!("{}: ", request.shown_input);
                 let reason = message.strip_prefix(&named).map_or(message.clone(), str::to_owned);
                 match class {
                     ErrorClass::Unreadable => Worked::None(Ending::Unreadable, reason),
-                    ErrorClass::Refused => Worked::None(Ending::Refused, reason),
+                    ErrorClass::Starved if !turn.is_alone() => Worked::Step(Step::NeedsAll),
+                    ErrorClass::Refused | ErrorClass::Starved => Worked::None(Ending::Refused, reason),
                     ErrorClass::Environment => Worked::Step(Step::Environment { reason }),
                     ErrorClass::Changed => Worked::Step(Step::Withdrawn(Withdrawal::Changed)),
                 }
             }
-            Ended::Died(death) => died(&death),
+            Ended::Died(death) => died(&death, turn),
         }
     }
 
@@ -303,22 +326,44 @@ impl<'a> Slot<'a> {
 
 /// How an attempt went.
 enum Worked {
-    Report(Box<Report>),
+    Report {
+        report: Box<Report>,
+        written: Option<Identity>,
+    },
     None(Ending, String),
     Step(Step),
     /// The claim is void.
     Lost,
 }
 
-fn died(death: &Death) -> Worked {
+fn died(death: &Death, turn: Turn) -> Worked {
     tracing::warn!(reason = death.line(), blame = death.blames_file(), "A worker process died.");
-    Worked::Step(Step::Died(match death.cause {
-        Cause::Fault(signal) => StoreDeath::Signal(signal),
-        Cause::Internal(code) => StoreDeath::Exit(code),
-        Cause::Memory => StoreDeath::MemoryLimit,
-        Cause::Time(_) => StoreDeath::TimeLimit,
-        Cause::Killed(signal) => StoreDeath::Killed(signal),
-    }))
+    Worked::Step(match death.cause {
+        Cause::Fault(signal) => Step::Died(StoreDeath::Signal(signal)),
+        Cause::Internal(code) => Step::Died(StoreDeath::Exit(code)),
+        Cause::Memory if !turn.is_alone() => Step::NeedsAll,
+        Cause::Memory => Step::Died(StoreDeath::MemoryLimit),
+        Cause::Machine | Cause::Cut => Step::Environment { reason: death.line() },
+        Cause::Time(_) => Step::Died(StoreDeath::TimeLimit),
+        Cause::Killed(signal) => Step::Died(StoreDeath::Killed(signal)),
+    })
+}
+
+/// What a worker is to do for a job.
+fn request(folder: &Folder, claim: &Claim, job: &Job, profile: Profile, limits: Limits) -> Request {
+    let work = folder.work(claim.token);
+    Request {
+        task: Task::Repair,
+        input: work.join(CLAIMED),
+        output: Some(work.join(OUTPUT)),
+        report: None,
+        witness: Some(work.join(WITNESS)),
+        mark: Some(work.join(IN_HAND)),
+        shown_input: folder.inbox().join(job.source.path.to_path()).display().to_string(),
+        shown_output: None,
+        profile,
+        limits,
+    }
 }
 
 /// A small file gets one thread and its slot's share of the memory; a file alone gets everything.
@@ -329,68 +374,6 @@ fn limits(config: &Config, turn: Turn) -> Limits {
         threads: if alone { config.threads } else { 1 },
         ..Limits::default()
     }
-}
-
-/// The claimed file, and what tells whether it changed since.
-struct Claimed {
-    watched: PathBuf,
-    identity: Identity,
-}
-
-impl Claimed {
-    fn is_unchanged(&self) -> bool {
-        Identity::of(&self.watched).is_ok_and(|now| now == self.identity)
-    }
-}
-
-/// Why a file could not be claimed.
-enum Unclaimed {
-    Withdrawn(Withdrawal),
-    Environment(String),
-}
-
-impl From<Unclaimed> for Step {
-    fn from(why: Unclaimed) -> Self {
-        match why {
-            Unclaimed::Withdrawn(why) => Self::Withdrawn(why),
-            Unclaimed::Environment(reason) => Self::Environment { reason },
-        }
-    }
-}
-
-/// Puts the dropped file into the attempt's folder: a hard link, which keeps it even if its name goes meanwhile; where that
-/// cannot be, a copy. The dropped name stays, so that whatever happens to the attempt's folder, the file is where it was.
-fn claim_file(folder: &Folder, job: &Job, work: &Path) -> Result<Claimed, Unclaimed> {
-    let (area, path) = job.original();
-    let source = folder.area(area).join(path.to_path());
-    let environment = |what: &str, error: &std::io::Error| Unclaimed::Environment(format!("{what}: {error}"));
-    let look = |path: &Path| match Identity::of(path) {
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Err(Unclaimed::Withdrawn(Withdrawal::Vanished)),
-        Err(e) => Err(environment("the file cannot be looked at", &e)),
-        Ok(found) if is_source(&found, job) => Ok(found),
-        Ok(_) => Err(Unclaimed::Withdrawn(Withdrawal::Changed)),
-    };
-    let size = look(&source)?.size;
-    // Room for the result and for what the engine puts aside: a large file must not fill the disk half way.
-    let (needed, free) = (size.saturating_mul(3), fsx::free_space(&folder.root, 0));
-    if free < needed {
-        let (needed, free) = (show_size(needed), show_size(free));
-        return Err(Unclaimed::Environment(format!("the disk has room for {free} more; this file may need {needed}")));
-    }
-    std::fs::create_dir_all(work).map_err(|e| environment("the work folder cannot be made", &e))?;
-    let claimed = work.join(CLAIMED);
-    if std::fs::hard_link(&source, &claimed).is_ok() {
-        // Linking changed ctime: from here on it must stay.
-        let identity = look(&claimed)?;
-        return Ok(Claimed { watched: claimed, identity });
-    }
-    // No hard links here, or not of other people's files.
-    let before = look(&source)?;
-    std::fs::copy(&source, &claimed).map_err(|e| environment("the file cannot be copied", &e))?;
-    if look(&source)? != before {
-        return Err(Unclaimed::Withdrawn(Withdrawal::Changed));
-    }
-    Ok(Claimed { watched: source, identity: before })
 }
 
 /// The settings for a file: of its folder or one above it, else by name.
@@ -406,17 +389,17 @@ fn find_profile(config: &Config, folder: &Folder, job: &Job) -> Result<Profile, 
     config.profile(&job.source.profile).ok_or_else(|| format!("there is no profile `{}` any more", job.source.profile))
 }
 
-/// Does the written file read back as the engine wrote it?
-fn verify(report: &Report, work: &Path) -> Result<(), String> {
-    let path = work.join(OUTPUT);
-    match &report.output {
-        None if report.outcome.is_good() => Err("the engine reports a result, but there is none".into()),
-        None => Ok(()),
-        Some(facts) => match fsx::hash(&path) {
-            Ok(hash) if hash == facts.blake3 => Ok(()),
-            Ok(_) => Err("the result does not read back as it was written".into()),
-            Err(error) => Err(format!("the result cannot be read back: {error}")),
+/// Is the output the very file that the worker wrote, synced and read back?
+fn verify(report: &Report, written: Option<&Identity>, work: &Path) -> Result<(), String> {
+    match (&report.output, written) {
+        (None, _) if report.outcome.is_good() => Err("the engine reports a result, but there is none".into()),
+        (None, _) => Ok(()),
+        (Some(facts), Some(written)) => match Identity::of(&work.join(OUTPUT)) {
+            Ok(found) if found == *written && found.size == facts.bytes => Ok(()),
+            Ok(_) => Err("the result is not the file any more that was written and read back".into()),
+            Err(error) => Err(format!("the result cannot be looked at: {error}")),
         },
+        (Some(_), None) => Err("the result could not be looked at when it was written".into()),
     }
 }
 
@@ -440,6 +423,10 @@ fn tell(job: &Job) {
         }
         State::Cancelled { why } => tracing::info!(?why, "Taken back."),
         State::Queued { .. } => tracing::info!(reason = job.note, "Back in the queue."),
+        // Said once; `suture jobs` tells of every further try.
+        _ if job.kind() == Kind::Parked && job.parked.is_some_and(|parked| parked.tries == 1) => {
+            tracing::error!(reason = job.note, "The result cannot be brought into place; it is kept, and tried again.");
+        }
         _ => {}
     }
 }

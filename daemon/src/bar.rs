@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use crate::say::{complain, plain};
 use crate::units::{show_count, show_seconds};
 
 /// Work that is done sooner shows no bar.
@@ -127,7 +128,7 @@ impl Bar {
     pub(crate) fn alone(&mut self, input: &Path, bytes: u64) {
         self.alone = Some((Instant::now(), bytes, Standing::default()));
         if self.scope.files == 1 {
-            self.bar.set_prefix(short(&input.file_name().unwrap_or_default().to_string_lossy()));
+            self.bar.set_prefix(short(&plain(&input.file_name().unwrap_or_default().to_string_lossy())));
         }
         self.show();
     }
@@ -194,7 +195,7 @@ impl Bar {
             // A reader that has gone away has seen enough.
             let _ = std::io::stdout().write_all(text.as_bytes());
             if let Some(line) = complaint {
-                eprintln!("{line}");
+                complain(&line);
             }
         });
     }

@@ -18,6 +18,7 @@ use crate::bar::{Bar, Scope};
 use crate::config::LARGE;
 use crate::exit::Exit;
 use crate::fsx;
+use crate::say::complain;
 use crate::signals::Stop;
 use crate::single::{Failure, Finished, Order, tell};
 use crate::supervise::Worker;
@@ -197,7 +198,7 @@ impl<'a> Line<'a> {
             // Whoever takes what is sent is there as long as anything is.
             let _ = match self.work(entry, &mut worker) {
                 Ok(finished) if finished.item.request.limits.defer_sync => to_sync.send((index, finished)).map_err(drop),
-                Err(failure) if failure.starved && self.limits.memory_bytes < self.order.limits.memory_bytes => {
+                Err(failure) if failure.is_starved() && self.limits.memory_bytes < self.order.limits.memory_bytes => {
                     self.hungry.store(true, Ordering::Relaxed);
                     done.send((index, Came::Hungry)).map_err(drop)
                 }
@@ -307,7 +308,7 @@ impl<'a> Teller<'a> {
             return self.worst;
         }
         if all > 1 {
-            eprintln!("suture: interrupted; {} of {all} files are done, nothing was written of the others", self.done);
+            complain(&format_args!("interrupted; {} of {all} files are done, nothing was written of the others", self.done));
         }
         Exit::Interrupted
     }

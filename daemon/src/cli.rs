@@ -17,7 +17,7 @@ const VERSION: &str = if cfg!(feature = "crash-points") {
 /// Unattended repair of triangle meshes for 3D printing.
 ///
 /// Exit status: 0 good under the profile; 1 done, but a file is not good; 2 unreadable or refused input, or wrong usage;
-/// 73 the folder is served by another daemon; 75 the job store cannot be used, try again.
+/// 73 the folder is served by another daemon; 75 the job store cannot be used, try again; 130 interrupted by a signal.
 #[derive(Debug, Parser)]
 #[command(name = "suture", version = VERSION, max_term_width = 100, disable_help_subcommand = true)]
 pub(crate) struct Cli {

@@ -2,20 +2,22 @@
 //! Unknown settings are errors, with their line.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::time::Duration;
 
 use serde::{Deserialize, Deserializer, de};
 use suture_core::Profile;
 
 use crate::cli::WatchArgs;
-use crate::profiles;
-use crate::units::{parse_duration, parse_size};
+use crate::units::{parse_duration, parse_size, show_size};
 
 /// A file as large as this is worked on alone, by all threads and with the whole memory.
 pub(crate) const LARGE: u64 = 64 << 20;
 /// Free space below which nothing new is taken.
 const RESERVE: u64 = 256 << 20;
+
+/// A worker with less could not read a mesh of some thousand triangles.
+const LEAST_MEMORY: u64 = 4 << 20;
 
 /// The configuration file.
 #[derive(Debug, Deserialize)]
@@ -149,6 +151,11 @@ impl Config {
         config.workers = args.workers.map_or(config.workers, usize::from);
         config.threads = args.threads.map_or(config.threads, usize::from);
         config.settle = args.settle.or(config.settle);
+        let least = LEAST_MEMORY.saturating_mul(config.workers as u64);
+        if config.memory < least {
+            let (memory, least) = (show_size(config.memory), show_size(least));
+            return Err(format!("{memory} of memory are too little for {} workers: they need {least} together", config.workers));
+        }
         Ok(config)
     }
 
@@ -181,8 +188,8 @@ impl Config {
         config.folders.clear();
         for folder in file.folders {
             let name = folder.name.unwrap_or_else(|| name_of(&folder.path));
-            if config.folders.iter().any(|other| other.name == name || other.path == folder.path) {
-                return Err(fail(&format!("two folders are called `{name}`; give each a path and a `name` of its own")));
+            if config.folders.iter().any(|other| other.name == name) {
+                return Err(fail(&format!("two folders are called `{name}`; give each a `name` of its own")));
             }
             config.folders.push(FolderConfig { name, path: folder.path, profile: folder.profile.unwrap_or("default".into()) });
         }
@@ -203,10 +210,11 @@ impl Config {
             config.time_limit.per_gib = limit.per_gib.unwrap_or(config.time_limit.per_gib);
         }
         for (name, mut profile) in file.profiles {
-            profiles::check(&profile).map_err(|e| fail(&format!("profile `{name}`: {e}")))?;
+            profile.validate().map_err(|e| fail(&format!("profile `{name}`: {e}")))?;
             profile.name.clone_from(&name);
             config.profiles.insert(name, profile);
         }
+        apart(&config.folders).map_err(|line| fail(&line))?;
         if let Some(folder) = config.folders.iter().find(|folder| config.profile(&folder.profile).is_none()) {
             return Err(fail(&format!("folder `{}`: there is no profile `{}`", folder.name, folder.profile)));
         }
@@ -222,6 +230,41 @@ impl Config {
 /// Where the job store of a hot folder is.
 pub(crate) fn default_state(folder: &Path) -> PathBuf {
     folder.join(".suture").join("state")
+}
+
+/// Are these hot folders that do not lie in one another, whatever their paths are called? A folder that is made only later is told by its
+/// path, through links and `..` as far as there is something.
+fn apart(folders: &[FolderConfig]) -> Result<(), String> {
+    let real: Vec<PathBuf> = folders.iter().map(|folder| real(&folder.path)).collect();
+    for (i, a) in real.iter().enumerate() {
+        for (j, b) in real.iter().enumerate().filter(|(j, _)| *j != i) {
+            if let (true, Some(inner), Some(outer)) = (a.starts_with(b), folders.get(i), folders.get(j)) {
+                let (shown, other) = (inner.path.display(), outer.path.display());
+                return Err(if a == b {
+                    format!("{shown} and {other} are the same folder")
+                } else {
+                    format!(
+                        "{shown} lies in the hot folder {other}, which would take its files; hot folders lie beside each other"
+                    )
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The path without links and detours, as far as there is something.
+fn real(path: &Path) -> PathBuf {
+    let full = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let mut real = PathBuf::new();
+    for part in full.components() {
+        match part {
+            Component::ParentDir => drop(real.pop()),
+            part => real.push(part),
+        }
+        real = real.canonicalize().unwrap_or(real);
+    }
+    real
 }
 
 fn name_of(dir: &Path) -> String {
@@ -275,6 +318,10 @@ mod tests {
         assert!(load("folders = []").unwrap_err().contains("no hot folder"));
         assert!(load("folders = [{ path = \"/a\", profile = \"nope\" }]").unwrap_err().contains("nope"));
         assert!(load("folders = [{ path = \"/x/a\" }, { path = \"/y/a\" }]").unwrap_err().contains("two folders"));
+        let error = load("folders = [{ path = \"/x\", name = \"a\" }, { path = \"/x/in/b\" }]").unwrap_err();
+        assert!(error.contains("/x/in/b lies in the hot folder /x"), "{error}");
+        let error = load("folders = [{ path = \"x\" }, { path = \"./y/../x\", name = \"b\" }]").unwrap_err();
+        assert!(error.contains("are the same folder"), "{error}");
         assert!(load("memory = \"lots\"\nfolders = [{ path = \"/a\" }]").unwrap_err().contains("line 1"));
     }
 }

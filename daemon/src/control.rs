@@ -1,12 +1,16 @@
 //! How `suture jobs` reaches the jobs: through a socket in the hot folder while its daemon runs (the store has one owner), else
 //! by opening the store. Either way the same [`Wish`] gets the same [`Answer`].
 
+use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, Read, Write};
+use std::net::Shutdown;
 use std::os::fd::AsRawFd;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use serde::{Deserialize, Serialize};
 use suture_store::{Control, Job, JobId, JobStore, Query, StoreError};
 
@@ -16,8 +20,10 @@ use crate::attempt::Context;
 const LONGEST_WISH: u64 = 4096;
 /// How long either side waits for the other.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// Pause after a knock that could not be answered.
-const AFTER_ERROR: Duration = Duration::from_millis(100);
+/// How often the daemon's side looks whether it is to end.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
+/// Requests answered at the same time; further ones wait.
+const AT_ONCE: usize = 16;
 
 /// What an operator wants.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -47,7 +53,13 @@ pub(crate) fn answer(store: &dyn JobStore, wish: &Wish) -> Answer {
     };
     match result {
         Ok(jobs) => Answer::Jobs(jobs),
-        Err(error) => Answer::Failed { line: error.to_string(), exit_code: error.exit_code() },
+        Err(error) => Answer::failed(&error),
+    }
+}
+
+impl Answer {
+    pub(crate) fn failed(error: &StoreError) -> Self {
+        Self::Failed { line: error.to_string(), exit_code: error.exit_code() }
     }
 }
 
@@ -77,20 +89,66 @@ impl Door {
         let path = socket(root);
         crate::fsx::remove_if_there(&path)?;
         let listener = short(&path, |path| UnixListener::bind(path))?;
+        // Whoever knocked may be gone before the door is opened.
+        listener.set_nonblocking(true)?;
         Ok(Self { listener, path })
     }
 
-    /// Serves whoever knocks until `end`, which is looked at after each knock: [`knock`] then.
+    /// Serves whoever knocks until `end`, each by a thread of its own: one that says nothing keeps no one waiting. Needs no knock to
+    /// end: the socket's name may be gone by then.
     pub(crate) fn serve(&self, context: &Context, end: &dyn Fn() -> bool) {
-        while !end() {
-            match self.listener.accept() {
-                Ok(_) if end() => return,
-                Ok((stream, _)) => {
-                    if let Err(error) = serve_one(context, stream) {
+        let busy = AtomicUsize::new(0);
+        let mut open: VecDeque<UnixStream> = VecDeque::new();
+        std::thread::scope(|scope| {
+            while !end() {
+                if busy.load(Ordering::Acquire) >= AT_ONCE {
+                    std::thread::sleep(LOOK_EVERY);
+                    continue;
+                }
+                if !self.someone_knocks() {
+                    continue;
+                }
+                let Ok((stream, _)) = self.listener.accept() else {
+                    std::thread::sleep(LOOK_EVERY);
+                    continue;
+                };
+                busy.fetch_add(1, Ordering::AcqRel);
+                // At most so many are still open.
+                open.extend(stream.try_clone());
+                while open.len() > AT_ONCE {
+                    open.pop_front();
+                }
+                let busy = &busy;
+                let serve = move || {
+                    let served = serve_one(context, &stream);
+                    // Whoever asked reads to the end, and another handle of the stream is kept.
+                    let _ = stream.shutdown(Shutdown::Both);
+                    if let Err(error) = served {
                         tracing::debug!(%error, "A request on the control socket was not understood.");
                     }
+                    busy.fetch_sub(1, Ordering::AcqRel);
+                };
+                if std::thread::Builder::new().spawn_scoped(scope, serve).is_err() {
+                    // No thread to be had: the stream is closed, whoever knocked knocks again.
+                    busy.fetch_sub(1, Ordering::AcqRel);
                 }
-                Err(_) => std::thread::sleep(AFTER_ERROR),
+            }
+            // Whoever has not said what they want by now keeps no one from ending.
+            for stream in &open {
+                let _ = stream.shutdown(Shutdown::Read);
+            }
+        });
+    }
+
+    /// Waits a while for a knock.
+    fn someone_knocks(&self) -> bool {
+        let mut knocks = [PollFd::new(&self.listener, PollFlags::IN)];
+        let wait = Timespec { tv_sec: 0, tv_nsec: i64::from(LOOK_EVERY.subsec_nanos()) };
+        match poll(&mut knocks, Some(&wait)) {
+            Ok(knocks) => knocks > 0,
+            Err(_) => {
+                std::thread::sleep(LOOK_EVERY);
+                false
             }
         }
     }
@@ -103,25 +161,25 @@ impl Drop for Door {
     }
 }
 
-fn serve_one(context: &Context, stream: UnixStream) -> io::Result<()> {
+fn serve_one(context: &Context, stream: &UnixStream) -> io::Result<()> {
+    stream.set_nonblocking(false)?;
     stream.set_read_timeout(Some(PATIENCE))?;
     stream.set_write_timeout(Some(PATIENCE))?;
     let mut line = String::new();
-    BufReader::new((&stream).take(LONGEST_WISH)).read_line(&mut line)?;
+    BufReader::new(stream.take(LONGEST_WISH)).read_line(&mut line)?;
     let wish: Wish = serde_json::from_str(&line)?;
+    let before = if let Wish::Cancel(id) = &wish { context.store.get(*id).ok().flatten() } else { None };
     let answer = answer(&*context.store, &wish);
+    if let (Some(before), Answer::Jobs(_)) = (&before, &answer) {
+        context.sweep(before);
+    }
     if let (Wish::Retry(id) | Wish::Cancel(id), Answer::Jobs(_)) = (&wish, &answer) {
         tracing::info!(job = id.0, ?wish, "An operator's wish.");
         context.schedule.news();
     }
-    let mut out = io::BufWriter::new(&stream);
+    let mut out = io::BufWriter::new(stream);
     serde_json::to_writer(&mut out, &answer)?;
     out.flush()
-}
-
-/// Wakes whoever serves the socket of a hot folder; no matter if no one does.
-pub(crate) fn knock(root: &Path) {
-    let _ = short(&socket(root), |path| UnixStream::connect(path));
 }
 
 /// Asks the daemon of a hot folder; `None` when none answers.

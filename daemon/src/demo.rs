@@ -12,8 +12,9 @@ use suture_store::{Job, JobId, State};
 use crate::config::Config;
 use crate::control::{Answer, Wish};
 use crate::exit::Exit;
+use crate::say::complain;
 use crate::signals::Stop;
-use crate::{fsx, jobs, table, watch};
+use crate::{create, fsx, jobs, table, watch};
 
 /// What is dropped, in this order, with about so many triangles each.
 const CASES: [Case; 10] = [
@@ -38,7 +39,7 @@ pub(crate) fn run() -> Exit {
     match demo() {
         Ok(exit) => exit,
         Err(line) => {
-            eprintln!("suture: {line}");
+            complain(&line);
             Exit::Refused
         }
     }
@@ -54,7 +55,7 @@ fn demo() -> Result<Exit, String> {
     let mut config = Config::for_folder(&dir);
     // Nobody writes slowly here.
     config.settle = Some(Duration::from_millis(100));
-    let exit = watch::serve(config, true, &stop);
+    let exit = watch::serve(config, true, &stop, false);
     if !matches!(exit, Exit::Good | Exit::NotGood) {
         return Ok(exit);
     }
@@ -92,9 +93,9 @@ fn farewell(dir: &Path, id: u64) {
 fn folder() -> Result<PathBuf, String> {
     let here = PathBuf::from("demo");
     let ours = here.join(".suture").is_dir();
-    if ours || (!fsx::exists(&here) && std::fs::create_dir(&here).is_ok()) {
-        let probe = fsx::temporary_in(&here);
-        if fsx::write_new(&probe, b"").is_ok() && fsx::remove_if_there(&probe).is_ok() {
+    if ours || (fsx::exists(&here).is_ok_and(|there| !there) && std::fs::create_dir(&here).is_ok()) {
+        let probe = create::temporary_in(&here);
+        if create::write_new(&probe, b"").is_ok() && fsx::remove_if_there(&probe).is_ok() {
             return Ok(here);
         }
     }
@@ -115,12 +116,12 @@ fn drop_files(inbox: &Path) -> Result<(), String> {
         }
     };
     for case in CASES {
-        let temporary = fsx::temporary_in(inbox);
+        let temporary = create::temporary_in(inbox);
         write_file(case, TRIANGLES, SEED, &temporary).map_err(|e| failed(&temporary, &e))?;
         place(&temporary, &format!("{}.stl", case.name().replace('_', "-")))?;
     }
-    let temporary = fsx::temporary_in(inbox);
-    fsx::write_new(&temporary, NO_MESH.1).map_err(|e| failed(&temporary, &e))?;
+    let temporary = create::temporary_in(inbox);
+    create::write_new(&temporary, NO_MESH.1).map_err(|e| failed(&temporary, &e))?;
     place(&temporary, NO_MESH.0)
 }
 

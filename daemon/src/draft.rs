@@ -6,10 +6,12 @@ use std::io;
 use std::os::fd::AsRawFd;
 use std::path::{Path, PathBuf};
 
-use rustix::fs::{AtFlags, CWD, Mode, OFlags};
+use rustix::fs::{AtFlags, CWD};
 use rustix::io::Errno;
 
+use crate::create;
 use crate::fsx;
+use crate::rights::Rights;
 
 /// An unfinished file in a folder. Dropping it makes it go away.
 pub(crate) struct Draft {
@@ -28,12 +30,11 @@ impl Draft {
     /// # Errors
     /// As `open`.
     pub(crate) fn new(folder: &Path) -> io::Result<Self> {
-        let flags = OFlags::TMPFILE | OFlags::RDWR | OFlags::CLOEXEC;
-        let kind = match rustix::fs::open(folder, flags, Mode::RUSR | Mode::WUSR) {
-            Ok(fd) => Kind::Nameless(fd.into()),
+        let kind = match create::nameless(folder) {
+            Ok(file) => Kind::Nameless(file),
             // How file systems (and old kernels) say that they know nothing of it.
             Err(Errno::OPNOTSUPP | Errno::ISDIR | Errno::INVAL | Errno::NOENT) if folder.is_dir() => {
-                Kind::Named(fsx::temporary_in(folder))
+                Kind::Named(create::temporary_in(folder))
             }
             Err(error) => return Err(error.into()),
         };
@@ -53,7 +54,7 @@ impl Draft {
     pub(crate) fn is_written(&self) -> bool {
         match &self.kind {
             Kind::Nameless(file) => file.metadata().is_ok_and(|m| m.len() > 0),
-            Kind::Named(path) => fsx::exists(path),
+            Kind::Named(path) => fsx::exists(path).unwrap_or(false),
         }
     }
 
@@ -68,27 +69,27 @@ impl Draft {
         }
     }
 
-    /// Gives it its name, which must lie in its folder, with the mode of an ordinary file there. An existing file is replaced if
-    /// `replace` says so; otherwise it is an error of kind `AlreadyExists`. The name is durable once the folder is synced.
+    /// Gives it its name, which must lie in its folder, with these rights. An existing file is replaced if `replace` says so; otherwise
+    /// it is an error of kind `AlreadyExists`. The name is durable once the folder is synced.
     ///
     /// # Errors
     /// As `link` and `rename`.
-    pub(crate) fn place(&self, target: &Path, replace: bool) -> io::Result<()> {
+    pub(crate) fn place(&self, target: &Path, rights: Rights, replace: bool) -> io::Result<()> {
         match &self.kind {
             Kind::Nameless(file) => {
-                fsx::fit(file, &self.folder)?;
+                rights.give(file, &self.folder)?;
                 if !replace {
                     return link(file, target);
                 }
                 // A link never replaces; the detour over a name of our own does.
-                let detour = fsx::temporary_in(&self.folder);
+                let detour = create::temporary_in(&self.folder);
                 link(file, &detour)?;
                 std::fs::rename(&detour, target).inspect_err(|_| {
                     let _ = fsx::remove_if_there(&detour);
                 })
             }
             Kind::Named(path) => {
-                fsx::fit_in(path, &self.folder)?;
+                rights.give_named(path, &self.folder)?;
                 if replace { std::fs::rename(path, target) } else { fsx::rename_new(path, target) }
             }
         }
@@ -115,7 +116,7 @@ mod tests {
 
     fn written(folder: &Path, named: bool) -> Draft {
         let draft = if named {
-            Draft { kind: Kind::Named(fsx::temporary_in(folder)), folder: folder.to_owned() }
+            Draft { kind: Kind::Named(create::temporary_in(folder)), folder: folder.to_owned() }
         } else {
             Draft::new(folder).unwrap()
         };
@@ -133,17 +134,18 @@ mod tests {
         for named in [false, true] {
             let dir = tempfile::tempdir().unwrap();
             let target = dir.path().join("part.stl");
+            let rights = Rights::of(&std::fs::metadata(dir.path()).unwrap());
             let entries = || std::fs::read_dir(dir.path()).unwrap().count();
             drop(written(dir.path(), named));
             assert_eq!(entries(), 0);
             std::fs::write(&target, b"old").unwrap();
-            let error = written(dir.path(), named).place(&target, false).unwrap_err();
+            let error = written(dir.path(), named).place(&target, rights, false).unwrap_err();
             assert_eq!(error.kind(), io::ErrorKind::AlreadyExists);
             assert_eq!(std::fs::read(&target).unwrap(), b"old");
-            written(dir.path(), named).place(&target, true).unwrap();
+            written(dir.path(), named).place(&target, rights, true).unwrap();
             assert_eq!(std::fs::read(&target).unwrap(), b"new");
             std::fs::remove_file(&target).unwrap();
-            written(dir.path(), named).place(&target, false).unwrap();
+            written(dir.path(), named).place(&target, rights, false).unwrap();
             assert_eq!(std::fs::read(&target).unwrap(), b"new");
             assert_eq!(entries(), 1);
         }

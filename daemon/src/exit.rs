@@ -15,9 +15,14 @@ pub(crate) enum Exit {
     Owned,
     /// The store cannot be used; try again.
     TryAgain,
+    /// A worker could not read what it was asked, or say what came of it.
+    Cut,
     /// Stopped by a signal.
     Interrupted,
 }
+
+/// Of a worker that is cut off from its supervisor (`EX_OSERR`).
+pub(crate) const WORKER_CUT: u8 = 71;
 
 impl Exit {
     /// `sysexits` where they fit: 73 cannot create, 75 temporary failure; 130 as shells report SIGINT.
@@ -28,6 +33,7 @@ impl Exit {
             Self::Refused => 2,
             Self::Owned => 73,
             Self::TryAgain => 75,
+            Self::Cut => WORKER_CUT,
             Self::Interrupted => 130,
         }
     }

@@ -2,7 +2,8 @@
 
 use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
-use std::io::{self, Read, Seek, Write};
+use std::io;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -10,12 +11,19 @@ use suture_store::job::Area;
 use suture_store::{RelPath, Token};
 
 use crate::config::FolderConfig;
-use crate::fsx;
+use crate::create;
+use crate::fsx::{self, Identity};
+use crate::rights;
 
 /// Part of a hot folder that holds results.
 const OUT: &str = "out";
-/// Work in progress and the job store; on the same file system as the rest, so that results appear by renaming.
+/// Work in progress and the job store.
 const PRIVATE: &str = ".suture";
+/// All parts of a hot folder.
+const PARTS: [&str; 6] = ["in", OUT, "done", "failed", "quarantine", ".suture/work"];
+/// Locked by the daemon that serves the folder, and its process number.
+const LOCK: &str = "owner";
+const PID: &str = "owner.pid";
 
 /// A hot folder that this process serves: it holds the lock as long as it lives.
 #[derive(Debug)]
@@ -24,7 +32,15 @@ pub(crate) struct Folder {
     pub root: PathBuf,
     /// Profile of files that lie in no sub-folder.
     pub profile: String,
-    _lock: File,
+    /// What the path stood for at the start.
+    id: (u64, u64),
+    /// File systems of the parts at the start.
+    devices: [Option<u64>; PARTS.len()],
+    lock: File,
+}
+
+fn id(meta: &std::fs::Metadata) -> (u64, u64) {
+    (meta.dev(), meta.ino())
 }
 
 /// Why a folder cannot be served.
@@ -48,41 +64,44 @@ impl Folder {
         };
         // Made once as an absolute path: the process may be asked to look again after hours.
         let root = std::path::absolute(&config.path).map_err(io(&config.path, "cannot be found"))?;
-        for part in ["in", OUT, "done", "failed", "quarantine", ".suture/work"] {
+        for part in PARTS {
             let path = root.join(part);
-            std::fs::create_dir_all(&path).map_err(io(&path, "cannot be made"))?;
+            make_folder(&path).map_err(io(&path, "cannot be made"))?;
         }
-        let path = root.join(PRIVATE).join("owner");
-        let mut lock = File::options()
-            .create(true)
-            .truncate(false)
-            .read(true)
-            .write(true)
-            .open(&path)
-            .map_err(io(&path, "cannot be opened"))?;
-        let asked = Instant::now();
-        loop {
-            match lock.try_lock() {
-                Ok(()) => break,
-                Err(TryLockError::WouldBlock) => {
-                    let mut text = String::new();
-                    // A lock without a readable pid is a lock all the same.
-                    let _ = lock.rewind().and_then(|()| lock.read_to_string(&mut text));
-                    let pid = text.trim().parse().ok();
-                    if !is_fading(pid, asked) {
-                        return Err(FolderError::Owned { root, pid });
-                    }
-                    std::thread::sleep(Duration::from_millis(10));
-                }
-                Err(TryLockError::Error(source)) => return Err(io(&path, "cannot be locked")(source)),
+        let lock = take_lock(&root)?;
+        let pid = format!("{}\n", std::process::id());
+        let path = root.join(PRIVATE).join(PID);
+        create::replace(&path, pid.as_bytes()).map_err(io(&path, "cannot be written"))?;
+        let id = id(&std::fs::metadata(&root).map_err(io(&root, "cannot be looked at"))?);
+        let devices = PARTS.map(|part| device(&root.join(part)));
+        Ok(Self { name: config.name.clone(), root, profile: config.profile.clone(), id, devices, lock })
+    }
+
+    /// Is the folder still the one that was opened? A path that leads elsewhere by now (renamed and made anew, a mount that came or went)
+    /// must not be believed: neither what is there, nor what is missing.
+    ///
+    /// # Errors
+    /// A line for people.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let shown = self.root.display();
+        let there = std::fs::metadata(&self.root).map_err(|error| format!("{shown}: the hot folder is out of reach: {error}"))?;
+        let lock = Identity::of(&self.root.join(PRIVATE).join(LOCK));
+        let held = self.lock.metadata().map(|meta| id(&meta));
+        let same_lock = matches!((&lock, &held), (Ok(lock), Ok(held)) if (lock.dev, lock.ino) == *held);
+        if id(&there) != self.id || !same_lock {
+            return Err(format!(
+                "{shown}: is another folder than at the start (moved, removed or made anew); put it back, or start again"
+            ));
+        }
+        for (part, device_then) in PARTS.iter().zip(self.devices) {
+            let now = device(&self.root.join(part));
+            // A part that was removed is made again where it is needed.
+            if now.is_some() && now != device_then {
+                let part = self.root.join(part);
+                return Err(format!("{}: is on another file system than at the start: a mount came or went", part.display()));
             }
         }
-        let pid = format!("{}\n", std::process::id());
-        lock.set_len(0)
-            .and_then(|()| lock.rewind())
-            .and_then(|()| lock.write_all(pid.as_bytes()))
-            .map_err(io(&path, "cannot be written"))?;
-        Ok(Self { name: config.name.clone(), root, profile: config.profile.clone(), _lock: lock })
+        Ok(())
     }
 
     /// Where files are dropped.
@@ -124,6 +143,36 @@ impl Folder {
     }
 }
 
+fn device(path: &Path) -> Option<u64> {
+    std::fs::metadata(path).ok().map(|meta| meta.dev())
+}
+
+/// The lock of the hot folder, which the system releases when the process ends.
+fn take_lock(root: &Path) -> Result<File, FolderError> {
+    let path = root.join(PRIVATE).join(LOCK);
+    let io = |action| {
+        let path = path.clone();
+        move |source| FolderError::Io { path, action, source }
+    };
+    let lock = create::lock_file(&path).map_err(io("cannot be opened"))?;
+    let asked = Instant::now();
+    loop {
+        match lock.try_lock() {
+            Ok(()) => return Ok(lock),
+            Err(TryLockError::WouldBlock) => {
+                // A lock without a readable number is a lock all the same.
+                let text = std::fs::read_to_string(root.join(PRIVATE).join(PID)).unwrap_or_default();
+                let pid = text.trim().parse().ok();
+                if !is_fading(pid, asked) {
+                    return Err(FolderError::Owned { root: root.to_owned(), pid });
+                }
+                std::thread::sleep(Duration::from_millis(10));
+            }
+            Err(TryLockError::Error(source)) => return Err(io("cannot be locked")(source)),
+        }
+    }
+}
+
 /// Is a lock's owner dead, and the lock about to go? A daemon that is killed just as it starts a worker leaves the lock to that
 /// process for the moment before it notices.
 pub(crate) fn is_fading(pid: Option<u32>, asked: Instant) -> bool {
@@ -161,16 +210,21 @@ pub(crate) fn name_kind(name: &OsStr) -> NameKind {
 /// # Errors
 /// As `mkdir` and `fsync`.
 pub(crate) fn make_parent(path: &Path) -> io::Result<()> {
-    let parent = fsx::folder_of(path);
-    if parent.is_dir() {
-        return Ok(());
+    make_folder(fsx::folder_of(path))
+}
+
+/// Makes a folder and those above it, each durable in the one it lies in, with its group.
+fn make_folder(path: &Path) -> io::Result<()> {
+    // Only what the system says is not there is made: an error is no absence.
+    match std::fs::metadata(path) {
+        Ok(there) if there.is_dir() => return Ok(()),
+        Ok(_) => return Err(io::ErrorKind::NotADirectory.into()),
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+        Err(_) => {}
     }
-    make_parent(parent)?;
-    match std::fs::create_dir(parent) {
-        Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(e),
-        _ => {}
-    }
-    fsx::sync_dir(fsx::folder_of(parent))
+    make_parent(path)?;
+    rights::make_folder(path)?;
+    fsx::sync_dir(fsx::folder_of(path))
 }
 
 #[cfg(test)]
@@ -204,6 +258,30 @@ mod tests {
         }
         drop(first);
         Folder::open(&config).unwrap();
+    }
+
+    /// D5: neither a folder that was made anew under the old name nor a store that was removed is taken for the one that was opened.
+    #[test]
+    fn a_folder_is_told_by_its_identity() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        let config = FolderConfig { name: "a".into(), path: at("hot"), profile: "default".into() };
+        let folder = Folder::open(&config).unwrap();
+        folder.check().unwrap();
+        std::fs::remove_dir(at("hot/out")).unwrap();
+        folder.check().expect("a part may be made again");
+        std::fs::rename(at("hot"), at("old")).unwrap();
+        assert!(folder.check().unwrap_err().contains("out of reach"));
+        std::fs::create_dir(at("hot")).unwrap();
+        assert!(folder.check().unwrap_err().contains("another folder"));
+        Folder::open(&config).expect("it is another folder, and another daemon's to serve");
+        assert!(folder.check().is_err());
+        std::fs::remove_dir_all(at("hot")).unwrap();
+        std::fs::rename(at("old"), at("hot")).unwrap();
+        folder.check().expect("it is back");
+        std::fs::remove_dir_all(at("hot/.suture")).unwrap();
+        std::fs::create_dir_all(at("hot/.suture/work")).unwrap();
+        assert!(folder.check().is_err(), "the store went with it");
     }
 
     #[test]

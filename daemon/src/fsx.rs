@@ -1,19 +1,19 @@
-//! The file system as this program uses it: nothing is overwritten, everything is synced, and names may be any bytes.
+//! Names in the file system as this program uses them: nothing is overwritten, everything is synced, and names may be any bytes.
+//! What is written is written by [`crate::create`].
 
 use std::ffi::{OsStr, OsString};
-use std::fs::{File, OpenOptions};
-use std::io::{self, Write};
+use std::fs::File;
+use std::io;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
-use std::os::unix::fs::{MetadataExt, PermissionsExt};
-use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::os::unix::fs::MetadataExt;
+use std::path::Path;
 
-use rustix::fs::{AtFlags, CWD, Gid, RenameFlags};
+use rustix::fs::{AtFlags, CWD, RenameFlags};
 use serde::{Deserialize, Serialize};
+use suture_store::Hash;
 
 /// Longest file name in bytes on the file systems we meet.
-const NAME_MAX: usize = 255;
+pub(crate) const NAME_MAX: usize = 255;
 
 /// What tells whether a file is still the one that was looked at. Renaming and linking change `ctime`, so it is compared only
 /// between two looks with neither in between.
@@ -87,46 +87,6 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// A name in `folder` that no one else uses, and that every scan ignores.
-pub(crate) fn temporary_in(folder: &Path) -> PathBuf {
-    static NEXT: AtomicU64 = AtomicU64::new(0);
-    let n = NEXT.fetch_add(1, Ordering::Relaxed);
-    folder.join(format!(".suture-{}-{n}.tmp", std::process::id()))
-}
-
-/// Writes a new file whole and synced; an existing one is an error.
-///
-/// # Errors
-/// As `open`, `write` and `fsync`.
-pub(crate) fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
-    file.write_all(bytes)?;
-    file.sync_all()
-}
-
-/// Makes an empty file that need not survive the machine.
-///
-/// # Errors
-/// As `open`.
-pub(crate) fn touch(path: &Path) -> io::Result<()> {
-    OpenOptions::new().write(true).create(true).truncate(false).open(path).map(drop)
-}
-
-/// Writes `value` as JSON, with a final newline, into a new file; synced if `sync` says so. An empty file that is open elsewhere and
-/// known by a path below `/proc` is as good as a new one.
-///
-/// # Errors
-/// As [`write_new`].
-pub(crate) fn write_new_json<T: Serialize>(path: &Path, value: &T, sync: bool) -> io::Result<()> {
-    let nameless = path.starts_with("/proc");
-    let file = OpenOptions::new().write(true).create_new(!nameless).open(path)?;
-    let mut out = io::BufWriter::new(file);
-    serde_json::to_writer_pretty(&mut out, value)?;
-    out.write_all(b"\n")?;
-    let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
-    if sync { file.sync_all() } else { Ok(()) }
-}
-
 /// Removes a file that may be gone already.
 ///
 /// # Errors
@@ -138,49 +98,14 @@ pub(crate) fn remove_if_there(path: &Path) -> io::Result<()> {
     }
 }
 
-/// BLAKE3 of a file's bytes, hexadecimal. Reads, never maps: the file may be cut short meanwhile.
+/// BLAKE3 of a file's bytes. Reads, never maps: the file may be cut short meanwhile.
 ///
 /// # Errors
 /// As `open` and `read`.
-pub(crate) fn hash(path: &Path) -> io::Result<String> {
+pub(crate) fn hash(path: &Path) -> io::Result<Hash> {
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(File::open(path)?)?;
-    Ok(hasher.finalize().to_hex().to_string())
-}
-
-/// Gives a new file its folder's group and the mode of any new file here, whatever its maker's taste.
-///
-/// # Errors
-/// As `chmod`. A group we may not give is left as it is.
-pub(crate) fn fit_in(path: &Path, folder: &Path) -> io::Result<()> {
-    fit(&File::open(path)?, folder)
-}
-
-/// The same for an open file.
-///
-/// # Errors
-/// As `chmod`.
-pub(crate) fn fit(file: &File, folder: &Path) -> io::Result<()> {
-    let (now, parent) = (file.metadata()?, std::fs::metadata(folder)?);
-    if now.gid() != parent.gid() {
-        // Not a member of that group, or a file system without owners.
-        let _ = rustix::fs::fchown(file, None, Some(Gid::from_raw(parent.gid())));
-    }
-    let mode = 0o644 & !umask();
-    if now.mode() & 0o7777 != mode {
-        file.set_permissions(std::fs::Permissions::from_mode(mode))?;
-    }
-    Ok(())
-}
-
-/// The process's file mode mask, read without changing it (another thread may be creating a file).
-fn umask() -> u32 {
-    static MASK: OnceLock<u32> = OnceLock::new();
-    *MASK.get_or_init(|| {
-        let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-        let mask = status.lines().find_map(|line| line.strip_prefix("Umask:"));
-        mask.and_then(|mask| u32::from_str_radix(mask.trim(), 8).ok()).unwrap_or(0o022)
-    })
+    Ok(Hash(*hasher.finalize().as_bytes()))
 }
 
 /// Bytes that may still be written to a folder's file system when `reserve` bytes, but at most a twentieth of it, are to stay
@@ -217,27 +142,44 @@ pub(crate) fn versioned(name: &OsStr, n: u32, reserve: usize) -> OsString {
     OsString::from_vec([stem, tilde.as_bytes(), &extension].concat())
 }
 
-/// Is there anything of that name, be it a dangling link?
-pub(crate) fn exists(path: &Path) -> bool {
-    std::fs::symlink_metadata(path).is_ok()
+/// What is under that name, be it a dangling link; `None` where there is nothing. That nothing is there is said by the system, never
+/// taken from an error.
+///
+/// # Errors
+/// As `lstat`.
+pub(crate) fn look(path: &Path) -> io::Result<Option<Identity>> {
+    match Identity::of(path) {
+        Ok(found) => Ok(Some(found)),
+        Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
+        Err(e) => Err(e),
+    }
+}
+
+/// Is there anything of that name?
+///
+/// # Errors
+/// As [`look`].
+pub(crate) fn exists(path: &Path) -> io::Result<bool> {
+    Ok(look(path)?.is_some())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::create;
 
     #[test]
     fn renaming_never_replaces() {
         let dir = tempfile::tempdir().unwrap();
         let (a, b) = (dir.path().join("a"), dir.path().join("b"));
-        write_new(&a, b"new").unwrap();
-        write_new(&b, b"old").unwrap();
+        create::write_new(&a, b"new").unwrap();
+        create::write_new(&b, b"old").unwrap();
         assert_eq!(rename_new(&a, &b).unwrap_err().kind(), io::ErrorKind::AlreadyExists);
         assert_eq!(std::fs::read(&b).unwrap(), b"old");
         std::fs::remove_file(&b).unwrap();
         rename_new(&a, &b).unwrap();
         assert_eq!(std::fs::read(&b).unwrap(), b"new");
-        assert!(!exists(&a));
+        assert!(!exists(&a).unwrap());
     }
 
     #[test]
@@ -255,20 +197,10 @@ mod tests {
     }
 
     #[test]
-    fn a_new_file_is_as_readable_as_its_neighbours() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("a");
-        write_new(&path, b"x").unwrap();
-        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o600)).unwrap();
-        fit_in(&path, dir.path()).unwrap();
-        assert_eq!(std::fs::metadata(&path).unwrap().mode() & 0o777, 0o644 & !umask());
-    }
-
-    #[test]
     fn identity_survives_a_rename_but_not_a_write() {
         let dir = tempfile::tempdir().unwrap();
         let (a, b) = (dir.path().join("a"), dir.path().join("b"));
-        write_new(&a, b"x").unwrap();
+        create::write_new(&a, b"x").unwrap();
         let before = Identity::of(&a).unwrap();
         rename_new(&a, &b).unwrap();
         assert!(before.same_content(&Identity::of(&b).unwrap()));

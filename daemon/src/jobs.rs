@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 
 use suture_core::Report;
 use suture_store::job::Area;
-use suture_store::{Job, JobId, SledStore, State};
+use suture_store::{Job, JobId, SledStore, State, StoreError};
 
 use crate::cli::{JobsArgs, JobsCommand};
 use crate::config::default_state;
 use crate::control::{Answer, Wish, answer, ask};
 use crate::exit::Exit;
 use crate::receipt::REPORT;
+use crate::say::{complain, plain};
 use crate::table;
 
 /// Does what the command line asks.
@@ -51,7 +52,7 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
 }
 
 fn fail(line: &str, code: u8) -> Exit {
-    eprintln!("suture: {line}");
+    complain(&line);
     match code {
         73 => Exit::Owned,
         75 => Exit::TryAgain,
@@ -65,16 +66,33 @@ pub(crate) fn reach(dir: &Path, wish: &Wish) -> Result<Answer, (String, Exit)> {
     if !dir.join(".suture").is_dir() {
         return Err(refuse(format!("{}: is no hot folder (try --dir DIR)", dir.display())));
     }
-    if let Some(answer) = ask(dir, wish).map_err(|e| refuse(format!("the daemon's answer cannot be understood: {e}")))? {
-        return Ok(answer);
+    match ask(dir, wish) {
+        Ok(Some(answer)) => return Ok(answer),
+        Ok(None) => {}
+        Err(error) => {
+            let silent = matches!(error.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut);
+            let line = match silent {
+                true => "the daemon does not answer: it is stopped, or very busy; try again".into(),
+                false => format!("the daemon's answer was cut off or cannot be understood: {error}; try again"),
+            };
+            return Err((line, Exit::TryAgain));
+        }
     }
     let state = state_of(dir);
     if !state.is_dir() {
         return Ok(Answer::Jobs(Vec::new()));
     }
-    let store = SledStore::open(&state)
-        .map_err(|error| (error.to_string(), if error.exit_code() == 73 { Exit::Owned } else { Exit::TryAgain }))?;
-    Ok(answer(&store, wish))
+    let failed = |error: StoreError| (error.to_string(), if error.exit_code() == 73 { Exit::Owned } else { Exit::TryAgain });
+    // To look needs no right to write, and no room.
+    match wish {
+        Wish::List => Ok(Answer::Jobs(SledStore::peek(&state).map_err(failed)?)),
+        Wish::Show(id) => {
+            let job = SledStore::peek(&state).map_err(failed)?.into_iter().find(|job| job.id == *id);
+            let unknown = || Answer::failed(&StoreError::Unknown(*id));
+            Ok(job.map_or_else(unknown, |job| Answer::Jobs(vec![job])))
+        }
+        Wish::Retry(_) | Wish::Cancel(_) => Ok(answer(&SledStore::open(&state).map_err(failed)?, wish)),
+    }
 }
 
 fn state_of(dir: &Path) -> PathBuf {
@@ -150,7 +168,7 @@ fn show(dir: &Path, job: &Job) -> String {
     }
     // With several folders to a store, it may be in another one.
     if let Some(path) = report_path(dir, job).filter(|path| path.exists()) {
-        text += &format!("  report    {}\n", path.display());
+        text += &format!("  report    {}\n", plain(&path.display().to_string()));
         if let Ok(bytes) = std::fs::read(&path)
             && let Ok(report) = serde_json::from_slice::<Report>(&bytes)
         {

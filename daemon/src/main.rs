@@ -1,12 +1,16 @@
 //! Suture: unattended, out-of-core repair of triangle meshes for 3D printing. This is the binary: the command line, the hot
 //! folders and their daemon, and the worker processes in which the engine runs.
 
+mod again;
 mod attempt;
 mod bar;
 mod batch;
+mod claim;
 mod cli;
 mod config;
+mod confine;
 mod control;
+mod create;
 mod demo;
 mod draft;
 mod exit;
@@ -14,11 +18,15 @@ mod folder;
 mod fsx;
 mod jobs;
 mod logging;
+mod names;
 mod naming;
+mod place;
 mod profiles;
 mod protocol;
 mod publish;
 mod receipt;
+mod rights;
+mod say;
 mod scan;
 mod schedule;
 mod settle;
@@ -28,7 +36,9 @@ mod supervise;
 mod table;
 mod units;
 mod watch;
+mod watchdog;
 mod worker;
+mod writers;
 
 use std::process::ExitCode;
 
@@ -51,8 +61,8 @@ fn main() -> ExitCode {
         Command::Worker => match worker::serve() {
             Ok(()) => Exit::Good,
             Err(error) => {
-                eprintln!("worker: {error}");
-                Exit::Refused
+                say::complain(&error);
+                Exit::Cut
             }
         },
         Command::Watch(args) => watch::run(args),

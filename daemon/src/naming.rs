@@ -104,7 +104,7 @@ impl Naming {
         let reserve = if self.report.is_some() { REPORT.len() } else { 0 };
         let from = given.versions.get(name).map_or(1, |last| last + 1);
         let mut candidates = (from..MAX_VERSIONS).map(|n| (n, fsx::versioned(name, n, reserve)));
-        let free = candidates.find(|(_, name)| !given.names.contains(name) && !fsx::exists(&self.output.join(name)));
+        let free = candidates.find(|(_, name)| !given.names.contains(name) && is_free(&self.output.join(name)));
         let Some((version, target)) = free else { return self.output.join(name) };
         given.versions.insert(name.to_owned(), version);
         given.names.insert(target.clone());
@@ -113,7 +113,7 @@ impl Naming {
 
     /// The next name when `target` has been taken by someone else meanwhile; `None` where only one name will do.
     pub(crate) fn next(&self, input: &Path) -> Option<PathBuf> {
-        self.folder.then(|| self.target(input)).filter(|target| !fsx::exists(target))
+        self.folder.then(|| self.target(input)).filter(|target| is_free(target))
     }
 
     /// Where the report goes beside a result of this name.
@@ -143,7 +143,7 @@ impl Naming {
         let exists = || Err(format!("{shown}: exists already; choose another name or add --force"));
         let Ok(there) = std::fs::metadata(target) else {
             // A link that leads nowhere would be replaced, too.
-            return if fsx::exists(target) && !self.force { exists() } else { Ok(()) };
+            return if !is_free(target) && !self.force { exists() } else { Ok(()) };
         };
         if self.inputs.contains(&id(&there)) {
             return Err(format!("{shown}: is an input itself; an input is never overwritten"));
@@ -158,6 +158,11 @@ impl Naming {
     pub(crate) fn is_folder(&self) -> bool {
         self.folder
     }
+}
+
+/// A name that cannot be looked at is not free.
+fn is_free(path: &Path) -> bool {
+    fsx::exists(path).is_ok_and(|there| !there)
 }
 
 fn id(metadata: &std::fs::Metadata) -> (u64, u64) {

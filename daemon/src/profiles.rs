@@ -14,7 +14,7 @@ pub(crate) const FOLDER_FILE: &str = ".suture.toml";
 pub(crate) fn from_file(path: &Path) -> Result<Profile, String> {
     let text = std::fs::read_to_string(path).map_err(|e| format!("{}: cannot read the profile: {e}", path.display()))?;
     let mut profile: Profile = toml::from_str(&text).map_err(|e| format!("{}: {}", path.display(), e.to_string().trim_end()))?;
-    check(&profile).map_err(|e| format!("{}: {e}", path.display()))?;
+    profile.validate().map_err(|e| format!("{}: {e}", path.display()))?;
     if profile.name == Profile::default().name {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         profile.name = if stem.starts_with('.') { "folder".into() } else { stem.into_owned() };
@@ -47,34 +47,6 @@ pub(crate) fn of_command(name: &str, no_self_intersections: bool) -> Result<Prof
     Ok(profile)
 }
 
-/// Are the numbers ones that mean something?
-///
-/// # Errors
-/// A line naming the setting.
-pub(crate) fn check(profile: &Profile) -> Result<(), String> {
-    let fractions = [
-        ("weld_relative", profile.weld_relative),
-        ("weld_max_edge_share", profile.weld_max_edge_share),
-        ("gap_edge_share", profile.gap_edge_share),
-        ("max_hole_perimeter_relative", profile.max_hole_perimeter_relative),
-        ("max_hole_perimeter_mm", profile.max_hole_perimeter_mm),
-        ("max_gap_mm", profile.max_gap_mm),
-        ("max_volume_change", profile.max_volume_change),
-        ("max_area_change", profile.max_area_change),
-        ("max_box_change_relative", profile.max_box_change_relative),
-        ("debris_area_share", profile.debris_area_share),
-        ("max_sheets_share", profile.max_sheets_share),
-        ("stack_gap_relative", profile.stack_gap_relative),
-        ("wrap_max_share", profile.wrap_max_share),
-        ("wrap_max_move", profile.wrap_max_move),
-        ("wrap_review_share", profile.wrap_review_share),
-    ];
-    match fractions.iter().find(|(_, value)| !value.is_finite() || *value < 0.0) {
-        Some((name, value)) => Err(format!("`{name}` must be a number from 0 up, not {value}")),
-        None => Ok(()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -91,6 +63,8 @@ mod tests {
         assert!(error.contains("line 2") && error.contains("max_hole_edgse"), "{error}");
         std::fs::write(&path, "weld_relative = -1.0\n").unwrap();
         assert!(from_file(&path).unwrap_err().contains("weld_relative"));
+        std::fs::write(&path, "max_separation_relative = inf\n").unwrap();
+        assert!(from_file(&path).unwrap_err().contains("`max_separation_relative` must be a number from 0 to 1, not inf"));
     }
 
     #[test]

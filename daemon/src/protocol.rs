@@ -1,6 +1,6 @@
 //! What a worker process and its supervisor say to each other: one JSON value a line.
 //!
-//! The supervisor writes [`Request`]s to the worker's standard input; for each, the worker writes any number of
+//! The supervisor writes [`Request`]s to the worker's standard input; for each, the worker writes one [`Message::Begun`], any number of
 //! [`Message::Progress`] and then exactly one [`Message::Done`] or [`Message::Failed`] to its standard output. End of input
 //! ends the worker. A worker that closes its output without an answer has died of the request.
 
@@ -9,6 +9,8 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use suture_core::report::Task;
 use suture_core::{ErrorClass, Limits, Profile, Report};
+
+use crate::fsx::Identity;
 
 /// One file to work on.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -27,6 +29,9 @@ pub(crate) struct Request {
     /// A file to leave behind when the supervisor dies during this work: the work did not kill it.
     #[serde(with = "path_bytes::option")]
     pub witness: Option<PathBuf>,
+    /// A file that exists while the supervisor reads the answer: for the supervisor alone.
+    #[serde(skip)]
+    pub mark: Option<PathBuf>,
     /// The input's name as people know it.
     pub shown_input: String,
     /// The output's name as people will know it.
@@ -39,10 +44,12 @@ pub(crate) struct Request {
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Message {
+    /// The request was understood; what happens from here on, the file may be to blame for.
+    Begun,
     /// Where the work stands; at most ten a second.
     Progress { stage: String, done: u64, total: u64 },
-    /// The work is done; the output, if any, is complete and synced.
-    Done(Box<Report>),
+    /// The work is done; the output, if any, is complete, synced and read back, and was `written` then.
+    Done { report: Box<Report>, written: Option<Identity> },
     /// The work ended without output; `message` names the file.
     Failed { class: ErrorClass, message: String },
 }
@@ -111,6 +118,7 @@ mod tests {
             output: Some(odd.clone()),
             report: None,
             witness: None,
+            mark: None,
             shown_input: "x".into(),
             shown_output: None,
             profile: Profile::default(),

@@ -46,10 +46,14 @@ pub(crate) struct NoReport<'a> {
     outcome: Ending,
     input: NoReportInput,
     reason: &'a str,
+    /// How an operator gets it worked on again.
+    next: String,
     attempts: u32,
     /// Attempts in which the worker died of the file, and deaths of the daemon beside it.
     worker_deaths: u32,
     daemon_deaths: u32,
+    /// Deaths of the machine meanwhile, for which no file is to blame.
+    machine_deaths: u32,
 }
 
 #[derive(Debug, Serialize)]
@@ -59,7 +63,7 @@ struct NoReportInput {
 }
 
 impl<'a> NoReport<'a> {
-    pub(crate) fn new(job: &Job, shown: String, ending: Ending, reason: &'a str) -> Self {
+    pub(crate) fn new(job: &Job, shown: String, ending: Ending, reason: &'a str, next: String) -> Self {
         Self {
             schema_version: SCHEMA_VERSION,
             engine_version: env!("CARGO_PKG_VERSION"),
@@ -67,9 +71,11 @@ impl<'a> NoReport<'a> {
             outcome: ending,
             input: NoReportInput { path: shown, bytes: job.source.size },
             reason,
+            next,
             attempts: job.attempts.0,
             worker_deaths: job.blame.charges,
             daemon_deaths: job.blame.deaths,
+            machine_deaths: job.blame.machine,
         }
     }
 }

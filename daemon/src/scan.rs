@@ -11,11 +11,13 @@ use std::time::Instant;
 
 use suture_store::{JobId, RelPath, Source, Submission};
 
+use crate::claim::Original;
 use crate::config::Config;
 use crate::folder::{Folder, NameKind, name_kind};
 use crate::fsx::Identity;
 use crate::profiles;
 use crate::settle::{Look, Rest, Settling, length_fits};
+use crate::writers::Writers;
 
 /// Sub-folders are searched to this depth.
 const DEPTH: usize = 8;
@@ -39,11 +41,13 @@ pub(crate) struct Reconciler {
     entries: BTreeMap<PathBuf, Entry>,
     /// Sub-folders whose unknown profile was named in the log.
     warned: BTreeSet<String>,
+    /// Sub-folders that could not be read: what is in them is not gone.
+    unreadable: BTreeSet<PathBuf>,
 }
 
 impl Reconciler {
     pub(crate) fn new(folder: Arc<Folder>, config: Arc<Config>, rest: Rest) -> Self {
-        Self { folder, config, rest, entries: BTreeMap::new(), warned: BTreeSet::new() }
+        Self { folder, config, rest, entries: BTreeMap::new(), warned: BTreeSet::new(), unreadable: BTreeSet::new() }
     }
 
     /// A job of an earlier life answers for this file already: it need not settle again, and when the job ends while the folder
@@ -60,11 +64,18 @@ impl Reconciler {
     /// # Errors
     /// When `in/` cannot be read: nothing is forgotten then, since a mount that is gone is not an empty folder.
     pub(crate) fn scan(&mut self, now: Instant) -> io::Result<Vec<JobId>> {
-        let mut found = BTreeMap::new();
-        walk(&self.folder.inbox(), Path::new(""), DEPTH, &mut found)?;
+        let mut found = Found::default();
+        found.walk(&self.folder.inbox(), Path::new(""), DEPTH)?;
+        for (path, reason) in &found.unreadable {
+            if !self.unreadable.contains(path) {
+                tracing::warn!(sub_folder = %path.display(), reason, "A sub-folder cannot be read.");
+            }
+        }
+        self.unreadable = found.unreadable.into_keys().collect();
+        let (unreadable, found) = (&self.unreadable, found.files);
         let mut gone = Vec::new();
         self.entries.retain(|path, entry| {
-            let stays = found.contains_key(path);
+            let stays = found.contains_key(path) || unreadable.iter().any(|folder| path.starts_with(folder));
             if let (false, Entry::Submitted { id, foreign: true, .. }) = (stays, entry) {
                 gone.push(*id);
             }
@@ -103,6 +114,7 @@ impl Reconciler {
     pub(crate) fn look(&mut self, now: Instant) -> Vec<(PathBuf, Submission)> {
         let inbox = self.folder.inbox();
         let mut ready = Vec::new();
+        let mut writers = Writers::default();
         for (path, entry) in &mut self.entries {
             let Entry::Settling { state, foreign } = entry else { continue };
             let full = inbox.join(path);
@@ -110,10 +122,17 @@ impl Reconciler {
             let Ok(identity) = Identity::of(&full) else { continue };
             let rests = match state.look(identity, now, self.rest) {
                 Look::Wait => false,
-                Look::IfLengthFits => foreign.is_some() || length_fits(&full).unwrap_or(false),
+                Look::IfLengthFits => {
+                    foreign.is_some() || Original::open(&full).and_then(|file| length_fits(file.file())).unwrap_or(false)
+                }
                 Look::Ready => true,
             };
-            if rests {
+            // What cannot be opened is the claim's business.
+            let written = rests && Original::open(&full).is_ok_and(|file| writers.has(file.file(), &identity));
+            if written && state.is_to_be_told(now) {
+                tracing::warn!(folder = %self.folder.name, file = %path.display(), "A program keeps the file open for writing; it waits.");
+            }
+            if rests && !written {
                 ready.push((path.clone(), *state.identity(), foreign.clone()));
             }
         }
@@ -193,31 +212,46 @@ impl Reconciler {
     }
 }
 
-/// Everything in a folder and below that is neither a folder nor temporary; what is no regular mesh file comes with words for
-/// what it is.
-fn walk(root: &Path, below: &Path, depth: usize, found: &mut BTreeMap<PathBuf, (Identity, Option<String>)>) -> io::Result<()> {
-    for entry in std::fs::read_dir(root.join(below))? {
-        let Ok(entry) = entry else { continue };
-        let name = entry.file_name();
-        let kind = name_kind(&name);
-        if kind == NameKind::Ignored {
-            continue;
-        }
-        // Gone between the two calls: not there. Not followed, if it is a link.
-        let Ok(meta) = entry.metadata() else { continue };
-        let path = below.join(&name);
-        if meta.is_dir() {
-            if depth > 0 {
-                // A sub-folder that cannot be read does not hide the others.
-                if let Err(error) = walk(root, &path, depth - 1, found) {
-                    tracing::warn!(sub_folder = %path.display(), %error, "A sub-folder cannot be read.");
-                }
+/// What lies in a folder.
+#[derive(Default)]
+struct Found {
+    /// Everything that is neither a folder nor temporary; what is no regular mesh file comes with words for what it is.
+    files: BTreeMap<PathBuf, (Identity, Option<String>)>,
+    /// Sub-folders that cannot be read, and why.
+    unreadable: BTreeMap<PathBuf, String>,
+}
+
+impl Found {
+    fn walk(&mut self, root: &Path, below: &Path, depth: usize) -> io::Result<()> {
+        for entry in std::fs::read_dir(root.join(below))? {
+            // A folder that is read half is not read.
+            let entry = entry?;
+            let name = entry.file_name();
+            let kind = name_kind(&name);
+            if kind == NameKind::Ignored {
+                continue;
             }
-            continue;
+            // Not followed, if it is a link.
+            let meta = match entry.metadata() {
+                Ok(meta) => meta,
+                // Gone between the two calls: not there.
+                Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+                Err(error) => return Err(error),
+            };
+            let path = below.join(&name);
+            if meta.is_dir() {
+                // A sub-folder that cannot be read does not hide the others.
+                if depth > 0
+                    && let Err(error) = self.walk(root, &path, depth - 1)
+                {
+                    self.unreadable.insert(path, error.to_string());
+                }
+                continue;
+            }
+            self.files.insert(path, (Identity::from(&meta), what_else(&meta, kind, &name.to_string_lossy())));
         }
-        found.insert(path, (Identity::from(&meta), what_else(&meta, kind, &name.to_string_lossy())));
+        Ok(())
     }
-    Ok(())
 }
 
 /// Words for what is no mesh.

@@ -3,15 +3,15 @@
 //! daemon died, twice) runs alone too, after everything else.
 //!
 //! So that small files do not wait behind a row of huge ones, a large file's turn comes when no small one waits, or when none
-//! has had a turn for [`LARGE_AT_LEAST_EVERY`]; that bounds the large ones' wait as well.
+//! has had a turn for [`ALONE_AT_LEAST_EVERY`]; that bounds the large ones' wait as well.
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use suture_store::Filter;
 
-/// However many small files come, a large one has a turn this often.
-const LARGE_AT_LEAST_EVERY: Duration = Duration::from_secs(300);
+/// However many small files come, one that runs alone has a turn this often.
+const ALONE_AT_LEAST_EVERY: Duration = Duration::from_secs(300);
 /// How often an idle slot asks again: pauses after errors end without anyone's word.
 const ASK_EVERY: Duration = Duration::from_secs(1);
 
@@ -22,8 +22,8 @@ pub(crate) enum Turn {
     Small,
     /// A large file, alone.
     Large,
-    /// A suspect of any size, alone.
-    Suspect,
+    /// A file of any size that must run alone: a suspect, or one that needs the whole memory.
+    Alone,
     /// Nothing any more.
     Stop,
 }
@@ -31,15 +31,15 @@ pub(crate) enum Turn {
 impl Turn {
     /// With all threads and the whole memory?
     pub(crate) fn is_alone(self) -> bool {
-        matches!(self, Self::Large | Self::Suspect)
+        matches!(self, Self::Large | Self::Alone)
     }
 
     /// As the store takes it.
     pub(crate) fn filter(self, large: u64) -> Filter {
         match self {
-            Self::Small | Self::Stop => Filter { size: (0, large.saturating_sub(1)), suspects: false },
-            Self::Large => Filter { size: (large, u64::MAX), suspects: false },
-            Self::Suspect => Filter { size: (0, u64::MAX), suspects: true },
+            Self::Small | Self::Stop => Filter { size: (0, large.saturating_sub(1)), alone: false },
+            Self::Large => Filter { size: (large, u64::MAX), alone: false },
+            Self::Alone => Filter { size: (0, u64::MAX), alone: true },
         }
     }
 }
@@ -62,7 +62,7 @@ struct State {
     news: u64,
     /// `news` when the store last had nothing for a kind of turn.
     empty: [u64; 3],
-    last_large: Instant,
+    last_alone: Instant,
 }
 
 impl State {
@@ -75,7 +75,7 @@ fn index(turn: Turn) -> usize {
     match turn {
         Turn::Small | Turn::Stop => 0,
         Turn::Large => 1,
-        Turn::Suspect => 2,
+        Turn::Alone => 2,
     }
 }
 
@@ -89,7 +89,7 @@ pub(crate) struct Given {
 impl Schedule {
     pub(crate) fn new() -> Self {
         let state =
-            State { busy: 0, alone: false, paused: false, stop: false, news: 1, empty: [0; 3], last_large: Instant::now() };
+            State { busy: 0, alone: false, paused: false, stop: false, news: 1, empty: [0; 3], last_alone: Instant::now() };
         Self { state: Mutex::new(state), wake: Condvar::new() }
     }
 
@@ -124,8 +124,8 @@ impl Schedule {
         if given.turn.is_alone() {
             state.alone = false;
         }
-        if given.turn == Turn::Large {
-            state.last_large = Instant::now();
+        if given.turn.is_alone() {
+            state.last_alone = Instant::now();
         }
         if !found && let Some(empty) = state.empty.get_mut(index(given.turn)) {
             *empty = given.news;
@@ -169,7 +169,7 @@ fn choose(state: &State) -> Option<Turn> {
         return None;
     }
     let large_waits = state.may_have(Turn::Large);
-    let overdue = large_waits && state.last_large.elapsed() >= LARGE_AT_LEAST_EVERY;
+    let overdue = (large_waits || state.may_have(Turn::Alone)) && state.last_alone.elapsed() >= ALONE_AT_LEAST_EVERY;
     if state.may_have(Turn::Small) && !overdue {
         return Some(Turn::Small);
     }
@@ -179,7 +179,7 @@ fn choose(state: &State) -> Option<Turn> {
     if large_waits {
         return Some(Turn::Large);
     }
-    state.may_have(Turn::Suspect).then_some(Turn::Suspect)
+    state.may_have(Turn::Alone).then_some(Turn::Alone)
 }
 
 #[cfg(test)]
@@ -214,7 +214,7 @@ mod tests {
             s.done(given, false);
         }
         let suspect = s.next();
-        assert_eq!(suspect.turn, Turn::Suspect);
+        assert_eq!(suspect.turn, Turn::Alone);
         assert_eq!(s.busy(), 1);
         s.done(suspect, false);
         assert_eq!(choose(&s.lock()), None, "there was nothing for anyone");

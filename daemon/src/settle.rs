@@ -4,8 +4,6 @@
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
-use std::os::unix::fs::OpenOptionsExt;
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 use crate::fsx::Identity;
@@ -14,6 +12,11 @@ use crate::fsx::Identity;
 const LOOKS: u32 = 3;
 /// A file whose length does not fit must rest this many times longer.
 const DOUBT: u32 = 6;
+
+/// A file that some program keeps open for writing is spoken of after so long.
+const TELL_AFTER: Duration = Duration::from_secs(600);
+/// So many zeros at the end, eight records of them, are no triangles.
+const ZEROS: usize = 8 * 50;
 
 /// How long a file must rest.
 #[derive(Clone, Copy, Debug)]
@@ -47,6 +50,8 @@ pub(crate) struct Settling {
     looks: u32,
     /// It came here whole, by a rename.
     renamed: bool,
+    /// It was said that it does not come to rest.
+    told: bool,
 }
 
 /// What a look at a settling file says.
@@ -63,7 +68,7 @@ pub(crate) enum Look {
 impl Settling {
     /// A file seen for the first time.
     pub(crate) fn new(identity: Identity, now: Instant) -> Self {
-        Self { identity, since: now, looks: 1, renamed: false }
+        Self { identity, since: now, looks: 1, renamed: false, told: false }
     }
 
     /// The system says that it was renamed into place: whoever did that had finished it.
@@ -74,6 +79,12 @@ impl Settling {
     /// As it was seen last.
     pub(crate) fn identity(&self) -> &Identity {
         &self.identity
+    }
+
+    /// Has it been at rest, but for a program that has it open for writing, for so long that people should know? Once.
+    pub(crate) fn is_to_be_told(&mut self, now: Instant) -> bool {
+        let long = now.duration_since(self.since) >= TELL_AFTER;
+        long && !std::mem::replace(&mut self.told, true)
     }
 
     /// Looks again.
@@ -97,28 +108,26 @@ impl Settling {
 }
 
 /// Has the file a length that a complete STL has: 84 bytes and 50 for each triangle that its header announces, or text whose end
-/// says `endsolid`? Reads 1.1 KB at most.
+/// says `endsolid`? And does it not end in zeros, as one does whose size was set before it was written? Reads 1.1 KB at most.
 ///
 /// # Errors
-/// As `open` and `read`.
-pub(crate) fn length_fits(path: &Path) -> io::Result<bool> {
-    let nofollow = rustix::fs::OFlags::NOFOLLOW | rustix::fs::OFlags::NONBLOCK;
-    // The flags are small positive constants.
-    let mut file = File::options().read(true).custom_flags(nofollow.bits() as i32).open(path)?;
+/// As `read`.
+pub(crate) fn length_fits(mut file: &File) -> io::Result<bool> {
     let size = file.metadata()?.len();
     let mut head = [0; 84];
+    let mut announced = None;
+    file.seek(SeekFrom::Start(0))?;
     if size >= 84 {
         file.read_exact(&mut head)?;
         let [.., a, b, c, d] = head;
-        if 84 + 50 * u64::from(u32::from_le_bytes([a, b, c, d])) == size {
-            return Ok(true);
-        }
+        announced = Some(84 + 50 * u64::from(u32::from_le_bytes([a, b, c, d])));
     }
     let tail_len = size.min(1024);
     file.seek(SeekFrom::Start(size - tail_len))?;
     let mut tail = Vec::new();
     file.take(tail_len).read_to_end(&mut tail)?;
-    Ok(ends_a_solid(&tail))
+    let zeros = tail.iter().rev().take_while(|byte| **byte == 0).count();
+    Ok((announced == Some(size) && zeros < ZEROS) || ends_a_solid(&tail))
 }
 
 /// Is the last line of text one that begins with `endsolid`, in any case?
@@ -175,13 +184,18 @@ mod tests {
         let path = dir.path().join("a");
         let fits = |bytes: &[u8]| {
             std::fs::write(&path, bytes).unwrap();
-            length_fits(&path).unwrap()
+            length_fits(&File::open(&path).unwrap()).unwrap()
         };
         let mut binary = vec![0; 84 + 100];
         binary[80] = 2;
         assert!(fits(&binary));
         assert!(!fits(&binary[..183]), "cut short");
         assert!(!fits(&[&binary[..], b"x"].concat()), "still growing, or with a tail");
+        let mut half = vec![7; 84 + 50 * 20];
+        half[80..84].copy_from_slice(&20_u32.to_le_bytes());
+        assert!(fits(&half));
+        half[84 + 50 * 10..].fill(0);
+        assert!(!fits(&half), "D6: its size was set before it was written");
         assert!(fits(b"solid a\nfacet\nENDSOLID a\r\n"));
         assert!(!fits(b"solid a\nfacet normal 0 0 1"));
         assert!(!fits(b""));

@@ -13,6 +13,8 @@ use crate::exit::Exit;
 use crate::fsx::{self, Identity};
 use crate::naming::Naming;
 use crate::protocol::Request;
+use crate::rights::Rights;
+use crate::say::complain_lines;
 use crate::signals::Stop;
 use crate::supervise::{Cause, Ended, Worker};
 use crate::{profiles, table};
@@ -66,7 +68,7 @@ fn carry_out(order: Result<Order, String>) -> Exit {
     match ready {
         Ok((order, stop)) => Batch::new(&order, &stop).run(),
         Err(line) => {
-            eprintln!("suture: {line}");
+            complain_lines(&line);
             Exit::Refused
         }
     }
@@ -79,13 +81,16 @@ pub(crate) struct Failure {
     pub line: String,
     /// It was stopped by a signal.
     pub stopped: bool,
-    /// More memory might have helped.
-    pub starved: bool,
 }
 
 impl Failure {
     pub(crate) fn new(class: ErrorClass, line: impl Into<String>) -> Self {
-        Self { class, line: line.into(), stopped: false, starved: false }
+        Self { class, line: line.into(), stopped: false }
+    }
+
+    /// More memory may help, so that the file is to be tried again with all of the budget.
+    pub(crate) fn is_starved(&self) -> bool {
+        self.class == ErrorClass::Starved
     }
 
     pub(crate) fn io(path: &Path, what: &str, error: &std::io::Error) -> Self {
@@ -110,6 +115,8 @@ pub(crate) struct Item {
     pub request: Request,
     /// The input as it was before anyone worked on it.
     before: Identity,
+    /// What is made of it gets these.
+    rights: Rights,
     /// The result and the report in the making, with the names they are to have.
     pub output: Option<(Draft, PathBuf)>,
     pub report: Option<(Draft, PathBuf)>,
@@ -127,8 +134,8 @@ impl Order<'_> {
     /// # Errors
     /// When it cannot be read, or nothing may be written where its result would go.
     pub(crate) fn item(&self, input: &Path, target: Option<&Path>, limits: Limits) -> Result<Item, Failure> {
-        let before = std::fs::metadata(input)
-            .map(|m| Identity::from(&m))
+        let (before, rights) = std::fs::metadata(input)
+            .map(|m| (Identity::from(&m), Rights::of(&m)))
             .map_err(|e| Failure { class: ErrorClass::Unreadable, ..Failure::io(input, "cannot be opened", &e) })?;
         let mut request = Request {
             task: if self.naming.is_some() { Task::Repair } else { Task::Inspect },
@@ -136,6 +143,7 @@ impl Order<'_> {
             output: None,
             report: None,
             witness: None,
+            mark: None,
             shown_input: input.display().to_string(),
             shown_output: None,
             profile: self.profile.clone(),
@@ -160,7 +168,7 @@ impl Order<'_> {
             request.shown_output = Some(target.display().to_string());
             output = Some((made, target.to_owned()));
         }
-        Ok(Item { request, before, output, report })
+        Ok(Item { request, before, rights, output, report })
     }
 }
 
@@ -188,21 +196,17 @@ impl Item {
         let changed_line =
             || Failure::new(ErrorClass::Changed, format!("{shown}: changed while it was being worked on; try again"));
         match ended {
-            Ended::Done(_) if changed() => Err(changed_line()),
-            Ended::Done(report) => {
+            Ended::Done { .. } if changed() => Err(changed_line()),
+            Ended::Done { report, .. } => {
                 *worker = Some(running);
                 Ok(report)
             }
             Ended::Failed { class, message } => {
                 *worker = Some(running);
-                Err(Failure { starved: class == ErrorClass::Refused, ..Failure::new(class, message) })
+                Err(Failure::new(class, message))
             }
             Ended::Died(death) if matches!(death.cause, Cause::Fault(_)) && changed() => Err(changed_line()),
-            Ended::Died(death) => {
-                let class = if death.blames_file() { ErrorClass::Refused } else { ErrorClass::Environment };
-                let starved = death.cause == Cause::Memory;
-                Err(Failure { starved, ..Failure::new(class, format!("{shown}: {}", death.line())) })
-            }
+            Ended::Died(death) => Err(Failure::new(death.class(), format!("{shown}: {}", death.line()))),
             Ended::Stopped => {
                 let line = format!("{shown}: interrupted; nothing was written");
                 Err(Failure { stopped: true, ..Failure::new(ErrorClass::Environment, line) })
@@ -239,23 +243,23 @@ impl Finished {
         // Where no triangle was left, the draft is no mesh, and the report knows of no output.
         let is_mesh = self.report.output.is_some();
         if let Some((draft, target)) = self.item.output.filter(|(draft, _)| is_mesh && draft.is_written()) {
-            let placed = place_result(&draft, target, &self.item.request.input, naming)?;
+            let placed = place_result(&draft, target, self.item.rights, &self.item.request.input, naming)?;
             note(&placed);
             if let Some(facts) = &mut self.report.output {
                 facts.path = placed;
             }
         }
         if let Some((draft, path)) = self.item.report {
-            draft.place(&path, naming.force).map_err(|error| not_placed(&path, &error))?;
+            draft.place(&path, self.item.rights, naming.force).map_err(|error| not_placed(&path, &error))?;
             note(&path);
         }
         Ok(self.report)
     }
 }
 
-fn place_result(draft: &Draft, mut target: PathBuf, input: &Path, naming: &Naming) -> Result<PathBuf, Failure> {
+fn place_result(draft: &Draft, mut target: PathBuf, rights: Rights, input: &Path, naming: &Naming) -> Result<PathBuf, Failure> {
     loop {
-        match draft.place(&target, naming.force && !naming.is_folder()) {
+        match draft.place(&target, rights, naming.force && !naming.is_folder()) {
             Ok(()) => return Ok(target),
             Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => match naming.next(input) {
                 Some(next) => target = next,
@@ -286,7 +290,7 @@ pub(crate) fn tell(input: &Path, result: &Result<Box<Report>, Failure>, order: &
             (text, None, if report.outcome.is_good() { Exit::Good } else { Exit::NotGood })
         }
         (Err(failure), _) => {
-            let line = format!("suture: {}", failure.line.replace('\n', " "));
+            let line = failure.line.clone();
             let text = if order.json {
                 let input = input.display().to_string();
                 format!("{}\n", serde_json::json!({ "input": input, "error": failure.line, "class": failure.class }))
@@ -322,6 +326,14 @@ mod tests {
     use suture_core::report::Outcome;
 
     use super::*;
+
+    /// A file of too many triangles is refused with any memory: to run it again would be in vain.
+    #[test]
+    fn only_a_file_refused_for_memory_gets_all_of_it() {
+        use ErrorClass::{Changed, Environment, Refused, Starved, Unreadable};
+        let starved = |class| Failure::new(class, "refused").is_starved();
+        assert_eq!([Starved, Refused, Unreadable, Environment, Changed].map(starved), [true, false, false, false, false]);
+    }
 
     /// One line each, and only what is certified and the same is good.
     #[test]

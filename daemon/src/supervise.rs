@@ -18,6 +18,9 @@ use crossbeam::channel::{Receiver, RecvTimeoutError, unbounded};
 use rustix::process::{Pid, Resource, Rlimit, Signal};
 use suture_core::{ErrorClass, Report};
 
+use crate::create;
+use crate::exit::WORKER_CUT;
+use crate::fsx::{self, Identity};
 use crate::protocol::{Message, Request};
 
 /// How often a waiting supervisor looks whether it should stop.
@@ -34,8 +37,8 @@ const TAIL_LINES: usize = 12;
 /// What came of one request.
 #[derive(Debug)]
 pub(crate) enum Ended {
-    /// An answer: the report.
-    Done(Box<Report>),
+    /// An answer: the report, and what the file that was written was when it had been read back.
+    Done { report: Box<Report>, written: Option<Identity> },
     /// An answer: the engine's error, in words that name the file.
     Failed { class: ErrorClass, message: String },
     /// No answer: the worker died, or was killed for exceeding a limit.
@@ -59,18 +62,31 @@ pub(crate) enum Cause {
     Fault(i32),
     /// It ended by itself without an answer (an internal error).
     Internal(i32),
-    /// It asked for more memory than its limit, or the kernel was out of memory.
+    /// It asked for more memory than its limit.
     Memory,
+    /// The machine, or the group of processes it runs in, was out of memory.
+    Machine,
     /// It took longer than it was given.
     Time(Duration),
+    /// It ended before it had begun, or could not say what came of its work: the world's fault.
+    Cut,
     /// Someone else killed it.
     Killed(i32),
 }
 
 impl Death {
-    /// Is the file to blame? An operator's kill never is its fault.
+    /// Is the file to blame? An operator's kill, or a machine that is too small, never is its fault.
     pub(crate) fn blames_file(&self) -> bool {
-        !matches!(self.cause, Cause::Killed(_))
+        !matches!(self.cause, Cause::Killed(_) | Cause::Machine | Cause::Cut)
+    }
+
+    /// Who can do something about it.
+    pub(crate) fn class(&self) -> ErrorClass {
+        match self.cause {
+            Cause::Memory => ErrorClass::Starved,
+            Cause::Killed(_) | Cause::Machine | Cause::Cut => ErrorClass::Environment,
+            Cause::Fault(_) | Cause::Internal(_) | Cause::Time(_) => ErrorClass::Refused,
+        }
     }
 
     /// One line for people, without the file's name.
@@ -82,7 +98,11 @@ impl Death {
             }
             Cause::Fault(signal) => format!("the worker crashed on it ({}); a defect in Suture, please report it", name_of(signal)),
             Cause::Internal(_) => "the worker ended in an internal error on it; a defect in Suture, please report it".to_owned(),
+            Cause::Cut => "the worker could not begin, or not say what came of it".to_owned(),
             Cause::Memory => "the work needed more memory than its budget allows; a larger --memory may let it through".to_owned(),
+            Cause::Machine => "the machine (or the control group of this process) ran out of memory; a smaller --memory, fewer workers, or \
+                               more memory for the machine let it through"
+                .to_owned(),
             Cause::Time(limit) => {
                 let stage = if self.last_words.is_empty() { String::new() } else { format!(", {}", self.last_words) };
                 let limit = crate::units::show_seconds(limit.as_secs_f64());
@@ -91,7 +111,7 @@ impl Death {
             Cause::Killed(signal) => format!("the worker was killed from outside ({}); the file is not to blame", name_of(signal)),
         };
         match (&self.cause, self.last_words.is_empty()) {
-            (Cause::Fault(_) | Cause::Internal(_), false) => format!("{base}: {}", self.last_words),
+            (Cause::Fault(_) | Cause::Internal(_) | Cause::Cut, false) => format!("{base}: {}", self.last_words),
             _ => base,
         }
     }
@@ -125,7 +145,8 @@ fn name_of(signal: i32) -> String {
 pub(crate) struct Worker {
     child: Child,
     stdin: Option<ChildStdin>,
-    messages: Receiver<Message>,
+    /// Lines as they came.
+    lines: Receiver<Vec<u8>>,
     tail: Arc<Mutex<VecDeque<String>>>,
     readers: Vec<JoinHandle<()>>,
     /// Kills for want of memory, as counted at that time.
@@ -165,25 +186,26 @@ impl Worker {
             });
         }
         let mut child = command.spawn()?;
-        let (sender, messages) = unbounded();
+        let (stdout, stderr, stdin) = (child.stdout.take(), child.stderr.take(), child.stdin.take());
+        let (sender, lines) = unbounded();
         let tail = Arc::new(Mutex::new(VecDeque::new()));
-        let mut readers = Vec::new();
-        if let Some(stdout) = child.stdout.take() {
-            readers.push(std::thread::spawn(move || {
+        let mut worker =
+            Self { child, stdin, lines, tail: Arc::clone(&tail), readers: Vec::new(), oom_kills: (oom_kills(), Instant::now()) };
+        // Where no more threads can be had, the worker is dropped, which ends it.
+        if let Some(stdout) = stdout {
+            worker.readers.push(reader(move || {
                 for line in BufReader::new(stdout).split(b'\n') {
-                    let Ok(Ok(message)) = line.map(|line| serde_json::from_slice(&line)) else { break };
-                    if sender.send(message).is_err() {
+                    let Ok(line) = line else { break };
+                    if sender.send(line).is_err() {
                         break;
                     }
                 }
-            }));
+            })?);
         }
-        if let Some(stderr) = child.stderr.take() {
-            let tail = Arc::clone(&tail);
-            readers.push(std::thread::spawn(move || keep_tail(stderr, &tail)));
+        if let Some(stderr) = stderr {
+            worker.readers.push(reader(move || keep_tail(stderr, &tail))?);
         }
-        let stdin = child.stdin.take();
-        Ok(Self { child, stdin, messages, tail, readers, oom_kills: (oom_kills(), Instant::now()) })
+        Ok(worker)
     }
 
     /// The process's id.
@@ -210,18 +232,24 @@ impl Worker {
             self.oom_kills = (oom_kills(), start);
         }
         if !self.send(request) {
-            return Ended::Died(self.post_mortem());
+            return Ended::Died(self.post_mortem(false));
         }
+        let mut begun = false;
         let mut reached = String::new();
         loop {
-            match self.messages.recv_timeout(LOOK_EVERY) {
-                Ok(Message::Progress { stage, done, total }) => {
-                    on_progress(&stage, done, total);
-                    reached = how_far(&stage, done, total);
-                }
-                Ok(Message::Done(report)) => return Ended::Done(report),
-                Ok(Message::Failed { class, message }) => return Ended::Failed { class, message },
-                Err(RecvTimeoutError::Disconnected) => return Ended::Died(self.post_mortem()),
+            match self.lines.recv_timeout(LOOK_EVERY) {
+                Ok(line) => match read_answer(&line, request) {
+                    Ok(Message::Begun) => begun = true,
+                    Ok(Message::Progress { stage, done, total }) => {
+                        on_progress(&stage, done, total);
+                        reached = how_far(&stage, done, total);
+                    }
+                    Ok(Message::Done { report, written }) => return Ended::Done { report, written },
+                    Ok(Message::Failed { class, message }) => return Ended::Failed { class, message },
+                    // It speaks nonsense.
+                    Err(_) => return Ended::Died(self.post_mortem(begun)),
+                },
+                Err(RecvTimeoutError::Disconnected) => return Ended::Died(self.post_mortem(begun)),
                 Err(RecvTimeoutError::Timeout) => {}
             }
             if stop() {
@@ -249,6 +277,8 @@ impl Worker {
             // Gone already: nothing to kill.
             let _ = rustix::process::kill_process_group(group, Signal::KILL);
         }
+        // Should the group be out of reach: the process itself.
+        let _ = self.child.kill();
         let status = self.child.wait().ok();
         for reader in self.readers.drain(..) {
             let _ = reader.join();
@@ -256,8 +286,8 @@ impl Worker {
         status
     }
 
-    /// The worker closed its output (or its input) unasked: finds out why.
-    fn post_mortem(&mut self) -> Death {
+    /// The worker closed its output (or its input) unasked: finds out why. `begun`: it had said that it works on the request.
+    fn post_mortem(&mut self, begun: bool) -> Death {
         // A worker that is alive but speaks nonsense, or is slow to die, gets a moment to show its own end.
         let patience = Instant::now() + Duration::from_secs(2);
         let status = loop {
@@ -278,11 +308,15 @@ impl Worker {
         });
         let cause = match status.map(|status| (status.signal(), status.code())) {
             _ if out_of_memory => Cause::Memory,
-            Some((Some(9), _)) if oom => Cause::Memory,
+            Some((Some(9), _)) if oom => Cause::Machine,
+            Some((Some(signal @ (9 | 15)), _)) => Cause::Killed(signal),
+            Some((None, Some(code))) if code == i32::from(WORKER_CUT) => Cause::Cut,
+            _ if !begun => Cause::Cut,
             Some((Some(signal @ (4..=8 | 11 | 31)), _)) => Cause::Fault(signal),
             Some((Some(signal), _)) => Cause::Killed(signal),
             Some((None, code)) => Cause::Internal(code.unwrap_or(-1)),
-            None => Cause::Internal(-1),
+            // It lives, but its voice broke.
+            None => Cause::Cut,
         };
         Death { cause, last_words }
     }
@@ -292,6 +326,26 @@ impl Drop for Worker {
     fn drop(&mut self) {
         self.kill();
     }
+}
+
+/// A thread that reads what a worker says.
+fn reader(read: impl FnOnce() + Send + 'static) -> io::Result<JoinHandle<()>> {
+    std::thread::Builder::new().name("worker's voice".into()).spawn(read)
+}
+
+/// What a worker said. A mark says meanwhile that its answer is being read: nothing else of a file gets as far as the daemon.
+fn read_answer(line: &[u8], request: &Request) -> serde_json::Result<Message> {
+    let is_answer = line.starts_with(br#"{"done"#) || line.starts_with(br#"{"failed"#);
+    let mark = request.mark.as_deref().filter(|_| is_answer);
+    // Without a mark the death that may follow is nobody's.
+    let _ = mark.map(create::mark);
+    #[cfg(feature = "crash-points")]
+    if request.shown_input.contains("!kill-daemon!") && is_answer {
+        let _ = rustix::process::kill_process(rustix::process::getpid(), Signal::KILL);
+    }
+    let message = serde_json::from_slice(line);
+    let _ = mark.map(fsx::remove_if_there);
+    message
 }
 
 /// Passes a worker's log on and keeps its end.
@@ -326,9 +380,28 @@ mod tests {
         let death = |cause| Death { cause, last_words: String::new() };
         assert!(!death(Cause::Killed(9)).blames_file());
         assert!(!death(Cause::Killed(15)).blames_file());
+        assert!(!death(Cause::Machine).blames_file() && !death(Cause::Cut).blames_file());
         for cause in [Cause::Fault(11), Cause::Internal(101), Cause::Memory, Cause::Time(Duration::from_secs(1))] {
             assert!(death(cause).blames_file());
         }
+    }
+
+    /// D9: a machine without memory is not helped by giving its workers more of it.
+    #[test]
+    fn a_machine_out_of_memory_advises_less() {
+        let line = |cause| Death { cause, last_words: String::new() }.line();
+        assert!(line(Cause::Machine).contains("smaller --memory") && !line(Cause::Machine).contains("larger"));
+        assert!(line(Cause::Memory).contains("larger --memory"));
+    }
+
+    #[test]
+    fn only_a_death_for_memory_is_starved() {
+        let class = |cause| Death { cause, last_words: String::new() }.class();
+        assert_eq!(class(Cause::Memory), ErrorClass::Starved);
+        for cause in [Cause::Fault(11), Cause::Internal(101), Cause::Time(Duration::from_secs(1))] {
+            assert_eq!(class(cause), ErrorClass::Refused);
+        }
+        assert_eq!(class(Cause::Killed(9)), ErrorClass::Environment);
     }
 
     #[test]

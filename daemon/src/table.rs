@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use suture_core::Report;
 use suture_core::report::{Defects, Format, Outcome, SelfIntersections, Task};
 
+use crate::say::plain;
 use crate::units::{show_count, show_seconds, show_size};
 
 /// Boundary loops, and pairs that intersect, listed before the table refers to the report.
@@ -240,7 +241,7 @@ fn item(out: &mut String, label: &str, text: &str) {
 
 fn line(out: &mut String, text: std::fmt::Arguments) {
     // Writing to a string cannot fail.
-    let _ = writeln!(out, "{text}");
+    let _ = writeln!(out, "{}", plain(&text.to_string()));
 }
 
 #[cfg(test)]

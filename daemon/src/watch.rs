@@ -2,30 +2,37 @@
 //! through ([`crate::attempt`]), one a folder answers `suture jobs` ([`crate::control`]).
 //!
 //! A *life* begins with the store's recovery and ends with a signal, with the end of all work (`--once`), or with an error of the
-//! store; after the last the store is opened again and the next life begins.
+//! store; after the last the program begins anew ([`crate::again`]).
 
+use std::mem::ManuallyDrop;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
+use std::thread::{Builder, ScopedJoinHandle};
 use std::time::{Duration, Instant};
 
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, unbounded};
 use notify::event::{EventKind, ModifyKind, RenameMode};
 use notify::{RecursiveMode, Watcher};
-use suture_store::job::{Area, Kind};
+use suture_store::job::{Area, Kind, Testimony};
 use suture_store::{Control, JobStore, Query, SledStore, StoreError, crash_point};
 
-use crate::attempt::{Context, Event, Slot, WITNESS, remove_work};
+use crate::again::Lives;
+use crate::attempt::{Context, Event, IN_HAND, Slot, WITNESS, remove_work};
 use crate::cli::WatchArgs;
 use crate::config::{Config, default_state};
-use crate::control::{Door, knock};
+use crate::control::Door;
+use crate::create;
 use crate::exit::Exit;
 use crate::folder::{Folder, FolderError, is_fading};
 use crate::fsx;
+use crate::say::{complain, complain_lines};
 use crate::scan::Reconciler;
 use crate::schedule::{Schedule, Turn};
 use crate::settle::Rest;
 use crate::signals::Stop;
+use crate::watchdog;
 
 /// Full scans, where the system tells of changes and where it does not.
 const RESCAN: Duration = Duration::from_secs(60);
@@ -37,15 +44,13 @@ const IDLE: Duration = Duration::from_millis(200);
 const IDLE_ONCE: Duration = Duration::from_millis(20);
 /// Free space is looked at this often.
 const DISK_EVERY: Duration = Duration::from_secs(5);
-/// The store is opened again so often in a row before the process gives up.
-const REOPENINGS: u32 = 3;
-/// A worker's word that it outlived the daemon is believed so many attempts long.
-const WITNESS_BELIEVED: u32 = 30;
+/// With `--once`, a result that cannot be brought into place is tried so often before it is left for the next run.
+const TRIES_ONCE: u32 = 4;
 
 /// Runs the daemon to its end.
 pub(crate) fn run(args: &WatchArgs) -> Exit {
     let refuse = |line: &str| {
-        eprintln!("suture: {line}");
+        complain_lines(line);
         Exit::Refused
     };
     let config = match Config::from_args(args) {
@@ -56,23 +61,28 @@ pub(crate) fn run(args: &WatchArgs) -> Exit {
         Ok(stop) => stop,
         Err(error) => return refuse(&format!("cannot listen for signals: {error}")),
     };
-    serve(config, args.once, &stop)
+    serve(config, args.once, &stop, true)
 }
 
-/// The same for a configuration at hand.
-pub(crate) fn serve(config: Config, once: bool, stop: &Stop) -> Exit {
+/// The same for a configuration at hand. `may_begin_anew`: after an error of the store the program may begin anew, with the arguments it
+/// was started with.
+pub(crate) fn serve(config: Config, once: bool, stop: &Stop, may_begin_anew: bool) -> Exit {
     let mut folders = Vec::new();
     for folder in &config.folders {
         match Folder::open(folder) {
             Ok(folder) => folders.push(Arc::new(folder)),
             Err(error) => {
-                eprintln!("suture: {error}");
+                complain(&error);
                 return match error {
                     FolderError::Owned { .. } => Exit::Owned,
                     FolderError::Io { .. } => Exit::Refused,
                 };
             }
         }
+    }
+    let (lives, not_good) = (Lives::so_far(), Arc::<AtomicBool>::default());
+    if may_begin_anew {
+        watchdog::start(lives, Arc::clone(&not_good), stop.clone());
     }
     let asked = Instant::now();
     let store = loop {
@@ -83,12 +93,12 @@ pub(crate) fn serve(config: Config, once: bool, stop: &Stop) -> Exit {
         }
     };
     note_state(&config, &folders);
-    let mut daemon = Daemon { config: Arc::new(config), folders, store, once, stop: stop.clone() };
+    let daemon = Daemon { config: Arc::new(config), folders, store, once, lives, not_good, stop: stop.clone(), may_begin_anew };
     daemon.run()
 }
 
 fn store_failed(error: &StoreError) -> Exit {
-    eprintln!("suture: {error}");
+    complain(&error);
     match error.exit_code() {
         73 => Exit::Owned,
         _ => Exit::TryAgain,
@@ -103,7 +113,7 @@ fn note_state(config: &Config, folders: &[Arc<Folder>]) {
         let result = if state == default_state(&folder.root) {
             fsx::remove_if_there(&note)
         } else {
-            std::fs::write(&note, state.as_os_str().as_encoded_bytes())
+            create::replace(&note, state.as_os_str().as_encoded_bytes())
         };
         if let Err(error) = result {
             tracing::warn!(%error, file = %note.display(), "The place of the job store could not be noted.");
@@ -116,37 +126,34 @@ struct Daemon {
     folders: Vec<Arc<Folder>>,
     store: Arc<SledStore>,
     once: bool,
+    lives: Lives,
+    /// A job ended not good, in any life.
+    not_good: Arc<AtomicBool>,
     stop: Stop,
+    /// The process is the daemon and nothing else.
+    may_begin_anew: bool,
 }
 
 /// How a life ended.
 enum End {
     /// By a signal, or because all work is done.
-    Rest { not_good: bool },
+    Rest,
     /// The store failed.
     Store(StoreError),
 }
 
 impl Daemon {
-    fn run(&mut self) -> Exit {
-        let mut reopenings = 0;
-        loop {
-            let born = Instant::now();
-            match self.live() {
-                End::Rest { not_good: true } if self.once => return Exit::NotGood,
-                End::Rest { .. } => return Exit::Good,
-                End::Store(error) => {
-                    tracing::error!(%error, "The job store failed.");
-                    // Lives that last are a different matter than one that cannot begin.
-                    reopenings = if born.elapsed() > Duration::from_secs(60) { 1 } else { reopenings + 1 };
-                    if reopenings > REOPENINGS || self.stop.asked() {
-                        return store_failed(&error);
-                    }
-                    std::thread::sleep(Duration::from_secs(1) * reopenings);
-                    if let Err(error) = self.store.reopen() {
-                        return store_failed(&error);
-                    }
+    fn run(&self) -> Exit {
+        let (lives, born) = (self.lives, Instant::now());
+        match self.live() {
+            End::Rest if self.once && (lives.not_good || self.not_good.load(Ordering::Relaxed)) => Exit::NotGood,
+            End::Rest => Exit::Good,
+            End::Store(error) => {
+                tracing::error!(%error, "The job store failed.");
+                if self.may_begin_anew {
+                    lives.begin_another(born.elapsed(), self.not_good.load(Ordering::Relaxed), &|| self.stop.asked());
                 }
+                store_failed(&error)
             }
         }
     }
@@ -161,53 +168,100 @@ impl Daemon {
             events: events.clone(),
             once: self.once,
             halt: AtomicBool::new(false),
-            not_good: AtomicBool::new(false),
+            not_good: Arc::clone(&self.not_good),
             failed: Mutex::new(None),
         };
-        if let Err(error) = recover(&context) {
+        if let Err(error) = guarded(|| recover(&context)) {
             return End::Store(error);
         }
         let mut keeper = Keeper::new(&context, events, inbox, &self.stop);
         let ended = AtomicBool::new(false);
         std::thread::scope(|scope| {
-            let slots: Vec<_> = (0..self.config.workers).map(|_| scope.spawn(|| Slot::new(&context).run())).collect();
-            for folder in &self.folders {
-                let (context, ended) = (&context, &ended);
-                scope.spawn(move || match Door::open(&folder.root) {
-                    Ok(door) => door.serve(context, &|| ended.load(Ordering::Relaxed)),
-                    Err(error) => tracing::warn!(%error, "`suture jobs` cannot reach this daemon."),
-                });
-            }
-            if let Err(error) = keeper.keep() {
-                context.fail(error);
-            }
+            let threads = self.start(scope, &context, &ended);
+            let kept = threads.and_then(|slots| guarded(|| keeper.keep()).map(|()| slots));
             context.schedule.stop();
-            let deadline = Instant::now() + self.config.drain;
-            while slots.iter().any(|slot| !slot.is_finished()) {
-                if Instant::now() >= deadline && !context.halt.swap(true, Ordering::Relaxed) {
-                    tracing::warn!("The time to finish running jobs is over; they go back into the queue.");
-                }
-                std::thread::sleep(Duration::from_millis(10));
+            match kept {
+                Ok(slots) => self.drain(&context, &slots),
+                Err(error) => context.fail(error),
             }
             ended.store(true, Ordering::Relaxed);
-            self.folders.iter().for_each(|folder| knock(&folder.root));
         });
         let failed = context.failed.lock().map_or_else(|poisoned| poisoned.into_inner().take(), |mut failed| failed.take());
         match failed {
             Some(error) => End::Store(error),
-            None => End::Rest { not_good: context.not_good.load(Ordering::Relaxed) },
+            None => End::Rest,
         }
     }
+}
+
+impl Daemon {
+    /// Starts the threads that work on jobs, and one a folder that answers `suture jobs`.
+    fn start<'s>(
+        &'s self,
+        scope: &'s std::thread::Scope<'s, '_>,
+        context: &'s Context,
+        ended: &'s AtomicBool,
+    ) -> Result<Vec<ScopedJoinHandle<'s, ()>>, StoreError> {
+        let thread = |name: &str| Builder::new().name(name.into());
+        let failed = |source| StoreError::Io { path: "thread".into(), action: "starting one", source };
+        for folder in &self.folders {
+            match Door::open(&folder.root) {
+                Ok(door) => {
+                    let serve = move || {
+                        let served = guarded(|| {
+                            door.serve(context, &|| ended.load(Ordering::Relaxed));
+                            Ok(())
+                        });
+                        served.unwrap_or_else(|error| context.fail(error));
+                    };
+                    thread("door").spawn_scoped(scope, serve).map(drop).map_err(failed)?;
+                }
+                Err(error) => tracing::warn!(%error, "`suture jobs` cannot reach this daemon."),
+            }
+        }
+        let slot = || {
+            let worked = guarded(|| {
+                Slot::new(context).run();
+                Ok(())
+            });
+            // The job in work is taken up by the next life.
+            worked.unwrap_or_else(|error| context.fail(error));
+        };
+        (0..self.config.workers).map(|_| thread("slot").spawn_scoped(scope, slot).map_err(failed)).collect()
+    }
+
+    /// Lets running jobs finish, for as long as they are given.
+    fn drain(&self, context: &Context, slots: &[ScopedJoinHandle<()>]) {
+        let deadline = Instant::now() + self.config.drain;
+        while slots.iter().any(|slot| !slot.is_finished()) {
+            if Instant::now() >= deadline && !context.halt.swap(true, Ordering::Relaxed) {
+                tracing::warn!("The time to finish running jobs is over; they go back into the queue.");
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+}
+
+/// A thread that ends in a panic, for want of another thread or by a defect, must not leave the others waiting: the daemon ends with it,
+/// and begins anew.
+fn guarded(work: impl FnOnce() -> Result<(), StoreError>) -> Result<(), StoreError> {
+    catch_unwind(AssertUnwindSafe(work))
+        .unwrap_or_else(|_| Err(StoreError::Poisoned { reason: "a thread of the daemon ended in an internal error".into() }))
 }
 
 /// Takes up what an earlier life left, and clears its work folders away.
 fn recover(context: &Context) -> Result<(), StoreError> {
     let folder = |name: &str| context.folders.iter().find(|folder| folder.name == name);
-    let innocent = |job: &suture_store::Job| {
-        let witness = job.work.and_then(|work| Some(folder(&job.source.folder)?.work(work).join(WITNESS)));
-        witness.is_some_and(|witness| fsx::exists(&witness)) && job.attempts.0 <= WITNESS_BELIEVED
+    let testimony = |job: &suture_store::Job| {
+        let work = job.work.and_then(|work| Some(folder(&job.source.folder)?.work(work)));
+        let there = |name: &str| work.as_ref().is_some_and(|work| fsx::exists(&work.join(name)).unwrap_or(false));
+        match () {
+            () if there(IN_HAND) => Testimony::InHand,
+            () if there(WITNESS) => Testimony::Outlived,
+            () => Testimony::None,
+        }
     };
-    let recovered = context.store.recover(&innocent)?;
+    let recovered = context.store.recover(&testimony)?;
     crash_point("daemon.recovered");
     if !recovered.is_empty() {
         tracing::info!(jobs = recovered.len(), "The daemon ended without finishing; its jobs go on.");
@@ -215,7 +269,7 @@ fn recover(context: &Context) -> Result<(), StoreError> {
     let mut slot = Slot::new(context);
     for found in recovered {
         if let Some(claim) = found.claim {
-            slot.finish(&claim, found.job, Turn::Suspect);
+            slot.finish(&claim, found.job, Turn::Alone);
         }
         if context.failed.lock().is_ok_and(|failed| failed.is_some()) {
             return Ok(());
@@ -223,7 +277,10 @@ fn recover(context: &Context) -> Result<(), StoreError> {
     }
     let held: Vec<_> = context
         .store
-        .list(&Query { kinds: vec![Kind::Running, Kind::Concluded, Kind::Publishing, Kind::Published], ..Query::default() })?
+        .list(&Query {
+            kinds: Kind::ALL.into_iter().filter(|kind| kind.is_held() || *kind == Kind::Parked).collect(),
+            ..Query::default()
+        })?
         .iter()
         .filter_map(|job| job.work.map(|token| token.to_string()))
         .collect();
@@ -245,9 +302,12 @@ struct Keeper<'a> {
     stop: &'a Stop,
     folders: Vec<Kept>,
     /// Keeps telling of changes as long as it lives.
-    _watchers: Vec<notify::RecommendedWatcher>,
+    _watchers: Vec<Watching>,
     disk_looked: Option<Instant>,
 }
+
+/// Tells of changes until the process ends.
+type Watching = ManuallyDrop<notify::RecommendedWatcher>;
 
 /// A folder under the keeper's eyes.
 struct Kept {
@@ -315,7 +375,7 @@ impl<'a> Keeper<'a> {
                 return Ok(());
             }
             let now = Instant::now();
-            self.look_at_disk(now);
+            self.look_at_disk(now)?;
             for kept in &mut self.folders {
                 kept.turn(self.context, now)?;
             }
@@ -361,8 +421,14 @@ impl<'a> Keeper<'a> {
         }
         let counts = self.context.store.counts()?;
         let of = |wanted: fn(Kind) -> bool| counts.iter().filter(|(kind, _)| wanted(*kind)).map(|(_, n)| n).sum::<u64>();
-        if of(|kind| matches!(kind, Kind::Queued | Kind::Suspect)) > 0 && !self.context.schedule.is_paused() {
+        if of(|kind| matches!(kind, Kind::Queued | Kind::Alone)) > 0 && !self.context.schedule.is_paused() {
             return Ok(false);
+        }
+        if of(|kind| kind == Kind::Parked) > 0 {
+            let parked = self.context.store.list(&Query { kinds: vec![Kind::Parked], ..Query::default() })?;
+            if parked.iter().any(|job| job.parked.is_some_and(|parked| parked.tries < TRIES_ONCE)) {
+                return Ok(false);
+            }
         }
         let waiting = of(Kind::is_live);
         if waiting > 0 || self.folders.iter().any(|kept| kept.unavailable) {
@@ -392,8 +458,9 @@ impl<'a> Keeper<'a> {
     fn forget_noticed(&self) -> Result<(), StoreError> {
         for job in self.context.store.list(&Query { kinds: vec![Kind::Noticed], ..Query::default() })? {
             if let Some(kept) = self.folders.iter().find(|kept| kept.folder.name == job.source.folder)
+                && kept.folder.check().is_ok()
                 && kept.folder.inbox().is_dir()
-                && !fsx::exists(&kept.folder.inbox().join(job.source.path.to_path()))
+                && fsx::exists(&kept.folder.inbox().join(job.source.path.to_path())).is_ok_and(|there| !there)
             {
                 forget(self.context, job.id)?;
             }
@@ -402,12 +469,13 @@ impl<'a> Keeper<'a> {
     }
 
     /// Takes nothing new while the disk is nearly full: a result needs room, and a half-full night is better than a broken one.
-    fn look_at_disk(&mut self, now: Instant) {
+    fn look_at_disk(&mut self, now: Instant) -> Result<(), StoreError> {
         if self.disk_looked.is_some_and(|then| now.duration_since(then) < DISK_EVERY) {
-            return;
+            return Ok(());
         }
         let first = self.disk_looked.is_none();
         self.disk_looked = Some(now);
+        self.context.store.check()?;
         let reserve = self.context.config.reserve;
         let full = self.folders.iter().find(|kept| fsx::free_space(&kept.folder.root, reserve) == 0);
         if self.context.schedule.pause(full.is_some()) != full.is_some() || (first && full.is_some()) {
@@ -419,6 +487,7 @@ impl<'a> Keeper<'a> {
                 None => tracing::info!("There is room on the disk again."),
             }
         }
+        Ok(())
     }
 }
 
@@ -436,7 +505,8 @@ impl Kept {
     }
 
     fn scan(&mut self, now: Instant) {
-        match self.reconciler.scan(now) {
+        let found = self.folder.check().and_then(|()| self.reconciler.scan(now).map_err(|error| error.to_string()));
+        match found {
             Ok(gone) => {
                 if std::mem::take(&mut self.unavailable) {
                     tracing::info!(folder = %self.folder.root.display(), "The folder is back.");
@@ -445,7 +515,7 @@ impl Kept {
             }
             Err(error) => {
                 if !std::mem::replace(&mut self.unavailable, true) {
-                    tracing::error!(folder = %self.folder.root.display(), %error, "The folder cannot be read; the others go on.");
+                    tracing::error!(folder = %self.folder.root.display(), error, "The folder cannot be served; the others go on.");
                 }
             }
         }
@@ -518,7 +588,7 @@ fn forget(context: &Context, id: suture_store::JobId) -> Result<(), StoreError> 
 }
 
 /// Passes on that something happened, and which names were renamed into place.
-fn watcher(inbox: &Path, events: Sender<Event>) -> notify::Result<notify::RecommendedWatcher> {
+fn watcher(inbox: &Path, events: Sender<Event>) -> notify::Result<Watching> {
     let mut watcher = notify::recommended_watcher(move |event: notify::Result<notify::Event>| {
         let hint = match event {
             Ok(event) if matches!(event.kind, EventKind::Access(_)) => return,
@@ -535,6 +605,12 @@ fn watcher(inbox: &Path, events: Sender<Event>) -> notify::Result<notify::Recomm
         // The daemon is ending.
         let _ = events.send(hint);
     })?;
-    watcher.watch(inbox, RecursiveMode::Recursive)?;
-    Ok(watcher)
+    // notify 8.2 says nothing where its thread cannot start, and panics at the next word, and again when it is dropped: it is asked
+    // something harmless first, and never dropped (the process ends with it).
+    let watching = catch_unwind(AssertUnwindSafe(|| {
+        watcher.configure(notify::Config::default())?;
+        watcher.watch(inbox, RecursiveMode::Recursive)
+    }));
+    let watcher = ManuallyDrop::new(watcher);
+    watching.unwrap_or_else(|_| Err(notify::Error::generic("its thread could not start"))).map(|()| watcher)
 }

@@ -5,9 +5,11 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use suture_core::report::Task;
-use suture_core::{Error, Progress, Report};
+use suture_core::{Access, Error, Limits, Progress, Report};
 
-use crate::fsx;
+use crate::confine;
+use crate::create;
+use crate::fsx::Identity;
 use crate::protocol::{Message, Request};
 
 /// Progress is told at most this often, and at the beginning of a stage.
@@ -20,17 +22,19 @@ const FIRST_AFTER: Duration = Duration::from_millis(100);
 /// # Errors
 /// When the supervisor is gone, or speaks another protocol.
 pub(crate) fn serve() -> io::Result<()> {
+    confine::confine();
     orphan::listen()?;
     for line in io::stdin().lock().lines() {
         let request: Request = serde_json::from_str(&line?)?;
+        say(&Message::Begun)?;
         orphan::work_begins(request.witness.as_deref());
         // The peak of this file, not of the process's life; a kernel that refuses leaves the report with the latter.
-        let _ = std::fs::write("/proc/self/clear_refs", "5");
+        let _ = create::tell_kernel("clear_refs", "5");
         let answer = answer(&request);
         orphan::work_begins(None);
         if let Some(witness) = &request.witness {
             // Not synced: a machine that goes down takes this word with it, and the file stays a suspect.
-            let _ = fsx::touch(witness);
+            let _ = create::mark(witness);
         }
         say(&answer)?;
     }
@@ -49,7 +53,11 @@ fn answer(request: &Request) -> Message {
     #[cfg(feature = "crash-points")]
     hook::act(request);
     match work(request) {
-        Ok(report) => Message::Done(Box::new(report)),
+        Ok(report) => {
+            let output = request.output.as_deref().filter(|_| report.output.is_some());
+            let written = output.and_then(|path| std::fs::metadata(path).ok()).map(|meta| Identity::from(&meta));
+            Message::Done { report: Box::new(report), written }
+        }
         Err(error) => Message::Failed { class: error.class(), message: named(&error, request) },
     }
 }
@@ -67,7 +75,11 @@ fn named(error: &Error, request: &Request) -> String {
 fn work(request: &Request) -> suture_core::error::Result<Report> {
     let start = Instant::now();
     let teller = Teller { start, last: Mutex::new((start, "")) };
-    let Request { input, profile, limits, .. } = request;
+    let Request { input, profile, .. } = request;
+    // SAFETY: this process does nothing else than this work. If someone truncates the file, SIGBUS ends it, and the supervisor tells why. If
+    // someone changes it, the bytes seen are plain numbers, valid in every state, and the result is thrown away.
+    let access = unsafe { Access::mapped() };
+    let limits = &Limits { access, ..request.limits.clone() };
     let mut report = match (request.task, &request.output) {
         (Task::Repair, Some(output)) => suture_core::repair(input, output, profile, limits, &teller)?,
         _ => suture_core::inspect(input, profile, limits, &teller)?,
@@ -80,7 +92,7 @@ fn work(request: &Request) -> suture_core::error::Result<Report> {
     report.limits.spool = None;
     report.limits.defer_sync = false;
     if let Some(path) = &request.report {
-        fsx::write_new_json(path, &report, !limits.defer_sync).map_err(|source| Error::Io {
+        create::write_new_json(path, &report, !limits.defer_sync).map_err(|source| Error::Io {
             path: path.clone(),
             action: "writing the report",
             source,
@@ -122,7 +134,6 @@ mod orphan {
     use std::ptr::null_mut;
     use std::sync::atomic::{AtomicPtr, Ordering};
 
-    use rustix::fs::{Mode, OFlags};
     use signal_hook::consts::SIGTERM;
 
     /// The name to leave: from `CString::into_raw`, or null. A name is never freed while the handler might read it: it is leaked,
@@ -140,9 +151,8 @@ mod orphan {
             if !name.is_null() {
                 // SAFETY: not null, so it came from `CString::into_raw`, ends with a NUL, and is never freed.
                 let name = unsafe { std::ffi::CStr::from_ptr(name) };
-                let flags = OFlags::CREATE | OFlags::WRONLY | OFlags::CLOEXEC;
                 // Without the file, the work is suspected, as it would be without this handler.
-                let _ = rustix::fs::open(name, flags, Mode::RUSR | Mode::WUSR);
+                crate::create::mark_in_handler(name);
             }
             // Ends the process as the signal would have.
             let _ = signal_hook::low_level::emulate_default_handler(SIGTERM);
@@ -155,7 +165,8 @@ mod orphan {
 }
 
 /// Faults on demand, for the tests of the supervisor and of the daemon: a build with the feature `crash-points` looks for
-/// `!abort!`, `!segv!`, `!hang!`, `!kill-daemon!`, `!memory!`, `!panic!` or `!slow!` in the input's name.
+/// `!abort!`, `!segv!`, `!hang!`, `!kill-parent!`, `!memory!`, `!panic!` or `!slow!` in the input's name. (The daemon looks for
+/// `!kill-daemon!`: it dies of the answer.)
 #[cfg(feature = "crash-points")]
 mod hook {
     use std::time::Duration;
@@ -173,10 +184,10 @@ mod hook {
                 let _ = rustix::process::kill_process(rustix::process::getpid(), rustix::process::Signal::SEGV);
             }
         }
-        if name.contains("!kill-daemon!")
+        if name.contains("!kill-parent!")
             && let Some(parent) = rustix::process::getppid()
         {
-            // Both at once: no one is left to testify.
+            // It is not allowed to: the parent lives and sees it abort.
             super::orphan::work_begins(None);
             let _ = rustix::process::kill_process(parent, rustix::process::Signal::KILL);
             std::process::abort();

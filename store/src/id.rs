@@ -1,6 +1,7 @@
 //! Names for numbers that must not be mixed up, and the clock.
 
 use std::fmt;
+use std::sync::OnceLock;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
@@ -44,6 +45,11 @@ number! {
     Time(u64)
 }
 
+number! {
+    /// One life of the machine: a digest of the system's boot id; 0 where the system has none.
+    Boot(u64)
+}
+
 impl Attempt {
     /// The attempt after this one.
     pub fn next(self) -> Self {
@@ -66,9 +72,17 @@ impl Time {
     }
 }
 
-/// Where the store's time comes from.
+impl Boot {
+    /// Is it known that the machine went down between the two?
+    pub fn differs(self, other: Self) -> bool {
+        self != Self(0) && other != Self(0) && self != other
+    }
+}
+
+/// Where the store's time comes from, and in which life of the machine it is.
 pub trait Clock: Send + Sync {
     fn now(&self) -> Time;
+    fn boot(&self) -> Boot;
 }
 
 /// The system's wall clock.
@@ -79,6 +93,16 @@ impl Clock for SystemClock {
     fn now(&self) -> Time {
         let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
         Time(u64::try_from(since.as_millis()).unwrap_or(u64::MAX))
+    }
+
+    fn boot(&self) -> Boot {
+        static BOOT: OnceLock<Boot> = OnceLock::new();
+        // The first half of a random number of 128 bits.
+        *BOOT.get_or_init(|| {
+            let id = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").unwrap_or_default();
+            let digits: String = id.chars().filter(char::is_ascii_hexdigit).take(16).collect();
+            Boot(u64::from_str_radix(&digits, 16).unwrap_or(0))
+        })
     }
 }
 

@@ -8,41 +8,47 @@
 //!    │ └──died, back────┘ └─condemned─► Concluded (result known, no worker needed, names not yet chosen)
 //!    └───retry (operator)── Ended (not good), Cancelled
 //! ```
+//! A job that is Concluded, Publishing or Published and cannot go on (a folder that may not be written, a foreign mount) is *parked*
+//! in its state: no one holds it, its reason is in its note, and it is claimed again after a pause.
+//!
 //! What the outside world owes a job follows from its state alone ([`Job::duty`]), so that recovery after a crash is the same
 //! code as normal work.
 //!
 //! **Blame.** An attempt is counted when it is claimed, before its worker starts, and is never taken back. It is *charged* to
 //! the file when the worker died of the file: a signal of its own making, the time limit, the memory limit. The second charge
-//! quarantines. A kill from outside is never charged. When the daemon dies, its running jobs are interrupted; after the second
-//! such death a job is a *suspect* and must run alone; a file that was alone in [`DEATHS_ALONE`] deaths of the daemon, or in
-//! charges and deaths alone together reached three, is quarantined. A death for which there is a witness that the file was
-//! innocent (its worker outlived the daemon) leaves no mark.
+//! quarantines. A kill from outside is never charged, and a death of the machine (another boot id) never is.
+//! When the daemon dies, its running jobs are interrupted; after the second such death, or one of the machine, a job must run alone. Only
+//! a death of the daemon while it reads what the worker of a file that runs alone has to say is the file's ([`Testimony::InHand`]):
+//! [`DEATHS_ALONE`] of them, charges included, quarantine. A witness that the file was innocent (its worker outlived the daemon)
+//! leaves no mark.
 
 use serde::{Deserialize, Serialize};
 
-use crate::id::{Attempt, Epoch, Hash, JobId, Seq, Time, Token};
+use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Seq, Time, Token};
 use crate::path::RelPath;
 
+mod blame;
+mod kind;
 mod step;
 #[cfg(test)]
 mod tests;
 
+pub use blame::{Blame, CHARGES, DEATHS_ALONE, DEATHS_TO_SUSPECT, Death, KILLS_FREE, Testimony};
+pub use kind::Kind;
 pub use step::{Event, Illegal};
 
-/// Charged attempts after which a file is quarantined.
-pub const CHARGES: u32 = 2;
-/// Deaths of the daemon, with this file the only one running, after which it is quarantined.
-pub const DEATHS_ALONE: u32 = 3;
-/// Deaths of the daemon, in company or not, after which a file must run alone.
-pub const DEATHS_TO_SUSPECT: u32 = 2;
 /// How often an error of the environment is tried again.
 pub const ENVIRONMENT_RETRIES: u32 = 5;
-/// Kills from outside after which the next start waits; they never end a job.
-pub const KILLS_FREE: u32 = 3;
 /// First pause after an error of the environment; doubles each time.
 pub const BACKOFF_MS: u64 = 30_000;
 /// Longest pause.
 pub const BACKOFF_CAP_MS: u64 = 30 * 60_000;
+/// Pause after something that no try of the file changes.
+pub const WAIT_MS: u64 = 15_000;
+/// First pause of a parked job; doubles each time. It never gives up.
+pub const PARK_MS: u64 = 1000;
+/// Longest pause of a parked job.
+pub const PARK_CAP_MS: u64 = 5 * 60_000;
 
 /// The dropped file, as it was when it came to rest.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -127,6 +133,10 @@ pub struct Publication {
     pub output: Option<RelPath>,
     pub output_hash: Option<Hash>,
     pub report_hash: Option<Hash>,
+    /// Last change of the original's inode, in nanoseconds since 1970, when its result was found. If it still has it, its content is
+    /// the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source_ctime_ns: Option<i64>,
     /// Name of the original in the area of the ending; `None` where originals stay in `in/`.
     pub original: Option<RelPath>,
 }
@@ -164,8 +174,23 @@ pub struct Hold {
     pub attempt: Attempt,
     pub epoch: Epoch,
     pub token: Token,
-    /// Nothing else may run meanwhile: this job is suspected of killing the daemon.
+    /// Nothing else may run meanwhile: the job is suspected of killing the daemon, or needs the whole memory.
     pub alone: bool,
+    /// The machine's life in which it was claimed.
+    #[serde(default)]
+    pub boot: Boot,
+}
+
+/// A result that could not be brought into place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Parked {
+    /// End of the pause; `None` while someone tries again.
+    pub until: Option<Time>,
+    /// How often it was tried.
+    pub tries: u32,
+    /// A file of the result is in its place already, so that the job cannot be taken back any more.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub committed: bool,
 }
 
 /// Where a job stands.
@@ -190,149 +215,6 @@ pub enum State {
     Cancelled { why: Withdrawal },
 }
 
-/// [`State`] without its data, endings told apart: what lists and counters show.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Kind {
-    Noticed,
-    /// Queued, and may be claimed.
-    Queued,
-    /// Queued, after a pause.
-    Waiting,
-    /// Queued, but must run alone.
-    Suspect,
-    Running,
-    Concluded,
-    Publishing,
-    Published,
-    Done,
-    Failed,
-    NeedsReview,
-    Quarantined,
-    Cancelled,
-}
-
-impl Kind {
-    /// All of them, in the order of a job's life.
-    pub const ALL: [Self; 13] = [
-        Self::Noticed,
-        Self::Queued,
-        Self::Waiting,
-        Self::Suspect,
-        Self::Running,
-        Self::Concluded,
-        Self::Publishing,
-        Self::Published,
-        Self::Done,
-        Self::Failed,
-        Self::NeedsReview,
-        Self::Quarantined,
-        Self::Cancelled,
-    ];
-
-    /// The word for it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Noticed => "noticed",
-            Self::Queued => "queued",
-            Self::Waiting => "waiting",
-            Self::Suspect => "suspect",
-            Self::Running => "running",
-            Self::Concluded => "concluded",
-            Self::Publishing => "publishing",
-            Self::Published => "published",
-            Self::Done => "done",
-            Self::Failed => "failed",
-            Self::NeedsReview => "needs_review",
-            Self::Quarantined => "quarantined",
-            Self::Cancelled => "cancelled",
-        }
-    }
-
-    /// Is there something left to do without anyone asking for it?
-    pub fn is_live(self) -> bool {
-        self.is_queued() || self.is_held()
-    }
-
-    /// Waiting for a claim.
-    pub fn is_queued(self) -> bool {
-        matches!(self, Self::Queued | Self::Waiting | Self::Suspect)
-    }
-
-    /// Under a claim.
-    pub fn is_held(self) -> bool {
-        matches!(self, Self::Running | Self::Concluded | Self::Publishing | Self::Published)
-    }
-}
-
-impl std::fmt::Display for Kind {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-/// What counts against a file. Reset by an operator's retry.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Blame {
-    /// Attempts whose worker died of the file.
-    pub charges: u32,
-    /// Deaths of the daemon while it ran.
-    pub deaths: u32,
-    /// Those of them in which nothing else ran.
-    pub deaths_alone: u32,
-    /// Errors of the environment.
-    pub environment: u32,
-    /// Kills from outside. They are counted only so that a start after many of them waits.
-    pub kills: u32,
-}
-
-impl Blame {
-    /// Must it run alone?
-    pub fn is_suspect(&self) -> bool {
-        self.deaths >= DEATHS_TO_SUSPECT
-    }
-
-    /// Has it killed too often?
-    pub fn is_condemned(&self) -> bool {
-        self.charges >= CHARGES || self.charges.saturating_add(self.deaths_alone) >= DEATHS_ALONE
-    }
-}
-
-/// How a worker process died.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Death {
-    /// By a signal of its own making (SIGSEGV, SIGBUS, SIGABRT …).
-    Signal(i32),
-    /// It ended with a code that is none of its protocol's (a panic).
-    Exit(i32),
-    /// It reached its time limit.
-    TimeLimit,
-    /// It reached its memory limit.
-    MemoryLimit,
-    /// It was killed from outside (SIGKILL, SIGTERM), not by one of our limits.
-    Killed(i32),
-}
-
-impl Death {
-    /// Did the worker die of the file?
-    pub fn is_charged(self) -> bool {
-        !matches!(self, Self::Killed(_))
-    }
-}
-
-impl std::fmt::Display for Death {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Signal(signal) => write!(f, "its worker died of signal {signal}"),
-            Self::Exit(code) => write!(f, "its worker ended with code {code}"),
-            Self::TimeLimit => f.write_str("its worker reached the time limit"),
-            Self::MemoryLimit => f.write_str("its worker reached the memory limit"),
-            Self::Killed(signal) => write!(f, "its worker was killed from outside with signal {signal}"),
-        }
-    }
-}
-
 /// What the holder of a claim reports. Each is legal only in the state it belongs to, and only with the claim's token.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Step {
@@ -340,6 +222,13 @@ pub enum Step {
     Died(Death),
     /// The world around the file failed (I/O, space, permission): try again later.
     Environment { reason: String },
+    /// Something that no try of this file changes (its folder is out of reach, no process or no room is to be had, a setting is wrong):
+    /// wait a while; it does not count.
+    Wait { reason: String },
+    /// Its share of the memory was too small: try again alone, with all of it.
+    NeedsAll,
+    /// The result cannot be brought into place for now; the claim ends. `committed`: a file of it is in its place already.
+    Park { reason: String, committed: bool },
     /// Stopping: the job goes back into the queue at no cost.
     HandBack,
     /// The worker was stopped as the operator asked, and the file is back in its place.
@@ -390,6 +279,12 @@ pub struct Job {
     /// Attempts so far.
     pub attempts: Attempt,
     pub blame: Blame,
+    /// It needs the whole memory.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub needs_all: bool,
+    /// Set while its result cannot be brought into place.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parked: Option<Parked>,
     /// Token of the last claim, whose work folder may still be there.
     pub work: Option<Token>,
     /// Why the last attempt came back; for people.
@@ -420,6 +315,8 @@ impl Job {
             state,
             attempts: Attempt(0),
             blame: Blame::default(),
+            needs_all: false,
+            parked: None,
             work: None,
             note: String::new(),
             submitted: now,
@@ -431,9 +328,10 @@ impl Job {
     /// The state without its data.
     pub fn kind(&self) -> Kind {
         match &self.state {
+            _ if self.rests_parked() => Kind::Parked,
             State::Noticed { .. } => Kind::Noticed,
             State::Queued { not_before: Some(_) } => Kind::Waiting,
-            State::Queued { not_before: None } if self.blame.is_suspect() => Kind::Suspect,
+            State::Queued { not_before: None } if self.must_run_alone() => Kind::Alone,
             State::Queued { not_before: None } => Kind::Queued,
             State::Running { .. } => Kind::Running,
             State::Concluded { .. } => Kind::Concluded,
@@ -449,9 +347,20 @@ impl Job {
         }
     }
 
+    /// Must nothing else run beside it?
+    pub fn must_run_alone(&self) -> bool {
+        self.needs_all || self.blame.is_suspect()
+    }
+
+    /// Parked, and no one tries?
+    fn rests_parked(&self) -> bool {
+        self.parked.is_some_and(|parked| parked.until.is_some())
+    }
+
     /// The claim on it, if there is one.
     pub fn hold(&self) -> Option<&Hold> {
         match &self.state {
+            _ if self.rests_parked() => None,
             State::Running { hold, .. }
             | State::Concluded { hold, .. }
             | State::Publishing { hold, .. }
@@ -463,6 +372,7 @@ impl Job {
     /// What is to be done for it.
     pub fn duty(&self) -> Duty {
         match &self.state {
+            _ if self.rests_parked() => Duty::Queue,
             State::Queued { .. } => Duty::Queue,
             State::Running { cancel: false, .. } => Duty::Run,
             State::Running { cancel: true, .. } => Duty::Stop,
@@ -473,14 +383,34 @@ impl Job {
         }
     }
 
+    /// End of the pause it is in: queued after an error, or parked.
+    pub fn pause(&self) -> Option<Time> {
+        match self.state {
+            State::Queued { not_before } => not_before,
+            _ => self.parked.and_then(|parked| parked.until),
+        }
+    }
+
+    /// What it is to leave, or has left, as far as that is known.
+    pub fn publication(&self) -> Option<&Publication> {
+        match &self.state {
+            State::Publishing { publication, .. } | State::Published { publication, .. } | State::Ended { publication } => {
+                Some(publication)
+            }
+            _ => None,
+        }
+    }
+
+    /// The claim whose work folder holds its files; 0 before the first.
+    pub fn work_token(&self) -> Token {
+        self.work.unwrap_or_default()
+    }
+
     /// May it be claimed at `now`? A pause that ends later than the longest pause from now was set by a clock that has jumped;
     /// it is over.
     pub fn is_due(&self, now: Time) -> bool {
-        match self.state {
-            State::Queued { not_before: None } => true,
-            State::Queued { not_before: Some(then) } => then <= now || then > now.plus_ms(BACKOFF_CAP_MS),
-            _ => false,
-        }
+        let waits = matches!(self.state, State::Queued { .. }) || self.rests_parked();
+        waits && self.pause().is_none_or(|then| then <= now || then > now.plus_ms(BACKOFF_CAP_MS))
     }
 
     /// Where the original is while no claim holds it: area and path in it.

@@ -16,12 +16,13 @@ pub mod path;
 mod queue;
 mod record;
 mod sled_store;
+pub mod stall;
 pub mod store;
 #[cfg(any(test, feature = "testkit"))]
 pub mod testkit;
 
 pub use crash::crash_point;
-pub use id::{Attempt, Clock, Epoch, Hash, JobId, Seq, SystemClock, Time, Token};
+pub use id::{Attempt, Boot, Clock, Epoch, Hash, JobId, Seq, SystemClock, Time, Token};
 pub use job::{Ending, Job, Kind, Publication, Source, State, Step};
 pub use memory::MemoryStore;
 pub use path::RelPath;

@@ -5,7 +5,7 @@ use std::ops::Bound;
 use std::sync::{Arc, RwLock};
 
 use crate::id::{Clock, Epoch, JobId, Seq, SystemClock};
-use crate::job::{Job, Kind, Step};
+use crate::job::{Job, Kind, Step, Testimony};
 use crate::queue::{Put, Queue, Table, Tables, Visit};
 use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted};
 
@@ -103,8 +103,8 @@ impl JobStore for MemoryStore {
         self.queue.control(id, wish)
     }
 
-    fn recover(&self, innocent: &dyn Fn(&Job) -> bool) -> Result<Vec<Recovered>, StoreError> {
-        self.queue.recover(innocent)
+    fn recover(&self, testimony: &dyn Fn(&Job) -> Testimony) -> Result<Vec<Recovered>, StoreError> {
+        self.queue.recover(testimony)
     }
 
     fn get(&self, id: JobId) -> Result<Option<Job>, StoreError> {
@@ -113,6 +113,10 @@ impl JobStore for MemoryStore {
 
     fn list(&self, query: &Query) -> Result<Vec<Job>, StoreError> {
         self.queue.list(query)
+    }
+
+    fn check(&self) -> Result<(), StoreError> {
+        Ok(())
     }
 
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {

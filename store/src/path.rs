@@ -14,6 +14,10 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 /// single name of 255 bytes, none of them valid UTF-8, fits.
 pub const MAX_TEXT: usize = 640;
 
+/// Longest path of a dropped file, in its text form: what a result's name adds to it (`~99999`, `.best`, each byte as two digits)
+/// still fits a [`RelPath`], so that no file is taken for which there are no names.
+pub const MAX_SOURCE: usize = MAX_TEXT - 32;
+
 /// A relative path without `.`, `..`, empty parts or NUL.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct RelPath(Vec<u8>);
@@ -68,6 +72,11 @@ impl RelPath {
     /// The bytes, parts parted by `/`.
     pub fn as_bytes(&self) -> &[u8] {
         &self.0
+    }
+
+    /// The first characters of its text, for messages about a path that is too long.
+    pub fn beginning(&self) -> String {
+        self.to_string().chars().take(40).collect()
     }
 
     /// The last part.

@@ -16,8 +16,9 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use serde::{Deserialize, Serialize};
 
 use crate::crash_point;
-use crate::id::{Clock, Epoch, JobId, Seq, Token};
-use crate::job::{Event, Illegal, Job, Kind, Source, State, Step};
+use crate::id::{Clock, Epoch, JobId, Seq, Time, Token};
+use crate::job::{Event, Illegal, Job, Kind, Source, State, Step, Testimony};
+use crate::path::MAX_SOURCE;
 use crate::record;
 use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted};
 
@@ -93,6 +94,16 @@ pub(crate) fn read_head(tables: &dyn Tables) -> Result<Option<Head>, StoreError>
         return if empty { Ok(None) } else { Err(record::corrupt("meta/head", "it is missing")) };
     };
     record::decode(Table::Meta, HEAD, &bytes).map(Some)
+}
+
+/// Every job in `tables`, by number.
+pub(crate) fn all_jobs(tables: &dyn Tables) -> Result<Vec<Job>, StoreError> {
+    let mut jobs = Vec::new();
+    tables.scan(Table::Jobs, &[], &[], &mut |key, value| {
+        jobs.push(record::decode(Table::Jobs, key, value)?);
+        Ok(true)
+    })?;
+    Ok(jobs)
 }
 
 impl<T: Tables> Queue<T> {
@@ -272,12 +283,31 @@ impl<T: Tables> Queue<T> {
         orphans.sort_by_key(|job| job.id);
         Ok(orphans)
     }
+
+    /// Parked jobs, before and after their pause was ended: with a new daemon there may be a new world.
+    fn wake_parked(&self, head: &mut Head, now: Time) -> Result<Vec<(Job, Job)>, StoreError> {
+        let mut woken = Vec::new();
+        for id in index::ids(&self.tables, Kind::Parked)? {
+            let before = self.known(id)?;
+            let mut after = before.after(&Event::Retry, now).map_err(|source| StoreError::Illegal { id, source })?;
+            head.seq.0 += 1;
+            after.seq = head.seq;
+            woken.push((before, after));
+        }
+        Ok(woken)
+    }
 }
 
 impl<T: Tables> JobStore for Queue<T> {
     fn submit(&self, found: &[Submission]) -> Result<Vec<Submitted>, StoreError> {
         self.tables.sound()?;
         for submission in found {
+            let path = &submission.source.path;
+            if path.to_string().len() > MAX_SOURCE {
+                return Err(StoreError::TooLong {
+                    what: format!("the path of {} bytes that begins with {}", path.as_bytes().len(), path.beginning()),
+                });
+            }
             fits("the folder's name", &submission.source.folder)?;
             fits("the profile's name", &submission.source.profile)?;
         }
@@ -301,7 +331,7 @@ impl<T: Tables> JobStore for Queue<T> {
         let mut head = inner.head;
         head.seq.0 += 1;
         let token = Token(head.seq.0);
-        let event = Event::Claim { epoch: head.epoch, token };
+        let event = Event::Claim { epoch: head.epoch, token, boot: self.clock.boot() };
         let mut job = before.after(&event, now).map_err(|source| StoreError::Illegal { id, source })?;
         job.seq = head.seq;
         self.commit(inner, head, &[(Some(&before), &job)], Vec::new())?;
@@ -337,7 +367,7 @@ impl<T: Tables> JobStore for Queue<T> {
         })
     }
 
-    fn recover(&self, innocent: &dyn Fn(&Job) -> bool) -> Result<Vec<Recovered>, StoreError> {
+    fn recover(&self, testimony: &dyn Fn(&Job) -> Testimony) -> Result<Vec<Recovered>, StoreError> {
         self.tables.sound()?;
         let now = self.clock.now();
         // The witness may look at files and call back: not under the lock. No one else can touch what an earlier epoch holds,
@@ -348,20 +378,26 @@ impl<T: Tables> JobStore for Queue<T> {
         // What was being published is company, too, unless the job was claimed to run alone: that a publication is stuck must not
         // save a file that kills the daemon again and again.
         let alone = |job: &Job| one_ran && (suspects.len() == 1 || job.hold().is_some_and(|hold| hold.alone));
-        let cleared: Vec<JobId> = suspects.iter().filter(|job| running(job) && innocent(job)).map(|job| job.id).collect();
+        let boot = self.clock.boot();
+        let fell = |job: &Job| job.hold().is_some_and(|hold| hold.boot.differs(boot));
+        let say = |job: &Job| if fell(job) { Testimony::Machine } else { testimony(job) };
+        let said: BTreeMap<JobId, Testimony> = suspects.iter().filter(|job| running(job)).map(|job| (job.id, say(job))).collect();
 
         let inner = self.lock();
         let mut head = inner.head;
         let orphans = self.orphans(head.epoch)?;
         let mut recovered = Vec::with_capacity(orphans.len());
         for job in &orphans {
-            recovered.push(take_back(job, &mut head, alone(job), cleared.contains(&job.id), now)?);
+            let testimony = said.get(&job.id).copied().unwrap_or(Testimony::None);
+            recovered.push(take_back(job, &mut head, alone(job), testimony, now)?);
         }
-        if recovered.is_empty() {
+        let parked = self.wake_parked(&mut head, now)?;
+        if recovered.is_empty() && parked.is_empty() {
             return Ok(recovered);
         }
         // All in one transaction: whether a job was alone can only be told while none of them is taken back yet.
-        let changes: Vec<_> = orphans.iter().zip(&recovered).map(|(from, to)| (Some(from), &to.job)).collect();
+        let mut changes: Vec<_> = orphans.iter().zip(&recovered).map(|(from, to)| (Some(from), &to.job)).collect();
+        changes.extend(parked.iter().map(|(from, to)| (Some(from), to)));
         self.commit(inner, head, &changes, Vec::new())?;
         self.settle(head)?;
         Ok(recovered)
@@ -401,6 +437,10 @@ impl<T: Tables> JobStore for Queue<T> {
         Ok(jobs)
     }
 
+    fn check(&self) -> Result<(), StoreError> {
+        self.tables.sound()
+    }
+
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {
         let inner = self.lock();
         Ok(Kind::ALL.into_iter().map(|kind| (kind, inner.counts.get(&kind).copied().unwrap_or(0))).collect())
@@ -408,12 +448,12 @@ impl<T: Tables> JobStore for Queue<T> {
 }
 
 /// One orphan after the death of its daemon; counts on in `head`.
-fn take_back(job: &Job, head: &mut Head, alone: bool, innocent: bool, now: crate::id::Time) -> Result<Recovered, StoreError> {
+fn take_back(job: &Job, head: &mut Head, alone: bool, testimony: Testimony, now: Time) -> Result<Recovered, StoreError> {
     let illegal = |source| StoreError::Illegal { id: job.id, source };
     let void = job.hold().map(|hold| hold.token).unwrap_or_default();
     head.seq.0 += 1;
     let mut after = match job.state {
-        State::Running { .. } => job.after(&Event::Interrupted { alone, innocent }, now).map_err(illegal)?,
+        State::Running { .. } => job.after(&Event::Interrupted { alone, testimony }, now).map_err(illegal)?,
         _ => job.clone(),
     };
     let token = Token(head.seq.0);

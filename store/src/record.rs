@@ -10,7 +10,7 @@ use crate::queue::Table;
 use crate::store::StoreError;
 
 /// Version of what the JSON means. Raised when an older program would misread it.
-pub(crate) const SCHEMA: u16 = 1;
+pub(crate) const SCHEMA: u16 = 2;
 /// Largest record in bytes. The database would put values from a quarter of its segment on into files of their own.
 pub(crate) const MAX: usize = 4096;
 
@@ -81,9 +81,9 @@ fn name(table: Table, key: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::id::{Attempt, Epoch, Hash, JobId, Seq, Time, Token};
-    use crate::job::{Area, Blame, Ending, Hold, Job, MAX_REASON, Publication, Source, State, one_line};
-    use crate::path::{MAX_TEXT, RelPath};
+    use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Seq, Time, Token};
+    use crate::job::{Area, Blame, Ending, Hold, Job, MAX_REASON, Parked, Publication, Source, State, one_line};
+    use crate::path::{MAX_SOURCE, MAX_TEXT, RelPath};
 
     /// Everything a job can hold, as long as it can be: no transition can fail for want of room.
     #[test]
@@ -93,34 +93,45 @@ mod tests {
         let reason = one_line(&"\"".repeat(2 * MAX_REASON));
         let source = Source {
             folder: name.clone(),
-            path: path.clone(),
+            path: RelPath::new("p".repeat(MAX_SOURCE)).unwrap(),
             dev: u64::MAX,
             ino: u64::MAX,
             size: u64::MAX,
             mtime_ns: i64::MIN,
             profile: name,
         };
-        let hold = Hold { attempt: Attempt(u32::MAX), epoch: Epoch(u64::MAX), token: Token(u64::MAX), alone: false };
+        let hold = Hold {
+            attempt: Attempt(u32::MAX),
+            epoch: Epoch(u64::MAX),
+            token: Token(u64::MAX),
+            alone: false,
+            boot: Boot(u64::MAX),
+        };
         let publication = Publication {
             ending: Ending::Quarantined,
             reason: reason.clone(),
             output: Some(path.clone()),
             output_hash: Some(Hash([0xff; 32])),
             report_hash: Some(Hash([0xff; 32])),
+            source_ctime_ns: Some(i64::MIN),
             original: Some(path.clone()),
         };
         let number = u32::MAX;
-        let blame = Blame { charges: number, deaths: number, deaths_alone: number, environment: number, kills: number };
+        let blame =
+            Blame { charges: number, deaths: number, deaths_alone: number, environment: number, kills: number, machine: number };
         let mut job = Job::queued(JobId(u64::MAX), source, Time(u64::MAX));
         job.moved_to = Some((Area::Quarantine, path));
         job.state = State::Publishing { hold, publication };
         job.attempts = Attempt(number);
         job.blame = blame;
+        job.needs_all = true;
+        job.parked = Some(Parked { until: Some(Time(u64::MAX)), tries: number, committed: false });
         job.work = Some(Token(u64::MAX));
         job.note = reason;
         job.seq = Seq(u64::MAX);
         let key = job.id.0.to_be_bytes();
         let bytes = encode(Table::Jobs, &key, &job).unwrap();
+        eprintln!("SIZE {}", bytes.len());
         assert_eq!(decode::<Job>(Table::Jobs, &key, &bytes).unwrap(), job);
     }
 
@@ -134,11 +145,25 @@ mod tests {
         damaged(decode(Table::Meta, b"head", b""));
         // A record of a later version, whole in itself.
         let mut later = bytes;
-        later[5] = 2;
-        let crc = checksum(Table::Meta, b"head", 2, b"7");
+        later[5] = 3;
+        let crc = checksum(Table::Meta, b"head", 3, b"7");
         later[6..10].copy_from_slice(&crc.to_be_bytes());
         let result = decode::<u32>(Table::Meta, b"head", &later);
-        assert!(matches!(result, Err(StoreError::Newer { found: 2, known: SCHEMA })), "{result:?}");
+        assert!(matches!(result, Err(StoreError::Newer { found: 3, known: SCHEMA })), "{result:?}");
+    }
+
+    /// A job as version 1 wrote it, without what was added since.
+    #[test]
+    fn jobs_of_schema_1_stay_readable() {
+        let json = r#"{"id":7,"source":{"folder":"hot","path":"part.stl","dev":1,"ino":2,"size":84,"mtime_ns":3,"profile":"default"},
+            "state":{"publishing":{"hold":{"attempt":1,"epoch":2,"token":9,"alone":false},"publication":{"ending":"clean","reason":"",
+            "output":"part.stl","output_hash":null,"report_hash":null,"original":"part.stl"}}},"attempts":1,
+            "blame":{"charges":0,"deaths":1,"deaths_alone":0,"environment":0,"kills":0},"work":9,"submitted":5,"changed":6,"seq":11}"#;
+        let key = 7_u64.to_be_bytes();
+        let crc = checksum(Table::Jobs, &key, 1, json.as_bytes());
+        let bytes = [&MAGIC[..], &1_u16.to_be_bytes(), &crc.to_be_bytes(), json.as_bytes()].concat();
+        let job: Job = decode(Table::Jobs, &key, &bytes).unwrap();
+        assert_eq!((job.kind(), job.blame.deaths, job.hold().unwrap().boot), (crate::job::Kind::Publishing, 1, Boot(0)));
     }
 
     #[test]

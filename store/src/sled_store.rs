@@ -25,14 +25,15 @@
 //! publish twice.
 //!
 //! **Errors.** sled stays broken after a failed write, so the first error of any kind poisons the store: nothing more is claimed
-//! or advanced until [`SledStore::reopen`] has dropped every handle and opened it anew (as a new epoch).
+//! or advanced. It is opened anew, as a new epoch, by a new process, or by the same one with a new program: handles of a database in
+//! doubt are not dropped, since sled waits at their end, now and then, for a write that never comes.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, RwLock};
+use std::sync::Arc;
 
 use crate::id::{Clock, Epoch, JobId, SystemClock};
-use crate::job::{Job, Kind, Step};
+use crate::job::{Job, Kind, Step, Testimony};
 use crate::queue::Queue;
 use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted};
 
@@ -60,16 +61,22 @@ pub struct Opening {
 /// The embedded [`JobStore`].
 pub struct SledStore {
     state: PathBuf,
-    clock: Arc<dyn Clock>,
-    live: RwLock<Live>,
-    opening: Mutex<Opening>,
-    /// The folder is ours until every handle of the database is gone.
-    lock: File,
+    queue: Queue<SledTables>,
+    opening: Opening,
+    /// The folder is ours until every handle of the database is gone: dropped last.
+    lock: Lock,
 }
 
-enum Live {
-    Open(Box<Queue<SledTables>>),
-    Closed(String),
+/// The lock of the state folder.
+struct Lock(File);
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        // Closing the file would do, but for a child that was started just now and has not let go of it yet.
+        if let Err(error) = self.0.unlock() {
+            tracing::warn!(%error, "the lock of the store could not be released; it ends with the process");
+        }
+    }
 }
 
 impl SledStore {
@@ -88,107 +95,74 @@ impl SledStore {
     /// # Errors
     /// As [`SledStore::open`].
     pub fn open_with(state: &Path, clock: Arc<dyn Clock>) -> Result<Self, StoreError> {
-        if !state.exists() {
-            std::fs::create_dir_all(state).map_err(files::io(state, "making the folder"))?;
-            if let Some(parent) = state.parent().filter(|parent| !parent.as_os_str().is_empty()) {
-                files::sync_dir(parent)?;
-            }
-        }
-        let lock = files::lock(state)?;
+        files::make_folder(state)?;
+        let lock = Lock(files::lock(state)?);
         let (queue, opening) = open::queue(state, &clock)?;
-        Ok(Self {
-            state: state.to_owned(),
-            clock,
-            live: RwLock::new(Live::Open(Box::new(queue))),
-            opening: Mutex::new(opening),
-            lock,
-        })
+        Ok(Self { state: state.to_owned(), queue, opening, lock })
     }
 
-    /// What the last opening met.
-    pub fn opening(&self) -> Opening {
-        self.opening.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clone()
-    }
-
-    /// Drops every handle of the database and opens it anew, as a new epoch: all claims are void afterwards and come back
-    /// through [`JobStore::recover`]. For use after an error, once its cause (a full disk) may be gone.
+    /// All jobs of the store in `state`, by number, without opening it: nothing is written, so that neither the right to write nor
+    /// room on its disk is needed.
     ///
     /// # Errors
-    /// As [`SledStore::open`]; the store stays closed then, and may be reopened again.
-    pub fn reopen(&self) -> Result<(), StoreError> {
-        let mut live = self.live.write().unwrap_or_else(std::sync::PoisonError::into_inner);
-        *live = Live::Closed("it is being opened again".into());
-        match open::queue(&self.state, &self.clock) {
-            Ok((queue, opening)) => {
-                *live = Live::Open(Box::new(queue));
-                *self.opening.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = opening;
-                Ok(())
-            }
-            Err(error) => {
-                *live = Live::Closed(error.to_string());
-                Err(error)
-            }
-        }
+    /// [`StoreError::Locked`] while a daemon owns the folder; else as [`SledStore::open`].
+    pub fn peek(state: &Path) -> Result<Vec<Job>, StoreError> {
+        open::peek(state)
     }
 
-    fn with<T>(&self, act: impl FnOnce(&Queue<SledTables>) -> Result<T, StoreError>) -> Result<T, StoreError> {
-        match &*self.live.read().unwrap_or_else(std::sync::PoisonError::into_inner) {
-            Live::Open(queue) => act(queue),
-            Live::Closed(reason) => Err(StoreError::Poisoned { reason: reason.clone() }),
-        }
+    /// What the opening met.
+    pub fn opening(&self) -> &Opening {
+        &self.opening
     }
 }
 
 impl Drop for SledStore {
     fn drop(&mut self) {
-        let live = self.live.get_mut().unwrap_or_else(std::sync::PoisonError::into_inner);
-        if let Live::Open(queue) = live
-            && let Err(error) = queue.tables().note(queue.reached())
-        {
+        let tables = self.queue.tables();
+        if let Err(error) = tables.note(self.queue.reached()) {
             tracing::warn!(%error, "the store could not note how far it got; nothing acknowledged is lost");
-        }
-        *live = Live::Closed("it was closed".into());
-        // Closing the file would do, but for a child that was started just now and has not let go of it yet.
-        if let Err(error) = self.lock.unlock() {
-            tracing::warn!(%error, "the lock of the store could not be released; it ends with the process");
         }
     }
 }
 
 impl JobStore for SledStore {
     fn submit(&self, found: &[Submission]) -> Result<Vec<Submitted>, StoreError> {
-        self.with(|queue| queue.submit(found))
+        self.queue.submit(found)
     }
 
     fn claim(&self, want: &Filter) -> Result<Option<Claim>, StoreError> {
-        self.with(|queue| queue.claim(want))
+        self.queue.claim(want)
     }
 
     fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError> {
-        self.with(|queue| queue.heartbeat(claim))
+        self.queue.heartbeat(claim)
     }
 
     fn advance(&self, claim: &Claim, step: Step) -> Result<Job, StoreError> {
-        self.with(|queue| queue.advance(claim, step))
+        self.queue.advance(claim, step)
     }
 
     fn control(&self, id: JobId, wish: Control) -> Result<Job, StoreError> {
-        self.with(|queue| queue.control(id, wish))
+        self.queue.control(id, wish)
     }
 
-    fn recover(&self, innocent: &dyn Fn(&Job) -> bool) -> Result<Vec<Recovered>, StoreError> {
-        self.with(|queue| queue.recover(innocent))
+    fn recover(&self, testimony: &dyn Fn(&Job) -> Testimony) -> Result<Vec<Recovered>, StoreError> {
+        self.queue.recover(testimony)
     }
 
     fn get(&self, id: JobId) -> Result<Option<Job>, StoreError> {
-        self.with(|queue| queue.get(id))
+        self.queue.get(id)
     }
 
     fn list(&self, query: &Query) -> Result<Vec<Job>, StoreError> {
-        self.with(|queue| queue.list(query))
+        self.queue.list(query)
+    }
+
+    fn check(&self) -> Result<(), StoreError> {
+        files::check_lock(&self.state, &self.lock.0)
     }
 
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {
-        self.with(|queue| queue.counts())
+        self.queue.counts()
     }
 }

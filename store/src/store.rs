@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::id::{Epoch, JobId, Seq, Token};
-use crate::job::{Illegal, Job, Kind, Source, Step};
+use crate::job::{Illegal, Job, Kind, Source, Step, Testimony};
 
 /// A durable job queue. A returned `Ok` means that the change survives a crash of process or machine; an `Err` that it did not
 /// happen or, for [`StoreError::Backend`], [`StoreError::Io`] and [`StoreError::Poisoned`] only, that this is unknown until the
@@ -16,8 +16,9 @@ pub trait JobStore: Send + Sync {
     /// [`StoreError::TooLong`] names a file whose path, folder or profile does not fit a record; nothing is taken in then.
     fn submit(&self, found: &[Submission]) -> Result<Vec<Submitted>, StoreError>;
 
-    /// Claims the oldest job that `want` allows, counting the attempt. `None` when there is none. With `want.suspects` only
-    /// jobs that must run alone are given; the caller sees to it that nothing else runs.
+    /// Claims the oldest job that `want` allows, counting the attempt. `None` when there is none. With `want.alone` only jobs that
+    /// must run alone are given; the caller sees to it that nothing else runs. A parked job whose pause is over is given to anyone,
+    /// first: it needs no worker.
     ///
     /// # Errors
     /// Store errors only.
@@ -43,12 +44,12 @@ pub trait JobStore: Send + Sync {
     fn control(&self, id: JobId, wish: Control) -> Result<Job, StoreError>;
 
     /// Takes back the claims of a daemon that died. Running jobs are interrupted: each is afterwards queued, cancelled, or
-    /// concluded (quarantined). Jobs whose result was on its way come with a new claim, and their duty is to be done.
-    /// `innocent` is asked once for each running job: `true` where there is evidence that the file did not kill the daemon.
+    /// concluded (quarantined). Jobs whose result was on its way come with a new claim, and their duty is to be done; parked jobs
+    /// may be claimed at once. `testimony` is asked once for each job that ran when the daemon, but not the machine, died.
     ///
     /// # Errors
     /// Store errors only.
-    fn recover(&self, innocent: &dyn Fn(&Job) -> bool) -> Result<Vec<Recovered>, StoreError>;
+    fn recover(&self, testimony: &dyn Fn(&Job) -> Testimony) -> Result<Vec<Recovered>, StoreError>;
 
     /// One job.
     ///
@@ -61,6 +62,12 @@ pub trait JobStore: Send + Sync {
     /// # Errors
     /// Store errors only.
     fn list(&self, query: &Query) -> Result<Vec<Job>, StoreError>;
+
+    /// Is the store still where it was opened?
+    ///
+    /// # Errors
+    /// [`StoreError::Unusable`] when it was moved or removed meanwhile: what is written to it, no one finds again.
+    fn check(&self) -> Result<(), StoreError>;
 
     /// How many jobs there are of each kind, in the order of [`Kind::ALL`].
     ///
@@ -91,13 +98,13 @@ pub struct Filter {
     /// Smallest and largest size of the source in bytes, both included.
     pub size: (u64, u64),
     /// `false`: only jobs that may run beside others. `true`: only jobs that must run alone.
-    pub suspects: bool,
+    pub alone: bool,
 }
 
 impl Default for Filter {
     /// Any size, beside others.
     fn default() -> Self {
-        Self { size: (0, u64::MAX), suspects: false }
+        Self { size: (0, u64::MAX), alone: false }
     }
 }
 

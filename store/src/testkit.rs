@@ -4,38 +4,50 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::id::{Attempt, Clock, Hash, JobId, Time};
+use crate::id::{Attempt, Boot, Clock, Hash, JobId, Time};
 use crate::job::{
     Area, BACKOFF_CAP_MS, BACKOFF_MS, Death, Duty, ENVIRONMENT_RETRIES, Ending, Illegal, Job, Kind, Publication, Source, State,
-    Step, Withdrawal,
+    Step, Testimony, Withdrawal,
 };
 use crate::path::{PathError, RelPath};
 use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, StoreError, Submission};
 
 /// A clock that stands still until it is set.
 #[derive(Debug)]
-pub struct ManualClock(AtomicU64);
+pub struct ManualClock {
+    now: AtomicU64,
+    boot: AtomicU64,
+}
 
 impl ManualClock {
     /// A clock at `now`.
     pub fn new(now: Time) -> Self {
-        Self(AtomicU64::new(now.0))
+        Self { now: AtomicU64::new(now.0), boot: AtomicU64::new(1) }
     }
 
     /// Sets it, forwards or backwards.
     pub fn set(&self, now: Time) {
-        self.0.store(now.0, Ordering::SeqCst);
+        self.now.store(now.0, Ordering::SeqCst);
     }
 
     /// Lets `ms` pass.
     pub fn pass(&self, ms: u64) {
-        self.0.fetch_add(ms, Ordering::SeqCst);
+        self.now.fetch_add(ms, Ordering::SeqCst);
+    }
+
+    /// The machine goes down and comes up again.
+    pub fn reboot(&self) {
+        self.boot.fetch_add(1, Ordering::SeqCst);
     }
 }
 
 impl Clock for ManualClock {
     fn now(&self) -> Time {
-        Time(self.0.load(Ordering::SeqCst))
+        Time(self.now.load(Ordering::SeqCst))
+    }
+
+    fn boot(&self) -> Boot {
+        Boot(self.boot.load(Ordering::SeqCst))
     }
 }
 
@@ -72,6 +84,7 @@ pub fn result_of(job: &Job, ending: Ending) -> Publication {
         output: Some(job.source.path.clone()),
         output_hash: Some(Hash([7; 32])),
         report_hash: Some(Hash([8; 32])),
+        source_ctime_ns: None,
         original: Some(job.source.path.clone()),
     }
 }
@@ -83,7 +96,7 @@ type Check = fn(&mut dyn Subject, &ManualClock) -> Result<(), StoreError>;
 /// # Panics
 /// When the store does not do what [`JobStore`] promises.
 pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
-    let checks: [(&str, Check); 13] = [
+    let checks: [(&str, Check); 15] = [
         ("submission is idempotent", submission_is_idempotent),
         ("a file that came back is new", a_file_that_came_back_is_new),
         ("the oldest that fits is claimed", the_oldest_that_fits_is_claimed),
@@ -94,6 +107,8 @@ pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
         ("the operator's wishes", the_operators_wishes),
         ("death of the daemon", death_of_the_daemon),
         ("suspects run alone", suspects_run_alone),
+        ("power cuts blame no one", power_cuts_blame_no_one),
+        ("a result that cannot be placed is parked", a_result_that_cannot_be_placed_is_parked),
         ("results on their way are finished", results_on_their_way_are_finished),
         ("lists and counts agree", lists_and_counts_agree),
         ("threads get different jobs", threads_get_different_jobs),
@@ -125,8 +140,8 @@ fn job(store: &dyn JobStore, id: JobId) -> Result<Job, StoreError> {
     store.get(id)?.ok_or(StoreError::Unknown(id))
 }
 
-fn no_one_is_innocent(_: &Job) -> bool {
-    false
+fn no_one_is_innocent(_: &Job) -> Testimony {
+    Testimony::None
 }
 
 fn submission_is_idempotent(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), StoreError> {
@@ -193,7 +208,7 @@ fn the_oldest_that_fits_is_claimed(subject: &mut dyn Subject, _: &ManualClock) -
         submit_one(store, &format!("{at}.stl"), size)?;
     }
     let take = |least, most| {
-        let claim = store.claim(&Filter { size: (least, most), suspects: false })?;
+        let claim = store.claim(&Filter { size: (least, most), alone: false })?;
         Ok::<_, StoreError>(claim.map(|claim| claim.id.0))
     };
     assert_eq!(take(1, 99)?, Some(5));
@@ -355,7 +370,7 @@ fn death_of_the_daemon(subject: &mut dyn Subject, _: &ManualClock) -> Result<(),
     assert_eq!(store.recover(&no_one_is_innocent)?, [], "a daemon that lives has lost nothing");
     subject.restart();
     let store = subject.store();
-    let recovered = store.recover(&|job| job.id == innocent)?;
+    let recovered = store.recover(&|job| if job.id == innocent { Testimony::Outlived } else { Testimony::None })?;
     assert_eq!(recovered.iter().map(|one| one.job.id).collect::<Vec<_>>(), [innocent, guilty, stopped]);
     assert!(recovered.iter().all(|one| one.claim.is_none() && one.job.work == Some(one.void)));
     assert_eq!(job(store, innocent)?.blame, crate::job::Blame::default());
@@ -389,9 +404,9 @@ fn suspects_run_alone(subject: &mut dyn Subject, clock: &ManualClock) -> Result<
         subject.store().recover(&no_one_is_innocent)?;
     }
     let store = subject.store();
-    assert_eq!(job(store, poison)?.kind(), Kind::Suspect);
+    assert_eq!(job(store, poison)?.kind(), Kind::Alone);
     assert_eq!(store.claim(&Filter::default())?, None, "suspects do not run beside others");
-    let suspects = Filter { suspects: true, ..Filter::default() };
+    let suspects = Filter { alone: true, ..Filter::default() };
     // Not even after a pause.
     let claim = store.claim(&suspects)?.ok_or(StoreError::Unknown(poison))?;
     store.advance(&claim, Step::Environment { reason: "no space left".into() })?;
@@ -403,10 +418,10 @@ fn suspects_run_alone(subject: &mut dyn Subject, clock: &ManualClock) -> Result<
         assert_eq!(claim.id, poison);
         assert!(claim.job.hold().is_some_and(|hold| hold.alone));
         subject.restart();
-        let recovered = subject.store().recover(&no_one_is_innocent)?;
+        let recovered = subject.store().recover(&|_| Testimony::InHand)?;
         let one = recovered.first().ok_or(StoreError::Unknown(poison))?;
         assert_eq!(one.job.blame.deaths_alone, death);
-        assert_eq!(one.job.kind(), if death < 3 { Kind::Suspect } else { Kind::Concluded });
+        assert_eq!(one.job.kind(), if death < 3 { Kind::Alone } else { Kind::Concluded });
         if let Some(claim) = &one.claim {
             assert_eq!(finish(subject.store(), claim, Ending::Quarantined, true)?.kind(), Kind::Quarantined);
         }
@@ -417,6 +432,54 @@ fn suspects_run_alone(subject: &mut dyn Subject, clock: &ManualClock) -> Result<
     assert_eq!(finish(store, &claim, Ending::Clean, true)?.kind(), Kind::Done);
     // An operator who releases it gives it a clean slate.
     assert_eq!(store.control(poison, Control::Retry)?.kind(), Kind::Queued);
+    Ok(())
+}
+
+/// Whatever a witness says, another life of the machine is not the file's doing.
+fn power_cuts_blame_no_one(subject: &mut dyn Subject, clock: &ManualClock) -> Result<(), StoreError> {
+    let id = submit_one(subject.store(), "long.stl", 84)?;
+    for cut in 0..5 {
+        let want = Filter { alone: cut > 0, ..Filter::default() };
+        let claim = subject.store().claim(&want)?.ok_or(StoreError::Unknown(id))?;
+        assert_eq!(claim.job.hold().map(|hold| hold.alone), Some(cut > 0), "alone before it is suspected");
+        subject.restart();
+        clock.reboot();
+        subject.store().recover(&|_| Testimony::InHand)?;
+        let blame = job(subject.store(), id)?.blame;
+        assert_eq!((blame.machine, blame.deaths, blame.deaths_alone, blame.charges), (cut + 1, 0, 0, 0));
+    }
+    Ok(())
+}
+
+fn a_result_that_cannot_be_placed_is_parked(subject: &mut dyn Subject, clock: &ManualClock) -> Result<(), StoreError> {
+    let store = subject.store();
+    let (id, other) = (submit_one(store, "part.stl", 84)?, submit_one(store, "other.stl", 84)?);
+    let claim = claim_any(store)?;
+    let publication = result_of(&claim.job, Ending::Clean);
+    store.advance(&claim, Step::Intend(publication))?;
+    let park = Step::Park { reason: "permission denied".into(), committed: false };
+    let parked = store.advance(&claim, park.clone())?;
+    assert_eq!((parked.kind(), parked.note.as_str()), (Kind::Parked, "permission denied"));
+    let void = store.advance(&claim, Step::Placed);
+    assert!(matches!(void, Err(StoreError::Illegal { source: Illegal::Fenced, .. })), "its claim is void: {void:?}");
+    assert_eq!(store.heartbeat(&claim)?, Lease::Lost);
+    // Others go on meanwhile; when its pause is over, it is given to whoever asks.
+    let between = claim_any(store)?;
+    assert_eq!(between.id, other);
+    assert_eq!(store.claim(&Filter::default())?, None);
+    clock.pass(crate::job::PARK_MS);
+    let again = store.claim(&Filter { size: (1 << 40, u64::MAX), alone: false })?.ok_or(StoreError::Unknown(id))?;
+    assert_eq!((again.id, again.job.duty(), again.job.attempts), (id, Duty::Place, Attempt(1)));
+    assert_eq!(again.job.work, Some(claim.token), "the work folder is still that of the worker");
+    store.advance(&again, park)?;
+    // A new daemon tries at once.
+    subject.restart();
+    let store = subject.store();
+    assert_eq!(store.recover(&no_one_is_innocent)?.len(), 1, "parked jobs are no one's");
+    let again = claim_any(store)?;
+    assert_eq!(again.id, id);
+    store.advance(&again, Step::Placed)?;
+    assert_eq!(store.advance(&again, Step::Finished)?.kind(), Kind::Done);
     Ok(())
 }
 

@@ -59,7 +59,7 @@ impl Edit {
         ]
     }
 
-    /// The records that the edit makes of `input`. New triangles have their own normals; the first of them take the places of deleted
+    /// The records that the edit makes of `input`. New, moved and turned triangles have the normals of their corners; the first of them take the places of deleted
     /// ones.
     ///
     /// # Panics
@@ -81,10 +81,11 @@ impl Edit {
     }
 }
 
-/// Second and third corner swapped, the normal turned (zeros stay positive), the attribute kept.
+/// Second and third corner swapped, the normal of these corners, the attribute kept.
 fn flipped(record: &Record) -> Record {
-    let [normal, a, b, c] = stl::numbers(record);
-    stl::record(normal.map(|x| if x == 0.0 { x } else { -x }), &[a, c, b], stl::attribute(record))
+    let [_, a, b, c] = stl::numbers(record);
+    let turned = [a, c, b];
+    stl::record(stl::unit_normal(&turned), &turned, stl::attribute(record))
 }
 
 fn triangle(value: &Value) -> Triangle {

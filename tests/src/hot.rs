@@ -97,6 +97,16 @@ impl Hot {
         String::from_utf8_lossy(&output.stdout).lines().map(|line| serde_json::from_str(line).expect("a line of JSON")).collect()
     }
 
+    /// `suture jobs` with these words; whether it was done.
+    ///
+    /// # Panics
+    /// When it cannot be started.
+    pub fn ask(&self, words: &[&str]) -> bool {
+        let mut command = Command::new(&self.binary);
+        command.arg("jobs").args(words).arg("--dir").arg(self.path()).stdout(Stdio::null()).stderr(Stdio::null());
+        command.status().expect("the binary can be started").success()
+    }
+
     /// Every file of a part of the folder (`out`, `done`, …).
     pub fn tree(&self, part: &str) -> Tree {
         let mut tree = Tree::new();

@@ -4,9 +4,14 @@
 //! Every helper panics where it cannot do its work: a test then means nothing and must fail.
 
 pub mod binary;
+pub mod disk;
 pub mod edit;
 pub mod hot;
+pub mod oracle;
 pub mod place;
+pub mod scene;
 pub mod stl;
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+pub mod trace;
 
 pub use place::{Place, Ran};

@@ -21,6 +21,7 @@ mod search;
 pub(crate) mod strip;
 pub mod tree;
 
+use crate::position::Position;
 use boxes::{Boxes, EMPTY, around};
 use clear::Clearance;
 use cross::{Contact, Triangle, common, do_cross, self_intersection, triangles_cross};
@@ -209,7 +210,7 @@ pub(crate) fn pinched(rim: &Rim<'_>) -> Result<Vec<[u32; 3]>, Unfillable> {
     if rim.len() > FillSettings::default().minimum_weight_vertices {
         return Err(Unfillable::TooLarge);
     }
-    let place = |i: u32| rim.points[i as usize].map(|x| (x + 0.0).to_bits());
+    let place = |i: u32| Position::of(rim.points[i as usize]);
     let forbidden = |i: u32, j: u32| place(i) == place(j) || (rim.forbidden)(i, j);
     let rim = &Rim { points: rim.points, apexes: rim.apexes, obstacles: rim.obstacles, forbidden: &forbidden };
     let mut clearance = Clearance::new(rim);
@@ -461,9 +462,12 @@ impl<'a> Surroundings<'a> {
 
 /// Are all positions finite, and no two of them equal?
 fn are_distinct(points: &[Point]) -> bool {
-    let mut sorted: Vec<Point> = points.iter().map(|p| p.map(|x| x + 0.0)).collect();
-    sorted.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])).then(a[2].total_cmp(&b[2])));
-    sorted.iter().flatten().all(|x| x.is_finite()) && sorted.windows(2).all(|w| w[0] != w[1])
+    if !points.as_flattened().iter().all(|x| x.is_finite()) {
+        return false;
+    }
+    let mut sorted: Vec<Position> = points.iter().copied().map(Position::of).collect();
+    sorted.sort_unstable();
+    sorted.windows(2).all(|w| w[0] != w[1])
 }
 
 /// Does any triangle cross another or fold onto it? Each has an area. Exact.

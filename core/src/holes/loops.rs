@@ -1,4 +1,4 @@
-//! Boundary loops, in the direction in which a patch traverses them (METHODS A6, C1).
+//! Boundary loops, in the direction in which a patch traverses them.
 //!
 //! A boundary edge is used by one triangle; its patch uses it the other way round. Where several holes meet in a vertex, the way
 //! goes on to the fan that lies across the hole, so that filling joins all fans into one. A way that comes back to a vertex is

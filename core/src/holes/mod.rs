@@ -1,4 +1,5 @@
-//! Boundary loops recognised for what they are, before any is closed (METHODS C, after the source S0 §4.3).
+//! Boundary loops recognised for what they are, before any is closed (after Yang et al., "Research on
+//! repair method of shoe mould for 3D printing", Computer Science and Application 11(4), 2021, section 4.3).
 //!
 //! All loops are classified first, by a stated order: a loop whose sides touch is a crack, one whose sides lie near each other a gap, or
 //! misaligned where they do not run alike; loops that meet in a vertex are nested; two that bound one missing ring are annular; a loop
@@ -174,7 +175,7 @@ fn shape_of(shop: &Shop, rim: &Loop) -> Shape {
     Shape::of(&points, rim.triangles.iter().map(|t| shop.normal(*t)))
 }
 
-/// A slender loop that folds back on itself when seen along Z, X or Y, though it is not flat (METHODS C7). The cutter's passes that made it
+/// A slender loop that folds back on itself when seen along Z, X or Y, though it is not flat. The cutter's passes that made it
 /// may have run on past each other, each into the other's side.
 fn machining(shape: &Shape) -> Option<(LoopClass, String)> {
     let circle = shape.perimeter * shape.perimeter / (4.0 * std::f64::consts::PI);

@@ -1,4 +1,4 @@
-//! Two loops that belong together: the rims of a missing ring, or a hole and an island in it (METHODS C5, D; source S3).
+//! Two loops that belong together: the rims of a missing ring, or a hole and an island in it.
 //!
 //! A patch over a missing ring leaves one rim and arrives at the other, so that the loops, each in its patch's direction, run opposite
 //! ways round the same axis, while two holes side by side in one surface run the same way round. What remains is told by the surface
@@ -26,7 +26,7 @@ use crate::sums::Bounds;
 
 /// Cosine between the vector areas of loops that belong together, at most.
 const OPPOSITE: f64 = -0.5;
-/// Loops of a ring differ by less than this (S3): see [`characteristic_distance`].
+/// Loops of a ring differ by less than this: see [`characteristic_distance`].
 const ANNULAR: f64 = 0.15;
 /// Rims of a ring are no farther apart than so many radii of the larger one.
 const FARTHEST: f64 = 3.0;
@@ -331,8 +331,8 @@ fn face(a: &Shape, b: &Shape, opposite: f64) -> bool {
     crate::shop::cosine(a.vector_area, b.vector_area) <= opposite
 }
 
-/// How much two loops differ: by their extents, as a share of the larger one, and by the directions of their planes. (The formula of S3 is
-/// lost. The cube lets the paper's threshold lie where one loop is about half the other: rings are closer in size, islands are not.)
+/// How much two loops differ: by their extents, as a share of the larger one, and by the directions of their planes. (The
+/// cube puts the threshold, [`ANNULAR`], where one loop is about half the other: rings are closer in size, islands are not.)
 fn characteristic_distance(a: &Shape, b: &Shape) -> f64 {
     let size = a.radius().max(b.radius()).max(f64::MIN_POSITIVE);
     let extents = (DVec3::from_array(a.extents) - DVec3::from_array(b.extents)).length() / size;

@@ -1,4 +1,4 @@
-//! Loops that are narrow: each vertex has another side of the hole near it (METHODS C2 to C4).
+//! Loops that are narrow: each vertex has another side of the hole near it.
 //!
 //! A side across runs the other way, since both are traversed by one patch: so a neighbouring edge of the same chain is never taken for
 //! it. Nor is the other rim of a thin wall, where the surface ends in the same direction. The ends of a slit, where the loop turns back, have

@@ -8,6 +8,7 @@ use super::{Finder, Region, Standing};
 use crate::chunk::{NONE, is_collinear};
 use crate::fill::cross::{Contact, Triangle, triangles_cross};
 use crate::plan::{ChunkId, HomeBox, Plan};
+use crate::position::Position;
 use crate::record;
 use crate::sums::Bounds;
 
@@ -27,9 +28,9 @@ impl Mesh {
         let mut positions: Vec<Point> = Vec::new();
         let mut numbers = BTreeMap::new();
         let mut vertex = |p: Point| {
-            let p = p.map(|c| c + 0.0);
-            *numbers.entry(p.map(f32::to_bits)).or_insert_with(|| {
-                positions.push(p);
+            let p = Position::of(p);
+            *numbers.entry(p).or_insert_with(|| {
+                positions.push(p.coordinates());
                 positions.len() as u32 - 1
             })
         };

@@ -142,6 +142,7 @@ impl Curve {
     /// 24 bits for each triangle, those that are large for the cell apart, since they would widen the boxes of small ones; or
     /// [`NONE`] for those that do not meet the cell.
     #[inline(always)]
+    #[expect(clippy::disallowed_methods, reason = "the number of a cell, no position")]
     fn places(&self, triangles: &Triangles) -> [u32; WIDTH] {
         let (cell_lo, cell_hi) = self.cell.ends();
         let mut places = [0; WIDTH];

@@ -1,24 +1,29 @@
 //! A mesh file as an array of [`Record`]s.
 //!
-//! Binary STL is mapped and read where it lies. Text STL is parsed once, in parallel, into a nameless spool file of the same
+//! Binary STL is read where it lies, mapped or copied ([`Access`]). Text STL is parsed once, in parallel, into a nameless spool file of the same
 //! records, which is mapped in its place. So the rest of the engine sees one thing: `&[Record]` in input order, backed by pages
 //! the system can drop at any time.
 //!
 //! What is odd about a file never stops the reading as long as its triangles are certain: it becomes a [`Finding`]. What is no
 //! mesh is refused with the reason a person needs ("a PNG picture").
 
+mod access;
 mod binary;
 mod facets;
 mod foreign;
 mod number;
 mod sniff;
+mod tail;
 mod text;
 
 use std::fs::{File, Metadata, OpenOptions};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
-use memmap2::{Mmap, MmapOptions};
+use memmap2::Mmap;
+
+pub use access::Access;
+pub use tail::ends_in_zeros;
 
 use crate::Progress;
 use crate::error::{Error, Result};
@@ -42,18 +47,27 @@ pub struct Finding {
     /// `true`: common slicers read the file all the same, and read the same mesh. `false`: some of them refuse it or read
     /// something else, so a file that is otherwise clean is worth rewriting.
     pub harmless: bool,
-    /// More than one triangle that the file announces is not there, or nobody knows how many: if the mesh is open, too, a part of
-    /// it is lost.
-    pub loss: bool,
+    /// Whether it says that a part of the mesh is lost.
+    pub loss: Loss,
+}
+
+/// Whether a finding says that a part of the mesh is lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Loss {
+    None,
+    /// More than one triangle that the file announces is not there, or nobody knows how many: if the mesh is open, too, a part of it is lost.
+    IfOpen,
+    /// The file was cut off; whole bodies may be missing, so that what is left may well be closed.
+    Certain,
 }
 
 impl Finding {
     fn flaw(text: impl Into<String>) -> Self {
-        Self { text: text.into(), harmless: false, loss: false }
+        Self { text: text.into(), harmless: false, loss: Loss::None }
     }
 
     fn loss(text: impl Into<String>) -> Self {
-        Self { loss: true, ..Self::flaw(text) }
+        Self { loss: Loss::IfOpen, ..Self::flaw(text) }
     }
 }
 
@@ -110,13 +124,13 @@ enum Source {
     Spooled(Mmap),
 }
 
-/// An open mesh file. Its pages are mapped: if someone truncates the file meanwhile, touching them raises SIGBUS, so that the
-/// process that opens foreign files should be one that may die.
+/// An open mesh file.
 #[derive(Debug)]
 pub struct MeshFile {
     path: PathBuf,
     identity: Identity,
-    file: File,
+    /// Holds what `input` does, at the same places; `None` for a copy in memory.
+    file: Option<File>,
     input: Mmap,
     source: Source,
     format: Format,
@@ -130,6 +144,7 @@ impl MeshFile {
     ///
     /// # Errors
     /// [`Error::Unreadable`] for what is no mesh or holds no triangle, [`Error::Refused`] beyond [`MAX_TRIANGLES`],
+    /// [`Error::Changed`] if the file is truncated meanwhile, [`Error::NoSpace`] where a copy finds no room,
     /// [`Error::Io`] where opening, mapping or spooling fails, or with [`std::io::ErrorKind::Interrupted`] when `progress`
     /// cancels.
     pub fn open(path: &Path, spool: &Path, limits: &Limits, progress: &dyn Progress) -> Result<Self> {
@@ -139,27 +154,29 @@ impl MeshFile {
         }
         // As long as the identity says, whatever happened in between.
         let length = usize::try_from(identity.size).map_err(|_| Rejection::TooMany.at(path))?;
-        // SAFETY: the map is read-only and private to this value. Another process changing the file can change the bytes seen
-        // (all of them plain numbers, valid in every state; `check_unchanged` finds out) or, by truncating it, end this process
-        // with SIGBUS, which its supervisor expects.
-        let input = unsafe { MmapOptions::new().len(length).map(&file) }.map_err(Error::io(path, "mapping"))?;
+        let (input, file) = access::Foreign { path, file, length, spool, limits, progress }.bytes()?;
         match sniff::sniff(&input).map_err(|rejection| rejection.at(path))? {
-            sniff::Kind::Binary(layout) => Ok(Self {
-                path: path.to_owned(),
-                identity,
-                file,
-                header: binary::safe_header(binary::header(&input)),
-                source: Source::InPlace(layout.triangles),
-                input,
-                format: Format::BinaryStl,
-                findings: layout.findings,
-            }),
+            sniff::Kind::Binary(sniff::Layout { triangles, mut findings }) => {
+                findings.extend(tail::of_records(binary::records(&input, triangles)));
+                Ok(Self {
+                    path: path.to_owned(),
+                    identity,
+                    file,
+                    header: binary::safe_header(binary::header(&input)),
+                    source: Source::InPlace(triangles),
+                    input,
+                    format: Format::BinaryStl,
+                    findings,
+                })
+            }
             sniff::Kind::Text(sniff::Text { start, mut findings }) => {
                 // Advice; without it reading ahead is only less bold.
                 let _ = input.advise(memmap2::Advice::Sequential);
                 let context = text::Context { path, spool, limits, progress };
-                let parsed = parallel::in_pool(limits.threads, || text::read(&input, start, &context))?;
+                let (content, zeros) = tail::split(&input);
+                let parsed = parallel::in_pool(limits.threads, || text::read(content, start, &context))?;
                 findings.extend(parsed.findings);
+                findings.extend(tail::of_text(content, zeros));
                 Ok(Self {
                     path: path.to_owned(),
                     identity,
@@ -212,11 +229,12 @@ impl MeshFile {
         &self.input
     }
 
-    /// The open input and the place in it where `part` of [`MeshFile::bytes`] or of the records lies, if it does: for copies that
+    /// The open file that holds the input, and the place in it where `part` of [`MeshFile::bytes`] or of the records lies, if it does: for copies that
     /// never leave the kernel.
     pub(crate) fn locate(&self, part: &[u8]) -> Option<(&File, u64)> {
         let offset = (part.as_ptr() as usize).checked_sub(self.input.as_ptr() as usize)?;
-        (offset + part.len() <= self.input.len()).then_some((&self.file, offset as u64))
+        let file = self.file.as_ref()?;
+        (offset + part.len() <= self.input.len()).then_some((file, offset as u64))
     }
 
     /// Size of the input in bytes.

@@ -1,6 +1,7 @@
 //! Tells binary from text: by size first, then by content, never by the word `solid` alone, which many binary headers begin
 //! with (56 of 410 files drawn from a model site, ArtOfIllusion and SolidWorks among their makers).
 
+pub(super) use super::binary::Layout;
 use super::{Finding, Rejection, binary, facets, foreign};
 
 /// How much of a text is looked at.
@@ -11,7 +12,7 @@ const HIGH_BYTES_WITHIN: usize = 1024;
 /// What a file is.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Kind {
-    Binary(binary::Layout),
+    Binary(Layout),
     Text(Text),
 }
 

@@ -1,4 +1,4 @@
-//! Missing rings: the two loops that bound one are closed by a strip between them (METHODS C5, D; source S3).
+//! Missing rings: the two loops that bound one are closed by a strip between them.
 //!
 //! Closed each for itself, a tube that has lost a ring would become two bodies, and the mouth of a vessel without its rim be shut.
 

@@ -22,14 +22,14 @@ use super::work::Work;
 use crate::chunk::{self, NONE};
 use crate::fill::cross::{Contact, Triangle as Corners, triangles_cross};
 use crate::fill::exact::{Point, at};
-use crate::record;
+use crate::position::{self, Position};
 use crate::report::{Region, Rung};
 use crate::settings::Profile;
 use crate::shop::components::{Reversed, nonmanifold_vertices};
 use crate::shop::edges::Edge;
 use crate::shop::wedges::{Half, Wedges};
-use crate::shop::{Shop, Triangle, Vertex, bits};
-use crate::sums::Bounds;
+use crate::shop::{Shop, Triangle, Vertex};
+use crate::sums::{Bounds, step_at};
 use crate::survey::Survey;
 
 /// A copy moves by no more than this share of the shortest edge at it, if there is a place for it then, so that no triangle comes near to turning
@@ -126,7 +126,7 @@ pub(super) fn separate(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reve
     }
     let before = Before {
         triangles: shop.triangles.clone(),
-        taken: shop.positions.iter().copied().map(bits).collect(),
+        taken: shop.positions.iter().copied().map(Position::of).collect(),
         farthest: profile.max_separation_relative * survey.bounds.diagonal(),
     };
     let mut from = BTreeMap::new();
@@ -186,7 +186,7 @@ fn regions(shop: &Shop, first: Vertex, copies: &[Copy]) -> Vec<Region> {
 struct Before {
     triangles: Vec<Triangle>,
     /// Positions of its vertices.
-    taken: HashSet<[u32; 3]>,
+    taken: HashSet<Position>,
     /// How far the profile lets a copy go.
     farthest: f64,
 }
@@ -224,7 +224,7 @@ struct Apart<'w, 's, 'b> {
     copies: Vec<Copy>,
     first: Vertex,
     /// Positions of the copies.
-    taken: HashSet<[u32; 3]>,
+    taken: HashSet<Position>,
     /// For each vertex from before its copies.
     family: HashMap<Vertex, Vec<Vertex>>,
     /// For each triangle that was added the one from before of which it is a part.
@@ -410,7 +410,7 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
         let most_places = MOST_PAIRS / ((near.len() + own.len()) * own.len());
         let points = || corners.iter().map(|v| shop.positions[*v as usize]);
         let largest = points().flatten().map(f32::abs).fold(0.0, f32::max);
-        let step = f64::from(largest.next_up()) - f64::from(largest);
+        let step = step_at(largest);
         let rays: Vec<DVec3> = points().map(|p| at(&p) - middle).filter(|ray| *ray != DVec3::ZERO).collect();
         let room = EDGE_SHARE * rays.iter().map(|ray| ray.length()).fold(f64::INFINITY, f64::min);
         let most = self.before.farthest.max(LEAST_STEPS * step);
@@ -421,17 +421,17 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
         let places = |first: f64, most: f64, ways: usize| {
             let steps = (0..30).map(move |k| first * f64::from(1_u32 << k)).take_while(move |step| *step <= most);
             let ways = &all[..ways];
-            steps.flat_map(move |step| ways.iter().map(move |d| (middle + *d * step).as_vec3().to_array().map(|x| x + 0.0)))
+            steps.flat_map(move |step| ways.iter().map(move |d| Position::nearest(middle + *d * step)))
         };
         let near_by = places(step, most.min(room), usual);
         let farther = places(step * FINEST, most.min(room.max(FREE_STEPS * step)), ways.len());
         let tried = near_by.chain(farther).enumerate().skip(self.from.get(&of).copied().unwrap_or(0));
         let mut seen = HashSet::new();
         for (place, position) in tried.take(most_places) {
-            if !seen.insert(bits(position)) || self.before.taken.contains(&bits(position)) || self.taken.contains(&bits(position))
-            {
+            if !seen.insert(position) || self.before.taken.contains(&position) || self.taken.contains(&position) {
                 continue;
             }
+            let position = position.coordinates();
             let (moved, away) = (moved(position), (at(&position) - middle).length());
             if (away <= room || self.keep_facing(&moved)) && self.accepts(&moved, &near) {
                 return Some((Copy { of, place, away }, position));
@@ -474,7 +474,8 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
 
     fn add(&mut self, copy: Copy, position: Point) -> Vertex {
         self.copies.push(copy);
-        self.taken.insert(bits(position));
+        let position = Position::of(position);
+        self.taken.insert(position);
         self.work.add_vertex(position)
     }
 
@@ -500,10 +501,10 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
         }
         let shop: &Shop = self.work;
         let positions = &shop.positions[self.first as usize..];
-        let copy_at: HashMap<[u32; 3], usize> = positions.iter().copied().map(bits).zip(0..).collect();
+        let copy_at: HashMap<Position, usize> = positions.iter().copied().map(Position::of).zip(0..).collect();
         for (suspect, _) in survey.beyond_the_workshop(positions) {
-            let corners = record::corners(&survey.records[suspect.triangle as usize]).map(|p| p.map(|x| x + 0.0));
-            blamed.extend(corners.iter().filter_map(|p| copy_at.get(&bits(*p))));
+            let corners = position::corners(&survey.records[suspect.triangle as usize]);
+            blamed.extend(corners.iter().filter_map(|p| copy_at.get(&Position::of(*p))));
         }
         let overlay = Overlay::of(survey, shop, reversed)?;
         let copies = |t: u32| shop.triangles[t as usize].v.into_iter().filter_map(|v| v.checked_sub(self.first));
@@ -512,7 +513,7 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
             let in_shop = pair.triangles.map(|number| overlay.changed_of(number));
             let before = pair.triangles.map(|number| match overlay.changed_of(number) {
                 Some(t) => self.points_before(self.whole(t)),
-                None => record::corners(&survey.records[number as usize]).map(|p| p.map(|x| x + 0.0)),
+                None => position::corners(&survey.records[number as usize]),
             });
             let of_one = matches!(in_shop, [Some(a), Some(b)] if self.whole(a) == self.whole(b));
             if of_one || badness(pair.contact) > badness(triangles_cross(&before[0], &before[1])) {

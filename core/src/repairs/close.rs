@@ -1,4 +1,4 @@
-//! Closes boundary loops (METHODS C8): by a triangulation between their vertices, which is then shaped to continue the surface, where it has
+//! Closes boundary loops: by a triangulation between their vertices, which is then shaped to continue the surface, where it has
 //! room for that, and revoked where it crosses anything.
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,4 +1,4 @@
-//! Triangles with a repeated vertex, and several triangles on the same three vertices (METHODS A1, A2).
+//! Triangles with a repeated vertex, and several triangles on the same three vertices.
 //!
 //! Of copies in one direction the first stays, unless the surface is closed only with all of them. Where both directions occur, it is a question of what they are part of:
 //! a triangle doubled back to back in an otherwise sound surface (one of them fits its neighbours: it stays), a wall of no

@@ -16,6 +16,7 @@ use super::orient::{Parity, turn};
 use super::work::Work;
 use crate::bodies::{self, Direction, Source};
 use crate::chunk::NONE;
+use crate::position::Position;
 use crate::record;
 use crate::shop::components::{Components, Reversed, Sample, Through};
 use crate::shop::edges::Edges;
@@ -229,9 +230,7 @@ impl Point {
     }
 
     fn is_before(&self, other: &Self) -> bool {
-        let by_place = || {
-            self.corners.as_flattened().iter().map(|x| x.to_bits()).lt(other.corners.as_flattened().iter().map(|x| x.to_bits()))
-        };
+        let by_place = || self.corners.map(Position::of) < other.corners.map(Position::of);
         match self.priority.total_cmp(&other.priority).then(other.record.cmp(&self.record)) {
             Ordering::Equal => by_place(),
             order => order.is_gt(),

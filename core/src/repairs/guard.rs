@@ -9,9 +9,9 @@ use super::overlay::Overlay;
 use super::work::Work;
 use crate::chunk::NONE;
 use crate::fill::cross::Triangle as Corners;
-use crate::record;
+use crate::position::{self, Position};
 use crate::shop::components::{Components, Reversed, Through};
-use crate::shop::{Origin, Shop, bits};
+use crate::shop::{Origin, Shop};
 use crate::survey::Survey;
 
 /// A triangle that a patch crosses.
@@ -76,7 +76,7 @@ pub(super) fn crossed(
         let corners = overlay.corners(survey, shop, other);
         let of_both = component(of_patch).zip(component(other));
         let obstacle = Obstacle { corners, met_already: of_both.is_some_and(|(a, b)| met.binary_search(&[a, b]).is_ok()) };
-        if known.insert((patch, corners.map(bits), obstacle.met_already)) {
+        if known.insert((patch, corners.map(Position::of), obstacle.met_already)) {
             crossed.entry(patch).or_default().push(obstacle);
         }
     }
@@ -105,7 +105,7 @@ pub(super) fn components_of_records(
     let positions: Vec<[f32; 3]> = wanted
         .iter()
         .filter(|record| !found.contains_key(record))
-        .map(|record| record::corners(&survey.records[*record as usize])[0].map(|x| x + 0.0))
+        .map(|record| position::corners(&survey.records[*record as usize])[0])
         .collect();
     if !positions.is_empty() {
         let around = survey.beyond_the_workshop(&positions);

@@ -1,4 +1,4 @@
-//! Islands: a loose piece of surface inside a hole is joined to the hole's rim, so that one patch closes both (METHODS C1).
+//! Islands: a loose piece of surface inside a hole is joined to the hole's rim, so that one patch closes both.
 //!
 //! Filled each for itself, the hole would be closed underneath the island and the island become a body of nearly no thickness. One patch is
 //! laid between the hole's rim and those of all its islands; one that touches the rim in a vertex is walked around with it. Where that is not to be had, two triangles between the nearest vertices of two

@@ -1,5 +1,4 @@
-//! Non-common vertices (T-junctions): the triangle whose edge a vertex lies on is split there (METHODS C3, S1's rule, which keeps
-//! every position).
+//! Non-common vertices (T-junctions): the triangle whose edge a vertex lies on is split there, which keeps every position.
 
 use super::collinear;
 use super::work::Work;

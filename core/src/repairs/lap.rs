@@ -1,4 +1,4 @@
-//! Lapping patches (METHODS B2, B8): a surface that ends on another one, within a tolerance by the size of the two, facing the same way.
+//! Lapping patches: a surface that ends on another one, within a tolerance by the size of the two, facing the same way.
 //!
 //! Where each of two pieces ends on the other, they overlap like shingles: the overlapping triangles of the smaller one go, so that the two
 //! ends face each other across a gap, which is closed later. A piece that lies on another one as a whole goes as a whole: what was meant is
@@ -12,6 +12,7 @@ use super::work::Work;
 use crate::boxes::BoxTree;
 use crate::fill::cross::Triangle as Corners;
 use crate::grid::Grid;
+use crate::position::Position;
 use crate::record;
 use crate::shop::components::{Component, Components, Reversed, Through};
 use crate::shop::edges::Edges;
@@ -34,7 +35,7 @@ const MOST_PAIRS: usize = 256;
 const OVERLAP: f64 = 0.5;
 
 /// Triangles that are looked at together, at most; where there are more, nothing is cut. By count, so that memory decides nothing.
-const MOST: usize = 1 << 19;
+pub(super) const MOST: usize = 1 << 19;
 
 /// Most triangles that a cut may take; they are worked on in memory.
 const MOST_CUT: usize = 1 << 17;
@@ -338,18 +339,16 @@ impl On<'_> {
 impl Cut {
     /// Fetches what is not in the workshop, removes it, and joins what is left to the other piece where both end.
     fn make(&self, survey: &mut Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) {
-        let by_position: HashMap<[u32; 3], Vertex> = numbered(work);
-        let mut wanted: Vec<[f32; 3]> = self.triangles.iter().flat_map(|m| m.corners.map(|p| p.map(|x| x + 0.0))).collect();
-        wanted.retain(|p| by_position.get(&p.map(f32::to_bits)).is_none_or(|v| !work.complete[*v as usize]));
-        wanted.sort_unstable_by_key(|p| p.map(f32::to_bits));
+        let by_position = work.by_position();
+        let mut wanted: Vec<Position> = self.triangles.iter().flat_map(|m| m.corners.map(Position::of)).collect();
+        wanted.retain(|p| by_position.get(p).is_none_or(|v| !work.complete[*v as usize]));
+        wanted.sort_unstable();
         wanted.dedup();
+        let wanted: Vec<[f32; 3]> = wanted.into_iter().map(Position::coordinates).collect();
         let mut doomed: Vec<u32> = self.triangles.iter().filter_map(|m| m.place.err()).collect();
         if !wanted.is_empty() {
             let new = survey.promote(&wanted);
-            work.extend(survey, &new, &[]);
-            let by_position = numbered(work);
-            let completed: Vec<Vertex> = wanted.iter().filter_map(|p| by_position.get(&p.map(f32::to_bits)).copied()).collect();
-            work.extend(survey, &[], &completed);
+            work.extend_at(survey, &new, &wanted);
             let mut records: Vec<u32> = self.triangles.iter().filter_map(|m| m.place.ok()).collect();
             records.sort_unstable();
             doomed.extend((0..).zip(&work.triangles).filter_map(|(t, triangle)| match triangle.origin {
@@ -410,12 +409,12 @@ fn join(work: &mut Work<'_>, [moving, staying]: [&[Vertex]; 2], reach: &Toleranc
             .map(|r| r.foot(p))
             .min_by(|a, b| p.distance_squared(*a).total_cmp(&p.distance_squared(*b)))
             .filter(|foot| (seen.at(shop, v)..=most).contains(&p.distance(*foot)));
-        feet.extend(foot.map(|foot| (v, foot.to_array().map(|x| x as f32 + 0.0))));
+        feet.extend(foot.map(|foot| (v, Position::nearest(foot))));
     }
-    let mut known = if feet.is_empty() { HashMap::new() } else { numbered(work) };
+    let mut known = if feet.is_empty() { HashMap::new() } else { work.by_position() };
     for (v, foot) in feet {
         // Where a vertex is already, the two would be one when the file is read.
-        known.entry(foot.map(f32::to_bits)).or_insert_with(|| {
+        known.entry(foot).or_insert_with(|| {
             let there = work.add_vertex(foot);
             work.merge(there, v);
             there
@@ -423,10 +422,6 @@ fn join(work: &mut Work<'_>, [moving, staying]: [&[Vertex]; 2], reach: &Toleranc
     }
     pairs.sort_unstable();
     merge::weld_pairs(work, &pairs, reach.weld);
-}
-
-fn numbered(shop: &Shop) -> HashMap<[u32; 3], Vertex> {
-    shop.positions.iter().zip(0..).map(|(p, v)| (p.map(f32::to_bits), v)).collect()
 }
 
 /// Wider on all sides, rounded outward.

@@ -1,5 +1,5 @@
-//! Merging of boundary vertices that lie within the weld tolerance of each other (METHODS C2, C3; tolerance weld as in
-//! ALGORITHMS 2.3: connected components of the ε-graph, bounded in extent).
+//! Merging of boundary vertices that lie within the weld tolerance of each other: connected components
+//! of the graph of pairs within tolerance, bounded in extent.
 //!
 //! A merge that would leave a new non-manifold edge is taken back.
 

@@ -77,10 +77,17 @@ const ROUNDS: usize = 4;
 const DEGENERATE: &str = "triangles without area removed, their T-junctions closed";
 const DUPLICATE: &str = "triangles on the vertices of another one";
 
+/// Bytes that trees over the edges of one triangle take at most, with what is kept of each of these edges: their vertices are compared, and
+/// surface that ends on other surface is looked for, up to a number of triangles. Measured on soups of 0.5 and 1 M triangles without a shared
+/// vertex (623 and 385 bytes an edge).
+pub(crate) fn boundary_bytes(edges: u64) -> u64 {
+    (400 * edges).max(640 * edges.min(3 * lap::MOST as u64))
+}
+
 /// Repairs what the profile allows.
 ///
 /// # Errors
-/// [`Error::Refused`] when there is not memory enough.
+/// [`Error::Starved`] when there is not memory enough.
 pub(crate) fn run(
     diagnosis: &mut Diagnosis<'_>,
     path: &Path,
@@ -171,6 +178,9 @@ pub(crate) fn run(
             resolved = resolve::resolve(&Rational, survey, shop, &mut reversed, profile, across, &means)?;
             Ok(resolved.pairs)
         })?;
+        log.time("dust", "bodies that cutting left, each of less than 2⁻⁴⁰ of all volume, dropped", || {
+            resolved.dust.len() as u64
+        });
         let open = close::open_again(shop, closed_across, &resolved.taken_part);
         log.take_back("fill", open.len() as u64);
         loops_left.extend(open);
@@ -242,6 +252,7 @@ pub(crate) fn run(
         probes.look_for(survey, shop, &reversed, &pieces, &wraps.triangles)
     });
     let mut all = std::mem::take(&mut resolved.regions);
+    all.append(&mut resolved.dust);
     all.append(&mut swallowed.regions);
     all.append(&mut separated.regions);
     all.extend(sheets.iter().map(Region::from));

@@ -1,4 +1,4 @@
-//! Coherent orientation over shared edges, then outward by enclosed volume, cavities inward (METHODS A9).
+//! Coherent orientation over shared edges, then outward by enclosed volume, cavities inward.
 
 use super::swallowed;
 use super::work::Work;

@@ -4,6 +4,7 @@ use crate::crossings::Pair;
 use crate::edit;
 use crate::fill::cross::{self, Triangle as Corners};
 use crate::fresh;
+use crate::position;
 use crate::record;
 use crate::shop::components::Reversed;
 use crate::shop::{Origin, Shop};
@@ -74,7 +75,7 @@ impl Overlay {
     pub(super) fn corners(&self, survey: &Survey<'_>, shop: &Shop, number: u32) -> Corners {
         match self.changed_of(number) {
             Some(t) => shop.points(t),
-            None => record::corners(&survey.records[number as usize]).map(|p| p.map(|x| x + 0.0)),
+            None => position::corners(&survey.records[number as usize]),
         }
     }
 

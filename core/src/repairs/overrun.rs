@@ -1,9 +1,9 @@
-//! Sides of a slit that run on past each other into the model and cross there, as simulated milling leaves them (METHODS B7).
+//! Sides of a slit that run on past each other into the model and cross there, as simulated milling leaves them.
 //!
 //! What lies behind the other side is surplus: the triangles around every vertex of the loop that does so go, if they cross nothing else than
-//! the other side of the same loop, and the loop, wider by them, is closed like any other. (S1 moves the ends of the two sides onto their
-//! intersection line, which lies in the groove that they make; the surface that stood there before is continued more truly by a
-//! patch.) Sides that cross outside of the model are left alone, and so is a loop that would become much longer.
+//! the other side of the same loop, and the loop, wider by them, is closed like any other. (Moving the ends of
+//! the two sides onto their intersection line would be another way; that line lies in the groove that they make, so a patch continues the surface
+//! that stood there before more truly.) Sides that cross outside of the model are left alone, and so is a loop that would become much longer.
 
 use std::collections::BTreeMap;
 

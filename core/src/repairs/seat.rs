@@ -1,4 +1,4 @@
-//! Shapes stacked on one another whose lower end is open (METHODS B6): the rim is let down along its own surface until all of it is inside of what it
+//! Shapes stacked on one another whose lower end is open: the rim is let down along its own surface until all of it is inside of what it
 //! stands on, so that the two can be cut along each other.
 //!
 //! After Yang et al. 2021 (Computer Science and Application 11(4), section 3, step 5) and the patent of the same group: stacked shapes are trimmed, are being
@@ -25,9 +25,11 @@ use crate::chunk::NONE;
 use crate::fill::cross::Triangle as Corners;
 use crate::fresh;
 use crate::holes::loops::{self, Loop};
+use crate::position::Position;
 use crate::settings::{Bodies, Profile};
 use crate::shop::components::{Components, Reversed, Through};
 use crate::shop::{self, Origin, Shop, Vertex};
+use crate::sums::step_at;
 use crate::survey::Survey;
 
 /// A rim points one way if the directions across its edges add up to this share of their number at least: that of a flat sheet or of a hole
@@ -62,8 +64,7 @@ struct Candidate {
 pub(super) fn let_down(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reversed, profile: &Profile) -> u64 {
     let reach = profile.stack_gap_relative * survey.bounds.diagonal();
     let is_wanted = profile.fill_holes && profile.resolve_crossings && profile.bodies != Bodies::Keep;
-    let largest = survey.bounds.largest_coordinate();
-    let is_told_apart = reach > STEPS * (f64::from(largest.next_up()) - f64::from(largest));
+    let is_told_apart = reach > STEPS * step_at(survey.bounds.largest_coordinate());
     if !is_wanted || !is_told_apart || survey.crossing_pairs.is_none() {
         return 0;
     }
@@ -217,7 +218,7 @@ impl Candidate {
         let ends: Vec<Vertex> = (0..n)
             .map(|i| {
                 let end = work.place(self.vertices[i]) + self.onward[i] * depth;
-                work.add_vertex(end.as_vec3().to_array())
+                work.add_vertex(Position::nearest(end))
             })
             .collect();
         for i in 0..n {

@@ -1,5 +1,4 @@
-//! Lone sheets beside bodies: open surface that bounds nothing and can be no part of a solid (METHODS B4, for what encloses nothing on either
-//! side).
+//! Lone sheets beside bodies: open surface that bounds nothing and can be no part of a solid.
 //!
 //! A sheet whose rim was not closed, since it would enclose next to nothing ([`super::admit`]), keeps a file from being a solid whatever else is
 //! in it. One that runs into a body or another sheet could not even be closed: it goes as a whole. (The part of it outside of a body may have

@@ -14,7 +14,7 @@ use super::work::Work;
 use crate::chunk::NONE;
 use crate::fill::exact::Point;
 use crate::parallel;
-use crate::record;
+use crate::position::{self, Position};
 use crate::shape::{self, Region, ShapeSettings, Shaped, edges, sorted};
 use crate::shop::{Origin, Shop, Vertex};
 use crate::survey::Survey;
@@ -177,12 +177,12 @@ impl Beyond {
         next.sort_unstable();
         next.dedup();
         let positions: Vec<Point> = next.iter().map(|v| shop.positions[*v as usize]).collect();
-        let numbers: HashMap<[u32; 3], Vertex> = next.iter().zip(&positions).map(|(v, p)| (p.map(f32::to_bits), *v)).collect();
+        let numbers: HashMap<Position, Vertex> = next.iter().zip(&positions).map(|(v, p)| (Position::of(*p), *v)).collect();
         let found = survey.beyond_the_workshop(&positions);
         let mut beyond = Self { of_vertex: Vec::new(), corners: Vec::with_capacity(found.len()) };
         for (number, (suspect, _)) in (0..).zip(&found) {
-            let corners = record::corners(&survey.records[suspect.triangle as usize]).map(|p| p.map(|x| x + 0.0));
-            let at = corners.iter().filter_map(|p| numbers.get(&p.map(f32::to_bits)));
+            let corners = position::corners(&survey.records[suspect.triangle as usize]);
+            let at = corners.iter().filter_map(|p| numbers.get(&Position::of(*p)));
             beyond.of_vertex.extend(at.map(|v| (*v, number)));
             beyond.corners.push(corners);
         }
@@ -208,9 +208,9 @@ struct Gathered {
 impl Gathered {
     fn of(shop: &Shop, beyond: &Beyond, patch: &Placed) -> Self {
         let mut region = Self { positions: Vec::new(), vertices: Vec::new(), patch: Vec::new(), around: Vec::new() };
-        let mut numbers: HashMap<[u32; 3], u32> = HashMap::new();
+        let mut numbers: HashMap<Position, u32> = HashMap::new();
         let mut number = |region: &mut Self, position: Point, vertex: Vertex| {
-            *numbers.entry(position.map(f32::to_bits)).or_insert_with(|| {
+            *numbers.entry(Position::of(position)).or_insert_with(|| {
                 region.positions.push(position);
                 region.vertices.push(vertex);
                 region.positions.len() as u32 - 1
@@ -259,7 +259,7 @@ fn put_in(work: &mut Work<'_>, patch: &mut Placed, mut vertices: Vec<Vertex>, sh
         return;
     }
     patch.triangles().for_each(|t| work.kill(t));
-    vertices.extend(shaped.added.iter().map(|p| work.add_vertex(*p)));
+    vertices.extend(shaped.added.iter().map(|p| work.add_vertex(Position::of(*p))));
     patch.first = work.triangles.len() as u32;
     patch.count = shaped.triangles.len() as u32;
     for t in &shaped.triangles {

@@ -1,4 +1,4 @@
-//! Surplus surface at non-manifold edges (METHODS A3).
+//! Surplus surface at non-manifold edges.
 //!
 //! The surface is cut at its non-manifold edges into sheets. A sheet is surplus when the rest is balanced at all its non-manifold
 //! edges without it: a fin that hangs from a sound surface by one side, or a wall across a body. One that goes on at one of them, using it by

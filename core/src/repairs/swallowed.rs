@@ -1,4 +1,4 @@
-//! Bodies inside the material of others (METHODS B5): they bound nothing, since there is material on both of their sides.
+//! Bodies inside the material of others: they bound nothing, since there is material on both of their sides.
 //!
 //! A piece of surface that crosses nothing lies in one cell of the rest, so that the winding number of the closed pieces around one of its
 //! points says on how much material its outer side looks out; its inner side has one more or, of a cavity, one less. Material is where the

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use super::apart::Separated;
 use super::overlay::Overlay;
-use super::resolve::{Refill, join_in, refill_of, take_in};
+use super::resolve::{Refill, join_in, refill_of};
 use super::work::Work;
 use crate::chunk::NONE;
 use crate::report::{Region, Rung};
@@ -96,7 +96,7 @@ fn complete_around(survey: &mut Survey<'_>, work: &mut Work<'_>, reversed: &Reve
     }
     let positions: Vec<[f32; 3]> = wanted.into_iter().map(|v| work.positions[v as usize]).collect();
     let new = survey.promote(&positions);
-    let first = take_in(survey, work, &new, &positions);
+    let first = work.extend_at(survey, &new, &positions);
     (first..work.triangles.len() as u32).for_each(|t| join_in(work, reversed, t));
 }
 

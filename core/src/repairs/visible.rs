@@ -1,4 +1,4 @@
-//! What nobody sees from outside (METHODS B5, the paper's mode): a piece of surface goes that other pieces hide in all of six directions.
+//! What nobody sees from outside: a piece of surface goes that other pieces hide in all of six directions.
 //!
 //! After Yang et al., "Research on repair method of shoe mould for 3D printing", Computer Science and Application 11(4), 2021, section 3.2 (and the
 //! patent of the same group): for each of Z, X, Y, −Z, −X, −Y, and each piece that is not known to be visible, take its largest triangle. If that
@@ -23,6 +23,7 @@ use super::swallowed::{self, Swallowed, crossing, lies_in_material};
 use super::work::Work;
 use crate::bodies::{self, Direction, Source};
 use crate::boxes::BoxTree;
+use crate::position::Position;
 use crate::record;
 use crate::report::{LoopLeft, SheetDropped};
 use crate::settings::{Bodies, Profile};
@@ -117,9 +118,8 @@ pub(super) fn remove(
     hidden.sheets.sort_by(|a, b| b.area.total_cmp(&a.area));
     hidden.sheets.truncate(LISTED);
     swallowed::take_away(work, reversed, pieces, &is_hidden);
-    let bits = |p: [f32; 3]| p.map(|x| (x + 0.0).to_bits());
-    let there: HashSet<[u32; 3]> = work.living().flat_map(|t| work.points(t)).map(bits).collect();
-    left.retain(|rim| there.contains(&bits(rim.at)));
+    let there: HashSet<Position> = work.living().flat_map(|t| work.points(t)).map(Position::of).collect();
+    left.retain(|rim| there.contains(&Position::of(rim.at)));
     hidden
 }
 

@@ -6,8 +6,10 @@
 use std::ops::Deref;
 
 use crate::chunk::{NONE, Suspect};
+use crate::position::Position;
 use crate::shop::edges::Edges;
 use crate::shop::{Origin, Shop, Triangle, Vertex};
+use crate::steps;
 use crate::survey::Survey;
 
 /// A pass that makes sure of something about every triangle, or every set of three vertices, which holds until one of the triangles
@@ -27,6 +29,15 @@ pub(super) struct Work<'a> {
     changed: Vec<u32>,
     /// How many of these each pass has seen; `None`: it has to look at everything.
     seen: [Option<usize>; 3],
+    journal: Option<Journal>,
+}
+
+/// What it takes to take back everything since a [`Work::mark`].
+struct Journal {
+    /// How many triangles there were.
+    count: usize,
+    /// Those of them that have changed since, each time as they were before.
+    old: Vec<(u32, Triangle)>,
 }
 
 impl Deref for Work<'_> {
@@ -39,7 +50,7 @@ impl Deref for Work<'_> {
 
 impl<'a> Work<'a> {
     pub(super) fn new(shop: &'a mut Shop) -> Self {
-        Self { shop, edges: None, changed: Vec::new(), seen: [None; 3] }
+        Self { shop, edges: None, changed: Vec::new(), seen: [None; 3], journal: None }
     }
 
     /// The mesh with its edges. O(workshop) after a change, O(1) else.
@@ -62,8 +73,49 @@ impl<'a> Work<'a> {
         Some(changed)
     }
 
+    /// From here on changes are noted, so that they can be taken back, until [`Self::keep`].
+    pub(super) fn mark(&mut self) {
+        self.journal = Some(Journal { count: self.shop.triangles.len(), old: Vec::new() });
+    }
+
+    /// What was changed since the mark stays.
+    pub(super) fn keep(&mut self) {
+        self.journal = None;
+    }
+
+    /// Puts all triangles back to what they were at the mark. Returns how many there were, and the numbers of those that were fetched
+    /// since: these stay, behind the others. O(changes), and the star lists are made anew.
+    pub(super) fn take_back(&mut self) -> (usize, Vec<u32>) {
+        let Some(Journal { count, old }) = self.journal.take() else { return (self.shop.triangles.len(), Vec::new()) };
+        steps::count(old.len() + self.shop.triangles.len() - count);
+        let is_fetched = |t: &u32| matches!(self.shop.triangles[*t as usize].origin, Origin::Input(_));
+        let fetched: Vec<u32> = (count as u32..self.shop.triangles.len() as u32).filter(is_fetched).collect();
+        for (place, t) in (count..).zip(&fetched) {
+            self.shop.triangles[place] = self.shop.triangles[*t as usize];
+        }
+        self.shop.triangles.truncate(count + fetched.len());
+        for (t, triangle) in old.into_iter().rev() {
+            self.shop.triangles[t as usize] = triangle;
+        }
+        self.edges = None;
+        self.seen = [None; 3];
+        self.shop.relink();
+        (count, fetched)
+    }
+
+    /// This triangle is about to change.
+    fn note(&mut self, t: u32) {
+        if let Some(journal) = &mut self.journal
+            && (t as usize) < journal.count
+        {
+            steps::count(1);
+            journal.old.push((t, self.shop.triangles[t as usize]));
+        }
+    }
+
     pub(super) fn kill(&mut self, t: u32) {
         self.edges = None;
+        self.note(t);
         self.shop.kill(t);
     }
 
@@ -76,7 +128,7 @@ impl<'a> Work<'a> {
     }
 
     /// Adds a vertex where none is, and returns its number.
-    pub(super) fn add_vertex(&mut self, position: [f32; 3]) -> Vertex {
+    pub(super) fn add_vertex(&mut self, position: Position) -> Vertex {
         self.edges = None;
         self.shop.add_vertex(position)
     }
@@ -85,22 +137,29 @@ impl<'a> Work<'a> {
     pub(super) fn merge(&mut self, stay: Vertex, go: Vertex) {
         self.edges = None;
         self.changed.extend(self.shop.star(go).map(|(t, _)| t));
+        if self.journal.is_some() {
+            let linked: Vec<u32> = self.shop.linked(go).collect();
+            linked.into_iter().for_each(|t| self.note(t));
+        }
         self.shop.merge(stay, go);
     }
 
     /// Turns a triangle over.
     pub(super) fn turn(&mut self, t: u32) {
         self.edges = None;
+        self.note(t);
         self.shop.triangles[t as usize].v.swap(1, 2);
     }
 
     /// Lets all triangles use `target[v]` instead of `v`. Their star lists are as they were until [`Self::relink`].
     pub(super) fn move_to(&mut self, target: &[Vertex]) {
         self.edges = None;
-        for (triangle, t) in self.shop.triangles.iter_mut().zip(0..) {
-            let v = triangle.v.map(|v| target[v as usize]);
-            if v != triangle.v {
-                triangle.v = v;
+        for t in 0..self.shop.triangles.len() as u32 {
+            let old = self.shop.triangles[t as usize].v;
+            let v = old.map(|v| target[v as usize]);
+            if v != old {
+                self.note(t);
+                self.shop.triangles[t as usize].v = v;
                 self.changed.push(t);
             }
         }
@@ -109,6 +168,7 @@ impl<'a> Work<'a> {
     /// Lets one corner of a triangle be another vertex. Star lists are as they were until [`Self::relink`].
     pub(super) fn assign(&mut self, t: u32, corner: usize, v: Vertex) {
         self.edges = None;
+        self.note(t);
         self.shop.triangles[t as usize].v[corner] = v;
         self.changed.push(t);
     }
@@ -120,6 +180,7 @@ impl<'a> Work<'a> {
     /// Puts all triangles back to what they were.
     pub(super) fn restore(&mut self, before: &[Triangle]) {
         self.edges = None;
+        self.journal = None;
         self.seen = [None; 3];
         self.shop.triangles.clear();
         self.shop.triangles.extend_from_slice(before);
@@ -128,6 +189,7 @@ impl<'a> Work<'a> {
 
     /// Gives each triangle that continues a patch the one it continues after a [`Survey::divide`].
     pub(super) fn follow_division(&mut self, survey: &Survey<'_>) {
+        debug_assert!(self.journal.is_none(), "a division is not taken back");
         for triangle in &mut self.shop.triangles {
             if triangle.patch != NONE {
                 triangle.patch = match triangle.origin {
@@ -142,8 +204,17 @@ impl<'a> Work<'a> {
     pub(super) fn extend(&mut self, survey: &Survey<'_>, new: &[(Suspect, u32)], completed: &[Vertex]) {
         self.edges = None;
         let first = self.shop.triangles.len() as u32;
-        self.shop.extend(survey, new, completed);
+        self.shop.extend(survey, new, |_| completed.to_vec());
         self.changed.extend(first..self.shop.triangles.len() as u32);
+    }
+
+    /// As [`Self::extend`]; the vertices at these positions become complete. Returns the first of the new triangles.
+    pub(super) fn extend_at(&mut self, survey: &Survey<'_>, new: &[(Suspect, u32)], positions: &[[f32; 3]]) -> u32 {
+        self.edges = None;
+        let first = self.shop.triangles.len() as u32;
+        self.shop.extend(survey, new, |known| positions.iter().filter_map(|p| known.get(&Position::of(*p)).copied()).collect());
+        self.changed.extend(first..self.shop.triangles.len() as u32);
+        first
     }
 }
 
@@ -201,5 +272,46 @@ mod tests {
         work.merge(a, b);
         assert_eq!(work.triangles.iter().map(|t| t.v).collect::<Vec<_>>(), before);
         assert!(all(&work, a));
+    }
+
+    #[test]
+    fn what_was_changed_since_a_mark_is_taken_back_without_a_look_at_the_rest() {
+        // The same changes in a plate of so many squares a side; the star lists are made anew, once.
+        let steps_for = |side: u8| {
+            let records = records(&plate(side, |_, _| true));
+            let mut d = diagnose(&records);
+            let mut work = Work::new(&mut d.shop);
+            let all = |work: &Work<'_>| work.triangles.iter().map(|t| (t.v, t.alive)).collect::<Vec<_>>();
+            let before = all(&work);
+            let [a, b, _] = work.triangles[0].v;
+            let (steps, _) = steps::of(|| {
+                work.mark();
+                work.merge(a, b);
+                work.add([0, 1, 2], Origin::Patch, NONE);
+                work.turn(1);
+                work.kill(1);
+                work.kill(2);
+                work.take_back()
+            });
+            assert_eq!(all(&work), before);
+            assert!(work.star(a).all(|(t, corner)| work.triangles[t as usize].v[corner] == a));
+            steps - work.triangles.len() as u64
+        };
+        assert_eq!(steps_for(8), steps_for(32));
+    }
+
+    #[test]
+    fn what_is_kept_is_not_taken_back() {
+        let records = records(&plate(2, |_, _| true));
+        let mut d = diagnose(&records);
+        let mut work = Work::new(&mut d.shop);
+        work.mark();
+        work.kill(0);
+        work.keep();
+        assert_eq!(work.take_back().0, 8);
+        work.mark();
+        work.kill(1);
+        work.take_back();
+        assert_eq!(work.living().next(), Some(1));
     }
 }

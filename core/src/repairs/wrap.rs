@@ -18,11 +18,12 @@ use super::work::Work;
 use crate::chunk::{self, NONE};
 use crate::fresh;
 use crate::parallel;
+use crate::position::{self, Position};
 use crate::record;
 use crate::report::Wrap;
 use crate::settings::Profile;
 use crate::shop::components::{self, Components, Reversed, Through};
-use crate::shop::{Shop, bits, place};
+use crate::shop::{Shop, place};
 use crate::sums::Bounds;
 use crate::survey::Survey;
 use crate::wrap::tree::{Corners, Tree};
@@ -52,14 +53,14 @@ pub(super) struct Wraps {
     /// The new triangles.
     pub(super) triangles: Vec<Corners>,
     pub(super) regions: u64,
-    /// Positions of all vertices of the workshop that are gone, ascending by bits.
-    gone: Vec<[u32; 3]>,
+    /// Positions of all vertices of the workshop that are gone, ascending.
+    gone: Vec<Position>,
 }
 
 impl Wraps {
     /// Was this vertex of the workshop part of what was replaced?
     pub(super) fn replaced(&self, position: [f32; 3]) -> bool {
-        self.gone.binary_search(&bits(position)).is_ok()
+        self.gone.binary_search(&Position::of(position)).is_ok()
     }
 }
 
@@ -144,7 +145,7 @@ fn apply(
     }
     let goes = |piece: u32| piece != NONE && goes[piece as usize];
     let doomed: Vec<u32> = work.living().filter(|t| goes(pieces.of_triangle[*t as usize])).collect();
-    wraps.gone = doomed.iter().flat_map(|t| work.points(*t)).map(bits).collect();
+    wraps.gone = doomed.iter().flat_map(|t| work.points(*t)).map(Position::of).collect();
     wraps.gone.sort_unstable();
     wraps.gone.dedup();
     doomed.into_iter().for_each(|t| work.kill(t));
@@ -229,10 +230,10 @@ impl Groups {
                 groups.broken.fill(true);
             }
         }
-        let mut kept: Vec<[u32; 3]> = kept_open.iter().copied().map(bits).collect();
+        let mut kept: Vec<Position> = kept_open.iter().copied().map(Position::of).collect();
         kept.sort_unstable();
         for t in shop.living() {
-            if !kept.is_empty() && shop.points(t).iter().any(|p| kept.binary_search(&bits(*p)).is_ok()) {
+            if !kept.is_empty() && shop.points(t).iter().any(|p| kept.binary_search(&Position::of(*p)).is_ok()) {
                 groups.kept[of(t) as usize] = true;
             }
         }
@@ -301,7 +302,7 @@ impl Site<'_, '_> {
         for group in all {
             let size = self.size(&group);
             let told = Wrap {
-                bounds: [size.bounds.lo, size.bounds.hi].map(|p| p.map(|x| x + 0.0)),
+                bounds: [size.bounds.lo, size.bounds.hi].map(position::canonical),
                 replaced: size.triangles,
                 area: size.area,
                 area_share: if whole > 0.0 { size.area / whole } else { 0.0 },
@@ -358,7 +359,7 @@ impl Site<'_, '_> {
         let mut gathered = vec![Vec::new(); groups.len()];
         for (group, record, patch, t) in all {
             let with_sheet = if t == NONE {
-                let [a, b, c] = record::corners(&self.survey.records[record as usize]).map(|p| p.map(|x| x + 0.0));
+                let [a, b, c] = position::corners(&self.survey.records[record as usize]);
                 let is_turned = self.reversed.patches[patch as usize];
                 (self.sheets.of_patch[patch as usize], if is_turned { [a, c, b] } else { [a, b, c] })
             } else {
@@ -530,17 +531,17 @@ impl Site<'_, '_> {
         };
         let mut met: Vec<[u32; 2]> = pairs.iter().map(|pair| pair.triangles.map(piece)).collect();
         // Vertices of two surfaces in one place would be one when the file is read.
-        let mut corners: Vec<([u32; 3], u32)> = Vec::with_capacity(all.len());
+        let mut corners: Vec<(Position, u32)> = Vec::with_capacity(all.len());
         for (number, triangle) in &all {
-            corners.extend(triangle.map(|p| (bits(p), piece_of_new(number - first_new))));
+            corners.extend(triangle.map(|p| (Position::of(p), piece_of_new(number - first_new))));
         }
         drop(all);
         corners.sort_unstable();
         corners.dedup();
         met.extend(corners.windows(2).filter(|pair| pair[0].0 == pair[1].0).map(|pair| [pair[0].1, pair[1].1]));
         let at = |p: [f32; 3]| {
-            let found = corners.partition_point(|(q, _)| *q < bits(p));
-            corners.get(found).filter(|(q, _)| *q == bits(p)).map(|(_, piece)| *piece)
+            let found = corners.partition_point(|(q, _)| *q < Position::of(p));
+            corners.get(found).filter(|(q, _)| *q == Position::of(p)).map(|(_, piece)| *piece)
         };
         for t in self.shop.living() {
             let own = self.pieces.of_triangle[t as usize];

@@ -1,4 +1,4 @@
-//! Small gaps zipped: vertices that face each other across a narrow gap become one (METHODS C2, C4, basic).
+//! Small gaps zipped: vertices that face each other across a narrow gap become one.
 //!
 //! Two boundary vertices face each other when each is the other's nearest within a share of the edges around them, and the surfaces
 //! they end point at each other. (The rims of a thin shell lie as near, but point the same way: they are left alone.) A merge that

@@ -3,8 +3,9 @@
 use super::sheet::{edges, sorted};
 use super::{Region, Shaped};
 use crate::fill::cross::Triangle;
-use crate::fill::exact::{Point, collinear};
+use crate::fill::exact::collinear;
 use crate::fill::tree::{SelfCrossing, crossing_of_first};
+use crate::position::Position;
 
 /// Finite and distinct positions; no triangle without area; with the triangles around, no edge with more than two triangles or two that
 /// disagree; no triangle of the patch crosses or overlaps another, or one around. O(n log n).
@@ -24,10 +25,9 @@ pub(super) fn is_valid(region: &Region<'_>, shaped: &Shaped) -> bool {
 
 /// Does no new vertex lie where another vertex of patch or surroundings is?
 fn new_positions(region: &Region<'_>, shaped: &Shaped) -> bool {
-    let order = |a: &Point, b: &Point| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])).then(a[2].total_cmp(&b[2]));
-    let mut all: Vec<(Point, bool)> = region.positions.iter().map(|p| (p.map(|x| x + 0.0), false)).collect();
-    all.extend(shaped.added.iter().map(|p| (*p, true)));
-    all.sort_unstable_by(|a, b| order(&a.0, &b.0).then(a.1.cmp(&b.1)));
+    let mut all: Vec<(Position, bool)> = region.positions.iter().map(|p| (Position::of(*p), false)).collect();
+    all.extend(shaped.added.iter().map(|p| (Position::of(*p), true)));
+    all.sort_unstable();
     all.windows(2).all(|w| w[0].0 != w[1].0 || !(w[0].1 || w[1].1))
 }
 

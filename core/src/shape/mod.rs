@@ -20,6 +20,7 @@ mod tests;
 use glam::DVec3;
 
 use crate::fill::exact::{Point, at};
+use crate::position::Position;
 use fair::{Energy, solve};
 use refine::refine;
 use sheet::Sheet;
@@ -241,11 +242,7 @@ fn within(sheet: &Sheet<'_>) -> bool {
 }
 
 fn finish(sheet: &Sheet<'_>, region: &Region<'_>) -> Result<Shaped, Unshaped> {
-    let round = |p: &DVec3| {
-        let p = *p * sheet.unit + sheet.centre;
-        // Zero has one sign, so that equal positions have equal bits.
-        [p.x as f32 + 0.0, p.y as f32 + 0.0, p.z as f32 + 0.0]
-    };
+    let round = |p: &DVec3| Position::nearest(*p * sheet.unit + sheet.centre).coordinates();
     let added: Vec<Point> = sheet.points[sheet.fixed..].iter().map(round).collect();
     let shaped = Shaped { added, triangles: sheet.triangles.clone() };
     if check::is_valid(region, &shaped) { Ok(shaped) } else { Err(Unshaped::Crosses) }

@@ -14,7 +14,9 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use crate::chunk::{self, NONE, Suspect};
+use crate::position::Position;
 use crate::record::{self, Record};
+use crate::steps;
 use crate::survey::Survey;
 use crate::weld::Weld;
 
@@ -28,7 +30,7 @@ pub(crate) enum Origin {
     Input(u32),
     /// A part of this record; takes its attribute.
     Part(u32),
-    /// Closes a hole.
+    /// Made by a repair, as a part of no record; its attribute is 0.
     Patch,
 }
 
@@ -98,6 +100,7 @@ impl Gathering {
 
 /// The mesh under repair.
 pub(crate) struct Shop {
+    /// The coordinates of [`Position`]s: without −0.0.
     pub(crate) positions: Vec<[f32; 3]>,
     /// The whole star is here.
     pub(crate) complete: Vec<bool>,
@@ -135,22 +138,35 @@ impl Shop {
         gathering.finish()
     }
 
-    /// Takes in what [`Survey::promote`] has found for some of its incomplete vertices, which become complete.
-    pub(crate) fn extend(&mut self, survey: &Survey<'_>, new: &[(Suspect, u32)], completed: &[Vertex]) {
-        let mut known: HashMap<[u32; 3], Vertex> =
-            self.positions.iter().enumerate().map(|(v, p)| (p.map(f32::to_bits), v as Vertex)).collect();
+    /// Vertices by position: of several there, one that is used.
+    pub(crate) fn by_position(&self) -> HashMap<Position, Vertex> {
+        steps::count(self.positions.len());
+        let used = self.living().flat_map(|t| self.triangles[t as usize].v);
+        let all = 0..self.positions.len() as Vertex;
+        all.chain(used).map(|v| (Position::of(self.positions[v as usize]), v)).collect()
+    }
+
+    /// Takes in what [`Survey::promote`] has found for some of its incomplete vertices, which become complete: those that `completed`
+    /// names, which is told of all vertices by position.
+    pub(crate) fn extend(
+        &mut self,
+        survey: &Survey<'_>,
+        new: &[(Suspect, u32)],
+        completed: impl FnOnce(&HashMap<Position, Vertex>) -> Vec<Vertex>,
+    ) {
+        let mut known = self.by_position();
         for (suspect, patch) in new {
             let v = corners(survey.records, suspect.triangle).map(|p| {
-                let position = p.map(|x| x + 0.0);
-                *known.entry(position.map(f32::to_bits)).or_insert_with(|| {
-                    self.positions.push(position);
+                let position = Position::of(p);
+                *known.entry(position).or_insert_with(|| {
+                    self.positions.push(position.coordinates());
                     self.complete.push(false);
                     self.positions.len() as Vertex - 1
                 })
             });
             self.triangles.push(Triangle { v, origin: Origin::Input(suspect.triangle), patch: *patch, alive: true });
         }
-        completed.iter().for_each(|v| self.complete[*v as usize] = true);
+        completed(&known).into_iter().for_each(|v| self.complete[v as usize] = true);
         self.relink();
     }
 
@@ -160,6 +176,7 @@ impl Shop {
         self.heads.resize(self.positions.len(), NONE);
         self.nexts.clear();
         self.nexts.resize(self.triangles.len() * 3, NONE);
+        steps::count(self.triangles.len());
         for t in 0..self.triangles.len() {
             if self.triangles[t].alive {
                 self.link(t);
@@ -185,8 +202,8 @@ impl Shop {
     }
 
     /// Adds a vertex where none is, and returns its number. Its star is what will be added to it.
-    pub(crate) fn add_vertex(&mut self, position: [f32; 3]) -> Vertex {
-        self.positions.push(position);
+    pub(crate) fn add_vertex(&mut self, position: Position) -> Vertex {
+        self.positions.push(position.coordinates());
         self.complete.push(true);
         self.heads.push(NONE);
         self.positions.len() as Vertex - 1
@@ -240,6 +257,7 @@ impl Shop {
         let mut corner = self.heads[v as usize];
         std::iter::from_fn(move || {
             while corner != NONE {
+                steps::count(1);
                 let at = corner;
                 corner = self.nexts[at as usize];
                 let triangle = &self.triangles[(at / 3) as usize];
@@ -248,6 +266,16 @@ impl Shop {
                 }
             }
             None
+        })
+    }
+
+    /// All triangles in the star list of `v`, dead ones too.
+    pub(crate) fn linked(&self, v: Vertex) -> impl Iterator<Item = u32> + '_ {
+        let mut corner = self.heads[v as usize];
+        std::iter::from_fn(move || {
+            let at = (corner != NONE).then_some(corner)?;
+            corner = self.nexts[at as usize];
+            Some(at / 3)
         })
     }
 
@@ -295,11 +323,6 @@ pub(crate) fn place(p: [f32; 3]) -> DVec3 {
 pub(crate) fn cosine(a: DVec3, b: DVec3) -> f64 {
     let length = (a.dot(a) * b.dot(b)).sqrt();
     if length > 0.0 { a.dot(b) / length } else { 0.0 }
-}
-
-/// A position by its bits, so that it can be looked up; zero has two signs in a record, and one here.
-pub(crate) fn bits(p: [f32; 3]) -> [u32; 3] {
-    p.map(|x| (x + 0.0).to_bits())
 }
 
 /// Squared distance of a point from a triangle (Ericson, Real-Time Collision Detection, 2005, 5.1.5: by the regions of its edges and face).

@@ -17,6 +17,7 @@
 
 use glam::DVec3;
 
+use crate::position::Position;
 use crate::shop::{place, square_distance};
 use crate::sums::Bounds;
 use crate::{bodies, chunk};
@@ -342,18 +343,16 @@ fn side(t: &Corners, from: DVec3) -> f64 {
 /// A triangle over every edge of a surface that is not used equally often both ways, with a corner in the middle of the rim that it belongs to:
 /// together with them the surface is closed. O(n log n).
 fn caps(triangles: &[Corners]) -> Vec<Corners> {
-    type Bits = [u32; 3];
-    let bits = |p: [f32; 3]| -> Bits { p.map(|x| (x + 0.0).to_bits()) };
-    let mut uses: Vec<(Bits, Bits, i32)> = triangles
+    let mut uses: Vec<(Position, Position, i32)> = triangles
         .iter()
         .flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])])
-        .map(|(a, b)| (bits(a), bits(b)))
+        .map(|(a, b)| (Position::of(a), Position::of(b)))
         .filter(|(a, b)| a != b)
         .map(|(a, b)| if a < b { (a, b, 1) } else { (b, a, -1) })
         .collect();
     uses.sort_unstable();
     // Every rim edge as it must be run through by what closes it.
-    let rim: Vec<[Bits; 2]> = uses
+    let rim: Vec<[Position; 2]> = uses
         .chunk_by(|a, b| (a.0, a.1) == (b.0, b.1))
         .flat_map(|uses| {
             let (low, high, _) = uses[0];
@@ -363,24 +362,23 @@ fn caps(triangles: &[Corners]) -> Vec<Corners> {
         })
         .collect();
     drop(uses);
-    let mut vertices: Vec<Bits> = rim.as_flattened().to_vec();
+    let mut vertices: Vec<Position> = rim.as_flattened().to_vec();
     vertices.sort_unstable();
     vertices.dedup();
-    let number = |p: &Bits| vertices.partition_point(|q| q < p) as u32;
+    let number = |p: &Position| vertices.partition_point(|q| q < p) as u32;
     let mut parents: Vec<u32> = (0..vertices.len() as u32).collect();
     for [a, b] in &rim {
         chunk::unite(&mut parents, number(a), number(b));
     }
-    let position = |p: Bits| p.map(f32::from_bits);
     let mut middles = vec![(DVec3::ZERO, 0.0); vertices.len()];
     for (v, p) in vertices.iter().enumerate() {
         let middle = &mut middles[chunk::find(&mut parents, v as u32) as usize];
-        middle.0 += place(position(*p));
+        middle.0 += place(p.coordinates());
         middle.1 += 1.0;
     }
-    let mut cap = |[a, b]: &[Bits; 2]| {
+    let mut cap = |[a, b]: &[Position; 2]| {
         let (sum, count) = middles[chunk::find(&mut parents, number(a)) as usize];
-        [position(*a), position(*b), (sum / count).to_array().map(|x| x as f32)]
+        [a.coordinates(), b.coordinates(), (sum / count).to_array().map(|x| x as f32)]
     };
     rim.iter().map(&mut cap).collect()
 }

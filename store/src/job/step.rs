@@ -1,20 +1,20 @@
 //! Which event may follow which state, and what comes of it.
 
 use super::{
-    BACKOFF_CAP_MS, BACKOFF_MS, Blame, Death, ENVIRONMENT_RETRIES, Ending, Hold, Job, KILLS_FREE, Kind, Publication, State, Step,
-    Withdrawal, one_line,
+    BACKOFF_CAP_MS, BACKOFF_MS, Blame, Death, ENVIRONMENT_RETRIES, Ending, Hold, Job, KILLS_FREE, Kind, PARK_CAP_MS, PARK_MS,
+    Parked, Publication, State, Step, Testimony, WAIT_MS, Withdrawal, one_line,
 };
-use crate::id::{Epoch, Time, Token};
+use crate::id::{Boot, Epoch, Time, Token};
 
 /// Something that happens to a job.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// A worker takes it.
-    Claim { epoch: Epoch, token: Token },
+    /// A worker takes it, or, if it is parked, someone tries to bring its result into place once more.
+    Claim { epoch: Epoch, token: Token, boot: Boot },
     /// The holder of the claim `token` reports.
     Step { token: Token, step: Step },
-    /// The daemon of the claim's epoch died. `alone`: nothing else ran. `innocent`: there is a witness that it was not the file.
-    Interrupted { alone: bool, innocent: bool },
+    /// The daemon of the claim's epoch died. `alone`: nothing else ran.
+    Interrupted { alone: bool, testimony: Testimony },
     /// The claim goes over to a new life of the daemon, which will bring the result into place.
     Reclaim { epoch: Epoch, token: Token },
     /// An operator wants it tried (again), now.
@@ -30,6 +30,9 @@ pub enum Event {
 pub enum Illegal {
     #[error("a job that is {kind} cannot be {event}")]
     State { kind: Kind, event: &'static str },
+    /// Too late to take it back.
+    #[error("its result is in place already; the rest of it is brought into place as soon as that is possible")]
+    Committed,
     /// The claim is not the job's current one.
     #[error("the claim is void: the job was given to another worker since")]
     Fenced,
@@ -43,6 +46,9 @@ impl Event {
                 Step::Died(_) => "reported dead",
                 Step::Environment { .. } => "put off",
                 Step::HandBack => "handed back",
+                Step::Wait { .. } => "made to wait",
+                Step::NeedsAll => "given the whole memory",
+                Step::Park { .. } => "parked",
                 Step::Cancelled | Step::Withdrawn(_) => "withdrawn",
                 Step::Intend(_) => "intended",
                 Step::Placed => "placed",
@@ -71,7 +77,7 @@ impl Job {
         next.changed = now;
         let illegal = Illegal::State { kind: self.kind(), event: event.name() };
         match event {
-            Event::Claim { epoch, token } => next.claim(*epoch, *token, now).ok_or(illegal)?,
+            Event::Claim { epoch, token, boot } => next.claim(*epoch, *token, *boot, now).ok_or(illegal)?,
             Event::Step { token, step } => {
                 let hold = *self.hold().ok_or(Illegal::Fenced)?;
                 if hold.token != *token {
@@ -79,9 +85,11 @@ impl Job {
                 }
                 next.step(hold, step, now).ok_or(illegal)?;
             }
-            Event::Interrupted { alone, innocent } => next.interrupt(*alone, *innocent).ok_or(illegal)?,
+            Event::Interrupted { alone, testimony } => next.interrupt(*alone, *testimony).ok_or(illegal)?,
+            Event::Reclaim { .. } if self.rests_parked() => return Err(illegal),
             Event::Reclaim { epoch, token } => next.reclaim(*epoch, *token).ok_or(illegal)?,
             Event::Retry => next.retry().ok_or(illegal)?,
+            Event::Cancel if next.rests_parked() => next.give_up()?,
             Event::Cancel => match &mut next.state {
                 State::Queued { .. } | State::Noticed { .. } => next.state = State::Cancelled { why: Withdrawal::Operator },
                 State::Running { cancel, .. } => *cancel = true,
@@ -95,15 +103,33 @@ impl Job {
         Ok(next)
     }
 
-    fn claim(&mut self, epoch: Epoch, token: Token, now: Time) -> Option<()> {
+    fn claim(&mut self, epoch: Epoch, token: Token, boot: Boot, now: Time) -> Option<()> {
         if !self.is_due(now) {
             return None;
         }
+        if let Some(parked) = &mut self.parked {
+            parked.until = None;
+            return self.reclaim(epoch, token);
+        }
         self.attempts = self.attempts.next();
         self.work = Some(token);
-        let hold = Hold { attempt: self.attempts, epoch, token, alone: self.blame.is_suspect() };
+        let hold = Hold { attempt: self.attempts, epoch, token, alone: self.must_run_alone(), boot };
         self.state = State::Running { hold, cancel: false };
         Some(())
+    }
+
+    /// An operator gives a parked job up: a result that is not in place is thrown away, an original that cannot be moved stays.
+    fn give_up(&mut self) -> Result<(), Illegal> {
+        let committed = self.parked.take().is_some_and(|parked| parked.committed);
+        match &mut self.state {
+            State::Published { publication, .. } => {
+                let publication = Publication { original: None, ..publication.clone() };
+                self.state = State::Ended { publication };
+            }
+            _ if committed => return Err(Illegal::Committed),
+            _ => self.state = State::Cancelled { why: Withdrawal::Operator },
+        }
+        Ok(())
     }
 
     fn reclaim(&mut self, epoch: Epoch, token: Token) -> Option<()> {
@@ -119,12 +145,27 @@ impl Job {
 
     /// A step of the holder; `None` when it does not belong to the state.
     fn step(&mut self, hold: Hold, step: &Step, now: Time) -> Option<()> {
+        if let Step::Park { reason, committed } = step {
+            return self.park(reason, *committed, now);
+        }
+        self.parked = None;
         let state = std::mem::replace(&mut self.state, NOW);
         self.state = match (state, step) {
             (State::Running { cancel, .. }, Step::Died(death)) => self.died(hold, *death, cancel, now),
             (State::Running { cancel, .. }, Step::Environment { reason }) => self.put_off(hold, reason, cancel, now),
+            (State::Running { cancel: false, .. }, Step::Wait { reason }) => {
+                self.note = one_line(reason);
+                State::Queued { not_before: Some(now.plus_ms(WAIT_MS)) }
+            }
             (State::Running { cancel: false, .. }, Step::HandBack) => NOW,
-            (State::Running { .. }, Step::HandBack | Step::Cancelled) => State::Cancelled { why: Withdrawal::Operator },
+            (State::Running { cancel: false, .. }, Step::NeedsAll) if !hold.alone => {
+                self.needs_all = true;
+                self.note = "its share of the memory was too small; it gets all of it".into();
+                NOW
+            }
+            (State::Running { .. }, Step::HandBack | Step::Wait { .. } | Step::NeedsAll | Step::Cancelled) => {
+                State::Cancelled { why: Withdrawal::Operator }
+            }
             (State::Running { .. }, Step::Withdrawn(why)) => State::Cancelled { why: *why },
             // A result that is there is not thrown away because a cancel came late. Who is condemned, the machine says.
             (State::Running { .. }, Step::Intend(publication)) if !publication.ending.is_condemned() => {
@@ -140,6 +181,8 @@ impl Job {
                 publishing(hold, publication)
             }
             (State::Publishing { publication, .. }, Step::Placed) => State::Published { hold, publication },
+            // The file changed before anything of its result was in place.
+            (State::Publishing { .. }, Step::Withdrawn(why)) => State::Cancelled { why: *why },
             (State::Publishing { publication, .. }, Step::Lost) if publication.ending.is_condemned() => {
                 State::Concluded { hold, ending: publication.ending, reason: publication.reason }
             }
@@ -156,6 +199,20 @@ impl Job {
             }
             _ => return None,
         };
+        Some(())
+    }
+
+    fn park(&mut self, reason: &str, committed: bool, now: Time) -> Option<()> {
+        if !matches!(self.state, State::Concluded { .. } | State::Publishing { .. } | State::Published { .. }) {
+            return None;
+        }
+        self.note = one_line(reason);
+        let earlier = self.parked.unwrap_or(Parked { until: None, tries: 0, committed: false });
+        self.parked = Some(Parked {
+            until: Some(pause(PARK_MS, PARK_CAP_MS, earlier.tries, now)),
+            tries: earlier.tries.saturating_add(1),
+            committed: committed || earlier.committed,
+        });
         Some(())
     }
 
@@ -186,12 +243,24 @@ impl Job {
         State::Queued { not_before: Some(backoff(before, now)) }
     }
 
-    fn interrupt(&mut self, alone: bool, innocent: bool) -> Option<()> {
+    fn interrupt(&mut self, alone: bool, testimony: Testimony) -> Option<()> {
         let State::Running { hold, cancel } = self.state else { return None };
-        self.note = "the daemon died while it ran".into();
-        if !innocent {
-            self.blame.deaths = self.blame.deaths.saturating_add(1);
-            self.blame.deaths_alone = self.blame.deaths_alone.saturating_add(u32::from(alone));
+        let note = match testimony {
+            Testimony::None => "the daemon died while it ran",
+            Testimony::Outlived => "the daemon died while it ran, and not of it",
+            Testimony::InHand => "the daemon died of its worker's answer",
+            Testimony::Machine => "the machine went down while it ran",
+        };
+        self.note = note.into();
+        let blame = &mut self.blame;
+        match testimony {
+            Testimony::Outlived => {}
+            Testimony::Machine => blame.machine = blame.machine.saturating_add(1),
+            Testimony::None | Testimony::InHand => {
+                blame.deaths = blame.deaths.saturating_add(1);
+                let found = alone && testimony == Testimony::InHand;
+                blame.deaths_alone = blame.deaths_alone.saturating_add(u32::from(found));
+            }
         }
         self.state = if cancel { State::Cancelled { why: Withdrawal::Operator } } else { self.judge(hold) };
         Some(())
@@ -207,6 +276,10 @@ impl Job {
     }
 
     fn retry(&mut self) -> Option<()> {
+        if self.rests_parked() {
+            self.parked = self.parked.map(|parked| Parked { until: Some(Time(0)), ..parked });
+            return Some(());
+        }
         match &self.state {
             State::Queued { .. } | State::Cancelled { why: Withdrawal::Operator } => {}
             State::Ended { publication } if !publication.ending.is_good() => {
@@ -230,6 +303,10 @@ fn publishing(hold: Hold, publication: &Publication) -> State {
 
 /// 30 s, 60 s, 120 s … up to half an hour.
 fn backoff(earlier: u32, now: Time) -> Time {
-    let pause = BACKOFF_MS.checked_shl(earlier.min(16)).unwrap_or(BACKOFF_CAP_MS);
-    now.plus_ms(pause.min(BACKOFF_CAP_MS))
+    pause(BACKOFF_MS, BACKOFF_CAP_MS, earlier, now)
+}
+
+/// The end of a pause that doubles from `first` to `cap`, after so many `earlier` ones.
+fn pause(first: u64, cap: u64, earlier: u32, now: Time) -> Time {
+    now.plus_ms(first.saturating_mul(1 << earlier.min(16)).min(cap))
 }

@@ -25,6 +25,7 @@ fn publication(ending: Ending, hash: u8) -> Publication {
         output: Some(path.clone()),
         output_hash: Some(Hash([hash; 32])),
         report_hash: None,
+        source_ctime_ns: None,
         original: Some(path),
     }
 }
@@ -58,6 +59,9 @@ fn steps() -> impl Strategy<Value = Step> {
         4 => deaths().prop_map(Step::Died),
         2 => Just(Step::Environment { reason: "no space left".into() }),
         1 => Just(Step::HandBack),
+        1 => Just(Step::NeedsAll),
+        1 => Just(Step::Wait { reason: "no room".into() }),
+        3 => any::<bool>().prop_map(|committed| Step::Park { reason: "permission denied".into(), committed }),
         1 => Just(Step::Cancelled),
         1 => Just(Step::Withdrawn(Withdrawal::Changed)),
         1 => Just(Step::Withdrawn(Withdrawal::Vanished)),
@@ -69,12 +73,16 @@ fn steps() -> impl Strategy<Value = Step> {
     ]
 }
 
+fn testimonies() -> impl Strategy<Value = Testimony> {
+    prop_oneof![Just(Testimony::None), Just(Testimony::Outlived), Just(Testimony::InHand), Just(Testimony::Machine)]
+}
+
 /// Tokens and epochs come from `0..9`, so that claims of others are common; those of real claims are made unique below.
 fn events() -> impl Strategy<Value = Event> {
     prop_oneof![
-        6 => Just(Event::Claim { epoch: Epoch(1), token: Token(0) }),
+        6 => Just(Event::Claim { epoch: Epoch(1), token: Token(0), boot: Boot(1) }),
         12 => (prop::bool::weighted(0.9), steps()).prop_map(|(own, step)| Event::Step { token: Token(u64::from(own)), step }),
-        4 => any::<(bool, bool)>().prop_map(|(alone, innocent)| Event::Interrupted { alone, innocent }),
+        4 => (any::<bool>(), testimonies()).prop_map(|(alone, testimony)| Event::Interrupted { alone, testimony }),
         2 => Just(Event::Reclaim { epoch: Epoch(2), token: Token(0) }),
         1 => Just(Event::Retry),
         1 => Just(Event::Cancel),
@@ -85,7 +93,7 @@ fn events() -> impl Strategy<Value = Event> {
 /// Events with the tokens they would really come with: new ones for claims, for steps the current (`Token(1)`) or a void one.
 fn real(event: &Event, job: &Job, next: u64) -> Event {
     match event {
-        Event::Claim { epoch, .. } => Event::Claim { epoch: *epoch, token: Token(next) },
+        Event::Claim { epoch, boot, .. } => Event::Claim { epoch: *epoch, token: Token(next), boot: *boot },
         Event::Reclaim { epoch, .. } => Event::Reclaim { epoch: *epoch, token: Token(next) },
         Event::Step { token: Token(1), step } => {
             Event::Step { token: job.hold().map_or(Token(0), |hold| hold.token), step: step.clone() }
@@ -96,8 +104,11 @@ fn real(event: &Event, job: &Job, next: u64) -> Event {
 
 fn check_transition(before: &Job, event: &Event, after: &Job) -> Result<(), TestCaseError> {
     let claimed = matches!(event, Event::Claim { .. });
-    prop_assert_eq!(after.attempts.0, before.attempts.0 + u32::from(claimed), "attempts are counted by claims alone, and stay");
-    prop_assert_eq!(claimed, before.kind().is_queued() && after.kind() == Kind::Running);
+    let again = before.kind() == Kind::Parked;
+    let started = u32::from(claimed && !again);
+    prop_assert_eq!(after.attempts.0, before.attempts.0 + started, "attempts are counted by claims alone, and stay");
+    prop_assert_eq!(claimed && !again, before.kind().is_queued() && after.kind() == Kind::Running);
+    check_parking(before, event, after)?;
 
     // At rest means at rest: only an operator wakes a job, and never one with a good result.
     if before.duty() == Duty::Rest {
@@ -112,7 +123,9 @@ fn check_transition(before: &Job, event: &Event, after: &Job) -> Result<(), Test
         let State::Published { publication: placed, .. } = &before.state else {
             return Err(TestCaseError::fail("it ended without having been published"));
         };
-        prop_assert_eq!(placed, publication);
+        // An operator may leave an original that cannot be moved where it is.
+        let original = if matches!(event, Event::Cancel) { None } else { placed.original.clone() };
+        prop_assert_eq!(&Publication { original, ..placed.clone() }, publication);
     }
     // Blame.
     let grew = (
@@ -121,28 +134,48 @@ fn check_transition(before: &Job, event: &Event, after: &Job) -> Result<(), Test
         after.blame.deaths_alone > before.blame.deaths_alone,
     );
     let charged = matches!(event, Event::Step { step: Step::Died(death), .. } if !matches!(death, Death::Killed(_)));
-    let died = matches!(event, Event::Interrupted { innocent: false, .. });
+    let died = matches!(event, Event::Interrupted { testimony: Testimony::None | Testimony::InHand, .. });
     prop_assert!(!grew.0 || charged, "charged by {:?}", event);
     prop_assert!(!grew.1 || died, "suspected by {:?}", event);
-    let died_alone = matches!(event, Event::Interrupted { alone: true, innocent: false });
-    prop_assert!(!grew.2 || died_alone, "found alone by {:?}", event);
+    let found = matches!(event, Event::Interrupted { alone: true, testimony: Testimony::InHand });
+    prop_assert!(!grew.2 || found, "found alone by {:?}", event);
     if !matches!(event, Event::Retry) {
         prop_assert!(after.blame.charges >= before.blame.charges && after.blame.deaths >= before.blame.deaths);
     }
     check_bounds(after)
 }
 
+/// A parked job is no one's, keeps its state and its work, and goes on from there.
+fn check_parking(before: &Job, event: &Event, after: &Job) -> Result<(), TestCaseError> {
+    let state = |job: &Job| std::mem::discriminant(&job.state);
+    if after.kind() == Kind::Parked {
+        prop_assert!(after.hold().is_none() && after.duty() == Duty::Queue && after.pause().is_some());
+        prop_assert!(before.work == after.work && state(before) == state(after));
+        let by = matches!(event, Event::Retry | Event::Step { step: Step::Park { .. }, .. });
+        prop_assert!(by, "parked by {:?}", event);
+    }
+    if before.kind() == Kind::Parked {
+        match event {
+            Event::Claim { .. } => prop_assert!(state(before) == state(after) && after.hold().is_some()),
+            Event::Retry => {}
+            Event::Cancel => prop_assert_eq!(after.duty(), Duty::Rest),
+            _ => return Err(TestCaseError::fail("a parked job is no one's")),
+        }
+    }
+    Ok(())
+}
+
 fn check_bounds(job: &Job) -> Result<(), TestCaseError> {
     let Blame { charges, deaths_alone, deaths, .. } = job.blame;
     prop_assert!(charges <= 2 && deaths_alone <= 3 && charges + deaths_alone <= 3 && deaths_alone <= deaths);
-    if matches!(job.kind(), Kind::Queued | Kind::Waiting | Kind::Suspect) {
+    if matches!(job.kind(), Kind::Queued | Kind::Waiting | Kind::Alone) {
         prop_assert!(charges <= 1 && charges + deaths_alone <= 2, "it would be tried too often");
     }
     if let State::Concluded { ending: Ending::Quarantined, .. } = job.state {
         prop_assert!(charges == 2 || charges + deaths_alone == 3, "quarantined without reason");
     }
     if let State::Running { hold, .. } = &job.state {
-        prop_assert_eq!(hold.alone, deaths >= 2);
+        prop_assert_eq!(hold.alone, deaths >= 2 || job.blame.machine > 0 || job.needs_all);
         prop_assert_eq!(hold.attempt, job.attempts);
     }
     Ok(())
@@ -181,12 +214,12 @@ proptest! {
             now = now.plus_ms(BACKOFF_CAP_MS);
             job = job.after(&real(event, &job, 10 + at as u64), now).unwrap_or(job);
         }
-        for at in 0..5 {
+        for at in 0..6 {
             now = now.plus_ms(BACKOFF_CAP_MS);
             let step = match (job.duty(), &job.state) {
                 (Duty::Rest, _) => break,
                 (Duty::Queue, _) => {
-                    job = job.after(&Event::Claim { epoch: Epoch(9), token: Token(100 + at) }, now).unwrap();
+                    job = job.after(&Event::Claim { epoch: Epoch(9), token: Token(100 + at), boot: Boot(1) }, now).unwrap();
                     continue;
                 }
                 (Duty::Run, _) => Step::Intend(publication(Ending::Clean, 1)),
@@ -207,23 +240,23 @@ proptest! {
 fn run(job: &Job, event: impl Fn(Token) -> Event) -> Job {
     let token = Token(u64::from(job.attempts.0) + 1);
     let now = job.changed.plus_ms(BACKOFF_CAP_MS);
-    job.after(&Event::Claim { epoch: Epoch(1), token }, now).unwrap().after(&event(token), now).unwrap()
+    job.after(&Event::Claim { epoch: Epoch(1), token, boot: Boot(1) }, now).unwrap().after(&event(token), now).unwrap()
 }
 
 fn dies(death: Death) -> impl Fn(Token) -> Event {
     move |token| Event::Step { token, step: Step::Died(death) }
 }
 
-fn daemon_dies(alone: bool, innocent: bool) -> impl Fn(Token) -> Event {
-    move |_| Event::Interrupted { alone, innocent }
+fn daemon_dies(alone: bool, testimony: Testimony) -> impl Fn(Token) -> Event {
+    move |_| Event::Interrupted { alone, testimony }
 }
 
 #[test]
-fn one_crash_and_two_deaths_of_the_daemon_alone_are_three() {
+fn one_crash_and_two_deaths_of_the_daemon_in_its_hands_are_three() {
     let mut job = run(&fresh(), dies(Death::Signal(6)));
-    job = run(&job, daemon_dies(true, false));
+    job = run(&job, daemon_dies(true, Testimony::InHand));
     assert_eq!(job.kind(), Kind::Queued);
-    job = run(&job, daemon_dies(true, false));
+    job = run(&job, daemon_dies(true, Testimony::InHand));
     assert_eq!((job.kind(), job.attempts), (Kind::Concluded, Attempt(3)));
 }
 
@@ -231,18 +264,85 @@ fn one_crash_and_two_deaths_of_the_daemon_alone_are_three() {
 fn company_is_no_proof() {
     let mut job = fresh();
     for _ in 0..10 {
-        job = run(&job, daemon_dies(false, false));
+        job = run(&job, daemon_dies(false, Testimony::InHand));
     }
-    assert_eq!((job.kind(), job.blame.deaths_alone), (Kind::Suspect, 0));
+    assert_eq!((job.kind(), job.blame.deaths_alone), (Kind::Alone, 0));
+}
+
+/// D8: daemon and worker killed at once, again and again, leave nothing that speaks against the file.
+#[test]
+fn deaths_without_a_trace_never_condemn() {
+    let mut job = fresh();
+    for _ in 0..100 {
+        job = run(&job, daemon_dies(true, Testimony::None));
+    }
+    assert_eq!((job.kind(), job.blame.deaths_alone), (Kind::Alone, 0));
+}
+
+/// D8: a power cut is never the file's fault; it runs alone afterwards.
+#[test]
+fn deaths_of_the_machine_never_condemn() {
+    let mut job = fresh();
+    for _ in 0..100 {
+        job = run(&job, daemon_dies(true, Testimony::Machine));
+        assert_eq!((job.kind(), job.blame.deaths, job.blame.deaths_alone), (Kind::Alone, 0, 0));
+    }
 }
 
 #[test]
 fn a_witness_clears_even_a_file_that_was_alone() {
     let mut job = fresh();
     for _ in 0..10 {
-        job = run(&job, daemon_dies(true, true));
+        job = run(&job, daemon_dies(true, Testimony::Outlived));
     }
     assert_eq!((job.kind(), job.blame), (Kind::Queued, Blame::default()));
+}
+
+/// D3: a result that cannot be brought into place waits by itself, ever longer, and goes on where it was.
+#[test]
+fn a_parked_job_is_tried_again_and_again() {
+    let park = |token| Event::Step { token, step: Step::Park { reason: "read-only\nfile system".into(), committed: false } };
+    let intend = |token| Event::Step { token, step: Step::Intend(publication(Ending::Clean, 1)) };
+    let mut job = run(&fresh(), intend);
+    job = job.after(&park(job.hold().unwrap().token), job.changed).unwrap();
+    for tries in 2..20 {
+        assert_eq!((job.kind(), job.note.as_str()), (Kind::Parked, "read-only file system"));
+        let pause = job.pause().unwrap().0 - job.changed.0;
+        assert_eq!(pause, (PARK_MS << (tries - 2)).min(PARK_CAP_MS));
+        assert!(!job.is_due(Time(job.pause().unwrap().0 - 1)));
+        job = run(&job, park);
+        assert_eq!((job.parked.unwrap().tries, job.attempts), (tries, Attempt(1)));
+    }
+    let job = run(&job, |token| Event::Step { token, step: Step::Placed });
+    assert_eq!((job.kind(), job.parked), (Kind::Published, None));
+}
+
+/// An operator can give a parked job up, unless a part of its result is in place already.
+#[test]
+fn a_parked_job_can_be_cancelled() {
+    let parked = |committed| {
+        let job = run(&fresh(), |token| Event::Step { token, step: Step::Intend(publication(Ending::Clean, 1)) });
+        let step = Step::Park { reason: "no".into(), committed };
+        job.after(&Event::Step { token: job.hold().unwrap().token, step }, job.changed).unwrap()
+    };
+    let cancelled = parked(false).after(&Event::Cancel, Time(0)).unwrap();
+    assert!(cancelled.kind() == Kind::Cancelled && cancelled.answers_for_source());
+    assert_eq!(parked(true).after(&Event::Cancel, Time(0)), Err(Illegal::Committed));
+    let published = run(&parked(true), |token| Event::Step { token, step: Step::Placed });
+    let token = published.hold().unwrap().token;
+    let stuck = Event::Step { token, step: Step::Park { reason: "not ours".into(), committed: true } };
+    let ended = published.after(&stuck, Time(0)).unwrap().after(&Event::Cancel, Time(0)).unwrap();
+    assert!(ended.kind() == Kind::Done && ended.answers_for_source(), "the original stays, and is not taken again");
+}
+
+/// A file that its share of the memory was too small for runs once more, alone, and is blamed for nothing.
+#[test]
+fn a_file_that_needs_all_memory_runs_alone() {
+    let job = run(&fresh(), |token| Event::Step { token, step: Step::NeedsAll });
+    assert_eq!((job.kind(), job.blame), (Kind::Alone, Blame::default()));
+    let alone = job.after(&Event::Claim { epoch: Epoch(1), token: Token(9), boot: Boot(1) }, job.changed).unwrap();
+    let again = alone.after(&Event::Step { token: Token(9), step: Step::NeedsAll }, job.changed);
+    assert!(alone.hold().unwrap().alone && again.unwrap().kind() != Kind::Alone, "there is not more than all");
 }
 
 #[test]
@@ -269,7 +369,7 @@ fn reasons_are_one_line_and_short() {
 fn only_the_rules_condemn() {
     for ending in [Ending::Quarantined, Ending::Environment] {
         let now = Time(1);
-        let running = fresh().after(&Event::Claim { epoch: Epoch(1), token: Token(1) }, now).unwrap();
+        let running = fresh().after(&Event::Claim { epoch: Epoch(1), token: Token(1), boot: Boot(1) }, now).unwrap();
         let event = Event::Step { token: Token(1), step: Step::Intend(publication(ending, 1)) };
         assert!(matches!(running.after(&event, now), Err(Illegal::State { kind: Kind::Running, .. })));
     }

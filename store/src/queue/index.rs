@@ -1,8 +1,9 @@
 //! The index by state. Keys begin with the kind's tag; what follows is what that kind is searched by:
 //!
-//! * queued, suspect: class of the size (its number of binary digits, one byte) · job number · size. So a claim that wants sizes
+//! * queued, queued alone: class of the size (its number of binary digits, one byte) · job number · size. So a claim that wants sizes
 //!   in a range looks at one entry for each class, not at every job.
-//! * waiting: end of the pause · job number · 1 if suspect · size.
+//! * waiting: end of the pause · job number · 1 if it must run alone · size.
+//! * parked: end of the pause · job number.
 //! * all others: job number.
 
 use std::collections::BTreeMap;
@@ -19,7 +20,7 @@ fn tag(kind: Kind) -> u8 {
         Kind::Noticed => 1,
         Kind::Queued => 2,
         Kind::Waiting => 3,
-        Kind::Suspect => 4,
+        Kind::Alone => 4,
         Kind::Running => 5,
         Kind::Concluded => 6,
         Kind::Publishing => 7,
@@ -29,6 +30,7 @@ fn tag(kind: Kind) -> u8 {
         Kind::NeedsReview => 11,
         Kind::Quarantined => 12,
         Kind::Cancelled => 13,
+        Kind::Parked => 14,
     }
 }
 
@@ -42,10 +44,14 @@ pub(super) fn key(job: &Job) -> Vec<u8> {
     let kind = job.kind();
     let mut key = vec![tag(kind)];
     match (kind, &job.state) {
+        (Kind::Parked, _) => {
+            key.extend_from_slice(&job.pause().unwrap_or_default().0.to_be_bytes());
+            key.extend_from_slice(&job.id.0.to_be_bytes());
+        }
         (_, State::Queued { not_before: Some(then) }) => {
             key.extend_from_slice(&then.0.to_be_bytes());
             key.extend_from_slice(&job.id.0.to_be_bytes());
-            key.push(u8::from(job.blame.is_suspect()));
+            key.push(u8::from(job.must_run_alone()));
             key.extend_from_slice(&job.source.size.to_be_bytes());
         }
         (_, State::Queued { not_before: None }) => {
@@ -66,8 +72,8 @@ fn number(key: &[u8], at: usize) -> Result<u64, StoreError> {
 /// Where the job number stands in a key.
 fn id_at(kind: Kind) -> usize {
     match kind {
-        Kind::Queued | Kind::Suspect => 2,
-        Kind::Waiting => 9,
+        Kind::Queued | Kind::Alone => 2,
+        Kind::Waiting | Kind::Parked => 9,
         _ => 1,
     }
 }
@@ -96,15 +102,18 @@ pub(super) fn count(tables: &dyn Tables) -> Result<BTreeMap<Kind, u64>, StoreErr
     Ok(counts)
 }
 
-/// The oldest job that `want` allows and that is due at `now`.
+/// The oldest job that `want` allows and that is due at `now`. Parked jobs come first: there is little to do for them.
 pub(super) fn first_due(tables: &dyn Tables, want: &Filter, now: Time) -> Result<Option<JobId>, StoreError> {
+    if let Some(id) = first_parked(tables, now)? {
+        return Ok(Some(id));
+    }
     let ready = first_ready(tables, want)?;
     let rested = first_rested(tables, want, now)?;
     Ok([ready, rested].into_iter().flatten().min())
 }
 
 fn first_ready(tables: &dyn Tables, want: &Filter) -> Result<Option<JobId>, StoreError> {
-    let tag = tag(if want.suspects { Kind::Suspect } else { Kind::Queued });
+    let tag = tag(if want.alone { Kind::Alone } else { Kind::Queued });
     let (least, most) = want.size;
     let mut best: Option<JobId> = None;
     let mut from = class(least);
@@ -133,23 +142,43 @@ fn first_ready(tables: &dyn Tables, want: &Filter) -> Result<Option<JobId>, Stor
     Ok(best)
 }
 
-/// The oldest job whose pause is over: it ended, or it ends later than any pause may (the clock has jumped).
-fn first_rested(tables: &dyn Tables, want: &Filter, now: Time) -> Result<Option<JobId>, StoreError> {
-    let tag = tag(Kind::Waiting);
+/// Keys of `kind` whose pause is over at `now`: it ended, or it ends later than any pause may (the clock has jumped).
+fn rested(
+    tables: &dyn Tables,
+    kind: Kind,
+    now: Time,
+    each: &mut dyn FnMut(&[u8]) -> Result<bool, StoreError>,
+) -> Result<(), StoreError> {
+    let tag = tag(kind);
     let at = |time: u64| [&[tag][..], &time.to_be_bytes()].concat();
-    let mut best: Option<JobId> = None;
     let over = (at(0), at(now.0.saturating_add(1)));
     let beyond = (at(now.plus_ms(BACKOFF_CAP_MS).0.saturating_add(1)), vec![tag + 1]);
     for (from, to) in [over, beyond] {
-        tables.scan(Table::ByState, &from, &to, &mut |key, _| {
-            let id = JobId(number(key, 9)?);
-            let suspect = key.get(17).is_some_and(|flag| *flag == 1);
-            let size = number(key, 18)?;
-            if suspect == want.suspects && (want.size.0..=want.size.1).contains(&size) {
-                best = Some(best.map_or(id, |best| best.min(id)));
-            }
-            Ok(true)
-        })?;
+        tables.scan(Table::ByState, &from, &to, &mut |key, _| each(key))?;
     }
+    Ok(())
+}
+
+fn first_parked(tables: &dyn Tables, now: Time) -> Result<Option<JobId>, StoreError> {
+    let mut first = None;
+    rested(tables, Kind::Parked, now, &mut |key| {
+        first = first.or(Some(JobId(number(key, id_at(Kind::Parked))?)));
+        Ok(false)
+    })?;
+    Ok(first)
+}
+
+/// The oldest job whose pause is over.
+fn first_rested(tables: &dyn Tables, want: &Filter, now: Time) -> Result<Option<JobId>, StoreError> {
+    let mut best: Option<JobId> = None;
+    rested(tables, Kind::Waiting, now, &mut |key| {
+        let id = JobId(number(key, id_at(Kind::Waiting))?);
+        let alone = key.get(17).is_some_and(|flag| *flag == 1);
+        let size = number(key, 18)?;
+        if alone == want.alone && (want.size.0..=want.size.1).contains(&size) {
+            best = Some(best.map_or(id, |best| best.min(id)));
+        }
+        Ok(true)
+    })?;
     Ok(best)
 }

@@ -36,6 +36,39 @@ pub(super) fn lock(state: &Path) -> Result<File, StoreError> {
     }
 }
 
+/// Is `LOCK` in the folder still the one that is held?
+pub(super) fn check_lock(state: &Path, held: &File) -> Result<(), StoreError> {
+    use std::os::unix::fs::MetadataExt;
+    let id = |meta: std::io::Result<std::fs::Metadata>| meta.ok().map(|meta| (meta.dev(), meta.ino()));
+    let there = id(std::fs::symlink_metadata(state.join("LOCK")));
+    if there.is_some() && there == id(held.metadata()) {
+        return Ok(());
+    }
+    Err(StoreError::Unusable {
+        path: state.to_owned(),
+        reason: "its folder was moved, removed or made anew while it was in use".into(),
+        advice: "put it back, or start again; originals and results are where they were".into(),
+    })
+}
+
+/// Is the folder owned by a daemon? Its process number, if it says so. Needs no right to write.
+pub(super) fn owner(state: &Path) -> Result<Option<Option<u32>>, StoreError> {
+    let path = state.join("LOCK");
+    let mut file = match File::open(&path) {
+        Ok(file) => file,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(source) => return Err(StoreError::Io { path, action: "opening the lock", source }),
+    };
+    match file.try_lock_shared() {
+        Ok(()) => Ok(None),
+        Err(TryLockError::WouldBlock) => {
+            let mut text = String::new();
+            Ok(Some(file.read_to_string(&mut text).ok().and_then(|_| text.trim().parse().ok())))
+        }
+        Err(TryLockError::Error(source)) => Err(StoreError::Io { path, action: "locking", source }),
+    }
+}
+
 /// A daemon that died while it started a worker holds the lock until that child has become the worker: a moment.
 fn try_patiently(file: &File) -> Result<(), TryLockError> {
     for _ in 0..20 {
@@ -85,11 +118,20 @@ pub(super) fn write_mark(state: &Path, epoch: Epoch, seq: Seq) -> Result<(), Sto
     let text = format!("{body} {:08x}\n", crc32fast::hash(body.as_bytes()));
     let path = state.join("SEQ");
     let temporary = state.join("SEQ.tmp");
-    let mut file = File::create(&temporary).map_err(io(&temporary, "making"))?;
+    let mut file = create_new(&temporary)?;
     file.write_all(text.as_bytes()).and_then(|()| file.sync_all()).map_err(io(&temporary, "writing"))?;
     crate::crash_point("store.mark.written");
     std::fs::rename(&temporary, &path).map_err(io(&path, "replacing"))?;
     sync_dir(state)
+}
+
+/// A new file of that name: whatever else the name stood for is unlinked, never opened.
+fn create_new(path: &Path) -> Result<File, StoreError> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(io(path, "removing")(error)),
+        _ => {}
+    }
+    File::options().write(true).create_new(true).open(path).map_err(io(path, "making"))
 }
 
 /// Makes the names in `dir` durable.
@@ -138,10 +180,28 @@ pub(super) fn copy_dir(from: &Path, to: &Path, leave_out: fn(&Path) -> bool) -> 
         if path.is_dir() {
             copy_dir(&path, &target, leave_out)?;
         } else {
-            std::fs::copy(&path, &target).map_err(io(&path, "copying"))?;
+            let mut from = File::open(&path).map_err(io(&path, "copying"))?;
+            std::io::copy(&mut from, &mut create_new(&target)?).map_err(io(&path, "copying"))?;
         }
     }
     Ok(())
+}
+
+/// Makes a folder and those above it, each durable in the one it lies in.
+pub(super) fn make_folder(path: &Path) -> Result<(), StoreError> {
+    // Only what the system says is not there is made: an error is no absence.
+    match std::fs::metadata(path) {
+        Ok(_) => return Ok(()),
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(io(path, "looking at the folder")(error)),
+        Err(_) => {}
+    }
+    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    make_folder(parent)?;
+    match std::fs::create_dir(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::AlreadyExists => return Err(io(path, "making the folder")(error)),
+        _ => {}
+    }
+    sync_dir(parent)
 }
 
 /// Makes everything in `dir` durable.

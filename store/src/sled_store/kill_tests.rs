@@ -12,7 +12,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use super::*;
 use crate::id::Seq;
-use crate::job::{Ending, Kind};
+use crate::job::{Ending, Kind, Testimony};
 use crate::testkit::{dropped, result_of};
 
 const VICTIM: &str = "SUTURE_STORE_TEST_VICTIM";
@@ -28,7 +28,7 @@ fn say(job: &Job) {
 
 fn victim(state: &Path) {
     let store = SledStore::open(state).unwrap();
-    for one in store.recover(&|_| true).unwrap() {
+    for one in store.recover(&|_| Testimony::Outlived).unwrap() {
         say(&one.job);
         if let Some(claim) = &one.claim {
             finish(&store, claim, one.job.kind());

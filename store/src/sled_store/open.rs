@@ -10,6 +10,7 @@ use super::files::{self, Mark, io};
 use super::tables::{self, SledTables};
 use crate::crash_point;
 use crate::id::{Clock, Epoch, Seq};
+use crate::job::Job;
 use crate::queue::{Queue, read_head};
 use crate::store::StoreError;
 
@@ -38,10 +39,32 @@ pub(super) fn queue(state: &Path, clock: &Arc<dyn Clock>) -> Result<(Queue<SledT
     if mark == Mark::Damaged {
         tracing::warn!("SEQ was damaged; the job database itself is sound, and SEQ is written anew");
     }
-    let queue = Queue::open(tables, Arc::clone(clock))?;
+    // sled never syncs its settings, nor the names of its files.
+    files::sync_all(&dir)?;
     files::sync_dir(state)?;
+    let queue = Queue::open(tables, Arc::clone(clock))?;
     opening.epoch = queue.epoch();
     Ok((queue, opening))
+}
+
+/// All jobs in `state`, read from a copy of its database in a temporary folder: for who may or can not write there. The copy is small
+/// (some kilobytes a job), and goes at once.
+///
+/// # Errors
+/// [`StoreError::Locked`] when a daemon owns the folder; else as opening.
+pub(super) fn peek(state: &Path) -> Result<Vec<Job>, StoreError> {
+    let dir = state.join("db");
+    if let Some(pid) = files::owner(state)? {
+        return Err(StoreError::Locked { path: state.to_owned(), pid });
+    }
+    if !dir.exists() {
+        return Ok(Vec::new());
+    }
+    let temporary = tempfile::tempdir().map_err(io(&std::env::temp_dir(), "making a temporary folder"))?;
+    let copy = temporary.path().join("db");
+    files::copy_dir(&dir, &copy, |path| path.extension().is_some_and(|ext| ext == "generating"))?;
+    let tables = SledTables::open(temporary.path(), &copy)?;
+    crate::queue::all_jobs(&tables)
 }
 
 /// Makes the folder fit for sled: an examination that a crash cut short is ended, and a first `SEQ` says that nothing was

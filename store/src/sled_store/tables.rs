@@ -11,6 +11,7 @@ use super::files::{self, io};
 use crate::crash_point;
 use crate::id::{Epoch, Seq};
 use crate::queue::{Put, Table, Tables, Visit};
+use crate::stall::Call;
 use crate::store::StoreError;
 
 /// Transitions between two marks in `SEQ`.
@@ -19,15 +20,43 @@ const MARK_EVERY: u64 = 64;
 pub(super) struct SledTables {
     state: PathBuf,
     dir: PathBuf,
+    /// Gone only while this value is dropped.
+    handles: Option<Handles>,
+    /// Our own handle of the database file: the only way to a real sync.
+    file: File,
+    progress: Mutex<Progress>,
+    synced: Condvar,
+}
+
+/// Everything that keeps the database open.
+struct Handles {
     db: sled::Db,
     meta: sled::Tree,
     jobs: sled::Tree,
     by_state: sled::Tree,
     by_key: sled::Tree,
-    /// Our own handle of the database file: the only way to a real sync.
-    file: File,
-    progress: Mutex<Progress>,
-    synced: Condvar,
+}
+
+impl Drop for SledTables {
+    fn drop(&mut self) {
+        // sled flushes when its last handle goes, and, where the disk fails it, panics or waits for ever: in doubt, the handles stay, and
+        // end with the process.
+        let sound = self.sound().and_then(|()| self.sync());
+        let handles = self.handles.take();
+        let closed = match sound {
+            Ok(()) => guarded(|| {
+                drop(handles);
+                Ok(())
+            }),
+            Err(error) => {
+                std::mem::forget(handles);
+                Err(error)
+            }
+        };
+        if let Err(error) = closed {
+            tracing::error!(%error, "the job database could not be closed; nothing acknowledged is lost");
+        }
+    }
 }
 
 #[derive(Default)]
@@ -52,8 +81,9 @@ pub(super) fn cause(error: &StoreError) -> Option<&sled::Error> {
     }
 }
 
-/// Runs `act` of sled, which may panic over damaged files; that is an error like any other.
+/// Runs `act` of sled, which may panic over damaged files; that is an error like any other. While it runs, it can be seen from outside.
 fn guarded<T>(act: impl FnOnce() -> Result<T, StoreError>) -> Result<T, StoreError> {
+    let _call = Call::begin();
     catch_unwind(AssertUnwindSafe(act)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
         let what = text.unwrap_or("no message").to_owned();
@@ -81,11 +111,7 @@ impl SledTables {
             Ok(Self {
                 state: state.to_owned(),
                 dir: dir.to_owned(),
-                db,
-                meta,
-                jobs,
-                by_state,
-                by_key,
+                handles: Some(Handles { db, meta, jobs, by_state, by_key }),
                 file,
                 progress: Mutex::default(),
                 synced: Condvar::new(),
@@ -95,16 +121,21 @@ impl SledTables {
 
     #[cfg(test)]
     pub(super) fn raw_jobs(&self) -> &sled::Tree {
-        &self.jobs
+        &self.handles.as_ref().unwrap().jobs
     }
 
-    fn tree(&self, table: Table) -> &sled::Tree {
-        match table {
-            Table::Meta => &self.meta,
-            Table::Jobs => &self.jobs,
-            Table::ByState => &self.by_state,
-            Table::ByKey => &self.by_key,
-        }
+    fn handles(&self) -> Result<&Handles, StoreError> {
+        self.handles.as_ref().ok_or_else(|| StoreError::Poisoned { reason: "it was closed".into() })
+    }
+
+    fn tree(&self, table: Table) -> Result<&sled::Tree, StoreError> {
+        let handles = self.handles()?;
+        Ok(match table {
+            Table::Meta => &handles.meta,
+            Table::Jobs => &handles.jobs,
+            Table::ByState => &handles.by_state,
+            Table::ByKey => &handles.by_key,
+        })
     }
 
     fn progress(&self) -> MutexGuard<'_, Progress> {
@@ -122,7 +153,7 @@ impl SledTables {
     /// Makes everything written durable.
     fn sync(&self) -> Result<(), StoreError> {
         guarded(|| {
-            self.db.flush().map_err(failed)?;
+            self.handles()?.db.flush().map_err(failed)?;
             crash_point("store.sync.flushed");
             self.file.sync_data().map_err(io(&self.dir.join("db"), "syncing the database file"))?;
             crash_point("store.sync.synced");
@@ -157,14 +188,13 @@ impl SledTables {
 
 impl Tables for SledTables {
     fn get(&self, table: Table, key: &[u8]) -> Result<Option<Vec<u8>>, StoreError> {
-        let read = guarded(|| self.tree(table).get(key).map_err(failed));
+        let read = guarded(|| self.tree(table)?.get(key).map_err(failed));
         Ok(read.map_err(|error| self.poison(error))?.map(|value| value.to_vec()))
     }
 
     fn scan(&self, table: Table, from: &[u8], to: &[u8], each: Visit<'_>) -> Result<(), StoreError> {
-        let tree = self.tree(table);
-        let entries = if to.is_empty() { tree.range(from..) } else { tree.range(from..to) };
-        let mut entries = entries;
+        let tree = self.tree(table)?;
+        let mut entries = if to.is_empty() { tree.range(from..) } else { tree.range(from..to) };
         while let Some(entry) = guarded(|| entries.next().transpose().map_err(failed)).map_err(|error| self.poison(error))? {
             if !each(&entry.0, &entry.1)? {
                 break;
@@ -175,7 +205,8 @@ impl Tables for SledTables {
 
     fn write(&self, puts: Vec<Put>, seq: Seq) -> Result<(), StoreError> {
         self.sound()?;
-        let trees = (&self.meta, &self.jobs, &self.by_state, &self.by_key);
+        let Handles { meta, jobs, by_state, by_key, .. } = self.handles()?;
+        let trees = (meta, jobs, by_state, by_key);
         let written = guarded(|| {
             let result: TransactionResult<(), ()> = trees.transaction(|(meta, jobs, by_state, by_key)| {
                 for put in &puts {

@@ -92,7 +92,7 @@ fn a_flipped_bit_is_an_error_not_another_value() {
     let id = submit(&store, "part.stl");
     let whole = store.get(id).unwrap().unwrap();
     let key = id.0.to_be_bytes();
-    let Live::Open(queue) = &*store.live.read().unwrap() else { panic!("it is open") };
+    let queue = &store.queue;
     let jobs = queue.tables().raw_jobs();
     let bytes = jobs.get(key).unwrap().unwrap().to_vec();
     for bit in 0..bytes.len() * 8 {
@@ -137,7 +137,7 @@ fn a_database_that_never_was_is_set_aside() {
     std::fs::write(state.path().join("db/snap.FFFFFFFFFFFFFFF0"), b"no snapshot").unwrap();
     let store = SledStore::open(state.path()).unwrap();
     assert_eq!(store.opening().epoch, Epoch(1));
-    assert!(store.opening().set_aside.unwrap().join("snap.FFFFFFFFFFFFFFF0").exists());
+    assert!(store.opening().set_aside.clone().unwrap().join("snap.FFFFFFFFFFFFFFF0").exists());
 }
 
 /// A crash between the two renames that put a restored database in the place of a damaged one.
@@ -204,7 +204,7 @@ fn a_damaged_snapshot_is_made_anew_from_the_log() {
         std::fs::write(path, bytes).unwrap();
     }
     let store = SledStore::open(state.path()).unwrap();
-    let aside = store.opening().set_aside.unwrap();
+    let aside = store.opening().set_aside.clone().unwrap();
     assert!(aside.join("db").exists(), "the damaged one is kept");
     assert_eq!(store.list(&Query::default()).unwrap().len(), 3);
     assert_eq!(store.opening().epoch, Epoch(4));
@@ -235,23 +235,25 @@ fn a_cut_log_is_refused_and_left_as_it_is() {
 }
 
 #[test]
-fn reopening_begins_a_new_epoch_and_keeps_everything() {
-    let state = tempfile::tempdir().unwrap();
-    let store = SledStore::open(state.path()).unwrap();
+fn a_poisoned_store_does_nothing_and_loses_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let state = folder.path().join("state");
+    let store = SledStore::open(&state).unwrap();
     let id = submit(&store, "part.stl");
     let claim = store.claim(&Filter::default()).unwrap().unwrap();
-    {
-        let Live::Open(queue) = &*store.live.read().unwrap() else { panic!("it is open") };
-        queue.tables().poison(StoreError::Poisoned { reason: "no space left".into() });
-    }
+    store.queue.tables().poison(StoreError::Poisoned { reason: "no space left".into() });
     let refused = store.advance(&claim, Step::HandBack).unwrap_err();
     assert!(matches!(&refused, StoreError::Poisoned { reason } if reason.contains("no space left")), "{refused:?}");
     assert!(matches!(store.claim(&Filter::default()), Err(StoreError::Poisoned { .. })));
     assert!(store.get(id).unwrap().is_some(), "reading goes on");
-    store.reopen().unwrap();
+    drop(store);
+    // Its handles end with this process: another one finds what a copy shows.
+    let copy = folder.path().join("copy");
+    super::files::copy_dir(&state, &copy, |_| false).unwrap();
+    let store = SledStore::open(&copy).unwrap();
     assert_eq!(store.opening().epoch, Epoch(2));
     assert_eq!(store.heartbeat(&claim).unwrap(), Lease::Lost);
-    let recovered = store.recover(&|_| true).unwrap();
+    let recovered = store.recover(&|_| Testimony::Outlived).unwrap();
     assert_eq!(recovered[0].void, claim.token);
     assert_eq!(store.claim(&Filter::default()).unwrap().unwrap().id, id);
 }
@@ -297,3 +299,40 @@ fn damage_on_disk_is_never_silent() {
 
 /// Places in each file that are damaged in turn.
 const FLIPS: usize = 12;
+
+/// A store is looked at without a right to write, without a new epoch, and not while a daemon owns it.
+#[test]
+fn a_peek_writes_nothing() {
+    let state = tempfile::tempdir().unwrap();
+    assert_eq!(SledStore::peek(state.path()).unwrap(), []);
+    let store = SledStore::open(state.path()).unwrap();
+    store.submit(&[dropped("part.stl", 84).unwrap()]).unwrap();
+    store.claim(&Filter::default()).unwrap().unwrap();
+    assert!(matches!(SledStore::peek(state.path()), Err(StoreError::Locked { pid: Some(_), .. })));
+    let job = store.get(JobId(1)).unwrap().unwrap();
+    drop(store);
+    let listing = || {
+        let mut names: Vec<_> = super::files::list(&state.path().join("db")).unwrap();
+        names.sort();
+        names.into_iter().map(|path| (std::fs::read(&path).unwrap_or_default(), path)).collect::<Vec<_>>()
+    };
+    let before = listing();
+    assert_eq!(SledStore::peek(state.path()).unwrap(), [job]);
+    assert!(listing() == before);
+}
+
+/// D5: a store whose folder was removed, or made anew, is not opened again as an empty one.
+#[test]
+fn a_store_that_was_taken_away_is_not_begun_anew() {
+    let dir = tempfile::tempdir().unwrap();
+    let state = dir.path().join("state");
+    let store = SledStore::open(&state).unwrap();
+    store.check().unwrap();
+    std::fs::rename(&state, dir.path().join("away")).unwrap();
+    assert!(matches!(store.check(), Err(StoreError::Unusable { .. })));
+    std::fs::create_dir(&state).unwrap();
+    assert!(matches!(store.check(), Err(StoreError::Unusable { .. })), "it is another folder");
+    std::fs::remove_dir(&state).unwrap();
+    std::fs::rename(dir.path().join("away"), &state).unwrap();
+    store.check().unwrap();
+}

@@ -242,6 +242,7 @@ fn attributes_normals_and_header_of_the_untouched_pass_through() {
     // The turned one: its corners change, its colour stays.
     assert_eq!(stl::corners(&new[2]), [a, b, c]);
     assert_eq!(stl::attribute(&new[2]), 0x8002);
+    assert_eq!(stl::numbers(&new[2])[0], stl::unit_normal(&[a, b, c]), "its normal is that of its corners");
     assert_eq!(new.len(), 12);
     assert_eq!((stl::attribute(&new[11]), stl::numbers(&new[11])[0]), (0, stl::unit_normal(&stl::corners(&new[11]))));
     assert_eq!(report["edit"]["untouched"], 10);

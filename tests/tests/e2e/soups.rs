@@ -109,7 +109,7 @@ fn holds_in_little_memory(input: &Path, output: &Path, written: &[u8]) -> Result
         match repair(input, output, &limits) {
             Ok(_) => prop_assert!(std::fs::read(output).unwrap() == written, "{} bytes of memory: other bytes", memory_bytes),
             Err(error) => {
-                prop_assert_eq!(error.class(), ErrorClass::Refused, "{}", error);
+                prop_assert_eq!(error.class(), ErrorClass::Starved, "{}", error);
                 prop_assert!(error.to_string().contains("--memory"), "{}", error);
             }
         }

@@ -179,6 +179,11 @@ fn folder_in_use_is_code_73() {
         std::thread::sleep(std::time::Duration::from_millis(50));
         place.at("hot/out").is_dir() && place.suture(["watch", "hot", "--once"]).code() == 73
     });
+    // Through the daemon, and at once.
+    let asked = std::time::Instant::now();
+    let listed = place.suture(["jobs", "list", "--dir", "hot"]).expect(0);
+    assert!(listed.stdout().contains("notes.txt") || listed.stdout().contains("no jobs"), "{}", listed.stdout());
+    assert!(asked.elapsed() < std::time::Duration::from_secs(5), "it waited for an answer that was there");
     rustix::process::kill_process(rustix::process::Pid::from_child(&daemon), rustix::process::Signal::TERM).unwrap();
     let status = daemon.wait().unwrap();
     assert!(serving && status.code() == Some(0), "{status}");

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use super::super::work::Work;
 use crate::arrange::{Arrange, Arrangement, Piece};
+use crate::position::Position;
 use crate::shop::{Shop, Vertex};
 
 /// Times that the triangles to be cut are added to because a neighbour was cut at its edge.
@@ -64,10 +65,8 @@ impl Cut {
         arrangement.pieces.iter().for_each(|piece| starts[piece.source as usize + 1] += 1);
         (0..sources.len()).for_each(|s| starts[s + 1] += starts[s]);
         let corners = sources.iter().flat_map(|t| shop.triangles[*t as usize].v);
-        let by_position: HashMap<[u64; 3], Vertex> =
-            corners.map(|v| (shop.positions[v as usize].map(|x| f64::from(x).to_bits()), v)).collect();
-        // −0.0 is no position of the workshop.
-        let at = |p: &[f64; 3]| by_position.get(&p.map(|x| (x + 0.0).to_bits())).copied();
+        let by_position: HashMap<Position, Vertex> = corners.map(|v| (Position::of(shop.positions[v as usize]), v)).collect();
+        let at = |p: &[f64; 3]| by_position.get(&Position::exactly(*p)?).copied();
         let exact = arrangement.points.iter().zip(&arrangement.exact).zip(0..).filter(|((_, exact), _)| **exact);
         let vertices: HashMap<u32, Vertex> = exact.filter_map(|((p, _), point)| Some((point, at(p)?))).collect();
         let points = vertices.iter().map(|(point, v)| (*v, *point)).collect();

@@ -8,10 +8,12 @@ use super::super::work::Work;
 use super::super::{collinear, duplicates};
 use super::cut::Cut;
 use super::sides::Sides;
-use super::{Failure, State, Stuck, Tried, vertices};
+use super::{Failure, State, Stuck, Tried};
 use crate::chunk::NONE;
 use crate::defects;
-use crate::shop::{Shop, Vertex, bits};
+use crate::position::Position;
+use crate::shop::{Shop, Vertex, place};
+use crate::steps;
 
 /// What becomes of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,18 +92,18 @@ impl State<'_, '_, '_> {
         let points: BTreeSet<u32> = new.iter().flat_map(|(_, v)| *v).filter(|point| !cut.vertices.contains_key(point)).collect();
         let cut_from: HashMap<u32, u32> = new.iter().flat_map(|(t, v)| v.map(|point| (point, *t))).collect();
         let step = self.step;
-        let rounded = |point: u32| cut.arrangement.points[point as usize].map(|x| place_of(x, step));
+        let rounded = |point: u32| Position::of(cut.arrangement.points[point as usize].map(|x| place_of(x, step)));
         // There may be a vertex already, here or elsewhere in the file.
-        self.complete(points.iter().map(|point| rounded(*point)).collect());
-        let mut known = vertices(self.work);
+        self.complete(points.iter().map(|point| rounded(*point).coordinates()).collect());
+        let mut known = self.work.by_position();
         let mut vertex_of: HashMap<u32, Vertex> = cut.vertices.clone();
         for point in points {
             let position = rounded(point);
             let exact = DVec3::from_array(cut.arrangement.points[point as usize]);
-            let by = exact.distance(DVec3::from_array(position.map(f64::from)));
+            let by = exact.distance(place(position.coordinates()));
             displaced = displaced.max(by);
             self.track.moved(&self.clusters, cut_from[&point], by);
-            let v = *known.entry(bits(position)).or_insert_with(|| self.work.add_vertex(position));
+            let v = *known.entry(position).or_insert_with(|| self.work.add_vertex(position));
             vertex_of.insert(point, v);
         }
         let first = self.work.triangles.len() as u32;
@@ -134,16 +136,16 @@ impl State<'_, '_, '_> {
 /// A coordinate in f32: what it is, if it has a place there, as in a plane along the axes, else the nearest on the grid.
 fn place_of(x: f64, step: f64) -> f32 {
     let nearest = x as f32;
-    if f64::from(nearest) == x { nearest + 0.0 } else { on_grid(x, step) }
+    if f64::from(nearest) == x { nearest } else { on_grid(x, step) }
 }
 
 /// The nearest multiple of a power of two, which is not too small for f32 to have them.
 fn on_grid(x: f64, step: f64) -> f32 {
-    ((x / step).round() * step) as f32 + 0.0
+    ((x / step).round() * step) as f32
 }
 
-/// What becomes of each source that need not be cut: all of it alike, nothing else that stays has an edge in its middle, as a body that stands on it
-/// with an edge, and nobody cut otherwise ends at a point in its middle or on its edges.
+/// A source stays whole if all its pieces share one fate, no other edge that stays crosses its interior (as of a body that stands on it with an
+/// edge), and no divided neighbour ends in its interior or on its edges.
 fn whole_sources(shop: &Shop, cut: &Cut, fates: &[Fate]) -> Vec<Option<Fate>> {
     let count = cut.sources.len();
     let range = |s: usize| cut.range(s);
@@ -179,38 +181,50 @@ fn whole_sources(shop: &Shop, cut: &Cut, fates: &[Fate]) -> Vec<Option<Fate>> {
             whole[own[0].1 as usize] = None;
         }
     }
-    // Sources with a piece at each point that is not theirs alone.
-    let mut at: HashMap<u32, Vec<u32>> = HashMap::new();
+    let mut uses: Vec<Use> = Vec::new();
     for s in 0..count {
         for piece in cut.pieces(s).iter().zip(&fates[range(s)]).filter(|(_, f)| **f != Fate::Goes).map(|(p, _)| p) {
-            for point in piece.v {
-                let sources = at.entry(point).or_default();
-                if sources.last() != Some(&(s as u32)) {
-                    sources.push(s as u32);
-                }
-            }
+            uses.extend(piece.v.map(|point| Use { point, source: s as u32, is_corner: is_corner(s, &point) }));
         }
     }
-    loop {
-        let mut changed = false;
-        for s in 0..count {
-            if !matches!(whole[s], Some(Fate::Stays | Fate::Turns)) || cut.pieces(s).len() == 1 {
-                continue;
+    let is_whole: Vec<bool> = whole.iter().map(|fate| matches!(fate, Some(Fate::Stays | Fate::Turns))).collect();
+    let mut stays = is_whole.clone();
+    divide_beside(uses, |s| cut.pieces(s).len() > 1, &mut stays);
+    for (fate, _) in whole.iter_mut().zip(is_whole.iter().zip(&stays)).filter(|(_, (was, is))| **was && !**is) {
+        *fate = None;
+    }
+    whole
+}
+
+/// A source has a piece that stays at a point, and the point may be a corner of its.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Use {
+    point: u32,
+    source: u32,
+    is_corner: bool,
+}
+
+/// Sources that would stay whole do not, if they are in several pieces and another source ends at a point of theirs that is no corner of theirs:
+/// one that has a corner there, or does not stay whole. O(uses · log): each point is looked at once.
+fn divide_beside(mut uses: Vec<Use>, is_divided: impl Fn(usize) -> bool, stays: &mut [bool]) {
+    uses.sort_unstable();
+    uses.dedup();
+    let points: Vec<&[Use]> = uses.chunk_by(|a, b| a.point == b.point).collect();
+    let mut points_of: Vec<Vec<u32>> = vec![Vec::new(); stays.len()];
+    for (number, there) in (0..).zip(&points) {
+        there.iter().for_each(|used| points_of[used.source as usize].push(number));
+    }
+    let ends = |there: &[Use]| there.iter().any(|used| used.is_corner || !stays[used.source as usize]);
+    let mut is_end: Vec<bool> = points.iter().map(|there| ends(there)).collect();
+    let mut left: Vec<u32> = (0..).zip(&is_end).filter(|(_, is_end)| **is_end).map(|(number, _)| number).collect();
+    while let Some(number) = left.pop() {
+        for used in points[number as usize] {
+            steps::count(1);
+            let s = used.source as usize;
+            if !used.is_corner && stays[s] && is_divided(s) {
+                stays[s] = false;
+                left.extend(points_of[s].iter().filter(|p| !std::mem::replace(&mut is_end[**p as usize], true)));
             }
-            let needed = |point: &u32| {
-                !is_corner(s, point)
-                    && at[point].iter().any(|o| {
-                        let o = *o as usize;
-                        is_corner(o, point) || !matches!(whole[o], Some(Fate::Stays | Fate::Turns))
-                    })
-            };
-            if cut.pieces(s).iter().flat_map(|piece| &piece.v).any(needed) {
-                whole[s] = None;
-                changed = true;
-            }
-        }
-        if !changed {
-            return whole;
         }
     }
 }
@@ -241,5 +255,39 @@ fn cancel(work: &mut Work<'_>, added: &[u32]) {
                 work.kill(o);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chain_of_divided_sources_takes_steps_in_proportion() {
+        // Each has a point in the middle in common with the next one, and the last one does not stay whole.
+        steps::assert_near_linear(1000, |n| {
+            let shared = |s: u32| [s, s + 1].map(|point| Use { point, source: s, is_corner: false });
+            let uses: Vec<Use> = (0..n as u32).flat_map(shared).collect();
+            let mut stays = vec![true; n];
+            stays[n - 1] = false;
+            let (steps, ()) = steps::of(|| divide_beside(uses, |_| true, &mut stays));
+            assert!(!stays.contains(&true));
+            steps
+        });
+    }
+
+    #[test]
+    fn a_source_is_divided_where_another_one_ends_but_not_at_its_own_corners() {
+        let used = |point, source, is_corner| Use { point, source, is_corner };
+        let stay = |uses: &[Use], pieces: [usize; 3], mut stays: [bool; 3]| {
+            divide_beside(uses.to_vec(), |s| pieces[s] > 1, &mut stays);
+            stays
+        };
+        let meet = [used(0, 0, false), used(0, 1, true), used(1, 1, true), used(1, 2, true)];
+        assert_eq!(stay(&meet, [2; 3], [true; 3]), [false, true, true], "1 ends in the middle of 0");
+        assert_eq!(stay(&meet, [1, 2, 2], [true; 3]), [true; 3], "0 is in one piece");
+        let middle = [used(0, 0, false), used(0, 1, false), used(1, 1, false), used(1, 2, false)];
+        assert_eq!(stay(&middle, [2; 3], [true; 3]), [true; 3], "nothing ends");
+        assert_eq!(stay(&middle, [2; 3], [true, true, false]), [false; 3], "2 is cut, and so all are");
     }
 }

@@ -1,4 +1,4 @@
-//! Crossings: bodies that cross each other, or themselves, become one (METHODS B3, B4).
+//! Crossings: bodies that cross each other, or themselves, become one.
 //!
 //! The triangles that cross something, and their neighbours, are cut along everything they meet ([`cut`], [`crate::arrange`]). Cells of space in
 //! front of and behind their pieces, the other triangles of the workshop and the patches of sound surface are one where these join
@@ -18,8 +18,10 @@
 //! it was, and the others are resolved without it.
 
 mod cut;
+mod dust;
 mod embed;
 mod near;
+mod passes;
 mod refill;
 mod sides;
 mod spread;
@@ -27,7 +29,8 @@ mod spread;
 mod tests;
 mod track;
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet, BinaryHeap, HashMap, HashSet};
 use std::path::Path;
 
 use self::cut::Cut;
@@ -42,13 +45,15 @@ use super::work::Work;
 use crate::Progress;
 use crate::arrange::Arrange;
 use crate::boxes;
-use crate::chunk::{self, NONE, Suspect};
+use crate::chunk::{self, NONE};
 use crate::defects;
 use crate::error::{Error, Result};
+use crate::position::Position;
 use crate::report::Region;
 use crate::settings::{Bodies, Limits, Profile};
 use crate::shop::components::{Component, Components, Reversed};
-use crate::shop::{self, Origin, Shop, Triangle, Vertex, bits};
+use crate::shop::{self, Origin, Shop, Triangle, Vertex};
+use crate::steps;
 use crate::sums::{Bounds, Extent};
 use crate::survey::{Division, Survey};
 
@@ -63,6 +68,8 @@ pub(super) struct Resolved {
     /// Bodies that became part of others, and the volume that counted more than once.
     pub(super) bodies: u64,
     pub(super) volume: f64,
+    /// Where cutting left bodies that no printer can see, which are dropped.
+    pub(super) dust: Vec<Region>,
     /// The surface was looked at anew: patches have other numbers than before.
     pub(super) divided: bool,
     /// Why some surfaces were left as they were, and how many of them.
@@ -150,7 +157,7 @@ pub(super) struct Means<'a> {
 /// crosses; the rest goes by what does.
 ///
 /// # Errors
-/// [`Error::Refused`] when there is not memory enough.
+/// [`Error::Starved`] when there is not memory enough.
 pub(super) fn resolve(
     engine: &dyn Arrange,
     survey: &mut Survey<'_>,
@@ -208,6 +215,7 @@ pub(super) fn resolve(
         match state.attempt(engine, &overlay, &pairs, &levels, profile, means.limits) {
             Ok(resolved) => {
                 state.drop_specks();
+                let dust = state.drop_dust(&pieces);
                 let (bodies_now, volume_now) = measured(&orient::pieces(state.survey, state.work, state.reversed));
                 return Ok(Resolved {
                     bodies: bodies.saturating_sub(bodies_now),
@@ -216,6 +224,7 @@ pub(super) fn resolve(
                     regions: state.track.regions(&mut state.clusters),
                     regions_left,
                     taken_part,
+                    dust,
                     divided: true,
                     ..resolved
                 });
@@ -243,19 +252,9 @@ pub(super) fn resolve(
 /// The corners of the triangles of some pairs, each once.
 fn corners(survey: &Survey<'_>, shop: &Shop, overlay: &Overlay, pairs: &[[u32; 2]]) -> Vec<[f32; 3]> {
     let mut positions: Vec<[f32; 3]> = pairs.iter().flatten().flat_map(|number| overlay.corners(survey, shop, *number)).collect();
-    positions.sort_unstable_by_key(|p| bits(*p));
+    positions.sort_unstable_by_key(|p| Position::of(*p));
     positions.dedup();
     positions
-}
-
-/// Takes triangles into the workshop, and marks the vertices at these positions as complete; returns the first of the triangles.
-pub(super) fn take_in(survey: &Survey<'_>, work: &mut Work<'_>, new: &[(Suspect, u32)], positions: &[[f32; 3]]) -> u32 {
-    let first = work.triangles.len() as u32;
-    work.extend(survey, new, &[]);
-    let known = vertices(work);
-    let completed: Vec<Vertex> = positions.iter().filter_map(|p| known.get(&bits(*p)).copied()).collect();
-    work.extend(survey, &[], &completed);
-    first
 }
 
 /// Gathers the stars of the vertices at these positions into the workshop, so that sound surface on the two sides of what crosses is two
@@ -268,7 +267,7 @@ fn divide(
     means: &Means<'_>,
 ) -> Result<()> {
     let Division { fetched, divided_from } = survey.divide(means.path, &positions, means.limits, means.progress)?;
-    let first = take_in(survey, work, &fetched, &positions);
+    let first = work.extend_at(survey, &fetched, &positions);
     for t in first..work.triangles.len() as u32 {
         join_in(work, reversed, t);
     }
@@ -418,6 +417,7 @@ impl State<'_, '_, '_> {
         self.track = Track::default();
         let too_many = || Stuck::with(Failure::TooMany);
         let mut crossing = self.crossing(overlay, pairs, profile);
+        self.unite(&crossing);
         resolved.pairs = crossing.len() as u64;
         let most = crossing.len().max(FEW) * GROWTH;
         let mut latest: Option<Overlay> = None;
@@ -448,6 +448,7 @@ impl State<'_, '_, '_> {
             let first_new = self.work.triangles.len() as u32;
             resolved.displaced = resolved.displaced.max(self.round(engine, &triangles, &along, limits.threads)?);
             let met = self.met(crossing, profile, |t| t >= first_new)?;
+            self.unite(&met.crossing);
             tracing::debug!(pairs = met.crossing.len(), "Cut.");
             width = (width * WIDER).min(self.step / FINEST * WIDEST);
             limit = (limit * WIDER).min(self.step / FINEST * FARTHEST);
@@ -473,7 +474,8 @@ impl State<'_, '_, '_> {
         Ok(resolved)
     }
 
-    /// What crosses now, after these triangles have changed: the pairs that did before, of which neither has, still do.
+    /// The pairs that cross now, after these triangles have changed: pairs from before, of which neither has, still do. Where that is kept,
+    /// their pieces are to be united.
     fn met(&mut self, before: Vec<[u32; 2]>, profile: &Profile, changed: impl Fn(u32) -> bool + Sync) -> Tried<Met> {
         let too_many = || Stuck::with(Failure::TooMany);
         self.check_closed()?;
@@ -492,19 +494,20 @@ impl State<'_, '_, '_> {
     /// triangles cross, and yet one side of the one is not one cell. `None` if that is too much work to tell.
     fn with_edges_along(&mut self, overlay: &Overlay, crossing: &BTreeSet<u32>) -> Option<BTreeSet<u32>> {
         let pieces: BTreeSet<u32> = crossing.iter().map(|t| self.clusters.of_triangle[*t as usize]).collect();
-        let (mut all, mut asked) = (crossing.clone(), BTreeSet::new());
-        loop {
-            let corners: BTreeSet<Vertex> = all.iter().flat_map(|t| self.work.triangles[*t as usize].v).collect();
-            let around: BTreeSet<u32> = corners.iter().flat_map(|v| self.work.star(*v)).map(|(t, _)| t).collect();
+        let (mut seen, mut asked): (HashSet<Vertex>, HashSet<u32>) = Default::default();
+        grown(crossing, |fresh| {
+            let corners: BTreeSet<Vertex> = fresh.iter().flat_map(|t| self.work.triangles[*t as usize].v).collect();
+            let corners = corners.into_iter().filter(|v| seen.insert(*v));
+            let around: BTreeSet<u32> = corners.flat_map(|v| self.work.star(v)).map(|(t, _)| t).collect();
             let new: Vec<u32> = around.into_iter().filter(|t| self.clusters.holds(*t) && asked.insert(*t)).collect();
             if new.is_empty() {
-                return Some(all);
+                return Some(Vec::new());
             }
             let pairs = overlay.edges_along(self.survey, self.work, &new)?;
             let pairs = self.in_shop(overlay, &pairs);
             let crosses = |t: &u32| pieces.contains(&self.clusters.of_triangle[*t as usize]);
-            all.extend(pairs.into_iter().filter(|pair| pair.iter().all(crosses)).flatten());
-        }
+            Some(pairs.into_iter().filter(|pair| pair.iter().all(crosses)).flatten().collect())
+        })
     }
 
     /// Cuts, decides and rounds once. Returns how far vertices were moved.
@@ -525,11 +528,15 @@ impl State<'_, '_, '_> {
             let [a, b] = pair.map(|t| self.clusters.of_triangle[t as usize]);
             self.clusters.takes_part(a) && self.clusters.takes_part(b) && (profile.bodies != Bodies::Keep || a == b)
         });
-        for pair in &crossing {
+        crossing
+    }
+
+    /// The pieces of these pairs are of one cluster from now on.
+    fn unite(&mut self, crossing: &[[u32; 2]]) {
+        for pair in crossing {
             let [a, b] = pair.map(|t| self.clusters.of_triangle[t as usize]);
             chunk::unite(&mut self.clusters.parents, a, b);
         }
-        crossing
     }
 
     /// Pairs of triangles as the workshop numbers them, where they are fetched to if need be, with all around them.
@@ -549,15 +556,15 @@ impl State<'_, '_, '_> {
 
     /// Fetches the stars of the vertices at these positions that are not here.
     fn complete(&mut self, mut positions: Vec<[f32; 3]>) {
-        positions.sort_unstable_by_key(|p| bits(*p));
+        positions.sort_unstable_by_key(|p| Position::of(*p));
         positions.dedup();
-        let known = vertices(self.work);
-        positions.retain(|p| known.get(&bits(*p)).is_none_or(|v| !self.work.complete[*v as usize]));
+        let known = self.work.by_position();
+        positions.retain(|p| known.get(&Position::of(*p)).is_none_or(|v| !self.work.complete[*v as usize]));
         if positions.is_empty() {
             return;
         }
         let new = self.survey.promote(&positions);
-        let first = take_in(self.survey, self.work, &new, &positions);
+        let first = self.work.extend_at(self.survey, &new, &positions);
         for t in first..self.work.triangles.len() as u32 {
             let mut triangle = self.work.triangles[t as usize];
             let patch = triangle.patch;
@@ -591,20 +598,8 @@ impl State<'_, '_, '_> {
         let piece_of: HashMap<u32, u32> = known.filter(|(_, piece)| *piece != NONE).collect();
         let pieces = left.iter().map(|t| record(*t).and_then(|r| piece_of.get(&r).copied()).unwrap_or(NONE));
         self.clusters.of_triangle.extend(pieces.collect::<Vec<_>>());
-        loop {
-            let before = left.len();
-            left.retain(|t| {
-                let stars = self.work.triangles[*t].v.into_iter().flat_map(|v| self.work.star(v));
-                let known = stars.map(|(o, _)| self.clusters.of_triangle[o as usize]).filter(|piece| *piece != NONE);
-                if self.clusters.of_triangle[*t] == NONE {
-                    self.clusters.of_triangle[*t] = known.min().unwrap_or(NONE);
-                }
-                self.clusters.of_triangle[*t] == NONE
-            });
-            if left.is_empty() || left.len() == before {
-                return;
-            }
-        }
+        left.retain(|t| self.clusters.of_triangle[*t] == NONE);
+        follow_neighbours(self.work, &left, &mut self.clusters.of_triangle);
     }
 
     /// Every edge of what takes part must be used as often in one direction as in the other.
@@ -665,6 +660,54 @@ impl State<'_, '_, '_> {
     }
 }
 
+/// Gives each of these triangles, ascending, the smallest piece of the triangles at its corners, and so on from neighbour to neighbour. They
+/// have their turns in rounds, each in their order, as soon as a neighbour has a piece. O(stars · log).
+fn follow_neighbours(shop: &Shop, left: &[usize], piece_of: &mut [u32]) {
+    let mut waiting: HashMap<Vertex, Vec<usize>> = HashMap::new();
+    // By vertex the smallest piece around it.
+    let mut least: HashMap<Vertex, u32> = HashMap::new();
+    let mut turns: BinaryHeap<Reverse<(u32, usize)>> = BinaryHeap::new();
+    for t in left {
+        for v in shop.triangles[*t].v {
+            waiting.entry(v).or_default().push(*t);
+            let around = || shop.star(v).map(|(o, _)| piece_of[o as usize]).min().unwrap_or(NONE);
+            if *least.entry(v).or_insert_with(around) != NONE {
+                turns.push(Reverse((0, *t)));
+            }
+        }
+    }
+    while let Some(Reverse((round, t))) = turns.pop() {
+        steps::count(1);
+        if piece_of[t] != NONE {
+            continue;
+        }
+        let v = shop.triangles[t].v;
+        let piece = v.iter().filter_map(|v| least.get(v)).min().copied().unwrap_or(NONE);
+        piece_of[t] = piece;
+        // A dead triangle is nobody's neighbour.
+        for v in v.iter().filter(|_| shop.lives(t as u32)) {
+            let least = least.entry(*v).or_insert(NONE);
+            if *least == NONE {
+                let waiting = waiting.remove(v).unwrap_or_default();
+                turns.extend(waiting.into_iter().map(|o| Reverse((round + u32::from(o <= t), o))));
+            }
+            *least = piece.min(*least);
+        }
+    }
+}
+
+/// These triangles and all that `beside` finds beside new ones, until there are none. `beside` is asked once about each triangle.
+fn grown(start: &BTreeSet<u32>, mut beside: impl FnMut(&[u32]) -> Option<Vec<u32>>) -> Option<BTreeSet<u32>> {
+    let mut all = start.clone();
+    let mut fresh: Vec<u32> = start.iter().copied().collect();
+    while !fresh.is_empty() {
+        steps::count(fresh.len());
+        fresh = beside(&fresh)?;
+        fresh.retain(|t| all.insert(*t));
+    }
+    Some(all)
+}
+
 /// How many points the cuts of these pairs may have in common, at most; if they are too many, the triangle on which most others come close to
 /// each other.
 fn meetings(bounds: impl Fn(u32) -> Bounds, crossing: &[[u32; 2]]) -> std::result::Result<u64, u32> {
@@ -688,7 +731,7 @@ fn meetings(bounds: impl Fn(u32) -> Bounds, crossing: &[[u32; 2]]) -> std::resul
 /// What cutting so many triangles along each other needs, beside what there is.
 fn refused(means: &Means<'_>, needed: u64, triangles: usize) -> Error {
     let mebibytes = |bytes: u64| bytes.div_ceil(1 << 20);
-    Error::Refused {
+    Error::Starved {
         path: means.path.into(),
         reason: format!("cutting {triangles} triangles along what they cross needs about {} MiB of memory", mebibytes(needed)),
         advice: format!(
@@ -716,11 +759,4 @@ fn coincident(shop: &Shop) -> Vec<[u32; 2]> {
     let candidates = defects::by_vertex_set(shop);
     let groups = candidates.chunk_by(|a, b| a.0 == b.0);
     groups.flat_map(|group| group.windows(2).map(|two| [two[0].1, two[1].1])).collect()
-}
-
-/// Vertices by position: of several there, one that is used.
-fn vertices(shop: &Shop) -> HashMap<[u32; 3], Vertex> {
-    let used = shop.living().flat_map(|t| shop.triangles[t as usize].v);
-    let all = 0..shop.positions.len() as Vertex;
-    all.chain(used).map(|v| (bits(shop.positions[v as usize]), v)).collect()
 }

@@ -13,11 +13,12 @@ use std::collections::BTreeSet;
 
 use glam::DVec3;
 
-use super::track::Track;
-use super::{Met, State, Tried, vertices};
+use super::passes::Passes;
+use super::{Met, State, Tried};
 use crate::chunk::NONE;
+use crate::position::Position;
 use crate::settings::Profile;
-use crate::shop::{Origin, Triangle, Vertex, bits};
+use crate::shop::Vertex;
 
 /// What a pass changed.
 #[derive(Default)]
@@ -26,38 +27,38 @@ struct Changed {
     triangles: BTreeSet<u32>,
     /// How far a surface was moved.
     farthest: f64,
-}
-
-/// The workshop before a pass.
-pub(super) struct Before {
-    triangles: Vec<Triangle>,
-    parents: Vec<u32>,
-    track: Track,
+    /// Triangles whose surface was made one with another one, and how far that was away: for the track, if the pass is kept.
+    snapped: Vec<(u32, f64)>,
 }
 
 impl State<'_, '_, '_> {
-    /// Passes while there are fewer pairs after each. Returns what crosses then, and how far anything was moved.
+    /// Passes while there are fewer pairs after each, as often as [`Passes`] allows. Returns what crosses then, and how far anything was moved.
     pub(super) fn draw_near(&mut self, mut met: Met, width: f64, profile: &Profile) -> Tried<(Met, f64)> {
-        let (mut displaced, mut imprints) = (0f64, true);
+        let (mut displaced, mut imprints, mut passes) = (0f64, true, Passes::default());
         while !met.crossing.is_empty() {
             let region = self.around(&met.crossing);
-            let before = self.before_pass();
+            self.work.mark();
             let first_new = self.work.triangles.len() as u32;
             let mut changed = Changed::default();
             self.thin(&region, width, &mut changed);
             if imprints {
                 self.imprint(&met.crossing, width, &mut changed);
             }
-            let Changed { triangles, farthest } = changed;
+            let Changed { triangles, farthest, snapped } = changed;
             self.clean(&triangles.iter().copied().collect::<Vec<_>>());
             let now = self.met(met.crossing.clone(), profile, |t| t >= first_new || triangles.contains(&t))?;
             tracing::debug!(imprints, pairs = now.crossing.len(), "Drawn near.");
             if now.crossing.len() < met.crossing.len() {
                 displaced = displaced.max(farthest);
-                met = now;
-                continue;
+                snapped.iter().for_each(|(t, by)| self.track.snapped(&self.clusters, *t, *by));
+                let goes_on = passes.may_go_on(met.crossing.len(), now.crossing.len());
+                met = self.keep(now);
+                if goes_on {
+                    continue;
+                }
+                break;
             }
-            self.take_back(before);
+            self.take_back();
             if !imprints {
                 break;
             }
@@ -75,24 +76,19 @@ impl State<'_, '_, '_> {
         around
     }
 
-    pub(super) fn before_pass(&self) -> Before {
-        Before { triangles: self.work.triangles.clone(), parents: self.clusters.parents.clone(), track: self.track.clone() }
+    /// What a pass has changed since the workshop was marked stays.
+    pub(super) fn keep(&mut self, now: Met) -> Met {
+        self.work.keep();
+        self.unite(&now.crossing);
+        now
     }
 
-    pub(super) fn take_back(&mut self, before: Before) {
-        // What was fetched meanwhile stays.
-        let mut triangles = before.triangles;
-        let count = triangles.len();
-        let fetched = (count..self.work.triangles.len())
-            .filter(|t| matches!(self.work.triangles[*t].origin, Origin::Input(_)))
-            .map(|t| (self.work.triangles[t], self.clusters.of_triangle[t]));
-        let (fetched, pieces): (Vec<Triangle>, Vec<u32>) = fetched.unzip();
-        triangles.extend(fetched);
+    /// Takes back what a pass has changed since the workshop was marked. What was fetched meanwhile stays.
+    pub(super) fn take_back(&mut self) {
+        let (count, fetched) = self.work.take_back();
+        let pieces: Vec<u32> = fetched.iter().map(|t| self.clusters.of_triangle[*t as usize]).collect();
         self.clusters.of_triangle.truncate(count);
         self.clusters.of_triangle.extend(pieces);
-        self.clusters.parents = before.parents;
-        self.track = before.track;
-        self.work.restore(&triangles);
     }
 
     /// Takes out triangles of these that are less than `width` across, as far as new vertices are what makes them so.
@@ -120,7 +116,7 @@ impl State<'_, '_, '_> {
 
     /// Of each pair that crosses, lets what is closest become one.
     fn imprint(&mut self, pairs: &[[u32; 2]], width: f64, changed: &mut Changed) {
-        let mut known = vertices(self.work);
+        let mut known = self.work.by_position();
         for pair in pairs {
             if pair.iter().any(|t| !self.work.lives(*t)) {
                 continue;
@@ -137,8 +133,8 @@ impl State<'_, '_, '_> {
                     self.put(&[[a, b, p], [b, c, p], [c, a, p]], pair[side], away, changed);
                 }
                 Closest { by: Nearness::Edges(edges, at), away } => {
-                    let position = at.to_array().map(|x| x as f32 + 0.0);
-                    let p = *known.entry(bits(position)).or_insert_with(|| self.work.add_vertex(position));
+                    let position = Position::nearest(at);
+                    let p = *known.entry(position).or_insert_with(|| self.work.add_vertex(position));
                     if edges.iter().flatten().all(|v| *v != p) {
                         edges.into_iter().for_each(|edge| self.lead_through(edge, p, away, changed));
                     }
@@ -157,7 +153,7 @@ impl State<'_, '_, '_> {
         changed.farthest = changed.farthest.max(by);
         for (t, _) in self.work.star(go) {
             changed.triangles.insert(t);
-            self.track.snapped(&self.clusters, t, by);
+            changed.snapped.push((t, by));
         }
         self.work.merge(stay, go);
     }
@@ -182,7 +178,7 @@ impl State<'_, '_, '_> {
     /// Puts parts in the place of a triangle.
     fn put(&mut self, parts: &[[Vertex; 3]], t: u32, away: f64, changed: &mut Changed) {
         changed.farthest = changed.farthest.max(away);
-        self.track.snapped(&self.clusters, t, away);
+        changed.snapped.push((t, away));
         let (origin, piece) = (self.work.triangles[t as usize].origin, self.clusters.of_triangle[t as usize]);
         for v in parts {
             changed.triangles.insert(self.work.add(*v, origin.of_part(), NONE));

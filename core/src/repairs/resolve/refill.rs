@@ -12,6 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec3;
 
 use super::near::nearest;
+use super::passes::Passes;
 use super::{Met, State, Tried};
 use crate::chunk::{self, NONE};
 use crate::fill::{self, Rim};
@@ -30,23 +31,24 @@ pub(in crate::repairs) struct Refill {
 }
 
 impl State<'_, '_, '_> {
-    /// Takes out what crosses, with more and more rings around it, while there are fewer pairs after it; nothing that moves the surface
+    /// Takes out what crosses, with more and more rings around it, while there are fewer pairs after it, as often as
+    /// [`Passes`] allows; nothing that moves the surface
     /// farther than a limit. Returns what crosses then, and how far anything was moved.
     pub(super) fn refill(&mut self, mut met: Met, limit: f64, profile: &Profile) -> Tried<(Met, f64)> {
-        let (mut displaced, mut rings) = (0f64, 0);
+        let (mut displaced, mut rings, mut passes) = (0f64, 0, Passes::default());
         while !met.crossing.is_empty() && rings <= RINGS {
             let refills = self.refills(&met.crossing, rings, limit);
             if refills.is_empty() {
                 rings += 1;
                 continue;
             }
-            let before = self.before_pass();
+            self.work.mark();
             let first_new = self.work.triangles.len() as u32;
-            let mut farthest = 0f64;
+            let (mut farthest, mut refilled) = (0f64, Vec::new());
             for Refill { triangles, patches, moved } in refills {
                 farthest = farthest.max(moved);
                 let piece = self.clusters.of_triangle[triangles[0] as usize];
-                triangles.iter().for_each(|t| self.track.refilled(&self.clusters, *t, moved));
+                refilled.extend(triangles.iter().map(|t| (*t, moved)));
                 triangles.iter().for_each(|t| self.work.kill(*t));
                 for v in patches {
                     self.work.add(v, Origin::Patch, NONE);
@@ -58,9 +60,14 @@ impl State<'_, '_, '_> {
             let now = self.met(met.crossing.clone(), profile, |t| t >= first_new)?;
             if now.crossing.len() < met.crossing.len() {
                 displaced = displaced.max(farthest);
-                (met, rings) = (now, 0);
+                refilled.iter().for_each(|(t, moved)| self.track.refilled(&self.clusters, *t, *moved));
+                let goes_on = passes.may_go_on(met.crossing.len(), now.crossing.len());
+                (met, rings) = (self.keep(now), 0);
+                if !goes_on {
+                    break;
+                }
             } else {
-                self.take_back(before);
+                self.take_back();
                 rings += 1;
             }
         }

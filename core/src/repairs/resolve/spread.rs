@@ -13,11 +13,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DMat3, DVec3};
 
-use super::{Clusters, Met, State, Tried, vertices};
+use super::{Clusters, Met, State, Tried};
 use crate::chunk::NONE;
+use crate::position::Position;
 use crate::settings::Profile;
+use crate::shop::Vertex;
 use crate::shop::components::{Components, Through};
-use crate::shop::{Vertex, bits};
 
 /// By how many steps of new vertices bodies are spread at first, and the next time.
 const STEPS: [f64; 2] = [8.0, 64.0];
@@ -68,7 +69,7 @@ impl State<'_, '_, '_> {
         let sheets = Components::of(self.survey, shop, edges, self.reversed, Through::ManifoldEdges).of_triangle;
         let ranks = ranks(crossing, &sheets);
         // By vertex and piece: where it goes.
-        let mut places: BTreeMap<(Vertex, u32), [f32; 3]> = BTreeMap::new();
+        let mut places: BTreeMap<(Vertex, u32), Position> = BTreeMap::new();
         for t in spread {
             let (piece, sheet) = (self.clusters.of_triangle[t as usize], sheets[t as usize]);
             let by = f64::from(ranks.get(&sheet).copied().unwrap_or(0)) * steps(&self.clusters, t).unwrap_or(0.0) * self.step;
@@ -77,15 +78,15 @@ impl State<'_, '_, '_> {
                 // Where a piece goes on as another sheet, it has to stay together.
                 if by > 0.0 && !places.contains_key(&(v, piece)) && fan().all(|t| sheets[t as usize] == sheet) {
                     let place = self.work.place(v) + outward(fan().map(|t| self.work.normal(t))) * by;
-                    places.insert((v, piece), place.to_array().map(|x| x as f32 + 0.0));
+                    places.insert((v, piece), Position::nearest(place));
                 }
             }
         }
-        let mut known = vertices(self.work);
+        let mut known = self.work.by_position();
         let mut moved: BTreeMap<(Vertex, u32), Vertex> = BTreeMap::new();
         let mut farthest = 0f64;
         for ((v, piece), place) in places {
-            let new = *known.entry(bits(place)).or_insert_with(|| self.work.add_vertex(place));
+            let new = *known.entry(place).or_insert_with(|| self.work.add_vertex(place));
             if new != v {
                 let by = self.work.distance(v, new);
                 farthest = farthest.max(by);
@@ -107,6 +108,7 @@ impl State<'_, '_, '_> {
         }
         self.clean(&(first_new..self.work.triangles.len() as u32).collect::<Vec<_>>());
         let met = self.met(crossing.to_vec(), profile, |t| t >= first_new)?;
+        self.unite(&met.crossing);
         tracing::debug!(pairs = met.crossing.len(), farthest, "Spread.");
         Ok(Some((met, farthest)))
     }

@@ -11,7 +11,7 @@ use crate::Quiet;
 use crate::arrange::Rational;
 use crate::report::Rung;
 use crate::settings::Limits;
-use crate::testing::{After, Corners, after, cube, cuboid, reversed, shifted};
+use crate::testing::{After, Corners, after, cube, cuboid, diagnose, records, reversed, shifted};
 
 fn resolved_by(triangles: &[Corners], profile: &Profile) -> After<Resolved> {
     after(triangles, |d, turned| {
@@ -302,4 +302,94 @@ fn bodies_whose_faces_lie_in_planes_that_f32_cannot_hold_are_spread_by_some_step
     assert!(got.verdict.good && got.defects.components == 1, "{:?}", got.verdict);
     // Five bodies against the one that stays, out of up to three planes at once.
     assert!(got.result > 8.0 && got.result <= 5.0 * 8.0 * 3.0 + 2.0, "{}", got.result);
+}
+
+#[test]
+fn triangles_that_follow_their_neighbours_take_steps_in_proportion() {
+    // A strip, of which the surface of the last triangle is known: turns come against the order of the triangles.
+    steps::assert_near_linear(500, |n| {
+        let at = |i: usize| [(i / 2) as f32, (i % 2) as f32, 0.0];
+        let strip: Vec<Corners> = (0..n).map(|i| [at(i), at(i + 1), at(i + 2)]).collect();
+        let records = records(&strip);
+        let d = diagnose(&records);
+        let mut piece_of = vec![NONE; n];
+        piece_of[n - 1] = 7;
+        let left: Vec<usize> = (0..n - 1).collect();
+        let (steps, ()) = steps::of(|| follow_neighbours(&d.shop, &left, &mut piece_of));
+        assert!(piece_of.iter().all(|piece| *piece == 7));
+        steps
+    });
+}
+
+#[test]
+fn a_triangle_follows_the_neighbour_whose_turn_came_first() {
+    // Around a vertex: 0 and 3 are known. 1 and 2 touch both there, and take the smaller one; 4 touches 3 only.
+    let fan: Vec<Corners> = (0..4u8)
+        .map(|i| [[0.0; 3], [1.0, f32::from(i), 0.0], [1.0, f32::from(i + 1), 0.0]])
+        .chain([[[1.0, 4.0, 0.0], [2.0, 4.0, 0.0], [2.0, 5.0, 0.0]]])
+        .collect();
+    let records = records(&fan);
+    let d = diagnose(&records);
+    let mut piece_of = [5, NONE, NONE, 3, NONE];
+    follow_neighbours(&d.shop, &[1, 2, 4], &mut piece_of);
+    assert_eq!(piece_of, [5, 3, 3, 3, 3]);
+}
+
+#[test]
+fn edges_that_run_along_each_other_from_ring_to_ring_take_steps_in_proportion() {
+    // Each triangle leads to the next one.
+    steps::assert_near_linear(500, |n| {
+        let next = |fresh: &[u32]| Some(fresh.iter().map(|t| (t + 1).min(n as u32)).collect());
+        let (steps, all) = steps::of(|| grown(&BTreeSet::from([0]), next));
+        assert_eq!(all.map(|all| all.len()), Some(n + 1));
+        steps
+    });
+}
+
+#[test]
+fn what_is_fetched_is_found_in_one_table_of_positions() {
+    // Nothing of a sound cube is in the workshop before a star is asked for.
+    let records = records(&cube());
+    let mut d = diagnose(&records);
+    let positions = [cube()[0][0]];
+    let new = d.survey.promote(&positions);
+    let mut work = Work::new(&mut d.shop);
+    work.extend_at(&d.survey, &new, &positions);
+    assert!(work.living().count() >= 3);
+    // Again, with nothing new: one table, and the star lists made anew.
+    let (steps, _) = steps::of(|| work.extend_at(&d.survey, &[], &positions));
+    assert_eq!(steps, (work.positions.len() + work.triangles.len()) as u64);
+    assert_eq!(work.complete.iter().filter(|complete| **complete).count(), 1);
+}
+
+#[test]
+fn dust_that_cutting_left_goes_and_is_named() {
+    // Three slots from side to side, inside out, cut a cube into eight: the smallest of them is a cube at the corner.
+    let slots = |crumb: f32| {
+        let slot = |k: usize| {
+            let (mut lo, mut hi) = ([-1.0; 3], [2.0; 3]);
+            (lo[k], hi[k]) = (crumb, 0.25);
+            reversed(&cuboid(lo, hi))
+        };
+        resolved(&[cube(), slot(0), slot(1), slot(2)].concat())
+    };
+    let (seen, dust) = ((-13f32).exp2(), (-14f32).exp2());
+    let got = slots(seen);
+    assert_eq!((got.result.dust.len(), got.defects.components), (0, 8), "a crumb of 2⁻³⁹ of a cube that is mostly left");
+    let got = slots(dust);
+    assert!(got.verdict.good, "{:?}", got.verdict);
+    assert_eq!(got.defects.components, 7);
+    let [region] = &got.result.dust[..] else { panic!("{:?}", got.result.dust) };
+    assert_eq!((region.rung, region.bounds, region.count), (Rung::Dropped, [[0.0; 3], [dust; 3]], 12));
+}
+
+#[test]
+fn dust_that_the_file_itself_has_stays() {
+    // Next to two cubes that cross: a tiny cube, and two tiny ones that cross each other.
+    let size = (-15f32).exp2();
+    let tiny = |at: f32| cuboid([at; 3], [at + 2.0 * size; 3]);
+    let both = [cube(), shifted(&cube(), [0.5, 0.625, 0.75])].concat();
+    let got = resolved(&[both, tiny(3.0), tiny(3.5), tiny(3.5 + size)].concat());
+    assert!(got.verdict.good, "{:?}", got.verdict);
+    assert_eq!((got.result.dust.len(), got.defects.components, got.result.bodies), (0, 3, 2));
 }

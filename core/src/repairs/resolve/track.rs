@@ -6,6 +6,7 @@ use super::Clusters;
 use crate::chunk;
 use crate::report::{Region, Rung};
 use crate::shop::Shop;
+use crate::steps;
 use crate::sums::Bounds;
 
 /// What was done to one piece of surface, or to several.
@@ -51,7 +52,7 @@ impl Done {
 }
 
 /// By piece, since clusters grow while they are resolved.
-#[derive(Clone, Default)]
+#[derive(Default)]
 pub(super) struct Track(BTreeMap<u32, Done>);
 
 impl Track {
@@ -113,11 +114,33 @@ impl Track {
         by_cluster.values().map(|done| done.region(rung(done))).collect()
     }
 
-    /// The region of some pieces that are left as they were: all, if there is none.
+    /// The region of some pieces that are left as they were, ascending: all, if there is none.
     pub(super) fn left(&self, pieces: &[u32], reason: String) -> Region {
         let mut all = Done::NOTHING;
-        let own = self.0.iter().filter(|(piece, _)| pieces.is_empty() || pieces.contains(piece));
-        own.for_each(|(_, done)| all.add(done));
+        if pieces.is_empty() {
+            self.0.values().for_each(|done| all.add(done));
+        }
+        steps::count(pieces.len());
+        pieces.iter().filter_map(|piece| self.0.get(piece)).for_each(|done| all.add(done));
         Region { moved: 0.0, reason: Some(reason), ..all.region(Rung::Left) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_region_of_many_pieces_takes_steps_in_proportion() {
+        steps::assert_near_linear(1000, |n| {
+            let pieces: Vec<u32> = (0..n as u32).map(|piece| 2 * piece).collect();
+            let done = |piece: &u32| (*piece, Done { triangles: 1, ..Done::NOTHING });
+            let track = Track(pieces.iter().map(done).collect());
+            // Every other one, and as many that are not there.
+            let asked: Vec<u32> = (0..n as u32).map(|piece| 2 * piece + piece % 2).collect();
+            let (steps, region) = steps::of(|| track.left(&asked, String::new()));
+            assert_eq!(region.count, n.div_ceil(2) as u64);
+            steps
+        });
     }
 }

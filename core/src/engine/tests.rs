@@ -1,0 +1,164 @@
+//! Whole files through [`inspect`] and [`repair`].
+
+use std::os::unix::fs::FileExt;
+
+use super::*;
+use crate::read::Access;
+use crate::record::Record;
+use crate::report::Outcome;
+use crate::testing::{Corners, cube, plate, records, shifted};
+
+fn file(records: &[Record]) -> Vec<u8> {
+    [&[0; 80][..], &(records.len() as u32).to_le_bytes(), records.as_flattened()].concat()
+}
+
+/// A plate with a hole, of more than 1 MiB.
+fn open_plate() -> Vec<Corners> {
+    plate(110, |x, y| (x, y) != (50, 50))
+}
+
+fn text(triangles: &[Corners]) -> String {
+    let vertex = |[x, y, z]: &[f32; 3]| format!("vertex {x} {y} {z}\n");
+    let facet =
+        |t: &Corners| format!("facet normal 0 0 1\nouter loop\n{}endloop\nendfacet\n", t.iter().map(vertex).collect::<String>());
+    format!("solid part\n{}endsolid part\n", triangles.iter().map(facet).collect::<String>())
+}
+
+/// Truncates the file as soon as a stage begins.
+struct Cutter<'a>(&'a Path, &'a str);
+
+impl Progress for Cutter<'_> {
+    fn at(&self, stage: &'static str, _: u64, _: u64) {
+        if stage == self.1 {
+            std::fs::OpenOptions::new().write(true).open(self.0).unwrap().set_len(100).unwrap();
+        }
+    }
+}
+
+/// Were it mapped, this test would end with SIGBUS.
+#[test]
+fn a_file_that_is_truncated_meanwhile_is_an_error_for_a_librarys_user() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("part.stl");
+    // In memory, and in a spool.
+    for memory_bytes in [1 << 30, 32 << 20] {
+        for stage in ["topology", "repair", "hash"] {
+            std::fs::write(&input, file(&records(&open_plate()))).unwrap();
+            let limits = Limits { threads: 1, memory_bytes, ..Limits::default() };
+            let output = folder.path().join(format!("{stage}-{memory_bytes}.stl"));
+            let result = repair(&input, &output, &Profile::default(), &limits, &Cutter(&input, stage));
+            assert!(matches!(result, Err(Error::Changed { .. })), "{stage}: {result:?}");
+        }
+    }
+}
+
+#[test]
+fn mapped_and_copied_files_give_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("part.stl");
+    for bytes in [file(&records(&open_plate())), text(&open_plate()).into_bytes()] {
+        std::fs::write(&input, bytes).unwrap();
+        // SAFETY: nobody else knows this folder.
+        let mapped = unsafe { Access::mapped() };
+        let mut outputs = Vec::new();
+        for (access, memory_bytes) in [(mapped, 1 << 30), (Access::COPIED, 1 << 30), (Access::COPIED, 32 << 20)] {
+            for threads in [1, 2] {
+                let limits = Limits { threads, memory_bytes, access, ..Limits::default() };
+                let output = folder.path().join(format!("{}.stl", outputs.len()));
+                let report = repair(&input, &output, &Profile::default(), &limits, &crate::Quiet).unwrap();
+                assert_eq!(report.input.blake3, blake3::hash(&std::fs::read(&input).unwrap()).to_hex().to_string());
+                outputs.push(std::fs::read(&output).unwrap());
+                std::fs::remove_file(&output).unwrap();
+            }
+        }
+        assert!(outputs.iter().all(|output| *output == outputs[0]));
+    }
+}
+
+/// The first half of a file of two bodies is closed: only the zeros behind it tell that something is missing.
+#[test]
+fn a_file_whose_last_records_are_zeros_is_never_good() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("part.stl");
+    let (profile, limits) = (Profile::default(), Limits::default());
+    let whole = records(&[cube(), shifted(&cube(), [5.0; 3])].concat());
+    // The copier wrote one body, and the system filled the rest of the file with zeros.
+    let binary = file(&[&whole[..12], &[[0; 50]; 12]].concat());
+    let words = text(&[cube(), shifted(&cube(), [5.0; 3])].concat());
+    let half = words.match_indices("facet normal").nth(12).unwrap().0;
+    let text = [&words.as_bytes()[..half], &vec![0; words.len() - half]].concat();
+    for (bytes, said) in
+        [(binary, "its last 12 of 24 records are zeros"), (text, "bytes are zeros, as in a file that was cut off")]
+    {
+        std::fs::write(&input, bytes).unwrap();
+        let inspected = inspect(&input, &profile, &limits, &crate::Quiet).unwrap();
+        assert_eq!(inspected.outcome, Outcome::NotGood);
+        assert!(inspected.verdict.reasons.iter().any(|reason| reason.contains(said)), "{:?}", inspected.verdict);
+        let output = folder.path().join(&said[..9]);
+        let repaired = repair(&input, &output, &profile, &limits, &crate::Quiet).unwrap();
+        assert_eq!((repaired.outcome, repaired.verdict.good), (Outcome::NeedsReview, true), "the half itself is closed");
+        assert!(repaired.verdict.reasons.iter().any(|r| r.starts_with("a part is missing") && r.contains(said)), "{repaired:?}");
+    }
+}
+
+#[test]
+fn a_few_zero_records_are_an_exporters() {
+    let folder = tempfile::tempdir().unwrap();
+    let (input, output) = (folder.path().join("part.stl"), folder.path().join("out.stl"));
+    std::fs::write(&input, file(&[&records(&cube())[..], &[[0; 50]; 7]].concat())).unwrap();
+    let repaired = repair(&input, &output, &Profile::default(), &Limits::default(), &crate::Quiet).unwrap();
+    assert_eq!((repaired.outcome, repaired.input.findings.len()), (Outcome::Repaired, 0));
+}
+
+/// Changes a byte of the file as soon as a stage begins.
+struct Meddler<'a> {
+    file: &'a Path,
+    stage: &'a str,
+}
+
+impl Progress for Meddler<'_> {
+    fn at(&self, stage: &'static str, _: u64, _: u64) {
+        if stage == self.stage {
+            let file = std::fs::OpenOptions::new().write(true).open(self.file).unwrap();
+            file.write_all_at(&[7], (PREFIX_BYTES + 50 * 12_345 + 49) as u64).unwrap();
+        }
+    }
+}
+
+/// The plate is large enough for two threads to copy it ahead.
+#[test]
+fn an_input_that_changes_is_said_to_have_changed() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("part.stl");
+    let bytes = file(&records(&open_plate()));
+    for threads in [1, 2] {
+        for stage in ["topology", "repair", "hash"] {
+            std::fs::write(&input, &bytes).unwrap();
+            // The clock of the file system is coarse.
+            std::thread::sleep(std::time::Duration::from_millis(20));
+            let limits = Limits { threads, ..Limits::default() };
+            let output = folder.path().join(format!("{stage}-{threads}.stl"));
+            let result = repair(&input, &output, &Profile::default(), &limits, &Meddler { file: &input, stage });
+            assert!(matches!(result, Err(Error::Changed { .. })), "{threads} threads, {stage}: {result:?}");
+        }
+    }
+}
+
+/// Triangles that share no vertex: what is kept of their edges is far more than what is kept of the triangles.
+#[test]
+fn the_edges_of_a_soup_are_counted_before_they_are_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("soup.stl");
+    let apart = |i: u16| [i % 100, i / 100, i % 7].map(|x| f32::from(x) * 3.0);
+    let soup: Vec<Corners> = (0..10_000).flat_map(|i| shifted(&cube()[..1], apart(i))).collect();
+    std::fs::write(&input, file(&records(&soup))).unwrap();
+    let inspected = |memory_bytes| {
+        let limits = Limits { threads: 1, memory_bytes, chunk_triangles: 1024, ..Limits::default() };
+        inspect(&input, &Profile::default(), &limits, &crate::Quiet)
+    };
+    assert_eq!(inspected(64 << 20).unwrap().before.boundary_edges, 30_000);
+    // 30,000 edges of 640 bytes are 19 MiB; what is kept of the triangles is 4 MiB.
+    let error = inspected(20 << 20).unwrap_err();
+    assert!(matches!(error, Error::Starved { .. }), "{error}");
+    assert!(error.to_string().contains("10000 triangles lie at defects, with 30000 edges that only one triangle has"), "{error}");
+}

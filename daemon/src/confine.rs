@@ -1,0 +1,77 @@
+//! What a worker may not do, whatever a file makes of it: send signals to other processes. So no file can kill the daemon, and a death
+//! of the daemon while a file was worked on is not the file's doing. And where the system runs out of memory, a worker goes first.
+
+use rustix::thread::set_no_new_privs;
+
+use crate::create;
+
+/// Added to the system's own count of who should go first (from −1000 to 1000).
+const OUT_OF_MEMORY_SCORE: &str = "500";
+
+/// Confines this process, before it has other threads. A system that refuses (an old kernel, a sandbox) leaves it as it is.
+pub(crate) fn confine() {
+    if let Err(error) = create::tell_kernel("oom_score_adj", OUT_OF_MEMORY_SCORE) {
+        tracing::debug!(%error, "The system will not let a worker go first when memory is short.");
+    }
+    let confined = set_no_new_privs(true).map_err(std::io::Error::from).and_then(|()| forbid_signals());
+    if let Err(error) = confined {
+        tracing::debug!(%error, "A worker is not kept from sending signals.");
+    }
+}
+
+/// Loads a filter that lets signals go to this process only.
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+fn forbid_signals() -> std::io::Result<()> {
+    let program = program(std::process::id());
+    let length = u16::try_from(program.len()).unwrap_or(0);
+    let filter = libc::sock_fprog { len: length, filter: program.as_ptr().cast_mut() };
+    // SAFETY: the kernel copies `length` instructions of `program`, which lives until the call returns, and checks them.
+    let result = unsafe { libc::prctl(libc::PR_SET_SECCOMP, libc::SECCOMP_MODE_FILTER, &raw const filter) };
+    if result == 0 { Ok(()) } else { Err(std::io::Error::last_os_error()) }
+}
+
+#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+fn forbid_signals() -> std::io::Result<()> {
+    Err(std::io::ErrorKind::Unsupported.into())
+}
+
+/// The filter (`seccomp(2)`): calls whose first argument is a process go through if that is `pid`; the other ways to send a signal fail
+/// with EPERM; all else goes through.
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+fn program(pid: u32) -> Vec<libc::sock_filter> {
+    use libc::{BPF_ABS, BPF_JEQ, BPF_JMP, BPF_K, BPF_LD, BPF_RET, BPF_W};
+    // `AUDIT_ARCH_X86_64` and `AUDIT_ARCH_AARCH64` of `linux/audit.h`.
+    const ARCH: u32 = if cfg!(target_arch = "x86_64") { 0xC000_003E } else { 0xC000_00B7 };
+    /// Places in `struct seccomp_data`: number of the call, architecture, low half of the first argument.
+    const NUMBER: u32 = 0;
+    const ARCHITECTURE: u32 = 4;
+    const FIRST: u32 = 16;
+    let to_a_process = [libc::SYS_kill, libc::SYS_tgkill, libc::SYS_rt_sigqueueinfo, libc::SYS_rt_tgsigqueueinfo];
+    let others = [libc::SYS_tkill, libc::SYS_pidfd_send_signal];
+    let instruction = |code: u32, k: u32, jt: usize, jf: usize| libc::sock_filter {
+        // Codes and distances are small.
+        code: code as u16,
+        jt: jt as u8,
+        jf: jf as u8,
+        k,
+    };
+    let load = |place| instruction(BPF_LD | BPF_W | BPF_ABS, place, 0, 0);
+    let give = |what| instruction(BPF_RET | BPF_K, what, 0, 0);
+    let equal = |k, jt, jf| instruction(BPF_JMP | BPF_JEQ | BPF_K, k, jt, jf);
+    let (calls, all) = (to_a_process.len(), to_a_process.len() + others.len());
+    let mut program = vec![load(ARCHITECTURE), equal(ARCH, 0, all + 1), load(NUMBER)];
+    for (i, call) in to_a_process.into_iter().chain(others).enumerate() {
+        // Behind the comparisons: allow, look at the process, refuse.
+        let left = all - i - 1;
+        let distance = if i < calls { left + 1 } else { left + 3 };
+        program.push(equal(call as u32, distance, 0));
+    }
+    program.extend([
+        give(libc::SECCOMP_RET_ALLOW),
+        load(FIRST),
+        equal(pid, 1, 0),
+        give(libc::SECCOMP_RET_ERRNO | libc::EPERM as u32),
+        give(libc::SECCOMP_RET_ALLOW),
+    ]);
+    program
+}

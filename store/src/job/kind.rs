@@ -1,0 +1,88 @@
+//! The words for where a job stands.
+
+use serde::{Deserialize, Serialize};
+
+/// [`State`] without its data, endings told apart: what lists and counters show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    Noticed,
+    /// Queued, and may be claimed.
+    Queued,
+    /// Queued, after a pause.
+    Waiting,
+    /// Queued, but must run alone.
+    Alone,
+    Running,
+    Concluded,
+    Publishing,
+    Published,
+    /// Its result is known, but cannot be brought into place for now: tried again after a pause.
+    Parked,
+    Done,
+    Failed,
+    NeedsReview,
+    Quarantined,
+    Cancelled,
+}
+
+impl Kind {
+    /// All of them, in the order of a job's life.
+    pub const ALL: [Self; 14] = [
+        Self::Noticed,
+        Self::Queued,
+        Self::Waiting,
+        Self::Alone,
+        Self::Running,
+        Self::Concluded,
+        Self::Publishing,
+        Self::Published,
+        Self::Parked,
+        Self::Done,
+        Self::Failed,
+        Self::NeedsReview,
+        Self::Quarantined,
+        Self::Cancelled,
+    ];
+
+    /// The word for it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Noticed => "noticed",
+            Self::Queued => "queued",
+            Self::Waiting => "waiting",
+            Self::Alone => "queued_alone",
+            Self::Running => "running",
+            Self::Concluded => "concluded",
+            Self::Publishing => "publishing",
+            Self::Published => "published",
+            Self::Parked => "parked",
+            Self::Done => "done",
+            Self::Failed => "failed",
+            Self::NeedsReview => "needs_review",
+            Self::Quarantined => "quarantined",
+            Self::Cancelled => "cancelled",
+        }
+    }
+
+    /// Is there something left to do without anyone asking for it?
+    pub fn is_live(self) -> bool {
+        self.is_queued() || self.is_held() || self == Self::Parked
+    }
+
+    /// Waiting for a claim.
+    pub fn is_queued(self) -> bool {
+        matches!(self, Self::Queued | Self::Waiting | Self::Alone)
+    }
+
+    /// Under a claim.
+    pub fn is_held(self) -> bool {
+        matches!(self, Self::Running | Self::Concluded | Self::Publishing | Self::Published)
+    }
+}
+
+impl std::fmt::Display for Kind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
+    }
+}

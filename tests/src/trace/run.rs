@@ -125,6 +125,11 @@ impl Tracer<'_> {
             libc::PTRACE_EVENT_SECCOMP => self.before(thread),
             libc::PTRACE_EVENT_FORK | libc::PTRACE_EVENT_VFORK | libc::PTRACE_EVENT_CLONE => self.made(thread),
             libc::PTRACE_EVENT_EXEC => {
+                // Another thread than the first may have asked; it has the first one's number from now on, and nobody tells of its end.
+                let former = event_message(thread);
+                if former != thread {
+                    self.threads.remove(&former);
+                }
                 if let Some(state) = self.threads.get_mut(&thread) {
                     if thread != self.first {
                         state.role = Role::Worker;
@@ -143,10 +148,7 @@ impl Tracer<'_> {
 
     /// A thread made another one: a thread, or a process.
     fn made(&mut self, maker: pid_t) {
-        let mut made: libc::c_ulong = 0;
-        // SAFETY: room for one number.
-        unsafe { libc::ptrace(libc::PTRACE_GETEVENTMSG, maker, 0, &raw mut made) };
-        let made = made as pid_t;
+        let made = event_message(maker);
         if let Some(state) = self.threads.get(&maker) {
             let new = Thread { role: state.role, begun: state.begun, in_call: false };
             self.threads.insert(made, new);
@@ -214,6 +216,14 @@ impl Tracer<'_> {
         }
         Ok(left)
     }
+}
+
+/// What the system tells of the event at which this thread has stopped: a thread's number.
+fn event_message(thread: pid_t) -> pid_t {
+    let mut message: libc::c_ulong = 0;
+    // SAFETY: room for one number.
+    unsafe { libc::ptrace(libc::PTRACE_GETEVENTMSG, thread, 0, &raw mut message) };
+    message as pid_t
 }
 
 fn go(thread: pid_t, signal: c_int) {

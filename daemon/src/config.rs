@@ -9,6 +9,7 @@ use serde::{Deserialize, Deserializer, de};
 use suture_core::Profile;
 
 use crate::cli::WatchArgs;
+use crate::profiles;
 use crate::units::{parse_duration, parse_size, show_size};
 
 /// A file as large as this is worked on alone, by all threads and with the whole memory.
@@ -140,7 +141,7 @@ impl Config {
     /// From the command line: a folder alone, or a configuration file; options on the command line count over the file's.
     ///
     /// # Errors
-    /// A line or more for people.
+    /// A line for people.
     pub(crate) fn from_args(args: &WatchArgs) -> Result<Self, String> {
         let mut config = match (&args.config, &args.dir) {
             (Some(file), _) => Self::from_file(file)?,
@@ -182,7 +183,7 @@ impl Config {
     fn from_file(path: &Path) -> Result<Self, String> {
         let fail = |line: &str| format!("{}: {line}", path.display());
         let text = std::fs::read_to_string(path).map_err(|e| fail(&format!("cannot read the configuration: {e}")))?;
-        let file: File = toml::from_str(&text).map_err(|e| fail(e.to_string().trim_end()))?;
+        let file: File = profiles::parse(&text).map_err(|e| fail(&e))?;
         let Some(first) = file.folders.first() else { return Err(fail("`folders` names no hot folder")) };
         let mut config = Self::for_folder(&first.path);
         config.folders.clear();

@@ -1,5 +1,6 @@
 //! What the process tells its caller.
 
+use std::io;
 use std::process::ExitCode;
 
 /// Exit statuses, the better before the worse; of several files, the worst counts.
@@ -13,7 +14,7 @@ pub(crate) enum Exit {
     Refused,
     /// The state directory is owned by another daemon.
     Owned,
-    /// The store cannot be used; try again.
+    /// The machine or the store cannot serve now; try again.
     TryAgain,
     /// A worker could not read what it was asked, or say what came of it.
     Cut,
@@ -39,8 +40,35 @@ impl Exit {
     }
 }
 
+impl Exit {
+    /// Of an error that keeps the daemon from starting. What runs short and what a disk says by the way is not the caller's mistake, and a
+    /// service manager tries again.
+    pub(crate) fn of_start(error: &io::Error) -> Self {
+        use libc::{EAGAIN, EBUSY, EDQUOT, EINTR, EIO, EMFILE, ENFILE, ENOMEM, ENOSPC, ESTALE, ETIMEDOUT};
+        match error.raw_os_error() {
+            Some(EAGAIN | EBUSY | EDQUOT | EINTR | EIO | EMFILE | ENFILE | ENOMEM | ENOSPC | ESTALE | ETIMEDOUT) => {
+                Self::TryAgain
+            }
+            _ => Self::Refused,
+        }
+    }
+}
+
 impl From<Exit> for ExitCode {
     fn from(exit: Exit) -> Self {
         Self::from(exit.code())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A full disk at the start was taken for wrong usage, and a service manager gave up.
+    #[test]
+    fn a_shortage_passes_and_a_mistake_does_not() {
+        let of = |errno| Exit::of_start(&io::Error::from_raw_os_error(errno));
+        assert_eq!([libc::ENOSPC, libc::EDQUOT, libc::EMFILE, libc::EIO].map(of), [Exit::TryAgain; 4]);
+        assert_eq!([libc::EACCES, libc::EROFS, libc::ENOTDIR].map(of), [Exit::Refused; 3]);
     }
 }

@@ -174,14 +174,28 @@ impl Move<'_> {
         Ok(matches!((fsx::look(a)?, fsx::look(b)?), (Some(a), Some(b)) if (a.dev, a.ino) == (b.dev, b.ino)))
     }
 
-    /// To another file system, from where the original was set aside.
+    /// To another file system, from where the original was set aside. While it cannot be taken there, it has its own name.
     fn take_aside(&self, aside: &Path, stage: &Path) -> io::Result<Placed> {
         if self.is_ours(aside)? {
-            return self.carry(aside, stage);
+            return self.carry(aside, stage).inspect_err(|_| self.show_again(aside));
         }
         // Someone had replaced it.
         self.give_back(aside)?;
         self.take_claimed(stage)
+    }
+
+    /// Gives the original its name back after an error, unless its copy counts already. If that cannot be done, it stays aside, and is
+    /// found there.
+    fn show_again(&self, aside: &Path) {
+        if !matches!(fsx::exists(&self.mark()), Ok(false)) {
+            return;
+        }
+        match fsx::rename_new(aside, self.from) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                tracing::warn!(%error, file = %aside.display(), "The original keeps a hidden name until it can be moved.");
+            }
+            _ => {}
+        }
     }
 
     fn carry(&self, from: &Path, stage: &Path) -> io::Result<Placed> {
@@ -321,6 +335,31 @@ mod tests {
             }
             fsx::remove_if_there(&stage).unwrap();
         }
+    }
+
+    /// While it cannot cross, an original is under its own name, and no part of a copy takes up room.
+    #[test]
+    fn an_original_that_cannot_cross_keeps_its_name() {
+        let Some((near, far)) = two_file_systems() else { return };
+        let at = |name: &str| near.path().join(name);
+        let (from, claimed) = (at("part.stl"), at("in.stl"));
+        std::fs::write(&from, b"customer's").unwrap();
+        std::fs::hard_link(&from, &claimed).unwrap();
+        let job = job(&from);
+        let (nowhere, there) = (far.path().join("gone/part.stl"), far.path().join("part.stl"));
+        let way = Move { job: &job, work: Token(7), from: &from, to: &nowhere, claimed: &claimed };
+        // The target's folder is missing: the rename says that before it says that it crosses, so the original is set aside by hand.
+        let aside = stage(near.path(), Token(7), "aside");
+        std::fs::rename(&from, &aside).unwrap();
+        assert!(way.run().is_err());
+        assert!(from.exists() && !aside.exists());
+        std::fs::rename(&from, &aside).unwrap();
+        create::mark(&way.mark()).unwrap();
+        way.show_again(&aside);
+        assert!(aside.exists(), "its copy counts: the name would be a second original");
+        std::fs::remove_file(way.mark()).unwrap();
+        assert_eq!(Move { to: &there, ..way }.run().unwrap(), Placed::Now);
+        assert!(!from.exists() && !aside.exists() && there.exists());
     }
 
     /// A file that took the name in the instant before the original was set aside goes back under it.

@@ -15,19 +15,9 @@ pub(crate) fn plain(text: &str) -> String {
     out
 }
 
-/// The same of several lines.
-pub(crate) fn plain_lines(text: &str) -> String {
-    text.split('\n').map(plain).collect::<Vec<_>>().join("\n")
-}
-
 /// Says on standard error what stands in the way. A standard error that is closed is no reason to fail.
 pub(crate) fn complain(line: &dyn Display) {
     let _ = writeln!(std::io::stderr(), "suture: {}", plain(&line.to_string()));
-}
-
-/// The same of several lines, as a mistake in a settings file is shown.
-pub(crate) fn complain_lines(lines: &str) {
-    let _ = writeln!(std::io::stderr(), "suture: {}", plain_lines(lines));
 }
 
 #[cfg(test)]
@@ -41,7 +31,6 @@ mod tests {
     fn control_characters_are_spelled_out() {
         assert_eq!(plain("a\u{1b}[2Jb\nc\td\u{9b}e\u{202e}f"), r"a\u{1b}[2Jb\nc\td\u{9b}e\u{202e}f");
         assert_eq!(plain("Größe 50 % → part.stl"), "Größe 50 % → part.stl");
-        assert_eq!(plain_lines("one\ntwo\u{7}"), "one\ntwo\\u{7}");
     }
 
     #[test]

@@ -14,7 +14,7 @@ use crate::fsx::{self, Identity};
 use crate::naming::Naming;
 use crate::protocol::Request;
 use crate::rights::Rights;
-use crate::say::complain_lines;
+use crate::say::complain;
 use crate::signals::Stop;
 use crate::supervise::{Cause, Ended, Worker};
 use crate::{profiles, table};
@@ -68,7 +68,7 @@ fn carry_out(order: Result<Order, String>) -> Exit {
     match ready {
         Ok((order, stop)) => Batch::new(&order, &stop).run(),
         Err(line) => {
-            complain_lines(&line);
+            complain(&line);
             Exit::Refused
         }
     }

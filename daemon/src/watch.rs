@@ -27,7 +27,7 @@ use crate::create;
 use crate::exit::Exit;
 use crate::folder::{Folder, FolderError, is_fading};
 use crate::fsx;
-use crate::say::{complain, complain_lines};
+use crate::say::complain;
 use crate::scan::Reconciler;
 use crate::schedule::{Schedule, Turn};
 use crate::settle::Rest;
@@ -49,17 +49,19 @@ const TRIES_ONCE: u32 = 4;
 
 /// Runs the daemon to its end.
 pub(crate) fn run(args: &WatchArgs) -> Exit {
-    let refuse = |line: &str| {
-        complain_lines(line);
-        Exit::Refused
-    };
     let config = match Config::from_args(args) {
         Ok(config) => config,
-        Err(line) => return refuse(&line),
+        Err(line) => {
+            complain(&line);
+            return Exit::Refused;
+        }
     };
     let stop = match Stop::listen() {
         Ok(stop) => stop,
-        Err(error) => return refuse(&format!("cannot listen for signals: {error}")),
+        Err(error) => {
+            complain(&format_args!("cannot listen for signals: {error}"));
+            return Exit::of_start(&error);
+        }
     };
     serve(config, args.once, &stop, true)
 }
@@ -73,9 +75,9 @@ pub(crate) fn serve(config: Config, once: bool, stop: &Stop, may_begin_anew: boo
             Ok(folder) => folders.push(Arc::new(folder)),
             Err(error) => {
                 complain(&error);
-                return match error {
+                return match &error {
                     FolderError::Owned { .. } => Exit::Owned,
-                    FolderError::Io { .. } => Exit::Refused,
+                    FolderError::Io { source, .. } => Exit::of_start(source),
                 };
             }
         }

@@ -29,6 +29,7 @@ fn six_power_cuts_during_one_long_file() {
             "1".as_ref(),
         ]);
         assert_eq!(ran.status.code(), Some(0));
+        std::fs::remove_file(&output).unwrap();
         start.elapsed() > Duration::from_secs(4)
     });
     let size = size.unwrap_or(1_600_000);

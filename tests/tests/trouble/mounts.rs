@@ -80,7 +80,7 @@ fn killed_while_files_cross() {
 }
 
 fn kill_while_crossing(seed: u64) -> u64 {
-    let mut dice = Dice(seed * 0x9E37_79B9_7F4A_7C15);
+    let mut dice = Dice(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15));
     let stage = Stage::new();
     let _mounts = PARTS.map(|part| Mount::tmpfs(&stage.at(part), "size=16m", 0));
     drop_three(&stage);

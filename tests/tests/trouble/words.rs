@@ -83,7 +83,7 @@ fn no_name_steers_a_terminal() {
         let raw = raw_controls(seen);
         assert!(raw.is_empty(), "{what}: {raw:?} in {:?}", String::from_utf8_lossy(seen));
         let forged = String::from_utf8_lossy(seen).lines().any(|line| line.starts_with("suture: all is well"));
-        assert!(!forged, "{what}: a name begins a line of its own");
+        assert!(!forged, "{what}: a name begins a line of its own in {:?}", String::from_utf8_lossy(seen));
     }
     row("words", "names with ESC, BEL, LF, CR and CSI on a terminal", &format!("{} outputs, no raw control byte", shown.len()));
 }

@@ -17,6 +17,7 @@ mod exit;
 mod folder;
 mod fsx;
 mod jobs;
+mod keeper;
 mod logging;
 mod names;
 mod naming;

@@ -1,25 +1,21 @@
-//! The daemon: `suture watch`. One thread looks after the folders ([`crate::scan`]), as many as there are workers bring jobs
+//! The daemon: `suture watch`. One thread looks after the folders ([`crate::keeper`]), as many as there are workers bring jobs
 //! through ([`crate::attempt`]), one a folder answers `suture jobs` ([`crate::control`]).
 //!
 //! A *life* begins with the store's recovery and ends with a signal, with the end of all work (`--once`), or with an error of the
 //! store; after the last the program begins anew ([`crate::again`]).
 
-use std::mem::ManuallyDrop;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::{Builder, ScopedJoinHandle};
 use std::time::{Duration, Instant};
 
-use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, unbounded};
-use notify::event::{EventKind, ModifyKind, RenameMode};
-use notify::{RecursiveMode, Watcher};
-use suture_store::job::{Area, Kind, Testimony};
-use suture_store::{Control, JobStore, Query, SledStore, StoreError, crash_point};
+use crossbeam::channel::unbounded;
+use suture_store::job::{Kind, Testimony};
+use suture_store::{JobStore, Query, SledStore, StoreError, crash_point};
 
 use crate::again::Lives;
-use crate::attempt::{Context, Event, IN_HAND, Slot, WITNESS, remove_work};
+use crate::attempt::{Context, IN_HAND, Slot, WITNESS, remove_work};
 use crate::cli::WatchArgs;
 use crate::config::{Config, default_state};
 use crate::control::Door;
@@ -27,25 +23,11 @@ use crate::create;
 use crate::exit::Exit;
 use crate::folder::{Folder, FolderError, is_fading};
 use crate::fsx;
+use crate::keeper::Keeper;
 use crate::say::complain;
-use crate::scan::Reconciler;
 use crate::schedule::{Schedule, Turn};
-use crate::settle::Rest;
 use crate::signals::Stop;
 use crate::watchdog;
-
-/// Full scans, where the system tells of changes and where it does not.
-const RESCAN: Duration = Duration::from_secs(60);
-const RESCAN_POLLED: Duration = Duration::from_secs(10);
-/// Hints within this time are one.
-const SCAN_AT_MOST_EVERY: Duration = Duration::from_millis(50);
-/// How often the keeper looks about when nothing happens: for signals, and with `--once` for the end of all work.
-const IDLE: Duration = Duration::from_millis(200);
-const IDLE_ONCE: Duration = Duration::from_millis(20);
-/// Free space is looked at this often.
-const DISK_EVERY: Duration = Duration::from_secs(5);
-/// With `--once`, a result that cannot be brought into place is tried so often before it is left for the next run.
-const TRIES_ONCE: u32 = 4;
 
 /// Runs the daemon to its end.
 pub(crate) fn run(args: &WatchArgs) -> Exit {
@@ -295,324 +277,4 @@ fn recover(context: &Context) -> Result<(), StoreError> {
         }
     }
     Ok(())
-}
-
-/// The thread that looks after the folders.
-struct Keeper<'a> {
-    context: &'a Context,
-    inbox: Receiver<Event>,
-    stop: &'a Stop,
-    folders: Vec<Kept>,
-    /// Keeps telling of changes as long as it lives.
-    _watchers: Vec<Watching>,
-    disk_looked: Option<Instant>,
-}
-
-/// Tells of changes until the process ends.
-type Watching = ManuallyDrop<notify::RecommendedWatcher>;
-
-/// A folder under the keeper's eyes.
-struct Kept {
-    folder: Arc<Folder>,
-    reconciler: Reconciler,
-    rest: Rest,
-    rescan: Duration,
-    scanned: Option<Instant>,
-    looked: Instant,
-    dirty: bool,
-    unavailable: bool,
-    /// Files that were only noticed, and are gone.
-    gone: Vec<suture_store::JobId>,
-    /// Names that were renamed into place since the last scan.
-    renamed: Vec<PathBuf>,
-    scan_takes: Duration,
-}
-
-impl<'a> Keeper<'a> {
-    fn new(context: &'a Context, events: Sender<Event>, inbox: Receiver<Event>, stop: &'a Stop) -> Self {
-        let mut watchers = Vec::new();
-        let mut folders = Vec::new();
-        for folder in &context.folders {
-            let mut polled = fsx::needs_polling(&folder.inbox());
-            if !polled {
-                match watcher(&folder.inbox(), events.clone()) {
-                    Ok(watcher) => watchers.push(watcher),
-                    Err(error) => {
-                        tracing::warn!(folder = %folder.root.display(), %error, "The system does not tell of changes; polling.");
-                        polled = true;
-                    }
-                }
-            }
-            let default = Rest::by_default(polled, context.once);
-            let rest = context.config.settle.map_or(default, |settle| Rest { settle });
-            let rescan = context.config.rescan.unwrap_or(if polled { RESCAN_POLLED } else { RESCAN });
-            tracing::info!(folder = %folder.root.display(), polled, "Serving a hot folder.");
-            folders.push(Kept {
-                folder: Arc::clone(folder),
-                reconciler: Reconciler::new(Arc::clone(folder), Arc::clone(&context.config), rest),
-                rest,
-                rescan,
-                scanned: None,
-                looked: Instant::now(),
-                dirty: true,
-                unavailable: false,
-                gone: Vec::new(),
-                renamed: Vec::new(),
-                scan_takes: Duration::ZERO,
-            });
-        }
-        Self { context, inbox, stop, folders, _watchers: watchers, disk_looked: None }
-    }
-
-    /// Keeps the folders until there is a reason to end.
-    fn keep(&mut self) -> Result<(), StoreError> {
-        self.remember_live()?;
-        self.forget_noticed()?;
-        loop {
-            if self.stop.asked() {
-                tracing::info!("Stopping: running jobs are finished, nothing new is taken.");
-                return Ok(());
-            }
-            if self.context.failed.lock().is_ok_and(|failed| failed.is_some()) {
-                return Ok(());
-            }
-            let now = Instant::now();
-            self.look_at_disk(now)?;
-            for kept in &mut self.folders {
-                kept.turn(self.context, now)?;
-            }
-            if self.context.once && self.is_finished()? {
-                return Ok(());
-            }
-            self.listen();
-        }
-    }
-
-    /// Waits for the next thing to do, and takes in what was heard.
-    fn listen(&mut self) {
-        let settling = self.folders.iter().filter(|kept| kept.reconciler.is_settling());
-        let looks = settling.map(|kept| kept.rest.look_every());
-        let scan = self.folders.iter().filter(|kept| kept.dirty).map(Kept::scan_at_most_every);
-        let idle = if self.context.once { IDLE_ONCE } else { IDLE };
-        let wait = looks.chain(scan).min().unwrap_or(idle).min(idle);
-        let mut next = self.inbox.recv_timeout(wait);
-        loop {
-            match next {
-                Ok(Event::Hint { renamed }) => {
-                    for kept in &mut self.folders {
-                        kept.hint(&renamed);
-                    }
-                }
-                Ok(Event::Ended { folder, path }) => {
-                    if let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == folder) {
-                        kept.reconciler.ended(&path);
-                        kept.dirty = true;
-                    }
-                }
-                Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => return,
-            }
-            next = self.inbox.try_recv().map_err(|_| RecvTimeoutError::Timeout);
-        }
-    }
-
-    /// With `--once`: is everything that came to rest finished?
-    fn is_finished(&self) -> Result<bool, StoreError> {
-        let folders_rest = self.folders.iter().all(|kept| !kept.dirty && (kept.unavailable || !kept.reconciler.is_settling()));
-        if !folders_rest || !self.inbox.is_empty() || self.context.schedule.busy() > 0 {
-            return Ok(false);
-        }
-        let counts = self.context.store.counts()?;
-        let of = |wanted: fn(Kind) -> bool| counts.iter().filter(|(kind, _)| wanted(*kind)).map(|(_, n)| n).sum::<u64>();
-        if of(|kind| matches!(kind, Kind::Queued | Kind::Alone)) > 0 && !self.context.schedule.is_paused() {
-            return Ok(false);
-        }
-        if of(|kind| kind == Kind::Parked) > 0 {
-            let parked = self.context.store.list(&Query { kinds: vec![Kind::Parked], ..Query::default() })?;
-            if parked.iter().any(|job| job.parked.is_some_and(|parked| parked.tries < TRIES_ONCE)) {
-                return Ok(false);
-            }
-        }
-        let waiting = of(Kind::is_live);
-        if waiting > 0 || self.folders.iter().any(|kept| kept.unavailable) {
-            tracing::warn!(
-                jobs = waiting,
-                "Some work is left for the next run: jobs that wait after errors, a full disk, or folders out of reach."
-            );
-            self.context.not_good.store(true, Ordering::Relaxed);
-        }
-        Ok(true)
-    }
-
-    /// Jobs of an earlier life whose files still wait in `in/`.
-    fn remember_live(&mut self) -> Result<(), StoreError> {
-        let kinds = Kind::ALL.into_iter().filter(|kind| kind.is_live()).collect();
-        for job in self.context.store.list(&Query { kinds, ..Query::default() })? {
-            if let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == job.source.folder)
-                && job.original().0 == Area::In
-            {
-                kept.reconciler.known(&job.source, job.id);
-            }
-        }
-        Ok(())
-    }
-
-    /// Files that were noticed in an earlier life and are gone now.
-    fn forget_noticed(&self) -> Result<(), StoreError> {
-        for job in self.context.store.list(&Query { kinds: vec![Kind::Noticed], ..Query::default() })? {
-            if let Some(kept) = self.folders.iter().find(|kept| kept.folder.name == job.source.folder)
-                && kept.folder.check().is_ok()
-                && kept.folder.inbox().is_dir()
-                && fsx::exists(&kept.folder.inbox().join(job.source.path.to_path())).is_ok_and(|there| !there)
-            {
-                forget(self.context, job.id)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Takes nothing new while the disk is nearly full: a result needs room, and a half-full night is better than a broken one.
-    fn look_at_disk(&mut self, now: Instant) -> Result<(), StoreError> {
-        if self.disk_looked.is_some_and(|then| now.duration_since(then) < DISK_EVERY) {
-            return Ok(());
-        }
-        let first = self.disk_looked.is_none();
-        self.disk_looked = Some(now);
-        self.context.store.check()?;
-        let reserve = self.context.config.reserve;
-        let full = self.folders.iter().find(|kept| fsx::free_space(&kept.folder.root, reserve) == 0);
-        if self.context.schedule.pause(full.is_some()) != full.is_some() || (first && full.is_some()) {
-            match full {
-                Some(kept) => {
-                    let folder = kept.folder.root.display();
-                    tracing::warn!(%folder, "The disk is nearly full; nothing new is taken.");
-                }
-                None => tracing::info!("There is room on the disk again."),
-            }
-        }
-        Ok(())
-    }
-}
-
-impl Kept {
-    fn hint(&mut self, renamed: &[PathBuf]) {
-        self.dirty = true;
-        let inbox = self.folder.inbox();
-        self.renamed.extend(renamed.iter().filter(|path| path.starts_with(&inbox)).cloned());
-    }
-
-    /// The shortest time between two scans: ten times what one takes, so that a full folder in which much happens is not read
-    /// again and again.
-    fn scan_at_most_every(&self) -> Duration {
-        SCAN_AT_MOST_EVERY.max(self.scan_takes * 10)
-    }
-
-    fn scan(&mut self, now: Instant) {
-        let found = self.folder.check().and_then(|()| self.reconciler.scan(now).map_err(|error| error.to_string()));
-        match found {
-            Ok(gone) => {
-                if std::mem::take(&mut self.unavailable) {
-                    tracing::info!(folder = %self.folder.root.display(), "The folder is back.");
-                }
-                self.gone.extend(gone);
-            }
-            Err(error) => {
-                if !std::mem::replace(&mut self.unavailable, true) {
-                    tracing::error!(folder = %self.folder.root.display(), error, "The folder cannot be served; the others go on.");
-                }
-            }
-        }
-    }
-
-    /// Scans and looks, as far as either is due.
-    fn turn(&mut self, context: &Context, now: Instant) -> Result<(), StoreError> {
-        let since = self.scanned.map(|then| now.duration_since(then));
-        let due = since.is_none_or(|since| since >= self.rescan || (self.dirty && since >= self.scan_at_most_every()));
-        if due {
-            self.scanned = Some(now);
-            self.dirty = false;
-            self.scan(now);
-            self.scan_takes = now.elapsed();
-            if !self.renamed.is_empty() {
-                // Known now, so that it can count; and to be looked at at once.
-                self.reconciler.came_whole(&std::mem::take(&mut self.renamed));
-                self.looked = now.checked_sub(self.rest.look_every()).unwrap_or(self.looked);
-            }
-        }
-        for id in self.gone.drain(..) {
-            forget(context, id)?;
-        }
-        if now.duration_since(self.looked) < self.rest.look_every() {
-            return Ok(());
-        }
-        self.looked = now;
-        let ready = self.reconciler.look(now);
-        if ready.is_empty() {
-            return Ok(());
-        }
-        let (paths, found): (Vec<_>, Vec<_>) = ready.into_iter().unzip();
-        match context.store.submit(&found) {
-            Ok(submitted) => {
-                crash_point("daemon.submitted");
-                for ((path, submission), answer) in paths.iter().zip(&found).zip(submitted) {
-                    if let (Some(what), true) = (&submission.foreign, answer.new) {
-                        tracing::info!(job = answer.id.0, file = %submission.source.path, what, "Left where it is.");
-                    }
-                    self.reconciler.submitted(path, submission, answer.id);
-                }
-            }
-            Err(StoreError::TooLong { .. }) => {
-                // One by one, to find out which.
-                for (path, submission) in paths.iter().zip(&found) {
-                    match context.store.submit(std::slice::from_ref(submission)) {
-                        Ok(answer) => {
-                            for answer in answer {
-                                self.reconciler.submitted(path, submission, answer.id);
-                            }
-                        }
-                        Err(error) if error.is_callers() => self.reconciler.refused(path, &error.to_string()),
-                        Err(error) => return Err(error),
-                    }
-                }
-            }
-            Err(error) => return Err(error),
-        }
-        context.schedule.news();
-        Ok(())
-    }
-}
-
-fn forget(context: &Context, id: suture_store::JobId) -> Result<(), StoreError> {
-    match context.store.control(id, Control::Forget) {
-        Err(error) if !error.is_callers() => Err(error),
-        // An operator was faster.
-        _ => Ok(()),
-    }
-}
-
-/// Passes on that something happened, and which names were renamed into place.
-fn watcher(inbox: &Path, events: Sender<Event>) -> notify::Result<Watching> {
-    let mut watcher = notify::recommended_watcher(move |event: notify::Result<notify::Event>| {
-        let hint = match event {
-            Ok(event) if matches!(event.kind, EventKind::Access(_)) => return,
-            Ok(event) => match event.kind {
-                EventKind::Modify(ModifyKind::Name(RenameMode::To)) => Event::Hint { renamed: event.paths },
-                EventKind::Modify(ModifyKind::Name(RenameMode::Both)) => {
-                    Event::Hint { renamed: event.paths.into_iter().skip(1).collect() }
-                }
-                _ => Event::Hint { renamed: Vec::new() },
-            },
-            // Lost events and the like: look for oneself.
-            Err(_) => Event::Hint { renamed: Vec::new() },
-        };
-        // The daemon is ending.
-        let _ = events.send(hint);
-    })?;
-    // notify 8.2 says nothing where its thread cannot start, and panics at the next word, and again when it is dropped: it is asked
-    // something harmless first, and never dropped (the process ends with it).
-    let watching = catch_unwind(AssertUnwindSafe(|| {
-        watcher.configure(notify::Config::default())?;
-        watcher.watch(inbox, RecursiveMode::Recursive)
-    }));
-    let watcher = ManuallyDrop::new(watcher);
-    watching.unwrap_or_else(|_| Err(notify::Error::generic("its thread could not start"))).map(|()| watcher)
 }

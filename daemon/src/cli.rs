@@ -40,7 +40,7 @@ pub(crate) enum Command {
     Demo,
     /// Work on requests from standard input (started by the supervisor)
     #[command(hide = true)]
-    Worker,
+    Worker(WorkerArgs),
 }
 
 const WATCH_HELP: &str = "\
@@ -196,6 +196,17 @@ pub(crate) struct WatchArgs {
     /// How long a file must be at rest before it is taken, e.g. 5s
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     pub settle: Option<Duration>,
+}
+
+/// What the supervisor tells a worker of itself.
+#[derive(Args, Debug)]
+pub(crate) struct WorkerArgs {
+    /// The process number of the supervisor, without which the worker ends
+    #[arg(long)]
+    pub parent: u32,
+    /// Bytes of memory that the worker may have of the system
+    #[arg(long)]
+    pub data: u64,
 }
 
 #[derive(Args, Debug)]

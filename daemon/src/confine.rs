@@ -1,19 +1,40 @@
-//! What a worker may not do, whatever a file makes of it: send signals to other processes. So no file can kill the daemon, and a death
-//! of the daemon while a file was worked on is not the file's doing. And where the system runs out of memory, a worker goes first.
+//! What a worker may not do, whatever a file makes of it: outlive its supervisor, take more memory than it was given, leave a core dump, or
+//! send signals to other processes. So no file can kill the daemon, and a death of the daemon while a file was worked on is not the file's
+//! doing. And where the system runs out of memory, a worker goes first.
 
+use std::io;
+
+use rustix::process::{Resource, Rlimit, Signal, getppid, set_parent_process_death_signal, setrlimit};
 use rustix::thread::set_no_new_privs;
 
+use crate::cli::WorkerArgs;
 use crate::create;
 
 /// Added to the system's own count of who should go first (from −1000 to 1000).
 const OUT_OF_MEMORY_SCORE: &str = "500";
+
+/// Binds this process to its supervisor and to its memory.
+///
+/// # Errors
+/// When the supervisor is gone already, or the system refuses.
+pub(crate) fn bind(args: &WorkerArgs) -> io::Result<()> {
+    set_parent_process_death_signal(Some(Signal::TERM))?;
+    // If it died before the line above took effect, someone else is the parent by now.
+    if getppid().map(|pid| pid.as_raw_nonzero().get().cast_unsigned()) != Some(args.parent) {
+        return Err(io::Error::new(io::ErrorKind::BrokenPipe, "the supervisor is gone"));
+    }
+    let limit = |bytes| Rlimit { current: Some(bytes), maximum: Some(bytes) };
+    setrlimit(Resource::Core, limit(0))?;
+    setrlimit(Resource::Data, limit(args.data))?;
+    Ok(())
+}
 
 /// Confines this process, before it has other threads. A system that refuses (an old kernel, a sandbox) leaves it as it is.
 pub(crate) fn confine() {
     if let Err(error) = create::tell_kernel("oom_score_adj", OUT_OF_MEMORY_SCORE) {
         tracing::debug!(%error, "The system will not let a worker go first when memory is short.");
     }
-    let confined = set_no_new_privs(true).map_err(std::io::Error::from).and_then(|()| forbid_signals());
+    let confined = set_no_new_privs(true).map_err(io::Error::from).and_then(|()| forbid_signals());
     if let Err(error) = confined {
         tracing::debug!(%error, "A worker is not kept from sending signals.");
     }
@@ -21,18 +42,18 @@ pub(crate) fn confine() {
 
 /// Loads a filter that lets signals go to this process only.
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
-fn forbid_signals() -> std::io::Result<()> {
+fn forbid_signals() -> io::Result<()> {
     let program = program(std::process::id());
     let length = u16::try_from(program.len()).unwrap_or(0);
     let filter = libc::sock_fprog { len: length, filter: program.as_ptr().cast_mut() };
     // SAFETY: the kernel copies `length` instructions of `program`, which lives until the call returns, and checks them.
     let result = unsafe { libc::prctl(libc::PR_SET_SECCOMP, libc::SECCOMP_MODE_FILTER, &raw const filter) };
-    if result == 0 { Ok(()) } else { Err(std::io::Error::last_os_error()) }
+    if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
 }
 
 #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-fn forbid_signals() -> std::io::Result<()> {
-    Err(std::io::ErrorKind::Unsupported.into())
+fn forbid_signals() -> io::Result<()> {
+    Err(io::ErrorKind::Unsupported.into())
 }
 
 /// The filter (`seccomp(2)`): calls whose first argument is a process go through if that is `pid`; the other ways to send a signal fail

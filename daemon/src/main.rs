@@ -59,7 +59,7 @@ fn main() -> ExitCode {
     let exit = match &cli.command {
         Command::Repair(args) => single::repair(args),
         Command::Inspect(args) => single::inspect(args),
-        Command::Worker => match worker::serve() {
+        Command::Worker(args) => match worker::serve(args) {
             Ok(()) => Exit::Good,
             Err(error) => {
                 say::complain(&error);

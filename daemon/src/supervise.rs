@@ -15,7 +15,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crossbeam::channel::{Receiver, RecvTimeoutError, unbounded};
-use rustix::process::{Pid, Resource, Rlimit, Signal};
+use rustix::process::{Pid, Signal};
 use suture_core::{ErrorClass, Report};
 
 use crate::create;
@@ -163,28 +163,16 @@ impl Worker {
         // The engine keeps to its budget by its own count; the limit only catches what escapes it. Stacks, allocator slack and
         // code are not in that count.
         let data = memory.saturating_add(memory / 4).saturating_add(256 << 20).saturating_add(threads as u64 * (8 << 20));
-        let parent = rustix::process::getpid();
         // The running binary itself, even when a newer one has taken its name meanwhile.
         let mut command = Command::new("/proc/self/exe");
         command.arg0("suture").arg("worker").env("RUST_BACKTRACE", "0");
+        command.args(["--parent", &std::process::id().to_string(), "--data", &data.to_string()]);
         if many && std::env::var_os(TUNABLES).is_none() {
             command.env(TUNABLES, KEEP_MEMORY);
         }
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
-        // SAFETY: between fork and exec only async-signal-safe calls are made: plain system calls that neither allocate nor lock.
-        unsafe {
-            command.pre_exec(move || {
-                rustix::process::set_parent_process_death_signal(Some(Signal::TERM))?;
-                if rustix::process::getppid() != Some(parent) {
-                    // The parent died before the line above could take effect.
-                    return Err(io::ErrorKind::BrokenPipe.into());
-                }
-                let none = Rlimit { current: Some(0), maximum: Some(0) };
-                rustix::process::setrlimit(Resource::Core, none)?;
-                rustix::process::setrlimit(Resource::Data, Rlimit { current: Some(data), maximum: Some(data) })?;
-                Ok(())
-            });
-        }
+        // The worker binds itself (`confine`): without anything to be done between fork and exec, the system starts it in one call, which never
+        // waits for a worker that waits for us.
         let mut child = command.spawn()?;
         let (stdout, stderr, stdin) = (child.stdout.take(), child.stderr.take(), child.stdin.take());
         let (sender, lines) = unbounded();

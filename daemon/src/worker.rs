@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use suture_core::report::Task;
 use suture_core::{Access, Error, Limits, Progress, Report};
 
+use crate::cli::WorkerArgs;
 use crate::confine;
 use crate::create;
 use crate::fsx::Identity;
@@ -21,9 +22,10 @@ const FIRST_AFTER: Duration = Duration::from_millis(100);
 ///
 /// # Errors
 /// When the supervisor is gone, or speaks another protocol.
-pub(crate) fn serve() -> io::Result<()> {
-    confine::confine();
+pub(crate) fn serve(args: &WorkerArgs) -> io::Result<()> {
     orphan::listen()?;
+    confine::bind(args)?;
+    confine::confine();
     for line in io::stdin().lock().lines() {
         let request: Request = serde_json::from_str(&line?)?;
         say(&Message::Begun)?;

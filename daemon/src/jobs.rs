@@ -13,7 +13,7 @@ use crate::control::{Answer, Wish, answer, ask};
 use crate::exit::Exit;
 use crate::receipt::REPORT;
 use crate::say::{complain, plain};
-use crate::table;
+use crate::{table, watch, watchdog};
 
 /// Does what the command line asks.
 pub(crate) fn run(args: &JobsArgs) -> Exit {
@@ -82,6 +82,7 @@ pub(crate) fn reach(dir: &Path, wish: &Wish) -> Result<Answer, (String, Exit)> {
     if !state.is_dir() {
         return Ok(Answer::Jobs(Vec::new()));
     }
+    watchdog::start(|| watch::end_hanging()).map_err(|error| (format!("no thread can be started: {error}"), Exit::TryAgain))?;
     let failed = |error: StoreError| (error.to_string(), if error.exit_code() == 73 { Exit::Owned } else { Exit::TryAgain });
     // To look needs no right to write, and no room.
     match wish {

@@ -12,7 +12,7 @@ use crossbeam::channel::{Receiver, RecvTimeoutError, Sender};
 use notify::event::{EventKind, ModifyKind, RenameMode};
 use notify::{RecursiveMode, Watcher};
 use suture_store::job::{Area, Kind};
-use suture_store::{Control, Query, StoreError, crash_point};
+use suture_store::{Clock, Control, Query, StoreError, SystemClock, crash_point};
 
 use crate::attempt::{Context, Event};
 use crate::folder::Folder;
@@ -167,11 +167,8 @@ impl<'a> Keeper<'a> {
         if of(|kind| matches!(kind, Kind::Queued | Kind::Alone)) > 0 && !self.context.schedule.is_paused() {
             return Ok(false);
         }
-        if of(|kind| kind == Kind::Parked) > 0 {
-            let parked = self.context.store.list(&Query { kinds: vec![Kind::Parked], ..Query::default() })?;
-            if parked.iter().any(|job| job.parked.is_some_and(|parked| parked.tries < TRIES_ONCE)) {
-                return Ok(false);
-            }
+        if of(|kind| kind == Kind::Parked) > 0 && !self.context.schedule.is_paused() && self.may_move_on()? {
+            return Ok(false);
         }
         let waiting = of(Kind::is_live);
         if waiting > 0 || self.folders.iter().any(|kept| kept.unavailable) {
@@ -182,6 +179,13 @@ impl<'a> Keeper<'a> {
             self.context.not_good.store(true, Ordering::Relaxed);
         }
         Ok(true)
+    }
+
+    /// Is a parked job tried once more, with `--once`? What an earlier run left was tried often; but the world may be another one now.
+    fn may_move_on(&self) -> Result<bool, StoreError> {
+        let now = SystemClock.now();
+        let parked = self.context.store.list(&Query { kinds: vec![Kind::Parked], ..Query::default() })?;
+        Ok(parked.iter().any(|job| job.is_due(now) || job.parked.is_some_and(|parked| parked.tries < TRIES_ONCE)))
     }
 
     /// Jobs of an earlier life whose files still wait in `in/`.

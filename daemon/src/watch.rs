@@ -65,8 +65,9 @@ pub(crate) fn serve(config: Config, once: bool, stop: &Stop, may_begin_anew: boo
         }
     }
     let (lives, not_good) = (Lives::so_far(), Arc::<AtomicBool>::default());
-    if may_begin_anew {
-        watchdog::start(lives, Arc::clone(&not_good), stop.clone());
+    if let Err(error) = watch_store(lives, &not_good, stop, may_begin_anew) {
+        complain(&format_args!("no thread can be started: {error}; try again, or raise the limit of processes"));
+        return Exit::TryAgain;
     }
     let asked = Instant::now();
     let store = loop {
@@ -79,6 +80,23 @@ pub(crate) fn serve(config: Config, once: bool, stop: &Stop, may_begin_anew: boo
     note_state(&config, &folders);
     let daemon = Daemon { config: Arc::new(config), folders, store, once, lives, not_good, stop: stop.clone(), may_begin_anew };
     daemon.run()
+}
+
+/// When a call into the job database hangs, the program begins anew, if it may, or ends.
+fn watch_store(lives: Lives, not_good: &Arc<AtomicBool>, stop: &Stop, may_begin_anew: bool) -> std::io::Result<()> {
+    let (born, not_good, stop) = (Instant::now(), Arc::clone(not_good), stop.clone());
+    watchdog::start(move || {
+        if may_begin_anew {
+            lives.begin_another(born.elapsed(), not_good.load(Ordering::Relaxed), &|| stop.asked());
+        }
+        end_hanging();
+    })
+}
+
+/// Ends a process in which nothing that could be waited for ends any more.
+pub(crate) fn end_hanging() -> ! {
+    complain(&"the job database does not answer after an error of its disk; try again");
+    std::process::exit(i32::from(Exit::TryAgain.code()))
 }
 
 fn store_failed(error: &StoreError) -> Exit {

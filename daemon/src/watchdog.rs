@@ -1,71 +1,101 @@
-//! Sees when a call into the job database will never return ([`suture_store::stall`]), and begins the program anew then. A disk that is only
-//! slow is not mistaken for that: whoever waits for a disk cannot be interrupted, and the system says so of the thread.
+//! Sees when a call into the job database will never return ([`suture_store::stall`]). A disk that is only slow is not mistaken for that:
+//! whoever waits for a disk cannot be interrupted, and the system says so of the thread.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::io;
+use std::path::Path;
+use std::time::Duration;
 
-use suture_store::stall::oldest_call;
-
-use crate::again::Lives;
-use crate::exit::Exit;
-use crate::say::complain;
-use crate::signals::Stop;
+use suture_store::stall::{UnderWay, under_way};
 
 const LOOK_EVERY: Duration = Duration::from_millis(500);
-/// Looks in a row at which a call hangs and no thread waits for a disk.
+/// So many more looks at which a call hangs than at which it is served. A single look tells little: other threads have work of their own.
 const LOOKS: u32 = 20;
+/// How sled names the threads that write for it.
+const DATABASE_THREADS: [&str; 2] = ["sled-io-", "log flusher"];
 
-/// Watches from a thread of its own until the process ends. Where no thread is to be had, there is no watch.
-pub(crate) fn start(lives: Lives, not_good: Arc<AtomicBool>, stop: Stop) {
-    let born = Instant::now();
+/// Watches from a thread of its own until the process ends, or a call hangs: then it does `on_hang`, and nothing more.
+///
+/// # Errors
+/// Where no thread is to be had. The database needs threads, too, and would wait for them for ever.
+pub(crate) fn start(on_hang: impl FnOnce() + Send + 'static) -> io::Result<()> {
     let watch = move || {
         let mut looks = 0;
-        loop {
+        while looks < LOOKS {
             std::thread::sleep(LOOK_EVERY);
-            let hangs = oldest_call().is_some_and(|age| age >= LOOK_EVERY) && !waits_for_a_disk();
-            looks = if hangs { looks + 1 } else { 0 };
-            if looks < LOOKS {
-                continue;
-            }
-            tracing::error!("A call into the job database does not return.");
-            lives.begin_another(born.elapsed(), not_good.load(Ordering::Relaxed), &|| stop.asked());
-            complain(&"the job database does not answer after an error of its disk; try again");
-            // Nothing that could be waited for ends any more.
-            std::process::exit(i32::from(Exit::TryAgain.code()));
+            looks = look(looks, &under_way());
         }
+        tracing::error!("A call into the job database does not return.");
+        on_hang();
     };
-    if let Err(error) = std::thread::Builder::new().name("watchdog".into()).spawn(watch) {
-        tracing::debug!(%error, "The job database is not watched.");
+    std::thread::Builder::new().name("watchdog".into()).spawn(watch).map(drop)
+}
+
+/// How many looks count after this one.
+fn look(looks: u32, calls: &[UnderWay]) -> u32 {
+    match calls.first() {
+        Some(oldest) if oldest.since.elapsed() < LOOK_EVERY => 0,
+        None => 0,
+        Some(_) if is_served(calls) => looks.saturating_sub(1),
+        Some(_) => looks + 1,
     }
 }
 
-/// Is a thread of this process in an uninterruptible wait, or at work?
-fn waits_for_a_disk() -> bool {
-    let own = rustix::thread::gettid().as_raw_nonzero().to_string();
+/// Does a thread wait for a disk, or is a thread of the database or one that waits for it at work?
+fn is_served(calls: &[UnderWay]) -> bool {
     let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
-    tasks.filter(|task| task.file_name().to_str() != Some(&own)).any(|task| {
-        let stat = std::fs::read_to_string(task.path().join("stat")).unwrap_or_default();
+    tasks.map(|task| task.path()).any(|task| {
+        let stat = std::fs::read_to_string(task.join("stat")).unwrap_or_default();
         // The name in parentheses may hold anything; the state is behind the last one.
-        let state = stat.rsplit(')').next().and_then(|rest| rest.trim_start().chars().next());
-        matches!(state, Some('D' | 'R'))
+        match stat.rsplit(')').next().and_then(|rest| rest.trim_start().chars().next()) {
+            Some('D') => true,
+            Some('R') => is_of_database(&task, calls),
+            _ => false,
+        }
     })
+}
+
+fn is_of_database(task: &Path, calls: &[UnderWay]) -> bool {
+    let number = task.file_name().and_then(|name| name.to_str()?.parse::<u32>().ok());
+    let name = std::fs::read_to_string(task.join("comm")).unwrap_or_default();
+    calls.iter().any(|call| Some(call.thread) == number) || DATABASE_THREADS.iter().any(|own| name.starts_with(own))
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::time::Instant;
+
     use super::*;
 
-    /// A thread at work is seen.
+    fn call(thread: u32) -> UnderWay {
+        UnderWay { since: Instant::now().checked_sub(Duration::from_secs(1)).unwrap(), thread }
+    }
+
+    /// A caller at work is served; work of other threads says nothing about the call.
     #[test]
-    fn a_busy_thread_is_no_hang() {
+    fn only_work_for_the_call_counts() {
         let end = Arc::new(AtomicBool::new(false));
-        let busy = {
-            let end = Arc::clone(&end);
-            std::thread::spawn(move || while !end.load(Ordering::Relaxed) {})
+        let (busy, number) = {
+            let (end, (tell, told)) = (Arc::clone(&end), std::sync::mpsc::channel());
+            let work = move || {
+                tell.send(rustix::thread::gettid().as_raw_nonzero().get().cast_unsigned()).unwrap();
+                while !end.load(Ordering::Relaxed) {}
+            };
+            (std::thread::Builder::new().name("a busy keeper".into()).spawn(work).unwrap(), told.recv().unwrap())
         };
-        assert!((0..100).any(|_| waits_for_a_disk()));
+        let task = Path::new("/proc/self/task").join(number.to_string());
+        assert!((0..100).any(|_| is_served(&[call(number)])));
+        assert!(is_of_database(&task, &[call(number)]) && !is_of_database(&task, &[call(1)]));
         end.store(true, Ordering::Relaxed);
         busy.join().unwrap();
+    }
+
+    /// A young call begins the count anew, an old one that is not served adds to it.
+    #[test]
+    fn looks_add_up_only_while_a_call_hangs() {
+        assert_eq!(look(7, &[]), 0);
+        assert_eq!(look(7, &[UnderWay { since: Instant::now(), thread: 1 }]), 0);
+        assert!([6, 8].contains(&look(7, &[call(1)])), "other tests may wait for a disk");
     }
 }

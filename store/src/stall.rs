@@ -3,11 +3,19 @@
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-static CALLS: Mutex<(u64, BTreeMap<u64, Instant>)> = Mutex::new((0, BTreeMap::new()));
+/// A call into the database that has not returned.
+#[derive(Clone, Copy, Debug)]
+pub struct UnderWay {
+    pub since: Instant,
+    /// Number of the thread that waits for it (`gettid`).
+    pub thread: u32,
+}
 
-fn calls() -> MutexGuard<'static, (u64, BTreeMap<u64, Instant>)> {
+static CALLS: Mutex<(u64, BTreeMap<u64, UnderWay>)> = Mutex::new((0, BTreeMap::new()));
+
+fn calls() -> MutexGuard<'static, (u64, BTreeMap<u64, UnderWay>)> {
     // Numbers and times: whole whatever panicked meanwhile.
     CALLS.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -20,7 +28,8 @@ impl Call {
         let mut calls = calls();
         calls.0 += 1;
         let id = calls.0;
-        calls.1.insert(id, Instant::now());
+        let thread = rustix::thread::gettid().as_raw_nonzero().get().cast_unsigned();
+        calls.1.insert(id, UnderWay { since: Instant::now(), thread });
         Self(id)
     }
 }
@@ -31,9 +40,9 @@ impl Drop for Call {
     }
 }
 
-/// How long the oldest call into the database of this process has been under way.
-pub fn oldest_call() -> Option<Duration> {
-    calls().1.values().next().map(Instant::elapsed)
+/// The calls into the database of this process that are under way, the oldest first.
+pub fn under_way() -> Vec<UnderWay> {
+    calls().1.values().copied().collect()
 }
 
 #[cfg(test)]
@@ -44,9 +53,9 @@ mod tests {
     fn a_call_counts_until_it_ends() {
         // Other tests' stores come and go meanwhile.
         let call = Call::begin();
-        std::thread::sleep(Duration::from_millis(20));
-        assert!(oldest_call().is_some_and(|age| age >= Duration::from_millis(20)));
         let id = call.0;
+        let own = rustix::thread::gettid().as_raw_nonzero().get().cast_unsigned();
+        assert!(under_way().iter().any(|call| call.thread == own));
         drop(call);
         assert!(!calls().1.contains_key(&id));
     }

@@ -188,3 +188,19 @@ fn folder_in_use_is_code_73() {
     let status = daemon.wait().unwrap();
     assert!(serving && status.code() == Some(0), "{status}");
 }
+
+/// With `--once`, what an earlier run could not bring into place however often it tried is tried by the next one.
+#[test]
+fn the_next_run_tries_what_the_last_one_left() {
+    let place = Place::new();
+    place.put("hot/in/scan/part.stl", &mesh(Case::Holes, 1));
+    // Where results of that sub-folder go is a file.
+    place.put("hot/out/scan", b"in the way");
+    once(&place).expect(1);
+    let job = jobs(&place).remove(0).1;
+    assert!(job["kind"] == "parked" && job["parked"]["tries"].as_u64() >= Some(4), "{job}");
+    std::fs::remove_file(place.at("hot/out/scan")).unwrap();
+    once(&place).expect(0);
+    assert_eq!(jobs(&place).remove(0).1["kind"], "done");
+    assert!(place.at("hot/out/scan/part.stl").is_file() && place.at("hot/done/scan/part.stl").is_file());
+}

@@ -38,9 +38,13 @@ fn limited(limit: u32) {
     // SAFETY: between fork and exec only an async-signal-safe call is made, with a local that outlives it.
     unsafe {
         command.pre_exec(move || {
-            let limit = libc::rlimit { rlim_cur: limit.into(), rlim_max: libc::RLIM_INFINITY };
-            libc::setrlimit(libc::RLIMIT_NPROC, &raw const limit);
-            Ok(())
+            // The hard limit stays: to raise it again is not for every user.
+            let mut now = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+            let done = libc::getrlimit(libc::RLIMIT_NPROC, &raw mut now) == 0 && {
+                now.rlim_cur = limit.into();
+                libc::setrlimit(libc::RLIMIT_NPROC, &raw const now) == 0
+            };
+            if done { Ok(()) } else { Err(std::io::Error::last_os_error()) }
         });
     }
     let mut daemon = stage.start(command);

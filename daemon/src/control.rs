@@ -7,6 +7,7 @@ use std::net::Shutdown;
 use std::os::fd::AsRawFd;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
@@ -20,6 +21,8 @@ use crate::attempt::Context;
 const LONGEST_WISH: u64 = 4096;
 /// How long either side waits for the other.
 const PATIENCE: Duration = Duration::from_secs(10);
+/// The same where nobody else can be served meanwhile.
+const SHORT_PATIENCE: Duration = Duration::from_millis(500);
 /// How often the daemon's side looks whether it is to end.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 /// Requests answered at the same time; further ones wait.
@@ -98,7 +101,7 @@ impl Door {
     /// end: the socket's name may be gone by then.
     pub(crate) fn serve(&self, context: &Context, end: &dyn Fn() -> bool) {
         let busy = AtomicUsize::new(0);
-        let mut open: VecDeque<UnixStream> = VecDeque::new();
+        let mut open: VecDeque<Arc<UnixStream>> = VecDeque::new();
         std::thread::scope(|scope| {
             while !end() {
                 if busy.load(Ordering::Acquire) >= AT_ONCE {
@@ -112,24 +115,21 @@ impl Door {
                     std::thread::sleep(LOOK_EVERY);
                     continue;
                 };
-                busy.fetch_add(1, Ordering::AcqRel);
+                let stream = Arc::new(stream);
                 // At most so many are still open.
-                open.extend(stream.try_clone());
+                open.push_back(Arc::clone(&stream));
                 while open.len() > AT_ONCE {
                     open.pop_front();
                 }
-                let busy = &busy;
+                busy.fetch_add(1, Ordering::AcqRel);
+                let (busy, other) = (&busy, Arc::clone(&stream));
                 let serve = move || {
-                    let served = serve_one(context, &stream);
-                    // Whoever asked reads to the end, and another handle of the stream is kept.
-                    let _ = stream.shutdown(Shutdown::Both);
-                    if let Err(error) = served {
-                        tracing::debug!(%error, "A request on the control socket was not understood.");
-                    }
+                    attend(context, &other, PATIENCE);
                     busy.fetch_sub(1, Ordering::AcqRel);
                 };
                 if std::thread::Builder::new().spawn_scoped(scope, serve).is_err() {
-                    // No thread to be had: the stream is closed, whoever knocked knocks again.
+                    // No thread to be had: here, as long as that holds up no one who knocks.
+                    attend(context, &stream, SHORT_PATIENCE);
                     busy.fetch_sub(1, Ordering::AcqRel);
                 }
             }
@@ -161,10 +161,19 @@ impl Drop for Door {
     }
 }
 
-fn serve_one(context: &Context, stream: &UnixStream) -> io::Result<()> {
+/// Serves one who knocked, and sees them off.
+fn attend(context: &Context, stream: &UnixStream, patience: Duration) {
+    if let Err(error) = serve_one(context, stream, patience) {
+        tracing::debug!(%error, "A request on the control socket was not understood.");
+    }
+    // Whoever asked reads to the end, and another handle of the stream is kept.
+    let _ = stream.shutdown(Shutdown::Both);
+}
+
+fn serve_one(context: &Context, stream: &UnixStream, patience: Duration) -> io::Result<()> {
     stream.set_nonblocking(false)?;
-    stream.set_read_timeout(Some(PATIENCE))?;
-    stream.set_write_timeout(Some(PATIENCE))?;
+    stream.set_read_timeout(Some(patience))?;
+    stream.set_write_timeout(Some(patience))?;
     let mut line = String::new();
     BufReader::new(stream.take(LONGEST_WISH)).read_line(&mut line)?;
     let wish: Wish = serde_json::from_str(&line)?;
@@ -199,7 +208,6 @@ pub(crate) fn ask(root: &Path, wish: &Wish) -> io::Result<Option<Answer>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::Arc;
     use suture_store::{MemoryStore, RelPath, Source, Submission, SystemClock};
 
     #[test]

@@ -4,7 +4,7 @@ use std::os::unix::process::CommandExt;
 use std::time::Duration;
 
 use crate::stage::{Stage, holes, row};
-use crate::world::{is_root, processes_of, set_limit};
+use crate::world::{is_root, processes_of, raise_limit_as};
 
 /// Users of this scenario, so that no one else's processes count.
 const FIRST_USER: u32 = 45_100;
@@ -53,7 +53,7 @@ fn limited(limit: u32) {
     let note = during.iter().filter_map(|job| job["note"].as_str()).find(|note| !note.is_empty()).unwrap_or_default().to_owned();
     stage.assert_originals("at the limit");
     for pid in processes_of(stage.binary()) {
-        set_limit(pid, libc::RLIMIT_NPROC, libc::RLIM_INFINITY);
+        raise_limit_as(user, pid, libc::RLIMIT_NPROC);
     }
     std::thread::sleep(Duration::from_millis(100));
     let took = stage.wait_done(60, &mut daemon);

@@ -4,7 +4,9 @@ use std::ffi::CString;
 use std::fs::File;
 use std::io::Write;
 use std::os::unix::ffi::OsStrExt;
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// Mounts and other users need root.
 pub(crate) fn is_root(scenario: &str) -> bool {
@@ -93,6 +95,28 @@ pub(crate) fn processes_of(binary: &Path) -> Vec<u32> {
         .filter_map(|entry| entry.file_name().to_str()?.parse().ok())
         .filter(|pid| std::fs::read_link(format!("/proc/{pid}/exe")).is_ok_and(|exe| exe == binary))
         .collect()
+}
+
+/// Raises the soft limit of a running process to its hard one, as its own user: not every root may change what belongs to others.
+pub(crate) fn raise_limit_as(user: u32, pid: u32, resource: libc::__rlimit_resource_t) {
+    let mut command = Command::new("true");
+    command.uid(user).gid(user);
+    // SAFETY: between fork and exec only plain system calls are made, with pointers to a local or null.
+    unsafe {
+        command.pre_exec(move || {
+            let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+            let done = libc::prlimit(pid.cast_signed(), resource, std::ptr::null(), &raw mut limit) == 0 && {
+                limit.rlim_cur = limit.rlim_max;
+                libc::prlimit(pid.cast_signed(), resource, &raw const limit, std::ptr::null_mut()) == 0
+            };
+            if done { Ok(()) } else { Err(std::io::Error::last_os_error()) }
+        });
+    }
+    // The process may have ended meanwhile.
+    match command.status() {
+        Err(error) if error.raw_os_error() != Some(libc::ESRCH) => panic!("the limit cannot be raised: {error}"),
+        _ => {}
+    }
 }
 
 /// Sets the soft limit of a running process.

@@ -12,6 +12,7 @@ use std::thread::JoinHandle;
 
 use crossbeam::channel::{Sender, bounded};
 
+use crate::parallel;
 use crate::settings::Limits;
 
 /// What is written between two pushes, a share of the budget between these.
@@ -45,9 +46,11 @@ impl WriteBehind {
         }
         self.unsynced.store(0, Ordering::Relaxed);
         if syncer.is_none() {
-            *syncer = Some(Syncer::start(&self.file)?);
+            *syncer = Syncer::start(&self.file)?;
         }
         match &*syncer {
+            // No thread to be had.
+            None => self.file.sync_data(),
             // The thread ends early only on an error, which `finish` returns.
             Some(running) if running.requests.send(()).is_err() => syncer.take().map_or(Ok(()), Syncer::finish),
             _ => Ok(()),
@@ -77,13 +80,11 @@ struct Syncer {
 }
 
 impl Syncer {
-    fn start(file: &File) -> io::Result<Self> {
+    fn start(file: &File) -> io::Result<Option<Self>> {
         let file = file.try_clone()?;
         let (requests, todo) = bounded(1);
-        let thread = std::thread::Builder::new()
-            .name("write-behind".into())
-            .spawn(move || todo.iter().try_for_each(|()| file.sync_data()))?;
-        Ok(Self { requests, thread })
+        Ok(parallel::servant("write-behind", move || todo.iter().try_for_each(|()| file.sync_data()))
+            .map(|thread| Self { requests, thread }))
     }
 
     fn finish(self) -> io::Result<()> {

@@ -9,7 +9,7 @@ use std::io::{self, IoSlice, Seek, SeekFrom, Write};
 use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::thread::{JoinHandle, ScopedJoinHandle};
+use std::thread::ScopedJoinHandle;
 
 use rustix::io::Errno;
 
@@ -18,6 +18,7 @@ use crate::behind::WriteBehind;
 use crate::digest::Digest;
 use crate::edit::{Edit, Step};
 use crate::error::{Error, Result};
+use crate::parallel::{self, Aside};
 use crate::read::{MeshFile, PREFIX_BYTES};
 use crate::record::Record;
 use crate::settings::Limits;
@@ -77,8 +78,7 @@ pub(crate) fn draft<R>(
     let is_ahead = mesh.is_in_place() && limits.threads > 1 && mesh.bytes().len() >= COPIED_AHEAD;
     std::thread::scope(|scope| {
         let copy = || Sink::create(mesh, output, limits, progress)?.copy(limits, &wanted);
-        let start = || std::thread::Builder::new().name("copy".into()).spawn_scoped(scope, copy);
-        let copying = is_ahead.then(start).transpose().map_err(Error::io(output, "copying"))?;
+        let copying = if is_ahead { parallel::scoped_servant(scope, "copy", copy) } else { None };
         work(Draft { mesh, output, limits, progress, wanted: &wanted, copying })
     })
 }
@@ -334,8 +334,7 @@ impl<'a> Sink<'a> {
             if deferred { Ok(()) } else { file.sync_all() }
         };
         let syncing = if limits.threads > 1 && self.mesh.bytes().len() >= SYNCED_BESIDE {
-            let thread = std::thread::Builder::new().name("sync".into()).spawn(sync);
-            Some(thread.map_err(Error::io(path, "syncing"))?)
+            Some(Aside::start("sync", sync))
         } else {
             sync().map_err(Error::io(path, "syncing"))?;
             None
@@ -365,7 +364,7 @@ const SYNCED_BESIDE: usize = 8 << 20;
 #[must_use]
 pub(crate) struct Written {
     path: PathBuf,
-    syncing: Option<JoinHandle<io::Result<()>>>,
+    syncing: Option<Aside<io::Result<()>>>,
 }
 
 impl Written {
@@ -375,8 +374,7 @@ impl Written {
     }
 
     fn wait(&mut self) -> io::Result<()> {
-        let thread = self.syncing.take();
-        thread.map_or(Ok(()), |thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+        self.syncing.take().map_or(Ok(()), Aside::join)
     }
 }
 

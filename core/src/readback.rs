@@ -124,11 +124,11 @@ impl<'a> Expectation<'a> {
     ) -> Result<String> {
         let (bytes, count) = (written.bytes(), written.records().len());
         let is_whole = self.difference.written_records == count && bytes.len() == PREFIX_BYTES + size_of_val(written.records());
-        let read = || self.read(written, digest, limits, progress);
+        let read = |by_one| self.read(written, digest, limits, progress, by_one);
         let values = match bytes.len() {
             _ if !is_whole => None,
-            0..READ_BY_ONE => read(),
-            _ => parallel::in_pool(limits.threads, read),
+            0..READ_BY_ONE => read(true),
+            _ => parallel::in_pool(limits.threads, || read(false)),
         };
         match values {
             Some(values) => Ok(digest::hash(bytes, &values)),
@@ -139,8 +139,15 @@ impl<'a> Expectation<'a> {
         }
     }
 
-    /// The digest of a file that holds what it should, `None` if it does not.
-    fn read(&self, written: &MeshFile, digest: &[ChainingValue], limits: &Limits, progress: &dyn Progress) -> Option<Digest> {
+    /// The digest of a file that holds what it should, `None` if it does not. Unless read `by_one` thread, blocks go to the pool's.
+    fn read(
+        &self,
+        written: &MeshFile,
+        digest: &[ChainingValue],
+        limits: &Limits,
+        progress: &dyn Progress,
+        by_one: bool,
+    ) -> Option<Digest> {
         let bytes = written.bytes();
         let input_guide = Guide::new(self.input.as_flattened(), limits);
         let value = |number: usize, block: &[u8]| match (self.compare(number * digest::BLOCK, block), digest.get(number)) {
@@ -153,8 +160,12 @@ impl<'a> Expectation<'a> {
         for window in Guide::new(bytes, limits).blocks(bytes).flat_map(|block| block.chunks(WINDOW)) {
             let first = values.len();
             input_guide.keep_ahead(&mut asked, self.input_behind(first * digest::BLOCK, window.len()));
-            let blocks = window.par_chunks(digest::BLOCK).enumerate();
-            values.extend(blocks.map(|(i, block)| value(first + i, block)).collect::<Option<Vec<_>>>()?);
+            let value = |(i, block): (usize, &[u8])| value(first + i, block);
+            values.extend(if by_one {
+                window.chunks(digest::BLOCK).enumerate().map(value).collect::<Option<Vec<_>>>()?
+            } else {
+                window.par_chunks(digest::BLOCK).enumerate().map(value).collect::<Option<Vec<_>>>()?
+            });
             progress.at("hash", (values.len() * digest::BLOCK / size_of::<Record>()) as u64, written.records().len() as u64);
         }
         Some(values)

@@ -9,6 +9,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
+use std::thread::Builder;
 use std::time::Duration;
 
 use crossbeam::channel::{Receiver, Sender, bounded, unbounded};
@@ -109,17 +110,23 @@ impl<'a> Batch<'a> {
         let (to_sync, unsynced) = bounded(SYNCERS);
         let teller = &mut self.teller;
         let hungry = std::thread::scope(|scope| {
-            for _ in 0..line.slots {
-                let (line, done, to_sync) = (&line, done.clone(), to_sync.clone());
-                scope.spawn(move || line.slot(&done, &to_sync));
-            }
-            for _ in 0..SYNCERS.min(range.len()) {
+            let syncers = (0..SYNCERS.min(range.len())).map_while(|_| {
                 let (done, unsynced) = (done.clone(), unsynced.clone());
-                scope.spawn(move || sync(&done, &unsynced));
-            }
+                Builder::new().spawn_scoped(scope, move || sync(&done, &unsynced)).ok()
+            });
+            let slots = (0..line.slots).map_while(|_| {
+                let (line, done, to_sync) = (&line, done.clone(), to_sync.clone());
+                Builder::new().spawn_scoped(scope, move || line.slot(&done, &to_sync)).ok()
+            });
+            let started = syncers.count() > 0 && slots.count() > 0;
             drop((done, to_sync, unsynced));
-            teller.listen(&outcomes, &line)
+            started.then(|| teller.listen(&outcomes, &line))
         });
+        let Some(hungry) = hungry else {
+            // No threads to be had: by this one.
+            self.alone(range.start);
+            return range.start + 1;
+        };
         let next = line.begun.into_inner().unwrap_or_else(PoisonError::into_inner);
         for index in hungry {
             self.alone(index);

@@ -11,6 +11,8 @@
 mod inodes;
 #[path = "fault/plan.rs"]
 mod plan;
+#[path = "fault/reads.rs"]
+mod reads;
 #[path = "fault/sweep.rs"]
 mod sweep;
 

@@ -17,8 +17,10 @@ pub enum ErrorClass {
     Refused,
     /// The file needs more memory than the budget allows. Trying again with more memory may succeed.
     Starved,
-    /// The world around the file failed (I/O, space, permission). Trying again may help.
+    /// The world around the file failed (I/O, permission). Trying again may help.
     Environment,
+    /// The machine has no room, no quota, no process or no file handle to spare. No try of the file changes that; it is to wait.
+    Shortage,
     /// The file changed while it was worked on. It must be looked at anew.
     Changed,
 }
@@ -67,10 +69,20 @@ impl Error {
             Self::Unreadable { .. } => ErrorClass::Unreadable,
             Self::Refused { .. } | Self::Profile { .. } => ErrorClass::Refused,
             Self::Starved { .. } => ErrorClass::Starved,
-            Self::NoSpace { .. } | Self::Io { .. } => ErrorClass::Environment,
+            Self::NoSpace { .. } => ErrorClass::Shortage,
+            Self::Io { source, .. } if is_shortage(source) => ErrorClass::Shortage,
+            Self::Io { .. } => ErrorClass::Environment,
             Self::Changed { .. } => ErrorClass::Changed,
         }
     }
+}
+
+/// Does the machine run short of something that has nothing to do with the file?
+fn is_shortage(error: &std::io::Error) -> bool {
+    use rustix::io::Errno;
+    use std::io::ErrorKind::{QuotaExceeded, StorageFull, WouldBlock};
+    let handles = [Errno::MFILE, Errno::NFILE].map(|errno| Some(errno.raw_os_error()));
+    matches!(error.kind(), StorageFull | QuotaExceeded | WouldBlock) || handles.contains(&error.raw_os_error())
 }
 
 /// The result of work on one file.
@@ -78,6 +90,8 @@ pub type Result<T> = std::result::Result<T, Error>;
 
 #[cfg(test)]
 mod tests {
+    use rustix::io::Errno;
+
     use super::*;
 
     /// A program that has more memory to give must know which refusals that would help.
@@ -90,6 +104,13 @@ mod tests {
         assert_eq!(starved.to_string(), "a.stl: refused: too much; raise --memory");
         let refused = Error::Refused { path: path.clone(), reason: reason.clone(), advice: advice.clone() };
         assert_eq!(refused.class(), ErrorClass::Refused);
-        assert_eq!(Error::NoSpace { path, reason, advice }.class(), ErrorClass::Environment, "room on the disk is no memory");
+        assert_eq!(
+            Error::NoSpace { path: path.clone(), reason, advice }.class(),
+            ErrorClass::Shortage,
+            "room on the disk is no memory"
+        );
+        let class = |errno: Errno| Error::io(&path, "writing")(errno.into()).class();
+        assert_eq!([Errno::NOSPC, Errno::DQUOT, Errno::MFILE].map(class), [ErrorClass::Shortage; 3]);
+        assert_eq!([Errno::IO, Errno::ACCESS].map(class), [ErrorClass::Environment; 2], "another try may end otherwise");
     }
 }

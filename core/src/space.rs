@@ -66,7 +66,7 @@ mod tests {
         check(&[need(folder.path(), half, "the output")]).unwrap();
         check(&[need(folder.path(), half, "the output"), need(Path::new("/nowhere"), u64::MAX, "nothing known")]).unwrap();
         let error = check(&[need(folder.path(), half, "the output"), need(&sub, half, "the spool")]).unwrap_err();
-        assert_eq!(error.class(), ErrorClass::Environment, "room can be made");
+        assert_eq!(error.class(), ErrorClass::Shortage, "room can be made");
         let line = error.to_string();
         for word in ["part.stl", &mebibytes(half * 2).to_string(), "for the output", "for the spool", "free"] {
             assert!(line.contains(word), "{word} in {line}");

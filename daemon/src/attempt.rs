@@ -303,6 +303,7 @@ impl<'a> Slot<'a> {
                     ErrorClass::Starved if !turn.is_alone() => Worked::Step(Step::NeedsAll),
                     ErrorClass::Refused | ErrorClass::Starved => Worked::None(Ending::Refused, reason),
                     ErrorClass::Environment => Worked::Step(Step::Environment { reason }),
+                    ErrorClass::Shortage => Worked::Step(Step::Wait { reason }),
                     ErrorClass::Changed => Worked::Step(Step::Withdrawn(Withdrawal::Changed)),
                 }
             }

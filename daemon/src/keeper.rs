@@ -109,6 +109,9 @@ impl<'a> Keeper<'a> {
     pub(crate) fn keep(&mut self) -> Result<(), StoreError> {
         self.remember_live()?;
         self.forget_noticed()?;
+        if self.context.once {
+            self.hasten_waiting()?;
+        }
         loop {
             if self.stop.asked() {
                 tracing::info!("Stopping: running jobs are finished, nothing new is taken.");
@@ -201,6 +204,15 @@ impl<'a> Keeper<'a> {
         Ok(())
     }
 
+    /// With `--once`, what waits is tried now: whoever starts a run may have put right what it waits for, and no other run may follow.
+    fn hasten_waiting(&self) -> Result<(), StoreError> {
+        for job in self.context.store.list(&Query { kinds: vec![Kind::Waiting], ..Query::default() })? {
+            control(self.context, job.id, Control::Hasten)?;
+        }
+        self.context.schedule.news();
+        Ok(())
+    }
+
     /// Files that were noticed in an earlier life and are gone now.
     fn forget_noticed(&self) -> Result<(), StoreError> {
         for job in self.context.store.list(&Query { kinds: vec![Kind::Noticed], ..Query::default() })? {
@@ -209,7 +221,7 @@ impl<'a> Keeper<'a> {
                 && kept.folder.inbox().is_dir()
                 && fsx::exists(&kept.folder.inbox().join(job.source.path.to_path())).is_ok_and(|there| !there)
             {
-                forget(self.context, job.id)?;
+                control(self.context, job.id, Control::Forget)?;
             }
         }
         Ok(())
@@ -284,7 +296,7 @@ impl Kept {
             }
         }
         for id in self.gone.drain(..) {
-            forget(context, id)?;
+            control(context, id, Control::Forget)?;
         }
         if now.duration_since(self.looked) < self.rest.look_every() {
             return Ok(());
@@ -326,8 +338,8 @@ impl Kept {
     }
 }
 
-fn forget(context: &Context, id: suture_store::JobId) -> Result<(), StoreError> {
-    match context.store.control(id, Control::Forget) {
+fn control(context: &Context, id: suture_store::JobId, wish: Control) -> Result<(), StoreError> {
+    match context.store.control(id, wish) {
         Err(error) if !error.is_callers() => Err(error),
         // An operator was faster.
         _ => Ok(()),

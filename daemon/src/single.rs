@@ -330,9 +330,12 @@ mod tests {
     /// A file of too many triangles is refused with any memory: to run it again would be in vain.
     #[test]
     fn only_a_file_refused_for_memory_gets_all_of_it() {
-        use ErrorClass::{Changed, Environment, Refused, Starved, Unreadable};
+        use ErrorClass::{Changed, Environment, Refused, Shortage, Starved, Unreadable};
         let starved = |class| Failure::new(class, "refused").is_starved();
-        assert_eq!([Starved, Refused, Unreadable, Environment, Changed].map(starved), [true, false, false, false, false]);
+        assert_eq!(
+            [Starved, Refused, Unreadable, Environment, Shortage, Changed].map(starved),
+            [true, false, false, false, false, false]
+        );
     }
 
     /// One line each, and only what is certified and the same is good.

@@ -363,6 +363,7 @@ impl<T: Tables> JobStore for Queue<T> {
                 Control::Retry => Event::Retry,
                 Control::Cancel => Event::Cancel,
                 Control::Forget => Event::Forget,
+                Control::Hasten => Event::Hasten,
             })
         })
     }

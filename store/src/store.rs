@@ -137,6 +137,8 @@ pub enum Control {
     Cancel,
     /// Drop a noticed file that is gone.
     Forget,
+    /// End the pause of a job that waits; its blame stays.
+    Hasten,
 }
 
 /// A job whose daemon died.

@@ -23,6 +23,8 @@ pub enum Event {
     Cancel,
     /// A file that was only noticed is gone.
     Forget,
+    /// Its pause is over before its time.
+    Hasten,
 }
 
 /// An event that cannot happen in this state. Nothing was changed.
@@ -61,6 +63,7 @@ impl Event {
             Self::Retry => "retried",
             Self::Cancel => "cancelled",
             Self::Forget => "forgotten",
+            Self::Hasten => "hastened",
         }
     }
 }
@@ -93,6 +96,10 @@ impl Job {
             Event::Cancel => match &mut next.state {
                 State::Queued { .. } | State::Noticed { .. } => next.state = State::Cancelled { why: Withdrawal::Operator },
                 State::Running { cancel, .. } => *cancel = true,
+                _ => return Err(illegal),
+            },
+            Event::Hasten => match &mut next.state {
+                State::Queued { not_before } if not_before.is_some() => *not_before = None,
                 _ => return Err(illegal),
             },
             Event::Forget => match next.state {

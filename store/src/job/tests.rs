@@ -87,6 +87,7 @@ fn events() -> impl Strategy<Value = Event> {
         1 => Just(Event::Retry),
         1 => Just(Event::Cancel),
         1 => Just(Event::Forget),
+        1 => Just(Event::Hasten),
     ]
 }
 
@@ -333,6 +334,16 @@ fn a_parked_job_can_be_cancelled() {
     let stuck = Event::Step { token, step: Step::Park { reason: "not ours".into(), committed: true } };
     let ended = published.after(&stuck, Time(0)).unwrap().after(&Event::Cancel, Time(0)).unwrap();
     assert!(ended.kind() == Kind::Done && ended.answers_for_source(), "the original stays, and is not taken again");
+}
+
+/// A job that waits can be hastened; what is held against it stays, and a job that does not wait is left alone.
+#[test]
+fn the_pause_of_a_waiting_job_can_be_ended() {
+    let waits = run(&fresh(), |token| Event::Step { token, step: Step::Environment { reason: "no disk".into() } });
+    assert_eq!(waits.kind(), Kind::Waiting);
+    let hastened = waits.after(&Event::Hasten, Time(0)).unwrap();
+    assert_eq!((hastened.kind(), hastened.blame), (Kind::Queued, waits.blame));
+    assert!(hastened.is_due(Time(0)) && hastened.after(&Event::Hasten, Time(0)).is_err());
 }
 
 /// A file that its share of the memory was too small for runs once more, alone, and is blamed for nothing.

@@ -204,3 +204,17 @@ fn the_next_run_tries_what_the_last_one_left() {
     assert_eq!(jobs(&place).remove(0).1["kind"], "done");
     assert!(place.at("hot/out/scan/part.stl").is_file() && place.at("hot/done/scan/part.stl").is_file());
 }
+
+/// With `--once`, a file that waits is tried by the next run, however short ago it began to wait.
+#[test]
+fn the_next_run_tries_what_waits() {
+    let place = Place::new();
+    place.put("hot/in/mine/part.stl", &mesh(Case::Holes, 1));
+    place.put("hot/in/mine/.suture.toml", b"max_hole_edgse = 7\n");
+    once(&place).expect(1);
+    let job = jobs(&place).remove(0).1;
+    assert!(job["kind"] == "waiting" && job["note"].as_str().unwrap().contains("max_hole_edgse"), "{job}");
+    std::fs::remove_file(place.at("hot/in/mine/.suture.toml")).unwrap();
+    once(&place).expect(0);
+    assert_eq!(jobs(&place).remove(0).1["kind"], "done");
+}

@@ -24,8 +24,9 @@ use suture_tests::scene::{Scene, six};
 use suture_tests::trace::count::Counter;
 use suture_tests::trace::{Fault, run};
 
-/// A run with a fault may pause and try again, but must end.
-const LIMIT: Duration = Duration::from_secs(25);
+/// A run with a fault may pause and try again, and find out that its database hangs (some 15 s), but must end; a loaded machine may take its
+/// time.
+const LIMIT: Duration = Duration::from_secs(60);
 
 #[test]
 fn any_call_may_fail() {

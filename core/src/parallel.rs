@@ -176,7 +176,7 @@ mod tests {
                 }
                 let text = std::fs::read_to_string(&path).unwrap();
                 let product = text.split("#[cfg(test)]").next().unwrap();
-                let starts = ["thread::spawn", "Builder::new().", ".spawn(", ".spawn_scoped(", "ThreadPoolBuilder"];
+                let starts = ["thread::spawn", "thread::Builder", ".spawn(", ".spawn_scoped(", "ThreadPoolBuilder"];
                 assert!(
                     path.ends_with("parallel.rs") || !starts.iter().any(|start| product.contains(start)),
                     "{}",

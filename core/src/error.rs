@@ -70,19 +70,21 @@ impl Error {
             Self::Refused { .. } | Self::Profile { .. } => ErrorClass::Refused,
             Self::Starved { .. } => ErrorClass::Starved,
             Self::NoSpace { .. } => ErrorClass::Shortage,
-            Self::Io { source, .. } if is_shortage(source) => ErrorClass::Shortage,
-            Self::Io { .. } => ErrorClass::Environment,
+            Self::Io { source, .. } => ErrorClass::of(source),
             Self::Changed { .. } => ErrorClass::Changed,
         }
     }
 }
 
-/// Does the machine run short of something that has nothing to do with the file?
-fn is_shortage(error: &std::io::Error) -> bool {
-    use rustix::io::Errno;
-    use std::io::ErrorKind::{QuotaExceeded, StorageFull, WouldBlock};
-    let handles = [Errno::MFILE, Errno::NFILE].map(|errno| Some(errno.raw_os_error()));
-    matches!(error.kind(), StorageFull | QuotaExceeded | WouldBlock) || handles.contains(&error.raw_os_error())
+impl ErrorClass {
+    /// Of an error of the system: [`ErrorClass::Shortage`] or [`ErrorClass::Environment`].
+    pub fn of(error: &std::io::Error) -> Self {
+        use rustix::io::Errno;
+        use std::io::ErrorKind::{QuotaExceeded, StorageFull, WouldBlock};
+        let handles = [Errno::MFILE, Errno::NFILE].map(|errno| Some(errno.raw_os_error()));
+        let short = matches!(error.kind(), StorageFull | QuotaExceeded | WouldBlock) || handles.contains(&error.raw_os_error());
+        if short { Self::Shortage } else { Self::Environment }
+    }
 }
 
 /// The result of work on one file.

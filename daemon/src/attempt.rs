@@ -165,6 +165,9 @@ impl<'a> Slot<'a> {
         let reason = error.to_string();
         let step = match (&job.state, error) {
             (State::Running { .. }, PublishError::Folder(_)) => Step::Wait { reason },
+            (State::Running { .. }, PublishError::Io { source, .. }) if ErrorClass::of(source) == ErrorClass::Shortage => {
+                Step::Wait { reason }
+            }
             (State::Running { .. }, _) => Step::Environment { reason },
             (state, _) => Step::Park { reason, committed: self.committed.take() || matches!(state, State::Published { .. }) },
         };
@@ -222,7 +225,7 @@ impl<'a> Slot<'a> {
                 Step::Withdrawn(why)
             }
             Err(Unclaimed::Environment(reason)) => Step::Environment { reason },
-            Err(Unclaimed::NoRoom(reason)) => Step::Wait { reason },
+            Err(Unclaimed::Shortage(reason)) => Step::Wait { reason },
             Ok(claimed) => {
                 crash_point("daemon.linked");
                 let worked = self.work(folder, token, job, &claimed, turn);

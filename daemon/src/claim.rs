@@ -11,11 +11,12 @@ use std::os::fd::AsRawFd;
 use std::path::{Path, PathBuf};
 
 use rustix::fs::{AtFlags, CWD};
+use suture_core::ErrorClass;
 use suture_store::Job;
 use suture_store::job::Withdrawal;
 
 use crate::create;
-use crate::folder::Folder;
+use crate::folder::{Folder, make_parent};
 use crate::fsx::{self, Identity};
 use crate::units::show_size;
 
@@ -94,12 +95,18 @@ impl Claimed {
 pub(crate) enum Unclaimed {
     Withdrawn(Withdrawal),
     Environment(String),
-    /// Too little room on the disk, for now.
-    NoRoom(String),
+    /// The machine has too little of something, for now.
+    Shortage(String),
 }
 
 fn failed<'a>(what: &'a str) -> impl FnOnce(io::Error) -> Unclaimed + 'a {
-    move |error| Unclaimed::Environment(format!("{what}: {error}"))
+    move |error| {
+        let reason = format!("{what}: {error}");
+        match ErrorClass::of(&error) {
+            ErrorClass::Shortage => Unclaimed::Shortage(reason),
+            _ => Unclaimed::Environment(reason),
+        }
+    }
 }
 
 /// Is this the file that the job was submitted for? Where this program has moved it itself, perhaps to another file system, size and
@@ -122,10 +129,10 @@ pub(crate) fn claim(folder: &Folder, job: &Job, work: &Path) -> Result<Claimed, 
     let (needed, free) = (before.size.saturating_mul(3), fsx::free_space(&folder.root, 0));
     if free < needed {
         let (needed, free) = (show_size(needed), show_size(free));
-        return Err(Unclaimed::NoRoom(format!("the disk has room for {free} more; this file may need {needed}")));
+        return Err(Unclaimed::Shortage(format!("the disk has room for {free} more; this file may need {needed}")));
     }
     // A new folder: what is in it, this attempt has put there.
-    std::fs::create_dir(work).map_err(failed("the work folder cannot be made"))?;
+    make_parent(work).and_then(|()| std::fs::create_dir(work)).map_err(failed("the work folder cannot be made"))?;
     take(original, job, &work.join(CLAIMED))
 }
 

@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 use suture_store::{Control, Job, JobId, JobStore, Query, StoreError};
 
 use crate::attempt::Context;
+use crate::fsx::Identity;
 
 /// A request is one line of at most this many bytes.
 const LONGEST_WISH: u64 = 4096;
@@ -81,6 +82,8 @@ fn short<T>(path: &Path, use_it: impl FnOnce(&Path) -> io::Result<T>) -> io::Res
 pub(crate) struct Door {
     listener: UnixListener,
     path: PathBuf,
+    /// What the name stood for when it was made: another daemon's socket may have it by now.
+    made: Option<Identity>,
 }
 
 impl Door {
@@ -94,7 +97,8 @@ impl Door {
         let listener = short(&path, |path| UnixListener::bind(path))?;
         // Whoever knocked may be gone before the door is opened.
         listener.set_nonblocking(true)?;
-        Ok(Self { listener, path })
+        let made = Identity::of(&path).ok();
+        Ok(Self { listener, path, made })
     }
 
     /// Serves whoever knocks until `end`, each by a thread of its own: one that says nothing keeps no one waiting. Needs no knock to
@@ -157,7 +161,9 @@ impl Door {
 impl Drop for Door {
     fn drop(&mut self) {
         // A left-over socket is recognised by nobody answering.
-        let _ = std::fs::remove_file(&self.path);
+        if Identity::of(&self.path).ok().zip(self.made).is_some_and(|(now, made)| (now.dev, now.ino) == (made.dev, made.ino)) {
+            let _ = std::fs::remove_file(&self.path);
+        }
     }
 }
 

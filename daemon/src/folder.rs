@@ -48,6 +48,10 @@ fn id(meta: &std::fs::Metadata) -> (u64, u64) {
 pub(crate) enum FolderError {
     #[error("{} is served by another daemon{}", root.display(), pid.map(|pid| format!(" (process {pid})")).unwrap_or_default())]
     Owned { root: PathBuf, pid: Option<u32> },
+    #[error("{} lies in the hot folder {}, which would take its files; put it beside that one, or remove {}/.suture if that is none any more", root.display(), outer.display(), outer.display())]
+    Within { root: PathBuf, outer: PathBuf },
+    #[error("{} and {} are one folder, or one lies in the other: results would be taken for drops", a.display(), b.display())]
+    Mixed { a: PathBuf, b: PathBuf },
     #[error("{}: {action}: {source}", path.display())]
     Io { path: PathBuf, action: &'static str, source: io::Error },
 }
@@ -64,6 +68,10 @@ impl Folder {
         };
         // Made once as an absolute path: the process may be asked to look again after hours.
         let root = std::path::absolute(&config.path).map_err(io(&config.path, "cannot be found"))?;
+        if let Some(outer) = outer_folder(&root) {
+            return Err(FolderError::Within { root, outer });
+        }
+        parts_apart(&root)?;
         for part in PARTS {
             let path = root.join(part);
             make_folder(&path).map_err(io(&path, "cannot be made"))?;
@@ -93,12 +101,16 @@ impl Folder {
                 "{shown}: is another folder than at the start (moved, removed or made anew); put it back, or start again"
             ));
         }
-        for (part, device_then) in PARTS.iter().zip(self.devices) {
-            let now = device(&self.root.join(part));
+        let ids = PARTS.map(|part| std::fs::metadata(self.root.join(part)).ok().map(|meta| id(&meta)));
+        for (i, (part, device_then)) in PARTS.iter().zip(self.devices).enumerate() {
             // A part that was removed is made again where it is needed.
-            if now.is_some() && now != device_then {
-                let part = self.root.join(part);
+            let Some(now) = ids[i] else { continue };
+            let part = self.root.join(part);
+            if Some(now.0) != device_then {
                 return Err(format!("{}: is on another file system than at the start: a mount came or went", part.display()));
+            }
+            if let Some(other) = ids.iter().take(i).position(|other| *other == Some(now)) {
+                return Err(FolderError::Mixed { a: self.root.join(PARTS[other]), b: part }.to_string());
             }
         }
         Ok(())
@@ -141,6 +153,36 @@ impl Folder {
         let first = parts.next()?.as_os_str().to_string_lossy().into_owned();
         parts.next().is_some().then_some(first)
     }
+}
+
+/// Is a folder a hot one?
+pub(crate) fn is_hot(path: &Path) -> bool {
+    path.join(PRIVATE).join(LOCK).exists()
+}
+
+/// The hot folder in a part of which `root` lies.
+fn outer_folder(root: &Path) -> Option<PathBuf> {
+    // A folder that is not there yet lies where the one above it does.
+    let real = root.ancestors().find_map(|above| Some(above.canonicalize().ok()?.join(root.strip_prefix(above).ok()?)))?;
+    let is_outer = |above: &&Path| is_hot(above) && PARTS.iter().any(|part| real.starts_with(above.join(part)));
+    real.ancestors().skip(1).find(is_outer).map(Path::to_owned)
+}
+
+/// No part may be another one, or lie in it, by links or mounts: what is put into `out/` would appear in `in/`, without end.
+fn parts_apart(root: &Path) -> Result<(), FolderError> {
+    let places = PARTS.map(|part| {
+        let path = root.join(part);
+        (path.canonicalize().ok(), std::fs::metadata(&path).ok().map(|meta| id(&meta)))
+    });
+    for (i, (a, a_id)) in places.iter().enumerate() {
+        for (j, (b, b_id)) in places.iter().enumerate().take(i) {
+            let nested = a.as_ref().zip(b.as_ref()).is_some_and(|(a, b)| a.starts_with(b) || b.starts_with(a));
+            if nested || (a_id.is_some() && a_id == b_id) {
+                return Err(FolderError::Mixed { a: root.join(PARTS[j]), b: root.join(PARTS[i]) });
+            }
+        }
+    }
+    Ok(())
 }
 
 fn device(path: &Path) -> Option<u64> {
@@ -282,6 +324,37 @@ mod tests {
         std::fs::remove_dir_all(at("hot/.suture")).unwrap();
         std::fs::create_dir_all(at("hot/.suture/work")).unwrap();
         assert!(folder.check().is_err(), "the store went with it");
+    }
+
+    /// `out/` or `done/` that leads to `in/` made results of results, without end.
+    #[test]
+    fn a_part_that_leads_to_another_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let config = FolderConfig { name: "a".into(), path: dir.path().into(), profile: "default".into() };
+        for (part, target) in [("out", "in"), ("done", "in"), ("failed", "in/deep")] {
+            std::fs::create_dir_all(dir.path().join("in/deep")).unwrap();
+            std::os::unix::fs::symlink(target, dir.path().join(part)).unwrap();
+            assert!(matches!(Folder::open(&config), Err(FolderError::Mixed { .. })), "{part} -> {target}");
+            std::fs::remove_file(dir.path().join(part)).unwrap();
+        }
+        let folder = Folder::open(&config).unwrap();
+        std::fs::remove_dir(dir.path().join("out")).unwrap();
+        std::os::unix::fs::symlink("in", dir.path().join("out")).unwrap();
+        assert!(folder.check().unwrap_err().contains("results would be taken for drops"), "while it is served, too");
+    }
+
+    /// A hot folder in a part of another one, each with a daemon of its own: both would take its files.
+    #[test]
+    fn a_folder_within_a_hot_one_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let config = |path: PathBuf| FolderConfig { name: "a".into(), path, profile: "default".into() };
+        let _outer = Folder::open(&config(dir.path().into())).unwrap();
+        for inner in ["in", "in/sub/deeper", "out"] {
+            let opened = Folder::open(&config(dir.path().join(inner)));
+            assert!(matches!(opened, Err(FolderError::Within { .. })), "{inner}: {opened:?}");
+            assert!(!dir.path().join("in/sub").exists(), "nothing was made");
+        }
+        Folder::open(&config(dir.path().join("beside"))).expect("not in a part");
     }
 
     #[test]

@@ -13,7 +13,7 @@ use suture_store::{JobId, RelPath, Source, Submission};
 
 use crate::claim::Original;
 use crate::config::Config;
-use crate::folder::{Folder, NameKind, name_kind};
+use crate::folder::{Folder, NameKind, is_hot, name_kind};
 use crate::fsx::Identity;
 use crate::profiles;
 use crate::settle::{Look, Rest, Settling, length_fits};
@@ -240,6 +240,11 @@ impl Found {
             };
             let path = below.join(&name);
             if meta.is_dir() {
+                // Someone else's files.
+                if is_hot(&root.join(&path)) {
+                    self.unreadable.insert(path, "it is a hot folder of its own".into());
+                    continue;
+                }
                 // A sub-folder that cannot be read does not hide the others.
                 if depth > 0
                     && let Err(error) = self.walk(root, &path, depth - 1)

@@ -59,6 +59,7 @@ pub(crate) fn serve(config: Config, once: bool, stop: &Stop, may_begin_anew: boo
                 complain(&error);
                 return match &error {
                     FolderError::Owned { .. } => Exit::Owned,
+                    FolderError::Within { .. } | FolderError::Mixed { .. } => Exit::Refused,
                     FolderError::Io { source, .. } => Exit::of_start(source),
                 };
             }

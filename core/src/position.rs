@@ -25,9 +25,10 @@ impl Position {
         Self(canonical(p))
     }
 
-    /// The nearest position to a place.
+    /// The nearest position to a place, which is a number: beyond the largest of single precision, a largest one.
+    #[expect(clippy::disallowed_methods, reason = "the one place where places are rounded to positions")]
     pub(crate) fn nearest(place: DVec3) -> Self {
-        Self::of(place.as_vec3().to_array())
+        Self::of(place.as_vec3().to_array().map(|x| x.clamp(-f32::MAX, f32::MAX)))
     }
 
     /// The position at exactly this place, if single precision has it.
@@ -135,5 +136,11 @@ mod tests {
         assert_eq!(Position::exactly([1e300, 0.0, 0.0]), None);
         assert_eq!(Position::exactly([f64::INFINITY, 0.0, 0.0]), None);
         assert_eq!(Position::nearest(DVec3::new(0.1, -1e-300, 0.0)).coordinates(), [0.1, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn the_position_nearest_to_a_place_beyond_single_precision_is_finite() {
+        let beyond = DVec3::new(f64::from(f32::MAX) * 1.5, -1e300, f64::INFINITY);
+        assert_eq!(Position::nearest(beyond).coordinates(), [f32::MAX, -f32::MAX, f32::MAX]);
     }
 }

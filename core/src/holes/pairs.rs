@@ -21,6 +21,7 @@ use glam::DVec3;
 
 use super::shape::Shape;
 use crate::boxes::BoxTree;
+use crate::position::Position;
 use crate::report::LoopClass;
 use crate::sums::Bounds;
 
@@ -352,6 +353,6 @@ fn some_points(shape: &Shape) -> impl Iterator<Item = DVec3> + '_ {
 }
 
 fn bounds(shape: &Shape, by: f64) -> Bounds {
-    let points: Vec<[f32; 3]> = shape.points.iter().map(|p| p.as_vec3().to_array()).collect();
+    let points: Vec<[f32; 3]> = shape.points.iter().map(|p| Position::nearest(*p).coordinates()).collect();
     crate::shop::near::around(&points, by)
 }

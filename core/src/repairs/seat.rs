@@ -183,7 +183,7 @@ impl Candidate {
         (0..n).map(move |i| {
             let [a, b] = [i, (i + 1) % n].map(|k| shop.place(self.vertices[k]));
             let by = self.across[i] * reach;
-            [a - by * BEHIND, b - by * BEHIND, b + by * IN_FRONT, a + by * IN_FRONT].map(|p| p.as_vec3().to_array())
+            [a - by * BEHIND, b - by * BEHIND, b + by * IN_FRONT, a + by * IN_FRONT].map(|p| Position::nearest(p).coordinates())
         })
     }
 

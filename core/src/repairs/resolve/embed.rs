@@ -136,7 +136,7 @@ impl State<'_, '_, '_> {
 /// A coordinate in f32: what it is, if it has a place there, as in a plane along the axes, else the nearest on the grid.
 fn place_of(x: f64, step: f64) -> f32 {
     let nearest = x as f32;
-    if f64::from(nearest) == x { nearest } else { on_grid(x, step) }
+    if f64::from(nearest) == x { nearest } else { on_grid(x, step).clamp(-f32::MAX, f32::MAX) }
 }
 
 /// The nearest multiple of a power of two, which is not too small for f32 to have them.

@@ -6,8 +6,8 @@
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use suture_bench::generate::{Case, write};
-use suture_core::fill::cross::{Triangle, triangles_cross};
 use suture_core::internals::Mesh;
+use suture_core::internals::{Triangle, triangles_cross};
 use suture_core::record::{Record, corners};
 
 fn main() {
@@ -101,7 +101,7 @@ fn triangles_cross_near(bencher: Bencher<'_, '_>) {
     let triangles: Vec<Triangle> = records.iter().map(|record: &Record| corners(record)).collect();
     bencher.counter(ItemsCount::new(triangles.len() - 3)).bench_local(|| {
         let pairs = triangles.iter().zip(triangles.iter().skip(3));
-        pairs.filter(|(a, b)| triangles_cross(black_box(a), black_box(b)).is_crossing()).count()
+        pairs.filter(|(a, b)| triangles_cross(black_box(a), black_box(b))).count()
     });
 }
 
@@ -114,7 +114,7 @@ fn triangles_cross_through(bencher: Bencher<'_, '_>) {
     let turned: Vec<Triangle> = triangles.iter().map(|t| t.map(|p| around(t[0], p))).collect();
     bencher.counter(ItemsCount::new(triangles.len())).bench_local(|| {
         let pairs = triangles.iter().zip(&turned);
-        pairs.filter(|(a, b)| triangles_cross(black_box(a), black_box(b)).is_crossing()).count()
+        pairs.filter(|(a, b)| triangles_cross(black_box(a), black_box(b))).count()
     });
 }
 

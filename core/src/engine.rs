@@ -6,27 +6,36 @@ use std::time::Instant;
 
 use blake3::Hasher;
 
-use crate::ahead::Guide;
-use crate::digest::Digest;
-use crate::edit::Edit;
-use crate::emit::{Content, Draft};
-use crate::error::{Error, Result};
-use crate::read::{Loss, MeshFile, PREFIX_BYTES};
-use crate::readback::Expectation;
-use crate::repairs::Swallowed;
-use crate::report::{
+use crate::contract::error::{Error, Result};
+use crate::contract::finite;
+use crate::contract::progress::Progress;
+use crate::contract::report::{
     BoundaryLoops, Certificate, Cost, Defects, EditSummary, FileFacts, Outcome, Regions, Report, SCHEMA_VERSION, Stage, Task,
     Tolerances,
 };
-use crate::rules::Subject;
-use crate::settings::{Bodies, Limits, Profile, folder_of};
-use crate::shop::Shop;
-use crate::shop::edges::{Edge, Edges};
-use crate::shop::near::Tolerance;
-use crate::space::{self, Need};
-use crate::sums::{Bounds, step_at};
-use crate::survey::Survey;
-use crate::{Progress, certificate, cost, defects, digest, emit, finite, members, parallel, record, repairs, second, verdict};
+use crate::contract::settings::{Bodies, Limits, Profile, folder_of};
+use crate::detect::certificate;
+use crate::detect::rules::Subject;
+use crate::detect::verdict;
+use crate::detect::verdict::Swallowed;
+use crate::diagnosis::Diagnosis;
+use crate::geometry::sums::Bounds;
+use crate::io::digest;
+use crate::io::digest::Digest;
+use crate::io::disk_space::{self, Need};
+use crate::io::read::{Loss, MeshFile, PREFIX_BYTES};
+use crate::io::read_ahead::Guide;
+use crate::io::record;
+use crate::output::edit::Edit;
+use crate::output::emit;
+use crate::output::emit::{Content, Draft};
+use crate::output::incremental;
+use crate::output::readback::Expectation;
+use crate::repairs;
+use crate::stream::members;
+use crate::submesh::near;
+use crate::util::cost;
+use crate::util::parallel;
 
 /// Fewer bytes are hashed by one thread: starting more would take longer.
 const HASHED_BY_ONE: usize = 1 << 20;
@@ -74,68 +83,6 @@ impl Clock {
     }
 }
 
-/// The survey of a file, its untouched workshop and its defects.
-pub(crate) struct Diagnosis<'a> {
-    pub(crate) survey: Survey<'a>,
-    pub(crate) shop: Shop,
-    pub(crate) tolerance: Tolerance,
-    pub(crate) defects: Defects,
-}
-
-impl<'a> Diagnosis<'a> {
-    pub(crate) fn of(
-        path: &Path,
-        records: &'a [record::Record],
-        profile: &Profile,
-        limits: &Limits,
-        progress: &dyn Progress,
-    ) -> Result<Self> {
-        let survey = Survey::new(path, records, profile.check_self_intersections, limits, progress)?;
-        let shop = Shop::gather(&survey);
-        let edges = Edges::of(&shop);
-        let boundary_edges = edges.iter().filter(Edge::is_boundary).count() as u64;
-        survey.take_boundary(path, boundary_edges, repairs::boundary_bytes(boundary_edges))?;
-        Ok(Self::counted(survey, shop, &edges, profile))
-    }
-
-    /// Of a workshop that is as gathered.
-    pub(crate) fn count(survey: Survey<'a>, shop: Shop, profile: &Profile) -> Self {
-        let edges = Edges::of(&shop);
-        Self::counted(survey, shop, &edges, profile)
-    }
-
-    fn counted(survey: Survey<'a>, shop: Shop, edges: &Edges, profile: &Profile) -> Self {
-        let tolerance = tolerance(&survey, profile);
-        let defects = defects::count(&survey, &shop, edges, &tolerance);
-        Self { survey, shop, tolerance, defects }
-    }
-
-    /// Gives the memory of everything else back.
-    fn into_survey(self) -> Survey<'a> {
-        self.survey
-    }
-
-    /// The box of all triangles that have an area.
-    fn surface_bounds(&self) -> Bounds {
-        let mut bounds = Bounds::EMPTY;
-        self.survey.patches.iter().for_each(|p| bounds.add(&p.bounds));
-        self.shop.living().filter(|t| !self.shop.is_collinear(*t)).for_each(|t| bounds.include(&self.shop.points(t)));
-        bounds.normalised()
-    }
-}
-
-/// Never below what f32 tells apart at the model's coordinates: four steps of the largest one.
-fn tolerance(survey: &Survey<'_>, profile: &Profile) -> Tolerance {
-    if profile.weld_relative <= 0.0 {
-        return Tolerance { weld: 0.0, edge_share: 0.0 };
-    }
-    let step = step_at(survey.bounds.largest_coordinate());
-    Tolerance {
-        weld: (profile.weld_relative * survey.bounds.diagonal()).max(4.0 * step),
-        edge_share: profile.weld_max_edge_share,
-    }
-}
-
 /// Refuses a profile that means nothing, before anything is done under it.
 fn validate(input: &Path, profile: &Profile) -> Result<()> {
     profile.validate().map_err(|source| Error::Profile { path: input.into(), profile: profile.name.clone(), source })
@@ -151,7 +98,7 @@ pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress
     let limits = &limits.spooling_beside(input);
     let mesh = open(input, limits, progress)?;
     clock.lap("read");
-    space::check(input, &[spool_need(&mesh, limits)])?;
+    disk_space::check(input, &[spool_need(&mesh, limits)])?;
     let mut diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
     clock.lap("topology");
     let blake3 = hash(&mesh, limits, progress);
@@ -208,7 +155,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     // The output is as large as its input but for what is added; what the input spools is gone by then, but the output spools as much.
     let bytes = (PREFIX_BYTES + size_of_val(mesh.records())) as u64;
     let folder = if emit::is_nameless(output) { limits.spool_folder() } else { folder_of(output).into() };
-    space::check(input, &[Need { folder, bytes, what: "the output" }, spool_need(&mesh, limits)])?;
+    disk_space::check(input, &[Need { folder, bytes, what: "the output" }, spool_need(&mesh, limits)])?;
     emit::draft(&mesh, output, limits, progress, |draft| {
         let mended = mend(draft, &mesh, output, profile, limits, progress, &mut clock);
         // What was copied before the input changed is not what is read back: nothing is wrong with the disk.
@@ -263,13 +210,13 @@ fn mend(
     let same = edit.is_empty() && flaws(mesh).is_empty();
     let (gone, added) = (edit.gone(), edit.added.len() as u64);
     let is_worthwhile = !same
-        && second::is_worthwhile(gone, added, mesh.records().len())
-        && second::bytes(survey.suspects.len() as u64, gone + added) <= limits.memory_bytes;
+        && incremental::is_worthwhile(gone, added, mesh.records().len())
+        && incremental::bytes(survey.suspects.len() as u64, gone + added) <= limits.memory_bytes;
     let expected = is_worthwhile.then(|| Expectation::of(mesh.records(), &edit));
     let emit = || draft.finish(&if same { Content::Input } else { Content::Edited(&edit) });
     // What the file will hold is looked at while it is written. It counts when the file was read back and does hold that.
     let look = || {
-        let looked = expected.as_ref().and_then(|expected| second::look(survey, &expected.difference));
+        let looked = expected.as_ref().and_then(|expected| incremental::look(survey, &expected.difference));
         looked.map(|(survey, shop)| Diagnosis::count(survey, shop, profile).defects)
     };
     let threads = if mesh.bytes().len() < HASHED_BY_ONE { 1 } else { limits.threads };
@@ -435,7 +382,7 @@ fn hash_blocks(bytes: &[u8], limits: &Limits, update: for<'h> fn(&'h mut Hasher,
 }
 
 pub(crate) fn tolerances(diagnosis: &Diagnosis<'_>) -> Tolerances {
-    let Tolerance { weld, edge_share } = diagnosis.tolerance;
+    let near::Tolerance { weld, edge_share } = diagnosis.tolerance;
     Tolerances {
         diagonal: diagnosis.survey.bounds.diagonal(),
         weld,

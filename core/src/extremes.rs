@@ -4,9 +4,12 @@
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 
-use crate::error::{Error, Result};
+use crate::contract::error::{Error, Result};
+use crate::contract::progress::Quiet;
+use crate::contract::report::Report;
+use crate::contract::settings::Limits;
+use crate::contract::settings::Profile;
 use crate::testing::{Corners, cube, cuboid, plate, records, reversed, shifted};
-use crate::{Limits, Profile, Quiet, Report};
 
 /// A report, in words and back.
 fn survives_json(result: &Result<Report>) -> std::result::Result<(), TestCaseError> {

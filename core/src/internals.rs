@@ -4,16 +4,25 @@
 use std::hint::black_box;
 use std::path::Path;
 
-use crate::ahead::Guide;
-use crate::boxes::BoxTree;
-use crate::chunk::Scratch;
-use crate::error::Result;
-use crate::members::Members;
-use crate::plan::{ChunkId, Plan};
-use crate::record::{Record, corners};
-use crate::settings::Limits;
-use crate::sums::{Bounds, Measure};
-use crate::weld::{BATCH, Weld};
+use crate::contract::error::Result;
+use crate::contract::settings::Limits;
+use crate::geometry::boxes::BoxTree;
+use crate::geometry::sums::{Bounds, Measure};
+use crate::geometry::tri_tri;
+use crate::io::read_ahead::Guide;
+use crate::io::record::{Record, corners};
+use crate::stream::members::Members;
+use crate::stream::plan::{ChunkId, Plan};
+use crate::topology::chunk::Scratch;
+use crate::topology::vertex_table::{BATCH, Weld};
+
+/// A triangle by the positions of its corners.
+pub type Triangle = [[f32; 3]; 3];
+
+/// Do two triangles cross or overlap? By the search for how they meet.
+pub fn triangles_cross(a: &Triangle, b: &Triangle) -> bool {
+    tri_tri::triangles_cross(a, b).is_crossing()
+}
 
 /// A mesh, and what a survey knows of it before its kernels run.
 pub struct Mesh {
@@ -138,7 +147,7 @@ impl Mesh {
 }
 
 fn gather(records: &[Record], plan: &Plan, limits: &Limits) -> Result<Members> {
-    Members::gather(Path::new("memory"), (records, &Guide::NONE), plan, true, limits, &crate::Quiet)
+    Members::gather(Path::new("memory"), (records, &Guide::NONE), plan, true, limits, &crate::contract::progress::Quiet)
 }
 
 fn bounds(record: &Record) -> Bounds {

@@ -5,90 +5,39 @@
 
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 
-mod ahead;
-mod arrange;
-mod behind;
-mod bodies;
-mod boxes;
-mod budget;
-mod certificate;
-mod chunk;
-mod columns;
-mod cost;
-mod crossings;
-mod defects;
-mod digest;
-mod edit;
-mod emit;
+mod algorithms;
+mod contract;
+mod detect;
+mod diagnosis;
 mod engine;
-pub mod error;
 #[cfg(test)]
 mod extremes;
-pub mod fill;
-mod finite;
-mod fresh;
-mod grid;
-mod holes;
+mod geometry;
 #[cfg(any(test, feature = "internals"))]
 #[doc(hidden)]
 pub mod internals;
-mod intersect;
-mod machine;
-mod members;
-mod parallel;
-mod parts;
-mod plan;
-mod position;
-mod radix;
-mod ranges;
-pub mod read;
-mod readback;
-pub mod record;
+mod io;
+mod output;
 mod repairs;
-pub mod report;
-mod rules;
-mod second;
-pub mod settings;
-mod shape;
-mod shop;
-mod source;
-mod space;
-mod spool;
-mod star;
-mod steps;
-mod sums;
-mod survey;
+mod stream;
+mod submesh;
 #[cfg(test)]
 mod testing;
-mod verdict;
-mod weld;
-mod wrap;
+mod topology;
+mod util;
 
-pub use error::{Error, ErrorClass};
-pub use ranges::ProfileError;
-pub use read::{Access, ends_in_zeros};
-pub use report::Report;
-pub use rules::{RULES, Rule};
-pub use settings::{Bodies, Guarantee, Limits, PatchShape, Profile};
+pub use contract::access::Access;
+pub use contract::error::{Error, ErrorClass};
+pub use contract::progress::{Progress, Quiet};
+pub use contract::ranges::ProfileError;
+pub use contract::report::Report;
+pub use contract::settings::{Bodies, Guarantee, Limits, PatchShape, Profile};
+pub use contract::{error, report, settings};
+pub use detect::rules::{RULES, Rule};
+pub use io::read::ends_in_zeros;
+pub use io::{read, record};
 
 use std::path::Path;
-
-/// Where the work on one file stands; cheap to call, called from worker threads.
-pub trait Progress: Sync {
-    /// `stage` has `done` of `total` units (triangles unless the stage says otherwise) behind it.
-    fn at(&self, stage: &'static str, done: u64, total: u64);
-    /// `true` asks the work to end as soon as it can, without output.
-    fn cancelled(&self) -> bool {
-        false
-    }
-}
-
-/// No one is watching.
-pub struct Quiet;
-
-impl Progress for Quiet {
-    fn at(&self, _: &'static str, _: u64, _: u64) {}
-}
 
 /// Diagnoses `input` and writes nothing.
 ///

@@ -4,15 +4,16 @@ use std::path::Path;
 
 use proptest::prelude::*;
 
-use crate::edit::{Edit, Step};
-use crate::engine::Diagnosis;
-use crate::readback::Expectation;
-use crate::record::{self, Record};
-use crate::report::{Defects, Verdict};
-use crate::settings::{Limits, Profile};
-use crate::shop::components::Reversed;
-use crate::survey::Survey;
-use crate::{Quiet, second};
+use crate::contract::progress::Quiet;
+use crate::contract::report::{Defects, Verdict};
+use crate::contract::settings::{Limits, Profile};
+use crate::diagnosis::Diagnosis;
+use crate::io::record::{self, Record};
+use crate::output::edit::{Edit, Step};
+use crate::output::incremental;
+use crate::output::readback::Expectation;
+use crate::submesh::components::Reversed;
+use crate::topology::survey::Survey;
 
 /// A triangle by its positions.
 pub(crate) type Corners = [[f32; 3]; 3];
@@ -76,14 +77,14 @@ pub(crate) fn after<R>(triangles: &[Corners], repair: impl FnOnce(&mut Diagnosis
     let edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &turned);
     let defects = diagnose(&written(&edit, &input)).defects;
     check_second_look(diagnosis.survey, &edit, &defects);
-    let verdict = crate::verdict::judge(&defects, &[]);
+    let verdict = crate::detect::verdict::judge(&defects, &[]);
     After { result, defects, verdict, untouched: edit.summary(input.len()).untouched }
 }
 
 /// The second look by the difference, if it comes to anything, must find what a look at everything finds. Says if it came to anything.
 pub(crate) fn check_second_look(survey: Survey<'_>, edit: &Edit, anew: &Defects) -> bool {
     let difference = Expectation::of(survey.records, edit).difference;
-    let Some((survey, shop)) = second::look(survey, &difference) else { return false };
+    let Some((survey, shop)) = incremental::look(survey, &difference) else { return false };
     let mut defects = Diagnosis::count(survey, shop, &Profile::default()).defects;
     // Sums are rounded by the box they are taken in, which may be another.
     for (got, want) in [(&mut defects.area, anew.area), (&mut defects.volume, anew.volume)] {

@@ -3,9 +3,9 @@
 use std::os::unix::fs::FileExt;
 
 use super::*;
-use crate::read::Access;
-use crate::record::Record;
-use crate::report::Outcome;
+use crate::contract::access::Access;
+use crate::contract::report::Outcome;
+use crate::io::record::Record;
 use crate::testing::{Corners, cube, plate, records, shifted};
 
 fn file(records: &[Record]) -> Vec<u8> {
@@ -65,7 +65,7 @@ fn mapped_and_copied_files_give_the_same_bytes() {
             for threads in [1, 2] {
                 let limits = Limits { threads, memory_bytes, access, ..Limits::default() };
                 let output = folder.path().join(format!("{}.stl", outputs.len()));
-                let report = repair(&input, &output, &Profile::default(), &limits, &crate::Quiet).unwrap();
+                let report = repair(&input, &output, &Profile::default(), &limits, &crate::contract::progress::Quiet).unwrap();
                 assert_eq!(report.input.blake3, blake3::hash(&std::fs::read(&input).unwrap()).to_hex().to_string());
                 outputs.push(std::fs::read(&output).unwrap());
                 std::fs::remove_file(&output).unwrap();
@@ -91,11 +91,11 @@ fn a_file_whose_last_records_are_zeros_is_never_good() {
         [(binary, "its last 12 of 24 records are zeros"), (text, "bytes are zeros, as in a file that was cut off")]
     {
         std::fs::write(&input, bytes).unwrap();
-        let inspected = inspect(&input, &profile, &limits, &crate::Quiet).unwrap();
+        let inspected = inspect(&input, &profile, &limits, &crate::contract::progress::Quiet).unwrap();
         assert_eq!(inspected.outcome, Outcome::NotGood);
         assert!(inspected.verdict.reasons.iter().any(|reason| reason.contains(said)), "{:?}", inspected.verdict);
         let output = folder.path().join(&said[..9]);
-        let repaired = repair(&input, &output, &profile, &limits, &crate::Quiet).unwrap();
+        let repaired = repair(&input, &output, &profile, &limits, &crate::contract::progress::Quiet).unwrap();
         assert_eq!((repaired.outcome, repaired.verdict.good), (Outcome::NeedsReview, true), "the half itself is closed");
         assert!(repaired.verdict.reasons.iter().any(|r| r.starts_with("a part is missing") && r.contains(said)), "{repaired:?}");
     }
@@ -106,7 +106,7 @@ fn a_few_zero_records_are_an_exporters() {
     let folder = tempfile::tempdir().unwrap();
     let (input, output) = (folder.path().join("part.stl"), folder.path().join("out.stl"));
     std::fs::write(&input, file(&[&records(&cube())[..], &[[0; 50]; 7]].concat())).unwrap();
-    let repaired = repair(&input, &output, &Profile::default(), &Limits::default(), &crate::Quiet).unwrap();
+    let repaired = repair(&input, &output, &Profile::default(), &Limits::default(), &crate::contract::progress::Quiet).unwrap();
     assert_eq!((repaired.outcome, repaired.input.findings.len()), (Outcome::Repaired, 0));
 }
 
@@ -154,7 +154,7 @@ fn the_edges_of_a_soup_are_counted_before_they_are_compared() {
     std::fs::write(&input, file(&records(&soup))).unwrap();
     let inspected = |memory_bytes| {
         let limits = Limits { threads: 1, memory_bytes, chunk_triangles: 1024, ..Limits::default() };
-        inspect(&input, &Profile::default(), &limits, &crate::Quiet)
+        inspect(&input, &Profile::default(), &limits, &crate::contract::progress::Quiet)
     };
     assert_eq!(inspected(64 << 20).unwrap().before.boundary_edges, 30_000);
     // 30,000 edges of 640 bytes are 19 MiB; what is kept of the triangles is 4 MiB.

@@ -7,15 +7,15 @@
 use glam::DVec3;
 
 use super::work::Work;
-use crate::chunk::NONE;
-use crate::holes::{self, Shapes, loops::Loop};
-use crate::report::LoopClass;
-use crate::settings::Profile;
-use crate::shop::Shop;
-use crate::shop::components::{Components, Reversed, Through};
-use crate::shop::edges::Edges;
-use crate::shop::near::Tolerance;
-use crate::survey::Survey;
+use crate::contract::report::LoopClass;
+use crate::contract::settings::Profile;
+use crate::detect::holes::{self, Shapes, loops::Loop};
+use crate::submesh::Shop;
+use crate::submesh::components::{Components, Reversed, Through};
+use crate::submesh::edges::Edges;
+use crate::submesh::near::Tolerance;
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
 
 /// A patch lies back along the surface if it continues it by less than this ([`Shapes::continues`]).
 const LIES_BACK: f64 = -0.5;

@@ -4,11 +4,11 @@
 
 use super::close::{are_joined, concatenated};
 use super::work::Work;
-use crate::fill::exact::Point;
-use crate::fill::{Rim, Unfillable, strip};
-use crate::holes::loops::Loop;
-use crate::parallel;
-use crate::shop::{Shop, Vertex};
+use crate::algorithms::triangulate::{Rim, Unfillable, strip};
+use crate::detect::holes::loops::Loop;
+use crate::geometry::exact::Point;
+use crate::submesh::{Shop, Vertex};
+use crate::util::parallel;
 
 /// Bridges pairs of loops: `place` is to put the triangles in. Those between which no valid strip was found stay open. Strips are found in
 /// parallel and put in in order; one that meets an edge of an earlier one is found anew.
@@ -67,7 +67,7 @@ fn meets_new_edge(shop: &Shop, pair: &[&Loop; 2], strip: &[[u32; 3]]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::super::close::{Closed, fill};
-    use crate::settings::Profile;
+    use crate::contract::settings::Profile;
     use crate::testing::{After, Corners, after, plate};
     use proptest::prelude::*;
 

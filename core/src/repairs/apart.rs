@@ -19,18 +19,18 @@ use glam::DVec3;
 use super::overlay::Overlay;
 use super::regions::Unsettled;
 use super::work::Work;
-use crate::chunk::{self, NONE};
-use crate::fill::cross::{Contact, Triangle as Corners, triangles_cross};
-use crate::fill::exact::{Point, at};
-use crate::position::{self, Position};
-use crate::report::{Region, Rung};
-use crate::settings::Profile;
-use crate::shop::components::{Reversed, nonmanifold_vertices};
-use crate::shop::edges::Edge;
-use crate::shop::wedges::{Half, Wedges};
-use crate::shop::{Shop, Triangle, Vertex};
-use crate::sums::{Bounds, step_at};
-use crate::survey::Survey;
+use crate::contract::report::{Region, Rung};
+use crate::contract::settings::Profile;
+use crate::geometry::exact::{Point, at};
+use crate::geometry::position::{self, Position};
+use crate::geometry::sums::{Bounds, step_at};
+use crate::geometry::tri_tri::{Contact, Triangle as Corners, triangles_cross};
+use crate::submesh::components::{Reversed, nonmanifold_vertices};
+use crate::submesh::edges::Edge;
+use crate::submesh::wedges::{Half, Wedges};
+use crate::submesh::{Shop, Triangle, Vertex};
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
 
 /// A copy moves by no more than this share of the shortest edge at it, if there is a place for it then, so that no triangle comes near to turning
 /// over.
@@ -165,13 +165,14 @@ fn regions(shop: &Shop, first: Vertex, copies: &[Copy]) -> Vec<Region> {
         for (t, _) in shop.star(first + copy) {
             let others = shop.triangles[t as usize].v.into_iter().filter_map(|v| v.checked_sub(first));
             others.for_each(|other| {
-                chunk::unite(&mut parents, copy, other);
+                crate::util::union_find::unite(&mut parents, copy, other);
             });
         }
     }
     let mut all: BTreeMap<u32, (Bounds, u64, f64)> = BTreeMap::new();
     for (copy, Copy { away, .. }) in (0..).zip(copies) {
-        let (bounds, count, moved) = all.entry(chunk::find(&mut parents, copy)).or_insert((Bounds::EMPTY, 0, 0.0));
+        let (bounds, count, moved) =
+            all.entry(crate::util::union_find::find(&mut parents, copy)).or_insert((Bounds::EMPTY, 0, 0.0));
         bounds.include(&[shop.positions[(first + copy) as usize]]);
         (*count, *moved) = (*count + 1, away.max(*moved));
     }
@@ -451,7 +452,7 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
         let shop: &Shop = self.work;
         moved.iter().enumerate().all(|(i, one)| {
             let (_, [a, b, c]) = one;
-            !chunk::is_collinear(a, b, c)
+            !crate::geometry::collinear::is_collinear(a, b, c)
                 && moved[..i].iter().all(|other| !self.meets(one, other))
                 && near.iter().all(|t| !self.meets(one, &(self.whole(*t), shop.points(*t))))
         })
@@ -531,19 +532,19 @@ fn surfaces(survey: &Survey<'_>, shop: &Shop, wedges: &Wedges) -> Vec<u32> {
     for t in shop.living() {
         let patch = shop.triangles[t as usize].patch;
         if patch != NONE {
-            chunk::unite(&mut parents, patch, patches + t);
+            crate::util::union_find::unite(&mut parents, patch, patches + t);
         }
         for mate in (0..3).filter_map(|corner| wedges.mate(Half { triangle: t, corner })) {
-            chunk::unite(&mut parents, patches + t, patches + mate.triangle);
+            crate::util::union_find::unite(&mut parents, patches + t, patches + mate.triangle);
         }
     }
     let mut first = vec![NONE; parents.len()];
     let records = survey.patches.iter().map(|p| p.first).zip(0..).chain(shop.living().map(|t| (shop.record(t), patches + t)));
     for (record, node) in records {
-        let root = chunk::find(&mut parents, node) as usize;
+        let root = crate::util::union_find::find(&mut parents, node) as usize;
         first[root] = first[root].min(record);
     }
-    (0..shop.triangles.len() as u32).map(|t| first[chunk::find(&mut parents, patches + t) as usize]).collect()
+    (0..shop.triangles.len() as u32).map(|t| first[crate::util::union_find::find(&mut parents, patches + t) as usize]).collect()
 }
 
 /// Ways to go from a vertex of surface with these unit normals, turned inward: first to the middle of the smallest ball around their ends, which
@@ -598,12 +599,12 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::Quiet;
-    use crate::edit::Edit;
-    use crate::engine::Diagnosis;
-    use crate::record::Record;
-    use crate::settings::Limits;
-    use crate::shop::components::Reversed;
+    use crate::contract::progress::Quiet;
+    use crate::contract::settings::Limits;
+    use crate::diagnosis::Diagnosis;
+    use crate::io::record::Record;
+    use crate::output::edit::Edit;
+    use crate::submesh::components::Reversed;
     use crate::testing::{After, Corners, after, cuboid, records, reversed, written};
 
     fn separated(triangles: &[Corners]) -> After<Separated> {

@@ -8,21 +8,22 @@ use super::admit::{Admission, NotAdmitted};
 use super::guard::{self, Obstacle};
 use super::work::Work;
 use super::{annular, collinear, islands, smooth};
-use crate::chunk::NONE;
-use crate::fill::exact::{self, Point};
-use crate::fill::{self, FillSettings, Rim, Unfillable, cross, strip};
-use crate::holes::{
+use crate::algorithms::fairing::{Method, ShapeSettings};
+use crate::algorithms::triangulate::{self, FillSettings, Rim, Unfillable, strip};
+use crate::contract::report::LoopLeft;
+use crate::contract::settings::{PatchShape, Profile};
+use crate::detect::holes::{
     self, Shapes,
     loops::{self, Boundary, Loop},
 };
-use crate::parallel;
-use crate::report::LoopLeft;
-use crate::settings::{PatchShape, Profile};
-use crate::shape::{Method, ShapeSettings};
-use crate::shop::components::{Components, Reversed, Through};
-use crate::shop::near::Tolerance;
-use crate::shop::{Origin, Shop, Vertex};
-use crate::survey::Survey;
+use crate::geometry::exact::{self, Point};
+use crate::geometry::tri_tri;
+use crate::submesh::components::{Components, Reversed, Through};
+use crate::submesh::near::Tolerance;
+use crate::submesh::{Origin, Shop, Vertex};
+use crate::topology::survey::Survey;
+use crate::util::parallel;
+use crate::util::union_find::NONE;
 
 /// What was closed, by method, and what was not.
 #[derive(Debug, Default)]
@@ -374,7 +375,7 @@ impl Closing<'_> {
         self.open = open;
         for (rim, _) in slits {
             let triangles = fan(self.rim(rim).vertices.len());
-            self.put_in(work, rim, &fill::Patch { triangles, method: fill::Method::Triangle }, SLIT);
+            self.put_in(work, rim, &triangulate::Patch { triangles, method: triangulate::Method::Triangle }, SLIT);
         }
         let mut balanced = 0;
         if balances {
@@ -432,7 +433,7 @@ impl Closing<'_> {
             let perimeter = (0..n).map(|i| work.distance(way[i], way[(i + 1) % n])).sum();
             let left = left(work, way[0], n, perimeter, &UNBALANCED);
             let rim = Rim { points: &points, apexes: &[], obstacles: &[], forbidden: &|_, _| false };
-            let Some(patch) = fill::unchecked(&rim) else {
+            let Some(patch) = triangulate::unchecked(&rim) else {
                 unclosed.push(left);
                 continue;
             };
@@ -446,7 +447,7 @@ impl Closing<'_> {
     }
 
     /// A patch that does not cross itself, if there is one, else any.
-    fn patch_across(&self, shop: &Shop, rim: u32) -> Option<fill::Patch> {
+    fn patch_across(&self, shop: &Shop, rim: u32) -> Option<triangulate::Patch> {
         let valid = self.fill(shop, rim, Neighbours::Heeded, &[]).or_else(|_| self.fill(shop, rim, Neighbours::Ignored, &[]));
         if let Ok(patch) = valid {
             return Some(patch);
@@ -455,7 +456,7 @@ impl Closing<'_> {
         let points = loop_.points(shop);
         let joined = |i: u32, j: u32| are_joined(shop, loop_.vertices[i as usize], loop_.vertices[j as usize]);
         let any = |forbidden: &dyn Fn(u32, u32) -> bool| {
-            fill::unchecked(&Rim { points: &points, apexes: &[], obstacles: &[], forbidden })
+            triangulate::unchecked(&Rim { points: &points, apexes: &[], obstacles: &[], forbidden })
         };
         any(&joined).or_else(|| any(&|_, _| false))
     }
@@ -498,7 +499,7 @@ impl Closing<'_> {
             let tries: &[bool] = if self.rim(rim).vertices.len() > SMALL { &[false] } else { &[false, true] };
             let made = tries.iter().find_map(|across| {
                 let heeded = self.placed[i].obstacles.iter().filter(|obstacle| !across || !obstacle.met_already);
-                let heeded: Vec<cross::Triangle> = heeded.map(|obstacle| obstacle.corners).collect();
+                let heeded: Vec<tri_tri::Triangle> = heeded.map(|obstacle| obstacle.corners).collect();
                 if heeded.len() > MAX_OBSTACLES {
                     return None;
                 }
@@ -530,7 +531,7 @@ impl Closing<'_> {
         &self.rims[rim as usize]
     }
 
-    fn put_in(&mut self, work: &mut Work<'_>, rim: u32, patch: &fill::Patch, method: &'static str) {
+    fn put_in(&mut self, work: &mut Work<'_>, rim: u32, patch: &triangulate::Patch, method: &'static str) {
         let triangles = of_workshop(self.rim(rim), patch);
         self.placed.push(Placed::put_in(work, vec![rim], &triangles, method));
     }
@@ -601,8 +602,8 @@ impl Closing<'_> {
         shop: &Shop,
         rim: u32,
         neighbours: Neighbours,
-        obstacles: &[cross::Triangle],
-    ) -> Result<fill::Patch, NotFilled> {
+        obstacles: &[tri_tri::Triangle],
+    ) -> Result<triangulate::Patch, NotFilled> {
         let rim = self.rim(rim);
         self.admission.check(shop, rim)?;
         let points = rim.points(shop);
@@ -616,7 +617,7 @@ impl Closing<'_> {
         {
             return Ok(patch);
         }
-        Ok(fill::triangulate(&of_patch, &settings)?)
+        Ok(triangulate::triangulate(&of_patch, &settings)?)
     }
 }
 
@@ -626,7 +627,7 @@ fn guard_rounds(patch: &Placed, rims: &[Loop]) -> usize {
 }
 
 /// The triangles of a patch by the vertices of the workshop.
-fn of_workshop(rim: &Loop, patch: &fill::Patch) -> Vec<[Vertex; 3]> {
+fn of_workshop(rim: &Loop, patch: &triangulate::Patch) -> Vec<[Vertex; 3]> {
     patch.triangles.iter().map(|t| t.map(|i| rim.vertices[i as usize])).collect()
 }
 
@@ -651,7 +652,7 @@ pub(super) fn are_joined(shop: &Shop, a: Vertex, b: Vertex) -> bool {
 }
 
 /// Twice the area of a patch, in the survey's units.
-fn twice_area(survey: &Survey<'_>, shop: &Shop, rim: &Loop, patch: &fill::Patch) -> f64 {
+fn twice_area(survey: &Survey<'_>, shop: &Shop, rim: &Loop, patch: &triangulate::Patch) -> f64 {
     let corners = |t: &[u32; 3]| t.map(|i| shop.positions[rim.vertices[i as usize] as usize]);
     patch.triangles.iter().map(|t| survey.measure.triangle(&corners(t)).area).sum::<i128>() as f64
 }
@@ -663,7 +664,7 @@ const SLIT: &str = "slit";
 const FLAT: &str = "flat on its neighbours";
 
 /// A chord of the patch is an edge of the mesh by now.
-fn meets_new_edge(shop: &Shop, rim: &Loop, patch: &fill::Patch) -> bool {
+fn meets_new_edge(shop: &Shop, rim: &Loop, patch: &triangulate::Patch) -> bool {
     let n = rim.vertices.len() as u32;
     patch.triangles.iter().any(|t| {
         (0..3).any(|k| {
@@ -693,7 +694,7 @@ enum Neighbours {
 
 /// All of it on a diagnosis, for tests.
 #[cfg(test)]
-pub(super) fn fill(d: &mut crate::engine::Diagnosis<'_>, profile: &Profile) -> Closed {
+pub(super) fn fill(d: &mut crate::diagnosis::Diagnosis<'_>, profile: &Profile) -> Closed {
     let unturned = Reversed::none(&d.survey);
     // What nothing closes without crossing something is another pass's then.
     let profile = Profile { resolve_crossings: false, ..profile.clone() };
@@ -703,7 +704,7 @@ pub(super) fn fill(d: &mut crate::engine::Diagnosis<'_>, profile: &Profile) -> C
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::LoopClass;
+    use crate::contract::report::LoopClass;
     use crate::testing::{After, Corners, after, cube, cuboid, plate, reversed, shifted};
     use proptest::prelude::*;
 
@@ -765,7 +766,7 @@ mod tests {
     fn a_patch_continues_the_globe() {
         let got = after(&open_globe(), |d, _| {
             let closed = fill(d, &Profile::default());
-            let new: Vec<f64> = d.shop.positions.iter().map(|p| crate::shop::place(*p).length()).collect();
+            let new: Vec<f64> = d.shop.positions.iter().map(|p| crate::submesh::place(*p).length()).collect();
             (closed, new.into_iter().map(|r| (r - 10.0).abs()).fold(0.0, f64::max))
         });
         assert!(got.verdict.good, "{:?}", got.verdict);

@@ -7,8 +7,8 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap, HashMap};
 
 use super::work::{Pass, Work};
-use crate::shop::{Shop, Vertex};
-use crate::steps;
+use crate::submesh::{Shop, Vertex};
+use crate::util::steps;
 
 /// Removes collinear triangles; returns how many there were. O((triangles in the stars along their long edges, and parts made of them) · log).
 pub(super) fn remove(work: &mut Work<'_>) -> u64 {

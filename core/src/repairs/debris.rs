@@ -4,9 +4,9 @@
 //! closed, and which of them to keep nobody could say.
 
 use super::work::Work;
-use crate::settings::Profile;
-use crate::shop::components::{Components, Reversed, Through};
-use crate::survey::Survey;
+use crate::contract::settings::Profile;
+use crate::submesh::components::{Components, Reversed, Through};
+use crate::topology::survey::Survey;
 
 /// So many times the area that a single speck may have is what all specks together may have, at most: 1 % of the model's, by default.
 const TOGETHER: f64 = 10.0;
@@ -44,7 +44,7 @@ pub(super) fn drop(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile) 
 #[cfg(test)]
 mod tests {
     use super::Work;
-    use crate::settings::Profile;
+    use crate::contract::settings::Profile;
     use crate::testing::{after, cube};
 
     #[test]

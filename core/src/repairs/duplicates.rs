@@ -6,10 +6,9 @@
 //! turned later), or two triangles on their own (nothing is enclosed: both go).
 
 use super::work::{Pass, Work};
-use crate::chunk;
-use crate::defects::{by_vertex_set, same_direction};
-use crate::shop::edges::Edges;
-use crate::shop::{Shop, Vertex};
+use crate::detect::defects::{by_vertex_set, same_direction};
+use crate::submesh::edges::Edges;
+use crate::submesh::{Shop, Vertex};
 
 /// Removes triangles with a repeated vertex. Their edges cancel out, so nothing opens.
 pub(super) fn drop_repeated(work: &mut Work<'_>) -> u64 {
@@ -109,7 +108,7 @@ fn spare(shop: &Shop, edges: &Edges, copies: &[u32]) -> Vec<u32> {
     let mut parents: Vec<u32> = (0..copies.len() as u32).collect();
     for around in uses.chunk_by(|a, b| a.0 == b.0) {
         around.iter().for_each(|(_, i, _)| {
-            chunk::unite(&mut parents, around[0].1, *i);
+            crate::util::union_find::unite(&mut parents, around[0].1, *i);
         });
     }
     // By set of copies that hang together: by how much more often its edges are used one way than the other without it, against now.
@@ -117,13 +116,17 @@ fn spare(shop: &Shop, edges: &Edges, copies: &[u32]) -> Vec<u32> {
     for around in uses.chunk_by(|a, b| a.0 == b.0) {
         let now: i64 = edges.get(around[0].0 as usize).uses.iter().map(|u| if u.forward { 1 } else { -1 }).sum();
         let without = now - around.iter().map(|(_, _, way)| way).sum::<i64>();
-        worse[chunk::find(&mut parents, around[0].1) as usize] += without.abs() - now.abs();
+        worse[crate::util::union_find::find(&mut parents, around[0].1) as usize] += without.abs() - now.abs();
     }
-    (0..).zip(copies).filter(|(i, _)| worse[chunk::find(&mut parents, *i) as usize] <= 0).map(|(_, t)| *t).collect()
+    (0..)
+        .zip(copies)
+        .filter(|(i, _)| worse[crate::util::union_find::find(&mut parents, *i) as usize] <= 0)
+        .map(|(_, t)| *t)
+        .collect()
 }
 
 fn sort_out(shop: &Shop, edges: &Edges, pairs: &mut [Pair]) -> Vec<u32> {
-    let mut pair_of = vec![chunk::NONE; shop.triangles.len()];
+    let mut pair_of = vec![crate::util::union_find::NONE; shop.triangles.len()];
     for (i, pair) in pairs.iter().enumerate() {
         pair.forward.iter().chain(&pair.backward).for_each(|t| pair_of[*t as usize] = i as u32);
     }
@@ -137,11 +140,11 @@ fn sort_out(shop: &Shop, edges: &Edges, pairs: &mut [Pair]) -> Vec<u32> {
             let (mut along, mut against) = (0i64, 0i64);
             for used in edge.uses {
                 match pair_of[used.triangle as usize] {
-                    chunk::NONE if edge.directed(used) == (a, b) => along += 1,
-                    chunk::NONE => against += 1,
+                    crate::util::union_find::NONE if edge.directed(used) == (a, b) => along += 1,
+                    crate::util::union_find::NONE => against += 1,
                     other if other != i as u32 => {
                         places[i] = places[i].max(Place::TwoSided);
-                        chunk::unite(&mut parents, i as u32, other);
+                        crate::util::union_find::unite(&mut parents, i as u32, other);
                     }
                     _ => {}
                 }
@@ -154,7 +157,7 @@ fn sort_out(shop: &Shop, edges: &Edges, pairs: &mut [Pair]) -> Vec<u32> {
             }
         }
     }
-    let roots: Vec<usize> = (0..pairs.len() as u32).map(|i| chunk::find(&mut parents, i) as usize).collect();
+    let roots: Vec<usize> = (0..pairs.len() as u32).map(|i| crate::util::union_find::find(&mut parents, i) as usize).collect();
     for i in 0..pairs.len() {
         places[roots[i]] = places[roots[i]].max(places[i]);
     }

@@ -14,14 +14,14 @@ use robust::Coord;
 
 use super::orient::{Parity, turn};
 use super::work::Work;
-use crate::bodies::{self, Direction, Source};
-use crate::chunk::NONE;
-use crate::position::Position;
-use crate::record;
-use crate::shop::components::{Components, Reversed, Sample, Through};
-use crate::shop::edges::Edges;
-use crate::shop::{Shop, place};
-use crate::survey::Survey;
+use crate::detect::bodies::{self, Direction, Source};
+use crate::geometry::position::Position;
+use crate::io::record;
+use crate::submesh::components::{Components, Reversed, Sample, Through};
+use crate::submesh::edges::Edges;
+use crate::submesh::{Shop, place};
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
 
 /// The smaller part of a sheet that disagrees with itself is just turned if it has no more triangles than this, or than this share of all. So is it
 /// everywhere if what is seen to be otherwise is less than this share of all surface.

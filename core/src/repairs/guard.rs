@@ -1,18 +1,18 @@
 //! What a new patch crosses: another patch, or any other surface, wherever that is in the file.
 //!
 //! A patch was tested against itself and the triangles along its rim when it was made. Here all new triangles are held against everything
-//! else in their boxes, chunk by chunk, exactly ([`crate::fresh`]). Of two patches that cross, the later one is to blame.
+//! else in their boxes, chunk by chunk, exactly ([`crate::detect::fresh`]). Of two patches that cross, the later one is to blame.
 
 use std::collections::{BTreeMap, HashSet};
 
 use super::overlay::Overlay;
 use super::work::Work;
-use crate::chunk::NONE;
-use crate::fill::cross::Triangle as Corners;
-use crate::position::{self, Position};
-use crate::shop::components::{Components, Reversed, Through};
-use crate::shop::{Origin, Shop};
-use crate::survey::Survey;
+use crate::geometry::position::{self, Position};
+use crate::geometry::tri_tri::Triangle as Corners;
+use crate::submesh::components::{Components, Reversed, Through};
+use crate::submesh::{Origin, Shop};
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
 
 /// A triangle that a patch crosses.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -10,15 +10,15 @@ use glam::DVec3;
 
 use super::close::{are_joined, concatenated};
 use super::work::Work;
-use crate::boxes::BoxTree;
-use crate::chunk::NONE;
-use crate::fill::exact::Point;
-use crate::fill::{self, Rim};
-use crate::holes::loops::Loop;
-use crate::shop::components::{Components, Reversed, Through};
-use crate::shop::{Origin, Shop, Vertex};
-use crate::sums::Bounds;
-use crate::survey::Survey;
+use crate::algorithms::triangulate::{self, Rim};
+use crate::detect::holes::loops::Loop;
+use crate::geometry::boxes::BoxTree;
+use crate::geometry::exact::Point;
+use crate::geometry::sums::Bounds;
+use crate::submesh::components::{Components, Reversed, Through};
+use crate::submesh::{Origin, Shop, Vertex};
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
 
 /// Holes, each with its islands: some pairs of loops look like one and the other; a lone sheet that none of them holds lies in the smallest
 /// hole whose box holds its middle. O(workshop) if there are any.
@@ -72,7 +72,8 @@ pub(super) fn touching(shop: &Shop, rims: &[Loop]) -> Vec<(Vec<usize>, Loop)> {
     of_way.sort_by_key(|i| rims[*i].way);
     let mut groups = Vec::new();
     for same in of_way.chunk_by(|a, b| rims[*a].way == rims[*b].way).filter(|same| (2..=MAX_TOUCHING).contains(&same.len())) {
-        let mut areas: Vec<(DVec3, usize)> = same.iter().map(|i| (fill::directed_area(&rims[*i].points(shop)), *i)).collect();
+        let mut areas: Vec<(DVec3, usize)> =
+            same.iter().map(|i| (triangulate::directed_area(&rims[*i].points(shop)), *i)).collect();
         areas.sort_by(|a, b| b.0.length().total_cmp(&a.0.length()).then(a.1.cmp(&b.1)));
         let (of_hole, hole) = areas[0];
         let mut left: Vec<usize> = areas[1..].iter().filter(|(area, _)| area.dot(of_hole) < 0.0).map(|(_, i)| *i).collect();
@@ -95,7 +96,7 @@ const MAX_TOUCHING: usize = 64;
 pub(super) fn patch_touching(shop: &Shop, way: &Loop) -> Option<Vec<[Vertex; 3]>> {
     let (points, apexes) = (way.points(shop), way.apexes(shop));
     let forbidden = |i: u32, j: u32| are_joined(shop, way.vertices[i as usize], way.vertices[j as usize]);
-    let patch = fill::pinched(&Rim { points: &points, apexes: &apexes, obstacles: &[], forbidden: &forbidden }).ok()?;
+    let patch = triangulate::pinched(&Rim { points: &points, apexes: &apexes, obstacles: &[], forbidden: &forbidden }).ok()?;
     Some(patch.into_iter().map(|t| t.map(|i| way.vertices[i as usize])).collect())
 }
 
@@ -126,7 +127,7 @@ pub(super) fn patch(shop: &Shop, group: &[&Loop]) -> Option<Vec<[Vertex; 3]>> {
         .map(|((points, apexes), forbidden)| Rim { points, apexes, obstacles: &[], forbidden })
         .collect();
     let joined = |i: u32, j: u32| are_joined(shop, vertices[i as usize], vertices[j as usize]);
-    let patch = fill::around_islands(&rims.iter().collect::<Vec<_>>(), &joined).ok()?;
+    let patch = triangulate::around_islands(&rims.iter().collect::<Vec<_>>(), &joined).ok()?;
     Some(patch.into_iter().map(|t| t.map(|i| vertices[i as usize])).collect())
 }
 
@@ -148,7 +149,7 @@ fn join(shop: &Shop, outer: &[Vertex], inner: &[Vertex]) -> Option<(Vec<Vertex>,
     let triangles = [[a, a_next, b], [b_last, b, a_next]];
     let flat = |t: &[Vertex; 3]| {
         let [p, q, r] = t.map(|v| &shop.positions[v as usize]);
-        crate::chunk::is_collinear(p, q, r)
+        crate::geometry::collinear::is_collinear(p, q, r)
     };
     let new_edges = [(a, b), (a_next, b), (a_next, b_last)];
     if triangles.iter().any(flat) || new_edges.iter().any(|(p, q)| shop.has_edge(*p, *q)) {
@@ -162,8 +163,8 @@ fn join(shop: &Shop, outer: &[Vertex], inner: &[Vertex]) -> Option<(Vec<Vertex>,
 mod tests {
     use super::super::close;
     use super::*;
-    use crate::holes::{self, loops};
-    use crate::settings::Profile;
+    use crate::contract::settings::Profile;
+    use crate::detect::holes::{self, loops};
     use crate::testing::{Corners, after, plate, shifted};
 
     /// Loops closed together with islands, and components and loops that are left, if those up to this length are closed.

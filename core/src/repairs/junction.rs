@@ -2,8 +2,8 @@
 
 use super::collinear;
 use super::work::Work;
-use crate::shop::Shop;
-use crate::shop::near::{self, OnEdge, Tolerance};
+use crate::submesh::Shop;
+use crate::submesh::near::{self, OnEdge, Tolerance};
 
 /// Splits boundary edges at the vertices that lie on them; returns how many vertices that were.
 pub(super) fn split_edges(work: &mut Work<'_>, tolerance: &Tolerance) -> u64 {

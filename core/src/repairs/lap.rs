@@ -9,17 +9,17 @@ use std::collections::{BTreeMap, HashMap};
 use super::layer::{Facet, Layer, Place, Reach, RimEdge, around};
 use super::merge;
 use super::work::Work;
-use crate::boxes::BoxTree;
-use crate::fill::cross::Triangle as Corners;
-use crate::grid::Grid;
-use crate::position::Position;
-use crate::record;
-use crate::shop::components::{Component, Components, Reversed, Through};
-use crate::shop::edges::Edges;
-use crate::shop::near::{Tolerance, boundary_vertices};
-use crate::shop::{self, Origin, Shop, Vertex};
-use crate::sums::Bounds;
-use crate::survey::Survey;
+use crate::geometry::boxes::BoxTree;
+use crate::geometry::grid::Grid;
+use crate::geometry::position::Position;
+use crate::geometry::sums::Bounds;
+use crate::geometry::tri_tri::Triangle as Corners;
+use crate::io::record;
+use crate::submesh::components::{Component, Components, Reversed, Through};
+use crate::submesh::edges::Edges;
+use crate::submesh::near::{Tolerance, boundary_vertices};
+use crate::submesh::{self, Origin, Shop, Vertex};
+use crate::topology::survey::Survey;
 
 /// Surfaces lie on each other within this share of the diagonals of their boxes together.
 const LAP: f64 = 1e-4;
@@ -35,7 +35,7 @@ const MOST_PAIRS: usize = 256;
 const OVERLAP: f64 = 0.5;
 
 /// Triangles that are looked at together, at most; where there are more, nothing is cut. By count, so that memory decides nothing.
-pub(super) const MOST: usize = 1 << 19;
+pub(super) const MOST: usize = crate::stream::budget::OVERLAPS_LOOKED_FOR;
 
 /// Most triangles that a cut may take; they are worked on in memory.
 const MOST_CUT: usize = 1 << 17;
@@ -426,7 +426,7 @@ fn join(work: &mut Work<'_>, [moving, staying]: [&[Vertex]; 2], reach: &Toleranc
 
 /// Wider on all sides, rounded outward.
 fn widened(b: &Bounds, by: f64) -> Bounds {
-    around(&[shop::place(b.lo), shop::place(b.hi)], by)
+    around(&[submesh::place(b.lo), submesh::place(b.hi)], by)
 }
 
 #[cfg(test)]

@@ -4,10 +4,10 @@
 
 use glam::DVec3;
 
-use crate::boxes::BoxTree;
-use crate::fill::cross::Triangle as Corners;
-use crate::shop::{place, square_distance};
-use crate::sums::Bounds;
+use crate::geometry::boxes::BoxTree;
+use crate::geometry::sums::Bounds;
+use crate::geometry::tri_tri::Triangle as Corners;
+use crate::submesh::{place, square_distance};
 
 /// Two surfaces face the same way if the cosine between their normals is at least this: up to about 25°.
 const AGREE: f64 = 0.9;

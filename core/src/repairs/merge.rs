@@ -4,10 +4,9 @@
 //! A merge that would leave a new non-manifold edge is taken back.
 
 use super::work::Work;
-use crate::chunk;
-use crate::shop::edges::Edges;
-use crate::shop::near::{self, Tolerance};
-use crate::shop::{Shop, Vertex};
+use crate::submesh::edges::Edges;
+use crate::submesh::near::{self, Tolerance};
+use crate::submesh::{Shop, Vertex};
 
 /// What the weld did.
 #[derive(Debug, Default)]
@@ -65,10 +64,10 @@ fn clusters(shop: &Shop, pairs: &[(Vertex, Vertex)], tolerance: f64) -> Vec<Vec<
     let number = |v: Vertex| vertices.binary_search(&v).unwrap_or(0) as u32;
     let mut parents: Vec<u32> = (0..vertices.len() as u32).collect();
     for (a, b) in pairs {
-        chunk::unite(&mut parents, number(*a), number(*b));
+        crate::util::union_find::unite(&mut parents, number(*a), number(*b));
     }
     let mut by_root: Vec<(u32, Vertex)> =
-        (0..vertices.len() as u32).map(|i| (chunk::find(&mut parents, i), vertices[i as usize])).collect();
+        (0..vertices.len() as u32).map(|i| (crate::util::union_find::find(&mut parents, i), vertices[i as usize])).collect();
     by_root.sort_unstable();
     let mut all = Vec::new();
     for group in by_root.chunk_by(|a, b| a.0 == b.0) {
@@ -107,7 +106,7 @@ fn targets(shop: &Shop, clusters: &[Vec<Vertex>]) -> Vec<Vertex> {
 
 /// Clusters at an edge of more than two triangles that was not one before.
 fn newly_nonmanifold(now: &Edges, before: &Edges, clusters: &[Vec<Vertex>], target: &[Vertex]) -> Vec<bool> {
-    let mut cluster_of = vec![chunk::NONE; target.len()];
+    let mut cluster_of = vec![crate::util::union_find::NONE; target.len()];
     for (i, cluster) in clusters.iter().enumerate() {
         cluster.iter().for_each(|v| cluster_of[*v as usize] = i as u32);
     }

@@ -37,20 +37,20 @@ mod zip;
 use std::path::Path;
 use std::time::Instant;
 
-use crate::Progress;
-use crate::arrange::Rational;
-use crate::engine::Diagnosis;
-use crate::error::Result;
-use crate::holes;
-use crate::report::{BoundaryLoops, LoopLeft, Region, Regions, Repair, SheetDropped, Volumes, Wrap};
-use crate::settings::{Bodies, Guarantee, Limits, Profile};
-use crate::shop::components::{Components, Reversed};
-use crate::shop::near::Tolerance;
-use crate::survey::Survey;
+use crate::contract::error::Result;
+use crate::contract::progress::Progress;
+use crate::contract::report::{BoundaryLoops, LoopLeft, Region, Regions, Repair, SheetDropped, Volumes, Wrap};
+use crate::contract::settings::{Bodies, Guarantee, Limits, Profile};
+use crate::detect::holes;
+use crate::detect::verdict::Swallowed;
+use crate::diagnosis::Diagnosis;
+use crate::geometry::arrange::Rational;
+use crate::submesh::components::{Components, Reversed};
+use crate::submesh::near::Tolerance;
+use crate::topology::survey::Survey;
 use overlay::Overlay;
 use probes::Probes;
 use resolve::{Means, Resolved};
-pub(crate) use swallowed::Swallowed;
 use work::Work;
 
 /// What the repairs did; the mesh itself is in the diagnosis' shop.
@@ -76,13 +76,6 @@ const ROUNDS: usize = 4;
 
 const DEGENERATE: &str = "triangles without area removed, their T-junctions closed";
 const DUPLICATE: &str = "triangles on the vertices of another one";
-
-/// Bytes that trees over the edges of one triangle take at most, with what is kept of each of these edges: their vertices are compared, and
-/// surface that ends on other surface is looked for, up to a number of triangles. Measured on soups of 0.5 and 1 M triangles without a shared
-/// vertex (623 and 385 bytes an edge).
-pub(crate) fn boundary_bytes(edges: u64) -> u64 {
-    (400 * edges).max(640 * edges.min(3 * lap::MOST as u64))
-}
 
 /// Repairs what the profile allows.
 ///

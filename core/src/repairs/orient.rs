@@ -2,13 +2,13 @@
 
 use super::swallowed;
 use super::work::Work;
-use crate::bodies;
-use crate::boxes::BoxTree;
-use crate::chunk::NONE;
-use crate::shop::Shop;
-use crate::shop::components::{Components, Reversed, Through};
-use crate::sums::Bounds;
-use crate::survey::Survey;
+use crate::detect::bodies;
+use crate::geometry::boxes::BoxTree;
+use crate::geometry::sums::Bounds;
+use crate::submesh::Shop;
+use crate::submesh::components::{Components, Reversed, Through};
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
 
 /// Union-find with the parity of each node against its root.
 pub(super) struct Parity {

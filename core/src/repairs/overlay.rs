@@ -1,14 +1,14 @@
 //! The surface as the repairs have left it: the file's records, less those that are gone, with what the workshop has instead.
 
-use crate::crossings::Pair;
-use crate::edit;
-use crate::fill::cross::{self, Triangle as Corners};
-use crate::fresh;
-use crate::position;
-use crate::record;
-use crate::shop::components::Reversed;
-use crate::shop::{Origin, Shop};
-use crate::survey::Survey;
+use crate::detect::fresh;
+use crate::geometry::position;
+use crate::geometry::tri_tri::{self, Triangle as Corners};
+use crate::io::record;
+use crate::output::edit;
+use crate::submesh::components::Reversed;
+use crate::submesh::{Origin, Shop};
+use crate::topology::crossings::Pair;
+use crate::topology::survey::Survey;
 
 /// Which records stand as they were read (perhaps turned), and which triangles of the workshop do not.
 ///
@@ -119,7 +119,7 @@ impl Overlay {
             self.changed.iter().filter(|t| of.binary_search(t).is_err()).map(|t| (self.number(*t), shop.points(*t))),
             |place| self.is_gone(place) || asked.binary_search(&place).is_ok(),
             u64::from(self.records) + shop.triangles.len() as u64,
-            cross::edge_along_edge,
+            tri_tri::edge_along_edge,
         )?;
         Some(found.iter().map(|pair| pair.triangles).collect())
     }

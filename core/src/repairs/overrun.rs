@@ -10,11 +10,11 @@ use std::collections::BTreeMap;
 use robust::Coord3D;
 
 use super::work::Work;
-use crate::chunk::NONE;
-use crate::fill::cross::{Triangle as Corners, common, self_intersection};
-use crate::holes::loops::{self, Loop};
-use crate::shop::{Origin, Shop, Vertex};
-use crate::survey::Survey;
+use crate::detect::holes::loops::{self, Loop};
+use crate::geometry::tri_tri::{Triangle as Corners, common, self_intersection};
+use crate::submesh::{Origin, Shop, Vertex};
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
 
 /// A loop may become so many times as long.
 const LONGER: f64 = 2.0;

@@ -12,13 +12,13 @@ use std::collections::BTreeSet;
 
 use glam::DVec3;
 
-use crate::bodies;
-use crate::record;
-use crate::report::{BodyLost, Volumes};
-use crate::shop::Shop;
-use crate::shop::components::{Component, Components, Reversed, Sample};
-use crate::sums::Bounds;
-use crate::survey::Survey;
+use crate::contract::report::{BodyLost, Volumes};
+use crate::detect::bodies;
+use crate::geometry::sums::Bounds;
+use crate::io::record;
+use crate::submesh::Shop;
+use crate::submesh::components::{Component, Components, Reversed, Sample};
+use crate::topology::survey::Survey;
 
 /// Bodies of less than this share of the volume of all are not looked for.
 const LEAST_SHARE: f64 = 1e-6;

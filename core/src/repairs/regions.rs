@@ -1,7 +1,7 @@
 //! What happened where: every region that was cut, snapped, taken apart, dropped, wrapped or left, for the report.
 
-use crate::report::{Region, Regions, Rung, SheetDropped, Wrap};
-use crate::sums::Bounds;
+use crate::contract::report::{Region, Regions, Rung, SheetDropped, Wrap};
+use crate::geometry::sums::Bounds;
 
 /// Regions that are listed.
 const LISTED: usize = 1000;

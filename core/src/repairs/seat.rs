@@ -21,16 +21,16 @@ use glam::DVec3;
 use super::guard::components_of_records;
 use super::overlay::Overlay;
 use super::work::Work;
-use crate::chunk::NONE;
-use crate::fill::cross::Triangle as Corners;
-use crate::fresh;
-use crate::holes::loops::{self, Loop};
-use crate::position::Position;
-use crate::settings::{Bodies, Profile};
-use crate::shop::components::{Components, Reversed, Through};
-use crate::shop::{self, Origin, Shop, Vertex};
-use crate::sums::step_at;
-use crate::survey::Survey;
+use crate::contract::settings::{Bodies, Profile};
+use crate::detect::fresh;
+use crate::detect::holes::loops::{self, Loop};
+use crate::geometry::position::Position;
+use crate::geometry::sums::step_at;
+use crate::geometry::tri_tri::Triangle as Corners;
+use crate::submesh::components::{Components, Reversed, Through};
+use crate::submesh::{self, Origin, Shop, Vertex};
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
 
 /// A rim points one way if the directions across its edges add up to this share of their number at least: that of a flat sheet or of a hole
 /// in a wall points all ways, that of a shape with steep walls one.
@@ -158,7 +158,7 @@ impl Candidate {
         let (mut sum, mut length) = (DVec3::ZERO, 0.0);
         for i in 0..n {
             let (from, along) = (shop.place(vertices[i]), shop.vector(vertices[i], vertices[(i + 1) % n]));
-            let inward = shop::place(apexes[i]?) - from;
+            let inward = submesh::place(apexes[i]?) - from;
             let outward = along * (inward.dot(along) / along.length_squared()) - inward;
             let direction = outward.try_normalize()?;
             sum += direction * along.length();
@@ -234,7 +234,7 @@ impl Candidate {
 /// How far from a point, in a direction of length 1, a triangle's plane is met inside of it (Möller & Trumbore, JGT 2(1), 1997). Rounded: what it says of a
 /// ray through an edge may be wrong, and the rim then stays as it is.
 fn hit(from: DVec3, direction: DVec3, corners: &Corners) -> Option<f64> {
-    let [a, b, c] = corners.map(shop::place);
+    let [a, b, c] = corners.map(submesh::place);
     let (u, v) = (b - a, c - a);
     let p = direction.cross(v);
     let determinant = u.dot(p);
@@ -254,9 +254,9 @@ mod tests {
 
     use super::super::{close, orient, resolve};
     use super::*;
-    use crate::Quiet;
-    use crate::arrange::Rational;
-    use crate::settings::Limits;
+    use crate::contract::progress::Quiet;
+    use crate::contract::settings::Limits;
+    use crate::geometry::arrange::Rational;
     use crate::testing::{After, Corners, after, cuboid, plate, reversed, shifted};
 
     /// How many rims were let down, once what they are part of was closed, turned and cut as in a repair.

@@ -11,11 +11,11 @@
 use super::close::SheetRim;
 use super::swallowed;
 use super::work::Work;
-use crate::chunk::NONE;
-use crate::report::{LoopLeft, SheetDropped};
-use crate::settings::{Guarantee, Profile, Sheets};
-use crate::shop::components::{Components, Reversed, Through};
-use crate::survey::Survey;
+use crate::contract::report::{LoopLeft, SheetDropped};
+use crate::contract::settings::{Guarantee, Profile, Sheets};
+use crate::submesh::components::{Components, Reversed, Through};
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
 
 /// Sheets in the report, at most: the largest.
 const LISTED: usize = 1000;

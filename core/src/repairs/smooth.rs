@@ -11,13 +11,13 @@ use glam::DVec3;
 
 use super::close::Placed;
 use super::work::Work;
-use crate::chunk::NONE;
-use crate::fill::exact::Point;
-use crate::parallel;
-use crate::position::{self, Position};
-use crate::shape::{self, Region, ShapeSettings, Shaped, edges, sorted};
-use crate::shop::{Origin, Shop, Vertex};
-use crate::survey::Survey;
+use crate::algorithms::fairing::{self, Region, ShapeSettings, Shaped, edges, sorted};
+use crate::geometry::exact::Point;
+use crate::geometry::position::{self, Position};
+use crate::submesh::{Origin, Shop, Vertex};
+use crate::topology::survey::Survey;
+use crate::util::parallel;
+use crate::util::union_find::NONE;
 
 /// Vertices on the rims of the patches that are worked on at once.
 const RIM_VERTICES_AT_ONCE: usize = 1 << 16;
@@ -52,7 +52,7 @@ pub(super) fn smooth(survey: &Survey<'_>, work: &mut Work<'_>, placed: &mut [Pla
         let shaped = parallel::map(threads, batch.len(), |i| {
             let region = Gathered::of(shop, &beyond, &placed[batch[i]]);
             let shaped =
-                shape::shape(&Region { positions: &region.positions, patch: &region.patch, around: &region.around }, settings);
+                fairing::shape(&Region { positions: &region.positions, patch: &region.patch, around: &region.around }, settings);
             shaped.map(|shaped| (region.vertices, shaped))
         });
         for (i, shaped) in batch.iter().zip(shaped) {
@@ -126,7 +126,7 @@ impl Edges {
         })
     }
 
-    /// Does the surface turn away at the rim? [`shape::shape`] would say so, too, after the rings around were fetched.
+    /// Does the surface turn away at the rim? [`fairing::shape`] would say so, too, after the rings around were fetched.
     fn is_rim_an_edge(&self, shop: &Shop, patch: &Placed) -> bool {
         let (mut turn, mut length) = (0.0, 0.0);
         for ((&[a, b], &t), beyond) in self.rim.iter().zip(&self.at_rim).zip(self.beyond(shop, patch)) {
@@ -136,7 +136,7 @@ impl Edges {
                 length += along;
             }
         }
-        shape::is_edge(turn, length)
+        fairing::is_edge(turn, length)
     }
 
     /// Is the patch flat, and the triangles along its rim with it, as far as coordinates of single precision can tell? Then there is nothing to
@@ -272,8 +272,8 @@ fn put_in(work: &mut Work<'_>, patch: &mut Placed, mut vertices: Vec<Vertex>, sh
 mod tests {
     use std::collections::BTreeMap;
 
+    use crate::contract::settings::Profile;
     use crate::repairs::close;
-    use crate::settings::Profile;
     use crate::testing::{Corners, after, plate};
 
     /// How a hole of 8 by 8 squares in a plate of 16 by 16 is closed that lies askew, far from the origin, and is bent to a cylinder.

@@ -9,11 +9,11 @@ use glam::DVec3;
 
 use super::admit;
 use super::work::Work;
-use crate::chunk::NONE;
-use crate::shop::components::{Components, Reversed, Through};
-use crate::shop::edges::Edges;
-use crate::shop::{Shop, Vertex};
-use crate::survey::Survey;
+use crate::submesh::components::{Components, Reversed, Through};
+use crate::submesh::edges::Edges;
+use crate::submesh::{Shop, Vertex};
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
 
 /// A sheet that ends at non-manifold edges.
 struct Sheet {

@@ -11,26 +11,17 @@
 
 use super::guard::components_of_records;
 use super::work::Work;
-use crate::bodies;
-use crate::boxes::BoxTree;
-use crate::chunk::NONE;
-use crate::record;
-use crate::report::{Region, Rung};
-use crate::settings::{Bodies, Profile};
-use crate::shop::components::{Component, Components, Reversed};
-use crate::shop::{Origin, Shop};
-use crate::sums::Bounds;
-use crate::survey::Survey;
-
-/// What was swallowed.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Swallowed {
-    pub(crate) bodies: u64,
-    /// What the bodies enclose less their cavities, which lies in the bodies around them as well. In the file's units, cubed.
-    pub(crate) volume: f64,
-    /// Where they were.
-    pub(crate) regions: Vec<Region>,
-}
+use crate::contract::report::{Region, Rung};
+use crate::contract::settings::{Bodies, Profile};
+use crate::detect::bodies;
+use crate::detect::verdict::Swallowed;
+use crate::geometry::boxes::BoxTree;
+use crate::geometry::sums::Bounds;
+use crate::io::record;
+use crate::submesh::components::{Component, Components, Reversed};
+use crate::submesh::{Origin, Shop};
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
 
 /// Removes what lies in the material of others and crosses nothing. Nothing is removed if it is not known what crosses what. Reads the
 /// chunks where pieces lie inside others' boxes.

@@ -12,14 +12,14 @@ use super::apart::Separated;
 use super::overlay::Overlay;
 use super::resolve::{Refill, join_in, refill_of};
 use super::work::Work;
-use crate::chunk::NONE;
-use crate::report::{Region, Rung};
-use crate::settings::Profile;
-use crate::shop::components::{Reversed, nonmanifold_vertices};
-use crate::shop::wedges::Wedges;
-use crate::shop::{Origin, Shop, Triangle, Vertex};
-use crate::sums::Bounds;
-use crate::survey::Survey;
+use crate::contract::report::{Region, Rung};
+use crate::contract::settings::Profile;
+use crate::geometry::sums::Bounds;
+use crate::submesh::components::{Reversed, nonmanifold_vertices};
+use crate::submesh::wedges::Wedges;
+use crate::submesh::{Origin, Shop, Triangle, Vertex};
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
 
 /// How often it is tried with other fans, and then without the vertices that these fail at.
 const ROUNDS: usize = 8;

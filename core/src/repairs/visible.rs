@@ -19,18 +19,19 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use robust::Coord;
 
-use super::swallowed::{self, Swallowed, crossing, lies_in_material};
+use super::swallowed::{self, crossing, lies_in_material};
 use super::work::Work;
-use crate::bodies::{self, Direction, Source};
-use crate::boxes::BoxTree;
-use crate::position::Position;
-use crate::record;
-use crate::report::{LoopLeft, SheetDropped};
-use crate::settings::{Bodies, Profile};
-use crate::shop::components::{Components, Reversed};
-use crate::shop::{Origin, Shop};
-use crate::sums::Bounds;
-use crate::survey::Survey;
+use crate::contract::report::{LoopLeft, SheetDropped};
+use crate::contract::settings::{Bodies, Profile};
+use crate::detect::bodies::{self, Direction, Source};
+use crate::detect::verdict::Swallowed;
+use crate::geometry::boxes::BoxTree;
+use crate::geometry::position::Position;
+use crate::geometry::sums::Bounds;
+use crate::io::record;
+use crate::submesh::components::{Components, Reversed};
+use crate::submesh::{Origin, Shop};
+use crate::topology::survey::Survey;
 
 /// Sheets in the report, at most: the largest.
 const LISTED: usize = 1000;

@@ -5,12 +5,13 @@
 
 use std::ops::Deref;
 
-use crate::chunk::{NONE, Suspect};
-use crate::position::Position;
-use crate::shop::edges::Edges;
-use crate::shop::{Origin, Shop, Triangle, Vertex};
-use crate::steps;
-use crate::survey::Survey;
+use crate::geometry::position::Position;
+use crate::submesh::edges::Edges;
+use crate::submesh::{Origin, Shop, Triangle, Vertex};
+use crate::topology::chunk::Suspect;
+use crate::topology::survey::Survey;
+use crate::util::steps;
+use crate::util::union_find::NONE;
 
 /// A pass that makes sure of something about every triangle, or every set of three vertices, which holds until one of the triangles
 /// gets another vertex.
@@ -221,8 +222,8 @@ impl<'a> Work<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chunk::NONE;
     use crate::testing::{diagnose, plate, records};
+    use crate::util::union_find::NONE;
 
     #[test]
     fn a_pass_sees_everything_once_and_then_what_changed() {

@@ -1,4 +1,4 @@
-//! The last rung: what no repair made a solid is replaced by a wrapped surface, which is one by construction ([`crate::wrap`]).
+//! The last rung: what no repair made a solid is replaced by a wrapped surface, which is one by construction ([`crate::algorithms::wrap`]).
 //!
 //! A **group** is what is replaced together: pieces of surface that are open, hang together in non-manifold edges or vertices, or run into each
 //! other, and at least one of which is no solid. Its wrap must keep clear of everything else in the file, exactly and in its vertices;
@@ -15,19 +15,19 @@ use super::guard;
 use super::orient;
 use super::overlay::Overlay;
 use super::work::Work;
-use crate::chunk::{self, NONE};
-use crate::fresh;
-use crate::parallel;
-use crate::position::{self, Position};
-use crate::record;
-use crate::report::Wrap;
-use crate::settings::Profile;
-use crate::shop::components::{self, Components, Reversed, Through};
-use crate::shop::{Shop, place};
-use crate::sums::Bounds;
-use crate::survey::Survey;
-use crate::wrap::tree::{Corners, Tree};
-use crate::wrap::{Wrapping, wrap};
+use crate::algorithms::wrap::tree::{Corners, Tree};
+use crate::algorithms::wrap::{Wrapping, wrap};
+use crate::contract::report::Wrap;
+use crate::contract::settings::Profile;
+use crate::detect::fresh;
+use crate::geometry::position::{self, Position};
+use crate::geometry::sums::Bounds;
+use crate::io::record;
+use crate::submesh::components::{self, Components, Reversed, Through};
+use crate::submesh::{Shop, place};
+use crate::topology::survey::Survey;
+use crate::util::parallel;
+use crate::util::union_find::NONE;
 
 /// Triangles of a group, or of several that are wrapped at a time, at most: some 100 bytes each.
 const MOST_TRIANGLES: u64 = 1 << 22;
@@ -242,7 +242,7 @@ impl Groups {
 
     fn unite(&mut self, a: u32, b: u32) {
         if a != NONE && b != NONE {
-            chunk::unite(&mut self.parents, a, b);
+            crate::util::union_find::unite(&mut self.parents, a, b);
         }
     }
 
@@ -250,7 +250,7 @@ impl Groups {
     fn list(&mut self) -> Vec<Vec<u32>> {
         let mut all: BTreeMap<u32, (Vec<u32>, bool)> = BTreeMap::new();
         for piece in 0..self.parents.len() as u32 {
-            let (list, is_broken) = all.entry(chunk::find(&mut self.parents, piece)).or_default();
+            let (list, is_broken) = all.entry(crate::util::union_find::find(&mut self.parents, piece)).or_default();
             list.push(piece);
             *is_broken |= self.broken[piece as usize];
         }
@@ -589,11 +589,11 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::Quiet;
-    use crate::edit::Edit;
-    use crate::engine::Diagnosis;
-    use crate::report::{Defects, Verdict};
-    use crate::settings::Limits;
+    use crate::contract::progress::Quiet;
+    use crate::contract::report::{Defects, Verdict};
+    use crate::contract::settings::Limits;
+    use crate::diagnosis::Diagnosis;
+    use crate::output::edit::Edit;
     use crate::testing::{cuboid, diagnose, plate, records, reversed, shifted, written};
 
     struct After {
@@ -616,7 +616,7 @@ mod tests {
         edit.added.extend(wraps.triangles.iter().map(|corners| record::encode(*corners, 0)));
         let output = written(&edit, &input);
         let defects = diagnose(&output).defects;
-        let verdict = crate::verdict::judge(&defects, &[]);
+        let verdict = crate::detect::verdict::judge(&defects, &[]);
         After { listed: wraps.listed, defects, verdict, untouched: edit.summary(input.len()).untouched, output }
     }
 

@@ -11,12 +11,11 @@ use glam::DVec3;
 
 use super::admit;
 use super::work::Work;
-use crate::chunk;
-use crate::holes::loops;
-use crate::settings::Profile;
-use crate::shop::edges::{Edge, Edges};
-use crate::shop::near::Tolerance;
-use crate::shop::{self, Shop, Vertex, near};
+use crate::contract::settings::Profile;
+use crate::detect::holes::loops;
+use crate::submesh::edges::{Edge, Edges};
+use crate::submesh::near::Tolerance;
+use crate::submesh::{self, Shop, Vertex, near};
 
 /// Facing: cosine between the directions in which the two surfaces end, at most.
 const FACING: f64 = -0.5;
@@ -92,7 +91,7 @@ fn facing(shop: &Shop, edges: &Edges, profile: &Profile) -> Vec<[Vertex; 2]> {
         // Mutual, and each pair once.
         if let Some(j) = found.filter(|j| *j > i && nearest[*j] == Some(i)) {
             let (v, w) = (vertices[i], vertices[j]);
-            if shop::cosine(outward[v as usize], outward[w as usize]) < FACING {
+            if submesh::cosine(outward[v as usize], outward[w as usize]) < FACING {
                 pairs.push((shop.distance(v, w), [v, w]));
             }
         }
@@ -110,9 +109,9 @@ fn fans(shop: &Shop, v: Vertex) -> usize {
     spokes.sort_unstable();
     let mut parents: Vec<u32> = (0..star.len() as u32).collect();
     for pair in spokes.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
-        chunk::unite(&mut parents, pair[0].1, pair[1].1);
+        crate::util::union_find::unite(&mut parents, pair[0].1, pair[1].1);
     }
-    (0..star.len() as u32).filter(|i| chunk::find(&mut parents, *i) == *i).count()
+    (0..star.len() as u32).filter(|i| crate::util::union_find::find(&mut parents, *i) == *i).count()
 }
 
 /// For each boundary vertex the direction in which its surface ends: away from the triangles, across their boundary edges.
@@ -151,19 +150,19 @@ fn may_merge(shop: &Shop, stay: Vertex, go: Vertex) -> bool {
             let before = shop.points(t);
             let mut after = before;
             after[k] = shop.positions[stay as usize];
-            shop::cosine(normal(before), normal(after)) >= STEADY
+            submesh::cosine(normal(before), normal(after)) >= STEADY
         })
 }
 
 fn normal(corners: [[f32; 3]; 3]) -> DVec3 {
-    let [a, b, c] = corners.map(shop::place);
+    let [a, b, c] = corners.map(submesh::place);
     (b - a).cross(c - a)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::LoopClass;
+    use crate::contract::report::LoopClass;
     use crate::testing::{Corners, after, plate, reversed, shifted};
 
     /// A plate cut along its middle line, where the right side stands this far off at three vertices.

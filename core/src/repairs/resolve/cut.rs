@@ -4,9 +4,9 @@ use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 
 use super::super::work::Work;
-use crate::arrange::{Arrange, Arrangement, Piece};
-use crate::position::Position;
-use crate::shop::{Shop, Vertex};
+use crate::geometry::arrange::{Arrange, Arrangement, Piece};
+use crate::geometry::position::Position;
+use crate::submesh::{Shop, Vertex};
 
 /// Times that the triangles to be cut are added to because a neighbour was cut at its edge.
 const GROWTHS: usize = 16;

@@ -2,7 +2,7 @@
 //!
 //! Where surfaces nearly lie on each other, cutting leaves crumbs of a few triangles between them. Dust encloses less than 2⁻⁴⁰ (about 10⁻¹²) of
 //! what all closed surface of the result encloses: a cube of that volume has less than a ten-thousandth of the size of the model, a few
-//! hundredths of a millimetre for one of a hundred. Both volumes are sums of integers ([`crate::sums`]), so that the comparison depends neither on their
+//! hundredths of a millimetre for one of a hundred. Both volumes are sums of integers ([`crate::geometry::sums`]), so that the comparison depends neither on their
 //! order nor on where the model lies, and the share is a power of two. (The thickness of a crumb, by which flakes go, is no measure here: crumbs
 //! are as thick as the gaps that cutting closed, some steps of f32 and more.)
 //!
@@ -12,10 +12,10 @@
 use super::super::orient;
 use super::super::swallowed::take_away;
 use super::State;
-use crate::chunk::NONE;
-use crate::report::{Region, Rung};
-use crate::shop::Origin;
-use crate::shop::components::Components;
+use crate::contract::report::{Region, Rung};
+use crate::submesh::Origin;
+use crate::submesh::components::Components;
+use crate::util::union_find::NONE;
 
 /// Two to this power is how many times dust would have to be there to be all of the result.
 const SHARE: u32 = 40;

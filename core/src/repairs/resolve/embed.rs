@@ -9,11 +9,11 @@ use super::super::{collinear, duplicates};
 use super::cut::Cut;
 use super::sides::Sides;
 use super::{Failure, State, Stuck, Tried};
-use crate::chunk::NONE;
-use crate::defects;
-use crate::position::Position;
-use crate::shop::{Shop, Vertex, place};
-use crate::steps;
+use crate::detect::defects;
+use crate::geometry::position::Position;
+use crate::submesh::{Shop, Vertex, place};
+use crate::util::steps;
+use crate::util::union_find::NONE;
 
 /// What becomes of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! Crossings: bodies that cross each other, or themselves, become one.
 //!
-//! The triangles that cross something, and their neighbours, are cut along everything they meet ([`cut`], [`crate::arrange`]). Cells of space in
+//! The triangles that cross something, and their neighbours, are cut along everything they meet ([`cut`], [`crate::geometry::arrange`]). Cells of space in
 //! front of and behind their pieces, the other triangles of the workshop and the patches of sound surface are one where these join
 //! ([`sides`]); behind each of them the winding number is larger by one than in front. One exact winding number a connected surface (`bodies`)
 //! makes all of them known. Material is where the winding number is positive (Jacobson et al. 2013; Zhou et al. 2016): what has it on one
@@ -42,20 +42,20 @@ use super::orient;
 use super::overlay::Overlay;
 use super::regions::Unsettled;
 use super::work::Work;
-use crate::Progress;
-use crate::arrange::Arrange;
-use crate::boxes;
-use crate::chunk::{self, NONE};
-use crate::defects;
-use crate::error::{Error, Result};
-use crate::position::Position;
-use crate::report::Region;
-use crate::settings::{Bodies, Limits, Profile};
-use crate::shop::components::{Component, Components, Reversed};
-use crate::shop::{self, Origin, Shop, Triangle, Vertex};
-use crate::steps;
-use crate::sums::{Bounds, Extent};
-use crate::survey::{Division, Survey};
+use crate::contract::error::{Error, Result};
+use crate::contract::progress::Progress;
+use crate::contract::report::Region;
+use crate::contract::settings::{Bodies, Limits, Profile};
+use crate::detect::defects;
+use crate::geometry::arrange::Arrange;
+use crate::geometry::boxes;
+use crate::geometry::position::Position;
+use crate::geometry::sums::{Bounds, Extent};
+use crate::submesh::components::{Component, Components, Reversed};
+use crate::submesh::{Origin, Shop, Triangle, Vertex};
+use crate::topology::survey::{Division, Survey};
+use crate::util::steps;
+use crate::util::union_find::NONE;
 
 /// What was resolved.
 #[derive(Clone, Debug, Default)]
@@ -381,9 +381,10 @@ impl Clusters {
     fn pieces_of(&mut self, triangles: &[u32]) -> Vec<u32> {
         let pieces = triangles.iter().map(|t| self.of_triangle[*t as usize]).filter(|piece| *piece != NONE);
         let roots: BTreeSet<u32> =
-            pieces.collect::<Vec<_>>().into_iter().map(|piece| chunk::find(&mut self.parents, piece)).collect();
+            pieces.collect::<Vec<_>>().into_iter().map(|piece| crate::util::union_find::find(&mut self.parents, piece)).collect();
         let all = 0..self.parents.len() as u32;
-        all.filter(|piece| self.takes_part(*piece) && roots.contains(&chunk::find(&mut self.parents, *piece))).collect()
+        all.filter(|piece| self.takes_part(*piece) && roots.contains(&crate::util::union_find::find(&mut self.parents, *piece)))
+            .collect()
     }
 }
 
@@ -435,9 +436,10 @@ impl State<'_, '_, '_> {
             tracing::debug!(round = resolved.rounds, pairs = crossing.len(), triangles = triangles.len(), "Crossings.");
             let meetings = meetings(|t| Bounds::of(&self.work.points(t)), &crossing);
             let meetings = meetings.map_err(|worst| Stuck { failure: Failure::TooMany, triangles: vec![worst] })?;
-            let needed = shop::bytes(self.work.triangles.len() as u64, self.work.positions.len() as u64)
-                + meetings * BYTES_PER_MEETING
-                + crossing.len() as u64 * BYTES_PER_PAIR;
+            let needed =
+                crate::stream::budget::workshop_bytes(self.work.triangles.len() as u64, self.work.positions.len() as u64)
+                    + meetings * BYTES_PER_MEETING
+                    + crossing.len() as u64 * BYTES_PER_PAIR;
             if needed > limits.memory_bytes {
                 return Err(Halted::NoMemory { needed, triangles: triangles.len() });
             }
@@ -535,7 +537,7 @@ impl State<'_, '_, '_> {
     fn unite(&mut self, crossing: &[[u32; 2]]) {
         for pair in crossing {
             let [a, b] = pair.map(|t| self.clusters.of_triangle[t as usize]);
-            chunk::unite(&mut self.clusters.parents, a, b);
+            crate::util::union_find::unite(&mut self.clusters.parents, a, b);
         }
     }
 

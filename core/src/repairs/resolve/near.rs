@@ -15,10 +15,10 @@ use glam::DVec3;
 
 use super::passes::Passes;
 use super::{Met, State, Tried};
-use crate::chunk::NONE;
-use crate::position::Position;
-use crate::settings::Profile;
-use crate::shop::Vertex;
+use crate::contract::settings::Profile;
+use crate::geometry::position::Position;
+use crate::submesh::Vertex;
+use crate::util::union_find::NONE;
 
 /// What a pass changed.
 #[derive(Default)]

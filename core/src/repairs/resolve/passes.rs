@@ -24,7 +24,7 @@ impl Passes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::steps;
+    use crate::util::steps;
 
     #[test]
     fn passes_that_take_out_one_pair_each_look_at_pairs_in_proportion() {

@@ -14,10 +14,10 @@ use glam::DVec3;
 use super::near::nearest;
 use super::passes::Passes;
 use super::{Met, State, Tried};
-use crate::chunk::{self, NONE};
-use crate::fill::{self, Rim};
-use crate::settings::Profile;
-use crate::shop::{Origin, Shop, Vertex};
+use crate::algorithms::triangulate::{self, Rim};
+use crate::contract::settings::Profile;
+use crate::submesh::{Origin, Shop, Vertex};
+use crate::util::union_find::NONE;
 
 /// Rings of triangles around those that cross that are taken out with them, at most.
 const RINGS: usize = 3;
@@ -97,12 +97,12 @@ fn parts(shop: &Shop, region: &[u32]) -> Vec<Vec<u32>> {
     for (n, t) in (0..).zip(region) {
         for [a, b] in directed_edges(shop.triangles[*t as usize].v) {
             let first = *at_edge.entry([a.min(b), a.max(b)]).or_insert(n);
-            chunk::unite(&mut parents, first, n);
+            crate::util::union_find::unite(&mut parents, first, n);
         }
     }
     let mut parts: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for (n, t) in (0..).zip(region) {
-        parts.entry(chunk::find(&mut parents, n)).or_default().push(*t);
+        parts.entry(crate::util::union_find::find(&mut parents, n)).or_default().push(*t);
     }
     parts.into_values().collect()
 }
@@ -117,7 +117,7 @@ pub(in crate::repairs) fn refill_of(shop: &Shop, part: Vec<u32>, beside: &[u32],
     let mut patches = Vec::new();
     for rim in loops(part.iter().map(|t| shop.triangles[*t as usize].v)) {
         let points: Vec<[f32; 3]> = rim.iter().map(|v| shop.positions[*v as usize]).collect();
-        let patch = fill::unchecked(&Rim { points: &points, apexes: &[], obstacles: &[], forbidden: &|_, _| false });
+        let patch = triangulate::unchecked(&Rim { points: &points, apexes: &[], obstacles: &[], forbidden: &|_, _| false });
         // What is on one line comes to nothing, however it is divided.
         let fan = || (1..rim.len() as u32 - 1).map(|n| [0, n, n + 1]).collect();
         let triangles: Vec<[u32; 3]> = patch.map_or_else(fan, |patch| patch.triangles);

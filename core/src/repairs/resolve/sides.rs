@@ -8,11 +8,11 @@ use super::super::orient;
 use super::super::work::Work;
 use super::Clusters;
 use super::cut::Cut;
-use crate::bodies::{self, INNER_POINT};
-use crate::chunk::{self, NONE};
-use crate::shop::Shop;
-use crate::shop::components::Reversed;
-use crate::survey::Survey;
+use crate::detect::bodies::{self, INNER_POINT};
+use crate::submesh::Shop;
+use crate::submesh::components::Reversed;
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
 
 /// The cells of space in front of and behind everything closed.
 ///
@@ -94,8 +94,8 @@ impl Sides {
     }
 
     fn join(&mut self, a: [u32; 2], b: [u32; 2]) {
-        chunk::unite(&mut self.parents, a[0], b[0]);
-        chunk::unite(&mut self.parents, a[1], b[1]);
+        crate::util::union_find::unite(&mut self.parents, a[0], b[0]);
+        crate::util::union_find::unite(&mut self.parents, a[1], b[1]);
     }
 
     /// The winding number at each node whose cell the cut surface tells of; `None` at others, and where that contradicts itself.
@@ -111,7 +111,7 @@ impl Sides {
         let pieces = orient::pieces(survey, work, reversed);
         let shop: &Shop = work;
         let mut parents = self.parents.clone();
-        let roots: Vec<u32> = (0..parents.len() as u32).map(|node| chunk::find(&mut parents, node)).collect();
+        let roots: Vec<u32> = (0..parents.len() as u32).map(|node| crate::util::union_find::find(&mut parents, node)).collect();
         let root = |node: u32| roots[node as usize];
         let mut steps: Vec<(u32, u32, i32)> = Vec::with_capacity(2 * self.steps.len());
         for (front, back, step) in &self.steps {

@@ -14,11 +14,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::{DMat3, DVec3};
 
 use super::{Clusters, Met, State, Tried};
-use crate::chunk::NONE;
-use crate::position::Position;
-use crate::settings::Profile;
-use crate::shop::Vertex;
-use crate::shop::components::{Components, Through};
+use crate::contract::settings::Profile;
+use crate::geometry::position::Position;
+use crate::submesh::Vertex;
+use crate::submesh::components::{Components, Through};
+use crate::util::union_find::NONE;
 
 /// By how many steps of new vertices bodies are spread at first, and the next time.
 const STEPS: [f64; 2] = [8.0, 64.0];

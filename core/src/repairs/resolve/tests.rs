@@ -7,10 +7,10 @@ use proptest::prelude::*;
 
 use super::super::duplicates;
 use super::*;
-use crate::Quiet;
-use crate::arrange::Rational;
-use crate::report::Rung;
-use crate::settings::Limits;
+use crate::contract::progress::Quiet;
+use crate::contract::report::Rung;
+use crate::contract::settings::Limits;
+use crate::geometry::arrange::Rational;
 use crate::testing::{After, Corners, after, cube, cuboid, diagnose, records, reversed, shifted};
 
 fn resolved_by(triangles: &[Corners], profile: &Profile) -> After<Resolved> {

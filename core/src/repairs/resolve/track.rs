@@ -3,11 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Clusters;
-use crate::chunk;
-use crate::report::{Region, Rung};
-use crate::shop::Shop;
-use crate::steps;
-use crate::sums::Bounds;
+use crate::contract::report::{Region, Rung};
+use crate::geometry::sums::Bounds;
+use crate::submesh::Shop;
+use crate::util::steps;
 
 /// What was done to one piece of surface, or to several.
 #[derive(Clone, Copy)]
@@ -103,7 +102,7 @@ impl Track {
     pub(super) fn regions(&self, clusters: &mut Clusters) -> Vec<Region> {
         let mut by_cluster: BTreeMap<u32, Done> = BTreeMap::new();
         for (piece, done) in &self.0 {
-            by_cluster.entry(chunk::find(&mut clusters.parents, *piece)).or_insert(Done::NOTHING).add(done);
+            by_cluster.entry(crate::util::union_find::find(&mut clusters.parents, *piece)).or_insert(Done::NOTHING).add(done);
         }
         let rung = |done: &Done| match done {
             Done { refilled: true, .. } => Rung::Refilled,

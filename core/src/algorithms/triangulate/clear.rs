@@ -1,0 +1,92 @@
+//! Which triangles a valid patch may have at all, as far as the loop and the mesh around it can tell.
+
+use super::Rim;
+use super::boxes::{Boxes, around, join};
+use crate::geometry::exact::{Plane, collinear};
+use crate::geometry::tri_tri::{do_cross, segment_pierces};
+
+/// Triangles looked at for one loop, divided by how many obstacles each is held against; beyond, none is known to be clear.
+const WORK: u32 = 1_000_000;
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Known {
+    Nothing,
+    Clear,
+    Not,
+}
+
+/// Number of a set of three, given ascending, in the combinatorial number system: those below k fill C(k, 3) places.
+fn rank(triangle: [u32; 3]) -> usize {
+    let [i, m, k] = triangle.map(|v| v as usize);
+    i + m * m.saturating_sub(1) / 2 + k * k.saturating_sub(1) * k.saturating_sub(2) / 6
+}
+
+/// The triangles between a loop's vertices through which neither rim nor neighbouring triangles of the mesh pass: no valid
+/// patch has another. Each is looked at once, however many triangulations ask.
+pub(super) struct Clearance<'a> {
+    rim: &'a Rim<'a>,
+    /// For each rim edge: the edge and the mesh's triangle beyond.
+    boxes: Boxes,
+    /// By the rank of the triangle among all.
+    known: Vec<Known>,
+    work: u32,
+    /// A triangle was refused because of the mesh.
+    pub(super) mesh_in_the_way: bool,
+}
+
+impl<'a> Clearance<'a> {
+    pub(super) fn new(rim: &'a Rim<'a>) -> Self {
+        let n = rim.len();
+        let boxes = Boxes::new((0..n).map(|i| {
+            let edge = around(&[rim.points[i], rim.points[(i + 1) % n]]);
+            rim.neighbour(i).map_or(edge, |t| join(&edge, &around(&t)))
+        }));
+        Self { rim, boxes, known: Vec::new(), work: WORK / (1 + rim.obstacles.len() as u32), mesh_in_the_way: false }
+    }
+
+    /// Corners ascending.
+    pub(super) fn is_clear(&mut self, triangle: [u32; 3]) -> bool {
+        let n = self.rim.len();
+        if self.known.is_empty() {
+            self.known = vec![Known::Nothing; n * (n - 1) * (n - 2) / 6];
+        }
+        let rank = rank(triangle);
+        if self.known[rank] == Known::Nothing && self.work > 0 {
+            self.work -= 1;
+            self.known[rank] = if self.look(triangle) { Known::Clear } else { Known::Not };
+        }
+        self.known[rank] == Known::Clear
+    }
+
+    fn look(&mut self, triangle: [u32; 3]) -> bool {
+        let rim = self.rim;
+        let corners = rim.corners(triangle);
+        let bounds = around(&corners);
+        let next = |i: usize| (i + 1) % rim.len();
+        // Most of what is near lies clearly on one side.
+        let plane = Plane::new(&corners[0], &corners[1], &corners[2]);
+        let pierces = |i: usize| {
+            let (a, b) = (rim.points[i], rim.points[next(i)]);
+            !plane.has_on_one_side(&[a, b]) && segment_pierces(&a, &b, &corners)
+        };
+        if collinear(&corners[0], &corners[1], &corners[2]) || self.boxes.any_near(&bounds, pierces) {
+            return false;
+        }
+        let meets = |i: usize| rim.neighbour(i).is_some_and(|t| !plane.has_on_one_side(&t) && do_cross(&corners, &t));
+        let meets_mesh = self.boxes.any_near(&bounds, meets) || rim.meets_obstacle(&corners);
+        self.mesh_in_the_way |= meets_mesh;
+        !meets_mesh
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rank;
+
+    #[test]
+    fn every_triangle_has_its_own_place_and_no_place_is_empty() {
+        let all = (2..9).flat_map(|k| (1..k).flat_map(move |m| (0..m).map(move |i| [i, m, k])));
+        let ranks: Vec<usize> = all.map(rank).collect();
+        assert_eq!(ranks, (0..9 * 8 * 7 / 6).collect::<Vec<_>>());
+    }
+}

@@ -1,0 +1,482 @@
+//! Closing one boundary loop with triangles between its vertices.
+//!
+//! A loop of n vertices takes n − 2 triangles and no new vertex: a triangulated polygon. The first patch that stands the exact
+//! tests of `Rim::accepts` wins. Tried are, in this order: the triangle itself; a constrained Delaunay triangulation in the
+//! plane of a nearly planar loop (`planar`); for loops of some hundred vertices the minimum-weight triangulation by dynamic
+//! programming (`minweight`), for larger ones an advancing front (`front`); where these cross themselves, another weight, the
+//! projection of a loop that is not planar, for small loops the front, and at last, for very small ones, any patch (`search`).
+//!
+//! Floating point only ever ranks patches; whether one is valid is decided with exact predicates. Every ranking uses
+//! + − × ÷ √ alone and every bound of work is a count, so results are the same everywhere.
+
+mod boxes;
+mod clear;
+pub(crate) mod flips;
+mod front;
+mod minweight;
+mod planar;
+mod search;
+pub(crate) mod strip;
+
+use crate::geometry::exact::{Point, at, collinear};
+use crate::geometry::position::Position;
+use crate::geometry::self_crossing::{SelfCrossing, self_crossing};
+use crate::geometry::tri_tri::{Contact, Triangle, common, do_cross, self_intersection, triangles_cross};
+use boxes::{Boxes, EMPTY, around};
+use clear::Clearance;
+use flips::Flips;
+use front::Order;
+use glam::DVec3;
+use minweight::{Choice, Weight};
+pub(crate) use planar::directed_area;
+
+/// A boundary loop and what its patch must respect.
+pub(crate) struct Rim<'a> {
+    /// Distinct finite positions, in the direction in which the patch traverses the loop: rim edge i runs from vertex i to
+    /// vertex i + 1 (the last one back to 0).
+    pub points: &'a [Point],
+    /// For each rim edge the third corner of the mesh's triangle on its other side, where known; may be shorter than the loop.
+    /// The patch then crosses none of these triangles, does not fold back flat onto them, and bends little against them.
+    pub apexes: &'a [Option<Point>],
+    /// Other triangles of the mesh that the patch must not cross.
+    pub obstacles: &'a [Triangle],
+    /// Is the chord between these two vertices (smaller index first) an edge of the mesh already? Never asked of rim edges.
+    pub forbidden: &'a dyn Fn(u32, u32) -> bool,
+}
+
+/// Bounds of the methods. They decide results, so they are part of what makes a repair repeatable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct FillSettings {
+    /// A loop is nearly planar when the root mean square of its vertices' distances from its plane is at most this share of the
+    /// square root of the area that it encloses in projection. (A circle of radius r: 0.02 allows 0.035 r.)
+    pub planar_deviation: f64,
+    /// Largest loop for the minimum-weight triangulation: O(n³) time, O(n²) memory.
+    pub minimum_weight_vertices: usize,
+    /// Largest loop at all.
+    pub max_vertices: usize,
+}
+
+impl Default for FillSettings {
+    fn default() -> Self {
+        Self { planar_deviation: 0.02, minimum_weight_vertices: 300, max_vertices: 100_000 }
+    }
+}
+
+/// How a patch was made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Method {
+    /// The loop has three vertices.
+    Triangle,
+    /// Constrained Delaunay triangulation in the loop's plane.
+    Planar,
+    /// Dynamic programming for the least bend, then the least area.
+    MinimumWeight,
+    /// Dynamic programming for the least area.
+    LeastArea,
+    /// Ear clipping, with the last vertices by minimum weight.
+    Front,
+    /// As planar, for a loop far from planar that is a simple polygon in projection.
+    Projected,
+    /// Any valid triangulation of a small loop.
+    Search,
+    /// A strip between the two sides of a narrow loop.
+    Zipped,
+}
+
+impl Method {
+    /// Name for reports.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Triangle => "triangle",
+            Self::Planar => "planar",
+            Self::MinimumWeight => "minimum_weight",
+            Self::LeastArea => "least_area",
+            Self::Front => "front",
+            Self::Projected => "projected",
+            Self::Search => "search",
+            Self::Zipped => "zipped",
+        }
+    }
+}
+
+/// Triangles that close a loop.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Patch {
+    /// Vertex indices; each triangle begins with its smallest, and they are sorted.
+    pub triangles: Vec<[u32; 3]>,
+    pub method: Method,
+}
+
+/// Why a loop was not closed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum Unfillable {
+    /// Fewer than three vertices, a position that occurs twice, or a coordinate that is not finite.
+    #[error("not a loop of distinct finite vertices")]
+    NotALoop,
+    /// All vertices lie exactly on one line: any triangle would have zero area. Split the neighbours instead.
+    #[error("all vertices lie on one line")]
+    Collinear,
+    /// More vertices than the settings allow, or too many for the methods that were left to try.
+    #[error("too many vertices")]
+    TooLarge,
+    /// Every patch tried crosses itself.
+    #[error("every patch tried crosses itself")]
+    CrossesItself,
+    /// Chords that are edges of the mesh already, or the triangles around the loop, leave no patch that was tried.
+    #[error("edges or triangles of the mesh around are in the way of every patch tried")]
+    Blocked,
+}
+
+/// Closes one loop.
+///
+/// For each patch returned holds, exactly: it is a disc with the loop as its border; no triangle has zero area; no chord is
+/// forbidden; it neither crosses nor overlaps itself, nor any of the mesh's triangles along the rim (other triangles of the mesh
+/// are the caller's to test). Time: O(n log n) if nearly planar, O(n³) up to [`FillSettings::minimum_weight_vertices`], about
+/// O(n log n) beyond.
+pub(crate) fn triangulate(rim: &Rim<'_>, settings: &FillSettings) -> Result<Patch, Unfillable> {
+    if !rim.is_loop() {
+        return Err(Unfillable::NotALoop);
+    }
+    if rim.len() > settings.max_vertices {
+        return Err(Unfillable::TooLarge);
+    }
+    if rim.on_one_line() {
+        return Err(Unfillable::Collinear);
+    }
+    if rim.len() == 3 {
+        let only = [0, 1, 2];
+        return if rim.admits(only) && !rim.meets_obstacle(&rim.corners(only)) {
+            Ok(Patch { triangles: vec![only], method: Method::Triangle })
+        } else {
+            Err(Unfillable::Blocked)
+        };
+    }
+    by_methods(rim, settings)
+}
+
+/// Any triangulation of a loop: it may cross itself and everything else. `None` for what is no loop, too large or on one line.
+pub(crate) fn unchecked(rim: &Rim<'_>) -> Option<Patch> {
+    let most = FillSettings::default().minimum_weight_vertices;
+    if !rim.is_loop() || rim.on_one_line() || rim.len() > FillSettings::default().max_vertices {
+        return None;
+    }
+    if rim.len() <= most {
+        let triangles = minweight::triangulate(rim, Weight::Area, Choice::Any).ok()?;
+        return Some(patch(triangles, Method::LeastArea));
+    }
+    front::triangulate(rim, Order::Chord, most).ok().map(|triangles| patch(triangles, Method::Front))
+}
+
+/// Closes a loop around others, the rims of islands in it, which run the other way round: triangles over the vertices of all, one loop
+/// after the other. `joined`: is there an edge of the mesh between vertices of two loops already?
+///
+/// Valid as a patch of [`triangulate`] is, but for its topology: a disc with a hole for each island. O(n log n), or what [`strip::bridge`] takes
+/// for the only one.
+pub(crate) fn around_islands(rims: &[&Rim<'_>], joined: &dyn Fn(u32, u32) -> bool) -> Result<Vec<[u32; 3]>, Unfillable> {
+    let points: Vec<Point> = rims.iter().flat_map(|rim| rim.points).copied().collect();
+    let sizes: Vec<usize> = rims.iter().map(|rim| rim.len()).collect();
+    if sizes.iter().any(|size| *size < 3) || u32::try_from(points.len()).is_err() || !are_distinct(&points) {
+        return Err(Unfillable::NotALoop);
+    }
+    let owners: Vec<(usize, u32)> =
+        sizes.iter().enumerate().flat_map(|(rim, size)| (0..*size as u32).map(move |i| (rim, i))).collect();
+    let allows = |a: u32, b: u32| {
+        let ((rim, i), (other, j)) = (owners[a as usize], owners[b as usize]);
+        if rim == other { rims[rim].allows(i, j) } else { !joined(a.min(b), a.max(b)) }
+    };
+    let beyond = rims.iter().flat_map(|rim| (0..rim.len()).map(|i| rim.neighbour(i))).collect();
+    let around = Surroundings::new(&points, beyond, &allows);
+    let checked = |triangles: Vec<[u32; 3]>| {
+        if !triangles.iter().all(|t| around.admits(t)) {
+            return Err(Fault::Inadmissible);
+        }
+        crosses_itself(&points, &triangles).map(|()| in_order(triangles))
+    };
+    match (planar::between(&points, &sizes).map(checked), rims) {
+        (Some(Ok(triangles)), _) => Ok(triangles),
+        (_, [outer, inner]) => strip::bridge([outer, inner], joined),
+        (Some(Err(fault)), _) => Err(fault.into()),
+        (None, _) => Err(Unfillable::Blocked),
+    }
+}
+
+/// Closes a loop that is in some places more than once, as it walks around islands that touch it: the copies of a place are one vertex of
+/// the mesh. Valid as a patch of [`triangulate`] is; no two chords lie between the same places. O(n³), and not for more vertices than
+/// [`FillSettings::minimum_weight_vertices`].
+pub(crate) fn pinched(rim: &Rim<'_>) -> Result<Vec<[u32; 3]>, Unfillable> {
+    if rim.len() > FillSettings::default().minimum_weight_vertices {
+        return Err(Unfillable::TooLarge);
+    }
+    let place = |i: u32| Position::of(rim.points[i as usize]);
+    let forbidden = |i: u32, j: u32| place(i) == place(j) || (rim.forbidden)(i, j);
+    let rim = &Rim { points: rim.points, apexes: rim.apexes, obstacles: rim.obstacles, forbidden: &forbidden };
+    let mut clearance = Clearance::new(rim);
+    let mut attempt = |weight| match rim.len() {
+        ..=PINCHED_THOROUGH => by_weight(rim, weight, &mut clearance).ok(),
+        _ => minweight::triangulate(rim, weight, Choice::Any).ok().filter(|made| rim.accepts(made, false).is_ok()),
+    };
+    let triangles = attempt(Weight::Bend).or_else(|| attempt(Weight::Area)).ok_or(Unfillable::Blocked)?;
+    if runs_once(&triangles, place) { Ok(in_order(triangles)) } else { Err(Unfillable::Blocked) }
+}
+
+/// Does no edge between two places have two triangles on one side?
+fn runs_once<P: Ord>(triangles: &[[u32; 3]], place: impl Fn(u32) -> P) -> bool {
+    let mut sides: Vec<[P; 2]> = triangles.iter().flat_map(|t| [0, 1, 2].map(|k| [place(t[k]), place(t[(k + 1) % 3])])).collect();
+    sides.sort_unstable();
+    sides.windows(2).all(|w| w[0] != w[1])
+}
+
+/// No way of [`pinched`] of more vertices is triangulated from clear triangles only: there are other ways to close what it is made of.
+const PINCHED_THOROUGH: usize = 100;
+
+/// Tries what there is for more than three vertices.
+fn by_methods(rim: &Rim<'_>, settings: &FillSettings) -> Result<Patch, Unfillable> {
+    const SMALL: [Method; 6] =
+        [Method::Planar, Method::MinimumWeight, Method::LeastArea, Method::Projected, Method::Front, Method::Search];
+    const LARGE: [Method; 3] = [Method::Planar, Method::Front, Method::Projected];
+    let small = rim.len() <= settings.minimum_weight_vertices;
+    let mut clearance = Clearance::new(rim);
+    let mut reason = Unfillable::Blocked;
+    for &method in if small { &SMALL[..] } else { &LARGE[..] } {
+        let made = match method {
+            Method::Planar => by_projection(rim, settings.planar_deviation),
+            Method::Projected => by_projection(rim, f64::INFINITY),
+            Method::MinimumWeight => by_weight(rim, Weight::Bend, &mut clearance),
+            Method::LeastArea => by_weight(rim, Weight::Area, &mut clearance),
+            Method::Front => by_front(rim, settings.minimum_weight_vertices),
+            Method::Search if rim.len() <= SEARCH_VERTICES => by_search(rim, &mut clearance),
+            Method::Search | Method::Triangle | Method::Zipped => Err(Unfillable::Blocked),
+        };
+        match made {
+            Ok(triangles) => return Ok(patch(triangles, method)),
+            // What a patch that was made came to grief on says more than that another could not be made; the first method says
+            // it best, and none says of a small loop that it is too large.
+            Err(other) if reason == Unfillable::Blocked && !(small && other == Unfillable::TooLarge) => reason = other,
+            Err(_) => {}
+        }
+    }
+    Err(reason)
+}
+
+fn by_projection(rim: &Rim<'_>, max_deviation: f64) -> Result<Vec<[u32; 3]>, Unfillable> {
+    let triangles = planar::triangulate(rim, max_deviation).ok_or(Unfillable::Blocked)?;
+    // What is nearly planar is as smooth as it gets.
+    if max_deviation == f64::INFINITY
+        && let Some(smooth) = smoothed(rim, &triangles)
+    {
+        return Ok(smooth);
+    }
+    rim.accepts(&triangles, true)?;
+    Ok(triangles)
+}
+
+/// The patch with fewer sharp bends, if that is valid.
+fn smoothed(rim: &Rim<'_>, triangles: &[[u32; 3]]) -> Option<Vec<[u32; 3]>> {
+    let mut mesh = Flips::new(rim, triangles.to_vec());
+    mesh.smooth();
+    rim.accepts(mesh.triangles(), false).is_ok().then(|| mesh.into_triangles())
+}
+
+/// The best patch; where it is not valid, the best of clear triangles; where that crosses itself, again without the larger of
+/// two triangles that cross, some times.
+fn by_weight(rim: &Rim<'_>, weight: Weight, clearance: &mut Clearance<'_>) -> Result<Vec<[u32; 3]>, Unfillable> {
+    let triangles = minweight::triangulate(rim, weight, Choice::Any)?;
+    if rim.accepts(&triangles, false).is_ok() {
+        return Ok(triangles);
+    }
+    let mut banned = Vec::new();
+    loop {
+        let triangles = minweight::triangulate(rim, weight, Choice::Clear(clearance, &banned))?;
+        let crossing = match rim.accepts(&triangles, false) {
+            Ok(()) => return Ok(triangles),
+            Err(Fault::Crossing(i, j)) if banned.len() < BAN_WORK / rim.len() => [triangles[i], triangles[j]],
+            Err(fault) => return Err(fault.into()),
+        };
+        banned.push(if rim.area(crossing[0]) > rim.area(crossing[1]) { crossing[0] } else { crossing[1] });
+    }
+}
+
+/// A loop of n vertices is triangulated anew up to this / n times.
+const BAN_WORK: usize = 600;
+
+fn by_front(rim: &Rim<'_>, max_rest: usize) -> Result<Vec<[u32; 3]>, Unfillable> {
+    let attempt = |order| {
+        let triangles = front::triangulate(rim, order, max_rest)?;
+        if let Some(smooth) = smoothed(rim, &triangles) {
+            return Ok(smooth);
+        }
+        rim.accepts(&triangles, false)?;
+        Ok(triangles)
+    };
+    attempt(Order::Chord).or_else(|_: Unfillable| attempt(Order::Angle))
+}
+
+fn by_search(rim: &Rim<'_>, clearance: &mut Clearance<'_>) -> Result<Vec<[u32; 3]>, Unfillable> {
+    // Why nothing was found the other methods say better.
+    let triangles = search::triangulate(rim, clearance).ok_or(Unfillable::Blocked)?;
+    rim.accepts(&triangles, false)?;
+    Ok(triangles)
+}
+
+/// Largest loop that is searched for any valid triangulation at all.
+const SEARCH_VERTICES: usize = 24;
+
+/// What is wrong with a triangulation.
+enum Fault {
+    /// A triangle or chord that the rim does not admit.
+    Inadmissible,
+    /// Two triangles cross.
+    Crossing(usize, usize),
+    /// Too crowded to tell.
+    Undecided,
+}
+
+impl From<Fault> for Unfillable {
+    fn from(fault: Fault) -> Self {
+        match fault {
+            Fault::Inadmissible => Self::Blocked,
+            Fault::Crossing(..) => Self::CrossesItself,
+            Fault::Undecided => Self::TooLarge,
+        }
+    }
+}
+
+fn patch(triangles: Vec<[u32; 3]>, method: Method) -> Patch {
+    Patch { triangles: in_order(triangles), method }
+}
+
+/// Each from its smallest vertex, and sorted.
+fn in_order(mut triangles: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
+    for t in &mut triangles {
+        let first = (0..3).min_by_key(|&k| t[k]).unwrap_or(0);
+        t.rotate_left(first);
+    }
+    triangles.sort_unstable();
+    triangles
+}
+
+impl Rim<'_> {
+    fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    fn is_loop(&self) -> bool {
+        self.len() >= 3 && u32::try_from(self.len()).is_ok() && are_distinct(self.points)
+    }
+
+    fn on_one_line(&self) -> bool {
+        self.points.iter().skip(2).all(|p| collinear(&self.points[0], &self.points[1], p))
+    }
+
+    pub(crate) fn corners(&self, t: [u32; 3]) -> [Point; 3] {
+        t.map(|v| self.points[v as usize])
+    }
+
+    fn area(&self, t: [u32; 3]) -> f64 {
+        let [a, b, c] = self.corners(t).map(|p| at(&p));
+        0.5 * (b - a).cross(c - a).length()
+    }
+
+    /// The mesh's triangle beyond rim edge `i`, as the mesh turns it.
+    fn neighbour(&self, i: usize) -> Option<Triangle> {
+        let apex = self.apexes.get(i).copied().flatten().filter(|a| a.iter().all(|x| x.is_finite()))?;
+        Some([self.points[(i + 1) % self.len()], self.points[i], apex])
+    }
+
+    /// Its unit normal; zero where there is none.
+    fn normal_beyond(&self, i: usize) -> DVec3 {
+        self.neighbour(i).map_or(DVec3::ZERO, |t| {
+            let [a, b, c] = t.map(|p| at(&p));
+            (b - a).cross(c - a).normalize_or_zero()
+        })
+    }
+
+    /// The rim edge from `a` to `b`, by its number.
+    fn rim_edge(&self, a: u32, b: u32) -> Option<usize> {
+        let (a, b) = (a as usize, b as usize);
+        (b == (a + 1) % self.len()).then_some(a)
+    }
+
+    /// May the patch have an edge between `a` and `b`?
+    fn allows(&self, a: u32, b: u32) -> bool {
+        self.rim_edge(a, b).is_some() || self.rim_edge(b, a).is_some() || !(self.forbidden)(a.min(b), a.max(b))
+    }
+
+    /// Has the triangle an area, and is it not folded flat onto the mesh's triangle beyond one of its rim edges?
+    fn admits(&self, t: [u32; 3]) -> bool {
+        let corners = self.corners(t);
+        !collinear(&corners[0], &corners[1], &corners[2])
+            && (0..3).all(|k| {
+                let neighbour = self.rim_edge(t[k], t[(k + 1) % 3]).and_then(|i| self.neighbour(i));
+                neighbour.is_none_or(|beyond| triangles_cross(&corners, &beyond) != Contact::Overlap)
+            })
+    }
+
+    pub(crate) fn meets_obstacle(&self, corners: &Triangle) -> bool {
+        self.obstacles.iter().any(|other| do_cross(corners, other))
+    }
+
+    /// Is this triangulation of the polygon valid: every triangle with an area and clear of the obstacles and the mesh's triangles along the rim,
+    /// every chord allowed, and nothing crosses or folds onto itself? `graph`: it is known to be a graph over a plane, which cannot
+    /// cross itself.
+    fn accepts(&self, triangles: &[[u32; 3]], graph: bool) -> Result<(), Fault> {
+        let beyond = (0..self.apexes.len().min(self.len())).map(|i| self.neighbour(i)).collect();
+        let allows = |a: u32, b: u32| self.allows(a, b);
+        let around = Surroundings::new(self.points, beyond, &allows);
+        if !triangles.iter().all(|t| around.admits(t) && !self.meets_obstacle(&self.corners(*t))) {
+            return Err(Fault::Inadmissible);
+        }
+        if graph { Ok(()) } else { crosses_itself(self.points, triangles) }
+    }
+}
+
+/// What a patch between one rim or several must respect.
+struct Surroundings<'a> {
+    points: &'a [Point],
+    /// The mesh's triangles along the rims.
+    beyond: Vec<Option<Triangle>>,
+    boxes: Boxes,
+    /// May the patch have an edge between two vertices?
+    allows: &'a dyn Fn(u32, u32) -> bool,
+}
+
+impl<'a> Surroundings<'a> {
+    fn new(points: &'a [Point], beyond: Vec<Option<Triangle>>, allows: &'a dyn Fn(u32, u32) -> bool) -> Self {
+        let boxes = Boxes::new(beyond.iter().map(|t| t.map_or(EMPTY, |t| around(&t))));
+        Self { points, beyond, boxes, allows }
+    }
+
+    /// Has the triangle an area, is it clear of the mesh's triangles, and are its edges allowed? Exact.
+    fn admits(&self, t: &[u32; 3]) -> bool {
+        let corners = t.map(|v| self.points[v as usize]);
+        // Whether neighbours touch or are apart does not matter, and is what takes longest to tell.
+        let crosses = |other: Triangle| self_intersection(&corners, &other, common(&corners, &other)).is_some();
+        !collinear(&corners[0], &corners[1], &corners[2])
+            && (0..3).all(|k| (self.allows)(t[k], t[(k + 1) % 3]))
+            && !self.boxes.any_near(&around(&corners), |i| self.beyond[i].is_some_and(crosses))
+    }
+}
+
+/// Are all positions finite, and no two of them equal?
+fn are_distinct(points: &[Point]) -> bool {
+    if !points.as_flattened().iter().all(|x| x.is_finite()) {
+        return false;
+    }
+    let mut sorted: Vec<Position> = points.iter().copied().map(Position::of).collect();
+    sorted.sort_unstable();
+    sorted.windows(2).all(|w| w[0] != w[1])
+}
+
+/// Does any triangle cross another or fold onto it? Each has an area. Exact.
+fn crosses_itself(points: &[Point], triangles: &[[u32; 3]]) -> Result<(), Fault> {
+    let solid: Vec<Triangle> = triangles.iter().map(|t| t.map(|v| points[v as usize])).collect();
+    // Enough for any patch but one great fan after the other; a bound by count, so the same everywhere.
+    match self_crossing(&solid, 2_000_000 + 500 * solid.len() as u64) {
+        SelfCrossing::None => Ok(()),
+        SelfCrossing::Pair(i, j) => Err(Fault::Crossing(i, j)),
+        SelfCrossing::Undecided => Err(Fault::Undecided),
+    }
+}
+
+#[cfg(test)]
+mod tests;

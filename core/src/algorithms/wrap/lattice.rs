@@ -1,0 +1,531 @@
+//! The lattice, its points and cubes, and the surface in it.
+//!
+//! Points go by their place in half cubes: corners have even coordinates, centres odd ones.
+
+use std::collections::{HashMap, HashSet};
+use std::hash::{BuildHasherDefault, Hasher};
+
+use glam::DVec3;
+
+use super::tree::{Corners, Tree};
+use crate::geometry::sums::Bounds;
+use crate::submesh::place;
+use crate::util::parallel;
+
+/// A wrapped surface.
+pub(crate) struct Wrapping {
+    pub(crate) triangles: Vec<Corners>,
+    /// Edge of a cube of the lattice, in the file's units.
+    pub(crate) cell: f64,
+    /// What it encloses, in the file's units, cubed.
+    pub(crate) volume: f64,
+}
+
+/// The lattice is never finer than this share of the diagonal, nor coarser than that, but for what f32 can hold.
+const FINEST: f64 = 1.0 / 1024.0;
+const COARSEST: f64 = 1.0 / 128.0;
+/// Cubes that a surface goes through, in squares of their side: what a plane does at most, about.
+const CUBES_A_SQUARE: f64 = 2.0;
+/// Steps of an edge's share of its length, at least: no vertex lies nearer to its ends than one of so many.
+const LEAST_STEPS: i64 = 16;
+/// Half a cube's side is at least two to this many steps, and at most two to that many.
+const STEP_BITS: [i32; 2] = [4, 10];
+/// Cubes that are looked at for each that was asked for, at most.
+const MOST_LOOKED_AT: usize = 16;
+/// Cubes around the box of the triangles.
+const MARGIN: i64 = 2;
+/// Points or cubes that a thread takes at a time.
+const BLOCK: usize = 512;
+
+/// Wraps the surface that winds around something; `tree` is made of the same triangles by [`Tree::winding`]. The lattice is chosen so that about
+/// `cubes` of it hold the surface. Deterministic, whatever `threads` says. `None` if there is no area, or the lattice would be finer than f32
+/// can tell apart there, or goes on and on. O(cubes · log triangles); about 200 bytes a cube.
+pub(crate) fn wrap(triangles: &[Corners], tree: &Tree, cubes: u32, threads: usize) -> Option<Wrapping> {
+    let lattice = Lattice::of(triangles, f64::from(cubes))?;
+    let field = Field::follow(triangles, tree, &lattice, cubes as usize * MOST_LOOKED_AT, threads)?;
+    let polygons = field.polygons(threads);
+    let mut names: Vec<u64> = polygons.iter().flatten().copied().filter(|name| *name != NO_EDGE).collect();
+    names.sort_unstable();
+    names.dedup();
+    let blocks = parallel::map(threads, names.len().div_ceil(BLOCK), |block| {
+        let names = &names[block * BLOCK..names.len().min((block + 1) * BLOCK)];
+        names.iter().map(|name| field.vertex(tree, *name)).collect::<Vec<_>>()
+    });
+    let vertices: Vec<[i64; 3]> = blocks.into_iter().flatten().collect();
+    let blocks = parallel::map(threads, polygons.len().div_ceil(BLOCK), |block| {
+        let mut halves = Vec::new();
+        for polygon in &polygons[block * BLOCK..polygons.len().min((block + 1) * BLOCK)] {
+            let number = |name: &u64| names.partition_point(|other| other < name) as u32;
+            cut(polygon.iter().filter(|name| **name != NO_EDGE).map(number).collect(), &vertices, &mut halves);
+        }
+        halves
+    });
+    let faces: Vec<[u32; 3]> = blocks.into_iter().flatten().collect();
+    drop((polygons, names));
+    let (faces, volume) = drop_specks(&faces, &vertices, lattice.half as f64 * 2.0);
+    let positions: Vec<[f32; 3]> = vertices.iter().map(|v| lattice.position(*v)).collect();
+    Some(Wrapping {
+        triangles: faces.iter().map(|f| f.map(|v| positions[v as usize])).collect(),
+        cell: 2.0 * lattice.half as f64 * lattice.step,
+        volume: volume * lattice.step * lattice.step * lattice.step,
+    })
+}
+
+/// Where points are. Coordinates of vertices are whole numbers of steps.
+struct Lattice {
+    /// A power of two, in the file's units.
+    step: f64,
+    /// Half a cube's side, in steps: a power of two.
+    half: i64,
+    /// Of the point 0, 0, 0.
+    origin: [i64; 3],
+    /// Points with coordinates beyond these are outside.
+    hi: [u32; 3],
+}
+
+impl Lattice {
+    fn of(triangles: &[Corners], cubes: f64) -> Option<Self> {
+        let mut bounds = Bounds::EMPTY;
+        let mut area = 0.0;
+        for t in triangles {
+            bounds.include(t);
+            let [a, b, c] = t.map(place);
+            area += (b - a).cross(c - a).length() / 2.0;
+        }
+        let (diagonal, largest) = (bounds.diagonal(), f64::from(bounds.largest_coordinate()));
+        if area.is_nan() || area <= 0.0 {
+            return None;
+        }
+        let wanted = (CUBES_A_SQUARE * area / cubes).sqrt().max(FINEST * diagonal).min(COARSEST * diagonal);
+        let (side, bits, exponent) = (log2_up(wanted)..)
+            .take_while(|side| power_of_two(*side) <= diagonal && largest + 16.0 * power_of_two(*side) < f64::from(f32::MAX))
+            .find_map(|side| {
+                // Up to what margin and origin may add to a coordinate.
+                let exact = log2_up(largest + 16.0 * power_of_two(side)) - 24;
+                let exponent = exact.max(-149).max(side - 1 - STEP_BITS[1]);
+                let bits = side - 1 - exponent;
+                (bits >= STEP_BITS[0]).then_some((power_of_two(side), bits, exponent))
+            })?;
+        let step = power_of_two(exponent);
+        let half = 1 << bits;
+        // The lowest planes of a box lie a third of a cube above corners, a sixth above centres: far from both, so that they stay flat.
+        let origin = bounds.lo.map(|x| (f64::from(x) / step).floor() as i64 - 2 * half / 3 - MARGIN * 2 * half);
+        let across = std::array::from_fn(|k| ((f64::from(bounds.hi[k]) - origin[k] as f64 * step) / side) as i64);
+        let hi = across.map(|cube: i64| (2 * (cube + MARGIN)) as u32);
+        Some(Self { step, half, origin, hi })
+    }
+
+    /// A whole number of steps, exact in f32.
+    fn position(&self, v: [i64; 3]) -> [f32; 3] {
+        std::array::from_fn(|k| ((self.origin[k] + v[k]) as f64 * self.step) as f32)
+    }
+
+    fn point(&self, p: [u32; 3]) -> DVec3 {
+        DVec3::from_array(std::array::from_fn(|k| (self.origin[k] + i64::from(p[k]) * self.half) as f64 * self.step))
+    }
+
+    /// A position in cubes.
+    fn in_cubes(&self, p: [f32; 3]) -> DVec3 {
+        let side = 2.0 * self.half as f64;
+        DVec3::from_array(std::array::from_fn(|k| (f64::from(p[k]) / self.step - self.origin[k] as f64) / side))
+    }
+
+    /// Beyond the margin there is nothing, whatever an odd soup may wind around there.
+    fn is_beyond(&self, p: [u32; 3]) -> bool {
+        (0..3).any(|k| p[k] < 2 || p[k] > self.hi[k])
+    }
+}
+
+/// The least power of two that is not below a positive number, as an exponent.
+fn log2_up(x: f64) -> i32 {
+    let exponent = (x.to_bits() >> 52) as i32 - 1023;
+    if x.to_bits() << 12 == 0 { exponent } else { exponent + 1 }
+}
+
+fn power_of_two(exponent: i32) -> f64 {
+    f64::from_bits(((exponent + 1023) as u64) << 52)
+}
+
+/// Names of points: 20 bits a coordinate, x lowest. Of edges: the lower end's, and three bits for where to.
+const COORDINATE_BITS: u32 = 20;
+const NO_EDGE: u64 = u64::MAX;
+
+fn name(p: [u32; 3]) -> u64 {
+    u64::from(p[0]) | u64::from(p[1]) << COORDINATE_BITS | u64::from(p[2]) << (2 * COORDINATE_BITS)
+}
+
+fn named(name: u64) -> [u32; 3] {
+    [0, 1, 2].map(|k| (name >> (k * COORDINATE_BITS)) as u32 & ((1 << COORDINATE_BITS) - 1))
+}
+
+/// Where the edges of a point go that are named after it: to the next cubes, and half as far along the diagonals.
+const WAYS: [[i32; 3]; 7] = [[2, 0, 0], [0, 2, 0], [0, 0, 2], [1, 1, 1], [-1, 1, 1], [1, -1, 1], [-1, -1, 1]];
+
+fn edge(a: u64, b: u64) -> u64 {
+    let (low, high) = (named(a.min(b)), named(a.max(b)));
+    let way: [i32; 3] = std::array::from_fn(|k| high[k] as i32 - low[k] as i32);
+    a.min(b) << 3 | WAYS.iter().position(|w| *w == way).unwrap_or(0) as u64
+}
+
+/// Hashes names, which nobody chooses with malice. What is kept by it is never gone through.
+#[derive(Default)]
+struct Scatter(u64);
+
+impl Hasher for Scatter {
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|b| self.write_u64(u64::from(*b)));
+    }
+
+    fn write_u64(&mut self, x: u64) {
+        let x = (self.0 ^ x).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        self.0 = x ^ x >> 32;
+    }
+
+    fn finish(&self) -> u64 {
+        self.0
+    }
+}
+
+type Hashing = BuildHasherDefault<Scatter>;
+
+/// Winding numbers where the surface is.
+struct Field<'l> {
+    lattice: &'l Lattice,
+    /// By point.
+    winding: HashMap<u64, f32, Hashing>,
+    /// All cubes that were looked at, ascending, by their lowest corner.
+    cubes: Vec<u64>,
+    known: HashSet<u64, Hashing>,
+}
+
+/// A cube's corners, bit k of the number: the upper one along axis k; and its centre.
+fn points_of(cube: [u32; 3]) -> [[u32; 3]; 9] {
+    std::array::from_fn(|n| {
+        std::array::from_fn(|k| if n == 8 { cube[k] + 1 } else { cube[k] + if n >> k & 1 == 1 { 2 } else { 0 } })
+    })
+}
+
+/// Corners of a cube's upper face along each axis, counter-clockwise seen from above it.
+fn face(axis: usize) -> [usize; 4] {
+    let (up, b, c) = (1 << axis, 1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
+    [up, up | b, up | b | c, up | c]
+}
+
+impl<'l> Field<'l> {
+    fn follow(triangles: &[Corners], tree: &Tree, lattice: &'l Lattice, most: usize, threads: usize) -> Option<Self> {
+        let mut field = Self { lattice, winding: HashMap::default(), cubes: Vec::new(), known: HashSet::default() };
+        let mut wave = touched(triangles, lattice, threads);
+        while !wave.is_empty() {
+            if field.known.len() + wave.len() > most {
+                return None;
+            }
+            field.known.extend(&wave);
+            let mut points: Vec<u64> = wave
+                .iter()
+                .flat_map(|cube| points_of(named(*cube)).map(name))
+                .filter(|p| !field.winding.contains_key(p))
+                .collect();
+            points.sort_unstable();
+            points.dedup();
+            let blocks = parallel::map(threads, points.len().div_ceil(BLOCK), |block| {
+                let points = &points[block * BLOCK..points.len().min((block + 1) * BLOCK)];
+                let wind = |p: &u64| {
+                    let p = named(*p);
+                    if lattice.is_beyond(p) { 0.0 } else { tree.winding_number(lattice.point(p)) as f32 }
+                };
+                points.iter().map(wind).collect::<Vec<_>>()
+            });
+            field.winding.extend(points.iter().copied().zip(blocks.into_iter().flatten()));
+            let mut next: Vec<u64> =
+                wave.iter().flat_map(|cube| field.goes_on(*cube)).filter(|c| !field.known.contains(c)).collect();
+            next.sort_unstable();
+            next.dedup();
+            field.cubes.append(&mut wave);
+            wave = next;
+        }
+        field.cubes.sort_unstable();
+        Some(field)
+    }
+
+    fn is_inside(&self, point: u64) -> bool {
+        self.winding.get(&point).is_some_and(|w| *w > 0.5)
+    }
+
+    /// The cubes across faces whose corners and this cube's centre are of both kinds.
+    fn goes_on(&self, cube: u64) -> impl Iterator<Item = u64> + use<> {
+        let at = named(cube);
+        let inside = points_of(at).map(|p| self.is_inside(name(p)));
+        let (mut found, mut count) = ([0; 6], 0);
+        for axis in 0..3 {
+            for upper in [false, true] {
+                let corners = face(axis).map(|n| if upper { n } else { n & !(1 << axis) });
+                if corners.iter().any(|n| inside[*n] != inside[8]) {
+                    let mut next = at;
+                    next[axis] = if upper { next[axis] + 2 } else { next[axis].wrapping_sub(2) };
+                    found[count] = name(next);
+                    count += 1;
+                }
+            }
+        }
+        found.into_iter().take(count)
+    }
+
+    /// The surface as triangles (the last name is none) and quadrilaterals of edges' names, seen from outside.
+    fn polygons(&self, threads: usize) -> Vec<[u64; 4]> {
+        let blocks = parallel::map(threads, self.cubes.len().div_ceil(BLOCK), |block| {
+            let mut polygons = Vec::new();
+            for cube in &self.cubes[block * BLOCK..self.cubes.len().min((block + 1) * BLOCK)] {
+                let at = named(*cube);
+                let points = points_of(at).map(name);
+                let inside = points.map(|p| self.is_inside(p));
+                for axis in 0..3 {
+                    let mut next = at;
+                    next[axis] += 2;
+                    if !self.known.contains(&name(next)) {
+                        continue;
+                    }
+                    let above = name(next.map(|x| x + 1));
+                    let corners = face(axis);
+                    for k in 0..4 {
+                        let (p, q) = (corners[k], corners[(k + 1) % 4]);
+                        let tetrahedron = [points[8], above, points[p], points[q]];
+                        march(tetrahedron, [inside[8], self.is_inside(above), inside[p], inside[q]], &mut polygons);
+                    }
+                }
+            }
+            polygons
+        });
+        blocks.into_iter().flatten().collect()
+    }
+
+    /// The vertex on an edge, in steps: where the edge leaves the surface, or where it would wind half a time if its winding number fell
+    /// evenly.
+    fn vertex(&self, tree: &Tree, edge: u64) -> [i64; 3] {
+        let low = named(edge >> 3);
+        let way = WAYS[(edge & 7) as usize];
+        let high: [u32; 3] = std::array::from_fn(|k| low[k].wrapping_add_signed(way[k]));
+        let [from, to] = [low, high].map(|p| self.lattice.point(p));
+        let [a, b] = [low, high].map(|p| self.winding.get(&name(p)).map_or(0.0, |w| f64::from(*w)));
+        let rises = b > a;
+        let share = if rises { tree.leaves(to, from).map(|s| 1.0 - s) } else { tree.leaves(from, to) };
+        let share = share.unwrap_or_else(|| (a - 0.5) / (a - b));
+        let is_long = way.contains(&0);
+        let steps = if is_long { 2 * self.lattice.half } else { self.lattice.half };
+        let least = steps / LEAST_STEPS;
+        let along = ((share * steps as f64 + 0.5) as i64).clamp(least, steps - least);
+        std::array::from_fn(|k| i64::from(low[k]) * self.lattice.half + i64::from(way[k].signum()) * along)
+    }
+}
+
+/// The surface in a tetrahedron whose corners 1, 2 and 3 run clockwise seen from corner 0.
+fn march(points: [u64; 4], inside: [bool; 4], polygons: &mut Vec<[u64; 4]>) {
+    let between = |a: usize, b: usize| edge(points[a], points[b]);
+    let count = inside.iter().filter(|i| **i).count();
+    if count == 0 || count == 4 {
+        return;
+    }
+    if count == 2 {
+        // Even permutations that bring the two inside to the front.
+        let [a, b, c, d] = match inside {
+            [true, true, _, _] => [0, 1, 2, 3],
+            [true, _, true, _] => [0, 2, 3, 1],
+            [true, ..] => [0, 3, 1, 2],
+            [_, true, true, _] => [1, 2, 0, 3],
+            [_, true, ..] => [1, 3, 2, 0],
+            _ => [2, 3, 0, 1],
+        };
+        polygons.push([between(a, c), between(a, d), between(b, d), between(b, c)]);
+        return;
+    }
+    let is_lone = |k: usize| inside[k] == (count == 1);
+    let lone = (0..4).find(|k| is_lone(*k)).unwrap_or(0);
+    let [a, b, c, d] = [[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]][lone];
+    // Where the lone one is outside, the triangle is seen from the other side.
+    let [b, c] = if count == 1 { [b, c] } else { [c, b] };
+    polygons.push([between(a, b), between(a, c), between(a, d), NO_EDGE]);
+}
+
+/// Cuts a polygon into triangles, a quadrilateral along its shorter diagonal.
+fn cut(polygon: Vec<u32>, vertices: &[[i64; 3]], triangles: &mut Vec<[u32; 3]>) {
+    let square = |a: u32, b: u32| (0..3).map(|k| (vertices[a as usize][k] - vertices[b as usize][k]).pow(2)).sum::<i64>();
+    match polygon[..] {
+        [a, b, c] => triangles.push([a, b, c]),
+        [a, b, c, d] if square(a, c) <= square(b, d) => triangles.extend([[a, b, c], [a, c, d]]),
+        [a, b, c, d] => triangles.extend([[a, b, d], [b, c, d]]),
+        _ => {}
+    }
+}
+
+/// Leaves out closed parts of less than two cubes and less than a millionth of all: bodies and cavities that the lattice made. What is left, and
+/// its volume in steps.
+fn drop_specks(faces: &[[u32; 3]], vertices: &[[i64; 3]], side: f64) -> (Vec<[u32; 3]>, f64) {
+    let mut parents: Vec<u32> = (0..vertices.len() as u32).collect();
+    for [a, b, c] in faces {
+        crate::util::union_find::unite(&mut parents, *a, *b);
+        crate::util::union_find::unite(&mut parents, *a, *c);
+    }
+    let mut volumes = vec![0.0; vertices.len()];
+    for face in faces {
+        let [a, b, c] = face.map(|v| DVec3::from_array(vertices[v as usize].map(|x| x as f64)));
+        volumes[crate::util::union_find::find(&mut parents, face[0]) as usize] += a.dot(b.cross(c)) / 6.0;
+    }
+    let all: f64 = volumes.iter().sum();
+    let least = (2.0 * side * side * side).min(1e-6 * all);
+    let stays = |face: &&[u32; 3]| volumes[crate::util::union_find::find(&mut parents, face[0]) as usize].abs() >= least;
+    let kept: Vec<[u32; 3]> = faces.iter().filter(stays).copied().collect();
+    (kept, volumes.iter().filter(|v| v.abs() >= least).sum())
+}
+
+/// The cubes that triangles touch, ascending.
+fn touched(triangles: &[Corners], lattice: &Lattice, threads: usize) -> Vec<u64> {
+    const AT_ONCE: usize = 4096;
+    let found = parallel::map(threads, triangles.len().div_ceil(AT_ONCE), |block| {
+        let mut cubes = Vec::new();
+        for t in &triangles[block * AT_ONCE..triangles.len().min((block + 1) * AT_ONCE)] {
+            let t = t.map(|p| lattice.in_cubes(p));
+            let [lo, hi] = [t[0].min(t[1]).min(t[2]), t[0].max(t[1]).max(t[2])].map(|p| p.to_array().map(|x| x as u32));
+            touch(&t, lo, hi, &mut cubes);
+        }
+        cubes.sort_unstable();
+        cubes.dedup();
+        cubes
+    });
+    let mut all: Vec<u64> = found.into_iter().flatten().collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// Notes the cubes from `lo` to `hi` that a triangle touches.
+fn touch(t: &[DVec3; 3], lo: [u32; 3], hi: [u32; 3], cubes: &mut Vec<u64>) {
+    let size: [u32; 3] = std::array::from_fn(|k| hi[k] - lo[k]);
+    if size.iter().any(|s| *s > 0) && !may_touch(t, lo, hi) {
+        return;
+    }
+    if size == [0; 3] {
+        if may_touch(t, lo, hi) {
+            cubes.push(name(lo.map(|x| 2 * x)));
+        }
+        return;
+    }
+    let axis = (1..3).fold(0, |best, k| if size[k] > size[best] { k } else { best });
+    let half = lo[axis] + size[axis] / 2;
+    let (mut below, mut above) = (hi, lo);
+    (below[axis], above[axis]) = (half, half + 1);
+    touch(t, lo, below, cubes);
+    touch(t, above, hi, cubes);
+}
+
+/// Does no plane separate a triangle and the box of cubes from `lo` to `hi`? (Akenine-Möller, "Fast 3D triangle-box overlap testing", J.
+/// Graphics Tools 6(1), 2001.) Rounding may err; what it misses the surface leads to.
+fn may_touch(t: &[DVec3; 3], lo: [u32; 3], hi: [u32; 3]) -> bool {
+    const SLACK: f64 = 1e-9;
+    let lo = DVec3::from_array(lo.map(f64::from));
+    let hi = DVec3::from_array(hi.map(|x| f64::from(x) + 1.0));
+    let (middle, half) = ((lo + hi) / 2.0, (hi - lo) / 2.0 + SLACK);
+    let v = t.map(|p| p - middle);
+    let edges = [v[1] - v[0], v[2] - v[1], v[0] - v[2]];
+    let overlaps = |axis: DVec3| {
+        let d = v.map(|p| p.dot(axis));
+        let reach = half.dot(axis.abs());
+        d[0].min(d[1]).min(d[2]) <= reach && d[0].max(d[1]).max(d[2]) >= -reach
+    };
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z];
+    axes.iter().all(|a| overlaps(*a))
+        && overlaps(edges[0].cross(edges[1]))
+        && axes.iter().all(|a| edges.iter().all(|e| overlaps(a.cross(*e))))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::testing::{cuboid, diagnose, plate, records, reversed, shifted, soup};
+
+    fn wrapped(triangles: &[Corners], cubes: u32) -> Option<Wrapping> {
+        wrap(triangles, &Tree::winding(triangles), cubes, 1)
+    }
+
+    /// Whatever the engine finds in a wrapped surface.
+    fn check(wrapping: &Wrapping) {
+        if wrapping.triangles.is_empty() {
+            return;
+        }
+        let records = records(&wrapping.triangles);
+        let d = diagnose(&records);
+        let verdict = crate::detect::verdict::judge(&d.defects, &[]);
+        assert!(verdict.good, "{:?}", verdict.reasons);
+        assert_eq!(d.defects.nested_positive, 0);
+        let off = (d.defects.volume - wrapping.volume).abs();
+        assert!(off <= 1e-6 * d.defects.volume, "{} instead of {}", wrapping.volume, d.defects.volume);
+    }
+
+    #[test]
+    fn a_box_keeps_its_volume_and_its_faces_stay_flat() {
+        let mesh = cuboid([-3.0, 1.0, 7.0], [9.0, 13.0, 19.0]);
+        let got = wrapped(&mesh, 4000).unwrap();
+        check(&got);
+        assert!((got.volume / 12.0f64.powi(3) - 1.0).abs() < 0.01, "{}", got.volume);
+        let on = |axis: usize, at: f32| got.triangles.iter().filter(|t| t.iter().all(|p| (p[axis] - at).abs() < 0.01)).count();
+        // About a sixth each, with what is lost at the rims.
+        assert!(on(0, -3.0) * 8 > got.triangles.len() && on(2, 7.0) * 8 > got.triangles.len());
+    }
+
+    #[test]
+    fn the_mouth_of_an_open_box_is_closed_and_a_cavity_kept() {
+        let mut open = cuboid([0.0; 3], [8.0; 3]);
+        open.drain(2..4);
+        let cavity = reversed(&cuboid([2.0; 3], [4.0; 3]));
+        let got = wrapped(&[open, cavity].concat(), 4000).unwrap();
+        check(&got);
+        let records = records(&got.triangles);
+        let found = diagnose(&records).defects;
+        assert_eq!((found.bodies, found.cavities), (1, 1));
+        assert!(got.volume > 0.8 * 504.0 && got.volume < 1.1 * 504.0, "{}", got.volume);
+    }
+
+    #[test]
+    fn bodies_that_run_into_each_other_become_one() {
+        let mesh = [cuboid([0.0; 3], [4.0; 3]), cuboid([2.0; 3], [6.0; 3])].concat();
+        let got = wrapped(&mesh, 4000).unwrap();
+        check(&got);
+        assert!((got.volume / 120.0 - 1.0).abs() < 0.02, "{}", got.volume);
+    }
+
+    #[test]
+    fn a_flat_sheet_encloses_nothing_and_a_point_has_no_lattice() {
+        assert!(wrapped(&plate(4, |_, _| true), 1000).unwrap().triangles.is_empty());
+        assert!(wrapped(&[[[1.0; 3]; 3]], 1000).is_none());
+        // Ten f32 steps in all.
+        let tiny = shifted(&cuboid([0.0; 3], [1.0; 3]), [1e6; 3]);
+        assert!(wrapped(&tiny, 1000).is_none());
+    }
+
+    #[test]
+    fn far_from_the_origin_everything_is_exact_still() {
+        for far in [100.0, 10_000.0, 300_000.0] {
+            let mesh = shifted(&[cuboid([0.0; 3], [64.0; 3]), cuboid([32.0; 3], [96.0; 3])].concat(), [far, -far, 0.0]);
+            check(&wrapped(&mesh, 2000).unwrap());
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+
+        /// Whatever goes in, what comes out is a solid, and the same one from any number of threads.
+        #[test]
+        fn any_soup_becomes_a_solid(soup in soup(), scale in -20i32..20, by in prop::array::uniform3(-4i32..4)) {
+            let scale = 2.0f32.powi(scale) * 1.1;
+            let finite = soup.into_iter().filter(|t| t.as_flattened().iter().all(|x| x.is_finite()));
+            let by = by.map(|x| x as f32 * 1.7);
+            let moved: Vec<Corners> =
+                finite.map(|t| t.map(|p| std::array::from_fn(|k| (p[k] + by[k]) * scale))).collect();
+            if let Some(got) = wrapped(&moved, 300) {
+                check(&got);
+                let again = wrap(&moved, &Tree::winding(&moved), 300, 3).unwrap();
+                prop_assert_eq!(got.triangles, again.triangles);
+            }
+        }
+    }
+}

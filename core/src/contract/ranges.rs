@@ -1,0 +1,178 @@
+//! The values that each setting of a profile may have. [`Profile::validate`] is the only place that decides on them.
+
+use crate::contract::settings::Profile;
+
+/// A setting of a profile has a value that means nothing.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("`{setting}` must be {range}, not {value}")]
+pub struct ProfileError {
+    /// The setting's name, as in a profile file.
+    pub setting: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// The values it may have, in words.
+    pub range: &'static str,
+}
+
+/// The values that mean something.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Range {
+    /// A part of a whole.
+    Share,
+    /// A bound that may be as large as anyone likes.
+    Bound,
+}
+
+impl Range {
+    fn words(self) -> &'static str {
+        match self {
+            Self::Share => "a number from 0 to 1",
+            Self::Bound => "a finite number from 0 up",
+        }
+    }
+
+    /// NaN lies in no range.
+    fn contains(self, value: f64) -> bool {
+        match self {
+            Self::Share => (0.0..=1.0).contains(&value),
+            Self::Bound => (0.0..=f64::MAX).contains(&value),
+        }
+    }
+}
+
+impl Profile {
+    /// Refuses a profile with a setting that is no number, or beyond the values that mean something.
+    ///
+    /// # Errors
+    /// [`ProfileError`] names the first of these settings, its value and its range.
+    pub fn validate(&self) -> Result<(), ProfileError> {
+        for (setting, value, range) in self.numbers() {
+            if !range.contains(value) {
+                return Err(ProfileError { setting, value, range: range.words() });
+            }
+        }
+        Ok(())
+    }
+
+    /// Every setting that is not a whole number or a choice, with its range. All fields are named, so that a new one cannot be forgotten here.
+    fn numbers(&self) -> [(&'static str, f64, Range); 16] {
+        let Self {
+            name: _,
+            weld_relative,
+            weld_max_edge_share,
+            gap_edge_share,
+            max_hole_perimeter_relative,
+            max_hole_perimeter_mm,
+            max_gap_mm,
+            max_volume_change,
+            max_area_change,
+            max_box_change_relative,
+            debris_area_share,
+            max_sheets_share,
+            stack_gap_relative,
+            max_separation_relative,
+            wrap_max_share,
+            wrap_max_move,
+            wrap_review_share,
+            // Counts: each value of their type means something, 0 and the largest included.
+            max_hole_edges: _,
+            max_bodies_lost: _,
+            debris_triangles: _,
+            // Choices.
+            leave_open: _,
+            close_sheets: _,
+            fill_holes: _,
+            patch_shape: _,
+            sheets: _,
+            bodies: _,
+            separate: _,
+            guarantee: _,
+            resolve_crossings: _,
+            check_self_intersections: _,
+        } = self;
+        [
+            ("weld_relative", *weld_relative, Range::Share),
+            ("weld_max_edge_share", *weld_max_edge_share, Range::Share),
+            ("gap_edge_share", *gap_edge_share, Range::Bound),
+            ("max_hole_perimeter_relative", *max_hole_perimeter_relative, Range::Bound),
+            ("max_hole_perimeter_mm", *max_hole_perimeter_mm, Range::Bound),
+            ("max_gap_mm", *max_gap_mm, Range::Bound),
+            ("max_volume_change", *max_volume_change, Range::Bound),
+            ("max_area_change", *max_area_change, Range::Bound),
+            ("max_box_change_relative", *max_box_change_relative, Range::Bound),
+            ("debris_area_share", *debris_area_share, Range::Share),
+            ("max_sheets_share", *max_sheets_share, Range::Share),
+            ("stack_gap_relative", *stack_gap_relative, Range::Share),
+            ("max_separation_relative", *max_separation_relative, Range::Share),
+            ("wrap_max_share", *wrap_max_share, Range::Share),
+            ("wrap_max_move", *wrap_max_move, Range::Bound),
+            ("wrap_review_share", *wrap_review_share, Range::Share),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use serde::Deserialize;
+    use serde::de::value::{Error as ValueError, MapDeserializer};
+
+    use super::*;
+    use crate::contract::error::Error;
+    use crate::contract::error::ErrorClass;
+    use crate::contract::progress::Quiet;
+    use crate::contract::settings::Limits;
+
+    /// The default profile with another value of one setting, as a file would give it.
+    fn with(setting: &str, value: f64) -> Profile {
+        Profile::deserialize(MapDeserializer::<_, ValueError>::new([(setting, value)].into_iter())).unwrap()
+    }
+
+    #[test]
+    fn every_built_in_profile_is_valid() {
+        for name in Profile::BUILT_IN {
+            Profile::built_in(name).unwrap().validate().unwrap();
+        }
+    }
+
+    /// Goes over the fields that are serialised, so that a new one is tried, too.
+    #[test]
+    fn every_setting_refuses_what_means_nothing() {
+        let fields = serde_json::to_value(Profile::default()).unwrap();
+        let settings: Vec<&String> =
+            fields.as_object().unwrap().iter().filter(|(_, value)| value.is_f64()).map(|f| f.0).collect();
+        assert_eq!(settings.len(), Profile::default().numbers().len());
+        for setting in settings {
+            for value in [-1.0, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, -f64::MIN_POSITIVE] {
+                let error = with(setting, value).validate().unwrap_err();
+                assert_eq!(error.setting, setting);
+                let line = error.to_string();
+                assert!(line.contains(&format!("not {value}")) && line.contains("from 0"), "{line}");
+            }
+            for value in [0.0, 0.5, 1.0] {
+                with(setting, value).validate().unwrap();
+            }
+        }
+    }
+
+    #[test]
+    fn a_share_is_at_most_all_of_it() {
+        assert!(with("wrap_max_share", 1.5).validate().unwrap_err().to_string().contains("from 0 to 1, not 1.5"));
+        with("max_hole_perimeter_relative", 1e300).validate().unwrap();
+    }
+
+    /// A library's user may never have called [`Profile::validate`].
+    #[test]
+    fn work_under_an_invalid_profile_is_refused() {
+        let (input, output) = (Path::new("not there.stl"), Path::new("nor this.stl"));
+        let profile = with("max_separation_relative", f64::INFINITY);
+        let limits = Limits::default();
+        let results = [crate::inspect(input, &profile, &limits, &Quiet), crate::repair(input, output, &profile, &limits, &Quiet)];
+        for result in results {
+            let error = result.unwrap_err();
+            assert!(matches!(error, Error::Profile { .. }) && error.class() == ErrorClass::Refused, "{error}");
+            assert!(error.to_string().contains("max_separation_relative"), "{error}");
+        }
+    }
+}

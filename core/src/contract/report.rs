@@ -1,0 +1,554 @@
+//! The report: what was found, what was done, and the verdict on the bytes written. Documented in `core/REPORT.md`.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize, Serializer};
+
+use crate::contract::settings::{Limits, Profile};
+
+/// Version of the report's JSON layout; raised when a field changes its meaning or goes away.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// Everything there is to say about one file.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Report {
+    /// [`SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// Engine version that wrote it.
+    pub engine_version: String,
+    /// `inspect` or `repair`.
+    pub task: Task,
+    /// What came of it.
+    pub outcome: Outcome,
+    /// The file read.
+    pub input: FileFacts,
+    /// The file written, `None` when nothing was (inspection, or no triangle left).
+    pub output: Option<FileFacts>,
+    /// Settings that decide the result.
+    pub profile: Profile,
+    /// Settings that do not.
+    pub limits: Limits,
+    /// Defects of the input.
+    pub before: Defects,
+    /// Defects of the output, counted on the bytes written; `None` for an inspection and for a copy of the input, which is compared by its
+    /// hash.
+    pub after: Option<Defects>,
+    /// Tolerances derived from the model.
+    pub tolerances: Tolerances,
+    /// Boundary loops of the input, by what kind of opening they are.
+    #[serde(default)]
+    pub loops: BoundaryLoops,
+    /// What was done, in order.
+    pub repairs: Vec<Repair>,
+    /// Boundary loops that were left open, and why (at most 1000 listed).
+    pub loops_left: Vec<LoopLeft>,
+    /// Open sheets that were dropped since they can be no part of a solid, the largest first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sheets_dropped: Vec<SheetDropped>,
+    /// Regions that no repair made a solid: replaced by a wrap, or left, the largest first (at most 1000 listed).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub wraps: Vec<Wrap>,
+    /// What became of the volume of bodies; `None` where nothing was done that might have lost any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub volumes: Option<Volumes>,
+    /// Where something was cut, moved, replaced, dropped or left, and how far surface moved there.
+    #[serde(default, skip_serializing_if = "Regions::is_empty")]
+    pub regions: Regions,
+    /// The edit in numbers.
+    pub edit: EditSummary,
+    /// The edit itself, when asked for.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub edit_records: Option<EditRecords>,
+    /// What the written bytes (for an inspection: the read ones) are.
+    pub verdict: Verdict,
+    /// What every rule found in them; `None` where nothing was written.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub certificate: Option<Certificate>,
+    /// Seconds by stage, in order.
+    pub stages: Vec<Stage>,
+    /// Where the time went and what it cost.
+    pub cost: Cost,
+}
+
+/// Which of the two entry points wrote a report.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Task {
+    Inspect,
+    Repair,
+}
+
+/// What came of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// Good as it came; the output, if any, is byte for byte the input.
+    Clean,
+    /// Repaired, and good.
+    Repaired,
+    /// Good, but the repair changed the part beyond the profile's limits: a person must look.
+    NeedsReview,
+    /// Not good under the profile (for an inspection: the input is not).
+    NotGood,
+}
+
+impl Outcome {
+    /// May it reach `out/`?
+    pub fn is_good(self) -> bool {
+        matches!(self, Self::Clean | Self::Repaired)
+    }
+}
+
+/// A mesh file's identity and format.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct FileFacts {
+    /// What is not UTF-8 in it is replaced when the report is written: names of files may be any bytes, JSON may not.
+    #[serde(serialize_with = "lossy")]
+    pub path: PathBuf,
+    pub bytes: u64,
+    /// BLAKE3 of the whole file, hexadecimal.
+    pub blake3: String,
+    pub format: Format,
+    /// Triangle records in the file, non-finite and degenerate ones included.
+    pub triangles: u64,
+    /// What is odd about the file itself, in the reader's words; empty for a flawless file.
+    pub findings: Vec<String>,
+}
+
+fn lossy<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&path.to_string_lossy())
+}
+
+/// Mesh file formats that are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Format {
+    BinaryStl,
+    AsciiStl,
+}
+
+/// Counts after the exact weld. Definitions: `core/DEFECTS.md`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Defects {
+    /// Triangles with finite coordinates.
+    pub triangles: u64,
+    /// Triangles with a NaN or infinite coordinate; in no other count.
+    pub nonfinite: u64,
+    /// Distinct positions.
+    pub vertices: u64,
+    /// Distinct positions used by a triangle with three distinct vertices.
+    pub vertices_used: u64,
+    pub edges: u64,
+    /// Triangles with a repeated vertex; left out of the topology.
+    pub degenerate_index: u64,
+    /// Triangles of three distinct, exactly collinear vertices; kept in the topology.
+    pub degenerate_area: u64,
+    /// Triangles with the vertex set and the direction of an earlier one.
+    pub duplicates_same: u64,
+    /// Triangles with the vertex set of an earlier one, none of them in the same direction.
+    pub duplicates_opposite: u64,
+    pub boundary_edges: u64,
+    /// Connected sets of boundary edges.
+    pub boundary_loops: u64,
+    /// Edges of more than two triangles.
+    pub nonmanifold_edges: u64,
+    /// Vertices on a non-manifold edge, or whose triangles form more than one fan.
+    pub nonmanifold_vertices: u64,
+    /// Two-triangle edges used twice in the same direction.
+    pub inconsistent_edges: u64,
+    /// Edges not used equally often in each direction.
+    pub unbalanced_edges: u64,
+    /// Sets of triangles connected through edges.
+    pub components: u64,
+    /// Closed, coherent components of negative volume that are no cavity.
+    pub inverted_components: u64,
+    /// Closed components of positive volume inside no other body.
+    pub bodies: u64,
+    /// Closed components of negative volume inside a body.
+    pub cavities: u64,
+    /// Closed components of positive volume inside another body (swallowed).
+    pub nested_positive: u64,
+    /// Boundary vertices inside a boundary edge of another triangle, within the weld tolerance (T-junctions).
+    pub noncommon_vertices: u64,
+    /// Boundary vertices within the weld tolerance of another boundary vertex.
+    pub weldable_vertices: u64,
+    /// Triangles that cross or overlap each other; `None` when they were not looked for.
+    #[serde(default)]
+    pub self_intersections: Option<SelfIntersections>,
+    /// Smallest and largest coordinates; `None` without a finite triangle.
+    pub bounds: Option<[[f32; 3]; 2]>,
+    pub area: f64,
+    /// Signed volume; means something only where closed and oriented.
+    pub volume: f64,
+    /// V − E + F, where the surface is closed and manifold.
+    pub euler: Option<i64>,
+    /// Counts that stopped at a bound are "at least"; their field names.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub at_least: Vec<String>,
+}
+
+/// Triangles that meet in more than a point, or edge along edge, beyond the corners they share. Exact.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SelfIntersections {
+    /// Triangles in at least one pair.
+    pub triangles: u64,
+    /// Pairs that cross: they meet along a segment inside at least one of them.
+    pub crossing_pairs: u64,
+    /// Pairs that overlap: they lie in one plane and share an area.
+    pub overlapping_pairs: u64,
+    /// The pairs with the smallest record numbers, at most 100.
+    pub listed: Vec<[u32; 2]>,
+    /// More pairs of triangles come close to each other than are looked at: nothing was counted.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub given_up: bool,
+}
+
+impl SelfIntersections {
+    /// Everything was looked at, and nothing found.
+    pub fn is_free(&self) -> bool {
+        self.triangles == 0 && !self.given_up
+    }
+}
+
+/// Lengths derived from the model, in its units.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Tolerances {
+    /// Diagonal of the bounding box.
+    pub diagonal: f64,
+    /// Boundary vertices closer than this may be welded.
+    pub weld: f64,
+    /// How `weld` was chosen.
+    pub weld_reason: String,
+}
+
+/// One kind of repair that did something.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Repair {
+    /// One of the names that `core/REPORT.md` lists, as `degenerate`, `tolerance_weld`, `t_junction` or `fill`.
+    pub name: String,
+    /// How often.
+    pub count: u64,
+    /// In words, with the method or the bound that mattered.
+    pub note: String,
+    pub seconds: f64,
+}
+
+/// What kind of opening a boundary loop is (`core/REPORT.md` has the rules).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LoopClass {
+    /// No opening: vertices of one side lie on the edges of the other (T-junctions).
+    Crack,
+    /// Narrow, with sides that run alike.
+    Gap,
+    /// Narrow, with sides that do not run alike.
+    Misaligned,
+    /// Meets another loop in a vertex.
+    Nested,
+    /// One of the two rims of a missing ring, both in about one plane.
+    AnnularCoplanar,
+    /// One of the two rims of a missing ring, in planes one above the other.
+    AnnularParallel,
+    /// A hole with a piece of surface in it, or the rim of that piece.
+    Island,
+    /// A slit when seen along an axis, though not flat.
+    Machining,
+    /// None of these.
+    Simple,
+}
+
+impl LoopClass {
+    /// In words, for one or several.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Crack => "crack",
+            Self::Gap => "gap",
+            Self::Misaligned => "misaligned",
+            Self::Nested => "nested",
+            Self::AnnularCoplanar => "annular, coplanar",
+            Self::AnnularParallel => "annular, parallel",
+            Self::Island => "island",
+            Self::Machining => "machining direction",
+            Self::Simple => "simple",
+        }
+    }
+}
+
+/// A boundary loop as it was found, before any repair. Lengths in the model's units.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BoundaryLoop {
+    pub class: LoopClass,
+    /// The rule that decided the class, with its measure.
+    pub rule: String,
+    /// A vertex on it.
+    pub at: [f32; 3],
+    pub vertices: u64,
+    pub perimeter: f64,
+    /// Of its projection along the direction in which that is largest.
+    pub area: f64,
+    /// Largest distance of a vertex from the plane that fits best.
+    pub off_plane: f64,
+    /// Of a narrow loop: the largest distance between its sides.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub width: Option<f64>,
+    /// How much it differs from the loop it belongs to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub characteristic_distance: Option<f64>,
+    /// The loop it belongs to, by place in the list of all: the other side, the other rim, or the hole around an island.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub partner: Option<u32>,
+}
+
+/// The boundary loops of the input.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BoundaryLoops {
+    /// How many of each class; classes without a loop are left out.
+    pub classes: std::collections::BTreeMap<LoopClass, u64>,
+    /// The first thousand, by their first vertex in the file.
+    pub listed: Vec<BoundaryLoop>,
+}
+
+/// A boundary loop that stayed open.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct LoopLeft {
+    /// A point on it.
+    pub at: [f32; 3],
+    pub edges: u64,
+    pub perimeter: f64,
+    pub reason: String,
+}
+
+/// An open sheet that was dropped.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SheetDropped {
+    /// Lower and upper corner of its box.
+    pub bounds: [[f32; 3]; 2],
+    pub area: f64,
+    pub triangles: u64,
+    /// It crossed a body, or another sheet.
+    pub crosses: bool,
+    /// Other surface hid it in all directions.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub hidden: bool,
+}
+
+/// A region that no repair made a solid. Lengths in the model's units.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Wrap {
+    /// Smallest and largest coordinates of what was there.
+    pub bounds: [[f32; 3]; 2],
+    /// Triangles that were there after all other repairs.
+    pub replaced: u64,
+    /// Triangles that replace them.
+    pub added: u64,
+    /// Of what was there.
+    pub area: f64,
+    /// The same as a fraction of the whole surface.
+    pub area_share: f64,
+    /// Edge of the lattice's cubes; 0 if there is no lattice for it.
+    pub cell: f64,
+    /// What the wrap encloses.
+    pub volume: f64,
+    /// Largest distance from the old surface to the new one, measured at some of its corners and middles; what had material on both sides is left
+    /// out.
+    pub moved: f64,
+    /// Largest distance from the new surface to the old one, likewise: where holes were wide.
+    pub new_ground: f64,
+    /// Why it was left as it is; `None`: it was replaced.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub left: Option<String>,
+}
+
+/// Whether bodies are still inside of the result: points in each are looked for there. In the file's units, cubed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Volumes {
+    /// Bodies that were looked for: the largest, at most 4096, each of more than a millionth of the volume of all.
+    pub bodies: u64,
+    /// Points in them.
+    pub points: u64,
+    /// What they enclose, each for itself: what several share counts for each.
+    pub volume: f64,
+    /// Of that, what is outside now, an estimate: of each body the share of its points that are.
+    pub outside: f64,
+    /// Bodies with no point inside.
+    pub lost: u64,
+    /// These, the largest first (at most 1000 listed).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub listed: Vec<BodyLost>,
+}
+
+/// A body that is not inside of the result.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BodyLost {
+    /// Smallest and largest coordinates of what was there.
+    pub bounds: [[f32; 3]; 2],
+    pub volume: f64,
+}
+
+/// Regions where the surface is not as it was.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Regions {
+    /// How many there are.
+    pub total: u64,
+    /// The largest of them by the diagonal of their boxes, at most 1000, the largest first.
+    pub listed: Vec<Region>,
+}
+
+impl Regions {
+    pub fn is_empty(&self) -> bool {
+        self.total == 0
+    }
+}
+
+/// Where something was done to what was no solid, or left undone. Lengths in the model's units.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Region {
+    /// What settled it.
+    pub rung: Rung,
+    /// Smallest and largest coordinates of what it was done to.
+    pub bounds: [[f32; 3]; 2],
+    /// Triangles that it was done to; where vertices were given to surfaces, vertices.
+    pub count: u64,
+    /// Rounds of cutting and rounding.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub rounds: u32,
+    /// Farthest that the surface moved.
+    pub moved: f64,
+    /// Why it was left.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+}
+
+fn is_zero(count: &u32) -> bool {
+    *count == 0
+}
+
+/// What settled a region, from the least intrusive to the most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Rung {
+    /// Surfaces that cross were cut along each other, and rounded to single precision.
+    Cut,
+    /// So they were, and what was nearly one there was made one: short edges, and vertices close to faces or edges.
+    Snapped,
+    /// So they were, after bodies that shared surface but for rounding were grown by steps of single precision, each by others.
+    Spread,
+    /// What kept crossing was taken out, and the small holes were closed.
+    Refilled,
+    /// Surfaces that shared a vertex or an edge were taken apart.
+    Separated,
+    /// It went: a lone sheet, a body in the material of others, or dust that cutting left.
+    Dropped,
+    /// It was replaced by a wrap.
+    Wrapped,
+    /// Nothing was done, or what was done was taken back.
+    Left,
+}
+
+/// The edit in numbers. Every record of the output is an untouched input record, a replaced one or an added one.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct EditSummary {
+    /// Input records that stand in the output byte for byte, in order.
+    pub untouched: u64,
+    /// Input records left out.
+    pub deleted: u64,
+    /// Input records whose winding was reversed.
+    pub flipped: u64,
+    /// Input records with a moved vertex.
+    pub moved: u64,
+    /// New records: in the places of those left out as far as these go, then at the end of the file.
+    pub added: u64,
+    /// Largest distance any vertex moved.
+    pub max_move: f64,
+}
+
+/// The edit, record by record. Ids are input record numbers from 0.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct EditRecords {
+    /// Inclusive ranges of records left out.
+    pub deleted: Vec<[u32; 2]>,
+    /// Inclusive ranges of records reversed.
+    pub flipped: Vec<[u32; 2]>,
+    /// Records with moved vertices and their new corners.
+    pub moved: Vec<(u32, [[f32; 3]; 3])>,
+    /// New records, in file order: corners and attribute word.
+    pub added: Vec<([[f32; 3]; 3], u16)>,
+}
+
+/// What a file is, judged on its bytes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// Everything that this version checks holds.
+    pub good: bool,
+    /// One line for people, e.g. `closed, manifold, oriented, free of self-intersection`.
+    pub statement: String,
+    pub closed: bool,
+    pub manifold: bool,
+    pub oriented: bool,
+    /// `None` when it was not checked.
+    #[serde(default)]
+    pub free_of_self_intersection: Option<bool>,
+    /// Why it is not good, or why it needs review.
+    pub reasons: Vec<String>,
+    /// What was not checked.
+    pub unchecked: Vec<String>,
+}
+
+/// What every rule found in the bytes of one file. The rules are listed in `core/REPORT.md`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Certificate {
+    /// Every rule was looked at, and passed.
+    pub printable: bool,
+    /// BLAKE3 of the whole file, hexadecimal.
+    pub blake3: String,
+    pub bytes: u64,
+    /// Triangle records in the file.
+    pub triangles: u64,
+    /// Names of the rules that were not passed, or not looked at.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub missing: Vec<String>,
+    /// Every rule, in the order of the table.
+    pub rules: Vec<RuleResult>,
+}
+
+/// What one rule found.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RuleResult {
+    /// Its name.
+    pub rule: String,
+    /// Raised when the rule counts anything else.
+    pub version: u32,
+    pub outcome: RuleOutcome,
+    /// What violates it; `None`: not looked at, or more than could be looked at.
+    pub count: Option<u64>,
+}
+
+/// Whether a file passes a rule.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RuleOutcome {
+    Passed,
+    Failed,
+    /// It was not looked at.
+    Unchecked,
+}
+
+/// One stage's share of the time.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Stage {
+    pub name: String,
+    pub seconds: f64,
+}
+
+/// What the work cost.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Cost {
+    pub wall_seconds: f64,
+    /// User and system time of the process during this work.
+    pub cpu_seconds: f64,
+    pub triangles_per_second: f64,
+    /// Largest resident set of the process, mapped file pages included.
+    pub peak_resident_bytes: u64,
+    /// Largest anonymous memory of the process, sampled at the stage borders.
+    pub peak_anonymous_bytes: u64,
+}

@@ -1,0 +1,271 @@
+//! What decides the result ([`Profile`]) kept apart from what only decides how it is computed ([`Limits`]).
+//!
+//! Same input and same profile give the same output bytes, whatever the limits.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::contract::access::Access;
+use crate::contract::report::LoopClass;
+
+/// What a repair may do, and what its result must satisfy. Lengths written `…_relative` are fractions of the bounding box's
+/// diagonal; `…_mm` are in the file's units, which STL users take for millimetres.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Profile {
+    /// Name shown in reports.
+    pub name: String,
+    /// Boundary vertices closer than this fraction of the diagonal are one vertex. Never below what f32 can tell apart at the
+    /// model's coordinates, never above [`Profile::weld_max_edge_share`] of the edges around. 0 switches the weld off.
+    pub weld_relative: f64,
+    /// Upper bound of the weld tolerance as a share of the shortest edge at either vertex.
+    pub weld_max_edge_share: f64,
+    /// Gaps are zipped while they are narrower than this share of the rim's edges. 0 switches zipping off.
+    pub gap_edge_share: f64,
+    /// Loops of more boundary edges than this are reported, not filled.
+    pub max_hole_edges: u32,
+    /// Loops longer than this fraction of the diagonal are reported, not filled.
+    pub max_hole_perimeter_relative: f64,
+    /// Loops longer than this are reported, not filled; 0: no such bound.
+    pub max_hole_perimeter_mm: f64,
+    /// Gaps wider than this are not zipped; 0: no such bound.
+    pub max_gap_mm: f64,
+    /// Kinds of loops that stay open.
+    pub leave_open: Vec<LoopClass>,
+    /// Close the rims of lone sheets, too, which become bodies of hardly any thickness.
+    pub close_sheets: bool,
+    /// Fill holes at all.
+    pub fill_holes: bool,
+    /// How patches that have room for vertices of their own are shaped.
+    pub patch_shape: PatchShape,
+    /// Largest change of the enclosed volume, as a fraction, between a closed part of the input and the output; beyond it the
+    /// result needs review.
+    pub max_volume_change: f64,
+    /// Largest change of the surface's area, as a fraction; beyond it the result needs review. What lies double or inside goes rightly, so that
+    /// only growth is bounded unless this is below 1.
+    pub max_area_change: f64,
+    /// Largest growth or shrinkage of the bounding box on any side, as a fraction of the diagonal. (Triangles without area do not
+    /// count; a fin that stood out does.)
+    pub max_box_change_relative: f64,
+    /// Bodies (components that enclose volume) the repair may lose without review.
+    pub max_bodies_lost: u32,
+    /// Components of fewer triangles than this that stay open after weld and splits are dropped as debris (0: never) ...
+    pub debris_triangles: u32,
+    /// ... if they have at most this share of the model's area, and all of them together at most ten times that; else all are kept.
+    pub debris_area_share: f64,
+    /// What becomes of lone sheets, which bound nothing, beside bodies that do.
+    pub sheets: Sheets,
+    /// Sheets that are dropped may have this share of the model's area together without review.
+    pub max_sheets_share: f64,
+    /// What becomes of bodies inside others, or crossing others.
+    pub bodies: Bodies,
+    /// The rim of an open shape that stands on other surface, within this fraction of the diagonal, is let down into it before it is closed, so that
+    /// the two become one. 0, as it is unless asked for: never; a thousandth is meant for shapes that were drawn on others.
+    pub stack_gap_relative: f64,
+    /// Take surfaces apart that share an edge or a vertex, so that each has positions of its own.
+    pub separate: bool,
+    /// How far a vertex may move for that, as a fraction of the diagonal; four steps of single precision are always allowed.
+    pub max_separation_relative: f64,
+    /// What is done about what no repair makes a solid.
+    pub guarantee: Guarantee,
+    /// Most of the surface's area that may be replaced by wraps, as a fraction. 1: all of it, since a wrap is named in the report and needs review
+    /// anyway beyond [`Profile::wrap_review_share`].
+    pub wrap_max_share: f64,
+    /// Farthest that surface may lie from the wrap that replaces it, as a fraction of the diagonal. What had material on both of its sides
+    /// does not count.
+    pub wrap_max_move: f64,
+    /// Beyond this fraction of the surface's area in wraps a result needs review.
+    pub wrap_review_share: f64,
+    /// Cut surfaces that cross each other or themselves, so that what is left is the surface of a solid.
+    pub resolve_crossings: bool,
+    /// Look for triangles that cross or overlap each other, in the input and in the output; without, the verdict calls it unchecked.
+    pub check_self_intersections: bool,
+}
+
+/// What is done about what no repair makes a solid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Guarantee {
+    /// Nothing, and only what passes every check is good: one that was not made is not enough.
+    Strict,
+    /// It is replaced by a surface around what it encloses.
+    #[default]
+    Wrap,
+    /// Nothing; what was not checked is said to be unchecked.
+    Off,
+}
+
+/// What becomes of bodies that lie inside others or cross them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Bodies {
+    /// Only what separates material from air stays: bodies inside the material of others go, those that cross become one; cavities, and what lies
+    /// in them, stay.
+    #[default]
+    Union,
+    /// Everything stays.
+    Keep,
+    /// Those that cross become one, and then only what can be seen from outside along the axes stays: a piece of surface, closed or open, whose
+    /// largest triangle is hidden by other pieces in all six directions goes, cavities too. (After Yang et al. 2021, section 3.2.)
+    Visible,
+}
+
+/// What becomes of a lone sheet in a file that holds bodies as well.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sheets {
+    /// One that crosses a body or another sheet goes, since no solid can have it; others go if they are next to nothing
+    /// ([`Profile::debris_area_share`], all of them together).
+    #[default]
+    Drop,
+    /// All stay, and the file stays open.
+    Keep,
+}
+
+/// How a patch is shaped.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PatchShape {
+    /// Not at all: triangles between the vertices of the rim.
+    Flat,
+    /// Refined, then fair: position, tangent and curvature continue the surface around (least change of mean curvature).
+    #[default]
+    Fair,
+    /// Refined, then moved onto a surface that a triharmonic radial basis function continues.
+    Implicit,
+}
+
+impl Default for Profile {
+    fn default() -> Self {
+        Self {
+            name: "default".into(),
+            weld_relative: 1e-5,
+            weld_max_edge_share: 0.25,
+            gap_edge_share: 0.35,
+            max_hole_edges: 20_000,
+            max_hole_perimeter_relative: 8.0,
+            max_hole_perimeter_mm: 0.0,
+            max_gap_mm: 0.0,
+            leave_open: Vec::new(),
+            close_sheets: false,
+            fill_holes: true,
+            patch_shape: PatchShape::Fair,
+            max_volume_change: 0.25,
+            max_area_change: 1.0,
+            max_box_change_relative: 0.02,
+            max_bodies_lost: 0,
+            debris_triangles: 4,
+            debris_area_share: 1e-3,
+            sheets: Sheets::Drop,
+            max_sheets_share: 0.01,
+            bodies: Bodies::Union,
+            stack_gap_relative: 0.0,
+            separate: true,
+            max_separation_relative: 1e-4,
+            guarantee: Guarantee::Wrap,
+            wrap_max_share: 1.0,
+            wrap_max_move: 0.05,
+            wrap_review_share: 0.01,
+            resolve_crossings: true,
+            check_self_intersections: true,
+        }
+    }
+}
+
+impl Profile {
+    /// The profiles that come with the product, by name: `default`; `scan` (larger holes, wider gaps, for scanned surfaces);
+    /// `cautious` (welds and drops surplus triangles, but closes, cuts and wraps nothing).
+    pub fn built_in(name: &str) -> Option<Self> {
+        let base = Self { name: name.into(), ..Self::default() };
+        match name {
+            "default" => Some(base),
+            "scan" => {
+                Some(Self { max_hole_edges: 100_000, gap_edge_share: 0.5, max_volume_change: 1.0, debris_triangles: 100, ..base })
+            }
+            "cautious" => Some(Self {
+                fill_holes: false,
+                gap_edge_share: 0.0,
+                sheets: Sheets::Keep,
+                resolve_crossings: false,
+                max_volume_change: 0.02,
+                guarantee: Guarantee::Strict,
+                ..base
+            }),
+            _ => None,
+        }
+    }
+
+    /// Names [`Profile::built_in`] knows.
+    pub const BUILT_IN: [&str; 3] = ["default", "scan", "cautious"];
+}
+
+/// What the machine may spend. Never changes a result: too little is an error, not another output.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Limits {
+    /// Bytes of memory the system cannot reclaim (anonymous memory and dirty file pages).
+    pub memory_bytes: u64,
+    /// Worker threads.
+    pub threads: usize,
+    /// Triangles in a chunk on average; the default fits the tables of a chunk into an L2 cache.
+    pub chunk_triangles: u32,
+    /// Folder for spool files (text input, triangles sorted by place); `None`: the output's folder.
+    pub spool: Option<PathBuf>,
+    /// Whether triangles are sorted by place into a spool file first.
+    pub spill: Spill,
+    /// List every record of the edit in the report (may be as large as the mesh).
+    pub list_edit: bool,
+    /// The caller syncs the output: among many small files it can wait for the disk once for several.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub defer_sync: bool,
+    /// How the input and the written output are read. Only code that answers for it can choose a map, so that no file and no message can.
+    #[serde(skip)]
+    pub access: Access,
+}
+
+/// When triangles are sorted by place into a spool file before their topology is worked out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Spill {
+    /// If their order in the file has nothing to do with their place and the file is larger than what can stay in the page cache,
+    /// or lists of them would take too much of the budget.
+    #[default]
+    Auto,
+    /// For tests.
+    Always,
+    Never,
+}
+
+impl Default for Limits {
+    /// 1 GiB, all processors, chunks of 32 k triangles.
+    fn default() -> Self {
+        Self {
+            memory_bytes: 1 << 30,
+            threads: std::thread::available_parallelism().map_or(1, usize::from),
+            chunk_triangles: 32 * 1024,
+            spool: None,
+            spill: Spill::Auto,
+            list_edit: false,
+            defer_sync: false,
+            access: Access::COPIED,
+        }
+    }
+}
+
+impl Limits {
+    /// These limits, with spools beside `file` unless they go elsewhere already.
+    pub(crate) fn spooling_beside(&self, file: &Path) -> Self {
+        Self { spool: Some(self.spool.clone().unwrap_or_else(|| folder_of(file).to_owned())), ..self.clone() }
+    }
+
+    /// Where spools go.
+    pub(crate) fn spool_folder(&self) -> PathBuf {
+        self.spool.clone().unwrap_or_else(std::env::temp_dir)
+    }
+}
+
+/// The folder that holds `file`.
+pub(crate) fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}

@@ -1,0 +1,499 @@
+//! Which components lie inside which closed ones: exact winding numbers by vertical rays.
+//!
+//! For each component asked about whose box lies inside a closed one's, a ray runs upwards from a point of one of its triangles. Crossings
+//! of every other component are counted with their sign by exact predicates and half-open rules, so that a ray through an edge or a
+//! vertex counts once. The sum of integers does not depend on the order, so triangles are visited chunk by chunk.
+//!
+//! [`obstructed`] casts rays along any axis in the same way, and asks only if they meet anything.
+
+use std::ops::Neg;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+use robust::{Coord, Coord3D};
+
+use crate::geometry::boxes::BoxTree;
+use crate::geometry::sums::Bounds;
+use crate::io::record;
+use crate::submesh::Shop;
+use crate::submesh::components::{Component, Components, Reversed, Sample};
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
+
+/// What lies around a component.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Surroundings {
+    /// Components that wind around it, with their winding numbers, ascending.
+    pub(crate) around: Vec<(u32, i32)>,
+}
+
+impl Surroundings {
+    pub(crate) fn winding(&self) -> i32 {
+        self.around.iter().map(|(_, w)| w).sum()
+    }
+}
+
+/// A ray upwards from a point.
+struct Ray {
+    from: [f64; 3],
+    /// Closed components whose crossings count, ascending.
+    candidates: Vec<u32>,
+}
+
+/// The surroundings of every component that is asked about; empty for others, and for those in no closed one's box. When at least one box
+/// lies in another, reads the chunks of the file once more that a ray may meet.
+pub(crate) fn surroundings(
+    survey: &Survey<'_>,
+    shop: &Shop,
+    components: &Components,
+    reversed: &Reversed,
+    asks: impl Fn(&Component) -> bool,
+) -> Vec<Surroundings> {
+    let mut all = vec![Surroundings::default(); components.list.len()];
+    let (of_rays, rays) = rays(survey, shop, &components.list, asks);
+    for (component, around) in of_rays.into_iter().zip(count(survey, shop, components, reversed, &rays)) {
+        all[component as usize].around = around;
+    }
+    all
+}
+
+/// How often all closed components together wind around each of some points, none of which may lie on a surface. Reads the chunks of the
+/// file that the rays may meet.
+pub(crate) fn windings(
+    survey: &Survey<'_>,
+    shop: &Shop,
+    components: &Components,
+    reversed: &Reversed,
+    points: &[[f64; 3]],
+) -> Vec<i32> {
+    let around = surfaces_around(survey, shop, components, reversed, points);
+    around.into_iter().map(|around| around.iter().map(|(_, w)| w).sum()).collect()
+}
+
+/// The closed components that wind around each of some points, ascending, with their winding numbers; as [`windings`] else.
+pub(crate) fn surfaces_around(
+    survey: &Survey<'_>,
+    shop: &Shop,
+    components: &Components,
+    reversed: &Reversed,
+    points: &[[f64; 3]],
+) -> Vec<Vec<(u32, i32)>> {
+    let (closed, tree) = closed_ones(&components.list);
+    let mut found = Vec::new();
+    let rays: Vec<Ray> = points
+        .iter()
+        .map(|from| {
+            let [lo, hi] = [0, 1].map(|side| from.map(|x| around(x)[side]));
+            // What the point is in is met by the box of the f32 around it.
+            tree.meeting(&Bounds { lo, hi }, &mut found);
+            found.sort_unstable();
+            Ray { from: *from, candidates: found.iter().map(|c| closed[*c as usize]).collect() }
+        })
+        .collect();
+    count(survey, shop, components, reversed, &rays)
+}
+
+/// How often closed surfaces of these triangles together wind around each of some points, none of which may lie on one.
+pub(crate) fn windings_of(triangles: &[[[f32; 3]; 3]], points: &[[f64; 3]]) -> Vec<i32> {
+    let mut windings = vec![0; points.len()];
+    if triangles.is_empty() || points.is_empty() {
+        return windings;
+    }
+    let rays: Vec<Ray> = points.iter().map(|from| Ray { from: *from, candidates: vec![0] }).collect();
+    let grid = Grid::new(&rays);
+    triangles.iter().for_each(|corners| grid.cross(&rays, corners, 0, &mut |at, w| windings[at as usize] += w));
+    windings
+}
+
+/// For each ray the components of its candidates that wind around where it begins, ascending.
+fn count(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed: &Reversed, rays: &[Ray]) -> Vec<Vec<(u32, i32)>> {
+    if rays.is_empty() {
+        return Vec::new();
+    }
+    let mut asked = vec![false; components.list.len()];
+    rays.iter().flat_map(|r| &r.candidates).for_each(|c| asked[*c as usize] = true);
+    let grid = Grid::new(rays);
+
+    let mut counts = vec![0i32; rays.iter().map(|r| r.candidates.len()).sum()];
+    let is_asked = |patch: u32| asked.get(components.of_patch[patch as usize] as usize) == Some(&true);
+    let per_chunk = survey.visit_sound(
+        is_asked,
+        |reach| Over::new(rays, &grid, reach).map(|over| (over, Vec::new())),
+        |(over, _), corners| over.may_meet(&grid, corners),
+        |(_, hits): &mut (Over, Vec<(u32, i32)>), triangle, patch| {
+            let corners = record::corners(&survey.records[triangle as usize]);
+            let sign = if reversed.patches[patch as usize] { -1 } else { 1 };
+            grid.cross(rays, &corners, components.of_patch[patch as usize], &mut |at, w| hits.push((at, sign * w)));
+        },
+    );
+    per_chunk.into_iter().flat_map(|(_, hits)| hits).for_each(|(at, w)| counts[at as usize] += w);
+    for t in shop.living() {
+        let component = components.of_triangle[t as usize];
+        if asked[component as usize] {
+            grid.cross(rays, &shop.points(t), component, &mut |at, w| counts[at as usize] += w);
+        }
+    }
+    let mut at = 0;
+    let around = |ray: &Ray| {
+        let found = &counts[at..at + ray.candidates.len()];
+        at += ray.candidates.len();
+        ray.candidates.iter().zip(found).filter(|(_, w)| **w != 0).map(|(c, w)| (*c, *w)).collect()
+    };
+    rays.iter().map(around).collect()
+}
+
+/// The closed components, ascending, and their boxes in that order.
+fn closed_ones(list: &[Component]) -> (Vec<u32>, BoxTree) {
+    let closed: Vec<u32> = (0..list.len() as u32).filter(|c| !list[*c as usize].open).collect();
+    let boxes: Vec<Bounds> = closed.iter().map(|c| list[*c as usize].bounds).collect();
+    (closed, BoxTree::new(&boxes))
+}
+
+/// A direction along an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Direction {
+    pub(crate) axis: usize,
+    /// Towards smaller coordinates.
+    pub(crate) backward: bool,
+}
+
+impl Direction {
+    /// The coordinates of a point in a frame in which this is upwards. Exact, and even where coordinates are mirrored, an edge that two triangles
+    /// share is the same for both.
+    pub(crate) fn upright<T: Copy + Neg<Output = T>>(self, p: [T; 3]) -> [T; 3] {
+        let [x, y, z] = [1, 2, 0].map(|k| p[(self.axis + k) % 3]);
+        [x, y, if self.backward { -z } else { z }]
+    }
+
+    fn upright_box(self, of: &Bounds) -> Bounds {
+        let (mut lo, mut hi) = (self.upright(of.lo), self.upright(of.hi));
+        if self.backward {
+            (lo[2], hi[2]) = (hi[2], lo[2]);
+        }
+        Bounds { lo, hi }
+    }
+}
+
+/// Where a ray begins, and the component that does not stand in its way.
+pub(crate) struct Source {
+    pub(crate) from: [f64; 3],
+    pub(crate) component: u32,
+}
+
+/// Which rays meet another component on their way in a direction. Triangles of the workshop count if `counts` says so, all others do; one whose
+/// plane holds the ray, or where it begins, does not. O(triangles under rays), and reads the chunks of the file that the rays may meet.
+pub(crate) fn obstructed(
+    survey: &Survey<'_>,
+    shop: &Shop,
+    components: &Components,
+    direction: Direction,
+    sources: &[Source],
+    counts: impl Fn(u32) -> bool,
+) -> Vec<bool> {
+    if sources.is_empty() {
+        return Vec::new();
+    }
+    let rays: Vec<Ray> =
+        sources.iter().map(|source| Ray { from: direction.upright(source.from), candidates: Vec::new() }).collect();
+    let grid = Grid::new(&rays);
+    let met: Vec<AtomicBool> = sources.iter().map(|_| AtomicBool::new(false)).collect();
+    let meet = |corners: &[[f32; 3]; 3], component: u32| {
+        for r in grid.under(corners).flatten().map(|r| *r as usize) {
+            // Whoever meets it first: it is met.
+            if sources[r].component != component && !met[r].load(Relaxed) && crossing(corners, rays[r].from) != 0 {
+                met[r].store(true, Relaxed);
+            }
+        }
+    };
+    let upright = |corners: &[[f32; 3]; 3]| corners.map(|p| direction.upright(p));
+    survey.visit_sound(
+        |patch| components.of_patch[patch as usize] != NONE,
+        |reach| Over::new(&rays, &grid, &direction.upright_box(reach)),
+        |over, corners| over.may_meet(&grid, &upright(corners)),
+        |_, triangle, patch| {
+            let corners = record::corners(&survey.records[triangle as usize]);
+            meet(&upright(&corners), components.of_patch[patch as usize]);
+        },
+    );
+    for t in shop.living().filter(|t| counts(*t)) {
+        meet(&upright(&shop.points(t)), components.of_triangle[t as usize]);
+    }
+    met.into_iter().map(AtomicBool::into_inner).collect()
+}
+
+/// The components asked about whose boxes lie in closed ones', ascending, and a ray for each.
+fn rays(survey: &Survey<'_>, shop: &Shop, list: &[Component], asks: impl Fn(&Component) -> bool) -> (Vec<u32>, Vec<Ray>) {
+    if list.len() < 2 || list.iter().all(|c| c.open) {
+        return Default::default();
+    }
+    let (closed, tree) = closed_ones(list);
+    let mut found = Vec::new();
+    let (mut of_rays, mut rays) = (Vec::new(), Vec::new());
+    for (component, inner) in (0..).zip(list).filter(|(_, inner)| asks(inner)) {
+        tree.meeting(&inner.bounds, &mut found);
+        let around = found.iter().map(|j| closed[*j as usize]);
+        let candidates: Vec<u32> =
+            around.filter(|c| *c != component && list[*c as usize].bounds.contains(&inner.bounds)).collect();
+        if !candidates.is_empty() {
+            let Sample { record, in_shop } = inner.sample;
+            let corners = in_shop.map_or_else(|| record::corners(&survey.records[record as usize]), |t| shop.points(t));
+            of_rays.push(component);
+            rays.push(Ray { from: inner_point(&corners), candidates });
+        }
+    }
+    (of_rays, rays)
+}
+
+/// The weights of a triangle's corners in a point of it, of no symmetry, so that it does not fall on grid lines that models are built on.
+pub(crate) const INNER_POINT: [f64; 3] = [0.318_411, 0.367_778, 0.313_811];
+
+/// A point of a triangle.
+pub(crate) fn inner_point(corners: &[[f32; 3]; 3]) -> [f64; 3] {
+    std::array::from_fn(|k| (0..3).map(|i| INNER_POINT[i] * f64::from(corners[i][k])).sum())
+}
+
+/// The rays that may meet what lies in some box.
+enum Over {
+    /// Few enough to be compared with each triangle: for each x and y, the largest f32 up to it and the smallest from it on.
+    Few(Vec<[[f32; 2]; 2]>),
+    Many,
+}
+
+impl Over {
+    /// More rays than these are looked up in the grid.
+    const FEW: usize = 4;
+
+    /// `None`: no ray meets the box.
+    fn new(rays: &[Ray], grid: &Grid, reach: &Bounds) -> Option<Self> {
+        if reach.is_empty() {
+            return None;
+        }
+        let inside = |ray: &&Ray| {
+            let within = |k: usize| f64::from(reach.lo[k]) <= ray.from[k] && ray.from[k] <= f64::from(reach.hi[k]);
+            within(0) && within(1) && ray.from[2] <= f64::from(reach.hi[2])
+        };
+        let mut few = Vec::new();
+        let corners = [reach.lo, reach.hi, reach.hi];
+        for ray in grid.under(&corners).flatten().map(|r| &rays[*r as usize]).filter(inside) {
+            if few.len() == Self::FEW {
+                return Some(Self::Many);
+            }
+            few.push([0, 1].map(|k| around(ray.from[k])));
+        }
+        (!few.is_empty()).then_some(Self::Few(few))
+    }
+
+    /// Asked of every triangle.
+    #[inline(always)]
+    fn may_meet(&self, grid: &Grid, corners: &[[f32; 3]; 3]) -> bool {
+        let low = |k: usize| corners[0][k].min(corners[1][k]).min(corners[2][k]);
+        let high = |k: usize| corners[0][k].max(corners[1][k]).max(corners[2][k]);
+        match self {
+            Self::Few(few) => {
+                let (lo, hi) = ([low(0), low(1)], [high(0), high(1)]);
+                few.iter().any(|[x, y]| (lo[0] <= x[0]) & (hi[0] >= x[1]) & (lo[1] <= y[0]) & (hi[1] >= y[1]))
+            }
+            Self::Many => grid.may_meet(corners),
+        }
+    }
+}
+
+/// The largest f32 that is not above `x`, and the smallest that is not below.
+pub(crate) fn around(x: f64) -> [f32; 2] {
+    let near = x as f32;
+    [if f64::from(near) > x { near.next_down() } else { near }, if f64::from(near) < x { near.next_up() } else { near }]
+}
+
+/// Rays by their place seen from above, in a grid of square cells.
+struct Grid {
+    lo: [f64; 2],
+    per_unit: [f64; 2],
+    side: usize,
+    /// Rays by cell, and where each cell's begin.
+    starts: Vec<u32>,
+    order: Vec<u32>,
+    /// Where each ray's candidates begin in the table of counts.
+    bases: Vec<u32>,
+}
+
+impl Grid {
+    fn new(rays: &[Ray]) -> Self {
+        // Several cells a ray, so that most small triangles are over with at the first look.
+        let side = ((rays.len() as f64).sqrt() as usize * 8).clamp(1, 1024);
+        let (mut lo, mut hi) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for ray in rays {
+            for k in 0..2 {
+                lo[k] = lo[k].min(ray.from[k]);
+                hi[k] = hi[k].max(ray.from[k]);
+            }
+        }
+        let per_unit = std::array::from_fn(|k| if hi[k] > lo[k] { side as f64 / (hi[k] - lo[k]) } else { 0.0 });
+        let mut grid = Self { lo, per_unit, side, starts: vec![0; side * side + 1], order: Vec::new(), bases: Vec::new() };
+        let cells: Vec<usize> = rays.iter().map(|r| grid.cell(1, r.from[1]) * side + grid.cell(0, r.from[0])).collect();
+        cells.iter().for_each(|c| grid.starts[c + 1] += 1);
+        (0..side * side).for_each(|c| grid.starts[c + 1] += grid.starts[c]);
+        grid.order = (0..rays.len() as u32).collect();
+        grid.order.sort_by_key(|r| cells[*r as usize]);
+        let mut base = 0;
+        for ray in rays {
+            grid.bases.push(base);
+            base += ray.candidates.len() as u32;
+        }
+        grid
+    }
+
+    fn cell(&self, axis: usize, x: f64) -> usize {
+        (((x - self.lo[axis]) * self.per_unit[axis]) as usize).min(self.side - 1)
+    }
+
+    /// The rays in the cells under the box of three corners, row by row.
+    fn under(&self, corners: &[[f32; 3]; 3]) -> impl Iterator<Item = &[u32]> {
+        let span = |k: usize| {
+            let x = corners.map(|c| f64::from(c[k]));
+            (self.cell(k, x[0].min(x[1]).min(x[2])), self.cell(k, x[0].max(x[1]).max(x[2])))
+        };
+        let ((x0, x1), (y0, y1)) = (span(0), span(1));
+        (y0..=y1).map(move |row| {
+            let row = row * self.side;
+            &self.order[self.starts[row + x0] as usize..self.starts[row + x1 + 1] as usize]
+        })
+    }
+
+    /// Is there a ray in the cells under the triangle? Asked of every triangle, so one cell is the case to be fast in.
+    #[inline]
+    fn may_meet(&self, corners: &[[f32; 3]; 3]) -> bool {
+        let cell = |k: usize, x: f32| self.cell(k, f64::from(x));
+        let low = |k: usize| corners[0][k].min(corners[1][k]).min(corners[2][k]);
+        let high = |k: usize| corners[0][k].max(corners[1][k]).max(corners[2][k]);
+        let (x0, x1, y0, y1) = (cell(0, low(0)), cell(0, high(0)), cell(1, low(1)), cell(1, high(1)));
+        (y0..=y1).any(|row| self.starts[row * self.side + x0] != self.starts[row * self.side + x1 + 1])
+    }
+
+    /// Reports `(place in the table of counts, signed crossing)` for every ray that asks for `component` and meets the triangle.
+    fn cross(&self, rays: &[Ray], corners: &[[f32; 3]; 3], component: u32, hit: &mut dyn FnMut(u32, i32)) {
+        for row in self.under(corners) {
+            for r in row {
+                let ray = &rays[*r as usize];
+                if let Ok(i) = ray.candidates.binary_search(&component) {
+                    let w = crossing(corners, ray.from);
+                    if w != 0 {
+                        hit(self.bases[*r as usize] + i as u32, w);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// How the ray upwards from `p` crosses a triangle: 1 from inside to outside, −1 from outside to inside, 0 not at all. A point on
+/// the triangle's plane does not cross it.
+pub(crate) fn crossing(corners: &[[f32; 3]; 3], p: [f64; 3]) -> i32 {
+    let q = corners.map(|c| c.map(f64::from));
+    if q.iter().all(|c| c[2] < p[2]) {
+        return 0;
+    }
+    let mut winding = 0;
+    for k in 0..3 {
+        let (a, b) = (q[k], q[(k + 1) % 3]);
+        let flat = |v: [f64; 3]| Coord { x: v[0], y: v[1] };
+        let from = Coord { x: p[0], y: p[1] };
+        // Half-open in y, strict in x: an edge shared by two triangles is decided alike for both.
+        if a[1] <= p[1] && b[1] > p[1] && robust::orient2d(flat(a), flat(b), from) > 0.0 {
+            winding += 1;
+        } else if b[1] <= p[1] && a[1] > p[1] && robust::orient2d(flat(b), flat(a), from) > 0.0 {
+            winding -= 1;
+        }
+    }
+    if winding == 0 {
+        return 0;
+    }
+    let at = |v: [f64; 3]| Coord3D { x: v[0], y: v[1], z: v[2] };
+    // Positive when p lies below the plane of three corners that run counter-clockwise seen from above.
+    let below = robust::orient3d(at(q[0]), at(q[1]), at(q[2]), at(p));
+    if below * f64::from(winding) > 0.0 { winding } else { 0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::submesh::components::Through;
+    use crate::testing::{Corners, cuboid, diagnose, records, reversed};
+
+    fn around(triangles: &[Corners]) -> Vec<Vec<(u32, i32)>> {
+        let records = records(triangles);
+        let d = diagnose(&records);
+        let none = Reversed::none(&d.survey);
+        let components =
+            Components::of(&d.survey, &d.shop, &crate::submesh::edges::Edges::of(&d.shop), &none, Through::EveryEdge);
+        surroundings(&d.survey, &d.shop, &components, &none, |_| true).into_iter().map(|s| s.around).collect()
+    }
+
+    fn nested(size: u8) -> Vec<Corners> {
+        cuboid([-f32::from(size); 3], [f32::from(size); 3])
+    }
+
+    #[test]
+    fn each_cube_winds_once_around_those_inside_it() {
+        // Components are numbered by their first triangle: 0 is the largest.
+        let got = around(&[nested(4), nested(2), nested(1)].concat());
+        assert_eq!(got, [vec![], vec![(0, 1)], vec![(0, 1), (1, 1)]]);
+        // A cavity winds the other way, so what floats in it is in nothing.
+        let got = around(&[nested(4), reversed(&nested(2)), nested(1)].concat());
+        assert_eq!(got, [vec![], vec![(0, 1)], vec![(0, 1), (1, -1)]]);
+    }
+
+    #[test]
+    fn a_box_inside_a_box_is_not_yet_a_body_inside_a_body() {
+        // The small cube lies in the corner that the octahedron leaves free in its box.
+        let got = around(&[octahedron(), cuboid([0.7; 3], [0.8; 3])].concat());
+        assert_eq!(got, [vec![], vec![]]);
+    }
+
+    /// The unit octahedron: vertices on the axes, so that rays on the grid hit vertices and edges.
+    fn octahedron() -> Vec<Corners> {
+        let signs = (0..8u8).map(|n| [0, 1, 2].map(|k| if n >> k & 1 == 1 { -1.0f32 } else { 1.0 }));
+        let face = |[x, y, z]: [f32; 3]| {
+            let [a, b, c] = [[x, 0.0, 0.0], [0.0, y, 0.0], [0.0, 0.0, z]];
+            if x * y * z > 0.0 { [a, b, c] } else { [a, c, b] }
+        };
+        signs.map(face).collect()
+    }
+
+    #[test]
+    fn each_direction_meets_what_lies_there_and_nothing_else() {
+        // Cubes of side 2 around the middle: one in each direction along the axes, each at another distance.
+        let middle = cuboid([-1.0; 3], [1.0; 3]);
+        for axis in 0..3 {
+            for backward in [false, true] {
+                let mut by = [0.0; 3];
+                by[axis] = if backward { -4.0 } else { 5.0 };
+                let mesh = [middle.clone(), crate::testing::shifted(&middle, by)].concat();
+                let records = records(&mesh);
+                let d = diagnose(&records);
+                let edges = crate::submesh::edges::Edges::of(&d.shop);
+                let none = Reversed::none(&d.survey);
+                let components = Components::of(&d.survey, &d.shop, &edges, &none, Through::EveryEdge);
+                for (other, turned) in (0..3).flat_map(|k| [(k, false), (k, true)]) {
+                    let direction = Direction { axis: other, backward: turned };
+                    // On grid lines, where rays run through diagonals of faces.
+                    let source = |component| [Source { from: [0.0; 3], component }];
+                    let met = |component| obstructed(&d.survey, &d.shop, &components, direction, &source(component), |_| true);
+                    assert_eq!(met(0), [(other, turned) == (axis, backward)], "{direction:?}, towards {by:?}");
+                    assert_eq!(met(1), [true], "out of the cube that is not the ray's own");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_ray_through_a_vertex_or_an_edge_counts_once() {
+        let crossings = |triangles: &[Corners], p| triangles.iter().map(|t| crossing(t, p)).sum::<i32>();
+        for (p, where_to) in [([0.0, 0.0, 0.0], "the top vertex"), ([0.25, 0.0, 0.0], "an edge"), ([0.1, 0.2, 0.0], "a face")] {
+            assert_eq!(crossings(&octahedron(), p), 1, "out through {where_to}");
+            assert_eq!(crossings(&reversed(&octahedron()), p), -1, "{where_to}, inside out");
+            assert_eq!(crossings(&octahedron(), [p[0], p[1], -5.0]), 0, "in at the bottom and out through {where_to}");
+            assert_eq!(crossings(&octahedron(), [p[0], p[1], 5.0]), 0, "upwards from above {where_to}");
+        }
+        // Under the diagonal that the two triangles of a cube's top share.
+        assert_eq!(crossings(&nested(1), [0.0; 3]), 1);
+    }
+}

@@ -1,0 +1,176 @@
+//! Self-intersections of a written file, where those of its input are known: pairs of untouched triangles are as they were, so only
+//! pairs with a fresh triangle are tested.
+//!
+//! Every fresh triangle is tested against everything whose box meets its own, chunk by chunk: the cell that has the lowest corner of the
+//! boxes' overlap owns the pair, and both triangles are there as members or visitors.
+
+use crate::contract::report::SelfIntersections;
+use crate::geometry::boxes::BoxTree;
+use crate::geometry::grid::Grid;
+use crate::geometry::position::canonical;
+use crate::geometry::sums::Bounds;
+use crate::geometry::tri_tri::{self, Contact, Triangle as Corners, common};
+use crate::io::record;
+use crate::output::readback::Difference;
+use crate::stream::plan::HomeBox;
+use crate::stream::source::{Seen, Source, Triangle};
+use crate::topology::crossings::{Crossings, Pair, most_tested};
+use crate::topology::survey::Survey;
+
+/// All self-intersections of the written file, numbered as its records are; `None` if those of the input are not all known, or too many
+/// boxes meet. O(n) boxes are held against a grid of the fresh ones around.
+pub(crate) fn self_intersections(survey: &Survey<'_>, difference: &Difference) -> Option<SelfIntersections> {
+    let is_gone = |place: u32| difference.gone.binary_search(&place).is_ok();
+    let known = survey.crossing_pairs.as_ref()?.iter().filter(|pair| !pair.triangles.iter().any(|t| is_gone(*t)));
+    let fresh = difference.fresh.iter().map(|(place, record)| (*place, record::corners(record)));
+    let new = met_by(survey, fresh, std::iter::empty(), is_gone, difference.written_records as u64, self_intersection)?;
+    let mut pairs: Vec<Pair> = known.copied().chain(new).collect();
+    for pair in &mut pairs {
+        // The numbers keep their order.
+        pair.triangles = pair.triangles.map(|place| difference.number(place));
+        pair.triangles.sort_unstable();
+    }
+    Some(Crossings::of_pairs(pairs))
+}
+
+/// How two triangles with an area, whose boxes meet, meet in a way that is asked for.
+pub(crate) type Meets = fn(&Corners, &Corners) -> Option<Contact>;
+
+/// Crossing or overlapping, as [`Meets`].
+pub(crate) fn self_intersection(a: &Corners, b: &Corners) -> Option<Contact> {
+    tri_tri::self_intersection(a, b, common(a, b))
+}
+
+/// All pairs in which one of the `fresh` triangles meets another of them, one of those `beside`, or one of the input that is not gone, in the
+/// way that is asked for; `None` if too many boxes meet for a file of so many triangles. Triangles go by numbers that no other one has. O(n) boxes where a
+/// chunk holds a fresh one are held against a grid of these.
+pub(crate) fn met_by(
+    survey: &Survey<'_>,
+    fresh: impl Iterator<Item = (u32, Corners)>,
+    beside: impl Iterator<Item = (u32, Corners)>,
+    is_gone: impl Fn(u32) -> bool + Sync,
+    triangles: u64,
+    meets: Meets,
+) -> Option<Vec<Pair>> {
+    let [fresh, beside] = [Solids::of(fresh), Solids::of(beside)];
+    let per_chunk =
+        survey.each_chunk(Search::default, |search, cell, seen| search.chunk(&fresh, &beside, &is_gone, (cell, meets), seen));
+    if per_chunk.iter().map(|found| found.tested).sum::<u64>() > most_tested(triangles) {
+        return None;
+    }
+    Some(per_chunk.into_iter().flat_map(|found| found.pairs).collect())
+}
+
+/// A triangle that has an area, with its box.
+struct Solid {
+    place: u32,
+    corners: Corners,
+    bounds: Bounds,
+}
+
+impl Solid {
+    fn of(place: u32, corners: Corners) -> Option<Self> {
+        let corners = corners.map(canonical);
+        let [a, b, c] = &corners;
+        // Two equal corners are collinear with any third.
+        (!crate::geometry::collinear::is_collinear(a, b, c)).then(|| Self { place, corners, bounds: Bounds::of(&corners) })
+    }
+}
+
+/// Triangles that can intersect anything.
+struct Solids {
+    all: Vec<Solid>,
+    tree: BoxTree,
+}
+
+impl Solids {
+    fn of(triangles: impl Iterator<Item = (u32, Corners)>) -> Self {
+        let all: Vec<Solid> = triangles.filter_map(|(place, corners)| Solid::of(place, corners)).collect();
+        let tree = BoxTree::new(&all.iter().map(|f| f.bounds).collect::<Vec<_>>());
+        Self { all, tree }
+    }
+
+    /// Those whose boxes meet `wanted`.
+    fn meeting<'s>(&'s self, wanted: &Bounds, found: &mut Vec<u32>) -> Vec<&'s Solid> {
+        found.clear();
+        if !self.all.is_empty() {
+            self.tree.meeting(wanted, found);
+        }
+        found.iter().map(|f| &self.all[*f as usize]).collect()
+    }
+}
+
+/// What a chunk found.
+#[derive(Default)]
+struct Found {
+    tested: u64,
+    pairs: Vec<Pair>,
+}
+
+/// A worker's lists, used again from chunk to chunk.
+#[derive(Default)]
+struct Search {
+    met: Vec<u32>,
+    grid: Grid,
+}
+
+impl Search {
+    fn chunk(
+        &mut self,
+        fresh: &Solids,
+        beside: &Solids,
+        is_gone: &impl Fn(u32) -> bool,
+        (cell, meets): (HomeBox, Meets),
+        seen: [&Seen<'_>; 2],
+    ) -> Found {
+        let mut found = Found::default();
+        let (lo, hi) = cell.ends();
+        let here = fresh.meeting(&Bounds { lo, hi }, &mut self.met);
+        if here.is_empty() {
+            return found;
+        }
+        let boxes: Vec<Bounds> = here.iter().map(|f| f.bounds).collect();
+        let tree = BoxTree::new(&boxes);
+        for (i, one) in here.iter().enumerate() {
+            tree.meeting(&one.bounds, &mut self.met);
+            for other in self.met.iter().filter(|j| **j as usize > i) {
+                found.test(one, here[*other as usize], cell, meets);
+            }
+            for other in beside.meeting(&one.bounds, &mut self.met) {
+                found.test(one, other, cell, meets);
+            }
+        }
+        self.grid.mark(boxes.iter().copied());
+        for triangles in seen {
+            triangles.for_each(|place, triangle| {
+                let corners = triangle.corners();
+                let bounds = Bounds::of(&corners);
+                if !self.grid.may_meet(&bounds) {
+                    return;
+                }
+                tree.meeting(&bounds, &mut self.met);
+                if self.met.is_empty() || is_gone(place) {
+                    return;
+                }
+                if let Some(one) = Solid::of(place, corners) {
+                    self.met.iter().for_each(|f| found.test(here[*f as usize], &one, cell, meets));
+                }
+            });
+        }
+        found
+    }
+}
+
+impl Found {
+    /// Decides a pair whose boxes meet, if the cell owns it.
+    fn test(&mut self, one: &Solid, other: &Solid, cell: HomeBox, meets: Meets) {
+        let lowest = std::array::from_fn(|k| one.bounds.lo[k].max(other.bounds.lo[k]));
+        if !cell.holds(lowest) {
+            return;
+        }
+        self.tested += 1;
+        if let Some(contact) = meets(&one.corners, &other.corners) {
+            self.pairs.push(Pair { triangles: [one.place, other.place], contact });
+        }
+    }
+}

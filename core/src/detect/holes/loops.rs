@@ -1,0 +1,499 @@
+//! Boundary loops, in the direction in which a patch traverses them.
+//!
+//! A boundary edge is used by one triangle; its patch uses it the other way round. Where several holes meet in a vertex, the way
+//! goes on to the fan that lies across the hole, so that filling joins all fans into one. A way that comes back to a vertex is
+//! cut there into simple loops. A hole that reaches an edge where other surface meets goes on along that edge.
+
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap, HashMap, HashSet};
+
+use crate::geometry::exact::Point;
+use crate::submesh::edges::{Edge, Edges, Use};
+use crate::submesh::{self, Shop, Vertex};
+
+/// A simple boundary loop.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Loop {
+    /// Vertices in the patch's direction, from the smallest.
+    pub(crate) vertices: Vec<Vertex>,
+    /// For each edge from a vertex to the next, the triangle on its other side.
+    pub(crate) triangles: Vec<u32>,
+    /// Part of it runs along non-manifold edges, which lack a triangle.
+    pub(crate) branches: bool,
+    /// The way that it was cut from: loops of one way meet in vertices.
+    pub(crate) way: u32,
+}
+
+impl Loop {
+    pub(crate) fn points(&self, shop: &Shop) -> Vec<Point> {
+        self.vertices.iter().map(|v| shop.positions[*v as usize]).collect()
+    }
+
+    /// For each edge, the third corner of the triangle on its other side.
+    pub(crate) fn apexes(&self, shop: &Shop) -> Vec<Option<Point>> {
+        let n = self.vertices.len();
+        let apex = |i: usize| {
+            let ends = [self.vertices[i], self.vertices[(i + 1) % n]];
+            let apex = shop.triangles[self.triangles[i] as usize].v.into_iter().find(|v| !ends.contains(v));
+            apex.map(|v| shop.positions[v as usize])
+        };
+        (0..n).map(apex).collect()
+    }
+
+    /// This loop with another one put in where they meet; `None` if they do not. What comes of it is in one vertex twice.
+    pub(crate) fn with(&self, other: &Loop) -> Option<Loop> {
+        let at = self.vertices.iter().position(|v| other.vertices.contains(v))?;
+        let from = other.vertices.iter().position(|v| *v == self.vertices[at])?;
+        let put_in = |own: &[u32], others: &[u32]| {
+            let turned = others[from..].iter().chain(&others[..from]);
+            own[..at].iter().chain(turned).chain(&own[at..]).copied().collect()
+        };
+        Some(Loop {
+            vertices: put_in(&self.vertices, &other.vertices),
+            triangles: put_in(&self.triangles, &other.triangles),
+            branches: self.branches || other.branches,
+            way: self.way,
+        })
+    }
+
+    pub(crate) fn perimeter(&self, shop: &Shop) -> f64 {
+        let n = self.vertices.len();
+        (0..n).map(|i| shop.distance(self.vertices[i], self.vertices[(i + 1) % n])).sum()
+    }
+}
+
+/// An edge that lacks a triangle, in the direction in which a patch would run through it.
+#[derive(Clone, Copy)]
+struct Rim {
+    from: Vertex,
+    to: Vertex,
+    /// The triangle on its other side.
+    triangle: u32,
+    /// It has other triangles too, which are each other's neighbours.
+    branches: bool,
+}
+
+/// The boundary of a workshop.
+#[derive(Debug, Default)]
+pub(crate) struct Boundary {
+    /// All simple loops, by smallest vertex.
+    pub(crate) loops: Vec<Loop>,
+    /// The boundary edges that are in none, in runs, by first vertex: ways that end where the triangles around a vertex do not agree.
+    pub(crate) chains: Vec<Vec<Vertex>>,
+}
+
+/// All boundary loops, by smallest vertex. O(n log n) in the boundary and the non-manifold edges.
+pub(crate) fn find(shop: &Shop, edges: &Edges) -> Vec<Loop> {
+    boundary(shop, edges).loops
+}
+
+/// The boundary in loops, and what is in none. A boundary that runs into a non-manifold edge goes on along it, if that lacks a triangle
+/// too: where the triangles around agree on their directions, the edges that lack one are a cycle (the boundary of a boundary is
+/// nothing), and so every way closes. O(n log n) in the boundary and the non-manifold edges.
+pub(crate) fn boundary(shop: &Shop, edges: &Edges) -> Boundary {
+    let mut rims: Vec<Rim> = edges.iter().filter_map(|e| lacking(shop, &e)).collect();
+    rims.sort_unstable_by_key(|r| (r.from, r.to));
+    let next = link(shop, edges, &rims);
+    let mut seen = vec![false; rims.len()];
+    let mut boundary = Boundary::default();
+    // A way that does not close is walked from its first edge.
+    let mut is_first = vec![true; rims.len()];
+    next.iter().filter(|n| **n != crate::util::union_find::NONE).for_each(|n| is_first[*n as usize] = false);
+    let firsts = (0..rims.len()).filter(|r| is_first[*r]);
+    for start in firsts.chain(0..rims.len()) {
+        let mut way: Vec<usize> = Vec::new();
+        let mut at = start as u32;
+        while at != crate::util::union_find::NONE && !seen[at as usize] {
+            seen[at as usize] = true;
+            way.push(at as usize);
+            at = next[at as usize];
+        }
+        cut_into_loops(&rims, start as u32, &way, &mut boundary);
+    }
+    boundary.loops.sort_by(|a, b| a.vertices.cmp(&b.vertices));
+    boundary.chains.sort();
+    boundary
+}
+
+/// An edge as the rim of a patch, if it lacks one triangle: a boundary edge, or a non-manifold one used once more in one direction than
+/// in the other.
+fn lacking(shop: &Shop, edge: &Edge<'_>) -> Option<Rim> {
+    let used = match edge.uses {
+        [used] => *used,
+        uses if uses.len() % 2 == 1 => unpaired(shop, edge)?,
+        _ => return None,
+    };
+    let (to, from) = edge.directed(&used);
+    Some(Rim { from, to, triangle: used.triangle, branches: edge.uses.len() > 1 })
+}
+
+/// The triangle of a non-manifold edge that is left when the others are paired around it, each with the one that faces its back: two such
+/// bound the same piece of a solid. `None` if more than one is left, or the edge has no length.
+fn unpaired(shop: &Shop, edge: &Edge<'_>) -> Option<Use> {
+    let axis = (shop.place(edge.high) - shop.place(edge.low)).normalize_or_zero();
+    let u = axis.any_orthonormal_vector();
+    let w = axis.cross(u);
+    let mut around: Vec<(f64, Use)> = edge
+        .uses
+        .iter()
+        .map(|used| {
+            let ends = [edge.low, edge.high];
+            let apex = shop.triangles[used.triangle as usize].v.into_iter().find(|v| !ends.contains(v)).unwrap_or(edge.low);
+            let out = shop.place(apex) - shop.place(edge.low);
+            (turn(out.dot(u), out.dot(w)), *used)
+        })
+        .collect();
+    around.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.triangle.cmp(&b.1.triangle)));
+    // Seen along the edge, a triangle that runs through it forward has the solid before it, in the order of angles; the other kind behind.
+    // Twice around, so that a pair across the start is found.
+    let n = around.len();
+    let mut paired = vec![false; n];
+    let mut waiting: Vec<usize> = Vec::new();
+    for i in (0..2 * n).map(|i| i % n) {
+        if paired[i] {
+            continue;
+        }
+        if !around[i].1.forward {
+            if !waiting.contains(&i) {
+                waiting.push(i);
+            }
+        } else if let Some(other) = waiting.pop() {
+            (paired[i], paired[other]) = (true, true);
+        }
+    }
+    let mut left = (0..n).filter(|i| !paired[*i]);
+    left.next().filter(|_| left.next().is_none()).map(|i| around[i].1)
+}
+
+/// Grows with the angle of a direction, from 0 to 4 in one turn.
+fn turn(x: f64, y: f64) -> f64 {
+    let size = x.abs() + y.abs();
+    if size == 0.0 {
+        return 0.0;
+    }
+    let (x, y) = (x / size, y / size);
+    match (x >= 0.0, y >= 0.0) {
+        (true, true) => y,
+        (false, true) => 1.0 - x,
+        (false, false) => 2.0 - y,
+        (true, false) => 3.0 + x,
+    }
+}
+
+/// The edge after each edge. Boundary edges go on among themselves where as many run into a vertex as out of it.
+fn link(shop: &Shop, edges: &Edges, rims: &[Rim]) -> Vec<u32> {
+    let mut next = vec![crate::util::union_find::NONE; rims.len()];
+    let mut incoming: Vec<u32> = (0..rims.len() as u32).collect();
+    incoming.sort_unstable_by_key(|r| (rims[*r as usize].to, *r));
+    for group in incoming.chunk_by(|a, b| rims[*a as usize].to == rims[*b as usize].to) {
+        let v = rims[group[0] as usize].to;
+        let from = rims.partition_point(|r| r.from < v);
+        let outgoing: Vec<u32> = (from..rims.len()).take_while(|r| rims[*r].from == v).map(|r| r as u32).collect();
+        if let ([i], [o]) = (group, outgoing.as_slice()) {
+            next[*i as usize] = *o;
+            continue;
+        }
+        let part = |all: &[u32]| all.iter().copied().partition(|r| !rims[*r as usize].branches);
+        let (into, into_branches): (Vec<u32>, Vec<u32>) = part(group);
+        let (out, out_branches): (Vec<u32>, Vec<u32>) = part(&outgoing);
+        let mut pair = |incoming: &[u32], outgoing: &[u32]| {
+            for (i, o) in across(shop, edges, rims, v, incoming, outgoing) {
+                next[i as usize] = o;
+            }
+        };
+        if into.len() == out.len() {
+            pair(&into, &out);
+            pair(&into_branches, &out_branches);
+        } else {
+            pair(group, &outgoing);
+        }
+    }
+    next
+}
+
+/// Where more fans than this meet, their edges are paired as they come: comparing all with all would take quadratic time, and no order
+/// makes surface of such a vertex.
+const MAX_FANS: usize = 64;
+
+/// Pairs the edges into and out of a vertex where several fans meet: each way in goes out along another fan, the one at the
+/// smallest angle first; along its own fan only if nothing else is left.
+fn across(shop: &Shop, edges: &Edges, rims: &[Rim], v: Vertex, incoming: &[u32], outgoing: &[u32]) -> Vec<(u32, u32)> {
+    if incoming.len() > MAX_FANS {
+        return incoming.iter().copied().zip(outgoing.iter().copied()).collect();
+    }
+    let fans = fans(shop, edges, v);
+    let fan = |rim: u32| {
+        fans.iter().find(|(t, _)| *t == rims[rim as usize].triangle).map_or(crate::util::union_find::NONE, |(_, f)| *f)
+    };
+    let mut pairs: Vec<(bool, f64, u32, u32)> = Vec::new();
+    for i in incoming {
+        for o in outgoing {
+            let cosine = submesh::cosine(shop.vector(v, rims[*i as usize].from), shop.vector(v, rims[*o as usize].to));
+            pairs.push((fan(*i) == fan(*o), -cosine, *i, *o));
+        }
+    }
+    pairs.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then((a.2, a.3).cmp(&(b.2, b.3))));
+    let mut chosen: Vec<(u32, u32)> = Vec::new();
+    for (_, _, i, o) in pairs {
+        if chosen.iter().all(|(a, b)| *a != i && *b != o) {
+            chosen.push((i, o));
+        }
+    }
+    chosen
+}
+
+/// The triangles around `v`, each with the smallest triangle of its fan.
+fn fans(shop: &Shop, edges: &Edges, v: Vertex) -> Vec<(u32, u32)> {
+    let mut star: Vec<u32> = shop.star(v).map(|(t, _)| t).collect();
+    star.sort_unstable();
+    let number = |t: u32| star.binary_search(&t).unwrap_or(0) as u32;
+    let mut parents: Vec<u32> = (0..star.len() as u32).collect();
+    for t in &star {
+        for w in shop.triangles[*t as usize].v.into_iter().filter(|w| *w != v) {
+            if let Some([a, b]) = edges.between(v, w).map(|e| e.uses) {
+                crate::util::union_find::unite(&mut parents, number(a.triangle), number(b.triangle));
+            }
+        }
+    }
+    (0..star.len() as u32).map(|i| (star[i as usize], star[crate::util::union_find::find(&mut parents, i) as usize])).collect()
+}
+
+/// Cuts a way of consecutive edges wherever it comes back to a vertex. What does not close is chains. Of non-manifold edges alone nothing
+/// is made: nothing is missing there that a patch could restore.
+fn cut_into_loops(rims: &[Rim], number: u32, way: &[usize], boundary: &mut Boundary) {
+    let mut open: Vec<Rim> = Vec::new();
+    let mut place: HashMap<Vertex, usize> = HashMap::new();
+    for rim in way.iter().map(|r| rims[*r]) {
+        place.insert(rim.from, open.len());
+        open.push(rim);
+        if let Some(start) = place.get(&rim.to).copied() {
+            let closed: Vec<Rim> = open.drain(start..).collect();
+            closed.iter().for_each(|r| {
+                place.remove(&r.from);
+            });
+            if closed.iter().any(|r| !r.branches) {
+                boundary.loops.push(from_smallest(&closed, number));
+            }
+        }
+    }
+    for chain in open.chunk_by(|a, b| !a.branches && !b.branches).filter(|chain| !chain[0].branches) {
+        let last = chain.last().map(|r| r.to);
+        boundary.chains.push(chain.iter().map(|r| r.from).chain(last).collect());
+    }
+}
+
+/// Vertices looked at, at most, to find the shortest ways back of [`unbalanced`]; from there on any way will do.
+const MOST_LOOKED_AT: usize = 1 << 22;
+
+/// What is used less often than the other way round, apart from some loops: simple loops in the direction of what is lacking, whether one triangle
+/// is at their edges or several, and whatever their directions are. With triangles over all of these, every edge is used equally often in both
+/// directions. From each edge, the loop goes back by the shortest way, so that patches are small. O(n log n) in the boundary and the
+/// non-manifold edges for each loop, where their ways are long, and for all within a bound.
+pub(crate) fn unbalanced<'l>(shop: &Shop, edges: &Edges, apart_from: impl Iterator<Item = &'l Loop>) -> Vec<Vec<Vertex>> {
+    let mut ways: BTreeMap<Vertex, Vec<Vertex>> = BTreeMap::new();
+    for edge in edges.iter().filter(Edge::is_unbalanced) {
+        let forward = edge.uses.iter().filter(|used| used.forward).count();
+        let backward = edge.uses.len() - forward;
+        let (from, to) = if forward > backward { (edge.high, edge.low) } else { (edge.low, edge.high) };
+        ways.entry(from).or_default().extend(std::iter::repeat_n(to, forward.abs_diff(backward)));
+    }
+    let mut ways = Ways(ways);
+    for rim in apart_from {
+        ways.remove(&rim.vertices);
+    }
+    let mut loops = Vec::new();
+    let mut looked_at = 0;
+    let starts: Vec<Vertex> = ways.0.keys().copied().collect();
+    for start in starts {
+        while looked_at < MOST_LOOKED_AT {
+            let Some(next) = ways.0.get(&start).and_then(|ends| ends.last().copied()) else { break };
+            if let Some(found) = ways.shortest(shop, next, start, &mut looked_at) {
+                ways.remove(&found);
+                loops.push(found);
+            } else {
+                ways.0.get_mut(&start).and_then(Vec::pop);
+            }
+        }
+        ways.walk(start, &mut loops);
+    }
+    loops
+}
+
+/// Directed edges by where they begin, each as often as it lacks a triangle.
+struct Ways(BTreeMap<Vertex, Vec<Vertex>>);
+
+impl Ways {
+    /// Takes the edges of a loop out, as far as they are there.
+    fn remove(&mut self, loop_: &[Vertex]) {
+        let n = loop_.len();
+        for [a, b] in (0..n).map(|i| [loop_[i], loop_[(i + 1) % n]]) {
+            if let Some(ends) = self.0.get_mut(&a)
+                && let Some(place) = ends.iter().position(|end| *end == b)
+            {
+                ends.remove(place);
+            }
+        }
+    }
+
+    /// The shortest way, from a vertex to another one, of those of equal length that through lower vertices (Dijkstra 1959).
+    fn shortest(&self, shop: &Shop, from: Vertex, to: Vertex, looked_at: &mut usize) -> Option<Vec<Vertex>> {
+        let mut before: HashMap<Vertex, (f64, Vertex)> = HashMap::from([(from, (0.0, from))]);
+        let mut done: HashSet<Vertex> = HashSet::new();
+        // Lengths are not negative, so that their bits are in order.
+        let mut next = BinaryHeap::from([Reverse((0u64, from))]);
+        while let Some(Reverse((length, at))) = next.pop() {
+            if at == to {
+                let mut way = vec![to];
+                while let Some(last) = way.last().copied().filter(|last| *last != from) {
+                    way.push(before.get(&last)?.1);
+                }
+                way.reverse();
+                return Some(way);
+            }
+            if !done.insert(at) {
+                continue;
+            }
+            *looked_at += 1;
+            for end in self.0.get(&at).into_iter().flatten() {
+                let further = f64::from_bits(length) + shop.distance(at, *end);
+                if before
+                    .get(end)
+                    .is_none_or(|(known, by)| further < *known || further == *known && at < *by && !done.contains(end))
+                {
+                    before.insert(*end, (further, at));
+                    next.push(Reverse((further.to_bits(), *end)));
+                }
+            }
+        }
+        None
+    }
+
+    /// Loops of whatever ways go on from a vertex, which are taken out.
+    fn walk(&mut self, start: Vertex, loops: &mut Vec<Vec<Vertex>>) {
+        let (mut way, mut places) = (vec![start], HashMap::from([(start, 0)]));
+        while let Some(next) = way.last().and_then(|at| self.0.get_mut(at)?.pop()) {
+            if let Some(place) = places.get(&next).copied() {
+                loops.push(way[place..].to_vec());
+                way.drain(place + 1..).for_each(|v| {
+                    places.remove(&v);
+                });
+            } else {
+                places.insert(next, way.len());
+                way.push(next);
+            }
+        }
+    }
+}
+
+fn from_smallest(rims: &[Rim], way: u32) -> Loop {
+    let first = (0..rims.len()).min_by_key(|i| rims[*i].from).unwrap_or(0);
+    let turned: Vec<Rim> = rims[first..].iter().chain(&rims[..first]).copied().collect();
+    Loop {
+        vertices: turned.iter().map(|r| r.from).collect(),
+        triangles: turned.iter().map(|r| r.triangle).collect(),
+        branches: turned.iter().any(|r| r.branches),
+        way,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Corners, cube, diagnose, plate, records, reversed, shifted};
+
+    /// Two square holes that meet in the middle of the plate.
+    fn pinched() -> Vec<Corners> {
+        plate(4, |x, y| !(x == y && (1..3).contains(&x)))
+    }
+
+    #[test]
+    fn two_holes_that_meet_in_a_vertex_are_two_loops() {
+        let records = records(&pinched());
+        let d = diagnose(&records);
+        let mut edges: Vec<usize> = find(&d.shop, &Edges::of(&d.shop)).iter().map(|l| l.vertices.len()).collect();
+        edges.sort_unstable();
+        assert_eq!(edges, [4, 4, 16], "and the rim of the plate");
+    }
+
+    #[test]
+    fn a_loop_runs_against_the_triangles_beyond_it() {
+        let records = records(&pinched());
+        let d = diagnose(&records);
+        for rim in find(&d.shop, &Edges::of(&d.shop)) {
+            let n = rim.vertices.len();
+            for i in 0..n {
+                let (from, to) = (rim.vertices[i], rim.vertices[(i + 1) % n]);
+                let v = d.shop.triangles[rim.triangles[i] as usize].v;
+                assert!((0..3).any(|k| (v[k], v[(k + 1) % 3]) == (to, from)));
+            }
+        }
+    }
+
+    /// Two cubes that touch along an edge, one of them without a side there.
+    fn open_at_a_shared_edge() -> Vec<Corners> {
+        let open = cube().into_iter().filter(|t| !t.iter().all(|p| p[0] == 1.0));
+        open.chain(shifted(&cube(), [1.0, 1.0, 0.0])).collect()
+    }
+
+    #[test]
+    fn a_hole_goes_on_along_an_edge_where_another_body_touches() {
+        let records = records(&open_at_a_shared_edge());
+        let d = diagnose(&records);
+        let Boundary { loops, chains } = boundary(&d.shop, &Edges::of(&d.shop));
+        assert_eq!((loops.len(), loops[0].vertices.len(), loops[0].branches, chains.len()), (1, 4, true, 0));
+        // The triangle beyond the shared edge is the open cube's, not one of the two that close the other.
+        let other = |t: &u32| d.shop.points(*t).iter().all(|p| p[0] >= 1.0 && p[1] >= 1.0);
+        assert!(!loops[0].triangles.iter().any(other));
+    }
+
+    #[test]
+    fn what_is_in_no_loop_is_in_a_chain() {
+        let mut holed = plate(3, |x, y| (x, y) != (1, 1));
+        let beside = holed.iter().position(|t| t.iter().filter(|p| (1.0..=2.0).contains(&p[0]) && p[1] == 1.0).count() == 2);
+        let beside = beside.unwrap();
+        holed[beside] = reversed(&holed[beside..=beside])[0];
+        let records = records(&holed);
+        let d = diagnose(&records);
+        let edges = Edges::of(&d.shop);
+        let Boundary { loops, chains } = boundary(&d.shop, &edges);
+        let in_loops: usize = loops.iter().map(|l| l.vertices.len()).sum();
+        let in_chains: usize = chains.iter().map(|c| c.len() - 1).sum();
+        assert!(in_chains > 0, "{loops:?}");
+        assert_eq!(in_loops + in_chains, edges.iter().filter(|e| e.is_boundary()).count());
+    }
+
+    #[test]
+    fn what_three_surfaces_leave_unbalanced_is_a_loop_in_the_direction_that_lacks() {
+        // A square across a cube, half way up: its rim lies on edges of the walls.
+        let lower = cube().into_iter().filter(|t| !t.iter().all(|p| p[2] == 1.0));
+        let upper = shifted(&cube(), [0.0, 0.0, 1.0]).into_iter().filter(|t| !t.iter().all(|p| p[2] == 1.0));
+        let across: Vec<Corners> = cube().into_iter().filter(|t| t.iter().all(|p| p[2] == 1.0)).collect();
+        let mesh: Vec<Corners> = lower.chain(upper).chain(across.clone()).collect();
+        let records = records(&mesh);
+        let d = diagnose(&records);
+        let edges = Edges::of(&d.shop);
+        assert!(find(&d.shop, &edges).is_empty(), "nothing is missing");
+        let loops = unbalanced(&d.shop, &edges, std::iter::empty());
+        let [rim] = &loops[..] else { panic!("{loops:?}") };
+        assert_eq!(rim.len(), 4);
+        // The square's own triangles run the other way.
+        let runs = |t: &Corners, from: Vertex, to: Vertex| {
+            let p = |v: Vertex| d.shop.positions[v as usize];
+            (0..3).any(|k| (t[k], t[(k + 1) % 3]) == (p(to), p(from)))
+        };
+        assert!((0..4).all(|i| across.iter().any(|t| runs(t, rim[i], rim[(i + 1) % 4]))));
+        // A loop that is to stay open is left out.
+        let open = records_of_open_cube();
+        let d = diagnose(&open);
+        let edges = Edges::of(&d.shop);
+        let rims = find(&d.shop, &edges);
+        assert_eq!(
+            (rims.len(), unbalanced(&d.shop, &edges, rims.iter()).len(), unbalanced(&d.shop, &edges, std::iter::empty()).len()),
+            (1, 0, 1)
+        );
+    }
+
+    fn records_of_open_cube() -> Vec<crate::io::record::Record> {
+        records(&cube().into_iter().filter(|t| !t.iter().all(|p| p[2] == 1.0)).collect::<Vec<_>>())
+    }
+}

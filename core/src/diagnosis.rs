@@ -1,0 +1,78 @@
+//! What is known of a file before anything is done about it: its survey, its workshop, its defects and the tolerances that follow from its size.
+
+use std::path::Path;
+
+use crate::contract::error::Result;
+use crate::contract::progress::Progress;
+use crate::contract::report::Defects;
+use crate::contract::settings::{Limits, Profile};
+use crate::detect::defects;
+use crate::geometry::sums::{Bounds, step_at};
+use crate::io::record;
+use crate::stream::budget;
+use crate::submesh::Shop;
+use crate::submesh::edges::{Edge, Edges};
+use crate::submesh::near::Tolerance;
+use crate::topology::survey::Survey;
+
+/// The survey of a file, its untouched workshop and its defects.
+pub(crate) struct Diagnosis<'a> {
+    pub(crate) survey: Survey<'a>,
+    pub(crate) shop: Shop,
+    pub(crate) tolerance: Tolerance,
+    pub(crate) defects: Defects,
+}
+
+impl<'a> Diagnosis<'a> {
+    pub(crate) fn of(
+        path: &Path,
+        records: &'a [record::Record],
+        profile: &Profile,
+        limits: &Limits,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let survey = Survey::new(path, records, profile.check_self_intersections, limits, progress)?;
+        let shop = Shop::gather(&survey);
+        let edges = Edges::of(&shop);
+        let boundary_edges = edges.iter().filter(Edge::is_boundary).count() as u64;
+        survey.take_boundary(path, boundary_edges, budget::boundary_bytes(boundary_edges))?;
+        Ok(Self::counted(survey, shop, &edges, profile))
+    }
+
+    /// Of a workshop that is as gathered.
+    pub(crate) fn count(survey: Survey<'a>, shop: Shop, profile: &Profile) -> Self {
+        let edges = Edges::of(&shop);
+        Self::counted(survey, shop, &edges, profile)
+    }
+
+    fn counted(survey: Survey<'a>, shop: Shop, edges: &Edges, profile: &Profile) -> Self {
+        let tolerance = tolerance(&survey, profile);
+        let defects = defects::count(&survey, &shop, edges, &tolerance);
+        Self { survey, shop, tolerance, defects }
+    }
+
+    /// Gives the memory of everything else back.
+    pub(crate) fn into_survey(self) -> Survey<'a> {
+        self.survey
+    }
+
+    /// The box of all triangles that have an area.
+    pub(crate) fn surface_bounds(&self) -> Bounds {
+        let mut bounds = Bounds::EMPTY;
+        self.survey.patches.iter().for_each(|p| bounds.add(&p.bounds));
+        self.shop.living().filter(|t| !self.shop.is_collinear(*t)).for_each(|t| bounds.include(&self.shop.points(t)));
+        bounds.normalised()
+    }
+}
+
+/// Never below what f32 tells apart at the model's coordinates: four steps of the largest one.
+fn tolerance(survey: &Survey<'_>, profile: &Profile) -> Tolerance {
+    if profile.weld_relative <= 0.0 {
+        return Tolerance { weld: 0.0, edge_share: 0.0 };
+    }
+    let step = step_at(survey.bounds.largest_coordinate());
+    Tolerance {
+        weld: (profile.weld_relative * survey.bounds.diagonal()).max(4.0 * step),
+        edge_share: profile.weld_max_edge_share,
+    }
+}

@@ -1,0 +1,181 @@
+//! Binary STL: 80 bytes of header, a `u32` count, records of 50 bytes. How many of the bytes are triangles is decided here.
+//!
+//! A count that fits the length is believed as it is; nothing else about the content is asked. Where the two disagree, the
+//! records must look like triangles before they are taken for some, and then the length is believed rather than the count, as
+//! most slicers do: a count of 0 or `u32::MAX` is what streaming exporters leave behind, a larger one means that the end is
+//! missing, and a smaller one that it was never updated, unless what follows does not look like triangles at all.
+
+use super::{Finding, HEADER_BYTES, MAX_TRIANGLES, PREFIX_BYTES, Rejection};
+use crate::io::record::{self, Record};
+
+/// Records looked at when a file must prove that it holds triangles.
+const SAMPLES: usize = 1000;
+/// Coordinates of a plausible triangle stay below this. Text read as `f32` mostly does not.
+const PLAUSIBLE_COORDINATE: f32 = 1e10;
+
+/// What of a binary file is triangles.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Layout {
+    pub(super) triangles: usize,
+    pub(super) findings: Vec<Finding>,
+}
+
+/// The header of a file of at least [`PREFIX_BYTES`]; blank for a shorter one.
+pub(super) fn header(bytes: &[u8]) -> [u8; HEADER_BYTES] {
+    bytes.first_chunk().copied().unwrap_or([0; HEADER_BYTES])
+}
+
+/// The first `triangles` records, as many of them as there are.
+pub(super) fn records(bytes: &[u8], triangles: usize) -> &[Record] {
+    let whole = bytes.get(PREFIX_BYTES..).unwrap_or_default().as_chunks().0;
+    whole.get(..triangles).unwrap_or(whole)
+}
+
+/// The count a file of at least [`PREFIX_BYTES`] declares.
+fn declared_count(bytes: &[u8]) -> Option<u32> {
+    bytes.get(HEADER_BYTES..)?.first_chunk().copied().map(u32::from_le_bytes)
+}
+
+/// Length of a file of so many triangles.
+fn length_of(triangles: u64) -> u64 {
+    PREFIX_BYTES as u64 + triangles * size_of::<Record>() as u64
+}
+
+/// A layout for a file whose declared count fits its length; nothing else.
+pub(super) fn exact(bytes: &[u8]) -> Option<Result<Layout, Rejection>> {
+    let declared = declared_count(bytes)?;
+    (bytes.len() as u64 == length_of(declared.into())).then(|| match declared {
+        0 => Err(no_triangles()),
+        _ => Ok(Layout { triangles: declared as usize, findings: header_findings(bytes) }),
+    })
+}
+
+/// A layout for a file whose declared count does not fit its length, if its records look like triangles; `None` if they do not.
+pub(super) fn mismatched(bytes: &[u8]) -> Option<Result<Layout, Rejection>> {
+    let declared = declared_count(bytes)?;
+    let body = bytes.get(PREFIX_BYTES..)?;
+    let (all, rest) = body.as_chunks::<{ size_of::<Record>() }>();
+    let announced = usize::try_from(declared).unwrap_or(usize::MAX);
+    if all.is_empty() {
+        // Too short for a single record: a binary STL only if the count does not say otherwise.
+        return (declared == 0).then(|| Err(no_triangles()));
+    }
+    let mut findings = header_findings(bytes);
+    let triangles = match declared {
+        0 | u32::MAX => {
+            if !look_like_triangles(all, Normals::Checked) {
+                return (declared == 0 && is_blank(body.get(..1 << 20).unwrap_or(body))).then(|| Err(no_triangles()));
+            }
+            findings
+                .push(Finding::flaw(format!("header leaves the count open ({declared}), file holds {} triangles", all.len())));
+            all.len()
+        }
+        _ if announced > all.len() => {
+            if !look_like_triangles(all, Normals::Checked) {
+                return None;
+            }
+            let text = format!("header says {declared} triangles, file holds {}: cut off or miscounted", all.len());
+            findings.push(if announced - all.len() > 1 { Finding::loss(text) } else { Finding::flaw(text) });
+            all.len()
+        }
+        _ => {
+            let (counted, beyond) = all.split_at(announced);
+            // That so many records are there is some evidence already: normals may be as odd as they like.
+            if !look_like_triangles(counted, Normals::Ignored) {
+                return None;
+            }
+            if beyond.is_empty() || !look_like_triangles(beyond, Normals::Checked) {
+                let trailing = body.len() - counted.as_flattened().len();
+                findings.push(Finding::flaw(format!("{trailing} {} after the last triangle, ignored", bytes_word(trailing))));
+                return Some(within_bounds(counted.len(), findings));
+            }
+            findings.push(Finding::flaw(format!("header says {declared} triangles, file holds {}", all.len())));
+            all.len()
+        }
+    };
+    if !rest.is_empty() {
+        let what = if announced > all.len() && declared != u32::MAX { "a triangle that is cut off" } else { "trailing" };
+        findings.push(Finding::flaw(format!(
+            "{} {} after the last whole triangle ({what}), ignored",
+            rest.len(),
+            bytes_word(rest.len())
+        )));
+    }
+    Some(within_bounds(triangles, findings))
+}
+
+pub(super) fn within_bounds(triangles: usize, findings: Vec<Finding>) -> Result<Layout, Rejection> {
+    match triangles as u64 {
+        0 => Err(no_triangles()),
+        many if many > MAX_TRIANGLES => Err(Rejection::TooMany),
+        _ => Ok(Layout { triangles, findings }),
+    }
+}
+
+pub(super) fn no_triangles() -> Rejection {
+    Rejection::Unreadable("no triangles".into())
+}
+
+fn bytes_word(count: usize) -> &'static str {
+    if count == 1 { "byte" } else { "bytes" }
+}
+
+/// Nothing but zero bytes.
+pub(super) fn is_blank(bytes: &[u8]) -> bool {
+    bytes.iter().all(|&byte| byte == 0)
+}
+
+/// Must a record's normal make sense for the record to be plausible?
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Normals {
+    Checked,
+    Ignored,
+}
+
+/// At least 95 of 100 records, of up to [`SAMPLES`] spread evenly, have finite coordinates of a sane size and a normal that is
+/// zero, of unit length or at right angles to the triangle; and they are not all blank.
+fn look_like_triangles(records: &[Record], normals: Normals) -> bool {
+    let step = records.len().div_ceil(SAMPLES).max(1);
+    let sampled = records.iter().step_by(step);
+    let (mut seen, mut good, mut blank) = (0usize, 0usize, true);
+    for record in sampled {
+        seen += 1;
+        blank &= is_blank(record);
+        let sane = record::corners(record).as_flattened().iter().all(|c| c.abs() < PLAUSIBLE_COORDINATE);
+        good += usize::from(sane && (normals == Normals::Ignored || normal_makes_sense(record)));
+    }
+    !blank && good * 100 >= seen * 95
+}
+
+fn normal_makes_sense(record: &Record) -> bool {
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let stored = record::normal(record).map(f64::from);
+    let length = dot(stored, stored).sqrt();
+    if length == 0.0 || (length - 1.0).abs() < 0.02 {
+        return true;
+    }
+    // Some exporters write the bare cross product.
+    let own = record::unit_normal(record::corners(record)).map(f64::from);
+    dot(stored, own).abs() > 0.99 * length
+}
+
+/// Where `solid` stands if a reader might take the header for the beginning of a text STL: after blanks, in any case.
+fn solid_at(header: &[u8]) -> Option<usize> {
+    let at = header.iter().position(|byte| !byte.is_ascii_whitespace())?;
+    header.get(at..at + 5)?.eq_ignore_ascii_case(b"solid").then_some(at)
+}
+
+fn header_findings(bytes: &[u8]) -> Vec<Finding> {
+    let text = "binary file whose header begins with \"solid\", as text files do";
+    solid_at(&header(bytes)).map(|_| Finding::flaw(text)).into_iter().collect()
+}
+
+/// The header, with `solid` at its beginning replaced by a word of the same length that no reader looks for: one reader in seven
+/// would take the file for text.
+pub(super) fn safe_header(mut header: [u8; HEADER_BYTES]) -> [u8; HEADER_BYTES] {
+    let word = solid_at(&header).and_then(|at| header.get_mut(at..at + 5));
+    if let Some(word) = word {
+        word.copy_from_slice(b"model");
+    }
+    header
+}

@@ -1,0 +1,341 @@
+//! The sparse edit: which input records leave, turn or change, and what is added. Everything else is untouched.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::contract::report::{EditRecords, EditSummary};
+use crate::io::read_ahead::ASKED_AT_ONCE;
+use crate::io::record::{self, Record};
+use crate::submesh::components::Reversed;
+use crate::submesh::{Origin, Shop, distance};
+use crate::topology::survey::Survey;
+
+/// What happens to an input record that is not untouched.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Change {
+    Delete,
+    Flip,
+    /// The same triangle with moved vertices.
+    Move(Box<Record>),
+}
+
+/// As the budget counts them.
+const _: () = assert!(size_of::<(u32, Change)>() == 24);
+
+/// An edit against the input.
+#[derive(Debug, Default)]
+pub(crate) struct Edit {
+    /// By record, ascending.
+    changes: Vec<(u32, Change)>,
+    /// Records of reversed patches, a bit each; empty when there are none.
+    flipped: Vec<u64>,
+    /// And of patches that go.
+    dropped: Vec<u64>,
+    /// New records. As many as can take the places of deleted ones, in order; the rest goes to the end of the file.
+    pub(crate) added: Vec<Record>,
+    flips: u64,
+    deletions: u64,
+    max_move: f64,
+}
+
+impl Edit {
+    /// What stands in the workshop against the records it was gathered from. O(workshop), and one pass over the records of
+    /// reversed patches.
+    pub(crate) fn of(survey: &Survey<'_>, shop: &Shop, reversed: &Reversed) -> Self {
+        let mut edit = Self::default();
+        edit.changes.reserve_exact(survey.nonfinite.iter().map(|r| r.1 as usize).sum());
+        edit.changes
+            .extend(survey.nonfinite.iter().flat_map(|(first, count)| *first..*first + *count).map(|t| (t, Change::Delete)));
+        for (i, triangle) in shop.triangles.iter().enumerate() {
+            if i % ASKED_AT_ONCE == 0 {
+                let soon = shop.triangles[i..].iter().take(ASKED_AT_ONCE);
+                survey.ask_for(soon.filter_map(|t| match t.origin {
+                    Origin::Input(record) | Origin::Part(record) => Some(record),
+                    Origin::Patch => None,
+                }));
+            }
+            let points = || shop.points(i as u32);
+            match triangle.origin {
+                Origin::Input(t) if triangle.alive => edit.compare(survey.records, t, points()),
+                Origin::Input(t) => edit.changes.push((t, Change::Delete)),
+                Origin::Part(t) if triangle.alive => {
+                    edit.added.push(record::encode(points(), record::attribute(&survey.records[t as usize])));
+                }
+                Origin::Patch if triangle.alive => edit.added.push(record::encode(points(), 0)),
+                Origin::Part(_) | Origin::Patch => {}
+            }
+        }
+        edit.changes.sort_unstable_by_key(|(t, _)| *t);
+        edit.deletions = edit.changes.iter().filter(|c| c.1 == Change::Delete).count() as u64;
+        edit.flips = edit.changes.iter().filter(|c| c.1 == Change::Flip).count() as u64;
+        let dropped = |patch: u32| reversed.dropped[patch as usize];
+        let (flipped, flips) = records_of(survey, |patch| reversed.patches[patch as usize] && !dropped(patch));
+        let (gone, deletions) = records_of(survey, dropped);
+        (edit.flipped, edit.dropped) = (flipped, gone);
+        edit.flips += flips;
+        edit.deletions += deletions;
+        edit
+    }
+
+    /// Notes how a living triangle differs from its record, if it does.
+    fn compare(&mut self, records: &[Record], t: u32, now: [[f32; 3]; 3]) {
+        let before = record::corners(&records[t as usize]);
+        // Comparing as numbers: −0.0 is 0.0.
+        if before == now {
+            return;
+        }
+        let change = if [before[0], before[2], before[1]] == now {
+            Change::Flip
+        } else {
+            for p in now {
+                let moved = before.iter().map(|q| distance(p, *q)).fold(f64::INFINITY, f64::min);
+                self.max_move = self.max_move.max(moved);
+            }
+            Change::Move(Box::new(record::encode(now, record::attribute(&records[t as usize]))))
+        };
+        self.changes.push((t, change));
+    }
+
+    /// Every record stays untouched, and none is added.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.changes.is_empty() && self.flips + self.deletions == 0 && self.added.is_empty()
+    }
+
+    /// Input records that do not stay as they are.
+    pub(crate) fn gone(&self) -> u64 {
+        let moved = self.changes.iter().filter(|c| matches!(c.1, Change::Move(_))).count() as u64;
+        self.deletions + self.flips + moved
+    }
+
+    /// Records in the output.
+    pub(crate) fn output_records(&self, input_records: usize) -> u64 {
+        input_records as u64 - self.deletions + self.added.len() as u64
+    }
+
+    /// The first deleted record whose place nothing takes, if there is one: up to there, every record of the output stands where the
+    /// input's does. O(edit).
+    pub(crate) fn first_gap(&self) -> Option<u32> {
+        let deleted = self.changes.iter().filter(|c| c.1 == Change::Delete).map(|c| c.0);
+        if self.dropped.is_empty() {
+            return deleted.into_iter().nth(self.added.len());
+        }
+        let mut both: Vec<u32> = deleted.collect();
+        both.extend(ones(&self.dropped).take(self.added.len() + 1));
+        both.sort_unstable();
+        both.get(self.added.len()).copied()
+    }
+
+    /// Walks through the input in order: runs of untouched records, then what becomes of the one that follows.
+    pub(crate) fn walk<'r, 'e, E>(
+        &'e self,
+        records: &'r [Record],
+        mut step: impl FnMut(Step<'r, 'e>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let mut changes = self.changes.iter().peekable();
+        let mut added = self.added.iter();
+        let mut start = 0;
+        let mut at = 0;
+        while at < records.len() {
+            let next_change = changes.peek().map_or(records.len(), |c| c.0 as usize);
+            let dropped = next_one(&self.dropped, at);
+            let next = next_change.min(next_one(&self.flipped, at)).min(dropped);
+            if next >= records.len() {
+                break;
+            }
+            if next > start {
+                step(Step::Untouched(&records[start..next]))?;
+            }
+            let place = next as u32;
+            let flipped = || Step::Changed(place, record::flip(&records[next]));
+            step(match changes.next_if(|c| c.0 == place).map(|c| &c.1) {
+                None if next != dropped => flipped(),
+                Some(Change::Flip) => flipped(),
+                Some(Change::Move(record)) => Step::Changed(place, **record),
+                Some(Change::Delete) | None => added.next().map_or(Step::Deleted(place), |record| Step::Changed(place, *record)),
+            })?;
+            at = next + 1;
+            start = at;
+        }
+        if start < records.len() {
+            step(Step::Untouched(&records[start..]))?;
+        }
+        added.try_for_each(|record| step(Step::Added(record)))
+    }
+
+    pub(crate) fn summary(&self, input_records: usize) -> EditSummary {
+        let gone = self.gone();
+        EditSummary {
+            untouched: input_records as u64 - gone,
+            deleted: self.deletions,
+            flipped: self.flips,
+            moved: gone - self.deletions - self.flips,
+            added: self.added.len() as u64,
+            max_move: self.max_move,
+        }
+    }
+
+    /// The edit record by record.
+    pub(crate) fn listed(&self) -> EditRecords {
+        let mut all = EditRecords::default();
+        let (mut flips, mut deleted): (Vec<u32>, Vec<u32>) = Default::default();
+        for (t, change) in &self.changes {
+            match change {
+                Change::Delete => deleted.push(*t),
+                Change::Flip => flips.push(*t),
+                Change::Move(record) => all.moved.push((*t, record::corners(record))),
+            }
+        }
+        flips.extend(ones(&self.flipped));
+        flips.sort_unstable();
+        deleted.extend(ones(&self.dropped));
+        deleted.sort_unstable();
+        deleted.iter().for_each(|t| extend_ranges(&mut all.deleted, *t));
+        flips.iter().for_each(|t| extend_ranges(&mut all.flipped, *t));
+        all.added = self.added.iter().map(|r| (record::corners(r), record::attribute(r))).collect();
+        all
+    }
+}
+
+/// What becomes of the input's records, one stretch after the other, and then what is added beyond their places.
+pub(crate) enum Step<'r, 'e> {
+    Untouched(&'r [Record]),
+    /// What stands in for the record of this number.
+    Changed(u32, Record),
+    Deleted(u32),
+    Added(&'e Record),
+}
+
+/// The records of some patches, a bit each, and how many; no bits if there are none. One pass over them.
+pub(crate) fn records_of(survey: &Survey<'_>, wanted: impl Fn(u32) -> bool + Sync) -> (Vec<u64>, u64) {
+    if !(0..survey.patches.len() as u32).any(&wanted) {
+        return (Vec::new(), 0);
+    }
+    let bits: Vec<AtomicU64> = std::iter::repeat_with(AtomicU64::default).take(survey.records.len().div_ceil(64)).collect();
+    let counts = survey.visit_sound(
+        wanted,
+        |_| Some(0),
+        |_, _| true,
+        |count: &mut u64, triangle, _| {
+            bits[triangle as usize / 64].fetch_or(1 << (triangle % 64), Ordering::Relaxed);
+            *count += 1;
+        },
+    );
+    (bits.into_iter().map(AtomicU64::into_inner).collect(), counts.into_iter().sum())
+}
+
+/// The first bit that is set from `at` on, or past the end.
+fn next_one(bits: &[u64], at: usize) -> usize {
+    let mut word = at / 64;
+    let mut mask = !0u64 << (at % 64);
+    while word < bits.len() {
+        let found = bits[word] & mask;
+        if found != 0 {
+            return word * 64 + found.trailing_zeros() as usize;
+        }
+        word += 1;
+        mask = !0;
+    }
+    usize::MAX
+}
+
+/// All bits that are set.
+fn ones(bits: &[u64]) -> impl Iterator<Item = u32> + '_ {
+    let next = |at: usize| Some(next_one(bits, at)).filter(|one| *one != usize::MAX);
+    std::iter::successors(next(0), move |one| next(one + 1)).map(|one| one as u32)
+}
+
+/// Adds the next number to inclusive ranges.
+fn extend_ranges(ranges: &mut Vec<[u32; 2]>, t: u32) {
+    match ranges.last_mut() {
+        Some(last) if last[1] + 1 == t => last[1] = t,
+        _ => ranges.push([t, t]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::testing::{Corners, cube, diagnose, plate, records, written};
+
+    const HERE: Corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    const THERE: Corners = [[5.0; 3], [6.0, 5.0, 5.0], [5.0, 6.0, 5.0]];
+
+    #[test]
+    fn turned_twice_is_untouched() {
+        // An open plate: all of it is in the workshop.
+        let records = records(&plate(2, |_, _| true));
+        let mut d = diagnose(&records);
+        let none = Reversed::none(&d.survey);
+        for flipped in [1, 0] {
+            d.shop.triangles[3].v.swap(1, 2);
+            let summary = Edit::of(&d.survey, &d.shop, &none).summary(records.len());
+            assert_eq!((summary.flipped, summary.untouched), (flipped, 8 - flipped));
+        }
+        assert_eq!(written(&Edit::of(&d.survey, &d.shop, &none), &records), records);
+    }
+
+    #[test]
+    fn a_moved_vertex_moves_the_triangles_around_it() {
+        let records = records(&plate(2, |_, _| true));
+        let mut d = diagnose(&records);
+        let middle = d.shop.positions.iter().position(|p| *p == [1.0, 1.0, 0.0]).unwrap();
+        d.shop.positions[middle] = [1.0, 1.0, 0.5];
+        let edit = Edit::of(&d.survey, &d.shop, &Reversed::none(&d.survey));
+        let summary = edit.summary(records.len());
+        // Six of eight triangles meet in the middle of the plate.
+        assert_eq!((summary.moved, summary.untouched, summary.max_move), (6, 2, 0.5));
+    }
+
+    #[test]
+    fn a_reversed_patch_flips_its_records() {
+        let records = records(&cube());
+        let d = diagnose(&records);
+        let edit = Edit::of(&d.survey, &d.shop, &Reversed { patches: vec![true], dropped: vec![false] });
+        assert_eq!(written(&edit, &records), records.iter().map(record::flip).collect::<Vec<_>>());
+        assert_eq!(edit.listed().flipped, [[0, 11]]);
+    }
+
+    proptest! {
+        /// The walk gives record by record what the edit says of it, and the summary and the list count the same.
+        #[test]
+        fn walking_does_what_the_edit_says(fates in prop::collection::vec(0u8..5, 0..200), added in 0usize..3) {
+            let input = records(&vec![HERE; fates.len()]);
+            let [moved, new] = [record::encode(THERE, 0), record::encode(THERE, 7)];
+            let mut edit = Edit { flipped: vec![0; fates.len().div_ceil(64)], added: vec![new; added], ..Edit::default() };
+            let (mut want, mut left) = (Vec::new(), added);
+            let mut gap = None;
+            for (t, fate) in fates.iter().enumerate() {
+                let before = input[t];
+                match fate {
+                    0 => want.push(before),
+                    1 => edit.changes.push((t as u32, Change::Delete)),
+                    2 => edit.changes.push((t as u32, Change::Flip)),
+                    3 => edit.changes.push((t as u32, Change::Move(Box::new(moved)))),
+                    // Of a reversed patch.
+                    _ => edit.flipped[t / 64] |= 1 << (t % 64),
+                }
+                match fate {
+                    2 | 4 => want.push(record::flip(&before)),
+                    3 => want.push(moved),
+                    1 if left > 0 => {
+                        want.push(new);
+                        left -= 1;
+                    }
+                    1 if gap.is_none() => gap = Some(t as u32),
+                    _ => {}
+                }
+            }
+            want.extend(vec![new; left]);
+            edit.deletions = fates.iter().filter(|f| **f == 1).count() as u64;
+            edit.flips = fates.iter().filter(|f| **f == 2 || **f == 4).count() as u64;
+            prop_assert_eq!(edit.first_gap(), gap);
+            prop_assert_eq!(edit.output_records(input.len()), want.len() as u64);
+            prop_assert_eq!(edit.summary(input.len()).untouched, fates.iter().filter(|f| **f == 0).count() as u64);
+            let listed = |ranges: &[[u32; 2]]| ranges.iter().map(|[a, b]| u64::from(b - a + 1)).sum::<u64>();
+            prop_assert_eq!(listed(&edit.listed().deleted), edit.deletions);
+            prop_assert_eq!(listed(&edit.listed().flipped), edit.flips);
+            prop_assert_eq!(written(&edit, &input), want);
+        }
+    }
+}

@@ -1,0 +1,562 @@
+//! Which triangles each chunk sees: every triangle with a corner at home there, in ascending order.
+//!
+//! One pass over the records makes run-coded lists. A coherent file stays inside the current chunk's box for long stretches, so a list
+//! costs about 0.02 bytes a triangle; a shuffled one costs up to 2. Where lists would not do (they would take too much memory, or lead all
+//! over a file that is larger than the page cache), the same pass copies the triangles into a [`Spool`] instead.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::contract::error::Result;
+use crate::contract::progress::Progress;
+use crate::contract::settings::{Limits, Spill};
+use crate::geometry::sums::Bounds;
+use crate::io::disk_space::{self, Need};
+use crate::io::read_ahead::Guide;
+use crate::io::record::{self, Record};
+use crate::stream::columns::{CellColumns, Columns, Extremes};
+use crate::stream::plan::{ChunkId, Plan};
+use crate::stream::source::{Mapped, Seen, Spooled};
+use crate::stream::spool::{self, Loaded, Spool, Unsorted};
+use crate::util::parallel;
+use crate::util::varint::{put_varint, take_varint};
+
+/// Who sees what, and what the same pass learns about the whole file.
+///
+/// A chunk's **visitors** are the triangles whose box meets its cell with no corner at home there. Self-intersections need them; where those
+/// are not looked for, there are none.
+#[derive(Debug)]
+pub(crate) struct Members {
+    kept: Kept,
+    /// Runs of triangles with a NaN or infinite coordinate: first and count.
+    pub(crate) nonfinite: Vec<(u32, u32)>,
+    pub(crate) bounds: Bounds,
+}
+
+#[derive(Debug)]
+enum Kept {
+    /// `members[chunk][piece]`: pieces are consecutive stretches of the file.
+    Lists {
+        members: Vec<Vec<RunList>>,
+        visitors: Vec<Vec<RunList>>,
+    },
+    Spool(Spool),
+}
+
+/// Ascending runs of triangle numbers, as variable-length integers: `distance from the end of the previous run << 1 | longer`,
+/// followed by `length − 2` when the run is longer than one.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct RunList {
+    bytes: Vec<u8>,
+    end: u32,
+}
+
+impl RunList {
+    /// Appends a run; returns how many bytes that took.
+    fn push(&mut self, first: u32, count: u32) -> usize {
+        let before = self.bytes.len();
+        let gap = u64::from(first - self.end) << 1 | u64::from(count > 1);
+        put_varint(&mut self.bytes, gap);
+        if count > 1 {
+            put_varint(&mut self.bytes, u64::from(count - 2));
+        }
+        self.end = first + count;
+        self.bytes.len() - before
+    }
+
+    pub(crate) fn runs(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
+        let (mut rest, mut end) = (self.bytes.as_slice(), 0u32);
+        std::iter::from_fn(move || {
+            let gap = take_varint(&mut rest)?;
+            let count = if gap & 1 == 1 { take_varint(&mut rest)? as u32 + 2 } else { 1 };
+            let first = end + (gap >> 1) as u32;
+            end = first + count;
+            Some((first, count))
+        })
+    }
+}
+
+/// Takes down who sees what in one stretch of the file.
+trait Take {
+    /// Triangles that are members of this chunk alone.
+    fn take_run(&mut self, chunk: ChunkId, first: u32, run: &[Record]);
+    /// A triangle that is a member of all `members` and a visitor of all `visitors`, which are all distinct.
+    fn take(&mut self, members: &[ChunkId], visitors: &[ChunkId], number: u32, record: &Record);
+    /// Is it of no use to go on?
+    fn given_up(&self) -> bool;
+}
+
+/// Lists of one piece.
+struct Lists<'a> {
+    members: Vec<RunList>,
+    visitors: Vec<RunList>,
+    /// Bytes not yet counted in `held`.
+    uncounted: usize,
+    /// Bytes in the lists of all pieces, and how many there may be.
+    held: &'a AtomicU64,
+    most: u64,
+}
+
+impl Lists<'_> {
+    fn count(&mut self, bytes: usize) {
+        self.uncounted += bytes;
+        if self.uncounted >= 64 << 10 {
+            self.held.fetch_add(self.uncounted as u64, Ordering::Relaxed);
+            self.uncounted = 0;
+        }
+    }
+}
+
+impl Take for Lists<'_> {
+    fn take_run(&mut self, chunk: ChunkId, first: u32, run: &[Record]) {
+        let bytes = self.members[chunk.0 as usize].push(first, run.len() as u32);
+        self.count(bytes);
+    }
+
+    fn take(&mut self, members: &[ChunkId], visitors: &[ChunkId], number: u32, _: &Record) {
+        let bytes: usize = members.iter().map(|c| self.members[c.0 as usize].push(number, 1)).sum();
+        let more: usize = visitors.iter().map(|c| self.visitors[c.0 as usize].push(number, 1)).sum();
+        self.count(bytes + more);
+    }
+
+    fn given_up(&self) -> bool {
+        is_too_much(self.held, self.most)
+    }
+}
+
+/// While a list grows, it takes up to three times its bytes.
+fn is_too_much(held: &AtomicU64, most: u64) -> bool {
+    held.load(Ordering::Relaxed).saturating_mul(3) > most
+}
+
+impl Take for spool::Writer<'_> {
+    fn take_run(&mut self, chunk: ChunkId, first: u32, run: &[Record]) {
+        self.take_run(chunk, first, run);
+    }
+
+    fn take(&mut self, members: &[ChunkId], visitors: &[ChunkId], number: u32, record: &Record) {
+        self.take(members, visitors, number, record);
+    }
+
+    fn given_up(&self) -> bool {
+        self.has_failed()
+    }
+}
+
+/// What is learnt in passing.
+struct Passing {
+    nonfinite: Vec<(u32, u32)>,
+    bounds: Bounds,
+}
+
+impl Passing {
+    const NOTHING: Self = Self { nonfinite: Vec::new(), bounds: Bounds::EMPTY };
+
+    fn note_nonfinite(&mut self, number: u32) {
+        match self.nonfinite.last_mut() {
+            Some((first, count)) if *first + *count == number => *count += 1,
+            _ => self.nonfinite.push((number, 1)),
+        }
+    }
+
+    fn add(&mut self, next: Self) {
+        self.nonfinite.extend(next.nonfinite);
+        self.bounds.add(&next.bounds);
+    }
+}
+
+impl Members {
+    /// Reads all records once, or twice if lists turn out to take too much memory. Lists visitors only if asked to.
+    ///
+    /// # Errors
+    /// Where spooling fails.
+    pub(crate) fn gather(
+        path: &Path,
+        (records, guide): (&[Record], &Guide<'_>),
+        plan: &Plan,
+        visitors: bool,
+        limits: &Limits,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let told = || Told { progress, done: AtomicU64::new(0), total: records.len() as u64 };
+        let most = if limits.spill == Spill::Never { u64::MAX } else { limits.memory_bytes / 4 };
+        if spool_bytes(records, guide, limits) == 0
+            && let Some(members) = Self::list((records, guide), plan, visitors, limits.threads, most, &told())
+        {
+            return Ok(members);
+        }
+        Self::spool(path, (records, guide), plan, visitors, limits, &told())
+    }
+
+    /// `None` if the lists would take more than `most` bytes.
+    fn list(
+        (records, guide): (&[Record], &Guide<'_>),
+        plan: &Plan,
+        visitors: bool,
+        threads: usize,
+        most: u64,
+        told: &Told<'_>,
+    ) -> Option<Self> {
+        // More pieces than threads only even out the load: lists of all pieces together say the same for any number of pieces.
+        let pieces = if records.len() < 1 << 16 { 1 } else { threads * 4 };
+        let held = AtomicU64::new(0);
+        let empty = || vec![RunList::default(); plan.chunks()];
+        let results = in_pieces(records, threads, pieces, |piece, offset| {
+            let mut lists = Lists { members: empty(), visitors: empty(), uncounted: 0, held: &held, most };
+            let passing = gather_piece((piece, guide), offset, plan, visitors, &mut lists, told);
+            held.fetch_add(lists.uncounted as u64, Ordering::Relaxed);
+            lists.members.iter_mut().chain(&mut lists.visitors).for_each(|l| l.bytes.shrink_to_fit());
+            (lists.members, lists.visitors, passing)
+        });
+        if is_too_much(&held, most) {
+            return None;
+        }
+        let (mut all, mut all_visitors) = (vec![Vec::new(); plan.chunks()], vec![Vec::new(); plan.chunks()]);
+        let mut passed = Passing::NOTHING;
+        for (members, visitors, passing) in results {
+            passed.add(passing);
+            for (lists, of_chunks) in [(members, &mut all), (visitors, &mut all_visitors)] {
+                let filled = lists.into_iter().zip(of_chunks).filter(|(list, _)| !list.bytes.is_empty());
+                filled.for_each(|(list, of_chunk)| of_chunk.push(list));
+            }
+        }
+        Some(Self::of(Kept::Lists { members: all, visitors: all_visitors }, passed))
+    }
+
+    fn spool(
+        path: &Path,
+        (records, guide): (&[Record], &Guide<'_>),
+        plan: &Plan,
+        visitors: bool,
+        limits: &Limits,
+        told: &Told<'_>,
+    ) -> Result<Self> {
+        // Asked again, for the lists may have led here.
+        let need = Need { folder: limits.spool_folder(), bytes: entries_bytes(records), what: "sorting triangles by place" };
+        disk_space::check(path, &[need])?;
+        let spool = Unsorted::new(path, spool::Layout::new(records.len(), plan, limits), plan, limits)?;
+        // One piece a thread: every piece ends with extents that are not full.
+        let results = in_pieces(records, limits.threads, limits.threads, |piece, offset| {
+            let mut writer = spool.writer(plan.chunks());
+            let passing = gather_piece((piece, guide), offset, plan, visitors, &mut writer, told);
+            (writer.finish(), passing)
+        });
+        let mut passed = Passing::NOTHING;
+        let parts = results
+            .into_iter()
+            .map(|(part, passing)| {
+                passed.add(passing);
+                part
+            })
+            .collect();
+        Ok(Self::of(Kept::Spool(spool.sorted(parts, plan.chunks())?), passed))
+    }
+
+    fn of(kept: Kept, passing: Passing) -> Self {
+        Self { kept, nonfinite: passing.nonfinite, bounds: passing.bounds }
+    }
+
+    /// Does `work` on every wanted chunk with its members and its visitors; results by chunk. Each thread makes one `scratch`.
+    pub(crate) fn each<S, R: Send>(
+        &self,
+        (records, guide, plan): (&[Record], &Guide<'_>, &Plan),
+        threads: usize,
+        wanted: impl Fn(ChunkId) -> bool + Sync,
+        scratch: impl Fn() -> S + Sync,
+        work: impl Fn(&mut S, ChunkId, &Seen<'_>, &Seen<'_>) -> R + Sync,
+    ) -> Vec<R> {
+        match &self.kept {
+            Kept::Lists { members, visitors } => {
+                let chunks: Vec<ChunkId> = (0..members.len() as u32).map(ChunkId).filter(|c| wanted(*c)).collect();
+                let group = guide.group(members.len());
+                let ask = |group: &[ChunkId]| {
+                    let lists = group.iter().flat_map(|c| members[c.0 as usize].iter().chain(&visitors[c.0 as usize]));
+                    guide.ask_for(lists.flat_map(RunList::runs));
+                };
+                parallel::map_with(threads, chunks.len(), scratch, |scratch, i| {
+                    // Chunks are taken in order: this group was asked for by whoever began with the one before.
+                    if let Some(group) = group
+                        && i % group == 0
+                    {
+                        let mut groups = chunks[i..].chunks(group);
+                        let this = groups.next().filter(|_| i == 0);
+                        this.into_iter().chain(groups.next()).for_each(ask);
+                    }
+                    let seen = [members, visitors].map(|lists| Mapped { records, lists: &lists[chunks[i].0 as usize] });
+                    let [members, visitors] = seen.map(Seen::Mapped);
+                    work(scratch, chunks[i], &members, &visitors)
+                })
+            }
+            Kept::Spool(spool) => {
+                let buckets: Vec<usize> = (0..spool.buckets()).filter(|b| spool.chunks(*b).any(&wanted)).collect();
+                let scratch = || (scratch(), Loaded::default());
+                let results = parallel::map_with(threads, buckets.len(), scratch, |(scratch, loaded), i| {
+                    spool.load(plan, buckets[i], loaded);
+                    let chunks = spool.chunks(buckets[i]).filter(|c| wanted(*c));
+                    let seen = |entries| Seen::Spooled(Spooled { entries });
+                    chunks
+                        .map(|chunk| work(scratch, chunk, &seen(loaded.members(chunk)), &seen(loaded.visitors(chunk))))
+                        .collect::<Vec<R>>()
+                });
+                results.into_iter().flatten().collect()
+            }
+        }
+    }
+
+    /// How many triangles `chunk` sees, visitors included.
+    pub(crate) fn count(&self, chunk: ChunkId) -> u64 {
+        match &self.kept {
+            Kept::Lists { members, visitors } => {
+                let lists = members[chunk.0 as usize].iter().chain(&visitors[chunk.0 as usize]);
+                lists.flat_map(RunList::runs).map(|(_, count)| u64::from(count)).sum()
+            }
+            Kept::Spool(spool) => spool.seen(chunk),
+        }
+    }
+
+    /// Bytes held, with what [`Self::each`] takes on so many threads.
+    pub(crate) fn heap_bytes(&self, threads: usize) -> u64 {
+        let kept = match &self.kept {
+            Kept::Lists { members, visitors } => {
+                let both = || members.iter().chain(visitors);
+                let pieces = both().flatten().map(|l| l.bytes.capacity() + size_of::<RunList>()).sum::<usize>();
+                (pieces + both().count() * size_of::<Vec<RunList>>()) as u64
+            }
+            Kept::Spool(spool) => spool.heap_bytes() as u64 + spool.loaded_bytes(threads),
+        };
+        kept + self.nonfinite.capacity() as u64 * 8
+    }
+}
+
+/// `work(piece, number of its first record)` on `pieces` stretches of the file, results in their order.
+fn in_pieces<R: Send>(records: &[Record], threads: usize, pieces: usize, work: impl Fn(&[Record], u32) -> R + Sync) -> Vec<R> {
+    let size = records.len().div_ceil(pieces.max(1)).max(1);
+    parallel::map(threads, records.len().div_ceil(size), |piece| {
+        let from = piece * size;
+        work(&records[from..records.len().min(from + size)], from as u32)
+    })
+}
+
+/// What will be spooled to find out who sees what, in bytes; 0 if lists will do, as far as can be told beforehand.
+pub(crate) fn spool_bytes(records: &[Record], guide: &Guide<'_>, limits: &Limits) -> u64 {
+    let spooled = match limits.spill {
+        Spill::Always => true,
+        Spill::Never => false,
+        Spill::Auto => guide.is_needed() && is_scattered(records, guide),
+    };
+    if spooled { entries_bytes(records) } else { 0 }
+}
+
+/// What a spool of these triangles takes, some of which lie across buckets.
+fn entries_bytes(records: &[Record]) -> u64 {
+    (records.len() * size_of::<spool::Entry>()) as u64 / 20 * 21
+}
+
+/// Stretches of the file that are looked at to find out how scattered its triangles are, and triangles in each.
+const STRETCHES: usize = 256;
+const STRETCH: usize = 64;
+
+/// Do neighbours in the file lie far from each other (in different parts of some hundred) more often than once in a page of triangles?
+/// (Whether they lie in the same chunk would not tell: rows of a grid cross many of them, but the next chunks continue where these end.)
+fn is_scattered(records: &[Record], guide: &Guide<'_>) -> bool {
+    let parts = Plan::new(records, guide, (records.len() / STRETCHES).try_into().unwrap_or(u32::MAX));
+    let step = (records.len() / STRETCHES).max(STRETCH);
+    guide.ask_for((0..records.len()).step_by(step).map(|first| (first as u32, STRETCH.min(records.len() - first) as u32)));
+    let (mut changes, mut looked_at) = (0, 0);
+    for stretch in records.chunks(step) {
+        let mut last = None;
+        for record in stretch.iter().take(STRETCH).filter(|r| record::all_finite(r)) {
+            let part = parts.home(record::corners(record)[0]);
+            changes += usize::from(last.is_some_and(|l| l != part));
+            looked_at += 1;
+            last = Some(part);
+        }
+    }
+    changes * STRETCH > looked_at
+}
+
+/// Says how far the pass over the records is.
+struct Told<'a> {
+    progress: &'a dyn Progress,
+    done: AtomicU64,
+    total: u64,
+}
+
+impl Told<'_> {
+    /// Records between two words.
+    const EVERY: usize = 1 << 18;
+
+    fn step(&self) {
+        let done = self.done.fetch_add(Self::EVERY as u64, Ordering::Relaxed) + Self::EVERY as u64;
+        self.progress.at("plan", done.min(self.total), self.total);
+    }
+}
+
+fn gather_piece(
+    (records, guide): (&[Record], &Guide<'_>),
+    offset: u32,
+    plan: &Plan,
+    visitors: bool,
+    take: &mut impl Take,
+    told: &Told<'_>,
+) -> Passing {
+    let mut passing = Passing::NOTHING;
+    let mut visited = Vec::new();
+    let mut current = ChunkId(0);
+    let mut cell = CellColumns::of(&plan.home_box(current));
+    let mut extremes = Extremes::EMPTY;
+    let (mut run_start, mut block_start) = (0usize, 0usize);
+    for block in guide.blocks(records) {
+        for (i, record) in (block_start..).zip(block) {
+            if (i + 1).is_multiple_of(Told::EVERY) {
+                told.step();
+            }
+            record::prefetch_after(record);
+            let columns = Columns::of(record);
+            if cell.holds(&columns) {
+                extremes.include(&columns);
+                continue;
+            }
+            if i > run_start {
+                take.take_run(current, offset + run_start as u32, &records[run_start..i]);
+            }
+            run_start = i + 1;
+            if take.given_up() {
+                return passing;
+            }
+            let (number, corners) = (offset + i as u32, record::corners(record));
+            if !corners.iter().flatten().all(|x| x.is_finite()) {
+                passing.note_nonfinite(number);
+                continue;
+            }
+            passing.bounds.include(&corners);
+            let homes = [plan.home(corners[0]), plan.home(corners[1]), plan.home(corners[2])];
+            if homes[0] == homes[1] && homes[0] == homes[2] {
+                current = homes[0];
+                cell = CellColumns::of(&plan.home_box(current));
+                run_start = i;
+                continue;
+            }
+            visited.clear();
+            if visitors {
+                let mut spread = Bounds::EMPTY;
+                spread.include(&corners);
+                plan.meeting(spread.lo, spread.hi, &mut |chunk| {
+                    if !homes.contains(&chunk) {
+                        visited.push(chunk);
+                    }
+                });
+            }
+            let [a, b, c] = homes;
+            let distinct = if a == b || b == c { &[a, c][..] } else { &[a, b, c][..if a == c { 2 } else { 3 }] };
+            take.take(distinct, &visited, number, record);
+        }
+        block_start += block.len();
+    }
+    if records.len() > run_start {
+        take.take_run(current, offset + run_start as u32, &records[run_start..]);
+    }
+    extremes.add_to(&mut passing.bounds);
+    passing
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stream::source::{Source, Triangle};
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn runs_come_back_as_pushed(gaps in prop::collection::vec((0u32..1000, 1u32..1000), 0..50)) {
+            let (mut list, mut end, mut want) = (RunList::default(), 0, Vec::new());
+            for (gap, count) in gaps {
+                list.push(end + gap, count);
+                want.push((end + gap, count));
+                end += gap + count;
+            }
+            prop_assert_eq!(list.runs().collect::<Vec<_>>(), want);
+        }
+
+        /// A chunk sees exactly the finite triangles with a corner at home there, in order, by lists and by spool, whatever the sizes;
+        /// its visitors are those of the others whose box meets its cell.
+        #[test]
+        fn members_are_the_triangles_with_a_corner_at_home(
+            points in prop::collection::vec(prop::array::uniform9(prop_oneof![9 => -4f32..4.0, 1 => Just(f32::NAN)]), 1..120),
+            chunk in 1u32..40,
+            threads in 1usize..4,
+        ) {
+            let records: Vec<Record> =
+                points.iter().map(|p| record::encode([[p[0], p[1], p[2]], [p[3], p[4], p[5]], [p[6], p[7], p[8]]], 0)).collect();
+            let plan = Plan::new(&records, &Guide::NONE, chunk);
+            let want: Vec<Vec<(u32, [[f32; 3]; 3])>> = (0..plan.chunks() as u32)
+                .map(|c| {
+                    let numbered = (0..).zip(records.iter().map(record::corners));
+                    let finite = numbered.filter(|(t, _)| record::all_finite(&records[*t as usize]));
+                    finite.filter(|(_, corners)| corners.iter().any(|p| plan.home(*p) == ChunkId(c))).collect()
+                })
+                .collect();
+            for spill in [Spill::Never, Spill::Auto, Spill::Always] {
+                let limits = Limits { threads, spill, ..Limits::default() };
+                let input = (&records[..], &Guide::NONE);
+                let members = Members::gather(Path::new("test"), input, &plan, true, &limits, &crate::contract::progress::Quiet).unwrap();
+                let wanted = |c: ChunkId| c.0 % 3 != 1;
+                let seen = members.each((&records, &Guide::NONE, &plan), threads, wanted, || (), |(), chunk, seen, visitors| {
+                    let list = |source: &Seen<'_>| {
+                        let mut all = Vec::new();
+                        source.for_each(|number, triangle| all.push((number, triangle.corners())));
+                        assert_eq!(all.len(), source.count());
+                        all
+                    };
+                    assert_eq!((seen.count() + visitors.count()) as u64, members.count(chunk));
+                    (chunk, list(seen), list(visitors))
+                });
+                let wanted: Vec<_> = (0..)
+                    .map(ChunkId)
+                    .zip(&want)
+                    .filter(|(c, _)| wanted(*c))
+                    .map(|(c, of_chunk)| {
+                        let mut visitors = Vec::new();
+                        for (t, record) in (0..).zip(&records).filter(|(_, r)| record::all_finite(r)) {
+                            let mut spread = Bounds::EMPTY;
+                            spread.include(&record::corners(record));
+                            if plan.home_box(c).meets(&spread) && of_chunk.iter().all(|(member, _)| *member != t) {
+                                visitors.push((t, record::corners(record)));
+                            }
+                        }
+                        (c, of_chunk.clone(), visitors)
+                    })
+                    .collect();
+                prop_assert_eq!(seen, wanted);
+            }
+        }
+    }
+
+    #[test]
+    fn neighbours_all_over_the_place_are_scattered_a_row_is_not() {
+        let at = |i: usize| record::encode([[i as f32, 0.0, 0.0], [i as f32 + 1.0, 0.0, 0.0], [i as f32, 1.0, 0.0]], 0);
+        let rows: Vec<Record> = (0..40_000).map(at).collect();
+        // 7919 is prime: a permutation.
+        let mixed: Vec<Record> = (0..40_000).map(|i| at(i * 7919 % 40_000)).collect();
+        assert!(!is_scattered(&rows, &Guide::NONE));
+        assert!(is_scattered(&mixed, &Guide::NONE));
+    }
+
+    #[test]
+    fn lists_that_take_too_much_are_given_up_for_a_spool() {
+        let at = |i: u32| [(i * 7919 % 300) as f32, (i * 7919 % 90_000 / 300) as f32];
+        let corners = |[x, y]: [f32; 2]| [[x, y, 0.0], [x + 1.0, y, 0.0], [x, y + 1.0, 0.0]];
+        let records: Vec<Record> = (0..90_000).map(|i| record::encode(corners(at(i)), 0)).collect();
+        let plan = Plan::new(&records, &Guide::NONE, 1000);
+        let limits = Limits { threads: 2, memory_bytes: 5 << 18, ..Limits::default() };
+        let gathered = |spill| {
+            let (input, limits) = ((&records[..], &Guide::NONE), Limits { spill, ..limits.clone() });
+            Members::gather(Path::new("test"), input, &plan, false, &limits, &crate::contract::progress::Quiet).unwrap()
+        };
+        let (lists, spooled) = (gathered(Spill::Never), gathered(Spill::Auto));
+        assert!(matches!(&lists.kept, Kept::Lists { .. }) && lists.heap_bytes(2) * 3 > limits.memory_bytes / 4);
+        assert!(matches!(&spooled.kept, Kept::Spool(_)));
+        let counts = |m: &Members| (0..plan.chunks() as u32).map(|c| m.count(ChunkId(c))).collect::<Vec<_>>();
+        assert_eq!(counts(&lists), counts(&spooled));
+    }
+}

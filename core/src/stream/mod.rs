@@ -1,0 +1,8 @@
+//! Stream: records in spatial chunks, in bounded memory.
+
+pub(crate) mod budget;
+pub(crate) mod columns;
+pub(crate) mod members;
+pub(crate) mod plan;
+pub(crate) mod source;
+pub(crate) mod spool;

@@ -1,0 +1,236 @@
+//! Components: patches of sound surface and triangles of the workshop that hang together through edges.
+
+use super::edges::{Edge, Edges};
+use super::{Shop, Vertex};
+use crate::geometry::sums::{Bounds, Extent};
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
+
+/// Which patches of sound surface are reversed, against how they stand in the file, and which go. Triangles of the shop are turned, or die, in
+/// place.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Reversed {
+    pub(crate) patches: Vec<bool>,
+    pub(crate) dropped: Vec<bool>,
+}
+
+impl Reversed {
+    pub(crate) fn none(survey: &Survey<'_>) -> Self {
+        Self { patches: vec![false; survey.patches.len()], dropped: vec![false; survey.patches.len()] }
+    }
+}
+
+/// One connected piece of surface.
+#[derive(Clone, Debug)]
+pub(crate) struct Component {
+    pub(crate) triangles: u64,
+    /// With its pieces turned as [`Reversed`] says.
+    pub(crate) extent: Extent,
+    pub(crate) bounds: Bounds,
+    /// It has an edge that it does not itself use equally often in both directions; a boundary edge above all.
+    pub(crate) open: bool,
+    /// Its smallest triangle in the file's order, new ones last.
+    pub(crate) sample: Sample,
+}
+
+/// A triangle of a component: its place in the file (past the end for a new one) and, if it is in the shop, its number there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Sample {
+    pub(crate) record: u32,
+    pub(crate) in_shop: Option<u32>,
+}
+
+/// All components, and who belongs to which.
+pub(crate) struct Components {
+    pub(crate) list: Vec<Component>,
+    pub(crate) of_patch: Vec<u32>,
+    /// [`NONE`] for what is dead or degenerate.
+    pub(crate) of_triangle: Vec<u32>,
+}
+
+/// How far a component reaches.
+#[derive(Clone, Copy)]
+pub(crate) enum Through<'a> {
+    /// Through every edge, as the report counts.
+    EveryEdge,
+    /// Not through non-manifold edges: the sheets between them.
+    ManifoldEdges,
+    /// Nor through edges whose two triangles disagree on their directions.
+    CoherentEdges,
+    /// Through non-manifold edges only between sheets (as given) that are open by themselves: bodies that touch along an edge stay
+    /// apart, and what is closed only together stays together.
+    OpenSheets(&'a Components),
+}
+
+impl Through<'_> {
+    /// Does a component reach through this edge to this triangle?
+    fn reaches(self, edge: &Edge<'_>, triangle: u32) -> bool {
+        match self {
+            Self::EveryEdge => true,
+            Self::ManifoldEdges => !edge.is_nonmanifold(),
+            Self::CoherentEdges => !edge.is_nonmanifold() && !edge.is_inconsistent(),
+            Self::OpenSheets(sheets) => {
+                !edge.is_nonmanifold() || sheets.list[sheets.of_triangle[triangle as usize] as usize].open
+            }
+        }
+    }
+}
+
+impl Components {
+    /// O(patches + shop). Components are numbered by their first patch, then by their first triangle in the shop.
+    pub(crate) fn of(survey: &Survey<'_>, shop: &Shop, edges: &Edges, reversed: &Reversed, through: Through<'_>) -> Self {
+        let patches = survey.patches.len() as u32;
+        let mut parents: Vec<u32> = (0..patches + shop.triangles.len() as u32).collect();
+        for t in shop.living() {
+            let patch = shop.triangles[t as usize].patch;
+            if patch != NONE {
+                crate::util::union_find::unite(&mut parents, patch, patches + t);
+            }
+        }
+        for edge in edges.iter() {
+            let mut reached = edge.uses.iter().filter(|u| through.reaches(&edge, u.triangle));
+            if let Some(first) = reached.next() {
+                reached.for_each(|u| {
+                    crate::util::union_find::unite(&mut parents, patches + first.triangle, patches + u.triangle);
+                });
+            }
+        }
+        let mut all =
+            Self { list: Vec::new(), of_patch: vec![NONE; patches as usize], of_triangle: vec![NONE; shop.triangles.len()] };
+        let mut numbers = vec![NONE; parents.len()];
+        // After a second look, there may be nothing left of a patch.
+        for p in (0..patches).filter(|p| survey.patches[*p as usize].first != NONE && !reversed.dropped[*p as usize]) {
+            let sum = &survey.patches[p as usize];
+            let c = all.number(
+                &mut numbers,
+                crate::util::union_find::find(&mut parents, p),
+                Sample { record: sum.first, in_shop: None },
+            );
+            all.of_patch[p as usize] = c;
+            let into = &mut all.list[c as usize];
+            into.triangles += sum.triangles;
+            into.bounds.add(&sum.bounds);
+            into.extent += turned(sum.extent, reversed.patches[p as usize]);
+        }
+        for t in shop.living() {
+            let c = all.number(
+                &mut numbers,
+                crate::util::union_find::find(&mut parents, patches + t),
+                Sample { record: shop.record(t), in_shop: Some(t) },
+            );
+            all.of_triangle[t as usize] = c;
+            let points = shop.points(t);
+            let into = &mut all.list[c as usize];
+            into.triangles += 1;
+            into.bounds.include(&points);
+            into.extent += survey.measure.triangle(&points);
+        }
+        for edge in edges.iter().filter(|e| e.is_nonmanifold() || e.is_unbalanced()) {
+            // Each component's own uses, forward less backward.
+            let mut own: Vec<(u32, i64)> =
+                edge.uses.iter().map(|u| (all.of_triangle[u.triangle as usize], if u.forward { 1 } else { -1 })).collect();
+            own.sort_unstable();
+            for group in own.chunk_by(|a, b| a.0 == b.0) {
+                all.list[group[0].0 as usize].open |= group.iter().map(|g| g.1).sum::<i64>() != 0;
+            }
+        }
+        all
+    }
+
+    fn number(&mut self, numbers: &mut [u32], root: u32, sample: Sample) -> u32 {
+        let number = &mut numbers[root as usize];
+        if *number == NONE {
+            *number = self.list.len() as u32;
+            self.list.push(Component { triangles: 0, extent: Extent::default(), bounds: Bounds::EMPTY, open: false, sample });
+        }
+        let component = &mut self.list[*number as usize];
+        component.sample = component.sample.min(sample);
+        *number
+    }
+}
+
+fn turned(extent: Extent, reversed: bool) -> Extent {
+    if reversed { Extent { volume: -extent.volume, ..extent } } else { extent }
+}
+
+/// Connected sets of boundary edges.
+pub(crate) fn boundary_loops(shop: &Shop, edges: &Edges) -> u64 {
+    let mut parents: Vec<Vertex> = (0..shop.positions.len() as u32).collect();
+    let mut on_boundary = vec![false; shop.positions.len()];
+    for edge in edges.iter().filter(|e| e.is_boundary()) {
+        on_boundary[edge.low as usize] = true;
+        on_boundary[edge.high as usize] = true;
+        crate::util::union_find::unite(&mut parents, edge.low, edge.high);
+    }
+    (0..parents.len()).filter(|v| on_boundary[*v] && parents[*v] == *v as u32).count() as u64
+}
+
+/// Vertices on a non-manifold edge, or with more than one fan. A fan hangs together through two-triangle edges.
+pub(crate) fn nonmanifold_vertices(shop: &Shop, edges: &Edges) -> Vec<Vertex> {
+    let mut bad = vec![false; shop.positions.len()];
+    let mut parents: Vec<u32> = (0..shop.triangles.len() as u32 * 3).collect();
+    let corner = |t: u32, v: Vertex| t * 3 + shop.triangles[t as usize].v.iter().position(|w| *w == v).unwrap_or(0) as u32;
+    for edge in edges.iter() {
+        if edge.is_nonmanifold() {
+            bad[edge.low as usize] = true;
+            bad[edge.high as usize] = true;
+        } else if let [a, b] = edge.uses {
+            for v in [edge.low, edge.high] {
+                crate::util::union_find::unite(&mut parents, corner(a.triangle, v), corner(b.triangle, v));
+            }
+        }
+    }
+    (0..shop.positions.len() as u32)
+        .filter(|v| {
+            if !shop.complete[*v as usize] {
+                return false;
+            }
+            let mut fans = shop.star(*v).map(|(t, k)| crate::util::union_find::find(&mut parents, t * 3 + k as u32));
+            bad[*v as usize] || fans.next().is_some_and(|first| fans.any(|f| f != first))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Corners, cube, cuboid, diagnose, plate, records};
+
+    /// Components through every edge, between sheets, and by [`Through::OpenSheets`]: how many, and how many of them open.
+    fn counted(triangles: &[Corners]) -> [(usize, usize); 3] {
+        let records = records(triangles);
+        let d = diagnose(&records);
+        let of = |through| Components::of(&d.survey, &d.shop, &Edges::of(&d.shop), &Reversed::none(&d.survey), through);
+        let sheets = of(Through::ManifoldEdges);
+        [of(Through::EveryEdge), of(Through::ManifoldEdges), of(Through::OpenSheets(&sheets))]
+            .map(|c| (c.list.len(), c.list.iter().filter(|c| c.open).count()))
+    }
+
+    #[test]
+    fn cubes_that_share_an_edge_are_apart_but_for_the_report() {
+        let cubes = [cube(), cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 1.0])].concat();
+        assert_eq!(counted(&cubes), [(1, 0), (2, 0), (2, 0)]);
+    }
+
+    #[test]
+    fn what_is_closed_only_together_stays_together() {
+        // A double box: the two shells are open at the wall between them, and only one of them has the wall.
+        let (left, right) = (cube(), cuboid([1.0, 0.0, 0.0], [2.0, 1.0, 1.0]));
+        let double = [&left[..], &right[..8], &right[10..]].concat();
+        assert_eq!(counted(&double), [(1, 1), (3, 3), (1, 1)]);
+    }
+
+    #[test]
+    fn a_ring_has_two_boundary_loops_and_a_pinched_plate_one_bad_vertex() {
+        let ring = records(&plate(3, |x, y| (x, y) != (1, 1)));
+        let d = diagnose(&ring);
+        assert_eq!(boundary_loops(&d.shop, &Edges::of(&d.shop)), 2);
+        assert!(nonmanifold_vertices(&d.shop, &Edges::of(&d.shop)).is_empty());
+        // Two squares that touch in one corner: two fans there.
+        let pinched = records(&plate(2, |x, y| x == y));
+        let d = diagnose(&pinched);
+        let bad: Vec<[f32; 3]> =
+            nonmanifold_vertices(&d.shop, &Edges::of(&d.shop)).iter().map(|v| d.shop.positions[*v as usize]).collect();
+        assert_eq!(bad, [[1.0, 1.0, 0.0]]);
+    }
+}

@@ -1,0 +1,372 @@
+//! The workshop: all triangles around unsound vertices, as a small mesh in memory that repairs can change.
+//!
+//! Its **complete** vertices have their whole star here (the unsound ones, and what was fetched on request); the others are its
+//! frontier and stay as they are. An edge with a complete end therefore has all its triangles here. Vertices and triangles are
+//! numbered by the input's order, so nothing that is done here depends on how the file was cut into chunks.
+
+pub(crate) mod components;
+pub(crate) mod edges;
+pub(crate) mod near;
+pub(crate) mod wedges;
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use crate::geometry::position::Position;
+use crate::io::read_ahead::ASKED_AT_ONCE;
+use crate::io::record::{self, Record};
+use crate::topology::chunk::Suspect;
+use crate::topology::survey::Survey;
+use crate::topology::vertex_table::Weld;
+use crate::util::steps;
+use crate::util::union_find::NONE;
+
+/// A vertex of the workshop.
+pub(crate) type Vertex = u32;
+
+/// Where a triangle comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Origin {
+    /// This record of the input.
+    Input(u32),
+    /// A part of this record; takes its attribute.
+    Part(u32),
+    /// Made by a repair, as a part of no record; its attribute is 0.
+    Patch,
+}
+
+impl Origin {
+    /// Where a part of the triangle comes from.
+    pub(crate) fn of_part(self) -> Self {
+        match self {
+            Self::Input(record) | Self::Part(record) => Self::Part(record),
+            Self::Patch => Self::Patch,
+        }
+    }
+}
+
+/// A triangle of the workshop.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Triangle {
+    pub(crate) v: [Vertex; 3],
+    pub(crate) origin: Origin,
+    /// The patch of sound surface it continues coherently, or [`NONE`].
+    pub(crate) patch: u32,
+    pub(crate) alive: bool,
+}
+
+impl Triangle {
+    /// The record it comes from; past all records for a new one.
+    pub(crate) fn record(&self) -> u32 {
+        match self.origin {
+            Origin::Input(record) | Origin::Part(record) => record,
+            Origin::Patch => NONE,
+        }
+    }
+}
+
+/// A workshop that is being made.
+pub(crate) struct Gathering {
+    weld: Weld,
+    complete: Vec<bool>,
+    triangles: Vec<Triangle>,
+}
+
+impl Gathering {
+    /// Of about so many triangles.
+    pub(crate) fn of(triangles: usize) -> Self {
+        let mut weld = Weld::default();
+        weld.reset(triangles);
+        Self { weld, complete: Vec::new(), triangles: Vec::with_capacity(triangles) }
+    }
+
+    /// Adds the triangle that is or stands in for the record at `place`, of whose vertices some have their whole star here (bit k of
+    /// `complete`: corner k), and the others belong to `patch`, or [`NONE`].
+    pub(crate) fn add(&mut self, place: u32, corners: [[f32; 3]; 3], complete: u8, patch: u32) {
+        let v = corners.map(|p| self.weld.vertex(p));
+        self.complete.resize(self.weld.positions().len(), false);
+        for (k, vertex) in v.iter().enumerate() {
+            self.complete[*vertex as usize] |= complete >> k & 1 == 1;
+        }
+        self.triangles.push(Triangle { v, origin: Origin::Input(place), patch, alive: true });
+    }
+
+    pub(crate) fn finish(self) -> Shop {
+        let Self { weld, complete, triangles } = self;
+        let mut shop = Shop { heads: Vec::new(), nexts: Vec::new(), positions: weld.into_positions(), complete, triangles };
+        shop.relink();
+        shop
+    }
+}
+
+/// The mesh under repair.
+pub(crate) struct Shop {
+    /// The coordinates of [`Position`]s: without −0.0.
+    pub(crate) positions: Vec<[f32; 3]>,
+    /// The whole star is here.
+    pub(crate) complete: Vec<bool>,
+    pub(crate) triangles: Vec<Triangle>,
+    /// First corner (3 · triangle + k) of each vertex, and the next one of the same vertex: a list for each star. A triangle that was turned over
+    /// since has the vertex at another corner.
+    heads: Vec<u32>,
+    nexts: Vec<u32>,
+}
+
+/// Which corner of a triangle is `vertex`, of which a star list says that it was `corner` when the list was made.
+fn corner_of(triangle: &[Vertex; 3], vertex: Vertex, corner: usize) -> usize {
+    triangle.iter().position(|v| *v == vertex).unwrap_or(corner % 3)
+}
+
+impl Shop {
+    /// Gathers the suspects of `survey`. O(suspects).
+    pub(crate) fn gather(survey: &Survey<'_>) -> Self {
+        let mut gathering = Gathering::of(survey.suspects.len());
+        for (i, (suspect, patch)) in survey.suspects.iter().zip(&survey.suspect_patches).enumerate() {
+            if i % ASKED_AT_ONCE == 0 {
+                survey.ask_for(survey.suspects[i..].iter().take(ASKED_AT_ONCE).map(|s| s.triangle));
+            }
+            gathering.add(suspect.triangle, corners(survey.records, suspect.triangle), suspect.unsound, *patch);
+        }
+        gathering.finish()
+    }
+
+    /// Vertices by position: of several there, one that is used.
+    pub(crate) fn by_position(&self) -> HashMap<Position, Vertex> {
+        steps::count(self.positions.len());
+        let used = self.living().flat_map(|t| self.triangles[t as usize].v);
+        let all = 0..self.positions.len() as Vertex;
+        all.chain(used).map(|v| (Position::of(self.positions[v as usize]), v)).collect()
+    }
+
+    /// Takes in what [`Survey::promote`] has found for some of its incomplete vertices, which become complete: those that `completed`
+    /// names, which is told of all vertices by position.
+    pub(crate) fn extend(
+        &mut self,
+        survey: &Survey<'_>,
+        new: &[(Suspect, u32)],
+        completed: impl FnOnce(&HashMap<Position, Vertex>) -> Vec<Vertex>,
+    ) {
+        let mut known = self.by_position();
+        for (suspect, patch) in new {
+            let v = corners(survey.records, suspect.triangle).map(|p| {
+                let position = Position::of(p);
+                *known.entry(position).or_insert_with(|| {
+                    self.positions.push(position.coordinates());
+                    self.complete.push(false);
+                    self.positions.len() as Vertex - 1
+                })
+            });
+            self.triangles.push(Triangle { v, origin: Origin::Input(suspect.triangle), patch: *patch, alive: true });
+        }
+        completed(&known).into_iter().for_each(|v| self.complete[v as usize] = true);
+        self.relink();
+    }
+
+    /// Builds the star lists anew, dropping what is dead. Lists run from the last triangle to the first.
+    pub(crate) fn relink(&mut self) {
+        self.heads.clear();
+        self.heads.resize(self.positions.len(), NONE);
+        self.nexts.clear();
+        self.nexts.resize(self.triangles.len() * 3, NONE);
+        steps::count(self.triangles.len());
+        for t in 0..self.triangles.len() {
+            if self.triangles[t].alive {
+                self.link(t);
+            }
+        }
+    }
+
+    fn link(&mut self, t: usize) {
+        for (k, v) in self.triangles[t].v.iter().enumerate() {
+            let corner = t * 3 + k;
+            self.nexts[corner] = self.heads[*v as usize];
+            self.heads[*v as usize] = corner as u32;
+        }
+    }
+
+    /// Adds a triangle and returns its number.
+    pub(crate) fn add(&mut self, v: [Vertex; 3], origin: Origin, patch: u32) -> u32 {
+        let t = self.triangles.len();
+        self.triangles.push(Triangle { v, origin, patch, alive: true });
+        self.nexts.extend([NONE; 3]);
+        self.link(t);
+        t as u32
+    }
+
+    /// Adds a vertex where none is, and returns its number. Its star is what will be added to it.
+    pub(crate) fn add_vertex(&mut self, position: Position) -> Vertex {
+        self.positions.push(position.coordinates());
+        self.complete.push(true);
+        self.heads.push(NONE);
+        self.positions.len() as Vertex - 1
+    }
+
+    pub(crate) fn kill(&mut self, t: u32) {
+        self.triangles[t as usize].alive = false;
+    }
+
+    /// Lets all triangles of `go` use `stay` instead.
+    pub(crate) fn merge(&mut self, stay: Vertex, go: Vertex) {
+        let mut corner = std::mem::replace(&mut self.heads[go as usize], NONE);
+        while corner != NONE {
+            let at = corner as usize;
+            corner = self.nexts[at];
+            let v = &mut self.triangles[at / 3].v;
+            v[corner_of(v, go, at)] = stay;
+            self.nexts[at] = self.heads[stay as usize];
+            self.heads[stay as usize] = at as u32;
+        }
+    }
+
+    pub(crate) fn points(&self, t: u32) -> [[f32; 3]; 3] {
+        self.triangles[t as usize].v.map(|v| self.positions[v as usize])
+    }
+
+    /// Exactly collinear corners.
+    pub(crate) fn is_collinear(&self, t: u32) -> bool {
+        let [a, b, c] = self.points(t);
+        crate::geometry::collinear::is_collinear(&a, &b, &c)
+    }
+
+    /// The record `t` comes from; past all records for a new triangle.
+    pub(crate) fn record(&self, t: u32) -> u32 {
+        self.triangles[t as usize].record()
+    }
+
+    /// Living triangles with three distinct vertices, by number.
+    pub(crate) fn living(&self) -> impl Iterator<Item = u32> + '_ {
+        (0..self.triangles.len() as u32).filter(|t| self.lives(*t))
+    }
+
+    /// A living triangle with three distinct vertices.
+    pub(crate) fn lives(&self, t: u32) -> bool {
+        let t = &self.triangles[t as usize];
+        t.alive && !has_repeated(t.v)
+    }
+
+    /// Living triangles around `v`, each with the number of `v`'s corner.
+    pub(crate) fn star(&self, v: Vertex) -> impl Iterator<Item = (u32, usize)> + '_ {
+        let mut corner = self.heads[v as usize];
+        std::iter::from_fn(move || {
+            while corner != NONE {
+                steps::count(1);
+                let at = corner;
+                corner = self.nexts[at as usize];
+                let triangle = &self.triangles[(at / 3) as usize];
+                if triangle.alive && !has_repeated(triangle.v) {
+                    return Some((at / 3, corner_of(&triangle.v, v, at as usize)));
+                }
+            }
+            None
+        })
+    }
+
+    /// All triangles in the star list of `v`, dead ones too.
+    pub(crate) fn linked(&self, v: Vertex) -> impl Iterator<Item = u32> + '_ {
+        let mut corner = self.heads[v as usize];
+        std::iter::from_fn(move || {
+            let at = (corner != NONE).then_some(corner)?;
+            corner = self.nexts[at as usize];
+            Some(at / 3)
+        })
+    }
+
+    /// Whether a living triangle holds the edge `a`–`b`. Looks from the end `a`, which must be complete to be sure.
+    pub(crate) fn has_edge(&self, a: Vertex, b: Vertex) -> bool {
+        self.star(a).any(|(t, _)| self.triangles[t as usize].v.contains(&b))
+    }
+
+    /// Shortest edge around `v`.
+    pub(crate) fn shortest_edge(&self, v: Vertex) -> f64 {
+        let ends = self.star(v).flat_map(|(t, k)| {
+            let corners = self.triangles[t as usize].v;
+            [corners[(k + 1) % 3], corners[(k + 2) % 3]]
+        });
+        ends.map(|w| self.distance(v, w)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// A position in f64.
+    pub(crate) fn place(&self, v: Vertex) -> DVec3 {
+        place(self.positions[v as usize])
+    }
+
+    /// The way from one vertex to another.
+    pub(crate) fn vector(&self, from: Vertex, to: Vertex) -> DVec3 {
+        self.place(to) - self.place(from)
+    }
+
+    /// Normal of a triangle, twice its area long.
+    pub(crate) fn normal(&self, t: u32) -> DVec3 {
+        let [a, b, c] = self.triangles[t as usize].v;
+        self.vector(a, b).cross(self.vector(a, c))
+    }
+
+    pub(crate) fn distance(&self, a: Vertex, b: Vertex) -> f64 {
+        distance(self.positions[a as usize], self.positions[b as usize])
+    }
+}
+
+/// A position in f64.
+pub(crate) fn place(p: [f32; 3]) -> DVec3 {
+    DVec3::from_array(p.map(f64::from))
+}
+
+/// Cosine of the angle between two vectors; 0 where one has no length.
+pub(crate) fn cosine(a: DVec3, b: DVec3) -> f64 {
+    let length = (a.dot(a) * b.dot(b)).sqrt();
+    if length > 0.0 { a.dot(b) / length } else { 0.0 }
+}
+
+/// Squared distance of a point from a triangle (Ericson, Real-Time Collision Detection, 2005, 5.1.5: by the regions of its edges and face).
+pub(crate) fn square_distance(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
+    let to_edge = |a: DVec3, b: DVec3| {
+        let (d, q) = (b - a, p - a);
+        let share = if d.length_squared() > 0.0 { (q.dot(d) / d.length_squared()).clamp(0.0, 1.0) } else { 0.0 };
+        (q - d * share).length_squared()
+    };
+    let rim = to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a));
+    let normal = (b - a).cross(c - a);
+    let is_over = |a: DVec3, b: DVec3| normal.cross(b - a).dot(p - a) >= 0.0;
+    if normal.length_squared() > 0.0 && is_over(a, b) && is_over(b, c) && is_over(c, a) {
+        let height = normal.dot(p - a);
+        return rim.min(height * height / normal.length_squared());
+    }
+    rim
+}
+
+/// Distance of two positions, in f64.
+pub(crate) fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
+    (0..3).map(|k| (f64::from(a[k]) - f64::from(b[k])).powi(2)).sum::<f64>().sqrt()
+}
+
+pub(crate) fn has_repeated(v: [Vertex; 3]) -> bool {
+    v[0] == v[1] || v[1] == v[2] || v[2] == v[0]
+}
+
+pub(crate) fn corners(records: &[Record], t: u32) -> [[f32; 3]; 3] {
+    record::corners(&records[t as usize])
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// No point of the triangle is nearer, and one about there is as near.
+        #[test]
+        fn distance_from_a_triangle_is_that_of_its_nearest_point(c in prop::array::uniform12(-4i8..5)) {
+            const STEPS: u32 = 40;
+            let v = |i: usize| DVec3::from_array([c[i], c[i + 1], c[i + 2]].map(f64::from));
+            let (p, [a, b, c]) = (v(0), [v(3), v(6), v(9)]);
+            let found = square_distance(p, [a, b, c]).sqrt();
+            let steps = (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |j| (i, j)));
+            let points = steps.map(|(i, j)| a + ((b - a) * f64::from(i) + (c - a) * f64::from(j)) / f64::from(STEPS));
+            let nearest = points.map(|point| point.distance(p)).fold(f64::INFINITY, f64::min);
+            let step = ((b - a).length() + (c - a).length()) / f64::from(STEPS);
+            prop_assert!(found <= nearest + 1e-9 && nearest <= found + step + 1e-9, "{} for {}", found, nearest);
+        }
+    }
+}

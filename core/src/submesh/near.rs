@@ -1,0 +1,205 @@
+//! What lies near the boundary: vertices that should be one, and vertices inside another triangle's edge.
+
+use super::edges::Edges;
+use super::{Shop, Vertex, distance};
+use crate::geometry::boxes::BoxTree;
+use crate::geometry::sums::Bounds;
+
+/// How near is near.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Tolerance {
+    /// Never more than this, in the model's units.
+    pub(crate) weld: f64,
+    /// Nor than this share of the shortest edge at a vertex.
+    pub(crate) edge_share: f64,
+}
+
+impl Tolerance {
+    /// What holds at `v`.
+    pub(crate) fn at(&self, shop: &Shop, v: Vertex) -> f64 {
+        self.weld.min(shop.shortest_edge(v) * self.edge_share)
+    }
+}
+
+/// Ends of boundary edges, ascending.
+pub(crate) fn boundary_vertices(edges: &Edges) -> Vec<Vertex> {
+    let mut all: Vec<Vertex> = edges.iter().filter(|e| e.is_boundary()).flat_map(|e| [e.low, e.high]).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// Pairs of boundary vertices, smaller number first, within the tolerance that holds at both; sorted. Vertices joined by an edge
+/// are never within it.
+pub(crate) fn close_pairs(shop: &Shop, edges: &Edges, tolerance: &Tolerance) -> Vec<(Vertex, Vertex)> {
+    let vertices = boundary_vertices(edges);
+    if vertices.is_empty() || tolerance.weld <= 0.0 {
+        return Vec::new();
+    }
+    let reach: Vec<f64> = vertices.iter().map(|v| tolerance.at(shop, *v)).collect();
+    let boxes: Vec<Bounds> = vertices.iter().map(|v| around(&[shop.positions[*v as usize]], 0.0)).collect();
+    let tree = BoxTree::new(&boxes);
+    let mut found = Vec::new();
+    let mut pairs = Vec::new();
+    for (i, v) in vertices.iter().enumerate() {
+        tree.meeting(&around(&[shop.positions[*v as usize]], reach[i]), &mut found);
+        for j in found.iter().map(|j| *j as usize).filter(|j| *j > i) {
+            if shop.distance(*v, vertices[j]) <= reach[i].min(reach[j]) {
+                pairs.push((*v, vertices[j]));
+            }
+        }
+    }
+    pairs.sort_unstable();
+    pairs
+}
+
+/// For each of some vertices the nearest of the others within both reaches that it shares no triangle with, by place in `vertices`;
+/// of equally near ones the first.
+pub(crate) fn nearest_apart(shop: &Shop, vertices: &[Vertex], reach: &[f64]) -> Vec<Option<usize>> {
+    let boxes: Vec<Bounds> = vertices.iter().map(|v| around(&[shop.positions[*v as usize]], 0.0)).collect();
+    if boxes.is_empty() {
+        return Vec::new();
+    }
+    let tree = BoxTree::new(&boxes);
+    let mut found = Vec::new();
+    let mut nearest = Vec::with_capacity(vertices.len());
+    for (i, v) in vertices.iter().enumerate() {
+        tree.meeting(&around(&[shop.positions[*v as usize]], reach[i]), &mut found);
+        let mut best: Option<(f64, usize)> = None;
+        for j in found.iter().map(|j| *j as usize).filter(|j| *j != i) {
+            let away = shop.distance(*v, vertices[j]);
+            if away <= reach[i].min(reach[j]) && best.is_none_or(|(d, _)| away < d) && !shop.has_edge(*v, vertices[j]) {
+                best = Some((away, j));
+            }
+        }
+        nearest.push(best.map(|(_, j)| j));
+    }
+    nearest
+}
+
+/// Boundary vertices within tolerance of another one.
+pub(crate) fn weldable_vertices(shop: &Shop, edges: &Edges, tolerance: &Tolerance) -> Vec<Vertex> {
+    let mut all: Vec<Vertex> = close_pairs(shop, edges, tolerance).into_iter().flat_map(|(a, b)| [a, b]).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// A boundary vertex inside a boundary edge of another triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct OnEdge {
+    /// Number of the edge in [`Edges`].
+    pub(crate) edge: u32,
+    /// Where on it, from its low end: 0 to 1.
+    pub(crate) at: f64,
+    pub(crate) vertex: Vertex,
+    pub(crate) distance: f64,
+}
+
+/// Every boundary vertex that lies within `reach(vertex, edge length)` of the inside of a boundary edge whose triangle it does not
+/// belong to, with its nearest such edge, by edge and place on it.
+pub(crate) fn on_edges(shop: &Shop, edges: &Edges, reach: impl Fn(Vertex) -> f64) -> Vec<OnEdge> {
+    let boundary: Vec<u32> = (0..edges.len() as u32).filter(|i| edges.get(*i as usize).is_boundary()).collect();
+    if boundary.is_empty() {
+        return Vec::new();
+    }
+    let ends = |i: u32| {
+        let e = edges.get(i as usize);
+        [shop.positions[e.low as usize], shop.positions[e.high as usize]]
+    };
+    let tree = BoxTree::new(&boundary.iter().map(|i| around(&ends(*i), 0.0)).collect::<Vec<_>>());
+    let mut found = Vec::new();
+    let mut all = Vec::new();
+    for v in boundary_vertices(edges) {
+        let (p, tolerance) = (shop.positions[v as usize], reach(v));
+        tree.meeting(&around(&[p], tolerance), &mut found);
+        let mut nearest: Option<OnEdge> = None;
+        for edge in found.iter().map(|i| boundary[*i as usize]) {
+            let triangle = edges.get(edge as usize).uses[0].triangle;
+            if shop.triangles[triangle as usize].v.contains(&v) {
+                continue;
+            }
+            let [a, b] = ends(edge);
+            let (at, off) = project(p, a, b);
+            let length = distance(a, b);
+            // Strictly inside, by more than the tolerance: what is nearer to an end is a matter of welding.
+            let inside = at * length > tolerance && (1.0 - at) * length > tolerance;
+            if inside && off <= tolerance && nearest.is_none_or(|n| off < n.distance) {
+                nearest = Some(OnEdge { edge, at, vertex: v, distance: off });
+            }
+        }
+        all.extend(nearest);
+    }
+    all.sort_by(|a, b| a.edge.cmp(&b.edge).then(a.at.total_cmp(&b.at)).then(a.vertex.cmp(&b.vertex)));
+    all
+}
+
+/// Boundary vertices inside a boundary edge of another triangle (T-junctions), with their edges.
+pub(crate) fn noncommon_vertices(shop: &Shop, edges: &Edges, tolerance: &Tolerance) -> Vec<OnEdge> {
+    on_edges(shop, edges, |v| tolerance.at(shop, v))
+}
+
+/// Foot of `p` on the line a–b as a fraction from a, clamped to the segment, and its distance. 0 for an edge of no length.
+fn project(p: [f32; 3], a: [f32; 3], b: [f32; 3]) -> (f64, f64) {
+    let [p, a, b] = [p, a, b].map(|q| q.map(f64::from));
+    let d: [f64; 3] = std::array::from_fn(|k| b[k] - a[k]);
+    let x: [f64; 3] = std::array::from_fn(|k| p[k] - a[k]);
+    let length2: f64 = d.iter().map(|c| c * c).sum();
+    let at = if length2 > 0.0 { (x.iter().zip(d).map(|(x, d)| x * d).sum::<f64>() / length2).clamp(0.0, 1.0) } else { 0.0 };
+    let off: f64 = (0..3).map(|k| (x[k] - at * d[k]).powi(2)).sum();
+    (at, off.sqrt())
+}
+
+/// Distance of `p` from the segment a–b.
+pub(crate) fn distance_to_line(p: [f32; 3], a: [f32; 3], b: [f32; 3]) -> f64 {
+    project(p, a, b).1
+}
+
+/// The box around some points, wider by `by` on all sides.
+pub(crate) fn around(points: &[[f32; 3]], by: f64) -> Bounds {
+    let mut b = Bounds::EMPTY;
+    b.include(points);
+    // Rounded outward, so that nothing is missed.
+    Bounds {
+        lo: b.lo.map(|x| ((f64::from(x) - by) as f32).next_down()),
+        hi: b.hi.map(|x| ((f64::from(x) + by) as f32).next_up()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Corners, diagnose, records};
+
+    /// A large triangle with its long edge on the x axis from 0 to 10, below it.
+    const BELOW: Corners = [[0.0; 3], [5.0, -10.0, 0.0], [10.0, 0.0, 0.0]];
+
+    fn on_edge(tip: [f32; 3], weld: f64) -> Vec<OnEdge> {
+        let records = records(&[BELOW, [tip, [12.0, 10.0, 0.0], [-2.0, 10.0, 0.0]]]);
+        let d = diagnose(&records);
+        noncommon_vertices(&d.shop, &Edges::of(&d.shop), &Tolerance { weld, edge_share: 0.25 })
+    }
+
+    #[test]
+    fn a_vertex_near_the_inside_of_an_edge_is_on_it() {
+        let found = on_edge([2.5, 0.5, 0.0], 0.5);
+        assert_eq!(found.len(), 1);
+        assert_eq!((found[0].at, found[0].distance), (0.25, 0.5));
+        assert!(on_edge([2.5, 0.5, 0.0], 0.4).is_empty(), "too far");
+        assert!(on_edge([0.4, 0.0, 0.0], 0.5).is_empty(), "so near to the end, it is a matter of welding");
+    }
+
+    #[test]
+    fn vertices_are_close_by_the_tolerance_and_by_the_edges_around() {
+        let pairs = |size: f32, weld: f64| {
+            let small: Corners = [[0.0, 0.1, 0.0], [-size, size, 0.0], [0.0, size, 0.0]];
+            let records = records(&[BELOW, small]);
+            let d = diagnose(&records);
+            close_pairs(&d.shop, &Edges::of(&d.shop), &Tolerance { weld, edge_share: 0.25 }).len()
+        };
+        assert_eq!(pairs(5.0, 0.2), 1);
+        assert_eq!(pairs(5.0, 0.05), 0, "beyond the tolerance");
+        assert_eq!(pairs(0.3, 0.2), 0, "a small feature is not welded away: its edges are 0.2 long");
+        assert_eq!(pairs(5.0, 0.0), 0, "switched off");
+    }
+}

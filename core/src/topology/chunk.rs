@@ -1,0 +1,630 @@
+//! The exact topology of one chunk: which vertices at home there have a sound star, and which sound surface hangs together.
+//!
+//! A chunk sees every triangle around each vertex at home in it, so it decides those vertices' stars exactly and alone. A vertex
+//! is **sound** when its triangles form one closed fan, coherently oriented: every directed edge that leaves it comes back exactly
+//! once, in one cycle of at least three. Anything else (boundary, non-manifold edge, disagreement, several fans, duplicates, a
+//! collinear triangle) makes it **unsound**, and all its triangles are reported to the workshop, which sorts out what is wrong.
+//! Sound vertices that share a triangle belong to one **patch**: a coherent piece of surface.
+//!
+//! Tables are laid out to stay in an L2 cache at 32 k triangles a chunk; a worker keeps them from chunk to chunk.
+
+use crate::geometry::sums::{Bounds, Extent, Measure};
+use crate::io::record::Point;
+use crate::stream::budget::{Budget, Purpose};
+use crate::stream::plan::HomeBox;
+use crate::stream::source::{Seen, Source, Triangle};
+use crate::topology::crossings::Crossings;
+use crate::topology::intersect::{self, Finder, Region, Standing};
+use crate::topology::star::{self, Ring, Stars};
+use crate::topology::vertex_table::{self, Weld};
+use crate::util::union_find::NONE;
+
+/// A triangle that goes to the workshop, and which of its corners are unsound here (bit k: corner k).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Suspect {
+    pub(crate) triangle: u32,
+    pub(crate) unsound: u8,
+}
+
+/// A triangle that more than one chunk sees, or that is a suspect, with the patch of its sound corners at home here.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Link {
+    pub(crate) triangle: u32,
+    /// Number of the patch, within the chunk or later the file, and in the highest bit whether the triangle is in the patch's sums: it
+    /// is in those of the chunk where its first corner is at home, if that knows nothing against it.
+    patch: u32,
+}
+
+/// The most patches that links can tell apart.
+pub(crate) const MOST_PATCHES: u64 = 1 << 31;
+
+impl Link {
+    fn new(triangle: u32, patch: u32, counted: bool) -> Self {
+        Self { triangle, patch: patch | u32::from(counted) << 31 }
+    }
+
+    pub(crate) fn patch(self) -> u32 {
+        self.patch & !(1 << 31)
+    }
+
+    pub(crate) fn is_counted(self) -> bool {
+        self.patch >> 31 == 1
+    }
+
+    /// The same with the patch's number raised by `base`.
+    pub(crate) fn raised(self, base: u32) -> Self {
+        Self { patch: self.patch + base, ..self }
+    }
+}
+
+/// What is summed over a patch: its triangles with three sound corners, until the merge also some whose other corners are not.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Patch {
+    pub(crate) triangles: u64,
+    pub(crate) extent: Extent,
+    /// Of its sound vertices.
+    pub(crate) bounds: Bounds,
+    /// Smallest member with a sound corner in it.
+    pub(crate) first: u32,
+}
+
+/// The patch of each member in list order.
+#[derive(Clone, Debug, Default)]
+pub(crate) enum Labels {
+    /// All members with a sound corner belong to patch 0 of the chunk.
+    #[default]
+    One,
+    /// Run-coded: count, then patch + 1 (0: none).
+    Runs(Vec<u8>),
+}
+
+/// What one chunk contributes.
+#[derive(Debug, Default)]
+pub(crate) struct ChunkTopology {
+    pub(crate) suspects: Vec<Suspect>,
+    pub(crate) links: Vec<Link>,
+    pub(crate) patches: Vec<Patch>,
+    pub(crate) labels: Labels,
+    /// The box of all triangles with a label that are no suspects here.
+    pub(crate) reach: Bounds,
+    /// Positions at home here.
+    pub(crate) vertices: u64,
+    /// Those used by a triangle with three distinct vertices.
+    pub(crate) vertices_used: u64,
+    /// Positions at home here that suspects use.
+    pub(crate) suspect_vertices: u64,
+    /// Self-intersections that this chunk owns; empty if they were not looked for.
+    pub(crate) crossings: Crossings,
+}
+
+/// Triangles that are welded at once.
+const BATCH: usize = vertex_table::BATCH / 3;
+
+/// Bytes that a patch takes until the file is judged: here, merged, and as a component.
+pub(crate) const BYTES_PER_PATCH: u64 = 3 * size_of::<Patch>() as u64 + 160;
+
+impl ChunkTopology {
+    /// Counts what it takes now and will take once it is merged.
+    pub(crate) fn take(&self, budget: &Budget) {
+        let labels = self.labels.heap_bytes();
+        let fixed = size_of::<Self>() as u64;
+        budget.take(Purpose::Surface, fixed + labels + self.patches.capacity() as u64 * BYTES_PER_PATCH);
+        // Copied when they are merged; of suspects, one more list is kept.
+        let seams = size_of::<Link>() * self.links.capacity() + size_of::<Suspect>() * self.suspects.capacity();
+        budget.take(Purpose::Seams, 2 * (seams as u64 + self.crossings.heap_bytes()));
+        budget.take(Purpose::Defects, crate::stream::budget::workshop_bytes(self.suspects.len() as u64, self.suspect_vertices));
+    }
+
+    /// Gives back what growing left over.
+    fn shrink(&mut self) {
+        self.suspects.shrink_to_fit();
+        self.links.shrink_to_fit();
+        self.patches.shrink_to_fit();
+    }
+}
+
+/// The tables of one worker, used again from chunk to chunk.
+#[derive(Default)]
+pub(crate) struct Scratch {
+    vertices: Weld,
+    /// Members: record number and vertices; a triangle with a repeated vertex has `NONE` first.
+    numbers: Vec<u32>,
+    triangles: Vec<[u32; 3]>,
+    /// Members with three distinct, exactly collinear vertices.
+    collinear: Vec<u32>,
+    stars: Stars,
+    /// Patch of a sound home vertex, [`UNSOUND`] or [`AWAY`].
+    states: Vec<u32>,
+    parents: Vec<u32>,
+    /// By vertex, for the search for self-intersections.
+    standing: Vec<Standing>,
+    finder: Finder,
+    /// Members, then visitors, that are in a self-intersection, a bit each.
+    hit: Vec<u64>,
+}
+
+/// State of a vertex at home here whose star is not sound.
+const UNSOUND: u32 = NONE - 1;
+/// State of a vertex at home elsewhere.
+const AWAY: u32 = NONE - 2;
+/// State of a sound vertex before patches are numbered. Smaller than the others, as the numbers are.
+const SOUND: u32 = 0;
+
+/// Bytes that one worker needs for a chunk of `members` triangles, at most.
+pub(crate) fn scratch_bytes(members: u64) -> u64 {
+    // A triangle has up to three vertices: slots 16 × 3, doubled when full, positions 12, states 4, parents 4; numbers 4, triangles 12.
+    members * (3 * (96 + 12 + 4 + 4 + star::BYTES_PER_VERTEX) + 4 + 12 + star::BYTES_PER_TRIANGLE + intersect::BYTES_PER_TRIANGLE)
+}
+
+impl Scratch {
+    /// Decides everything that can be decided inside the chunk of this cell; the vertices at the positions `cut` count as unsound. O(members).
+    pub(crate) fn solve(&mut self, seen: &Seen<'_>, cell: HomeBox, measure: &Measure, cut: &[Point]) -> ChunkTopology {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("bmi2") {
+            // SAFETY: the processor has them.
+            return unsafe { self.solve_avx2(seen, cell, measure, cut) };
+        }
+        self.solve_by(seen, cell, measure, cut, Self::take, Ring::places)
+    }
+
+    /// The same code with wider vectors.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,bmi1,bmi2")]
+    fn solve_avx2(&mut self, seen: &Seen<'_>, cell: HomeBox, measure: &Measure, cut: &[Point]) -> ChunkTopology {
+        let take = |scratch: &mut Self, corners: &[[Point; 3]]| scratch.take_avx2(corners);
+        self.solve_by(seen, cell, measure, cut, take, |ring, corner| ring.places_avx2(corner))
+    }
+
+    /// The same as [`Self::take`]: it is called from where the compiler does not see what the processor has.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,bmi1,bmi2")]
+    fn take_avx2(&mut self, corners: &[[Point; 3]]) {
+        self.take(corners);
+    }
+
+    /// `take` takes members in, `places` tells where a corner stands in a ring.
+    #[inline(always)]
+    fn solve_by(
+        &mut self,
+        seen: &Seen<'_>,
+        cell: HomeBox,
+        measure: &Measure,
+        cut: &[Point],
+        take: impl Fn(&mut Self, &[[Point; 3]]),
+        places: impl Fn(&Ring, u32) -> u32 + Copy,
+    ) -> ChunkTopology {
+        let total = match seen {
+            Seen::Mapped(source) => self.weld(source, measure, take),
+            Seen::Spooled(source) => self.weld(source, measure, take),
+        };
+        self.judge_stars(cell, cut, places);
+        self.collect(measure, total)
+    }
+
+    /// Finds the self-intersections that the chunk owns, after it was solved; counts little more than `allowance` pairs. The
+    /// `visitors` are added to its triangles.
+    pub(crate) fn cross(&mut self, visitors: &Seen<'_>, cell: HomeBox, allowance: u64) -> Crossings {
+        visitors.for_each(|number, triangle| {
+            self.numbers.push(number);
+            self.take(&[triangle.corners()]);
+        });
+        self.standing.clear();
+        self.standing.extend(self.states.iter().map(|state| match *state {
+            AWAY => Standing::Away,
+            UNSOUND => Standing::Unsound,
+            _ => Standing::Sound,
+        }));
+        // No visitor has a corner at home here.
+        self.standing.resize(self.vertices.positions().len(), Standing::Away);
+        let region = Region {
+            positions: self.vertices.positions(),
+            triangles: &self.triangles,
+            left_out: &self.collinear,
+            standing: &self.standing,
+            cell,
+        };
+        self.hit.clear();
+        self.hit.resize(self.triangles.len().div_ceil(64), 0);
+        let mut crossings = Crossings::default();
+        let tested = self.finder.pairs(&region, allowance, |i, j, contact| {
+            crossings.add(self.numbers[i as usize], self.numbers[j as usize], contact);
+            for t in [i, j] {
+                self.hit[t as usize / 64] |= 1 << (t % 64);
+            }
+        });
+        let (mut inner, mut across) = (0, Vec::new());
+        for (word, hit) in self.hit.iter().enumerate() {
+            for t in intersect::bits(*hit).map(|bit| word * 64 + bit) {
+                if self.triangles[t].iter().all(|v| self.standing[*v as usize] != Standing::Away) {
+                    inner += 1;
+                } else {
+                    across.push(self.numbers[t]);
+                }
+            }
+        }
+        crossings.close(tested, inner, across);
+        crossings
+    }
+
+    /// Numbers the vertices of all members; returns the sum over them.
+    #[inline(always)]
+    fn weld(&mut self, source: &impl Source, measure: &Measure, take: impl Fn(&mut Self, &[[Point; 3]])) -> Extent {
+        self.numbers.clear();
+        self.triangles.clear();
+        self.collinear.clear();
+        let expected = source.count();
+        // Half a vertex a triangle is the rule; a soup has three, and grows the table.
+        self.vertices.reset(expected / 2);
+        self.numbers.reserve(expected);
+        self.triangles.reserve(expected);
+        let (mut corners, mut filled, mut total) = ([[[0f32; 3]; 3]; BATCH], 0, Extent::default());
+        source.for_each(|number, triangle| {
+            self.numbers.push(number);
+            corners[filled] = triangle.corners();
+            filled += 1;
+            if filled == BATCH {
+                take(self, &corners);
+                total += measure.sum(&corners);
+                filled = 0;
+            }
+        });
+        take(self, &corners[..filled]);
+        total += measure.sum(&corners[..filled]);
+        total
+    }
+
+    /// Takes in the next members, at most [`BATCH`].
+    #[inline(always)]
+    fn take(&mut self, corners: &[[Point; 3]]) {
+        let mut triangles = [[NONE; 3]; BATCH];
+        self.vertices.vertices(corners.as_flattened(), triangles.as_flattened_mut());
+        for (t, [p, q, r]) in triangles.into_iter().zip(corners) {
+            let [a, b, c] = t;
+            let repeated = (a == b) | (b == c) | (c == a);
+            if !repeated && crate::geometry::collinear::is_collinear(p, q, r) {
+                self.collinear.push(self.triangles.len() as u32);
+            }
+            self.triangles.push(if repeated { [NONE, a, b] } else { t });
+        }
+    }
+
+    /// Tests whether the triangles around each home vertex are one closed coherent fan, and puts those that are sound into patches.
+    #[inline(always)]
+    fn judge_stars(&mut self, cell: HomeBox, cut: &[Point], places: impl Fn(&Ring, u32) -> u32 + Copy) {
+        let positions = self.vertices.positions();
+        self.stars.gather(positions.len(), &self.triangles);
+        self.states.clear();
+        self.states.extend(positions.iter().map(|p| if cell.holds(*p) { SOUND } else { AWAY }));
+        // The workshop must see the neighbours that a collinear triangle is to be closed with.
+        let of_collinear = self.collinear.iter().flat_map(|i| self.triangles[*i as usize]);
+        for v in of_collinear.chain(cut.iter().filter_map(|p| self.vertices.find(*p))) {
+            let state = &mut self.states[v as usize];
+            *state = if *state == SOUND { UNSOUND } else { *state };
+        }
+        self.parents.clear();
+        self.parents.extend(0..positions.len() as u32);
+        let roots = self.judge(places);
+        self.unite_patches(roots);
+    }
+
+    /// Tests stars by ascending vertex. A sound one is put with an older sound neighbour, one in its first triangle if that will do;
+    /// what is left without makes a root, and mostly there is only one. Returns their number.
+    #[inline(always)]
+    fn judge(&mut self, places: impl Fn(&Ring, u32) -> u32 + Copy) -> usize {
+        let (states, parents) = (&mut self.states[..], &mut self.parents[..]);
+        let mut roots = 0;
+        for v in 0..states.len().min(parents.len()) {
+            if states[v] != SOUND {
+                continue;
+            }
+            if !self.stars.is_closed_fan(v, places) {
+                states[v] = UNSOUND;
+                continue;
+            }
+            let (next, previous) = self.stars.around(v);
+            let older = |w: &&u32| **w < v as u32 && states[**w as usize] == SOUND;
+            match previous.first().filter(older).or_else(|| next.iter().find(older)) {
+                Some(w) => parents[v] = parents[*w as usize],
+                None => roots += 1,
+            }
+        }
+        roots
+    }
+
+    /// Unites the patches of sound home vertices that share a triangle, of which there are `roots` as yet.
+    #[inline(always)]
+    fn unite_patches(&mut self, mut roots: usize) {
+        for t in self.triangles.iter().filter(|t| t[0] != NONE) {
+            if roots <= 1 {
+                return;
+            }
+            let parent = self.parents[t[0] as usize];
+            if (self.parents[t[1] as usize] == parent) & (self.parents[t[2] as usize] == parent) {
+                continue;
+            }
+            let sound = t.map(|v| self.states[v as usize] == SOUND);
+            if sound[0] && sound[1] {
+                roots -= usize::from(crate::util::union_find::unite(&mut self.parents, t[0], t[1]));
+            }
+            if sound[2] && (sound[0] || sound[1]) {
+                roots -= usize::from(crate::util::union_find::unite(&mut self.parents, t[2], if sound[0] { t[0] } else { t[1] }));
+            }
+        }
+    }
+
+    /// Vertices at home here that these suspects use. O(members).
+    fn count_suspect_vertices(&mut self, suspects: &[Suspect]) -> u64 {
+        self.hit.clear();
+        self.hit.resize(self.states.len().div_ceil(64), 0);
+        let mut suspects = suspects.iter().map(|s| s.triangle).peekable();
+        for (t, number) in self.triangles.iter().zip(&self.numbers) {
+            if suspects.next_if_eq(number).is_none() {
+                if suspects.peek().is_none() {
+                    break;
+                }
+                continue;
+            }
+            for v in t.iter().map(|v| *v as usize).filter(|v| self.states.get(*v).is_some_and(|s| *s != AWAY)) {
+                self.hit[v / 64] |= 1 << (v % 64);
+            }
+        }
+        self.hit.iter().map(|word| u64::from(word.count_ones())).sum()
+    }
+
+    /// `total` is the sum over all members.
+    #[inline(always)]
+    fn collect(&mut self, measure: &Measure, total: Extent) -> ChunkTopology {
+        let home = || self.states.iter().enumerate().filter(|(_, state)| **state != AWAY);
+        let mut out = ChunkTopology {
+            suspects: Vec::new(),
+            crossings: Crossings::default(),
+            links: Vec::new(),
+            patches: Vec::new(),
+            labels: Labels::One,
+            reach: Bounds::EMPTY,
+            vertices: home().count() as u64,
+            vertices_used: home().filter(|(v, _)| self.stars.count(*v) > 0).count() as u64,
+            suspect_vertices: 0,
+        };
+        let largest = self.number_patches(&mut out.patches);
+        let mut labels = LabelWriter::default();
+        let mut sum = Sum::new(measure, self.vertices.positions(), largest);
+        for (t, number) in self.triangles.iter().zip(&self.numbers) {
+            let triangle = *number;
+            if t[0] == NONE {
+                // Of no area.
+                out.suspects.push(Suspect { triangle, unsound: 0 });
+                labels.push(NONE);
+                continue;
+            }
+            let states = [self.states[t[0] as usize], self.states[t[1] as usize], self.states[t[2] as usize]];
+            if states.iter().all(|s| *s < AWAY) {
+                labels.push(states[0]);
+                sum.add(states[0], triangle, *t, &mut out.patches);
+                continue;
+            }
+            let unsound = (0..3).fold(0, |mask, k| mask | u8::from(states[k] == UNSOUND) << k);
+            let patch = states.into_iter().rfind(|s| *s < AWAY).unwrap_or(NONE);
+            labels.push(patch);
+            if unsound != 0 {
+                out.suspects.push(Suspect { triangle, unsound });
+            }
+            let counted = patch != NONE && unsound == 0 && states[0] != AWAY;
+            if !counted {
+                sum.leave(*t);
+            }
+            if patch != NONE {
+                if counted {
+                    sum.add(patch, triangle, *t, &mut out.patches);
+                } else {
+                    let first = &mut out.patches[patch as usize].first;
+                    *first = triangle.min(*first);
+                }
+                out.links.push(Link::new(triangle, patch, counted));
+                if unsound == 0 {
+                    out.reach.include(&t.map(|v| self.vertices.positions()[v as usize]));
+                }
+            }
+        }
+        sum.finish(total, &mut out.patches);
+        out.patches.iter().for_each(|p| out.reach.add(&p.bounds));
+        out.suspect_vertices = self.count_suspect_vertices(&out.suspects);
+        if out.patches.len() > 1 {
+            out.labels = Labels::Runs(labels.finish());
+        }
+        out.shrink();
+        out
+    }
+
+    /// Numbers the patches by their first vertices, and returns the one of most vertices.
+    #[inline(always)]
+    fn number_patches(&mut self, patches: &mut Vec<Patch>) -> u32 {
+        let mut bounds = Bounds::EMPTY;
+        let mut patch = NONE;
+        let (mut sizes, mut run): (Vec<usize>, usize) = (Vec::new(), 0);
+        for (v, position) in self.vertices.positions().iter().enumerate() {
+            if self.states[v] != SOUND {
+                continue;
+            }
+            // Never younger than the vertex, so it has its number already.
+            let parent = self.parents[v] as usize;
+            self.states[v] = if parent == v { patches.len() as u32 } else { self.states[parent] };
+            if parent == v {
+                patches.push(Patch { triangles: 0, extent: Extent::default(), bounds: Bounds::EMPTY, first: NONE });
+                sizes.push(0);
+            }
+            if self.states[v] != patch {
+                if patch != NONE {
+                    patches[patch as usize].bounds.add(&bounds);
+                    sizes[patch as usize] += run;
+                }
+                (patch, bounds, run) = (self.states[v], Bounds::EMPTY, 0);
+            }
+            bounds.include(&[*position]);
+            run += 1;
+        }
+        if patch != NONE {
+            patches[patch as usize].bounds.add(&bounds);
+            sizes[patch as usize] += run;
+        }
+        sizes.iter().zip(0..).max_by_key(|(size, _)| **size).map_or(NONE, |(_, patch)| patch)
+    }
+}
+
+/// Adds triangles up for the patch that the last of them belonged to. Those of the largest patch are only counted: the sum over all of
+/// the chunk is known, and sums are exact, so theirs is what the others leave.
+struct Sum<'a> {
+    measure: &'a Measure,
+    positions: &'a [Point],
+    /// [`NONE`] if there is none.
+    largest: u32,
+    patch: u32,
+    first: u32,
+    triangles: u64,
+    of_patch: Batch,
+    of_none: Batch,
+    /// Of what is not the largest patch's.
+    others: Extent,
+}
+
+impl<'a> Sum<'a> {
+    fn new(measure: &'a Measure, positions: &'a [Point], largest: u32) -> Self {
+        let (of_patch, of_none) = (Batch::default(), Batch::default());
+        Self { measure, positions, largest, patch: NONE, first: NONE, triangles: 0, of_patch, of_none, others: Extent::default() }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, patch: u32, triangle: u32, vertices: [u32; 3], patches: &mut [Patch]) {
+        if self.patch != patch || self.of_patch.is_full() {
+            self.flush(patches);
+            self.patch = patch;
+        }
+        self.first = self.first.min(triangle);
+        self.triangles += 1;
+        if patch != self.largest {
+            self.of_patch.push(vertices.map(|v| self.positions[v as usize]));
+        }
+    }
+
+    /// Leaves a triangle out.
+    #[inline(always)]
+    fn leave(&mut self, vertices: [u32; 3]) {
+        if self.of_none.is_full() {
+            self.others += self.of_none.take(self.measure);
+        }
+        self.of_none.push(vertices.map(|v| self.positions[v as usize]));
+    }
+
+    #[inline(always)]
+    fn flush(&mut self, patches: &mut [Patch]) {
+        if self.triangles > 0 {
+            let extent = self.of_patch.take(self.measure);
+            self.others += extent;
+            let sums = &mut patches[self.patch as usize];
+            sums.first = sums.first.min(self.first);
+            sums.triangles += self.triangles;
+            sums.extent += extent;
+        }
+        (self.first, self.triangles) = (NONE, 0);
+    }
+
+    /// The sum over all members being `total`.
+    fn finish(mut self, mut total: Extent, patches: &mut [Patch]) {
+        self.flush(patches);
+        self.others += self.of_none.take(self.measure);
+        total -= self.others;
+        if let Some(largest) = patches.get_mut(self.largest as usize) {
+            largest.extent = total;
+        }
+    }
+}
+
+/// Some triangles that are summed at once.
+struct Batch {
+    corners: [[Point; 3]; Self::LEN],
+    filled: usize,
+}
+
+impl Default for Batch {
+    fn default() -> Self {
+        Self { corners: [[[0.0; 3]; 3]; Self::LEN], filled: 0 }
+    }
+}
+
+impl Batch {
+    const LEN: usize = 32;
+
+    #[inline(always)]
+    fn is_full(&self) -> bool {
+        self.filled == Self::LEN
+    }
+
+    /// Must not be full.
+    #[inline(always)]
+    fn push(&mut self, corners: [Point; 3]) {
+        self.corners[self.filled] = corners;
+        self.filled += 1;
+    }
+
+    fn take(&mut self, measure: &Measure) -> Extent {
+        measure.sum(&self.corners[..std::mem::take(&mut self.filled)])
+    }
+}
+
+#[derive(Default)]
+struct LabelWriter {
+    bytes: Vec<u8>,
+    patch: u32,
+    count: u64,
+}
+
+impl LabelWriter {
+    #[inline]
+    fn push(&mut self, patch: u32) {
+        if patch != self.patch {
+            self.flush();
+            self.patch = patch;
+        }
+        self.count += 1;
+    }
+
+    fn flush(&mut self) {
+        if self.count > 0 {
+            crate::util::varint::put_varint(&mut self.bytes, self.count);
+            crate::util::varint::put_varint(&mut self.bytes, u64::from(self.patch.wrapping_add(1)));
+        }
+        self.count = 0;
+    }
+
+    fn finish(mut self) -> Vec<u8> {
+        self.flush();
+        self.bytes.shrink_to_fit();
+        self.bytes
+    }
+}
+
+impl Labels {
+    pub(crate) fn heap_bytes(&self) -> u64 {
+        match self {
+            Self::One => 0,
+            Self::Runs(bytes) => bytes.capacity() as u64,
+        }
+    }
+
+    /// The patch of each member in list order, [`NONE`] where it has none; for [`Labels::One`] always patch 0.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = u32> + '_ {
+        let mut rest: &[u8] = match self {
+            Self::One => &[],
+            Self::Runs(bytes) => bytes,
+        };
+        let (mut left, mut patch) = if matches!(self, Self::One) { (u64::MAX, 0) } else { (0, NONE) };
+        std::iter::from_fn(move || {
+            if left == 0 {
+                left = crate::util::varint::take_varint(&mut rest)?;
+                patch = (crate::util::varint::take_varint(&mut rest)? as u32).wrapping_sub(1);
+            }
+            left -= 1;
+            Some(patch)
+        })
+    }
+}

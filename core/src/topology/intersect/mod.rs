@@ -1,0 +1,367 @@
+//! The pairs of triangles of one chunk that intersect, decided exactly.
+//!
+//! A mesh intersects itself where two of its triangles meet beyond what they share, along a segment inside one of them or in
+//! an area ([`Contact::is_crossing`]). What a chunk sees of the mesh is all triangles with a corner in its cell, and *visitors*, whose
+//! box meets the cell without a corner in it. Every pair is **owned** by one cell, which decides it, so results do not depend on how
+//! space was cut:
+//!
+//! * a pair that shares vertices by the cell where the lexicographically smallest of them is at home: all triangles around it are
+//!   members there;
+//! * a pair that shares none by the cell of the lowest corner of the overlap of their boxes: that point lies in both boxes, so
+//!   both triangles are there, as members or visitors.
+//!
+//! In the order of the work: [`stars`] certifies vertices none of whose triangles can meet, [`tree`] finds pairs of overlapping
+//! boxes, [`narrow`] finds what is clearly apart or clearly crosses, and what is left is decided by exact predicates.
+//!
+//! Work can be quadratic in the size of a defect (a thousand copies of one triangle are half a million pairs), so pairs are
+//! counted. A pair counts when its boxes overlap and it shares no vertex, or the smallest vertex it shares is not certified: a
+//! property of the mesh. The owner counts it.
+
+mod lanes;
+mod narrow;
+mod stars;
+#[cfg(test)]
+mod tests;
+mod tree;
+
+use crate::geometry::tri_tri::{Contact, self_intersection};
+use crate::stream::plan::HomeBox;
+use crate::util::union_find::NONE;
+use lanes::{Lanes, Pairs, Triangles, WIDTH};
+use narrow::Neighbours;
+use stars::Stars;
+use tree::{Forest, Visit, Walk};
+
+pub(crate) use tree::bits;
+
+/// What one cell sees of a mesh. All coordinates are finite, −0.0 does not occur.
+pub(crate) struct Region<'a> {
+    pub(crate) positions: &'a [[f32; 3]],
+    /// Members in input order, then visitors. A triangle with a repeated vertex has [`NONE`] first and is left out.
+    pub(crate) triangles: &'a [[u32; 3]],
+    /// The exactly collinear ones, ascending; left out too.
+    pub(crate) left_out: &'a [u32],
+    /// By vertex.
+    pub(crate) standing: &'a [Standing],
+    pub(crate) cell: HomeBox,
+}
+
+/// What a cell knows of a vertex.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub(crate) enum Standing {
+    /// At home in another cell.
+    Away,
+    /// At home here, and not sound.
+    Unsound,
+    /// At home here, in the middle of a closed, coherent fan without collinear triangles.
+    Sound,
+}
+
+impl Region<'_> {
+    #[inline(always)]
+    fn corners(&self, t: [u32; 3]) -> [[f32; 3]; 3] {
+        let [a, b, c] = t;
+        [self.positions[a as usize], self.positions[b as usize], self.positions[c as usize]]
+    }
+
+    /// Exactly. `common`: which corners of each are also corners of the other.
+    fn decide(&self, i: u32, j: u32, common: [[bool; 3]; 2], found: &mut impl FnMut(u32, u32, Contact)) {
+        let [a, b] = [i, j].map(|i| self.corners(self.triangles[i as usize]));
+        if let Some(contact) = self_intersection(&a, &b, common) {
+            found(i.min(j), i.max(j), contact);
+        }
+    }
+
+    /// The triangles that are not left out, with their numbers.
+    #[inline]
+    fn solid_triangles(&self) -> impl Iterator<Item = (u32, [u32; 3])> {
+        let mut left_out = self.left_out.iter().copied();
+        let mut next = left_out.next().unwrap_or(NONE);
+        self.triangles.iter().enumerate().filter_map(move |(i, t)| {
+            if i as u32 == next {
+                next = left_out.next().unwrap_or(NONE);
+                return None;
+            }
+            (t[0] != NONE).then_some((i as u32, *t))
+        })
+    }
+}
+
+/// Up to sixteen triangles of a region, one batch after the other. Not a closure called for each, which would not be compiled for the
+/// processor that its caller is compiled for.
+struct Batch {
+    numbers: [u32; WIDTH],
+    count: usize,
+    triangles: Triangles,
+}
+
+impl Batch {
+    const EMPTY: Self = Self { numbers: [0; WIDTH], count: 0, triangles: Triangles::NONE };
+
+    /// Takes the next ones, if there are any.
+    #[inline(always)]
+    fn fill(&mut self, region: &Region<'_>, solid: &mut impl Iterator<Item = (u32, [u32; 3])>) -> bool {
+        self.count = 0;
+        for (number, t) in solid.take(WIDTH) {
+            self.numbers[self.count] = number;
+            self.triangles.set(self.count, &region.corners(t));
+            self.count += 1;
+        }
+        self.count > 0
+    }
+
+    #[inline(always)]
+    fn numbers(&self) -> &[u32] {
+        &self.numbers[..self.count]
+    }
+}
+
+/// Pairs with common vertices that are gathered before they are decided.
+const NEIGHBOURS: usize = 128;
+
+/// What is known of a vertex.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum State {
+    /// At home in another cell.
+    Away,
+    /// At home here, and no two triangles around it meet beyond what they share.
+    Certified,
+    /// At home here, and nothing is known.
+    Open,
+}
+
+/// Finds the self-intersections of one region after the other, and keeps its memory.
+#[derive(Default)]
+pub(crate) struct Finder {
+    stars: Stars,
+    states: Vec<State>,
+    forest: Forest,
+    waiting: Pairs,
+    neighbours: Vec<Neighbours>,
+    by_vertex: Vec<(u32, u32)>,
+}
+
+/// Bytes that a [`Finder`] takes for each triangle of a region: its part of the tree, and for up to three vertices each a view, a
+/// standing, a state and a turn.
+pub(crate) const BYTES_PER_TRIANGLE: u64 = tree::BYTES_PER_TRIANGLE + 3 * (size_of::<stars::View>() as u64 + 3);
+
+impl Finder {
+    /// Calls `found` for each self-intersecting pair that the region's cell owns, once, the smaller number first; in an order that
+    /// depends on the region. Returns how many pairs were counted; if they are more than `allowance`, it ended early.
+    ///
+    /// O(n log n) besides the pairs of overlapping boxes, of which those around a certified vertex and around a vertex of more
+    /// than 256 triangles that is at home elsewhere cost nothing.
+    pub(crate) fn pairs(&mut self, region: &Region<'_>, allowance: u64, mut found: impl FnMut(u32, u32, Contact)) -> u64 {
+        self.prepare(region);
+        self.waiting.clear();
+        self.neighbours.clear();
+        let mut search = Search {
+            region,
+            states: &self.states,
+            forest: &self.forest,
+            waiting: &mut self.waiting,
+            neighbours: &mut self.neighbours,
+            counted: 0,
+            allowance,
+            found: &mut found,
+        };
+        let walked = Walk::new(&self.forest, &mut search).all();
+        search.separate();
+        if walked {
+            search.around_hubs(&self.forest, &mut self.by_vertex);
+        }
+        search.decide_neighbours();
+        search.counted
+    }
+}
+
+/// What comes before the walk, compiled for different processors. Sums and products are the same on all of them: in the same order,
+/// and none fused.
+impl Finder {
+    fn prepare(&mut self, region: &Region<'_>) {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") && is_x86_feature_detected!("avx512bw")
+            {
+                // SAFETY: the processor has what it is compiled for.
+                return unsafe { self.prepare_avx512(region) };
+            }
+            if is_x86_feature_detected!("avx2") {
+                // SAFETY: as above.
+                return unsafe { self.prepare_avx2(region) };
+            }
+        }
+        self.prepare_by(region);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512vl,avx512bw")]
+    fn prepare_avx512(&mut self, region: &Region<'_>) {
+        self.prepare_by(region);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn prepare_avx2(&mut self, region: &Region<'_>) {
+        self.prepare_by(region);
+    }
+
+    #[inline(always)]
+    fn prepare_by(&mut self, region: &Region<'_>) {
+        self.stars.look(region);
+        self.states.clear();
+        self.states.extend(region.standing.iter().enumerate().map(|(v, standing)| match standing {
+            Standing::Away => State::Away,
+            Standing::Sound if self.stars.is_certified(v) => State::Certified,
+            Standing::Sound | Standing::Unsound => State::Open,
+        }));
+        self.forest.build(region, &self.stars, &self.states);
+    }
+}
+
+/// Which vertices of each are also vertices of the other.
+#[inline(always)]
+fn common_vertices(s: [u32; 3], t: [u32; 3]) -> [[bool; 3]; 2] {
+    let among = |v: u32, t: [u32; 3]| (v == t[0]) | (v == t[1]) | (v == t[2]);
+    [[among(s[0], t), among(s[1], t), among(s[2], t)], [among(t[0], s), among(t[1], s), among(t[2], s)]]
+}
+
+/// What becomes of overlapping boxes.
+struct Search<'a, F> {
+    region: &'a Region<'a>,
+    states: &'a [State],
+    forest: &'a Forest,
+    /// Rows that overlap, without a common vertex.
+    waiting: &'a mut Pairs,
+    /// Pairs with one or two common vertices.
+    neighbours: &'a mut Vec<Neighbours>,
+    counted: u64,
+    allowance: u64,
+    found: &'a mut F,
+}
+
+impl<F: FnMut(u32, u32, Contact)> Visit for Search<'_, F> {
+    #[inline(always)]
+    fn visit(&mut self, with: impl Lanes, row: usize, first: usize, lanes: u32, sharing: u32) -> bool {
+        if lanes & !sharing != 0 {
+            with.append(self.waiting, row as u32, first as u32, lanes & !sharing);
+        }
+        // A vertex that both have and that is not open is away, so the pair is not owned here, or certified, so it is apart.
+        if lanes & sharing != 0 && self.forest.is_open(row) {
+            self.all_sharing(row, first, lanes & sharing);
+        }
+        if self.waiting.is_full() {
+            self.separate();
+        }
+        self.counted <= self.allowance
+    }
+}
+
+impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
+    #[inline(never)]
+    fn all_sharing(&mut self, row: usize, first: usize, lanes: u32) {
+        for j in bits(lanes) {
+            self.sharing(self.forest.triangle(row), self.forest.triangle(first + j), NONE);
+        }
+    }
+
+    /// A pair of overlapping boxes with vertices in common. With `only`, nothing is done if another vertex is the smallest.
+    fn sharing(&mut self, i: u32, j: u32, only: u32) {
+        let [s, t] = [i, j].map(|i| self.region.triangles[i as usize]);
+        let common = common_vertices(s, t);
+        let position = |v: u32| self.region.positions[v as usize];
+        let (mut smallest, mut first, mut count, mut certified) = (NONE, 0, 0, false);
+        for k in (0..3).filter(|k| common[0][*k]) {
+            if count == 0 || position(s[k]) < position(smallest) {
+                (smallest, first) = (s[k], k);
+            }
+            certified |= self.states[s[k] as usize] == State::Certified;
+            count += 1;
+        }
+        if count == 0 || (only != NONE && smallest != only) || self.states[smallest as usize] != State::Open {
+            return;
+        }
+        self.counted += 1;
+        if certified {
+            return;
+        }
+        if count == 3 {
+            return self.region.decide(i, j, common, self.found);
+        }
+        let apart_from_s = |order: [usize; 3]| order.into_iter().find(|k| !common[1][*k]).map_or(NONE, |k| t[k]);
+        let (next, last) = (apart_from_s([0, 1, 2]), apart_from_s([2, 1, 0]));
+        let vertices = [[s[first], s[(first + 1) % 3], s[(first + 2) % 3]], [smallest, next, last]];
+        self.neighbours.push(Neighbours { triangles: [i, j], vertices });
+        if self.neighbours.len() == NEIGHBOURS {
+            self.decide_neighbours();
+        }
+    }
+
+    /// Decides the waiting pairs with one or two common vertices.
+    #[inline(never)]
+    fn decide_neighbours(&mut self) {
+        let Self { region, neighbours, found, .. } = self;
+        let [crossing, unsure] = narrow::sort(region, neighbours);
+        for Neighbours { triangles: [i, j], .. } in &neighbours[..crossing] {
+            found(*i.min(j), *i.max(j), Contact::Cross);
+        }
+        for Neighbours { triangles: [i, j], .. } in &neighbours[crossing..crossing + unsure] {
+            let [s, t] = [i, j].map(|i| region.triangles[*i as usize]);
+            region.decide(*i, *j, common_vertices(s, t), found);
+        }
+        neighbours.clear();
+    }
+
+    /// The pairs within each hub's tree whose smallest vertex is not the hub. That vertex is open; the hub is certified, or
+    /// away and larger.
+    fn around_hubs(&mut self, forest: &Forest, by_vertex: &mut Vec<(u32, u32)>) {
+        for tree in forest.trees.iter().filter(|t| t.hub != NONE) {
+            by_vertex.clear();
+            for row in tree.rows.clone() {
+                for v in self.region.triangles[forest.triangle(row) as usize] {
+                    let smaller = self.region.positions[v as usize] < self.region.positions[tree.hub as usize];
+                    if smaller && self.states[v as usize] == State::Open {
+                        by_vertex.push((v, row as u32));
+                    }
+                }
+            }
+            by_vertex.sort_unstable();
+            for around in by_vertex.chunk_by(|a, b| a.0 == b.0) {
+                for (k, (v, row)) in around.iter().enumerate() {
+                    let row = *row as usize;
+                    for other in around[k + 1..].iter().map(|(_, row)| *row as usize) {
+                        if forest.overlap(row, other) {
+                            self.sharing(forest.triangle(row), forest.triangle(other), *v);
+                        }
+                    }
+                    if self.counted > self.allowance {
+                        return;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Counts and decides those waiting pairs that are owned here; none of them shares a vertex.
+    #[inline(never)]
+    fn separate(&mut self) {
+        let Self { region, forest, waiting, found, .. } = self;
+        let pairs = waiting.as_mut_slice();
+        let mut owned = 0;
+        for k in 0..pairs.len() {
+            let [row, other] = pairs[k].map(|row| row as usize);
+            pairs[owned] = [forest.triangle(row), forest.triangle(other)];
+            owned += usize::from(forest.owns_pair(row, other));
+        }
+        self.counted += owned as u64;
+        let [crossing, unsure] = narrow::sort(region, &mut pairs[..owned]);
+        for [i, j] in &pairs[..crossing] {
+            found(*i.min(j), *i.max(j), Contact::Cross);
+        }
+        for [i, j] in &pairs[crossing..crossing + unsure] {
+            region.decide(*i, *j, [[false; 3]; 2], found);
+        }
+        waiting.clear();
+    }
+}

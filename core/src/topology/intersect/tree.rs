@@ -1,0 +1,525 @@
+//! Boxes of triangles in a tree, and all pairs of them that overlap.
+//!
+//! Triangles are put in the order of a space-filling curve (Morton, "A computer oriented geodetic data base", IBM 1966) and taken
+//! sixteen at a time; sixteen such groups make a node, and so on: a tree without pointers, in which a box is compared with sixteen
+//! others at once ([`super::lanes`]). The tree is walked against itself, so that boxes of groups that are apart are compared once for all their
+//! triangles.
+//!
+//! Boxes overlap when `lo < hi` holds both ways on each axis, strictly: where one ends at the coordinate at which the other begins,
+//! that plane separates the triangles, and holds a vertex or an edge of each at most, neither of which counts. A
+//! triangle that lies in such a plane itself has an axis of zero extent, and its box is widened there to the neighbouring floats
+//! both ways; then it overlaps exactly what it may meet, except that two parallel planes one float apart pass for one
+//! ([`Row::same_plane`]).
+//!
+//! Boxes are cut to the cell widened to the neighbouring floats. Pairs that the cell owns keep an overlap: its lowest corner, or the
+//! position that the two share, is in the cell, and as it lies below the upper end of both boxes and not above the cell's,
+//! a part of positive extent is left.
+//!
+//! A vertex with very many triangles would make as many pairs as their square. Triangles of such a **hub** get a tree of
+//! their own, whose pairs with itself are left to the caller.
+
+use std::ops::Range;
+
+use super::lanes::{self, Boxes, Corners, Lanes, Pairs, Triangles, WIDTH, max, min};
+use super::stars::Stars;
+use super::{Batch, Region, State};
+use crate::stream::plan::HomeBox;
+use crate::util::union_find::NONE;
+
+/// A vertex with more triangles is a hub.
+const HUB: f32 = 256.0;
+
+/// Enough for 2³² triangles, and the crown.
+const LEVELS: usize = 10;
+
+/// In a row's flags, by axis: begins below the cell.
+const BELOW: u8 = 1;
+/// Has no extent.
+const FLAT: u8 = 1 << 3;
+/// Has a vertex at home here whose star is not certified.
+const OPEN: u8 = 1 << 6;
+
+/// Up to sixteen triangles. A **row** is a place in a leaf: sixteen times the leaf's number, and the lane.
+#[derive(Clone, Copy)]
+struct Leaf {
+    boxes: Boxes,
+    corners: Corners,
+    triangles: [u32; WIDTH],
+    /// [`BELOW`] and [`FLAT`], shifted by the axis, and [`OPEN`].
+    flags: [u8; WIDTH],
+}
+
+impl Leaf {
+    const EMPTY: Self = Self { boxes: Boxes::EMPTY, corners: Corners::NONE, triangles: [NONE; WIDTH], flags: [0; WIDTH] };
+
+    fn clear(&mut self, i: usize) {
+        self.boxes.set(i, [f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        self.corners.clear(i);
+        (self.triangles[i], self.flags[i]) = (NONE, 0);
+    }
+
+    /// Sets the boxes, widened where they are flat and cut to the cell, and the flags that say so.
+    #[inline(always)]
+    fn set_boxes(&mut self, triangles: &Triangles, cell: &HomeBox) {
+        let (cell_lo, cell_hi) = cell.ends();
+        for k in 0..3 {
+            let (lows, highs) = (&mut self.boxes.lo[k].0, &mut self.boxes.hi[k].0);
+            let mut any_flat = false;
+            for i in 0..WIDTH {
+                let (lo, hi) = triangles.ends(k, i);
+                self.flags[i] |= ((u8::from(lo < cell_lo[k]) * BELOW) | (u8::from(lo == hi) * FLAT)) << k;
+                any_flat |= lo == hi;
+                (lows[i], highs[i]) = (lo, hi);
+            }
+            if any_flat {
+                for (lo, hi) in lows.iter_mut().zip(highs.iter_mut()).filter(|(lo, hi)| lo == hi) {
+                    (*lo, *hi) = (lo.next_down(), hi.next_up());
+                }
+            }
+            let (cut_lo, cut_hi) = (cell_lo[k].next_down(), cell_hi[k].next_up());
+            for i in 0..WIDTH {
+                (lows[i], highs[i]) = (max(lows[i], cut_lo), min(highs[i], cut_hi));
+            }
+        }
+    }
+}
+
+/// A tree, the rows in it, and what its triangles have in common.
+#[derive(Clone, Debug)]
+pub(super) struct Tree {
+    /// Where each level starts: level 0 among the leaves, the others among the nodes. The highest, the **crown**, is one node
+    /// whose first lane is the box of all.
+    starts: [u32; LEVELS],
+    crown: usize,
+    pub(super) rows: Range<usize>,
+    /// The hub that all its triangles have, or [`NONE`].
+    pub(super) hub: u32,
+}
+
+/// The trees of a region; memory is kept from one to the next.
+#[derive(Default)]
+pub(super) struct Forest {
+    /// Place on the curve above the number of the triangle.
+    keys: Vec<u64>,
+    swap: Vec<u64>,
+    /// Tree of each triangle, where there are hubs.
+    groups: Vec<u32>,
+    /// Those of one tree after those of another, and older ones; a tree's last one may have empty lanes.
+    leaves: Vec<Leaf>,
+    planted: usize,
+    nodes: Vec<Boxes>,
+    /// Of the ordinary triangles, then of each hub.
+    pub(super) trees: Vec<Tree>,
+}
+
+/// Bytes of a [`Forest`] for each triangle: two keys, a group, its part of a leaf and of the nodes.
+pub(super) const BYTES_PER_TRIANGLE: u64 =
+    (16 + 4 + size_of::<Leaf>() / WIDTH + size_of::<Boxes>().div_ceil(WIDTH * (WIDTH - 1))) as u64;
+
+/// Where on the curve a triangle comes. The order changes nothing but the time that the walk takes.
+struct Curve {
+    cell: HomeBox,
+    lo: [f32; 3],
+    /// Steps of the curve for a unit of length.
+    scale: f32,
+}
+
+impl Curve {
+    /// Through what the region sees of its cell.
+    fn new(region: &Region<'_>) -> Self {
+        let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        for p in region.positions {
+            for k in 0..3 {
+                (lo[k], hi[k]) = (min(lo[k], p[k]), max(hi[k], p[k]));
+            }
+        }
+        let (cell_lo, cell_hi) = region.cell.ends();
+        let lo = [0, 1, 2].map(|k| max(lo[k], cell_lo[k]));
+        let size = (0..3).map(|k| min(hi[k], cell_hi[k]) - lo[k]).fold(0.0, f32::max);
+        Self { cell: region.cell, lo, scale: 256.0 / size }
+    }
+
+    /// 24 bits for each triangle, those that are large for the cell apart, since they would widen the boxes of small ones; or
+    /// [`NONE`] for those that do not meet the cell.
+    #[inline(always)]
+    #[expect(clippy::disallowed_methods, reason = "the number of a cell, no position")]
+    fn places(&self, triangles: &Triangles) -> [u32; WIDTH] {
+        let (cell_lo, cell_hi) = self.cell.ends();
+        let mut places = [0; WIDTH];
+        for (i, place) in places.iter_mut().enumerate() {
+            let (mut curve, mut extent, mut meets) = (0, 0.0, true);
+            for k in 0..3 {
+                let (lo, hi) = triangles.ends(k, i);
+                meets &= (lo <= cell_hi[k]) & (hi >= cell_lo[k]);
+                let (lo, hi) = (max(lo, cell_lo[k]), min(hi, cell_hi[k]));
+                // What is no number becomes zero. The last bits of a float above 2²³ are an integer, in fewer instructions than `as` takes.
+                let step = min(max((lo * 0.5 + hi * 0.5 - self.lo[k]) * self.scale, 0.0), 255.0);
+                curve |= spread((step + 8_388_608.0).to_bits() & 255) << k;
+                extent = max(extent, hi - lo);
+            }
+            let extent = extent * self.scale;
+            let class = u32::from(extent > 8.0) + u32::from(extent > 32.0) + u32::from(extent > 128.0);
+            *place = if meets { curve >> 2 | class << 22 } else { NONE };
+        }
+        places
+    }
+}
+
+/// Eight bits, two zeros after each.
+#[inline(always)]
+fn spread(x: u32) -> u32 {
+    let x = (x | x << 8) & 0x0000_F00F;
+    let x = (x | x << 4) & 0x000C_30C3;
+    (x | x << 2) & 0x0024_9249
+}
+
+impl Forest {
+    /// Arranges the triangles that meet the cell. O(triangles).
+    #[inline(always)]
+    pub(super) fn build(&mut self, region: &Region<'_>, stars: &Stars, states: &[State]) {
+        self.collect(region);
+        let hubs = self.group_by_hub(region, stars, states);
+        self.planted = 0;
+        self.nodes.clear();
+        self.trees.clear();
+        let mut rest = 0..self.keys.len();
+        for (group, hub) in hubs.iter().enumerate() {
+            let of_group = |key: &u64| self.groups[*key as u32 as usize] == group as u32;
+            let count =
+                if hubs.len() == 1 { rest.len() } else { self.keys[rest.clone()].iter().take_while(|k| of_group(k)).count() };
+            if count > 0 {
+                self.plant(region, states, rest.start..rest.start + count, *hub);
+            }
+            rest.start += count;
+        }
+    }
+
+    /// The `keys` of all triangles that are no line and meet the cell, in the order of the curve.
+    #[inline(always)]
+    fn collect(&mut self, region: &Region<'_>) {
+        let curve = Curve::new(region);
+        let (mut low, mut high) = ([0_u32; 4096], [0_u32; 4096]);
+        self.keys.clear();
+        self.keys.reserve(region.triangles.len());
+        let (mut batch, mut solid) = (Batch::EMPTY, region.solid_triangles());
+        while batch.fill(region, &mut solid) {
+            let places = curve.places(&batch.triangles);
+            for (triangle, place) in batch.numbers().iter().zip(places).filter(|(_, place)| *place != NONE) {
+                low[(place & 4095) as usize] += 1;
+                high[(place >> 12) as usize & 4095] += 1;
+                self.keys.push(u64::from(place) << 32 | u64::from(*triangle));
+            }
+        }
+        self.swap.clear();
+        self.swap.resize(self.keys.len(), 0);
+        for (counts, shift) in [(&mut low, 32), (&mut high, 44)] {
+            let mut start = 0;
+            for count in counts.iter_mut() {
+                start += std::mem::replace(count, start);
+            }
+            for key in &self.keys {
+                let place = &mut counts[(key >> shift) as usize & 4095];
+                self.swap[*place as usize] = *key;
+                *place += 1;
+            }
+            std::mem::swap(&mut self.keys, &mut self.swap);
+        }
+    }
+
+    /// Brings the triangles of each hub together, keeping their order; the hubs of the groups, the first of which has none.
+    fn group_by_hub(&mut self, region: &Region<'_>, stars: &Stars, states: &[State]) -> Vec<u32> {
+        let is_hub = |v: u32| stars.degree(v as usize) > HUB && states[v as usize] != State::Open;
+        let mut hubs = vec![NONE];
+        hubs.extend((0..region.positions.len() as u32).filter(|v| is_hub(*v)));
+        if hubs.len() == 1 {
+            return hubs;
+        }
+        self.groups.clear();
+        self.groups.resize(region.triangles.len(), 0);
+        let mut starts = vec![0_u32; hubs.len() + 1];
+        for triangle in self.keys.iter().map(|key| *key as u32 as usize) {
+            // The hub with the smallest number, which is position in `hubs`.
+            let group = region.triangles[triangle].iter().filter_map(|v| hubs[1..].binary_search(v).ok()).min();
+            let group = group.map_or(0, |g| g + 1);
+            self.groups[triangle] = group as u32;
+            starts[group + 1] += 1;
+        }
+        for group in 0..hubs.len() {
+            starts[group + 1] += starts[group];
+        }
+        for key in &self.keys {
+            let place = &mut starts[self.groups[*key as u32 as usize] as usize];
+            self.swap[*place as usize] = *key;
+            *place += 1;
+        }
+        std::mem::swap(&mut self.keys, &mut self.swap);
+        hubs
+    }
+
+    /// Builds the tree over some of `keys`, at least one.
+    #[inline(always)]
+    fn plant(&mut self, region: &Region<'_>, states: &[State], keys: Range<usize>, hub: u32) {
+        let rows = self.planted * WIDTH..self.planted * WIDTH + keys.len();
+        let mut starts = [0; LEVELS];
+        (starts[0], starts[1]) = (self.planted as u32, self.nodes.len() as u32);
+        let leaves = keys.len().div_ceil(WIDTH);
+        let first = self.planted;
+        self.planted += leaves;
+        if self.leaves.len() < self.planted {
+            self.leaves.resize(self.planted, Leaf::EMPTY);
+        }
+        self.nodes.resize(self.nodes.len() + leaves.div_ceil(WIDTH), Boxes::EMPTY);
+        let parents = &mut self.nodes[starts[1] as usize..];
+        let mut triangles = Triangles::NONE;
+        for ((number, leaf), keys) in self.leaves[first..].iter_mut().enumerate().zip(self.keys[keys].chunks(WIDTH)) {
+            for (i, key) in keys.iter().enumerate() {
+                let triangle = *key as u32;
+                let vertices = region.triangles[triangle as usize];
+                triangles.set(i, &region.corners(vertices));
+                leaf.corners.set(i, vertices);
+                leaf.triangles[i] = triangle;
+                let open = vertices.map(|v| states[v as usize] == State::Open);
+                leaf.flags[i] = u8::from(open[0] | open[1] | open[2]) * OPEN;
+            }
+            leaf.set_boxes(&triangles, &region.cell);
+            for i in keys.len()..WIDTH {
+                leaf.clear(i);
+            }
+            let (lo, hi) = leaf.boxes.bounds();
+            parents[number / WIDTH].set(number % WIDTH, lo, hi);
+        }
+        // Boxes in the level; where there is one only, it is the crown.
+        let (mut level, mut boxes) = (1, leaves);
+        while boxes > 1 {
+            boxes = boxes.div_ceil(WIDTH);
+            level += 1;
+            let (below, here) = (starts[level - 1] as usize, self.nodes.len());
+            starts[level] = here as u32;
+            self.nodes.resize(here + boxes.div_ceil(WIDTH), Boxes::EMPTY);
+            for i in 0..boxes {
+                let (lo, hi) = self.nodes[below + i].bounds();
+                self.nodes[here + i / WIDTH].set(i % WIDTH, lo, hi);
+            }
+        }
+        self.trees.push(Tree { starts, crown: level, rows, hub });
+    }
+}
+
+/// What is asked about rows.
+impl Forest {
+    #[inline(always)]
+    fn lane(&self, row: usize) -> (&Leaf, usize) {
+        (&self.leaves[row / WIDTH], row % WIDTH)
+    }
+
+    #[inline(always)]
+    pub(super) fn triangle(&self, row: usize) -> u32 {
+        let (leaf, i) = self.lane(row);
+        leaf.triangles[i]
+    }
+
+    /// Has it a vertex at home here whose star is not certified?
+    #[inline(always)]
+    pub(super) fn is_open(&self, row: usize) -> bool {
+        let (leaf, i) = self.lane(row);
+        leaf.flags[i] & OPEN != 0
+    }
+
+    /// Of two rows that overlap: is the lowest corner of the overlap in the cell, and are they, where both are flat on one axis, in
+    /// one plane?
+    #[inline(always)]
+    pub(super) fn owns_pair(&self, row: usize, other: usize) -> bool {
+        let ((a, i), (b, j)) = (self.lane(row), self.lane(other));
+        let both = a.flags[i] & b.flags[j];
+        // Both meet the cell, so neither begins above it. What is flat was widened, or cut, the same way.
+        let same_plane = || bits(both >> 3 & 7).all(|k| a.boxes.lo(i)[k] == b.boxes.lo(j)[k]);
+        both & 7 == 0 && (both >> 3 & 7 == 0 || same_plane())
+    }
+
+    #[inline]
+    pub(super) fn overlap(&self, row: usize, other: usize) -> bool {
+        let ((a, i), (b, j)) = (self.lane(row), self.lane(other));
+        let begins_before = |a: [f32; 3], b: [f32; 3]| (0..3).all(|k| a[k] < b[k]);
+        begins_before(a.boxes.lo(i), b.boxes.hi(j)) && begins_before(b.boxes.lo(j), a.boxes.hi(i))
+    }
+}
+
+/// What is done with overlapping boxes.
+pub(super) trait Visit {
+    /// `row` overlaps the rows from `first` on whose bits are set in `lanes`; those in `sharing` (and maybe others, which do not
+    /// overlap) have a vertex in common with it. Returns `false` to end the walk.
+    fn visit(&mut self, with: impl Lanes, row: usize, first: usize, lanes: u32, sharing: u32) -> bool;
+}
+
+/// A node: number of the tree, level, number within the level.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct At {
+    tree: u32,
+    level: u32,
+    index: u32,
+}
+
+impl At {
+    #[inline(always)]
+    fn child(self, i: usize) -> Self {
+        Self { level: self.level - 1, index: self.index * WIDTH as u32 + i as u32, ..self }
+    }
+}
+
+/// A walk over a forest.
+pub(super) struct Walk<'a, V> {
+    forest: &'a Forest,
+    /// Pairs of nodes whose boxes overlap, or a node and itself, that are yet to be looked into.
+    stack: Vec<[At; 2]>,
+    /// A leaf, and a row that is to be compared with it.
+    rows: Pairs,
+    visit: &'a mut V,
+}
+
+impl<'a, V: Visit> Walk<'a, V> {
+    pub(super) fn new(forest: &'a Forest, visit: &'a mut V) -> Self {
+        Self { forest, stack: Vec::new(), rows: Pairs::default(), visit }
+    }
+
+    /// All overlapping pairs within the tree of ordinary triangles and between trees, but not within that of a hub. `false` when
+    /// it was ended.
+    pub(super) fn all(&mut self) -> bool {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if let Some(lanes) = lanes::Sixteens::detect() {
+                // SAFETY: the processor has what it is compiled for.
+                return unsafe { self.all_avx512(lanes) };
+            }
+            if let Some(lanes) = lanes::Eights::detect() {
+                // SAFETY: as above.
+                return unsafe { self.all_avx2(lanes) };
+            }
+        }
+        self.all_by(lanes::Fours)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512bw,bmi1,popcnt")]
+    fn all_avx512(&mut self, lanes: lanes::Sixteens) -> bool {
+        self.all_by(lanes)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,bmi1")]
+    fn all_avx2(&mut self, lanes: lanes::Eights) -> bool {
+        self.all_by(lanes)
+    }
+
+    #[inline(always)]
+    fn all_by(&mut self, lanes: impl Lanes) -> bool {
+        let trees = &self.forest.trees;
+        for (i, tree) in trees.iter().enumerate() {
+            for (j, other) in trees.iter().enumerate().skip(i) {
+                let [(a, bounds), (b, others)] = [(i, tree), (j, other)].map(|(i, tree)| {
+                    let crown = At { tree: i as u32, level: tree.crown as u32, index: 0 };
+                    (crown.child(0), self.boxes(crown))
+                });
+                let wanted = if i == j { tree.hub == NONE } else { lanes.overlapping(bounds, others, 0) & 1 != 0 };
+                if wanted && !self.below([a, b], lanes) {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    /// The boxes of what is below a node.
+    #[inline(always)]
+    fn boxes(&self, at: At) -> &'a Boxes {
+        let index = self.forest.trees[at.tree as usize].starts[at.level as usize] as usize + at.index as usize;
+        if at.level == 0 { &self.forest.leaves[index].boxes } else { &self.forest.nodes[index] }
+    }
+
+    /// The boxes among which a node's own is, and its lane.
+    #[inline(always)]
+    fn own_box(&self, at: At) -> (&'a Boxes, usize) {
+        let index = at.index as usize;
+        (self.boxes(At { level: at.level + 1, index: (index / WIDTH) as u32, ..at }), index % WIDTH)
+    }
+
+    /// Pairs of one triangle of each of two nodes, or of two of one.
+    #[inline(always)]
+    fn below(&mut self, pair: [At; 2], lanes: impl Lanes) -> bool {
+        self.stack.clear();
+        self.stack.push(pair);
+        while let Some([a, b]) = self.stack.pop() {
+            if a.level.max(b.level) == 0 {
+                self.leaves(a, b, lanes);
+                if self.rows.is_full() && !self.compare(lanes) {
+                    return false;
+                }
+            } else if a == b {
+                let boxes = self.boxes(a);
+                for i in (0..WIDTH).take_while(|i| boxes.is_set(*i)) {
+                    self.stack.push([a.child(i); 2]);
+                    let later = lanes.overlapping(boxes, boxes, i) & (!1 << i);
+                    self.stack.extend(bits(later).map(|j| [a.child(i), a.child(j)]));
+                }
+            } else {
+                let (a, b) = if a.level < b.level { (b, a) } else { (a, b) };
+                let (boxes, (others, lane)) = (self.boxes(a), self.own_box(b));
+                for i in bits(lanes.overlapping(boxes, others, lane)) {
+                    if a.level > b.level {
+                        self.stack.push([a.child(i), b]);
+                    } else {
+                        let found = lanes.overlapping(self.boxes(b), boxes, i);
+                        self.stack.extend(bits(found).map(|j| [a.child(i), b.child(j)]));
+                    }
+                }
+            }
+        }
+        self.compare(lanes)
+    }
+
+    /// Notes the rows of one leaf that are to be compared with another leaf, or with their own.
+    #[inline(always)]
+    fn leaves(&mut self, a: At, b: At, lanes: impl Lanes) {
+        let number = |at: At| self.forest.trees[at.tree as usize].starts[0] + at.index;
+        let (mut one, mut other) = (number(a), number(b));
+        let mut rows = !0 >> 16;
+        if one != other {
+            // One by one those of the leaf of which fewer meet the other's box.
+            let ((a_boxes, a_lane), (b_boxes, b_lane)) = (self.own_box(a), self.own_box(b));
+            rows = lanes.overlapping(&self.forest.leaves[one as usize].boxes, b_boxes, b_lane);
+            let others = lanes.overlapping(&self.forest.leaves[other as usize].boxes, a_boxes, a_lane);
+            if others.count_ones() < rows.count_ones() {
+                (one, other, rows) = (other, one, others);
+            }
+        }
+        lanes.append(&mut self.rows, other, one * WIDTH as u32, rows);
+    }
+
+    /// Compares the rows that were noted.
+    #[inline(always)]
+    fn compare(&mut self, lanes: impl Lanes) -> bool {
+        let leaves = &self.forest.leaves[..];
+        for [other, row] in self.rows.as_mut_slice().iter().map(|pair| pair.map(|x| x as usize)) {
+            let (leaf, i, theirs) = (&leaves[row / WIDTH], row % WIDTH, &leaves[other]);
+            // Within a leaf, those that come later.
+            let wanted = if other == row / WIDTH { !1 << i } else { !0 };
+            let found = lanes.overlapping(&theirs.boxes, &leaf.boxes, i) & wanted;
+            let sharing = lanes.sharing(&theirs.corners, &leaf.corners, i);
+            if found != 0 && !self.visit.visit(lanes, row, other * WIDTH, found, sharing) {
+                return false;
+            }
+        }
+        self.rows.clear();
+        true
+    }
+}
+
+/// The numbers of the bits that are set, ascending.
+#[inline(always)]
+pub(crate) fn bits(mask: impl Into<u64>) -> impl Iterator<Item = usize> {
+    let mut mask = mask.into();
+    std::iter::from_fn(move || {
+        let bit = (mask != 0).then(|| mask.trailing_zeros() as usize);
+        mask &= mask.wrapping_sub(1);
+        bit
+    })
+}

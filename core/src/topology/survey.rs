@@ -1,0 +1,551 @@
+//! The topology of a whole file: chunks solved in parallel, then merged over the triangles they share.
+//!
+//! What comes out does not depend on the chunks: the suspects (all triangles around unsound vertices), and the patches of sound
+//! surface, numbered by their smallest triangle. Everything global is proportional to the seams and the defects, not to the file.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::contract::error::{Error, Result};
+use crate::contract::progress::Progress;
+use crate::contract::report::SelfIntersections;
+use crate::contract::settings::Limits;
+use crate::geometry::position;
+use crate::geometry::sums::{Bounds, Measure};
+use crate::io::digest;
+use crate::io::read_ahead::Guide;
+use crate::io::record::{self, Record};
+use crate::io::write_behind;
+use crate::stream::budget::{Budget, Purpose};
+use crate::stream::members::Members;
+use crate::stream::plan::{ChunkId, HomeBox, Plan};
+use crate::stream::source::{Seen, Source, Triangle};
+use crate::topology::chunk::{self, ChunkTopology, Labels, Patch, Scratch, Suspect};
+use crate::topology::chunk_regions::Parts;
+use crate::topology::crossings::{self, Crossings, Pair};
+use crate::topology::vertex_table::{Sieve, Weld};
+use crate::util::union_find::NONE;
+
+/// Topology of the sound part of a file, and the list of what is not sound.
+#[derive(Debug)]
+pub(crate) struct Survey<'a> {
+    pub(crate) records: &'a [Record],
+    pub(crate) measure: Measure,
+    pub(crate) bounds: Bounds,
+    /// Triangles of the workshop, ascending, each once.
+    pub(crate) suspects: Vec<Suspect>,
+    /// The patch of each suspect's sound corners, or [`NONE`].
+    pub(crate) suspect_patches: Vec<u32>,
+    /// Patches by ascending smallest triangle. Sums leave the suspects out.
+    pub(crate) patches: Vec<Patch>,
+    /// Runs of triangles with non-finite coordinates.
+    pub(crate) nonfinite: Vec<(u32, u32)>,
+    /// Triangles with finite coordinates.
+    pub(crate) triangles: u64,
+    /// `None` if they were not looked for.
+    pub(crate) self_intersections: Option<SelfIntersections>,
+    /// All of their pairs, unless there are too many to keep.
+    pub(crate) crossing_pairs: Option<Vec<Pair>>,
+    /// To be added to the volume in units of `measure`: not 0 only after a second look at what is open in another box.
+    pub(crate) volume_beside: f64,
+    /// Sound vertices whose triangles were made suspects.
+    pub(crate) promoted: Vec<[f32; 3]>,
+    /// Distinct positions, and those used by a triangle with three distinct vertices.
+    pub(crate) vertices: u64,
+    pub(crate) vertices_used: u64,
+    guide: Guide<'a>,
+    plan: Plan,
+    members: Members,
+    labels: Vec<Labels>,
+    /// By chunk, the box of all sound triangles that it sees.
+    reaches: Vec<Bounds>,
+    parts: Parts,
+    /// Part → patch.
+    merged: Vec<u32>,
+    /// So many of the promoted vertices have divided the surface.
+    dividing: usize,
+    /// What was counted while the chunks were solved, and is still held.
+    budget: Budget,
+    threads: usize,
+}
+
+/// What became of patches that were divided.
+pub(crate) struct Division {
+    /// The new suspects, ascending, with the patches they belonged to.
+    pub(crate) fetched: Vec<(Suspect, u32)>,
+    /// For each patch now the one that it was a part of.
+    pub(crate) divided_from: Vec<u32>,
+}
+
+/// Most triangles a workshop can number the corners of, with room for what repairs add.
+const MOST_SUSPECTS: u64 = 1 << 30;
+
+/// Stage name under which the survey reports progress.
+const STAGE: &str = "topology";
+
+impl<'a> Survey<'a> {
+    /// Reads `records` twice (once to plan, once by chunks). Looks for self-intersections if asked to. Refuses
+    /// when tables would not fit `limits.memory_bytes`.
+    pub(crate) fn new(
+        path: &Path,
+        records: &'a [Record],
+        self_intersections: bool,
+        limits: &Limits,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let span = tracing::debug_span!("plan").entered();
+        progress.at("plan", 0, records.len() as u64);
+        let guide = Guide::new(records.as_flattened(), limits);
+        let plan = Plan::new(records, &guide, limits.chunk_triangles);
+        let mut members = Members::gather(path, (records, &guide), &plan, self_intersections, limits, progress)?;
+        drop(span);
+        let bounds = members.bounds.normalised();
+        let measure = Measure::new(&bounds);
+        let budget = Budget::new(limits.memory_bytes);
+        // A copy of the file and its digest may be in the making.
+        budget.take(Purpose::Tables, write_behind::most_dirty(limits) + digest::heap_bytes(size_of_val(records) as u64));
+        let scratch = take_tables(path, &budget, &plan, &members, limits)?;
+
+        let most_tested = crossings::most_tested(records.len() as u64);
+        let _span = tracing::debug_span!("chunks", count = plan.chunks()).entered();
+        let [done, suspects, patches, tested, kept] = [const { AtomicU64::new(0) }; 5];
+        let mut chunks = members.each(
+            (records, &guide, &plan),
+            limits.threads,
+            |_| true,
+            Scratch::default,
+            |scratch, chunk, seen, visitors| {
+                // Once it is clear that there is too much to keep, the rest need not be known.
+                if progress.cancelled() || budget.is_exceeded() {
+                    return ChunkTopology::default();
+                }
+                let cell = plan.home_box(chunk);
+                let mut topology = scratch.solve(seen, cell, &measure, &[]);
+                if self_intersections {
+                    let allowance = most_tested.saturating_sub(tested.load(Ordering::Relaxed));
+                    topology.crossings = scratch.cross(visitors, cell, allowance);
+                    tested.fetch_add(topology.crossings.tested, Ordering::Relaxed);
+                    topology.crossings.keep(&kept);
+                }
+                suspects.fetch_add(topology.suspects.len() as u64, Ordering::Relaxed);
+                patches.fetch_add(topology.patches.len() as u64, Ordering::Relaxed);
+                topology.take(&budget);
+                let chunks_done = done.fetch_add(1, Ordering::Relaxed) + 1;
+                progress.at(STAGE, chunks_done * records.len() as u64 / plan.chunks() as u64, records.len() as u64);
+                topology
+            },
+        );
+        if progress.cancelled() {
+            return Err(Error::io(path, STAGE)(std::io::ErrorKind::Interrupted.into()));
+        }
+        check(path, &budget, suspects.into_inner(), patches.into_inner())?;
+        budget.give_back(Purpose::Tables, scratch);
+        let span = tracing::debug_span!("merge").entered();
+        let mut fresh: Vec<(ChunkId, &mut ChunkTopology)> = (0..).map(ChunkId).zip(&mut chunks).collect();
+        let (parts, suspects) = Parts::none(plan.chunks()).renewed((records, &measure), Vec::new(), &mut fresh, |_| true);
+        let (patches, merged) = parts.united();
+        let suspect_patches = parts.patches_of(&suspects, &merged);
+        drop(span);
+        let (self_intersections, crossing_pairs) = if self_intersections {
+            let (summed, pairs) = Crossings::sum(chunks.iter_mut().map(|c| std::mem::take(&mut c.crossings)), most_tested);
+            (Some(summed), pairs)
+        } else {
+            (None, None)
+        };
+        let nonfinite = std::mem::take(&mut members.nonfinite);
+        Ok(Self {
+            records,
+            measure,
+            bounds,
+            suspects,
+            suspect_patches,
+            patches,
+            triangles: records.len() as u64 - count_of(&nonfinite),
+            nonfinite,
+            self_intersections,
+            crossing_pairs,
+            volume_beside: 0.0,
+            promoted: Vec::new(),
+            vertices: chunks.iter().map(|c| c.vertices).sum(),
+            vertices_used: chunks.iter().map(|c| c.vertices_used).sum(),
+            guide,
+            plan,
+            members,
+            reaches: chunks.iter().map(|c| c.reach).collect(),
+            labels: chunks.into_iter().map(|c| c.labels).collect(),
+            parts,
+            merged,
+            dividing: 0,
+            budget,
+            threads: limits.threads,
+        })
+    }
+
+    /// Divides the surface at the sound vertices among `positions`: they count as unsound, so that their triangles become suspects, and
+    /// what hangs together only through them, or what was promoted before, becomes several patches. Solves the chunks again where they are at home,
+    /// and those that share triangles with these. Refuses when tables would not fit `limits.memory_bytes`.
+    pub(crate) fn divide(
+        &mut self,
+        path: &Path,
+        positions: &[[f32; 3]],
+        limits: &Limits,
+        progress: &dyn Progress,
+    ) -> Result<Division> {
+        let _span = tracing::debug_span!("divide", positions = positions.len()).entered();
+        let budget = Budget::new(limits.memory_bytes);
+        budget.take(Purpose::Tables, write_behind::most_dirty(limits) + digest::heap_bytes(size_of_val(self.records) as u64));
+        take_tables(path, &budget, &self.plan, &self.members, limits)?;
+        let fetched = self.beyond_the_workshop(positions);
+        let all: Vec<[f32; 3]> = self.promoted.iter().chain(positions).copied().collect();
+        let mut is_cut = vec![false; self.plan.chunks()];
+        all[self.dividing..].iter().for_each(|p| is_cut[self.plan.home(*p).0 as usize] = true);
+        let is_fresh = self.parts.with_neighbours(&is_cut);
+        let by_home = self.by_home(&all);
+        let kept = (0..self.plan.chunks()).filter(|c| !is_fresh[*c]);
+        self.parts.take(&budget, kept.clone().map(|c| &self.labels[c]), self.suspects.len() as u64);
+        let suspects = AtomicU64::new(self.suspects.len() as u64);
+        let patches = AtomicU64::new(kept.map(|c| self.parts.of_chunk(ChunkId(c as u32)).len() as u64).sum());
+        let mut solved = self.members.each(
+            (self.records, &self.guide, &self.plan),
+            self.threads,
+            |chunk| is_fresh[chunk.0 as usize],
+            Scratch::default,
+            |scratch, chunk, seen, _| {
+                if progress.cancelled() || budget.is_exceeded() {
+                    return (chunk, ChunkTopology::default());
+                }
+                let cut: Vec<[f32; 3]> = at_home(&by_home, chunk).iter().map(|(_, p)| *p).collect();
+                let topology = scratch.solve(seen, self.plan.home_box(chunk), &self.measure, &cut);
+                suspects.fetch_add(topology.suspects.len() as u64, Ordering::Relaxed);
+                patches.fetch_add(topology.patches.len() as u64, Ordering::Relaxed);
+                topology.take(&budget);
+                (chunk, topology)
+            },
+        );
+        if progress.cancelled() {
+            return Err(Error::io(path, STAGE)(std::io::ErrorKind::Interrupted.into()));
+        }
+        check(path, &budget, suspects.into_inner(), patches.into_inner())?;
+        let mut unsound = Weld::default();
+        unsound.reset(self.suspects.len());
+        for suspect in &self.suspects {
+            let corners = record::corners(&self.records[suspect.triangle as usize]);
+            (0..3).filter(|k| suspect.unsound >> k & 1 == 1).for_each(|k| {
+                unsound.vertex(corners[k]);
+            });
+        }
+        let mut fresh: Vec<(ChunkId, &mut ChunkTopology)> =
+            solved.iter_mut().map(|(chunk, topology)| (*chunk, topology)).collect();
+        let known = (self.records, &self.measure);
+        let (parts, suspects) = self.parts.renewed(known, self.suspects.clone(), &mut fresh, |chunk| is_cut[chunk]);
+        let (patches, merged) = parts.united();
+        self.promoted.extend(positions.iter().filter(|p| unsound.find(**p).is_none()));
+        self.dividing = self.promoted.len();
+        // By what was true before.
+        let divided_from = self.patches_at(patches.iter().map(|patch| patch.first));
+        self.suspect_patches = parts.patches_of(&suspects, &merged);
+        (self.suspects, self.patches, self.merged, self.parts) = (suspects, patches, merged, parts);
+        for (chunk, topology) in solved {
+            self.reaches[chunk.0 as usize] = topology.reach;
+            self.labels[chunk.0 as usize] = topology.labels;
+        }
+        Ok(Division { fetched, divided_from })
+    }
+
+    /// The patches of some triangles with a sound corner.
+    fn patches_at(&self, triangles: impl Iterator<Item = u32>) -> Vec<u32> {
+        let triangles: Vec<u32> = triangles.collect();
+        let positions: Vec<[f32; 3]> = triangles.iter().flat_map(|t| position::corners(&self.records[*t as usize])).collect();
+        // Around positions that are not sound there may be triangles of no patch, or of the workshop.
+        let around = self.beyond_the_workshop(&positions);
+        let patch = |t: u32| match self.suspects.binary_search_by_key(&t, |s| s.triangle) {
+            Ok(i) => self.suspect_patches[i],
+            Err(_) => around.binary_search_by_key(&t, |(s, _)| s.triangle).map_or(NONE, |i| around[i].1),
+        };
+        triangles.into_iter().map(patch).collect()
+    }
+
+    /// The patch of a suspect's sound corners, if it has any.
+    pub(crate) fn patch_of_suspect(&self, record: u32) -> u32 {
+        self.suspects.binary_search_by_key(&record, |s| s.triangle).map_or(NONE, |i| self.suspect_patches[i])
+    }
+
+    /// Positions with the chunks where they are at home, by chunk.
+    fn by_home(&self, positions: &[[f32; 3]]) -> Vec<(ChunkId, [f32; 3])> {
+        let mut by_home: Vec<(ChunkId, [f32; 3])> = positions.iter().map(|p| (self.plan.home(*p), *p)).collect();
+        by_home.sort_by_key(|(home, _)| *home);
+        by_home
+    }
+
+    /// Refuses the work on `path` if what is to be known of so many edges of one triangle in the workshop, in `bytes`, does not fit the budget
+    /// beside what was counted while the chunks were solved.
+    pub(crate) fn take_boundary(&self, path: &Path, boundary_edges: u64, bytes: u64) -> Result<()> {
+        self.budget.take(Purpose::Defects, bytes);
+        self.budget.check(path, || {
+            format!("{} triangles lie at defects, with {boundary_edges} edges that only one triangle has", self.suspects.len())
+        })
+    }
+
+    /// Threads to work with.
+    pub(crate) fn threads(&self) -> usize {
+        self.threads
+    }
+
+    /// Asks the disk for these records, which are about to be looked at.
+    pub(crate) fn ask_for(&self, numbers: impl Iterator<Item = u32>) {
+        self.guide.ask_for(numbers.map(|number| (number, 1)));
+    }
+
+    /// Merged patches of a chunk, by the chunk's own numbers.
+    fn patches_of(&self, chunk: ChunkId) -> &[u32] {
+        &self.merged[self.parts.of_chunk(chunk)]
+    }
+
+    /// Visits every triangle with three sound corners whose patch is `wanted` and that `passes`, exactly once, with its patch: chunks
+    /// in parallel, results in chunk order (which the plan decides: only sums of integers and sets may be made of them). `make` is
+    /// given the box of all sound triangles that a chunk sees, and says `None` if none of them is of interest.
+    /// `passes` is asked first, since it may be cheaper than finding out whose turn it is.
+    pub(crate) fn visit_sound<R: Send>(
+        &self,
+        wanted: impl Fn(u32) -> bool + Sync,
+        make: impl Fn(&Bounds) -> Option<R> + Sync,
+        passes: impl Fn(&R, &[[f32; 3]; 3]) -> bool + Sync,
+        visit: impl Fn(&mut R, u32, u32) + Sync,
+    ) -> Vec<R> {
+        let makes = |chunk: ChunkId| make(&self.reaches[chunk.0 as usize]);
+        let is_wanted = |chunk: ChunkId| self.patches_of(chunk).iter().any(|p| wanted(*p)) && makes(chunk).is_some();
+        let visited = self.members.each(
+            (self.records, &self.guide, &self.plan),
+            self.threads,
+            is_wanted,
+            || (),
+            |(), chunk, seen, _| {
+                let mut result = makes(chunk)?;
+                let patches = self.patches_of(chunk);
+                let cell = self.plan.home_box(chunk);
+                let mut labels = self.labels[chunk.0 as usize].iter();
+                seen.for_each(|triangle, place| {
+                    let patch = labels.next().unwrap_or(NONE);
+                    if patch == NONE || !wanted(patches[patch as usize]) {
+                        return;
+                    }
+                    let corners = place.corners();
+                    if !passes(&result, &corners) || self.suspects.binary_search_by_key(&triangle, |s| s.triangle).is_ok() {
+                        return;
+                    }
+                    // A sound triangle has a label in every chunk that sees it; the lowest of them visits it.
+                    if corners.iter().all(|p| cell.holds(*p)) || corners.iter().all(|p| self.plan.home(*p) >= chunk) {
+                        visit(&mut result, triangle, patches[patch as usize]);
+                    }
+                });
+                Some(result)
+            },
+        );
+        visited.into_iter().flatten().collect()
+    }
+
+    /// `work` on every chunk: its cell, its members, and its visitors, which there are if self-intersections were looked for. Results by
+    /// chunk, so only sums and sets may be made of them.
+    pub(crate) fn each_chunk<S, R: Send>(
+        &self,
+        scratch: impl Fn() -> S + Sync,
+        work: impl Fn(&mut S, HomeBox, [&Seen<'_>; 2]) -> R + Sync,
+    ) -> Vec<R> {
+        self.members.each(
+            (self.records, &self.guide, &self.plan),
+            self.threads,
+            |_| true,
+            scratch,
+            |scratch, chunk, members, visitors| work(scratch, self.plan.home_box(chunk), [members, visitors]),
+        )
+    }
+
+    /// Makes suspects of all triangles around the sound vertices at `positions`, and returns the new ones, ascending.
+    /// Reads the chunks where the vertices are at home.
+    pub(crate) fn promote(&mut self, positions: &[[f32; 3]]) -> Vec<(Suspect, u32)> {
+        self.promoted.extend(positions);
+        let new = self.beyond_the_workshop(positions);
+        for (suspect, patch) in &new {
+            let sum = &mut self.patches[*patch as usize];
+            let extent = self.measure.triangle(&record::corners(&self.records[suspect.triangle as usize]));
+            sum.triangles -= 1;
+            sum.extent -= extent;
+        }
+        let mut all: Vec<(Suspect, u32)> =
+            self.suspects.iter().copied().zip(self.suspect_patches.iter().copied()).chain(new.iter().copied()).collect();
+        all.sort_unstable();
+        (self.suspects, self.suspect_patches) = all.into_iter().unzip();
+        new
+    }
+
+    /// The triangles around sound vertices at `positions` that are no suspects, ascending, each with the corners that are there and
+    /// the patch it belongs to. Reads the chunks where the vertices are at home.
+    pub(crate) fn beyond_the_workshop(&self, positions: &[[f32; 3]]) -> Vec<(Suspect, u32)> {
+        let mut wanted = Weld::default();
+        wanted.reset(positions.len() * 8);
+        positions.iter().for_each(|p| {
+            wanted.vertex(*p);
+        });
+        let by_home = self.by_home(positions);
+        let at_home = |chunk| at_home(&by_home, chunk);
+        let found = self.members.each(
+            (self.records, &self.guide, &self.plan),
+            self.threads,
+            |chunk| !at_home(chunk).is_empty(),
+            Sieve::default,
+            |sieve, chunk, seen, _| {
+                sieve.fill(at_home(chunk).iter().map(|(_, p)| *p));
+                let patches = self.patches_of(chunk);
+                let mut labels = self.labels[chunk.0 as usize].iter();
+                let mut found = Vec::new();
+                seen.for_each(|triangle, place| {
+                    let patch = labels.next().unwrap_or(NONE);
+                    let corners = place.corners();
+                    if !sieve.may_hold(&corners) {
+                        return;
+                    }
+                    let unsound = (0..3).filter(|k| wanted.find(corners[*k]).is_some()).fold(0, |mask, k| mask | 1 << k);
+                    if unsound != 0 {
+                        // Only suspects are in no patch, and those are known.
+                        found.push((Suspect { triangle, unsound }, patches.get(patch as usize).copied().unwrap_or(NONE)));
+                    }
+                });
+                found
+            },
+        );
+        let mut all: Vec<(Suspect, u32)> = found.into_iter().flatten().collect();
+        all.sort_unstable();
+        all.dedup_by_key(|(s, _)| s.triangle);
+        all.retain(|(s, _)| self.suspects.binary_search_by_key(&s.triangle, |t| t.triangle).is_err());
+        all
+    }
+}
+
+/// Those of a chunk, of positions by chunk.
+fn at_home(by_home: &[(ChunkId, [f32; 3])], chunk: ChunkId) -> &[(ChunkId, [f32; 3])] {
+    let from = by_home.partition_point(|(home, _)| *home < chunk);
+    &by_home[from..from + by_home[from..].partition_point(|(home, _)| *home == chunk)]
+}
+
+/// Refuses what the chunks found to be too much to keep.
+fn check(path: &Path, budget: &Budget, suspects: u64, pieces: u64) -> Result<()> {
+    budget.check(path, || format!("at least {suspects} triangles lie at defects, in {pieces} pieces of surface or more"))?;
+    refuse_more_than(path, MOST_SUSPECTS, suspects, "triangles lie at defects")?;
+    refuse_more_than(path, chunk::MOST_PATCHES, pieces, "pieces of surface, counted by chunks, are there")
+}
+
+/// Triangles in runs of them.
+fn count_of(runs: &[(u32, u32)]) -> u64 {
+    runs.iter().map(|run| u64::from(run.1)).sum()
+}
+
+/// Refuses what could not be numbered.
+fn refuse_more_than(path: &Path, most: u64, there: u64, what: &str) -> Result<()> {
+    if there <= most {
+        return Ok(());
+    }
+    let advice = format!("at most {most} can be worked on: split the file");
+    Err(Error::Refused { path: path.into(), reason: format!("{there} {what}"), advice })
+}
+
+/// Takes what is known to be needed before the chunks are solved; returns how much of it is free again once they are.
+fn take_tables(path: &Path, budget: &Budget, plan: &Plan, members: &Members, limits: &Limits) -> Result<u64> {
+    let mut counts: Vec<u64> = (0..plan.chunks()).map(|c| members.count(ChunkId(c as u32))).collect();
+    counts.sort_unstable_by(|a, b| b.cmp(a));
+    // A thread's tables are as large as its largest chunk, and no two threads work on the same one.
+    let scratch = counts.iter().take(limits.threads).map(|n| chunk::scratch_bytes(*n)).sum::<u64>();
+    budget.take(Purpose::Tables, scratch + members.heap_bytes(limits.threads) + plan.heap_bytes());
+    let largest = counts.first().copied().unwrap_or(0);
+    budget.check(path, || format!("the largest chunk holds {largest} triangles"))?;
+    let nonfinite = count_of(&members.nonfinite);
+    budget.take(Purpose::Defects, nonfinite * crate::stream::budget::BYTES_PER_NONFINITE);
+    budget.check(path, || format!("{nonfinite} triangles have coordinates that are no finite numbers"))?;
+    Ok(scratch)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::contract::progress::Quiet;
+    use crate::contract::settings::Spill;
+    use crate::testing::{cuboid, records, soup};
+
+    /// What a survey says that must not depend on its chunks.
+    fn surveyed(records: &[Record], chunk_triangles: u32, spill: Spill) -> impl PartialEq + std::fmt::Debug {
+        let limits = Limits { threads: 1, chunk_triangles, spill, ..Limits::default() };
+        let survey = Survey::new(Path::new("test"), records, true, &limits, &Quiet).unwrap();
+        let patches: Vec<_> = survey.patches.iter().map(|p| (p.first, p.triangles, p.extent, p.bounds)).collect();
+        let found = (survey.suspects, survey.suspect_patches, patches, survey.nonfinite, survey.self_intersections);
+        (found, survey.vertices, survey.vertices_used)
+    }
+
+    proptest! {
+        /// Chunks and spools only divide the work: however small, they find what one chunk of everything finds.
+        #[test]
+        fn chunks_do_not_show_in_the_result(triangles in soup()) {
+            let records = records(&triangles);
+            let whole = surveyed(&records, u32::MAX, Spill::Never);
+            for chunk_triangles in [1, 2, 7] {
+                for spill in [Spill::Never, Spill::Always] {
+                    prop_assert_eq!(&surveyed(&records, chunk_triangles, spill), &whole);
+                }
+            }
+        }
+    }
+
+    /// What is known after the surface was divided at some corners, some others were promoted, and it was divided at others again.
+    fn divided(records: &[Record], chunk_triangles: u32, corners: &[Vec<usize>; 3]) -> impl PartialEq + std::fmt::Debug + use<> {
+        let limits = Limits { threads: 1, chunk_triangles, ..Limits::default() };
+        let path = Path::new("test");
+        let mut survey = Survey::new(path, records, true, &limits, &Quiet).unwrap();
+        let all: Vec<[f32; 3]> =
+            records.iter().map(record::corners).filter(|t| t.as_flattened().iter().all(|x| x.is_finite())).flatten().collect();
+        let [first, promoted, second] = corners.each_ref().map(|some| -> Vec<[f32; 3]> {
+            let mut some: Vec<[f32; 3]> = some.iter().map(|k| position::canonical(all[k % all.len()])).collect();
+            some.sort_by(|a, b| a.partial_cmp(b).unwrap());
+            some.dedup();
+            some
+        });
+        let mut divisions = Vec::new();
+        let mut divide = |survey: &mut Survey<'_>, positions: &[[f32; 3]]| {
+            let division = survey.divide(path, positions, &limits, &Quiet).unwrap();
+            divisions.push((division.fetched, division.divided_from));
+        };
+        divide(&mut survey, &first);
+        let sound: Vec<[f32; 3]> = promoted.into_iter().filter(|p| !first.contains(p)).collect();
+        let new = survey.promote(&sound);
+        divide(&mut survey, &second);
+        let patches: Vec<_> = survey.patches.iter().map(|p| (p.first, p.triangles, p.extent, p.bounds)).collect();
+        (divisions, new, survey.suspects, survey.suspect_patches, patches, survey.promoted)
+    }
+
+    proptest! {
+        /// Chunks that are not solved again when the surface is divided say what they would say.
+        #[test]
+        fn chunks_do_not_show_where_surface_is_divided(
+            triangles in soup(),
+            corners in std::array::from_fn::<_, 3, _>(|_| proptest::collection::vec(0usize..1000, 0..4)),
+        ) {
+            let records = records(&triangles);
+            prop_assume!(records.iter().any(|r| record::corners(r).as_flattened().iter().all(|x| x.is_finite())));
+            let whole = divided(&records, u32::MAX, &corners);
+            for chunk_triangles in [1, 2, 7] {
+                prop_assert_eq!(&divided(&records, chunk_triangles, &corners), &whole);
+            }
+        }
+    }
+
+    #[test]
+    fn a_cube_is_one_patch_and_no_suspect() {
+        let records = records(&cuboid([0.0; 3], [2.0; 3]));
+        for chunk_triangles in [1, u32::MAX] {
+            let limits = Limits { threads: 1, chunk_triangles, ..Limits::default() };
+            let survey = Survey::new(Path::new("test"), &records, true, &limits, &Quiet).unwrap();
+            assert!(survey.suspects.is_empty());
+            assert_eq!((survey.patches.len(), survey.patches[0].triangles, survey.vertices), (1, 12, 8));
+            assert!((survey.measure.volume(survey.patches[0].extent) - 8.0).abs() < 1e-9);
+        }
+    }
+}

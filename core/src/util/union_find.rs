@@ -1,0 +1,23 @@
+//! Sets of numbered things that are merged pair by pair, in a table of parents.
+
+/// No vertex, patch or triangle.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// Root of `v`, halving the path.
+#[inline]
+pub(crate) fn find(parents: &mut [u32], mut v: u32) -> u32 {
+    while parents[v as usize] != v {
+        let up = parents[parents[v as usize] as usize];
+        parents[v as usize] = up;
+        v = up;
+    }
+    v
+}
+
+/// The smaller root wins, so that the result does not depend on the order of unions. Says whether there were two.
+#[inline]
+pub(crate) fn unite(parents: &mut [u32], a: u32, b: u32) -> bool {
+    let (a, b) = (find(parents, a), find(parents, b));
+    parents[a.max(b) as usize] = a.min(b);
+    a != b
+}

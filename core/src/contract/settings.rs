@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::contract::access::Access;
-use crate::contract::report::LoopClass;
+use crate::contract::loop_class::LoopClass;
 
 /// What a repair may do, and what its result must satisfy. Lengths written `…_relative` are fractions of the bounding box's
 /// diagonal; `…_mm` are in the file's units, which STL users take for millimetres.

@@ -2,7 +2,7 @@
 //!
 //! Closed each for itself, a tube that has lost a ring would become two bodies, and the mouth of a vessel without its rim be shut.
 
-use super::close::{are_joined, concatenated};
+use super::placed::{are_joined, concatenated};
 use super::work::Work;
 use crate::algorithms::triangulate::{Rim, Unfillable, strip};
 use crate::detect::holes::loops::Loop;

@@ -6,6 +6,7 @@ use std::ops::Range;
 
 use super::admit::{Admission, NotAdmitted};
 use super::guard::{self, Obstacle};
+use super::placed::{Placed, are_joined, of_workshop};
 use super::work::Work;
 use super::{annular, collinear, islands, smooth};
 use crate::algorithms::fairing::{Method, ShapeSettings};
@@ -78,62 +79,6 @@ const SMALL: usize = 64;
 
 /// No patch is looked for around more triangles than this: what is so much in the way leaves no room.
 const MAX_OBSTACLES: usize = 48;
-
-/// A patch that is in the workshop.
-#[derive(Debug)]
-pub(super) struct Placed {
-    /// The loops it closes, by number.
-    rims: Vec<u32>,
-    method: &'static str,
-    /// Its triangles are consecutive.
-    pub(super) first: u32,
-    pub(super) count: u32,
-    /// Of a patch that was shaped: the triangles that it was shaped from.
-    pub(super) coarse: Vec<[Vertex; 3]>,
-    /// What it came to grief on.
-    obstacles: Vec<Obstacle>,
-    /// Nothing else was found than a patch that crosses bodies which run into this one already.
-    across: bool,
-    /// It may cross anything, and is to be cut along that.
-    to_be_cut: bool,
-    /// A patch that does, with its method, while others are tried.
-    spare: Option<(&'static str, Vec<[Vertex; 3]>)>,
-}
-
-impl Placed {
-    pub(super) fn triangles(&self) -> impl Iterator<Item = u32> + use<> {
-        self.first..self.first + self.count
-    }
-
-    pub(super) fn holds(&self, t: u32) -> bool {
-        (self.first..self.first + self.count).contains(&t)
-    }
-
-    fn put_in(work: &mut Work<'_>, rims: Vec<u32>, triangles: &[[Vertex; 3]], method: &'static str) -> Self {
-        let mut placed = Self {
-            rims,
-            method,
-            first: 0,
-            count: 0,
-            coarse: Vec::new(),
-            obstacles: Vec::new(),
-            across: false,
-            to_be_cut: false,
-            spare: None,
-        };
-        placed.replace(work, triangles);
-        placed
-    }
-
-    /// Puts these triangles in, in place of those that were.
-    fn replace(&mut self, work: &mut Work<'_>, triangles: &[[Vertex; 3]]) {
-        self.triangles().for_each(|t| work.kill(t));
-        (self.first, self.count) = (work.triangles.len() as u32, triangles.len() as u32);
-        triangles.iter().for_each(|v| {
-            work.add(*v, Origin::Patch, NONE);
-        });
-    }
-}
 
 /// Fills every loop that the profile admits. Patches are found in parallel and put in in the loops' order; one that meets an edge
 /// that an earlier one has made is found anew, so that the result does not depend on the threads.
@@ -626,11 +571,6 @@ fn guard_rounds(patch: &Placed, rims: &[Loop]) -> usize {
     if vertices > SMALL { GUARD_ROUNDS.0 } else { GUARD_ROUNDS.1 }
 }
 
-/// The triangles of a patch by the vertices of the workshop.
-fn of_workshop(rim: &Loop, patch: &triangulate::Patch) -> Vec<[Vertex; 3]> {
-    patch.triangles.iter().map(|t| t.map(|i| rim.vertices[i as usize])).collect()
-}
-
 fn is_on_one_line(shop: &Shop, way: &[Vertex]) -> bool {
     let [a, b] = [way[0], way[1]].map(|v| shop.positions[v as usize]);
     way[2..].iter().all(|v| exact::collinear(&a, &b, &shop.positions[*v as usize]))
@@ -639,16 +579,6 @@ fn is_on_one_line(shop: &Shop, way: &[Vertex]) -> bool {
 /// Triangles around the first vertex of a loop.
 fn fan(vertices: usize) -> Vec<[u32; 3]> {
     (2..vertices as u32).map(|n| [0, n - 1, n]).collect()
-}
-
-/// The vertices of some loops, one loop after the other.
-pub(super) fn concatenated(group: &[&Loop]) -> Vec<Vertex> {
-    group.iter().flat_map(|rim| rim.vertices.iter().copied()).collect()
-}
-
-/// Is there an edge between two vertices of loops?
-pub(super) fn are_joined(shop: &Shop, a: Vertex, b: Vertex) -> bool {
-    if shop.complete[a as usize] { shop.has_edge(a, b) } else { shop.has_edge(b, a) }
 }
 
 /// Twice the area of a patch, in the survey's units.

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
-use super::close::{are_joined, concatenated};
+use super::placed::{are_joined, concatenated};
 use super::work::Work;
 use crate::algorithms::triangulate::{self, Rim};
 use crate::detect::holes::loops::Loop;

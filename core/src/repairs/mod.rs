@@ -20,6 +20,7 @@ mod merge;
 mod orient;
 mod overlay;
 mod overrun;
+mod placed;
 mod probes;
 mod regions;
 mod resolve;

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::close::Placed;
+use super::placed::Placed;
 use super::work::Work;
 use crate::algorithms::fairing::{self, Region, ShapeSettings, Shaped, edges, sorted};
 use crate::geometry::exact::Point;

@@ -4,6 +4,7 @@
 //! costs about 0.02 bytes a triangle; a shuffled one costs up to 2. Where lists would not do (they would take too much memory, or lead all
 //! over a file that is larger than the page cache), the same pass copies the triangles into a [`Spool`] instead.
 
+use crate::stream::run_list::RunList;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -19,7 +20,6 @@ use crate::stream::plan::{ChunkId, Plan};
 use crate::stream::source::{Mapped, Seen, Spooled};
 use crate::stream::spool::{self, Loaded, Spool, Unsorted};
 use crate::util::parallel;
-use crate::util::varint::{put_varint, take_varint};
 
 /// Who sees what, and what the same pass learns about the whole file.
 ///
@@ -41,39 +41,6 @@ enum Kept {
         visitors: Vec<Vec<RunList>>,
     },
     Spool(Spool),
-}
-
-/// Ascending runs of triangle numbers, as variable-length integers: `distance from the end of the previous run << 1 | longer`,
-/// followed by `length − 2` when the run is longer than one.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct RunList {
-    bytes: Vec<u8>,
-    end: u32,
-}
-
-impl RunList {
-    /// Appends a run; returns how many bytes that took.
-    fn push(&mut self, first: u32, count: u32) -> usize {
-        let before = self.bytes.len();
-        let gap = u64::from(first - self.end) << 1 | u64::from(count > 1);
-        put_varint(&mut self.bytes, gap);
-        if count > 1 {
-            put_varint(&mut self.bytes, u64::from(count - 2));
-        }
-        self.end = first + count;
-        self.bytes.len() - before
-    }
-
-    pub(crate) fn runs(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
-        let (mut rest, mut end) = (self.bytes.as_slice(), 0u32);
-        std::iter::from_fn(move || {
-            let gap = take_varint(&mut rest)?;
-            let count = if gap & 1 == 1 { take_varint(&mut rest)? as u32 + 2 } else { 1 };
-            let first = end + (gap >> 1) as u32;
-            end = first + count;
-            Some((first, count))
-        })
-    }
 }
 
 /// Takes down who sees what in one stretch of the file.
@@ -205,7 +172,7 @@ impl Members {
             let mut lists = Lists { members: empty(), visitors: empty(), uncounted: 0, held: &held, most };
             let passing = gather_piece((piece, guide), offset, plan, visitors, &mut lists, told);
             held.fetch_add(lists.uncounted as u64, Ordering::Relaxed);
-            lists.members.iter_mut().chain(&mut lists.visitors).for_each(|l| l.bytes.shrink_to_fit());
+            lists.members.iter_mut().chain(&mut lists.visitors).for_each(RunList::shrink);
             (lists.members, lists.visitors, passing)
         });
         if is_too_much(&held, most) {
@@ -216,7 +183,7 @@ impl Members {
         for (members, visitors, passing) in results {
             passed.add(passing);
             for (lists, of_chunks) in [(members, &mut all), (visitors, &mut all_visitors)] {
-                let filled = lists.into_iter().zip(of_chunks).filter(|(list, _)| !list.bytes.is_empty());
+                let filled = lists.into_iter().zip(of_chunks).filter(|(list, _)| !list.is_empty());
                 filled.for_each(|(list, of_chunk)| of_chunk.push(list));
             }
         }
@@ -319,7 +286,7 @@ impl Members {
         let kept = match &self.kept {
             Kept::Lists { members, visitors } => {
                 let both = || members.iter().chain(visitors);
-                let pieces = both().flatten().map(|l| l.bytes.capacity() + size_of::<RunList>()).sum::<usize>();
+                let pieces = both().flatten().map(|l| l.heap_bytes() + size_of::<RunList>()).sum::<usize>();
                 (pieces + both().count() * size_of::<Vec<RunList>>()) as u64
             }
             Kept::Spool(spool) => spool.heap_bytes() as u64 + spool.loaded_bytes(threads),

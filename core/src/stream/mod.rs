@@ -4,5 +4,6 @@ pub(crate) mod budget;
 pub(crate) mod columns;
 pub(crate) mod members;
 pub(crate) mod plan;
+pub(crate) mod run_list;
 pub(crate) mod source;
 pub(crate) mod spool;

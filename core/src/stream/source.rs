@@ -1,7 +1,7 @@
 //! Where triangles come from: the records of a mapped file, or the entries of a spool.
 
 use crate::io::record::{self, Point, Record};
-use crate::stream::members::RunList;
+use crate::stream::run_list::RunList;
 use crate::stream::spool::{self, Entry};
 
 /// A triangle where it lies. Its corners are decoded only when they are asked for.

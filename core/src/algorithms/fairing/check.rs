@@ -1,7 +1,7 @@
 //! Whether a shaped patch is valid, exactly.
 
+use super::region::{Region, Shaped};
 use super::sheet::{edges, sorted};
-use super::{Region, Shaped};
 use crate::geometry::exact::collinear;
 use crate::geometry::position::Position;
 use crate::geometry::self_crossing::{SelfCrossing, crossing_of_first};

@@ -6,8 +6,8 @@
 
 use glam::DVec3;
 
+use super::region::{Region, Unshaped};
 use super::sheet::{NONE, Sheet, edges, sorted};
-use super::{Region, Unshaped};
 use crate::algorithms::triangulate::{FillSettings, Rim, triangulate};
 use crate::geometry::exact::Point;
 

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::Region;
+use super::region::Region;
 use crate::algorithms::triangulate::flips::{Edge, Hinge, relink};
 use crate::geometry::exact::at;
 

@@ -1,7 +1,7 @@
 //! Which triangles a valid patch may have at all, as far as the loop and the mesh around it can tell.
 
-use super::Rim;
 use super::boxes::{Boxes, around, join};
+use super::rim::Rim;
 use crate::geometry::exact::{Plane, collinear};
 use crate::geometry::tri_tri::{do_cross, segment_pierces};
 

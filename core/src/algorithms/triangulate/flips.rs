@@ -1,6 +1,6 @@
 //! Edge flips in a triangulated polygon: an edge between two triangles is replaced by the other diagonal of the two.
 
-use super::Rim;
+use super::rim::Rim;
 use crate::geometry::exact::at;
 use glam::DVec3;
 

@@ -12,9 +12,10 @@ use glam::DVec3;
 
 use super::boxes::{Box3, Boxes, around, join};
 use super::clear::Clearance;
-use super::directed_area;
 use super::minweight::{self, Choice, Weight};
-use super::{Rim, Unfillable};
+use super::patch::Unfillable;
+use super::planar::directed_area;
+use super::rim::Rim;
 use crate::geometry::exact::{Point, at};
 use crate::geometry::tri_tri::{Triangle, segment_pierces, triangles_cross};
 

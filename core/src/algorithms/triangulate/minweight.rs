@@ -12,7 +12,8 @@
 use glam::DVec3;
 
 use super::clear::Clearance;
-use super::{Rim, Unfillable};
+use super::patch::Unfillable;
+use super::rim::Rim;
 use crate::geometry::exact::{at, collinear};
 
 /// What is minimised first.

@@ -10,8 +10,8 @@ use glam::DVec3;
 use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
-use super::Rim;
 use super::flips::Flips;
+use super::rim::Rim;
 use crate::geometry::exact::{Point, at, turn};
 
 /// A loop's directed area: half of Σ pᵢ × pᵢ₊₁, taken about the first vertex.

@@ -4,8 +4,8 @@
 //! Backtracking: the triangle on an open chord is chosen, shortest sides first, among those that cross nothing chosen before.
 //! There are 1430 triangulations of ten vertices, so the search is complete up to about there; beyond, its bound may end it.
 
-use super::Rim;
 use super::clear::Clearance;
+use super::rim::Rim;
 use crate::geometry::exact::at;
 use crate::geometry::tri_tri::{Triangle, triangles_cross};
 

@@ -13,7 +13,8 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::{Fault, Method, Patch, Rim, Surroundings, Unfillable, are_distinct, crosses_itself, in_order, patch, runs_once};
+use super::patch::{Method, Patch, Unfillable, in_order, patch};
+use super::rim::{Fault, Rim, Surroundings, are_distinct, crosses_itself, runs_once};
 use crate::geometry::exact::{Point, at};
 
 /// Pairs of vertices up to which all are looked at; beyond, those at about the same share of both lengths.

@@ -1,5 +1,7 @@
 //! Every patch is checked by code of its own: integer arithmetic and brute force, nothing of the module under test.
 
+use crate::geometry::self_crossing::{SelfCrossing, self_crossing};
+use crate::geometry::tri_tri::{Contact, Triangle, triangles_cross};
 use proptest::prelude::*;
 
 use super::*;

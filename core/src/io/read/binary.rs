@@ -5,7 +5,8 @@
 //! most slicers do: a count of 0 or `u32::MAX` is what streaming exporters leave behind, a larger one means that the end is
 //! missing, and a smaller one that it was never updated, unless what follows does not look like triangles at all.
 
-use super::{Finding, HEADER_BYTES, MAX_TRIANGLES, PREFIX_BYTES, Rejection};
+use super::finding::{Finding, Rejection};
+use super::limits::{HEADER_BYTES, MAX_TRIANGLES, PREFIX_BYTES};
 use crate::io::record::{self, Record};
 
 /// Records looked at when a file must prove that it holds triangles.

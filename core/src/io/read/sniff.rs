@@ -2,7 +2,8 @@
 //! with (56 of 410 files drawn from a model site, ArtOfIllusion and SolidWorks among their makers).
 
 pub(super) use super::binary::Layout;
-use super::{Finding, Rejection, binary, facets, foreign};
+use super::finding::{Finding, Rejection};
+use super::{binary, facets, foreign};
 
 /// How much of a text is looked at.
 const HEAD: usize = 4096;

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io;
 use std::os::unix::fs::FileExt;
 
-use super::{Finding, Loss};
+use super::finding::{Finding, Loss};
 use crate::io::record::Record;
 
 /// Fewer records of zeros at the end may be an exporter's. (None of 104 binary files from many makers ended in a single one.)

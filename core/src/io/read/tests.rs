@@ -3,8 +3,14 @@
 mod damage;
 mod text;
 
+use crate::contract::error::{Error, Result};
+use crate::contract::progress::Progress;
+use crate::contract::report::Format;
+use crate::io::record::Record;
+use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
 use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
 
 use super::*;
 use crate::contract::error::ErrorClass;

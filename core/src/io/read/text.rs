@@ -10,9 +10,11 @@ use std::path::Path;
 use memmap2::Mmap;
 use rayon::prelude::*;
 
+use super::binary;
 use super::facets::{self, Tally};
+use super::finding::{Finding, Rejection};
+use super::limits::{HEADER_BYTES, MAX_TRIANGLES};
 use super::number::{COMMA, POINT};
-use super::{Finding, HEADER_BYTES, MAX_TRIANGLES, Rejection, binary};
 use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::settings::Limits;

@@ -11,7 +11,7 @@
 
 use super::super::orient;
 use super::super::swallowed::take_away;
-use super::State;
+use super::state::State;
 use crate::contract::report::{Region, Rung};
 use crate::submesh::Origin;
 use crate::submesh::components::Components;

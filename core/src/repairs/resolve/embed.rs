@@ -8,7 +8,7 @@ use super::super::work::Work;
 use super::super::{collinear, duplicates};
 use super::cut::Cut;
 use super::sides::Sides;
-use super::{Failure, State, Stuck, Tried};
+use super::state::{Failure, State, Stuck, Tried};
 use crate::detect::defects;
 use crate::geometry::position::Position;
 use crate::submesh::{Shop, Vertex, place};

@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 
 use super::passes::Passes;
-use super::{Met, State, Tried};
+use super::state::{Met, State, Tried};
 use crate::contract::settings::Profile;
 use crate::geometry::position::Position;
 use crate::submesh::Vertex;

@@ -13,7 +13,7 @@ use glam::DVec3;
 
 use super::near::nearest;
 use super::passes::Passes;
-use super::{Met, State, Tried};
+use super::state::{Met, State, Tried};
 use crate::algorithms::triangulate::{self, Rim};
 use crate::contract::settings::Profile;
 use crate::submesh::{Origin, Shop, Vertex};

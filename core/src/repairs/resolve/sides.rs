@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::super::orient;
 use super::super::work::Work;
-use super::Clusters;
+use super::clusters::Clusters;
 use super::cut::Cut;
 use crate::detect::bodies::{self, INNER_POINT};
 use crate::submesh::Shop;

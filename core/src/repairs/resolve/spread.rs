@@ -13,7 +13,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DMat3, DVec3};
 
-use super::{Clusters, Met, State, Tried};
+use super::clusters::Clusters;
+use super::state::{Met, State, Tried};
 use crate::contract::settings::Profile;
 use crate::geometry::position::Position;
 use crate::submesh::Vertex;

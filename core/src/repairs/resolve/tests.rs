@@ -1,5 +1,8 @@
 //! Small bodies that cross.
 
+use super::state::{follow_neighbours, grown};
+use crate::contract::settings::Bodies;
+use crate::util::steps;
 use std::path::Path;
 
 use glam::DVec3;

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::Clusters;
+use super::clusters::Clusters;
 use crate::contract::report::{Region, Rung};
 use crate::geometry::sums::Bounds;
 use crate::submesh::Shop;

@@ -5,8 +5,6 @@
 
 use glam::Vec4;
 
-use super::bits;
-
 /// Lanes of a node.
 pub(super) const WIDTH: usize = 16;
 
@@ -357,6 +355,17 @@ mod wide {
             }
         }
     }
+}
+
+/// The numbers of the bits that are set, ascending.
+#[inline(always)]
+pub(crate) fn bits(mask: impl Into<u64>) -> impl Iterator<Item = usize> {
+    let mut mask = mask.into();
+    std::iter::from_fn(move || {
+        let bit = (mask != 0).then(|| mask.trailing_zeros() as usize);
+        mask &= mask.wrapping_sub(1);
+        bit
+    })
 }
 
 #[cfg(test)]

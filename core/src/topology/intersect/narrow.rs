@@ -12,8 +12,8 @@
 
 use glam::Vec3;
 
-use super::Region;
 use super::lanes::{Triangles, WIDTH, max, min};
+use super::region::Region;
 use crate::geometry::tri_tri::{Sure, sure, sure_of_neighbours};
 
 /// 16ε.

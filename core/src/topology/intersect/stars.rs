@@ -30,7 +30,7 @@
 //! more and cost more than it saved.)
 
 use super::lanes::{Line, Triangles, WIDTH};
-use super::{Batch, Region};
+use super::region::{Batch, Region};
 
 /// 16ε.
 const ERROR: f32 = 1.0 / (1 << 20) as f32;

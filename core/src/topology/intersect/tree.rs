@@ -20,9 +20,10 @@
 
 use std::ops::Range;
 
+use super::lanes::bits;
 use super::lanes::{self, Boxes, Corners, Lanes, Pairs, Triangles, WIDTH, max, min};
+use super::region::{Batch, Region, State};
 use super::stars::Stars;
-use super::{Batch, Region, State};
 use crate::stream::plan::HomeBox;
 use crate::util::union_find::NONE;
 
@@ -511,15 +512,4 @@ impl<'a, V: Visit> Walk<'a, V> {
         self.rows.clear();
         true
     }
-}
-
-/// The numbers of the bits that are set, ascending.
-#[inline(always)]
-pub(crate) fn bits(mask: impl Into<u64>) -> impl Iterator<Item = usize> {
-    let mut mask = mask.into();
-    std::iter::from_fn(move || {
-        let bit = (mask != 0).then(|| mask.trailing_zeros() as usize);
-        mask &= mask.wrapping_sub(1);
-        bit
-    })
 }

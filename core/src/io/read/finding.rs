@@ -1,0 +1,59 @@
+//! What is odd about a file, and why one is not read.
+
+use super::limits::MAX_TRIANGLES;
+use crate::contract::error::Error;
+use std::path::Path;
+
+/// Something odd about the file itself (not about its mesh).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Finding {
+    /// One line for people.
+    pub text: String,
+    /// `true`: common slicers read the file all the same, and read the same mesh. `false`: some of them refuse it or read
+    /// something else, so a file that is otherwise clean is worth rewriting.
+    pub harmless: bool,
+    /// Whether it says that a part of the mesh is lost.
+    pub loss: Loss,
+}
+
+/// Whether a finding says that a part of the mesh is lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Loss {
+    None,
+    /// More than one triangle that the file announces is not there, or nobody knows how many: if the mesh is open, too, a part of it is lost.
+    IfOpen,
+    /// The file was cut off; whole bodies may be missing, so that what is left may well be closed.
+    Certain,
+}
+
+impl Finding {
+    pub(super) fn flaw(text: impl Into<String>) -> Self {
+        Self { text: text.into(), harmless: false, loss: Loss::None }
+    }
+
+    pub(super) fn loss(text: impl Into<String>) -> Self {
+        Self { loss: Loss::IfOpen, ..Self::flaw(text) }
+    }
+}
+
+/// Why a file was not read, before it is joined with the file's name.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Rejection {
+    /// No mesh, or damaged beyond reading.
+    Unreadable(String),
+    /// More triangles than a binary STL can count.
+    TooMany,
+}
+
+impl Rejection {
+    pub(super) fn at(self, path: &Path) -> Error {
+        match self {
+            Self::Unreadable(reason) => Error::Unreadable { path: path.to_owned(), reason },
+            Self::TooMany => Error::Refused {
+                path: path.to_owned(),
+                reason: format!("more than {MAX_TRIANGLES} triangles"),
+                advice: "split it, for no binary STL can count them".into(),
+            },
+        }
+    }
+}

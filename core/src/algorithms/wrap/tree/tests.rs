@@ -1,0 +1,80 @@
+use proptest::prelude::*;
+
+use super::*;
+use crate::testing::{cuboid, reversed};
+
+#[test]
+fn arguments_are_those_of_the_standard_library() {
+    for k in -1000..=1000 {
+        let angle = f64::from(k) / 1000.0 * std::f64::consts::PI;
+        let got = argument(angle.cos(), angle.sin()) * 2.0 * std::f64::consts::PI;
+        assert!((got - angle).abs() < 1e-9 || (got.abs() - std::f64::consts::PI).abs() < 1e-9, "{got} for {angle}");
+    }
+}
+
+#[test]
+fn bodies_count_once_each_and_cavities_are_air() {
+    let mesh = [cuboid([0.0; 3], [8.0; 3]), cuboid([4.0; 3], [12.0; 3]), reversed(&cuboid([1.0; 3], [3.0; 3]))].concat();
+    let tree = Tree::winding(&mesh);
+    for (x, want) in [(-1.0, 0.0), (0.5, 1.0), (2.1, 0.0), (3.5, 1.0), (6.3, 2.0), (11.0, 1.0), (13.0, 0.0), (100.0, 0.0)] {
+        let got = tree.winding_number(DVec3::new(x, x + 0.125, x));
+        assert!((got - want).abs() < 0.01, "{got} at {x}");
+    }
+}
+
+#[test]
+fn half_a_turn_in_the_mouth_of_an_open_box() {
+    let mut open = cuboid([0.0; 3], [2.0; 3]);
+    open.drain(2..4);
+    let tree = Tree::winding(&open);
+    let got = tree.winding_number(DVec3::new(1.0, 1.0, 1.999_999));
+    assert!((got - 0.5).abs() < 1e-5, "{got}");
+    assert!(tree.winding_number(DVec3::new(1.0, 1.0, 0.1)) > 0.9);
+}
+
+/// Half a box, with its rim in a plane where points are asked for too.
+#[test]
+fn rays_and_caps_tell_what_solid_angles_tell() {
+    let mut open = cuboid([0.0; 3], [2.0; 3]);
+    open.extend(cuboid([3.0; 3], [5.0; 3]));
+    open.extend(cuboid([1.0; 3], [4.0; 3]));
+    open.drain(2..4);
+    let by_rays = Tree::winding(&open);
+    assert!(by_rays.caps.as_ref().is_some_and(|caps| caps.triangles.len() == 4));
+    let plain = Tree::new(&open).with_moments();
+    for n in 0..4096 {
+        let p = DVec3::new(f64::from(n % 16), f64::from(n / 16 % 16), f64::from(n / 256)) * 0.5 - 1.25;
+        for p in [p, DVec3::new(p.x, p.y, 2.0)] {
+            let (got, want) = (by_rays.winding_number(p), plain.solid_angle(p));
+            assert!((got - want).abs() < 0.05, "{got} instead of {want} at {p}");
+        }
+    }
+}
+
+#[test]
+fn a_segment_leaves_where_it_passes_a_face_outwards() {
+    let tree = Tree::new(&cuboid([0.0; 3], [2.0; 3]));
+    let at = |from: [f64; 3], to: [f64; 3]| tree.leaves(DVec3::from_array(from), DVec3::from_array(to));
+    assert_eq!(at([1.0, 1.0, 1.0], [1.0, 1.0, 5.0]), Some(0.25));
+    assert_eq!(at([1.0, 1.0, -1.0], [1.0, 1.0, 3.0]), Some(0.75), "it enters before");
+    assert_eq!(at([1.0, 1.0, -1.0], [1.0, 1.0, 1.0]), Some(0.5), "it only enters");
+    assert_eq!(at([3.0, 1.0, -1.0], [3.0, 1.0, 1.0]), None);
+}
+
+proptest! {
+    /// Far nodes taken together change little, and the nearest triangle is the nearest.
+    #[test]
+    fn answers_are_those_of_a_plain_loop(
+        triangles in prop::collection::vec(prop::array::uniform3(prop::array::uniform3(-9i8..9)), 1..80),
+        p in prop::array::uniform3(-12.0f64..12.0),
+    ) {
+        let triangles: Vec<Corners> = triangles.iter().map(|t| t.map(|p| p.map(f32::from))).collect();
+        let p = DVec3::from_array(p);
+        let tree = Tree::winding(&triangles);
+        let mut plain = Angle::default();
+        triangles.iter().for_each(|t| plain.add(t, p));
+        prop_assert!((tree.winding_number(p) - plain.turns()).abs() < 0.05 * (1.0 + triangles.len() as f64 / 20.0));
+        let nearest = triangles.iter().map(|t| square_distance(p, t.map(place))).fold(f64::INFINITY, f64::min).sqrt();
+        prop_assert!((tree.distance(p) - nearest).abs() < 1e-9);
+    }
+}

@@ -1,6 +1,7 @@
 //! The way of one file through the engine: read → survey → workshop → repairs → edit → emit → read back → report. The output is surveyed
 //! as a whole only where the second look, at what changed, cannot tell.
 
+use crate::repairs::Repaired;
 use std::path::Path;
 use std::time::Instant;
 
@@ -107,7 +108,7 @@ pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress
     let mut report = report(Task::Inspect, &mesh, &diagnosis, profile, limits);
     report.input.blake3 = blake3;
     report.certificate = Some(certify(&report.input, &report.before, &flaws(&mesh)));
-    report.loops = repairs::recognise(&mut diagnosis, profile);
+    report.loops = repairs::recognise(&mut diagnosis, mesh.path(), profile, limits, progress)?;
     report.outcome = if report.verdict.good { Outcome::Clean } else { Outcome::NotGood };
     clock.close(report, &mesh)
 }
@@ -195,14 +196,7 @@ fn mend(
         clock.lap("repair");
         edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &repaired.reversed);
         edit.added.extend(repaired.wrapped.iter().map(|corners| record::encode(*corners, 0)));
-        report.loops = repaired.loops;
-        report.repairs = repaired.repairs;
-        report.loops_left = repaired.loops_left;
-        report.sheets_dropped = repaired.sheets;
-        report.wraps = repaired.wraps;
-        report.volumes = repaired.volumes;
-        report.regions = repaired.regions;
-        swallowed = repaired.swallowed;
+        swallowed = take_account(&mut report, repaired);
     }
     // Of the input's survey, the second look may go on; the memory of its workshop is needed for that of the output.
     let survey = diagnosis.into_survey();
@@ -247,6 +241,19 @@ fn mend(
     clock.lap("verify");
     mesh.check_unchanged()?;
     Ok(report)
+}
+
+/// Puts into the report what was done; what lay in the material of others is needed for the verdict.
+fn take_account(report: &mut Report, repaired: Repaired) -> Swallowed {
+    let Repaired { mut account, regions, .. } = repaired;
+    report.repairs = account.repairs();
+    report.loops = account.loops.unwrap_or_default();
+    report.loops_left = account.loops_left;
+    report.sheets_dropped = account.sheets;
+    report.wraps = account.wraps;
+    report.volumes = account.volumes;
+    report.regions = regions;
+    account.swallowed
 }
 
 /// What working out the topology of `mesh` spools.

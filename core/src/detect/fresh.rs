@@ -5,13 +5,13 @@
 //! boxes' overlap owns the pair, and both triangles are there as members or visitors.
 
 use crate::contract::report::SelfIntersections;
+use crate::detect::difference::Difference;
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::grid::Grid;
 use crate::geometry::position::canonical;
 use crate::geometry::sums::Bounds;
 use crate::geometry::tri_tri::{self, Contact, Triangle as Corners, common};
 use crate::io::record;
-use crate::output::readback::Difference;
 use crate::stream::plan::HomeBox;
 use crate::stream::source::{Seen, Source, Triangle};
 use crate::topology::crossings::{Crossings, Pair, most_tested};

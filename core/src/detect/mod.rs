@@ -3,6 +3,7 @@
 pub(crate) mod bodies;
 pub(crate) mod certificate;
 pub(crate) mod defects;
+pub(crate) mod difference;
 pub(crate) mod fresh;
 pub(crate) mod holes;
 pub(crate) mod rules;

@@ -39,7 +39,7 @@ impl<'a> Guide<'a> {
         if bytes.len() < ALWAYS_STAYS {
             return Self { bytes, room: None };
         }
-        let room = machine::page_cache_room(limits);
+        let room = machine::page_cache_room(limits.memory_bytes);
         let guide = Self { bytes, room: Some(room).filter(|room| bytes.len() as u64 > *room) };
         guide.advise(0, bytes.len(), if guide.is_needed() { Advice::Random } else { Advice::Normal });
         guide

@@ -10,10 +10,10 @@
 
 use glam::DVec3;
 
+use crate::detect::difference::Difference;
 use crate::detect::fresh;
 use crate::geometry::sums::{Bounds, Measure};
 use crate::io::record;
-use crate::output::readback::Difference;
 use crate::submesh::edges::Edges;
 use crate::submesh::{Gathering, Shop, has_repeated};
 use crate::topology::chunk::Suspect;

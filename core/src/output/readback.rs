@@ -3,6 +3,7 @@
 //! What is found equal to the input needs no second proof of what was proved of the input: the second look goes on from here
 //! ([`crate::output::incremental`]).
 
+use crate::detect::difference::Difference;
 use blake3::hazmat::ChainingValue;
 use rayon::prelude::*;
 
@@ -16,27 +17,6 @@ use crate::io::read_ahead::Guide;
 use crate::io::record::Record;
 use crate::output::edit::{Edit, Step};
 use crate::util::parallel;
-
-/// How a written file differs from its input. A triangle's **place** is the number of the input record that it is or stands in for; added
-/// ones have the places after all of these.
-#[derive(Debug, Default)]
-pub(crate) struct Difference {
-    /// Input records that the written file does not hold, ascending.
-    pub(crate) gone: Vec<u32>,
-    /// Those of them that nothing stands in for, ascending.
-    deleted: Vec<u32>,
-    /// What the written file holds besides untouched records of the input, by ascending place.
-    pub(crate) fresh: Vec<(u32, Record)>,
-    /// Records in the written file.
-    pub(crate) written_records: usize,
-}
-
-impl Difference {
-    /// The number, in the written file, of the record at a place.
-    pub(crate) fn number(&self, place: u32) -> u32 {
-        place - self.deleted.partition_point(|d| *d < place) as u32
-    }
-}
 
 /// Fewer bytes are not worth starting threads for.
 const READ_BY_ONE: usize = 1 << 20;

@@ -1,8 +1,10 @@
 //! Closes boundary loops: by a triangulation between their vertices, which is then shaped to continue the surface, where it has
 //! room for that, and revoked where it crosses anything.
 
+use super::account::RepairName;
+use super::context::{Changes, Done, Repair};
+use super::context::{PatchAcross, SheetRim};
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
 
 use super::admit::{Admission, NotAdmitted};
 use super::guard::{self, Obstacle};
@@ -26,6 +28,21 @@ use crate::topology::survey::Survey;
 use crate::util::parallel;
 use crate::util::union_find::NONE;
 
+/// Loops. Hands over what no patch closes.
+pub(super) const REPAIR: Repair = Repair {
+    name: RepairName::Fill,
+    changes: Changes::Surface,
+    run: |cx| {
+        let closed = fill_loops(cx.survey, &mut cx.work, &cx.reversed, cx.tolerance, cx.profile, cx.limits.threads);
+        let parts: Vec<String> = closed.by_method.iter().map(|(name, count)| format!("{count} {name}")).collect();
+        cx.account.loops_left = closed.left;
+        cx.handed.kept_open = closed.kept_open;
+        cx.handed.sheets = closed.sheets;
+        cx.handed.across = closed.across;
+        Ok(Done::count(closed.loops, format!("loops closed: {}", parts.join(", "))))
+    },
+};
+
 /// What was closed, by method, and what was not.
 #[derive(Debug, Default)]
 pub(super) struct Closed {
@@ -38,21 +55,11 @@ pub(super) struct Closed {
     pub(super) kept_open: Vec<[f32; 3]>,
     /// Loops that nothing closes which crosses nothing: the triangles of patches that are to be cut along what they cross, and what to say of the
     /// loops if that does not come about.
-    pub(super) across: Vec<(Range<u32>, LoopLeft)>,
-}
-
-/// The rim of a lone sheet, which stays open.
-#[derive(Debug)]
-pub(super) struct SheetRim {
-    /// A triangle along it.
-    pub(super) triangle: u32,
-    pub(super) edges: usize,
-    /// Its place among the loops that are left, unless it comes after the last one listed.
-    pub(super) listed: Option<usize>,
+    pub(super) across: Vec<PatchAcross>,
 }
 
 /// Takes those patches back that are of surfaces which did not take part when crossings were resolved.
-pub(super) fn open_again(work: &mut Work<'_>, across: Vec<(Range<u32>, LoopLeft)>, taken_part: &[bool]) -> Vec<LoopLeft> {
+pub(super) fn open_again(work: &mut Work<'_>, across: Vec<PatchAcross>, taken_part: &[bool]) -> Vec<LoopLeft> {
     let has_taken_part = |t: u32| taken_part.get(t as usize) == Some(&true);
     let back = across.into_iter().filter(|(triangles, _)| !triangles.clone().any(has_taken_part));
     back.map(|(triangles, left)| {
@@ -346,7 +353,7 @@ impl Closing<'_> {
 
     /// Closes what is left as if nothing were in the way, each by a patch that may cross anything, itself included. Returns the triangles
     /// of each.
-    fn close_across(&mut self, work: &mut Work<'_>) -> Vec<(Range<u32>, LoopLeft)> {
+    fn close_across(&mut self, work: &mut Work<'_>) -> Vec<PatchAcross> {
         let mut across = Vec::new();
         for (rim, reason) in std::mem::take(&mut self.open) {
             let patch = match reason {
@@ -370,7 +377,7 @@ impl Closing<'_> {
 
     /// Closes whatever still lacks triangles on one side, as along an edge that three surfaces share: one that the patch then lies on, or that it
     /// parts from the others, goes when all is cut along what it crosses. Loops that were left open stay open. Returns those that nothing closes.
-    fn balance(&self, work: &mut Work<'_>, across: &mut Vec<(Range<u32>, LoopLeft)>) -> Vec<LoopLeft> {
+    fn balance(&self, work: &mut Work<'_>, across: &mut Vec<PatchAcross>) -> Vec<LoopLeft> {
         let mut unclosed = Vec::new();
         for way in self.unbalanced(work) {
             let points: Vec<Point> = way.iter().map(|v| work.positions[*v as usize]).collect();

@@ -3,12 +3,32 @@
 //! Such a triangle lies along its longest edge, with the third vertex inside it. Every other triangle at the long edge is split at
 //! that vertex, which closes the surface without moving anything; dropping the triangle alone would open it.
 
+use super::account::RepairName;
+use super::context::{Changes, Done, Repair};
+use super::duplicates;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap, HashMap};
 
 use super::work::{Pass, Work};
 use crate::submesh::{Shop, Vertex};
 use crate::util::steps;
+
+/// What a report says of triangles without area.
+const NOTE: &str = "triangles without area removed, their T-junctions closed";
+
+/// Triangles with a repeated vertex, and with them what of those without area needs no neighbours.
+pub(super) const REPEATED: Repair = Repair {
+    name: RepairName::Degenerate,
+    changes: Changes::Surface,
+    run: |cx| Ok(Done::count(duplicates::drop_repeated(&mut cx.work), NOTE)),
+};
+
+/// All triangles without area.
+pub(super) const DEGENERATE: Repair = Repair {
+    name: RepairName::Degenerate,
+    changes: Changes::Surface,
+    run: |cx| Ok(Done::count(duplicates::drop_repeated(&mut cx.work) + remove(&mut cx.work), NOTE)),
+};
 
 /// Removes collinear triangles; returns how many there were. O((triangles in the stars along their long edges, and parts made of them) · log).
 pub(super) fn remove(work: &mut Work<'_>) -> u64 {

@@ -3,10 +3,22 @@
 //! All of them go or none: many specks that together are much of the surface are no debris but what is left of it, whose holes are to be
 //! closed, and which of them to keep nobody could say.
 
+use super::account::RepairName;
+use super::context::{Changes, Done, Repair};
 use super::work::Work;
 use crate::contract::settings::Profile;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::topology::survey::Survey;
+
+/// Open specks.
+pub(super) const REPAIR: Repair = Repair {
+    name: RepairName::Debris,
+    changes: Changes::Surface,
+    run: |cx| {
+        let dropped = drop(cx.survey, &mut cx.work, cx.profile);
+        Ok(Done::count(dropped, "triangles of open specks dropped, which together are next to nothing of the surface"))
+    },
+};
 
 /// So many times the area that a single speck may have is what all specks together may have, at most: 1 % of the model's, by default.
 const TOGETHER: f64 = 10.0;

@@ -5,10 +5,19 @@
 //! thickness inside a body (the surface closes without it: all go), a surface exported with both sides (one side stays and is
 //! turned later), or two triangles on their own (nothing is enclosed: both go).
 
+use super::account::RepairName;
+use super::context::{Changes, Done, Repair};
 use super::work::{Pass, Work};
 use crate::detect::defects::{by_vertex_set, same_direction};
 use crate::submesh::edges::Edges;
 use crate::submesh::{Shop, Vertex};
+
+/// Copies of triangles.
+pub(super) const DUPLICATE: Repair = Repair {
+    name: RepairName::Duplicate,
+    changes: Changes::Surface,
+    run: |cx| Ok(Done::count(drop_duplicates(&mut cx.work), "triangles on the vertices of another one")),
+};
 
 /// Removes triangles with a repeated vertex. Their edges cancel out, so nothing opens.
 pub(super) fn drop_repeated(work: &mut Work<'_>) -> u64 {

@@ -7,6 +7,8 @@
 //! meshes based on ray casting", JCGT 3(4), 2014, who cast them in all directions). What is seen from both sides alike, or from none, follows its
 //! neighbours. Edges between parts that are both right, and disagree, stay: no surface goes on there, and they are balanced later.
 
+use super::account::RepairName;
+use super::context::{Changes, Done, Repair};
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -22,6 +24,20 @@ use crate::submesh::edges::Edges;
 use crate::submesh::{Shop, place};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
+
+/// Parts that are seen from behind, where crossings are known. Hands over what is settled by that.
+pub(super) const REPAIR: Repair = Repair {
+    name: RepairName::Facing,
+    changes: Changes::Directions,
+    run: |cx| {
+        if cx.profile.resolve_crossings && cx.survey.crossing_pairs.is_some() {
+            let faced = face_outward(cx.survey, &mut cx.work, &mut cx.reversed);
+            cx.handed.settled = faced.settled;
+            return Ok(Done::count(faced.triangles, "triangles turned that are seen from behind, or whose neighbours are"));
+        }
+        Ok(Done::count(0, ""))
+    },
+};
 
 /// The smaller part of a sheet that disagrees with itself is just turned if it has no more triangles than this, or than this share of all. So is it
 /// everywhere if what is seen to be otherwise is less than this share of all surface.

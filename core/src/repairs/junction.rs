@@ -1,9 +1,21 @@
 //! Non-common vertices (T-junctions): the triangle whose edge a vertex lies on is split there, which keeps every position.
 
+use super::account::RepairName;
 use super::collinear;
+use super::context::{Changes, Done, Repair};
 use super::work::Work;
 use crate::submesh::Shop;
 use crate::submesh::near::{self, OnEdge, Tolerance};
+
+/// T-junctions.
+pub(super) const REPAIR: Repair = Repair {
+    name: RepairName::TJunction,
+    changes: Changes::Surface,
+    run: |cx| {
+        let split = split_edges(&mut cx.work, cx.tolerance);
+        Ok(Done::count(split, "vertices inside a neighbour's edge, which was split there"))
+    },
+};
 
 /// Splits boundary edges at the vertices that lie on them; returns how many vertices that were.
 pub(super) fn split_edges(work: &mut Work<'_>, tolerance: &Tolerance) -> u64 {

@@ -4,6 +4,8 @@
 //! ends face each other across a gap, which is closed later. A piece that lies on another one as a whole goes as a whole: what was meant is
 //! one surface, drawn twice. A piece on a surface that does not end there is left alone: nothing says that it was to be joined.
 
+use super::account::RepairName;
+use super::context::{Changes, Done, Repair};
 use std::collections::{BTreeMap, HashMap};
 
 use super::layer::{Facet, Layer, Place, Reach, RimEdge, around};
@@ -20,6 +22,16 @@ use crate::submesh::edges::Edges;
 use crate::submesh::near::{Tolerance, boundary_vertices};
 use crate::submesh::{self, Origin, Shop, Vertex};
 use crate::topology::survey::Survey;
+
+/// Surface that lies on other surface.
+pub(super) const REPAIR: Repair = Repair {
+    name: RepairName::Lap,
+    changes: Changes::Surface,
+    run: |cx| {
+        let cut = cut_back(cx.survey, &mut cx.work, cx.tolerance);
+        Ok(Done::count(cut, "triangles of surface that lay on another one, which faces the same way"))
+    },
+};
 
 /// Surfaces lie on each other within this share of the diagonals of their boxes together.
 const LAP: f64 = 1e-4;

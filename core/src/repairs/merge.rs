@@ -3,10 +3,26 @@
 //!
 //! A merge that would leave a new non-manifold edge is taken back.
 
+use super::account::RepairName;
+use super::context::{Changes, Done, Repair};
 use super::work::Work;
 use crate::submesh::edges::Edges;
 use crate::submesh::near::{self, Tolerance};
 use crate::submesh::{Shop, Vertex};
+
+/// Boundary vertices within the weld tolerance become one.
+pub(super) const REPAIR: Repair = Repair {
+    name: RepairName::ToleranceWeld,
+    changes: Changes::Surface,
+    run: |cx| {
+        let welded = weld(&mut cx.work, cx.tolerance);
+        if welded.taken_back > 0 {
+            tracing::info!(clusters = welded.taken_back, "Welds taken back, since they made an edge of more than two triangles.");
+        }
+        let note = "boundary vertices within the weld tolerance, moved to the one with most triangles";
+        Ok(Done::count(welded.vertices, note))
+    },
+};
 
 /// What the weld did.
 #[derive(Debug, Default)]

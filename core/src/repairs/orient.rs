@@ -1,14 +1,44 @@
 //! Coherent orientation over shared edges, then outward by enclosed volume, cavities inward.
 
+use super::account::RepairName;
+use super::context::{Changes, Done, Repair};
 use super::swallowed;
 use super::work::Work;
 use crate::detect::bodies;
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::sums::Bounds;
 use crate::submesh::Shop;
-use crate::submesh::components::{Components, Reversed, Through};
+use crate::submesh::components::{Components, Reversed};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
+
+/// Neighbours that disagree.
+pub(super) const COHERENT: Repair = Repair {
+    name: RepairName::Orient,
+    changes: Changes::Directions,
+    run: |cx| {
+        let turned = make_coherent(cx.survey, &mut cx.work, &mut cx.reversed, &cx.handed.settled);
+        if turned.contradictions > 0 {
+            tracing::info!(edges = turned.contradictions, "No orientation satisfies all edges: a surface is one-sided.");
+        }
+        Ok(Done::count(turned.triangles, "triangles turned to agree with their neighbours"))
+    },
+};
+
+/// What is inside out.
+pub(super) const OUTWARD: Repair = Repair {
+    name: RepairName::Outward,
+    changes: Changes::Outward,
+    run: |cx| {
+        let mut turned = 0;
+        if !cx.is_outward() {
+            let pieces = cx.pieces();
+            turned = make_outward(cx.survey, &mut cx.work, &mut cx.reversed, &pieces).0;
+            cx.found_outward();
+        }
+        Ok(Done::count(turned, "components that were inside out"))
+    },
+};
 
 /// Union-find with the parity of each node against its root.
 pub(super) struct Parity {
@@ -141,17 +171,6 @@ pub(super) fn make_outward(
     (count, triangles)
 }
 
-/// The pieces of surface that stand for themselves: bodies that touch along an edge each for itself, what is closed only together, together.
-/// O(patches + workshop).
-pub(super) fn pieces(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reversed) -> Components {
-    let (shop, edges) = work.edges();
-    let components = Components::of(survey, shop, edges, reversed, Through::ManifoldEdges);
-    if !edges.any_nonmanifold() {
-        return components;
-    }
-    Components::of(survey, shop, edges, reversed, Through::OpenSheets(&components))
-}
-
 /// Which components are inside out: from the outside in, one of negative volume that no body winds around. One that was coherent
 /// with an inverted component around it (of opposite sign: its cavity) is turned along. One that passes through the wall of another one of the
 /// same sign is no cavity of that, wherever the point lies that tells what is around it: in a file that is inside out both are bodies.
@@ -189,12 +208,13 @@ fn inverted(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed:
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::repairs::pieces;
     use crate::testing::{After, Corners, after, cube, cuboid, plate, reversed};
 
     fn outward(triangles: &[Corners]) -> After<(u64, u64)> {
         after(triangles, |d, turned| {
             let work = &mut Work::new(&mut d.shop);
-            let pieces = pieces(&d.survey, work, turned);
+            let pieces = pieces::pieces(&d.survey, work, turned);
             make_outward(&d.survey, work, turned, &pieces)
         })
     }

@@ -5,6 +5,8 @@
 //! the two sides onto their intersection line would be another way; that line lies in the groove that they make, so a patch continues the surface
 //! that stood there before more truly.) Sides that cross outside of the model are left alone, and so is a loop that would become much longer.
 
+use super::account::RepairName;
+use super::context::{Changes, Done, Repair};
 use std::collections::BTreeMap;
 
 use robust::Coord3D;
@@ -15,6 +17,16 @@ use crate::geometry::tri_tri::{Triangle as Corners, common, self_intersection};
 use crate::submesh::{Origin, Shop, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
+
+/// Slits whose sides overlap.
+pub(super) const REPAIR: Repair = Repair {
+    name: RepairName::Overrun,
+    changes: Changes::Surface,
+    run: |cx| {
+        let cut = cut_back(cx.survey, &mut cx.work);
+        Ok(Done::count(cut, "triangles of slits whose sides run past each other into the model, cut back"))
+    },
+};
 
 /// A loop may become so many times as long.
 const LONGER: f64 = 2.0;

@@ -165,9 +165,10 @@ fn points_below(
 
 #[cfg(test)]
 mod tests {
-    use super::super::orient;
+
     use super::super::work::Work;
     use super::*;
+    use crate::repairs::pieces;
     use crate::testing::{Corners, cuboid, diagnose, records, reversed, shifted};
 
     /// What is found of a mesh once `change` was done to its patches, and these triangles were wrapped.
@@ -176,10 +177,10 @@ mod tests {
         let mut d = diagnose(&records);
         let work = &mut Work::new(&mut d.shop);
         let mut turned = Reversed::none(&d.survey);
-        let pieces = orient::pieces(&d.survey, work, &turned);
+        let pieces = pieces::pieces(&d.survey, work, &turned);
         let probes = Probes::of(&d.survey, work, &turned, &pieces);
         change(&mut turned);
-        let pieces = orient::pieces(&d.survey, work, &turned);
+        let pieces = pieces::pieces(&d.survey, work, &turned);
         probes.look_for(&d.survey, work, &turned, &pieces, wrapped)
     }
 

@@ -16,6 +16,8 @@
 //! Only on request ([`Profile::stack_gap_relative`]): rims that merely run along other surface are let down as well. Over a hollow in what it
 //! stands on, the patch that closes the strip may leave a pocket, a small cavity.
 
+use super::account::RepairName;
+use super::context::{Changes, Done, Repair};
 use glam::DVec3;
 
 use super::guard::components_of_records;
@@ -31,6 +33,17 @@ use crate::submesh::components::{Components, Reversed, Through};
 use crate::submesh::{self, Origin, Shop, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
+
+/// Open shapes that stand on other surface.
+pub(super) const REPAIR: Repair = Repair {
+    name: RepairName::Seat,
+    changes: Changes::Surface,
+    run: |cx| {
+        let seated = let_down(cx.survey, &mut cx.work, &cx.reversed, cx.profile);
+        cx.handed.has_skirts = seated > 0;
+        Ok(Done::count(seated, "rims of open shapes that stand on other surface, let down into it"))
+    },
+};
 
 /// A rim points one way if the directions across its edges add up to this share of their number at least: that of a flat sheet or of a hole
 /// in a wall points all ways, that of a shape with steep walls one.
@@ -257,6 +270,7 @@ mod tests {
     use crate::contract::progress::Quiet;
     use crate::contract::settings::Limits;
     use crate::geometry::arrange::Rational;
+    use crate::repairs::pieces;
     use crate::testing::{After, Corners, after, cuboid, plate, reversed, shifted};
 
     /// How many rims were let down, once what they are part of was closed, turned and cut as in a repair.
@@ -266,7 +280,7 @@ mod tests {
             orient::make_coherent(&d.survey, work, turned, &[]);
             let seated = let_down(&d.survey, work, turned, profile);
             close::fill_loops(&d.survey, work, turned, &d.tolerance, profile, 1);
-            let pieces = orient::pieces(&d.survey, work, turned);
+            let pieces = pieces::pieces(&d.survey, work, turned);
             orient::make_outward(&d.survey, work, turned, &pieces);
             let limits = Limits { threads: 1, ..Limits::default() };
             let means = resolve::Means { path: Path::new("test"), limits: &limits, progress: &Quiet };

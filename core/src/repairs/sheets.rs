@@ -8,7 +8,9 @@
 //!
 //! A file that holds no body, or in which the sheets have more area than the bodies, keeps them: they are what it is about.
 
-use super::close::SheetRim;
+use super::account::RepairName;
+use super::context::SheetRim;
+use super::context::{Changes, Done, Repair};
 use super::swallowed;
 use super::work::Work;
 use crate::contract::report::{LoopLeft, SheetDropped};
@@ -16,6 +18,19 @@ use crate::contract::settings::{Guarantee, Profile, Sheets};
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
+
+/// Open sheets that can be no part of a solid.
+pub(super) const REPAIR: Repair = Repair {
+    name: RepairName::Sheets,
+    changes: Changes::Surface,
+    run: |cx| {
+        let rims = std::mem::take(&mut cx.handed.sheets);
+        let dropped = drop(cx.survey, &mut cx.work, &mut cx.reversed, &rims, &mut cx.account.loops_left, cx.profile);
+        let count = dropped.len() as u64;
+        cx.account.sheets.extend(dropped);
+        Ok(Done::count(count, "open sheets dropped that can be no part of a solid, listed in `sheets_dropped`"))
+    },
+};
 
 /// Sheets in the report, at most: the largest.
 const LISTED: usize = 1000;

@@ -5,6 +5,8 @@
 //! twos, or that has a hole but encloses more than next to nothing, is no such thing, but a body that touches others there. Smallest area goes first, and the
 //! rest is judged anew. Where as many triangles run one way as the other (bodies that touch along an edge) nothing is surplus.
 
+use super::account::RepairName;
+use super::context::{Changes, Done, Repair};
 use glam::DVec3;
 
 use super::admit;
@@ -14,6 +16,28 @@ use crate::submesh::edges::Edges;
 use crate::submesh::{Shop, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
+
+/// Sheets that are no part of a surface.
+pub(super) const REPAIR: Repair = Repair {
+    name: RepairName::Surplus,
+    changes: Changes::Surface,
+    run: |cx| {
+        let removed = remove(cx.survey, &mut cx.work);
+        Ok(Done::count(removed, "triangles of sheets that hang from a closed surface or cross a body"))
+    },
+};
+
+/// Fetches the stars that the removal of surplus surface may need. Duplicates are gone by then: they make non-manifold edges of no
+/// interest.
+pub(super) fn complete_at_seams(survey: &mut Survey<'_>, work: &mut Work<'_>) {
+    let (shop, edges) = work.edges();
+    let wanted = wanted_stars(survey, shop, edges);
+    if !wanted.is_empty() {
+        let positions: Vec<[f32; 3]> = wanted.iter().map(|v| shop.positions[*v as usize]).collect();
+        let new = survey.promote(&positions);
+        work.extend(survey, &new, &wanted);
+    }
+}
 
 /// A sheet that ends at non-manifold edges.
 struct Sheet {
@@ -147,8 +171,8 @@ pub(super) fn wanted_stars(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> V
 
 #[cfg(test)]
 mod tests {
-    use super::super::complete_at_seams;
     use super::Work;
+    use super::complete_at_seams;
     use crate::testing::{After, Corners, after, cube, cuboid, reversed, shifted};
 
     fn removed(triangles: &[Corners]) -> After<u64> {

@@ -9,6 +9,8 @@
 //! does it swallow anything (a vessel whose mouth was closed would swallow what stands in it), and nothing is removed where an open piece
 //! might be the wall of a cavity. A sheet in the material of a body stays: it may be the floor of a hole whose walls lack.
 
+use super::account::RepairName;
+use super::context::{Changes, Done, Repair};
 use super::guard::components_of_records;
 use super::work::Work;
 use crate::contract::report::{Region, Rung};
@@ -23,9 +25,29 @@ use crate::submesh::{Origin, Shop};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
 
+/// Bodies in the material of others.
+pub(super) const REPAIR: Repair = Repair {
+    name: RepairName::Swallowed,
+    changes: Changes::Pieces,
+    run: |cx| {
+        if cx.profile.bodies != Bodies::Union {
+            return Ok(Done::count(0, ""));
+        }
+        let pieces = cx.pieces();
+        let mut swallowed = remove(cx.survey, &mut cx.work, &mut cx.reversed, &pieces, cx.profile);
+        let Swallowed { bodies, volume, .. } = swallowed;
+        // Cavities that went are no bodies.
+        let changed = !swallowed.regions.is_empty();
+        cx.account.regions.append(&mut swallowed.regions);
+        cx.account.swallow(bodies, volume);
+        let note = format!("bodies in the material of others removed: {bodies}, of {volume:.4} units³ together");
+        Ok(Done { changed, ..Done::count(bodies, note) })
+    },
+};
+
 /// Removes what lies in the material of others and crosses nothing. Nothing is removed if it is not known what crosses what. Reads the
 /// chunks where pieces lie inside others' boxes.
-/// `pieces`: as [`super::orient::pieces`] finds them.
+/// `pieces`: as [`crate::repairs::pieces::pieces`] finds them.
 pub(super) fn remove(
     survey: &Survey<'_>,
     work: &mut Work<'_>,
@@ -150,6 +172,7 @@ pub(super) fn crossing_pieces(
 mod tests {
     use super::super::{close, orient};
     use super::*;
+    use crate::repairs::pieces;
     use crate::testing::{After, Corners, after, cuboid, plate, reversed, shifted};
 
     fn nested(size: f32) -> Vec<Corners> {
@@ -162,9 +185,9 @@ mod tests {
             let work = &mut Work::new(&mut d.shop);
             orient::make_coherent(&d.survey, work, turned, &[]);
             close::fill_loops(&d.survey, work, turned, &d.tolerance, &profile, 1);
-            let pieces = orient::pieces(&d.survey, work, turned);
+            let pieces = pieces::pieces(&d.survey, work, turned);
             orient::make_outward(&d.survey, work, turned, &pieces);
-            let pieces = orient::pieces(&d.survey, work, turned);
+            let pieces = pieces::pieces(&d.survey, work, turned);
             let Swallowed { bodies, volume, .. } = remove(&d.survey, work, turned, &pieces, &profile);
             (bodies, volume)
         })

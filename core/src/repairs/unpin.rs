@@ -6,6 +6,9 @@
 //! copy might. What the new triangles cross, or meet in more than
 //! the loop's edges, is tested exactly; a vertex with a patch that does is tried with its other fans, then left.
 
+use super::account::RepairName;
+use super::apart;
+use super::context::{Changes, Done, Repair};
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use super::apart::Separated;
@@ -20,6 +23,20 @@ use crate::submesh::wedges::Wedges;
 use crate::submesh::{Origin, Shop, Triangle, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
+
+/// Surfaces that meet in vertices and edges: taken apart, or closed without their vertex.
+pub(super) const REPAIR: Repair = Repair {
+    name: RepairName::Separated,
+    changes: Changes::Surface,
+    run: |cx| {
+        let mut separated = apart::separate(cx.survey, &mut cx.work, &cx.reversed, cx.profile);
+        unpin(cx.survey, &mut cx.work, &cx.reversed, cx.profile, &mut separated);
+        cx.account.regions.append(&mut separated.regions);
+        cx.handed.unsettled.append(&mut separated.regions_left);
+        cx.handed.may_cross |= separated.edges > 0;
+        Ok(Done::count(separated.vertices + separated.edges + separated.removed, separated.to_string()))
+    },
+};
 
 /// How often it is tried with other fans, and then without the vertices that these fail at.
 const ROUNDS: usize = 8;

@@ -4,7 +4,7 @@
 //! patent of the same group): for each of Z, X, Y, −Z, −X, −Y, and each piece that is not known to be visible, take its largest triangle. If that
 //! stands along the direction, or a ray from it meets another piece, the piece is hidden in this direction.
 //!
-//! What the paper leaves open is settled so. A piece is what stands for itself ([`orient::pieces`]), closed or open, after crossings were cut. Of
+//! What the paper leaves open is settled so. A piece is what stands for itself ([`pieces::pieces`]), closed or open, after crossings were cut. Of
 //! several largest triangles the first in the file counts, measured in rounded arithmetic that is the same everywhere; triangles that a repair
 //! has added are neither asked nor do they hide anything, since the paper decides before it fills. The ray begins inside of the
 //! triangle, within a rounding of f64, which is far finer than what f32 can tell apart; whether a triangle stands along a direction and what a ray meets are
@@ -15,6 +15,8 @@
 //! the jaws of another. What lies in the material of others, or in a closed piece, was to go; a body that lies in none, and a sheet,
 //! may have been meant to stay, and a person is asked (`verdict`). Nothing that crosses anything goes.
 
+use super::account::RepairName;
+use super::context::{Changes, Done, Repair};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use robust::Coord;
@@ -32,6 +34,22 @@ use crate::io::record;
 use crate::submesh::components::{Components, Reversed};
 use crate::submesh::{Origin, Shop};
 use crate::topology::survey::Survey;
+
+/// What others hide.
+pub(super) const REPAIR: Repair = Repair {
+    name: RepairName::Hidden,
+    changes: Changes::Pieces,
+    run: |cx| {
+        if cx.profile.bodies != Bodies::Visible {
+            return Ok(Done::count(0, ""));
+        }
+        let pieces = cx.pieces();
+        let mut hidden = remove(cx.survey, &mut cx.work, &mut cx.reversed, &pieces, &mut cx.account.loops_left, cx.profile);
+        cx.account.sheets.append(&mut hidden.sheets);
+        cx.account.swallow(hidden.expected.bodies, hidden.expected.volume);
+        Ok(Done::count(hidden.pieces, hidden.to_string()))
+    },
+};
 
 /// Sheets in the report, at most: the largest.
 const LISTED: usize = 1000;
@@ -74,7 +92,7 @@ impl std::fmt::Display for Hidden {
 
 /// Removes what is hidden, and takes its loops off the list of those that are `left`. Nothing is removed if it is not known what crosses what.
 /// Reads the chunks of pieces with others on both sides of them once, and for each direction those that a ray may meet.
-/// `pieces`: as [`super::orient::pieces`] finds them.
+/// `pieces`: as [`crate::repairs::pieces::pieces`] finds them.
 pub(super) fn remove(
     survey: &Survey<'_>,
     work: &mut Work<'_>,
@@ -251,6 +269,7 @@ fn largest_triangles(survey: &Survey<'_>, shop: &Shop, pieces: &Components, aske
 mod tests {
     use super::super::{close, orient};
     use super::*;
+    use crate::repairs::pieces;
     use crate::testing::{After, Corners, after, cuboid, plate, reversed, shifted};
 
     fn nested(size: f32) -> Vec<Corners> {
@@ -264,9 +283,9 @@ mod tests {
             let work = &mut Work::new(&mut d.shop);
             orient::make_coherent(&d.survey, work, turned, &[]);
             let mut closed = close::fill_loops(&d.survey, work, turned, &d.tolerance, &profile, 1);
-            let pieces = orient::pieces(&d.survey, work, turned);
+            let pieces = pieces::pieces(&d.survey, work, turned);
             orient::make_outward(&d.survey, work, turned, &pieces);
-            let pieces = orient::pieces(&d.survey, work, turned);
+            let pieces = pieces::pieces(&d.survey, work, turned);
             let rims = closed.left.len();
             let hidden = remove(&d.survey, work, turned, &pieces, &mut closed.left, &profile);
             assert_eq!(rims - closed.left.len(), hidden.sheets.len(), "a sheet has one rim here");

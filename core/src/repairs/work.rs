@@ -31,6 +31,8 @@ pub(super) struct Work<'a> {
     /// How many of these each pass has seen; `None`: it has to look at everything.
     seen: [Option<usize>; 3],
     journal: Option<Journal>,
+    /// Counts the changes.
+    version: u64,
 }
 
 /// What it takes to take back everything since a [`Work::mark`].
@@ -51,7 +53,7 @@ impl Deref for Work<'_> {
 
 impl<'a> Work<'a> {
     pub(super) fn new(shop: &'a mut Shop) -> Self {
-        Self { shop, edges: None, changed: Vec::new(), seen: [None; 3], journal: None }
+        Self { shop, edges: None, changed: Vec::new(), seen: [None; 3], journal: None, version: 0 }
     }
 
     /// The mesh with its edges. O(workshop) after a change, O(1) else.
@@ -98,10 +100,21 @@ impl<'a> Work<'a> {
         for (t, triangle) in old.into_iter().rev() {
             self.shop.triangles[t as usize] = triangle;
         }
-        self.edges = None;
+        self.touch();
         self.seen = [None; 3];
         self.shop.relink();
         (count, fetched)
+    }
+
+    /// Another number after every change.
+    pub(super) fn version(&self) -> u64 {
+        self.version
+    }
+
+    /// The mesh is about to change.
+    fn touch(&mut self) {
+        self.edges = None;
+        self.version += 1;
     }
 
     /// This triangle is about to change.
@@ -115,14 +128,14 @@ impl<'a> Work<'a> {
     }
 
     pub(super) fn kill(&mut self, t: u32) {
-        self.edges = None;
+        self.touch();
         self.note(t);
         self.shop.kill(t);
     }
 
     /// Adds a triangle and returns its number.
     pub(super) fn add(&mut self, v: [Vertex; 3], origin: Origin, patch: u32) -> u32 {
-        self.edges = None;
+        self.touch();
         let t = self.shop.add(v, origin, patch);
         self.changed.push(t);
         t
@@ -130,13 +143,13 @@ impl<'a> Work<'a> {
 
     /// Adds a vertex where none is, and returns its number.
     pub(super) fn add_vertex(&mut self, position: Position) -> Vertex {
-        self.edges = None;
+        self.touch();
         self.shop.add_vertex(position)
     }
 
     /// Lets all triangles of `go` use `stay` instead.
     pub(super) fn merge(&mut self, stay: Vertex, go: Vertex) {
-        self.edges = None;
+        self.touch();
         self.changed.extend(self.shop.star(go).map(|(t, _)| t));
         if self.journal.is_some() {
             let linked: Vec<u32> = self.shop.linked(go).collect();
@@ -147,14 +160,14 @@ impl<'a> Work<'a> {
 
     /// Turns a triangle over.
     pub(super) fn turn(&mut self, t: u32) {
-        self.edges = None;
+        self.touch();
         self.note(t);
         self.shop.triangles[t as usize].v.swap(1, 2);
     }
 
     /// Lets all triangles use `target[v]` instead of `v`. Their star lists are as they were until [`Self::relink`].
     pub(super) fn move_to(&mut self, target: &[Vertex]) {
-        self.edges = None;
+        self.touch();
         for t in 0..self.shop.triangles.len() as u32 {
             let old = self.shop.triangles[t as usize].v;
             let v = old.map(|v| target[v as usize]);
@@ -168,7 +181,7 @@ impl<'a> Work<'a> {
 
     /// Lets one corner of a triangle be another vertex. Star lists are as they were until [`Self::relink`].
     pub(super) fn assign(&mut self, t: u32, corner: usize, v: Vertex) {
-        self.edges = None;
+        self.touch();
         self.note(t);
         self.shop.triangles[t as usize].v[corner] = v;
         self.changed.push(t);
@@ -180,7 +193,7 @@ impl<'a> Work<'a> {
 
     /// Puts all triangles back to what they were.
     pub(super) fn restore(&mut self, before: &[Triangle]) {
-        self.edges = None;
+        self.touch();
         self.journal = None;
         self.seen = [None; 3];
         self.shop.triangles.clear();
@@ -203,7 +216,7 @@ impl<'a> Work<'a> {
 
     /// Takes in what [`Survey::promote`] has found for some incomplete vertices, which become complete.
     pub(super) fn extend(&mut self, survey: &Survey<'_>, new: &[(Suspect, u32)], completed: &[Vertex]) {
-        self.edges = None;
+        self.touch();
         let first = self.shop.triangles.len() as u32;
         self.shop.extend(survey, new, |_| completed.to_vec());
         self.changed.extend(first..self.shop.triangles.len() as u32);
@@ -211,7 +224,7 @@ impl<'a> Work<'a> {
 
     /// As [`Self::extend`]; the vertices at these positions become complete. Returns the first of the new triangles.
     pub(super) fn extend_at(&mut self, survey: &Survey<'_>, new: &[(Suspect, u32)], positions: &[[f32; 3]]) -> u32 {
-        self.edges = None;
+        self.touch();
         let first = self.shop.triangles.len() as u32;
         self.shop.extend(survey, new, |known| positions.iter().filter_map(|p| known.get(&Position::of(*p)).copied()).collect());
         self.changed.extend(first..self.shop.triangles.len() as u32);

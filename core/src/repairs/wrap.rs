@@ -8,11 +8,14 @@
 //! The wrapped triangles never enter the workshop, but go to the edit as they are: there may be millions of them, and nothing is done to
 //! them any more.
 
+use super::account::RepairName;
+use super::context::{Changes, Context, Done, Repair};
+use crate::contract::settings::Guarantee;
+use crate::repairs::pieces;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 use super::guard;
-use super::orient;
 use super::overlay::Overlay;
 use super::work::Work;
 use crate::algorithms::wrap::tree::{Corners, Tree};
@@ -28,6 +31,33 @@ use crate::submesh::{Shop, place};
 use crate::topology::survey::Survey;
 use crate::util::parallel;
 use crate::util::union_find::NONE;
+
+/// What nothing else made a solid.
+pub(super) const REPAIR: Repair = Repair {
+    name: RepairName::Wrap,
+    changes: Changes::Surface,
+    run: |cx| {
+        let is_wanted = cx.profile.guarantee == Guarantee::Wrap && (cx.handed.may_cross || is_broken(&mut cx.work));
+        let mut count = 0;
+        if is_wanted {
+            let pairs = if cx.profile.check_self_intersections {
+                let overlay = Overlay::of(cx.survey, &cx.work, &cx.reversed);
+                overlay.and_then(|overlay| overlay.crossing_pairs(cx.survey, &cx.work))
+            } else {
+                Some(Vec::new())
+            };
+            let (kept_open, threads) = (&cx.handed.kept_open, cx.limits.threads);
+            let wraps = replace(cx.survey, &mut cx.work, &mut cx.reversed, pairs.as_deref(), kept_open, cx.profile, threads);
+            count = wraps.regions;
+            cx.account.wraps = wraps.listed;
+            (cx.handed.wrapped, cx.handed.replaced) = (wraps.triangles, wraps.gone);
+            let Context { account, handed, .. } = cx;
+            account.loops_left.retain(|left| !handed.is_replaced(left.at));
+        }
+        let note = "regions that nothing else made a solid, replaced by a surface around what they enclose";
+        Ok(Done::count(count, note))
+    },
+};
 
 /// Triangles of a group, or of several that are wrapped at a time, at most: some 100 bytes each.
 const MOST_TRIANGLES: u64 = 1 << 22;
@@ -57,13 +87,6 @@ pub(super) struct Wraps {
     gone: Vec<Position>,
 }
 
-impl Wraps {
-    /// Was this vertex of the workshop part of what was replaced?
-    pub(super) fn replaced(&self, position: [f32; 3]) -> bool {
-        self.gone.binary_search(&Position::of(position)).is_ok()
-    }
-}
-
 /// Is anything of the workshop no closed, coherent, manifold surface? O(workshop).
 pub(super) fn is_broken(work: &mut Work<'_>) -> bool {
     let (shop, edges) = work.edges();
@@ -83,7 +106,7 @@ pub(super) fn replace(
     profile: &Profile,
     threads: usize,
 ) -> Wraps {
-    let pieces = orient::pieces(survey, work, reversed);
+    let pieces = pieces::pieces(survey, work, reversed);
     let mut groups = Groups::of(survey, work, &pieces, pairs, kept_open);
     let mut wraps = Wraps::default();
     if !groups.broken.contains(&true) {

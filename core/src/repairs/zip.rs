@@ -5,6 +5,8 @@
 //! would turn a triangle over, flatten it, or make an edge of more than two triangles is left out. So is one that leaves a vertex where
 //! several fans meet: nothing beside it was merged, and two loops that only meet there would be closed each for itself.
 
+use super::account::RepairName;
+use super::context::{Changes, Done, Repair};
 use std::collections::BTreeSet;
 
 use glam::DVec3;
@@ -16,6 +18,16 @@ use crate::detect::holes::loops;
 use crate::submesh::edges::{Edge, Edges};
 use crate::submesh::near::Tolerance;
 use crate::submesh::{self, Shop, Vertex, near};
+
+/// Narrow gaps.
+pub(super) const REPAIR: Repair = Repair {
+    name: RepairName::Zip,
+    changes: Changes::Surface,
+    run: |cx| {
+        let merged = zip(&mut cx.work, cx.tolerance, cx.profile);
+        Ok(Done::count(merged, "vertices merged with the one that faces them across a narrow gap"))
+    },
+};
 
 /// Facing: cosine between the directions in which the two surfaces end, at most.
 const FACING: f64 = -0.5;

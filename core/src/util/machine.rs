@@ -4,15 +4,13 @@
 
 use std::path::Path;
 
-use crate::contract::settings::Limits;
-
 /// Bytes of mapped files that can stay in memory beside a full budget, going by what the machine and the memory cgroups around this
 /// process leave.
-pub(crate) fn page_cache_room(limits: &Limits) -> u64 {
+pub(crate) fn page_cache_room(memory_bytes: u64) -> u64 {
     let cgroups = std::fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
     let groups = cgroup_room(&cgroups, Path::new("/sys/fs/cgroup"));
     let free = memory_available().unwrap_or(u64::MAX).min(groups.unwrap_or(u64::MAX));
-    free.saturating_sub(limits.memory_bytes)
+    free.saturating_sub(memory_bytes)
 }
 
 /// Memory that could be had without swapping.

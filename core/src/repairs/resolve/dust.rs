@@ -9,10 +9,10 @@
 //! Only crumbs go. A surface that cutting did not make stays, however small, and so does one with a triangle of a body that was as small
 //! before it was cut: that is a body of the file.
 
-use super::super::orient;
 use super::super::swallowed::take_away;
 use super::state::State;
 use crate::contract::report::{Region, Rung};
+use crate::repairs::pieces;
 use crate::submesh::Origin;
 use crate::submesh::components::Components;
 use crate::util::union_find::NONE;
@@ -29,7 +29,7 @@ fn is_dust(volume: i128, all: i128) -> bool {
 impl State<'_, '_, '_> {
     /// Drops dust. `before`: the pieces of surface before they were cut. Returns where each crumb was.
     pub(super) fn drop_dust(&mut self, before: &Components) -> Vec<Region> {
-        let pieces = orient::pieces(self.survey, self.work, self.reversed);
+        let pieces = pieces::pieces(self.survey, self.work, self.reversed);
         let all = pieces.list.iter().filter(|piece| !piece.open).map(|piece| piece.extent.volume).sum();
         let mut goes: Vec<bool> = pieces.list.iter().map(|piece| !piece.open && is_dust(piece.extent.volume, all)).collect();
         let mut is_cut = vec![false; pieces.list.len()];

@@ -32,6 +32,11 @@ mod state;
 mod tests;
 mod track;
 
+use super::account::RepairName;
+use super::close;
+use super::context::{Changes, Context, Done, Repair};
+use crate::geometry::arrange::Rational;
+use crate::repairs::pieces;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -44,7 +49,6 @@ use self::spread::Level;
 use self::state::{Before, FINEST, Failure, Halted, State, Stuck, Tried, WIDER, coincident, corners};
 pub(super) use self::state::{Resolved, join_in};
 use self::track::Track;
-use super::orient;
 use super::overlay::Overlay;
 use super::regions::Unsettled;
 use super::work::Work;
@@ -57,6 +61,37 @@ use crate::submesh::components::{Component, Components, Reversed};
 use crate::submesh::{Origin, Vertex};
 use crate::topology::survey::{Division, Survey};
 use crate::util::union_find::NONE;
+
+/// Surfaces that cross each other, and the patches that were to be cut.
+pub(super) const REPAIR: Repair = Repair { name: RepairName::Resolve, changes: Changes::Surface, run: account_for };
+
+fn account_for(cx: &mut Context<'_, '_>) -> Result<Done> {
+    cx.handed.may_cross = !cx.profile.resolve_crossings;
+    if !cx.profile.resolve_crossings {
+        return Ok(Done::count(0, ""));
+    }
+    let across = cx.handed.has_skirts || !cx.handed.across.is_empty();
+    let means = Means { path: cx.path, limits: cx.limits, progress: cx.progress };
+    let mut resolved = resolve(&Rational, cx.survey, &mut cx.work, &mut cx.reversed, cx.profile, across, &means)?;
+    cx.handed.dust = resolved.dust.len() as u64;
+    let open = close::open_again(&mut cx.work, std::mem::take(&mut cx.handed.across), &resolved.taken_part);
+    cx.account.take_back(RepairName::Fill, open.len() as u64);
+    let changed = resolved.divided || !open.is_empty();
+    cx.account.loops_left.extend(open);
+    cx.account.regions.append(&mut resolved.regions);
+    cx.account.regions.append(&mut resolved.dust);
+    cx.account.swallow(resolved.bodies, resolved.volume);
+    cx.handed.unsettled.append(&mut resolved.regions_left);
+    cx.handed.may_cross |= !resolved.left.is_empty();
+    let left = resolved.left.iter().map(|(failure, pieces)| format!("of {pieces} pieces of surface: {failure}"));
+    cx.handed.crossings_left.extend(left);
+    let Resolved { pairs, rounds, displaced, bodies, volume, .. } = resolved;
+    let note = format!(
+        "pairs of triangles that crossed; rounds: {rounds}, vertices moved by at most {displaced:e}, bodies that became part of others: \
+         {bodies}, with {volume:.4} units³ of them"
+    );
+    Ok(Done { changed, ..Done::count(pairs, note) })
+}
 
 /// Rounds of cutting and rounding.
 const ROUNDS: u32 = 24;
@@ -137,7 +172,7 @@ pub(super) fn resolve(
     let mut attempts = 0;
     loop {
         attempts += 1;
-        let pieces = orient::pieces(state.survey, state.work, state.reversed);
+        let pieces = pieces::pieces(state.survey, state.work, state.reversed);
         blocked.resize(pieces.list.len(), false);
         levels.resize(pieces.list.len(), Level::default());
         if attempts == 1 {
@@ -155,7 +190,7 @@ pub(super) fn resolve(
             Ok(resolved) => {
                 state.drop_specks();
                 let dust = state.drop_dust(&pieces);
-                let (bodies_now, volume_now) = measured(&orient::pieces(state.survey, state.work, state.reversed));
+                let (bodies_now, volume_now) = measured(&pieces::pieces(state.survey, state.work, state.reversed));
                 return Ok(Resolved {
                     bodies: bodies.saturating_sub(bodies_now),
                     volume: state.survey.measure.volume(Extent { area: 0, volume: volume - volume_now }),
@@ -305,7 +340,7 @@ impl State<'_, '_, '_> {
     /// Drops closed surfaces of nothing but parts of triangles that are no thicker than what rounding moves: they are nothing but that. So do those
     /// with other triangles, too, that are far thinner: what was cut off one and is next to nothing.
     fn drop_specks(&mut self) {
-        let pieces = orient::pieces(self.survey, self.work, self.reversed);
+        let pieces = pieces::pieces(self.survey, self.work, self.reversed);
         let measure = &self.survey.measure;
         let thickness = |piece: &Component| measure.volume(piece.extent).abs() / measure.area(piece.extent);
         let flakes = pieces.list.iter().map(|piece| !piece.open && thickness(piece) <= self.step * FLAKE);

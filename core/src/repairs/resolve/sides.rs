@@ -1,10 +1,10 @@
 //! The cells of space around what is cut, and the winding numbers there.
 
+use crate::repairs::pieces;
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
-use super::super::orient;
 use super::super::work::Work;
 use super::clusters::Clusters;
 use super::cut::Cut;
@@ -108,7 +108,7 @@ impl Sides {
         crossing: &BTreeSet<u32>,
         clusters: &Clusters,
     ) -> Vec<Option<i32>> {
-        let pieces = orient::pieces(survey, work, reversed);
+        let pieces = pieces::pieces(survey, work, reversed);
         let shop: &Shop = work;
         let mut parents = self.parents.clone();
         let roots: Vec<u32> = (0..parents.len() as u32).map(|node| crate::util::union_find::find(&mut parents, node)).collect();

@@ -2,6 +2,7 @@
 
 use super::state::{follow_neighbours, grown};
 use crate::contract::settings::Bodies;
+use crate::repairs::pieces;
 use crate::util::steps;
 use std::path::Path;
 
@@ -283,7 +284,7 @@ fn bodies_whose_faces_lie_in_planes_that_f32_cannot_hold_are_spread_by_some_step
         let overlay = Overlay::of(survey, work, turned).unwrap();
         let pairs = overlay.crossing_pairs(survey, work).unwrap();
         divide(survey, work, turned, corners(survey, work, &overlay, &pairs), &means).unwrap();
-        let pieces = orient::pieces(survey, work, turned);
+        let pieces = pieces::pieces(survey, work, turned);
         let mut state = State {
             clusters: Clusters::of(&pieces, &vec![false; pieces.list.len()]),
             track: Track::default(),

@@ -1,0 +1,170 @@
+//! All repairs in their order.
+//!
+//! Weld and splits change stars, so components, orientation and loops come after them; the surface is filled before it is decided
+//! which way is outward, since the signed volume of an open surface depends on the origin.
+
+use std::time::Instant;
+
+use super::account::RepairName;
+use super::context::{Context, Repair};
+use super::probes::Probes;
+use super::surplus::complete_at_seams;
+use super::{
+    close, collinear, debris, duplicates, facing, junction, lap, merge, orient, overrun, resolve, seat, sheets, surplus,
+    swallowed, unpin, visible, wrap, zip,
+};
+use crate::contract::error::Result;
+use crate::contract::settings::Bodies;
+use crate::detect::holes;
+
+/// A step of the work on a file.
+pub(super) enum Step {
+    /// Changes the mesh.
+    Repair(Repair),
+    /// Finds something out, and leaves the surface as it is.
+    Look(fn(&mut Context<'_, '_>)),
+    /// These steps again and again, so many times at most, until a round changes nothing: each can uncover work for the others. A count, so that
+    /// results do not depend on time.
+    Rounds(usize, &'static [Step]),
+}
+
+use Step::{Look, Repair as Do, Rounds};
+
+/// From the file as it came to what is written.
+pub(super) const ALL: &[Step] = &[
+    Do(collinear::REPEATED),
+    Do(duplicates::DUPLICATE),
+    Do(lap::REPAIR),
+    Look(|cx| complete_at_seams(cx.survey, &mut cx.work)),
+    Rounds(
+        4,
+        &[
+            Do(collinear::DEGENERATE),
+            Do(duplicates::DUPLICATE),
+            Do(surplus::REPAIR),
+            Do(merge::REPAIR),
+            Do(collinear::DEGENERATE),
+            Do(duplicates::DUPLICATE),
+            Do(surplus::REPAIR),
+            Look(recognise_loops),
+            Do(junction::REPAIR),
+        ],
+    ),
+    Do(zip::REPAIR),
+    Do(collinear::DEGENERATE),
+    Do(duplicates::DUPLICATE),
+    Do(surplus::REPAIR),
+    Do(overrun::REPAIR),
+    Do(debris::REPAIR),
+    Do(facing::REPAIR),
+    Do(orient::COHERENT),
+    Do(seat::REPAIR),
+    Do(close::REPAIR),
+    Do(sheets::REPAIR),
+    Do(orient::OUTWARD),
+    Look(probe_bodies),
+    Do(resolve::REPAIR),
+    Look(tell_dust),
+    // What was cut off may stand for itself.
+    Do(orient::OUTWARD),
+    Look(tell_crossings_left),
+    Do(swallowed::REPAIR),
+    Do(visible::REPAIR),
+    Do(unpin::REPAIR),
+    // What hung on a body by an edge or a vertex stands for itself now.
+    Do(orient::OUTWARD),
+    Do(wrap::REPAIR),
+    Look(measure_bodies),
+];
+
+/// As far as loops are recognised: surplus surface is gone, and vertices within the weld tolerance are one.
+pub(super) const RECOGNITION: &[Step] = &[
+    Do(collinear::REPEATED),
+    Do(duplicates::DUPLICATE),
+    Do(lap::REPAIR),
+    Look(|cx| complete_at_seams(cx.survey, &mut cx.work)),
+    Do(collinear::DEGENERATE),
+    Do(duplicates::DUPLICATE),
+    Do(surplus::REPAIR),
+    Do(merge::REPAIR),
+    Do(collinear::DEGENERATE),
+    Do(duplicates::DUPLICATE),
+    Do(surplus::REPAIR),
+    Look(recognise_loops),
+];
+
+/// Takes the steps in their order. Returns how much was done.
+///
+/// # Errors
+/// [`Error::Starved`](crate::Error::Starved) when there is not memory enough.
+pub(super) fn take(steps: &[Step], cx: &mut Context<'_, '_>) -> Result<u64> {
+    let mut all = 0;
+    for step in steps {
+        match step {
+            Do(repair) => all += carry_out(repair, cx)?,
+            Look(look) => look(cx),
+            Rounds(most, steps) => {
+                for _ in 0..*most {
+                    let done = take(steps, cx)?;
+                    all += done;
+                    if done == 0 {
+                        break;
+                    }
+                }
+            }
+        }
+    }
+    Ok(all)
+}
+
+fn carry_out(repair: &Repair, cx: &mut Context<'_, '_>) -> Result<u64> {
+    let span = tracing::debug_span!("repair", name = repair.name.as_str()).entered();
+    let start = Instant::now();
+    let done = (repair.run)(cx)?;
+    drop(span);
+    if done.changed {
+        cx.changed(repair.changes);
+    }
+    cx.account.add(repair.name, done.count, done.note, start.elapsed().as_secs_f64());
+    Ok(done.count)
+}
+
+/// The boundary loops as they are the first time.
+fn recognise_loops(cx: &mut Context<'_, '_>) {
+    if cx.account.loops.is_none() {
+        let (shop, edges) = cx.work.edges();
+        cx.account.loops = Some(holes::report(shop, edges, cx.tolerance, cx.profile.gap_edge_share));
+    }
+}
+
+/// Points in the bodies, if anything may lose one: all is closed that can be, and nothing is cut, removed or replaced yet.
+fn probe_bodies(cx: &mut Context<'_, '_>) {
+    let may_lose = !cx.handed.across.is_empty()
+        || cx.before.nested_positive > 0
+        || cx.profile.bodies == Bodies::Visible
+        || cx.profile.check_self_intersections && cx.survey.crossing_pairs.as_ref().is_none_or(|pairs| !pairs.is_empty())
+        || wrap::is_broken(&mut cx.work);
+    if may_lose {
+        let pieces = cx.pieces();
+        cx.handed.probes = Some(Probes::of(cx.survey, &cx.work, &cx.reversed, &pieces));
+    }
+}
+
+fn tell_dust(cx: &mut Context<'_, '_>) {
+    let note = "bodies that cutting left, each of less than 2⁻⁴⁰ of all volume, dropped";
+    cx.account.add(RepairName::Dust, cx.handed.dust, note.into(), 0.0);
+}
+
+fn tell_crossings_left(cx: &mut Context<'_, '_>) {
+    for note in std::mem::take(&mut cx.handed.crossings_left) {
+        cx.account.say(RepairName::CrossingsLeft, note);
+    }
+}
+
+/// Looks for the points in the bodies that there are now.
+fn measure_bodies(cx: &mut Context<'_, '_>) {
+    if let Some(probes) = cx.handed.probes.take() {
+        let pieces = cx.pieces();
+        cx.account.volumes = Some(probes.look_for(cx.survey, &cx.work, &cx.reversed, &pieces, &cx.handed.wrapped));
+    }
+}

@@ -1,0 +1,97 @@
+//! The rules of the house, read from the source: files import each other in no circle, folders of the engine import only those above them, and no
+//! file or function is too long to be read in one go.
+
+#[path = "house/imports.rs"]
+mod imports;
+#[path = "house/lengths.rs"]
+mod lengths;
+
+use std::path::{Path, PathBuf};
+
+use imports::Imports;
+
+/// The folders of the engine, each of which may import those before it, and only those.
+const ROOMS: [&str; 13] = [
+    "util",
+    "contract",
+    "io",
+    "geometry",
+    "stream",
+    "topology",
+    "submesh",
+    "detect",
+    "algorithms",
+    "output",
+    "diagnosis",
+    "repairs",
+    "engine",
+];
+
+fn sources(of_crate: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(of_crate).join("src")
+}
+
+#[test]
+fn no_files_import_each_other_in_a_circle() {
+    for of_crate in ["core", "store", "daemon", "bench"] {
+        let imports = Imports::of(&sources(of_crate));
+        assert!(imports.edges() > 10, "{of_crate}: imports are found");
+        let circles = imports.circles();
+        assert!(circles.is_empty(), "{of_crate}: {circles:#?}");
+    }
+}
+
+#[test]
+fn no_folder_of_the_engine_imports_one_below_it() {
+    let imports = Imports::of(&sources("core"));
+    let rank =
+        |room: &str| ROOMS.iter().position(|known| *known == room).unwrap_or_else(|| panic!("{room} has no place in ROOMS"));
+    let mut upward = Vec::new();
+    for (from, to) in imports.all() {
+        // The root of the crate says what the engine offers, and may import anything; nothing imports the root.
+        match (from.first(), to.first()) {
+            (Some(from_room), Some(to_room)) if rank(to_room) > rank(from_room) => {
+                upward.push(format!("{from:?} imports {to:?}"))
+            }
+            (Some(_), None) => upward.push(format!("{from:?} imports the root")),
+            _ => {}
+        }
+    }
+    assert!(upward.is_empty(), "{upward:#?}");
+}
+
+#[test]
+fn circles_are_found() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::create_dir_all(path.parent().expect("it has a parent")).expect("a folder");
+        std::fs::write(path, text).expect("a file");
+    };
+    write("lib.rs", "mod a; mod b; mod c; mod d; #[cfg(test)] mod e;");
+    write("a.rs", "use crate::b::{self, B};");
+    write("b.rs", "struct B; mod inner { use super::super::c::C; }");
+    write("c/mod.rs", "mod child; struct C; #[cfg(test)] mod tests { use crate::a; }");
+    write("c/child.rs", "fn f() { crate::d::g(); }");
+    write("d.rs", "fn g() {}");
+    write("e.rs", "use crate::d; mod f { use crate::e; }");
+    assert_eq!(Imports::of(folder.path()).circles(), Vec::<Vec<String>>::new(), "tests may look anywhere");
+    write("d.rs", "use super::a::A;");
+    assert_eq!(Imports::of(folder.path()).circles(), Vec::<Vec<String>>::new(), "c does not use its child");
+    write("c/mod.rs", "mod child; use child::f; struct C;");
+    assert_eq!(Imports::of(folder.path()).circles(), [["a", "b", "c", "c::child", "d"]]);
+}
+
+/// Lines of a file, at most.
+const LONGEST_FILE: usize = 500;
+/// Lines of a function, at most.
+const LONGEST_FUNCTION: usize = 60;
+
+#[test]
+fn no_file_and_no_function_is_too_long() {
+    let mut long = Vec::new();
+    for of_crate in ["core", "store", "daemon", "bench"] {
+        long.extend(lengths::beyond(&sources(of_crate), LONGEST_FILE, LONGEST_FUNCTION));
+    }
+    assert!(long.is_empty(), "{long:#?}");
+}

@@ -4,41 +4,15 @@
 //! repairs in their order; [`context`] says what a repair may know and what it hands on; each repair has a file, with its entry for the list at the
 //! top. A repair changes triangles in the workshop only, by way of [`work`], and turns or drops patches of sound surface as a whole.
 
-mod account;
-mod admit;
-mod annular;
-mod apart;
-mod close;
-mod collinear;
-mod context;
-mod debris;
-mod duplicates;
-mod facing;
-mod guard;
-mod islands;
-mod junction;
-mod lap;
-mod layer;
-mod merge;
+mod boolean;
+mod cleanup;
+mod holes;
 mod orient;
-mod overlay;
-mod overrun;
-mod pieces;
 mod pipeline;
-mod placed;
-mod probes;
-mod regions;
-mod resolve;
-mod seat;
-mod sheets;
-mod smooth;
-mod surplus;
-mod swallowed;
-mod unpin;
-mod visible;
-mod work;
+mod separate;
+mod shared;
+mod stitch;
 mod wrap;
-mod zip;
 
 use std::path::Path;
 
@@ -47,9 +21,9 @@ use crate::contract::progress::Progress;
 use crate::contract::report::{BoundaryLoops, Region, Regions};
 use crate::contract::settings::{Limits, Profile};
 use crate::diagnosis::Diagnosis;
+use crate::repairs::shared::account::Account;
+use crate::repairs::shared::context::Context;
 use crate::submesh::components::Reversed;
-use account::Account;
-use context::Context;
 
 /// What the repairs did; the mesh itself is in the diagnosis' workshop.
 pub(crate) struct Repaired {
@@ -79,7 +53,7 @@ pub(crate) fn run(
     let unsettled = std::mem::take(&mut handed.unsettled);
     all.extend(unsettled.into_iter().filter(|left| !handed.is_replaced(left.at)).map(|left| left.region));
     all.extend(account.wraps.iter().map(Region::from));
-    Ok(Repaired { reversed, account, regions: regions::told(all), wrapped: handed.wrapped })
+    Ok(Repaired { reversed, account, regions: shared::regions::told(all), wrapped: handed.wrapped })
 }
 
 /// The boundary loops of a file, with their kinds, as they are when surplus surface is gone and vertices within the weld tolerance are one, which

@@ -5,20 +5,35 @@
 
 use std::time::Instant;
 
-use super::account::RepairName;
-use super::context::{Context, Repair};
-use super::probes::Probes;
-use super::surplus::complete_at_seams;
-use super::{
-    close, collinear, debris, duplicates, facing, junction, lap, merge, orient, overrun, resolve, seat, sheets, surplus,
-    swallowed, unpin, visible, wrap, zip,
-};
 use crate::contract::error::Result;
 use crate::contract::settings::Bodies;
 use crate::detect::holes;
+use crate::repairs::boolean::enclosed;
+use crate::repairs::boolean::hidden;
+use crate::repairs::boolean::resolve;
+use crate::repairs::cleanup::debris;
+use crate::repairs::cleanup::degenerate;
+use crate::repairs::cleanup::duplicates;
+use crate::repairs::cleanup::sheets;
+use crate::repairs::cleanup::surplus;
+use crate::repairs::cleanup::surplus::complete_at_seams;
+use crate::repairs::holes::fill;
+use crate::repairs::holes::skirt;
+use crate::repairs::orient::directions;
+use crate::repairs::orient::visibility;
+use crate::repairs::separate::pinch_vertices;
+use crate::repairs::shared::account::RepairName;
+use crate::repairs::shared::context::{Context, Repair};
+use crate::repairs::shared::probes::Probes;
+use crate::repairs::stitch::overlaps;
+use crate::repairs::stitch::slits;
+use crate::repairs::stitch::t_junctions;
+use crate::repairs::stitch::weld;
+use crate::repairs::stitch::zip;
+use crate::repairs::wrap;
 
 /// A step of the work on a file.
-pub(super) enum Step {
+pub(crate) enum Step {
     /// Changes the mesh.
     Repair(Repair),
     /// Finds something out, and leaves the surface as it is.
@@ -31,63 +46,63 @@ pub(super) enum Step {
 use Step::{Look, Repair as Do, Rounds};
 
 /// From the file as it came to what is written.
-pub(super) const ALL: &[Step] = &[
-    Do(collinear::REPEATED),
+pub(crate) const ALL: &[Step] = &[
+    Do(degenerate::REPEATED),
     Do(duplicates::DUPLICATE),
-    Do(lap::REPAIR),
+    Do(overlaps::REPAIR),
     Look(|cx| complete_at_seams(cx.survey, &mut cx.work)),
     Rounds(
         4,
         &[
-            Do(collinear::DEGENERATE),
+            Do(degenerate::DEGENERATE),
             Do(duplicates::DUPLICATE),
             Do(surplus::REPAIR),
-            Do(merge::REPAIR),
-            Do(collinear::DEGENERATE),
+            Do(weld::REPAIR),
+            Do(degenerate::DEGENERATE),
             Do(duplicates::DUPLICATE),
             Do(surplus::REPAIR),
             Look(recognise_loops),
-            Do(junction::REPAIR),
+            Do(t_junctions::REPAIR),
         ],
     ),
     Do(zip::REPAIR),
-    Do(collinear::DEGENERATE),
+    Do(degenerate::DEGENERATE),
     Do(duplicates::DUPLICATE),
     Do(surplus::REPAIR),
-    Do(overrun::REPAIR),
+    Do(slits::REPAIR),
     Do(debris::REPAIR),
-    Do(facing::REPAIR),
-    Do(orient::COHERENT),
-    Do(seat::REPAIR),
-    Do(close::REPAIR),
+    Do(visibility::REPAIR),
+    Do(directions::COHERENT),
+    Do(skirt::REPAIR),
+    Do(fill::REPAIR),
     Do(sheets::REPAIR),
-    Do(orient::OUTWARD),
+    Do(directions::OUTWARD),
     Look(probe_bodies),
     Do(resolve::REPAIR),
     Look(tell_dust),
     // What was cut off may stand for itself.
-    Do(orient::OUTWARD),
+    Do(directions::OUTWARD),
     Look(tell_crossings_left),
-    Do(swallowed::REPAIR),
-    Do(visible::REPAIR),
-    Do(unpin::REPAIR),
+    Do(enclosed::REPAIR),
+    Do(hidden::REPAIR),
+    Do(pinch_vertices::REPAIR),
     // What hung on a body by an edge or a vertex stands for itself now.
-    Do(orient::OUTWARD),
+    Do(directions::OUTWARD),
     Do(wrap::REPAIR),
     Look(measure_bodies),
 ];
 
 /// As far as loops are recognised: surplus surface is gone, and vertices within the weld tolerance are one.
-pub(super) const RECOGNITION: &[Step] = &[
-    Do(collinear::REPEATED),
+pub(crate) const RECOGNITION: &[Step] = &[
+    Do(degenerate::REPEATED),
     Do(duplicates::DUPLICATE),
-    Do(lap::REPAIR),
+    Do(overlaps::REPAIR),
     Look(|cx| complete_at_seams(cx.survey, &mut cx.work)),
-    Do(collinear::DEGENERATE),
+    Do(degenerate::DEGENERATE),
     Do(duplicates::DUPLICATE),
     Do(surplus::REPAIR),
-    Do(merge::REPAIR),
-    Do(collinear::DEGENERATE),
+    Do(weld::REPAIR),
+    Do(degenerate::DEGENERATE),
     Do(duplicates::DUPLICATE),
     Do(surplus::REPAIR),
     Look(recognise_loops),
@@ -97,7 +112,7 @@ pub(super) const RECOGNITION: &[Step] = &[
 ///
 /// # Errors
 /// [`Error::Starved`](crate::Error::Starved) when there is not memory enough.
-pub(super) fn take(steps: &[Step], cx: &mut Context<'_, '_>) -> Result<u64> {
+pub(crate) fn take(steps: &[Step], cx: &mut Context<'_, '_>) -> Result<u64> {
     let mut all = 0;
     for step in steps {
         match step {

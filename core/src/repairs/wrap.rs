@@ -8,16 +8,14 @@
 //! The wrapped triangles never enter the workshop, but go to the edit as they are: there may be millions of them, and nothing is done to
 //! them any more.
 
-use super::account::RepairName;
-use super::context::{Changes, Context, Done, Repair};
 use crate::contract::settings::Guarantee;
-use crate::repairs::pieces;
+use crate::repairs::shared::account::RepairName;
+use crate::repairs::shared::context::{Changes, Context, Done, Repair};
+use crate::repairs::shared::pieces;
+use crate::repairs::shared::pieces::components_of_records;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-use super::guard;
-use super::overlay::Overlay;
-use super::work::Work;
 use crate::algorithms::wrap::tree::{Corners, Tree};
 use crate::algorithms::wrap::{Wrapping, wrap};
 use crate::contract::report::Wrap;
@@ -26,6 +24,8 @@ use crate::detect::fresh;
 use crate::geometry::position::{self, Position};
 use crate::geometry::sums::Bounds;
 use crate::io::record;
+use crate::repairs::shared::overlay::Overlay;
+use crate::repairs::shared::work::Work;
 use crate::submesh::components::{self, Components, Reversed, Through};
 use crate::submesh::{Shop, place};
 use crate::topology::survey::Survey;
@@ -33,7 +33,7 @@ use crate::util::parallel;
 use crate::util::union_find::NONE;
 
 /// What nothing else made a solid.
-pub(super) const REPAIR: Repair = Repair {
+pub(crate) const REPAIR: Repair = Repair {
     name: RepairName::Wrap,
     changes: Changes::Surface,
     run: |cx| {
@@ -77,18 +77,18 @@ const LISTED: usize = 1000;
 
 /// What was wrapped.
 #[derive(Default)]
-pub(super) struct Wraps {
+pub(crate) struct Wraps {
     /// Regions that were replaced, and those that would have been but for a reason.
-    pub(super) listed: Vec<Wrap>,
+    pub(crate) listed: Vec<Wrap>,
     /// The new triangles.
-    pub(super) triangles: Vec<Corners>,
-    pub(super) regions: u64,
+    pub(crate) triangles: Vec<Corners>,
+    pub(crate) regions: u64,
     /// Positions of all vertices of the workshop that are gone, ascending.
     gone: Vec<Position>,
 }
 
 /// Is anything of the workshop no closed, coherent, manifold surface? O(workshop).
-pub(super) fn is_broken(work: &mut Work<'_>) -> bool {
+pub(crate) fn is_broken(work: &mut Work<'_>) -> bool {
     let (shop, edges) = work.edges();
     edges.iter().any(|edge| edge.uses.len() != 2 || edge.is_unbalanced())
         || !components::nonmanifold_vertices(shop, edges).is_empty()
@@ -97,7 +97,7 @@ pub(super) fn is_broken(work: &mut Work<'_>) -> bool {
 /// Replaces what is no solid, as far as the profile allows. `pairs`: as [`Overlay::crossing_pairs`] finds them (empty if nobody looked for any);
 /// `kept_open`: a vertex of each loop that was left open on purpose. Reads the chunks where groups have sound surface, and all for every round
 /// of wraps.
-pub(super) fn replace(
+pub(crate) fn replace(
     survey: &Survey<'_>,
     work: &mut Work<'_>,
     reversed: &mut Reversed,
@@ -234,7 +234,7 @@ impl Groups {
             Some(pairs) => {
                 let records = survey.records.len() as u32;
                 let old = pairs.iter().flatten().copied().filter(|number| *number < records);
-                let of_record = guard::components_of_records(survey, shop, pieces, old);
+                let of_record = components_of_records(survey, shop, pieces, old);
                 let piece = |number: u32| match number.checked_sub(records) {
                     Some(t) => Some(of(t)),
                     None => of_record.get(&number).copied(),
@@ -542,7 +542,7 @@ impl Site<'_, '_> {
             fresh::self_intersection,
         )?;
         let old = pairs.iter().flat_map(|pair| pair.triangles).filter(|number| *number < records);
-        let of_record = guard::components_of_records(self.survey, self.shop, self.pieces, old);
+        let of_record = components_of_records(self.survey, self.shop, self.pieces, old);
         let piece = |number: u32| {
             if let Some(new) = number.checked_sub(first_new) {
                 return piece_of_new(new);

@@ -1,0 +1,239 @@
+//! The cells of space around what is cut, and the winding numbers there.
+
+use crate::repairs::shared::pieces;
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::DVec3;
+
+use crate::detect::bodies::{self, INNER_POINT};
+use crate::repairs::boolean::clusters::Clusters;
+use crate::repairs::boolean::cut::Cut;
+use crate::repairs::shared::work::Work;
+use crate::submesh::Shop;
+use crate::submesh::components::Reversed;
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
+
+/// The cells of space in front of and behind everything closed.
+///
+/// Nodes: those of the arrangement, then two for each patch, then two for each triangle of the workshop, front and back.
+pub(crate) struct Sides {
+    parents: Vec<u32>,
+    cells: u32,
+    pub(crate) patches: u32,
+    /// Front, back, and by how much the winding number is larger there.
+    steps: Vec<(u32, u32, i32)>,
+}
+
+impl Sides {
+    pub(crate) fn of(survey: &Survey<'_>, work: &mut Work<'_>, cut: &Cut, clusters: &Clusters) -> Self {
+        let (shop, edges) = work.edges();
+        let (cells, patches) = (cut.arrangement.cells, survey.patches.len() as u32);
+        let nodes = cells + 2 * patches + 2 * shop.triangles.len() as u32;
+        let mut sides = Self { parents: (0..nodes).collect(), cells, patches, steps: Vec::new() };
+        for p in (0..patches).filter(|p| clusters.holds_patch(*p)) {
+            let [front, back] = sides.of_patch(p);
+            sides.steps.push((front, back, 1));
+        }
+        let source_of = |t: u32| cut.sources.binary_search(&t).ok();
+        for t in shop.living().filter(|t| clusters.holds(*t)) {
+            let triangle = &shop.triangles[t as usize];
+            let source = source_of(t);
+            let own = sides.of_triangle(t);
+            if source.is_none() {
+                sides.steps.push((own[0], own[1], 1));
+            }
+            // A sound corner's star was not cut.
+            if triangle.patch == NONE || triangle.v.iter().all(|v| shop.complete[*v as usize]) {
+                continue;
+            }
+            let patch = sides.of_patch(triangle.patch);
+            match source {
+                None => sides.join(own, patch),
+                Some(s) => cut.pieces(s).iter().for_each(|piece| sides.join(piece.cells, patch)),
+            }
+        }
+        for piece in &cut.arrangement.pieces {
+            sides.steps.push((piece.cells[0], piece.cells[1], piece.step));
+        }
+        'edges: for edge in edges.iter() {
+            let [a, b] = edge.uses else { continue };
+            let sources = [source_of(a.triangle), source_of(b.triangle)];
+            if sources.iter().all(Option::is_some) || !clusters.holds(a.triangle) || !clusters.holds(b.triangle) {
+                continue;
+            }
+            let mut of = [[0; 2]; 2];
+            for (i, used) in [a, b].into_iter().enumerate() {
+                let v = shop.triangles[used.triangle as usize].v;
+                let (from, _) = edge.directed(used);
+                let k = v.iter().position(|w| *w == from).unwrap_or(0);
+                match sources[i] {
+                    None => of[i] = sides.of_triangle(used.triangle),
+                    Some(s) => match cut.whole_edge(shop, s, k) {
+                        Some(piece) => of[i] = piece.cells,
+                        // Covered by another one.
+                        None => continue 'edges,
+                    },
+                }
+            }
+            if edge.is_inconsistent() {
+                of[1].swap(0, 1);
+            }
+            sides.join(of[0], of[1]);
+        }
+        sides
+    }
+
+    pub(crate) fn of_patch(&self, patch: u32) -> [u32; 2] {
+        [self.cells + 2 * patch, self.cells + 2 * patch + 1]
+    }
+
+    pub(crate) fn of_triangle(&self, t: u32) -> [u32; 2] {
+        let first = self.cells + 2 * self.patches + 2 * t;
+        [first, first + 1]
+    }
+
+    fn join(&mut self, a: [u32; 2], b: [u32; 2]) {
+        crate::util::union_find::unite(&mut self.parents, a[0], b[0]);
+        crate::util::union_find::unite(&mut self.parents, a[1], b[1]);
+    }
+
+    /// The winding number at each node whose cell the cut surface tells of; `None` at others, and where that contradicts itself.
+    pub(crate) fn windings(
+        &self,
+        survey: &Survey<'_>,
+        work: &mut Work<'_>,
+        reversed: &Reversed,
+        cut: &Cut,
+        crossing: &BTreeSet<u32>,
+        clusters: &Clusters,
+    ) -> Vec<Option<i32>> {
+        let pieces = pieces::pieces(survey, work, reversed);
+        let shop: &Shop = work;
+        let mut parents = self.parents.clone();
+        let roots: Vec<u32> = (0..parents.len() as u32).map(|node| crate::util::union_find::find(&mut parents, node)).collect();
+        let root = |node: u32| roots[node as usize];
+        let mut steps: Vec<(u32, u32, i32)> = Vec::with_capacity(2 * self.steps.len());
+        for (front, back, step) in &self.steps {
+            steps.push((root(*front), root(*back), *step));
+            steps.push((root(*back), root(*front), -step));
+        }
+        steps.sort_unstable();
+        steps.dedup();
+        let from = |node: u32| {
+            let first = steps.partition_point(|s| s.0 < node);
+            steps[first..].iter().take_while(move |s| s.0 == node)
+        };
+        // Surfaces that hang together, each with its nodes' winding numbers against its first one's.
+        let mut surface_of = vec![NONE; parents.len()];
+        let mut relative = vec![0i32; parents.len()];
+        let mut sound: Vec<bool> = Vec::new();
+        for start in cut.arrangement.pieces.iter().map(|piece| root(piece.cells[0])) {
+            if surface_of[start as usize] != NONE {
+                continue;
+            }
+            let surface = sound.len() as u32;
+            sound.push(true);
+            surface_of[start as usize] = surface;
+            let mut queue = vec![start];
+            while let Some(at) = queue.pop() {
+                for (_, to, step) in from(at) {
+                    let winding = relative[at as usize] + step;
+                    if surface_of[*to as usize] == NONE {
+                        surface_of[*to as usize] = surface;
+                        relative[*to as usize] = winding;
+                        queue.push(*to);
+                    } else if relative[*to as usize] != winding {
+                        sound[surface as usize] = false;
+                    }
+                }
+            }
+        }
+        let surface_at = |node: u32| surface_of.get(root(node) as usize).filter(|s| **s != NONE).map(|s| *s as usize);
+        let samples = self.samples(shop, cut, crossing, clusters, surface_at);
+        let points: Vec<[f64; 3]> = samples.iter().map(|sample| sample.point).collect();
+        let found = bodies::windings(survey, shop, &pieces, reversed, &points);
+        let mut bases: Vec<Option<i32>> = vec![None; sound.len()];
+        for (sample, winding) in samples.iter().zip(found) {
+            if let Some(surface) = surface_at(sample.node).filter(|surface| sound[*surface]) {
+                bases[surface] = Some(winding - relative[root(sample.node) as usize]);
+            }
+        }
+        // What lies in the material of others would go: it is resolved for itself, and it is asked later if it is to go.
+        let mut least: Vec<i32> = vec![i32::MAX; sound.len()];
+        let absolute = |node: u32| {
+            let surface = surface_at(node)?;
+            Some((surface, bases[surface]? + relative[root(node) as usize]))
+        };
+        for (surface, winding) in (0..parents.len() as u32).filter_map(absolute) {
+            least[surface] = least[surface].min(winding);
+        }
+        let own = |node: u32| absolute(node).map(|(surface, winding)| winding - least[surface].max(0));
+        (0..parents.len() as u32).map(own).collect()
+    }
+
+    /// For each surface that was cut one of its triangles: one that crosses nothing if there is any, of the largest, of the first.
+    fn samples(
+        &self,
+        shop: &Shop,
+        cut: &Cut,
+        crossing: &BTreeSet<u32>,
+        clusters: &Clusters,
+        surface_of: impl Fn(u32) -> Option<usize>,
+    ) -> Vec<Sample> {
+        let mut best: BTreeMap<usize, Sample> = BTreeMap::new();
+        let mut offer = |clear: bool, node: u32, corners: [DVec3; 3]| {
+            let Some(surface) = surface_of(node) else { return };
+            let (area, point) = in_front(corners);
+            let sample = Sample { clear, area, node, point };
+            best.entry(surface)
+                .and_modify(|best| {
+                    if (clear, area) > (best.clear, best.area) {
+                        *best = sample;
+                    }
+                })
+                .or_insert(sample);
+        };
+        for t in shop.living().filter(|t| !crossing.contains(t) && clusters.holds(*t)) {
+            let corners = shop.triangles[t as usize].v.map(|v| shop.place(v));
+            match cut.sources.binary_search(&t) {
+                Err(_) => offer(true, self.of_triangle(t)[0], corners),
+                // What lies on it, or it on, is no clear case.
+                Ok(s) => {
+                    if let [piece] = cut.pieces(s)
+                        && piece.step == 1
+                    {
+                        offer(true, piece.cells[0], corners);
+                    }
+                }
+            }
+        }
+        for piece in &cut.arrangement.pieces {
+            offer(false, piece.cells[0], piece.v.map(|v| DVec3::from_array(cut.arrangement.points[v as usize])));
+        }
+        best.into_values().collect()
+    }
+}
+
+/// A triangle of a surface that was cut.
+#[derive(Clone, Copy)]
+struct Sample {
+    /// It crosses nothing.
+    clear: bool,
+    /// Twice its area.
+    area: f64,
+    /// Where it looks, and a point there.
+    node: u32,
+    point: [f64; 3],
+}
+
+/// Twice the area of a triangle, and a point in front of it, by so little that f32 knows nothing between.
+fn in_front(corners: [DVec3; 3]) -> (f64, [f64; 3]) {
+    let [a, b, c] = corners;
+    let normal = (b - a).cross(c - a);
+    let area = normal.length();
+    let point = a * INNER_POINT[0] + b * INNER_POINT[1] + c * INNER_POINT[2];
+    let largest = corners.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+    // 2⁻⁴⁰: far above what f64 rounds, far below what f32 can tell.
+    (area, (point + normal / area.max(f64::MIN_POSITIVE) * (largest * 9.1e-13)).to_array())
+}

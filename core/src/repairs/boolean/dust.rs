@@ -1,0 +1,72 @@
+//! Dust: bodies, and voids, that cutting left and no printer can see.
+//!
+//! Where surfaces nearly lie on each other, cutting leaves crumbs of a few triangles between them. Dust encloses less than 2⁻⁴⁰ (about 10⁻¹²) of
+//! what all closed surface of the result encloses: a cube of that volume has less than a ten-thousandth of the size of the model, a few
+//! hundredths of a millimetre for one of a hundred. Both volumes are sums of integers ([`crate::geometry::sums`]), so that the comparison depends neither on their
+//! order nor on where the model lies, and the share is a power of two. (The thickness of a crumb, by which flakes go, is no measure here: crumbs
+//! are as thick as the gaps that cutting closed, some steps of f32 and more.)
+//!
+//! Only crumbs go. A surface that cutting did not make stays, however small, and so does one with a triangle of a body that was as small
+//! before it was cut: that is a body of the file.
+
+use crate::contract::report::{Region, Rung};
+use crate::repairs::boolean::state::State;
+use crate::repairs::shared::pieces;
+use crate::repairs::shared::pieces::take_away;
+use crate::submesh::Origin;
+use crate::submesh::components::Components;
+use crate::util::union_find::NONE;
+
+/// Two to this power is how many times dust would have to be there to be all of the result.
+const SHARE: u32 = 40;
+
+/// Does a surface enclose next to nothing of all that is enclosed? The rest of the division is cut off, so that of next to nothing at all,
+/// nothing is dust.
+fn is_dust(volume: i128, all: i128) -> bool {
+    i128::try_from(volume.unsigned_abs()).is_ok_and(|volume| volume < all >> SHARE)
+}
+
+impl State<'_, '_, '_> {
+    /// Drops dust. `before`: the pieces of surface before they were cut. Returns where each crumb was.
+    pub(crate) fn drop_dust(&mut self, before: &Components) -> Vec<Region> {
+        let pieces = pieces::pieces(self.survey, self.work, self.reversed);
+        let all = pieces.list.iter().filter(|piece| !piece.open).map(|piece| piece.extent.volume).sum();
+        let mut goes: Vec<bool> = pieces.list.iter().map(|piece| !piece.open && is_dust(piece.extent.volume, all)).collect();
+        let mut is_cut = vec![false; pieces.list.len()];
+        for t in self.work.living() {
+            let piece = pieces.of_triangle[t as usize] as usize;
+            is_cut[piece] |= t >= self.first_triangle && !matches!(self.work.triangles[t as usize].origin, Origin::Input(_));
+            let whole = before.list.get(self.clusters.of_triangle[t as usize] as usize);
+            goes[piece] &= whole.is_some_and(|whole| !is_dust(whole.extent.volume, all));
+        }
+        // Sound surface that was not cut is the file's.
+        for piece in pieces.of_patch.iter().filter(|piece| **piece != NONE) {
+            goes[*piece as usize] = false;
+        }
+        goes.iter_mut().zip(is_cut).for_each(|(goes, is_cut)| *goes &= is_cut);
+        let dust = pieces.list.iter().zip(&goes).filter(|(_, goes)| **goes);
+        let regions = dust.map(|(piece, _)| {
+            let bounds = piece.bounds.normalised();
+            let (rung, bounds, count) = (Rung::Dropped, [bounds.lo, bounds.hi], piece.triangles);
+            Region { rung, bounds, count, rounds: 0, moved: 0.0, reason: None }
+        });
+        let regions = regions.collect();
+        if goes.contains(&true) {
+            take_away(self.work, self.reversed, &pieces, &goes);
+        }
+        regions
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dust_is_what_is_below_its_share_by_one() {
+        let all = 1 << 60;
+        assert!(is_dust((1 << 20) - 1, all) && is_dust(1 - (1 << 20), all) && is_dust(0, all));
+        assert!(!is_dust(1 << 20, all) && !is_dust(-(1 << 20), all));
+        assert!(!is_dust(0, 0) && !is_dust(-5, -7) && !is_dust(i128::MIN, i128::MAX));
+    }
+}

@@ -1,0 +1,197 @@
+//! Bodies inside the material of others: they bound nothing, since there is material on both of their sides.
+//!
+//! A piece of surface that crosses nothing lies in one cell of the rest, so that the winding number of the closed pieces around one of its
+//! points says on how much material its outer side looks out; its inner side has one more or, of a cavity, one less. Material is where the
+//! winding number is positive (Jacobson et al., "Robust inside-outside segmentation using generalized winding numbers", ACM TOG 32(4), 2013;
+//! of closed pieces it is an integer). Integers from exact predicates: nothing is decided by a margin.
+//!
+//! What is removed is lost, so that only what the file itself says counts: a piece that was closed or turned by a repair is neither removed nor
+//! does it swallow anything (a vessel whose mouth was closed would swallow what stands in it), and nothing is removed where an open piece
+//! might be the wall of a cavity. A sheet in the material of a body stays: it may be the floor of a hole whose walls lack.
+
+use crate::contract::report::{Region, Rung};
+use crate::contract::settings::{Bodies, Profile};
+use crate::detect::bodies;
+use crate::detect::verdict::Swallowed;
+use crate::geometry::boxes::BoxTree;
+use crate::geometry::sums::Bounds;
+use crate::io::record;
+use crate::repairs::shared::account::RepairName;
+use crate::repairs::shared::context::{Changes, Done, Repair};
+use crate::repairs::shared::pieces::{crossing, lies_in_material, take_away};
+use crate::repairs::shared::work::Work;
+use crate::submesh::components::{Components, Reversed};
+use crate::submesh::{Origin, Shop};
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
+
+/// Bodies in the material of others.
+pub(crate) const REPAIR: Repair = Repair {
+    name: RepairName::Swallowed,
+    changes: Changes::Pieces,
+    run: |cx| {
+        if cx.profile.bodies != Bodies::Union {
+            return Ok(Done::count(0, ""));
+        }
+        let pieces = cx.pieces();
+        let mut swallowed = remove(cx.survey, &mut cx.work, &mut cx.reversed, &pieces, cx.profile);
+        let Swallowed { bodies, volume, .. } = swallowed;
+        // Cavities that went are no bodies.
+        let changed = !swallowed.regions.is_empty();
+        cx.account.regions.append(&mut swallowed.regions);
+        cx.account.swallow(bodies, volume);
+        let note = format!("bodies in the material of others removed: {bodies}, of {volume:.4} units³ together");
+        Ok(Done { changed, ..Done::count(bodies, note) })
+    },
+};
+
+/// Removes what lies in the material of others and crosses nothing. Nothing is removed if it is not known what crosses what. Reads the
+/// chunks where pieces lie inside others' boxes.
+/// `pieces`: as [`crate::repairs::shared::pieces::pieces`] finds them.
+pub(crate) fn remove(
+    survey: &Survey<'_>,
+    work: &mut Work<'_>,
+    reversed: &mut Reversed,
+    pieces: &Components,
+    profile: &Profile,
+) -> Swallowed {
+    let mut swallowed = Swallowed::default();
+    let Some(crossing_pairs) = survey.crossing_pairs.as_deref().filter(|_| profile.bodies == Bodies::Union) else {
+        return swallowed;
+    };
+    let shop: &Shop = work;
+    let around = bodies::surroundings(survey, shop, pieces, reversed, |piece| !piece.open);
+    if around.iter().all(|a| a.winding() < 1) {
+        return swallowed;
+    }
+    let crossing = crossing(survey, shop, pieces, crossing_pairs.iter().map(|pair| pair.triangles));
+    let is_as_read = are_as_read(survey, shop, pieces, reversed);
+    let open: Vec<Bounds> = pieces.list.iter().filter(|piece| piece.open).map(|piece| piece.bounds).collect();
+    let open = BoxTree::new(&open);
+    let mut met = Vec::new();
+    let is_swallowed: Vec<bool> = (0..pieces.list.len())
+        .map(|i| {
+            let (piece, around) = (&pieces.list[i], &around[i]);
+            open.meeting(&piece.bounds, &mut met);
+            !crossing[i]
+                && met.is_empty()
+                && lies_in_material(piece, around.winding())
+                && is_as_read[i]
+                && around.around.iter().all(|(outer, _)| is_as_read[*outer as usize])
+        })
+        .collect();
+    for (piece, _) in pieces.list.iter().zip(&is_swallowed).filter(|(_, gone)| **gone) {
+        swallowed.bodies += u64::from(piece.extent.volume > 0);
+        swallowed.volume += survey.measure.volume(piece.extent);
+        let Bounds { lo, hi } = piece.bounds.normalised();
+        let (rung, bounds, count) = (Rung::Dropped, [lo, hi], piece.triangles);
+        swallowed.regions.push(Region { rung, bounds, count, rounds: 0, moved: 0.0, reason: None });
+    }
+    if !is_swallowed.contains(&true) {
+        return swallowed;
+    }
+    take_away(work, reversed, pieces, &is_swallowed);
+    swallowed
+}
+
+/// Which pieces hold nothing but triangles of the file, the way round that they have there.
+fn are_as_read(survey: &Survey<'_>, shop: &Shop, pieces: &Components, reversed: &Reversed) -> Vec<bool> {
+    let mut as_read = vec![true; pieces.list.len()];
+    let turned = pieces.of_patch.iter().zip(&reversed.patches).filter(|(piece, turned)| **turned && **piece != NONE);
+    turned.for_each(|(piece, _)| as_read[*piece as usize] = false);
+    for t in shop.living() {
+        let is_as_read = match shop.triangles[t as usize].origin {
+            Origin::Input(record) => {
+                let [a, b, c] = shop.points(t);
+                record::corners(&survey.records[record as usize]) != [a, c, b]
+            }
+            Origin::Part(_) => true,
+            Origin::Patch => false,
+        };
+        let piece = pieces.of_triangle[t as usize];
+        if !is_as_read && piece != NONE {
+            as_read[piece as usize] = false;
+        }
+    }
+    as_read
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::repairs::holes::fill;
+    use crate::repairs::orient::directions;
+    use crate::repairs::shared::pieces;
+    use crate::testing::{After, Corners, after, cuboid, plate, reversed, shifted};
+
+    fn nested(size: f32) -> Vec<Corners> {
+        cuboid([-size; 3], [size; 3])
+    }
+
+    fn removed(mesh: &[Corners], bodies: Bodies) -> After<(u64, f64)> {
+        let profile = Profile { bodies, ..Profile::default() };
+        after(mesh, |d, turned| {
+            let work = &mut Work::new(&mut d.shop);
+            directions::make_coherent(&d.survey, work, turned, &[]);
+            fill::fill_loops(&d.survey, work, turned, &d.tolerance, &profile, 1);
+            let pieces = pieces::pieces(&d.survey, work, turned);
+            directions::make_outward(&d.survey, work, turned, &pieces);
+            let pieces = pieces::pieces(&d.survey, work, turned);
+            let Swallowed { bodies, volume, .. } = remove(&d.survey, work, turned, &pieces, &profile);
+            (bodies, volume)
+        })
+    }
+
+    #[test]
+    fn a_body_inside_another_goes_and_a_cavity_with_what_floats_in_it_stays() {
+        let hollow = [nested(4.0), reversed(&nested(2.0)), nested(1.0)].concat();
+        let inside = shifted(&nested(0.5), [3.0, 3.0, 3.0]);
+        let got = removed(&[hollow.clone(), inside.clone()].concat(), Bodies::Union);
+        assert_eq!((got.result, got.untouched), ((1, 1.0), 36));
+        assert!((got.defects.volume - (512.0 - 64.0 + 8.0)).abs() < 1e-9, "{}", got.defects.volume);
+        assert_eq!(removed(&[hollow, inside].concat(), Bodies::Keep).untouched, 48);
+    }
+
+    #[test]
+    fn a_hollow_body_inside_another_goes_with_its_cavity_and_what_floats_there() {
+        let got = removed(&[nested(8.0), nested(4.0), reversed(&nested(2.0)), nested(1.0)].concat(), Bodies::Union);
+        assert_eq!((got.result, got.untouched), ((2, 512.0 - 64.0 + 8.0), 12));
+    }
+
+    #[test]
+    fn a_sheet_inside_a_body_stays_and_so_does_what_may_be_behind_it() {
+        let sheet = shifted(&plate(2, |_, _| true), [-1.0, -1.0, 0.5]);
+        let beside = shifted(&nested(0.5), [3.0, 3.0, 3.0]);
+        assert_eq!(removed(&[nested(4.0), sheet.clone(), beside].concat(), Bodies::Union).result.0, 1);
+        let beneath = shifted(&nested(0.5), [0.0, 0.0, 0.25]);
+        let got = removed(&[nested(4.0), sheet, beneath].concat(), Bodies::Union);
+        assert_eq!((got.result.0, got.untouched), (0, 32));
+    }
+
+    #[test]
+    fn what_a_repair_has_closed_or_turned_swallows_nothing_and_is_not_swallowed() {
+        let inside = || shifted(&nested(0.5), [1.0, 1.0, 1.0]);
+        // A tray without its top.
+        let mut tray = nested(4.0);
+        tray.drain(2..4);
+        assert_eq!(removed(&[tray, inside()].concat(), Bodies::Union).result.0, 0);
+        // A shell of which half is turned may have been meant for a cavity.
+        let mut torn = nested(2.0);
+        (0..6).for_each(|i| torn[i] = reversed(&torn[i..=i])[0]);
+        assert_eq!(removed(&[nested(4.0), torn].concat(), Bodies::Union).result.0, 0);
+        assert_eq!(removed(&[nested(4.0), inside()].concat(), Bodies::Union).result.0, 1);
+    }
+
+    #[test]
+    fn a_body_that_sticks_out_is_not_swallowed() {
+        let needle = cuboid([-0.1, -0.1, -1.0], [0.1, 0.1, 5.0]);
+        assert_eq!(removed(&[nested(4.0), needle].concat(), Bodies::Union).result.0, 0);
+        // Its box lies in the other's, which it crosses: a corner of the slanted half of a cube.
+        let [x, y, z] = [[4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]];
+        let o = [0.0; 3];
+        let wedge: Vec<Corners> = vec![[o, y, x], [o, x, z], [o, z, y], [x, y, z]];
+        let crossing = cuboid([0.5; 3], [2.0; 3]);
+        assert_eq!(removed(&[wedge.clone(), crossing].concat(), Bodies::Union).result.0, 0);
+        assert_eq!(removed(&[wedge, cuboid([0.5; 3], [0.75; 3])].concat(), Bodies::Union).result.0, 1);
+    }
+}

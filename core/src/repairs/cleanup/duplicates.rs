@@ -1,0 +1,245 @@
+//! Triangles with a repeated vertex, and several triangles on the same three vertices.
+//!
+//! Of copies in one direction the first stays, unless the surface is closed only with all of them. Where both directions occur, it is a question of what they are part of:
+//! a triangle doubled back to back in an otherwise sound surface (one of them fits its neighbours: it stays), a wall of no
+//! thickness inside a body (the surface closes without it: all go), a surface exported with both sides (one side stays and is
+//! turned later), or two triangles on their own (nothing is enclosed: both go).
+
+use crate::detect::defects::{by_vertex_set, same_direction};
+use crate::repairs::shared::account::RepairName;
+use crate::repairs::shared::context::{Changes, Done, Repair};
+use crate::repairs::shared::work::{Pass, Work};
+use crate::submesh::edges::Edges;
+use crate::submesh::{Shop, Vertex};
+
+/// Copies of triangles.
+pub(crate) const DUPLICATE: Repair = Repair {
+    name: RepairName::Duplicate,
+    changes: Changes::Surface,
+    run: |cx| Ok(Done::count(drop_duplicates(&mut cx.work), "triangles on the vertices of another one")),
+};
+
+/// Removes triangles with a repeated vertex. Their edges cancel out, so nothing opens.
+pub(crate) fn drop_repeated(work: &mut Work<'_>) -> u64 {
+    let changed = work.changed_for(Pass::Repeated);
+    let is_repeated = |t: &u32| work.triangles[*t as usize].alive && !work.lives(*t);
+    let doomed: Vec<u32> = match changed {
+        None => (0..work.triangles.len() as u32).filter(is_repeated).collect(),
+        Some(changed) => changed.into_iter().filter(is_repeated).collect(),
+    };
+    doomed.iter().for_each(|t| work.kill(*t));
+    doomed.len() as u64
+}
+
+/// Triangles on one vertex set in both directions.
+struct Pair {
+    forward: Vec<u32>,
+    backward: Vec<u32>,
+    /// Triangles around that need a forward one here, less those that need a backward one.
+    votes: i64,
+}
+
+/// What a connected set of pairs is part of.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Place {
+    /// Alone on its three vertices.
+    Alone,
+    /// A surface with both sides.
+    TwoSided,
+    /// A wall inside a body.
+    Wall,
+    /// Some neighbour needs one side.
+    Needed,
+}
+
+/// Removes surplus triangles on the same three vertices; returns how many.
+pub(crate) fn drop_duplicates(work: &mut Work<'_>) -> u64 {
+    // Afterwards no two are on the same vertices, and only a new vertex makes another copy.
+    let candidates = match work.changed_for(Pass::Copies) {
+        None => by_vertex_set(work),
+        Some(changed) => copies_of(work, &changed),
+    };
+    let (mut copies, mut doomed) = (Vec::new(), Vec::new());
+    let mut pairs: Vec<Pair> = Vec::new();
+    for group in candidates.chunk_by(|a, b| a.0 == b.0).filter(|g| g.len() > 1) {
+        let first = work.triangles[group[0].1 as usize].v;
+        let (forward, backward): (Vec<u32>, Vec<u32>) =
+            group.iter().map(|g| g.1).partition(|t| same_direction(first, work.triangles[*t as usize].v));
+        if backward.is_empty() {
+            copies.extend(&forward[1..]);
+        } else {
+            pairs.push(Pair { forward, backward, votes: 0 });
+        }
+    }
+    if !pairs.is_empty() || !copies.is_empty() {
+        let (shop, edges) = work.edges();
+        doomed.extend(sort_out(shop, edges, &mut pairs));
+        doomed.extend(spare(shop, edges, &copies));
+    }
+    doomed.iter().for_each(|t| work.kill(*t));
+    doomed.len() as u64
+}
+
+/// As [`by_vertex_set`], of all triangles on the vertices of a changed one. O(stars of the changed ones); of a triangle's three stars
+/// only as much is looked at as the smallest has.
+fn copies_of(shop: &Shop, changed: &[u32]) -> Vec<([Vertex; 3], u32)> {
+    let sorted = |t: u32| {
+        let mut v = shop.triangles[t as usize].v;
+        v.sort_unstable();
+        v
+    };
+    let mut sets: Vec<[Vertex; 3]> = changed.iter().filter(|t| shop.lives(**t)).map(|t| sorted(*t)).collect();
+    sets.sort_unstable();
+    sets.dedup();
+    let mut all = Vec::new();
+    for set in sets {
+        let mut stars = set.map(|v| shop.star(v));
+        let smallest = (0..3).cycle().find(|k| stars[*k].next().is_none()).unwrap_or(0);
+        let first = all.len();
+        all.extend(shop.star(set[smallest]).map(|(t, _)| (set, t)).filter(|(_, t)| sorted(*t) == set));
+        all[first..].sort_unstable();
+    }
+    all
+}
+
+/// Those of the copies without which the surface is no farther from closed. Where two bodies have part of their surface in common, each needs
+/// its own.
+fn spare(shop: &Shop, edges: &Edges, copies: &[u32]) -> Vec<u32> {
+    let mut uses: Vec<(u32, u32, i64)> = Vec::with_capacity(3 * copies.len());
+    for (i, t) in (0..).zip(copies) {
+        let v = shop.triangles[*t as usize].v;
+        for k in 0..3 {
+            let (a, b) = (v[k], v[(k + 1) % 3]);
+            uses.extend(edges.number(a, b).map(|edge| (edge, i, if a < b { 1 } else { -1 })));
+        }
+    }
+    uses.sort_unstable();
+    let mut parents: Vec<u32> = (0..copies.len() as u32).collect();
+    for around in uses.chunk_by(|a, b| a.0 == b.0) {
+        around.iter().for_each(|(_, i, _)| {
+            crate::util::union_find::unite(&mut parents, around[0].1, *i);
+        });
+    }
+    // By set of copies that hang together: by how much more often its edges are used one way than the other without it, against now.
+    let mut worse = vec![0i64; copies.len()];
+    for around in uses.chunk_by(|a, b| a.0 == b.0) {
+        let now: i64 = edges.get(around[0].0 as usize).uses.iter().map(|u| if u.forward { 1 } else { -1 }).sum();
+        let without = now - around.iter().map(|(_, _, way)| way).sum::<i64>();
+        worse[crate::util::union_find::find(&mut parents, around[0].1) as usize] += without.abs() - now.abs();
+    }
+    (0..)
+        .zip(copies)
+        .filter(|(i, _)| worse[crate::util::union_find::find(&mut parents, *i) as usize] <= 0)
+        .map(|(_, t)| *t)
+        .collect()
+}
+
+fn sort_out(shop: &Shop, edges: &Edges, pairs: &mut [Pair]) -> Vec<u32> {
+    let mut pair_of = vec![crate::util::union_find::NONE; shop.triangles.len()];
+    for (i, pair) in pairs.iter().enumerate() {
+        pair.forward.iter().chain(&pair.backward).for_each(|t| pair_of[*t as usize] = i as u32);
+    }
+    let mut parents: Vec<u32> = (0..pairs.len() as u32).collect();
+    let mut places = vec![Place::Alone; pairs.len()];
+    for i in 0..pairs.len() {
+        let v = shop.triangles[pairs[i].forward[0] as usize].v;
+        for k in 0..3 {
+            let (a, b) = (v[k], v[(k + 1) % 3]);
+            let Some(edge) = edges.between(a, b) else { continue };
+            let (mut along, mut against) = (0i64, 0i64);
+            for used in edge.uses {
+                match pair_of[used.triangle as usize] {
+                    crate::util::union_find::NONE if edge.directed(used) == (a, b) => along += 1,
+                    crate::util::union_find::NONE => against += 1,
+                    other if other != i as u32 => {
+                        places[i] = places[i].max(Place::TwoSided);
+                        crate::util::union_find::unite(&mut parents, i as u32, other);
+                    }
+                    _ => {}
+                }
+            }
+            pairs[i].votes += against - along;
+            if along != against {
+                places[i] = Place::Needed;
+            } else if along > 0 {
+                places[i] = places[i].max(Place::Wall);
+            }
+        }
+    }
+    let roots: Vec<usize> = (0..pairs.len() as u32).map(|i| crate::util::union_find::find(&mut parents, i) as usize).collect();
+    for i in 0..pairs.len() {
+        places[roots[i]] = places[roots[i]].max(places[i]);
+    }
+    pairs.iter().enumerate().flat_map(|(i, pair)| surplus_of(pair, places[roots[i]])).collect()
+}
+
+/// What has to go of a pair in a set of this place.
+fn surplus_of(pair: &Pair, place: Place) -> Vec<u32> {
+    let all = || pair.forward.iter().chain(&pair.backward).copied();
+    let stays = match place {
+        Place::Alone | Place::Wall => None,
+        Place::TwoSided => all().min(),
+        Place::Needed if pair.votes > 0 => Some(pair.forward[0]),
+        Place::Needed if pair.votes < 0 => Some(pair.backward[0]),
+        Place::Needed => all().min(),
+    };
+    all().filter(|t| Some(*t) != stays).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{after, cube, cuboid, reversed};
+
+    #[test]
+    fn of_a_reversed_copy_the_one_that_fits_stays() {
+        // The wrong one comes first: the order in the file does not decide.
+        let doubled = [reversed(&cube()[..1]), cube()].concat();
+        let got = after(&doubled, |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
+        assert_eq!((got.result, got.untouched), (1, 12));
+        assert!(got.verdict.good, "{:?}", got.verdict);
+    }
+
+    #[test]
+    fn a_wall_of_no_thickness_inside_a_body_goes() {
+        // Two cubes that touch: both have the face between them, in opposite directions.
+        let cubes = [cube(), cuboid([1.0, 0.0, 0.0], [2.0, 1.0, 1.0])].concat();
+        let got = after(&cubes, |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
+        assert_eq!(got.result, 4);
+        assert!(got.verdict.good && (got.defects.volume - 2.0).abs() < 1e-9, "{:?}", got.defects);
+    }
+
+    #[test]
+    fn of_a_surface_with_both_sides_one_stays() {
+        let both = [cube(), reversed(&cube())].concat();
+        let got = after(&both, |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
+        assert_eq!(got.result, 12);
+        assert!(got.verdict.good, "{:?}", got.verdict);
+    }
+
+    #[test]
+    fn two_triangles_on_their_own_enclose_nothing() {
+        let alone = [&cube()[..1], &reversed(&cube()[..1])].concat();
+        let got = after(&alone, |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
+        assert_eq!((got.result, got.defects.triangles), (2, 0));
+    }
+
+    #[test]
+    fn what_two_bodies_have_in_common_stays_with_both() {
+        // Two boxes with the same bottom, one of them higher.
+        let both = [cube(), cuboid([0.0; 3], [1.0, 1.0, 2.0])].concat();
+        let got = after(&both, |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
+        assert_eq!((got.result, got.defects.boundary_edges, got.defects.unbalanced_edges), (0, 0, 0));
+        // A triangle that stands there twice stays once.
+        let got = after(&[&both[..], &both[2..3]].concat(), |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
+        assert_eq!((got.result, got.defects.unbalanced_edges), (1, 0));
+    }
+
+    #[test]
+    fn of_equal_copies_the_first_stays() {
+        let twice = [cube(), cube()].concat();
+        let got = after(&twice, |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
+        assert_eq!((got.result, got.untouched), (12, 12));
+        assert!(got.verdict.good);
+    }
+}

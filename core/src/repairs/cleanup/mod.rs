@@ -1,0 +1,7 @@
+//! What is no surface goes: repeated and copied triangles, triangles without area, debris, sheets.
+
+pub(crate) mod debris;
+pub(crate) mod degenerate;
+pub(crate) mod duplicates;
+pub(crate) mod sheets;
+pub(crate) mod surplus;

@@ -1,0 +1,194 @@
+//! Lone sheets beside bodies: open surface that bounds nothing and can be no part of a solid.
+//!
+//! A sheet whose rim was not closed, since it would enclose next to nothing ([`crate::repairs::shared::admission`]), keeps a file from being a solid whatever else is
+//! in it. One that runs into a body or another sheet could not even be closed: it goes as a whole. (The part of it outside of a body may have
+//! been meant for a wall: the report names each with its box and area, and a person is asked to look at more than a small share of the
+//! model.) One that crosses nothing may be a wall that only was not joined: if it is more than next to nothing, it goes only where whatever is no
+//! solid is replaced by one ([`Guarantee::Wrap`]), and a person is asked to look.
+//!
+//! A file that holds no body, or in which the sheets have more area than the bodies, keeps them: they are what it is about.
+
+use crate::contract::report::{LoopLeft, SheetDropped};
+use crate::contract::settings::{Guarantee, Profile, Sheets};
+use crate::repairs::shared::account::RepairName;
+use crate::repairs::shared::context::SheetRim;
+use crate::repairs::shared::context::{Changes, Done, Repair};
+use crate::repairs::shared::work::Work;
+use crate::submesh::components::{Components, Reversed, Through};
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
+
+/// Open sheets that can be no part of a solid.
+pub(crate) const REPAIR: Repair = Repair {
+    name: RepairName::Sheets,
+    changes: Changes::Surface,
+    run: |cx| {
+        let rims = std::mem::take(&mut cx.handed.sheets);
+        let dropped = drop(cx.survey, &mut cx.work, &mut cx.reversed, &rims, &mut cx.account.loops_left, cx.profile);
+        let count = dropped.len() as u64;
+        cx.account.sheets.extend(dropped);
+        Ok(Done::count(count, "open sheets dropped that can be no part of a solid, listed in `sheets_dropped`"))
+    },
+};
+
+/// Sheets in the report, at most: the largest.
+const LISTED: usize = 1000;
+
+/// Drops lone sheets, whose `rims` were left open, and takes their loops off the list of those that are `left`; returns what went, the largest
+/// first. O(patches + workshop), and a look at the chunks where such a sheet crosses something.
+pub(crate) fn drop(
+    survey: &Survey<'_>,
+    work: &mut Work<'_>,
+    reversed: &mut Reversed,
+    rims: &[SheetRim],
+    left: &mut Vec<LoopLeft>,
+    profile: &Profile,
+) -> Vec<SheetDropped> {
+    if rims.is_empty() || profile.sheets == Sheets::Keep {
+        return Vec::new();
+    }
+    let (shop, edges) = work.edges();
+    let components = Components::of(survey, shop, edges, reversed, Through::EveryEdge);
+    // Nothing else of a lone sheet is open than the rims of sheets.
+    let mut open_edges = vec![0usize; components.list.len()];
+    for edge in edges.iter().filter(|e| e.is_boundary()) {
+        open_edges[components.of_triangle[edge.uses[0].triangle as usize] as usize] += 1;
+    }
+    let mut rim_edges = vec![0usize; open_edges.len()];
+    for rim in rims {
+        rim_edges[components.of_triangle[rim.triangle as usize] as usize] += rim.edges;
+    }
+    let is_sheet = |c: usize| rim_edges[c] > 0 && rim_edges[c] == open_edges[c];
+    let area = |of: &dyn Fn(usize) -> bool| -> i128 {
+        components.list.iter().enumerate().filter(|(c, _)| of(*c)).map(|(_, component)| component.extent.area).sum()
+    };
+    let encloses = |c: usize| !components.list[c].open && components.list[c].extent.volume != 0;
+    let of_sheets = area(&is_sheet);
+    if of_sheets == 0 || of_sheets > area(&encloses) {
+        return Vec::new();
+    }
+    let pairs = survey.crossing_pairs.as_deref().unwrap_or_default();
+    let crossing = crate::repairs::shared::pieces::crossing(survey, shop, &components, pairs.iter().map(|pair| pair.triangles));
+    let next_to_nothing = profile.debris_area_share * area(&|_| true) as f64;
+    let are_specks = area(&|c| is_sheet(c) && !crossing[c]) as f64 <= next_to_nothing;
+    let all_go = are_specks || profile.guarantee == Guarantee::Wrap;
+    let goes = |c: u32| c != NONE && is_sheet(c as usize) && (crossing[c as usize] || all_go);
+    let mut gone: Vec<(i128, SheetDropped)> = (0..components.list.len() as u32)
+        .filter(|c| goes(*c))
+        .map(|c| {
+            let (sheet, crosses) = (&components.list[c as usize], crossing[c as usize]);
+            let bounds = sheet.bounds.normalised();
+            let (bounds, area) = ([bounds.lo, bounds.hi], survey.measure.area(sheet.extent));
+            (sheet.extent.area, SheetDropped { bounds, area, triangles: sheet.triangles, crosses, hidden: false })
+        })
+        .collect();
+    // Stable: of equal ones the first in the file.
+    gone.sort_by_key(|(area, _)| std::cmp::Reverse(*area));
+    let closed: Vec<usize> =
+        rims.iter().filter(|rim| goes(components.of_triangle[rim.triangle as usize])).filter_map(|rim| rim.listed).collect();
+    let mut number = 0..;
+    left.retain(|_| number.next().is_none_or(|i| closed.binary_search(&i).is_err()));
+    reversed.dropped.iter_mut().zip(&components.of_patch).for_each(|(dropped, c)| *dropped |= goes(*c));
+    let doomed: Vec<u32> = shop.living().filter(|t| goes(components.of_triangle[*t as usize])).collect();
+    doomed.into_iter().for_each(|t| work.kill(t));
+    gone.into_iter().take(LISTED).map(|(_, sheet)| sheet).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::repairs::holes::fill;
+    use crate::testing::{After, Corners, after, cuboid, plate, reversed, shifted};
+
+    fn dropped(mesh: &[Corners], profile: &Profile) -> After<(Vec<SheetDropped>, usize)> {
+        after(mesh, |d, turned| {
+            let work = &mut Work::new(&mut d.shop);
+            let mut closed = fill::fill_loops(&d.survey, work, turned, &d.tolerance, profile, 1);
+            let gone = drop(&d.survey, work, turned, &closed.sheets, &mut closed.left, profile);
+            (gone, closed.left.len())
+        })
+    }
+
+    fn body() -> Vec<Corners> {
+        cuboid([0.25, 0.25, -4.0], [8.25, 8.25, 4.5])
+    }
+
+    /// A sheet of side 4, half of it in the body.
+    fn entering() -> Vec<Corners> {
+        shifted(&plate(4, |_, _| true), [-2.0, 2.0, 0.0])
+    }
+
+    #[test]
+    fn a_sheet_that_enters_a_body_goes_and_is_named() {
+        let mesh = [body(), entering()].concat();
+        let got = dropped(&mesh, &Profile::default());
+        let sheet =
+            SheetDropped { bounds: [[-2.0, 2.0, 0.0], [2.0, 6.0, 0.0]], area: 16.0, triangles: 32, crosses: true, hidden: false };
+        let (gone, left) = got.result;
+        assert_eq!((gone, left, got.untouched), (vec![sheet], 0, 12));
+        assert!(got.verdict.good, "{:?}", got.verdict);
+        let kept = dropped(&mesh, &Profile { sheets: Sheets::Keep, ..Profile::default() });
+        assert_eq!((kept.result.0.len(), kept.result.1, kept.untouched), (0, 1, 44));
+    }
+
+    #[test]
+    fn sheets_that_cross_each_other_go_and_one_that_crosses_nothing_where_all_is_to_be_a_solid() {
+        let upright = plate(4, |_, _| true).into_iter().map(|t| t.map(|[x, y, _]| [x + 10.3, 1.5, y - 1.7]));
+        let upright = [shifted(&plate(4, |_, _| true), [10.0, 0.0, 0.0]), upright.collect()].concat();
+        let got = dropped(&[body(), upright].concat(), &Profile::default());
+        assert_eq!((got.result.0.len(), got.untouched), (2, 12));
+        let beside = shifted(&entering(), [-4.0, 0.0, 0.0]);
+        let strict = Profile { guarantee: Guarantee::Strict, ..Profile::default() };
+        assert_eq!(dropped(&[body(), beside.clone()].concat(), &strict).result.0, []);
+        let got = dropped(&[body(), beside.clone()].concat(), &Profile::default());
+        assert!(!got.result.0[0].crosses && got.result.1 == 0 && got.verdict.good, "{:?}", got.verdict);
+        // Next to nothing: below a thousandth of the area.
+        let speck: Vec<Corners> = beside.iter().map(|t| t.map(|p| p.map(|x| x / 16.0))).collect();
+        let got = dropped(&[body(), shifted(&speck, [-4.0, 0.0, 0.0])].concat(), &strict);
+        assert!(got.result.0.len() == 1 && got.verdict.good, "{:?}", got.verdict);
+    }
+
+    #[test]
+    fn a_file_of_sheets_and_an_open_vessel_lose_nothing() {
+        let upright = plate(4, |_, _| true).into_iter().map(|t| t.map(|[x, y, _]| [x, 1.5, y - 1.7]));
+        let sheets = [plate(4, |_, _| true), upright.collect()].concat();
+        assert_eq!(dropped(&sheets, &Profile::default()).result.0, [], "there is no body");
+        let speck = cuboid([20.0; 3], [21.0; 3]);
+        assert_eq!(dropped(&[sheets, speck].concat(), &Profile::default()).result.0, [], "the sheets are what the file is about");
+        // A tray without its top, in which a body stands that runs into its floor.
+        let mut tray = reversed(&cuboid([0.0; 3], [8.0, 8.0, 4.0]));
+        tray.drain(2..4);
+        let got = dropped(&[tray, cuboid([3.0, 3.0, -1.0], [5.0, 5.0, 2.0])].concat(), &Profile::default());
+        assert_eq!(got.result.0, []);
+    }
+
+    /// Found by random soups: a rim and that of an island in it are closed together, but stay open since they enclose next to nothing, so that
+    /// what joined them goes, which the rim was named by.
+    #[test]
+    fn a_rim_that_was_joined_to_an_island_is_named_by_a_triangle_that_is_there() {
+        let mesh = [
+            [[0.0, 0.0, 0.0], [4.0, 1.0, 5.0], [0.0, 5.0, 5.0]],
+            [[2.0, 3.0, 3.0], [4.0, 3.0, 3.0], [0.0, 0.0, 1.0]],
+            [[0.0, 0.0, 5.0], [0.0, 1.0, 4.0], [5.0, 1.0, 4.0]],
+            [[4.0, 1.0, 5.0], [3.0, 3.0, 2.0], [0.0, 1.0, 0.0]],
+            [[0.0, 0.0, 5.0], [5.0, 1.0, 1.0], [0.0, 0.0, 2.0]],
+            [[0.0, 0.0, 1.0], [0.0, 5.0, 0.0], [2.0, 0.0, 4.0]],
+            [[5.0, 1.0, 4.0], [2.0, 2.0, 0.0], [0.0, 5.0, 0.0]],
+            [[0.0, 0.0, 3.0], [2.0, 0.0, 4.0], [2.0, 0.0, 2.0]],
+            [[2.0, 1.0, 3.0], [2.0, 2.0, 2.0], [1.0, 0.0, 1.0]],
+            [[0.0, 2.0, 0.0], [0.0, 0.0, 0.0], [0.0, 2.0, 3.0]],
+            [[0.0, 5.0, 5.0], [0.0, 1.0, 1.0], [2.0, 1.0, 3.0]],
+            [[0.0, 0.0, 0.0], [5.0, 1.0, 1.0], [1.0, 3.0, 2.0]],
+            [[0.0, 0.0, 2.0], [1.0, 3.0, 2.0], [2.0, 3.0, 3.0]],
+            [[0.0, 2.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 5.0]],
+            [[0.0, 0.0, 5.0], [4.0, 3.0, 3.0], [2.0, 2.0, 1.0]],
+        ];
+        let lives = after(&mesh, |d, turned| {
+            let work = &mut Work::new(&mut d.shop);
+            let closed = fill::fill_loops(&d.survey, work, turned, &d.tolerance, &Profile::default(), 1);
+            let lives: Vec<bool> = closed.sheets.iter().map(|rim| work.lives(rim.triangle)).collect();
+            lives
+        });
+        assert!(!lives.result.is_empty() && lives.result.iter().all(|lives| *lives));
+    }
+}

@@ -1,0 +1,223 @@
+//! Surplus surface at non-manifold edges.
+//!
+//! The surface is cut at its non-manifold edges into sheets. A sheet is surplus when the rest is balanced at all its non-manifold
+//! edges without it: a fin that hangs from a sound surface by one side, or a wall across a body. One that goes on at one of them, using it by
+//! twos, or that has a hole but encloses more than next to nothing, is no such thing, but a body that touches others there. Smallest area goes first, and the
+//! rest is judged anew. Where as many triangles run one way as the other (bodies that touch along an edge) nothing is surplus.
+
+use crate::repairs::shared::account::RepairName;
+use crate::repairs::shared::context::{Changes, Done, Repair};
+use glam::DVec3;
+
+use crate::repairs::shared::admission;
+use crate::repairs::shared::work::Work;
+use crate::submesh::components::{Components, Reversed, Through};
+use crate::submesh::edges::Edges;
+use crate::submesh::{Shop, Vertex};
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
+
+/// Sheets that are no part of a surface.
+pub(crate) const REPAIR: Repair = Repair {
+    name: RepairName::Surplus,
+    changes: Changes::Surface,
+    run: |cx| {
+        let removed = remove(cx.survey, &mut cx.work);
+        Ok(Done::count(removed, "triangles of sheets that hang from a closed surface or cross a body"))
+    },
+};
+
+/// Fetches the stars that the removal of surplus surface may need. Duplicates are gone by then: they make non-manifold edges of no
+/// interest.
+pub(crate) fn complete_at_seams(survey: &mut Survey<'_>, work: &mut Work<'_>) {
+    let (shop, edges) = work.edges();
+    let wanted = wanted_stars(survey, shop, edges);
+    if !wanted.is_empty() {
+        let positions: Vec<[f32; 3]> = wanted.iter().map(|v| shop.positions[*v as usize]).collect();
+        let new = survey.promote(&positions);
+        work.extend(survey, &new, &wanted);
+    }
+}
+
+/// A sheet that ends at non-manifold edges.
+struct Sheet {
+    /// Twice its area, in the survey's units.
+    area: i128,
+    triangles: Vec<u32>,
+    /// Its non-manifold edges, each as often as it is used and in which direction.
+    seams: Vec<(u32, bool)>,
+    /// Ends of its boundary edges, added up, and how many.
+    rim: (DVec3, f64),
+    /// It reaches beyond what the workshop may change.
+    anchored: bool,
+}
+
+/// Removes surplus sheets; returns how many triangles.
+pub(crate) fn remove(survey: &Survey<'_>, work: &mut Work<'_>) -> u64 {
+    let (shop, edges) = work.edges();
+    if !edges.any_nonmanifold() {
+        return 0;
+    }
+    let mut sheets = sheets(survey, shop, edges);
+    let mut order: Vec<usize> = (0..sheets.len()).filter(|s| !sheets[*s].anchored && !sheets[*s].seams.is_empty()).collect();
+    order.sort_by_key(|s| (sheets[*s].area, sheets[*s].triangles.first().copied()));
+    // Uses of each edge that are left, in either direction.
+    let mut uses: Vec<[u32; 2]> = edges
+        .iter()
+        .map(|e| {
+            let forward = e.uses.iter().filter(|u| u.forward).count() as u32;
+            [forward, e.uses.len() as u32 - forward]
+        })
+        .collect();
+    let mut removed = 0;
+    for s in order {
+        let sheet = &mut sheets[s];
+        sheet.seams.sort_unstable();
+        let free = sheet.rim.1 > 0.0;
+        if is_surplus(free, &uses, &sheet.seams) && !(free && encloses(work, survey.measure.area_of(sheet.area), sheet)) {
+            sheet.seams.iter().for_each(|(e, forward)| uses[*e as usize][usize::from(!forward)] -= 1);
+            sheet.triangles.iter().for_each(|t| work.kill(*t));
+            removed += sheet.triangles.len() as u64;
+        }
+    }
+    removed
+}
+
+/// Is the surface closed at all the sheet's seams without it, and is something wrong with it there? `own`: its uses of them, sorted.
+fn is_surplus(free: bool, uses: &[[u32; 2]], own: &[(u32, bool)]) -> bool {
+    let mut wrong = free;
+    for seam in own.chunk_by(|a, b| a.0 == b.0) {
+        let [forward, backward] = uses[seam[0].0 as usize];
+        let own_forward = seam.iter().filter(|s| s.1).count() as u32;
+        let (left_forward, left_backward) = (forward - own_forward, backward - (seam.len() as u32 - own_forward));
+        if left_forward != left_backward || left_forward == 0 || seam.len() % 2 == 0 {
+            return false;
+        }
+        wrong |= forward != backward;
+    }
+    wrong
+}
+
+/// Would the sheet enclose more than next to nothing, if its hole were closed to its middle? By the same measure as for rims ([`admission::THIN`]).
+fn encloses(shop: &Shop, area: f64, sheet: &Sheet) -> bool {
+    let middle = sheet.rim.0 / sheet.rim.1;
+    let cones = sheet.triangles.iter().map(|t| {
+        let [a, b, c] = shop.triangles[*t as usize].v.map(|v| shop.place(v) - middle);
+        a.dot(b.cross(c)) / 6.0
+    });
+    cones.sum::<f64>().abs() > admission::THIN * (area / 2.0).powf(1.5)
+}
+
+fn sheets(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> Vec<Sheet> {
+    let parts = Components::of(survey, shop, edges, &Reversed::none(survey), Through::ManifoldEdges);
+    let mut sheets: Vec<Sheet> = parts
+        .list
+        .iter()
+        .map(|c| Sheet {
+            area: c.extent.area,
+            triangles: Vec::new(),
+            seams: Vec::new(),
+            rim: (DVec3::ZERO, 0.0),
+            anchored: false,
+        })
+        .collect();
+    for (p, component) in parts.of_patch.iter().enumerate() {
+        sheets[*component as usize].anchored |= survey.patches[p].triangles > 0;
+    }
+    for t in shop.living() {
+        let component = parts.of_triangle[t as usize];
+        if component != NONE {
+            let sheet = &mut sheets[component as usize];
+            sheet.triangles.push(t);
+            // Beyond an incomplete vertex the surface goes on outside the workshop.
+            sheet.anchored |= shop.triangles[t as usize].v.iter().filter(|v| !shop.complete[**v as usize]).count() > 1;
+        }
+    }
+    for (edge, number) in edges.iter().zip(0..).filter(|(e, _)| e.is_nonmanifold()) {
+        for used in edge.uses {
+            sheets[parts.of_triangle[used.triangle as usize] as usize].seams.push((number, used.forward));
+        }
+    }
+    for edge in edges.iter().filter(|e| e.is_boundary()) {
+        let rim = &mut sheets[parts.of_triangle[edge.uses[0].triangle as usize] as usize].rim;
+        rim.0 += shop.place(edge.low) + shop.place(edge.high);
+        rim.1 += 2.0;
+    }
+    sheets
+}
+
+/// Incomplete vertices of sheets that might be removed: their stars are needed before. A sheet that goes on into sound surface stays.
+pub(crate) fn wanted_stars(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> Vec<Vertex> {
+    if !edges.any_nonmanifold() {
+        return Vec::new();
+    }
+    let sheets = Components::of(survey, shop, edges, &Reversed::none(survey), Through::ManifoldEdges);
+    let mut goes_on = vec![false; sheets.list.len()];
+    for (p, component) in sheets.of_patch.iter().enumerate() {
+        goes_on[*component as usize] |= survey.patches[p].triangles > 0;
+    }
+    let mut wanted: Vec<Vertex> = edges
+        .iter()
+        .filter(|e| e.is_nonmanifold())
+        .flat_map(|e| e.uses)
+        .filter(|u| !goes_on[sheets.of_triangle[u.triangle as usize] as usize])
+        .flat_map(|u| shop.triangles[u.triangle as usize].v)
+        .filter(|v| !shop.complete[*v as usize])
+        .collect();
+    wanted.sort_unstable();
+    wanted.dedup();
+    wanted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Work;
+    use super::complete_at_seams;
+    use crate::testing::{After, Corners, after, cube, cuboid, reversed, shifted};
+
+    fn removed(triangles: &[Corners]) -> After<u64> {
+        after(triangles, |d, _| {
+            let work = &mut Work::new(&mut d.shop);
+            complete_at_seams(&mut d.survey, work);
+            super::remove(&d.survey, work)
+        })
+    }
+
+    #[test]
+    fn a_fin_on_a_cube_goes() {
+        let mut mesh = cube();
+        mesh.insert(0, [[0.0; 3], [1.0, 0.0, 0.0], [0.5, -1.0, -1.0]]);
+        let got = removed(&mesh);
+        assert_eq!(got.result, 1);
+        assert!(got.verdict.good, "{:?}", got.verdict);
+    }
+
+    #[test]
+    fn a_cube_between_two_others_stays_whatever_is_wrong_with_it() {
+        let cubes: Vec<Corners> = (0..3).flat_map(|k| shifted(&cube(), [k as f32, k as f32, 0.0])).collect();
+        for t in 12..24 {
+            let mut turned = cubes.clone();
+            turned[t] = reversed(&turned[t..=t])[0];
+            assert_eq!(removed(&turned).result, 0, "turned: {t}");
+            let mut open = cubes.clone();
+            open.remove(t);
+            assert_eq!(removed(&open).result, 0, "without {t}");
+        }
+    }
+
+    #[test]
+    fn two_cubes_that_share_an_edge_stay() {
+        // As many triangles run one way as the other: either could be kept, so neither goes.
+        let got = removed(&[cube(), cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 1.0])].concat());
+        assert_eq!((got.result, got.untouched), (0, 24));
+    }
+
+    #[test]
+    fn a_wall_across_a_box_goes() {
+        // The two halves of the box would be closed with the wall, too, but only one of them the right way round.
+        let (left, right) = (cube(), cuboid([1.0, 0.0, 0.0], [2.0, 1.0, 1.0]));
+        let got = removed(&[&left[..], &right[..8], &right[10..]].concat());
+        assert_eq!(got.result, 2);
+        assert!(got.verdict.good && (got.defects.volume - 2.0).abs() < 1e-9, "{:?}", got.verdict);
+    }
+}

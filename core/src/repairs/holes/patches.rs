@@ -1,0 +1,79 @@
+//! Patches that are in the workshop, and loops as they see them.
+
+use crate::algorithms::triangulate::{self};
+use crate::detect::holes::loops::Loop;
+use crate::repairs::shared::collisions::Obstacle;
+use crate::repairs::shared::work::Work;
+use crate::submesh::{Origin, Shop, Vertex};
+use crate::util::union_find::NONE;
+
+/// A patch that is in the workshop.
+#[derive(Debug)]
+pub(crate) struct Placed {
+    /// The loops it closes, by number.
+    pub(crate) rims: Vec<u32>,
+    pub(crate) method: &'static str,
+    /// Its triangles are consecutive.
+    pub(crate) first: u32,
+    pub(crate) count: u32,
+    /// Of a patch that was shaped: the triangles that it was shaped from.
+    pub(crate) coarse: Vec<[Vertex; 3]>,
+    /// What it came to grief on.
+    pub(crate) obstacles: Vec<Obstacle>,
+    /// Nothing else was found than a patch that crosses bodies which run into this one already.
+    pub(crate) across: bool,
+    /// It may cross anything, and is to be cut along that.
+    pub(crate) to_be_cut: bool,
+    /// A patch that does, with its method, while others are tried.
+    pub(crate) spare: Option<(&'static str, Vec<[Vertex; 3]>)>,
+}
+
+impl Placed {
+    pub(crate) fn triangles(&self) -> impl Iterator<Item = u32> + use<> {
+        self.first..self.first + self.count
+    }
+
+    pub(crate) fn holds(&self, t: u32) -> bool {
+        (self.first..self.first + self.count).contains(&t)
+    }
+
+    pub(crate) fn put_in(work: &mut Work<'_>, rims: Vec<u32>, triangles: &[[Vertex; 3]], method: &'static str) -> Self {
+        let mut placed = Self {
+            rims,
+            method,
+            first: 0,
+            count: 0,
+            coarse: Vec::new(),
+            obstacles: Vec::new(),
+            across: false,
+            to_be_cut: false,
+            spare: None,
+        };
+        placed.replace(work, triangles);
+        placed
+    }
+
+    /// Puts these triangles in, in place of those that were.
+    pub(crate) fn replace(&mut self, work: &mut Work<'_>, triangles: &[[Vertex; 3]]) {
+        self.triangles().for_each(|t| work.kill(t));
+        (self.first, self.count) = (work.triangles.len() as u32, triangles.len() as u32);
+        triangles.iter().for_each(|v| {
+            work.add(*v, Origin::Patch, NONE);
+        });
+    }
+}
+
+/// The triangles of a patch by the vertices of the workshop.
+pub(crate) fn of_workshop(rim: &Loop, patch: &triangulate::Patch) -> Vec<[Vertex; 3]> {
+    patch.triangles.iter().map(|t| t.map(|i| rim.vertices[i as usize])).collect()
+}
+
+/// The vertices of some loops, one loop after the other.
+pub(crate) fn concatenated(group: &[&Loop]) -> Vec<Vertex> {
+    group.iter().flat_map(|rim| rim.vertices.iter().copied()).collect()
+}
+
+/// Is there an edge between two vertices of loops?
+pub(crate) fn are_joined(shop: &Shop, a: Vertex, b: Vertex) -> bool {
+    if shop.complete[a as usize] { shop.has_edge(a, b) } else { shop.has_edge(b, a) }
+}

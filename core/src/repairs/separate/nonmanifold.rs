@@ -1,0 +1,596 @@
+//! Surfaces that share an edge or a vertex, taken apart: what is read again is welded by position, so that each needs positions of its own.
+//!
+//! The triangles of an edge are paired by wedges of material ([`Wedges`]), so that the star of a vertex falls into fans, each the skin of one
+//! surface there. All fans of a vertex but one get a copy of it, as near as single precision and validity allow, first into their own material:
+//! along a chain of edges that two bodies share, one of them draws back. Where the two wedges of an edge have the same fans at both of its
+//! ends (a bridge that narrows to an edge and widens again), one of them gets a vertex in the middle of the edge, which draws back alone.
+//!
+//! A copy goes no farther than a share of the shortest edge at it; only where there is no place so near, as at the slivers that cutting in single
+//! precision leaves, may it go farther than these are wide. Its place is valid if none of its triangles loses its area or comes to meet another
+//! one more than before, touching included. That is tested exactly, for the triangles around while places are tried, and for everything else
+//! once all copies have theirs; those that meet anything are tried anew from their next place on. Vertices with an edge that is open, incoherent
+//! or lies between triangles in one direction, and those whose fans cross each other, are left alone.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::fmt;
+
+use glam::DVec3;
+
+use crate::contract::report::{Region, Rung};
+use crate::contract::settings::Profile;
+use crate::geometry::exact::{Point, at};
+use crate::geometry::position::{self, Position};
+use crate::geometry::sums::{Bounds, step_at};
+use crate::geometry::tri_tri::{Contact, Triangle as Corners, triangles_cross};
+use crate::repairs::shared::overlay::Overlay;
+use crate::repairs::shared::regions::Unsettled;
+use crate::repairs::shared::work::Work;
+use crate::submesh::components::{Reversed, nonmanifold_vertices};
+use crate::submesh::edges::Edge;
+use crate::submesh::wedges::{Half, Wedges};
+use crate::submesh::{Shop, Triangle, Vertex};
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
+
+/// A copy moves by no more than this share of the shortest edge at it, if there is a place for it then, so that no triangle comes near to turning
+/// over.
+const EDGE_SHARE: f64 = 0.125;
+
+/// A copy may always move by so many steps of the largest coordinate there, however small the profile's bound: what is far from the origin has
+/// no finer ones.
+const LEAST_STEPS: f64 = 4.0;
+
+/// Where there is no place so near, a copy may move by so many steps however short the edges are, if the profile lets it: cutting in single
+/// precision leaves edges of a single step.
+const FREE_STEPS: f64 = 64.0;
+
+/// Then finer steps are tried, too, since smaller coordinates have them: down to this share of a step of the largest.
+const FINEST: f64 = 1.0 / 64.0;
+
+/// How often copies that meet something are tried from their next place on, and then how often such are given up.
+const TRIED: usize = 4;
+const GIVEN_UP: usize = 10;
+
+/// Rounds of opening edges: a triangle with several such edges is divided at one of them in each.
+const OPENINGS: usize = 8;
+
+/// Pairs of triangles that are compared for one copy, at all places that are tried for it together, or around one vertex. Where it takes more,
+/// the vertex is left alone.
+const MOST_PAIRS: usize = 1 << 20;
+
+/// What was taken apart.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Separated {
+    /// Fans that got a copy of their vertex.
+    pub(crate) vertices: u64,
+    /// Edges that got a vertex in their middle, for one wedge of theirs.
+    pub(crate) edges: u64,
+    /// Fans that were closed without their vertex ([`crate::repairs::separate::pinch_vertices`]).
+    pub(crate) removed: u64,
+    /// Vertices that still have several fans, or an edge of more than two triangles.
+    pub(crate) left: u64,
+    /// How far a copy is from where it was made, or a surface from where its vertex was.
+    pub(crate) farthest: f64,
+    /// Where: copies that share triangles are in one.
+    pub(crate) regions: Vec<Region>,
+    /// And where surfaces still meet: each vertex for itself.
+    pub(crate) regions_left: Vec<Unsettled>,
+}
+
+impl Separated {
+    /// Some fans were closed without their vertex.
+    pub(crate) fn closed(&mut self, work: &mut Work<'_>, mut regions: Vec<Region>) {
+        self.removed += regions.len() as u64;
+        self.farthest = regions.iter().fold(self.farthest, |farthest, region| farthest.max(region.moved));
+        self.regions.append(&mut regions);
+        let (shop, edges) = work.edges();
+        *self = std::mem::take(self).but(shop, &nonmanifold_vertices(shop, edges));
+    }
+
+    /// At these vertices surfaces still meet.
+    fn but(self, shop: &Shop, vertices: &[Vertex]) -> Self {
+        let one = |v: &Vertex| {
+            let at = shop.positions[*v as usize];
+            let reason = Some("surfaces that meet there could not be taken apart".into());
+            let region = Region { rung: Rung::Left, bounds: [at; 2], count: 1, rounds: 0, moved: 0.0, reason };
+            Unsettled { region, at }
+        };
+        let regions_left = vertices.iter().map(one).collect();
+        Self { left: vertices.len() as u64, regions_left, ..self }
+    }
+}
+
+impl fmt::Display for Separated {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { vertices, edges, removed, left, farthest, .. } = self;
+        write!(
+            f,
+            "surfaces that met given a vertex of their own: {vertices} at vertices, {edges} on edges, moved by at most {farthest:e}"
+        )?;
+        if *removed > 0 {
+            write!(f, "; closed without it: {removed}")?;
+        }
+        if *left > 0 {
+            write!(f, "; vertices where surfaces still meet: {left}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Takes surfaces apart at all vertices where that is possible. O(workshop) and a look at all boxes around what moves, if anything does.
+pub(crate) fn separate(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reversed, profile: &Profile) -> Separated {
+    let (shop, edges) = work.edges();
+    let vertices = if profile.separate { nonmanifold_vertices(shop, edges) } else { Vec::new() };
+    if vertices.is_empty() {
+        return Separated::default();
+    }
+    let before = Before {
+        triangles: shop.triangles.clone(),
+        taken: shop.positions.iter().copied().map(Position::of).collect(),
+        farthest: profile.max_separation_relative * survey.bounds.diagonal(),
+    };
+    let mut from = BTreeMap::new();
+    for round in 0..TRIED + GIVEN_UP {
+        let mut apart = Apart::new(work, &before, &from);
+        apart.part_vertices(survey, &vertices);
+        apart.open_edges();
+        let Some(blamed) = apart.blamed(survey, reversed) else { break };
+        let copies = std::mem::take(&mut apart.copies);
+        let first = apart.first;
+        if blamed.is_empty() {
+            let (shop, edges) = work.edges();
+            let mut done = Separated::default().but(shop, &nonmanifold_vertices(shop, edges));
+            done.regions = regions(shop, first, &copies);
+            for copy in copies {
+                *if copy.of.is_edge() { &mut done.edges } else { &mut done.vertices } += 1;
+                done.farthest = done.farthest.max(copy.away);
+            }
+            return done;
+        }
+        tracing::debug!(round, copies = blamed.len(), "Copies of vertices meet something.");
+        for copy in blamed {
+            let Copy { of, place, .. } = copies[copy];
+            from.insert(of, if round < TRIED { place + 1 } else { usize::MAX });
+        }
+        work.restore(&before.triangles);
+    }
+    work.restore(&before.triangles);
+    Separated::default().but(work, &vertices)
+}
+
+/// The copies of vertices, `first` the first of them, by what hangs together.
+fn regions(shop: &Shop, first: Vertex, copies: &[Copy]) -> Vec<Region> {
+    let mut parents: Vec<u32> = (0..copies.len() as u32).collect();
+    for copy in 0..copies.len() as u32 {
+        for (t, _) in shop.star(first + copy) {
+            let others = shop.triangles[t as usize].v.into_iter().filter_map(|v| v.checked_sub(first));
+            others.for_each(|other| {
+                crate::util::union_find::unite(&mut parents, copy, other);
+            });
+        }
+    }
+    let mut all: BTreeMap<u32, (Bounds, u64, f64)> = BTreeMap::new();
+    for (copy, Copy { away, .. }) in (0..).zip(copies) {
+        let (bounds, count, moved) =
+            all.entry(crate::util::union_find::find(&mut parents, copy)).or_insert((Bounds::EMPTY, 0, 0.0));
+        bounds.include(&[shop.positions[(first + copy) as usize]]);
+        (*count, *moved) = (*count + 1, away.max(*moved));
+    }
+    let region = |(bounds, count, moved): (Bounds, u64, f64)| {
+        let Bounds { lo, hi } = bounds.normalised();
+        Region { rung: Rung::Separated, bounds: [lo, hi], count, rounds: 0, moved, reason: None }
+    };
+    all.into_values().map(region).collect()
+}
+
+/// The workshop as it was.
+struct Before {
+    triangles: Vec<Triangle>,
+    /// Positions of its vertices.
+    taken: HashSet<Position>,
+    /// How far the profile lets a copy go.
+    farthest: f64,
+}
+
+/// What a copy is made of, by numbers from before, so that they mean the same whatever else is copied: a vertex (twice) with the first triangle of
+/// a fan, or the ends of an edge with the two triangles of a wedge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Of {
+    ends: [Vertex; 2],
+    triangles: [u32; 2],
+}
+
+impl Of {
+    fn is_edge(&self) -> bool {
+        self.ends[0] != self.ends[1]
+    }
+}
+
+/// A new vertex.
+#[derive(Clone, Copy)]
+struct Copy {
+    of: Of,
+    /// Which of the places that were tried it has.
+    place: usize,
+    away: f64,
+}
+
+/// One way of taking everything apart.
+struct Apart<'w, 's, 'b> {
+    work: &'w mut Work<'s>,
+    before: &'b Before,
+    /// The first place to try for a copy, where it is not the first of all.
+    from: &'b BTreeMap<Of, usize>,
+    /// By number of the vertex, less `first`.
+    copies: Vec<Copy>,
+    first: Vertex,
+    /// Positions of the copies.
+    taken: HashSet<Position>,
+    /// For each vertex from before its copies.
+    family: HashMap<Vertex, Vec<Vertex>>,
+    /// For each triangle that was added the one from before of which it is a part.
+    whole: Vec<u32>,
+}
+
+/// A triangle with a copy for a corner, and the triangle from before of which it is a part.
+type Moved = (u32, Corners);
+
+impl<'w, 's, 'b> Apart<'w, 's, 'b> {
+    fn new(work: &'w mut Work<'s>, before: &'b Before, from: &'b BTreeMap<Of, usize>) -> Self {
+        let first = work.positions.len() as Vertex;
+        let (taken, family) = (HashSet::new(), HashMap::new());
+        Self { work, before, from, copies: Vec::new(), first, taken, family, whole: Vec::new() }
+    }
+
+    /// Gives every fan of each of these vertices but one a vertex of its own, if there is a place for it. What stays is the surface that comes first
+    /// in the file, so that along an edge it is the same at both ends.
+    fn part_vertices(&mut self, survey: &Survey<'_>, vertices: &[Vertex]) {
+        let (shop, edges) = self.work.edges();
+        let wedges = Wedges::of(shop, edges);
+        let surfaces = surfaces(survey, shop, &wedges);
+        for v in vertices {
+            let Some(mut fans) = wedges.fans(self.work, *v) else { continue };
+            if self.fans_cross(&fans) {
+                continue;
+            }
+            let rank = |fan: &Vec<Half>| {
+                fan.iter().map(|h| (surfaces[h.triangle as usize], self.work.record(h.triangle), h.triangle)).min()
+            };
+            fans.sort_by_cached_key(rank);
+            let mut there = fans.len();
+            for fan in fans.iter().skip(1).chain(fans.first()) {
+                if there > 1 && self.part(*v, fan) {
+                    there -= 1;
+                }
+            }
+        }
+        self.work.relink();
+    }
+
+    /// Do triangles of different fans cross (or are there too many to tell)? What runs into each other there cannot be parted by moving the vertex;
+    /// what only lies on each other may be.
+    fn fans_cross(&self, fans: &[Vec<Half>]) -> bool {
+        let points = |h: &Half| self.points_before(h.triangle);
+        let meet = |a: &[Half], b: &[Half]| {
+            a.iter().any(|a| b.iter().any(|b| triangles_cross(&points(a), &points(b)) == Contact::Cross))
+        };
+        let all: usize = fans.iter().map(Vec::len).sum();
+        all * all > MOST_PAIRS || (1..fans.len()).any(|i| fans[..i].iter().any(|other| meet(other, &fans[i])))
+    }
+
+    /// Gives a fan of `v` a vertex of its own; `false` if there is no place for it. Star lists stay as they were.
+    fn part(&mut self, v: Vertex, fan: &[Half]) -> bool {
+        let shop: &Shop = self.work;
+        let first = fan.iter().map(|h| h.triangle).min().unwrap_or(NONE);
+        let of = Of { ends: [v; 2], triangles: [first, NONE] };
+        let corners: Vec<Vertex> = fan.iter().flat_map(|h| shop.triangles[h.triangle as usize].v).collect();
+        let own: Vec<u32> = fan.iter().map(|h| h.triangle).collect();
+        let moved = |p: Point| -> Vec<Moved> {
+            let one = |h: &Half| {
+                let mut corners = shop.points(h.triangle);
+                corners[h.corner] = p;
+                (h.triangle, corners)
+            };
+            fan.iter().map(one).collect()
+        };
+        let Some((copy, position)) = self.place(of, shop.place(v), &corners, &own, moved) else { return false };
+        let new = self.add(copy, position);
+        self.family.entry(v).or_default().push(new);
+        fan.iter().for_each(|h| self.work.assign(h.triangle, h.corner, new));
+        true
+    }
+
+    /// Gives every wedge but one of each edge that still has several a vertex of its own in the middle, if there is a place for it.
+    fn open_edges(&mut self) {
+        for _ in 0..OPENINGS {
+            let crowded = self.crowded_edges();
+            let (mut again, made) = (false, self.copies.len());
+            for (ends, wedges) in crowded {
+                // Divided along another edge: its triangles are others now.
+                if wedges.iter().flatten().any(|h| !self.work.lives(h.triangle)) {
+                    again = true;
+                    continue;
+                }
+                let mut there = wedges.len();
+                for wedge in wedges.iter().skip(1).chain(wedges.first()) {
+                    if there > 1 && self.open(ends, wedge) {
+                        there -= 1;
+                    }
+                }
+            }
+            if !again || self.copies.len() == made {
+                return;
+            }
+        }
+    }
+
+    /// The edges of more than two triangles between vertices all of whose fans are closed, with their wedges in the file's order.
+    fn crowded_edges(&mut self) -> Vec<([Vertex; 2], Vec<[Half; 2]>)> {
+        let (shop, edges) = self.work.edges();
+        if !edges.any_nonmanifold() {
+            return Vec::new();
+        }
+        let wedges = Wedges::of(shop, edges);
+        let crowded =
+            edges.iter().filter(|e| e.is_nonmanifold() && [e.low, e.high].iter().all(|v| wedges.fans(shop, *v).is_some()));
+        let in_order = |edge: Edge<'_>| {
+            let forward = edge.uses.iter().filter(|u| u.forward);
+            let mut pairs: Vec<[Half; 2]> = forward
+                .filter_map(|u| {
+                    let half = Half::of(shop, &edge, u);
+                    Some([half, wedges.mate(half)?])
+                })
+                .collect();
+            pairs.sort_by_key(|pair| pair.map(|h| (shop.record(h.triangle), h.triangle)).into_iter().min());
+            ([edge.low, edge.high], pairs)
+        };
+        crowded.map(in_order).collect()
+    }
+
+    /// Divides the two triangles of a wedge at a new vertex; `false` if there is no place for it.
+    fn open(&mut self, ends: [Vertex; 2], wedge: &[Half; 2]) -> bool {
+        let shop: &Shop = self.work;
+        let mut wholes = wedge.map(|h| self.whole(h.triangle));
+        wholes.sort_unstable();
+        let mut from = ends.map(|v| self.original(v));
+        from.sort_unstable();
+        let of = Of { ends: from, triangles: wholes };
+        // The halves of each triangle, as places among its corners, 3 being the new vertex.
+        let parts = |h: &Half| {
+            let [a, b, c] = [0, 1, 2].map(|k| (h.corner + k) % 3);
+            [[a, 3, c], [3, b, c]]
+        };
+        let corners: Vec<Vertex> = wedge.iter().flat_map(|h| shop.triangles[h.triangle as usize].v).collect();
+        let own = wedge.map(|h| h.triangle);
+        let moved = |p: Point| -> Vec<Moved> {
+            let both = |h: &Half| {
+                let [a, b, c] = shop.points(h.triangle);
+                let whole = self.whole(h.triangle);
+                parts(h).map(|part| (whole, part.map(|k| [a, b, c, p][k])))
+            };
+            wedge.iter().flat_map(both).collect()
+        };
+        let middle = (shop.place(ends[0]) + shop.place(ends[1])) / 2.0;
+        let Some((copy, position)) = self.place(of, middle, &corners, &own, moved) else { return false };
+        let new = self.add(copy, position);
+        for h in wedge {
+            let Triangle { v: [a, b, c], origin, patch, .. } = self.work.triangles[h.triangle as usize];
+            let whole = self.whole(h.triangle);
+            self.work.kill(h.triangle);
+            for part in parts(h) {
+                self.work.add(part.map(|k| [a, b, c, new][k]), origin.of_part(), patch);
+                self.whole.push(whole);
+            }
+        }
+        true
+    }
+
+    /// The nearest valid place of a copy that is made at `middle`, of whose triangles these are all `corners`. It takes the place of its `own`
+    /// triangles; `moved`: what comes instead, where the copy has a certain position.
+    fn place(
+        &self,
+        of: Of,
+        middle: DVec3,
+        corners: &[Vertex],
+        own: &[u32],
+        moved: impl Fn(Point) -> Vec<Moved>,
+    ) -> Option<(Copy, Point)> {
+        let shop: &Shop = self.work;
+        let mut corners = corners.to_vec();
+        corners.sort_unstable();
+        corners.dedup();
+        let mut near: Vec<u32> = Vec::new();
+        for v in &corners {
+            let original = self.original(*v);
+            let copies = self.family.get(&original).into_iter().flatten();
+            near.extend(copies.chain([&original]).flat_map(|v| shop.star(*v)).map(|(t, _)| t));
+        }
+        near.sort_unstable();
+        near.dedup();
+        near.retain(|t| !own.contains(t));
+        let most_places = MOST_PAIRS / ((near.len() + own.len()) * own.len());
+        let points = || corners.iter().map(|v| shop.positions[*v as usize]);
+        let largest = points().flatten().map(f32::abs).fold(0.0, f32::max);
+        let step = step_at(largest);
+        let rays: Vec<DVec3> = points().map(|p| at(&p) - middle).filter(|ray| *ray != DVec3::ZERO).collect();
+        let room = EDGE_SHARE * rays.iter().map(|ray| ray.length()).fold(f64::INFINITY, f64::min);
+        let most = self.before.farthest.max(LEAST_STEPS * step);
+        let mut ways = directions(own.iter().map(|t| -shop.normal(*t).normalize_or_zero()));
+        let usual = ways.len();
+        ways.extend(sideways(&rays));
+        let all = &ways;
+        let places = |first: f64, most: f64, ways: usize| {
+            let steps = (0..30).map(move |k| first * f64::from(1_u32 << k)).take_while(move |step| *step <= most);
+            let ways = &all[..ways];
+            steps.flat_map(move |step| ways.iter().map(move |d| Position::nearest(middle + *d * step)))
+        };
+        let near_by = places(step, most.min(room), usual);
+        let farther = places(step * FINEST, most.min(room.max(FREE_STEPS * step)), ways.len());
+        let tried = near_by.chain(farther).enumerate().skip(self.from.get(&of).copied().unwrap_or(0));
+        let mut seen = HashSet::new();
+        for (place, position) in tried.take(most_places) {
+            if !seen.insert(position) || self.before.taken.contains(&position) || self.taken.contains(&position) {
+                continue;
+            }
+            let position = position.coordinates();
+            let (moved, away) = (moved(position), (at(&position) - middle).length());
+            if (away <= room || self.keep_facing(&moved)) && self.accepts(&moved, &near) {
+                return Some((Copy { of, place, away }, position));
+            }
+        }
+        None
+    }
+
+    /// Do triangles that move farther than their edges are long face the way they did, taken together?
+    fn keep_facing(&self, moved: &[Moved]) -> bool {
+        let normal = |[a, b, c]: &Corners| (at(b) - at(a)).cross(at(c) - at(a));
+        moved.iter().map(|(whole, now)| normal(now).dot(normal(&self.points_before(*whole)))).sum::<f64>() > 0.0
+    }
+
+    /// Do these triangles all have an area, and meet neither each other nor those `near` more than before?
+    fn accepts(&self, moved: &[Moved], near: &[u32]) -> bool {
+        let shop: &Shop = self.work;
+        moved.iter().enumerate().all(|(i, one)| {
+            let (_, [a, b, c]) = one;
+            !crate::geometry::collinear::is_collinear(a, b, c)
+                && moved[..i].iter().all(|other| !self.meets(one, other))
+                && near.iter().all(|t| !self.meets(one, &(self.whole(*t), shop.points(*t))))
+        })
+    }
+
+    /// Do two triangles meet more than those from before did of which they are parts? Where these lay on each other they may cross for the time being,
+    /// until all vertices between them have moved.
+    fn meets(&self, a: &Moved, b: &Moved) -> bool {
+        let now = triangles_cross(&a.1, &b.1);
+        if now == Contact::Apart || a.0 == b.0 {
+            return now != Contact::Apart;
+        }
+        let before = triangles_cross(&self.points_before(a.0), &self.points_before(b.0));
+        badness(now) > badness(before) && !before.is_crossing()
+    }
+
+    fn points_before(&self, t: u32) -> Corners {
+        self.before.triangles[t as usize].v.map(|v| self.work.positions[v as usize])
+    }
+
+    fn add(&mut self, copy: Copy, position: Point) -> Vertex {
+        self.copies.push(copy);
+        let position = Position::of(position);
+        self.taken.insert(position);
+        self.work.add_vertex(position)
+    }
+
+    /// The vertex from before of which `v` is a copy; itself in the middle of an edge.
+    fn original(&self, v: Vertex) -> Vertex {
+        match v.checked_sub(self.first).map(|copy| self.copies[copy as usize].of) {
+            Some(of) if !of.is_edge() => of.ends[0],
+            _ => v,
+        }
+    }
+
+    /// The triangle from before of which `t` is a part, or that it is.
+    fn whole(&self, t: u32) -> u32 {
+        t.checked_sub(self.before.triangles.len() as u32).map_or(t, |part| self.whole[part as usize])
+    }
+
+    /// The copies that cannot stay: a triangle of theirs crosses another one that it did not cross before, or another vertex of the file has their
+    /// position. `None` if that is too much work to tell.
+    fn blamed(&self, survey: &Survey<'_>, reversed: &Reversed) -> Option<BTreeSet<usize>> {
+        let mut blamed = BTreeSet::new();
+        if self.copies.is_empty() {
+            return Some(blamed);
+        }
+        let shop: &Shop = self.work;
+        let positions = &shop.positions[self.first as usize..];
+        let copy_at: HashMap<Position, usize> = positions.iter().copied().map(Position::of).zip(0..).collect();
+        for (suspect, _) in survey.beyond_the_workshop(positions) {
+            let corners = position::corners(&survey.records[suspect.triangle as usize]);
+            blamed.extend(corners.iter().filter_map(|p| copy_at.get(&Position::of(*p))));
+        }
+        let overlay = Overlay::of(survey, shop, reversed)?;
+        let copies = |t: u32| shop.triangles[t as usize].v.into_iter().filter_map(|v| v.checked_sub(self.first));
+        let pairs = overlay.met_by(survey, shop, |t| copies(t).next().is_some())?;
+        for pair in pairs {
+            let in_shop = pair.triangles.map(|number| overlay.changed_of(number));
+            let before = pair.triangles.map(|number| match overlay.changed_of(number) {
+                Some(t) => self.points_before(self.whole(t)),
+                None => position::corners(&survey.records[number as usize]),
+            });
+            let of_one = matches!(in_shop, [Some(a), Some(b)] if self.whole(a) == self.whole(b));
+            if of_one || badness(pair.contact) > badness(triangles_cross(&before[0], &before[1])) {
+                blamed.extend(in_shop.into_iter().flatten().flat_map(copies).map(|copy| copy as usize));
+            }
+        }
+        Some(blamed)
+    }
+}
+
+/// For each triangle the first record of the surface that it is a part of, as surfaces go on through wedges. O(patches + workshop).
+fn surfaces(survey: &Survey<'_>, shop: &Shop, wedges: &Wedges) -> Vec<u32> {
+    let patches = survey.patches.len() as u32;
+    let mut parents: Vec<u32> = (0..patches + shop.triangles.len() as u32).collect();
+    for t in shop.living() {
+        let patch = shop.triangles[t as usize].patch;
+        if patch != NONE {
+            crate::util::union_find::unite(&mut parents, patch, patches + t);
+        }
+        for mate in (0..3).filter_map(|corner| wedges.mate(Half { triangle: t, corner })) {
+            crate::util::union_find::unite(&mut parents, patches + t, patches + mate.triangle);
+        }
+    }
+    let mut first = vec![NONE; parents.len()];
+    let records = survey.patches.iter().map(|p| p.first).zip(0..).chain(shop.living().map(|t| (shop.record(t), patches + t)));
+    for (record, node) in records {
+        let root = crate::util::union_find::find(&mut parents, node) as usize;
+        first[root] = first[root].min(record);
+    }
+    (0..shop.triangles.len() as u32).map(|t| first[crate::util::union_find::find(&mut parents, patches + t) as usize]).collect()
+}
+
+/// Ways to go from a vertex of surface with these unit normals, turned inward: first to the middle of the smallest ball around their ends, which
+/// leads away from all planes alike if any way leads into the material behind each of them; then the opposite way, along the axes, and between
+/// them. Of each the largest component is 1.
+fn directions(inward: impl Iterator<Item = DVec3>) -> Vec<DVec3> {
+    let inward: Vec<DVec3> = inward.collect();
+    let mut middle = inward.first().copied().unwrap_or(DVec3::ZERO);
+    // Bădoiu & Clarkson, "Smaller core-sets for balls", SODA 2003.
+    for k in 2..=64 {
+        let far = inward.iter().fold((0.0, middle), |far, n| {
+            let distance = (*n - middle).length_squared();
+            if distance > far.0 { (distance, *n) } else { far }
+        });
+        middle += (far.1 - middle) / f64::from(k);
+    }
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|d| [d, -d]);
+    let between = (0..8).map(|k| DVec3::from_array([0, 1, 2].map(|bit| if k >> bit & 1 == 1 { 1.0 } else { -1.0 })));
+    let largest = middle.abs().max_element();
+    let own = (largest > 1e-6).then(|| middle / largest).into_iter().flat_map(|d| [d, -d]);
+    own.chain(axes).chain(between).collect()
+}
+
+/// More ways to go, where all of these are blocked: along the edges that end there, and between two axes. Of each the largest component is 1.
+fn sideways(edges: &[DVec3]) -> Vec<DVec3> {
+    let along = edges.iter().map(|edge| *edge / edge.abs().max_element());
+    let signs = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
+    let between = (0..3).flat_map(|k| {
+        signs.map(|(x, y)| {
+            let mut way = [0.0; 3];
+            (way[k], way[(k + 1) % 3]) = (x, y);
+            DVec3::from_array(way)
+        })
+    });
+    along.chain(between).collect()
+}
+
+/// What lies on something can be lifted off it; what crosses it cannot.
+fn badness(contact: Contact) -> u8 {
+    match contact {
+        Contact::Apart => 0,
+        Contact::Touch => 1,
+        Contact::Overlap => 2,
+        Contact::Cross => 3,
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,118 @@
+//! What was done to a file, for its report.
+
+use crate::contract::report::{BoundaryLoops, LoopLeft, Region, Repair, SheetDropped, Volumes, Wrap};
+use crate::detect::verdict::Swallowed;
+
+/// Kinds of repairs. Several steps may account for one kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum RepairName {
+    Degenerate,
+    Duplicate,
+    Lap,
+    Surplus,
+    ToleranceWeld,
+    TJunction,
+    Zip,
+    Overrun,
+    Debris,
+    Facing,
+    Orient,
+    Seat,
+    Fill,
+    Sheets,
+    Outward,
+    Resolve,
+    Dust,
+    CrossingsLeft,
+    Swallowed,
+    Hidden,
+    Separated,
+    Wrap,
+}
+
+impl RepairName {
+    /// As the report has it.
+    pub(crate) fn as_str(self) -> &'static str {
+        match self {
+            Self::Degenerate => "degenerate",
+            Self::Duplicate => "duplicate",
+            Self::Lap => "lap",
+            Self::Surplus => "surplus",
+            Self::ToleranceWeld => "tolerance_weld",
+            Self::TJunction => "t_junction",
+            Self::Zip => "zip",
+            Self::Overrun => "overrun",
+            Self::Debris => "debris",
+            Self::Facing => "facing",
+            Self::Orient => "orient",
+            Self::Seat => "seat",
+            Self::Fill => "fill",
+            Self::Sheets => "sheets",
+            Self::Outward => "outward",
+            Self::Resolve => "resolve",
+            Self::Dust => "dust",
+            Self::CrossingsLeft => "crossings left",
+            Self::Swallowed => "swallowed",
+            Self::Hidden => "hidden",
+            Self::Separated => "separated",
+            Self::Wrap => "wrap",
+        }
+    }
+}
+
+/// What the report says of the repairs.
+#[derive(Default)]
+pub(crate) struct Account {
+    /// By kind, in order of first use.
+    done: Vec<(RepairName, Repair)>,
+    /// The boundary loops as they were recognised, before any was closed.
+    pub(crate) loops: Option<BoundaryLoops>,
+    pub(crate) loops_left: Vec<LoopLeft>,
+    pub(crate) sheets: Vec<SheetDropped>,
+    /// What lay in the material of others, and is gone.
+    pub(crate) swallowed: Swallowed,
+    /// What was replaced because nothing else made it a solid, or would have been.
+    pub(crate) wraps: Vec<Wrap>,
+    /// What became of the volume of bodies; `None` where nothing was done that might have lost any.
+    pub(crate) volumes: Option<Volumes>,
+    /// Where something was cut, snapped, taken apart, or dropped.
+    pub(crate) regions: Vec<Region>,
+}
+
+impl Account {
+    /// Adds to what was done of a kind. A kind is listed when something was done; later notes of the same kind are not needed.
+    pub(crate) fn add(&mut self, name: RepairName, count: u64, note: String, seconds: f64) {
+        match self.done.iter_mut().find(|(other, _)| *other == name) {
+            Some((_, repair)) => {
+                repair.count += count;
+                repair.seconds += seconds;
+            }
+            None if count > 0 => self.done.push((name, Repair { name: name.as_str().into(), count, note, seconds })),
+            None => {}
+        }
+    }
+
+    /// Counts less of what was done.
+    pub(crate) fn take_back(&mut self, name: RepairName, count: u64) {
+        if let Some((_, repair)) = self.done.iter_mut().find(|(other, _)| *other == name) {
+            repair.count -= count;
+        }
+    }
+
+    /// Says something of a repair that has changed nothing.
+    pub(crate) fn say(&mut self, name: RepairName, note: String) {
+        tracing::info!(name = name.as_str(), note, "A repair changed nothing.");
+        self.done.push((name, Repair { name: name.as_str().into(), count: 0, note, seconds: 0.0 }));
+    }
+
+    /// Some that lay in the material of others, or were made one with them, are gone.
+    pub(crate) fn swallow(&mut self, bodies: u64, volume: f64) {
+        self.swallowed.bodies += bodies;
+        self.swallowed.volume += volume;
+    }
+
+    /// The list of repairs as it stands in the report.
+    pub(crate) fn repairs(&mut self) -> Vec<Repair> {
+        std::mem::take(&mut self.done).into_iter().map(|(_, repair)| repair).collect()
+    }
+}

@@ -1,0 +1,83 @@
+//! What a new patch crosses: another patch, or any other surface, wherever that is in the file.
+//!
+//! A patch was tested against itself and the triangles along its rim when it was made. Here all new triangles are held against everything
+//! else in their boxes, chunk by chunk, exactly ([`crate::detect::fresh`]). Of two patches that cross, the later one is to blame.
+
+use crate::repairs::shared::pieces::components_of_records;
+use std::collections::{BTreeMap, HashSet};
+
+use crate::geometry::position::Position;
+use crate::geometry::tri_tri::Triangle as Corners;
+use crate::repairs::shared::overlay::Overlay;
+use crate::repairs::shared::work::Work;
+use crate::submesh::components::{Components, Reversed, Through};
+use crate::topology::survey::Survey;
+
+/// A triangle that a patch crosses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Obstacle {
+    pub(crate) corners: Corners,
+    /// It belongs to a body that the one whose loop the patch closes runs into already.
+    pub(crate) met_already: bool,
+}
+
+/// For each patch that crosses something what it crosses. `patch_of`: the patch that a triangle of the workshop belongs to; `is_new`: whether
+/// a patch is to be tested against everything, and not only against such ones. `None` if that is too much work to tell, or the file holds
+/// too many triangles to number them. O(boxes around new patches), and a look at the components if anything is crossed.
+pub(crate) fn crossed(
+    survey: &Survey<'_>,
+    work: &mut Work<'_>,
+    reversed: &Reversed,
+    patch_of: &[Option<u32>],
+    is_new: impl Fn(u32) -> bool,
+) -> Option<BTreeMap<u32, Vec<Obstacle>>> {
+    let (shop, edges) = work.edges();
+    let patch = |t: u32| patch_of[t as usize];
+    let overlay = Overlay::of(survey, shop, reversed)?;
+    let pairs = overlay.met_by(survey, shop, |t| patch(t).is_some_and(&is_new))?;
+    let owner = |number: u32| overlay.changed_of(number).and_then(patch);
+    // The patch to blame with one of its triangles, and what that crosses.
+    let mut blamed: Vec<(u32, u32, u32)> = Vec::new();
+    for pair in pairs {
+        let [a, b] = pair.triangles;
+        match (owner(a), owner(b)) {
+            (Some(p), Some(q)) if p > q => blamed.push((p, a, b)),
+            (Some(p), Some(q)) if p < q => blamed.push((q, b, a)),
+            // What was accepted crosses neither itself nor its rim.
+            (Some(_), Some(_)) | (None, None) => {}
+            (Some(p), None) => blamed.push((p, a, b)),
+            (None, Some(q)) => blamed.push((q, b, a)),
+        }
+    }
+    if blamed.is_empty() {
+        return Some(BTreeMap::new());
+    }
+    blamed.sort_unstable();
+    let components = Components::of(survey, shop, edges, reversed, Through::EveryEdge);
+    let met = survey.crossing_pairs.as_deref().unwrap_or_default();
+    let others = blamed.iter().map(|(_, _, other)| *other).filter(|other| overlay.changed_of(*other).is_none());
+    let of_record = components_of_records(survey, shop, &components, others.chain(met.iter().flat_map(|pair| pair.triangles)));
+    let mut met: Vec<[u32; 2]> = met
+        .iter()
+        .filter_map(|pair| Some([*of_record.get(&pair.triangles[0])?, *of_record.get(&pair.triangles[1])?]))
+        .flat_map(|[a, b]| [[a, b], [b, a]])
+        .filter(|[a, b]| a != b)
+        .collect();
+    met.sort_unstable();
+    met.dedup();
+    let component = |number: u32| match overlay.changed_of(number) {
+        Some(t) => Some(components.of_triangle[t as usize]),
+        None => of_record.get(&number).copied(),
+    };
+    let mut crossed: BTreeMap<u32, Vec<Obstacle>> = BTreeMap::new();
+    let mut known = HashSet::new();
+    for (patch, of_patch, other) in blamed {
+        let corners = overlay.corners(survey, shop, other);
+        let of_both = component(of_patch).zip(component(other));
+        let obstacle = Obstacle { corners, met_already: of_both.is_some_and(|(a, b)| met.binary_search(&[a, b]).is_ok()) };
+        if known.insert((patch, corners.map(Position::of), obstacle.met_already)) {
+            crossed.entry(patch).or_default().push(obstacle);
+        }
+    }
+    Some(crossed)
+}

@@ -1,0 +1,11 @@
+//! What all repairs share: the workshop and its changes, what is known of it, and the account of what was done.
+
+pub(crate) mod account;
+pub(crate) mod admission;
+pub(crate) mod collisions;
+pub(crate) mod context;
+pub(crate) mod overlay;
+pub(crate) mod pieces;
+pub(crate) mod probes;
+pub(crate) mod regions;
+pub(crate) mod work;

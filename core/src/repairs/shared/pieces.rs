@@ -1,0 +1,105 @@
+//! What stands for itself: the pieces of surface that are turned, removed or kept as a whole.
+
+use crate::repairs::shared::work::Work;
+use std::collections::BTreeMap;
+
+use crate::geometry::position;
+use crate::submesh::components::{Component, Components, Reversed, Through};
+use crate::submesh::{Origin, Shop};
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
+
+/// The pieces of surface that stand for themselves: bodies that touch along an edge each for itself, what is closed only together, together.
+/// O(patches + workshop).
+pub(crate) fn pieces(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reversed) -> Components {
+    let (shop, edges) = work.edges();
+    let components = Components::of(survey, shop, edges, reversed, Through::ManifoldEdges);
+    if !edges.any_nonmanifold() {
+        return components;
+    }
+    Components::of(survey, shop, edges, reversed, Through::OpenSheets(&components))
+}
+
+/// Removes whole pieces. O(patches + workshop).
+pub(crate) fn take_away(work: &mut Work<'_>, reversed: &mut Reversed, pieces: &Components, goes: &[bool]) {
+    let goes = |piece: &u32| *piece != NONE && goes[*piece as usize];
+    reversed.dropped.iter_mut().zip(&pieces.of_patch).for_each(|(dropped, piece)| *dropped |= goes(piece));
+    let doomed: Vec<u32> = work.living().filter(|t| goes(&pieces.of_triangle[*t as usize])).collect();
+    doomed.into_iter().for_each(|t| work.kill(t));
+}
+
+/// Is there material on both sides of a closed piece outside of which the others wind so many times?
+pub(crate) fn lies_in_material(piece: &Component, outside: i32) -> bool {
+    let inside = match piece.extent.volume.signum() {
+        _ if piece.open => return false,
+        1 => outside + 1,
+        -1 => outside - 1,
+        _ => return false,
+    };
+    outside.min(inside) >= 1
+}
+
+/// Which pieces cross another one.
+pub(crate) fn crossing(
+    survey: &Survey<'_>,
+    shop: &Shop,
+    pieces: &Components,
+    pairs: impl Iterator<Item = [u32; 2]> + Clone,
+) -> Vec<bool> {
+    let mut crossing = vec![false; pieces.list.len()];
+    let all = crossing_pieces(survey, shop, pieces, pairs);
+    all.into_iter().flatten().for_each(|piece| crossing[piece as usize] = true);
+    crossing
+}
+
+/// The pieces that cross each other, by twos, the smaller number first; each once, ascending. A look at the chunks of what crosses.
+pub(crate) fn crossing_pieces(
+    survey: &Survey<'_>,
+    shop: &Shop,
+    pieces: &Components,
+    pairs: impl Iterator<Item = [u32; 2]> + Clone,
+) -> Vec<[u32; 2]> {
+    let of_record = components_of_records(survey, shop, pieces, pairs.clone().flatten());
+    // What is gone crosses nothing any more.
+    let piece = |record: u32| of_record.get(&record).copied().filter(|piece| *piece != NONE);
+    let mut all: Vec<[u32; 2]> = pairs
+        .filter_map(|[a, b]| Some([piece(a)?, piece(b)?]))
+        .filter(|[a, b]| a != b)
+        .map(|[a, b]| [a.min(b), a.max(b)])
+        .collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// The components of some records that are as they were. Reads the chunks where those are that are not in the workshop.
+pub(crate) fn components_of_records(
+    survey: &Survey<'_>,
+    shop: &Shop,
+    components: &Components,
+    records: impl Iterator<Item = u32>,
+) -> BTreeMap<u32, u32> {
+    let mut wanted: Vec<u32> = records.collect();
+    wanted.sort_unstable();
+    wanted.dedup();
+    let is_wanted = |record: u32| wanted.binary_search(&record).is_ok();
+    let mut found = BTreeMap::new();
+    for (t, triangle) in shop.triangles.iter().enumerate() {
+        if let Origin::Input(record) = triangle.origin
+            && is_wanted(record)
+        {
+            found.insert(record, components.of_triangle[t]);
+        }
+    }
+    let positions: Vec<[f32; 3]> = wanted
+        .iter()
+        .filter(|record| !found.contains_key(record))
+        .map(|record| position::corners(&survey.records[*record as usize])[0])
+        .collect();
+    if !positions.is_empty() {
+        let around = survey.beyond_the_workshop(&positions);
+        let around = around.iter().filter(|(suspect, patch)| is_wanted(suspect.triangle) && *patch != NONE);
+        found.extend(around.map(|(suspect, patch)| (suspect.triangle, components.of_patch[*patch as usize])));
+    }
+    found
+}

@@ -1,0 +1,331 @@
+//! The workshop while it is repaired: changed by way of here only, so that what is known of it is known to be true.
+//!
+//! The edges are made when they are asked for and kept until something changes. What was changed is noted, so that a pass which
+//! has seen everything once looks only at what is new to it the next time.
+
+use std::ops::Deref;
+
+use crate::geometry::position::Position;
+use crate::submesh::edges::Edges;
+use crate::submesh::{Origin, Shop, Triangle, Vertex};
+use crate::topology::chunk::Suspect;
+use crate::topology::survey::Survey;
+use crate::util::steps;
+use crate::util::union_find::NONE;
+
+/// A pass that makes sure of something about every triangle, or every set of three vertices, which holds until one of the triangles
+/// gets another vertex.
+#[derive(Clone, Copy)]
+pub(crate) enum Pass {
+    Repeated,
+    Collinear,
+    Copies,
+}
+
+/// The workshop under repair. Reading goes through to it; what changes it goes through here.
+pub(crate) struct Work<'a> {
+    shop: &'a mut Shop,
+    edges: Option<Edges>,
+    /// Triangles as they were added or got another vertex.
+    changed: Vec<u32>,
+    /// How many of these each pass has seen; `None`: it has to look at everything.
+    seen: [Option<usize>; 3],
+    journal: Option<Journal>,
+    /// Counts the changes.
+    version: u64,
+}
+
+/// What it takes to take back everything since a [`Work::mark`].
+struct Journal {
+    /// How many triangles there were.
+    count: usize,
+    /// Those of them that have changed since, each time as they were before.
+    old: Vec<(u32, Triangle)>,
+}
+
+impl Deref for Work<'_> {
+    type Target = Shop;
+
+    fn deref(&self) -> &Shop {
+        self.shop
+    }
+}
+
+impl<'a> Work<'a> {
+    pub(crate) fn new(shop: &'a mut Shop) -> Self {
+        Self { shop, edges: None, changed: Vec::new(), seen: [None; 3], journal: None, version: 0 }
+    }
+
+    /// The mesh with its edges. O(workshop) after a change, O(1) else.
+    pub(crate) fn edges(&mut self) -> (&Shop, &Edges) {
+        let edges = self.edges.get_or_insert_with(|| Edges::of(self.shop));
+        (self.shop, edges)
+    }
+
+    /// The edges as they are now, to be kept while the mesh changes.
+    pub(crate) fn take_edges(&mut self) -> Edges {
+        self.edges.take().unwrap_or_else(|| Edges::of(self.shop))
+    }
+
+    /// What may have changed since `pass` asked last, ascending, each once; `None`: it has to look at everything.
+    pub(crate) fn changed_for(&mut self, pass: Pass) -> Option<Vec<u32>> {
+        let seen = self.seen[pass as usize].replace(self.changed.len())?;
+        let mut changed = self.changed[seen..].to_vec();
+        changed.sort_unstable();
+        changed.dedup();
+        Some(changed)
+    }
+
+    /// From here on changes are noted, so that they can be taken back, until [`Self::keep`].
+    pub(crate) fn mark(&mut self) {
+        self.journal = Some(Journal { count: self.shop.triangles.len(), old: Vec::new() });
+    }
+
+    /// What was changed since the mark stays.
+    pub(crate) fn keep(&mut self) {
+        self.journal = None;
+    }
+
+    /// Puts all triangles back to what they were at the mark. Returns how many there were, and the numbers of those that were fetched
+    /// since: these stay, behind the others. O(changes), and the star lists are made anew.
+    pub(crate) fn take_back(&mut self) -> (usize, Vec<u32>) {
+        let Some(Journal { count, old }) = self.journal.take() else { return (self.shop.triangles.len(), Vec::new()) };
+        steps::count(old.len() + self.shop.triangles.len() - count);
+        let is_fetched = |t: &u32| matches!(self.shop.triangles[*t as usize].origin, Origin::Input(_));
+        let fetched: Vec<u32> = (count as u32..self.shop.triangles.len() as u32).filter(is_fetched).collect();
+        for (place, t) in (count..).zip(&fetched) {
+            self.shop.triangles[place] = self.shop.triangles[*t as usize];
+        }
+        self.shop.triangles.truncate(count + fetched.len());
+        for (t, triangle) in old.into_iter().rev() {
+            self.shop.triangles[t as usize] = triangle;
+        }
+        self.touch();
+        self.seen = [None; 3];
+        self.shop.relink();
+        (count, fetched)
+    }
+
+    /// Another number after every change.
+    pub(crate) fn version(&self) -> u64 {
+        self.version
+    }
+
+    /// The mesh is about to change.
+    fn touch(&mut self) {
+        self.edges = None;
+        self.version += 1;
+    }
+
+    /// This triangle is about to change.
+    fn note(&mut self, t: u32) {
+        if let Some(journal) = &mut self.journal
+            && (t as usize) < journal.count
+        {
+            steps::count(1);
+            journal.old.push((t, self.shop.triangles[t as usize]));
+        }
+    }
+
+    pub(crate) fn kill(&mut self, t: u32) {
+        self.touch();
+        self.note(t);
+        self.shop.kill(t);
+    }
+
+    /// Adds a triangle and returns its number.
+    pub(crate) fn add(&mut self, v: [Vertex; 3], origin: Origin, patch: u32) -> u32 {
+        self.touch();
+        let t = self.shop.add(v, origin, patch);
+        self.changed.push(t);
+        t
+    }
+
+    /// Adds a vertex where none is, and returns its number.
+    pub(crate) fn add_vertex(&mut self, position: Position) -> Vertex {
+        self.touch();
+        self.shop.add_vertex(position)
+    }
+
+    /// Lets all triangles of `go` use `stay` instead.
+    pub(crate) fn merge(&mut self, stay: Vertex, go: Vertex) {
+        self.touch();
+        self.changed.extend(self.shop.star(go).map(|(t, _)| t));
+        if self.journal.is_some() {
+            let linked: Vec<u32> = self.shop.linked(go).collect();
+            linked.into_iter().for_each(|t| self.note(t));
+        }
+        self.shop.merge(stay, go);
+    }
+
+    /// Turns a triangle over.
+    pub(crate) fn turn(&mut self, t: u32) {
+        self.touch();
+        self.note(t);
+        self.shop.triangles[t as usize].v.swap(1, 2);
+    }
+
+    /// Lets all triangles use `target[v]` instead of `v`. Their star lists are as they were until [`Self::relink`].
+    pub(crate) fn move_to(&mut self, target: &[Vertex]) {
+        self.touch();
+        for t in 0..self.shop.triangles.len() as u32 {
+            let old = self.shop.triangles[t as usize].v;
+            let v = old.map(|v| target[v as usize]);
+            if v != old {
+                self.note(t);
+                self.shop.triangles[t as usize].v = v;
+                self.changed.push(t);
+            }
+        }
+    }
+
+    /// Lets one corner of a triangle be another vertex. Star lists are as they were until [`Self::relink`].
+    pub(crate) fn assign(&mut self, t: u32, corner: usize, v: Vertex) {
+        self.touch();
+        self.note(t);
+        self.shop.triangles[t as usize].v[corner] = v;
+        self.changed.push(t);
+    }
+
+    pub(crate) fn relink(&mut self) {
+        self.shop.relink();
+    }
+
+    /// Puts all triangles back to what they were.
+    pub(crate) fn restore(&mut self, before: &[Triangle]) {
+        self.touch();
+        self.journal = None;
+        self.seen = [None; 3];
+        self.shop.triangles.clear();
+        self.shop.triangles.extend_from_slice(before);
+        self.shop.relink();
+    }
+
+    /// Gives each triangle that continues a patch the one it continues after a [`Survey::divide`].
+    pub(crate) fn follow_division(&mut self, survey: &Survey<'_>) {
+        debug_assert!(self.journal.is_none(), "a division is not taken back");
+        for triangle in &mut self.shop.triangles {
+            if triangle.patch != NONE {
+                triangle.patch = match triangle.origin {
+                    Origin::Input(record) | Origin::Part(record) => survey.patch_of_suspect(record),
+                    Origin::Patch => NONE,
+                };
+            }
+        }
+    }
+
+    /// Takes in what [`Survey::promote`] has found for some incomplete vertices, which become complete.
+    pub(crate) fn extend(&mut self, survey: &Survey<'_>, new: &[(Suspect, u32)], completed: &[Vertex]) {
+        self.touch();
+        let first = self.shop.triangles.len() as u32;
+        self.shop.extend(survey, new, |_| completed.to_vec());
+        self.changed.extend(first..self.shop.triangles.len() as u32);
+    }
+
+    /// As [`Self::extend`]; the vertices at these positions become complete. Returns the first of the new triangles.
+    pub(crate) fn extend_at(&mut self, survey: &Survey<'_>, new: &[(Suspect, u32)], positions: &[[f32; 3]]) -> u32 {
+        self.touch();
+        let first = self.shop.triangles.len() as u32;
+        self.shop.extend(survey, new, |known| positions.iter().filter_map(|p| known.get(&Position::of(*p)).copied()).collect());
+        self.changed.extend(first..self.shop.triangles.len() as u32);
+        first
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{diagnose, plate, records};
+    use crate::util::union_find::NONE;
+
+    #[test]
+    fn a_pass_sees_everything_once_and_then_what_changed() {
+        let records = records(&plate(2, |_, _| true));
+        let mut d = diagnose(&records);
+        let mut work = Work::new(&mut d.shop);
+        assert_eq!(work.changed_for(Pass::Copies), None);
+        assert_eq!(work.changed_for(Pass::Copies), Some(vec![]));
+        let t = work.add([0, 1, 2], Origin::Patch, NONE);
+        assert_eq!(work.changed_for(Pass::Copies), Some(vec![t]));
+        assert_eq!(work.changed_for(Pass::Collinear), None, "each pass by itself");
+        let moved: Vec<u32> = work.star(3).map(|(t, _)| t).collect();
+        work.merge(0, 3);
+        assert_eq!(work.changed_for(Pass::Copies).map(|c| c.len()), Some(moved.len()));
+        let before = work.triangles.clone();
+        work.restore(&before);
+        assert_eq!(work.changed_for(Pass::Copies), None, "what was taken back has to be looked at anew");
+    }
+
+    #[test]
+    fn edges_are_those_of_the_mesh_as_it_is() {
+        let records = records(&plate(2, |_, _| true));
+        let mut d = diagnose(&records);
+        let mut work = Work::new(&mut d.shop);
+        let boundary = |work: &mut Work<'_>| work.edges().1.iter().filter(|e| e.is_boundary()).count();
+        assert_eq!(boundary(&mut work), 8);
+        work.kill(0);
+        // One of its edges was the rim's, the others are the rim's now.
+        assert_ne!(boundary(&mut work), 8);
+        let disagreeing = |work: &mut Work<'_>| work.edges().1.iter().filter(|e| e.is_inconsistent()).count();
+        assert_eq!(disagreeing(&mut work), 0);
+        work.turn(3);
+        assert_ne!(disagreeing(&mut work), 0);
+    }
+
+    #[test]
+    fn a_turned_triangle_is_at_the_right_corner_in_every_star() {
+        let records = records(&plate(2, |_, _| true));
+        let mut d = diagnose(&records);
+        let mut work = Work::new(&mut d.shop);
+        (0..work.triangles.len() as u32).for_each(|t| work.turn(t));
+        let [a, b] = [work.triangles[0].v[1], work.triangles[0].v[2]];
+        let all = |work: &Work<'_>, v| work.star(v).all(|(t, corner)| work.triangles[t as usize].v[corner] == v);
+        assert!((0..work.positions.len() as Vertex).all(|v| all(&work, v)));
+        // Whatever is merged into another one, nothing else is.
+        let before: Vec<_> = work.triangles.iter().map(|t| t.v.map(|v| if v == b { a } else { v })).collect();
+        work.merge(a, b);
+        assert_eq!(work.triangles.iter().map(|t| t.v).collect::<Vec<_>>(), before);
+        assert!(all(&work, a));
+    }
+
+    #[test]
+    fn what_was_changed_since_a_mark_is_taken_back_without_a_look_at_the_rest() {
+        // The same changes in a plate of so many squares a side; the star lists are made anew, once.
+        let steps_for = |side: u8| {
+            let records = records(&plate(side, |_, _| true));
+            let mut d = diagnose(&records);
+            let mut work = Work::new(&mut d.shop);
+            let all = |work: &Work<'_>| work.triangles.iter().map(|t| (t.v, t.alive)).collect::<Vec<_>>();
+            let before = all(&work);
+            let [a, b, _] = work.triangles[0].v;
+            let (steps, _) = steps::of(|| {
+                work.mark();
+                work.merge(a, b);
+                work.add([0, 1, 2], Origin::Patch, NONE);
+                work.turn(1);
+                work.kill(1);
+                work.kill(2);
+                work.take_back()
+            });
+            assert_eq!(all(&work), before);
+            assert!(work.star(a).all(|(t, corner)| work.triangles[t as usize].v[corner] == a));
+            steps - work.triangles.len() as u64
+        };
+        assert_eq!(steps_for(8), steps_for(32));
+    }
+
+    #[test]
+    fn what_is_kept_is_not_taken_back() {
+        let records = records(&plate(2, |_, _| true));
+        let mut d = diagnose(&records);
+        let mut work = Work::new(&mut d.shop);
+        work.mark();
+        work.kill(0);
+        work.keep();
+        assert_eq!(work.take_back().0, 8);
+        work.mark();
+        work.kill(1);
+        work.take_back();
+        assert_eq!(work.living().next(), Some(1));
+    }
+}

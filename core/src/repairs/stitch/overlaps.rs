@@ -1,0 +1,505 @@
+//! Lapping patches: a surface that ends on another one, within a tolerance by the size of the two, facing the same way.
+//!
+//! Where each of two pieces ends on the other, they overlap like shingles: the overlapping triangles of the smaller one go, so that the two
+//! ends face each other across a gap, which is closed later. A piece that lies on another one as a whole goes as a whole: what was meant is
+//! one surface, drawn twice. A piece on a surface that does not end there is left alone: nothing says that it was to be joined.
+
+use crate::repairs::shared::account::RepairName;
+use crate::repairs::shared::context::{Changes, Done, Repair};
+use std::collections::{BTreeMap, HashMap};
+
+use crate::geometry::boxes::BoxTree;
+use crate::geometry::grid::Grid;
+use crate::geometry::position::Position;
+use crate::geometry::sums::Bounds;
+use crate::geometry::tri_tri::Triangle as Corners;
+use crate::io::record;
+use crate::repairs::shared::work::Work;
+use crate::repairs::stitch::layer::{Facet, Layer, Place, Reach, RimEdge, around};
+use crate::repairs::stitch::weld;
+use crate::submesh::components::{Component, Components, Reversed, Through};
+use crate::submesh::edges::Edges;
+use crate::submesh::near::{Tolerance, boundary_vertices};
+use crate::submesh::{self, Origin, Shop, Vertex};
+use crate::topology::survey::Survey;
+
+/// Surface that lies on other surface.
+pub(crate) const REPAIR: Repair = Repair {
+    name: RepairName::Lap,
+    changes: Changes::Surface,
+    run: |cx| {
+        let cut = cut_back(cx.survey, &mut cx.work, cx.tolerance);
+        Ok(Done::count(cut, "triangles of surface that lay on another one, which faces the same way"))
+    },
+};
+
+/// Surfaces lie on each other within this share of the diagonals of their boxes together.
+const LAP: f64 = 1e-4;
+
+/// A piece may lap over several others: each takes part in one cut a round, so many times.
+const ROUNDS: usize = 4;
+
+/// Pairs of pieces that are looked at in a round, at most: each is a pass over the surface where their boxes meet.
+const MOST_PAIRS: usize = 256;
+
+/// What is cut off must lie on the other piece with this share of its area: surfaces that only cross at a small angle, or large triangles that
+/// lap by little, do not.
+const OVERLAP: f64 = 0.5;
+
+/// Triangles that are looked at together, at most; where there are more, nothing is cut. By count, so that memory decides nothing.
+pub(crate) const MOST: usize = crate::stream::budget::OVERLAPS_LOOKED_FOR;
+
+/// Most triangles that a cut may take; they are worked on in memory.
+const MOST_CUT: usize = 1 << 17;
+
+/// Cuts back what laps over another surface; returns how many triangles went. O(n log n) in the boundary and the surface near it, which is
+/// read if pieces end in each other's boxes.
+pub(crate) fn cut_back(survey: &mut Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) -> u64 {
+    let mut removed = 0;
+    for _ in 0..ROUNDS {
+        let cuts = cuts(survey, work, tolerance);
+        if cuts.is_empty() {
+            break;
+        }
+        for cut in cuts {
+            removed += cut.triangles.len() as u64;
+            cut.make(survey, work, tolerance);
+        }
+    }
+    removed
+}
+
+/// A triangle of a piece.
+#[derive(Clone, Copy, Debug)]
+struct Member {
+    piece: u32,
+    corners: Corners,
+    /// The record of a sound one, or its number in the workshop.
+    place: Result<u32, u32>,
+}
+
+/// Two pieces, the smaller one first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Pair {
+    pieces: [u32; 2],
+    /// Each ends on the other; else one may lie on the other as a whole.
+    lap: bool,
+}
+
+/// What is to be cut off.
+struct Cut {
+    triangles: Vec<Member>,
+    /// Boundary vertices of the piece that is cut and of the other one, if they are to be joined, and within which distance.
+    join: Option<([Vec<Vertex>; 2], f64)>,
+}
+
+/// Pieces of surface with what is needed to compare them.
+struct Pieces {
+    components: Components,
+    /// All boundary edges, by piece, with the share of their triangle's height that a reach may have.
+    rims: Vec<(RimEdge, f64)>,
+    /// Diagonals of the boxes.
+    sizes: Vec<f64>,
+    /// What is nearer than this to where a piece ends is a matter of welding.
+    weld: f64,
+}
+
+impl Pieces {
+    fn of(survey: &Survey<'_>, shop: &Shop, edges: &Edges, tolerance: &Tolerance) -> Self {
+        let components = Components::of(survey, shop, edges, &Reversed::none(survey), Through::EveryEdge);
+        let rims = edges.iter().filter(|e| e.is_boundary()).map(|e| {
+            let t = e.uses[0].triangle;
+            let facet = Facet::of(&shop.points(t), components.of_triangle[t as usize]);
+            let ends = [shop.place(e.low), shop.place(e.high)];
+            (RimEdge { ends, normal: facet.normal, piece: facet.piece }, facet.height() * tolerance.edge_share)
+        });
+        let mut rims: Vec<_> = rims.collect();
+        rims.sort_by_key(|(rim, _)| rim.piece);
+        let sizes = components.list.iter().map(|c| c.bounds.diagonal()).collect();
+        Self { components, rims, sizes, weld: tolerance.weld }
+    }
+
+    fn list(&self) -> &[Component] {
+        &self.components.list
+    }
+
+    /// How near two pieces lie on each other, where a triangle of one is so high that it may do so within `most`.
+    fn reach(&self, a: u32, b: u32, most: f64) -> Reach {
+        self.reach_of(self.sizes[a as usize] + self.sizes[b as usize], most)
+    }
+
+    fn reach_of(&self, sizes: f64, most: f64) -> Reach {
+        let rim = (LAP * sizes).max(self.weld);
+        Reach { on: rim.min(most), rim }
+    }
+
+    /// For each piece that ends, the others in whose box it may do so; numbered as the pieces are.
+    fn neighbours(&self) -> Vec<Vec<u32>> {
+        let mut all = vec![Vec::new(); self.list().len()];
+        let mut ends = vec![false; all.len()];
+        self.rims.iter().for_each(|(r, _)| ends[r.piece as usize] = true);
+        if !ends.contains(&true) || all.len() < 2 {
+            return all;
+        }
+        let boxes: Vec<Bounds> = self.list().iter().map(|c| c.bounds).collect();
+        let tree = BoxTree::new(&boxes);
+        let largest = self.sizes.iter().copied().fold(0.0, f64::max);
+        for (a, near) in (0..).zip(&mut all).filter(|(a, _)| ends[*a as usize]) {
+            tree.meeting(&widened(&boxes[a as usize], self.reach_of(self.sizes[a as usize] + largest, f64::INFINITY).rim), near);
+            near.retain(|b| *b != a);
+        }
+        all
+    }
+
+    fn rims_of(&self, piece: u32) -> Vec<RimEdge> {
+        let from = self.rims.partition_point(|(r, _)| r.piece < piece);
+        self.rims[from..].iter().map(|(r, _)| *r).take_while(|r| r.piece == piece).collect()
+    }
+
+    /// All triangles of wanted pieces whose boxes meet one of these; `None` if they are too many.
+    fn gather(
+        &self,
+        survey: &Survey<'_>,
+        shop: &Shop,
+        is_wanted: impl Fn(u32) -> bool + Sync,
+        boxes: &[Bounds],
+    ) -> Option<Vec<Member>> {
+        let tree = BoxTree::new(boxes);
+        let mut grid = Grid::default();
+        grid.mark(boxes.iter().copied());
+        let mut everything = Bounds::EMPTY;
+        boxes.iter().for_each(|b| everything.add(b));
+        let meets = |corners: &Corners| {
+            let bounds = Bounds::of(corners);
+            let mut found = Vec::new();
+            grid.may_meet(&bounds) && {
+                tree.meeting(&bounds, &mut found);
+                !found.is_empty()
+            }
+        };
+        let mut all = Vec::new();
+        for t in shop.living() {
+            let (piece, corners) = (self.components.of_triangle[t as usize], shop.points(t));
+            if is_wanted(piece) && meets(&corners) {
+                all.push(Member { piece, corners, place: Err(t) });
+            }
+        }
+        let of_patch = &self.components.of_patch;
+        let found = survey.visit_sound(
+            |patch| is_wanted(of_patch[patch as usize]),
+            |reach| reach.overlap(&everything).map(|_| Vec::new()),
+            |_, corners| meets(corners),
+            |found: &mut Vec<(u32, u32)>, triangle, patch| found.push((triangle, patch)),
+        );
+        let mut sound: Vec<(u32, u32)> = found.into_iter().flatten().collect();
+        sound.sort_unstable();
+        all.extend(sound.into_iter().map(|(record, patch)| {
+            let corners = record::corners(&survey.records[record as usize]);
+            Member { piece: of_patch[patch as usize], corners, place: Ok(record) }
+        }));
+        (all.len() <= MOST).then_some(all)
+    }
+}
+
+/// Cuts that can be made side by side: no piece takes part in two of them.
+fn cuts(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) -> Vec<Cut> {
+    let (shop, edges) = work.edges();
+    if tolerance.edge_share <= 0.0 || !edges.iter().any(|e| e.is_boundary()) {
+        return Vec::new();
+    }
+    let pieces = Pieces::of(survey, shop, edges, tolerance);
+    let pairs = lapping(survey, shop, &pieces);
+    let mut taken = vec![false; pieces.list().len()];
+    let mut cuts = Vec::new();
+    for pair in pairs.into_iter().take(MOST_PAIRS) {
+        if pair.pieces.iter().any(|piece| taken[*piece as usize]) {
+            continue;
+        }
+        if let Some(cut) = cut(survey, shop, edges, &pieces, pair, tolerance) {
+            pair.pieces.iter().for_each(|piece| taken[*piece as usize] = true);
+            cuts.push(cut);
+        }
+    }
+    cuts
+}
+
+/// Pairs of pieces of which each ends on the other, or one lies on the other with all of its ends; the smaller one first.
+fn lapping(survey: &Survey<'_>, shop: &Shop, pieces: &Pieces) -> Vec<Pair> {
+    let neighbours = pieces.neighbours();
+    let largest = pieces.sizes.iter().copied().fold(0.0, f64::max);
+    let mut is_wanted = vec![false; neighbours.len()];
+    neighbours.iter().flatten().for_each(|b| is_wanted[*b as usize] = true);
+    let most = |(rim, share): &(RimEdge, f64)| pieces.reach_of(pieces.sizes[rim.piece as usize] + largest, *share);
+    let ends: Vec<&(RimEdge, f64)> = pieces.rims.iter().filter(|(r, _)| !neighbours[r.piece as usize].is_empty()).collect();
+    if ends.is_empty() {
+        return Vec::new();
+    }
+    let boxes: Vec<Bounds> = ends.iter().map(|end| around(&[end.0.middle()], most(end).on)).collect();
+    let Some(near) = pieces.gather(survey, shop, |piece| is_wanted[piece as usize], &boxes) else { return Vec::new() };
+    let facets = near.iter().map(|m| Facet::of(&m.corners, m.piece)).collect();
+    let layer = Layer::new(facets, pieces.rims.iter().map(|(r, _)| *r).collect());
+    // By piece and the one that it ends on: how many of its edges lie inside that one, and on it at all.
+    let mut counts: BTreeMap<[u32; 2], [usize; 2]> = BTreeMap::new();
+    let mut edges = vec![0; neighbours.len()];
+    for end in ends {
+        let (rim, share) = end;
+        edges[rim.piece as usize] += 1;
+        let is_neighbour = |piece: u32| neighbours[rim.piece as usize].binary_search(&piece).is_ok();
+        let reach = |piece: u32| pieces.reach(rim.piece, piece, if is_neighbour(piece) { *share } else { 0.0 });
+        for (piece, place) in layer.under(rim.middle(), rim.normal, most(end), reach) {
+            let [inside, on] = counts.entry([rim.piece, piece]).or_default();
+            *inside += usize::from(place == Place::Inside);
+            *on += 1;
+        }
+    }
+    let ends_inside = |a: u32, b: u32| counts.get(&[a, b]).is_some_and(|[inside, _]| *inside > 0);
+    let mut pairs: Vec<Pair> = Vec::new();
+    for ([a, b], [_, on]) in &counts {
+        let is_covered = *on == edges[*a as usize];
+        let lap = ends_inside(*a, *b) && ends_inside(*b, *a);
+        if is_covered || lap {
+            // Of equal ones the first stays.
+            let order = |piece: u32| (pieces.list()[piece as usize].extent.area, std::cmp::Reverse(piece));
+            pairs.push(Pair { pieces: if order(*a) < order(*b) { [*a, *b] } else { [*b, *a] }, lap });
+        }
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    pairs
+}
+
+/// What is to be cut off of a pair: a piece that lies on the other one as a whole, or what laps, of the first one if something would be left of
+/// it.
+fn cut(survey: &Survey<'_>, shop: &Shop, edges: &Edges, pieces: &Pieces, pair: Pair, tolerance: &Tolerance) -> Option<Cut> {
+    let Pair { pieces: pair, lap } = pair;
+    let [a, b] = pair;
+    let reach = pieces.reach(a, b, f64::INFINITY).rim;
+    let [box_a, box_b] = pair.map(|piece| widened(&pieces.list()[piece as usize].bounds, reach));
+    let both = box_a.overlap(&box_b)?;
+    let members = pieces.gather(survey, shop, |piece| pair.contains(&piece), &[both])?;
+    let layers = pair.map(|piece| {
+        let facets = members.iter().filter(|m| m.piece == piece).map(|m| Facet::of(&m.corners, piece)).collect();
+        Layer::new(facets, pieces.rims_of(piece))
+    });
+    for [cut, stays] in [[0, 1], [1, 0]] {
+        let on = On { layer: &layers[stays], reach, share: tolerance.edge_share };
+        let mine: Vec<&Member> = members.iter().filter(|m| m.piece == pair[cut]).collect();
+        let facets: Vec<Facet> = mine.iter().map(|m| Facet::of(&m.corners, m.piece)).collect();
+        let is_whole = mine.len() as u64 == pieces.list()[pair[cut] as usize].triangles;
+        if is_whole && mine.len() <= MOST_CUT && facets.iter().all(|f| on.covers(f)) && facets.iter().any(|f| on.meets(f)) {
+            return Some(Cut { triangles: mine.into_iter().copied().collect(), join: None });
+        }
+        let met: Vec<(&Member, &Facet)> = mine.into_iter().zip(&facets).filter(|(_, f)| on.meets(f)).collect();
+        let leaves_some = (met.len() as u64) < pieces.list()[pair[cut] as usize].triangles;
+        let area: f64 = met.iter().map(|(_, f)| f.area()).sum();
+        let overlapping: f64 = met.iter().map(|(_, f)| f.area() * on.share(f)).sum();
+        if lap && !met.is_empty() && met.len() <= MOST_CUT && leaves_some && overlapping >= OVERLAP * area {
+            let doomed = met.into_iter().map(|(member, _)| *member).collect();
+            let boundary = boundary_vertices(edges);
+            let of_piece = |piece: u32| {
+                let is_of = |v: &Vertex| shop.star(*v).any(|(t, _)| pieces.components.of_triangle[t as usize] == piece);
+                boundary.iter().copied().filter(is_of).collect()
+            };
+            return Some(Cut { triangles: doomed, join: Some(([pair[cut], pair[stays]].map(of_piece), reach)) });
+        }
+    }
+    None
+}
+
+/// A surface that triangles may lie on.
+struct On<'l> {
+    layer: &'l Layer,
+    reach: f64,
+    /// The reach is at most this share of a triangle's height.
+    share: f64,
+}
+
+impl On<'_> {
+    fn reach(&self, facet: &Facet) -> Reach {
+        Reach { on: self.reach.min(self.share * facet.height()), rim: self.reach }
+    }
+
+    fn places(&self, facet: &Facet) -> impl Iterator<Item = Option<Place>> {
+        let reach = self.reach(facet);
+        let [a, b, c] = facet.corners;
+        [facet.centre(), a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0]
+            .into_iter()
+            .map(move |p| self.layer.under(p, facet.normal, reach, |_| reach).first().map(|(_, place)| *place))
+    }
+
+    /// Does all of a triangle lie on it?
+    fn covers(&self, facet: &Facet) -> bool {
+        self.places(facet).all(|place| place.is_some())
+    }
+
+    /// How much of a triangle lies on it, about.
+    fn share(&self, facet: &Facet) -> f64 {
+        let (mut on, mut all) = (0.0, 0.0);
+        self.places(facet).for_each(|place| {
+            all += 1.0;
+            on += if place.is_some() { 1.0 } else { 0.0 };
+        });
+        on / all
+    }
+
+    /// Does a part of a triangle lie on it, more than its edges on its rim?
+    fn meets(&self, facet: &Facet) -> bool {
+        self.places(facet).any(|place| place == Some(Place::Inside)) || self.layer.ends_over(facet, self.reach(facet))
+    }
+}
+
+impl Cut {
+    /// Fetches what is not in the workshop, removes it, and joins what is left to the other piece where both end.
+    fn make(&self, survey: &mut Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) {
+        let by_position = work.by_position();
+        let mut wanted: Vec<Position> = self.triangles.iter().flat_map(|m| m.corners.map(Position::of)).collect();
+        wanted.retain(|p| by_position.get(p).is_none_or(|v| !work.complete[*v as usize]));
+        wanted.sort_unstable();
+        wanted.dedup();
+        let wanted: Vec<[f32; 3]> = wanted.into_iter().map(Position::coordinates).collect();
+        let mut doomed: Vec<u32> = self.triangles.iter().filter_map(|m| m.place.err()).collect();
+        if !wanted.is_empty() {
+            let new = survey.promote(&wanted);
+            work.extend_at(survey, &new, &wanted);
+            let mut records: Vec<u32> = self.triangles.iter().filter_map(|m| m.place.ok()).collect();
+            records.sort_unstable();
+            doomed.extend((0..).zip(&work.triangles).filter_map(|(t, triangle)| match triangle.origin {
+                Origin::Input(record) => records.binary_search(&record).is_ok().then_some(t),
+                Origin::Part(_) | Origin::Patch => None,
+            }));
+        }
+        doomed.iter().for_each(|t| work.kill(*t));
+        if let Some(([moving, staying], reach)) = &self.join {
+            // What is cut ends elsewhere now.
+            let mut moving: Vec<Vertex> =
+                doomed.iter().flat_map(|t| work.triangles[*t as usize].v).chain(moving.iter().copied()).collect();
+            moving.sort_unstable();
+            moving.dedup();
+            join(work, [&moving, staying], &Tolerance { weld: *reach, edge_share: tolerance.edge_share }, tolerance);
+        }
+    }
+}
+
+/// Brings boundary vertices of one piece that lie within reach of where the other one ends, but farther than the weld and the splitting of
+/// edges would see, to a vertex there, or onto the edge.
+fn join(work: &mut Work<'_>, [moving, staying]: [&[Vertex]; 2], reach: &Tolerance, seen: &Tolerance) {
+    let (shop, edges) = work.edges();
+    let still: Vec<Vertex> = boundary_vertices(edges);
+    let is_still = |v: &&Vertex| still.binary_search(v).is_ok();
+    let staying: Vec<Vertex> = staying.iter().filter(is_still).copied().collect();
+    let moving: Vec<Vertex> = moving.iter().filter(is_still).copied().collect();
+    let is_in = |list: &[Vertex], v: Vertex| list.binary_search(&v).is_ok();
+    let rims: Vec<RimEdge> = edges
+        .iter()
+        .filter(|e| e.is_boundary() && is_in(&staying, e.low) && is_in(&staying, e.high))
+        .map(|e| RimEdge { ends: [shop.place(e.low), shop.place(e.high)], normal: glam::DVec3::ZERO, piece: 0 })
+        .collect();
+    let layer = Layer::new(Vec::new(), rims);
+    let points = BoxTree::new(&staying.iter().map(|v| around(&[shop.place(*v)], 0.0)).collect::<Vec<_>>());
+    let (mut pairs, mut feet, mut found) = (Vec::new(), Vec::new(), Vec::new());
+    for v in moving {
+        let (p, most) = (shop.place(v), reach.at(shop, v));
+        let wanted = around(&[p], most);
+        if !staying.is_empty() {
+            points.meeting(&wanted, &mut found);
+        } else {
+            found.clear();
+        }
+        let near = |w: Vertex| shop.distance(v, w) <= most.min(reach.at(shop, w));
+        let nearest = found
+            .iter()
+            .map(|w| staying[*w as usize])
+            .filter(|w| near(*w))
+            .min_by(|a, b| shop.distance(v, *a).total_cmp(&shop.distance(v, *b)).then(a.cmp(b)));
+        if let Some(w) = nearest {
+            pairs.push((v.min(w), v.max(w)));
+            continue;
+        }
+        let foot = layer
+            .rims_near(&wanted)
+            .into_iter()
+            .map(|r| r.foot(p))
+            .min_by(|a, b| p.distance_squared(*a).total_cmp(&p.distance_squared(*b)))
+            .filter(|foot| (seen.at(shop, v)..=most).contains(&p.distance(*foot)));
+        feet.extend(foot.map(|foot| (v, Position::nearest(foot))));
+    }
+    let mut known = if feet.is_empty() { HashMap::new() } else { work.by_position() };
+    for (v, foot) in feet {
+        // Where a vertex is already, the two would be one when the file is read.
+        known.entry(foot).or_insert_with(|| {
+            let there = work.add_vertex(foot);
+            work.merge(there, v);
+            there
+        });
+    }
+    pairs.sort_unstable();
+    weld::weld_pairs(work, &pairs, reach.weld);
+}
+
+/// Wider on all sides, rounded outward.
+fn widened(b: &Bounds, by: f64) -> Bounds {
+    around(&[submesh::place(b.lo), submesh::place(b.hi)], by)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{After, after, cuboid, plate, reversed, shifted};
+
+    /// Two pieces this far apart.
+    fn cut(lower: &[Corners], upper: &[Corners], up: f32) -> After<u64> {
+        after(&[lower, &shifted(upper, [0.0, 0.0, up])].concat(), |d, _| {
+            cut_back(&mut d.survey, &mut Work::new(&mut d.shop), &d.tolerance)
+        })
+    }
+
+    #[test]
+    fn of_two_plates_that_lap_one_is_cut_back_and_joined() {
+        let [left, right] = [plate(8, |x, _| x < 5), plate(8, |x, _| x >= 3)];
+        // Sixteen squares lie on the other plate, as far as a ten-thousandth of their size goes. Both end at x = 5 then.
+        let got = cut(&left, &right, 0.001);
+        assert_eq!((got.result, got.defects.boundary_loops, got.defects.boundary_edges), (32, 1, 32));
+        assert_eq!(got.defects.triangles, 128);
+        assert_eq!(cut(&left, &right, 0.01).result, 0, "too far apart");
+        assert_eq!(cut(&left, &reversed(&right), 0.001).result, 0, "a thin wall");
+    }
+
+    #[test]
+    fn what_is_left_of_a_piece_ends_in_front_of_the_other() {
+        // Its squares are shifted by half of one.
+        let right = shifted(&plate(8, |x, y| x >= 3 && (2..6).contains(&y)), [0.5, 0.5, 0.0]);
+        let got = cut(&plate(8, |x, _| x < 5), &right, 0.001);
+        // Of eight triangles a row of squares, two that reach over the end.
+        assert_eq!(got.result, 4 * 4);
+        assert_eq!((got.defects.boundary_loops, got.defects.components), (2, 2));
+    }
+
+    #[test]
+    fn a_lid_is_cut_to_its_hole() {
+        let around = plate(8, |x, y| !(3..5).contains(&x) || !(3..5).contains(&y));
+        let lid = plate(8, |x, y| (2..6).contains(&x) && (2..6).contains(&y));
+        let got = cut(&around, &lid, 0.0005);
+        assert_eq!((got.result, got.defects.triangles, got.defects.boundary_loops), (24, 128, 1));
+    }
+
+    #[test]
+    fn a_patch_that_lies_on_a_body_goes_and_one_that_reaches_beyond_stays() {
+        let body = cuboid([0.0, 0.0, -8.0], [8.0, 8.0, 0.0]);
+        let got = cut(&body, &plate(8, |x, _| (2..6).contains(&x)), 0.001);
+        assert_eq!(got.result, 64);
+        assert!(got.verdict.good, "{:?}", got.verdict);
+        let beyond = shifted(&plate(8, |_, _| true), [4.0, 0.0, 0.0]);
+        assert_eq!(cut(&body, &beyond, 0.001).result, 0);
+    }
+
+    #[test]
+    fn neighbours_stay() {
+        let [left, right] = [plate(8, |x, _| x < 4), plate(8, |x, _| x >= 4)];
+        for up in [0.0, 0.001] {
+            assert_eq!(cut(&left, &right, up).result, 0);
+        }
+        // A plate with a loose patch in its hole.
+        let around = plate(8, |x, y| !(3..5).contains(&x) || !(3..5).contains(&y));
+        assert_eq!(cut(&around, &plate(8, |x, y| (3..5).contains(&x) && (3..5).contains(&y)), 0.001).result, 0);
+    }
+}

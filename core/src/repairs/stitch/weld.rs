@@ -1,0 +1,189 @@
+//! Merging of boundary vertices that lie within the weld tolerance of each other: connected components
+//! of the graph of pairs within tolerance, bounded in extent.
+//!
+//! A merge that would leave a new non-manifold edge is taken back.
+
+use crate::repairs::shared::account::RepairName;
+use crate::repairs::shared::context::{Changes, Done, Repair};
+use crate::repairs::shared::work::Work;
+use crate::submesh::edges::Edges;
+use crate::submesh::near::{self, Tolerance};
+use crate::submesh::{Shop, Vertex};
+
+/// Boundary vertices within the weld tolerance become one.
+pub(crate) const REPAIR: Repair = Repair {
+    name: RepairName::ToleranceWeld,
+    changes: Changes::Surface,
+    run: |cx| {
+        let welded = weld(&mut cx.work, cx.tolerance);
+        if welded.taken_back > 0 {
+            tracing::info!(clusters = welded.taken_back, "Welds taken back, since they made an edge of more than two triangles.");
+        }
+        let note = "boundary vertices within the weld tolerance, moved to the one with most triangles";
+        Ok(Done::count(welded.vertices, note))
+    },
+};
+
+/// What the weld did.
+#[derive(Debug, Default)]
+pub(crate) struct Welded {
+    pub(crate) vertices: u64,
+    pub(crate) taken_back: u64,
+}
+
+/// How often clusters that made a defect are taken out and the rest tried again.
+const ATTEMPTS: usize = 4;
+
+/// Welds boundary vertices. O(n log n) in the boundary.
+pub(crate) fn weld(work: &mut Work<'_>, tolerance: &Tolerance) -> Welded {
+    let (shop, edges) = work.edges();
+    let pairs = near::close_pairs(shop, edges, tolerance);
+    weld_pairs(work, &pairs, tolerance.weld)
+}
+
+/// Welds pairs of boundary vertices, smaller number first, sorted, which lie within `tolerance` of each other.
+pub(crate) fn weld_pairs(work: &mut Work<'_>, pairs: &[(Vertex, Vertex)], tolerance: f64) -> Welded {
+    let mut clusters = clusters(work, pairs, tolerance);
+    let mut result = Welded::default();
+    if clusters.is_empty() {
+        return result;
+    }
+    let edges = work.take_edges();
+    let before = work.triangles.clone();
+    for _ in 0..ATTEMPTS {
+        if clusters.is_empty() {
+            return result;
+        }
+        let target = targets(work, &clusters);
+        work.move_to(&target);
+        crate::repairs::cleanup::duplicates::drop_repeated(work);
+        work.relink();
+        crate::repairs::cleanup::duplicates::drop_duplicates(work);
+        let bad = newly_nonmanifold(work.edges().1, &edges, &clusters, &target);
+        if !bad.iter().any(|b| *b) {
+            result.vertices = clusters.iter().map(|c| c.len() as u64 - 1).sum();
+            return result;
+        }
+        work.restore(&before);
+        result.taken_back += bad.iter().filter(|b| **b).count() as u64;
+        let mut bad = bad.into_iter();
+        clusters.retain(|_| !bad.next().unwrap_or(false));
+    }
+    result
+}
+
+/// Connected components of the pairs. One wider than four tolerances is cut up greedily, in order of vertex number.
+fn clusters(shop: &Shop, pairs: &[(Vertex, Vertex)], tolerance: f64) -> Vec<Vec<Vertex>> {
+    let mut vertices: Vec<Vertex> = pairs.iter().flat_map(|(a, b)| [*a, *b]).collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    let number = |v: Vertex| vertices.binary_search(&v).unwrap_or(0) as u32;
+    let mut parents: Vec<u32> = (0..vertices.len() as u32).collect();
+    for (a, b) in pairs {
+        crate::util::union_find::unite(&mut parents, number(*a), number(*b));
+    }
+    let mut by_root: Vec<(u32, Vertex)> =
+        (0..vertices.len() as u32).map(|i| (crate::util::union_find::find(&mut parents, i), vertices[i as usize])).collect();
+    by_root.sort_unstable();
+    let mut all = Vec::new();
+    for group in by_root.chunk_by(|a, b| a.0 == b.0) {
+        let mut rest: Vec<Vertex> = group.iter().map(|g| g.1).collect();
+        while let Some(first) = rest.first().copied() {
+            // A component that hangs together within the bound is taken whole: its first vertex then reaches all of it.
+            let (near, far): (Vec<Vertex>, Vec<Vertex>) = rest.iter().partition(|v| shop.distance(first, **v) <= 2.0 * tolerance);
+            if near.len() > 1 && !share_a_triangle(shop, &near) {
+                all.push(near);
+                rest = far;
+            } else {
+                rest.remove(0);
+            }
+        }
+    }
+    all.sort_unstable();
+    all
+}
+
+/// Two of them are corners of one triangle, which would lose its area.
+fn share_a_triangle(shop: &Shop, cluster: &[Vertex]) -> bool {
+    cluster.iter().any(|v| {
+        shop.star(*v).any(|(t, _)| shop.triangles[t as usize].v.iter().filter(|w| cluster.binary_search(w).is_ok()).count() > 1)
+    })
+}
+
+/// Where each vertex goes: to the one of its cluster with most triangles, the smallest of equals.
+fn targets(shop: &Shop, clusters: &[Vec<Vertex>]) -> Vec<Vertex> {
+    let mut target: Vec<Vertex> = (0..shop.positions.len() as u32).collect();
+    for cluster in clusters {
+        let chosen = cluster.iter().copied().min_by_key(|v| (std::cmp::Reverse(shop.star(*v).count()), *v)).unwrap_or(0);
+        cluster.iter().for_each(|v| target[*v as usize] = chosen);
+    }
+    target
+}
+
+/// Clusters at an edge of more than two triangles that was not one before.
+fn newly_nonmanifold(now: &Edges, before: &Edges, clusters: &[Vec<Vertex>], target: &[Vertex]) -> Vec<bool> {
+    let mut cluster_of = vec![crate::util::union_find::NONE; target.len()];
+    for (i, cluster) in clusters.iter().enumerate() {
+        cluster.iter().for_each(|v| cluster_of[*v as usize] = i as u32);
+    }
+    let mut old: Vec<(Vertex, Vertex)> = before
+        .iter()
+        .filter(|e| e.is_nonmanifold())
+        .map(|e| (target[e.low as usize], target[e.high as usize]))
+        .map(|(a, b)| (a.min(b), a.max(b)))
+        .collect();
+    old.sort_unstable();
+    let mut bad = vec![false; clusters.len()];
+    for edge in now.iter().filter(|e| e.is_nonmanifold()) {
+        if old.binary_search(&(edge.low, edge.high)).is_err() {
+            for v in [edge.low, edge.high] {
+                if let Some(b) = bad.get_mut(cluster_of[v as usize] as usize) {
+                    *b = true;
+                }
+            }
+        }
+    }
+    bad
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Corners, after, cube, shifted};
+
+    #[test]
+    fn the_jittered_corners_of_a_soup_become_one_vertex_each() {
+        // Each triangle a little elsewhere, within the tolerance of 1.7e-5: no two share a vertex.
+        let soup: Vec<Corners> = cube().iter().zip(0u8..).flat_map(|(t, i)| shifted(&[*t], [f32::from(i) * 1e-6; 3])).collect();
+        let got = after(&soup, |d, _| {
+            assert_eq!(d.defects.vertices, 36);
+            weld(&mut Work::new(&mut d.shop), &d.tolerance)
+        });
+        assert_eq!((got.result.vertices, got.result.taken_back, got.defects.vertices), (28, 0, 8));
+        assert!(got.verdict.good, "{:?}", got.verdict);
+    }
+
+    #[test]
+    fn two_vertices_of_one_triangle_are_never_merged() {
+        // The first triangle's short edge is bridged by other triangles' tips, each within reach of the next.
+        let tip = |i: u8| {
+            let (x, y) = (f32::from(i) / 4.0, 10.0 * f32::from(i));
+            [[x, 0.0, 0.0], [x, y, 1.0], [x, y, 9.0]]
+        };
+        let mesh = [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, -9.0, 0.0]], tip(1), tip(2), tip(3)];
+        let got = after(&mesh, |d, _| weld(&mut Work::new(&mut d.shop), &Tolerance { weld: 1.0, edge_share: 0.25 }));
+        // Four in a row, but not the fifth: both ends of the edge are left.
+        assert_eq!(got.result.vertices, 3);
+        assert_eq!((got.defects.triangles, got.defects.degenerate_index), (4, 0));
+    }
+
+    #[test]
+    fn a_weld_that_makes_an_edge_of_three_triangles_is_taken_back() {
+        let (a, b) = ([0.0; 3], [1.0, 0.0, 0.0]);
+        let near = |p: [f32; 3]| [p[0], p[1], 1e-6];
+        let mesh = [[a, b, [0.0, 1.0, 0.0]], [b, a, [0.0, -1.0, 0.0]], [near(a), near(b), [0.0, 0.0, 1.0]]];
+        let got = after(&mesh, |d, _| weld(&mut Work::new(&mut d.shop), &d.tolerance));
+        assert_eq!((got.result.vertices, got.result.taken_back), (0, 2));
+        assert_eq!((got.defects.nonmanifold_edges, got.untouched), (0, 3));
+    }
+}

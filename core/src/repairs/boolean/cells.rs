@@ -1,6 +1,7 @@
 //! The cells of space around what is cut, and the winding numbers there.
 
 use crate::repairs::shared::pieces;
+use crate::util::union_find;
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
@@ -94,8 +95,8 @@ impl Sides {
     }
 
     fn join(&mut self, a: [u32; 2], b: [u32; 2]) {
-        crate::util::union_find::unite(&mut self.parents, a[0], b[0]);
-        crate::util::union_find::unite(&mut self.parents, a[1], b[1]);
+        union_find::unite(&mut self.parents, a[0], b[0]);
+        union_find::unite(&mut self.parents, a[1], b[1]);
     }
 
     /// The winding number at each node whose cell the cut surface tells of; `None` at others, and where that contradicts itself.
@@ -110,66 +111,28 @@ impl Sides {
     ) -> Vec<Option<i32>> {
         let pieces = pieces::pieces(survey, work, reversed);
         let shop: &Shop = work;
-        let mut parents = self.parents.clone();
-        let roots: Vec<u32> = (0..parents.len() as u32).map(|node| crate::util::union_find::find(&mut parents, node)).collect();
-        let root = |node: u32| roots[node as usize];
-        let mut steps: Vec<(u32, u32, i32)> = Vec::with_capacity(2 * self.steps.len());
-        for (front, back, step) in &self.steps {
-            steps.push((root(*front), root(*back), *step));
-            steps.push((root(*back), root(*front), -step));
-        }
-        steps.sort_unstable();
-        steps.dedup();
-        let from = |node: u32| {
-            let first = steps.partition_point(|s| s.0 < node);
-            steps[first..].iter().take_while(move |s| s.0 == node)
-        };
-        // Surfaces that hang together, each with its nodes' winding numbers against its first one's.
-        let mut surface_of = vec![NONE; parents.len()];
-        let mut relative = vec![0i32; parents.len()];
-        let mut sound: Vec<bool> = Vec::new();
-        for start in cut.arrangement.pieces.iter().map(|piece| root(piece.cells[0])) {
-            if surface_of[start as usize] != NONE {
-                continue;
-            }
-            let surface = sound.len() as u32;
-            sound.push(true);
-            surface_of[start as usize] = surface;
-            let mut queue = vec![start];
-            while let Some(at) = queue.pop() {
-                for (_, to, step) in from(at) {
-                    let winding = relative[at as usize] + step;
-                    if surface_of[*to as usize] == NONE {
-                        surface_of[*to as usize] = surface;
-                        relative[*to as usize] = winding;
-                        queue.push(*to);
-                    } else if relative[*to as usize] != winding {
-                        sound[surface as usize] = false;
-                    }
-                }
-            }
-        }
-        let surface_at = |node: u32| surface_of.get(root(node) as usize).filter(|s| **s != NONE).map(|s| *s as usize);
-        let samples = self.samples(shop, cut, crossing, clusters, surface_at);
+        let surfaces = CutSurfaces::of(self, cut);
+        let samples = self.samples(shop, cut, crossing, clusters, |node| surfaces.at(node));
         let points: Vec<[f64; 3]> = samples.iter().map(|sample| sample.point).collect();
         let found = bodies::windings(survey, shop, &pieces, reversed, &points);
-        let mut bases: Vec<Option<i32>> = vec![None; sound.len()];
+        let mut bases: Vec<Option<i32>> = vec![None; surfaces.consistent.len()];
         for (sample, winding) in samples.iter().zip(found) {
-            if let Some(surface) = surface_at(sample.node).filter(|surface| sound[*surface]) {
-                bases[surface] = Some(winding - relative[root(sample.node) as usize]);
+            if let Some(surface) = surfaces.at(sample.node).filter(|surface| surfaces.consistent[*surface]) {
+                bases[surface] = Some(winding - surfaces.winding(sample.node));
             }
         }
         // What lies in the material of others would go: it is resolved for itself, and it is asked later if it is to go.
-        let mut least: Vec<i32> = vec![i32::MAX; sound.len()];
+        let mut least: Vec<i32> = vec![i32::MAX; bases.len()];
         let absolute = |node: u32| {
-            let surface = surface_at(node)?;
-            Some((surface, bases[surface]? + relative[root(node) as usize]))
+            let surface = surfaces.at(node)?;
+            Some((surface, bases[surface]? + surfaces.winding(node)))
         };
-        for (surface, winding) in (0..parents.len() as u32).filter_map(absolute) {
+        let nodes = || 0..surfaces.roots.len() as u32;
+        for (surface, winding) in nodes().filter_map(absolute) {
             least[surface] = least[surface].min(winding);
         }
         let own = |node: u32| absolute(node).map(|(surface, winding)| winding - least[surface].max(0));
-        (0..parents.len() as u32).map(own).collect()
+        nodes().map(own).collect()
     }
 
     /// For each surface that was cut one of its triangles: one that crosses nothing if there is any, of the largest, of the first.
@@ -236,4 +199,70 @@ fn in_front(corners: [DVec3; 3]) -> (f64, [f64; 3]) {
     let largest = corners.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
     // 2⁻⁴⁰: far above what f64 rounds, far below what f32 can tell.
     (area, (point + normal / area.max(f64::MIN_POSITIVE) * (largest * 9.1e-13)).to_array())
+}
+
+/// Surfaces that were cut and hang together, each with the winding numbers of the cells along it against that of its first one.
+struct CutSurfaces {
+    /// By node: the node that stands for its cell.
+    roots: Vec<u32>,
+    /// By root.
+    surface_of: Vec<u32>,
+    relative: Vec<i32>,
+    /// By surface: all ways to a cell say the same of it.
+    consistent: Vec<bool>,
+}
+
+impl CutSurfaces {
+    fn of(sides: &Sides, cut: &Cut) -> Self {
+        let mut parents = sides.parents.clone();
+        let roots: Vec<u32> = (0..parents.len() as u32).map(|node| union_find::find(&mut parents, node)).collect();
+        let mut steps: Vec<(u32, u32, i32)> = Vec::with_capacity(2 * sides.steps.len());
+        for (front, back, step) in &sides.steps {
+            let (front, back) = (roots[*front as usize], roots[*back as usize]);
+            steps.push((front, back, *step));
+            steps.push((back, front, -step));
+        }
+        steps.sort_unstable();
+        steps.dedup();
+        let (surface_of, relative) = (vec![NONE; roots.len()], vec![0; roots.len()]);
+        let mut all = Self { roots, surface_of, relative, consistent: Vec::new() };
+        for piece in &cut.arrangement.pieces {
+            all.follow(all.roots[piece.cells[0] as usize], &steps);
+        }
+        all
+    }
+
+    /// Goes along a surface from one of its cells, unless it is known already.
+    fn follow(&mut self, start: u32, steps: &[(u32, u32, i32)]) {
+        if self.surface_of[start as usize] != NONE {
+            return;
+        }
+        let surface = self.consistent.len();
+        self.consistent.push(true);
+        self.surface_of[start as usize] = surface as u32;
+        let mut waiting = vec![start];
+        while let Some(at) = waiting.pop() {
+            let first = steps.partition_point(|s| s.0 < at);
+            for (_, to, step) in steps[first..].iter().take_while(|s| s.0 == at) {
+                let (to, winding) = (*to as usize, self.relative[at as usize] + step);
+                if self.surface_of[to] == NONE {
+                    self.surface_of[to] = surface as u32;
+                    self.relative[to] = winding;
+                    waiting.push(to as u32);
+                } else if self.relative[to] != winding {
+                    self.consistent[surface] = false;
+                }
+            }
+        }
+    }
+
+    /// The surface along which a node's cell lies.
+    fn at(&self, node: u32) -> Option<usize> {
+        self.surface_of.get(self.roots[node as usize] as usize).filter(|s| **s != NONE).map(|s| *s as usize)
+    }
+
+    /// Of a node's cell, against the first one along its surface.
+    fn winding(&self, node: u32) -> i32 {
+        self.relative[self.roots[node as usize] as usize]
+    }
 }

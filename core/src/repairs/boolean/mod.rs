@@ -11,6 +11,7 @@ pub(crate) mod passes;
 pub(crate) mod perturb;
 pub(crate) mod refill;
 pub(crate) mod resolve;
+pub(crate) mod rounds;
 pub(crate) mod select;
 pub(crate) mod snap;
 pub(crate) mod state;

@@ -25,21 +25,18 @@ use crate::repairs::holes::fill;
 use crate::repairs::shared::account::RepairName;
 use crate::repairs::shared::context::{Changes, Context, Done, Repair};
 use crate::repairs::shared::pieces;
-use std::collections::BTreeSet;
 use std::path::Path;
 
 use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::settings::{Limits, Profile};
 use crate::geometry::arrange::Arrange;
-use crate::geometry::sums::{Bounds, Extent};
-use crate::repairs::boolean::cells::Sides;
+use crate::geometry::sums::Extent;
 use crate::repairs::boolean::clusters::Clusters;
-use crate::repairs::boolean::cut::Cut;
-use crate::repairs::boolean::meetings::meetings;
 use crate::repairs::boolean::perturb::Level;
 pub(crate) use crate::repairs::boolean::refill::{Refill, refill_of};
-use crate::repairs::boolean::state::{Before, FINEST, Failure, Halted, State, Stuck, Tried, WIDER, coincident, corners};
+use crate::repairs::boolean::rounds::Attempt;
+use crate::repairs::boolean::state::{Before, FINEST, Failure, Halted, State, Stuck, coincident, corners};
 pub(crate) use crate::repairs::boolean::state::{Resolved, join_in};
 use crate::repairs::boolean::track::Track;
 use crate::repairs::shared::overlay::Overlay;
@@ -81,27 +78,6 @@ fn account_for(cx: &mut Context<'_, '_>) -> Result<Done> {
     Ok(Done { changed, ..Done::count(pairs, note) })
 }
 
-/// Rounds of cutting and rounding.
-const ROUNDS: u32 = 24;
-
-/// Pairs may become more from round to round, but not more than so many times as many as at first, or as a few.
-const GROWTH: usize = 4;
-const FEW: usize = 1024;
-
-/// What cutting takes beside the workshop, for each of these meetings and for each pair that crosses. Measured: 415 MB for 78 000 pairs of two bodies
-/// that cross everywhere, 1.9 GB for 229 000 pairs with 24 million meetings.
-const BYTES_PER_MEETING: u64 = 48;
-const BYTES_PER_PAIR: u64 = 4096;
-
-const WIDEST: f64 = 1.0 / 4096.0;
-
-/// Rounds after which what crosses is taken out, if it has not become half as much in the last one.
-const REFILL_AFTER: u32 = 2;
-
-/// And no patch in its place is farther away than this share of the power of two above the largest coordinate, nor than a width farther in each
-/// round.
-const FARTHEST: f64 = 1.0 / 256.0;
-
 /// A closed surface is a flake if it is no thicker than this share of the step of new vertices.
 const FLAKE: f64 = 1.0 / 16.0;
 
@@ -140,13 +116,8 @@ pub(crate) fn resolve(
     }
     divide(survey, work, reversed, corners(survey, work, &overlay, &pairs), means)?;
     let before = Before { triangles: work.triangles.clone(), reversed: reversed.clone() };
-    let mut left: Vec<Failure> = Vec::new();
-    let mut regions_left: Vec<Unsettled> = Vec::new();
-    let mut blocked: Vec<bool> = Vec::new();
-    let mut levels: Vec<Level> = Vec::new();
-    let (mut bodies, mut volume) = (0, 0);
     let largest = above(survey.bounds.largest_coordinate());
-    let mut state = State {
+    let state = State {
         survey,
         work,
         reversed,
@@ -157,24 +128,63 @@ pub(crate) fn resolve(
         first_vertex: 0,
         step: largest * FINEST,
     };
+    attempt_until_done(
+        state,
+        &Attempt { engine, overlay: &overlay, pairs: &pairs, levels: &[], profile, limits: means.limits },
+        means,
+    )
+}
+
+/// What attempts that failed have left.
+#[derive(Default)]
+struct Failed {
+    left: Vec<Failure>,
+    regions: Vec<Unsettled>,
+    /// By piece: it takes no part any more.
+    blocked: Vec<bool>,
+    /// By piece.
+    levels: Vec<Level>,
+}
+
+impl Failed {
+    /// Takes in why an attempt failed, once all is as it was: the surfaces that it failed with are tried in another way, or not any more.
+    fn learn(&mut self, state: &mut State<'_, '_, '_>, Stuck { failure, triangles }: Stuck) {
+        let failed = state.clusters.pieces_of(&triangles);
+        state.restore();
+        let again: Vec<(u32, Level)> = failed.iter().filter_map(|p| Some((*p, self.levels[*p as usize].next()?))).collect();
+        if failure == Failure::Endless && !again.is_empty() {
+            again.into_iter().for_each(|(piece, level)| self.levels[piece as usize] = level);
+            return;
+        }
+        self.regions.extend(state.unsettled(&failed, failure));
+        self.left.extend(std::iter::repeat_n(failure, failed.len().max(1)));
+        if failed.is_empty() {
+            self.blocked.fill(true);
+        }
+        failed.iter().for_each(|piece| self.blocked[*piece as usize] = true);
+    }
+}
+
+/// Attempts, each without the clusters that failed before.
+fn attempt_until_done(mut state: State<'_, '_, '_>, by: &Attempt<'_>, means: &Means<'_>) -> Result<Resolved> {
+    let mut failed = Failed::default();
+    let mut at_first = None;
     let mut attempts = 0;
     loop {
         attempts += 1;
         let pieces = pieces::pieces(state.survey, state.work, state.reversed);
-        blocked.resize(pieces.list.len(), false);
-        levels.resize(pieces.list.len(), Level::default());
-        if attempts == 1 {
-            (bodies, volume) = measured(&pieces);
-        }
+        failed.blocked.resize(pieces.list.len(), false);
+        failed.levels.resize(pieces.list.len(), Level::default());
+        let (bodies, volume) = *at_first.get_or_insert_with(|| measured(&pieces));
         if attempts > ATTEMPTS {
             // With all of them blocked there is nothing to fail with.
-            blocked.fill(true);
+            failed.blocked.fill(true);
         }
-        state.clusters = Clusters::of(&pieces, &blocked);
+        state.clusters = Clusters::of(&pieces, &failed.blocked);
         state.first_triangle = state.work.triangles.len() as u32;
         state.first_vertex = state.work.positions.len() as Vertex;
         let taken_part: Vec<bool> = (0..state.work.triangles.len() as u32).map(|t| state.clusters.holds(t)).collect();
-        match state.attempt(engine, &overlay, &pairs, &levels, profile, means.limits) {
+        match state.attempt(&Attempt { levels: &failed.levels, ..*by }) {
             Ok(resolved) => {
                 state.drop_specks();
                 let dust = state.drop_dust(&pieces);
@@ -182,9 +192,9 @@ pub(crate) fn resolve(
                 return Ok(Resolved {
                     bodies: bodies.saturating_sub(bodies_now),
                     volume: state.survey.measure.volume(Extent { area: 0, volume: volume - volume_now }),
-                    left: counted(left),
+                    left: counted(failed.left),
                     regions: state.track.regions(&mut state.clusters),
-                    regions_left,
+                    regions_left: failed.regions,
                     taken_part,
                     dust,
                     divided: true,
@@ -192,21 +202,7 @@ pub(crate) fn resolve(
                 });
             }
             Err(Halted::NoMemory { needed, triangles }) => return Err(refused(means, needed, triangles)),
-            Err(Halted::Stuck(Stuck { failure, triangles })) => {
-                let failed = state.clusters.pieces_of(&triangles);
-                state.restore();
-                let again: Vec<(u32, Level)> = failed.iter().filter_map(|p| Some((*p, levels[*p as usize].next()?))).collect();
-                if failure == Failure::Endless && !again.is_empty() {
-                    again.into_iter().for_each(|(piece, level)| levels[piece as usize] = level);
-                    continue;
-                }
-                regions_left.extend(state.unsettled(&failed, failure));
-                left.extend(std::iter::repeat_n(failure, failed.len().max(1)));
-                if failed.is_empty() {
-                    blocked.fill(true);
-                }
-                failed.iter().for_each(|piece| blocked[*piece as usize] = true);
-            }
+            Err(Halted::Stuck(stuck)) => failed.learn(&mut state, stuck),
         }
     }
 }
@@ -244,87 +240,6 @@ fn measured(pieces: &Components) -> (u64, i128) {
 }
 
 impl State<'_, '_, '_> {
-    fn attempt(
-        &mut self,
-        engine: &dyn Arrange,
-        overlay: &Overlay,
-        pairs: &[[u32; 2]],
-        levels: &[Level],
-        profile: &Profile,
-        limits: &Limits,
-    ) -> Tried<Resolved> {
-        let mut resolved = Resolved::default();
-        self.track = Track::default();
-        let too_many = || Stuck::with(Failure::TooMany);
-        let mut crossing = self.crossing(overlay, pairs, profile);
-        self.unite(&crossing);
-        resolved.pairs = crossing.len() as u64;
-        let most = crossing.len().max(FEW) * GROWTH;
-        let mut latest: Option<Overlay> = None;
-        if let Some((met, moved)) = self.spread(&crossing, levels, profile)? {
-            resolved.displaced = moved;
-            (crossing, latest) = (met.crossing, Some(met.overlay));
-        }
-        // What is nearer is made one, and what is taken out has its patch within the limit.
-        let (mut width, mut limit) = (self.step, self.step * WIDER);
-        while !crossing.is_empty() {
-            let triangles: BTreeSet<u32> = crossing.iter().flatten().copied().collect();
-            if resolved.rounds == ROUNDS || resolved.rounds > 0 && crossing.len() > most {
-                return Err(Stuck { failure: Failure::Endless, triangles: triangles.into_iter().collect() }.into());
-            }
-            tracing::debug!(round = resolved.rounds, pairs = crossing.len(), triangles = triangles.len(), "Crossings.");
-            let meetings = meetings(|t| Bounds::of(&self.work.points(t)), &crossing);
-            let meetings = meetings.map_err(|worst| Stuck { failure: Failure::TooMany, triangles: vec![worst] })?;
-            let needed =
-                crate::stream::budget::workshop_bytes(self.work.triangles.len() as u64, self.work.positions.len() as u64)
-                    + meetings * BYTES_PER_MEETING
-                    + crossing.len() as u64 * BYTES_PER_PAIR;
-            if needed > limits.memory_bytes {
-                return Err(Halted::NoMemory { needed, triangles: triangles.len() });
-            }
-            resolved.rounds += 1;
-            self.track.crossed(self.work, &self.clusters, &triangles, resolved.rounds);
-            let pairs_before = crossing.len();
-            let along = self.with_edges_along(latest.as_ref().unwrap_or(overlay), &triangles).ok_or_else(too_many)?;
-            let first_new = self.work.triangles.len() as u32;
-            resolved.displaced = resolved.displaced.max(self.round(engine, &triangles, &along, limits.threads)?);
-            let met = self.met(crossing, profile, |t| t >= first_new)?;
-            self.unite(&met.crossing);
-            tracing::debug!(pairs = met.crossing.len(), "Cut.");
-            width = (width * WIDER).min(self.step / FINEST * WIDEST);
-            limit = (limit * WIDER).min(self.step / FINEST * FARTHEST);
-            let (mut met, mut moved) = self.draw_near(met, width, profile)?;
-            if resolved.rounds >= REFILL_AFTER && 2 * met.crossing.len() >= pairs_before {
-                let refilled;
-                (met, refilled) = self.refill(met, limit, profile)?;
-                moved = moved.max(refilled);
-            }
-            resolved.displaced = resolved.displaced.max(moved);
-            let is_impatient = |t: &u32| {
-                let piece = self.clusters.of_triangle[*t as usize];
-                levels.get(piece as usize) == Some(&Level::Impatient)
-            };
-            if resolved.rounds == 1 && met.crossing.len() >= pairs_before.max(FEW) {
-                let triangles: Vec<u32> = met.crossing.iter().flatten().copied().collect();
-                if triangles.iter().any(is_impatient) {
-                    return Err(Stuck { failure: Failure::Endless, triangles }.into());
-                }
-            }
-            (crossing, latest) = (met.crossing, Some(met.overlay));
-        }
-        Ok(resolved)
-    }
-
-    /// Cuts, decides and rounds once. Returns how far vertices were moved.
-    fn round(&mut self, engine: &dyn Arrange, crossing: &BTreeSet<u32>, along: &BTreeSet<u32>, threads: usize) -> Tried<f64> {
-        let clusters = &self.clusters;
-        let cut = Cut::of(engine, self.work, along, |t| clusters.holds(t), threads);
-        let cut = cut.ok_or_else(|| Stuck::with(Failure::NotArranged))?;
-        let sides = Sides::of(self.survey, self.work, &cut, &self.clusters);
-        let windings = sides.windings(self.survey, self.work, self.reversed, &cut, crossing, &self.clusters);
-        self.apply(&cut, &sides, &windings)
-    }
-
     /// Drops closed surfaces of nothing but parts of triangles that are no thicker than what rounding moves: they are nothing but that. So do those
     /// with other triangles, too, that are far thinner: what was cut off one and is next to nothing.
     fn drop_specks(&mut self) {

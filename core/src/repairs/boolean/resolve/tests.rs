@@ -1,6 +1,11 @@
 //! Small bodies that cross.
 
+use std::collections::BTreeSet;
+
 use crate::contract::settings::Bodies;
+use crate::geometry::sums::Bounds;
+use crate::repairs::boolean::meetings::meetings;
+use crate::repairs::boolean::rounds::BYTES_PER_PAIR;
 use crate::repairs::boolean::state::{follow_neighbours, grown};
 use crate::repairs::shared::pieces;
 use crate::util::steps;
@@ -298,7 +303,9 @@ fn bodies_whose_faces_lie_in_planes_that_f32_cannot_hold_are_spread_by_some_step
         };
         let levels = vec![Level::Spread; pieces.list.len()];
         let profile = Profile::default();
-        let Ok(resolved) = state.attempt(&Rational, &overlay, &pairs, &levels, &profile, &limits) else { panic!("resolved") };
+        let (overlay, pairs, levels) = (&overlay, &pairs[..], &levels[..]);
+        let by = Attempt { engine: &Rational, overlay, pairs, levels, profile: &profile, limits: &limits };
+        let Ok(resolved) = state.attempt(&by) else { panic!("resolved") };
         let regions = state.track.regions(&mut state.clusters);
         assert!(regions.iter().all(|region| region.rung == Rung::Spread) && regions.len() == 1, "{regions:?}");
         resolved.displaced / state.step

@@ -1,3 +1,6 @@
+use crate::algorithms::wrap::tree::Corners;
+use crate::contract::report::Wrap;
+use crate::io::record;
 use std::path::Path;
 
 use super::*;

@@ -1,0 +1,144 @@
+//! What wraps run into: other pieces, and each other.
+
+use super::outcome::Outcome;
+use super::site::Site;
+use crate::algorithms::wrap::tree::Corners;
+use crate::detect::fresh;
+use crate::geometry::position::Position;
+use crate::geometry::sums::Bounds;
+use crate::io::record;
+use crate::repairs::shared::overlay::Overlay;
+use crate::repairs::shared::pieces::components_of_records;
+use crate::util::union_find::NONE;
+use std::collections::BTreeMap;
+
+/// Wraps that are not given up yet, and what they replace.
+struct Accepted<'o> {
+    groups: Vec<(&'o Vec<u32>, &'o Outcome)>,
+    /// By piece: a wrap replaces it.
+    goes: Vec<bool>,
+    /// The triangles of all wraps, numbered after those of the workshop.
+    triangles: Vec<(u32, Corners)>,
+    first: u32,
+    /// Where the triangles of each group begin.
+    starts: Vec<u32>,
+}
+
+impl<'o> Accepted<'o> {
+    /// `None` if there are too many triangles to be numbered.
+    fn of(site: &Site<'_, '_>, outcomes: &'o BTreeMap<Vec<u32>, Outcome>) -> Option<Self> {
+        let groups: Vec<(&Vec<u32>, &Outcome)> = outcomes.iter().filter(|(_, o)| o.told.left.is_none()).collect();
+        let mut goes = vec![false; site.pieces.list.len()];
+        groups.iter().flat_map(|(group, _)| group.iter()).for_each(|piece| goes[*piece as usize] = true);
+        let first = (site.survey.records.len() as u32).checked_add(site.shop.triangles.len() as u32)?;
+        let (mut starts, mut triangles) = (Vec::new(), Vec::new());
+        for (_, outcome) in &groups {
+            starts.push(triangles.len() as u32);
+            let from = first.checked_add(triangles.len() as u32)?;
+            from.checked_add(outcome.triangles.len() as u32)?;
+            triangles.extend((from..).zip(outcome.triangles.iter().copied()));
+        }
+        Some(Self { groups, goes, triangles, first, starts })
+    }
+
+    fn goes(&self, piece: u32) -> bool {
+        piece != NONE && self.goes[piece as usize]
+    }
+
+    /// A piece of the group that a triangle of a wrap replaces; `number`: among the triangles of wraps.
+    fn piece_of(&self, number: u32) -> u32 {
+        self.groups[self.starts.partition_point(|s| *s <= number) - 1].0[0]
+    }
+
+    /// Records that go, ascending.
+    fn gone(&self, site: &Site<'_, '_>) -> Vec<u32> {
+        let of_shop = site.shop.living().filter(|t| self.goes(site.pieces.of_triangle[*t as usize]));
+        let mut gone: Vec<u32> = of_shop.map(|t| site.shop.record(t)).collect();
+        let sound = site.survey.visit_sound(
+            |patch| self.goes(site.pieces.of_patch[patch as usize]),
+            |_| Some(Vec::new()),
+            |_, _| true,
+            |list: &mut Vec<u32>, record, _| list.push(record),
+        );
+        gone.extend(sound.into_iter().flatten());
+        gone.sort_unstable();
+        gone
+    }
+
+    /// Pieces, one of them of a wrap, whose triangles cross. `None` if that is too much work to tell.
+    fn crossing(&self, site: &Site<'_, '_>) -> Option<Vec<[u32; 2]>> {
+        let records = site.survey.records.len() as u32;
+        let overlay = Overlay::of(site.survey, site.shop, site.reversed)?;
+        let gone = self.gone(site);
+        let beside = overlay.changed().iter().filter(|t| !self.goes(site.pieces.of_triangle[**t as usize]));
+        let pairs = fresh::met_by(
+            site.survey,
+            self.triangles.iter().copied(),
+            beside.map(|t| (records + t, site.shop.points(*t))),
+            |record| overlay.is_gone(record) || gone.binary_search(&record).is_ok(),
+            u64::from(self.first) + self.triangles.len() as u64,
+            fresh::self_intersection,
+        )?;
+        let old = pairs.iter().flat_map(|pair| pair.triangles).filter(|number| *number < records);
+        let of_record = components_of_records(site.survey, site.shop, site.pieces, old);
+        let piece = |number: u32| {
+            if let Some(new) = number.checked_sub(self.first) {
+                return self.piece_of(new);
+            }
+            match number.checked_sub(records) {
+                Some(t) => site.pieces.of_triangle[t as usize],
+                None => of_record.get(&number).copied().unwrap_or(NONE),
+            }
+        };
+        Some(pairs.iter().map(|pair| pair.triangles.map(piece)).collect())
+    }
+
+    /// Pieces, one of them of a wrap, that have a vertex in one place: it would be one vertex when the file is read.
+    fn touching(&self, site: &Site<'_, '_>) -> Vec<[u32; 2]> {
+        let mut corners: Vec<(Position, u32)> = Vec::with_capacity(self.triangles.len());
+        for (number, triangle) in &self.triangles {
+            corners.extend(triangle.map(|p| (Position::of(p), self.piece_of(number - self.first))));
+        }
+        corners.sort_unstable();
+        corners.dedup();
+        let same_place = corners.windows(2).filter(|pair| pair[0].0 == pair[1].0);
+        let mut met: Vec<[u32; 2]> = same_place.map(|pair| [pair[0].1, pair[1].1]).collect();
+        let at = |p: [f32; 3]| {
+            let found = corners.partition_point(|(q, _)| *q < Position::of(p));
+            corners.get(found).filter(|(q, _)| *q == Position::of(p)).map(|(_, piece)| *piece)
+        };
+        for t in site.shop.living() {
+            let own = site.pieces.of_triangle[t as usize];
+            if !self.goes(own) {
+                met.extend(site.shop.points(t).into_iter().filter_map(at).map(|piece| [piece, own]));
+            }
+        }
+        let mut bounds = Bounds::EMPTY;
+        self.triangles.iter().for_each(|(_, t)| bounds.include(t));
+        let touched = site.survey.visit_sound(
+            |patch| !site.reversed.dropped[patch as usize] && !self.goes(site.pieces.of_patch[patch as usize]),
+            |reach| reach.overlap(&bounds).map(|_| Vec::new()),
+            |_, corners| corners.iter().any(|p| at(*p).is_some()),
+            |list: &mut Vec<(u32, u32)>, record, patch| list.push((record, patch)),
+        );
+        for (record, patch) in touched.into_iter().flatten() {
+            let corners = record::corners(&site.survey.records[record as usize]);
+            met.extend(corners.into_iter().filter_map(at).map(|piece| [piece, site.pieces.of_patch[patch as usize]]));
+        }
+        met
+    }
+}
+
+/// Which pieces an accepted wrap meets, with one of its own; or which two wraps' pieces meet. `None` if that is too much work to tell.
+pub(crate) fn contacts(site: &Site<'_, '_>, outcomes: &BTreeMap<Vec<u32>, Outcome>) -> Option<Vec<[u32; 2]>> {
+    let accepted = Accepted::of(site, outcomes)?;
+    if accepted.groups.is_empty() {
+        return Some(Vec::new());
+    }
+    let mut met = accepted.crossing(site)?;
+    met.append(&mut accepted.touching(site));
+    met.retain(|[a, b]| a != b && *a != NONE && *b != NONE);
+    met.sort_unstable();
+    met.dedup();
+    Some(met)
+}

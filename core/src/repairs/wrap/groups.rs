@@ -1,0 +1,97 @@
+//! Which pieces of surface are replaced together.
+
+use crate::geometry::position::Position;
+use crate::repairs::shared::pieces::components_of_records;
+use crate::repairs::shared::work::Work;
+use crate::submesh::components::{self, Components};
+use crate::topology::survey::Survey;
+use crate::util::union_find::NONE;
+use std::collections::BTreeMap;
+
+/// Which pieces are to be replaced together.
+pub(crate) struct Groups {
+    pub(crate) parents: Vec<u32>,
+    /// Pieces that are no solid, or run into one.
+    pub(crate) broken: Vec<bool>,
+    /// Pieces with a loop that was left open on purpose.
+    pub(crate) kept: Vec<bool>,
+}
+
+impl Groups {
+    pub(crate) fn of(
+        survey: &Survey<'_>,
+        work: &mut Work<'_>,
+        pieces: &Components,
+        pairs: Option<&[[u32; 2]]>,
+        kept_open: &[[f32; 3]],
+    ) -> Self {
+        let (shop, edges) = work.edges();
+        let count = pieces.list.len();
+        let mut groups = Self {
+            parents: (0..count as u32).collect(),
+            broken: pieces.list.iter().map(|piece| piece.open).collect(),
+            kept: vec![false; count],
+        };
+        let of = |t: u32| pieces.of_triangle[t as usize];
+        for edge in edges.iter().filter(|e| e.uses.len() != 2 || e.is_inconsistent()) {
+            edge.uses.windows(2).for_each(|pair| groups.unite(of(pair[0].triangle), of(pair[1].triangle)));
+            edge.uses.iter().for_each(|u| groups.broken[of(u.triangle) as usize] = true);
+        }
+        for v in components::nonmanifold_vertices(shop, edges) {
+            let around: Vec<u32> = shop.star(v).map(|(t, _)| of(t)).collect();
+            around.iter().for_each(|piece| groups.broken[*piece as usize] = true);
+            around.windows(2).for_each(|pair| groups.unite(pair[0], pair[1]));
+        }
+        for t in shop.living().filter(|t| shop.is_collinear(*t)) {
+            groups.broken[of(t) as usize] = true;
+        }
+        match pairs {
+            Some(pairs) => {
+                let records = survey.records.len() as u32;
+                let old = pairs.iter().flatten().copied().filter(|number| *number < records);
+                let of_record = components_of_records(survey, shop, pieces, old);
+                let piece = |number: u32| match number.checked_sub(records) {
+                    Some(t) => Some(of(t)),
+                    None => of_record.get(&number).copied(),
+                };
+                for pair in pairs {
+                    if let [Some(a), Some(b)] = pair.map(|number| piece(number).filter(|piece| *piece != NONE)) {
+                        groups.unite(a, b);
+                        groups.broken[a as usize] = true;
+                        groups.broken[b as usize] = true;
+                    }
+                }
+            }
+            // Anything may run into anything.
+            None => {
+                (1..count as u32).for_each(|piece| groups.unite(0, piece));
+                groups.broken.fill(true);
+            }
+        }
+        let mut kept: Vec<Position> = kept_open.iter().copied().map(Position::of).collect();
+        kept.sort_unstable();
+        for t in shop.living() {
+            if !kept.is_empty() && shop.points(t).iter().any(|p| kept.binary_search(&Position::of(*p)).is_ok()) {
+                groups.kept[of(t) as usize] = true;
+            }
+        }
+        groups
+    }
+
+    pub(crate) fn unite(&mut self, a: u32, b: u32) {
+        if a != NONE && b != NONE {
+            crate::util::union_find::unite(&mut self.parents, a, b);
+        }
+    }
+
+    /// The groups that are to be replaced, each by its pieces, ascending.
+    pub(crate) fn list(&mut self) -> Vec<Vec<u32>> {
+        let mut all: BTreeMap<u32, (Vec<u32>, bool)> = BTreeMap::new();
+        for piece in 0..self.parents.len() as u32 {
+            let (list, is_broken) = all.entry(crate::util::union_find::find(&mut self.parents, piece)).or_default();
+            list.push(piece);
+            *is_broken |= self.broken[piece as usize];
+        }
+        all.into_values().filter(|(_, is_broken)| *is_broken).map(|(list, _)| list).collect()
+    }
+}

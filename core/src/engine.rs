@@ -182,22 +182,11 @@ fn mend(
     clock.lap("topology");
     let surface = diagnosis.surface_bounds();
     let mut report = report(Task::Repair, mesh, &diagnosis, profile, limits);
-    let mut edit = Edit::default();
-    let mut swallowed = Swallowed::default();
-    // What lies in the material of others, or cannot be seen, makes a file no less printable, but it does not belong there.
-    let holds_more = match profile.bodies {
-        Bodies::Union => report.before.nested_positive > 0,
-        Bodies::Visible => report.before.components > 1,
-        Bodies::Keep => false,
-    };
-    if !report.verdict.good || holds_more {
-        progress.at("repair", 0, mesh.records().len() as u64);
-        let repaired = repairs::run(&mut diagnosis, mesh.path(), profile, limits, progress)?;
+    let repaired = repair_diagnosed(&mut diagnosis, mesh, &mut report, (profile, limits), progress)?;
+    if repaired.is_some() {
         clock.lap("repair");
-        edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &repaired.reversed);
-        edit.added.extend(repaired.wrapped.iter().map(|corners| record::encode(*corners, 0)));
-        swallowed = take_account(&mut report, repaired);
     }
+    let (edit, swallowed) = repaired.unwrap_or_default();
     // Of the input's survey, the second look may go on; the memory of its workshop is needed for that of the output.
     let survey = diagnosis.into_survey();
     // Good as it came, or nothing in it could be repaired.
@@ -241,6 +230,31 @@ fn mend(
     clock.lap("verify");
     mesh.check_unchanged()?;
     Ok(report)
+}
+
+/// Repairs what was diagnosed, if there is anything to be repaired: what is to be edited, and what lay in the material of others.
+/// `None`: it is good as it is.
+fn repair_diagnosed(
+    diagnosis: &mut Diagnosis<'_>,
+    mesh: &MeshFile,
+    report: &mut Report,
+    (profile, limits): (&Profile, &Limits),
+    progress: &dyn Progress,
+) -> Result<Option<(Edit, Swallowed)>> {
+    // What lies in the material of others, or cannot be seen, makes a file no less printable, but it does not belong there.
+    let holds_more = match profile.bodies {
+        Bodies::Union => report.before.nested_positive > 0,
+        Bodies::Visible => report.before.components > 1,
+        Bodies::Keep => false,
+    };
+    if report.verdict.good && !holds_more {
+        return Ok(None);
+    }
+    progress.at("repair", 0, mesh.records().len() as u64);
+    let repaired = repairs::run(diagnosis, mesh.path(), profile, limits, progress)?;
+    let mut edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &repaired.reversed);
+    edit.added.extend(repaired.wrapped.iter().map(|corners| record::encode(*corners, 0)));
+    Ok(Some((edit, take_account(report, repaired))))
 }
 
 /// Puts into the report what was done; what lay in the material of others is needed for the verdict.

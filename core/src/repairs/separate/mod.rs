@@ -2,3 +2,5 @@
 
 pub(crate) mod nonmanifold;
 pub(crate) mod pinch_vertices;
+pub(crate) mod places;
+pub(crate) mod separated;

@@ -11,8 +11,9 @@
 //! once all copies have theirs; those that meet anything are tried anew from their next place on. Vertices with an edge that is open, incoherent
 //! or lies between triangles in one direction, and those whose fans cross each other, are left alone.
 
+use crate::repairs::separate::places::{directions, sideways};
+use crate::repairs::separate::separated::Separated;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
-use std::fmt;
 
 use glam::DVec3;
 
@@ -23,7 +24,6 @@ use crate::geometry::position::{self, Position};
 use crate::geometry::sums::{Bounds, step_at};
 use crate::geometry::tri_tri::{Contact, Triangle as Corners, triangles_cross};
 use crate::repairs::shared::overlay::Overlay;
-use crate::repairs::shared::regions::Unsettled;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Reversed, nonmanifold_vertices};
 use crate::submesh::edges::Edge;
@@ -57,65 +57,6 @@ const OPENINGS: usize = 8;
 /// Pairs of triangles that are compared for one copy, at all places that are tried for it together, or around one vertex. Where it takes more,
 /// the vertex is left alone.
 const MOST_PAIRS: usize = 1 << 20;
-
-/// What was taken apart.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Separated {
-    /// Fans that got a copy of their vertex.
-    pub(crate) vertices: u64,
-    /// Edges that got a vertex in their middle, for one wedge of theirs.
-    pub(crate) edges: u64,
-    /// Fans that were closed without their vertex ([`crate::repairs::separate::pinch_vertices`]).
-    pub(crate) removed: u64,
-    /// Vertices that still have several fans, or an edge of more than two triangles.
-    pub(crate) left: u64,
-    /// How far a copy is from where it was made, or a surface from where its vertex was.
-    pub(crate) farthest: f64,
-    /// Where: copies that share triangles are in one.
-    pub(crate) regions: Vec<Region>,
-    /// And where surfaces still meet: each vertex for itself.
-    pub(crate) regions_left: Vec<Unsettled>,
-}
-
-impl Separated {
-    /// Some fans were closed without their vertex.
-    pub(crate) fn closed(&mut self, work: &mut Work<'_>, mut regions: Vec<Region>) {
-        self.removed += regions.len() as u64;
-        self.farthest = regions.iter().fold(self.farthest, |farthest, region| farthest.max(region.moved));
-        self.regions.append(&mut regions);
-        let (shop, edges) = work.edges();
-        *self = std::mem::take(self).but(shop, &nonmanifold_vertices(shop, edges));
-    }
-
-    /// At these vertices surfaces still meet.
-    fn but(self, shop: &Shop, vertices: &[Vertex]) -> Self {
-        let one = |v: &Vertex| {
-            let at = shop.positions[*v as usize];
-            let reason = Some("surfaces that meet there could not be taken apart".into());
-            let region = Region { rung: Rung::Left, bounds: [at; 2], count: 1, rounds: 0, moved: 0.0, reason };
-            Unsettled { region, at }
-        };
-        let regions_left = vertices.iter().map(one).collect();
-        Self { left: vertices.len() as u64, regions_left, ..self }
-    }
-}
-
-impl fmt::Display for Separated {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { vertices, edges, removed, left, farthest, .. } = self;
-        write!(
-            f,
-            "surfaces that met given a vertex of their own: {vertices} at vertices, {edges} on edges, moved by at most {farthest:e}"
-        )?;
-        if *removed > 0 {
-            write!(f, "; closed without it: {removed}")?;
-        }
-        if *left > 0 {
-            write!(f, "; vertices where surfaces still meet: {left}")?;
-        }
-        Ok(())
-    }
-}
 
 /// Takes surfaces apart at all vertices where that is possible. O(workshop) and a look at all boxes around what moves, if anything does.
 pub(crate) fn separate(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reversed, profile: &Profile) -> Separated {
@@ -545,41 +486,6 @@ fn surfaces(survey: &Survey<'_>, shop: &Shop, wedges: &Wedges) -> Vec<u32> {
         first[root] = first[root].min(record);
     }
     (0..shop.triangles.len() as u32).map(|t| first[crate::util::union_find::find(&mut parents, patches + t) as usize]).collect()
-}
-
-/// Ways to go from a vertex of surface with these unit normals, turned inward: first to the middle of the smallest ball around their ends, which
-/// leads away from all planes alike if any way leads into the material behind each of them; then the opposite way, along the axes, and between
-/// them. Of each the largest component is 1.
-fn directions(inward: impl Iterator<Item = DVec3>) -> Vec<DVec3> {
-    let inward: Vec<DVec3> = inward.collect();
-    let mut middle = inward.first().copied().unwrap_or(DVec3::ZERO);
-    // Bădoiu & Clarkson, "Smaller core-sets for balls", SODA 2003.
-    for k in 2..=64 {
-        let far = inward.iter().fold((0.0, middle), |far, n| {
-            let distance = (*n - middle).length_squared();
-            if distance > far.0 { (distance, *n) } else { far }
-        });
-        middle += (far.1 - middle) / f64::from(k);
-    }
-    let axes = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|d| [d, -d]);
-    let between = (0..8).map(|k| DVec3::from_array([0, 1, 2].map(|bit| if k >> bit & 1 == 1 { 1.0 } else { -1.0 })));
-    let largest = middle.abs().max_element();
-    let own = (largest > 1e-6).then(|| middle / largest).into_iter().flat_map(|d| [d, -d]);
-    own.chain(axes).chain(between).collect()
-}
-
-/// More ways to go, where all of these are blocked: along the edges that end there, and between two axes. Of each the largest component is 1.
-fn sideways(edges: &[DVec3]) -> Vec<DVec3> {
-    let along = edges.iter().map(|edge| *edge / edge.abs().max_element());
-    let signs = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
-    let between = (0..3).flat_map(|k| {
-        signs.map(|(x, y)| {
-            let mut way = [0.0; 3];
-            (way[k], way[(k + 1) % 3]) = (x, y);
-            DVec3::from_array(way)
-        })
-    });
-    along.chain(between).collect()
 }
 
 /// What lies on something can be lifted off it; what crosses it cannot.

@@ -15,7 +15,7 @@ use crate::contract::report::{Region, Rung};
 use crate::contract::settings::Profile;
 use crate::geometry::sums::Bounds;
 use crate::repairs::boolean::resolve::{Refill, join_in, refill_of};
-use crate::repairs::separate::nonmanifold::Separated;
+use crate::repairs::separate::separated::Separated;
 use crate::repairs::shared::overlay::Overlay;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Reversed, nonmanifold_vertices};

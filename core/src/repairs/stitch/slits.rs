@@ -80,33 +80,11 @@ struct Slits {
 
 impl Slits {
     fn of(shop: &Shop, rims: &[Loop], pairs: impl Iterator<Item = [u32; 2]> + Clone) -> Self {
-        let mut of_vertex = vec![NONE; shop.positions.len()];
-        for (i, rim) in (0..).zip(rims) {
-            for v in &rim.vertices {
-                let of = &mut of_vertex[*v as usize];
-                *of = if *of == NONE { i } else { SEVERAL };
-            }
-        }
-        // The loop of a triangle, if it is along one: `SEVERAL` if along two.
-        let loop_of = |t: u32| {
-            let mut all = shop.triangles[t as usize].v.map(|v| of_vertex[v as usize]).into_iter().filter(|of| *of != NONE);
-            let first = all.next()?;
-            Some(if all.all(|of| of == first) { first } else { SEVERAL })
-        };
-        let mut records: Vec<u32> = pairs.clone().flatten().collect();
-        records.sort_unstable();
-        records.dedup();
-        let triangles: BTreeMap<u32, u32> = shop
-            .living()
-            .filter_map(|t| match shop.triangles[t as usize].origin {
-                Origin::Input(record) => records.binary_search(&record).is_ok().then_some((record, t)),
-                Origin::Part(_) | Origin::Patch => None,
-            })
-            .collect();
+        let along = Along::of(shop, rims, pairs.clone());
         let mut sides: Vec<Sides> = rims.iter().map(|_| Sides::default()).collect();
         for pair in pairs {
-            let there = pair.map(|record| triangles.get(&record).copied());
-            let of = there.map(|t| t.and_then(loop_of));
+            let there = pair.map(|record| along.triangles.get(&record).copied());
+            let of = there.map(|t| t.and_then(|t| along.loop_of(shop, t)));
             if of == [None, None] {
                 continue;
             }
@@ -120,17 +98,7 @@ impl Slits {
                     && i == j
                     && let Some(sides) = sides.get_mut(i as usize)
                 {
-                    sides.crossing.extend([a, b]);
-                    for (t, other) in [(a, b), (b, a)] {
-                        let of_other = shop.triangles[other as usize].v;
-                        let of_loop = shop.triangles[t as usize].v.into_iter().filter(|v| of_vertex[*v as usize] == i);
-                        for v in of_loop.filter(|v| !of_other.contains(v)) {
-                            let behind = side(&shop.points(other), shop.positions[v as usize]);
-                            let [behind_of, before] = sides.seen.entry(v).or_default();
-                            *behind_of += u32::from(behind > 0.0);
-                            *before += u32::from(behind < 0.0);
-                        }
-                    }
+                    sides.cross(shop, [a, b], |v| along.of_vertex[v as usize] == i);
                     continue;
                 }
             }
@@ -141,6 +109,59 @@ impl Slits {
             }
         }
         Self { sides }
+    }
+}
+
+impl Sides {
+    /// Takes in two triangles along the loop that cross each other.
+    fn cross(&mut self, shop: &Shop, [a, b]: [u32; 2], is_of_loop: impl Fn(Vertex) -> bool) {
+        self.crossing.extend([a, b]);
+        for (t, other) in [(a, b), (b, a)] {
+            let of_other = shop.triangles[other as usize].v;
+            let of_loop = shop.triangles[t as usize].v.into_iter().filter(|v| is_of_loop(*v));
+            for v in of_loop.filter(|v| !of_other.contains(v)) {
+                let behind = side(&shop.points(other), shop.positions[v as usize]);
+                let [behind_of, before] = self.seen.entry(v).or_default();
+                *behind_of += u32::from(behind > 0.0);
+                *before += u32::from(behind < 0.0);
+            }
+        }
+    }
+}
+
+/// Which triangles lie along which loop.
+struct Along {
+    /// By vertex: its loop, [`NONE`] or [`SEVERAL`].
+    of_vertex: Vec<u32>,
+    /// By record of the file, of those that cross something: its triangle in the workshop.
+    triangles: BTreeMap<u32, u32>,
+}
+
+impl Along {
+    fn of(shop: &Shop, rims: &[Loop], pairs: impl Iterator<Item = [u32; 2]>) -> Self {
+        let mut of_vertex = vec![NONE; shop.positions.len()];
+        for (i, rim) in (0..).zip(rims) {
+            for v in &rim.vertices {
+                let of = &mut of_vertex[*v as usize];
+                *of = if *of == NONE { i } else { SEVERAL };
+            }
+        }
+        let mut records: Vec<u32> = pairs.flatten().collect();
+        records.sort_unstable();
+        records.dedup();
+        let crossing = |t: u32| match shop.triangles[t as usize].origin {
+            Origin::Input(record) => records.binary_search(&record).is_ok().then_some((record, t)),
+            Origin::Part(_) | Origin::Patch => None,
+        };
+        Self { of_vertex, triangles: shop.living().filter_map(crossing).collect() }
+    }
+
+    /// The loop of a triangle, if it is along one; [`SEVERAL`] if along two.
+    fn loop_of(&self, shop: &Shop, t: u32) -> Option<u32> {
+        let corners = shop.triangles[t as usize].v.into_iter();
+        let mut all = corners.map(|v| self.of_vertex[v as usize]).filter(|of| *of != NONE);
+        let first = all.next()?;
+        Some(if all.all(|of| of == first) { first } else { SEVERAL })
     }
 }
 

@@ -2,6 +2,7 @@ use super::*;
 use crate::contract::report::LoopClass;
 use crate::testing::{After, Corners, after, cube, cuboid, plate, reversed, shifted};
 use proptest::prelude::*;
+use std::collections::BTreeMap;
 
 /// A cube without its top.
 fn filled(profile: &Profile) -> After<Closed> {

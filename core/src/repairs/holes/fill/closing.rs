@@ -1,0 +1,179 @@
+//! The loops of a workshop while they are closed: patches that are in, and loops that are open, with the reason.
+
+use crate::algorithms::triangulate::{self, FillSettings, Rim, Unfillable, strip};
+use crate::contract::report::LoopLeft;
+use crate::detect::holes::{self, loops::Loop};
+use crate::geometry::tri_tri;
+use crate::repairs::holes::patches::{Placed, are_joined, of_workshop};
+use crate::repairs::shared::admission::{Admission, NotAdmitted};
+use crate::repairs::shared::context::{PatchAcross, SheetRim};
+use crate::repairs::shared::work::Work;
+use crate::submesh::{Origin, Shop, Vertex};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What was closed, by method, and what was not.
+#[derive(Debug, Default)]
+pub(crate) struct Closed {
+    pub(crate) loops: u64,
+    pub(crate) by_method: BTreeMap<String, u64>,
+    pub(crate) left: Vec<LoopLeft>,
+    /// Of what was not closed, the rims of lone sheets.
+    pub(crate) sheets: Vec<SheetRim>,
+    /// A vertex of each loop that was left open on purpose: it was not admitted.
+    pub(crate) kept_open: Vec<[f32; 3]>,
+    /// Loops that nothing closes which crosses nothing: the triangles of patches that are to be cut along what they cross, and what to say of the
+    /// loops if that does not come about.
+    pub(crate) across: Vec<PatchAcross>,
+}
+
+/// The loops of a workshop while they are closed.
+pub(crate) struct Closing<'p> {
+    pub(crate) admission: Admission<'p>,
+    pub(crate) max_edges: usize,
+    pub(crate) rims: Vec<Loop>,
+    pub(crate) placed: Vec<Placed>,
+    /// Loops, by number, and why they are not closed.
+    pub(crate) open: Vec<(u32, NotFilled)>,
+    /// Triangles that join the rims of islands to those of their holes, ascending.
+    pub(crate) joints: Vec<u32>,
+}
+
+/// Why a loop stays open.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum NotFilled {
+    #[error(transparent)]
+    NotAdmitted(#[from] NotAdmitted),
+    #[error("every patch tried crosses the surface around")]
+    Crosses,
+    #[error(transparent)]
+    Method(#[from] Unfillable),
+}
+
+/// Whether a patch must not lie on the triangles around its loop.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Neighbours {
+    Heeded,
+    Ignored,
+}
+
+/// Longest list of open loops in a report.
+pub(crate) const LISTED: usize = 1000;
+
+pub(crate) fn left(shop: &Shop, from: Vertex, edges: usize, perimeter: f64, reason: &dyn std::fmt::Display) -> LoopLeft {
+    LoopLeft { at: shop.positions[from as usize], edges: edges as u64, perimeter, reason: reason.to_string() }
+}
+
+/// Name of the method that closes a loop on one line.
+pub(crate) const SLIT: &str = "slit";
+
+/// Name of the method that closes a small loop on the triangles around it.
+pub(crate) const FLAT: &str = "flat on its neighbours";
+
+/// A chord of the patch is an edge of the mesh by now.
+pub(crate) fn meets_new_edge(shop: &Shop, rim: &Loop, patch: &triangulate::Patch) -> bool {
+    let n = rim.vertices.len() as u32;
+    patch.triangles.iter().any(|t| {
+        (0..3).any(|k| {
+            let (i, j) = (t[k], t[(k + 1) % 3]);
+            j != (i + 1) % n && shop.has_edge(rim.vertices[i as usize], rim.vertices[j as usize])
+        })
+    })
+}
+
+/// Vertices of a small one, at most.
+pub(crate) const SMALL: usize = 64;
+
+impl Closing<'_> {
+    pub(crate) fn rim(&self, rim: u32) -> &Loop {
+        &self.rims[rim as usize]
+    }
+
+    pub(crate) fn put_in(&mut self, work: &mut Work<'_>, rim: u32, patch: &triangulate::Patch, method: &'static str) {
+        let triangles = of_workshop(self.rim(rim), patch);
+        self.placed.push(Placed::put_in(work, vec![rim], &triangles, method));
+    }
+
+    /// A triangulation of a loop that crosses none of the `obstacles`.
+    pub(crate) fn fill(
+        &self,
+        shop: &Shop,
+        rim: u32,
+        neighbours: Neighbours,
+        obstacles: &[tri_tri::Triangle],
+    ) -> Result<triangulate::Patch, NotFilled> {
+        let rim = self.rim(rim);
+        self.admission.check(shop, rim)?;
+        let points = rim.points(shop);
+        let apexes = if neighbours == Neighbours::Heeded { rim.apexes(shop) } else { Vec::new() };
+        let forbidden = |i: u32, j: u32| are_joined(shop, rim.vertices[i as usize], rim.vertices[j as usize]);
+        let settings = FillSettings { max_vertices: self.max_edges, ..FillSettings::default() };
+        let of_patch = Rim { points: &points, apexes: &apexes, obstacles, forbidden: &forbidden };
+        if neighbours == Neighbours::Heeded
+            && let Some(patch) = holes::folds(shop, rim).and_then(|folds| strip::zip(&of_patch, folds).ok())
+            && !patch.triangles.iter().any(|t| of_patch.meets_obstacle(&of_patch.corners(*t)))
+        {
+            return Ok(patch);
+        }
+        Ok(triangulate::triangulate(&of_patch, &settings)?)
+    }
+
+    pub(crate) fn finish(mut self, work: &mut Work<'_>) -> Closed {
+        let mut closed = Closed::default();
+        for patch in self.placed.iter().filter(|p| p.count > 0) {
+            let loops = patch.rims.len() as u64;
+            closed.loops += loops;
+            let shaped = match patch {
+                _ if !patch.coarse.is_empty() => " (shaped)",
+                _ if patch.across => " (across a body met already)",
+                _ if patch.to_be_cut => " (to be cut along what it crosses)",
+                _ => "",
+            };
+            *closed.by_method.entry(format!("{}{shaped}", patch.method)).or_default() += loops;
+        }
+        self.drop_idle_joints(work);
+        self.open.sort_by_key(|(rim, _)| *rim);
+        let kept = self.open.iter().filter(|(_, reason)| matches!(reason, NotFilled::NotAdmitted(_)));
+        closed.kept_open = kept.map(|(rim, _)| work.positions[self.rim(*rim).vertices[0] as usize]).collect();
+        for (i, (rim, reason)) in self.open.iter().enumerate() {
+            let rim = self.rim(*rim);
+            if matches!(reason, NotFilled::NotAdmitted(NotAdmitted::Sheet)) {
+                let listed = (i < LISTED).then_some(i);
+                // Of an island's rim and its hole's together, some are joints, which are gone.
+                if let Some(triangle) = rim.triangles.iter().copied().find(|t| work.lives(*t)) {
+                    closed.sheets.push(SheetRim { triangle, edges: rim.vertices.len(), listed });
+                }
+            }
+            if i >= LISTED {
+                continue;
+            }
+            closed.left.push(left(work, rim.vertices[0], rim.vertices.len(), rim.perimeter(work), reason));
+        }
+        closed
+    }
+
+    /// What joined an island to a rim that stays open leads nowhere, unless a patch was closed along it.
+    pub(crate) fn drop_idle_joints(&self, work: &mut Work<'_>) {
+        let of_open = self.open.iter().flat_map(|(rim, _)| &self.rim(*rim).triangles).copied();
+        let mut idle: BTreeSet<u32> = of_open.filter(|t| self.joints.binary_search(t).is_ok()).collect();
+        // The two triangles of a joint stay or go together.
+        loop {
+            let is_needed = |t: &u32| {
+                let v = work.triangles[*t as usize].v;
+                (0..3).any(|k| {
+                    work.star(v[k]).any(|(other, _)| {
+                        let triangle = &work.triangles[other as usize];
+                        triangle.v.contains(&v[(k + 1) % 3]) && triangle.origin == Origin::Patch && !idle.contains(&other)
+                    })
+                })
+            };
+            let needed: Vec<u32> = idle.iter().copied().filter(is_needed).collect();
+            if needed.is_empty() {
+                break;
+            }
+            needed.iter().for_each(|t| {
+                idle.remove(t);
+            });
+        }
+        idle.into_iter().for_each(|t| work.kill(t));
+    }
+}

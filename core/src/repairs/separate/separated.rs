@@ -1,0 +1,67 @@
+//! What was taken apart, for the report.
+
+use crate::contract::report::{Region, Rung};
+use crate::repairs::shared::regions::Unsettled;
+use crate::repairs::shared::work::Work;
+use crate::submesh::components::nonmanifold_vertices;
+use crate::submesh::{Shop, Vertex};
+use std::fmt;
+
+/// What was taken apart.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Separated {
+    /// Fans that got a copy of their vertex.
+    pub(crate) vertices: u64,
+    /// Edges that got a vertex in their middle, for one wedge of theirs.
+    pub(crate) edges: u64,
+    /// Fans that were closed without their vertex ([`crate::repairs::separate::pinch_vertices`]).
+    pub(crate) removed: u64,
+    /// Vertices that still have several fans, or an edge of more than two triangles.
+    pub(crate) left: u64,
+    /// How far a copy is from where it was made, or a surface from where its vertex was.
+    pub(crate) farthest: f64,
+    /// Where: copies that share triangles are in one.
+    pub(crate) regions: Vec<Region>,
+    /// And where surfaces still meet: each vertex for itself.
+    pub(crate) regions_left: Vec<Unsettled>,
+}
+
+impl Separated {
+    /// Some fans were closed without their vertex.
+    pub(crate) fn closed(&mut self, work: &mut Work<'_>, mut regions: Vec<Region>) {
+        self.removed += regions.len() as u64;
+        self.farthest = regions.iter().fold(self.farthest, |farthest, region| farthest.max(region.moved));
+        self.regions.append(&mut regions);
+        let (shop, edges) = work.edges();
+        *self = std::mem::take(self).but(shop, &nonmanifold_vertices(shop, edges));
+    }
+
+    /// At these vertices surfaces still meet.
+    pub(crate) fn but(self, shop: &Shop, vertices: &[Vertex]) -> Self {
+        let one = |v: &Vertex| {
+            let at = shop.positions[*v as usize];
+            let reason = Some("surfaces that meet there could not be taken apart".into());
+            let region = Region { rung: Rung::Left, bounds: [at; 2], count: 1, rounds: 0, moved: 0.0, reason };
+            Unsettled { region, at }
+        };
+        let regions_left = vertices.iter().map(one).collect();
+        Self { left: vertices.len() as u64, regions_left, ..self }
+    }
+}
+
+impl fmt::Display for Separated {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { vertices, edges, removed, left, farthest, .. } = self;
+        write!(
+            f,
+            "surfaces that met given a vertex of their own: {vertices} at vertices, {edges} on edges, moved by at most {farthest:e}"
+        )?;
+        if *removed > 0 {
+            write!(f, "; closed without it: {removed}")?;
+        }
+        if *left > 0 {
+            write!(f, "; vertices where surfaces still meet: {left}")?;
+        }
+        Ok(())
+    }
+}

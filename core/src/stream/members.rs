@@ -14,7 +14,7 @@ use crate::contract::settings::{Limits, Spill};
 use crate::geometry::sums::Bounds;
 use crate::io::disk_space::{self, Need};
 use crate::io::read_ahead::Guide;
-use crate::io::record::{self, Record};
+use crate::io::record::{self, Point, Record};
 use crate::stream::columns::{CellColumns, Columns, Extremes};
 use crate::stream::plan::{ChunkId, Plan};
 use crate::stream::source::{Mapped, Seen, Spooled};
@@ -359,6 +359,17 @@ impl Told<'_> {
     }
 }
 
+/// The chunks whose cells a triangle's box meets, but for those where its corners are at home.
+fn note_visited(plan: &Plan, corners: &[Point; 3], homes: [ChunkId; 3], visited: &mut Vec<ChunkId>) {
+    let mut spread = Bounds::EMPTY;
+    spread.include(corners);
+    plan.meeting(spread.lo, spread.hi, &mut |chunk| {
+        if !homes.contains(&chunk) {
+            visited.push(chunk);
+        }
+    });
+}
+
 fn gather_piece(
     (records, guide): (&[Record], &Guide<'_>),
     offset: u32,
@@ -397,7 +408,7 @@ fn gather_piece(
                 continue;
             }
             passing.bounds.include(&corners);
-            let homes = [plan.home(corners[0]), plan.home(corners[1]), plan.home(corners[2])];
+            let homes = corners.map(|p| plan.home(p));
             if homes[0] == homes[1] && homes[0] == homes[2] {
                 current = homes[0];
                 cell = CellColumns::of(&plan.home_box(current));
@@ -406,13 +417,7 @@ fn gather_piece(
             }
             visited.clear();
             if visitors {
-                let mut spread = Bounds::EMPTY;
-                spread.include(&corners);
-                plan.meeting(spread.lo, spread.hi, &mut |chunk| {
-                    if !homes.contains(&chunk) {
-                        visited.push(chunk);
-                    }
-                });
+                note_visited(plan, &corners, homes, &mut visited);
             }
             let [a, b, c] = homes;
             let distinct = if a == b || b == c { &[a, c][..] } else { &[a, b, c][..if a == c { 2 } else { 3 }] };

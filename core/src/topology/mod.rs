@@ -4,6 +4,7 @@ pub(crate) mod chunk;
 pub(crate) mod chunk_regions;
 pub(crate) mod crossings;
 pub(crate) mod intersect;
+pub(crate) mod solving;
 pub(crate) mod star;
 pub(crate) mod survey;
 pub(crate) mod vertex_table;

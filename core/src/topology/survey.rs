@@ -3,6 +3,7 @@
 //! What comes out does not depend on the chunks: the suspects (all triangles around unsound vertices), and the patches of sound
 //! surface, numbered by their smallest triangle. Everything global is proportional to the seams and the defects, not to the file.
 
+use crate::topology::solving::{Solving, at_home, count_of, take_tables};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -77,12 +78,6 @@ pub(crate) struct Division {
     pub(crate) divided_from: Vec<u32>,
 }
 
-/// Most triangles a workshop can number the corners of, with room for what repairs add.
-const MOST_SUSPECTS: u64 = 1 << 30;
-
-/// Stage name under which the survey reports progress.
-const STAGE: &str = "topology";
-
 impl<'a> Survey<'a> {
     /// Reads `records` twice (once to plan, once by chunks). Looks for self-intersections if asked to. Refuses
     /// when tables would not fit `limits.memory_bytes`.
@@ -108,37 +103,18 @@ impl<'a> Survey<'a> {
 
         let most_tested = crossings::most_tested(records.len() as u64);
         let _span = tracing::debug_span!("chunks", count = plan.chunks()).entered();
-        let [done, suspects, patches, tested, kept] = [const { AtomicU64::new(0) }; 5];
-        let mut chunks = members.each(
-            (records, &guide, &plan),
-            limits.threads,
-            |_| true,
-            Scratch::default,
-            |scratch, chunk, seen, visitors| {
-                // Once it is clear that there is too much to keep, the rest need not be known.
-                if progress.cancelled() || budget.is_exceeded() {
-                    return ChunkTopology::default();
-                }
-                let cell = plan.home_box(chunk);
-                let mut topology = scratch.solve(seen, cell, &measure, &[]);
-                if self_intersections {
-                    let allowance = most_tested.saturating_sub(tested.load(Ordering::Relaxed));
-                    topology.crossings = scratch.cross(visitors, cell, allowance);
-                    tested.fetch_add(topology.crossings.tested, Ordering::Relaxed);
-                    topology.crossings.keep(&kept);
-                }
-                suspects.fetch_add(topology.suspects.len() as u64, Ordering::Relaxed);
-                patches.fetch_add(topology.patches.len() as u64, Ordering::Relaxed);
-                topology.take(&budget);
-                let chunks_done = done.fetch_add(1, Ordering::Relaxed) + 1;
-                progress.at(STAGE, chunks_done * records.len() as u64 / plan.chunks() as u64, records.len() as u64);
-                topology
-            },
-        );
-        if progress.cancelled() {
-            return Err(Error::io(path, STAGE)(std::io::ErrorKind::Interrupted.into()));
-        }
-        check(path, &budget, suspects.into_inner(), patches.into_inner())?;
+        let solving = Solving {
+            path,
+            records,
+            guide: &guide,
+            plan: &plan,
+            members: &members,
+            measure: &measure,
+            budget: &budget,
+            threads: limits.threads,
+            progress,
+        };
+        let mut chunks = solving.all(self_intersections.then_some(most_tested))?;
         budget.give_back(Purpose::Tables, scratch);
         let span = tracing::debug_span!("merge").entered();
         let mut fresh: Vec<(ChunkId, &mut ChunkTopology)> = (0..).map(ChunkId).zip(&mut chunks).collect();
@@ -203,37 +179,20 @@ impl<'a> Survey<'a> {
         let by_home = self.by_home(&all);
         let kept = (0..self.plan.chunks()).filter(|c| !is_fresh[*c]);
         self.parts.take(&budget, kept.clone().map(|c| &self.labels[c]), self.suspects.len() as u64);
-        let suspects = AtomicU64::new(self.suspects.len() as u64);
-        let patches = AtomicU64::new(kept.map(|c| self.parts.of_chunk(ChunkId(c as u32)).len() as u64).sum());
-        let mut solved = self.members.each(
-            (self.records, &self.guide, &self.plan),
-            self.threads,
-            |chunk| is_fresh[chunk.0 as usize],
-            Scratch::default,
-            |scratch, chunk, seen, _| {
-                if progress.cancelled() || budget.is_exceeded() {
-                    return (chunk, ChunkTopology::default());
-                }
-                let cut: Vec<[f32; 3]> = at_home(&by_home, chunk).iter().map(|(_, p)| *p).collect();
-                let topology = scratch.solve(seen, self.plan.home_box(chunk), &self.measure, &cut);
-                suspects.fetch_add(topology.suspects.len() as u64, Ordering::Relaxed);
-                patches.fetch_add(topology.patches.len() as u64, Ordering::Relaxed);
-                topology.take(&budget);
-                (chunk, topology)
-            },
-        );
-        if progress.cancelled() {
-            return Err(Error::io(path, STAGE)(std::io::ErrorKind::Interrupted.into()));
-        }
-        check(path, &budget, suspects.into_inner(), patches.into_inner())?;
-        let mut unsound = Weld::default();
-        unsound.reset(self.suspects.len());
-        for suspect in &self.suspects {
-            let corners = record::corners(&self.records[suspect.triangle as usize]);
-            (0..3).filter(|k| suspect.unsound >> k & 1 == 1).for_each(|k| {
-                unsound.vertex(corners[k]);
-            });
-        }
+        let patches = kept.map(|c| self.parts.of_chunk(ChunkId(c as u32)).len() as u64).sum();
+        let solving = Solving {
+            path,
+            records: self.records,
+            guide: &self.guide,
+            plan: &self.plan,
+            members: &self.members,
+            measure: &self.measure,
+            budget: &budget,
+            threads: self.threads,
+            progress,
+        };
+        let mut solved = solving.again(&is_fresh, &by_home, [self.suspects.len() as u64, patches])?;
+        let unsound = self.unsound();
         let mut fresh: Vec<(ChunkId, &mut ChunkTopology)> =
             solved.iter_mut().map(|(chunk, topology)| (*chunk, topology)).collect();
         let known = (self.records, &self.measure);
@@ -250,6 +209,19 @@ impl<'a> Survey<'a> {
             self.labels[chunk.0 as usize] = topology.labels;
         }
         Ok(Division { fetched, divided_from })
+    }
+
+    /// The corners of suspects that are unsound.
+    fn unsound(&self) -> Weld {
+        let mut unsound = Weld::default();
+        unsound.reset(self.suspects.len());
+        for suspect in &self.suspects {
+            let corners = record::corners(&self.records[suspect.triangle as usize]);
+            (0..3).filter(|k| suspect.unsound >> k & 1 == 1).for_each(|k| {
+                unsound.vertex(corners[k]);
+            });
+        }
+        unsound
     }
 
     /// The patches of some triangles with a sound corner.
@@ -419,48 +391,6 @@ impl<'a> Survey<'a> {
         all.retain(|(s, _)| self.suspects.binary_search_by_key(&s.triangle, |t| t.triangle).is_err());
         all
     }
-}
-
-/// Those of a chunk, of positions by chunk.
-fn at_home(by_home: &[(ChunkId, [f32; 3])], chunk: ChunkId) -> &[(ChunkId, [f32; 3])] {
-    let from = by_home.partition_point(|(home, _)| *home < chunk);
-    &by_home[from..from + by_home[from..].partition_point(|(home, _)| *home == chunk)]
-}
-
-/// Refuses what the chunks found to be too much to keep.
-fn check(path: &Path, budget: &Budget, suspects: u64, pieces: u64) -> Result<()> {
-    budget.check(path, || format!("at least {suspects} triangles lie at defects, in {pieces} pieces of surface or more"))?;
-    refuse_more_than(path, MOST_SUSPECTS, suspects, "triangles lie at defects")?;
-    refuse_more_than(path, chunk::MOST_PATCHES, pieces, "pieces of surface, counted by chunks, are there")
-}
-
-/// Triangles in runs of them.
-fn count_of(runs: &[(u32, u32)]) -> u64 {
-    runs.iter().map(|run| u64::from(run.1)).sum()
-}
-
-/// Refuses what could not be numbered.
-fn refuse_more_than(path: &Path, most: u64, there: u64, what: &str) -> Result<()> {
-    if there <= most {
-        return Ok(());
-    }
-    let advice = format!("at most {most} can be worked on: split the file");
-    Err(Error::Refused { path: path.into(), reason: format!("{there} {what}"), advice })
-}
-
-/// Takes what is known to be needed before the chunks are solved; returns how much of it is free again once they are.
-fn take_tables(path: &Path, budget: &Budget, plan: &Plan, members: &Members, limits: &Limits) -> Result<u64> {
-    let mut counts: Vec<u64> = (0..plan.chunks()).map(|c| members.count(ChunkId(c as u32))).collect();
-    counts.sort_unstable_by(|a, b| b.cmp(a));
-    // A thread's tables are as large as its largest chunk, and no two threads work on the same one.
-    let scratch = counts.iter().take(limits.threads).map(|n| chunk::scratch_bytes(*n)).sum::<u64>();
-    budget.take(Purpose::Tables, scratch + members.heap_bytes(limits.threads) + plan.heap_bytes());
-    let largest = counts.first().copied().unwrap_or(0);
-    budget.check(path, || format!("the largest chunk holds {largest} triangles"))?;
-    let nonfinite = count_of(&members.nonfinite);
-    budget.take(Purpose::Defects, nonfinite * crate::stream::budget::BYTES_PER_NONFINITE);
-    budget.check(path, || format!("{nonfinite} triangles have coordinates that are no finite numbers"))?;
-    Ok(scratch)
 }
 
 #[cfg(test)]

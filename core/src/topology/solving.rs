@@ -1,0 +1,175 @@
+//! The chunks of a file, solved in parallel and within a budget.
+
+use crate::contract::error::{Error, Result};
+use crate::contract::progress::Progress;
+use crate::contract::report::SelfIntersections;
+use crate::contract::settings::Limits;
+use crate::geometry::position;
+use crate::geometry::sums::{Bounds, Measure};
+use crate::io::digest;
+use crate::io::read_ahead::Guide;
+use crate::io::record::{self, Record};
+use crate::io::write_behind;
+use crate::stream::budget::{Budget, Purpose};
+use crate::stream::members::Members;
+use crate::stream::plan::{ChunkId, HomeBox, Plan};
+use crate::stream::source::{Seen, Source, Triangle};
+use crate::topology::chunk::{self, ChunkTopology, Labels, Patch, Scratch, Suspect};
+use crate::topology::chunk_regions::Parts;
+use crate::topology::crossings::{self, Crossings, Pair};
+use crate::topology::vertex_table::{Sieve, Weld};
+use crate::util::union_find::NONE;
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// What chunks are solved from, and with.
+pub(crate) struct Solving<'s, 'a> {
+    pub(crate) path: &'s Path,
+    pub(crate) records: &'a [Record],
+    pub(crate) guide: &'s Guide<'a>,
+    pub(crate) plan: &'s Plan,
+    pub(crate) members: &'s Members,
+    pub(crate) measure: &'s Measure,
+    pub(crate) budget: &'s Budget,
+    pub(crate) threads: usize,
+    pub(crate) progress: &'s dyn Progress,
+}
+
+/// What was found so far that has to be kept.
+struct Found {
+    suspects: AtomicU64,
+    patches: AtomicU64,
+}
+
+impl Found {
+    fn new(suspects: u64, patches: u64) -> Self {
+        Self { suspects: AtomicU64::new(suspects), patches: AtomicU64::new(patches) }
+    }
+
+    fn add(&self, topology: &ChunkTopology) {
+        self.suspects.fetch_add(topology.suspects.len() as u64, Ordering::Relaxed);
+        self.patches.fetch_add(topology.patches.len() as u64, Ordering::Relaxed);
+    }
+}
+
+impl Solving<'_, '_> {
+    /// Once it is clear that there is too much to keep, the rest need not be known.
+    fn is_given_up(&self) -> bool {
+        self.progress.cancelled() || self.budget.is_exceeded()
+    }
+
+    /// All chunks, with the self-intersections that they own if `most_tested` says how many pairs may be tested for that.
+    pub(crate) fn all(&self, most_tested: Option<u64>) -> Result<Vec<ChunkTopology>> {
+        let (found, [done, tested, kept]) = (Found::new(0, 0), [const { AtomicU64::new(0) }; 3]);
+        let all = self.records.len() as u64;
+        let chunks = self.members.each(
+            (self.records, self.guide, self.plan),
+            self.threads,
+            |_| true,
+            Scratch::default,
+            |scratch, chunk, seen, visitors| {
+                if self.is_given_up() {
+                    return ChunkTopology::default();
+                }
+                let cell = self.plan.home_box(chunk);
+                let mut topology = scratch.solve(seen, cell, self.measure, &[]);
+                if let Some(most_tested) = most_tested {
+                    let allowance = most_tested.saturating_sub(tested.load(Ordering::Relaxed));
+                    topology.crossings = scratch.cross(visitors, cell, allowance);
+                    tested.fetch_add(topology.crossings.tested, Ordering::Relaxed);
+                    topology.crossings.keep(&kept);
+                }
+                found.add(&topology);
+                topology.take(self.budget);
+                let chunks_done = done.fetch_add(1, Ordering::Relaxed) + 1;
+                self.progress.at(STAGE, chunks_done * all / self.plan.chunks() as u64, all);
+                topology
+            },
+        );
+        self.check(found)?;
+        Ok(chunks)
+    }
+
+    /// Some chunks again, with vertices that count as unsound, by the chunk where they are at home. `kept`: how many suspects and patches there are
+    /// beside what is found.
+    pub(crate) fn again(
+        &self,
+        is_wanted: &[bool],
+        unsound: &[(ChunkId, [f32; 3])],
+        kept: [u64; 2],
+    ) -> Result<Vec<(ChunkId, ChunkTopology)>> {
+        let found = Found::new(kept[0], kept[1]);
+        let chunks = self.members.each(
+            (self.records, self.guide, self.plan),
+            self.threads,
+            |chunk| is_wanted[chunk.0 as usize],
+            Scratch::default,
+            |scratch, chunk, seen, _| {
+                if self.is_given_up() {
+                    return (chunk, ChunkTopology::default());
+                }
+                let cut: Vec<[f32; 3]> = at_home(unsound, chunk).iter().map(|(_, p)| *p).collect();
+                let topology = scratch.solve(seen, self.plan.home_box(chunk), self.measure, &cut);
+                found.add(&topology);
+                topology.take(self.budget);
+                (chunk, topology)
+            },
+        );
+        self.check(found)?;
+        Ok(chunks)
+    }
+
+    /// Refuses what the chunks found to be too much to keep.
+    fn check(&self, found: Found) -> Result<()> {
+        if self.progress.cancelled() {
+            return Err(Error::io(self.path, STAGE)(std::io::ErrorKind::Interrupted.into()));
+        }
+        let [suspects, pieces] = [found.suspects, found.patches].map(AtomicU64::into_inner);
+        self.budget.check(self.path, || {
+            format!("at least {suspects} triangles lie at defects, in {pieces} pieces of surface or more")
+        })?;
+        refuse_more_than(self.path, MOST_SUSPECTS, suspects, "triangles lie at defects")?;
+        refuse_more_than(self.path, chunk::MOST_PATCHES, pieces, "pieces of surface, counted by chunks, are there")
+    }
+}
+
+/// Most triangles a workshop can number the corners of, with room for what repairs add.
+const MOST_SUSPECTS: u64 = 1 << 30;
+
+/// Stage name under which the survey reports progress.
+const STAGE: &str = "topology";
+
+/// Those of a chunk, of positions by chunk.
+pub(crate) fn at_home(by_home: &[(ChunkId, [f32; 3])], chunk: ChunkId) -> &[(ChunkId, [f32; 3])] {
+    let from = by_home.partition_point(|(home, _)| *home < chunk);
+    &by_home[from..from + by_home[from..].partition_point(|(home, _)| *home == chunk)]
+}
+
+/// Triangles in runs of them.
+pub(crate) fn count_of(runs: &[(u32, u32)]) -> u64 {
+    runs.iter().map(|run| u64::from(run.1)).sum()
+}
+
+/// Refuses what could not be numbered.
+fn refuse_more_than(path: &Path, most: u64, there: u64, what: &str) -> Result<()> {
+    if there <= most {
+        return Ok(());
+    }
+    let advice = format!("at most {most} can be worked on: split the file");
+    Err(Error::Refused { path: path.into(), reason: format!("{there} {what}"), advice })
+}
+
+/// Takes what is known to be needed before the chunks are solved; returns how much of it is free again once they are.
+pub(crate) fn take_tables(path: &Path, budget: &Budget, plan: &Plan, members: &Members, limits: &Limits) -> Result<u64> {
+    let mut counts: Vec<u64> = (0..plan.chunks()).map(|c| members.count(ChunkId(c as u32))).collect();
+    counts.sort_unstable_by(|a, b| b.cmp(a));
+    // A thread's tables are as large as its largest chunk, and no two threads work on the same one.
+    let scratch = counts.iter().take(limits.threads).map(|n| chunk::scratch_bytes(*n)).sum::<u64>();
+    budget.take(Purpose::Tables, scratch + members.heap_bytes(limits.threads) + plan.heap_bytes());
+    let largest = counts.first().copied().unwrap_or(0);
+    budget.check(path, || format!("the largest chunk holds {largest} triangles"))?;
+    let nonfinite = count_of(&members.nonfinite);
+    budget.take(Purpose::Defects, nonfinite * crate::stream::budget::BYTES_PER_NONFINITE);
+    budget.check(path, || format!("{nonfinite} triangles have coordinates that are no finite numbers"))?;
+    Ok(scratch)
+}

@@ -3,6 +3,7 @@
 pub(crate) mod access;
 pub mod error;
 pub(crate) mod finite;
+pub(crate) mod judgement;
 pub(crate) mod loop_class;
 pub(crate) mod progress;
 pub(crate) mod ranges;

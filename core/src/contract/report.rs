@@ -1,5 +1,6 @@
 //! The report: what was found, what was done, and the verdict on the bytes written. Documented in `core/REPORT.md`.
 
+pub use crate::contract::judgement::{Certificate, RuleOutcome, RuleResult, Verdict};
 pub use crate::contract::loop_class::LoopClass;
 use std::path::{Path, PathBuf};
 
@@ -433,64 +434,6 @@ pub struct EditRecords {
     pub moved: Vec<(u32, [[f32; 3]; 3])>,
     /// New records, in file order: corners and attribute word.
     pub added: Vec<([[f32; 3]; 3], u16)>,
-}
-
-/// What a file is, judged on its bytes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Verdict {
-    /// Everything that this version checks holds.
-    pub good: bool,
-    /// One line for people, e.g. `closed, manifold, oriented, free of self-intersection`.
-    pub statement: String,
-    pub closed: bool,
-    pub manifold: bool,
-    pub oriented: bool,
-    /// `None` when it was not checked.
-    #[serde(default)]
-    pub free_of_self_intersection: Option<bool>,
-    /// Why it is not good, or why it needs review.
-    pub reasons: Vec<String>,
-    /// What was not checked.
-    pub unchecked: Vec<String>,
-}
-
-/// What every rule found in the bytes of one file. The rules are listed in `core/REPORT.md`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Certificate {
-    /// Every rule was looked at, and passed.
-    pub printable: bool,
-    /// BLAKE3 of the whole file, hexadecimal.
-    pub blake3: String,
-    pub bytes: u64,
-    /// Triangle records in the file.
-    pub triangles: u64,
-    /// Names of the rules that were not passed, or not looked at.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub missing: Vec<String>,
-    /// Every rule, in the order of the table.
-    pub rules: Vec<RuleResult>,
-}
-
-/// What one rule found.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct RuleResult {
-    /// Its name.
-    pub rule: String,
-    /// Raised when the rule counts anything else.
-    pub version: u32,
-    pub outcome: RuleOutcome,
-    /// What violates it; `None`: not looked at, or more than could be looked at.
-    pub count: Option<u64>,
-}
-
-/// Whether a file passes a rule.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum RuleOutcome {
-    Passed,
-    Failed,
-    /// It was not looked at.
-    Unchecked,
 }
 
 /// One stage's share of the time.

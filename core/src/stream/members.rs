@@ -361,6 +361,7 @@ impl Told<'_> {
 
 /// The chunks whose cells a triangle's box meets, but for those where its corners are at home.
 fn note_visited(plan: &Plan, corners: &[Point; 3], homes: [ChunkId; 3], visited: &mut Vec<ChunkId>) {
+    visited.clear();
     let mut spread = Bounds::EMPTY;
     spread.include(corners);
     plan.meeting(spread.lo, spread.hi, &mut |chunk| {
@@ -415,7 +416,6 @@ fn gather_piece(
                 run_start = i;
                 continue;
             }
-            visited.clear();
             if visitors {
                 note_visited(plan, &corners, homes, &mut visited);
             }

@@ -15,6 +15,8 @@ use crate::stream::plan::HomeBox;
 use crate::stream::source::{Seen, Source, Triangle};
 use crate::topology::crossings::Crossings;
 use crate::topology::intersect::{self, Finder, Region, Standing};
+use crate::topology::labels::{LabelWriter, Labels};
+use crate::topology::patch_sums::{Patch, Sum};
 use crate::topology::star::{self, Ring, Stars};
 use crate::topology::vertex_table::{self, Weld};
 use crate::util::union_find::NONE;
@@ -55,27 +57,6 @@ impl Link {
     pub(crate) fn raised(self, base: u32) -> Self {
         Self { patch: self.patch + base, ..self }
     }
-}
-
-/// What is summed over a patch: its triangles with three sound corners, until the merge also some whose other corners are not.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Patch {
-    pub(crate) triangles: u64,
-    pub(crate) extent: Extent,
-    /// Of its sound vertices.
-    pub(crate) bounds: Bounds,
-    /// Smallest member with a sound corner in it.
-    pub(crate) first: u32,
-}
-
-/// The patch of each member in list order.
-#[derive(Clone, Debug, Default)]
-pub(crate) enum Labels {
-    /// All members with a sound corner belong to patch 0 of the chunk.
-    #[default]
-    One,
-    /// Run-coded: count, then patch + 1 (0: none).
-    Runs(Vec<u8>),
 }
 
 /// What one chunk contributes.
@@ -375,17 +356,9 @@ impl Scratch {
     #[inline(always)]
     fn collect(&mut self, measure: &Measure, total: Extent) -> ChunkTopology {
         let home = || self.states.iter().enumerate().filter(|(_, state)| **state != AWAY);
-        let mut out = ChunkTopology {
-            suspects: Vec::new(),
-            crossings: Crossings::default(),
-            links: Vec::new(),
-            patches: Vec::new(),
-            labels: Labels::One,
-            reach: Bounds::EMPTY,
-            vertices: home().count() as u64,
-            vertices_used: home().filter(|(v, _)| self.stars.count(*v) > 0).count() as u64,
-            suspect_vertices: 0,
-        };
+        let mut out = ChunkTopology { reach: Bounds::EMPTY, ..ChunkTopology::default() };
+        out.vertices = home().count() as u64;
+        out.vertices_used = home().filter(|(v, _)| self.stars.count(*v) > 0).count() as u64;
         let largest = self.number_patches(&mut out.patches);
         let mut labels = LabelWriter::default();
         let mut sum = Sum::new(measure, self.vertices.positions(), largest);
@@ -468,163 +441,5 @@ impl Scratch {
             sizes[patch as usize] += run;
         }
         sizes.iter().zip(0..).max_by_key(|(size, _)| **size).map_or(NONE, |(_, patch)| patch)
-    }
-}
-
-/// Adds triangles up for the patch that the last of them belonged to. Those of the largest patch are only counted: the sum over all of
-/// the chunk is known, and sums are exact, so theirs is what the others leave.
-struct Sum<'a> {
-    measure: &'a Measure,
-    positions: &'a [Point],
-    /// [`NONE`] if there is none.
-    largest: u32,
-    patch: u32,
-    first: u32,
-    triangles: u64,
-    of_patch: Batch,
-    of_none: Batch,
-    /// Of what is not the largest patch's.
-    others: Extent,
-}
-
-impl<'a> Sum<'a> {
-    fn new(measure: &'a Measure, positions: &'a [Point], largest: u32) -> Self {
-        let (of_patch, of_none) = (Batch::default(), Batch::default());
-        Self { measure, positions, largest, patch: NONE, first: NONE, triangles: 0, of_patch, of_none, others: Extent::default() }
-    }
-
-    #[inline(always)]
-    fn add(&mut self, patch: u32, triangle: u32, vertices: [u32; 3], patches: &mut [Patch]) {
-        if self.patch != patch || self.of_patch.is_full() {
-            self.flush(patches);
-            self.patch = patch;
-        }
-        self.first = self.first.min(triangle);
-        self.triangles += 1;
-        if patch != self.largest {
-            self.of_patch.push(vertices.map(|v| self.positions[v as usize]));
-        }
-    }
-
-    /// Leaves a triangle out.
-    #[inline(always)]
-    fn leave(&mut self, vertices: [u32; 3]) {
-        if self.of_none.is_full() {
-            self.others += self.of_none.take(self.measure);
-        }
-        self.of_none.push(vertices.map(|v| self.positions[v as usize]));
-    }
-
-    #[inline(always)]
-    fn flush(&mut self, patches: &mut [Patch]) {
-        if self.triangles > 0 {
-            let extent = self.of_patch.take(self.measure);
-            self.others += extent;
-            let sums = &mut patches[self.patch as usize];
-            sums.first = sums.first.min(self.first);
-            sums.triangles += self.triangles;
-            sums.extent += extent;
-        }
-        (self.first, self.triangles) = (NONE, 0);
-    }
-
-    /// The sum over all members being `total`.
-    fn finish(mut self, mut total: Extent, patches: &mut [Patch]) {
-        self.flush(patches);
-        self.others += self.of_none.take(self.measure);
-        total -= self.others;
-        if let Some(largest) = patches.get_mut(self.largest as usize) {
-            largest.extent = total;
-        }
-    }
-}
-
-/// Some triangles that are summed at once.
-struct Batch {
-    corners: [[Point; 3]; Self::LEN],
-    filled: usize,
-}
-
-impl Default for Batch {
-    fn default() -> Self {
-        Self { corners: [[[0.0; 3]; 3]; Self::LEN], filled: 0 }
-    }
-}
-
-impl Batch {
-    const LEN: usize = 32;
-
-    #[inline(always)]
-    fn is_full(&self) -> bool {
-        self.filled == Self::LEN
-    }
-
-    /// Must not be full.
-    #[inline(always)]
-    fn push(&mut self, corners: [Point; 3]) {
-        self.corners[self.filled] = corners;
-        self.filled += 1;
-    }
-
-    fn take(&mut self, measure: &Measure) -> Extent {
-        measure.sum(&self.corners[..std::mem::take(&mut self.filled)])
-    }
-}
-
-#[derive(Default)]
-struct LabelWriter {
-    bytes: Vec<u8>,
-    patch: u32,
-    count: u64,
-}
-
-impl LabelWriter {
-    #[inline]
-    fn push(&mut self, patch: u32) {
-        if patch != self.patch {
-            self.flush();
-            self.patch = patch;
-        }
-        self.count += 1;
-    }
-
-    fn flush(&mut self) {
-        if self.count > 0 {
-            crate::util::varint::put_varint(&mut self.bytes, self.count);
-            crate::util::varint::put_varint(&mut self.bytes, u64::from(self.patch.wrapping_add(1)));
-        }
-        self.count = 0;
-    }
-
-    fn finish(mut self) -> Vec<u8> {
-        self.flush();
-        self.bytes.shrink_to_fit();
-        self.bytes
-    }
-}
-
-impl Labels {
-    pub(crate) fn heap_bytes(&self) -> u64 {
-        match self {
-            Self::One => 0,
-            Self::Runs(bytes) => bytes.capacity() as u64,
-        }
-    }
-
-    /// The patch of each member in list order, [`NONE`] where it has none; for [`Labels::One`] always patch 0.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = u32> + '_ {
-        let mut rest: &[u8] = match self {
-            Self::One => &[],
-            Self::Runs(bytes) => bytes,
-        };
-        let (mut left, mut patch) = if matches!(self, Self::One) { (u64::MAX, 0) } else { (0, NONE) };
-        std::iter::from_fn(move || {
-            if left == 0 {
-                left = crate::util::varint::take_varint(&mut rest)?;
-                patch = (crate::util::varint::take_varint(&mut rest)? as u32).wrapping_sub(1);
-            }
-            left -= 1;
-            Some(patch)
-        })
     }
 }

@@ -7,7 +7,9 @@ use crate::geometry::sums::Measure;
 use crate::io::record::{self, Record};
 use crate::stream::budget::{Budget, Purpose};
 use crate::stream::plan::ChunkId;
-use crate::topology::chunk::{self, ChunkTopology, Labels, Link, Patch, Suspect};
+use crate::topology::chunk::{self, ChunkTopology, Link, Suspect};
+use crate::topology::labels::Labels;
+use crate::topology::patch_sums::Patch;
 use crate::util::radix;
 use crate::util::union_find::NONE;
 

@@ -4,6 +4,8 @@ pub(crate) mod chunk;
 pub(crate) mod chunk_regions;
 pub(crate) mod crossings;
 pub(crate) mod intersect;
+pub(crate) mod labels;
+pub(crate) mod patch_sums;
 pub(crate) mod solving;
 pub(crate) mod star;
 pub(crate) mod survey;

@@ -2,23 +2,14 @@
 
 use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
-use crate::contract::report::SelfIntersections;
 use crate::contract::settings::Limits;
-use crate::geometry::position;
-use crate::geometry::sums::{Bounds, Measure};
-use crate::io::digest;
+use crate::geometry::sums::Measure;
 use crate::io::read_ahead::Guide;
-use crate::io::record::{self, Record};
-use crate::io::write_behind;
+use crate::io::record::Record;
 use crate::stream::budget::{Budget, Purpose};
 use crate::stream::members::Members;
-use crate::stream::plan::{ChunkId, HomeBox, Plan};
-use crate::stream::source::{Seen, Source, Triangle};
-use crate::topology::chunk::{self, ChunkTopology, Labels, Patch, Scratch, Suspect};
-use crate::topology::chunk_regions::Parts;
-use crate::topology::crossings::{self, Crossings, Pair};
-use crate::topology::vertex_table::{Sieve, Weld};
-use crate::util::union_find::NONE;
+use crate::stream::plan::{ChunkId, Plan};
+use crate::topology::chunk::{self, ChunkTopology, Scratch};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -159,8 +150,15 @@ fn refuse_more_than(path: &Path, most: u64, there: u64, what: &str) -> Result<()
     Err(Error::Refused { path: path.into(), reason: format!("{there} {what}"), advice })
 }
 
-/// Takes what is known to be needed before the chunks are solved; returns how much of it is free again once they are.
-pub(crate) fn take_tables(path: &Path, budget: &Budget, plan: &Plan, members: &Members, limits: &Limits) -> Result<u64> {
+/// Takes what is known to be needed for chunks, and for so many triangles that are `nonfinite`, before the chunks are solved; returns how much of it is free again once they are.
+pub(crate) fn take_tables(
+    path: &Path,
+    budget: &Budget,
+    plan: &Plan,
+    members: &Members,
+    nonfinite: u64,
+    limits: &Limits,
+) -> Result<u64> {
     let mut counts: Vec<u64> = (0..plan.chunks()).map(|c| members.count(ChunkId(c as u32))).collect();
     counts.sort_unstable_by(|a, b| b.cmp(a));
     // A thread's tables are as large as its largest chunk, and no two threads work on the same one.
@@ -168,7 +166,6 @@ pub(crate) fn take_tables(path: &Path, budget: &Budget, plan: &Plan, members: &M
     budget.take(Purpose::Tables, scratch + members.heap_bytes(limits.threads) + plan.heap_bytes());
     let largest = counts.first().copied().unwrap_or(0);
     budget.check(path, || format!("the largest chunk holds {largest} triangles"))?;
-    let nonfinite = count_of(&members.nonfinite);
     budget.take(Purpose::Defects, nonfinite * crate::stream::budget::BYTES_PER_NONFINITE);
     budget.check(path, || format!("{nonfinite} triangles have coordinates that are no finite numbers"))?;
     Ok(scratch)

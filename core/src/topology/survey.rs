@@ -5,9 +5,8 @@
 
 use crate::topology::solving::{Solving, at_home, count_of, take_tables};
 use std::path::Path;
-use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::contract::error::{Error, Result};
+use crate::contract::error::Result;
 use crate::contract::progress::Progress;
 use crate::contract::report::SelfIntersections;
 use crate::contract::settings::Limits;
@@ -21,9 +20,11 @@ use crate::stream::budget::{Budget, Purpose};
 use crate::stream::members::Members;
 use crate::stream::plan::{ChunkId, HomeBox, Plan};
 use crate::stream::source::{Seen, Source, Triangle};
-use crate::topology::chunk::{self, ChunkTopology, Labels, Patch, Scratch, Suspect};
+use crate::topology::chunk::{ChunkTopology, Suspect};
 use crate::topology::chunk_regions::Parts;
 use crate::topology::crossings::{self, Crossings, Pair};
+use crate::topology::labels::Labels;
+use crate::topology::patch_sums::Patch;
 use crate::topology::vertex_table::{Sieve, Weld};
 use crate::util::union_find::NONE;
 
@@ -92,69 +93,86 @@ impl<'a> Survey<'a> {
         progress.at("plan", 0, records.len() as u64);
         let guide = Guide::new(records.as_flattened(), limits);
         let plan = Plan::new(records, &guide, limits.chunk_triangles);
-        let mut members = Members::gather(path, (records, &guide), &plan, self_intersections, limits, progress)?;
+        let members = Members::gather(path, (records, &guide), &plan, self_intersections, limits, progress)?;
         drop(span);
-        let bounds = members.bounds.normalised();
-        let measure = Measure::new(&bounds);
-        let budget = Budget::new(limits.memory_bytes);
-        // A copy of the file and its digest may be in the making.
-        budget.take(Purpose::Tables, write_behind::most_dirty(limits) + digest::heap_bytes(size_of_val(records) as u64));
-        let scratch = take_tables(path, &budget, &plan, &members, limits)?;
+        let mut survey = Self::unsolved(records, guide, plan, members, limits);
+        let scratch = survey.take_tables(path, &survey.budget, limits)?;
+        let most_tested = self_intersections.then(|| crossings::most_tested(records.len() as u64));
+        let _span = tracing::debug_span!("chunks", count = survey.plan.chunks()).entered();
+        let chunks = survey.solving(path, &survey.budget, progress).all(most_tested)?;
+        survey.budget.give_back(Purpose::Tables, scratch);
+        survey.merge(chunks, most_tested);
+        Ok(survey)
+    }
 
-        let most_tested = crossings::most_tested(records.len() as u64);
-        let _span = tracing::debug_span!("chunks", count = plan.chunks()).entered();
-        let solving = Solving {
-            path,
-            records,
-            guide: &guide,
-            plan: &plan,
-            members: &members,
-            measure: &measure,
-            budget: &budget,
-            threads: limits.threads,
-            progress,
-        };
-        let mut chunks = solving.all(self_intersections.then_some(most_tested))?;
-        budget.give_back(Purpose::Tables, scratch);
-        let span = tracing::debug_span!("merge").entered();
-        let mut fresh: Vec<(ChunkId, &mut ChunkTopology)> = (0..).map(ChunkId).zip(&mut chunks).collect();
-        let (parts, suspects) = Parts::none(plan.chunks()).renewed((records, &measure), Vec::new(), &mut fresh, |_| true);
-        let (patches, merged) = parts.united();
-        let suspect_patches = parts.patches_of(&suspects, &merged);
-        drop(span);
-        let (self_intersections, crossing_pairs) = if self_intersections {
-            let (summed, pairs) = Crossings::sum(chunks.iter_mut().map(|c| std::mem::take(&mut c.crossings)), most_tested);
-            (Some(summed), pairs)
-        } else {
-            (None, None)
-        };
+    /// What is known before chunks are solved.
+    fn unsolved(records: &'a [Record], guide: Guide<'a>, plan: Plan, mut members: Members, limits: &Limits) -> Self {
+        let bounds = members.bounds.normalised();
         let nonfinite = std::mem::take(&mut members.nonfinite);
-        Ok(Self {
+        Self {
             records,
-            measure,
+            measure: Measure::new(&bounds),
             bounds,
-            suspects,
-            suspect_patches,
-            patches,
+            suspects: Vec::new(),
+            suspect_patches: Vec::new(),
+            patches: Vec::new(),
             triangles: records.len() as u64 - count_of(&nonfinite),
             nonfinite,
-            self_intersections,
-            crossing_pairs,
+            self_intersections: None,
+            crossing_pairs: None,
             volume_beside: 0.0,
             promoted: Vec::new(),
-            vertices: chunks.iter().map(|c| c.vertices).sum(),
-            vertices_used: chunks.iter().map(|c| c.vertices_used).sum(),
+            vertices: 0,
+            vertices_used: 0,
+            parts: Parts::none(plan.chunks()),
             guide,
             plan,
             members,
-            reaches: chunks.iter().map(|c| c.reach).collect(),
-            labels: chunks.into_iter().map(|c| c.labels).collect(),
-            parts,
-            merged,
+            reaches: Vec::new(),
+            labels: Vec::new(),
+            merged: Vec::new(),
             dividing: 0,
-            budget,
+            budget: Budget::new(limits.memory_bytes),
             threads: limits.threads,
-        })
+        }
+    }
+
+    /// Takes from the budget what is needed before chunks are solved; returns how much of it is free again once they are.
+    fn take_tables(&self, path: &Path, budget: &Budget, limits: &Limits) -> Result<u64> {
+        // A copy of the file and its digest may be in the making.
+        let beside = write_behind::most_dirty(limits) + digest::heap_bytes(size_of_val(self.records) as u64);
+        budget.take(Purpose::Tables, beside);
+        take_tables(path, budget, &self.plan, &self.members, count_of(&self.nonfinite), limits)
+    }
+
+    fn solving<'s>(&'s self, path: &'s Path, budget: &'s Budget, progress: &'s dyn Progress) -> Solving<'s, 'a> {
+        Solving {
+            path,
+            records: self.records,
+            guide: &self.guide,
+            plan: &self.plan,
+            members: &self.members,
+            measure: &self.measure,
+            budget,
+            threads: self.threads,
+            progress,
+        }
+    }
+
+    /// Takes in what all chunks found. `most_tested`: pairs that might be tested for self-intersection, if these were looked for.
+    fn merge(&mut self, mut chunks: Vec<ChunkTopology>, most_tested: Option<u64>) {
+        let span = tracing::debug_span!("merge").entered();
+        let mut fresh: Vec<(ChunkId, &mut ChunkTopology)> = (0..).map(ChunkId).zip(&mut chunks).collect();
+        let known = (self.records, &self.measure);
+        (self.parts, self.suspects) = self.parts.renewed(known, Vec::new(), &mut fresh, |_| true);
+        (self.patches, self.merged) = self.parts.united();
+        self.suspect_patches = self.parts.patches_of(&self.suspects, &self.merged);
+        drop(span);
+        (self.self_intersections, self.crossing_pairs) = summed_crossings(&mut chunks, most_tested);
+        self.vertices = chunks.iter().map(|c| c.vertices).sum();
+        self.vertices_used = chunks.iter().map(|c| c.vertices_used).sum();
+        self.reaches = chunks.iter().map(|c| c.reach).collect();
+        self.labels = chunks.into_iter().map(|c| c.labels).collect();
     }
 
     /// Divides the surface at the sound vertices among `positions`: they count as unsound, so that their triangles become suspects, and
@@ -169,8 +187,7 @@ impl<'a> Survey<'a> {
     ) -> Result<Division> {
         let _span = tracing::debug_span!("divide", positions = positions.len()).entered();
         let budget = Budget::new(limits.memory_bytes);
-        budget.take(Purpose::Tables, write_behind::most_dirty(limits) + digest::heap_bytes(size_of_val(self.records) as u64));
-        take_tables(path, &budget, &self.plan, &self.members, limits)?;
+        self.take_tables(path, &budget, limits)?;
         let fetched = self.beyond_the_workshop(positions);
         let all: Vec<[f32; 3]> = self.promoted.iter().chain(positions).copied().collect();
         let mut is_cut = vec![false; self.plan.chunks()];
@@ -180,18 +197,8 @@ impl<'a> Survey<'a> {
         let kept = (0..self.plan.chunks()).filter(|c| !is_fresh[*c]);
         self.parts.take(&budget, kept.clone().map(|c| &self.labels[c]), self.suspects.len() as u64);
         let patches = kept.map(|c| self.parts.of_chunk(ChunkId(c as u32)).len() as u64).sum();
-        let solving = Solving {
-            path,
-            records: self.records,
-            guide: &self.guide,
-            plan: &self.plan,
-            members: &self.members,
-            measure: &self.measure,
-            budget: &budget,
-            threads: self.threads,
-            progress,
-        };
-        let mut solved = solving.again(&is_fresh, &by_home, [self.suspects.len() as u64, patches])?;
+        let mut solved =
+            self.solving(path, &budget, progress).again(&is_fresh, &by_home, [self.suspects.len() as u64, patches])?;
         let unsound = self.unsound();
         let mut fresh: Vec<(ChunkId, &mut ChunkTopology)> =
             solved.iter_mut().map(|(chunk, topology)| (*chunk, topology)).collect();
@@ -391,6 +398,13 @@ impl<'a> Survey<'a> {
         all.retain(|(s, _)| self.suspects.binary_search_by_key(&s.triangle, |t| t.triangle).is_err());
         all
     }
+}
+
+/// What all chunks found of self-intersections; nothing if they were not looked for.
+fn summed_crossings(chunks: &mut [ChunkTopology], most_tested: Option<u64>) -> (Option<SelfIntersections>, Option<Vec<Pair>>) {
+    let Some(most_tested) = most_tested else { return (None, None) };
+    let (summed, pairs) = Crossings::sum(chunks.iter_mut().map(|c| std::mem::take(&mut c.crossings)), most_tested);
+    (Some(summed), pairs)
 }
 
 #[cfg(test)]

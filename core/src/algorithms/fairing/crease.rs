@@ -73,6 +73,11 @@ pub(super) fn find(sheet: &Sheet<'_>) -> Result<Creases, Unshaped> {
         return Err(Unshaped::RimIsEdge);
     }
     lines.sort_unstable();
+    Ok(Creases { sharp, through: through(sheet, &lines)? })
+}
+
+/// Where a crease goes through the patch. `lines`: sharp edges in both directions, ascending, and whether they count for themselves.
+fn through(sheet: &Sheet<'_>, lines: &[([u32; 2], bool)]) -> Result<Option<[(u32, DVec3); 2]>, Unshaped> {
     let way = |[v, w]: [u32; 2]| (sheet.points[w as usize] - sheet.points[v as usize]).normalize_or_zero();
     let goes_on = |[v, w]: [u32; 2]| {
         let from = lines.partition_point(|(line, _)| line[0] < w);
@@ -86,18 +91,17 @@ pub(super) fn find(sheet: &Sheet<'_>) -> Result<Creases, Unshaped> {
         .filter(|(line, strong)| sheet.on_rim[line[0] as usize] && (*strong || goes_on(*line)))
         .map(|([v, w], _)| (*v, way([*w, *v])))
         .collect();
-    let through = match *ends {
-        [] => None,
+    match *ends {
+        [] => Ok(None),
         [a, b] if a.0 != b.0 => {
             let along = (sheet.points[b.0 as usize] - sheet.points[a.0 as usize]).normalize_or_zero();
             if a.1.dot(along) < FACING || -b.1.dot(along) < FACING {
                 return Err(Unshaped::Creased);
             }
-            Some([a, b])
+            Ok(Some([a, b]))
         }
-        _ => return Err(Unshaped::Creased),
-    };
-    Ok(Creases { sharp, through })
+        _ => Err(Unshaped::Creased),
+    }
 }
 
 /// A coarse patch with an edge between two vertices of the rim: the given one, or, if it is a disc, one made anew of its two parts.

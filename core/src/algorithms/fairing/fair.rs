@@ -151,20 +151,8 @@ fn curvature(
     energy: Energy,
     column: impl Fn(u32) -> u32,
 ) -> (Rows, Rows) {
-    // Where H is wanted: new vertices, the rim, and one ring beyond.
-    const NO: u32 = u32::MAX;
     let n = sheet.points.len();
-    let mut wanted = vec![false; n];
-    wanted[sheet.fixed..].fill(true);
-    for v in 0..sheet.fixed {
-        if sheet.on_rim[v] {
-            for &i in at.of(v as u32) {
-                for w in all[i as usize] {
-                    wanted[w as usize] = true;
-                }
-            }
-        }
-    }
+    let wanted = wanted(sheet, all, at);
     let mut number = vec![NO; n];
     let mut areas = Vec::new();
     let mut inner = Rows::default();
@@ -187,6 +175,30 @@ fn curvature(
         }
         return (inner, outer);
     }
+    (inner, differences_of(sheet, all, &number, areas.len() as u32))
+}
+
+/// No row.
+const NO: u32 = u32::MAX;
+
+/// By vertex: its mean curvature H is wanted. Those of new vertices, of the rim, and of one ring beyond.
+fn wanted(sheet: &Sheet<'_>, all: &[[u32; 3]], at: &Lists) -> Vec<bool> {
+    let mut wanted = vec![false; sheet.points.len()];
+    wanted[sheet.fixed..].fill(true);
+    for v in 0..sheet.fixed {
+        if sheet.on_rim[v] {
+            for &i in at.of(v as u32) {
+                for w in all[i as usize] {
+                    wanted[w as usize] = true;
+                }
+            }
+        }
+    }
+    wanted
+}
+
+/// Differences between the rows of neighbours, weighted by cotangents. `number`: the row of each vertex; so many `rows` there are.
+fn differences_of(sheet: &Sheet<'_>, all: &[[u32; 3]], number: &[u32], rows: u32) -> Rows {
     let mut between: Vec<(u32, u32, f64)> = Vec::new();
     for t in all {
         let of = t.map(|v| number[v as usize]);
@@ -203,13 +215,14 @@ fn curvature(
     }
     between.sort_by_key(|(i, j, _)| (*i, *j));
     let mut rest = between.as_slice();
-    for i in 0..inner.len() as u32 {
+    let mut outer = Rows::default();
+    for i in 0..rows {
         let own = rest.partition_point(|e| e.0 == i);
         let (here, after) = rest.split_at(own);
         outer.push(here.chunk_by(|a, b| a.1 == b.1).map(|same| (same[0].1, same.iter().map(|e| e.2).sum())));
         rest = after;
     }
-    (inner, outer)
+    outer
 }
 
 /// One row of the discrete Laplacian.

@@ -267,23 +267,9 @@ impl Grid {
             for j in self.rows[i].clone() {
                 let (p, q) = (first.positions[i], second.positions[j]);
                 let square = p.distance_squared(q);
-                let way = |normal: DVec3| {
-                    let [a, b] = [come[j], across].map(|(cost, before)| match weight {
-                        Weight::Bend => cost + square * bend(before, normal),
-                        Weight::Area => cost,
-                    });
-                    if b < a { (b, true) } else { (a, false) }
-                };
+                let ways = [come[j], across];
                 let onward = |a: DVec3, b: DVec3, apex: DVec3, new_edge: f64, beyond: DVec3| {
-                    let normal = (b - a).cross(apex - a) * 0.5;
-                    let area = normal.length();
-                    let normal = if area > 0.0 { normal / area } else { DVec3::ZERO };
-                    let (cost, from_second) = way(normal);
-                    let own = match weight {
-                        Weight::Bend => area * (1.0 + bend(normal, beyond)),
-                        Weight::Area => area,
-                    };
-                    (cost + own + SHORT * new_edge, normal, from_second)
+                    onward(ways, weight, square, [a, b, apex], new_edge, beyond)
                 };
                 if (i, j) == (n, m) {
                     last_of_second = across.0 < come[j].0;
@@ -338,6 +324,32 @@ impl Grid {
 /// 1 − cos of the angle between unit normals; 0 where one is unknown.
 fn bend(a: DVec3, b: DVec3) -> f64 {
     if a == DVec3::ZERO || b == DVec3::ZERO { 0.0 } else { 1.0 - a.dot(b) }
+}
+
+/// The cost of going on by a triangle, its normal, and whether the way to it by the second side is the cheaper one. `ways`: what it costs to come by
+/// each side, and the normals there; `square`: of the edge in between.
+#[inline(always)]
+fn onward(
+    ways: [(f64, DVec3); 2],
+    weight: Weight,
+    square: f64,
+    [a, b, apex]: [DVec3; 3],
+    new_edge: f64,
+    beyond: DVec3,
+) -> (f64, DVec3, bool) {
+    let normal = (b - a).cross(apex - a) * 0.5;
+    let area = normal.length();
+    let normal = if area > 0.0 { normal / area } else { DVec3::ZERO };
+    let [by_first, by_second] = ways.map(|(cost, before)| match weight {
+        Weight::Bend => cost + square * bend(before, normal),
+        Weight::Area => cost,
+    });
+    let (cost, from_second) = if by_second < by_first { (by_second, true) } else { (by_first, false) };
+    let own = match weight {
+        Weight::Bend => area * (1.0 + bend(normal, beyond)),
+        Weight::Area => area,
+    };
+    (cost + own + SHORT * new_edge, normal, from_second)
 }
 
 #[cfg(test)]

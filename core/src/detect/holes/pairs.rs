@@ -144,22 +144,7 @@ pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
         return Vec::new();
     }
     let shape = |place: usize| &shapes[free[place] as usize];
-    let tree = BoxTree::new(&(0..free.len()).map(|i| bounds(shape(i), 0.0)).collect::<Vec<_>>());
-    let mut found = Vec::new();
-    let nearest: Vec<Option<(usize, Ring)>> = (0..free.len())
-        .map(|i| {
-            tree.meeting(&bounds(shape(i), FARTHEST * shape(i).radius()), &mut found);
-            // Only of those that it can be a ring with: what else lies near is no reason to leave one open.
-            let others = found.iter().map(|j| *j as usize).filter(|j| *j != i);
-            let mut rings: Vec<(usize, Ring)> = others.filter_map(|j| Some((j, ring(shape(i), shape(j))?))).collect();
-            // Of pipes that end inside each other, the walls are closed, not the rooms between them, however narrow.
-            if rings.iter().any(|(_, ring)| ring.is_wall() && ring.level) {
-                rings.retain(|(_, ring)| ring.missing != Missing::Floor);
-            }
-            let by_distance = rings.into_iter().map(|(j, ring)| (distance(shape(i), shape(j)), j, ring));
-            by_distance.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(_, j, ring)| (j, ring))
-        })
-        .collect();
+    let nearest = nearest_rings(free, shape);
     let larger_first = |i: usize, j: usize| if shape(j).radius() > shape(i).radius() { [j, i] } else { [i, j] };
     let mut pairs = Vec::new();
     let mut taken = vec![false; free.len()];
@@ -178,10 +163,47 @@ pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
         }
     };
     take_rings(false, &mut taken, &mut pairs);
+    let mut with_islands = taken.clone();
+    for [outer, inner] in islands(free, shape, &taken) {
+        (with_islands[outer], with_islands[inner]) = (true, true);
+        pairs.push(Pair {
+            loops: [outer, inner].map(|i| free[i]),
+            class: LoopClass::Island,
+            rule: "one lies inside the other's opening and runs the other way round".into(),
+            characteristic_distance: characteristic_distance(shape(outer), shape(inner)),
+        });
+    }
+    // Two holes may look at each other across a gap between bodies: one with an island in it is no end of a tube.
+    take_rings(true, &mut with_islands, &mut pairs);
+    pairs
+}
+
+/// For each loop, by place, the nearest one that it is a ring with.
+fn nearest_rings<'s>(free: &[u32], shape: impl Fn(usize) -> &'s Shape) -> Vec<Option<(usize, Ring)>> {
+    let tree = BoxTree::new(&(0..free.len()).map(|i| bounds(shape(i), 0.0)).collect::<Vec<_>>());
+    let mut found = Vec::new();
+    (0..free.len())
+        .map(|i| {
+            tree.meeting(&bounds(shape(i), FARTHEST * shape(i).radius()), &mut found);
+            // Only of those that it can be a ring with: what else lies near is no reason to leave one open.
+            let others = found.iter().map(|j| *j as usize).filter(|j| *j != i);
+            let mut rings: Vec<(usize, Ring)> = others.filter_map(|j| Some((j, ring(shape(i), shape(j))?))).collect();
+            // Of pipes that end inside each other, the walls are closed, not the rooms between them, however narrow.
+            if rings.iter().any(|(_, ring)| ring.is_wall() && ring.level) {
+                rings.retain(|(_, ring)| ring.missing != Missing::Floor);
+            }
+            let by_distance = rings.into_iter().map(|(j, ring)| (distance(shape(i), shape(j)), j, ring));
+            by_distance.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(_, j, ring)| (j, ring))
+        })
+        .collect()
+}
+
+/// Islands and the holes around them, by place: each with the smallest hole that holds it. What is `taken` is neither.
+fn islands<'s>(free: &[u32], shape: impl Fn(usize) -> &'s Shape, taken: &[bool]) -> Vec<[usize; 2]> {
     // A domed island stands out of its hole's box.
     let reaches: Vec<Bounds> = (0..free.len()).map(|i| bounds(shape(i), OFF_PLANE * shape(i).area().sqrt())).collect();
     let tree = BoxTree::new(&reaches);
-    let mut with_islands = taken.clone();
+    let (mut found, mut islands) = (Vec::new(), Vec::new());
     for inner in 0..free.len() {
         tree.meeting(&bounds(shape(inner), 0.0), &mut found);
         let holds = |outer: usize| {
@@ -192,19 +214,10 @@ pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
                 && ring(shape(outer), shape(inner)).is_none()
         };
         let around = found.iter().map(|j| *j as usize).filter(|j| holds(*j));
-        if let Some(outer) = around.min_by(|a, b| shape(*a).radius().total_cmp(&shape(*b).radius()).then(a.cmp(b))) {
-            (with_islands[outer], with_islands[inner]) = (true, true);
-            pairs.push(Pair {
-                loops: [outer, inner].map(|i| free[i]),
-                class: LoopClass::Island,
-                rule: "one lies inside the other's opening and runs the other way round".into(),
-                characteristic_distance: characteristic_distance(shape(outer), shape(inner)),
-            });
-        }
+        let smallest = around.min_by(|a, b| shape(*a).radius().total_cmp(&shape(*b).radius()).then(a.cmp(b)));
+        islands.extend(smallest.map(|outer| [outer, inner]));
     }
-    // Two holes may look at each other across a gap between bodies: one with an island in it is no end of a tube.
-    take_rings(true, &mut with_islands, &mut pairs);
-    pairs
+    islands
 }
 
 /// Outer and inner rims of walls, by place: each inner rim with the outer rim nearest to it, if that has a wall's rim nearest, too. In the

@@ -142,68 +142,93 @@ pub(super) fn measure(shop: &Shop, loops: &[Loop], tolerance: &Tolerance, share:
     if boxes.is_empty() {
         return Vec::new();
     }
-    let tree = BoxTree::new(&boxes);
-    let mut found = Vec::new();
-    let mut first = 0;
-    loops
-        .iter()
-        .zip(0..)
-        .map(|(rim, number)| {
-            let own = &segments[first..first + rim.vertices.len()];
-            first += own.len();
-            let mut sides = Sides { share, ..Sides::default() };
-            let mut ways = Ways::default();
-            let mut width: f64 = 0.0;
-            let mut others: Vec<u32> = Vec::new();
-            let n = rim.vertices.len();
-            for i in 0..n {
-                let before = (i + n - 1) % n;
-                let [previous, v, next] = [before, i, (i + 1) % n].map(|k| rim.vertices[k]);
-                let (coming, going) = (shop.vector(previous, v), shop.vector(v, next));
-                if coming.dot(going) < 0.0 {
-                    ways.before = None;
-                    continue;
-                }
-                sides.inner += 1;
-                let touching = tolerance.at(shop, v);
-                let near = touching.max(share * coming.length().min(going.length()));
-                let reach = touching.max(WIDER * share * 0.5 * (coming.length() + going.length()));
-                tree.meeting(&near::around(&[shop.positions[v as usize]], reach), &mut found);
-                let ahead = own[before].ahead(shop) + own[i].ahead(shop);
-                let across = found
-                    .iter()
-                    .map(|s| &segments[*s as usize])
-                    .filter(|s| !s.ends.contains(&v))
-                    .filter(|s| submesh::cosine(shop.vector(s.ends[0], s.ends[1]), coming + going) < AGAINST)
-                    .map(|s| (way_to(shop, v, s), s))
-                    .filter(|(way, s)| way.length() <= touching || submesh::cosine(ahead, s.ahead(shop)) <= ALIKE)
-                    .map(|(way, s)| (way, s.of_loop))
-                    .min_by(|a, b| a.0.length().total_cmp(&b.0.length()))
-                    .filter(|(way, _)| way.length() <= reach);
-                let Some((way, of_loop)) = across else {
-                    ways.before = None;
-                    continue;
-                };
-                sides.across += 1;
-                sides.near += usize::from(way.length() <= near);
-                sides.touching += usize::from(way.length() <= touching);
-                width = width.max(way.length());
-                if of_loop != number {
-                    others.push(of_loop);
-                }
-                let normal = [before, i].map(|k| shop.normal(rim.triangles[k]).normalize_or_zero()).into_iter().sum::<DVec3>();
-                ways.step(way, normal.normalize_or_zero(), coming.length());
+    let around = Around { shop, tree: BoxTree::new(&boxes), segments: &segments, tolerance, share };
+    let (mut found, mut first) = (Vec::new(), 0);
+    let of = |(rim, number): (&Loop, u32)| {
+        let own = &segments[first..first + rim.vertices.len()];
+        first += own.len();
+        around.sides_of(rim, number, own, &mut found)
+    };
+    loops.iter().zip(0..).map(of).collect()
+}
+
+/// The edges of all loops, to be searched.
+struct Around<'s> {
+    shop: &'s Shop,
+    tree: BoxTree,
+    segments: &'s [Segment],
+    tolerance: &'s Tolerance,
+    share: f64,
+}
+
+impl<'s> Around<'s> {
+    /// Of one loop, by its number; `own`: its edges.
+    fn sides_of(&self, rim: &Loop, number: u32, own: &[Segment], found: &mut Vec<u32>) -> Sides {
+        let shop = self.shop;
+        let mut sides = Sides { share: self.share, ..Sides::default() };
+        let mut ways = Ways::default();
+        let mut width: f64 = 0.0;
+        let mut others: Vec<u32> = Vec::new();
+        let n = rim.vertices.len();
+        for i in 0..n {
+            let before = (i + n - 1) % n;
+            let [previous, v, next] = [before, i, (i + 1) % n].map(|k| rim.vertices[k]);
+            let (coming, going) = (shop.vector(previous, v), shop.vector(v, next));
+            if coming.dot(going) < 0.0 {
+                ways.before = None;
+                continue;
             }
-            sides.width = most(sides.across, sides.inner).then_some(width);
-            sides.unevenness = ways.unevenness();
-            if 2 * others.len() > sides.across {
-                others.sort_unstable();
-                let most = others.chunk_by(|a, b| a == b).max_by_key(|same| (same.len(), std::cmp::Reverse(same[0])));
-                sides.partner = most.map(|same| same[0]).filter(|_| sides.class().is_some());
+            sides.inner += 1;
+            let touching = self.tolerance.at(shop, v);
+            let near = touching.max(self.share * coming.length().min(going.length()));
+            let ahead = own[before].ahead(shop) + own[i].ahead(shop);
+            let Some((way, of_loop)) = self.across(v, [coming, going], ahead, touching, found) else {
+                ways.before = None;
+                continue;
+            };
+            sides.across += 1;
+            sides.near += usize::from(way.length() <= near);
+            sides.touching += usize::from(way.length() <= touching);
+            width = width.max(way.length());
+            if of_loop != number {
+                others.push(of_loop);
             }
-            sides
-        })
-        .collect()
+            let normal = [before, i].map(|k| shop.normal(rim.triangles[k]).normalize_or_zero()).into_iter().sum::<DVec3>();
+            ways.step(way, normal.normalize_or_zero(), coming.length());
+        }
+        sides.width = most(sides.across, sides.inner).then_some(width);
+        sides.unevenness = ways.unevenness();
+        if 2 * others.len() > sides.across {
+            others.sort_unstable();
+            let most = others.chunk_by(|a, b| a == b).max_by_key(|same| (same.len(), std::cmp::Reverse(same[0])));
+            sides.partner = most.map(|same| same[0]).filter(|_| sides.class().is_some());
+        }
+        sides
+    }
+
+    /// The nearest edge that runs against the loop at one of its vertices, on the side where it is open: the way to it, and its loop.
+    fn across(
+        &self,
+        v: submesh::Vertex,
+        [coming, going]: [DVec3; 2],
+        ahead: DVec3,
+        touching: f64,
+        found: &mut Vec<u32>,
+    ) -> Option<(DVec3, u32)> {
+        let shop = self.shop;
+        let reach = touching.max(WIDER * self.share * 0.5 * (coming.length() + going.length()));
+        self.tree.meeting(&near::around(&[shop.positions[v as usize]], reach), found);
+        found
+            .iter()
+            .map(|s| &self.segments[*s as usize])
+            .filter(|s| !s.ends.contains(&v))
+            .filter(|s| submesh::cosine(shop.vector(s.ends[0], s.ends[1]), coming + going) < AGAINST)
+            .map(|s| (way_to(shop, v, s), s))
+            .filter(|(way, s)| way.length() <= touching || submesh::cosine(ahead, s.ahead(shop)) <= ALIKE)
+            .map(|(way, s)| (way, s.of_loop))
+            .min_by(|a, b| a.0.length().total_cmp(&b.0.length()))
+            .filter(|(way, _)| way.length() <= reach)
+    }
 }
 
 /// From a vertex to the nearest point of a segment.

@@ -12,16 +12,15 @@
 //! or lies between triangles in one direction, and those whose fans cross each other, are left alone.
 
 use crate::repairs::separate::places::{directions, sideways};
-use crate::repairs::separate::separated::Separated;
+use crate::repairs::separate::separated::{Separated, regions};
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use glam::DVec3;
 
-use crate::contract::report::{Region, Rung};
 use crate::contract::settings::Profile;
 use crate::geometry::exact::{Point, at};
 use crate::geometry::position::{self, Position};
-use crate::geometry::sums::{Bounds, step_at};
+use crate::geometry::sums::step_at;
 use crate::geometry::tri_tri::{Contact, Triangle as Corners, triangles_cross};
 use crate::repairs::shared::overlay::Overlay;
 use crate::repairs::shared::work::Work;
@@ -81,7 +80,8 @@ pub(crate) fn separate(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reve
         if blamed.is_empty() {
             let (shop, edges) = work.edges();
             let mut done = Separated::default().but(shop, &nonmanifold_vertices(shop, edges));
-            done.regions = regions(shop, first, &copies);
+            let away: Vec<f64> = copies.iter().map(|copy| copy.away).collect();
+            done.regions = regions(shop, first, &away);
             for copy in copies {
                 *if copy.of.is_edge() { &mut done.edges } else { &mut done.vertices } += 1;
                 done.farthest = done.farthest.max(copy.away);
@@ -97,31 +97,6 @@ pub(crate) fn separate(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reve
     }
     work.restore(&before.triangles);
     Separated::default().but(work, &vertices)
-}
-
-/// The copies of vertices, `first` the first of them, by what hangs together.
-fn regions(shop: &Shop, first: Vertex, copies: &[Copy]) -> Vec<Region> {
-    let mut parents: Vec<u32> = (0..copies.len() as u32).collect();
-    for copy in 0..copies.len() as u32 {
-        for (t, _) in shop.star(first + copy) {
-            let others = shop.triangles[t as usize].v.into_iter().filter_map(|v| v.checked_sub(first));
-            others.for_each(|other| {
-                crate::util::union_find::unite(&mut parents, copy, other);
-            });
-        }
-    }
-    let mut all: BTreeMap<u32, (Bounds, u64, f64)> = BTreeMap::new();
-    for (copy, Copy { away, .. }) in (0..).zip(copies) {
-        let (bounds, count, moved) =
-            all.entry(crate::util::union_find::find(&mut parents, copy)).or_insert((Bounds::EMPTY, 0, 0.0));
-        bounds.include(&[shop.positions[(first + copy) as usize]]);
-        (*count, *moved) = (*count + 1, away.max(*moved));
-    }
-    let region = |(bounds, count, moved): (Bounds, u64, f64)| {
-        let Bounds { lo, hi } = bounds.normalised();
-        Region { rung: Rung::Separated, bounds: [lo, hi], count, rounds: 0, moved, reason: None }
-    };
-    all.into_values().map(region).collect()
 }
 
 /// The workshop as it was.

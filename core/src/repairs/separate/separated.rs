@@ -1,6 +1,9 @@
 //! What was taken apart, for the report.
 
+use std::collections::BTreeMap;
+
 use crate::contract::report::{Region, Rung};
+use crate::geometry::sums::Bounds;
 use crate::repairs::shared::regions::Unsettled;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::nonmanifold_vertices;
@@ -64,4 +67,29 @@ impl fmt::Display for Separated {
         }
         Ok(())
     }
+}
+
+/// The copies of vertices, `first` the first of them, by what hangs together. `away`: how far each is from where it was made.
+pub(crate) fn regions(shop: &Shop, first: Vertex, away: &[f64]) -> Vec<Region> {
+    let mut parents: Vec<u32> = (0..away.len() as u32).collect();
+    for copy in 0..away.len() as u32 {
+        for (t, _) in shop.star(first + copy) {
+            let others = shop.triangles[t as usize].v.into_iter().filter_map(|v| v.checked_sub(first));
+            others.for_each(|other| {
+                crate::util::union_find::unite(&mut parents, copy, other);
+            });
+        }
+    }
+    let mut all: BTreeMap<u32, (Bounds, u64, f64)> = BTreeMap::new();
+    for (copy, away) in (0..).zip(away) {
+        let (bounds, count, moved) =
+            all.entry(crate::util::union_find::find(&mut parents, copy)).or_insert((Bounds::EMPTY, 0, 0.0));
+        bounds.include(&[shop.positions[(first + copy) as usize]]);
+        (*count, *moved) = (*count + 1, away.max(*moved));
+    }
+    let region = |(bounds, count, moved): (Bounds, u64, f64)| {
+        let Bounds { lo, hi } = bounds.normalised();
+        Region { rung: Rung::Separated, bounds: [lo, hi], count, rounds: 0, moved, reason: None }
+    };
+    all.into_values().map(region).collect()
 }

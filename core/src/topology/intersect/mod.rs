@@ -17,6 +17,7 @@
 //! counted. A pair counts when its boxes overlap and it shares no vertex, or the smallest vertex it shares is not certified: a
 //! property of the mesh. The owner counts it.
 
+mod curve;
 mod lanes;
 mod narrow;
 mod region;

@@ -4,6 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::contract::progress::Quiet;
+use crate::contract::report::Rung;
 use crate::contract::settings::Limits;
 use crate::diagnosis::Diagnosis;
 use crate::io::record::Record;

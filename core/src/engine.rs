@@ -191,11 +191,7 @@ fn mend(
     let survey = diagnosis.into_survey();
     // Good as it came, or nothing in it could be repaired.
     let same = edit.is_empty() && flaws(mesh).is_empty();
-    let (gone, added) = (edit.gone(), edit.added.len() as u64);
-    let is_worthwhile = !same
-        && incremental::is_worthwhile(gone, added, mesh.records().len())
-        && incremental::bytes(survey.suspects.len() as u64, gone + added) <= limits.memory_bytes;
-    let expected = is_worthwhile.then(|| Expectation::of(mesh.records(), &edit));
+    let expected = if same { None } else { expectation(mesh, &edit, survey.suspects.len() as u64, limits) };
     let emit = || draft.finish(&if same { Content::Input } else { Content::Edited(&edit) });
     // What the file will hold is looked at while it is written. It counts when the file was read back and does hold that.
     let look = || {
@@ -230,6 +226,14 @@ fn mend(
     clock.lap("verify");
     mesh.check_unchanged()?;
     Ok(report)
+}
+
+/// What the file will hold after `edit`, where a look at the difference costs less than reading all of it, and its tables fit in memory.
+fn expectation<'e>(mesh: &'e MeshFile, edit: &'e Edit, suspects: u64, limits: &Limits) -> Option<Expectation<'e>> {
+    let (gone, added) = (edit.gone(), edit.added.len() as u64);
+    let is_worthwhile = incremental::is_worthwhile(gone, added, mesh.records().len())
+        && incremental::bytes(suspects, gone + added) <= limits.memory_bytes;
+    is_worthwhile.then(|| Expectation::of(mesh.records(), edit))
 }
 
 /// Repairs what was diagnosed, if there is anything to be repaired: what is to be edited, and what lay in the material of others.

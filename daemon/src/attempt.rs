@@ -22,7 +22,8 @@ use crate::folder::Folder;
 use crate::fsx::Identity;
 use crate::profiles;
 use crate::protocol::Request;
-use crate::publish::{Conclusion, Desk, OUTPUT, PublishError, discard};
+use crate::publish::{Conclusion, Desk, OUTPUT, discard};
+use crate::publish_error::PublishError;
 use crate::schedule::{Schedule, Turn};
 use crate::supervise::{Cause, Death, Ended, Worker};
 
@@ -284,33 +285,26 @@ impl<'a> Slot<'a> {
             }
         };
         match ended {
-            Ended::Stopped if context.has_failed() => {
-                // The daemon ends for reasons of its own: the next one is not to suspect the file. Without the mark it runs alone.
-                let _ = create::mark(&folder.work(claim.token).join(WITNESS));
-                Worked::Lost
-            }
-            Ended::Stopped => match lease.get() {
-                Lease::Cancel => Worked::Step(Step::Cancelled),
-                Lease::Lost => Worked::Lost,
-                Lease::Held => Worked::Step(Step::HandBack),
-            },
+            Ended::Stopped => self.stopped(folder, claim, lease.get()),
             Ended::Died(death) if !changed || !matches!(death.cause, Cause::Fault(_)) => died(&death, turn),
             _ if changed => Worked::Step(Step::Withdrawn(Withdrawal::Changed)),
             Ended::Done { report, written } => Worked::Report { report, written },
-            Ended::Failed { class, message } => {
-                // Whoever reads it knows which file it is about.
-                let named = format!("{}: ", request.shown_input);
-                let reason = message.strip_prefix(&named).map_or(message.clone(), str::to_owned);
-                match class {
-                    ErrorClass::Unreadable => Worked::None(Ending::Unreadable, reason),
-                    ErrorClass::Starved if !turn.is_alone() => Worked::Step(Step::NeedsAll),
-                    ErrorClass::Refused | ErrorClass::Starved => Worked::None(Ending::Refused, reason),
-                    ErrorClass::Environment => Worked::Step(Step::Environment { reason }),
-                    ErrorClass::Shortage => Worked::Step(Step::Wait { reason }),
-                    ErrorClass::Changed => Worked::Step(Step::Withdrawn(Withdrawal::Changed)),
-                }
-            }
+            Ended::Failed { class, message } => failed(class, &message, &request.shown_input, turn),
             Ended::Died(death) => died(&death, turn),
+        }
+    }
+
+    /// The worker was stopped: what that means for the job.
+    fn stopped(&self, folder: &Folder, claim: &Claim, lease: Lease) -> Worked {
+        if self.context.has_failed() {
+            // The daemon ends for reasons of its own: the next one is not to suspect the file. Without the mark it runs alone.
+            let _ = create::mark(&folder.work(claim.token).join(WITNESS));
+            return Worked::Lost;
+        }
+        match lease {
+            Lease::Cancel => Worked::Step(Step::Cancelled),
+            Lease::Lost => Worked::Lost,
+            Lease::Held => Worked::Step(Step::HandBack),
         }
     }
 
@@ -338,6 +332,20 @@ enum Worked {
     Step(Step),
     /// The claim is void.
     Lost,
+}
+
+/// The engine refused the file, or failed over it: what that means for the job.
+fn failed(class: ErrorClass, message: &str, shown_input: &str, turn: Turn) -> Worked {
+    // Whoever reads it knows which file it is about.
+    let reason = message.strip_prefix(&format!("{shown_input}: ")).unwrap_or(message).to_owned();
+    match class {
+        ErrorClass::Unreadable => Worked::None(Ending::Unreadable, reason),
+        ErrorClass::Starved if !turn.is_alone() => Worked::Step(Step::NeedsAll),
+        ErrorClass::Refused | ErrorClass::Starved => Worked::None(Ending::Refused, reason),
+        ErrorClass::Environment => Worked::Step(Step::Environment { reason }),
+        ErrorClass::Shortage => Worked::Step(Step::Wait { reason }),
+        ErrorClass::Changed => Worked::Step(Step::Withdrawn(Withdrawal::Changed)),
+    }
 }
 
 fn died(death: &Death, turn: Turn) -> Worked {

@@ -19,9 +19,9 @@ use crate::bar::{Bar, Scope};
 use crate::config::LARGE;
 use crate::exit::Exit;
 use crate::fsx;
+use crate::item::{Failure, Finished, Order, tell};
 use crate::say::complain;
 use crate::signals::Stop;
-use crate::single::{Failure, Finished, Order, tell};
 use crate::supervise::Worker;
 
 /// Threads that wait for the disk. What waits together is committed together, so that more of them wait no longer.

@@ -5,7 +5,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use suture_bench::generate::{Case, write_file};
 use suture_core::Report;
 use suture_store::{Job, JobId, State};
 
@@ -16,21 +15,8 @@ use crate::say::complain;
 use crate::signals::Stop;
 use crate::{create, fsx, jobs, table, watch};
 
-/// What is dropped, in this order, with about so many triangles each.
-const CASES: [Case; 10] = [
-    Case::Clean,
-    Case::Holes,
-    Case::Cracks,
-    Case::Gaps,
-    Case::Duplicates,
-    Case::Degenerate,
-    Case::Flipped,
-    Case::InsideOut,
-    Case::Shuffled,
-    Case::Mixed,
-];
-const TRIANGLES: u64 = 5_000;
-const SEED: u64 = 1;
+mod meshes;
+
 /// A file that no one can repair, so that one sees where those go.
 const NO_MESH: (&str, &[u8]) = ("holiday.stl", b"\x89PNG\r\n\x1a\nthis is a picture with the wrong name");
 
@@ -50,8 +36,8 @@ fn demo() -> Result<Exit, String> {
     let shown = dir.display();
     let stop = Stop::listen().map_err(|e| format!("cannot listen for signals: {e}"))?;
     let before = known_jobs(&dir)?.iter().map(|job| job.id).max().unwrap_or(JobId(0));
-    say(format_args!("Dropping {} small meshes into {shown}/in and serving them, as `suture watch` would.\n", CASES.len() + 1));
-    drop_files(&dir.join("in"))?;
+    let dropped = drop_files(&dir.join("in"))?;
+    say(format_args!("Dropped {dropped} small files into {shown}/in; serving them, as `suture watch` would.\n"));
     let mut config = Config::for_folder(&dir);
     // Nobody writes slowly here.
     config.settle = Some(Duration::from_millis(100));
@@ -103,8 +89,8 @@ fn folder() -> Result<PathBuf, String> {
     made.map(tempfile::TempDir::keep).map_err(|e| format!("no folder for the demo can be made: {e}"))
 }
 
-/// Writes each file under a hidden name and renames it into place, as a careful program would.
-fn drop_files(inbox: &Path) -> Result<(), String> {
+/// Writes each file under a hidden name and renames it into place, as a careful program would; returns their number.
+fn drop_files(inbox: &Path) -> Result<usize, String> {
     let failed = |path: &Path, e: &dyn std::fmt::Display| format!("{}: cannot be written: {e}", path.display());
     std::fs::create_dir_all(inbox).map_err(|e| failed(inbox, &e))?;
     let place = |temporary: &Path, name: &str| {
@@ -115,14 +101,14 @@ fn drop_files(inbox: &Path) -> Result<(), String> {
             _ => fsx::remove_if_there(temporary).map_err(|e| failed(temporary, &e)),
         }
     };
-    for case in CASES {
+    let meshes = meshes::all();
+    let files = meshes.iter().map(|mesh| (format!("{}.stl", mesh.name), mesh.bytes()));
+    for (name, bytes) in files.chain([(NO_MESH.0.to_owned(), NO_MESH.1.to_vec())]) {
         let temporary = create::temporary_in(inbox);
-        write_file(case, TRIANGLES, SEED, &temporary).map_err(|e| failed(&temporary, &e))?;
-        place(&temporary, &format!("{}.stl", case.name().replace('_', "-")))?;
+        create::write_new(&temporary, &bytes).map_err(|e| failed(&temporary, &e))?;
+        place(&temporary, &name)?;
     }
-    let temporary = create::temporary_in(inbox);
-    create::write_new(&temporary, NO_MESH.1).map_err(|e| failed(&temporary, &e))?;
-    place(&temporary, NO_MESH.0)
+    Ok(meshes.len() + 1)
 }
 
 fn known_jobs(dir: &Path) -> Result<Vec<Job>, String> {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use suture_store::RelPath;
 
 use crate::fsx;
-use crate::publish::{PublishError, io_at};
+use crate::publish_error::{PublishError, io_at};
 use crate::receipt::{RECEIPT, REPORT};
 
 /// What the longest companion adds to a name.

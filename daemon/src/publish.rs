@@ -15,7 +15,7 @@ use serde::Serialize;
 use suture_core::Report;
 use suture_core::report::Outcome;
 use suture_store::job::Withdrawal;
-use suture_store::{Claim, Ending, Hash, Job, JobStore, Publication, RelPath, State, Step, StoreError, crash_point};
+use suture_store::{Claim, Ending, Hash, Job, JobStore, Publication, RelPath, State, Step, crash_point};
 
 use crate::claim::{CLAIMED, Original, is_source};
 use crate::create;
@@ -23,6 +23,7 @@ use crate::folder::{Folder, make_parent};
 use crate::fsx::{self, Identity};
 use crate::names::{BEST, COMPANION, Names, VERSIONS, best_of, companions, first, no_free_name, with_suffix};
 use crate::place::{Item, Move, Placed, stage};
+use crate::publish_error::{PublishError, io_at};
 use crate::receipt::{NoReport, RECEIPT, REPORT, Receipt};
 use crate::rights::Rights;
 
@@ -30,24 +31,6 @@ use crate::rights::Rights;
 pub(crate) const OUTPUT: &str = "out.stl";
 const REPORT_FILE: &str = "report.json";
 const RECEIPT_FILE: &str = "receipt.json";
-
-/// Why a job could not be brought further.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum PublishError {
-    #[error(transparent)]
-    Store(#[from] StoreError),
-    /// The state says what is to be done; it can be tried again at any time.
-    #[error("{}: {source}", path.display())]
-    Io { path: PathBuf, source: io::Error },
-    /// The hot folder is not the one that the job is of.
-    #[error("{0}")]
-    Folder(String),
-}
-
-pub(crate) fn io_at(path: &Path) -> impl FnOnce(io::Error) -> PublishError {
-    let path = path.to_owned();
-    move |source| PublishError::Io { path, source }
-}
 
 /// What came of the work, before names are chosen.
 pub(crate) enum Conclusion {

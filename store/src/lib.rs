@@ -18,6 +18,7 @@ mod record;
 mod sled_store;
 pub mod stall;
 pub mod store;
+mod tables;
 #[cfg(any(test, feature = "testkit"))]
 pub mod testkit;
 

@@ -6,8 +6,9 @@ use std::sync::{Arc, RwLock};
 
 use crate::id::{Clock, Epoch, JobId, Seq, SystemClock};
 use crate::job::{Job, Kind, Step, Testimony};
-use crate::queue::{Put, Queue, Table, Tables, Visit};
+use crate::queue::Queue;
 use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted};
+use crate::tables::{Put, Table, Tables, Visit};
 
 /// A [`JobStore`] that forgets everything when it is dropped.
 pub struct MemoryStore {

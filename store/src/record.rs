@@ -6,8 +6,8 @@
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::queue::Table;
 use crate::store::StoreError;
+use crate::tables::Table;
 
 /// Version of what the JSON means. Raised when an older program would misread it.
 pub(crate) const SCHEMA: u16 = 2;

@@ -32,7 +32,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::id::{Clock, Epoch, JobId, SystemClock};
+use crate::id::{Clock, JobId, SystemClock};
 use crate::job::{Job, Kind, Step, Testimony};
 use crate::queue::Queue;
 use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted};
@@ -45,18 +45,8 @@ mod tables;
 #[cfg(test)]
 mod tests;
 
+pub use open::Opening;
 use tables::SledTables;
-
-/// What opening the store met.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Opening {
-    /// The epoch that began.
-    pub epoch: Epoch,
-    /// Torn snapshots that were removed.
-    pub torn_snapshots: u32,
-    /// Where a damaged database was put, when the store could go on without it.
-    pub set_aside: Option<PathBuf>,
-}
 
 /// The embedded [`JobStore`].
 pub struct SledStore {

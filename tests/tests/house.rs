@@ -28,7 +28,7 @@ const ROOMS: [&str; 13] = [
 ];
 
 /// The crates that are held to these rules.
-const CRATES: [&str; 1] = ["core"];
+const CRATES: [&str; 4] = ["core", "store", "daemon", "bench"];
 
 fn sources(of_crate: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(of_crate).join("src")

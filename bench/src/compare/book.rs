@@ -4,11 +4,13 @@ use std::path::Path;
 
 use suture_bench::generate::Case;
 
-use super::closing::{Closed, Shaped};
-use super::record::{Input, Line, Outcome, Run, Session, Way, read};
-use super::solids::Solved;
+use super::child::Cost;
+use super::error::Error;
+use super::made::{Closed, Shaped, Solved};
+use super::record::{Input, Line, Outcome, Run, Session, read};
+use super::sides::Side;
 use super::statistics::Spread;
-use super::{Cost, Error, Side};
+use super::way::Way;
 
 /// One raw file.
 pub(super) struct Chapter {

@@ -5,7 +5,7 @@ use std::io;
 use std::os::fd::AsRawFd;
 use std::path::Path;
 
-use super::record::Cache;
+use super::way::Cache;
 
 /// Brings every file of `paths` into the page cache, or out of it; returns the share of their pages that is there afterwards.
 ///

@@ -4,112 +4,45 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, SystemTime};
 
-use serde::{Deserialize, Serialize};
-use suture_bench::Counts;
 use suture_bench::judge;
 
+use super::child;
+use super::error::Error;
+use super::machine::Machine;
+use super::made::{Closed, Found, Shaped, Shaper};
 use super::programs::Programs;
-use super::record::{Journal, Line, Session, Way};
-use super::{Error, Machine, Side, child};
-use crate::holes::{self, Change, Hole, Measured, Surface};
+use super::record::{Journal, Line, Session};
+use super::sides::Side;
+use super::way::Way;
+use crate::holes::{self, Hole, Surface};
 use crate::{mesh, picture};
 
-/// What one program made of one hole in a known surface.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct Shaped {
-    /// [`Surface::name`].
-    pub(crate) surface: String,
-    #[serde(flatten)]
-    pub(crate) hole: Hole,
-    /// Of the mesh around.
-    pub(crate) chord_error: f64,
-    pub(crate) tool: Shaper,
-    /// `None`: there is no patch.
-    pub(crate) measured: Option<Measured>,
-}
-
-/// A program with its settings.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub(crate) enum Shaper {
-    Suture,
-    /// With the profile's `patch_shape = "implicit"`.
-    SutureImplicit,
-    Pymeshlab,
-    Meshlib,
-    MeshlibArea,
-    MeshlibEqual,
-    MeshlibEqualArea,
-}
-
-impl Shaper {
-    const ALL: [Self; 7] = [
-        Self::Suture,
-        Self::SutureImplicit,
-        Self::Pymeshlab,
-        Self::Meshlib,
-        Self::MeshlibArea,
-        Self::MeshlibEqual,
-        Self::MeshlibEqualArea,
-    ];
-
-    pub(super) fn is_meshlib(self) -> bool {
-        !matches!(self, Self::Suture | Self::SutureImplicit | Self::Pymeshlab)
-    }
-
-    /// One process that closes the holes of all files in a folder.
-    fn command(self, programs: &Programs, folder: &Path, from: &Path, to: &Path) -> Result<Command, Error> {
-        let meshlib = |flags: &[&str]| {
-            let mut command = programs.script("close_meshlib.py");
-            command.args([from, to]).args(flags);
+/// One process that closes the holes of all files in a folder.
+fn command(shaper: Shaper, programs: &Programs, folder: &Path, from: &Path, to: &Path) -> Result<Command, Error> {
+    let meshlib = |flags: &[&str]| {
+        let mut command = programs.script("close_meshlib.py");
+        command.args([from, to]).args(flags);
+        command
+    };
+    Ok(match shaper {
+        Shaper::Suture => programs.command(&Way::plain(Side::Suture), 2, from, to),
+        Shaper::SutureImplicit => {
+            let profile = folder.join("implicit.toml");
+            std::fs::write(&profile, "patch_shape = \"implicit\"\n").map_err(Error::io("writing a profile"))?;
+            let mut command = programs.command(&Way::plain(Side::Suture), 2, from, to);
+            command.arg("--profile").arg(profile);
             command
-        };
-        Ok(match self {
-            Self::Suture => programs.command(&Way::plain(Side::Suture), 2, from, to),
-            Self::SutureImplicit => {
-                let profile = folder.join("implicit.toml");
-                std::fs::write(&profile, "patch_shape = \"implicit\"\n").map_err(Error::io("writing a profile"))?;
-                let mut command = programs.command(&Way::plain(Side::Suture), 2, from, to);
-                command.arg("--profile").arg(profile);
-                command
-            }
-            Self::Pymeshlab => {
-                let mut command = programs.script("close_pymeshlab.py");
-                command.args([from, to]);
-                command
-            }
-            Self::Meshlib => meshlib(&[]),
-            Self::MeshlibArea => meshlib(&["--area"]),
-            Self::MeshlibEqual => meshlib(&["--equal"]),
-            Self::MeshlibEqualArea => meshlib(&["--equal", "--area"]),
-        })
-    }
-}
-
-/// What one program made of one real file.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct Closed {
-    /// Its name.
-    pub(crate) file: String,
-    pub(crate) side: Side,
-    pub(crate) before: Found,
-    /// `None`: it wrote nothing that can be read.
-    pub(crate) after: Option<Found>,
-    pub(crate) change: Option<Change>,
-    /// How the process ended.
-    pub(crate) end: String,
-    pub(crate) seconds: f64,
-    /// Of suture: loops that its report names as left open, each with the rule that kept it so.
-    pub(crate) named_open: Option<u64>,
-}
-
-/// What is wrong with a file.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub(crate) struct Found {
-    /// By the judge.
-    pub(crate) counts: Counts,
-    /// Pairs of triangles that cross or overlap, by `suture inspect`; `None` when it could not look.
-    pub(crate) pairs: Option<u64>,
+        }
+        Shaper::Pymeshlab => {
+            let mut command = programs.script("close_pymeshlab.py");
+            command.args([from, to]);
+            command
+        }
+        Shaper::Meshlib => meshlib(&[]),
+        Shaper::MeshlibArea => meshlib(&["--area"]),
+        Shaper::MeshlibEqual => meshlib(&["--equal"]),
+        Shaper::MeshlibEqualArea => meshlib(&["--equal", "--area"]),
+    })
 }
 
 /// Where and how, of either comparison.
@@ -203,7 +136,7 @@ pub(crate) fn shapes(options: &Options) -> Result<(), Error> {
         eprintln!("{tool:?}");
         let outputs = folder.join(format!("{tool:?}"));
         std::fs::create_dir(&outputs).map_err(Error::io("making a folder of outputs"))?;
-        let command = tool.command(&bench.programs, &folder, &inputs, &outputs)?;
+        let command = command(tool, &bench.programs, &folder, &inputs, &outputs)?;
         let ended = child::measure(command, None, false, options.limit)?;
         if !ended.cost.complaint.is_empty() {
             eprintln!("{}", ended.cost.complaint);

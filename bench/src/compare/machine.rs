@@ -9,9 +9,9 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use super::cache;
-use super::home;
+use super::folders::home;
 use super::programs::said;
-use super::record::Cache;
+use super::way::Cache;
 
 /// Where a comparison ran.
 #[derive(Clone, Debug, Serialize, Deserialize)]

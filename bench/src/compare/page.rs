@@ -3,13 +3,14 @@
 use std::fmt::Write;
 
 use super::book::{Book, did_its_work};
+use super::child::Cost;
 use super::machine::Machine;
 use super::page_closing;
 use super::page_solids;
-use super::record::{Cache, Input, Judged, Outcome, Way, is_good};
-use super::sides::LICENCES;
+use super::record::{Input, Judged, Outcome, is_good};
+use super::sides::{LICENCES, Side};
 use super::statistics::{Spread, number, short as short_number, spaced};
-use super::{Cost, Side};
+use super::way::{Cache, Way};
 
 const ABOUT: &str = "\
 Written by `suture-bench publish` from the raw runs in `results/`: every single process is there, with its command, place in the order,

@@ -2,9 +2,10 @@
 
 use std::fmt::Write;
 
-use super::Side;
 use super::book::Book;
-use super::closing::{Closed, PICTURES, Shaped, Shaper};
+use super::closing::PICTURES;
+use super::made::{Closed, Shaped, Shaper};
+use super::sides::Side;
 use super::statistics::{Spread, spaced};
 
 /// The last file that has what is asked for.
@@ -74,22 +75,7 @@ pub(super) fn shapes(book: &Book) -> String {
             .collect();
         kept += rims.iter().filter(|rim| rim.holds()).count();
         all += rims.len();
-        let each = |value: &dyn Fn(&Rim) -> Option<String>| {
-            rims.iter().map(|rim| value(rim).unwrap_or_else(|| "–".into())).collect::<Vec<_>>().join(" / ")
-        };
-        let far = |value: fn(&Rim) -> Option<f64>| each(&|rim| value(rim).map(|far| format!("{far:.1e}")));
-        let angle = |value: fn(&Rim) -> Option<f64>| each(&|rim| value(rim).map(|angle| format!("{angle:.2}")));
-        let columns = [
-            format!("{}, {:.0} %", kind.0, 100.0 * kind.1),
-            far(|rim| rim.suture),
-            far(|rim| rim.implicit),
-            far(|rim| rim.meshlib),
-            far(|rim| rim.pymeshlab),
-            far(|rim| Some(rim.bound)),
-            angle(|rim| rim.suture_normals),
-            angle(|rim| rim.meshlib_normals),
-        ];
-        let _ = writeln!(rows, "| {} |", columns.join(" | "));
+        let _ = writeln!(rows, "| {} |", columns(kind, &rims).join(" | "));
     }
     if rows.is_empty() {
         return rows;
@@ -111,6 +97,25 @@ pub(super) fn shapes(book: &Book) -> String {
          ![A bowl of two skins without its rim: open, and closed by pymeshlab, MeshLib and Suture]({bowl})\n\n\
          *A bowl of two skins without its rim: open, capped by pymeshlab and MeshLib, bridged by Suture*\n"
     )
+}
+
+/// What the table says of a hole, for each sampling of its rim.
+fn columns((surface, share): (&str, f64), rims: &[Rim]) -> [String; 8] {
+    let each = |value: &dyn Fn(&Rim) -> Option<String>| {
+        rims.iter().map(|rim| value(rim).unwrap_or_else(|| "–".into())).collect::<Vec<_>>().join(" / ")
+    };
+    let far = |value: fn(&Rim) -> Option<f64>| each(&|rim| value(rim).map(|far| format!("{far:.1e}")));
+    let angle = |value: fn(&Rim) -> Option<f64>| each(&|rim| value(rim).map(|angle| format!("{angle:.2}")));
+    [
+        format!("{surface}, {:.0} %", 100.0 * share),
+        far(|rim| rim.suture),
+        far(|rim| rim.implicit),
+        far(|rim| rim.meshlib),
+        far(|rim| rim.pymeshlab),
+        far(|rim| Some(rim.bound)),
+        angle(|rim| rim.suture_normals),
+        angle(|rim| rim.meshlib_normals),
+    ]
 }
 
 /// What became of real files with holes.
@@ -184,7 +189,7 @@ fn pairs(line: &Closed) -> Option<(u64, u64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::compare::closing::Found;
+    use crate::compare::made::Found;
     use crate::holes::{Change, Hole, Measured};
     use suture_bench::Counts;
 

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use super::Side;
 use super::book::Book;
-use super::solids::Solved;
+use super::made::Solved;
+use super::sides::Side;
 use super::statistics::{Spread, number};
 
 /// By file, what each side made of it: the newest line of each.
@@ -189,8 +189,8 @@ fn named(files: &Files, side: Side) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::book::Chapter;
+    use super::super::made::Report;
     use super::super::record::Line;
-    use super::super::solids::Report;
     use super::*;
     use crate::holes::Change;
     use suture_bench::Counts;

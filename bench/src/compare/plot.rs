@@ -6,9 +6,12 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::book::Book;
-use super::record::{Input, Way};
+use super::child::Cost;
+use super::error::Error;
+use super::record::Input;
+use super::sides::Side;
 use super::statistics::{number, short, spaced};
-use super::{Cost, Error, Side};
+use super::way::Way;
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Drawn = Result<(), Box<dyn std::error::Error>>;

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use super::record::Way;
+use super::error::Error;
+use super::folders::home;
 use super::sides::{NO_SI, Program, Side};
-use super::{Error, home};
+use super::way::Way;
 
 /// What is there to be measured.
 pub(super) struct Programs {

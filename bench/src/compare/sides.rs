@@ -103,6 +103,106 @@ const COMPETENT: Facts = Facts {
     ..PLAIN
 };
 
+const CP_SYNCED: Facts = Facts { name: "cp-synced", about: "`cp IN OUT && sync OUT`", ..COPY };
+
+const SUTURE_NO_SI: Facts = Facts {
+    name: "suture-no-si",
+    flag: Some(NO_SI),
+    about: "`suture repair --no-self-intersections`: topology alone is looked at",
+    ..SUTURE
+};
+
+const INSPECT: Facts =
+    Facts { name: "inspect", writes: false, judged: false, about: "`suture inspect`, which writes nothing", ..SUTURE };
+
+const INSPECT_NO_SI: Facts =
+    Facts { name: "inspect-no-si", flag: Some(NO_SI), about: "`suture inspect --no-self-intersections`", ..INSPECT };
+
+const PYMESHLAB_PLAIN_SI: Facts = Facts {
+    name: "pymeshlab-plain-si",
+    flag: PYMESHLAB_SI,
+    about: "the same, and its selection of self-intersecting faces once, on the result",
+    ..PLAIN
+};
+
+const PYMESHLAB_COMPETENT_SI: Facts = Facts {
+    name: "pymeshlab-competent-si",
+    flag: PYMESHLAB_SI,
+    about: "the same, and its selection of self-intersecting faces once, on the result",
+    ..COMPETENT
+};
+
+const MESHLIB: Facts = Facts {
+    name: "meshlib",
+    program: Program::Python { script: "meshlib_repair.py", package: "meshlib" },
+    about: "MeshLib: load, find self-collisions, fill holes, save",
+    ..PLAIN
+};
+
+const MESHLIB_DETECT: Facts = Facts {
+    name: "meshlib-detect",
+    program: Program::Python { script: "meshlib_detect.py", package: "meshlib" },
+    writes: false,
+    judged: false,
+    about: "MeshLib: load and `findSelfCollidingTriangles`, which is also timed by itself",
+    ..PLAIN
+};
+
+const PYMESHFIX: Facts = Facts {
+    name: "pymeshfix",
+    program: Program::Python { script: "meshfix.py", package: "pymeshfix" },
+    most_triangles: 1_100_000,
+    about: "MeshFix: fill all boundaries, clean; keeps the largest body and removes what crosses itself",
+    ..PLAIN
+};
+
+const ADMESH: Facts = Facts {
+    name: "admesh",
+    program: Program::Admesh,
+    most_triangles: 1_100_000,
+    about: "the command line, all its checks",
+    ..PLAIN
+};
+
+const TRIMESH: Facts = Facts {
+    name: "trimesh",
+    program: Program::Python { script: "trimesh_repair.py", package: "trimesh" },
+    most_triangles: 110_000,
+    about: "`trimesh.repair`",
+    ..PLAIN
+};
+
+const MANIFOLD3D: Facts = Facts {
+    name: "manifold3d",
+    program: Program::Python { script: "manifold_repair.py", package: "manifold3d" },
+    about: "merge vertices, make a manifold; refuses what is not nearly one",
+    ..PLAIN
+};
+
+const SUTURE_OFF: Facts = Facts {
+    name: "suture-off",
+    flag: Some("--guarantee=off"),
+    about: "`suture repair --guarantee off`: nothing is wrapped",
+    ..SUTURE
+};
+
+const PYMESHLAB_SOLID: Facts = Facts {
+    name: "pymeshlab-solid",
+    flag: Some("--resolve"),
+    about: "pymeshlab-competent, and then up to three rounds of deleting self-intersecting faces and closing what that opens",
+    ..COMPETENT
+};
+
+const MESHLIB_SOLID: Facts = Facts {
+    name: "meshlib-solid",
+    program: Program::Python { script: "meshlib_solid.py", package: "meshlib" },
+    about: "MeshLib: unite close vertices, multiple edges, degenerate faces, holes, self-intersections cut and filled, holes",
+    ..PLAIN
+};
+
+const MANIFOLD3D_UNION: Facts =
+    Facts { name: "manifold3d-union", flag: Some("--union"), about: "the same, and all parts united", ..MANIFOLD3D };
+
 /// What pymeshlab's scripts and suture are told.
 const PYMESHLAB_SI: Option<&str> = Some("--self-intersections");
 pub(super) const NO_SI: &str = "--no-self-intersections";
@@ -140,105 +240,29 @@ impl Side {
         matches!(self, Self::SutureOff | Self::PymeshlabSolid | Self::MeshlibSolid | Self::Manifold3dUnion)
     }
 
+    /// What is to be known about it.
     pub(crate) fn facts(self) -> Facts {
         match self {
             Self::Cp => COPY,
-            Self::CpSynced => Facts { name: "cp-synced", about: "`cp IN OUT && sync OUT`", ..COPY },
+            Self::CpSynced => CP_SYNCED,
             Self::Suture => SUTURE,
-            Self::SutureNoSi => Facts {
-                name: "suture-no-si",
-                flag: Some(NO_SI),
-                about: "`suture repair --no-self-intersections`: topology alone is looked at",
-                ..SUTURE
-            },
-            Self::Inspect => {
-                Facts { name: "inspect", writes: false, judged: false, about: "`suture inspect`, which writes nothing", ..SUTURE }
-            }
-            Self::InspectNoSi => Facts {
-                name: "inspect-no-si",
-                flag: Some(NO_SI),
-                about: "`suture inspect --no-self-intersections`",
-                ..Self::Inspect.facts()
-            },
+            Self::SutureNoSi => SUTURE_NO_SI,
+            Self::Inspect => INSPECT,
+            Self::InspectNoSi => INSPECT_NO_SI,
             Self::PymeshlabPlain => PLAIN,
-            Self::PymeshlabPlainSi => Facts {
-                name: "pymeshlab-plain-si",
-                flag: PYMESHLAB_SI,
-                about: "the same, and its selection of self-intersecting faces once, on the result",
-                ..PLAIN
-            },
+            Self::PymeshlabPlainSi => PYMESHLAB_PLAIN_SI,
             Self::PymeshlabCompetent => COMPETENT,
-            Self::PymeshlabCompetentSi => Facts {
-                name: "pymeshlab-competent-si",
-                flag: PYMESHLAB_SI,
-                about: "the same, and its selection of self-intersecting faces once, on the result",
-                ..COMPETENT
-            },
-            Self::Meshlib => Facts {
-                name: "meshlib",
-                program: Program::Python { script: "meshlib_repair.py", package: "meshlib" },
-                about: "MeshLib: load, find self-collisions, fill holes, save",
-                ..PLAIN
-            },
-            Self::MeshlibDetect => Facts {
-                name: "meshlib-detect",
-                program: Program::Python { script: "meshlib_detect.py", package: "meshlib" },
-                writes: false,
-                judged: false,
-                about: "MeshLib: load and `findSelfCollidingTriangles`, which is also timed by itself",
-                ..PLAIN
-            },
-            Self::Pymeshfix => Facts {
-                name: "pymeshfix",
-                program: Program::Python { script: "meshfix.py", package: "pymeshfix" },
-                most_triangles: 1_100_000,
-                about: "MeshFix: fill all boundaries, clean; keeps the largest body and removes what crosses itself",
-                ..PLAIN
-            },
-            Self::Admesh => Facts {
-                name: "admesh",
-                program: Program::Admesh,
-                most_triangles: 1_100_000,
-                about: "the command line, all its checks",
-                ..PLAIN
-            },
-            Self::Trimesh => Facts {
-                name: "trimesh",
-                program: Program::Python { script: "trimesh_repair.py", package: "trimesh" },
-                most_triangles: 110_000,
-                about: "`trimesh.repair`",
-                ..PLAIN
-            },
-            Self::Manifold3d => Facts {
-                name: "manifold3d",
-                program: Program::Python { script: "manifold_repair.py", package: "manifold3d" },
-                about: "merge vertices, make a manifold; refuses what is not nearly one",
-                ..PLAIN
-            },
-            Self::SutureOff => Facts {
-                name: "suture-off",
-                flag: Some("--guarantee=off"),
-                about: "`suture repair --guarantee off`: nothing is wrapped",
-                ..SUTURE
-            },
-            Self::PymeshlabSolid => Facts {
-                name: "pymeshlab-solid",
-                flag: Some("--resolve"),
-                about: "pymeshlab-competent, and then up to three rounds of deleting self-intersecting faces and closing what that opens",
-                ..COMPETENT
-            },
-            Self::MeshlibSolid => Facts {
-                name: "meshlib-solid",
-                program: Program::Python { script: "meshlib_solid.py", package: "meshlib" },
-                about: "MeshLib: unite close vertices, multiple edges, degenerate faces, holes, self-intersections cut and filled, holes",
-                ..PLAIN
-            },
-            Self::Manifold3dUnion => Facts {
-                name: "manifold3d-union",
-                flag: Some("--union"),
-                about: "the same, and all parts united",
-                ..Self::Manifold3d.facts()
-            },
+            Self::PymeshlabCompetentSi => PYMESHLAB_COMPETENT_SI,
+            Self::Meshlib => MESHLIB,
+            Self::MeshlibDetect => MESHLIB_DETECT,
+            Self::Pymeshfix => PYMESHFIX,
+            Self::Admesh => ADMESH,
+            Self::Trimesh => TRIMESH,
+            Self::Manifold3d => MANIFOLD3D,
+            Self::SutureOff => SUTURE_OFF,
+            Self::PymeshlabSolid => PYMESHLAB_SOLID,
+            Self::MeshlibSolid => MESHLIB_SOLID,
+            Self::Manifold3dUnion => MANIFOLD3D_UNION,
         }
     }
 

@@ -8,11 +8,15 @@ use suture_bench::Counts;
 use suture_bench::generate::{self, Case};
 use suture_bench::judge;
 
+use super::cache;
 use super::cgroup::Group;
 use super::child::{self, Cost, Ended, Stage};
+use super::error::Error;
+use super::options::Options;
 use super::programs::Programs;
-use super::record::{Input, Journal, Line, Outcome, Run, Way, is_good};
-use super::{Error, Options, Side, cache};
+use super::record::{Input, Journal, Line, Outcome, Run, is_good};
+use super::sides::Side;
+use super::way::Way;
 
 /// What one input after the other goes through.
 pub(super) struct Trials<'a> {

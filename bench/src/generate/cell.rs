@@ -1,7 +1,7 @@
 //! One cell of the surface with the defect it was given, and what that defect adds to the counts.
 
 use super::surface::{CELL, Point, Ring, Triangle, on_grid};
-use crate::Counts;
+use crate::counts::Counts;
 
 /// Which quads of a cell are meant.
 pub(super) type Mask = [[bool; CELL]; CELL];

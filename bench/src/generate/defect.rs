@@ -42,7 +42,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// The name under which a [`super::Truth`] counts it.
+    /// The name under which a [`super::case::Truth`] counts it.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Hole => "holes",

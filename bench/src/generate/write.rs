@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 use std::io::Write;
 
+use super::case::{Case, Error, Result, Truth};
 use super::cell::{Cell, cross, dot, minus};
+use super::defect::Kind;
 use super::noise::{Permutation, Random, hash, noise, turn};
 use super::surface::{CELL_TRIANGLES, Ring, Triangle, on_grid};
-use super::{Case, Error, Kind, Result, Truth};
-use crate::Counts;
+use crate::counts::Counts;
 
 /// Every tenth cell holds a defect, more in files too small to show every kind.
 const CELLS_PER_DEFECT: u64 = 10;

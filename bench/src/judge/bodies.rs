@@ -6,7 +6,7 @@
 //! else is, as far as there are such places. A body is lost if none of its points has a winding number other than zero in the other
 //! mesh: exact where that is sealed, generalised and rounded else.
 
-use super::Triangle;
+use super::judgement::Triangle;
 use super::shells::{Line, Shells};
 use super::topology::volume_about;
 

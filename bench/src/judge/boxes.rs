@@ -1,6 +1,6 @@
 //! A tree of boxes over triangles: which of them can meet, and which a line along an axis can meet.
 
-use super::Triangle;
+use super::judgement::Triangle;
 
 /// Triangles of a leaf.
 const LEAF: usize = 4;

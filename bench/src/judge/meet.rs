@@ -3,9 +3,9 @@
 //! Two triangles *cross* where they have a segment in common that is not an edge of both; they *overlap* where they lie in one plane
 //! and have an area in common. A point, and edge along edge, as at a hinge, are no more than touching. All signs are exact.
 
-use super::Triangle;
 use super::boxes::Tree;
 use super::exact::{collinear, side, turn};
+use super::judgement::Triangle;
 
 /// How many triangles cross or overlap another one. Triangles without area are left out.
 ///

@@ -11,6 +11,7 @@
 mod bodies;
 mod boxes;
 mod exact;
+mod judgement;
 mod kept;
 mod meet;
 mod shells;
@@ -20,40 +21,11 @@ mod topology;
 
 use std::path::Path;
 
-use crate::Counts;
-
 pub use bodies::{Bodies, Found as BodiesFound};
+pub use judgement::{Judgement, Triangle};
 pub use kept::{Kept, Same, kept_in_order};
 pub use solid::{Fault, Solid, solid};
 pub use stl::{Error, Result};
-
-/// Three corners.
-pub type Triangle = [[f32; 3]; 3];
-
-/// What a mesh file holds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "compare", derive(serde::Serialize, serde::Deserialize))]
-pub struct Judgement {
-    pub counts: Counts,
-    /// Triangles with a NaN or infinite coordinate.
-    pub nonfinite: u64,
-    /// Distinct positions.
-    pub vertices: u64,
-    /// Signed volume about the centre of the bounding box, in cubic units of the file. Means something only where closed and
-    /// oriented.
-    pub volume: f64,
-    /// Closed, coherent components of positive volume.
-    pub positive_bodies: u64,
-    /// Closed, coherent components of negative volume: cavities, or bodies inside out.
-    pub negative_bodies: u64,
-}
-
-impl Judgement {
-    /// Closed, manifold and consistently oriented: what a slicer needs at least.
-    pub fn sound(&self) -> bool {
-        self.counts.closed() && self.counts.manifold() && self.counts.oriented()
-    }
-}
 
 /// Judges a binary STL.
 ///

@@ -1,9 +1,9 @@
 //! Components of a mesh as surfaces around something: where a line along an axis passes through them, and how often they wind around
 //! a point.
 
-use super::Triangle;
 use super::boxes::Tree;
 use super::exact::turn;
+use super::judgement::Triangle;
 use super::stl::Soup;
 use super::topology::{Components, examine, volume_about};
 

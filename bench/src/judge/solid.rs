@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
+use super::judgement::Judgement;
 use super::meet::meeting;
 use super::shells::Shells;
+use super::stl;
 use super::stl::{Result, Soup};
 use super::topology::{Components, examine};
-use super::{Judgement, stl};
 
 /// What was found in a file.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,6 +4,8 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
+use super::judgement::Triangle;
+
 /// Bytes before the first record.
 const HEADER: u64 = 84;
 /// Bytes of a record.
@@ -89,7 +91,7 @@ impl Records {
 }
 
 impl Soup {
-    pub(super) fn of(triangles: &[super::Triangle]) -> Self {
+    pub(super) fn of(triangles: &[Triangle]) -> Self {
         let mut soup = Self { corners: Vec::with_capacity(3 * triangles.len()), nonfinite: 0 };
         triangles.iter().for_each(|&triangle| soup.push(triangle));
         soup

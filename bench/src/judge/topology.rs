@@ -1,9 +1,9 @@
 //! Vertices, edges, fans and components by sorting.
 
-use super::Judgement;
 use super::exact::collinear;
+use super::judgement::Judgement;
 use super::stl::{Corner, Soup, number};
-use crate::Counts;
+use crate::counts::Counts;
 
 /// One use of an edge by a triangle: the edge's two vertices, the smaller in the upper half; then the corner where the triangle
 /// begins it, and whether that corner is the smaller vertex, in the lowest bit.

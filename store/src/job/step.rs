@@ -1,9 +1,9 @@
 //! Which event may follow which state, and what comes of it.
 
-use super::{
-    BACKOFF_CAP_MS, BACKOFF_MS, Blame, Death, ENVIRONMENT_RETRIES, Ending, Hold, Job, KILLS_FREE, Kind, PARK_CAP_MS, PARK_MS,
-    Parked, Publication, State, Step, Testimony, WAIT_MS, Withdrawal, one_line,
-};
+use super::blame::{Blame, Death, KILLS_FREE, Testimony};
+use super::kind::Kind;
+use super::pauses::{BACKOFF_CAP_MS, BACKOFF_MS, ENVIRONMENT_RETRIES, PARK_CAP_MS, PARK_MS, WAIT_MS};
+use super::state::{Ending, Hold, Job, Parked, Publication, State, Step, Withdrawal, one_line};
 use crate::id::{Boot, Epoch, Time, Token};
 
 /// Something that happens to a job.

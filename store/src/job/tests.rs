@@ -3,6 +3,8 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Time, Token};
+use crate::path::RelPath;
 
 fn fresh() -> Job {
     let source = Source {

@@ -8,11 +8,11 @@
 
 use std::collections::BTreeMap;
 
-use super::{Table, Tables};
 use crate::id::{JobId, Time};
 use crate::job::{BACKOFF_CAP_MS, Job, Kind, State};
 use crate::record::corrupt;
 use crate::store::{Filter, StoreError};
+use crate::tables::{Table, Tables};
 
 /// Written to disk: a kind's tag never changes its meaning.
 fn tag(kind: Kind) -> u8 {

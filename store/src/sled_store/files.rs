@@ -120,7 +120,7 @@ pub(super) fn write_mark(state: &Path, epoch: Epoch, seq: Seq) -> Result<(), Sto
     let temporary = state.join("SEQ.tmp");
     let mut file = create_new(&temporary)?;
     file.write_all(text.as_bytes()).and_then(|()| file.sync_all()).map_err(io(&temporary, "writing"))?;
-    crate::crash_point("store.mark.written");
+    crate::crash::crash_point("store.mark.written");
     std::fs::rename(&temporary, &path).map_err(io(&path, "replacing"))?;
     sync_dir(state)
 }

@@ -1,18 +1,28 @@
 //! Opening the database: what may have been left by a crash is cleared away, what is damaged is examined on a copy, and nothing is
 //! accepted that lacks an acknowledged transition.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::Opening;
 use super::files::{self, Mark, io};
 use super::tables::{self, SledTables};
-use crate::crash_point;
+use crate::crash::crash_point;
 use crate::id::{Clock, Epoch, Seq};
 use crate::job::Job;
 use crate::queue::{Queue, read_head};
 use crate::store::StoreError;
+
+/// What opening the store met.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Opening {
+    /// The epoch that began.
+    pub epoch: Epoch,
+    /// Torn snapshots that were removed.
+    pub torn_snapshots: u32,
+    /// Where a damaged database was put, when the store could go on without it.
+    pub set_aside: Option<PathBuf>,
+}
 
 /// The queue in `state`, whose lock is held, in a new epoch.
 pub(super) fn queue(state: &Path, clock: &Arc<dyn Clock>) -> Result<(Queue<SledTables>, Opening), StoreError> {

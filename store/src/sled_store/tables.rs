@@ -8,11 +8,11 @@ use std::sync::{Condvar, Mutex, MutexGuard};
 use sled::transaction::{TransactionError, TransactionResult, Transactional};
 
 use super::files::{self, io};
-use crate::crash_point;
+use crate::crash::crash_point;
 use crate::id::{Epoch, Seq};
-use crate::queue::{Put, Table, Tables, Visit};
 use crate::stall::Call;
 use crate::store::StoreError;
+use crate::tables::{Put, Table, Tables, Visit};
 
 /// Transitions between two marks in `SEQ`.
 const MARK_EVERY: u64 = 64;

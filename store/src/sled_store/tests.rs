@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::files::{self, Mark};
 use super::*;
-use crate::id::Seq;
+use crate::id::{Epoch, Seq};
 use crate::testkit::{Subject, conformance, dropped};
 
 struct OnDisk {

@@ -1,0 +1,300 @@
+//! One input of a command line: what is asked for, the worker's turn, the result's way to its name, and what is said of it.
+
+use std::path::{Path, PathBuf};
+
+use suture_core::report::{Certificate, Task};
+use suture_core::{ErrorClass, Limits, Profile, Report};
+
+use crate::draft::Draft;
+use crate::exit::Exit;
+use crate::fsx::{self, Identity};
+use crate::naming::Naming;
+use crate::protocol::Request;
+use crate::rights::Rights;
+use crate::signals::Stop;
+use crate::supervise::{Cause, Ended, Worker};
+use crate::table;
+
+/// Why there is no result for a file.
+#[derive(Debug)]
+pub(crate) struct Failure {
+    pub class: ErrorClass,
+    pub line: String,
+    /// It was stopped by a signal.
+    pub stopped: bool,
+}
+
+impl Failure {
+    pub(crate) fn new(class: ErrorClass, line: impl Into<String>) -> Self {
+        Self { class, line: line.into(), stopped: false }
+    }
+
+    /// More memory may help, so that the file is to be tried again with all of the budget.
+    pub(crate) fn is_starved(&self) -> bool {
+        self.class == ErrorClass::Starved
+    }
+
+    pub(crate) fn io(path: &Path, what: &str, error: &std::io::Error) -> Self {
+        Self::new(ErrorClass::Environment, format!("{}: {what}: {error}", path.display()))
+    }
+}
+
+/// What a command line asks for.
+pub(crate) struct Order<'a> {
+    pub inputs: &'a [PathBuf],
+    pub profile: Profile,
+    pub limits: Limits,
+    /// Where results go; `None` for an inspection.
+    pub naming: Option<Naming>,
+    /// What is said to be true of the input: that is checked, and nothing else told.
+    pub certificate: Option<Certificate>,
+    pub json: bool,
+}
+
+/// One input, ready to be worked on.
+pub(crate) struct Item {
+    pub request: Request,
+    /// The input as it was before anyone worked on it.
+    before: Identity,
+    /// What is made of it gets these.
+    rights: Rights,
+    /// The result and the report in the making, with the names they are to have.
+    pub output: Option<(Draft, PathBuf)>,
+    pub report: Option<(Draft, PathBuf)>,
+}
+
+/// A result that is not in place yet.
+pub(crate) struct Finished {
+    pub report: Box<Report>,
+    pub item: Item,
+}
+
+impl Order<'_> {
+    /// Makes an input ready, its result to be called `target`.
+    ///
+    /// # Errors
+    /// When it cannot be read, or nothing may be written where its result would go.
+    pub(crate) fn item(&self, input: &Path, target: Option<&Path>, limits: Limits) -> Result<Item, Failure> {
+        let (before, rights) = std::fs::metadata(input)
+            .map(|m| (Identity::from(&m), Rights::of(&m)))
+            .map_err(|e| Failure { class: ErrorClass::Unreadable, ..Failure::io(input, "cannot be opened", &e) })?;
+        let mut request = Request {
+            task: if self.naming.is_some() { Task::Repair } else { Task::Inspect },
+            input: input.to_owned(),
+            output: None,
+            report: None,
+            witness: None,
+            mark: None,
+            shown_input: input.display().to_string(),
+            shown_output: None,
+            profile: self.profile.clone(),
+            limits,
+        };
+        let (mut output, mut report) = (None, None);
+        if let (Some(naming), Some(target)) = (&self.naming, target) {
+            let refused = |line| Failure::new(ErrorClass::Refused, line);
+            if !naming.is_folder() {
+                naming.check(target).map_err(refused)?;
+            }
+            let draft =
+                |path: &Path| Draft::new(fsx::folder_of(path)).map_err(|error| Failure::io(path, "cannot be written", &error));
+            if let Some(path) = naming.report(target).map_err(refused)? {
+                let made = draft(&path)?;
+                request.report = Some(made.path());
+                report = Some((made, path));
+            }
+            let made = draft(target)?;
+            request.output = Some(made.path());
+            request.limits.spool.get_or_insert_with(|| fsx::folder_of(target).to_owned());
+            request.shown_output = Some(target.display().to_string());
+            output = Some((made, target.to_owned()));
+        }
+        Ok(Item { request, before, rights, output, report })
+    }
+}
+
+impl Item {
+    /// Runs the request in a worker of its memory and threads, which is started when there is none (for `many` small files, or for
+    /// one); it is there again afterwards if it survived.
+    ///
+    /// # Errors
+    /// When the file has no result, for whatever reason.
+    pub(crate) fn work(
+        &self,
+        worker: &mut Option<Worker>,
+        many: bool,
+        stop: &Stop,
+        on_progress: &mut dyn FnMut(&str, u64, u64),
+    ) -> Result<Box<Report>, Failure> {
+        let Request { limits, shown_input: shown, .. } = &self.request;
+        let mut running = match worker.take() {
+            Some(worker) => worker,
+            None => Worker::spawn(limits.memory_bytes, limits.threads, many)
+                .map_err(|e| Failure::new(ErrorClass::Environment, format!("cannot start a worker process: {e}")))?,
+        };
+        let ended = running.run(&self.request, None, &|| stop.asked(), on_progress);
+        let changed = || std::fs::metadata(&self.request.input).map_or(true, |m| Identity::from(&m) != self.before);
+        let changed_line =
+            || Failure::new(ErrorClass::Changed, format!("{shown}: changed while it was being worked on; try again"));
+        match ended {
+            Ended::Done { .. } if changed() => Err(changed_line()),
+            Ended::Done { report, .. } => {
+                *worker = Some(running);
+                Ok(report)
+            }
+            Ended::Failed { class, message } => {
+                *worker = Some(running);
+                Err(Failure::new(class, message))
+            }
+            Ended::Died(death) if matches!(death.cause, Cause::Fault(_)) && changed() => Err(changed_line()),
+            Ended::Died(death) => Err(Failure::new(death.class(), format!("{shown}: {}", death.line()))),
+            Ended::Stopped => {
+                let line = format!("{shown}: interrupted; nothing was written");
+                Err(Failure { stopped: true, ..Failure::new(ErrorClass::Environment, line) })
+            }
+        }
+    }
+
+    /// Makes the content of result and report durable.
+    ///
+    /// # Errors
+    /// When the disk fails.
+    pub(crate) fn sync(&self) -> Result<(), Failure> {
+        for (draft, path) in [&self.output, &self.report].into_iter().flatten() {
+            if draft.is_written() {
+                draft.sync().map_err(|error| Failure::io(path, "cannot be synced", &error))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Finished {
+    /// Gives result and report their names; durable once their folders, which are added to `folders`, are synced.
+    ///
+    /// # Errors
+    /// When a name cannot be had.
+    pub(crate) fn place(mut self, naming: &Naming, folders: &mut Vec<PathBuf>) -> Result<Box<Report>, Failure> {
+        let mut note = |path: &Path| {
+            let folder = fsx::folder_of(path);
+            if !folders.iter().any(|known| known == folder) {
+                folders.push(folder.to_owned());
+            }
+        };
+        // Where no triangle was left, the draft is no mesh, and the report knows of no output.
+        let is_mesh = self.report.output.is_some();
+        if let Some((draft, target)) = self.item.output.filter(|(draft, _)| is_mesh && draft.is_written()) {
+            let placed = place_result(&draft, target, self.item.rights, &self.item.request.input, naming)?;
+            note(&placed);
+            if let Some(facts) = &mut self.report.output {
+                facts.path = placed;
+            }
+        }
+        if let Some((draft, path)) = self.item.report {
+            draft.place(&path, self.item.rights, naming.force).map_err(|error| not_placed(&path, &error))?;
+            note(&path);
+        }
+        Ok(self.report)
+    }
+}
+
+fn place_result(draft: &Draft, mut target: PathBuf, rights: Rights, input: &Path, naming: &Naming) -> Result<PathBuf, Failure> {
+    loop {
+        match draft.place(&target, rights, naming.force && !naming.is_folder()) {
+            Ok(()) => return Ok(target),
+            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => match naming.next(input) {
+                Some(next) => target = next,
+                None => return Err(not_placed(&target, &error)),
+            },
+            Err(error) => return Err(not_placed(&target, &error)),
+        }
+    }
+}
+
+fn not_placed(path: &Path, error: &std::io::Error) -> Failure {
+    if error.kind() == std::io::ErrorKind::AlreadyExists {
+        let line = format!("{}: has come to exist meanwhile; nothing was replaced", path.display());
+        return Failure::new(ErrorClass::Refused, line);
+    }
+    Failure::io(path, "cannot be written", error)
+}
+
+/// What is printed of one input, on standard output and on standard error, and what it means for the exit code.
+pub(crate) fn tell(input: &Path, result: &Result<Box<Report>, Failure>, order: &Order<'_>) -> (String, Option<String>, Exit) {
+    match (result, &order.certificate) {
+        (Ok(report), Some(certificate)) => {
+            let (text, exit) = check(input, certificate, report);
+            (text + "\n", None, exit)
+        }
+        (Ok(report), None) => {
+            let text = if order.json { serde_json::to_string(&report).unwrap_or_default() + "\n" } else { table::render(report) };
+            (text, None, if report.outcome.is_good() { Exit::Good } else { Exit::NotGood })
+        }
+        (Err(failure), _) => {
+            let line = failure.line.clone();
+            let text = if order.json {
+                let input = input.display().to_string();
+                format!("{}\n", serde_json::json!({ "input": input, "error": failure.line, "class": failure.class }))
+            } else {
+                String::new()
+            };
+            (text, Some(line), if failure.stopped { Exit::Interrupted } else { Exit::Refused })
+        }
+    }
+}
+
+/// Whether `certificate` holds for the file that `report` is of, in one line; good only if it says that the file is printable.
+fn check(input: &Path, certificate: &Certificate, report: &Report) -> (String, Exit) {
+    let shown = input.display();
+    let contradictions =
+        report.certificate.as_ref().map_or(vec!["the file has none".into()], |now| certificate.contradictions(now));
+    let rules = certificate.rules.len();
+    if !contradictions.is_empty() {
+        return (format!("{shown}: the certificate does not hold: {}", contradictions.join("; ")), Exit::NotGood);
+    }
+    let of = format!("of these {} bytes with BLAKE3 {}", certificate.bytes, certificate.blake3);
+    if certificate.printable {
+        return (format!("{shown}: the certificate holds: printable, {rules} of {rules} rules passed, {of}"), Exit::Good);
+    }
+    let missing = &certificate.missing;
+    let passed = rules.saturating_sub(missing.len());
+    let line = format!("{shown}: not certified: {passed} of {rules} rules passed, {of}, but not {}", missing.join(", "));
+    (line, Exit::NotGood)
+}
+
+#[cfg(test)]
+mod tests {
+    use suture_core::report::Outcome;
+
+    use super::*;
+
+    /// A file of too many triangles is refused with any memory: to run it again would be in vain.
+    #[test]
+    fn only_a_file_refused_for_memory_gets_all_of_it() {
+        use ErrorClass::{Changed, Environment, Refused, Shortage, Starved, Unreadable};
+        let starved = |class| Failure::new(class, "refused").is_starved();
+        assert_eq!(
+            [Starved, Refused, Unreadable, Environment, Shortage, Changed].map(starved),
+            [true, false, false, false, false, false]
+        );
+    }
+
+    /// One line each, and only what is certified and the same is good.
+    #[test]
+    fn a_certificate_holds_contradicts_or_certifies_nothing() {
+        let mut report = table::tests::sample(Outcome::Clean);
+        let certificate =
+            Certificate { printable: true, blake3: "ab".into(), bytes: 684, triangles: 12, missing: vec![], rules: vec![] };
+        assert_eq!(check(Path::new("a"), &certificate, &report).1, Exit::NotGood, "the file has none");
+        report.certificate = Some(certificate.clone());
+        let (text, exit) = check(Path::new("a"), &certificate, &report);
+        assert!(text.starts_with("a: the certificate holds: printable") && exit == Exit::Good, "{text}");
+        let other = Certificate { blake3: "cd".into(), ..certificate.clone() };
+        let (text, exit) = check(Path::new("a"), &other, &report);
+        assert!(text.contains("does not hold: these are not the bytes") && exit == Exit::NotGood, "{text}");
+        let open = Certificate { printable: false, ..certificate };
+        report.certificate = Some(open.clone());
+        let (text, exit) = check(Path::new("a"), &open, &report);
+        assert!(text.starts_with("a: not certified") && exit == Exit::NotGood, "{text}");
+    }
+}

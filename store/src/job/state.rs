@@ -1,0 +1,392 @@
+//! A dropped file's job: its states, what its holder may report, and what it is owed.
+
+use serde::{Deserialize, Serialize};
+
+use super::blame::{Blame, Death};
+use super::kind::Kind;
+use super::pauses::BACKOFF_CAP_MS;
+use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Seq, Time, Token};
+use crate::path::RelPath;
+
+/// The dropped file, as it was when it came to rest.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Source {
+    /// Name of the hot folder in the daemon's settings.
+    pub folder: String,
+    /// Below the folder's `in/`.
+    pub path: RelPath,
+    pub dev: u64,
+    pub ino: u64,
+    /// Bytes.
+    pub size: u64,
+    /// Nanoseconds since 1970.
+    pub mtime_ns: i64,
+    /// Profile to repair it with.
+    pub profile: String,
+}
+
+/// Part of a hot folder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Area {
+    In,
+    Done,
+    Failed,
+    Quarantine,
+}
+
+/// Result of a job: it is on disk, and nothing more will be done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Ending {
+    /// Good as it came.
+    Clean,
+    /// Repaired, and good.
+    Repaired,
+    /// Repaired, but a person must look.
+    NeedsReview,
+    /// Not good under the profile after all repairs.
+    NotGood,
+    /// No mesh we can read.
+    Unreadable,
+    /// Beyond a stated limit.
+    Refused,
+    /// The world around the file failed too often.
+    Environment,
+    /// It killed its worker, or the daemon, too often.
+    Quarantined,
+}
+
+impl Ending {
+    /// Where the original goes.
+    pub fn area(self) -> Area {
+        match self {
+            Self::Clean | Self::Repaired => Area::Done,
+            Self::NeedsReview | Self::NotGood | Self::Unreadable | Self::Refused | Self::Environment => Area::Failed,
+            Self::Quarantined => Area::Quarantine,
+        }
+    }
+
+    /// Does its result belong into `out/`?
+    pub fn is_good(self) -> bool {
+        self.area() == Area::Done
+    }
+
+    /// Reached without a result of the engine: there is nothing that running again after lost files would bring back.
+    pub(super) fn is_condemned(self) -> bool {
+        matches!(self, Self::Quarantined | Self::Environment)
+    }
+}
+
+/// The intent: which files a finished job leaves, under which names. Durable before the first of them is moved.
+///
+/// A good result stands in `out/`, any other (the best attempt) in the area of its ending. Report and receipt take their names
+/// from the output's, or from the original's where there is no output.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Publication {
+    pub ending: Ending,
+    /// One line for people; empty when there is nothing to add. Cut to [`MAX_REASON`] bytes.
+    pub reason: String,
+    /// The repaired mesh.
+    pub output: Option<RelPath>,
+    pub output_hash: Option<Hash>,
+    pub report_hash: Option<Hash>,
+    /// Last change of the original's inode, in nanoseconds since 1970, when its result was found. If it still has it, its content is
+    /// the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source_ctime_ns: Option<i64>,
+    /// Name of the original in the area of the ending; `None` where originals stay in `in/`.
+    pub original: Option<RelPath>,
+}
+
+/// Longest reason kept, in bytes.
+pub const MAX_REASON: usize = 200;
+
+/// Cuts `text` to one line of at most [`MAX_REASON`] bytes, in characters that a record need not escape.
+pub fn one_line(text: &str) -> String {
+    let plain = |c: char| match c {
+        '"' => '\'',
+        '\\' => '/',
+        c if c.is_control() => ' ',
+        c => c,
+    };
+    let clean: String = text.chars().map(plain).collect();
+    clean.get(..clean.floor_char_boundary(MAX_REASON)).unwrap_or_default().to_owned()
+}
+
+/// Why a job was cancelled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Withdrawal {
+    /// An operator said so. The file stays where it is, and is not taken again until a retry.
+    Operator,
+    /// The file changed; what it became is a new drop with a job of its own.
+    Changed,
+    /// The file is gone.
+    Vanished,
+}
+
+/// Who works on a job, and in which life of the daemon.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Hold {
+    pub attempt: Attempt,
+    pub epoch: Epoch,
+    pub token: Token,
+    /// Nothing else may run meanwhile: the job is suspected of killing the daemon, or needs the whole memory.
+    pub alone: bool,
+    /// The machine's life in which it was claimed.
+    #[serde(default)]
+    pub boot: Boot,
+}
+
+/// A result that could not be brought into place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Parked {
+    /// End of the pause; `None` while someone tries again.
+    pub until: Option<Time>,
+    /// How often it was tried.
+    pub tries: u32,
+    /// A file of the result is in its place already, so that the job cannot be taken back any more.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub committed: bool,
+}
+
+/// Where a job stands.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum State {
+    /// A file of a format that is not repaired: left where it is, named once. `reason` says what it is.
+    Noticed { reason: String },
+    /// Waiting to be claimed; not before `not_before`, if there is one.
+    Queued { not_before: Option<Time> },
+    /// Claimed: a worker runs, or is about to, or has just ended. `cancel`: an operator wants it stopped.
+    Running { hold: Hold, cancel: bool },
+    /// The result is known and needs no worker; its names are not chosen yet.
+    Concluded { hold: Hold, ending: Ending, reason: String },
+    /// The intent is durable; files are being put in place.
+    Publishing { hold: Hold, publication: Publication },
+    /// The result is in place; the original has still to be moved.
+    Published { hold: Hold, publication: Publication },
+    /// Result and original are in place.
+    Ended { publication: Publication },
+    /// Taken back.
+    Cancelled { why: Withdrawal },
+}
+
+/// What the holder of a claim reports. Each is legal only in the state it belongs to, and only with the claim's token.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// The worker died.
+    Died(Death),
+    /// The world around the file failed (I/O, space, permission): try again later.
+    Environment { reason: String },
+    /// Something that no try of this file changes (its folder is out of reach, no process or no room is to be had, a setting is wrong):
+    /// wait a while; it does not count.
+    Wait { reason: String },
+    /// Its share of the memory was too small: try again alone, with all of it.
+    NeedsAll,
+    /// The result cannot be brought into place for now; the claim ends. `committed`: a file of it is in its place already.
+    Park { reason: String, committed: bool },
+    /// Stopping: the job goes back into the queue at no cost.
+    HandBack,
+    /// The worker was stopped as the operator asked, and the file is back in its place.
+    Cancelled,
+    /// The file is not the one that was submitted any more.
+    Withdrawn(Withdrawal),
+    /// The names of the result; the files are durable under temporary ones. Said again while publishing, it replaces the
+    /// earlier intent (a name was taken meanwhile).
+    Intend(Publication),
+    /// The files of the intent are in place, durably.
+    Placed,
+    /// The original will go to another name than intended, since that one was taken meanwhile.
+    Redirect { original: RelPath },
+    /// The original is in its place, durably.
+    Finished,
+    /// The intended files are neither in place nor under their temporary names: the work must be done again.
+    Lost,
+}
+
+/// What the outside world owes a job now.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Duty {
+    /// Nothing until it is claimed.
+    Queue,
+    /// Run a worker on it.
+    Run,
+    /// Stop its worker, put the file back, report [`Step::Cancelled`].
+    Stop,
+    /// Write the report, choose the names, report [`Step::Intend`].
+    Intend,
+    /// Put the files in place, report [`Step::Placed`] (or [`Step::Lost`]).
+    Place,
+    /// Move the original, report [`Step::Finished`].
+    MoveOriginal,
+    /// Nothing any more.
+    Rest,
+}
+
+/// All that is known of one dropped file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Job {
+    pub id: JobId,
+    pub source: Source,
+    /// Where the original is while no claim holds it, if it is not at its source (after a retry of a failed job).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moved_to: Option<(Area, RelPath)>,
+    pub state: State,
+    /// Attempts so far.
+    pub attempts: Attempt,
+    pub blame: Blame,
+    /// It needs the whole memory.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub needs_all: bool,
+    /// Set while its result cannot be brought into place.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parked: Option<Parked>,
+    /// Token of the last claim, whose work folder may still be there.
+    pub work: Option<Token>,
+    /// Why the last attempt came back; for people.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub note: String,
+    pub submitted: Time,
+    pub changed: Time,
+    /// The transition that made it what it is.
+    pub seq: Seq,
+}
+
+impl Job {
+    /// A file that was just found, to be repaired.
+    pub fn queued(id: JobId, source: Source, now: Time) -> Self {
+        Self::new(id, source, State::Queued { not_before: None }, now)
+    }
+
+    /// A file that was just found, of a format that is left alone.
+    pub fn noticed(id: JobId, source: Source, reason: &str, now: Time) -> Self {
+        Self::new(id, source, State::Noticed { reason: one_line(reason) }, now)
+    }
+
+    fn new(id: JobId, source: Source, state: State, now: Time) -> Self {
+        Self {
+            id,
+            source,
+            moved_to: None,
+            state,
+            attempts: Attempt(0),
+            blame: Blame::default(),
+            needs_all: false,
+            parked: None,
+            work: None,
+            note: String::new(),
+            submitted: now,
+            changed: now,
+            seq: Seq(0),
+        }
+    }
+
+    /// The state without its data.
+    pub fn kind(&self) -> Kind {
+        match &self.state {
+            _ if self.rests_parked() => Kind::Parked,
+            State::Noticed { .. } => Kind::Noticed,
+            State::Queued { not_before: Some(_) } => Kind::Waiting,
+            State::Queued { not_before: None } if self.must_run_alone() => Kind::Alone,
+            State::Queued { not_before: None } => Kind::Queued,
+            State::Running { .. } => Kind::Running,
+            State::Concluded { .. } => Kind::Concluded,
+            State::Publishing { .. } => Kind::Publishing,
+            State::Published { .. } => Kind::Published,
+            State::Ended { publication } => match publication.ending {
+                Ending::Clean | Ending::Repaired => Kind::Done,
+                Ending::NeedsReview => Kind::NeedsReview,
+                Ending::Quarantined => Kind::Quarantined,
+                Ending::NotGood | Ending::Unreadable | Ending::Refused | Ending::Environment => Kind::Failed,
+            },
+            State::Cancelled { .. } => Kind::Cancelled,
+        }
+    }
+
+    /// Must nothing else run beside it?
+    pub fn must_run_alone(&self) -> bool {
+        self.needs_all || self.blame.is_suspect()
+    }
+
+    /// Parked, and no one tries?
+    pub(super) fn rests_parked(&self) -> bool {
+        self.parked.is_some_and(|parked| parked.until.is_some())
+    }
+
+    /// The claim on it, if there is one.
+    pub fn hold(&self) -> Option<&Hold> {
+        match &self.state {
+            _ if self.rests_parked() => None,
+            State::Running { hold, .. }
+            | State::Concluded { hold, .. }
+            | State::Publishing { hold, .. }
+            | State::Published { hold, .. } => Some(hold),
+            State::Noticed { .. } | State::Queued { .. } | State::Ended { .. } | State::Cancelled { .. } => None,
+        }
+    }
+
+    /// What is to be done for it.
+    pub fn duty(&self) -> Duty {
+        match &self.state {
+            _ if self.rests_parked() => Duty::Queue,
+            State::Queued { .. } => Duty::Queue,
+            State::Running { cancel: false, .. } => Duty::Run,
+            State::Running { cancel: true, .. } => Duty::Stop,
+            State::Concluded { .. } => Duty::Intend,
+            State::Publishing { .. } => Duty::Place,
+            State::Published { .. } => Duty::MoveOriginal,
+            State::Noticed { .. } | State::Ended { .. } | State::Cancelled { .. } => Duty::Rest,
+        }
+    }
+
+    /// End of the pause it is in: queued after an error, or parked.
+    pub fn pause(&self) -> Option<Time> {
+        match self.state {
+            State::Queued { not_before } => not_before,
+            _ => self.parked.and_then(|parked| parked.until),
+        }
+    }
+
+    /// What it is to leave, or has left, as far as that is known.
+    pub fn publication(&self) -> Option<&Publication> {
+        match &self.state {
+            State::Publishing { publication, .. } | State::Published { publication, .. } | State::Ended { publication } => {
+                Some(publication)
+            }
+            _ => None,
+        }
+    }
+
+    /// The claim whose work folder holds its files; 0 before the first.
+    pub fn work_token(&self) -> Token {
+        self.work.unwrap_or_default()
+    }
+
+    /// May it be claimed at `now`? A pause that ends later than the longest pause from now was set by a clock that has jumped;
+    /// it is over.
+    pub fn is_due(&self, now: Time) -> bool {
+        let waits = matches!(self.state, State::Queued { .. }) || self.rests_parked();
+        waits && self.pause().is_none_or(|then| then <= now || then > now.plus_ms(BACKOFF_CAP_MS))
+    }
+
+    /// Where the original is while no claim holds it: area and path in it.
+    pub fn original(&self) -> (Area, &RelPath) {
+        match (&self.state, &self.moved_to) {
+            (State::Ended { publication: Publication { ending, original: Some(original), .. } }, _) => (ending.area(), original),
+            (_, Some((area, path))) => (*area, path),
+            (_, None) => (Area::In, &self.source.path),
+        }
+    }
+
+    /// Is the same file, seen in `in/` again, this job's? Not when the job's own original was moved away (someone moved it
+    /// back: a new drop), or when the job ended because the file went.
+    pub fn answers_for_source(&self) -> bool {
+        match &self.state {
+            State::Ended { publication } => publication.original.is_none(),
+            State::Cancelled { why } => *why == Withdrawal::Operator && self.moved_to.is_none(),
+            _ => self.moved_to.is_none(),
+        }
+    }
+}

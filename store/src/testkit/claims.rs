@@ -1,0 +1,155 @@
+//! What is taken in, and who may claim it when.
+
+use crate::id::{Attempt, JobId, Time};
+use crate::job::{
+    Area, BACKOFF_CAP_MS, BACKOFF_MS, Death, Duty, ENVIRONMENT_RETRIES, Ending, Illegal, Job, Kind, State, Step, Withdrawal,
+};
+use crate::path::RelPath;
+use crate::store::{Filter, Lease, Query, StoreError};
+
+use super::tools::{ManualClock, Subject, claim_any, finish, job, named, no_one_is_innocent, result_of, submit_one};
+
+pub(super) fn submission_is_idempotent(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), StoreError> {
+    let store = subject.store();
+    let (a, b) = (named("a.stl", 84)?, named("b.stl", 84)?);
+    let first = store.submit(&[a.clone(), b.clone(), a.clone()])?;
+    assert_eq!(first.iter().map(|x| (x.id, x.new)).collect::<Vec<_>>(), [(JobId(1), true), (JobId(2), true), (JobId(1), false)]);
+    let again = store.submit(&[b, a.clone()])?;
+    assert_eq!(again.iter().map(|x| (x.id, x.new)).collect::<Vec<_>>(), [(JobId(2), false), (JobId(1), false)]);
+    // Other bytes (another size), another file (another inode), another time, another folder: another drop.
+    let mut others = [a.clone(), a.clone(), a.clone(), a.clone()];
+    let [size, inode, time, folder] = &mut others;
+    size.source.size += 1;
+    inode.source.ino += 1;
+    time.source.mtime_ns += 1;
+    folder.source.folder = "other".into();
+    assert!(store.submit(&others)?.iter().all(|x| x.new));
+    // A name that fits no record is refused with all that came with it.
+    let mut long = a;
+    long.source.profile = "p".repeat(200);
+    let refused = store.submit(&[named("c.stl", 84)?, long]);
+    assert!(matches!(refused, Err(StoreError::TooLong { .. })), "{refused:?}");
+    assert_eq!(store.list(&Query::default())?.len(), 6);
+    subject.restart();
+    assert_eq!(subject.store().list(&Query::default())?.len(), 6);
+    let answers = subject.store().submit(&[named("b.stl", 84)?, named("d.stl", 84)?])?;
+    assert_eq!(answers.iter().map(|x| (x.id, x.new)).collect::<Vec<_>>(), [(JobId(2), false), (JobId(7), true)]);
+    Ok(())
+}
+
+pub(super) fn a_file_that_came_back_is_new(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), StoreError> {
+    let store = subject.store();
+    // Its original went to done/, and someone moved it back into in/: same identity, but a new drop.
+    let moved = submit_one(store, "moved.stl", 84)?;
+    finish(store, &claim_any(store)?, Ending::Clean, true)?;
+    assert_ne!(submit_one(store, "moved.stl", 84)?, moved);
+    finish(store, &claim_any(store)?, Ending::Clean, true)?;
+    // Where originals stay in in/, a scan finds them again and again: the same drop.
+    let stays = submit_one(store, "stays.stl", 84)?;
+    finish(store, &claim_any(store)?, Ending::Clean, false)?;
+    assert_eq!(submit_one(store, "stays.stl", 84)?, stays);
+    // Changed under our hands: whatever is found there later is new.
+    let changed = submit_one(store, "changed.stl", 84)?;
+    store.advance(&claim_any(store)?, Step::Withdrawn(Withdrawal::Changed))?;
+    assert_ne!(submit_one(store, "changed.stl", 84)?, changed);
+    Ok(())
+}
+
+pub(super) fn the_oldest_that_fits_is_claimed(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), StoreError> {
+    let store = subject.store();
+    let sizes = [5000, 100, 4096, 4095, 1, 0, 70_000];
+    for (at, size) in sizes.into_iter().enumerate() {
+        submit_one(store, &format!("{at}.stl"), size)?;
+    }
+    let take = |least, most| {
+        let claim = store.claim(&Filter { size: (least, most), alone: false })?;
+        Ok::<_, StoreError>(claim.map(|claim| claim.id.0))
+    };
+    assert_eq!(take(1, 99)?, Some(5));
+    assert_eq!(take(4096, 5000)?, Some(1), "bounds are included, and the oldest goes first");
+    assert_eq!(take(4096, 4999)?, Some(3));
+    assert_eq!(take(4096, 4999)?, None);
+    assert_eq!(take(0, u64::MAX)?, Some(2));
+    assert_eq!(take(0, u64::MAX)?, Some(4));
+    assert_eq!(take(0, 0)?, Some(6));
+    assert_eq!(take(0, u64::MAX)?, Some(7));
+    assert_eq!(take(0, u64::MAX)?, None);
+    Ok(())
+}
+
+pub(super) fn the_whole_way(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), StoreError> {
+    let store = subject.store();
+    let id = submit_one(store, "part.stl", 84)?;
+    let claim = claim_any(store)?;
+    assert_eq!((claim.id, claim.job.attempts, claim.job.duty()), (id, Attempt(1), Duty::Run));
+    let wrong = store.advance(&claim, Step::Finished);
+    assert!(matches!(wrong, Err(StoreError::Illegal { source: Illegal::State { .. }, .. })), "{wrong:?}");
+    let mut publication = result_of(&claim.job, Ending::Repaired);
+    assert_eq!(store.advance(&claim, Step::Intend(publication.clone()))?.duty(), Duty::Place);
+    // The name was taken meanwhile.
+    publication.output = RelPath::new("part~2.stl").ok();
+    assert_eq!(store.advance(&claim, Step::Intend(publication.clone()))?.duty(), Duty::Place);
+    assert_eq!(store.advance(&claim, Step::Placed)?.duty(), Duty::MoveOriginal);
+    let original = publication.output.clone().ok_or(StoreError::Unknown(id))?;
+    store.advance(&claim, Step::Redirect { original: original.clone() })?;
+    assert_eq!(store.advance(&claim, Step::Finished)?.duty(), Duty::Rest);
+    publication.original = Some(original.clone());
+    subject.restart();
+    let job = job(subject.store(), id)?;
+    assert_eq!(job.state, State::Ended { publication });
+    assert_eq!((job.kind(), job.original()), (Kind::Done, (Area::Done, &original)));
+    assert_eq!(subject.store().recover(&no_one_is_innocent)?, []);
+    assert_eq!(subject.store().claim(&Filter::default())?, None);
+    Ok(())
+}
+
+pub(super) fn claims_are_fenced(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), StoreError> {
+    let store = subject.store();
+    submit_one(store, "part.stl", 84)?;
+    let old = claim_any(store)?;
+    assert_eq!(store.heartbeat(&old)?, Lease::Held);
+    store.advance(&old, Step::HandBack)?;
+    let fenced = |result: Result<Job, StoreError>| {
+        assert!(matches!(result, Err(StoreError::Illegal { source: Illegal::Fenced, .. })), "{result:?}");
+    };
+    assert_eq!(store.heartbeat(&old)?, Lease::Lost);
+    fenced(store.advance(&old, Step::Died(Death::TimeLimit)));
+    let new = claim_any(store)?;
+    assert!(new.token > old.token);
+    assert_eq!(new.job.attempts, Attempt(2), "handed back costs nothing, but is counted");
+    assert_eq!(store.heartbeat(&old)?, Lease::Lost);
+    fenced(store.advance(&old, Step::Intend(result_of(&old.job, Ending::Clean))));
+    subject.restart();
+    // Void even before anyone recovers it.
+    assert_eq!(subject.store().heartbeat(&new)?, Lease::Lost);
+    fenced(subject.store().advance(&new, Step::Intend(result_of(&new.job, Ending::Clean))));
+    Ok(())
+}
+
+pub(super) fn pauses_are_kept(subject: &mut dyn Subject, clock: &ManualClock) -> Result<(), StoreError> {
+    let id = submit_one(subject.store(), "part.stl", 84)?;
+    let mut pause = BACKOFF_MS;
+    for _ in 0..ENVIRONMENT_RETRIES {
+        let store = subject.store();
+        store.advance(&claim_any(store)?, Step::Environment { reason: "no space\nleft".into() })?;
+        let job = job(store, id)?;
+        assert_eq!((job.kind(), job.note.as_str()), (Kind::Waiting, "no space left"));
+        clock.pass(pause - 1);
+        assert_eq!(store.claim(&Filter::default())?, None, "a pause of {pause} ms");
+        clock.pass(1);
+        pause = (2 * pause).min(BACKOFF_CAP_MS);
+        subject.restart();
+    }
+    let store = subject.store();
+    let claim = claim_any(store)?;
+    let end = store.advance(&claim, Step::Environment { reason: "no space left".into() })?;
+    assert_eq!((end.kind(), end.duty()), (Kind::Concluded, Duty::Intend));
+    assert_eq!(finish(store, &claim, Ending::Environment, true)?.kind(), Kind::Failed);
+
+    // A clock that jumps back does not make a pause endless.
+    let id = submit_one(store, "other.stl", 84)?;
+    store.advance(&claim_any(store)?, Step::Environment { reason: "no space left".into() })?;
+    clock.set(Time(1000));
+    assert_eq!(claim_any(store)?.id, id);
+    Ok(())
+}

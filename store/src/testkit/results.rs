@@ -1,0 +1,123 @@
+//! Results on their way, and what the lists say.
+
+use std::collections::BTreeSet;
+
+use crate::id::{Attempt, JobId};
+use crate::job::{Duty, Ending, Illegal, Kind, State, Step};
+use crate::store::{Filter, Lease, Query, StoreError};
+
+use super::tools::{ManualClock, Subject, claim_any, finish, job, named, no_one_is_innocent, result_of, submit_one};
+
+pub(super) fn a_result_that_cannot_be_placed_is_parked(subject: &mut dyn Subject, clock: &ManualClock) -> Result<(), StoreError> {
+    let store = subject.store();
+    let (id, other) = (submit_one(store, "part.stl", 84)?, submit_one(store, "other.stl", 84)?);
+    let claim = claim_any(store)?;
+    let publication = result_of(&claim.job, Ending::Clean);
+    store.advance(&claim, Step::Intend(publication))?;
+    let park = Step::Park { reason: "permission denied".into(), committed: false };
+    let parked = store.advance(&claim, park.clone())?;
+    assert_eq!((parked.kind(), parked.note.as_str()), (Kind::Parked, "permission denied"));
+    let void = store.advance(&claim, Step::Placed);
+    assert!(matches!(void, Err(StoreError::Illegal { source: Illegal::Fenced, .. })), "its claim is void: {void:?}");
+    assert_eq!(store.heartbeat(&claim)?, Lease::Lost);
+    // Others go on meanwhile; when its pause is over, it is given to whoever asks.
+    let between = claim_any(store)?;
+    assert_eq!(between.id, other);
+    assert_eq!(store.claim(&Filter::default())?, None);
+    clock.pass(crate::job::PARK_MS);
+    let again = store.claim(&Filter { size: (1 << 40, u64::MAX), alone: false })?.ok_or(StoreError::Unknown(id))?;
+    assert_eq!((again.id, again.job.duty(), again.job.attempts), (id, Duty::Place, Attempt(1)));
+    assert_eq!(again.job.work, Some(claim.token), "the work folder is still that of the worker");
+    store.advance(&again, park)?;
+    // A new daemon tries at once.
+    subject.restart();
+    let store = subject.store();
+    assert_eq!(store.recover(&no_one_is_innocent)?.len(), 1, "parked jobs are no one's");
+    let again = claim_any(store)?;
+    assert_eq!(again.id, id);
+    store.advance(&again, Step::Placed)?;
+    assert_eq!(store.advance(&again, Step::Finished)?.kind(), Kind::Done);
+    Ok(())
+}
+
+pub(super) fn results_on_their_way_are_finished(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), StoreError> {
+    let store = subject.store();
+    let id = submit_one(store, "part.stl", 84)?;
+    let claim = claim_any(store)?;
+    let publication = result_of(&claim.job, Ending::Clean);
+    store.advance(&claim, Step::Intend(publication.clone()))?;
+    let mut void = claim.token;
+    for (duty, step) in [(Duty::Place, Step::Placed), (Duty::MoveOriginal, Step::Finished)] {
+        subject.restart();
+        let store = subject.store();
+        let recovered = store.recover(&no_one_is_innocent)?;
+        let one = recovered.first().ok_or(StoreError::Unknown(id))?;
+        assert_eq!((one.job.duty(), one.void, one.job.attempts), (duty, void, Attempt(1)));
+        assert_eq!(one.job.work, Some(claim.token), "the work folder is still that of the worker");
+        let claim = one.claim.clone().ok_or(StoreError::Unknown(id))?;
+        void = claim.token;
+        store.advance(&claim, step)?;
+    }
+    let done = job(subject.store(), id)?;
+    assert_eq!(done.state, State::Ended { publication });
+    assert_eq!(done.blame, crate::job::Blame::default());
+    // A result that was lost on its way is made again.
+    let store = subject.store();
+    submit_one(store, "lost.stl", 84)?;
+    let claim = claim_any(store)?;
+    store.advance(&claim, Step::Intend(result_of(&claim.job, Ending::Clean)))?;
+    assert_eq!(store.advance(&claim, Step::Lost)?.kind(), Kind::Waiting);
+    Ok(())
+}
+
+pub(super) fn lists_and_counts_agree(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), StoreError> {
+    let store = subject.store();
+    let found: Result<Vec<_>, _> = (0..2500).map(|at| named(&format!("{at}.stl"), at)).collect();
+    assert_eq!(store.submit(&found?)?.len(), 2500);
+    for ending in [Ending::Clean, Ending::NeedsReview, Ending::Unreadable, Ending::Repaired] {
+        finish(store, &claim_any(store)?, ending, true)?;
+    }
+    claim_any(store)?;
+    subject.restart();
+    let store = subject.store();
+    let all = store.list(&Query::default())?;
+    assert!(all.iter().map(|job| job.id.0).eq(1..=2500));
+    for (kind, count) in store.counts()? {
+        let listed = store.list(&Query { kinds: vec![kind], ..Query::default() })?;
+        assert!(listed.iter().eq(all.iter().filter(|job| job.kind() == kind)), "{kind}");
+        assert_eq!(listed.len() as u64, count, "{kind}");
+    }
+    assert_eq!(store.counts()?.iter().map(|(_, count)| count).sum::<u64>(), 2500);
+    let page = store.list(&Query { kinds: vec![Kind::Queued, Kind::Done], after: JobId(2), limit: 3 })?;
+    assert!(page.iter().map(|job| job.id.0).eq([4, 6, 7]));
+    let page = store.list(&Query { kinds: Vec::new(), after: JobId(2), limit: 3 })?;
+    assert!(page.iter().map(|job| job.id.0).eq([3, 4, 5]));
+    Ok(())
+}
+
+pub(super) fn threads_get_different_jobs(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), StoreError> {
+    let store = subject.store();
+    let found: Result<Vec<_>, _> = (0..64).map(|at| named(&format!("{at}.stl"), at)).collect();
+    store.submit(&found?)?;
+    let work = || -> Result<Vec<JobId>, StoreError> {
+        let mut done = Vec::new();
+        while let Some(claim) = store.claim(&Filter::default())? {
+            finish(store, &claim, Ending::Clean, true)?;
+            done.push(claim.id);
+        }
+        Ok(done)
+    };
+    let results: Vec<Result<Vec<JobId>, StoreError>> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..4).map(|_| scope.spawn(work)).collect();
+        threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
+    });
+    let mut taken = Vec::new();
+    for result in results {
+        taken.extend(result?);
+    }
+    assert_eq!(taken.len(), 64);
+    assert_eq!(taken.iter().collect::<BTreeSet<_>>().len(), 64, "no job twice");
+    let seqs: BTreeSet<_> = store.list(&Query::default())?.iter().map(|job| job.seq).collect();
+    assert_eq!(seqs.len(), 64, "every transition has its own number");
+    Ok(())
+}

@@ -1,4 +1,8 @@
-//! What is known of a file before anything is done about it: its survey, its workshop, its defects and the tolerances that follow from its size.
+//! Diagnosis: what is known of a file before anything is done about it.
+//!
+//! **In:** records, a profile, limits.
+//! **Out:** a [`Diagnosis`]: the survey, the submesh, its defects, and the tolerances that follow from the size of the surface.
+//! **Promise:** nothing is changed; `inspect` ends here.
 
 use std::path::Path;
 

@@ -1,5 +1,12 @@
-//! The way of one file through the engine: read → survey → workshop → repairs → edit → emit → read back → report. The output is surveyed
-//! as a whole only where the second look, at what changed, cannot tell.
+//! Engine: the way of one file through all of it.
+//!
+//! **In:** a path, a profile, limits, a progress.
+//! **Out:** a report; for a repair, the file at the path for it.
+//! **Promise:** what stands at that path is complete and synced when a report is returned. The input is what it was at the beginning, or
+//! the result is thrown away.
+//!
+//! read → survey → workshop → repairs → edit → emit → read back → report. The output is surveyed as a whole only where the second look, at
+//! what changed, cannot tell.
 
 use crate::repairs::Repaired;
 use std::path::Path;

@@ -26,6 +26,7 @@ pub(crate) fn serve(args: &WorkerArgs) -> io::Result<()> {
     orphan::listen()?;
     confine::bind(args)?;
     confine::confine();
+    name_want_of_memory();
     for line in io::stdin().lock().lines() {
         let request: Request = serde_json::from_str(&line?)?;
         say(&Message::Begun)?;
@@ -41,6 +42,23 @@ pub(crate) fn serve(args: &WorkerArgs) -> io::Result<()> {
         say(&answer)?;
     }
     Ok(())
+}
+
+/// Libraries that panic for want of memory are made to end as the standard library does: by an abort whose line the supervisor knows.
+fn name_want_of_memory() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if panic.location().is_some_and(|place| is_of_allocation(place.file())) {
+            eprintln!("memory allocation of a library's table failed");
+            std::process::abort();
+        }
+        usual(panic);
+    }));
+}
+
+/// Is this the source file in which `bytemuck`, which `obvhs` gets its tables from, unwraps what it allocates?
+fn is_of_allocation(source: &str) -> bool {
+    source.ends_with("allocation.rs") && source.contains("bytemuck")
 }
 
 fn say(message: &Message) -> io::Result<()> {
@@ -209,5 +227,28 @@ mod hook {
         if name.contains("!slow!") {
             std::thread::sleep(Duration::from_millis(300));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+
+    use super::*;
+
+    /// Wherever another version of the library panics, this fails.
+    #[test]
+    fn a_librarys_want_of_memory_is_told_by_its_place() {
+        let (said, places) = channel();
+        let usual = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            let _ = said.send(panic.location().map(|place| place.file().to_owned()));
+        }));
+        let without = std::panic::catch_unwind(|| bytemuck::allocation::zeroed_vec::<u8>(isize::MAX.unsigned_abs()).len());
+        std::panic::set_hook(usual);
+        assert!(without.is_err());
+        let places: Vec<String> = places.iter().flatten().collect();
+        assert!(places.iter().any(|place| is_of_allocation(place)), "{places:?}");
+        assert!(!is_of_allocation("core/src/geometry/boxes.rs"));
     }
 }

@@ -1,4 +1,4 @@
-//! The rules of the house, read from the source: files import each other in no circle, folders of the engine import only those above them, and no
+//! The rules of the house, read from the source: files import each other in no circle, nor do folders, those of the engine import only those above them and state their contract, and no
 //! file or function is too long to be read in one go.
 
 #[path = "house/imports.rs"]
@@ -45,6 +45,25 @@ fn no_files_import_each_other_in_a_circle() {
 }
 
 #[test]
+fn no_folders_import_each_other_in_a_circle() {
+    for of_crate in CRATES {
+        let circles: Vec<_> = Imports::of(&sources(of_crate)).folders().iter().flat_map(Imports::circles).collect();
+        assert!(circles.is_empty(), "{of_crate}: {circles:#?}");
+    }
+}
+
+#[test]
+fn each_folder_of_the_engine_states_its_contract() {
+    for room in ROOMS {
+        let [folder, file] = [sources("core").join(room).join("mod.rs"), sources("core").join(format!("{room}.rs"))];
+        let text = std::fs::read_to_string(if folder.exists() { &folder } else { &file }).expect("it can be read");
+        for part in ["//! **In:**", "//! **Out:**", "//! **Promise:**"] {
+            assert!(text.contains(part), "{room} lacks `{part}`");
+        }
+    }
+}
+
+#[test]
 fn no_folder_of_the_engine_imports_one_below_it() {
     let imports = Imports::of(&sources("core"));
     let rank =
@@ -83,6 +102,25 @@ fn circles_are_found() {
     assert_eq!(Imports::of(folder.path()).circles(), Vec::<Vec<String>>::new(), "c does not use its child");
     write("c/mod.rs", "mod child; use child::f; struct C;");
     assert_eq!(Imports::of(folder.path()).circles(), [["a", "b", "c", "c::child", "d"]]);
+}
+
+#[test]
+fn circles_of_folders_are_found() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::create_dir_all(path.parent().expect("it has a parent")).expect("a folder");
+        std::fs::write(path, text).expect("a file");
+    };
+    write("lib.rs", "mod a; mod b;");
+    write("a/mod.rs", "mod one; mod two;");
+    write("a/one.rs", "use crate::b::B;");
+    write("a/two.rs", "pub struct Two;");
+    write("b.rs", "use crate::a::two::Two;");
+    let imports = Imports::of(folder.path());
+    assert!(imports.circles().is_empty(), "no file leads to itself");
+    let circles: Vec<_> = imports.folders().iter().flat_map(Imports::circles).collect();
+    assert_eq!(circles, [["a", "b"]]);
 }
 
 /// Lines of a file, at most.

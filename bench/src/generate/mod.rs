@@ -28,7 +28,7 @@ pub fn write(case: Case, triangles: u64, seed: u64, out: &mut impl Write) -> Res
 /// The same, into a file that is created or replaced.
 ///
 /// # Errors
-/// As [`write`], and when the file cannot be created.
+/// As [`write()`], and when the file cannot be created.
 pub fn write_file(case: Case, triangles: u64, seed: u64, path: &Path) -> Result<Truth> {
     let mut file = File::create(path).map_err(|source| Error::Create { path: path.into(), source })?;
     let truth = write(case, triangles, seed, &mut file)?;

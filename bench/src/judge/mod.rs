@@ -3,7 +3,7 @@
 //!
 //! Vertices are identified by exact f32 coordinates (−0.0 = 0.0), as a slicer does; nothing is tolerated, nothing merged.
 //! Triangles with a coordinate that is no number are dropped and counted; triangles with a repeated vertex are counted and left
-//! out of everything else. [`judge`] does not look for self-intersections; [`solid`] does, and says whether a file can be printed.
+//! out of everything else. [`judge`] does not look for self-intersections; [`solid()`] does, and says whether a file can be printed.
 //! [`Bodies`] tells which bodies of a mesh are still in another one.
 //!
 //! O(n log n) time, about 100 bytes of memory a triangle.

@@ -1,4 +1,9 @@
-//! Contract: what a caller gives (settings and limits) and gets (a report or an error).
+//! Contract: what a caller gives and gets.
+//!
+//! **In:** a profile (what is to be repaired), limits (memory, threads, bounds), a progress to tell.
+//! **Out:** a report (schema in `core/REPORT.md`) or an error.
+//! **Promise:** a profile or a limit that makes no sense is refused by name before work begins ([`ranges`]). Every number of a report is
+//! finite ([`finite`]). An error says whether more memory, another machine, or nothing at all would help ([`error`]).
 
 pub(crate) mod access;
 pub mod error;

@@ -1,4 +1,10 @@
-//! Detect: what is wrong, told from the survey and the submesh; and what that says about the file.
+//! Detection: what is wrong, told from the survey and the submesh; and what that says about the file.
+//!
+//! **In:** a survey and a submesh.
+//! **Out:** counts of defects ([`defects`]), bodies and what lies in what ([`bodies`]), boundary loops by class ([`holes`]); the rules of a
+//! printable file, and what they say of this one ([`rules`], [`verdict`], [`certificate`]).
+//! **Promise:** nothing is changed. What was not looked at is called unchecked, and is never certified. Verdict and certificate come from
+//! one table.
 
 pub(crate) mod bodies;
 pub(crate) mod certificate;

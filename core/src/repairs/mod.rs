@@ -1,8 +1,12 @@
-//! Repairs: the workshop of a file is changed until it is printable, as far as the profile allows.
+//! Repairs: the submesh of a file is changed until the file is printable, as far as the profile allows.
 //!
-//! In comes a [`Diagnosis`], out goes the workshop as it is to be written, and an [`Account`] of what was done. [`pipeline`] lists the
-//! repairs in their order; [`context`] says what a repair may know and what it hands on; each repair has a file, with its entry for the list at the
-//! top. A repair changes triangles in the workshop only, by way of [`work`], and turns or drops patches of sound surface as a whole.
+//! **In:** a [`Diagnosis`].
+//! **Out:** the submesh as it is to be written, and an [`Account`] of what was done and where.
+//! **Promise:** a repair changes triangles of the submesh by way of `work` only, and turns or drops patches of sound surface as a whole;
+//! what it may change stands in its entry. What is not proved valid is taken back.
+//!
+//! [`pipeline`] lists the repairs in their order; `context` says what a repair may know and what it hands on. Each repair has a file,
+//! with its entry for the list at the top.
 
 mod boolean;
 mod cleanup;

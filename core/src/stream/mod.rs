@@ -1,4 +1,10 @@
 //! Stream: records in spatial chunks, in bounded memory.
+//!
+//! **In:** all records of a file, and a budget of memory.
+//! **Out:** a plan of chunks ([`plan`]), for each chunk its triangles in ascending order ([`members`]), and triangles by number or by place
+//! ([`source`], [`spool`]).
+//! **Promise:** memory is counted before it is taken ([`budget`]); too little is a refusal. Where the planes of the plan lie changes no
+//! result.
 
 pub(crate) mod budget;
 pub(crate) mod columns;

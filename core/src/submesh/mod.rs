@@ -1,5 +1,10 @@
 //! The workshop: all triangles around unsound vertices, as a small mesh in memory that repairs can change.
 //!
+//! **In:** the triangles around unsound vertices, by their numbers, and the records they stand in.
+//! **Out:** a [`Shop`] of vertices and triangles; its edges ([`edges`]), the wedges of material around an edge ([`wedges`]), its components
+//! ([`components`]), vertices near a place ([`near`]).
+//! **Promise:** everything that a repair decides on is here: the star of each complete vertex is whole.
+//!
 //! Its **complete** vertices have their whole star here (the unsound ones, and what was fetched on request); the others are its
 //! frontier and stay as they are. An edge with a complete end therefore has all its triangles here. Vertices and triangles are
 //! numbered by the input's order, so nothing that is done here depends on how the file was cut into chunks.

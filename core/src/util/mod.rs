@@ -1,4 +1,10 @@
-//! Util: what a program needs and a mesh does not: threads, sorts, sets, counts of steps, and what the machine has.
+//! Util: what a program needs and a mesh does not.
+//!
+//! **In:** closures, keys, counters.
+//! **Out:** threads that are a help and never a need ([`parallel`]), sorts by digits ([`radix`]), disjoint sets ([`union_find`]), numbers
+//! in few bytes ([`varint`]), what a run costs ([`cost`]), counted steps of loops ([`steps`]), what the machine has ([`machine`]).
+//! **Promise:** nothing here knows a triangle. Parallel work returns its results in the order of its items, so that no result depends on
+//! the number of threads.
 
 pub(crate) mod cost;
 pub(crate) mod machine;

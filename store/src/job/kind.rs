@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// [`State`] without its data, endings told apart: what lists and counters show.
+/// `State` without its data, endings told apart: what lists and counters show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {

@@ -52,6 +52,25 @@ impl Imports {
         circles.into_iter().collect()
     }
 
+    /// The folders of this crate, each with those beside it that its files import, once for every folder that holds folders.
+    pub(crate) fn folders(&self) -> Vec<Self> {
+        let parents: BTreeSet<&[String]> = self.0.keys().flat_map(|module| (0..module.len()).map(|n| &module[..n])).collect();
+        let below = |parent: &[String]| {
+            let child =
+                |module: &Module| module.strip_prefix(parent).filter(|rest| !rest.is_empty()).map(|rest| rest[..1].to_vec());
+            let mut folders: BTreeMap<Module, BTreeSet<Module>> = BTreeMap::new();
+            for (from, to) in self.all() {
+                if let (Some(from), Some(to)) = (child(from), child(to))
+                    && from != to
+                {
+                    folders.entry(from).or_default().insert(to);
+                }
+            }
+            Self(folders)
+        };
+        parents.into_iter().map(below).collect()
+    }
+
     fn reached(&self, from: &Module) -> BTreeSet<&Module> {
         let mut all = BTreeSet::new();
         let mut waiting: Vec<&Module> = self.0.get(from).into_iter().flatten().collect();

@@ -64,7 +64,7 @@ impl MeshFile {
     /// `spool`, which should not be a memory file system; its progress is reported in bytes as stage `read`.
     ///
     /// # Errors
-    /// [`Error::Unreadable`] for what is no mesh or holds no triangle, [`Error::Refused`] beyond [`MAX_TRIANGLES`],
+    /// [`Error::Unreadable`] for what is no mesh or holds no triangle, [`Error::Refused`] beyond `MAX_TRIANGLES`,
     /// [`Error::Changed`] if the file is truncated meanwhile, [`Error::NoSpace`] where a copy finds no room,
     /// [`Error::Io`] where opening, mapping or spooling fails, or with [`std::io::ErrorKind::Interrupted`] when `progress`
     /// cancels.

@@ -1,6 +1,6 @@
-//! A mesh file as an array of [`Record`]s.
+//! A mesh file as an array of `Record`s.
 //!
-//! Binary STL is read where it lies, mapped or copied ([`Access`]). Text STL is parsed once, in parallel, into a nameless spool file of the same
+//! Binary STL is read where it lies, mapped or copied (`Access`). Text STL is parsed once, in parallel, into a nameless spool file of the same
 //! records, which is mapped in its place. So the rest of the engine sees one thing: `&[Record]` in input order, backed by pages
 //! the system can drop at any time.
 //!

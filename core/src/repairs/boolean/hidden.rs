@@ -4,7 +4,7 @@
 //! patent of the same group): for each of Z, X, Y, −Z, −X, −Y, and each piece that is not known to be visible, take its largest triangle. If that
 //! stands along the direction, or a ray from it meets another piece, the piece is hidden in this direction.
 //!
-//! What the paper leaves open is settled so. A piece is what stands for itself ([`pieces::pieces`]), closed or open, after crossings were cut. Of
+//! What the paper leaves open is settled so. A piece is what stands for itself (`pieces::pieces`), closed or open, after crossings were cut. Of
 //! several largest triangles the first in the file counts, measured in rounded arithmetic that is the same everywhere; triangles that a repair
 //! has added are neither asked nor do they hide anything, since the paper decides before it fills. The ray begins inside of the
 //! triangle, within a rounding of f64, which is far finer than what f32 can tell apart; whether a triangle stands along a direction and what a ray meets are

@@ -1,15 +1,15 @@
 //! Crossings: bodies that cross each other, or themselves, become one.
 //!
-//! The triangles that cross something, and their neighbours, are cut along everything they meet ([`cut`], [`crate::geometry::arrange`]). Cells of space in
+//! The triangles that cross something, and their neighbours, are cut along everything they meet (`cut`, [`crate::geometry::arrange`]). Cells of space in
 //! front of and behind their pieces, the other triangles of the workshop and the patches of sound surface are one where these join
-//! ([`sides`]); behind each of them the winding number is larger by one than in front. One exact winding number a connected surface (`bodies`)
+//! (`sides`); behind each of them the winding number is larger by one than in front. One exact winding number a connected surface (`bodies`)
 //! makes all of them known. Material is where the winding number is positive (Jacobson et al. 2013; Zhou et al. 2016): what has it on one
-//! side only stays, so that a body inside out comes right and what lies inside of another one goes, whole patches as bits of the edit ([`embed`]).
+//! side only stays, so that a body inside out comes right and what lies inside of another one goes, whole patches as bits of the edit (`embed`).
 //!
 //! Where the surface was cut, new vertices are rounded to f32. Triangles that come to nothing by that leave every directed edge balanced, and
 //! what crosses after it is resolved in the next round, with what it crosses, from the f32 coordinates. (Near zero f32 has places far closer to
 //! each other than elsewhere, which are of no use: no place is finer than those at the file's largest coordinate, but for what has its place
-//! exactly.) Before each round, features that are nearly one there are made one ([`near`]), the nearer the sooner, so that f32 has room
+//! exactly.) Before each round, features that are nearly one there are made one (`near`), the nearer the sooner, so that f32 has room
 //! between those that are left (the iterated snap rounding of Valque & Lazard, SGP 2025, and CGAL 6.1 brings vertices to a coarser grid
 //! instead, with 31 more bits). Rounds are counted, so that time decides nothing.
 //!

@@ -142,7 +142,7 @@ pub(crate) fn turn(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reve
     }
 }
 
-/// Turns closed ones of all [`pieces`] inside out where they enclose negative volume and are no cavity; returns (pieces, triangles).
+/// Turns closed ones of all `pieces` inside out where they enclose negative volume and are no cavity; returns (pieces, triangles).
 pub(crate) fn make_outward(
     survey: &Survey<'_>,
     work: &mut Work<'_>,

@@ -9,7 +9,7 @@
 //! that plane separates the triangles, and holds a vertex or an edge of each at most, neither of which counts. A
 //! triangle that lies in such a plane itself has an axis of zero extent, and its box is widened there to the neighbouring floats
 //! both ways; then it overlaps exactly what it may meet, except that two parallel planes one float apart pass for one
-//! ([`Row::same_plane`]).
+//! (`Row::same_plane`).
 //!
 //! Boxes are cut to the cell widened to the neighbouring floats. Pairs that the cell owns keep an overlap: its lowest corner, or the
 //! position that the two share, is in the cell, and as it lies below the upper end of both boxes and not above the cell's,

@@ -14,15 +14,15 @@ use crate::detect::defects;
 use crate::geometry::sums::{Bounds, step_at};
 use crate::io::record;
 use crate::stream::budget;
-use crate::submesh::Shop;
+use crate::submesh::Submesh;
 use crate::submesh::edges::{Edge, Edges};
 use crate::submesh::near::Tolerance;
 use crate::topology::survey::Survey;
 
-/// The survey of a file, its untouched workshop and its defects.
+/// The survey of a file, its untouched submesh and its defects.
 pub(crate) struct Diagnosis<'a> {
     pub(crate) survey: Survey<'a>,
-    pub(crate) shop: Shop,
+    pub(crate) submesh: Submesh,
     pub(crate) tolerance: Tolerance,
     pub(crate) defects: Defects,
 }
@@ -36,23 +36,23 @@ impl<'a> Diagnosis<'a> {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let survey = Survey::new(path, records, profile.check_self_intersections, limits, progress)?;
-        let shop = Shop::gather(&survey);
-        let edges = Edges::of(&shop);
+        let submesh = Submesh::gather(&survey);
+        let edges = Edges::of(&submesh);
         let boundary_edges = edges.iter().filter(Edge::is_boundary).count() as u64;
         survey.take_boundary(path, boundary_edges, budget::boundary_bytes(boundary_edges))?;
-        Ok(Self::counted(survey, shop, &edges, profile))
+        Ok(Self::counted(survey, submesh, &edges, profile))
     }
 
-    /// Of a workshop that is as gathered.
-    pub(crate) fn count(survey: Survey<'a>, shop: Shop, profile: &Profile) -> Self {
-        let edges = Edges::of(&shop);
-        Self::counted(survey, shop, &edges, profile)
+    /// Of a submesh that is as gathered.
+    pub(crate) fn count(survey: Survey<'a>, submesh: Submesh, profile: &Profile) -> Self {
+        let edges = Edges::of(&submesh);
+        Self::counted(survey, submesh, &edges, profile)
     }
 
-    fn counted(survey: Survey<'a>, shop: Shop, edges: &Edges, profile: &Profile) -> Self {
+    fn counted(survey: Survey<'a>, submesh: Submesh, edges: &Edges, profile: &Profile) -> Self {
         let tolerance = tolerance(&survey, profile);
-        let defects = defects::count(&survey, &shop, edges, &tolerance);
-        Self { survey, shop, tolerance, defects }
+        let defects = defects::count(&survey, &submesh, edges, &tolerance);
+        Self { survey, submesh, tolerance, defects }
     }
 
     /// Gives the memory of everything else back.
@@ -64,7 +64,7 @@ impl<'a> Diagnosis<'a> {
     pub(crate) fn surface_bounds(&self) -> Bounds {
         let mut bounds = Bounds::EMPTY;
         self.survey.patches.iter().for_each(|p| bounds.add(&p.bounds));
-        self.shop.living().filter(|t| !self.shop.is_collinear(*t)).for_each(|t| bounds.include(&self.shop.points(t)));
+        self.submesh.living().filter(|t| !self.submesh.is_collinear(*t)).for_each(|t| bounds.include(&self.submesh.points(t)));
         bounds.normalised()
     }
 }

@@ -5,7 +5,7 @@
 //! **Promise:** what stands at that path is complete and synced when a report is returned. The input is what it was at the beginning, or
 //! the result is thrown away.
 //!
-//! read → survey → workshop → repairs → edit → emit → read back → report. The output is surveyed as a whole only where the second look, at
+//! read → survey → submesh → repairs → edit → emit → read back → report. The output is surveyed as a whole only where the second look, at
 //! what changed, cannot tell.
 
 use crate::repairs::Repaired;
@@ -194,16 +194,16 @@ fn mend(
         clock.lap("repair");
     }
     let (edit, swallowed) = repaired.unwrap_or_default();
-    // Of the input's survey, the second look may go on; the memory of its workshop is needed for that of the output.
+    // Of the input's survey, the second look may go on; the memory of its submesh is needed for that of the output.
     let survey = diagnosis.into_survey();
     // Good as it came, or nothing in it could be repaired.
     let same = edit.is_empty() && flaws(mesh).is_empty();
-    let expected = if same { None } else { expectation(mesh, &edit, survey.suspects.len() as u64, limits) };
+    let expected = if same { None } else { expectation(mesh, &edit, survey.irregular_triangles.len() as u64, limits) };
     let emit = || draft.finish(&if same { Content::Input } else { Content::Edited(&edit) });
     // What the file will hold is looked at while it is written. It counts when the file was read back and does hold that.
     let look = || {
         let looked = expected.as_ref().and_then(|expected| incremental::look(survey, &expected.difference));
-        looked.map(|(survey, shop)| Diagnosis::count(survey, shop, profile).defects)
+        looked.map(|(survey, submesh)| Diagnosis::count(survey, submesh, profile).defects)
     };
     let threads = if mesh.bytes().len() < HASHED_BY_ONE { 1 } else { limits.threads };
     let (written, looked) = parallel::both(threads, emit, look);
@@ -236,10 +236,10 @@ fn mend(
 }
 
 /// What the file will hold after `edit`, where a look at the difference costs less than reading all of it, and its tables fit in memory.
-fn expectation<'e>(mesh: &'e MeshFile, edit: &'e Edit, suspects: u64, limits: &Limits) -> Option<Expectation<'e>> {
+fn expectation<'e>(mesh: &'e MeshFile, edit: &'e Edit, irregular_triangles: u64, limits: &Limits) -> Option<Expectation<'e>> {
     let (gone, added) = (edit.gone(), edit.added.len() as u64);
     let is_worthwhile = incremental::is_worthwhile(gone, added, mesh.records().len())
-        && incremental::bytes(suspects, gone + added) <= limits.memory_bytes;
+        && incremental::bytes(irregular_triangles, gone + added) <= limits.memory_bytes;
     is_worthwhile.then(|| Expectation::of(mesh.records(), edit))
 }
 
@@ -263,7 +263,7 @@ fn repair_diagnosed(
     }
     progress.at("repair", 0, mesh.records().len() as u64);
     let repaired = repairs::run(diagnosis, mesh.path(), profile, limits, progress)?;
-    let mut edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &repaired.reversed);
+    let mut edit = Edit::of(&diagnosis.survey, &diagnosis.submesh, &repaired.reversed);
     edit.added.extend(repaired.wrapped.iter().map(|corners| record::encode(*corners, 0)));
     Ok(Some((edit, take_account(report, repaired))))
 }

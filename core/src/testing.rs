@@ -74,7 +74,7 @@ pub(crate) fn after<R>(triangles: &[Corners], repair: impl FnOnce(&mut Diagnosis
     let mut diagnosis = diagnose(&input);
     let mut turned = Reversed::none(&diagnosis.survey);
     let result = repair(&mut diagnosis, &mut turned);
-    let edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &turned);
+    let edit = Edit::of(&diagnosis.survey, &diagnosis.submesh, &turned);
     let defects = diagnose(&written(&edit, &input)).defects;
     check_second_look(diagnosis.survey, &edit, &defects);
     let verdict = crate::detect::verdict::judge(&defects, &[]);
@@ -84,8 +84,8 @@ pub(crate) fn after<R>(triangles: &[Corners], repair: impl FnOnce(&mut Diagnosis
 /// The second look by the difference, if it comes to anything, must find what a look at everything finds. Says if it came to anything.
 pub(crate) fn check_second_look(survey: Survey<'_>, edit: &Edit, anew: &Defects) -> bool {
     let difference = Expectation::of(survey.records, edit).difference;
-    let Some((survey, shop)) = incremental::look(survey, &difference) else { return false };
-    let mut defects = Diagnosis::count(survey, shop, &Profile::default()).defects;
+    let Some((survey, submesh)) = incremental::look(survey, &difference) else { return false };
+    let mut defects = Diagnosis::count(survey, submesh, &Profile::default()).defects;
     // Sums are rounded by the box they are taken in, which may be another.
     for (got, want) in [(&mut defects.area, anew.area), (&mut defects.volume, anew.volume)] {
         assert!((*got - want).abs() <= 1e-9 * (1.0 + want.abs()), "{got} instead of {want}");
@@ -111,7 +111,7 @@ pub(crate) fn written(edit: &Edit, input: &[Record]) -> Vec<Record> {
     output
 }
 
-/// Unit cubes on a grid, which touch and overlap, and stray triangles: sound and unsound stars side by side.
+/// Unit cubes on a grid, which touch and overlap, and stray triangles: regular and irregular stars side by side.
 pub(crate) fn soup() -> impl Strategy<Value = Vec<Corners>> {
     let cubes = prop::collection::vec(prop::array::uniform3(0u8..4), 0..5);
     let coordinate = prop_oneof![60 => (0u8..5).prop_map(f32::from), 1 => Just(f32::NAN)];

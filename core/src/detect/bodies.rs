@@ -14,7 +14,7 @@ use robust::{Coord, Coord3D};
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::sums::Bounds;
 use crate::io::record;
-use crate::submesh::Shop;
+use crate::submesh::Submesh;
 use crate::submesh::components::{Component, Components, Reversed, Sample};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
@@ -43,14 +43,14 @@ struct Ray {
 /// lies in another, reads the chunks of the file once more that a ray may meet.
 pub(crate) fn surroundings(
     survey: &Survey<'_>,
-    shop: &Shop,
+    submesh: &Submesh,
     components: &Components,
     reversed: &Reversed,
     asks: impl Fn(&Component) -> bool,
 ) -> Vec<Surroundings> {
     let mut all = vec![Surroundings::default(); components.list.len()];
-    let (of_rays, rays) = rays(survey, shop, &components.list, asks);
-    for (component, around) in of_rays.into_iter().zip(count(survey, shop, components, reversed, &rays)) {
+    let (of_rays, rays) = rays(survey, submesh, &components.list, asks);
+    for (component, around) in of_rays.into_iter().zip(count(survey, submesh, components, reversed, &rays)) {
         all[component as usize].around = around;
     }
     all
@@ -60,19 +60,19 @@ pub(crate) fn surroundings(
 /// file that the rays may meet.
 pub(crate) fn windings(
     survey: &Survey<'_>,
-    shop: &Shop,
+    submesh: &Submesh,
     components: &Components,
     reversed: &Reversed,
     points: &[[f64; 3]],
 ) -> Vec<i32> {
-    let around = surfaces_around(survey, shop, components, reversed, points);
+    let around = surfaces_around(survey, submesh, components, reversed, points);
     around.into_iter().map(|around| around.iter().map(|(_, w)| w).sum()).collect()
 }
 
 /// The closed components that wind around each of some points, ascending, with their winding numbers; as [`windings`] else.
 pub(crate) fn surfaces_around(
     survey: &Survey<'_>,
-    shop: &Shop,
+    submesh: &Submesh,
     components: &Components,
     reversed: &Reversed,
     points: &[[f64; 3]],
@@ -89,7 +89,7 @@ pub(crate) fn surfaces_around(
             Ray { from: *from, candidates: found.iter().map(|c| closed[*c as usize]).collect() }
         })
         .collect();
-    count(survey, shop, components, reversed, &rays)
+    count(survey, submesh, components, reversed, &rays)
 }
 
 /// How often closed surfaces of these triangles together wind around each of some points, none of which may lie on one.
@@ -105,7 +105,13 @@ pub(crate) fn windings_of(triangles: &[[[f32; 3]; 3]], points: &[[f64; 3]]) -> V
 }
 
 /// For each ray the components of its candidates that wind around where it begins, ascending.
-fn count(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed: &Reversed, rays: &[Ray]) -> Vec<Vec<(u32, i32)>> {
+fn count(
+    survey: &Survey<'_>,
+    submesh: &Submesh,
+    components: &Components,
+    reversed: &Reversed,
+    rays: &[Ray],
+) -> Vec<Vec<(u32, i32)>> {
     if rays.is_empty() {
         return Vec::new();
     }
@@ -115,7 +121,7 @@ fn count(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed: &R
 
     let mut counts = vec![0i32; rays.iter().map(|r| r.candidates.len()).sum()];
     let is_asked = |patch: u32| asked.get(components.of_patch[patch as usize] as usize) == Some(&true);
-    let per_chunk = survey.visit_sound(
+    let per_chunk = survey.visit_regular(
         is_asked,
         |reach| Over::new(rays, &grid, reach).map(|over| (over, Vec::new())),
         |(over, _), corners| over.may_meet(&grid, corners),
@@ -126,10 +132,10 @@ fn count(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed: &R
         },
     );
     per_chunk.into_iter().flat_map(|(_, hits)| hits).for_each(|(at, w)| counts[at as usize] += w);
-    for t in shop.living() {
+    for t in submesh.living() {
         let component = components.of_triangle[t as usize];
         if asked[component as usize] {
-            grid.cross(rays, &shop.points(t), component, &mut |at, w| counts[at as usize] += w);
+            grid.cross(rays, &submesh.points(t), component, &mut |at, w| counts[at as usize] += w);
         }
     }
     let mut at = 0;
@@ -179,11 +185,11 @@ pub(crate) struct Source {
     pub(crate) component: u32,
 }
 
-/// Which rays meet another component on their way in a direction. Triangles of the workshop count if `counts` says so, all others do; one whose
+/// Which rays meet another component on their way in a direction. Triangles of the submesh count if `counts` says so, all others do; one whose
 /// plane holds the ray, or where it begins, does not. O(triangles under rays), and reads the chunks of the file that the rays may meet.
 pub(crate) fn obstructed(
     survey: &Survey<'_>,
-    shop: &Shop,
+    submesh: &Submesh,
     components: &Components,
     direction: Direction,
     sources: &[Source],
@@ -205,7 +211,7 @@ pub(crate) fn obstructed(
         }
     };
     let upright = |corners: &[[f32; 3]; 3]| corners.map(|p| direction.upright(p));
-    survey.visit_sound(
+    survey.visit_regular(
         |patch| components.of_patch[patch as usize] != NONE,
         |reach| Over::new(&rays, &grid, &direction.upright_box(reach)),
         |over, corners| over.may_meet(&grid, &upright(corners)),
@@ -214,14 +220,14 @@ pub(crate) fn obstructed(
             meet(&upright(&corners), components.of_patch[patch as usize]);
         },
     );
-    for t in shop.living().filter(|t| counts(*t)) {
-        meet(&upright(&shop.points(t)), components.of_triangle[t as usize]);
+    for t in submesh.living().filter(|t| counts(*t)) {
+        meet(&upright(&submesh.points(t)), components.of_triangle[t as usize]);
     }
     met.into_iter().map(AtomicBool::into_inner).collect()
 }
 
 /// The components asked about whose boxes lie in closed ones', ascending, and a ray for each.
-fn rays(survey: &Survey<'_>, shop: &Shop, list: &[Component], asks: impl Fn(&Component) -> bool) -> (Vec<u32>, Vec<Ray>) {
+fn rays(survey: &Survey<'_>, submesh: &Submesh, list: &[Component], asks: impl Fn(&Component) -> bool) -> (Vec<u32>, Vec<Ray>) {
     if list.len() < 2 || list.iter().all(|c| c.open) {
         return Default::default();
     }
@@ -234,8 +240,8 @@ fn rays(survey: &Survey<'_>, shop: &Shop, list: &[Component], asks: impl Fn(&Com
         let candidates: Vec<u32> =
             around.filter(|c| *c != component && list[*c as usize].bounds.contains(&inner.bounds)).collect();
         if !candidates.is_empty() {
-            let Sample { record, in_shop } = inner.sample;
-            let corners = in_shop.map_or_else(|| record::corners(&survey.records[record as usize]), |t| shop.points(t));
+            let Sample { record, in_submesh } = inner.sample;
+            let corners = in_submesh.map_or_else(|| record::corners(&survey.records[record as usize]), |t| submesh.points(t));
             of_rays.push(component);
             rays.push(Ray { from: inner_point(&corners), candidates });
         }
@@ -423,8 +429,8 @@ mod tests {
         let d = diagnose(&records);
         let none = Reversed::none(&d.survey);
         let components =
-            Components::of(&d.survey, &d.shop, &crate::submesh::edges::Edges::of(&d.shop), &none, Through::EveryEdge);
-        surroundings(&d.survey, &d.shop, &components, &none, |_| true).into_iter().map(|s| s.around).collect()
+            Components::of(&d.survey, &d.submesh, &crate::submesh::edges::Edges::of(&d.submesh), &none, Through::EveryEdge);
+        surroundings(&d.survey, &d.submesh, &components, &none, |_| true).into_iter().map(|s| s.around).collect()
     }
 
     fn nested(size: u8) -> Vec<Corners> {
@@ -469,14 +475,14 @@ mod tests {
                 let mesh = [middle.clone(), crate::testing::shifted(&middle, by)].concat();
                 let records = records(&mesh);
                 let d = diagnose(&records);
-                let edges = crate::submesh::edges::Edges::of(&d.shop);
+                let edges = crate::submesh::edges::Edges::of(&d.submesh);
                 let none = Reversed::none(&d.survey);
-                let components = Components::of(&d.survey, &d.shop, &edges, &none, Through::EveryEdge);
+                let components = Components::of(&d.survey, &d.submesh, &edges, &none, Through::EveryEdge);
                 for (other, turned) in (0..3).flat_map(|k| [(k, false), (k, true)]) {
                     let direction = Direction { axis: other, backward: turned };
                     // On grid lines, where rays run through diagonals of faces.
                     let source = |component| [Source { from: [0.0; 3], component }];
-                    let met = |component| obstructed(&d.survey, &d.shop, &components, direction, &source(component), |_| true);
+                    let met = |component| obstructed(&d.survey, &d.submesh, &components, direction, &source(component), |_| true);
                     assert_eq!(met(0), [(other, turned) == (axis, backward)], "{direction:?}, towards {by:?}");
                     assert_eq!(met(1), [true], "out of the cube that is not the ray's own");
                 }

@@ -1,9 +1,9 @@
-//! Counts the defects of a mesh from its survey and its untouched workshop. Definitions: `core/DEFECTS.md`.
+//! Counts the defects of a mesh from its survey and its untouched submesh. Definitions: `core/DEFECTS.md`.
 
 use crate::contract::report::Defects;
 use crate::detect::bodies;
 use crate::geometry::sums::Extent;
-use crate::submesh::Shop;
+use crate::submesh::Submesh;
 use crate::submesh::components::{self, Components, Reversed, Through};
 use crate::submesh::edges::Edges;
 use crate::submesh::near::{self, Tolerance};
@@ -11,29 +11,30 @@ use crate::topology::survey::Survey;
 use crate::util::parallel;
 use crate::util::radix;
 
-/// Workshops of fewer triangles are counted by one thread: starting another would take longer.
+/// Submeshs of fewer triangles are counted by one thread: starting another would take longer.
 const COUNTED_BY_ONE: usize = 4096;
 
-/// All counts of one file. The workshop must be as gathered.
-pub(crate) fn count(survey: &Survey<'_>, shop: &Shop, edges: &Edges, tolerance: &Tolerance) -> Defects {
+/// All counts of one file. The submesh must be as gathered.
+pub(crate) fn count(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> Defects {
     let reversed = Reversed::none(survey);
-    let threads = if shop.triangles.len() < COUNTED_BY_ONE { 1 } else { survey.threads() };
+    let threads = if submesh.triangles.len() < COUNTED_BY_ONE { 1 } else { survey.threads() };
     let (components, by_edges) = parallel::both(
         threads,
-        || Components::of(survey, shop, edges, &reversed, Through::EveryEdge),
-        || count_by_edges(shop, edges, tolerance),
+        || Components::of(survey, submesh, edges, &reversed, Through::EveryEdge),
+        || count_by_edges(submesh, edges, tolerance),
     );
-    let degenerate_index = shop.triangles.len() as u64 - shop.living().count() as u64;
+    let degenerate_index = submesh.triangles.len() as u64 - submesh.living().count() as u64;
     let uses: usize = edges.iter().map(|e| e.uses.len()).sum();
     let topology = survey.triangles - degenerate_index;
-    let total =
-        survey.patches.iter().map(|p| p.extent).chain(shop.living().map(|t| survey.measure.triangle(&shop.points(t)))).fold(
-            Extent::default(),
-            |mut sum, e| {
-                sum += e;
-                sum
-            },
-        );
+    let total = survey
+        .patches
+        .iter()
+        .map(|p| p.extent)
+        .chain(submesh.living().map(|t| survey.measure.triangle(&submesh.points(t))))
+        .fold(Extent::default(), |mut sum, e| {
+            sum += e;
+            sum
+        });
     let mut defects = Defects {
         triangles: survey.triangles,
         nonfinite: survey.nonfinite.iter().map(|run| u64::from(run.1)).sum(),
@@ -52,31 +53,31 @@ pub(crate) fn count(survey: &Survey<'_>, shop: &Shop, edges: &Edges, tolerance: 
     if defects.boundary_edges + defects.nonmanifold_edges + defects.nonmanifold_vertices == 0 {
         defects.euler = Some(defects.vertices_used as i64 - defects.edges as i64 + topology as i64);
     }
-    count_bodies(survey, shop, &components, &reversed, &mut defects);
+    count_bodies(survey, submesh, &components, &reversed, &mut defects);
     defects
 }
 
-/// What the workshop's edges and triangles tell without what hangs together beyond it.
-fn count_by_edges(shop: &Shop, edges: &Edges, tolerance: &Tolerance) -> Defects {
-    let (duplicates_same, duplicates_opposite) = duplicates(shop);
+/// What the submesh's edges and triangles tell without what hangs together beyond it.
+fn count_by_edges(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> Defects {
+    let (duplicates_same, duplicates_opposite) = duplicates(submesh);
     Defects {
-        degenerate_area: shop.living().filter(|t| shop.is_collinear(*t)).count() as u64,
+        degenerate_area: submesh.living().filter(|t| submesh.is_collinear(*t)).count() as u64,
         duplicates_same,
         duplicates_opposite,
         boundary_edges: edges.iter().filter(|e| e.is_boundary()).count() as u64,
-        boundary_loops: components::boundary_loops(shop, edges),
+        boundary_loops: components::boundary_loops(submesh, edges),
         nonmanifold_edges: edges.iter().filter(|e| e.is_nonmanifold()).count() as u64,
-        nonmanifold_vertices: components::nonmanifold_vertices(shop, edges).len() as u64,
+        nonmanifold_vertices: components::nonmanifold_vertices(submesh, edges).len() as u64,
         inconsistent_edges: edges.iter().filter(|e| e.is_inconsistent()).count() as u64,
         unbalanced_edges: edges.iter().filter(|e| e.is_unbalanced()).count() as u64,
-        noncommon_vertices: near::noncommon_vertices(shop, edges, tolerance).len() as u64,
-        weldable_vertices: near::weldable_vertices(shop, edges, tolerance).len() as u64,
+        noncommon_vertices: near::noncommon_vertices(submesh, edges, tolerance).len() as u64,
+        weldable_vertices: near::weldable_vertices(submesh, edges, tolerance).len() as u64,
         ..Defects::default()
     }
 }
 
-fn count_bodies(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed: &Reversed, defects: &mut Defects) {
-    let around = bodies::surroundings(survey, shop, components, reversed, |c| !c.open);
+fn count_bodies(survey: &Survey<'_>, submesh: &Submesh, components: &Components, reversed: &Reversed, defects: &mut Defects) {
+    let around = bodies::surroundings(survey, submesh, components, reversed, |c| !c.open);
     for (component, around) in components.list.iter().zip(&around).filter(|(c, _)| !c.open) {
         let inside = around.winding() > 0;
         match component.extent.volume.signum() {
@@ -90,11 +91,11 @@ fn count_bodies(survey: &Survey<'_>, shop: &Shop, components: &Components, rever
 }
 
 /// Living triangles by vertex set: (sorted vertices, number), sorted.
-pub(crate) fn by_vertex_set(shop: &Shop) -> Vec<([u32; 3], u32)> {
-    let mut keys: Vec<([u32; 3], u32)> = shop
+pub(crate) fn by_vertex_set(submesh: &Submesh) -> Vec<([u32; 3], u32)> {
+    let mut keys: Vec<([u32; 3], u32)> = submesh
         .living()
         .map(|t| {
-            let mut v = shop.triangles[t as usize].v;
+            let mut v = submesh.triangles[t as usize].v;
             v.sort_unstable();
             (v, t)
         })
@@ -111,10 +112,10 @@ pub(crate) fn same_direction(a: [u32; 3], b: [u32; 3]) -> bool {
 }
 
 /// Triangles whose vertex set stands earlier: (with that direction, only in the other one).
-fn duplicates(shop: &Shop) -> (u64, u64) {
+fn duplicates(submesh: &Submesh) -> (u64, u64) {
     let (mut same, mut opposite) = (0, 0);
-    for group in by_vertex_set(shop).chunk_by(|a, b| a.0 == b.0) {
-        let corners = |g: &([u32; 3], u32)| shop.triangles[g.1 as usize].v;
+    for group in by_vertex_set(submesh).chunk_by(|a, b| a.0 == b.0) {
+        let corners = |g: &([u32; 3], u32)| submesh.triangles[g.1 as usize].v;
         for (i, later) in group.iter().enumerate().skip(1) {
             if group[..i].iter().any(|earlier| same_direction(corners(earlier), corners(later))) {
                 same += 1;

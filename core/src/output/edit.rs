@@ -6,7 +6,7 @@ use crate::contract::report::{EditRecords, EditSummary};
 use crate::io::read_ahead::ASKED_AT_ONCE;
 use crate::io::record::{self, Record};
 use crate::submesh::components::Reversed;
-use crate::submesh::{Origin, Shop, distance};
+use crate::submesh::{Origin, Submesh, distance};
 use crate::topology::survey::Survey;
 
 /// What happens to an input record that is not untouched.
@@ -38,22 +38,22 @@ pub(crate) struct Edit {
 }
 
 impl Edit {
-    /// What stands in the workshop against the records it was gathered from. O(workshop), and one pass over the records of
+    /// What stands in the submesh against the records it was gathered from. O(submesh), and one pass over the records of
     /// reversed patches.
-    pub(crate) fn of(survey: &Survey<'_>, shop: &Shop, reversed: &Reversed) -> Self {
+    pub(crate) fn of(survey: &Survey<'_>, submesh: &Submesh, reversed: &Reversed) -> Self {
         let mut edit = Self::default();
         edit.changes.reserve_exact(survey.nonfinite.iter().map(|r| r.1 as usize).sum());
         edit.changes
             .extend(survey.nonfinite.iter().flat_map(|(first, count)| *first..*first + *count).map(|t| (t, Change::Delete)));
-        for (i, triangle) in shop.triangles.iter().enumerate() {
+        for (i, triangle) in submesh.triangles.iter().enumerate() {
             if i % ASKED_AT_ONCE == 0 {
-                let soon = shop.triangles[i..].iter().take(ASKED_AT_ONCE);
+                let soon = submesh.triangles[i..].iter().take(ASKED_AT_ONCE);
                 survey.ask_for(soon.filter_map(|t| match t.origin {
                     Origin::Input(record) | Origin::Part(record) => Some(record),
                     Origin::Patch => None,
                 }));
             }
-            let points = || shop.points(i as u32);
+            let points = || submesh.points(i as u32);
             match triangle.origin {
                 Origin::Input(t) if triangle.alive => edit.compare(survey.records, t, points()),
                 Origin::Input(t) => edit.changes.push((t, Change::Delete)),
@@ -210,7 +210,7 @@ pub(crate) fn records_of(survey: &Survey<'_>, wanted: impl Fn(u32) -> bool + Syn
         return (Vec::new(), 0);
     }
     let bits: Vec<AtomicU64> = std::iter::repeat_with(AtomicU64::default).take(survey.records.len().div_ceil(64)).collect();
-    let counts = survey.visit_sound(
+    let counts = survey.visit_regular(
         wanted,
         |_| Some(0),
         |_, _| true,
@@ -263,25 +263,25 @@ mod tests {
 
     #[test]
     fn turned_twice_is_untouched() {
-        // An open plate: all of it is in the workshop.
+        // An open plate: all of it is in the submesh.
         let records = records(&plate(2, |_, _| true));
         let mut d = diagnose(&records);
         let none = Reversed::none(&d.survey);
         for flipped in [1, 0] {
-            d.shop.triangles[3].v.swap(1, 2);
-            let summary = Edit::of(&d.survey, &d.shop, &none).summary(records.len());
+            d.submesh.triangles[3].v.swap(1, 2);
+            let summary = Edit::of(&d.survey, &d.submesh, &none).summary(records.len());
             assert_eq!((summary.flipped, summary.untouched), (flipped, 8 - flipped));
         }
-        assert_eq!(written(&Edit::of(&d.survey, &d.shop, &none), &records), records);
+        assert_eq!(written(&Edit::of(&d.survey, &d.submesh, &none), &records), records);
     }
 
     #[test]
     fn a_moved_vertex_moves_the_triangles_around_it() {
         let records = records(&plate(2, |_, _| true));
         let mut d = diagnose(&records);
-        let middle = d.shop.positions.iter().position(|p| *p == [1.0, 1.0, 0.0]).unwrap();
-        d.shop.positions[middle] = [1.0, 1.0, 0.5];
-        let edit = Edit::of(&d.survey, &d.shop, &Reversed::none(&d.survey));
+        let middle = d.submesh.positions.iter().position(|p| *p == [1.0, 1.0, 0.0]).unwrap();
+        d.submesh.positions[middle] = [1.0, 1.0, 0.5];
+        let edit = Edit::of(&d.survey, &d.submesh, &Reversed::none(&d.survey));
         let summary = edit.summary(records.len());
         // Six of eight triangles meet in the middle of the plate.
         assert_eq!((summary.moved, summary.untouched, summary.max_move), (6, 2, 0.5));
@@ -291,7 +291,7 @@ mod tests {
     fn a_reversed_patch_flips_its_records() {
         let records = records(&cube());
         let d = diagnose(&records);
-        let edit = Edit::of(&d.survey, &d.shop, &Reversed { patches: vec![true], dropped: vec![false] });
+        let edit = Edit::of(&d.survey, &d.submesh, &Reversed { patches: vec![true], dropped: vec![false] });
         assert_eq!(written(&edit, &records), records.iter().map(record::flip).collect::<Vec<_>>());
         assert_eq!(edit.listed().flipped, [[0, 11]]);
     }

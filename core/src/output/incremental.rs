@@ -2,8 +2,8 @@
 //!
 //! All but a few of its records are the input's, byte for byte, which is confirmed when it is read back ([`crate::output::readback`]). A
 //! vertex none of whose triangles came, went or changed has the star it had; the others are **disturbed**. All triangles around
-//! disturbed vertices and around those that were not sound before go to a new workshop, from the records that are written, where
-//! they are counted as any file's. What is left of the input's patches is sound as it was.
+//! disturbed vertices and around those that were not regular before go to a new submesh, from the records that are written, where
+//! they are counted as any file's. What is left of the input's patches is regular as it was.
 //!
 //! What cannot be shown to hold in this way is looked at anew: [`look`] returns nothing then, and the file is surveyed as if nothing were
 //! known of it. What is found is the same.
@@ -15,8 +15,8 @@ use crate::detect::fresh;
 use crate::geometry::sums::{Bounds, Measure};
 use crate::io::record;
 use crate::submesh::edges::Edges;
-use crate::submesh::{Gathering, Shop, has_repeated};
-use crate::topology::chunk::Suspect;
+use crate::submesh::{Gathering, Submesh, has_repeated};
+use crate::topology::chunk::IrregularTriangle;
 use crate::topology::survey::Survey;
 use crate::topology::vertex_table::Weld;
 use crate::util::union_find::NONE;
@@ -26,10 +26,10 @@ pub(crate) fn is_worthwhile(gone: u64, added: u64, input_records: usize) -> bool
     (gone + added) * 8 <= input_records as u64 && input_records as u64 + added < u64::from(NONE)
 }
 
-/// Bytes that a look takes where an edit of so many records was made among so many suspects: measured at defects here and there, with all
+/// Bytes that a look takes where an edit of so many records was made among so many irregular triangles: measured at defects here and there, with all
 /// that is kept of the input.
-pub(crate) fn bytes(suspects: u64, changed: u64) -> u64 {
-    320 * (suspects + changed)
+pub(crate) fn bytes(irregular_triangles: u64, changed: u64) -> u64 {
+    320 * (irregular_triangles + changed)
 }
 
 /// Suspects that need no place in the budget: about 20 MB.
@@ -37,69 +37,70 @@ const SUSPECTS_BESIDE: usize = 100_000;
 
 /// What the survey of the input and the `difference` say of the written file; `None` if that is not all there is to know. The survey is
 /// in terms of places; its records are still the input's, and none of those that are gone is looked at again.
-pub(crate) fn look<'a>(mut survey: Survey<'a>, difference: &Difference) -> Option<(Survey<'a>, Shop)> {
+pub(crate) fn look<'a>(mut survey: Survey<'a>, difference: &Difference) -> Option<(Survey<'a>, Submesh)> {
     let _span = tracing::debug_span!("second look").entered();
     let mut around = Disturbed::of(&survey, difference);
     let new = around.newly();
-    let suspects = survey.suspects.len();
+    let irregular_triangles = survey.irregular_triangles.len();
     if !new.is_empty() {
         survey.promote(&new);
     }
     // So many were not counted with.
-    if survey.suspects.len() > suspects + suspects / 2 + SUSPECTS_BESIDE {
+    if survey.irregular_triangles.len() > irregular_triangles + irregular_triangles / 2 + SUSPECTS_BESIDE {
         return None;
     }
-    let shop = around.gather(&survey, difference);
-    around.settle_patches(&mut survey, &shop)?;
+    let submesh = around.gather(&survey, difference);
+    around.settle_patches(&mut survey, &submesh)?;
     // Not needed any more, and the edges take much.
     around.vertices = Weld::default();
-    let edges = Edges::of(&shop);
-    if !around.keep_patches_whole(&shop, &edges) {
+    let edges = Edges::of(&submesh);
+    if !around.keep_patches_whole(&submesh, &edges) {
         return None;
     }
-    around.count(&mut survey, &shop, difference);
+    around.count(&mut survey, &submesh, difference);
     // The volume of what is not closed depends on the middle of the box, which may be another now.
-    survey.volume_beside = survey.measure.volume_seen_from(&Measure::new(&survey.bounds), vector_area(&shop, &edges));
+    survey.volume_beside = survey.measure.volume_seen_from(&Measure::new(&survey.bounds), vector_area(&submesh, &edges));
     drop((around, edges));
     if let Some(pairs) = survey.self_intersections.is_some().then(|| fresh::self_intersections(&survey, difference)) {
         survey.self_intersections = Some(pairs?);
     }
     survey.crossing_pairs = None;
     survey.nonfinite.clear();
-    Some((survey, shop))
+    Some((survey, submesh))
 }
 
 /// The vertices whose stars are to be looked at again.
 struct Disturbed {
-    /// Those that were not sound first, then those that were.
+    /// Those that were not regular first, then those that were.
     vertices: Weld,
-    /// By vertex: it was sound, if it was there; a triangle of the input, or of the written file, has it; such a triangle with three
+    /// By vertex: it was regular, if it was there; a triangle of the input, or of the written file, has it; such a triangle with three
     /// distinct vertices.
-    was_sound: Vec<bool>,
+    was_regular: Vec<bool>,
     in_input: Vec<[bool; 2]>,
     in_output: Vec<[bool; 2]>,
     /// How many were known before this look, promoted ones included.
     known: usize,
-    /// By suspect of the input, and by triangle of the new workshop: the vertices of this table it has.
-    of_suspects: Vec<[u32; 3]>,
+    /// By irregular triangle of the input, and by triangle of the new submesh: the vertices of this table it has.
+    of_irregular_triangles: Vec<[u32; 3]>,
     of_triangles: Vec<[u32; 3]>,
 }
 
 impl Disturbed {
     fn of(survey: &Survey<'_>, difference: &Difference) -> Self {
         let mut vertices = Weld::default();
-        vertices.reset(survey.suspects.len() + 3 * (difference.gone.len() + difference.fresh.len()));
-        let corners = |suspect: &Suspect| record::corners(&survey.records[suspect.triangle as usize]);
-        for suspect in &survey.suspects {
-            for p in (0..3).filter(|k| suspect.unsound >> k & 1 == 1).map(|k| corners(suspect)[k]) {
+        vertices.reset(survey.irregular_triangles.len() + 3 * (difference.gone.len() + difference.fresh.len()));
+        let corners =
+            |irregular_triangle: &IrregularTriangle| record::corners(&survey.records[irregular_triangle.triangle as usize]);
+        for irregular_triangle in &survey.irregular_triangles {
+            for p in (0..3).filter(|k| irregular_triangle.irregular >> k & 1 == 1).map(|k| corners(irregular_triangle)[k]) {
                 vertices.vertex(p);
             }
         }
         let known = vertices.positions().len();
-        let mut was_sound = vec![false; known];
-        survey.promoted.iter().filter_map(|p| vertices.find(*p)).for_each(|v| was_sound[v as usize] = true);
-        // Triangles with a repeated vertex are suspects, whatever their vertices are.
-        survey.suspects.iter().map(corners).filter(|c| !is_distinct(c)).flatten().for_each(|p| {
+        let mut was_regular = vec![false; known];
+        survey.promoted.iter().filter_map(|p| vertices.find(*p)).for_each(|v| was_regular[v as usize] = true);
+        // Triangles with a repeated vertex are irregular triangles, whatever their vertices are.
+        survey.irregular_triangles.iter().map(corners).filter(|c| !is_distinct(c)).flatten().for_each(|p| {
             vertices.vertex(p);
         });
         for t in &difference.gone {
@@ -116,20 +117,20 @@ impl Disturbed {
             });
         }
         let count = vertices.positions().len();
-        was_sound.resize(count, true);
+        was_regular.resize(count, true);
         let none = vec![[false; 2]; count];
         Self {
             vertices,
-            was_sound,
+            was_regular,
             in_input: none.clone(),
             in_output: none,
             known,
-            of_suspects: Vec::new(),
+            of_irregular_triangles: Vec::new(),
             of_triangles: Vec::new(),
         }
     }
 
-    /// Those of which not all triangles are suspects yet.
+    /// Those of which not all triangles are irregular triangles yet.
     fn newly(&self) -> Vec<[f32; 3]> {
         self.vertices.positions()[self.known..].to_vec()
     }
@@ -139,28 +140,32 @@ impl Disturbed {
     }
 
     /// The triangles of the written file around these vertices, by place.
-    fn gather(&mut self, survey: &Survey<'_>, difference: &Difference) -> Shop {
-        let mut gathering = Gathering::of(survey.suspects.len() + difference.fresh.len());
+    fn gather(&mut self, survey: &Survey<'_>, difference: &Difference) -> Submesh {
+        let mut gathering = Gathering::of(survey.irregular_triangles.len() + difference.fresh.len());
         let mut fresh = difference.fresh.iter().peekable();
         let mut gone = difference.gone.iter().peekable();
         let mut add = |this: &mut Self, place: u32, corners: [[f32; 3]; 3], patch: u32| {
             let at = this.at(corners);
             note(&mut this.in_output, at, &corners);
-            // A sound corner that is left holds it to its patch.
+            // A regular corner that is left holds it to its patch.
             let patch = if at.contains(&NONE) { patch } else { NONE };
             let complete = (0..3).fold(0, |mask, k| mask | u8::from(at[k] != NONE) << k);
             this.of_triangles.push(at);
             gathering.add(place, corners, complete, patch);
         };
-        for (i, (suspect, patch)) in survey.suspects.iter().zip(&survey.suspect_patches).enumerate() {
+        for (i, (irregular_triangle, patch)) in
+            survey.irregular_triangles.iter().zip(&survey.irregular_triangle_patches).enumerate()
+        {
             if i % crate::io::read_ahead::ASKED_AT_ONCE == 0 {
-                survey.ask_for(survey.suspects[i..].iter().take(crate::io::read_ahead::ASKED_AT_ONCE).map(|s| s.triangle));
+                survey.ask_for(
+                    survey.irregular_triangles[i..].iter().take(crate::io::read_ahead::ASKED_AT_ONCE).map(|s| s.triangle),
+                );
             }
-            let place = suspect.triangle;
+            let place = irregular_triangle.triangle;
             let corners = record::corners(&survey.records[place as usize]);
             let at = self.at(corners);
             note(&mut self.in_input, at, &corners);
-            self.of_suspects.push(at);
+            self.of_irregular_triangles.push(at);
             while let Some((place, record)) = fresh.next_if(|f| f.0 <= place) {
                 add(self, *place, record::corners(record), NONE);
             }
@@ -175,21 +180,23 @@ impl Disturbed {
 
     /// Brings the patches up to date, whose disturbed vertices are no part of them any more. Fails if it is not known how far what is
     /// left of a patch reaches, or where it begins.
-    fn settle_patches(&self, survey: &mut Survey<'_>, shop: &Shop) -> Option<()> {
-        let mut held = vec![false; self.was_sound.len()];
+    fn settle_patches(&self, survey: &mut Survey<'_>, submesh: &Submesh) -> Option<()> {
+        let mut held = vec![false; self.was_regular.len()];
         let mut is_left: Vec<bool> = survey.patches.iter().map(|p| p.triangles > 0).collect();
         let mut begins = vec![false; survey.patches.len()];
-        for (t, corners) in shop.triangles.iter().zip(&self.of_triangles).filter(|(t, _)| t.patch != NONE) {
+        for (t, corners) in submesh.triangles.iter().zip(&self.of_triangles).filter(|(t, _)| t.patch != NONE) {
             is_left[t.patch as usize] = true;
             begins[t.patch as usize] |= t.record() == survey.patches[t.patch as usize].first;
             corners.iter().filter(|v| **v != NONE).for_each(|v| held[*v as usize] = true);
         }
-        for (at, patch) in self.of_suspects.iter().zip(&survey.suspect_patches).filter(|(_, patch)| **patch != NONE) {
+        for (at, patch) in
+            self.of_irregular_triangles.iter().zip(&survey.irregular_triangle_patches).filter(|(_, patch)| **patch != NONE)
+        {
             for v in at.iter().filter(|v| **v != NONE) {
                 let p = self.vertices.positions()[*v as usize];
                 let bounds = &survey.patches[*patch as usize].bounds;
                 let at_the_end = (0..3).any(|k| p[k] == bounds.lo[k] || p[k] == bounds.hi[k]);
-                if at_the_end && is_left[*patch as usize] && self.was_sound[*v as usize] && !held[*v as usize] {
+                if at_the_end && is_left[*patch as usize] && self.was_regular[*v as usize] && !held[*v as usize] {
                     return None;
                 }
             }
@@ -198,41 +205,41 @@ impl Disturbed {
             if !is_left[p] {
                 patch.first = NONE;
                 patch.bounds = Bounds::EMPTY;
-            } else if !begins[p] && survey.suspects.binary_search_by_key(&patch.first, |s| s.triangle).is_ok() {
+            } else if !begins[p] && survey.irregular_triangles.binary_search_by_key(&patch.first, |s| s.triangle).is_ok() {
                 return None;
             }
         }
         Some(())
     }
 
-    /// Does what is left of every patch hang together, be it over the workshop?
+    /// Does what is left of every patch hang together, be it over the submesh?
     ///
     /// Of the vertices of a patch, those that are disturbed are taken out. What leads from one of the others to another through a set
     /// of disturbed ones that hang together enters and leaves it at neighbours of the set. So if all neighbours of each such set hang
     /// together otherwise, everything does.
-    fn keep_patches_whole(&self, shop: &Shop, edges: &Edges) -> bool {
-        if !self.was_sound.contains(&true) {
+    fn keep_patches_whole(&self, submesh: &Submesh, edges: &Edges) -> bool {
+        if !self.was_regular.contains(&true) {
             return true;
         }
-        let mut sets: Vec<u32> = (0..self.was_sound.len() as u32).collect();
-        for at in &self.of_suspects {
-            let mut were_sound = at.iter().copied().filter(|v| *v != NONE && self.was_sound[*v as usize]);
-            if let Some(first) = were_sound.next() {
-                were_sound.for_each(|v| {
+        let mut sets: Vec<u32> = (0..self.was_regular.len() as u32).collect();
+        for at in &self.of_irregular_triangles {
+            let mut were_regular = at.iter().copied().filter(|v| *v != NONE && self.was_regular[*v as usize]);
+            if let Some(first) = were_regular.next() {
+                were_regular.for_each(|v| {
                     crate::util::union_find::unite(&mut sets, first, v);
                 });
             }
         }
         // Triangles hang together through edges, and around a vertex that is not disturbed.
-        let mut parents: Vec<u32> = (0..shop.triangles.len() as u32).collect();
+        let mut parents: Vec<u32> = (0..submesh.triangles.len() as u32).collect();
         for edge in edges.iter() {
             edge.uses[1..].iter().for_each(|u| {
                 crate::util::union_find::unite(&mut parents, edge.uses[0].triangle, u.triangle);
             });
         }
-        let mut around = vec![NONE; shop.positions.len()];
-        for (t, triangle) in shop.triangles.iter().enumerate().filter(|(_, t)| !has_repeated(t.v)) {
-            for v in triangle.v.iter().filter(|v| !shop.complete[**v as usize]) {
+        let mut around = vec![NONE; submesh.positions.len()];
+        for (t, triangle) in submesh.triangles.iter().enumerate().filter(|(_, t)| !has_repeated(t.v)) {
+            for v in triangle.v.iter().filter(|v| !submesh.complete[**v as usize]) {
                 let first = &mut around[*v as usize];
                 if *first == NONE {
                     *first = t as u32;
@@ -241,10 +248,10 @@ impl Disturbed {
                 }
             }
         }
-        let mut neighbours = vec![NONE; self.was_sound.len()];
-        for (t, corners) in self.of_triangles.iter().enumerate().filter(|(t, _)| shop.triangles[*t].patch != NONE) {
+        let mut neighbours = vec![NONE; self.was_regular.len()];
+        for (t, corners) in self.of_triangles.iter().enumerate().filter(|(t, _)| submesh.triangles[*t].patch != NONE) {
             let piece = crate::util::union_find::find(&mut parents, t as u32);
-            for v in corners.iter().filter(|v| **v != NONE && self.was_sound[**v as usize]) {
+            for v in corners.iter().filter(|v| **v != NONE && self.was_regular[**v as usize]) {
                 let of_set = &mut neighbours[crate::util::union_find::find(&mut sets, *v) as usize];
                 if *of_set == NONE {
                     *of_set = piece;
@@ -257,24 +264,24 @@ impl Disturbed {
     }
 
     /// Counts triangles and vertices and the box around them.
-    fn count(&self, survey: &mut Survey<'_>, shop: &Shop, difference: &Difference) {
+    fn count(&self, survey: &mut Survey<'_>, submesh: &Submesh, difference: &Difference) {
         let have = |table: &[[bool; 2]], k: usize| table.iter().filter(|had| had[k]).count() as u64;
         survey.triangles = difference.written_records as u64;
         survey.vertices = survey.vertices - have(&self.in_input, 0) + have(&self.in_output, 0);
         survey.vertices_used = survey.vertices_used - have(&self.in_input, 1) + have(&self.in_output, 1);
         let mut bounds = Bounds::EMPTY;
         survey.patches.iter().for_each(|p| bounds.add(&p.bounds));
-        bounds.include(&shop.positions);
+        bounds.include(&submesh.positions);
         survey.bounds = bounds.normalised();
     }
 }
 
 /// The sum of the triangles' normals, each as long as its area: half the sum of a × b over the edges from a to b that bound the surface
 /// (Stokes). None for closed surfaces.
-fn vector_area(shop: &Shop, edges: &Edges) -> [f64; 3] {
+fn vector_area(submesh: &Submesh, edges: &Edges) -> [f64; 3] {
     let bounding = edges.iter().filter(|e| e.is_unbalanced()).map(|e| {
         let net: f64 = e.uses.iter().map(|u| if u.forward { 1.0 } else { -1.0 }).sum();
-        net * shop.place(e.low).cross(shop.place(e.high)) / 2.0
+        net * submesh.place(e.low).cross(submesh.place(e.high)) / 2.0
     });
     bounding.sum::<DVec3>().to_array()
 }
@@ -313,7 +320,7 @@ mod tests {
         // A wrap takes long, and leaves next to nothing to look at by itself.
         let profile = Profile { guarantee: Guarantee::Off, ..Profile::default() };
         let repaired = repairs::run(&mut diagnosis, Path::new("test"), &profile, &limits, &Quiet).unwrap();
-        let edit = Edit::of(&diagnosis.survey, &diagnosis.shop, &repaired.reversed);
+        let edit = Edit::of(&diagnosis.survey, &diagnosis.submesh, &repaired.reversed);
         check_second_look(diagnosis.survey, &edit, &diagnose(&written(&edit, &input)).defects)
     }
 
@@ -370,14 +377,14 @@ mod tests {
         let all: Vec<[f32; 3]> = triangles.iter().filter(|t| kill(t)).flatten().copied().collect();
         let new = d.survey.promote(&all);
         let completed: Vec<u32> =
-            (0..d.shop.positions.len() as u32).filter(|v| all.contains(&d.shop.positions[*v as usize])).collect();
-        d.shop.extend(&d.survey, &new, |_| completed);
-        for t in 0..d.shop.triangles.len() as u32 {
-            if kill(&d.shop.points(t)) {
-                d.shop.kill(t);
+            (0..d.submesh.positions.len() as u32).filter(|v| all.contains(&d.submesh.positions[*v as usize])).collect();
+        d.submesh.extend(&d.survey, &new, |_| completed);
+        for t in 0..d.submesh.triangles.len() as u32 {
+            if kill(&d.submesh.points(t)) {
+                d.submesh.kill(t);
             }
         }
-        let edit = Edit::of(&d.survey, &d.shop, &Reversed::none(&d.survey));
+        let edit = Edit::of(&d.survey, &d.submesh, &Reversed::none(&d.survey));
         check_second_look(d.survey, &edit, &diagnose(&written(&edit, &input)).defects)
     }
 

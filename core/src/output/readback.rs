@@ -224,15 +224,15 @@ mod tests {
         // The one that comes takes the place of the one that goes, or of the first of three.
         for go in [vec![0], vec![0, 9_000, 17_000]] {
             let mut d = diagnose(&input);
-            let last = d.shop.triangles.len() - 1;
-            let of_record = |t: u32| d.shop.triangles.iter().position(|u| u.record() == t).unwrap() as u32;
+            let last = d.submesh.triangles.len() - 1;
+            let of_record = |t: u32| d.submesh.triangles.iter().position(|u| u.record() == t).unwrap() as u32;
             let go: Vec<u32> = go.iter().map(|t| of_record(*t)).collect();
-            go.iter().for_each(|t| d.shop.kill(*t));
-            d.shop.triangles[last].v.swap(1, 2);
-            let corner = d.shop.triangles[3].v[0];
-            d.shop.positions[corner as usize][2] += 0.25;
-            d.shop.add([0, 2, 5], crate::submesh::Origin::Patch, crate::util::union_find::NONE);
-            let edit = Edit::of(&d.survey, &d.shop, &Reversed::none(&d.survey));
+            go.iter().for_each(|t| d.submesh.kill(*t));
+            d.submesh.triangles[last].v.swap(1, 2);
+            let corner = d.submesh.triangles[3].v[0];
+            d.submesh.positions[corner as usize][2] += 0.25;
+            d.submesh.add([0, 2, 5], crate::submesh::Origin::Patch, crate::util::union_find::NONE);
+            let edit = Edit::of(&d.survey, &d.submesh, &Reversed::none(&d.survey));
             let output = written(&edit, &input);
 
             let expectation = Expectation::of(&input, &edit);

@@ -2,7 +2,7 @@
 //!
 //! **In:** a [`Diagnosis`].
 //! **Out:** the submesh as it is to be written, and an [`Account`] of what was done and where.
-//! **Promise:** a repair changes triangles of the submesh by way of `work` only, and turns or drops patches of sound surface as a whole;
+//! **Promise:** a repair changes triangles of the submesh by way of `work` only, and turns or drops patches of regular surface as a whole;
 //! what it may change stands in its entry. What is not proved valid is taken back.
 //!
 //! [`pipeline`] lists the repairs in their order; `context` says what a repair may know and what it hands on. Each repair has a file,
@@ -29,12 +29,12 @@ use crate::repairs::shared::account::Account;
 use crate::repairs::shared::context::Context;
 use crate::submesh::components::Reversed;
 
-/// What the repairs did; the mesh itself is in the diagnosis' workshop.
+/// What the repairs did; the mesh itself is in the diagnosis' submesh.
 pub(crate) struct Repaired {
     pub(crate) reversed: Reversed,
     pub(crate) account: Account,
     pub(crate) regions: Regions,
-    /// Triangles that replace others and are not in the workshop.
+    /// Triangles that replace others and are not in the submesh.
     pub(crate) wrapped: Vec<[[f32; 3]; 3]>,
 }
 
@@ -61,7 +61,7 @@ pub(crate) fn run(
 }
 
 /// The boundary loops of a file, with their kinds, as they are when surplus surface is gone and vertices within the weld tolerance are one, which
-/// the workshop is brought to.
+/// the submesh is brought to.
 ///
 /// # Errors
 /// None as yet; those of repairs.

@@ -147,8 +147,8 @@ fn carry_out(repair: &Repair, cx: &mut Context<'_, '_>) -> Result<u64> {
 /// The boundary loops as they are the first time.
 fn recognise_loops(cx: &mut Context<'_, '_>) {
     if cx.account.loops.is_none() {
-        let (shop, edges) = cx.work.edges();
-        cx.account.loops = Some(holes::report(shop, edges, cx.tolerance, cx.profile.gap_edge_share));
+        let (submesh, edges) = cx.work.edges();
+        cx.account.loops = Some(holes::report(submesh, edges, cx.tolerance, cx.profile.gap_edge_share));
     }
 }
 

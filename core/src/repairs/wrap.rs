@@ -5,7 +5,7 @@
 //! what it meets joins the group, which is wrapped anew. A group stays as it is, and the report says why, if a loop of it was left open on
 //! purpose, if it encloses next to nothing (a lone sheet), or if its wrap would go beyond the profile's limits.
 //!
-//! The wrapped triangles never enter the workshop, but go to the edit as they are: there may be millions of them, and nothing is done to
+//! The wrapped triangles never enter the submesh, but go to the edit as they are: there may be millions of them, and nothing is done to
 //! them any more.
 
 mod contacts;
@@ -64,15 +64,15 @@ const ROUNDS: usize = 8;
 /// Regions that are listed.
 const LISTED: usize = 1000;
 
-/// Is anything of the workshop no closed, coherent, manifold surface? O(workshop).
+/// Is anything of the submesh no closed, coherent, manifold surface? O(submesh).
 pub(crate) fn is_broken(work: &mut Work<'_>) -> bool {
-    let (shop, edges) = work.edges();
+    let (submesh, edges) = work.edges();
     edges.iter().any(|edge| edge.uses.len() != 2 || edge.is_unbalanced())
-        || !components::nonmanifold_vertices(shop, edges).is_empty()
+        || !components::nonmanifold_vertices(submesh, edges).is_empty()
 }
 
 /// Replaces what is no solid, as far as the profile allows. `pairs`: as [`Overlay::crossing_pairs`] finds them (empty if nobody looked for any);
-/// `kept_open`: a vertex of each loop that was left open on purpose. Reads the chunks where groups have sound surface, and all for every round
+/// `kept_open`: a vertex of each loop that was left open on purpose. Reads the chunks where groups have regular surface, and all for every round
 /// of wraps.
 pub(crate) fn replace(
     survey: &Survey<'_>,
@@ -89,9 +89,9 @@ pub(crate) fn replace(
     if !groups.broken.contains(&true) {
         return wraps;
     }
-    let (shop, edges) = work.edges();
-    let sheets = Components::of(survey, shop, edges, reversed, Through::ManifoldEdges);
-    let site = Site { survey, shop, reversed, pieces: &pieces, sheets: &sheets, profile, threads };
+    let (submesh, edges) = work.edges();
+    let sheets = Components::of(survey, submesh, edges, reversed, Through::ManifoldEdges);
+    let site = Site { survey, submesh, reversed, pieces: &pieces, sheets: &sheets, profile, threads };
     let mut outcomes: BTreeMap<Vec<u32>, Outcome> = BTreeMap::new();
     for round in 0..=ROUNDS {
         let all = groups.list();

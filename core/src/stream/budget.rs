@@ -10,11 +10,11 @@ use crate::contract::error::{Error, Result};
 pub(crate) enum Purpose {
     /// Lists, spools and the tables that chunks are solved in.
     Tables,
-    /// Pieces of sound surface.
+    /// Pieces of regular surface.
     Surface,
-    /// What chunks know of triangles that others see, too. Given back before the workshop is made.
+    /// What chunks know of triangles that others see, too. Given back before the submesh is made.
     Seams,
-    /// Triangles at defects, in the workshop.
+    /// Triangles at defects, in the submesh.
     Defects,
 }
 
@@ -70,9 +70,9 @@ impl Budget {
     }
 }
 
-/// Bytes that a workshop of so many triangles and vertices takes, tables of the repairs and the edit included: measured on a soup, which
+/// Bytes that a submesh of so many triangles and vertices takes, tables of the repairs and the edit included: measured on a soup, which
 /// has three vertices a triangle (320 bytes each), and on meshes with defects here and there, which have about 0.6 (296).
-pub(crate) fn workshop_bytes(triangles: u64, vertices: u64) -> u64 {
+pub(crate) fn submesh_bytes(triangles: u64, vertices: u64) -> u64 {
     288 * triangles + 12 * vertices
 }
 

@@ -1,12 +1,12 @@
-//! Components: patches of sound surface and triangles of the workshop that hang together through edges.
+//! Components: patches of regular surface and triangles of the submesh that hang together through edges.
 
 use super::edges::{Edge, Edges};
-use super::{Shop, Vertex};
+use super::{Submesh, Vertex};
 use crate::geometry::sums::{Bounds, Extent};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
 
-/// Which patches of sound surface are reversed, against how they stand in the file, and which go. Triangles of the shop are turned, or die, in
+/// Which patches of regular surface are reversed, against how they stand in the file, and which go. Triangles of the shop are turned, or die, in
 /// place.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Reversed {
@@ -37,7 +37,7 @@ pub(crate) struct Component {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Sample {
     pub(crate) record: u32,
-    pub(crate) in_shop: Option<u32>,
+    pub(crate) in_submesh: Option<u32>,
 }
 
 /// All components, and who belongs to which.
@@ -78,11 +78,11 @@ impl Through<'_> {
 
 impl Components {
     /// O(patches + shop). Components are numbered by their first patch, then by their first triangle in the shop.
-    pub(crate) fn of(survey: &Survey<'_>, shop: &Shop, edges: &Edges, reversed: &Reversed, through: Through<'_>) -> Self {
+    pub(crate) fn of(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, reversed: &Reversed, through: Through<'_>) -> Self {
         let patches = survey.patches.len() as u32;
-        let mut parents: Vec<u32> = (0..patches + shop.triangles.len() as u32).collect();
-        for t in shop.living() {
-            let patch = shop.triangles[t as usize].patch;
+        let mut parents: Vec<u32> = (0..patches + submesh.triangles.len() as u32).collect();
+        for t in submesh.living() {
+            let patch = submesh.triangles[t as usize].patch;
             if patch != NONE {
                 crate::util::union_find::unite(&mut parents, patch, patches + t);
             }
@@ -96,7 +96,7 @@ impl Components {
             }
         }
         let mut all =
-            Self { list: Vec::new(), of_patch: vec![NONE; patches as usize], of_triangle: vec![NONE; shop.triangles.len()] };
+            Self { list: Vec::new(), of_patch: vec![NONE; patches as usize], of_triangle: vec![NONE; submesh.triangles.len()] };
         let mut numbers = vec![NONE; parents.len()];
         // After a second look, there may be nothing left of a patch.
         for p in (0..patches).filter(|p| survey.patches[*p as usize].first != NONE && !reversed.dropped[*p as usize]) {
@@ -104,7 +104,7 @@ impl Components {
             let c = all.number(
                 &mut numbers,
                 crate::util::union_find::find(&mut parents, p),
-                Sample { record: sum.first, in_shop: None },
+                Sample { record: sum.first, in_submesh: None },
             );
             all.of_patch[p as usize] = c;
             let into = &mut all.list[c as usize];
@@ -112,14 +112,14 @@ impl Components {
             into.bounds.add(&sum.bounds);
             into.extent += turned(sum.extent, reversed.patches[p as usize]);
         }
-        for t in shop.living() {
+        for t in submesh.living() {
             let c = all.number(
                 &mut numbers,
                 crate::util::union_find::find(&mut parents, patches + t),
-                Sample { record: shop.record(t), in_shop: Some(t) },
+                Sample { record: submesh.record(t), in_submesh: Some(t) },
             );
             all.of_triangle[t as usize] = c;
-            let points = shop.points(t);
+            let points = submesh.points(t);
             let into = &mut all.list[c as usize];
             into.triangles += 1;
             into.bounds.include(&points);
@@ -154,9 +154,9 @@ fn turned(extent: Extent, reversed: bool) -> Extent {
 }
 
 /// Connected sets of boundary edges.
-pub(crate) fn boundary_loops(shop: &Shop, edges: &Edges) -> u64 {
-    let mut parents: Vec<Vertex> = (0..shop.positions.len() as u32).collect();
-    let mut on_boundary = vec![false; shop.positions.len()];
+pub(crate) fn boundary_loops(submesh: &Submesh, edges: &Edges) -> u64 {
+    let mut parents: Vec<Vertex> = (0..submesh.positions.len() as u32).collect();
+    let mut on_boundary = vec![false; submesh.positions.len()];
     for edge in edges.iter().filter(|e| e.is_boundary()) {
         on_boundary[edge.low as usize] = true;
         on_boundary[edge.high as usize] = true;
@@ -166,10 +166,10 @@ pub(crate) fn boundary_loops(shop: &Shop, edges: &Edges) -> u64 {
 }
 
 /// Vertices on a non-manifold edge, or with more than one fan. A fan hangs together through two-triangle edges.
-pub(crate) fn nonmanifold_vertices(shop: &Shop, edges: &Edges) -> Vec<Vertex> {
-    let mut bad = vec![false; shop.positions.len()];
-    let mut parents: Vec<u32> = (0..shop.triangles.len() as u32 * 3).collect();
-    let corner = |t: u32, v: Vertex| t * 3 + shop.triangles[t as usize].v.iter().position(|w| *w == v).unwrap_or(0) as u32;
+pub(crate) fn nonmanifold_vertices(submesh: &Submesh, edges: &Edges) -> Vec<Vertex> {
+    let mut bad = vec![false; submesh.positions.len()];
+    let mut parents: Vec<u32> = (0..submesh.triangles.len() as u32 * 3).collect();
+    let corner = |t: u32, v: Vertex| t * 3 + submesh.triangles[t as usize].v.iter().position(|w| *w == v).unwrap_or(0) as u32;
     for edge in edges.iter() {
         if edge.is_nonmanifold() {
             bad[edge.low as usize] = true;
@@ -180,12 +180,12 @@ pub(crate) fn nonmanifold_vertices(shop: &Shop, edges: &Edges) -> Vec<Vertex> {
             }
         }
     }
-    (0..shop.positions.len() as u32)
+    (0..submesh.positions.len() as u32)
         .filter(|v| {
-            if !shop.complete[*v as usize] {
+            if !submesh.complete[*v as usize] {
                 return false;
             }
-            let mut fans = shop.star(*v).map(|(t, k)| crate::util::union_find::find(&mut parents, t * 3 + k as u32));
+            let mut fans = submesh.star(*v).map(|(t, k)| crate::util::union_find::find(&mut parents, t * 3 + k as u32));
             bad[*v as usize] || fans.next().is_some_and(|first| fans.any(|f| f != first))
         })
         .collect()
@@ -200,7 +200,7 @@ mod tests {
     fn counted(triangles: &[Corners]) -> [(usize, usize); 3] {
         let records = records(triangles);
         let d = diagnose(&records);
-        let of = |through| Components::of(&d.survey, &d.shop, &Edges::of(&d.shop), &Reversed::none(&d.survey), through);
+        let of = |through| Components::of(&d.survey, &d.submesh, &Edges::of(&d.submesh), &Reversed::none(&d.survey), through);
         let sheets = of(Through::ManifoldEdges);
         [of(Through::EveryEdge), of(Through::ManifoldEdges), of(Through::OpenSheets(&sheets))]
             .map(|c| (c.list.len(), c.list.iter().filter(|c| c.open).count()))
@@ -224,13 +224,13 @@ mod tests {
     fn a_ring_has_two_boundary_loops_and_a_pinched_plate_one_bad_vertex() {
         let ring = records(&plate(3, |x, y| (x, y) != (1, 1)));
         let d = diagnose(&ring);
-        assert_eq!(boundary_loops(&d.shop, &Edges::of(&d.shop)), 2);
-        assert!(nonmanifold_vertices(&d.shop, &Edges::of(&d.shop)).is_empty());
+        assert_eq!(boundary_loops(&d.submesh, &Edges::of(&d.submesh)), 2);
+        assert!(nonmanifold_vertices(&d.submesh, &Edges::of(&d.submesh)).is_empty());
         // Two squares that touch in one corner: two fans there.
         let pinched = records(&plate(2, |x, y| x == y));
         let d = diagnose(&pinched);
         let bad: Vec<[f32; 3]> =
-            nonmanifold_vertices(&d.shop, &Edges::of(&d.shop)).iter().map(|v| d.shop.positions[*v as usize]).collect();
+            nonmanifold_vertices(&d.submesh, &Edges::of(&d.submesh)).iter().map(|v| d.submesh.positions[*v as usize]).collect();
         assert_eq!(bad, [[1.0, 1.0, 0.0]]);
     }
 }

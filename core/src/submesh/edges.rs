@@ -1,6 +1,6 @@
-//! The edges of the workshop that have a complete end, with all their triangles.
+//! The edges of the submesh that have a complete end, with all their triangles.
 
-use super::{Shop, Vertex};
+use super::{Submesh, Vertex};
 
 /// A triangle's use of an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,28 +52,28 @@ pub(crate) struct Edges {
 }
 
 impl Edges {
-    /// O(n log n) in the half-edges around one vertex, O(n) in the workshop.
-    pub(crate) fn of(shop: &Shop) -> Self {
+    /// O(n log n) in the half-edges around one vertex, O(n) in the submesh.
+    pub(crate) fn of(submesh: &Submesh) -> Self {
         // Counting sort by the low end, then each vertex's few edges by comparison.
-        let mut starts = vec![0u32; shop.positions.len() + 1];
-        let halves = |shop: &Shop, visit: &mut dyn FnMut(Vertex, Vertex, Use)| {
-            for t in shop.living() {
-                let v = shop.triangles[t as usize].v;
+        let mut starts = vec![0u32; submesh.positions.len() + 1];
+        let halves = |submesh: &Submesh, visit: &mut dyn FnMut(Vertex, Vertex, Use)| {
+            for t in submesh.living() {
+                let v = submesh.triangles[t as usize].v;
                 for k in 0..3 {
                     let (a, b) = (v[k], v[(k + 1) % 3]);
-                    if shop.complete[a as usize] || shop.complete[b as usize] {
+                    if submesh.complete[a as usize] || submesh.complete[b as usize] {
                         visit(a.min(b), a.max(b), Use { triangle: t, forward: a < b });
                     }
                 }
             }
         };
-        halves(shop, &mut |low, _, _| starts[low as usize + 1] += 1);
+        halves(submesh, &mut |low, _, _| starts[low as usize + 1] += 1);
         for v in 1..starts.len() {
             starts[v] += starts[v - 1];
         }
         let mut at = starts.clone();
         let mut table = vec![(0, Use { triangle: 0, forward: false }); *starts.last().unwrap_or(&0) as usize];
-        halves(shop, &mut |low, high, used| {
+        halves(submesh, &mut |low, high, used| {
             table[at[low as usize] as usize] = (high, used);
             at[low as usize] += 1;
         });
@@ -83,7 +83,7 @@ impl Edges {
             uses: Vec::with_capacity(table.len()),
             any_nonmanifold: false,
         };
-        for low in 0..shop.positions.len() {
+        for low in 0..submesh.positions.len() {
             let part = &mut table[starts[low] as usize..starts[low + 1] as usize];
             part.sort_unstable_by_key(|(high, used)| (*high, used.triangle));
             for group in part.chunk_by(|a, b| a.0 == b.0) {
@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn a_square_has_four_boundary_edges_and_a_diagonal() {
         let records = records(&plate(1, |_, _| true));
-        let edges = Edges::of(&diagnose(&records).shop);
+        let edges = Edges::of(&diagnose(&records).submesh);
         assert_eq!(edges.len(), 5);
         assert_eq!(edges.iter().filter(|e| e.is_boundary() && e.is_unbalanced()).count(), 4);
         let diagonal = edges.iter().find(|e| e.uses.len() == 2).unwrap();
@@ -150,10 +150,10 @@ mod tests {
         let mut square = plate(1, |_, _| true);
         square[1] = reversed(&square[1..])[0];
         let turned = records(&square);
-        assert_eq!(Edges::of(&diagnose(&turned).shop).iter().filter(|e| e.is_inconsistent() && e.is_unbalanced()).count(), 1);
+        assert_eq!(Edges::of(&diagnose(&turned).submesh).iter().filter(|e| e.is_inconsistent() && e.is_unbalanced()).count(), 1);
         square.push([[0.0; 3], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
         let three = records(&square);
-        let edges = Edges::of(&diagnose(&three).shop);
+        let edges = Edges::of(&diagnose(&three).submesh);
         // Three uses are no longer a disagreement of two.
         assert_eq!(edges.iter().filter(|e| e.is_nonmanifold() && !e.is_inconsistent()).count(), 1);
     }

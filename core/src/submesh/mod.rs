@@ -1,11 +1,11 @@
-//! The workshop: all triangles around unsound vertices, as a small mesh in memory that repairs can change.
+//! The submesh: all triangles around irregular vertices, as a small mesh in memory that repairs can change.
 //!
-//! **In:** the triangles around unsound vertices, by their numbers, and the records they stand in.
-//! **Out:** a [`Shop`] of vertices and triangles; its edges ([`edges`]), the wedges of material around an edge ([`wedges`]), its components
+//! **In:** the triangles around irregular vertices, by their numbers, and the records they stand in.
+//! **Out:** a [`Submesh`] of vertices and triangles; its edges ([`edges`]), the wedges of material around an edge ([`wedges`]), its components
 //! ([`components`]), vertices near a place ([`near`]).
 //! **Promise:** everything that a repair decides on is here: the star of each complete vertex is whole.
 //!
-//! Its **complete** vertices have their whole star here (the unsound ones, and what was fetched on request); the others are its
+//! Its **complete** vertices have their whole star here (the irregular ones, and what was fetched on request); the others are its
 //! frontier and stay as they are. An edge with a complete end therefore has all its triangles here. Vertices and triangles are
 //! numbered by the input's order, so nothing that is done here depends on how the file was cut into chunks.
 
@@ -21,13 +21,13 @@ use glam::DVec3;
 use crate::geometry::position::Position;
 use crate::io::read_ahead::ASKED_AT_ONCE;
 use crate::io::record::{self, Record};
-use crate::topology::chunk::Suspect;
+use crate::topology::chunk::IrregularTriangle;
 use crate::topology::survey::Survey;
 use crate::topology::vertex_table::Weld;
 use crate::util::steps;
 use crate::util::union_find::NONE;
 
-/// A vertex of the workshop.
+/// A vertex of the submesh.
 pub(crate) type Vertex = u32;
 
 /// Where a triangle comes from.
@@ -51,12 +51,12 @@ impl Origin {
     }
 }
 
-/// A triangle of the workshop.
+/// A triangle of the submesh.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Triangle {
     pub(crate) v: [Vertex; 3],
     pub(crate) origin: Origin,
-    /// The patch of sound surface it continues coherently, or [`NONE`].
+    /// The patch of regular surface it continues coherently, or [`NONE`].
     pub(crate) patch: u32,
     pub(crate) alive: bool,
 }
@@ -71,7 +71,7 @@ impl Triangle {
     }
 }
 
-/// A workshop that is being made.
+/// A submesh that is being made.
 pub(crate) struct Gathering {
     weld: Weld,
     complete: Vec<bool>,
@@ -97,16 +97,16 @@ impl Gathering {
         self.triangles.push(Triangle { v, origin: Origin::Input(place), patch, alive: true });
     }
 
-    pub(crate) fn finish(self) -> Shop {
+    pub(crate) fn finish(self) -> Submesh {
         let Self { weld, complete, triangles } = self;
-        let mut shop = Shop { heads: Vec::new(), nexts: Vec::new(), positions: weld.into_positions(), complete, triangles };
-        shop.relink();
-        shop
+        let mut submesh = Submesh { heads: Vec::new(), nexts: Vec::new(), positions: weld.into_positions(), complete, triangles };
+        submesh.relink();
+        submesh
     }
 }
 
 /// The mesh under repair.
-pub(crate) struct Shop {
+pub(crate) struct Submesh {
     /// The coordinates of [`Position`]s: without −0.0.
     pub(crate) positions: Vec<[f32; 3]>,
     /// The whole star is here.
@@ -123,15 +123,22 @@ fn corner_of(triangle: &[Vertex; 3], vertex: Vertex, corner: usize) -> usize {
     triangle.iter().position(|v| *v == vertex).unwrap_or(corner % 3)
 }
 
-impl Shop {
-    /// Gathers the suspects of `survey`. O(suspects).
+impl Submesh {
+    /// Gathers the irregular triangles of `survey`. O(irregular triangles).
     pub(crate) fn gather(survey: &Survey<'_>) -> Self {
-        let mut gathering = Gathering::of(survey.suspects.len());
-        for (i, (suspect, patch)) in survey.suspects.iter().zip(&survey.suspect_patches).enumerate() {
+        let mut gathering = Gathering::of(survey.irregular_triangles.len());
+        for (i, (irregular_triangle, patch)) in
+            survey.irregular_triangles.iter().zip(&survey.irregular_triangle_patches).enumerate()
+        {
             if i % ASKED_AT_ONCE == 0 {
-                survey.ask_for(survey.suspects[i..].iter().take(ASKED_AT_ONCE).map(|s| s.triangle));
+                survey.ask_for(survey.irregular_triangles[i..].iter().take(ASKED_AT_ONCE).map(|s| s.triangle));
             }
-            gathering.add(suspect.triangle, corners(survey.records, suspect.triangle), suspect.unsound, *patch);
+            gathering.add(
+                irregular_triangle.triangle,
+                corners(survey.records, irregular_triangle.triangle),
+                irregular_triangle.irregular,
+                *patch,
+            );
         }
         gathering.finish()
     }
@@ -149,12 +156,12 @@ impl Shop {
     pub(crate) fn extend(
         &mut self,
         survey: &Survey<'_>,
-        new: &[(Suspect, u32)],
+        new: &[(IrregularTriangle, u32)],
         completed: impl FnOnce(&HashMap<Position, Vertex>) -> Vec<Vertex>,
     ) {
         let mut known = self.by_position();
-        for (suspect, patch) in new {
-            let v = corners(survey.records, suspect.triangle).map(|p| {
+        for (irregular_triangle, patch) in new {
+            let v = corners(survey.records, irregular_triangle.triangle).map(|p| {
                 let position = Position::of(p);
                 *known.entry(position).or_insert_with(|| {
                     self.positions.push(position.coordinates());
@@ -162,7 +169,7 @@ impl Shop {
                     self.positions.len() as Vertex - 1
                 })
             });
-            self.triangles.push(Triangle { v, origin: Origin::Input(suspect.triangle), patch: *patch, alive: true });
+            self.triangles.push(Triangle { v, origin: Origin::Input(irregular_triangle.triangle), patch: *patch, alive: true });
         }
         completed(&known).into_iter().for_each(|v| self.complete[v as usize] = true);
         self.relink();

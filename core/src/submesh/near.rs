@@ -1,7 +1,7 @@
 //! What lies near the boundary: vertices that should be one, and vertices inside another triangle's edge.
 
 use super::edges::Edges;
-use super::{Shop, Vertex, distance};
+use super::{Submesh, Vertex, distance};
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::sums::Bounds;
 
@@ -16,8 +16,8 @@ pub(crate) struct Tolerance {
 
 impl Tolerance {
     /// What holds at `v`.
-    pub(crate) fn at(&self, shop: &Shop, v: Vertex) -> f64 {
-        self.weld.min(shop.shortest_edge(v) * self.edge_share)
+    pub(crate) fn at(&self, submesh: &Submesh, v: Vertex) -> f64 {
+        self.weld.min(submesh.shortest_edge(v) * self.edge_share)
     }
 }
 
@@ -31,20 +31,20 @@ pub(crate) fn boundary_vertices(edges: &Edges) -> Vec<Vertex> {
 
 /// Pairs of boundary vertices, smaller number first, within the tolerance that holds at both; sorted. Vertices joined by an edge
 /// are never within it.
-pub(crate) fn close_pairs(shop: &Shop, edges: &Edges, tolerance: &Tolerance) -> Vec<(Vertex, Vertex)> {
+pub(crate) fn close_pairs(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> Vec<(Vertex, Vertex)> {
     let vertices = boundary_vertices(edges);
     if vertices.is_empty() || tolerance.weld <= 0.0 {
         return Vec::new();
     }
-    let reach: Vec<f64> = vertices.iter().map(|v| tolerance.at(shop, *v)).collect();
-    let boxes: Vec<Bounds> = vertices.iter().map(|v| around(&[shop.positions[*v as usize]], 0.0)).collect();
+    let reach: Vec<f64> = vertices.iter().map(|v| tolerance.at(submesh, *v)).collect();
+    let boxes: Vec<Bounds> = vertices.iter().map(|v| around(&[submesh.positions[*v as usize]], 0.0)).collect();
     let tree = BoxTree::new(&boxes);
     let mut found = Vec::new();
     let mut pairs = Vec::new();
     for (i, v) in vertices.iter().enumerate() {
-        tree.meeting(&around(&[shop.positions[*v as usize]], reach[i]), &mut found);
+        tree.meeting(&around(&[submesh.positions[*v as usize]], reach[i]), &mut found);
         for j in found.iter().map(|j| *j as usize).filter(|j| *j > i) {
-            if shop.distance(*v, vertices[j]) <= reach[i].min(reach[j]) {
+            if submesh.distance(*v, vertices[j]) <= reach[i].min(reach[j]) {
                 pairs.push((*v, vertices[j]));
             }
         }
@@ -55,8 +55,8 @@ pub(crate) fn close_pairs(shop: &Shop, edges: &Edges, tolerance: &Tolerance) -> 
 
 /// For each of some vertices the nearest of the others within both reaches that it shares no triangle with, by place in `vertices`;
 /// of equally near ones the first.
-pub(crate) fn nearest_apart(shop: &Shop, vertices: &[Vertex], reach: &[f64]) -> Vec<Option<usize>> {
-    let boxes: Vec<Bounds> = vertices.iter().map(|v| around(&[shop.positions[*v as usize]], 0.0)).collect();
+pub(crate) fn nearest_apart(submesh: &Submesh, vertices: &[Vertex], reach: &[f64]) -> Vec<Option<usize>> {
+    let boxes: Vec<Bounds> = vertices.iter().map(|v| around(&[submesh.positions[*v as usize]], 0.0)).collect();
     if boxes.is_empty() {
         return Vec::new();
     }
@@ -64,11 +64,11 @@ pub(crate) fn nearest_apart(shop: &Shop, vertices: &[Vertex], reach: &[f64]) -> 
     let mut found = Vec::new();
     let mut nearest = Vec::with_capacity(vertices.len());
     for (i, v) in vertices.iter().enumerate() {
-        tree.meeting(&around(&[shop.positions[*v as usize]], reach[i]), &mut found);
+        tree.meeting(&around(&[submesh.positions[*v as usize]], reach[i]), &mut found);
         let mut best: Option<(f64, usize)> = None;
         for j in found.iter().map(|j| *j as usize).filter(|j| *j != i) {
-            let away = shop.distance(*v, vertices[j]);
-            if away <= reach[i].min(reach[j]) && best.is_none_or(|(d, _)| away < d) && !shop.has_edge(*v, vertices[j]) {
+            let away = submesh.distance(*v, vertices[j]);
+            if away <= reach[i].min(reach[j]) && best.is_none_or(|(d, _)| away < d) && !submesh.has_edge(*v, vertices[j]) {
                 best = Some((away, j));
             }
         }
@@ -78,8 +78,8 @@ pub(crate) fn nearest_apart(shop: &Shop, vertices: &[Vertex], reach: &[f64]) -> 
 }
 
 /// Boundary vertices within tolerance of another one.
-pub(crate) fn weldable_vertices(shop: &Shop, edges: &Edges, tolerance: &Tolerance) -> Vec<Vertex> {
-    let mut all: Vec<Vertex> = close_pairs(shop, edges, tolerance).into_iter().flat_map(|(a, b)| [a, b]).collect();
+pub(crate) fn weldable_vertices(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> Vec<Vertex> {
+    let mut all: Vec<Vertex> = close_pairs(submesh, edges, tolerance).into_iter().flat_map(|(a, b)| [a, b]).collect();
     all.sort_unstable();
     all.dedup();
     all
@@ -98,25 +98,25 @@ pub(crate) struct OnEdge {
 
 /// Every boundary vertex that lies within `reach(vertex, edge length)` of the inside of a boundary edge whose triangle it does not
 /// belong to, with its nearest such edge, by edge and place on it.
-pub(crate) fn on_edges(shop: &Shop, edges: &Edges, reach: impl Fn(Vertex) -> f64) -> Vec<OnEdge> {
+pub(crate) fn on_edges(submesh: &Submesh, edges: &Edges, reach: impl Fn(Vertex) -> f64) -> Vec<OnEdge> {
     let boundary: Vec<u32> = (0..edges.len() as u32).filter(|i| edges.get(*i as usize).is_boundary()).collect();
     if boundary.is_empty() {
         return Vec::new();
     }
     let ends = |i: u32| {
         let e = edges.get(i as usize);
-        [shop.positions[e.low as usize], shop.positions[e.high as usize]]
+        [submesh.positions[e.low as usize], submesh.positions[e.high as usize]]
     };
     let tree = BoxTree::new(&boundary.iter().map(|i| around(&ends(*i), 0.0)).collect::<Vec<_>>());
     let mut found = Vec::new();
     let mut all = Vec::new();
     for v in boundary_vertices(edges) {
-        let (p, tolerance) = (shop.positions[v as usize], reach(v));
+        let (p, tolerance) = (submesh.positions[v as usize], reach(v));
         tree.meeting(&around(&[p], tolerance), &mut found);
         let mut nearest: Option<OnEdge> = None;
         for edge in found.iter().map(|i| boundary[*i as usize]) {
             let triangle = edges.get(edge as usize).uses[0].triangle;
-            if shop.triangles[triangle as usize].v.contains(&v) {
+            if submesh.triangles[triangle as usize].v.contains(&v) {
                 continue;
             }
             let [a, b] = ends(edge);
@@ -135,8 +135,8 @@ pub(crate) fn on_edges(shop: &Shop, edges: &Edges, reach: impl Fn(Vertex) -> f64
 }
 
 /// Boundary vertices inside a boundary edge of another triangle (T-junctions), with their edges.
-pub(crate) fn noncommon_vertices(shop: &Shop, edges: &Edges, tolerance: &Tolerance) -> Vec<OnEdge> {
-    on_edges(shop, edges, |v| tolerance.at(shop, v))
+pub(crate) fn noncommon_vertices(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> Vec<OnEdge> {
+    on_edges(submesh, edges, |v| tolerance.at(submesh, v))
 }
 
 /// Foot of `p` on the line a–b as a fraction from a, clamped to the segment, and its distance. 0 for an edge of no length.
@@ -177,7 +177,7 @@ mod tests {
     fn on_edge(tip: [f32; 3], weld: f64) -> Vec<OnEdge> {
         let records = records(&[BELOW, [tip, [12.0, 10.0, 0.0], [-2.0, 10.0, 0.0]]]);
         let d = diagnose(&records);
-        noncommon_vertices(&d.shop, &Edges::of(&d.shop), &Tolerance { weld, edge_share: 0.25 })
+        noncommon_vertices(&d.submesh, &Edges::of(&d.submesh), &Tolerance { weld, edge_share: 0.25 })
     }
 
     #[test]
@@ -195,7 +195,7 @@ mod tests {
             let small: Corners = [[0.0, 0.1, 0.0], [-size, size, 0.0], [0.0, size, 0.0]];
             let records = records(&[BELOW, small]);
             let d = diagnose(&records);
-            close_pairs(&d.shop, &Edges::of(&d.shop), &Tolerance { weld, edge_share: 0.25 }).len()
+            close_pairs(&d.submesh, &Edges::of(&d.submesh), &Tolerance { weld, edge_share: 0.25 }).len()
         };
         assert_eq!(pairs(5.0, 0.2), 1);
         assert_eq!(pairs(5.0, 0.05), 0, "beyond the tolerance");

@@ -7,7 +7,7 @@
 use std::cmp::Ordering;
 
 use super::edges::{Edge, Edges, Use};
-use super::{Shop, Vertex};
+use super::{Submesh, Vertex};
 use crate::geometry::exact::{Point, collinear, side, turn};
 use crate::util::union_find::NONE;
 
@@ -20,9 +20,9 @@ pub(crate) struct Half {
 
 impl Half {
     /// The edge as its triangle has it.
-    pub(crate) fn of(shop: &Shop, edge: &Edge<'_>, used: &Use) -> Self {
+    pub(crate) fn of(submesh: &Submesh, edge: &Edge<'_>, used: &Use) -> Self {
         let (start, _) = edge.directed(used);
-        let corner = shop.triangles[used.triangle as usize].v.iter().position(|v| *v == start).unwrap_or(0);
+        let corner = submesh.triangles[used.triangle as usize].v.iter().position(|v| *v == start).unwrap_or(0);
         Self { triangle: used.triangle, corner }
     }
 
@@ -39,12 +39,12 @@ pub(crate) struct Wedges {
 
 impl Wedges {
     /// An edge whose triangles do not run as often one way as the other, or two of which lie in one direction from it, pairs none of them.
-    /// O(workshop), O(n log n) in the triangles around one edge.
-    pub(crate) fn of(shop: &Shop, edges: &Edges) -> Self {
-        let mut mates = vec![NONE; shop.triangles.len() * 3];
+    /// O(submesh), O(n log n) in the triangles around one edge.
+    pub(crate) fn of(submesh: &Submesh, edges: &Edges) -> Self {
+        let mut mates = vec![NONE; submesh.triangles.len() * 3];
         for edge in edges.iter().filter(|e| !e.is_unbalanced()) {
-            for wedge in wedges(shop, &edge) {
-                let [a, b] = wedge.map(|used| Half::of(shop, &edge, used).number());
+            for wedge in wedges(submesh, &edge) {
+                let [a, b] = wedge.map(|used| Half::of(submesh, &edge, used).number());
                 mates[a as usize] = b;
                 mates[b as usize] = a;
             }
@@ -60,8 +60,8 @@ impl Wedges {
 
     /// The fans around `v`, each in its order from its first triangle, by first triangle; `None` if one of them is not closed. Each corner
     /// is where its triangle has `v`. O(n log n) in the triangles around it.
-    pub(crate) fn fans(&self, shop: &Shop, v: Vertex) -> Option<Vec<Vec<Half>>> {
-        let mut star: Vec<Half> = shop.star(v).map(|(triangle, corner)| Half { triangle, corner }).collect();
+    pub(crate) fn fans(&self, submesh: &Submesh, v: Vertex) -> Option<Vec<Vec<Half>>> {
+        let mut star: Vec<Half> = submesh.star(v).map(|(triangle, corner)| Half { triangle, corner }).collect();
         star.sort_unstable_by_key(|half| half.number());
         let mut seen = vec![false; star.len()];
         let mut fans = Vec::new();
@@ -85,14 +85,14 @@ impl Wedges {
 
 /// The pairs of a balanced edge's triangles that have a wedge of material between them, each with the triangle first behind which it begins,
 /// seen from the edge's low end turning left. None if two triangles lie in one direction from the edge.
-fn wedges<'e>(shop: &Shop, edge: &Edge<'e>) -> Vec<[&'e Use; 2]> {
+fn wedges<'e>(submesh: &Submesh, edge: &Edge<'e>) -> Vec<[&'e Use; 2]> {
     if let [a, b] = edge.uses {
         return vec![if a.forward { [b, a] } else { [a, b] }];
     }
-    let ends = [edge.low, edge.high].map(|v| shop.positions[v as usize]);
+    let ends = [edge.low, edge.high].map(|v| submesh.positions[v as usize]);
     let apexes = edge.uses.iter().map(|u| {
-        let apex = shop.triangles[u.triangle as usize].v.into_iter().find(|v| *v != edge.low && *v != edge.high);
-        shop.positions[apex.unwrap_or(edge.low) as usize]
+        let apex = submesh.triangles[u.triangle as usize].v.into_iter().find(|v| *v != edge.low && *v != edge.high);
+        submesh.positions[apex.unwrap_or(edge.low) as usize]
     });
     let Some(order) = around(&ends, &apexes.collect::<Vec<Point>>()) else { return Vec::new() };
     // Behind one that runs against the edge's direction material begins, behind the others it ends. What is turned by begins where least is open.
@@ -164,13 +164,13 @@ mod tests {
     fn paired(mesh: &[Corners]) -> Vec<[u32; 2]> {
         let records = records(mesh);
         let d = diagnose(&records);
-        let edges = Edges::of(&d.shop);
-        let number = |p: [f32; 3]| d.shop.positions.iter().position(|q| *q == p).unwrap() as u32;
+        let edges = Edges::of(&d.submesh);
+        let number = |p: [f32; 3]| d.submesh.positions.iter().position(|q| *q == p).unwrap() as u32;
         let edge = edges.between(number([1.0, 1.0, 0.0]), number([1.0, 1.0, 1.0])).unwrap();
-        let mut pairs: Vec<[u32; 2]> = wedges(&d.shop, &edge)
+        let mut pairs: Vec<[u32; 2]> = wedges(&d.submesh, &edge)
             .iter()
             .map(|pair| {
-                let mut places = pair.map(|used| d.shop.record(used.triangle));
+                let mut places = pair.map(|used| d.submesh.record(used.triangle));
                 places.sort_unstable();
                 places
             })
@@ -208,8 +208,8 @@ mod tests {
     fn fans(mesh: &[Corners]) -> Option<Vec<usize>> {
         let records = records(mesh);
         let d = diagnose(&records);
-        let v = d.shop.positions.iter().position(|p| *p == [1.0; 3]).unwrap() as u32;
-        let fans = Wedges::of(&d.shop, &Edges::of(&d.shop)).fans(&d.shop, v)?;
+        let v = d.submesh.positions.iter().position(|p| *p == [1.0; 3]).unwrap() as u32;
+        let fans = Wedges::of(&d.submesh, &Edges::of(&d.submesh)).fans(&d.submesh, v)?;
         Some(fans.iter().map(Vec::len).collect())
     }
 

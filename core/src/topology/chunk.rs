@@ -1,10 +1,10 @@
-//! The exact topology of one chunk: which vertices at home there have a sound star, and which sound surface hangs together.
+//! The exact topology of one chunk: which vertices at home there have a regular star, and which regular surface hangs together.
 //!
 //! A chunk sees every triangle around each vertex at home in it, so it decides those vertices' stars exactly and alone. A vertex
-//! is **sound** when its triangles form one closed fan, coherently oriented: every directed edge that leaves it comes back exactly
+//! is **regular** when its triangles form one closed fan, coherently oriented: every directed edge that leaves it comes back exactly
 //! once, in one cycle of at least three. Anything else (boundary, non-manifold edge, disagreement, several fans, duplicates, a
-//! collinear triangle) makes it **unsound**, and all its triangles are reported to the workshop, which sorts out what is wrong.
-//! Sound vertices that share a triangle belong to one **patch**: a coherent piece of surface.
+//! collinear triangle) makes it **irregular**, and all its triangles are reported to the submesh, which sorts out what is wrong.
+//! Regular vertices that share a triangle belong to one **patch**: a coherent piece of surface.
 //!
 //! Tables are laid out to stay in an L2 cache at 32 k triangles a chunk; a worker keeps them from chunk to chunk.
 
@@ -21,14 +21,14 @@ use crate::topology::star::{self, Ring, Stars};
 use crate::topology::vertex_table::{self, Weld};
 use crate::util::union_find::NONE;
 
-/// A triangle that goes to the workshop, and which of its corners are unsound here (bit k: corner k).
+/// A triangle that goes to the submesh, and which of its corners are irregular here (bit k: corner k).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Suspect {
+pub(crate) struct IrregularTriangle {
     pub(crate) triangle: u32,
-    pub(crate) unsound: u8,
+    pub(crate) irregular: u8,
 }
 
-/// A triangle that more than one chunk sees, or that is a suspect, with the patch of its sound corners at home here.
+/// A triangle that more than one chunk sees, or that is an irregular triangle, with the patch of its regular corners at home here.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Link {
     pub(crate) triangle: u32,
@@ -62,18 +62,18 @@ impl Link {
 /// What one chunk contributes.
 #[derive(Debug, Default)]
 pub(crate) struct ChunkTopology {
-    pub(crate) suspects: Vec<Suspect>,
+    pub(crate) irregular_triangles: Vec<IrregularTriangle>,
     pub(crate) links: Vec<Link>,
     pub(crate) patches: Vec<Patch>,
     pub(crate) labels: Labels,
-    /// The box of all triangles with a label that are no suspects here.
+    /// The box of all triangles with a label that are no irregular triangles here.
     pub(crate) reach: Bounds,
     /// Positions at home here.
     pub(crate) vertices: u64,
     /// Those used by a triangle with three distinct vertices.
     pub(crate) vertices_used: u64,
-    /// Positions at home here that suspects use.
-    pub(crate) suspect_vertices: u64,
+    /// Positions at home here that irregular triangles use.
+    pub(crate) irregular_triangle_vertices: u64,
     /// Self-intersections that this chunk owns; empty if they were not looked for.
     pub(crate) crossings: Crossings,
 }
@@ -90,15 +90,19 @@ impl ChunkTopology {
         let labels = self.labels.heap_bytes();
         let fixed = size_of::<Self>() as u64;
         budget.take(Purpose::Surface, fixed + labels + self.patches.capacity() as u64 * BYTES_PER_PATCH);
-        // Copied when they are merged; of suspects, one more list is kept.
-        let seams = size_of::<Link>() * self.links.capacity() + size_of::<Suspect>() * self.suspects.capacity();
+        // Copied when they are merged; of irregular triangles, one more list is kept.
+        let seams =
+            size_of::<Link>() * self.links.capacity() + size_of::<IrregularTriangle>() * self.irregular_triangles.capacity();
         budget.take(Purpose::Seams, 2 * (seams as u64 + self.crossings.heap_bytes()));
-        budget.take(Purpose::Defects, crate::stream::budget::workshop_bytes(self.suspects.len() as u64, self.suspect_vertices));
+        budget.take(
+            Purpose::Defects,
+            crate::stream::budget::submesh_bytes(self.irregular_triangles.len() as u64, self.irregular_triangle_vertices),
+        );
     }
 
     /// Gives back what growing left over.
     fn shrink(&mut self) {
-        self.suspects.shrink_to_fit();
+        self.irregular_triangles.shrink_to_fit();
         self.links.shrink_to_fit();
         self.patches.shrink_to_fit();
     }
@@ -114,7 +118,7 @@ pub(crate) struct Scratch {
     /// Members with three distinct, exactly collinear vertices.
     collinear: Vec<u32>,
     stars: Stars,
-    /// Patch of a sound home vertex, [`UNSOUND`] or [`AWAY`].
+    /// Patch of a regular home vertex, [`IRREGULAR`] or [`AWAY`].
     states: Vec<u32>,
     parents: Vec<u32>,
     /// By vertex, for the search for self-intersections.
@@ -124,11 +128,11 @@ pub(crate) struct Scratch {
     hit: Vec<u64>,
 }
 
-/// State of a vertex at home here whose star is not sound.
-const UNSOUND: u32 = NONE - 1;
+/// State of a vertex at home here whose star is not regular.
+const IRREGULAR: u32 = NONE - 1;
 /// State of a vertex at home elsewhere.
 const AWAY: u32 = NONE - 2;
-/// State of a sound vertex before patches are numbered. Smaller than the others, as the numbers are.
+/// State of a regular vertex before patches are numbered. Smaller than the others, as the numbers are.
 const SOUND: u32 = 0;
 
 /// Bytes that one worker needs for a chunk of `members` triangles, at most.
@@ -138,7 +142,7 @@ pub(crate) fn scratch_bytes(members: u64) -> u64 {
 }
 
 impl Scratch {
-    /// Decides everything that can be decided inside the chunk of this cell; the vertices at the positions `cut` count as unsound. O(members).
+    /// Decides everything that can be decided inside the chunk of this cell; the vertices at the positions `cut` count as irregular. O(members).
     pub(crate) fn solve(&mut self, seen: &Seen<'_>, cell: HomeBox, measure: &Measure, cut: &[Point]) -> ChunkTopology {
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("bmi2") {
@@ -192,8 +196,8 @@ impl Scratch {
         self.standing.clear();
         self.standing.extend(self.states.iter().map(|state| match *state {
             AWAY => Standing::Away,
-            UNSOUND => Standing::Unsound,
-            _ => Standing::Sound,
+            IRREGULAR => Standing::Irregular,
+            _ => Standing::Regular,
         }));
         // No visitor has a corner at home here.
         self.standing.resize(self.vertices.positions().len(), Standing::Away);
@@ -269,18 +273,18 @@ impl Scratch {
         }
     }
 
-    /// Tests whether the triangles around each home vertex are one closed coherent fan, and puts those that are sound into patches.
+    /// Tests whether the triangles around each home vertex are one closed coherent fan, and puts those that are regular into patches.
     #[inline(always)]
     fn judge_stars(&mut self, cell: HomeBox, cut: &[Point], places: impl Fn(&Ring, u32) -> u32 + Copy) {
         let positions = self.vertices.positions();
         self.stars.gather(positions.len(), &self.triangles);
         self.states.clear();
         self.states.extend(positions.iter().map(|p| if cell.holds(*p) { SOUND } else { AWAY }));
-        // The workshop must see the neighbours that a collinear triangle is to be closed with.
+        // The submesh must see the neighbours that a collinear triangle is to be closed with.
         let of_collinear = self.collinear.iter().flat_map(|i| self.triangles[*i as usize]);
         for v in of_collinear.chain(cut.iter().filter_map(|p| self.vertices.find(*p))) {
             let state = &mut self.states[v as usize];
-            *state = if *state == SOUND { UNSOUND } else { *state };
+            *state = if *state == SOUND { IRREGULAR } else { *state };
         }
         self.parents.clear();
         self.parents.extend(0..positions.len() as u32);
@@ -288,7 +292,7 @@ impl Scratch {
         self.unite_patches(roots);
     }
 
-    /// Tests stars by ascending vertex. A sound one is put with an older sound neighbour, one in its first triangle if that will do;
+    /// Tests stars by ascending vertex. A regular one is put with an older regular neighbour, one in its first triangle if that will do;
     /// what is left without makes a root, and mostly there is only one. Returns their number.
     #[inline(always)]
     fn judge(&mut self, places: impl Fn(&Ring, u32) -> u32 + Copy) -> usize {
@@ -299,7 +303,7 @@ impl Scratch {
                 continue;
             }
             if !self.stars.is_closed_fan(v, places) {
-                states[v] = UNSOUND;
+                states[v] = IRREGULAR;
                 continue;
             }
             let (next, previous) = self.stars.around(v);
@@ -312,7 +316,7 @@ impl Scratch {
         roots
     }
 
-    /// Unites the patches of sound home vertices that share a triangle, of which there are `roots` as yet.
+    /// Unites the patches of regular home vertices that share a triangle, of which there are `roots` as yet.
     #[inline(always)]
     fn unite_patches(&mut self, mut roots: usize) {
         for t in self.triangles.iter().filter(|t| t[0] != NONE) {
@@ -323,24 +327,25 @@ impl Scratch {
             if (self.parents[t[1] as usize] == parent) & (self.parents[t[2] as usize] == parent) {
                 continue;
             }
-            let sound = t.map(|v| self.states[v as usize] == SOUND);
-            if sound[0] && sound[1] {
+            let regular = t.map(|v| self.states[v as usize] == SOUND);
+            if regular[0] && regular[1] {
                 roots -= usize::from(crate::util::union_find::unite(&mut self.parents, t[0], t[1]));
             }
-            if sound[2] && (sound[0] || sound[1]) {
-                roots -= usize::from(crate::util::union_find::unite(&mut self.parents, t[2], if sound[0] { t[0] } else { t[1] }));
+            if regular[2] && (regular[0] || regular[1]) {
+                roots -=
+                    usize::from(crate::util::union_find::unite(&mut self.parents, t[2], if regular[0] { t[0] } else { t[1] }));
             }
         }
     }
 
-    /// Vertices at home here that these suspects use. O(members).
-    fn count_suspect_vertices(&mut self, suspects: &[Suspect]) -> u64 {
+    /// Vertices at home here that these irregular triangles use. O(members).
+    fn count_irregular_triangle_vertices(&mut self, irregular_triangles: &[IrregularTriangle]) -> u64 {
         self.hit.clear();
         self.hit.resize(self.states.len().div_ceil(64), 0);
-        let mut suspects = suspects.iter().map(|s| s.triangle).peekable();
+        let mut irregular_triangles = irregular_triangles.iter().map(|s| s.triangle).peekable();
         for (t, number) in self.triangles.iter().zip(&self.numbers) {
-            if suspects.next_if_eq(number).is_none() {
-                if suspects.peek().is_none() {
+            if irregular_triangles.next_if_eq(number).is_none() {
+                if irregular_triangles.peek().is_none() {
                     break;
                 }
                 continue;
@@ -366,7 +371,7 @@ impl Scratch {
             let triangle = *number;
             if t[0] == NONE {
                 // Of no area.
-                out.suspects.push(Suspect { triangle, unsound: 0 });
+                out.irregular_triangles.push(IrregularTriangle { triangle, irregular: 0 });
                 labels.push(NONE);
                 continue;
             }
@@ -376,13 +381,13 @@ impl Scratch {
                 sum.add(states[0], triangle, *t, &mut out.patches);
                 continue;
             }
-            let unsound = (0..3).fold(0, |mask, k| mask | u8::from(states[k] == UNSOUND) << k);
+            let irregular = (0..3).fold(0, |mask, k| mask | u8::from(states[k] == IRREGULAR) << k);
             let patch = states.into_iter().rfind(|s| *s < AWAY).unwrap_or(NONE);
             labels.push(patch);
-            if unsound != 0 {
-                out.suspects.push(Suspect { triangle, unsound });
+            if irregular != 0 {
+                out.irregular_triangles.push(IrregularTriangle { triangle, irregular });
             }
-            let counted = patch != NONE && unsound == 0 && states[0] != AWAY;
+            let counted = patch != NONE && irregular == 0 && states[0] != AWAY;
             if !counted {
                 sum.leave(*t);
             }
@@ -394,14 +399,14 @@ impl Scratch {
                     *first = triangle.min(*first);
                 }
                 out.links.push(Link::new(triangle, patch, counted));
-                if unsound == 0 {
+                if irregular == 0 {
                     out.reach.include(&t.map(|v| self.vertices.positions()[v as usize]));
                 }
             }
         }
         sum.finish(total, &mut out.patches);
         out.patches.iter().for_each(|p| out.reach.add(&p.bounds));
-        out.suspect_vertices = self.count_suspect_vertices(&out.suspects);
+        out.irregular_triangle_vertices = self.count_irregular_triangle_vertices(&out.irregular_triangles);
         if out.patches.len() > 1 {
             out.labels = Labels::Runs(labels.finish());
         }

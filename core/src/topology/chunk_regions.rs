@@ -7,7 +7,7 @@ use crate::geometry::sums::Measure;
 use crate::io::record::{self, Record};
 use crate::stream::budget::{Budget, Purpose};
 use crate::stream::plan::ChunkId;
-use crate::topology::chunk::{self, ChunkTopology, Link, Suspect};
+use crate::topology::chunk::{self, ChunkTopology, IrregularTriangle, Link};
 use crate::topology::labels::Labels;
 use crate::topology::patch_sums::Patch;
 use crate::util::radix;
@@ -18,17 +18,17 @@ use crate::util::union_find::NONE;
 pub(crate) struct Parts {
     /// The first part of each chunk, and one past the last.
     bases: Vec<u32>,
-    /// Sums leave the suspects out.
+    /// Sums leave the irregular triangles out.
     sums: Vec<Patch>,
     /// Parts that share a triangle, each pair once, ascending.
     neighbours: Vec<[u32; 2]>,
-    /// A part of each suspect that has sound corners, by ascending suspect.
-    of_suspects: Vec<(u32, u32)>,
+    /// A part of each irregular triangle that has regular corners, by ascending irregular triangle.
+    of_irregular_triangles: Vec<(u32, u32)>,
 }
 
 impl Parts {
     pub(crate) fn none(chunks: usize) -> Self {
-        Self { bases: vec![0; chunks + 1], sums: Vec::new(), neighbours: Vec::new(), of_suspects: Vec::new() }
+        Self { bases: vec![0; chunks + 1], sums: Vec::new(), neighbours: Vec::new(), of_irregular_triangles: Vec::new() }
     }
 
     /// Numbers of the parts of a chunk.
@@ -41,7 +41,7 @@ impl Parts {
         self.bases.partition_point(|base| *base <= part) - 1
     }
 
-    /// By chunk: is it among these, or does it share a triangle with a sound corner on each side with one of these?
+    /// By chunk: is it among these, or does it share a triangle with a regular corner on each side with one of these?
     pub(crate) fn with_neighbours(&self, chunks: &[bool]) -> Vec<bool> {
         let mut all = chunks.to_vec();
         for pair in &self.neighbours {
@@ -52,18 +52,18 @@ impl Parts {
         all
     }
 
-    /// The parts with what chunks say that were solved again, ascending, and all suspects, with those that were known. `is_changed`: vertices at home in
-    /// that chunk became unsound, so that its parts are others; the other chunks solved share triangles with such ones, and say what they said.
-    /// O(parts + seams + suspects), sorted.
+    /// The parts with what chunks say that were solved again, ascending, and all irregular triangles, with those that were known. `is_changed`: vertices at home in
+    /// that chunk became irregular, so that its parts are others; the other chunks solved share triangles with such ones, and say what they said.
+    /// O(parts + seams + irregular triangles), sorted.
     pub(crate) fn renewed(
         &self,
         (records, measure): (&[Record], &Measure),
-        mut suspects: Vec<Suspect>,
+        mut irregular_triangles: Vec<IrregularTriangle>,
         fresh: &mut [(ChunkId, &mut ChunkTopology)],
         is_changed: impl Fn(usize) -> bool,
-    ) -> (Self, Vec<Suspect>) {
+    ) -> (Self, Vec<IrregularTriangle>) {
         let mut links: Vec<Link> = Vec::with_capacity(fresh.iter().map(|(_, c)| c.links.len()).sum());
-        suspects.reserve_exact(fresh.iter().map(|(_, c)| c.suspects.len()).sum());
+        irregular_triangles.reserve_exact(fresh.iter().map(|(_, c)| c.irregular_triangles.len()).sum());
         let chunks = self.bases.len() - 1;
         let mut new = Self::none(chunks);
         let mut fresh = fresh.iter_mut().peekable();
@@ -73,16 +73,16 @@ impl Parts {
                 Some((_, chunk)) => {
                     new.sums.append(&mut chunk.patches);
                     links.extend(std::mem::take(&mut chunk.links).into_iter().map(|l| l.raised(base)));
-                    suspects.append(&mut std::mem::take(&mut chunk.suspects));
+                    irregular_triangles.append(&mut std::mem::take(&mut chunk.irregular_triangles));
                 }
                 None => new.sums.extend_from_slice(&self.sums[self.of_chunk(ChunkId(c as u32))]),
             }
             new.bases[c + 1] = new.sums.len() as u32;
         }
-        radix::sort_by_number(&mut suspects, |s| s.triangle);
-        suspects.dedup_by(|b, a| {
+        radix::sort_by_number(&mut irregular_triangles, |s| s.triangle);
+        irregular_triangles.dedup_by(|b, a| {
             let same = a.triangle == b.triangle;
-            a.unsound |= if same { b.unsound } else { 0 };
+            a.irregular |= if same { b.irregular } else { 0 };
             same
         });
         radix::sort_by_number(&mut links, |l| l.triangle);
@@ -101,13 +101,14 @@ impl Parts {
         new.neighbours.sort_unstable();
         new.neighbours.dedup();
         new.neighbours.shrink_to_fit();
-        let mut known = self.of_suspects.iter().peekable();
-        let of_links = take_out_suspects(records, measure, &links, &suspects, &mut new.sums);
-        for (suspect, part) in suspects.iter().zip(of_links) {
-            let before = known.next_if(|(triangle, _)| *triangle == suspect.triangle).and_then(|(_, part)| renumbered(*part));
-            new.of_suspects.extend(part.or(before).map(|part| (suspect.triangle, part)));
+        let mut known = self.of_irregular_triangles.iter().peekable();
+        let of_links = take_out_irregular_triangles(records, measure, &links, &irregular_triangles, &mut new.sums);
+        for (irregular_triangle, part) in irregular_triangles.iter().zip(of_links) {
+            let before =
+                known.next_if(|(triangle, _)| *triangle == irregular_triangle.triangle).and_then(|(_, part)| renumbered(*part));
+            new.of_irregular_triangles.extend(part.or(before).map(|part| (irregular_triangle.triangle, part)));
         }
-        (new, suspects)
+        (new, irregular_triangles)
     }
 
     /// The patches of the file by their smallest triangle, and for each part which one it is of.
@@ -119,38 +120,38 @@ impl Parts {
         number(&mut parents, &self.sums)
     }
 
-    /// The patch of each suspect's sound corners, or [`NONE`].
-    pub(crate) fn patches_of(&self, suspects: &[Suspect], merged: &[u32]) -> Vec<u32> {
-        let mut known = self.of_suspects.iter().peekable();
-        let part = |s: &Suspect| known.next_if(|(triangle, _)| *triangle == s.triangle);
-        suspects.iter().map(part).map(|known| known.map_or(NONE, |(_, part)| merged[*part as usize])).collect()
+    /// The patch of each irregular triangle's regular corners, or [`NONE`].
+    pub(crate) fn patches_of(&self, irregular_triangles: &[IrregularTriangle], merged: &[u32]) -> Vec<u32> {
+        let mut known = self.of_irregular_triangles.iter().peekable();
+        let part = |s: &IrregularTriangle| known.next_if(|(triangle, _)| *triangle == s.triangle);
+        irregular_triangles.iter().map(part).map(|known| known.map_or(NONE, |(_, part)| merged[*part as usize])).collect()
     }
 
     /// Counts what is kept, with the labels of the chunks that are.
-    pub(crate) fn take<'l>(&self, budget: &Budget, labels: impl Iterator<Item = &'l Labels>, suspects: u64) {
+    pub(crate) fn take<'l>(&self, budget: &Budget, labels: impl Iterator<Item = &'l Labels>, irregular_triangles: u64) {
         let labels: u64 = labels.map(Labels::heap_bytes).sum();
         budget.take(Purpose::Surface, labels + self.sums.len() as u64 * chunk::BYTES_PER_PATCH);
-        let seams = size_of_val(&*self.neighbours) + size_of_val(&*self.of_suspects);
+        let seams = size_of_val(&*self.neighbours) + size_of_val(&*self.of_irregular_triangles);
         budget.take(Purpose::Seams, 2 * seams as u64);
-        budget.take(Purpose::Defects, crate::stream::budget::workshop_bytes(suspects, suspects));
+        budget.take(Purpose::Defects, crate::stream::budget::submesh_bytes(irregular_triangles, irregular_triangles));
     }
 }
 
-/// Takes suspects out of the sums of chunks that knew nothing against them; returns a part of each suspect.
-fn take_out_suspects(
+/// Takes irregular triangles out of the sums of chunks that knew nothing against them; returns a part of each irregular triangle.
+fn take_out_irregular_triangles(
     records: &[Record],
     measure: &Measure,
     links: &[Link],
-    suspects: &[Suspect],
+    irregular_triangles: &[IrregularTriangle],
     sums: &mut [Patch],
 ) -> Vec<Option<u32>> {
-    let mut parts = vec![None; suspects.len()];
+    let mut parts = vec![None; irregular_triangles.len()];
     let mut s = 0;
     for link in links {
-        while s < suspects.len() && suspects[s].triangle < link.triangle {
+        while s < irregular_triangles.len() && irregular_triangles[s].triangle < link.triangle {
             s += 1;
         }
-        if s < suspects.len() && suspects[s].triangle == link.triangle {
+        if s < irregular_triangles.len() && irregular_triangles[s].triangle == link.triangle {
             parts[s] = Some(link.patch());
             if link.is_counted() {
                 let sum = &mut sums[link.patch() as usize];

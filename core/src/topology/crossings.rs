@@ -13,7 +13,7 @@ use crate::geometry::tri_tri::Contact;
 pub(crate) const LISTED: usize = 100;
 
 /// Candidate pairs whose contact may be worked out in a file of so many triangles, lest a heap of coincident ones takes forever. A count, so
-/// that it depends on the mesh alone. Sound meshes have up to four a triangle, CAD parts with many touching faces ten (measured).
+/// that it depends on the mesh alone. Regular meshes have up to four a triangle, CAD parts with many touching faces ten (measured).
 pub(crate) fn most_tested(triangles: u64) -> u64 {
     (1 << 30) + 16 * triangles
 }

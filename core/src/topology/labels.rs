@@ -5,7 +5,7 @@ use crate::util::union_find::NONE;
 /// The patch of each member in list order.
 #[derive(Clone, Debug, Default)]
 pub(crate) enum Labels {
-    /// All members with a sound corner belong to patch 0 of the chunk.
+    /// All members with a regular corner belong to patch 0 of the chunk.
     #[default]
     One,
     /// Run-coded: count, then patch + 1 (0: none).

@@ -1,7 +1,7 @@
-//! Topology: from chunks to what is sound and what is not, over the whole file.
+//! Topology: from chunks to what is regular and what is not, over the whole file.
 //!
 //! **In:** the chunks of [`crate::stream`].
-//! **Out:** a [`survey::Survey`]: the triangles around unsound vertices, sound surface as patches with exact sums, and the pairs of
+//! **Out:** a [`survey::Survey`]: the triangles around irregular vertices, regular surface as patches with exact sums, and the pairs of
 //! triangles that intersect ([`intersect`]).
 //! **Promise:** every vertex is decided by one chunk, which sees its whole star, and every pair of triangles by one owner. So the survey
 //! depends on the mesh alone, and not on chunks, memory or threads.

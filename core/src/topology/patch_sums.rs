@@ -4,14 +4,14 @@ use crate::geometry::sums::{Bounds, Extent, Measure};
 use crate::io::record::Point;
 use crate::util::union_find::NONE;
 
-/// What is summed over a patch: its triangles with three sound corners, until the merge also some whose other corners are not.
+/// What is summed over a patch: its triangles with three regular corners, until the merge also some whose other corners are not.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Patch {
     pub(crate) triangles: u64,
     pub(crate) extent: Extent,
-    /// Of its sound vertices.
+    /// Of its regular vertices.
     pub(crate) bounds: Bounds,
-    /// Smallest member with a sound corner in it.
+    /// Smallest member with a regular corner in it.
     pub(crate) first: u32,
 }
 

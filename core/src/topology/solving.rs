@@ -28,17 +28,17 @@ pub(crate) struct Solving<'s, 'a> {
 
 /// What was found so far that has to be kept.
 struct Found {
-    suspects: AtomicU64,
+    irregular_triangles: AtomicU64,
     patches: AtomicU64,
 }
 
 impl Found {
-    fn new(suspects: u64, patches: u64) -> Self {
-        Self { suspects: AtomicU64::new(suspects), patches: AtomicU64::new(patches) }
+    fn new(irregular_triangles: u64, patches: u64) -> Self {
+        Self { irregular_triangles: AtomicU64::new(irregular_triangles), patches: AtomicU64::new(patches) }
     }
 
     fn add(&self, topology: &ChunkTopology) {
-        self.suspects.fetch_add(topology.suspects.len() as u64, Ordering::Relaxed);
+        self.irregular_triangles.fetch_add(topology.irregular_triangles.len() as u64, Ordering::Relaxed);
         self.patches.fetch_add(topology.patches.len() as u64, Ordering::Relaxed);
     }
 }
@@ -81,12 +81,12 @@ impl Solving<'_, '_> {
         Ok(chunks)
     }
 
-    /// Some chunks again, with vertices that count as unsound, by the chunk where they are at home. `kept`: how many suspects and patches there are
+    /// Some chunks again, with vertices that count as irregular, by the chunk where they are at home. `kept`: how many irregular triangles and patches there are
     /// beside what is found.
     pub(crate) fn again(
         &self,
         is_wanted: &[bool],
-        unsound: &[(ChunkId, [f32; 3])],
+        irregular: &[(ChunkId, [f32; 3])],
         kept: [u64; 2],
     ) -> Result<Vec<(ChunkId, ChunkTopology)>> {
         let found = Found::new(kept[0], kept[1]);
@@ -99,7 +99,7 @@ impl Solving<'_, '_> {
                 if self.is_given_up() {
                     return (chunk, ChunkTopology::default());
                 }
-                let cut: Vec<[f32; 3]> = at_home(unsound, chunk).iter().map(|(_, p)| *p).collect();
+                let cut: Vec<[f32; 3]> = at_home(irregular, chunk).iter().map(|(_, p)| *p).collect();
                 let topology = scratch.solve(seen, self.plan.home_box(chunk), self.measure, &cut);
                 found.add(&topology);
                 topology.take(self.budget);
@@ -115,16 +115,16 @@ impl Solving<'_, '_> {
         if self.progress.cancelled() {
             return Err(Error::io(self.path, STAGE)(std::io::ErrorKind::Interrupted.into()));
         }
-        let [suspects, pieces] = [found.suspects, found.patches].map(AtomicU64::into_inner);
+        let [irregular_triangles, pieces] = [found.irregular_triangles, found.patches].map(AtomicU64::into_inner);
         self.budget.check(self.path, || {
-            format!("at least {suspects} triangles lie at defects, in {pieces} pieces of surface or more")
+            format!("at least {irregular_triangles} triangles lie at defects, in {pieces} pieces of surface or more")
         })?;
-        refuse_more_than(self.path, MOST_SUSPECTS, suspects, "triangles lie at defects")?;
+        refuse_more_than(self.path, MOST_SUSPECTS, irregular_triangles, "triangles lie at defects")?;
         refuse_more_than(self.path, chunk::MOST_PATCHES, pieces, "pieces of surface, counted by chunks, are there")
     }
 }
 
-/// Most triangles a workshop can number the corners of, with room for what repairs add.
+/// Most triangles a submesh can number the corners of, with room for what repairs add.
 const MOST_SUSPECTS: u64 = 1 << 30;
 
 /// Stage name under which the survey reports progress.

@@ -197,20 +197,20 @@ mod tests {
         stars.gather(v as usize + 1, &triangles);
         let (next, previous) = stars.around(v as usize);
         assert!(next.iter().zip(previous).map(|(n, p)| [*n, *p]).eq(around.iter().copied()));
-        let sound = stars.is_closed_fan(v as usize, Ring::places);
+        let regular = stars.is_closed_fan(v as usize, Ring::places);
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("avx2") {
             // SAFETY: the processor has AVX2.
-            assert_eq!(stars.is_closed_fan(v as usize, |ring, corner| unsafe { ring.places_avx2(corner) }), sound);
+            assert_eq!(stars.is_closed_fan(v as usize, |ring, corner| unsafe { ring.places_avx2(corner) }), regular);
         }
-        sound
+        regular
     }
 
     /// On both sides of the border between the two ways of testing, which is at eight.
     const SIZES: [u32; 4] = [3, 8, 9, 30];
 
     #[test]
-    fn a_closed_fan_is_sound() {
+    fn a_closed_fan_is_regular() {
         for n in SIZES {
             assert!(is_closed_fan(&fan(n, 0)), "{n}");
         }

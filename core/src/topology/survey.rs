@@ -1,6 +1,6 @@
 //! The topology of a whole file: chunks solved in parallel, then merged over the triangles they share.
 //!
-//! What comes out does not depend on the chunks: the suspects (all triangles around unsound vertices), and the patches of sound
+//! What comes out does not depend on the chunks: the irregular triangles (all triangles around irregular vertices), and the patches of regular
 //! surface, numbered by their smallest triangle. Everything global is proportional to the seams and the defects, not to the file.
 
 use crate::topology::solving::{Solving, at_home, count_of, take_tables};
@@ -20,7 +20,7 @@ use crate::stream::budget::{Budget, Purpose};
 use crate::stream::members::Members;
 use crate::stream::plan::{ChunkId, HomeBox, Plan};
 use crate::stream::source::{Seen, Source, Triangle};
-use crate::topology::chunk::{ChunkTopology, Suspect};
+use crate::topology::chunk::{ChunkTopology, IrregularTriangle};
 use crate::topology::chunk_regions::Parts;
 use crate::topology::crossings::{self, Crossings, Pair};
 use crate::topology::labels::Labels;
@@ -28,17 +28,17 @@ use crate::topology::patch_sums::Patch;
 use crate::topology::vertex_table::{Sieve, Weld};
 use crate::util::union_find::NONE;
 
-/// Topology of the sound part of a file, and the list of what is not sound.
+/// Topology of the regular part of a file, and the list of what is not regular.
 #[derive(Debug)]
 pub(crate) struct Survey<'a> {
     pub(crate) records: &'a [Record],
     pub(crate) measure: Measure,
     pub(crate) bounds: Bounds,
-    /// Triangles of the workshop, ascending, each once.
-    pub(crate) suspects: Vec<Suspect>,
-    /// The patch of each suspect's sound corners, or [`NONE`].
-    pub(crate) suspect_patches: Vec<u32>,
-    /// Patches by ascending smallest triangle. Sums leave the suspects out.
+    /// Triangles of the submesh, ascending, each once.
+    pub(crate) irregular_triangles: Vec<IrregularTriangle>,
+    /// The patch of each irregular triangle's regular corners, or [`NONE`].
+    pub(crate) irregular_triangle_patches: Vec<u32>,
+    /// Patches by ascending smallest triangle. Sums leave the irregular triangles out.
     pub(crate) patches: Vec<Patch>,
     /// Runs of triangles with non-finite coordinates.
     pub(crate) nonfinite: Vec<(u32, u32)>,
@@ -50,7 +50,7 @@ pub(crate) struct Survey<'a> {
     pub(crate) crossing_pairs: Option<Vec<Pair>>,
     /// To be added to the volume in units of `measure`: not 0 only after a second look at what is open in another box.
     pub(crate) volume_beside: f64,
-    /// Sound vertices whose triangles were made suspects.
+    /// Regular vertices whose triangles were made irregular triangles.
     pub(crate) promoted: Vec<[f32; 3]>,
     /// Distinct positions, and those used by a triangle with three distinct vertices.
     pub(crate) vertices: u64,
@@ -59,7 +59,7 @@ pub(crate) struct Survey<'a> {
     plan: Plan,
     members: Members,
     labels: Vec<Labels>,
-    /// By chunk, the box of all sound triangles that it sees.
+    /// By chunk, the box of all regular triangles that it sees.
     reaches: Vec<Bounds>,
     parts: Parts,
     /// Part → patch.
@@ -73,8 +73,8 @@ pub(crate) struct Survey<'a> {
 
 /// What became of patches that were divided.
 pub(crate) struct Division {
-    /// The new suspects, ascending, with the patches they belonged to.
-    pub(crate) fetched: Vec<(Suspect, u32)>,
+    /// The new irregular triangles, ascending, with the patches they belonged to.
+    pub(crate) fetched: Vec<(IrregularTriangle, u32)>,
     /// For each patch now the one that it was a part of.
     pub(crate) divided_from: Vec<u32>,
 }
@@ -113,8 +113,8 @@ impl<'a> Survey<'a> {
             records,
             measure: Measure::new(&bounds),
             bounds,
-            suspects: Vec::new(),
-            suspect_patches: Vec::new(),
+            irregular_triangles: Vec::new(),
+            irregular_triangle_patches: Vec::new(),
             patches: Vec::new(),
             triangles: records.len() as u64 - count_of(&nonfinite),
             nonfinite,
@@ -164,9 +164,9 @@ impl<'a> Survey<'a> {
         let span = tracing::debug_span!("merge").entered();
         let mut fresh: Vec<(ChunkId, &mut ChunkTopology)> = (0..).map(ChunkId).zip(&mut chunks).collect();
         let known = (self.records, &self.measure);
-        (self.parts, self.suspects) = self.parts.renewed(known, Vec::new(), &mut fresh, |_| true);
+        (self.parts, self.irregular_triangles) = self.parts.renewed(known, Vec::new(), &mut fresh, |_| true);
         (self.patches, self.merged) = self.parts.united();
-        self.suspect_patches = self.parts.patches_of(&self.suspects, &self.merged);
+        self.irregular_triangle_patches = self.parts.patches_of(&self.irregular_triangles, &self.merged);
         drop(span);
         (self.self_intersections, self.crossing_pairs) = summed_crossings(&mut chunks, most_tested);
         self.vertices = chunks.iter().map(|c| c.vertices).sum();
@@ -175,7 +175,7 @@ impl<'a> Survey<'a> {
         self.labels = chunks.into_iter().map(|c| c.labels).collect();
     }
 
-    /// Divides the surface at the sound vertices among `positions`: they count as unsound, so that their triangles become suspects, and
+    /// Divides the surface at the regular vertices among `positions`: they count as irregular, so that their triangles become irregular triangles, and
     /// what hangs together only through them, or what was promoted before, becomes several patches. Solves the chunks again where they are at home,
     /// and those that share triangles with these. Refuses when tables would not fit `limits.memory_bytes`.
     pub(crate) fn divide(
@@ -188,29 +188,30 @@ impl<'a> Survey<'a> {
         let _span = tracing::debug_span!("divide", positions = positions.len()).entered();
         let budget = Budget::new(limits.memory_bytes);
         self.take_tables(path, &budget, limits)?;
-        let fetched = self.beyond_the_workshop(positions);
+        let fetched = self.beyond_the_submesh(positions);
         let all: Vec<[f32; 3]> = self.promoted.iter().chain(positions).copied().collect();
         let mut is_cut = vec![false; self.plan.chunks()];
         all[self.dividing..].iter().for_each(|p| is_cut[self.plan.home(*p).0 as usize] = true);
         let is_fresh = self.parts.with_neighbours(&is_cut);
         let by_home = self.by_home(&all);
         let kept = (0..self.plan.chunks()).filter(|c| !is_fresh[*c]);
-        self.parts.take(&budget, kept.clone().map(|c| &self.labels[c]), self.suspects.len() as u64);
+        self.parts.take(&budget, kept.clone().map(|c| &self.labels[c]), self.irregular_triangles.len() as u64);
         let patches = kept.map(|c| self.parts.of_chunk(ChunkId(c as u32)).len() as u64).sum();
         let mut solved =
-            self.solving(path, &budget, progress).again(&is_fresh, &by_home, [self.suspects.len() as u64, patches])?;
-        let unsound = self.unsound();
+            self.solving(path, &budget, progress).again(&is_fresh, &by_home, [self.irregular_triangles.len() as u64, patches])?;
+        let irregular = self.irregular();
         let mut fresh: Vec<(ChunkId, &mut ChunkTopology)> =
             solved.iter_mut().map(|(chunk, topology)| (*chunk, topology)).collect();
         let known = (self.records, &self.measure);
-        let (parts, suspects) = self.parts.renewed(known, self.suspects.clone(), &mut fresh, |chunk| is_cut[chunk]);
+        let (parts, irregular_triangles) =
+            self.parts.renewed(known, self.irregular_triangles.clone(), &mut fresh, |chunk| is_cut[chunk]);
         let (patches, merged) = parts.united();
-        self.promoted.extend(positions.iter().filter(|p| unsound.find(**p).is_none()));
+        self.promoted.extend(positions.iter().filter(|p| irregular.find(**p).is_none()));
         self.dividing = self.promoted.len();
         // By what was true before.
         let divided_from = self.patches_at(patches.iter().map(|patch| patch.first));
-        self.suspect_patches = parts.patches_of(&suspects, &merged);
-        (self.suspects, self.patches, self.merged, self.parts) = (suspects, patches, merged, parts);
+        self.irregular_triangle_patches = parts.patches_of(&irregular_triangles, &merged);
+        (self.irregular_triangles, self.patches, self.merged, self.parts) = (irregular_triangles, patches, merged, parts);
         for (chunk, topology) in solved {
             self.reaches[chunk.0 as usize] = topology.reach;
             self.labels[chunk.0 as usize] = topology.labels;
@@ -218,35 +219,37 @@ impl<'a> Survey<'a> {
         Ok(Division { fetched, divided_from })
     }
 
-    /// The corners of suspects that are unsound.
-    fn unsound(&self) -> Weld {
-        let mut unsound = Weld::default();
-        unsound.reset(self.suspects.len());
-        for suspect in &self.suspects {
-            let corners = record::corners(&self.records[suspect.triangle as usize]);
-            (0..3).filter(|k| suspect.unsound >> k & 1 == 1).for_each(|k| {
-                unsound.vertex(corners[k]);
+    /// The corners of irregular triangles that are irregular.
+    fn irregular(&self) -> Weld {
+        let mut irregular = Weld::default();
+        irregular.reset(self.irregular_triangles.len());
+        for irregular_triangle in &self.irregular_triangles {
+            let corners = record::corners(&self.records[irregular_triangle.triangle as usize]);
+            (0..3).filter(|k| irregular_triangle.irregular >> k & 1 == 1).for_each(|k| {
+                irregular.vertex(corners[k]);
             });
         }
-        unsound
+        irregular
     }
 
-    /// The patches of some triangles with a sound corner.
+    /// The patches of some triangles with a regular corner.
     fn patches_at(&self, triangles: impl Iterator<Item = u32>) -> Vec<u32> {
         let triangles: Vec<u32> = triangles.collect();
         let positions: Vec<[f32; 3]> = triangles.iter().flat_map(|t| position::corners(&self.records[*t as usize])).collect();
-        // Around positions that are not sound there may be triangles of no patch, or of the workshop.
-        let around = self.beyond_the_workshop(&positions);
-        let patch = |t: u32| match self.suspects.binary_search_by_key(&t, |s| s.triangle) {
-            Ok(i) => self.suspect_patches[i],
+        // Around positions that are not regular there may be triangles of no patch, or of the submesh.
+        let around = self.beyond_the_submesh(&positions);
+        let patch = |t: u32| match self.irregular_triangles.binary_search_by_key(&t, |s| s.triangle) {
+            Ok(i) => self.irregular_triangle_patches[i],
             Err(_) => around.binary_search_by_key(&t, |(s, _)| s.triangle).map_or(NONE, |i| around[i].1),
         };
         triangles.into_iter().map(patch).collect()
     }
 
-    /// The patch of a suspect's sound corners, if it has any.
-    pub(crate) fn patch_of_suspect(&self, record: u32) -> u32 {
-        self.suspects.binary_search_by_key(&record, |s| s.triangle).map_or(NONE, |i| self.suspect_patches[i])
+    /// The patch of an irregular triangle's regular corners, if it has any.
+    pub(crate) fn patch_of_irregular_triangle(&self, record: u32) -> u32 {
+        self.irregular_triangles
+            .binary_search_by_key(&record, |s| s.triangle)
+            .map_or(NONE, |i| self.irregular_triangle_patches[i])
     }
 
     /// Positions with the chunks where they are at home, by chunk.
@@ -256,12 +259,15 @@ impl<'a> Survey<'a> {
         by_home
     }
 
-    /// Refuses the work on `path` if what is to be known of so many edges of one triangle in the workshop, in `bytes`, does not fit the budget
+    /// Refuses the work on `path` if what is to be known of so many edges of one triangle in the submesh, in `bytes`, does not fit the budget
     /// beside what was counted while the chunks were solved.
     pub(crate) fn take_boundary(&self, path: &Path, boundary_edges: u64, bytes: u64) -> Result<()> {
         self.budget.take(Purpose::Defects, bytes);
         self.budget.check(path, || {
-            format!("{} triangles lie at defects, with {boundary_edges} edges that only one triangle has", self.suspects.len())
+            format!(
+                "{} triangles lie at defects, with {boundary_edges} edges that only one triangle has",
+                self.irregular_triangles.len()
+            )
         })
     }
 
@@ -280,11 +286,11 @@ impl<'a> Survey<'a> {
         &self.merged[self.parts.of_chunk(chunk)]
     }
 
-    /// Visits every triangle with three sound corners whose patch is `wanted` and that `passes`, exactly once, with its patch: chunks
+    /// Visits every triangle with three regular corners whose patch is `wanted` and that `passes`, exactly once, with its patch: chunks
     /// in parallel, results in chunk order (which the plan decides: only sums of integers and sets may be made of them). `make` is
-    /// given the box of all sound triangles that a chunk sees, and says `None` if none of them is of interest.
+    /// given the box of all regular triangles that a chunk sees, and says `None` if none of them is of interest.
     /// `passes` is asked first, since it may be cheaper than finding out whose turn it is.
-    pub(crate) fn visit_sound<R: Send>(
+    pub(crate) fn visit_regular<R: Send>(
         &self,
         wanted: impl Fn(u32) -> bool + Sync,
         make: impl Fn(&Bounds) -> Option<R> + Sync,
@@ -309,10 +315,12 @@ impl<'a> Survey<'a> {
                         return;
                     }
                     let corners = place.corners();
-                    if !passes(&result, &corners) || self.suspects.binary_search_by_key(&triangle, |s| s.triangle).is_ok() {
+                    if !passes(&result, &corners)
+                        || self.irregular_triangles.binary_search_by_key(&triangle, |s| s.triangle).is_ok()
+                    {
                         return;
                     }
-                    // A sound triangle has a label in every chunk that sees it; the lowest of them visits it.
+                    // A regular triangle has a label in every chunk that sees it; the lowest of them visits it.
                     if corners.iter().all(|p| cell.holds(*p)) || corners.iter().all(|p| self.plan.home(*p) >= chunk) {
                         visit(&mut result, triangle, patches[patch as usize]);
                     }
@@ -339,27 +347,32 @@ impl<'a> Survey<'a> {
         )
     }
 
-    /// Makes suspects of all triangles around the sound vertices at `positions`, and returns the new ones, ascending.
+    /// Makes irregular triangles of all triangles around the regular vertices at `positions`, and returns the new ones, ascending.
     /// Reads the chunks where the vertices are at home.
-    pub(crate) fn promote(&mut self, positions: &[[f32; 3]]) -> Vec<(Suspect, u32)> {
+    pub(crate) fn promote(&mut self, positions: &[[f32; 3]]) -> Vec<(IrregularTriangle, u32)> {
         self.promoted.extend(positions);
-        let new = self.beyond_the_workshop(positions);
-        for (suspect, patch) in &new {
+        let new = self.beyond_the_submesh(positions);
+        for (irregular_triangle, patch) in &new {
             let sum = &mut self.patches[*patch as usize];
-            let extent = self.measure.triangle(&record::corners(&self.records[suspect.triangle as usize]));
+            let extent = self.measure.triangle(&record::corners(&self.records[irregular_triangle.triangle as usize]));
             sum.triangles -= 1;
             sum.extent -= extent;
         }
-        let mut all: Vec<(Suspect, u32)> =
-            self.suspects.iter().copied().zip(self.suspect_patches.iter().copied()).chain(new.iter().copied()).collect();
+        let mut all: Vec<(IrregularTriangle, u32)> = self
+            .irregular_triangles
+            .iter()
+            .copied()
+            .zip(self.irregular_triangle_patches.iter().copied())
+            .chain(new.iter().copied())
+            .collect();
         all.sort_unstable();
-        (self.suspects, self.suspect_patches) = all.into_iter().unzip();
+        (self.irregular_triangles, self.irregular_triangle_patches) = all.into_iter().unzip();
         new
     }
 
-    /// The triangles around sound vertices at `positions` that are no suspects, ascending, each with the corners that are there and
+    /// The triangles around regular vertices at `positions` that are no irregular triangles, ascending, each with the corners that are there and
     /// the patch it belongs to. Reads the chunks where the vertices are at home.
-    pub(crate) fn beyond_the_workshop(&self, positions: &[[f32; 3]]) -> Vec<(Suspect, u32)> {
+    pub(crate) fn beyond_the_submesh(&self, positions: &[[f32; 3]]) -> Vec<(IrregularTriangle, u32)> {
         let mut wanted = Weld::default();
         wanted.reset(positions.len() * 8);
         positions.iter().for_each(|p| {
@@ -383,19 +396,22 @@ impl<'a> Survey<'a> {
                     if !sieve.may_hold(&corners) {
                         return;
                     }
-                    let unsound = (0..3).filter(|k| wanted.find(corners[*k]).is_some()).fold(0, |mask, k| mask | 1 << k);
-                    if unsound != 0 {
-                        // Only suspects are in no patch, and those are known.
-                        found.push((Suspect { triangle, unsound }, patches.get(patch as usize).copied().unwrap_or(NONE)));
+                    let irregular = (0..3).filter(|k| wanted.find(corners[*k]).is_some()).fold(0, |mask, k| mask | 1 << k);
+                    if irregular != 0 {
+                        // Only irregular triangles are in no patch, and those are known.
+                        found.push((
+                            IrregularTriangle { triangle, irregular },
+                            patches.get(patch as usize).copied().unwrap_or(NONE),
+                        ));
                     }
                 });
                 found
             },
         );
-        let mut all: Vec<(Suspect, u32)> = found.into_iter().flatten().collect();
+        let mut all: Vec<(IrregularTriangle, u32)> = found.into_iter().flatten().collect();
         all.sort_unstable();
         all.dedup_by_key(|(s, _)| s.triangle);
-        all.retain(|(s, _)| self.suspects.binary_search_by_key(&s.triangle, |t| t.triangle).is_err());
+        all.retain(|(s, _)| self.irregular_triangles.binary_search_by_key(&s.triangle, |t| t.triangle).is_err());
         all
     }
 }

@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BinaryHeap, HashMap, HashSet};
 
 use crate::geometry::exact::Point;
 use crate::submesh::edges::{Edge, Edges, Use};
-use crate::submesh::{self, Shop, Vertex};
+use crate::submesh::{self, Submesh, Vertex};
 
 /// A simple boundary loop.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -25,17 +25,17 @@ pub(crate) struct Loop {
 }
 
 impl Loop {
-    pub(crate) fn points(&self, shop: &Shop) -> Vec<Point> {
-        self.vertices.iter().map(|v| shop.positions[*v as usize]).collect()
+    pub(crate) fn points(&self, submesh: &Submesh) -> Vec<Point> {
+        self.vertices.iter().map(|v| submesh.positions[*v as usize]).collect()
     }
 
     /// For each edge, the third corner of the triangle on its other side.
-    pub(crate) fn apexes(&self, shop: &Shop) -> Vec<Option<Point>> {
+    pub(crate) fn apexes(&self, submesh: &Submesh) -> Vec<Option<Point>> {
         let n = self.vertices.len();
         let apex = |i: usize| {
             let ends = [self.vertices[i], self.vertices[(i + 1) % n]];
-            let apex = shop.triangles[self.triangles[i] as usize].v.into_iter().find(|v| !ends.contains(v));
-            apex.map(|v| shop.positions[v as usize])
+            let apex = submesh.triangles[self.triangles[i] as usize].v.into_iter().find(|v| !ends.contains(v));
+            apex.map(|v| submesh.positions[v as usize])
         };
         (0..n).map(apex).collect()
     }
@@ -56,9 +56,9 @@ impl Loop {
         })
     }
 
-    pub(crate) fn perimeter(&self, shop: &Shop) -> f64 {
+    pub(crate) fn perimeter(&self, submesh: &Submesh) -> f64 {
         let n = self.vertices.len();
-        (0..n).map(|i| shop.distance(self.vertices[i], self.vertices[(i + 1) % n])).sum()
+        (0..n).map(|i| submesh.distance(self.vertices[i], self.vertices[(i + 1) % n])).sum()
     }
 }
 
@@ -73,7 +73,7 @@ struct Rim {
     branches: bool,
 }
 
-/// The boundary of a workshop.
+/// The boundary of a submesh.
 #[derive(Debug, Default)]
 pub(crate) struct Boundary {
     /// All simple loops, by smallest vertex.
@@ -83,17 +83,17 @@ pub(crate) struct Boundary {
 }
 
 /// All boundary loops, by smallest vertex. O(n log n) in the boundary and the non-manifold edges.
-pub(crate) fn find(shop: &Shop, edges: &Edges) -> Vec<Loop> {
-    boundary(shop, edges).loops
+pub(crate) fn find(submesh: &Submesh, edges: &Edges) -> Vec<Loop> {
+    boundary(submesh, edges).loops
 }
 
 /// The boundary in loops, and what is in none. A boundary that runs into a non-manifold edge goes on along it, if that lacks a triangle
 /// too: where the triangles around agree on their directions, the edges that lack one are a cycle (the boundary of a boundary is
 /// nothing), and so every way closes. O(n log n) in the boundary and the non-manifold edges.
-pub(crate) fn boundary(shop: &Shop, edges: &Edges) -> Boundary {
-    let mut rims: Vec<Rim> = edges.iter().filter_map(|e| lacking(shop, &e)).collect();
+pub(crate) fn boundary(submesh: &Submesh, edges: &Edges) -> Boundary {
+    let mut rims: Vec<Rim> = edges.iter().filter_map(|e| lacking(submesh, &e)).collect();
     rims.sort_unstable_by_key(|r| (r.from, r.to));
-    let next = link(shop, edges, &rims);
+    let next = link(submesh, edges, &rims);
     let mut seen = vec![false; rims.len()];
     let mut boundary = Boundary::default();
     // A way that does not close is walked from its first edge.
@@ -117,10 +117,10 @@ pub(crate) fn boundary(shop: &Shop, edges: &Edges) -> Boundary {
 
 /// An edge as the rim of a patch, if it lacks one triangle: a boundary edge, or a non-manifold one used once more in one direction than
 /// in the other.
-fn lacking(shop: &Shop, edge: &Edge<'_>) -> Option<Rim> {
+fn lacking(submesh: &Submesh, edge: &Edge<'_>) -> Option<Rim> {
     let used = match edge.uses {
         [used] => *used,
-        uses if uses.len() % 2 == 1 => unpaired(shop, edge)?,
+        uses if uses.len() % 2 == 1 => unpaired(submesh, edge)?,
         _ => return None,
     };
     let (to, from) = edge.directed(&used);
@@ -129,8 +129,8 @@ fn lacking(shop: &Shop, edge: &Edge<'_>) -> Option<Rim> {
 
 /// The triangle of a non-manifold edge that is left when the others are paired around it, each with the one that faces its back: two such
 /// bound the same piece of a solid. `None` if more than one is left, or the edge has no length.
-fn unpaired(shop: &Shop, edge: &Edge<'_>) -> Option<Use> {
-    let axis = (shop.place(edge.high) - shop.place(edge.low)).normalize_or_zero();
+fn unpaired(submesh: &Submesh, edge: &Edge<'_>) -> Option<Use> {
+    let axis = (submesh.place(edge.high) - submesh.place(edge.low)).normalize_or_zero();
     let u = axis.any_orthonormal_vector();
     let w = axis.cross(u);
     let mut around: Vec<(f64, Use)> = edge
@@ -138,8 +138,8 @@ fn unpaired(shop: &Shop, edge: &Edge<'_>) -> Option<Use> {
         .iter()
         .map(|used| {
             let ends = [edge.low, edge.high];
-            let apex = shop.triangles[used.triangle as usize].v.into_iter().find(|v| !ends.contains(v)).unwrap_or(edge.low);
-            let out = shop.place(apex) - shop.place(edge.low);
+            let apex = submesh.triangles[used.triangle as usize].v.into_iter().find(|v| !ends.contains(v)).unwrap_or(edge.low);
+            let out = submesh.place(apex) - submesh.place(edge.low);
             (turn(out.dot(u), out.dot(w)), *used)
         })
         .collect();
@@ -181,7 +181,7 @@ fn turn(x: f64, y: f64) -> f64 {
 }
 
 /// The edge after each edge. Boundary edges go on among themselves where as many run into a vertex as out of it.
-fn link(shop: &Shop, edges: &Edges, rims: &[Rim]) -> Vec<u32> {
+fn link(submesh: &Submesh, edges: &Edges, rims: &[Rim]) -> Vec<u32> {
     let mut next = vec![crate::util::union_find::NONE; rims.len()];
     let mut incoming: Vec<u32> = (0..rims.len() as u32).collect();
     incoming.sort_unstable_by_key(|r| (rims[*r as usize].to, *r));
@@ -197,7 +197,7 @@ fn link(shop: &Shop, edges: &Edges, rims: &[Rim]) -> Vec<u32> {
         let (into, into_branches): (Vec<u32>, Vec<u32>) = part(group);
         let (out, out_branches): (Vec<u32>, Vec<u32>) = part(&outgoing);
         let mut pair = |incoming: &[u32], outgoing: &[u32]| {
-            for (i, o) in across(shop, edges, rims, v, incoming, outgoing) {
+            for (i, o) in across(submesh, edges, rims, v, incoming, outgoing) {
                 next[i as usize] = o;
             }
         };
@@ -217,18 +217,18 @@ const MAX_FANS: usize = 64;
 
 /// Pairs the edges into and out of a vertex where several fans meet: each way in goes out along another fan, the one at the
 /// smallest angle first; along its own fan only if nothing else is left.
-fn across(shop: &Shop, edges: &Edges, rims: &[Rim], v: Vertex, incoming: &[u32], outgoing: &[u32]) -> Vec<(u32, u32)> {
+fn across(submesh: &Submesh, edges: &Edges, rims: &[Rim], v: Vertex, incoming: &[u32], outgoing: &[u32]) -> Vec<(u32, u32)> {
     if incoming.len() > MAX_FANS {
         return incoming.iter().copied().zip(outgoing.iter().copied()).collect();
     }
-    let fans = fans(shop, edges, v);
+    let fans = fans(submesh, edges, v);
     let fan = |rim: u32| {
         fans.iter().find(|(t, _)| *t == rims[rim as usize].triangle).map_or(crate::util::union_find::NONE, |(_, f)| *f)
     };
     let mut pairs: Vec<(bool, f64, u32, u32)> = Vec::new();
     for i in incoming {
         for o in outgoing {
-            let cosine = submesh::cosine(shop.vector(v, rims[*i as usize].from), shop.vector(v, rims[*o as usize].to));
+            let cosine = submesh::cosine(submesh.vector(v, rims[*i as usize].from), submesh.vector(v, rims[*o as usize].to));
             pairs.push((fan(*i) == fan(*o), -cosine, *i, *o));
         }
     }
@@ -243,13 +243,13 @@ fn across(shop: &Shop, edges: &Edges, rims: &[Rim], v: Vertex, incoming: &[u32],
 }
 
 /// The triangles around `v`, each with the smallest triangle of its fan.
-fn fans(shop: &Shop, edges: &Edges, v: Vertex) -> Vec<(u32, u32)> {
-    let mut star: Vec<u32> = shop.star(v).map(|(t, _)| t).collect();
+fn fans(submesh: &Submesh, edges: &Edges, v: Vertex) -> Vec<(u32, u32)> {
+    let mut star: Vec<u32> = submesh.star(v).map(|(t, _)| t).collect();
     star.sort_unstable();
     let number = |t: u32| star.binary_search(&t).unwrap_or(0) as u32;
     let mut parents: Vec<u32> = (0..star.len() as u32).collect();
     for t in &star {
-        for w in shop.triangles[*t as usize].v.into_iter().filter(|w| *w != v) {
+        for w in submesh.triangles[*t as usize].v.into_iter().filter(|w| *w != v) {
             if let Some([a, b]) = edges.between(v, w).map(|e| e.uses) {
                 crate::util::union_find::unite(&mut parents, number(a.triangle), number(b.triangle));
             }
@@ -289,7 +289,7 @@ const MOST_LOOKED_AT: usize = 1 << 22;
 /// is at their edges or several, and whatever their directions are. With triangles over all of these, every edge is used equally often in both
 /// directions. From each edge, the loop goes back by the shortest way, so that patches are small. O(n log n) in the boundary and the
 /// non-manifold edges for each loop, where their ways are long, and for all within a bound.
-pub(crate) fn unbalanced<'l>(shop: &Shop, edges: &Edges, apart_from: impl Iterator<Item = &'l Loop>) -> Vec<Vec<Vertex>> {
+pub(crate) fn unbalanced<'l>(submesh: &Submesh, edges: &Edges, apart_from: impl Iterator<Item = &'l Loop>) -> Vec<Vec<Vertex>> {
     let mut ways: BTreeMap<Vertex, Vec<Vertex>> = BTreeMap::new();
     for edge in edges.iter().filter(Edge::is_unbalanced) {
         let forward = edge.uses.iter().filter(|used| used.forward).count();
@@ -307,7 +307,7 @@ pub(crate) fn unbalanced<'l>(shop: &Shop, edges: &Edges, apart_from: impl Iterat
     for start in starts {
         while looked_at < MOST_LOOKED_AT {
             let Some(next) = ways.0.get(&start).and_then(|ends| ends.last().copied()) else { break };
-            if let Some(found) = ways.shortest(shop, next, start, &mut looked_at) {
+            if let Some(found) = ways.shortest(submesh, next, start, &mut looked_at) {
                 ways.remove(&found);
                 loops.push(found);
             } else {
@@ -336,7 +336,7 @@ impl Ways {
     }
 
     /// The shortest way, from a vertex to another one, of those of equal length that through lower vertices (Dijkstra 1959).
-    fn shortest(&self, shop: &Shop, from: Vertex, to: Vertex, looked_at: &mut usize) -> Option<Vec<Vertex>> {
+    fn shortest(&self, submesh: &Submesh, from: Vertex, to: Vertex, looked_at: &mut usize) -> Option<Vec<Vertex>> {
         let mut before: HashMap<Vertex, (f64, Vertex)> = HashMap::from([(from, (0.0, from))]);
         let mut done: HashSet<Vertex> = HashSet::new();
         // Lengths are not negative, so that their bits are in order.
@@ -355,7 +355,7 @@ impl Ways {
             }
             *looked_at += 1;
             for end in self.0.get(&at).into_iter().flatten() {
-                let further = f64::from_bits(length) + shop.distance(at, *end);
+                let further = f64::from_bits(length) + submesh.distance(at, *end);
                 if before
                     .get(end)
                     .is_none_or(|(known, by)| further < *known || further == *known && at < *by && !done.contains(end))
@@ -410,7 +410,7 @@ mod tests {
     fn two_holes_that_meet_in_a_vertex_are_two_loops() {
         let records = records(&pinched());
         let d = diagnose(&records);
-        let mut edges: Vec<usize> = find(&d.shop, &Edges::of(&d.shop)).iter().map(|l| l.vertices.len()).collect();
+        let mut edges: Vec<usize> = find(&d.submesh, &Edges::of(&d.submesh)).iter().map(|l| l.vertices.len()).collect();
         edges.sort_unstable();
         assert_eq!(edges, [4, 4, 16], "and the rim of the plate");
     }
@@ -419,11 +419,11 @@ mod tests {
     fn a_loop_runs_against_the_triangles_beyond_it() {
         let records = records(&pinched());
         let d = diagnose(&records);
-        for rim in find(&d.shop, &Edges::of(&d.shop)) {
+        for rim in find(&d.submesh, &Edges::of(&d.submesh)) {
             let n = rim.vertices.len();
             for i in 0..n {
                 let (from, to) = (rim.vertices[i], rim.vertices[(i + 1) % n]);
-                let v = d.shop.triangles[rim.triangles[i] as usize].v;
+                let v = d.submesh.triangles[rim.triangles[i] as usize].v;
                 assert!((0..3).any(|k| (v[k], v[(k + 1) % 3]) == (to, from)));
             }
         }
@@ -439,10 +439,10 @@ mod tests {
     fn a_hole_goes_on_along_an_edge_where_another_body_touches() {
         let records = records(&open_at_a_shared_edge());
         let d = diagnose(&records);
-        let Boundary { loops, chains } = boundary(&d.shop, &Edges::of(&d.shop));
+        let Boundary { loops, chains } = boundary(&d.submesh, &Edges::of(&d.submesh));
         assert_eq!((loops.len(), loops[0].vertices.len(), loops[0].branches, chains.len()), (1, 4, true, 0));
         // The triangle beyond the shared edge is the open cube's, not one of the two that close the other.
-        let other = |t: &u32| d.shop.points(*t).iter().all(|p| p[0] >= 1.0 && p[1] >= 1.0);
+        let other = |t: &u32| d.submesh.points(*t).iter().all(|p| p[0] >= 1.0 && p[1] >= 1.0);
         assert!(!loops[0].triangles.iter().any(other));
     }
 
@@ -454,8 +454,8 @@ mod tests {
         holed[beside] = reversed(&holed[beside..=beside])[0];
         let records = records(&holed);
         let d = diagnose(&records);
-        let edges = Edges::of(&d.shop);
-        let Boundary { loops, chains } = boundary(&d.shop, &edges);
+        let edges = Edges::of(&d.submesh);
+        let Boundary { loops, chains } = boundary(&d.submesh, &edges);
         let in_loops: usize = loops.iter().map(|l| l.vertices.len()).sum();
         let in_chains: usize = chains.iter().map(|c| c.len() - 1).sum();
         assert!(in_chains > 0, "{loops:?}");
@@ -471,24 +471,28 @@ mod tests {
         let mesh: Vec<Corners> = lower.chain(upper).chain(across.clone()).collect();
         let records = records(&mesh);
         let d = diagnose(&records);
-        let edges = Edges::of(&d.shop);
-        assert!(find(&d.shop, &edges).is_empty(), "nothing is missing");
-        let loops = unbalanced(&d.shop, &edges, std::iter::empty());
+        let edges = Edges::of(&d.submesh);
+        assert!(find(&d.submesh, &edges).is_empty(), "nothing is missing");
+        let loops = unbalanced(&d.submesh, &edges, std::iter::empty());
         let [rim] = &loops[..] else { panic!("{loops:?}") };
         assert_eq!(rim.len(), 4);
         // The square's own triangles run the other way.
         let runs = |t: &Corners, from: Vertex, to: Vertex| {
-            let p = |v: Vertex| d.shop.positions[v as usize];
+            let p = |v: Vertex| d.submesh.positions[v as usize];
             (0..3).any(|k| (t[k], t[(k + 1) % 3]) == (p(to), p(from)))
         };
         assert!((0..4).all(|i| across.iter().any(|t| runs(t, rim[i], rim[(i + 1) % 4]))));
         // A loop that is to stay open is left out.
         let open = records_of_open_cube();
         let d = diagnose(&open);
-        let edges = Edges::of(&d.shop);
-        let rims = find(&d.shop, &edges);
+        let edges = Edges::of(&d.submesh);
+        let rims = find(&d.submesh, &edges);
         assert_eq!(
-            (rims.len(), unbalanced(&d.shop, &edges, rims.iter()).len(), unbalanced(&d.shop, &edges, std::iter::empty()).len()),
+            (
+                rims.len(),
+                unbalanced(&d.submesh, &edges, rims.iter()).len(),
+                unbalanced(&d.submesh, &edges, std::iter::empty()).len()
+            ),
             (1, 0, 1)
         );
     }

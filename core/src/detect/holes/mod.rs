@@ -20,7 +20,7 @@ use glam::DVec3;
 use crate::contract::report::{BoundaryLoop, BoundaryLoops, LoopClass};
 use crate::submesh::edges::Edges;
 use crate::submesh::near::Tolerance;
-use crate::submesh::{Shop, Vertex};
+use crate::submesh::{Submesh, Vertex};
 use crate::util::parallel;
 use loops::Loop;
 use shape::Shape;
@@ -45,11 +45,11 @@ const FLAT: f64 = 0.05;
 /// Loops that are listed in a report.
 const LISTED: usize = 1000;
 
-/// The loops of a workshop for the report.
-pub(crate) fn report(shop: &Shop, edges: &Edges, tolerance: &Tolerance, gap_share: f64) -> BoundaryLoops {
-    let loops = loops::find(shop, edges);
+/// The loops of a submesh for the report.
+pub(crate) fn report(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance, gap_share: f64) -> BoundaryLoops {
+    let loops = loops::find(submesh, edges);
     let mut all = BoundaryLoops::default();
-    for found in classify(shop, edges, &loops, tolerance, gap_share) {
+    for found in classify(submesh, edges, &loops, tolerance, gap_share) {
         *all.classes.entry(found.class).or_default() += 1;
         if all.listed.len() < LISTED {
             all.listed.push(found);
@@ -61,15 +61,15 @@ pub(crate) fn report(shop: &Shop, edges: &Edges, tolerance: &Tolerance, gap_shar
 /// What kinds of openings these boundary loops are, in their order; partners are places in it. `gap_share`: a gap is narrower than this
 /// share of the edges beside it; 0: nothing is a gap. O(n log n) in the boundary.
 pub(crate) fn classify(
-    shop: &Shop,
+    submesh: &Submesh,
     edges: &Edges,
     loops: &[Loop],
     tolerance: &Tolerance,
     gap_share: f64,
 ) -> impl Iterator<Item = BoundaryLoop> {
     // First, since it takes the most memory while it lasts.
-    let sides = sides::measure(shop, loops, tolerance, gap_share);
-    let shapes: Vec<Shape> = loops.iter().map(|rim| shape_of(shop, rim)).collect();
+    let sides = sides::measure(submesh, loops, tolerance, gap_share);
+    let shapes: Vec<Shape> = loops.iter().map(|rim| shape_of(submesh, rim)).collect();
     let several = vertices_of_several(edges);
     let mut classes: Vec<Option<(LoopClass, String)>> = loops
         .iter()
@@ -106,7 +106,7 @@ pub(crate) fn classify(
         BoundaryLoop {
             class,
             rule,
-            at: shop.positions[loops[i].vertices[0] as usize],
+            at: submesh.positions[loops[i].vertices[0] as usize],
             vertices: loops[i].vertices.len() as u64,
             perimeter: shapes[i].perimeter,
             area: shapes[i].area(),
@@ -134,8 +134,8 @@ pub(crate) struct Shapes(Vec<Shape>);
 
 impl Shapes {
     /// O(vertices).
-    pub(crate) fn of(shop: &Shop, loops: &[Loop], threads: usize) -> Self {
-        Self(parallel::map(threads, loops.len(), |i| shape_of(shop, &loops[i])))
+    pub(crate) fn of(submesh: &Submesh, loops: &[Loop], threads: usize) -> Self {
+        Self(parallel::map(threads, loops.len(), |i| shape_of(submesh, &loops[i])))
     }
 
     /// The partners among the loops. O(n log n) in their vertices.
@@ -170,9 +170,9 @@ impl Shapes {
     }
 }
 
-fn shape_of(shop: &Shop, rim: &Loop) -> Shape {
-    let points: Vec<DVec3> = rim.vertices.iter().map(|v| shop.place(*v)).collect();
-    Shape::of(&points, rim.triangles.iter().map(|t| shop.normal(*t)))
+fn shape_of(submesh: &Submesh, rim: &Loop) -> Shape {
+    let points: Vec<DVec3> = rim.vertices.iter().map(|v| submesh.place(*v)).collect();
+    Shape::of(&points, rim.triangles.iter().map(|t| submesh.normal(*t)))
 }
 
 /// A slender loop that folds back on itself when seen along Z, X or Y, though it is not flat. The cutter's passes that made it
@@ -199,11 +199,11 @@ fn machining(shape: &Shape) -> Option<(LoopClass, String)> {
 }
 
 /// The places where a loop lost to machining turns back: its ends along its length. `None` for any other loop. O(vertices).
-pub(crate) fn folds(shop: &Shop, rim: &Loop) -> Option<[usize; 2]> {
+pub(crate) fn folds(submesh: &Submesh, rim: &Loop) -> Option<[usize; 2]> {
     if rim.vertices.len() < FEWEST_FOLDED {
         return None;
     }
-    let shape = shape_of(shop, rim);
+    let shape = shape_of(submesh, rim);
     machining(&shape)?;
     let farthest = |from: DVec3| {
         let away = |i: &usize| shape.points[*i].distance_squared(from);

@@ -11,7 +11,7 @@ use crate::contract::report::LoopClass;
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::sums::Bounds;
 use crate::submesh::near::{self, Tolerance};
-use crate::submesh::{self, Shop};
+use crate::submesh::{self, Submesh};
 
 /// Cosine between a chain and the side across it, at most.
 const AGAINST: f64 = -0.5;
@@ -118,14 +118,14 @@ struct Segment {
 
 impl Segment {
     /// The direction in which the surface ends there, as long as the edge.
-    fn ahead(&self, shop: &Shop) -> DVec3 {
+    fn ahead(&self, submesh: &Submesh) -> DVec3 {
         // The edge runs against its triangle.
-        shop.normal(self.triangle).normalize_or_zero().cross(shop.vector(self.ends[0], self.ends[1]))
+        submesh.normal(self.triangle).normalize_or_zero().cross(submesh.vector(self.ends[0], self.ends[1]))
     }
 }
 
 /// Of every loop. O(n log n) in all their vertices.
-pub(super) fn measure(shop: &Shop, loops: &[Loop], tolerance: &Tolerance, share: f64) -> Vec<Sides> {
+pub(super) fn measure(submesh: &Submesh, loops: &[Loop], tolerance: &Tolerance, share: f64) -> Vec<Sides> {
     let segments: Vec<Segment> = loops
         .iter()
         .zip(0..)
@@ -138,11 +138,11 @@ pub(super) fn measure(shop: &Shop, loops: &[Loop], tolerance: &Tolerance, share:
             })
         })
         .collect();
-    let boxes: Vec<Bounds> = segments.iter().map(|s| Bounds::of(&s.ends.map(|v| shop.positions[v as usize]))).collect();
+    let boxes: Vec<Bounds> = segments.iter().map(|s| Bounds::of(&s.ends.map(|v| submesh.positions[v as usize]))).collect();
     if boxes.is_empty() {
         return Vec::new();
     }
-    let around = Around { shop, tree: BoxTree::new(&boxes), segments: &segments, tolerance, share };
+    let around = Around { submesh, tree: BoxTree::new(&boxes), segments: &segments, tolerance, share };
     let (mut found, mut first) = (Vec::new(), 0);
     let of = |(rim, number): (&Loop, u32)| {
         let own = &segments[first..first + rim.vertices.len()];
@@ -154,7 +154,7 @@ pub(super) fn measure(shop: &Shop, loops: &[Loop], tolerance: &Tolerance, share:
 
 /// The edges of all loops, to be searched.
 struct Around<'s> {
-    shop: &'s Shop,
+    submesh: &'s Submesh,
     tree: BoxTree,
     segments: &'s [Segment],
     tolerance: &'s Tolerance,
@@ -164,7 +164,7 @@ struct Around<'s> {
 impl<'s> Around<'s> {
     /// Of one loop, by its number; `own`: its edges.
     fn sides_of(&self, rim: &Loop, number: u32, own: &[Segment], found: &mut Vec<u32>) -> Sides {
-        let shop = self.shop;
+        let submesh = self.submesh;
         let mut sides = Sides { share: self.share, ..Sides::default() };
         let mut ways = Ways::default();
         let mut width: f64 = 0.0;
@@ -173,15 +173,15 @@ impl<'s> Around<'s> {
         for i in 0..n {
             let before = (i + n - 1) % n;
             let [previous, v, next] = [before, i, (i + 1) % n].map(|k| rim.vertices[k]);
-            let (coming, going) = (shop.vector(previous, v), shop.vector(v, next));
+            let (coming, going) = (submesh.vector(previous, v), submesh.vector(v, next));
             if coming.dot(going) < 0.0 {
                 ways.before = None;
                 continue;
             }
             sides.inner += 1;
-            let touching = self.tolerance.at(shop, v);
+            let touching = self.tolerance.at(submesh, v);
             let near = touching.max(self.share * coming.length().min(going.length()));
-            let ahead = own[before].ahead(shop) + own[i].ahead(shop);
+            let ahead = own[before].ahead(submesh) + own[i].ahead(submesh);
             let Some((way, of_loop)) = self.across(v, [coming, going], ahead, touching, found) else {
                 ways.before = None;
                 continue;
@@ -193,7 +193,7 @@ impl<'s> Around<'s> {
             if of_loop != number {
                 others.push(of_loop);
             }
-            let normal = [before, i].map(|k| shop.normal(rim.triangles[k]).normalize_or_zero()).into_iter().sum::<DVec3>();
+            let normal = [before, i].map(|k| submesh.normal(rim.triangles[k]).normalize_or_zero()).into_iter().sum::<DVec3>();
             ways.step(way, normal.normalize_or_zero(), coming.length());
         }
         sides.width = most(sides.across, sides.inner).then_some(width);
@@ -215,16 +215,16 @@ impl<'s> Around<'s> {
         touching: f64,
         found: &mut Vec<u32>,
     ) -> Option<(DVec3, u32)> {
-        let shop = self.shop;
+        let submesh = self.submesh;
         let reach = touching.max(WIDER * self.share * 0.5 * (coming.length() + going.length()));
-        self.tree.meeting(&near::around(&[shop.positions[v as usize]], reach), found);
+        self.tree.meeting(&near::around(&[submesh.positions[v as usize]], reach), found);
         found
             .iter()
             .map(|s| &self.segments[*s as usize])
             .filter(|s| !s.ends.contains(&v))
-            .filter(|s| submesh::cosine(shop.vector(s.ends[0], s.ends[1]), coming + going) < AGAINST)
-            .map(|s| (way_to(shop, v, s), s))
-            .filter(|(way, s)| way.length() <= touching || submesh::cosine(ahead, s.ahead(shop)) <= ALIKE)
+            .filter(|s| submesh::cosine(submesh.vector(s.ends[0], s.ends[1]), coming + going) < AGAINST)
+            .map(|s| (way_to(submesh, v, s), s))
+            .filter(|(way, s)| way.length() <= touching || submesh::cosine(ahead, s.ahead(submesh)) <= ALIKE)
             .map(|(way, s)| (way, s.of_loop))
             .min_by(|a, b| a.0.length().total_cmp(&b.0.length()))
             .filter(|(way, _)| way.length() <= reach)
@@ -232,9 +232,9 @@ impl<'s> Around<'s> {
 }
 
 /// From a vertex to the nearest point of a segment.
-fn way_to(shop: &Shop, v: submesh::Vertex, segment: &Segment) -> DVec3 {
-    let [a, b] = segment.ends.map(|v| shop.place(v));
-    let (p, d) = (shop.place(v), b - a);
+fn way_to(submesh: &Submesh, v: submesh::Vertex, segment: &Segment) -> DVec3 {
+    let [a, b] = segment.ends.map(|v| submesh.place(v));
+    let (p, d) = (submesh.place(v), b - a);
     let at = ((p - a).dot(d) / d.dot(d).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
     a + d * at - p
 }

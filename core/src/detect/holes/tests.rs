@@ -10,8 +10,8 @@ use crate::testing::{Corners, diagnose, plate, records, reversed};
 fn classes(triangles: &[Corners], leave_longest: bool) -> Vec<LoopClass> {
     let records = records(triangles);
     let d = diagnose(&records);
-    let edges = Edges::of(&d.shop);
-    let mut all: Vec<_> = classify(&d.shop, &edges, &loops::find(&d.shop, &edges), &d.tolerance, 0.35).collect();
+    let edges = Edges::of(&d.submesh);
+    let mut all: Vec<_> = classify(&d.submesh, &edges, &loops::find(&d.submesh, &edges), &d.tolerance, 0.35).collect();
     for (i, l) in all.iter().enumerate() {
         if let Some(partner) = l.partner {
             assert_ne!(partner as usize, i);
@@ -143,8 +143,8 @@ fn the_missing_ends_of_a_wall_are_annular_however_thick_the_wall() {
         .collect();
     let records = records(&in_each_other);
     let d = diagnose(&records);
-    let edges = Edges::of(&d.shop);
-    let all = classify(&d.shop, &edges, &loops::find(&d.shop, &edges), &d.tolerance, 0.35).collect::<Vec<_>>();
+    let edges = Edges::of(&d.submesh);
+    let all = classify(&d.submesh, &edges, &loops::find(&d.submesh, &edges), &d.tolerance, 0.35).collect::<Vec<_>>();
     for l in &all {
         let partner = &all[l.partner.unwrap() as usize];
         let [larger, smaller] = if l.perimeter > partner.perimeter { [l, partner] } else { [partner, l] };
@@ -227,9 +227,9 @@ fn a_loop_whose_sides_run_past_each_other_is_machining_and_folds_at_its_ends() {
     assert_eq!(classes(&triangles, true), [Machining]);
     let records = records(&triangles);
     let d = diagnose(&records);
-    let found: Vec<_> = loops::find(&d.shop, &Edges::of(&d.shop))
+    let found: Vec<_> = loops::find(&d.submesh, &Edges::of(&d.submesh))
         .iter()
-        .filter_map(|rim| folds(&d.shop, rim).map(|ends| ends.map(|i| d.shop.positions[rim.vertices[i] as usize])))
+        .filter_map(|rim| folds(&d.submesh, rim).map(|ends| ends.map(|i| d.submesh.positions[rim.vertices[i] as usize])))
         .collect();
     let mut ends = found[0];
     ends.sort_by(|a, b| a[1].total_cmp(&b[1]));

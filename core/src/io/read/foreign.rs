@@ -55,7 +55,7 @@ fn beginning(head: &[u8]) -> Option<&'static str> {
     BEGINNINGS.iter().find(|(begin, _)| fits(begin)).map(|&(_, name)| name)
 }
 
-/// WebP pictures, sound and film share one container.
+/// WebP pictures, regular and film share one container.
 fn riff(head: &[u8]) -> Option<&'static str> {
     head.starts_with(b"RIFF").then(|| if head.get(8..12) == Some(b"WEBP") { "a WebP picture" } else { "a sound or film" })
 }

@@ -10,14 +10,14 @@ use crate::detect::bodies::{self, INNER_POINT};
 use crate::repairs::boolean::clusters::Clusters;
 use crate::repairs::boolean::cut::Cut;
 use crate::repairs::shared::work::Work;
-use crate::submesh::Shop;
+use crate::submesh::Submesh;
 use crate::submesh::components::Reversed;
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
 
 /// The cells of space in front of and behind everything closed.
 ///
-/// Nodes: those of the arrangement, then two for each patch, then two for each triangle of the workshop, front and back.
+/// Nodes: those of the arrangement, then two for each patch, then two for each triangle of the submesh, front and back.
 pub(crate) struct Sides {
     parents: Vec<u32>,
     cells: u32,
@@ -28,24 +28,24 @@ pub(crate) struct Sides {
 
 impl Sides {
     pub(crate) fn of(survey: &Survey<'_>, work: &mut Work<'_>, cut: &Cut, clusters: &Clusters) -> Self {
-        let (shop, edges) = work.edges();
+        let (submesh, edges) = work.edges();
         let (cells, patches) = (cut.arrangement.cells, survey.patches.len() as u32);
-        let nodes = cells + 2 * patches + 2 * shop.triangles.len() as u32;
+        let nodes = cells + 2 * patches + 2 * submesh.triangles.len() as u32;
         let mut sides = Self { parents: (0..nodes).collect(), cells, patches, steps: Vec::new() };
         for p in (0..patches).filter(|p| clusters.holds_patch(*p)) {
             let [front, back] = sides.of_patch(p);
             sides.steps.push((front, back, 1));
         }
         let source_of = |t: u32| cut.sources.binary_search(&t).ok();
-        for t in shop.living().filter(|t| clusters.holds(*t)) {
-            let triangle = &shop.triangles[t as usize];
+        for t in submesh.living().filter(|t| clusters.holds(*t)) {
+            let triangle = &submesh.triangles[t as usize];
             let source = source_of(t);
             let own = sides.of_triangle(t);
             if source.is_none() {
                 sides.steps.push((own[0], own[1], 1));
             }
-            // A sound corner's star was not cut.
-            if triangle.patch == NONE || triangle.v.iter().all(|v| shop.complete[*v as usize]) {
+            // A regular corner's star was not cut.
+            if triangle.patch == NONE || triangle.v.iter().all(|v| submesh.complete[*v as usize]) {
                 continue;
             }
             let patch = sides.of_patch(triangle.patch);
@@ -65,12 +65,12 @@ impl Sides {
             }
             let mut of = [[0; 2]; 2];
             for (i, used) in [a, b].into_iter().enumerate() {
-                let v = shop.triangles[used.triangle as usize].v;
+                let v = submesh.triangles[used.triangle as usize].v;
                 let (from, _) = edge.directed(used);
                 let k = v.iter().position(|w| *w == from).unwrap_or(0);
                 match sources[i] {
                     None => of[i] = sides.of_triangle(used.triangle),
-                    Some(s) => match cut.whole_edge(shop, s, k) {
+                    Some(s) => match cut.whole_edge(submesh, s, k) {
                         Some(piece) => of[i] = piece.cells,
                         // Covered by another one.
                         None => continue 'edges,
@@ -110,11 +110,11 @@ impl Sides {
         clusters: &Clusters,
     ) -> Vec<Option<i32>> {
         let pieces = pieces::pieces(survey, work, reversed);
-        let shop: &Shop = work;
+        let submesh: &Submesh = work;
         let surfaces = CutSurfaces::of(self, cut);
-        let samples = self.samples(shop, cut, crossing, clusters, |node| surfaces.at(node));
+        let samples = self.samples(submesh, cut, crossing, clusters, |node| surfaces.at(node));
         let points: Vec<[f64; 3]> = samples.iter().map(|sample| sample.point).collect();
-        let found = bodies::windings(survey, shop, &pieces, reversed, &points);
+        let found = bodies::windings(survey, submesh, &pieces, reversed, &points);
         let mut bases: Vec<Option<i32>> = vec![None; surfaces.consistent.len()];
         for (sample, winding) in samples.iter().zip(found) {
             if let Some(surface) = surfaces.at(sample.node).filter(|surface| surfaces.consistent[*surface]) {
@@ -138,7 +138,7 @@ impl Sides {
     /// For each surface that was cut one of its triangles: one that crosses nothing if there is any, of the largest, of the first.
     fn samples(
         &self,
-        shop: &Shop,
+        submesh: &Submesh,
         cut: &Cut,
         crossing: &BTreeSet<u32>,
         clusters: &Clusters,
@@ -157,8 +157,8 @@ impl Sides {
                 })
                 .or_insert(sample);
         };
-        for t in shop.living().filter(|t| !crossing.contains(t) && clusters.holds(*t)) {
-            let corners = shop.triangles[t as usize].v.map(|v| shop.place(v));
+        for t in submesh.living().filter(|t| !crossing.contains(t) && clusters.holds(*t)) {
+            let corners = submesh.triangles[t as usize].v.map(|v| submesh.place(v));
             match cut.sources.binary_search(&t) {
                 Err(_) => offer(true, self.of_triangle(t)[0], corners),
                 // What lies on it, or it on, is no clear case.

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 /// Which triangles are of surfaces that take part: closed before anything was cut, and not blocked.
 #[derive(Default)]
 pub(crate) struct Clusters {
-    /// By triangle of the workshop and by patch, the piece of surface that it was part of, or [`NONE`].
+    /// By triangle of the submesh and by patch, the piece of surface that it was part of, or [`NONE`].
     pub(crate) of_triangle: Vec<u32>,
     pub(crate) of_patch: Vec<u32>,
     pub(crate) takes_part: Vec<bool>,

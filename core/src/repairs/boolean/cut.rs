@@ -6,7 +6,7 @@ use std::ops::Range;
 use crate::geometry::arrange::{Arrange, Arrangement, Piece};
 use crate::geometry::position::Position;
 use crate::repairs::shared::work::Work;
-use crate::submesh::{Shop, Vertex};
+use crate::submesh::{Submesh, Vertex};
 
 /// Times that the triangles to be cut are added to because a neighbour was cut at its edge.
 const GROWTHS: usize = 16;
@@ -35,22 +35,22 @@ impl Cut {
         in_play: impl Fn(u32) -> bool,
         threads: usize,
     ) -> Option<Self> {
-        let (shop, edges) = work.edges();
+        let (submesh, edges) = work.edges();
         let in_play = |t: &u32| in_play(*t);
         let mut sources = crossing.clone();
         for edge in edges.iter().filter(|edge| edge.is_nonmanifold()) {
             sources.extend(edge.uses.iter().map(|u| u.triangle).filter(in_play));
         }
-        crossing.iter().for_each(|t| sources.extend((0..3).flat_map(|k| beside(shop, *t, k)).filter(in_play)));
+        crossing.iter().for_each(|t| sources.extend((0..3).flat_map(|k| beside(submesh, *t, k)).filter(in_play)));
         for _ in 0..GROWTHS {
             let list: Vec<u32> = sources.iter().copied().collect();
-            let corners: Vec<_> = list.iter().map(|t| shop.points(*t)).collect();
-            let cut = Self::new(shop, list, engine.arrange(&corners, threads)?);
+            let corners: Vec<_> = list.iter().map(|t| submesh.points(*t)).collect();
+            let cut = Self::new(submesh, list, engine.arrange(&corners, threads)?);
             let before = sources.len();
             for s in 0..cut.sources.len() {
                 let t = cut.sources[s];
-                for k in (0..3).filter(|k| !cut.is_alone(shop, s, *k)) {
-                    sources.extend(beside(shop, t, k).filter(in_play));
+                for k in (0..3).filter(|k| !cut.is_alone(submesh, s, *k)) {
+                    sources.extend(beside(submesh, t, k).filter(in_play));
                 }
             }
             if sources.len() == before {
@@ -60,12 +60,12 @@ impl Cut {
         None
     }
 
-    fn new(shop: &Shop, sources: Vec<u32>, arrangement: Arrangement) -> Self {
+    fn new(submesh: &Submesh, sources: Vec<u32>, arrangement: Arrangement) -> Self {
         let mut starts: Vec<u32> = vec![0; sources.len() + 1];
         arrangement.pieces.iter().for_each(|piece| starts[piece.source as usize + 1] += 1);
         (0..sources.len()).for_each(|s| starts[s + 1] += starts[s]);
-        let corners = sources.iter().flat_map(|t| shop.triangles[*t as usize].v);
-        let by_position: HashMap<Position, Vertex> = corners.map(|v| (Position::of(shop.positions[v as usize]), v)).collect();
+        let corners = sources.iter().flat_map(|t| submesh.triangles[*t as usize].v);
+        let by_position: HashMap<Position, Vertex> = corners.map(|v| (Position::of(submesh.positions[v as usize]), v)).collect();
         let at = |p: &[f64; 3]| by_position.get(&Position::exactly(*p)?).copied();
         let exact = arrangement.points.iter().zip(&arrangement.exact).zip(0..).filter(|((_, exact), _)| **exact);
         let vertices: HashMap<u32, Vertex> = exact.filter_map(|((p, _), point)| Some((point, at(p)?))).collect();
@@ -90,29 +90,29 @@ impl Cut {
     }
 
     /// The piece of a source that has its edge from corner `k` on as it was.
-    pub(crate) fn whole_edge(&self, shop: &Shop, source: usize, k: usize) -> Option<&Piece> {
-        let v = shop.triangles[self.sources[source] as usize].v;
+    pub(crate) fn whole_edge(&self, submesh: &Submesh, source: usize, k: usize) -> Option<&Piece> {
+        let v = submesh.triangles[self.sources[source] as usize].v;
         let (a, b) = (*self.points.get(&v[k])?, *self.points.get(&v[(k + 1) % 3])?);
         self.pieces(source).iter().find(|piece| (0..3).any(|k| (piece.v[k], piece.v[(k + 1) % 3]) == (a, b)))
     }
 
     /// Is a source's edge from corner `k` on as it was, with no pieces there but those of triangles that have the same edge? Else all of these have
     /// to be cut along: of the space around the edge nothing can be told without them.
-    fn is_alone(&self, shop: &Shop, source: usize, k: usize) -> bool {
-        let v = shop.triangles[self.sources[source] as usize].v;
+    fn is_alone(&self, submesh: &Submesh, source: usize, k: usize) -> bool {
+        let v = submesh.triangles[self.sources[source] as usize].v;
         let ends = [v[k], v[(k + 1) % 3]];
         let [Some(a), Some(b)] = ends.map(|v| self.points.get(&v).copied()) else { return false };
         let key = (a.min(b), a.max(b));
         let first = self.uses.partition_point(|(edge, _)| *edge < key);
         let around = || self.uses[first..].iter().take_while(|(edge, _)| *edge == key).map(|(_, source)| *source as usize);
         around().any(|s| s == source)
-            && around().all(|s| ends.iter().all(|end| shop.triangles[self.sources[s] as usize].v.contains(end)))
+            && around().all(|s| ends.iter().all(|end| submesh.triangles[self.sources[s] as usize].v.contains(end)))
     }
 }
 
 /// Other triangles at the edge of `t` from its corner `k` on.
-fn beside(shop: &Shop, t: u32, k: usize) -> impl Iterator<Item = u32> {
-    let v = shop.triangles[t as usize].v;
+fn beside(submesh: &Submesh, t: u32, k: usize) -> impl Iterator<Item = u32> {
+    let v = submesh.triangles[t as usize].v;
     let end = v[(k + 1) % 3];
-    shop.star(v[k]).map(|(o, _)| o).filter(move |o| *o != t && shop.triangles[*o as usize].v.contains(&end))
+    submesh.star(v[k]).map(|(o, _)| o).filter(move |o| *o != t && submesh.triangles[*o as usize].v.contains(&end))
 }

@@ -39,7 +39,7 @@ impl State<'_, '_, '_> {
             let whole = before.list.get(self.clusters.of_triangle[t as usize] as usize);
             goes[piece] &= whole.is_some_and(|whole| !is_dust(whole.extent.volume, all));
         }
-        // Sound surface that was not cut is the file's.
+        // Regular surface that was not cut is the file's.
         for piece in pieces.of_patch.iter().filter(|piece| **piece != NONE) {
             goes[*piece as usize] = false;
         }

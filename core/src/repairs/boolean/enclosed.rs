@@ -21,7 +21,7 @@ use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::pieces::{crossing, lies_in_material, take_away};
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed};
-use crate::submesh::{Origin, Shop};
+use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
 
@@ -59,13 +59,13 @@ pub(crate) fn remove(
     let Some(crossing_pairs) = survey.crossing_pairs.as_deref().filter(|_| profile.bodies == Bodies::Union) else {
         return swallowed;
     };
-    let shop: &Shop = work;
-    let around = bodies::surroundings(survey, shop, pieces, reversed, |piece| !piece.open);
+    let submesh: &Submesh = work;
+    let around = bodies::surroundings(survey, submesh, pieces, reversed, |piece| !piece.open);
     if around.iter().all(|a| a.winding() < 1) {
         return swallowed;
     }
-    let crossing = crossing(survey, shop, pieces, crossing_pairs.iter().map(|pair| pair.triangles));
-    let is_as_read = are_as_read(survey, shop, pieces, reversed);
+    let crossing = crossing(survey, submesh, pieces, crossing_pairs.iter().map(|pair| pair.triangles));
+    let is_as_read = are_as_read(survey, submesh, pieces, reversed);
     let open: Vec<Bounds> = pieces.list.iter().filter(|piece| piece.open).map(|piece| piece.bounds).collect();
     let open = BoxTree::new(&open);
     let mut met = Vec::new();
@@ -95,14 +95,14 @@ pub(crate) fn remove(
 }
 
 /// Which pieces hold nothing but triangles of the file, the way round that they have there.
-fn are_as_read(survey: &Survey<'_>, shop: &Shop, pieces: &Components, reversed: &Reversed) -> Vec<bool> {
+fn are_as_read(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components, reversed: &Reversed) -> Vec<bool> {
     let mut as_read = vec![true; pieces.list.len()];
     let turned = pieces.of_patch.iter().zip(&reversed.patches).filter(|(piece, turned)| **turned && **piece != NONE);
     turned.for_each(|(piece, _)| as_read[*piece as usize] = false);
-    for t in shop.living() {
-        let is_as_read = match shop.triangles[t as usize].origin {
+    for t in submesh.living() {
+        let is_as_read = match submesh.triangles[t as usize].origin {
             Origin::Input(record) => {
-                let [a, b, c] = shop.points(t);
+                let [a, b, c] = submesh.points(t);
                 record::corners(&survey.records[record as usize]) != [a, c, b]
             }
             Origin::Part(_) => true,
@@ -131,7 +131,7 @@ mod tests {
     fn removed(mesh: &[Corners], bodies: Bodies) -> After<(u64, f64)> {
         let profile = Profile { bodies, ..Profile::default() };
         after(mesh, |d, turned| {
-            let work = &mut Work::new(&mut d.shop);
+            let work = &mut Work::new(&mut d.submesh);
             directions::make_coherent(&d.survey, work, turned, &[]);
             fill::fill_loops(&d.survey, work, turned, &d.tolerance, &profile, 1);
             let pieces = pieces::pieces(&d.survey, work, turned);

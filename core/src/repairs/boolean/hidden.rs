@@ -32,7 +32,7 @@ use crate::io::record;
 use crate::repairs::shared::pieces::{crossing, lies_in_material};
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed};
-use crate::submesh::{Origin, Shop};
+use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
 
 /// What others hide.
@@ -105,14 +105,14 @@ pub(crate) fn remove(
     let Some(crossing_pairs) = survey.crossing_pairs.as_deref().filter(|_| profile.bodies == Bodies::Visible) else {
         return hidden;
     };
-    let shop: &Shop = work;
-    let mut is_hidden = hidden_pieces(survey, shop, pieces);
+    let submesh: &Submesh = work;
+    let mut is_hidden = hidden_pieces(survey, submesh, pieces);
     if !is_hidden.contains(&true) {
         return hidden;
     }
-    let crossing = crossing(survey, shop, pieces, crossing_pairs.iter().map(|pair| pair.triangles));
+    let crossing = crossing(survey, submesh, pieces, crossing_pairs.iter().map(|pair| pair.triangles));
     is_hidden.iter_mut().zip(crossing).for_each(|(hidden, crosses)| *hidden &= !crosses);
-    let around = bodies::surroundings(survey, shop, pieces, reversed, |piece| !piece.open);
+    let around = bodies::surroundings(survey, submesh, pieces, reversed, |piece| !piece.open);
     for (i, piece) in pieces.list.iter().enumerate().filter(|(i, _)| is_hidden[*i]) {
         hidden.pieces += 1;
         let volume = survey.measure.volume(piece.extent);
@@ -143,7 +143,7 @@ pub(crate) fn remove(
 }
 
 /// Which pieces are seen from no direction.
-fn hidden_pieces(survey: &Survey<'_>, shop: &Shop, pieces: &Components) -> Vec<bool> {
+fn hidden_pieces(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components) -> Vec<bool> {
     let boxes: Vec<Bounds> = pieces.list.iter().map(|piece| piece.bounds).collect();
     let tree = BoxTree::new(&boxes);
     // A triangle with an area stands along four directions at most, so that a piece with nothing on one side along each axis is seen.
@@ -159,10 +159,10 @@ fn hidden_pieces(survey: &Survey<'_>, shop: &Shop, pieces: &Components) -> Vec<b
     if !asked.contains(&true) {
         return is_hidden;
     }
-    let largest = largest_triangles(survey, shop, pieces, &asked);
+    let largest = largest_triangles(survey, submesh, pieces, &asked);
     let sources = || {
         largest.iter().map(|(piece, largest)| {
-            let corners = largest.corners(survey, shop);
+            let corners = largest.corners(survey, submesh);
             (corners, Source { from: bodies::inner_point(&corners), component: *piece })
         })
     };
@@ -173,11 +173,11 @@ fn hidden_pieces(survey: &Survey<'_>, shop: &Shop, pieces: &Components) -> Vec<b
         };
         is_hidden[source.component as usize] = !DIRECTIONS.iter().any(is_seen);
     }
-    let is_of_the_file = |t: u32| shop.triangles[t as usize].origin != Origin::Patch;
+    let is_of_the_file = |t: u32| submesh.triangles[t as usize].origin != Origin::Patch;
     for direction in DIRECTIONS {
         let asked = sources().filter(|(corners, s)| is_hidden[s.component as usize] && !stands_along(corners, direction));
         let asked: Vec<Source> = asked.map(|(_, source)| source).collect();
-        let met = bodies::obstructed(survey, shop, pieces, direction, &asked, is_of_the_file);
+        let met = bodies::obstructed(survey, submesh, pieces, direction, &asked, is_of_the_file);
         for (source, met) in asked.iter().zip(met) {
             is_hidden[source.component as usize] = met;
         }
@@ -217,32 +217,32 @@ struct Largest {
     /// Square of twice the area.
     size: f64,
     record: u32,
-    in_shop: Option<u32>,
+    in_submesh: Option<u32>,
 }
 
 impl Largest {
-    fn of(corners: &[[f32; 3]; 3], record: u32, in_shop: Option<u32>) -> Self {
+    fn of(corners: &[[f32; 3]; 3], record: u32, in_submesh: Option<u32>) -> Self {
         let [a, b, c] = corners.map(|p| p.map(f64::from));
         let [u, v]: [[f64; 3]; 2] = [b, c].map(|p| std::array::from_fn(|k| p[k] - a[k]));
         let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-        Self { size: cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2], record, in_shop }
+        Self { size: cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2], record, in_submesh }
     }
 
     /// The larger one; of equal ones what comes first in the file.
     fn or(self, other: Self) -> Self {
-        let first = || (self.record, self.in_shop) <= (other.record, other.in_shop);
+        let first = || (self.record, self.in_submesh) <= (other.record, other.in_submesh);
         if self.size > other.size || self.size == other.size && first() { self } else { other }
     }
 
-    fn corners(&self, survey: &Survey<'_>, shop: &Shop) -> [[f32; 3]; 3] {
-        self.in_shop.map_or_else(|| record::corners(&survey.records[self.record as usize]), |t| shop.points(t))
+    fn corners(&self, survey: &Survey<'_>, submesh: &Submesh) -> [[f32; 3]; 3] {
+        self.in_submesh.map_or_else(|| record::corners(&survey.records[self.record as usize]), |t| submesh.points(t))
     }
 }
 
 /// The largest triangle of each piece that is asked about, of those that the file holds; pieces that consist of others have none.
-fn largest_triangles(survey: &Survey<'_>, shop: &Shop, pieces: &Components, asked: &[bool]) -> BTreeMap<u32, Largest> {
+fn largest_triangles(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components, asked: &[bool]) -> BTreeMap<u32, Largest> {
     let is_asked = |piece: u32| asked.get(piece as usize) == Some(&true);
-    let found = survey.visit_sound(
+    let found = survey.visit_regular(
         |patch| is_asked(pieces.of_patch[patch as usize]),
         |_| Some(HashMap::<u32, Largest>::new()),
         |_, _| true,
@@ -251,14 +251,14 @@ fn largest_triangles(survey: &Survey<'_>, shop: &Shop, pieces: &Components, aske
             found.entry(pieces.of_patch[patch as usize]).and_modify(|known| *known = known.or(this)).or_insert(this);
         },
     );
-    let in_shop = shop.living().filter_map(|t| {
+    let in_submesh = submesh.living().filter_map(|t| {
         let piece = pieces.of_triangle[t as usize];
-        let is_of_the_file = shop.triangles[t as usize].origin != Origin::Patch;
-        (is_of_the_file && is_asked(piece)).then(|| (piece, Largest::of(&shop.points(t), shop.record(t), Some(t))))
+        let is_of_the_file = submesh.triangles[t as usize].origin != Origin::Patch;
+        (is_of_the_file && is_asked(piece)).then(|| (piece, Largest::of(&submesh.points(t), submesh.record(t), Some(t))))
     });
     let mut largest: BTreeMap<u32, Largest> = BTreeMap::new();
     // Which of two is the larger does not depend on the order that they come in.
-    for (piece, this) in found.into_iter().flatten().chain(in_shop) {
+    for (piece, this) in found.into_iter().flatten().chain(in_submesh) {
         largest.entry(piece).and_modify(|known| *known = known.or(this)).or_insert(this);
     }
     largest.retain(|_, largest| largest.size > 0.0);
@@ -281,7 +281,7 @@ mod tests {
     fn removed(mesh: &[Corners]) -> After<Hidden> {
         let profile = Profile { bodies: Bodies::Visible, ..Profile::default() };
         after(mesh, |d, turned| {
-            let work = &mut Work::new(&mut d.shop);
+            let work = &mut Work::new(&mut d.submesh);
             directions::make_coherent(&d.survey, work, turned, &[]);
             let mut closed = fill::fill_loops(&d.survey, work, turned, &d.tolerance, &profile, 1);
             let pieces = pieces::pieces(&d.survey, work, turned);

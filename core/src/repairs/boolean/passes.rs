@@ -1,6 +1,6 @@
 //! How often a pass may follow a pass.
 //!
-//! Each pass looks at the whole workshop, so that passes which take out one pair after the other would cost the square of the pairs. Most have to
+//! Each pass looks at the whole submesh, so that passes which take out one pair after the other would cost the square of the pairs. Most have to
 //! leave no more than seven of eight pairs, and only some may leave more: so there are no more than 8 · ln(pairs) + [`SLOW`] of them, and all
 //! together look at pairs in proportion to those of the first. (Of fewer than nine pairs, one less is enough.)
 

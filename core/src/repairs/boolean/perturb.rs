@@ -57,7 +57,7 @@ impl Level {
 
 impl State<'_, '_, '_> {
     /// Spreads the sheets of these pairs whose pieces are to be. Returns what crosses then, and how far anything was moved; `None` if nothing
-    /// was. O(pairs + workshop).
+    /// was. O(pairs + submesh).
     pub(crate) fn spread(&mut self, crossing: &[[u32; 2]], levels: &[Level], profile: &Profile) -> Tried<Option<(Met, f64)>> {
         let steps =
             |clusters: &Clusters, t: u32| levels.get(clusters.of_triangle[t as usize] as usize).and_then(|level| level.steps());
@@ -66,8 +66,8 @@ impl State<'_, '_, '_> {
             return Ok(None);
         }
         self.complete(spread.iter().flat_map(|t| self.work.points(*t)).collect());
-        let (shop, edges) = self.work.edges();
-        let sheets = Components::of(self.survey, shop, edges, self.reversed, Through::ManifoldEdges).of_triangle;
+        let (submesh, edges) = self.work.edges();
+        let sheets = Components::of(self.survey, submesh, edges, self.reversed, Through::ManifoldEdges).of_triangle;
         let ranks = ranks(crossing, &sheets);
         // By vertex and piece: where it goes.
         let mut places: BTreeMap<(Vertex, u32), Position> = BTreeMap::new();

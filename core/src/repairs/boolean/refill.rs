@@ -16,7 +16,7 @@ use crate::contract::settings::Profile;
 use crate::repairs::boolean::passes::Passes;
 use crate::repairs::boolean::snap::nearest;
 use crate::repairs::boolean::state::{Met, State, Tried};
-use crate::submesh::{Origin, Shop, Vertex};
+use crate::submesh::{Origin, Submesh, Vertex};
 use crate::util::union_find::NONE;
 
 /// Rings of triangles around those that cross that are taken out with them, at most.
@@ -91,11 +91,11 @@ impl State<'_, '_, '_> {
 }
 
 /// What hangs together in edges, each in ascending order.
-fn parts(shop: &Shop, region: &[u32]) -> Vec<Vec<u32>> {
+fn parts(submesh: &Submesh, region: &[u32]) -> Vec<Vec<u32>> {
     let mut at_edge: BTreeMap<[Vertex; 2], u32> = BTreeMap::new();
     let mut parents: Vec<u32> = (0..region.len() as u32).collect();
     for (n, t) in (0..).zip(region) {
-        for [a, b] in directed_edges(shop.triangles[*t as usize].v) {
+        for [a, b] in directed_edges(submesh.triangles[*t as usize].v) {
             let first = *at_edge.entry([a.min(b), a.max(b)]).or_insert(n);
             crate::util::union_find::unite(&mut parents, first, n);
         }
@@ -113,21 +113,21 @@ fn directed_edges([a, b, c]: [Vertex; 3]) -> [[Vertex; 2]; 3] {
 
 /// Patches over the loops around a part of the surface, if every point of it is near to one, or to one of the triangles that stay `beside` it.
 /// O(triangles²).
-pub(crate) fn refill_of(shop: &Shop, part: Vec<u32>, beside: &[u32], limit: f64) -> Option<Refill> {
+pub(crate) fn refill_of(submesh: &Submesh, part: Vec<u32>, beside: &[u32], limit: f64) -> Option<Refill> {
     let mut patches = Vec::new();
-    for rim in loops(part.iter().map(|t| shop.triangles[*t as usize].v)) {
-        let points: Vec<[f32; 3]> = rim.iter().map(|v| shop.positions[*v as usize]).collect();
+    for rim in loops(part.iter().map(|t| submesh.triangles[*t as usize].v)) {
+        let points: Vec<[f32; 3]> = rim.iter().map(|v| submesh.positions[*v as usize]).collect();
         let patch = triangulate::unchecked(&Rim { points: &points, apexes: &[], obstacles: &[], forbidden: &|_, _| false });
         // What is on one line comes to nothing, however it is divided.
         let fan = || (1..rim.len() as u32 - 1).map(|n| [0, n, n + 1]).collect();
         let triangles: Vec<[u32; 3]> = patch.map_or_else(fan, |patch| patch.triangles);
         patches.extend(triangles.into_iter().map(|t| t.map(|n| rim[n as usize])));
     }
-    let stays = patches.iter().copied().chain(beside.iter().map(|t| shop.triangles[*t as usize].v));
-    let stays: Vec<[DVec3; 3]> = stays.map(|t| t.map(|v| shop.place(v))).collect();
+    let stays = patches.iter().copied().chain(beside.iter().map(|t| submesh.triangles[*t as usize].v));
+    let stays: Vec<[DVec3; 3]> = stays.map(|t| t.map(|v| submesh.place(v))).collect();
     let mut moved = 0f64;
     for t in &part {
-        let [a, b, c] = shop.triangles[*t as usize].v.map(|v| shop.place(v));
+        let [a, b, c] = submesh.triangles[*t as usize].v.map(|v| submesh.place(v));
         for p in [a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0] {
             let away = stays.iter().map(|t| nearest(t, p).distance(p)).fold(f64::INFINITY, f64::min);
             moved = moved.max(away);

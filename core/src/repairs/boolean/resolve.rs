@@ -1,7 +1,7 @@
 //! Crossings: bodies that cross each other, or themselves, become one.
 //!
 //! The triangles that cross something, and their neighbours, are cut along everything they meet (`cut`, [`crate::geometry::arrange`]). Cells of space in
-//! front of and behind their pieces, the other triangles of the workshop and the patches of sound surface are one where these join
+//! front of and behind their pieces, the other triangles of the submesh and the patches of regular surface are one where these join
 //! (`sides`); behind each of them the winding number is larger by one than in front. One exact winding number a connected surface (`bodies`)
 //! makes all of them known. Material is where the winding number is positive (Jacobson et al. 2013; Zhou et al. 2016): what has it on one
 //! side only stays, so that a body inside out comes right and what lies inside of another one goes, whole patches as bits of the edit (`embed`).
@@ -207,7 +207,7 @@ fn attempt_until_done(mut state: State<'_, '_, '_>, by: &Attempt<'_>, means: &Me
     }
 }
 
-/// Gathers the stars of the vertices at these positions into the workshop, so that sound surface on the two sides of what crosses is two
+/// Gathers the stars of the vertices at these positions into the submesh, so that regular surface on the two sides of what crosses is two
 /// patches.
 fn divide(
     survey: &mut Survey<'_>,

@@ -22,7 +22,7 @@ const GROWTH: usize = 4;
 
 const FEW: usize = 1024;
 
-/// What cutting takes beside the workshop, for each of these meetings and for each pair that crosses. Measured: 415 MB for 78 000 pairs of two bodies
+/// What cutting takes beside the submesh, for each of these meetings and for each pair that crosses. Measured: 415 MB for 78 000 pairs of two bodies
 /// that cross everywhere, 1.9 GB for 229 000 pairs with 24 million meetings.
 const BYTES_PER_MEETING: u64 = 48;
 
@@ -95,7 +95,7 @@ impl State<'_, '_, '_> {
     fn check_memory(&self, crossing: &[[u32; 2]], triangles: usize, limits: &Limits) -> Tried<()> {
         let meetings = meetings(|t| Bounds::of(&self.work.points(t)), crossing);
         let meetings = meetings.map_err(|worst| Stuck { failure: Failure::TooMany, triangles: vec![worst] })?;
-        let needed = budget::workshop_bytes(self.work.triangles.len() as u64, self.work.positions.len() as u64)
+        let needed = budget::submesh_bytes(self.work.triangles.len() as u64, self.work.positions.len() as u64)
             + meetings * BYTES_PER_MEETING
             + crossing.len() as u64 * BYTES_PER_PAIR;
         if needed > limits.memory_bytes { Err(Halted::NoMemory { needed, triangles }) } else { Ok(()) }

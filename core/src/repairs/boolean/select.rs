@@ -12,7 +12,7 @@ use crate::repairs::boolean::state::{Failure, State, Stuck, Tried};
 use crate::repairs::cleanup::degenerate;
 use crate::repairs::cleanup::duplicates;
 use crate::repairs::shared::work::Work;
-use crate::submesh::{Shop, Vertex, place};
+use crate::submesh::{Submesh, Vertex, place};
 use crate::util::steps;
 use crate::util::union_find::NONE;
 
@@ -38,7 +38,7 @@ fn fate(front: Option<i32>, back: Option<i32>) -> Fate {
 }
 
 impl State<'_, '_, '_> {
-    /// Makes of the workshop what the windings say. Returns how far new vertices were moved.
+    /// Makes of the submesh what the windings say. Returns how far new vertices were moved.
     pub(crate) fn apply(&mut self, cut: &Cut, sides: &Sides, windings: &[Option<i32>]) -> Tried<f64> {
         let of = |[front, back]: [u32; 2]| fate(windings[front as usize], windings[back as usize]);
         let fates: Vec<Fate> = cut.arrangement.pieces.iter().map(|piece| of(piece.cells)).collect();
@@ -86,7 +86,7 @@ impl State<'_, '_, '_> {
         Ok(self.put_in(cut, &new))
     }
 
-    /// Puts pieces of triangles into the workshop, their points rounded to f32, and takes out what comes to nothing by that. Returns how far
+    /// Puts pieces of triangles into the submesh, their points rounded to f32, and takes out what comes to nothing by that. Returns how far
     /// a point was moved.
     fn put_in(&mut self, cut: &Cut, new: &[(u32, [u32; 3])]) -> f64 {
         let mut displaced = 0f64;
@@ -147,10 +147,10 @@ fn on_grid(x: f64, step: f64) -> f32 {
 
 /// A source stays whole if all its pieces share one fate, no other edge that stays crosses its interior (as of a body that stands on it with an
 /// edge), and no divided neighbour ends in its interior or on its edges.
-fn whole_sources(shop: &Shop, cut: &Cut, fates: &[Fate]) -> Vec<Option<Fate>> {
+fn whole_sources(submesh: &Submesh, cut: &Cut, fates: &[Fate]) -> Vec<Option<Fate>> {
     let count = cut.sources.len();
     let range = |s: usize| cut.range(s);
-    let corners = |s: usize| shop.triangles[cut.sources[s] as usize].v;
+    let corners = |s: usize| submesh.triangles[cut.sources[s] as usize].v;
     let is_corner = |s: usize, point: &u32| cut.vertices.get(point).is_some_and(|v| corners(s).contains(v));
     let mut whole: Vec<Option<Fate>> = (0..count)
         .map(|s| {

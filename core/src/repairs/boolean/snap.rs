@@ -67,7 +67,7 @@ impl State<'_, '_, '_> {
         Ok((met, displaced))
     }
 
-    /// The triangles around these pairs, all of whose neighbours are in the workshop then.
+    /// The triangles around these pairs, all of whose neighbours are in the submesh then.
     fn around(&mut self, pairs: &[[u32; 2]]) -> BTreeSet<u32> {
         let corners: BTreeSet<Vertex> = pairs.iter().flatten().flat_map(|t| self.work.triangles[*t as usize].v).collect();
         let stars = corners.iter().flat_map(|v| self.work.star(*v)).map(|(t, _)| t);
@@ -76,14 +76,14 @@ impl State<'_, '_, '_> {
         around
     }
 
-    /// What a pass has changed since the workshop was marked stays.
+    /// What a pass has changed since the submesh was marked stays.
     pub(crate) fn keep(&mut self, now: Met) -> Met {
         self.work.keep();
         self.unite(&now.crossing);
         now
     }
 
-    /// Takes back what a pass has changed since the workshop was marked. What was fetched meanwhile stays.
+    /// Takes back what a pass has changed since the submesh was marked. What was fetched meanwhile stays.
     pub(crate) fn take_back(&mut self) {
         let (count, fetched) = self.work.take_back();
         let pieces: Vec<u32> = fetched.iter().map(|t| self.clusters.of_triangle[*t as usize]).collect();

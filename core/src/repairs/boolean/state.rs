@@ -1,4 +1,4 @@
-//! What an attempt works on: the survey, the workshop, its clusters, and all as it was before.
+//! What an attempt works on: the survey, the submesh, its clusters, and all as it was before.
 
 use crate::contract::report::Region;
 use crate::contract::settings::{Bodies, Profile};
@@ -10,7 +10,7 @@ use crate::repairs::shared::overlay::Overlay;
 use crate::repairs::shared::regions::Unsettled;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::Reversed;
-use crate::submesh::{Origin, Shop, Triangle, Vertex};
+use crate::submesh::{Origin, Submesh, Triangle, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::steps;
 use crate::util::union_find::NONE;
@@ -82,7 +82,7 @@ pub(crate) struct Before {
     pub(crate) reversed: Reversed,
 }
 
-/// Pairs of triangles of the workshop that cross, and what they were found with.
+/// Pairs of triangles of the submesh that cross, and what they were found with.
 pub(crate) struct Met {
     pub(crate) crossing: Vec<[u32; 2]>,
     pub(crate) overlay: Overlay,
@@ -108,7 +108,7 @@ pub(crate) struct Resolved {
     /// Each cluster that was resolved, and each that was left.
     pub(crate) regions: Vec<Region>,
     pub(crate) regions_left: Vec<Unsettled>,
-    /// By triangle of the workshop, as far as it was there before: was its surface closed, and was it not left? Empty: no.
+    /// By triangle of the submesh, as far as it was there before: was its surface closed, and was it not left? Empty: no.
     pub(crate) taken_part: Vec<bool>,
 }
 
@@ -148,15 +148,16 @@ pub(crate) fn join_in(work: &mut Work<'_>, reversed: &Reversed, t: u32) {
 }
 
 /// Triangles on the same three vertices, by twos: they are in no pair that crosses.
-pub(crate) fn coincident(shop: &Shop) -> Vec<[u32; 2]> {
-    let candidates = defects::by_vertex_set(shop);
+pub(crate) fn coincident(submesh: &Submesh) -> Vec<[u32; 2]> {
+    let candidates = defects::by_vertex_set(submesh);
     let groups = candidates.chunk_by(|a, b| a.0 == b.0);
     groups.flat_map(|group| group.windows(2).map(|two| [two[0].1, two[1].1])).collect()
 }
 
 /// The corners of the triangles of some pairs, each once.
-pub(crate) fn corners(survey: &Survey<'_>, shop: &Shop, overlay: &Overlay, pairs: &[[u32; 2]]) -> Vec<[f32; 3]> {
-    let mut positions: Vec<[f32; 3]> = pairs.iter().flatten().flat_map(|number| overlay.corners(survey, shop, *number)).collect();
+pub(crate) fn corners(survey: &Survey<'_>, submesh: &Submesh, overlay: &Overlay, pairs: &[[u32; 2]]) -> Vec<[f32; 3]> {
+    let mut positions: Vec<[f32; 3]> =
+        pairs.iter().flatten().flat_map(|number| overlay.corners(survey, submesh, *number)).collect();
     positions.sort_unstable_by_key(|p| Position::of(*p));
     positions.dedup();
     positions
@@ -193,15 +194,15 @@ impl State<'_, '_, '_> {
                 return Some(Vec::new());
             }
             let pairs = overlay.edges_along(self.survey, self.work, &new)?;
-            let pairs = self.in_shop(overlay, &pairs);
+            let pairs = self.in_submesh(overlay, &pairs);
             let crosses = |t: &u32| pieces.contains(&self.clusters.of_triangle[*t as usize]);
             Some(pairs.into_iter().filter(|pair| pair.iter().all(crosses)).flatten().collect())
         })
     }
 
-    /// The pairs of triangles that take part, in the workshop; where bodies are to be kept, only of one and the same.
+    /// The pairs of triangles that take part, in the submesh; where bodies are to be kept, only of one and the same.
     pub(crate) fn crossing(&mut self, overlay: &Overlay, pairs: &[[u32; 2]], profile: &Profile) -> Vec<[u32; 2]> {
-        let mut crossing = self.in_shop(overlay, pairs);
+        let mut crossing = self.in_submesh(overlay, pairs);
         crossing.extend(coincident(self.work));
         crossing.retain(|pair| {
             let [a, b] = pair.map(|t| self.clusters.of_triangle[t as usize]);
@@ -218,8 +219,8 @@ impl State<'_, '_, '_> {
         }
     }
 
-    /// Pairs of triangles as the workshop numbers them, where they are fetched to if need be, with all around them.
-    pub(crate) fn in_shop(&mut self, overlay: &Overlay, pairs: &[[u32; 2]]) -> Vec<[u32; 2]> {
+    /// Pairs of triangles as the submesh numbers them, where they are fetched to if need be, with all around them.
+    pub(crate) fn in_submesh(&mut self, overlay: &Overlay, pairs: &[[u32; 2]]) -> Vec<[u32; 2]> {
         self.complete(corners(self.survey, self.work, overlay, pairs));
         let of_record: HashMap<u32, u32> = self
             .work
@@ -298,15 +299,15 @@ impl State<'_, '_, '_> {
 
 /// Gives each of these triangles, ascending, the smallest piece of the triangles at its corners, and so on from neighbour to neighbour. They
 /// have their turns in rounds, each in their order, as soon as a neighbour has a piece. O(stars · log).
-pub(crate) fn follow_neighbours(shop: &Shop, left: &[usize], piece_of: &mut [u32]) {
+pub(crate) fn follow_neighbours(submesh: &Submesh, left: &[usize], piece_of: &mut [u32]) {
     let mut waiting: HashMap<Vertex, Vec<usize>> = HashMap::new();
     // By vertex the smallest piece around it.
     let mut least: HashMap<Vertex, u32> = HashMap::new();
     let mut turns: BinaryHeap<Reverse<(u32, usize)>> = BinaryHeap::new();
     for t in left {
-        for v in shop.triangles[*t].v {
+        for v in submesh.triangles[*t].v {
             waiting.entry(v).or_default().push(*t);
-            let around = || shop.star(v).map(|(o, _)| piece_of[o as usize]).min().unwrap_or(NONE);
+            let around = || submesh.star(v).map(|(o, _)| piece_of[o as usize]).min().unwrap_or(NONE);
             if *least.entry(v).or_insert_with(around) != NONE {
                 turns.push(Reverse((0, *t)));
             }
@@ -317,11 +318,11 @@ pub(crate) fn follow_neighbours(shop: &Shop, left: &[usize], piece_of: &mut [u32
         if piece_of[t] != NONE {
             continue;
         }
-        let v = shop.triangles[t].v;
+        let v = submesh.triangles[t].v;
         let piece = v.iter().filter_map(|v| least.get(v)).min().copied().unwrap_or(NONE);
         piece_of[t] = piece;
         // A dead triangle is nobody's neighbour.
-        for v in v.iter().filter(|_| shop.lives(t as u32)) {
+        for v in v.iter().filter(|_| submesh.lives(t as u32)) {
             let least = least.entry(*v).or_insert(NONE);
             if *least == NONE {
                 let waiting = waiting.remove(v).unwrap_or_default();

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::contract::report::{Region, Rung};
 use crate::geometry::sums::Bounds;
 use crate::repairs::boolean::clusters::Clusters;
-use crate::submesh::Shop;
+use crate::submesh::Submesh;
 use crate::util::steps;
 
 /// What was done to one piece of surface, or to several.
@@ -56,10 +56,10 @@ pub(crate) struct Track(BTreeMap<u32, Done>);
 
 impl Track {
     /// In this round (from 1 on) these triangles cross something, and are cut.
-    pub(crate) fn crossed(&mut self, shop: &Shop, clusters: &Clusters, triangles: &BTreeSet<u32>, round: u32) {
+    pub(crate) fn crossed(&mut self, submesh: &Submesh, clusters: &Clusters, triangles: &BTreeSet<u32>, round: u32) {
         for t in triangles {
             let done = self.0.entry(clusters.of_triangle[*t as usize]).or_insert(Done::NOTHING);
-            done.bounds.include(&shop.points(*t));
+            done.bounds.include(&submesh.points(*t));
             done.triangles += u64::from(round == 1);
             done.rounds = round;
         }

@@ -24,13 +24,13 @@ pub(crate) const REPAIR: Repair = Repair {
 const TOGETHER: f64 = 10.0;
 
 /// Drops open components of fewer triangles and less area than the profile says, unless they are much of the surface together; returns how many
-/// triangles. O(workshop).
+/// triangles. O(submesh).
 pub(crate) fn drop(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile) -> u64 {
-    let (shop, edges) = work.edges();
+    let (submesh, edges) = work.edges();
     if !edges.iter().any(|e| e.is_boundary()) {
         return 0;
     }
-    let components = Components::of(survey, shop, edges, &Reversed::none(survey), Through::EveryEdge);
+    let components = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::EveryEdge);
     let total: i128 = components.list.iter().map(|c| c.extent.area).sum();
     let bound = total as f64 * profile.debris_area_share;
     let is_debris: Vec<bool> = components
@@ -48,7 +48,7 @@ pub(crate) fn drop(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile) 
         );
         return 0;
     }
-    let doomed: Vec<u32> = shop.living().filter(|t| is_debris[components.of_triangle[*t as usize] as usize]).collect();
+    let doomed: Vec<u32> = submesh.living().filter(|t| is_debris[components.of_triangle[*t as usize] as usize]).collect();
     doomed.iter().for_each(|t| work.kill(*t));
     doomed.len() as u64
 }
@@ -63,7 +63,7 @@ mod tests {
     fn a_speck_goes_but_not_a_large_triangle() {
         let dropped = |size: f32, profile: &Profile| {
             let speck = [[5.0, 0.0, 0.0], [5.0 + size, 0.0, 0.0], [5.0, size, 0.0]];
-            after(&[cube(), vec![speck]].concat(), |d, _| super::drop(&d.survey, &mut Work::new(&mut d.shop), profile))
+            after(&[cube(), vec![speck]].concat(), |d, _| super::drop(&d.survey, &mut Work::new(&mut d.submesh), profile))
         };
         // The cube's area is 6, so the bound is 0.006 and a little; a speck has size² / 2.
         let got = dropped(0.1, &Profile::default());
@@ -80,7 +80,7 @@ mod tests {
                 [[x, 0.0, 0.0], [x + 0.1, 0.0, 0.0], [x, 0.1, 0.0]]
             });
             let triangles = cube().into_iter().chain(specks).collect::<Vec<_>>();
-            after(&triangles, |d, _| super::drop(&d.survey, &mut Work::new(&mut d.shop), &Profile::default())).result
+            after(&triangles, |d, _| super::drop(&d.survey, &mut Work::new(&mut d.submesh), &Profile::default())).result
         };
         // Of an area of 0.005 each; the bound is 0.06 and a little.
         assert_eq!([1, 12, 13].map(dropped), [1, 12, 0]);

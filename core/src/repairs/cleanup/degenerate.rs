@@ -10,7 +10,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap, HashMap};
 
 use crate::repairs::shared::work::{Pass, Work};
-use crate::submesh::{Shop, Vertex};
+use crate::submesh::{Submesh, Vertex};
 use crate::util::steps;
 
 /// What a report says of triangles without area.
@@ -65,9 +65,9 @@ struct Flat {
 }
 
 impl Flat {
-    fn of(shop: &Shop, triangle: u32) -> Self {
-        let v = shop.triangles[triangle as usize].v;
-        let length = |k: usize| shop.distance(v[k], v[(k + 1) % 3]);
+    fn of(submesh: &Submesh, triangle: u32) -> Self {
+        let v = submesh.triangles[triangle as usize].v;
+        let length = |k: usize| submesh.distance(v[k], v[(k + 1) % 3]);
         let (k, length) = (1..3).fold((0, length(0)), |best, k| if length(k) > best.1 { (k, length(k)) } else { best });
         Self { triangle, long: [v[k], v[(k + 1) % 3]], middle: v[(k + 2) % 3], length }
     }
@@ -126,8 +126,8 @@ impl Removal {
     }
 
     /// Takes a collinear triangle into the list, to be tried first in this round.
-    fn register(&mut self, shop: &Shop, t: u32, round: u32) {
-        let (place, flat) = (self.list.len() as u32, Flat::of(shop, t));
+    fn register(&mut self, submesh: &Submesh, t: u32, round: u32) {
+        let (place, flat) = (self.list.len() as u32, Flat::of(submesh, t));
         self.list.push(flat);
         self.place_of.insert(t, place);
         self.tries.push(Reverse((round, place)));
@@ -158,7 +158,7 @@ impl Removal {
     }
 
     /// A collinear triangle with this opposite vertex is no longer at an edge. Triangles that waited for it get their turn.
-    fn leave(&mut self, shop: &Shop, edge: Ends, opposite: Vertex) {
+    fn leave(&mut self, submesh: &Submesh, edge: Ends, opposite: Vertex) {
         let Some(line) = self.lines.get_mut(&edge) else { return };
         if let Some(count) = line.opposite.get_mut(&opposite) {
             *count -= 1;
@@ -169,7 +169,7 @@ impl Removal {
         if line.opposite.len() == 1 {
             let mut long = std::mem::take(&mut line.long);
             steps::count(long.len());
-            long.retain(|place| shop.lives(self.list[*place as usize].triangle));
+            long.retain(|place| submesh.lives(self.list[*place as usize].triangle));
             let turns = long.iter().map(|place| Reverse((self.next_round_for(*place), *place)));
             self.tries.extend(turns.collect::<Vec<_>>());
             self.lines.entry(edge).or_default().long = long;
@@ -178,8 +178,8 @@ impl Removal {
 
     /// Of the collinear triangles along the longest edge of all, the first one if they are few. Of more, the one with the middle vertex: what is
     /// on its two sides is a knot of half as many triangles. (The order decides nothing but the order of new triangles.)
-    fn middle_of_longest(&mut self, shop: &Shop) -> Option<Flat> {
-        let lives = |place: u32| shop.lives(self.list[place as usize].triangle);
+    fn middle_of_longest(&mut self, submesh: &Submesh) -> Option<Flat> {
+        let lives = |place: u32| submesh.lives(self.list[place as usize].triangle);
         while self.by_length.peek().is_some_and(|(_, Reverse(place))| !lives(*place)) {
             self.by_length.pop();
         }
@@ -189,7 +189,7 @@ impl Removal {
         let mut along: Vec<(f64, Vertex, u32)> = Vec::new();
         for place in line.long.iter().copied().filter(|place| lives(*place)) {
             let middle = self.list[place as usize].middle;
-            along.push((shop.distance(a, middle), middle, place));
+            along.push((submesh.distance(a, middle), middle, place));
         }
         steps::count(line.long.len());
         along.sort_by(|x, y| x.0.total_cmp(&y.0).then((x.1, x.2).cmp(&(y.1, y.2))));
@@ -228,27 +228,27 @@ struct Around(HashMap<Vertex, HashMap<Vertex, Vec<u32>>>);
 
 impl Around {
     /// The living triangles at an edge, in the order of the star of `a`.
-    fn edge(&mut self, shop: &Shop, a: Vertex, b: Vertex) -> Vec<u32> {
+    fn edge(&mut self, submesh: &Submesh, a: Vertex, b: Vertex) -> Vec<u32> {
         let star = self.0.entry(a).or_insert_with(|| {
             let mut edges: HashMap<Vertex, Vec<u32>> = HashMap::new();
-            let all: Vec<u32> = shop.star(a).map(|(t, _)| t).collect();
+            let all: Vec<u32> = submesh.star(a).map(|(t, _)| t).collect();
             // The last triangle comes first in a star, and new triangles come last here.
             for t in all.into_iter().rev() {
-                shop.triangles[t as usize].v.iter().filter(|v| **v != a).for_each(|v| edges.entry(*v).or_default().push(t));
+                submesh.triangles[t as usize].v.iter().filter(|v| **v != a).for_each(|v| edges.entry(*v).or_default().push(t));
             }
             edges
         });
         let there = star.get_mut(&b).map(std::mem::take).unwrap_or_default();
         steps::count(there.len());
-        let living: Vec<u32> = there.into_iter().filter(|t| shop.lives(*t)).collect();
+        let living: Vec<u32> = there.into_iter().filter(|t| submesh.lives(*t)).collect();
         star.insert(b, living.clone());
         living.into_iter().rev().collect()
     }
 
     /// Takes in the triangles from this one on.
-    fn add(&mut self, shop: &Shop, first: u32) {
-        for t in first..shop.triangles.len() as u32 {
-            let v = shop.triangles[t as usize].v;
+    fn add(&mut self, submesh: &Submesh, first: u32) {
+        for t in first..submesh.triangles.len() as u32 {
+            let v = submesh.triangles[t as usize].v;
             for (a, b) in (0..3).flat_map(|k| [(v[k], v[(k + 1) % 3]), (v[(k + 1) % 3], v[k])]) {
                 if let Some(star) = self.0.get_mut(&a) {
                     star.entry(b).or_default().push(t);
@@ -260,8 +260,8 @@ impl Around {
 
 /// Splits triangle `t` at vertices on its edge between `ends`, given in order from `ends[0]` to `ends[1]`, into a fan from the
 /// opposite corner. Vertices that are the opposite corner are left out.
-pub(crate) fn split(shop: &mut Work<'_>, t: u32, ends: [u32; 2], at: &[u32]) {
-    let triangle = shop.triangles[t as usize];
+pub(crate) fn split(submesh: &mut Work<'_>, t: u32, ends: [u32; 2], at: &[u32]) {
+    let triangle = submesh.triangles[t as usize];
     let Some(k) = (0..3).find(|k| !ends.contains(&triangle.v[*k])) else { return };
     let (apex, from, to) = (triangle.v[k], triangle.v[(k + 1) % 3], triangle.v[(k + 2) % 3]);
     let mut stops: Vec<u32> = at.iter().copied().filter(|v| *v != apex).collect();
@@ -271,10 +271,10 @@ pub(crate) fn split(shop: &mut Work<'_>, t: u32, ends: [u32; 2], at: &[u32]) {
     if stops.is_empty() {
         return;
     }
-    shop.kill(t);
+    submesh.kill(t);
     let mut last = from;
     for next in stops.into_iter().chain([to]) {
-        shop.add([apex, last, next], triangle.origin.of_part(), triangle.patch);
+        submesh.add([apex, last, next], triangle.origin.of_part(), triangle.patch);
         last = next;
     }
 }
@@ -289,7 +289,7 @@ mod tests {
         // A loop on one line closed twice, by different triangles: every edge is used once each way.
         let [a, b, c, d] = [0.0, 3.0, 1.0, 2.0].map(|x| [x, 0.0, 0.0]);
         let mesh = [[a, b, c], [a, c, d], [b, a, d], [b, d, c]];
-        let got = after(&mesh, |d, _| remove(&mut Work::new(&mut d.shop)));
+        let got = after(&mesh, |d, _| remove(&mut Work::new(&mut d.submesh)));
         assert_eq!(got.defects.triangles, 0);
     }
 
@@ -302,7 +302,7 @@ mod tests {
         mesh.extend([[a, b, m], [b, a, m]]);
         let got = after(&mesh, |_, _| ());
         assert_eq!((got.defects.degenerate_area, got.defects.unbalanced_edges), (2, 0));
-        let got = after(&mesh, |d, _| remove(&mut Work::new(&mut d.shop)));
+        let got = after(&mesh, |d, _| remove(&mut Work::new(&mut d.submesh)));
         assert_eq!((got.result, got.defects.degenerate_area, got.defects.unbalanced_edges), (2, 0, 0));
         assert!(got.verdict.good && (got.defects.volume - 1.0).abs() < 1e-9, "{:?}", got.verdict);
     }
@@ -316,7 +316,7 @@ mod tests {
         mesh.extend([[a, b, m], [m, b, c], [a, m, c]]);
         let got = after(&mesh, |d, _| {
             assert_eq!((d.defects.degenerate_area, d.defects.boundary_edges), (1, 0), "closed by the cap");
-            remove(&mut Work::new(&mut d.shop))
+            remove(&mut Work::new(&mut d.submesh))
         });
         // One goes, one becomes two.
         assert_eq!((got.result, got.defects.triangles), (1, 14));
@@ -332,7 +332,7 @@ mod tests {
         };
         let records = records(&[5.0, 9.0, 1.0].map(cap).concat());
         let mut d = diagnose(&records);
-        let mut work = Work::new(&mut d.shop);
+        let mut work = Work::new(&mut d.submesh);
         assert_eq!(remove(&mut work), 3);
         let split: Vec<f32> = work.living().map(|t| work.points(t)[0][0]).collect();
         assert_eq!(split, [6.0, 6.0, 10.0, 10.0, 2.0, 2.0]);
@@ -342,7 +342,7 @@ mod tests {
     fn steps_for(mesh: &[Corners]) -> u64 {
         let records = records(mesh);
         let mut d = diagnose(&records);
-        let mut work = Work::new(&mut d.shop);
+        let mut work = Work::new(&mut d.submesh);
         let (steps, removed) = steps::of(|| remove(&mut work));
         assert!(removed > 0 && work.living().all(|t| !work.is_collinear(t)));
         steps
@@ -400,7 +400,7 @@ mod tests {
         mesh.extend((1..4).map(|i| [at(0), at(below[i]), at(below[i + 1])]));
         let edges_of_one = |mesh: &[Corners]| after(mesh, |_, _| ()).defects.boundary_edges;
         assert_eq!(edges_of_one(&mesh), 4);
-        let got = after(&mesh, |d, _| remove(&mut Work::new(&mut d.shop)));
+        let got = after(&mesh, |d, _| remove(&mut Work::new(&mut d.submesh)));
         assert_eq!((got.result, got.defects.degenerate_area, got.defects.boundary_edges), (6, 0, 4));
         // Each side of the strip has the vertices of both: 7 places, 7 triangles, twice.
         assert_eq!(got.defects.triangles, 14);

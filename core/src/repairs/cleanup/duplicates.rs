@@ -1,7 +1,7 @@
 //! Triangles with a repeated vertex, and several triangles on the same three vertices.
 //!
 //! Of copies in one direction the first stays, unless the surface is closed only with all of them. Where both directions occur, it is a question of what they are part of:
-//! a triangle doubled back to back in an otherwise sound surface (one of them fits its neighbours: it stays), a wall of no
+//! a triangle doubled back to back in an otherwise regular surface (one of them fits its neighbours: it stays), a wall of no
 //! thickness inside a body (the surface closes without it: all go), a surface exported with both sides (one side stays and is
 //! turned later), or two triangles on their own (nothing is enclosed: both go).
 
@@ -10,7 +10,7 @@ use crate::repairs::shared::account::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::{Pass, Work};
 use crate::submesh::edges::Edges;
-use crate::submesh::{Shop, Vertex};
+use crate::submesh::{Submesh, Vertex};
 
 /// Copies of triangles.
 pub(crate) const DUPLICATE: Repair = Repair {
@@ -72,9 +72,9 @@ pub(crate) fn drop_duplicates(work: &mut Work<'_>) -> u64 {
         }
     }
     if !pairs.is_empty() || !copies.is_empty() {
-        let (shop, edges) = work.edges();
-        doomed.extend(sort_out(shop, edges, &mut pairs));
-        doomed.extend(spare(shop, edges, &copies));
+        let (submesh, edges) = work.edges();
+        doomed.extend(sort_out(submesh, edges, &mut pairs));
+        doomed.extend(spare(submesh, edges, &copies));
     }
     doomed.iter().for_each(|t| work.kill(*t));
     doomed.len() as u64
@@ -82,21 +82,21 @@ pub(crate) fn drop_duplicates(work: &mut Work<'_>) -> u64 {
 
 /// As [`by_vertex_set`], of all triangles on the vertices of a changed one. O(stars of the changed ones); of a triangle's three stars
 /// only as much is looked at as the smallest has.
-fn copies_of(shop: &Shop, changed: &[u32]) -> Vec<([Vertex; 3], u32)> {
+fn copies_of(submesh: &Submesh, changed: &[u32]) -> Vec<([Vertex; 3], u32)> {
     let sorted = |t: u32| {
-        let mut v = shop.triangles[t as usize].v;
+        let mut v = submesh.triangles[t as usize].v;
         v.sort_unstable();
         v
     };
-    let mut sets: Vec<[Vertex; 3]> = changed.iter().filter(|t| shop.lives(**t)).map(|t| sorted(*t)).collect();
+    let mut sets: Vec<[Vertex; 3]> = changed.iter().filter(|t| submesh.lives(**t)).map(|t| sorted(*t)).collect();
     sets.sort_unstable();
     sets.dedup();
     let mut all = Vec::new();
     for set in sets {
-        let mut stars = set.map(|v| shop.star(v));
+        let mut stars = set.map(|v| submesh.star(v));
         let smallest = (0..3).cycle().find(|k| stars[*k].next().is_none()).unwrap_or(0);
         let first = all.len();
-        all.extend(shop.star(set[smallest]).map(|(t, _)| (set, t)).filter(|(_, t)| sorted(*t) == set));
+        all.extend(submesh.star(set[smallest]).map(|(t, _)| (set, t)).filter(|(_, t)| sorted(*t) == set));
         all[first..].sort_unstable();
     }
     all
@@ -104,10 +104,10 @@ fn copies_of(shop: &Shop, changed: &[u32]) -> Vec<([Vertex; 3], u32)> {
 
 /// Those of the copies without which the surface is no farther from closed. Where two bodies have part of their surface in common, each needs
 /// its own.
-fn spare(shop: &Shop, edges: &Edges, copies: &[u32]) -> Vec<u32> {
+fn spare(submesh: &Submesh, edges: &Edges, copies: &[u32]) -> Vec<u32> {
     let mut uses: Vec<(u32, u32, i64)> = Vec::with_capacity(3 * copies.len());
     for (i, t) in (0..).zip(copies) {
-        let v = shop.triangles[*t as usize].v;
+        let v = submesh.triangles[*t as usize].v;
         for k in 0..3 {
             let (a, b) = (v[k], v[(k + 1) % 3]);
             uses.extend(edges.number(a, b).map(|edge| (edge, i, if a < b { 1 } else { -1 })));
@@ -134,15 +134,15 @@ fn spare(shop: &Shop, edges: &Edges, copies: &[u32]) -> Vec<u32> {
         .collect()
 }
 
-fn sort_out(shop: &Shop, edges: &Edges, pairs: &mut [Pair]) -> Vec<u32> {
-    let mut pair_of = vec![crate::util::union_find::NONE; shop.triangles.len()];
+fn sort_out(submesh: &Submesh, edges: &Edges, pairs: &mut [Pair]) -> Vec<u32> {
+    let mut pair_of = vec![crate::util::union_find::NONE; submesh.triangles.len()];
     for (i, pair) in pairs.iter().enumerate() {
         pair.forward.iter().chain(&pair.backward).for_each(|t| pair_of[*t as usize] = i as u32);
     }
     let mut parents: Vec<u32> = (0..pairs.len() as u32).collect();
     let mut places = vec![Place::Alone; pairs.len()];
     for i in 0..pairs.len() {
-        let v = shop.triangles[pairs[i].forward[0] as usize].v;
+        let v = submesh.triangles[pairs[i].forward[0] as usize].v;
         for k in 0..3 {
             let (a, b) = (v[k], v[(k + 1) % 3]);
             let Some(edge) = edges.between(a, b) else { continue };
@@ -195,7 +195,7 @@ mod tests {
     fn of_a_reversed_copy_the_one_that_fits_stays() {
         // The wrong one comes first: the order in the file does not decide.
         let doubled = [reversed(&cube()[..1]), cube()].concat();
-        let got = after(&doubled, |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
+        let got = after(&doubled, |d, _| drop_duplicates(&mut Work::new(&mut d.submesh)));
         assert_eq!((got.result, got.untouched), (1, 12));
         assert!(got.verdict.good, "{:?}", got.verdict);
     }
@@ -204,7 +204,7 @@ mod tests {
     fn a_wall_of_no_thickness_inside_a_body_goes() {
         // Two cubes that touch: both have the face between them, in opposite directions.
         let cubes = [cube(), cuboid([1.0, 0.0, 0.0], [2.0, 1.0, 1.0])].concat();
-        let got = after(&cubes, |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
+        let got = after(&cubes, |d, _| drop_duplicates(&mut Work::new(&mut d.submesh)));
         assert_eq!(got.result, 4);
         assert!(got.verdict.good && (got.defects.volume - 2.0).abs() < 1e-9, "{:?}", got.defects);
     }
@@ -212,7 +212,7 @@ mod tests {
     #[test]
     fn of_a_surface_with_both_sides_one_stays() {
         let both = [cube(), reversed(&cube())].concat();
-        let got = after(&both, |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
+        let got = after(&both, |d, _| drop_duplicates(&mut Work::new(&mut d.submesh)));
         assert_eq!(got.result, 12);
         assert!(got.verdict.good, "{:?}", got.verdict);
     }
@@ -220,7 +220,7 @@ mod tests {
     #[test]
     fn two_triangles_on_their_own_enclose_nothing() {
         let alone = [&cube()[..1], &reversed(&cube()[..1])].concat();
-        let got = after(&alone, |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
+        let got = after(&alone, |d, _| drop_duplicates(&mut Work::new(&mut d.submesh)));
         assert_eq!((got.result, got.defects.triangles), (2, 0));
     }
 
@@ -228,17 +228,17 @@ mod tests {
     fn what_two_bodies_have_in_common_stays_with_both() {
         // Two boxes with the same bottom, one of them higher.
         let both = [cube(), cuboid([0.0; 3], [1.0, 1.0, 2.0])].concat();
-        let got = after(&both, |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
+        let got = after(&both, |d, _| drop_duplicates(&mut Work::new(&mut d.submesh)));
         assert_eq!((got.result, got.defects.boundary_edges, got.defects.unbalanced_edges), (0, 0, 0));
         // A triangle that stands there twice stays once.
-        let got = after(&[&both[..], &both[2..3]].concat(), |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
+        let got = after(&[&both[..], &both[2..3]].concat(), |d, _| drop_duplicates(&mut Work::new(&mut d.submesh)));
         assert_eq!((got.result, got.defects.unbalanced_edges), (1, 0));
     }
 
     #[test]
     fn of_equal_copies_the_first_stays() {
         let twice = [cube(), cube()].concat();
-        let got = after(&twice, |d, _| drop_duplicates(&mut Work::new(&mut d.shop)));
+        let got = after(&twice, |d, _| drop_duplicates(&mut Work::new(&mut d.submesh)));
         assert_eq!((got.result, got.untouched), (12, 12));
         assert!(got.verdict.good);
     }

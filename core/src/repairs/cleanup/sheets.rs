@@ -35,7 +35,7 @@ pub(crate) const REPAIR: Repair = Repair {
 const LISTED: usize = 1000;
 
 /// Drops lone sheets, whose `rims` were left open, and takes their loops off the list of those that are `left`; returns what went, the largest
-/// first. O(patches + workshop), and a look at the chunks where such a sheet crosses something.
+/// first. O(patches + submesh), and a look at the chunks where such a sheet crosses something.
 pub(crate) fn drop(
     survey: &Survey<'_>,
     work: &mut Work<'_>,
@@ -47,8 +47,8 @@ pub(crate) fn drop(
     if rims.is_empty() || profile.sheets == Sheets::Keep {
         return Vec::new();
     }
-    let (shop, edges) = work.edges();
-    let components = Components::of(survey, shop, edges, reversed, Through::EveryEdge);
+    let (submesh, edges) = work.edges();
+    let components = Components::of(survey, submesh, edges, reversed, Through::EveryEdge);
     // Nothing else of a lone sheet is open than the rims of sheets.
     let mut open_edges = vec![0usize; components.list.len()];
     for edge in edges.iter().filter(|e| e.is_boundary()) {
@@ -68,7 +68,8 @@ pub(crate) fn drop(
         return Vec::new();
     }
     let pairs = survey.crossing_pairs.as_deref().unwrap_or_default();
-    let crossing = crate::repairs::shared::pieces::crossing(survey, shop, &components, pairs.iter().map(|pair| pair.triangles));
+    let crossing =
+        crate::repairs::shared::pieces::crossing(survey, submesh, &components, pairs.iter().map(|pair| pair.triangles));
     let next_to_nothing = profile.debris_area_share * area(&|_| true) as f64;
     let are_specks = area(&|c| is_sheet(c) && !crossing[c]) as f64 <= next_to_nothing;
     let all_go = are_specks || profile.guarantee == Guarantee::Wrap;
@@ -89,7 +90,7 @@ pub(crate) fn drop(
     let mut number = 0..;
     left.retain(|_| number.next().is_none_or(|i| closed.binary_search(&i).is_err()));
     reversed.dropped.iter_mut().zip(&components.of_patch).for_each(|(dropped, c)| *dropped |= goes(*c));
-    let doomed: Vec<u32> = shop.living().filter(|t| goes(components.of_triangle[*t as usize])).collect();
+    let doomed: Vec<u32> = submesh.living().filter(|t| goes(components.of_triangle[*t as usize])).collect();
     doomed.into_iter().for_each(|t| work.kill(t));
     gone.into_iter().take(LISTED).map(|(_, sheet)| sheet).collect()
 }
@@ -102,7 +103,7 @@ mod tests {
 
     fn dropped(mesh: &[Corners], profile: &Profile) -> After<(Vec<SheetDropped>, usize)> {
         after(mesh, |d, turned| {
-            let work = &mut Work::new(&mut d.shop);
+            let work = &mut Work::new(&mut d.submesh);
             let mut closed = fill::fill_loops(&d.survey, work, turned, &d.tolerance, profile, 1);
             let gone = drop(&d.survey, work, turned, &closed.sheets, &mut closed.left, profile);
             (gone, closed.left.len())
@@ -184,7 +185,7 @@ mod tests {
             [[0.0, 0.0, 5.0], [4.0, 3.0, 3.0], [2.0, 2.0, 1.0]],
         ];
         let lives = after(&mesh, |d, turned| {
-            let work = &mut Work::new(&mut d.shop);
+            let work = &mut Work::new(&mut d.submesh);
             let closed = fill::fill_loops(&d.survey, work, turned, &d.tolerance, &Profile::default(), 1);
             let lives: Vec<bool> = closed.sheets.iter().map(|rim| work.lives(rim.triangle)).collect();
             lives

@@ -1,7 +1,7 @@
 //! Surplus surface at non-manifold edges.
 //!
 //! The surface is cut at its non-manifold edges into sheets. A sheet is surplus when the rest is balanced at all its non-manifold
-//! edges without it: a fin that hangs from a sound surface by one side, or a wall across a body. One that goes on at one of them, using it by
+//! edges without it: a fin that hangs from a regular surface by one side, or a wall across a body. One that goes on at one of them, using it by
 //! twos, or that has a hole but encloses more than next to nothing, is no such thing, but a body that touches others there. Smallest area goes first, and the
 //! rest is judged anew. Where as many triangles run one way as the other (bodies that touch along an edge) nothing is surplus.
 
@@ -13,7 +13,7 @@ use crate::repairs::shared::admission;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::submesh::edges::Edges;
-use crate::submesh::{Shop, Vertex};
+use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
 
@@ -30,10 +30,10 @@ pub(crate) const REPAIR: Repair = Repair {
 /// Fetches the stars that the removal of surplus surface may need. Duplicates are gone by then: they make non-manifold edges of no
 /// interest.
 pub(crate) fn complete_at_seams(survey: &mut Survey<'_>, work: &mut Work<'_>) {
-    let (shop, edges) = work.edges();
-    let wanted = wanted_stars(survey, shop, edges);
+    let (submesh, edges) = work.edges();
+    let wanted = wanted_stars(survey, submesh, edges);
     if !wanted.is_empty() {
-        let positions: Vec<[f32; 3]> = wanted.iter().map(|v| shop.positions[*v as usize]).collect();
+        let positions: Vec<[f32; 3]> = wanted.iter().map(|v| submesh.positions[*v as usize]).collect();
         let new = survey.promote(&positions);
         work.extend(survey, &new, &wanted);
     }
@@ -48,17 +48,17 @@ struct Sheet {
     seams: Vec<(u32, bool)>,
     /// Ends of its boundary edges, added up, and how many.
     rim: (DVec3, f64),
-    /// It reaches beyond what the workshop may change.
+    /// It reaches beyond what the submesh may change.
     anchored: bool,
 }
 
 /// Removes surplus sheets; returns how many triangles.
 pub(crate) fn remove(survey: &Survey<'_>, work: &mut Work<'_>) -> u64 {
-    let (shop, edges) = work.edges();
+    let (submesh, edges) = work.edges();
     if !edges.any_nonmanifold() {
         return 0;
     }
-    let mut sheets = sheets(survey, shop, edges);
+    let mut sheets = sheets(survey, submesh, edges);
     let mut order: Vec<usize> = (0..sheets.len()).filter(|s| !sheets[*s].anchored && !sheets[*s].seams.is_empty()).collect();
     order.sort_by_key(|s| (sheets[*s].area, sheets[*s].triangles.first().copied()));
     // Uses of each edge that are left, in either direction.
@@ -99,17 +99,17 @@ fn is_surplus(free: bool, uses: &[[u32; 2]], own: &[(u32, bool)]) -> bool {
 }
 
 /// Would the sheet enclose more than next to nothing, if its hole were closed to its middle? By the same measure as for rims ([`admission::THIN`]).
-fn encloses(shop: &Shop, area: f64, sheet: &Sheet) -> bool {
+fn encloses(submesh: &Submesh, area: f64, sheet: &Sheet) -> bool {
     let middle = sheet.rim.0 / sheet.rim.1;
     let cones = sheet.triangles.iter().map(|t| {
-        let [a, b, c] = shop.triangles[*t as usize].v.map(|v| shop.place(v) - middle);
+        let [a, b, c] = submesh.triangles[*t as usize].v.map(|v| submesh.place(v) - middle);
         a.dot(b.cross(c)) / 6.0
     });
     cones.sum::<f64>().abs() > admission::THIN * (area / 2.0).powf(1.5)
 }
 
-fn sheets(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> Vec<Sheet> {
-    let parts = Components::of(survey, shop, edges, &Reversed::none(survey), Through::ManifoldEdges);
+fn sheets(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges) -> Vec<Sheet> {
+    let parts = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::ManifoldEdges);
     let mut sheets: Vec<Sheet> = parts
         .list
         .iter()
@@ -124,13 +124,13 @@ fn sheets(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> Vec<Sheet> {
     for (p, component) in parts.of_patch.iter().enumerate() {
         sheets[*component as usize].anchored |= survey.patches[p].triangles > 0;
     }
-    for t in shop.living() {
+    for t in submesh.living() {
         let component = parts.of_triangle[t as usize];
         if component != NONE {
             let sheet = &mut sheets[component as usize];
             sheet.triangles.push(t);
-            // Beyond an incomplete vertex the surface goes on outside the workshop.
-            sheet.anchored |= shop.triangles[t as usize].v.iter().filter(|v| !shop.complete[**v as usize]).count() > 1;
+            // Beyond an incomplete vertex the surface goes on outside the submesh.
+            sheet.anchored |= submesh.triangles[t as usize].v.iter().filter(|v| !submesh.complete[**v as usize]).count() > 1;
         }
     }
     for (edge, number) in edges.iter().zip(0..).filter(|(e, _)| e.is_nonmanifold()) {
@@ -140,18 +140,18 @@ fn sheets(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> Vec<Sheet> {
     }
     for edge in edges.iter().filter(|e| e.is_boundary()) {
         let rim = &mut sheets[parts.of_triangle[edge.uses[0].triangle as usize] as usize].rim;
-        rim.0 += shop.place(edge.low) + shop.place(edge.high);
+        rim.0 += submesh.place(edge.low) + submesh.place(edge.high);
         rim.1 += 2.0;
     }
     sheets
 }
 
-/// Incomplete vertices of sheets that might be removed: their stars are needed before. A sheet that goes on into sound surface stays.
-pub(crate) fn wanted_stars(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> Vec<Vertex> {
+/// Incomplete vertices of sheets that might be removed: their stars are needed before. A sheet that goes on into regular surface stays.
+pub(crate) fn wanted_stars(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges) -> Vec<Vertex> {
     if !edges.any_nonmanifold() {
         return Vec::new();
     }
-    let sheets = Components::of(survey, shop, edges, &Reversed::none(survey), Through::ManifoldEdges);
+    let sheets = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::ManifoldEdges);
     let mut goes_on = vec![false; sheets.list.len()];
     for (p, component) in sheets.of_patch.iter().enumerate() {
         goes_on[*component as usize] |= survey.patches[p].triangles > 0;
@@ -161,8 +161,8 @@ pub(crate) fn wanted_stars(survey: &Survey<'_>, shop: &Shop, edges: &Edges) -> V
         .filter(|e| e.is_nonmanifold())
         .flat_map(|e| e.uses)
         .filter(|u| !goes_on[sheets.of_triangle[u.triangle as usize] as usize])
-        .flat_map(|u| shop.triangles[u.triangle as usize].v)
-        .filter(|v| !shop.complete[*v as usize])
+        .flat_map(|u| submesh.triangles[u.triangle as usize].v)
+        .filter(|v| !submesh.complete[*v as usize])
         .collect();
     wanted.sort_unstable();
     wanted.dedup();
@@ -177,7 +177,7 @@ mod tests {
 
     fn removed(triangles: &[Corners]) -> After<u64> {
         after(triangles, |d, _| {
-            let work = &mut Work::new(&mut d.shop);
+            let work = &mut Work::new(&mut d.submesh);
             complete_at_seams(&mut d.survey, work);
             super::remove(&d.survey, work)
         })

@@ -7,7 +7,7 @@ use crate::detect::holes::loops::Loop;
 use crate::geometry::exact::Point;
 use crate::repairs::holes::patches::{are_joined, concatenated};
 use crate::repairs::shared::work::Work;
-use crate::submesh::{Shop, Vertex};
+use crate::submesh::{Submesh, Vertex};
 use crate::util::parallel;
 
 /// Bridges pairs of loops: `place` is to put the triangles in. Those between which no valid strip was found stay open. Strips are found in
@@ -18,8 +18,8 @@ pub(crate) fn bridge(
     threads: usize,
     mut place: impl FnMut(&mut Work<'_>, usize, &[[Vertex; 3]]),
 ) {
-    let shop: &Shop = work;
-    let strips = parallel::map(threads, pairs.len(), |i| between(shop, &pairs[i]));
+    let submesh: &Submesh = work;
+    let strips = parallel::map(threads, pairs.len(), |i| between(submesh, &pairs[i]));
     for (i, (pair, strip)) in pairs.iter().zip(strips).enumerate() {
         let strip = match strip {
             Ok(strip) if meets_new_edge(work, pair, &strip) => between(work, pair),
@@ -39,12 +39,12 @@ pub(crate) fn bridge(
 }
 
 /// The strip, over the vertices of the first loop and then those of the second.
-fn between(shop: &Shop, pair: &[&Loop; 2]) -> Result<Vec<[u32; 3]>, Unfillable> {
-    let [a, b] = pair.map(|rim| (rim.points(shop), rim.apexes(shop)));
+fn between(submesh: &Submesh, pair: &[&Loop; 2]) -> Result<Vec<[u32; 3]>, Unfillable> {
+    let [a, b] = pair.map(|rim| (rim.points(submesh), rim.apexes(submesh)));
     // A strip has no chords within a rim.
     let none = |_: u32, _: u32| false;
     let vertices = concatenated(pair);
-    let joined = |i: u32, j: u32| are_joined(shop, vertices[i as usize], vertices[j as usize]);
+    let joined = |i: u32, j: u32| are_joined(submesh, vertices[i as usize], vertices[j as usize]);
     strip::bridge([&rim(&a, &none), &rim(&b, &none)], &joined)
 }
 
@@ -53,13 +53,13 @@ fn rim<'a>((points, apexes): &'a (Vec<Point>, Vec<Option<Point>>), forbidden: &'
 }
 
 /// An edge between the two loops is one of the mesh by now.
-fn meets_new_edge(shop: &Shop, pair: &[&Loop; 2], strip: &[[u32; 3]]) -> bool {
+fn meets_new_edge(submesh: &Submesh, pair: &[&Loop; 2], strip: &[[u32; 3]]) -> bool {
     let vertices = concatenated(pair);
     let second = pair[0].vertices.len() as u32;
     strip.iter().any(|t| {
         (0..3).any(|k| {
             let (i, j) = (t[k], t[(k + 1) % 3]);
-            (i < second) != (j < second) && shop.has_edge(vertices[i as usize], vertices[j as usize])
+            (i < second) != (j < second) && submesh.has_edge(vertices[i as usize], vertices[j as usize])
         })
     })
 }

@@ -1,7 +1,7 @@
 //! Patches refined to the density around them, and shaped so that they continue the surface: each with the rings of triangles that it needs
 //! from whichever chunks hold them, regions in parallel.
 //!
-//! A region is a patch, the stars of its rim's vertices, which are in the workshop, and the stars of all vertices next to the rim, most of
+//! A region is a patch, the stars of its rim's vertices, which are in the submesh, and the stars of all vertices next to the rim, most of
 //! which are fetched from the file. They are fetched for so many patches at once as fit a bound by count, so that neither memory nor chunks
 //! decide anything.
 
@@ -14,7 +14,7 @@ use crate::geometry::exact::Point;
 use crate::geometry::position::{self, Position};
 use crate::repairs::holes::patches::Placed;
 use crate::repairs::shared::work::Work;
-use crate::submesh::{Origin, Shop, Vertex};
+use crate::submesh::{Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::parallel;
 use crate::util::union_find::NONE;
@@ -31,8 +31,8 @@ const FLAT: f64 = 2.0 * f32::EPSILON as f64;
 
 /// Shapes every patch that has room. One that cannot be shaped stays as it is.
 pub(crate) fn smooth(survey: &Survey<'_>, work: &mut Work<'_>, placed: &mut [Placed], settings: &ShapeSettings, threads: usize) {
-    let shop: &Shop = work;
-    let wanted = parallel::map(threads, placed.len(), |i| is_wanted(shop, &placed[i]));
+    let submesh: &Submesh = work;
+    let wanted = parallel::map(threads, placed.len(), |i| is_wanted(submesh, &placed[i]));
     let roomy: Vec<usize> = (0..placed.len()).filter(|i| wanted[*i]).collect();
     let mut rest = roomy.as_slice();
     while !rest.is_empty() {
@@ -47,10 +47,10 @@ pub(crate) fn smooth(survey: &Survey<'_>, work: &mut Work<'_>, placed: &mut [Pla
             .count();
         let (batch, later) = rest.split_at(count);
         rest = later;
-        let shop: &Shop = work;
-        let beyond = Beyond::of(survey, shop, batch.iter().map(|i| &placed[*i]));
+        let submesh: &Submesh = work;
+        let beyond = Beyond::of(survey, submesh, batch.iter().map(|i| &placed[*i]));
         let shaped = parallel::map(threads, batch.len(), |i| {
-            let region = Gathered::of(shop, &beyond, &placed[batch[i]]);
+            let region = Gathered::of(submesh, &beyond, &placed[batch[i]]);
             let shaped =
                 fairing::shape(&Region { positions: &region.positions, patch: &region.patch, around: &region.around }, settings);
             shaped.map(|shaped| (region.vertices, shaped))
@@ -64,12 +64,12 @@ pub(crate) fn smooth(survey: &Survey<'_>, work: &mut Work<'_>, placed: &mut [Pla
     }
 }
 
-/// Is a patch to be shaped, as far as the triangles of the workshop tell?
-fn is_wanted(shop: &Shop, patch: &Placed) -> bool {
+/// Is a patch to be shaped, as far as the triangles of the submesh tell?
+fn is_wanted(submesh: &Submesh, patch: &Placed) -> bool {
     // One triangle has no inner edge.
     patch.count > 1 && {
-        let edges = Edges::of(shop, patch);
-        edges.have_room(shop) && !edges.is_rim_an_edge(shop, patch) && !edges.lie_in_a_plane(shop, patch)
+        let edges = Edges::of(submesh, patch);
+        edges.have_room(submesh) && !edges.is_rim_an_edge(submesh, patch) && !edges.lie_in_a_plane(submesh, patch)
     }
 }
 
@@ -82,8 +82,8 @@ struct Edges {
 }
 
 impl Edges {
-    fn of(shop: &Shop, patch: &Placed) -> Self {
-        let of_triangle = |t: u32| edges(shop.triangles[t as usize].v).map(|e| (sorted(e), t));
+    fn of(submesh: &Submesh, patch: &Placed) -> Self {
+        let of_triangle = |t: u32| edges(submesh.triangles[t as usize].v).map(|e| (sorted(e), t));
         let mut all: Vec<([Vertex; 2], u32)> = patch.triangles().flat_map(of_triangle).collect();
         all.sort_unstable();
         let mut found = Self { inner: Vec::new(), rim: Vec::new(), at_rim: Vec::new() };
@@ -100,10 +100,10 @@ impl Edges {
     }
 
     /// Is an inner edge long for what is around?
-    fn have_room(&self, shop: &Shop) -> bool {
+    fn have_room(&self, submesh: &Submesh) -> bool {
         let mut ends: Vec<(Vertex, f64)> = Vec::with_capacity(2 * self.rim.len());
         for &[a, b] in &self.rim {
-            let length = shop.distance(a, b);
+            let length = submesh.distance(a, b);
             ends.extend([(a, length), (b, length)]);
         }
         // Stable: the lengths at a vertex are summed in the edges' order.
@@ -114,25 +114,25 @@ impl Edges {
             let (sum, count) = here.fold((0.0, 0_u32), |(sum, count), (_, length)| (sum + length, count + 1));
             if count == 0 { f64::INFINITY } else { sum / f64::from(count) }
         };
-        self.inner.iter().any(|&[a, b]| shop.distance(a, b) > ROOMY * 0.5 * (usual(a) + usual(b)))
+        self.inner.iter().any(|&[a, b]| submesh.distance(a, b) > ROOMY * 0.5 * (usual(a) + usual(b)))
     }
 
     /// The triangle beyond each edge of the rim, if there is exactly one.
-    fn beyond<'s>(&'s self, shop: &'s Shop, patch: &'s Placed) -> impl Iterator<Item = Option<u32>> + 's {
+    fn beyond<'s>(&'s self, submesh: &'s Submesh, patch: &'s Placed) -> impl Iterator<Item = Option<u32>> + 's {
         self.rim.iter().map(|&[a, b]| {
             let mut there =
-                shop.star(a).map(|(t, _)| t).filter(|t| !patch.holds(*t) && shop.triangles[*t as usize].v.contains(&b));
+                submesh.star(a).map(|(t, _)| t).filter(|t| !patch.holds(*t) && submesh.triangles[*t as usize].v.contains(&b));
             there.next().filter(|_| there.next().is_none())
         })
     }
 
     /// Does the surface turn away at the rim? [`fairing::shape`] would say so, too, after the rings around were fetched.
-    fn is_rim_an_edge(&self, shop: &Shop, patch: &Placed) -> bool {
+    fn is_rim_an_edge(&self, submesh: &Submesh, patch: &Placed) -> bool {
         let (mut turn, mut length) = (0.0, 0.0);
-        for ((&[a, b], &t), beyond) in self.rim.iter().zip(&self.at_rim).zip(self.beyond(shop, patch)) {
+        for ((&[a, b], &t), beyond) in self.rim.iter().zip(&self.at_rim).zip(self.beyond(submesh, patch)) {
             if let Some(beyond) = beyond {
-                let along = shop.distance(a, b);
-                turn += shop.normal(t).normalize_or_zero().dot(shop.normal(beyond).normalize_or_zero()) * along;
+                let along = submesh.distance(a, b);
+                turn += submesh.normal(t).normalize_or_zero().dot(submesh.normal(beyond).normalize_or_zero()) * along;
                 length += along;
             }
         }
@@ -141,47 +141,48 @@ impl Edges {
 
     /// Is the patch flat, and the triangles along its rim with it, as far as coordinates of single precision can tell? Then there is nothing to
     /// continue but the plane.
-    fn lie_in_a_plane(&self, shop: &Shop, patch: &Placed) -> bool {
-        let normal: DVec3 = patch.triangles().map(|t| shop.normal(t)).sum();
-        let perimeter: f64 = self.rim.iter().map(|&[a, b]| shop.distance(a, b)).sum();
+    fn lie_in_a_plane(&self, submesh: &Submesh, patch: &Placed) -> bool {
+        let normal: DVec3 = patch.triangles().map(|t| submesh.normal(t)).sum();
+        let perimeter: f64 = self.rim.iter().map(|&[a, b]| submesh.distance(a, b)).sum();
         // Of a circle its radius, of a slit its width: how well the rim holds the plane.
         let size = normal.length() / perimeter;
-        let centre = self.rim.iter().map(|e| shop.place(e[0]) + shop.place(e[1])).sum::<DVec3>() / (2 * self.rim.len()) as f64;
+        let centre =
+            self.rim.iter().map(|e| submesh.place(e[0]) + submesh.place(e[1])).sum::<DVec3>() / (2 * self.rim.len()) as f64;
         let normal = normal.normalize_or_zero();
         let lies = |v: Vertex| {
-            let place = shop.place(v);
+            let place = submesh.place(v);
             let away = place - centre;
             let rounding = FLAT * place.abs().max(centre.abs()).max_element();
             away.dot(normal).abs() <= rounding * (1.0 + away.length() / size)
         };
-        let of_patch = patch.triangles().chain(self.beyond(shop, patch).flatten());
-        normal != DVec3::ZERO && of_patch.flat_map(|t| shop.triangles[t as usize].v).all(lies)
+        let of_patch = patch.triangles().chain(self.beyond(submesh, patch).flatten());
+        normal != DVec3::ZERO && of_patch.flat_map(|t| submesh.triangles[t as usize].v).all(lies)
     }
 }
 
-/// Triangles that are not in the workshop, around vertices that are: where each has its corners, by vertex.
+/// Triangles that are not in the submesh, around vertices that are: where each has its corners, by vertex.
 struct Beyond {
-    /// By vertex of the workshop, then by triangle.
+    /// By vertex of the submesh, then by triangle.
     of_vertex: Vec<(Vertex, u32)>,
     corners: Vec<[Point; 3]>,
 }
 
 impl Beyond {
     /// Around the vertices next to the rims of some patches. Reads the chunks where they are at home.
-    fn of<'p>(survey: &Survey<'_>, shop: &Shop, patches: impl Iterator<Item = &'p Placed>) -> Self {
+    fn of<'p>(survey: &Survey<'_>, submesh: &Submesh, patches: impl Iterator<Item = &'p Placed>) -> Self {
         let mut next: Vec<Vertex> = patches
-            .flat_map(|patch| patch.triangles().flat_map(|t| shop.triangles[t as usize].v))
-            .flat_map(|v| shop.star(v).flat_map(|(t, _)| shop.triangles[t as usize].v))
-            .filter(|v| !shop.complete[*v as usize])
+            .flat_map(|patch| patch.triangles().flat_map(|t| submesh.triangles[t as usize].v))
+            .flat_map(|v| submesh.star(v).flat_map(|(t, _)| submesh.triangles[t as usize].v))
+            .filter(|v| !submesh.complete[*v as usize])
             .collect();
         next.sort_unstable();
         next.dedup();
-        let positions: Vec<Point> = next.iter().map(|v| shop.positions[*v as usize]).collect();
+        let positions: Vec<Point> = next.iter().map(|v| submesh.positions[*v as usize]).collect();
         let numbers: HashMap<Position, Vertex> = next.iter().zip(&positions).map(|(v, p)| (Position::of(*p), *v)).collect();
-        let found = survey.beyond_the_workshop(&positions);
+        let found = survey.beyond_the_submesh(&positions);
         let mut beyond = Self { of_vertex: Vec::new(), corners: Vec::with_capacity(found.len()) };
-        for (number, (suspect, _)) in (0..).zip(&found) {
-            let corners = position::corners(&survey.records[suspect.triangle as usize]);
+        for (number, (irregular_triangle, _)) in (0..).zip(&found) {
+            let corners = position::corners(&survey.records[irregular_triangle.triangle as usize]);
             let at = corners.iter().filter_map(|p| numbers.get(&Position::of(*p)));
             beyond.of_vertex.extend(at.map(|v| (*v, number)));
             beyond.corners.push(corners);
@@ -199,14 +200,14 @@ impl Beyond {
 /// A region in a numbering of its own, which begins with the vertices of the patch.
 struct Gathered {
     positions: Vec<Point>,
-    /// Vertices of the workshop; [`NONE`] for others.
+    /// Vertices of the submesh; [`NONE`] for others.
     vertices: Vec<Vertex>,
     patch: Vec<[u32; 3]>,
     around: Vec<[u32; 3]>,
 }
 
 impl Gathered {
-    fn of(shop: &Shop, beyond: &Beyond, patch: &Placed) -> Self {
+    fn of(submesh: &Submesh, beyond: &Beyond, patch: &Placed) -> Self {
         let mut region = Self { positions: Vec::new(), vertices: Vec::new(), patch: Vec::new(), around: Vec::new() };
         let mut numbers: HashMap<Position, u32> = HashMap::new();
         let mut number = |region: &mut Self, position: Point, vertex: Vertex| {
@@ -217,21 +218,21 @@ impl Gathered {
             })
         };
         for t in patch.triangles() {
-            let v = shop.triangles[t as usize].v.map(|v| number(&mut region, shop.positions[v as usize], v));
+            let v = submesh.triangles[t as usize].v.map(|v| number(&mut region, submesh.positions[v as usize], v));
             region.patch.push(v);
         }
         let rim = region.vertices.clone();
-        let mut near: Vec<u32> = rim.iter().flat_map(|v| shop.star(*v).map(|(t, _)| t)).filter(|t| !patch.holds(*t)).collect();
+        let mut near: Vec<u32> = rim.iter().flat_map(|v| submesh.star(*v).map(|(t, _)| t)).filter(|t| !patch.holds(*t)).collect();
         near.sort_unstable();
         near.dedup();
-        let mut next: Vec<Vertex> = near.iter().flat_map(|t| shop.triangles[*t as usize].v).collect();
+        let mut next: Vec<Vertex> = near.iter().flat_map(|t| submesh.triangles[*t as usize].v).collect();
         next.sort_unstable();
         next.dedup();
-        near.extend(next.iter().flat_map(|v| shop.star(*v).map(|(t, _)| t)).filter(|t| !patch.holds(*t)));
+        near.extend(next.iter().flat_map(|v| submesh.star(*v).map(|(t, _)| t)).filter(|t| !patch.holds(*t)));
         near.sort_unstable();
         near.dedup();
         for t in near {
-            let v = shop.triangles[t as usize].v.map(|v| number(&mut region, shop.positions[v as usize], v));
+            let v = submesh.triangles[t as usize].v.map(|v| number(&mut region, submesh.positions[v as usize], v));
             region.around.push(v);
         }
         let mut far: Vec<u32> = next.iter().flat_map(|v| beyond.star(*v)).collect();
@@ -250,12 +251,12 @@ fn put_in(work: &mut Work<'_>, patch: &mut Placed, mut vertices: Vec<Vertex>, sh
     let coarse: Vec<[Vertex; 3]> = patch.triangles().map(|t| work.triangles[t as usize].v).collect();
     let mut own: Vec<[Vertex; 2]> = coarse.iter().flat_map(|v| edges(*v)).map(sorted).collect();
     own.sort_unstable();
-    let of_workshop = |v: u32| vertices.get(v as usize).copied().unwrap_or(NONE);
+    let of_submesh = |v: u32| vertices.get(v as usize).copied().unwrap_or(NONE);
     let is_there = |[a, b]: [Vertex; 2]| {
         // Of the coarse patch's, the rim's are the surface's as well, and the others go.
         a != NONE && b != NONE && own.binary_search(&[a, b]).is_err() && work.has_edge(a, b)
     };
-    if shaped.triangles.iter().flat_map(|t| edges(t.map(of_workshop))).map(sorted).any(is_there) {
+    if shaped.triangles.iter().flat_map(|t| edges(t.map(of_submesh))).map(sorted).any(is_there) {
         return;
     }
     patch.triangles().for_each(|t| work.kill(t));

@@ -23,7 +23,7 @@ use crate::detect::holes::{
 use crate::repairs::holes::fair;
 use crate::repairs::shared::admission::Admission;
 use crate::repairs::shared::work::Work;
-use crate::submesh::Shop;
+use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::submesh::near::Tolerance;
 use crate::topology::survey::Survey;
@@ -71,9 +71,9 @@ pub(crate) fn fill_loops(
     profile: &Profile,
     threads: usize,
 ) -> Closed {
-    let (shop, edges) = work.edges();
-    let Boundary { loops: rims, chains } = loops::boundary(shop, edges);
-    let shapes = Shapes::of(shop, &rims, threads);
+    let (submesh, edges) = work.edges();
+    let Boundary { loops: rims, chains } = loops::boundary(submesh, edges);
+    let shapes = Shapes::of(submesh, &rims, threads);
     let admission = Admission::of(survey, work, &rims, &shapes, reversed, tolerance, profile);
     let max_edges = profile.max_hole_edges as usize;
     let mut closing =
@@ -133,8 +133,8 @@ fn shape_settings(profile: &Profile) -> Option<ShapeSettings> {
 }
 
 /// Twice the area of a patch, in the survey's units.
-fn twice_area(survey: &Survey<'_>, shop: &Shop, rim: &Loop, patch: &triangulate::Patch) -> f64 {
-    let corners = |t: &[u32; 3]| t.map(|i| shop.positions[rim.vertices[i as usize] as usize]);
+fn twice_area(survey: &Survey<'_>, submesh: &Submesh, rim: &Loop, patch: &triangulate::Patch) -> f64 {
+    let corners = |t: &[u32; 3]| t.map(|i| submesh.positions[rim.vertices[i as usize] as usize]);
     patch.triangles.iter().map(|t| survey.measure.triangle(&corners(t)).area).sum::<i128>() as f64
 }
 
@@ -144,15 +144,15 @@ pub(crate) fn fill(d: &mut crate::diagnosis::Diagnosis<'_>, profile: &Profile) -
     let unturned = Reversed::none(&d.survey);
     // What nothing closes without crossing something is another pass's then.
     let profile = Profile { resolve_crossings: false, ..profile.clone() };
-    fill_loops(&d.survey, &mut Work::new(&mut d.shop), &unturned, &d.tolerance, &profile, 1)
+    fill_loops(&d.survey, &mut Work::new(&mut d.submesh), &unturned, &d.tolerance, &profile, 1)
 }
 
 impl Closing<'_> {
     /// Closes the loops from number `first` on, each for itself.
     pub(crate) fn triangulate(&mut self, work: &mut Work<'_>, first: usize, threads: usize) {
-        let shop: &Shop = work;
+        let submesh: &Submesh = work;
         let patches =
-            parallel::map(threads, self.rims.len() - first, |i| self.fill(shop, (first + i) as u32, Neighbours::Heeded, &[]));
+            parallel::map(threads, self.rims.len() - first, |i| self.fill(submesh, (first + i) as u32, Neighbours::Heeded, &[]));
         for (rim, patch) in (first as u32..).zip(patches) {
             let patch = match patch {
                 Ok(patch) if meets_new_edge(work, self.rim(rim), &patch) => self.fill(work, rim, Neighbours::Heeded, &[]),
@@ -170,8 +170,8 @@ impl Closing<'_> {
         if self.open.is_empty() {
             return;
         }
-        let (shop, edges) = work.edges();
-        let components = Components::of(survey, shop, edges, &Reversed::none(survey), Through::EveryEdge);
+        let (submesh, edges) = work.edges();
+        let components = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::EveryEdge);
         for (rim, reason) in std::mem::take(&mut self.open) {
             let loop_ = self.rim(rim);
             let area = components.list[components.of_triangle[loop_.triangles[0] as usize] as usize].extent.area as f64;

@@ -16,12 +16,12 @@ use crate::geometry::sums::Bounds;
 use crate::repairs::holes::patches::{are_joined, concatenated};
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed, Through};
-use crate::submesh::{Origin, Shop, Vertex};
+use crate::submesh::{Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
 
 /// Holes, each with its islands: some pairs of loops look like one and the other; a lone sheet that none of them holds lies in the smallest
-/// hole whose box holds its middle. O(workshop) if there are any.
+/// hole whose box holds its middle. O(submesh) if there are any.
 pub(crate) fn groups(
     survey: &Survey<'_>,
     work: &mut Work<'_>,
@@ -33,13 +33,13 @@ pub(crate) fn groups(
     if pairs.is_empty() && sheets.is_empty() {
         return Vec::new();
     }
-    let (shop, edges) = work.edges();
-    let components = Components::of(survey, shop, edges, &Reversed::none(survey), Through::EveryEdge);
+    let (submesh, edges) = work.edges();
+    let components = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::EveryEdge);
     let component = |rim: usize| components.of_triangle[rims[rim].triangles[0] as usize];
     let mut loops_of = vec![0u32; components.list.len()];
     (0..rims.len()).for_each(|rim| loops_of[component(rim) as usize] += 1);
     let mut inside: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    let bounds: Vec<Bounds> = rims.iter().map(|rim| Bounds::of(&rim.points(shop))).collect();
+    let bounds: Vec<Bounds> = rims.iter().map(|rim| Bounds::of(&rim.points(submesh))).collect();
     let tree = BoxTree::new(&bounds);
     let mut found = Vec::new();
     let known: BTreeSet<usize> = pairs.iter().map(|[_, island]| *island).collect();
@@ -48,9 +48,9 @@ pub(crate) fn groups(
         let Bounds { lo, hi } = bounds[sheet];
         let middle: [f32; 3] = std::array::from_fn(|k| 0.5 * lo[k] + 0.5 * hi[k]);
         tree.meeting(&Bounds { lo: middle, hi: middle }, &mut found);
-        let length = rims[sheet].perimeter(shop);
+        let length = rims[sheet].perimeter(submesh);
         let around = found.iter().map(|hole| *hole as usize).filter(|hole| !is_sheet(&rims[*hole]));
-        let around = around.map(|hole| (rims[hole].perimeter(shop), hole)).filter(|(perimeter, _)| *perimeter > length);
+        let around = around.map(|hole| (rims[hole].perimeter(submesh), hole)).filter(|(perimeter, _)| *perimeter > length);
         pairs.extend(around.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(_, hole)| [hole, sheet]));
     }
     for [hole, island] in pairs {
@@ -67,13 +67,13 @@ pub(crate) fn groups(
 /// Holes with islands that touch their rims, or each other, in one vertex: the numbers of the loops, the hole's first, and the way around
 /// all of them. Of the loops that one way was cut into, the largest is the hole's, and those that turn against it are islands'.
 /// O(loops), and the square of what one way was cut into.
-pub(crate) fn touching(shop: &Shop, rims: &[Loop]) -> Vec<(Vec<usize>, Loop)> {
+pub(crate) fn touching(submesh: &Submesh, rims: &[Loop]) -> Vec<(Vec<usize>, Loop)> {
     let mut of_way: Vec<usize> = (0..rims.len()).collect();
     of_way.sort_by_key(|i| rims[*i].way);
     let mut groups = Vec::new();
     for same in of_way.chunk_by(|a, b| rims[*a].way == rims[*b].way).filter(|same| (2..=MAX_TOUCHING).contains(&same.len())) {
         let mut areas: Vec<(DVec3, usize)> =
-            same.iter().map(|i| (triangulate::directed_area(&rims[*i].points(shop)), *i)).collect();
+            same.iter().map(|i| (triangulate::directed_area(&rims[*i].points(submesh)), *i)).collect();
         areas.sort_by(|a, b| b.0.length().total_cmp(&a.0.length()).then(a.1.cmp(&b.1)));
         let (of_hole, hole) = areas[0];
         let mut left: Vec<usize> = areas[1..].iter().filter(|(area, _)| area.dot(of_hole) < 0.0).map(|(_, i)| *i).collect();
@@ -93,9 +93,9 @@ pub(crate) fn touching(shop: &Shop, rims: &[Loop]) -> Vec<(Vec<usize>, Loop)> {
 const MAX_TOUCHING: usize = 64;
 
 /// One patch for a hole and the islands that touch its rim.
-pub(crate) fn patch_touching(shop: &Shop, way: &Loop) -> Option<Vec<[Vertex; 3]>> {
-    let (points, apexes) = (way.points(shop), way.apexes(shop));
-    let forbidden = |i: u32, j: u32| are_joined(shop, way.vertices[i as usize], way.vertices[j as usize]);
+pub(crate) fn patch_touching(submesh: &Submesh, way: &Loop) -> Option<Vec<[Vertex; 3]>> {
+    let (points, apexes) = (way.points(submesh), way.apexes(submesh));
+    let forbidden = |i: u32, j: u32| are_joined(submesh, way.vertices[i as usize], way.vertices[j as usize]);
     let patch = triangulate::pinched(&Rim { points: &points, apexes: &apexes, obstacles: &[], forbidden: &forbidden }).ok()?;
     Some(patch.into_iter().map(|t| t.map(|i| way.vertices[i as usize])).collect())
 }
@@ -114,30 +114,31 @@ pub(crate) fn join_all(work: &mut Work<'_>, group: &[&Loop]) -> Vec<u32> {
 }
 
 /// One patch between a hole's rim and those of its islands.
-pub(crate) fn patch(shop: &Shop, group: &[&Loop]) -> Option<Vec<[Vertex; 3]>> {
+pub(crate) fn patch(submesh: &Submesh, group: &[&Loop]) -> Option<Vec<[Vertex; 3]>> {
     let vertices = concatenated(group);
-    let shapes: Vec<(Vec<Point>, Vec<Option<Point>>)> = group.iter().map(|rim| (rim.points(shop), rim.apexes(shop))).collect();
+    let shapes: Vec<(Vec<Point>, Vec<Option<Point>>)> =
+        group.iter().map(|rim| (rim.points(submesh), rim.apexes(submesh))).collect();
     let chords: Vec<_> = group
         .iter()
-        .map(|rim| move |i: u32, j: u32| are_joined(shop, rim.vertices[i as usize], rim.vertices[j as usize]))
+        .map(|rim| move |i: u32, j: u32| are_joined(submesh, rim.vertices[i as usize], rim.vertices[j as usize]))
         .collect();
     let rims: Vec<Rim<'_>> = shapes
         .iter()
         .zip(&chords)
         .map(|((points, apexes), forbidden)| Rim { points, apexes, obstacles: &[], forbidden })
         .collect();
-    let joined = |i: u32, j: u32| are_joined(shop, vertices[i as usize], vertices[j as usize]);
+    let joined = |i: u32, j: u32| are_joined(submesh, vertices[i as usize], vertices[j as usize]);
     let patch = triangulate::around_islands(&rims.iter().collect::<Vec<_>>(), &joined).ok()?;
     Some(patch.into_iter().map(|t| t.map(|i| vertices[i as usize])).collect())
 }
 
 /// Joins two rims at their nearest vertices: the loop that is left, and the two triangles.
-fn join(shop: &Shop, outer: &[Vertex], inner: &[Vertex]) -> Option<(Vec<Vertex>, [[Vertex; 3]; 2])> {
+fn join(submesh: &Submesh, outer: &[Vertex], inner: &[Vertex]) -> Option<(Vec<Vertex>, [[Vertex; 3]; 2])> {
     let (n, m) = (outer.len(), inner.len());
     let mut best: Option<(f64, usize, usize)> = None;
     for (i, v) in outer.iter().enumerate() {
         for (j, w) in inner.iter().enumerate() {
-            let away = shop.distance(*v, *w);
+            let away = submesh.distance(*v, *w);
             if best.is_none_or(|(d, ..)| away < d) {
                 best = Some((away, i, j));
             }
@@ -148,11 +149,11 @@ fn join(shop: &Shop, outer: &[Vertex], inner: &[Vertex]) -> Option<(Vec<Vertex>,
     let (b, b_last) = (inner[j], inner[(j + m - 1) % m]);
     let triangles = [[a, a_next, b], [b_last, b, a_next]];
     let flat = |t: &[Vertex; 3]| {
-        let [p, q, r] = t.map(|v| &shop.positions[v as usize]);
+        let [p, q, r] = t.map(|v| &submesh.positions[v as usize]);
         crate::geometry::collinear::is_collinear(p, q, r)
     };
     let new_edges = [(a, b), (a_next, b), (a_next, b_last)];
-    if triangles.iter().any(flat) || new_edges.iter().any(|(p, q)| shop.has_edge(*p, *q)) {
+    if triangles.iter().any(flat) || new_edges.iter().any(|(p, q)| submesh.has_edge(*p, *q)) {
         return None;
     }
     let way = (0..n).map(|k| outer[(i + 1 + k) % n]).chain((0..m).map(|k| inner[(j + k) % m]));
@@ -207,10 +208,10 @@ mod tests {
     fn rims_are_joined_at_their_nearest_vertices() {
         let open = plate(6, |x, y| !(1..5).contains(&x) || !(1..5).contains(&y) || ((2..4).contains(&x) && (2..4).contains(&y)));
         let got = after(&open, |d, _| {
-            let mut work = Work::new(&mut d.shop);
-            let (shop, edges) = work.edges();
-            let rims = loops::find(shop, edges);
-            let holes::Partners { rings, islands, .. } = holes::Shapes::of(shop, &rims, 1).partners();
+            let mut work = Work::new(&mut d.submesh);
+            let (submesh, edges) = work.edges();
+            let rims = loops::find(submesh, edges);
+            let holes::Partners { rings, islands, .. } = holes::Shapes::of(submesh, &rims, 1).partners();
             let pairs = [rings, islands].concat();
             let [hole, island] = pairs[0].map(|i| rims[i].vertices.clone());
             let (joined, triangles) = join(&work, &hole, &island).unwrap();

@@ -1,13 +1,13 @@
-//! Patches that are in the workshop, and loops as they see them.
+//! Patches that are in the submesh, and loops as they see them.
 
 use crate::algorithms::triangulate::{self};
 use crate::detect::holes::loops::Loop;
 use crate::repairs::shared::collisions::Obstacle;
 use crate::repairs::shared::work::Work;
-use crate::submesh::{Origin, Shop, Vertex};
+use crate::submesh::{Origin, Submesh, Vertex};
 use crate::util::union_find::NONE;
 
-/// A patch that is in the workshop.
+/// A patch that is in the submesh.
 #[derive(Debug)]
 pub(crate) struct Placed {
     /// The loops it closes, by number.
@@ -63,8 +63,8 @@ impl Placed {
     }
 }
 
-/// The triangles of a patch by the vertices of the workshop.
-pub(crate) fn of_workshop(rim: &Loop, patch: &triangulate::Patch) -> Vec<[Vertex; 3]> {
+/// The triangles of a patch by the vertices of the submesh.
+pub(crate) fn of_submesh(rim: &Loop, patch: &triangulate::Patch) -> Vec<[Vertex; 3]> {
     patch.triangles.iter().map(|t| t.map(|i| rim.vertices[i as usize])).collect()
 }
 
@@ -74,6 +74,6 @@ pub(crate) fn concatenated(group: &[&Loop]) -> Vec<Vertex> {
 }
 
 /// Is there an edge between two vertices of loops?
-pub(crate) fn are_joined(shop: &Shop, a: Vertex, b: Vertex) -> bool {
-    if shop.complete[a as usize] { shop.has_edge(a, b) } else { shop.has_edge(b, a) }
+pub(crate) fn are_joined(submesh: &Submesh, a: Vertex, b: Vertex) -> bool {
+    if submesh.complete[a as usize] { submesh.has_edge(a, b) } else { submesh.has_edge(b, a) }
 }

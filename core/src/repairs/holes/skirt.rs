@@ -30,7 +30,7 @@ use crate::repairs::shared::overlay::Overlay;
 use crate::repairs::shared::pieces::components_of_records;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed, Through};
-use crate::submesh::{self, Origin, Shop, Vertex};
+use crate::submesh::{self, Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
 
@@ -81,21 +81,21 @@ pub(crate) fn let_down(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reve
     if !is_wanted || !is_told_apart || survey.crossing_pairs.is_none() {
         return 0;
     }
-    let (shop, edges) = work.edges();
-    let mut candidates: Vec<Candidate> = loops::find(shop, edges)
+    let (submesh, edges) = work.edges();
+    let mut candidates: Vec<Candidate> = loops::find(submesh, edges)
         .into_iter()
         .filter(|rim| !rim.branches && rim.vertices.len() as u64 <= u64::from(profile.max_hole_edges))
-        .filter_map(|rim| Candidate::of(shop, rim))
+        .filter_map(|rim| Candidate::of(submesh, rim))
         .collect();
     if candidates.is_empty() {
         return 0;
     }
-    let components = Components::of(survey, shop, edges, reversed, Through::EveryEdge);
+    let components = Components::of(survey, submesh, edges, reversed, Through::EveryEdge);
     for candidate in &mut candidates {
         candidate.component = components.of_triangle[candidate.triangles[0] as usize];
     }
-    let Some(met) = met(survey, shop, reversed, &components, &candidates, reach) else { return 0 };
-    let depths: Vec<Option<f64>> = candidates.iter().zip(met).map(|(rim, met)| rim.depth(shop, &met, reach)).collect();
+    let Some(met) = met(survey, submesh, reversed, &components, &candidates, reach) else { return 0 };
+    let depths: Vec<Option<f64>> = candidates.iter().zip(met).map(|(rim, met)| rim.depth(submesh, &met, reach)).collect();
     let mut count = 0;
     for (rim, depth) in candidates.iter().zip(depths).filter_map(|(rim, depth)| Some((rim, depth?))) {
         rim.extend(work, depth);
@@ -114,26 +114,26 @@ struct Met {
 /// For each rim the triangles of other components near each of its edges; `None` if that is too much to tell.
 fn met(
     survey: &Survey<'_>,
-    shop: &Shop,
+    submesh: &Submesh,
     reversed: &Reversed,
     components: &Components,
     candidates: &[Candidate],
     reach: f64,
 ) -> Option<Vec<Met>> {
-    let overlay = Overlay::of(survey, shop, reversed)?;
-    let first = survey.records.len() as u32 + shop.triangles.len() as u32;
+    let overlay = Overlay::of(survey, submesh, reversed)?;
+    let first = survey.records.len() as u32 + submesh.triangles.len() as u32;
     // Two triangles an edge, which stand in for the strip.
     let mut of_probe: Vec<(u32, u32)> = Vec::new();
     let mut probes: Vec<Corners> = Vec::new();
     for (c, rim) in (0..).zip(candidates) {
-        for (e, [a, b, c_, d]) in (0..).zip(rim.probes(shop, reach)) {
+        for (e, [a, b, c_, d]) in (0..).zip(rim.probes(submesh, reach)) {
             probes.extend([[a, b, c_], [a, c_, d]]);
             of_probe.extend([(c, e); 2]);
         }
     }
     let total = u64::from(first) + probes.len() as u64;
     u32::try_from(total).ok()?;
-    let beside = overlay.changed().iter().map(|t| (overlay.number(*t), shop.points(*t)));
+    let beside = overlay.changed().iter().map(|t| (overlay.number(*t), submesh.points(*t)));
     let pairs =
         fresh::met_by(survey, (first..).zip(probes), beside, |record| overlay.is_gone(record), total, fresh::self_intersection)?;
     let mut hits: Vec<((u32, u32), u32)> = pairs
@@ -147,7 +147,7 @@ fn met(
     hits.sort_unstable();
     hits.dedup();
     let records = hits.iter().map(|(_, other)| *other).filter(|other| overlay.changed_of(*other).is_none());
-    let of_record = components_of_records(survey, shop, components, records);
+    let of_record = components_of_records(survey, submesh, components, records);
     let mut met: Vec<Met> = candidates.iter().map(|_| Met::default()).collect();
     for ((rim, edge), other) in hits {
         let component = match overlay.changed_of(other) {
@@ -155,7 +155,7 @@ fn met(
             None => of_record.get(&other).copied().unwrap_or(NONE),
         };
         if component != candidates[rim as usize].component {
-            met[rim as usize].triangles.push((edge, overlay.corners(survey, shop, other), component));
+            met[rim as usize].triangles.push((edge, overlay.corners(survey, submesh, other), component));
         }
     }
     Some(met)
@@ -163,14 +163,14 @@ fn met(
 
 impl Candidate {
     /// `None`: the rim does not point one way.
-    fn of(shop: &Shop, rim: Loop) -> Option<Self> {
-        let apexes = rim.apexes(shop);
+    fn of(submesh: &Submesh, rim: Loop) -> Option<Self> {
+        let apexes = rim.apexes(submesh);
         let Loop { vertices, triangles, .. } = rim;
         let n = vertices.len();
         let mut across = Vec::with_capacity(n);
         let (mut sum, mut length) = (DVec3::ZERO, 0.0);
         for i in 0..n {
-            let (from, along) = (shop.place(vertices[i]), shop.vector(vertices[i], vertices[(i + 1) % n]));
+            let (from, along) = (submesh.place(vertices[i]), submesh.vector(vertices[i], vertices[(i + 1) % n]));
             let inward = submesh::place(apexes[i]?) - from;
             let outward = along * (inward.dot(along) / along.length_squared()) - inward;
             let direction = outward.try_normalize()?;
@@ -191,24 +191,24 @@ impl Candidate {
     }
 
     /// A quadrangle for each edge, from behind it to in front of it.
-    fn probes(&self, shop: &Shop, reach: f64) -> impl Iterator<Item = [[f32; 3]; 4]> {
+    fn probes(&self, submesh: &Submesh, reach: f64) -> impl Iterator<Item = [[f32; 3]; 4]> {
         let n = self.vertices.len();
         (0..n).map(move |i| {
-            let [a, b] = [i, (i + 1) % n].map(|k| shop.place(self.vertices[k]));
+            let [a, b] = [i, (i + 1) % n].map(|k| submesh.place(self.vertices[k]));
             let by = self.across[i] * reach;
             [a - by * BEHIND, b - by * BEHIND, b + by * IN_FRONT, a + by * IN_FRONT].map(|p| Position::nearest(p).coordinates())
         })
     }
 
     /// How deep a strip must go to end inside of what the rim stands on; `None` if it stands on nothing.
-    fn depth(&self, shop: &Shop, met: &Met, reach: f64) -> Option<f64> {
+    fn depth(&self, submesh: &Submesh, met: &Met, reach: f64) -> Option<f64> {
         let n = self.vertices.len();
         let mut rest = &met.triangles[..];
         let (mut below, mut deepest) = (None, 0.0f64);
         for i in 0..n {
             let (own, others) = rest.split_at(rest.partition_point(|(edge, _, _)| *edge == i as u32));
             rest = others;
-            let [a, b] = [i, (i + 1) % n].map(|k| shop.place(self.vertices[k]));
+            let [a, b] = [i, (i + 1) % n].map(|k| submesh.place(self.vertices[k]));
             for share in PLACES {
                 let from = a + (b - a) * share;
                 let mut hits = own.iter().filter_map(|(_, corners, component)| {
@@ -278,7 +278,7 @@ mod tests {
     /// How many rims were let down, once what they are part of was closed, turned and cut as in a repair.
     fn seated_by(mesh: &[Corners], profile: &Profile) -> After<u64> {
         after(mesh, |d, turned| {
-            let work = &mut Work::new(&mut d.shop);
+            let work = &mut Work::new(&mut d.submesh);
             directions::make_coherent(&d.survey, work, turned, &[]);
             let seated = let_down(&d.survey, work, turned, profile);
             fill::fill_loops(&d.survey, work, turned, &d.tolerance, profile, 1);

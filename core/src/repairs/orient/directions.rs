@@ -6,7 +6,7 @@ use crate::geometry::sums::Bounds;
 use crate::repairs::shared::account::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
-use crate::submesh::Shop;
+use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
@@ -90,13 +90,13 @@ pub(crate) struct Turned {
 }
 
 /// Makes two-triangle edges agree: in each connected surface the smaller part is turned, of equal parts the one with the later
-/// triangle. What is `settled`, by triangle of the workshop, stays as it is. O(patches + workshop).
+/// triangle. What is `settled`, by triangle of the submesh, stays as it is. O(patches + submesh).
 pub(crate) fn make_coherent(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed, settled: &[bool]) -> Turned {
-    let (shop, edges) = work.edges();
+    let (submesh, edges) = work.edges();
     let patches = survey.patches.len() as u32;
-    let mut parity = Parity::new(survey.patches.len() + shop.triangles.len());
-    for t in shop.living() {
-        let patch = shop.triangles[t as usize].patch;
+    let mut parity = Parity::new(survey.patches.len() + submesh.triangles.len());
+    for t in submesh.living() {
+        let patch = submesh.triangles[t as usize].patch;
         if patch != NONE {
             parity.relate(patch, patches + t, false);
         }
@@ -113,7 +113,7 @@ pub(crate) fn make_coherent(survey: &Survey<'_>, work: &mut Work<'_>, reversed: 
     // Triangles on each side of each root, and the smallest record there.
     let nodes: Vec<(u32, u64, u32)> = (0..patches)
         .map(|p| (p, survey.patches[p as usize].triangles, survey.patches[p as usize].first))
-        .chain(shop.living().map(|t| (patches + t, 1, shop.record(t))))
+        .chain(submesh.living().map(|t| (patches + t, 1, submesh.record(t))))
         .collect();
     let mut sides = vec![[(0u64, NONE); 2]; parity.parents.len()];
     for (node, triangles, record) in &nodes {
@@ -134,7 +134,7 @@ pub(crate) fn make_coherent(survey: &Survey<'_>, work: &mut Work<'_>, reversed: 
     turned
 }
 
-/// Turns a node of the parity structure: a patch or a triangle of the workshop.
+/// Turns a node of the parity structure: a patch or a triangle of the submesh.
 pub(crate) fn turn(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed, node: u32) {
     match node.checked_sub(survey.patches.len() as u32) {
         None => reversed.patches[node as usize] ^= true,
@@ -149,11 +149,11 @@ pub(crate) fn make_outward(
     reversed: &mut Reversed,
     components: &Components,
 ) -> (u64, u64) {
-    let shop: &Shop = work;
+    let submesh: &Submesh = work;
     if components.list.iter().all(|c| c.open || c.extent.volume >= 0) {
         return (0, 0);
     }
-    let inverted = inverted(survey, shop, components, reversed);
+    let inverted = inverted(survey, submesh, components, reversed);
     let (mut count, mut triangles) = (0, 0);
     for (component, _) in components.list.iter().zip(&inverted).filter(|(_, i)| **i) {
         count += 1;
@@ -173,9 +173,9 @@ pub(crate) fn make_outward(
 /// Which components are inside out: from the outside in, one of negative volume that no body winds around. One that was coherent
 /// with an inverted component around it (of opposite sign: its cavity) is turned along. One that passes through the wall of another one of the
 /// same sign is no cavity of that, wherever the point lies that tells what is around it: in a file that is inside out both are bodies.
-fn inverted(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed: &Reversed) -> Vec<bool> {
+fn inverted(survey: &Survey<'_>, submesh: &Submesh, components: &Components, reversed: &Reversed) -> Vec<bool> {
     let list = &components.list;
-    let around = bodies::surroundings(survey, shop, components, reversed, |c| !c.open);
+    let around = bodies::surroundings(survey, submesh, components, reversed, |c| !c.open);
     let sign = |c: u32| list[c as usize].extent.volume.signum();
     // What lies in fewer components is decided first.
     let mut order: Vec<u32> = (0..list.len() as u32).filter(|c| !list[*c as usize].open).collect();
@@ -185,7 +185,7 @@ fn inverted(survey: &Survey<'_>, shop: &Shop, components: &Components, reversed:
     let tree = BoxTree::new(&open);
     let mut met = Vec::new();
     let pairs = survey.crossing_pairs.as_deref().unwrap_or_default().iter().map(|pair| pair.triangles);
-    let crossing = crate::repairs::shared::pieces::crossing_pieces(survey, shop, components, pairs);
+    let crossing = crate::repairs::shared::pieces::crossing_pieces(survey, submesh, components, pairs);
     let passes_through = |c: u32, o: u32| sign(c) == sign(o) && crossing.binary_search(&[c.min(o), c.max(o)]).is_ok();
     let mut inverted = vec![false; list.len()];
     for c in order {
@@ -212,7 +212,7 @@ mod tests {
 
     fn outward(triangles: &[Corners]) -> After<(u64, u64)> {
         after(triangles, |d, turned| {
-            let work = &mut Work::new(&mut d.shop);
+            let work = &mut Work::new(&mut d.submesh);
             let pieces = pieces::pieces(&d.survey, work, turned);
             make_outward(&d.survey, work, turned, &pieces)
         })
@@ -222,7 +222,7 @@ mod tests {
     fn a_flipped_face_is_turned_back() {
         let mut mesh = cube();
         mesh[5] = reversed(&mesh[5..6])[0];
-        let got = after(&mesh, |d, turned| make_coherent(&d.survey, &mut Work::new(&mut d.shop), turned, &[]));
+        let got = after(&mesh, |d, turned| make_coherent(&d.survey, &mut Work::new(&mut d.submesh), turned, &[]));
         assert_eq!((got.result.triangles, got.result.contradictions, got.untouched), (1, 0, 11));
         assert!(got.verdict.good, "{:?}", got.verdict);
     }

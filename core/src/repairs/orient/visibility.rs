@@ -21,7 +21,7 @@ use crate::repairs::orient::directions::{Parity, turn};
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed, Sample, Through};
 use crate::submesh::edges::Edges;
-use crate::submesh::{Shop, place};
+use crate::submesh::{Submesh, place};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
 
@@ -62,18 +62,18 @@ const OFF: f64 = 1.0 / (1u64 << 40) as f64;
 pub(crate) struct Faced {
     /// Triangles that were turned.
     pub(crate) triangles: u64,
-    /// By triangle of the workshop: it is settled how it faces. Empty: of none.
+    /// By triangle of the submesh: it is settled how it faces. Empty: of none.
     pub(crate) settled: Vec<bool>,
 }
 
-/// Turns large parts that are seen from behind, and what follows them. O(patches + workshop), and if there are any, a pass over the chunks
+/// Turns large parts that are seen from behind, and what follows them. O(patches + submesh), and if there are any, a pass over the chunks
 /// that they are in, and one for each direction over those that rays may meet.
 pub(crate) fn face_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed) -> Faced {
-    let (shop, edges) = work.edges();
+    let (submesh, edges) = work.edges();
     if !edges.iter().any(|edge| edge.is_unbalanced() && edge.uses.len() > 1) {
         return Faced::default();
     }
-    let surface = Surface::of(survey, shop, edges, reversed);
+    let surface = Surface::of(survey, submesh, edges, reversed);
     let parts = &surface.parts.list;
     // What would be turned of each sheet if only neighbours counted.
     let by_neighbours = surface.follow(&vec![None; parts.len()]);
@@ -85,7 +85,7 @@ pub(crate) fn face_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &
     }
     asked.sort_by_key(|p| (Reverse(parts[*p as usize].extent.area), parts[*p as usize].sample));
     asked.truncate(MOST);
-    let seen = seen(survey, shop, reversed, &surface.parts, &asked);
+    let seen = seen(survey, submesh, reversed, &surface.parts, &asked);
     // Where hardly anything is seen otherwise than neighbours have it, they are to be followed everywhere.
     let all: i128 = parts.iter().map(|part| part.extent.area).sum();
     let is_contested =
@@ -120,9 +120,9 @@ struct Surface {
 }
 
 impl Surface {
-    fn of(survey: &Survey<'_>, shop: &Shop, edges: &Edges, reversed: &Reversed) -> Self {
-        let parts = Components::of(survey, shop, edges, reversed, Through::CoherentEdges);
-        let sheets = Components::of(survey, shop, edges, reversed, Through::ManifoldEdges);
+    fn of(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, reversed: &Reversed) -> Self {
+        let parts = Components::of(survey, submesh, edges, reversed, Through::CoherentEdges);
+        let sheets = Components::of(survey, submesh, edges, reversed, Through::ManifoldEdges);
         let mut sheet_of = vec![NONE; parts.list.len()];
         let nodes = parts.of_patch.iter().zip(&sheets.of_patch).chain(parts.of_triangle.iter().zip(&sheets.of_triangle));
         nodes.filter(|(part, _)| **part != NONE).for_each(|(part, sheet)| sheet_of[*part as usize] = *sheet);
@@ -264,9 +264,9 @@ fn note(points: &mut Vec<Point>, point: Point) {
 }
 
 /// From where the parts that are asked about are seen.
-fn seen(survey: &Survey<'_>, shop: &Shop, reversed: &Reversed, parts: &Components, asked: &[u32]) -> BTreeMap<u32, Sides> {
+fn seen(survey: &Survey<'_>, submesh: &Submesh, reversed: &Reversed, parts: &Components, asked: &[u32]) -> BTreeMap<u32, Sides> {
     let wanted: HashSet<u32> = asked.iter().copied().collect();
-    let found = survey.visit_sound(
+    let found = survey.visit_regular(
         |patch| wanted.contains(&parts.of_patch[patch as usize]),
         |_| Some(HashMap::<u32, Vec<Point>>::new()),
         |_, _| true,
@@ -282,8 +282,8 @@ fn seen(survey: &Survey<'_>, shop: &Shop, reversed: &Reversed, parts: &Component
         let own = points.entry(part).or_default();
         found.into_iter().for_each(|point| note(own, point));
     }
-    for t in shop.living().filter(|t| wanted.contains(&parts.of_triangle[*t as usize])) {
-        note(points.entry(parts.of_triangle[t as usize]).or_default(), Point::of(shop.points(t), shop.record(t)));
+    for t in submesh.living().filter(|t| wanted.contains(&parts.of_triangle[*t as usize])) {
+        note(points.entry(parts.of_triangle[t as usize]).or_default(), Point::of(submesh.points(t), submesh.record(t)));
     }
     let all: Vec<(u32, Point)> =
         points.into_iter().flat_map(|(part, points)| points.into_iter().map(move |p| (part, p))).collect();
@@ -310,7 +310,7 @@ fn seen(survey: &Survey<'_>, shop: &Shop, reversed: &Reversed, parts: &Component
             Source { from, component: NONE }
         };
         let sources: Vec<Source> = towards.iter().map(source).collect();
-        let met = bodies::obstructed(survey, shop, parts, direction, &sources, |_| true);
+        let met = bodies::obstructed(survey, submesh, parts, direction, &sources, |_| true);
         for ((i, is_behind), _) in towards.iter().zip(met).filter(|(_, met)| !met) {
             sides[*i][usize::from(*is_behind)] = true;
         }
@@ -331,7 +331,7 @@ mod tests {
     use crate::testing::{After, Corners, after, cuboid, reversed};
 
     fn faced(mesh: &[Corners]) -> After<u64> {
-        after(mesh, |d, turned| face_outward(&d.survey, &mut Work::new(&mut d.shop), turned).triangles)
+        after(mesh, |d, turned| face_outward(&d.survey, &mut Work::new(&mut d.submesh), turned).triangles)
     }
 
     /// A box whose faces are divided in squares of one unit, without the face `without` (x low, x high, y low, …).

@@ -27,7 +27,7 @@ use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Reversed, nonmanifold_vertices};
 use crate::submesh::edges::Edge;
 use crate::submesh::wedges::{Half, Wedges};
-use crate::submesh::{Shop, Triangle, Vertex};
+use crate::submesh::{Submesh, Triangle, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
 
@@ -57,16 +57,16 @@ const OPENINGS: usize = 8;
 /// the vertex is left alone.
 const MOST_PAIRS: usize = 1 << 20;
 
-/// Takes surfaces apart at all vertices where that is possible. O(workshop) and a look at all boxes around what moves, if anything does.
+/// Takes surfaces apart at all vertices where that is possible. O(submesh) and a look at all boxes around what moves, if anything does.
 pub(crate) fn separate(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reversed, profile: &Profile) -> Separated {
-    let (shop, edges) = work.edges();
-    let vertices = if profile.separate { nonmanifold_vertices(shop, edges) } else { Vec::new() };
+    let (submesh, edges) = work.edges();
+    let vertices = if profile.separate { nonmanifold_vertices(submesh, edges) } else { Vec::new() };
     if vertices.is_empty() {
         return Separated::default();
     }
     let before = Before {
-        triangles: shop.triangles.clone(),
-        taken: shop.positions.iter().copied().map(Position::of).collect(),
+        triangles: submesh.triangles.clone(),
+        taken: submesh.positions.iter().copied().map(Position::of).collect(),
         farthest: profile.max_separation_relative * survey.bounds.diagonal(),
     };
     let mut from = BTreeMap::new();
@@ -78,10 +78,10 @@ pub(crate) fn separate(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reve
         let copies = std::mem::take(&mut apart.copies);
         let first = apart.first;
         if blamed.is_empty() {
-            let (shop, edges) = work.edges();
-            let mut done = Separated::default().but(shop, &nonmanifold_vertices(shop, edges));
+            let (submesh, edges) = work.edges();
+            let mut done = Separated::default().but(submesh, &nonmanifold_vertices(submesh, edges));
             let away: Vec<f64> = copies.iter().map(|copy| copy.away).collect();
-            done.regions = regions(shop, first, &away);
+            done.regions = regions(submesh, first, &away);
             for copy in copies {
                 *if copy.of.is_edge() { &mut done.edges } else { &mut done.vertices } += 1;
                 done.farthest = done.farthest.max(copy.away);
@@ -99,7 +99,7 @@ pub(crate) fn separate(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reve
     Separated::default().but(work, &vertices)
 }
 
-/// The workshop as it was.
+/// The submesh as it was.
 struct Before {
     triangles: Vec<Triangle>,
     /// Positions of its vertices.
@@ -161,9 +161,9 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
     /// Gives every fan of each of these vertices but one a vertex of its own, if there is a place for it. What stays is the surface that comes first
     /// in the file, so that along an edge it is the same at both ends.
     fn part_vertices(&mut self, survey: &Survey<'_>, vertices: &[Vertex]) {
-        let (shop, edges) = self.work.edges();
-        let wedges = Wedges::of(shop, edges);
-        let surfaces = surfaces(survey, shop, &wedges);
+        let (submesh, edges) = self.work.edges();
+        let wedges = Wedges::of(submesh, edges);
+        let surfaces = surfaces(survey, submesh, &wedges);
         for v in vertices {
             let Some(mut fans) = wedges.fans(self.work, *v) else { continue };
             if self.fans_cross(&fans) {
@@ -196,20 +196,20 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
 
     /// Gives a fan of `v` a vertex of its own; `false` if there is no place for it. Star lists stay as they were.
     fn part(&mut self, v: Vertex, fan: &[Half]) -> bool {
-        let shop: &Shop = self.work;
+        let submesh: &Submesh = self.work;
         let first = fan.iter().map(|h| h.triangle).min().unwrap_or(NONE);
         let of = Of { ends: [v; 2], triangles: [first, NONE] };
-        let corners: Vec<Vertex> = fan.iter().flat_map(|h| shop.triangles[h.triangle as usize].v).collect();
+        let corners: Vec<Vertex> = fan.iter().flat_map(|h| submesh.triangles[h.triangle as usize].v).collect();
         let own: Vec<u32> = fan.iter().map(|h| h.triangle).collect();
         let moved = |p: Point| -> Vec<Moved> {
             let one = |h: &Half| {
-                let mut corners = shop.points(h.triangle);
+                let mut corners = submesh.points(h.triangle);
                 corners[h.corner] = p;
                 (h.triangle, corners)
             };
             fan.iter().map(one).collect()
         };
-        let Some((copy, position)) = self.place(of, shop.place(v), &corners, &own, moved) else { return false };
+        let Some((copy, position)) = self.place(of, submesh.place(v), &corners, &own, moved) else { return false };
         let new = self.add(copy, position);
         self.family.entry(v).or_default().push(new);
         fan.iter().for_each(|h| self.work.assign(h.triangle, h.corner, new));
@@ -242,22 +242,22 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
 
     /// The edges of more than two triangles between vertices all of whose fans are closed, with their wedges in the file's order.
     fn crowded_edges(&mut self) -> Vec<([Vertex; 2], Vec<[Half; 2]>)> {
-        let (shop, edges) = self.work.edges();
+        let (submesh, edges) = self.work.edges();
         if !edges.any_nonmanifold() {
             return Vec::new();
         }
-        let wedges = Wedges::of(shop, edges);
+        let wedges = Wedges::of(submesh, edges);
         let crowded =
-            edges.iter().filter(|e| e.is_nonmanifold() && [e.low, e.high].iter().all(|v| wedges.fans(shop, *v).is_some()));
+            edges.iter().filter(|e| e.is_nonmanifold() && [e.low, e.high].iter().all(|v| wedges.fans(submesh, *v).is_some()));
         let in_order = |edge: Edge<'_>| {
             let forward = edge.uses.iter().filter(|u| u.forward);
             let mut pairs: Vec<[Half; 2]> = forward
                 .filter_map(|u| {
-                    let half = Half::of(shop, &edge, u);
+                    let half = Half::of(submesh, &edge, u);
                     Some([half, wedges.mate(half)?])
                 })
                 .collect();
-            pairs.sort_by_key(|pair| pair.map(|h| (shop.record(h.triangle), h.triangle)).into_iter().min());
+            pairs.sort_by_key(|pair| pair.map(|h| (submesh.record(h.triangle), h.triangle)).into_iter().min());
             ([edge.low, edge.high], pairs)
         };
         crowded.map(in_order).collect()
@@ -265,7 +265,7 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
 
     /// Divides the two triangles of a wedge at a new vertex; `false` if there is no place for it.
     fn open(&mut self, ends: [Vertex; 2], wedge: &[Half; 2]) -> bool {
-        let shop: &Shop = self.work;
+        let submesh: &Submesh = self.work;
         let mut wholes = wedge.map(|h| self.whole(h.triangle));
         wholes.sort_unstable();
         let mut from = ends.map(|v| self.original(v));
@@ -276,17 +276,17 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
             let [a, b, c] = [0, 1, 2].map(|k| (h.corner + k) % 3);
             [[a, 3, c], [3, b, c]]
         };
-        let corners: Vec<Vertex> = wedge.iter().flat_map(|h| shop.triangles[h.triangle as usize].v).collect();
+        let corners: Vec<Vertex> = wedge.iter().flat_map(|h| submesh.triangles[h.triangle as usize].v).collect();
         let own = wedge.map(|h| h.triangle);
         let moved = |p: Point| -> Vec<Moved> {
             let both = |h: &Half| {
-                let [a, b, c] = shop.points(h.triangle);
+                let [a, b, c] = submesh.points(h.triangle);
                 let whole = self.whole(h.triangle);
                 parts(h).map(|part| (whole, part.map(|k| [a, b, c, p][k])))
             };
             wedge.iter().flat_map(both).collect()
         };
-        let middle = (shop.place(ends[0]) + shop.place(ends[1])) / 2.0;
+        let middle = (submesh.place(ends[0]) + submesh.place(ends[1])) / 2.0;
         let Some((copy, position)) = self.place(of, middle, &corners, &own, moved) else { return false };
         let new = self.add(copy, position);
         for h in wedge {
@@ -311,7 +311,7 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
         own: &[u32],
         moved: impl Fn(Point) -> Vec<Moved>,
     ) -> Option<(Copy, Point)> {
-        let shop: &Shop = self.work;
+        let submesh: &Submesh = self.work;
         let mut corners = corners.to_vec();
         corners.sort_unstable();
         corners.dedup();
@@ -319,19 +319,19 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
         for v in &corners {
             let original = self.original(*v);
             let copies = self.family.get(&original).into_iter().flatten();
-            near.extend(copies.chain([&original]).flat_map(|v| shop.star(*v)).map(|(t, _)| t));
+            near.extend(copies.chain([&original]).flat_map(|v| submesh.star(*v)).map(|(t, _)| t));
         }
         near.sort_unstable();
         near.dedup();
         near.retain(|t| !own.contains(t));
         let most_places = MOST_PAIRS / ((near.len() + own.len()) * own.len());
-        let points = || corners.iter().map(|v| shop.positions[*v as usize]);
+        let points = || corners.iter().map(|v| submesh.positions[*v as usize]);
         let largest = points().flatten().map(f32::abs).fold(0.0, f32::max);
         let step = step_at(largest);
         let rays: Vec<DVec3> = points().map(|p| at(&p) - middle).filter(|ray| *ray != DVec3::ZERO).collect();
         let room = EDGE_SHARE * rays.iter().map(|ray| ray.length()).fold(f64::INFINITY, f64::min);
         let most = self.before.farthest.max(LEAST_STEPS * step);
-        let mut ways = directions(own.iter().map(|t| -shop.normal(*t).normalize_or_zero()));
+        let mut ways = directions(own.iter().map(|t| -submesh.normal(*t).normalize_or_zero()));
         let usual = ways.len();
         ways.extend(sideways(&rays));
         let all = &ways;
@@ -365,12 +365,12 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
 
     /// Do these triangles all have an area, and meet neither each other nor those `near` more than before?
     fn accepts(&self, moved: &[Moved], near: &[u32]) -> bool {
-        let shop: &Shop = self.work;
+        let submesh: &Submesh = self.work;
         moved.iter().enumerate().all(|(i, one)| {
             let (_, [a, b, c]) = one;
             !crate::geometry::collinear::is_collinear(a, b, c)
                 && moved[..i].iter().all(|other| !self.meets(one, other))
-                && near.iter().all(|t| !self.meets(one, &(self.whole(*t), shop.points(*t))))
+                && near.iter().all(|t| !self.meets(one, &(self.whole(*t), submesh.points(*t))))
         })
     }
 
@@ -416,37 +416,37 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
         if self.copies.is_empty() {
             return Some(blamed);
         }
-        let shop: &Shop = self.work;
-        let positions = &shop.positions[self.first as usize..];
+        let submesh: &Submesh = self.work;
+        let positions = &submesh.positions[self.first as usize..];
         let copy_at: HashMap<Position, usize> = positions.iter().copied().map(Position::of).zip(0..).collect();
-        for (suspect, _) in survey.beyond_the_workshop(positions) {
-            let corners = position::corners(&survey.records[suspect.triangle as usize]);
+        for (irregular_triangle, _) in survey.beyond_the_submesh(positions) {
+            let corners = position::corners(&survey.records[irregular_triangle.triangle as usize]);
             blamed.extend(corners.iter().filter_map(|p| copy_at.get(&Position::of(*p))));
         }
-        let overlay = Overlay::of(survey, shop, reversed)?;
-        let copies = |t: u32| shop.triangles[t as usize].v.into_iter().filter_map(|v| v.checked_sub(self.first));
-        let pairs = overlay.met_by(survey, shop, |t| copies(t).next().is_some())?;
+        let overlay = Overlay::of(survey, submesh, reversed)?;
+        let copies = |t: u32| submesh.triangles[t as usize].v.into_iter().filter_map(|v| v.checked_sub(self.first));
+        let pairs = overlay.met_by(survey, submesh, |t| copies(t).next().is_some())?;
         for pair in pairs {
-            let in_shop = pair.triangles.map(|number| overlay.changed_of(number));
+            let in_submesh = pair.triangles.map(|number| overlay.changed_of(number));
             let before = pair.triangles.map(|number| match overlay.changed_of(number) {
                 Some(t) => self.points_before(self.whole(t)),
                 None => position::corners(&survey.records[number as usize]),
             });
-            let of_one = matches!(in_shop, [Some(a), Some(b)] if self.whole(a) == self.whole(b));
+            let of_one = matches!(in_submesh, [Some(a), Some(b)] if self.whole(a) == self.whole(b));
             if of_one || badness(pair.contact) > badness(triangles_cross(&before[0], &before[1])) {
-                blamed.extend(in_shop.into_iter().flatten().flat_map(copies).map(|copy| copy as usize));
+                blamed.extend(in_submesh.into_iter().flatten().flat_map(copies).map(|copy| copy as usize));
             }
         }
         Some(blamed)
     }
 }
 
-/// For each triangle the first record of the surface that it is a part of, as surfaces go on through wedges. O(patches + workshop).
-fn surfaces(survey: &Survey<'_>, shop: &Shop, wedges: &Wedges) -> Vec<u32> {
+/// For each triangle the first record of the surface that it is a part of, as surfaces go on through wedges. O(patches + submesh).
+fn surfaces(survey: &Survey<'_>, submesh: &Submesh, wedges: &Wedges) -> Vec<u32> {
     let patches = survey.patches.len() as u32;
-    let mut parents: Vec<u32> = (0..patches + shop.triangles.len() as u32).collect();
-    for t in shop.living() {
-        let patch = shop.triangles[t as usize].patch;
+    let mut parents: Vec<u32> = (0..patches + submesh.triangles.len() as u32).collect();
+    for t in submesh.living() {
+        let patch = submesh.triangles[t as usize].patch;
         if patch != NONE {
             crate::util::union_find::unite(&mut parents, patch, patches + t);
         }
@@ -455,12 +455,15 @@ fn surfaces(survey: &Survey<'_>, shop: &Shop, wedges: &Wedges) -> Vec<u32> {
         }
     }
     let mut first = vec![NONE; parents.len()];
-    let records = survey.patches.iter().map(|p| p.first).zip(0..).chain(shop.living().map(|t| (shop.record(t), patches + t)));
+    let records =
+        survey.patches.iter().map(|p| p.first).zip(0..).chain(submesh.living().map(|t| (submesh.record(t), patches + t)));
     for (record, node) in records {
         let root = crate::util::union_find::find(&mut parents, node) as usize;
         first[root] = first[root].min(record);
     }
-    (0..shop.triangles.len() as u32).map(|t| first[crate::util::union_find::find(&mut parents, patches + t) as usize]).collect()
+    (0..submesh.triangles.len() as u32)
+        .map(|t| first[crate::util::union_find::find(&mut parents, patches + t) as usize])
+        .collect()
 }
 
 /// What lies on something can be lifted off it; what crosses it cannot.

@@ -20,7 +20,7 @@ use crate::repairs::shared::overlay::Overlay;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Reversed, nonmanifold_vertices};
 use crate::submesh::wedges::Wedges;
-use crate::submesh::{Origin, Shop, Triangle, Vertex};
+use crate::submesh::{Origin, Submesh, Triangle, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
 
@@ -53,7 +53,7 @@ struct Pinned {
     from: usize,
 }
 
-/// Closes fans of vertices at which [`crate::repairs::separate::nonmanifold::separate`] left several. O(workshop) a round.
+/// Closes fans of vertices at which [`crate::repairs::separate::nonmanifold::separate`] left several. O(submesh) a round.
 pub(crate) fn unpin(
     survey: &mut Survey<'_>,
     work: &mut Work<'_>,
@@ -64,17 +64,17 @@ pub(crate) fn unpin(
     if separated.left == 0 {
         return;
     }
-    let (shop, edges) = work.edges();
-    let vertices = nonmanifold_vertices(shop, edges);
+    let (submesh, edges) = work.edges();
+    let vertices = nonmanifold_vertices(submesh, edges);
     complete_around(survey, work, reversed, &vertices[..vertices.len().min(MOST)]);
-    let (shop, edges) = work.edges();
-    let wedges = Wedges::of(shop, edges);
+    let (submesh, edges) = work.edges();
+    let wedges = Wedges::of(submesh, edges);
     let limit = profile.max_separation_relative * survey.bounds.diagonal();
     let mut all: BTreeMap<Vertex, Pinned> = BTreeMap::new();
     for v in vertices.iter().take(MOST) {
-        all.extend(Pinned::at(shop, &wedges, *v, limit).map(|pinned| (*v, pinned)));
+        all.extend(Pinned::at(submesh, &wedges, *v, limit).map(|pinned| (*v, pinned)));
     }
-    let before: Vec<Triangle> = shop.triangles.clone();
+    let before: Vec<Triangle> = submesh.triangles.clone();
     let met_before: HashSet<Vertex> = vertices.iter().copied().collect();
     for _ in 0..ROUNDS {
         if all.is_empty() {
@@ -119,15 +119,15 @@ fn complete_around(survey: &mut Survey<'_>, work: &mut Work<'_>, reversed: &Reve
 
 impl Pinned {
     /// `None` if the fans are not all closed and complete, or not enough of them can be closed within the limit.
-    fn at(shop: &Shop, wedges: &Wedges, v: Vertex, limit: f64) -> Option<Self> {
-        let fans = wedges.fans(shop, v)?;
-        let is_complete = |t: &u32| shop.triangles[*t as usize].v.iter().all(|v| shop.complete[*v as usize]);
+    fn at(submesh: &Submesh, wedges: &Wedges, v: Vertex, limit: f64) -> Option<Self> {
+        let fans = wedges.fans(submesh, v)?;
+        let is_complete = |t: &u32| submesh.triangles[*t as usize].v.iter().all(|v| submesh.complete[*v as usize]);
         let wanted = fans.len().checked_sub(1).filter(|wanted| *wanted > 0)?;
         let fans: Vec<Vec<u32>> = fans.iter().map(|fan| fan.iter().map(|half| half.triangle).collect()).collect();
         let complete = fans.iter().filter(|fan| fan.iter().all(is_complete));
         let way = |fan: &Vec<u32>| {
             let beside: Vec<u32> = fans.iter().filter(|other| *other != fan).flatten().copied().collect();
-            refill_of(shop, fan.clone(), &beside, limit)
+            refill_of(submesh, fan.clone(), &beside, limit)
         };
         let mut ways: Vec<Refill> = complete.filter_map(way).collect();
         ways.sort_by(|a, b| a.moved.total_cmp(&b.moved).then_with(|| a.triangles.cmp(&b.triangles)));
@@ -171,13 +171,13 @@ fn blamed(
     let by = |t: u32| t.checked_sub(first).map(|n| added_by[n as usize]);
     let added = first..work.triangles.len() as u32;
     let mut blamed: BTreeSet<Vertex> = added.clone().filter(|t| work.is_collinear(*t)).filter_map(by).collect();
-    let (shop, edges) = work.edges();
+    let (submesh, edges) = work.edges();
     let of_pairs = edges.iter().filter(|edge| edge.uses.len() > 2).flat_map(|edge| edge.uses).map(|used| used.triangle);
     blamed.extend(of_pairs.filter_map(by));
-    let met: HashSet<Vertex> = nonmanifold_vertices(shop, edges).into_iter().filter(|v| !met_before.contains(v)).collect();
-    blamed.extend(added.filter(|t| shop.triangles[*t as usize].v.iter().any(|v| met.contains(v))).filter_map(by));
-    let overlay = Overlay::of(survey, shop, reversed)?;
-    let pairs = overlay.met_by(survey, shop, |t| t >= first)?;
+    let met: HashSet<Vertex> = nonmanifold_vertices(submesh, edges).into_iter().filter(|v| !met_before.contains(v)).collect();
+    blamed.extend(added.filter(|t| submesh.triangles[*t as usize].v.iter().any(|v| met.contains(v))).filter_map(by));
+    let overlay = Overlay::of(survey, submesh, reversed)?;
+    let pairs = overlay.met_by(survey, submesh, |t| t >= first)?;
     let numbers = pairs.iter().flat_map(|pair| pair.triangles);
     blamed.extend(numbers.filter_map(|number| overlay.changed_of(number)).filter_map(by));
     Some(blamed)
@@ -193,7 +193,7 @@ mod tests {
         let profile = Profile { max_separation_relative: limit, ..Profile::default() };
         after(&mesh, |d, turned| {
             let mut separated = Separated { left: 1, ..Separated::default() };
-            unpin(&mut d.survey, &mut Work::new(&mut d.shop), turned, &profile, &mut separated);
+            unpin(&mut d.survey, &mut Work::new(&mut d.submesh), turned, &profile, &mut separated);
             separated
         })
     }

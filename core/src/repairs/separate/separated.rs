@@ -7,7 +7,7 @@ use crate::geometry::sums::Bounds;
 use crate::repairs::shared::regions::Unsettled;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::nonmanifold_vertices;
-use crate::submesh::{Shop, Vertex};
+use crate::submesh::{Submesh, Vertex};
 use std::fmt;
 
 /// What was taken apart.
@@ -35,14 +35,14 @@ impl Separated {
         self.removed += regions.len() as u64;
         self.farthest = regions.iter().fold(self.farthest, |farthest, region| farthest.max(region.moved));
         self.regions.append(&mut regions);
-        let (shop, edges) = work.edges();
-        *self = std::mem::take(self).but(shop, &nonmanifold_vertices(shop, edges));
+        let (submesh, edges) = work.edges();
+        *self = std::mem::take(self).but(submesh, &nonmanifold_vertices(submesh, edges));
     }
 
     /// At these vertices surfaces still meet.
-    pub(crate) fn but(self, shop: &Shop, vertices: &[Vertex]) -> Self {
+    pub(crate) fn but(self, submesh: &Submesh, vertices: &[Vertex]) -> Self {
         let one = |v: &Vertex| {
-            let at = shop.positions[*v as usize];
+            let at = submesh.positions[*v as usize];
             let reason = Some("surfaces that meet there could not be taken apart".into());
             let region = Region { rung: Rung::Left, bounds: [at; 2], count: 1, rounds: 0, moved: 0.0, reason };
             Unsettled { region, at }
@@ -70,11 +70,11 @@ impl fmt::Display for Separated {
 }
 
 /// The copies of vertices, `first` the first of them, by what hangs together. `away`: how far each is from where it was made.
-pub(crate) fn regions(shop: &Shop, first: Vertex, away: &[f64]) -> Vec<Region> {
+pub(crate) fn regions(submesh: &Submesh, first: Vertex, away: &[f64]) -> Vec<Region> {
     let mut parents: Vec<u32> = (0..away.len() as u32).collect();
     for copy in 0..away.len() as u32 {
-        for (t, _) in shop.star(first + copy) {
-            let others = shop.triangles[t as usize].v.into_iter().filter_map(|v| v.checked_sub(first));
+        for (t, _) in submesh.star(first + copy) {
+            let others = submesh.triangles[t as usize].v.into_iter().filter_map(|v| v.checked_sub(first));
             others.for_each(|other| {
                 crate::util::union_find::unite(&mut parents, copy, other);
             });
@@ -84,7 +84,7 @@ pub(crate) fn regions(shop: &Shop, first: Vertex, away: &[f64]) -> Vec<Region> {
     for (copy, away) in (0..).zip(away) {
         let (bounds, count, moved) =
             all.entry(crate::util::union_find::find(&mut parents, copy)).or_insert((Bounds::EMPTY, 0, 0.0));
-        bounds.include(&[shop.positions[(first + copy) as usize]]);
+        bounds.include(&[submesh.positions[(first + copy) as usize]]);
         (*count, *moved) = (*count + 1, away.max(*moved));
     }
     let region = |(bounds, count, moved): (Bounds, u64, f64)| {

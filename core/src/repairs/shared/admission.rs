@@ -10,7 +10,7 @@ use crate::contract::report::LoopClass;
 use crate::contract::settings::Profile;
 use crate::detect::holes::{self, Shapes, loops::Loop};
 use crate::repairs::shared::work::Work;
-use crate::submesh::Shop;
+use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::submesh::edges::Edges;
 use crate::submesh::near::Tolerance;
@@ -40,7 +40,7 @@ pub(crate) enum NotAdmitted {
     Sheet,
 }
 
-/// What decides of a workshop's loops.
+/// What decides of a submesh's loops.
 pub(crate) struct Admission<'p> {
     profile: &'p Profile,
     longest: f64,
@@ -59,30 +59,30 @@ impl<'p> Admission<'p> {
         tolerance: &Tolerance,
         profile: &'p Profile,
     ) -> Self {
-        let (shop, edges) = work.edges();
+        let (submesh, edges) = work.edges();
         let by_share = profile.max_hole_perimeter_relative * survey.bounds.diagonal();
         let longest = if profile.max_hole_perimeter_mm > 0.0 { by_share.min(profile.max_hole_perimeter_mm) } else { by_share };
         let mut refused = Vec::new();
         if !profile.leave_open.is_empty() {
-            let left = left_open(shop, edges, loops, tolerance, profile);
+            let left = left_open(submesh, edges, loops, tolerance, profile);
             refused.extend(left.map(|(rim, class)| (rim.vertices[0], NotAdmitted::Class(class.name()))));
         }
         if !profile.close_sheets && profile.fill_holes {
-            refused.extend(sheet_rims(survey, shop, edges, loops, shapes, reversed).map(|v| (v, NotAdmitted::Sheet)));
+            refused.extend(sheet_rims(survey, submesh, edges, loops, shapes, reversed).map(|v| (v, NotAdmitted::Sheet)));
         }
         refused.sort_by_key(|(v, _)| *v);
         Self { profile, longest, refused }
     }
 
     /// May this loop be closed?
-    pub(crate) fn check(&self, shop: &Shop, rim: &Loop) -> Result<(), NotAdmitted> {
-        self.check_limits(shop, rim)?;
+    pub(crate) fn check(&self, submesh: &Submesh, rim: &Loop) -> Result<(), NotAdmitted> {
+        self.check_limits(submesh, rim)?;
         self.refusal(rim).map_or(Ok(()), |reason| Err(reason.clone()))
     }
 
     /// The same together with another loop: a sheet that is joined to something is lone no more.
-    pub(crate) fn check_joined(&self, shop: &Shop, rim: &Loop) -> Result<(), NotAdmitted> {
-        if self.is_sheet(rim) { self.check_limits(shop, rim) } else { self.check(shop, rim) }
+    pub(crate) fn check_joined(&self, submesh: &Submesh, rim: &Loop) -> Result<(), NotAdmitted> {
+        if self.is_sheet(rim) { self.check_limits(submesh, rim) } else { self.check(submesh, rim) }
     }
 
     /// Is it the rim of a lone sheet?
@@ -97,14 +97,14 @@ impl<'p> Admission<'p> {
         self.refused.retain(|(v, _)| firsts.binary_search(v).is_err());
     }
 
-    fn check_limits(&self, shop: &Shop, rim: &Loop) -> Result<(), NotAdmitted> {
+    fn check_limits(&self, submesh: &Submesh, rim: &Loop) -> Result<(), NotAdmitted> {
         if !self.profile.fill_holes {
             return Err(NotAdmitted::FillsNone);
         }
         if rim.vertices.len() as u64 > u64::from(self.profile.max_hole_edges) {
             return Err(NotAdmitted::Edges(self.profile.max_hole_edges));
         }
-        if rim.perimeter(shop) > self.longest {
+        if rim.perimeter(submesh) > self.longest {
             return Err(NotAdmitted::Perimeter(self.longest));
         }
         Ok(())
@@ -118,20 +118,20 @@ impl<'p> Admission<'p> {
 
 /// Loops of kinds that the profile leaves open.
 pub(crate) fn left_open<'l>(
-    shop: &Shop,
+    submesh: &Submesh,
     edges: &Edges,
     loops: &'l [Loop],
     tolerance: &Tolerance,
     profile: &Profile,
 ) -> impl Iterator<Item = (&'l Loop, LoopClass)> {
-    let classes = holes::classify(shop, edges, loops, tolerance, profile.gap_edge_share).map(|found| found.class);
+    let classes = holes::classify(submesh, edges, loops, tolerance, profile.gap_edge_share).map(|found| found.class);
     loops.iter().zip(classes).filter(|(_, class)| profile.leave_open.contains(class))
 }
 
 /// First vertices of the loops that are rims of lone sheets.
 fn sheet_rims<'l>(
     survey: &Survey<'_>,
-    shop: &Shop,
+    submesh: &Submesh,
     edges: &Edges,
     loops: &'l [Loop],
     shapes: &Shapes,
@@ -141,7 +141,7 @@ fn sheet_rims<'l>(
     let mut of_loop = vec![NONE; loops.len()];
     let mut is_sheet = Vec::new();
     if lies_back.contains(&true) {
-        let components = Components::of(survey, shop, edges, reversed, Through::EveryEdge);
+        let components = Components::of(survey, submesh, edges, reversed, Through::EveryEdge);
         let middle = survey.measure.middle();
         // What the components enclose once their loops are closed, and the area they have then.
         let mut enclosed: Vec<(f64, f64)> =
@@ -149,7 +149,7 @@ fn sheet_rims<'l>(
         for ((rim, component), lies_back) in loops.iter().zip(&mut of_loop).zip(&mut lies_back) {
             *component = components.of_triangle[rim.triangles[0] as usize];
             if let Some((volume, area)) = enclosed.get_mut(*component as usize) {
-                let (more, patch) = fan(shop, rim, middle);
+                let (more, patch) = fan(submesh, rim, middle);
                 *lies_back &= patch >= LARGE * survey.measure.area(components.list[*component as usize].extent);
                 *volume += more;
                 *area += patch;
@@ -166,12 +166,12 @@ fn sheet_rims<'l>(
 }
 
 /// Volume under a fan over a loop, seen from a point, and its area.
-fn fan(shop: &Shop, rim: &Loop, from: DVec3) -> (f64, f64) {
+fn fan(submesh: &Submesh, rim: &Loop, from: DVec3) -> (f64, f64) {
     let n = rim.vertices.len();
-    let centre = rim.vertices.iter().map(|v| shop.place(*v)).sum::<DVec3>() / n as f64;
+    let centre = rim.vertices.iter().map(|v| submesh.place(*v)).sum::<DVec3>() / n as f64;
     let (mut volume, mut area) = (0.0, 0.0);
     for i in 0..n {
-        let [a, b] = [i, (i + 1) % n].map(|k| shop.place(rim.vertices[k]));
+        let [a, b] = [i, (i + 1) % n].map(|k| submesh.place(rim.vertices[k]));
         let normal = (a - centre).cross(b - centre);
         volume += (centre - from).dot(normal) / 6.0;
         area += normal.length() / 2.0;

@@ -21,7 +21,7 @@ pub(crate) struct Obstacle {
     pub(crate) met_already: bool,
 }
 
-/// For each patch that crosses something what it crosses. `patch_of`: the patch that a triangle of the workshop belongs to; `is_new`: whether
+/// For each patch that crosses something what it crosses. `patch_of`: the patch that a triangle of the submesh belongs to; `is_new`: whether
 /// a patch is to be tested against everything, and not only against such ones. `None` if that is too much work to tell, or the file holds
 /// too many triangles to number them. O(boxes around new patches), and a look at the components if anything is crossed.
 pub(crate) fn crossed(
@@ -31,10 +31,10 @@ pub(crate) fn crossed(
     patch_of: &[Option<u32>],
     is_new: impl Fn(u32) -> bool,
 ) -> Option<BTreeMap<u32, Vec<Obstacle>>> {
-    let (shop, edges) = work.edges();
+    let (submesh, edges) = work.edges();
     let patch = |t: u32| patch_of[t as usize];
-    let overlay = Overlay::of(survey, shop, reversed)?;
-    let pairs = overlay.met_by(survey, shop, |t| patch(t).is_some_and(&is_new))?;
+    let overlay = Overlay::of(survey, submesh, reversed)?;
+    let pairs = overlay.met_by(survey, submesh, |t| patch(t).is_some_and(&is_new))?;
     let owner = |number: u32| overlay.changed_of(number).and_then(patch);
     // The patch to blame with one of its triangles, and what that crosses.
     let mut blamed: Vec<(u32, u32, u32)> = Vec::new();
@@ -53,10 +53,10 @@ pub(crate) fn crossed(
         return Some(BTreeMap::new());
     }
     blamed.sort_unstable();
-    let components = Components::of(survey, shop, edges, reversed, Through::EveryEdge);
+    let components = Components::of(survey, submesh, edges, reversed, Through::EveryEdge);
     let met = survey.crossing_pairs.as_deref().unwrap_or_default();
     let others = blamed.iter().map(|(_, _, other)| *other).filter(|other| overlay.changed_of(*other).is_none());
-    let of_record = components_of_records(survey, shop, &components, others.chain(met.iter().flat_map(|pair| pair.triangles)));
+    let of_record = components_of_records(survey, submesh, &components, others.chain(met.iter().flat_map(|pair| pair.triangles)));
     let mut met: Vec<[u32; 2]> = met
         .iter()
         .filter_map(|pair| Some([*of_record.get(&pair.triangles[0])?, *of_record.get(&pair.triangles[1])?]))
@@ -72,7 +72,7 @@ pub(crate) fn crossed(
     let mut crossed: BTreeMap<u32, Vec<Obstacle>> = BTreeMap::new();
     let mut known = HashSet::new();
     for (patch, of_patch, other) in blamed {
-        let corners = overlay.corners(survey, shop, other);
+        let corners = overlay.corners(survey, submesh, other);
         let of_both = component(of_patch).zip(component(other));
         let obstacle = Obstacle { corners, met_already: of_both.is_some_and(|(a, b)| met.binary_search(&[a, b]).is_ok()) };
         if known.insert((patch, corners.map(Position::of), obstacle.met_already)) {

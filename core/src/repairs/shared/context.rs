@@ -71,7 +71,7 @@ struct Known {
 /// What one repair hands to a later one.
 #[derive(Default)]
 pub(crate) struct Handed {
-    /// By triangle of the workshop: it is settled which way it faces. Of facing, for the orientation.
+    /// By triangle of the submesh: it is settled which way it faces. Of facing, for the orientation.
     pub(crate) settled: Vec<bool>,
     /// Rims of open shapes were let down into what they stand on, so there is something to be cut.
     pub(crate) has_skirts: bool,
@@ -91,7 +91,7 @@ pub(crate) struct Handed {
     pub(crate) may_cross: bool,
     /// Regions that were left as they were, unless a wrap replaces them.
     pub(crate) unsettled: Vec<Unsettled>,
-    /// The triangles of wraps, which are not in the workshop.
+    /// The triangles of wraps, which are not in the submesh.
     pub(crate) wrapped: Vec<[[f32; 3]; 3]>,
     /// Where vertices were that wraps replaced, ascending.
     pub(crate) replaced: Vec<Position>,
@@ -121,7 +121,7 @@ pub(crate) type PatchAcross = (std::ops::Range<u32>, LoopLeft);
 pub(crate) struct Context<'c, 'r> {
     pub(crate) survey: &'c mut Survey<'r>,
     pub(crate) work: Work<'c>,
-    /// How patches of sound surface, which are not in the workshop, are turned, and which of them go.
+    /// How patches of regular surface, which are not in the submesh, are turned, and which of them go.
     pub(crate) reversed: Reversed,
     pub(crate) tolerance: &'c Tolerance,
     /// The defects of the file as it came.
@@ -136,7 +136,7 @@ pub(crate) struct Context<'c, 'r> {
 }
 
 impl<'c, 'r> Context<'c, 'r> {
-    /// Of a file whose workshop is as it was gathered.
+    /// Of a file whose submesh is as it was gathered.
     pub(crate) fn of(
         diagnosis: &'c mut Diagnosis<'r>,
         path: &'c Path,
@@ -145,10 +145,10 @@ impl<'c, 'r> Context<'c, 'r> {
         progress: &'c dyn Progress,
     ) -> Self {
         let reversed = Reversed::none(&diagnosis.survey);
-        let Diagnosis { survey, shop, tolerance, defects } = diagnosis;
+        let Diagnosis { survey, submesh, tolerance, defects } = diagnosis;
         Self {
             survey,
-            work: Work::new(shop),
+            work: Work::new(submesh),
             reversed,
             tolerance,
             before: defects,
@@ -162,7 +162,7 @@ impl<'c, 'r> Context<'c, 'r> {
         }
     }
 
-    /// The pieces of surface that stand for themselves, as [`pieces::pieces`] finds them. O(patches + workshop) after a change, O(1) else.
+    /// The pieces of surface that stand for themselves, as [`pieces::pieces`] finds them. O(patches + submesh) after a change, O(1) else.
     pub(crate) fn pieces(&mut self) -> Rc<Components> {
         let version = self.work.version();
         match &self.known.pieces {

@@ -1,4 +1,4 @@
-//! What all repairs share: the workshop and its changes, what is known of it, and the account of what was done.
+//! What all repairs share: the submesh and its changes, what is known of it, and the account of what was done.
 
 pub(crate) mod account;
 pub(crate) mod admission;

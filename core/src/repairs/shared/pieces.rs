@@ -5,22 +5,22 @@ use std::collections::BTreeMap;
 
 use crate::geometry::position;
 use crate::submesh::components::{Component, Components, Reversed, Through};
-use crate::submesh::{Origin, Shop};
+use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
 
 /// The pieces of surface that stand for themselves: bodies that touch along an edge each for itself, what is closed only together, together.
-/// O(patches + workshop).
+/// O(patches + submesh).
 pub(crate) fn pieces(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reversed) -> Components {
-    let (shop, edges) = work.edges();
-    let components = Components::of(survey, shop, edges, reversed, Through::ManifoldEdges);
+    let (submesh, edges) = work.edges();
+    let components = Components::of(survey, submesh, edges, reversed, Through::ManifoldEdges);
     if !edges.any_nonmanifold() {
         return components;
     }
-    Components::of(survey, shop, edges, reversed, Through::OpenSheets(&components))
+    Components::of(survey, submesh, edges, reversed, Through::OpenSheets(&components))
 }
 
-/// Removes whole pieces. O(patches + workshop).
+/// Removes whole pieces. O(patches + submesh).
 pub(crate) fn take_away(work: &mut Work<'_>, reversed: &mut Reversed, pieces: &Components, goes: &[bool]) {
     let goes = |piece: &u32| *piece != NONE && goes[*piece as usize];
     reversed.dropped.iter_mut().zip(&pieces.of_patch).for_each(|(dropped, piece)| *dropped |= goes(piece));
@@ -42,12 +42,12 @@ pub(crate) fn lies_in_material(piece: &Component, outside: i32) -> bool {
 /// Which pieces cross another one.
 pub(crate) fn crossing(
     survey: &Survey<'_>,
-    shop: &Shop,
+    submesh: &Submesh,
     pieces: &Components,
     pairs: impl Iterator<Item = [u32; 2]> + Clone,
 ) -> Vec<bool> {
     let mut crossing = vec![false; pieces.list.len()];
-    let all = crossing_pieces(survey, shop, pieces, pairs);
+    let all = crossing_pieces(survey, submesh, pieces, pairs);
     all.into_iter().flatten().for_each(|piece| crossing[piece as usize] = true);
     crossing
 }
@@ -55,11 +55,11 @@ pub(crate) fn crossing(
 /// The pieces that cross each other, by twos, the smaller number first; each once, ascending. A look at the chunks of what crosses.
 pub(crate) fn crossing_pieces(
     survey: &Survey<'_>,
-    shop: &Shop,
+    submesh: &Submesh,
     pieces: &Components,
     pairs: impl Iterator<Item = [u32; 2]> + Clone,
 ) -> Vec<[u32; 2]> {
-    let of_record = components_of_records(survey, shop, pieces, pairs.clone().flatten());
+    let of_record = components_of_records(survey, submesh, pieces, pairs.clone().flatten());
     // What is gone crosses nothing any more.
     let piece = |record: u32| of_record.get(&record).copied().filter(|piece| *piece != NONE);
     let mut all: Vec<[u32; 2]> = pairs
@@ -72,10 +72,10 @@ pub(crate) fn crossing_pieces(
     all
 }
 
-/// The components of some records that are as they were. Reads the chunks where those are that are not in the workshop.
+/// The components of some records that are as they were. Reads the chunks where those are that are not in the submesh.
 pub(crate) fn components_of_records(
     survey: &Survey<'_>,
-    shop: &Shop,
+    submesh: &Submesh,
     components: &Components,
     records: impl Iterator<Item = u32>,
 ) -> BTreeMap<u32, u32> {
@@ -84,7 +84,7 @@ pub(crate) fn components_of_records(
     wanted.dedup();
     let is_wanted = |record: u32| wanted.binary_search(&record).is_ok();
     let mut found = BTreeMap::new();
-    for (t, triangle) in shop.triangles.iter().enumerate() {
+    for (t, triangle) in submesh.triangles.iter().enumerate() {
         if let Origin::Input(record) = triangle.origin
             && is_wanted(record)
         {
@@ -97,9 +97,11 @@ pub(crate) fn components_of_records(
         .map(|record| position::corners(&survey.records[*record as usize])[0])
         .collect();
     if !positions.is_empty() {
-        let around = survey.beyond_the_workshop(&positions);
-        let around = around.iter().filter(|(suspect, patch)| is_wanted(suspect.triangle) && *patch != NONE);
-        found.extend(around.map(|(suspect, patch)| (suspect.triangle, components.of_patch[*patch as usize])));
+        let around = survey.beyond_the_submesh(&positions);
+        let around = around.iter().filter(|(irregular_triangle, patch)| is_wanted(irregular_triangle.triangle) && *patch != NONE);
+        found.extend(
+            around.map(|(irregular_triangle, patch)| (irregular_triangle.triangle, components.of_patch[*patch as usize])),
+        );
     }
     found
 }

@@ -16,7 +16,7 @@ use crate::contract::report::{BodyLost, Volumes};
 use crate::detect::bodies;
 use crate::geometry::sums::Bounds;
 use crate::io::record;
-use crate::submesh::Shop;
+use crate::submesh::Submesh;
 use crate::submesh::components::{Component, Components, Reversed, Sample};
 use crate::topology::survey::Survey;
 
@@ -54,7 +54,7 @@ pub(crate) struct Probes {
 
 impl Probes {
     /// Of the closed `pieces` of positive volume. Reads the chunks of the file above the points that are tried.
-    pub(crate) fn of(survey: &Survey<'_>, shop: &Shop, reversed: &Reversed, pieces: &Components) -> Self {
+    pub(crate) fn of(survey: &Survey<'_>, submesh: &Submesh, reversed: &Reversed, pieces: &Components) -> Self {
         let volume = |piece: &Component| survey.measure.volume(piece.extent);
         let mut list: Vec<(u32, f64)> = (0..)
             .zip(&pieces.list)
@@ -71,10 +71,10 @@ impl Probes {
         let (in_box, depths) = (share(IN_BOX), share(DEPTHS).max(LEAST_DEPTHS));
         let candidates = |number: u32| {
             let piece = &pieces.list[number as usize];
-            points_in(&piece.bounds, in_box).chain(points_below(survey, shop, &turned, piece, depths)).collect()
+            points_in(&piece.bounds, in_box).chain(points_below(survey, submesh, &turned, piece, depths)).collect()
         };
         let tried: Vec<Vec<[f64; 3]>> = list.iter().map(|(number, _)| candidates(*number)).collect();
-        let mut around = bodies::surfaces_around(survey, shop, pieces, reversed, &tried.concat()).into_iter();
+        let mut around = bodies::surfaces_around(survey, submesh, pieces, reversed, &tried.concat()).into_iter();
         let mut probes = Self { bodies: Vec::new(), points: Vec::new() };
         for ((number, volume), tried) in list.into_iter().zip(tried) {
             let first = probes.points.len();
@@ -100,12 +100,12 @@ impl Probes {
     pub(crate) fn look_for(
         &self,
         survey: &Survey<'_>,
-        shop: &Shop,
+        submesh: &Submesh,
         reversed: &Reversed,
         pieces: &Components,
         wrapped: &[[[f32; 3]; 3]],
     ) -> Volumes {
-        let mut windings = bodies::windings(survey, shop, pieces, reversed, &self.points);
+        let mut windings = bodies::windings(survey, submesh, pieces, reversed, &self.points);
         windings.iter_mut().zip(bodies::windings_of(wrapped, &self.points)).for_each(|(all, more)| *all += more);
         let mut found = Volumes { bodies: self.bodies.len() as u64, points: self.points.len() as u64, ..Volumes::default() };
         for body in &self.bodies {
@@ -141,17 +141,17 @@ fn points_in(bounds: &Bounds, count: usize) -> impl Iterator<Item = [f64; 3]> {
 /// that are.
 fn points_below(
     survey: &Survey<'_>,
-    shop: &Shop,
+    submesh: &Submesh,
     turned: &BTreeSet<u32>,
     piece: &Component,
     count: usize,
 ) -> impl Iterator<Item = [f64; 3]> {
-    let Sample { record, in_shop } = piece.sample;
-    let corners = in_shop.map_or_else(|| record::corners(&survey.records[record as usize]), |t| shop.points(t));
+    let Sample { record, in_submesh } = piece.sample;
+    let corners = in_submesh.map_or_else(|| record::corners(&survey.records[record as usize]), |t| submesh.points(t));
     let from = DVec3::from_array(bodies::inner_point(&corners));
     let [a, b, c] = corners.map(|p| DVec3::from_array(p.map(f64::from)));
-    // Triangles of the workshop are turned in place.
-    let turn = if in_shop.is_none() && turned.contains(&record) { -1.0 } else { 1.0 };
+    // Triangles of the submesh are turned in place.
+    let turn = if in_submesh.is_none() && turned.contains(&record) { -1.0 } else { 1.0 };
     let normal = (b - a).cross(c - a).normalize_or_zero() * turn;
     let mut depth = 0.5 * piece.bounds.diagonal();
     // Halved, and halved again where few are to come as far.
@@ -175,7 +175,7 @@ mod tests {
     fn found(mesh: &[Corners], wrapped: &[Corners], change: impl Fn(&mut Reversed)) -> Volumes {
         let records = records(mesh);
         let mut d = diagnose(&records);
-        let work = &mut Work::new(&mut d.shop);
+        let work = &mut Work::new(&mut d.submesh);
         let mut turned = Reversed::none(&d.survey);
         let pieces = pieces::pieces(&d.survey, work, &turned);
         let probes = Probes::of(&d.survey, work, &turned, &pieces);

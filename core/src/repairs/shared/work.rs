@@ -1,4 +1,4 @@
-//! The workshop while it is repaired: changed by way of here only, so that what is known of it is known to be true.
+//! The submesh while it is repaired: changed by way of here only, so that what is known of it is known to be true.
 //!
 //! The edges are made when they are asked for and kept until something changes. What was changed is noted, so that a pass which
 //! has seen everything once looks only at what is new to it the next time.
@@ -7,8 +7,8 @@ use std::ops::Deref;
 
 use crate::geometry::position::Position;
 use crate::submesh::edges::Edges;
-use crate::submesh::{Origin, Shop, Triangle, Vertex};
-use crate::topology::chunk::Suspect;
+use crate::submesh::{Origin, Submesh, Triangle, Vertex};
+use crate::topology::chunk::IrregularTriangle;
 use crate::topology::survey::Survey;
 use crate::util::steps;
 use crate::util::union_find::NONE;
@@ -22,9 +22,9 @@ pub(crate) enum Pass {
     Copies,
 }
 
-/// The workshop under repair. Reading goes through to it; what changes it goes through here.
+/// The submesh under repair. Reading goes through to it; what changes it goes through here.
 pub(crate) struct Work<'a> {
-    shop: &'a mut Shop,
+    submesh: &'a mut Submesh,
     edges: Option<Edges>,
     /// Triangles as they were added or got another vertex.
     changed: Vec<u32>,
@@ -44,27 +44,27 @@ struct Journal {
 }
 
 impl Deref for Work<'_> {
-    type Target = Shop;
+    type Target = Submesh;
 
-    fn deref(&self) -> &Shop {
-        self.shop
+    fn deref(&self) -> &Submesh {
+        self.submesh
     }
 }
 
 impl<'a> Work<'a> {
-    pub(crate) fn new(shop: &'a mut Shop) -> Self {
-        Self { shop, edges: None, changed: Vec::new(), seen: [None; 3], journal: None, version: 0 }
+    pub(crate) fn new(submesh: &'a mut Submesh) -> Self {
+        Self { submesh, edges: None, changed: Vec::new(), seen: [None; 3], journal: None, version: 0 }
     }
 
-    /// The mesh with its edges. O(workshop) after a change, O(1) else.
-    pub(crate) fn edges(&mut self) -> (&Shop, &Edges) {
-        let edges = self.edges.get_or_insert_with(|| Edges::of(self.shop));
-        (self.shop, edges)
+    /// The mesh with its edges. O(submesh) after a change, O(1) else.
+    pub(crate) fn edges(&mut self) -> (&Submesh, &Edges) {
+        let edges = self.edges.get_or_insert_with(|| Edges::of(self.submesh));
+        (self.submesh, edges)
     }
 
     /// The edges as they are now, to be kept while the mesh changes.
     pub(crate) fn take_edges(&mut self) -> Edges {
-        self.edges.take().unwrap_or_else(|| Edges::of(self.shop))
+        self.edges.take().unwrap_or_else(|| Edges::of(self.submesh))
     }
 
     /// What may have changed since `pass` asked last, ascending, each once; `None`: it has to look at everything.
@@ -78,7 +78,7 @@ impl<'a> Work<'a> {
 
     /// From here on changes are noted, so that they can be taken back, until [`Self::keep`].
     pub(crate) fn mark(&mut self) {
-        self.journal = Some(Journal { count: self.shop.triangles.len(), old: Vec::new() });
+        self.journal = Some(Journal { count: self.submesh.triangles.len(), old: Vec::new() });
     }
 
     /// What was changed since the mark stays.
@@ -89,20 +89,20 @@ impl<'a> Work<'a> {
     /// Puts all triangles back to what they were at the mark. Returns how many there were, and the numbers of those that were fetched
     /// since: these stay, behind the others. O(changes), and the star lists are made anew.
     pub(crate) fn take_back(&mut self) -> (usize, Vec<u32>) {
-        let Some(Journal { count, old }) = self.journal.take() else { return (self.shop.triangles.len(), Vec::new()) };
-        steps::count(old.len() + self.shop.triangles.len() - count);
-        let is_fetched = |t: &u32| matches!(self.shop.triangles[*t as usize].origin, Origin::Input(_));
-        let fetched: Vec<u32> = (count as u32..self.shop.triangles.len() as u32).filter(is_fetched).collect();
+        let Some(Journal { count, old }) = self.journal.take() else { return (self.submesh.triangles.len(), Vec::new()) };
+        steps::count(old.len() + self.submesh.triangles.len() - count);
+        let is_fetched = |t: &u32| matches!(self.submesh.triangles[*t as usize].origin, Origin::Input(_));
+        let fetched: Vec<u32> = (count as u32..self.submesh.triangles.len() as u32).filter(is_fetched).collect();
         for (place, t) in (count..).zip(&fetched) {
-            self.shop.triangles[place] = self.shop.triangles[*t as usize];
+            self.submesh.triangles[place] = self.submesh.triangles[*t as usize];
         }
-        self.shop.triangles.truncate(count + fetched.len());
+        self.submesh.triangles.truncate(count + fetched.len());
         for (t, triangle) in old.into_iter().rev() {
-            self.shop.triangles[t as usize] = triangle;
+            self.submesh.triangles[t as usize] = triangle;
         }
         self.touch();
         self.seen = [None; 3];
-        self.shop.relink();
+        self.submesh.relink();
         (count, fetched)
     }
 
@@ -123,20 +123,20 @@ impl<'a> Work<'a> {
             && (t as usize) < journal.count
         {
             steps::count(1);
-            journal.old.push((t, self.shop.triangles[t as usize]));
+            journal.old.push((t, self.submesh.triangles[t as usize]));
         }
     }
 
     pub(crate) fn kill(&mut self, t: u32) {
         self.touch();
         self.note(t);
-        self.shop.kill(t);
+        self.submesh.kill(t);
     }
 
     /// Adds a triangle and returns its number.
     pub(crate) fn add(&mut self, v: [Vertex; 3], origin: Origin, patch: u32) -> u32 {
         self.touch();
-        let t = self.shop.add(v, origin, patch);
+        let t = self.submesh.add(v, origin, patch);
         self.changed.push(t);
         t
     }
@@ -144,36 +144,36 @@ impl<'a> Work<'a> {
     /// Adds a vertex where none is, and returns its number.
     pub(crate) fn add_vertex(&mut self, position: Position) -> Vertex {
         self.touch();
-        self.shop.add_vertex(position)
+        self.submesh.add_vertex(position)
     }
 
     /// Lets all triangles of `go` use `stay` instead.
     pub(crate) fn merge(&mut self, stay: Vertex, go: Vertex) {
         self.touch();
-        self.changed.extend(self.shop.star(go).map(|(t, _)| t));
+        self.changed.extend(self.submesh.star(go).map(|(t, _)| t));
         if self.journal.is_some() {
-            let linked: Vec<u32> = self.shop.linked(go).collect();
+            let linked: Vec<u32> = self.submesh.linked(go).collect();
             linked.into_iter().for_each(|t| self.note(t));
         }
-        self.shop.merge(stay, go);
+        self.submesh.merge(stay, go);
     }
 
     /// Turns a triangle over.
     pub(crate) fn turn(&mut self, t: u32) {
         self.touch();
         self.note(t);
-        self.shop.triangles[t as usize].v.swap(1, 2);
+        self.submesh.triangles[t as usize].v.swap(1, 2);
     }
 
     /// Lets all triangles use `target[v]` instead of `v`. Their star lists are as they were until [`Self::relink`].
     pub(crate) fn move_to(&mut self, target: &[Vertex]) {
         self.touch();
-        for t in 0..self.shop.triangles.len() as u32 {
-            let old = self.shop.triangles[t as usize].v;
+        for t in 0..self.submesh.triangles.len() as u32 {
+            let old = self.submesh.triangles[t as usize].v;
             let v = old.map(|v| target[v as usize]);
             if v != old {
                 self.note(t);
-                self.shop.triangles[t as usize].v = v;
+                self.submesh.triangles[t as usize].v = v;
                 self.changed.push(t);
             }
         }
@@ -183,12 +183,12 @@ impl<'a> Work<'a> {
     pub(crate) fn assign(&mut self, t: u32, corner: usize, v: Vertex) {
         self.touch();
         self.note(t);
-        self.shop.triangles[t as usize].v[corner] = v;
+        self.submesh.triangles[t as usize].v[corner] = v;
         self.changed.push(t);
     }
 
     pub(crate) fn relink(&mut self) {
-        self.shop.relink();
+        self.submesh.relink();
     }
 
     /// Puts all triangles back to what they were.
@@ -196,18 +196,18 @@ impl<'a> Work<'a> {
         self.touch();
         self.journal = None;
         self.seen = [None; 3];
-        self.shop.triangles.clear();
-        self.shop.triangles.extend_from_slice(before);
-        self.shop.relink();
+        self.submesh.triangles.clear();
+        self.submesh.triangles.extend_from_slice(before);
+        self.submesh.relink();
     }
 
     /// Gives each triangle that continues a patch the one it continues after a [`Survey::divide`].
     pub(crate) fn follow_division(&mut self, survey: &Survey<'_>) {
         debug_assert!(self.journal.is_none(), "a division is not taken back");
-        for triangle in &mut self.shop.triangles {
+        for triangle in &mut self.submesh.triangles {
             if triangle.patch != NONE {
                 triangle.patch = match triangle.origin {
-                    Origin::Input(record) | Origin::Part(record) => survey.patch_of_suspect(record),
+                    Origin::Input(record) | Origin::Part(record) => survey.patch_of_irregular_triangle(record),
                     Origin::Patch => NONE,
                 };
             }
@@ -215,19 +215,20 @@ impl<'a> Work<'a> {
     }
 
     /// Takes in what [`Survey::promote`] has found for some incomplete vertices, which become complete.
-    pub(crate) fn extend(&mut self, survey: &Survey<'_>, new: &[(Suspect, u32)], completed: &[Vertex]) {
+    pub(crate) fn extend(&mut self, survey: &Survey<'_>, new: &[(IrregularTriangle, u32)], completed: &[Vertex]) {
         self.touch();
-        let first = self.shop.triangles.len() as u32;
-        self.shop.extend(survey, new, |_| completed.to_vec());
-        self.changed.extend(first..self.shop.triangles.len() as u32);
+        let first = self.submesh.triangles.len() as u32;
+        self.submesh.extend(survey, new, |_| completed.to_vec());
+        self.changed.extend(first..self.submesh.triangles.len() as u32);
     }
 
     /// As [`Self::extend`]; the vertices at these positions become complete. Returns the first of the new triangles.
-    pub(crate) fn extend_at(&mut self, survey: &Survey<'_>, new: &[(Suspect, u32)], positions: &[[f32; 3]]) -> u32 {
+    pub(crate) fn extend_at(&mut self, survey: &Survey<'_>, new: &[(IrregularTriangle, u32)], positions: &[[f32; 3]]) -> u32 {
         self.touch();
-        let first = self.shop.triangles.len() as u32;
-        self.shop.extend(survey, new, |known| positions.iter().filter_map(|p| known.get(&Position::of(*p)).copied()).collect());
-        self.changed.extend(first..self.shop.triangles.len() as u32);
+        let first = self.submesh.triangles.len() as u32;
+        self.submesh
+            .extend(survey, new, |known| positions.iter().filter_map(|p| known.get(&Position::of(*p)).copied()).collect());
+        self.changed.extend(first..self.submesh.triangles.len() as u32);
         first
     }
 }
@@ -242,7 +243,7 @@ mod tests {
     fn a_pass_sees_everything_once_and_then_what_changed() {
         let records = records(&plate(2, |_, _| true));
         let mut d = diagnose(&records);
-        let mut work = Work::new(&mut d.shop);
+        let mut work = Work::new(&mut d.submesh);
         assert_eq!(work.changed_for(Pass::Copies), None);
         assert_eq!(work.changed_for(Pass::Copies), Some(vec![]));
         let t = work.add([0, 1, 2], Origin::Patch, NONE);
@@ -260,7 +261,7 @@ mod tests {
     fn edges_are_those_of_the_mesh_as_it_is() {
         let records = records(&plate(2, |_, _| true));
         let mut d = diagnose(&records);
-        let mut work = Work::new(&mut d.shop);
+        let mut work = Work::new(&mut d.submesh);
         let boundary = |work: &mut Work<'_>| work.edges().1.iter().filter(|e| e.is_boundary()).count();
         assert_eq!(boundary(&mut work), 8);
         work.kill(0);
@@ -276,7 +277,7 @@ mod tests {
     fn a_turned_triangle_is_at_the_right_corner_in_every_star() {
         let records = records(&plate(2, |_, _| true));
         let mut d = diagnose(&records);
-        let mut work = Work::new(&mut d.shop);
+        let mut work = Work::new(&mut d.submesh);
         (0..work.triangles.len() as u32).for_each(|t| work.turn(t));
         let [a, b] = [work.triangles[0].v[1], work.triangles[0].v[2]];
         let all = |work: &Work<'_>, v| work.star(v).all(|(t, corner)| work.triangles[t as usize].v[corner] == v);
@@ -294,7 +295,7 @@ mod tests {
         let steps_for = |side: u8| {
             let records = records(&plate(side, |_, _| true));
             let mut d = diagnose(&records);
-            let mut work = Work::new(&mut d.shop);
+            let mut work = Work::new(&mut d.submesh);
             let all = |work: &Work<'_>| work.triangles.iter().map(|t| (t.v, t.alive)).collect::<Vec<_>>();
             let before = all(&work);
             let [a, b, _] = work.triangles[0].v;
@@ -318,7 +319,7 @@ mod tests {
     fn what_is_kept_is_not_taken_back() {
         let records = records(&plate(2, |_, _| true));
         let mut d = diagnose(&records);
-        let mut work = Work::new(&mut d.shop);
+        let mut work = Work::new(&mut d.submesh);
         work.mark();
         work.kill(0);
         work.keep();

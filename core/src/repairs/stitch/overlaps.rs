@@ -20,7 +20,7 @@ use crate::repairs::stitch::weld;
 use crate::submesh::components::{Component, Components, Reversed, Through};
 use crate::submesh::edges::Edges;
 use crate::submesh::near::{Tolerance, boundary_vertices};
-use crate::submesh::{self, Origin, Shop, Vertex};
+use crate::submesh::{self, Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
 
 /// Surface that lies on other surface.
@@ -74,7 +74,7 @@ pub(crate) fn cut_back(survey: &mut Survey<'_>, work: &mut Work<'_>, tolerance: 
 struct Member {
     piece: u32,
     corners: Corners,
-    /// The record of a sound one, or its number in the workshop.
+    /// The record of a regular one, or its number in the submesh.
     place: Result<u32, u32>,
 }
 
@@ -105,12 +105,12 @@ struct Pieces {
 }
 
 impl Pieces {
-    fn of(survey: &Survey<'_>, shop: &Shop, edges: &Edges, tolerance: &Tolerance) -> Self {
-        let components = Components::of(survey, shop, edges, &Reversed::none(survey), Through::EveryEdge);
+    fn of(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> Self {
+        let components = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::EveryEdge);
         let rims = edges.iter().filter(|e| e.is_boundary()).map(|e| {
             let t = e.uses[0].triangle;
-            let facet = Facet::of(&shop.points(t), components.of_triangle[t as usize]);
-            let ends = [shop.place(e.low), shop.place(e.high)];
+            let facet = Facet::of(&submesh.points(t), components.of_triangle[t as usize]);
+            let ends = [submesh.place(e.low), submesh.place(e.high)];
             (RimEdge { ends, normal: facet.normal, piece: facet.piece }, facet.height() * tolerance.edge_share)
         });
         let mut rims: Vec<_> = rims.collect();
@@ -160,7 +160,7 @@ impl Pieces {
     fn gather(
         &self,
         survey: &Survey<'_>,
-        shop: &Shop,
+        submesh: &Submesh,
         is_wanted: impl Fn(u32) -> bool + Sync,
         boxes: &[Bounds],
     ) -> Option<Vec<Member>> {
@@ -178,22 +178,22 @@ impl Pieces {
             }
         };
         let mut all = Vec::new();
-        for t in shop.living() {
-            let (piece, corners) = (self.components.of_triangle[t as usize], shop.points(t));
+        for t in submesh.living() {
+            let (piece, corners) = (self.components.of_triangle[t as usize], submesh.points(t));
             if is_wanted(piece) && meets(&corners) {
                 all.push(Member { piece, corners, place: Err(t) });
             }
         }
         let of_patch = &self.components.of_patch;
-        let found = survey.visit_sound(
+        let found = survey.visit_regular(
             |patch| is_wanted(of_patch[patch as usize]),
             |reach| reach.overlap(&everything).map(|_| Vec::new()),
             |_, corners| meets(corners),
             |found: &mut Vec<(u32, u32)>, triangle, patch| found.push((triangle, patch)),
         );
-        let mut sound: Vec<(u32, u32)> = found.into_iter().flatten().collect();
-        sound.sort_unstable();
-        all.extend(sound.into_iter().map(|(record, patch)| {
+        let mut regular: Vec<(u32, u32)> = found.into_iter().flatten().collect();
+        regular.sort_unstable();
+        all.extend(regular.into_iter().map(|(record, patch)| {
             let corners = record::corners(&survey.records[record as usize]);
             Member { piece: of_patch[patch as usize], corners, place: Ok(record) }
         }));
@@ -203,19 +203,19 @@ impl Pieces {
 
 /// Cuts that can be made side by side: no piece takes part in two of them.
 fn cuts(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) -> Vec<Cut> {
-    let (shop, edges) = work.edges();
+    let (submesh, edges) = work.edges();
     if tolerance.edge_share <= 0.0 || !edges.iter().any(|e| e.is_boundary()) {
         return Vec::new();
     }
-    let pieces = Pieces::of(survey, shop, edges, tolerance);
-    let pairs = lapping(survey, shop, &pieces);
+    let pieces = Pieces::of(survey, submesh, edges, tolerance);
+    let pairs = lapping(survey, submesh, &pieces);
     let mut taken = vec![false; pieces.list().len()];
     let mut cuts = Vec::new();
     for pair in pairs.into_iter().take(MOST_PAIRS) {
         if pair.pieces.iter().any(|piece| taken[*piece as usize]) {
             continue;
         }
-        if let Some(cut) = cut(survey, shop, edges, &pieces, pair, tolerance) {
+        if let Some(cut) = cut(survey, submesh, edges, &pieces, pair, tolerance) {
             pair.pieces.iter().for_each(|piece| taken[*piece as usize] = true);
             cuts.push(cut);
         }
@@ -224,7 +224,7 @@ fn cuts(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) -> Vec<
 }
 
 /// Pairs of pieces of which each ends on the other, or one lies on the other with all of its ends; the smaller one first.
-fn lapping(survey: &Survey<'_>, shop: &Shop, pieces: &Pieces) -> Vec<Pair> {
+fn lapping(survey: &Survey<'_>, submesh: &Submesh, pieces: &Pieces) -> Vec<Pair> {
     let neighbours = pieces.neighbours();
     let largest = pieces.sizes.iter().copied().fold(0.0, f64::max);
     let mut is_wanted = vec![false; neighbours.len()];
@@ -235,7 +235,7 @@ fn lapping(survey: &Survey<'_>, shop: &Shop, pieces: &Pieces) -> Vec<Pair> {
         return Vec::new();
     }
     let boxes: Vec<Bounds> = ends.iter().map(|end| around(&[end.0.middle()], most(end).on)).collect();
-    let Some(near) = pieces.gather(survey, shop, |piece| is_wanted[piece as usize], &boxes) else { return Vec::new() };
+    let Some(near) = pieces.gather(survey, submesh, |piece| is_wanted[piece as usize], &boxes) else { return Vec::new() };
     let facets = near.iter().map(|m| Facet::of(&m.corners, m.piece)).collect();
     let layer = Layer::new(facets, pieces.rims.iter().map(|(r, _)| *r).collect());
     // By piece and the one that it ends on: how many of its edges lie inside that one, and on it at all.
@@ -270,13 +270,13 @@ fn lapping(survey: &Survey<'_>, shop: &Shop, pieces: &Pieces) -> Vec<Pair> {
 
 /// What is to be cut off of a pair: a piece that lies on the other one as a whole, or what laps, of the first one if something would be left of
 /// it.
-fn cut(survey: &Survey<'_>, shop: &Shop, edges: &Edges, pieces: &Pieces, pair: Pair, tolerance: &Tolerance) -> Option<Cut> {
+fn cut(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, pieces: &Pieces, pair: Pair, tolerance: &Tolerance) -> Option<Cut> {
     let Pair { pieces: pair, lap } = pair;
     let [a, b] = pair;
     let reach = pieces.reach(a, b, f64::INFINITY).rim;
     let [box_a, box_b] = pair.map(|piece| widened(&pieces.list()[piece as usize].bounds, reach));
     let both = box_a.overlap(&box_b)?;
-    let members = pieces.gather(survey, shop, |piece| pair.contains(&piece), &[both])?;
+    let members = pieces.gather(survey, submesh, |piece| pair.contains(&piece), &[both])?;
     let layers = pair.map(|piece| {
         let facets = members.iter().filter(|m| m.piece == piece).map(|m| Facet::of(&m.corners, piece)).collect();
         Layer::new(facets, pieces.rims_of(piece))
@@ -297,7 +297,7 @@ fn cut(survey: &Survey<'_>, shop: &Shop, edges: &Edges, pieces: &Pieces, pair: P
             let doomed = met.into_iter().map(|(member, _)| *member).collect();
             let boundary = boundary_vertices(edges);
             let of_piece = |piece: u32| {
-                let is_of = |v: &Vertex| shop.star(*v).any(|(t, _)| pieces.components.of_triangle[t as usize] == piece);
+                let is_of = |v: &Vertex| submesh.star(*v).any(|(t, _)| pieces.components.of_triangle[t as usize] == piece);
                 boundary.iter().copied().filter(is_of).collect()
             };
             return Some(Cut { triangles: doomed, join: Some(([pair[cut], pair[stays]].map(of_piece), reach)) });
@@ -349,7 +349,7 @@ impl On<'_> {
 }
 
 impl Cut {
-    /// Fetches what is not in the workshop, removes it, and joins what is left to the other piece where both end.
+    /// Fetches what is not in the submesh, removes it, and joins what is left to the other piece where both end.
     fn make(&self, survey: &mut Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) {
         let by_position = work.by_position();
         let mut wanted: Vec<Position> = self.triangles.iter().flat_map(|m| m.corners.map(Position::of)).collect();
@@ -383,7 +383,7 @@ impl Cut {
 /// Brings boundary vertices of one piece that lie within reach of where the other one ends, but farther than the weld and the splitting of
 /// edges would see, to a vertex there, or onto the edge.
 fn join(work: &mut Work<'_>, [moving, staying]: [&[Vertex]; 2], reach: &Tolerance, seen: &Tolerance) {
-    let (shop, edges) = work.edges();
+    let (submesh, edges) = work.edges();
     let still: Vec<Vertex> = boundary_vertices(edges);
     let is_still = |v: &&Vertex| still.binary_search(v).is_ok();
     let staying: Vec<Vertex> = staying.iter().filter(is_still).copied().collect();
@@ -392,25 +392,25 @@ fn join(work: &mut Work<'_>, [moving, staying]: [&[Vertex]; 2], reach: &Toleranc
     let rims: Vec<RimEdge> = edges
         .iter()
         .filter(|e| e.is_boundary() && is_in(&staying, e.low) && is_in(&staying, e.high))
-        .map(|e| RimEdge { ends: [shop.place(e.low), shop.place(e.high)], normal: glam::DVec3::ZERO, piece: 0 })
+        .map(|e| RimEdge { ends: [submesh.place(e.low), submesh.place(e.high)], normal: glam::DVec3::ZERO, piece: 0 })
         .collect();
     let layer = Layer::new(Vec::new(), rims);
-    let points = BoxTree::new(&staying.iter().map(|v| around(&[shop.place(*v)], 0.0)).collect::<Vec<_>>());
+    let points = BoxTree::new(&staying.iter().map(|v| around(&[submesh.place(*v)], 0.0)).collect::<Vec<_>>());
     let (mut pairs, mut feet, mut found) = (Vec::new(), Vec::new(), Vec::new());
     for v in moving {
-        let (p, most) = (shop.place(v), reach.at(shop, v));
+        let (p, most) = (submesh.place(v), reach.at(submesh, v));
         let wanted = around(&[p], most);
         if !staying.is_empty() {
             points.meeting(&wanted, &mut found);
         } else {
             found.clear();
         }
-        let near = |w: Vertex| shop.distance(v, w) <= most.min(reach.at(shop, w));
+        let near = |w: Vertex| submesh.distance(v, w) <= most.min(reach.at(submesh, w));
         let nearest = found
             .iter()
             .map(|w| staying[*w as usize])
             .filter(|w| near(*w))
-            .min_by(|a, b| shop.distance(v, *a).total_cmp(&shop.distance(v, *b)).then(a.cmp(b)));
+            .min_by(|a, b| submesh.distance(v, *a).total_cmp(&submesh.distance(v, *b)).then(a.cmp(b)));
         if let Some(w) = nearest {
             pairs.push((v.min(w), v.max(w)));
             continue;
@@ -420,7 +420,7 @@ fn join(work: &mut Work<'_>, [moving, staying]: [&[Vertex]; 2], reach: &Toleranc
             .into_iter()
             .map(|r| r.foot(p))
             .min_by(|a, b| p.distance_squared(*a).total_cmp(&p.distance_squared(*b)))
-            .filter(|foot| (seen.at(shop, v)..=most).contains(&p.distance(*foot)));
+            .filter(|foot| (seen.at(submesh, v)..=most).contains(&p.distance(*foot)));
         feet.extend(foot.map(|foot| (v, Position::nearest(foot))));
     }
     let mut known = if feet.is_empty() { HashMap::new() } else { work.by_position() };

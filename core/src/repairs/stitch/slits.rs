@@ -14,7 +14,7 @@ use robust::Coord3D;
 use crate::detect::holes::loops::{self, Loop};
 use crate::geometry::tri_tri::{Triangle as Corners, common, self_intersection};
 use crate::repairs::shared::work::Work;
-use crate::submesh::{Origin, Shop, Vertex};
+use crate::submesh::{Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::union_find::NONE;
 
@@ -34,27 +34,27 @@ const LONGER: f64 = 2.0;
 /// A vertex where several loops meet.
 const SEVERAL: u32 = NONE - 1;
 
-/// Removes what runs past the other side of its loop; returns how many triangles. O(workshop), if triangles at a boundary cross others.
+/// Removes what runs past the other side of its loop; returns how many triangles. O(submesh), if triangles at a boundary cross others.
 pub(crate) fn cut_back(survey: &mut Survey<'_>, work: &mut Work<'_>) -> u64 {
     let pairs = match survey.crossing_pairs.as_deref() {
         Some(pairs) if !pairs.is_empty() => pairs.iter().map(|pair| pair.triangles),
         _ => return 0,
     };
-    let (shop, edges) = work.edges();
-    let rims = loops::find(shop, edges);
+    let (submesh, edges) = work.edges();
+    let rims = loops::find(submesh, edges);
     if rims.is_empty() {
         return 0;
     }
-    let slits = Slits::of(shop, &rims, pairs);
-    let mut doomed: Vec<u32> = rims.iter().zip(&slits.sides).flat_map(|(rim, sides)| surplus(shop, rim, sides)).collect();
+    let slits = Slits::of(submesh, &rims, pairs);
+    let mut doomed: Vec<u32> = rims.iter().zip(&slits.sides).flat_map(|(rim, sides)| surplus(submesh, rim, sides)).collect();
     doomed.sort_unstable();
     doomed.dedup();
     let mut wanted: Vec<Vertex> =
-        doomed.iter().flat_map(|t| shop.triangles[*t as usize].v).filter(|v| !shop.complete[*v as usize]).collect();
+        doomed.iter().flat_map(|t| submesh.triangles[*t as usize].v).filter(|v| !submesh.complete[*v as usize]).collect();
     wanted.sort_unstable();
     wanted.dedup();
     if !wanted.is_empty() {
-        let positions: Vec<[f32; 3]> = wanted.iter().map(|v| shop.positions[*v as usize]).collect();
+        let positions: Vec<[f32; 3]> = wanted.iter().map(|v| submesh.positions[*v as usize]).collect();
         let new = survey.promote(&positions);
         work.extend(survey, &new, &wanted);
     }
@@ -79,17 +79,17 @@ struct Slits {
 }
 
 impl Slits {
-    fn of(shop: &Shop, rims: &[Loop], pairs: impl Iterator<Item = [u32; 2]> + Clone) -> Self {
-        let along = Along::of(shop, rims, pairs.clone());
+    fn of(submesh: &Submesh, rims: &[Loop], pairs: impl Iterator<Item = [u32; 2]> + Clone) -> Self {
+        let along = Along::of(submesh, rims, pairs.clone());
         let mut sides: Vec<Sides> = rims.iter().map(|_| Sides::default()).collect();
         for pair in pairs {
             let there = pair.map(|record| along.triangles.get(&record).copied());
-            let of = there.map(|t| t.and_then(|t| along.loop_of(shop, t)));
+            let of = there.map(|t| t.and_then(|t| along.loop_of(submesh, t)));
             if of == [None, None] {
                 continue;
             }
             if let [Some(a), Some(b)] = there {
-                let [p, q] = [shop.points(a), shop.points(b)];
+                let [p, q] = [submesh.points(a), submesh.points(b)];
                 // Some may have been moved apart since.
                 if self_intersection(&p, &q, common(&p, &q)).is_none() {
                     continue;
@@ -98,7 +98,7 @@ impl Slits {
                     && i == j
                     && let Some(sides) = sides.get_mut(i as usize)
                 {
-                    sides.cross(shop, [a, b], |v| along.of_vertex[v as usize] == i);
+                    sides.cross(submesh, [a, b], |v| along.of_vertex[v as usize] == i);
                     continue;
                 }
             }
@@ -114,13 +114,13 @@ impl Slits {
 
 impl Sides {
     /// Takes in two triangles along the loop that cross each other.
-    fn cross(&mut self, shop: &Shop, [a, b]: [u32; 2], is_of_loop: impl Fn(Vertex) -> bool) {
+    fn cross(&mut self, submesh: &Submesh, [a, b]: [u32; 2], is_of_loop: impl Fn(Vertex) -> bool) {
         self.crossing.extend([a, b]);
         for (t, other) in [(a, b), (b, a)] {
-            let of_other = shop.triangles[other as usize].v;
-            let of_loop = shop.triangles[t as usize].v.into_iter().filter(|v| is_of_loop(*v));
+            let of_other = submesh.triangles[other as usize].v;
+            let of_loop = submesh.triangles[t as usize].v.into_iter().filter(|v| is_of_loop(*v));
             for v in of_loop.filter(|v| !of_other.contains(v)) {
-                let behind = side(&shop.points(other), shop.positions[v as usize]);
+                let behind = side(&submesh.points(other), submesh.positions[v as usize]);
                 let [behind_of, before] = self.seen.entry(v).or_default();
                 *behind_of += u32::from(behind > 0.0);
                 *before += u32::from(behind < 0.0);
@@ -133,13 +133,13 @@ impl Sides {
 struct Along {
     /// By vertex: its loop, [`NONE`] or [`SEVERAL`].
     of_vertex: Vec<u32>,
-    /// By record of the file, of those that cross something: its triangle in the workshop.
+    /// By record of the file, of those that cross something: its triangle in the submesh.
     triangles: BTreeMap<u32, u32>,
 }
 
 impl Along {
-    fn of(shop: &Shop, rims: &[Loop], pairs: impl Iterator<Item = [u32; 2]>) -> Self {
-        let mut of_vertex = vec![NONE; shop.positions.len()];
+    fn of(submesh: &Submesh, rims: &[Loop], pairs: impl Iterator<Item = [u32; 2]>) -> Self {
+        let mut of_vertex = vec![NONE; submesh.positions.len()];
         for (i, rim) in (0..).zip(rims) {
             for v in &rim.vertices {
                 let of = &mut of_vertex[*v as usize];
@@ -149,16 +149,16 @@ impl Along {
         let mut records: Vec<u32> = pairs.flatten().collect();
         records.sort_unstable();
         records.dedup();
-        let crossing = |t: u32| match shop.triangles[t as usize].origin {
+        let crossing = |t: u32| match submesh.triangles[t as usize].origin {
             Origin::Input(record) => records.binary_search(&record).is_ok().then_some((record, t)),
             Origin::Part(_) | Origin::Patch => None,
         };
-        Self { of_vertex, triangles: shop.living().filter_map(crossing).collect() }
+        Self { of_vertex, triangles: submesh.living().filter_map(crossing).collect() }
     }
 
     /// The loop of a triangle, if it is along one; [`SEVERAL`] if along two.
-    fn loop_of(&self, shop: &Shop, t: u32) -> Option<u32> {
-        let corners = shop.triangles[t as usize].v.into_iter();
+    fn loop_of(&self, submesh: &Submesh, t: u32) -> Option<u32> {
+        let corners = submesh.triangles[t as usize].v.into_iter();
         let mut all = corners.map(|v| self.of_vertex[v as usize]).filter(|of| *of != NONE);
         let first = all.next()?;
         Some(if all.all(|of| of == first) { first } else { SEVERAL })
@@ -173,33 +173,34 @@ fn side(triangle: &Corners, p: [f32; 3]) -> f64 {
 }
 
 /// The triangles around all vertices of a loop that lie behind its other side, if that is all that is wrong with it.
-fn surplus(shop: &Shop, rim: &Loop, sides: &Sides) -> Vec<u32> {
+fn surplus(submesh: &Submesh, rim: &Loop, sides: &Sides) -> Vec<u32> {
     // Of the triangles of a curved side, one may look away from what lies behind all others.
     let is_astray = |v: &Vertex| sides.seen.get(v).is_some_and(|[behind, in_front]| behind > in_front);
-    if sides.meets_others || !sides.crossing.iter().all(|t| shop.triangles[*t as usize].v.iter().any(is_astray)) {
+    if sides.meets_others || !sides.crossing.iter().all(|t| submesh.triangles[*t as usize].v.iter().any(is_astray)) {
         return Vec::new();
     }
-    let mut doomed: Vec<u32> = sides.seen.keys().filter(|v| is_astray(v)).flat_map(|v| shop.star(*v).map(|(t, _)| t)).collect();
+    let mut doomed: Vec<u32> =
+        sides.seen.keys().filter(|v| is_astray(v)).flat_map(|v| submesh.star(*v).map(|(t, _)| t)).collect();
     doomed.sort_unstable();
     doomed.dedup();
-    if perimeter_without(shop, rim, &doomed) > LONGER * rim.perimeter(shop) { Vec::new() } else { doomed }
+    if perimeter_without(submesh, rim, &doomed) > LONGER * rim.perimeter(submesh) { Vec::new() } else { doomed }
 }
 
 /// How long the loop is once some triangles along it, ascending, are gone.
-fn perimeter_without(shop: &Shop, rim: &Loop, doomed: &[u32]) -> f64 {
+fn perimeter_without(submesh: &Submesh, rim: &Loop, doomed: &[u32]) -> f64 {
     let n = rim.vertices.len();
     let own = (0..n).map(|i| {
         let ends = [rim.vertices[i], rim.vertices[(i + 1) % n]];
         (ends[0].min(ends[1]), ends[0].max(ends[1]))
     });
     let of_doomed = doomed.iter().flat_map(|t| {
-        let v = shop.triangles[*t as usize].v;
+        let v = submesh.triangles[*t as usize].v;
         [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (v[i].min(v[j]), v[i].max(v[j])))
     });
     // An edge of the loop is one once it has one doomed triangle; an inner one that has one becomes part of the loop.
     let mut edges: Vec<(Vertex, Vertex)> = own.chain(of_doomed).collect();
     edges.sort_unstable();
-    edges.chunk_by(|a, b| a == b).filter(|same| same.len() == 1).map(|same| shop.distance(same[0].0, same[0].1)).sum()
+    edges.chunk_by(|a, b| a == b).filter(|same| same.len() == 1).map(|same| submesh.distance(same[0].0, same[0].1)).sum()
 }
 
 #[cfg(test)]
@@ -220,7 +221,7 @@ mod tests {
     }
 
     fn cut(mesh: &[Corners]) -> After<u64> {
-        after(mesh, |d, _| cut_back(&mut d.survey, &mut Work::new(&mut d.shop)))
+        after(mesh, |d, _| cut_back(&mut d.survey, &mut Work::new(&mut d.submesh)))
     }
 
     #[test]

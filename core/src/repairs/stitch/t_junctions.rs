@@ -4,7 +4,7 @@ use crate::repairs::cleanup::degenerate;
 use crate::repairs::shared::account::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
-use crate::submesh::Shop;
+use crate::submesh::Submesh;
 use crate::submesh::near::{self, OnEdge, Tolerance};
 
 /// T-junctions.
@@ -19,8 +19,8 @@ pub(crate) const REPAIR: Repair = Repair {
 
 /// Splits boundary edges at the vertices that lie on them; returns how many vertices that were.
 pub(crate) fn split_edges(work: &mut Work<'_>, tolerance: &Tolerance) -> u64 {
-    let (shop, edges) = work.edges();
-    let on = near::noncommon_vertices(shop, edges, tolerance);
+    let (submesh, edges) = work.edges();
+    let on = near::noncommon_vertices(submesh, edges, tolerance);
     if on.is_empty() {
         return 0;
     }
@@ -41,14 +41,17 @@ pub(crate) fn split_edges(work: &mut Work<'_>, tolerance: &Tolerance) -> u64 {
 
 /// The vertices that may be joined to the opposite corner: the triangle is high enough not to be turned over, and the new edge
 /// does not exist yet.
-fn admissible(shop: &Shop, t: u32, ends: [u32; 2], group: &[OnEdge]) -> Vec<u32> {
-    let Some(apex) = shop.triangles[t as usize].v.into_iter().find(|v| !ends.contains(v)) else { return Vec::new() };
-    let height =
-        near::distance_to_line(shop.positions[apex as usize], shop.positions[ends[0] as usize], shop.positions[ends[1] as usize]);
+fn admissible(submesh: &Submesh, t: u32, ends: [u32; 2], group: &[OnEdge]) -> Vec<u32> {
+    let Some(apex) = submesh.triangles[t as usize].v.into_iter().find(|v| !ends.contains(v)) else { return Vec::new() };
+    let height = near::distance_to_line(
+        submesh.positions[apex as usize],
+        submesh.positions[ends[0] as usize],
+        submesh.positions[ends[1] as usize],
+    );
     let mut stops: Vec<u32> = Vec::new();
     let mut last_at = f64::NEG_INFINITY;
     for on in group {
-        if on.distance * 4.0 < height && on.at > last_at && !shop.has_edge(on.vertex, apex) {
+        if on.distance * 4.0 < height && on.at > last_at && !submesh.has_edge(on.vertex, apex) {
             stops.push(on.vertex);
             last_at = on.at;
         }
@@ -69,7 +72,7 @@ mod tests {
         mesh.extend([[a, b, m], [m, b, c]]);
         let got = after(&mesh, |d, _| {
             assert_eq!((d.defects.boundary_edges, d.defects.noncommon_vertices), (3, 1));
-            split_edges(&mut Work::new(&mut d.shop), &d.tolerance)
+            split_edges(&mut Work::new(&mut d.submesh), &d.tolerance)
         });
         // No vertex moved: only the neighbour is replaced.
         assert_eq!((got.result, got.untouched, got.defects.triangles), (1, 12, 14));

@@ -8,7 +8,7 @@ use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
 use crate::submesh::edges::Edges;
 use crate::submesh::near::{self, Tolerance};
-use crate::submesh::{Shop, Vertex};
+use crate::submesh::{Submesh, Vertex};
 
 /// Boundary vertices within the weld tolerance become one.
 pub(crate) const REPAIR: Repair = Repair {
@@ -36,8 +36,8 @@ const ATTEMPTS: usize = 4;
 
 /// Welds boundary vertices. O(n log n) in the boundary.
 pub(crate) fn weld(work: &mut Work<'_>, tolerance: &Tolerance) -> Welded {
-    let (shop, edges) = work.edges();
-    let pairs = near::close_pairs(shop, edges, tolerance);
+    let (submesh, edges) = work.edges();
+    let pairs = near::close_pairs(submesh, edges, tolerance);
     weld_pairs(work, &pairs, tolerance.weld)
 }
 
@@ -73,7 +73,7 @@ pub(crate) fn weld_pairs(work: &mut Work<'_>, pairs: &[(Vertex, Vertex)], tolera
 }
 
 /// Connected components of the pairs. One wider than four tolerances is cut up greedily, in order of vertex number.
-fn clusters(shop: &Shop, pairs: &[(Vertex, Vertex)], tolerance: f64) -> Vec<Vec<Vertex>> {
+fn clusters(submesh: &Submesh, pairs: &[(Vertex, Vertex)], tolerance: f64) -> Vec<Vec<Vertex>> {
     let mut vertices: Vec<Vertex> = pairs.iter().flat_map(|(a, b)| [*a, *b]).collect();
     vertices.sort_unstable();
     vertices.dedup();
@@ -90,8 +90,9 @@ fn clusters(shop: &Shop, pairs: &[(Vertex, Vertex)], tolerance: f64) -> Vec<Vec<
         let mut rest: Vec<Vertex> = group.iter().map(|g| g.1).collect();
         while let Some(first) = rest.first().copied() {
             // A component that hangs together within the bound is taken whole: its first vertex then reaches all of it.
-            let (near, far): (Vec<Vertex>, Vec<Vertex>) = rest.iter().partition(|v| shop.distance(first, **v) <= 2.0 * tolerance);
-            if near.len() > 1 && !share_a_triangle(shop, &near) {
+            let (near, far): (Vec<Vertex>, Vec<Vertex>) =
+                rest.iter().partition(|v| submesh.distance(first, **v) <= 2.0 * tolerance);
+            if near.len() > 1 && !share_a_triangle(submesh, &near) {
                 all.push(near);
                 rest = far;
             } else {
@@ -104,17 +105,19 @@ fn clusters(shop: &Shop, pairs: &[(Vertex, Vertex)], tolerance: f64) -> Vec<Vec<
 }
 
 /// Two of them are corners of one triangle, which would lose its area.
-fn share_a_triangle(shop: &Shop, cluster: &[Vertex]) -> bool {
+fn share_a_triangle(submesh: &Submesh, cluster: &[Vertex]) -> bool {
     cluster.iter().any(|v| {
-        shop.star(*v).any(|(t, _)| shop.triangles[t as usize].v.iter().filter(|w| cluster.binary_search(w).is_ok()).count() > 1)
+        submesh
+            .star(*v)
+            .any(|(t, _)| submesh.triangles[t as usize].v.iter().filter(|w| cluster.binary_search(w).is_ok()).count() > 1)
     })
 }
 
 /// Where each vertex goes: to the one of its cluster with most triangles, the smallest of equals.
-fn targets(shop: &Shop, clusters: &[Vec<Vertex>]) -> Vec<Vertex> {
-    let mut target: Vec<Vertex> = (0..shop.positions.len() as u32).collect();
+fn targets(submesh: &Submesh, clusters: &[Vec<Vertex>]) -> Vec<Vertex> {
+    let mut target: Vec<Vertex> = (0..submesh.positions.len() as u32).collect();
     for cluster in clusters {
-        let chosen = cluster.iter().copied().min_by_key(|v| (std::cmp::Reverse(shop.star(*v).count()), *v)).unwrap_or(0);
+        let chosen = cluster.iter().copied().min_by_key(|v| (std::cmp::Reverse(submesh.star(*v).count()), *v)).unwrap_or(0);
         cluster.iter().for_each(|v| target[*v as usize] = chosen);
     }
     target
@@ -157,7 +160,7 @@ mod tests {
         let soup: Vec<Corners> = cube().iter().zip(0u8..).flat_map(|(t, i)| shifted(&[*t], [f32::from(i) * 1e-6; 3])).collect();
         let got = after(&soup, |d, _| {
             assert_eq!(d.defects.vertices, 36);
-            weld(&mut Work::new(&mut d.shop), &d.tolerance)
+            weld(&mut Work::new(&mut d.submesh), &d.tolerance)
         });
         assert_eq!((got.result.vertices, got.result.taken_back, got.defects.vertices), (28, 0, 8));
         assert!(got.verdict.good, "{:?}", got.verdict);
@@ -171,7 +174,7 @@ mod tests {
             [[x, 0.0, 0.0], [x, y, 1.0], [x, y, 9.0]]
         };
         let mesh = [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, -9.0, 0.0]], tip(1), tip(2), tip(3)];
-        let got = after(&mesh, |d, _| weld(&mut Work::new(&mut d.shop), &Tolerance { weld: 1.0, edge_share: 0.25 }));
+        let got = after(&mesh, |d, _| weld(&mut Work::new(&mut d.submesh), &Tolerance { weld: 1.0, edge_share: 0.25 }));
         // Four in a row, but not the fifth: both ends of the edge are left.
         assert_eq!(got.result.vertices, 3);
         assert_eq!((got.defects.triangles, got.defects.degenerate_index), (4, 0));
@@ -182,7 +185,7 @@ mod tests {
         let (a, b) = ([0.0; 3], [1.0, 0.0, 0.0]);
         let near = |p: [f32; 3]| [p[0], p[1], 1e-6];
         let mesh = [[a, b, [0.0, 1.0, 0.0]], [b, a, [0.0, -1.0, 0.0]], [near(a), near(b), [0.0, 0.0, 1.0]]];
-        let got = after(&mesh, |d, _| weld(&mut Work::new(&mut d.shop), &d.tolerance));
+        let got = after(&mesh, |d, _| weld(&mut Work::new(&mut d.submesh), &d.tolerance));
         assert_eq!((got.result.vertices, got.result.taken_back), (0, 2));
         assert_eq!((got.defects.nonmanifold_edges, got.untouched), (0, 3));
     }

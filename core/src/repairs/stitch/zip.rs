@@ -17,7 +17,7 @@ use crate::repairs::shared::admission;
 use crate::repairs::shared::work::Work;
 use crate::submesh::edges::{Edge, Edges};
 use crate::submesh::near::Tolerance;
-use crate::submesh::{self, Shop, Vertex, near};
+use crate::submesh::{self, Submesh, Vertex, near};
 
 /// Narrow gaps.
 pub(crate) const REPAIR: Repair = Repair {
@@ -37,14 +37,14 @@ const STEADY: f64 = 0.7;
 const ATTEMPTS: usize = 8;
 
 /// Zips gaps narrower than the profile's share of the shortest edges at their vertices, but for loops of kinds that the profile leaves open;
-/// returns how many vertices were merged into another. O(n log n) in the boundary, and a copy of the workshop if anything is merged.
+/// returns how many vertices were merged into another. O(n log n) in the boundary, and a copy of the submesh if anything is merged.
 pub(crate) fn zip(work: &mut Work<'_>, tolerance: &Tolerance, profile: &Profile) -> u64 {
     if profile.gap_edge_share <= 0.0 {
         return 0;
     }
-    let (shop, edges) = work.edges();
-    let left_open = left_open(shop, edges, tolerance, profile);
-    let mut pairs = facing(shop, edges, profile);
+    let (submesh, edges) = work.edges();
+    let left_open = left_open(submesh, edges, tolerance, profile);
+    let mut pairs = facing(submesh, edges, profile);
     pairs.retain(|pair| pair.iter().all(|v| left_open.binary_search(v).is_err()));
     if pairs.is_empty() {
         return 0;
@@ -63,7 +63,7 @@ pub(crate) fn zip(work: &mut Work<'_>, tolerance: &Tolerance, profile: &Profile)
     0
 }
 
-/// Merges pairs in their order where that is sound, each into the vertex of more triangles; returns that one, the pair, and how many fans
+/// Merges pairs in their order where that is valid, each into the vertex of more triangles; returns that one, the pair, and how many fans
 /// the one of its vertices with most of them had.
 fn merge(work: &mut Work<'_>, pairs: &[[Vertex; 2]]) -> Vec<(Vertex, [Vertex; 2], usize)> {
     let mut merged = Vec::new();
@@ -79,12 +79,12 @@ fn merge(work: &mut Work<'_>, pairs: &[[Vertex; 2]]) -> Vec<(Vertex, [Vertex; 2]
 }
 
 /// Vertices on loops that the profile leaves open, ascending.
-fn left_open(shop: &Shop, edges: &Edges, tolerance: &Tolerance, profile: &Profile) -> Vec<Vertex> {
+fn left_open(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance, profile: &Profile) -> Vec<Vertex> {
     if profile.leave_open.is_empty() {
         return Vec::new();
     }
-    let rims = loops::find(shop, edges);
-    let left = admission::left_open(shop, edges, &rims, tolerance, profile);
+    let rims = loops::find(submesh, edges);
+    let left = admission::left_open(submesh, edges, &rims, tolerance, profile);
     let mut vertices: Vec<Vertex> = left.flat_map(|(rim, _)| rim.vertices.iter().copied()).collect();
     vertices.sort_unstable();
     vertices.dedup();
@@ -92,19 +92,19 @@ fn left_open(shop: &Shop, edges: &Edges, tolerance: &Tolerance, profile: &Profil
 }
 
 /// Pairs of boundary vertices that face each other, the nearest first.
-fn facing(shop: &Shop, edges: &Edges, profile: &Profile) -> Vec<[Vertex; 2]> {
+fn facing(submesh: &Submesh, edges: &Edges, profile: &Profile) -> Vec<[Vertex; 2]> {
     let widest = if profile.max_gap_mm > 0.0 { profile.max_gap_mm } else { f64::INFINITY };
     let vertices = near::boundary_vertices(edges);
-    let outward = ends(shop, edges);
-    let reach: Vec<f64> = vertices.iter().map(|v| (shop.shortest_edge(*v) * profile.gap_edge_share).min(widest)).collect();
-    let nearest = near::nearest_apart(shop, &vertices, &reach);
+    let outward = ends(submesh, edges);
+    let reach: Vec<f64> = vertices.iter().map(|v| (submesh.shortest_edge(*v) * profile.gap_edge_share).min(widest)).collect();
+    let nearest = near::nearest_apart(submesh, &vertices, &reach);
     let mut pairs: Vec<(f64, [Vertex; 2])> = Vec::new();
     for (i, found) in nearest.iter().enumerate() {
         // Mutual, and each pair once.
         if let Some(j) = found.filter(|j| *j > i && nearest[*j] == Some(i)) {
             let (v, w) = (vertices[i], vertices[j]);
             if submesh::cosine(outward[v as usize], outward[w as usize]) < FACING {
-                pairs.push((shop.distance(v, w), [v, w]));
+                pairs.push((submesh.distance(v, w), [v, w]));
             }
         }
     }
@@ -113,10 +113,10 @@ fn facing(shop: &Shop, edges: &Edges, profile: &Profile) -> Vec<[Vertex; 2]> {
 }
 
 /// Fans around a vertex: sets of triangles that hang together by edges at it.
-fn fans(shop: &Shop, v: Vertex) -> usize {
-    let star: Vec<u32> = shop.star(v).map(|(t, _)| t).collect();
+fn fans(submesh: &Submesh, v: Vertex) -> usize {
+    let star: Vec<u32> = submesh.star(v).map(|(t, _)| t).collect();
     let mut spokes: Vec<(Vertex, u32)> = (0..star.len() as u32)
-        .flat_map(|i| shop.triangles[star[i as usize] as usize].v.into_iter().filter(|w| *w != v).map(move |w| (w, i)))
+        .flat_map(|i| submesh.triangles[star[i as usize] as usize].v.into_iter().filter(|w| *w != v).map(move |w| (w, i)))
         .collect();
     spokes.sort_unstable();
     let mut parents: Vec<u32> = (0..star.len() as u32).collect();
@@ -127,13 +127,15 @@ fn fans(shop: &Shop, v: Vertex) -> usize {
 }
 
 /// For each boundary vertex the direction in which its surface ends: away from the triangles, across their boundary edges.
-fn ends(shop: &Shop, edges: &Edges) -> Vec<DVec3> {
-    let mut all = vec![DVec3::ZERO; shop.positions.len()];
+fn ends(submesh: &Submesh, edges: &Edges) -> Vec<DVec3> {
+    let mut all = vec![DVec3::ZERO; submesh.positions.len()];
     for edge in edges.iter().filter(Edge::is_boundary) {
         let t = edge.uses[0].triangle;
-        let Some(apex) = shop.triangles[t as usize].v.into_iter().find(|v| *v != edge.low && *v != edge.high) else { continue };
-        let along = shop.vector(edge.low, edge.high);
-        let from_apex = shop.vector(apex, edge.low);
+        let Some(apex) = submesh.triangles[t as usize].v.into_iter().find(|v| *v != edge.low && *v != edge.high) else {
+            continue;
+        };
+        let along = submesh.vector(edge.low, edge.high);
+        let from_apex = submesh.vector(apex, edge.low);
         let part = from_apex.dot(along) / along.dot(along).max(f64::MIN_POSITIVE);
         for v in [edge.low, edge.high] {
             all[v as usize] += from_apex - part * along;
@@ -142,26 +144,26 @@ fn ends(shop: &Shop, edges: &Edges) -> Vec<DVec3> {
     all
 }
 
-/// Would the mesh stay as sound as it is?
-fn may_merge(shop: &Shop, stay: Vertex, go: Vertex) -> bool {
-    let corners = |t: u32| shop.triangles[t as usize].v;
-    if shop.star(go).any(|(t, _)| corners(t).contains(&stay)) {
+/// Would the mesh stay as valid as it is?
+fn may_merge(submesh: &Submesh, stay: Vertex, go: Vertex) -> bool {
+    let corners = |t: u32| submesh.triangles[t as usize].v;
+    if submesh.star(go).any(|(t, _)| corners(t).contains(&stay)) {
         return false;
     }
-    let mut neighbours: Vec<Vertex> = shop.star(go).flat_map(|(t, _)| corners(t)).filter(|x| *x != go).collect();
+    let mut neighbours: Vec<Vertex> = submesh.star(go).flat_map(|(t, _)| corners(t)).filter(|x| *x != go).collect();
     neighbours.sort_unstable();
     neighbours.dedup();
-    let uses = |v: Vertex, x: Vertex| shop.star(v).filter(|(t, _)| corners(*t).contains(&x)).count();
+    let uses = |v: Vertex, x: Vertex| submesh.star(v).filter(|(t, _)| corners(*t).contains(&x)).count();
     // An edge that both have becomes one.
     let manifold = neighbours.iter().all(|x| {
         let shared = uses(stay, *x);
         shared == 0 || shared + uses(go, *x) <= 2
     });
     manifold
-        && shop.star(go).all(|(t, k)| {
-            let before = shop.points(t);
+        && submesh.star(go).all(|(t, k)| {
+            let before = submesh.points(t);
             let mut after = before;
-            after[k] = shop.positions[stay as usize];
+            after[k] = submesh.positions[stay as usize];
             submesh::cosine(normal(before), normal(after)) >= STEADY
         })
 }
@@ -188,7 +190,7 @@ mod tests {
     fn rims_that_face_each_other_across_a_narrow_gap_are_joined() {
         let zipped = |gap: f32, share: f64| {
             let profile = Profile { gap_edge_share: share, ..Profile::default() };
-            after(&slit(gap), |d, _| zip(&mut Work::new(&mut d.shop), &d.tolerance, &profile))
+            after(&slit(gap), |d, _| zip(&mut Work::new(&mut d.submesh), &d.tolerance, &profile))
         };
         let got = zipped(0.125, 0.35);
         // Only the rim of the plate is left.
@@ -203,7 +205,7 @@ mod tests {
         // As near as above, but both surfaces end in the same direction.
         let bottom = reversed(&plate(2, |_, _| true));
         let top = shifted(&plate(2, |_, _| true), [0.0, 0.0, 0.125]);
-        let got = after(&[bottom, top].concat(), |d, _| zip(&mut Work::new(&mut d.shop), &d.tolerance, &Profile::default()));
+        let got = after(&[bottom, top].concat(), |d, _| zip(&mut Work::new(&mut d.submesh), &d.tolerance, &Profile::default()));
         assert_eq!(got.result, 0);
     }
 
@@ -220,7 +222,7 @@ mod tests {
         };
         let zipped = |jag: f32, leave_open: &[LoopClass]| {
             let profile = Profile { leave_open: leave_open.to_vec(), ..Profile::default() };
-            after(&open(jag), |d, _| zip(&mut Work::new(&mut d.shop), &d.tolerance, &profile)).result
+            after(&open(jag), |d, _| zip(&mut Work::new(&mut d.submesh), &d.tolerance, &profile)).result
         };
         for (jag, class, other) in [(0.0, LoopClass::Gap, LoopClass::Misaligned), (0.25, LoopClass::Misaligned, LoopClass::Gap)] {
             assert_eq!(zipped(jag, &[class]), 0, "{class:?}");
@@ -237,9 +239,9 @@ mod tests {
         let right = right.map(|t| t.map(|[x, y, z]| if y == 1.0 { [x, y, z] } else { [x + 1.0, y, z] }));
         let open: Vec<Corners> = left.into_iter().chain(right).collect();
         let got = after(&open, |d, _| {
-            let (shop, edges) = (&d.shop, Edges::of(&d.shop));
-            assert_eq!(facing(shop, &edges, &Profile::default()).len(), 1);
-            zip(&mut Work::new(&mut d.shop), &d.tolerance, &Profile::default())
+            let (submesh, edges) = (&d.submesh, Edges::of(&d.submesh));
+            assert_eq!(facing(submesh, &edges, &Profile::default()).len(), 1);
+            zip(&mut Work::new(&mut d.submesh), &d.tolerance, &Profile::default())
         });
         assert_eq!((got.result, got.defects.nonmanifold_vertices, got.defects.boundary_loops), (0, 0, 2));
     }

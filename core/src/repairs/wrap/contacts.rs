@@ -17,7 +17,7 @@ struct Accepted<'o> {
     groups: Vec<(&'o Vec<u32>, &'o Outcome)>,
     /// By piece: a wrap replaces it.
     goes: Vec<bool>,
-    /// The triangles of all wraps, numbered after those of the workshop.
+    /// The triangles of all wraps, numbered after those of the submesh.
     triangles: Vec<(u32, Corners)>,
     first: u32,
     /// Where the triangles of each group begin.
@@ -30,7 +30,7 @@ impl<'o> Accepted<'o> {
         let groups: Vec<(&Vec<u32>, &Outcome)> = outcomes.iter().filter(|(_, o)| o.told.left.is_none()).collect();
         let mut goes = vec![false; site.pieces.list.len()];
         groups.iter().flat_map(|(group, _)| group.iter()).for_each(|piece| goes[*piece as usize] = true);
-        let first = (site.survey.records.len() as u32).checked_add(site.shop.triangles.len() as u32)?;
+        let first = (site.survey.records.len() as u32).checked_add(site.submesh.triangles.len() as u32)?;
         let (mut starts, mut triangles) = (Vec::new(), Vec::new());
         for (_, outcome) in &groups {
             starts.push(triangles.len() as u32);
@@ -52,15 +52,15 @@ impl<'o> Accepted<'o> {
 
     /// Records that go, ascending.
     fn gone(&self, site: &Site<'_, '_>) -> Vec<u32> {
-        let of_shop = site.shop.living().filter(|t| self.goes(site.pieces.of_triangle[*t as usize]));
-        let mut gone: Vec<u32> = of_shop.map(|t| site.shop.record(t)).collect();
-        let sound = site.survey.visit_sound(
+        let of_submesh = site.submesh.living().filter(|t| self.goes(site.pieces.of_triangle[*t as usize]));
+        let mut gone: Vec<u32> = of_submesh.map(|t| site.submesh.record(t)).collect();
+        let regular = site.survey.visit_regular(
             |patch| self.goes(site.pieces.of_patch[patch as usize]),
             |_| Some(Vec::new()),
             |_, _| true,
             |list: &mut Vec<u32>, record, _| list.push(record),
         );
-        gone.extend(sound.into_iter().flatten());
+        gone.extend(regular.into_iter().flatten());
         gone.sort_unstable();
         gone
     }
@@ -68,19 +68,19 @@ impl<'o> Accepted<'o> {
     /// Pieces, one of them of a wrap, whose triangles cross. `None` if that is too much work to tell.
     fn crossing(&self, site: &Site<'_, '_>) -> Option<Vec<[u32; 2]>> {
         let records = site.survey.records.len() as u32;
-        let overlay = Overlay::of(site.survey, site.shop, site.reversed)?;
+        let overlay = Overlay::of(site.survey, site.submesh, site.reversed)?;
         let gone = self.gone(site);
         let beside = overlay.changed().iter().filter(|t| !self.goes(site.pieces.of_triangle[**t as usize]));
         let pairs = fresh::met_by(
             site.survey,
             self.triangles.iter().copied(),
-            beside.map(|t| (records + t, site.shop.points(*t))),
+            beside.map(|t| (records + t, site.submesh.points(*t))),
             |record| overlay.is_gone(record) || gone.binary_search(&record).is_ok(),
             u64::from(self.first) + self.triangles.len() as u64,
             fresh::self_intersection,
         )?;
         let old = pairs.iter().flat_map(|pair| pair.triangles).filter(|number| *number < records);
-        let of_record = components_of_records(site.survey, site.shop, site.pieces, old);
+        let of_record = components_of_records(site.survey, site.submesh, site.pieces, old);
         let piece = |number: u32| {
             if let Some(new) = number.checked_sub(self.first) {
                 return self.piece_of(new);
@@ -107,15 +107,15 @@ impl<'o> Accepted<'o> {
             let found = corners.partition_point(|(q, _)| *q < Position::of(p));
             corners.get(found).filter(|(q, _)| *q == Position::of(p)).map(|(_, piece)| *piece)
         };
-        for t in site.shop.living() {
+        for t in site.submesh.living() {
             let own = site.pieces.of_triangle[t as usize];
             if !self.goes(own) {
-                met.extend(site.shop.points(t).into_iter().filter_map(at).map(|piece| [piece, own]));
+                met.extend(site.submesh.points(t).into_iter().filter_map(at).map(|piece| [piece, own]));
             }
         }
         let mut bounds = Bounds::EMPTY;
         self.triangles.iter().for_each(|(_, t)| bounds.include(t));
-        let touched = site.survey.visit_sound(
+        let touched = site.survey.visit_regular(
             |patch| !site.reversed.dropped[patch as usize] && !self.goes(site.pieces.of_patch[patch as usize]),
             |reach| reach.overlap(&bounds).map(|_| Vec::new()),
             |_, corners| corners.iter().any(|p| at(*p).is_some()),

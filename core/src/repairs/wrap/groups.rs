@@ -25,7 +25,7 @@ impl Groups {
         pairs: Option<&[[u32; 2]]>,
         kept_open: &[[f32; 3]],
     ) -> Self {
-        let (shop, edges) = work.edges();
+        let (submesh, edges) = work.edges();
         let count = pieces.list.len();
         let mut groups = Self {
             parents: (0..count as u32).collect(),
@@ -37,19 +37,19 @@ impl Groups {
             edge.uses.windows(2).for_each(|pair| groups.unite(of(pair[0].triangle), of(pair[1].triangle)));
             edge.uses.iter().for_each(|u| groups.broken[of(u.triangle) as usize] = true);
         }
-        for v in components::nonmanifold_vertices(shop, edges) {
-            let around: Vec<u32> = shop.star(v).map(|(t, _)| of(t)).collect();
+        for v in components::nonmanifold_vertices(submesh, edges) {
+            let around: Vec<u32> = submesh.star(v).map(|(t, _)| of(t)).collect();
             around.iter().for_each(|piece| groups.broken[*piece as usize] = true);
             around.windows(2).for_each(|pair| groups.unite(pair[0], pair[1]));
         }
-        for t in shop.living().filter(|t| shop.is_collinear(*t)) {
+        for t in submesh.living().filter(|t| submesh.is_collinear(*t)) {
             groups.broken[of(t) as usize] = true;
         }
         match pairs {
             Some(pairs) => {
                 let records = survey.records.len() as u32;
                 let old = pairs.iter().flatten().copied().filter(|number| *number < records);
-                let of_record = components_of_records(survey, shop, pieces, old);
+                let of_record = components_of_records(survey, submesh, pieces, old);
                 let piece = |number: u32| match number.checked_sub(records) {
                     Some(t) => Some(of(t)),
                     None => of_record.get(&number).copied(),
@@ -70,8 +70,8 @@ impl Groups {
         }
         let mut kept: Vec<Position> = kept_open.iter().copied().map(Position::of).collect();
         kept.sort_unstable();
-        for t in shop.living() {
-            if !kept.is_empty() && shop.points(t).iter().any(|p| kept.binary_search(&Position::of(*p)).is_ok()) {
+        for t in submesh.living() {
+            if !kept.is_empty() && submesh.points(t).iter().any(|p| kept.binary_search(&Position::of(*p)).is_ok()) {
                 groups.kept[of(t) as usize] = true;
             }
         }

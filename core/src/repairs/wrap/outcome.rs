@@ -12,7 +12,7 @@ pub(crate) struct Wraps {
     /// The new triangles.
     pub(crate) triangles: Vec<Corners>,
     pub(crate) regions: u64,
-    /// Positions of all vertices of the workshop that are gone, ascending.
+    /// Positions of all vertices of the submesh that are gone, ascending.
     pub(crate) gone: Vec<Position>,
 }
 

@@ -9,7 +9,7 @@ use crate::contract::settings::Profile;
 use crate::geometry::position::{self};
 use crate::geometry::sums::Bounds;
 use crate::submesh::components::{Components, Reversed};
-use crate::submesh::{Shop, place};
+use crate::submesh::{Submesh, place};
 use crate::topology::survey::Survey;
 use crate::util::parallel;
 use crate::util::union_find::NONE;
@@ -44,7 +44,7 @@ pub(crate) struct Size {
 /// What there is to look at.
 pub(crate) struct Site<'s, 'a> {
     pub(crate) survey: &'s Survey<'a>,
-    pub(crate) shop: &'s Shop,
+    pub(crate) submesh: &'s Submesh,
     pub(crate) reversed: &'s Reversed,
     pub(crate) pieces: &'s Components,
     /// What hangs together through edges of two triangles.
@@ -119,7 +119,7 @@ impl Site<'_, '_> {
         }
         let of_piece = |piece: u32| if piece == NONE { NONE } else { group_of[piece as usize] };
         let of_patch = |patch: u32| of_piece(self.pieces.of_patch[patch as usize]);
-        let found = self.survey.visit_sound(
+        let found = self.survey.visit_regular(
             |patch| of_patch(patch) != NONE,
             |_| Some(Vec::new()),
             |_, _| true,
@@ -127,8 +127,8 @@ impl Site<'_, '_> {
         );
         let mut all: Vec<(u32, u32, u32, u32)> = found.into_iter().flatten().collect();
         let of_triangle = |t: u32| of_piece(self.pieces.of_triangle[t as usize]);
-        let in_shop = self.shop.living().filter(|t| of_triangle(*t) != NONE);
-        all.extend(in_shop.map(|t| (of_triangle(t), self.shop.record(t), NONE, t)));
+        let in_submesh = self.submesh.living().filter(|t| of_triangle(*t) != NONE);
+        all.extend(in_submesh.map(|t| (of_triangle(t), self.submesh.record(t), NONE, t)));
         all.sort_unstable();
         let mut gathered = vec![Vec::new(); groups.len()];
         for (group, record, patch, t) in all {
@@ -137,7 +137,7 @@ impl Site<'_, '_> {
                 let is_turned = self.reversed.patches[patch as usize];
                 (self.sheets.of_patch[patch as usize], if is_turned { [a, c, b] } else { [a, b, c] })
             } else {
-                (self.sheets.of_triangle[t as usize], self.shop.points(t))
+                (self.sheets.of_triangle[t as usize], self.submesh.points(t))
             };
             gathered[group as usize].push(with_sheet);
         }

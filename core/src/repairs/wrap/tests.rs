@@ -24,10 +24,10 @@ fn wrapped(mesh: &[Corners], kept_open: &[[f32; 3]], profile: &Profile, limits: 
     let input = records(mesh);
     let mut d = Diagnosis::of(Path::new("test"), &input, profile, limits, &Quiet).unwrap();
     let mut reversed = Reversed::none(&d.survey);
-    let work = &mut Work::new(&mut d.shop);
+    let work = &mut Work::new(&mut d.submesh);
     let pairs = Overlay::of(&d.survey, work, &reversed).and_then(|overlay| overlay.crossing_pairs(&d.survey, work));
     let wraps = replace(&d.survey, work, &mut reversed, pairs.as_deref(), kept_open, profile, limits.threads);
-    let mut edit = Edit::of(&d.survey, &d.shop, &reversed);
+    let mut edit = Edit::of(&d.survey, &d.submesh, &reversed);
     edit.added.extend(wraps.triangles.iter().map(|corners| record::encode(*corners, 0)));
     let output = written(&edit, &input);
     let defects = diagnose(&output).defects;
@@ -113,7 +113,7 @@ fn the_profile_bounds_how_much_and_how_far() {
 
 #[test]
 fn chunks_and_threads_change_nothing() {
-    // Balls of a few hundred triangles, so that most of them is no suspect.
+    // Balls of a few hundred triangles, so that most of them is no irregular triangle.
     let ball = |at: f32| -> Vec<Corners> {
         let p = |i: u32, j: u32| {
             let (a, b) = (f64::from(i) * 0.3141592653589793, f64::from(j) * 0.3141592653589793);

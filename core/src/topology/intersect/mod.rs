@@ -122,8 +122,8 @@ impl Finder {
         self.states.clear();
         self.states.extend(region.standing.iter().enumerate().map(|(v, standing)| match standing {
             Standing::Away => State::Away,
-            Standing::Sound if self.stars.is_certified(v) => State::Certified,
-            Standing::Sound | Standing::Unsound => State::Open,
+            Standing::Regular if self.stars.is_certified(v) => State::Certified,
+            Standing::Regular | Standing::Irregular => State::Open,
         }));
         self.forest.build(region, &self.stars, &self.states);
     }

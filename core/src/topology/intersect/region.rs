@@ -23,10 +23,10 @@ pub(crate) struct Region<'a> {
 pub(crate) enum Standing {
     /// At home in another cell.
     Away,
-    /// At home here, and not sound.
-    Unsound,
+    /// At home here, and not regular.
+    Irregular,
     /// At home here, in the middle of a closed, coherent fan without collinear triangles.
-    Sound,
+    Regular,
 }
 
 impl Region<'_> {

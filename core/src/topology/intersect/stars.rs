@@ -1,6 +1,6 @@
 //! Stars that cannot intersect themselves, recognised in linear time.
 //!
-//! Most boxes that overlap belong to triangles around one vertex. Let v be sound: its triangles (v, next, previous) form one closed
+//! Most boxes that overlap belong to triangles around one vertex. Let v be regular: its triangles (v, next, previous) form one closed
 //! coherent fan. Let d be any vector, and look at the star along d.
 //!
 //! 1. If the normal of every triangle has a positive component along d, each triangle is seen with positive area and turns the same
@@ -107,7 +107,7 @@ impl Stars {
         }
     }
 
-    /// Is the star of a sound vertex certified?
+    /// Is the star of a regular vertex certified?
     #[inline]
     pub(super) fn is_certified(&self, vertex: usize) -> bool {
         self.turns[vertex] == 1

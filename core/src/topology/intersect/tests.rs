@@ -21,7 +21,7 @@ struct Mesh {
     positions: Vec<Point>,
     triangles: Vec<[u32; 3]>,
     collinear: Vec<bool>,
-    sound: Vec<bool>,
+    regular: Vec<bool>,
 }
 
 impl Mesh {
@@ -43,13 +43,13 @@ impl Mesh {
             })
             .collect();
         let collinear = soup.iter().map(|[a, b, c]| is_collinear(a, b, c)).collect();
-        let mut mesh = Self { positions, triangles, collinear, sound: Vec::new() };
-        mesh.sound = (0..mesh.positions.len() as u32).map(|v| mesh.is_sound(v)).collect();
+        let mut mesh = Self { positions, triangles, collinear, regular: Vec::new() };
+        mesh.regular = (0..mesh.positions.len() as u32).map(|v| mesh.is_regular(v)).collect();
         mesh
     }
 
     /// One closed, coherent fan without collinear triangles: going from triangle to triangle meets each once and comes back.
-    fn is_sound(&self, v: u32) -> bool {
+    fn is_regular(&self, v: u32) -> bool {
         let mut after = BTreeMap::new();
         let around = || (0..self.triangles.len()).filter(|t| self.triangles[*t][0] != NONE && self.triangles[*t].contains(&v));
         for t in around() {
@@ -104,10 +104,10 @@ impl Mesh {
             })
             .collect();
         let left_out: Vec<u32> = (0..seen.len() as u32).filter(|i| self.collinear[seen[*i as usize] as usize]).collect();
-        let standing = |v: &usize| match (home[*v], self.sound[*v]) {
+        let standing = |v: &usize| match (home[*v], self.regular[*v]) {
             (false, _) => Standing::Away,
-            (true, false) => Standing::Unsound,
-            (true, true) => Standing::Sound,
+            (true, false) => Standing::Irregular,
+            (true, true) => Standing::Regular,
         };
         let region = Region {
             positions: &vertices.iter().map(|v| self.positions[*v]).collect::<Vec<_>>(),
@@ -284,7 +284,7 @@ fn stars_that_go_round_once_are_certified() {
         let (pairs, tested) = whole(&fan(BELOW, &ring(n, 1.0, 1.5)));
         assert_eq!((pairs.len(), tested), (0, 0), "{n}");
     }
-    // Twice round the apex, which is sound by its fan alone.
+    // Twice round the apex, which is regular by its fan alone.
     let star = fan(BELOW, &ring(15, 2.0, 1.5));
     let (pairs, tested) = whole(&star);
     assert_eq!(pairs, Mesh::new(&star).by_brute_force());
@@ -309,7 +309,7 @@ fn faults_around_hubs_are_found_in_any_cell() {
     let ring = ring(600, 1.0, 1.5);
     for apex in [BELOW, [1.0, 0.0, 0.0], [20.0, 0.0, 0.0]] {
         let mut soup = fan(apex, &ring);
-        // A second triangle on one edge of the hub, and a copy of one: two vertices of the rim are no longer sound.
+        // A second triangle on one edge of the hub, and a copy of one: two vertices of the rim are no longer regular.
         soup.push([ring[7], apex, [-1.0, ring[7][1] * 1.5, ring[7][2]]]);
         soup.push(soup[400]);
         let expected = Mesh::new(&soup).by_brute_force();

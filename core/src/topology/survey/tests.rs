@@ -10,7 +10,8 @@ fn surveyed(records: &[Record], chunk_triangles: u32, spill: Spill) -> impl Part
     let limits = Limits { threads: 1, chunk_triangles, spill, ..Limits::default() };
     let survey = Survey::new(Path::new("test"), records, true, &limits, &Quiet).unwrap();
     let patches: Vec<_> = survey.patches.iter().map(|p| (p.first, p.triangles, p.extent, p.bounds)).collect();
-    let found = (survey.suspects, survey.suspect_patches, patches, survey.nonfinite, survey.self_intersections);
+    let found =
+        (survey.irregular_triangles, survey.irregular_triangle_patches, patches, survey.nonfinite, survey.self_intersections);
     (found, survey.vertices, survey.vertices_used)
 }
 
@@ -47,11 +48,11 @@ fn divided(records: &[Record], chunk_triangles: u32, corners: &[Vec<usize>; 3]) 
         divisions.push((division.fetched, division.divided_from));
     };
     divide(&mut survey, &first);
-    let sound: Vec<[f32; 3]> = promoted.into_iter().filter(|p| !first.contains(p)).collect();
-    let new = survey.promote(&sound);
+    let regular: Vec<[f32; 3]> = promoted.into_iter().filter(|p| !first.contains(p)).collect();
+    let new = survey.promote(&regular);
     divide(&mut survey, &second);
     let patches: Vec<_> = survey.patches.iter().map(|p| (p.first, p.triangles, p.extent, p.bounds)).collect();
-    (divisions, new, survey.suspects, survey.suspect_patches, patches, survey.promoted)
+    (divisions, new, survey.irregular_triangles, survey.irregular_triangle_patches, patches, survey.promoted)
 }
 
 proptest! {
@@ -71,12 +72,12 @@ proptest! {
 }
 
 #[test]
-fn a_cube_is_one_patch_and_no_suspect() {
+fn a_cube_is_one_patch_and_no_irregular_triangle() {
     let records = records(&cuboid([0.0; 3], [2.0; 3]));
     for chunk_triangles in [1, u32::MAX] {
         let limits = Limits { threads: 1, chunk_triangles, ..Limits::default() };
         let survey = Survey::new(Path::new("test"), &records, true, &limits, &Quiet).unwrap();
-        assert!(survey.suspects.is_empty());
+        assert!(survey.irregular_triangles.is_empty());
         assert_eq!((survey.patches.len(), survey.patches[0].triangles, survey.vertices), (1, 12, 8));
         assert!((survey.measure.volume(survey.patches[0].extent) - 8.0).abs() < 1e-9);
     }

@@ -24,7 +24,7 @@ use crate::testing::{After, Corners, after, cube, cuboid, diagnose, records, rev
 
 fn resolved_by(triangles: &[Corners], profile: &Profile) -> After<Resolved> {
     after(triangles, |d, turned| {
-        let work = &mut Work::new(&mut d.shop);
+        let work = &mut Work::new(&mut d.submesh);
         duplicates::drop_duplicates(work);
         let limits = Limits { threads: 1, ..Limits::default() };
         let means = Means { path: Path::new("test"), limits: &limits, progress: &Quiet };
@@ -46,7 +46,7 @@ fn what_would_take_more_memory_than_there_is_is_refused() {
         after(&row, |d, turned| {
             let limits = Limits { threads: 1, memory_bytes, ..Limits::default() };
             let means = Means { path: Path::new("test"), limits: &limits, progress: &Quiet };
-            let work = &mut Work::new(&mut d.shop);
+            let work = &mut Work::new(&mut d.submesh);
             resolve(&Rational, &mut d.survey, work, turned, &Profile::default(), false, &means).map(|resolved| resolved.pairs)
         })
     };
@@ -285,7 +285,7 @@ fn bodies_whose_faces_lie_in_planes_that_f32_cannot_hold_are_spread_by_some_step
     let got = after(&mesh, |d, turned| {
         let limits = Limits { threads: 1, ..Limits::default() };
         let means = Means { path: Path::new("test"), limits: &limits, progress: &Quiet };
-        let (survey, work) = (&mut d.survey, &mut Work::new(&mut d.shop));
+        let (survey, work) = (&mut d.survey, &mut Work::new(&mut d.submesh));
         let overlay = Overlay::of(survey, work, turned).unwrap();
         let pairs = overlay.crossing_pairs(survey, work).unwrap();
         divide(survey, work, turned, corners(survey, work, &overlay, &pairs), &means).unwrap();
@@ -326,7 +326,7 @@ fn triangles_that_follow_their_neighbours_take_steps_in_proportion() {
         let mut piece_of = vec![NONE; n];
         piece_of[n - 1] = 7;
         let left: Vec<usize> = (0..n - 1).collect();
-        let (steps, ()) = steps::of(|| follow_neighbours(&d.shop, &left, &mut piece_of));
+        let (steps, ()) = steps::of(|| follow_neighbours(&d.submesh, &left, &mut piece_of));
         assert!(piece_of.iter().all(|piece| *piece == 7));
         steps
     });
@@ -342,7 +342,7 @@ fn a_triangle_follows_the_neighbour_whose_turn_came_first() {
     let records = records(&fan);
     let d = diagnose(&records);
     let mut piece_of = [5, NONE, NONE, 3, NONE];
-    follow_neighbours(&d.shop, &[1, 2, 4], &mut piece_of);
+    follow_neighbours(&d.submesh, &[1, 2, 4], &mut piece_of);
     assert_eq!(piece_of, [5, 3, 3, 3, 3]);
 }
 
@@ -359,12 +359,12 @@ fn edges_that_run_along_each_other_from_ring_to_ring_take_steps_in_proportion() 
 
 #[test]
 fn what_is_fetched_is_found_in_one_table_of_positions() {
-    // Nothing of a sound cube is in the workshop before a star is asked for.
+    // Nothing of a regular cube is in the submesh before a star is asked for.
     let records = records(&cube());
     let mut d = diagnose(&records);
     let positions = [cube()[0][0]];
     let new = d.survey.promote(&positions);
-    let mut work = Work::new(&mut d.shop);
+    let mut work = Work::new(&mut d.submesh);
     work.extend_at(&d.survey, &new, &positions);
     assert!(work.living().count() >= 3);
     // Again, with nothing new: one table, and the star lists made anew.

@@ -9,7 +9,7 @@ use crate::repairs::cleanup::degenerate;
 use crate::repairs::holes::patches::are_joined;
 use crate::repairs::shared::context::PatchAcross;
 use crate::repairs::shared::work::Work;
-use crate::submesh::{Origin, Shop, Vertex};
+use crate::submesh::{Origin, Submesh, Vertex};
 use crate::util::union_find::NONE;
 
 /// Triangles around the first vertex of a loop.
@@ -17,9 +17,9 @@ pub(crate) fn fan(vertices: usize) -> Vec<[u32; 3]> {
     (2..vertices as u32).map(|n| [0, n - 1, n]).collect()
 }
 
-pub(crate) fn is_on_one_line(shop: &Shop, way: &[Vertex]) -> bool {
-    let [a, b] = [way[0], way[1]].map(|v| shop.positions[v as usize]);
-    way[2..].iter().all(|v| exact::collinear(&a, &b, &shop.positions[*v as usize]))
+pub(crate) fn is_on_one_line(submesh: &Submesh, way: &[Vertex]) -> bool {
+    let [a, b] = [way[0], way[1]].map(|v| submesh.positions[v as usize]);
+    way[2..].iter().all(|v| exact::collinear(&a, &b, &submesh.positions[*v as usize]))
 }
 
 /// And why a loop does along which edges are not used equally often in both directions.
@@ -54,8 +54,8 @@ impl Closing<'_> {
     /// Loops of edges that lack a side, but for those that were left open.
     pub(crate) fn unbalanced(&self, work: &mut Work<'_>) -> Vec<Vec<Vertex>> {
         let open = self.open.iter().map(|(rim, _)| self.rim(*rim));
-        let (shop, edges) = work.edges();
-        loops::unbalanced(shop, edges, open)
+        let (submesh, edges) = work.edges();
+        loops::unbalanced(submesh, edges, open)
     }
 
     /// Closes what is left as if nothing were in the way, each by a patch that may cross anything, itself included. Returns the triangles
@@ -106,14 +106,15 @@ impl Closing<'_> {
     }
 
     /// A patch that does not cross itself, if there is one, else any.
-    pub(crate) fn patch_across(&self, shop: &Shop, rim: u32) -> Option<triangulate::Patch> {
-        let valid = self.fill(shop, rim, Neighbours::Heeded, &[]).or_else(|_| self.fill(shop, rim, Neighbours::Ignored, &[]));
+    pub(crate) fn patch_across(&self, submesh: &Submesh, rim: u32) -> Option<triangulate::Patch> {
+        let valid =
+            self.fill(submesh, rim, Neighbours::Heeded, &[]).or_else(|_| self.fill(submesh, rim, Neighbours::Ignored, &[]));
         if let Ok(patch) = valid {
             return Some(patch);
         }
         let loop_ = self.rim(rim);
-        let points = loop_.points(shop);
-        let joined = |i: u32, j: u32| are_joined(shop, loop_.vertices[i as usize], loop_.vertices[j as usize]);
+        let points = loop_.points(submesh);
+        let joined = |i: u32, j: u32| are_joined(submesh, loop_.vertices[i as usize], loop_.vertices[j as usize]);
         let any = |forbidden: &dyn Fn(u32, u32) -> bool| {
             triangulate::unchecked(&Rim { points: &points, apexes: &[], obstacles: &[], forbidden })
         };

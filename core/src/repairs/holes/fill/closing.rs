@@ -1,14 +1,14 @@
-//! The loops of a workshop while they are closed: patches that are in, and loops that are open, with the reason.
+//! The loops of a submesh while they are closed: patches that are in, and loops that are open, with the reason.
 
 use crate::algorithms::triangulate::{self, FillSettings, Rim, Unfillable, strip};
 use crate::contract::report::LoopLeft;
 use crate::detect::holes::{self, loops::Loop};
 use crate::geometry::tri_tri;
-use crate::repairs::holes::patches::{Placed, are_joined, of_workshop};
+use crate::repairs::holes::patches::{Placed, are_joined, of_submesh};
 use crate::repairs::shared::admission::{Admission, NotAdmitted};
 use crate::repairs::shared::context::{PatchAcross, SheetRim};
 use crate::repairs::shared::work::Work;
-use crate::submesh::{Origin, Shop, Vertex};
+use crate::submesh::{Origin, Submesh, Vertex};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What was closed, by method, and what was not.
@@ -26,7 +26,7 @@ pub(crate) struct Closed {
     pub(crate) across: Vec<PatchAcross>,
 }
 
-/// The loops of a workshop while they are closed.
+/// The loops of a submesh while they are closed.
 pub(crate) struct Closing<'p> {
     pub(crate) admission: Admission<'p>,
     pub(crate) max_edges: usize,
@@ -59,8 +59,8 @@ pub(crate) enum Neighbours {
 /// Longest list of open loops in a report.
 pub(crate) const LISTED: usize = 1000;
 
-pub(crate) fn left(shop: &Shop, from: Vertex, edges: usize, perimeter: f64, reason: &dyn std::fmt::Display) -> LoopLeft {
-    LoopLeft { at: shop.positions[from as usize], edges: edges as u64, perimeter, reason: reason.to_string() }
+pub(crate) fn left(submesh: &Submesh, from: Vertex, edges: usize, perimeter: f64, reason: &dyn std::fmt::Display) -> LoopLeft {
+    LoopLeft { at: submesh.positions[from as usize], edges: edges as u64, perimeter, reason: reason.to_string() }
 }
 
 /// Name of the method that closes a loop on one line.
@@ -70,12 +70,12 @@ pub(crate) const SLIT: &str = "slit";
 pub(crate) const FLAT: &str = "flat on its neighbours";
 
 /// A chord of the patch is an edge of the mesh by now.
-pub(crate) fn meets_new_edge(shop: &Shop, rim: &Loop, patch: &triangulate::Patch) -> bool {
+pub(crate) fn meets_new_edge(submesh: &Submesh, rim: &Loop, patch: &triangulate::Patch) -> bool {
     let n = rim.vertices.len() as u32;
     patch.triangles.iter().any(|t| {
         (0..3).any(|k| {
             let (i, j) = (t[k], t[(k + 1) % 3]);
-            j != (i + 1) % n && shop.has_edge(rim.vertices[i as usize], rim.vertices[j as usize])
+            j != (i + 1) % n && submesh.has_edge(rim.vertices[i as usize], rim.vertices[j as usize])
         })
     })
 }
@@ -89,27 +89,27 @@ impl Closing<'_> {
     }
 
     pub(crate) fn put_in(&mut self, work: &mut Work<'_>, rim: u32, patch: &triangulate::Patch, method: &'static str) {
-        let triangles = of_workshop(self.rim(rim), patch);
+        let triangles = of_submesh(self.rim(rim), patch);
         self.placed.push(Placed::put_in(work, vec![rim], &triangles, method));
     }
 
     /// A triangulation of a loop that crosses none of the `obstacles`.
     pub(crate) fn fill(
         &self,
-        shop: &Shop,
+        submesh: &Submesh,
         rim: u32,
         neighbours: Neighbours,
         obstacles: &[tri_tri::Triangle],
     ) -> Result<triangulate::Patch, NotFilled> {
         let rim = self.rim(rim);
-        self.admission.check(shop, rim)?;
-        let points = rim.points(shop);
-        let apexes = if neighbours == Neighbours::Heeded { rim.apexes(shop) } else { Vec::new() };
-        let forbidden = |i: u32, j: u32| are_joined(shop, rim.vertices[i as usize], rim.vertices[j as usize]);
+        self.admission.check(submesh, rim)?;
+        let points = rim.points(submesh);
+        let apexes = if neighbours == Neighbours::Heeded { rim.apexes(submesh) } else { Vec::new() };
+        let forbidden = |i: u32, j: u32| are_joined(submesh, rim.vertices[i as usize], rim.vertices[j as usize]);
         let settings = FillSettings { max_vertices: self.max_edges, ..FillSettings::default() };
         let of_patch = Rim { points: &points, apexes: &apexes, obstacles, forbidden: &forbidden };
         if neighbours == Neighbours::Heeded
-            && let Some(patch) = holes::folds(shop, rim).and_then(|folds| strip::zip(&of_patch, folds).ok())
+            && let Some(patch) = holes::folds(submesh, rim).and_then(|folds| strip::zip(&of_patch, folds).ok())
             && !patch.triangles.iter().any(|t| of_patch.meets_obstacle(&of_patch.corners(*t)))
         {
             return Ok(patch);

@@ -3,7 +3,7 @@
 use super::closing::{Closing, FLAT, Neighbours, NotFilled, SMALL};
 use crate::detect::holes::loops::Loop;
 use crate::geometry::tri_tri;
-use crate::repairs::holes::patches::{Placed, of_workshop};
+use crate::repairs::holes::patches::{Placed, of_submesh};
 use crate::repairs::shared::collisions::{self, Obstacle};
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::Reversed;
@@ -101,7 +101,7 @@ impl Closing<'_> {
             });
             made.map_or_else(Vec::new, |(patch, across)| {
                 (self.placed[i].method, self.placed[i].across) = (patch.method.name(), across);
-                of_workshop(self.rim(rim), &patch)
+                of_submesh(self.rim(rim), &patch)
             })
         } else {
             Vec::new()

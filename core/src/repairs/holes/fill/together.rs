@@ -9,7 +9,7 @@ use crate::repairs::holes::annular;
 use crate::repairs::holes::islands;
 use crate::repairs::holes::patches::Placed;
 use crate::repairs::shared::work::Work;
-use crate::submesh::{Shop, Vertex};
+use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
 
 /// Loops while groups of them are closed.
@@ -80,16 +80,16 @@ impl Closing<'_> {
         let Grouped { mut done, placed, joined, .. } = all;
         self.admission.joined(&joined);
         let first = done.len();
-        let (shop, edges) = work.edges();
-        done.extend(loops::find(shop, edges));
+        let (submesh, edges) = work.edges();
+        done.extend(loops::find(submesh, edges));
         (self.rims, self.placed) = (done, placed);
         first
     }
 
     /// May all loops of a group be closed?
-    fn admits(&self, shop: &Shop, group: &[&Loop]) -> bool {
-        self.admission.check(shop, group[0]).is_ok()
-            && group[1..].iter().all(|rim| self.admission.check_joined(shop, rim).is_ok())
+    fn admits(&self, submesh: &Submesh, group: &[&Loop]) -> bool {
+        self.admission.check(submesh, group[0]).is_ok()
+            && group[1..].iter().all(|rim| self.admission.check_joined(submesh, rim).is_ok())
     }
 
     /// Holes whose islands touch the rim.

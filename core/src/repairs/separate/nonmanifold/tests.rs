@@ -13,7 +13,7 @@ use crate::submesh::components::Reversed;
 use crate::testing::{After, Corners, after, cuboid, records, reversed, written};
 
 fn separated(triangles: &[Corners]) -> After<Separated> {
-    after(triangles, |d, turned| separate(&d.survey, &mut Work::new(&mut d.shop), turned, &Profile::default()))
+    after(triangles, |d, turned| separate(&d.survey, &mut Work::new(&mut d.submesh), turned, &Profile::default()))
 }
 
 /// The skin of the unit cubes of a 4 × 4 × 4 grid whose bits are set. `diagonals`: which way the square faces are divided.
@@ -97,7 +97,7 @@ fn cavities_that_meet_in_a_vertex_draw_back_from_each_other() {
 fn what_a_profile_wants_to_stay_stays() {
     let mesh = [cuboid([0.0; 3], [1.0; 3]), cuboid([1.0; 3], [2.0; 3])].concat();
     let profile = Profile { separate: false, ..Profile::default() };
-    let got = after(&mesh, |d, turned| separate(&d.survey, &mut Work::new(&mut d.shop), turned, &profile));
+    let got = after(&mesh, |d, turned| separate(&d.survey, &mut Work::new(&mut d.submesh), turned, &profile));
     assert_eq!((got.result, got.untouched), (Separated::default(), 24));
 }
 
@@ -117,8 +117,8 @@ fn written_by(mesh: &[Corners], chunk_triangles: u32) -> Vec<Record> {
     let limits = Limits { threads: 1, chunk_triangles, ..Limits::default() };
     let mut d = Diagnosis::of(Path::new("test"), &input, &Profile::default(), &limits, &Quiet).unwrap();
     let none = Reversed::none(&d.survey);
-    separate(&d.survey, &mut Work::new(&mut d.shop), &none, &Profile::default());
-    written(&Edit::of(&d.survey, &d.shop, &Reversed::none(&d.survey)), &input)
+    separate(&d.survey, &mut Work::new(&mut d.submesh), &none, &Profile::default());
+    written(&Edit::of(&d.survey, &d.submesh, &Reversed::none(&d.survey)), &input)
 }
 
 proptest! {

@@ -4,7 +4,7 @@ use crate::testing::{After, after, cuboid, plate, reversed, shifted};
 /// Two pieces this far apart.
 fn cut(lower: &[Corners], upper: &[Corners], up: f32) -> After<u64> {
     after(&[lower, &shifted(upper, [0.0, 0.0, up])].concat(), |d, _| {
-        cut_back(&mut d.survey, &mut Work::new(&mut d.shop), &d.tolerance)
+        cut_back(&mut d.survey, &mut Work::new(&mut d.submesh), &d.tolerance)
     })
 }
 

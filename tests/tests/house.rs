@@ -6,6 +6,7 @@ mod imports;
 #[path = "house/lengths.rs"]
 mod lengths;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use imports::Imports;
@@ -121,6 +122,25 @@ fn circles_of_folders_are_found() {
     assert!(imports.circles().is_empty(), "no file leads to itself");
     let circles: Vec<_> = imports.folders().iter().flat_map(Imports::circles).collect();
     assert_eq!(circles, [["a", "b"]]);
+}
+
+#[test]
+fn the_map_names_every_file() {
+    let map = std::fs::read_to_string(sources("core").join("../../ARCHITECTURE.md")).expect("the map");
+    let mut named = BTreeSet::new();
+    for line in map.lines() {
+        // Every second part of a line stands between backticks.
+        let quoted = line.split('`').skip(1).step_by(2);
+        let heading = line.strip_prefix("### ");
+        named.extend(quoted.chain(heading).flat_map(|part| part.split(|c: char| !c.is_ascii_alphanumeric() && c != '_')));
+    }
+    for of_crate in ["core", "store", "daemon"] {
+        let unnamed: Vec<_> = Imports::of(&sources(of_crate))
+            .files()
+            .filter_map(|file| file.last().filter(|name| !named.contains(name.as_str())).map(|_| file.join("/")))
+            .collect();
+        assert!(unnamed.is_empty(), "{of_crate}: {unnamed:?} are not in ARCHITECTURE.md");
+    }
 }
 
 /// Lines of a file, at most.

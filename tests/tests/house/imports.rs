@@ -31,6 +31,11 @@ impl Imports {
         Self(files.iter().map(of_file).collect())
     }
 
+    /// Every file, but the root and those for tests.
+    pub(crate) fn files(&self) -> impl Iterator<Item = &Module> {
+        self.0.keys().filter(|module| !module.is_empty())
+    }
+
     pub(crate) fn all(&self) -> impl Iterator<Item = (&Module, &Module)> {
         self.0.iter().flat_map(|(from, to)| to.iter().map(move |to| (from, to)))
     }

@@ -12,6 +12,7 @@ mod shape;
 mod sides;
 #[cfg(test)]
 mod tests;
+pub(crate) mod unbalanced;
 
 use std::collections::BTreeMap;
 

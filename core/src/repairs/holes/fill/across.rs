@@ -3,7 +3,7 @@
 use super::closing::{Closing, Neighbours, NotFilled, SLIT, left};
 use crate::algorithms::triangulate::{self, Rim, Unfillable};
 use crate::contract::report::LoopLeft;
-use crate::detect::holes::loops::{self};
+use crate::detect::holes::unbalanced::unbalanced;
 use crate::geometry::exact::{self, Point};
 use crate::repairs::cleanup::degenerate;
 use crate::repairs::holes::patches::are_joined;
@@ -55,7 +55,7 @@ impl Closing<'_> {
     pub(crate) fn unbalanced(&self, work: &mut Work<'_>) -> Vec<Vec<Vertex>> {
         let open = self.open.iter().map(|(rim, _)| self.rim(*rim));
         let (submesh, edges) = work.edges();
-        loops::unbalanced(submesh, edges, open)
+        unbalanced(submesh, edges, open)
     }
 
     /// Closes what is left as if nothing were in the way, each by a patch that may cross anything, itself included. Returns the triangles

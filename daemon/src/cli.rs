@@ -27,14 +27,14 @@ pub(crate) struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Repair files: write what is printable, say what was wrong and what was done
+    /// Repair files: write the repaired meshes, and say what was wrong and what was done
     Repair(RepairArgs),
     /// Diagnose files and write nothing
     Inspect(InspectArgs),
     /// Serve a hot folder: repair whatever is dropped into DIR/in
     #[command(long_about = WATCH_HELP)]
     Watch(WatchArgs),
-    /// See and steer the jobs of a hot folder, whether or not its daemon runs
+    /// List, show, retry or cancel the jobs of a hot folder, with or without a running daemon
     Jobs(JobsArgs),
     /// Make a hot folder of small broken meshes, repair them, and show what happened
     Demo,
@@ -77,11 +77,11 @@ pub(crate) struct Spend {
 /// As the engine's own, for the command line.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum Guarantee {
-    /// Leave it, and call only good what passed every check
+    /// Leave it; only a file that passed every check is good
     Strict,
     /// Replace it by a surface around what it encloses
     Wrap,
-    /// Leave it
+    /// Leave it; a check that was not made does not keep a file from being good
     Off,
 }
 
@@ -136,7 +136,7 @@ pub(crate) struct RepairArgs {
     /// Do not look for self-intersections: faster, but the verdict then calls them unchecked
     #[arg(long)]
     pub no_self_intersections: bool,
-    /// What to do about what no repair makes a solid [default: the profile's, which is wrap but for cautious]
+    /// What to do with geometry that no repair can turn into a solid [default: the profile's: wrap; strict in cautious]
     #[arg(long, value_enum)]
     pub guarantee: Option<Guarantee>,
     #[command(flatten)]

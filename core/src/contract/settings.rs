@@ -33,7 +33,7 @@ pub struct Profile {
     pub max_gap_mm: f64,
     /// Kinds of loops that stay open.
     pub leave_open: Vec<LoopClass>,
-    /// Close the rims of lone sheets, too, which become bodies of hardly any thickness.
+    /// Close the rims of lone sheets, too. They become bodies of hardly any thickness.
     pub close_sheets: bool,
     /// Fill holes at all.
     pub fill_holes: bool,
@@ -42,8 +42,8 @@ pub struct Profile {
     /// Largest change of the enclosed volume, as a fraction, between a closed part of the input and the output; beyond it the
     /// result needs review.
     pub max_volume_change: f64,
-    /// Largest change of the surface's area, as a fraction; beyond it the result needs review. What lies double or inside goes rightly, so that
-    /// only growth is bounded unless this is below 1.
+    /// Largest change of the surface's area, as a fraction; beyond it the result needs review. A repair rightly removes surface that lies double or
+    /// inside, so a value of 1 or more bounds growth only.
     pub max_area_change: f64,
     /// Largest growth or shrinkage of the bounding box on any side, as a fraction of the diagonal. (Triangles without area do not
     /// count; a fin that stood out does.)
@@ -54,26 +54,26 @@ pub struct Profile {
     pub debris_triangles: u32,
     /// ... if they have at most this share of the model's area, and all of them together at most ten times that; else all are kept.
     pub debris_area_share: f64,
-    /// What becomes of lone sheets, which bound nothing, beside bodies that do.
+    /// What to do with lone sheets.
     pub sheets: Sheets,
     /// Sheets that are dropped may have this share of the model's area together without review.
     pub max_sheets_share: f64,
-    /// What becomes of bodies inside others, or crossing others.
+    /// What to do with bodies inside others, or crossing others.
     pub bodies: Bodies,
-    /// The rim of an open shape that stands on other surface, within this fraction of the diagonal, is let down into it before it is closed, so that
-    /// the two become one. 0, as it is unless asked for: never; a thousandth is meant for shapes that were drawn on others.
+    /// An open shape that stands within this fraction of the diagonal above other surface gets a skirt down into that surface before it is closed,
+    /// so the two become one body. 0 (default): never. 0.001 suits shapes that were drawn on top of each other.
     pub stack_gap_relative: f64,
     /// Take surfaces apart that share an edge or a vertex, so that each has positions of its own.
     pub separate: bool,
     /// How far a vertex may move for that, as a fraction of the diagonal; four steps of single precision are always allowed.
     pub max_separation_relative: f64,
-    /// What is done about what no repair makes a solid.
+    /// What to do with geometry that no repair can turn into a solid.
     pub guarantee: Guarantee,
-    /// Most of the surface's area that may be replaced by wraps, as a fraction. 1: all of it, since a wrap is named in the report and needs review
-    /// anyway beyond [`Profile::wrap_review_share`].
+    /// Largest share of the surface's area that wraps may replace. 1: all of it; a result with more than [`Profile::wrap_review_share`] in wraps needs
+    /// review anyway.
     pub wrap_max_share: f64,
-    /// Farthest that surface may lie from the wrap that replaces it, as a fraction of the diagonal. What had material on both of its sides
-    /// does not count.
+    /// Largest distance of surface from the wrap that replaces it, as a fraction of the diagonal. Surface with material on both sides does not
+    /// count.
     pub wrap_max_move: f64,
     /// Beyond this fraction of the surface's area in wraps a result needs review.
     pub wrap_review_share: f64,
@@ -83,43 +83,43 @@ pub struct Profile {
     pub check_self_intersections: bool,
 }
 
-/// What is done about what no repair makes a solid.
+/// What to do with geometry that no repair can turn into a solid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Guarantee {
-    /// Nothing, and only what passes every check is good: one that was not made is not enough.
+    /// Leave it. A file is good only if it passed every check; a check that was not made keeps it from being good.
     Strict,
-    /// It is replaced by a surface around what it encloses.
+    /// Replace it by a surface around the space that it encloses.
     #[default]
     Wrap,
-    /// Nothing; what was not checked is said to be unchecked.
+    /// Leave it. A check that was not made is reported as unchecked, and the file may still be good.
     Off,
 }
 
-/// What becomes of bodies that lie inside others or cross them.
+/// What to do with bodies that lie inside other bodies, or cross them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Bodies {
-    /// Only what separates material from air stays: bodies inside the material of others go, those that cross become one; cavities, and what lies
-    /// in them, stay.
+    /// Keep the surface that separates material from air: bodies inside the material of others go, bodies that cross become one. Cavities stay,
+    /// and so do bodies inside a cavity.
     #[default]
     Union,
-    /// Everything stays.
+    /// Keep all bodies.
     Keep,
-    /// Those that cross become one, and then only what can be seen from outside along the axes stays: a piece of surface, closed or open, whose
-    /// largest triangle is hidden by other pieces in all six directions goes, cavities too. (After Yang et al. 2021, section 3.2.)
+    /// Bodies that cross become one. Then a piece of surface, closed or open, goes if other pieces hide its largest triangle in all six directions
+    /// along the axes; so cavities go, too. (After Yang et al. 2021, section 3.2.)
     Visible,
 }
 
-/// What becomes of a lone sheet in a file that holds bodies as well.
+/// What to do with a lone sheet (open surface that bounds no material) in a file that also holds bodies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sheets {
-    /// One that crosses a body or another sheet goes, since no solid can have it; others go if they are next to nothing
-    /// ([`Profile::debris_area_share`], all of them together).
+    /// Drop a sheet that crosses a body or another sheet: no solid can have it. Drop the others if all of them together have at most
+    /// [`Profile::debris_area_share`] of the area.
     #[default]
     Drop,
-    /// All stay, and the file stays open.
+    /// Keep all sheets; the file stays open.
     Keep,
 }
 

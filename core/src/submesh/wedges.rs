@@ -95,7 +95,8 @@ fn wedges<'e>(submesh: &Submesh, edge: &Edge<'e>) -> Vec<[&'e Use; 2]> {
         submesh.positions[apex.unwrap_or(edge.low) as usize]
     });
     let Some(order) = around(&ends, &apexes.collect::<Vec<Point>>()) else { return Vec::new() };
-    // Behind one that runs against the edge's direction material begins, behind the others it ends. What is turned by begins where least is open.
+    // Material begins behind a triangle that runs against the edge's direction, and ends behind the others. The radial sweep starts where the fewest
+    // wedges are open.
     let begins = |i: usize| !edge.uses[i].forward;
     let (mut open, mut least, mut first) = (0_i64, 0, 0);
     for (place, i) in order.iter().enumerate() {

@@ -52,8 +52,8 @@ impl Parts {
         all
     }
 
-    /// The parts with what chunks say that were solved again, ascending, and all irregular triangles, with those that were known. `is_changed`: vertices at home in
-    /// that chunk became irregular, so that its parts are others; the other chunks solved share triangles with such ones, and say what they said.
+    /// Merges the chunks that were solved again, ascending, with the cached ones. `is_changed(c)`: vertices of chunk `c` itself became irregular, so
+    /// its parts are others; the other chunks that were solved again only border such a chunk. `irregular_triangles`: all of them.
     /// O(parts + seams + irregular triangles), sorted.
     pub(crate) fn renewed(
         &self,

@@ -24,7 +24,7 @@ pub(crate) struct Wrapping {
 /// The lattice is never finer than this share of the diagonal, nor coarser than that, but for what f32 can hold.
 const FINEST: f64 = 1.0 / 1024.0;
 const COARSEST: f64 = 1.0 / 128.0;
-/// Cubes that a surface goes through, in squares of their side: what a plane does at most, about.
+/// Lattice cubes that are cut for each cube-sided square of surface; a plane cuts about 2.
 const CUBES_A_SQUARE: f64 = 2.0;
 /// Steps of an edge's share of its length, at least: no vertex lies nearer to its ends than one of so many.
 const LEAST_STEPS: i64 = 16;

@@ -1,9 +1,9 @@
 //! Surplus surface at non-manifold edges.
 //!
 //! The surface is cut at its non-manifold edges into sheets. A sheet is surplus when the rest is balanced at all its non-manifold
-//! edges without it: a fin that hangs from a regular surface by one side, or a wall across a body. One that goes on at one of them, using it by
-//! twos, or that has a hole but encloses more than next to nothing, is no such thing, but a body that touches others there. Smallest area goes first, and the
-//! rest is judged anew. Where as many triangles run one way as the other (bodies that touch along an edge) nothing is surplus.
+//! edges without it: a fin that hangs from a regular surface by one side, or a wall across a body. A sheet that uses a non-manifold edge an even number
+//! of times, or that is open but encloses volume, is a touching body: it stays. The smallest area goes first, and the rest is judged
+//! anew. Where as many triangles run one way as the other (bodies that touch along an edge) nothing is surplus.
 
 use crate::repairs::shared::account::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};

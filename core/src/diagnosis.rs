@@ -63,7 +63,7 @@ impl<'a> Diagnosis<'a> {
     /// The box of all triangles that have an area.
     pub(crate) fn surface_bounds(&self) -> Bounds {
         let mut bounds = Bounds::EMPTY;
-        self.survey.patches.iter().for_each(|p| bounds.add(&p.bounds));
+        self.survey.regions.iter().for_each(|p| bounds.add(&p.bounds));
         self.submesh.living().filter(|t| !self.submesh.is_collinear(*t)).for_each(|t| bounds.include(&self.submesh.points(t)));
         bounds.normalised()
     }

@@ -23,9 +23,10 @@ use crate::contract::report::{
 };
 use crate::contract::settings::{Bodies, Limits, Profile, folder_of};
 use crate::detect::certificate;
+use crate::detect::review;
+use crate::detect::review::Enclosed;
 use crate::detect::rules::Subject;
 use crate::detect::verdict;
-use crate::detect::verdict::Swallowed;
 use crate::diagnosis::Diagnosis;
 use crate::geometry::sums::Bounds;
 use crate::io::digest;
@@ -64,7 +65,7 @@ impl Clock {
     }
 
     /// Ends the stage that ran until now.
-    pub(crate) fn lap(&mut self, name: &str) {
+    pub(crate) fn stage(&mut self, name: &str) {
         let seconds = self.lap.elapsed().as_secs_f64();
         self.lap = Instant::now();
         self.peak_anonymous_bytes = self.peak_anonymous_bytes.max(cost::anonymous_bytes());
@@ -105,12 +106,12 @@ pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress
     validate(input, profile)?;
     let limits = &limits.spooling_beside(input);
     let mesh = open(input, limits, progress)?;
-    clock.lap("read");
+    clock.stage("read");
     disk_space::check(input, &[spool_need(&mesh, limits)])?;
     let mut diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
-    clock.lap("topology");
+    clock.stage("topology");
     let blake3 = hash(&mesh, limits, progress);
-    clock.lap("hash");
+    clock.stage("hash");
     mesh.check_unchanged()?;
     let mut report = report(Task::Inspect, &mesh, &diagnosis, profile, limits);
     report.input.blake3 = blake3;
@@ -159,7 +160,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     validate(input, profile)?;
     let limits = &limits.spooling_beside(output);
     let mesh = open(input, limits, progress)?;
-    clock.lap("read");
+    clock.stage("read");
     // The output is as large as its input but for what is added; what the input spools is gone by then, but the output spools as much.
     let bytes = (PREFIX_BYTES + size_of_val(mesh.records())) as u64;
     let folder = if emit::is_nameless(output) { limits.spool_folder() } else { folder_of(output).into() };
@@ -186,14 +187,14 @@ fn mend(
     clock: &mut Clock,
 ) -> Result<Report> {
     let mut diagnosis = Diagnosis::of(mesh.path(), mesh.records(), profile, limits, progress)?;
-    clock.lap("topology");
+    clock.stage("topology");
     let surface = diagnosis.surface_bounds();
     let mut report = report(Task::Repair, mesh, &diagnosis, profile, limits);
     let repaired = repair_diagnosed(&mut diagnosis, mesh, &mut report, (profile, limits), progress)?;
     if repaired.is_some() {
-        clock.lap("repair");
+        clock.stage("repair");
     }
-    let (edit, swallowed) = repaired.unwrap_or_default();
+    let (edit, enclosed) = repaired.unwrap_or_default();
     // Of the input's survey, the second look may go on; the memory of its submesh is needed for that of the output.
     let survey = diagnosis.into_survey();
     // Good as it came, or nothing in it could be repaired.
@@ -213,7 +214,7 @@ fn mend(
         // Of a text.
         digest.clear();
     }
-    clock.lap("emit");
+    clock.stage("emit");
     report.edit = edit.summary(mesh.records().len());
     report.edit_records = limits.list_edit.then(|| edit.listed());
     if same {
@@ -222,7 +223,7 @@ fn mend(
         verify(
             &mut report,
             mesh,
-            (&surface, &swallowed),
+            (&surface, &enclosed),
             expected.map(|expected| (expected, digest, looked)),
             output,
             limits,
@@ -230,7 +231,7 @@ fn mend(
         )?;
     }
     written.durable()?;
-    clock.lap("verify");
+    clock.stage("verify");
     mesh.check_unchanged()?;
     Ok(report)
 }
@@ -251,7 +252,7 @@ fn repair_diagnosed(
     report: &mut Report,
     (profile, limits): (&Profile, &Limits),
     progress: &dyn Progress,
-) -> Result<Option<(Edit, Swallowed)>> {
+) -> Result<Option<(Edit, Enclosed)>> {
     // What lies in the material of others, or cannot be seen, makes a file no less printable, but it does not belong there.
     let holds_more = match profile.bodies {
         Bodies::Union => report.before.nested_positive > 0,
@@ -269,7 +270,7 @@ fn repair_diagnosed(
 }
 
 /// Puts into the report what was done; what lay in the material of others is needed for the verdict.
-fn take_account(report: &mut Report, repaired: Repaired) -> Swallowed {
+fn take_account(report: &mut Report, repaired: Repaired) -> Enclosed {
     let Repaired { mut account, regions, .. } = repaired;
     report.repairs = account.repairs();
     report.loops = account.loops.unwrap_or_default();
@@ -278,7 +279,7 @@ fn take_account(report: &mut Report, repaired: Repaired) -> Swallowed {
     report.wraps = account.wraps;
     report.volumes = account.volumes;
     report.regions = regions;
-    account.swallowed
+    account.enclosed
 }
 
 /// What working out the topology of `mesh` spools.
@@ -307,7 +308,7 @@ fn confirm_copy(report: &mut Report, input: &MeshFile, output: &Path, limits: &L
 fn verify(
     report: &mut Report,
     input: &MeshFile,
-    (surface, swallowed): (&Bounds, &Swallowed),
+    (surface, enclosed): (&Bounds, &Enclosed),
     known: Option<(Expectation<'_>, Digest, Option<Defects>)>,
     output: &Path,
     limits: &Limits,
@@ -328,10 +329,10 @@ fn verify(
     report.verdict = verdict::judge(&defects, &flaws(&written)).under(report.profile.guarantee);
     report.outcome = if report.verdict.good { Outcome::Repaired } else { Outcome::NotGood };
     if report.verdict.good {
-        let mut concerns = verdict::review(&report.before, surface, swallowed, &defects, &report.profile);
-        concerns.extend(report.volumes.iter().flat_map(|volumes| verdict::review_volumes(volumes, &report.profile)));
-        concerns.extend(verdict::review_sheets(&report.before, &report.sheets_dropped, &report.profile));
-        concerns.extend(verdict::review_wraps(&report.wraps, &report.profile));
+        let mut concerns = review::counts(&report.before, surface, enclosed, &defects, &report.profile);
+        concerns.extend(report.volumes.iter().flat_map(|volumes| review::volumes(volumes, &report.profile)));
+        concerns.extend(review::sheets(&report.before, &report.sheets_dropped, &report.profile));
+        concerns.extend(review::wraps(&report.wraps, &report.profile));
         // What was closed had to be guessed: nobody knows what stood in the part that is missing.
         let is_open = report.before.boundary_edges > 0;
         let lost = input.findings().iter().filter(|f| f.loss == Loss::Certain || f.loss == Loss::IfOpen && is_open);

@@ -91,7 +91,7 @@ impl Mesh {
         self.weld.positions().len()
     }
 
-    /// All that topology decides inside chunks: weld, stars, patches, sums; returns the vertices at home in them.
+    /// All that topology decides inside chunks: weld, stars, regions, sums; returns the vertices at home in them.
     pub fn solve(&self) -> u64 {
         let solved = self.members.each(
             (&self.records, &Guide::NONE, &self.plan),

@@ -31,7 +31,7 @@ const ROWS: [Row; 19] = [
     ("non-manifold vertices", |d| d.nonmanifold_vertices),
     ("disagreeing edges", |d| d.inconsistent_edges),
     ("inside-out components", |d| d.inverted_components),
-    ("swallowed bodies", |d| d.nested_positive),
+    ("enclosed bodies", |d| d.nested_positive),
     ("self-intersecting triangles", |d| found(d).map_or(0, |s| if s.given_up { TOO_MANY } else { s.triangles })),
     ("pairs that cross", |d| found(d).map_or(0, |s| s.crossing_pairs)),
     ("pairs that overlap", |d| found(d).map_or(0, |s| s.overlapping_pairs)),
@@ -70,7 +70,7 @@ pub(crate) fn render(report: &Report) -> String {
     for repair in &report.repairs {
         let times = if repair.count == 1 { String::new() } else { format!(" × {}", show_count(repair.count)) };
         let note = if repair.note.is_empty() { String::new() } else { format!(": {}", repair.note) };
-        item(&mut out, "done", &format!("{}{times}{note}", repair.name.replace('_', " ")));
+        item(&mut out, "done", &format!("{}{times}{note}", repair.name.as_str().replace('_', " ")));
     }
     for left in report.loops_left.iter().take(LOOPS_SHOWN) {
         let [x, y, z] = left.at;
@@ -144,8 +144,11 @@ pub(crate) fn summary(report: &Report) -> (String, String) {
         .map(|(name, of)| format!("{} {name}", shown(of(&report.before))))
         .chain(report.input.findings.iter().cloned())
         .collect();
-    let done: Vec<String> =
-        report.repairs.iter().map(|repair| format!("{} × {}", repair.name.replace('_', " "), show_count(repair.count))).collect();
+    let done: Vec<String> = report
+        .repairs
+        .iter()
+        .map(|repair| format!("{} × {}", repair.name.as_str().replace('_', " "), show_count(repair.count)))
+        .collect();
     let or = |list: Vec<String>, none: &str| if list.is_empty() { none.to_owned() } else { list.join(", ") };
     (or(wrong, "nothing"), or(done, if report.outcome == Outcome::Clean { "copied byte for byte" } else { "nothing" }))
 }
@@ -248,7 +251,7 @@ fn line(out: &mut String, text: std::fmt::Arguments) {
 pub(crate) mod tests {
     use super::*;
     use suture_core::report::{
-        BoundaryLoops, Cost, EditSummary, FileFacts, Regions, Repair, SCHEMA_VERSION, Tolerances, Verdict,
+        BoundaryLoops, Cost, EditSummary, FileFacts, Regions, Repair, RepairName, SCHEMA_VERSION, Tolerances, Verdict,
     };
     use suture_core::{Limits, Profile};
 
@@ -311,7 +314,7 @@ pub(crate) mod tests {
         report.before.boundary_edges = 3;
         report.before.components = 2;
         report.after = Some(Defects { components: 2, ..Defects::default() });
-        report.repairs.push(Repair { name: "fill".into(), count: 1, note: "one hole".into(), seconds: 0.0 });
+        report.repairs.push(Repair { name: RepairName::Fill, count: 1, note: "one hole".into(), seconds: 0.0 });
         let text = render(&report);
         assert!(text.contains("boundary edges"), "{text}");
         assert!(!text.contains("duplicate") && !text.contains("components"), "{text}");

@@ -12,5 +12,6 @@ pub(crate) mod judgement;
 pub(crate) mod loop_class;
 pub(crate) mod progress;
 pub(crate) mod ranges;
+pub(crate) mod repair_name;
 pub mod report;
 pub mod settings;

@@ -2,6 +2,7 @@
 
 pub use crate::contract::judgement::{Certificate, RuleOutcome, RuleResult, Verdict};
 pub use crate::contract::loop_class::LoopClass;
+pub use crate::contract::repair_name::RepairName;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize, Serializer};
@@ -9,7 +10,10 @@ use serde::{Deserialize, Serialize, Serializer};
 use crate::contract::settings::{Limits, Profile};
 
 /// Version of the report's JSON layout; raised when a field changes its meaning or goes away.
-pub const SCHEMA_VERSION: u32 = 1;
+pub const SCHEMA_VERSION: u32 = 2;
+
+/// No list of a report holds more than this many items (but for the pairs of triangles that cross, at most 100, and an edit that was asked for).
+pub const MOST_LISTED: usize = 1000;
 
 /// Everything there is to say about one file.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -168,7 +172,7 @@ pub struct Defects {
     pub bodies: u64,
     /// Closed components of negative volume inside a body.
     pub cavities: u64,
-    /// Closed components of positive volume inside another body (swallowed).
+    /// Closed components of positive volume inside another body (enclosed).
     pub nested_positive: u64,
     /// Boundary vertices inside a boundary edge of another triangle, within the weld tolerance (T-junctions).
     pub noncommon_vertices: u64,
@@ -226,8 +230,8 @@ pub struct Tolerances {
 /// One kind of repair that did something.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Repair {
-    /// One of the names that `core/REPORT.md` lists, as `degenerate`, `tolerance_weld`, `t_junction` or `fill`.
-    pub name: String,
+    /// What kind.
+    pub name: RepairName,
     /// How often.
     pub count: u64,
     /// In words, with the method or the bound that mattered.
@@ -364,8 +368,9 @@ impl Regions {
 /// Where something was done to what was no solid, or left undone. Lengths in the model's units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Region {
-    /// What settled it.
-    pub rung: Rung,
+    /// What settled it. (`rung` in schema 1.)
+    #[serde(alias = "rung")]
+    pub method: RegionMethod,
     /// Smallest and largest coordinates of what it was done to.
     pub bounds: [[f32; 3]; 2],
     /// Triangles that it was done to; where vertices were given to surfaces, vertices.
@@ -387,13 +392,14 @@ fn is_zero(count: &u32) -> bool {
 /// What settled a region, from the least intrusive to the most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Rung {
+pub enum RegionMethod {
     /// Surfaces that cross were cut along each other, and rounded to single precision.
     Cut,
     /// So they were, and what was nearly one there was made one: short edges, and vertices close to faces or edges.
     Snapped,
     /// So they were, after bodies that shared surface but for rounding were grown by steps of single precision, each by others.
-    Spread,
+    #[serde(alias = "spread")]
+    Perturbed,
     /// What kept crossing was taken out, and the small holes were closed.
     Refilled,
     /// Surfaces that shared a vertex or an edge were taken apart.

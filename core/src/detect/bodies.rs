@@ -17,7 +17,7 @@ use crate::io::record;
 use crate::submesh::Submesh;
 use crate::submesh::components::{Component, Components, Reversed, Sample};
 use crate::topology::survey::Survey;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// What lies around a component.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -120,15 +120,15 @@ fn count(
     let grid = Grid::new(rays);
 
     let mut counts = vec![0i32; rays.iter().map(|r| r.candidates.len()).sum()];
-    let is_asked = |patch: u32| asked.get(components.of_patch[patch as usize] as usize) == Some(&true);
+    let is_asked = |region: u32| asked.get(components.of_region[region as usize] as usize) == Some(&true);
     let per_chunk = survey.visit_regular(
         is_asked,
         |reach| Over::new(rays, &grid, reach).map(|over| (over, Vec::new())),
         |(over, _), corners| over.may_meet(&grid, corners),
-        |(_, hits): &mut (Over, Vec<(u32, i32)>), triangle, patch| {
+        |(_, hits): &mut (Over, Vec<(u32, i32)>), triangle, region| {
             let corners = record::corners(&survey.records[triangle as usize]);
-            let sign = if reversed.patches[patch as usize] { -1 } else { 1 };
-            grid.cross(rays, &corners, components.of_patch[patch as usize], &mut |at, w| hits.push((at, sign * w)));
+            let sign = if reversed.regions[region as usize] { -1 } else { 1 };
+            grid.cross(rays, &corners, components.of_region[region as usize], &mut |at, w| hits.push((at, sign * w)));
         },
     );
     per_chunk.into_iter().flat_map(|(_, hits)| hits).for_each(|(at, w)| counts[at as usize] += w);
@@ -212,12 +212,12 @@ pub(crate) fn obstructed(
     };
     let upright = |corners: &[[f32; 3]; 3]| corners.map(|p| direction.upright(p));
     survey.visit_regular(
-        |patch| components.of_patch[patch as usize] != NONE,
+        |region| components.of_region[region as usize] != NONE,
         |reach| Over::new(&rays, &grid, &direction.upright_box(reach)),
         |over, corners| over.may_meet(&grid, &upright(corners)),
-        |_, triangle, patch| {
+        |_, triangle, region| {
             let corners = record::corners(&survey.records[triangle as usize]);
-            meet(&upright(&corners), components.of_patch[patch as usize]);
+            meet(&upright(&corners), components.of_region[region as usize]);
         },
     );
     for t in submesh.living().filter(|t| counts(*t)) {

@@ -27,7 +27,7 @@ pub(crate) fn count(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, toler
     let uses: usize = edges.iter().map(|e| e.uses.len()).sum();
     let topology = survey.triangles - degenerate_index;
     let total = survey
-        .patches
+        .regions
         .iter()
         .map(|p| p.extent)
         .chain(submesh.living().map(|t| survey.measure.triangle(&submesh.points(t))))

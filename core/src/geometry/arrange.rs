@@ -110,7 +110,7 @@ fn flatten(graph: &IntersectionGraph, triangles: &[[[f32; 3]; 3]]) -> (Vec<Piece
 
 /// Do two triangles of one plane face the same way? Exact: that of their shadows, along an axis in which they have any.
 fn agree(a: &[[f32; 3]; 3], b: &[[f32; 3]; 3]) -> bool {
-    let turn = |t: &[[f32; 3]; 3], axis: usize| exact::turn(&t[0], &t[1], &t[2], axis);
+    let turn = |t: &[[f32; 3]; 3], axis: usize| exact::orientation_along(&t[0], &t[1], &t[2], axis);
     (0..3).any(|axis| turn(a, axis) * turn(b, axis) > 0)
 }
 
@@ -145,12 +145,12 @@ fn number_cells(graph: &IntersectionGraph, pieces: &mut [Piece]) -> u32 {
             }
         }
     }
-    let mut numbers = vec![crate::util::union_find::NONE; parents.len()];
+    let mut numbers = vec![crate::util::ids::NONE; parents.len()];
     let mut count = 0;
     for (i, piece) in pieces.iter_mut().enumerate() {
         for behind in [false, true] {
             let root = crate::util::union_find::find(&mut parents, side(i, behind)) as usize;
-            if numbers[root] == crate::util::union_find::NONE {
+            if numbers[root] == crate::util::ids::NONE {
                 numbers[root] = count;
                 count += 1;
             }

@@ -120,16 +120,16 @@ fn integers<const M: usize, const N: usize>(pairs: [[(f32, f32); M]; N], bits: u
 }
 
 /// Sign of the component along `axis` of the normal of (a, b, c): how the triangle turns when one looks down that axis.
-pub(crate) fn turn(a: &Point, b: &Point, c: &Point, axis: usize) -> i8 {
+pub(crate) fn orientation_along(a: &Point, b: &Point, c: &Point, axis: usize) -> i8 {
     let (x, y) = ((axis + 1) % 3, (axis + 2) % 3);
     let d = |p: &Point, k: usize| f64::from(p[k]) - f64::from(a[k]);
     let (p, q) = (d(b, x) * d(c, y), d(b, y) * d(c, x));
     let (value, magnitude) = (p - q, p.abs() + q.abs());
-    if value.abs() > 4e-16 * magnitude || magnitude == 0.0 { sign(value) } else { turn_exact([a, b, c], x, y) }
+    if value.abs() > 4e-16 * magnitude || magnitude == 0.0 { sign(value) } else { orientation_along_exactly([a, b, c], x, y) }
 }
 
 #[cold]
-fn turn_exact([a, b, c]: [&Point; 3], x: usize, y: usize) -> i8 {
+fn orientation_along_exactly([a, b, c]: [&Point; 3], x: usize, y: usize) -> i8 {
     if let Some([[ux, uy], [vx, vy]]) = integers([b, c].map(|p| [(p[x], a[x]), (p[y], a[y])]), 60) {
         return (i128::from(ux) * i128::from(vy) - i128::from(uy) * i128::from(vx)).signum() as i8;
     }
@@ -139,7 +139,7 @@ fn turn_exact([a, b, c]: [&Point; 3], x: usize, y: usize) -> i8 {
 
 /// Do the three lie on one line (or coincide)?
 pub(crate) fn collinear(a: &Point, b: &Point, c: &Point) -> bool {
-    (0..3).all(|axis| turn(a, b, c, axis) == 0)
+    (0..3).all(|axis| orientation_along(a, b, c, axis) == 0)
 }
 
 #[cfg(test)]
@@ -174,7 +174,7 @@ mod tests {
                 d(1, u) * d(2, v) - d(1, v) * d(2, u)
             });
             for (axis, component) in normal.iter().enumerate() {
-                prop_assert_eq!(i128::from(turn(&f[0], &f[1], &f[2], axis)), component.signum());
+                prop_assert_eq!(i128::from(orientation_along(&f[0], &f[1], &f[2], axis)), component.signum());
             }
             prop_assert_eq!(collinear(&f[0], &f[1], &f[2]), normal == [0; 3]);
             let det: i128 = (0..3).map(|k| normal[k] * d(3, k)).sum();
@@ -187,7 +187,7 @@ mod tests {
     fn smallest_and_largest_coordinates_are_told_apart() {
         let tiny = f32::from_bits(1);
         assert_eq!(side(&[0.0; 3], &[tiny, 0.0, 0.0], &[0.0, tiny, 0.0], &[0.0, 0.0, tiny]), 1);
-        assert_eq!(turn(&[0.0; 3], &[tiny, 0.0, 0.0], &[f32::MAX, tiny, 0.0], 2), 1);
+        assert_eq!(orientation_along(&[0.0; 3], &[tiny, 0.0, 0.0], &[f32::MAX, tiny, 0.0], 2), 1);
         let big = f32::MAX;
         assert_eq!(side(&[-big; 3], &[big, -big, -big], &[-big, big, -big], &[-big, -big, big]), 1);
         assert!(collinear(&[-big; 3], &[big; 3], &[tiny; 3]));

@@ -9,7 +9,7 @@
 //! four end points (the idea of Guigue & Devillers, "Fast and Robust Triangle-Triangle Overlap Test Using Orientation
 //! Predicates", JGT 8(1), 2003), so no coordinate of an intersection is ever computed.
 
-use crate::geometry::exact::{Plane, Point, collinear, side, turn};
+use crate::geometry::exact::{Plane, Point, collinear, orientation_along, side};
 
 /// A triangle by the positions of its corners.
 pub(crate) type Triangle = [Point; 3];
@@ -198,7 +198,7 @@ pub(crate) enum Sure {
 /// or zero. Without branches, so that a loop over many pairs can be compiled to vectors.
 #[inline(always)]
 pub(crate) fn sure(a: &Triangle, b: &Triangle) -> Sure {
-    let (of_b, of_a) = (Sides::new(a, b), Sides::new(b, a));
+    let (of_b, of_a) = (PlaneSides::new(a, b), PlaneSides::new(b, a));
     let one_sided = of_b.all_above | of_b.all_below | of_a.all_above | of_a.all_below;
     // As in `on_common_line`; meaningless where a plane has all corners on one side, or a sign is in doubt.
     let ((p, others), (q, [f, g])) = (of_a.alone(a), of_b.alone(b));
@@ -251,7 +251,7 @@ pub(crate) fn sure_of_neighbours(a: &Triangle, b: &Triangle) -> Sure {
 }
 
 /// The sides of one triangle's plane on which the corners of another lie, by rounded arithmetic.
-struct Sides {
+struct PlaneSides {
     above: [bool; 3],
     all_above: bool,
     all_below: bool,
@@ -259,7 +259,7 @@ struct Sides {
     sure: bool,
 }
 
-impl Sides {
+impl PlaneSides {
     #[inline(always)]
     fn new(a: &Triangle, b: &Triangle) -> Self {
         let plane = Plane::new(&a[0], &a[1], &a[2]);
@@ -288,8 +288,8 @@ impl Sides {
 /// Both in one plane, or `a` without area.
 fn coplanar(a: &Triangle, b: &Triangle, shared: usize, touching: bool) -> Contact {
     // Looking down an axis along which `a` shows an area keeps what is in its plane apart.
-    let Some(axis) = (0..3).find(|&k| turn(&a[0], &a[1], &a[2], k) != 0) else { return Contact::Apart };
-    let (of_a, of_b) = (turn(&a[0], &a[1], &a[2], axis), turn(&b[0], &b[1], &b[2], axis));
+    let Some(axis) = (0..3).find(|&k| orientation_along(&a[0], &a[1], &a[2], k) != 0) else { return Contact::Apart };
+    let (of_a, of_b) = (orientation_along(&a[0], &a[1], &a[2], axis), orientation_along(&b[0], &b[1], &b[2], axis));
     if of_b == 0 {
         return Contact::Apart;
     }
@@ -302,7 +302,7 @@ fn coplanar(a: &Triangle, b: &Triangle, shared: usize, touching: bool) -> Contac
         for k in 0..3 {
             let mut inner = -1;
             for p in y {
-                inner = inner.max(sense * turn(&x[k], &x[(k + 1) % 3], p, axis));
+                inner = inner.max(sense * orientation_along(&x[k], &x[(k + 1) % 3], p, axis));
                 if inner == 1 {
                     break;
                 }
@@ -330,7 +330,7 @@ fn along_each_other(a: &Triangle, b: &Triangle, axis: usize) -> bool {
         let p = &a[(i + s) % 3];
         (1..3).any(|t| {
             let q = &b[(j + t) % 3];
-            turn(apex, p, q, axis) == 0 && ahead(p, q)
+            orientation_along(apex, p, q, axis) == 0 && ahead(p, q)
         })
     })
 }
@@ -349,10 +349,10 @@ pub(crate) fn segment_pierces(a: &Point, b: &Point, t: &Triangle) -> bool {
         let turns = || [0, 1, 2].map(|k| side(a, b, &t[k], &t[(k + 1) % 3]));
         return at_a * at_b < 0 && one_sided(turns());
     }
-    let Some(axis) = (0..3).find(|&k| turn(&t[0], &t[1], &t[2], k) != 0) else { return false };
-    let sense = turn(&t[0], &t[1], &t[2], axis);
-    let beyond = |k: usize| [a, b].iter().all(|p| sense * turn(&t[k], &t[(k + 1) % 3], p, axis) <= 0);
-    let across = t.map(|p| turn(a, b, &p, axis));
+    let Some(axis) = (0..3).find(|&k| orientation_along(&t[0], &t[1], &t[2], k) != 0) else { return false };
+    let sense = orientation_along(&t[0], &t[1], &t[2], axis);
+    let beyond = |k: usize| [a, b].iter().all(|p| sense * orientation_along(&t[k], &t[(k + 1) % 3], p, axis) <= 0);
+    let across = t.map(|p| orientation_along(a, b, &p, axis));
     !(0..3).any(beyond) && across.contains(&1) && across.contains(&-1)
 }
 

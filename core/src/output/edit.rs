@@ -26,9 +26,9 @@ const _: () = assert!(size_of::<(u32, Change)>() == 24);
 pub(crate) struct Edit {
     /// By record, ascending.
     changes: Vec<(u32, Change)>,
-    /// Records of reversed patches, a bit each; empty when there are none.
+    /// Records of reversed regions, a bit each; empty when there are none.
     flipped: Vec<u64>,
-    /// And of patches that go.
+    /// And of regions that go.
     dropped: Vec<u64>,
     /// New records. As many as can take the places of deleted ones, in order; the rest goes to the end of the file.
     pub(crate) added: Vec<Record>,
@@ -39,7 +39,7 @@ pub(crate) struct Edit {
 
 impl Edit {
     /// What stands in the submesh against the records it was gathered from. O(submesh), and one pass over the records of
-    /// reversed patches.
+    /// reversed regions.
     pub(crate) fn of(survey: &Survey<'_>, submesh: &Submesh, reversed: &Reversed) -> Self {
         let mut edit = Self::default();
         edit.changes.reserve_exact(survey.nonfinite.iter().map(|r| r.1 as usize).sum());
@@ -50,7 +50,7 @@ impl Edit {
                 let soon = submesh.triangles[i..].iter().take(ASKED_AT_ONCE);
                 survey.ask_for(soon.filter_map(|t| match t.origin {
                     Origin::Input(record) | Origin::Part(record) => Some(record),
-                    Origin::Patch => None,
+                    Origin::Added => None,
                 }));
             }
             let points = || submesh.points(i as u32);
@@ -60,15 +60,15 @@ impl Edit {
                 Origin::Part(t) if triangle.alive => {
                     edit.added.push(record::encode(points(), record::attribute(&survey.records[t as usize])));
                 }
-                Origin::Patch if triangle.alive => edit.added.push(record::encode(points(), 0)),
-                Origin::Part(_) | Origin::Patch => {}
+                Origin::Added if triangle.alive => edit.added.push(record::encode(points(), 0)),
+                Origin::Part(_) | Origin::Added => {}
             }
         }
         edit.changes.sort_unstable_by_key(|(t, _)| *t);
         edit.deletions = edit.changes.iter().filter(|c| c.1 == Change::Delete).count() as u64;
         edit.flips = edit.changes.iter().filter(|c| c.1 == Change::Flip).count() as u64;
-        let dropped = |patch: u32| reversed.dropped[patch as usize];
-        let (flipped, flips) = records_of(survey, |patch| reversed.patches[patch as usize] && !dropped(patch));
+        let dropped = |region: u32| reversed.dropped[region as usize];
+        let (flipped, flips) = records_of(survey, |region| reversed.regions[region as usize] && !dropped(region));
         let (gone, deletions) = records_of(survey, dropped);
         (edit.flipped, edit.dropped) = (flipped, gone);
         edit.flips += flips;
@@ -204,9 +204,9 @@ pub(crate) enum Step<'r, 'e> {
     Added(&'e Record),
 }
 
-/// The records of some patches, a bit each, and how many; no bits if there are none. One pass over them.
+/// The records of some regions, a bit each, and how many; no bits if there are none. One pass over them.
 pub(crate) fn records_of(survey: &Survey<'_>, wanted: impl Fn(u32) -> bool + Sync) -> (Vec<u64>, u64) {
-    if !(0..survey.patches.len() as u32).any(&wanted) {
+    if !(0..survey.regions.len() as u32).any(&wanted) {
         return (Vec::new(), 0);
     }
     let bits: Vec<AtomicU64> = std::iter::repeat_with(AtomicU64::default).take(survey.records.len().div_ceil(64)).collect();
@@ -288,10 +288,10 @@ mod tests {
     }
 
     #[test]
-    fn a_reversed_patch_flips_its_records() {
+    fn a_reversed_region_flips_its_records() {
         let records = records(&cube());
         let d = diagnose(&records);
-        let edit = Edit::of(&d.survey, &d.submesh, &Reversed { patches: vec![true], dropped: vec![false] });
+        let edit = Edit::of(&d.survey, &d.submesh, &Reversed { regions: vec![true], dropped: vec![false] });
         assert_eq!(written(&edit, &records), records.iter().map(record::flip).collect::<Vec<_>>());
         assert_eq!(edit.listed().flipped, [[0, 11]]);
     }
@@ -312,7 +312,7 @@ mod tests {
                     1 => edit.changes.push((t as u32, Change::Delete)),
                     2 => edit.changes.push((t as u32, Change::Flip)),
                     3 => edit.changes.push((t as u32, Change::Move(Box::new(moved)))),
-                    // Of a reversed patch.
+                    // Of a reversed region.
                     _ => edit.flipped[t / 64] |= 1 << (t % 64),
                 }
                 match fate {

@@ -3,7 +3,7 @@
 //! All but a few of its records are the input's, byte for byte, which is confirmed when it is read back ([`crate::output::readback`]). A
 //! vertex none of whose triangles came, went or changed has the star it had; the others are **disturbed**. All triangles around
 //! disturbed vertices and around those that were not regular before go to a new submesh, from the records that are written, where
-//! they are counted as any file's. What is left of the input's patches is regular as it was.
+//! they are counted as any file's. What is left of the input's regions is regular as it was.
 //!
 //! What cannot be shown to hold in this way is looked at anew: [`look`] returns nothing then, and the file is surveyed as if nothing were
 //! known of it. What is found is the same.
@@ -19,7 +19,7 @@ use crate::submesh::{Gathering, Submesh, has_repeated};
 use crate::topology::chunk::IrregularTriangle;
 use crate::topology::survey::Survey;
 use crate::topology::vertex_table::Weld;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// Is an edit so small against the file that looking at what it disturbs is less work than looking at everything?
 pub(crate) fn is_worthwhile(gone: u64, added: u64, input_records: usize) -> bool {
@@ -50,11 +50,11 @@ pub(crate) fn look<'a>(mut survey: Survey<'a>, difference: &Difference) -> Optio
         return None;
     }
     let submesh = around.gather(&survey, difference);
-    around.settle_patches(&mut survey, &submesh)?;
+    around.settle_regions(&mut survey, &submesh)?;
     // Not needed any more, and the edges take much.
     around.vertices = Weld::default();
     let edges = Edges::of(&submesh);
-    if !around.keep_patches_whole(&submesh, &edges) {
+    if !around.keep_regions_whole(&submesh, &edges) {
         return None;
     }
     around.count(&mut survey, &submesh, difference);
@@ -144,17 +144,17 @@ impl Disturbed {
         let mut gathering = Gathering::of(survey.irregular_triangles.len() + difference.fresh.len());
         let mut fresh = difference.fresh.iter().peekable();
         let mut gone = difference.gone.iter().peekable();
-        let mut add = |this: &mut Self, place: u32, corners: [[f32; 3]; 3], patch: u32| {
+        let mut add = |this: &mut Self, place: u32, corners: [[f32; 3]; 3], region: u32| {
             let at = this.at(corners);
             note(&mut this.in_output, at, &corners);
-            // A regular corner that is left holds it to its patch.
-            let patch = if at.contains(&NONE) { patch } else { NONE };
+            // A regular corner that is left holds it to its region.
+            let region = if at.contains(&NONE) { region } else { NONE };
             let complete = (0..3).fold(0, |mask, k| mask | u8::from(at[k] != NONE) << k);
             this.of_triangles.push(at);
-            gathering.add(place, corners, complete, patch);
+            gathering.add(place, corners, complete, region);
         };
-        for (i, (irregular_triangle, patch)) in
-            survey.irregular_triangles.iter().zip(&survey.irregular_triangle_patches).enumerate()
+        for (i, (irregular_triangle, region)) in
+            survey.irregular_triangles.iter().zip(&survey.irregular_triangle_regions).enumerate()
         {
             if i % crate::io::read_ahead::ASKED_AT_ONCE == 0 {
                 survey.ask_for(
@@ -171,53 +171,53 @@ impl Disturbed {
             }
             while gone.next_if(|t| **t < place).is_some() {}
             if gone.next_if_eq(&&place).is_none() {
-                add(self, place, corners, *patch);
+                add(self, place, corners, *region);
             }
         }
         fresh.for_each(|(place, record)| add(self, *place, record::corners(record), NONE));
         gathering.finish()
     }
 
-    /// Brings the patches up to date, whose disturbed vertices are no part of them any more. Fails if it is not known how far what is
-    /// left of a patch reaches, or where it begins.
-    fn settle_patches(&self, survey: &mut Survey<'_>, submesh: &Submesh) -> Option<()> {
+    /// Brings the regions up to date, whose disturbed vertices are no part of them any more. Fails if it is not known how far what is
+    /// left of a region reaches, or where it begins.
+    fn settle_regions(&self, survey: &mut Survey<'_>, submesh: &Submesh) -> Option<()> {
         let mut held = vec![false; self.was_regular.len()];
-        let mut is_left: Vec<bool> = survey.patches.iter().map(|p| p.triangles > 0).collect();
-        let mut begins = vec![false; survey.patches.len()];
-        for (t, corners) in submesh.triangles.iter().zip(&self.of_triangles).filter(|(t, _)| t.patch != NONE) {
-            is_left[t.patch as usize] = true;
-            begins[t.patch as usize] |= t.record() == survey.patches[t.patch as usize].first;
+        let mut is_left: Vec<bool> = survey.regions.iter().map(|p| p.triangles > 0).collect();
+        let mut begins = vec![false; survey.regions.len()];
+        for (t, corners) in submesh.triangles.iter().zip(&self.of_triangles).filter(|(t, _)| t.region != NONE) {
+            is_left[t.region as usize] = true;
+            begins[t.region as usize] |= t.record() == survey.regions[t.region as usize].first;
             corners.iter().filter(|v| **v != NONE).for_each(|v| held[*v as usize] = true);
         }
-        for (at, patch) in
-            self.of_irregular_triangles.iter().zip(&survey.irregular_triangle_patches).filter(|(_, patch)| **patch != NONE)
+        for (at, region) in
+            self.of_irregular_triangles.iter().zip(&survey.irregular_triangle_regions).filter(|(_, region)| **region != NONE)
         {
             for v in at.iter().filter(|v| **v != NONE) {
                 let p = self.vertices.positions()[*v as usize];
-                let bounds = &survey.patches[*patch as usize].bounds;
+                let bounds = &survey.regions[*region as usize].bounds;
                 let at_the_end = (0..3).any(|k| p[k] == bounds.lo[k] || p[k] == bounds.hi[k]);
-                if at_the_end && is_left[*patch as usize] && self.was_regular[*v as usize] && !held[*v as usize] {
+                if at_the_end && is_left[*region as usize] && self.was_regular[*v as usize] && !held[*v as usize] {
                     return None;
                 }
             }
         }
-        for (p, patch) in survey.patches.iter_mut().enumerate() {
+        for (p, region) in survey.regions.iter_mut().enumerate() {
             if !is_left[p] {
-                patch.first = NONE;
-                patch.bounds = Bounds::EMPTY;
-            } else if !begins[p] && survey.irregular_triangles.binary_search_by_key(&patch.first, |s| s.triangle).is_ok() {
+                region.first = NONE;
+                region.bounds = Bounds::EMPTY;
+            } else if !begins[p] && survey.irregular_triangles.binary_search_by_key(&region.first, |s| s.triangle).is_ok() {
                 return None;
             }
         }
         Some(())
     }
 
-    /// Does what is left of every patch hang together, be it over the submesh?
+    /// Does what is left of every region hang together, be it over the submesh?
     ///
-    /// Of the vertices of a patch, those that are disturbed are taken out. What leads from one of the others to another through a set
+    /// Of the vertices of a region, those that are disturbed are taken out. What leads from one of the others to another through a set
     /// of disturbed ones that hang together enters and leaves it at neighbours of the set. So if all neighbours of each such set hang
     /// together otherwise, everything does.
-    fn keep_patches_whole(&self, submesh: &Submesh, edges: &Edges) -> bool {
+    fn keep_regions_whole(&self, submesh: &Submesh, edges: &Edges) -> bool {
         if !self.was_regular.contains(&true) {
             return true;
         }
@@ -249,7 +249,7 @@ impl Disturbed {
             }
         }
         let mut neighbours = vec![NONE; self.was_regular.len()];
-        for (t, corners) in self.of_triangles.iter().enumerate().filter(|(t, _)| submesh.triangles[*t].patch != NONE) {
+        for (t, corners) in self.of_triangles.iter().enumerate().filter(|(t, _)| submesh.triangles[*t].region != NONE) {
             let piece = crate::util::union_find::find(&mut parents, t as u32);
             for v in corners.iter().filter(|v| **v != NONE && self.was_regular[**v as usize]) {
                 let of_set = &mut neighbours[crate::util::union_find::find(&mut sets, *v) as usize];
@@ -270,7 +270,7 @@ impl Disturbed {
         survey.vertices = survey.vertices - have(&self.in_input, 0) + have(&self.in_output, 0);
         survey.vertices_used = survey.vertices_used - have(&self.in_input, 1) + have(&self.in_output, 1);
         let mut bounds = Bounds::EMPTY;
-        survey.patches.iter().for_each(|p| bounds.add(&p.bounds));
+        survey.regions.iter().for_each(|p| bounds.add(&p.bounds));
         bounds.include(&submesh.positions);
         survey.bounds = bounds.normalised();
     }
@@ -395,7 +395,7 @@ mod tests {
 
     #[test]
     fn a_surface_that_falls_apart_is_looked_at_as_a_whole() {
-        // All around the middle: two halves are left, each open, which were one patch.
+        // All around the middle: two halves are left, each open, which were one region.
         let cut = |t: &Corners| t.iter().all(|p| p[0] >= 4.0 && p[0] <= 5.0);
         assert!(!holds(&block(9), cut));
     }

@@ -231,7 +231,7 @@ mod tests {
             d.submesh.triangles[last].v.swap(1, 2);
             let corner = d.submesh.triangles[3].v[0];
             d.submesh.positions[corner as usize][2] += 0.25;
-            d.submesh.add([0, 2, 5], crate::submesh::Origin::Patch, crate::util::union_find::NONE);
+            d.submesh.add([0, 2, 5], crate::submesh::Origin::Added, crate::util::ids::NONE);
             let edit = Edit::of(&d.survey, &d.submesh, &Reversed::none(&d.survey));
             let output = written(&edit, &input);
 

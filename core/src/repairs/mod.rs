@@ -2,7 +2,7 @@
 //!
 //! **In:** a [`Diagnosis`].
 //! **Out:** the submesh as it is to be written, and an [`Account`] of what was done and where.
-//! **Promise:** a repair changes triangles of the submesh by way of `work` only, and turns or drops patches of regular surface as a whole;
+//! **Promise:** a repair changes triangles of the submesh by way of `work` only, and turns or drops regions of regular surface as a whole;
 //! what it may change stands in its entry. What is not proved valid is taken back.
 //!
 //! [`pipeline`] lists the repairs in their order; `context` says what a repair may know and what it hands on. Each repair has a file,
@@ -57,7 +57,7 @@ pub(crate) fn run(
     let unsettled = std::mem::take(&mut handed.unsettled);
     all.extend(unsettled.into_iter().filter(|left| !handed.is_replaced(left.at)).map(|left| left.region));
     all.extend(account.wraps.iter().map(Region::from));
-    Ok(Repaired { reversed, account, regions: shared::regions::told(all), wrapped: handed.wrapped })
+    Ok(Repaired { reversed, account, regions: shared::region_report::summarise(all), wrapped: handed.wrapped })
 }
 
 /// The boundary loops of a file, with their kinds, as they are when surplus surface is gone and vertices within the weld tolerance are one, which

@@ -6,6 +6,7 @@
 use std::time::Instant;
 
 use crate::contract::error::Result;
+use crate::contract::report::RepairName;
 use crate::contract::settings::Bodies;
 use crate::detect::holes;
 use crate::repairs::boolean::enclosed;
@@ -22,7 +23,6 @@ use crate::repairs::holes::skirt;
 use crate::repairs::orient::directions;
 use crate::repairs::orient::visibility;
 use crate::repairs::separate::pinch_vertices;
-use crate::repairs::shared::account::RepairName;
 use crate::repairs::shared::context::{Context, Repair};
 use crate::repairs::shared::probes::Probes;
 use crate::repairs::stitch::overlaps;
@@ -82,7 +82,7 @@ pub(crate) const ALL: &[Step] = &[
     Look(tell_dust),
     // What was cut off may stand for itself.
     Do(directions::OUTWARD),
-    Look(tell_crossings_left),
+    Look(tell_intersections_left),
     Do(enclosed::REPAIR),
     Do(hidden::REPAIR),
     Do(pinch_vertices::REPAIR),
@@ -170,9 +170,9 @@ fn tell_dust(cx: &mut Context<'_, '_>) {
     cx.account.add(RepairName::Dust, cx.handed.dust, note.into(), 0.0);
 }
 
-fn tell_crossings_left(cx: &mut Context<'_, '_>) {
-    for note in std::mem::take(&mut cx.handed.crossings_left) {
-        cx.account.say(RepairName::CrossingsLeft, note);
+fn tell_intersections_left(cx: &mut Context<'_, '_>) {
+    for note in std::mem::take(&mut cx.handed.intersections_left) {
+        cx.account.say(RepairName::SelfIntersectionsLeft, note);
     }
 }
 

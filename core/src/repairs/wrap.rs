@@ -13,8 +13,8 @@ mod groups;
 mod outcome;
 mod site;
 
+use crate::contract::report::{MOST_LISTED, RepairName};
 use crate::contract::settings::Guarantee;
-use crate::repairs::shared::account::RepairName;
 use crate::repairs::shared::context::{Changes, Context, Done, Repair};
 use crate::repairs::shared::pieces;
 use contacts::contacts;
@@ -26,11 +26,11 @@ use std::collections::BTreeMap;
 
 use crate::contract::settings::Profile;
 use crate::geometry::position::Position;
-use crate::repairs::shared::overlay::Overlay;
+use crate::repairs::shared::overlay::{Overlay, Which};
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{self, Components, Reversed, Through};
 use crate::topology::survey::Survey;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// What nothing else made a solid.
 pub(crate) const REPAIR: Repair = Repair {
@@ -42,7 +42,7 @@ pub(crate) const REPAIR: Repair = Repair {
         if is_wanted {
             let pairs = if cx.profile.check_self_intersections {
                 let overlay = Overlay::of(cx.survey, &cx.work, &cx.reversed);
-                overlay.and_then(|overlay| overlay.crossing_pairs(cx.survey, &cx.work))
+                overlay.and_then(|overlay| overlay.crossing_triangles(cx.survey, &cx.work))
             } else {
                 Some(Vec::new())
             };
@@ -61,8 +61,6 @@ pub(crate) const REPAIR: Repair = Repair {
 
 /// Each round wraps anew what met something in the round before.
 const ROUNDS: usize = 8;
-/// Regions that are listed.
-const LISTED: usize = 1000;
 
 /// Is anything of the submesh no closed, coherent, manifold surface? O(submesh).
 pub(crate) fn is_broken(work: &mut Work<'_>) -> bool {
@@ -71,14 +69,14 @@ pub(crate) fn is_broken(work: &mut Work<'_>) -> bool {
         || !components::nonmanifold_vertices(submesh, edges).is_empty()
 }
 
-/// Replaces what is no solid, as far as the profile allows. `pairs`: as [`Overlay::crossing_pairs`] finds them (empty if nobody looked for any);
+/// Replaces what is no solid, as far as the profile allows. `pairs`: as [`Overlay::crossing_triangles`] finds them (empty if nobody looked for any);
 /// `kept_open`: a vertex of each loop that was left open on purpose. Reads the chunks where groups have regular surface, and all for every round
 /// of wraps.
 pub(crate) fn replace(
     survey: &Survey<'_>,
     work: &mut Work<'_>,
     reversed: &mut Reversed,
-    pairs: Option<&[[u32; 2]]>,
+    pairs: Option<&[[Which; 2]]>,
     kept_open: &[[f32; 3]],
     profile: &Profile,
     threads: usize,
@@ -139,7 +137,7 @@ fn apply(
             wraps.regions += 1;
             wraps.triangles.extend(outcome.triangles);
         }
-        if wraps.listed.len() < LISTED {
+        if wraps.listed.len() < MOST_LISTED {
             wraps.listed.push(outcome.told);
         }
     }
@@ -149,8 +147,8 @@ fn apply(
     wraps.gone.sort_unstable();
     wraps.gone.dedup();
     doomed.into_iter().for_each(|t| work.kill(t));
-    if pieces.of_patch.iter().any(|piece| goes(*piece)) {
-        reversed.dropped.iter_mut().zip(&pieces.of_patch).for_each(|(dropped, piece)| *dropped |= goes(*piece));
+    if pieces.of_region.iter().any(|piece| goes(*piece)) {
+        reversed.dropped.iter_mut().zip(&pieces.of_region).for_each(|(dropped, piece)| *dropped |= goes(*piece));
     }
 }
 

@@ -1,22 +1,22 @@
-//! Components: patches of regular surface and triangles of the submesh that hang together through edges.
+//! Components: regions of regular surface and triangles of the submesh that hang together through edges.
 
 use super::edges::{Edge, Edges};
 use super::{Submesh, Vertex};
 use crate::geometry::sums::{Bounds, Extent};
 use crate::topology::survey::Survey;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
-/// Which patches of regular surface are reversed, against how they stand in the file, and which go. Triangles of the shop are turned, or die, in
+/// Which regions of regular surface are reversed, against how they stand in the file, and which go. Triangles of the shop are turned, or die, in
 /// place.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Reversed {
-    pub(crate) patches: Vec<bool>,
+    pub(crate) regions: Vec<bool>,
     pub(crate) dropped: Vec<bool>,
 }
 
 impl Reversed {
     pub(crate) fn none(survey: &Survey<'_>) -> Self {
-        Self { patches: vec![false; survey.patches.len()], dropped: vec![false; survey.patches.len()] }
+        Self { regions: vec![false; survey.regions.len()], dropped: vec![false; survey.regions.len()] }
     }
 }
 
@@ -43,7 +43,7 @@ pub(crate) struct Sample {
 /// All components, and who belongs to which.
 pub(crate) struct Components {
     pub(crate) list: Vec<Component>,
-    pub(crate) of_patch: Vec<u32>,
+    pub(crate) of_region: Vec<u32>,
     /// [`NONE`] for what is dead or degenerate.
     pub(crate) of_triangle: Vec<u32>,
 }
@@ -77,45 +77,45 @@ impl Through<'_> {
 }
 
 impl Components {
-    /// O(patches + shop). Components are numbered by their first patch, then by their first triangle in the shop.
+    /// O(regions + shop). Components are numbered by their first region, then by their first triangle in the shop.
     pub(crate) fn of(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, reversed: &Reversed, through: Through<'_>) -> Self {
-        let patches = survey.patches.len() as u32;
-        let mut parents: Vec<u32> = (0..patches + submesh.triangles.len() as u32).collect();
+        let regions = survey.regions.len() as u32;
+        let mut parents: Vec<u32> = (0..regions + submesh.triangles.len() as u32).collect();
         for t in submesh.living() {
-            let patch = submesh.triangles[t as usize].patch;
-            if patch != NONE {
-                crate::util::union_find::unite(&mut parents, patch, patches + t);
+            let region = submesh.triangles[t as usize].region;
+            if region != NONE {
+                crate::util::union_find::unite(&mut parents, region, regions + t);
             }
         }
         for edge in edges.iter() {
             let mut reached = edge.uses.iter().filter(|u| through.reaches(&edge, u.triangle));
             if let Some(first) = reached.next() {
                 reached.for_each(|u| {
-                    crate::util::union_find::unite(&mut parents, patches + first.triangle, patches + u.triangle);
+                    crate::util::union_find::unite(&mut parents, regions + first.triangle, regions + u.triangle);
                 });
             }
         }
         let mut all =
-            Self { list: Vec::new(), of_patch: vec![NONE; patches as usize], of_triangle: vec![NONE; submesh.triangles.len()] };
+            Self { list: Vec::new(), of_region: vec![NONE; regions as usize], of_triangle: vec![NONE; submesh.triangles.len()] };
         let mut numbers = vec![NONE; parents.len()];
-        // After a second look, there may be nothing left of a patch.
-        for p in (0..patches).filter(|p| survey.patches[*p as usize].first != NONE && !reversed.dropped[*p as usize]) {
-            let sum = &survey.patches[p as usize];
+        // After a second look, there may be nothing left of a region.
+        for p in (0..regions).filter(|p| survey.regions[*p as usize].first != NONE && !reversed.dropped[*p as usize]) {
+            let sum = &survey.regions[p as usize];
             let c = all.number(
                 &mut numbers,
                 crate::util::union_find::find(&mut parents, p),
                 Sample { record: sum.first, in_submesh: None },
             );
-            all.of_patch[p as usize] = c;
+            all.of_region[p as usize] = c;
             let into = &mut all.list[c as usize];
             into.triangles += sum.triangles;
             into.bounds.add(&sum.bounds);
-            into.extent += turned(sum.extent, reversed.patches[p as usize]);
+            into.extent += turned(sum.extent, reversed.regions[p as usize]);
         }
         for t in submesh.living() {
             let c = all.number(
                 &mut numbers,
-                crate::util::union_find::find(&mut parents, patches + t),
+                crate::util::union_find::find(&mut parents, regions + t),
                 Sample { record: submesh.record(t), in_submesh: Some(t) },
             );
             all.of_triangle[t as usize] = c;

@@ -1,7 +1,7 @@
 //! The submesh: all triangles around irregular vertices, as a small mesh in memory that repairs can change.
 //!
 //! **In:** the triangles around irregular vertices, by their numbers, and the records they stand in.
-//! **Out:** a [`Submesh`] of vertices and triangles; its edges ([`edges`]), the wedges of material around an edge ([`wedges`]), its components
+//! **Out:** a [`Submesh`] of vertices and triangles; its edges ([`edges`]), the wedges of material around an edge ([`radial`]), its components
 //! ([`components`]), vertices near a place ([`near`]).
 //! **Promise:** everything that a repair decides on is here: the star of each complete vertex is whole.
 //!
@@ -12,7 +12,7 @@
 pub(crate) mod components;
 pub(crate) mod edges;
 pub(crate) mod near;
-pub(crate) mod wedges;
+pub(crate) mod radial;
 
 use std::collections::HashMap;
 
@@ -24,8 +24,8 @@ use crate::io::record::{self, Record};
 use crate::topology::chunk::IrregularTriangle;
 use crate::topology::survey::Survey;
 use crate::topology::vertex_table::Weld;
+use crate::util::ids::NONE;
 use crate::util::steps;
-use crate::util::union_find::NONE;
 
 /// A vertex of the submesh.
 pub(crate) type Vertex = u32;
@@ -38,7 +38,7 @@ pub(crate) enum Origin {
     /// A part of this record; takes its attribute.
     Part(u32),
     /// Made by a repair, as a part of no record; its attribute is 0.
-    Patch,
+    Added,
 }
 
 impl Origin {
@@ -46,7 +46,7 @@ impl Origin {
     pub(crate) fn of_part(self) -> Self {
         match self {
             Self::Input(record) | Self::Part(record) => Self::Part(record),
-            Self::Patch => Self::Patch,
+            Self::Added => Self::Added,
         }
     }
 }
@@ -56,8 +56,8 @@ impl Origin {
 pub(crate) struct Triangle {
     pub(crate) v: [Vertex; 3],
     pub(crate) origin: Origin,
-    /// The patch of regular surface it continues coherently, or [`NONE`].
-    pub(crate) patch: u32,
+    /// The region of regular surface it continues coherently, or [`NONE`].
+    pub(crate) region: u32,
     pub(crate) alive: bool,
 }
 
@@ -66,7 +66,7 @@ impl Triangle {
     pub(crate) fn record(&self) -> u32 {
         match self.origin {
             Origin::Input(record) | Origin::Part(record) => record,
-            Origin::Patch => NONE,
+            Origin::Added => NONE,
         }
     }
 }
@@ -87,14 +87,14 @@ impl Gathering {
     }
 
     /// Adds the triangle that is or stands in for the record at `place`, of whose vertices some have their whole star here (bit k of
-    /// `complete`: corner k), and the others belong to `patch`, or [`NONE`].
-    pub(crate) fn add(&mut self, place: u32, corners: [[f32; 3]; 3], complete: u8, patch: u32) {
+    /// `complete`: corner k), and the others belong to `region`, or [`NONE`].
+    pub(crate) fn add(&mut self, place: u32, corners: [[f32; 3]; 3], complete: u8, region: u32) {
         let v = corners.map(|p| self.weld.vertex(p));
         self.complete.resize(self.weld.positions().len(), false);
         for (k, vertex) in v.iter().enumerate() {
             self.complete[*vertex as usize] |= complete >> k & 1 == 1;
         }
-        self.triangles.push(Triangle { v, origin: Origin::Input(place), patch, alive: true });
+        self.triangles.push(Triangle { v, origin: Origin::Input(place), region, alive: true });
     }
 
     pub(crate) fn finish(self) -> Submesh {
@@ -127,8 +127,8 @@ impl Submesh {
     /// Gathers the irregular triangles of `survey`. O(irregular triangles).
     pub(crate) fn gather(survey: &Survey<'_>) -> Self {
         let mut gathering = Gathering::of(survey.irregular_triangles.len());
-        for (i, (irregular_triangle, patch)) in
-            survey.irregular_triangles.iter().zip(&survey.irregular_triangle_patches).enumerate()
+        for (i, (irregular_triangle, region)) in
+            survey.irregular_triangles.iter().zip(&survey.irregular_triangle_regions).enumerate()
         {
             if i % ASKED_AT_ONCE == 0 {
                 survey.ask_for(survey.irregular_triangles[i..].iter().take(ASKED_AT_ONCE).map(|s| s.triangle));
@@ -137,7 +137,7 @@ impl Submesh {
                 irregular_triangle.triangle,
                 corners(survey.records, irregular_triangle.triangle),
                 irregular_triangle.irregular,
-                *patch,
+                *region,
             );
         }
         gathering.finish()
@@ -160,7 +160,7 @@ impl Submesh {
         completed: impl FnOnce(&HashMap<Position, Vertex>) -> Vec<Vertex>,
     ) {
         let mut known = self.by_position();
-        for (irregular_triangle, patch) in new {
+        for (irregular_triangle, region) in new {
             let v = corners(survey.records, irregular_triangle.triangle).map(|p| {
                 let position = Position::of(p);
                 *known.entry(position).or_insert_with(|| {
@@ -169,7 +169,7 @@ impl Submesh {
                     self.positions.len() as Vertex - 1
                 })
             });
-            self.triangles.push(Triangle { v, origin: Origin::Input(irregular_triangle.triangle), patch: *patch, alive: true });
+            self.triangles.push(Triangle { v, origin: Origin::Input(irregular_triangle.triangle), region: *region, alive: true });
         }
         completed(&known).into_iter().for_each(|v| self.complete[v as usize] = true);
         self.relink();
@@ -198,9 +198,9 @@ impl Submesh {
     }
 
     /// Adds a triangle and returns its number.
-    pub(crate) fn add(&mut self, v: [Vertex; 3], origin: Origin, patch: u32) -> u32 {
+    pub(crate) fn add(&mut self, v: [Vertex; 3], origin: Origin, region: u32) -> u32 {
         let t = self.triangles.len();
-        self.triangles.push(Triangle { v, origin, patch, alive: true });
+        self.triangles.push(Triangle { v, origin, region, alive: true });
         self.nexts.extend([NONE; 3]);
         self.link(t);
         t as u32

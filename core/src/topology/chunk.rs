@@ -4,7 +4,7 @@
 //! is **regular** when its triangles form one closed fan, coherently oriented: every directed edge that leaves it comes back exactly
 //! once, in one cycle of at least three. Anything else (boundary, non-manifold edge, disagreement, several fans, duplicates, a
 //! collinear triangle) makes it **irregular**, and all its triangles are reported to the submesh, which sorts out what is wrong.
-//! Regular vertices that share a triangle belong to one **patch**: a coherent piece of surface.
+//! Regular vertices that share a triangle belong to one **region**: a coherent piece of surface.
 //!
 //! Tables are laid out to stay in an L2 cache at 32 k triangles a chunk; a worker keeps them from chunk to chunk.
 
@@ -14,12 +14,12 @@ use crate::stream::budget::{Budget, Purpose};
 use crate::stream::plan::HomeBox;
 use crate::stream::source::{Seen, Source, Triangle};
 use crate::topology::crossings::Crossings;
-use crate::topology::intersect::{self, Finder, Region, Standing};
+use crate::topology::intersect::{self, CellView, Finder, Standing};
 use crate::topology::labels::{LabelWriter, Labels};
-use crate::topology::patch_sums::{Patch, Sum};
+use crate::topology::region_sums::{RegionSums, Sum};
 use crate::topology::star::{self, Ring, Stars};
 use crate::topology::vertex_table::{self, Weld};
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// A triangle that goes to the submesh, and which of its corners are irregular here (bit k: corner k).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -28,34 +28,34 @@ pub(crate) struct IrregularTriangle {
     pub(crate) irregular: u8,
 }
 
-/// A triangle that more than one chunk sees, or that is an irregular triangle, with the patch of its regular corners at home here.
+/// A triangle that more than one chunk sees, or that is an irregular triangle, with the region of its regular corners at home here.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Link {
     pub(crate) triangle: u32,
-    /// Number of the patch, within the chunk or later the file, and in the highest bit whether the triangle is in the patch's sums: it
+    /// Number of the region, within the chunk or later the file, and in the highest bit whether the triangle is in the region's sums: it
     /// is in those of the chunk where its first corner is at home, if that knows nothing against it.
-    patch: u32,
+    region: u32,
 }
 
-/// The most patches that links can tell apart.
-pub(crate) const MOST_PATCHES: u64 = 1 << 31;
+/// The most regions that links can tell apart.
+pub(crate) const MOST_REGIONS: u64 = 1 << 31;
 
 impl Link {
-    fn new(triangle: u32, patch: u32, counted: bool) -> Self {
-        Self { triangle, patch: patch | u32::from(counted) << 31 }
+    fn new(triangle: u32, region: u32, counted: bool) -> Self {
+        Self { triangle, region: region | u32::from(counted) << 31 }
     }
 
-    pub(crate) fn patch(self) -> u32 {
-        self.patch & !(1 << 31)
+    pub(crate) fn region(self) -> u32 {
+        self.region & !(1 << 31)
     }
 
     pub(crate) fn is_counted(self) -> bool {
-        self.patch >> 31 == 1
+        self.region >> 31 == 1
     }
 
-    /// The same with the patch's number raised by `base`.
+    /// The same with the region's number raised by `base`.
     pub(crate) fn raised(self, base: u32) -> Self {
-        Self { patch: self.patch + base, ..self }
+        Self { region: self.region + base, ..self }
     }
 }
 
@@ -64,7 +64,7 @@ impl Link {
 pub(crate) struct ChunkTopology {
     pub(crate) irregular_triangles: Vec<IrregularTriangle>,
     pub(crate) links: Vec<Link>,
-    pub(crate) patches: Vec<Patch>,
+    pub(crate) regions: Vec<RegionSums>,
     pub(crate) labels: Labels,
     /// The box of all triangles with a label that are no irregular triangles here.
     pub(crate) reach: Bounds,
@@ -81,15 +81,15 @@ pub(crate) struct ChunkTopology {
 /// Triangles that are welded at once.
 const BATCH: usize = vertex_table::BATCH / 3;
 
-/// Bytes that a patch takes until the file is judged: here, merged, and as a component.
-pub(crate) const BYTES_PER_PATCH: u64 = 3 * size_of::<Patch>() as u64 + 160;
+/// Bytes that a region takes until the file is judged: here, merged, and as a component.
+pub(crate) const BYTES_PER_REGION: u64 = 3 * size_of::<RegionSums>() as u64 + 160;
 
 impl ChunkTopology {
     /// Counts what it takes now and will take once it is merged.
     pub(crate) fn take(&self, budget: &Budget) {
         let labels = self.labels.heap_bytes();
         let fixed = size_of::<Self>() as u64;
-        budget.take(Purpose::Surface, fixed + labels + self.patches.capacity() as u64 * BYTES_PER_PATCH);
+        budget.take(Purpose::Surface, fixed + labels + self.regions.capacity() as u64 * BYTES_PER_REGION);
         // Copied when they are merged; of irregular triangles, one more list is kept.
         let seams =
             size_of::<Link>() * self.links.capacity() + size_of::<IrregularTriangle>() * self.irregular_triangles.capacity();
@@ -104,7 +104,7 @@ impl ChunkTopology {
     fn shrink(&mut self) {
         self.irregular_triangles.shrink_to_fit();
         self.links.shrink_to_fit();
-        self.patches.shrink_to_fit();
+        self.regions.shrink_to_fit();
     }
 }
 
@@ -118,7 +118,7 @@ pub(crate) struct Scratch {
     /// Members with three distinct, exactly collinear vertices.
     collinear: Vec<u32>,
     stars: Stars,
-    /// Patch of a regular home vertex, [`IRREGULAR`] or [`AWAY`].
+    /// RegionSums of a regular home vertex, [`IRREGULAR`] or [`AWAY`].
     states: Vec<u32>,
     parents: Vec<u32>,
     /// By vertex, for the search for self-intersections.
@@ -132,7 +132,7 @@ pub(crate) struct Scratch {
 const IRREGULAR: u32 = NONE - 1;
 /// State of a vertex at home elsewhere.
 const AWAY: u32 = NONE - 2;
-/// State of a regular vertex before patches are numbered. Smaller than the others, as the numbers are.
+/// State of a regular vertex before regions are numbered. Smaller than the others, as the numbers are.
 const SOUND: u32 = 0;
 
 /// Bytes that one worker needs for a chunk of `members` triangles, at most.
@@ -201,7 +201,7 @@ impl Scratch {
         }));
         // No visitor has a corner at home here.
         self.standing.resize(self.vertices.positions().len(), Standing::Away);
-        let region = Region {
+        let view = CellView {
             positions: self.vertices.positions(),
             triangles: &self.triangles,
             left_out: &self.collinear,
@@ -211,7 +211,7 @@ impl Scratch {
         self.hit.clear();
         self.hit.resize(self.triangles.len().div_ceil(64), 0);
         let mut crossings = Crossings::default();
-        let tested = self.finder.pairs(&region, allowance, |i, j, contact| {
+        let tested = self.finder.pairs(&view, allowance, |i, j, contact| {
             crossings.add(self.numbers[i as usize], self.numbers[j as usize], contact);
             for t in [i, j] {
                 self.hit[t as usize / 64] |= 1 << (t % 64);
@@ -273,7 +273,7 @@ impl Scratch {
         }
     }
 
-    /// Tests whether the triangles around each home vertex are one closed coherent fan, and puts those that are regular into patches.
+    /// Tests whether the triangles around each home vertex are one closed coherent fan, and puts those that are regular into regions.
     #[inline(always)]
     fn judge_stars(&mut self, cell: HomeBox, cut: &[Point], places: impl Fn(&Ring, u32) -> u32 + Copy) {
         let positions = self.vertices.positions();
@@ -289,7 +289,7 @@ impl Scratch {
         self.parents.clear();
         self.parents.extend(0..positions.len() as u32);
         let roots = self.judge(places);
-        self.unite_patches(roots);
+        self.unite_regions(roots);
     }
 
     /// Tests stars by ascending vertex. A regular one is put with an older regular neighbour, one in its first triangle if that will do;
@@ -316,9 +316,9 @@ impl Scratch {
         roots
     }
 
-    /// Unites the patches of regular home vertices that share a triangle, of which there are `roots` as yet.
+    /// Unites the regions of regular home vertices that share a triangle, of which there are `roots` as yet.
     #[inline(always)]
-    fn unite_patches(&mut self, mut roots: usize) {
+    fn unite_regions(&mut self, mut roots: usize) {
         for t in self.triangles.iter().filter(|t| t[0] != NONE) {
             if roots <= 1 {
                 return;
@@ -364,7 +364,7 @@ impl Scratch {
         let mut out = ChunkTopology { reach: Bounds::EMPTY, ..ChunkTopology::default() };
         out.vertices = home().count() as u64;
         out.vertices_used = home().filter(|(v, _)| self.stars.count(*v) > 0).count() as u64;
-        let largest = self.number_patches(&mut out.patches);
+        let largest = self.number_regions(&mut out.regions);
         let mut labels = LabelWriter::default();
         let mut sum = Sum::new(measure, self.vertices.positions(), largest);
         for (t, number) in self.triangles.iter().zip(&self.numbers) {
@@ -378,47 +378,47 @@ impl Scratch {
             let states = [self.states[t[0] as usize], self.states[t[1] as usize], self.states[t[2] as usize]];
             if states.iter().all(|s| *s < AWAY) {
                 labels.push(states[0]);
-                sum.add(states[0], triangle, *t, &mut out.patches);
+                sum.add(states[0], triangle, *t, &mut out.regions);
                 continue;
             }
             let irregular = (0..3).fold(0, |mask, k| mask | u8::from(states[k] == IRREGULAR) << k);
-            let patch = states.into_iter().rfind(|s| *s < AWAY).unwrap_or(NONE);
-            labels.push(patch);
+            let region = states.into_iter().rfind(|s| *s < AWAY).unwrap_or(NONE);
+            labels.push(region);
             if irregular != 0 {
                 out.irregular_triangles.push(IrregularTriangle { triangle, irregular });
             }
-            let counted = patch != NONE && irregular == 0 && states[0] != AWAY;
+            let counted = region != NONE && irregular == 0 && states[0] != AWAY;
             if !counted {
                 sum.leave(*t);
             }
-            if patch != NONE {
+            if region != NONE {
                 if counted {
-                    sum.add(patch, triangle, *t, &mut out.patches);
+                    sum.add(region, triangle, *t, &mut out.regions);
                 } else {
-                    let first = &mut out.patches[patch as usize].first;
+                    let first = &mut out.regions[region as usize].first;
                     *first = triangle.min(*first);
                 }
-                out.links.push(Link::new(triangle, patch, counted));
+                out.links.push(Link::new(triangle, region, counted));
                 if irregular == 0 {
                     out.reach.include(&t.map(|v| self.vertices.positions()[v as usize]));
                 }
             }
         }
-        sum.finish(total, &mut out.patches);
-        out.patches.iter().for_each(|p| out.reach.add(&p.bounds));
+        sum.finish(total, &mut out.regions);
+        out.regions.iter().for_each(|p| out.reach.add(&p.bounds));
         out.irregular_triangle_vertices = self.count_irregular_triangle_vertices(&out.irregular_triangles);
-        if out.patches.len() > 1 {
+        if out.regions.len() > 1 {
             out.labels = Labels::Runs(labels.finish());
         }
         out.shrink();
         out
     }
 
-    /// Numbers the patches by their first vertices, and returns the one of most vertices.
+    /// Numbers the regions by their first vertices, and returns the one of most vertices.
     #[inline(always)]
-    fn number_patches(&mut self, patches: &mut Vec<Patch>) -> u32 {
+    fn number_regions(&mut self, regions: &mut Vec<RegionSums>) -> u32 {
         let mut bounds = Bounds::EMPTY;
-        let mut patch = NONE;
+        let mut region = NONE;
         let (mut sizes, mut run): (Vec<usize>, usize) = (Vec::new(), 0);
         for (v, position) in self.vertices.positions().iter().enumerate() {
             if self.states[v] != SOUND {
@@ -426,25 +426,25 @@ impl Scratch {
             }
             // Never younger than the vertex, so it has its number already.
             let parent = self.parents[v] as usize;
-            self.states[v] = if parent == v { patches.len() as u32 } else { self.states[parent] };
+            self.states[v] = if parent == v { regions.len() as u32 } else { self.states[parent] };
             if parent == v {
-                patches.push(Patch { triangles: 0, extent: Extent::default(), bounds: Bounds::EMPTY, first: NONE });
+                regions.push(RegionSums { triangles: 0, extent: Extent::default(), bounds: Bounds::EMPTY, first: NONE });
                 sizes.push(0);
             }
-            if self.states[v] != patch {
-                if patch != NONE {
-                    patches[patch as usize].bounds.add(&bounds);
-                    sizes[patch as usize] += run;
+            if self.states[v] != region {
+                if region != NONE {
+                    regions[region as usize].bounds.add(&bounds);
+                    sizes[region as usize] += run;
                 }
-                (patch, bounds, run) = (self.states[v], Bounds::EMPTY, 0);
+                (region, bounds, run) = (self.states[v], Bounds::EMPTY, 0);
             }
             bounds.include(&[*position]);
             run += 1;
         }
-        if patch != NONE {
-            patches[patch as usize].bounds.add(&bounds);
-            sizes[patch as usize] += run;
+        if region != NONE {
+            regions[region as usize].bounds.add(&bounds);
+            sizes[region as usize] += run;
         }
-        sizes.iter().zip(0..).max_by_key(|(size, _)| **size).map_or(NONE, |(_, patch)| patch)
+        sizes.iter().zip(0..).max_by_key(|(size, _)| **size).map_or(NONE, |(_, region)| region)
     }
 }

@@ -1,4 +1,4 @@
-//! From the patches of chunks, here parts, to those of the file: parts that share a triangle are united.
+//! From the regions of chunks, here parts, to those of the file: parts that share a triangle are united.
 //!
 //! The parts are kept, and which of them are neighbours, so that chunks can be solved again without the others: where vertices divide the
 //! surface, only the chunks where these are at home say something new, and those that share triangles with them say it again.
@@ -9,9 +9,9 @@ use crate::stream::budget::{Budget, Purpose};
 use crate::stream::plan::ChunkId;
 use crate::topology::chunk::{self, ChunkTopology, IrregularTriangle, Link};
 use crate::topology::labels::Labels;
-use crate::topology::patch_sums::Patch;
+use crate::topology::region_sums::RegionSums;
+use crate::util::ids::NONE;
 use crate::util::radix;
-use crate::util::union_find::NONE;
 
 /// What the chunks said, before it is united.
 #[derive(Debug)]
@@ -19,7 +19,7 @@ pub(crate) struct Parts {
     /// The first part of each chunk, and one past the last.
     bases: Vec<u32>,
     /// Sums leave the irregular triangles out.
-    sums: Vec<Patch>,
+    sums: Vec<RegionSums>,
     /// Parts that share a triangle, each pair once, ascending.
     neighbours: Vec<[u32; 2]>,
     /// A part of each irregular triangle that has regular corners, by ascending irregular triangle.
@@ -71,7 +71,7 @@ impl Parts {
             let base = new.bases[c];
             match fresh.next_if(|(chunk, _)| chunk.0 as usize == c) {
                 Some((_, chunk)) => {
-                    new.sums.append(&mut chunk.patches);
+                    new.sums.append(&mut chunk.regions);
                     links.extend(std::mem::take(&mut chunk.links).into_iter().map(|l| l.raised(base)));
                     irregular_triangles.append(&mut std::mem::take(&mut chunk.irregular_triangles));
                 }
@@ -94,7 +94,7 @@ impl Parts {
         // A triangle is seen by three chunks at most.
         let sharing = |k: usize| {
             let pairs = links.windows(k + 1).filter(move |of| of[0].triangle == of[k].triangle);
-            pairs.map(move |of| [of[0].patch(), of[k].patch()])
+            pairs.map(move |of| [of[0].region(), of[k].region()])
         };
         let all = kept.chain(sharing(1)).chain(sharing(2)).filter(|[a, b]| a != b);
         new.neighbours = all.map(|[a, b]| [a.min(b), a.max(b)]).collect();
@@ -111,8 +111,8 @@ impl Parts {
         (new, irregular_triangles)
     }
 
-    /// The patches of the file by their smallest triangle, and for each part which one it is of.
-    pub(crate) fn united(&self) -> (Vec<Patch>, Vec<u32>) {
+    /// The regions of the file by their smallest triangle, and for each part which one it is of.
+    pub(crate) fn united(&self) -> (Vec<RegionSums>, Vec<u32>) {
         let mut parents: Vec<u32> = (0..self.sums.len() as u32).collect();
         for [a, b] in &self.neighbours {
             crate::util::union_find::unite(&mut parents, *a, *b);
@@ -120,8 +120,8 @@ impl Parts {
         number(&mut parents, &self.sums)
     }
 
-    /// The patch of each irregular triangle's regular corners, or [`NONE`].
-    pub(crate) fn patches_of(&self, irregular_triangles: &[IrregularTriangle], merged: &[u32]) -> Vec<u32> {
+    /// The region of each irregular triangle's regular corners, or [`NONE`].
+    pub(crate) fn regions_of(&self, irregular_triangles: &[IrregularTriangle], merged: &[u32]) -> Vec<u32> {
         let mut known = self.of_irregular_triangles.iter().peekable();
         let part = |s: &IrregularTriangle| known.next_if(|(triangle, _)| *triangle == s.triangle);
         irregular_triangles.iter().map(part).map(|known| known.map_or(NONE, |(_, part)| merged[*part as usize])).collect()
@@ -130,7 +130,7 @@ impl Parts {
     /// Counts what is kept, with the labels of the chunks that are.
     pub(crate) fn take<'l>(&self, budget: &Budget, labels: impl Iterator<Item = &'l Labels>, irregular_triangles: u64) {
         let labels: u64 = labels.map(Labels::heap_bytes).sum();
-        budget.take(Purpose::Surface, labels + self.sums.len() as u64 * chunk::BYTES_PER_PATCH);
+        budget.take(Purpose::Surface, labels + self.sums.len() as u64 * chunk::BYTES_PER_REGION);
         let seams = size_of_val(&*self.neighbours) + size_of_val(&*self.of_irregular_triangles);
         budget.take(Purpose::Seams, 2 * seams as u64);
         budget.take(Purpose::Defects, crate::stream::budget::submesh_bytes(irregular_triangles, irregular_triangles));
@@ -143,7 +143,7 @@ fn take_out_irregular_triangles(
     measure: &Measure,
     links: &[Link],
     irregular_triangles: &[IrregularTriangle],
-    sums: &mut [Patch],
+    sums: &mut [RegionSums],
 ) -> Vec<Option<u32>> {
     let mut parts = vec![None; irregular_triangles.len()];
     let mut s = 0;
@@ -152,9 +152,9 @@ fn take_out_irregular_triangles(
             s += 1;
         }
         if s < irregular_triangles.len() && irregular_triangles[s].triangle == link.triangle {
-            parts[s] = Some(link.patch());
+            parts[s] = Some(link.region());
             if link.is_counted() {
-                let sum = &mut sums[link.patch() as usize];
+                let sum = &mut sums[link.region() as usize];
                 sum.triangles -= 1;
                 sum.extent -= measure.triangle(&record::corners(&records[link.triangle as usize]));
             }
@@ -163,29 +163,29 @@ fn take_out_irregular_triangles(
     parts
 }
 
-/// Folds united parts into one patch each and numbers them by their smallest triangle.
-fn number(parents: &mut [u32], sums: &[Patch]) -> (Vec<Patch>, Vec<u32>) {
+/// Folds united parts into one region each and numbers them by their smallest triangle.
+fn number(parents: &mut [u32], sums: &[RegionSums]) -> (Vec<RegionSums>, Vec<u32>) {
     let mut merged = vec![NONE; sums.len()];
-    let mut patches: Vec<Patch> = Vec::new();
+    let mut regions: Vec<RegionSums> = Vec::new();
     for (raw, sum) in sums.iter().enumerate() {
         // The root is the smallest of its union, so it comes first.
         let root = crate::util::union_find::find(parents, raw as u32) as usize;
         if root == raw {
-            merged[raw] = patches.len() as u32;
-            patches.push(*sum);
+            merged[raw] = regions.len() as u32;
+            regions.push(*sum);
         } else {
             merged[raw] = merged[root];
-            let into = &mut patches[merged[root] as usize];
+            let into = &mut regions[merged[root] as usize];
             into.triangles += sum.triangles;
             into.extent += sum.extent;
             into.bounds.add(&sum.bounds);
             into.first = into.first.min(sum.first);
         }
     }
-    let mut order: Vec<u32> = (0..patches.len() as u32).collect();
-    order.sort_unstable_by_key(|p| patches[*p as usize].first);
+    let mut order: Vec<u32> = (0..regions.len() as u32).collect();
+    order.sort_unstable_by_key(|p| regions[*p as usize].first);
     let mut rank = vec![0; order.len()];
     order.iter().enumerate().for_each(|(r, p)| rank[*p as usize] = r as u32);
     merged.iter_mut().for_each(|m| *m = rank[*m as usize]);
-    (order.into_iter().map(|p| patches[p as usize]).collect(), merged)
+    (order.into_iter().map(|p| regions[p as usize]).collect(), merged)
 }

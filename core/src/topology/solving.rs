@@ -29,17 +29,17 @@ pub(crate) struct Solving<'s, 'a> {
 /// What was found so far that has to be kept.
 struct Found {
     irregular_triangles: AtomicU64,
-    patches: AtomicU64,
+    regions: AtomicU64,
 }
 
 impl Found {
-    fn new(irregular_triangles: u64, patches: u64) -> Self {
-        Self { irregular_triangles: AtomicU64::new(irregular_triangles), patches: AtomicU64::new(patches) }
+    fn new(irregular_triangles: u64, regions: u64) -> Self {
+        Self { irregular_triangles: AtomicU64::new(irregular_triangles), regions: AtomicU64::new(regions) }
     }
 
     fn add(&self, topology: &ChunkTopology) {
         self.irregular_triangles.fetch_add(topology.irregular_triangles.len() as u64, Ordering::Relaxed);
-        self.patches.fetch_add(topology.patches.len() as u64, Ordering::Relaxed);
+        self.regions.fetch_add(topology.regions.len() as u64, Ordering::Relaxed);
     }
 }
 
@@ -81,7 +81,7 @@ impl Solving<'_, '_> {
         Ok(chunks)
     }
 
-    /// Some chunks again, with vertices that count as irregular, by the chunk where they are at home. `kept`: how many irregular triangles and patches there are
+    /// Some chunks again, with vertices that count as irregular, by the chunk where they are at home. `kept`: how many irregular triangles and regions there are
     /// beside what is found.
     pub(crate) fn again(
         &self,
@@ -115,12 +115,12 @@ impl Solving<'_, '_> {
         if self.progress.cancelled() {
             return Err(Error::io(self.path, STAGE)(std::io::ErrorKind::Interrupted.into()));
         }
-        let [irregular_triangles, pieces] = [found.irregular_triangles, found.patches].map(AtomicU64::into_inner);
+        let [irregular_triangles, pieces] = [found.irregular_triangles, found.regions].map(AtomicU64::into_inner);
         self.budget.check(self.path, || {
             format!("at least {irregular_triangles} triangles lie at defects, in {pieces} pieces of surface or more")
         })?;
         refuse_more_than(self.path, MOST_SUSPECTS, irregular_triangles, "triangles lie at defects")?;
-        refuse_more_than(self.path, chunk::MOST_PATCHES, pieces, "pieces of surface, counted by chunks, are there")
+        refuse_more_than(self.path, chunk::MOST_REGIONS, pieces, "pieces of surface, counted by chunks, are there")
     }
 }
 

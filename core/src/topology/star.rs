@@ -3,7 +3,7 @@
 //! Nearly all vertices have at most eight triangles: these have a place of two cache-line halves each, so that no pass is needed to
 //! count them first, and a corner is compared with all others at once. What is around the others is laid out one after another.
 
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// Most triangles of a short star.
 const SHORT: usize = 8;

@@ -1,6 +1,6 @@
 //! The topology of a whole file: chunks solved in parallel, then merged over the triangles they share.
 //!
-//! What comes out does not depend on the chunks: the irregular triangles (all triangles around irregular vertices), and the patches of regular
+//! What comes out does not depend on the chunks: the irregular triangles (all triangles around irregular vertices), and the regions of regular
 //! surface, numbered by their smallest triangle. Everything global is proportional to the seams and the defects, not to the file.
 
 use crate::topology::solving::{Solving, at_home, count_of, take_tables};
@@ -24,9 +24,9 @@ use crate::topology::chunk::{ChunkTopology, IrregularTriangle};
 use crate::topology::chunk_regions::Parts;
 use crate::topology::crossings::{self, Crossings, Pair};
 use crate::topology::labels::Labels;
-use crate::topology::patch_sums::Patch;
+use crate::topology::region_sums::RegionSums;
 use crate::topology::vertex_table::{Sieve, Weld};
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// Topology of the regular part of a file, and the list of what is not regular.
 #[derive(Debug)]
@@ -36,10 +36,10 @@ pub(crate) struct Survey<'a> {
     pub(crate) bounds: Bounds,
     /// Triangles of the submesh, ascending, each once.
     pub(crate) irregular_triangles: Vec<IrregularTriangle>,
-    /// The patch of each irregular triangle's regular corners, or [`NONE`].
-    pub(crate) irregular_triangle_patches: Vec<u32>,
-    /// Patches by ascending smallest triangle. Sums leave the irregular triangles out.
-    pub(crate) patches: Vec<Patch>,
+    /// The region of each irregular triangle's regular corners, or [`NONE`].
+    pub(crate) irregular_triangle_regions: Vec<u32>,
+    /// Regions by ascending smallest triangle. Sums leave the irregular triangles out.
+    pub(crate) regions: Vec<RegionSums>,
     /// Runs of triangles with non-finite coordinates.
     pub(crate) nonfinite: Vec<(u32, u32)>,
     /// Triangles with finite coordinates.
@@ -62,7 +62,7 @@ pub(crate) struct Survey<'a> {
     /// By chunk, the box of all regular triangles that it sees.
     reaches: Vec<Bounds>,
     parts: Parts,
-    /// Part → patch.
+    /// Part → region.
     merged: Vec<u32>,
     /// So many of the promoted vertices have divided the surface.
     dividing: usize,
@@ -71,11 +71,11 @@ pub(crate) struct Survey<'a> {
     threads: usize,
 }
 
-/// What became of patches that were divided.
+/// What became of regions that were divided.
 pub(crate) struct Division {
-    /// The new irregular triangles, ascending, with the patches they belonged to.
+    /// The new irregular triangles, ascending, with the regions they belonged to.
     pub(crate) fetched: Vec<(IrregularTriangle, u32)>,
-    /// For each patch now the one that it was a part of.
+    /// For each region now the one that it was a part of.
     pub(crate) divided_from: Vec<u32>,
 }
 
@@ -114,8 +114,8 @@ impl<'a> Survey<'a> {
             measure: Measure::new(&bounds),
             bounds,
             irregular_triangles: Vec::new(),
-            irregular_triangle_patches: Vec::new(),
-            patches: Vec::new(),
+            irregular_triangle_regions: Vec::new(),
+            regions: Vec::new(),
             triangles: records.len() as u64 - count_of(&nonfinite),
             nonfinite,
             self_intersections: None,
@@ -165,8 +165,8 @@ impl<'a> Survey<'a> {
         let mut fresh: Vec<(ChunkId, &mut ChunkTopology)> = (0..).map(ChunkId).zip(&mut chunks).collect();
         let known = (self.records, &self.measure);
         (self.parts, self.irregular_triangles) = self.parts.renewed(known, Vec::new(), &mut fresh, |_| true);
-        (self.patches, self.merged) = self.parts.united();
-        self.irregular_triangle_patches = self.parts.patches_of(&self.irregular_triangles, &self.merged);
+        (self.regions, self.merged) = self.parts.united();
+        self.irregular_triangle_regions = self.parts.regions_of(&self.irregular_triangles, &self.merged);
         drop(span);
         (self.self_intersections, self.crossing_pairs) = summed_crossings(&mut chunks, most_tested);
         self.vertices = chunks.iter().map(|c| c.vertices).sum();
@@ -176,7 +176,7 @@ impl<'a> Survey<'a> {
     }
 
     /// Divides the surface at the regular vertices among `positions`: they count as irregular, so that their triangles become irregular triangles, and
-    /// what hangs together only through them, or what was promoted before, becomes several patches. Solves the chunks again where they are at home,
+    /// what hangs together only through them, or what was promoted before, becomes several regions. Solves the chunks again where they are at home,
     /// and those that share triangles with these. Refuses when tables would not fit `limits.memory_bytes`.
     pub(crate) fn divide(
         &mut self,
@@ -196,22 +196,22 @@ impl<'a> Survey<'a> {
         let by_home = self.by_home(&all);
         let kept = (0..self.plan.chunks()).filter(|c| !is_fresh[*c]);
         self.parts.take(&budget, kept.clone().map(|c| &self.labels[c]), self.irregular_triangles.len() as u64);
-        let patches = kept.map(|c| self.parts.of_chunk(ChunkId(c as u32)).len() as u64).sum();
+        let regions = kept.map(|c| self.parts.of_chunk(ChunkId(c as u32)).len() as u64).sum();
         let mut solved =
-            self.solving(path, &budget, progress).again(&is_fresh, &by_home, [self.irregular_triangles.len() as u64, patches])?;
+            self.solving(path, &budget, progress).again(&is_fresh, &by_home, [self.irregular_triangles.len() as u64, regions])?;
         let irregular = self.irregular();
         let mut fresh: Vec<(ChunkId, &mut ChunkTopology)> =
             solved.iter_mut().map(|(chunk, topology)| (*chunk, topology)).collect();
         let known = (self.records, &self.measure);
         let (parts, irregular_triangles) =
             self.parts.renewed(known, self.irregular_triangles.clone(), &mut fresh, |chunk| is_cut[chunk]);
-        let (patches, merged) = parts.united();
+        let (regions, merged) = parts.united();
         self.promoted.extend(positions.iter().filter(|p| irregular.find(**p).is_none()));
         self.dividing = self.promoted.len();
         // By what was true before.
-        let divided_from = self.patches_at(patches.iter().map(|patch| patch.first));
-        self.irregular_triangle_patches = parts.patches_of(&irregular_triangles, &merged);
-        (self.irregular_triangles, self.patches, self.merged, self.parts) = (irregular_triangles, patches, merged, parts);
+        let divided_from = self.regions_at(regions.iter().map(|region| region.first));
+        self.irregular_triangle_regions = parts.regions_of(&irregular_triangles, &merged);
+        (self.irregular_triangles, self.regions, self.merged, self.parts) = (irregular_triangles, regions, merged, parts);
         for (chunk, topology) in solved {
             self.reaches[chunk.0 as usize] = topology.reach;
             self.labels[chunk.0 as usize] = topology.labels;
@@ -232,24 +232,24 @@ impl<'a> Survey<'a> {
         irregular
     }
 
-    /// The patches of some triangles with a regular corner.
-    fn patches_at(&self, triangles: impl Iterator<Item = u32>) -> Vec<u32> {
+    /// The regions of some triangles with a regular corner.
+    fn regions_at(&self, triangles: impl Iterator<Item = u32>) -> Vec<u32> {
         let triangles: Vec<u32> = triangles.collect();
         let positions: Vec<[f32; 3]> = triangles.iter().flat_map(|t| position::corners(&self.records[*t as usize])).collect();
-        // Around positions that are not regular there may be triangles of no patch, or of the submesh.
+        // Around positions that are not regular there may be triangles of no region, or of the submesh.
         let around = self.beyond_the_submesh(&positions);
-        let patch = |t: u32| match self.irregular_triangles.binary_search_by_key(&t, |s| s.triangle) {
-            Ok(i) => self.irregular_triangle_patches[i],
+        let region = |t: u32| match self.irregular_triangles.binary_search_by_key(&t, |s| s.triangle) {
+            Ok(i) => self.irregular_triangle_regions[i],
             Err(_) => around.binary_search_by_key(&t, |(s, _)| s.triangle).map_or(NONE, |i| around[i].1),
         };
-        triangles.into_iter().map(patch).collect()
+        triangles.into_iter().map(region).collect()
     }
 
-    /// The patch of an irregular triangle's regular corners, if it has any.
-    pub(crate) fn patch_of_irregular_triangle(&self, record: u32) -> u32 {
+    /// The region of an irregular triangle's regular corners, if it has any.
+    pub(crate) fn region_of_irregular_triangle(&self, record: u32) -> u32 {
         self.irregular_triangles
             .binary_search_by_key(&record, |s| s.triangle)
-            .map_or(NONE, |i| self.irregular_triangle_patches[i])
+            .map_or(NONE, |i| self.irregular_triangle_regions[i])
     }
 
     /// Positions with the chunks where they are at home, by chunk.
@@ -281,12 +281,12 @@ impl<'a> Survey<'a> {
         self.guide.ask_for(numbers.map(|number| (number, 1)));
     }
 
-    /// Merged patches of a chunk, by the chunk's own numbers.
-    fn patches_of(&self, chunk: ChunkId) -> &[u32] {
+    /// Merged regions of a chunk, by the chunk's own numbers.
+    fn regions_of(&self, chunk: ChunkId) -> &[u32] {
         &self.merged[self.parts.of_chunk(chunk)]
     }
 
-    /// Visits every triangle with three regular corners whose patch is `wanted` and that `passes`, exactly once, with its patch: chunks
+    /// Visits every triangle with three regular corners whose region is `wanted` and that `passes`, exactly once, with its region: chunks
     /// in parallel, results in chunk order (which the plan decides: only sums of integers and sets may be made of them). `make` is
     /// given the box of all regular triangles that a chunk sees, and says `None` if none of them is of interest.
     /// `passes` is asked first, since it may be cheaper than finding out whose turn it is.
@@ -298,7 +298,7 @@ impl<'a> Survey<'a> {
         visit: impl Fn(&mut R, u32, u32) + Sync,
     ) -> Vec<R> {
         let makes = |chunk: ChunkId| make(&self.reaches[chunk.0 as usize]);
-        let is_wanted = |chunk: ChunkId| self.patches_of(chunk).iter().any(|p| wanted(*p)) && makes(chunk).is_some();
+        let is_wanted = |chunk: ChunkId| self.regions_of(chunk).iter().any(|p| wanted(*p)) && makes(chunk).is_some();
         let visited = self.members.each(
             (self.records, &self.guide, &self.plan),
             self.threads,
@@ -306,12 +306,12 @@ impl<'a> Survey<'a> {
             || (),
             |(), chunk, seen, _| {
                 let mut result = makes(chunk)?;
-                let patches = self.patches_of(chunk);
+                let regions = self.regions_of(chunk);
                 let cell = self.plan.home_box(chunk);
                 let mut labels = self.labels[chunk.0 as usize].iter();
                 seen.for_each(|triangle, place| {
-                    let patch = labels.next().unwrap_or(NONE);
-                    if patch == NONE || !wanted(patches[patch as usize]) {
+                    let region = labels.next().unwrap_or(NONE);
+                    if region == NONE || !wanted(regions[region as usize]) {
                         return;
                     }
                     let corners = place.corners();
@@ -322,7 +322,7 @@ impl<'a> Survey<'a> {
                     }
                     // A regular triangle has a label in every chunk that sees it; the lowest of them visits it.
                     if corners.iter().all(|p| cell.holds(*p)) || corners.iter().all(|p| self.plan.home(*p) >= chunk) {
-                        visit(&mut result, triangle, patches[patch as usize]);
+                        visit(&mut result, triangle, regions[region as usize]);
                     }
                 });
                 Some(result)
@@ -352,8 +352,8 @@ impl<'a> Survey<'a> {
     pub(crate) fn promote(&mut self, positions: &[[f32; 3]]) -> Vec<(IrregularTriangle, u32)> {
         self.promoted.extend(positions);
         let new = self.beyond_the_submesh(positions);
-        for (irregular_triangle, patch) in &new {
-            let sum = &mut self.patches[*patch as usize];
+        for (irregular_triangle, region) in &new {
+            let sum = &mut self.regions[*region as usize];
             let extent = self.measure.triangle(&record::corners(&self.records[irregular_triangle.triangle as usize]));
             sum.triangles -= 1;
             sum.extent -= extent;
@@ -362,16 +362,16 @@ impl<'a> Survey<'a> {
             .irregular_triangles
             .iter()
             .copied()
-            .zip(self.irregular_triangle_patches.iter().copied())
+            .zip(self.irregular_triangle_regions.iter().copied())
             .chain(new.iter().copied())
             .collect();
         all.sort_unstable();
-        (self.irregular_triangles, self.irregular_triangle_patches) = all.into_iter().unzip();
+        (self.irregular_triangles, self.irregular_triangle_regions) = all.into_iter().unzip();
         new
     }
 
     /// The triangles around regular vertices at `positions` that are no irregular triangles, ascending, each with the corners that are there and
-    /// the patch it belongs to. Reads the chunks where the vertices are at home.
+    /// the region it belongs to. Reads the chunks where the vertices are at home.
     pub(crate) fn beyond_the_submesh(&self, positions: &[[f32; 3]]) -> Vec<(IrregularTriangle, u32)> {
         let mut wanted = Weld::default();
         wanted.reset(positions.len() * 8);
@@ -387,21 +387,21 @@ impl<'a> Survey<'a> {
             Sieve::default,
             |sieve, chunk, seen, _| {
                 sieve.fill(at_home(chunk).iter().map(|(_, p)| *p));
-                let patches = self.patches_of(chunk);
+                let regions = self.regions_of(chunk);
                 let mut labels = self.labels[chunk.0 as usize].iter();
                 let mut found = Vec::new();
                 seen.for_each(|triangle, place| {
-                    let patch = labels.next().unwrap_or(NONE);
+                    let region = labels.next().unwrap_or(NONE);
                     let corners = place.corners();
                     if !sieve.may_hold(&corners) {
                         return;
                     }
                     let irregular = (0..3).filter(|k| wanted.find(corners[*k]).is_some()).fold(0, |mask, k| mask | 1 << k);
                     if irregular != 0 {
-                        // Only irregular triangles are in no patch, and those are known.
+                        // Only irregular triangles are in no region, and those are known.
                         found.push((
                             IrregularTriangle { triangle, irregular },
-                            patches.get(patch as usize).copied().unwrap_or(NONE),
+                            regions.get(region as usize).copied().unwrap_or(NONE),
                         ));
                     }
                 });

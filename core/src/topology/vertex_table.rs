@@ -1,5 +1,6 @@
 //! The exact weld: a vertex is a position, −0.0 and 0.0 being one.
 
+use crate::util::ids::NONE;
 use glam::Vec4;
 
 use crate::geometry::position::{bits, canonical};
@@ -29,7 +30,6 @@ struct Bucket {
 }
 
 const LANES: usize = 4;
-const NONE: u32 = u32::MAX;
 /// NaN is equal to nothing.
 const FREE: Bucket = Bucket { x: Vec4::NAN, y: Vec4::NAN, z: Vec4::NAN, vertex: [NONE; LANES] };
 

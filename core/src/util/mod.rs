@@ -7,6 +7,7 @@
 //! the number of threads.
 
 pub(crate) mod cost;
+pub(crate) mod ids;
 pub(crate) mod machine;
 pub(crate) mod parallel;
 pub(crate) mod radix;

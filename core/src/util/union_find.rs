@@ -1,8 +1,5 @@
 //! Sets of numbered things that are merged pair by pair, in a table of parents.
 
-/// No vertex, patch or triangle.
-pub(crate) const NONE: u32 = u32::MAX;
-
 /// Root of `v`, halving the path.
 #[inline]
 pub(crate) fn find(parents: &mut [u32], mut v: u32) -> u32 {

@@ -142,5 +142,5 @@ fn touching_bodies_are_taken_apart() {
     assert!(judged.sound(), "{judged:?}");
     assert_eq!(report["outcome"], "repaired");
     let repairs = report["repairs"].as_array().unwrap();
-    assert!(repairs.iter().any(|repair| repair["name"] == "separated" && repair["count"].as_u64() > Some(0)), "{repairs:?}");
+    assert!(repairs.iter().any(|repair| repair["name"] == "separate" && repair["count"].as_u64() > Some(0)), "{repairs:?}");
 }

@@ -270,7 +270,7 @@ fn report_says_all_it_promises() {
     assert_eq!(ran.report(), report, "what is printed is what is written");
     let text = |field: &str| report.pointer(field).and_then(|v| v.as_str()).unwrap_or_else(|| panic!("{field}")).to_owned();
     let number = |field: &str| report.pointer(field).and_then(|v| v.as_f64()).unwrap_or_else(|| panic!("{field}"));
-    assert_eq!(number("/schema_version"), 1.0);
+    assert_eq!(number("/schema_version"), 2.0);
     assert_eq!(text("/task"), "repair");
     assert_eq!(text("/input/path"), "mixed.stl");
     assert_eq!(text("/output/path"), "out.stl");

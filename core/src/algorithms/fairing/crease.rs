@@ -6,10 +6,11 @@
 
 use glam::DVec3;
 
-use super::region::{Region, Unshaped};
-use super::sheet::{NONE, Sheet, edges, sorted};
+use super::coarse::{CoarsePatch, Unshaped};
+use super::sheet::{Sheet, edges, sorted};
 use crate::algorithms::triangulate::{FillSettings, Rim, triangulate};
 use crate::geometry::exact::Point;
+use crate::util::ids::NONE;
 
 /// Below this cosine between normals, about 40°, an edge is a crease.
 const CREASE: f64 = 0.766;
@@ -105,12 +106,12 @@ fn through(sheet: &Sheet<'_>, lines: &[([u32; 2], bool)]) -> Result<Option<[(u32
 }
 
 /// A coarse patch with an edge between two vertices of the rim: the given one, or, if it is a disc, one made anew of its two parts.
-pub(super) fn with_edge(region: &Region<'_>, sheet: &Sheet<'_>, [a, b]: [u32; 2]) -> Option<Vec<[u32; 3]>> {
+pub(super) fn with_edge(coarse: &CoarsePatch<'_>, sheet: &Sheet<'_>, [a, b]: [u32; 2]) -> Option<Vec<[u32; 3]>> {
     let has_edge = |triangles: &[[u32; 3]]| triangles.iter().flat_map(|t| edges(*t)).any(|e| sorted(e) == sorted([a, b]));
-    if has_edge(region.patch) {
-        return Some(region.patch.to_vec());
+    if has_edge(coarse.patch) {
+        return Some(coarse.patch.to_vec());
     }
-    if has_edge(region.around) {
+    if has_edge(coarse.around) {
         return None;
     }
     let rim = sheet.rim()?;
@@ -121,12 +122,12 @@ pub(super) fn with_edge(region: &Region<'_>, sheet: &Sheet<'_>, [a, b]: [u32; 2]
     };
     let mut patch = Vec::new();
     for part in [turned(i, j), turned(j, i)] {
-        let points: Vec<Point> = part.iter().map(|&v| region.positions[v as usize]).collect();
+        let points: Vec<Point> = part.iter().map(|&v| coarse.positions[v as usize]).collect();
         let apexes: Vec<Option<Point>> = (0..part.len() - 1)
             .map(|k| {
-                let beyond = region.around.iter().find(|t| edges(**t).contains(&[part[k + 1], part[k]]))?;
+                let beyond = coarse.around.iter().find(|t| edges(**t).contains(&[part[k + 1], part[k]]))?;
                 let apex = beyond.iter().find(|&&v| v != part[k] && v != part[k + 1])?;
-                Some(region.positions[*apex as usize])
+                Some(coarse.positions[*apex as usize])
             })
             .collect();
         let forbidden = |x: u32, y: u32| sheet.is_taken(part[x as usize], part[y as usize]);

@@ -6,6 +6,7 @@
 //! usual cotangents it does not depend on how they are triangulated, which makes the result better by one to two orders of magnitude.
 //! The integral's matrix is symmetric and positive definite whatever the triangles are, as its weights are cut off below.
 
+use crate::util::ids::NONE;
 use glam::DVec3;
 
 use super::sheet::Sheet;
@@ -153,7 +154,7 @@ fn curvature(
 ) -> (Rows, Rows) {
     let n = sheet.points.len();
     let wanted = wanted(sheet, all, at);
-    let mut number = vec![NO; n];
+    let mut number = vec![NONE; n];
     let mut areas = Vec::new();
     let mut inner = Rows::default();
     let mut row = Stencil::default();
@@ -178,9 +179,6 @@ fn curvature(
     (inner, differences_of(sheet, all, &number, areas.len() as u32))
 }
 
-/// No row.
-const NO: u32 = u32::MAX;
-
 /// By vertex: its mean curvature H is wanted. Those of new vertices, of the rim, and of one ring beyond.
 fn wanted(sheet: &Sheet<'_>, all: &[[u32; 3]], at: &Lists) -> Vec<bool> {
     let mut wanted = vec![false; sheet.points.len()];
@@ -202,7 +200,7 @@ fn differences_of(sheet: &Sheet<'_>, all: &[[u32; 3]], number: &[u32], rows: u32
     let mut between: Vec<(u32, u32, f64)> = Vec::new();
     for t in all {
         let of = t.map(|v| number[v as usize]);
-        if of.contains(&NO) {
+        if of.contains(&NONE) {
             continue;
         }
         let corners = sheet.corners(*t);

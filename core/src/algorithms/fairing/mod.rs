@@ -8,11 +8,11 @@
 //! work is a count, all arithmetic is + − × ÷ √ in a fixed order: the same bits everywhere.
 
 mod check;
+mod coarse;
 mod crease;
 mod fair;
 mod rbf;
 mod refine;
-mod region;
 mod sheet;
 mod sparse;
 #[cfg(test)]
@@ -22,9 +22,9 @@ use glam::DVec3;
 
 use crate::geometry::exact::{Point, at};
 use crate::geometry::position::Position;
+pub(crate) use coarse::{CoarsePatch, Shaped, Unshaped};
 use fair::{Energy, solve};
 use refine::refine;
-pub(crate) use region::{Region, Shaped, Unshaped};
 use sheet::Sheet;
 pub(crate) use sheet::{edges, sorted};
 
@@ -67,22 +67,22 @@ pub(crate) fn is_edge(turn: f64, length: f64) -> bool {
 ///
 /// # Errors
 /// [`Unshaped`]: the coarse patch is to be used.
-pub(crate) fn shape(region: &Region<'_>, settings: &ShapeSettings) -> Result<Shaped, Unshaped> {
-    if is_fine(region) {
+pub(crate) fn shape(coarse: &CoarsePatch<'_>, settings: &ShapeSettings) -> Result<Shaped, Unshaped> {
+    if is_fine(coarse) {
         return Err(Unshaped::NothingToAdd);
     }
-    let mut sheet = Sheet::new(region).ok_or(Unshaped::NotASurface)?;
+    let mut sheet = Sheet::new(coarse).ok_or(Unshaped::NotASurface)?;
     if refine::is_fine(&sheet) {
         return Err(Unshaped::NothingToAdd);
     }
     let crease::Creases { mut sharp, through } = crease::find(&sheet)?;
-    if !tells_curvature(&sheet, region, &sharp) {
+    if !tells_curvature(&sheet, coarse, &sharp) {
         return Err(Unshaped::Uncurved);
     }
     let divided;
     if let Some(ends) = through {
-        divided = crease::with_edge(region, &sheet, ends.map(|e| e.0)).ok_or(Unshaped::Creased)?;
-        sheet = Sheet::new(&Region { patch: &divided, ..*region }).ok_or(Unshaped::NotASurface)?;
+        divided = crease::with_edge(coarse, &sheet, ends.map(|e| e.0)).ok_or(Unshaped::Creased)?;
+        sheet = Sheet::new(&CoarsePatch { patch: &divided, ..*coarse }).ok_or(Unshaped::NotASurface)?;
     }
     let rim = sheet.on_rim.iter().filter(|on| **on).count() as f64;
     let most = settings.max_vertices.min((50.0 * rim * rim.sqrt()) as usize);
@@ -104,13 +104,13 @@ pub(crate) fn shape(region: &Region<'_>, settings: &ShapeSettings) -> Result<Sha
     }
     if settings.method == Method::Implicit && through.is_none() {
         implicit(&mut sheet)?;
-        return finish(&sheet, region);
+        return finish(&sheet, coarse);
     }
-    let coarse = sheet.points.clone();
+    let unfaired = sheet.points.clone();
     for energy in [Energy::Curvature, Energy::Plate] {
-        sheet.points.clone_from(&coarse);
+        sheet.points.clone_from(&unfaired);
         match fair(&mut sheet, &sharp, energy) {
-            Ok(()) => match finish(&sheet, region) {
+            Ok(()) => match finish(&sheet, coarse) {
                 Err(Unshaped::Crosses) if energy == Energy::Curvature => {}
                 done => return done,
             },
@@ -122,9 +122,9 @@ pub(crate) fn shape(region: &Region<'_>, settings: &ShapeSettings) -> Result<Sha
 }
 
 /// Are at least half of the vertices next to the rim on smooth surface?
-fn tells_curvature(sheet: &Sheet<'_>, region: &Region<'_>, sharp: &[bool]) -> bool {
+fn tells_curvature(sheet: &Sheet<'_>, coarse: &CoarsePatch<'_>, sharp: &[bool]) -> bool {
     let is_on_rim = |v: &u32| sheet.on_rim[*v as usize];
-    let beside = region.around.iter().filter(|t| t.iter().any(is_on_rim)).flatten().filter(|v| !is_on_rim(v));
+    let beside = coarse.around.iter().filter(|t| t.iter().any(is_on_rim)).flatten().filter(|v| !is_on_rim(v));
     let mut next: Vec<u32> = beside.copied().collect();
     next.sort_unstable();
     next.dedup();
@@ -132,15 +132,15 @@ fn tells_curvature(sheet: &Sheet<'_>, region: &Region<'_>, sharp: &[bool]) -> bo
 }
 
 /// Cheap: is no triangle large enough to be divided, whatever the scale?
-fn is_fine(region: &Region<'_>) -> bool {
-    let corners = |t: &[u32; 3]| t.map(|v| at(&region.positions[v as usize]));
-    let least = region
+fn is_fine(coarse: &CoarsePatch<'_>) -> bool {
+    let corners = |t: &[u32; 3]| t.map(|v| at(&coarse.positions[v as usize]));
+    let least = coarse
         .around
         .iter()
         .map(corners)
         .map(|[a, b, c]| a.distance_squared(b).min(b.distance_squared(c)).min(c.distance_squared(a)))
         .fold(f64::INFINITY, f64::min);
-    region.patch.iter().map(corners).all(|t| {
+    coarse.patch.iter().map(corners).all(|t| {
         let centre = (t[0] + t[1] + t[2]) / 3.0;
         t.iter().any(|p| refine::DENSITY * refine::DENSITY * p.distance_squared(centre) <= least)
     })
@@ -195,9 +195,9 @@ fn within(sheet: &Sheet<'_>) -> bool {
     sheet.points[sheet.fixed..].iter().all(|p| p.cmpge(lo - room).all() && p.cmple(hi + room).all())
 }
 
-fn finish(sheet: &Sheet<'_>, region: &Region<'_>) -> Result<Shaped, Unshaped> {
+fn finish(sheet: &Sheet<'_>, coarse: &CoarsePatch<'_>) -> Result<Shaped, Unshaped> {
     let round = |p: &DVec3| Position::nearest(*p * sheet.unit + sheet.centre).coordinates();
     let added: Vec<Point> = sheet.points[sheet.fixed..].iter().map(round).collect();
     let shaped = Shaped { added, triangles: sheet.triangles.clone() };
-    if check::is_valid(region, &shaped) { Ok(shaped) } else { Err(Unshaped::Crosses) }
+    if check::is_valid(coarse, &shaped) { Ok(shaped) } else { Err(Unshaped::Crosses) }
 }

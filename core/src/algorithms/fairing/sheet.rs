@@ -2,26 +2,26 @@
 
 use glam::DVec3;
 
-use super::region::Region;
+use super::coarse::CoarsePatch;
 use crate::algorithms::triangulate::flips::{Edge, Hinge, relink};
 use crate::geometry::exact::at;
 
-pub(super) use crate::algorithms::triangulate::flips::NONE;
+use crate::util::ids::NONE;
 
 /// Flips for each triangle, at most: what is not planar need not settle by itself.
 const FLIPS: usize = 16;
 
-/// A patch within its surroundings. Vertices below `fixed` are the region's and stay where they are.
+/// A patch within its surroundings. Vertices below `fixed` are those of the coarse patch and stay where they are.
 pub(super) struct Sheet<'a> {
     pub(super) points: Vec<DVec3>,
     pub(super) fixed: usize,
-    /// Vertices below this stay, too: those beyond the region's are on creases.
+    /// Vertices below this stay, too: those beyond those of the coarse patch are on creases.
     pub(super) held: usize,
     pub(super) triangles: Vec<[u32; 3]>,
     /// The triangle across the edge from corner k to corner k + 1; [`NONE`] across the rim.
     across: Vec<[u32; 3]>,
     pub(super) around: &'a [[u32; 3]],
-    /// For each of the region's vertices: is it on the rim?
+    /// For each vertex of the coarse patch: is it on the rim?
     pub(super) on_rim: Vec<bool>,
     /// The edge length wanted at each vertex; 0 where nobody asks.
     pub(super) scale: Vec<f64>,
@@ -69,15 +69,15 @@ fn neighbours(triangles: &[[u32; 3]]) -> Option<Vec<[u32; 3]>> {
 
 impl<'a> Sheet<'a> {
     /// `None` where the patch is no coherent 2-manifold with a border. O(n log n).
-    pub(super) fn new(region: &Region<'a>) -> Option<Self> {
-        let across = neighbours(region.patch)?;
-        let mut on_rim = vec![false; region.positions.len()];
+    pub(super) fn new(coarse: &CoarsePatch<'a>) -> Option<Self> {
+        let across = neighbours(coarse.patch)?;
+        let mut on_rim = vec![false; coarse.positions.len()];
         let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for (t, across) in region.patch.iter().zip(&across) {
+        for (t, across) in coarse.patch.iter().zip(&across) {
             for (edge, _) in edges(*t).iter().zip(across).filter(|(_, there)| **there == NONE) {
                 for &v in edge {
                     on_rim[v as usize] = true;
-                    let p = at(&region.positions[v as usize]);
+                    let p = at(&coarse.positions[v as usize]);
                     (lo, hi) = (lo.min(p), hi.max(p));
                 }
             }
@@ -87,15 +87,15 @@ impl<'a> Sheet<'a> {
             return None;
         }
         let between = |e: &[u32; 2]| e.iter().all(|&v| on_rim[v as usize]);
-        let mut taken: Vec<[u32; 2]> = region.around.iter().flat_map(|t| edges(*t)).filter(between).map(sorted).collect();
+        let mut taken: Vec<[u32; 2]> = coarse.around.iter().flat_map(|t| edges(*t)).filter(between).map(sorted).collect();
         taken.sort_unstable();
         let mut sheet = Self {
-            points: region.positions.iter().map(|p| (at(p) - centre) / unit).collect(),
-            fixed: region.positions.len(),
-            held: region.positions.len(),
-            triangles: region.patch.to_vec(),
+            points: coarse.positions.iter().map(|p| (at(p) - centre) / unit).collect(),
+            fixed: coarse.positions.len(),
+            held: coarse.positions.len(),
+            triangles: coarse.patch.to_vec(),
             across,
-            around: region.around,
+            around: coarse.around,
             on_rim,
             scale: Vec::new(),
             taken,

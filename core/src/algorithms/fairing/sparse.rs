@@ -5,9 +5,8 @@
 //! along its longest axis, and what of the one half has neighbours in the other comes last. Sequential, + − × ÷ √ alone: the same
 //! bits everywhere.
 
+use crate::util::ids::NONE;
 use glam::DVec3;
-
-const NONE: u32 = u32::MAX;
 
 /// A sparse matrix by rows.
 #[derive(Clone, Debug, Default)]

@@ -179,7 +179,7 @@ impl Case {
 
     fn shaped(&self, patch: &[[u32; 3]], settings: &ShapeSettings) -> Result<Shaped, Unshaped> {
         let (positions, around, patch) = self.cut(patch);
-        shape(&Region { positions: &positions, patch: &patch, around: &around }, settings)
+        shape(&CoarsePatch { positions: &positions, patch: &patch, around: &around }, settings)
     }
 
     /// As the caller gives it: three rings. Numbers stay.
@@ -376,11 +376,11 @@ fn closed_by_fan(triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
 fn a_lid_and_a_corner_are_not_made_round() {
     let (positions, around) = cube(|p| p.z < 6.0);
     let patch = closed_by_fan(&around);
-    let region = Region { positions: &positions, patch: &patch, around: &around };
+    let region = CoarsePatch { positions: &positions, patch: &patch, around: &around };
     assert_eq!(shape(&region, &ShapeSettings::default()), Err(Unshaped::RimIsEdge));
     let (positions, around) = cube(|p| !(p.x > 4.0 && p.y > 4.0 && p.z > 4.0));
     let patch = closed_by_fan(&around);
-    let region = Region { positions: &positions, patch: &patch, around: &around };
+    let region = CoarsePatch { positions: &positions, patch: &patch, around: &around };
     let refused = shape(&region, &ShapeSettings::default()).unwrap_err();
     assert!(matches!(refused, Unshaped::Creased | Unshaped::RimIsEdge), "{refused}");
 }
@@ -409,7 +409,7 @@ fn a_bound_makes_the_patch_coarser() {
 fn without_any_surroundings_the_patch_is_what_it_was_or_a_membrane() {
     let case = Case::round(Surface::Sphere, 0.4, 0.05, 1.0);
     let patch = case.coarse();
-    let region = Region { positions: &case.positions, patch: &patch, around: &[] };
+    let region = CoarsePatch { positions: &case.positions, patch: &patch, around: &[] };
     if let Ok(shaped) = shape(&region, &ShapeSettings::default()) {
         assert!(shaped.added.iter().all(|p| p[2] > 0.5 && p[2] < 1.1));
     }

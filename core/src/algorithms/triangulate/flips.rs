@@ -2,9 +2,8 @@
 
 use super::rim::Rim;
 use crate::geometry::exact::at;
+use crate::util::ids::NONE;
 use glam::DVec3;
-
-pub(crate) const NONE: u32 = u32::MAX;
 
 /// Flips for each triangle, at most. What is not planar need not settle by itself.
 const WORK: usize = 16;

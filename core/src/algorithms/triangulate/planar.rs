@@ -12,7 +12,7 @@ use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
 use super::flips::Flips;
 use super::rim::Rim;
-use crate::geometry::exact::{Point, at, turn};
+use crate::geometry::exact::{Point, at, orientation_along};
 
 /// A loop's directed area: half of Σ pᵢ × pᵢ₊₁, taken about the first vertex.
 pub(crate) fn directed_area(points: &[Point]) -> DVec3 {
@@ -46,7 +46,7 @@ pub(super) fn triangulate(rim: &Rim<'_>, max_deviation: f64) -> Option<Vec<[u32;
     let forward = area[axis] > 0.0;
     let turns_right_way = |t: [u32; 3]| {
         let [a, b, c] = rim.corners(t);
-        turn(&a, &b, &c, axis) == if forward { 1 } else { -1 }
+        orientation_along(&a, &b, &c, axis) == if forward { 1 } else { -1 }
     };
     let mut mesh = Flips::new(rim, delaunay(rim.points, axis, forward)?);
     if !mesh.triangles().iter().all(|t| turns_right_way(*t)) {

@@ -97,12 +97,12 @@ pub(crate) fn boundary(submesh: &Submesh, edges: &Edges) -> Boundary {
     let mut boundary = Boundary::default();
     // A way that does not close is walked from its first edge.
     let mut is_first = vec![true; rims.len()];
-    next.iter().filter(|n| **n != crate::util::union_find::NONE).for_each(|n| is_first[*n as usize] = false);
+    next.iter().filter(|n| **n != crate::util::ids::NONE).for_each(|n| is_first[*n as usize] = false);
     let firsts = (0..rims.len()).filter(|r| is_first[*r]);
     for start in firsts.chain(0..rims.len()) {
         let mut way: Vec<usize> = Vec::new();
         let mut at = start as u32;
-        while at != crate::util::union_find::NONE && !seen[at as usize] {
+        while at != crate::util::ids::NONE && !seen[at as usize] {
             seen[at as usize] = true;
             way.push(at as usize);
             at = next[at as usize];
@@ -139,7 +139,7 @@ fn unpaired(submesh: &Submesh, edge: &Edge<'_>) -> Option<Use> {
             let ends = [edge.low, edge.high];
             let apex = submesh.triangles[used.triangle as usize].v.into_iter().find(|v| !ends.contains(v)).unwrap_or(edge.low);
             let out = submesh.place(apex) - submesh.place(edge.low);
-            (turn(out.dot(u), out.dot(w)), *used)
+            (diamond_angle(out.dot(u), out.dot(w)), *used)
         })
         .collect();
     around.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.triangle.cmp(&b.1.triangle)));
@@ -165,7 +165,7 @@ fn unpaired(submesh: &Submesh, edge: &Edge<'_>) -> Option<Use> {
 }
 
 /// Grows with the angle of a direction, from 0 to 4 in one turn.
-fn turn(x: f64, y: f64) -> f64 {
+fn diamond_angle(x: f64, y: f64) -> f64 {
     let size = x.abs() + y.abs();
     if size == 0.0 {
         return 0.0;
@@ -181,7 +181,7 @@ fn turn(x: f64, y: f64) -> f64 {
 
 /// The edge after each edge. Boundary edges go on among themselves where as many run into a vertex as out of it.
 fn link(submesh: &Submesh, edges: &Edges, rims: &[Rim]) -> Vec<u32> {
-    let mut next = vec![crate::util::union_find::NONE; rims.len()];
+    let mut next = vec![crate::util::ids::NONE; rims.len()];
     let mut incoming: Vec<u32> = (0..rims.len() as u32).collect();
     incoming.sort_unstable_by_key(|r| (rims[*r as usize].to, *r));
     for group in incoming.chunk_by(|a, b| rims[*a as usize].to == rims[*b as usize].to) {
@@ -221,9 +221,7 @@ fn across(submesh: &Submesh, edges: &Edges, rims: &[Rim], v: Vertex, incoming: &
         return incoming.iter().copied().zip(outgoing.iter().copied()).collect();
     }
     let fans = fans(submesh, edges, v);
-    let fan = |rim: u32| {
-        fans.iter().find(|(t, _)| *t == rims[rim as usize].triangle).map_or(crate::util::union_find::NONE, |(_, f)| *f)
-    };
+    let fan = |rim: u32| fans.iter().find(|(t, _)| *t == rims[rim as usize].triangle).map_or(crate::util::ids::NONE, |(_, f)| *f);
     let mut pairs: Vec<(bool, f64, u32, u32)> = Vec::new();
     for i in incoming {
         for o in outgoing {

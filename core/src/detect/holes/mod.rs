@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use crate::contract::report::{BoundaryLoop, BoundaryLoops, LoopClass};
+use crate::contract::report::{BoundaryLoop, BoundaryLoops, LoopClass, MOST_LISTED};
 use crate::submesh::edges::Edges;
 use crate::submesh::near::Tolerance;
 use crate::submesh::{Submesh, Vertex};
@@ -43,16 +43,13 @@ const LENGTH: f64 = 2.0;
 /// A loop is flat if it rises so little above its plane, measured by the plane's smaller extent.
 const FLAT: f64 = 0.05;
 
-/// Loops that are listed in a report.
-const LISTED: usize = 1000;
-
 /// The loops of a submesh for the report.
 pub(crate) fn report(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance, gap_share: f64) -> BoundaryLoops {
     let loops = loops::find(submesh, edges);
     let mut all = BoundaryLoops::default();
     for found in classify(submesh, edges, &loops, tolerance, gap_share) {
         *all.classes.entry(found.class).or_default() += 1;
-        if all.listed.len() < LISTED {
+        if all.listed.len() < MOST_LISTED {
             all.listed.push(found);
         }
     }

@@ -13,27 +13,27 @@ use crate::repairs::shared::work::Work;
 use crate::submesh::Submesh;
 use crate::submesh::components::Reversed;
 use crate::topology::survey::Survey;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// The cells of space in front of and behind everything closed.
 ///
-/// Nodes: those of the arrangement, then two for each patch, then two for each triangle of the submesh, front and back.
-pub(crate) struct Sides {
+/// Nodes: those of the arrangement, then two for each region, then two for each triangle of the submesh, front and back.
+pub(crate) struct SpaceCells {
     parents: Vec<u32>,
     cells: u32,
-    pub(crate) patches: u32,
+    pub(crate) regions: u32,
     /// Front, back, and by how much the winding number is larger there.
     steps: Vec<(u32, u32, i32)>,
 }
 
-impl Sides {
+impl SpaceCells {
     pub(crate) fn of(survey: &Survey<'_>, work: &mut Work<'_>, cut: &Cut, clusters: &Clusters) -> Self {
         let (submesh, edges) = work.edges();
-        let (cells, patches) = (cut.arrangement.cells, survey.patches.len() as u32);
-        let nodes = cells + 2 * patches + 2 * submesh.triangles.len() as u32;
-        let mut sides = Self { parents: (0..nodes).collect(), cells, patches, steps: Vec::new() };
-        for p in (0..patches).filter(|p| clusters.holds_patch(*p)) {
-            let [front, back] = sides.of_patch(p);
+        let (cells, regions) = (cut.arrangement.cells, survey.regions.len() as u32);
+        let nodes = cells + 2 * regions + 2 * submesh.triangles.len() as u32;
+        let mut sides = Self { parents: (0..nodes).collect(), cells, regions, steps: Vec::new() };
+        for p in (0..regions).filter(|p| clusters.holds_region(*p)) {
+            let [front, back] = sides.of_region(p);
             sides.steps.push((front, back, 1));
         }
         let source_of = |t: u32| cut.sources.binary_search(&t).ok();
@@ -45,13 +45,13 @@ impl Sides {
                 sides.steps.push((own[0], own[1], 1));
             }
             // A regular corner's star was not cut.
-            if triangle.patch == NONE || triangle.v.iter().all(|v| submesh.complete[*v as usize]) {
+            if triangle.region == NONE || triangle.v.iter().all(|v| submesh.complete[*v as usize]) {
                 continue;
             }
-            let patch = sides.of_patch(triangle.patch);
+            let region = sides.of_region(triangle.region);
             match source {
-                None => sides.join(own, patch),
-                Some(s) => cut.pieces(s).iter().for_each(|piece| sides.join(piece.cells, patch)),
+                None => sides.join(own, region),
+                Some(s) => cut.pieces(s).iter().for_each(|piece| sides.join(piece.cells, region)),
             }
         }
         for piece in &cut.arrangement.pieces {
@@ -85,12 +85,12 @@ impl Sides {
         sides
     }
 
-    pub(crate) fn of_patch(&self, patch: u32) -> [u32; 2] {
-        [self.cells + 2 * patch, self.cells + 2 * patch + 1]
+    pub(crate) fn of_region(&self, region: u32) -> [u32; 2] {
+        [self.cells + 2 * region, self.cells + 2 * region + 1]
     }
 
     pub(crate) fn of_triangle(&self, t: u32) -> [u32; 2] {
-        let first = self.cells + 2 * self.patches + 2 * t;
+        let first = self.cells + 2 * self.regions + 2 * t;
         [first, first + 1]
     }
 
@@ -213,7 +213,7 @@ struct CutSurfaces {
 }
 
 impl CutSurfaces {
-    fn of(sides: &Sides, cut: &Cut) -> Self {
+    fn of(sides: &SpaceCells, cut: &Cut) -> Self {
         let mut parents = sides.parents.clone();
         let roots: Vec<u32> = (0..parents.len() as u32).map(|node| union_find::find(&mut parents, node)).collect();
         let mut steps: Vec<(u32, u32, i32)> = Vec::with_capacity(2 * sides.steps.len());

@@ -1,15 +1,15 @@
 //! Pieces of surface that cross each other are solved together.
 
 use crate::submesh::components::Components;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 use std::collections::BTreeSet;
 
 /// Which triangles are of surfaces that take part: closed before anything was cut, and not blocked.
 #[derive(Default)]
 pub(crate) struct Clusters {
-    /// By triangle of the submesh and by patch, the piece of surface that it was part of, or [`NONE`].
+    /// By triangle of the submesh and by region, the piece of surface that it was part of, or [`NONE`].
     pub(crate) of_triangle: Vec<u32>,
-    pub(crate) of_patch: Vec<u32>,
+    pub(crate) of_region: Vec<u32>,
     pub(crate) takes_part: Vec<bool>,
     /// Pieces that cross each other are united.
     pub(crate) parents: Vec<u32>,
@@ -19,7 +19,7 @@ impl Clusters {
     pub(crate) fn of(pieces: &Components, blocked: &[bool]) -> Self {
         Self {
             of_triangle: pieces.of_triangle.clone(),
-            of_patch: pieces.of_patch.clone(),
+            of_region: pieces.of_region.clone(),
             takes_part: pieces.list.iter().zip(blocked).map(|(piece, blocked)| !piece.open && !blocked).collect(),
             parents: (0..pieces.list.len() as u32).collect(),
         }
@@ -33,8 +33,8 @@ impl Clusters {
         self.takes_part(self.of_triangle[triangle as usize])
     }
 
-    pub(crate) fn holds_patch(&self, patch: u32) -> bool {
-        self.takes_part(self.of_patch[patch as usize])
+    pub(crate) fn holds_region(&self, region: u32) -> bool {
+        self.takes_part(self.of_region[region as usize])
     }
 
     /// All pieces that cross those of some triangles, and these, as far as they take part; ascending.

@@ -9,13 +9,13 @@
 //! Only crumbs go. A surface that cutting did not make stays, however small, and so does one with a triangle of a body that was as small
 //! before it was cut: that is a body of the file.
 
-use crate::contract::report::{Region, Rung};
+use crate::contract::report::{Region, RegionMethod};
 use crate::repairs::boolean::state::State;
 use crate::repairs::shared::pieces;
 use crate::repairs::shared::pieces::take_away;
 use crate::submesh::Origin;
 use crate::submesh::components::Components;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// Two to this power is how many times dust would have to be there to be all of the result.
 const SHARE: u32 = 40;
@@ -40,15 +40,15 @@ impl State<'_, '_, '_> {
             goes[piece] &= whole.is_some_and(|whole| !is_dust(whole.extent.volume, all));
         }
         // Regular surface that was not cut is the file's.
-        for piece in pieces.of_patch.iter().filter(|piece| **piece != NONE) {
+        for piece in pieces.of_region.iter().filter(|piece| **piece != NONE) {
             goes[*piece as usize] = false;
         }
         goes.iter_mut().zip(is_cut).for_each(|(goes, is_cut)| *goes &= is_cut);
         let dust = pieces.list.iter().zip(&goes).filter(|(_, goes)| **goes);
         let regions = dust.map(|(piece, _)| {
             let bounds = piece.bounds.normalised();
-            let (rung, bounds, count) = (Rung::Dropped, [bounds.lo, bounds.hi], piece.triangles);
-            Region { rung, bounds, count, rounds: 0, moved: 0.0, reason: None }
+            let (method, bounds, count) = (RegionMethod::Dropped, [bounds.lo, bounds.hi], piece.triangles);
+            Region { method, bounds, count, rounds: 0, moved: 0.0, reason: None }
         });
         let regions = regions.collect();
         if goes.contains(&true) {

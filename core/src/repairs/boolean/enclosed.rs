@@ -9,37 +9,37 @@
 //! does it swallow anything (a vessel whose mouth was closed would swallow what stands in it), and nothing is removed where an open piece
 //! might be the wall of a cavity. A sheet in the material of a body stays: it may be the floor of a hole whose walls lack.
 
-use crate::contract::report::{Region, Rung};
+use crate::contract::report::RepairName;
+use crate::contract::report::{Region, RegionMethod};
 use crate::contract::settings::{Bodies, Profile};
 use crate::detect::bodies;
-use crate::detect::verdict::Swallowed;
+use crate::detect::review::Enclosed;
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::sums::Bounds;
 use crate::io::record;
-use crate::repairs::shared::account::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::pieces::{crossing, lies_in_material, take_away};
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed};
 use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// Bodies in the material of others.
 pub(crate) const REPAIR: Repair = Repair {
-    name: RepairName::Swallowed,
+    name: RepairName::Enclosed,
     changes: Changes::Pieces,
     run: |cx| {
         if cx.profile.bodies != Bodies::Union {
             return Ok(Done::count(0, ""));
         }
         let pieces = cx.pieces();
-        let mut swallowed = remove(cx.survey, &mut cx.work, &mut cx.reversed, &pieces, cx.profile);
-        let Swallowed { bodies, volume, .. } = swallowed;
+        let mut enclosed = remove(cx.survey, &mut cx.work, &mut cx.reversed, &pieces, cx.profile);
+        let Enclosed { bodies, volume, .. } = enclosed;
         // Cavities that went are no bodies.
-        let changed = !swallowed.regions.is_empty();
-        cx.account.regions.append(&mut swallowed.regions);
-        cx.account.swallow(bodies, volume);
+        let changed = !enclosed.regions.is_empty();
+        cx.account.regions.append(&mut enclosed.regions);
+        cx.account.enclose(bodies, volume);
         let note = format!("bodies in the material of others removed: {bodies}, of {volume:.4} units³ together");
         Ok(Done { changed, ..Done::count(bodies, note) })
     },
@@ -54,22 +54,22 @@ pub(crate) fn remove(
     reversed: &mut Reversed,
     pieces: &Components,
     profile: &Profile,
-) -> Swallowed {
-    let mut swallowed = Swallowed::default();
+) -> Enclosed {
+    let mut enclosed = Enclosed::default();
     let Some(crossing_pairs) = survey.crossing_pairs.as_deref().filter(|_| profile.bodies == Bodies::Union) else {
-        return swallowed;
+        return enclosed;
     };
     let submesh: &Submesh = work;
     let around = bodies::surroundings(survey, submesh, pieces, reversed, |piece| !piece.open);
     if around.iter().all(|a| a.winding() < 1) {
-        return swallowed;
+        return enclosed;
     }
     let crossing = crossing(survey, submesh, pieces, crossing_pairs.iter().map(|pair| pair.triangles));
     let is_as_read = are_as_read(survey, submesh, pieces, reversed);
     let open: Vec<Bounds> = pieces.list.iter().filter(|piece| piece.open).map(|piece| piece.bounds).collect();
     let open = BoxTree::new(&open);
     let mut met = Vec::new();
-    let is_swallowed: Vec<bool> = (0..pieces.list.len())
+    let is_enclosed: Vec<bool> = (0..pieces.list.len())
         .map(|i| {
             let (piece, around) = (&pieces.list[i], &around[i]);
             open.meeting(&piece.bounds, &mut met);
@@ -80,24 +80,24 @@ pub(crate) fn remove(
                 && around.around.iter().all(|(outer, _)| is_as_read[*outer as usize])
         })
         .collect();
-    for (piece, _) in pieces.list.iter().zip(&is_swallowed).filter(|(_, gone)| **gone) {
-        swallowed.bodies += u64::from(piece.extent.volume > 0);
-        swallowed.volume += survey.measure.volume(piece.extent);
+    for (piece, _) in pieces.list.iter().zip(&is_enclosed).filter(|(_, gone)| **gone) {
+        enclosed.bodies += u64::from(piece.extent.volume > 0);
+        enclosed.volume += survey.measure.volume(piece.extent);
         let Bounds { lo, hi } = piece.bounds.normalised();
-        let (rung, bounds, count) = (Rung::Dropped, [lo, hi], piece.triangles);
-        swallowed.regions.push(Region { rung, bounds, count, rounds: 0, moved: 0.0, reason: None });
+        let (method, bounds, count) = (RegionMethod::Dropped, [lo, hi], piece.triangles);
+        enclosed.regions.push(Region { method, bounds, count, rounds: 0, moved: 0.0, reason: None });
     }
-    if !is_swallowed.contains(&true) {
-        return swallowed;
+    if !is_enclosed.contains(&true) {
+        return enclosed;
     }
-    take_away(work, reversed, pieces, &is_swallowed);
-    swallowed
+    take_away(work, reversed, pieces, &is_enclosed);
+    enclosed
 }
 
 /// Which pieces hold nothing but triangles of the file, the way round that they have there.
 fn are_as_read(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components, reversed: &Reversed) -> Vec<bool> {
     let mut as_read = vec![true; pieces.list.len()];
-    let turned = pieces.of_patch.iter().zip(&reversed.patches).filter(|(piece, turned)| **turned && **piece != NONE);
+    let turned = pieces.of_region.iter().zip(&reversed.regions).filter(|(piece, turned)| **turned && **piece != NONE);
     turned.for_each(|(piece, _)| as_read[*piece as usize] = false);
     for t in submesh.living() {
         let is_as_read = match submesh.triangles[t as usize].origin {
@@ -106,7 +106,7 @@ fn are_as_read(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components, reve
                 record::corners(&survey.records[record as usize]) != [a, c, b]
             }
             Origin::Part(_) => true,
-            Origin::Patch => false,
+            Origin::Added => false,
         };
         let piece = pieces.of_triangle[t as usize];
         if !is_as_read && piece != NONE {
@@ -137,7 +137,7 @@ mod tests {
             let pieces = pieces::pieces(&d.survey, work, turned);
             directions::make_outward(&d.survey, work, turned, &pieces);
             let pieces = pieces::pieces(&d.survey, work, turned);
-            let Swallowed { bodies, volume, .. } = remove(&d.survey, work, turned, &pieces, &profile);
+            let Enclosed { bodies, volume, .. } = remove(&d.survey, work, turned, &pieces, &profile);
             (bodies, volume)
         })
     }
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_repair_has_closed_or_turned_swallows_nothing_and_is_not_swallowed() {
+    fn what_a_repair_has_closed_or_turned_encloses_nothing_and_is_not_enclosed() {
         let inside = || shifted(&nested(0.5), [1.0, 1.0, 1.0]);
         // A tray without its top.
         let mut tray = nested(4.0);
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn a_body_that_sticks_out_is_not_swallowed() {
+    fn a_body_that_sticks_out_is_not_enclosed() {
         let needle = cuboid([-0.1, -0.1, -1.0], [0.1, 0.1, 5.0]);
         assert_eq!(removed(&[nested(4.0), needle].concat(), Bodies::Union).result.0, 0);
         // Its box lies in the other's, which it crosses: a corner of the slanted half of a cube.

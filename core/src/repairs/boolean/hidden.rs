@@ -15,16 +15,16 @@
 //! the jaws of another. What lies in the material of others, or in a closed piece, was to go; a body that lies in none, and a sheet,
 //! may have been meant to stay, and a person is asked (`verdict`). Nothing that crosses anything goes.
 
-use crate::repairs::shared::account::RepairName;
+use crate::contract::report::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use robust::Coord;
 
-use crate::contract::report::{LoopLeft, SheetDropped};
+use crate::contract::report::{LoopLeft, MOST_LISTED, SheetDropped};
 use crate::contract::settings::{Bodies, Profile};
 use crate::detect::bodies::{self, Direction, Source};
-use crate::detect::verdict::Swallowed;
+use crate::detect::review::Enclosed;
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::position::Position;
 use crate::geometry::sums::Bounds;
@@ -46,13 +46,10 @@ pub(crate) const REPAIR: Repair = Repair {
         let pieces = cx.pieces();
         let mut hidden = remove(cx.survey, &mut cx.work, &mut cx.reversed, &pieces, &mut cx.account.loops_left, cx.profile);
         cx.account.sheets.append(&mut hidden.sheets);
-        cx.account.swallow(hidden.expected.bodies, hidden.expected.volume);
+        cx.account.enclose(hidden.expected.bodies, hidden.expected.volume);
         Ok(Done::count(hidden.pieces, hidden.to_string()))
     },
 };
-
-/// Sheets in the report, at most: the largest.
-const LISTED: usize = 1000;
 
 /// The paper's order: Z, X, Y, −Z, −X, −Y.
 const DIRECTIONS: [Direction; 6] = [
@@ -76,7 +73,7 @@ pub(crate) struct Hidden {
     pub(crate) cavities: u64,
     pub(crate) filled: f64,
     /// What may go without a person's look: bodies inside of closed pieces, and the volume that counted more than once.
-    pub(crate) expected: Swallowed,
+    pub(crate) expected: Enclosed,
     /// Open pieces, the largest first.
     pub(crate) sheets: Vec<SheetDropped>,
 }
@@ -135,7 +132,7 @@ pub(crate) fn remove(
     }
     // Stable: of equal ones the first in the file.
     hidden.sheets.sort_by(|a, b| b.area.total_cmp(&a.area));
-    hidden.sheets.truncate(LISTED);
+    hidden.sheets.truncate(MOST_LISTED);
     crate::repairs::shared::pieces::take_away(work, reversed, pieces, &is_hidden);
     let there: HashSet<Position> = work.living().flat_map(|t| work.points(t)).map(Position::of).collect();
     left.retain(|rim| there.contains(&Position::of(rim.at)));
@@ -173,7 +170,7 @@ fn hidden_pieces(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components) ->
         };
         is_hidden[source.component as usize] = !DIRECTIONS.iter().any(is_seen);
     }
-    let is_of_the_file = |t: u32| submesh.triangles[t as usize].origin != Origin::Patch;
+    let is_of_the_file = |t: u32| submesh.triangles[t as usize].origin != Origin::Added;
     for direction in DIRECTIONS {
         let asked = sources().filter(|(corners, s)| is_hidden[s.component as usize] && !stands_along(corners, direction));
         let asked: Vec<Source> = asked.map(|(_, source)| source).collect();
@@ -243,17 +240,17 @@ impl Largest {
 fn largest_triangles(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components, asked: &[bool]) -> BTreeMap<u32, Largest> {
     let is_asked = |piece: u32| asked.get(piece as usize) == Some(&true);
     let found = survey.visit_regular(
-        |patch| is_asked(pieces.of_patch[patch as usize]),
+        |region| is_asked(pieces.of_region[region as usize]),
         |_| Some(HashMap::<u32, Largest>::new()),
         |_, _| true,
-        |found, triangle, patch| {
+        |found, triangle, region| {
             let this = Largest::of(&record::corners(&survey.records[triangle as usize]), triangle, None);
-            found.entry(pieces.of_patch[patch as usize]).and_modify(|known| *known = known.or(this)).or_insert(this);
+            found.entry(pieces.of_region[region as usize]).and_modify(|known| *known = known.or(this)).or_insert(this);
         },
     );
     let in_submesh = submesh.living().filter_map(|t| {
         let piece = pieces.of_triangle[t as usize];
-        let is_of_the_file = submesh.triangles[t as usize].origin != Origin::Patch;
+        let is_of_the_file = submesh.triangles[t as usize].origin != Origin::Added;
         (is_of_the_file && is_asked(piece)).then(|| (piece, Largest::of(&submesh.points(t), submesh.record(t), Some(t))))
     });
     let mut largest: BTreeMap<u32, Largest> = BTreeMap::new();

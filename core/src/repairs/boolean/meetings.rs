@@ -2,7 +2,7 @@
 
 use crate::geometry::boxes;
 use crate::geometry::sums::Bounds;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 use std::collections::BTreeMap;
 
 /// Two triangles that cross a third one, where boxes around the cuts meet, of all triangles together: so many points may the cuts have in common, at

@@ -19,7 +19,7 @@ use crate::repairs::boolean::clusters::Clusters;
 use crate::repairs::boolean::state::{Met, State, Tried};
 use crate::submesh::Vertex;
 use crate::submesh::components::{Components, Through};
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// By how many steps of new vertices bodies are spread at first, and the next time.
 const STEPS: [f64; 2] = [8.0, 64.0];
@@ -30,8 +30,8 @@ pub(crate) enum Level {
     /// They are left where they are, and given up as soon as the first cut leaves no fewer pairs that cross.
     #[default]
     Impatient,
-    Spread,
-    FartherSpread,
+    Perturbed,
+    PerturbedMore,
     /// They are left where they are, and not given up before it is hopeless.
     Patient,
 }
@@ -39,9 +39,9 @@ pub(crate) enum Level {
 impl Level {
     pub(crate) fn next(self) -> Option<Self> {
         match self {
-            Self::Impatient => Some(Self::Spread),
-            Self::Spread => Some(Self::FartherSpread),
-            Self::FartherSpread => Some(Self::Patient),
+            Self::Impatient => Some(Self::Perturbed),
+            Self::Perturbed => Some(Self::PerturbedMore),
+            Self::PerturbedMore => Some(Self::Patient),
             Self::Patient => None,
         }
     }
@@ -49,8 +49,8 @@ impl Level {
     fn steps(self) -> Option<f64> {
         match self {
             Self::Impatient | Self::Patient => None,
-            Self::Spread => Some(STEPS[0]),
-            Self::FartherSpread => Some(STEPS[1]),
+            Self::Perturbed => Some(STEPS[0]),
+            Self::PerturbedMore => Some(STEPS[1]),
         }
     }
 }
@@ -58,20 +58,21 @@ impl Level {
 impl State<'_, '_, '_> {
     /// Spreads the sheets of these pairs whose pieces are to be. Returns what crosses then, and how far anything was moved; `None` if nothing
     /// was. O(pairs + submesh).
-    pub(crate) fn spread(&mut self, crossing: &[[u32; 2]], levels: &[Level], profile: &Profile) -> Tried<Option<(Met, f64)>> {
+    pub(crate) fn perturb(&mut self, crossing: &[[u32; 2]], levels: &[Level], profile: &Profile) -> Tried<Option<(Met, f64)>> {
         let steps =
             |clusters: &Clusters, t: u32| levels.get(clusters.of_triangle[t as usize] as usize).and_then(|level| level.steps());
-        let spread: BTreeSet<u32> = crossing.iter().flatten().copied().filter(|t| steps(&self.clusters, *t).is_some()).collect();
-        if spread.is_empty() {
+        let perturbed: BTreeSet<u32> =
+            crossing.iter().flatten().copied().filter(|t| steps(&self.clusters, *t).is_some()).collect();
+        if perturbed.is_empty() {
             return Ok(None);
         }
-        self.complete(spread.iter().flat_map(|t| self.work.points(*t)).collect());
+        self.complete(perturbed.iter().flat_map(|t| self.work.points(*t)).collect());
         let (submesh, edges) = self.work.edges();
         let sheets = Components::of(self.survey, submesh, edges, self.reversed, Through::ManifoldEdges).of_triangle;
         let ranks = ranks(crossing, &sheets);
         // By vertex and piece: where it goes.
         let mut places: BTreeMap<(Vertex, u32), Position> = BTreeMap::new();
-        for t in spread {
+        for t in perturbed {
             let (piece, sheet) = (self.clusters.of_triangle[t as usize], sheets[t as usize]);
             let by = f64::from(ranks.get(&sheet).copied().unwrap_or(0)) * steps(&self.clusters, t).unwrap_or(0.0) * self.step;
             for v in self.work.triangles[t as usize].v {
@@ -91,7 +92,7 @@ impl State<'_, '_, '_> {
             if new != v {
                 let by = self.work.distance(v, new);
                 farthest = farthest.max(by);
-                self.track.spread(piece, by);
+                self.track.perturb(piece, by);
                 moved.insert((v, piece), new);
             }
         }
@@ -110,7 +111,7 @@ impl State<'_, '_, '_> {
         self.clean(&(first_new..self.work.triangles.len() as u32).collect::<Vec<_>>());
         let met = self.met(crossing.to_vec(), profile, |t| t >= first_new)?;
         self.unite(&met.crossing);
-        tracing::debug!(pairs = met.crossing.len(), farthest, "Spread.");
+        tracing::debug!(pairs = met.crossing.len(), farthest, "Perturbed.");
         Ok(Some((met, farthest)))
     }
 }

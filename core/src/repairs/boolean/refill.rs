@@ -17,7 +17,7 @@ use crate::repairs::boolean::passes::Passes;
 use crate::repairs::boolean::snap::nearest;
 use crate::repairs::boolean::state::{Met, State, Tried};
 use crate::submesh::{Origin, Submesh, Vertex};
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// Rings of triangles around those that cross that are taken out with them, at most.
 const RINGS: usize = 3;
@@ -51,7 +51,7 @@ impl State<'_, '_, '_> {
                 refilled.extend(triangles.iter().map(|t| (*t, moved)));
                 triangles.iter().for_each(|t| self.work.kill(*t));
                 for v in patches {
-                    self.work.add(v, Origin::Patch, NONE);
+                    self.work.add(v, Origin::Added, NONE);
                     self.clusters.of_triangle.push(piece);
                 }
             }

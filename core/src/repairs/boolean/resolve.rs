@@ -1,10 +1,10 @@
 //! Crossings: bodies that cross each other, or themselves, become one.
 //!
 //! The triangles that cross something, and their neighbours, are cut along everything they meet (`cut`, [`crate::geometry::arrange`]). Cells of space in
-//! front of and behind their pieces, the other triangles of the submesh and the patches of regular surface are one where these join
+//! front of and behind their pieces, the other triangles of the submesh and the regions of regular surface are one where these join
 //! (`sides`); behind each of them the winding number is larger by one than in front. One exact winding number a connected surface (`bodies`)
 //! makes all of them known. Material is where the winding number is positive (Jacobson et al. 2013; Zhou et al. 2016): what has it on one
-//! side only stays, so that a body inside out comes right and what lies inside of another one goes, whole patches as bits of the edit (`embed`).
+//! side only stays, so that a body inside out comes right and what lies inside of another one goes, whole regions as bits of the edit (`embed`).
 //!
 //! Where the surface was cut, new vertices are rounded to f32. Triangles that come to nothing by that leave every directed edge balanced, and
 //! what crosses after it is resolved in the next round, with what it crosses, from the f32 coordinates. (Near zero f32 has places far closer to
@@ -20,9 +20,9 @@
 #[cfg(test)]
 mod tests;
 
+use crate::contract::report::RepairName;
 use crate::geometry::arrange::Rational;
 use crate::repairs::holes::fill;
-use crate::repairs::shared::account::RepairName;
 use crate::repairs::shared::context::{Changes, Context, Done, Repair};
 use crate::repairs::shared::pieces;
 use std::path::Path;
@@ -40,15 +40,15 @@ use crate::repairs::boolean::state::{Before, FINEST, Failure, Halted, State, Stu
 pub(crate) use crate::repairs::boolean::state::{Resolved, join_in};
 use crate::repairs::boolean::track::Track;
 use crate::repairs::shared::overlay::Overlay;
-use crate::repairs::shared::regions::Unsettled;
+use crate::repairs::shared::region_report::Unsettled;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Component, Components, Reversed};
 use crate::submesh::{Origin, Vertex};
 use crate::topology::survey::{Division, Survey};
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// Surfaces that cross each other, and the patches that were to be cut.
-pub(crate) const REPAIR: Repair = Repair { name: RepairName::Resolve, changes: Changes::Surface, run: account_for };
+pub(crate) const REPAIR: Repair = Repair { name: RepairName::SelfIntersection, changes: Changes::Surface, run: account_for };
 
 fn account_for(cx: &mut Context<'_, '_>) -> Result<Done> {
     cx.handed.may_cross = !cx.profile.resolve_crossings;
@@ -65,11 +65,11 @@ fn account_for(cx: &mut Context<'_, '_>) -> Result<Done> {
     cx.account.loops_left.extend(open);
     cx.account.regions.append(&mut resolved.regions);
     cx.account.regions.append(&mut resolved.dust);
-    cx.account.swallow(resolved.bodies, resolved.volume);
+    cx.account.enclose(resolved.bodies, resolved.volume);
     cx.handed.unsettled.append(&mut resolved.regions_left);
     cx.handed.may_cross |= !resolved.left.is_empty();
     let left = resolved.left.iter().map(|(failure, pieces)| format!("of {pieces} pieces of surface: {failure}"));
-    cx.handed.crossings_left.extend(left);
+    cx.handed.intersections_left.extend(left);
     let Resolved { pairs, rounds, displaced, bodies, volume, .. } = resolved;
     let note = format!(
         "pairs of triangles that crossed; rounds: {rounds}, vertices moved by at most {displaced:e}, bodies that became part of others: \
@@ -222,8 +222,8 @@ fn divide(
         join_in(work, reversed, t);
     }
     work.follow_division(survey);
-    let of = |all: &[bool]| divided_from.iter().map(|patch| all.get(*patch as usize) == Some(&true)).collect();
-    *reversed = Reversed { patches: of(&reversed.patches), dropped: of(&reversed.dropped) };
+    let of = |all: &[bool]| divided_from.iter().map(|region| all.get(*region as usize) == Some(&true)).collect();
+    *reversed = Reversed { regions: of(&reversed.regions), dropped: of(&reversed.dropped) };
     Ok(())
 }
 
@@ -256,7 +256,7 @@ impl State<'_, '_, '_> {
             is_cut[piece] |= !as_read && t >= self.first_triangle;
             is_speck[piece] &= !as_read;
         }
-        for piece in pieces.of_patch.iter().filter(|piece| **piece != NONE) {
+        for piece in pieces.of_region.iter().filter(|piece| **piece != NONE) {
             (is_flake[*piece as usize], is_speck[*piece as usize]) = (false, false);
         }
         let goes = |t: u32| {

@@ -5,13 +5,13 @@ use std::collections::BTreeSet;
 use crate::contract::settings::{Limits, Profile};
 use crate::geometry::arrange::Arrange;
 use crate::geometry::sums::Bounds;
-use crate::repairs::boolean::cells::Sides;
+use crate::repairs::boolean::cells::SpaceCells;
 use crate::repairs::boolean::cut::Cut;
 use crate::repairs::boolean::meetings::meetings;
 use crate::repairs::boolean::perturb::Level;
 use crate::repairs::boolean::state::{FINEST, Failure, Halted, Met, Resolved, State, Stuck, Tried, WIDER};
 use crate::repairs::boolean::track::Track;
-use crate::repairs::shared::overlay::Overlay;
+use crate::repairs::shared::overlay::{Overlay, Standing};
 use crate::stream::budget;
 
 /// Rounds of cutting and rounding.
@@ -43,7 +43,7 @@ pub(crate) struct Attempt<'a> {
     pub(crate) engine: &'a dyn Arrange,
     pub(crate) overlay: &'a Overlay,
     /// All that crosses, as the overlay numbers triangles.
-    pub(crate) pairs: &'a [[u32; 2]],
+    pub(crate) pairs: &'a [[Standing; 2]],
     /// By piece.
     pub(crate) levels: &'a [Level],
     pub(crate) profile: &'a Profile,
@@ -66,7 +66,7 @@ impl State<'_, '_, '_> {
         resolved.pairs = crossing.len() as u64;
         let most = crossing.len().max(FEW) * GROWTH;
         let mut latest: Option<Overlay> = None;
-        if let Some((met, moved)) = self.spread(&crossing, by.levels, by.profile)? {
+        if let Some((met, moved)) = self.perturb(&crossing, by.levels, by.profile)? {
             resolved.displaced = moved;
             (crossing, latest) = (met.crossing, Some(met.overlay));
         }
@@ -158,7 +158,7 @@ impl State<'_, '_, '_> {
         let clusters = &self.clusters;
         let cut = Cut::of(engine, self.work, along, |t| clusters.holds(t), threads);
         let cut = cut.ok_or_else(|| Stuck::with(Failure::NotArranged))?;
-        let sides = Sides::of(self.survey, self.work, &cut, &self.clusters);
+        let sides = SpaceCells::of(self.survey, self.work, &cut, &self.clusters);
         let windings = sides.windings(self.survey, self.work, self.reversed, &cut, crossing, &self.clusters);
         self.apply(&cut, &sides, &windings)
     }

@@ -6,15 +6,15 @@ use glam::DVec3;
 
 use crate::detect::defects;
 use crate::geometry::position::Position;
-use crate::repairs::boolean::cells::Sides;
+use crate::repairs::boolean::cells::SpaceCells;
 use crate::repairs::boolean::cut::Cut;
 use crate::repairs::boolean::state::{Failure, State, Stuck, Tried};
 use crate::repairs::cleanup::degenerate;
 use crate::repairs::cleanup::duplicates;
 use crate::repairs::shared::work::Work;
 use crate::submesh::{Submesh, Vertex, place};
+use crate::util::ids::NONE;
 use crate::util::steps;
-use crate::util::union_find::NONE;
 
 /// What becomes of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,7 +39,7 @@ fn fate(front: Option<i32>, back: Option<i32>) -> Fate {
 
 impl State<'_, '_, '_> {
     /// Makes of the submesh what the windings say. Returns how far new vertices were moved.
-    pub(crate) fn apply(&mut self, cut: &Cut, sides: &Sides, windings: &[Option<i32>]) -> Tried<f64> {
+    pub(crate) fn apply(&mut self, cut: &Cut, sides: &SpaceCells, windings: &[Option<i32>]) -> Tried<f64> {
         let of = |[front, back]: [u32; 2]| fate(windings[front as usize], windings[back as usize]);
         let fates: Vec<Fate> = cut.arrangement.pieces.iter().map(|piece| of(piece.cells)).collect();
         let unknown = cut.arrangement.pieces.iter().zip(&fates).filter(|(_, fate)| **fate == Fate::Unknown);
@@ -48,10 +48,10 @@ impl State<'_, '_, '_> {
             return Err(Stuck { failure: Failure::Contradiction, triangles }.into());
         }
         let (work, reversed) = (&mut *self.work, &mut *self.reversed);
-        for p in (0..sides.patches).filter(|p| self.clusters.holds_patch(*p)) {
-            match of(sides.of_patch(p)) {
+        for p in (0..sides.regions).filter(|p| self.clusters.holds_region(*p)) {
+            match of(sides.of_region(p)) {
                 Fate::Goes => reversed.dropped[p as usize] = true,
-                Fate::Turns => reversed.patches[p as usize] ^= true,
+                Fate::Turns => reversed.regions[p as usize] ^= true,
                 Fate::Stays | Fate::Unknown => {}
             }
         }
@@ -59,7 +59,7 @@ impl State<'_, '_, '_> {
         for t in living {
             match of(sides.of_triangle(t)) {
                 Fate::Goes => work.kill(t),
-                Fate::Turns => work.turn(t),
+                Fate::Turns => work.flip(t),
                 Fate::Stays | Fate::Unknown => {}
             }
         }
@@ -68,7 +68,7 @@ impl State<'_, '_, '_> {
         for (s, (t, whole)) in cut.sources.iter().zip(whole).enumerate() {
             match whole {
                 Some(Fate::Stays | Fate::Unknown) => {}
-                Some(Fate::Turns) => work.turn(*t),
+                Some(Fate::Turns) => work.flip(*t),
                 Some(Fate::Goes) => work.kill(*t),
                 None => {
                     work.kill(*t);

@@ -18,7 +18,7 @@ use crate::geometry::position::Position;
 use crate::repairs::boolean::passes::Passes;
 use crate::repairs::boolean::state::{Met, State, Tried};
 use crate::submesh::Vertex;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// What a pass changed.
 #[derive(Default)]

@@ -6,14 +6,14 @@ use crate::detect::defects;
 use crate::geometry::position::Position;
 use crate::repairs::boolean::clusters::Clusters;
 use crate::repairs::boolean::track::Track;
-use crate::repairs::shared::overlay::Overlay;
-use crate::repairs::shared::regions::Unsettled;
+use crate::repairs::shared::overlay::{Overlay, Standing, Which};
+use crate::repairs::shared::region_report::Unsettled;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::Reversed;
 use crate::submesh::{Origin, Submesh, Triangle, Vertex};
 use crate::topology::survey::Survey;
+use crate::util::ids::NONE;
 use crate::util::steps;
-use crate::util::union_find::NONE;
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap, HashMap, HashSet};
 
@@ -101,7 +101,7 @@ pub(crate) struct Resolved {
     pub(crate) volume: f64,
     /// Where cutting left bodies that no printer can see, which are dropped.
     pub(crate) dust: Vec<Region>,
-    /// The surface was looked at anew: patches have other numbers than before.
+    /// The surface was looked at anew: regions have other numbers than before.
     pub(crate) divided: bool,
     /// Why some surfaces were left as they were, and how many of them.
     pub(crate) left: Vec<(Failure, u64)>,
@@ -134,16 +134,16 @@ pub(crate) struct State<'a, 'r, 'w> {
     pub(crate) step: f64,
 }
 
-/// Does with a triangle that was fetched what was done with the patch that it belonged to.
+/// Does with a triangle that was fetched what was done with the region that it belonged to.
 pub(crate) fn join_in(work: &mut Work<'_>, reversed: &Reversed, t: u32) {
-    let patch = work.triangles[t as usize].patch;
-    if patch == NONE {
+    let region = work.triangles[t as usize].region;
+    if region == NONE {
         return;
     }
-    if reversed.dropped[patch as usize] {
+    if reversed.dropped[region as usize] {
         work.kill(t);
-    } else if reversed.patches[patch as usize] {
-        work.turn(t);
+    } else if reversed.regions[region as usize] {
+        work.flip(t);
     }
 }
 
@@ -155,7 +155,7 @@ pub(crate) fn coincident(submesh: &Submesh) -> Vec<[u32; 2]> {
 }
 
 /// The corners of the triangles of some pairs, each once.
-pub(crate) fn corners(survey: &Survey<'_>, submesh: &Submesh, overlay: &Overlay, pairs: &[[u32; 2]]) -> Vec<[f32; 3]> {
+pub(crate) fn corners(survey: &Survey<'_>, submesh: &Submesh, overlay: &Overlay, pairs: &[[Standing; 2]]) -> Vec<[f32; 3]> {
     let mut positions: Vec<[f32; 3]> =
         pairs.iter().flatten().flat_map(|number| overlay.corners(survey, submesh, *number)).collect();
     positions.sort_unstable_by_key(|p| Position::of(*p));
@@ -171,7 +171,7 @@ impl State<'_, '_, '_> {
         self.check_closed()?;
         let overlay = Overlay::of(self.survey, self.work, self.reversed).ok_or_else(too_many)?;
         let met = overlay.met_by(self.survey, self.work, &changed).ok_or_else(too_many)?;
-        let pairs: Vec<[u32; 2]> = met.iter().map(|pair| pair.triangles).collect();
+        let pairs: Vec<[Standing; 2]> = met.iter().map(|pair| pair.triangles).collect();
         let mut crossing = self.crossing(&overlay, &pairs, profile);
         crossing.extend(before.into_iter().filter(|pair| pair.iter().all(|t| self.work.lives(*t) && !changed(*t))));
         crossing.iter_mut().for_each(|pair| pair.sort_unstable());
@@ -201,7 +201,7 @@ impl State<'_, '_, '_> {
     }
 
     /// The pairs of triangles that take part, in the submesh; where bodies are to be kept, only of one and the same.
-    pub(crate) fn crossing(&mut self, overlay: &Overlay, pairs: &[[u32; 2]], profile: &Profile) -> Vec<[u32; 2]> {
+    pub(crate) fn crossing(&mut self, overlay: &Overlay, pairs: &[[Standing; 2]], profile: &Profile) -> Vec<[u32; 2]> {
         let mut crossing = self.in_submesh(overlay, pairs);
         crossing.extend(coincident(self.work));
         crossing.retain(|pair| {
@@ -220,17 +220,20 @@ impl State<'_, '_, '_> {
     }
 
     /// Pairs of triangles as the submesh numbers them, where they are fetched to if need be, with all around them.
-    pub(crate) fn in_submesh(&mut self, overlay: &Overlay, pairs: &[[u32; 2]]) -> Vec<[u32; 2]> {
+    pub(crate) fn in_submesh(&mut self, overlay: &Overlay, pairs: &[[Standing; 2]]) -> Vec<[u32; 2]> {
         self.complete(corners(self.survey, self.work, overlay, pairs));
         let of_record: HashMap<u32, u32> = self
             .work
             .living()
             .filter_map(|t| match self.work.triangles[t as usize].origin {
                 Origin::Input(record) => Some((record, t)),
-                Origin::Part(_) | Origin::Patch => None,
+                Origin::Part(_) | Origin::Added => None,
             })
             .collect();
-        let triangle = |number: u32| overlay.changed_of(number).or_else(|| of_record.get(&number).copied());
+        let triangle = |number: Standing| match overlay.which(number) {
+            Which::Submesh(t) => Some(t),
+            Which::Record(record) => of_record.get(&record).copied(),
+        };
         pairs.iter().filter_map(|[a, b]| Some([triangle(*a)?, triangle(*b)?])).collect()
     }
 
@@ -247,21 +250,21 @@ impl State<'_, '_, '_> {
         let first = self.work.extend_at(self.survey, &new, &positions);
         for t in first..self.work.triangles.len() as u32 {
             let mut triangle = self.work.triangles[t as usize];
-            let patch = triangle.patch;
-            self.clusters.of_triangle.push(if patch == NONE { NONE } else { self.clusters.of_patch[patch as usize] });
+            let region = triangle.region;
+            self.clusters.of_triangle.push(if region == NONE { NONE } else { self.clusters.of_region[region as usize] });
             join_in(self.work, self.reversed, t);
-            // They are no part of their patch any more, whatever becomes of the attempt.
-            if patch != NONE {
-                if self.before.reversed.patches[patch as usize] {
+            // They are no part of their region any more, whatever becomes of the attempt.
+            if region != NONE {
+                if self.before.reversed.regions[region as usize] {
                     triangle.v.swap(1, 2);
                 }
-                triangle.alive = !self.before.reversed.dropped[patch as usize];
+                triangle.alive = !self.before.reversed.dropped[region as usize];
             }
             self.before.triangles.push(triangle);
         }
     }
 
-    /// Triangles that came without a surface are of that of the record that they are parts of; those of patches, of that of a neighbour.
+    /// Triangles that came without a surface are of that of the record that they are parts of; those of regions, of that of a neighbour.
     pub(crate) fn follow(&mut self) {
         let first = self.clusters.of_triangle.len();
         let all = self.work.triangles.len();
@@ -271,7 +274,7 @@ impl State<'_, '_, '_> {
         }
         let record = |t: usize| match self.work.triangles[t].origin {
             Origin::Input(record) | Origin::Part(record) => Some(record),
-            Origin::Patch => None,
+            Origin::Added => None,
         };
         let wanted: HashSet<u32> = left.iter().filter_map(|t| record(*t)).collect();
         let known = (0..first).filter_map(|t| Some((record(t).filter(|r| wanted.contains(r))?, self.clusters.of_triangle[t])));

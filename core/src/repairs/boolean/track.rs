@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::contract::report::{Region, Rung};
+use crate::contract::report::{Region, RegionMethod};
 use crate::geometry::sums::Bounds;
 use crate::repairs::boolean::clusters::Clusters;
 use crate::submesh::Submesh;
@@ -18,29 +18,29 @@ struct Done {
     /// The last round in which any did.
     rounds: u32,
     snapped: bool,
-    spread: bool,
+    perturbed: bool,
     refilled: bool,
     moved: f64,
 }
 
 impl Done {
     const NOTHING: Self =
-        Self { bounds: Bounds::EMPTY, triangles: 0, rounds: 0, snapped: false, spread: false, refilled: false, moved: 0.0 };
+        Self { bounds: Bounds::EMPTY, triangles: 0, rounds: 0, snapped: false, perturbed: false, refilled: false, moved: 0.0 };
 
     fn add(&mut self, other: &Self) {
         self.bounds.add(&other.bounds);
         self.triangles += other.triangles;
         self.rounds = self.rounds.max(other.rounds);
         self.snapped |= other.snapped;
-        self.spread |= other.spread;
+        self.perturbed |= other.perturbed;
         self.refilled |= other.refilled;
         self.moved = self.moved.max(other.moved);
     }
 
-    fn region(&self, rung: Rung) -> Region {
+    fn region(&self, method: RegionMethod) -> Region {
         let bounds = self.bounds.normalised();
         Region {
-            rung,
+            method,
             bounds: [bounds.lo, bounds.hi],
             count: self.triangles,
             rounds: self.rounds,
@@ -75,9 +75,9 @@ impl Track {
     }
 
     /// This piece was grown by so much.
-    pub(crate) fn spread(&mut self, piece: u32, by: f64) {
+    pub(crate) fn perturb(&mut self, piece: u32, by: f64) {
         let done = self.0.entry(piece).or_insert(Done::NOTHING);
-        done.spread = true;
+        done.perturbed = true;
         done.moved = done.moved.max(by);
     }
 
@@ -104,13 +104,13 @@ impl Track {
         for (piece, done) in &self.0 {
             by_cluster.entry(crate::util::union_find::find(&mut clusters.parents, *piece)).or_insert(Done::NOTHING).add(done);
         }
-        let rung = |done: &Done| match done {
-            Done { refilled: true, .. } => Rung::Refilled,
-            Done { spread: true, .. } => Rung::Spread,
-            Done { snapped: true, .. } => Rung::Snapped,
-            _ => Rung::Cut,
+        let method = |done: &Done| match done {
+            Done { refilled: true, .. } => RegionMethod::Refilled,
+            Done { perturbed: true, .. } => RegionMethod::Perturbed,
+            Done { snapped: true, .. } => RegionMethod::Snapped,
+            _ => RegionMethod::Cut,
         };
-        by_cluster.values().map(|done| done.region(rung(done))).collect()
+        by_cluster.values().map(|done| done.region(method(done))).collect()
     }
 
     /// The region of some pieces that are left as they were, ascending: all, if there is none.
@@ -121,7 +121,7 @@ impl Track {
         }
         steps::count(pieces.len());
         pieces.iter().filter_map(|piece| self.0.get(piece)).for_each(|done| all.add(done));
-        Region { moved: 0.0, reason: Some(reason), ..all.region(Rung::Left) }
+        Region { moved: 0.0, reason: Some(reason), ..all.region(RegionMethod::Left) }
     }
 }
 

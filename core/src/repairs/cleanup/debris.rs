@@ -3,8 +3,8 @@
 //! All of them go or none: many specks that together are much of the surface are no debris but what is left of it, whose holes are to be
 //! closed, and which of them to keep nobody could say.
 
+use crate::contract::report::RepairName;
 use crate::contract::settings::Profile;
-use crate::repairs::shared::account::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed, Through};

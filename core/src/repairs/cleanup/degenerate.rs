@@ -3,8 +3,8 @@
 //! Such a triangle lies along its longest edge, with the third vertex inside it. Every other triangle at the long edge is split at
 //! that vertex, which closes the surface without moving anything; dropping the triangle alone would open it.
 
+use crate::contract::report::RepairName;
 use crate::repairs::cleanup::duplicates;
-use crate::repairs::shared::account::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap, HashMap};
@@ -274,7 +274,7 @@ pub(crate) fn split(submesh: &mut Work<'_>, t: u32, ends: [u32; 2], at: &[u32]) 
     submesh.kill(t);
     let mut last = from;
     for next in stops.into_iter().chain([to]) {
-        submesh.add([apex, last, next], triangle.origin.of_part(), triangle.patch);
+        submesh.add([apex, last, next], triangle.origin.of_part(), triangle.region);
         last = next;
     }
 }

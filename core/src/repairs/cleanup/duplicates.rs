@@ -5,8 +5,8 @@
 //! thickness inside a body (the surface closes without it: all go), a surface exported with both sides (one side stays and is
 //! turned later), or two triangles on their own (nothing is enclosed: both go).
 
+use crate::contract::report::RepairName;
 use crate::detect::defects::{by_vertex_set, same_direction};
-use crate::repairs::shared::account::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::{Pass, Work};
 use crate::submesh::edges::Edges;
@@ -135,7 +135,7 @@ fn spare(submesh: &Submesh, edges: &Edges, copies: &[u32]) -> Vec<u32> {
 }
 
 fn sort_out(submesh: &Submesh, edges: &Edges, pairs: &mut [Pair]) -> Vec<u32> {
-    let mut pair_of = vec![crate::util::union_find::NONE; submesh.triangles.len()];
+    let mut pair_of = vec![crate::util::ids::NONE; submesh.triangles.len()];
     for (i, pair) in pairs.iter().enumerate() {
         pair.forward.iter().chain(&pair.backward).for_each(|t| pair_of[*t as usize] = i as u32);
     }
@@ -149,8 +149,8 @@ fn sort_out(submesh: &Submesh, edges: &Edges, pairs: &mut [Pair]) -> Vec<u32> {
             let (mut along, mut against) = (0i64, 0i64);
             for used in edge.uses {
                 match pair_of[used.triangle as usize] {
-                    crate::util::union_find::NONE if edge.directed(used) == (a, b) => along += 1,
-                    crate::util::union_find::NONE => against += 1,
+                    crate::util::ids::NONE if edge.directed(used) == (a, b) => along += 1,
+                    crate::util::ids::NONE => against += 1,
                     other if other != i as u32 => {
                         places[i] = places[i].max(Place::TwoSided);
                         crate::util::union_find::unite(&mut parents, i as u32, other);

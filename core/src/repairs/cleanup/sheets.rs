@@ -8,15 +8,15 @@
 //!
 //! A file that holds no body, or in which the sheets have more area than the bodies, keeps them: they are what it is about.
 
-use crate::contract::report::{LoopLeft, SheetDropped};
+use crate::contract::report::RepairName;
+use crate::contract::report::{LoopLeft, MOST_LISTED, SheetDropped};
 use crate::contract::settings::{Guarantee, Profile, Sheets};
-use crate::repairs::shared::account::RepairName;
 use crate::repairs::shared::context::SheetRim;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::topology::survey::Survey;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// Open sheets that can be no part of a solid.
 pub(crate) const REPAIR: Repair = Repair {
@@ -31,11 +31,8 @@ pub(crate) const REPAIR: Repair = Repair {
     },
 };
 
-/// Sheets in the report, at most: the largest.
-const LISTED: usize = 1000;
-
 /// Drops lone sheets, whose `rims` were left open, and takes their loops off the list of those that are `left`; returns what went, the largest
-/// first. O(patches + submesh), and a look at the chunks where such a sheet crosses something.
+/// first. O(regions + submesh), and a look at the chunks where such a sheet crosses something.
 pub(crate) fn drop(
     survey: &Survey<'_>,
     work: &mut Work<'_>,
@@ -89,10 +86,10 @@ pub(crate) fn drop(
         rims.iter().filter(|rim| goes(components.of_triangle[rim.triangle as usize])).filter_map(|rim| rim.listed).collect();
     let mut number = 0..;
     left.retain(|_| number.next().is_none_or(|i| closed.binary_search(&i).is_err()));
-    reversed.dropped.iter_mut().zip(&components.of_patch).for_each(|(dropped, c)| *dropped |= goes(*c));
+    reversed.dropped.iter_mut().zip(&components.of_region).for_each(|(dropped, c)| *dropped |= goes(*c));
     let doomed: Vec<u32> = submesh.living().filter(|t| goes(components.of_triangle[*t as usize])).collect();
     doomed.into_iter().for_each(|t| work.kill(t));
-    gone.into_iter().take(LISTED).map(|(_, sheet)| sheet).collect()
+    gone.into_iter().take(MOST_LISTED).map(|(_, sheet)| sheet).collect()
 }
 
 #[cfg(test)]

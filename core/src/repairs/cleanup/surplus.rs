@@ -5,7 +5,7 @@
 //! of times, or that is open but encloses volume, is a touching body: it stays. The smallest area goes first, and the rest is judged
 //! anew. Where as many triangles run one way as the other (bodies that touch along an edge) nothing is surplus.
 
-use crate::repairs::shared::account::RepairName;
+use crate::contract::report::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use glam::DVec3;
 
@@ -15,7 +15,7 @@ use crate::submesh::components::{Components, Reversed, Through};
 use crate::submesh::edges::Edges;
 use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// Sheets that are no part of a surface.
 pub(crate) const REPAIR: Repair = Repair {
@@ -121,8 +121,8 @@ fn sheets(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges) -> Vec<Sheet> {
             anchored: false,
         })
         .collect();
-    for (p, component) in parts.of_patch.iter().enumerate() {
-        sheets[*component as usize].anchored |= survey.patches[p].triangles > 0;
+    for (p, component) in parts.of_region.iter().enumerate() {
+        sheets[*component as usize].anchored |= survey.regions[p].triangles > 0;
     }
     for t in submesh.living() {
         let component = parts.of_triangle[t as usize];
@@ -153,8 +153,8 @@ pub(crate) fn wanted_stars(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges
     }
     let sheets = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::ManifoldEdges);
     let mut goes_on = vec![false; sheets.list.len()];
-    for (p, component) in sheets.of_patch.iter().enumerate() {
-        goes_on[*component as usize] |= survey.patches[p].triangles > 0;
+    for (p, component) in sheets.of_region.iter().enumerate() {
+        goes_on[*component as usize] |= survey.regions[p].triangles > 0;
     }
     let mut wanted: Vec<Vertex> = edges
         .iter()

@@ -9,15 +9,15 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use crate::algorithms::fairing::{self, Region, ShapeSettings, Shaped, edges, sorted};
+use crate::algorithms::fairing::{self, CoarsePatch, ShapeSettings, Shaped, edges, sorted};
 use crate::geometry::exact::Point;
 use crate::geometry::position::{self, Position};
 use crate::repairs::holes::patches::Placed;
 use crate::repairs::shared::work::Work;
 use crate::submesh::{Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
+use crate::util::ids::NONE;
 use crate::util::parallel;
-use crate::util::union_find::NONE;
 
 /// Vertices on the rims of the patches that are worked on at once.
 const RIM_VERTICES_AT_ONCE: usize = 1 << 16;
@@ -51,8 +51,10 @@ pub(crate) fn smooth(survey: &Survey<'_>, work: &mut Work<'_>, placed: &mut [Pla
         let beyond = Beyond::of(survey, submesh, batch.iter().map(|i| &placed[*i]));
         let shaped = parallel::map(threads, batch.len(), |i| {
             let region = Gathered::of(submesh, &beyond, &placed[batch[i]]);
-            let shaped =
-                fairing::shape(&Region { positions: &region.positions, patch: &region.patch, around: &region.around }, settings);
+            let shaped = fairing::shape(
+                &CoarsePatch { positions: &region.positions, patch: &region.patch, around: &region.around },
+                settings,
+            );
             shaped.map(|shaped| (region.vertices, shaped))
         });
         for (i, shaped) in batch.iter().zip(shaped) {
@@ -264,7 +266,7 @@ fn put_in(work: &mut Work<'_>, patch: &mut Placed, mut vertices: Vec<Vertex>, sh
     patch.first = work.triangles.len() as u32;
     patch.count = shaped.triangles.len() as u32;
     for t in &shaped.triangles {
-        work.add(t.map(|v| vertices[v as usize]), Origin::Patch, NONE);
+        work.add(t.map(|v| vertices[v as usize]), Origin::Added, NONE);
     }
     patch.coarse = coarse;
 }

@@ -6,11 +6,11 @@ mod closing;
 mod step_back;
 mod together;
 
-use crate::repairs::shared::account::RepairName;
+use crate::contract::report::{MOST_LISTED, RepairName};
 use crate::repairs::shared::context::PatchAcross;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 pub(crate) use closing::Closed;
-use closing::{Closing, FLAT, LISTED, Neighbours, NotFilled, left, meets_new_edge};
+use closing::{Closing, FLAT, Neighbours, NotFilled, left, meets_new_edge};
 
 use crate::algorithms::fairing::{Method, ShapeSettings};
 use crate::algorithms::triangulate::{self, Unfillable};
@@ -104,14 +104,14 @@ pub(crate) fn fill_loops(
         closed.loops += balancing;
         *closed.by_method.entry(BALANCING.into()).or_insert(0) += balancing;
     }
-    closed.left.extend(unclosed.into_iter().take(LISTED.saturating_sub(closed.left.len())));
+    closed.left.extend(unclosed.into_iter().take(MOST_LISTED.saturating_sub(closed.left.len())));
     if !profile.fill_holes {
         closed.kept_open.extend(chains.iter().map(|chain| work.positions[chain[0] as usize]));
     }
     closed.across = across;
     // Where edges were balanced, they are in the loops there.
     let chains = if balances { &[] } else { &chains[..] };
-    for chain in chains.iter().take(LISTED.saturating_sub(closed.left.len())) {
+    for chain in chains.iter().take(MOST_LISTED.saturating_sub(closed.left.len())) {
         let length = chain.windows(2).map(|w| work.distance(w[0], w[1])).sum();
         closed.left.push(left(work, chain[0], chain.len() - 1, length, &NO_LOOP));
     }

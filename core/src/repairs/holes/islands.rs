@@ -18,7 +18,7 @@ use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::submesh::{Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// Holes, each with its islands: some pairs of loops look like one and the other; a lone sheet that none of them holds lies in the smallest
 /// hole whose box holds its middle. O(submesh) if there are any.
@@ -107,7 +107,7 @@ pub(crate) fn join_all(work: &mut Work<'_>, group: &[&Loop]) -> Vec<u32> {
     for island in &group[1..] {
         if let Some((joined, triangles)) = join(work, &outer, &island.vertices) {
             outer = joined;
-            joints.extend(triangles.map(|t| work.add(t, Origin::Patch, NONE)));
+            joints.extend(triangles.map(|t| work.add(t, Origin::Added, NONE)));
         }
     }
     joints
@@ -216,7 +216,7 @@ mod tests {
             let [hole, island] = pairs[0].map(|i| rims[i].vertices.clone());
             let (joined, triangles) = join(&work, &hole, &island).unwrap();
             triangles.into_iter().for_each(|t| {
-                work.add(t, Origin::Patch, NONE);
+                work.add(t, Origin::Added, NONE);
             });
             joined.len()
         });

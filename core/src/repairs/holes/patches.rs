@@ -5,7 +5,7 @@ use crate::detect::holes::loops::Loop;
 use crate::repairs::shared::collisions::Obstacle;
 use crate::repairs::shared::work::Work;
 use crate::submesh::{Origin, Submesh, Vertex};
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// A patch that is in the submesh.
 #[derive(Debug)]
@@ -58,7 +58,7 @@ impl Placed {
         self.triangles().for_each(|t| work.kill(t));
         (self.first, self.count) = (work.triangles.len() as u32, triangles.len() as u32);
         triangles.iter().for_each(|v| {
-            work.add(*v, Origin::Patch, NONE);
+            work.add(*v, Origin::Added, NONE);
         });
     }
 }

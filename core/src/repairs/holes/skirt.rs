@@ -16,27 +16,26 @@
 //! Only on request ([`Profile::stack_gap_relative`]): rims that merely run along other surface are let down as well. Over a hollow in what it
 //! stands on, the patch that closes the strip may leave a pocket, a small cavity.
 
-use crate::repairs::shared::account::RepairName;
+use crate::contract::report::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use glam::DVec3;
 
 use crate::contract::settings::{Bodies, Profile};
-use crate::detect::fresh;
 use crate::detect::holes::loops::{self, Loop};
 use crate::geometry::position::Position;
 use crate::geometry::sums::step_at;
 use crate::geometry::tri_tri::Triangle as Corners;
-use crate::repairs::shared::overlay::Overlay;
+use crate::repairs::shared::overlay::{Held, Overlay, Standing, Which};
 use crate::repairs::shared::pieces::components_of_records;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::submesh::{self, Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// Open shapes that stand on other surface.
 pub(crate) const REPAIR: Repair = Repair {
-    name: RepairName::Seat,
+    name: RepairName::Skirt,
     changes: Changes::Surface,
     run: |cx| {
         let seated = let_down(cx.survey, &mut cx.work, &cx.reversed, cx.profile);
@@ -121,7 +120,6 @@ fn met(
     reach: f64,
 ) -> Option<Vec<Met>> {
     let overlay = Overlay::of(survey, submesh, reversed)?;
-    let first = survey.records.len() as u32 + submesh.triangles.len() as u32;
     // Two triangles an edge, which stand in for the strip.
     let mut of_probe: Vec<(u32, u32)> = Vec::new();
     let mut probes: Vec<Corners> = Vec::new();
@@ -131,28 +129,25 @@ fn met(
             of_probe.extend([(c, e); 2]);
         }
     }
-    let total = u64::from(first) + probes.len() as u64;
-    u32::try_from(total).ok()?;
-    let beside = overlay.changed().iter().map(|t| (overlay.number(*t), submesh.points(*t)));
-    let pairs =
-        fresh::met_by(survey, (first..).zip(probes), beside, |record| overlay.is_gone(record), total, fresh::self_intersection)?;
-    let mut hits: Vec<((u32, u32), u32)> = pairs
-        .iter()
-        .filter_map(|pair| {
-            let [one, other] = pair.triangles;
-            let (probe, other) = (one.max(other), one.min(other));
-            (probe >= first && other < first).then(|| (of_probe[(probe - first) as usize], other))
+    let pairs = overlay.met_by_others(survey, submesh, &probes, |_| true, |_| false)?;
+    let mut hits: Vec<((u32, u32), Standing)> = pairs
+        .into_iter()
+        .filter_map(|pair| match pair {
+            [Held::Other(probe), Held::Surface(other)] | [Held::Surface(other), Held::Other(probe)] => {
+                Some((of_probe[probe as usize], other))
+            }
+            _ => None,
         })
         .collect();
     hits.sort_unstable();
     hits.dedup();
-    let records = hits.iter().map(|(_, other)| *other).filter(|other| overlay.changed_of(*other).is_none());
+    let records = hits.iter().filter_map(|(_, other)| overlay.record_of(*other));
     let of_record = components_of_records(survey, submesh, components, records);
     let mut met: Vec<Met> = candidates.iter().map(|_| Met::default()).collect();
     for ((rim, edge), other) in hits {
-        let component = match overlay.changed_of(other) {
-            Some(t) => components.of_triangle[t as usize],
-            None => of_record.get(&other).copied().unwrap_or(NONE),
+        let component = match overlay.which(other) {
+            Which::Submesh(t) => components.of_triangle[t as usize],
+            Which::Record(record) => of_record.get(&record).copied().unwrap_or(NONE),
         };
         if component != candidates[rim as usize].component {
             met[rim as usize].triangles.push((edge, overlay.corners(survey, submesh, other), component));
@@ -238,8 +233,8 @@ impl Candidate {
             let next = (i + 1) % n;
             // In the direction of a patch.
             let [a, b] = [self.vertices[i], self.vertices[next]];
-            work.add([a, b, ends[next]], Origin::Patch, NONE);
-            work.add([a, ends[next], ends[i]], Origin::Patch, NONE);
+            work.add([a, b, ends[next]], Origin::Added, NONE);
+            work.add([a, ends[next], ends[i]], Origin::Added, NONE);
         }
     }
 }

@@ -1,15 +1,15 @@
 //! Coherent orientation over shared edges, then outward by enclosed volume, cavities inward.
 
+use crate::contract::report::RepairName;
 use crate::detect::bodies;
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::sums::Bounds;
-use crate::repairs::shared::account::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
 use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed};
 use crate::topology::survey::Survey;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// Neighbours that disagree.
 pub(crate) const COHERENT: Repair = Repair {
@@ -90,30 +90,30 @@ pub(crate) struct Turned {
 }
 
 /// Makes two-triangle edges agree: in each connected surface the smaller part is turned, of equal parts the one with the later
-/// triangle. What is `settled`, by triangle of the submesh, stays as it is. O(patches + submesh).
+/// triangle. What is `settled`, by triangle of the submesh, stays as it is. O(regions + submesh).
 pub(crate) fn make_coherent(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed, settled: &[bool]) -> Turned {
     let (submesh, edges) = work.edges();
-    let patches = survey.patches.len() as u32;
-    let mut parity = Parity::new(survey.patches.len() + submesh.triangles.len());
+    let regions = survey.regions.len() as u32;
+    let mut parity = Parity::new(survey.regions.len() + submesh.triangles.len());
     for t in submesh.living() {
-        let patch = submesh.triangles[t as usize].patch;
-        if patch != NONE {
-            parity.relate(patch, patches + t, false);
+        let region = submesh.triangles[t as usize].region;
+        if region != NONE {
+            parity.relate(region, regions + t, false);
         }
     }
     let mut turned = Turned::default();
     for edge in edges.iter() {
         if let [a, b] = edge.uses
             && settled.get(a.triangle as usize) != Some(&true)
-            && !parity.relate(patches + a.triangle, patches + b.triangle, edge.is_inconsistent())
+            && !parity.relate(regions + a.triangle, regions + b.triangle, edge.is_inconsistent())
         {
             turned.contradictions += 1;
         }
     }
     // Triangles on each side of each root, and the smallest record there.
-    let nodes: Vec<(u32, u64, u32)> = (0..patches)
-        .map(|p| (p, survey.patches[p as usize].triangles, survey.patches[p as usize].first))
-        .chain(submesh.living().map(|t| (patches + t, 1, submesh.record(t))))
+    let nodes: Vec<(u32, u64, u32)> = (0..regions)
+        .map(|p| (p, survey.regions[p as usize].triangles, survey.regions[p as usize].first))
+        .chain(submesh.living().map(|t| (regions + t, 1, submesh.record(t))))
         .collect();
     let mut sides = vec![[(0u64, NONE); 2]; parity.parents.len()];
     for (node, triangles, record) in &nodes {
@@ -128,17 +128,17 @@ pub(crate) fn make_coherent(survey: &Survey<'_>, work: &mut Work<'_>, reversed: 
         let odd_wins = odd_side.0 > even_side.0 || (odd_side.0 == even_side.0 && odd_side.1 < even_side.1);
         if odd != odd_wins {
             turned.triangles += triangles;
-            turn(survey, work, reversed, node);
+            flip_node(survey, work, reversed, node);
         }
     }
     turned
 }
 
-/// Turns a node of the parity structure: a patch or a triangle of the submesh.
-pub(crate) fn turn(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed, node: u32) {
-    match node.checked_sub(survey.patches.len() as u32) {
-        None => reversed.patches[node as usize] ^= true,
-        Some(t) => work.turn(t),
+/// Turns a node of the parity structure: a region or a triangle of the submesh.
+pub(crate) fn flip_node(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed, node: u32) {
+    match node.checked_sub(survey.regions.len() as u32) {
+        None => reversed.regions[node as usize] ^= true,
+        Some(t) => work.flip(t),
     }
 }
 
@@ -159,12 +159,12 @@ pub(crate) fn make_outward(
         count += 1;
         triangles += component.triangles;
     }
-    for (p, component) in components.of_patch.iter().enumerate() {
-        reversed.patches[p] ^= inverted.get(*component as usize) == Some(&true);
+    for (p, component) in components.of_region.iter().enumerate() {
+        reversed.regions[p] ^= inverted.get(*component as usize) == Some(&true);
     }
     for (t, component) in components.of_triangle.iter().enumerate() {
         if *component != NONE && inverted[*component as usize] {
-            work.turn(t as u32);
+            work.flip(t as u32);
         }
     }
     (count, triangles)

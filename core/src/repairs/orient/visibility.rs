@@ -7,7 +7,7 @@
 //! meshes based on ray casting", JCGT 3(4), 2014, who cast them in all directions). What is seen from both sides alike, or from none, follows its
 //! neighbours. Edges between parts that are both right, and disagree, stay: no surface goes on there, and they are balanced later.
 
-use crate::repairs::shared::account::RepairName;
+use crate::contract::report::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -17,17 +17,17 @@ use robust::Coord;
 use crate::detect::bodies::{self, Direction, Source};
 use crate::geometry::position::Position;
 use crate::io::record;
-use crate::repairs::orient::directions::{Parity, turn};
+use crate::repairs::orient::directions::{Parity, flip_node};
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed, Sample, Through};
 use crate::submesh::edges::Edges;
 use crate::submesh::{Submesh, place};
 use crate::topology::survey::Survey;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// Parts that are seen from behind, where crossings are known. Hands over what is settled by that.
 pub(crate) const REPAIR: Repair = Repair {
-    name: RepairName::Facing,
+    name: RepairName::Visibility,
     changes: Changes::Directions,
     run: |cx| {
         if cx.profile.resolve_crossings && cx.survey.crossing_pairs.is_some() {
@@ -66,7 +66,7 @@ pub(crate) struct Faced {
     pub(crate) settled: Vec<bool>,
 }
 
-/// Turns large parts that are seen from behind, and what follows them. O(patches + submesh), and if there are any, a pass over the chunks
+/// Turns large parts that are seen from behind, and what follows them. O(regions + submesh), and if there are any, a pass over the chunks
 /// that they are in, and one for each direction over those that rays may meet.
 pub(crate) fn face_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed) -> Faced {
     let (submesh, edges) = work.edges();
@@ -89,7 +89,7 @@ pub(crate) fn face_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &
     // Where hardly anything is seen otherwise than neighbours have it, they are to be followed everywhere.
     let all: i128 = parts.iter().map(|part| part.extent.area).sum();
     let is_contested =
-        |(part, sides): &(&u32, &Sides)| sides.is_behind().is_some_and(|behind| behind != by_neighbours[**part as usize]);
+        |(part, sides): &(&u32, &Sightings)| sides.is_behind().is_some_and(|behind| behind != by_neighbours[**part as usize]);
     let contested = seen.iter().filter(is_contested).map(|(part, _)| parts[*part as usize].extent.area);
     if (contested.sum::<i128>() as f64) < SMALL * all as f64 {
         return Faced::default();
@@ -101,9 +101,9 @@ pub(crate) fn face_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &
     let is_settled = |sheet: &u32| looked_at.get(*sheet as usize) == Some(&true);
     let settled = surface.sheets.of_triangle.iter().map(is_settled).collect();
     let triangles = parts.iter().zip(&turns).filter(|(_, turns)| **turns).map(|(part, _)| part.triangles).sum();
-    let nodes = surface.parts.of_patch.iter().chain(&surface.parts.of_triangle).zip(0..);
+    let nodes = surface.parts.of_region.iter().chain(&surface.parts.of_triangle).zip(0..);
     let turned = nodes.filter(|(part, _)| turns.get(**part as usize) == Some(&true)).map(|(_, node)| node);
-    turned.for_each(|node| turn(survey, work, reversed, node));
+    turned.for_each(|node| flip_node(survey, work, reversed, node));
     Faced { triangles, settled }
 }
 
@@ -124,7 +124,7 @@ impl Surface {
         let parts = Components::of(survey, submesh, edges, reversed, Through::CoherentEdges);
         let sheets = Components::of(survey, submesh, edges, reversed, Through::ManifoldEdges);
         let mut sheet_of = vec![NONE; parts.list.len()];
-        let nodes = parts.of_patch.iter().zip(&sheets.of_patch).chain(parts.of_triangle.iter().zip(&sheets.of_triangle));
+        let nodes = parts.of_region.iter().zip(&sheets.of_region).chain(parts.of_triangle.iter().zip(&sheets.of_triangle));
         nodes.filter(|(part, _)| **part != NONE).for_each(|(part, sheet)| sheet_of[*part as usize] = *sheet);
         let mut between: HashMap<[u32; 2], u64> = HashMap::new();
         let mut at_odds = vec![false; sheets.list.len()];
@@ -207,13 +207,13 @@ impl Surface {
 
 /// Of how many points each side of a part is seen.
 #[derive(Clone, Copy, Default)]
-struct Sides {
+struct Sightings {
     points: usize,
     front: usize,
     back: usize,
 }
 
-impl Sides {
+impl Sightings {
     /// Is the part seen from behind? `None` if that is not clear.
     fn is_behind(&self) -> Option<bool> {
         let Self { points, front, back } = *self;
@@ -264,16 +264,22 @@ fn note(points: &mut Vec<Point>, point: Point) {
 }
 
 /// From where the parts that are asked about are seen.
-fn seen(survey: &Survey<'_>, submesh: &Submesh, reversed: &Reversed, parts: &Components, asked: &[u32]) -> BTreeMap<u32, Sides> {
+fn seen(
+    survey: &Survey<'_>,
+    submesh: &Submesh,
+    reversed: &Reversed,
+    parts: &Components,
+    asked: &[u32],
+) -> BTreeMap<u32, Sightings> {
     let wanted: HashSet<u32> = asked.iter().copied().collect();
     let found = survey.visit_regular(
-        |patch| wanted.contains(&parts.of_patch[patch as usize]),
+        |region| wanted.contains(&parts.of_region[region as usize]),
         |_| Some(HashMap::<u32, Vec<Point>>::new()),
         |_, _| true,
-        |found, triangle, patch| {
+        |found, triangle, region| {
             let [a, b, c] = record::corners(&survey.records[triangle as usize]);
-            let corners = if reversed.patches[patch as usize] { [a, c, b] } else { [a, b, c] };
-            note(found.entry(parts.of_patch[patch as usize]).or_default(), Point::of(corners, triangle));
+            let corners = if reversed.regions[region as usize] { [a, c, b] } else { [a, b, c] };
+            note(found.entry(parts.of_region[region as usize]).or_default(), Point::of(corners, triangle));
         },
     );
     let mut points: BTreeMap<u32, Vec<Point>> = BTreeMap::new();
@@ -315,7 +321,7 @@ fn seen(survey: &Survey<'_>, submesh: &Submesh, reversed: &Reversed, parts: &Com
             sides[*i][usize::from(*is_behind)] = true;
         }
     }
-    let mut seen: BTreeMap<u32, Sides> = BTreeMap::new();
+    let mut seen: BTreeMap<u32, Sightings> = BTreeMap::new();
     for ((part, _), [front, back]) in all.iter().zip(sides) {
         let own = seen.entry(*part).or_default();
         own.points += 1;

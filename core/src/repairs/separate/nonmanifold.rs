@@ -1,6 +1,6 @@
 //! Surfaces that share an edge or a vertex, taken apart: what is read again is welded by position, so that each needs positions of its own.
 //!
-//! The triangles of an edge are paired by wedges of material ([`Wedges`]), so that the star of a vertex falls into fans, each the skin of one
+//! The triangles of an edge are paired by wedges of material ([`RadialPairs`]), so that the star of a vertex falls into fans, each the skin of one
 //! surface there. All fans of a vertex but one get a copy of it, as near as single precision and validity allow, first into their own material:
 //! along a chain of edges that two bodies share, one of them draws back. Where the two wedges of an edge have the same fans at both of its
 //! ends (a bridge that narrows to an edge and widens again), one of them gets a vertex in the middle of the edge, which draws back alone.
@@ -22,14 +22,14 @@ use crate::geometry::exact::{Point, at};
 use crate::geometry::position::{self, Position};
 use crate::geometry::sums::step_at;
 use crate::geometry::tri_tri::{Contact, Triangle as Corners, triangles_cross};
-use crate::repairs::shared::overlay::Overlay;
+use crate::repairs::shared::overlay::{Overlay, Which};
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Reversed, nonmanifold_vertices};
 use crate::submesh::edges::Edge;
-use crate::submesh::wedges::{Half, Wedges};
+use crate::submesh::radial::{Half, RadialPairs};
 use crate::submesh::{Submesh, Triangle, Vertex};
 use crate::topology::survey::Survey;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// A copy moves by no more than this share of the shortest edge at it, if there is a place for it then, so that no triangle comes near to turning
 /// over.
@@ -162,10 +162,10 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
     /// in the file, so that along an edge it is the same at both ends.
     fn part_vertices(&mut self, survey: &Survey<'_>, vertices: &[Vertex]) {
         let (submesh, edges) = self.work.edges();
-        let wedges = Wedges::of(submesh, edges);
-        let surfaces = surfaces(survey, submesh, &wedges);
+        let radial = RadialPairs::of(submesh, edges);
+        let surfaces = surfaces(survey, submesh, &radial);
         for v in vertices {
-            let Some(mut fans) = wedges.fans(self.work, *v) else { continue };
+            let Some(mut fans) = radial.fans(self.work, *v) else { continue };
             if self.fans_cross(&fans) {
                 continue;
             }
@@ -246,15 +246,15 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
         if !edges.any_nonmanifold() {
             return Vec::new();
         }
-        let wedges = Wedges::of(submesh, edges);
+        let radial = RadialPairs::of(submesh, edges);
         let crowded =
-            edges.iter().filter(|e| e.is_nonmanifold() && [e.low, e.high].iter().all(|v| wedges.fans(submesh, *v).is_some()));
+            edges.iter().filter(|e| e.is_nonmanifold() && [e.low, e.high].iter().all(|v| radial.fans(submesh, *v).is_some()));
         let in_order = |edge: Edge<'_>| {
             let forward = edge.uses.iter().filter(|u| u.forward);
             let mut pairs: Vec<[Half; 2]> = forward
                 .filter_map(|u| {
                     let half = Half::of(submesh, &edge, u);
-                    Some([half, wedges.mate(half)?])
+                    Some([half, radial.mate(half)?])
                 })
                 .collect();
             pairs.sort_by_key(|pair| pair.map(|h| (submesh.record(h.triangle), h.triangle)).into_iter().min());
@@ -290,11 +290,11 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
         let Some((copy, position)) = self.place(of, middle, &corners, &own, moved) else { return false };
         let new = self.add(copy, position);
         for h in wedge {
-            let Triangle { v: [a, b, c], origin, patch, .. } = self.work.triangles[h.triangle as usize];
+            let Triangle { v: [a, b, c], origin, region, .. } = self.work.triangles[h.triangle as usize];
             let whole = self.whole(h.triangle);
             self.work.kill(h.triangle);
             for part in parts(h) {
-                self.work.add(part.map(|k| [a, b, c, new][k]), origin.of_part(), patch);
+                self.work.add(part.map(|k| [a, b, c, new][k]), origin.of_part(), region);
                 self.whole.push(whole);
             }
         }
@@ -428,9 +428,9 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
         let pairs = overlay.met_by(survey, submesh, |t| copies(t).next().is_some())?;
         for pair in pairs {
             let in_submesh = pair.triangles.map(|number| overlay.changed_of(number));
-            let before = pair.triangles.map(|number| match overlay.changed_of(number) {
-                Some(t) => self.points_before(self.whole(t)),
-                None => position::corners(&survey.records[number as usize]),
+            let before = pair.triangles.map(|number| match overlay.which(number) {
+                Which::Submesh(t) => self.points_before(self.whole(t)),
+                Which::Record(record) => position::corners(&survey.records[record as usize]),
             });
             let of_one = matches!(in_submesh, [Some(a), Some(b)] if self.whole(a) == self.whole(b));
             if of_one || badness(pair.contact) > badness(triangles_cross(&before[0], &before[1])) {
@@ -441,28 +441,28 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
     }
 }
 
-/// For each triangle the first record of the surface that it is a part of, as surfaces go on through wedges. O(patches + submesh).
-fn surfaces(survey: &Survey<'_>, submesh: &Submesh, wedges: &Wedges) -> Vec<u32> {
-    let patches = survey.patches.len() as u32;
-    let mut parents: Vec<u32> = (0..patches + submesh.triangles.len() as u32).collect();
+/// For each triangle the first record of the surface that it is a part of, as surfaces go on through wedges. O(regions + submesh).
+fn surfaces(survey: &Survey<'_>, submesh: &Submesh, radial: &RadialPairs) -> Vec<u32> {
+    let regions = survey.regions.len() as u32;
+    let mut parents: Vec<u32> = (0..regions + submesh.triangles.len() as u32).collect();
     for t in submesh.living() {
-        let patch = submesh.triangles[t as usize].patch;
-        if patch != NONE {
-            crate::util::union_find::unite(&mut parents, patch, patches + t);
+        let region = submesh.triangles[t as usize].region;
+        if region != NONE {
+            crate::util::union_find::unite(&mut parents, region, regions + t);
         }
-        for mate in (0..3).filter_map(|corner| wedges.mate(Half { triangle: t, corner })) {
-            crate::util::union_find::unite(&mut parents, patches + t, patches + mate.triangle);
+        for mate in (0..3).filter_map(|corner| radial.mate(Half { triangle: t, corner })) {
+            crate::util::union_find::unite(&mut parents, regions + t, regions + mate.triangle);
         }
     }
     let mut first = vec![NONE; parents.len()];
     let records =
-        survey.patches.iter().map(|p| p.first).zip(0..).chain(submesh.living().map(|t| (submesh.record(t), patches + t)));
+        survey.regions.iter().map(|p| p.first).zip(0..).chain(submesh.living().map(|t| (submesh.record(t), regions + t)));
     for (record, node) in records {
         let root = crate::util::union_find::find(&mut parents, node) as usize;
         first[root] = first[root].min(record);
     }
     (0..submesh.triangles.len() as u32)
-        .map(|t| first[crate::util::union_find::find(&mut parents, patches + t) as usize])
+        .map(|t| first[crate::util::union_find::find(&mut parents, regions + t) as usize])
         .collect()
 }
 

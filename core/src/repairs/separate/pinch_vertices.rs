@@ -6,12 +6,12 @@
 //! copy might. What the new triangles cross, or meet in more than
 //! the loop's edges, is tested exactly; a vertex with a patch that does is tried with its other fans, then left.
 
+use crate::contract::report::RepairName;
 use crate::repairs::separate::nonmanifold;
-use crate::repairs::shared::account::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
-use crate::contract::report::{Region, Rung};
+use crate::contract::report::{Region, RegionMethod};
 use crate::contract::settings::Profile;
 use crate::geometry::sums::Bounds;
 use crate::repairs::boolean::resolve::{Refill, join_in, refill_of};
@@ -19,14 +19,14 @@ use crate::repairs::separate::separated::Separated;
 use crate::repairs::shared::overlay::Overlay;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Reversed, nonmanifold_vertices};
-use crate::submesh::wedges::Wedges;
+use crate::submesh::radial::RadialPairs;
 use crate::submesh::{Origin, Submesh, Triangle, Vertex};
 use crate::topology::survey::Survey;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// Surfaces that meet in vertices and edges: taken apart, or closed without their vertex.
 pub(crate) const REPAIR: Repair = Repair {
-    name: RepairName::Separated,
+    name: RepairName::Separate,
     changes: Changes::Surface,
     run: |cx| {
         let mut separated = nonmanifold::separate(cx.survey, &mut cx.work, &cx.reversed, cx.profile);
@@ -68,11 +68,11 @@ pub(crate) fn unpin(
     let vertices = nonmanifold_vertices(submesh, edges);
     complete_around(survey, work, reversed, &vertices[..vertices.len().min(MOST)]);
     let (submesh, edges) = work.edges();
-    let wedges = Wedges::of(submesh, edges);
+    let radial = RadialPairs::of(submesh, edges);
     let limit = profile.max_separation_relative * survey.bounds.diagonal();
     let mut all: BTreeMap<Vertex, Pinned> = BTreeMap::new();
     for v in vertices.iter().take(MOST) {
-        all.extend(Pinned::at(submesh, &wedges, *v, limit).map(|pinned| (*v, pinned)));
+        all.extend(Pinned::at(submesh, &radial, *v, limit).map(|pinned| (*v, pinned)));
     }
     let before: Vec<Triangle> = submesh.triangles.clone();
     let met_before: HashSet<Vertex> = vertices.iter().copied().collect();
@@ -119,8 +119,8 @@ fn complete_around(survey: &mut Survey<'_>, work: &mut Work<'_>, reversed: &Reve
 
 impl Pinned {
     /// `None` if the fans are not all closed and complete, or not enough of them can be closed within the limit.
-    fn at(submesh: &Submesh, wedges: &Wedges, v: Vertex, limit: f64) -> Option<Self> {
-        let fans = wedges.fans(submesh, v)?;
+    fn at(submesh: &Submesh, radial: &RadialPairs, v: Vertex, limit: f64) -> Option<Self> {
+        let fans = radial.fans(submesh, v)?;
         let is_complete = |t: &u32| submesh.triangles[*t as usize].v.iter().all(|v| submesh.complete[*v as usize]);
         let wanted = fans.len().checked_sub(1).filter(|wanted| *wanted > 0)?;
         let fans: Vec<Vec<u32>> = fans.iter().map(|fan| fan.iter().map(|half| half.triangle).collect()).collect();
@@ -147,12 +147,19 @@ fn put_in(work: &mut Work<'_>, all: &BTreeMap<Vertex, Pinned>) -> (Vec<Vertex>, 
             triangles.iter().for_each(|t| bounds.include(&work.points(*t)));
             triangles.iter().for_each(|t| work.kill(*t));
             for corners in patches {
-                work.add(*corners, Origin::Patch, NONE);
+                work.add(*corners, Origin::Added, NONE);
                 added_by.push(*v);
             }
             let Bounds { lo, hi } = bounds.normalised();
             let count = triangles.len() as u64;
-            regions.push(Region { rung: Rung::Refilled, bounds: [lo, hi], count, rounds: 0, moved: *moved, reason: None });
+            regions.push(Region {
+                method: RegionMethod::Refilled,
+                bounds: [lo, hi],
+                count,
+                rounds: 0,
+                moved: *moved,
+                reason: None,
+            });
         }
     }
     (added_by, regions)

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::contract::report::{Region, Rung};
+use crate::contract::report::{Region, RegionMethod};
 use crate::geometry::sums::Bounds;
-use crate::repairs::shared::regions::Unsettled;
+use crate::repairs::shared::region_report::Unsettled;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::nonmanifold_vertices;
 use crate::submesh::{Submesh, Vertex};
@@ -44,7 +44,7 @@ impl Separated {
         let one = |v: &Vertex| {
             let at = submesh.positions[*v as usize];
             let reason = Some("surfaces that meet there could not be taken apart".into());
-            let region = Region { rung: Rung::Left, bounds: [at; 2], count: 1, rounds: 0, moved: 0.0, reason };
+            let region = Region { method: RegionMethod::Left, bounds: [at; 2], count: 1, rounds: 0, moved: 0.0, reason };
             Unsettled { region, at }
         };
         let regions_left = vertices.iter().map(one).collect();
@@ -89,7 +89,7 @@ pub(crate) fn regions(submesh: &Submesh, first: Vertex, away: &[f64]) -> Vec<Reg
     }
     let region = |(bounds, count, moved): (Bounds, u64, f64)| {
         let Bounds { lo, hi } = bounds.normalised();
-        Region { rung: Rung::Separated, bounds: [lo, hi], count, rounds: 0, moved, reason: None }
+        Region { method: RegionMethod::Separated, bounds: [lo, hi], count, rounds: 0, moved, reason: None }
     };
     all.into_values().map(region).collect()
 }

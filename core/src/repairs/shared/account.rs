@@ -1,64 +1,7 @@
 //! What was done to a file, for its report.
 
-use crate::contract::report::{BoundaryLoops, LoopLeft, Region, Repair, SheetDropped, Volumes, Wrap};
-use crate::detect::verdict::Swallowed;
-
-/// Kinds of repairs. Several steps may account for one kind.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum RepairName {
-    Degenerate,
-    Duplicate,
-    Lap,
-    Surplus,
-    ToleranceWeld,
-    TJunction,
-    Zip,
-    Overrun,
-    Debris,
-    Facing,
-    Orient,
-    Seat,
-    Fill,
-    Sheets,
-    Outward,
-    Resolve,
-    Dust,
-    CrossingsLeft,
-    Swallowed,
-    Hidden,
-    Separated,
-    Wrap,
-}
-
-impl RepairName {
-    /// As the report has it.
-    pub(crate) fn as_str(self) -> &'static str {
-        match self {
-            Self::Degenerate => "degenerate",
-            Self::Duplicate => "duplicate",
-            Self::Lap => "lap",
-            Self::Surplus => "surplus",
-            Self::ToleranceWeld => "tolerance_weld",
-            Self::TJunction => "t_junction",
-            Self::Zip => "zip",
-            Self::Overrun => "overrun",
-            Self::Debris => "debris",
-            Self::Facing => "facing",
-            Self::Orient => "orient",
-            Self::Seat => "seat",
-            Self::Fill => "fill",
-            Self::Sheets => "sheets",
-            Self::Outward => "outward",
-            Self::Resolve => "resolve",
-            Self::Dust => "dust",
-            Self::CrossingsLeft => "crossings left",
-            Self::Swallowed => "swallowed",
-            Self::Hidden => "hidden",
-            Self::Separated => "separated",
-            Self::Wrap => "wrap",
-        }
-    }
-}
+use crate::contract::report::{BoundaryLoops, LoopLeft, Region, Repair, RepairName, SheetDropped, Volumes, Wrap};
+use crate::detect::review::Enclosed;
 
 /// What the report says of the repairs.
 #[derive(Default)]
@@ -70,7 +13,7 @@ pub(crate) struct Account {
     pub(crate) loops_left: Vec<LoopLeft>,
     pub(crate) sheets: Vec<SheetDropped>,
     /// What lay in the material of others, and is gone.
-    pub(crate) swallowed: Swallowed,
+    pub(crate) enclosed: Enclosed,
     /// What was replaced because nothing else made it a solid, or would have been.
     pub(crate) wraps: Vec<Wrap>,
     /// What became of the volume of bodies; `None` where nothing was done that might have lost any.
@@ -87,7 +30,7 @@ impl Account {
                 repair.count += count;
                 repair.seconds += seconds;
             }
-            None if count > 0 => self.done.push((name, Repair { name: name.as_str().into(), count, note, seconds })),
+            None if count > 0 => self.done.push((name, Repair { name, count, note, seconds })),
             None => {}
         }
     }
@@ -102,13 +45,13 @@ impl Account {
     /// Says something of a repair that has changed nothing.
     pub(crate) fn say(&mut self, name: RepairName, note: String) {
         tracing::info!(name = name.as_str(), note, "A repair changed nothing.");
-        self.done.push((name, Repair { name: name.as_str().into(), count: 0, note, seconds: 0.0 }));
+        self.done.push((name, Repair { name, count: 0, note, seconds: 0.0 }));
     }
 
     /// Some that lay in the material of others, or were made one with them, are gone.
-    pub(crate) fn swallow(&mut self, bodies: u64, volume: f64) {
-        self.swallowed.bodies += bodies;
-        self.swallowed.volume += volume;
+    pub(crate) fn enclose(&mut self, bodies: u64, volume: f64) {
+        self.enclosed.bodies += bodies;
+        self.enclosed.volume += volume;
     }
 
     /// The list of repairs as it stands in the report.

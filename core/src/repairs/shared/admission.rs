@@ -15,7 +15,7 @@ use crate::submesh::components::{Components, Reversed, Through};
 use crate::submesh::edges::Edges;
 use crate::submesh::near::Tolerance;
 use crate::topology::survey::Survey;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// A patch lies back along the surface if it continues it by less than this ([`Shapes::continues`]).
 const LIES_BACK: f64 = -0.5;

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, HashSet};
 
 use crate::geometry::position::Position;
 use crate::geometry::tri_tri::Triangle as Corners;
-use crate::repairs::shared::overlay::Overlay;
+use crate::repairs::shared::overlay::{Overlay, Standing, Which};
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::topology::survey::Survey;
@@ -35,9 +35,9 @@ pub(crate) fn crossed(
     let patch = |t: u32| patch_of[t as usize];
     let overlay = Overlay::of(survey, submesh, reversed)?;
     let pairs = overlay.met_by(survey, submesh, |t| patch(t).is_some_and(&is_new))?;
-    let owner = |number: u32| overlay.changed_of(number).and_then(patch);
+    let owner = |number: Standing| overlay.changed_of(number).and_then(patch);
     // The patch to blame with one of its triangles, and what that crosses.
-    let mut blamed: Vec<(u32, u32, u32)> = Vec::new();
+    let mut blamed: Vec<(u32, Standing, Standing)> = Vec::new();
     for pair in pairs {
         let [a, b] = pair.triangles;
         match (owner(a), owner(b)) {
@@ -55,7 +55,7 @@ pub(crate) fn crossed(
     blamed.sort_unstable();
     let components = Components::of(survey, submesh, edges, reversed, Through::EveryEdge);
     let met = survey.crossing_pairs.as_deref().unwrap_or_default();
-    let others = blamed.iter().map(|(_, _, other)| *other).filter(|other| overlay.changed_of(*other).is_none());
+    let others = blamed.iter().filter_map(|(_, _, other)| overlay.record_of(*other));
     let of_record = components_of_records(survey, submesh, &components, others.chain(met.iter().flat_map(|pair| pair.triangles)));
     let mut met: Vec<[u32; 2]> = met
         .iter()
@@ -65,9 +65,9 @@ pub(crate) fn crossed(
         .collect();
     met.sort_unstable();
     met.dedup();
-    let component = |number: u32| match overlay.changed_of(number) {
-        Some(t) => Some(components.of_triangle[t as usize]),
-        None => of_record.get(&number).copied(),
+    let component = |number: Standing| match overlay.which(number) {
+        Which::Submesh(t) => Some(components.of_triangle[t as usize]),
+        Which::Record(record) => of_record.get(&record).copied(),
     };
     let mut crossed: BTreeMap<u32, Vec<Obstacle>> = BTreeMap::new();
     let mut known = HashSet::new();

@@ -5,14 +5,15 @@ use std::rc::Rc;
 
 use crate::contract::error::Result;
 use crate::contract::progress::Progress;
+use crate::contract::report::RepairName;
 use crate::contract::report::{Defects, LoopLeft};
 use crate::contract::settings::{Limits, Profile};
 use crate::diagnosis::Diagnosis;
 use crate::geometry::position::Position;
-use crate::repairs::shared::account::{Account, RepairName};
+use crate::repairs::shared::account::Account;
 use crate::repairs::shared::pieces;
 use crate::repairs::shared::probes::Probes;
-use crate::repairs::shared::regions::Unsettled;
+use crate::repairs::shared::region_report::Unsettled;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed};
 use crate::submesh::near::Tolerance;
@@ -86,7 +87,7 @@ pub(crate) struct Handed {
     /// Bodies that cutting left and no printer can see, which are gone.
     pub(crate) dust: u64,
     /// Crossings that were left, as the report says it.
-    pub(crate) crossings_left: Vec<String>,
+    pub(crate) intersections_left: Vec<String>,
     /// After the resolution there may be crossings: it was not done, or left some, or edges were taken apart.
     pub(crate) may_cross: bool,
     /// Regions that were left as they were, unless a wrap replaces them.
@@ -121,7 +122,7 @@ pub(crate) type PatchAcross = (std::ops::Range<u32>, LoopLeft);
 pub(crate) struct Context<'c, 'r> {
     pub(crate) survey: &'c mut Survey<'r>,
     pub(crate) work: Work<'c>,
-    /// How patches of regular surface, which are not in the submesh, are turned, and which of them go.
+    /// How regions of regular surface, which are not in the submesh, are turned, and which of them go.
     pub(crate) reversed: Reversed,
     pub(crate) tolerance: &'c Tolerance,
     /// The defects of the file as it came.
@@ -162,7 +163,7 @@ impl<'c, 'r> Context<'c, 'r> {
         }
     }
 
-    /// The pieces of surface that stand for themselves, as [`pieces::pieces`] finds them. O(patches + submesh) after a change, O(1) else.
+    /// The pieces of surface that stand for themselves, as [`pieces::pieces`] finds them. O(regions + submesh) after a change, O(1) else.
     pub(crate) fn pieces(&mut self) -> Rc<Components> {
         let version = self.work.version();
         match &self.known.pieces {

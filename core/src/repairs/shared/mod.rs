@@ -7,5 +7,5 @@ pub(crate) mod context;
 pub(crate) mod overlay;
 pub(crate) mod pieces;
 pub(crate) mod probes;
-pub(crate) mod regions;
+pub(crate) mod region_report;
 pub(crate) mod work;

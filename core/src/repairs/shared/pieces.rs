@@ -7,10 +7,10 @@ use crate::geometry::position;
 use crate::submesh::components::{Component, Components, Reversed, Through};
 use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// The pieces of surface that stand for themselves: bodies that touch along an edge each for itself, what is closed only together, together.
-/// O(patches + submesh).
+/// O(regions + submesh).
 pub(crate) fn pieces(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reversed) -> Components {
     let (submesh, edges) = work.edges();
     let components = Components::of(survey, submesh, edges, reversed, Through::ManifoldEdges);
@@ -20,10 +20,10 @@ pub(crate) fn pieces(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Revers
     Components::of(survey, submesh, edges, reversed, Through::OpenSheets(&components))
 }
 
-/// Removes whole pieces. O(patches + submesh).
+/// Removes whole pieces. O(regions + submesh).
 pub(crate) fn take_away(work: &mut Work<'_>, reversed: &mut Reversed, pieces: &Components, goes: &[bool]) {
     let goes = |piece: &u32| *piece != NONE && goes[*piece as usize];
-    reversed.dropped.iter_mut().zip(&pieces.of_patch).for_each(|(dropped, piece)| *dropped |= goes(piece));
+    reversed.dropped.iter_mut().zip(&pieces.of_region).for_each(|(dropped, piece)| *dropped |= goes(piece));
     let doomed: Vec<u32> = work.living().filter(|t| goes(&pieces.of_triangle[*t as usize])).collect();
     doomed.into_iter().for_each(|t| work.kill(t));
 }
@@ -98,9 +98,10 @@ pub(crate) fn components_of_records(
         .collect();
     if !positions.is_empty() {
         let around = survey.beyond_the_submesh(&positions);
-        let around = around.iter().filter(|(irregular_triangle, patch)| is_wanted(irregular_triangle.triangle) && *patch != NONE);
+        let around =
+            around.iter().filter(|(irregular_triangle, region)| is_wanted(irregular_triangle.triangle) && *region != NONE);
         found.extend(
-            around.map(|(irregular_triangle, patch)| (irregular_triangle.triangle, components.of_patch[*patch as usize])),
+            around.map(|(irregular_triangle, region)| (irregular_triangle.triangle, components.of_region[*region as usize])),
         );
     }
     found

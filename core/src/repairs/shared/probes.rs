@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 
 use glam::DVec3;
 
-use crate::contract::report::{BodyLost, Volumes};
+use crate::contract::report::{BodyLost, MOST_LISTED, Volumes};
 use crate::detect::bodies;
 use crate::geometry::sums::Bounds;
 use crate::io::record;
@@ -35,9 +35,6 @@ const LEAST_DEPTHS: usize = 4;
 
 /// The least depth, against the diagonal of its box.
 const LEAST_DEPTH: f64 = 1.0 / 65_536.0;
-
-/// Bodies that are listed.
-const LISTED: usize = 1000;
 
 /// A body, and where its probes are among all.
 struct Body {
@@ -65,8 +62,8 @@ impl Probes {
         list.retain(|(_, volume)| *volume > LEAST_SHARE * all);
         list.sort_by(|a, b| b.1.total_cmp(&a.1));
         list.truncate(MOST_BODIES);
-        let turned = survey.patches.iter().zip(&reversed.patches).filter(|(_, turned)| **turned);
-        let turned: BTreeSet<u32> = turned.map(|(patch, _)| patch.first).collect();
+        let turned = survey.regions.iter().zip(&reversed.regions).filter(|(_, turned)| **turned);
+        let turned: BTreeSet<u32> = turned.map(|(region, _)| region.first).collect();
         let share = |[one, all]: [usize; 2]| one.min(all / list.len().max(1));
         let (in_box, depths) = (share(IN_BOX), share(DEPTHS).max(LEAST_DEPTHS));
         let candidates = |number: u32| {
@@ -114,7 +111,7 @@ impl Probes {
             found.outside += body.volume * outside as f64 / body.probes.len() as f64;
             if outside == body.probes.len() {
                 found.lost += 1;
-                if found.listed.len() < LISTED {
+                if found.listed.len() < MOST_LISTED {
                     let Body { bounds, volume, .. } = body;
                     found.listed.push(BodyLost { bounds: [bounds.lo, bounds.hi], volume: *volume });
                 }
@@ -137,7 +134,7 @@ fn points_in(bounds: &Bounds, count: usize) -> impl Iterator<Item = [f64; 3]> {
     })
 }
 
-/// Points below the first triangle of a body, from the deepest, half of its size, to the least deep. `turned`: the first records of patches
+/// Points below the first triangle of a body, from the deepest, half of its size, to the least deep. `turned`: the first records of regions
 /// that are.
 fn points_below(
     survey: &Survey<'_>,
@@ -171,7 +168,7 @@ mod tests {
     use crate::repairs::shared::work::Work;
     use crate::testing::{Corners, cuboid, diagnose, records, reversed, shifted};
 
-    /// What is found of a mesh once `change` was done to its patches, and these triangles were wrapped.
+    /// What is found of a mesh once `change` was done to its regions, and these triangles were wrapped.
     fn found(mesh: &[Corners], wrapped: &[Corners], change: impl Fn(&mut Reversed)) -> Volumes {
         let records = records(mesh);
         let mut d = diagnose(&records);
@@ -202,7 +199,7 @@ mod tests {
         assert_eq!((less.outside, less.lost), (1.0, 1));
         assert_eq!(less.listed, [BodyLost { bounds: [[0.0; 3], [1.0; 3]], volume: 1.0 }]);
         // Or is inside out.
-        assert_eq!(found(&two(), &[], |turned| turned.patches[1] = true).outside, 8.0);
+        assert_eq!(found(&two(), &[], |turned| turned.regions[1] = true).outside, 8.0);
         let wrapped = found(&two(), &small(), |turned| turned.dropped[0] = true);
         assert_eq!((wrapped.outside, wrapped.lost), (0.0, 0));
     }

@@ -10,8 +10,8 @@ use crate::submesh::edges::Edges;
 use crate::submesh::{Origin, Submesh, Triangle, Vertex};
 use crate::topology::chunk::IrregularTriangle;
 use crate::topology::survey::Survey;
+use crate::util::ids::NONE;
 use crate::util::steps;
-use crate::util::union_find::NONE;
 
 /// A pass that makes sure of something about every triangle, or every set of three vertices, which holds until one of the triangles
 /// gets another vertex.
@@ -134,9 +134,9 @@ impl<'a> Work<'a> {
     }
 
     /// Adds a triangle and returns its number.
-    pub(crate) fn add(&mut self, v: [Vertex; 3], origin: Origin, patch: u32) -> u32 {
+    pub(crate) fn add(&mut self, v: [Vertex; 3], origin: Origin, region: u32) -> u32 {
         self.touch();
-        let t = self.submesh.add(v, origin, patch);
+        let t = self.submesh.add(v, origin, region);
         self.changed.push(t);
         t
     }
@@ -159,7 +159,7 @@ impl<'a> Work<'a> {
     }
 
     /// Turns a triangle over.
-    pub(crate) fn turn(&mut self, t: u32) {
+    pub(crate) fn flip(&mut self, t: u32) {
         self.touch();
         self.note(t);
         self.submesh.triangles[t as usize].v.swap(1, 2);
@@ -201,14 +201,14 @@ impl<'a> Work<'a> {
         self.submesh.relink();
     }
 
-    /// Gives each triangle that continues a patch the one it continues after a [`Survey::divide`].
+    /// Gives each triangle that continues a region the one it continues after a [`Survey::divide`].
     pub(crate) fn follow_division(&mut self, survey: &Survey<'_>) {
         debug_assert!(self.journal.is_none(), "a division is not taken back");
         for triangle in &mut self.submesh.triangles {
-            if triangle.patch != NONE {
-                triangle.patch = match triangle.origin {
-                    Origin::Input(record) | Origin::Part(record) => survey.patch_of_irregular_triangle(record),
-                    Origin::Patch => NONE,
+            if triangle.region != NONE {
+                triangle.region = match triangle.origin {
+                    Origin::Input(record) | Origin::Part(record) => survey.region_of_irregular_triangle(record),
+                    Origin::Added => NONE,
                 };
             }
         }
@@ -237,7 +237,7 @@ impl<'a> Work<'a> {
 mod tests {
     use super::*;
     use crate::testing::{diagnose, plate, records};
-    use crate::util::union_find::NONE;
+    use crate::util::ids::NONE;
 
     #[test]
     fn a_pass_sees_everything_once_and_then_what_changed() {
@@ -246,7 +246,7 @@ mod tests {
         let mut work = Work::new(&mut d.submesh);
         assert_eq!(work.changed_for(Pass::Copies), None);
         assert_eq!(work.changed_for(Pass::Copies), Some(vec![]));
-        let t = work.add([0, 1, 2], Origin::Patch, NONE);
+        let t = work.add([0, 1, 2], Origin::Added, NONE);
         assert_eq!(work.changed_for(Pass::Copies), Some(vec![t]));
         assert_eq!(work.changed_for(Pass::Collinear), None, "each pass by itself");
         let moved: Vec<u32> = work.star(3).map(|(t, _)| t).collect();
@@ -269,7 +269,7 @@ mod tests {
         assert_ne!(boundary(&mut work), 8);
         let disagreeing = |work: &mut Work<'_>| work.edges().1.iter().filter(|e| e.is_inconsistent()).count();
         assert_eq!(disagreeing(&mut work), 0);
-        work.turn(3);
+        work.flip(3);
         assert_ne!(disagreeing(&mut work), 0);
     }
 
@@ -278,7 +278,7 @@ mod tests {
         let records = records(&plate(2, |_, _| true));
         let mut d = diagnose(&records);
         let mut work = Work::new(&mut d.submesh);
-        (0..work.triangles.len() as u32).for_each(|t| work.turn(t));
+        (0..work.triangles.len() as u32).for_each(|t| work.flip(t));
         let [a, b] = [work.triangles[0].v[1], work.triangles[0].v[2]];
         let all = |work: &Work<'_>, v| work.star(v).all(|(t, corner)| work.triangles[t as usize].v[corner] == v);
         assert!((0..work.positions.len() as Vertex).all(|v| all(&work, v)));
@@ -302,8 +302,8 @@ mod tests {
             let (steps, _) = steps::of(|| {
                 work.mark();
                 work.merge(a, b);
-                work.add([0, 1, 2], Origin::Patch, NONE);
-                work.turn(1);
+                work.add([0, 1, 2], Origin::Added, NONE);
+                work.flip(1);
                 work.kill(1);
                 work.kill(2);
                 work.take_back()

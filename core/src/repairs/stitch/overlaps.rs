@@ -1,10 +1,10 @@
-//! Lapping patches: a surface that ends on another one, within a tolerance by the size of the two, facing the same way.
+//! Lapping regions: a surface that ends on another one, within a tolerance by the size of the two, facing the same way.
 //!
 //! Where each of two pieces ends on the other, they overlap like shingles: the overlapping triangles of the smaller one go, so that the two
 //! ends face each other across a gap, which is closed later. A piece that lies on another one as a whole goes as a whole: what was meant is
 //! one surface, drawn twice. A piece on a surface that does not end there is left alone: nothing says that it was to be joined.
 
-use crate::repairs::shared::account::RepairName;
+use crate::contract::report::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use std::collections::{BTreeMap, HashMap};
 
@@ -25,7 +25,7 @@ use crate::topology::survey::Survey;
 
 /// Surface that lies on other surface.
 pub(crate) const REPAIR: Repair = Repair {
-    name: RepairName::Lap,
+    name: RepairName::Overlap,
     changes: Changes::Surface,
     run: |cx| {
         let cut = cut_back(cx.survey, &mut cx.work, cx.tolerance);
@@ -69,13 +69,37 @@ pub(crate) fn cut_back(survey: &mut Survey<'_>, work: &mut Work<'_>, tolerance: 
     removed
 }
 
+/// Which triangle of the mesh.
+#[derive(Clone, Copy, Debug)]
+enum Number {
+    /// The record of a triangle with regular corners only.
+    Record(u32),
+    /// A triangle of the submesh.
+    Submesh(u32),
+}
+
+impl Number {
+    fn record(self) -> Option<u32> {
+        match self {
+            Self::Record(record) => Some(record),
+            Self::Submesh(_) => None,
+        }
+    }
+
+    fn submesh(self) -> Option<u32> {
+        match self {
+            Self::Submesh(t) => Some(t),
+            Self::Record(_) => None,
+        }
+    }
+}
+
 /// A triangle of a piece.
 #[derive(Clone, Copy, Debug)]
 struct Member {
     piece: u32,
     corners: Corners,
-    /// The record of a regular one, or its number in the submesh.
-    place: Result<u32, u32>,
+    number: Number,
 }
 
 /// Two pieces, the smaller one first.
@@ -181,21 +205,21 @@ impl Pieces {
         for t in submesh.living() {
             let (piece, corners) = (self.components.of_triangle[t as usize], submesh.points(t));
             if is_wanted(piece) && meets(&corners) {
-                all.push(Member { piece, corners, place: Err(t) });
+                all.push(Member { piece, corners, number: Number::Submesh(t) });
             }
         }
-        let of_patch = &self.components.of_patch;
+        let of_region = &self.components.of_region;
         let found = survey.visit_regular(
-            |patch| is_wanted(of_patch[patch as usize]),
+            |region| is_wanted(of_region[region as usize]),
             |reach| reach.overlap(&everything).map(|_| Vec::new()),
             |_, corners| meets(corners),
-            |found: &mut Vec<(u32, u32)>, triangle, patch| found.push((triangle, patch)),
+            |found: &mut Vec<(u32, u32)>, triangle, region| found.push((triangle, region)),
         );
         let mut regular: Vec<(u32, u32)> = found.into_iter().flatten().collect();
         regular.sort_unstable();
-        all.extend(regular.into_iter().map(|(record, patch)| {
+        all.extend(regular.into_iter().map(|(record, region)| {
             let corners = record::corners(&survey.records[record as usize]);
-            Member { piece: of_patch[patch as usize], corners, place: Ok(record) }
+            Member { piece: of_region[region as usize], corners, number: Number::Record(record) }
         }));
         (all.len() <= MOST).then_some(all)
     }
@@ -357,15 +381,15 @@ impl Cut {
         wanted.sort_unstable();
         wanted.dedup();
         let wanted: Vec<[f32; 3]> = wanted.into_iter().map(Position::coordinates).collect();
-        let mut doomed: Vec<u32> = self.triangles.iter().filter_map(|m| m.place.err()).collect();
+        let mut doomed: Vec<u32> = self.triangles.iter().filter_map(|m| m.number.submesh()).collect();
         if !wanted.is_empty() {
             let new = survey.promote(&wanted);
             work.extend_at(survey, &new, &wanted);
-            let mut records: Vec<u32> = self.triangles.iter().filter_map(|m| m.place.ok()).collect();
+            let mut records: Vec<u32> = self.triangles.iter().filter_map(|m| m.number.record()).collect();
             records.sort_unstable();
             doomed.extend((0..).zip(&work.triangles).filter_map(|(t, triangle)| match triangle.origin {
                 Origin::Input(record) => records.binary_search(&record).is_ok().then_some(t),
-                Origin::Part(_) | Origin::Patch => None,
+                Origin::Part(_) | Origin::Added => None,
             }));
         }
         doomed.iter().for_each(|t| work.kill(*t));

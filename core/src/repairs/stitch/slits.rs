@@ -1,11 +1,11 @@
-//! Sides of a slit that run on past each other into the model and cross there, as simulated milling leaves them.
+//! SlitSides of a slit that run on past each other into the model and cross there, as simulated milling leaves them.
 //!
 //! What lies behind the other side is surplus: the triangles around every vertex of the loop that does so go, if they cross nothing else than
 //! the other side of the same loop, and the loop, wider by them, is closed like any other. (Moving the ends of
 //! the two sides onto their intersection line would be another way; that line lies in the groove that they make, so a patch continues the surface
-//! that stood there before more truly.) Sides that cross outside of the model are left alone, and so is a loop that would become much longer.
+//! that stood there before more truly.) SlitSides that cross outside of the model are left alone, and so is a loop that would become much longer.
 
-use crate::repairs::shared::account::RepairName;
+use crate::contract::report::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use std::collections::BTreeMap;
 
@@ -16,11 +16,11 @@ use crate::geometry::tri_tri::{Triangle as Corners, common, self_intersection};
 use crate::repairs::shared::work::Work;
 use crate::submesh::{Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// Slits whose sides overlap.
 pub(crate) const REPAIR: Repair = Repair {
-    name: RepairName::Overrun,
+    name: RepairName::SlitSides,
     changes: Changes::Surface,
     run: |cx| {
         let cut = cut_back(cx.survey, &mut cx.work);
@@ -64,7 +64,7 @@ pub(crate) fn cut_back(survey: &mut Survey<'_>, work: &mut Work<'_>) -> u64 {
 
 /// What crosses at a loop.
 #[derive(Default)]
-struct Sides {
+struct SlitSides {
     /// Triangles along it that cross each other.
     crossing: Vec<u32>,
     /// Its vertices at these: behind how many of the triangles that theirs cross, and in front of how many.
@@ -75,13 +75,13 @@ struct Sides {
 
 struct Slits {
     /// As the loops are numbered.
-    sides: Vec<Sides>,
+    sides: Vec<SlitSides>,
 }
 
 impl Slits {
     fn of(submesh: &Submesh, rims: &[Loop], pairs: impl Iterator<Item = [u32; 2]> + Clone) -> Self {
         let along = Along::of(submesh, rims, pairs.clone());
-        let mut sides: Vec<Sides> = rims.iter().map(|_| Sides::default()).collect();
+        let mut sides: Vec<SlitSides> = rims.iter().map(|_| SlitSides::default()).collect();
         for pair in pairs {
             let there = pair.map(|record| along.triangles.get(&record).copied());
             let of = there.map(|t| t.and_then(|t| along.loop_of(submesh, t)));
@@ -112,7 +112,7 @@ impl Slits {
     }
 }
 
-impl Sides {
+impl SlitSides {
     /// Takes in two triangles along the loop that cross each other.
     fn cross(&mut self, submesh: &Submesh, [a, b]: [u32; 2], is_of_loop: impl Fn(Vertex) -> bool) {
         self.crossing.extend([a, b]);
@@ -151,7 +151,7 @@ impl Along {
         records.dedup();
         let crossing = |t: u32| match submesh.triangles[t as usize].origin {
             Origin::Input(record) => records.binary_search(&record).is_ok().then_some((record, t)),
-            Origin::Part(_) | Origin::Patch => None,
+            Origin::Part(_) | Origin::Added => None,
         };
         Self { of_vertex, triangles: submesh.living().filter_map(crossing).collect() }
     }
@@ -173,7 +173,7 @@ fn side(triangle: &Corners, p: [f32; 3]) -> f64 {
 }
 
 /// The triangles around all vertices of a loop that lie behind its other side, if that is all that is wrong with it.
-fn surplus(submesh: &Submesh, rim: &Loop, sides: &Sides) -> Vec<u32> {
+fn surplus(submesh: &Submesh, rim: &Loop, sides: &SlitSides) -> Vec<u32> {
     // Of the triangles of a curved side, one may look away from what lies behind all others.
     let is_astray = |v: &Vertex| sides.seen.get(v).is_some_and(|[behind, in_front]| behind > in_front);
     if sides.meets_others || !sides.crossing.iter().all(|t| submesh.triangles[*t as usize].v.iter().any(is_astray)) {

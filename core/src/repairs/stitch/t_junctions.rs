@@ -1,7 +1,7 @@
 //! Non-common vertices (T-junctions): the triangle whose edge a vertex lies on is split there, which keeps every position.
 
+use crate::contract::report::RepairName;
 use crate::repairs::cleanup::degenerate;
-use crate::repairs::shared::account::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
 use crate::submesh::Submesh;

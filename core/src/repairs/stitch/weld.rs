@@ -3,7 +3,7 @@
 //!
 //! A merge that would leave a new non-manifold edge is taken back.
 
-use crate::repairs::shared::account::RepairName;
+use crate::contract::report::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
 use crate::submesh::edges::Edges;
@@ -125,7 +125,7 @@ fn targets(submesh: &Submesh, clusters: &[Vec<Vertex>]) -> Vec<Vertex> {
 
 /// Clusters at an edge of more than two triangles that was not one before.
 fn newly_nonmanifold(now: &Edges, before: &Edges, clusters: &[Vec<Vertex>], target: &[Vertex]) -> Vec<bool> {
-    let mut cluster_of = vec![crate::util::union_find::NONE; target.len()];
+    let mut cluster_of = vec![crate::util::ids::NONE; target.len()];
     for (i, cluster) in clusters.iter().enumerate() {
         cluster.iter().for_each(|v| cluster_of[*v as usize] = i as u32);
     }

@@ -5,7 +5,7 @@
 //! would turn a triangle over, flatten it, or make an edge of more than two triangles is left out. So is one that leaves a vertex where
 //! several fans meet: nothing beside it was merged, and two loops that only meet there would be closed each for itself.
 
-use crate::repairs::shared::account::RepairName;
+use crate::contract::report::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use std::collections::BTreeSet;
 

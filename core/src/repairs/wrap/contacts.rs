@@ -3,13 +3,12 @@
 use super::outcome::Outcome;
 use super::site::Site;
 use crate::algorithms::wrap::tree::Corners;
-use crate::detect::fresh;
 use crate::geometry::position::Position;
 use crate::geometry::sums::Bounds;
 use crate::io::record;
-use crate::repairs::shared::overlay::Overlay;
+use crate::repairs::shared::overlay::{Held, Overlay, Which};
 use crate::repairs::shared::pieces::components_of_records;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 use std::collections::BTreeMap;
 
 /// Wraps that are not given up yet, and what they replace.
@@ -17,28 +16,23 @@ struct Accepted<'o> {
     groups: Vec<(&'o Vec<u32>, &'o Outcome)>,
     /// By piece: a wrap replaces it.
     goes: Vec<bool>,
-    /// The triangles of all wraps, numbered after those of the submesh.
-    triangles: Vec<(u32, Corners)>,
-    first: u32,
+    /// The triangles of all wraps.
+    triangles: Vec<Corners>,
     /// Where the triangles of each group begin.
     starts: Vec<u32>,
 }
 
 impl<'o> Accepted<'o> {
-    /// `None` if there are too many triangles to be numbered.
-    fn of(site: &Site<'_, '_>, outcomes: &'o BTreeMap<Vec<u32>, Outcome>) -> Option<Self> {
+    fn of(site: &Site<'_, '_>, outcomes: &'o BTreeMap<Vec<u32>, Outcome>) -> Self {
         let groups: Vec<(&Vec<u32>, &Outcome)> = outcomes.iter().filter(|(_, o)| o.told.left.is_none()).collect();
         let mut goes = vec![false; site.pieces.list.len()];
         groups.iter().flat_map(|(group, _)| group.iter()).for_each(|piece| goes[*piece as usize] = true);
-        let first = (site.survey.records.len() as u32).checked_add(site.submesh.triangles.len() as u32)?;
         let (mut starts, mut triangles) = (Vec::new(), Vec::new());
         for (_, outcome) in &groups {
             starts.push(triangles.len() as u32);
-            let from = first.checked_add(triangles.len() as u32)?;
-            from.checked_add(outcome.triangles.len() as u32)?;
-            triangles.extend((from..).zip(outcome.triangles.iter().copied()));
+            triangles.extend(outcome.triangles.iter().copied());
         }
-        Some(Self { groups, goes, triangles, first, starts })
+        Self { groups, goes, triangles, starts }
     }
 
     fn goes(&self, piece: u32) -> bool {
@@ -55,7 +49,7 @@ impl<'o> Accepted<'o> {
         let of_submesh = site.submesh.living().filter(|t| self.goes(site.pieces.of_triangle[*t as usize]));
         let mut gone: Vec<u32> = of_submesh.map(|t| site.submesh.record(t)).collect();
         let regular = site.survey.visit_regular(
-            |patch| self.goes(site.pieces.of_patch[patch as usize]),
+            |region| self.goes(site.pieces.of_region[region as usize]),
             |_| Some(Vec::new()),
             |_, _| true,
             |list: &mut Vec<u32>, record, _| list.push(record),
@@ -67,37 +61,35 @@ impl<'o> Accepted<'o> {
 
     /// Pieces, one of them of a wrap, whose triangles cross. `None` if that is too much work to tell.
     fn crossing(&self, site: &Site<'_, '_>) -> Option<Vec<[u32; 2]>> {
-        let records = site.survey.records.len() as u32;
         let overlay = Overlay::of(site.survey, site.submesh, site.reversed)?;
         let gone = self.gone(site);
-        let beside = overlay.changed().iter().filter(|t| !self.goes(site.pieces.of_triangle[**t as usize]));
-        let pairs = fresh::met_by(
+        let pairs = overlay.met_by_others(
             site.survey,
-            self.triangles.iter().copied(),
-            beside.map(|t| (records + t, site.submesh.points(*t))),
-            |record| overlay.is_gone(record) || gone.binary_search(&record).is_ok(),
-            u64::from(self.first) + self.triangles.len() as u64,
-            fresh::self_intersection,
+            site.submesh,
+            &self.triangles,
+            |t| !self.goes(site.pieces.of_triangle[t as usize]),
+            |record| gone.binary_search(&record).is_ok(),
         )?;
-        let old = pairs.iter().flat_map(|pair| pair.triangles).filter(|number| *number < records);
+        let old = pairs.iter().flatten().filter_map(|held| match held {
+            Held::Surface(number) => overlay.record_of(*number),
+            Held::Other(_) => None,
+        });
         let of_record = components_of_records(site.survey, site.submesh, site.pieces, old);
-        let piece = |number: u32| {
-            if let Some(new) = number.checked_sub(self.first) {
-                return self.piece_of(new);
-            }
-            match number.checked_sub(records) {
-                Some(t) => site.pieces.of_triangle[t as usize],
-                None => of_record.get(&number).copied().unwrap_or(NONE),
-            }
+        let piece = |held: Held| match held {
+            Held::Other(new) => self.piece_of(new),
+            Held::Surface(number) => match overlay.which(number) {
+                Which::Submesh(t) => site.pieces.of_triangle[t as usize],
+                Which::Record(record) => of_record.get(&record).copied().unwrap_or(NONE),
+            },
         };
-        Some(pairs.iter().map(|pair| pair.triangles.map(piece)).collect())
+        Some(pairs.into_iter().map(|pair| pair.map(piece)).collect())
     }
 
     /// Pieces, one of them of a wrap, that have a vertex in one place: it would be one vertex when the file is read.
     fn touching(&self, site: &Site<'_, '_>) -> Vec<[u32; 2]> {
         let mut corners: Vec<(Position, u32)> = Vec::with_capacity(self.triangles.len());
-        for (number, triangle) in &self.triangles {
-            corners.extend(triangle.map(|p| (Position::of(p), self.piece_of(number - self.first))));
+        for (number, triangle) in (0..).zip(&self.triangles) {
+            corners.extend(triangle.map(|p| (Position::of(p), self.piece_of(number))));
         }
         corners.sort_unstable();
         corners.dedup();
@@ -114,16 +106,16 @@ impl<'o> Accepted<'o> {
             }
         }
         let mut bounds = Bounds::EMPTY;
-        self.triangles.iter().for_each(|(_, t)| bounds.include(t));
+        self.triangles.iter().for_each(|t| bounds.include(t));
         let touched = site.survey.visit_regular(
-            |patch| !site.reversed.dropped[patch as usize] && !self.goes(site.pieces.of_patch[patch as usize]),
+            |region| !site.reversed.dropped[region as usize] && !self.goes(site.pieces.of_region[region as usize]),
             |reach| reach.overlap(&bounds).map(|_| Vec::new()),
             |_, corners| corners.iter().any(|p| at(*p).is_some()),
-            |list: &mut Vec<(u32, u32)>, record, patch| list.push((record, patch)),
+            |list: &mut Vec<(u32, u32)>, record, region| list.push((record, region)),
         );
-        for (record, patch) in touched.into_iter().flatten() {
+        for (record, region) in touched.into_iter().flatten() {
             let corners = record::corners(&site.survey.records[record as usize]);
-            met.extend(corners.into_iter().filter_map(at).map(|piece| [piece, site.pieces.of_patch[patch as usize]]));
+            met.extend(corners.into_iter().filter_map(at).map(|piece| [piece, site.pieces.of_region[region as usize]]));
         }
         met
     }
@@ -131,7 +123,7 @@ impl<'o> Accepted<'o> {
 
 /// Which pieces an accepted wrap meets, with one of its own; or which two wraps' pieces meet. `None` if that is too much work to tell.
 pub(crate) fn contacts(site: &Site<'_, '_>, outcomes: &BTreeMap<Vec<u32>, Outcome>) -> Option<Vec<[u32; 2]>> {
-    let accepted = Accepted::of(site, outcomes)?;
+    let accepted = Accepted::of(site, outcomes);
     if accepted.groups.is_empty() {
         return Some(Vec::new());
     }

@@ -1,11 +1,12 @@
 //! Which pieces of surface are replaced together.
 
 use crate::geometry::position::Position;
+use crate::repairs::shared::overlay::Which;
 use crate::repairs::shared::pieces::components_of_records;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{self, Components};
 use crate::topology::survey::Survey;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 use std::collections::BTreeMap;
 
 /// Which pieces are to be replaced together.
@@ -22,7 +23,7 @@ impl Groups {
         survey: &Survey<'_>,
         work: &mut Work<'_>,
         pieces: &Components,
-        pairs: Option<&[[u32; 2]]>,
+        pairs: Option<&[[Which; 2]]>,
         kept_open: &[[f32; 3]],
     ) -> Self {
         let (submesh, edges) = work.edges();
@@ -47,15 +48,14 @@ impl Groups {
         }
         match pairs {
             Some(pairs) => {
-                let records = survey.records.len() as u32;
-                let old = pairs.iter().flatten().copied().filter(|number| *number < records);
+                let old = pairs.iter().flatten().filter_map(|triangle| triangle.record());
                 let of_record = components_of_records(survey, submesh, pieces, old);
-                let piece = |number: u32| match number.checked_sub(records) {
-                    Some(t) => Some(of(t)),
-                    None => of_record.get(&number).copied(),
+                let piece = |triangle: Which| match triangle {
+                    Which::Submesh(t) => Some(of(t)),
+                    Which::Record(record) => of_record.get(&record).copied(),
                 };
                 for pair in pairs {
-                    if let [Some(a), Some(b)] = pair.map(|number| piece(number).filter(|piece| *piece != NONE)) {
+                    if let [Some(a), Some(b)] = pair.map(|triangle| piece(triangle).filter(|piece| *piece != NONE)) {
                         groups.unite(a, b);
                         groups.broken[a as usize] = true;
                         groups.broken[b as usize] = true;

@@ -11,8 +11,8 @@ use crate::geometry::sums::Bounds;
 use crate::submesh::components::{Components, Reversed};
 use crate::submesh::{Submesh, place};
 use crate::topology::survey::Survey;
+use crate::util::ids::NONE;
 use crate::util::parallel;
-use crate::util::union_find::NONE;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
@@ -118,12 +118,12 @@ impl Site<'_, '_> {
             group.iter().for_each(|piece| group_of[*piece as usize] = number);
         }
         let of_piece = |piece: u32| if piece == NONE { NONE } else { group_of[piece as usize] };
-        let of_patch = |patch: u32| of_piece(self.pieces.of_patch[patch as usize]);
+        let of_region = |region: u32| of_piece(self.pieces.of_region[region as usize]);
         let found = self.survey.visit_regular(
-            |patch| of_patch(patch) != NONE,
+            |region| of_region(region) != NONE,
             |_| Some(Vec::new()),
             |_, _| true,
-            |list: &mut Vec<(u32, u32, u32, u32)>, record, patch| list.push((of_patch(patch), record, patch, NONE)),
+            |list: &mut Vec<(u32, u32, u32, u32)>, record, region| list.push((of_region(region), record, region, NONE)),
         );
         let mut all: Vec<(u32, u32, u32, u32)> = found.into_iter().flatten().collect();
         let of_triangle = |t: u32| of_piece(self.pieces.of_triangle[t as usize]);
@@ -131,11 +131,11 @@ impl Site<'_, '_> {
         all.extend(in_submesh.map(|t| (of_triangle(t), self.submesh.record(t), NONE, t)));
         all.sort_unstable();
         let mut gathered = vec![Vec::new(); groups.len()];
-        for (group, record, patch, t) in all {
+        for (group, record, region, t) in all {
             let with_sheet = if t == NONE {
                 let [a, b, c] = position::corners(&self.survey.records[record as usize]);
-                let is_turned = self.reversed.patches[patch as usize];
-                (self.sheets.of_patch[patch as usize], if is_turned { [a, c, b] } else { [a, b, c] })
+                let is_turned = self.reversed.regions[region as usize];
+                (self.sheets.of_region[region as usize], if is_turned { [a, c, b] } else { [a, b, c] })
             } else {
                 (self.sheets.of_triangle[t as usize], self.submesh.points(t))
             };

@@ -25,7 +25,7 @@ fn wrapped(mesh: &[Corners], kept_open: &[[f32; 3]], profile: &Profile, limits: 
     let mut d = Diagnosis::of(Path::new("test"), &input, profile, limits, &Quiet).unwrap();
     let mut reversed = Reversed::none(&d.survey);
     let work = &mut Work::new(&mut d.submesh);
-    let pairs = Overlay::of(&d.survey, work, &reversed).and_then(|overlay| overlay.crossing_pairs(&d.survey, work));
+    let pairs = Overlay::of(&d.survey, work, &reversed).and_then(|overlay| overlay.crossing_triangles(&d.survey, work));
     let wraps = replace(&d.survey, work, &mut reversed, pairs.as_deref(), kept_open, profile, limits.threads);
     let mut edit = Edit::of(&d.survey, &d.submesh, &reversed);
     edit.added.extend(wraps.triangles.iter().map(|corners| record::encode(*corners, 0)));

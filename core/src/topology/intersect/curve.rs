@@ -1,9 +1,9 @@
 //! A curve through the cell: the order in which triangles are put into a tree.
 
 use super::lanes::{Triangles, WIDTH, max, min};
-use super::region::Region;
+use super::view::CellView;
 use crate::stream::plan::HomeBox;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// Where on the curve a triangle comes. The order changes nothing but the time that the walk takes.
 pub(super) struct Curve {
@@ -14,18 +14,18 @@ pub(super) struct Curve {
 }
 
 impl Curve {
-    /// Through what the region sees of its cell.
-    pub(super) fn new(region: &Region<'_>) -> Self {
+    /// Through what the view sees of its cell.
+    pub(super) fn new(view: &CellView<'_>) -> Self {
         let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-        for p in region.positions {
+        for p in view.positions {
             for k in 0..3 {
                 (lo[k], hi[k]) = (min(lo[k], p[k]), max(hi[k], p[k]));
             }
         }
-        let (cell_lo, cell_hi) = region.cell.ends();
+        let (cell_lo, cell_hi) = view.cell.ends();
         let lo = [0, 1, 2].map(|k| max(lo[k], cell_lo[k]));
         let size = (0..3).map(|k| min(hi[k], cell_hi[k]) - lo[k]).fold(0.0, f32::max);
-        Self { cell: region.cell, lo, scale: 256.0 / size }
+        Self { cell: view.cell, lo, scale: 256.0 / size }
     }
 
     /// 24 bits for each triangle, those that are large for the cell apart, since they would widen the boxes of small ones; or

@@ -20,27 +20,27 @@
 mod curve;
 mod lanes;
 mod narrow;
-mod region;
 mod stars;
 #[cfg(test)]
 mod tests;
 mod tree;
+mod view;
 
 use crate::geometry::tri_tri::Contact;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 use lanes::{Lanes, Pairs};
 use narrow::Neighbours;
-use region::State;
-pub(crate) use region::{Region, Standing};
 use stars::Stars;
 use tree::{Forest, Visit, Walk};
+use view::State;
+pub(crate) use view::{CellView, Standing};
 
 pub(crate) use lanes::bits;
 
 /// Pairs with common vertices that are gathered before they are decided.
 const NEIGHBOURS: usize = 128;
 
-/// Finds the self-intersections of one region after the other, and keeps its memory.
+/// Finds the self-intersections of one view after the other, and keeps its memory.
 #[derive(Default)]
 pub(crate) struct Finder {
     stars: Stars,
@@ -51,22 +51,22 @@ pub(crate) struct Finder {
     by_vertex: Vec<(u32, u32)>,
 }
 
-/// Bytes that a [`Finder`] takes for each triangle of a region: its part of the tree, and for up to three vertices each a view, a
+/// Bytes that a [`Finder`] takes for each triangle of a view: its part of the tree, and for up to three vertices each a view, a
 /// standing, a state and a turn.
 pub(crate) const BYTES_PER_TRIANGLE: u64 = tree::BYTES_PER_TRIANGLE + 3 * (size_of::<stars::View>() as u64 + 3);
 
 impl Finder {
-    /// Calls `found` for each self-intersecting pair that the region's cell owns, once, the smaller number first; in an order that
-    /// depends on the region. Returns how many pairs were counted; if they are more than `allowance`, it ended early.
+    /// Calls `found` for each self-intersecting pair that the view's cell owns, once, the smaller number first; in an order that
+    /// depends on the view. Returns how many pairs were counted; if they are more than `allowance`, it ended early.
     ///
     /// O(n log n) besides the pairs of overlapping boxes, of which those around a certified vertex and around a vertex of more
     /// than 256 triangles that is at home elsewhere cost nothing.
-    pub(crate) fn pairs(&mut self, region: &Region<'_>, allowance: u64, mut found: impl FnMut(u32, u32, Contact)) -> u64 {
-        self.prepare(region);
+    pub(crate) fn pairs(&mut self, view: &CellView<'_>, allowance: u64, mut found: impl FnMut(u32, u32, Contact)) -> u64 {
+        self.prepare(view);
         self.waiting.clear();
         self.neighbours.clear();
         let mut search = Search {
-            region,
+            view,
             states: &self.states,
             forest: &self.forest,
             waiting: &mut self.waiting,
@@ -88,44 +88,44 @@ impl Finder {
 /// What comes before the walk, compiled for different processors. Sums and products are the same on all of them: in the same order,
 /// and none fused.
 impl Finder {
-    fn prepare(&mut self, region: &Region<'_>) {
+    fn prepare(&mut self, view: &CellView<'_>) {
         #[cfg(target_arch = "x86_64")]
         {
             if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") && is_x86_feature_detected!("avx512bw")
             {
                 // SAFETY: the processor has what it is compiled for.
-                return unsafe { self.prepare_avx512(region) };
+                return unsafe { self.prepare_avx512(view) };
             }
             if is_x86_feature_detected!("avx2") {
                 // SAFETY: as above.
-                return unsafe { self.prepare_avx2(region) };
+                return unsafe { self.prepare_avx2(view) };
             }
         }
-        self.prepare_by(region);
+        self.prepare_by(view);
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx512f,avx512vl,avx512bw")]
-    fn prepare_avx512(&mut self, region: &Region<'_>) {
-        self.prepare_by(region);
+    fn prepare_avx512(&mut self, view: &CellView<'_>) {
+        self.prepare_by(view);
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn prepare_avx2(&mut self, region: &Region<'_>) {
-        self.prepare_by(region);
+    fn prepare_avx2(&mut self, view: &CellView<'_>) {
+        self.prepare_by(view);
     }
 
     #[inline(always)]
-    fn prepare_by(&mut self, region: &Region<'_>) {
-        self.stars.look(region);
+    fn prepare_by(&mut self, view: &CellView<'_>) {
+        self.stars.look(view);
         self.states.clear();
-        self.states.extend(region.standing.iter().enumerate().map(|(v, standing)| match standing {
+        self.states.extend(view.standing.iter().enumerate().map(|(v, standing)| match standing {
             Standing::Away => State::Away,
             Standing::Regular if self.stars.is_certified(v) => State::Certified,
             Standing::Regular | Standing::Irregular => State::Open,
         }));
-        self.forest.build(region, &self.stars, &self.states);
+        self.forest.build(view, &self.stars, &self.states);
     }
 }
 
@@ -138,7 +138,7 @@ fn common_vertices(s: [u32; 3], t: [u32; 3]) -> [[bool; 3]; 2] {
 
 /// What becomes of overlapping boxes.
 struct Search<'a, F> {
-    region: &'a Region<'a>,
+    view: &'a CellView<'a>,
     states: &'a [State],
     forest: &'a Forest,
     /// Rows that overlap, without a common vertex.
@@ -177,9 +177,9 @@ impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
 
     /// A pair of overlapping boxes with vertices in common. With `only`, nothing is done if another vertex is the smallest.
     fn sharing(&mut self, i: u32, j: u32, only: u32) {
-        let [s, t] = [i, j].map(|i| self.region.triangles[i as usize]);
+        let [s, t] = [i, j].map(|i| self.view.triangles[i as usize]);
         let common = common_vertices(s, t);
-        let position = |v: u32| self.region.positions[v as usize];
+        let position = |v: u32| self.view.positions[v as usize];
         let (mut smallest, mut first, mut count, mut certified) = (NONE, 0, 0, false);
         for k in (0..3).filter(|k| common[0][*k]) {
             if count == 0 || position(s[k]) < position(smallest) {
@@ -196,7 +196,7 @@ impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
             return;
         }
         if count == 3 {
-            return self.region.decide(i, j, common, self.found);
+            return self.view.decide(i, j, common, self.found);
         }
         let apart_from_s = |order: [usize; 3]| order.into_iter().find(|k| !common[1][*k]).map_or(NONE, |k| t[k]);
         let (next, last) = (apart_from_s([0, 1, 2]), apart_from_s([2, 1, 0]));
@@ -210,14 +210,14 @@ impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
     /// Decides the waiting pairs with one or two common vertices.
     #[inline(never)]
     fn decide_neighbours(&mut self) {
-        let Self { region, neighbours, found, .. } = self;
-        let [crossing, unsure] = narrow::sort(region, neighbours);
+        let Self { view, neighbours, found, .. } = self;
+        let [crossing, unsure] = narrow::sort(view, neighbours);
         for Neighbours { triangles: [i, j], .. } in &neighbours[..crossing] {
             found(*i.min(j), *i.max(j), Contact::Cross);
         }
         for Neighbours { triangles: [i, j], .. } in &neighbours[crossing..crossing + unsure] {
-            let [s, t] = [i, j].map(|i| region.triangles[*i as usize]);
-            region.decide(*i, *j, common_vertices(s, t), found);
+            let [s, t] = [i, j].map(|i| view.triangles[*i as usize]);
+            view.decide(*i, *j, common_vertices(s, t), found);
         }
         neighbours.clear();
     }
@@ -228,8 +228,8 @@ impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
         for tree in forest.trees.iter().filter(|t| t.hub != NONE) {
             by_vertex.clear();
             for row in tree.rows.clone() {
-                for v in self.region.triangles[forest.triangle(row) as usize] {
-                    let smaller = self.region.positions[v as usize] < self.region.positions[tree.hub as usize];
+                for v in self.view.triangles[forest.triangle(row) as usize] {
+                    let smaller = self.view.positions[v as usize] < self.view.positions[tree.hub as usize];
                     if smaller && self.states[v as usize] == State::Open {
                         by_vertex.push((v, row as u32));
                     }
@@ -255,7 +255,7 @@ impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
     /// Counts and decides those waiting pairs that are owned here; none of them shares a vertex.
     #[inline(never)]
     fn separate(&mut self) {
-        let Self { region, forest, waiting, found, .. } = self;
+        let Self { view, forest, waiting, found, .. } = self;
         let pairs = waiting.as_mut_slice();
         let mut owned = 0;
         for k in 0..pairs.len() {
@@ -264,12 +264,12 @@ impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
             owned += usize::from(forest.owns_pair(row, other));
         }
         self.counted += owned as u64;
-        let [crossing, unsure] = narrow::sort(region, &mut pairs[..owned]);
+        let [crossing, unsure] = narrow::sort(view, &mut pairs[..owned]);
         for [i, j] in &pairs[..crossing] {
             found(*i.min(j), *i.max(j), Contact::Cross);
         }
         for [i, j] in &pairs[crossing..crossing + unsure] {
-            region.decide(*i, *j, [[false; 3]; 2], found);
+            view.decide(*i, *j, [[false; 3]; 2], found);
         }
         waiting.clear();
     }

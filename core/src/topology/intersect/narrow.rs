@@ -13,7 +13,7 @@
 use glam::Vec3;
 
 use super::lanes::{Triangles, WIDTH, max, min};
-use super::region::Region;
+use super::view::CellView;
 use crate::geometry::tri_tri::{Sure, sure, sure_of_neighbours};
 
 /// 16ε.
@@ -25,46 +25,46 @@ const LARGEST: f32 = (1_u128 << 107) as f32;
 /// Pairs of triangles of one kind.
 pub(super) trait Sort: Sized {
     /// As [`sort`], with whatever vectors the caller is compiled for; to be inlined there.
-    fn sort(region: &Region<'_>, pairs: &mut [Self]) -> [usize; 2];
+    fn sort(view: &CellView<'_>, pairs: &mut [Self]) -> [usize; 2];
 }
 
 /// Sorts pairs: to the front those that cross, then those of which nothing is sure; the rest are apart. Returns how many there are of the
 /// first kind and of the second.
-pub(super) fn sort<P: Sort>(region: &Region<'_>, pairs: &mut [P]) -> [usize; 2] {
+pub(super) fn sort<P: Sort>(view: &CellView<'_>, pairs: &mut [P]) -> [usize; 2] {
     #[cfg(target_arch = "x86_64")]
     {
         if has_avx512() {
             // SAFETY: the processor has what it is compiled for.
-            return unsafe { sort_avx512(region, pairs) };
+            return unsafe { sort_avx512(view, pairs) };
         }
         if is_x86_feature_detected!("avx2") {
             // SAFETY: as above.
-            return unsafe { sort_avx2(region, pairs) };
+            return unsafe { sort_avx2(view, pairs) };
         }
     }
-    P::sort(region, pairs)
+    P::sort(view, pairs)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl,avx512bw")]
-fn sort_avx512<P: Sort>(region: &Region<'_>, pairs: &mut [P]) -> [usize; 2] {
-    P::sort(region, pairs)
+fn sort_avx512<P: Sort>(view: &CellView<'_>, pairs: &mut [P]) -> [usize; 2] {
+    P::sort(view, pairs)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn sort_avx2<P: Sort>(region: &Region<'_>, pairs: &mut [P]) -> [usize; 2] {
-    P::sort(region, pairs)
+fn sort_avx2<P: Sort>(view: &CellView<'_>, pairs: &mut [P]) -> [usize; 2] {
+    P::sort(view, pairs)
 }
 
 /// Without a common vertex.
 impl Sort for [u32; 2] {
     #[inline(always)]
-    fn sort(region: &Region<'_>, pairs: &mut [Self]) -> [usize; 2] {
+    fn sort(view: &CellView<'_>, pairs: &mut [Self]) -> [usize; 2] {
         let mut block = Block::EMPTY;
         let mut left = 0;
         for start in (0..pairs.len()).step_by(WIDTH) {
-            let count = block.fill(region, &pairs[start..]);
+            let count = block.fill(view, &pairs[start..]);
             for (i, apart) in block.apart_by_planes().into_iter().enumerate().take(count) {
                 pairs[left] = pairs[start + i];
                 left += usize::from(!apart);
@@ -72,7 +72,7 @@ impl Sort for [u32; 2] {
         }
         let end = std::mem::take(&mut left);
         for start in (0..end).step_by(WIDTH) {
-            let count = block.fill(region, &pairs[start..end]);
+            let count = block.fill(view, &pairs[start..end]);
             for (i, apart) in block.apart_by_edges().into_iter().enumerate().take(count) {
                 pairs[left] = pairs[start + i];
                 left += usize::from(!apart);
@@ -81,7 +81,7 @@ impl Sort for [u32; 2] {
         let end = std::mem::take(&mut left);
         let mut crossing = 0;
         for start in (0..end).step_by(WIDTH) {
-            let count = block.fill(region, &pairs[start..end]);
+            let count = block.fill(view, &pairs[start..end]);
             for (i, sure) in block.sure().into_iter().enumerate().take(count) {
                 pairs[left] = pairs[start + i];
                 if sure == Sure::Cross {
@@ -106,13 +106,13 @@ pub(super) struct Neighbours {
 
 impl Sort for Neighbours {
     #[inline(always)]
-    fn sort(region: &Region<'_>, pairs: &mut [Self]) -> [usize; 2] {
+    fn sort(view: &CellView<'_>, pairs: &mut [Self]) -> [usize; 2] {
         let mut block = Block::EMPTY;
         let (mut left, mut crossing) = (0, 0);
         for start in (0..pairs.len()).step_by(WIDTH) {
             let count = (pairs.len() - start).min(WIDTH);
             for (i, pair) in pairs[start..start + count].iter().enumerate() {
-                block.set(i, pair.vertices.map(|t| region.corners(t)));
+                block.set(i, pair.vertices.map(|t| view.corners(t)));
             }
             for (i, sure) in block.sure_of_neighbours().into_iter().enumerate().take(count) {
                 pairs[left] = pairs[start + i];
@@ -187,10 +187,10 @@ impl Block {
 
     /// Takes up to sixteen of `pairs` and returns how many.
     #[inline(always)]
-    fn fill(&mut self, region: &Region<'_>, pairs: &[[u32; 2]]) -> usize {
+    fn fill(&mut self, view: &CellView<'_>, pairs: &[[u32; 2]]) -> usize {
         let count = pairs.len().min(WIDTH);
         for (i, pair) in pairs[..count].iter().enumerate() {
-            self.set(i, pair.map(|t| region.corners(region.triangles[t as usize])));
+            self.set(i, pair.map(|t| view.corners(view.triangles[t as usize])));
         }
         count
     }
@@ -271,15 +271,15 @@ mod tests {
             let positions: Vec<[f32; 3]> = triangles.iter().flatten().map(|p| p.map(f32::from)).collect();
             let numbers: Vec<[u32; 3]> = (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
             let standing = vec![Standing::Away; positions.len()];
-            let region =
-                Region { positions: &positions, triangles: &numbers, left_out: &[], standing: &standing, cell: HomeBox::ALL };
+            let view =
+                CellView { positions: &positions, triangles: &numbers, left_out: &[], standing: &standing, cell: HomeBox::ALL };
             let contact = |[i, j]: [u32; 2]| {
-                let [a, b] = [i, j].map(|t| region.corners(numbers[t as usize]));
+                let [a, b] = [i, j].map(|t| view.corners(numbers[t as usize]));
                 triangles_cross(&a, &b)
             };
             let all: Vec<[u32; 2]> = (1..numbers.len() as u32).flat_map(|j| (0..j).map(move |i| [i, j])).take(140).collect();
             let mut pairs = all.clone();
-            let [crossing, unsure] = sort(&region, &mut pairs);
+            let [crossing, unsure] = sort(&view, &mut pairs);
             pairs.truncate(crossing + unsure);
             for (k, pair) in pairs.iter().enumerate() {
                 prop_assert!(k >= crossing || contact(*pair) == Contact::Cross);
@@ -288,13 +288,13 @@ mod tests {
                 prop_assert!(!contact(*pair).is_crossing());
             }
             let mut narrow = all.clone();
-            prop_assert_eq!(<[u32; 2]>::sort(&region, &mut narrow), [crossing, unsure]);
+            prop_assert_eq!(<[u32; 2]>::sort(&view, &mut narrow), [crossing, unsure]);
             prop_assert_eq!(&narrow[..crossing + unsure], &pairs[..]);
             #[cfg(target_arch = "x86_64")]
             if is_x86_feature_detected!("avx2") {
                 let mut wider = all.clone();
                 // SAFETY: the processor has what it is compiled for.
-                prop_assert_eq!(unsafe { sort_avx2(&region, &mut wider) }, [crossing, unsure]);
+                prop_assert_eq!(unsafe { sort_avx2(&view, &mut wider) }, [crossing, unsure]);
                 prop_assert_eq!(&wider[..crossing + unsure], &pairs[..]);
             }
         }

@@ -30,7 +30,7 @@
 //! more and cost more than it saved.)
 
 use super::lanes::{Line, Triangles, WIDTH};
-use super::region::{Batch, Region};
+use super::view::{Batch, CellView};
 
 /// 16ε.
 const ERROR: f32 = 1.0 / (1 << 20) as f32;
@@ -68,17 +68,17 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
 }
 
 impl Stars {
-    /// Looks at all vertices of the region. O(triangles).
+    /// Looks at all vertices of the view. O(triangles).
     #[inline(always)]
-    pub(super) fn look(&mut self, region: &Region<'_>) {
+    pub(super) fn look(&mut self, view: &CellView<'_>) {
         self.views.clear();
-        self.views.resize(region.positions.len(), View::default());
-        let (mut batch, mut solid) = (Batch::EMPTY, region.solid_triangles());
-        while batch.fill(region, &mut solid) {
+        self.views.resize(view.positions.len(), View::default());
+        let (mut batch, mut solid) = (Batch::EMPTY, view.solid_triangles());
+        while batch.fill(view, &mut solid) {
             let normals = unit_normals(&batch.triangles);
             for (i, number) in batch.numbers().iter().enumerate() {
                 let normal = [normals[0].0[i], normals[1].0[i], normals[2].0[i], 1.0];
-                for v in region.triangles[*number as usize] {
+                for v in view.triangles[*number as usize] {
                     let view = &mut self.views[v as usize];
                     for k in 0..4 {
                         view[k] += normal[k];
@@ -87,11 +87,11 @@ impl Stars {
             }
         }
         self.turns.clear();
-        self.turns.resize(region.positions.len(), 0);
-        let (mut views, mut solid) = (Triangles::NONE, region.solid_triangles());
-        while batch.fill(region, &mut solid) {
+        self.turns.resize(view.positions.len(), 0);
+        let (mut views, mut solid) = (Triangles::NONE, view.solid_triangles());
+        while batch.fill(view, &mut solid) {
             for (i, number) in batch.numbers().iter().enumerate() {
-                let along = region.triangles[*number as usize].map(|v| {
+                let along = view.triangles[*number as usize].map(|v| {
                     let [x, y, z, _] = self.views[v as usize];
                     [x, y, z]
                 });
@@ -99,7 +99,7 @@ impl Stars {
             }
             let turns = sectors(&batch.triangles, &views);
             for (i, number) in batch.numbers().iter().enumerate() {
-                for (v, more) in region.triangles[*number as usize].iter().zip(&turns) {
+                for (v, more) in view.triangles[*number as usize].iter().zip(&turns) {
                     let turns = &mut self.turns[*v as usize];
                     *turns = (*turns + more[i] as u8).min(REFUSED);
                 }

@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use proptest::prelude::*;
 
-use super::{Finder, Region, Standing};
+use super::{CellView, Finder, Standing};
 use crate::geometry::collinear::is_collinear;
 use crate::geometry::position::Position;
 use crate::geometry::sums::Bounds;
 use crate::geometry::tri_tri::{Contact, Triangle, triangles_cross};
 use crate::io::record;
 use crate::stream::plan::{ChunkId, HomeBox, Plan};
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 type Point = [f32; 3];
 type Pairs = Vec<(u32, u32, Contact)>;
@@ -109,7 +109,7 @@ impl Mesh {
             (true, false) => Standing::Irregular,
             (true, true) => Standing::Regular,
         };
-        let region = Region {
+        let view = CellView {
             positions: &vertices.iter().map(|v| self.positions[*v]).collect::<Vec<_>>(),
             triangles: &triangles,
             left_out: &left_out,
@@ -117,7 +117,7 @@ impl Mesh {
             cell,
         };
         let mut pairs = Vec::new();
-        let tested = finder.pairs(&region, allowance, |i, j, contact| {
+        let tested = finder.pairs(&view, allowance, |i, j, contact| {
             let [i, j] = [i, j].map(|t| seen[t as usize]);
             pairs.push((i.min(j), i.max(j), contact));
         });

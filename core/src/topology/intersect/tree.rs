@@ -23,10 +23,10 @@ use std::ops::Range;
 
 use super::lanes::bits;
 use super::lanes::{self, Boxes, Corners, Lanes, Pairs, Triangles, WIDTH, max, min};
-use super::region::{Batch, Region, State};
 use super::stars::Stars;
+use super::view::{Batch, CellView, State};
 use crate::stream::plan::HomeBox;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// A vertex with more triangles is a hub.
 const HUB: f32 = 256.0;
@@ -98,7 +98,7 @@ pub(super) struct Tree {
     pub(super) hub: u32,
 }
 
-/// The trees of a region; memory is kept from one to the next.
+/// The trees of a view; memory is kept from one to the next.
 #[derive(Default)]
 pub(super) struct Forest {
     /// Place on the curve above the number of the triangle.
@@ -121,9 +121,9 @@ pub(super) const BYTES_PER_TRIANGLE: u64 =
 impl Forest {
     /// Arranges the triangles that meet the cell. O(triangles).
     #[inline(always)]
-    pub(super) fn build(&mut self, region: &Region<'_>, stars: &Stars, states: &[State]) {
-        self.collect(region);
-        let hubs = self.group_by_hub(region, stars, states);
+    pub(super) fn build(&mut self, view: &CellView<'_>, stars: &Stars, states: &[State]) {
+        self.collect(view);
+        let hubs = self.group_by_hub(view, stars, states);
         self.planted = 0;
         self.nodes.clear();
         self.trees.clear();
@@ -133,7 +133,7 @@ impl Forest {
             let count =
                 if hubs.len() == 1 { rest.len() } else { self.keys[rest.clone()].iter().take_while(|k| of_group(k)).count() };
             if count > 0 {
-                self.plant(region, states, rest.start..rest.start + count, *hub);
+                self.plant(view, states, rest.start..rest.start + count, *hub);
             }
             rest.start += count;
         }
@@ -141,13 +141,13 @@ impl Forest {
 
     /// The `keys` of all triangles that are no line and meet the cell, in the order of the curve.
     #[inline(always)]
-    fn collect(&mut self, region: &Region<'_>) {
-        let curve = Curve::new(region);
+    fn collect(&mut self, view: &CellView<'_>) {
+        let curve = Curve::new(view);
         let (mut low, mut high) = ([0_u32; 4096], [0_u32; 4096]);
         self.keys.clear();
-        self.keys.reserve(region.triangles.len());
-        let (mut batch, mut solid) = (Batch::EMPTY, region.solid_triangles());
-        while batch.fill(region, &mut solid) {
+        self.keys.reserve(view.triangles.len());
+        let (mut batch, mut solid) = (Batch::EMPTY, view.solid_triangles());
+        while batch.fill(view, &mut solid) {
             let places = curve.places(&batch.triangles);
             for (triangle, place) in batch.numbers().iter().zip(places).filter(|(_, place)| *place != NONE) {
                 low[(place & 4095) as usize] += 1;
@@ -172,19 +172,19 @@ impl Forest {
     }
 
     /// Brings the triangles of each hub together, keeping their order; the hubs of the groups, the first of which has none.
-    fn group_by_hub(&mut self, region: &Region<'_>, stars: &Stars, states: &[State]) -> Vec<u32> {
+    fn group_by_hub(&mut self, view: &CellView<'_>, stars: &Stars, states: &[State]) -> Vec<u32> {
         let is_hub = |v: u32| stars.degree(v as usize) > HUB && states[v as usize] != State::Open;
         let mut hubs = vec![NONE];
-        hubs.extend((0..region.positions.len() as u32).filter(|v| is_hub(*v)));
+        hubs.extend((0..view.positions.len() as u32).filter(|v| is_hub(*v)));
         if hubs.len() == 1 {
             return hubs;
         }
         self.groups.clear();
-        self.groups.resize(region.triangles.len(), 0);
+        self.groups.resize(view.triangles.len(), 0);
         let mut starts = vec![0_u32; hubs.len() + 1];
         for triangle in self.keys.iter().map(|key| *key as u32 as usize) {
             // The hub with the smallest number, which is position in `hubs`.
-            let group = region.triangles[triangle].iter().filter_map(|v| hubs[1..].binary_search(v).ok()).min();
+            let group = view.triangles[triangle].iter().filter_map(|v| hubs[1..].binary_search(v).ok()).min();
             let group = group.map_or(0, |g| g + 1);
             self.groups[triangle] = group as u32;
             starts[group + 1] += 1;
@@ -203,7 +203,7 @@ impl Forest {
 
     /// Builds the tree over some of `keys`, at least one.
     #[inline(always)]
-    fn plant(&mut self, region: &Region<'_>, states: &[State], keys: Range<usize>, hub: u32) {
+    fn plant(&mut self, view: &CellView<'_>, states: &[State], keys: Range<usize>, hub: u32) {
         let rows = self.planted * WIDTH..self.planted * WIDTH + keys.len();
         let mut starts = [0; LEVELS];
         (starts[0], starts[1]) = (self.planted as u32, self.nodes.len() as u32);
@@ -219,14 +219,14 @@ impl Forest {
         for ((number, leaf), keys) in self.leaves[first..].iter_mut().enumerate().zip(self.keys[keys].chunks(WIDTH)) {
             for (i, key) in keys.iter().enumerate() {
                 let triangle = *key as u32;
-                let vertices = region.triangles[triangle as usize];
-                triangles.set(i, &region.corners(vertices));
+                let vertices = view.triangles[triangle as usize];
+                triangles.set(i, &view.corners(vertices));
                 leaf.corners.set(i, vertices);
                 leaf.triangles[i] = triangle;
                 let open = vertices.map(|v| states[v as usize] == State::Open);
                 leaf.flags[i] = u8::from(open[0] | open[1] | open[2]) * OPEN;
             }
-            leaf.set_boxes(&triangles, &region.cell);
+            leaf.set_boxes(&triangles, &view.cell);
             for i in keys.len()..WIDTH {
                 leaf.clear(i);
             }

@@ -9,9 +9,9 @@ use crate::testing::{cuboid, records, soup};
 fn surveyed(records: &[Record], chunk_triangles: u32, spill: Spill) -> impl PartialEq + std::fmt::Debug {
     let limits = Limits { threads: 1, chunk_triangles, spill, ..Limits::default() };
     let survey = Survey::new(Path::new("test"), records, true, &limits, &Quiet).unwrap();
-    let patches: Vec<_> = survey.patches.iter().map(|p| (p.first, p.triangles, p.extent, p.bounds)).collect();
+    let regions: Vec<_> = survey.regions.iter().map(|p| (p.first, p.triangles, p.extent, p.bounds)).collect();
     let found =
-        (survey.irregular_triangles, survey.irregular_triangle_patches, patches, survey.nonfinite, survey.self_intersections);
+        (survey.irregular_triangles, survey.irregular_triangle_regions, regions, survey.nonfinite, survey.self_intersections);
     (found, survey.vertices, survey.vertices_used)
 }
 
@@ -51,8 +51,8 @@ fn divided(records: &[Record], chunk_triangles: u32, corners: &[Vec<usize>; 3]) 
     let regular: Vec<[f32; 3]> = promoted.into_iter().filter(|p| !first.contains(p)).collect();
     let new = survey.promote(&regular);
     divide(&mut survey, &second);
-    let patches: Vec<_> = survey.patches.iter().map(|p| (p.first, p.triangles, p.extent, p.bounds)).collect();
-    (divisions, new, survey.irregular_triangles, survey.irregular_triangle_patches, patches, survey.promoted)
+    let regions: Vec<_> = survey.regions.iter().map(|p| (p.first, p.triangles, p.extent, p.bounds)).collect();
+    (divisions, new, survey.irregular_triangles, survey.irregular_triangle_regions, regions, survey.promoted)
 }
 
 proptest! {
@@ -72,13 +72,13 @@ proptest! {
 }
 
 #[test]
-fn a_cube_is_one_patch_and_no_irregular_triangle() {
+fn a_cube_is_one_region_and_no_irregular_triangle() {
     let records = records(&cuboid([0.0; 3], [2.0; 3]));
     for chunk_triangles in [1, u32::MAX] {
         let limits = Limits { threads: 1, chunk_triangles, ..Limits::default() };
         let survey = Survey::new(Path::new("test"), &records, true, &limits, &Quiet).unwrap();
         assert!(survey.irregular_triangles.is_empty());
-        assert_eq!((survey.patches.len(), survey.patches[0].triangles, survey.vertices), (1, 12, 8));
-        assert!((survey.measure.volume(survey.patches[0].extent) - 8.0).abs() < 1e-9);
+        assert_eq!((survey.regions.len(), survey.regions[0].triangles, survey.vertices), (1, 12, 8));
+        assert!((survey.measure.volume(survey.regions[0].extent) - 8.0).abs() < 1e-9);
     }
 }

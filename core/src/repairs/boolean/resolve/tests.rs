@@ -16,7 +16,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::contract::progress::Quiet;
-use crate::contract::report::Rung;
+use crate::contract::report::RegionMethod;
 use crate::contract::settings::Limits;
 use crate::geometry::arrange::Rational;
 use crate::repairs::cleanup::duplicates;
@@ -254,8 +254,8 @@ fn every_cluster_is_told_of() {
     let both = [cube(), shifted(&cube(), [0.5, 0.625, 0.75])].concat();
     let got = resolved(&[both.clone(), shifted(&both, [16.0, 0.0, 0.0])].concat()).result;
     let bounds = |at: f32| [[at, 0.0, 0.0], [at + 1.5, 1.625, 1.75]];
-    let told: Vec<_> = got.regions.iter().map(|region| (region.rung, region.bounds, region.rounds, region.moved)).collect();
-    assert_eq!(told, [(Rung::Cut, bounds(0.0), 1, 0.0), (Rung::Cut, bounds(16.0), 1, 0.0)]);
+    let told: Vec<_> = got.regions.iter().map(|region| (region.method, region.bounds, region.rounds, region.moved)).collect();
+    assert_eq!(told, [(RegionMethod::Cut, bounds(0.0), 1, 0.0), (RegionMethod::Cut, bounds(16.0), 1, 0.0)]);
     assert!(got.regions.iter().all(|region| region.count > 3) && got.regions_left.is_empty());
 }
 
@@ -301,13 +301,13 @@ fn bodies_whose_faces_lie_in_planes_that_f32_cannot_hold_are_spread_by_some_step
             work,
             reversed: turned,
         };
-        let levels = vec![Level::Spread; pieces.list.len()];
+        let levels = vec![Level::Perturbed; pieces.list.len()];
         let profile = Profile::default();
         let (overlay, pairs, levels) = (&overlay, &pairs[..], &levels[..]);
         let by = Attempt { engine: &Rational, overlay, pairs, levels, profile: &profile, limits: &limits };
         let Ok(resolved) = state.attempt(&by) else { panic!("resolved") };
         let regions = state.track.regions(&mut state.clusters);
-        assert!(regions.iter().all(|region| region.rung == Rung::Spread) && regions.len() == 1, "{regions:?}");
+        assert!(regions.iter().all(|region| region.method == RegionMethod::Perturbed) && regions.len() == 1, "{regions:?}");
         resolved.displaced / state.step
     });
     assert!(got.verdict.good && got.defects.components == 1, "{:?}", got.verdict);
@@ -391,7 +391,7 @@ fn dust_that_cutting_left_goes_and_is_named() {
     assert!(got.verdict.good, "{:?}", got.verdict);
     assert_eq!(got.defects.components, 7);
     let [region] = &got.result.dust[..] else { panic!("{:?}", got.result.dust) };
-    assert_eq!((region.rung, region.bounds, region.count), (Rung::Dropped, [[0.0; 3], [dust; 3]], 12));
+    assert_eq!((region.method, region.bounds, region.count), (RegionMethod::Dropped, [[0.0; 3], [dust; 3]], 12));
 }
 
 #[test]

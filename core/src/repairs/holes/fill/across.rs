@@ -10,7 +10,7 @@ use crate::repairs::holes::patches::are_joined;
 use crate::repairs::shared::context::PatchAcross;
 use crate::repairs::shared::work::Work;
 use crate::submesh::{Origin, Submesh, Vertex};
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// Triangles around the first vertex of a loop.
 pub(crate) fn fan(vertices: usize) -> Vec<[u32; 3]> {
@@ -42,7 +42,7 @@ impl Closing<'_> {
                 if is_on_one_line(work, &way) {
                     balanced += 1;
                     fan(way.len()).into_iter().for_each(|t| {
-                        work.add(t.map(|i| way[i as usize]), Origin::Patch, NONE);
+                        work.add(t.map(|i| way[i as usize]), Origin::Added, NONE);
                     });
                 }
             }
@@ -98,7 +98,7 @@ impl Closing<'_> {
             };
             let first = work.triangles.len() as u32;
             for triangle in &patch.triangles {
-                work.add(triangle.map(|i| way[i as usize]), Origin::Patch, NONE);
+                work.add(triangle.map(|i| way[i as usize]), Origin::Added, NONE);
             }
             across.push((first..work.triangles.len() as u32, left));
         }

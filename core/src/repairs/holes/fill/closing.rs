@@ -1,7 +1,7 @@
 //! The loops of a submesh while they are closed: patches that are in, and loops that are open, with the reason.
 
 use crate::algorithms::triangulate::{self, FillSettings, Rim, Unfillable, strip};
-use crate::contract::report::LoopLeft;
+use crate::contract::report::{LoopLeft, MOST_LISTED};
 use crate::detect::holes::{self, loops::Loop};
 use crate::geometry::tri_tri;
 use crate::repairs::holes::patches::{Placed, are_joined, of_submesh};
@@ -55,9 +55,6 @@ pub(crate) enum Neighbours {
     Heeded,
     Ignored,
 }
-
-/// Longest list of open loops in a report.
-pub(crate) const LISTED: usize = 1000;
 
 pub(crate) fn left(submesh: &Submesh, from: Vertex, edges: usize, perimeter: f64, reason: &dyn std::fmt::Display) -> LoopLeft {
     LoopLeft { at: submesh.positions[from as usize], edges: edges as u64, perimeter, reason: reason.to_string() }
@@ -137,13 +134,13 @@ impl Closing<'_> {
         for (i, (rim, reason)) in self.open.iter().enumerate() {
             let rim = self.rim(*rim);
             if matches!(reason, NotFilled::NotAdmitted(NotAdmitted::Sheet)) {
-                let listed = (i < LISTED).then_some(i);
+                let listed = (i < MOST_LISTED).then_some(i);
                 // Of an island's rim and its hole's together, some are joints, which are gone.
                 if let Some(triangle) = rim.triangles.iter().copied().find(|t| work.lives(*t)) {
                     closed.sheets.push(SheetRim { triangle, edges: rim.vertices.len(), listed });
                 }
             }
-            if i >= LISTED {
+            if i >= MOST_LISTED {
                 continue;
             }
             closed.left.push(left(work, rim.vertices[0], rim.vertices.len(), rim.perimeter(work), reason));
@@ -162,7 +159,7 @@ impl Closing<'_> {
                 (0..3).any(|k| {
                     work.star(v[k]).any(|(other, _)| {
                         let triangle = &work.triangles[other as usize];
-                        triangle.v.contains(&v[(k + 1) % 3]) && triangle.origin == Origin::Patch && !idle.contains(&other)
+                        triangle.v.contains(&v[(k + 1) % 3]) && triangle.origin == Origin::Added && !idle.contains(&other)
                     })
                 })
             };

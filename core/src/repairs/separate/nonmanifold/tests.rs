@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::contract::progress::Quiet;
-use crate::contract::report::Rung;
+use crate::contract::report::RegionMethod;
 use crate::contract::settings::Limits;
 use crate::diagnosis::Diagnosis;
 use crate::io::record::Record;
@@ -55,8 +55,8 @@ fn of_two_cubes_at_an_edge_the_second_draws_back() {
     let got = separated(&mesh);
     assert_eq!((got.result.vertices, got.result.edges, got.result.left), (2, 0, 0));
     // Both ends of the edge are one region.
-    let regions: Vec<_> = got.result.regions.iter().map(|region| (region.rung, region.count, region.moved)).collect();
-    assert_eq!(regions, [(Rung::Separated, 2, got.result.farthest)]);
+    let regions: Vec<_> = got.result.regions.iter().map(|region| (region.method, region.count, region.moved)).collect();
+    assert_eq!(regions, [(RegionMethod::Separated, 2, got.result.farthest)]);
     // All of the first one's triangles are as they were.
     assert!(got.untouched >= 12 && got.verdict.good && got.defects.bodies == 2, "{:?}", got.verdict);
     assert!((got.defects.bounds.unwrap(), got.result.farthest < 1e-6) == ([[0.0; 3], [2.0, 2.0, 1.0]], true));

@@ -38,7 +38,7 @@ fn a_lid_is_cut_to_its_hole() {
 }
 
 #[test]
-fn a_patch_that_lies_on_a_body_goes_and_one_that_reaches_beyond_stays() {
+fn a_region_that_lies_on_a_body_goes_and_one_that_reaches_beyond_stays() {
     let body = cuboid([0.0, 0.0, -8.0], [8.0, 8.0, 0.0]);
     let got = cut(&body, &plate(8, |x, _| (2..6).contains(&x)), 0.001);
     assert_eq!(got.result, 64);
@@ -53,7 +53,7 @@ fn neighbours_stay() {
     for up in [0.0, 0.001] {
         assert_eq!(cut(&left, &right, up).result, 0);
     }
-    // A plate with a loose patch in its hole.
+    // A plate with a loose region in its hole.
     let around = plate(8, |x, y| !(3..5).contains(&x) || !(3..5).contains(&y));
     assert_eq!(cut(&around, &plate(8, |x, y| (3..5).contains(&x) && (3..5).contains(&y)), 0.001).result, 0);
 }

@@ -3,10 +3,10 @@
 use super::lanes::{Triangles, WIDTH};
 use crate::geometry::tri_tri::{Contact, self_intersection};
 use crate::stream::plan::HomeBox;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
 /// What one cell sees of a mesh. All coordinates are finite, −0.0 does not occur.
-pub(crate) struct Region<'a> {
+pub(crate) struct CellView<'a> {
     pub(crate) positions: &'a [[f32; 3]],
     /// Members in input order, then visitors. A triangle with a repeated vertex has [`NONE`] first and is left out.
     pub(crate) triangles: &'a [[u32; 3]],
@@ -29,7 +29,7 @@ pub(crate) enum Standing {
     Regular,
 }
 
-impl Region<'_> {
+impl CellView<'_> {
     #[inline(always)]
     pub(super) fn corners(&self, t: [u32; 3]) -> [[f32; 3]; 3] {
         let [a, b, c] = t;
@@ -59,7 +59,7 @@ impl Region<'_> {
     }
 }
 
-/// Up to sixteen triangles of a region, one batch after the other. Not a closure called for each, which would not be compiled for the
+/// Up to sixteen triangles of a view, one batch after the other. Not a closure called for each, which would not be compiled for the
 /// processor that its caller is compiled for.
 pub(super) struct Batch {
     pub(super) numbers: [u32; WIDTH],
@@ -72,11 +72,11 @@ impl Batch {
 
     /// Takes the next ones, if there are any.
     #[inline(always)]
-    pub(super) fn fill(&mut self, region: &Region<'_>, solid: &mut impl Iterator<Item = (u32, [u32; 3])>) -> bool {
+    pub(super) fn fill(&mut self, view: &CellView<'_>, solid: &mut impl Iterator<Item = (u32, [u32; 3])>) -> bool {
         self.count = 0;
         for (number, t) in solid.take(WIDTH) {
             self.numbers[self.count] = number;
-            self.triangles.set(self.count, &region.corners(t));
+            self.triangles.set(self.count, &view.corners(t));
             self.count += 1;
         }
         self.count > 0

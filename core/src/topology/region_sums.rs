@@ -1,12 +1,12 @@
-//! What is summed over the patches of a chunk.
+//! What is summed over the regions of a chunk.
 
 use crate::geometry::sums::{Bounds, Extent, Measure};
 use crate::io::record::Point;
-use crate::util::union_find::NONE;
+use crate::util::ids::NONE;
 
-/// What is summed over a patch: its triangles with three regular corners, until the merge also some whose other corners are not.
+/// What is summed over a region: its triangles with three regular corners, until the merge also some whose other corners are not.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Patch {
+pub(crate) struct RegionSums {
     pub(crate) triangles: u64,
     pub(crate) extent: Extent,
     /// Of its regular vertices.
@@ -15,38 +15,48 @@ pub(crate) struct Patch {
     pub(crate) first: u32,
 }
 
-/// Adds triangles up for the patch that the last of them belonged to. Those of the largest patch are only counted: the sum over all of
+/// Adds triangles up for the region that the last of them belonged to. Those of the largest region are only counted: the sum over all of
 /// the chunk is known, and sums are exact, so theirs is what the others leave.
 pub(crate) struct Sum<'a> {
     pub(crate) measure: &'a Measure,
     pub(crate) positions: &'a [Point],
     /// [`NONE`] if there is none.
     pub(crate) largest: u32,
-    pub(crate) patch: u32,
+    pub(crate) region: u32,
     pub(crate) first: u32,
     pub(crate) triangles: u64,
-    pub(crate) of_patch: Batch,
+    pub(crate) of_region: Batch,
     pub(crate) of_none: Batch,
-    /// Of what is not the largest patch's.
+    /// Of what is not the largest region's.
     pub(crate) others: Extent,
 }
 
 impl<'a> Sum<'a> {
     pub(crate) fn new(measure: &'a Measure, positions: &'a [Point], largest: u32) -> Self {
-        let (of_patch, of_none) = (Batch::default(), Batch::default());
-        Self { measure, positions, largest, patch: NONE, first: NONE, triangles: 0, of_patch, of_none, others: Extent::default() }
+        let (of_region, of_none) = (Batch::default(), Batch::default());
+        Self {
+            measure,
+            positions,
+            largest,
+            region: NONE,
+            first: NONE,
+            triangles: 0,
+            of_region,
+            of_none,
+            others: Extent::default(),
+        }
     }
 
     #[inline(always)]
-    pub(crate) fn add(&mut self, patch: u32, triangle: u32, vertices: [u32; 3], patches: &mut [Patch]) {
-        if self.patch != patch || self.of_patch.is_full() {
-            self.flush(patches);
-            self.patch = patch;
+    pub(crate) fn add(&mut self, region: u32, triangle: u32, vertices: [u32; 3], regions: &mut [RegionSums]) {
+        if self.region != region || self.of_region.is_full() {
+            self.flush(regions);
+            self.region = region;
         }
         self.first = self.first.min(triangle);
         self.triangles += 1;
-        if patch != self.largest {
-            self.of_patch.push(vertices.map(|v| self.positions[v as usize]));
+        if region != self.largest {
+            self.of_region.push(vertices.map(|v| self.positions[v as usize]));
         }
     }
 
@@ -60,11 +70,11 @@ impl<'a> Sum<'a> {
     }
 
     #[inline(always)]
-    pub(crate) fn flush(&mut self, patches: &mut [Patch]) {
+    pub(crate) fn flush(&mut self, regions: &mut [RegionSums]) {
         if self.triangles > 0 {
-            let extent = self.of_patch.take(self.measure);
+            let extent = self.of_region.take(self.measure);
             self.others += extent;
-            let sums = &mut patches[self.patch as usize];
+            let sums = &mut regions[self.region as usize];
             sums.first = sums.first.min(self.first);
             sums.triangles += self.triangles;
             sums.extent += extent;
@@ -73,11 +83,11 @@ impl<'a> Sum<'a> {
     }
 
     /// The sum over all members being `total`.
-    pub(crate) fn finish(mut self, mut total: Extent, patches: &mut [Patch]) {
-        self.flush(patches);
+    pub(crate) fn finish(mut self, mut total: Extent, regions: &mut [RegionSums]) {
+        self.flush(regions);
         self.others += self.of_none.take(self.measure);
         total -= self.others;
-        if let Some(largest) = patches.get_mut(self.largest as usize) {
+        if let Some(largest) = regions.get_mut(self.largest as usize) {
             largest.extent = total;
         }
     }

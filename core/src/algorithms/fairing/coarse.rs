@@ -4,7 +4,7 @@ use crate::geometry::exact::Point;
 
 /// What a patch is shaped from, in one numbering of vertices. Positions are finite, and no two of the same piece are equal.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Region<'a> {
+pub(crate) struct CoarsePatch<'a> {
     /// The rim's vertices and those of the rings around.
     pub(crate) positions: &'a [Point],
     /// The coarse patch, with all its vertices on its border, the rim.

@@ -8,8 +8,8 @@ use std::cmp::Ordering;
 
 use super::edges::{Edge, Edges, Use};
 use super::{Submesh, Vertex};
-use crate::geometry::exact::{Point, collinear, side, turn};
-use crate::util::union_find::NONE;
+use crate::geometry::exact::{Point, collinear, orientation_along, side};
+use crate::util::ids::NONE;
 
 /// An edge of a triangle: the one that begins at this corner of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,18 +32,18 @@ impl Half {
 }
 
 /// The partner of every edge of every triangle.
-pub(crate) struct Wedges {
+pub(crate) struct RadialPairs {
     /// By [`Half::number`]; [`NONE`] where there is none.
     mates: Vec<u32>,
 }
 
-impl Wedges {
+impl RadialPairs {
     /// An edge whose triangles do not run as often one way as the other, or two of which lie in one direction from it, pairs none of them.
     /// O(submesh), O(n log n) in the triangles around one edge.
     pub(crate) fn of(submesh: &Submesh, edges: &Edges) -> Self {
         let mut mates = vec![NONE; submesh.triangles.len() * 3];
         for edge in edges.iter().filter(|e| !e.is_unbalanced()) {
-            for wedge in wedges(submesh, &edge) {
+            for wedge in radial_pairs(submesh, &edge) {
                 let [a, b] = wedge.map(|used| Half::of(submesh, &edge, used).number());
                 mates[a as usize] = b;
                 mates[b as usize] = a;
@@ -85,7 +85,7 @@ impl Wedges {
 
 /// The pairs of a balanced edge's triangles that have a wedge of material between them, each with the triangle first behind which it begins,
 /// seen from the edge's low end turning left. None if two triangles lie in one direction from the edge.
-fn wedges<'e>(submesh: &Submesh, edge: &Edge<'e>) -> Vec<[&'e Use; 2]> {
+fn radial_pairs<'e>(submesh: &Submesh, edge: &Edge<'e>) -> Vec<[&'e Use; 2]> {
     if let [a, b] = edge.uses {
         return vec![if a.forward { [b, a] } else { [a, b] }];
     }
@@ -125,11 +125,11 @@ fn around(ends: &[Point; 2], points: &[Point]) -> Option<Vec<usize>> {
         return None;
     }
     let first = &points[0];
-    let axis = (0..3).find(|axis| turn(p, q, first, *axis) != 0)?;
+    let axis = (0..3).find(|axis| orientation_along(p, q, first, *axis) != 0)?;
     let quarter = |r: &Point| match side(p, q, first, r) {
         1 => 1,
         -1 => 3,
-        _ if turn(p, q, r, axis) == turn(p, q, first, axis) => 0,
+        _ if orientation_along(p, q, r, axis) == orientation_along(p, q, first, axis) => 0,
         _ => 2,
     };
     let mut order: Vec<(u8, usize)> = points.iter().enumerate().map(|(i, r)| (quarter(r), i)).collect();
@@ -168,7 +168,7 @@ mod tests {
         let edges = Edges::of(&d.submesh);
         let number = |p: [f32; 3]| d.submesh.positions.iter().position(|q| *q == p).unwrap() as u32;
         let edge = edges.between(number([1.0, 1.0, 0.0]), number([1.0, 1.0, 1.0])).unwrap();
-        let mut pairs: Vec<[u32; 2]> = wedges(&d.submesh, &edge)
+        let mut pairs: Vec<[u32; 2]> = radial_pairs(&d.submesh, &edge)
             .iter()
             .map(|pair| {
                 let mut places = pair.map(|used| d.submesh.record(used.triangle));
@@ -210,7 +210,7 @@ mod tests {
         let records = records(mesh);
         let d = diagnose(&records);
         let v = d.submesh.positions.iter().position(|p| *p == [1.0; 3]).unwrap() as u32;
-        let fans = Wedges::of(&d.submesh, &Edges::of(&d.submesh)).fans(&d.submesh, v)?;
+        let fans = RadialPairs::of(&d.submesh, &Edges::of(&d.submesh)).fans(&d.submesh, v)?;
         Some(fans.iter().map(Vec::len).collect())
     }
 

@@ -1,0 +1,125 @@
+//! The kinds of repairs, as reports name them.
+
+use serde::{Deserialize, Serialize};
+
+/// A kind of repair. Several steps of the pipeline may account for one kind. `core/REPORT.md` says what each does.
+///
+/// In JSON it is the variant's name in `snake_case`. Names of reports of schema 1 are read, too.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum RepairName {
+    /// Triangles with a repeated corner, or of no area, were removed.
+    Degenerate,
+    /// Triangles on the vertices of another triangle were removed.
+    Duplicate,
+    /// Surface that lay on other surface, facing the same way, was removed.
+    #[serde(alias = "lap")]
+    Overlap,
+    /// Sheets that hang from a closed surface, or cross a body, were removed.
+    Surplus,
+    /// Boundary vertices within the weld tolerance were moved to one position.
+    ToleranceWeld,
+    /// Edges were split at vertices that lie on them.
+    TJunction,
+    /// Boundary vertices were merged across a narrow gap.
+    Zip,
+    /// Triangles of slits whose two sides run past each other were removed.
+    #[serde(alias = "overrun")]
+    SlitSides,
+    /// Open specks were dropped.
+    Debris,
+    /// Parts that are seen from behind were turned.
+    #[serde(alias = "facing")]
+    Visibility,
+    /// Triangles were turned to agree with their neighbours.
+    Orient,
+    /// Rims of open shapes got a skirt down into the surface that they stand on.
+    #[serde(alias = "seat")]
+    Skirt,
+    /// Boundary loops were closed.
+    Fill,
+    /// Lone sheets were dropped.
+    Sheets,
+    /// Components that were inside out were turned.
+    Outward,
+    /// Triangles that crossed were cut along each other.
+    #[serde(alias = "resolve")]
+    SelfIntersection,
+    /// Tiny bodies and voids that cutting left were dropped.
+    Dust,
+    /// Nothing was changed: these crossings were left.
+    #[serde(alias = "crossings left")]
+    SelfIntersectionsLeft,
+    /// Bodies that lay in the material of others were removed.
+    #[serde(alias = "swallowed")]
+    Enclosed,
+    /// Surface that cannot be seen from outside was removed.
+    Hidden,
+    /// Surfaces that shared an edge or a vertex got vertices of their own.
+    #[serde(alias = "separated")]
+    Separate,
+    /// A region was replaced by a surface around the space that it encloses.
+    Wrap,
+}
+
+impl RepairName {
+    /// The name in a report.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Degenerate => "degenerate",
+            Self::Duplicate => "duplicate",
+            Self::Overlap => "overlap",
+            Self::Surplus => "surplus",
+            Self::ToleranceWeld => "tolerance_weld",
+            Self::TJunction => "t_junction",
+            Self::Zip => "zip",
+            Self::SlitSides => "slit_sides",
+            Self::Debris => "debris",
+            Self::Visibility => "visibility",
+            Self::Orient => "orient",
+            Self::Skirt => "skirt",
+            Self::Fill => "fill",
+            Self::Sheets => "sheets",
+            Self::Outward => "outward",
+            Self::SelfIntersection => "self_intersection",
+            Self::Dust => "dust",
+            Self::SelfIntersectionsLeft => "self_intersections_left",
+            Self::Enclosed => "enclosed",
+            Self::Hidden => "hidden",
+            Self::Separate => "separate",
+            Self::Wrap => "wrap",
+        }
+    }
+}
+
+impl std::fmt::Display for RepairName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.as_str())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::RepairName;
+
+    #[test]
+    fn reports_of_schema_1_are_read() {
+        let read = |name: &str| serde_json::from_value::<RepairName>(name.into()).map(RepairName::as_str).ok();
+        let renamed = [
+            ("lap", "overlap"),
+            ("overrun", "slit_sides"),
+            ("facing", "visibility"),
+            ("seat", "skirt"),
+            ("resolve", "self_intersection"),
+            ("crossings left", "self_intersections_left"),
+            ("swallowed", "enclosed"),
+            ("separated", "separate"),
+            ("t_junction", "t_junction"),
+        ];
+        for (before, now) in renamed {
+            assert_eq!((read(before), read(now)), (Some(now), Some(now)));
+        }
+        assert_eq!(read("no repair"), None);
+    }
+}

@@ -1,0 +1,182 @@
+//! The review: what a good result has changed beyond the profile's limits, so that a person must look at it.
+//!
+//! Each function returns its concerns as lines for people; none means that nobody need look. `core/REPORT.md` has the limits.
+
+use crate::contract::report::{Defects, Region, SheetDropped, Volumes, Wrap};
+use crate::contract::settings::Profile;
+use crate::geometry::sums::Bounds;
+
+/// Bodies that lay in the material of others.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Enclosed {
+    pub(crate) bodies: u64,
+    /// What the bodies enclose less their cavities, which lies in the bodies around them as well. In the file's units, cubed.
+    pub(crate) volume: f64,
+    /// Where they were.
+    pub(crate) regions: Vec<Region>,
+}
+
+/// What wraps have replaced beyond the profile's limit, in words.
+pub(crate) fn wraps(wraps: &[Wrap], profile: &Profile) -> Option<String> {
+    let done = || wraps.iter().filter(|wrap| wrap.left.is_none());
+    let share: f64 = done().map(|wrap| wrap.area_share).sum();
+    let moved = done().map(|wrap| wrap.moved).fold(0.0, f64::max);
+    (share > profile.wrap_review_share)
+        .then(|| format!("{:.1} % of the surface was replaced by wraps, and moved by up to {moved:.4}", share * 100.0))
+}
+
+/// What a good result has changed beyond the profile's limits, in words; empty when a person need not look. `surface`: the box of the
+/// input's surface, triangles of no area left out; `enclosed`: the bodies that lay in others, whose volume
+/// counted twice.
+pub(crate) fn counts(before: &Defects, surface: &Bounds, enclosed: &Enclosed, after: &Defects, profile: &Profile) -> Vec<String> {
+    let mut concerns = Vec::new();
+    // The volume of an open or incoherent surface depends on the origin, and duplicates count twice: only what enclosed a volume
+    // once can be compared.
+    let has_volume = before.boundary_edges + before.unbalanced_edges + before.nonmanifold_edges + before.inverted_components == 0;
+    let volume = before.volume - enclosed.volume;
+    if has_volume && volume > 0.0 {
+        let change = (after.volume - volume).abs() / volume;
+        if change > profile.max_volume_change {
+            concerns.push(format!("the volume changed by {:.1} %, from {} to {}", change * 100.0, volume, after.volume));
+        }
+    }
+    if before.area > 0.0 {
+        let change = (after.area - before.area) / before.area;
+        if change.abs() > profile.max_area_change {
+            concerns.push(format!("the area changed by {:.1} %, from {} to {}", change * 100.0, before.area, after.area));
+        }
+    }
+    if let Some([lo, hi]) = after.bounds {
+        let pairs = surface.lo.iter().zip(lo).chain(surface.hi.iter().zip(hi));
+        let most = pairs.map(|(a, b)| (f64::from(*a) - f64::from(b)).abs()).fold(0.0, f64::max);
+        if most > profile.max_box_change_relative * surface.diagonal() {
+            concerns.push(format!("the bounding box moved by {most}"));
+        }
+    }
+    let all = before.bodies + before.nested_positive;
+    let lost = all.saturating_sub(after.bodies + after.nested_positive + enclosed.bodies);
+    if lost > u64::from(profile.max_bodies_lost) {
+        concerns.push(format!("{lost} of {all} bodies were lost"));
+    }
+    concerns
+}
+
+/// What left the model of its bodies beyond the profile's limits, in words.
+pub(crate) fn volumes(volumes: &Volumes, profile: &Profile) -> Vec<String> {
+    let mut concerns = Vec::new();
+    if volumes.lost > u64::from(profile.max_bodies_lost) {
+        let largest = volumes.listed.first().map_or(String::new(), |body| {
+            let [lo, hi] = body.bounds;
+            format!(", the largest from {lo:?} to {hi:?} of {:.4} units³", body.volume)
+        });
+        concerns.push(format!("{} of {} bodies are not inside the result{largest}", volumes.lost, volumes.bodies));
+    }
+    if volumes.outside > profile.max_volume_change * volumes.volume {
+        let share = volumes.outside / volumes.volume * 100.0;
+        concerns.push(format!("about {share:.1} % of what the bodies enclosed is outside of the result"));
+    }
+    concerns
+}
+
+/// Whether a person should look at what was dropped of sheets: they may have been meant for walls.
+pub(crate) fn sheets(before: &Defects, dropped: &[SheetDropped], profile: &Profile) -> Option<String> {
+    let area: f64 = dropped.iter().map(|sheet| sheet.area).sum();
+    // Nothing tells against one that crosses nothing and is not hidden but that it is open.
+    let free: f64 = dropped.iter().filter(|sheet| !sheet.crosses && !sheet.hidden).map(|sheet| sheet.area).sum();
+    let [lo, hi] = dropped.first()?.bounds;
+    (area > profile.max_sheets_share * before.area || free > profile.debris_area_share * before.area).then(|| {
+        let (count, share) = (dropped.len(), area / before.area * 100.0);
+        format!("open sheets dropped that bound nothing, {count} of {share:.1} % of the area, the largest from {lo:?} to {hi:?}")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contract::report::SelfIntersections;
+
+    /// The counts of a unit cube.
+    fn cube() -> Defects {
+        let self_intersections = Some(SelfIntersections::default());
+        Defects {
+            triangles: 12,
+            bodies: 1,
+            volume: 1.0,
+            bounds: Some([[0.0; 3], [1.0; 3]]),
+            self_intersections,
+            ..Defects::default()
+        }
+    }
+
+    const BOX: Bounds = Bounds { lo: [0.0; 3], hi: [1.0; 3] };
+
+    #[test]
+    fn review_begins_beyond_the_limits() {
+        let profile =
+            Profile { max_volume_change: 0.25, max_box_change_relative: 0.25, max_bodies_lost: 1, ..Profile::default() };
+        let concerns = |before: Defects, after: Defects| counts(&before, &BOX, &Enclosed::default(), &after, &profile).len();
+        // The volume may change by just a quarter either way.
+        for (volume, count) in [(1.25, 0), (0.75, 0), (1.26, 1), (0.74, 1)] {
+            assert_eq!(concerns(cube(), Defects { volume, ..cube() }), count, "volume {volume}");
+        }
+        // A quarter of the diagonal is 0.433.
+        for (x, count) in [(1.43, 0), (1.44, 1), (0.57, 0), (0.56, 1)] {
+            assert_eq!(concerns(cube(), Defects { bounds: Some([[0.0; 3], [x, 1.0, 1.0]]), ..cube() }), count, "side {x}");
+        }
+        for (bodies, nested_positive, count) in [(2, 0, 0), (1, 0, 1), (1, 1, 0)] {
+            assert_eq!(concerns(Defects { bodies: 3, ..cube() }, Defects { bodies, nested_positive, ..cube() }), count);
+        }
+    }
+
+    #[test]
+    fn the_volume_of_what_enclosed_none_is_not_compared() {
+        let open = Defects { boundary_edges: 3, volume: 0.1, ..cube() };
+        assert!(counts(&open, &BOX, &Enclosed::default(), &cube(), &Profile::default()).is_empty());
+        let inside_out = Defects { inverted_components: 1, volume: -1.0, ..cube() };
+        assert!(counts(&inside_out, &BOX, &Enclosed::default(), &cube(), &Profile::default()).is_empty());
+    }
+
+    #[test]
+    fn what_lay_in_others_is_neither_lost_nor_a_change_of_volume() {
+        let before = Defects { bodies: 1, nested_positive: 2, volume: 1.5, ..cube() };
+        let enclosed = Enclosed { bodies: 2, volume: 0.5, ..Enclosed::default() };
+        let concerns = |enclosed: &Enclosed| counts(&before, &BOX, enclosed, &cube(), &Profile::default());
+        assert!(concerns(&enclosed).is_empty(), "{:?}", concerns(&enclosed));
+        assert_eq!(concerns(&Enclosed::default()).len(), 2, "the volume, and the bodies");
+    }
+
+    #[test]
+    fn the_area_may_grow_by_as_much_as_the_profile_says() {
+        let profile = Profile { max_area_change: 0.25, ..Profile::default() };
+        let concerns = |area: f64| {
+            let before = Defects { area: 6.0, ..cube() };
+            counts(&before, &BOX, &Enclosed::default(), &Defects { area, ..cube() }, &profile).len()
+        };
+        assert_eq!([7.5, 7.6, 4.5, 4.4].map(concerns), [0, 1, 0, 1]);
+    }
+
+    #[test]
+    fn bodies_that_left_the_model_need_review() {
+        let profile = Profile { max_volume_change: 0.25, max_bodies_lost: 1, ..Profile::default() };
+        let concerns = |lost: u64, outside: f64| {
+            volumes(&Volumes { bodies: 9, points: 9, volume: 4.0, outside, lost, listed: Vec::new() }, &profile).len()
+        };
+        assert_eq!([concerns(0, 0.0), concerns(1, 1.0), concerns(2, 1.0), concerns(0, 1.01)], [0, 0, 1, 1]);
+    }
+
+    #[test]
+    fn dropped_sheets_need_review_beyond_a_share_of_the_area() {
+        let before = Defects { area: 600.0, ..cube() };
+        let dropped = |area: f64, crosses: bool| {
+            let sheet = SheetDropped { bounds: [[0.0; 3], [1.0; 3]], area, triangles: 2, crosses, hidden: false };
+            let profile = Profile { max_sheets_share: 0.25, debris_area_share: 0.125, ..Profile::default() };
+            sheets(&before, &[sheet.clone(), sheet], &profile)
+        };
+        let concern = |area: f64| dropped(area, true);
+        assert_eq!(concern(75.0), None);
+        assert_eq!(dropped(37.5, false), None, "next to nothing");
+        assert!(dropped(37.6, false).is_some(), "it crosses nothing");
+        assert!(concern(75.1).is_some_and(|words| words.contains("2 of 25.0 %")));
+        assert_eq!(sheets(&before, &[], &Profile::default()), None);
+    }
+}

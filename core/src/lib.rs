@@ -1,7 +1,14 @@
 //! Suture's engine: it reads a triangle soup, builds its topology in star-complete chunks, repairs what is broken as a sparse
 //! edit against the original, writes the result once and judges the written bytes.
 //!
-//! It knows no daemon and no store. The two entry points are [`inspect`] and [`repair`].
+//! It knows no daemon and no store. For files there are [`inspect`] and [`repair`], out of core; for meshes in memory [`inspect_mesh`] and
+//! [`repair_mesh`], and the single steps in [`operations`].
+//!
+//! - [`Profile`] says what a repair may do, [`Limits`] what it may spend. The result depends on the profile alone.
+//! - A [`Progress`] is told where the work stands, and can end it ([`Error::is_cancellation`]).
+//! - **Panics:** no function of this crate panics, whatever the bytes of a file, the numbers of a mesh, or the settings. Where a library
+//!   below panics for want of memory, the error is [`Error::Starved`]. Property tests and ten minutes of random inputs for each function
+//!   hold this; a panic is a defect to be reported. A panic of the caller's [`Progress`] goes through.
 
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 
@@ -27,27 +34,33 @@ mod topology;
 mod util;
 
 pub use contract::access::Access;
+pub use contract::builder::ProfileBuilder;
 pub use contract::error::{Error, ErrorClass};
 pub use contract::progress::{Progress, Quiet};
 pub use contract::ranges::ProfileError;
-pub use contract::report::Report;
-pub use contract::settings::{Bodies, Guarantee, Limits, PatchShape, Profile};
+pub use contract::report::{FaceOrigin, RepairName, Report};
+pub use contract::settings::{Bodies, Guarantee, Limits, PatchShape, Profile, Sheets, Spill};
 pub use contract::{error, report, settings};
 pub use detect::rules::{RULES, Rule};
+pub use engine::memory::RepairedMesh;
+pub use engine::mesh::{Mesh, MeshError, MeshView};
+pub use engine::operations;
 pub use io::read::ends_in_zeros;
 pub use io::{read, record};
 
 use std::path::Path;
 
-/// Diagnoses `input` and writes nothing.
+/// Diagnoses the file `input` and writes nothing.
+///
+/// O(n log n) in its triangles, within the memory of `limits` whatever the file's size.
 ///
 /// # Errors
 /// [`Error`]; nothing was written in any case.
 pub fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> error::Result<Report> {
-    engine::inspect(input, profile, limits, progress)
+    engine::files::inspect(input, profile, limits, progress)
 }
 
-/// Repairs `input` into `output`, which must not exist: the caller owns a temporary name and publishes it. (Or it is an empty file
+/// Repairs the file `input` into `output`, which must not exist: the caller owns a temporary name and publishes it. (Or it is an empty file
 /// without a name, which the caller holds open and knows by its path below `/proc`; then [`Limits::spool`] says where there is room.)
 /// The output is synced to disk before this returns, unless [`Limits::defer_sync`] says otherwise. A file that is good as it comes is
 /// copied byte for byte.
@@ -55,5 +68,58 @@ pub fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress: &dyn 
 /// # Errors
 /// [`Error`]; what then stands at `output` is incomplete and to be removed.
 pub fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> error::Result<Report> {
-    engine::repair(input, output, profile, limits, progress)
+    engine::files::repair(input, output, profile, limits, progress)
+}
+
+/// Diagnoses a mesh in memory.
+///
+/// ```
+/// use suture_core::{Limits, Mesh, Profile, Quiet, inspect_mesh};
+///
+/// let mesh = Mesh::from_triangles(&[[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]])?;
+/// let report = inspect_mesh(&mesh, &Profile::default(), &Limits::default(), &Quiet)?;
+/// assert!(!report.verdict.good);
+/// assert_eq!(report.before.boundary_edges, 3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`Error`], but for those of reading and writing files. A mesh without faces is [`Error::Unreadable`].
+pub fn inspect_mesh<'m>(
+    mesh: impl Into<MeshView<'m>>,
+    profile: &Profile,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> error::Result<Report> {
+    engine::memory::inspect(mesh.into(), profile, limits, progress)
+}
+
+/// Repairs a mesh in memory. Its faces become those that [`repair`] writes for a file of the same triangles, in the same order; each has an
+/// origin.
+///
+/// The memory of `limits` is what the engine needs beside the mesh, 50 bytes a face, and the result.
+///
+/// ```
+/// use suture_core::{FaceOrigin, Limits, Mesh, Profile, Quiet, RepairName, repair_mesh};
+///
+/// // A tetrahedron without its last face.
+/// let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// let open = Mesh::new(corners, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2]])?;
+/// let repaired = repair_mesh(&open, &Profile::default(), &Limits::default(), &Quiet)?;
+/// assert!(repaired.report.verdict.good);
+/// assert_eq!(repaired.mesh.faces().len(), 4);
+/// assert_eq!(repaired.origins[2], FaceOrigin::Input(2));
+/// assert_eq!(repaired.origins[3], FaceOrigin::Repair(RepairName::Fill));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`Error`], but for those of reading and writing files. A mesh without faces is [`Error::Unreadable`].
+pub fn repair_mesh<'m>(
+    mesh: impl Into<MeshView<'m>>,
+    profile: &Profile,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> error::Result<RepairedMesh> {
+    engine::memory::repair(mesh.into(), repairs::Steps::All, profile, limits, progress)
 }

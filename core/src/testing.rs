@@ -74,7 +74,7 @@ pub(crate) fn after<R>(triangles: &[Corners], repair: impl FnOnce(&mut Diagnosis
     let mut diagnosis = diagnose(&input);
     let mut turned = Reversed::none(&diagnosis.survey);
     let result = repair(&mut diagnosis, &mut turned);
-    let edit = Edit::of(&diagnosis.survey, &diagnosis.submesh, &turned);
+    let edit = Edit::of(&diagnosis.survey, &diagnosis.submesh, &turned, &[]);
     let defects = diagnose(&written(&edit, &input)).defects;
     check_second_look(diagnosis.survey, &edit, &defects);
     let verdict = crate::detect::verdict::judge(&defects, &[]);
@@ -101,9 +101,9 @@ pub(crate) fn written(edit: &Edit, input: &[Record]) -> Vec<Record> {
     let walked: Result<(), ()> = edit.walk(input, |step| {
         match step {
             Step::Untouched(run) => output.extend_from_slice(run),
-            Step::Changed(_, record) => output.push(record),
+            Step::Changed(_, record, _) => output.push(record),
             Step::Deleted(_) => {}
-            Step::Added(record) => output.push(*record),
+            Step::Added(record, _) => output.push(*record),
         }
         Ok(())
     });

@@ -179,6 +179,8 @@ fn size(report: &Report) -> String {
     let format = match report.input.format {
         Format::BinaryStl => "binary STL",
         Format::AsciiStl => "ASCII STL",
+        // The command line reads files only.
+        _ => "no file",
     };
     format!("{} triangles, {}, {format}", show_count(report.input.triangles), show_size(report.input.bytes))
 }

@@ -63,6 +63,11 @@ impl Error {
         move |source| Self::Io { path, action, source }
     }
 
+    /// The work ended because its [`Progress`](crate::Progress) said so.
+    pub fn is_cancellation(&self) -> bool {
+        matches!(self, Self::Io { source, .. } if source.kind() == std::io::ErrorKind::Interrupted)
+    }
+
     /// Who can do something about it.
     pub fn class(&self) -> ErrorClass {
         match self {

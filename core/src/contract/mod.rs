@@ -6,7 +6,9 @@
 //! finite ([`finite`]). An error says whether more memory, another machine, or nothing at all would help ([`error`]).
 
 pub(crate) mod access;
+pub(crate) mod builder;
 pub mod error;
+pub(crate) mod face_origin;
 pub(crate) mod finite;
 pub(crate) mod judgement;
 pub(crate) mod loop_class;

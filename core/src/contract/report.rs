@@ -1,5 +1,6 @@
 //! The report: what was found, what was done, and the verdict on the bytes written. Documented in `core/REPORT.md`.
 
+pub use crate::contract::face_origin::FaceOrigin;
 pub use crate::contract::judgement::{Certificate, RuleOutcome, RuleResult, Verdict};
 pub use crate::contract::loop_class::LoopClass;
 pub use crate::contract::repair_name::RepairName;
@@ -125,12 +126,15 @@ fn lossy<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&path.to_string_lossy())
 }
 
-/// Mesh file formats that are read.
+/// Where a mesh is read from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Format {
     BinaryStl,
     AsciiStl,
+    /// No file: a mesh that a program handed over in memory.
+    Memory,
 }
 
 /// Counts after the exact weld. Definitions: `core/DEFECTS.md`.
@@ -440,6 +444,9 @@ pub struct EditRecords {
     pub moved: Vec<(u32, [[f32; 3]; 3])>,
     /// New records, in file order: corners and attribute word.
     pub added: Vec<([[f32; 3]; 3], u16)>,
+    /// Where each of them comes from: [`FaceOrigin::Part`] or [`FaceOrigin::Repair`]. Empty in a report of an engine that did not tell.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub added_from: Vec<FaceOrigin>,
 }
 
 /// One stage's share of the time.

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::contract::report::{EditRecords, EditSummary};
+use crate::contract::report::{EditRecords, EditSummary, FaceOrigin, RepairName};
 use crate::io::read_ahead::ASKED_AT_ONCE;
 use crate::io::record::{self, Record};
 use crate::submesh::components::Reversed;
@@ -31,16 +31,18 @@ pub(crate) struct Edit {
     /// And of regions that go.
     dropped: Vec<u64>,
     /// New records. As many as can take the places of deleted ones, in order; the rest goes to the end of the file.
-    pub(crate) added: Vec<Record>,
+    added: Vec<Record>,
+    /// Where each of them comes from.
+    added_from: Vec<FaceOrigin>,
     flips: u64,
     deletions: u64,
     max_move: f64,
 }
 
 impl Edit {
-    /// What stands in the submesh against the records it was gathered from. O(submesh), and one pass over the records of
-    /// reversed regions.
-    pub(crate) fn of(survey: &Survey<'_>, submesh: &Submesh, reversed: &Reversed) -> Self {
+    /// What stands in the submesh against the records it was gathered from, and the triangles of wraps. O(submesh + wrapped), and one pass
+    /// over the records of reversed regions.
+    pub(crate) fn of(survey: &Survey<'_>, submesh: &Submesh, reversed: &Reversed, wrapped: &[[[f32; 3]; 3]]) -> Self {
         let mut edit = Self::default();
         edit.changes.reserve_exact(survey.nonfinite.iter().map(|r| r.1 as usize).sum());
         edit.changes
@@ -50,7 +52,7 @@ impl Edit {
                 let soon = submesh.triangles[i..].iter().take(ASKED_AT_ONCE);
                 survey.ask_for(soon.filter_map(|t| match t.origin {
                     Origin::Input(record) | Origin::Part(record) => Some(record),
-                    Origin::Added => None,
+                    Origin::Added(_) => None,
                 }));
             }
             let points = || submesh.points(i as u32);
@@ -58,12 +60,13 @@ impl Edit {
                 Origin::Input(t) if triangle.alive => edit.compare(survey.records, t, points()),
                 Origin::Input(t) => edit.changes.push((t, Change::Delete)),
                 Origin::Part(t) if triangle.alive => {
-                    edit.added.push(record::encode(points(), record::attribute(&survey.records[t as usize])));
+                    edit.add(points(), record::attribute(&survey.records[t as usize]), FaceOrigin::Part(t));
                 }
-                Origin::Added if triangle.alive => edit.added.push(record::encode(points(), 0)),
-                Origin::Part(_) | Origin::Added => {}
+                Origin::Added(repair) if triangle.alive => edit.add(points(), 0, FaceOrigin::Repair(repair)),
+                Origin::Part(_) | Origin::Added(_) => {}
             }
         }
+        wrapped.iter().for_each(|corners| edit.add(*corners, 0, FaceOrigin::Repair(RepairName::Wrap)));
         edit.changes.sort_unstable_by_key(|(t, _)| *t);
         edit.deletions = edit.changes.iter().filter(|c| c.1 == Change::Delete).count() as u64;
         edit.flips = edit.changes.iter().filter(|c| c.1 == Change::Flip).count() as u64;
@@ -74,6 +77,16 @@ impl Edit {
         edit.flips += flips;
         edit.deletions += deletions;
         edit
+    }
+
+    fn add(&mut self, corners: [[f32; 3]; 3], attribute: u16, from: FaceOrigin) {
+        self.added.push(record::encode(corners, attribute));
+        self.added_from.push(from);
+    }
+
+    /// New records, in order.
+    pub(crate) fn added(&self) -> &[Record] {
+        &self.added
     }
 
     /// Notes how a living triangle differs from its record, if it does.
@@ -131,7 +144,7 @@ impl Edit {
         mut step: impl FnMut(Step<'r, 'e>) -> Result<(), E>,
     ) -> Result<(), E> {
         let mut changes = self.changes.iter().peekable();
-        let mut added = self.added.iter();
+        let mut added = self.added.iter().zip(&self.added_from);
         let mut start = 0;
         let mut at = 0;
         while at < records.len() {
@@ -145,12 +158,14 @@ impl Edit {
                 step(Step::Untouched(&records[start..next]))?;
             }
             let place = next as u32;
-            let flipped = || Step::Changed(place, record::flip(&records[next]));
+            let flipped = || Step::Changed(place, record::flip(&records[next]), FaceOrigin::Flipped(place));
             step(match changes.next_if(|c| c.0 == place).map(|c| &c.1) {
                 None if next != dropped => flipped(),
                 Some(Change::Flip) => flipped(),
-                Some(Change::Move(record)) => Step::Changed(place, **record),
-                Some(Change::Delete) | None => added.next().map_or(Step::Deleted(place), |record| Step::Changed(place, *record)),
+                Some(Change::Move(record)) => Step::Changed(place, **record, FaceOrigin::Moved(place)),
+                Some(Change::Delete) | None => {
+                    added.next().map_or(Step::Deleted(place), |(record, from)| Step::Changed(place, *record, *from))
+                }
             })?;
             at = next + 1;
             start = at;
@@ -158,7 +173,7 @@ impl Edit {
         if start < records.len() {
             step(Step::Untouched(&records[start..]))?;
         }
-        added.try_for_each(|record| step(Step::Added(record)))
+        added.try_for_each(|(record, from)| step(Step::Added(record, *from)))
     }
 
     pub(crate) fn summary(&self, input_records: usize) -> EditSummary {
@@ -191,6 +206,7 @@ impl Edit {
         deleted.iter().for_each(|t| extend_ranges(&mut all.deleted, *t));
         flips.iter().for_each(|t| extend_ranges(&mut all.flipped, *t));
         all.added = self.added.iter().map(|r| (record::corners(r), record::attribute(r))).collect();
+        all.added_from.clone_from(&self.added_from);
         all
     }
 }
@@ -198,10 +214,10 @@ impl Edit {
 /// What becomes of the input's records, one stretch after the other, and then what is added beyond their places.
 pub(crate) enum Step<'r, 'e> {
     Untouched(&'r [Record]),
-    /// What stands in for the record of this number.
-    Changed(u32, Record),
+    /// What stands in the place of the record of this number, and where it comes from.
+    Changed(u32, Record, FaceOrigin),
     Deleted(u32),
-    Added(&'e Record),
+    Added(&'e Record, FaceOrigin),
 }
 
 /// The records of some regions, a bit each, and how many; no bits if there are none. One pass over them.
@@ -269,10 +285,10 @@ mod tests {
         let none = Reversed::none(&d.survey);
         for flipped in [1, 0] {
             d.submesh.triangles[3].v.swap(1, 2);
-            let summary = Edit::of(&d.survey, &d.submesh, &none).summary(records.len());
+            let summary = Edit::of(&d.survey, &d.submesh, &none, &[]).summary(records.len());
             assert_eq!((summary.flipped, summary.untouched), (flipped, 8 - flipped));
         }
-        assert_eq!(written(&Edit::of(&d.survey, &d.submesh, &none), &records), records);
+        assert_eq!(written(&Edit::of(&d.survey, &d.submesh, &none, &[]), &records), records);
     }
 
     #[test]
@@ -281,7 +297,7 @@ mod tests {
         let mut d = diagnose(&records);
         let middle = d.submesh.positions.iter().position(|p| *p == [1.0, 1.0, 0.0]).unwrap();
         d.submesh.positions[middle] = [1.0, 1.0, 0.5];
-        let edit = Edit::of(&d.survey, &d.submesh, &Reversed::none(&d.survey));
+        let edit = Edit::of(&d.survey, &d.submesh, &Reversed::none(&d.survey), &[]);
         let summary = edit.summary(records.len());
         // Six of eight triangles meet in the middle of the plate.
         assert_eq!((summary.moved, summary.untouched, summary.max_move), (6, 2, 0.5));
@@ -291,7 +307,7 @@ mod tests {
     fn a_reversed_region_flips_its_records() {
         let records = records(&cube());
         let d = diagnose(&records);
-        let edit = Edit::of(&d.survey, &d.submesh, &Reversed { regions: vec![true], dropped: vec![false] });
+        let edit = Edit::of(&d.survey, &d.submesh, &Reversed { regions: vec![true], dropped: vec![false] }, &[]);
         assert_eq!(written(&edit, &records), records.iter().map(record::flip).collect::<Vec<_>>());
         assert_eq!(edit.listed().flipped, [[0, 11]]);
     }
@@ -302,7 +318,8 @@ mod tests {
         fn walking_does_what_the_edit_says(fates in prop::collection::vec(0u8..5, 0..200), added in 0usize..3) {
             let input = records(&vec![HERE; fates.len()]);
             let [moved, new] = [record::encode(THERE, 0), record::encode(THERE, 7)];
-            let mut edit = Edit { flipped: vec![0; fates.len().div_ceil(64)], added: vec![new; added], ..Edit::default() };
+            let mut edit = Edit { flipped: vec![0; fates.len().div_ceil(64)], ..Edit::default() };
+            (0..added).for_each(|_| edit.add(THERE, 7, FaceOrigin::Repair(RepairName::Fill)));
             let (mut want, mut left) = (Vec::new(), added);
             let mut gap = None;
             for (t, fate) in fates.iter().enumerate() {

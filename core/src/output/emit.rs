@@ -218,9 +218,9 @@ impl<'a> Sink<'a> {
         self.put(&count.to_le_bytes())?;
         edit.walk(records, |step| match step {
             Step::Untouched(run) => self.put_input(run.as_flattened()),
-            Step::Changed(_, record) => self.put(&record),
+            Step::Changed(_, record, _) => self.put(&record),
             Step::Deleted(_) => Ok(()),
-            Step::Added(record) => self.put(record),
+            Step::Added(record, _) => self.put(record),
         })
     }
 

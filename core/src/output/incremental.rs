@@ -319,8 +319,8 @@ mod tests {
         let limits = Limits { threads: 1, ..Limits::default() };
         // A wrap takes long, and leaves next to nothing to look at by itself.
         let profile = Profile { guarantee: Guarantee::Off, ..Profile::default() };
-        let repaired = repairs::run(&mut diagnosis, Path::new("test"), &profile, &limits, &Quiet).unwrap();
-        let edit = Edit::of(&diagnosis.survey, &diagnosis.submesh, &repaired.reversed);
+        let repaired = repairs::run(&mut diagnosis, repairs::Steps::All, Path::new("test"), &profile, &limits, &Quiet).unwrap();
+        let edit = Edit::of(&diagnosis.survey, &diagnosis.submesh, &repaired.reversed, &repaired.wrapped);
         check_second_look(diagnosis.survey, &edit, &diagnose(&written(&edit, &input)).defects)
     }
 
@@ -384,7 +384,7 @@ mod tests {
                 d.submesh.kill(t);
             }
         }
-        let edit = Edit::of(&d.survey, &d.submesh, &Reversed::none(&d.survey));
+        let edit = Edit::of(&d.survey, &d.submesh, &Reversed::none(&d.survey), &[]);
         check_second_look(d.survey, &edit, &diagnose(&written(&edit, &input)).defects)
     }
 

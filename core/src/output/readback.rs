@@ -66,7 +66,7 @@ impl<'a> Expectation<'a> {
             let fresh = difference.fresh.len();
             let (from, count, expected) = match step {
                 Step::Untouched(run) => (at, run.len(), Expected::Input(at)),
-                Step::Changed(place, record) => {
+                Step::Changed(place, record, _) => {
                     difference.gone.push(place);
                     difference.fresh.push((place, record));
                     (at, 1, Expected::Fresh(fresh))
@@ -77,7 +77,7 @@ impl<'a> Expectation<'a> {
                     at += 1;
                     return Ok(());
                 }
-                Step::Added(record) => {
+                Step::Added(record, _) => {
                     let place = difference.fresh.last().map_or(0, |(last, _)| last + 1).max(input.len() as u32);
                     difference.fresh.push((place, *record));
                     (at, 1, Expected::Fresh(fresh))
@@ -203,6 +203,7 @@ mod tests {
 
     use super::*;
     use crate::contract::progress::Quiet;
+    use crate::contract::report::RepairName;
     use crate::submesh::components::Reversed;
     use crate::testing::{Corners, cube, diagnose, plate, records, shifted, written};
 
@@ -231,8 +232,8 @@ mod tests {
             d.submesh.triangles[last].v.swap(1, 2);
             let corner = d.submesh.triangles[3].v[0];
             d.submesh.positions[corner as usize][2] += 0.25;
-            d.submesh.add([0, 2, 5], crate::submesh::Origin::Added, crate::util::ids::NONE);
-            let edit = Edit::of(&d.survey, &d.submesh, &Reversed::none(&d.survey));
+            d.submesh.add([0, 2, 5], crate::submesh::Origin::Added(RepairName::Fill), crate::util::ids::NONE);
+            let edit = Edit::of(&d.survey, &d.submesh, &Reversed::none(&d.survey), &[]);
             let output = written(&edit, &input);
 
             let expectation = Expectation::of(&input, &edit);

@@ -29,6 +29,33 @@ use crate::repairs::shared::account::Account;
 use crate::repairs::shared::context::Context;
 use crate::submesh::components::Reversed;
 
+/// Which repairs are made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Steps {
+    /// Everything that the profile allows.
+    All,
+    /// Boundary loops are closed: all, or the one through this place.
+    Fill(Option<[f32; 3]>),
+    /// Triangles are turned.
+    Orient,
+    /// Bodies are united.
+    Union,
+    /// What is no solid is replaced.
+    Wrap,
+}
+
+impl Steps {
+    fn list(self) -> &'static [pipeline::Step] {
+        match self {
+            Self::All => pipeline::ALL,
+            Self::Fill(_) => pipeline::FILL,
+            Self::Orient => pipeline::ORIENT,
+            Self::Union => pipeline::UNION,
+            Self::Wrap => pipeline::WRAP,
+        }
+    }
+}
+
 /// What the repairs did; the mesh itself is in the diagnosis' submesh.
 pub(crate) struct Repaired {
     pub(crate) reversed: Reversed,
@@ -38,19 +65,23 @@ pub(crate) struct Repaired {
     pub(crate) wrapped: Vec<[[f32; 3]; 3]>,
 }
 
-/// Repairs what the profile allows.
+/// Makes these repairs, as far as the profile allows.
 ///
 /// # Errors
 /// [`Error::Starved`](crate::Error::Starved) when there is not memory enough.
 pub(crate) fn run(
     diagnosis: &mut Diagnosis<'_>,
+    steps: Steps,
     path: &Path,
     profile: &Profile,
     limits: &Limits,
     progress: &dyn Progress,
 ) -> Result<Repaired> {
     let mut cx = Context::of(diagnosis, path, profile, limits, progress);
-    pipeline::take(pipeline::ALL, &mut cx)?;
+    if let Steps::Fill(only_loop) = steps {
+        cx.handed.only_loop = only_loop;
+    }
+    pipeline::take(steps.list(), &mut cx)?;
     let Context { reversed, mut account, mut handed, .. } = cx;
     let mut all = std::mem::take(&mut account.regions);
     all.extend(account.sheets.iter().map(Region::from));

@@ -92,6 +92,44 @@ pub(crate) const ALL: &[Step] = &[
     Look(measure_bodies),
 ];
 
+/// Boundary loops are closed, and nothing else.
+pub(crate) const FILL: &[Step] =
+    &[Do(degenerate::REPEATED), Look(|cx| complete_at_seams(cx.survey, &mut cx.work)), Do(fill::REPAIR)];
+
+/// Triangles are turned, and nothing else.
+pub(crate) const ORIENT: &[Step] = &[
+    Look(|cx| complete_at_seams(cx.survey, &mut cx.work)),
+    Do(visibility::REPAIR),
+    Do(directions::COHERENT),
+    Do(directions::OUTWARD),
+];
+
+/// Bodies that cross become one, and what lies in the material of others goes.
+pub(crate) const UNION: &[Step] = &[
+    Look(|cx| complete_at_seams(cx.survey, &mut cx.work)),
+    Do(directions::OUTWARD),
+    Look(probe_bodies),
+    Do(resolve::REPAIR),
+    Look(tell_dust),
+    Do(directions::OUTWARD),
+    Look(tell_intersections_left),
+    Do(enclosed::REPAIR),
+    Do(hidden::REPAIR),
+    Do(pinch_vertices::REPAIR),
+    Do(directions::OUTWARD),
+    Look(measure_bodies),
+];
+
+/// What is no solid is replaced by a wrap.
+pub(crate) const WRAP: &[Step] = &[
+    Look(|cx| complete_at_seams(cx.survey, &mut cx.work)),
+    Look(probe_bodies),
+    // Nobody has looked for crossings yet.
+    Look(|cx| cx.handed.may_cross = true),
+    Do(wrap::REPAIR),
+    Look(measure_bodies),
+];
+
 /// As far as loops are recognised: surplus surface is gone, and vertices within the weld tolerance are one.
 pub(crate) const RECOGNITION: &[Step] = &[
     Do(degenerate::REPEATED),

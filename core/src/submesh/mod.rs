@@ -18,6 +18,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
+use crate::contract::repair_name::RepairName;
 use crate::geometry::position::Position;
 use crate::io::read_ahead::ASKED_AT_ONCE;
 use crate::io::record::{self, Record};
@@ -37,8 +38,8 @@ pub(crate) enum Origin {
     Input(u32),
     /// A part of this record; takes its attribute.
     Part(u32),
-    /// Made by a repair, as a part of no record; its attribute is 0.
-    Added,
+    /// Made by this repair, as a part of no record; its attribute is 0.
+    Added(RepairName),
 }
 
 impl Origin {
@@ -46,7 +47,7 @@ impl Origin {
     pub(crate) fn of_part(self) -> Self {
         match self {
             Self::Input(record) | Self::Part(record) => Self::Part(record),
-            Self::Added => Self::Added,
+            Self::Added(repair) => Self::Added(repair),
         }
     }
 }
@@ -66,7 +67,7 @@ impl Triangle {
     pub(crate) fn record(&self) -> u32 {
         match self.origin {
             Origin::Input(record) | Origin::Part(record) => record,
-            Origin::Added => NONE,
+            Origin::Added(_) => NONE,
         }
     }
 }

@@ -106,7 +106,7 @@ fn are_as_read(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components, reve
                 record::corners(&survey.records[record as usize]) != [a, c, b]
             }
             Origin::Part(_) => true,
-            Origin::Added => false,
+            Origin::Added(_) => false,
         };
         let piece = pieces.of_triangle[t as usize];
         if !is_as_read && piece != NONE {
@@ -133,7 +133,7 @@ mod tests {
         after(mesh, |d, turned| {
             let work = &mut Work::new(&mut d.submesh);
             directions::make_coherent(&d.survey, work, turned, &[]);
-            fill::fill_loops(&d.survey, work, turned, &d.tolerance, &profile, 1);
+            fill::fill_loops(&d.survey, work, turned, &d.tolerance, (&profile, None), 1);
             let pieces = pieces::pieces(&d.survey, work, turned);
             directions::make_outward(&d.survey, work, turned, &pieces);
             let pieces = pieces::pieces(&d.survey, work, turned);

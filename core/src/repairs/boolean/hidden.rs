@@ -170,7 +170,7 @@ fn hidden_pieces(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components) ->
         };
         is_hidden[source.component as usize] = !DIRECTIONS.iter().any(is_seen);
     }
-    let is_of_the_file = |t: u32| submesh.triangles[t as usize].origin != Origin::Added;
+    let is_of_the_file = |t: u32| !matches!(submesh.triangles[t as usize].origin, Origin::Added(_));
     for direction in DIRECTIONS {
         let asked = sources().filter(|(corners, s)| is_hidden[s.component as usize] && !stands_along(corners, direction));
         let asked: Vec<Source> = asked.map(|(_, source)| source).collect();
@@ -250,7 +250,7 @@ fn largest_triangles(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components
     );
     let in_submesh = submesh.living().filter_map(|t| {
         let piece = pieces.of_triangle[t as usize];
-        let is_of_the_file = submesh.triangles[t as usize].origin != Origin::Added;
+        let is_of_the_file = !matches!(submesh.triangles[t as usize].origin, Origin::Added(_));
         (is_of_the_file && is_asked(piece)).then(|| (piece, Largest::of(&submesh.points(t), submesh.record(t), Some(t))))
     });
     let mut largest: BTreeMap<u32, Largest> = BTreeMap::new();
@@ -280,7 +280,7 @@ mod tests {
         after(mesh, |d, turned| {
             let work = &mut Work::new(&mut d.submesh);
             directions::make_coherent(&d.survey, work, turned, &[]);
-            let mut closed = fill::fill_loops(&d.survey, work, turned, &d.tolerance, &profile, 1);
+            let mut closed = fill::fill_loops(&d.survey, work, turned, &d.tolerance, (&profile, None), 1);
             let pieces = pieces::pieces(&d.survey, work, turned);
             directions::make_outward(&d.survey, work, turned, &pieces);
             let pieces = pieces::pieces(&d.survey, work, turned);

@@ -12,6 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec3;
 
 use crate::algorithms::triangulate::{self, Rim};
+use crate::contract::report::RepairName;
 use crate::contract::settings::Profile;
 use crate::repairs::boolean::passes::Passes;
 use crate::repairs::boolean::snap::nearest;
@@ -51,7 +52,7 @@ impl State<'_, '_, '_> {
                 refilled.extend(triangles.iter().map(|t| (*t, moved)));
                 triangles.iter().for_each(|t| self.work.kill(*t));
                 for v in patches {
-                    self.work.add(v, Origin::Added, NONE);
+                    self.work.add(v, Origin::Added(RepairName::SelfIntersection), NONE);
                     self.clusters.of_triangle.push(piece);
                 }
             }

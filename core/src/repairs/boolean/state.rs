@@ -227,7 +227,7 @@ impl State<'_, '_, '_> {
             .living()
             .filter_map(|t| match self.work.triangles[t as usize].origin {
                 Origin::Input(record) => Some((record, t)),
-                Origin::Part(_) | Origin::Added => None,
+                Origin::Part(_) | Origin::Added(_) => None,
             })
             .collect();
         let triangle = |number: Standing| match overlay.which(number) {
@@ -274,7 +274,7 @@ impl State<'_, '_, '_> {
         }
         let record = |t: usize| match self.work.triangles[t].origin {
             Origin::Input(record) | Origin::Part(record) => Some(record),
-            Origin::Added => None,
+            Origin::Added(_) => None,
         };
         let wanted: HashSet<u32> = left.iter().filter_map(|t| record(*t)).collect();
         let known = (0..first).filter_map(|t| Some((record(t).filter(|r| wanted.contains(r))?, self.clusters.of_triangle[t])));

@@ -101,7 +101,7 @@ mod tests {
     fn dropped(mesh: &[Corners], profile: &Profile) -> After<(Vec<SheetDropped>, usize)> {
         after(mesh, |d, turned| {
             let work = &mut Work::new(&mut d.submesh);
-            let mut closed = fill::fill_loops(&d.survey, work, turned, &d.tolerance, profile, 1);
+            let mut closed = fill::fill_loops(&d.survey, work, turned, &d.tolerance, (profile, None), 1);
             let gone = drop(&d.survey, work, turned, &closed.sheets, &mut closed.left, profile);
             (gone, closed.left.len())
         })
@@ -183,7 +183,7 @@ mod tests {
         ];
         let lives = after(&mesh, |d, turned| {
             let work = &mut Work::new(&mut d.submesh);
-            let closed = fill::fill_loops(&d.survey, work, turned, &d.tolerance, &Profile::default(), 1);
+            let closed = fill::fill_loops(&d.survey, work, turned, &d.tolerance, (&Profile::default(), None), 1);
             let lives: Vec<bool> = closed.sheets.iter().map(|rim| work.lives(rim.triangle)).collect();
             lives
         });

@@ -10,6 +10,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use crate::algorithms::fairing::{self, CoarsePatch, ShapeSettings, Shaped, edges, sorted};
+use crate::contract::report::RepairName;
 use crate::geometry::exact::Point;
 use crate::geometry::position::{self, Position};
 use crate::repairs::holes::patches::Placed;
@@ -266,7 +267,7 @@ fn put_in(work: &mut Work<'_>, patch: &mut Placed, mut vertices: Vec<Vertex>, sh
     patch.first = work.triangles.len() as u32;
     patch.count = shaped.triangles.len() as u32;
     for t in &shaped.triangles {
-        work.add(t.map(|v| vertices[v as usize]), Origin::Added, NONE);
+        work.add(t.map(|v| vertices[v as usize]), Origin::Added(RepairName::Fill), NONE);
     }
     patch.coarse = coarse;
 }

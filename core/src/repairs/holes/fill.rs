@@ -34,7 +34,8 @@ pub(crate) const REPAIR: Repair = Repair {
     name: RepairName::Fill,
     changes: Changes::Surface,
     run: |cx| {
-        let closed = fill_loops(cx.survey, &mut cx.work, &cx.reversed, cx.tolerance, cx.profile, cx.limits.threads);
+        let closed =
+            fill_loops(cx.survey, &mut cx.work, &cx.reversed, cx.tolerance, (cx.profile, cx.handed.only_loop), cx.limits.threads);
         let parts: Vec<String> = closed.by_method.iter().map(|(name, count)| format!("{count} {name}")).collect();
         cx.account.loops_left = closed.left;
         cx.handed.kept_open = closed.kept_open;
@@ -61,20 +62,20 @@ const MAX_FLAT_SHARE: f64 = 0.1;
 /// And only for loops of at most so many edges.
 const MAX_FLAT_EDGES: usize = 64;
 
-/// Fills every loop that the profile admits. Patches are found in parallel and put in in the loops' order; one that meets an edge
+/// Fills every loop that the profile admits, or only the one through a place. Patches are found in parallel and put in in the loops' order; one that meets an edge
 /// that an earlier one has made is found anew, so that the result does not depend on the threads.
 pub(crate) fn fill_loops(
     survey: &Survey<'_>,
     work: &mut Work<'_>,
     reversed: &Reversed,
     tolerance: &Tolerance,
-    profile: &Profile,
+    (profile, only_loop): (&Profile, Option<[f32; 3]>),
     threads: usize,
 ) -> Closed {
     let (submesh, edges) = work.edges();
     let Boundary { loops: rims, chains } = loops::boundary(submesh, edges);
     let shapes = Shapes::of(submesh, &rims, threads);
-    let admission = Admission::of(survey, work, &rims, &shapes, reversed, tolerance, profile);
+    let admission = Admission::of(survey, work, &rims, &shapes, reversed, tolerance, (profile, only_loop));
     let max_edges = profile.max_hole_edges as usize;
     let mut closing =
         Closing { admission, max_edges, rims: Vec::new(), placed: Vec::new(), open: Vec::new(), joints: Vec::new() };
@@ -144,7 +145,7 @@ pub(crate) fn fill(d: &mut crate::diagnosis::Diagnosis<'_>, profile: &Profile) -
     let unturned = Reversed::none(&d.survey);
     // What nothing closes without crossing something is another pass's then.
     let profile = Profile { resolve_crossings: false, ..profile.clone() };
-    fill_loops(&d.survey, &mut Work::new(&mut d.submesh), &unturned, &d.tolerance, &profile, 1)
+    fill_loops(&d.survey, &mut Work::new(&mut d.submesh), &unturned, &d.tolerance, (&profile, None), 1)
 }
 
 impl Closing<'_> {

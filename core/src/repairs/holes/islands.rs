@@ -9,6 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec3;
 
 use crate::algorithms::triangulate::{self, Rim};
+use crate::contract::report::RepairName;
 use crate::detect::holes::loops::Loop;
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::exact::Point;
@@ -107,7 +108,7 @@ pub(crate) fn join_all(work: &mut Work<'_>, group: &[&Loop]) -> Vec<u32> {
     for island in &group[1..] {
         if let Some((joined, triangles)) = join(work, &outer, &island.vertices) {
             outer = joined;
-            joints.extend(triangles.map(|t| work.add(t, Origin::Added, NONE)));
+            joints.extend(triangles.map(|t| work.add(t, Origin::Added(RepairName::Fill), NONE)));
         }
     }
     joints
@@ -216,7 +217,7 @@ mod tests {
             let [hole, island] = pairs[0].map(|i| rims[i].vertices.clone());
             let (joined, triangles) = join(&work, &hole, &island).unwrap();
             triangles.into_iter().for_each(|t| {
-                work.add(t, Origin::Added, NONE);
+                work.add(t, Origin::Added(RepairName::Fill), NONE);
             });
             joined.len()
         });

@@ -1,6 +1,7 @@
 //! Patches that are in the submesh, and loops as they see them.
 
 use crate::algorithms::triangulate::{self};
+use crate::contract::report::RepairName;
 use crate::detect::holes::loops::Loop;
 use crate::repairs::shared::collisions::Obstacle;
 use crate::repairs::shared::work::Work;
@@ -58,7 +59,7 @@ impl Placed {
         self.triangles().for_each(|t| work.kill(t));
         (self.first, self.count) = (work.triangles.len() as u32, triangles.len() as u32);
         triangles.iter().for_each(|v| {
-            work.add(*v, Origin::Added, NONE);
+            work.add(*v, Origin::Added(RepairName::Fill), NONE);
         });
     }
 }

@@ -233,8 +233,8 @@ impl Candidate {
             let next = (i + 1) % n;
             // In the direction of a patch.
             let [a, b] = [self.vertices[i], self.vertices[next]];
-            work.add([a, b, ends[next]], Origin::Added, NONE);
-            work.add([a, ends[next], ends[i]], Origin::Added, NONE);
+            work.add([a, b, ends[next]], Origin::Added(RepairName::Skirt), NONE);
+            work.add([a, ends[next], ends[i]], Origin::Added(RepairName::Skirt), NONE);
         }
     }
 }
@@ -276,7 +276,7 @@ mod tests {
             let work = &mut Work::new(&mut d.submesh);
             directions::make_coherent(&d.survey, work, turned, &[]);
             let seated = let_down(&d.survey, work, turned, profile);
-            fill::fill_loops(&d.survey, work, turned, &d.tolerance, profile, 1);
+            fill::fill_loops(&d.survey, work, turned, &d.tolerance, (profile, None), 1);
             let pieces = pieces::pieces(&d.survey, work, turned);
             directions::make_outward(&d.survey, work, turned, &pieces);
             let limits = Limits { threads: 1, ..Limits::default() };

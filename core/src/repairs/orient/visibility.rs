@@ -263,14 +263,14 @@ fn note(points: &mut Vec<Point>, point: Point) {
     }
 }
 
-/// From where the parts that are asked about are seen.
-fn seen(
+/// The first points of the parts that are asked about, by part.
+fn first_points(
     survey: &Survey<'_>,
     submesh: &Submesh,
     reversed: &Reversed,
     parts: &Components,
     asked: &[u32],
-) -> BTreeMap<u32, Sightings> {
+) -> Vec<(u32, Point)> {
     let wanted: HashSet<u32> = asked.iter().copied().collect();
     let found = survey.visit_regular(
         |region| wanted.contains(&parts.of_region[region as usize]),
@@ -291,8 +291,18 @@ fn seen(
     for t in submesh.living().filter(|t| wanted.contains(&parts.of_triangle[*t as usize])) {
         note(points.entry(parts.of_triangle[t as usize]).or_default(), Point::of(submesh.points(t), submesh.record(t)));
     }
-    let all: Vec<(u32, Point)> =
-        points.into_iter().flat_map(|(part, points)| points.into_iter().map(move |p| (part, p))).collect();
+    points.into_iter().flat_map(|(part, points)| points.into_iter().map(move |p| (part, p))).collect()
+}
+
+/// From where the parts that are asked about are seen.
+fn seen(
+    survey: &Survey<'_>,
+    submesh: &Submesh,
+    reversed: &Reversed,
+    parts: &Components,
+    asked: &[u32],
+) -> BTreeMap<u32, Sightings> {
+    let all = first_points(survey, submesh, reversed, parts, asked);
     let off = OFF * f64::from(survey.bounds.largest_coordinate());
     // By point: is it seen from the front, from behind?
     let mut sides = vec![[false; 2]; all.len()];

@@ -147,7 +147,7 @@ fn put_in(work: &mut Work<'_>, all: &BTreeMap<Vertex, Pinned>) -> (Vec<Vertex>, 
             triangles.iter().for_each(|t| bounds.include(&work.points(*t)));
             triangles.iter().for_each(|t| work.kill(*t));
             for corners in patches {
-                work.add(*corners, Origin::Added, NONE);
+                work.add(*corners, Origin::Added(RepairName::Separate), NONE);
                 added_by.push(*v);
             }
             let Bounds { lo, hi } = bounds.normalised();

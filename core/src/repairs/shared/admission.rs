@@ -36,6 +36,8 @@ pub(crate) enum NotAdmitted {
     Perimeter(f64),
     #[error("the profile leaves {0} loops open")]
     Class(&'static str),
+    #[error("only another loop was to be closed")]
+    NotAsked,
     #[error("the rim of a lone sheet, which would enclose next to nothing; the profile's `close_sheets` closes it")]
     Sheet,
 }
@@ -57,7 +59,7 @@ impl<'p> Admission<'p> {
         shapes: &Shapes,
         reversed: &Reversed,
         tolerance: &Tolerance,
-        profile: &'p Profile,
+        (profile, only_loop): (&'p Profile, Option<[f32; 3]>),
     ) -> Self {
         let (submesh, edges) = work.edges();
         let by_share = profile.max_hole_perimeter_relative * survey.bounds.diagonal();
@@ -69,6 +71,12 @@ impl<'p> Admission<'p> {
         }
         if !profile.close_sheets && profile.fill_holes {
             refused.extend(sheet_rims(survey, submesh, edges, loops, shapes, reversed).map(|v| (v, NotAdmitted::Sheet)));
+        }
+        if let Some(place) = only_loop {
+            // As numbers: −0.0 is 0.0, and no vertex is where NaN is.
+            let is_there = |v: &u32| submesh.positions[*v as usize] == place;
+            let others = loops.iter().filter(|rim| !rim.vertices.iter().any(is_there));
+            refused = others.map(|rim| (rim.vertices[0], NotAdmitted::NotAsked)).collect();
         }
         refused.sort_by_key(|(v, _)| *v);
         Self { profile, longest, refused }

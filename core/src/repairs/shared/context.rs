@@ -72,6 +72,8 @@ struct Known {
 /// What one repair hands to a later one.
 #[derive(Default)]
 pub(crate) struct Handed {
+    /// Only the loop through this place is to be closed. Of the caller, for the filling.
+    pub(crate) only_loop: Option<[f32; 3]>,
     /// By triangle of the submesh: it is settled which way it faces. Of facing, for the orientation.
     pub(crate) settled: Vec<bool>,
     /// Rims of open shapes were let down into what they stand on, so there is something to be cut.

@@ -80,7 +80,7 @@ impl Overlay {
                     }
                     stands
                 }
-                Origin::Part(_) | Origin::Added => false,
+                Origin::Part(_) | Origin::Added(_) => false,
             };
             if lives && !stands {
                 changed.push(t);

@@ -208,7 +208,7 @@ impl<'a> Work<'a> {
             if triangle.region != NONE {
                 triangle.region = match triangle.origin {
                     Origin::Input(record) | Origin::Part(record) => survey.region_of_irregular_triangle(record),
-                    Origin::Added => NONE,
+                    Origin::Added(_) => NONE,
                 };
             }
         }
@@ -236,6 +236,7 @@ impl<'a> Work<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contract::report::RepairName;
     use crate::testing::{diagnose, plate, records};
     use crate::util::ids::NONE;
 
@@ -246,7 +247,7 @@ mod tests {
         let mut work = Work::new(&mut d.submesh);
         assert_eq!(work.changed_for(Pass::Copies), None);
         assert_eq!(work.changed_for(Pass::Copies), Some(vec![]));
-        let t = work.add([0, 1, 2], Origin::Added, NONE);
+        let t = work.add([0, 1, 2], Origin::Added(RepairName::Fill), NONE);
         assert_eq!(work.changed_for(Pass::Copies), Some(vec![t]));
         assert_eq!(work.changed_for(Pass::Collinear), None, "each pass by itself");
         let moved: Vec<u32> = work.star(3).map(|(t, _)| t).collect();
@@ -302,7 +303,7 @@ mod tests {
             let (steps, _) = steps::of(|| {
                 work.mark();
                 work.merge(a, b);
-                work.add([0, 1, 2], Origin::Added, NONE);
+                work.add([0, 1, 2], Origin::Added(RepairName::Fill), NONE);
                 work.flip(1);
                 work.kill(1);
                 work.kill(2);

@@ -389,7 +389,7 @@ impl Cut {
             records.sort_unstable();
             doomed.extend((0..).zip(&work.triangles).filter_map(|(t, triangle)| match triangle.origin {
                 Origin::Input(record) => records.binary_search(&record).is_ok().then_some(t),
-                Origin::Part(_) | Origin::Added => None,
+                Origin::Part(_) | Origin::Added(_) => None,
             }));
         }
         doomed.iter().for_each(|t| work.kill(*t));

@@ -151,7 +151,7 @@ impl Along {
         records.dedup();
         let crossing = |t: u32| match submesh.triangles[t as usize].origin {
             Origin::Input(record) => records.binary_search(&record).is_ok().then_some((record, t)),
-            Origin::Part(_) | Origin::Added => None,
+            Origin::Part(_) | Origin::Added(_) => None,
         };
         Self { of_vertex, triangles: submesh.living().filter_map(crossing).collect() }
     }

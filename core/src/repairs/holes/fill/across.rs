@@ -3,6 +3,7 @@
 use super::closing::{Closing, Neighbours, NotFilled, SLIT, left};
 use crate::algorithms::triangulate::{self, Rim, Unfillable};
 use crate::contract::report::LoopLeft;
+use crate::contract::report::RepairName;
 use crate::detect::holes::unbalanced::unbalanced;
 use crate::geometry::exact::{self, Point};
 use crate::repairs::cleanup::degenerate;
@@ -42,7 +43,7 @@ impl Closing<'_> {
                 if is_on_one_line(work, &way) {
                     balanced += 1;
                     fan(way.len()).into_iter().for_each(|t| {
-                        work.add(t.map(|i| way[i as usize]), Origin::Added, NONE);
+                        work.add(t.map(|i| way[i as usize]), Origin::Added(RepairName::Fill), NONE);
                     });
                 }
             }
@@ -98,7 +99,7 @@ impl Closing<'_> {
             };
             let first = work.triangles.len() as u32;
             for triangle in &patch.triangles {
-                work.add(triangle.map(|i| way[i as usize]), Origin::Added, NONE);
+                work.add(triangle.map(|i| way[i as usize]), Origin::Added(RepairName::Fill), NONE);
             }
             across.push((first..work.triangles.len() as u32, left));
         }

@@ -159,7 +159,9 @@ impl Closing<'_> {
                 (0..3).any(|k| {
                     work.star(v[k]).any(|(other, _)| {
                         let triangle = &work.triangles[other as usize];
-                        triangle.v.contains(&v[(k + 1) % 3]) && triangle.origin == Origin::Added && !idle.contains(&other)
+                        triangle.v.contains(&v[(k + 1) % 3])
+                            && matches!(triangle.origin, Origin::Added(_))
+                            && !idle.contains(&other)
                     })
                 })
             };

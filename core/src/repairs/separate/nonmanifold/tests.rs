@@ -118,7 +118,7 @@ fn written_by(mesh: &[Corners], chunk_triangles: u32) -> Vec<Record> {
     let mut d = Diagnosis::of(Path::new("test"), &input, &Profile::default(), &limits, &Quiet).unwrap();
     let none = Reversed::none(&d.survey);
     separate(&d.survey, &mut Work::new(&mut d.submesh), &none, &Profile::default());
-    written(&Edit::of(&d.survey, &d.submesh, &Reversed::none(&d.survey)), &input)
+    written(&Edit::of(&d.survey, &d.submesh, &Reversed::none(&d.survey), &[]), &input)
 }
 
 proptest! {

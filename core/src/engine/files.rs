@@ -1,0 +1,271 @@
+//! The way of one file through all of it.
+//!
+//! read → survey → submesh → repairs → edit → emit → read back → report. The output is surveyed as a whole only where the second look, at
+//! what changed, cannot tell.
+
+use std::path::Path;
+
+use blake3::Hasher;
+
+use crate::contract::error::{Error, Result};
+use crate::contract::progress::Progress;
+use crate::contract::report::{Defects, FileFacts, Report, Task};
+use crate::contract::settings::{Limits, Profile, folder_of};
+use crate::detect::review::Enclosed;
+use crate::diagnosis::Diagnosis;
+use crate::engine::clock::Clock;
+use crate::engine::judging::{self, Input, Written};
+use crate::geometry::sums::Bounds;
+use crate::io::digest;
+use crate::io::digest::Digest;
+use crate::io::disk_space::{self, Need};
+use crate::io::read::{MeshFile, PREFIX_BYTES};
+use crate::io::read_ahead::Guide;
+use crate::io::record::Record;
+use crate::output::edit::Edit;
+use crate::output::emit;
+use crate::output::emit::{Content, Draft};
+use crate::output::incremental;
+use crate::output::readback::Expectation;
+use crate::repairs::{self, Steps};
+use crate::stream::members;
+use crate::util::parallel;
+
+/// Fewer bytes are hashed by one thread: starting more would take longer.
+const HASHED_BY_ONE: usize = 1 << 20;
+
+/// Diagnoses `input` and writes nothing.
+///
+/// # Errors
+/// [`Error`], any of them; [`Error::Profile`] before the file is opened.
+pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> Result<Report> {
+    let mut clock = Clock::start();
+    judging::validate(input, profile)?;
+    let limits = &limits.spooling_beside(input);
+    let mesh = open(input, limits, progress)?;
+    clock.stage("read");
+    disk_space::check(input, &[spool_need(mesh.records(), limits)])?;
+    let mut diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
+    clock.stage("topology");
+    let blake3 = hash(&mesh, limits, progress);
+    clock.stage("hash");
+    mesh.check_unchanged()?;
+    let mut report = judging::begin(Task::Inspect, &subject(&mesh, blake3), &diagnosis, profile, limits);
+    let facts = report.input.clone();
+    judging::conclude_unchanged(&mut report, &facts, mesh.findings());
+    report.loops = repairs::recognise(&mut diagnosis, mesh.path(), profile, limits, progress)?;
+    clock.close(report, mesh.path(), mesh.records().len())
+}
+
+/// Repairs `input` into the new file `output`.
+///
+/// # Errors
+/// [`Error`], any of them; [`Error::Profile`] before the file is opened.
+pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> Result<Report> {
+    let mut clock = Clock::start();
+    judging::validate(input, profile)?;
+    let limits = &limits.spooling_beside(output);
+    let mesh = open(input, limits, progress)?;
+    clock.stage("read");
+    // The output is as large as its input but for what is added; what the input spools is gone by then, but the output spools as much.
+    let bytes = (PREFIX_BYTES + size_of_val(mesh.records())) as u64;
+    let folder = if emit::is_nameless(output) { limits.spool_folder() } else { folder_of(output).into() };
+    disk_space::check(input, &[Need { folder, bytes, what: "the output" }, spool_need(mesh.records(), limits)])?;
+    emit::draft(&mesh, output, limits, progress, |draft| {
+        let mended = mend(draft, &mesh, output, profile, limits, progress, &mut clock);
+        // What was copied before the input changed is not what is read back: nothing is wrong with the disk.
+        let report = mended.map_err(|error| match error {
+            Error::Io { .. } if !progress.cancelled() => mesh.check_unchanged().err().unwrap_or(error),
+            other => other,
+        })?;
+        clock.close(report, mesh.path(), mesh.records().len())
+    })
+}
+
+/// Makes `draft` the repaired `mesh` and judges what then stands at `output`; cost and stages are still to come.
+fn mend(
+    draft: Draft<'_, '_>,
+    mesh: &MeshFile,
+    output: &Path,
+    profile: &Profile,
+    limits: &Limits,
+    progress: &dyn Progress,
+    clock: &mut Clock,
+) -> Result<Report> {
+    let mut diagnosis = Diagnosis::of(mesh.path(), mesh.records(), profile, limits, progress)?;
+    clock.stage("topology");
+    let surface = diagnosis.surface_bounds();
+    let input = subject(mesh, String::new());
+    let mut report = judging::begin(Task::Repair, &input, &diagnosis, profile, limits);
+    let repaired = judging::repair_diagnosed(&mut diagnosis, Steps::All, &input, &mut report, (profile, limits), progress)?;
+    if repaired.is_some() {
+        clock.stage("repair");
+    }
+    let (edit, enclosed) = repaired.unwrap_or_default();
+    // Of the input's survey, the second look may go on; the memory of its submesh is needed for that of the output.
+    let survey = diagnosis.into_survey();
+    // Good as it came, or nothing in it could be repaired.
+    let same = edit.is_empty() && judging::flaws(mesh.findings()).is_empty();
+    let expected = if same { None } else { expectation(mesh.records(), &edit, survey.irregular_triangles.len() as u64, limits) };
+    let emit = || draft.finish(&if same { Content::Input } else { Content::Edited(&edit) });
+    // What the file will hold is looked at while it is written. It counts when the file was read back and does hold that.
+    let look = || {
+        let looked = expected.as_ref().and_then(|expected| incremental::look(survey, &expected.difference));
+        looked.map(|(survey, submesh)| Diagnosis::count(survey, submesh, profile).defects)
+    };
+    let threads = if mesh.bytes().len() < HASHED_BY_ONE { 1 } else { limits.threads };
+    let (written, looked) = parallel::both(threads, emit, look);
+    let (written, mut digest) = written?;
+    report.input.blake3 = digest::hash(mesh.bytes(), &digest);
+    if !mesh.is_in_place() {
+        // Of a text.
+        digest.clear();
+    }
+    clock.stage("emit");
+    report.edit = edit.summary(mesh.records().len());
+    report.edit_records = limits.list_edit.then(|| edit.listed());
+    if same {
+        confirm_copy(&mut report, mesh, output, limits, progress)?;
+    } else {
+        verify(
+            &mut report,
+            mesh,
+            (&surface, &enclosed),
+            expected.map(|expected| (expected, digest, looked)),
+            output,
+            limits,
+            progress,
+        )?;
+    }
+    written.durable()?;
+    clock.stage("verify");
+    mesh.check_unchanged()?;
+    Ok(report)
+}
+
+/// What the file will hold after `edit`, where a look at the difference costs less than reading all of it, and its tables fit in memory.
+pub(crate) fn expectation<'e>(
+    records: &'e [Record],
+    edit: &'e Edit,
+    irregular_triangles: u64,
+    limits: &Limits,
+) -> Option<Expectation<'e>> {
+    let (gone, added) = (edit.gone(), edit.added().len() as u64);
+    let is_worthwhile = incremental::is_worthwhile(gone, added, records.len())
+        && incremental::bytes(irregular_triangles, gone + added) <= limits.memory_bytes;
+    is_worthwhile.then(|| Expectation::of(records, edit))
+}
+
+/// What working out the topology of `records` spools.
+pub(crate) fn spool_need(records: &[Record], limits: &Limits) -> Need {
+    Need {
+        folder: limits.spool_folder(),
+        bytes: members::spool_bytes(records, &Guide::new(records.as_flattened(), limits), limits),
+        what: "sorting triangles by place",
+    }
+}
+
+/// The written file should be the input, byte for byte: its hash is compared, and what was found in the input holds.
+fn confirm_copy(report: &mut Report, input: &MeshFile, output: &Path, limits: &Limits, progress: &dyn Progress) -> Result<()> {
+    let written = open(output, limits, progress)?;
+    let facts = facts(&written, hash(&written, limits, progress));
+    if facts.blake3 != report.input.blake3 {
+        return Err(Error::Changed { path: input.path().into() });
+    }
+    judging::conclude_unchanged(report, &facts, written.findings());
+    report.output = Some(facts);
+    Ok(())
+}
+
+/// Reads the written file again and judges it, against the box of the input's surface and the bodies in it that lay in others.
+fn verify(
+    report: &mut Report,
+    input: &MeshFile,
+    (surface, enclosed): (&Bounds, &Enclosed),
+    known: Option<(Expectation<'_>, Digest, Option<Defects>)>,
+    output: &Path,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> Result<()> {
+    let written = match open(output, limits, progress) {
+        // Nothing was left to write: there is no mesh to judge.
+        Err(Error::Unreadable { .. }) if report.edit.untouched + report.edit.added == 0 => {
+            judging::conclude_empty(report);
+            return Ok(());
+        }
+        other => other?,
+    };
+    let (blake3, defects) = look_again(known, &written, &report.profile, limits, progress)?;
+    let facts = facts(&written, blake3);
+    let written = Written { facts, findings: written.findings(), defects };
+    judging::conclude(report, input.findings(), (surface, enclosed), written);
+    Ok(())
+}
+
+/// The hash and the defects of a written file: what was `known` of it before, if it holds what it should, or else by a survey of its own.
+fn look_again(
+    known: Option<(Expectation<'_>, Digest, Option<Defects>)>,
+    written: &MeshFile,
+    profile: &Profile,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> Result<(String, Defects)> {
+    let blake3 = match known {
+        Some((expected, digest, looked)) => {
+            let blake3 = expected.confirm(written, &digest, limits, progress)?;
+            if let Some(defects) = looked {
+                return Ok((blake3, defects));
+            }
+            tracing::debug!("The difference does not tell: the written file is surveyed.");
+            blake3
+        }
+        None => hash(written, limits, progress),
+    };
+    let diagnosis = Diagnosis::of(written.path(), written.records(), profile, limits, progress)?;
+    Ok((blake3, diagnosis.defects))
+}
+
+/// Opens a mesh file.
+pub(crate) fn open(input: &Path, limits: &Limits, progress: &dyn Progress) -> Result<MeshFile> {
+    MeshFile::open(input, &limits.spool_folder(), limits, progress)
+}
+
+/// What a report is about.
+fn subject(mesh: &MeshFile, blake3: String) -> Input<'_> {
+    Input { path: mesh.path(), facts: facts(mesh, blake3), findings: mesh.findings() }
+}
+
+fn facts(mesh: &MeshFile, blake3: String) -> FileFacts {
+    FileFacts {
+        path: mesh.path().into(),
+        bytes: mesh.byte_len(),
+        blake3,
+        format: mesh.format(),
+        triangles: mesh.records().len() as u64,
+        findings: mesh.findings().iter().map(|f| f.text.clone()).collect(),
+    }
+}
+
+fn hash(mesh: &MeshFile, limits: &Limits, progress: &dyn Progress) -> String {
+    progress.at("hash", 0, mesh.records().len() as u64);
+    hash_of(mesh.bytes(), limits)
+}
+
+/// BLAKE3, hexadecimal.
+pub(crate) fn hash_of(bytes: &[u8], limits: &Limits) -> String {
+    if limits.threads < 2 || bytes.len() < HASHED_BY_ONE {
+        return hash_blocks(bytes, limits, Hasher::update);
+    }
+    parallel::in_pool(limits.threads, || hash_blocks(bytes, limits, Hasher::update_rayon))
+}
+
+fn hash_blocks(bytes: &[u8], limits: &Limits, update: for<'h> fn(&'h mut Hasher, &[u8]) -> &'h mut Hasher) -> String {
+    let mut hasher = Hasher::new();
+    for block in Guide::new(bytes, limits).blocks(bytes) {
+        update(&mut hasher, block);
+    }
+    hasher.finalize().to_hex().to_string()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,175 @@
+//! The report of a mesh, from a file or from memory: what is said before anything is done, what was done, and the verdict at the end.
+
+use std::path::Path;
+
+use crate::contract::error::{Error, Result};
+use crate::contract::progress::Progress;
+use crate::contract::report::{
+    BoundaryLoops, Certificate, Cost, Defects, EditSummary, FileFacts, Outcome, Regions, Report, SCHEMA_VERSION, Task, Tolerances,
+};
+use crate::contract::settings::{Bodies, Limits, Profile};
+use crate::detect::certificate;
+use crate::detect::review;
+use crate::detect::review::Enclosed;
+use crate::detect::rules::Subject;
+use crate::detect::verdict;
+use crate::diagnosis::Diagnosis;
+use crate::geometry::sums::Bounds;
+use crate::io::read::{Finding, Loss};
+use crate::output::edit::Edit;
+use crate::repairs::{self, Repaired, Steps};
+use crate::submesh::near;
+
+/// A mesh that a report is about.
+pub(crate) struct Input<'a> {
+    /// Where it comes from, as errors name it.
+    pub(crate) path: &'a Path,
+    /// Its hash may be still to come.
+    pub(crate) facts: FileFacts,
+    /// What is odd about its file.
+    pub(crate) findings: &'a [Finding],
+}
+
+/// Refuses a profile that means nothing, before anything is done under it.
+pub(crate) fn validate(path: &Path, profile: &Profile) -> Result<()> {
+    profile.validate().map_err(|source| Error::Profile { path: path.into(), profile: profile.name.clone(), source })
+}
+
+/// What there is to say about an input before anything is done; its hash, outcome and cost are still to come.
+pub(crate) fn begin(task: Task, input: &Input<'_>, diagnosis: &Diagnosis<'_>, profile: &Profile, limits: &Limits) -> Report {
+    Report {
+        schema_version: SCHEMA_VERSION,
+        engine_version: env!("CARGO_PKG_VERSION").into(),
+        task,
+        outcome: Outcome::Clean,
+        input: input.facts.clone(),
+        output: None,
+        profile: profile.clone(),
+        limits: limits.clone(),
+        tolerances: tolerances(diagnosis),
+        before: diagnosis.defects.clone(),
+        after: None,
+        loops: BoundaryLoops::default(),
+        repairs: Vec::new(),
+        loops_left: Vec::new(),
+        sheets_dropped: Vec::new(),
+        wraps: Vec::new(),
+        volumes: None,
+        regions: Regions::default(),
+        edit: EditSummary::default(),
+        edit_records: None,
+        verdict: verdict::judge(&diagnosis.defects, &flaws(input.findings)).under(profile.guarantee),
+        certificate: None,
+        stages: Vec::new(),
+        cost: Cost::default(),
+    }
+}
+
+/// Ends the report of an inspection, or of a mesh that nothing was done to: what was found in the input holds of `facts`.
+pub(crate) fn conclude_unchanged(report: &mut Report, facts: &FileFacts, findings: &[Finding]) {
+    report.outcome = if report.verdict.good { Outcome::Clean } else { Outcome::NotGood };
+    report.certificate = Some(certify(facts, &report.before, &flaws(findings)));
+}
+
+/// Repairs what was diagnosed by these steps, if there is anything to be repaired: what is to be edited, and what lay in the material of
+/// others. `None`: it is good as it is.
+pub(crate) fn repair_diagnosed(
+    diagnosis: &mut Diagnosis<'_>,
+    steps: Steps,
+    input: &Input<'_>,
+    report: &mut Report,
+    (profile, limits): (&Profile, &Limits),
+    progress: &dyn Progress,
+) -> Result<Option<(Edit, Enclosed)>> {
+    // What lies in the material of others, or cannot be seen, makes a file no less printable, but it does not belong there.
+    let holds_more = match profile.bodies {
+        Bodies::Union => report.before.nested_positive > 0,
+        Bodies::Visible => report.before.components > 1,
+        Bodies::Keep => false,
+    };
+    if report.verdict.good && !holds_more {
+        return Ok(None);
+    }
+    progress.at("repair", 0, diagnosis.survey.records.len() as u64);
+    let repaired = repairs::run(diagnosis, steps, input.path, profile, limits, progress)?;
+    let edit = Edit::of(&diagnosis.survey, &diagnosis.submesh, &repaired.reversed, &repaired.wrapped);
+    Ok(Some((edit, take_account(report, repaired))))
+}
+
+/// Puts into the report what was done; what lay in the material of others is needed for the verdict.
+fn take_account(report: &mut Report, repaired: Repaired) -> Enclosed {
+    let Repaired { mut account, regions, .. } = repaired;
+    report.repairs = account.repairs();
+    report.loops = account.loops.unwrap_or_default();
+    report.loops_left = account.loops_left;
+    report.sheets_dropped = account.sheets;
+    report.wraps = account.wraps;
+    report.volumes = account.volumes;
+    report.regions = regions;
+    account.enclosed
+}
+
+/// Ends the report of a mesh from which nothing was left.
+pub(crate) fn conclude_empty(report: &mut Report) {
+    report.outcome = Outcome::NotGood;
+    report.verdict.good = false;
+    report.verdict.reasons.push("no triangle was left after the repair".into());
+}
+
+/// What is written, or returned.
+pub(crate) struct Written<'a> {
+    pub(crate) facts: FileFacts,
+    pub(crate) findings: &'a [Finding],
+    pub(crate) defects: Defects,
+}
+
+/// Ends the report of a repair by a verdict on what came of it, against the box of the input's surface and the bodies in it that lay in
+/// others.
+pub(crate) fn conclude(report: &mut Report, input: &[Finding], (surface, enclosed): (&Bounds, &Enclosed), written: Written<'_>) {
+    let Written { facts, findings, defects } = written;
+    let flaws = flaws(findings);
+    report.verdict = verdict::judge(&defects, &flaws).under(report.profile.guarantee);
+    report.outcome = if report.verdict.good { Outcome::Repaired } else { Outcome::NotGood };
+    if report.verdict.good {
+        let mut concerns = review::counts(&report.before, surface, enclosed, &defects, &report.profile);
+        concerns.extend(report.volumes.iter().flat_map(|volumes| review::volumes(volumes, &report.profile)));
+        concerns.extend(review::sheets(&report.before, &report.sheets_dropped, &report.profile));
+        concerns.extend(review::wraps(&report.wraps, &report.profile));
+        // What was closed had to be guessed: nobody knows what stood in the part that is missing.
+        let is_open = report.before.boundary_edges > 0;
+        let lost = input.iter().filter(|f| f.loss == Loss::Certain || f.loss == Loss::IfOpen && is_open);
+        concerns.extend(lost.map(|f| format!("a part is missing: {}", f.text)));
+        if !concerns.is_empty() {
+            report.outcome = Outcome::NeedsReview;
+            report.verdict.reasons = concerns;
+        }
+    }
+    report.certificate = Some(certify(&facts, &defects, &flaws));
+    report.after = Some(defects);
+    report.output = Some(facts);
+}
+
+/// The certificate of a file of these facts, counts and flaws.
+pub(crate) fn certify(facts: &FileFacts, defects: &Defects, flaws: &[String]) -> Certificate {
+    certificate::certify(facts, &Subject { defects, flaws })
+}
+
+/// What makes a file itself less than flawless.
+pub(crate) fn flaws(findings: &[Finding]) -> Vec<String> {
+    findings.iter().filter(|f| !f.harmless).map(|f| f.text.clone()).collect()
+}
+
+fn tolerances(diagnosis: &Diagnosis<'_>) -> Tolerances {
+    let near::Tolerance { weld, edge_share } = diagnosis.tolerance;
+    Tolerances {
+        diagonal: diagnosis.survey.bounds.diagonal(),
+        weld,
+        weld_reason: if weld > 0.0 {
+            format!(
+                "a share of the diagonal, at least four f32 steps of the largest coordinate, at most {edge_share} of the shortest edge at a vertex"
+            )
+        } else {
+            "switched off by the profile".into()
+        },
+    }
+}

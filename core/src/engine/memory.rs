@@ -1,0 +1,200 @@
+//! The way of one mesh in memory through all of it: as that of a file, but that nothing is read or written.
+
+use std::path::Path;
+
+use crate::contract::error::{Error, Result};
+use crate::contract::progress::Progress;
+use crate::contract::report::{Defects, FaceOrigin, FileFacts, Format, Report, Task};
+use crate::contract::settings::{Limits, Profile};
+use crate::diagnosis::Diagnosis;
+use crate::engine::clock::Clock;
+use crate::engine::files;
+use crate::engine::judging::{self, Input, Written};
+use crate::engine::mesh::{Mesh, MeshView};
+use crate::io::disk_space;
+use crate::io::read::PREFIX_BYTES;
+use crate::io::record::Record;
+use crate::output::edit::{Edit, Step};
+use crate::output::incremental;
+use crate::repairs::{self, Steps};
+
+/// How errors and reports name what has no path.
+const NAME: &str = "mesh in memory";
+
+/// What a repair made of a mesh in memory.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct RepairedMesh {
+    /// The mesh. If nothing was repaired, it is the input, array by array. Otherwise each position is one vertex, numbered by first appearance.
+    pub mesh: Mesh,
+    /// Where each of its faces comes from.
+    pub origins: Vec<FaceOrigin>,
+    /// What was found and done, and the verdict on the mesh.
+    pub report: Report,
+}
+
+/// A mesh in memory as the engine reads it.
+pub(crate) struct Held {
+    pub(crate) records: Vec<Record>,
+}
+
+impl Held {
+    /// Refuses what has no faces.
+    pub(crate) fn of(mesh: MeshView<'_>, limits: &Limits) -> Result<Self> {
+        let records = mesh.records();
+        if records.is_empty() {
+            return Err(Error::Unreadable { path: Self::path().into(), reason: "it has no faces".into() });
+        }
+        disk_space::check(Self::path(), &[files::spool_need(&records, limits)])?;
+        Ok(Self { records })
+    }
+
+    pub(crate) fn path() -> &'static Path {
+        Path::new(NAME)
+    }
+
+    /// Everything that is to be known of it.
+    pub(crate) fn diagnose(&self, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> Result<Diagnosis<'_>> {
+        Diagnosis::of(Self::path(), &self.records, profile, limits, progress)
+    }
+
+    /// The facts that stand for those of a file.
+    pub(crate) fn facts(&self, limits: &Limits) -> FileFacts {
+        facts(&self.records, limits)
+    }
+}
+
+fn facts(records: &[Record], limits: &Limits) -> FileFacts {
+    FileFacts {
+        path: NAME.into(),
+        bytes: (PREFIX_BYTES + size_of_val(records)) as u64,
+        blake3: files::hash_of(records.as_flattened(), limits),
+        format: Format::Memory,
+        triangles: records.len() as u64,
+        findings: Vec::new(),
+    }
+}
+
+/// Diagnoses a mesh.
+///
+/// # Errors
+/// [`Error`], but for those of reading and writing files.
+pub(crate) fn inspect(mesh: MeshView<'_>, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> Result<Report> {
+    let mut clock = Clock::start();
+    judging::validate(Held::path(), profile)?;
+    let held = Held::of(mesh, limits)?;
+    clock.stage("read");
+    let mut diagnosis = held.diagnose(profile, limits, progress)?;
+    clock.stage("topology");
+    let facts = held.facts(limits);
+    clock.stage("hash");
+    let input = Input { path: Held::path(), facts: facts.clone(), findings: &[] };
+    let mut report = judging::begin(Task::Inspect, &input, &diagnosis, profile, limits);
+    judging::conclude_unchanged(&mut report, &facts, &[]);
+    report.loops = repairs::recognise(&mut diagnosis, Held::path(), profile, limits, progress)?;
+    clock.close(report, Held::path(), held.records.len())
+}
+
+/// Repairs a mesh by these steps.
+///
+/// # Errors
+/// [`Error`], but for those of reading and writing files.
+pub(crate) fn repair(
+    mesh: MeshView<'_>,
+    steps: Steps,
+    profile: &Profile,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> Result<RepairedMesh> {
+    let mut clock = Clock::start();
+    judging::validate(Held::path(), profile)?;
+    let held = Held::of(mesh, limits)?;
+    clock.stage("read");
+    let mut diagnosis = held.diagnose(profile, limits, progress)?;
+    clock.stage("topology");
+    let surface = diagnosis.surface_bounds();
+    let input = Input { path: Held::path(), facts: held.facts(limits), findings: &[] };
+    clock.stage("hash");
+    let mut report = judging::begin(Task::Repair, &input, &diagnosis, profile, limits);
+    let repaired = judging::repair_diagnosed(&mut diagnosis, steps, &input, &mut report, (profile, limits), progress)?;
+    clock.stage("repair");
+    let (edit, enclosed) = repaired.unwrap_or_default();
+    let survey = diagnosis.into_survey();
+    report.edit = edit.summary(held.records.len());
+    report.edit_records = limits.list_edit.then(|| edit.listed());
+    if edit.is_empty() {
+        drop(survey);
+        judging::conclude_unchanged(&mut report, &input.facts, &[]);
+        report.output = Some(input.facts);
+        let report = clock.close(report, Held::path(), held.records.len())?;
+        let origins = (0..held.records.len() as u32).map(FaceOrigin::Input).collect();
+        return Ok(RepairedMesh { mesh: mesh.to_mesh(), origins, report });
+    }
+    let expected = files::expectation(&held.records, &edit, survey.irregular_triangles.len() as u64, limits);
+    let looked = expected.as_ref().and_then(|expected| incremental::look(survey, &expected.difference));
+    let looked = looked.map(|(survey, submesh)| Diagnosis::count(survey, submesh, profile).defects);
+    drop(expected);
+    let (records, origins) = edited(&held.records, &edit);
+    if records.is_empty() {
+        judging::conclude_empty(&mut report);
+    } else {
+        let defects = judged(looked, &records, profile, limits, progress)?;
+        clock.stage("verify");
+        let facts = facts(&records, limits);
+        judging::conclude(&mut report, &[], (&surface, &enclosed), Written { facts, findings: &[], defects });
+    }
+    let mesh = Mesh::of_records(&records).map_err(|e| Error::Refused {
+        path: NAME.into(),
+        reason: e.to_string(),
+        advice: "divide the mesh".into(),
+    })?;
+    clock.stage("emit");
+    Ok(RepairedMesh { mesh, origins, report: clock.close(report, Held::path(), held.records.len())? })
+}
+
+/// The defects of the result: as the second look found them, or by a survey of its own.
+fn judged(
+    looked: Option<Defects>,
+    records: &[Record],
+    profile: &Profile,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> Result<Defects> {
+    match looked {
+        Some(defects) => Ok(defects),
+        None => Ok(Diagnosis::of(Held::path(), records, profile, limits, progress)?.defects),
+    }
+}
+
+/// The records as `edit` leaves them, and where each comes from.
+fn edited(input: &[Record], edit: &Edit) -> (Vec<Record>, Vec<FaceOrigin>) {
+    let count = edit.output_records(input.len()) as usize;
+    let (mut records, mut origins) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    // The next record of the input.
+    let mut at = 0;
+    let walked: std::result::Result<(), std::convert::Infallible> = edit.walk(input, |step| {
+        match step {
+            Step::Untouched(run) => {
+                records.extend_from_slice(run);
+                origins.extend((at..at + run.len() as u32).map(FaceOrigin::Input));
+                at += run.len() as u32;
+            }
+            Step::Changed(_, record, from) => {
+                records.push(record);
+                origins.push(from);
+                at += 1;
+            }
+            Step::Deleted(_) => at += 1,
+            Step::Added(record, from) => {
+                records.push(*record);
+                origins.push(from);
+            }
+        }
+        Ok(())
+    });
+    let Ok(()) = walked;
+    (records, origins)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,140 @@
+//! A mesh in memory becomes what its file becomes.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use proptest::prelude::*;
+use proptest::test_runner::TestCaseError;
+
+use super::*;
+use crate::contract::progress::Quiet;
+use crate::contract::report::{Outcome, RepairName};
+use crate::io::record;
+use crate::testing::{Corners, cube, cuboid, plate, records, shifted, soup};
+
+fn limits() -> Limits {
+    Limits { threads: 1, list_edit: true, ..Limits::default() }
+}
+
+fn repaired(triangles: &[Corners]) -> RepairedMesh {
+    crate::repair_mesh(&Mesh::from_triangles(triangles).unwrap(), &Profile::default(), &limits(), &Quiet).unwrap()
+}
+
+/// The records that the engine writes for a file of these triangles, and its report.
+fn repaired_file(triangles: &[Corners]) -> (Vec<Record>, Report) {
+    let folder = tempfile::tempdir().unwrap();
+    let (input, output) = (folder.path().join("in.stl"), folder.path().join("out.stl"));
+    let records = records(triangles);
+    std::fs::write(&input, [&[0; 80][..], &(records.len() as u32).to_le_bytes(), records.as_flattened()].concat()).unwrap();
+    let report = crate::repair(&input, &output, &Profile::default(), &limits(), &Quiet).unwrap();
+    let bytes = std::fs::read(&output).unwrap_or_default();
+    (bytes.get(PREFIX_BYTES..).unwrap_or_default().as_chunks::<50>().0.to_vec(), report)
+}
+
+/// The face of an origin must be what the origin says of the input's.
+fn check_origin(input: &[Corners], face: Corners, origin: FaceOrigin) -> std::result::Result<(), TestCaseError> {
+    let before = origin.input_face().map(|face| input[face as usize]);
+    match (origin, before) {
+        (FaceOrigin::Input(_), Some(before)) => prop_assert_eq!(face, before),
+        (FaceOrigin::Flipped(_), Some([a, b, c])) => prop_assert_eq!(face, [a, c, b]),
+        (FaceOrigin::Moved(_), Some(before)) => prop_assert!(face != before),
+        (FaceOrigin::Part(_), Some(_)) | (FaceOrigin::Repair(_), None) => {}
+        other => prop_assert!(false, "{:?}", other),
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+
+    /// The same faces in the same order, the same counts, verdict and edit; and every face is what its origin says.
+    #[test]
+    fn a_mesh_becomes_what_its_file_becomes(triangles in soup().prop_filter("no mesh", |t| !t.is_empty())) {
+        let RepairedMesh { mesh, origins, report } = repaired(&triangles);
+        let (written, of_file) = repaired_file(&triangles);
+        let faces: Vec<Corners> = mesh.view().triangles().collect();
+        if report.outcome == Outcome::Clean || report.after.is_some() {
+            prop_assert_eq!(&faces, &written.iter().map(record::corners).collect::<Vec<_>>());
+        } else {
+            prop_assert!(faces.iter().all(|t| t.as_flattened().iter().all(|x| x.is_finite())) || report.edit.deleted == 0);
+        }
+        prop_assert_eq!(report.outcome, of_file.outcome);
+        prop_assert_eq!(&report.before, &of_file.before);
+        prop_assert_eq!(&report.after, &of_file.after);
+        prop_assert_eq!(&report.verdict, &of_file.verdict);
+        prop_assert_eq!(&report.edit, &of_file.edit);
+        let (listed, of_file) = (report.edit_records.unwrap(), of_file.edit_records.unwrap());
+        prop_assert_eq!(&listed.added_from, &of_file.added_from);
+        prop_assert_eq!(listed.added.len(), listed.added_from.len());
+        prop_assert_eq!(origins.len(), faces.len());
+        for (face, origin) in faces.into_iter().zip(&origins) {
+            check_origin(&triangles, face, *origin)?;
+        }
+        let count = |wanted: fn(&FaceOrigin) -> bool| origins.iter().filter(|o| wanted(o)).count() as u64;
+        prop_assert_eq!(count(|o| matches!(o, FaceOrigin::Input(_))), report.edit.untouched);
+        prop_assert_eq!(count(|o| matches!(o, FaceOrigin::Flipped(_))), report.edit.flipped);
+        prop_assert_eq!(count(|o| matches!(o, FaceOrigin::Moved(_))), report.edit.moved);
+        prop_assert_eq!(count(|o| matches!(o, FaceOrigin::Part(_) | FaceOrigin::Repair(_))), report.edit.added);
+    }
+}
+
+/// Vertices that no face uses, and two at one position, are the caller's.
+#[test]
+fn a_mesh_that_needs_no_repair_is_returned_as_it_came() {
+    let (vertices, faces) = Mesh::from_triangles(&cube()).unwrap().into_parts();
+    let odd = Mesh::new([&[[9.0; 3], [9.0; 3]], &vertices[..]].concat(), faces.iter().map(|f| f.map(|v| v + 2)).collect());
+    let odd = odd.unwrap();
+    let repaired = crate::repair_mesh(&odd, &Profile::default(), &limits(), &Quiet).unwrap();
+    assert_eq!((repaired.report.outcome, &repaired.mesh), (Outcome::Clean, &odd));
+    assert_eq!(repaired.origins, (0..12).map(FaceOrigin::Input).collect::<Vec<_>>());
+    assert_eq!(repaired.report.input.format, Format::Memory);
+}
+
+/// Two cubes that cross are cut along each other, a third lacks its top, a fourth is inside out.
+#[test]
+fn origins_name_the_repair() {
+    let crossing = [cube(), shifted(&cube(), [0.5; 3])].concat();
+    let mut open = cuboid([5.0; 3], [6.0; 3]);
+    open.drain(2..4);
+    let inside_out = crate::testing::reversed(&shifted(&cube(), [0.0, 0.0, 9.0]));
+    let all = [crossing, open, inside_out].concat();
+    let RepairedMesh { origins, report, .. } = repaired(&all);
+    assert_eq!(report.outcome, Outcome::Repaired, "{:?}", report.verdict);
+    assert_eq!(origins.iter().filter(|o| **o == FaceOrigin::Repair(RepairName::Fill)).count(), 2);
+    assert_eq!(origins.iter().filter(|o| matches!(o, FaceOrigin::Flipped(34..46))).count(), 12);
+    assert!(origins.iter().any(|o| matches!(o, FaceOrigin::Part(0..24))));
+}
+
+#[test]
+fn a_mesh_without_faces_is_an_error() {
+    let error = crate::inspect_mesh(&Mesh::default(), &Profile::default(), &limits(), &Quiet).unwrap_err();
+    assert_eq!(error.to_string(), "mesh in memory: cannot be read as a mesh: it has no faces");
+}
+
+#[test]
+fn what_a_repair_leaves_nothing_of_is_an_empty_mesh() {
+    let RepairedMesh { mesh, origins, report } = repaired(&[[[0.0; 3]; 3]]);
+    assert_eq!((mesh.faces().len(), origins.len(), report.outcome), (0, 0, Outcome::NotGood));
+}
+
+/// Asks for the end as soon as a stage begins.
+struct Ending(&'static str, AtomicBool);
+
+impl Progress for Ending {
+    fn at(&self, stage: &'static str, _: u64, _: u64) {
+        if stage == self.0 {
+            self.1.store(true, Ordering::Relaxed);
+        }
+    }
+
+    fn cancelled(&self) -> bool {
+        self.1.load(Ordering::Relaxed)
+    }
+}
+
+#[test]
+fn work_that_is_cancelled_ends_with_an_error_that_says_so() {
+    let mesh = Mesh::from_triangles(&plate(60, |x, y| (x, y) != (7, 7))).unwrap();
+    let ending = Ending("plan", AtomicBool::new(false));
+    let error = crate::repair_mesh(&mesh, &Profile::default(), &limits(), &ending).unwrap_err();
+    assert!(error.is_cancellation(), "{error}");
+}

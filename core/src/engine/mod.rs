@@ -1,0 +1,13 @@
+//! Engine: the way of one mesh through all of it.
+//!
+//! **In:** a path or a [`Mesh`](mesh::Mesh), a profile, limits, a progress.
+//! **Out:** a report; for a repair, the file at the path for it, or a mesh and where each of its faces comes from.
+//! **Promise:** what stands at that path is complete and synced when a report is returned. The input is what it was at the beginning, or
+//! the result is thrown away. A mesh from memory becomes the mesh that its file would become, face by face.
+
+mod clock;
+pub(crate) mod files;
+mod judging;
+pub(crate) mod memory;
+pub(crate) mod mesh;
+pub mod operations;

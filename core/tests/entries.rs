@@ -1,0 +1,320 @@
+//! The promise about panics: no public function panics, whatever it is given.
+//!
+//! A test here fails when a function panics; what it returns is looked at elsewhere. Each runs a few cases, or for as many seconds as
+//! `SUTURE_FUZZ_SECONDS` says, with other cases each time.
+
+#![allow(clippy::unwrap_used)]
+
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+use proptest::prelude::*;
+use proptest::test_runner::{Config, TestRunner};
+use suture_core::operations::{self, Fill, Orient, Union, Wrap};
+use suture_core::{
+    Bodies, Guarantee, Limits, Mesh, MeshView, PatchShape, Profile, Progress, Sheets, Spill, inspect, inspect_mesh, repair,
+    repair_mesh,
+};
+
+/// Cases of each function if no time is given.
+const CASES: u32 = 24;
+
+/// Calls `entry` with what `strategy` makes, for as long as is asked for. Whatever it panics with is told with the smallest input that does it.
+fn hold<S: Strategy>(strategy: S, entry: impl Fn(S::Value)) {
+    let seconds = std::env::var("SUTURE_FUZZ_SECONDS").ok().and_then(|text| text.parse().ok());
+    let end = seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds));
+    loop {
+        let config = Config { cases: CASES, failure_persistence: None, ..Config::default() };
+        let result = TestRunner::new(config).run(&strategy, |given| {
+            entry(given);
+            Ok(())
+        });
+        if let Err(error) = result {
+            panic!("{error}");
+        }
+        if end.is_none_or(|end| Instant::now() > end) {
+            return;
+        }
+    }
+}
+
+/// Coordinates that meet, that nearly meet, and that mean nothing.
+fn coordinate() -> impl Strategy<Value = f32> {
+    prop_oneof![
+        40 => (0i8..4).prop_map(f32::from),
+        4 => (0i8..4).prop_map(|x| f32::from(x).next_up()),
+        4 => (0u8..=255).prop_map(|x| f32::from(x) / 64.0),
+        1 => any::<f32>(),
+        1 => prop::sample::select(vec![f32::NAN, f32::INFINITY, -f32::INFINITY, f32::MAX, -f32::MAX, f32::MIN_POSITIVE, -0.0]),
+    ]
+}
+
+/// The corners of a box, twice each face.
+fn block() -> impl Strategy<Value = Vec<[[f32; 3]; 3]>> {
+    let places = (prop::array::uniform3(0u8..4), prop::array::uniform3(1u8..4), any::<bool>(), prop::option::of(0usize..12));
+    places.prop_map(|(at, size, turned, lost)| {
+        let p = |n: usize| std::array::from_fn(|k| f32::from(at[k] + if n >> k & 1 == 1 { size[k] } else { 0 }));
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let mut faces: Vec<[[f32; 3]; 3]> =
+            quads.iter().flat_map(|q| [[p(q[0]), p(q[1]), p(q[2])], [p(q[0]), p(q[2]), p(q[3])]]).collect();
+        lost.into_iter().for_each(|face| {
+            faces.remove(face);
+        });
+        if turned {
+            faces.iter_mut().for_each(|face| face.swap(1, 2));
+        }
+        faces
+    })
+}
+
+/// A few boxes that touch, cross and are inside out or open, and stray triangles.
+fn soup() -> impl Strategy<Value = Vec<[[f32; 3]; 3]>> {
+    let strays = prop::collection::vec(prop::array::uniform3(prop::array::uniform3(coordinate())), 0..12);
+    (prop::collection::vec(block(), 0..4), strays).prop_map(|(blocks, strays)| [blocks.concat(), strays].concat())
+}
+
+/// Vertices and faces that fit, or do not.
+fn arrays() -> impl Strategy<Value = (Vec<[f32; 3]>, Vec<[u32; 3]>)> {
+    let vertices = prop::collection::vec(prop::array::uniform3(coordinate()), 0..20);
+    let number = prop_oneof![200 => 0u32..20, 1 => any::<u32>()];
+    (vertices, prop::collection::vec(prop::array::uniform3(number), 0..40))
+}
+
+fn mesh() -> impl Strategy<Value = Mesh> {
+    let indexed = arrays().prop_map(|(vertices, faces)| {
+        let count = vertices.len() as u32;
+        let fitting = faces.into_iter().filter(|face| face.iter().all(|v| *v < count)).collect();
+        Mesh::new(vertices, fitting).unwrap()
+    });
+    prop_oneof![3 => soup().prop_map(|soup| Mesh::from_triangles(&soup).unwrap()), 1 => indexed]
+}
+
+/// Limits that nobody means are limits, too.
+fn limits() -> impl Strategy<Value = Limits> {
+    let bytes = prop_oneof![4 => Just(1u64 << 30), 1 => 0u64..(64 << 20), 1 => any::<u64>()];
+    let chunk = prop_oneof![3 => Just(32u32 << 10), 1 => 0u32..64, 1 => any::<u32>()];
+    let spill = prop::sample::select(vec![Spill::Auto, Spill::Never, Spill::Always]);
+    (bytes, 0usize..4, chunk, spill, any::<bool>()).prop_map(|(memory_bytes, threads, chunk_triangles, spill, list_edit)| {
+        let mut limits = Limits::default().with_memory(memory_bytes).with_spill(spill);
+        (limits.threads, limits.chunk_triangles, limits.list_edit) = (threads, chunk_triangles, list_edit);
+        limits
+    })
+}
+
+/// Settings that mean something, at their ends, and now and then one that does not.
+fn profile() -> impl Strategy<Value = Profile> {
+    let number =
+        || prop_oneof![4 => 0.0..1.0f64, 1 => prop::sample::select(vec![0.0, 1.0, 1e-300, 1e300, f64::MAX, f64::NAN, -1.0])];
+    let choices = (
+        prop::sample::select(vec![Guarantee::Strict, Guarantee::Wrap, Guarantee::Off]),
+        prop::sample::select(vec![Bodies::Union, Bodies::Keep, Bodies::Visible]),
+        prop::sample::select(vec![PatchShape::Flat, PatchShape::Fair, PatchShape::Implicit]),
+        prop::sample::select(vec![Sheets::Drop, Sheets::Keep]),
+    );
+    let switches = prop::array::uniform5(any::<bool>());
+    let names = prop::sample::select(Profile::BUILT_IN.to_vec());
+    let changed = prop::option::of((choices, switches, prop::option::of((0usize..16, number()))));
+    (names, changed, prop::array::uniform3(prop_oneof![Just(20_000u32), 0u32..9, any::<u32>()])).prop_map(
+        |(name, changed, counts)| {
+            let mut profile = Profile::built_in(name).unwrap();
+            let Some(((guarantee, bodies, patch_shape, sheets), [a, b, c, d, e], number)) = changed else { return profile };
+            (profile.guarantee, profile.bodies, profile.patch_shape, profile.sheets) = (guarantee, bodies, patch_shape, sheets);
+            (profile.close_sheets, profile.fill_holes, profile.separate) = (a, b, c);
+            (profile.resolve_crossings, profile.check_self_intersections) = (d, e);
+            [profile.max_hole_edges, profile.max_bodies_lost, profile.debris_triangles] = counts;
+            if let Some((which, value)) = number {
+                *setting(&mut profile, which) = value;
+            }
+            profile
+        },
+    )
+}
+
+fn setting(profile: &mut Profile, which: usize) -> &mut f64 {
+    match which {
+        0 => &mut profile.weld_relative,
+        1 => &mut profile.weld_max_edge_share,
+        2 => &mut profile.gap_edge_share,
+        3 => &mut profile.max_hole_perimeter_relative,
+        4 => &mut profile.max_hole_perimeter_mm,
+        5 => &mut profile.max_gap_mm,
+        6 => &mut profile.max_volume_change,
+        7 => &mut profile.max_area_change,
+        8 => &mut profile.max_box_change_relative,
+        9 => &mut profile.debris_area_share,
+        10 => &mut profile.max_sheets_share,
+        11 => &mut profile.stack_gap_relative,
+        12 => &mut profile.max_separation_relative,
+        13 => &mut profile.wrap_max_share,
+        14 => &mut profile.wrap_max_move,
+        _ => &mut profile.wrap_review_share,
+    }
+}
+
+/// Ends the work after so many words about it.
+#[derive(Debug)]
+struct Patience(AtomicU32);
+
+impl Progress for Patience {
+    fn at(&self, _: &'static str, _: u64, _: u64) {
+        let _ = self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1));
+    }
+
+    fn cancelled(&self) -> bool {
+        self.0.load(Ordering::Relaxed) == 0
+    }
+}
+
+fn progress() -> impl Strategy<Value = Patience> {
+    prop_oneof![9 => Just(u32::MAX), 1 => 1u32..40].prop_map(|words| Patience(AtomicU32::new(words)))
+}
+
+/// The bytes of files: meshes, meshes that were cut off or changed, text, and anything.
+fn file() -> impl Strategy<Value = Vec<u8>> {
+    let binary = soup().prop_map(|soup| {
+        let record = |t: &[[f32; 3]; 3]| -> Vec<u8> {
+            [0.0f32; 3].iter().chain(t.as_flattened()).flat_map(|x| x.to_le_bytes()).chain([0, 0]).collect()
+        };
+        [&[0u8; 80][..], &(soup.len() as u32).to_le_bytes(), &soup.iter().flat_map(record).collect::<Vec<_>>()].concat()
+    });
+    let text = soup().prop_map(|soup| {
+        let vertex = |[x, y, z]: &[f32; 3]| format!("vertex {x} {y} {z}\n");
+        let facet = |t: &[[f32; 3]; 3]| {
+            format!("facet normal 0 0 1\nouter loop\n{}endloop\nendfacet\n", t.iter().map(vertex).collect::<String>())
+        };
+        format!("solid part\n{}endsolid part\n", soup.iter().map(facet).collect::<String>()).into_bytes()
+    });
+    let meshes = prop_oneof![binary, text];
+    let damaged = (
+        meshes,
+        prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..4),
+        prop::option::of(any::<prop::sample::Index>()),
+    );
+    let damaged = damaged.prop_map(|(mut bytes, changes, end)| {
+        for (at, byte) in changes {
+            let at = at.index(bytes.len());
+            bytes[at] = byte;
+        }
+        end.into_iter().for_each(|end| bytes.truncate(end.index(bytes.len())));
+        bytes
+    });
+    prop_oneof![6 => damaged, 1 => prop::collection::vec(any::<u8>(), 0..400)]
+}
+
+#[test]
+fn mesh_new() {
+    hold(arrays(), |(vertices, faces)| {
+        let _ = MeshView::new(&vertices, &faces);
+        let _ = Mesh::new(vertices, faces);
+    });
+}
+
+#[test]
+fn mesh_from_triangles() {
+    hold(soup(), |soup| drop(Mesh::from_triangles(&soup)));
+}
+
+#[test]
+fn inspect_mesh_() {
+    hold((mesh(), profile(), limits(), progress()), |(mesh, profile, limits, progress)| {
+        let _ = inspect_mesh(&mesh, &profile, &limits, &progress);
+    });
+}
+
+#[test]
+fn repair_mesh_() {
+    hold((mesh(), profile(), limits(), progress()), |(mesh, profile, limits, progress)| {
+        let _ = repair_mesh(&mesh, &profile, &limits, &progress);
+    });
+}
+
+#[test]
+fn operations_find_defects() {
+    hold((mesh(), limits(), progress()), |(mesh, limits, progress)| drop(operations::find_defects(&mesh, &limits, &progress)));
+}
+
+#[test]
+fn operations_find_loops() {
+    hold((mesh(), limits(), progress()), |(mesh, limits, progress)| drop(operations::find_loops(&mesh, &limits, &progress)));
+}
+
+#[test]
+fn operations_find_self_intersections() {
+    hold((mesh(), limits(), progress()), |(mesh, limits, progress)| {
+        let _ = operations::find_self_intersections(&mesh, &limits, &progress);
+    });
+}
+
+#[test]
+fn operations_certificate() {
+    hold((mesh(), limits(), progress()), |(mesh, limits, progress)| drop(operations::certificate(&mesh, &limits, &progress)));
+}
+
+#[test]
+fn operations_fill() {
+    let shape = prop::sample::select(vec![PatchShape::Flat, PatchShape::Fair, PatchShape::Implicit]);
+    let place = prop::option::of(prop::array::uniform3(coordinate()));
+    let how = (place, shape, prop_oneof![Just(20_000u32), 0u32..9], any::<bool>())
+        .prop_map(|(place, shape, edges, sheets)| Fill::default().only_loop(place).shape(shape).max_edges(edges).sheets(sheets));
+    hold((mesh(), how, limits(), progress()), |(mesh, how, limits, progress)| {
+        let _ = operations::fill(&mesh, &how, &limits, &progress);
+    });
+}
+
+#[test]
+fn operations_orient() {
+    hold((mesh(), any::<bool>(), limits(), progress()), |(mesh, by_visibility, limits, progress)| {
+        let _ = operations::orient(&mesh, &Orient::default().by_visibility(by_visibility), &limits, &progress);
+    });
+}
+
+#[test]
+fn operations_union() {
+    hold((mesh(), any::<[bool; 2]>(), limits(), progress()), |(mesh, [visible, separate], limits, progress)| {
+        let _ = operations::union(&mesh, &Union::default().visible_only(visible).separate(separate), &limits, &progress);
+    });
+}
+
+#[test]
+fn operations_wrap() {
+    let number = || prop_oneof![3 => 0.0..1.0f64, 1 => any::<f64>()];
+    hold((mesh(), number(), number(), limits(), progress()), |(mesh, share, distance, limits, progress)| {
+        let _ = operations::wrap(&mesh, &Wrap::default().max_share(share).max_move(distance), &limits, &progress);
+    });
+}
+
+#[test]
+fn inspect_() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("in.stl");
+    hold((file(), profile(), limits(), progress()), |(bytes, profile, limits, progress)| {
+        std::fs::write(&input, bytes).unwrap();
+        let _ = inspect(&input, &profile, &limits, &progress);
+    });
+}
+
+#[test]
+fn repair_() {
+    let folder = tempfile::tempdir().unwrap();
+    let (input, output) = (folder.path().join("in.stl"), folder.path().join("out.stl"));
+    hold((file(), profile(), limits(), progress()), |(bytes, profile, limits, progress)| {
+        std::fs::write(&input, bytes).unwrap();
+        let _ = repair(&input, &output, &profile, &limits, &progress);
+        let _ = std::fs::remove_file(&output);
+    });
+}
+
+#[test]
+fn profile_validate() {
+    hold(profile(), |profile| drop(profile.to_builder().build()));
+}
+
+#[test]
+fn ends_in_zeros() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("in.stl");
+    hold(file(), |bytes| {
+        std::fs::write(&input, bytes).unwrap();
+        let _ = suture_core::ends_in_zeros(&std::fs::File::open(&input).unwrap());
+    });
+}

@@ -3,6 +3,8 @@
 //! The generators ([`generate`]) and the judge ([`judge`]) need nothing but the standard library; they share no code with the
 //! engine, so that neither can hide a fault of the other. The comparison with other tools is in the binary.
 
+#![deny(missing_docs)]
+
 pub mod counts;
 pub mod generate;
 pub mod judge;

@@ -10,6 +10,7 @@
 //!   below panics for want of memory, the error is [`Error::Starved`]. Property tests and ten minutes of random inputs for each function
 //!   hold this; a panic is a defect to be reported. A panic of the caller's [`Progress`] goes through.
 
+#![deny(missing_docs)]
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 mod algorithms;

@@ -381,11 +381,8 @@ fn request(folder: &Folder, claim: &Claim, job: &Job, profile: Profile, limits: 
 /// A small file gets one thread and its slot's share of the memory; a file alone gets everything.
 fn limits(config: &Config, turn: Turn) -> Limits {
     let alone = turn.is_alone();
-    Limits {
-        memory_bytes: if alone { config.memory } else { config.memory / config.workers.max(1) as u64 },
-        threads: if alone { config.threads } else { 1 },
-        ..Limits::default()
-    }
+    let memory = if alone { config.memory } else { config.memory / config.workers.max(1) as u64 };
+    Limits::default().with_memory(memory).with_threads(if alone { config.threads } else { 1 })
 }
 
 /// The settings for a file: of its folder or one above it, else by name.

@@ -158,11 +158,8 @@ impl<'a> Line<'a> {
         let whole = &order.limits;
         let slots = whole.threads.clamp(1, range.len().max(1));
         let unsynced = UNSYNCED.min(whole.memory_bytes / 8);
-        let limits = Limits {
-            threads: (whole.threads / slots).max(1),
-            memory_bytes: (whole.memory_bytes - unsynced) / slots as u64,
-            ..whole.clone()
-        };
+        let memory = (whole.memory_bytes - unsynced) / slots as u64;
+        let limits = whole.clone().with_threads(whole.threads / slots).with_memory(memory);
         Self {
             order,
             stop,
@@ -216,8 +213,9 @@ impl<'a> Line<'a> {
 
     fn work(&self, entry: &Entry, worker: &mut Option<Worker>) -> Outcome {
         // A list of what was edited may be much larger than the mesh.
-        let defer_sync = entry.target.is_some() && entry.size <= self.deferred && !self.limits.list_edit;
-        let item = self.order.item(entry.input, entry.target.as_deref(), Limits { defer_sync, ..self.limits.clone() })?;
+        let mut limits = self.limits.clone();
+        limits.defer_sync = entry.target.is_some() && entry.size <= self.deferred && !limits.list_edit;
+        let item = self.order.item(entry.input, entry.target.as_deref(), limits)?;
         let report = item.work(worker, true, self.stop, &mut |_, _, _| {})?;
         Ok(Finished { report, item })
     }

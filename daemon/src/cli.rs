@@ -106,14 +106,14 @@ pub(crate) enum Spill {
 impl Spend {
     /// As the engine takes it.
     pub(crate) fn limits(&self, list_edit: bool) -> suture_core::Limits {
-        let mut limits = suture_core::Limits { list_edit, ..Default::default() };
+        let mut limits = suture_core::Limits::default().with_edit_listed(list_edit);
         limits.memory_bytes = self.memory.unwrap_or(limits.memory_bytes);
         limits.threads = self.threads.map_or(limits.threads, usize::from);
         limits.chunk_triangles = self.chunk_triangles.unwrap_or(limits.chunk_triangles);
         limits.spill = match self.spill {
-            Spill::Auto => suture_core::settings::Spill::Auto,
-            Spill::Always => suture_core::settings::Spill::Always,
-            Spill::Never => suture_core::settings::Spill::Never,
+            Spill::Auto => suture_core::Spill::Auto,
+            Spill::Always => suture_core::Spill::Always,
+            Spill::Never => suture_core::Spill::Never,
         };
         limits
     }

@@ -252,55 +252,22 @@ fn line(out: &mut String, text: std::fmt::Arguments) {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use suture_core::report::{
-        BoundaryLoops, Cost, EditSummary, FileFacts, Regions, Repair, RepairName, SCHEMA_VERSION, Tolerances, Verdict,
-    };
-    use suture_core::{Limits, Profile};
+    use suture_core::{Limits, Mesh, Profile, Quiet};
 
+    /// Of a file of 12 triangles to which nothing was done.
     pub(crate) fn sample(outcome: Outcome) -> Report {
-        let facts = FileFacts {
-            path: "part.stl".into(),
-            bytes: 684,
-            blake3: String::new(),
-            format: Format::BinaryStl,
-            triangles: 12,
-            findings: vec![],
-        };
-        Report {
-            schema_version: SCHEMA_VERSION,
-            engine_version: "0".into(),
-            task: Task::Repair,
-            outcome,
-            input: facts.clone(),
-            output: Some(facts),
-            profile: Profile::default(),
-            limits: Limits::default(),
-            before: Defects::default(),
-            after: Some(Defects::default()),
-            tolerances: Tolerances::default(),
-            repairs: vec![],
-            loops: BoundaryLoops::default(),
-            loops_left: vec![],
-            sheets_dropped: vec![],
-            wraps: vec![],
-            volumes: None,
-            regions: Regions::default(),
-            edit: EditSummary::default(),
-            edit_records: None,
-            verdict: Verdict {
-                good: outcome.is_good(),
-                statement: "closed, manifold, oriented".into(),
-                closed: true,
-                manifold: true,
-                oriented: true,
-                free_of_self_intersection: Some(true),
-                reasons: vec![],
-                unchecked: vec![],
-            },
-            certificate: None,
-            stages: vec![],
-            cost: Cost::default(),
-        }
+        let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let mesh = Mesh::new(corners, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]).unwrap();
+        let mut report = suture_core::inspect_mesh(&mesh, &Profile::default(), &Limits::default(), &Quiet).unwrap();
+        (report.task, report.outcome) = (Task::Repair, outcome);
+        (report.input.path, report.input.bytes, report.input.triangles) = ("part.stl".into(), 684, 12);
+        report.input.format = Format::BinaryStl;
+        report.output = Some(report.input.clone());
+        report.before = Defects::default();
+        report.after = Some(Defects::default());
+        report.verdict.good = outcome.is_good();
+        report.certificate = None;
+        report
     }
 
     #[test]
@@ -315,8 +282,9 @@ pub(crate) mod tests {
         let mut report = sample(Outcome::Repaired);
         report.before.boundary_edges = 3;
         report.before.components = 2;
-        report.after = Some(Defects { components: 2, ..Defects::default() });
-        report.repairs.push(Repair { name: RepairName::Fill, count: 1, note: "one hole".into(), seconds: 0.0 });
+        report.after.as_mut().unwrap().components = 2;
+        let fill = r#"{"name": "fill", "count": 1, "note": "one hole", "seconds": 0.0}"#;
+        report.repairs.push(serde_json::from_str(fill).unwrap());
         let text = render(&report);
         assert!(text.contains("boundary edges"), "{text}");
         assert!(!text.contains("duplicate") && !text.contains("components"), "{text}");
@@ -329,10 +297,12 @@ pub(crate) mod tests {
     #[test]
     fn self_intersections_are_shown_before_and_after() {
         let pairs = |n: u32| {
-            let listed = (0..n).map(|k| [k, k + 10]).collect();
-            let counts =
-                SelfIntersections { triangles: u64::from(2 * n), crossing_pairs: u64::from(n), listed, ..Default::default() };
-            Defects { self_intersections: Some(counts), ..Defects::default() }
+            let mut counts = SelfIntersections::default();
+            counts.listed = (0..n).map(|k| [k, k + 10]).collect();
+            (counts.triangles, counts.crossing_pairs) = (u64::from(2 * n), u64::from(n));
+            let mut defects = Defects::default();
+            defects.self_intersections = Some(counts);
+            defects
         };
         let mut report = sample(Outcome::NotGood);
         report.before = pairs(7);
@@ -343,7 +313,8 @@ pub(crate) mod tests {
         assert!(text.contains("pairs that cross") && !text.contains("pairs that overlap"), "{text}");
         assert!(text.contains("  pairs   triangles 0 and 10, 1 and 11, 2 and 12, and 2 more (numbered from 0)"), "{text}");
         if let Some(found) = &mut report.before.self_intersections {
-            *found = SelfIntersections { given_up: true, ..Default::default() };
+            *found = SelfIntersections::default();
+            found.given_up = true;
         }
         assert!(render(&report).contains("too many"));
         assert!(summary(&report).0.contains("too many self-intersecting triangles"));

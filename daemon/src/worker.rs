@@ -5,7 +5,7 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use suture_core::report::Task;
-use suture_core::{Access, Error, Limits, Progress, Report};
+use suture_core::{Access, Error, Progress, Report};
 
 use crate::cli::WorkerArgs;
 use crate::confine;
@@ -99,7 +99,9 @@ fn work(request: &Request) -> suture_core::error::Result<Report> {
     // SAFETY: this process does nothing else than this work. If someone truncates the file, SIGBUS ends it, and the supervisor tells why. If
     // someone changes it, the bytes seen are plain numbers, valid in every state, and the result is thrown away.
     let access = unsafe { Access::mapped() };
-    let limits = &Limits { access, ..request.limits.clone() };
+    let mut limits = request.limits.clone();
+    limits.access = access;
+    let limits = &limits;
     let mut report = match (request.task, &request.output) {
         (Task::Repair, Some(output)) => suture_core::repair(input, output, profile, limits, &teller)?,
         _ => suture_core::inspect(input, profile, limits, &teller)?,

@@ -81,7 +81,9 @@ impl Boot {
 
 /// Where the store's time comes from, and in which life of the machine it is.
 pub trait Clock: Send + Sync {
+    /// The time of day.
     fn now(&self) -> Time;
+    /// Which start of the machine this is.
     fn boot(&self) -> Boot;
 }
 

@@ -8,6 +8,8 @@
 //!
 //! The store is the index, the file system is the evidence: it never says more than what the files can confirm.
 
+#![deny(missing_docs)]
+
 pub mod crash;
 pub mod id;
 pub mod job;

@@ -24,6 +24,7 @@ pub struct RelPath(Vec<u8>);
 
 /// Why something is no [`RelPath`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of each variant says it")]
 pub enum PathError {
     #[error("not a plain relative path (absolute, empty, or with `.`, `..` or NUL in it)")]
     NotPlain,

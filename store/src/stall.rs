@@ -8,6 +8,7 @@ use std::time::Instant;
 /// A call into the database that has not returned.
 #[derive(Clone, Copy, Debug)]
 pub struct UnderWay {
+    /// When it began.
     pub since: Instant,
     /// Number of the thread that waits for it (`gettid`).
     pub thread: u32,

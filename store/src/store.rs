@@ -79,6 +79,7 @@ pub trait JobStore: Send + Sync {
 /// A file that was found.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Submission {
+    /// The file, as it came to rest.
     pub source: Source,
     /// `Some`: not a format that is repaired; what it is instead. It is recorded and left where it is.
     pub foreign: Option<String>,
@@ -87,6 +88,7 @@ pub struct Submission {
 /// What became of a submission.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Submitted {
+    /// Its job.
     pub id: JobId,
     /// `false`: the job was there already.
     pub new: bool,
@@ -111,7 +113,9 @@ impl Default for Filter {
 /// The right to work on a job, until it ends, is handed back, or the daemon dies.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Claim {
+    /// The job.
     pub id: JobId,
+    /// Names this claim; the store knows no other one of the job.
     pub token: Token,
     /// The job as it was claimed.
     pub job: Job,
@@ -165,6 +169,7 @@ pub struct Query {
 
 /// What can go wrong with a store.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each variant says what its fields are")]
 pub enum StoreError {
     /// Another daemon owns the state folder.
     #[error("{} is owned by another daemon{}", path.display(), pid.map(|pid| format!(" (process {pid})")).unwrap_or_default())]

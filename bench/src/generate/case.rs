@@ -143,6 +143,7 @@ impl std::str::FromStr for Case {
 
 /// Why a file could not be generated.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each variant says what its fields are")]
 pub enum Error {
     /// A name that is not in [`Case::ALL`].
     #[error("there is no case `{name}`; the cases are {}", Case::ALL.map(Case::name).join(", "))]
@@ -164,7 +165,9 @@ pub type Result<T> = std::result::Result<T, Error>;
 /// What was written, and what is wrong with it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Truth {
+    /// What is wrong with it.
     pub case: Case,
+    /// The seed: equal seeds give equal bytes.
     pub seed: u64,
     /// What an exact check must find.
     pub counts: Counts,

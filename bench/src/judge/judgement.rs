@@ -9,6 +9,7 @@ pub type Triangle = [[f32; 3]; 3];
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "compare", derive(serde::Serialize, serde::Deserialize))]
 pub struct Judgement {
+    /// What was counted.
     pub counts: Counts,
     /// Triangles with a NaN or infinite coordinate.
     pub nonfinite: u64,

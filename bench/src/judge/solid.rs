@@ -13,6 +13,7 @@ use super::topology::{Components, examine};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "compare", derive(serde::Serialize, serde::Deserialize))]
 pub struct Solid {
+    /// Of the file as it is.
     pub judgement: Judgement,
     /// Triangles that cross or overlap another one: that have a segment in common which is not an edge of both, or an area.
     pub meeting: u64,
@@ -25,13 +26,21 @@ pub struct Solid {
 /// Why a file cannot be printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Fault {
+    /// It has no triangle.
     Empty,
+    /// A coordinate is no finite number.
     NotFinite,
+    /// The count in the header is not that of the file.
     Header,
+    /// An edge has one triangle.
     Open,
+    /// An edge has more than two triangles, or a vertex more than one fan.
     NonManifold,
+    /// Two neighbours disagree on their directions.
     NotOriented,
+    /// Two triangles cross.
     SelfIntersecting,
+    /// It encloses a negative volume.
     InsideOut,
 }
 

@@ -13,6 +13,7 @@ pub(super) const RECORD: usize = 50;
 
 /// Why a file cannot be judged.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each variant says what its fields are")]
 pub enum Error {
     /// Reading failed.
     #[error("{}: {source}", path.display())]

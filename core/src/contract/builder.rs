@@ -110,10 +110,16 @@ impl Limits {
         Self { threads: threads.max(1), ..self }
     }
 
-    /// The same with a list of every record of the edit in the report.
+    /// The same with this many triangles in a chunk on average; 0 is 1.
     #[must_use]
-    pub fn with_edit_listed(self) -> Self {
-        Self { list_edit: true, ..self }
+    pub fn with_chunk_triangles(self, chunk_triangles: u32) -> Self {
+        Self { chunk_triangles: chunk_triangles.max(1), ..self }
+    }
+
+    /// The same with, or without, a list of every record of the edit in the report.
+    #[must_use]
+    pub fn with_edit_listed(self, list_edit: bool) -> Self {
+        Self { list_edit, ..self }
     }
 
     /// The same with this way of sorting triangles by place into a spool file.

@@ -25,8 +25,11 @@ pub enum ErrorClass {
     Changed,
 }
 
-/// An error that ended the work on one file. No output was published.
+/// An error that ended the work on one file, at `path`, or on a mesh in memory. No output was published. `reason`, `action` and `advice` are
+/// parts of the sentence that it is shown as.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs, reason = "each variant says what its fields are")]
 pub enum Error {
     /// Not a mesh, or damaged beyond reading; `reason` says how that was decided.
     #[error("{}: cannot be read as a mesh: {reason}", path.display())]

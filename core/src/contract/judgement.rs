@@ -4,13 +4,17 @@ use serde::{Deserialize, Serialize};
 
 /// What a file is, judged on its bytes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Verdict {
     /// Everything that this version checks holds.
     pub good: bool,
     /// One line for people, e.g. `closed, manifold, oriented, free of self-intersection`.
     pub statement: String,
+    /// No edge has one triangle only.
     pub closed: bool,
+    /// No edge has more than two triangles, and no vertex more than one fan.
     pub manifold: bool,
+    /// Neighbours agree on their directions, and bodies enclose what is inside of them.
     pub oriented: bool,
     /// `None` when it was not checked.
     #[serde(default)]
@@ -23,11 +27,13 @@ pub struct Verdict {
 
 /// What every rule found in the bytes of one file. The rules are listed in `core/REPORT.md`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Certificate {
     /// Every rule was looked at, and passed.
     pub printable: bool,
     /// BLAKE3 of the whole file, hexadecimal.
     pub blake3: String,
+    /// Length of the file.
     pub bytes: u64,
     /// Triangle records in the file.
     pub triangles: u64,
@@ -40,11 +46,13 @@ pub struct Certificate {
 
 /// What one rule found.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct RuleResult {
     /// Its name.
     pub rule: String,
     /// Raised when the rule counts anything else.
     pub version: u32,
+    /// Whether the file passes.
     pub outcome: RuleOutcome,
     /// What violates it; `None`: not looked at, or more than could be looked at.
     pub count: Option<u64>,
@@ -54,7 +62,9 @@ pub struct RuleResult {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RuleOutcome {
+    /// Nothing violates it.
     Passed,
+    /// Something violates it.
     Failed,
     /// It was not looked at.
     Unchecked,

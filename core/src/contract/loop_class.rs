@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 /// What kind of opening a boundary loop is (`core/REPORT.md` has the rules).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum LoopClass {
     /// No opening: vertices of one side lie on the edges of the other (T-junctions).
     Crack,

@@ -5,6 +5,7 @@ use crate::contract::settings::Profile;
 /// A setting of a profile has a value that means nothing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("`{setting}` must be {range}, not {value}")]
+#[non_exhaustive]
 pub struct ProfileError {
     /// The setting's name, as in a profile file.
     pub setting: &'static str,

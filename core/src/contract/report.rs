@@ -18,6 +18,7 @@ pub const MOST_LISTED: usize = 1000;
 
 /// Everything there is to say about one file.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Report {
     /// [`SCHEMA_VERSION`].
     pub schema_version: u32,
@@ -81,7 +82,9 @@ pub struct Report {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Task {
+    /// The file was diagnosed.
     Inspect,
+    /// The file was repaired.
     Repair,
 }
 
@@ -108,13 +111,16 @@ impl Outcome {
 
 /// A mesh file's identity and format.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct FileFacts {
     /// What is not UTF-8 in it is replaced when the report is written: names of files may be any bytes, JSON may not.
     #[serde(serialize_with = "lossy")]
     pub path: PathBuf,
+    /// Length of the file; of a mesh in memory, that of a binary STL of it.
     pub bytes: u64,
     /// BLAKE3 of the whole file, hexadecimal.
     pub blake3: String,
+    /// What it was read from.
     pub format: Format,
     /// Triangle records in the file, non-finite and degenerate ones included.
     pub triangles: u64,
@@ -131,7 +137,9 @@ fn lossy<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Format {
+    /// A binary STL.
     BinaryStl,
+    /// A text STL.
     AsciiStl,
     /// No file: a mesh that a program handed over in memory.
     Memory,
@@ -139,6 +147,7 @@ pub enum Format {
 
 /// Counts after the exact weld. Definitions: `core/DEFECTS.md`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Defects {
     /// Triangles with finite coordinates.
     pub triangles: u64,
@@ -148,6 +157,7 @@ pub struct Defects {
     pub vertices: u64,
     /// Distinct positions used by a triangle with three distinct vertices.
     pub vertices_used: u64,
+    /// Distinct edges of triangles with three distinct vertices.
     pub edges: u64,
     /// Triangles with a repeated vertex; left out of the topology.
     pub degenerate_index: u64,
@@ -157,6 +167,7 @@ pub struct Defects {
     pub duplicates_same: u64,
     /// Triangles with the vertex set of an earlier one, none of them in the same direction.
     pub duplicates_opposite: u64,
+    /// Edges of one triangle.
     pub boundary_edges: u64,
     /// Connected sets of boundary edges.
     pub boundary_loops: u64,
@@ -187,6 +198,7 @@ pub struct Defects {
     pub self_intersections: Option<SelfIntersections>,
     /// Smallest and largest coordinates; `None` without a finite triangle.
     pub bounds: Option<[[f32; 3]; 2]>,
+    /// Sum of the areas of all triangles.
     pub area: f64,
     /// Signed volume; means something only where closed and oriented.
     pub volume: f64,
@@ -199,6 +211,7 @@ pub struct Defects {
 
 /// Triangles that meet in more than a point, or edge along edge, beyond the corners they share. Exact.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct SelfIntersections {
     /// Triangles in at least one pair.
     pub triangles: u64,
@@ -222,6 +235,7 @@ impl SelfIntersections {
 
 /// Lengths derived from the model, in its units.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Tolerances {
     /// Diagonal of the bounding box.
     pub diagonal: f64,
@@ -233,6 +247,7 @@ pub struct Tolerances {
 
 /// One kind of repair that did something.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Repair {
     /// What kind.
     pub name: RepairName,
@@ -240,18 +255,23 @@ pub struct Repair {
     pub count: u64,
     /// In words, with the method or the bound that mattered.
     pub note: String,
+    /// Time that it took.
     pub seconds: f64,
 }
 
 /// A boundary loop as it was found, before any repair. Lengths in the model's units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct BoundaryLoop {
+    /// What kind of opening it is.
     pub class: LoopClass,
     /// The rule that decided the class, with its measure.
     pub rule: String,
     /// A vertex on it.
     pub at: [f32; 3],
+    /// Vertices on it.
     pub vertices: u64,
+    /// Length of its edges together.
     pub perimeter: f64,
     /// Of its projection along the direction in which that is largest.
     pub area: f64,
@@ -270,6 +290,7 @@ pub struct BoundaryLoop {
 
 /// The boundary loops of the input.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct BoundaryLoops {
     /// How many of each class; classes without a loop are left out.
     pub classes: std::collections::BTreeMap<LoopClass, u64>,
@@ -279,20 +300,27 @@ pub struct BoundaryLoops {
 
 /// A boundary loop that stayed open.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct LoopLeft {
     /// A point on it.
     pub at: [f32; 3],
+    /// Edges on it.
     pub edges: u64,
+    /// Length of its edges together.
     pub perimeter: f64,
+    /// Why it stayed open.
     pub reason: String,
 }
 
 /// An open sheet that was dropped.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct SheetDropped {
     /// Lower and upper corner of its box.
     pub bounds: [[f32; 3]; 2],
+    /// Of all its triangles.
     pub area: f64,
+    /// How many it had.
     pub triangles: u64,
     /// It crossed a body, or another sheet.
     pub crosses: bool,
@@ -303,6 +331,7 @@ pub struct SheetDropped {
 
 /// A region that no repair made a solid. Lengths in the model's units.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Wrap {
     /// Smallest and largest coordinates of what was there.
     pub bounds: [[f32; 3]; 2],
@@ -330,6 +359,7 @@ pub struct Wrap {
 
 /// Whether bodies are still inside of the result: points in each are looked for there. In the file's units, cubed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Volumes {
     /// Bodies that were looked for: the largest, at most 4096, each of more than a millionth of the volume of all.
     pub bodies: u64,
@@ -348,14 +378,17 @@ pub struct Volumes {
 
 /// A body that is not inside of the result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct BodyLost {
     /// Smallest and largest coordinates of what was there.
     pub bounds: [[f32; 3]; 2],
+    /// What it enclosed.
     pub volume: f64,
 }
 
 /// Regions where the surface is not as it was.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Regions {
     /// How many there are.
     pub total: u64,
@@ -364,6 +397,7 @@ pub struct Regions {
 }
 
 impl Regions {
+    /// The surface is as it was everywhere.
     pub fn is_empty(&self) -> bool {
         self.total == 0
     }
@@ -371,6 +405,7 @@ impl Regions {
 
 /// Where something was done to what was no solid, or left undone. Lengths in the model's units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Region {
     /// What settled it. (`rung` in schema 1.)
     #[serde(alias = "rung")]
@@ -396,6 +431,7 @@ fn is_zero(count: &u32) -> bool {
 /// What settled a region, from the least intrusive to the most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum RegionMethod {
     /// Surfaces that cross were cut along each other, and rounded to single precision.
     Cut,
@@ -418,6 +454,7 @@ pub enum RegionMethod {
 
 /// The edit in numbers. Every record of the output is an untouched input record, a replaced one or an added one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct EditSummary {
     /// Input records that stand in the output byte for byte, in order.
     pub untouched: u64,
@@ -435,6 +472,7 @@ pub struct EditSummary {
 
 /// The edit, record by record. Ids are input record numbers from 0.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct EditRecords {
     /// Inclusive ranges of records left out.
     pub deleted: Vec<[u32; 2]>,
@@ -451,17 +489,23 @@ pub struct EditRecords {
 
 /// One stage's share of the time.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Stage {
+    /// Its name; `core/REPORT.md` lists them.
     pub name: String,
+    /// Time that went by.
     pub seconds: f64,
 }
 
 /// What the work cost.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Cost {
+    /// From the first look at the file to its report.
     pub wall_seconds: f64,
     /// User and system time of the process during this work.
     pub cpu_seconds: f64,
+    /// Of the input, by the time that went by.
     pub triangles_per_second: f64,
     /// Largest resident set of the process, mapped file pages included.
     pub peak_resident_bytes: u64,

@@ -13,6 +13,7 @@ use crate::contract::loop_class::LoopClass;
 /// diagonal; `…_mm` are in the file's units, which STL users take for millimetres.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Profile {
     /// Name shown in reports.
     pub name: String,
@@ -86,6 +87,7 @@ pub struct Profile {
 /// What to do with geometry that no repair can turn into a solid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Guarantee {
     /// Leave it. A file is good only if it passed every check; a check that was not made keeps it from being good.
     Strict,
@@ -99,6 +101,7 @@ pub enum Guarantee {
 /// What to do with bodies that lie inside other bodies, or cross them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Bodies {
     /// Keep the surface that separates material from air: bodies inside the material of others go, bodies that cross become one. Cavities stay,
     /// and so do bodies inside a cavity.
@@ -114,6 +117,7 @@ pub enum Bodies {
 /// What to do with a lone sheet (open surface that bounds no material) in a file that also holds bodies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Sheets {
     /// Drop a sheet that crosses a body or another sheet: no solid can have it. Drop the others if all of them together have at most
     /// [`Profile::debris_area_share`] of the area.
@@ -126,6 +130,7 @@ pub enum Sheets {
 /// How a patch is shaped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum PatchShape {
     /// Not at all: triangles between the vertices of the rim.
     Flat,
@@ -203,6 +208,7 @@ impl Profile {
 /// What the machine may spend. Never changes a result: too little is an error, not another output.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Limits {
     /// Bytes of memory the system cannot reclaim (anonymous memory and dirty file pages).
     pub memory_bytes: u64,
@@ -227,6 +233,7 @@ pub struct Limits {
 /// When triangles are sorted by place into a spool file before their topology is worked out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Spill {
     /// If their order in the file has nothing to do with their place and the file is larger than what can stay in the page cache,
     /// or lists of them would take too much of the budget.
@@ -234,6 +241,7 @@ pub enum Spill {
     Auto,
     /// For tests.
     Always,
+    /// They are read where they lie.
     Never,
 }
 

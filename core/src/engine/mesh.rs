@@ -24,6 +24,7 @@ pub struct MeshView<'m> {
 /// Why arrays are no mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "each variant says what its fields are")]
 pub enum MeshError {
     /// A face refers to a vertex that is not there.
     #[error("face {face} refers to vertex {vertex}, and there are {vertices} vertices")]

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
+    /// A file was seen, and is not taken yet.
     Noticed,
     /// Queued, and may be claimed.
     Queued,
@@ -13,16 +14,25 @@ pub enum Kind {
     Waiting,
     /// Queued, but must run alone.
     Alone,
+    /// A worker has it.
     Running,
+    /// It is decided how it ends, and nothing is in place yet.
     Concluded,
+    /// Its result is being put in its place.
     Publishing,
+    /// Its result is in its place, and the original is to be moved.
     Published,
     /// Its result is known, but cannot be brought into place for now: tried again after a pause.
     Parked,
+    /// Good, and in `out/`.
     Done,
+    /// Not good, and in `failed/`.
     Failed,
+    /// Good, but a person must look; in `failed/`.
     NeedsReview,
+    /// It crashed or hung the repair.
     Quarantined,
+    /// It was withdrawn.
     Cancelled,
 }
 

@@ -15,7 +15,9 @@ pub struct Source {
     pub folder: String,
     /// Below the folder's `in/`.
     pub path: RelPath,
+    /// Device of the file.
     pub dev: u64,
+    /// Inode of the file.
     pub ino: u64,
     /// Bytes.
     pub size: u64,
@@ -29,9 +31,13 @@ pub struct Source {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Area {
+    /// Where files are dropped.
     In,
+    /// Originals of what is in `out/`.
     Done,
+    /// Originals of what could not be made good, or needs review.
     Failed,
+    /// What crashes or hangs the repair.
     Quarantine,
 }
 
@@ -84,12 +90,15 @@ impl Ending {
 /// from the output's, or from the original's where there is no output.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Publication {
+    /// How the job ends.
     pub ending: Ending,
     /// One line for people; empty when there is nothing to add. Cut to [`MAX_REASON`] bytes.
     pub reason: String,
     /// The repaired mesh.
     pub output: Option<RelPath>,
+    /// Of the bytes of the repaired mesh.
     pub output_hash: Option<Hash>,
+    /// Of the bytes of the report.
     pub report_hash: Option<Hash>,
     /// Last change of the original's inode, in nanoseconds since 1970, when its result was found. If it still has it, its content is
     /// the same.
@@ -129,8 +138,11 @@ pub enum Withdrawal {
 /// Who works on a job, and in which life of the daemon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Hold {
+    /// Which attempt this is.
     pub attempt: Attempt,
+    /// The life of the daemon that claimed it.
     pub epoch: Epoch,
+    /// Names the claim; each claim has another one.
     pub token: Token,
     /// Nothing else may run meanwhile: the job is suspected of killing the daemon, or needs the whole memory.
     pub alone: bool,
@@ -154,6 +166,7 @@ pub struct Parked {
 /// Where a job stands.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[allow(missing_docs, reason = "each variant says what its fields are")]
 pub enum State {
     /// A file of a format that is not repaired: left where it is, named once. `reason` says what it is.
     Noticed { reason: String },
@@ -175,6 +188,7 @@ pub enum State {
 
 /// What the holder of a claim reports. Each is legal only in the state it belongs to, and only with the claim's token.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "each variant says what its fields are")]
 pub enum Step {
     /// The worker died.
     Died(Death),
@@ -228,14 +242,18 @@ pub enum Duty {
 /// All that is known of one dropped file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Job {
+    /// Its number.
     pub id: JobId,
+    /// The dropped file.
     pub source: Source,
     /// Where the original is while no claim holds it, if it is not at its source (after a retry of a failed job).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moved_to: Option<(Area, RelPath)>,
+    /// Where it stands.
     pub state: State,
     /// Attempts so far.
     pub attempts: Attempt,
+    /// What it is suspected of.
     pub blame: Blame,
     /// It needs the whole memory.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -248,7 +266,9 @@ pub struct Job {
     /// Why the last attempt came back; for people.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub note: String,
+    /// When the file was found.
     pub submitted: Time,
+    /// When its state changed last.
     pub changed: Time,
     /// The transition that made it what it is.
     pub seq: Seq,

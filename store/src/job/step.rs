@@ -8,6 +8,7 @@ use crate::id::{Boot, Epoch, Time, Token};
 
 /// Something that happens to a job.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "each variant says what its fields are")]
 pub enum Event {
     /// A worker takes it, or, if it is parked, someone tries to bring its result into place once more.
     Claim { epoch: Epoch, token: Token, boot: Boot },
@@ -29,6 +30,7 @@ pub enum Event {
 
 /// An event that cannot happen in this state. Nothing was changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "each variant says what its fields are")]
 pub enum Illegal {
     #[error("a job that is {kind} cannot be {event}")]
     State { kind: Kind, event: &'static str },

@@ -92,20 +92,20 @@ fn assert_counts(counted: &Defects, judged: &Judgement) -> Result<(), TestCaseEr
 fn repair(input: &Path, output: &Path, limits: &Limits) -> suture_core::error::Result<Report> {
     let _ = std::fs::remove_file(output);
     // A soup that is wrapped takes seconds each time; what a wrap holds is tested beside it.
-    let profile = Profile { guarantee: Guarantee::Off, ..Profile::default() };
+    let profile = Profile::builder().guarantee(Guarantee::Off).build().expect("it is valid");
     suture_core::repair(input, output, &profile, limits, &Quiet)
 }
 
 /// The same with ample memory, in chunks of that many triangles.
 fn repaired(input: &Path, output: &Path, chunk_triangles: u32, threads: usize) -> Report {
-    let limits = Limits { threads, chunk_triangles, list_edit: true, ..Limits::default() };
+    let limits = Limits::default().with_threads(threads).with_chunk_triangles(chunk_triangles).with_edit_listed(true);
     repair(input, output, &limits).expect("a soup can be repaired, if not made good")
 }
 
 /// Less and less memory: the same bytes, or a refusal that names the budget.
 fn holds_in_little_memory(input: &Path, output: &Path, written: &[u8]) -> Result<(), TestCaseError> {
     for memory_bytes in [1 << 20, 1 << 16, 1 << 13, 1 << 10] {
-        let limits = Limits { memory_bytes, threads: 1, chunk_triangles: 64, ..Limits::default() };
+        let limits = Limits::default().with_memory(memory_bytes).with_threads(1).with_chunk_triangles(64);
         match repair(input, output, &limits) {
             Ok(_) => prop_assert!(std::fs::read(output).unwrap() == written, "{} bytes of memory: other bytes", memory_bytes),
             Err(error) => {

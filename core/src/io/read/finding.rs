@@ -19,6 +19,7 @@ pub struct Finding {
 /// Whether a finding says that a part of the mesh is lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Loss {
+    /// It says nothing of a loss.
     None,
     /// More than one triangle that the file announces is not there, or nobody knows how many: if the mesh is open, too, a part of it is lost.
     IfOpen,

@@ -29,7 +29,7 @@ const ROOMS: [&str; 13] = [
 ];
 
 /// The crates that are held to these rules.
-const CRATES: [&str; 4] = ["core", "store", "daemon", "bench"];
+const CRATES: [&str; 5] = ["core", "store", "daemon", "python", "bench"];
 
 fn sources(of_crate: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(of_crate).join("src")
@@ -134,7 +134,7 @@ fn the_map_names_every_file() {
         let heading = line.strip_prefix("### ");
         named.extend(quoted.chain(heading).flat_map(|part| part.split(|c: char| !c.is_ascii_alphanumeric() && c != '_')));
     }
-    for of_crate in ["core", "store", "daemon"] {
+    for of_crate in ["core", "store", "daemon", "python"] {
         let unnamed: Vec<_> = Imports::of(&sources(of_crate))
             .files()
             .filter_map(|file| file.last().filter(|name| !named.contains(name.as_str())).map(|_| file.join("/")))

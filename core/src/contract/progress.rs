@@ -4,7 +4,8 @@
 pub trait Progress: Sync {
     /// `stage` has `done` of `total` units (triangles unless the stage says otherwise) behind it.
     fn at(&self, stage: &'static str, done: u64, total: u64);
-    /// `true` asks the work to end as soon as it can, without output.
+    /// `true` asks the work to end as soon as it can, without output: within a chunk of the survey, or before the next repair. The error says so
+    /// ([`Error::is_cancellation`](crate::Error::is_cancellation)).
     fn cancelled(&self) -> bool {
         false
     }

@@ -64,6 +64,32 @@ pub enum RepairName {
 }
 
 impl RepairName {
+    /// Every kind, in the order of the pipeline.
+    pub const ALL: [Self; 22] = [
+        Self::Degenerate,
+        Self::Duplicate,
+        Self::Overlap,
+        Self::Surplus,
+        Self::ToleranceWeld,
+        Self::TJunction,
+        Self::Zip,
+        Self::SlitSides,
+        Self::Debris,
+        Self::Visibility,
+        Self::Orient,
+        Self::Skirt,
+        Self::Fill,
+        Self::Sheets,
+        Self::Outward,
+        Self::SelfIntersection,
+        Self::Dust,
+        Self::SelfIntersectionsLeft,
+        Self::Enclosed,
+        Self::Hidden,
+        Self::Separate,
+        Self::Wrap,
+    ];
+
     /// The name in a report.
     pub fn as_str(self) -> &'static str {
         match self {
@@ -102,6 +128,13 @@ impl std::fmt::Display for RepairName {
 #[cfg(test)]
 mod tests {
     use super::RepairName;
+
+    /// The order of the variants is that of the list, so that none is missing between two others.
+    #[test]
+    fn every_kind_is_listed_once() {
+        assert!(RepairName::ALL.iter().enumerate().all(|(place, name)| *name as usize == place));
+        assert_eq!(*RepairName::ALL.last().unwrap(), RepairName::Wrap);
+    }
 
     #[test]
     fn reports_of_schema_1_are_read() {

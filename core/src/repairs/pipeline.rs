@@ -5,7 +5,7 @@
 
 use std::time::Instant;
 
-use crate::contract::error::Result;
+use crate::contract::error::{Error, Result};
 use crate::contract::report::RepairName;
 use crate::contract::settings::Bodies;
 use crate::detect::holes;
@@ -149,7 +149,8 @@ pub(crate) const RECOGNITION: &[Step] = &[
 /// Takes the steps in their order. Returns how much was done.
 ///
 /// # Errors
-/// [`Error::Starved`](crate::Error::Starved) when there is not memory enough.
+/// [`Error::Starved`] when there is not memory enough; [`Error::Io`] with [`std::io::ErrorKind::Interrupted`] when `progress` cancels, before the
+/// next repair.
 pub(crate) fn take(steps: &[Step], cx: &mut Context<'_, '_>) -> Result<u64> {
     let mut all = 0;
     for step in steps {
@@ -173,6 +174,9 @@ pub(crate) fn take(steps: &[Step], cx: &mut Context<'_, '_>) -> Result<u64> {
 fn carry_out(repair: &Repair, cx: &mut Context<'_, '_>) -> Result<u64> {
     let span = tracing::debug_span!("repair", name = repair.name.as_str()).entered();
     let start = Instant::now();
+    if cx.progress.cancelled() {
+        return Err(Error::io(cx.path, repair.name.as_str())(std::io::ErrorKind::Interrupted.into()));
+    }
     let done = (repair.run)(cx)?;
     drop(span);
     if done.changed {

@@ -134,7 +134,9 @@ impl Progress for Ending {
 #[test]
 fn work_that_is_cancelled_ends_with_an_error_that_says_so() {
     let mesh = Mesh::from_triangles(&plate(60, |x, y| (x, y) != (7, 7))).unwrap();
-    let ending = Ending("plan", AtomicBool::new(false));
-    let error = crate::repair_mesh(&mesh, &Profile::default(), &limits(), &ending).unwrap_err();
-    assert!(error.is_cancellation(), "{error}");
+    for stage in ["plan", "repair"] {
+        let ending = Ending(stage, AtomicBool::new(false));
+        let error = crate::repair_mesh(&mesh, &Profile::default(), &limits(), &ending).unwrap_err();
+        assert!(error.is_cancellation(), "{stage}: {error}");
+    }
 }

@@ -39,7 +39,7 @@ fn sources(of_crate: &str) -> PathBuf {
 fn no_files_import_each_other_in_a_circle() {
     for of_crate in CRATES {
         let imports = Imports::of(&sources(of_crate));
-        assert!(imports.edges() > 10, "{of_crate}: imports are found");
+        assert!(imports.edges() >= imports.files().count(), "{of_crate}: imports are found");
         let circles = imports.circles();
         assert!(circles.is_empty(), "{of_crate}: {circles:#?}");
     }

@@ -7,8 +7,8 @@
 
 pub(crate) mod access;
 pub(crate) mod builder;
+pub(crate) mod edit_report;
 pub mod error;
-pub(crate) mod face_origin;
 pub(crate) mod finite;
 pub(crate) mod judgement;
 pub(crate) mod loop_class;

@@ -1,6 +1,6 @@
 //! The report: what was found, what was done, and the verdict on the bytes written. Documented in `core/REPORT.md`.
 
-pub use crate::contract::face_origin::FaceOrigin;
+pub use crate::contract::edit_report::{EditRecords, EditSummary, FaceOrigin};
 pub use crate::contract::judgement::{Certificate, RuleOutcome, RuleResult, Verdict};
 pub use crate::contract::loop_class::LoopClass;
 pub use crate::contract::repair_name::RepairName;
@@ -450,41 +450,6 @@ pub enum RegionMethod {
     Wrapped,
     /// Nothing was done, or what was done was taken back.
     Left,
-}
-
-/// The edit in numbers. Every record of the output is an untouched input record, a replaced one or an added one.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[non_exhaustive]
-pub struct EditSummary {
-    /// Input records that stand in the output byte for byte, in order.
-    pub untouched: u64,
-    /// Input records left out.
-    pub deleted: u64,
-    /// Input records whose winding was reversed.
-    pub flipped: u64,
-    /// Input records with a moved vertex.
-    pub moved: u64,
-    /// New records: in the places of those left out as far as these go, then at the end of the file.
-    pub added: u64,
-    /// Largest distance any vertex moved.
-    pub max_move: f64,
-}
-
-/// The edit, record by record. Ids are input record numbers from 0.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-#[non_exhaustive]
-pub struct EditRecords {
-    /// Inclusive ranges of records left out.
-    pub deleted: Vec<[u32; 2]>,
-    /// Inclusive ranges of records reversed.
-    pub flipped: Vec<[u32; 2]>,
-    /// Records with moved vertices and their new corners.
-    pub moved: Vec<(u32, [[f32; 3]; 3])>,
-    /// New records, in file order: corners and attribute word.
-    pub added: Vec<([[f32; 3]; 3], u16)>,
-    /// Where each of them comes from: [`FaceOrigin::Part`] or [`FaceOrigin::Repair`]. Empty in a report of an engine that did not tell.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub added_from: Vec<FaceOrigin>,
 }
 
 /// One stage's share of the time.

@@ -2,12 +2,13 @@
 //!
 //! **In:** coordinates in f32.
 //! **Out:** exact answers: does a triangle have area ([`collinear`]), do two triangles meet ([`tri_tri`]), which boxes meet a box
-//! ([`boxes`]), triangles cut along each other ([`arrange`]); sums that do not depend on their order ([`sums`]).
+//! ([`boxes`]), triangles cut along each other ([`arrange`]); distances ([`distance`]); sums that do not depend on their order ([`sums`]).
 //! **Promise:** what decides validity is exact; rounding only ever ranks. Nothing here knows a file or a mesh.
 
 pub(crate) mod arrange;
 pub(crate) mod boxes;
 pub(crate) mod collinear;
+pub(crate) mod distance;
 pub(crate) mod exact;
 pub(crate) mod grid;
 pub(crate) mod position;

@@ -3,10 +3,11 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::contract::report::{EditRecords, EditSummary, FaceOrigin, RepairName};
+use crate::geometry::distance::distance;
 use crate::io::read_ahead::ASKED_AT_ONCE;
 use crate::io::record::{self, Record};
 use crate::submesh::components::Reversed;
-use crate::submesh::{Origin, Submesh, distance};
+use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
 
 /// What happens to an input record that is not untouched.

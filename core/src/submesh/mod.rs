@@ -19,6 +19,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use crate::contract::repair_name::RepairName;
+use crate::geometry::distance::{distance, place};
 use crate::geometry::position::Position;
 use crate::io::read_ahead::ASKED_AT_ONCE;
 use crate::io::record::{self, Record};
@@ -320,66 +321,10 @@ impl Submesh {
     }
 }
 
-/// A position in f64.
-pub(crate) fn place(p: [f32; 3]) -> DVec3 {
-    DVec3::from_array(p.map(f64::from))
-}
-
-/// Cosine of the angle between two vectors; 0 where one has no length.
-pub(crate) fn cosine(a: DVec3, b: DVec3) -> f64 {
-    let length = (a.dot(a) * b.dot(b)).sqrt();
-    if length > 0.0 { a.dot(b) / length } else { 0.0 }
-}
-
-/// Squared distance of a point from a triangle (Ericson, Real-Time Collision Detection, 2005, 5.1.5: by the regions of its edges and face).
-pub(crate) fn square_distance(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
-    let to_edge = |a: DVec3, b: DVec3| {
-        let (d, q) = (b - a, p - a);
-        let share = if d.length_squared() > 0.0 { (q.dot(d) / d.length_squared()).clamp(0.0, 1.0) } else { 0.0 };
-        (q - d * share).length_squared()
-    };
-    let rim = to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a));
-    let normal = (b - a).cross(c - a);
-    let is_over = |a: DVec3, b: DVec3| normal.cross(b - a).dot(p - a) >= 0.0;
-    if normal.length_squared() > 0.0 && is_over(a, b) && is_over(b, c) && is_over(c, a) {
-        let height = normal.dot(p - a);
-        return rim.min(height * height / normal.length_squared());
-    }
-    rim
-}
-
-/// Distance of two positions, in f64.
-pub(crate) fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
-    (0..3).map(|k| (f64::from(a[k]) - f64::from(b[k])).powi(2)).sum::<f64>().sqrt()
-}
-
 pub(crate) fn has_repeated(v: [Vertex; 3]) -> bool {
     v[0] == v[1] || v[1] == v[2] || v[2] == v[0]
 }
 
 pub(crate) fn corners(records: &[Record], t: u32) -> [[f32; 3]; 3] {
     record::corners(&records[t as usize])
-}
-
-#[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-
-    use super::*;
-
-    proptest! {
-        /// No point of the triangle is nearer, and one about there is as near.
-        #[test]
-        fn distance_from_a_triangle_is_that_of_its_nearest_point(c in prop::array::uniform12(-4i8..5)) {
-            const STEPS: u32 = 40;
-            let v = |i: usize| DVec3::from_array([c[i], c[i + 1], c[i + 2]].map(f64::from));
-            let (p, [a, b, c]) = (v(0), [v(3), v(6), v(9)]);
-            let found = square_distance(p, [a, b, c]).sqrt();
-            let steps = (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |j| (i, j)));
-            let points = steps.map(|(i, j)| a + ((b - a) * f64::from(i) + (c - a) * f64::from(j)) / f64::from(STEPS));
-            let nearest = points.map(|point| point.distance(p)).fold(f64::INFINITY, f64::min);
-            let step = ((b - a).length() + (c - a).length()) / f64::from(STEPS);
-            prop_assert!(found <= nearest + 1e-9 && nearest <= found + step + 1e-9, "{} for {}", found, nearest);
-        }
-    }
 }

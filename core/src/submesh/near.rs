@@ -3,6 +3,7 @@
 use super::edges::Edges;
 use super::{Submesh, Vertex, distance};
 use crate::geometry::boxes::BoxTree;
+use crate::geometry::distance::{place, share_along};
 use crate::geometry::sums::Bounds;
 
 /// How near is near.
@@ -141,13 +142,9 @@ pub(crate) fn noncommon_vertices(submesh: &Submesh, edges: &Edges, tolerance: &T
 
 /// Foot of `p` on the line a–b as a fraction from a, clamped to the segment, and its distance. 0 for an edge of no length.
 fn project(p: [f32; 3], a: [f32; 3], b: [f32; 3]) -> (f64, f64) {
-    let [p, a, b] = [p, a, b].map(|q| q.map(f64::from));
-    let d: [f64; 3] = std::array::from_fn(|k| b[k] - a[k]);
-    let x: [f64; 3] = std::array::from_fn(|k| p[k] - a[k]);
-    let length2: f64 = d.iter().map(|c| c * c).sum();
-    let at = if length2 > 0.0 { (x.iter().zip(d).map(|(x, d)| x * d).sum::<f64>() / length2).clamp(0.0, 1.0) } else { 0.0 };
-    let off: f64 = (0..3).map(|k| (x[k] - at * d[k]).powi(2)).sum();
-    (at, off.sqrt())
+    let [p, a, b] = [p, a, b].map(place);
+    let at = share_along(p, a, b);
+    (at, (p - a - (b - a) * at).length())
 }
 
 /// Distance of `p` from the segment a–b.

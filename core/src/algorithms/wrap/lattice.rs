@@ -8,8 +8,8 @@ use std::hash::{BuildHasherDefault, Hasher};
 use glam::DVec3;
 
 use super::tree::{Corners, Tree};
+use crate::geometry::distance::place;
 use crate::geometry::sums::Bounds;
-use crate::submesh::place;
 use crate::util::parallel;
 
 /// A wrapped surface.

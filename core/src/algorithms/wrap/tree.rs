@@ -18,9 +18,9 @@
 use glam::DVec3;
 
 use crate::detect::bodies;
+use crate::geometry::distance::{place, square_distance};
 use crate::geometry::position::Position;
 use crate::geometry::sums::Bounds;
-use crate::submesh::{place, square_distance};
 
 /// A triangle by its positions.
 pub(crate) type Corners = [[f32; 3]; 3];

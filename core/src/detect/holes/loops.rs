@@ -6,9 +6,10 @@
 
 use std::collections::HashMap;
 
+use crate::geometry::distance;
 use crate::geometry::exact::Point;
 use crate::submesh::edges::{Edge, Edges, Use};
-use crate::submesh::{self, Submesh, Vertex};
+use crate::submesh::{Submesh, Vertex};
 
 /// A simple boundary loop.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -225,7 +226,7 @@ fn across(submesh: &Submesh, edges: &Edges, rims: &[Rim], v: Vertex, incoming: &
     let mut pairs: Vec<(bool, f64, u32, u32)> = Vec::new();
     for i in incoming {
         for o in outgoing {
-            let cosine = submesh::cosine(submesh.vector(v, rims[*i as usize].from), submesh.vector(v, rims[*o as usize].to));
+            let cosine = distance::cosine(submesh.vector(v, rims[*i as usize].from), submesh.vector(v, rims[*o as usize].to));
             pairs.push((fan(*i) == fan(*o), -cosine, *i, *o));
         }
     }

@@ -22,6 +22,7 @@ use glam::DVec3;
 use super::shape::Shape;
 use crate::contract::report::LoopClass;
 use crate::geometry::boxes::BoxTree;
+use crate::geometry::distance::{cosine, nearest_of_segment};
 use crate::geometry::position::Position;
 use crate::geometry::sums::Bounds;
 
@@ -318,9 +319,7 @@ fn outlines_agree(a: &Shape, b: &Shape) -> bool {
         let n = other.points.len();
         (0..n).any(|i| {
             let [from, to] = [i, (i + 1) % n].map(|i| flat(other.points[i]) - p);
-            let along = to - from;
-            let at = (-from.dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-            (from + along * at).length() <= reach
+            nearest_of_segment(from, to, DVec3::ZERO).length() <= reach
         })
     };
     some_points(a).all(|p| is_near(flat(p), b)) && some_points(b).all(|p| is_near(flat(p), a))
@@ -342,7 +341,7 @@ fn holds_island(outer: &Shape, inner: &Shape) -> bool {
 
 /// Run opposite ways round.
 fn face(a: &Shape, b: &Shape, opposite: f64) -> bool {
-    crate::submesh::cosine(a.vector_area, b.vector_area) <= opposite
+    cosine(a.vector_area, b.vector_area) <= opposite
 }
 
 /// How much two loops differ: by their extents, as a share of the larger one, and by the directions of their planes. (The

@@ -9,6 +9,7 @@ use glam::DVec3;
 use super::loops::Loop;
 use crate::contract::report::LoopClass;
 use crate::geometry::boxes::BoxTree;
+use crate::geometry::distance::{cosine, nearest_of_segment};
 use crate::geometry::sums::Bounds;
 use crate::submesh::near::{self, Tolerance};
 use crate::submesh::{self, Submesh};
@@ -222,9 +223,9 @@ impl<'s> Around<'s> {
             .iter()
             .map(|s| &self.segments[*s as usize])
             .filter(|s| !s.ends.contains(&v))
-            .filter(|s| submesh::cosine(submesh.vector(s.ends[0], s.ends[1]), coming + going) < AGAINST)
+            .filter(|s| cosine(submesh.vector(s.ends[0], s.ends[1]), coming + going) < AGAINST)
             .map(|s| (way_to(submesh, v, s), s))
-            .filter(|(way, s)| way.length() <= touching || submesh::cosine(ahead, s.ahead(submesh)) <= ALIKE)
+            .filter(|(way, s)| way.length() <= touching || cosine(ahead, s.ahead(submesh)) <= ALIKE)
             .map(|(way, s)| (way, s.of_loop))
             .min_by(|a, b| a.0.length().total_cmp(&b.0.length()))
             .filter(|(way, _)| way.length() <= reach)
@@ -234,7 +235,6 @@ impl<'s> Around<'s> {
 /// From a vertex to the nearest point of a segment.
 fn way_to(submesh: &Submesh, v: submesh::Vertex, segment: &Segment) -> DVec3 {
     let [a, b] = segment.ends.map(|v| submesh.place(v));
-    let (p, d) = (submesh.place(v), b - a);
-    let at = ((p - a).dot(d) / d.dot(d).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-    a + d * at - p
+    let p = submesh.place(v);
+    nearest_of_segment(a, b, p) - p
 }

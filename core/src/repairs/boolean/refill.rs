@@ -14,8 +14,8 @@ use glam::DVec3;
 use crate::algorithms::triangulate::{self, Rim};
 use crate::contract::report::RepairName;
 use crate::contract::settings::Profile;
+use crate::geometry::distance::nearest_of_triangle;
 use crate::repairs::boolean::passes::Passes;
-use crate::repairs::boolean::snap::nearest;
 use crate::repairs::boolean::state::{Met, State, Tried};
 use crate::submesh::{Origin, Submesh, Vertex};
 use crate::util::ids::NONE;
@@ -130,7 +130,7 @@ pub(crate) fn refill_of(submesh: &Submesh, part: Vec<u32>, beside: &[u32], limit
     for t in &part {
         let [a, b, c] = submesh.triangles[*t as usize].v.map(|v| submesh.place(v));
         for p in [a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0] {
-            let away = stays.iter().map(|t| nearest(t, p).distance(p)).fold(f64::INFINITY, f64::min);
+            let away = stays.iter().map(|t| nearest_of_triangle(t, p).distance(p)).fold(f64::INFINITY, f64::min);
             moved = moved.max(away);
             if moved > limit {
                 return None;

@@ -5,6 +5,7 @@ use std::collections::{BTreeSet, HashMap};
 use glam::DVec3;
 
 use crate::detect::defects;
+use crate::geometry::distance::place;
 use crate::geometry::position::Position;
 use crate::repairs::boolean::cells::SpaceCells;
 use crate::repairs::boolean::cut::Cut;
@@ -12,7 +13,7 @@ use crate::repairs::boolean::state::{Failure, State, Stuck, Tried};
 use crate::repairs::cleanup::degenerate;
 use crate::repairs::cleanup::duplicates;
 use crate::repairs::shared::work::Work;
-use crate::submesh::{Submesh, Vertex, place};
+use crate::submesh::{Submesh, Vertex};
 use crate::util::ids::NONE;
 use crate::util::steps;
 

@@ -14,6 +14,7 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 
 use crate::contract::settings::Profile;
+use crate::geometry::distance::{nearest_of_segment, nearest_of_segments, nearest_of_triangle};
 use crate::geometry::position::Position;
 use crate::repairs::boolean::passes::Passes;
 use crate::repairs::boolean::state::{Met, State, Tried};
@@ -209,12 +210,12 @@ fn closest(corners: &[[Vertex; 3]; 2], places: &[[DVec3; 3]; 2], width: f64) -> 
     for [side, other] in [[0, 1], [1, 0]] {
         let (v, points) = (corners[other], &places[other]);
         for (p, place) in corners[side].into_iter().zip(places[side]).filter(|(p, _)| !v.contains(p)) {
-            let away = nearest(points, place).distance(place);
+            let away = nearest_of_triangle(points, place).distance(place);
             if away >= width {
                 continue;
             }
             let vertex = (0..3).find(|k| points[*k].distance(place) < width);
-            let edge = (0..3).find(|k| on_segment(points[*k], points[(*k + 1) % 3], place).distance(place) < width);
+            let edge = (0..3).find(|k| nearest_of_segment(points[*k], points[(*k + 1) % 3], place).distance(place) < width);
             all.push(match (vertex, edge) {
                 (Some(k), _) => Closest { by: Nearness::Vertices([p, v[k]]), away: points[k].distance(place) },
                 (None, Some(k)) => Closest { by: Nearness::VertexAndEdge(p, [v[k], v[(k + 1) % 3]]), away },
@@ -230,41 +231,12 @@ fn closest(corners: &[[Vertex; 3]; 2], places: &[[DVec3; 3]; 2], width: f64) -> 
             if edges[0].iter().any(|v| edges[1].contains(v)) {
                 continue;
             }
-            let (x, y) = between(ends(0, k), ends(1, l));
+            let (x, y) = nearest_of_segments(ends(0, k), ends(1, l));
             all.push(Closest { by: Nearness::Edges(edges, (x + y) / 2.0), away: x.distance(y) });
         }
     }
     let near = all.into_iter().filter(|closest| closest.away < width);
     near.min_by(|a, b| a.away.total_cmp(&b.away))
-}
-
-/// The nearest point of a segment.
-fn on_segment(a: DVec3, b: DVec3, p: DVec3) -> DVec3 {
-    let ab = b - a;
-    let t = (p - a).dot(ab) / ab.length_squared();
-    a + ab * t.clamp(0.0, 1.0)
-}
-
-/// The nearest point of a triangle.
-pub(crate) fn nearest(points: &[DVec3; 3], p: DVec3) -> DVec3 {
-    let [a, b, c] = *points;
-    let n = (b - a).cross(c - a);
-    if [(a, b), (b, c), (c, a)].iter().all(|(u, v)| (*v - *u).cross(p - *u).dot(n) > 0.0) {
-        return p - n * ((p - a).dot(n) / n.length_squared());
-    }
-    let sides = [(a, b), (b, c), (c, a)].map(|(u, v)| on_segment(u, v, p));
-    sides[1..].iter().fold(sides[0], |best, q| if q.distance(p) < best.distance(p) { *q } else { best })
-}
-
-/// The nearest points of two segments.
-fn between([a, b]: [DVec3; 2], [c, d]: [DVec3; 2]) -> (DVec3, DVec3) {
-    let (u, v, w) = (b - a, d - c, a - c);
-    let (uu, uv, vv, uw, vw) = (u.dot(u), u.dot(v), v.dot(v), u.dot(w), v.dot(w));
-    let det = uu * vv - uv * uv;
-    let s = if det > 0.0 { ((uv * vw - vv * uw) / det).clamp(0.0, 1.0) } else { 0.0 };
-    let y = on_segment(c, d, a + u * s);
-    let x = on_segment(a, b, y);
-    (x, on_segment(c, d, x))
 }
 
 #[cfg(test)]

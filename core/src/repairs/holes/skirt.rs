@@ -17,6 +17,7 @@
 //! stands on, the patch that closes the strip may leave a pocket, a small cavity.
 
 use crate::contract::report::RepairName;
+use crate::geometry::distance::place;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use glam::DVec3;
 
@@ -29,7 +30,7 @@ use crate::repairs::shared::overlay::{Held, Overlay, Standing, Which};
 use crate::repairs::shared::pieces::components_of_records;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed, Through};
-use crate::submesh::{self, Origin, Submesh, Vertex};
+use crate::submesh::{Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 
@@ -166,7 +167,7 @@ impl Candidate {
         let (mut sum, mut length) = (DVec3::ZERO, 0.0);
         for i in 0..n {
             let (from, along) = (submesh.place(vertices[i]), submesh.vector(vertices[i], vertices[(i + 1) % n]));
-            let inward = submesh::place(apexes[i]?) - from;
+            let inward = place(apexes[i]?) - from;
             let outward = along * (inward.dot(along) / along.length_squared()) - inward;
             let direction = outward.try_normalize()?;
             sum += direction * along.length();
@@ -242,7 +243,7 @@ impl Candidate {
 /// How far from a point, in a direction of length 1, a triangle's plane is met inside of it (Möller & Trumbore, JGT 2(1), 1997). Rounded: what it says of a
 /// ray through an edge may be wrong, and the rim then stays as it is.
 fn hit(from: DVec3, direction: DVec3, corners: &Corners) -> Option<f64> {
-    let [a, b, c] = corners.map(submesh::place);
+    let [a, b, c] = corners.map(place);
     let (u, v) = (b - a, c - a);
     let p = direction.cross(v);
     let determinant = u.dot(p);

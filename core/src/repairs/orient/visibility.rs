@@ -15,13 +15,14 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use robust::Coord;
 
 use crate::detect::bodies::{self, Direction, Source};
+use crate::geometry::distance::place;
 use crate::geometry::position::Position;
 use crate::io::record;
 use crate::repairs::orient::directions::{Parity, flip_node};
 use crate::repairs::shared::work::Work;
+use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed, Sample, Through};
 use crate::submesh::edges::Edges;
-use crate::submesh::{Submesh, place};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 

@@ -5,9 +5,9 @@
 use glam::DVec3;
 
 use crate::geometry::boxes::BoxTree;
+use crate::geometry::distance::{place, share_along, square_distance};
 use crate::geometry::sums::Bounds;
 use crate::geometry::tri_tri::Triangle as Corners;
-use crate::submesh::{place, square_distance};
 
 /// Two surfaces face the same way if the cosine between their normals is at least this: up to about 25°.
 const AGREE: f64 = 0.9;
@@ -98,8 +98,7 @@ impl RimEdge {
     /// Its point nearest to `p`.
     pub(crate) fn foot(&self, p: DVec3) -> DVec3 {
         let [a, b] = self.ends;
-        let length = a.distance_squared(b);
-        if length > 0.0 { a.lerp(b, ((p - a).dot(b - a) / length).clamp(0.0, 1.0)) } else { a }
+        a.lerp(b, share_along(p, a, b))
     }
 }
 

@@ -5,6 +5,7 @@
 //! one surface, drawn twice. A piece on a surface that does not end there is left alone: nothing says that it was to be joined.
 
 use crate::contract::report::RepairName;
+use crate::geometry::distance::place;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use std::collections::{BTreeMap, HashMap};
 
@@ -20,7 +21,7 @@ use crate::repairs::stitch::weld;
 use crate::submesh::components::{Component, Components, Reversed, Through};
 use crate::submesh::edges::Edges;
 use crate::submesh::near::{Tolerance, boundary_vertices};
-use crate::submesh::{self, Origin, Submesh, Vertex};
+use crate::submesh::{Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
 
 /// Surface that lies on other surface.
@@ -462,7 +463,7 @@ fn join(work: &mut Work<'_>, [moving, staying]: [&[Vertex]; 2], reach: &Toleranc
 
 /// Wider on all sides, rounded outward.
 fn widened(b: &Bounds, by: f64) -> Bounds {
-    around(&[submesh::place(b.lo), submesh::place(b.hi)], by)
+    around(&[place(b.lo), place(b.hi)], by)
 }
 
 #[cfg(test)]

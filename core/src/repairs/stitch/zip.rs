@@ -6,6 +6,7 @@
 //! several fans meet: nothing beside it was merged, and two loops that only meet there would be closed each for itself.
 
 use crate::contract::report::RepairName;
+use crate::geometry::distance::{cosine, place};
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use std::collections::BTreeSet;
 
@@ -17,7 +18,7 @@ use crate::repairs::shared::admission;
 use crate::repairs::shared::work::Work;
 use crate::submesh::edges::{Edge, Edges};
 use crate::submesh::near::Tolerance;
-use crate::submesh::{self, Submesh, Vertex, near};
+use crate::submesh::{Submesh, Vertex, near};
 
 /// Narrow gaps.
 pub(crate) const REPAIR: Repair = Repair {
@@ -103,7 +104,7 @@ fn facing(submesh: &Submesh, edges: &Edges, profile: &Profile) -> Vec<[Vertex; 2
         // Mutual, and each pair once.
         if let Some(j) = found.filter(|j| *j > i && nearest[*j] == Some(i)) {
             let (v, w) = (vertices[i], vertices[j]);
-            if submesh::cosine(outward[v as usize], outward[w as usize]) < FACING {
+            if cosine(outward[v as usize], outward[w as usize]) < FACING {
                 pairs.push((submesh.distance(v, w), [v, w]));
             }
         }
@@ -164,12 +165,12 @@ fn may_merge(submesh: &Submesh, stay: Vertex, go: Vertex) -> bool {
             let before = submesh.points(t);
             let mut after = before;
             after[k] = submesh.positions[stay as usize];
-            submesh::cosine(normal(before), normal(after)) >= STEADY
+            cosine(normal(before), normal(after)) >= STEADY
         })
 }
 
 fn normal(corners: [[f32; 3]; 3]) -> DVec3 {
-    let [a, b, c] = corners.map(submesh::place);
+    let [a, b, c] = corners.map(place);
     (b - a).cross(c - a)
 }
 

@@ -62,7 +62,7 @@ fn open_globe() -> Vec<Corners> {
 fn a_patch_continues_the_globe() {
     let got = after(&open_globe(), |d, _| {
         let closed = fill(d, &Profile::default());
-        let new: Vec<f64> = d.submesh.positions.iter().map(|p| crate::submesh::place(*p).length()).collect();
+        let new: Vec<f64> = d.submesh.positions.iter().map(|p| crate::geometry::distance::place(*p).length()).collect();
         (closed, new.into_iter().map(|r| (r - 10.0).abs()).fold(0.0, f64::max))
     });
     assert!(got.verdict.good, "{:?}", got.verdict);

@@ -21,9 +21,8 @@ ROUNDS = 3
 
 
 class Repair:
-    def __init__(self, source):
-        self.meshes = pymeshlab.MeshSet(verbose=False)
-        self.meshes.load_new_mesh(source)
+    def __init__(self, meshes, stages):
+        self.meshes, self.stages = meshes, stages
 
     def apply(self, name, **settings):
         try:
@@ -85,13 +84,38 @@ class Repair:
         return self.meshes.current_mesh().selected_face_number()
 
 
+    def complete(self, resolve=False):
+        if not (resolve and self.is_sound()):
+            self.make_solid(resolve)
+        self.orient()
+        self.stages.end("orient")
+
+    def make_solid(self, resolve):
+        self.weld()
+        self.stages.end("weld")
+        self.drop_bad_faces()
+        self.stages.end("bad faces")
+        for attempt in range(ROUNDS):
+            self.make_manifold()
+            if attempt == 0:
+                self.apply("meshing_snap_mismatched_borders", edgedistratio=SNAP_WITHIN_EDGE)
+            self.close()
+            if self.is_done():
+                break
+        self.stages.end("rounds of closing")
+        if resolve:
+            for _ in range(ROUNDS):
+                if not self.resolve():
+                    break
+            self.stages.end("rounds of resolving")
+
+
 def repair(source, target, stages, self_intersections, resolve):
-    work = Repair(source)
+    meshes = pymeshlab.MeshSet(verbose=False)
+    meshes.load_new_mesh(source)
     stages.end("load")
-    if not (resolve and work.is_sound()):
-        make_solid(work, stages, resolve)
-    work.orient()
-    stages.end("orient")
+    work = Repair(meshes, stages)
+    work.complete(resolve)
     if self_intersections:
         stages.facts["self-intersecting"] = work.self_intersecting()
         stages.end("self-intersections")
@@ -99,24 +123,5 @@ def repair(source, target, stages, self_intersections, resolve):
     stages.end("save")
 
 
-def make_solid(work, stages, resolve):
-    work.weld()
-    stages.end("weld")
-    work.drop_bad_faces()
-    stages.end("bad faces")
-    for attempt in range(ROUNDS):
-        work.make_manifold()
-        if attempt == 0:
-            work.apply("meshing_snap_mismatched_borders", edgedistratio=SNAP_WITHIN_EDGE)
-        work.close()
-        if work.is_done():
-            break
-    stages.end("rounds of closing")
-    if resolve:
-        for _ in range(ROUNDS):
-            if not work.resolve():
-                break
-        stages.end("rounds of resolving")
-
-
-run(repair, "self-intersections", "resolve")
+if __name__ == "__main__":
+    run(repair, "self-intersections", "resolve")

@@ -8,6 +8,13 @@ import numpy
 from shared import read_corners, run, weld, write_corners
 
 
+def fill_and_clean(mesh, stages):
+    mesh.fill_small_boundaries()
+    stages.end("fill boundaries")
+    mesh.clean(max_iters=10, inner_loops=3)
+    stages.end("clean")
+
+
 def repair(source, target, stages):
     mesh = pymeshfix.PyTMesh()
     mesh.set_quiet(True)
@@ -15,13 +22,11 @@ def repair(source, target, stages):
     stages.end("load")
     mesh.load_array(vertices.astype(numpy.float64), faces.astype(numpy.int32))
     stages.end("connect")
-    mesh.fill_small_boundaries()
-    stages.end("fill boundaries")
-    mesh.clean(max_iters=10, inner_loops=3)
-    stages.end("clean")
+    fill_and_clean(mesh, stages)
     vertices, faces = mesh.return_arrays()
     write_corners(target, vertices[faces])
     stages.end("save")
 
 
-run(repair)
+if __name__ == "__main__":
+    run(repair)

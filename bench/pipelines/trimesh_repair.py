@@ -4,9 +4,7 @@ import trimesh
 from shared import run
 
 
-def repair(source, target, stages):
-    mesh = trimesh.load(source, file_type="stl", force="mesh", process=True)
-    stages.end("load")
+def mend(mesh, stages):
     mesh.update_faces(mesh.unique_faces() & mesh.nondegenerate_faces())
     mesh.remove_unreferenced_vertices()
     stages.end("bad faces")
@@ -14,8 +12,15 @@ def repair(source, target, stages):
     stages.end("fill holes")
     trimesh.repair.fix_normals(mesh, multibody=True)
     stages.end("orient")
+
+
+def repair(source, target, stages):
+    mesh = trimesh.load(source, file_type="stl", force="mesh", process=True)
+    stages.end("load")
+    mend(mesh, stages)
     mesh.export(target)
     stages.end("save")
 
 
-run(repair)
+if __name__ == "__main__":
+    run(repair)

@@ -180,7 +180,7 @@ impl std::str::FromStr for Peer {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        let all = || Side::ALL.into_iter().filter(|side| !side.is_for_solids_alone()).collect();
+        let all = || Side::ALL.into_iter().filter(|side| !side.is_for_solids_alone() && !side.is_of_arrays()).collect();
         if name == "all" { Ok(Self(all())) } else { name.parse().map(|side| Self(vec![side])) }
     }
 }

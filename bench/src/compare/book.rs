@@ -52,6 +52,11 @@ impl Chapter {
         Self { name: name.into(), lines }
     }
 
+    #[cfg(test)]
+    pub(super) fn lines_mut(&mut self) -> &mut [Line] {
+        &mut self.lines
+    }
+
     fn runs<'a, 'i>(&'a self, input: &'i Input) -> impl Iterator<Item = &'a Run> + use<'a, 'i> {
         self.lines.iter().filter_map(move |line| match line {
             Line::Run(run) if run.input == input.key => Some(run),
@@ -132,6 +137,11 @@ impl Book {
 
     /// How much longer one way took than another, over the pairs of one round of one session.
     pub(super) fn wall_ratio(&self, input: &Input, slow: &Way, fast: &Way) -> Option<Spread> {
+        self.ratio(input, slow, fast, |cost| Some(cost.wall_seconds))
+    }
+
+    /// The same for a part of the slow one's time.
+    pub(super) fn ratio(&self, input: &Input, slow: &Way, fast: &Way, part: impl Fn(&Cost) -> Option<f64>) -> Option<Spread> {
         self.chapters.iter().rev().find_map(|chapter| {
             let good = |way: &Way| -> Vec<&Run> {
                 chapter.runs(input).filter(|run| run.way == *way && did_its_work(input, run)).collect()
@@ -139,7 +149,7 @@ impl Book {
             let quick = good(fast);
             let pairs = good(slow).into_iter().filter_map(|run| {
                 let other = quick.iter().find(|other| other.round == run.round)?;
-                Some(run.cost.wall_seconds / other.cost.wall_seconds)
+                Some(part(&run.cost)? / other.cost.wall_seconds)
             });
             Spread::of(pairs)
         })
@@ -160,7 +170,7 @@ impl Book {
                     let with = good(Side::Inspect, round)?.wall_seconds;
                     let ours = with - good(Side::InspectNoSi, round)?.wall_seconds;
                     // A search shorter than the noise of two processes says nothing.
-                    (ours > 0.0).then_some((ours, search_seconds(theirs)?))
+                    (ours > 0.0).then_some((ours, theirs.stage_seconds("self-intersections")?))
                 })
                 .collect();
             let ours = Spread::of(pairs.iter().map(|pair| pair.0))?;
@@ -214,11 +224,6 @@ pub(super) fn did_its_work(input: &Input, run: &Run) -> bool {
     let output = !run.way.side.facts().writes || run.cost.output_bytes.is_some();
     let may_be_1 = run.way.side.may_exit_1() || input.files > 1;
     output && (run.cost.code == Some(0) || run.cost.code == Some(1) && may_be_1)
-}
-
-/// Seconds of the search for self-intersections, by a process's own word.
-fn search_seconds(cost: &Cost) -> Option<f64> {
-    cost.stages.iter().find(|stage| stage.name == "self-intersections").map(|stage| stage.seconds)
 }
 
 #[cfg(test)]

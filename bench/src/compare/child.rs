@@ -42,6 +42,13 @@ pub(crate) struct Cost {
     pub(crate) complaint: String,
 }
 
+impl Cost {
+    /// Seconds of a stage, by the process's own word.
+    pub(super) fn stage_seconds(&self, name: &str) -> Option<f64> {
+        self.stages.iter().find(|stage| stage.name == name).map(|stage| stage.seconds)
+    }
+}
+
 /// A part of a process's work.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Stage {

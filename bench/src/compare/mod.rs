@@ -17,6 +17,7 @@ mod machine;
 mod made;
 mod options;
 mod page;
+mod page_arrays;
 mod page_closing;
 mod page_solids;
 mod plot;

@@ -5,9 +5,10 @@ use std::fmt::Write;
 use super::book::{Book, did_its_work};
 use super::child::Cost;
 use super::machine::Machine;
+use super::page_arrays;
 use super::page_closing;
 use super::page_solids;
-use super::record::{Input, Judged, Outcome, is_good};
+use super::record::{Input, Judged, is_good};
 use super::sides::{LICENCES, Side};
 use super::statistics::{Spread, number, short as short_number, spaced};
 use super::way::{Cache, Way};
@@ -41,6 +42,7 @@ pub(super) fn page(book: &Book, plots: &[(String, String)]) -> String {
     page += &page_closing::shapes(book);
     page += &page_closing::files(book);
     page += &page_solids::solids(book);
+    page += &page_arrays::arrays(book);
     for input in book.inputs() {
         page += &of_input(book, input);
     }
@@ -103,14 +105,6 @@ fn date(seconds: u64) -> String {
     format!("{year}-{month:02}-{day:02} {:02}:{:02} UTC", seconds / 3600 % 24, seconds / 60 % 60)
 }
 
-/// One figure with its range.
-fn range(spread: Spread) -> String {
-    match spread.count {
-        1 => number(spread.median),
-        _ => format!("{} ({}–{})", number(spread.median), number(spread.least), number(spread.most)),
-    }
-}
-
 fn or_dash(text: Option<String>) -> String {
     text.unwrap_or_else(|| "–".into())
 }
@@ -126,7 +120,7 @@ fn of_input(book: &Book, input: &Input) -> String {
         "\n\n| | wall s | {rate} | CPU s | resident MB | anonymous MB | × suture | × suture-no-si | runs | output | kept |\n"
     );
     page += "|---|---:|---:|---:|---:|---:|---:|---:|---:|---|---|\n";
-    for way in book.ways(input) {
+    for way in book.ways(input).into_iter().filter(|way| !way.side.is_of_arrays()) {
         let wall = book.wall(input, &way);
         let amount = if input.files > 1 { input.files as f64 } else { input.triangles as f64 / 1e6 };
         let memory = |value: fn(&Cost) -> Option<u64>| {
@@ -142,7 +136,7 @@ fn of_input(book: &Book, input: &Input) -> String {
         let failed = runs.iter().find(|run| !did_its_work(input, run)).map(|run| run.cost.end.clone());
         let row = [
             way.name(),
-            wall.map(range).or(failed).unwrap_or_default(),
+            wall.map(Spread::text).or(failed).unwrap_or_default(),
             or_dash(wall.map(|wall| number(amount / wall.median))),
             or_dash(book.spread(input, &way, |cost| Some(cost.cpu_seconds)).map(|spread| number(spread.median))),
             memory(|cost| Some(cost.peak_resident_bytes)),
@@ -150,7 +144,7 @@ fn of_input(book: &Book, input: &Input) -> String {
             beside(Side::Suture),
             beside(Side::SutureNoSi),
             runs.len().to_string(),
-            or_dash(book.outcome(input, way.side).map(|outcome| verdict(input, outcome))),
+            or_dash(book.outcome(input, way.side).map(|outcome| outcome.verdict(input))),
             or_dash(book.outcome(input, way.side).and_then(|outcome| outcome.judged.as_ref()).map(kept)),
         ];
         let _ = writeln!(page, "| {} |", row.join(" | "));
@@ -171,30 +165,6 @@ fn of_input(book: &Book, input: &Input) -> String {
         page += ".\n";
     }
     page
-}
-
-/// `good`, or all that is wrong.
-fn verdict(input: &Input, outcome: &Outcome) -> String {
-    if let Some(good) = outcome.good_files {
-        return format!("{} of {} good", spaced(good), spaced(input.files));
-    }
-    let Some(judged) = &outcome.judged else { return outcome.reason.replace(['|', '\n'], " ") };
-    if is_good(&judged.judgement, input.volume) {
-        return "good".into();
-    }
-    let counts = &judged.judgement.counts;
-    let faults = [
-        (counts.boundary_edges, "boundary edges"),
-        (counts.nonmanifold_edges, "non-manifold edges"),
-        (counts.nonmanifold_vertices, "non-manifold vertices"),
-        (counts.inconsistent_edges, "disagreeing edges"),
-    ];
-    let mut faults: Vec<_> =
-        faults.into_iter().filter(|&(count, _)| count > 0).map(|(count, name)| format!("{} {name}", spaced(count))).collect();
-    if let Some(volume) = input.volume.filter(|_| judged.judgement.sound()) {
-        faults.push(format!("volume {:+.1} %", 100.0 * (judged.judgement.volume / volume - 1.0)));
-    }
-    if faults.is_empty() { "not closed".into() } else { faults.join(", ") }
 }
 
 /// Share of records kept; by corners, too, where that is another number.
@@ -221,7 +191,7 @@ fn targets(book: &Book) -> String {
             if let Some(ratio) = book.wall_ratio(input, &Way::plain(slow), &Way::plain(fast)) {
                 let (slow, fast) = (slow.facts().name, fast.facts().name);
                 let name = format!("{}, {}", input.case, short_number(input.size));
-                let _ = writeln!(rows, "| {slow} / {fast} | {name} | {limit} | {} | {} |", range(ratio), ratio.count);
+                let _ = writeln!(rows, "| {slow} / {fast} | {name} | {limit} | {} | {} |", ratio.text(), ratio.count);
             }
         }
         for peer in [Side::PymeshlabPlain, Side::PymeshlabCompetent].into_iter().filter(|_| input.files > 1) {
@@ -231,7 +201,7 @@ fn targets(book: &Book) -> String {
                     rows,
                     "| {} / suture | {name} | at least 20 | {} | {} |",
                     peer.facts().name,
-                    range(ratio),
+                    ratio.text(),
                     ratio.count
                 );
             }
@@ -241,7 +211,7 @@ fn targets(book: &Book) -> String {
             if let Some(ratio) = book.wall_ratio(input, &threads(1), &threads(2)) {
                 let name = format!("{}, {}", input.case, short_number(input.size));
                 let what = format!("{}: 1 thread / 2 threads", side.facts().name);
-                let _ = writeln!(rows, "| {what} | {name} | at least 1.7 | {} | {} |", range(ratio), ratio.count);
+                let _ = writeln!(rows, "| {what} | {name} | at least 1.7 | {} | {} |", ratio.text(), ratio.count);
             }
         }
     }
@@ -292,9 +262,9 @@ fn searches(book: &Book) -> String {
         let row = [
             input.case.clone(),
             spaced(input.triangles),
-            range(ours),
-            range(theirs),
-            range(ratio),
+            ours.text(),
+            theirs.text(),
+            ratio.text(),
             ratio.count.to_string(),
             count(Side::Inspect),
             count(Side::MeshlibDetect),

@@ -26,15 +26,17 @@ const NAMES: i32 = 190;
 /// One colour a tool, whatever the plot; blues and greens are Suture's.
 fn colour(side: Side) -> RGBColor {
     match side {
-        Side::Suture | Side::SutureOff | Side::Inspect => RGBColor(0, 90, 181),
+        Side::Suture | Side::SutureOff | Side::SutureArrays | Side::Inspect => RGBColor(0, 90, 181),
         Side::SutureNoSi | Side::InspectNoSi => RGBColor(0, 158, 142),
         Side::Cp | Side::CpSynced => RGBColor(120, 124, 132),
         Side::PymeshlabPlain | Side::PymeshlabPlainSi => RGBColor(230, 130, 0),
-        Side::PymeshlabCompetent | Side::PymeshlabCompetentSi | Side::PymeshlabSolid => RGBColor(200, 60, 20),
-        Side::Meshlib | Side::MeshlibDetect | Side::MeshlibSolid => RGBColor(140, 60, 170),
-        Side::Pymeshfix => RGBColor(190, 50, 120),
+        Side::PymeshlabCompetent | Side::PymeshlabCompetentSi | Side::PymeshlabSolid | Side::PymeshlabArrays => {
+            RGBColor(200, 60, 20)
+        }
+        Side::Meshlib | Side::MeshlibDetect | Side::MeshlibSolid | Side::MeshlibArrays => RGBColor(140, 60, 170),
+        Side::Pymeshfix | Side::PymeshfixArrays => RGBColor(190, 50, 120),
         Side::Admesh => RGBColor(110, 80, 40),
-        Side::Trimesh => RGBColor(170, 150, 30),
+        Side::Trimesh | Side::TrimeshArrays => RGBColor(170, 150, 30),
         Side::Manifold3d | Side::Manifold3dUnion => RGBColor(90, 140, 60),
     }
 }
@@ -318,7 +320,7 @@ fn centred(size: i32) -> TextStyle<'static> {
 
 /// Seconds by tool.
 fn times(book: &Book, input: &Input) -> Vec<(Side, f64)> {
-    let sides = Side::ALL.into_iter().filter(|side| *side != Side::Cp && side.facts().writes);
+    let sides = Side::ALL.into_iter().filter(|side| *side != Side::Cp && side.facts().writes && !side.is_of_arrays());
     let mut times: Vec<_> = sides.filter_map(|side| Some((side, book.wall(input, &Way::plain(side))?.median))).collect();
     times.sort_by(|a, b| a.1.total_cmp(&b.1));
     times

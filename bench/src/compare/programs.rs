@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 
 use super::error::Error;
 use super::folders::home;
-use super::sides::{NO_SI, Program, Side};
+use super::sides::{NO_SI, Program, SUTURE_PACKAGE, Side};
 use super::way::Way;
 
 /// What is there to be measured.
@@ -177,24 +177,45 @@ fn python_with(wanted: &[&str]) -> (Option<PathBuf>, BTreeMap<String, String>) {
     let pinned = pins(&std::fs::read_to_string(&requirements).unwrap_or_default());
     let right = |there: &BTreeMap<String, String>, name: &str| there.get(name) == pinned.get(name);
     let mut there = installed(&python);
-    if wanted.iter().all(|name| right(&there, name)) {
-        return (Some(python), there);
+    let peers = |wanted: &&&str| **wanted != SUTURE_PACKAGE;
+    if !wanted.iter().filter(peers).all(|name| right(&there, name)) {
+        if !make_environment(&folder, &pinned) {
+            return (None, BTreeMap::new());
+        }
+        there = installed(&python);
     }
+    there.retain(|name, version| pinned.get(name) == Some(version));
+    if wanted.contains(&SUTURE_PACKAGE) {
+        there.extend(install_suture(&python));
+    }
+    (Some(python), there)
+}
+
+/// The package of this repository, built now, so that no older one is measured: its name and version, if that can be done.
+fn install_suture(python: &Path) -> Option<(String, String)> {
+    eprintln!("building {SUTURE_PACKAGE}");
+    let mut pip = Command::new(python);
+    pip.args(["-m", "pip", "install", "--quiet", "--force-reinstall", "--no-deps"]).arg(home().join("../python"));
+    pip.status().ok().filter(|status| status.success())?;
+    installed(python).remove_entry(SUTURE_PACKAGE)
+}
+
+/// A Python environment with the pinned packages, as far as they can be had; false if there is no Python to make one.
+fn make_environment(folder: &Path, pinned: &BTreeMap<String, String>) -> bool {
+    let python = folder.join("bin/python");
     eprintln!("installing {} into {}", pinned.keys().cloned().collect::<Vec<_>>().join(", "), folder.display());
-    let made = Command::new("python3").args(["-m", "venv", "--clear"]).arg(&folder).status();
+    let made = Command::new("python3").args(["-m", "venv", "--clear"]).arg(folder).status();
     if !made.is_ok_and(|status| status.success()) {
-        return (None, BTreeMap::new());
+        return false;
     }
     // One by one, so that what cannot be had keeps nothing else away.
-    for (name, version) in &pinned {
+    for (name, version) in pinned {
         let pip = Command::new(&python).args(["-m", "pip", "install", "--quiet", &format!("{name}=={version}")]).status();
         if !pip.is_ok_and(|status| status.success()) {
             eprintln!("{name} {version} could not be installed");
         }
     }
-    there = installed(&python);
-    there.retain(|name, version| pinned.get(name) == Some(version));
-    (Some(python), there)
+    true
 }
 
 /// `NAME==VERSION` of each line.
@@ -221,7 +242,8 @@ mod tests {
     fn every_package_of_a_side_is_pinned() {
         let pinned = pins(include_str!("../../pipelines/requirements.txt"));
         for side in Side::ALL {
-            assert!(package(side).is_none_or(|name| pinned.contains_key(name)), "{side:?}");
+            let name = package(side).filter(|name| *name != SUTURE_PACKAGE);
+            assert!(name.is_none_or(|name| pinned.contains_key(name)), "{side:?}");
         }
         assert_eq!(pins("# a==1\nb==2.0\n\n").into_iter().collect::<Vec<_>>(), [("b".into(), "2.0".into())]);
     }

@@ -14,6 +14,7 @@ use super::error::Error;
 use super::machine::Machine;
 use super::made::{Closed, Shaped, Solved};
 use super::sides::Side;
+use super::statistics::spaced;
 use super::way::Way;
 
 /// A line of a raw file.
@@ -101,6 +102,32 @@ pub(crate) struct Outcome {
     pub(crate) reason: String,
     /// Of a folder: how many outputs are good.
     pub(crate) good_files: Option<u64>,
+}
+
+impl Outcome {
+    /// `good`, or all that is wrong.
+    pub(super) fn verdict(&self, input: &Input) -> String {
+        if let Some(good) = self.good_files {
+            return format!("{} of {} good", spaced(good), spaced(input.files));
+        }
+        let Some(judged) = &self.judged else { return self.reason.replace(['|', '\n'], " ") };
+        if is_good(&judged.judgement, input.volume) {
+            return "good".into();
+        }
+        let counts = &judged.judgement.counts;
+        let faults = [
+            (counts.boundary_edges, "boundary edges"),
+            (counts.nonmanifold_edges, "non-manifold edges"),
+            (counts.nonmanifold_vertices, "non-manifold vertices"),
+            (counts.inconsistent_edges, "disagreeing edges"),
+        ];
+        let mut faults: Vec<_> =
+            faults.into_iter().filter(|&(count, _)| count > 0).map(|(count, name)| format!("{} {name}", spaced(count))).collect();
+        if let Some(volume) = input.volume.filter(|_| judged.judgement.sound()) {
+            faults.push(format!("volume {:+.1} %", 100.0 * (judged.judgement.volume / volume - 1.0)));
+        }
+        if faults.is_empty() { "not closed".into() } else { faults.join(", ") }
+    }
 }
 
 /// The judge's word on an output.

@@ -37,6 +37,12 @@ pub(crate) enum Side {
     MeshlibSolid,
     /// All parts united.
     Manifold3dUnion,
+    /// `suture.repair` of the Python package, from arrays and back.
+    SutureArrays,
+    PymeshlabArrays,
+    MeshlibArrays,
+    PymeshfixArrays,
+    TrimeshArrays,
 }
 
 /// Whose program it is.
@@ -203,12 +209,56 @@ const MESHLIB_SOLID: Facts = Facts {
 const MANIFOLD3D_UNION: Facts =
     Facts { name: "manifold3d-union", flag: Some("--union"), about: "the same, and all parts united", ..MANIFOLD3D };
 
+/// The Python package of this repository, by the name that it has where packages are listed.
+pub(super) const SUTURE_PACKAGE: &str = "suture-mesh";
+
+const SUTURE_ARRAYS: Facts = Facts {
+    name: "suture-arrays",
+    program: Program::Python { script: "arrays.py", package: SUTURE_PACKAGE },
+    flag: Some("--suture"),
+    about: "`suture.repair(vertices, faces)` of the Python package, built from this repository",
+    ..SUTURE
+};
+
+const PYMESHLAB_ARRAYS: Facts = Facts {
+    name: "pymeshlab-arrays",
+    program: Program::Python { script: "arrays.py", package: "pymeshlab" },
+    flag: Some("--pymeshlab"),
+    about: "as pymeshlab-competent, from arrays and back",
+    ..PLAIN
+};
+
+const MESHLIB_ARRAYS: Facts = Facts {
+    name: "meshlib-arrays",
+    program: Program::Python { script: "arrays.py", package: "meshlib" },
+    flag: Some("--meshlib"),
+    about: "as meshlib, from arrays and back",
+    ..PLAIN
+};
+
+const PYMESHFIX_ARRAYS: Facts = Facts {
+    name: "pymeshfix-arrays",
+    program: Program::Python { script: "arrays.py", package: "pymeshfix" },
+    flag: Some("--pymeshfix"),
+    about: "as pymeshfix, from arrays and back",
+    ..PYMESHFIX
+};
+
+const TRIMESH_ARRAYS: Facts = Facts {
+    name: "trimesh-arrays",
+    program: Program::Python { script: "arrays.py", package: "trimesh" },
+    flag: Some("--trimesh"),
+    most_triangles: 1_100_000,
+    about: "as trimesh, from arrays and back",
+    ..TRIMESH
+};
+
 /// What pymeshlab's scripts and suture are told.
 const PYMESHLAB_SI: Option<&str> = Some("--self-intersections");
 pub(super) const NO_SI: &str = "--no-self-intersections";
 
 impl Side {
-    pub(crate) const ALL: [Self; 20] = [
+    pub(crate) const ALL: [Self; 25] = [
         Self::Cp,
         Self::CpSynced,
         Self::Suture,
@@ -229,6 +279,11 @@ impl Side {
         Self::PymeshlabSolid,
         Self::MeshlibSolid,
         Self::Manifold3dUnion,
+        Self::SutureArrays,
+        Self::PymeshlabArrays,
+        Self::MeshlibArrays,
+        Self::PymeshfixArrays,
+        Self::TrimeshArrays,
     ];
 
     /// Those that are asked for a solid from any file, each with the settings that get it furthest.
@@ -238,6 +293,15 @@ impl Side {
     /// Measured only where solids are asked for: what comes out matters there, and not how fast.
     pub(crate) fn is_for_solids_alone(self) -> bool {
         matches!(self, Self::SutureOff | Self::PymeshlabSolid | Self::MeshlibSolid | Self::Manifold3dUnion)
+    }
+
+    /// Those that are given arrays. Beside others they are measured where they are asked for by name.
+    pub(crate) const ARRAYS: [Self; 5] =
+        [Self::SutureArrays, Self::PymeshlabArrays, Self::MeshlibArrays, Self::PymeshfixArrays, Self::TrimeshArrays];
+
+    /// Its time is that of its work on arrays, and not that of its process.
+    pub(crate) fn is_of_arrays(self) -> bool {
+        Self::ARRAYS.contains(&self)
     }
 
     /// What is to be known about it.
@@ -263,6 +327,11 @@ impl Side {
             Self::PymeshlabSolid => PYMESHLAB_SOLID,
             Self::MeshlibSolid => MESHLIB_SOLID,
             Self::Manifold3dUnion => MANIFOLD3D_UNION,
+            Self::SutureArrays => SUTURE_ARRAYS,
+            Self::PymeshlabArrays => PYMESHLAB_ARRAYS,
+            Self::MeshlibArrays => MESHLIB_ARRAYS,
+            Self::PymeshfixArrays => PYMESHFIX_ARRAYS,
+            Self::TrimeshArrays => TRIMESH_ARRAYS,
         }
     }
 

@@ -18,6 +18,14 @@ impl Spread {
         let lower = *values.get((values.len() - 1) / 2)?;
         Some(Self { median: (lower + upper) / 2.0, least: *values.first()?, most: *values.last()?, count: values.len() })
     }
+
+    /// The median, and the range in brackets if there is one.
+    pub(super) fn text(self) -> String {
+        match self.count {
+            1 => number(self.median),
+            _ => format!("{} ({}–{})", number(self.median), number(self.least), number(self.most)),
+        }
+    }
 }
 
 /// Three digits that count.

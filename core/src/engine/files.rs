@@ -32,7 +32,7 @@ use crate::stream::members;
 use crate::util::parallel;
 
 /// Fewer bytes are hashed by one thread: starting more would take longer.
-const HASHED_BY_ONE: usize = 1 << 20;
+pub(crate) const HASHED_BY_ONE: usize = 1 << 20;
 
 /// Diagnoses `input` and writes nothing.
 ///

@@ -8,15 +8,18 @@ use crate::contract::report::{Defects, FaceOrigin, FileFacts, Format, Report, Ta
 use crate::contract::settings::{Limits, Profile};
 use crate::diagnosis::Diagnosis;
 use crate::engine::clock::Clock;
+use crate::engine::edited_mesh::EditedMesh;
 use crate::engine::files;
 use crate::engine::judging::{self, Input, Written};
 use crate::engine::mesh::{Mesh, MeshView};
 use crate::io::disk_space;
 use crate::io::read::PREFIX_BYTES;
 use crate::io::record::Record;
-use crate::output::edit::{Edit, Step};
+use crate::output::edit::Edit;
 use crate::output::incremental;
 use crate::repairs::{self, Steps};
+use crate::topology::survey::Survey;
+use crate::util::parallel;
 
 /// How errors and reports name what has no path.
 const NAME: &str = "mesh in memory";
@@ -41,7 +44,7 @@ pub(crate) struct Held {
 impl Held {
     /// Refuses what has no faces.
     pub(crate) fn of(mesh: MeshView<'_>, limits: &Limits) -> Result<Self> {
-        let records = mesh.records();
+        let records = mesh.records(limits.threads);
         if records.is_empty() {
             return Err(Error::Unreadable { path: Self::path().into(), reason: "it has no faces".into() });
         }
@@ -60,15 +63,15 @@ impl Held {
 
     /// The facts that stand for those of a file.
     pub(crate) fn facts(&self, limits: &Limits) -> FileFacts {
-        facts(&self.records, limits)
+        facts(&self.records, files::hash_of(self.records.as_flattened(), limits))
     }
 }
 
-fn facts(records: &[Record], limits: &Limits) -> FileFacts {
+fn facts(records: &[Record], blake3: String) -> FileFacts {
     FileFacts {
         path: NAME.into(),
         bytes: (PREFIX_BYTES + size_of_val(records)) as u64,
-        blake3: files::hash_of(records.as_flattened(), limits),
+        blake3,
         format: Format::Memory,
         triangles: records.len() as u64,
         findings: Vec::new(),
@@ -113,8 +116,7 @@ pub(crate) fn repair(
     let mut diagnosis = held.diagnose(profile, limits, progress)?;
     clock.stage("topology");
     let surface = diagnosis.surface_bounds();
-    let input = Input { path: Held::path(), facts: held.facts(limits), findings: &[] };
-    clock.stage("hash");
+    let input = Input { path: Held::path(), facts: facts(&held.records, String::new()), findings: &[] };
     let mut report = judging::begin(Task::Repair, &input, &diagnosis, profile, limits);
     let repaired = judging::repair_diagnosed(&mut diagnosis, steps, &input, &mut report, (profile, limits), progress)?;
     clock.stage("repair");
@@ -122,34 +124,53 @@ pub(crate) fn repair(
     let survey = diagnosis.into_survey();
     report.edit = edit.summary(held.records.len());
     report.edit_records = limits.list_edit.then(|| edit.listed());
+    let faces = held.records.len();
     if edit.is_empty() {
         drop(survey);
-        judging::conclude_unchanged(&mut report, &input.facts, &[]);
-        report.output = Some(input.facts);
-        let report = clock.close(report, Held::path(), held.records.len())?;
-        let origins = (0..held.records.len() as u32).map(FaceOrigin::Input).collect();
-        return Ok(RepairedMesh { mesh: mesh.to_mesh(), origins, report });
+        report.input = held.facts(limits);
+        clock.stage("hash");
+        let facts = report.input.clone();
+        judging::conclude_unchanged(&mut report, &facts, &[]);
+        report.output = Some(facts);
+        let origins = (0..faces as u32).map(FaceOrigin::Input).collect();
+        return Ok(RepairedMesh { mesh: mesh.to_mesh(), origins, report: clock.close(report, Held::path(), faces)? });
     }
-    let expected = files::expectation(&held.records, &edit, survey.irregular_triangles.len() as u64, limits);
-    let looked = expected.as_ref().and_then(|expected| incremental::look(survey, &expected.difference));
-    let looked = looked.map(|(survey, submesh)| Diagnosis::count(survey, submesh, profile).defects);
-    drop(expected);
-    let (records, origins) = edited(&held.records, &edit);
+    let (mut edited, looked) = emit(mesh, &held, survey, &edit, profile, limits, &mut report.input.blake3);
+    clock.stage("emit");
+    let Held { mut records } = held;
+    edited.apply(&mut records);
     if records.is_empty() {
         judging::conclude_empty(&mut report);
     } else {
         let defects = judged(looked, &records, profile, limits, progress)?;
-        clock.stage("verify");
-        let facts = facts(&records, limits);
+        let facts = facts(&records, files::hash_of(records.as_flattened(), limits));
         judging::conclude(&mut report, &[], (&surface, &enclosed), Written { facts, findings: &[], defects });
     }
-    let mesh = Mesh::of_records(&records).map_err(|e| Error::Refused {
-        path: NAME.into(),
-        reason: e.to_string(),
-        advice: "divide the mesh".into(),
-    })?;
-    clock.stage("emit");
-    Ok(RepairedMesh { mesh, origins, report: clock.close(report, Held::path(), held.records.len())? })
+    clock.stage("verify");
+    let EditedMesh { mesh, origins, .. } = edited;
+    Ok(RepairedMesh { mesh, origins, report: clock.close(report, Held::path(), faces)? })
+}
+
+/// The mesh as `edit` leaves it, and side by side with it the second look at its defects, if that tells, and the hash of the input.
+fn emit(
+    mesh: MeshView<'_>,
+    held: &Held,
+    survey: Survey<'_>,
+    edit: &Edit,
+    profile: &Profile,
+    limits: &Limits,
+    blake3: &mut String,
+) -> (EditedMesh, Option<Defects>) {
+    let expected = files::expectation(&held.records, edit, survey.irregular_triangles.len() as u64, limits);
+    let bytes = held.records.as_flattened();
+    let threads = if bytes.len() < files::HASHED_BY_ONE { 1 } else { limits.threads };
+    let positions = survey.nonfinite.is_empty().then_some(survey.vertices);
+    let look = || {
+        *blake3 = files::hash_of(bytes, &Limits { threads: 1, ..limits.clone() });
+        let looked = expected.as_ref().and_then(|expected| incremental::look(survey, &expected.difference));
+        looked.map(|(survey, submesh)| Diagnosis::count(survey, submesh, profile).defects)
+    };
+    parallel::both(threads, || EditedMesh::of(mesh, &held.records, positions, edit), look)
 }
 
 /// The defects of the result: as the second look found them, or by a survey of its own.
@@ -164,36 +185,6 @@ fn judged(
         Some(defects) => Ok(defects),
         None => Ok(Diagnosis::of(Held::path(), records, profile, limits, progress)?.defects),
     }
-}
-
-/// The records as `edit` leaves them, and where each comes from.
-fn edited(input: &[Record], edit: &Edit) -> (Vec<Record>, Vec<FaceOrigin>) {
-    let count = edit.output_records(input.len()) as usize;
-    let (mut records, mut origins) = (Vec::with_capacity(count), Vec::with_capacity(count));
-    // The next record of the input.
-    let mut at = 0;
-    let walked: std::result::Result<(), std::convert::Infallible> = edit.walk(input, |step| {
-        match step {
-            Step::Untouched(run) => {
-                records.extend_from_slice(run);
-                origins.extend((at..at + run.len() as u32).map(FaceOrigin::Input));
-                at += run.len() as u32;
-            }
-            Step::Changed(_, record, from) => {
-                records.push(record);
-                origins.push(from);
-                at += 1;
-            }
-            Step::Deleted(_) => at += 1,
-            Step::Added(record, from) => {
-                records.push(*record);
-                origins.push(from);
-            }
-        }
-        Ok(())
-    });
-    let Ok(()) = walked;
-    (records, origins)
 }
 
 #[cfg(test)]

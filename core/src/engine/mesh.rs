@@ -1,8 +1,14 @@
 //! A mesh in memory.
 
+use rayon::prelude::*;
+
 use crate::io::read::MAX_TRIANGLES;
 use crate::io::record::{self, Record};
 use crate::topology::vertex_table::Weld;
+use crate::util::parallel;
+
+/// Fewer records are made by one thread: starting more would take longer.
+const MADE_BY_ONE: usize = 1 << 16;
 
 /// A triangle mesh in memory: vertices, and faces of three of them each, which are seen from outside counter-clockwise.
 ///
@@ -92,9 +98,9 @@ impl Mesh {
         Ok(Self { vertices, faces })
     }
 
-    /// Of records, whose corners are all finite.
-    pub(crate) fn of_records(records: &[Record]) -> Result<Self, MeshError> {
-        Self::welded(records.iter().map(record::corners))
+    /// Of vertices, and faces that refer to these.
+    pub(crate) fn of_parts(vertices: Vec<[f32; 3]>, faces: Vec<[u32; 3]>) -> Self {
+        Self { vertices, faces }
     }
 
     /// Positions of the vertices.
@@ -169,8 +175,12 @@ impl<'m> MeshView<'m> {
     }
 
     /// The faces as the engine reads them; without normals, which it does not ask for, and attributes.
-    pub(crate) fn records(&self) -> Vec<Record> {
-        self.triangles().map(|corners| record::assemble([0.0; 3], corners, 0)).collect()
+    pub(crate) fn records(&self, threads: usize) -> Vec<Record> {
+        let record = |face: &[u32; 3]| record::assemble([0.0; 3], face.map(|v| self.vertices[v as usize]), 0);
+        if threads < 2 || self.faces.len() < MADE_BY_ONE {
+            return self.faces.iter().map(record).collect();
+        }
+        parallel::in_pool(threads, || self.faces.par_iter().map(record).collect())
     }
 }
 

@@ -6,6 +6,7 @@
 //! the result is thrown away. A mesh from memory becomes the mesh that its file would become, face by face.
 
 mod clock;
+mod edited_mesh;
 pub(crate) mod files;
 mod judging;
 pub(crate) mod memory;

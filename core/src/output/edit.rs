@@ -90,6 +90,15 @@ impl Edit {
         &self.added
     }
 
+    /// All records that are new, moved ones included and turned ones not, in no order that matters.
+    pub(crate) fn new_records(&self) -> impl Iterator<Item = &Record> {
+        let moved = self.changes.iter().filter_map(|(_, change)| match change {
+            Change::Move(record) => Some(&**record),
+            Change::Delete | Change::Flip => None,
+        });
+        moved.chain(&self.added)
+    }
+
     /// Notes how a living triangle differs from its record, if it does.
     fn compare(&mut self, records: &[Record], t: u32, now: [[f32; 3]; 3]) {
         let before = record::corners(&records[t as usize]);

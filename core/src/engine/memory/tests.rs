@@ -77,6 +77,39 @@ proptest! {
     }
 }
 
+proptest! {
+    /// However the vertices are numbered, shared, repeated or unused: the same positions in the faces become the same mesh, whose vertices
+    /// are distinct positions in the order of their first appearance.
+    #[test]
+    fn the_result_does_not_depend_on_how_vertices_are_numbered(
+        triangles in soup().prop_filter("no mesh", |t| !t.is_empty()),
+        copies in prop::collection::vec(0u8..4, 1..60),
+        unused in 0usize..4,
+        backwards: bool,
+    ) {
+        let plain = repaired(&triangles);
+        prop_assume!(plain.report.outcome != Outcome::Clean && plain.report.after.is_some());
+        let welded = Mesh::from_triangles(&triangles).unwrap();
+        let count = welded.vertices().len() as u32;
+        // Unused vertices first, then each vertex, then copies of vertices: corners of a face may use the copy.
+        let mut vertices = welded.vertices()[..unused.min(count as usize)].to_vec();
+        let before = vertices.len() as u32;
+        vertices.extend(welded.vertices());
+        vertices.extend(welded.vertices());
+        let mut uses = copies.iter().cycle();
+        let mut faces: Vec<[u32; 3]> = welded.faces().iter().map(|f| f.map(|v| before + v + if *uses.next().unwrap() == 0 { count } else { 0 })).collect();
+        if backwards {
+            vertices.reverse();
+            faces.iter_mut().flatten().for_each(|v| *v = vertices.len() as u32 - 1 - *v);
+        }
+        let odd = crate::repair_mesh(&Mesh::new(vertices, faces).unwrap(), &Profile::default(), &limits(), &Quiet).unwrap();
+        prop_assert_eq!(&odd.mesh, &plain.mesh);
+        prop_assert_eq!(&odd.origins, &plain.origins);
+        let again = Mesh::from_triangles(&odd.mesh.view().triangles().collect::<Vec<_>>()).unwrap();
+        prop_assert_eq!(odd.mesh, again);
+    }
+}
+
 /// Vertices that no face uses, and two at one position, are the caller's.
 #[test]
 fn a_mesh_that_needs_no_repair_is_returned_as_it_came() {

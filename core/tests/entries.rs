@@ -10,11 +10,9 @@ use std::time::{Duration, Instant};
 
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
+use serde_json::Value;
 use suture_core::operations::{self, Fill, Orient, Union, Wrap};
-use suture_core::{
-    Bodies, Guarantee, Limits, Mesh, MeshView, PatchShape, Profile, Progress, Sheets, Spill, inspect, inspect_mesh, repair,
-    repair_mesh,
-};
+use suture_core::{Limits, Mesh, MeshView, PatchShape, Profile, Progress, Spill, inspect, inspect_mesh, repair, repair_mesh};
 
 /// Cases of each function if no time is given.
 const CASES: u32 = 24;
@@ -101,54 +99,42 @@ fn limits() -> impl Strategy<Value = Limits> {
     })
 }
 
-/// Settings that mean something, at their ends, and now and then one that does not.
+/// Profiles with one setting or more changed: numbers that mean something, at their ends, and now and then one that does not; switches; every
+/// choice. The settings are those that a profile has when it is written down, so that none is forgotten.
 fn profile() -> impl Strategy<Value = Profile> {
-    let number =
-        || prop_oneof![4 => 0.0..1.0f64, 1 => prop::sample::select(vec![0.0, 1.0, 1e-300, 1e300, f64::MAX, f64::NAN, -1.0])];
-    let choices = (
-        prop::sample::select(vec![Guarantee::Strict, Guarantee::Wrap, Guarantee::Off]),
-        prop::sample::select(vec![Bodies::Union, Bodies::Keep, Bodies::Visible]),
-        prop::sample::select(vec![PatchShape::Flat, PatchShape::Fair, PatchShape::Implicit]),
-        prop::sample::select(vec![Sheets::Drop, Sheets::Keep]),
-    );
-    let switches = prop::array::uniform5(any::<bool>());
+    let number = prop_oneof![4 => 0.0..1.0f64, 1 => prop::sample::select(vec![0.0, 1.0, 1e-300, 1e300, f64::MAX, -1.0])];
+    let count = prop_oneof![Just(20_000u32), 0u32..9, any::<u32>()];
+    let change = (any::<prop::sample::Index>(), number, count, any::<prop::sample::Index>());
     let names = prop::sample::select(Profile::BUILT_IN.to_vec());
-    let changed = prop::option::of((choices, switches, prop::option::of((0usize..16, number()))));
-    (names, changed, prop::array::uniform3(prop_oneof![Just(20_000u32), 0u32..9, any::<u32>()])).prop_map(
-        |(name, changed, counts)| {
-            let mut profile = Profile::built_in(name).unwrap();
-            let Some(((guarantee, bodies, patch_shape, sheets), [a, b, c, d, e], number)) = changed else { return profile };
-            (profile.guarantee, profile.bodies, profile.patch_shape, profile.sheets) = (guarantee, bodies, patch_shape, sheets);
-            (profile.close_sheets, profile.fill_holes, profile.separate) = (a, b, c);
-            (profile.resolve_crossings, profile.check_self_intersections) = (d, e);
-            [profile.max_hole_edges, profile.max_bodies_lost, profile.debris_triangles] = counts;
-            if let Some((which, value)) = number {
-                *setting(&mut profile, which) = value;
-            }
-            profile
-        },
-    )
+    (names, prop::collection::vec(change, 0..6), prop::bool::weighted(0.02)).prop_map(|(name, changes, is_nan)| {
+        let mut settings = serde_json::to_value(Profile::built_in(name).unwrap()).unwrap();
+        for (which, number, count, choice) in changes {
+            let all = settings.as_object_mut().unwrap();
+            let which = which.index(all.len());
+            let (name, value) = all.iter_mut().nth(which).unwrap();
+            *value = match &*value {
+                Value::Bool(value) => (!value).into(),
+                Value::Number(value) if value.is_f64() => number.into(),
+                Value::Number(_) => count.into(),
+                Value::String(_) if name != "name" => choice.get(&choices(name)).as_str().into(),
+                other => other.clone(),
+            };
+        }
+        let mut profile: Profile = serde_json::from_value(settings).unwrap();
+        if is_nan {
+            // JSON cannot hold it.
+            profile.max_volume_change = f64::NAN;
+        }
+        profile
+    })
 }
 
-fn setting(profile: &mut Profile, which: usize) -> &mut f64 {
-    match which {
-        0 => &mut profile.weld_relative,
-        1 => &mut profile.weld_max_edge_share,
-        2 => &mut profile.gap_edge_share,
-        3 => &mut profile.max_hole_perimeter_relative,
-        4 => &mut profile.max_hole_perimeter_mm,
-        5 => &mut profile.max_gap_mm,
-        6 => &mut profile.max_volume_change,
-        7 => &mut profile.max_area_change,
-        8 => &mut profile.max_box_change_relative,
-        9 => &mut profile.debris_area_share,
-        10 => &mut profile.max_sheets_share,
-        11 => &mut profile.stack_gap_relative,
-        12 => &mut profile.max_separation_relative,
-        13 => &mut profile.wrap_max_share,
-        14 => &mut profile.wrap_max_move,
-        _ => &mut profile.wrap_review_share,
-    }
+/// The values of a setting that is a choice, as its own error names them.
+fn choices(setting: &str) -> Vec<String> {
+    let odd = serde_json::from_value::<Profile>(serde_json::json!({ setting: "?" })).unwrap_err().to_string();
+    let choices: Vec<_> = odd.split('`').skip(3).step_by(2).map(str::to_owned).collect();
+    assert!(choices.len() > 1, "{odd}");
+    choices
 }
 
 /// Ends the work after so many words about it.

@@ -116,7 +116,8 @@ fn beside(files: &Files) -> String {
                 let kept = |line: &Solved| line.change.map_or(0.0, |change| change.kept);
                 both += 1;
                 near += usize::from(suture.distance().unwrap_or(f64::INFINITY) <= peer.distance().unwrap_or(0.0) + SAME);
-                keeps += usize::from(kept(suture) >= kept(peer));
+                // Shares of one file that differ in their last bit are one share.
+                keeps += usize::from(kept(suture) >= kept(peer) - 1e-12);
             }
             None if ours => alone += 1,
             _ => none += usize::from(!ours),

@@ -6,7 +6,7 @@ use crate::geometry::sums::{Bounds, Extent};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 
-/// Which regions of regular surface are reversed, against how they stand in the file, and which go. Triangles of the shop are turned, or die, in
+/// Which regions of regular surface are reversed, against how they stand in the file, and which go. Triangles of the submesh are turned, or die, in
 /// place.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Reversed {
@@ -33,7 +33,7 @@ pub(crate) struct Component {
     pub(crate) sample: Sample,
 }
 
-/// A triangle of a component: its place in the file (past the end for a new one) and, if it is in the shop, its number there.
+/// A triangle of a component: its place in the file (past the end for a new one) and, if it is in the submesh, its number there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Sample {
     pub(crate) record: u32,
@@ -77,7 +77,7 @@ impl Through<'_> {
 }
 
 impl Components {
-    /// O(regions + shop). Components are numbered by their first region, then by their first triangle in the shop.
+    /// O(regions + submesh). Components are numbered by their first region, then by their first triangle in the submesh.
     pub(crate) fn of(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, reversed: &Reversed, through: Through<'_>) -> Self {
         let regions = survey.regions.len() as u32;
         let mut parents: Vec<u32> = (0..regions + submesh.triangles.len() as u32).collect();

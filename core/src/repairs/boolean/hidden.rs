@@ -13,7 +13,7 @@
 //!
 //! It is a rule of thumb, and no more than that: one triangle speaks for a piece, cavities go with what floats in them, and so does a part between
 //! the jaws of another. What lies in the material of others, or in a closed piece, was to go; a body that lies in none, and a sheet,
-//! may have been meant to stay, and a person is asked (`verdict`). Nothing that crosses anything goes.
+//! may have been meant to stay, and a person is asked (`review`). Nothing that crosses anything goes.
 
 use crate::contract::report::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};

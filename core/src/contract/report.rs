@@ -56,6 +56,10 @@ pub struct Report {
     /// Regions that no repair made a solid: replaced by a wrap, or left, the largest first (at most 1000 listed).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub wraps: Vec<Wrap>,
+    /// The volume that the file meant to enclose: after welding and orienting, before anything is closed, cut or removed, with each boundary loop
+    /// closed by a cone to its centroid. `None` where nothing was repaired, or where neighbours disagree for good, so that nobody knows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub volume_meant: Option<f64>,
     /// What became of the volume of bodies; `None` where nothing was done that might have lost any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub volumes: Option<Volumes>,

@@ -8,6 +8,7 @@
 
 pub(crate) mod bodies;
 pub(crate) mod certificate;
+pub(crate) mod coned_volume;
 pub(crate) mod defects;
 pub(crate) mod difference;
 pub(crate) mod fresh;

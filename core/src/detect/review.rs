@@ -14,6 +14,10 @@ pub(crate) struct Enclosed {
     pub(crate) volume: f64,
     /// Where they were.
     pub(crate) regions: Vec<Region>,
+    /// Of that volume, bodies that nothing crosses and that lay wholly in the material of another one: each may have been meant for a cavity.
+    pub(crate) filled: f64,
+    /// The volume that the surface meant to enclose before anything was closed, cut or removed; `None` if nobody knows.
+    pub(crate) meant: Option<f64>,
 }
 
 /// What wraps have replaced beyond the profile's limit, in words.
@@ -30,15 +34,15 @@ pub(crate) fn wraps(wraps: &[Wrap], profile: &Profile) -> Option<String> {
 /// counted twice.
 pub(crate) fn counts(before: &Defects, surface: &Bounds, enclosed: &Enclosed, after: &Defects, profile: &Profile) -> Vec<String> {
     let mut concerns = Vec::new();
-    // The volume of an open or incoherent surface depends on the origin, and duplicates count twice: only what enclosed a volume
-    // once can be compared.
+    // The volume of an open or incoherent surface depends on the origin, and duplicates count twice.
     let has_volume = before.boundary_edges + before.unbalanced_edges + before.nonmanifold_edges + before.inverted_components == 0;
-    let volume = before.volume - enclosed.volume;
-    if has_volume && volume > 0.0 {
-        let change = (after.volume - volume).abs() / volume;
-        if change > profile.max_volume_change {
-            concerns.push(format!("the volume changed by {:.1} %, from {} to {}", change * 100.0, volume, after.volume));
-        }
+    let meant = if has_volume { Some(before.volume) } else { enclosed.meant };
+    concerns.extend(meant.filter(|meant| *meant > 0.0).and_then(|meant| volume(meant, enclosed, after.volume, profile)));
+    if enclosed.filled > profile.max_volume_change * after.volume {
+        let share = enclosed.filled / after.volume * 100.0;
+        concerns.push(format!(
+            "bodies that lay wholly in the material of others are gone, {share:.1} % of the volume; if one was meant for a cavity, it is filled"
+        ));
     }
     if before.area > 0.0 {
         let change = (after.area - before.area) / before.area;
@@ -59,6 +63,17 @@ pub(crate) fn counts(before: &Defects, surface: &Bounds, enclosed: &Enclosed, af
         concerns.push(format!("{lost} of {all} bodies were lost"));
     }
     concerns
+}
+
+/// A change of the volume beyond the limit, in words. What lay in the material of others was counted twice.
+fn volume(meant: f64, enclosed: &Enclosed, after: f64, profile: &Profile) -> Option<String> {
+    let once = meant - enclosed.volume;
+    if once <= 0.0 {
+        let twice = enclosed.volume;
+        return Some(format!("the file enclosed {meant}; of that, {twice} was counted twice, and the result encloses {after}"));
+    }
+    let change = (after - once).abs() / once;
+    (change > profile.max_volume_change).then(|| format!("the volume changed by {:.1} %, from {once} to {after}", change * 100.0))
 }
 
 /// What left the model of its bodies beyond the profile's limits, in words.
@@ -125,6 +140,29 @@ mod tests {
         }
         for (bodies, nested_positive, count) in [(2, 0, 0), (1, 0, 1), (1, 1, 0)] {
             assert_eq!(concerns(Defects { bodies: 3, ..cube() }, Defects { bodies, nested_positive, ..cube() }), count);
+        }
+    }
+
+    #[test]
+    fn a_broken_file_is_held_against_what_it_meant_to_enclose() {
+        let open = Defects { boundary_edges: 3, volume: 0.1, ..cube() };
+        let concerns = |meant: f64, volume: f64| {
+            let enclosed = Enclosed { meant: Some(meant), volume, ..Enclosed::default() };
+            counts(&open, &BOX, &enclosed, &cube(), &Profile::default()).join(" ")
+        };
+        assert_eq!(concerns(1.2, 0.0), "");
+        assert!(concerns(3.0, 0.0).contains("66.7 %"), "{}", concerns(3.0, 0.0));
+        assert_eq!(concerns(1.5, 0.5), "", "half of it counted twice");
+        // A cavity that was turned into a body: the two have more in common than the file encloses.
+        assert!(concerns(0.2, 0.6).contains("counted twice"));
+    }
+
+    #[test]
+    fn a_large_body_in_the_material_of_another_may_be_a_cavity() {
+        let before = Defects { bodies: 1, nested_positive: 1, volume: 1.3, ..cube() };
+        for (filled, count) in [(0.24, 0), (0.26, 1)] {
+            let enclosed = Enclosed { bodies: 1, volume: 0.3, filled, ..Enclosed::default() };
+            assert_eq!(counts(&before, &BOX, &enclosed, &cube(), &Profile::default()).len(), count, "{filled}");
         }
     }
 

@@ -54,6 +54,7 @@ pub(crate) fn begin(task: Task, input: &Input<'_>, diagnosis: &Diagnosis<'_>, pr
         loops_left: Vec::new(),
         sheets_dropped: Vec::new(),
         wraps: Vec::new(),
+        volume_meant: None,
         volumes: None,
         regions: Regions::default(),
         edit: EditSummary::default(),
@@ -104,6 +105,7 @@ fn take_account(report: &mut Report, repaired: Repaired) -> Enclosed {
     report.loops_left = account.loops_left;
     report.sheets_dropped = account.sheets;
     report.wraps = account.wraps;
+    report.volume_meant = account.enclosed.meant;
     report.volumes = account.volumes;
     report.regions = regions;
     account.enclosed

@@ -8,6 +8,7 @@ use std::time::Instant;
 use crate::contract::error::{Error, Result};
 use crate::contract::report::RepairName;
 use crate::contract::settings::Bodies;
+use crate::detect::coned_volume::coned_volume;
 use crate::detect::holes;
 use crate::repairs::boolean::enclosed;
 use crate::repairs::boolean::hidden;
@@ -73,6 +74,7 @@ pub(crate) const ALL: &[Step] = &[
     Do(debris::REPAIR),
     Do(visibility::REPAIR),
     Do(directions::COHERENT),
+    Look(measure_volume),
     Do(skirt::REPAIR),
     Do(fill::REPAIR),
     Do(sheets::REPAIR),
@@ -192,6 +194,14 @@ fn recognise_loops(cx: &mut Context<'_, '_>) {
         let (submesh, edges) = cx.work.edges();
         cx.account.loops = Some(holes::report(submesh, edges, cx.tolerance, cx.profile.gap_edge_share));
     }
+}
+
+/// The volume that is meant, while all of the surface is there and nothing is guessed.
+fn measure_volume(cx: &mut Context<'_, '_>) {
+    let pieces = cx.pieces();
+    let (submesh, edges) = cx.work.edges();
+    cx.account.enclosed.meant = coned_volume(cx.survey, submesh, edges, &pieces);
+    tracing::debug!(volume = ?cx.account.enclosed.meant, "The volume that is meant.");
 }
 
 /// Points in the bodies, if anything may lose one: all is closed that can be, and nothing is cut, removed or replaced yet.

@@ -137,6 +137,21 @@ fn origins_name_the_repair() {
     assert!(origins.iter().any(|o| matches!(o, FaceOrigin::Part(0..24))));
 }
 
+/// Valid is not yet right: each of these was closed, manifold and full of material where a cavity was meant.
+#[test]
+fn a_cavity_is_not_filled_without_a_look() {
+    let host = cuboid([0.0; 3], [4.0; 3]);
+    let cavity = |at: [f32; 3]| cuboid(at, at.map(|x| x + 3.0));
+    let pokes_out = [host.clone(), crate::testing::reversed(&cavity([1.5, 0.5, 0.5]))].concat();
+    let faces_outward = [host.clone(), cavity([0.5; 3])].concat();
+    for broken in [pokes_out, faces_outward] {
+        let report = repaired(&broken).report;
+        assert_eq!(report.outcome, Outcome::NeedsReview, "{:?}", report.verdict);
+    }
+    let right = repaired(&[&host[2..], &crate::testing::reversed(&cavity([0.5; 3]))[1..]].concat()).report;
+    assert_eq!((right.outcome, right.volume_meant.map(f64::round)), (Outcome::Repaired, Some(37.0)), "{:?}", right.verdict);
+}
+
 #[test]
 fn a_mesh_without_faces_is_an_error() {
     let error = crate::inspect_mesh(&Mesh::default(), &Profile::default(), &limits(), &Quiet).unwrap_err();

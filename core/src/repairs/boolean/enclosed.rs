@@ -40,6 +40,7 @@ pub(crate) const REPAIR: Repair = Repair {
         let changed = !enclosed.regions.is_empty();
         cx.account.regions.append(&mut enclosed.regions);
         cx.account.enclose(bodies, volume);
+        cx.account.enclosed.filled = volume;
         let note = format!("bodies in the material of others removed: {bodies}, of {volume:.4} units³ together");
         Ok(Done { changed, ..Done::count(bodies, note) })
     },

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import re
 from typing import Any
 
@@ -14,14 +15,32 @@ _UNITS = {"": 1, "B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 _UNITS |= {"KIB": 2**10, "MIB": 2**20, "GIB": 2**30, "TIB": 2**40}
 
 
+def whole_number(value: Any, what: str, bits: int) -> int:
+    """The value as a whole number from 0 up of so many bits; ``what`` says in an error whose it is."""
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise ValueError(f"{what} is a whole number, not {value!r}") from None
+    if not 0 <= number < 2**bits:
+        raise ValueError(f"{what} is a whole number from 0 to 2**{bits} - 1, not {number}")
+    return number
+
+
+def thread_count(threads: int | None) -> int | None:
+    """How many threads; ``None``: as many as there are processors."""
+    return None if threads is None else whole_number(threads, "threads", 64)
+
+
 def memory_bytes(memory: int | str | None) -> int | None:
     """``512 * 2**20`` and ``"512MiB"`` are the same."""
-    if memory is None or isinstance(memory, int):
-        return memory
+    if memory is None:
+        return None
+    if not isinstance(memory, str):
+        return whole_number(memory, "memory in bytes", 64)
     found = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*([a-zA-Z]*)\s*", memory)
     if found is None or found[2].upper() not in _UNITS:
         raise ValueError(f"memory is a number of bytes, or a text like '512MiB', not {memory!r}")
-    return int(float(found[1]) * _UNITS[found[2].upper()])
+    return whole_number(int(float(found[1]) * _UNITS[found[2].upper()]), "memory in bytes", 64)
 
 
 def as_vertices(vertices: ArrayLike) -> tuple[NDArray[np.float32], dict[str, Any] | None]:
@@ -37,10 +56,11 @@ def as_vertices(vertices: ArrayLike) -> tuple[NDArray[np.float32], dict[str, Any
     if given.dtype.kind not in "fiu":
         raise ValueError(f"vertices are numbers, not {given.dtype}")
     if given.dtype == np.float32:
-        return np.ascontiguousarray(given), None
+        return _as_rows(given, np.float32), None
     with np.errstate(over="ignore"):
-        rounded = np.ascontiguousarray(given, dtype=np.float32)
-    wide = given.astype(np.float64, copy=False)
+        rounded = _as_rows(given, np.float32)
+    # Whole numbers of 64 bits have more digits than float64.
+    wide = given if given.dtype.kind == "f" else given.astype(np.longdouble)
     finite = np.isfinite(wide)
     if (finite & ~np.isfinite(rounded)).any():
         raise RefusedError("a coordinate is larger than single precision can hold (3.4e38): scale the mesh down")
@@ -63,9 +83,14 @@ def as_faces(faces: ArrayLike, vertices: int) -> NDArray[np.uint32]:
     if given.dtype.kind not in "iu":
         raise ValueError(f"faces are whole numbers, not {given.dtype}")
     if given.dtype == np.uint32:
-        return np.ascontiguousarray(given)
+        return _as_rows(given, np.uint32)
     # In 32 bits, a number that is too large would become another one.
     if given.size and (given.min() < 0 or given.max() >= vertices):
         face = int(np.argmax(((given < 0) | (given >= vertices)).any(axis=1)))
         raise ValueError(f"face {face} refers to vertices {given[face].tolist()}, and there are {vertices} vertices")
-    return np.ascontiguousarray(given, dtype=np.uint32)
+    return _as_rows(given, np.uint32)
+
+
+def _as_rows(given: NDArray[Any], dtype: Any) -> NDArray[Any]:
+    """Of this type, row by row, at addresses that the processor likes; not copied if it is already."""
+    return np.require(given, dtype, ["C", "A"])

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from . import _suture
-from ._arrays import memory_bytes
+from ._arrays import memory_bytes, thread_count
 from ._profile import profile_text
 
 Progress = Callable[[str, int, int], object]
@@ -30,7 +30,7 @@ def inspect_file(
     """
     spool = Path(path).absolute().parent
     return json.loads(
-        _suture.inspect_file(path, profile_text(profile), memory_bytes(memory), threads, spool, progress)
+        _suture.inspect_file(path, profile_text(profile), memory_bytes(memory), thread_count(threads), spool, progress)
     )
 
 
@@ -53,12 +53,14 @@ def repair_file(
     output = Path(output)
     if not replace and os.path.lexists(output):
         raise FileExistsError(f"{output} exists already; replace=True replaces it")
-    if output.exists() and output.samefile(path):
+    if output.is_dir():
+        raise IsADirectoryError(f"{output} is a folder; the output is a file")
+    if output.exists() and os.path.exists(path) and output.samefile(path):
         raise FileExistsError(f"{output} is the input, which is never overwritten")
     draft = output.absolute().parent / f".{secrets.token_hex(8)}.suture"
     spool = draft.parent
     try:
-        text = _suture.repair_file(path, draft, profile_text(profile), memory_bytes(memory), threads, spool, progress)
+        text = _suture.repair_file(path, draft, profile_text(profile), memory_bytes(memory), thread_count(threads), spool, progress)
         report = json.loads(text)
         if report["output"] is not None:
             if replace:

@@ -16,6 +16,13 @@ def built_in_profile(name: str = "default") -> dict[str, Any]:
     return json.loads(_suture.built_in_profile(name))
 
 
+def _plain(value: Any) -> Any:
+    """A number of numpy as one of Python."""
+    if hasattr(value, "item"):
+        return value.item()
+    raise ValueError(f"no setting of a profile is {value!r}")
+
+
 def profile_text(profile: str | dict[str, Any]) -> str:
     """The profile as the engine reads it. Settings that a dictionary leaves out are those of ``default``."""
-    return profile if isinstance(profile, str) else json.dumps(profile, allow_nan=False)
+    return profile if isinstance(profile, str) else json.dumps(profile, allow_nan=False, default=_plain)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import trimesh
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Repaired:
     """A mesh, where each of its faces comes from, and the report."""
 

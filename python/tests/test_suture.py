@@ -307,6 +307,49 @@ class Watched(unittest.TestCase):
             suture.repair(*tangle(30_000), progress=fail)
 
 
+class Arguments(unittest.TestCase):
+    """Found by a stranger who gave what nobody had thought of."""
+
+    def test_arrays_at_odd_addresses_are_converted(self):
+        vertices, faces = (np.asarray(part) for part in tangle(300))
+        vertices, faces = vertices.astype(np.float32), faces.astype(np.uint32)
+        odd = [np.frombuffer(b"." + part.tobytes(), np.uint8)[1:].view(part.dtype).reshape(-1, 3) for part in (vertices, faces)]
+        self.assertFalse(odd[0].flags.aligned or odd[1].flags.aligned)
+        self.assertTrue((suture.repair(*odd).faces == suture.repair(vertices, faces).faces).all())
+
+    def test_what_no_precision_holds_is_refused(self):
+        vertices, faces = tangle(300)
+        wide = np.asarray(vertices, np.longdouble)
+        wide[0, 0] = np.longdouble("1e4000")
+        with self.assertRaises(suture.RefusedError):
+            suture.repair(wide, faces)
+        large = np.array([[2**53 + 1, 0, 0], [0, 2**53, 0], [0, 0, 2**53]], np.int64)
+        self.assertEqual(suture.inspect(large, [[0, 1, 2]])["rounding"]["moved"], 1)
+
+    def test_what_means_nothing_is_a_value_error(self):
+        mesh = tangle(300)
+        for bad in [{"memory": -1}, {"memory": 2**64}, {"memory": "99999999999TB"}, {"memory": 1e9}, {"threads": -1}, {"threads": 2**64}]:
+            with self.assertRaises(ValueError, msg=str(bad)):
+                suture.inspect(*mesh, **bad)
+        for bad in [{"max_edges": -1}, {"max_edges": 2**32}, {"only": -1}, {"only": 0.5}]:
+            with self.assertRaises(ValueError, msg=str(bad)):
+                suture.fill_loops(*mesh, **bad)
+        suture.inspect(*mesh, memory=np.int64(2**30), threads=np.int64(2), profile={"max_gap_mm": np.float32(1)})
+
+    def test_results_are_told_apart_by_identity(self):
+        fixed = suture.repair(*tangle(300))
+        self.assertTrue(fixed == fixed and fixed in [fixed] and fixed != suture.repair(*tangle(300)))
+
+    def test_more_threads_than_help_are_not_started(self):
+        begun = time.monotonic()
+        suture.repair(*tangle(2_000), threads=2**63)
+        self.assertLess(time.monotonic() - begun, 30)
+
+    def test_the_certificate_is_of_the_mesh_that_is_returned(self):
+        fixed = suture.repair([[0, 0, -0.0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2]])
+        self.assertEqual(fixed.report["certificate"]["blake3"], suture.certificate(fixed.vertices, fixed.faces)["blake3"])
+
+
 class Others(unittest.TestCase):
     def test_trimesh_and_back(self):
         try:

@@ -18,6 +18,13 @@ pub(crate) struct EditedMesh {
     /// By face.
     pub(crate) origins: Vec<FaceOrigin>,
     layout: Layout,
+    /// Of the input; its records have them, and the mesh does not.
+    has_negative_zeros: bool,
+}
+
+/// As the mesh has it: without −0.0, normal and attribute.
+fn plain(record: &Record) -> Record {
+    record::assemble([0.0; 3], record::corners(record).map(canonical), 0)
 }
 
 /// How the input's records become those of the result.
@@ -72,17 +79,22 @@ impl EditedMesh {
             Ok(())
         });
         let Ok(()) = walked;
-        Self { mesh: Mesh::of_parts(numbers.vertices, faces), origins, layout }
+        let has_negative_zeros = input.vertices().as_flattened().iter().any(|x| *x == 0.0 && x.is_sign_negative());
+        Self { mesh: Mesh::of_parts(numbers.vertices, faces), origins, layout, has_negative_zeros }
     }
 
-    /// Makes the input's records those of the result.
+    /// Makes the input's records those of the result: what [`MeshView::records`] makes of the mesh.
     pub(crate) fn apply(&mut self, records: &mut Vec<Record>) {
         let Layout { moves, fresh } = std::mem::take(&mut self.layout);
         for (from, to, count) in moves {
             records.copy_within(from..from + count, to);
         }
         records.truncate(self.origins.len());
+        if self.has_negative_zeros {
+            records.iter_mut().for_each(|record| *record = plain(record));
+        }
         for (place, record) in fresh {
+            let record = plain(&record);
             match records.get_mut(place) {
                 Some(old) => *old = record,
                 None => records.push(record),

@@ -21,7 +21,7 @@ mod wrap;
 use std::path::Path;
 
 use crate::contract::error::Result;
-use crate::contract::progress::Progress;
+use crate::contract::progress::{Latched, Progress};
 use crate::contract::report::{BoundaryLoops, Region, Regions};
 use crate::contract::settings::{Limits, Profile};
 use crate::diagnosis::Diagnosis;
@@ -77,7 +77,8 @@ pub(crate) fn run(
     limits: &Limits,
     progress: &dyn Progress,
 ) -> Result<Repaired> {
-    let mut cx = Context::of(diagnosis, path, profile, limits, progress);
+    let progress = Latched::new(progress);
+    let mut cx = Context::of(diagnosis, path, profile, limits, &progress);
     if let Steps::Fill(only_loop) = steps {
         cx.handed.only_loop = only_loop;
     }

@@ -176,10 +176,14 @@ pub(crate) fn take(steps: &[Step], cx: &mut Context<'_, '_>) -> Result<u64> {
 fn carry_out(repair: &Repair, cx: &mut Context<'_, '_>) -> Result<u64> {
     let span = tracing::debug_span!("repair", name = repair.name.as_str()).entered();
     let start = Instant::now();
-    if cx.progress.cancelled() {
-        return Err(Error::io(cx.path, repair.name.as_str())(std::io::ErrorKind::Interrupted.into()));
-    }
+    let go_on = |cx: &Context<'_, '_>| match cx.progress.cancelled() {
+        true => Err(Error::io(cx.path, repair.name.as_str())(std::io::ErrorKind::Interrupted.into())),
+        false => Ok(()),
+    };
+    go_on(cx)?;
     let done = (repair.run)(cx)?;
+    // A repair that saw it has left things undone.
+    go_on(cx)?;
     drop(span);
     if done.changed {
         cx.changed(repair.changes);

@@ -13,6 +13,7 @@ mod groups;
 mod outcome;
 mod site;
 
+use crate::contract::progress::Progress;
 use crate::contract::report::{MOST_LISTED, RepairName};
 use crate::contract::settings::Guarantee;
 use crate::repairs::shared::context::{Changes, Context, Done, Repair};
@@ -46,8 +47,8 @@ pub(crate) const REPAIR: Repair = Repair {
             } else {
                 Some(Vec::new())
             };
-            let (kept_open, threads) = (&cx.handed.kept_open, cx.limits.threads);
-            let wraps = replace(cx.survey, &mut cx.work, &mut cx.reversed, pairs.as_deref(), kept_open, cx.profile, threads);
+            let (kept_open, means) = (&cx.handed.kept_open, (cx.limits.threads, cx.progress));
+            let wraps = replace(cx.survey, &mut cx.work, &mut cx.reversed, pairs.as_deref(), kept_open, cx.profile, means);
             count = wraps.regions;
             cx.account.wraps = wraps.listed;
             (cx.handed.wrapped, cx.handed.replaced) = (wraps.triangles, wraps.gone);
@@ -79,7 +80,7 @@ pub(crate) fn replace(
     pairs: Option<&[[Which; 2]]>,
     kept_open: &[[f32; 3]],
     profile: &Profile,
-    threads: usize,
+    (threads, progress): (usize, &dyn Progress),
 ) -> Wraps {
     let pieces = pieces::pieces(survey, work, reversed);
     let mut groups = Groups::of(survey, work, &pieces, pairs, kept_open);
@@ -89,9 +90,12 @@ pub(crate) fn replace(
     }
     let (submesh, edges) = work.edges();
     let sheets = Components::of(survey, submesh, edges, reversed, Through::ManifoldEdges);
-    let site = Site { survey, submesh, reversed, pieces: &pieces, sheets: &sheets, profile, threads };
+    let site = Site { survey, submesh, reversed, pieces: &pieces, sheets: &sheets, profile, threads, progress };
     let mut outcomes: BTreeMap<Vec<u32>, Outcome> = BTreeMap::new();
     for round in 0..=ROUNDS {
+        if progress.cancelled() {
+            return wraps;
+        }
         let all = groups.list();
         let mut before = std::mem::take(&mut outcomes);
         let (known, new): (Vec<_>, Vec<_>) = all.into_iter().partition(|group| before.contains_key(group));

@@ -5,13 +5,23 @@
 
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::thread::{Builder, JoinHandle, Scope, ScopedJoinHandle};
 
 use rayon::ThreadPoolBuilder;
 
+/// Threads a processor, at most: more would only cost their starts.
+const MOST_A_PROCESSOR: usize = 4;
+
+/// So many threads of those asked for are of use on this machine.
+fn useful(threads: usize) -> usize {
+    static MOST: OnceLock<usize> = OnceLock::new();
+    threads.min(*MOST.get_or_init(|| MOST_A_PROCESSOR * std::thread::available_parallelism().map_or(1, usize::from)))
+}
+
 /// Runs `work` on a rayon pool of so many threads.
 pub(crate) fn in_pool<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
+    let threads = useful(threads);
     if let Ok(pool) = ThreadPoolBuilder::new().num_threads(threads).build() {
         return pool.install(work);
     }
@@ -118,7 +128,7 @@ pub(crate) fn map_with<S, R: Send>(
     scratch: impl Fn() -> S + Sync,
     work: impl Fn(&mut S, usize) -> R + Sync,
 ) -> Vec<R> {
-    let threads = threads.clamp(1, count.max(1));
+    let threads = useful(threads).clamp(1, count.max(1));
     if threads == 1 {
         let mut s = scratch();
         return (0..count).map(|i| work(&mut s, i)).collect();

@@ -8,6 +8,7 @@ use std::hash::{BuildHasherDefault, Hasher};
 use glam::DVec3;
 
 use super::tree::{Corners, Tree};
+use crate::contract::progress::Progress;
 use crate::geometry::distance::place;
 use crate::geometry::sums::Bounds;
 use crate::util::parallel;
@@ -39,18 +40,24 @@ const BLOCK: usize = 512;
 
 /// Wraps the surface that winds around something; `tree` is made of the same triangles by [`Tree::winding`]. The lattice is chosen so that about
 /// `cubes` of it hold the surface. Deterministic, whatever `threads` says. `None` if there is no area, or the lattice would be finer than f32
-/// can tell apart there, or goes on and on. O(cubes · log triangles); about 200 bytes a cube.
-pub(crate) fn wrap(triangles: &[Corners], tree: &Tree, cubes: u32, threads: usize) -> Option<Wrapping> {
+/// can tell apart there, or goes on and on, or the work is cancelled. O(cubes · log triangles); about 200 bytes a cube.
+pub(crate) fn wrap(triangles: &[Corners], tree: &Tree, cubes: u32, threads: usize, progress: &dyn Progress) -> Option<Wrapping> {
     let lattice = Lattice::of(triangles, f64::from(cubes))?;
-    let field = Field::follow(triangles, tree, &lattice, cubes as usize * MOST_LOOKED_AT, threads)?;
+    let field = Field::follow(triangles, tree, &lattice, cubes as usize * MOST_LOOKED_AT, (threads, progress))?;
     let polygons = field.polygons(threads);
     let mut names: Vec<u64> = polygons.iter().flatten().copied().filter(|name| *name != NO_EDGE).collect();
     names.sort_unstable();
     names.dedup();
     let blocks = parallel::map(threads, names.len().div_ceil(BLOCK), |block| {
         let names = &names[block * BLOCK..names.len().min((block + 1) * BLOCK)];
+        if progress.cancelled() {
+            return Vec::new();
+        }
         names.iter().map(|name| field.vertex(tree, *name)).collect::<Vec<_>>()
     });
+    if progress.cancelled() {
+        return None;
+    }
     let vertices: Vec<[i64; 3]> = blocks.into_iter().flatten().collect();
     let blocks = parallel::map(threads, polygons.len().div_ceil(BLOCK), |block| {
         let mut halves = Vec::new();
@@ -212,11 +219,17 @@ fn face(axis: usize) -> [usize; 4] {
 }
 
 impl<'l> Field<'l> {
-    fn follow(triangles: &[Corners], tree: &Tree, lattice: &'l Lattice, most: usize, threads: usize) -> Option<Self> {
+    fn follow(
+        triangles: &[Corners],
+        tree: &Tree,
+        lattice: &'l Lattice,
+        most: usize,
+        (threads, progress): (usize, &dyn Progress),
+    ) -> Option<Self> {
         let mut field = Self { lattice, winding: HashMap::default(), cubes: Vec::new(), known: HashSet::default() };
         let mut wave = touched(triangles, lattice, threads);
         while !wave.is_empty() {
-            if field.known.len() + wave.len() > most {
+            if field.known.len() + wave.len() > most || progress.cancelled() {
                 return None;
             }
             field.known.extend(&wave);
@@ -233,6 +246,9 @@ impl<'l> Field<'l> {
                     let p = named(*p);
                     if lattice.is_beyond(p) { 0.0 } else { tree.winding_number(lattice.point(p)) as f32 }
                 };
+                if progress.cancelled() {
+                    return vec![0.0; points.len()];
+                }
                 points.iter().map(wind).collect::<Vec<_>>()
             });
             field.winding.extend(points.iter().copied().zip(blocks.into_iter().flatten()));

@@ -1,6 +1,6 @@
 //! A mesh in memory becomes what its file becomes.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
@@ -66,6 +66,10 @@ proptest! {
         prop_assert_eq!(&listed.added_from, &of_file.added_from);
         prop_assert_eq!(listed.added.len(), listed.added_from.len());
         prop_assert_eq!(origins.len(), faces.len());
+        if let Some(output) = report.output.filter(|_| !faces.is_empty()) {
+            let again = crate::inspect_mesh(&mesh, &Profile::default(), &limits(), &Quiet).unwrap();
+            prop_assert_eq!(again.input.blake3, output.blake3, "the certificate is of the mesh that is returned");
+        }
         for (face, origin) in faces.into_iter().zip(&origins) {
             check_origin(&triangles, face, *origin)?;
         }
@@ -186,5 +190,36 @@ fn work_that_is_cancelled_ends_with_an_error_that_says_so() {
         let ending = Ending(stage, AtomicBool::new(false));
         let error = crate::repair_mesh(&mesh, &Profile::default(), &limits(), &ending).unwrap_err();
         assert!(error.is_cancellation(), "{stage}: {error}");
+    }
+}
+
+/// Counts how often it is asked, and says once that the work is to end.
+struct Asked(AtomicUsize, usize);
+
+impl Progress for Asked {
+    fn at(&self, _: &'static str, _: u64, _: u64) {}
+
+    fn cancelled(&self) -> bool {
+        self.0.fetch_add(1, Ordering::Relaxed) == self.1
+    }
+}
+
+/// One repair may be nearly all of the work: a wrap of some boxes took nine seconds in which nobody was asked.
+#[test]
+fn long_repairs_are_cancelled_in_their_middle() {
+    let boxes: Vec<Corners> = (0..6u8).flat_map(|i| shifted(&cube(), [f32::from(i) * 0.3; 3])[1..].to_vec()).collect();
+    let mesh = Mesh::from_triangles(&boxes).unwrap();
+    let wrap = |asked: &Asked| crate::operations::wrap(&mesh, &crate::operations::Wrap::default(), &limits(), asked);
+    let all = Asked(AtomicUsize::new(0), usize::MAX);
+    wrap(&all).unwrap();
+    let all = all.0.into_inner();
+    assert!(all > 50, "asked {all} times");
+    for at in [all / 4, all / 2, all - all / 4] {
+        let asked = Asked(AtomicUsize::new(0), at);
+        let error = wrap(&asked).unwrap_err();
+        assert!(error.is_cancellation(), "{error}");
+        let more = asked.0.into_inner() - at;
+        // Blocks that are due already ask as well, and do nothing then.
+        assert!(more < all / 2, "asked {more} times after the end, of {all}");
     }
 }

@@ -130,7 +130,15 @@ pub(crate) fn resolve(
     };
     attempt_until_done(
         state,
-        &Attempt { engine, overlay: &overlay, pairs: &pairs, levels: &[], profile, limits: means.limits },
+        &Attempt {
+            engine,
+            overlay: &overlay,
+            pairs: &pairs,
+            levels: &[],
+            profile,
+            limits: means.limits,
+            progress: means.progress,
+        },
         means,
     )
 }
@@ -202,6 +210,10 @@ fn attempt_until_done(mut state: State<'_, '_, '_>, by: &Attempt<'_>, means: &Me
                 });
             }
             Err(Halted::NoMemory { needed, triangles }) => return Err(refused(means, needed, triangles)),
+            Err(Halted::Cancelled) => {
+                let action = RepairName::SelfIntersection.as_str();
+                return Err(Error::io(means.path, action)(std::io::ErrorKind::Interrupted.into()));
+            }
             Err(Halted::Stuck(stuck)) => failed.learn(&mut state, stuck),
         }
     }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use crate::contract::progress::Progress;
 use crate::contract::settings::{Limits, Profile};
 use crate::geometry::arrange::Arrange;
 use crate::geometry::sums::Bounds;
@@ -48,6 +49,7 @@ pub(crate) struct Attempt<'a> {
     pub(crate) levels: &'a [Level],
     pub(crate) profile: &'a Profile,
     pub(crate) limits: &'a Limits,
+    pub(crate) progress: &'a dyn Progress,
 }
 
 /// How near features are made one before a round, and how far a patch may lie from what it replaces.
@@ -72,6 +74,9 @@ impl State<'_, '_, '_> {
         }
         let mut reach = Reach { width: self.step, limit: self.step * WIDER };
         while !crossing.is_empty() {
+            if by.progress.cancelled() {
+                return Err(Halted::Cancelled);
+            }
             let triangles: BTreeSet<u32> = crossing.iter().flatten().copied().collect();
             if resolved.rounds == ROUNDS || resolved.rounds > 0 && crossing.len() > most {
                 return Err(Stuck { failure: Failure::Endless, triangles: triangles.into_iter().collect() }.into());

@@ -61,6 +61,8 @@ impl Stuck {
 /// Why an attempt ended before its time.
 pub(crate) enum Halted {
     Stuck(Stuck),
+    /// Whoever waits for it does not want it any more.
+    Cancelled,
     /// It would have needed so many bytes.
     NoMemory {
         needed: u64,

@@ -4,6 +4,7 @@ use super::groups::Groups;
 use super::outcome::Outcome;
 use crate::algorithms::wrap::tree::{Corners, Tree};
 use crate::algorithms::wrap::{Wrapping, wrap};
+use crate::contract::progress::Progress;
 use crate::contract::report::Wrap;
 use crate::contract::settings::Profile;
 use crate::geometry::distance::place;
@@ -52,6 +53,7 @@ pub(crate) struct Site<'s, 'a> {
     pub(crate) sheets: &'s Components,
     pub(crate) profile: &'s Profile,
     pub(crate) threads: usize,
+    pub(crate) progress: &'s dyn Progress,
 }
 
 impl Site<'_, '_> {
@@ -156,7 +158,7 @@ impl Site<'_, '_> {
         }
         let told = &mut outcome.told;
         let cubes = (CUBES * told.area_share).max(LEAST_CUBES) as u32;
-        let Some(Wrapping { triangles: new, cell, volume }) = wrap(&triangles, &tree, cubes, self.threads) else {
+        let Some(Wrapping { triangles: new, cell, volume }) = wrap(&triangles, &tree, cubes, self.threads, self.progress) else {
             outcome.give_up("no lattice can hold it: it has no area, or f32 is too coarse where it lies");
             return;
         };

@@ -1,10 +1,11 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::contract::progress::Quiet;
 use crate::testing::{cuboid, diagnose, plate, records, reversed, shifted, soup};
 
 fn wrapped(triangles: &[Corners], cubes: u32) -> Option<Wrapping> {
-    wrap(triangles, &Tree::winding(triangles), cubes, 1)
+    wrap(triangles, &Tree::winding(triangles), cubes, 1, &Quiet)
 }
 
 /// Whatever the engine finds in a wrapped surface.
@@ -83,7 +84,7 @@ proptest! {
             finite.map(|t| t.map(|p| std::array::from_fn(|k| (p[k] + by[k]) * scale))).collect();
         if let Some(got) = wrapped(&moved, 300) {
             check(&got);
-            let again = wrap(&moved, &Tree::winding(&moved), 300, 3).unwrap();
+            let again = wrap(&moved, &Tree::winding(&moved), 300, 3, &Quiet).unwrap();
             prop_assert_eq!(got.triangles, again.triangles);
         }
     }

@@ -304,7 +304,7 @@ fn bodies_whose_faces_lie_in_planes_that_f32_cannot_hold_are_spread_by_some_step
         let levels = vec![Level::Perturbed; pieces.list.len()];
         let profile = Profile::default();
         let (overlay, pairs, levels) = (&overlay, &pairs[..], &levels[..]);
-        let by = Attempt { engine: &Rational, overlay, pairs, levels, profile: &profile, limits: &limits };
+        let by = Attempt { engine: &Rational, overlay, pairs, levels, profile: &profile, limits: &limits, progress: &Quiet };
         let Ok(resolved) = state.attempt(&by) else { panic!("resolved") };
         let regions = state.track.regions(&mut state.clusters);
         assert!(regions.iter().all(|region| region.method == RegionMethod::Perturbed) && regions.len() == 1, "{regions:?}");

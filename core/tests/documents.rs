@@ -1,4 +1,4 @@
-//! What the documents list is what there is.
+//! The documents list every setting and every repair.
 
 #![allow(clippy::unwrap_used)]
 

@@ -295,7 +295,7 @@ impl Side {
         matches!(self, Self::SutureOff | Self::PymeshlabSolid | Self::MeshlibSolid | Self::Manifold3dUnion)
     }
 
-    /// Those that are given arrays. Beside others they are measured where they are asked for by name.
+    /// Sides that are given arrays instead of a file. They are measured only where they are asked for by name.
     pub(crate) const ARRAYS: [Self; 5] =
         [Self::SutureArrays, Self::PymeshlabArrays, Self::MeshlibArrays, Self::PymeshfixArrays, Self::TrimeshArrays];
 

@@ -24,8 +24,8 @@ const MOST_MEETINGS: usize = 1 << 24;
 /// The volume that the components enclose together, in the file's units, cubed; `None` if one of them has two neighbours that disagree, so that
 /// nobody knows what is inside of it, or if too many boxes meet.
 ///
-/// What lies in the box of another component may be a cavity in it, so the signed volumes of components whose boxes meet are added up; those
-/// apart from all others are taken by their size, since each of them may be inside out. O(regions + submesh), and what finding the loops costs.
+/// A component in the box of another one may be a cavity in it, so the signed volumes of components whose boxes meet are added up. A component
+/// apart from all others counts by its size, since it may be inside out. O(regions + submesh), and what finding the loops costs.
 pub(crate) fn coned_volume(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, components: &Components) -> Option<f64> {
     if edges.iter().any(|edge| edge.is_inconsistent()) {
         return None;

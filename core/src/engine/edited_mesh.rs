@@ -132,7 +132,7 @@ impl<'m> Numbers<'m> {
         let mut standing = vec![NONE; count];
         // One without faces may share the position of another.
         for (v, p) in vertices.iter().enumerate().filter(|(v, _)| used[*v]) {
-            // What is not finite is equal to nothing.
+            // A position that is not finite equals no other.
             if let Some(place) = new.find(*p) {
                 standing[place as usize] = standing[place as usize].min(first_at.get(v).copied().unwrap_or(v as u32));
             }

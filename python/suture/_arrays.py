@@ -26,9 +26,9 @@ def whole_number(value: Any, what: str, bits: int) -> int:
     return number
 
 
-def thread_count(threads: int | None) -> int | None:
-    """How many threads; ``None``: as many as there are processors."""
-    return None if threads is None else whole_number(threads, "threads", 64)
+def limits(memory: int | str | None, threads: int | None) -> tuple[int | None, int | None]:
+    """What the engine may spend: bytes and threads; ``None`` is its own choice."""
+    return memory_bytes(memory), None if threads is None else whole_number(threads, "threads", 64)
 
 
 def memory_bytes(memory: int | str | None) -> int | None:

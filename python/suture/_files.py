@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from . import _suture
-from ._arrays import memory_bytes, thread_count
+from ._arrays import limits
 from ._profile import profile_text
 
 Progress = Callable[[str, int, int], object]
@@ -30,7 +30,7 @@ def inspect_file(
     """
     spool = Path(path).absolute().parent
     return json.loads(
-        _suture.inspect_file(path, profile_text(profile), memory_bytes(memory), thread_count(threads), spool, progress)
+        _suture.inspect_file(path, profile_text(profile), *limits(memory, threads), spool, progress)
     )
 
 
@@ -60,7 +60,7 @@ def repair_file(
     draft = output.absolute().parent / f".{secrets.token_hex(8)}.suture"
     spool = draft.parent
     try:
-        text = _suture.repair_file(path, draft, profile_text(profile), memory_bytes(memory), thread_count(threads), spool, progress)
+        text = _suture.repair_file(path, draft, profile_text(profile), *limits(memory, threads), spool, progress)
         report = json.loads(text)
         if report["output"] is not None:
             if replace:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _suture
-from ._arrays import as_faces, as_vertices, memory_bytes, thread_count, whole_number
+from ._arrays import as_faces, as_vertices, limits, whole_number
 from ._profile import profile_text
 from ._result import Repaired
 
@@ -47,7 +47,7 @@ def inspect(
 ) -> dict[str, Any]:
     """Diagnoses a mesh: returns the report, with the counts of its defects, its boundary loops, and a verdict."""
     mesh = _Given(vertices, faces)
-    text = _suture.inspect(mesh.vertices, mesh.faces, profile_text(profile), memory_bytes(memory), thread_count(threads), progress)
+    text = _suture.inspect(mesh.vertices, mesh.faces, profile_text(profile), *limits(memory, threads), progress)
     return mesh.report(text)
 
 
@@ -70,7 +70,7 @@ def repair(
     Other threads run meanwhile, and must leave the arrays alone. Ctrl-C ends the work.
     """
     mesh = _Given(vertices, faces)
-    arrays = _suture.repair(mesh.vertices, mesh.faces, profile_text(profile), memory_bytes(memory), thread_count(threads), progress)
+    arrays = _suture.repair(mesh.vertices, mesh.faces, profile_text(profile), *limits(memory, threads), progress)
     return mesh.repaired(arrays)
 
 
@@ -79,7 +79,7 @@ def find_defects(
 ) -> dict[str, Any]:
     """Counts the defects of a mesh (``core/DEFECTS.md`` defines them). Self-intersections are not looked for."""
     mesh = _Given(vertices, faces)
-    return json.loads(_suture.find_defects(mesh.vertices, mesh.faces, memory_bytes(memory), thread_count(threads)))
+    return json.loads(_suture.find_defects(mesh.vertices, mesh.faces, *limits(memory, threads)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,7 @@ def find_loops(
 ) -> list[Loop]:
     """Finds all boundary loops of a mesh, and what kinds of openings they are."""
     mesh = _Given(vertices, faces)
-    found = _suture.find_loops(mesh.vertices, mesh.faces, memory_bytes(memory), thread_count(threads))
+    found = _suture.find_loops(mesh.vertices, mesh.faces, *limits(memory, threads))
     return [Loop(way, json.loads(facts)) for way, facts in found]
 
 
@@ -121,7 +121,7 @@ def find_self_intersections(
 ) -> Intersections:
     """Finds all pairs of faces that cross or overlap each other, beyond the corners they share. Exact."""
     mesh = _Given(vertices, faces)
-    arrays, counts = _suture.find_self_intersections(mesh.vertices, mesh.faces, memory_bytes(memory), thread_count(threads))
+    arrays, counts = _suture.find_self_intersections(mesh.vertices, mesh.faces, *limits(memory, threads))
     pairs, overlap = arrays if arrays is not None else (None, None)
     return Intersections(pairs, overlap, json.loads(counts))
 
@@ -131,7 +131,7 @@ def certificate(
 ) -> dict[str, Any]:
     """What each rule of a printable mesh finds; ``printable`` says whether all of them passed."""
     mesh = _Given(vertices, faces)
-    return json.loads(_suture.certificate(mesh.vertices, mesh.faces, memory_bytes(memory), thread_count(threads)))
+    return json.loads(_suture.certificate(mesh.vertices, mesh.faces, *limits(memory, threads)))
 
 
 def fill_loops(
@@ -159,7 +159,7 @@ def fill_loops(
             raise ValueError(f"there is no vertex {only}; there are {len(mesh.vertices)}")
         place = mesh.vertices[only].tolist()
     how = (place, shape, whole_number(max_edges, "max_edges", 32), sheets)
-    return mesh.repaired(_suture.fill(mesh.vertices, mesh.faces, how, memory_bytes(memory), thread_count(threads)))
+    return mesh.repaired(_suture.fill(mesh.vertices, mesh.faces, how, *limits(memory, threads)))
 
 
 def orient(
@@ -172,7 +172,7 @@ def orient(
 ) -> Repaired:
     """Turns faces, so that neighbours agree and closed surfaces enclose what is inside of them. Does nothing else."""
     mesh = _Given(vertices, faces)
-    return mesh.repaired(_suture.orient(mesh.vertices, mesh.faces, by_visibility, memory_bytes(memory), thread_count(threads)))
+    return mesh.repaired(_suture.orient(mesh.vertices, mesh.faces, by_visibility, *limits(memory, threads)))
 
 
 def union(
@@ -189,7 +189,7 @@ def union(
     ``visible_only`` removes what cannot be seen from outside, too. ``separate`` takes surfaces apart that share an edge or a vertex.
     """
     mesh = _Given(vertices, faces)
-    arrays = _suture.union(mesh.vertices, mesh.faces, (visible_only, separate), memory_bytes(memory), thread_count(threads))
+    arrays = _suture.union(mesh.vertices, mesh.faces, (visible_only, separate), *limits(memory, threads))
     return mesh.repaired(arrays)
 
 
@@ -208,5 +208,5 @@ def wrap(
     the bounding box's diagonal.
     """
     mesh = _Given(vertices, faces)
-    arrays = _suture.wrap(mesh.vertices, mesh.faces, (max_share, max_move), memory_bytes(memory), thread_count(threads))
+    arrays = _suture.wrap(mesh.vertices, mesh.faces, (max_share, max_move), *limits(memory, threads))
     return mesh.repaired(arrays)

@@ -66,6 +66,11 @@ impl Error {
         move |source| Self::Io { path, action, source }
     }
 
+    /// `progress` has ended the work on `path` during `action`.
+    pub(crate) fn cancelled(path: &Path, action: &'static str) -> Self {
+        Self::io(path, action)(std::io::ErrorKind::Interrupted.into())
+    }
+
     /// The work ended because its [`Progress`](crate::Progress) said so.
     pub fn is_cancellation(&self) -> bool {
         matches!(self, Self::Io { source, .. } if source.kind() == std::io::ErrorKind::Interrupted)

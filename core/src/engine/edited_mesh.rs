@@ -4,7 +4,7 @@
 //! corner of the result. The result's records take the place of the input's.
 
 use crate::contract::report::FaceOrigin;
-use crate::engine::mesh::{Mesh, MeshView};
+use crate::engine::mesh::{Mesh, MeshError, MeshView};
 use crate::geometry::position::canonical;
 use crate::io::record::{self, Point, Record};
 use crate::output::edit::{Edit, Step};
@@ -39,7 +39,10 @@ struct Layout {
 impl EditedMesh {
     /// Of a mesh, its records and an edit of these. `positions` is how many positions the faces' corners have, if all of them are finite.
     /// O(vertices + faces + edit).
-    pub(crate) fn of(input: MeshView<'_>, records: &[Record], positions: Option<u64>, edit: &Edit) -> Self {
+    ///
+    /// # Errors
+    /// [`MeshError::TooManyVertices`].
+    pub(crate) fn of(input: MeshView<'_>, records: &[Record], positions: Option<u64>, edit: &Edit) -> Result<Self, MeshError> {
         let count = edit.output_records(records.len()) as usize;
         let mut numbers = Numbers::of(input, positions, edit.new_records().map(record::corners));
         let (mut faces, mut origins) = (Vec::with_capacity(count), Vec::with_capacity(count));
@@ -80,7 +83,9 @@ impl EditedMesh {
         });
         let Ok(()) = walked;
         let has_negative_zeros = input.vertices().as_flattened().iter().any(|x| *x == 0.0 && x.is_sign_negative());
-        Self { mesh: Mesh::of_parts(numbers.vertices, faces), origins, layout, has_negative_zeros }
+        let vertices = numbers.vertices.len();
+        u32::try_from(vertices).map_err(|_| MeshError::TooManyVertices { vertices })?;
+        Ok(Self { mesh: Mesh::of_parts(numbers.vertices, faces), origins, layout, has_negative_zeros })
     }
 
     /// Makes the input's records those of the result: what [`MeshView::records`] makes of the mesh.

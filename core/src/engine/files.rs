@@ -29,6 +29,7 @@ use crate::output::incremental;
 use crate::output::readback::Expectation;
 use crate::repairs::{self, Steps};
 use crate::stream::members;
+use crate::topology::survey::Survey;
 use crate::util::parallel;
 
 /// Fewer bytes are hashed by one thread: starting more would take longer.
@@ -109,10 +110,7 @@ fn mend(
     let expected = if same { None } else { expectation(mesh.records(), &edit, survey.irregular_triangles.len() as u64, limits) };
     let emit = || draft.finish(&if same { Content::Input } else { Content::Edited(&edit) });
     // What the file will hold is looked at while it is written. It counts when the file was read back and does hold that.
-    let look = || {
-        let looked = expected.as_ref().and_then(|expected| incremental::look(survey, &expected.difference));
-        looked.map(|(survey, submesh)| Diagnosis::count(survey, submesh, profile).defects)
-    };
+    let look = || second_look(survey, expected.as_ref(), profile);
     let threads = if mesh.bytes().len() < HASHED_BY_ONE { 1 } else { limits.threads };
     let (written, looked) = parallel::both(threads, emit, look);
     let (written, mut digest) = written?;
@@ -154,6 +152,12 @@ pub(crate) fn expectation<'e>(
     let is_worthwhile = incremental::is_worthwhile(gone, added, records.len())
         && incremental::bytes(irregular_triangles, gone + added) <= limits.memory_bytes;
     is_worthwhile.then(|| Expectation::of(records, edit))
+}
+
+/// The defects of what is expected, by the survey of the input and what differs from it; `None` if that does not tell.
+pub(crate) fn second_look(survey: Survey<'_>, expected: Option<&Expectation<'_>>, profile: &Profile) -> Option<Defects> {
+    let (survey, submesh) = incremental::look(survey, &expected?.difference)?;
+    Some(Diagnosis::count(survey, submesh, profile).defects)
 }
 
 /// What working out the topology of `records` spools.

@@ -11,12 +11,11 @@ use crate::engine::clock::Clock;
 use crate::engine::edited_mesh::EditedMesh;
 use crate::engine::files;
 use crate::engine::judging::{self, Input, Written};
-use crate::engine::mesh::{Mesh, MeshView};
+use crate::engine::mesh::{Mesh, MeshError, MeshView};
 use crate::io::disk_space;
 use crate::io::read::PREFIX_BYTES;
 use crate::io::record::Record;
 use crate::output::edit::Edit;
-use crate::output::incremental;
 use crate::repairs::{self, Steps};
 use crate::topology::survey::Survey;
 use crate::util::parallel;
@@ -135,7 +134,13 @@ pub(crate) fn repair(
         let origins = (0..faces as u32).map(FaceOrigin::Input).collect();
         return Ok(RepairedMesh { mesh: mesh.to_mesh(), origins, report: clock.close(report, Held::path(), faces)? });
     }
-    let (mut edited, looked) = emit(mesh, &held, survey, &edit, profile, limits, &mut report.input.blake3);
+    let (edited, (blake3, looked)) = emit(mesh, &held, survey, &edit, profile, limits);
+    report.input.blake3 = blake3;
+    let mut edited = edited.map_err(|error| Error::Refused {
+        path: NAME.into(),
+        reason: error.to_string(),
+        advice: "divide the mesh".into(),
+    })?;
     clock.stage("emit");
     let Held { mut records } = held;
     edited.apply(&mut records);
@@ -151,7 +156,7 @@ pub(crate) fn repair(
     Ok(RepairedMesh { mesh, origins, report: clock.close(report, Held::path(), faces)? })
 }
 
-/// The mesh as `edit` leaves it, and side by side with it the second look at its defects, if that tells, and the hash of the input.
+/// The mesh as `edit` leaves it; side by side with that, the hash of the input, and what the second look finds, if that tells.
 fn emit(
     mesh: MeshView<'_>,
     held: &Held,
@@ -159,16 +164,14 @@ fn emit(
     edit: &Edit,
     profile: &Profile,
     limits: &Limits,
-    blake3: &mut String,
-) -> (EditedMesh, Option<Defects>) {
+) -> (std::result::Result<EditedMesh, MeshError>, (String, Option<Defects>)) {
     let expected = files::expectation(&held.records, edit, survey.irregular_triangles.len() as u64, limits);
     let bytes = held.records.as_flattened();
     let threads = if bytes.len() < files::HASHED_BY_ONE { 1 } else { limits.threads };
     let positions = survey.nonfinite.is_empty().then_some(survey.vertices);
     let look = || {
-        *blake3 = files::hash_of(bytes, &Limits { threads: 1, ..limits.clone() });
-        let looked = expected.as_ref().and_then(|expected| incremental::look(survey, &expected.difference));
-        looked.map(|(survey, submesh)| Diagnosis::count(survey, submesh, profile).defects)
+        let blake3 = files::hash_of(bytes, &Limits { threads: 1, ..limits.clone() });
+        (blake3, files::second_look(survey, expected.as_ref(), profile))
     };
     parallel::both(threads, || EditedMesh::of(mesh, &held.records, positions, edit), look)
 }

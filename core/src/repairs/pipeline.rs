@@ -177,7 +177,7 @@ fn carry_out(repair: &Repair, cx: &mut Context<'_, '_>) -> Result<u64> {
     let span = tracing::debug_span!("repair", name = repair.name.as_str()).entered();
     let start = Instant::now();
     let go_on = |cx: &Context<'_, '_>| match cx.progress.cancelled() {
-        true => Err(Error::io(cx.path, repair.name.as_str())(std::io::ErrorKind::Interrupted.into())),
+        true => Err(Error::cancelled(cx.path, repair.name.as_str())),
         false => Ok(()),
     };
     go_on(cx)?;

@@ -113,7 +113,7 @@ impl Solving<'_, '_> {
     /// Refuses what the chunks found to be too much to keep.
     fn check(&self, found: Found) -> Result<()> {
         if self.progress.cancelled() {
-            return Err(Error::io(self.path, STAGE)(std::io::ErrorKind::Interrupted.into()));
+            return Err(Error::cancelled(self.path, STAGE));
         }
         let [irregular_triangles, pieces] = [found.irregular_triangles, found.regions].map(AtomicU64::into_inner);
         self.budget.check(self.path, || {

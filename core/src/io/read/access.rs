@@ -72,7 +72,7 @@ impl Foreign<'_> {
             done += step;
             self.progress.at("read", done, length);
             if self.progress.cancelled() {
-                return Err(Error::io(self.path, "reading")(io::ErrorKind::Interrupted.into()));
+                return Err(Error::cancelled(self.path, "reading"));
             }
         }
         behind.finish().map_err(Error::io(self.spool, "spooling"))?;

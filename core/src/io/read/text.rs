@@ -71,7 +71,7 @@ pub(super) fn read(text: &[u8], start: usize, context: &Context<'_>) -> Result<P
         }
         context.progress.at("read", windows.at as u64, text.len() as u64);
         if context.progress.cancelled() {
-            return Err(Error::io(context.path, "reading")(std::io::ErrorKind::Interrupted.into()));
+            return Err(Error::cancelled(context.path, "reading"));
         }
     }
     judge(&tally, spool.records).map_err(reject)?;

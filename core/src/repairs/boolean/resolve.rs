@@ -210,10 +210,7 @@ fn attempt_until_done(mut state: State<'_, '_, '_>, by: &Attempt<'_>, means: &Me
                 });
             }
             Err(Halted::NoMemory { needed, triangles }) => return Err(refused(means, needed, triangles)),
-            Err(Halted::Cancelled) => {
-                let action = RepairName::SelfIntersection.as_str();
-                return Err(Error::io(means.path, action)(std::io::ErrorKind::Interrupted.into()));
-            }
+            Err(Halted::Cancelled) => return Err(Error::cancelled(means.path, RepairName::SelfIntersection.as_str())),
             Err(Halted::Stuck(stuck)) => failed.learn(&mut state, stuck),
         }
     }

@@ -6,6 +6,15 @@ use crate::contract::report::{Defects, Region, SheetDropped, Volumes, Wrap};
 use crate::contract::settings::Profile;
 use crate::geometry::sums::Bounds;
 
+/// What the repairs know and a person would want to, beside what can be counted in the result.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Evidence {
+    /// What lay in the material of others.
+    pub(crate) enclosed: Enclosed,
+    /// Guesses that may be wrong, each a line for people.
+    pub(crate) doubts: Vec<String>,
+}
+
 /// Bodies that lay in the material of others.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Enclosed {

@@ -11,7 +11,7 @@ use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::report::{Defects, FileFacts, Report, Task};
 use crate::contract::settings::{Limits, Profile, folder_of};
-use crate::detect::review::Enclosed;
+use crate::detect::review::Evidence;
 use crate::diagnosis::Diagnosis;
 use crate::engine::clock::Clock;
 use crate::engine::judging::{self, Input, Written};
@@ -102,7 +102,7 @@ fn mend(
     if repaired.is_some() {
         clock.stage("repair");
     }
-    let (edit, enclosed) = repaired.unwrap_or_default();
+    let (edit, evidence) = repaired.unwrap_or_default();
     // Of the input's survey, the second look may go on; the memory of its submesh is needed for that of the output.
     let survey = diagnosis.into_survey();
     // Good as it came, or nothing in it could be repaired.
@@ -128,7 +128,7 @@ fn mend(
         verify(
             &mut report,
             mesh,
-            (&surface, &enclosed),
+            (&surface, &evidence),
             expected.map(|expected| (expected, digest, looked)),
             output,
             limits,
@@ -185,7 +185,7 @@ fn confirm_copy(report: &mut Report, input: &MeshFile, output: &Path, limits: &L
 fn verify(
     report: &mut Report,
     input: &MeshFile,
-    (surface, enclosed): (&Bounds, &Enclosed),
+    (surface, evidence): (&Bounds, &Evidence),
     known: Option<(Expectation<'_>, Digest, Option<Defects>)>,
     output: &Path,
     limits: &Limits,
@@ -202,7 +202,7 @@ fn verify(
     let (blake3, defects) = look_again(known, &written, &report.profile, limits, progress)?;
     let facts = facts(&written, blake3);
     let written = Written { facts, findings: written.findings(), defects };
-    judging::conclude(report, input.findings(), (surface, enclosed), written);
+    judging::conclude(report, input.findings(), (surface, evidence), written);
     Ok(())
 }
 

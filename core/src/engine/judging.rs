@@ -10,7 +10,7 @@ use crate::contract::report::{
 use crate::contract::settings::{Bodies, Limits, Profile};
 use crate::detect::certificate;
 use crate::detect::review;
-use crate::detect::review::Enclosed;
+use crate::detect::review::Evidence;
 use crate::detect::rules::Subject;
 use crate::detect::verdict;
 use crate::diagnosis::Diagnosis;
@@ -72,8 +72,8 @@ pub(crate) fn conclude_unchanged(report: &mut Report, facts: &FileFacts, finding
     report.certificate = Some(certify(facts, &report.before, &flaws(findings)));
 }
 
-/// Repairs what was diagnosed by these steps, if there is anything to be repaired: what is to be edited, and what lay in the material of
-/// others. `None`: it is good as it is.
+/// Repairs what was diagnosed by these steps, if there is anything to be repaired: what is to be edited, and what a
+/// review needs to know. `None`: it is good as it is.
 pub(crate) fn repair_diagnosed(
     diagnosis: &mut Diagnosis<'_>,
     steps: Steps,
@@ -81,7 +81,7 @@ pub(crate) fn repair_diagnosed(
     report: &mut Report,
     (profile, limits): (&Profile, &Limits),
     progress: &dyn Progress,
-) -> Result<Option<(Edit, Enclosed)>> {
+) -> Result<Option<(Edit, Evidence)>> {
     // What lies in the material of others, or cannot be seen, makes a file no less printable, but it does not belong there.
     let holds_more = match profile.bodies {
         Bodies::Union => report.before.nested_positive > 0,
@@ -97,8 +97,8 @@ pub(crate) fn repair_diagnosed(
     Ok(Some((edit, take_account(report, repaired))))
 }
 
-/// Puts into the report what was done; what lay in the material of others is needed for the verdict.
-fn take_account(report: &mut Report, repaired: Repaired) -> Enclosed {
+/// Puts into the report what was done; returns what else the verdict needs.
+fn take_account(report: &mut Report, repaired: Repaired) -> Evidence {
     let Repaired { mut account, regions, .. } = repaired;
     report.repairs = account.repairs();
     report.loops = account.loops.unwrap_or_default();
@@ -108,7 +108,7 @@ fn take_account(report: &mut Report, repaired: Repaired) -> Enclosed {
     report.volume_meant = account.enclosed.meant;
     report.volumes = account.volumes;
     report.regions = regions;
-    account.enclosed
+    Evidence { enclosed: account.enclosed, doubts: account.doubts }
 }
 
 /// Ends the report of a mesh from which nothing was left.
@@ -125,15 +125,15 @@ pub(crate) struct Written<'a> {
     pub(crate) defects: Defects,
 }
 
-/// Ends the report of a repair by a verdict on what came of it, against the box of the input's surface and the bodies in it that lay in
-/// others.
-pub(crate) fn conclude(report: &mut Report, input: &[Finding], (surface, enclosed): (&Bounds, &Enclosed), written: Written<'_>) {
+/// Ends the report of a repair by a verdict on what came of it, against the box of the input's surface and what the repairs know.
+pub(crate) fn conclude(report: &mut Report, input: &[Finding], (surface, evidence): (&Bounds, &Evidence), written: Written<'_>) {
     let Written { facts, findings, defects } = written;
     let flaws = flaws(findings);
     report.verdict = verdict::judge(&defects, &flaws).under(report.profile.guarantee);
     report.outcome = if report.verdict.good { Outcome::Repaired } else { Outcome::NotGood };
     if report.verdict.good {
-        let mut concerns = review::counts(&report.before, surface, enclosed, &defects, &report.profile);
+        let mut concerns = review::counts(&report.before, surface, &evidence.enclosed, &defects, &report.profile);
+        concerns.extend_from_slice(&evidence.doubts);
         concerns.extend(report.volumes.iter().flat_map(|volumes| review::volumes(volumes, &report.profile)));
         concerns.extend(review::sheets(&report.before, &report.sheets_dropped, &report.profile));
         concerns.extend(review::wraps(&report.wraps, &report.profile));

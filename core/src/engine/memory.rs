@@ -119,7 +119,7 @@ pub(crate) fn repair(
     let mut report = judging::begin(Task::Repair, &input, &diagnosis, profile, limits);
     let repaired = judging::repair_diagnosed(&mut diagnosis, steps, &input, &mut report, (profile, limits), progress)?;
     clock.stage("repair");
-    let (edit, enclosed) = repaired.unwrap_or_default();
+    let (edit, evidence) = repaired.unwrap_or_default();
     let survey = diagnosis.into_survey();
     report.edit = edit.summary(held.records.len());
     report.edit_records = limits.list_edit.then(|| edit.listed());
@@ -149,7 +149,7 @@ pub(crate) fn repair(
     } else {
         let defects = judged(looked, &records, profile, limits, progress)?;
         let facts = facts(&records, files::hash_of(records.as_flattened(), limits));
-        judging::conclude(&mut report, &[], (&surface, &enclosed), Written { facts, findings: &[], defects });
+        judging::conclude(&mut report, &[], (&surface, &evidence), Written { facts, findings: &[], defects });
     }
     clock.stage("verify");
     let EditedMesh { mesh, origins, .. } = edited;

@@ -14,6 +14,8 @@ pub(crate) struct Account {
     pub(crate) sheets: Vec<SheetDropped>,
     /// What lay in the material of others, and is gone.
     pub(crate) enclosed: Enclosed,
+    /// Guesses of repairs that a person must look at, each a line that names the guess, its place and its size. A good result with any needs review.
+    pub(crate) doubts: Vec<String>,
     /// What was replaced because nothing else made it a solid, or would have been.
     pub(crate) wraps: Vec<Wrap>,
     /// What became of the volume of bodies; `None` where nothing was done that might have lost any.

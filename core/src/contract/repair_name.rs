@@ -13,6 +13,8 @@ pub enum RepairName {
     Degenerate,
     /// Triangles on the vertices of another triangle were removed.
     Duplicate,
+    /// Walls that bodies had in common were removed: these bodies are one body now.
+    CommonWall,
     /// Surface that lay on other surface, facing the same way, was removed.
     #[serde(alias = "lap")]
     Overlap,
@@ -65,9 +67,10 @@ pub enum RepairName {
 
 impl RepairName {
     /// Every kind, in the order of the pipeline.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::Degenerate,
         Self::Duplicate,
+        Self::CommonWall,
         Self::Overlap,
         Self::Surplus,
         Self::ToleranceWeld,
@@ -95,6 +98,7 @@ impl RepairName {
         match self {
             Self::Degenerate => "degenerate",
             Self::Duplicate => "duplicate",
+            Self::CommonWall => "common_wall",
             Self::Overlap => "overlap",
             Self::Surplus => "surplus",
             Self::ToleranceWeld => "tolerance_weld",

@@ -226,6 +226,37 @@ pub(crate) fn obstructed(
     met.into_iter().map(AtomicBool::into_inner).collect()
 }
 
+/// Which points surface lies around: in at least four of the six directions along the axes, a ray leaves surface more often than it enters, or
+/// the other way. Neither holes nor a few turned triangles change much of that. O(triangles under rays), and reads the chunks of the
+/// file that the rays may meet, six times.
+pub(crate) fn are_surrounded(survey: &Survey<'_>, submesh: &Submesh, points: &[[f64; 3]]) -> Vec<bool> {
+    let mut votes = vec![0; points.len()];
+    if points.is_empty() {
+        return Vec::new();
+    }
+    for (axis, backward) in (0..3).flat_map(|axis| [(axis, false), (axis, true)]) {
+        let direction = Direction { axis, backward };
+        let rays: Vec<Ray> = points.iter().map(|p| Ray { from: direction.upright(*p), candidates: vec![0] }).collect();
+        let grid = Grid::new(&rays);
+        let upright = |corners: &[[f32; 3]; 3]| corners.map(|p| direction.upright(p));
+        let mut windings = vec![0; points.len()];
+        let per_chunk = survey.visit_regular(
+            |_| true,
+            |reach| Over::new(&rays, &grid, &direction.upright_box(reach)).map(|over| (over, Vec::new())),
+            |(over, _), corners| over.may_meet(&grid, &upright(corners)),
+            |(_, hits): &mut (Over, Vec<(u32, i32)>), triangle, _| {
+                let corners = record::corners(&survey.records[triangle as usize]);
+                grid.cross(&rays, &upright(&corners), 0, &mut |at, w| hits.push((at, w)));
+            },
+        );
+        per_chunk.into_iter().flat_map(|(_, hits)| hits).for_each(|(at, w)| windings[at as usize] += w);
+        let mut cross = |t| grid.cross(&rays, &upright(&submesh.points(t)), 0, &mut |at, w| windings[at as usize] += w);
+        submesh.living().for_each(&mut cross);
+        votes.iter_mut().zip(&windings).for_each(|(vote, w)| *vote += i32::from(*w != 0));
+    }
+    votes.into_iter().map(|votes| votes >= 4).collect()
+}
+
 /// The components asked about whose boxes lie in closed ones', ascending, and a ray for each.
 fn rays(survey: &Survey<'_>, submesh: &Submesh, list: &[Component], asks: impl Fn(&Component) -> bool) -> (Vec<u32>, Vec<Ray>) {
     if list.len() < 2 || list.iter().all(|c| c.open) {

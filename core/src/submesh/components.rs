@@ -64,7 +64,7 @@ pub(crate) enum Through<'a> {
 
 impl Through<'_> {
     /// Does a component reach through this edge to this triangle?
-    fn reaches(self, edge: &Edge<'_>, triangle: u32) -> bool {
+    pub(crate) fn reaches(self, edge: &Edge<'_>, triangle: u32) -> bool {
         match self {
             Self::EveryEdge => true,
             Self::ManifoldEdges => !edge.is_nonmanifold(),

@@ -1,22 +1,31 @@
 //! Triangles with a repeated vertex, and several triangles on the same three vertices.
 //!
-//! Of copies in one direction the first stays, unless the surface is closed only with all of them. Where both directions occur, it is a question of what they are part of:
-//! a triangle doubled back to back in an otherwise regular surface (one of them fits its neighbours: it stays), a wall of no
-//! thickness inside a body (the surface closes without it: all go), a surface exported with both sides (one side stays and is
-//! turned later), or two triangles on their own (nothing is enclosed: both go).
+//! Of copies in one direction the first stays, unless the surface is closed only with all of them. Of triangles in both directions
+//! [`back_to_back`] says which go.
 
 use crate::contract::report::RepairName;
+use crate::contract::settings::Bodies;
 use crate::detect::defects::{by_vertex_set, same_direction};
+use crate::repairs::cleanup::back_to_back::{self, Pair};
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::{Pass, Work};
 use crate::submesh::edges::Edges;
 use crate::submesh::{Submesh, Vertex};
+use crate::topology::survey::Survey;
 
 /// Copies of triangles.
 pub(crate) const DUPLICATE: Repair = Repair {
     name: RepairName::Duplicate,
     changes: Changes::Surface,
-    run: |cx| Ok(Done::count(drop_duplicates(&mut cx.work), "triangles on the vertices of another one")),
+    run: |cx| {
+        let dropped = drop_duplicates(cx.survey, &mut cx.work, cx.profile.bodies);
+        let note = "triangles of walls that bodies had in common removed: these bodies are one body now";
+        cx.account.add(RepairName::CommonWall, dropped.walls, note.into(), 0.0);
+        Ok(Done {
+            changed: dropped.all > 0,
+            ..Done::count(dropped.all - dropped.walls, "triangles on the vertices of another one")
+        })
+    },
 };
 
 /// Removes triangles with a repeated vertex. Their edges cancel out, so nothing opens.
@@ -31,35 +40,22 @@ pub(crate) fn drop_repeated(work: &mut Work<'_>) -> u64 {
     doomed.len() as u64
 }
 
-/// Triangles on one vertex set in both directions.
-struct Pair {
-    forward: Vec<u32>,
-    backward: Vec<u32>,
-    /// Triangles around that need a forward one here, less those that need a backward one.
-    votes: i64,
+/// How many triangles were removed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Dropped {
+    pub(crate) all: u64,
+    /// Of these, walls that two bodies had in common: the bodies are one now.
+    pub(crate) walls: u64,
 }
 
-/// What a connected set of pairs is part of.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Place {
-    /// Alone on its three vertices.
-    Alone,
-    /// A surface with both sides.
-    TwoSided,
-    /// A wall inside a body.
-    Wall,
-    /// Some neighbour needs one side.
-    Needed,
-}
-
-/// Removes surplus triangles on the same three vertices; returns how many.
-pub(crate) fn drop_duplicates(work: &mut Work<'_>) -> u64 {
+/// Removes surplus triangles on the same three vertices. `bodies`: whether walls that bodies have in common may go.
+pub(crate) fn drop_duplicates(survey: &Survey<'_>, work: &mut Work<'_>, bodies: Bodies) -> Dropped {
     // Afterwards no two are on the same vertices, and only a new vertex makes another copy.
     let candidates = match work.changed_for(Pass::Copies) {
         None => by_vertex_set(work),
         Some(changed) => copies_of(work, &changed),
     };
-    let (mut copies, mut doomed) = (Vec::new(), Vec::new());
+    let mut copies = Vec::new();
     let mut pairs: Vec<Pair> = Vec::new();
     for group in candidates.chunk_by(|a, b| a.0 == b.0).filter(|g| g.len() > 1) {
         let first = work.triangles[group[0].1 as usize].v;
@@ -68,16 +64,22 @@ pub(crate) fn drop_duplicates(work: &mut Work<'_>) -> u64 {
         if backward.is_empty() {
             copies.extend(&forward[1..]);
         } else {
-            pairs.push(Pair { forward, backward, votes: 0 });
+            pairs.push(Pair { forward, backward });
         }
     }
-    if !pairs.is_empty() || !copies.is_empty() {
-        let (submesh, edges) = work.edges();
-        doomed.extend(sort_out(submesh, edges, &mut pairs));
-        doomed.extend(spare(submesh, edges, &copies));
+    if pairs.is_empty() && copies.is_empty() {
+        return Dropped::default();
+    }
+    let (submesh, edges) = work.edges();
+    let mut doomed = spare(submesh, edges, &copies);
+    let walls = back_to_back::surplus(survey, submesh, edges, &pairs, &doomed);
+    doomed.extend(&walls.sides);
+    if bodies != Bodies::Keep {
+        doomed.extend(&walls.common);
     }
     doomed.iter().for_each(|t| work.kill(*t));
-    doomed.len() as u64
+    let common = if bodies == Bodies::Keep { 0 } else { walls.common.len() as u64 };
+    Dropped { all: doomed.len() as u64, walls: common }
 }
 
 /// As [`by_vertex_set`], of all triangles on the vertices of a changed one. O(stars of the changed ones); of a triangle's three stars
@@ -134,68 +136,21 @@ fn spare(submesh: &Submesh, edges: &Edges, copies: &[u32]) -> Vec<u32> {
         .collect()
 }
 
-fn sort_out(submesh: &Submesh, edges: &Edges, pairs: &mut [Pair]) -> Vec<u32> {
-    let mut pair_of = vec![crate::util::ids::NONE; submesh.triangles.len()];
-    for (i, pair) in pairs.iter().enumerate() {
-        pair.forward.iter().chain(&pair.backward).for_each(|t| pair_of[*t as usize] = i as u32);
-    }
-    let mut parents: Vec<u32> = (0..pairs.len() as u32).collect();
-    let mut places = vec![Place::Alone; pairs.len()];
-    for i in 0..pairs.len() {
-        let v = submesh.triangles[pairs[i].forward[0] as usize].v;
-        for k in 0..3 {
-            let (a, b) = (v[k], v[(k + 1) % 3]);
-            let Some(edge) = edges.between(a, b) else { continue };
-            let (mut along, mut against) = (0i64, 0i64);
-            for used in edge.uses {
-                match pair_of[used.triangle as usize] {
-                    crate::util::ids::NONE if edge.directed(used) == (a, b) => along += 1,
-                    crate::util::ids::NONE => against += 1,
-                    other if other != i as u32 => {
-                        places[i] = places[i].max(Place::TwoSided);
-                        crate::util::union_find::unite(&mut parents, i as u32, other);
-                    }
-                    _ => {}
-                }
-            }
-            pairs[i].votes += against - along;
-            if along != against {
-                places[i] = Place::Needed;
-            } else if along > 0 {
-                places[i] = places[i].max(Place::Wall);
-            }
-        }
-    }
-    let roots: Vec<usize> = (0..pairs.len() as u32).map(|i| crate::util::union_find::find(&mut parents, i) as usize).collect();
-    for i in 0..pairs.len() {
-        places[roots[i]] = places[roots[i]].max(places[i]);
-    }
-    pairs.iter().enumerate().flat_map(|(i, pair)| surplus_of(pair, places[roots[i]])).collect()
-}
-
-/// What has to go of a pair in a set of this place.
-fn surplus_of(pair: &Pair, place: Place) -> Vec<u32> {
-    let all = || pair.forward.iter().chain(&pair.backward).copied();
-    let stays = match place {
-        Place::Alone | Place::Wall => None,
-        Place::TwoSided => all().min(),
-        Place::Needed if pair.votes > 0 => Some(pair.forward[0]),
-        Place::Needed if pair.votes < 0 => Some(pair.backward[0]),
-        Place::Needed => all().min(),
-    };
-    all().filter(|t| Some(*t) != stays).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnosis::Diagnosis;
     use crate::testing::{after, cube, cuboid, reversed};
+
+    fn dropped(d: &mut Diagnosis<'_>) -> u64 {
+        drop_duplicates(&d.survey, &mut Work::new(&mut d.submesh), Bodies::Union).all
+    }
 
     #[test]
     fn of_a_reversed_copy_the_one_that_fits_stays() {
         // The wrong one comes first: the order in the file does not decide.
         let doubled = [reversed(&cube()[..1]), cube()].concat();
-        let got = after(&doubled, |d, _| drop_duplicates(&mut Work::new(&mut d.submesh)));
+        let got = after(&doubled, |d, _| dropped(d));
         assert_eq!((got.result, got.untouched), (1, 12));
         assert!(got.verdict.good, "{:?}", got.verdict);
     }
@@ -204,7 +159,7 @@ mod tests {
     fn a_wall_of_no_thickness_inside_a_body_goes() {
         // Two cubes that touch: both have the face between them, in opposite directions.
         let cubes = [cube(), cuboid([1.0, 0.0, 0.0], [2.0, 1.0, 1.0])].concat();
-        let got = after(&cubes, |d, _| drop_duplicates(&mut Work::new(&mut d.submesh)));
+        let got = after(&cubes, |d, _| dropped(d));
         assert_eq!(got.result, 4);
         assert!(got.verdict.good && (got.defects.volume - 2.0).abs() < 1e-9, "{:?}", got.defects);
     }
@@ -212,7 +167,7 @@ mod tests {
     #[test]
     fn of_a_surface_with_both_sides_one_stays() {
         let both = [cube(), reversed(&cube())].concat();
-        let got = after(&both, |d, _| drop_duplicates(&mut Work::new(&mut d.submesh)));
+        let got = after(&both, |d, _| dropped(d));
         assert_eq!(got.result, 12);
         assert!(got.verdict.good, "{:?}", got.verdict);
     }
@@ -220,7 +175,7 @@ mod tests {
     #[test]
     fn two_triangles_on_their_own_enclose_nothing() {
         let alone = [&cube()[..1], &reversed(&cube()[..1])].concat();
-        let got = after(&alone, |d, _| drop_duplicates(&mut Work::new(&mut d.submesh)));
+        let got = after(&alone, |d, _| dropped(d));
         assert_eq!((got.result, got.defects.triangles), (2, 0));
     }
 
@@ -228,17 +183,17 @@ mod tests {
     fn what_two_bodies_have_in_common_stays_with_both() {
         // Two boxes with the same bottom, one of them higher.
         let both = [cube(), cuboid([0.0; 3], [1.0, 1.0, 2.0])].concat();
-        let got = after(&both, |d, _| drop_duplicates(&mut Work::new(&mut d.submesh)));
+        let got = after(&both, |d, _| dropped(d));
         assert_eq!((got.result, got.defects.boundary_edges, got.defects.unbalanced_edges), (0, 0, 0));
         // A triangle that stands there twice stays once.
-        let got = after(&[&both[..], &both[2..3]].concat(), |d, _| drop_duplicates(&mut Work::new(&mut d.submesh)));
+        let got = after(&[&both[..], &both[2..3]].concat(), |d, _| dropped(d));
         assert_eq!((got.result, got.defects.unbalanced_edges), (1, 0));
     }
 
     #[test]
     fn of_equal_copies_the_first_stays() {
         let twice = [cube(), cube()].concat();
-        let got = after(&twice, |d, _| drop_duplicates(&mut Work::new(&mut d.submesh)));
+        let got = after(&twice, |d, _| dropped(d));
         assert_eq!((got.result, got.untouched), (12, 12));
         assert!(got.verdict.good);
     }

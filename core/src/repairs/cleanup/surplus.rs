@@ -1,7 +1,8 @@
 //! Surplus surface at non-manifold edges.
 //!
 //! The surface is cut at its non-manifold edges into sheets. A sheet is surplus when the rest is balanced at all its non-manifold
-//! edges without it: a fin that hangs from a regular surface by one side, or a wall across a body. A sheet that uses a non-manifold edge an even number
+//! edges without it: a fin that hangs from a regular surface by one side, or a wall across a body. (At most of them, for a sheet that also ends
+//! where two triangles disagree: a wall across a body beside a hole.) A sheet that uses a non-manifold edge an even number
 //! of times, or that is open but encloses volume, is a touching body: it stays. The smallest area goes first, and the rest is judged
 //! anew. Where as many triangles run one way as the other (bodies that touch along an edge) nothing is surplus.
 
@@ -12,7 +13,7 @@ use glam::DVec3;
 use crate::repairs::shared::admission;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed, Through};
-use crate::submesh::edges::Edges;
+use crate::submesh::edges::{Edge, Edges};
 use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
@@ -54,11 +55,21 @@ struct Sheet {
 
 /// Removes surplus sheets; returns how many triangles.
 pub(crate) fn remove(survey: &Survey<'_>, work: &mut Work<'_>) -> u64 {
+    let removed = remove_of(survey, work, Through::ManifoldEdges);
+    let (_, edges) = work.edges();
+    if edges.any_nonmanifold() && edges.iter().any(|e| e.is_inconsistent()) {
+        return removed + remove_of(survey, work, Through::CoherentEdges);
+    }
+    removed
+}
+
+/// Removes surplus sheets that reach through these edges.
+fn remove_of(survey: &Survey<'_>, work: &mut Work<'_>, through: Through<'_>) -> u64 {
     let (submesh, edges) = work.edges();
     if !edges.any_nonmanifold() {
         return 0;
     }
-    let mut sheets = sheets(survey, submesh, edges);
+    let mut sheets = sheets(survey, submesh, edges, through);
     let mut order: Vec<usize> = (0..sheets.len()).filter(|s| !sheets[*s].anchored && !sheets[*s].seams.is_empty()).collect();
     order.sort_by_key(|s| (sheets[*s].area, sheets[*s].triangles.first().copied()));
     // Uses of each edge that are left, in either direction.
@@ -83,19 +94,25 @@ pub(crate) fn remove(survey: &Survey<'_>, work: &mut Work<'_>) -> u64 {
     removed
 }
 
-/// Is the surface closed at all the sheet's seams without it, and is something wrong with it there? `own`: its uses of them, sorted.
+/// Is the surface closed at the sheet's seams without it, and is something wrong with it there? `own`: its uses of them, sorted. Where only two
+/// triangles disagree, the surface may stay open, if it is closed at more of the others.
 fn is_surplus(free: bool, uses: &[[u32; 2]], own: &[(u32, bool)]) -> bool {
-    let mut wrong = free;
+    let (mut wrong, mut closed, mut open) = (free, 0, 0);
     for seam in own.chunk_by(|a, b| a.0 == b.0) {
         let [forward, backward] = uses[seam[0].0 as usize];
         let own_forward = seam.iter().filter(|s| s.1).count() as u32;
         let (left_forward, left_backward) = (forward - own_forward, backward - (seam.len() as u32 - own_forward));
+        if left_forward + left_backward == 1 && forward + backward == 2 {
+            open += 1;
+            continue;
+        }
         if left_forward != left_backward || left_forward == 0 || seam.len() % 2 == 0 {
             return false;
         }
+        closed += 1;
         wrong |= forward != backward;
     }
-    wrong
+    wrong && closed > open
 }
 
 /// Would the sheet enclose more than next to nothing, if its hole were closed to its middle? By the same measure as for rims ([`admission::THIN`]).
@@ -108,8 +125,8 @@ fn encloses(submesh: &Submesh, area: f64, sheet: &Sheet) -> bool {
     cones.sum::<f64>().abs() > admission::THIN * (area / 2.0).powf(1.5)
 }
 
-fn sheets(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges) -> Vec<Sheet> {
-    let parts = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::ManifoldEdges);
+fn sheets(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, through: Through<'_>) -> Vec<Sheet> {
+    let parts = Components::of(survey, submesh, edges, &Reversed::none(survey), through);
     let mut sheets: Vec<Sheet> = parts
         .list
         .iter()
@@ -133,7 +150,8 @@ fn sheets(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges) -> Vec<Sheet> {
             sheet.anchored |= submesh.triangles[t as usize].v.iter().filter(|v| !submesh.complete[**v as usize]).count() > 1;
         }
     }
-    for (edge, number) in edges.iter().zip(0..).filter(|(e, _)| e.is_nonmanifold()) {
+    let is_seam = |used: &Edge<'_>| used.uses.iter().any(|u| !through.reaches(used, u.triangle));
+    for (edge, number) in edges.iter().zip(0..).filter(|(e, _)| is_seam(e)) {
         for used in edge.uses {
             sheets[parts.of_triangle[used.triangle as usize] as usize].seams.push((number, used.forward));
         }
@@ -210,6 +228,32 @@ mod tests {
         // As many triangles run one way as the other: either could be kept, so neither goes.
         let got = removed(&[cube(), cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 1.0])].concat());
         assert_eq!((got.result, got.untouched), (0, 24));
+    }
+
+    /// Without one of the faces that the wall ends at, it looks like a part of the other half, turned.
+    #[test]
+    fn a_wall_across_a_box_beside_a_hole_goes() {
+        let (left, right) = (cube(), cuboid([1.0, 0.0, 0.0], [2.0, 1.0, 1.0]));
+        let wall = |t: &&Corners| t.iter().all(|p| p[0] == 1.0);
+        let bottom = |t: &&Corners| t.iter().all(|p| p[2] == 0.0);
+        let open: Vec<Corners> = left.iter().filter(|t| !bottom(t)).chain(right.iter().filter(|t| !wall(t))).copied().collect();
+        assert_eq!(open.len(), 20);
+        let got = removed(&open);
+        assert_eq!((got.result, got.defects.boundary_edges, got.defects.nonmanifold_edges), (2, 4, 0));
+    }
+
+    /// It is turned, and not surplus.
+    #[test]
+    fn a_turned_triangle_beside_a_fin_stays() {
+        for t in 0..12 {
+            let mut mesh = cube();
+            mesh[t].swap(0, 1);
+            mesh.push([[0.0; 3], [1.0, 0.0, 0.0], [0.5, -1.0, -1.0]]);
+            let got = removed(&mesh);
+            // At the fin's own edge, nobody knows which of three is wrong.
+            let at_the_fin = mesh[t].iter().filter(|p| p[1] == 0.0 && p[2] == 0.0).count() == 2;
+            assert_eq!(got.result, u64::from(!at_the_fin), "turned: {t}");
+        }
     }
 
     #[test]

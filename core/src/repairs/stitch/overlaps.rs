@@ -400,14 +400,14 @@ impl Cut {
                 doomed.iter().flat_map(|t| work.triangles[*t as usize].v).chain(moving.iter().copied()).collect();
             moving.sort_unstable();
             moving.dedup();
-            join(work, [&moving, staying], &Tolerance { weld: *reach, edge_share: tolerance.edge_share }, tolerance);
+            join(survey, work, [&moving, staying], &Tolerance { weld: *reach, edge_share: tolerance.edge_share }, tolerance);
         }
     }
 }
 
 /// Brings boundary vertices of one piece that lie within reach of where the other one ends, but farther than the weld and the splitting of
 /// edges would see, to a vertex there, or onto the edge.
-fn join(work: &mut Work<'_>, [moving, staying]: [&[Vertex]; 2], reach: &Tolerance, seen: &Tolerance) {
+fn join(survey: &Survey<'_>, work: &mut Work<'_>, [moving, staying]: [&[Vertex]; 2], reach: &Tolerance, seen: &Tolerance) {
     let (submesh, edges) = work.edges();
     let still: Vec<Vertex> = boundary_vertices(edges);
     let is_still = |v: &&Vertex| still.binary_search(v).is_ok();
@@ -458,7 +458,7 @@ fn join(work: &mut Work<'_>, [moving, staying]: [&[Vertex]; 2], reach: &Toleranc
         });
     }
     pairs.sort_unstable();
-    weld::weld_pairs(work, &pairs, reach.weld);
+    weld::weld_pairs(survey, work, &pairs, reach.weld);
 }
 
 /// Wider on all sides, rounded outward.

@@ -4,18 +4,20 @@
 //! A merge that would leave a new non-manifold edge is taken back.
 
 use crate::contract::report::RepairName;
+use crate::contract::settings::Bodies;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
 use crate::submesh::edges::Edges;
 use crate::submesh::near::{self, Tolerance};
 use crate::submesh::{Submesh, Vertex};
+use crate::topology::survey::Survey;
 
 /// Boundary vertices within the weld tolerance become one.
 pub(crate) const REPAIR: Repair = Repair {
     name: RepairName::ToleranceWeld,
     changes: Changes::Surface,
     run: |cx| {
-        let welded = weld(&mut cx.work, cx.tolerance);
+        let welded = weld(cx.survey, &mut cx.work, cx.tolerance);
         if welded.taken_back > 0 {
             tracing::info!(clusters = welded.taken_back, "Welds taken back, since they made an edge of more than two triangles.");
         }
@@ -35,14 +37,14 @@ pub(crate) struct Welded {
 const ATTEMPTS: usize = 4;
 
 /// Welds boundary vertices. O(n log n) in the boundary.
-pub(crate) fn weld(work: &mut Work<'_>, tolerance: &Tolerance) -> Welded {
+pub(crate) fn weld(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) -> Welded {
     let (submesh, edges) = work.edges();
     let pairs = near::close_pairs(submesh, edges, tolerance);
-    weld_pairs(work, &pairs, tolerance.weld)
+    weld_pairs(survey, work, &pairs, tolerance.weld)
 }
 
 /// Welds pairs of boundary vertices, smaller number first, sorted, which lie within `tolerance` of each other.
-pub(crate) fn weld_pairs(work: &mut Work<'_>, pairs: &[(Vertex, Vertex)], tolerance: f64) -> Welded {
+pub(crate) fn weld_pairs(survey: &Survey<'_>, work: &mut Work<'_>, pairs: &[(Vertex, Vertex)], tolerance: f64) -> Welded {
     let mut clusters = clusters(work, pairs, tolerance);
     let mut result = Welded::default();
     if clusters.is_empty() {
@@ -58,7 +60,7 @@ pub(crate) fn weld_pairs(work: &mut Work<'_>, pairs: &[(Vertex, Vertex)], tolera
         work.move_to(&target);
         crate::repairs::cleanup::duplicates::drop_repeated(work);
         work.relink();
-        crate::repairs::cleanup::duplicates::drop_duplicates(work);
+        crate::repairs::cleanup::duplicates::drop_duplicates(survey, work, Bodies::Union);
         let bad = newly_nonmanifold(work.edges().1, &edges, &clusters, &target);
         if !bad.iter().any(|b| *b) {
             result.vertices = clusters.iter().map(|c| c.len() as u64 - 1).sum();
@@ -160,7 +162,7 @@ mod tests {
         let soup: Vec<Corners> = cube().iter().zip(0u8..).flat_map(|(t, i)| shifted(&[*t], [f32::from(i) * 1e-6; 3])).collect();
         let got = after(&soup, |d, _| {
             assert_eq!(d.defects.vertices, 36);
-            weld(&mut Work::new(&mut d.submesh), &d.tolerance)
+            weld(&d.survey, &mut Work::new(&mut d.submesh), &d.tolerance)
         });
         assert_eq!((got.result.vertices, got.result.taken_back, got.defects.vertices), (28, 0, 8));
         assert!(got.verdict.good, "{:?}", got.verdict);
@@ -174,7 +176,8 @@ mod tests {
             [[x, 0.0, 0.0], [x, y, 1.0], [x, y, 9.0]]
         };
         let mesh = [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, -9.0, 0.0]], tip(1), tip(2), tip(3)];
-        let got = after(&mesh, |d, _| weld(&mut Work::new(&mut d.submesh), &Tolerance { weld: 1.0, edge_share: 0.25 }));
+        let got =
+            after(&mesh, |d, _| weld(&d.survey, &mut Work::new(&mut d.submesh), &Tolerance { weld: 1.0, edge_share: 0.25 }));
         // Four in a row, but not the fifth: both ends of the edge are left.
         assert_eq!(got.result.vertices, 3);
         assert_eq!((got.defects.triangles, got.defects.degenerate_index), (4, 0));
@@ -185,7 +188,7 @@ mod tests {
         let (a, b) = ([0.0; 3], [1.0, 0.0, 0.0]);
         let near = |p: [f32; 3]| [p[0], p[1], 1e-6];
         let mesh = [[a, b, [0.0, 1.0, 0.0]], [b, a, [0.0, -1.0, 0.0]], [near(a), near(b), [0.0, 0.0, 1.0]]];
-        let got = after(&mesh, |d, _| weld(&mut Work::new(&mut d.submesh), &d.tolerance));
+        let got = after(&mesh, |d, _| weld(&d.survey, &mut Work::new(&mut d.submesh), &d.tolerance));
         assert_eq!((got.result.vertices, got.result.taken_back), (0, 2));
         assert_eq!((got.defects.nonmanifold_edges, got.untouched), (0, 3));
     }

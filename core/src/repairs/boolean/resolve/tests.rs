@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 
-use crate::contract::settings::Bodies;
 use crate::geometry::sums::Bounds;
 use crate::repairs::boolean::meetings::meetings;
 use crate::repairs::boolean::rounds::BYTES_PER_PAIR;
@@ -17,7 +16,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::contract::progress::Quiet;
 use crate::contract::report::RegionMethod;
-use crate::contract::settings::Limits;
+use crate::contract::settings::{Bodies, Limits};
 use crate::geometry::arrange::Rational;
 use crate::repairs::cleanup::duplicates;
 use crate::testing::{After, Corners, after, cube, cuboid, diagnose, records, reversed, shifted};
@@ -25,7 +24,7 @@ use crate::testing::{After, Corners, after, cube, cuboid, diagnose, records, rev
 fn resolved_by(triangles: &[Corners], profile: &Profile) -> After<Resolved> {
     after(triangles, |d, turned| {
         let work = &mut Work::new(&mut d.submesh);
-        duplicates::drop_duplicates(work);
+        duplicates::drop_duplicates(&d.survey, work, Bodies::Union);
         let limits = Limits { threads: 1, ..Limits::default() };
         let means = Means { path: Path::new("test"), limits: &limits, progress: &Quiet };
         resolve(&Rational, &mut d.survey, work, turned, profile, false, &means).unwrap()

@@ -6,6 +6,8 @@
 //! of times, or that is open but encloses volume, is a touching body: it stays. The smallest area goes first, and the rest is judged
 //! anew. Where as many triangles run one way as the other (bodies that touch along an edge) nothing is surplus.
 
+use std::collections::BTreeSet;
+
 use crate::contract::report::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use glam::DVec3;
@@ -57,7 +59,7 @@ struct Sheet {
 pub(crate) fn remove(survey: &Survey<'_>, work: &mut Work<'_>) -> u64 {
     let removed = remove_of(survey, work, Through::ManifoldEdges);
     let (_, edges) = work.edges();
-    if edges.any_nonmanifold() && edges.iter().any(|e| e.is_inconsistent()) {
+    if edges.any_nonmanifold() && !beside_holes(edges).is_empty() {
         return removed + remove_of(survey, work, Through::CoherentEdges);
     }
     removed
@@ -80,12 +82,15 @@ fn remove_of(survey: &Survey<'_>, work: &mut Work<'_>, through: Through<'_>) -> 
             [forward, e.uses.len() as u32 - forward]
         })
         .collect();
+    let beside_holes = beside_holes(edges);
     let mut removed = 0;
     for s in order {
         let sheet = &mut sheets[s];
         sheet.seams.sort_unstable();
         let free = sheet.rim.1 > 0.0;
-        if is_surplus(free, &uses, &sheet.seams) && !(free && encloses(work, survey.measure.area_of(sheet.area), sheet)) {
+        if is_surplus(free, &uses, &sheet.seams, &beside_holes)
+            && !(free && encloses(work, survey.measure.area_of(sheet.area), sheet))
+        {
             sheet.seams.iter().for_each(|(e, forward)| uses[*e as usize][usize::from(!forward)] -= 1);
             sheet.triangles.iter().for_each(|t| work.kill(*t));
             removed += sheet.triangles.len() as u64;
@@ -94,15 +99,22 @@ fn remove_of(survey: &Survey<'_>, work: &mut Work<'_>, through: Through<'_>) -> 
     removed
 }
 
-/// Is the surface closed at the sheet's seams without it, and is something wrong with it there? `own`: its uses of them, sorted. Where only two
-/// triangles disagree, the surface may stay open, if it is closed at more of the others.
-fn is_surplus(free: bool, uses: &[[u32; 2]], own: &[(u32, bool)]) -> bool {
+/// The edges of two triangles that disagree, with a boundary edge at either end.
+fn beside_holes(edges: &Edges) -> BTreeSet<u32> {
+    let on_rim: BTreeSet<Vertex> = edges.iter().filter(|e| e.is_boundary()).flat_map(|e| [e.low, e.high]).collect();
+    let is_beside = |e: &Edge<'_>| e.is_inconsistent() && on_rim.contains(&e.low) && on_rim.contains(&e.high);
+    edges.iter().zip(0..).filter(|(e, _)| is_beside(e)).map(|(_, number)| number).collect()
+}
+
+/// Is the surface closed at the sheet's seams without it, and is something wrong with it there? `own`: its uses of them, sorted. Beside a hole
+/// the surface may stay open, if it is closed at more of the others.
+fn is_surplus(free: bool, uses: &[[u32; 2]], own: &[(u32, bool)], beside_holes: &BTreeSet<u32>) -> bool {
     let (mut wrong, mut closed, mut open) = (free, 0, 0);
     for seam in own.chunk_by(|a, b| a.0 == b.0) {
         let [forward, backward] = uses[seam[0].0 as usize];
         let own_forward = seam.iter().filter(|s| s.1).count() as u32;
         let (left_forward, left_backward) = (forward - own_forward, backward - (seam.len() as u32 - own_forward));
-        if left_forward + left_backward == 1 && forward + backward == 2 {
+        if left_forward + left_backward == 1 && beside_holes.contains(&seam[0].0) {
             open += 1;
             continue;
         }

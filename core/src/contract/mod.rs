@@ -17,3 +17,4 @@ pub(crate) mod ranges;
 pub(crate) mod repair_name;
 pub mod report;
 pub mod settings;
+pub(crate) mod skin;

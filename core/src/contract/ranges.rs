@@ -56,7 +56,7 @@ impl Profile {
     }
 
     /// Every setting that is not a whole number or a choice, with its range. All fields are named, so that a new one cannot be forgotten here.
-    fn numbers(&self) -> [(&'static str, f64, Range); 16] {
+    fn numbers(&self) -> [(&'static str, f64, Range); 19] {
         let Self {
             name: _,
             weld_relative,
@@ -68,6 +68,9 @@ impl Profile {
             max_volume_change,
             max_area_change,
             max_box_change_relative,
+            skin_reach_relative,
+            max_skin_lost,
+            max_skin_invented,
             debris_area_share,
             max_sheets_share,
             stack_gap_relative,
@@ -101,6 +104,9 @@ impl Profile {
             ("max_volume_change", *max_volume_change, Range::Bound),
             ("max_area_change", *max_area_change, Range::Bound),
             ("max_box_change_relative", *max_box_change_relative, Range::Bound),
+            ("skin_reach_relative", *skin_reach_relative, Range::Share),
+            ("max_skin_lost", *max_skin_lost, Range::Share),
+            ("max_skin_invented", *max_skin_invented, Range::Share),
             ("debris_area_share", *debris_area_share, Range::Share),
             ("max_sheets_share", *max_sheets_share, Range::Share),
             ("stack_gap_relative", *stack_gap_relative, Range::Share),

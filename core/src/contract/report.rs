@@ -4,6 +4,7 @@ pub use crate::contract::edit_report::{EditRecords, EditSummary, FaceOrigin};
 pub use crate::contract::judgement::{Certificate, RuleOutcome, RuleResult, Verdict};
 pub use crate::contract::loop_class::LoopClass;
 pub use crate::contract::repair_name::RepairName;
+pub use crate::contract::skin::{Skin, SkinCause, SkinChange, SkinPlace};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize, Serializer};
@@ -63,6 +64,9 @@ pub struct Report {
     /// What became of the volume of bodies; `None` where nothing was done that might have lost any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub volumes: Option<Volumes>,
+    /// What was done to the surface that can be seen; `None` where nothing was repaired, or the profile's reach is 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub skin: Option<Skin>,
     /// Where something was cut, moved, replaced, dropped or left, and how far surface moved there.
     #[serde(default, skip_serializing_if = "Regions::is_empty")]
     pub regions: Regions,

@@ -49,6 +49,13 @@ pub struct Profile {
     /// Largest growth or shrinkage of the bounding box on any side, as a fraction of the diagonal. (Triangles without area do not
     /// count; a fin that stood out does.)
     pub max_box_change_relative: f64,
+    /// Surface that moves no farther than this fraction of the diagonal counts as neither lost nor invented. 0: the skin is not measured.
+    pub skin_reach_relative: f64,
+    /// Largest share of the surface that could be seen from outside and is lost; beyond it the result needs review.
+    pub max_skin_lost: f64,
+    /// Largest share of the surface that can be seen and that nothing in the file stood for, flat or small patches left out; beyond it the result
+    /// needs review.
+    pub max_skin_invented: f64,
     /// Bodies (components that enclose volume) the repair may lose without review.
     pub max_bodies_lost: u32,
     /// Components of fewer triangles than this that stay open after weld and splits are dropped as debris (0: never) ...
@@ -159,6 +166,9 @@ impl Default for Profile {
             max_volume_change: 0.25,
             max_area_change: 1.0,
             max_box_change_relative: 0.02,
+            skin_reach_relative: 0.005,
+            max_skin_lost: 0.001,
+            max_skin_invented: 0.01,
             max_bodies_lost: 0,
             debris_triangles: 4,
             debris_area_share: 1e-3,

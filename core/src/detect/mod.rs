@@ -2,7 +2,8 @@
 //!
 //! **In:** a survey and a submesh.
 //! **Out:** counts of defects ([`defects`]), bodies and what lies in what ([`bodies`]), boundary loops by class ([`holes`]); the rules of a
-//! printable file, and what they say of this one ([`rules`], [`verdict`], [`certificate`]); what a person should look at ([`review`]).
+//! printable file, and what they say of this one ([`rules`], [`verdict`], [`certificate`]); what became of the surface that can be
+//! seen ([`skin`]); what a person should look at ([`review`]).
 //! **Promise:** nothing is changed. What was not looked at is called unchecked, and is never certified. Verdict and certificate come from
 //! one table.
 
@@ -15,4 +16,5 @@ pub(crate) mod fresh;
 pub(crate) mod holes;
 pub(crate) mod review;
 pub(crate) mod rules;
+pub(crate) mod skin;
 pub(crate) mod verdict;

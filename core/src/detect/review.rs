@@ -2,7 +2,7 @@
 //!
 //! Each function returns its concerns as lines for people; none means that nobody need look. `core/REPORT.md` has the limits.
 
-use crate::contract::report::{Defects, Region, SheetDropped, Volumes, Wrap};
+use crate::contract::report::{Defects, Region, SheetDropped, Skin, SkinChange, Volumes, Wrap};
 use crate::contract::settings::Profile;
 use crate::geometry::sums::Bounds;
 
@@ -100,6 +100,23 @@ pub(crate) fn volumes(volumes: &Volumes, profile: &Profile) -> Vec<String> {
         concerns.push(format!("about {share:.1} % of what the bodies enclosed is outside of the result"));
     }
     concerns
+}
+
+/// What was done to the surface that can be seen beyond the profile's limits, in words.
+pub(crate) fn skin(skin: &Skin, profile: &Profile) -> Vec<String> {
+    let words = |change: &SkinChange, what: &str, from: &str, most: f64| {
+        let place = change.places.first().filter(|_| change.share > most)?;
+        let by: Vec<&str> = change.causes.iter().take(3).map(|cause| cause.repair.as_str()).collect();
+        let ([lo, hi], share) = (place.bounds, change.share * 100.0);
+        Some(format!(
+            "{what} by {}: {share:.2} % of the surface, up to {:.4} away from {from}, most of it from {lo:?} to {hi:?}",
+            by.join(", "),
+            change.farthest
+        ))
+    };
+    let lost = words(&skin.lost, "visible surface was lost", "the result", profile.max_skin_lost);
+    let invented = words(&skin.invented, "visible surface was invented", "all that was there", profile.max_skin_invented);
+    lost.into_iter().chain(invented).collect()
 }
 
 /// Whether a person should look at what was dropped of sheets: they may have been meant for walls.

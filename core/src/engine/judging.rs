@@ -56,6 +56,7 @@ pub(crate) fn begin(task: Task, input: &Input<'_>, diagnosis: &Diagnosis<'_>, pr
         wraps: Vec::new(),
         volume_meant: None,
         volumes: None,
+        skin: None,
         regions: Regions::default(),
         edit: EditSummary::default(),
         edit_records: None,
@@ -107,6 +108,7 @@ fn take_account(report: &mut Report, repaired: Repaired) -> Evidence {
     report.wraps = account.wraps;
     report.volume_meant = account.enclosed.meant;
     report.volumes = account.volumes;
+    report.skin = account.skin;
     report.regions = regions;
     Evidence { enclosed: account.enclosed, doubts: account.doubts }
 }
@@ -135,6 +137,7 @@ pub(crate) fn conclude(report: &mut Report, input: &[Finding], (surface, evidenc
         let mut concerns = review::counts(&report.before, surface, &evidence.enclosed, &defects, &report.profile);
         concerns.extend_from_slice(&evidence.doubts);
         concerns.extend(report.volumes.iter().flat_map(|volumes| review::volumes(volumes, &report.profile)));
+        concerns.extend(report.skin.iter().flat_map(|skin| review::skin(skin, &report.profile)));
         concerns.extend(review::sheets(&report.before, &report.sheets_dropped, &report.profile));
         concerns.extend(review::wraps(&report.wraps, &report.profile));
         // What was closed had to be guessed: nobody knows what stood in the part that is missing.

@@ -10,6 +10,7 @@ use crate::contract::report::RepairName;
 use crate::contract::settings::Bodies;
 use crate::detect::coned_volume::coned_volume;
 use crate::detect::holes;
+use crate::detect::skin;
 use crate::repairs::boolean::enclosed;
 use crate::repairs::boolean::hidden;
 use crate::repairs::boolean::resolve;
@@ -92,6 +93,7 @@ pub(crate) const ALL: &[Step] = &[
     Do(directions::OUTWARD),
     Do(wrap::REPAIR),
     Look(measure_bodies),
+    Look(measure_skin),
 ];
 
 /// Boundary loops are closed, and nothing else.
@@ -181,12 +183,13 @@ fn carry_out(repair: &Repair, cx: &mut Context<'_, '_>) -> Result<u64> {
         false => Ok(()),
     };
     go_on(cx)?;
+    cx.work.is_changed_by(repair.name);
     let done = (repair.run)(cx)?;
     // A repair that saw it has left things undone.
     go_on(cx)?;
     drop(span);
     if done.changed {
-        cx.changed(repair.changes);
+        cx.changed(repair.name, repair.changes);
     }
     cx.account.add(repair.name, done.count, done.note, start.elapsed().as_secs_f64());
     Ok(done.count)
@@ -237,5 +240,15 @@ fn measure_bodies(cx: &mut Context<'_, '_>) {
     if let Some(probes) = cx.handed.probes.take() {
         let pieces = cx.pieces();
         cx.account.volumes = Some(probes.look_for(cx.survey, &cx.work, &cx.reversed, &pieces, &cx.handed.wrapped));
+    }
+}
+
+/// Holds the surface that there is now against the one that there was.
+fn measure_skin(cx: &mut Context<'_, '_>) {
+    let reach = cx.profile.skin_reach_relative * cx.survey.bounds.diagonal();
+    if reach > 0.0 {
+        let pieces = cx.pieces();
+        let turned = (&cx.reversed, &cx.handed.dropped_by);
+        cx.account.skin = Some(skin::measure(cx.survey, &cx.work, turned, &pieces, &cx.handed.wrapped, reach));
     }
 }

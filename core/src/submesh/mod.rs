@@ -61,6 +61,8 @@ pub(crate) struct Triangle {
     /// The region of regular surface it continues coherently, or [`NONE`].
     pub(crate) region: u32,
     pub(crate) alive: bool,
+    /// The repair that changed it last, or removed it.
+    pub(crate) by: Option<RepairName>,
 }
 
 impl Triangle {
@@ -96,7 +98,7 @@ impl Gathering {
         for (k, vertex) in v.iter().enumerate() {
             self.complete[*vertex as usize] |= complete >> k & 1 == 1;
         }
-        self.triangles.push(Triangle { v, origin: Origin::Input(place), region, alive: true });
+        self.triangles.push(Triangle { v, origin: Origin::Input(place), region, alive: true, by: None });
     }
 
     pub(crate) fn finish(self) -> Submesh {
@@ -171,7 +173,13 @@ impl Submesh {
                     self.positions.len() as Vertex - 1
                 })
             });
-            self.triangles.push(Triangle { v, origin: Origin::Input(irregular_triangle.triangle), region: *region, alive: true });
+            self.triangles.push(Triangle {
+                v,
+                origin: Origin::Input(irregular_triangle.triangle),
+                region: *region,
+                alive: true,
+                by: None,
+            });
         }
         completed(&known).into_iter().for_each(|v| self.complete[v as usize] = true);
         self.relink();
@@ -202,7 +210,7 @@ impl Submesh {
     /// Adds a triangle and returns its number.
     pub(crate) fn add(&mut self, v: [Vertex; 3], origin: Origin, region: u32) -> u32 {
         let t = self.triangles.len();
-        self.triangles.push(Triangle { v, origin, region, alive: true });
+        self.triangles.push(Triangle { v, origin, region, alive: true, by: None });
         self.nexts.extend([NONE; 3]);
         self.link(t);
         t as u32

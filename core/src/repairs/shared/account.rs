@@ -1,6 +1,6 @@
 //! What was done to a file, for its report.
 
-use crate::contract::report::{BoundaryLoops, LoopLeft, Region, Repair, RepairName, SheetDropped, Volumes, Wrap};
+use crate::contract::report::{BoundaryLoops, LoopLeft, Region, Repair, RepairName, SheetDropped, Skin, Volumes, Wrap};
 use crate::detect::review::Enclosed;
 
 /// What the report says of the repairs.
@@ -20,6 +20,8 @@ pub(crate) struct Account {
     pub(crate) wraps: Vec<Wrap>,
     /// What became of the volume of bodies; `None` where nothing was done that might have lost any.
     pub(crate) volumes: Option<Volumes>,
+    /// What became of the surface that can be seen; `None` where it was not measured.
+    pub(crate) skin: Option<Skin>,
     /// Where something was cut, snapped, taken apart, or dropped.
     pub(crate) regions: Vec<Region>,
 }

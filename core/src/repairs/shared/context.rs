@@ -8,6 +8,7 @@ use crate::contract::progress::Progress;
 use crate::contract::report::RepairName;
 use crate::contract::report::{Defects, LoopLeft};
 use crate::contract::settings::{Limits, Profile};
+use crate::detect::skin::DroppedBy;
 use crate::diagnosis::Diagnosis;
 use crate::geometry::position::Position;
 use crate::repairs::shared::account::Account;
@@ -96,6 +97,8 @@ pub(crate) struct Handed {
     pub(crate) unsettled: Vec<Unsettled>,
     /// The triangles of wraps, which are not in the submesh.
     pub(crate) wrapped: Vec<[[f32; 3]; 3]>,
+    /// By region of regular surface, the repair that dropped it.
+    pub(crate) dropped_by: DroppedBy,
     /// Where vertices were that wraps replaced, ascending.
     pub(crate) replaced: Vec<Position>,
 }
@@ -183,8 +186,12 @@ impl<'c, 'r> Context<'c, 'r> {
         self.known.is_outward
     }
 
-    /// Forgets what does not hold after a repair.
-    pub(crate) fn changed(&mut self, changes: Changes) {
+    /// Forgets what does not hold after a repair, and notes what it dropped.
+    pub(crate) fn changed(&mut self, name: RepairName, changes: Changes) {
+        let by = &mut self.handed.dropped_by;
+        by.resize(self.reversed.dropped.len(), None);
+        let dropped = by.iter_mut().zip(&self.reversed.dropped).filter(|(by, dropped)| **dropped && by.is_none());
+        dropped.for_each(|(by, _)| *by = Some(name));
         self.known.pieces = None;
         self.known.is_outward = match changes {
             Changes::Surface | Changes::Directions => false,

@@ -5,6 +5,7 @@
 
 use std::ops::Deref;
 
+use crate::contract::report::RepairName;
 use crate::geometry::position::Position;
 use crate::submesh::edges::Edges;
 use crate::submesh::{Origin, Submesh, Triangle, Vertex};
@@ -33,6 +34,8 @@ pub(crate) struct Work<'a> {
     journal: Option<Journal>,
     /// Counts the changes.
     version: u64,
+    /// Who changes it.
+    by: Option<RepairName>,
 }
 
 /// What it takes to take back everything since a [`Work::mark`].
@@ -53,7 +56,7 @@ impl Deref for Work<'_> {
 
 impl<'a> Work<'a> {
     pub(crate) fn new(submesh: &'a mut Submesh) -> Self {
-        Self { submesh, edges: None, changed: Vec::new(), seen: [None; 3], journal: None, version: 0 }
+        Self { submesh, edges: None, changed: Vec::new(), seen: [None; 3], journal: None, version: 0, by: None }
     }
 
     /// The mesh with its edges. O(submesh) after a change, O(1) else.
@@ -106,6 +109,11 @@ impl<'a> Work<'a> {
         (count, fetched)
     }
 
+    /// From here on this repair changes the mesh.
+    pub(crate) fn is_changed_by(&mut self, repair: RepairName) {
+        self.by = Some(repair);
+    }
+
     /// Another number after every change.
     pub(crate) fn version(&self) -> u64 {
         self.version
@@ -130,6 +138,7 @@ impl<'a> Work<'a> {
     pub(crate) fn kill(&mut self, t: u32) {
         self.touch();
         self.note(t);
+        self.submesh.triangles[t as usize].by = self.by;
         self.submesh.kill(t);
     }
 
@@ -150,10 +159,14 @@ impl<'a> Work<'a> {
     /// Lets all triangles of `go` use `stay` instead.
     pub(crate) fn merge(&mut self, stay: Vertex, go: Vertex) {
         self.touch();
+        let first = self.changed.len();
         self.changed.extend(self.submesh.star(go).map(|(t, _)| t));
         if self.journal.is_some() {
             let linked: Vec<u32> = self.submesh.linked(go).collect();
             linked.into_iter().for_each(|t| self.note(t));
+        }
+        for t in &self.changed[first..] {
+            self.submesh.triangles[*t as usize].by = self.by;
         }
         self.submesh.merge(stay, go);
     }
@@ -174,6 +187,7 @@ impl<'a> Work<'a> {
             if v != old {
                 self.note(t);
                 self.submesh.triangles[t as usize].v = v;
+                self.submesh.triangles[t as usize].by = self.by;
                 self.changed.push(t);
             }
         }
@@ -184,6 +198,7 @@ impl<'a> Work<'a> {
         self.touch();
         self.note(t);
         self.submesh.triangles[t as usize].v[corner] = v;
+        self.submesh.triangles[t as usize].by = self.by;
         self.changed.push(t);
     }
 
@@ -236,7 +251,6 @@ impl<'a> Work<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contract::report::RepairName;
     use crate::testing::{diagnose, plate, records};
     use crate::util::ids::NONE;
 

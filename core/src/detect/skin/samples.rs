@@ -1,0 +1,97 @@
+//! Points on triangles, as many as their area asks for.
+
+use crate::contract::report::RepairName;
+
+use super::surfaces::Surfaces;
+
+/// No more points than about this many are taken on a surface.
+const MOST: f64 = 65_536.0;
+/// Otherwise one is taken on a square of this share of the reach.
+const SPACING: f64 = 0.5;
+
+/// Points, each of which stands for the same area.
+#[derive(Default)]
+pub(super) struct Samples {
+    pub(super) points: Vec<[f64; 3]>,
+    /// The repair that changed the surface there.
+    pub(super) causes: Vec<Option<RepairName>>,
+    pub(super) area_of_each: f64,
+}
+
+/// Points of one triangle, by the triangle's number.
+type Taken = (u32, Option<RepairName>, Vec<[f64; 3]>);
+
+impl Samples {
+    /// On what is not there any more.
+    pub(super) fn gone(surfaces: &Surfaces<'_>, reach: f64) -> Self {
+        let measure = &surfaces.survey.measure;
+        let mut twice = 0i128;
+        surfaces.each_gone(|_, corners, _| twice += measure.triangle(corners).area);
+        let regions = surfaces.survey.regions.iter().zip(&surfaces.reversed.dropped);
+        let dropped = regions.filter(|(_, dropped)| **dropped).map(|(region, _)| region.extent.area);
+        let drops = surfaces.reversed.dropped.contains(&true);
+        let each = area_of_each(measure.area_of(twice + dropped.sum::<i128>()), reach);
+        let mut taken = Vec::new();
+        surfaces.each_gone(|number, corners, by| take(&mut taken, number, corners, by, each));
+        if drops {
+            let of_chunks =
+                surfaces.each_dropped(|into: &mut Vec<Taken>, number, corners, by| take(into, number, corners, by, each));
+            taken.extend(of_chunks.into_iter().flatten());
+            taken.sort_unstable_by_key(|(number, ..)| *number);
+        }
+        Self::of(taken, each)
+    }
+
+    /// On what was not there before. `but`: triangles of the submesh that none are taken on, ascending.
+    pub(super) fn added(surfaces: &Surfaces<'_>, but: &[u32], reach: f64) -> Self {
+        let measure = &surfaces.survey.measure;
+        let counts = |number: u32| but.binary_search(&number).is_err();
+        let mut twice = 0i128;
+        surfaces.each_added(|number, corners, _| twice += if counts(number) { measure.triangle(corners).area } else { 0 });
+        let each = area_of_each(measure.area_of(twice), reach);
+        let mut taken = Vec::new();
+        surfaces.each_added(|number, corners, by| {
+            if counts(number) {
+                take(&mut taken, number, corners, by, each);
+            }
+        });
+        Self::of(taken, each)
+    }
+
+    fn of(taken: Vec<Taken>, area_of_each: f64) -> Self {
+        let mut samples = Self { area_of_each, ..Self::default() };
+        for (_, by, points) in taken {
+            samples.causes.extend(points.iter().map(|_| by));
+            samples.points.extend(points);
+        }
+        samples
+    }
+}
+
+fn area_of_each(area: f64, reach: f64) -> f64 {
+    (area / MOST).max((reach * SPACING) * (reach * SPACING))
+}
+
+/// Points on a triangle, on average one for each such area. A number of the triangle decides where, and what becomes of the rest of the area.
+fn take(taken: &mut Vec<Taken>, number: u32, corners: &[[f32; 3]; 3], by: Option<RepairName>, each: f64) {
+    let [a, b, c] = corners.map(|p| glam::DVec3::from_array(p.map(f64::from)));
+    let count = (b - a).cross(c - a).length() / 2.0 / each + fraction(number);
+    if !count.is_finite() || count < 1.0 {
+        return;
+    }
+    // Roberts' sequence: it fills the square evenly, wherever it ends.
+    let points = (1..=count as u32).map(|i| {
+        let along = |step: f64| (fraction(number) + step * f64::from(i)).fract();
+        let (u, v) = (along(0.754_877_666_246_692_7), along(0.569_840_290_998_053_3));
+        let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+        (a + (b - a) * u + (c - a) * v).to_array()
+    });
+    taken.push((number, by, points.collect()));
+}
+
+/// A number from 0 to 1 that looks drawn at random.
+fn fraction(number: u32) -> f64 {
+    let mixed = (u64::from(number) + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    (mixed >> 11) as f64 / (1u64 << 53) as f64
+}

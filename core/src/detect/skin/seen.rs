@@ -1,0 +1,158 @@
+//! Which points of a surface can be seen from outside.
+//!
+//! From each point rays run into fourteen directions: along the axes, a little askew, so that no wall of a part that stands straight holds one,
+//! and towards the corners of a cube. Rays go both ways through a surface, so that it does not matter which side is meant to be outside. A point can
+//! be seen if one of its rays meets nothing. What is next to the point itself does not count.
+//!
+//! A direction is made the upright one by a shear, in which both triangles at an edge still have the same edge; so no ray slips through.
+
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+use crate::geometry::position;
+
+use super::surfaces::{Surfaces, Which};
+
+/// The share of the reach within which surface is next to a point.
+const BESIDE: f64 = 0.02;
+
+/// Which of these points, which lie on a surface, can be seen from outside. O(triangles under rays), and reads the file twice at most.
+pub(super) fn from_outside(surfaces: &Surfaces<'_>, which: Which, points: &[[f64; 3]], reach: f64) -> Vec<bool> {
+    let mut seen = vec![false; points.len()];
+    for directions in [straight(), corners()] {
+        let hidden: Vec<u32> = (0..points.len() as u32).filter(|p| !seen[*p as usize]).collect();
+        if hidden.is_empty() {
+            break;
+        }
+        let here: Vec<[f64; 3]> = hidden.iter().map(|p| points[*p as usize]).collect();
+        for (p, is_free) in hidden.iter().zip(are_free(surfaces, which, &here, &directions, reach * BESIDE)) {
+            seen[*p as usize] = is_free;
+        }
+    }
+    seen
+}
+
+/// Does any ray of each point meet nothing?
+fn are_free(surfaces: &Surfaces<'_>, which: Which, points: &[[f64; 3]], directions: &[Direction], beside: f64) -> Vec<bool> {
+    let bundles: Vec<Bundle> = directions.iter().map(|direction| Bundle::of(*direction, points, beside)).collect();
+    let meet = |corners: &[[f32; 3]; 3]| {
+        let corners = corners.map(|p| p.map(f64::from));
+        bundles.iter().for_each(|bundle| bundle.meet(&corners));
+    };
+    surfaces.each_in_memory(which, meet);
+    surfaces.survey.visit_regular(
+        |region| surfaces.has(which, region),
+        |_| Some(()),
+        |(), _| true,
+        |(), triangle, _| meet(&position::corners(&surfaces.survey.records[triangle as usize])),
+    );
+    (0..points.len()).map(|p| bundles.iter().any(|bundle| !bundle.met[p].load(Relaxed))).collect()
+}
+
+/// A direction, by the axis that it is nearest to.
+#[derive(Clone, Copy)]
+struct Direction {
+    axis: usize,
+    /// 1, or −1 towards smaller coordinates.
+    way: f64,
+    /// How far it leads along the two other axes meanwhile.
+    askew: [f64; 2],
+}
+
+impl Direction {
+    /// The coordinates in a frame in which it is upright.
+    fn upright(&self, p: [f64; 3]) -> [f64; 3] {
+        let [x, y, z] = [1, 2, 0].map(|k| p[(self.axis + k) % 3]);
+        let up = z * self.way;
+        [x - self.askew[0] * up, y - self.askew[1] * up, up]
+    }
+}
+
+fn straight() -> Vec<Direction> {
+    let along = |axis| [1.0, -1.0].map(|way| Direction { axis, way, askew: [0.0131, 0.0297] });
+    (0..3).flat_map(along).collect()
+}
+
+fn corners() -> Vec<Direction> {
+    let signs = [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]];
+    let towards = |way: f64| signs.map(|[x, y]| Direction { axis: 2, way, askew: [x * 0.89, y * 0.93] });
+    [1.0, -1.0].into_iter().flat_map(towards).collect()
+}
+
+/// Rays of one direction, in a grid of cells seen from above.
+struct Bundle {
+    direction: Direction,
+    beside: f64,
+    /// Where the rays begin, upright.
+    from: Vec<[f64; 3]>,
+    met: Vec<AtomicBool>,
+    lo: [f64; 2],
+    per_unit: [f64; 2],
+    side: usize,
+    starts: Vec<u32>,
+    order: Vec<u32>,
+}
+
+impl Bundle {
+    fn of(direction: Direction, points: &[[f64; 3]], beside: f64) -> Self {
+        let from: Vec<[f64; 3]> = points.iter().map(|p| direction.upright(*p)).collect();
+        let met = from.iter().map(|_| AtomicBool::new(false)).collect();
+        let side = ((from.len() as f64).sqrt() as usize * 4).clamp(1, 512);
+        let ends = |k: usize| from.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p[k]), b.max(p[k])));
+        let ends = [ends(0), ends(1)];
+        let per_unit = ends.map(|(lo, hi)| if hi > lo { side as f64 / (hi - lo) } else { 0.0 });
+        let mut bundle = Self {
+            direction,
+            beside,
+            from,
+            met,
+            lo: ends.map(|(lo, _)| lo),
+            per_unit,
+            side,
+            starts: vec![0; side * side + 1],
+            order: Vec::new(),
+        };
+        let cells: Vec<usize> = bundle.from.iter().map(|p| bundle.cell(1, p[1]) * side + bundle.cell(0, p[0])).collect();
+        cells.iter().for_each(|c| bundle.starts[c + 1] += 1);
+        (0..side * side).for_each(|c| bundle.starts[c + 1] += bundle.starts[c]);
+        bundle.order = (0..cells.len() as u32).collect();
+        bundle.order.sort_by_key(|p| cells[*p as usize]);
+        bundle
+    }
+
+    fn cell(&self, axis: usize, x: f64) -> usize {
+        (((x - self.lo[axis]) * self.per_unit[axis]) as usize).min(self.side - 1)
+    }
+
+    /// Notes the rays that a triangle is in the way of.
+    fn meet(&self, corners: &[[f64; 3]; 3]) {
+        let q = corners.map(|p| self.direction.upright(p));
+        let span = |k: usize| {
+            let (lo, hi) = (q[0][k].min(q[1][k]).min(q[2][k]), q[0][k].max(q[1][k]).max(q[2][k]));
+            (self.cell(k, lo), self.cell(k, hi))
+        };
+        let ((x0, x1), (y0, y1)) = (span(0), span(1));
+        for row in (y0..=y1).map(|y| y * self.side) {
+            let rays = &self.order[self.starts[row + x0] as usize..self.starts[row + x1 + 1] as usize];
+            for ray in rays.iter().map(|r| *r as usize) {
+                if !self.met[ray].load(Relaxed) && is_above(&q, self.from[ray], self.beside) {
+                    self.met[ray].store(true, Relaxed);
+                }
+            }
+        }
+    }
+}
+
+/// Does a triangle, its rim included, lie over a point, by more than a margin?
+fn is_above(q: &[[f64; 3]; 3], p: [f64; 3], beside: f64) -> bool {
+    if q.iter().all(|c| c[2] <= p[2] + beside) {
+        return false;
+    }
+    let side = |a: [f64; 3], b: [f64; 3]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+    let of = [side(q[1], q[2]), side(q[2], q[0]), side(q[0], q[1])];
+    if of.iter().any(|s| *s < 0.0) && of.iter().any(|s| *s > 0.0) {
+        return false;
+    }
+    let whole = of[0] + of[1] + of[2];
+    // A triangle that is seen from its edge hides nothing.
+    whole != 0.0 && (of[0] * q[0][2] + of[1] * q[1][2] + of[2] * q[2][2]) / whole > p[2] + beside
+}

@@ -1,0 +1,112 @@
+//! The surface before and after the repairs.
+
+use crate::contract::report::RepairName;
+use crate::geometry::position;
+use crate::io::record;
+use crate::submesh::components::Reversed;
+use crate::submesh::{Origin, Submesh};
+use crate::topology::survey::Survey;
+use crate::util::ids::NONE;
+
+use super::DroppedBy;
+
+type Corners = [[f32; 3]; 3];
+
+/// A surface: before the repairs, or after them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Which {
+    Before,
+    After,
+}
+
+/// Both surfaces: regular surface that stands in both, and what the submesh has of either.
+pub(crate) struct Surfaces<'a> {
+    pub(crate) survey: &'a Survey<'a>,
+    pub(crate) submesh: &'a Submesh,
+    pub(crate) reversed: &'a Reversed,
+    pub(crate) dropped_by: &'a DroppedBy,
+    pub(crate) wrapped: &'a [Corners],
+}
+
+impl Surfaces<'_> {
+    /// Does a region of regular surface stand there?
+    pub(crate) fn has(&self, which: Which, region: u32) -> bool {
+        which == Which::Before || !self.reversed.dropped[region as usize]
+    }
+
+    /// Visits the triangles of a surface that are not regular.
+    pub(crate) fn each_in_memory(&self, which: Which, mut visit: impl FnMut(&Corners)) {
+        match which {
+            Which::Before => self.submesh.triangles.iter().filter_map(|t| self.as_read(t.origin)).for_each(|t| visit(&t)),
+            Which::After => {
+                self.submesh.living().for_each(|t| visit(&self.submesh.points(t)));
+                self.wrapped.iter().for_each(visit);
+            }
+        }
+    }
+
+    /// The triangles that were there and are not there any more, or not as they were, each by its record, with the repair that did it.
+    pub(crate) fn each_gone(&self, mut visit: impl FnMut(u32, &Corners, Option<RepairName>)) {
+        for t in 0..self.submesh.triangles.len() as u32 {
+            let triangle = &self.submesh.triangles[t as usize];
+            if let (Origin::Input(record), Some(corners)) = (triangle.origin, self.as_read(triangle.origin))
+                && !(self.submesh.lives(t) && is_same(&corners, &self.submesh.points(t)))
+            {
+                visit(record, &corners, triangle.by);
+            }
+        }
+    }
+
+    /// The same of dropped regions, in no order; each chunk gathers by `visit` in a list of its own.
+    pub(crate) fn each_dropped<R: Send + Default>(
+        &self,
+        visit: impl Fn(&mut R, u32, &Corners, Option<RepairName>) + Sync,
+    ) -> Vec<R> {
+        self.survey.visit_regular(
+            |region| self.reversed.dropped[region as usize],
+            |_| Some(R::default()),
+            |_, _| true,
+            |into, place, region| {
+                let by = self.dropped_by.get(region as usize).copied().flatten();
+                visit(into, place, &position::corners(&self.survey.records[place as usize]), by);
+            },
+        )
+    }
+
+    /// The triangles that were not there as they are, each by a number of its own, with the repair that made them.
+    pub(crate) fn each_added(&self, mut visit: impl FnMut(u32, &Corners, Option<RepairName>)) {
+        for t in self.submesh.living() {
+            let (triangle, points) = (&self.submesh.triangles[t as usize], self.submesh.points(t));
+            let by = match triangle.origin {
+                Origin::Added(by) => Some(by),
+                Origin::Input(_) | Origin::Part(_) => triangle.by,
+            };
+            if self.as_read(triangle.origin).is_none_or(|corners| !is_same(&corners, &points)) {
+                visit(t, &points, by);
+            }
+        }
+        let first = self.submesh.triangles.len() as u32;
+        (first..).zip(self.wrapped).for_each(|(n, corners)| visit(n, corners, Some(RepairName::Wrap)));
+    }
+
+    /// Twice the area of all that was there, in the survey's units.
+    pub(crate) fn area_before(&self) -> i128 {
+        let measure = &self.survey.measure;
+        let regular: i128 = self.survey.regions.iter().filter(|r| r.first != NONE).map(|r| r.extent.area).sum();
+        let irregular = self.submesh.triangles.iter().filter_map(|t| self.as_read(t.origin));
+        regular + irregular.map(|corners| measure.triangle(&corners).area).sum::<i128>()
+    }
+
+    /// A triangle as the file has it; `None` for one that it does not have.
+    fn as_read(&self, origin: Origin) -> Option<Corners> {
+        match origin {
+            Origin::Input(place) => Some(record::corners(&self.survey.records[place as usize]).map(position::canonical)),
+            Origin::Part(_) | Origin::Added(_) => None,
+        }
+    }
+}
+
+/// Whichever way round.
+fn is_same(a: &Corners, b: &Corners) -> bool {
+    a == b || [a[0], a[2], a[1]] == *b
+}

@@ -15,6 +15,7 @@ mod error;
 mod folders;
 mod machine;
 mod made;
+pub(crate) mod meaning;
 mod options;
 mod page;
 mod page_arrays;

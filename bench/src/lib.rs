@@ -9,5 +9,6 @@ pub mod counts;
 pub mod generate;
 pub mod judge;
 pub mod meaning;
+pub mod space;
 
 pub use counts::Counts;

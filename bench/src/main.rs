@@ -47,6 +47,9 @@ enum Task {
         /// What it was meant to be (an STL whose material is where it winds at least once): how far is it from that?
         #[arg(long, conflicts_with_all = ["reference", "json"])]
         intended: Option<PathBuf>,
+        /// The input it was made from: which part of its skin is lost, and what was never drawn?
+        #[arg(long, conflicts_with_all = ["reference", "json", "intended"])]
+        skin_of: Option<PathBuf>,
         /// Look for self-intersections and for what is inside out, too, and say only what keeps the file from being printed.
         #[arg(long, conflicts_with_all = ["reference", "json"])]
         solid: bool,
@@ -94,6 +97,19 @@ enum Task {
         folder: PathBuf,
         #[command(flatten)]
         which: Which,
+    },
+    /// Have suture repair the STL files of a folder, and publish what of their skin is lost, and what was never drawn.
+    Skin {
+        /// A folder of STL files.
+        folder: PathBuf,
+        /// Processes at a time.
+        #[arg(long, default_value_t = 1)]
+        jobs: usize,
+        /// Put what comes out into this folder.
+        #[arg(long, value_name = "DIR")]
+        keep: Option<PathBuf>,
+        #[command(flatten)]
+        options: Closing,
     },
     /// Make RESULTS.md, the plots and the README's table from the raw runs that are kept.
     Publish(Publish),
@@ -253,6 +269,7 @@ fn main() -> ExitCode {
         Task::Generate { case, triangles, out, seed } => generate_file(case, triangles, &out, seed),
         Task::Judge { file, solid: true, .. } => judge_solid(&file),
         Task::Judge { file, intended: Some(intended), .. } => judge_intended(&file, &intended),
+        Task::Judge { file, skin_of: Some(before), .. } => judge_skin(&file, &before),
         Task::Judge { file, reference, json, .. } => judge_file(&file, reference.as_deref(), json),
         Task::Picture(options) => picture::draw(&options).map(|()| ExitCode::SUCCESS),
         Task::Compare(choices) => compare_all(*choices),
@@ -263,6 +280,7 @@ fn main() -> ExitCode {
         }
         Task::Meaning(choices) => judge_meaning(choices),
         Task::Meant { folder, which } => write_meant(&folder, &which),
+        Task::Skin { folder, jobs, keep, options } => judge_skins(&folder, jobs, keep, options),
         Task::Publish(choices) => publish(choices.results.as_deref()).map(|()| ExitCode::SUCCESS),
     };
     done.unwrap_or_else(|error| {
@@ -309,6 +327,11 @@ fn judge_intended(file: &Path, intended: &Path) -> Result<ExitCode, Box<dyn Erro
     Ok(ExitCode::SUCCESS)
 }
 
+fn judge_skin(file: &Path, before: &Path) -> Result<ExitCode, Box<dyn Error>> {
+    println!("{:#?}", judge::skin(&mesh::read(before)?, &mesh::read(file)?));
+    Ok(ExitCode::SUCCESS)
+}
+
 fn judge_solid(file: &Path) -> Result<ExitCode, Box<dyn Error>> {
     let found = judge::solid(file)?;
     match found.fault() {
@@ -351,6 +374,12 @@ fn stl_files(folder: &Path) -> Result<Vec<PathBuf>, Box<dyn Error>> {
     files.retain(|path| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("stl")));
     files.sort();
     Ok(files)
+}
+
+/// Over all STL files of a folder.
+fn judge_skins(folder: &Path, jobs: usize, keep: Option<PathBuf>, choices: Closing) -> Result<ExitCode, Box<dyn Error>> {
+    let files = stl_files(folder)?;
+    closing(choices, "skin", false, |options| compare::skin::skins(options, &files, jobs.max(1), keep))
 }
 
 /// Over the STL files of a folder that are not too large, the smallest first: the raw file is always gone on with.

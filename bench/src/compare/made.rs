@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use suture_bench::Counts;
-use suture_bench::judge::{BodiesFound, Fault, Solid};
+use suture_bench::judge::{BodiesFound, Fault, Skin, Solid};
 
 use super::sides::Side;
 use crate::holes::{Change, Hole, Measured};
@@ -231,6 +231,34 @@ pub(crate) struct Understood {
     pub(crate) bad: Vec<Bad>,
 }
 
+/// What Suture did to the skin of one real file.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct Skinned {
+    /// Its name.
+    pub(crate) file: String,
+    pub(crate) triangles: u64,
+    /// What ran.
+    pub(crate) program: String,
+    /// `None`: it said none, or broke off.
+    pub(crate) report: Option<Report>,
+    /// Of the surface, the share that was replaced by wraps.
+    pub(crate) wrapped: f64,
+    /// `None`: nothing was written.
+    pub(crate) skin: Option<Skin>,
+    pub(crate) seconds: f64,
+}
+
+impl Skinned {
+    /// `repaired`, `needs_review`, …, or that it broke off.
+    pub(crate) fn outcome(&self) -> &str {
+        self.report.as_ref().map_or("failed", |report| &report.outcome)
+    }
+
+    pub(crate) fn is_called_good(&self) -> bool {
+        ["clean", "repaired"].contains(&self.outcome())
+    }
+}
+
 /// A file that is not as wanted.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Bad {
@@ -304,8 +332,16 @@ impl Understood {
     pub(crate) fn summary(&self) -> String {
         format!(
             "{:4} files: {:4} right, {:3} wrong, {:3} + {:3} review (right + wrong), {:3} withheld, {:3} failed, {:3} unprintable, {:6.1} s, slowest {:.1} s",
-            self.seeds, self.right, self.wrong, self.review_right, self.review_wrong, self.withheld, self.failed,
-            self.unprintable, self.seconds, self.slowest
+            self.seeds,
+            self.right,
+            self.wrong,
+            self.review_right,
+            self.review_wrong,
+            self.withheld,
+            self.failed,
+            self.unprintable,
+            self.seconds,
+            self.slowest
         )
     }
 }

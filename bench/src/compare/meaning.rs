@@ -181,7 +181,8 @@ impl Run<'_> {
         std::thread::scope(|scope| {
             for _ in 0..self.asked.jobs {
                 scope.spawn(|| {
-                    while let Some((number, case)) = Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|n| Some((n, self.cases.get(n)?)))
+                    while let Some((number, case)) =
+                        Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|n| Some((n, self.cases.get(n)?)))
                     {
                         let made = work(case);
                         done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((number, made));

@@ -12,7 +12,7 @@ use suture_bench::judge::{Judgement, Kept};
 use super::child::Cost;
 use super::error::Error;
 use super::machine::Machine;
-use super::made::{Closed, Shaped, Solved, Understood};
+use super::made::{Closed, Shaped, Skinned, Solved, Understood};
 use super::sides::Side;
 use super::statistics::spaced;
 use super::way::Way;
@@ -30,6 +30,7 @@ pub(crate) enum Line {
     Closed(Closed),
     Solved(Box<Solved>),
     Understood(Understood),
+    Skinned(Box<Skinned>),
     /// Something was left out, and why.
     Skipped {
         side: Side,

@@ -164,8 +164,7 @@ fn along(axis: usize, solids: &[Vec<[[f64; 3]; 3]>; 2], is_turned: bool) -> Sums
             };
             for j in grid.cells(1, span(1)) {
                 for i in grid.cells(0, span(0)) {
-                    let sides: [bool; 3] =
-                        std::array::from_fn(|k| is_left(flat[k], flat[(k + 1) % 3], grid.line([i, j], axis)));
+                    let sides: [bool; 3] = std::array::from_fn(|k| is_left(flat[k], flat[(k + 1) % 3], grid.line([i, j], axis)));
                     if sides[0] == sides[1] && sides[1] == sides[2] {
                         let depth = depth(t, axis, grid.line([i, j], axis));
                         // Facing along the axis: whoever goes on leaves.

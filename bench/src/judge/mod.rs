@@ -15,7 +15,9 @@ mod fidelity;
 mod judgement;
 mod kept;
 mod meet;
+mod near;
 mod shells;
+mod skin;
 mod solid;
 mod stl;
 mod topology;
@@ -26,6 +28,8 @@ pub use bodies::{Bodies, Found as BodiesFound};
 pub use fidelity::{Fidelity, fidelity};
 pub use judgement::{Judgement, Triangle};
 pub use kept::{Kept, Same, kept_in_order};
+pub use near::Near;
+pub use skin::{Place, Skin, skin};
 pub use solid::{Fault, Solid, solid};
 pub use stl::{Error, Result};
 

@@ -9,14 +9,14 @@ use super::shapes::{BORE, P, apart, arc, cuboid, cylinder, revolved, sleeve, tor
 
 pub(super) const FAMILIES: [Entry; 9] = [
     ("clearance-sound", "parts with a gap between them, nothing broken", true, sound),
-    ("ball-joint", "ball in its socket, a region of one lost at the gap", true, ball),
-    ("hinge", "pin in its knuckle, a region of one lost at the gap", true, hinge),
+    ("ball-joint", "ball in its socket, a region of one or both lost at the gap", true, ball),
+    ("hinge", "pin in its knuckle, a region of one or both lost at the gap", true, hinge),
     ("sleeve-bore", "a sleeve around a shaft lost its bore", true, bore),
     ("sleeve-triangles", "sleeve and shaft, triangles of both lost", true, sleeve_triangles),
     ("double-wall", "two thin walls with a gap less than their width, 3 % of the triangles lost", true, double_wall),
     ("boxes-one-face", "parallel boxes; one lost the face towards the other", true, boxes_one),
     ("boxes-both-faces", "parallel boxes; both lost the faces towards each other", false, boxes_both),
-    ("linked-rings", "two linked rings, a region of one lost where they are near", true, rings),
+    ("linked-rings", "two linked rings, a region of one or both lost where they are near", true, rings),
 ];
 
 /// A ball on a stem, and the cup around it.
@@ -54,14 +54,19 @@ fn sound(chance: &mut Chance) -> Draft {
     Draft::of(all.clone(), all).bodies(2..=2)
 }
 
-/// A region of either is lost where the other is near: on the lower half of a ball, on a pin's side within its knuckle.
+/// A region is lost of either or both bodies where they are near each other.
 fn region_lost(chance: &mut Chance, inner: &Mesh, outer: &Mesh, place: V, radius: f64) -> Mesh {
-    let of_outer = chance.is(0.5);
-    let (from, other) = if of_outer { (outer, inner) } else { (inner, outer) };
-    // Only the skin that faces the gap: not the outside of a thin cup.
-    let nearest = from.0.iter().map(|face| apart(face.middle(), place)).fold(f64::INFINITY, f64::min);
-    let left = lose_near(from, place, radius.max(nearest * 1.01));
-    left.and(other)
+    let which = chance.count(0, 3);
+    // Where triangles are larger than the region, one is.
+    let left = |mesh: &Mesh| {
+        let nearest = mesh.0.iter().map(|face| apart(face.middle(), place)).fold(f64::INFINITY, f64::min);
+        lose_near(mesh, place, radius.max(nearest * 1.01))
+    };
+    match which {
+        0 => left(inner).and(outer),
+        1 => inner.and(&left(outer)),
+        _ => left(inner).and(&left(outer)),
+    }
 }
 
 fn ball(chance: &mut Chance) -> Draft {
@@ -73,7 +78,7 @@ fn ball(chance: &mut Chance) -> Draft {
         }
     };
     let place = down.map(|x| x * (radius + gap / 2.0));
-    let wide = radius * chance.from(0.15, 0.35);
+    let wide = radius * chance.from(0.15, 0.45);
     let damaged = region_lost(chance, &ball, &socket, place, wide);
     Draft::of(damaged, ball.and(&socket)).within(0.03).bodies(2..=2)
 }
@@ -157,7 +162,11 @@ fn rings(chance: &mut Chance) -> Draft {
     let a = torus(ring, radius, sides, section);
     let gap = radius * chance.scale(0.03, 0.3);
     // The second one stands upright and passes through the first, near its inner side.
-    let b = torus(ring, radius, sides, section).map(|[x, y, z]| [x, z, y]).turned().moved([2.0 * ring - 2.0 * radius - gap, 0.0, 0.0]);
+    let b = torus(ring, radius, sides, section).map(|[x, y, z]| [x, z, y]).turned().moved([
+        2.0 * ring - 2.0 * radius - gap,
+        0.0,
+        0.0,
+    ]);
     let place = [ring - radius - gap / 2.0, 0.0, 0.0];
     let wide = radius * chance.from(0.5, 1.0);
     let damaged = region_lost(chance, &a, &b, place, wide);

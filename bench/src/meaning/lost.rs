@@ -132,9 +132,12 @@ fn chance_of(p: V) -> f64 {
 fn scan(chance: &mut Chance) -> Draft {
     let body = if chance.is(0.6) { blob(chance, 12.0, 28) } else { smooth(chance).finer(3.0) };
     let to = if chance.is(0.6) { [0.0, 0.0, 1.0] } else { chance.direction() };
-    let extent = body.0.iter().flat_map(|face| face.p).map(|p| dot(p, to)).fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| {
-        [a.min(x), b.max(x)]
-    });
+    let extent = body
+        .0
+        .iter()
+        .flat_map(|face| face.p)
+        .map(|p| dot(p, to))
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
     let at = extent[0] + (extent[1] - extent[0]) * chance.from(0.1, 0.45);
     // Everything below is pressed flat onto the plane: the bottom is where the form stood.
     let pressed = body.map(|p| if dot(p, to) < at { plus(p, times(to, at - dot(p, to))) } else { p });

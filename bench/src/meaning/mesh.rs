@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-pub(super) type V = [f64; 3];
+use crate::space::bounds;
+pub(super) use crate::space::{Vector as V, cross, dot, length, minus, plus, times, unit};
 
 /// A triangle, and the part of the surface that it belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,35 +15,6 @@ pub(super) struct Face {
 /// Triangles; corners that are one vertex have equal coordinates.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Mesh(pub(super) Vec<Face>);
-
-pub(super) fn minus(a: V, b: V) -> V {
-    std::array::from_fn(|k| a[k] - b[k])
-}
-
-pub(super) fn plus(a: V, b: V) -> V {
-    std::array::from_fn(|k| a[k] + b[k])
-}
-
-pub(super) fn times(a: V, s: f64) -> V {
-    a.map(|x| x * s)
-}
-
-pub(super) fn dot(a: V, b: V) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-pub(super) fn cross(a: V, b: V) -> V {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-pub(super) fn length(a: V) -> f64 {
-    dot(a, a).sqrt()
-}
-
-/// Of length 1; nothing stays nothing.
-pub(super) fn unit(a: V) -> V {
-    times(a, 1.0 / length(a).max(f64::MIN_POSITIVE))
-}
 
 /// Two directions square to `axis` and to each other.
 pub(super) fn beside(axis: V) -> [V; 2] {
@@ -105,12 +77,7 @@ impl Mesh {
 
     /// Its lowest and highest coordinates.
     pub(super) fn corners(&self) -> [V; 2] {
-        let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for p in self.0.iter().flat_map(|face| face.p) {
-            lo = std::array::from_fn(|k| lo[k].min(p[k]));
-            hi = std::array::from_fn(|k| hi[k].max(p[k]));
-        }
-        [lo, hi]
+        bounds(self.0.iter().flat_map(|face| face.p))
     }
 
     /// Diagonal of its box.

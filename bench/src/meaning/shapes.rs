@@ -239,8 +239,9 @@ pub(super) fn helix(radius: f64, rise: f64, turns: f64, steps: usize) -> Vec<V> 
 
 /// A sphere with bumps: a free form.
 pub(super) fn blob(chance: &mut Chance, radius: f64, sides: usize) -> Mesh {
-    let waves: Vec<(V, f64, f64)> =
-        (0..5).map(|_| (times(chance.direction(), chance.from(0.2, 0.5)), chance.from(0.0, 1.0), chance.from(0.02, 0.07))).collect();
+    let waves: Vec<(V, f64, f64)> = (0..5)
+        .map(|_| (times(chance.direction(), chance.from(0.2, 0.5)), chance.from(0.0, 1.0), chance.from(0.02, 0.07)))
+        .collect();
     sphere(radius, sides).map(|p| {
         let to = times(p, 1.0 / radius);
         let bump: f64 = waves.iter().map(|(wave, phase, height)| height * around(dot(*wave, to) + phase).1).sum();

@@ -15,7 +15,7 @@ pub(super) const FAMILIES: [Entry; 11] = [
     ("folds-alone", "folded sheets and nothing else", false, folds_alone),
     ("fins", "triangles that stand on edges of the surface", true, fins),
     ("walls-of-no-thickness", "a wall of one sheet, or of two back to back, on a body", false, walls),
-    ("spikes", "needles without thickness", true, spikes),
+    ("spikes", "needles without thickness", false, spikes),
     ("dust", "closed specks beside a body", true, dust),
     ("stray-triangles", "single triangles beside a body", true, strays),
     ("inner-sheets", "sheets within a body, which cannot be seen", true, inner),

@@ -264,8 +264,11 @@ fn judged(case: &Case, output: &Path, is_peer: bool, seconds: f64) -> Made {
     Made { verdict, why: why.join(", "), unprintable: fault.is_some(), seconds }
 }
 
+/// A body of a smaller share of the volume is a speck that no printer can make: it is counted by nobody.
+const SPECK: f64 = 1e-6;
+
 /// Why triangles are not what was meant; empty: they are.
-pub(crate) fn faults(meant: &Meant, triangles: &[Triangle]) -> String {
+fn faults(meant: &Meant, triangles: &[Triangle]) -> String {
     let found = judge::judge_triangles(triangles);
     let mut faults = Vec::new();
     if !found.counts.closed() || found.counts.unbalanced_edges > 0 {
@@ -276,7 +279,9 @@ pub(crate) fn faults(meant: &Meant, triangles: &[Triangle]) -> String {
         let extra = fidelity.difference - fidelity.missing;
         faults.push(format!("{:.4} missing, {extra:.4} too much, of {}", fidelity.missing, meant.tolerance));
     }
-    let bodies = if found.volume < 0.0 { found.negative_bodies } else { found.positive_bodies };
+    let least = SPECK * fidelity.volume;
+    let is_body = |volume: &&f64| if found.volume < 0.0 { -**volume > least } else { **volume > least };
+    let bodies = judge::volumes(triangles).iter().filter(is_body).count() as u64;
     if !meant.bodies.contains(&bodies) && !meant.intended.is_empty() {
         faults.push(format!("{bodies} bodies for {:?}", meant.bodies));
     }

@@ -43,7 +43,7 @@ pub(crate) fn skins(options: &Options, files: &[PathBuf], jobs: usize, keep: Opt
             triangles: before.len() as u64,
             program: program.clone(),
             report: Report::read(&ended.said).filter(|_| ended.cost.exited),
-            wrapped: wraps.filter_map(|wrap| wrap["area_share"].as_f64()).sum(),
+            wrapped: wraps.filter_map(|wrap| wrap["area_share"].as_f64()).fold(0.0, |sum, share| sum + share),
             skin: after.map(|after| judge::skin(&before, &after)),
             seconds: ended.cost.wall_seconds,
         }))

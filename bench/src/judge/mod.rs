@@ -46,6 +46,12 @@ pub fn judge_triangles(triangles: &[Triangle]) -> Judgement {
     topology::judge(stl::Soup::of(triangles))
 }
 
+/// Signed volumes of the components that are sealed: every edge is used equally often in each direction.
+pub fn volumes(triangles: &[Triangle]) -> Vec<f64> {
+    let parts = topology::examine(stl::Soup::of(triangles)).1;
+    parts.volumes.iter().zip(&parts.sealed).filter(|(_, sealed)| **sealed).map(|(volume, _)| *volume).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -66,7 +66,8 @@ fn pokes_out(chance: &mut Chance) -> Draft {
     let beyond = wall * chance.scale(0.02, 1.0);
     let cavity = pushed(chance, &host, &cavity, beyond);
     let all = host.and(&cavity);
-    Draft::of(all.clone(), all).within(0.02)
+    // Where facets of both pass each other, islands of the wall may be left.
+    Draft::of(all.clone(), all).within(0.02).bodies(1..=u64::MAX)
 }
 
 fn near_wall(chance: &mut Chance) -> Draft {
@@ -74,8 +75,8 @@ fn near_wall(chance: &mut Chance) -> Draft {
     let beyond = -wall * chance.scale(0.002, 0.1);
     let cavity = pushed(chance, &host, &cavity, beyond);
     let all = host.and(&cavity);
-    // Facets of round walls may meet all the same.
-    Draft::of(all.clone(), all).within(0.02)
+    // Facets of round walls may meet all the same, and leave islands.
+    Draft::of(all.clone(), all).within(0.02).bodies(1..=u64::MAX)
 }
 
 /// What is cut, and the outline of the cutter, which fits into it.

@@ -226,6 +226,8 @@ pub(crate) struct Understood {
     pub(crate) wanted: u64,
     /// Of those called good or handed to a person: such that cannot be printed.
     pub(crate) unprintable: u64,
+    /// Of the right ones.
+    pub(crate) right_unprintable: u64,
     pub(crate) seconds: f64,
     pub(crate) slowest: f64,
     pub(crate) bad: Vec<Bad>,
@@ -286,6 +288,7 @@ impl Understood {
             failed: 0,
             wanted: 0,
             unprintable: 0,
+            right_unprintable: 0,
             seconds: 0.0,
             slowest: 0.0,
             bad: Vec::new(),
@@ -305,6 +308,7 @@ impl Understood {
         self.seeds += 1;
         self.wanted += u64::from(wanted);
         self.unprintable += u64::from(unprintable);
+        self.right_unprintable += u64::from(unprintable && verdict == Verdict::Right);
         self.seconds += seconds;
         self.slowest = self.slowest.max(seconds);
         self.bad.extend(bad);
@@ -322,6 +326,7 @@ impl Understood {
             sum.failed += line.failed;
             sum.wanted += line.wanted;
             sum.unprintable += line.unprintable;
+            sum.right_unprintable += line.right_unprintable;
             sum.seconds += line.seconds;
             sum.slowest = sum.slowest.max(line.slowest);
             sum

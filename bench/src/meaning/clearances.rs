@@ -44,7 +44,7 @@ fn pin(chance: &mut Chance) -> (Mesh, Mesh, f64, f64) {
     let length = radius * chance.from(2.0, 5.0);
     let pin = cylinder(radius, -chance.from(1.0, 5.0), length + chance.from(1.0, 5.0), sides);
     let knuckle = sleeve(radius + gap, radius * chance.from(1.5, 2.2), 0.0, length, sides);
-    let fine = radius * chance.from(0.3, 0.9);
+    let fine = radius * chance.from(0.5, 1.0);
     (pin.finer(fine), knuckle.finer(fine), radius, gap)
 }
 

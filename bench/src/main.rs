@@ -14,6 +14,7 @@ use clap::{Args, Parser, Subcommand};
 use compare::{Cache, Judged, Options, Side};
 use suture_bench::generate::{self, Case};
 use suture_bench::judge::{self, Judgement, Same};
+use suture_bench::meaning::{self, Family};
 
 #[derive(Parser)]
 #[command(about = "Makes broken meshes, judges meshes, and compares Suture with its peers.")]
@@ -43,6 +44,12 @@ enum Task {
         /// Print one JSON object (needs a reference).
         #[arg(long, requires = "reference")]
         json: bool,
+        /// What it was meant to be (an STL whose material is where it winds at least once): how far is it from that?
+        #[arg(long, conflicts_with_all = ["reference", "json"])]
+        intended: Option<PathBuf>,
+        /// The input it was made from: which part of its skin is lost, and what was never drawn?
+        #[arg(long, conflicts_with_all = ["reference", "json", "intended"])]
+        skin_of: Option<PathBuf>,
         /// Look for self-intersections and for what is inside out, too, and say only what keeps the file from being printed.
         #[arg(long, conflicts_with_all = ["reference", "json"])]
         solid: bool,
@@ -79,6 +86,28 @@ enum Task {
         /// Run what is in the raw file already, by the very same program.
         #[arg(long)]
         again: bool,
+        #[command(flatten)]
+        options: Closing,
+    },
+    /// Have suture and its peers repair damaged files whose intended solid is known, and publish whether it is what comes out.
+    Meaning(Meaning),
+    /// Write such files: each damaged, as it was meant, and what is to be known of it.
+    Meant {
+        /// The folder to write to.
+        folder: PathBuf,
+        #[command(flatten)]
+        which: Which,
+    },
+    /// Have suture repair the STL files of a folder, and publish what of their skin is lost, and what was never drawn.
+    Skin {
+        /// A folder of STL files.
+        folder: PathBuf,
+        /// Processes at a time.
+        #[arg(long, default_value_t = 1)]
+        jobs: usize,
+        /// Put what comes out into this folder.
+        #[arg(long, value_name = "DIR")]
+        keep: Option<PathBuf>,
         #[command(flatten)]
         options: Closing,
     },
@@ -153,6 +182,56 @@ struct Compare {
 }
 
 #[derive(Args)]
+struct Meaning {
+    #[command(flatten)]
+    which: Which,
+    /// Which programs. Suture takes minutes, each peer half an hour for ten seeds.
+    #[arg(long, value_delimiter = ',', default_value = "suture")]
+    sides: Vec<Side>,
+    /// Processes at a time; as many as there are processors otherwise.
+    #[arg(long)]
+    jobs: Option<usize>,
+    /// Run what is in the raw file already, by the very same program over the very same files.
+    #[arg(long)]
+    again: bool,
+    /// Put files that are not as wanted, and what came out, into this folder.
+    #[arg(long, value_name = "DIR")]
+    keep: Option<PathBuf>,
+    #[command(flatten)]
+    options: Closing,
+}
+
+#[derive(Args)]
+struct Which {
+    /// Families, or groups of them (an unknown name lists them); all otherwise.
+    #[arg(long, value_delimiter = ',', value_parser = families)]
+    families: Vec<Named>,
+    /// Files of each family.
+    #[arg(long, default_value_t = 50)]
+    seeds: u64,
+    /// The first seed.
+    #[arg(long, default_value_t = 1)]
+    first: u64,
+}
+
+/// One family, or a group.
+#[derive(Clone)]
+struct Named(Vec<Family>);
+
+fn families(name: &str) -> Result<Named, String> {
+    let found: Vec<_> = meaning::families().filter(|family| family.name == name || family.group == name).collect();
+    let names = || meaning::families().map(|family| family.name).collect::<Vec<_>>().join(", ");
+    if found.is_empty() { Err(format!("the families are {}", names())) } else { Ok(Named(found)) }
+}
+
+impl Which {
+    fn families(&self) -> Vec<Family> {
+        let named: Vec<_> = self.families.iter().flat_map(|named| named.0.iter().copied()).collect();
+        if named.is_empty() { meaning::families().collect() } else { named }
+    }
+}
+
+#[derive(Args)]
 struct Closing {
     /// The folder of raw files, instead of this crate's `results`. Page and plots are then put there, too.
     #[arg(long, value_name = "DIR")]
@@ -189,6 +268,8 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().task {
         Task::Generate { case, triangles, out, seed } => generate_file(case, triangles, &out, seed),
         Task::Judge { file, solid: true, .. } => judge_solid(&file),
+        Task::Judge { file, intended: Some(intended), .. } => judge_intended(&file, &intended),
+        Task::Judge { file, skin_of: Some(before), .. } => judge_skin(&file, &before),
         Task::Judge { file, reference, json, .. } => judge_file(&file, reference.as_deref(), json),
         Task::Picture(options) => picture::draw(&options).map(|()| ExitCode::SUCCESS),
         Task::Compare(choices) => compare_all(*choices),
@@ -197,6 +278,9 @@ fn main() -> ExitCode {
         Task::Solids { folder, sides, up_to, smallest, again, options } => {
             make_solids(&folder, &sides, up_to, smallest, again, options)
         }
+        Task::Meaning(choices) => judge_meaning(choices),
+        Task::Meant { folder, which } => write_meant(&folder, &which),
+        Task::Skin { folder, jobs, keep, options } => judge_skins(&folder, jobs, keep, options),
         Task::Publish(choices) => publish(choices.results.as_deref()).map(|()| ExitCode::SUCCESS),
     };
     done.unwrap_or_else(|error| {
@@ -234,6 +318,18 @@ fn judge_file(file: &Path, reference: Option<&Path>, json: bool) -> Result<ExitC
         }
     }
     Ok(ExitCode::from(u8::from(!judgement.sound())))
+}
+
+fn judge_intended(file: &Path, intended: &Path) -> Result<ExitCode, Box<dyn Error>> {
+    let (triangles, intended) = (mesh::read(file)?, mesh::read(intended)?);
+    println!("{:#?}", judge::fidelity(&triangles, &intended));
+    println!("bodies: {}", judge::judge_triangles(&triangles).positive_bodies);
+    Ok(ExitCode::SUCCESS)
+}
+
+fn judge_skin(file: &Path, before: &Path) -> Result<ExitCode, Box<dyn Error>> {
+    println!("{:#?}", judge::skin(&mesh::read(before)?, &mesh::read(file)?));
+    Ok(ExitCode::SUCCESS)
 }
 
 fn judge_solid(file: &Path) -> Result<ExitCode, Box<dyn Error>> {
@@ -280,6 +376,12 @@ fn stl_files(folder: &Path) -> Result<Vec<PathBuf>, Box<dyn Error>> {
     Ok(files)
 }
 
+/// Over all STL files of a folder.
+fn judge_skins(folder: &Path, jobs: usize, keep: Option<PathBuf>, choices: Closing) -> Result<ExitCode, Box<dyn Error>> {
+    let files = stl_files(folder)?;
+    closing(choices, "skin", false, |options| compare::skin::skins(options, &files, jobs.max(1), keep))
+}
+
 /// Over the STL files of a folder that are not too large, the smallest first: the raw file is always gone on with.
 fn make_solids(
     folder: &Path,
@@ -295,6 +397,29 @@ fn make_solids(
     files.sort_by_key(size);
     files.truncate(smallest.unwrap_or(usize::MAX));
     closing(choices, "solids", true, |options| compare::solids::solids(options, &files, sides, again))
+}
+
+/// Families over seeds: the raw file is always gone on with.
+fn judge_meaning(choices: Meaning) -> Result<ExitCode, Box<dyn Error>> {
+    let asked = compare::meaning::Asked {
+        families: choices.which.families(),
+        first: choices.which.first,
+        seeds: choices.which.seeds,
+        sides: choices.sides,
+        jobs: choices.jobs.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).max(1),
+        again: choices.again,
+        keep: choices.keep,
+    };
+    closing(choices.options, "meaning", true, |options| compare::meaning::meaning(options, &asked))
+}
+
+fn write_meant(folder: &Path, which: &Which) -> Result<ExitCode, Box<dyn Error>> {
+    for family in which.families() {
+        for seed in which.first..which.first + which.seeds {
+            compare::meaning::write_case(folder, &family, seed, &family.case(seed))?;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
 /// The command line as it is published.

@@ -1,38 +1,13 @@
-//! Triangles as three points, STL files of them, and the little arithmetic that pictures and measures need.
+//! Triangles as three points, and STL files of them.
 
 use std::collections::{HashMap, HashSet};
 use std::fs;
 use std::path::Path;
 
+pub(crate) use suture_bench::space::{Vector, cross, dot, length, minus, unit, wide};
+
 pub(crate) type Point = [f32; 3];
-pub(crate) type Vector = [f64; 3];
 pub(crate) type Triangle = [Point; 3];
-
-pub(crate) fn minus(a: Vector, b: Vector) -> Vector {
-    std::array::from_fn(|k| a[k] - b[k])
-}
-
-pub(crate) fn dot(a: Vector, b: Vector) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-pub(crate) fn cross(a: Vector, b: Vector) -> Vector {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-pub(crate) fn length(a: Vector) -> f64 {
-    dot(a, a).sqrt()
-}
-
-/// Of length 1; nothing stays nothing.
-pub(crate) fn unit(a: Vector) -> Vector {
-    let length = length(a).max(f64::MIN_POSITIVE);
-    a.map(|x| x / length)
-}
-
-pub(crate) fn wide(p: Point) -> Vector {
-    p.map(f64::from)
-}
 
 /// The finite triangles of an STL, binary (it has as many whole records as its count says, less than another one behind them is left
 /// out) or ASCII.

@@ -6,7 +6,7 @@ use suture_bench::generate::Case;
 
 use super::child::Cost;
 use super::error::Error;
-use super::made::{Closed, Shaped, Solved};
+use super::made::{Closed, Shaped, Skinned, Solved, Understood};
 use super::record::{Input, Line, Outcome, Run, Session, read};
 use super::sides::Side;
 use super::statistics::Spread;
@@ -45,6 +45,14 @@ impl Chapter {
 
     pub(super) fn solved(&self) -> impl Iterator<Item = &Solved> {
         self.lines.iter().filter_map(|line| if let Line::Solved(solved) = line { Some(&**solved) } else { None })
+    }
+
+    pub(super) fn understood(&self) -> impl Iterator<Item = &Understood> {
+        self.lines.iter().filter_map(|line| if let Line::Understood(understood) = line { Some(understood) } else { None })
+    }
+
+    pub(super) fn skinned(&self) -> impl Iterator<Item = &Skinned> {
+        self.lines.iter().filter_map(|line| if let Line::Skinned(skinned) = line { Some(&**skinned) } else { None })
     }
 
     #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use suture_bench::Counts;
-use suture_bench::judge::{BodiesFound, Fault, Solid};
+use suture_bench::judge::{BodiesFound, Fault, Skin, Solid};
 
 use super::sides::Side;
 use crate::holes::{Change, Hole, Measured};
@@ -157,6 +157,197 @@ impl Report {
             wraps: report["wraps"].as_array().map_or(0, |wraps| wraps.len() as u64),
             reasons: reasons.filter_map(|reason| reason.as_str().map(Into::into)).collect(),
         })
+    }
+}
+
+/// What one program made of one file whose meaning is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Verdict {
+    /// Called good, and what was meant.
+    Right,
+    /// Called good, and not what was meant.
+    Wrong,
+    /// A person is asked, and it is what was meant.
+    ReviewRight,
+    /// A person is asked, and it is not.
+    ReviewWrong,
+    /// The program says itself that it is not good, or made nothing; of one without a word of its own: it is not closed.
+    Withheld,
+    /// It broke off.
+    Failed,
+}
+
+impl Verdict {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Right => "right",
+            Self::Wrong => "wrong",
+            Self::ReviewRight => "review, right",
+            Self::ReviewWrong => "review, wrong",
+            Self::Withheld => "withheld",
+            Self::Failed => "failed",
+        }
+    }
+
+    /// Where the file does not decide, asking is as good; where no solid was meant, anything but calling one good is.
+    pub(crate) fn is_wanted(self, decides: bool, is_solid: bool) -> bool {
+        match self {
+            Self::Right => true,
+            Self::Wrong => false,
+            Self::ReviewRight | Self::ReviewWrong => !decides || !is_solid,
+            Self::Withheld | Self::Failed => !is_solid,
+        }
+    }
+}
+
+/// What one program made of the files of one family.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct Understood {
+    pub(crate) family: String,
+    pub(crate) group: String,
+    /// The file alone decides what was meant.
+    pub(crate) decides: bool,
+    pub(crate) side: Side,
+    /// What ran: a version, and the hash of the binary or the script.
+    pub(crate) program: String,
+    /// Names the files and what they mean.
+    pub(crate) cases: String,
+    /// Seeds are from this one on.
+    pub(crate) first: u64,
+    pub(crate) seeds: u64,
+    pub(crate) right: u64,
+    pub(crate) wrong: u64,
+    pub(crate) review_right: u64,
+    pub(crate) review_wrong: u64,
+    pub(crate) withheld: u64,
+    pub(crate) failed: u64,
+    /// As wanted: right, asked where that is as good, or nothing where nothing was meant.
+    pub(crate) wanted: u64,
+    /// Of those called good or handed to a person: such that cannot be printed.
+    pub(crate) unprintable: u64,
+    /// Of the right ones.
+    pub(crate) right_unprintable: u64,
+    pub(crate) seconds: f64,
+    pub(crate) slowest: f64,
+    pub(crate) bad: Vec<Bad>,
+}
+
+/// What Suture did to the skin of one real file.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct Skinned {
+    /// Its name.
+    pub(crate) file: String,
+    pub(crate) triangles: u64,
+    /// What ran.
+    pub(crate) program: String,
+    /// `None`: it said none, or broke off.
+    pub(crate) report: Option<Report>,
+    /// Of the surface, the share that was replaced by wraps.
+    pub(crate) wrapped: f64,
+    /// `None`: nothing was written.
+    pub(crate) skin: Option<Skin>,
+    pub(crate) seconds: f64,
+}
+
+impl Skinned {
+    /// `repaired`, `needs_review`, …, or that it broke off.
+    pub(crate) fn outcome(&self) -> &str {
+        self.report.as_ref().map_or("failed", |report| &report.outcome)
+    }
+
+    pub(crate) fn is_called_good(&self) -> bool {
+        ["clean", "repaired"].contains(&self.outcome())
+    }
+}
+
+/// A file that is not as wanted.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct Bad {
+    pub(crate) seed: u64,
+    pub(crate) verdict: Verdict,
+    pub(crate) why: String,
+}
+
+impl Understood {
+    pub(crate) fn new(family: &str, group: &str, side: Side, program: String, cases: String) -> Self {
+        Self {
+            family: family.into(),
+            group: group.into(),
+            decides: true,
+            side,
+            program,
+            cases,
+            first: 0,
+            seeds: 0,
+            right: 0,
+            wrong: 0,
+            review_right: 0,
+            review_wrong: 0,
+            withheld: 0,
+            failed: 0,
+            wanted: 0,
+            unprintable: 0,
+            right_unprintable: 0,
+            seconds: 0.0,
+            slowest: 0.0,
+            bad: Vec::new(),
+        }
+    }
+
+    pub(crate) fn add(&mut self, verdict: Verdict, unprintable: bool, seconds: f64, wanted: bool, bad: Option<Bad>) {
+        let count = match verdict {
+            Verdict::Right => &mut self.right,
+            Verdict::Wrong => &mut self.wrong,
+            Verdict::ReviewRight => &mut self.review_right,
+            Verdict::ReviewWrong => &mut self.review_wrong,
+            Verdict::Withheld => &mut self.withheld,
+            Verdict::Failed => &mut self.failed,
+        };
+        *count += 1;
+        self.seeds += 1;
+        self.wanted += u64::from(wanted);
+        self.unprintable += u64::from(unprintable);
+        self.right_unprintable += u64::from(unprintable && verdict == Verdict::Right);
+        self.seconds += seconds;
+        self.slowest = self.slowest.max(seconds);
+        self.bad.extend(bad);
+    }
+
+    /// Of all together; `None` of none.
+    pub(crate) fn sum<'a>(lines: impl Iterator<Item = &'a Self>) -> Option<Self> {
+        lines.cloned().reduce(|mut sum, line| {
+            sum.seeds += line.seeds;
+            sum.right += line.right;
+            sum.wrong += line.wrong;
+            sum.review_right += line.review_right;
+            sum.review_wrong += line.review_wrong;
+            sum.withheld += line.withheld;
+            sum.failed += line.failed;
+            sum.wanted += line.wanted;
+            sum.unprintable += line.unprintable;
+            sum.right_unprintable += line.right_unprintable;
+            sum.seconds += line.seconds;
+            sum.slowest = sum.slowest.max(line.slowest);
+            sum
+        })
+    }
+
+    /// In one line.
+    pub(crate) fn summary(&self) -> String {
+        format!(
+            "{:4} files: {:4} right, {:3} wrong, {:3} + {:3} review (right + wrong), {:3} withheld, {:3} failed, {:3} unprintable, {:6.1} s, slowest {:.1} s",
+            self.seeds,
+            self.right,
+            self.wrong,
+            self.review_right,
+            self.review_wrong,
+            self.withheld,
+            self.failed,
+            self.unprintable,
+            self.seconds,
+            self.slowest
+        )
     }
 }
 

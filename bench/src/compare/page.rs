@@ -7,6 +7,8 @@ use super::child::Cost;
 use super::machine::Machine;
 use super::page_arrays;
 use super::page_closing;
+use super::page_meaning;
+use super::page_skin;
 use super::page_solids;
 use super::record::{Input, Judged, is_good};
 use super::sides::{LICENCES, Side};
@@ -41,6 +43,8 @@ pub(super) fn page(book: &Book, plots: &[(String, String)]) -> String {
     page += &searches(book);
     page += &page_closing::shapes(book);
     page += &page_closing::files(book);
+    page += &page_meaning::meaning(book);
+    page += &page_skin::skin(book);
     page += &page_solids::solids(book);
     page += &page_arrays::arrays(book);
     for input in book.inputs() {
@@ -57,6 +61,7 @@ fn peers(book: &Book) -> String {
     let inputs = book.inputs();
     for side in Side::ALL {
         let ran = book.chapters.iter().flat_map(|chapter| chapter.solved()).any(|line| line.side == side)
+            || book.chapters.iter().flat_map(|chapter| chapter.understood()).any(|line| line.side == side)
             || inputs.iter().any(|input| book.ways(input).iter().any(|way| way.side == side));
         let name = side.facts().name;
         let licence = LICENCES.iter().find(|(peer, _)| name.starts_with(peer)).map_or("", |(_, licence)| licence);

@@ -12,7 +12,7 @@ use suture_bench::judge::{Judgement, Kept};
 use super::child::Cost;
 use super::error::Error;
 use super::machine::Machine;
-use super::made::{Closed, Shaped, Solved};
+use super::made::{Closed, Shaped, Skinned, Solved, Understood};
 use super::sides::Side;
 use super::statistics::spaced;
 use super::way::Way;
@@ -29,6 +29,8 @@ pub(crate) enum Line {
     Shaped(Shaped),
     Closed(Closed),
     Solved(Box<Solved>),
+    Understood(Understood),
+    Skinned(Box<Skinned>),
     /// Something was left out, and why.
     Skipped {
         side: Side,
@@ -163,6 +165,10 @@ impl Journal {
         let lines = if resume && path.exists() { read(path)? } else { Vec::new() };
         let file = if resume { File::options().create(true).append(true).open(path) } else { File::create(path) };
         Ok(Self { file: file.map_err(Error::io(action()))?, path: path.into(), lines })
+    }
+
+    pub(super) fn understood(&self) -> impl Iterator<Item = &Understood> {
+        self.lines.iter().filter_map(|line| if let Line::Understood(understood) = line { Some(understood) } else { None })
     }
 
     /// Drops those lines that `keep` says no to, in the file as well: all at once, so that it is never half of what it was.

@@ -16,6 +16,7 @@ use std::io::Write;
 use std::path::Path;
 
 pub use case::{Case, Error, Result, Truth};
+pub(crate) use noise::{Random, turn};
 
 /// Writes about `triangles` triangles (at least one cell of 512; the truth says how many) of `case` as binary STL.
 ///

@@ -19,31 +19,31 @@ pub(super) fn noise(seed: u64, key: u64) -> f64 {
 }
 
 /// A stream of random numbers (SplitMix64).
-pub(super) struct Random(u64);
+pub(crate) struct Random(u64);
 
 impl Random {
-    pub(super) fn new(seed: u64, key: u64) -> Self {
+    pub(crate) fn new(seed: u64, key: u64) -> Self {
         Self(hash(seed, key))
     }
 
-    pub(super) fn next(&mut self) -> u64 {
+    pub(crate) fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         scatter(self.0)
     }
 
     /// A whole number from `low` to `high`, both included (the bias of the remainder does not matter here).
-    pub(super) fn within(&mut self, low: usize, high: usize) -> usize {
+    pub(crate) fn within(&mut self, low: usize, high: usize) -> usize {
         low + (self.next() % (high - low + 1) as u64) as usize
     }
 
     /// A number in [0, 1).
-    pub(super) fn unit(&mut self) -> f64 {
+    pub(crate) fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 }
 
 /// Cosine and sine of `part / whole` of a full turn, within 2e-16.
-pub(super) fn turn(part: u64, whole: u64) -> (f64, f64) {
+pub(crate) fn turn(part: u64, whole: u64) -> (f64, f64) {
     let part = u128::from(part % whole) * 8;
     let (octant, rest) = (part / u128::from(whole), part % u128::from(whole));
     // Odd octants are measured back from their end, so that the angle is at most an eighth of a turn.
@@ -78,7 +78,7 @@ pub(super) struct Permutation {
 }
 
 impl Permutation {
-    pub(super) fn new(seed: u64, count: u64) -> Self {
+    pub(crate) fn new(seed: u64, count: u64) -> Self {
         let bits = 64 - count.max(2).leading_zeros();
         Self { seed, count, half_bits: bits.div_ceil(2) }
     }

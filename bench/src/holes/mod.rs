@@ -8,6 +8,8 @@ mod surface;
 
 use std::path::Path;
 
+use suture_bench::judge::Near;
+
 use crate::mesh::{self, Triangle};
 
 pub(crate) use cut::{Hole, bowl, mesh as with_hole};
@@ -42,8 +44,7 @@ pub(crate) fn change(before: &[Triangle], after: &[Triangle]) -> Change {
     }
     let diagonal = mesh::length(mesh::minus(hi, lo)).max(f64::MIN_POSITIVE);
     // What stands in both is nowhere far away.
-    let far =
-        |from: &[Triangle], to: &[Triangle]| distance::farthest(&mesh::not_in(from, to), &distance::Tree::new(to)) / diagonal;
+    let far = |from: &[Triangle], to: &[Triangle]| distance::farthest(&mesh::not_in(from, to), &Near::new(to)) / diagonal;
     let kept = mesh::kept(before, after) as f64 / before.len().max(1) as f64;
     Change { kept, taken: far(before, after), added: far(after, before) }
 }

@@ -4,17 +4,20 @@
 //! Vertices are identified by exact f32 coordinates (−0.0 = 0.0), as a slicer does; nothing is tolerated, nothing merged.
 //! Triangles with a coordinate that is no number are dropped and counted; triangles with a repeated vertex are counted and left
 //! out of everything else. [`judge`] does not look for self-intersections; [`solid()`] does, and says whether a file can be printed.
-//! [`Bodies`] tells which bodies of a mesh are still in another one.
+//! [`Bodies`] tells which bodies of a mesh are still in another one, [`fidelity()`] how much of a solid that was meant is there.
 //!
 //! O(n log n) time, about 100 bytes of memory a triangle.
 
 mod bodies;
 mod boxes;
 mod exact;
+mod fidelity;
 mod judgement;
 mod kept;
 mod meet;
+mod near;
 mod shells;
+mod skin;
 mod solid;
 mod stl;
 mod topology;
@@ -22,8 +25,11 @@ mod topology;
 use std::path::Path;
 
 pub use bodies::{Bodies, Found as BodiesFound};
+pub use fidelity::{Fidelity, fidelity};
 pub use judgement::{Judgement, Triangle};
 pub use kept::{Kept, Same, kept_in_order};
+pub use near::Near;
+pub use skin::{Place, Skin, skin};
 pub use solid::{Fault, Solid, solid};
 pub use stl::{Error, Result};
 
@@ -33,6 +39,17 @@ pub use stl::{Error, Result};
 /// When the file cannot be read, or is no binary STL whose length is what its count says.
 pub fn judge(path: &Path) -> Result<Judgement> {
     Ok(topology::judge(stl::Soup::read(path)?))
+}
+
+/// The same of triangles, which are finite.
+pub fn judge_triangles(triangles: &[Triangle]) -> Judgement {
+    topology::judge(stl::Soup::of(triangles))
+}
+
+/// Signed volumes of the components that are sealed: every edge is used equally often in each direction.
+pub fn volumes(triangles: &[Triangle]) -> Vec<f64> {
+    let parts = topology::examine(stl::Soup::of(triangles)).1;
+    parts.volumes.iter().zip(&parts.sealed).filter(|(_, sealed)| **sealed).map(|(volume, _)| *volume).collect()
 }
 
 #[cfg(test)]

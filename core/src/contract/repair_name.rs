@@ -20,6 +20,8 @@ pub enum RepairName {
     Surplus,
     /// Boundary vertices within the weld tolerance were moved to one position.
     ToleranceWeld,
+    /// Rims that run along each other were joined, farther apart than the weld tolerance.
+    Sew,
     /// Edges were split at vertices that lie on them.
     TJunction,
     /// Boundary vertices were merged across a narrow gap.
@@ -65,12 +67,13 @@ pub enum RepairName {
 
 impl RepairName {
     /// Every kind, in the order of the pipeline.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::Degenerate,
         Self::Duplicate,
         Self::Overlap,
         Self::Surplus,
         Self::ToleranceWeld,
+        Self::Sew,
         Self::TJunction,
         Self::Zip,
         Self::SlitSides,
@@ -98,6 +101,7 @@ impl RepairName {
             Self::Overlap => "overlap",
             Self::Surplus => "surplus",
             Self::ToleranceWeld => "tolerance_weld",
+            Self::Sew => "sew",
             Self::TJunction => "t_junction",
             Self::Zip => "zip",
             Self::SlitSides => "slit_sides",

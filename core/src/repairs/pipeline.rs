@@ -27,6 +27,7 @@ use crate::repairs::separate::pinch_vertices;
 use crate::repairs::shared::context::{Context, Repair};
 use crate::repairs::shared::probes::Probes;
 use crate::repairs::stitch::overlaps;
+use crate::repairs::stitch::sew;
 use crate::repairs::stitch::slits;
 use crate::repairs::stitch::t_junctions;
 use crate::repairs::stitch::weld;
@@ -59,6 +60,7 @@ pub(crate) const ALL: &[Step] = &[
             Do(duplicates::DUPLICATE),
             Do(surplus::REPAIR),
             Do(weld::REPAIR),
+            Do(sew::REPAIR),
             Do(degenerate::DEGENERATE),
             Do(duplicates::DUPLICATE),
             Do(surplus::REPAIR),
@@ -142,6 +144,7 @@ pub(crate) const RECOGNITION: &[Step] = &[
     Do(duplicates::DUPLICATE),
     Do(surplus::REPAIR),
     Do(weld::REPAIR),
+    Do(sew::REPAIR),
     Do(degenerate::DEGENERATE),
     Do(duplicates::DUPLICATE),
     Do(surplus::REPAIR),

@@ -47,27 +47,36 @@ pub(crate) enum Step {
 
 use Step::{Look, Repair as Do, Rounds};
 
+/// What lies together becomes one.
+const JOIN: Step = Rounds(
+    4,
+    &[
+        Do(degenerate::DEGENERATE),
+        Do(duplicates::DUPLICATE),
+        Do(surplus::REPAIR),
+        Do(weld::REPAIR),
+        Do(sew::REPAIR),
+        Do(degenerate::DEGENERATE),
+        Do(duplicates::DUPLICATE),
+        Do(surplus::REPAIR),
+        Look(recognise_loops),
+        Do(t_junctions::REPAIR),
+    ],
+);
+
 /// From the file as it came to what is written.
 pub(crate) const ALL: &[Step] = &[
     Do(degenerate::REPEATED),
     Do(duplicates::DUPLICATE),
-    Do(overlaps::REPAIR),
     Look(|cx| complete_at_seams(cx.survey, &mut cx.work)),
-    Rounds(
-        4,
-        &[
-            Do(degenerate::DEGENERATE),
-            Do(duplicates::DUPLICATE),
-            Do(surplus::REPAIR),
-            Do(weld::REPAIR),
-            Do(sew::REPAIR),
-            Do(degenerate::DEGENERATE),
-            Do(duplicates::DUPLICATE),
-            Do(surplus::REPAIR),
-            Look(recognise_loops),
-            Do(t_junctions::REPAIR),
-        ],
-    ),
+    Do(degenerate::DEGENERATE),
+    Do(duplicates::DUPLICATE),
+    Do(surplus::REPAIR),
+    // What was drawn twice with little between is one surface then, and no overlap.
+    Do(weld::REPAIR),
+    Do(sew::REPAIR),
+    Do(overlaps::REPAIR),
+    JOIN,
     Do(zip::REPAIR),
     Do(degenerate::DEGENERATE),
     Do(duplicates::DUPLICATE),
@@ -138,13 +147,17 @@ pub(crate) const WRAP: &[Step] = &[
 pub(crate) const RECOGNITION: &[Step] = &[
     Do(degenerate::REPEATED),
     Do(duplicates::DUPLICATE),
-    Do(overlaps::REPAIR),
     Look(|cx| complete_at_seams(cx.survey, &mut cx.work)),
     Do(degenerate::DEGENERATE),
     Do(duplicates::DUPLICATE),
     Do(surplus::REPAIR),
     Do(weld::REPAIR),
     Do(sew::REPAIR),
+    Do(degenerate::DEGENERATE),
+    Do(duplicates::DUPLICATE),
+    Do(surplus::REPAIR),
+    Do(overlaps::REPAIR),
+    Do(weld::REPAIR),
     Do(degenerate::DEGENERATE),
     Do(duplicates::DUPLICATE),
     Do(surplus::REPAIR),

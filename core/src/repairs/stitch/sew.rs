@@ -52,14 +52,17 @@ pub(crate) fn sew(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Toleranc
     let gap = if profile.max_gap_mm > 0.0 { profile.max_gap_mm } else { f64::INFINITY };
     let widest = (profile.sew_relative * survey.bounds.diagonal()).min(gap);
     let mut sewn = Sewn::default();
-    let mut width = tolerance.weld;
-    // Whatever lies within the first step of each other is one thing to any printer.
-    let mut is_crack = true;
-    while width > 0.0 && width < widest && work.edges().1.iter().any(|e| e.is_boundary()) {
-        width = (STEP * width).min(widest);
-        let at = Width { tolerance: Tolerance { weld: width, edge_share: tolerance.edge_share }, is_crack };
-        step(survey, work, profile, &at, &mut sewn);
-        is_crack = false;
+    // A split leaves short edges, which bound what comes after it: so first whatever needs none, as wide as may be.
+    for way in [join, split] {
+        let mut width = tolerance.weld;
+        // Whatever lies within the first step of each other is one thing to any printer.
+        let mut is_crack = true;
+        while width > 0.0 && width < widest && work.edges().1.iter().any(|e| e.is_boundary()) {
+            width = (STEP * width).min(widest);
+            let tolerance = Tolerance { weld: width, edge_share: tolerance.edge_share };
+            way(survey, work, profile, &Width { tolerance, is_crack }, &mut sewn);
+            is_crack = false;
+        }
     }
     sewn
 }
@@ -71,16 +74,15 @@ pub(crate) struct Width {
     pub(crate) is_crack: bool,
 }
 
-/// One width: rims as they are, then with splits.
-fn step(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile, width: &Width, sewn: &mut Sewn) {
-    join(survey, work, profile, width, sewn);
+/// Splits edges where the vertices of rims differ, and matches and joins then; as [`join`].
+fn split(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile, width: &Width, sewn: &mut Sewn) -> Option<Vec<u32>> {
     let (submesh, edges) = work.edges();
     let known = rims::Rims::of(survey, submesh, edges, width, &[]);
     let mut wanted = splits::wanted(submesh, edges, &known);
     let before = work.triangles.clone();
     for _ in 0..weld::ATTEMPTS {
         if wanted.is_empty() {
-            return;
+            break;
         }
         let made = splits::make(work, &wanted);
         let mut more = Sewn { widest: sewn.widest, ..Sewn::default() };
@@ -90,11 +92,12 @@ fn step(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile, width: &Wid
             sewn.vertices += more.vertices;
             sewn.splits += made.len() as u64;
             sewn.widest = more.widest.max(wanted.iter().map(|on| on.distance).fold(0.0, f64::max));
-            return;
+            return target;
         }
         work.restore(&before);
         wanted.retain(|on| idle.binary_search(&(on.edge, on.vertex)).is_err());
     }
+    None
 }
 
 /// Matches edges and joins their ends. Returns where each vertex went, if any did.

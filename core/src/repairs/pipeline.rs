@@ -13,6 +13,7 @@ use crate::detect::holes;
 use crate::repairs::boolean::enclosed;
 use crate::repairs::boolean::hidden;
 use crate::repairs::boolean::resolve;
+use crate::repairs::cleanup::copies;
 use crate::repairs::cleanup::debris;
 use crate::repairs::cleanup::degenerate;
 use crate::repairs::cleanup::duplicates;
@@ -68,6 +69,7 @@ const JOIN: Step = Rounds(
 pub(crate) const ALL: &[Step] = &[
     Do(degenerate::REPEATED),
     Do(duplicates::DUPLICATE),
+    Do(copies::REPAIR),
     Look(|cx| complete_at_seams(cx.survey, &mut cx.work)),
     Do(degenerate::DEGENERATE),
     Do(duplicates::DUPLICATE),
@@ -147,6 +149,7 @@ pub(crate) const WRAP: &[Step] = &[
 pub(crate) const RECOGNITION: &[Step] = &[
     Do(degenerate::REPEATED),
     Do(duplicates::DUPLICATE),
+    Do(copies::REPAIR),
     Look(|cx| complete_at_seams(cx.survey, &mut cx.work)),
     Do(degenerate::DEGENERATE),
     Do(duplicates::DUPLICATE),

@@ -1,5 +1,6 @@
 //! What is no surface goes: repeated and copied triangles, triangles without area, debris, sheets.
 
+pub(crate) mod copies;
 pub(crate) mod debris;
 pub(crate) mod degenerate;
 pub(crate) mod duplicates;

@@ -1,6 +1,6 @@
 //! Which matches are made, and which vertices become one by them.
 
-use crate::repairs::stitch::sew::rims::{Match, Rims, What};
+use crate::repairs::stitch::sew::rims::{Match, Rims};
 use crate::submesh::{Submesh, Vertex};
 use crate::util::union_find;
 
@@ -10,21 +10,12 @@ pub(crate) fn of(submesh: &Submesh, vertices: &[Vertex], rims: &Rims, matches: &
     let mut taken = Taken::of(submesh, vertices);
     let mut is_used = vec![false; rims.edges.len()];
     let mut widest = 0.0f64;
-    for Match { width, what } in matches {
-        let is_taken = match what {
-            What::Copy { triangles: [first, copy], turned } => taken.copy(*first, *copy, *turned),
-            What::Edges { edges: [i, j], against } => {
-                let [a, b] = [i, j].map(|i| &rims.edges[*i as usize]);
-                let is_free = [i, j].iter().all(|i| !is_used[**i as usize]);
-                let other = if *against { [b.ends[1], b.ends[0]] } else { b.ends };
-                let is_taken = is_free && taken.edge([a.triangle, b.triangle], a.ends, other, &rims.reach);
-                if is_taken {
-                    [i, j].iter().for_each(|i| is_used[**i as usize] = true);
-                }
-                is_taken
-            }
-        };
-        if is_taken {
+    for Match { width, edges, against } in matches {
+        let [i, j] = edges.map(|i| i as usize);
+        let [a, b] = [&rims.edges[i], &rims.edges[j]];
+        let other = if *against { [b.ends[1], b.ends[0]] } else { b.ends };
+        if !is_used[i] && !is_used[j] && a.triangle != b.triangle && taken.edge(a.ends, other, &rims.reach) {
+            (is_used[i], is_used[j]) = (true, true);
             widest = widest.max(*width);
         }
     }
@@ -39,14 +30,12 @@ struct Taken<'m> {
     parents: Vec<u32>,
     /// By root.
     members: Vec<Vec<Vertex>>,
-    /// Copies, which will be gone; ascending.
-    gone: std::collections::BTreeSet<u32>,
 }
 
 impl<'m> Taken<'m> {
     fn of(submesh: &'m Submesh, vertices: &'m [Vertex]) -> Self {
         let members = vertices.iter().map(|v| vec![*v]).collect();
-        Self { submesh, vertices, parents: (0..vertices.len() as u32).collect(), members, gone: Default::default() }
+        Self { submesh, vertices, parents: (0..vertices.len() as u32).collect(), members }
     }
 
     /// The set of a vertex; `None` if it is not on the boundary.
@@ -72,7 +61,6 @@ impl<'m> Taken<'m> {
         let mut all: Vec<u32> = members.flat_map(|v| self.submesh.star(*v).map(|(t, _)| t)).collect();
         all.sort_unstable();
         all.dedup();
-        all.retain(|t| !self.gone.contains(t));
         all
     }
 
@@ -89,23 +77,10 @@ impl<'m> Taken<'m> {
         }
     }
 
-    /// Puts the second triangle, turned, on the first one.
-    fn copy(&mut self, first: u32, copy: u32, turned: usize) -> bool {
-        let [a, b] = [first, copy].map(|t| self.submesh.triangles[t as usize].v);
-        let pairs = [0, 1, 2].map(|k| (a[k], b[(k + turned) % 3]));
-        if self.gone.contains(&first) || self.gone.contains(&copy) || pairs.iter().any(|(v, w)| self.flattens(*v, *w)) {
-            return false;
-        }
-        pairs.into_iter().for_each(|(v, w)| self.unite(v, w));
-        self.gone.insert(copy);
-        true
-    }
-
-    /// Makes two edges one, of exactly these two triangles.
-    fn edge(&mut self, triangles: [u32; 2], a: [Vertex; 2], b: [Vertex; 2], reach: &[f64]) -> bool {
+    /// Makes two edges one, of two triangles and no more.
+    fn edge(&mut self, a: [Vertex; 2], b: [Vertex; 2], reach: &[f64]) -> bool {
         let pairs = [(a[0], b[0]), (a[1], b[1])];
-        let is_possible = triangles.iter().all(|t| !self.gone.contains(t))
-            && pairs.iter().all(|(v, w)| !self.flattens(*v, *w) && self.hangs_together(*v, *w, reach));
+        let is_possible = pairs.iter().all(|(v, w)| !self.flattens(*v, *w) && self.hangs_together(*v, *w, reach));
         if !is_possible {
             return false;
         }

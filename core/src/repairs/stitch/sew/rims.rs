@@ -9,8 +9,6 @@
 //!   much more than they lie apart now, as at the edge of a wedge;
 //! * not both belong to bodies with a hole, unless to the same one or within the first step: there may be a clearance between them. A body
 //!   with a hole has more area than a flat piece can have within such rims (the isoperimetric inequality).
-//!
-//! Two triangles on three vertices within a tenth of the reach, facing the same way, are copies of each other.
 
 use std::f64::consts::PI;
 
@@ -50,19 +48,14 @@ pub(crate) struct RimEdge {
 }
 
 /// Two that are to become one.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Match {
-    /// How far the vertices lie apart, at most.
+    /// How far their ends lie apart, at most.
     pub(crate) width: f64,
-    pub(crate) what: What,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum What {
-    /// Triangles: the second one is a copy of the first, turned by so many corners.
-    Copy { triangles: [u32; 2], turned: usize },
-    /// Edges by place in [`Rims::edges`], and whether they run against each other.
-    Edges { edges: [u32; 2], against: bool },
+    /// By place in [`Rims::edges`].
+    pub(crate) edges: [u32; 2],
+    /// They run against each other.
+    pub(crate) against: bool,
 }
 
 /// All boundary edges, with what it takes to judge them.
@@ -133,28 +126,25 @@ impl Rims {
         Some(most)
     }
 
-    /// All that may be matched: copies first, then the nearest.
+    /// All that may be matched, the nearest first.
     pub(crate) fn matches(&self, submesh: &Submesh) -> Vec<Match> {
-        let middles: Vec<Bounds> = self.edges.iter().map(|e| middle(submesh, &e.ends, 0.0)).collect();
+        let middles: Vec<Bounds> = self.edges.iter().map(|e| middle(submesh, e.ends, 0.0)).collect();
         if middles.is_empty() {
             return Vec::new();
         }
         let tree = BoxTree::new(&middles);
         let mut found = Vec::new();
-        let mut all = self.copies(submesh);
+        let mut all = Vec::new();
         for (i, edge) in (0..).zip(&self.edges) {
             let reach = edge.ends.map(|v| self.reach[v as usize]);
-            tree.meeting(&middle(submesh, &edge.ends, reach[0].min(reach[1])), &mut found);
+            tree.meeting(&middle(submesh, edge.ends, reach[0].min(reach[1])), &mut found);
             found.retain(|j| *j > i);
             if found.len() > MOST {
                 continue;
             }
             all.extend(found.iter().filter_map(|j| self.matching(submesh, [i, *j])));
         }
-        all.sort_by(|a, b| {
-            let is_edge = |m: &Match| matches!(m.what, What::Edges { .. });
-            is_edge(a).cmp(&is_edge(b)).then(a.width.total_cmp(&b.width)).then(a.what.cmp(&b.what))
-        });
+        all.sort_by(|a: &Match, b| a.width.total_cmp(&b.width).then(a.edges.cmp(&b.edges)));
         all
     }
 
@@ -165,53 +155,7 @@ impl Rims {
             Some(width) => (width, true),
             None => (self.apart(submesh, a.ends, [from, to], UNSURE)?, false),
         };
-        self.may_join(a, b, width).then_some(Match { width, what: What::Edges { edges, against } })
-    }
-
-    /// Triangles that hang on nothing and lie on another one whose corners are all on the boundary, facing the same way.
-    fn copies(&self, submesh: &Submesh) -> Vec<Match> {
-        let corners = |t: u32| submesh.triangles[t as usize].v;
-        let mut touched: Vec<u32> = self.edges.iter().map(|e| e.triangle).collect();
-        touched.sort_unstable();
-        let lone: Vec<u32> = touched.chunk_by(|a, b| a == b).filter(|g| g.len() == 3).map(|g| g[0]).collect();
-        touched.dedup();
-        touched.retain(|t| corners(*t).iter().all(|v| self.reach[*v as usize] > 0.0));
-        if lone.is_empty() || touched.len() < 2 {
-            return Vec::new();
-        }
-        let tree = BoxTree::new(&touched.iter().map(|t| middle(submesh, &corners(*t), 0.0)).collect::<Vec<_>>());
-        let mut found = Vec::new();
-        let mut all = Vec::new();
-        for copy in lone {
-            let reach = corners(copy).map(|v| self.reach[v as usize]).into_iter().fold(f64::INFINITY, f64::min);
-            tree.meeting(&middle(submesh, &corners(copy), UNSURE * reach), &mut found);
-            for first in found.iter().take(MOST).map(|i| touched[*i as usize]).filter(|t| *t != copy) {
-                // Of two lone ones the later one is the copy.
-                let is_lone = first > copy && self.is_lone(submesh, first);
-                let turned = (0..3).find_map(|turned| {
-                    let other = std::array::from_fn::<_, 3, _>(|k| corners(copy)[(k + turned) % 3]);
-                    Some((turned, self.lies_on(submesh, corners(first), other)?))
-                });
-                if let (Some((turned, width)), false) = (turned, is_lone) {
-                    all.push(Match { width, what: What::Copy { triangles: [first, copy], turned } });
-                }
-            }
-        }
-        all
-    }
-
-    /// No two of its corners are on an edge with another triangle.
-    fn is_lone(&self, submesh: &Submesh, t: u32) -> bool {
-        let v = submesh.triangles[t as usize].v;
-        (0..3).all(|k| {
-            let (a, b) = (v[k], v[(k + 1) % 3]);
-            submesh.star(a).all(|(other, _)| other == t || !submesh.triangles[other as usize].v.contains(&b))
-        })
-    }
-
-    fn lies_on(&self, submesh: &Submesh, a: [Vertex; 3], b: [Vertex; 3]) -> Option<f64> {
-        let sides = [0, 1].map(|k| self.apart(submesh, [a[k], a[k + 1]], [b[k], b[k + 1]], UNSURE));
-        sides.into_iter().try_fold(0.0, |most: f64, side| Some(most.max(side?)))
+        self.may_join(a, b, width).then_some(Match { width, edges, against })
     }
 }
 
@@ -222,9 +166,8 @@ fn inward(submesh: &Submesh, triangle: u32, [from, to]: [Vertex; 2]) -> DVec3 {
     to_apex - along * (to_apex.dot(along) / along.dot(along).max(f64::MIN_POSITIVE))
 }
 
-/// The box around the middle of some vertices.
-fn middle(submesh: &Submesh, vertices: &[Vertex], by: f64) -> Bounds {
-    let sum: DVec3 = vertices.iter().map(|v| submesh.place(*v)).sum();
-    let middle = sum / vertices.len() as f64;
+/// The box around the middle of an edge.
+fn middle(submesh: &Submesh, [a, b]: [Vertex; 2], by: f64) -> Bounds {
+    let middle = (submesh.place(a) + submesh.place(b)) / 2.0;
     around(&[[middle.x as f32, middle.y as f32, middle.z as f32]], by)
 }

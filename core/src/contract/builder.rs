@@ -55,6 +55,7 @@ impl ProfileBuilder {
     setters! {
         weld_relative: f64,
         weld_max_edge_share: f64,
+        sew_relative: f64,
         gap_edge_share: f64,
         max_hole_edges: u32,
         max_hole_perimeter_relative: f64,

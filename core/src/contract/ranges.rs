@@ -56,11 +56,12 @@ impl Profile {
     }
 
     /// Every setting that is not a whole number or a choice, with its range. All fields are named, so that a new one cannot be forgotten here.
-    fn numbers(&self) -> [(&'static str, f64, Range); 19] {
+    fn numbers(&self) -> [(&'static str, f64, Range); 20] {
         let Self {
             name: _,
             weld_relative,
             weld_max_edge_share,
+            sew_relative,
             gap_edge_share,
             max_hole_perimeter_relative,
             max_hole_perimeter_mm,
@@ -97,6 +98,7 @@ impl Profile {
         [
             ("weld_relative", *weld_relative, Range::Share),
             ("weld_max_edge_share", *weld_max_edge_share, Range::Share),
+            ("sew_relative", *sew_relative, Range::Share),
             ("gap_edge_share", *gap_edge_share, Range::Bound),
             ("max_hole_perimeter_relative", *max_hole_perimeter_relative, Range::Bound),
             ("max_hole_perimeter_mm", *max_hole_perimeter_mm, Range::Bound),

@@ -22,6 +22,8 @@ pub enum RepairName {
     Surplus,
     /// Boundary vertices within the weld tolerance were moved to one position.
     ToleranceWeld,
+    /// Rims that run along each other were joined, farther apart than the weld tolerance.
+    Sew,
     /// Edges were split at vertices that lie on them.
     TJunction,
     /// Boundary vertices were merged across a narrow gap.
@@ -74,6 +76,7 @@ impl RepairName {
         Self::Overlap,
         Self::Surplus,
         Self::ToleranceWeld,
+        Self::Sew,
         Self::TJunction,
         Self::Zip,
         Self::SlitSides,
@@ -102,6 +105,7 @@ impl RepairName {
             Self::Overlap => "overlap",
             Self::Surplus => "surplus",
             Self::ToleranceWeld => "tolerance_weld",
+            Self::Sew => "sew",
             Self::TJunction => "t_junction",
             Self::Zip => "zip",
             Self::SlitSides => "slit_sides",

@@ -22,6 +22,9 @@ pub struct Profile {
     pub weld_relative: f64,
     /// Upper bound of the weld tolerance as a share of the shortest edge at either vertex.
     pub weld_max_edge_share: f64,
+    /// Rims that run along each other as the sides of a crack do are joined while they lie within this fraction of the diagonal of each other,
+    /// and within [`Profile::weld_max_edge_share`]. 0 switches sewing off.
+    pub sew_relative: f64,
     /// Gaps are zipped while they are narrower than this share of the rim's edges. 0 switches zipping off.
     pub gap_edge_share: f64,
     /// Loops of more boundary edges than this are reported, not filled.
@@ -154,6 +157,7 @@ impl Default for Profile {
             name: "default".into(),
             weld_relative: 1e-5,
             weld_max_edge_share: 0.25,
+            sew_relative: 0.01,
             gap_edge_share: 0.35,
             max_hole_edges: 20_000,
             max_hole_perimeter_relative: 8.0,

@@ -14,6 +14,7 @@ use crate::detect::skin;
 use crate::repairs::boolean::enclosed;
 use crate::repairs::boolean::hidden;
 use crate::repairs::boolean::resolve;
+use crate::repairs::cleanup::copies;
 use crate::repairs::cleanup::debris;
 use crate::repairs::cleanup::degenerate;
 use crate::repairs::cleanup::duplicates;
@@ -28,6 +29,7 @@ use crate::repairs::separate::pinch_vertices;
 use crate::repairs::shared::context::{Context, Repair};
 use crate::repairs::shared::probes::Probes;
 use crate::repairs::stitch::overlaps;
+use crate::repairs::stitch::sew;
 use crate::repairs::stitch::slits;
 use crate::repairs::stitch::t_junctions;
 use crate::repairs::stitch::weld;
@@ -47,26 +49,37 @@ pub(crate) enum Step {
 
 use Step::{Look, Repair as Do, Rounds};
 
+/// What lies together becomes one.
+const JOIN: Step = Rounds(
+    4,
+    &[
+        Do(degenerate::DEGENERATE),
+        Do(duplicates::DUPLICATE),
+        Do(surplus::REPAIR),
+        Do(weld::REPAIR),
+        Do(sew::REPAIR),
+        Do(degenerate::DEGENERATE),
+        Do(duplicates::DUPLICATE),
+        Do(surplus::REPAIR),
+        Look(recognise_loops),
+        Do(t_junctions::REPAIR),
+    ],
+);
+
 /// From the file as it came to what is written.
 pub(crate) const ALL: &[Step] = &[
     Do(degenerate::REPEATED),
     Do(duplicates::DUPLICATE),
-    Do(overlaps::REPAIR),
+    Do(copies::REPAIR),
     Look(|cx| complete_at_seams(cx.survey, &mut cx.work)),
-    Rounds(
-        4,
-        &[
-            Do(degenerate::DEGENERATE),
-            Do(duplicates::DUPLICATE),
-            Do(surplus::REPAIR),
-            Do(weld::REPAIR),
-            Do(degenerate::DEGENERATE),
-            Do(duplicates::DUPLICATE),
-            Do(surplus::REPAIR),
-            Look(recognise_loops),
-            Do(t_junctions::REPAIR),
-        ],
-    ),
+    Do(degenerate::DEGENERATE),
+    Do(duplicates::DUPLICATE),
+    Do(surplus::REPAIR),
+    // What was drawn twice with little between is one surface then, and no overlap.
+    Do(weld::REPAIR),
+    Do(sew::REPAIR),
+    Do(overlaps::REPAIR),
+    JOIN,
     Do(zip::REPAIR),
     Do(degenerate::DEGENERATE),
     Do(duplicates::DUPLICATE),
@@ -138,11 +151,17 @@ pub(crate) const WRAP: &[Step] = &[
 pub(crate) const RECOGNITION: &[Step] = &[
     Do(degenerate::REPEATED),
     Do(duplicates::DUPLICATE),
-    Do(overlaps::REPAIR),
+    Do(copies::REPAIR),
     Look(|cx| complete_at_seams(cx.survey, &mut cx.work)),
     Do(degenerate::DEGENERATE),
     Do(duplicates::DUPLICATE),
     Do(surplus::REPAIR),
+    Do(weld::REPAIR),
+    Do(sew::REPAIR),
+    Do(degenerate::DEGENERATE),
+    Do(duplicates::DUPLICATE),
+    Do(surplus::REPAIR),
+    Do(overlaps::REPAIR),
     Do(weld::REPAIR),
     Do(degenerate::DEGENERATE),
     Do(duplicates::DUPLICATE),

@@ -1,6 +1,7 @@
 //! What is no surface goes: repeated and copied triangles, triangles without area, debris, sheets.
 
 pub(crate) mod back_to_back;
+pub(crate) mod copies;
 pub(crate) mod debris;
 pub(crate) mod degenerate;
 pub(crate) mod duplicates;

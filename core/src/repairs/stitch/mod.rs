@@ -2,6 +2,7 @@
 
 pub(crate) mod layer;
 pub(crate) mod overlaps;
+pub(crate) mod sew;
 pub(crate) mod slits;
 pub(crate) mod t_junctions;
 pub(crate) mod weld;

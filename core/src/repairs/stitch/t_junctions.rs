@@ -41,7 +41,7 @@ pub(crate) fn split_edges(work: &mut Work<'_>, tolerance: &Tolerance) -> u64 {
 
 /// The vertices that may be joined to the opposite corner: the triangle is high enough not to be turned over, and the new edge
 /// does not exist yet.
-fn admissible(submesh: &Submesh, t: u32, ends: [u32; 2], group: &[OnEdge]) -> Vec<u32> {
+pub(crate) fn admissible(submesh: &Submesh, t: u32, ends: [u32; 2], group: &[OnEdge]) -> Vec<u32> {
     let Some(apex) = submesh.triangles[t as usize].v.into_iter().find(|v| !ends.contains(v)) else { return Vec::new() };
     let height = near::distance_to_line(
         submesh.positions[apex as usize],

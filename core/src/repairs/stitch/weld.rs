@@ -5,12 +5,14 @@
 
 use crate::contract::report::RepairName;
 use crate::contract::settings::Bodies;
+use crate::geometry::distance::cosine;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
 use crate::submesh::edges::Edges;
 use crate::submesh::near::{self, Tolerance};
-use crate::submesh::{Submesh, Vertex};
+use crate::submesh::{Submesh, Triangle, Vertex};
 use crate::topology::survey::Survey;
+use crate::util::ids::NONE;
 
 /// Boundary vertices within the weld tolerance become one.
 pub(crate) const REPAIR: Repair = Repair {
@@ -34,7 +36,7 @@ pub(crate) struct Welded {
 }
 
 /// How often clusters that made a defect are taken out and the rest tried again.
-const ATTEMPTS: usize = 4;
+pub(crate) const ATTEMPTS: usize = 4;
 
 /// Welds boundary vertices. O(n log n) in the boundary.
 pub(crate) fn weld(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) -> Welded {
@@ -45,33 +47,82 @@ pub(crate) fn weld(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Toleran
 
 /// Welds pairs of boundary vertices, smaller number first, sorted, which lie within `tolerance` of each other.
 pub(crate) fn weld_pairs(survey: &Survey<'_>, work: &mut Work<'_>, pairs: &[(Vertex, Vertex)], tolerance: f64) -> Welded {
-    let mut clusters = clusters(work, pairs, tolerance);
+    let clusters = clusters(work, pairs, tolerance);
+    weld_clusters(survey, work, clusters, Moves::Any).0
+}
+
+/// What may become of the triangles whose corners move.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Moves {
+    /// Anything: the way is shorter than any that counts.
+    Any,
+    /// They face the way they did, about.
+    Steady,
+}
+
+/// A moved triangle's normal keeps at least this cosine to what it was.
+pub(crate) const STEADY: f64 = 0.7;
+
+/// Makes each of some sets of vertices one vertex, but for those that spoil something. Returns where each vertex went, if any did.
+pub(crate) fn weld_clusters(
+    survey: &Survey<'_>,
+    work: &mut Work<'_>,
+    mut clusters: Vec<Vec<Vertex>>,
+    moves: Moves,
+) -> (Welded, Option<Vec<Vertex>>) {
     let mut result = Welded::default();
     if clusters.is_empty() {
-        return result;
+        return (result, None);
     }
     let edges = work.take_edges();
     let before = work.triangles.clone();
     for _ in 0..ATTEMPTS {
         if clusters.is_empty() {
-            return result;
+            return (result, None);
         }
         let target = targets(work, &clusters);
         work.move_to(&target);
         crate::repairs::cleanup::duplicates::drop_repeated(work);
         work.relink();
         crate::repairs::cleanup::duplicates::drop_duplicates(survey, work, Bodies::Union);
-        let bad = newly_nonmanifold(work.edges().1, &edges, &clusters, &target);
+        let mut bad = newly_nonmanifold(work.edges().1, &edges, &clusters, &target);
+        if moves == Moves::Steady {
+            spoiled(work, &before, &clusters, &mut bad);
+        }
         if !bad.iter().any(|b| *b) {
             result.vertices = clusters.iter().map(|c| c.len() as u64 - 1).sum();
-            return result;
+            return (result, Some(target));
         }
         work.restore(&before);
         result.taken_back += bad.iter().filter(|b| **b).count() as u64;
         let mut bad = bad.into_iter();
         clusters.retain(|_| !bad.next().unwrap_or(false));
     }
-    result
+    (result, None)
+}
+
+/// Marks the clusters with a corner of a triangle that was turned over or flattened.
+fn spoiled(submesh: &Submesh, before: &[Triangle], clusters: &[Vec<Vertex>], bad: &mut [bool]) {
+    let of_vertex = of_vertices(submesh.positions.len(), clusters);
+    let normal = |v: [Vertex; 3]| submesh.vector(v[0], v[1]).cross(submesh.vector(v[0], v[2]));
+    for (old, now) in before.iter().zip(&submesh.triangles).filter(|(old, now)| now.alive && old.v != now.v) {
+        if cosine(normal(old.v), normal(now.v)) < STEADY {
+            for v in old.v {
+                if let Some(b) = bad.get_mut(of_vertex[v as usize] as usize) {
+                    *b = true;
+                }
+            }
+        }
+    }
+}
+
+/// By vertex: the set that it is in, or [`NONE`].
+fn of_vertices(vertices: usize, clusters: &[Vec<Vertex>]) -> Vec<u32> {
+    let mut all = vec![NONE; vertices];
+    for (i, cluster) in clusters.iter().enumerate() {
+        cluster.iter().for_each(|v| all[*v as usize] = i as u32);
+    }
+    all
 }
 
 /// Connected components of the pairs. One wider than four tolerances is cut up greedily, in order of vertex number.
@@ -127,10 +178,7 @@ fn targets(submesh: &Submesh, clusters: &[Vec<Vertex>]) -> Vec<Vertex> {
 
 /// Clusters at an edge of more than two triangles that was not one before.
 fn newly_nonmanifold(now: &Edges, before: &Edges, clusters: &[Vec<Vertex>], target: &[Vertex]) -> Vec<bool> {
-    let mut cluster_of = vec![crate::util::ids::NONE; target.len()];
-    for (i, cluster) in clusters.iter().enumerate() {
-        cluster.iter().for_each(|v| cluster_of[*v as usize] = i as u32);
-    }
+    let cluster_of = of_vertices(target.len(), clusters);
     let mut old: Vec<(Vertex, Vertex)> = before
         .iter()
         .filter(|e| e.is_nonmanifold())

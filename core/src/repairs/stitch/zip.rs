@@ -16,6 +16,7 @@ use crate::contract::settings::Profile;
 use crate::detect::holes::loops;
 use crate::repairs::shared::admission;
 use crate::repairs::shared::work::Work;
+use crate::repairs::stitch::weld::STEADY;
 use crate::submesh::edges::{Edge, Edges};
 use crate::submesh::near::Tolerance;
 use crate::submesh::{Submesh, Vertex, near};
@@ -32,8 +33,6 @@ pub(crate) const REPAIR: Repair = Repair {
 
 /// Facing: cosine between the directions in which the two surfaces end, at most.
 const FACING: f64 = -0.5;
-/// A moved triangle's normal keeps at least this cosine to what it was.
-const STEADY: f64 = 0.7;
 /// How often merges that made a defect are taken out and the rest tried again; then none is made.
 const ATTEMPTS: usize = 8;
 
@@ -80,7 +79,7 @@ fn merge(work: &mut Work<'_>, pairs: &[[Vertex; 2]]) -> Vec<(Vertex, [Vertex; 2]
 }
 
 /// Vertices on loops that the profile leaves open, ascending.
-fn left_open(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance, profile: &Profile) -> Vec<Vertex> {
+pub(crate) fn left_open(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance, profile: &Profile) -> Vec<Vertex> {
     if profile.leave_open.is_empty() {
         return Vec::new();
     }

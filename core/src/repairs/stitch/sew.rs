@@ -1,0 +1,126 @@
+//! Rims sewn: boundary edges that run along each other as the two sides of a crack do become one edge, also where they lie farther apart than
+//! the weld tolerance.
+//!
+//! How badly a file was sewn is not known, so the width grows tenfold at each step, up to the profile's widest. At each, the nearest edges are
+//! matched first, each with one other; only the ends of matched edges move. So every step leaves fewer open edges, or is not taken; what was
+//! closed by a narrower step is not touched by a wider one. Where the vertices of two rims differ, the edges are split first ([`splits`]), and
+//! the splits that close nothing are taken back. What may be matched is said in [`rims`].
+
+use crate::contract::report::RepairName;
+use crate::contract::settings::Profile;
+use crate::repairs::shared::context::{Changes, Done, Repair};
+use crate::repairs::shared::work::Work;
+use crate::repairs::stitch::weld::{self, Welded};
+use crate::repairs::stitch::zip;
+use crate::submesh::near::{Tolerance, boundary_vertices};
+use crate::topology::survey::Survey;
+
+mod clusters;
+mod rims;
+mod splits;
+
+/// Rims that run along each other.
+pub(crate) const REPAIR: Repair = Repair {
+    name: RepairName::Sew,
+    changes: Changes::Surface,
+    run: |cx| {
+        let sewn = sew(cx.survey, &mut cx.work, cx.tolerance, cx.profile);
+        let note = format!(
+            "vertices of rims that run along each other, joined beyond the weld tolerance: at first by up to {:.3e}, with {} splits",
+            sewn.widest, sewn.splits
+        );
+        Ok(Done::count(sewn.vertices, note))
+    },
+};
+
+/// From one width to the next.
+const STEP: f64 = 10.0;
+
+/// What was sewn.
+#[derive(Debug, Default)]
+pub(crate) struct Sewn {
+    /// Vertices that became another one.
+    pub(crate) vertices: u64,
+    /// Edges split for that at a vertex of the other rim.
+    pub(crate) splits: u64,
+    /// How far the ends of matched edges lay apart, at most.
+    pub(crate) widest: f64,
+}
+
+/// Sews rims beyond the weld tolerance. O(n log n) in the boundary, and a few copies of the submesh if any is sewn.
+pub(crate) fn sew(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance, profile: &Profile) -> Sewn {
+    let gap = if profile.max_gap_mm > 0.0 { profile.max_gap_mm } else { f64::INFINITY };
+    let widest = (profile.sew_relative * survey.bounds.diagonal()).min(gap);
+    let mut sewn = Sewn::default();
+    // A split leaves short edges, which bound what comes after it: so first whatever needs none, as wide as may be.
+    for way in [join, split] {
+        let mut width = tolerance.weld;
+        // Whatever lies within the first step of each other is one thing to any printer.
+        let mut is_crack = true;
+        while width > 0.0 && width < widest && work.edges().1.iter().any(|e| e.is_boundary()) {
+            width = (STEP * width).min(widest);
+            let tolerance = Tolerance { weld: width, edge_share: tolerance.edge_share };
+            way(survey, work, profile, &Width { tolerance, is_crack }, &mut sewn);
+            is_crack = false;
+        }
+    }
+    sewn
+}
+
+/// How wide a step is.
+pub(crate) struct Width {
+    pub(crate) tolerance: Tolerance,
+    /// No clearance between bodies is as narrow.
+    pub(crate) is_crack: bool,
+}
+
+/// Splits edges where the vertices of rims differ, and matches and joins then; as [`join`].
+fn split(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile, width: &Width, sewn: &mut Sewn) -> Option<Vec<u32>> {
+    let (submesh, edges) = work.edges();
+    let known = rims::Rims::of(survey, submesh, edges, width, &[]);
+    let mut wanted = splits::wanted(submesh, edges, &known);
+    let before = work.triangles.clone();
+    for _ in 0..weld::ATTEMPTS {
+        if wanted.is_empty() {
+            break;
+        }
+        let made = splits::make(work, &wanted);
+        let mut more = Sewn { widest: sewn.widest, ..Sewn::default() };
+        let target = join(survey, work, profile, width, &mut more);
+        let idle = splits::idle(work, &made, target.as_deref());
+        if idle.is_empty() {
+            sewn.vertices += more.vertices;
+            sewn.splits += made.len() as u64;
+            sewn.widest = more.widest.max(wanted.iter().map(|on| on.distance).fold(0.0, f64::max));
+            return target;
+        }
+        work.restore(&before);
+        wanted.retain(|on| idle.binary_search(&(on.edge, on.vertex)).is_err());
+    }
+    None
+}
+
+/// Matches edges and joins their ends. Returns where each vertex went, if any did.
+fn join(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile, width: &Width, sewn: &mut Sewn) -> Option<Vec<u32>> {
+    let (submesh, edges) = work.edges();
+    let left_open = zip::left_open(submesh, edges, &width.tolerance, profile);
+    let known = rims::Rims::of(survey, submesh, edges, width, &left_open);
+    let matches = known.matches(submesh);
+    if matches.is_empty() {
+        return None;
+    }
+    let vertices = boundary_vertices(edges);
+    let (clusters, widest) = clusters::of(submesh, &vertices, &known, &matches);
+    let (Welded { vertices, taken_back }, target) = weld::weld_clusters(survey, work, clusters, weld::Moves::Steady);
+    if taken_back > 0 {
+        tracing::info!(clusters = taken_back, "Joins of rims taken back, since they spoiled triangles around.");
+    }
+    sewn.vertices += vertices;
+    if vertices > 0 {
+        sewn.widest = sewn.widest.max(widest);
+    }
+    target
+}
+
+#[cfg(test)]
+mod tests;

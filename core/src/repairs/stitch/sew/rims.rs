@@ -1,0 +1,173 @@
+//! Which boundary edges run along each other.
+//!
+//! Two boundary edges may be the two sides of a crack if both ends lie within reach of each other, by the width of the step and a share of the
+//! shortest edges there, and
+//!
+//! * they run against each other, as they do where a surface goes on. Without that, a tenth of the reach must do: one of the two is
+//!   turned over;
+//! * their triangles part: where they end in about the same direction, as the two skins of a thin wall do, they lead away from the edge by
+//!   much more than they lie apart now, as at the edge of a wedge;
+//! * not both belong to bodies with a hole, unless to the same one or within the first step: there may be a clearance between them. A body
+//!   with a hole has more area than a flat piece can have within such rims (the isoperimetric inequality).
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+
+use crate::geometry::boxes::BoxTree;
+use crate::geometry::distance::cosine;
+use crate::geometry::sums::Bounds;
+use crate::repairs::stitch::sew::Width;
+use crate::submesh::components::{Components, Reversed, Through};
+use crate::submesh::edges::Edges;
+use crate::submesh::near::around;
+use crate::submesh::{Submesh, Vertex};
+use crate::topology::survey::Survey;
+
+/// Less evidence, less reach.
+const UNSURE: f64 = 0.1;
+
+/// Triangles that end in directions with a larger cosine than this must part.
+const ALIKE: f64 = 0.5;
+
+/// So many times as far as they lie apart.
+const PART: f64 = 4.0;
+
+/// An edge with more others within reach is in a tangle that nothing is known of.
+const MOST: usize = 64;
+
+/// A boundary edge, as its triangle runs through it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RimEdge {
+    pub(crate) ends: [Vertex; 2],
+    pub(crate) triangle: u32,
+    /// Its number in [`Edges`].
+    pub(crate) number: u32,
+    /// From it to the opposite corner, square to it.
+    inward: DVec3,
+}
+
+/// Two that are to become one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Match {
+    /// How far their ends lie apart, at most.
+    pub(crate) width: f64,
+    /// By place in [`Rims::edges`].
+    pub(crate) edges: [u32; 2],
+    /// They run against each other.
+    pub(crate) against: bool,
+}
+
+/// All boundary edges, with what it takes to judge them.
+pub(crate) struct Rims {
+    pub(crate) edges: Vec<RimEdge>,
+    /// By vertex: within which distance it may find its partner. 0 but for boundary vertices.
+    pub(crate) reach: Vec<f64>,
+    of_triangle: Vec<u32>,
+    /// By component: a body with a hole.
+    is_body: Vec<bool>,
+    is_crack: bool,
+}
+
+impl Rims {
+    /// Without the edges that have both ends among `left_open` (ascending).
+    pub(crate) fn of(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, width: &Width, left_open: &[Vertex]) -> Self {
+        let components = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::EveryEdge);
+        let mut reach = vec![0.0; submesh.positions.len()];
+        let mut perimeters = vec![0.0; components.list.len()];
+        let mut rims = Vec::new();
+        for (edge, number) in edges.iter().zip(0..).filter(|(e, _)| e.is_boundary()) {
+            let triangle = edge.uses[0].triangle;
+            if let Some(perimeter) = perimeters.get_mut(components.of_triangle[triangle as usize] as usize) {
+                *perimeter += submesh.distance(edge.low, edge.high);
+            }
+            let (from, to) = edge.directed(&edge.uses[0]);
+            if [from, to].iter().all(|v| left_open.binary_search(v).is_ok()) {
+                continue;
+            }
+            for v in [from, to] {
+                if reach[v as usize] == 0.0 {
+                    reach[v as usize] = width.tolerance.at(submesh, v);
+                }
+            }
+            rims.push(RimEdge { ends: [from, to], triangle, number, inward: inward(submesh, triangle, [from, to]) });
+        }
+        let is_body = components
+            .list
+            .iter()
+            .zip(&perimeters)
+            .map(|(c, perimeter)| survey.measure.area_of(c.extent.area) > perimeter * perimeter / (4.0 * PI))
+            .collect();
+        Self { edges: rims, reach, of_triangle: components.of_triangle, is_body, is_crack: width.is_crack }
+    }
+
+    /// May these two edges become one, if their ends lie so far apart?
+    pub(crate) fn may_join(&self, a: &RimEdge, b: &RimEdge, apart: f64) -> bool {
+        let alike = cosine(a.inward, b.inward);
+        let parts = alike <= ALIKE || {
+            let height = a.inward.length().min(b.inward.length());
+            height * (1.0 - alike * alike).max(0.0).sqrt() >= PART * apart
+        };
+        let [of_a, of_b] = [a, b].map(|e| self.of_triangle[e.triangle as usize]);
+        let body = |c: u32| self.is_body.get(c as usize) == Some(&true);
+        parts && a.triangle != b.triangle && (self.is_crack || of_a == of_b || !body(of_a) || !body(of_b))
+    }
+
+    /// How far the ends of two edges lie apart, if they are within reach of each other.
+    fn apart(&self, submesh: &Submesh, a: [Vertex; 2], b: [Vertex; 2], share: f64) -> Option<f64> {
+        let mut most = 0.0f64;
+        for (v, w) in [(a[0], b[0]), (a[1], b[1])] {
+            let away = submesh.distance(v, w);
+            if away > share * self.reach[v as usize].min(self.reach[w as usize]) {
+                return None;
+            }
+            most = most.max(away);
+        }
+        Some(most)
+    }
+
+    /// All that may be matched, the nearest first.
+    pub(crate) fn matches(&self, submesh: &Submesh) -> Vec<Match> {
+        let middles: Vec<Bounds> = self.edges.iter().map(|e| middle(submesh, e.ends, 0.0)).collect();
+        if middles.is_empty() {
+            return Vec::new();
+        }
+        let tree = BoxTree::new(&middles);
+        let mut found = Vec::new();
+        let mut all = Vec::new();
+        for (i, edge) in (0..).zip(&self.edges) {
+            let reach = edge.ends.map(|v| self.reach[v as usize]);
+            tree.meeting(&middle(submesh, edge.ends, reach[0].min(reach[1])), &mut found);
+            found.retain(|j| *j > i);
+            if found.len() > MOST {
+                continue;
+            }
+            all.extend(found.iter().filter_map(|j| self.matching(submesh, [i, *j])));
+        }
+        all.sort_by(|a: &Match, b| a.width.total_cmp(&b.width).then(a.edges.cmp(&b.edges)));
+        all
+    }
+
+    fn matching(&self, submesh: &Submesh, edges: [u32; 2]) -> Option<Match> {
+        let [a, b] = edges.map(|i| &self.edges[i as usize]);
+        let [from, to] = b.ends;
+        let (width, against) = match self.apart(submesh, a.ends, [to, from], 1.0) {
+            Some(width) => (width, true),
+            None => (self.apart(submesh, a.ends, [from, to], UNSURE)?, false),
+        };
+        self.may_join(a, b, width).then_some(Match { width, edges, against })
+    }
+}
+
+/// From an edge of a triangle to its opposite corner, square to the edge.
+fn inward(submesh: &Submesh, triangle: u32, [from, to]: [Vertex; 2]) -> DVec3 {
+    let apex = submesh.triangles[triangle as usize].v.into_iter().find(|v| ![from, to].contains(v)).unwrap_or(from);
+    let (along, to_apex) = (submesh.vector(from, to), submesh.vector(from, apex));
+    to_apex - along * (to_apex.dot(along) / along.dot(along).max(f64::MIN_POSITIVE))
+}
+
+/// The box around the middle of an edge.
+fn middle(submesh: &Submesh, [a, b]: [Vertex; 2], by: f64) -> Bounds {
+    let middle = (submesh.place(a) + submesh.place(b)) / 2.0;
+    around(&[[middle.x as f32, middle.y as f32, middle.z as f32]], by)
+}

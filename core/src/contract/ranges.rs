@@ -86,6 +86,7 @@ impl Profile {
             patch_shape: _,
             sheets: _,
             bodies: _,
+            hollow: _,
             separate: _,
             guarantee: _,
             resolve_crossings: _,

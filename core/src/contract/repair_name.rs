@@ -43,6 +43,8 @@ pub enum RepairName {
     Sheets,
     /// Components that were inside out were turned.
     Outward,
+    /// Bodies in the material of others became cavities.
+    Hollow,
     /// Triangles that crossed were cut along each other.
     #[serde(alias = "resolve")]
     SelfIntersection,
@@ -65,7 +67,7 @@ pub enum RepairName {
 
 impl RepairName {
     /// Every kind, in the order of the pipeline.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::Degenerate,
         Self::Duplicate,
         Self::Overlap,
@@ -81,6 +83,7 @@ impl RepairName {
         Self::Fill,
         Self::Sheets,
         Self::Outward,
+        Self::Hollow,
         Self::SelfIntersection,
         Self::Dust,
         Self::SelfIntersectionsLeft,
@@ -108,6 +111,7 @@ impl RepairName {
             Self::Fill => "fill",
             Self::Sheets => "sheets",
             Self::Outward => "outward",
+            Self::Hollow => "hollow",
             Self::SelfIntersection => "self_intersection",
             Self::Dust => "dust",
             Self::SelfIntersectionsLeft => "self_intersections_left",

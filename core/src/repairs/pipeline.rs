@@ -22,6 +22,7 @@ use crate::repairs::cleanup::surplus::complete_at_seams;
 use crate::repairs::holes::fill;
 use crate::repairs::holes::skirt;
 use crate::repairs::orient::directions;
+use crate::repairs::orient::hollow;
 use crate::repairs::orient::visibility;
 use crate::repairs::separate::pinch_vertices;
 use crate::repairs::shared::context::{Context, Repair};
@@ -79,6 +80,7 @@ pub(crate) const ALL: &[Step] = &[
     Do(fill::REPAIR),
     Do(sheets::REPAIR),
     Do(directions::OUTWARD),
+    Do(hollow::REPAIR),
     Look(probe_bodies),
     Do(resolve::REPAIR),
     Look(tell_dust),

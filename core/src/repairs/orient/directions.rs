@@ -1,12 +1,9 @@
 //! Coherent orientation over shared edges, then outward by enclosed volume, cavities inward.
 
 use crate::contract::report::RepairName;
-use crate::detect::bodies;
-use crate::geometry::boxes::BoxTree;
-use crate::geometry::sums::Bounds;
+use crate::repairs::orient::inverted::inverted;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
-use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
@@ -32,7 +29,10 @@ pub(crate) const OUTWARD: Repair = Repair {
         let mut turned = 0;
         if !cx.is_outward() {
             let pieces = cx.pieces();
-            turned = make_outward(cx.survey, &mut cx.work, &mut cx.reversed, &pieces).0;
+            let outward = make_outward(cx.survey, &mut cx.work, &mut cx.reversed, &pieces);
+            turned = outward.pieces;
+            let news: Vec<String> = outward.doubts.into_iter().filter(|doubt| !cx.account.doubts.contains(doubt)).collect();
+            cx.account.doubts.extend(news);
             cx.found_outward();
         }
         Ok(Done::count(turned, "components that were inside out"))
@@ -142,66 +142,41 @@ pub(crate) fn flip_node(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut
     }
 }
 
-/// Turns closed ones of all `pieces` inside out where they enclose negative volume and are no cavity; returns (pieces, triangles).
-pub(crate) fn make_outward(
-    survey: &Survey<'_>,
-    work: &mut Work<'_>,
-    reversed: &mut Reversed,
-    components: &Components,
-) -> (u64, u64) {
-    let submesh: &Submesh = work;
-    if components.list.iter().all(|c| c.open || c.extent.volume >= 0) {
-        return (0, 0);
+/// Closed pieces that were turned.
+#[derive(Debug, Default)]
+pub(crate) struct Outward {
+    pub(crate) pieces: u64,
+    pub(crate) triangles: u64,
+    /// Guesses, each a line for people.
+    pub(crate) doubts: Vec<String>,
+}
+
+/// Turns closed ones of all `pieces` inside out where they enclose negative volume and are no cavity.
+pub(crate) fn make_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed, pieces: &Components) -> Outward {
+    if pieces.list.iter().all(|c| c.open || c.extent.volume >= 0) {
+        return Outward::default();
     }
-    let inverted = inverted(survey, submesh, components, reversed);
+    let found = inverted(survey, work, pieces, reversed);
+    let (count, triangles) = turn(work, reversed, pieces, &found.pieces);
+    Outward { pieces: count, triangles, doubts: found.doubts }
+}
+
+/// Turns these of all pieces inside out; returns (pieces, triangles).
+pub(crate) fn turn(work: &mut Work<'_>, reversed: &mut Reversed, pieces: &Components, turns: &[bool]) -> (u64, u64) {
     let (mut count, mut triangles) = (0, 0);
-    for (component, _) in components.list.iter().zip(&inverted).filter(|(_, i)| **i) {
+    for (piece, _) in pieces.list.iter().zip(turns).filter(|(_, turns)| **turns) {
         count += 1;
-        triangles += component.triangles;
+        triangles += piece.triangles;
     }
-    for (p, component) in components.of_region.iter().enumerate() {
-        reversed.regions[p] ^= inverted.get(*component as usize) == Some(&true);
+    for (p, piece) in pieces.of_region.iter().enumerate() {
+        reversed.regions[p] ^= turns.get(*piece as usize) == Some(&true);
     }
-    for (t, component) in components.of_triangle.iter().enumerate() {
-        if *component != NONE && inverted[*component as usize] {
+    for (t, piece) in pieces.of_triangle.iter().enumerate() {
+        if *piece != NONE && turns[*piece as usize] {
             work.flip(t as u32);
         }
     }
     (count, triangles)
-}
-
-/// Which components are inside out: from the outside in, one of negative volume that no body winds around. One that was coherent
-/// with an inverted component around it (of opposite sign: its cavity) is turned along. One that passes through the wall of another one of the
-/// same sign is no cavity of that, wherever the point lies that tells what is around it: in a file that is inside out both are bodies.
-fn inverted(survey: &Survey<'_>, submesh: &Submesh, components: &Components, reversed: &Reversed) -> Vec<bool> {
-    let list = &components.list;
-    let around = bodies::surroundings(survey, submesh, components, reversed, |c| !c.open);
-    let sign = |c: u32| list[c as usize].extent.volume.signum();
-    // What lies in fewer components is decided first.
-    let mut order: Vec<u32> = (0..list.len() as u32).filter(|c| !list[*c as usize].open).collect();
-    order.sort_by_key(|c| around[*c as usize].around.len());
-    // Whose wall a piece inside an open one is, nobody knows.
-    let open: Vec<Bounds> = list.iter().filter(|c| c.open).map(|c| c.bounds).collect();
-    let tree = BoxTree::new(&open);
-    let mut met = Vec::new();
-    let pairs = survey.crossing_pairs.as_deref().unwrap_or_default().iter().map(|pair| pair.triangles);
-    let crossing = crate::repairs::shared::pieces::crossing_pieces(survey, submesh, components, pairs);
-    let passes_through = |c: u32, o: u32| sign(c) == sign(o) && crossing.binary_search(&[c.min(o), c.max(o)]).is_ok();
-    let mut inverted = vec![false; list.len()];
-    for c in order {
-        tree.meeting(&list[c as usize].bounds, &mut met);
-        if met.iter().any(|o| open[*o as usize].contains(&list[c as usize].bounds)) {
-            continue;
-        }
-        let outer = || around[c as usize].around.iter().filter(|(o, _)| !passes_through(c, *o));
-        // The component directly around: itself inside most others.
-        let direct = outer().map(|o| o.0).max_by_key(|o| (around[*o as usize].around.len(), std::cmp::Reverse(*o)));
-        let along = direct.is_some_and(|o| inverted[o as usize] && sign(o) == -sign(c));
-        let winding: i32 = outer().map(|(o, w)| if inverted[*o as usize] { -w } else { *w }).sum();
-        let volume = if along { -sign(c) } else { sign(c) };
-        inverted[c as usize] = along ^ (volume < 0 && winding < 1);
-    }
-    inverted
 }
 
 #[cfg(test)]
@@ -214,7 +189,8 @@ mod tests {
         after(triangles, |d, turned| {
             let work = &mut Work::new(&mut d.submesh);
             let pieces = pieces::pieces(&d.survey, work, turned);
-            make_outward(&d.survey, work, turned, &pieces)
+            let Outward { pieces, triangles, .. } = make_outward(&d.survey, work, turned, &pieces);
+            (pieces, triangles)
         })
     }
 

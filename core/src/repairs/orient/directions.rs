@@ -1,6 +1,7 @@
 //! Coherent orientation over shared edges, then outward by enclosed volume, cavities inward.
 
 use crate::contract::report::RepairName;
+use crate::geometry::sums::Bounds;
 use crate::repairs::orient::inverted::inverted;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
@@ -33,6 +34,7 @@ pub(crate) const OUTWARD: Repair = Repair {
             turned = outward.pieces;
             let news: Vec<String> = outward.doubts.into_iter().filter(|doubt| !cx.account.doubts.contains(doubt)).collect();
             cx.account.doubts.extend(news);
+            cx.account.enclosed.outline = cx.account.enclosed.outline.or(outward.outline);
             cx.found_outward();
         }
         Ok(Done::count(turned, "components that were inside out"))
@@ -146,9 +148,10 @@ pub(crate) fn flip_node(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut
 #[derive(Debug, Default)]
 pub(crate) struct Outward {
     pub(crate) pieces: u64,
-    pub(crate) triangles: u64,
     /// Guesses, each a line for people.
     pub(crate) doubts: Vec<String>,
+    /// The box that material is in, if cavities poke out of it.
+    pub(crate) outline: Option<Bounds>,
 }
 
 /// Turns closed ones of all `pieces` inside out where they enclose negative volume and are no cavity.
@@ -157,17 +160,27 @@ pub(crate) fn make_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &
         return Outward::default();
     }
     let found = inverted(survey, work, pieces, reversed);
-    let (count, triangles) = turn(work, reversed, pieces, &found.pieces);
-    Outward { pieces: count, triangles, doubts: found.doubts }
+    let count = turn(work, reversed, pieces, &found.pieces);
+    Outward { pieces: count, doubts: found.doubts, outline: outline(pieces, &found.poking_out) }
 }
 
-/// Turns these of all pieces inside out; returns (pieces, triangles).
-pub(crate) fn turn(work: &mut Work<'_>, reversed: &mut Reversed, pieces: &Components, turns: &[bool]) -> (u64, u64) {
-    let (mut count, mut triangles) = (0, 0);
-    for (piece, _) in pieces.list.iter().zip(turns).filter(|(_, turns)| **turns) {
-        count += 1;
-        triangles += piece.triangles;
+/// The box of all pieces but these, where it ends sooner than that of all: to the other sides it is endless. `None`: nowhere.
+fn outline(pieces: &Components, without: &[u32]) -> Option<Bounds> {
+    let (mut all, mut rest) = (Bounds::EMPTY, Bounds::EMPTY);
+    for (number, piece) in (0..).zip(&pieces.list) {
+        all.add(&piece.bounds);
+        if without.binary_search(&number).is_err() {
+            rest.add(&piece.bounds);
+        }
     }
+    let side = |all: f32, rest: f32, end: f32| if all == rest { end } else { rest };
+    let lo = std::array::from_fn(|k| side(all.lo[k], rest.lo[k], f32::NEG_INFINITY));
+    let hi = std::array::from_fn(|k| side(all.hi[k], rest.hi[k], f32::INFINITY));
+    (all != rest).then_some(Bounds { lo, hi })
+}
+
+/// Turns these of all pieces inside out; returns how many they are.
+pub(crate) fn turn(work: &mut Work<'_>, reversed: &mut Reversed, pieces: &Components, turns: &[bool]) -> u64 {
     for (p, piece) in pieces.of_region.iter().enumerate() {
         reversed.regions[p] ^= turns.get(*piece as usize) == Some(&true);
     }
@@ -176,7 +189,7 @@ pub(crate) fn turn(work: &mut Work<'_>, reversed: &mut Reversed, pieces: &Compon
             work.flip(t as u32);
         }
     }
-    (count, triangles)
+    turns.iter().filter(|turns| **turns).count() as u64
 }
 
 #[cfg(test)]
@@ -185,12 +198,11 @@ mod tests {
     use crate::repairs::shared::pieces;
     use crate::testing::{After, Corners, after, cube, cuboid, plate, reversed};
 
-    fn outward(triangles: &[Corners]) -> After<(u64, u64)> {
+    fn outward(triangles: &[Corners]) -> After<u64> {
         after(triangles, |d, turned| {
             let work = &mut Work::new(&mut d.submesh);
             let pieces = pieces::pieces(&d.survey, work, turned);
-            let Outward { pieces, triangles, .. } = make_outward(&d.survey, work, turned, &pieces);
-            (pieces, triangles)
+            make_outward(&d.survey, work, turned, &pieces).pieces
         })
     }
 
@@ -210,7 +222,7 @@ mod tests {
             let mut bar = reversed(&cuboid([1.0; 3], [2.0, 2.0, 3.5]));
             bar.rotate_left(end);
             let got = outward(&[reversed(&cuboid([0.0; 3], [3.0; 3])), bar].concat());
-            assert_eq!(got.result, (2, 24));
+            assert_eq!((got.result, got.untouched), (2, 0));
         }
     }
 
@@ -218,7 +230,7 @@ mod tests {
     fn of_everything_inside_out_the_cavity_comes_to_point_inward() {
         // The cavity's surface by itself is the right way round, so that only its surroundings tell.
         let got = outward(&[reversed(&cuboid([0.0; 3], [3.0; 3])), cuboid([1.0; 3], [2.0; 3])].concat());
-        assert_eq!(got.result, (2, 24));
+        assert_eq!((got.result, got.untouched), (2, 0));
         assert_eq!((got.defects.bodies, got.defects.cavities), (1, 1));
         assert!(got.verdict.good && (got.defects.volume - 26.0).abs() < 1e-9, "{:?}", got.verdict);
     }
@@ -226,7 +238,7 @@ mod tests {
     #[test]
     fn an_outer_shell_alone_inside_out_is_turned_alone() {
         let got = outward(&[reversed(&cuboid([0.0; 3], [3.0; 3])), reversed(&cuboid([1.0; 3], [2.0; 3]))].concat());
-        assert_eq!((got.result, got.untouched), ((1, 12), 12));
+        assert_eq!((got.result, got.untouched), (1, 12));
         assert!(got.verdict.good && (got.defects.volume - 26.0).abs() < 1e-9, "{:?}", got.verdict);
     }
 
@@ -235,9 +247,26 @@ mod tests {
         let mut body = cuboid([0.0; 3], [3.0; 3]);
         body.pop();
         let got = outward(&[body, reversed(&cuboid([1.0; 3], [2.0; 3]))].concat());
-        assert_eq!((got.result, got.untouched), ((0, 0), 23));
+        assert_eq!((got.result, got.untouched), (0, 23));
         let got = outward(&[plate(3, |_, _| true), reversed(&cuboid([1.0; 3], [2.0; 3]))].concat());
-        assert_eq!(got.result, (1, 12), "it is not in the sheet's box");
+        assert_eq!(got.result, 1, "it is not in the sheet's box");
+    }
+
+    #[test]
+    fn a_cavity_that_pokes_out_is_not_in_the_box_of_what_is_material() {
+        let box_of = |reaches: f32| {
+            let cavity = reversed(&cuboid([1.0; 3], [2.0, 2.0, reaches]));
+            let mesh = [cuboid([0.0; 3], [3.0; 3]), cavity].concat();
+            let all = after(&mesh, |d, turned| {
+                let work = &mut Work::new(&mut d.submesh);
+                let pieces = pieces::pieces(&d.survey, work, turned);
+                outline(&pieces, &inverted(&d.survey, work, &pieces, turned).poking_out)
+            });
+            all.result
+        };
+        let (least, most) = (f32::NEG_INFINITY, f32::INFINITY);
+        assert_eq!(box_of(3.25), Some(Bounds { lo: [least; 3], hi: [most, most, 3.0] }));
+        assert_eq!(box_of(2.5), None);
     }
 
     #[test]
@@ -246,7 +275,7 @@ mod tests {
         for at in [0.0, -100.0] {
             let right = cuboid([at + 1.0, 0.0, 0.0], [at + 2.0, 1.0, 1.0]);
             let got = outward(&[cuboid([at, 0.0, 0.0], [at + 1.0, 1.0, 1.0]), right].concat());
-            assert_eq!((got.result, got.untouched), ((0, 0), 24));
+            assert_eq!((got.result, got.untouched), (0, 24));
         }
     }
 }

@@ -27,11 +27,14 @@ pub(crate) const REPAIR: Repair = Repair { name: RepairName::Hollow, changes: Ch
 fn run(cx: &mut Context<'_, '_>) -> crate::contract::error::Result<Done> {
     let pieces = cx.pieces();
     let Found { turns, guessed } = meant_for_cavities(cx.survey, &cx.work, &cx.reversed, &pieces, cx.profile);
-    let (count, _) = turn(&mut cx.work, &mut cx.reversed, &pieces, &turns);
-    let turned = || pieces.list.iter().zip(&turns).filter(|(_, turns)| **turns).map(|(piece, _)| piece);
-    let volume: f64 = turned().map(|piece| cx.survey.measure.volume(piece.extent)).sum();
-    // It was counted as material, and is taken off now.
-    cx.account.enclose(count, 2.0 * volume);
+    turn(&mut cx.work, &mut cx.reversed, &pieces, &turns);
+    let volumes =
+        pieces.list.iter().zip(&turns).filter(|(_, turns)| **turns).map(|(piece, _)| cx.survey.measure.volume(piece.extent));
+    let (cavities, bodies): (Vec<f64>, Vec<f64>) = volumes.partition(|volume| *volume > 0.0);
+    let [hollow, filled] = [&cavities, &bodies].map(|volumes| volumes.iter().sum::<f64>());
+    let count = cavities.len() as u64;
+    // It was counted as material, and is taken off now; or the other way round.
+    cx.account.enclose(count, 2.0 * (hollow + filled));
     for bounds in guessed {
         let Bounds { lo, hi } = bounds.normalised();
         cx.account.doubts.push(format!(
@@ -39,7 +42,7 @@ fn run(cx: &mut Context<'_, '_>) -> crate::contract::error::Result<Done> {
              from {lo:?} to {hi:?}"
         ));
     }
-    Ok(Done::count(count, format!("bodies in the material of others turned into cavities, of {volume:.4} units³ together")))
+    Ok(Done::count(count, format!("bodies in the material of others turned into cavities, of {hollow:.4} units³ together")))
 }
 
 /// A piece of which more than this share of the triangles was turned, and more than this share was not, says nothing of its direction.
@@ -111,8 +114,12 @@ fn meant_for_cavities(
         let (piece, around) = (&list[p], &around[p].around);
         let winding: i32 = around.iter().map(|(o, w)| if found.turns[*o as usize] { -w } else { *w }).sum();
         open.meeting(&piece.bounds, &mut met);
-        let holds = piece.extent.volume > 0 && winding >= 1 && !crossing[p] && met.is_empty();
-        if !holds || around.iter().any(|(o, _)| said[*o as usize].is_patched()) {
+        if crossing[p] || !met.is_empty() || around.iter().any(|(o, _)| said[*o as usize].is_patched()) {
+            continue;
+        }
+        if piece.extent.volume <= 0 || winding < 1 {
+            // What was a cavity is a body if it lies in a new one.
+            found.turns[p] = piece.extent.volume < 0 && winding < 1 && around.iter().any(|(o, _)| found.turns[*o as usize]);
             continue;
         }
         found.turns[p] = profile.hollow == Hollow::Keep || said[p].is_mixed();
@@ -181,6 +188,10 @@ mod tests {
         assert_eq!((got.result, got.untouched), ((2, 0), 24));
         assert!((got.defects.volume - (512.0 - 216.0 + 64.0 - 8.0)).abs() < 1e-9, "{}", got.defects.volume);
         assert_eq!(hollowed(&mesh, Hollow::Fill).result, (0, 0));
+        // What was a cavity in material twice over is a body in the new cavity.
+        let got = hollowed(&[nested(4.0), nested(3.0), reversed(&nested(2.0))].concat(), Hollow::Keep);
+        assert_eq!(got.result, (2, 0));
+        assert!((got.defects.volume - (512.0 - 216.0 + 64.0)).abs() < 1e-9, "{}", got.defects.volume);
         // What is hollow already stays so, with what floats in it.
         assert_eq!(hollowed(&[nested(4.0), reversed(&nested(2.0)), nested(1.0)].concat(), Hollow::Keep).result, (0, 0));
     }

@@ -17,14 +17,14 @@ use crate::geometry::sums::Bounds;
 use crate::repairs::orient::points::spread;
 use crate::repairs::shared::pieces::crossing_pieces;
 use crate::submesh::Submesh;
-use crate::submesh::components::{Components, Reversed};
+use crate::submesh::components::{Component, Components, Reversed};
 use crate::topology::survey::Survey;
 
 /// Pieces that cross others of opposite sign and are looked at point by point: the largest. Of others one point tells.
 const MOST: usize = 1024;
 
 /// A piece of which this share lies in the material of others is plainly meant for a cavity.
-const PLAINLY: f64 = 0.75;
+const PLAINLY: f64 = 2.0 / 3.0;
 
 /// What is inside out.
 #[derive(Debug, Default)]
@@ -33,6 +33,8 @@ pub(crate) struct Inverted {
     pub(crate) pieces: Vec<bool>,
     /// Guesses, each a line for people.
     pub(crate) doubts: Vec<String>,
+    /// Cavities that cross the walls of others, ascending.
+    pub(crate) poking_out: Vec<u32>,
 }
 
 /// What winds around a point, ascending, with winding numbers.
@@ -40,57 +42,109 @@ type Around = Vec<(u32, i32)>;
 
 /// The closed ones of all `pieces` that are inside out. A look at the chunks where pieces lie in others' boxes, and at those of what crosses.
 pub(crate) fn inverted(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components, reversed: &Reversed) -> Inverted {
-    let list = &pieces.list;
-    let around = bodies::surroundings(survey, submesh, pieces, reversed, |c| !c.open);
-    let sign = |c: u32| list[c as usize].extent.volume.signum();
-    let size = |c: u32| list[c as usize].extent.volume.abs();
     let pairs = survey.crossing_pairs.as_deref().unwrap_or_default().iter().map(|pair| pair.triangles);
     let crossing = crossing_pieces(survey, submesh, pieces, pairs);
-    let by_points = around_points(survey, submesh, pieces, reversed, &crossing);
-    // What lies in fewer pieces is decided first, and what is larger.
-    let mut order: Vec<u32> = (0..list.len() as u32).filter(|c| !list[*c as usize].open).collect();
-    order.sort_by_key(|c| (around[*c as usize].around.len(), Reverse(size(*c))));
-    // Whose wall a piece inside an open one is, nobody knows.
-    let open: Vec<Bounds> = list.iter().filter(|c| c.open).map(|c| c.bounds).collect();
-    let tree = BoxTree::new(&open);
-    let mut met = Vec::new();
-    let mut found = Inverted { pieces: vec![false; list.len()], doubts: Vec::new() };
-    for c in order {
-        tree.meeting(&list[c as usize].bounds, &mut met);
-        if met.iter().any(|o| open[*o as usize].contains(&list[c as usize].bounds)) {
-            continue;
-        }
-        let passes_through = |o: u32| sign(c) == sign(o) && crossing.binary_search(&[c.min(o), c.max(o)]).is_ok();
-        let by_one = || vec![around[c as usize].around.clone()];
-        let mut points = by_points.get(&c).cloned().unwrap_or_else(by_one);
-        points.iter_mut().for_each(|point| point.retain(|(o, _)| *o != c && !passes_through(*o)));
-        let inverted = &mut found.pieces;
-        // The piece directly around: itself inside most others.
-        let depth = |o: &u32| (around[*o as usize].around.len(), Reverse(*o));
-        let direct = around_most(&points).into_iter().max_by_key(depth);
-        let along = direct.is_some_and(|o| inverted[o as usize] && sign(o) == -sign(c));
-        let winding = |(o, w): &(u32, i32)| if inverted[*o as usize] { -w } else { *w };
-        let in_material = points.iter().filter(|point| point.iter().map(winding).sum::<i32>() >= 1).count();
-        let share = in_material as f64 / points.len() as f64;
-        let is_negative = (sign(c) < 0) ^ along && sign(c) != 0;
-        inverted[c as usize] = along ^ (is_negative && share < 0.5);
-        if is_negative && share > 0.0 && share < PLAINLY {
-            let meant = if share < 0.5 { "a body" } else { "a cavity" };
-            let Bounds { lo, hi } = list[c as usize].bounds.normalised();
-            found.doubts.push(format!(
-                "surface that faces inward crosses other bodies, and {:.0} % of it lies in their material: it was taken for {meant}, from {lo:?} to {hi:?}",
-                share * 100.0
-            ));
-        }
-    }
-    found
+    let around = bodies::surroundings(survey, submesh, pieces, reversed, |c| !c.open);
+    let mut all = All {
+        list: &pieces.list,
+        around: around.into_iter().map(|around| around.around).collect(),
+        by_points: around_points(survey, submesh, pieces, reversed, &crossing),
+        crossing,
+        inverted: vec![false; pieces.list.len()],
+    };
+    all.decide();
+    let (doubts, poking_out) = all.guesses();
+    Inverted { pieces: all.inverted, doubts, poking_out }
 }
 
-/// What winds around most of the points.
-fn around_most(points: &[Around]) -> Vec<u32> {
-    let mut counts: BTreeMap<u32, usize> = BTreeMap::new();
-    points.iter().flatten().for_each(|(o, _)| *counts.entry(*o).or_insert(0) += 1);
-    counts.into_iter().filter(|(_, count)| *count as f64 >= PLAINLY * points.len() as f64).map(|(o, _)| o).collect()
+/// All pieces, and which of them are known to be inside out.
+struct All<'a> {
+    list: &'a [Component],
+    /// By piece: what winds around its first triangle.
+    around: Vec<Around>,
+    /// Of pieces that cross others: what winds around points spread over them.
+    by_points: BTreeMap<u32, Vec<Around>>,
+    /// The pieces that cross each other.
+    crossing: Vec<[u32; 2]>,
+    inverted: Vec<bool>,
+}
+
+impl All<'_> {
+    fn sign(&self, piece: u32) -> i128 {
+        self.list[piece as usize].extent.volume.signum()
+    }
+
+    fn decide(&mut self) {
+        let size = |c: u32| self.list[c as usize].extent.volume.abs();
+        // What lies in fewer pieces is decided first, and what is larger.
+        let mut order: Vec<u32> = (0..self.list.len() as u32).filter(|c| !self.list[*c as usize].open).collect();
+        order.sort_by_key(|c| (self.around[*c as usize].len(), Reverse(size(*c))));
+        // Whose wall a piece inside an open one is, nobody knows.
+        let open: Vec<Bounds> = self.list.iter().filter(|c| c.open).map(|c| c.bounds).collect();
+        let (tree, mut met) = (BoxTree::new(&open), Vec::new());
+        for c in order {
+            let bounds = &self.list[c as usize].bounds;
+            tree.meeting(bounds, &mut met);
+            if met.iter().any(|o| open[*o as usize].contains(bounds)) {
+                continue;
+            }
+            let points = self.points(c);
+            let direct = self.directly_around(&points);
+            let along = direct.is_some_and(|o| self.inverted[o as usize] && self.sign(o) == -self.sign(c));
+            let is_negative = if along { self.sign(c) > 0 } else { self.sign(c) < 0 };
+            self.inverted[c as usize] = along ^ (is_negative && self.share_in_material(&points) < 0.5);
+        }
+    }
+
+    /// What winds around points of a piece, but for itself, and what it passes through.
+    fn points(&self, c: u32) -> Vec<Around> {
+        let passes_through = |o: u32| self.sign(c) == self.sign(o) && self.crossing.binary_search(&[c.min(o), c.max(o)]).is_ok();
+        let by_one = || vec![self.around[c as usize].clone()];
+        let mut points = self.by_points.get(&c).cloned().unwrap_or_else(by_one);
+        points.iter_mut().for_each(|point| point.retain(|(o, _)| *o != c && !passes_through(*o)));
+        points
+    }
+
+    /// Of what winds around at least half of the points, the piece that is itself inside most others.
+    fn directly_around(&self, points: &[Around]) -> Option<u32> {
+        let mut counts: BTreeMap<u32, usize> = BTreeMap::new();
+        points.iter().flatten().for_each(|(o, _)| *counts.entry(*o).or_insert(0) += 1);
+        let most = counts.into_iter().filter(|(_, count)| 2 * count >= points.len()).map(|(o, _)| o);
+        most.max_by_key(|o| (self.around[*o as usize].len(), Reverse(*o)))
+    }
+
+    /// The share of the points that lie in material.
+    fn share_in_material(&self, points: &[Around]) -> f64 {
+        let winding = |(o, w): &(u32, i32)| if self.inverted[*o as usize] { -w } else { *w };
+        let in_material = points.iter().filter(|point| point.iter().map(winding).sum::<i32>() >= 1).count();
+        in_material as f64 / points.len() as f64
+    }
+
+    /// Lines on what was to be guessed, and what was taken for cavities.
+    fn guesses(&self) -> (Vec<String>, Vec<u32>) {
+        let (mut doubts, mut poking_out) = (Vec::new(), Vec::new());
+        for c in self.by_points.keys() {
+            let (was_negative, is_turned) = (self.sign(*c) < 0, self.inverted[*c as usize]);
+            let share = self.share_in_material(&self.points(*c));
+            let meant = match (was_negative, is_turned) {
+                (true, true) if share > 0.0 => "a body",
+                (true, false) | (false, true) => "a cavity",
+                _ => continue,
+            };
+            let Bounds { lo, hi } = self.list[*c as usize].bounds.normalised();
+            if was_negative == is_turned || share < PLAINLY {
+                let share = share * 100.0;
+                doubts.push(format!(
+                    "surface that faces inward crosses other bodies, and {share:.0} % of it lies in their material: it was taken for {meant}, from \
+                     {lo:?} to {hi:?}"
+                ));
+            }
+            if was_negative != is_turned {
+                poking_out.push(*c);
+            }
+        }
+        (doubts, poking_out)
+    }
 }
 
 /// For each closed piece that crosses one of opposite sign, and is to be looked at, what winds around points spread over it.

@@ -205,8 +205,9 @@ fn recognise_loops(cx: &mut Context<'_, '_>) {
 /// The volume that is meant, while all of the surface is there and nothing is guessed.
 fn measure_volume(cx: &mut Context<'_, '_>) {
     let pieces = cx.pieces();
+    let inverted = directions::inside_out(cx.survey, &cx.work, &cx.reversed, &pieces);
     let (submesh, edges) = cx.work.edges();
-    cx.account.enclosed.meant = coned_volume(cx.survey, submesh, edges, &pieces);
+    cx.account.enclosed.meant = coned_volume(cx.survey, submesh, edges, &pieces, &inverted.pieces);
     tracing::debug!(volume = ?cx.account.enclosed.meant, "The volume that is meant.");
 }
 

@@ -2,9 +2,10 @@
 
 use crate::contract::report::RepairName;
 use crate::geometry::sums::Bounds;
-use crate::repairs::orient::inverted::inverted;
+use crate::repairs::orient::inverted::{Inverted, inverted};
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
+use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
@@ -154,12 +155,17 @@ pub(crate) struct Outward {
     pub(crate) outline: Option<Bounds>,
 }
 
+/// The closed pieces that are inside out. No look at the file if all enclose positive volume.
+pub(crate) fn inside_out(survey: &Survey<'_>, submesh: &Submesh, reversed: &Reversed, pieces: &Components) -> Inverted {
+    if pieces.list.iter().all(|c| c.open || c.extent.volume >= 0) {
+        return Inverted::default();
+    }
+    inverted(survey, submesh, pieces, reversed)
+}
+
 /// Turns closed ones of all `pieces` inside out where they enclose negative volume and are no cavity.
 pub(crate) fn make_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed, pieces: &Components) -> Outward {
-    if pieces.list.iter().all(|c| c.open || c.extent.volume >= 0) {
-        return Outward::default();
-    }
-    let found = inverted(survey, work, pieces, reversed);
+    let found = inside_out(survey, work, reversed, pieces);
     let count = turn(work, reversed, pieces, &found.pieces);
     Outward { pieces: count, doubts: found.doubts, outline: outline(pieces, &found.poking_out) }
 }
@@ -185,7 +191,7 @@ pub(crate) fn turn(work: &mut Work<'_>, reversed: &mut Reversed, pieces: &Compon
         reversed.regions[p] ^= turns.get(*piece as usize) == Some(&true);
     }
     for (t, piece) in pieces.of_triangle.iter().enumerate() {
-        if *piece != NONE && turns[*piece as usize] {
+        if turns.get(*piece as usize) == Some(&true) {
             work.flip(t as u32);
         }
     }

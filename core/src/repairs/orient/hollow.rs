@@ -7,10 +7,13 @@
 //!
 //! A vessel whose mouth a patch has closed would swallow what stands in it. So nothing is turned in a body of which patches are much.
 
+use glam::DVec3;
+
 use crate::contract::report::RepairName;
 use crate::contract::settings::{Bodies, Hollow, Profile};
 use crate::detect::bodies;
 use crate::geometry::boxes::BoxTree;
+use crate::geometry::distance::place;
 use crate::geometry::sums::Bounds;
 use crate::io::record;
 use crate::repairs::orient::directions::turn;
@@ -52,7 +55,7 @@ const MIXED: f64 = 0.125;
 const PATCHED: f64 = 0.05;
 
 /// The smaller part of a piece's triangles is a minority, and not chance, if it is smaller than half by so many times the square root of all.
-const CHANCE: f64 = 2.0;
+const CHANCE: f64 = 3.0;
 
 struct Found {
     /// By piece.
@@ -82,10 +85,16 @@ impl Said {
         self.patched as f64 > PATCHED * self.area as f64
     }
 
-    /// Most of the file's triangles have the direction that the piece has.
-    fn is_mostly_as_read(&self) -> bool {
-        let all = self.triangles as f64;
-        (self.turned as f64) < all / 2.0 - CHANCE * all.sqrt()
+    fn share_turned(&self) -> f64 {
+        self.turned as f64 / self.triangles.max(1) as f64
+    }
+
+    /// Does the file say that this is a body? Most triangles have the direction that it has; unless the piece around, of which it is known
+    /// where is out, has as many wrong ones as this would have as a cavity.
+    fn is_a_body(&self, host: Option<&Self>) -> bool {
+        let (all, own) = (self.triangles as f64, self.share_turned());
+        let most = own * all < all / 2.0 - CHANCE * all.sqrt();
+        most && host.map(Self::share_turned).is_none_or(|host| (own - host).abs() <= (1.0 - own - host).abs())
     }
 }
 
@@ -100,18 +109,18 @@ fn meant_for_cavities(
     let list = &pieces.list;
     let mut found = Found { turns: vec![false; list.len()], guessed: Vec::new() };
     let Some(pairs) = survey.crossing_pairs.as_deref().filter(|_| profile.bodies != Bodies::Visible) else { return found };
-    let around = bodies::surroundings(survey, submesh, pieces, reversed, |piece| !piece.open);
-    if around.iter().all(|a| a.winding() < 1) {
+    let all_around = bodies::surroundings(survey, submesh, pieces, reversed, |piece| !piece.open);
+    if all_around.iter().all(|a| a.winding() < 1) {
         return found;
     }
     let crossing = crossing(survey, submesh, pieces, pairs.iter().map(|pair| pair.triangles));
     let said = said(survey, submesh, pieces, reversed);
     let open: Vec<Bounds> = list.iter().filter(|piece| piece.open).map(|piece| piece.bounds).collect();
     let (open, mut met) = (BoxTree::new(&open), Vec::new());
-    let mut order: Vec<usize> = (0..list.len()).filter(|p| !around[*p].around.is_empty()).collect();
-    order.sort_by_key(|p| around[*p].around.len());
+    let mut order: Vec<usize> = (0..list.len()).filter(|p| !all_around[*p].around.is_empty()).collect();
+    order.sort_by_key(|p| all_around[*p].around.len());
     for p in order {
-        let (piece, around) = (&list[p], &around[p].around);
+        let (piece, around) = (&list[p], &all_around[p].around);
         let winding: i32 = around.iter().map(|(o, w)| if found.turns[*o as usize] { -w } else { *w }).sum();
         open.meeting(&piece.bounds, &mut met);
         if crossing[p] || !met.is_empty() || around.iter().any(|(o, _)| said[*o as usize].is_patched()) {
@@ -123,7 +132,9 @@ fn meant_for_cavities(
             continue;
         }
         found.turns[p] = profile.hollow == Hollow::Keep || said[p].is_mixed();
-        if found.turns[p] && profile.hollow != Hollow::Keep && said[p].is_mostly_as_read() {
+        let host = around.iter().max_by_key(|(o, _)| all_around[*o as usize].around.len());
+        let host = host.map(|(o, _)| &said[*o as usize]);
+        if found.turns[p] && profile.hollow != Hollow::Keep && said[p].is_a_body(host) {
             found.guessed.push(piece.bounds);
         }
     }
@@ -144,16 +155,21 @@ fn said(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components, reversed: &
         let points = submesh.points(t);
         match submesh.triangles[t as usize].origin {
             Origin::Input(record) => {
-                let [a, b, c] = points;
-                let read = record::corners(&survey.records[record as usize]);
+                // Its corners may have been welded to others.
+                let [now, read] = [points, record::corners(&survey.records[record as usize])].map(normal);
                 said.triangles += 1;
-                said.turned += u64::from([[a, c, b], [c, b, a], [b, a, c]].contains(&read));
+                said.turned += u64::from(now.dot(read) < 0.0);
             }
             Origin::Part(_) => {}
             Origin::Added(_) => said.patched += survey.measure.triangle(&points).area,
         }
     }
     said
+}
+
+fn normal(corners: [[f32; 3]; 3]) -> DVec3 {
+    let [a, b, c] = corners.map(place);
+    (b - a).cross(c - a)
 }
 
 #[cfg(test)]

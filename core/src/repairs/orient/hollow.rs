@@ -18,7 +18,7 @@ use crate::geometry::sums::Bounds;
 use crate::io::record;
 use crate::repairs::orient::directions::turn;
 use crate::repairs::shared::context::{Changes, Context, Done, Repair};
-use crate::repairs::shared::pieces::crossing;
+use crate::repairs::shared::pieces::{are_patched, crossing};
 use crate::submesh::components::{Components, Reversed};
 use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
@@ -51,9 +51,6 @@ fn run(cx: &mut Context<'_, '_>) -> crate::contract::error::Result<Done> {
 /// A piece of which more than this share of the triangles was turned, and more than this share was not, says nothing of its direction.
 const MIXED: f64 = 0.125;
 
-/// Of what holds a cavity, patches may be this share of the area.
-const PATCHED: f64 = 0.05;
-
 /// The smaller part of a piece's triangles is a minority, and not chance, if it is smaller than half by so many times the square root of all.
 const CHANCE: f64 = 3.0;
 
@@ -70,19 +67,12 @@ struct Said {
     /// Triangles of the file: all, and those that were turned.
     triangles: u64,
     turned: u64,
-    /// Area: all, and that of patches.
-    area: i128,
-    patched: i128,
 }
 
 impl Said {
     fn is_mixed(&self) -> bool {
         let least = MIXED * self.triangles as f64;
         self.turned as f64 > least && (self.triangles - self.turned) as f64 > least
-    }
-
-    fn is_patched(&self) -> bool {
-        self.patched as f64 > PATCHED * self.area as f64
     }
 
     fn share_turned(&self) -> f64 {
@@ -114,7 +104,7 @@ fn meant_for_cavities(
         return found;
     }
     let crossing = crossing(survey, submesh, pieces, pairs.iter().map(|pair| pair.triangles));
-    let said = said(survey, submesh, pieces, reversed);
+    let (said, patched) = (said(survey, submesh, pieces, reversed), are_patched(survey, submesh, pieces));
     let open: Vec<Bounds> = list.iter().filter(|piece| piece.open).map(|piece| piece.bounds).collect();
     let (open, mut met) = (BoxTree::new(&open), Vec::new());
     let mut order: Vec<usize> = (0..list.len()).filter(|p| !all_around[*p].around.is_empty()).collect();
@@ -123,7 +113,7 @@ fn meant_for_cavities(
         let (piece, around) = (&list[p], &all_around[p].around);
         let winding: i32 = around.iter().map(|(o, w)| if found.turns[*o as usize] { -w } else { *w }).sum();
         open.meeting(&piece.bounds, &mut met);
-        if crossing[p] || !met.is_empty() || around.iter().any(|(o, _)| said[*o as usize].is_patched()) {
+        if crossing[p] || !met.is_empty() || around.iter().any(|(o, _)| patched[*o as usize]) {
             continue;
         }
         if piece.extent.volume <= 0 || winding < 1 {
@@ -144,7 +134,6 @@ fn meant_for_cavities(
 /// By piece.
 fn said(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components, reversed: &Reversed) -> Vec<Said> {
     let mut said = vec![Said::default(); pieces.list.len()];
-    said.iter_mut().zip(&pieces.list).for_each(|(said, piece)| said.area = piece.extent.area);
     for (region, piece) in pieces.of_region.iter().enumerate().filter(|(_, piece)| **piece != NONE) {
         let (said, triangles) = (&mut said[*piece as usize], survey.regions[region].triangles);
         said.triangles += triangles;
@@ -152,16 +141,11 @@ fn said(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components, reversed: &
     }
     for t in submesh.living().filter(|t| pieces.of_triangle[*t as usize] != NONE) {
         let said = &mut said[pieces.of_triangle[t as usize] as usize];
-        let points = submesh.points(t);
-        match submesh.triangles[t as usize].origin {
-            Origin::Input(record) => {
-                // Its corners may have been welded to others.
-                let [now, read] = [points, record::corners(&survey.records[record as usize])].map(normal);
-                said.triangles += 1;
-                said.turned += u64::from(now.dot(read) < 0.0);
-            }
-            Origin::Part(_) => {}
-            Origin::Added(_) => said.patched += survey.measure.triangle(&points).area,
+        if let Origin::Input(record) = submesh.triangles[t as usize].origin {
+            // Its corners may have been welded to others.
+            let [now, read] = [submesh.points(t), record::corners(&survey.records[record as usize])].map(normal);
+            said.triangles += 1;
+            said.turned += u64::from(now.dot(read) < 0.0);
         }
     }
     said

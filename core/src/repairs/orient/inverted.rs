@@ -4,7 +4,7 @@
 //! inverted piece around it (of opposite sign: its cavity) is turned along. One that passes through the wall of another one of the same sign is no
 //! cavity of that: in a file that is inside out both are bodies, and two cavities that meet are one.
 //!
-//! Of a piece that crosses no other, one point tells what it lies in. One that crosses the wall of a piece of opposite sign is a cavity that
+//! Of a piece that crosses no other, one point tells what it lies in, and so it is with one that large patches have closed. One that crosses the wall of a piece of opposite sign is a cavity that
 //! pokes out, a cutter that was never subtracted, or a body inside out. Points spread over it tell what share of it lies in material; the larger
 //! share decides, and what was to be guessed is told.
 
@@ -15,7 +15,7 @@ use crate::detect::bodies;
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::sums::Bounds;
 use crate::repairs::orient::points::spread;
-use crate::repairs::shared::pieces::crossing_pieces;
+use crate::repairs::shared::pieces::{are_patched, crossing_pieces};
 use crate::submesh::Submesh;
 use crate::submesh::components::{Component, Components, Reversed};
 use crate::topology::survey::Survey;
@@ -25,6 +25,12 @@ const MOST: usize = 1024;
 
 /// A piece of which this share lies in the material of others is plainly meant for a cavity.
 const PLAINLY: f64 = 2.0 / 3.0;
+
+/// A piece of which no more than this share does is plainly a body: it only touches others.
+const TOUCHES: f64 = 0.02;
+
+/// A guess about a piece of less than this share of all volume is not told.
+const LEAST: f64 = 1e-3;
 
 /// What is inside out.
 #[derive(Debug, Default)]
@@ -123,16 +129,19 @@ impl All<'_> {
     /// Lines on what was to be guessed, and what was taken for cavities.
     fn guesses(&self) -> (Vec<String>, Vec<u32>) {
         let (mut doubts, mut poking_out) = (Vec::new(), Vec::new());
+        let closed = self.list.iter().filter(|piece| !piece.open);
+        let all: f64 = closed.map(|piece| piece.extent.volume.abs() as f64).sum();
         for c in self.by_points.keys() {
             let (was_negative, is_turned) = (self.sign(*c) < 0, self.inverted[*c as usize]);
             let share = self.share_in_material(&self.points(*c));
             let meant = match (was_negative, is_turned) {
-                (true, true) if share > 0.0 => "a body",
+                (true, true) if share > TOUCHES => "a body",
                 (true, false) | (false, true) => "a cavity",
                 _ => continue,
             };
             let Bounds { lo, hi } = self.list[*c as usize].bounds.normalised();
-            if was_negative == is_turned || share < PLAINLY {
+            let is_large = self.list[*c as usize].extent.volume.abs() as f64 > LEAST * all;
+            if is_large && (was_negative == is_turned || share < PLAINLY) {
                 let share = share * 100.0;
                 doubts.push(format!(
                     "surface that faces inward crosses other bodies, and {share:.0} % of it lies in their material: it was taken for {meant}, from \
@@ -161,6 +170,8 @@ fn around_points(
     let mut asked: Vec<u32> = opposed.flatten().copied().collect();
     asked.sort_by_key(|c| (Reverse(list[*c as usize].extent.volume.abs()), *c));
     asked.dedup();
+    let patched = are_patched(survey, submesh, pieces);
+    asked.retain(|c| !patched[*c as usize]);
     asked.truncate(MOST);
     let points = spread(survey, submesh, reversed, pieces, &asked);
     let places: Vec<[f64; 3]> = points.iter().map(|(_, place)| *place).collect();

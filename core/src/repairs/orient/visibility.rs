@@ -48,6 +48,9 @@ const SMALL: f64 = 0.01;
 /// Parts that are looked at, at most: the largest.
 const MOST: usize = 4096;
 
+/// A part is seen from one side if so many times as many points are seen from there as from the other.
+const CLEARLY: usize = 2;
+
 /// A ray begins so far from the surface, as a share of the largest coordinate: what rounding in f64 cannot do, and far less than f32 can tell.
 const OFF: f64 = 1.0 / (1u64 << 40) as f64;
 
@@ -157,8 +160,8 @@ impl Surface {
                 area,
                 triangles: part.triangles,
                 sample: part.sample,
-                looked_at: seen.map_or(0.0, |_| area),
-                front: seen.map_or(0.0, |seen| area * seen.from_the_front()),
+                looked_at: seen.filter(|seen| !seen.is_ambiguous()).map_or(0.0, |_| area),
+                front: seen.filter(|seen| !seen.is_ambiguous()).map_or(0.0, |seen| area * seen.from_the_front()),
             }
         };
         (0..).zip(&self.parts.list).map(part).collect()
@@ -174,6 +177,12 @@ struct Sightings {
 }
 
 impl Sightings {
+    /// Is the part seen from both sides, and from neither much more than from the other? A sheet is.
+    fn is_ambiguous(&self) -> bool {
+        let (less, more) = (self.front.min(self.back), self.front.max(self.back));
+        more > 0 && more <= CLEARLY * less
+    }
+
     /// The share of points seen from the front, less that of those seen from behind.
     fn from_the_front(&self) -> f64 {
         (self.front as f64 - self.back as f64) / self.points as f64

@@ -40,7 +40,7 @@ pub use contract::error::{Error, ErrorClass};
 pub use contract::progress::{Progress, Quiet};
 pub use contract::ranges::ProfileError;
 pub use contract::report::{FaceOrigin, RepairName, Report};
-pub use contract::settings::{Bodies, Guarantee, Limits, PatchShape, Profile, Sheets, Spill};
+pub use contract::settings::{Bodies, Guarantee, Hollow, Limits, PatchShape, Profile, Sheets, Spill};
 pub use contract::{error, report, settings};
 pub use detect::rules::{RULES, Rule};
 pub use engine::memory::RepairedMesh;

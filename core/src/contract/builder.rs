@@ -2,7 +2,7 @@
 
 use crate::contract::loop_class::LoopClass;
 use crate::contract::ranges::ProfileError;
-use crate::contract::settings::{Bodies, Guarantee, Limits, PatchShape, Profile, Sheets, Spill};
+use crate::contract::settings::{Bodies, Guarantee, Hollow, Limits, PatchShape, Profile, Sheets, Spill};
 
 /// Makes a [`Profile`].
 ///
@@ -77,6 +77,7 @@ impl ProfileBuilder {
         sheets: Sheets,
         max_sheets_share: f64,
         bodies: Bodies,
+        hollow: Hollow,
         stack_gap_relative: f64,
         separate: bool,
         max_separation_relative: f64,

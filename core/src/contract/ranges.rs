@@ -90,6 +90,7 @@ impl Profile {
             patch_shape: _,
             sheets: _,
             bodies: _,
+            hollow: _,
             separate: _,
             guarantee: _,
             resolve_crossings: _,

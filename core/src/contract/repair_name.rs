@@ -47,6 +47,8 @@ pub enum RepairName {
     Sheets,
     /// Components that were inside out were turned.
     Outward,
+    /// Bodies in the material of others became cavities.
+    Hollow,
     /// Triangles that crossed were cut along each other.
     #[serde(alias = "resolve")]
     SelfIntersection,
@@ -87,6 +89,7 @@ impl RepairName {
         Self::Fill,
         Self::Sheets,
         Self::Outward,
+        Self::Hollow,
         Self::SelfIntersection,
         Self::Dust,
         Self::SelfIntersectionsLeft,
@@ -116,6 +119,7 @@ impl RepairName {
             Self::Fill => "fill",
             Self::Sheets => "sheets",
             Self::Outward => "outward",
+            Self::Hollow => "hollow",
             Self::SelfIntersection => "self_intersection",
             Self::Dust => "dust",
             Self::SelfIntersectionsLeft => "self_intersections_left",

@@ -71,6 +71,8 @@ pub struct Profile {
     pub max_sheets_share: f64,
     /// What to do with bodies inside others, or crossing others.
     pub bodies: Bodies,
+    /// What a body wholly in the material of another one, which nothing crosses, is meant for.
+    pub hollow: Hollow,
     /// An open shape that stands within this fraction of the diagonal above other surface gets a skirt down into that surface before it is closed,
     /// so the two become one body. 0 (default): never. 0.001 suits shapes that were drawn on top of each other.
     pub stack_gap_relative: f64,
@@ -122,6 +124,18 @@ pub enum Bodies {
     /// Bodies that cross become one. Then a piece of surface, closed or open, goes if other pieces hide its largest triangle in all six directions
     /// along the axes; so cavities go, too. (After Yang et al. 2021, section 3.2.)
     Visible,
+}
+
+/// What a body wholly in the material of another one, which nothing crosses, is meant for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Hollow {
+    /// Material: what it bounds is filled, as [`Profile::bodies`] says.
+    #[default]
+    Fill,
+    /// The wall of a hollow print that was not turned: it becomes a cavity. Bodies in each other are material and air by turns.
+    Keep,
 }
 
 /// What to do with a lone sheet (open surface that bounds no material) in a file that also holds bodies.
@@ -179,6 +193,7 @@ impl Default for Profile {
             sheets: Sheets::Drop,
             max_sheets_share: 0.01,
             bodies: Bodies::Union,
+            hollow: Hollow::Fill,
             stack_gap_relative: 0.0,
             separate: true,
             max_separation_relative: 1e-4,

@@ -25,8 +25,14 @@ const MOST_MEETINGS: usize = 1 << 24;
 /// nobody knows what is inside of it, or if too many boxes meet.
 ///
 /// A component in the box of another one may be a cavity in it, so the signed volumes of components whose boxes meet are added up. A component
-/// apart from all others counts by its size, since it may be inside out. O(regions + submesh), and what finding the loops costs.
-pub(crate) fn coned_volume(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, components: &Components) -> Option<f64> {
+/// apart from all others counts by its size, since it may be inside out; so do those that are known to be, by component. O(regions + submesh), and what finding the loops costs.
+pub(crate) fn coned_volume(
+    survey: &Survey<'_>,
+    submesh: &Submesh,
+    edges: &Edges,
+    components: &Components,
+    inverted: &[bool],
+) -> Option<f64> {
     if edges.iter().any(|edge| edge.is_inconsistent()) {
         return None;
     }
@@ -37,6 +43,7 @@ pub(crate) fn coned_volume(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges
             volumes[*component as usize] += cone(survey.measure.middle(), submesh, &rim);
         }
     }
+    volumes.iter_mut().zip(inverted).filter(|(_, inverted)| **inverted).for_each(|(volume, _)| *volume = -*volume);
     let boxes: Vec<Bounds> = components.list.iter().map(|c| c.bounds).collect();
     let (tree, mut met, mut meetings) = (BoxTree::new(&boxes), Vec::new(), 0);
     let mut parents: Vec<u32> = (0..boxes.len() as u32).collect();
@@ -87,17 +94,17 @@ mod tests {
     use crate::submesh::components::{Reversed, Through};
     use crate::testing::{Corners, cube, cuboid, diagnose, records, reversed, shifted};
 
-    fn volume(triangles: &[Corners]) -> Option<f64> {
+    fn volume(triangles: &[Corners], inverted: &[bool]) -> Option<f64> {
         let records = records(triangles);
         let d = diagnose(&records);
         let edges = Edges::of(&d.submesh);
         let components = Components::of(&d.survey, &d.submesh, &edges, &Reversed::none(&d.survey), Through::ManifoldEdges);
-        coned_volume(&d.survey, &d.submesh, &edges, &components)
+        coned_volume(&d.survey, &d.submesh, &edges, &components, inverted)
     }
 
     #[track_caller]
     fn encloses(triangles: &[Corners], expected: f64) {
-        let volume = volume(triangles).unwrap();
+        let volume = volume(triangles, &[]).unwrap();
         assert!((volume - expected).abs() < 1e-6 * expected.max(1.0), "{volume}");
     }
 
@@ -114,6 +121,13 @@ mod tests {
         let other = reversed(&shifted(&cube(), [5.0, 0.0, 0.0]));
         encloses(&[cube(), other].concat(), 2.0);
         encloses(&reversed(&cube())[1..], 1.0);
+    }
+
+    /// Their boxes meet, so that it might be a cavity.
+    #[test]
+    fn what_is_known_to_be_inside_out_counts_as_a_body() {
+        let mesh = [cube(), reversed(&shifted(&cube(), [1.0, 0.0, 0.0]))].concat();
+        assert_eq!([volume(&mesh, &[]), volume(&mesh, &[false, true])], [Some(0.0), Some(2.0)]);
     }
 
     /// Closed or not, and if it pokes out of the wall.
@@ -133,6 +147,6 @@ mod tests {
     fn where_neighbours_disagree_nobody_knows() {
         let mut odd = cube();
         odd[3].swap(0, 1);
-        assert_eq!(volume(&odd), None);
+        assert_eq!(volume(&odd, &[]), None);
     }
 }

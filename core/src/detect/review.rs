@@ -25,6 +25,8 @@ pub(crate) struct Enclosed {
     pub(crate) regions: Vec<Region>,
     /// Of that volume, bodies that nothing crosses and that lay wholly in the material of another one: each may have been meant for a cavity.
     pub(crate) filled: f64,
+    /// Beyond this box, there is nothing but cavities that poke out.
+    pub(crate) outline: Option<Bounds>,
     /// The volume that the surface meant to enclose before anything was closed, cut or removed; `None` if nobody knows.
     pub(crate) meant: Option<f64>,
 }
@@ -60,7 +62,10 @@ pub(crate) fn counts(before: &Defects, surface: &Bounds, enclosed: &Enclosed, af
         }
     }
     if let Some([lo, hi]) = after.bounds {
-        let pairs = surface.lo.iter().zip(lo).chain(surface.hi.iter().zip(hi));
+        let outline = enclosed.outline.unwrap_or(*surface);
+        let before_lo: [f32; 3] = std::array::from_fn(|k| surface.lo[k].max(outline.lo[k]));
+        let before_hi: [f32; 3] = std::array::from_fn(|k| surface.hi[k].min(outline.hi[k]));
+        let pairs = before_lo.iter().zip(lo).chain(before_hi.iter().zip(hi));
         let most = pairs.map(|(a, b)| (f64::from(*a) - f64::from(b)).abs()).fold(0.0, f64::max);
         if most > profile.max_box_change_relative * surface.diagonal() {
             concerns.push(format!("the bounding box moved by {most}"));
@@ -167,6 +172,17 @@ mod tests {
         for (bodies, nested_positive, count) in [(2, 0, 0), (1, 0, 1), (1, 1, 0)] {
             assert_eq!(concerns(Defects { bodies: 3, ..cube() }, Defects { bodies, nested_positive, ..cube() }), count);
         }
+    }
+
+    #[test]
+    fn the_box_of_a_cavity_that_pokes_out_does_not_count() {
+        let surface = Bounds { lo: [0.0; 3], hi: [1.0, 1.0, 2.0] };
+        let outline = Some(Bounds { lo: [f32::NEG_INFINITY; 3], hi: [f32::INFINITY, f32::INFINITY, 1.0] });
+        let concerns = |outline: Option<Bounds>| {
+            let enclosed = Enclosed { outline, ..Enclosed::default() };
+            counts(&cube(), &surface, &enclosed, &cube(), &Profile::default()).len()
+        };
+        assert_eq!([concerns(None), concerns(outline)], [1, 0]);
     }
 
     #[test]

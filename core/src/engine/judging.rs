@@ -7,7 +7,7 @@ use crate::contract::progress::Progress;
 use crate::contract::report::{
     BoundaryLoops, Certificate, Cost, Defects, EditSummary, FileFacts, Outcome, Regions, Report, SCHEMA_VERSION, Task, Tolerances,
 };
-use crate::contract::settings::{Bodies, Limits, Profile};
+use crate::contract::settings::{Bodies, Hollow, Limits, Profile};
 use crate::detect::certificate;
 use crate::detect::review;
 use crate::detect::review::Evidence;
@@ -87,7 +87,7 @@ pub(crate) fn repair_diagnosed(
     let holds_more = match profile.bodies {
         Bodies::Union => report.before.nested_positive > 0,
         Bodies::Visible => report.before.components > 1,
-        Bodies::Keep => false,
+        Bodies::Keep => profile.hollow == Hollow::Keep && report.before.nested_positive > 0,
     };
     if report.verdict.good && !holds_more {
         return Ok(None);

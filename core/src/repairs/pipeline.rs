@@ -24,6 +24,7 @@ use crate::repairs::cleanup::surplus::complete_at_seams;
 use crate::repairs::holes::fill;
 use crate::repairs::holes::skirt;
 use crate::repairs::orient::directions;
+use crate::repairs::orient::hollow;
 use crate::repairs::orient::visibility;
 use crate::repairs::separate::pinch_vertices;
 use crate::repairs::shared::context::{Context, Repair};
@@ -93,6 +94,7 @@ pub(crate) const ALL: &[Step] = &[
     Do(fill::REPAIR),
     Do(sheets::REPAIR),
     Do(directions::OUTWARD),
+    Do(hollow::REPAIR),
     Look(probe_bodies),
     Do(resolve::REPAIR),
     Look(tell_dust),
@@ -225,8 +227,9 @@ fn recognise_loops(cx: &mut Context<'_, '_>) {
 /// The volume that is meant, while all of the surface is there and nothing is guessed.
 fn measure_volume(cx: &mut Context<'_, '_>) {
     let pieces = cx.pieces();
+    let inverted = directions::inside_out(cx.survey, &cx.work, &cx.reversed, &pieces);
     let (submesh, edges) = cx.work.edges();
-    cx.account.enclosed.meant = coned_volume(cx.survey, submesh, edges, &pieces);
+    cx.account.enclosed.meant = coned_volume(cx.survey, submesh, edges, &pieces, &inverted.pieces);
     tracing::debug!(volume = ?cx.account.enclosed.meant, "The volume that is meant.");
 }
 

@@ -1,9 +1,8 @@
 //! Coherent orientation over shared edges, then outward by enclosed volume, cavities inward.
 
 use crate::contract::report::RepairName;
-use crate::detect::bodies;
-use crate::geometry::boxes::BoxTree;
 use crate::geometry::sums::Bounds;
+use crate::repairs::orient::inverted::{Inverted, inverted};
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
 use crate::submesh::Submesh;
@@ -32,7 +31,11 @@ pub(crate) const OUTWARD: Repair = Repair {
         let mut turned = 0;
         if !cx.is_outward() {
             let pieces = cx.pieces();
-            turned = make_outward(cx.survey, &mut cx.work, &mut cx.reversed, &pieces).0;
+            let outward = make_outward(cx.survey, &mut cx.work, &mut cx.reversed, &pieces);
+            turned = outward.pieces;
+            let news: Vec<String> = outward.doubts.into_iter().filter(|doubt| !cx.account.doubts.contains(doubt)).collect();
+            cx.account.doubts.extend(news);
+            cx.account.enclosed.outline = cx.account.enclosed.outline.or(outward.outline);
             cx.found_outward();
         }
         Ok(Done::count(turned, "components that were inside out"))
@@ -142,66 +145,57 @@ pub(crate) fn flip_node(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut
     }
 }
 
-/// Turns closed ones of all `pieces` inside out where they enclose negative volume and are no cavity; returns (pieces, triangles).
-pub(crate) fn make_outward(
-    survey: &Survey<'_>,
-    work: &mut Work<'_>,
-    reversed: &mut Reversed,
-    components: &Components,
-) -> (u64, u64) {
-    let submesh: &Submesh = work;
-    if components.list.iter().all(|c| c.open || c.extent.volume >= 0) {
-        return (0, 0);
+/// Closed pieces that were turned.
+#[derive(Debug, Default)]
+pub(crate) struct Outward {
+    pub(crate) pieces: u64,
+    /// Guesses, each a line for people.
+    pub(crate) doubts: Vec<String>,
+    /// The box that material is in, if cavities poke out of it.
+    pub(crate) outline: Option<Bounds>,
+}
+
+/// The closed pieces that are inside out. No look at the file if all enclose positive volume.
+pub(crate) fn inside_out(survey: &Survey<'_>, submesh: &Submesh, reversed: &Reversed, pieces: &Components) -> Inverted {
+    if pieces.list.iter().all(|c| c.open || c.extent.volume >= 0) {
+        return Inverted::default();
     }
-    let inverted = inverted(survey, submesh, components, reversed);
-    let (mut count, mut triangles) = (0, 0);
-    for (component, _) in components.list.iter().zip(&inverted).filter(|(_, i)| **i) {
-        count += 1;
-        triangles += component.triangles;
+    inverted(survey, submesh, pieces, reversed)
+}
+
+/// Turns closed ones of all `pieces` inside out where they enclose negative volume and are no cavity.
+pub(crate) fn make_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed, pieces: &Components) -> Outward {
+    let found = inside_out(survey, work, reversed, pieces);
+    let count = turn(work, reversed, pieces, &found.pieces);
+    Outward { pieces: count, doubts: found.doubts, outline: outline(pieces, &found.poking_out) }
+}
+
+/// The box of all pieces but these, where it ends sooner than that of all: to the other sides it is endless. `None`: nowhere.
+fn outline(pieces: &Components, without: &[u32]) -> Option<Bounds> {
+    let (mut all, mut rest) = (Bounds::EMPTY, Bounds::EMPTY);
+    for (number, piece) in (0..).zip(&pieces.list) {
+        all.add(&piece.bounds);
+        if without.binary_search(&number).is_err() {
+            rest.add(&piece.bounds);
+        }
     }
-    for (p, component) in components.of_region.iter().enumerate() {
-        reversed.regions[p] ^= inverted.get(*component as usize) == Some(&true);
+    let side = |all: f32, rest: f32, end: f32| if all == rest { end } else { rest };
+    let lo = std::array::from_fn(|k| side(all.lo[k], rest.lo[k], f32::NEG_INFINITY));
+    let hi = std::array::from_fn(|k| side(all.hi[k], rest.hi[k], f32::INFINITY));
+    (all != rest).then_some(Bounds { lo, hi })
+}
+
+/// Turns these of all pieces inside out; returns how many they are.
+pub(crate) fn turn(work: &mut Work<'_>, reversed: &mut Reversed, pieces: &Components, turns: &[bool]) -> u64 {
+    for (p, piece) in pieces.of_region.iter().enumerate() {
+        reversed.regions[p] ^= turns.get(*piece as usize) == Some(&true);
     }
-    for (t, component) in components.of_triangle.iter().enumerate() {
-        if *component != NONE && inverted[*component as usize] {
+    for (t, piece) in pieces.of_triangle.iter().enumerate() {
+        if turns.get(*piece as usize) == Some(&true) {
             work.flip(t as u32);
         }
     }
-    (count, triangles)
-}
-
-/// Which components are inside out: from the outside in, one of negative volume that no body winds around. One that was coherent
-/// with an inverted component around it (of opposite sign: its cavity) is turned along. One that passes through the wall of another one of the
-/// same sign is no cavity of that, wherever the point lies that tells what is around it: in a file that is inside out both are bodies.
-fn inverted(survey: &Survey<'_>, submesh: &Submesh, components: &Components, reversed: &Reversed) -> Vec<bool> {
-    let list = &components.list;
-    let around = bodies::surroundings(survey, submesh, components, reversed, |c| !c.open);
-    let sign = |c: u32| list[c as usize].extent.volume.signum();
-    // What lies in fewer components is decided first.
-    let mut order: Vec<u32> = (0..list.len() as u32).filter(|c| !list[*c as usize].open).collect();
-    order.sort_by_key(|c| around[*c as usize].around.len());
-    // Whose wall a piece inside an open one is, nobody knows.
-    let open: Vec<Bounds> = list.iter().filter(|c| c.open).map(|c| c.bounds).collect();
-    let tree = BoxTree::new(&open);
-    let mut met = Vec::new();
-    let pairs = survey.crossing_pairs.as_deref().unwrap_or_default().iter().map(|pair| pair.triangles);
-    let crossing = crate::repairs::shared::pieces::crossing_pieces(survey, submesh, components, pairs);
-    let passes_through = |c: u32, o: u32| sign(c) == sign(o) && crossing.binary_search(&[c.min(o), c.max(o)]).is_ok();
-    let mut inverted = vec![false; list.len()];
-    for c in order {
-        tree.meeting(&list[c as usize].bounds, &mut met);
-        if met.iter().any(|o| open[*o as usize].contains(&list[c as usize].bounds)) {
-            continue;
-        }
-        let outer = || around[c as usize].around.iter().filter(|(o, _)| !passes_through(c, *o));
-        // The component directly around: itself inside most others.
-        let direct = outer().map(|o| o.0).max_by_key(|o| (around[*o as usize].around.len(), std::cmp::Reverse(*o)));
-        let along = direct.is_some_and(|o| inverted[o as usize] && sign(o) == -sign(c));
-        let winding: i32 = outer().map(|(o, w)| if inverted[*o as usize] { -w } else { *w }).sum();
-        let volume = if along { -sign(c) } else { sign(c) };
-        inverted[c as usize] = along ^ (volume < 0 && winding < 1);
-    }
-    inverted
+    turns.iter().filter(|turns| **turns).count() as u64
 }
 
 #[cfg(test)]
@@ -210,11 +204,11 @@ mod tests {
     use crate::repairs::shared::pieces;
     use crate::testing::{After, Corners, after, cube, cuboid, plate, reversed};
 
-    fn outward(triangles: &[Corners]) -> After<(u64, u64)> {
+    fn outward(triangles: &[Corners]) -> After<u64> {
         after(triangles, |d, turned| {
             let work = &mut Work::new(&mut d.submesh);
             let pieces = pieces::pieces(&d.survey, work, turned);
-            make_outward(&d.survey, work, turned, &pieces)
+            make_outward(&d.survey, work, turned, &pieces).pieces
         })
     }
 
@@ -234,7 +228,7 @@ mod tests {
             let mut bar = reversed(&cuboid([1.0; 3], [2.0, 2.0, 3.5]));
             bar.rotate_left(end);
             let got = outward(&[reversed(&cuboid([0.0; 3], [3.0; 3])), bar].concat());
-            assert_eq!(got.result, (2, 24));
+            assert_eq!((got.result, got.untouched), (2, 0));
         }
     }
 
@@ -242,7 +236,7 @@ mod tests {
     fn of_everything_inside_out_the_cavity_comes_to_point_inward() {
         // The cavity's surface by itself is the right way round, so that only its surroundings tell.
         let got = outward(&[reversed(&cuboid([0.0; 3], [3.0; 3])), cuboid([1.0; 3], [2.0; 3])].concat());
-        assert_eq!(got.result, (2, 24));
+        assert_eq!((got.result, got.untouched), (2, 0));
         assert_eq!((got.defects.bodies, got.defects.cavities), (1, 1));
         assert!(got.verdict.good && (got.defects.volume - 26.0).abs() < 1e-9, "{:?}", got.verdict);
     }
@@ -250,7 +244,7 @@ mod tests {
     #[test]
     fn an_outer_shell_alone_inside_out_is_turned_alone() {
         let got = outward(&[reversed(&cuboid([0.0; 3], [3.0; 3])), reversed(&cuboid([1.0; 3], [2.0; 3]))].concat());
-        assert_eq!((got.result, got.untouched), ((1, 12), 12));
+        assert_eq!((got.result, got.untouched), (1, 12));
         assert!(got.verdict.good && (got.defects.volume - 26.0).abs() < 1e-9, "{:?}", got.verdict);
     }
 
@@ -259,9 +253,26 @@ mod tests {
         let mut body = cuboid([0.0; 3], [3.0; 3]);
         body.pop();
         let got = outward(&[body, reversed(&cuboid([1.0; 3], [2.0; 3]))].concat());
-        assert_eq!((got.result, got.untouched), ((0, 0), 23));
+        assert_eq!((got.result, got.untouched), (0, 23));
         let got = outward(&[plate(3, |_, _| true), reversed(&cuboid([1.0; 3], [2.0; 3]))].concat());
-        assert_eq!(got.result, (1, 12), "it is not in the sheet's box");
+        assert_eq!(got.result, 1, "it is not in the sheet's box");
+    }
+
+    #[test]
+    fn a_cavity_that_pokes_out_is_not_in_the_box_of_what_is_material() {
+        let box_of = |reaches: f32| {
+            let cavity = reversed(&cuboid([1.0; 3], [2.0, 2.0, reaches]));
+            let mesh = [cuboid([0.0; 3], [3.0; 3]), cavity].concat();
+            let all = after(&mesh, |d, turned| {
+                let work = &mut Work::new(&mut d.submesh);
+                let pieces = pieces::pieces(&d.survey, work, turned);
+                outline(&pieces, &inverted(&d.survey, work, &pieces, turned).poking_out)
+            });
+            all.result
+        };
+        let (least, most) = (f32::NEG_INFINITY, f32::INFINITY);
+        assert_eq!(box_of(3.25), Some(Bounds { lo: [least; 3], hi: [most, most, 3.0] }));
+        assert_eq!(box_of(2.5), None);
     }
 
     #[test]
@@ -270,7 +281,7 @@ mod tests {
         for at in [0.0, -100.0] {
             let right = cuboid([at + 1.0, 0.0, 0.0], [at + 2.0, 1.0, 1.0]);
             let got = outward(&[cuboid([at, 0.0, 0.0], [at + 1.0, 1.0, 1.0]), right].concat());
-            assert_eq!((got.result, got.untouched), ((0, 0), 24));
+            assert_eq!((got.result, got.untouched), (0, 24));
         }
     }
 }

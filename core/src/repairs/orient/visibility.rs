@@ -1,27 +1,27 @@
 //! Which way surface faces where its neighbours do not tell: the way it is seen from outside.
 //!
-//! Neighbours that disagree tell that something is to be turned, but not what. Of a small patch and much around it that is plain, and
-//! [`crate::repairs::orient::directions`] turns the smaller part. Where the parts are both large, as bodies that were welded along an edge of each, or surfaces that end at each
-//! other in non-manifold edges, each is looked at: of points on it, spread by area, rays run along the axes, and those that meet nothing tell from
-//! which side it is seen (the idea of Takayama, Jacobson, Kavan & Sorkine-Hornung, "A simple method for correcting facet orientations in polygon
-//! meshes based on ray casting", JCGT 3(4), 2014, who cast them in all directions). What is seen from both sides alike, or from none, follows its
-//! neighbours. Edges between parts that are both right, and disagree, stay: no surface goes on there, and they are balanced later.
+//! Neighbours that disagree tell that one of them is to be turned, and so for all that hang together what agrees with what, but neither which
+//! side of it is out, nor if surface goes on there at all: bodies that were welded along an edge of each meet in it like halves of one surface. So
+//! where much of a sheet would be turned, or sheets end at each other in non-manifold edges, it is looked at: of points on it, spread by area, rays
+//! run along the axes, and those that meet nothing tell from which side it is seen (the idea of Takayama, Jacobson, Kavan & Sorkine-Hornung, "A
+//! simple method for correcting facet orientations in polygon meshes based on ray casting", JCGT 3(4), 2014, who cast them in all directions).
+//! `groups` weighs one against the other: a ray that escapes through a hole turns nothing that its neighbours hold. Edges between parts that
+//! are both right, and disagree, stay: no surface goes on there, and they are balanced later.
 
 use crate::contract::report::RepairName;
 use crate::repairs::shared::context::{Changes, Done, Repair};
-use std::cmp::{Ordering, Reverse};
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
 
 use robust::Coord;
 
 use crate::detect::bodies::{self, Direction, Source};
-use crate::geometry::distance::place;
-use crate::geometry::position::Position;
-use crate::io::record;
-use crate::repairs::orient::directions::{Parity, flip_node};
+use crate::repairs::orient::directions::flip_node;
+use crate::repairs::orient::groups::{self, Link, Part};
+use crate::repairs::orient::points::first_points;
 use crate::repairs::shared::work::Work;
 use crate::submesh::Submesh;
-use crate::submesh::components::{Components, Reversed, Sample, Through};
+use crate::submesh::components::{Component, Components, Reversed, Through};
 use crate::submesh::edges::Edges;
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
@@ -48,12 +48,8 @@ const SMALL: f64 = 0.01;
 /// Parts that are looked at, at most: the largest.
 const MOST: usize = 4096;
 
-/// Points of each.
-const POINTS: usize = 32;
-
-/// A part is seen from one side if so many times as many points are seen from there as from the other, and no fewer than one of so many.
+/// A part is seen from one side if so many times as many points are seen from there as from the other.
 const CLEARLY: usize = 2;
-const ENOUGH: usize = 8;
 
 /// A ray begins so far from the surface, as a share of the largest coordinate: what rounding in f64 cannot do, and far less than f32 can tell.
 const OFF: f64 = 1.0 / (1u64 << 40) as f64;
@@ -77,7 +73,7 @@ pub(crate) fn face_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &
     let surface = Surface::of(survey, submesh, edges, reversed);
     let parts = &surface.parts.list;
     // What would be turned of each sheet if only neighbours counted.
-    let by_neighbours = surface.follow(&vec![None; parts.len()]);
+    let by_neighbours = groups::turned(&surface.as_seen(&BTreeMap::new()), &surface.links);
     let looked_at = surface.worth_a_look(&by_neighbours);
     let is_asked = |p: u32| looked_at[surface.sheet_of[p as usize] as usize];
     let mut asked: Vec<u32> = (0..parts.len() as u32).filter(|p| is_asked(*p)).collect();
@@ -87,18 +83,15 @@ pub(crate) fn face_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &
     asked.sort_by_key(|p| (Reverse(parts[*p as usize].extent.area), parts[*p as usize].sample));
     asked.truncate(MOST);
     let seen = seen(survey, submesh, reversed, &surface.parts, &asked);
+    let mut turns = groups::turned(&surface.as_seen(&seen), &surface.links);
+    (0..parts.len()).filter(|p| !is_asked(*p as u32)).for_each(|p| turns[p] = false);
     // Where hardly anything is seen otherwise than neighbours have it, they are to be followed everywhere.
     let all: i128 = parts.iter().map(|part| part.extent.area).sum();
-    let is_contested =
-        |(part, sides): &(&u32, &Sightings)| sides.is_behind().is_some_and(|behind| behind != by_neighbours[**part as usize]);
-    let contested = seen.iter().filter(is_contested).map(|(part, _)| parts[*part as usize].extent.area);
-    if (contested.sum::<i128>() as f64) < SMALL * all as f64 {
+    let is_contested = |p: &usize| is_asked(*p as u32) && turns[*p] != by_neighbours[*p];
+    let contested: i128 = (0..parts.len()).filter(is_contested).map(|p| parts[p].extent.area).sum();
+    if (contested as f64) < SMALL * all as f64 {
         return Faced::default();
     }
-    let mut known = vec![None; parts.len()];
-    seen.iter().for_each(|(part, sides)| known[*part as usize] = sides.is_behind());
-    let mut turns = surface.follow(&known);
-    (0..parts.len()).filter(|p| !is_asked(*p as u32)).for_each(|p| turns[p] = false);
     let is_settled = |sheet: &u32| looked_at.get(*sheet as usize) == Some(&true);
     let settled = surface.sheets.of_triangle.iter().map(is_settled).collect();
     let triangles = parts.iter().zip(&turns).filter(|(_, turns)| **turns).map(|(part, _)| part.triangles).sum();
@@ -114,8 +107,8 @@ struct Surface {
     sheets: Components,
     /// By part.
     sheet_of: Vec<u32>,
-    /// Parts of one sheet that disagree where they meet, those with the most such edges first.
-    links: Vec<[u32; 2]>,
+    /// Parts of one sheet that disagree where they meet.
+    links: Vec<Link>,
     /// By sheet: another one ends at it, or goes on from it, and faces the wrong way for that.
     at_odds: Vec<bool>,
 }
@@ -127,25 +120,22 @@ impl Surface {
         let mut sheet_of = vec![NONE; parts.list.len()];
         let nodes = parts.of_region.iter().zip(&sheets.of_region).chain(parts.of_triangle.iter().zip(&sheets.of_triangle));
         nodes.filter(|(part, _)| **part != NONE).for_each(|(part, sheet)| sheet_of[*part as usize] = *sheet);
-        let mut between: HashMap<[u32; 2], u64> = HashMap::new();
+        let area = |t: u32| survey.measure.triangle(&submesh.points(t)).area;
+        let mut between: BTreeMap<[u32; 2], i128> = BTreeMap::new();
         let mut at_odds = vec![false; sheets.list.len()];
         for edge in edges.iter().filter(|edge| edge.is_unbalanced()) {
             match edge.uses {
                 [_] => {}
                 [a, b] => {
+                    let beside = area(a.triangle).min(area(b.triangle));
                     let [a, b] = [a, b].map(|used| parts.of_triangle[used.triangle as usize]);
-                    *between.entry([a.min(b), a.max(b)]).or_insert(0) += 1;
+                    *between.entry([a.min(b), a.max(b)]).or_insert(0) += beside;
                 }
                 uses => uses.iter().for_each(|used| at_odds[sheets.of_triangle[used.triangle as usize] as usize] = true),
             }
         }
-        let mut links: Vec<([u32; 2], u64)> = between.into_iter().filter(|([a, b], _)| a != b).collect();
-        // Of as many edges, what comes first in the file.
-        links.sort_by_key(|(pair, count)| {
-            let [a, b] = pair.map(|p| parts.list[p as usize].sample);
-            (Reverse(*count), a.min(b), a.max(b))
-        });
-        let links = links.into_iter().map(|(pair, _)| pair).collect();
+        let links = between.into_iter().filter(|([a, b], _)| a != b);
+        let links = links.map(|(parts, area)| Link { parts, area: area as f64 }).collect();
         Self { parts, sheets, sheet_of, links, at_odds }
     }
 
@@ -161,48 +151,20 @@ impl Surface {
         sheets.map(|((sheet, at_odds), count)| *at_odds || is_much(count, sheet.triangles)).collect()
     }
 
-    /// By part: is it to be turned? So that what is known to be behind is, and what is not known agrees with its neighbours; between groups of
-    /// parts with nothing known, the smaller side is turned.
-    fn follow(&self, known: &[Option<bool>]) -> Vec<bool> {
-        let count = self.parts.list.len() as u32;
-        let mut parity = Parity::new(self.parts.list.len());
-        // By root of a group: is the root behind?
-        let mut behind = known.to_vec();
-        for [a, b] in &self.links {
-            let (ra, rb) = (parity.find(*a).0, parity.find(*b).0);
-            let (from, is_behind) = match [ra, rb].map(|root| behind[root as usize]) {
-                // No two that are known depend on each other.
-                [Some(_), Some(_)] => continue,
-                [Some(is_behind), None] => (ra, Some(is_behind)),
-                [None, is_behind] => (rb, is_behind),
-            };
-            parity.relate(*a, *b, true);
-            let (root, odd) = parity.find(from);
-            behind[root as usize] = is_behind.map(|is_behind| is_behind ^ odd);
-        }
-        let smaller = self.smaller_sides(&mut parity);
-        let is_turned = |p: u32| {
-            let (root, odd) = parity.find(p);
-            behind[root as usize].map_or(smaller[p as usize], |is_behind| is_behind ^ odd)
+    /// The parts with what is seen of them.
+    fn as_seen(&self, seen: &BTreeMap<u32, Sightings>) -> Vec<Part> {
+        let part = |(number, part): (u32, &Component)| {
+            let area = part.extent.area as f64;
+            let seen = seen.get(&number);
+            Part {
+                area,
+                triangles: part.triangles,
+                sample: part.sample,
+                looked_at: seen.filter(|seen| !seen.is_ambiguous()).map_or(0.0, |_| area),
+                front: seen.filter(|seen| !seen.is_ambiguous()).map_or(0.0, |seen| area * seen.from_the_front()),
+            }
         };
-        (0..count).map(is_turned).collect()
-    }
-
-    /// Which parts are on the smaller side of what they are related to, of equal sides on that with the later triangle.
-    fn smaller_sides(&self, parity: &mut Parity) -> Vec<bool> {
-        let of: Vec<(u32, bool)> = (0..self.parts.list.len() as u32).map(|p| parity.find(p)).collect();
-        let mut sides = vec![[(0, None::<Reverse<Sample>>); 2]; of.len()];
-        for (part, (root, odd)) in self.parts.list.iter().zip(&of) {
-            let (triangles, first) = &mut sides[*root as usize][usize::from(*odd)];
-            *triangles += part.triangles;
-            *first = (*first).max(Some(Reverse(part.sample)));
-        }
-        of.iter()
-            .map(|(root, odd)| {
-                let [even_side, odd_side] = sides[*root as usize];
-                *odd != (odd_side > even_side)
-            })
-            .collect()
+        (0..).zip(&self.parts.list).map(part).collect()
     }
 }
 
@@ -215,84 +177,16 @@ struct Sightings {
 }
 
 impl Sightings {
-    /// Is the part seen from behind? `None` if that is not clear.
-    fn is_behind(&self) -> Option<bool> {
-        let Self { points, front, back } = *self;
-        let clearly = |more: usize, less: usize| more > CLEARLY * less && more * ENOUGH >= points;
-        match (clearly(front, back), clearly(back, front)) {
-            (true, _) => Some(false),
-            (_, true) => Some(true),
-            _ => None,
-        }
-    }
-}
-
-/// A triangle that one of the points is in.
-#[derive(Clone, Copy, PartialEq)]
-struct Point {
-    /// Area over a number between 0 and 1 of its own: the points with the largest are spread evenly over the area (Duffield, Lund & Thorup,
-    /// "Priority sampling for estimation of arbitrary subset sums", JACM 54(6), 2007).
-    priority: f64,
-    record: u32,
-    corners: [[f32; 3]; 3],
-}
-
-impl Point {
-    fn of(corners: [[f32; 3]; 3], record: u32) -> Self {
-        let [a, b, c] = corners.map(place);
-        let x = (u64::from(record) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        let x = (x ^ x >> 32).wrapping_mul(0xd6e8_feb8_6659_fd93);
-        let share = ((x >> 11) as f64 + 1.0) / (1u64 << 53) as f64;
-        Self { priority: (b - a).cross(c - a).length() / share, record, corners }
+    /// Is the part seen from both sides, and from neither much more than from the other? A sheet is.
+    fn is_ambiguous(&self) -> bool {
+        let (less, more) = (self.front.min(self.back), self.front.max(self.back));
+        more > 0 && more <= CLEARLY * less
     }
 
-    fn is_before(&self, other: &Self) -> bool {
-        let by_place = || self.corners.map(Position::of) < other.corners.map(Position::of);
-        match self.priority.total_cmp(&other.priority).then(other.record.cmp(&self.record)) {
-            Ordering::Equal => by_place(),
-            order => order.is_gt(),
-        }
+    /// The share of points seen from the front, less that of those seen from behind.
+    fn from_the_front(&self) -> f64 {
+        (self.front as f64 - self.back as f64) / self.points as f64
     }
-}
-
-/// Takes a point in, if it is among the first.
-fn note(points: &mut Vec<Point>, point: Point) {
-    let at = points.partition_point(|other| other.is_before(&point));
-    if at < POINTS {
-        points.truncate(POINTS - 1);
-        points.insert(at, point);
-    }
-}
-
-/// The first points of the parts that are asked about, by part.
-fn first_points(
-    survey: &Survey<'_>,
-    submesh: &Submesh,
-    reversed: &Reversed,
-    parts: &Components,
-    asked: &[u32],
-) -> Vec<(u32, Point)> {
-    let wanted: HashSet<u32> = asked.iter().copied().collect();
-    let found = survey.visit_regular(
-        |region| wanted.contains(&parts.of_region[region as usize]),
-        |_| Some(HashMap::<u32, Vec<Point>>::new()),
-        |_, _| true,
-        |found, triangle, region| {
-            let [a, b, c] = record::corners(&survey.records[triangle as usize]);
-            let corners = if reversed.regions[region as usize] { [a, c, b] } else { [a, b, c] };
-            note(found.entry(parts.of_region[region as usize]).or_default(), Point::of(corners, triangle));
-        },
-    );
-    let mut points: BTreeMap<u32, Vec<Point>> = BTreeMap::new();
-    // Which points are the first does not depend on the order that they come in.
-    for (part, found) in found.into_iter().flatten() {
-        let own = points.entry(part).or_default();
-        found.into_iter().for_each(|point| note(own, point));
-    }
-    for t in submesh.living().filter(|t| wanted.contains(&parts.of_triangle[*t as usize])) {
-        note(points.entry(parts.of_triangle[t as usize]).or_default(), Point::of(submesh.points(t), submesh.record(t)));
-    }
-    points.into_iter().flat_map(|(part, points)| points.into_iter().map(move |p| (part, p))).collect()
 }
 
 /// From where the parts that are asked about are seen.
@@ -402,17 +296,5 @@ mod tests {
         mesh[7] = reversed(&mesh[7..8])[0];
         assert_eq!(faced(&mesh).result, 0);
         assert_eq!(faced(&cuboid([0.0; 3], [1.0; 3])).result, 0);
-    }
-
-    #[test]
-    fn the_points_spread_by_area_do_not_depend_on_their_order() {
-        let all: Vec<Point> =
-            (0..200u32).map(|n| Point::of([[0.0; 3], [1.0 + n as f32, 0.0, 0.0], [0.0, 1.0, 0.0]], n)).collect();
-        let mut forward = Vec::new();
-        all.iter().for_each(|p| note(&mut forward, *p));
-        let mut backward = Vec::new();
-        all.iter().rev().for_each(|p| note(&mut backward, *p));
-        assert_eq!(forward.len(), POINTS);
-        assert!(forward == backward);
     }
 }

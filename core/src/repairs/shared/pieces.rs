@@ -39,6 +39,22 @@ pub(crate) fn lies_in_material(piece: &Component, outside: i32) -> bool {
     outside.min(inside) >= 1
 }
 
+/// Of a piece that is what the file has, patches may be this share of the area.
+const PATCHED: f64 = 0.05;
+
+/// Which pieces are closed by more than small patches, so that what they enclose is a guess.
+pub(crate) fn are_patched(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components) -> Vec<bool> {
+    let mut patches = vec![0; pieces.list.len()];
+    for t in submesh.living() {
+        let (piece, origin) = (pieces.of_triangle[t as usize], submesh.triangles[t as usize].origin);
+        if piece != NONE && matches!(origin, Origin::Added(_)) {
+            patches[piece as usize] += survey.measure.triangle(&submesh.points(t)).area;
+        }
+    }
+    let pieces = pieces.list.iter().zip(patches);
+    pieces.map(|(piece, area)| area as f64 > PATCHED * piece.extent.area as f64).collect()
+}
+
 /// Which pieces cross another one.
 pub(crate) fn crossing(
     survey: &Survey<'_>,

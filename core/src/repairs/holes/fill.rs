@@ -45,6 +45,9 @@ pub(crate) const REPAIR: Repair = Repair {
         cx.handed.sheets = closed.sheets;
         cx.handed.across = closed.across;
         cx.account.doubts.extend(closed.doubts);
+        if let Some(meant) = &mut cx.account.enclosed.meant {
+            *meant -= closed.not_meant;
+        }
         Ok(Done::count(closed.loops, format!("loops closed: {}", parts.join(", "))))
     },
 };
@@ -90,6 +93,7 @@ pub(crate) fn fill_loops(
         open: Vec::new(),
         joints: Vec::new(),
         doubts: Vec::new(),
+        not_meant: 0.0,
     };
     let first = closing.close_together(survey, work, rims, (shapes, owners), threads);
     closing.triangulate(work, first, threads);

@@ -26,6 +26,8 @@ pub(crate) struct Closed {
     pub(crate) across: Vec<PatchAcross>,
     /// What was guessed, and a person should look at.
     pub(crate) doubts: Vec<String>,
+    /// What caps over the loops would enclose beside what is meant.
+    pub(crate) not_meant: f64,
 }
 
 /// The loops of a submesh while they are closed.
@@ -40,6 +42,8 @@ pub(crate) struct Closing<'p> {
     pub(crate) joints: Vec<u32>,
     /// What was guessed, and a person should look at.
     pub(crate) doubts: Vec<String>,
+    /// What caps over its loops would enclose that no surface is meant to: there is a way through. In the file's units, cubed.
+    pub(crate) not_meant: f64,
 }
 
 /// Why a loop stays open.
@@ -119,7 +123,7 @@ impl Closing<'_> {
     }
 
     pub(crate) fn finish(mut self, work: &mut Work<'_>) -> Closed {
-        let mut closed = Closed { doubts: std::mem::take(&mut self.doubts), ..Closed::default() };
+        let mut closed = Closed { doubts: std::mem::take(&mut self.doubts), not_meant: self.not_meant, ..Closed::default() };
         for patch in self.placed.iter().filter(|p| p.count > 0) {
             let loops = patch.rims.len() as u64;
             closed.loops += loops;

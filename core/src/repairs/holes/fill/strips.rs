@@ -1,12 +1,18 @@
 //! Two holes whose patches cross what runs through them: the sides of the way from one to the other are missing, as of a sleeve around a shaft.
 
+use glam::DVec3;
+
 use super::closing::{Closing, NotFilled};
-use crate::detect::holes::{Shapes, loops::Loop, owners::Owners};
+use crate::detect::holes::{
+    Shapes,
+    loops::Loop,
+    owners::{self, Owners},
+};
 use crate::repairs::holes::annular;
 use crate::repairs::holes::patches::Placed;
 use crate::repairs::shared::collisions;
 use crate::repairs::shared::work::Work;
-use crate::submesh::Vertex;
+use crate::submesh::{Submesh, Vertex};
 use crate::submesh::components::Reversed;
 use crate::topology::survey::Survey;
 
@@ -18,6 +24,12 @@ struct Attempt {
     strip: usize,
     rims: [u32; 2],
     instead: Option<(usize, Vec<[Vertex; 3]>)>,
+}
+
+/// Volume under a triangle, seen from a point.
+fn volume_under(submesh: &Submesh, t: u32, from: DVec3) -> f64 {
+    let [a, b, c] = submesh.triangles[t as usize].v.map(|v| submesh.place(v) - from);
+    a.dot(b.cross(c)) / 6.0
 }
 
 impl Closing<'_> {
@@ -45,6 +57,12 @@ impl Closing<'_> {
             }
             stays
         });
+        let middle = survey.measure.middle();
+        for attempt in &attempts {
+            let caps = attempt.rims.map(|rim| owners::fan(work, &self.rim(rim).vertices, middle).0);
+            let strip: f64 = self.placed[attempt.strip].triangles().map(|t| volume_under(work, t, middle)).sum();
+            self.not_meant += caps[0] + caps[1] - strip;
+        }
         self.open.retain(|(rim, _)| !attempts.iter().any(|attempt| attempt.rims.contains(rim)));
     }
 

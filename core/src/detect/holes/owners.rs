@@ -18,10 +18,15 @@ const ROOM: f64 = 0.02;
 /// Patches of a piece that stands for itself have no more than this share of the area of its surface: those of half a ball have half of it.
 const PATCHED: f64 = 0.4;
 
+/// An opening is no detail of its piece from this share of the piece's size on: the cube root of its volume, squared.
+const LARGE: f64 = 0.1;
+
 /// The owners of some loops, by loop.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Owners {
     of_loop: Vec<u32>,
+    /// What the piece encloses once it is closed, by piece.
+    volumes: Vec<f64>,
     /// The way that the piece's surface faces: 1 outward, -1 inward, as the largest one faces outward; 0: it does not stand for itself. By piece.
     stands: Vec<i8>,
 }
@@ -45,6 +50,7 @@ impl Owners {
             .map(|(c, (volume, patched))| (measure.volume(c.extent) + volume, measure.area(c.extent), patched))
             .collect();
         let largest = closed.iter().map(|c| c.0).max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+        let volumes = closed.iter().map(|c| c.0.abs()).collect();
         let stands = closed
             .into_iter()
             .map(|(volume, area, patched)| {
@@ -56,12 +62,12 @@ impl Owners {
                 }
             })
             .collect();
-        Self { of_loop, stands }
+        Self { of_loop, volumes, stands }
     }
 
     /// All loops are of one piece.
     pub(crate) fn one(loops: usize) -> Self {
-        Self { of_loop: vec![0; loops], stands: vec![0] }
+        Self { of_loop: vec![0; loops], volumes: vec![0.0], stands: vec![0] }
     }
 
     /// Do two loops, by number, belong to one piece?
@@ -77,6 +83,14 @@ impl Owners {
     /// The same, whichever way they face.
     pub(crate) fn stand(&self, a: usize, b: usize) -> bool {
         !self.are_same(a, b) && [a, b].into_iter().all(|i| self.way(i) != 0)
+    }
+
+    /// Is an opening of this area no detail of the piece that the loop belongs to? Of a cube its side is as large as the cube's size, of a shaft of
+    /// thirty times its radius its end has an eighth of that.
+    pub(crate) fn is_large(&self, i: usize, area: f64) -> bool {
+        let volume = self.volumes.get(self.of_loop[i] as usize).copied().unwrap_or(0.0);
+        // area³ of volume², so as to take no cube root.
+        area.powi(3) >= LARGE.powi(3) * volume * volume
     }
 
     fn way(&self, i: usize) -> i8 {

@@ -60,6 +60,8 @@ const HOLE: f64 = 0.7;
 /// Outlines of holes back to back agree as long as no vertex is farther from the other outline, seen along the axis, than this share of the
 /// larger radius: circles of eight facets do.
 const OUTLINE: f64 = 0.15;
+/// And outlines of openings in two bodies, if these were one: what broke may be turned aside a little.
+const ALIKE_OUTLINE: f64 = 0.35;
 /// Cosine between the vector areas of a hole and an island in it, at most: an island is small, and may lie on a slope.
 const ISLAND_OPPOSITE: f64 = -0.2;
 /// An island lies no farther from the plane of its hole than this share of the hole's size.
@@ -118,7 +120,7 @@ impl Ring {
     /// surface that faces the other one's is one of each. Skins that face each other bound the air between the bodies, unless two caps
     /// would lie on each other.
     fn may_join_bodies(&self, rims: [&Shape; 2]) -> bool {
-        let open = rims.iter().all(|rim| rim.continues <= MOSTLY_OPEN);
+        let open = rims.iter().all(|rim| rim.continues <= MOSTLY_OPEN) && outlines_agree(rims[0], rims[1], ALIKE_OUTLINE);
         match self.missing {
             Missing::Tube | Missing::OneSurface => open,
             Missing::Floor => open && self.level,
@@ -161,7 +163,11 @@ pub(super) fn find(free: &[u32], shapes: &[Shape], owners: &Owners) -> Vec<Pair>
     }
     let shape = |place: usize| &shapes[free[place] as usize];
     let are_bodies = |i: usize, j: usize| owners.are_bodies(free[i] as usize, free[j] as usize);
-    let nearest = nearest_rings(free, shape, are_bodies);
+    let may_be_ring = |i: usize, j: usize, ring: &Ring| {
+        let is_large = |i: usize| owners.is_large(free[i] as usize, shape(i).area());
+        !are_bodies(i, j) || (is_large(i) || is_large(j)) && ring.may_join_bodies([shape(i), shape(j)])
+    };
+    let nearest = nearest_rings(free, shape, may_be_ring);
     let larger_first = |i: usize, j: usize| if shape(j).radius() > shape(i).radius() { [j, i] } else { [i, j] };
     let mut pairs = Vec::new();
     let mut taken = vec![false; free.len()];
@@ -199,7 +205,7 @@ pub(super) fn find(free: &[u32], shapes: &[Shape], owners: &Owners) -> Vec<Pair>
 fn nearest_rings<'s>(
     free: &[u32],
     shape: impl Fn(usize) -> &'s Shape,
-    are_bodies: impl Fn(usize, usize) -> bool,
+    may_be: impl Fn(usize, usize, &Ring) -> bool,
 ) -> Vec<Option<(usize, Ring)>> {
     let tree = BoxTree::new(&(0..free.len()).map(|i| bounds(shape(i), 0.0)).collect::<Vec<_>>());
     let mut found = Vec::new();
@@ -208,10 +214,8 @@ fn nearest_rings<'s>(
             tree.meeting(&bounds(shape(i), FARTHEST * shape(i).radius()), &mut found);
             // Only of those that it can be a ring with: what else lies near is no reason to leave one open.
             let others = found.iter().map(|j| *j as usize).filter(|j| *j != i);
-            let mut rings: Vec<(usize, Ring)> = others
-                .filter_map(|j| Some((j, ring(shape(i), shape(j))?)))
-                .filter(|(j, ring)| !are_bodies(i, *j) || ring.may_join_bodies([shape(i), shape(*j)]))
-                .collect();
+            let mut rings: Vec<(usize, Ring)> =
+                others.filter_map(|j| Some((j, ring(shape(i), shape(j))?))).filter(|(j, ring)| may_be(i, *j, ring)).collect();
             // Of pipes that end inside each other, the walls are closed, not the rooms between them, however narrow.
             if rings.iter().any(|(_, ring)| ring.is_wall() && ring.level) {
                 rings.retain(|(_, ring)| ring.missing != Missing::Floor);
@@ -318,7 +322,7 @@ fn ring(a: &Shape, b: &Shape) -> Option<Ring> {
     }
     let back_to_back = towards.iter().all(|t| *t < 0.0);
     let are_holes = outer.continues.min(inner.continues) >= HOLE;
-    (back_to_back && are_holes && strip < caps && outlines_agree(outer, inner))
+    (back_to_back && are_holes && strip < caps && outlines_agree(outer, inner, OUTLINE))
         .then(|| two_planes(Missing::Through(strip, caps)))
         .flatten()
 }
@@ -353,8 +357,8 @@ fn lies_inside(inner: &Shape, outer: &Shape) -> bool {
 }
 
 /// Is neither outline far from the other, seen along the axis?
-fn outlines_agree(a: &Shape, b: &Shape) -> bool {
-    let reach = OUTLINE * a.radius().max(b.radius());
+fn outlines_agree(a: &Shape, b: &Shape, share: f64) -> bool {
+    let reach = share * a.radius().max(b.radius());
     let flat = |p: DVec3| p - a.normal * p.dot(a.normal);
     let is_near = |p: DVec3, other: &Shape| {
         let n = other.points.len();

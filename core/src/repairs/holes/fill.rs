@@ -102,7 +102,7 @@ pub(crate) fn fill_loops(
         fair::smooth(survey, work, &mut closing.placed, &settings, threads);
     }
     if profile.check_self_intersections {
-        closing.guard(survey, work, reversed);
+        closing.guard(survey, work, reversed, shape_settings(profile));
         closing.close_by_strips(survey, work, reversed, threads);
     }
     let balances = profile.resolve_crossings && profile.fill_holes && survey.crossing_pairs.is_some();

@@ -12,8 +12,8 @@ use crate::repairs::holes::annular;
 use crate::repairs::holes::patches::Placed;
 use crate::repairs::shared::collisions;
 use crate::repairs::shared::work::Work;
-use crate::submesh::{Submesh, Vertex};
 use crate::submesh::components::Reversed;
+use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
 
 /// No more loops than this are looked at.

@@ -1,8 +1,8 @@
 //! Creases that run into a hole, and their way through it.
 //!
 //! Curvature does not go across a crease. One that ends at the rim and faces another such end is carried on to that along a cubic curve, with
-//! vertices that stay where they are; the patch's two sides are then made smooth each for itself. Anything else that ends at the rim
-//! is not guessed at.
+//! vertices that stay where they are; the patch's parts beside are then made smooth each for itself. There may be several, none across
+//! another. Anything else that ends at the rim is not guessed at.
 
 use glam::DVec3;
 
@@ -22,12 +22,18 @@ const ON: f64 = 0.7;
 /// Two ends face each other when both point along the line between them within this cosine, 45°.
 const FACING: f64 = 0.7;
 
+/// Creases that end at the rim, at most: every two of them may be one.
+const MOST_ENDS: usize = 12;
+
+/// Where a crease ends at the rim: the vertex, and the direction in which it comes in.
+type End = (u32, DVec3);
+
 /// What is sharp.
 pub(super) struct Creases {
     /// For each vertex: does curvature not go across it?
     pub(super) sharp: Vec<bool>,
-    /// The rim's two vertices between which a crease goes on, with the directions in which it comes in.
-    pub(super) through: Option<[(u32, DVec3); 2]>,
+    /// The creases that go on through the patch, each between two vertices of the rim.
+    pub(super) through: Vec<[End; 2]>,
 }
 
 /// Finds edges that are sharp. `Err` where the patch would not continue what is around, or creases end at the rim that cannot be carried on.
@@ -77,8 +83,8 @@ pub(super) fn find(sheet: &Sheet<'_>) -> Result<Creases, Unshaped> {
     Ok(Creases { sharp, through: through(sheet, &lines)? })
 }
 
-/// Where a crease goes through the patch. `lines`: sharp edges in both directions, ascending, and whether they count for themselves.
-fn through(sheet: &Sheet<'_>, lines: &[([u32; 2], bool)]) -> Result<Option<[(u32, DVec3); 2]>, Unshaped> {
+/// Where creases go through the patch. `lines`: sharp edges in both directions, ascending, and whether they count for themselves.
+fn through(sheet: &Sheet<'_>, lines: &[([u32; 2], bool)]) -> Result<Vec<[End; 2]>, Unshaped> {
     let way = |[v, w]: [u32; 2]| (sheet.points[w as usize] - sheet.points[v as usize]).normalize_or_zero();
     let goes_on = |[v, w]: [u32; 2]| {
         let from = lines.partition_point(|(line, _)| line[0] < w);
@@ -87,62 +93,99 @@ fn through(sheet: &Sheet<'_>, lines: &[([u32; 2], bool)]) -> Result<Option<[(u32
             .take_while(|(line, _)| line[0] == w)
             .any(|(line, _)| line[1] != v && way(*line).dot(way([v, w])) > ON)
     };
-    let ends: Vec<(u32, DVec3)> = lines
+    let ends: Vec<End> = lines
         .iter()
         .filter(|(line, strong)| sheet.on_rim[line[0] as usize] && (*strong || goes_on(*line)))
         .map(|([v, w], _)| (*v, way([*w, *v])))
         .collect();
-    match *ends {
-        [] => Ok(None),
-        [a, b] if a.0 != b.0 => {
-            let along = (sheet.points[b.0 as usize] - sheet.points[a.0 as usize]).normalize_or_zero();
-            if a.1.dot(along) < FACING || -b.1.dot(along) < FACING {
-                return Err(Unshaped::Creased);
-            }
-            Ok(Some([a, b]))
-        }
-        _ => Err(Unshaped::Creased),
+    if ends.is_empty() {
+        return Ok(Vec::new());
     }
+    // One vertex where several end is a corner that is not known.
+    if ends.len() > MOST_ENDS || ends.windows(2).any(|pair| pair[0].0 == pair[1].0) {
+        return Err(Unshaped::Creased);
+    }
+    matched(sheet, &ends).ok_or(Unshaped::Creased)
 }
 
-/// A coarse patch with an edge between two vertices of the rim: the given one, or, if it is a disc, one made anew of its two parts.
-pub(super) fn with_edge(coarse: &CoarsePatch<'_>, sheet: &Sheet<'_>, [a, b]: [u32; 2]) -> Option<Vec<[u32; 3]>> {
-    let has_edge = |triangles: &[[u32; 3]]| triangles.iter().flat_map(|t| edges(*t)).any(|e| sorted(e) == sorted([a, b]));
-    if has_edge(coarse.patch) {
+/// The ends by twos that face each other, best first; `None` if one is left over.
+fn matched(sheet: &Sheet<'_>, ends: &[End]) -> Option<Vec<[End; 2]>> {
+    let mut pairs: Vec<(f64, [usize; 2])> = Vec::new();
+    for (i, a) in ends.iter().enumerate() {
+        for (j, b) in ends.iter().enumerate().skip(i + 1) {
+            let along = (sheet.points[b.0 as usize] - sheet.points[a.0 as usize]).normalize_or_zero();
+            let [from, to] = [a.1.dot(along), -b.1.dot(along)];
+            if from >= FACING && to >= FACING {
+                pairs.push((from + to, [i, j]));
+            }
+        }
+    }
+    pairs.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    let mut free = vec![true; ends.len()];
+    let mut all = Vec::new();
+    for (_, [i, j]) in pairs {
+        if free[i] && free[j] {
+            (free[i], free[j]) = (false, false);
+            all.push([ends[i], ends[j]]);
+        }
+    }
+    (2 * all.len() == ends.len()).then_some(all)
+}
+
+/// A coarse patch with an edge between every two of these vertices of the rim: the given one, or, if it is a disc, one made anew of its parts.
+pub(super) fn with_edges(coarse: &CoarsePatch<'_>, sheet: &Sheet<'_>, creases: &[[End; 2]]) -> Option<Vec<[u32; 3]>> {
+    let wanted: Vec<[u32; 2]> = creases.iter().map(|ends| sorted(ends.map(|end| end.0))).collect();
+    let missing = |triangles: &[[u32; 3]]| {
+        let mut there: Vec<[u32; 2]> = triangles.iter().flat_map(|t| edges(*t)).map(sorted).collect();
+        there.sort_unstable();
+        wanted.iter().filter(|edge| there.binary_search(edge).is_err()).count()
+    };
+    if missing(coarse.patch) == 0 {
         return Some(coarse.patch.to_vec());
     }
-    if has_edge(coarse.around) {
+    if missing(coarse.around) < wanted.len() {
         return None;
     }
-    let rim = sheet.rim()?;
-    let (i, j) = (rim.iter().position(|&v| v == a)?, rim.iter().position(|&v| v == b)?);
-    let turned = |from: usize, to: usize| -> Vec<u32> {
-        let count = (to + rim.len() - from) % rim.len();
-        (0..=count).map(|k| rim[(from + k) % rim.len()]).collect()
-    };
+    let mut parts = vec![sheet.rim()?];
+    for [a, b] in wanted {
+        // Creases that cross would have no part with both ends.
+        let (at, i, j) = parts
+            .iter()
+            .enumerate()
+            .find_map(|(at, part)| Some((at, part.iter().position(|v| *v == a)?, part.iter().position(|v| *v == b)?)))?;
+        let part = parts.swap_remove(at);
+        for (from, to) in [(i, j), (j, i)] {
+            let count = (to + part.len() - from) % part.len();
+            parts.push((0..=count).map(|k| part[(from + k) % part.len()]).collect());
+        }
+    }
     let mut patch = Vec::new();
-    for part in [turned(i, j), turned(j, i)] {
-        let points: Vec<Point> = part.iter().map(|&v| coarse.positions[v as usize]).collect();
-        let apexes: Vec<Option<Point>> = (0..part.len() - 1)
-            .map(|k| {
-                let beyond = coarse.around.iter().find(|t| edges(**t).contains(&[part[k + 1], part[k]]))?;
-                let apex = beyond.iter().find(|&&v| v != part[k] && v != part[k + 1])?;
-                Some(coarse.positions[*apex as usize])
-            })
-            .collect();
-        let forbidden = |x: u32, y: u32| sheet.is_taken(part[x as usize], part[y as usize]);
-        let made = triangulate(
-            &Rim { points: &points, apexes: &apexes, obstacles: &[], forbidden: &forbidden },
-            &FillSettings::default(),
-        )
-        .ok()?;
-        patch.extend(made.triangles.iter().map(|t| t.map(|v| part[v as usize])));
+    for part in &parts {
+        patch.extend(triangulated(coarse, sheet, part)?);
     }
     Some(patch)
 }
 
+/// A part of a patch, made anew.
+fn triangulated(coarse: &CoarsePatch<'_>, sheet: &Sheet<'_>, part: &[u32]) -> Option<Vec<[u32; 3]>> {
+    let points: Vec<Point> = part.iter().map(|&v| coarse.positions[v as usize]).collect();
+    let apexes: Vec<Option<Point>> = (0..part.len())
+        .map(|k| {
+            let next = part[(k + 1) % part.len()];
+            let beyond = coarse.around.iter().find(|t| edges(**t).contains(&[next, part[k]]))?;
+            let apex = beyond.iter().find(|&&v| v != part[k] && v != next)?;
+            Some(coarse.positions[*apex as usize])
+        })
+        .collect();
+    let forbidden = |x: u32, y: u32| sheet.is_taken(part[x as usize], part[y as usize]);
+    let made =
+        triangulate(&Rim { points: &points, apexes: &apexes, obstacles: &[], forbidden: &forbidden }, &FillSettings::default())
+            .ok()?;
+    Some(made.triangles.iter().map(|t| t.map(|v| part[v as usize])).collect())
+}
+
 /// Divides the edge between the two ends along a cubic curve that goes on in their directions. Its vertices are held.
-pub(super) fn carry_on(sheet: &mut Sheet<'_>, [(a, from), (b, to)]: [(u32, DVec3); 2]) -> bool {
+pub(super) fn carry_on(sheet: &mut Sheet<'_>, [(a, from), (b, to)]: [End; 2]) -> bool {
     let (start, end) = (sheet.points[a as usize], sheet.points[b as usize]);
     let length = start.distance(end);
     let scale = 0.5 * (sheet.scale[a as usize] + sheet.scale[b as usize]);

@@ -41,13 +41,15 @@ pub(crate) enum Method {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ShapeSettings {
     pub(crate) method: Method,
+    /// Edges are to be so many times shorter than those around.
+    pub(crate) finer: f64,
     /// New vertices, at most; a patch that would need more gets longer edges. 5,000 take about a second.
     pub(crate) max_vertices: usize,
 }
 
 impl Default for ShapeSettings {
     fn default() -> Self {
-        Self { method: Method::Fair, max_vertices: 5_000 }
+        Self { method: Method::Fair, finer: 1.0, max_vertices: 5_000 }
     }
 }
 
@@ -68,10 +70,10 @@ pub(crate) fn is_edge(turn: f64, length: f64) -> bool {
 /// # Errors
 /// [`Unshaped`]: the coarse patch is to be used.
 pub(crate) fn shape(coarse: &CoarsePatch<'_>, settings: &ShapeSettings) -> Result<Shaped, Unshaped> {
-    if is_fine(coarse) {
+    if is_fine(coarse, settings.finer) {
         return Err(Unshaped::NothingToAdd);
     }
-    let mut sheet = Sheet::new(coarse).ok_or(Unshaped::NotASurface)?;
+    let mut sheet = sheet_of(coarse, settings.finer).ok_or(Unshaped::NotASurface)?;
     if refine::is_fine(&sheet) {
         return Err(Unshaped::NothingToAdd);
     }
@@ -80,9 +82,9 @@ pub(crate) fn shape(coarse: &CoarsePatch<'_>, settings: &ShapeSettings) -> Resul
         return Err(Unshaped::Uncurved);
     }
     let divided;
-    if let Some(ends) = through {
-        divided = crease::with_edge(coarse, &sheet, ends.map(|e| e.0)).ok_or(Unshaped::Creased)?;
-        sheet = Sheet::new(&CoarsePatch { patch: &divided, ..*coarse }).ok_or(Unshaped::NotASurface)?;
+    if !through.is_empty() {
+        divided = crease::with_edges(coarse, &sheet, &through).ok_or(Unshaped::Creased)?;
+        sheet = sheet_of(&CoarsePatch { patch: &divided, ..*coarse }, settings.finer).ok_or(Unshaped::NotASurface)?;
     }
     let rim = sheet.on_rim.iter().filter(|on| **on).count() as f64;
     let most = settings.max_vertices.min((50.0 * rim * rim.sqrt()) as usize);
@@ -93,16 +95,14 @@ pub(crate) fn shape(coarse: &CoarsePatch<'_>, settings: &ShapeSettings) -> Resul
             *scale *= coarser;
         }
     }
-    if let Some(ends) = through
-        && !crease::carry_on(&mut sheet, ends)
-    {
+    if !through.iter().all(|ends| crease::carry_on(&mut sheet, *ends)) {
         return Err(Unshaped::Creased);
     }
     sharp.resize(sheet.held, true);
     if refine(&mut sheet, most) == 0 {
         return Err(Unshaped::NothingToAdd);
     }
-    if settings.method == Method::Implicit && through.is_none() {
+    if settings.method == Method::Implicit && through.is_empty() {
         implicit(&mut sheet)?;
         return finish(&sheet, coarse);
     }
@@ -121,6 +121,12 @@ pub(crate) fn shape(coarse: &CoarsePatch<'_>, settings: &ShapeSettings) -> Resul
     Err(Unshaped::Crosses)
 }
 
+fn sheet_of<'a>(coarse: &CoarsePatch<'a>, finer: f64) -> Option<Sheet<'a>> {
+    let mut sheet = Sheet::new(coarse)?;
+    sheet.scale.iter_mut().for_each(|scale| *scale /= finer);
+    Some(sheet)
+}
+
 /// Are at least half of the vertices next to the rim on smooth surface?
 fn tells_curvature(sheet: &Sheet<'_>, coarse: &CoarsePatch<'_>, sharp: &[bool]) -> bool {
     let is_on_rim = |v: &u32| sheet.on_rim[*v as usize];
@@ -132,7 +138,7 @@ fn tells_curvature(sheet: &Sheet<'_>, coarse: &CoarsePatch<'_>, sharp: &[bool]) 
 }
 
 /// Cheap: is no triangle large enough to be divided, whatever the scale?
-fn is_fine(coarse: &CoarsePatch<'_>) -> bool {
+fn is_fine(coarse: &CoarsePatch<'_>, finer: f64) -> bool {
     let corners = |t: &[u32; 3]| t.map(|v| at(&coarse.positions[v as usize]));
     let least = coarse
         .around
@@ -142,7 +148,7 @@ fn is_fine(coarse: &CoarsePatch<'_>) -> bool {
         .fold(f64::INFINITY, f64::min);
     coarse.patch.iter().map(corners).all(|t| {
         let centre = (t[0] + t[1] + t[2]) / 3.0;
-        t.iter().any(|p| refine::DENSITY * refine::DENSITY * p.distance_squared(centre) <= least)
+        t.iter().any(|p| refine::DENSITY * refine::DENSITY * finer * finer * p.distance_squared(centre) <= least)
     })
 }
 

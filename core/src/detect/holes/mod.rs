@@ -7,6 +7,7 @@
 //! simple. Each rule's measure goes to the report beside the class.
 
 pub(crate) mod loops;
+pub(crate) mod owners;
 mod pairs;
 mod shape;
 mod sides;
@@ -24,6 +25,7 @@ use crate::submesh::near::Tolerance;
 use crate::submesh::{Submesh, Vertex};
 use crate::util::parallel;
 use loops::Loop;
+use owners::Owners;
 use shape::Shape;
 
 /// Smallest share of a loop's projected area, seen along an axis, in that of a circle of its perimeter: below, it is a slit from there.
@@ -85,7 +87,7 @@ pub(crate) fn classify(
     let mut partners: Vec<Option<u32>> = sides.iter().map(|s| s.partner).collect();
     let free: Vec<u32> = (0..loops.len() as u32).filter(|i| classes[*i as usize].is_none()).collect();
     let mut distances: Vec<Option<f64>> = vec![None; loops.len()];
-    for pair in pairs::find(&free, &shapes) {
+    for pair in pairs::find(&free, &shapes, &Owners::one(loops.len())) {
         let [outer, inner] = pair.loops.map(|i| i as usize);
         for (i, other) in [(outer, inner), (inner, outer)] {
             // An island's hole keeps what it was found to be first.
@@ -136,13 +138,13 @@ impl Shapes {
         Self(parallel::map(threads, loops.len(), |i| shape_of(submesh, &loops[i])))
     }
 
-    /// The partners among the loops. O(n log n) in their vertices.
-    pub(crate) fn partners(&self) -> Partners {
+    /// The partners among the loops of these owners. O(n log n) in their vertices.
+    pub(crate) fn partners(&self, owners: &Owners) -> Partners {
         let all: Vec<u32> = (0..self.0.len() as u32).collect();
         let mut partners = Partners::default();
         let mut groups: Vec<Vec<usize>> = Vec::new();
         let mut group_of: BTreeMap<usize, usize> = BTreeMap::new();
-        for pair in pairs::find(&all, &self.0) {
+        for pair in pairs::find(&all, &self.0, owners) {
             let [outer, inner] = pair.loops.map(|i| i as usize);
             if pair.class == LoopClass::Island {
                 partners.islands.push([outer, inner]);
@@ -160,6 +162,13 @@ impl Shapes {
             }
         }
         partners
+    }
+
+    /// The other loops that a strip may lead to from this one though two caps have less area, the nearest first: of the same surface, alike, and the
+    /// other way round. O(vertices).
+    pub(crate) fn across(&self, of: usize, owners: &Owners) -> Vec<usize> {
+        let others = (0..self.0.len()).filter(|other| *other != of && owners.are_same(of, *other));
+        pairs::across(&self.0, of, others)
     }
 
     /// For each loop: would a flat patch continue the surface (1), stand on it (0), or lie back along it (−1)?

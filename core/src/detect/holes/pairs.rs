@@ -19,6 +19,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
+use super::owners::Owners;
 use super::shape::Shape;
 use crate::contract::report::LoopClass;
 use crate::geometry::boxes::BoxTree;
@@ -46,6 +47,8 @@ const WASHER: f64 = -0.5;
 /// How much both rims' surfaces go on across them, together, at most: holes in two bodies that face each other come to 2, the ends of a
 /// tube to 0.
 const FACING_HOLES: f64 = 1.0;
+/// How much the surface goes on across a rim, at most, if the opening is most of what is cut there: the end of a tube, or of a cone.
+const MOSTLY_OPEN: f64 = 0.5;
 /// How far the surface along a rim faces the axis, or away from it, to be a skin.
 const SKIN: f64 = 0.3;
 /// The same for the skins of a wall whose rims are not alike ...
@@ -57,6 +60,8 @@ const HOLE: f64 = 0.7;
 /// Outlines of holes back to back agree as long as no vertex is farther from the other outline, seen along the axis, than this share of the
 /// larger radius: circles of eight facets do.
 const OUTLINE: f64 = 0.15;
+/// And outlines of openings in two bodies, if these were one: what broke may be turned aside a little.
+const ALIKE_OUTLINE: f64 = 0.35;
 /// Cosine between the vector areas of a hole and an island in it, at most: an island is small, and may lie on a slope.
 const ISLAND_OPPOSITE: f64 = -0.2;
 /// An island lies no farther from the plane of its hole than this share of the hole's size.
@@ -111,6 +116,18 @@ impl Ring {
         matches!(self.missing, Missing::Tube | Missing::Through(..))
     }
 
+    /// May it be missing between two bodies that can each be closed alone? Only where most of what is cut there is the opening: a hole in a
+    /// surface that faces the other one's is one of each. Skins that face each other bound the air between the bodies, unless two caps
+    /// would lie on each other.
+    fn may_join_bodies(&self, rims: [&Shape; 2]) -> bool {
+        let open = rims.iter().all(|rim| rim.continues <= MOSTLY_OPEN) && outlines_agree(rims[0], rims[1], ALIKE_OUTLINE);
+        match self.missing {
+            Missing::Tube | Missing::OneSurface => open,
+            Missing::Floor => open && self.level,
+            Missing::Wall(..) | Missing::Through(..) => false,
+        }
+    }
+
     fn rule(&self) -> String {
         let planes = if self.one_plane { "one plane" } else { "two planes" };
         let less =
@@ -140,12 +157,17 @@ impl Ring {
 
 /// The pairs among `free` loops: walls, rings of one surface, islands, rings of tubes and ways through, each in the loops' order. A wall with several bores is in
 /// several pairs, as is a hole with several islands.
-pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
+pub(super) fn find(free: &[u32], shapes: &[Shape], owners: &Owners) -> Vec<Pair> {
     if free.len() < 2 {
         return Vec::new();
     }
     let shape = |place: usize| &shapes[free[place] as usize];
-    let nearest = nearest_rings(free, shape);
+    let are_bodies = |i: usize, j: usize| owners.are_bodies(free[i] as usize, free[j] as usize);
+    let may_be_ring = |i: usize, j: usize, ring: &Ring| {
+        let is_large = |i: usize| owners.is_large(free[i] as usize, shape(i).area());
+        !are_bodies(i, j) || (is_large(i) || is_large(j)) && ring.may_join_bodies([shape(i), shape(j)])
+    };
+    let nearest = nearest_rings(free, shape, may_be_ring);
     let larger_first = |i: usize, j: usize| if shape(j).radius() > shape(i).radius() { [j, i] } else { [i, j] };
     let mut pairs = Vec::new();
     let mut taken = vec![false; free.len()];
@@ -165,7 +187,7 @@ pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
     };
     take_rings(false, &mut taken, &mut pairs);
     let mut with_islands = taken.clone();
-    for [outer, inner] in islands(free, shape, &taken) {
+    for [outer, inner] in islands(free, shape, are_bodies, &taken) {
         (with_islands[outer], with_islands[inner]) = (true, true);
         pairs.push(Pair {
             loops: [outer, inner].map(|i| free[i]),
@@ -180,7 +202,11 @@ pub(super) fn find(free: &[u32], shapes: &[Shape]) -> Vec<Pair> {
 }
 
 /// For each loop, by place, the nearest one that it is a ring with.
-fn nearest_rings<'s>(free: &[u32], shape: impl Fn(usize) -> &'s Shape) -> Vec<Option<(usize, Ring)>> {
+fn nearest_rings<'s>(
+    free: &[u32],
+    shape: impl Fn(usize) -> &'s Shape,
+    may_be: impl Fn(usize, usize, &Ring) -> bool,
+) -> Vec<Option<(usize, Ring)>> {
     let tree = BoxTree::new(&(0..free.len()).map(|i| bounds(shape(i), 0.0)).collect::<Vec<_>>());
     let mut found = Vec::new();
     (0..free.len())
@@ -188,7 +214,8 @@ fn nearest_rings<'s>(free: &[u32], shape: impl Fn(usize) -> &'s Shape) -> Vec<Op
             tree.meeting(&bounds(shape(i), FARTHEST * shape(i).radius()), &mut found);
             // Only of those that it can be a ring with: what else lies near is no reason to leave one open.
             let others = found.iter().map(|j| *j as usize).filter(|j| *j != i);
-            let mut rings: Vec<(usize, Ring)> = others.filter_map(|j| Some((j, ring(shape(i), shape(j))?))).collect();
+            let mut rings: Vec<(usize, Ring)> =
+                others.filter_map(|j| Some((j, ring(shape(i), shape(j))?))).filter(|(j, ring)| may_be(i, *j, ring)).collect();
             // Of pipes that end inside each other, the walls are closed, not the rooms between them, however narrow.
             if rings.iter().any(|(_, ring)| ring.is_wall() && ring.level) {
                 rings.retain(|(_, ring)| ring.missing != Missing::Floor);
@@ -200,7 +227,12 @@ fn nearest_rings<'s>(free: &[u32], shape: impl Fn(usize) -> &'s Shape) -> Vec<Op
 }
 
 /// Islands and the holes around them, by place: each with the smallest hole that holds it. What is `taken` is neither.
-fn islands<'s>(free: &[u32], shape: impl Fn(usize) -> &'s Shape, taken: &[bool]) -> Vec<[usize; 2]> {
+fn islands<'s>(
+    free: &[u32],
+    shape: impl Fn(usize) -> &'s Shape,
+    are_bodies: impl Fn(usize, usize) -> bool,
+    taken: &[bool],
+) -> Vec<[usize; 2]> {
     // A domed island stands out of its hole's box.
     let reaches: Vec<Bounds> = (0..free.len()).map(|i| bounds(shape(i), OFF_PLANE * shape(i).area().sqrt())).collect();
     let tree = BoxTree::new(&reaches);
@@ -211,6 +243,7 @@ fn islands<'s>(free: &[u32], shape: impl Fn(usize) -> &'s Shape, taken: &[bool])
             outer != inner
                 && !taken[inner]
                 && !taken[outer]
+                && !are_bodies(outer, inner)
                 && holds_island(shape(outer), shape(inner))
                 && ring(shape(outer), shape(inner)).is_none()
         };
@@ -276,22 +309,34 @@ fn ring(a: &Shape, b: &Shape) -> Option<Ring> {
     if one_plane && one_surface >= ONE_SURFACE && is_hole_around(outer, inner) {
         return ring(Missing::OneSurface);
     }
-    if one_plane && skins {
+    let holes = outer.continues + inner.continues > FACING_HOLES;
+    if one_plane && skins && !holes {
         return ring(Missing::Floor);
     }
     let two_planes = |missing| Some(Ring { missing, one_plane: false, level, apart });
     let towards = [outer.vector_area.dot(way), -inner.vector_area.dot(way)];
     let bore = outer.outwards <= -SKIN && inner.outwards <= -SKIN;
-    let holes = outer.continues + inner.continues > FACING_HOLES;
     let goes_on = if bore { towards.iter().all(|t| *t < 0.0) } else { towards.iter().all(|t| *t > 0.0) };
     if goes_on && one_surface > WASHER && !holes {
         return two_planes(Missing::Tube);
     }
     let back_to_back = towards.iter().all(|t| *t < 0.0);
     let are_holes = outer.continues.min(inner.continues) >= HOLE;
-    (back_to_back && are_holes && strip < caps && outlines_agree(outer, inner))
+    (back_to_back && are_holes && strip < caps && outlines_agree(outer, inner, OUTLINE))
         .then(|| two_planes(Missing::Through(strip, caps)))
         .flatten()
+}
+
+/// Which of `others` a strip may lead to though two caps have less area, the nearest first.
+pub(super) fn across(shapes: &[Shape], of: usize, others: impl Iterator<Item = usize>) -> Vec<usize> {
+    let rim = &shapes[of];
+    let may = |other: &usize| {
+        let other = &shapes[*other];
+        face(rim, other, OPPOSITE) && characteristic_distance(rim, other) < ANNULAR
+    };
+    let mut found: Vec<(f64, usize)> = others.filter(may).map(|other| (distance(rim, &shapes[other]), other)).collect();
+    found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    found.into_iter().map(|(_, other)| other).collect()
 }
 
 /// Does a face end there that is to be recognised without another rim like it?
@@ -312,8 +357,8 @@ fn lies_inside(inner: &Shape, outer: &Shape) -> bool {
 }
 
 /// Is neither outline far from the other, seen along the axis?
-fn outlines_agree(a: &Shape, b: &Shape) -> bool {
-    let reach = OUTLINE * a.radius().max(b.radius());
+fn outlines_agree(a: &Shape, b: &Shape, share: f64) -> bool {
+    let reach = share * a.radius().max(b.radius());
     let flat = |p: DVec3| p - a.normal * p.dot(a.normal);
     let is_near = |p: DVec3, other: &Shape| {
         let n = other.points.len();

@@ -33,7 +33,7 @@ const FLAT: f64 = 2.0 * f32::EPSILON as f64;
 /// Shapes every patch that has room. One that cannot be shaped stays as it is.
 pub(crate) fn smooth(survey: &Survey<'_>, work: &mut Work<'_>, placed: &mut [Placed], settings: &ShapeSettings, threads: usize) {
     let submesh: &Submesh = work;
-    let wanted = parallel::map(threads, placed.len(), |i| is_wanted(submesh, &placed[i]));
+    let wanted = parallel::map(threads, placed.len(), |i| is_wanted(submesh, &placed[i], settings.finer));
     let roomy: Vec<usize> = (0..placed.len()).filter(|i| wanted[*i]).collect();
     let mut rest = roomy.as_slice();
     while !rest.is_empty() {
@@ -68,11 +68,13 @@ pub(crate) fn smooth(survey: &Survey<'_>, work: &mut Work<'_>, placed: &mut [Pla
 }
 
 /// Is a patch to be shaped, as far as the triangles of the submesh tell?
-fn is_wanted(submesh: &Submesh, patch: &Placed) -> bool {
+fn is_wanted(submesh: &Submesh, patch: &Placed, finer: f64) -> bool {
     // One triangle has no inner edge.
-    patch.count > 1 && {
+    (patch.count > 1 || patch.count == 1 && finer > 1.0) && {
         let edges = Edges::of(submesh, patch);
-        edges.have_room(submesh) && !edges.is_rim_an_edge(submesh, patch) && !edges.lie_in_a_plane(submesh, patch)
+        (finer > 1.0 || edges.have_room(submesh))
+            && !edges.is_rim_an_edge(submesh, patch)
+            && !edges.lie_in_a_plane(submesh, patch)
     }
 }
 

@@ -3,7 +3,9 @@
 
 mod across;
 mod closing;
+mod doubts;
 mod step_back;
+mod strips;
 mod together;
 
 use crate::contract::report::{MOST_LISTED, RepairName};
@@ -19,6 +21,7 @@ use crate::contract::settings::{PatchShape, Profile};
 use crate::detect::holes::{
     Shapes,
     loops::{self, Boundary, Loop},
+    owners::Owners,
 };
 use crate::repairs::holes::fair;
 use crate::repairs::shared::admission::Admission;
@@ -41,6 +44,10 @@ pub(crate) const REPAIR: Repair = Repair {
         cx.handed.kept_open = closed.kept_open;
         cx.handed.sheets = closed.sheets;
         cx.handed.across = closed.across;
+        cx.account.doubts.extend(closed.doubts);
+        if let Some(meant) = &mut cx.account.enclosed.meant {
+            *meant -= closed.not_meant;
+        }
         Ok(Done::count(closed.loops, format!("loops closed: {}", parts.join(", "))))
     },
 };
@@ -75,24 +82,35 @@ pub(crate) fn fill_loops(
     let (submesh, edges) = work.edges();
     let Boundary { loops: rims, chains } = loops::boundary(submesh, edges);
     let shapes = Shapes::of(submesh, &rims, threads);
+    let owners = Owners::of(survey, submesh, edges, reversed, &rims);
     let admission = Admission::of(survey, work, &rims, &shapes, reversed, tolerance, (profile, only_loop));
     let max_edges = profile.max_hole_edges as usize;
-    let mut closing =
-        Closing { admission, max_edges, rims: Vec::new(), placed: Vec::new(), open: Vec::new(), joints: Vec::new() };
-    let first = closing.close_together(survey, work, rims, shapes, threads);
+    let mut closing = Closing {
+        admission,
+        max_edges,
+        rims: Vec::new(),
+        placed: Vec::new(),
+        open: Vec::new(),
+        joints: Vec::new(),
+        doubts: Vec::new(),
+        not_meant: 0.0,
+    };
+    let first = closing.close_together(survey, work, rims, (shapes, owners), threads);
     closing.triangulate(work, first, threads);
     closing.close_flat(survey, work);
     if let Some(settings) = shape_settings(profile) {
         fair::smooth(survey, work, &mut closing.placed, &settings, threads);
     }
     if profile.check_self_intersections {
-        closing.guard(survey, work, reversed);
+        closing.guard(survey, work, reversed, shape_settings(profile));
+        closing.close_by_strips(survey, work, reversed, threads);
     }
     let balances = profile.resolve_crossings && profile.fill_holes && survey.crossing_pairs.is_some();
     let mut balancing = closing.close_slits(work, balances);
     let mut across = Vec::new();
     if profile.resolve_crossings && survey.crossing_pairs.is_some() {
         across = closing.close_across(work);
+        closing.doubt_across(survey, work, reversed);
     }
     let mut unclosed = Vec::new();
     let first_balancing = across.len();

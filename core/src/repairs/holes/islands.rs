@@ -165,7 +165,7 @@ fn join(submesh: &Submesh, outer: &[Vertex], inner: &[Vertex]) -> Option<(Vec<Ve
 mod tests {
     use super::*;
     use crate::contract::settings::Profile;
-    use crate::detect::holes::{self, loops};
+    use crate::detect::holes::{self, loops, owners::Owners};
     use crate::repairs::holes::fill;
     use crate::testing::{Corners, after, plate, shifted};
 
@@ -212,7 +212,7 @@ mod tests {
             let mut work = Work::new(&mut d.submesh);
             let (submesh, edges) = work.edges();
             let rims = loops::find(submesh, edges);
-            let holes::Partners { rings, islands, .. } = holes::Shapes::of(submesh, &rims, 1).partners();
+            let holes::Partners { rings, islands, .. } = holes::Shapes::of(submesh, &rims, 1).partners(&Owners::one(rims.len()));
             let pairs = [rings, islands].concat();
             let [hole, island] = pairs[0].map(|i| rims[i].vertices.clone());
             let (joined, triangles) = join(&work, &hole, &island).unwrap();

@@ -19,6 +19,8 @@ pub(crate) struct Placed {
     pub(crate) count: u32,
     /// Of a patch that was shaped: the triangles that it was shaped from.
     pub(crate) coarse: Vec<[Vertex; 3]>,
+    /// It was shaped more finely since it crossed another body.
+    pub(crate) refined: bool,
     /// What it came to grief on.
     pub(crate) obstacles: Vec<Obstacle>,
     /// Nothing else was found than a patch that crosses bodies which run into this one already.
@@ -45,6 +47,7 @@ impl Placed {
             first: 0,
             count: 0,
             coarse: Vec::new(),
+            refined: false,
             obstacles: Vec::new(),
             across: false,
             to_be_cut: false,

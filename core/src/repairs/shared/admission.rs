@@ -4,11 +4,9 @@
 //! drew. Its rim is told from a hole by the patch, which would lie back along the surface, and by what it would enclose: next to nothing for
 //! the surface's size. (A relief without its bottom encloses more, and is closed.)
 
-use glam::DVec3;
-
 use crate::contract::report::LoopClass;
 use crate::contract::settings::Profile;
-use crate::detect::holes::{self, Shapes, loops::Loop};
+use crate::detect::holes::{self, Shapes, loops::Loop, owners};
 use crate::repairs::shared::work::Work;
 use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed, Through};
@@ -157,7 +155,7 @@ fn sheet_rims<'l>(
         for ((rim, component), lies_back) in loops.iter().zip(&mut of_loop).zip(&mut lies_back) {
             *component = components.of_triangle[rim.triangles[0] as usize];
             if let Some((volume, area)) = enclosed.get_mut(*component as usize) {
-                let (more, patch) = fan(submesh, rim, middle);
+                let (more, patch) = owners::fan(submesh, &rim.vertices, middle);
                 *lies_back &= patch >= LARGE * survey.measure.area(components.list[*component as usize].extent);
                 *volume += more;
                 *area += patch;
@@ -171,18 +169,4 @@ fn sheet_rims<'l>(
         .zip(of_loop)
         .filter(move |((_, lies_back), component)| *lies_back && is_sheet.get(*component as usize) == Some(&true))
         .map(|((rim, _), _)| rim.vertices[0])
-}
-
-/// Volume under a fan over a loop, seen from a point, and its area.
-fn fan(submesh: &Submesh, rim: &Loop, from: DVec3) -> (f64, f64) {
-    let n = rim.vertices.len();
-    let centre = rim.vertices.iter().map(|v| submesh.place(*v)).sum::<DVec3>() / n as f64;
-    let (mut volume, mut area) = (0.0, 0.0);
-    for i in 0..n {
-        let [a, b] = [i, (i + 1) % n].map(|k| submesh.place(rim.vertices[k]));
-        let normal = (a - centre).cross(b - centre);
-        volume += (centre - from).dot(normal) / 6.0;
-        area += normal.length() / 2.0;
-    }
-    (volume, area)
 }

@@ -19,6 +19,8 @@ pub(crate) struct Obstacle {
     pub(crate) corners: Corners,
     /// It belongs to a body that the one whose loop the patch closes runs into already.
     pub(crate) met_already: bool,
+    /// It belongs to another body.
+    pub(crate) of_other: bool,
 }
 
 /// For each patch that crosses something what it crosses. `patch_of`: the patch that a triangle of the submesh belongs to; `is_new`: whether
@@ -74,7 +76,11 @@ pub(crate) fn crossed(
     for (patch, of_patch, other) in blamed {
         let corners = overlay.corners(survey, submesh, other);
         let of_both = component(of_patch).zip(component(other));
-        let obstacle = Obstacle { corners, met_already: of_both.is_some_and(|(a, b)| met.binary_search(&[a, b]).is_ok()) };
+        let obstacle = Obstacle {
+            corners,
+            met_already: of_both.is_some_and(|(a, b)| met.binary_search(&[a, b]).is_ok()),
+            of_other: of_both.is_some_and(|(a, b)| a != b),
+        };
         if known.insert((patch, corners.map(Position::of), obstacle.met_already)) {
             crossed.entry(patch).or_default().push(obstacle);
         }

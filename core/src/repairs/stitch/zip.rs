@@ -1,7 +1,9 @@
 //! Small gaps zipped: vertices that face each other across a narrow gap become one.
 //!
 //! Two boundary vertices face each other when each is the other's nearest within a share of the edges around them, and the surfaces
-//! they end point at each other. (The rims of a thin shell lie as near, but point the same way: they are left alone.) A merge that
+//! they end point at each other. (The rims of a thin shell lie as near, but point the same way: they are left alone, as are two walls
+//! with a clearance between them, which turn their backs to each other.) No vertex moves far, and bodies that can each be closed alone are
+//! never zipped together: a gap between these is as likely a clearance. A merge that
 //! would turn a triangle over, flatten it, or make an edge of more than two triangles is left out. So is one that leaves a vertex where
 //! several fans meet: nothing beside it was merged, and two loops that only meet there would be closed each for itself.
 
@@ -14,38 +16,48 @@ use glam::DVec3;
 
 use crate::contract::settings::Profile;
 use crate::detect::holes::loops;
+use crate::detect::holes::owners::Owners;
 use crate::repairs::shared::admission;
 use crate::repairs::shared::work::Work;
 use crate::repairs::stitch::weld::STEADY;
+use crate::submesh::components::Reversed;
 use crate::submesh::edges::{Edge, Edges};
 use crate::submesh::near::Tolerance;
 use crate::submesh::{Submesh, Vertex, near};
+use crate::topology::survey::Survey;
 
 /// Narrow gaps.
 pub(crate) const REPAIR: Repair = Repair {
     name: RepairName::Zip,
     changes: Changes::Surface,
     run: |cx| {
-        let merged = zip(&mut cx.work, cx.tolerance, cx.profile);
+        let merged = zip(cx.survey, &mut cx.work, cx.tolerance, cx.profile);
         Ok(Done::count(merged, "vertices merged with the one that faces them across a narrow gap"))
     },
 };
 
 /// Facing: cosine between the directions in which the two surfaces end, at most.
 const FACING: f64 = -0.5;
+/// No vertex moves farther than this share of the diagonal.
+const FARTHEST: f64 = 0.005;
+/// The way between two walls makes at least this cosine with their normals.
+const ASIDE: f64 = 0.7;
 /// How often merges that made a defect are taken out and the rest tried again; then none is made.
 const ATTEMPTS: usize = 8;
 
 /// Zips gaps narrower than the profile's share of the shortest edges at their vertices, but for loops of kinds that the profile leaves open;
 /// returns how many vertices were merged into another. O(n log n) in the boundary, and a copy of the submesh if anything is merged.
-pub(crate) fn zip(work: &mut Work<'_>, tolerance: &Tolerance, profile: &Profile) -> u64 {
+pub(crate) fn zip(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance, profile: &Profile) -> u64 {
     if profile.gap_edge_share <= 0.0 {
         return 0;
     }
     let (submesh, edges) = work.edges();
     let left_open = left_open(submesh, edges, tolerance, profile);
-    let mut pairs = facing(submesh, edges, profile);
+    let mut pairs = facing(submesh, edges, profile, FARTHEST * survey.bounds.diagonal());
     pairs.retain(|pair| pair.iter().all(|v| left_open.binary_search(v).is_err()));
+    if !pairs.is_empty() {
+        leave_bodies_apart(survey, submesh, edges, &mut pairs);
+    }
     if pairs.is_empty() {
         return 0;
     }
@@ -91,9 +103,23 @@ pub(crate) fn left_open(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance,
     vertices
 }
 
-/// Pairs of boundary vertices that face each other, the nearest first.
-fn facing(submesh: &Submesh, edges: &Edges, profile: &Profile) -> Vec<[Vertex; 2]> {
-    let widest = if profile.max_gap_mm > 0.0 { profile.max_gap_mm } else { f64::INFINITY };
+/// Drops pairs of which each vertex is on a body of its own. O(regions + submesh).
+fn leave_bodies_apart(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, pairs: &mut Vec<[Vertex; 2]>) {
+    let rims = loops::find(submesh, edges);
+    let owners = Owners::of(survey, submesh, edges, &Reversed::none(survey), &rims);
+    let mut rim_of: Vec<(Vertex, usize)> =
+        rims.iter().enumerate().flat_map(|(i, rim)| rim.vertices.iter().map(move |v| (*v, i))).collect();
+    rim_of.sort_unstable();
+    let rim = |v: Vertex| {
+        let at = rim_of.partition_point(|(w, _)| *w < v);
+        rim_of.get(at).filter(|(w, _)| *w == v).map(|(_, i)| *i)
+    };
+    pairs.retain(|[v, w]| !rim(*v).zip(rim(*w)).is_some_and(|(a, b)| owners.stand(a, b)));
+}
+
+/// Pairs of boundary vertices that face each other, the nearest first; none farther apart than `widest`, unless the profile says how far.
+fn facing(submesh: &Submesh, edges: &Edges, profile: &Profile, widest: f64) -> Vec<[Vertex; 2]> {
+    let widest = if profile.max_gap_mm > 0.0 { profile.max_gap_mm } else { widest };
     let vertices = near::boundary_vertices(edges);
     let outward = ends(submesh, edges);
     let reach: Vec<f64> = vertices.iter().map(|v| (submesh.shortest_edge(*v) * profile.gap_edge_share).min(widest)).collect();
@@ -103,13 +129,20 @@ fn facing(submesh: &Submesh, edges: &Edges, profile: &Profile) -> Vec<[Vertex; 2
         // Mutual, and each pair once.
         if let Some(j) = found.filter(|j| *j > i && nearest[*j] == Some(i)) {
             let (v, w) = (vertices[i], vertices[j]);
-            if cosine(outward[v as usize], outward[w as usize]) < FACING {
+            if cosine(outward[v as usize], outward[w as usize]) < FACING && !are_back_to_back(submesh, v, w) {
                 pairs.push((submesh.distance(v, w), [v, w]));
             }
         }
     }
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     pairs.into_iter().map(|(_, pair)| pair).collect()
+}
+
+/// Do the surfaces at two vertices face opposite ways, one behind the other?
+fn are_back_to_back(submesh: &Submesh, v: Vertex, w: Vertex) -> bool {
+    let normal = |v: Vertex| submesh.star(v).map(|(t, _)| submesh.normal(t)).sum::<DVec3>();
+    let (of_v, of_w, way) = (normal(v), normal(w), submesh.vector(v, w));
+    cosine(of_v, of_w) < 0.0 && [of_v, of_w].iter().any(|normal| cosine(*normal, way).abs() > ASIDE)
 }
 
 /// Fans around a vertex: sets of triangles that hang together by edges at it.
@@ -190,7 +223,7 @@ mod tests {
     fn rims_that_face_each_other_across_a_narrow_gap_are_joined() {
         let zipped = |gap: f32, share: f64| {
             let profile = Profile { gap_edge_share: share, ..Profile::default() };
-            after(&slit(gap), |d, _| zip(&mut Work::new(&mut d.submesh), &d.tolerance, &profile))
+            after(&slit(gap), |d, _| zip(&d.survey, &mut Work::new(&mut d.submesh), &d.tolerance, &profile))
         };
         let got = zipped(0.125, 0.35);
         // Only the rim of the plate is left.
@@ -205,7 +238,9 @@ mod tests {
         // As near as above, but both surfaces end in the same direction.
         let bottom = reversed(&plate(2, |_, _| true));
         let top = shifted(&plate(2, |_, _| true), [0.0, 0.0, 0.125]);
-        let got = after(&[bottom, top].concat(), |d, _| zip(&mut Work::new(&mut d.submesh), &d.tolerance, &Profile::default()));
+        let got = after(&[bottom, top].concat(), |d, _| {
+            zip(&d.survey, &mut Work::new(&mut d.submesh), &d.tolerance, &Profile::default())
+        });
         assert_eq!(got.result, 0);
     }
 
@@ -222,7 +257,7 @@ mod tests {
         };
         let zipped = |jag: f32, leave_open: &[LoopClass]| {
             let profile = Profile { leave_open: leave_open.to_vec(), ..Profile::default() };
-            after(&open(jag), |d, _| zip(&mut Work::new(&mut d.submesh), &d.tolerance, &profile)).result
+            after(&open(jag), |d, _| zip(&d.survey, &mut Work::new(&mut d.submesh), &d.tolerance, &profile)).result
         };
         for (jag, class, other) in [(0.0, LoopClass::Gap, LoopClass::Misaligned), (0.25, LoopClass::Misaligned, LoopClass::Gap)] {
             assert_eq!(zipped(jag, &[class]), 0, "{class:?}");
@@ -240,8 +275,8 @@ mod tests {
         let open: Vec<Corners> = left.into_iter().chain(right).collect();
         let got = after(&open, |d, _| {
             let (submesh, edges) = (&d.submesh, Edges::of(&d.submesh));
-            assert_eq!(facing(submesh, &edges, &Profile::default()).len(), 1);
-            zip(&mut Work::new(&mut d.submesh), &d.tolerance, &Profile::default())
+            assert_eq!(facing(submesh, &edges, &Profile::default(), 1.0).len(), 1);
+            zip(&d.survey, &mut Work::new(&mut d.submesh), &d.tolerance, &Profile::default())
         });
         assert_eq!((got.result, got.defects.nonmanifold_vertices, got.defects.boundary_loops), (0, 0, 2));
     }

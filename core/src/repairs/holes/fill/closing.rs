@@ -24,6 +24,10 @@ pub(crate) struct Closed {
     /// Loops that nothing closes which crosses nothing: the triangles of patches that are to be cut along what they cross, and what to say of the
     /// loops if that does not come about.
     pub(crate) across: Vec<PatchAcross>,
+    /// What was guessed, and a person should look at.
+    pub(crate) doubts: Vec<String>,
+    /// What caps over the loops would enclose beside what is meant.
+    pub(crate) not_meant: f64,
 }
 
 /// The loops of a submesh while they are closed.
@@ -36,6 +40,10 @@ pub(crate) struct Closing<'p> {
     pub(crate) open: Vec<(u32, NotFilled)>,
     /// Triangles that join the rims of islands to those of their holes, ascending.
     pub(crate) joints: Vec<u32>,
+    /// What was guessed, and a person should look at.
+    pub(crate) doubts: Vec<String>,
+    /// What caps over its loops would enclose that no surface is meant to: there is a way through. In the file's units, cubed.
+    pub(crate) not_meant: f64,
 }
 
 /// Why a loop stays open.
@@ -115,7 +123,7 @@ impl Closing<'_> {
     }
 
     pub(crate) fn finish(mut self, work: &mut Work<'_>) -> Closed {
-        let mut closed = Closed::default();
+        let mut closed = Closed { doubts: std::mem::take(&mut self.doubts), not_meant: self.not_meant, ..Closed::default() };
         for patch in self.placed.iter().filter(|p| p.count > 0) {
             let loops = patch.rims.len() as u64;
             closed.loops += loops;

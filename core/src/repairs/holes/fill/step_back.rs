@@ -1,8 +1,10 @@
 //! Patches that cross something are replaced by others, or taken back.
 
 use super::closing::{Closing, FLAT, Neighbours, NotFilled, SMALL};
+use crate::algorithms::fairing::ShapeSettings;
 use crate::detect::holes::loops::Loop;
 use crate::geometry::tri_tri;
+use crate::repairs::holes::fair;
 use crate::repairs::holes::patches::{Placed, of_submesh};
 use crate::repairs::shared::collisions::{self, Obstacle};
 use crate::repairs::shared::work::Work;
@@ -16,16 +18,26 @@ pub(crate) const GUARD_ROUNDS: (usize, usize) = (2, 4);
 /// No patch is looked for around more triangles than this: what is so much in the way leaves no room.
 pub(crate) const MAX_OBSTACLES: usize = 48;
 
+/// How many times shorter the edges of a patch are than those around, if it is to keep clear of another body.
+const FINER: f64 = 2.0;
+
 pub(crate) fn guard_rounds(patch: &Placed, rims: &[Loop]) -> usize {
     let vertices: usize = patch.rims.iter().map(|rim| rims[*rim as usize].vertices.len()).sum();
     if vertices > SMALL { GUARD_ROUNDS.0 } else { GUARD_ROUNDS.1 }
 }
 
 impl Closing<'_> {
-    /// Steps back where a patch crosses anything: from the shape to the triangulation it came from, to another one around what it
+    /// Steps back where a patch crosses anything: to a finer shape, which keeps clear of another body near by; from the shape to the triangulation it came from, to another one around what it
     /// crosses, to the first one that crosses only bodies that the loop's own runs into already, to none. (What is closed for itself and runs
     /// into others is a solid still, which an open one is not.)
-    pub(crate) fn guard(&mut self, survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reversed) {
+    pub(crate) fn guard(
+        &mut self,
+        survey: &Survey<'_>,
+        work: &mut Work<'_>,
+        reversed: &Reversed,
+        shaping: Option<ShapeSettings>,
+    ) {
+        let finer = shaping.map(|settings| ShapeSettings { finer: FINER, ..settings });
         let mut is_new = vec![true; self.placed.len()];
         for round in 0..=GUARD_ROUNDS.1 {
             let mut patch_of = vec![None; work.triangles.len()];
@@ -45,6 +57,13 @@ impl Closing<'_> {
                     continue;
                 }
                 is_new[i] = true;
+                let runs_into_another = obstacles.iter().any(|obstacle| obstacle.of_other && !obstacle.met_already);
+                if runs_into_another
+                    && round < guard_rounds(&self.placed[i], &self.rims)
+                    && finer.is_some_and(|settings| self.refine(survey, work, i, &settings))
+                {
+                    continue;
+                }
                 if !self.step_back(work, i, obstacles, round) {
                     self.revoke(work, i, &mut is_new);
                 }
@@ -53,6 +72,28 @@ impl Closing<'_> {
                 return;
             }
         }
+    }
+
+    /// Shapes a patch more finely than what is around, once: where flat triangles between the vertices of curved surface cut into what lies close
+    /// by, smaller ones do not.
+    fn refine(&mut self, survey: &Survey<'_>, work: &mut Work<'_>, i: usize, settings: &ShapeSettings) -> bool {
+        let patch = &mut self.placed[i];
+        if std::mem::replace(&mut patch.refined, true) {
+            return false;
+        }
+        let shaped = patch.triangles().map(|t| work.triangles[t as usize].v).collect::<Vec<_>>();
+        let coarse = std::mem::take(&mut patch.coarse);
+        if !coarse.is_empty() {
+            patch.replace(work, &coarse);
+        }
+        fair::smooth(survey, work, std::slice::from_mut(patch), settings, 1);
+        let patch = &mut self.placed[i];
+        let is_finer = !patch.coarse.is_empty();
+        if !is_finer && !coarse.is_empty() {
+            patch.replace(work, &shaped);
+            patch.coarse = coarse;
+        }
+        is_finer
     }
 
     /// Gives a patch up. Loops that it closed together are closed each for itself, where that is admitted.

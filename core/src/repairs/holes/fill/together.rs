@@ -1,9 +1,11 @@
 //! Loops that are closed together: the rims of missing rings, and holes with islands.
 
 use super::closing::Closing;
+use super::doubts;
 use crate::detect::holes::{
     Shapes,
     loops::{self, Loop},
+    owners::Owners,
 };
 use crate::repairs::holes::annular;
 use crate::repairs::holes::islands;
@@ -56,17 +58,17 @@ impl Closing<'_> {
         survey: &Survey<'_>,
         work: &mut Work<'_>,
         rims: Vec<Loop>,
-        shapes: Shapes,
+        (shapes, owners): (Shapes, Owners),
         threads: usize,
     ) -> usize {
-        let partners = shapes.partners();
+        let partners = shapes.partners(&owners);
         drop(shapes);
         let taken = vec![false; rims.len()];
         let mut all = Grouped { rims: &rims, taken, done: Vec::new(), placed: Vec::new(), joined: Vec::new() };
         // Before anything is put in: components change by that.
         let islands = islands::groups(survey, work, &rims, &partners.islands, |rim| self.admission.is_sheet(rim));
         self.close_touching(work, &mut all);
-        self.close_rings(work, partners.rings, &mut all, threads);
+        self.close_rings(work, partners.rings, &owners, &mut all, threads);
         for group in &islands {
             self.close_group(work, "islands", group, &mut all);
         }
@@ -104,12 +106,25 @@ impl Closing<'_> {
     }
 
     /// Pairs of rims between which a ring is missing.
-    fn close_rings(&self, work: &mut Work<'_>, rings: Vec<[usize; 2]>, all: &mut Grouped<'_>, threads: usize) {
+    fn close_rings(
+        &mut self,
+        work: &mut Work<'_>,
+        rings: Vec<[usize; 2]>,
+        owners: &Owners,
+        all: &mut Grouped<'_>,
+        threads: usize,
+    ) {
         let admits = |rim: &Loop| self.admission.check_joined(work, rim).is_ok();
         let is_ring = |pair: &[usize; 2]| all.is_free(pair) && pair.iter().all(|i| admits(&all.rims[*i]));
         let numbers: Vec<[usize; 2]> = rings.into_iter().filter(is_ring).collect();
         let pairs: Vec<[&Loop; 2]> = numbers.iter().map(|pair| pair.map(|i| &all.rims[i])).collect();
-        annular::bridge(work, &pairs, threads, |work, i, triangles| all.place(work, &numbers[i], triangles, "annular"));
+        annular::bridge(work, &pairs, threads, |work, i, triangles| {
+            let [a, b] = numbers[i];
+            if owners.are_bodies(a, b) {
+                self.doubts.push(doubts::bridged(work, [&all.rims[a], &all.rims[b]]));
+            }
+            all.place(work, &numbers[i], triangles, "annular");
+        });
     }
 
     /// A hole and its islands: by one patch, or the rims are joined, and closed as one loop later.

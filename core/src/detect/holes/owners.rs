@@ -1,0 +1,113 @@
+//! Whose loops these are: the pieces of surface that they belong to, and which of these can stand for themselves.
+//!
+//! A piece stands for itself if its own patches make a body of it that has room inside, and are small for its surface: a box without its lid does, a
+//! sheet, one face of a box or half of a ball do not. What joins two such pieces is a guess, since each may have been a body of its own.
+
+use glam::DVec3;
+
+use super::loops::Loop;
+use crate::submesh::components::{Components, Reversed, Through};
+use crate::submesh::edges::Edges;
+use crate::submesh::{Submesh, Vertex};
+use crate::topology::survey::Survey;
+use crate::util::ids::NONE;
+
+/// A piece that is closed by its own patches encloses at least this share of its size to have room inside: the root of the area of one
+/// side, cubed. A plate that rises by a fiftieth of its width on average.
+const ROOM: f64 = 0.02;
+/// Patches of a piece that stands for itself have no more than this share of the area of its surface: those of half a ball have half of it.
+const PATCHED: f64 = 0.4;
+
+/// An opening is no detail of its piece from this share of the piece's size on: the cube root of its volume, squared.
+const LARGE: f64 = 0.1;
+
+/// The owners of some loops, by loop.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Owners {
+    of_loop: Vec<u32>,
+    /// What the piece encloses once it is closed, by piece.
+    volumes: Vec<f64>,
+    /// The way that the piece's surface faces: 1 outward, -1 inward, as the largest one faces outward; 0: it does not stand for itself. By piece.
+    stands: Vec<i8>,
+}
+
+impl Owners {
+    /// O(regions + submesh).
+    pub(crate) fn of(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, reversed: &Reversed, loops: &[Loop]) -> Self {
+        let components = Components::of(survey, submesh, edges, reversed, Through::EveryEdge);
+        let of_loop: Vec<u32> = loops.iter().map(|rim| components.of_triangle[rim.triangles[0] as usize]).collect();
+        let (measure, middle) = (&survey.measure, survey.measure.middle());
+        let mut patches = vec![(0.0, 0.0); components.list.len()];
+        for (rim, owner) in loops.iter().zip(&of_loop).filter(|(_, owner)| **owner != NONE) {
+            let (volume, area) = fan(submesh, &rim.vertices, middle);
+            let sum = &mut patches[*owner as usize];
+            *sum = (sum.0 + volume, sum.1 + area);
+        }
+        let closed: Vec<(f64, f64, f64)> = components
+            .list
+            .iter()
+            .zip(patches)
+            .map(|(c, (volume, patched))| (measure.volume(c.extent) + volume, measure.area(c.extent), patched))
+            .collect();
+        let largest = closed.iter().map(|c| c.0).max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+        let volumes = closed.iter().map(|c| c.0.abs()).collect();
+        let stands = closed
+            .into_iter()
+            .map(|(volume, area, patched)| {
+                let size = ((area + patched) / 2.0).powi(3).sqrt();
+                match volume.abs() >= ROOM * size && patched <= PATCHED * area {
+                    true if (volume > 0.0) == (largest > 0.0) => 1,
+                    true => -1,
+                    false => 0,
+                }
+            })
+            .collect();
+        Self { of_loop, volumes, stands }
+    }
+
+    /// All loops are of one piece.
+    pub(crate) fn one(loops: usize) -> Self {
+        Self { of_loop: vec![0; loops], volumes: vec![0.0], stands: vec![0] }
+    }
+
+    /// Do two loops, by number, belong to one piece?
+    pub(crate) fn are_same(&self, a: usize, b: usize) -> bool {
+        self.of_loop[a] == self.of_loop[b] && self.of_loop[a] != NONE
+    }
+
+    /// Do they belong to different ones, and do both of these stand for themselves, with material inside? (What faces inward is the wall of a cavity in another one.)
+    pub(crate) fn are_bodies(&self, a: usize, b: usize) -> bool {
+        !self.are_same(a, b) && [a, b].into_iter().all(|i| self.way(i) == 1)
+    }
+
+    /// The same, whichever way they face.
+    pub(crate) fn stand(&self, a: usize, b: usize) -> bool {
+        !self.are_same(a, b) && [a, b].into_iter().all(|i| self.way(i) != 0)
+    }
+
+    /// Is an opening of this area no detail of the piece that the loop belongs to? Of a cube its side is as large as the cube's size, of a shaft of
+    /// thirty times its radius its end has an eighth of that.
+    pub(crate) fn is_large(&self, i: usize, area: f64) -> bool {
+        let volume = self.volumes.get(self.of_loop[i] as usize).copied().unwrap_or(0.0);
+        // area³ of volume², so as to take no cube root.
+        area.powi(3) >= LARGE.powi(3) * volume * volume
+    }
+
+    fn way(&self, i: usize) -> i8 {
+        self.stands.get(self.of_loop[i] as usize).copied().unwrap_or(0)
+    }
+}
+
+/// Volume under a fan over a loop, seen from a point, and its area.
+pub(crate) fn fan(submesh: &Submesh, way: &[Vertex], from: DVec3) -> (f64, f64) {
+    let n = way.len();
+    let centre = way.iter().map(|v| submesh.place(*v)).sum::<DVec3>() / n as f64;
+    let (mut volume, mut area) = (0.0, 0.0);
+    for i in 0..n {
+        let [a, b] = [i, (i + 1) % n].map(|k| submesh.place(way[k]));
+        let normal = (a - centre).cross(b - centre);
+        volume += (centre - from).dot(normal) / 6.0;
+        area += normal.length() / 2.0;
+    }
+    (volume, area)
+}

@@ -13,7 +13,7 @@ use crate::algorithms::fairing::{self, CoarsePatch, ShapeSettings, Shaped, edges
 use crate::contract::report::RepairName;
 use crate::geometry::exact::Point;
 use crate::geometry::position::{self, Position};
-use crate::repairs::holes::patches::Placed;
+use crate::repairs::holes::patches::{EXTENDED, Placed};
 use crate::repairs::shared::work::Work;
 use crate::submesh::{Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
@@ -69,8 +69,8 @@ pub(crate) fn smooth(survey: &Survey<'_>, work: &mut Work<'_>, placed: &mut [Pla
 
 /// Is a patch to be shaped, as far as the triangles of the submesh tell?
 fn is_wanted(submesh: &Submesh, patch: &Placed) -> bool {
-    // One triangle has no inner edge.
-    patch.count > 1 && {
+    // One triangle has no inner edge, and planes are as they should be.
+    patch.count > 1 && patch.method != EXTENDED && {
         let edges = Edges::of(submesh, patch);
         edges.have_room(submesh) && !edges.is_rim_an_edge(submesh, patch) && !edges.lie_in_a_plane(submesh, patch)
     }

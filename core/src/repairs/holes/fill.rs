@@ -78,7 +78,7 @@ pub(crate) fn fill_loops(
     let admission = Admission::of(survey, work, &rims, &shapes, reversed, tolerance, (profile, only_loop));
     let max_edges = profile.max_hole_edges as usize;
     let mut closing =
-        Closing { admission, max_edges, rims: Vec::new(), placed: Vec::new(), open: Vec::new(), joints: Vec::new() };
+        Closing { admission, max_edges, may_add: profile.patch_shape != PatchShape::Flat, rims: Vec::new(), placed: Vec::new(), open: Vec::new(), joints: Vec::new() };
     let first = closing.close_together(survey, work, rims, shapes, threads);
     closing.triangulate(work, first, threads);
     closing.close_flat(survey, work);
@@ -152,11 +152,17 @@ impl Closing<'_> {
     /// Closes the loops from number `first` on, each for itself.
     pub(crate) fn triangulate(&mut self, work: &mut Work<'_>, first: usize, threads: usize) {
         let submesh: &Submesh = work;
-        let patches =
-            parallel::map(threads, self.rims.len() - first, |i| self.fill(submesh, (first + i) as u32, Neighbours::Heeded, &[]));
-        for (rim, patch) in (first as u32..).zip(patches) {
+        let patches = parallel::map(threads, self.rims.len() - first, |i| {
+            let rim = (first + i) as u32;
+            (self.extend(submesh, rim), self.fill(submesh, rim, Neighbours::Heeded, &[]))
+        });
+        for (rim, (extended, patch)) in (first as u32..).zip(patches) {
+            if let Some(extended) = extended.filter(|e| !meets_new_edge(work, self.rim(rim), &e.triangles)) {
+                self.put_in_extended(work, rim, &extended);
+                continue;
+            }
             let patch = match patch {
-                Ok(patch) if meets_new_edge(work, self.rim(rim), &patch) => self.fill(work, rim, Neighbours::Heeded, &[]),
+                Ok(patch) if meets_new_edge(work, self.rim(rim), &patch.triangles) => self.fill(work, rim, Neighbours::Heeded, &[]),
                 other => other,
             };
             match patch {

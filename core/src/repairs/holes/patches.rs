@@ -8,6 +8,9 @@ use crate::repairs::shared::work::Work;
 use crate::submesh::{Origin, Submesh, Vertex};
 use crate::util::ids::NONE;
 
+/// Name of the method that lets flat surface go on to where it meets other.
+pub(crate) const EXTENDED: &str = "planes to where they meet";
+
 /// A patch that is in the submesh.
 #[derive(Debug)]
 pub(crate) struct Placed {

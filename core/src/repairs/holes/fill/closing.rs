@@ -1,10 +1,12 @@
 //! The loops of a submesh while they are closed: patches that are in, and loops that are open, with the reason.
 
+use crate::algorithms::extend::{self, Extended};
 use crate::algorithms::triangulate::{self, FillSettings, Rim, Unfillable, strip};
 use crate::contract::report::{LoopLeft, MOST_LISTED};
 use crate::detect::holes::{self, loops::Loop};
+use crate::geometry::position::Position;
 use crate::geometry::tri_tri;
-use crate::repairs::holes::patches::{Placed, are_joined, of_submesh};
+use crate::repairs::holes::patches::{EXTENDED, Placed, are_joined, of_submesh};
 use crate::repairs::shared::admission::{Admission, NotAdmitted};
 use crate::repairs::shared::context::{PatchAcross, SheetRim};
 use crate::repairs::shared::work::Work;
@@ -30,6 +32,8 @@ pub(crate) struct Closed {
 pub(crate) struct Closing<'p> {
     pub(crate) admission: Admission<'p>,
     pub(crate) max_edges: usize,
+    /// Patches may have vertices of their own.
+    pub(crate) may_add: bool,
     pub(crate) rims: Vec<Loop>,
     pub(crate) placed: Vec<Placed>,
     /// Loops, by number, and why they are not closed.
@@ -67,12 +71,12 @@ pub(crate) const SLIT: &str = "slit";
 pub(crate) const FLAT: &str = "flat on its neighbours";
 
 /// A chord of the patch is an edge of the mesh by now.
-pub(crate) fn meets_new_edge(submesh: &Submesh, rim: &Loop, patch: &triangulate::Patch) -> bool {
+pub(crate) fn meets_new_edge(submesh: &Submesh, rim: &Loop, triangles: &[[u32; 3]]) -> bool {
     let n = rim.vertices.len() as u32;
-    patch.triangles.iter().any(|t| {
+    triangles.iter().any(|t| {
         (0..3).any(|k| {
             let (i, j) = (t[k], t[(k + 1) % 3]);
-            j != (i + 1) % n && submesh.has_edge(rim.vertices[i as usize], rim.vertices[j as usize])
+            i < n && j < n && j != (i + 1) % n && submesh.has_edge(rim.vertices[i as usize], rim.vertices[j as usize])
         })
     })
 }
@@ -112,6 +116,24 @@ impl Closing<'_> {
             return Ok(patch);
         }
         Ok(triangulate::triangulate(&of_patch, &settings)?)
+    }
+
+    /// A patch of planes that meet where the loop's surface is missing, if the loop tells them.
+    pub(crate) fn extend(&self, submesh: &Submesh, rim: u32) -> Option<Extended> {
+        let rim = self.rim(rim);
+        self.admission.check(submesh, rim).ok()?;
+        let points = rim.points(submesh);
+        let apexes = rim.apexes(submesh);
+        let forbidden = |i: u32, j: u32| are_joined(submesh, rim.vertices[i as usize], rim.vertices[j as usize]);
+        let of_patch = Rim { points: &points, apexes: &apexes, obstacles: &[], forbidden: &forbidden };
+        extend::extend(&of_patch, self.may_add)
+    }
+
+    pub(crate) fn put_in_extended(&mut self, work: &mut Work<'_>, rim: u32, patch: &Extended) {
+        let mut vertices = self.rim(rim).vertices.clone();
+        vertices.extend(patch.added.iter().map(|p| work.add_vertex(Position::of(*p))));
+        let triangles: Vec<[Vertex; 3]> = patch.triangles.iter().map(|t| t.map(|i| vertices[i as usize])).collect();
+        self.placed.push(Placed::put_in(work, vec![rim], &triangles, EXTENDED));
     }
 
     pub(crate) fn finish(mut self, work: &mut Work<'_>) -> Closed {

@@ -45,6 +45,12 @@ pub(crate) struct Extended {
     pub(crate) triangles: Vec<[u32; 3]>,
     /// A piece of it stands at right angles to what is around because nothing says how else.
     pub(crate) assumed: bool,
+    /// How many pieces there are.
+    pieces: usize,
+    /// What lies under it, seen from the loop's centre.
+    pub(crate) volume: f64,
+    /// The volume by which another patch like it differs.
+    pub(crate) in_doubt: f64,
 }
 
 /// Closes a loop by flat pieces that meet at clear angles; `None` where these do not explain it. `may_add`: new vertices.
@@ -67,10 +73,17 @@ pub(crate) fn extend(rim: &Rim<'_>, may_add: bool) -> Option<Extended> {
         })
         .collect();
     let outline: Vec<u32> = (0..n as u32).collect();
-    let accept = |points: &[Point], pieces: &[Vec<u32>]| accepted(rim, &beyond, tolerance, points, pieces);
-    let mut search = Search::new(rim.points, &beyond, tolerance, (centre, radius), accept);
+    let mut found: Vec<Extended> = Vec::new();
+    let show = |points: &[Point], pieces: &[Vec<u32>]| found.extend(accepted(rim, &beyond, tolerance, points, pieces));
+    let mut search = Search::new(rim.points, &beyond, tolerance, (centre, radius), show);
     search.may_add = may_add;
-    search.peel(&outline)
+    search.peel(&outline);
+    // Of equal ones the first.
+    let (best, _) = (0..).zip(&found).min_by_key(|(i, patch)| (patch.assumed, patch.pieces, *i)).map(|(i, p)| (i, p.volume))?;
+    let mut best = found.swap_remove(best);
+    let differ = found.iter().filter(|other| !other.assumed || best.assumed).map(|other| (other.volume - best.volume).abs());
+    best.in_doubt = differ.fold(0.0, f64::max);
+    Some(best)
 }
 
 /// These pieces as a patch, if each plane has a witness, they meet at clear angles, and the patch is valid.
@@ -101,7 +114,17 @@ fn accepted(rim: &Rim<'_>, beyond: &[Option<DVec3>], tolerance: f64, points: &[P
         let made = in_plane(&Rim { points: outline, apexes: &[], obstacles: &[], forbidden: &forbidden })?;
         triangles.extend(made.into_iter().map(|t| t.map(|i| piece[i as usize])));
     }
-    stands(rim, points, &triangles).then(|| Extended { added: points[rim.points.len()..].to_vec(), triangles, assumed })
+    let n = rim.points.len();
+    let centre = rim.points.iter().map(at).sum::<DVec3>() / n as f64;
+    let volume = triangles
+        .iter()
+        .map(|t| {
+            let [a, b, c] = t.map(|v| at(&points[v as usize]) - centre);
+            a.cross(b).dot(c) / 6.0
+        })
+        .sum();
+    let added = points[n..].to_vec();
+    stands(rim, points, &triangles).then_some(Extended { added, triangles, assumed, pieces: pieces.len(), volume, in_doubt: 0.0 })
 }
 
 /// What tells that there is a plane.

@@ -34,8 +34,8 @@ pub(super) struct Search<'a, F> {
     pub(super) may_add: bool,
     outlines: usize,
     pieces: Vec<Vec<u32>>,
-    /// Are these pieces, and the planes that nobody saw, a patch?
-    accept: F,
+    /// Is shown all vertices and the pieces of each way.
+    show: F,
 }
 
 /// A run of an outline.
@@ -45,8 +45,8 @@ struct Run {
     plane: Option<Flat>,
 }
 
-impl<'a, T, F: FnMut(&[Point], &[Vec<u32>]) -> Option<T>> Search<'a, F> {
-    pub(super) fn new(rim: &[Point], beyond: &'a [Option<DVec3>], tolerance: f64, reach: (DVec3, f64), accept: F) -> Self {
+impl<'a, F: FnMut(&[Point], &[Vec<u32>])> Search<'a, F> {
+    pub(super) fn new(rim: &[Point], beyond: &'a [Option<DVec3>], tolerance: f64, reach: (DVec3, f64), show: F) -> Self {
         Self {
             points: rim.to_vec(),
             beyond,
@@ -55,24 +55,24 @@ impl<'a, T, F: FnMut(&[Point], &[Vec<u32>]) -> Option<T>> Search<'a, F> {
             may_add: true,
             outlines: 0,
             pieces: Vec::new(),
-            accept,
+            show,
         }
     }
 
-    /// The first way to take an outline apart that is accepted.
-    pub(super) fn peel(&mut self, outline: &[u32]) -> Option<T> {
+    /// Shows every way to take an outline apart that it finds.
+    pub(super) fn peel(&mut self, outline: &[u32]) {
         self.outlines += 1;
         if outline.len() < 3 || self.outlines > MOST_OUTLINES || self.pieces.len() >= MOST_PIECES {
-            return None;
+            return;
         }
         let places: Vec<DVec3> = outline.iter().map(|v| at(&self.points[*v as usize])).collect();
         match lie(places.iter().copied(), self.tolerance) {
-            Lie::Line => return None,
+            Lie::Line => return,
             Lie::Plane(_) => {
                 self.pieces.push(outline.to_vec());
-                let accepted = (self.accept)(&self.points, &self.pieces);
+                (self.show)(&self.points, &self.pieces);
                 self.pieces.pop();
-                return accepted;
+                return;
             }
             Lie::Space => {}
         }
@@ -80,16 +80,13 @@ impl<'a, T, F: FnMut(&[Point], &[Vec<u32>]) -> Option<T>> Search<'a, F> {
             let runs = self.runs(outline, &ends);
             let last = if runs.len() == 2 { 1 } else { runs.len() };
             for run in 0..last {
-                if let Some(made) = self.close(&runs, run) {
-                    return Some(made);
-                }
+                self.close(&runs, run);
             }
         }
-        None
     }
 
     /// Closes a run, and goes on with what is left.
-    fn close(&mut self, runs: &[Run], run: usize) -> Option<T> {
+    fn close(&mut self, runs: &[Run], run: usize) -> Option<()> {
         let k = runs.len();
         let [before, after] = [(run + k - 1) % k, (run + 1) % k].map(|r| runs[r].plane);
         let vertices = &runs[run].vertices;
@@ -114,22 +111,50 @@ impl<'a, T, F: FnMut(&[Point], &[Vec<u32>]) -> Option<T>> Search<'a, F> {
             return None;
         }
         let added = apex.map(|apex| self.add(apex));
-        let mut piece = vertices.clone();
-        piece.extend(added);
-        let mut rest: Vec<u32> = vec![first];
-        rest.extend(added);
+        let (pieces, mut rest) = self.closed(vertices, added);
         for other in (1..k).map(|i| (run + i) % k) {
             rest.extend(&runs[other].vertices[..runs[other].vertices.len() - 1]);
         }
-        self.pieces.push(piece);
-        let made = self.peel(&rest);
-        if made.is_none() {
-            self.pieces.pop();
-            if added.is_some() {
-                self.points.pop();
+        let count = self.pieces.len();
+        self.pieces.extend(pieces);
+        self.peel(&rest);
+        self.pieces.truncate(count);
+        if added.is_some() {
+            self.points.pop();
+        }
+        Some(())
+    }
+
+    /// The pieces between a run and what closes it, the line between its ends or the two to a new vertex, and that line, from where the run
+    /// begins to before its end. The run may touch it in between.
+    fn closed(&self, run: &[u32], apex: Option<u32>) -> (Vec<Vec<u32>>, Vec<u32>) {
+        let place = |v: u32| at(&self.points[v as usize]);
+        let (first, last) = (place(run[0]), place(run[run.len() - 1]));
+        let lies = |v: u32, from: DVec3, to: DVec3| {
+            let along = (to - from).normalize_or_zero();
+            let p = place(v) - from;
+            p.dot(along) > 0.0 && p.dot(along) < from.distance(to) && p.cross(along).length() <= self.tolerance
+        };
+        let corner = apex.map_or(last, place);
+        // The run's places on the first line, then those on the second one.
+        let before = (0..run.len()).take_while(|i| *i + 1 < run.len()).filter(|i| *i == 0 || lies(run[*i], first, corner));
+        let before: Vec<usize> = before.collect();
+        let turn = *before.last().unwrap_or(&0);
+        let after = (turn + 1..run.len()).filter(|i| *i + 1 == run.len() || apex.is_some() && lies(run[*i], corner, last));
+        let cuts: Vec<usize> = before.iter().copied().chain(after).collect();
+        let (mut pieces, mut line) = (Vec::new(), Vec::new());
+        for w in cuts.windows(2) {
+            let mut piece = run[w[0]..=w[1]].to_vec();
+            line.push(run[w[0]]);
+            if w[0] == turn {
+                piece.extend(apex);
+                line.extend(apex);
+            }
+            if piece.len() > 2 {
+                pieces.push(piece);
             }
         }
-        made
+        (pieces, line)
     }
 
     /// A new vertex; its coordinates are those of vertices of the loop where they hardly differ.

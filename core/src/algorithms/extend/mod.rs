@@ -53,6 +53,21 @@ pub(crate) struct Extended {
     pub(crate) in_doubt: f64,
 }
 
+/// Do all of these places lie in one plane, as well as they are known?
+pub(crate) fn lie_in_a_plane(points: &[Point]) -> bool {
+    let places: Vec<DVec3> = points.iter().map(at).collect();
+    let (_, _, tolerance) = measure(points, &places);
+    matches!(lie(places.iter().copied(), tolerance), Lie::Plane(_))
+}
+
+/// The middle of a loop's vertices, how far they are from it at most, and how well they are known.
+fn measure(points: &[Point], places: &[DVec3]) -> (DVec3, f64, f64) {
+    let centre = places.iter().sum::<DVec3>() / places.len() as f64;
+    let radius = places.iter().map(|p| p.distance(centre)).fold(0.0, f64::max);
+    let largest = points.as_flattened().iter().fold(0.0_f32, |most, x| most.max(x.abs()));
+    (centre, radius, 4.0 * step_at(largest) + 2.0 * OFF_PLANE * radius)
+}
+
 /// Closes a loop by flat pieces that meet at clear angles; `None` where these do not explain it. `may_add`: new vertices.
 pub(crate) fn extend(rim: &Rim<'_>, may_add: bool) -> Option<Extended> {
     let n = rim.points.len();
@@ -60,10 +75,7 @@ pub(crate) fn extend(rim: &Rim<'_>, may_add: bool) -> Option<Extended> {
         return None;
     }
     let places: Vec<DVec3> = rim.points.iter().map(at).collect();
-    let centre = places.iter().sum::<DVec3>() / n as f64;
-    let radius = places.iter().map(|p| p.distance(centre)).fold(0.0, f64::max);
-    let largest = rim.points.as_flattened().iter().fold(0.0_f32, |most, x| most.max(x.abs()));
-    let tolerance = 4.0 * step_at(largest) + 2.0 * OFF_PLANE * radius;
+    let (centre, radius, tolerance) = measure(rim.points, &places);
     let beyond: Vec<Option<DVec3>> = (0..n)
         .map(|i| {
             let (a, b, apex) = (places[i], places[(i + 1) % n], at(&(*rim.apexes.get(i)?)?));

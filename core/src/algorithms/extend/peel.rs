@@ -47,16 +47,7 @@ struct Run {
 
 impl<'a, F: FnMut(&[Point], &[Vec<u32>])> Search<'a, F> {
     pub(super) fn new(rim: &[Point], beyond: &'a [Option<DVec3>], tolerance: f64, reach: (DVec3, f64), show: F) -> Self {
-        Self {
-            points: rim.to_vec(),
-            beyond,
-            tolerance,
-            reach,
-            may_add: true,
-            outlines: 0,
-            pieces: Vec::new(),
-            show,
-        }
+        Self { points: rim.to_vec(), beyond, tolerance, reach, may_add: true, outlines: 0, pieces: Vec::new(), show }
     }
 
     /// Shows every way to take an outline apart that it finds.
@@ -104,7 +95,9 @@ impl<'a, F: FnMut(&[Point], &[Vec<u32>])> Search<'a, F> {
             }
             _ => None,
         };
-        if apex.is_none() && (before.is_some_and(|a| a.off(ends[1]) > self.tolerance) || after.is_some_and(|b| b.off(ends[0]) > self.tolerance)) {
+        if apex.is_none()
+            && (before.is_some_and(|a| a.off(ends[1]) > self.tolerance) || after.is_some_and(|b| b.off(ends[0]) > self.tolerance))
+        {
             return None;
         }
         if apex.is_some() && !self.may_add {

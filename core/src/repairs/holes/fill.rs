@@ -3,6 +3,8 @@
 
 mod across;
 mod closing;
+mod judged;
+mod mouth;
 mod step_back;
 mod together;
 
@@ -41,6 +43,12 @@ pub(crate) const REPAIR: Repair = Repair {
         cx.handed.kept_open = closed.kept_open;
         cx.handed.sheets = closed.sheets;
         cx.handed.across = closed.across;
+        cx.account.doubts.extend(closed.judged.doubts);
+        cx.account.explained.area += closed.judged.area;
+        cx.account.explained.reached.add(&closed.judged.reached);
+        if let Some(meant) = &mut cx.account.enclosed.meant {
+            *meant += closed.judged.volume;
+        }
         Ok(Done::count(closed.loops, format!("loops closed: {}", parts.join(", "))))
     },
 };
@@ -77,8 +85,15 @@ pub(crate) fn fill_loops(
     let shapes = Shapes::of(submesh, &rims, threads);
     let admission = Admission::of(survey, work, &rims, &shapes, reversed, tolerance, (profile, only_loop));
     let max_edges = profile.max_hole_edges as usize;
-    let mut closing =
-        Closing { admission, max_edges, may_add: profile.patch_shape != PatchShape::Flat, rims: Vec::new(), placed: Vec::new(), open: Vec::new(), joints: Vec::new() };
+    let mut closing = Closing {
+        admission,
+        max_edges,
+        may_add: profile.patch_shape != PatchShape::Flat,
+        rims: Vec::new(),
+        placed: Vec::new(),
+        open: Vec::new(),
+        joints: Vec::new(),
+    };
     let first = closing.close_together(survey, work, rims, shapes, threads);
     closing.triangulate(work, first, threads);
     closing.close_flat(survey, work);
@@ -100,7 +115,9 @@ pub(crate) fn fill_loops(
         unclosed = closing.balance(work, &mut across);
     }
     balancing += (across.len() - first_balancing) as u64;
+    let judged = closing.judge(survey, work, profile);
     let mut closed = closing.finish(work);
+    closed.judged = judged;
     if balancing > 0 {
         closed.loops += balancing;
         *closed.by_method.entry(BALANCING.into()).or_insert(0) += balancing;
@@ -162,7 +179,9 @@ impl Closing<'_> {
                 continue;
             }
             let patch = match patch {
-                Ok(patch) if meets_new_edge(work, self.rim(rim), &patch.triangles) => self.fill(work, rim, Neighbours::Heeded, &[]),
+                Ok(patch) if meets_new_edge(work, self.rim(rim), &patch.triangles) => {
+                    self.fill(work, rim, Neighbours::Heeded, &[])
+                }
                 other => other,
             };
             match patch {

@@ -5,8 +5,9 @@ use crate::algorithms::triangulate::{self, FillSettings, Rim, Unfillable, strip}
 use crate::contract::report::{LoopLeft, MOST_LISTED};
 use crate::detect::holes::{self, loops::Loop};
 use crate::geometry::position::Position;
+use crate::geometry::sums::Bounds;
 use crate::geometry::tri_tri;
-use crate::repairs::holes::patches::{EXTENDED, Placed, are_joined, of_submesh};
+use crate::repairs::holes::patches::{EXTENDED, Placed, Planes, are_joined, of_submesh};
 use crate::repairs::shared::admission::{Admission, NotAdmitted};
 use crate::repairs::shared::context::{PatchAcross, SheetRim};
 use crate::repairs::shared::work::Work;
@@ -23,9 +24,24 @@ pub(crate) struct Closed {
     pub(crate) sheets: Vec<SheetRim>,
     /// A vertex of each loop that was left open on purpose: it was not admitted.
     pub(crate) kept_open: Vec<[f32; 3]>,
+    /// What is to be said of the guesses.
+    pub(crate) judged: Judged,
     /// Loops that nothing closes which crosses nothing: the triangles of patches that are to be cut along what they cross, and what to say of the
     /// loops if that does not come about.
     pub(crate) across: Vec<PatchAcross>,
+}
+
+/// What is to be said of patches.
+#[derive(Debug, Default)]
+pub(crate) struct Judged {
+    /// Guesses that may be wrong, each a line for people.
+    pub(crate) doubts: Vec<String>,
+    /// Area of the patches that nothing speaks against.
+    pub(crate) area: f64,
+    /// Around those of them that reach beyond their loops.
+    pub(crate) reached: Bounds,
+    /// What these enclose more than cones over their loops.
+    pub(crate) volume: f64,
 }
 
 /// The loops of a submesh while they are closed.
@@ -133,7 +149,9 @@ impl Closing<'_> {
         let mut vertices = self.rim(rim).vertices.clone();
         vertices.extend(patch.added.iter().map(|p| work.add_vertex(Position::of(*p))));
         let triangles: Vec<[Vertex; 3]> = patch.triangles.iter().map(|t| t.map(|i| vertices[i as usize])).collect();
-        self.placed.push(Placed::put_in(work, vec![rim], &triangles, EXTENDED));
+        let mut placed = Placed::put_in(work, vec![rim], &triangles, EXTENDED);
+        placed.planes = Some(Planes { assumed: patch.assumed, volume: patch.volume, in_doubt: patch.in_doubt });
+        self.placed.push(placed);
     }
 
     pub(crate) fn finish(mut self, work: &mut Work<'_>) -> Closed {

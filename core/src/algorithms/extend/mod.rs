@@ -45,8 +45,8 @@ pub(crate) struct Extended {
     pub(crate) triangles: Vec<[u32; 3]>,
     /// A piece of it stands at right angles to what is around because nothing says how else.
     pub(crate) assumed: bool,
-    /// How many pieces there are.
-    pieces: usize,
+    /// How many pieces there are, and how many of them lie in the plane of no surface.
+    pieces: [usize; 2],
     /// What lies under it, seen from the loop's centre.
     pub(crate) volume: f64,
     /// The volume by which another patch like it differs.
@@ -93,8 +93,7 @@ pub(crate) fn extend(rim: &Rim<'_>, may_add: bool) -> Option<Extended> {
     // Of equal ones the first.
     let (best, _) = (0..).zip(&found).min_by_key(|(i, patch)| (patch.assumed, patch.pieces, *i)).map(|(i, p)| (i, p.volume))?;
     let mut best = found.swap_remove(best);
-    let differ = found.iter().filter(|other| !other.assumed || best.assumed).map(|other| (other.volume - best.volume).abs());
-    best.in_doubt = differ.fold(0.0, f64::max);
+    best.in_doubt = found.iter().map(|other| (other.volume - best.volume).abs()).fold(0.0, f64::max);
     Some(best)
 }
 
@@ -105,10 +104,11 @@ fn accepted(rim: &Rim<'_>, beyond: &[Option<DVec3>], tolerance: f64, points: &[P
     }
     let outlines: Vec<Vec<Point>> = pieces.iter().map(|piece| piece.iter().map(|v| points[*v as usize]).collect()).collect();
     let normals: Vec<DVec3> = outlines.iter().map(|outline| directed_area(outline).normalize_or_zero()).collect();
-    let mut assumed = false;
+    let (mut assumed, mut unseen) = (false, 0);
     for (piece, normal) in pieces.iter().zip(&normals) {
         match witness(piece, *normal, beyond, tolerance, points) {
-            Witness::Some => {}
+            Witness::Surface => {}
+            Witness::Corners => unseen += 1,
             Witness::Assumed => assumed = true,
             Witness::None => return None,
         }
@@ -136,7 +136,14 @@ fn accepted(rim: &Rim<'_>, beyond: &[Option<DVec3>], tolerance: f64, points: &[P
         })
         .sum();
     let added = points[n..].to_vec();
-    stands(rim, points, &triangles).then_some(Extended { added, triangles, assumed, pieces: pieces.len(), volume, in_doubt: 0.0 })
+    stands(rim, points, &triangles).then_some(Extended {
+        added,
+        triangles,
+        assumed,
+        pieces: [pieces.len(), unseen],
+        volume,
+        in_doubt: 0.0,
+    })
 }
 
 /// What tells that there is a plane.
@@ -144,7 +151,10 @@ enum Witness {
     None,
     /// It holds one line of the loop, at right angles to the surface beyond.
     Assumed,
-    Some,
+    /// Corners of the loop, or right angles.
+    Corners,
+    /// Surface that lies in it.
+    Surface,
 }
 
 fn witness(piece: &[u32], normal: DVec3, beyond: &[Option<DVec3>], tolerance: f64, points: &[Point]) -> Witness {
@@ -160,20 +170,20 @@ fn witness(piece: &[u32], normal: DVec3, beyond: &[Option<DVec3>], tolerance: f6
         !matches!(lie(ends.collect::<Vec<_>>().iter().copied(), tolerance), Lie::Line)
     };
     if tells(&|c| c > SAME) {
-        return Witness::Some;
+        return Witness::Surface;
     }
     let turns = |i: &usize| {
         let [before, here, after] = [i + piece.len() - 1, *i, i + 1].map(|i| place(piece[i % piece.len()]));
         (here - before).normalize_or_zero().cross((after - here).normalize_or_zero()).length() > TURN
     };
     if (0..piece.len()).filter(|i| (piece[*i] as usize) < n && turns(i)).count() >= CORNERS {
-        return Witness::Some;
+        return Witness::Corners;
     }
     let is_square = |c: f64| c > SAME || c.abs() < SQUARE;
     if edges.is_empty() || !edges.iter().all(|e| cosine(e).is_none_or(is_square)) {
         return Witness::None;
     }
-    if tells(&is_square) { Witness::Some } else { Witness::Assumed }
+    if tells(&is_square) { Witness::Corners } else { Witness::Assumed }
 }
 
 /// Do pieces meet at angles at which no smooth surface is bent?

@@ -12,7 +12,7 @@ use crate::geometry::position::Position;
 use crate::geometry::sums::step_at;
 
 /// Outlines looked at for one loop.
-const MOST_OUTLINES: usize = 64;
+const MOST_OUTLINES: usize = 48;
 /// Pieces of one patch.
 const MOST_PIECES: usize = 8;
 /// Planes meet in a point if their normals span at least this volume.
@@ -32,7 +32,8 @@ pub(super) struct Search<'a, F> {
     /// Centre and radius of the loop.
     pub(super) reach: (DVec3, f64),
     pub(super) may_add: bool,
-    outlines: usize,
+    /// Outlines that were looked at: one comes up again when runs apart are closed in another order.
+    seen: Vec<Vec<Position>>,
     pieces: Vec<Vec<u32>>,
     /// Is shown all vertices and the pieces of each way.
     show: F,
@@ -52,10 +53,13 @@ impl<'a, F: FnMut(&[Point], &[Vec<u32>])> Search<'a, F> {
 
     /// Shows every way to take an outline apart that it finds.
     pub(super) fn peel(&mut self, outline: &[u32]) {
-        self.outlines += 1;
-        if outline.len() < 3 || self.outlines > MOST_OUTLINES || self.pieces.len() >= MOST_PIECES {
+        let mut seen: Vec<Position> = outline.iter().map(|v| Position::of(self.points[*v as usize])).collect();
+        seen.sort_unstable();
+        if outline.len() < 3 || self.pieces.len() >= MOST_PIECES || self.seen.len() >= MOST_OUTLINES || self.seen.contains(&seen)
+        {
             return;
         }
+        self.seen.push(seen);
         let places: Vec<DVec3> = outline.iter().map(|v| at(&self.points[*v as usize])).collect();
         match lie(places.iter().copied(), self.tolerance) {
             Lie::Line => return,
@@ -95,9 +99,9 @@ impl<'a, F: FnMut(&[Point], &[Vec<u32>])> Search<'a, F> {
             }
             _ => None,
         };
-        if apex.is_none()
-            && (before.is_some_and(|a| a.off(ends[1]) > self.tolerance) || after.is_some_and(|b| b.off(ends[0]) > self.tolerance))
-        {
+        // The line between the ends is in one of the planes beside.
+        let is_off = |beside: Option<Flat>, end: usize| beside.is_some_and(|plane| plane.off(ends[end]) > self.tolerance);
+        if apex.is_none() && is_off(before, 1) && is_off(after, 0) {
             return None;
         }
         if apex.is_some() && !self.may_add {

@@ -26,6 +26,8 @@ const WIDE: f64 = 0.05;
 const HOLE: f64 = 0.7;
 /// A way through takes no more than this share of the body without a word.
 const WAY_THROUGH: f64 = 0.05;
+/// Sine of the turn at a corner: a circle of ten facets has none.
+const CORNER: f64 = 0.6;
 /// Lines for people, at most.
 const MOST_SAID: usize = 20;
 
@@ -54,7 +56,9 @@ impl Closing<'_> {
             let body = Body { area: survey.measure.area(extent), volume: survey.measure.volume(extent) };
             let doubt = match (patch.planes, patch.rims.as_slice()) {
                 (Some(planes), _) if patch.method == EXTENDED => judged.planes(submesh, patch, planes, body),
-                (_, [_]) if !patch.coarse.is_empty() => shaped(submesh, patch, body, profile),
+                (_, [_]) if !patch.coarse.is_empty() && area(submesh, patch) >= WIDE * body.area => {
+                    shaped(submesh, patch, body, profile)
+                }
                 (_, [rim]) => judged.flat(survey, submesh, (patch, self.rim(*rim)), body, profile),
                 (_, [a, b]) => way_through(submesh, patch, [*a, *b].map(|rim| self.rim(rim)), body),
                 _ => None,
@@ -82,12 +86,15 @@ impl Judged {
         if planes.assumed {
             return Some("a face of which nothing is left was put in at right angles to what is around".into());
         }
-        for t in patch.triangles().filter(|t| submesh.lives(*t)) {
-            self.reached.include(&submesh.points(t));
-        }
-        self.area += area(submesh, patch);
+        self.explain(submesh, patch);
         self.volume += planes.volume * body.volume.signum();
         None
+    }
+
+    /// One that nothing speaks against: it is small against its body, or of planes that are known.
+    fn explain(&mut self, submesh: &Submesh, patch: &Placed) {
+        patch.triangles().filter(|t| submesh.lives(*t)).for_each(|t| self.reached.include(&submesh.points(t)));
+        self.area += area(submesh, patch);
     }
 
     fn flat(
@@ -100,19 +107,21 @@ impl Judged {
     ) -> Option<String> {
         let points: Vec<Point> = rim.points(submesh);
         let size = area(submesh, patch);
-        if !extend::lie_in_a_plane(&points) && points.len() > 3 {
+        if size < WIDE * body.area {
+            self.explain(submesh, patch);
             return None;
         }
-        if size >= WIDE * body.area {
-            let beyond = Beyond::of(survey, submesh, std::iter::once(patch));
-            let more = mouth::beyond(&Gathered::of(submesh, &beyond, patch), size);
-            let volume = body.volume.abs();
-            if more > profile.max_volume_change * (volume + more) {
-                let share = 100.0 * size / body.area;
-                return Some(format!(
-                    "a mouth of {share:.0} % of its body's area was closed flat, while the surface is bent there: much more may be missing"
-                ));
-            }
+        let beyond = Beyond::of(survey, submesh, std::iter::once(patch));
+        let more = mouth::beyond(&Gathered::of(submesh, &beyond, patch), size);
+        let volume = body.volume.abs();
+        if more > profile.max_volume_change * (volume + more) {
+            let share = 100.0 * size / body.area;
+            return Some(format!(
+                "a mouth of {share:.0} % of its body's area was closed, while the surface is bent there: much more may be missing"
+            ));
+        }
+        if points.len() > 3 && !extend::lie_in_a_plane(&points) {
+            return None;
         }
         self.area += size;
         None
@@ -140,7 +149,7 @@ fn way_through(submesh: &Submesh, patch: &Placed, rims: [&Loop; 2], body: Body) 
         let sum: f64 = (0..n).map(|i| submesh.normal(rim.triangles[i]).normalize_or_zero().dot(normal) * along(i)).sum();
         sum >= HOLE * rim.perimeter(submesh)
     };
-    if !rims.iter().all(|rim| goes_on(rim)) {
+    if !rims.iter().all(|rim| goes_on(rim)) || rims.iter().all(|rim| is_round(submesh, rim)) {
         return None;
     }
     let from = middle(rims[0]);
@@ -154,6 +163,13 @@ fn way_through(submesh: &Submesh, patch: &Placed, rims: [&Loop; 2], body: Body) 
             share * 100.0
         )
     })
+}
+
+/// Has a loop no corner, as what is drilled has none?
+fn is_round(submesh: &Submesh, rim: &Loop) -> bool {
+    let n = rim.vertices.len();
+    let way = |i: usize| submesh.vector(rim.vertices[i % n], rim.vertices[(i + 1) % n]).normalize_or_zero();
+    (0..n).all(|i| way(i).dot(way(i + 1)) > 0.0 && way(i).cross(way(i + 1)).length() < CORNER)
 }
 
 /// A loop's directed area about a place.

@@ -48,7 +48,7 @@ struct Run {
 
 impl<'a, F: FnMut(&[Point], &[Vec<u32>])> Search<'a, F> {
     pub(super) fn new(rim: &[Point], beyond: &'a [Option<DVec3>], tolerance: f64, reach: (DVec3, f64), show: F) -> Self {
-        Self { points: rim.to_vec(), beyond, tolerance, reach, may_add: true, outlines: 0, pieces: Vec::new(), show }
+        Self { points: rim.to_vec(), beyond, tolerance, reach, may_add: true, seen: Vec::new(), pieces: Vec::new(), show }
     }
 
     /// Shows every way to take an outline apart that it finds.

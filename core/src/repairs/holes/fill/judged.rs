@@ -18,13 +18,17 @@ use crate::submesh::components::{Components, Reversed, Through};
 use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
 
-/// Patches of planes are in doubt if another one differs by more than this share of the body.
+/// Patches of planes are in doubt if another one differs by more than this share of all volume.
 const IN_DOUBT: f64 = 0.001;
+/// A body of less than this share of all volume is a detail, which nobody need look at.
+const DETAIL: f64 = 0.1;
+/// And so many times the share of volume that may change without a word is what a mouth must seem to lack: it is a rough estimate.
+const ROUGH: f64 = 2.0;
 /// A mouth of less than this share of the body's area is not wide.
 const WIDE: f64 = 0.05;
 /// How much the surface goes on across a hole's rim, at least, for the hole to be one in flat surface.
 const HOLE: f64 = 0.7;
-/// A way through takes no more than this share of the body without a word.
+/// A way through takes no more than this share of all volume without a word.
 const WAY_THROUGH: f64 = 0.05;
 /// Sine of the turn at a corner: a circle of ten facets has none.
 const CORNER: f64 = 0.6;
@@ -37,6 +41,14 @@ struct Body {
     area: f64,
     /// Signed.
     volume: f64,
+    /// Of all bodies together.
+    all: f64,
+}
+
+impl Body {
+    fn is_detail(&self) -> bool {
+        self.volume.abs() < DETAIL * self.all
+    }
 }
 
 impl Closing<'_> {
@@ -49,11 +61,12 @@ impl Closing<'_> {
         }
         let (submesh, edges) = work.edges();
         let bodies = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::EveryEdge);
+        let all = bodies.list.iter().map(|c| survey.measure.volume(c.extent).abs()).sum();
         for patch in self.placed.iter().filter(is_in) {
             // What was split since is elsewhere.
             let Some(first) = patch.triangles().find(|t| submesh.lives(*t)) else { continue };
             let extent = bodies.list[bodies.of_triangle[first as usize] as usize].extent;
-            let body = Body { area: survey.measure.area(extent), volume: survey.measure.volume(extent) };
+            let body = Body { area: survey.measure.area(extent), volume: survey.measure.volume(extent), all };
             let doubt = match (patch.planes, patch.rims.as_slice()) {
                 (Some(planes), _) if patch.method == EXTENDED => judged.planes(submesh, patch, planes, body),
                 (_, [_]) if !patch.coarse.is_empty() && area(submesh, patch) >= WIDE * body.area => {
@@ -76,14 +89,14 @@ impl Closing<'_> {
 
 impl Judged {
     fn planes(&mut self, submesh: &Submesh, patch: &Placed, planes: Planes, body: Body) -> Option<String> {
-        let share = planes.in_doubt / body.volume.abs();
+        let share = planes.in_doubt / body.all;
         if share > IN_DOUBT {
             let share = share * 100.0;
             return Some(format!(
-                "planes around a hole meet in several ways, which differ by {share:.1} % of the body; one was taken"
+                "planes around a hole meet in several ways, which differ by {share:.1} % of all volume; one was taken"
             ));
         }
-        if planes.assumed {
+        if planes.assumed && planes.volume.abs() > IN_DOUBT * body.all {
             return Some("a face of which nothing is left was put in at right angles to what is around".into());
         }
         self.explain(submesh, patch);
@@ -114,7 +127,7 @@ impl Judged {
         let beyond = Beyond::of(survey, submesh, std::iter::once(patch));
         let more = mouth::beyond(&Gathered::of(submesh, &beyond, patch), size);
         let volume = body.volume.abs();
-        if more > profile.max_volume_change * (volume + more) {
+        if !body.is_detail() && more > ROUGH * profile.max_volume_change * volume {
             let share = 100.0 * size / body.area;
             return Some(format!(
                 "a mouth of {share:.0} % of its body's area was closed, while the surface is bent there: much more may be missing"
@@ -134,7 +147,7 @@ fn shaped(submesh: &Submesh, patch: &Placed, body: Body, profile: &Profile) -> O
     let living = patch.triangles().filter(|t| submesh.lives(*t)).map(|t| submesh.triangles[t as usize].v);
     let differ = (under(submesh, living, from) - under(submesh, patch.coarse.iter().copied(), from)).abs();
     let share = differ / body.volume.abs();
-    (share > profile.max_volume_change)
+    (share > profile.max_volume_change && !body.is_detail())
         .then(|| format!("a patch that continues the surface differs from a flat one by {:.1} % of the body", share * 100.0))
 }
 
@@ -156,10 +169,10 @@ fn way_through(submesh: &Submesh, patch: &Placed, rims: [&Loop; 2], body: Body) 
     let living = patch.triangles().filter(|t| submesh.lives(*t)).map(|t| submesh.triangles[t as usize].v);
     // Cones over the loops; the first one is seen from its own middle.
     let caps = axis(rims[1]).dot(middle(rims[1]) - from) / 3.0;
-    let share = (under(submesh, living, from) - caps).abs() / body.volume.abs();
+    let share = (under(submesh, living, from) - caps).abs() / body.all;
     (share > WAY_THROUGH).then(|| {
         format!(
-            "two holes back to back were closed as a way through, {:.1} % of the body; the skins may have been lost",
+            "two holes back to back were closed as a way through, {:.1} % of all volume; the skins may have been lost",
             share * 100.0
         )
     })

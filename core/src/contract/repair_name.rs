@@ -71,7 +71,7 @@ pub enum RepairName {
 
 impl RepairName {
     /// Every kind, in the order of the pipeline.
-    pub const ALL: [Self; 23] = [
+    pub const ALL: [Self; 25] = [
         Self::Degenerate,
         Self::Duplicate,
         Self::CommonWall,

@@ -13,6 +13,34 @@ pub(crate) struct Evidence {
     pub(crate) enclosed: Enclosed,
     /// Guesses that may be wrong, each a line for people.
     pub(crate) doubts: Vec<String>,
+    /// What explains changes.
+    pub(crate) explained: Explained,
+}
+
+/// Changes that nobody need look at.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Explained {
+    /// Area of patches that nothing speaks against.
+    pub(crate) area: f64,
+    /// Around such as reach beyond their loops.
+    pub(crate) reached: Bounds,
+    /// Around the surface that was left when specks were dropped; `None` if none were.
+    pub(crate) without_specks: Option<Bounds>,
+}
+
+impl Explained {
+    /// The box of the surface as it was, with what is explained: on each side, where specks reached farther, only what was left of them.
+    fn surface(&self, was: &Bounds) -> Bounds {
+        let mut surface = *was;
+        if let Some(left) = self.without_specks.filter(|left| !left.is_empty()) {
+            for k in 0..3 {
+                surface.lo[k] = surface.lo[k].max(left.lo[k]);
+                surface.hi[k] = surface.hi[k].min(left.hi[k]);
+            }
+        }
+        surface.add(&self.reached);
+        surface
+    }
 }
 
 /// Bodies that lay in the material of others.
@@ -43,7 +71,9 @@ pub(crate) fn wraps(wraps: &[Wrap], profile: &Profile) -> Option<String> {
 /// What a good result has changed beyond the profile's limits, in words; empty when a person need not look. `surface`: the box of the
 /// input's surface, triangles of no area left out; `enclosed`: the bodies that lay in others, whose volume
 /// counted twice.
-pub(crate) fn counts(before: &Defects, surface: &Bounds, enclosed: &Enclosed, after: &Defects, profile: &Profile) -> Vec<String> {
+pub(crate) fn counts(before: &Defects, surface: &Bounds, evidence: &Evidence, after: &Defects, profile: &Profile) -> Vec<String> {
+    let Evidence { enclosed, explained, .. } = evidence;
+    let surface = explained.surface(surface);
     let mut concerns = Vec::new();
     // The volume of an open or incoherent surface depends on the origin, and duplicates count twice.
     let has_volume = before.boundary_edges + before.unbalanced_edges + before.nonmanifold_edges + before.inverted_components == 0;
@@ -57,12 +87,14 @@ pub(crate) fn counts(before: &Defects, surface: &Bounds, enclosed: &Enclosed, af
     }
     if before.area > 0.0 {
         let change = (after.area - before.area) / before.area;
-        if change.abs() > profile.max_area_change {
+        // A patch that nothing speaks against is no change of what was there.
+        let unexplained = (after.area - explained.area - before.area) / before.area;
+        if change.abs().min(unexplained.abs()) > profile.max_area_change {
             concerns.push(format!("the area changed by {:.1} %, from {} to {}", change * 100.0, before.area, after.area));
         }
     }
     if let Some([lo, hi]) = after.bounds {
-        let outline = enclosed.outline.unwrap_or(*surface);
+        let outline = enclosed.outline.unwrap_or(surface);
         let before_lo: [f32; 3] = std::array::from_fn(|k| surface.lo[k].max(outline.lo[k]));
         let before_hi: [f32; 3] = std::array::from_fn(|k| surface.hi[k].min(outline.hi[k]));
         let pairs = before_lo.iter().zip(lo).chain(before_hi.iter().zip(hi));
@@ -154,13 +186,40 @@ mod tests {
         }
     }
 
+    fn of(enclosed: &Enclosed) -> Evidence {
+        Evidence { enclosed: enclosed.clone(), ..Evidence::default() }
+    }
+
+    #[test]
+    fn what_is_explained_is_no_change() {
+        let concerns = |explained: Explained, before: Defects, after: Defects, surface: Bounds| {
+            let evidence = Evidence { explained, ..Evidence::default() };
+            counts(&before, &surface, &evidence, &after, &Profile::default()).len()
+        };
+        // A flat box without top and bottom: its sides are a tenth of it.
+        let (sides, whole) = (Defects { area: 1.0, ..cube() }, Defects { area: 10.0, ..cube() });
+        let explained = |area: f64| Explained { area, ..Explained::default() };
+        assert_eq!(concerns(explained(9.0), sides.clone(), whole.clone(), BOX), 0);
+        assert_eq!(concerns(explained(7.0), sides, whole, BOX), 1, "twice as much as there was is not explained");
+        // A speck beside the cube, which is gone.
+        let with_speck = Bounds { hi: [9.0, 1.0, 1.0], ..BOX };
+        let left = Explained { without_specks: Some(BOX), ..Explained::default() };
+        assert_eq!(concerns(left, cube(), cube(), with_speck), 0);
+        assert_eq!(concerns(Explained::default(), cube(), cube(), with_speck), 1);
+        // A corner that stands out.
+        let corner = Defects { bounds: Some([[0.0; 3], [2.0, 1.0, 1.0]]), ..cube() };
+        let reached = Bounds { lo: [2.0, 1.0, 1.0], hi: [2.0, 1.0, 1.0] };
+        assert_eq!(concerns(Explained { reached, ..Explained::default() }, cube(), corner.clone(), BOX), 0);
+        assert_eq!(concerns(Explained::default(), cube(), corner, BOX), 1);
+    }
+
     const BOX: Bounds = Bounds { lo: [0.0; 3], hi: [1.0; 3] };
 
     #[test]
     fn review_begins_beyond_the_limits() {
         let profile =
             Profile { max_volume_change: 0.25, max_box_change_relative: 0.25, max_bodies_lost: 1, ..Profile::default() };
-        let concerns = |before: Defects, after: Defects| counts(&before, &BOX, &Enclosed::default(), &after, &profile).len();
+        let concerns = |before: Defects, after: Defects| counts(&before, &BOX, &Evidence::default(), &after, &profile).len();
         // The volume may change by just a quarter either way.
         for (volume, count) in [(1.25, 0), (0.75, 0), (1.26, 1), (0.74, 1)] {
             assert_eq!(concerns(cube(), Defects { volume, ..cube() }), count, "volume {volume}");
@@ -190,7 +249,7 @@ mod tests {
         let open = Defects { boundary_edges: 3, volume: 0.1, ..cube() };
         let concerns = |meant: f64, volume: f64| {
             let enclosed = Enclosed { meant: Some(meant), volume, ..Enclosed::default() };
-            counts(&open, &BOX, &enclosed, &cube(), &Profile::default()).join(" ")
+            counts(&open, &BOX, &of(&enclosed), &cube(), &Profile::default()).join(" ")
         };
         assert_eq!(concerns(1.2, 0.0), "");
         assert!(concerns(3.0, 0.0).contains("66.7 %"), "{}", concerns(3.0, 0.0));
@@ -204,23 +263,23 @@ mod tests {
         let before = Defects { bodies: 1, nested_positive: 1, volume: 1.3, ..cube() };
         for (filled, count) in [(0.24, 0), (0.26, 1)] {
             let enclosed = Enclosed { bodies: 1, volume: 0.3, filled, ..Enclosed::default() };
-            assert_eq!(counts(&before, &BOX, &enclosed, &cube(), &Profile::default()).len(), count, "{filled}");
+            assert_eq!(counts(&before, &BOX, &of(&enclosed), &cube(), &Profile::default()).len(), count, "{filled}");
         }
     }
 
     #[test]
     fn the_volume_of_what_enclosed_none_is_not_compared() {
         let open = Defects { boundary_edges: 3, volume: 0.1, ..cube() };
-        assert!(counts(&open, &BOX, &Enclosed::default(), &cube(), &Profile::default()).is_empty());
+        assert!(counts(&open, &BOX, &Evidence::default(), &cube(), &Profile::default()).is_empty());
         let inside_out = Defects { inverted_components: 1, volume: -1.0, ..cube() };
-        assert!(counts(&inside_out, &BOX, &Enclosed::default(), &cube(), &Profile::default()).is_empty());
+        assert!(counts(&inside_out, &BOX, &Evidence::default(), &cube(), &Profile::default()).is_empty());
     }
 
     #[test]
     fn what_lay_in_others_is_neither_lost_nor_a_change_of_volume() {
         let before = Defects { bodies: 1, nested_positive: 2, volume: 1.5, ..cube() };
         let enclosed = Enclosed { bodies: 2, volume: 0.5, ..Enclosed::default() };
-        let concerns = |enclosed: &Enclosed| counts(&before, &BOX, enclosed, &cube(), &Profile::default());
+        let concerns = |enclosed: &Enclosed| counts(&before, &BOX, &of(enclosed), &cube(), &Profile::default());
         assert!(concerns(&enclosed).is_empty(), "{:?}", concerns(&enclosed));
         assert_eq!(concerns(&Enclosed::default()).len(), 2, "the volume, and the bodies");
     }
@@ -230,7 +289,7 @@ mod tests {
         let profile = Profile { max_area_change: 0.25, ..Profile::default() };
         let concerns = |area: f64| {
             let before = Defects { area: 6.0, ..cube() };
-            counts(&before, &BOX, &Enclosed::default(), &Defects { area, ..cube() }, &profile).len()
+            counts(&before, &BOX, &Evidence::default(), &Defects { area, ..cube() }, &profile).len()
         };
         assert_eq!([7.5, 7.6, 4.5, 4.4].map(concerns), [0, 1, 0, 1]);
     }

@@ -110,7 +110,7 @@ fn take_account(report: &mut Report, repaired: Repaired) -> Evidence {
     report.volumes = account.volumes;
     report.skin = account.skin;
     report.regions = regions;
-    Evidence { enclosed: account.enclosed, doubts: account.doubts }
+    Evidence { enclosed: account.enclosed, doubts: account.doubts, explained: account.explained }
 }
 
 /// Ends the report of a mesh from which nothing was left.
@@ -134,7 +134,7 @@ pub(crate) fn conclude(report: &mut Report, input: &[Finding], (surface, evidenc
     report.verdict = verdict::judge(&defects, &flaws).under(report.profile.guarantee);
     report.outcome = if report.verdict.good { Outcome::Repaired } else { Outcome::NotGood };
     if report.verdict.good {
-        let mut concerns = review::counts(&report.before, surface, &evidence.enclosed, &defects, &report.profile);
+        let mut concerns = review::counts(&report.before, surface, evidence, &defects, &report.profile);
         concerns.extend_from_slice(&evidence.doubts);
         concerns.extend(report.volumes.iter().flat_map(|volumes| review::volumes(volumes, &report.profile)));
         concerns.extend(report.skin.iter().flat_map(|skin| review::skin(skin, &report.profile)));

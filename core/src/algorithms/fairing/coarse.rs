@@ -36,6 +36,9 @@ pub(crate) enum Unshaped {
     /// The rim is an edge of the surface: a lid is missing, which does not continue what is around.
     #[error("the rim is an edge of the surface")]
     RimIsEdge,
+    /// The surface was cut along a plane there.
+    #[error("the surface was cut along a plane")]
+    Cut,
     /// Most of what is next to the rim is sharp: the surface around says nothing of curvature.
     #[error("the surface around does not tell how it is curved")]
     Uncurved,

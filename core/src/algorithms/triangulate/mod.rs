@@ -90,6 +90,27 @@ pub(crate) fn unchecked(rim: &Rim<'_>) -> Option<Patch> {
     front::triangulate(rim, Order::Chord, most).ok().map(|triangles| patch(triangles, Method::Front))
 }
 
+/// A planar loop by its constrained Delaunay triangulation: no triangle is collinear, and none crosses another. `None` where the loop is no simple
+/// polygon in its plane, or needs a forbidden chord.
+pub(crate) fn in_plane(rim: &Rim<'_>) -> Option<Vec<[u32; 3]>> {
+    match rim.len() {
+        3 => Some(vec![[0, 1, 2]]),
+        _ => planar::triangulate(rim, FillSettings::default().planar_deviation),
+    }
+}
+
+/// Are these triangles over a loop's vertices, and others behind them in `points`, valid as the loop's patch, as one of [`triangulate`] is? That
+/// they close it is the caller's to know.
+pub(crate) fn stands(rim: &Rim<'_>, points: &[Point], triangles: &[[u32; 3]]) -> bool {
+    let n = rim.len() as u32;
+    let allows = |a: u32, b: u32| a >= n || b >= n || rim.allows(a, b);
+    let around = Surroundings::new(points, (0..rim.len()).map(|i| rim.neighbour(i)).collect(), &allows);
+    let corners = |t: &[u32; 3]| t.map(|v| points[v as usize]);
+    are_distinct(points)
+        && triangles.iter().all(|t| around.admits(t) && !rim.meets_obstacle(&corners(t)))
+        && crosses_itself(points, triangles).is_ok()
+}
+
 /// Closes a loop around others, the rims of islands in it, which run the other way round: triangles over the vertices of all, one loop
 /// after the other. `joined`: is there an edge of the mesh between vertices of two loops already?
 ///

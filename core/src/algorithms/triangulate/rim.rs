@@ -85,7 +85,7 @@ impl Rim<'_> {
     }
 
     /// May the patch have an edge between `a` and `b`?
-    pub(super) fn allows(&self, a: u32, b: u32) -> bool {
+    pub(crate) fn allows(&self, a: u32, b: u32) -> bool {
         self.rim_edge(a, b).is_some() || self.rim_edge(b, a).is_some() || !(self.forbidden)(a.min(b), a.max(b))
     }
 

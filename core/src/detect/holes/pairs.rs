@@ -14,6 +14,7 @@
 //!
 //! A wall's rims may also be closed by two caps, and so may holes back to back: those belong together if a strip between them has less area
 //! than the two caps, as a soap film would have it. So a hole in the top and one in the bottom of a box as high as they are wide are two holes.
+//! Nor is there a way through between holes whose outlines are ragged: nobody drills along the edges of triangles.
 
 use std::collections::BTreeMap;
 
@@ -62,6 +63,12 @@ const HOLE: f64 = 0.7;
 const OUTLINE: f64 = 0.15;
 /// And outlines of openings in two bodies, if these were one: what broke may be turned aside a little.
 const ALIKE_OUTLINE: f64 = 0.35;
+/// Sine of the turn at a corner of an outline.
+const CORNER: f64 = 0.3;
+/// An outline is ragged if it turns the other way at this share of its vertices,
+const RAGGED: f64 = 0.25;
+/// of which it has at least so many: letters have fewer.
+const FEWEST_RAGGED: usize = 16;
 /// Cosine between the vector areas of a hole and an island in it, at most: an island is small, and may lie on a slope.
 const ISLAND_OPPOSITE: f64 = -0.2;
 /// An island lies no farther from the plane of its hole than this share of the hole's size.
@@ -322,9 +329,8 @@ fn ring(a: &Shape, b: &Shape) -> Option<Ring> {
     }
     let back_to_back = towards.iter().all(|t| *t < 0.0);
     let are_holes = outer.continues.min(inner.continues) >= HOLE;
-    (back_to_back && are_holes && strip < caps && outlines_agree(outer, inner, OUTLINE))
-        .then(|| two_planes(Missing::Through(strip, caps)))
-        .flatten()
+    let is_way = back_to_back && are_holes && strip < caps && !(is_ragged(outer) && is_ragged(inner));
+    (is_way && outlines_agree(outer, inner, OUTLINE)).then(|| two_planes(Missing::Through(strip, caps))).flatten()
 }
 
 /// Which of `others` a strip may lead to though two caps have less area, the nearest first.
@@ -349,6 +355,21 @@ fn closings(outer: &Shape, inner: &Shape, depth: f64) -> [f64; 2] {
     let along = 0.5 * (outer.perimeter + inner.perimeter) * depth;
     let across = outer.area() - inner.area();
     [(along * along + across * across).sqrt(), outer.area() + inner.area()]
+}
+
+/// Does the loop turn to and fro all along, as the rim of triangles that were lost does?
+fn is_ragged(shape: &Shape) -> bool {
+    let n = shape.points.len();
+    if n < FEWEST_RAGGED {
+        return false;
+    }
+    let turn = |i: usize| {
+        let [a, b, c] = [i, i + 1, i + 2].map(|i| shape.points[i % n]);
+        (b - a).normalize_or_zero().cross((c - b).normalize_or_zero()).dot(shape.normal)
+    };
+    let turns: Vec<f64> = (0..n).map(turn).filter(|turn| turn.abs() > CORNER).collect();
+    let changes = (0..turns.len()).filter(|i| turns[*i] * turns[(i + 1) % turns.len()] < 0.0).count();
+    changes as f64 >= RAGGED * n as f64
 }
 
 /// Lies all of a loop inside the other, seen along that one's axis?

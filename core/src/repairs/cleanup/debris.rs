@@ -5,10 +5,12 @@
 
 use crate::contract::report::RepairName;
 use crate::contract::settings::Profile;
+use crate::geometry::sums::Bounds;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::topology::survey::Survey;
+use crate::util::ids::NONE;
 
 /// Open specks.
 pub(crate) const REPAIR: Repair = Repair {
@@ -16,6 +18,14 @@ pub(crate) const REPAIR: Repair = Repair {
     changes: Changes::Surface,
     run: |cx| {
         let dropped = drop(cx.survey, &mut cx.work, cx.profile);
+        if dropped > 0 {
+            let mut left = Bounds::EMPTY;
+            cx.work.living().for_each(|t| left.include(&cx.work.points(t)));
+            let regions =
+                cx.survey.regions.iter().zip(&cx.reversed.dropped).filter(|(region, dropped)| region.first != NONE && !**dropped);
+            regions.for_each(|(region, _)| left.add(&region.bounds));
+            cx.account.explained.without_specks = Some(left);
+        }
         Ok(Done::count(dropped, "triangles of open specks dropped, which together are next to nothing of the surface"))
     },
 };

@@ -9,11 +9,12 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use crate::algorithms::fairing::{self, CoarsePatch, ShapeSettings, Shaped, edges, sorted};
+use crate::algorithms::extend;
+use crate::algorithms::fairing::{self, CoarsePatch, ShapeSettings, Shaped, Unshaped, edges, sorted};
 use crate::contract::report::RepairName;
-use crate::geometry::exact::Point;
+use crate::geometry::exact::{Point, at};
 use crate::geometry::position::{self, Position};
-use crate::repairs::holes::patches::Placed;
+use crate::repairs::holes::patches::{EXTENDED, Placed};
 use crate::repairs::shared::work::Work;
 use crate::submesh::{Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
@@ -52,6 +53,9 @@ pub(crate) fn smooth(survey: &Survey<'_>, work: &mut Work<'_>, placed: &mut [Pla
         let beyond = Beyond::of(survey, submesh, batch.iter().map(|i| &placed[*i]));
         let shaped = parallel::map(threads, batch.len(), |i| {
             let region = Gathered::of(submesh, &beyond, &placed[batch[i]]);
+            if is_cut(&region) {
+                return Err(Unshaped::Cut);
+            }
             let shaped = fairing::shape(
                 &CoarsePatch { positions: &region.positions, patch: &region.patch, around: &region.around },
                 settings,
@@ -67,10 +71,33 @@ pub(crate) fn smooth(survey: &Survey<'_>, work: &mut Work<'_>, placed: &mut [Pla
     }
 }
 
+/// A rim of fewer vertices lies in a plane by chance.
+const FEWEST_CUT: usize = 8;
+/// Vertices next to a rim are as far from its plane as each other if these distances differ by less than this share of the largest.
+const ALIKE: f64 = 0.5;
+
+/// Was the surface cut along a plane, as a scan is at its bottom? Its rim lies in one, and what is next to it anywhere: where rows of vertices
+/// run along the rim, the plane is theirs.
+fn is_cut(region: &Gathered) -> bool {
+    let rim = region.patch.iter().flatten().max().map_or(0, |last| *last as usize + 1);
+    let points = &region.positions[..rim];
+    if rim < FEWEST_CUT || !extend::lie_in_a_plane(points) {
+        return false;
+    }
+    let place = |v: u32| at(&region.positions[v as usize]);
+    let normal: DVec3 = region.patch.iter().map(|t| (place(t[1]) - place(t[0])).cross(place(t[2]) - place(t[0]))).sum();
+    let normal = normal.normalize_or_zero();
+    let is_on_rim = |v: &&u32| (**v as usize) < rim;
+    let next = region.around.iter().filter(|t| t.iter().any(|v| is_on_rim(&v))).flatten().filter(|v| !is_on_rim(v));
+    let heights = next.map(|v| (place(*v) - place(0)).dot(normal).abs());
+    let (least, most) = heights.fold((f64::INFINITY, 0.0_f64), |(least, most), h| (least.min(h), most.max(h)));
+    most > 0.0 && most - least > ALIKE * most
+}
+
 /// Is a patch to be shaped, as far as the triangles of the submesh tell?
 fn is_wanted(submesh: &Submesh, patch: &Placed, finer: f64) -> bool {
-    // One triangle has no inner edge.
-    (patch.count > 1 || patch.count == 1 && finer > 1.0) && {
+    // One triangle has no inner edge, and planes are as they should be.
+    (patch.count > 1 || patch.count == 1 && finer > 1.0) && patch.method != EXTENDED && {
         let edges = Edges::of(submesh, patch);
         (finer > 1.0 || edges.have_room(submesh))
             && !edges.is_rim_an_edge(submesh, patch)
@@ -166,7 +193,7 @@ impl Edges {
 }
 
 /// Triangles that are not in the submesh, around vertices that are: where each has its corners, by vertex.
-struct Beyond {
+pub(crate) struct Beyond {
     /// By vertex of the submesh, then by triangle.
     of_vertex: Vec<(Vertex, u32)>,
     corners: Vec<[Point; 3]>,
@@ -174,7 +201,7 @@ struct Beyond {
 
 impl Beyond {
     /// Around the vertices next to the rims of some patches. Reads the chunks where they are at home.
-    fn of<'p>(survey: &Survey<'_>, submesh: &Submesh, patches: impl Iterator<Item = &'p Placed>) -> Self {
+    pub(crate) fn of<'p>(survey: &Survey<'_>, submesh: &Submesh, patches: impl Iterator<Item = &'p Placed>) -> Self {
         let mut next: Vec<Vertex> = patches
             .flat_map(|patch| patch.triangles().flat_map(|t| submesh.triangles[t as usize].v))
             .flat_map(|v| submesh.star(v).flat_map(|(t, _)| submesh.triangles[t as usize].v))
@@ -203,16 +230,16 @@ impl Beyond {
 }
 
 /// A region in a numbering of its own, which begins with the vertices of the patch.
-struct Gathered {
-    positions: Vec<Point>,
+pub(crate) struct Gathered {
+    pub(crate) positions: Vec<Point>,
     /// Vertices of the submesh; [`NONE`] for others.
     vertices: Vec<Vertex>,
-    patch: Vec<[u32; 3]>,
-    around: Vec<[u32; 3]>,
+    pub(crate) patch: Vec<[u32; 3]>,
+    pub(crate) around: Vec<[u32; 3]>,
 }
 
 impl Gathered {
-    fn of(submesh: &Submesh, beyond: &Beyond, patch: &Placed) -> Self {
+    pub(crate) fn of(submesh: &Submesh, beyond: &Beyond, patch: &Placed) -> Self {
         let mut region = Self { positions: Vec::new(), vertices: Vec::new(), patch: Vec::new(), around: Vec::new() };
         let mut numbers: HashMap<Position, u32> = HashMap::new();
         let mut number = |region: &mut Self, position: Point, vertex: Vertex| {

@@ -4,6 +4,8 @@
 mod across;
 mod closing;
 mod doubts;
+mod judged;
+mod mouth;
 mod step_back;
 mod strips;
 mod together;
@@ -45,8 +47,11 @@ pub(crate) const REPAIR: Repair = Repair {
         cx.handed.sheets = closed.sheets;
         cx.handed.across = closed.across;
         cx.account.doubts.extend(closed.doubts);
+        cx.account.doubts.extend(closed.judged.doubts);
+        cx.account.explained.area += closed.judged.area;
+        cx.account.explained.reached.add(&closed.judged.reached);
         if let Some(meant) = &mut cx.account.enclosed.meant {
-            *meant -= closed.not_meant;
+            *meant += closed.judged.volume - closed.not_meant;
         }
         Ok(Done::count(closed.loops, format!("loops closed: {}", parts.join(", "))))
     },
@@ -88,6 +93,7 @@ pub(crate) fn fill_loops(
     let mut closing = Closing {
         admission,
         max_edges,
+        may_add: profile.patch_shape != PatchShape::Flat,
         rims: Vec::new(),
         placed: Vec::new(),
         open: Vec::new(),
@@ -118,7 +124,9 @@ pub(crate) fn fill_loops(
         unclosed = closing.balance(work, &mut across);
     }
     balancing += (across.len() - first_balancing) as u64;
+    let judged = closing.judge(survey, work, profile);
     let mut closed = closing.finish(work);
+    closed.judged = judged;
     if balancing > 0 {
         closed.loops += balancing;
         *closed.by_method.entry(BALANCING.into()).or_insert(0) += balancing;
@@ -170,11 +178,19 @@ impl Closing<'_> {
     /// Closes the loops from number `first` on, each for itself.
     pub(crate) fn triangulate(&mut self, work: &mut Work<'_>, first: usize, threads: usize) {
         let submesh: &Submesh = work;
-        let patches =
-            parallel::map(threads, self.rims.len() - first, |i| self.fill(submesh, (first + i) as u32, Neighbours::Heeded, &[]));
-        for (rim, patch) in (first as u32..).zip(patches) {
+        let patches = parallel::map(threads, self.rims.len() - first, |i| {
+            let rim = (first + i) as u32;
+            (self.extend(submesh, rim), self.fill(submesh, rim, Neighbours::Heeded, &[]))
+        });
+        for (rim, (extended, patch)) in (first as u32..).zip(patches) {
+            if let Some(extended) = extended.filter(|e| !meets_new_edge(work, self.rim(rim), &e.triangles)) {
+                self.put_in_extended(work, rim, &extended);
+                continue;
+            }
             let patch = match patch {
-                Ok(patch) if meets_new_edge(work, self.rim(rim), &patch) => self.fill(work, rim, Neighbours::Heeded, &[]),
+                Ok(patch) if meets_new_edge(work, self.rim(rim), &patch.triangles) => {
+                    self.fill(work, rim, Neighbours::Heeded, &[])
+                }
                 other => other,
             };
             match patch {

@@ -8,6 +8,20 @@ use crate::repairs::shared::work::Work;
 use crate::submesh::{Origin, Submesh, Vertex};
 use crate::util::ids::NONE;
 
+/// Name of the method that lets flat surface go on to where it meets other.
+pub(crate) const EXTENDED: &str = "planes to where they meet";
+
+/// How much of a guess a patch of planes is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Planes {
+    /// Nothing tells one of the planes but right angles.
+    pub(crate) assumed: bool,
+    /// What lies under the patch, seen from the middle of its loop's vertices.
+    pub(crate) volume: f64,
+    /// The volume by which another patch like it differs.
+    pub(crate) in_doubt: f64,
+}
+
 /// A patch that is in the submesh.
 #[derive(Debug)]
 pub(crate) struct Placed {
@@ -29,6 +43,8 @@ pub(crate) struct Placed {
     pub(crate) to_be_cut: bool,
     /// A patch that does, with its method, while others are tried.
     pub(crate) spare: Option<(&'static str, Vec<[Vertex; 3]>)>,
+    /// Of planes that go on to where they meet: what is to be said of the guess.
+    pub(crate) planes: Option<Planes>,
 }
 
 impl Placed {
@@ -51,6 +67,7 @@ impl Placed {
             obstacles: Vec::new(),
             across: false,
             to_be_cut: false,
+            planes: None,
             spare: None,
         };
         placed.replace(work, triangles);

@@ -1,7 +1,7 @@
 //! What was done to a file, for its report.
 
 use crate::contract::report::{BoundaryLoops, LoopLeft, Region, Repair, RepairName, SheetDropped, Skin, Volumes, Wrap};
-use crate::detect::review::Enclosed;
+use crate::detect::review::{Enclosed, Explained};
 
 /// What the report says of the repairs.
 #[derive(Default)]
@@ -16,6 +16,8 @@ pub(crate) struct Account {
     pub(crate) enclosed: Enclosed,
     /// Guesses of repairs that a person must look at, each a line that names the guess, its place and its size. A good result with any needs review.
     pub(crate) doubts: Vec<String>,
+    /// Changes that nobody need look at.
+    pub(crate) explained: Explained,
     /// What was replaced because nothing else made it a solid, or would have been.
     pub(crate) wraps: Vec<Wrap>,
     /// What became of the volume of bodies; `None` where nothing was done that might have lost any.

@@ -1,10 +1,13 @@
 //! The loops of a submesh while they are closed: patches that are in, and loops that are open, with the reason.
 
+use crate::algorithms::extend::{self, Extended};
 use crate::algorithms::triangulate::{self, FillSettings, Rim, Unfillable, strip};
 use crate::contract::report::{LoopLeft, MOST_LISTED};
 use crate::detect::holes::{self, loops::Loop};
+use crate::geometry::position::Position;
+use crate::geometry::sums::Bounds;
 use crate::geometry::tri_tri;
-use crate::repairs::holes::patches::{Placed, are_joined, of_submesh};
+use crate::repairs::holes::patches::{EXTENDED, Placed, Planes, are_joined, of_submesh};
 use crate::repairs::shared::admission::{Admission, NotAdmitted};
 use crate::repairs::shared::context::{PatchAcross, SheetRim};
 use crate::repairs::shared::work::Work;
@@ -21,6 +24,8 @@ pub(crate) struct Closed {
     pub(crate) sheets: Vec<SheetRim>,
     /// A vertex of each loop that was left open on purpose: it was not admitted.
     pub(crate) kept_open: Vec<[f32; 3]>,
+    /// What is to be said of the guesses.
+    pub(crate) judged: Judged,
     /// Loops that nothing closes which crosses nothing: the triangles of patches that are to be cut along what they cross, and what to say of the
     /// loops if that does not come about.
     pub(crate) across: Vec<PatchAcross>,
@@ -30,10 +35,25 @@ pub(crate) struct Closed {
     pub(crate) not_meant: f64,
 }
 
+/// What is to be said of patches.
+#[derive(Debug, Default)]
+pub(crate) struct Judged {
+    /// Guesses that may be wrong, each a line for people.
+    pub(crate) doubts: Vec<String>,
+    /// Area of the patches that nothing speaks against.
+    pub(crate) area: f64,
+    /// Around those of them that reach beyond their loops.
+    pub(crate) reached: Bounds,
+    /// What these enclose more than cones over their loops.
+    pub(crate) volume: f64,
+}
+
 /// The loops of a submesh while they are closed.
 pub(crate) struct Closing<'p> {
     pub(crate) admission: Admission<'p>,
     pub(crate) max_edges: usize,
+    /// Patches may have vertices of their own.
+    pub(crate) may_add: bool,
     pub(crate) rims: Vec<Loop>,
     pub(crate) placed: Vec<Placed>,
     /// Loops, by number, and why they are not closed.
@@ -75,12 +95,12 @@ pub(crate) const SLIT: &str = "slit";
 pub(crate) const FLAT: &str = "flat on its neighbours";
 
 /// A chord of the patch is an edge of the mesh by now.
-pub(crate) fn meets_new_edge(submesh: &Submesh, rim: &Loop, patch: &triangulate::Patch) -> bool {
+pub(crate) fn meets_new_edge(submesh: &Submesh, rim: &Loop, triangles: &[[u32; 3]]) -> bool {
     let n = rim.vertices.len() as u32;
-    patch.triangles.iter().any(|t| {
+    triangles.iter().any(|t| {
         (0..3).any(|k| {
             let (i, j) = (t[k], t[(k + 1) % 3]);
-            j != (i + 1) % n && submesh.has_edge(rim.vertices[i as usize], rim.vertices[j as usize])
+            i < n && j < n && j != (i + 1) % n && submesh.has_edge(rim.vertices[i as usize], rim.vertices[j as usize])
         })
     })
 }
@@ -120,6 +140,26 @@ impl Closing<'_> {
             return Ok(patch);
         }
         Ok(triangulate::triangulate(&of_patch, &settings)?)
+    }
+
+    /// A patch of planes that meet where the loop's surface is missing, if the loop tells them.
+    pub(crate) fn extend(&self, submesh: &Submesh, rim: u32) -> Option<Extended> {
+        let rim = self.rim(rim);
+        self.admission.check(submesh, rim).ok()?;
+        let points = rim.points(submesh);
+        let apexes = rim.apexes(submesh);
+        let forbidden = |i: u32, j: u32| are_joined(submesh, rim.vertices[i as usize], rim.vertices[j as usize]);
+        let of_patch = Rim { points: &points, apexes: &apexes, obstacles: &[], forbidden: &forbidden };
+        extend::extend(&of_patch, self.may_add)
+    }
+
+    pub(crate) fn put_in_extended(&mut self, work: &mut Work<'_>, rim: u32, patch: &Extended) {
+        let mut vertices = self.rim(rim).vertices.clone();
+        vertices.extend(patch.added.iter().map(|p| work.add_vertex(Position::of(*p))));
+        let triangles: Vec<[Vertex; 3]> = patch.triangles.iter().map(|t| t.map(|i| vertices[i as usize])).collect();
+        let mut placed = Placed::put_in(work, vec![rim], &triangles, EXTENDED);
+        placed.planes = Some(Planes { assumed: patch.assumed, volume: patch.volume, in_doubt: patch.in_doubt });
+        self.placed.push(placed);
     }
 
     pub(crate) fn finish(mut self, work: &mut Work<'_>) -> Closed {

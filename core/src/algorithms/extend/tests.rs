@@ -1,0 +1,76 @@
+use super::*;
+
+/// Closes a loop; each edge with a place in the surface beyond it.
+fn closed(rim: &[(Point, Point)], may_add: bool) -> Option<Extended> {
+    let points: Vec<Point> = rim.iter().map(|(p, _)| *p).collect();
+    let apexes: Vec<Option<Point>> = rim.iter().map(|(_, apex)| Some(*apex)).collect();
+    extend(&Rim { points: &points, apexes: &apexes, obstacles: &[], forbidden: &|_, _| false }, may_add)
+}
+
+/// A box of 2 by 3 by 4 without the faces at x = 2 and y = 3. The vertical edge between these is still to be found.
+fn two_faces_lost() -> Vec<(Point, Point)> {
+    vec![
+        ([2.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
+        ([2.0, 3.0, 0.0], [0.0, 0.0, 0.0]),
+        ([0.0, 3.0, 0.0], [0.0, 0.0, 0.0]),
+        ([0.0, 3.0, 4.0], [0.0, 0.0, 4.0]),
+        ([2.0, 3.0, 4.0], [0.0, 0.0, 4.0]),
+        ([2.0, 0.0, 4.0], [0.0, 0.0, 4.0]),
+    ]
+}
+
+/// A cube's corner at the origin, of which a triangle is missing in each of three faces; the cube lies where coordinates are positive.
+fn corner_lost() -> Vec<(Point, Point)> {
+    vec![
+        ([1.0, 0.0, 0.0], [3.0, 0.0, 3.0]),
+        ([1.0, 0.0, 1.0], [3.0, 0.0, 3.0]),
+        ([0.0, 0.0, 1.0], [0.0, 3.0, 3.0]),
+        ([0.0, 1.0, 1.0], [0.0, 3.0, 3.0]),
+        ([0.0, 1.0, 0.0], [3.0, 3.0, 0.0]),
+        ([1.0, 1.0, 0.0], [3.0, 3.0, 0.0]),
+    ]
+}
+
+#[test]
+fn two_faces_of_a_box_meet_in_its_edge() {
+    for may_add in [false, true] {
+        let made = closed(&two_faces_lost(), may_add).unwrap();
+        assert!(made.added.is_empty() && !made.assumed);
+        assert_eq!(made.triangles.len(), 4);
+        let has_edge = |t: &[u32; 3]| t.contains(&1) && t.contains(&4);
+        assert_eq!(made.triangles.iter().filter(|t| has_edge(t)).count(), 2, "{:?}", made.triangles);
+    }
+}
+
+#[test]
+fn three_faces_of_a_cube_meet_in_its_corner() {
+    let made = closed(&corner_lost(), true).unwrap();
+    assert_eq!(made.added, [[0.0; 3]]);
+    assert_eq!(made.triangles.len(), 6);
+    assert!(closed(&corner_lost(), false).is_none(), "there is no vertex for it");
+}
+
+#[test]
+fn a_loop_on_bent_surface_tells_no_planes() {
+    // Around the top of a ball, up and down.
+    let rim: Vec<(Point, Point)> = (0..8)
+        .map(|i| {
+            let turn = std::f32::consts::TAU * i as f32 / 8.0;
+            let [r, z] = if i % 2 == 0 { [0.6, 0.8] } else { [0.8, 0.6] };
+            ([r * turn.cos(), r * turn.sin(), z], [turn.cos(), turn.sin(), 0.0])
+        })
+        .rev()
+        .collect();
+    assert!(closed(&rim, true).is_none());
+}
+
+#[test]
+fn a_flat_loop_is_no_matter_of_several_planes() {
+    let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let rim: Vec<(Point, Point)> = square.iter().map(|[x, y]| ([*x, *y, 0.0], [3.0 * x - 1.0, 3.0 * y - 1.0, 0.0])).collect();
+    assert!(closed(&rim, true).is_none());
+    let points: Vec<Point> = rim.iter().map(|(p, _)| *p).collect();
+    assert!(lie_in_a_plane(&points));
+    let corners: Vec<Point> = corner_lost().iter().map(|(p, _)| *p).collect();
+    assert!(!lie_in_a_plane(&corners));
+}

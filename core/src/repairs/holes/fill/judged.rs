@@ -1,0 +1,206 @@
+//! What is to be said of patches: which are guesses that a person must look at, and which explain how the surface has changed.
+//!
+//! A flat patch on a flat rim is what is missing if the surface runs straight to the rim, as the walls of a box or a tube do. Where the
+//! surface is bent there, and its mouth is wide against its body, much more may be missing (`mouth`).
+
+use glam::DVec3;
+
+use super::closing::{Closing, Judged};
+use super::mouth;
+use crate::algorithms::extend;
+use crate::contract::settings::Profile;
+use crate::detect::holes::loops::Loop;
+use crate::geometry::exact::Point;
+use crate::repairs::holes::fair::{Beyond, Gathered};
+use crate::repairs::holes::patches::{EXTENDED, Placed, Planes};
+use crate::repairs::shared::work::Work;
+use crate::submesh::components::{Components, Reversed, Through};
+use crate::submesh::{Submesh, Vertex};
+use crate::topology::survey::Survey;
+
+/// Patches of planes are in doubt if another one differs by more than this share of all volume.
+const IN_DOUBT: f64 = 0.001;
+/// A body of less than this share of all volume is a detail, which nobody need look at.
+const DETAIL: f64 = 0.1;
+/// And so many times the share of volume that may change without a word is what a mouth must seem to lack: it is a rough estimate.
+const ROUGH: f64 = 2.0;
+/// A mouth of less than this share of the body's area is not wide.
+const WIDE: f64 = 0.05;
+/// How much the surface goes on across a hole's rim, at least, for the hole to be one in flat surface.
+const HOLE: f64 = 0.7;
+/// A way through takes no more than this share of all volume without a word.
+const WAY_THROUGH: f64 = 0.05;
+/// Sine of the turn at a corner: a circle of ten facets has none.
+const CORNER: f64 = 0.6;
+/// Lines for people, at most.
+const MOST_SAID: usize = 20;
+
+/// The body that a patch is of.
+#[derive(Clone, Copy)]
+struct Body {
+    area: f64,
+    /// Signed.
+    volume: f64,
+    /// Of all bodies together.
+    all: f64,
+}
+
+impl Body {
+    fn is_detail(&self) -> bool {
+        self.volume.abs() < DETAIL * self.all
+    }
+}
+
+impl Closing<'_> {
+    /// Judges all patches that are in, and cross nothing. O(submesh), and a look at the surroundings of wide mouths.
+    pub(crate) fn judge(&self, survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile) -> Judged {
+        let mut judged = Judged::default();
+        let is_in = |patch: &&Placed| patch.count > 0 && !patch.across && !patch.to_be_cut;
+        if !self.placed.iter().any(|patch| is_in(&patch)) {
+            return judged;
+        }
+        let (submesh, edges) = work.edges();
+        let bodies = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::EveryEdge);
+        let all = bodies.list.iter().map(|c| survey.measure.volume(c.extent).abs()).sum();
+        for patch in self.placed.iter().filter(is_in) {
+            // What was split since is elsewhere.
+            let Some(first) = patch.triangles().find(|t| submesh.lives(*t)) else { continue };
+            let extent = bodies.list[bodies.of_triangle[first as usize] as usize].extent;
+            let body = Body { area: survey.measure.area(extent), volume: survey.measure.volume(extent), all };
+            let doubt = match (patch.planes, patch.rims.as_slice()) {
+                (Some(planes), _) if patch.method == EXTENDED => judged.planes(submesh, patch, planes, body),
+                (_, [_]) if !patch.coarse.is_empty() && area(submesh, patch) >= WIDE * body.area => {
+                    shaped(submesh, patch, body, profile)
+                }
+                (_, [rim]) => judged.flat(survey, submesh, (patch, self.rim(*rim)), body, profile),
+                (_, [a, b]) => way_through(submesh, patch, [*a, *b].map(|rim| self.rim(rim)), body),
+                _ => None,
+            };
+            judged.doubts.extend(doubt.map(|doubt| format!("{doubt}, at {:?}", submesh.points(first)[0])));
+        }
+        let more = judged.doubts.len().saturating_sub(MOST_SAID);
+        judged.doubts.truncate(MOST_SAID);
+        if more > 0 {
+            judged.doubts.push(format!("{more} more patches are guesses like these"));
+        }
+        judged
+    }
+}
+
+impl Judged {
+    fn planes(&mut self, submesh: &Submesh, patch: &Placed, planes: Planes, body: Body) -> Option<String> {
+        let share = planes.in_doubt / body.all;
+        if share > IN_DOUBT {
+            let share = share * 100.0;
+            return Some(format!(
+                "planes around a hole meet in several ways, which differ by {share:.1} % of all volume; one was taken"
+            ));
+        }
+        if planes.assumed && planes.volume.abs() > IN_DOUBT * body.all {
+            return Some("a face of which nothing is left was put in at right angles to what is around".into());
+        }
+        self.explain(submesh, patch);
+        self.volume += planes.volume * body.volume.signum();
+        None
+    }
+
+    /// One that nothing speaks against: it is small against its body, or of planes that are known.
+    fn explain(&mut self, submesh: &Submesh, patch: &Placed) {
+        patch.triangles().filter(|t| submesh.lives(*t)).for_each(|t| self.reached.include(&submesh.points(t)));
+        self.area += area(submesh, patch);
+    }
+
+    fn flat(
+        &mut self,
+        survey: &Survey<'_>,
+        submesh: &Submesh,
+        (patch, rim): (&Placed, &Loop),
+        body: Body,
+        profile: &Profile,
+    ) -> Option<String> {
+        let points: Vec<Point> = rim.points(submesh);
+        let size = area(submesh, patch);
+        if size < WIDE * body.area {
+            self.explain(submesh, patch);
+            return None;
+        }
+        let beyond = Beyond::of(survey, submesh, std::iter::once(patch));
+        let more = mouth::beyond(&Gathered::of(submesh, &beyond, patch), size);
+        let volume = body.volume.abs();
+        if !body.is_detail() && more > ROUGH * profile.max_volume_change * volume {
+            let share = 100.0 * size / body.area;
+            return Some(format!(
+                "a mouth of {share:.0} % of its body's area was closed, while the surface is bent there: much more may be missing"
+            ));
+        }
+        if points.len() > 3 && !extend::lie_in_a_plane(&points) {
+            return None;
+        }
+        self.area += size;
+        None
+    }
+}
+
+/// A patch that continues the surface, and encloses much more, or less, than a flat one would.
+fn shaped(submesh: &Submesh, patch: &Placed, body: Body, profile: &Profile) -> Option<String> {
+    let from = submesh.place(patch.coarse[0][0]);
+    let living = patch.triangles().filter(|t| submesh.lives(*t)).map(|t| submesh.triangles[t as usize].v);
+    let differ = (under(submesh, living, from) - under(submesh, patch.coarse.iter().copied(), from)).abs();
+    let share = differ / body.volume.abs();
+    (share > profile.max_volume_change && !body.is_detail())
+        .then(|| format!("a patch that continues the surface differs from a flat one by {:.1} % of the body", share * 100.0))
+}
+
+/// A way through a wall, which caps on both holes would have left closed.
+fn way_through(submesh: &Submesh, patch: &Placed, rims: [&Loop; 2], body: Body) -> Option<String> {
+    let middle = |rim: &Loop| rim.vertices.iter().map(|v| submesh.place(*v)).sum::<DVec3>() / rim.vertices.len() as f64;
+    let axis = |rim: &Loop| directed_area(submesh, rim, middle(rim));
+    let goes_on = |rim: &Loop| {
+        let n = rim.vertices.len();
+        let along = |i: usize| submesh.distance(rim.vertices[i], rim.vertices[(i + 1) % n]);
+        let normal = axis(rim).normalize_or_zero();
+        let sum: f64 = (0..n).map(|i| submesh.normal(rim.triangles[i]).normalize_or_zero().dot(normal) * along(i)).sum();
+        sum >= HOLE * rim.perimeter(submesh)
+    };
+    if !rims.iter().all(|rim| goes_on(rim)) || rims.iter().all(|rim| is_round(submesh, rim)) {
+        return None;
+    }
+    let from = middle(rims[0]);
+    let living = patch.triangles().filter(|t| submesh.lives(*t)).map(|t| submesh.triangles[t as usize].v);
+    // Cones over the loops; the first one is seen from its own middle.
+    let caps = axis(rims[1]).dot(middle(rims[1]) - from) / 3.0;
+    let share = (under(submesh, living, from) - caps).abs() / body.all;
+    (share > WAY_THROUGH).then(|| {
+        format!(
+            "two holes back to back were closed as a way through, {:.1} % of all volume; the skins may have been lost",
+            share * 100.0
+        )
+    })
+}
+
+/// Has a loop no corner, as what is drilled has none?
+fn is_round(submesh: &Submesh, rim: &Loop) -> bool {
+    let n = rim.vertices.len();
+    let way = |i: usize| submesh.vector(rim.vertices[i % n], rim.vertices[(i + 1) % n]).normalize_or_zero();
+    (0..n).all(|i| way(i).dot(way(i + 1)) > 0.0 && way(i).cross(way(i + 1)).length() < CORNER)
+}
+
+/// A loop's directed area about a place.
+fn directed_area(submesh: &Submesh, rim: &Loop, from: DVec3) -> DVec3 {
+    let n = rim.vertices.len();
+    let ends = |i: usize| [rim.vertices[i], rim.vertices[(i + 1) % n]].map(|v| submesh.place(v) - from);
+    (0..n).map(ends).map(|[a, b]| a.cross(b) * 0.5).sum()
+}
+
+/// The signed volume between a place and triangles.
+fn under(submesh: &Submesh, triangles: impl Iterator<Item = [Vertex; 3]>, from: DVec3) -> f64 {
+    let of = |t: [Vertex; 3]| {
+        let [a, b, c] = t.map(|v| submesh.place(v) - from);
+        a.cross(b).dot(c) / 6.0
+    };
+    triangles.map(of).sum()
+}
+
+fn area(submesh: &Submesh, patch: &Placed) -> f64 {
+    patch.triangles().filter(|t| submesh.lives(*t)).map(|t| submesh.normal(t).length() / 2.0).sum()
+}

@@ -56,7 +56,7 @@ impl Profile {
     }
 
     /// Every setting that is not a whole number or a choice, with its range. All fields are named, so that a new one cannot be forgotten here.
-    fn numbers(&self) -> [(&'static str, f64, Range); 16] {
+    fn numbers(&self) -> [(&'static str, f64, Range); 18] {
         let Self {
             name: _,
             weld_relative,
@@ -69,6 +69,8 @@ impl Profile {
             max_area_change,
             max_box_change_relative,
             debris_area_share,
+            sheet_thickness_relative,
+            sheet_thickness_mm,
             max_sheets_share,
             stack_gap_relative,
             max_separation_relative,
@@ -102,6 +104,8 @@ impl Profile {
             ("max_area_change", *max_area_change, Range::Bound),
             ("max_box_change_relative", *max_box_change_relative, Range::Bound),
             ("debris_area_share", *debris_area_share, Range::Share),
+            ("sheet_thickness_relative", *sheet_thickness_relative, Range::Share),
+            ("sheet_thickness_mm", *sheet_thickness_mm, Range::Bound),
             ("max_sheets_share", *max_sheets_share, Range::Share),
             ("stack_gap_relative", *stack_gap_relative, Range::Share),
             ("max_separation_relative", *max_separation_relative, Range::Share),

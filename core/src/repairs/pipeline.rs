@@ -20,6 +20,7 @@ use crate::repairs::cleanup::sheets;
 use crate::repairs::cleanup::surplus;
 use crate::repairs::cleanup::surplus::complete_at_seams;
 use crate::repairs::holes::fill;
+use crate::repairs::holes::sheet_solids;
 use crate::repairs::holes::skirt;
 use crate::repairs::orient::directions;
 use crate::repairs::orient::visibility;
@@ -74,6 +75,7 @@ pub(crate) const ALL: &[Step] = &[
     Do(debris::REPAIR),
     Do(visibility::REPAIR),
     Do(directions::COHERENT),
+    Do(sheet_solids::REPAIR),
     Look(measure_volume),
     Do(skirt::REPAIR),
     Do(fill::REPAIR),

@@ -73,7 +73,7 @@ pub(crate) fn fill_loops(
     threads: usize,
 ) -> Closed {
     let (submesh, edges) = work.edges();
-    let Boundary { loops: rims, chains } = loops::boundary(submesh, edges);
+    let Boundary { loops: rims, mut chains } = loops::boundary(submesh, edges);
     let shapes = Shapes::of(submesh, &rims, threads);
     let admission = Admission::of(survey, work, &rims, &shapes, reversed, tolerance, (profile, only_loop));
     let max_edges = profile.max_hole_edges as usize;
@@ -100,7 +100,9 @@ pub(crate) fn fill_loops(
         unclosed = closing.balance(work, &mut across);
     }
     balancing += (across.len() - first_balancing) as u64;
-    let mut closed = closing.finish(work);
+    let mut kept = Closed::default();
+    closing.keep_open(work, &mut chains, &mut kept);
+    let mut closed = closing.finish(work, kept);
     if balancing > 0 {
         closed.loops += balancing;
         *closed.by_method.entry(BALANCING.into()).or_insert(0) += balancing;

@@ -1,7 +1,7 @@
 //! What was done to a file, for its report.
 
 use crate::contract::report::{BoundaryLoops, LoopLeft, Region, Repair, RepairName, SheetDropped, Volumes, Wrap};
-use crate::detect::review::Enclosed;
+use crate::detect::review::{Asked, Enclosed};
 
 /// What the report says of the repairs.
 #[derive(Default)]
@@ -16,6 +16,10 @@ pub(crate) struct Account {
     pub(crate) enclosed: Enclosed,
     /// Guesses of repairs that a person must look at, each a line that names the guess, its place and its size. A good result with any needs review.
     pub(crate) doubts: Vec<String>,
+    /// Rims of lone sheets that stay open.
+    pub(crate) open_sheets: u64,
+    /// What the profile asked to be added.
+    pub(crate) asked: Asked,
     /// What was replaced because nothing else made it a solid, or would have been.
     pub(crate) wraps: Vec<Wrap>,
     /// What became of the volume of bodies; `None` where nothing was done that might have lost any.

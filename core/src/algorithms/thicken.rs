@@ -47,7 +47,10 @@ pub(crate) fn thicken(sheet: &[Corners], thickness: f64) -> Option<Vec<Corners>>
             sum += turned(normals[corner.triangle], *sign);
         }
         let along = sum.try_normalize()?;
-        let least = corners.iter().zip(&signs).map(|(corner, sign)| turned(normals[corner.triangle], *sign).normalize_or_zero().dot(along));
+        let least = corners
+            .iter()
+            .zip(&signs)
+            .map(|(corner, sign)| turned(normals[corner.triangle], *sign).normalize_or_zero().dot(along));
         let by = along * (thickness / 2.0 / least.fold(1.0, f64::min).max(1.0 / MOST_AT_BENDS));
         skins.push([*point + by, *point - by].map(|p| Position::nearest(p).coordinates()));
     }
@@ -149,10 +152,12 @@ mod tests {
             let i = i % N;
             [at(i, side), at(i, -side)]
         };
-        (0..N).flat_map(|i| {
-            let ([a, b], [c, d]) = (ends(i), ends(i + 1));
-            [[a, b, d], [a, d, c]]
-        }).collect()
+        (0..N)
+            .flat_map(|i| {
+                let ([a, b], [c, d]) = (ends(i), ends(i + 1));
+                [[a, b, d], [a, d, c]]
+            })
+            .collect()
     }
 
     #[test]

@@ -224,7 +224,7 @@ fn probe_bodies(cx: &mut Context<'_, '_>) {
 }
 
 fn tell_dust(cx: &mut Context<'_, '_>) {
-    let note = "bodies that cutting left, each of less than 2⁻⁴⁰ of all volume, dropped";
+    let note = "bodies that cutting left and no printer can see, dropped; listed in `regions`";
     cx.account.add(RepairName::Dust, cx.handed.dust, note.into(), 0.0);
 }
 

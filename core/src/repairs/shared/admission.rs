@@ -3,8 +3,8 @@
 use crate::contract::report::LoopClass;
 use crate::contract::settings::Profile;
 use crate::detect::holes::{self, Shapes, loops::Loop};
-use crate::repairs::shared::lone_sheets;
 pub(crate) use crate::repairs::shared::lone_sheets::THIN;
+use crate::repairs::shared::lone_sheets::{self, Which};
 use crate::repairs::shared::work::Work;
 use crate::submesh::Submesh;
 use crate::submesh::components::Reversed;
@@ -62,7 +62,7 @@ impl<'p> Admission<'p> {
             refused.extend(left.map(|(rim, class)| (rim.vertices[0], NotAdmitted::Class(class.name()))));
         }
         if !profile.closes_sheets() && profile.fill_holes {
-            let sheets = lone_sheets::recognise(survey, submesh, edges, loops, shapes, reversed);
+            let sheets = lone_sheets::recognise(survey, submesh, edges, loops, shapes, reversed, Which::Sheets);
             refused.extend(sheets.rims.into_iter().map(|v| (v, NotAdmitted::Sheet)));
             one_sided = sheets.one_sided;
         }

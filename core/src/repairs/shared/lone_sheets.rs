@@ -46,6 +46,14 @@ const MOST_TRIANGLES: u64 = 1 << 21;
 /// Triangles of a component that are asked what is behind them, at most.
 const SAMPLES: usize = 1 << 11;
 
+/// What counts.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Which {
+    Sheets,
+    /// Reliefs as well: what rises from its rim, so that a flat patch would enclose something.
+    Reliefs,
+}
+
 /// The lone sheets of a submesh.
 #[derive(Debug, Default)]
 pub(crate) struct LoneSheets {
@@ -94,6 +102,7 @@ pub(crate) fn recognise(
     loops: &[Loop],
     shapes: &Shapes,
     reversed: &Reversed,
+    which: Which,
 ) -> LoneSheets {
     let one_sided = one_sided(survey, submesh, edges);
     if loops.is_empty() && one_sided.is_empty() {
@@ -109,7 +118,8 @@ pub(crate) fn recognise(
         let lies_back = all.continues[i] < LIES_BACK && all.cone_of[i] >= WIDE * mouth.area;
         let is_of_sheet = all.cone_of[i] >= OF_A_SHEET * mouth.area;
         let is_torn = torn[component as usize];
-        if lies_back && (mouth.is_thin() || mouth.is_unsteady()) || is_torn && (is_of_sheet || mouth.is_one_sided) {
+        let bounds_nothing = which == Which::Reliefs || mouth.is_thin() || mouth.is_unsteady();
+        if lies_back && bounds_nothing || is_torn && (is_of_sheet || mouth.is_one_sided) {
             rims.push(rim.vertices[0]);
         }
     }
@@ -352,3 +362,6 @@ fn one_sided(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges) -> Vec<bool>
     let found: Vec<bool> = (0..submesh.triangles.len() as u32).map(&mut is_one_sided).collect();
     if found.contains(&true) { found } else { Vec::new() }
 }
+
+#[cfg(test)]
+mod tests;

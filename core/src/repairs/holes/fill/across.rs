@@ -2,8 +2,8 @@
 
 use super::closing::{Closed, Closing, Neighbours, NotFilled, SLIT, left};
 use crate::algorithms::triangulate::{self, Rim, Unfillable};
-use crate::contract::report::{LoopLeft, MOST_LISTED};
 use crate::contract::report::RepairName;
+use crate::contract::report::{LoopLeft, MOST_LISTED};
 use crate::detect::holes::unbalanced::unbalanced;
 use crate::geometry::exact::{self, Point};
 use crate::repairs::cleanup::degenerate;

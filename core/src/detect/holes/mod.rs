@@ -168,13 +168,6 @@ impl Shapes {
     }
 }
 
-impl Shapes {
-    /// For each loop: how far it is from its plane, as a root of mean squares.
-    pub(crate) fn off_plane(&self) -> impl Iterator<Item = f64> + '_ {
-        self.0.iter().map(|shape| shape.extents[2])
-    }
-}
-
 fn shape_of(submesh: &Submesh, rim: &Loop) -> Shape {
     let points: Vec<DVec3> = rim.vertices.iter().map(|v| submesh.place(*v)).collect();
     Shape::of(&points, rim.triangles.iter().map(|t| submesh.normal(*t)))

@@ -71,6 +71,7 @@ impl<'p> Admission<'p> {
             let is_there = |v: &u32| submesh.positions[*v as usize] == place;
             let others = loops.iter().filter(|rim| !rim.vertices.iter().any(is_there));
             refused = others.map(|rim| (rim.vertices[0], NotAdmitted::NotAsked)).collect();
+            one_sided.clear();
         }
         refused.sort_by_key(|(v, _)| *v);
         Self { profile, longest, refused, one_sided }

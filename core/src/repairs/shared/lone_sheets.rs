@@ -7,8 +7,6 @@
 //! * **Thin:** the patch would lie back along the surface, and enclose next to nothing for the surface's size.
 //! * **Torn:** a cone over each rim closes the surface, but a good part of it then has material on its front, where the air should be: the surface
 //!   passes through its own patch, which would cut it into splinters.
-//! * **Unsteady:** the rim rises and falls as much as the surface does, as that of terrain cut out of a larger one, so that a patch is as
-//!   much of a guess as all that it encloses.
 //! * **One-sided:** no orientation satisfies its edges, and, cut open where they disagree, it is torn, or what would close it is larger than it is.
 //!   (A body of which a few triangles are glued on the wrong way has no such mouth.)
 
@@ -20,7 +18,7 @@ use crate::geometry::distance::place;
 use crate::geometry::position::{self, Position};
 use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed, Through};
-use crate::submesh::edges::{Edge, Edges};
+use crate::submesh::edges::Edges;
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 use crate::util::{parallel, union_find};
@@ -33,13 +31,11 @@ const WIDE: f64 = 0.25;
 /// on average.
 pub(crate) const THIN: f64 = 0.02;
 /// Torn is what has its front inside on this share of its area at least, and on no more than the rest of it.
-const TORN: f64 = 0.05;
+const TORN: f64 = 1.0 / 16.0;
 /// Of what is torn, rims are left open whose patch is at least this share of the surface. Others are holes in the sheet.
 const OF_A_SHEET: f64 = 0.05;
-/// A rim is unsteady if it leaves its plane by more than this share of the mean thickness, as a root of mean squares ...
-const UNSTEADY: f64 = 0.25;
-/// ... and the mouth has at least this share of the surface: that of a half sphere has half of it.
-const SHALLOW: f64 = 0.55;
+/// What is less of the whole area than this is as well closed as left open.
+const SUBSTANTIAL: f64 = 0.01;
 /// Components that are looked at triangle by triangle, at most, the largest first, and triangles of all of them: some 100 bytes each.
 const MOST_LOOKED_AT: usize = 256;
 const MOST_TRIANGLES: u64 = 1 << 21;
@@ -71,11 +67,8 @@ struct Mouth {
     cones: f64,
     /// What it encloses with them.
     volume: f64,
-    /// Mean squares of distances of the widest rim from its plane, as a root; and that rim's cone.
-    off_plane: f64,
-    widest: f64,
     is_one_sided: bool,
-    /// No loop, or edges that disagree: nothing is known of what would close it.
+    /// Several surfaces meet in an edge of it, or edges are in no loop: it is no sheet, or nothing is known of what would close it.
     is_unclear: bool,
 }
 
@@ -86,10 +79,6 @@ impl Mouth {
 
     fn is_thin(&self) -> bool {
         self.volume.abs() < THIN * ((self.area + self.cones) / 2.0).powi(3).sqrt()
-    }
-
-    fn is_unsteady(&self) -> bool {
-        self.widest >= SHALLOW * self.area && self.off_plane * self.cones > UNSTEADY * self.volume.abs()
     }
 }
 
@@ -118,7 +107,7 @@ pub(crate) fn recognise(
         let lies_back = all.continues[i] < LIES_BACK && all.cone_of[i] >= WIDE * mouth.area;
         let is_of_sheet = all.cone_of[i] >= OF_A_SHEET * mouth.area;
         let is_torn = torn[component as usize];
-        let bounds_nothing = which == Which::Reliefs || mouth.is_thin() || mouth.is_unsteady();
+        let bounds_nothing = which == Which::Reliefs || mouth.is_thin();
         if lies_back && bounds_nothing || is_torn && (is_of_sheet || mouth.is_one_sided) {
             rims.push(rim.vertices[0]);
         }
@@ -165,7 +154,7 @@ impl Mouths {
         }
         let middle = survey.measure.middle();
         let mut open_edges = vec![0usize; components.list.len()];
-        for (rim, off_plane) in loops.iter().zip(shapes.off_plane()) {
+        for rim in loops {
             let component = components.of_triangle[rim.triangles[0] as usize];
             let n = rim.vertices.len();
             let ways: Vec<[u32; 2]> = (0..n).map(|i| [rim.vertices[i], rim.vertices[(i + 1) % n]]).collect();
@@ -175,9 +164,6 @@ impl Mouths {
             open_edges[component as usize] += n;
             mouth.cones += area;
             mouth.volume += volume;
-            if area > mouth.widest {
-                (mouth.widest, mouth.off_plane) = (area, off_plane);
-            }
             all.cones.extend(cone.into_iter().map(|corners| (component, corners)));
         }
         all.close_the_rest(submesh, edges, components, (open_edges, middle));
@@ -194,9 +180,13 @@ impl Mouths {
         (mut in_loops, middle): (Vec<usize>, DVec3),
     ) {
         let mut rest: Vec<(u32, [u32; 2])> = Vec::new();
-        for edge in edges.iter().filter(Edge::is_unbalanced) {
+        for edge in edges.iter().filter(|edge| edge.is_unbalanced() || edge.is_nonmanifold()) {
             let component = components.of_triangle[edge.uses[0].triangle as usize];
             let Some(mouth) = self.mouths.get_mut(component as usize) else { continue };
+            mouth.is_unclear |= edge.is_nonmanifold();
+            if !edge.is_unbalanced() {
+                continue;
+            }
             if !mouth.is_one_sided {
                 match in_loops[component as usize].checked_sub(1) {
                     Some(left) => in_loops[component as usize] = left,
@@ -223,11 +213,11 @@ impl Mouths {
 
     /// Which components pass through what would close them, or are one-sided and have hardly more than a rim.
     fn torn(&self, survey: &Survey<'_>, submesh: &Submesh, components: &Components, reversed: &Reversed) -> Vec<bool> {
-        let mut torn: Vec<bool> = self.mouths.iter().map(|mouth| mouth.is_one_sided && mouth.cones >= mouth.area).collect();
-        let is_asked = |c: &usize| {
-            let mouth = &self.mouths[*c];
-            mouth.is_wide() && !mouth.is_unclear && !torn[*c]
-        };
+        let least = SUBSTANTIAL * self.mouths.iter().map(|mouth| mouth.area).sum::<f64>();
+        let may_be = |mouth: &Mouth| mouth.area >= least && mouth.is_wide() && !mouth.is_unclear;
+        let mut torn: Vec<bool> =
+            self.mouths.iter().map(|mouth| may_be(mouth) && mouth.is_one_sided && mouth.cones >= mouth.area).collect();
+        let is_asked = |c: &usize| may_be(&self.mouths[*c]) && !torn[*c];
         let mut asked: Vec<usize> = (0..self.mouths.len()).filter(is_asked).collect();
         asked.sort_by_key(|c| std::cmp::Reverse(components.list[*c].extent.area));
         asked.truncate(MOST_LOOKED_AT);

@@ -75,6 +75,8 @@ impl ProfileBuilder {
         debris_triangles: u32,
         debris_area_share: f64,
         sheets: Sheets,
+        sheet_thickness_relative: f64,
+        sheet_thickness_mm: f64,
         max_sheets_share: f64,
         bodies: Bodies,
         hollow: Hollow,

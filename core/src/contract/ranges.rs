@@ -56,7 +56,7 @@ impl Profile {
     }
 
     /// Every setting that is not a whole number or a choice, with its range. All fields are named, so that a new one cannot be forgotten here.
-    fn numbers(&self) -> [(&'static str, f64, Range); 20] {
+    fn numbers(&self) -> [(&'static str, f64, Range); 22] {
         let Self {
             name: _,
             weld_relative,
@@ -73,6 +73,8 @@ impl Profile {
             max_skin_lost,
             max_skin_invented,
             debris_area_share,
+            sheet_thickness_relative,
+            sheet_thickness_mm,
             max_sheets_share,
             stack_gap_relative,
             max_separation_relative,
@@ -111,6 +113,8 @@ impl Profile {
             ("max_skin_lost", *max_skin_lost, Range::Share),
             ("max_skin_invented", *max_skin_invented, Range::Share),
             ("debris_area_share", *debris_area_share, Range::Share),
+            ("sheet_thickness_relative", *sheet_thickness_relative, Range::Share),
+            ("sheet_thickness_mm", *sheet_thickness_mm, Range::Bound),
             ("max_sheets_share", *max_sheets_share, Range::Share),
             ("stack_gap_relative", *stack_gap_relative, Range::Share),
             ("max_separation_relative", *max_separation_relative, Range::Share),

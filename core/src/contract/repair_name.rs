@@ -38,6 +38,8 @@ pub enum RepairName {
     Visibility,
     /// Triangles were turned to agree with their neighbours.
     Orient,
+    /// Lone sheets were thickened, or given a base.
+    SheetSolids,
     /// Rims of open shapes got a skirt down into the surface that they stand on.
     #[serde(alias = "seat")]
     Skirt,
@@ -71,7 +73,7 @@ pub enum RepairName {
 
 impl RepairName {
     /// Every kind, in the order of the pipeline.
-    pub const ALL: [Self; 25] = [
+    pub const ALL: [Self; 26] = [
         Self::Degenerate,
         Self::Duplicate,
         Self::CommonWall,
@@ -85,6 +87,7 @@ impl RepairName {
         Self::Debris,
         Self::Visibility,
         Self::Orient,
+        Self::SheetSolids,
         Self::Skirt,
         Self::Fill,
         Self::Sheets,
@@ -115,6 +118,7 @@ impl RepairName {
             Self::Debris => "debris",
             Self::Visibility => "visibility",
             Self::Orient => "orient",
+            Self::SheetSolids => "sheet_solids",
             Self::Skirt => "skirt",
             Self::Fill => "fill",
             Self::Sheets => "sheets",

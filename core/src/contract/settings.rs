@@ -37,7 +37,7 @@ pub struct Profile {
     pub max_gap_mm: f64,
     /// Kinds of loops that stay open.
     pub leave_open: Vec<LoopClass>,
-    /// Close the rims of lone sheets, too. They become bodies of hardly any thickness.
+    /// An older word for [`Sheets::Close`] in [`Profile::sheets`]: true is the same as that, whatever stands there.
     pub close_sheets: bool,
     /// Fill holes at all.
     pub fill_holes: bool,
@@ -67,6 +67,10 @@ pub struct Profile {
     pub debris_area_share: f64,
     /// What to do with lone sheets.
     pub sheets: Sheets,
+    /// How thick [`Sheets::Thicken`] makes a sheet, and how far [`Sheets::Base`] goes down below its lowest point, as a fraction of the diagonal.
+    pub sheet_thickness_relative: f64,
+    /// The same in the file's units; 0: by the fraction.
+    pub sheet_thickness_mm: f64,
     /// Sheets that are dropped may have this share of the model's area together without review.
     pub max_sheets_share: f64,
     /// What to do with bodies inside others, or crossing others.
@@ -138,17 +142,23 @@ pub enum Hollow {
     Keep,
 }
 
-/// What to do with a lone sheet (open surface that bounds no material) in a file that also holds bodies.
+/// What to do with a lone sheet: open surface that bounds no material, such as terrain, or a Möbius strip.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Sheets {
-    /// Drop a sheet that crosses a body or another sheet: no solid can have it. Drop the others if all of them together have at most
-    /// [`Profile::debris_area_share`] of the area.
+    /// Beside bodies, drop a sheet that crosses a body or another sheet: no solid can have it. Drop the others if all of them together have at most
+    /// [`Profile::debris_area_share`] of the area, or the guarantee is [`Guarantee::Wrap`]. A file that holds nothing else stays open.
     #[default]
     Drop,
     /// Keep all sheets; the file stays open.
     Keep,
+    /// Make each a wall of [`Profile::sheet_thickness_relative`], half of it on either side.
+    Thicken,
+    /// Let the rim of each down along −Z, and close it by a flat base below the lowest point of all sheets: terrain becomes a block.
+    Base,
+    /// Close the rims as if they were holes. What is nearly flat becomes a body of hardly any thickness; what passes through its own patch, splinters.
+    Close,
 }
 
 /// How a patch is shaped.
@@ -191,6 +201,8 @@ impl Default for Profile {
             debris_triangles: 4,
             debris_area_share: 1e-3,
             sheets: Sheets::Drop,
+            sheet_thickness_relative: 0.01,
+            sheet_thickness_mm: 0.0,
             max_sheets_share: 0.01,
             bodies: Bodies::Union,
             hollow: Hollow::Fill,
@@ -228,6 +240,16 @@ impl Profile {
             }),
             _ => None,
         }
+    }
+
+    /// Are the rims of lone sheets closed as if they were holes?
+    pub(crate) fn closes_sheets(&self) -> bool {
+        self.close_sheets || self.sheets == Sheets::Close
+    }
+
+    /// How thick a lone sheet becomes, or its base below it, in a file of this diagonal.
+    pub(crate) fn sheet_thickness(&self, diagonal: f64) -> f64 {
+        if self.sheet_thickness_mm > 0.0 { self.sheet_thickness_mm } else { self.sheet_thickness_relative * diagonal }
     }
 
     /// Names [`Profile::built_in`] knows.

@@ -15,6 +15,10 @@ pub(crate) struct Evidence {
     pub(crate) doubts: Vec<String>,
     /// What explains changes.
     pub(crate) explained: Explained,
+    /// What the profile asked to be added: it is no reason for a person to look.
+    pub(crate) asked: Asked,
+    /// Rims of lone sheets that stay open.
+    pub(crate) open_sheets: u64,
 }
 
 /// Changes that nobody need look at.
@@ -41,6 +45,29 @@ impl Explained {
         surface.add(&self.reached);
         surface
     }
+}
+
+/// What was added to a file because its profile asked for it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Asked {
+    pub(crate) bounds: Bounds,
+    /// In the file's units, squared.
+    pub(crate) area: f64,
+}
+
+impl Default for Asked {
+    fn default() -> Self {
+        Self { bounds: Bounds::EMPTY, area: 0.0 }
+    }
+}
+
+/// What to say of lone sheets that keep a file from being good.
+pub(crate) fn open_sheets(count: u64) -> Option<String> {
+    (count > 0).then(|| {
+        format!(
+            "{count} rims of lone sheets, which bound no material, are open; `sheets` in the profile makes solids of them: \"thicken\" walls, \"base\" blocks"
+        )
+    })
 }
 
 /// Bodies that lay in the material of others.

@@ -135,6 +135,7 @@ fn mend(
             progress,
         )?;
     }
+    judging::advise(&mut report, &evidence);
     written.durable()?;
     clock.stage("verify");
     mesh.check_unchanged()?;

@@ -17,7 +17,7 @@ use crate::diagnosis::Diagnosis;
 use crate::geometry::sums::Bounds;
 use crate::io::read::{Finding, Loss};
 use crate::output::edit::Edit;
-use crate::repairs::{self, Repaired, Steps};
+use crate::repairs::{self, Account, Repaired, Steps};
 use crate::submesh::near;
 
 /// A mesh that a report is about.
@@ -102,15 +102,16 @@ pub(crate) fn repair_diagnosed(
 fn take_account(report: &mut Report, repaired: Repaired) -> Evidence {
     let Repaired { mut account, regions, .. } = repaired;
     report.repairs = account.repairs();
-    report.loops = account.loops.unwrap_or_default();
-    report.loops_left = account.loops_left;
-    report.sheets_dropped = account.sheets;
-    report.wraps = account.wraps;
+    report.loops = account.loops.take().unwrap_or_default();
+    report.loops_left = std::mem::take(&mut account.loops_left);
+    report.sheets_dropped = std::mem::take(&mut account.sheets);
+    report.wraps = std::mem::take(&mut account.wraps);
     report.volume_meant = account.enclosed.meant;
-    report.volumes = account.volumes;
-    report.skin = account.skin;
+    report.volumes = account.volumes.take();
+    report.skin = account.skin.take();
     report.regions = regions;
-    Evidence { enclosed: account.enclosed, doubts: account.doubts, explained: account.explained }
+    let Account { enclosed, doubts, explained, asked, open_sheets, .. } = account;
+    Evidence { enclosed, doubts, explained, asked, open_sheets }
 }
 
 /// Ends the report of a mesh from which nothing was left.
@@ -134,7 +135,10 @@ pub(crate) fn conclude(report: &mut Report, input: &[Finding], (surface, evidenc
     report.verdict = verdict::judge(&defects, &flaws).under(report.profile.guarantee);
     report.outcome = if report.verdict.good { Outcome::Repaired } else { Outcome::NotGood };
     if report.verdict.good {
-        let mut concerns = review::counts(&report.before, surface, evidence, &defects, &report.profile);
+        let mut surface = *surface;
+        surface.add(&evidence.asked.bounds);
+        let before = Defects { area: report.before.area + evidence.asked.area, ..report.before.clone() };
+        let mut concerns = review::counts(&before, &surface, evidence, &defects, &report.profile);
         concerns.extend_from_slice(&evidence.doubts);
         concerns.extend(report.volumes.iter().flat_map(|volumes| review::volumes(volumes, &report.profile)));
         concerns.extend(report.skin.iter().flat_map(|skin| review::skin(skin, &report.profile)));
@@ -152,6 +156,13 @@ pub(crate) fn conclude(report: &mut Report, input: &[Finding], (surface, evidenc
     report.certificate = Some(certify(&facts, &defects, &flaws));
     report.after = Some(defects);
     report.output = Some(facts);
+}
+
+/// Says of a result that is not good what would make it so.
+pub(crate) fn advise(report: &mut Report, evidence: &Evidence) {
+    if report.outcome == Outcome::NotGood {
+        report.verdict.reasons.extend(review::open_sheets(evidence.open_sheets));
+    }
 }
 
 /// The certificate of a file of these facts, counts and flaws.

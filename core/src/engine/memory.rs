@@ -130,6 +130,7 @@ pub(crate) fn repair(
         clock.stage("hash");
         let facts = report.input.clone();
         judging::conclude_unchanged(&mut report, &facts, &[]);
+        judging::advise(&mut report, &evidence);
         report.output = Some(facts);
         let origins = (0..faces as u32).map(FaceOrigin::Input).collect();
         return Ok(RepairedMesh { mesh: mesh.to_mesh(), origins, report: clock.close(report, Held::path(), faces)? });
@@ -151,6 +152,7 @@ pub(crate) fn repair(
         let facts = facts(&records, files::hash_of(records.as_flattened(), limits));
         judging::conclude(&mut report, &[], (&surface, &evidence), Written { facts, findings: &[], defects });
     }
+    judging::advise(&mut report, &evidence);
     clock.stage("verify");
     let EditedMesh { mesh, origins, .. } = edited;
     Ok(RepairedMesh { mesh, origins, report: clock.close(report, Held::path(), faces)? })

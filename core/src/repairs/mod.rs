@@ -25,7 +25,7 @@ use crate::contract::progress::{Latched, Progress};
 use crate::contract::report::{BoundaryLoops, Region, Regions};
 use crate::contract::settings::{Limits, Profile};
 use crate::diagnosis::Diagnosis;
-use crate::repairs::shared::account::Account;
+pub(crate) use crate::repairs::shared::account::Account;
 use crate::repairs::shared::context::Context;
 use crate::submesh::components::Reversed;
 

@@ -22,6 +22,7 @@ use crate::repairs::cleanup::sheets;
 use crate::repairs::cleanup::surplus;
 use crate::repairs::cleanup::surplus::complete_at_seams;
 use crate::repairs::holes::fill;
+use crate::repairs::holes::sheet_solids;
 use crate::repairs::holes::skirt;
 use crate::repairs::orient::directions;
 use crate::repairs::orient::hollow;
@@ -89,6 +90,7 @@ pub(crate) const ALL: &[Step] = &[
     Do(debris::REPAIR),
     Do(visibility::REPAIR),
     Do(directions::COHERENT),
+    Do(sheet_solids::REPAIR),
     Look(measure_volume),
     Do(skirt::REPAIR),
     Do(fill::REPAIR),
@@ -247,7 +249,7 @@ fn probe_bodies(cx: &mut Context<'_, '_>) {
 }
 
 fn tell_dust(cx: &mut Context<'_, '_>) {
-    let note = "bodies that cutting left, each of less than 2⁻⁴⁰ of all volume, dropped";
+    let note = "bodies that cutting left and no printer can see, dropped; listed in `regions`";
     cx.account.add(RepairName::Dust, cx.handed.dust, note.into(), 0.0);
 }
 

@@ -26,6 +26,7 @@ pub(crate) const REPAIR: Repair = Repair {
         let rims = std::mem::take(&mut cx.handed.sheets);
         let dropped = drop(cx.survey, &mut cx.work, &mut cx.reversed, &rims, &mut cx.account.loops_left, cx.profile);
         let count = dropped.len() as u64;
+        cx.account.open_sheets = rims.iter().filter(|rim| cx.work.lives(rim.triangle)).count() as u64;
         cx.account.sheets.extend(dropped);
         Ok(Done::count(count, "open sheets dropped that can be no part of a solid, listed in `sheets_dropped`"))
     },
@@ -41,7 +42,7 @@ pub(crate) fn drop(
     left: &mut Vec<LoopLeft>,
     profile: &Profile,
 ) -> Vec<SheetDropped> {
-    if rims.is_empty() || profile.sheets == Sheets::Keep {
+    if rims.is_empty() || profile.sheets != Sheets::Drop {
         return Vec::new();
     }
     let (submesh, edges) = work.edges();

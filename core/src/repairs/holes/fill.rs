@@ -85,7 +85,7 @@ pub(crate) fn fill_loops(
     threads: usize,
 ) -> Closed {
     let (submesh, edges) = work.edges();
-    let Boundary { loops: rims, chains } = loops::boundary(submesh, edges);
+    let Boundary { loops: rims, mut chains } = loops::boundary(submesh, edges);
     let shapes = Shapes::of(submesh, &rims, threads);
     let owners = Owners::of(survey, submesh, edges, reversed, &rims);
     let admission = Admission::of(survey, work, &rims, &shapes, reversed, tolerance, (profile, only_loop));
@@ -125,7 +125,9 @@ pub(crate) fn fill_loops(
     }
     balancing += (across.len() - first_balancing) as u64;
     let judged = closing.judge(survey, work, profile);
-    let mut closed = closing.finish(work);
+    let mut kept = Closed::default();
+    closing.keep_open(work, &mut chains, &mut kept);
+    let mut closed = closing.finish(work, kept);
     closed.judged = judged;
     if balancing > 0 {
         closed.loops += balancing;

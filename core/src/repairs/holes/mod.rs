@@ -5,4 +5,5 @@ pub(crate) mod fair;
 pub(crate) mod fill;
 pub(crate) mod islands;
 pub(crate) mod patches;
+pub(crate) mod sheet_solids;
 pub(crate) mod skirt;

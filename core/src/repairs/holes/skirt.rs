@@ -40,7 +40,7 @@ pub(crate) const REPAIR: Repair = Repair {
     changes: Changes::Surface,
     run: |cx| {
         let seated = let_down(cx.survey, &mut cx.work, &cx.reversed, cx.profile);
-        cx.handed.has_skirts = seated > 0;
+        cx.handed.has_skirts |= seated > 0;
         Ok(Done::count(seated, "rims of open shapes that stand on other surface, let down into it"))
     },
 };

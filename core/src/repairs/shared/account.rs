@@ -1,7 +1,7 @@
 //! What was done to a file, for its report.
 
 use crate::contract::report::{BoundaryLoops, LoopLeft, Region, Repair, RepairName, SheetDropped, Skin, Volumes, Wrap};
-use crate::detect::review::{Enclosed, Explained};
+use crate::detect::review::{Asked, Enclosed, Explained};
 
 /// What the report says of the repairs.
 #[derive(Default)]
@@ -18,6 +18,10 @@ pub(crate) struct Account {
     pub(crate) doubts: Vec<String>,
     /// Changes that nobody need look at.
     pub(crate) explained: Explained,
+    /// Rims of lone sheets that stay open.
+    pub(crate) open_sheets: u64,
+    /// What the profile asked to be added.
+    pub(crate) asked: Asked,
     /// What was replaced because nothing else made it a solid, or would have been.
     pub(crate) wraps: Vec<Wrap>,
     /// What became of the volume of bodies; `None` where nothing was done that might have lost any.

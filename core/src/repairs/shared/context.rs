@@ -77,7 +77,7 @@ pub(crate) struct Handed {
     pub(crate) only_loop: Option<[f32; 3]>,
     /// By triangle of the submesh: it is settled which way it faces. Of facing, for the orientation.
     pub(crate) settled: Vec<bool>,
-    /// Rims of open shapes were let down into what they stand on, so there is something to be cut.
+    /// Rims of open shapes were let down into what they stand on, or sheets made solid, so there may be something to be cut.
     pub(crate) has_skirts: bool,
     /// Rims of lone sheets, which no patch closes. Of the filling, for the dropping of sheets.
     pub(crate) sheets: Vec<SheetRim>,

@@ -383,9 +383,10 @@ fn dust_that_cutting_left_goes_and_is_named() {
         };
         resolved(&[cube(), slot(0), slot(1), slot(2)].concat())
     };
-    let (seen, dust) = ((-13f32).exp2(), (-14f32).exp2());
+    // A cube as thick as 2⁻¹³ of the diagonal, which is that of the slots, would have 1/525: a third of its size is its thickness.
+    let (seen, dust) = ((-9f32).exp2(), (-10f32).exp2());
     let got = slots(seen);
-    assert_eq!((got.result.dust.len(), got.defects.components), (0, 8), "a crumb of 2⁻³⁹ of a cube that is mostly left");
+    assert_eq!((got.result.dust.len(), got.defects.components), (0, 8), "a crumb that can be seen");
     let got = slots(dust);
     assert!(got.verdict.good, "{:?}", got.verdict);
     assert_eq!(got.defects.components, 7);

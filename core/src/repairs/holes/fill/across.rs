@@ -1,14 +1,15 @@
 //! Loops that no patch closes without crossing anything: slits, patches that are to be cut, and edges that lack a side.
 
-use super::closing::{Closing, Neighbours, NotFilled, SLIT, left};
+use super::closing::{Closed, Closing, Neighbours, NotFilled, SLIT, left};
 use crate::algorithms::triangulate::{self, Rim, Unfillable};
-use crate::contract::report::LoopLeft;
 use crate::contract::report::RepairName;
+use crate::contract::report::{LoopLeft, MOST_LISTED};
 use crate::detect::holes::unbalanced::unbalanced;
 use crate::geometry::exact::{self, Point};
 use crate::repairs::cleanup::degenerate;
 use crate::repairs::holes::patches::are_joined;
-use crate::repairs::shared::context::PatchAcross;
+use crate::repairs::shared::admission::NotAdmitted;
+use crate::repairs::shared::context::{PatchAcross, SheetRim};
 use crate::repairs::shared::work::Work;
 use crate::submesh::{Origin, Submesh, Vertex};
 use crate::util::ids::NONE;
@@ -56,7 +57,28 @@ impl Closing<'_> {
     pub(crate) fn unbalanced(&self, work: &mut Work<'_>) -> Vec<Vec<Vertex>> {
         let open = self.open.iter().map(|(rim, _)| self.rim(*rim));
         let (submesh, edges) = work.edges();
-        unbalanced(submesh, edges, open)
+        let mut ways = unbalanced(submesh, edges, open);
+        // What passes through a vertex of such a sheet runs along it.
+        ways.retain(|way| !submesh.star(way[0]).any(|(t, _)| self.admission.is_one_sided(t)));
+        ways
+    }
+
+    /// Chains of boundary edges of lone sheets that have one side only: what is left of their rims where these are no loops. Takes them out of
+    /// the others.
+    pub(crate) fn keep_open(&self, submesh: &Submesh, chains: &mut Vec<Vec<Vertex>>, closed: &mut Closed) {
+        chains.retain(|chain| {
+            let along = submesh.star(chain[0]).map(|(t, _)| t).filter(|t| submesh.triangles[*t as usize].v.contains(&chain[1]));
+            let Some(triangle) = along.min().filter(|t| self.admission.is_one_sided(*t)) else { return true };
+            let edges = chain.len() - 1;
+            let listed = (closed.left.len() < MOST_LISTED).then_some(closed.left.len());
+            closed.sheets.push(SheetRim { triangle, edges, listed });
+            closed.kept_open.push(submesh.positions[chain[0] as usize]);
+            if listed.is_some() {
+                let length = chain.windows(2).map(|w| submesh.distance(w[0], w[1])).sum();
+                closed.left.push(left(submesh, chain[0], edges, length, &NotAdmitted::Sheet));
+            }
+            false
+        });
     }
 
     /// Closes what is left as if nothing were in the way, each by a patch that may cross anything, itself included. Returns the triangles

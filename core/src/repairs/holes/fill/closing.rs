@@ -162,8 +162,10 @@ impl Closing<'_> {
         self.placed.push(placed);
     }
 
-    pub(crate) fn finish(mut self, work: &mut Work<'_>) -> Closed {
-        let mut closed = Closed { doubts: std::mem::take(&mut self.doubts), not_meant: self.not_meant, ..Closed::default() };
+    /// What came of it, after what is `closed` already.
+    pub(crate) fn finish(mut self, work: &mut Work<'_>, mut closed: Closed) -> Closed {
+        closed.doubts.append(&mut self.doubts);
+        closed.not_meant += self.not_meant;
         for patch in self.placed.iter().filter(|p| p.count > 0) {
             let loops = patch.rims.len() as u64;
             closed.loops += loops;
@@ -178,8 +180,8 @@ impl Closing<'_> {
         self.drop_idle_joints(work);
         self.open.sort_by_key(|(rim, _)| *rim);
         let kept = self.open.iter().filter(|(_, reason)| matches!(reason, NotFilled::NotAdmitted(_)));
-        closed.kept_open = kept.map(|(rim, _)| work.positions[self.rim(*rim).vertices[0] as usize]).collect();
-        for (i, (rim, reason)) in self.open.iter().enumerate() {
+        closed.kept_open.extend(kept.map(|(rim, _)| work.positions[self.rim(*rim).vertices[0] as usize]));
+        for (i, (rim, reason)) in (closed.left.len()..).zip(&self.open) {
             let rim = self.rim(*rim);
             if matches!(reason, NotFilled::NotAdmitted(NotAdmitted::Sheet)) {
                 let listed = (i < MOST_LISTED).then_some(i);

@@ -1,0 +1,357 @@
+//! Lone sheets: open surface that bounds no material, such as terrain, a folded layer, a Möbius strip.
+//!
+//! A sheet was meant to be one, or lacks everything but one side: whatever closes it turns it into a body that nobody drew. What is open and
+//! has a mouth that is wide against its surface is a sheet if one of these holds. (A vessel without its bottom is none: it encloses much, and all
+//! of its surface has material behind it.)
+//!
+//! * **Thin:** the patch would lie back along the surface, and enclose next to nothing for the surface's size.
+//! * **Torn:** a cone over each rim closes the surface, but a good part of it then has material on its front, where the air should be: the surface
+//!   passes through its own patch, which would cut it into splinters.
+//! * **One-sided:** no orientation satisfies its edges, and, cut open where they disagree, it is torn, or what would close it is larger than it is.
+//!   (A body of which a few triangles are glued on the wrong way has no such mouth.)
+
+use glam::DVec3;
+
+use crate::algorithms::wrap::tree::{Corners, Tree};
+use crate::detect::holes::{Shapes, loops::Loop};
+use crate::geometry::distance::place;
+use crate::geometry::position::{self, Position};
+use crate::submesh::Submesh;
+use crate::submesh::components::{Components, Reversed, Through};
+use crate::submesh::edges::Edges;
+use crate::topology::survey::Survey;
+use crate::util::ids::NONE;
+use crate::util::{parallel, union_find};
+
+/// A patch lies back along the surface if it continues it by less than this ([`Shapes::continues`]).
+const LIES_BACK: f64 = -0.5;
+/// A mouth is wide from this share of the surface on: the patch of a sheet is about as large as the sheet.
+const WIDE: f64 = 0.25;
+/// A sheet encloses less than this share of its size: the root of the area of one side, cubed. A plate that rises by a fiftieth of its width
+/// on average.
+pub(crate) const THIN: f64 = 0.02;
+/// Torn is what has its front inside on this share of its area at least, and on no more than the rest of it.
+const TORN: f64 = 1.0 / 16.0;
+/// Of what is torn, rims are left open whose patch is at least this share of the surface. Others are holes in the sheet.
+const OF_A_SHEET: f64 = 0.05;
+/// What is less of the whole area than this is as well closed as left open.
+const SUBSTANTIAL: f64 = 0.01;
+/// Components that are looked at triangle by triangle, at most, the largest first, and triangles of all of them: some 100 bytes each.
+const MOST_LOOKED_AT: usize = 256;
+const MOST_TRIANGLES: u64 = 1 << 21;
+/// Triangles of a component that are asked what is behind them, at most.
+const SAMPLES: usize = 1 << 11;
+
+/// What counts.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Which {
+    Sheets,
+    /// Reliefs as well: what rises from its rim, so that a flat patch would enclose something.
+    Reliefs,
+}
+
+/// The lone sheets of a submesh.
+#[derive(Debug, Default)]
+pub(crate) struct LoneSheets {
+    /// First vertices of their rims, ascending.
+    pub(crate) rims: Vec<u32>,
+    /// By triangle of the submesh: it is part of a sheet that has one side only, whose rim may be no loop. Empty: there is none.
+    pub(crate) one_sided: Vec<bool>,
+}
+
+/// What is known of a component.
+#[derive(Clone, Copy, Default)]
+struct Mouth {
+    /// Of the surface, and of the cones over its rims.
+    area: f64,
+    cones: f64,
+    /// What it encloses with them.
+    volume: f64,
+    is_one_sided: bool,
+    /// Several surfaces meet in an edge of it, or edges are in no loop: it is no sheet, or nothing is known of what would close it.
+    is_unclear: bool,
+}
+
+impl Mouth {
+    fn is_wide(&self) -> bool {
+        self.cones >= WIDE * self.area
+    }
+
+    fn is_thin(&self) -> bool {
+        self.volume.abs() < THIN * ((self.area + self.cones) / 2.0).powi(3).sqrt()
+    }
+}
+
+/// Finds the lone sheets among what is open. O(regions + submesh) if there are `loops` or edges that disagree, and a look at the chunks of components
+/// that have a wide mouth.
+pub(crate) fn recognise(
+    survey: &Survey<'_>,
+    submesh: &Submesh,
+    edges: &Edges,
+    loops: &[Loop],
+    shapes: &Shapes,
+    reversed: &Reversed,
+    which: Which,
+) -> LoneSheets {
+    let one_sided = one_sided(survey, submesh, edges);
+    if loops.is_empty() && one_sided.is_empty() {
+        return LoneSheets::default();
+    }
+    let components = Components::of(survey, submesh, edges, reversed, Through::EveryEdge);
+    let all = Mouths::of(survey, submesh, edges, &components, (loops, shapes), &one_sided);
+    let torn = all.torn(survey, submesh, &components, reversed);
+    let mut rims: Vec<u32> = Vec::new();
+    for (i, rim) in loops.iter().enumerate() {
+        let component = components.of_triangle[rim.triangles[0] as usize];
+        let Some(mouth) = all.mouths.get(component as usize) else { continue };
+        let lies_back = all.continues[i] < LIES_BACK && all.cone_of[i] >= WIDE * mouth.area;
+        let is_of_sheet = all.cone_of[i] >= OF_A_SHEET * mouth.area;
+        let is_torn = torn[component as usize];
+        let bounds_nothing = which == Which::Reliefs || mouth.is_thin();
+        if lies_back && bounds_nothing || is_torn && (is_of_sheet || mouth.is_one_sided) {
+            rims.push(rim.vertices[0]);
+        }
+    }
+    rims.sort_unstable();
+    let is_lone = |component: u32| component != NONE && torn[component as usize] && all.mouths[component as usize].is_one_sided;
+    let mut of_one_sided: Vec<bool> = components.of_triangle.iter().map(|component| is_lone(*component)).collect();
+    if !of_one_sided.contains(&true) {
+        of_one_sided.clear();
+    }
+    LoneSheets { rims, one_sided: of_one_sided }
+}
+
+/// All components, and what closes them.
+struct Mouths {
+    mouths: Vec<Mouth>,
+    /// By loop.
+    cone_of: Vec<f64>,
+    continues: Vec<f64>,
+    /// Triangles of the cones, with their components.
+    cones: Vec<(u32, Corners)>,
+}
+
+impl Mouths {
+    fn of(
+        survey: &Survey<'_>,
+        submesh: &Submesh,
+        edges: &Edges,
+        components: &Components,
+        (loops, shapes): (&[Loop], &Shapes),
+        one_sided: &[bool],
+    ) -> Self {
+        let of = |c: &crate::submesh::components::Component| Mouth {
+            area: survey.measure.area(c.extent),
+            volume: survey.measure.volume(c.extent),
+            ..Mouth::default()
+        };
+        let mouths = components.list.iter().map(of).collect();
+        let mut all = Self { mouths, cone_of: Vec::new(), continues: shapes.continues().collect(), cones: Vec::new() };
+        for t in submesh.living().filter(|t| one_sided.get(*t as usize) == Some(&true)) {
+            if let Some(mouth) = all.mouths.get_mut(components.of_triangle[t as usize] as usize) {
+                mouth.is_one_sided = true;
+            }
+        }
+        let middle = survey.measure.middle();
+        let mut open_edges = vec![0usize; components.list.len()];
+        for rim in loops {
+            let component = components.of_triangle[rim.triangles[0] as usize];
+            let n = rim.vertices.len();
+            let ways: Vec<[u32; 2]> = (0..n).map(|i| [rim.vertices[i], rim.vertices[(i + 1) % n]]).collect();
+            let (volume, area, cone) = cone(submesh, &ways, middle);
+            all.cone_of.push(area);
+            let Some(mouth) = all.mouths.get_mut(component as usize).filter(|mouth| !mouth.is_one_sided) else { continue };
+            open_edges[component as usize] += n;
+            mouth.cones += area;
+            mouth.volume += volume;
+            all.cones.extend(cone.into_iter().map(|corners| (component, corners)));
+        }
+        all.close_the_rest(submesh, edges, components, (open_edges, middle));
+        all
+    }
+
+    /// Where edges lack a side and are in no loop, nothing is known, unless the component is one-sided: then all of them are closed by one cone, those
+    /// that disagree as if the surface were cut open there.
+    fn close_the_rest(
+        &mut self,
+        submesh: &Submesh,
+        edges: &Edges,
+        components: &Components,
+        (mut in_loops, middle): (Vec<usize>, DVec3),
+    ) {
+        let mut rest: Vec<(u32, [u32; 2])> = Vec::new();
+        for edge in edges.iter().filter(|edge| edge.is_unbalanced() || edge.is_nonmanifold()) {
+            let component = components.of_triangle[edge.uses[0].triangle as usize];
+            let Some(mouth) = self.mouths.get_mut(component as usize) else { continue };
+            mouth.is_unclear |= edge.is_nonmanifold();
+            if !edge.is_unbalanced() {
+                continue;
+            }
+            if !mouth.is_one_sided {
+                match in_loops[component as usize].checked_sub(1) {
+                    Some(left) => in_loops[component as usize] = left,
+                    None => mouth.is_unclear = true,
+                }
+                continue;
+            }
+            for used in edge.uses {
+                let (from, to) = edge.directed(used);
+                rest.push((component, [to, from]));
+            }
+        }
+        rest.sort_by_key(|(component, _)| *component);
+        for group in rest.chunk_by(|a, b| a.0 == b.0) {
+            let component = group[0].0;
+            let ways: Vec<[u32; 2]> = group.iter().map(|(_, way)| *way).collect();
+            let (volume, area, cone) = cone(submesh, &ways, middle);
+            let mouth = &mut self.mouths[component as usize];
+            mouth.cones += area;
+            mouth.volume += volume;
+            self.cones.extend(cone.into_iter().map(|corners| (component, corners)));
+        }
+    }
+
+    /// Which components pass through what would close them, or are one-sided and have hardly more than a rim.
+    fn torn(&self, survey: &Survey<'_>, submesh: &Submesh, components: &Components, reversed: &Reversed) -> Vec<bool> {
+        let least = SUBSTANTIAL * self.mouths.iter().map(|mouth| mouth.area).sum::<f64>();
+        let may_be = |mouth: &Mouth| mouth.area >= least && mouth.is_wide() && !mouth.is_unclear;
+        let mut torn: Vec<bool> =
+            self.mouths.iter().map(|mouth| may_be(mouth) && mouth.is_one_sided && mouth.cones >= mouth.area).collect();
+        let is_asked = |c: &usize| may_be(&self.mouths[*c]) && !torn[*c];
+        let mut asked: Vec<usize> = (0..self.mouths.len()).filter(is_asked).collect();
+        asked.sort_by_key(|c| std::cmp::Reverse(components.list[*c].extent.area));
+        asked.truncate(MOST_LOOKED_AT);
+        let mut room = MOST_TRIANGLES;
+        asked.retain(|c| {
+            let triangles = components.list[*c].triangles;
+            let fits = triangles <= room;
+            room -= if fits { triangles } else { 0 };
+            fits
+        });
+        asked.sort_unstable();
+        let mut all = gather(survey, submesh, components, reversed, &asked);
+        for (component, corners) in &self.cones {
+            if let Ok(place) = asked.binary_search(&(*component as usize)) {
+                all[place].1.push(*corners);
+            }
+        }
+        for (c, (surface, cones)) in asked.into_iter().zip(all) {
+            torn[c] = is_torn(surface, &cones, survey.threads());
+        }
+        torn
+    }
+}
+
+/// The volume under a cone over some edges, as seen from a point, its area, and its triangles.
+fn cone(submesh: &Submesh, ways: &[[u32; 2]], from: DVec3) -> (f64, f64, Vec<Corners>) {
+    let sum: DVec3 = ways.iter().map(|[a, _]| submesh.place(*a)).sum();
+    let tip = Position::nearest(sum / ways.len() as f64);
+    let centre = place(tip.coordinates());
+    let (mut volume, mut area) = (0.0, 0.0);
+    let mut triangles = Vec::with_capacity(ways.len());
+    for way in ways {
+        let [a, b] = way.map(|v| submesh.place(v));
+        let normal = (a - centre).cross(b - centre);
+        volume += (centre - from).dot(normal) / 6.0;
+        area += normal.length() / 2.0;
+        triangles.push([tip.coordinates(), submesh.positions[way[0] as usize], submesh.positions[way[1] as usize]]);
+    }
+    (volume, area, triangles)
+}
+
+/// The triangles of some components, ascending, in the order of the file as they are turned now, each with room for what closes them.
+pub(crate) fn gather(
+    survey: &Survey<'_>,
+    submesh: &Submesh,
+    components: &Components,
+    reversed: &Reversed,
+    wanted: &[usize],
+) -> Vec<(Vec<Corners>, Vec<Corners>)> {
+    let mut gathered: Vec<(Vec<Corners>, Vec<Corners>)> = wanted.iter().map(|_| (Vec::new(), Vec::new())).collect();
+    if wanted.is_empty() {
+        return gathered;
+    }
+    let group = |component: u32| wanted.binary_search(&(component as usize)).ok();
+    let of_region = |region: u32| group(components.of_region[region as usize]);
+    let found = survey.visit_regular(
+        |region| of_region(region).is_some(),
+        |_| Some(Vec::new()),
+        |_, _| true,
+        |list: &mut Vec<(u32, u32, u32)>, record, region| list.push((record, region, NONE)),
+    );
+    let mut all: Vec<(u32, u32, u32)> = found.into_iter().flatten().collect();
+    let of_triangle = |t: u32| components.of_triangle[t as usize];
+    let in_submesh = submesh.living().filter(|t| of_triangle(*t) != NONE && group(of_triangle(*t)).is_some());
+    all.extend(in_submesh.map(|t| (submesh.record(t), NONE, t)));
+    all.sort_unstable();
+    for (record, region, t) in all {
+        let (place, corners) = if t == NONE {
+            let [a, b, c] = position::corners(&survey.records[record as usize]);
+            (of_region(region), if reversed.regions[region as usize] { [a, c, b] } else { [a, b, c] })
+        } else {
+            (group(of_triangle(t)), submesh.points(t))
+        };
+        if let Some(place) = place {
+            gathered[place].0.push(corners);
+        }
+    }
+    gathered
+}
+
+/// Does a surface, with what closes it, have its front inside on a good part of it?
+fn is_torn(mut surface: Vec<Corners>, cones: &[Corners], threads: usize) -> bool {
+    let count = surface.len();
+    surface.extend_from_slice(cones);
+    let tree = Tree::winding(&surface);
+    let step = count.div_ceil(SAMPLES).max(1);
+    // The area of a triangle, and whether the surface winds around what is right behind it.
+    let samples = parallel::map(threads, count.div_ceil(step), |i| {
+        let [a, b, c] = surface[i * step].map(place);
+        let normal = (b - a).cross(c - a);
+        let off = normal.normalize_or_zero() * (OFF * normal.length().sqrt());
+        (normal.length(), tree.winding_number((a + b + c) / 3.0 - off) > 0.5)
+    });
+    let all: f64 = samples.iter().map(|(area, _)| area).sum();
+    let behind: f64 = samples.iter().filter(|(_, is_inside)| *is_inside).map(|(area, _)| area).sum();
+    behind.min(all - behind) > TORN * all
+}
+
+/// How far behind a triangle it is asked, in roots of twice its area.
+const OFF: f64 = 1e-2;
+
+/// By triangle of the submesh: no orientation satisfies the edges of the surface that it is part of. Empty if that is so nowhere. O(regions + submesh) if any
+/// edges disagree.
+fn one_sided(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges) -> Vec<bool> {
+    if !edges.iter().any(|edge| edge.is_inconsistent()) {
+        return Vec::new();
+    }
+    // Each region and triangle stands for itself as it is, and turned.
+    let regions = survey.regions.len() as u32;
+    let count = regions + submesh.triangles.len() as u32;
+    let mut parents: Vec<u32> = (0..2 * count).collect();
+    let mut relate = |a: u32, b: u32, disagree: bool| {
+        let turned = if disagree { count } else { 0 };
+        union_find::unite(&mut parents, a, b + turned);
+        union_find::unite(&mut parents, a + count, b + count - turned);
+    };
+    for t in submesh.living() {
+        let region = submesh.triangles[t as usize].region;
+        if region != NONE {
+            relate(region, regions + t, false);
+        }
+    }
+    for edge in edges.iter() {
+        if let [a, b] = edge.uses {
+            relate(regions + a.triangle, regions + b.triangle, edge.is_inconsistent());
+        }
+    }
+    let mut is_one_sided = |t: u32| {
+        let node = regions + t;
+        submesh.lives(t) && union_find::find(&mut parents, node) == union_find::find(&mut parents, node + count)
+    };
+    let found: Vec<bool> = (0..submesh.triangles.len() as u32).map(&mut is_one_sided).collect();
+    if found.contains(&true) { found } else { Vec::new() }
+}
+
+#[cfg(test)]
+mod tests;

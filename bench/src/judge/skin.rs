@@ -98,7 +98,7 @@ fn area(triangle: &Triangle) -> f64 {
     length(cross(minus(b, a), minus(c, a))) / 2.0
 }
 
-/// Directions spread evenly over a sphere.
+/// Directions spread evenly over a sphere, those that follow each other far apart, so that a way out is soon found.
 fn directions() -> Vec<Vector> {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     let at = |k: usize| {
@@ -107,7 +107,7 @@ fn directions() -> Vec<Vector> {
         let r = (1.0 - z * z).sqrt();
         [r * c, r * s, z]
     };
-    (0..RAYS).map(at).collect()
+    (0..RAYS).map(|k| at(k * 37 % RAYS)).collect()
 }
 
 /// One mesh, seen from outside, and what of it is far from the other.

@@ -80,18 +80,19 @@ impl Near {
 
     /// Does a ray meet a triangle farther than `least` along it (in lengths of `to`)?
     pub fn is_met(&self, from: Vector, to: Vector, least: f64) -> bool {
-        !self.triangles.is_empty() && self.meets(from, to, least, 0, 0, self.triangles.len())
+        let ray = Ray { from, to, per: to.map(|x| 1.0 / x), least };
+        !self.triangles.is_empty() && self.meets(&ray, 0, 0, self.triangles.len())
     }
 
-    fn meets(&self, from: Vector, to: Vector, least: f64, node: usize, low: usize, high: usize) -> bool {
-        if !passes(from, to, self.boxes[node]) {
+    fn meets(&self, ray: &Ray, node: usize, low: usize, high: usize) -> bool {
+        if !ray.passes(self.boxes[node]) {
             return false;
         }
         if high - low <= LEAF {
-            return self.triangles[low..high].iter().any(|t| along(from, to, *t).is_some_and(|far| far > least));
+            return self.triangles[low..high].iter().any(|t| along(ray.from, ray.to, *t).is_some_and(|far| far > ray.least));
         }
         let middle = (low + high) / 2;
-        self.meets(from, to, least, 2 * node + 1, low, middle) || self.meets(from, to, least, 2 * node + 2, middle, high)
+        self.meets(ray, 2 * node + 1, low, middle) || self.meets(ray, 2 * node + 2, middle, high)
     }
 
     fn to_box(&self, p: Vector, node: usize) -> f64 {
@@ -118,17 +119,27 @@ fn to_segment(p: Vector, a: Vector, b: Vector) -> f64 {
     length(std::array::from_fn(|k| w[k] - t * u[k]))
 }
 
-/// Does a ray pass a box?
-fn passes(from: Vector, to: Vector, [lo, hi]: [Vector; 2]) -> bool {
-    let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
-    for k in 0..3 {
-        let (a, b) = ((lo[k] - from[k]) / to[k], (hi[k] - from[k]) / to[k]);
-        if a.is_nan() || b.is_nan() {
-            continue;
+/// A ray that is looked for in boxes.
+struct Ray {
+    from: Vector,
+    to: Vector,
+    /// One over each coordinate of `to`.
+    per: Vector,
+    least: f64,
+}
+
+impl Ray {
+    /// Does it pass a box? Where it runs within the plane of a side, those two sides do not decide.
+    fn passes(&self, [lo, hi]: [Vector; 2]) -> bool {
+        let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
+        for k in 0..3 {
+            let (a, b) = ((lo[k] - self.from[k]) * self.per[k], (hi[k] - self.from[k]) * self.per[k]);
+            if !a.is_nan() && !b.is_nan() {
+                (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
+            }
         }
-        (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
+        enter <= leave
     }
-    enter <= leave
 }
 
 /// How far along a ray is a triangle, if the ray meets it?

@@ -9,7 +9,7 @@
 //!
 //! O(n log n) time, and rays only from points that are far, and from each 32nd point for the whole of what can be seen.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::judgement::Triangle;
 use super::near::Near;
@@ -98,16 +98,16 @@ fn area(triangle: &Triangle) -> f64 {
     length(cross(minus(b, a), minus(c, a))) / 2.0
 }
 
-/// Directions spread evenly over a sphere.
+/// Directions spread evenly over a sphere, those that follow each other far apart, so that a way out is soon found.
 fn directions() -> Vec<Vector> {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     let at = |k: usize| {
         let z = 1.0 - (2.0 * k as f64 + 1.0) / RAYS as f64;
-        let (s, c) = (golden * k as f64).sin_cos();
+        let (s, c) = (golden * (k as f64 + 0.5)).sin_cos();
         let r = (1.0 - z * z).sqrt();
         [r * c, r * s, z]
     };
-    (0..RAYS).map(at).collect()
+    (0..RAYS).map(|k| at(k * 37 % RAYS)).collect()
 }
 
 /// One mesh, seen from outside, and what of it is far from the other.
@@ -129,9 +129,12 @@ fn look(mesh: &[Triangle], other: &[Triangle], diagonal: f64) -> Look {
     };
     let (mut seen, mut looked, mut far, all) = (0, 0, Vec::new(), points(mesh));
     let count = all.len() as f64;
+    // What stands in both is nowhere far away.
+    let standing: HashSet<_> = other.iter().map(corners).collect();
+    let stands: Vec<bool> = mesh.iter().map(|triangle| standing.contains(&corners(triangle))).collect();
     for (number, point) in all.into_iter().enumerate() {
         let is_probe = number.is_multiple_of(PROBE);
-        let distance = there.distance_above(point.at, FAR * diagonal);
+        let distance = if stands[point.triangle] { 0.0 } else { there.distance_above(point.at, FAR * diagonal) };
         let is_far = distance > FAR * diagonal;
         if !is_probe && !is_far {
             continue;
@@ -146,11 +149,18 @@ fn look(mesh: &[Triangle], other: &[Triangle], diagonal: f64) -> Look {
     Look { seen: count * f64::from(seen) / f64::from(looked.max(1)), far }
 }
 
+/// A triangle by its exact corners, in whatever direction.
+fn corners(triangle: &Triangle) -> [[u32; 3]; 3] {
+    let mut corners = triangle.map(|p| p.map(|x| (x + 0.0).to_bits()));
+    corners.sort_unstable();
+    corners
+}
+
 /// Judges what became of the skin of `before`.
 pub fn skin(before: &[Triangle], after: &[Triangle]) -> Skin {
     let [lo, hi] = bounds(before.as_flattened().iter().map(|p| wide(*p)));
     let diagonal = length(minus(hi, lo));
-    if before.is_empty() || !(diagonal > 0.0) {
+    if before.is_empty() || diagonal <= 0.0 {
         return Skin::default();
     }
     let lost = look(before, after, diagonal);

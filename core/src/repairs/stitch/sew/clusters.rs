@@ -101,9 +101,7 @@ impl<'m> Taken<'m> {
     fn hangs_together(&mut self, v: Vertex, w: Vertex, reach: &[f64]) -> bool {
         let (Some(a), Some(b)) = (self.root(v), self.root(w)) else { return false };
         let (a, b) = (&self.members[a as usize], &self.members[b as usize]);
-        a.iter().all(|x| {
-            b.iter().all(|y| self.submesh.distance(*x, *y) <= 2.0 * reach[*x as usize].min(reach[*y as usize]))
-        })
+        a.iter().all(|x| b.iter().all(|y| self.submesh.distance(*x, *y) <= 2.0 * reach[*x as usize].min(reach[*y as usize])))
     }
 
     fn clusters(self) -> Vec<Vec<Vertex>> {

@@ -26,10 +26,10 @@ pub(crate) const REPAIR: Repair = Repair {
     run: |cx| {
         let sewn = sew(cx.survey, &mut cx.work, cx.tolerance, cx.profile);
         let note = format!(
-            "vertices of rims that run along each other, joined beyond the weld tolerance: at first by up to {:.3e}, with {} splits",
-            sewn.widest, sewn.splits
+            "vertices of rims that run along each other, joined beyond the weld tolerance, and edges split for that ({}); the farthest lay {:.3e} apart",
+            sewn.splits, sewn.widest
         );
-        Ok(Done::count(sewn.vertices, note))
+        Ok(Done::count(sewn.vertices + sewn.splits, note))
     },
 };
 

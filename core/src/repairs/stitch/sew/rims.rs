@@ -7,8 +7,9 @@
 //!   turned over;
 //! * their triangles part: where they end in about the same direction, as the two skins of a thin wall do, they lead away from the edge by
 //!   much more than they lie apart now, as at the edge of a wedge;
-//! * not both belong to bodies with a hole, unless to the same one or within the first step: there may be a clearance between them. A body
-//!   with a hole has more area than a flat piece can have within such rims (the isoperimetric inequality).
+//! * not both belong to bodies with holes, unless to the same one or within the first step: there may be a clearance between them. A body
+//!   with holes has more area than a flat piece can have within a rim as long as all of its rims together (the isoperimetric inequality). For
+//!   edges that do not run against each other, as those of the two walls of a clearance, within each rim for itself.
 
 use std::f64::consts::PI;
 
@@ -19,10 +20,11 @@ use crate::geometry::distance::cosine;
 use crate::geometry::sums::Bounds;
 use crate::repairs::stitch::sew::Width;
 use crate::submesh::components::{Components, Reversed, Through};
-use crate::submesh::edges::Edges;
+use crate::submesh::edges::{Edge, Edges};
 use crate::submesh::near::around;
 use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
+use crate::util::union_find;
 
 /// Less evidence, less reach.
 const UNSURE: f64 = 0.1;
@@ -64,8 +66,8 @@ pub(crate) struct Rims {
     /// By vertex: within which distance it may find its partner. 0 but for boundary vertices.
     pub(crate) reach: Vec<f64>,
     of_triangle: Vec<u32>,
-    /// By component: a body with a hole.
-    is_body: Vec<bool>,
+    /// By component: a body with holes, by all rims together, and by each.
+    is_body: Vec<[bool; 2]>,
     is_crack: bool,
 }
 
@@ -74,13 +76,9 @@ impl Rims {
     pub(crate) fn of(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, width: &Width, left_open: &[Vertex]) -> Self {
         let components = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::EveryEdge);
         let mut reach = vec![0.0; submesh.positions.len()];
-        let mut perimeters = vec![0.0; components.list.len()];
         let mut rims = Vec::new();
         for (edge, number) in edges.iter().zip(0..).filter(|(e, _)| e.is_boundary()) {
             let triangle = edge.uses[0].triangle;
-            if let Some(perimeter) = perimeters.get_mut(components.of_triangle[triangle as usize] as usize) {
-                *perimeter += submesh.distance(edge.low, edge.high);
-            }
             let (from, to) = edge.directed(&edge.uses[0]);
             if [from, to].iter().all(|v| left_open.binary_search(v).is_ok()) {
                 continue;
@@ -92,24 +90,19 @@ impl Rims {
             }
             rims.push(RimEdge { ends: [from, to], triangle, number, inward: inward(submesh, triangle, [from, to]) });
         }
-        let is_body = components
-            .list
-            .iter()
-            .zip(&perimeters)
-            .map(|(c, perimeter)| survey.measure.area_of(c.extent.area) > perimeter * perimeter / (4.0 * PI))
-            .collect();
+        let is_body = bodies(survey, submesh, edges, &components);
         Self { edges: rims, reach, of_triangle: components.of_triangle, is_body, is_crack: width.is_crack }
     }
 
-    /// May these two edges become one, if their ends lie so far apart?
-    pub(crate) fn may_join(&self, a: &RimEdge, b: &RimEdge, apart: f64) -> bool {
+    /// May these two edges, which run against each other or not, become one, if their ends lie so far apart?
+    pub(crate) fn may_join(&self, a: &RimEdge, b: &RimEdge, against: bool, apart: f64) -> bool {
         let alike = cosine(a.inward, b.inward);
         let parts = alike <= ALIKE || {
             let height = a.inward.length().min(b.inward.length());
             height * (1.0 - alike * alike).max(0.0).sqrt() >= PART * apart
         };
         let [of_a, of_b] = [a, b].map(|e| self.of_triangle[e.triangle as usize]);
-        let body = |c: u32| self.is_body.get(c as usize) == Some(&true);
+        let body = |c: u32| self.is_body.get(c as usize).is_some_and(|is| is[usize::from(!against)]);
         parts && a.triangle != b.triangle && (self.is_crack || of_a == of_b || !body(of_a) || !body(of_b))
     }
 
@@ -155,8 +148,32 @@ impl Rims {
             Some(width) => (width, true),
             None => (self.apart(submesh, a.ends, [from, to], UNSURE)?, false),
         };
-        self.may_join(a, b, width).then_some(Match { width, edges, against })
+        self.may_join(a, b, against, width).then_some(Match { width, edges, against })
     }
+}
+
+/// Which components are bodies with holes, by all rims together and by each.
+fn bodies(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, components: &Components) -> Vec<[bool; 2]> {
+    let rims: Vec<_> = edges.iter().filter(|e| e.is_boundary()).collect();
+    let mut parents: Vec<u32> = (0..submesh.positions.len() as u32).collect();
+    rims.iter().for_each(|e| {
+        union_find::unite(&mut parents, e.low, e.high);
+    });
+    let of = |e: &Edge<'_>| components.of_triangle[e.uses[0].triangle as usize];
+    let mut lengths: Vec<(u32, u32, f64)> =
+        rims.iter().map(|e| (of(e), union_find::find(&mut parents, e.low), submesh.distance(e.low, e.high))).collect();
+    lengths.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2)));
+    let disc = |perimeter: f64| perimeter * perimeter / (4.0 * PI);
+    let sum = |rim: &[(u32, u32, f64)]| rim.iter().map(|(_, _, length)| length).sum::<f64>();
+    let mut all = vec![[false; 2]; components.list.len()];
+    for own in lengths.chunk_by(|a, b| a.0 == b.0) {
+        if let Some(component) = components.list.get(own[0].0 as usize) {
+            let area = survey.measure.area_of(component.extent.area);
+            let each: f64 = own.chunk_by(|a, b| a.1 == b.1).map(|rim| disc(sum(rim))).sum();
+            all[own[0].0 as usize] = [area > disc(sum(own)), area > each];
+        }
+    }
+    all
 }
 
 /// From an edge of a triangle to its opposite corner, square to the edge.

@@ -49,7 +49,7 @@ impl Along<'_> {
         self.at_vertex[from..].iter().take_while(|(v, _)| *v == on.vertex).any(|(_, i)| {
             let other = &self.rims.edges[*i as usize];
             let next = if other.ends[0] == on.vertex { other.ends[1] } else { other.ends[0] };
-            self.runs_along(edge, other, next).is_some_and(|apart| self.rims.may_join(edge, other, apart.max(on.distance)))
+            self.runs_along(edge, other, next).is_some_and(|apart| self.rims.may_join(edge, other, true, apart.max(on.distance)))
         })
     }
 

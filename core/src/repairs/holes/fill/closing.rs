@@ -1,5 +1,6 @@
 //! The loops of a submesh while they are closed: patches that are in, and loops that are open, with the reason.
 
+use super::doubts;
 use crate::algorithms::triangulate::{self, FillSettings, Rim, Unfillable, strip};
 use crate::contract::report::{LoopLeft, MOST_LISTED};
 use crate::detect::holes::{self, loops::Loop};
@@ -123,7 +124,11 @@ impl Closing<'_> {
     }
 
     pub(crate) fn finish(mut self, work: &mut Work<'_>) -> Closed {
-        let mut closed = Closed { doubts: std::mem::take(&mut self.doubts), not_meant: self.not_meant, ..Closed::default() };
+        let mut closed = Closed {
+            doubts: doubts::summed_up(std::mem::take(&mut self.doubts)),
+            not_meant: self.not_meant,
+            ..Closed::default()
+        };
         for patch in self.placed.iter().filter(|p| p.count > 0) {
             let loops = patch.rims.len() as u64;
             closed.loops += loops;

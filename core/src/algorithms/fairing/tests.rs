@@ -387,7 +387,7 @@ fn two_ridges_go_on_through_one_hole() {
         assert!((f64::from(p[2]) - z).abs() < 1e-5, "{p:?}");
     }
     for ridge in [4.0, 8.0] {
-        assert!(shaped.added.iter().filter(|p| (p[0] - ridge).abs() < 1e-5).count() >= 3, "{ridge}");
+        assert!(shaped.added.iter().filter(|p| (p[0] - ridge).abs() < 1e-5).count() >= 2, "{ridge}");
     }
 }
 

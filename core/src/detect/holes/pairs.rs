@@ -60,8 +60,10 @@ const HOLE: f64 = 0.7;
 /// Outlines of holes back to back agree as long as no vertex is farther from the other outline, seen along the axis, than this share of the
 /// larger radius: circles of eight facets do.
 const OUTLINE: f64 = 0.15;
-/// And outlines of openings in two bodies, if these were one: what broke may be turned aside a little.
-const ALIKE_OUTLINE: f64 = 0.35;
+/// And outlines of openings in two bodies, if these were one: what broke may lean, and be turned aside a little.
+const ALIKE_OUTLINE: f64 = 0.5;
+/// The smaller one of these openings has at least this share of the larger one's area.
+const ALIKE_AREA: f64 = 0.6;
 /// Cosine between the vector areas of a hole and an island in it, at most: an island is small, and may lie on a slope.
 const ISLAND_OPPOSITE: f64 = -0.2;
 /// An island lies no farther from the plane of its hole than this share of the hole's size.
@@ -120,7 +122,9 @@ impl Ring {
     /// surface that faces the other one's is one of each. Skins that face each other bound the air between the bodies, unless two caps
     /// would lie on each other.
     fn may_join_bodies(&self, rims: [&Shape; 2]) -> bool {
-        let open = rims.iter().all(|rim| rim.continues <= MOSTLY_OPEN) && outlines_agree(rims[0], rims[1], ALIKE_OUTLINE);
+        let [a, b] = rims;
+        let alike = a.area().min(b.area()) >= ALIKE_AREA * a.area().max(b.area()) && outlines_agree(a, b, ALIKE_OUTLINE);
+        let open = alike && rims.iter().all(|rim| rim.continues <= MOSTLY_OPEN);
         match self.missing {
             Missing::Tube | Missing::OneSurface => open,
             Missing::Floor => open && self.level,

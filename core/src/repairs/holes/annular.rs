@@ -249,7 +249,7 @@ mod tests {
         let mut shell: Vec<[f32; 2]> = arc(8.25, 20).collect();
         shell.reverse();
         let inside = turned(&shell, 24);
-        let outside = turned(&arc(12.0, 24).collect::<Vec<_>>(), 24);
+        let outside = turned(&arc(12.0, 23).chain([[0.0, 12.0]]).collect::<Vec<_>>(), 24);
         let got = closed(&[ball, inside, outside].concat());
         assert_eq!((closed_by(&got, "annular"), got.result.loops, got.defects.components), (0, 2, 3), "{:?}", got.result);
         assert!(got.verdict.good, "{:?}", got.verdict);

@@ -12,6 +12,7 @@ use crate::repairs::shared::overlay::{Overlay, Standing, Which};
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::topology::survey::Survey;
+use crate::util::ids::NONE;
 use crate::util::union_find;
 
 /// A triangle that a patch crosses.
@@ -64,7 +65,7 @@ pub(crate) fn crossed(
         .iter()
         .filter_map(|pair| Some([*of_record.get(&pair.triangles[0])?, *of_record.get(&pair.triangles[1])?]))
         .flat_map(|[a, b]| [[a, b], [b, a]])
-        .filter(|[a, b]| a != b)
+        .filter(|[a, b]| a != b && *a != NONE && *b != NONE)
         .collect();
     met.sort_unstable();
     met.dedup();
@@ -80,7 +81,7 @@ pub(crate) fn crossed(
     let mut known = HashSet::new();
     for (patch, of_patch, other) in blamed {
         let corners = overlay.corners(survey, submesh, other);
-        let of_both = component(of_patch).zip(component(other));
+        let of_both = component(of_patch).zip(component(other)).filter(|(a, b)| *a != NONE && *b != NONE);
         let obstacle = Obstacle {
             corners,
             met_already: of_both.is_some_and(|(a, b)| met.binary_search(&[a, b]).is_ok()),

@@ -285,7 +285,7 @@ mod tests {
         // The right side of a slit of nine vertices stands off evenly, or is jagged.
         let open = |jag: f32| -> Vec<Corners> {
             let off = |p: [f32; 3]| match p {
-                [12.0, y, z] if (2.0..=10.0).contains(&y) => [12.05, y, z + if (y as u8).is_multiple_of(2) { jag } else { -jag }],
+                [12.0, y, z] if (2.0..=10.0).contains(&y) => [12.04, y, z + if (y as u8).is_multiple_of(2) { jag } else { -jag }],
                 _ => p,
             };
             let right = plate(24, |x, y| x >= 12 && y < 12).into_iter().map(|t| t.map(off));
@@ -295,8 +295,7 @@ mod tests {
             let profile = Profile { leave_open: leave_open.to_vec(), ..Profile::default() };
             after(&open(jag), |d, _| zip(&d.survey, &mut Work::new(&mut d.submesh), &d.tolerance, &profile)).result
         };
-        for (jag, class, other) in [(0.0, LoopClass::Gap, LoopClass::Misaligned), (0.125, LoopClass::Misaligned, LoopClass::Gap)]
-        {
+        for (jag, class, other) in [(0.0, LoopClass::Gap, LoopClass::Misaligned), (0.16, LoopClass::Misaligned, LoopClass::Gap)] {
             assert_eq!(zipped(jag, &[class]), 0, "{class:?}");
             assert_eq!(zipped(jag, &[other]), zipped(jag, &[]), "{class:?}");
             assert!(zipped(jag, &[]) > 0, "{class:?}");

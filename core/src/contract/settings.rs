@@ -33,7 +33,7 @@ pub struct Profile {
     pub max_hole_perimeter_relative: f64,
     /// Loops longer than this are reported, not filled; 0: no such bound.
     pub max_hole_perimeter_mm: f64,
-    /// Gaps wider than this are not zipped; 0: no such bound.
+    /// Gaps wider than this are not zipped; 0: none wider than 0.005 of the diagonal.
     pub max_gap_mm: f64,
     /// Kinds of loops that stay open.
     pub leave_open: Vec<LoopClass>,

@@ -19,8 +19,8 @@ pub(super) const TURN: f64 = 0.5;
 /// A crease that bends less than [`TURN`] is a line only if it goes on within this cosine, 45°, beyond its first edge: rough surfaces have
 /// single edges as sharp.
 const ON: f64 = 0.7;
-/// Two ends face each other when both point along the line between them within this cosine, 45°.
-const FACING: f64 = 0.7;
+/// Two ends face each other when both point along the line between them within this cosine, 53°: those of a quarter of a circle do.
+const FACING: f64 = 0.6;
 
 /// Creases that end at the rim, at most: every two of them may be one.
 const MOST_ENDS: usize = 12;
@@ -86,50 +86,69 @@ pub(super) fn find(sheet: &Sheet<'_>) -> Result<Creases, Unshaped> {
 /// Where creases go through the patch. `lines`: sharp edges in both directions, ascending, and whether they count for themselves.
 fn through(sheet: &Sheet<'_>, lines: &[([u32; 2], bool)]) -> Result<Vec<[End; 2]>, Unshaped> {
     let way = |[v, w]: [u32; 2]| (sheet.points[w as usize] - sheet.points[v as usize]).normalize_or_zero();
-    let goes_on = |[v, w]: [u32; 2]| {
+    // The line that goes on straightest beyond a line's second end.
+    let onward = |[v, w]: [u32; 2]| {
         let from = lines.partition_point(|(line, _)| line[0] < w);
-        lines[from..]
-            .iter()
-            .take_while(|(line, _)| line[0] == w)
-            .any(|(line, _)| line[1] != v && way(*line).dot(way([v, w])) > ON)
+        let on = lines[from..].iter().map(|(line, _)| *line).take_while(|line| line[0] == w).filter(|line| line[1] != v);
+        let straight = on.map(|line| (way(line).dot(way([v, w])), line)).filter(|(cosine, _)| *cosine > ON);
+        straight.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, line)| line)
     };
     let ends: Vec<End> = lines
         .iter()
-        .filter(|(line, strong)| sheet.on_rim[line[0] as usize] && (*strong || goes_on(*line)))
-        .map(|([v, w], _)| (*v, way([*w, *v])))
+        .filter(|(line, strong)| sheet.on_rim[line[0] as usize] && (*strong || onward(*line).is_some()))
+        .map(|(line, _)| {
+            let [v, w] = *line;
+            // At a vertex of a polyline the curve turns half of what it turns from edge to edge.
+            let before = onward(*line).map_or(way([w, v]), |[w, x]| way([x, w]));
+            (v, (1.5 * way([w, v]) - 0.5 * before).normalize_or_zero())
+        })
         .collect();
-    if ends.is_empty() {
-        return Ok(Vec::new());
+    // Where several end in one vertex is a corner, at which another one may begin.
+    let (mut single, mut corners) = (Vec::new(), Vec::new());
+    for same in ends.chunk_by(|a, b| a.0 == b.0) {
+        match same {
+            [end] => single.push(*end),
+            [(v, _), ..] => corners.push(*v),
+            [] => {}
+        }
     }
-    // One vertex where several end is a corner that is not known.
-    if ends.len() > MOST_ENDS || ends.windows(2).any(|pair| pair[0].0 == pair[1].0) {
+    if single.is_empty() && !corners.is_empty() || ends.len() > MOST_ENDS {
         return Err(Unshaped::Creased);
     }
-    matched(sheet, &ends).ok_or(Unshaped::Creased)
+    matched(sheet, &single, &corners).ok_or(Unshaped::Creased)
 }
 
-/// The ends by twos that face each other, best first; `None` if one is left over.
-fn matched(sheet: &Sheet<'_>, ends: &[End]) -> Option<Vec<[End; 2]>> {
-    let mut pairs: Vec<(f64, [usize; 2])> = Vec::new();
+/// The ends by twos that face each other, or each with a corner that it faces, best first; `None` if one is left over.
+fn matched(sheet: &Sheet<'_>, ends: &[End], corners: &[u32]) -> Option<Vec<[End; 2]>> {
+    let along = |from: u32, to: u32| (sheet.points[to as usize] - sheet.points[from as usize]).normalize_or_zero();
+    let mut pairs: Vec<(f64, [usize; 2], [End; 2])> = Vec::new();
     for (i, a) in ends.iter().enumerate() {
         for (j, b) in ends.iter().enumerate().skip(i + 1) {
-            let along = (sheet.points[b.0 as usize] - sheet.points[a.0 as usize]).normalize_or_zero();
+            let along = along(a.0, b.0);
             let [from, to] = [a.1.dot(along), -b.1.dot(along)];
             if from >= FACING && to >= FACING {
-                pairs.push((from + to, [i, j]));
+                pairs.push((from + to, [i, j], [*a, *b]));
+            }
+        }
+        for (j, corner) in (ends.len()..).zip(corners) {
+            let along = along(a.0, *corner);
+            let from = a.1.dot(along);
+            if from >= FACING {
+                // It arrives as it set out, mirrored: on an arc of a circle.
+                pairs.push((from + FACING, [i, j], [*a, (*corner, a.1 - 2.0 * from * along)]));
             }
         }
     }
     pairs.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    let mut free = vec![true; ends.len()];
+    let mut free = vec![true; ends.len() + corners.len()];
     let mut all = Vec::new();
-    for (_, [i, j]) in pairs {
+    for (_, [i, j], pair) in pairs {
         if free[i] && free[j] {
             (free[i], free[j]) = (false, false);
-            all.push([ends[i], ends[j]]);
+            all.push(pair);
         }
     }
-    (2 * all.len() == ends.len()).then_some(all)
+    free[..ends.len()].iter().all(|free| !free).then_some(all)
 }
 
 /// A coarse patch with an edge between every two of these vertices of the rim: the given one, or, if it is a disc, one made anew of its parts.
@@ -189,13 +208,15 @@ pub(super) fn carry_on(sheet: &mut Sheet<'_>, [(a, from), (b, to)]: [End; 2]) ->
     let (start, end) = (sheet.points[a as usize], sheet.points[b as usize]);
     let length = start.distance(end);
     let scale = 0.5 * (sheet.scale[a as usize] + sheet.scale[b as usize]);
+    let chord = (end - start) / length.max(f64::MIN_POSITIVE);
+    // Bézier's points: on a straight line a third of the length along it; such that the curve is nearly an arc where it was one.
+    let reach = |way: DVec3, chord: DVec3| length * 2.0 / 3.0 / (1.0 + way.dot(chord).max(0.0));
     let parts = (length / scale).round().clamp(1.0, 1000.0) as u32;
     let mut last = a;
     for k in 1..parts {
         let t = f64::from(k) / f64::from(parts);
         let s = 1.0 - t;
-        // Bézier's points are a third of the length along the directions.
-        let (p, q) = (start + from * (length / 3.0), end + to * (length / 3.0));
+        let (p, q) = (start + from * reach(from, chord), end + to * reach(to, -chord));
         let point = start * (s * s * s) + p * (3.0 * s * s * t) + q * (3.0 * s * t * t) + end * (t * t * t);
         let Some((i, side)) = sheet.find_edge([last, b]) else { return false };
         let v = sheet.add_point(point, scale);

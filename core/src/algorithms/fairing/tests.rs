@@ -337,6 +337,60 @@ fn a_ridge_goes_on_through_the_hole() {
     }
 }
 
+#[test]
+fn two_ridges_go_on_through_one_hole() {
+    // A step with rounded corners of no size: flat, down a slope of 60°, flat. The hole lies over both edges.
+    let height = |x: i32| {
+        if x <= 4 {
+            0.0
+        } else if x <= 8 {
+            -1.75 * (x - 4) as f32
+        } else {
+            -7.0
+        }
+    };
+    let n = 12;
+    let at = |i: i32, j: i32| [i as f32, j as f32, height(i)];
+    let positions: Vec<Point> = (0..=n).flat_map(|j| (0..=n).map(move |i| (i, j))).map(|(i, j)| at(i, j)).collect();
+    let number = |i: i32, j: i32| (j * (n + 1) + i) as u32;
+    let (hole, rest): (Vec<_>, Vec<_>) = (0..n)
+        .flat_map(|j| (0..n).map(move |i| (i, j)))
+        .flat_map(|(i, j)| {
+            let [a, b, c, d] = [number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)];
+            [((i, j), [a, b, c]), ((i, j), [a, c, d])]
+        })
+        .partition(|((i, j), _)| (3..9).contains(i) && (4..8).contains(j));
+    let around: Vec<[u32; 3]> = rest.into_iter().map(|(_, t)| t).collect();
+    assert_eq!(hole.len(), 48);
+    let rim: Vec<u32> = (3..9)
+        .map(|i| number(i, 4))
+        .chain((4..8).map(|j| number(9, j)))
+        .chain((4..=9).rev().map(|i| number(i, 8)))
+        .chain((5..=8).rev().map(|j| number(3, j)))
+        .collect();
+    let points: Vec<Point> = rim.iter().map(|v| positions[*v as usize]).collect();
+    let patch =
+        triangulate(&Rim { points: &points, apexes: &[], obstacles: &[], forbidden: &|_, _| false }, &FillSettings::default())
+            .unwrap();
+    let patch: Vec<[u32; 3]> = patch.triangles.iter().map(|t| t.map(|v| rim[v as usize])).collect();
+    let region = CoarsePatch { positions: &positions, patch: &patch, around: &around };
+    let shaped = shape(&region, &ShapeSettings::default()).unwrap();
+    for p in &shaped.added {
+        let x = f64::from(p[0]);
+        let z = if x <= 4.0 {
+            0.0
+        } else if x <= 8.0 {
+            -1.75 * (x - 4.0)
+        } else {
+            -7.0
+        };
+        assert!((f64::from(p[2]) - z).abs() < 1e-5, "{p:?}");
+    }
+    for ridge in [4.0, 8.0] {
+        assert!(shaped.added.iter().filter(|p| (p[0] - ridge).abs() < 1e-5).count() >= 2, "{ridge}");
+    }
+}
+
 /// A cube of 6 x 6 squares a side; `keep` by the middle of each triangle.
 fn cube(keep: impl Fn(DVec3) -> bool) -> (Vec<Point>, Vec<[u32; 3]>) {
     let n = 6;

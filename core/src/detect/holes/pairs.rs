@@ -61,8 +61,10 @@ const HOLE: f64 = 0.7;
 /// Outlines of holes back to back agree as long as no vertex is farther from the other outline, seen along the axis, than this share of the
 /// larger radius: circles of eight facets do.
 const OUTLINE: f64 = 0.15;
-/// And outlines of openings in two bodies, if these were one: what broke may be turned aside a little.
-const ALIKE_OUTLINE: f64 = 0.35;
+/// And outlines of openings in two bodies, if these were one: what broke may lean, and be turned aside a little.
+const ALIKE_OUTLINE: f64 = 0.5;
+/// The smaller one of these openings has at least this share of the larger one's area.
+const ALIKE_AREA: f64 = 0.6;
 /// Sine of the turn at a corner of an outline.
 const CORNER: f64 = 0.3;
 /// An outline is ragged if it turns the other way at this share of its vertices,
@@ -127,7 +129,9 @@ impl Ring {
     /// surface that faces the other one's is one of each. Skins that face each other bound the air between the bodies, unless two caps
     /// would lie on each other.
     fn may_join_bodies(&self, rims: [&Shape; 2]) -> bool {
-        let open = rims.iter().all(|rim| rim.continues <= MOSTLY_OPEN) && outlines_agree(rims[0], rims[1], ALIKE_OUTLINE);
+        let [a, b] = rims;
+        let alike = a.area().min(b.area()) >= ALIKE_AREA * a.area().max(b.area()) && outlines_agree(a, b, ALIKE_OUTLINE);
+        let open = alike && rims.iter().all(|rim| rim.continues <= MOSTLY_OPEN);
         match self.missing {
             Missing::Tube | Missing::OneSurface => open,
             Missing::Floor => open && self.level,

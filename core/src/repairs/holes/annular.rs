@@ -230,6 +230,53 @@ mod tests {
     }
 
     #[test]
+    fn what_joins_two_bodies_is_a_doubt_and_what_mends_one_is_not() {
+        // Two vessels mouth to mouth, each of which a lid would close.
+        let got = closed(&[turned(&can(0.0, 5.0, 4.0), 24), turned(&lid(6.0, 11.0, 4.0), 24)].concat());
+        assert_eq!((closed_by(&got, "annular"), got.result.doubts.len()), (2, 1));
+        // The end of a pipe.
+        let got = closed(&[turned(&[[4.0, 0.0], [4.0, 10.0]], 48), turned(&[[3.0, 10.0], [3.0, 0.0]], 48)].concat());
+        assert_eq!((closed_by(&got, "annular"), got.result.doubts.len()), (4, 0));
+    }
+
+    #[test]
+    fn skins_that_face_each_other_across_a_clearance_stay_two_bodies() {
+        // A ball in a shell, both without the cap above 0.9 of their height.
+        let arc = |r: f32, to: u8| {
+            (0..=to).map(move |i| (std::f32::consts::PI * f32::from(i) / 24.0).sin_cos()).map(move |(s, c)| [r * s, -r * c])
+        };
+        let ball = turned(&arc(8.0, 20).collect::<Vec<_>>(), 24);
+        let mut shell: Vec<[f32; 2]> = arc(8.25, 20).collect();
+        shell.reverse();
+        let inside = turned(&shell, 24);
+        let outside = turned(&arc(12.0, 23).chain([[0.0, 12.0]]).collect::<Vec<_>>(), 24);
+        let got = closed(&[ball, inside, outside].concat());
+        assert_eq!((closed_by(&got, "annular"), got.result.loops, got.defects.components), (0, 2, 3), "{:?}", got.result);
+        assert!(got.verdict.good, "{:?}", got.verdict);
+    }
+
+    #[test]
+    fn a_sleeve_without_its_bore_gets_it_back_around_the_shaft() {
+        let shaft = turned(&[[0.0, -1.0], [3.0, -1.0], [3.0, 11.0], [0.0, 11.0]], 32);
+        let sleeve = turned(&[[3.125, 0.0], [5.0, 0.0], [5.0, 10.0], [3.125, 10.0]], 32);
+        let of_sleeve = (25.0 - 3.125 * 3.125) * 10.0;
+        let got = closed(&[shaft.clone(), sleeve.clone()].concat());
+        assert_bridged_around(&got, polygon(32) * (9.0 * 12.0 + of_sleeve));
+        // Without the shaft, two lids have less area.
+        assert_eq!(closed_by(&closed(&sleeve), "annular"), 0);
+        // A pin that ends inside: one of the lids would do, and goes.
+        let pin = turned(&[[0.0, -1.0], [3.0, -1.0], [3.0, 5.0], [0.0, 5.0]], 32);
+        assert_bridged_around(&closed(&[pin, sleeve].concat()), polygon(32) * (9.0 * 6.0 + of_sleeve));
+    }
+
+    /// A bore was put back, so that the sleeve and what runs through it are two good bodies of this volume.
+    fn assert_bridged_around(got: &After<Closed>, volume: f64) {
+        assert_eq!((closed_by(got, "annular"), got.result.loops, got.defects.components), (2, 2, 2), "{:?}", got.result);
+        assert!(got.verdict.good && got.result.doubts.is_empty(), "{:?}", got.verdict);
+        assert!((got.defects.volume / volume - 1.0).abs() < 1e-3, "{} instead of {volume}", got.defects.volume);
+    }
+
+    #[test]
     fn holes_side_by_side_and_islands_are_no_rings() {
         let open = plate(24, |x, y| {
             let in_hole = |x0: u8, y0: u8, side: u8| (x0..x0 + side).contains(&x) && (y0..y0 + side).contains(&y);

@@ -31,11 +31,18 @@ const ROOMY: f64 = 1.5;
 /// √3/2 times half of it, and so may be the plane.
 const FLAT: f64 = 2.0 * f32::EPSILON as f64;
 
-/// Shapes every patch that has room. One that cannot be shaped stays as it is.
-pub(crate) fn smooth(survey: &Survey<'_>, work: &mut Work<'_>, placed: &mut [Placed], settings: &ShapeSettings, threads: usize) {
+/// Shapes every patch of these numbers that has room. One that cannot be shaped stays as it is.
+pub(crate) fn smooth(
+    survey: &Survey<'_>,
+    work: &mut Work<'_>,
+    placed: &mut [Placed],
+    numbers: &[usize],
+    settings: &ShapeSettings,
+    threads: usize,
+) {
     let submesh: &Submesh = work;
-    let wanted = parallel::map(threads, placed.len(), |i| is_wanted(submesh, &placed[i], settings.finer));
-    let roomy: Vec<usize> = (0..placed.len()).filter(|i| wanted[*i]).collect();
+    let wanted = parallel::map(threads, numbers.len(), |k| is_wanted(submesh, &placed[numbers[k]], settings.finer));
+    let roomy: Vec<usize> = numbers.iter().zip(wanted).filter(|(_, wanted)| *wanted).map(|(i, _)| *i).collect();
     let mut rest = roomy.as_slice();
     while !rest.is_empty() {
         let mut vertices = 0;

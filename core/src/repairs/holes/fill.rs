@@ -105,10 +105,11 @@ pub(crate) fn fill_loops(
     closing.triangulate(work, first, threads);
     closing.close_flat(survey, work);
     if let Some(settings) = shape_settings(profile) {
-        fair::smooth(survey, work, &mut closing.placed, &settings, threads);
+        let all: Vec<usize> = (0..closing.placed.len()).collect();
+        fair::smooth(survey, work, &mut closing.placed, &all, &settings, threads);
     }
     if profile.check_self_intersections {
-        closing.guard(survey, work, reversed, shape_settings(profile));
+        closing.guard(survey, work, reversed, shape_settings(profile), threads);
         closing.close_by_strips(survey, work, reversed, threads);
     }
     let balances = profile.resolve_crossings && profile.fill_holes && survey.crossing_pairs.is_some();
@@ -116,7 +117,6 @@ pub(crate) fn fill_loops(
     let mut across = Vec::new();
     if profile.resolve_crossings && survey.crossing_pairs.is_some() {
         across = closing.close_across(work);
-        closing.doubt_across(survey, work, reversed);
     }
     let mut unclosed = Vec::new();
     let first_balancing = across.len();

@@ -12,6 +12,8 @@ use crate::repairs::shared::overlay::{Overlay, Standing, Which};
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::topology::survey::Survey;
+use crate::util::ids::NONE;
+use crate::util::union_find;
 
 /// A triangle that a patch crosses.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,8 +21,8 @@ pub(crate) struct Obstacle {
     pub(crate) corners: Corners,
     /// It belongs to a body that the one whose loop the patch closes runs into already.
     pub(crate) met_already: bool,
-    /// It belongs to another body.
-    pub(crate) of_other: bool,
+    /// It belongs to a body that neither that one nor what that one runs into has met: with the patch, all of these become one.
+    pub(crate) joins: bool,
 }
 
 /// For each patch that crosses something what it crosses. `patch_of`: the patch that a triangle of the submesh belongs to; `is_new`: whether
@@ -63,10 +65,14 @@ pub(crate) fn crossed(
         .iter()
         .filter_map(|pair| Some([*of_record.get(&pair.triangles[0])?, *of_record.get(&pair.triangles[1])?]))
         .flat_map(|[a, b]| [[a, b], [b, a]])
-        .filter(|[a, b]| a != b)
+        .filter(|[a, b]| a != b && *a != NONE && *b != NONE)
         .collect();
     met.sort_unstable();
     met.dedup();
+    let mut groups: Vec<u32> = (0..components.list.len() as u32).collect();
+    met.iter().for_each(|[a, b]| {
+        union_find::unite(&mut groups, *a, *b);
+    });
     let component = |number: Standing| match overlay.which(number) {
         Which::Submesh(t) => Some(components.of_triangle[t as usize]),
         Which::Record(record) => of_record.get(&record).copied(),
@@ -75,11 +81,11 @@ pub(crate) fn crossed(
     let mut known = HashSet::new();
     for (patch, of_patch, other) in blamed {
         let corners = overlay.corners(survey, submesh, other);
-        let of_both = component(of_patch).zip(component(other));
+        let of_both = component(of_patch).zip(component(other)).filter(|(a, b)| *a != NONE && *b != NONE);
         let obstacle = Obstacle {
             corners,
             met_already: of_both.is_some_and(|(a, b)| met.binary_search(&[a, b]).is_ok()),
-            of_other: of_both.is_some_and(|(a, b)| a != b),
+            joins: of_both.is_some_and(|(a, b)| union_find::find(&mut groups, a) != union_find::find(&mut groups, b)),
         };
         if known.insert((patch, corners.map(Position::of), obstacle.met_already)) {
             crossed.entry(patch).or_default().push(obstacle);

@@ -214,9 +214,9 @@ mod tests {
 
     /// A plate cut along its middle line, where the right side stands this far off at three vertices.
     fn slit(gap: f32) -> Vec<Corners> {
-        let open = |p: [f32; 3]| if p[0] == 2.0 && (1.0..=3.0).contains(&p[1]) { [2.0 + gap, p[1], p[2]] } else { p };
-        let right = plate(4, |x, _| x >= 2).into_iter().map(|t| t.map(open));
-        plate(4, |x, _| x < 2).into_iter().chain(right).collect()
+        let open = |p: [f32; 3]| if p[0] == 12.0 && (1.0..=3.0).contains(&p[1]) { [12.0 + gap, p[1], p[2]] } else { p };
+        let right = plate(24, |x, _| x >= 12).into_iter().map(|t| t.map(open));
+        plate(24, |x, _| x < 12).into_iter().chain(right).collect()
     }
 
     #[test]
@@ -227,10 +227,45 @@ mod tests {
         };
         let got = zipped(0.125, 0.35);
         // Only the rim of the plate is left.
-        assert_eq!((got.result, got.defects.boundary_loops, got.defects.boundary_edges), (3, 1, 16));
+        assert_eq!((got.result, got.defects.boundary_loops, got.defects.boundary_edges), (3, 1, 96));
         assert_eq!(got.defects.nonmanifold_edges + got.defects.inconsistent_edges, 0);
-        assert_eq!(zipped(0.5, 0.35).result, 0, "too wide");
+        assert_eq!(zipped(0.5, 0.35).result, 0, "too wide for its edges");
+        assert_eq!(zipped(0.25, 0.35).result, 0, "too wide for the model, whose diagonal is 34");
         assert_eq!(zipped(0.125, 0.0).result, 0, "switched off");
+    }
+
+    #[test]
+    fn two_walls_with_a_clearance_between_them_are_left_alone() {
+        // Each lacks the same cells, so that vertices face each other across both the holes and the clearance, which is narrower.
+        let hole = |x: u8, y: u8| (8..16).contains(&x) && (8..16).contains(&y);
+        let lower = plate(24, |x, y| !hole(x, y));
+        let upper = shifted(&reversed(&plate(24, |x, y| !hole(x, y))), [8.0, 0.0, 0.125]);
+        let got = after(&[lower, upper].concat(), |d, _| {
+            zip(&d.survey, &mut Work::new(&mut d.submesh), &d.tolerance, &Profile::default())
+        });
+        assert_eq!(got.result, 0);
+    }
+
+    #[test]
+    fn two_boxes_without_the_sides_that_face_each_other_are_not_zipped() {
+        let got = after(&[open_box(0.0, false), open_box(10.02, true)].concat(), |d, _| {
+            zip(&d.survey, &mut Work::new(&mut d.submesh), &d.tolerance, &Profile::default())
+        });
+        assert_eq!((got.result, got.defects.boundary_loops), (0, 2));
+    }
+
+    /// A cube of ten, from this height up, without its top or without its bottom.
+    fn open_box(z: f32, top: bool) -> Vec<Corners> {
+        let corner = |i: u8| [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]][usize::from(i % 4)];
+        let at = |i: u8, up: bool| [corner(i)[0], corner(i)[1], if up { z + 10.0 } else { z }];
+        let sides = (0..4)
+            .flat_map(|i| [[at(i, false), at(i + 1, false), at(i + 1, true)], [at(i, false), at(i + 1, true), at(i, true)]]);
+        let lid = if top {
+            [[at(0, true), at(1, true), at(2, true)], [at(0, true), at(2, true), at(3, true)]]
+        } else {
+            [[at(0, false), at(2, false), at(1, false)], [at(0, false), at(3, false), at(2, false)]]
+        };
+        sides.chain(lid).collect()
     }
 
     #[test]
@@ -249,7 +284,7 @@ mod tests {
         // The right side of a slit of nine vertices stands off evenly, or is jagged.
         let open = |jag: f32| -> Vec<Corners> {
             let off = |p: [f32; 3]| match p {
-                [12.0, y, z] if (2.0..=10.0).contains(&y) => [12.1, y, z + if (y as u8).is_multiple_of(2) { jag } else { -jag }],
+                [12.0, y, z] if (2.0..=10.0).contains(&y) => [12.04, y, z + if (y as u8).is_multiple_of(2) { jag } else { -jag }],
                 _ => p,
             };
             let right = plate(24, |x, y| x >= 12 && y < 12).into_iter().map(|t| t.map(off));
@@ -259,7 +294,7 @@ mod tests {
             let profile = Profile { leave_open: leave_open.to_vec(), ..Profile::default() };
             after(&open(jag), |d, _| zip(&d.survey, &mut Work::new(&mut d.submesh), &d.tolerance, &profile)).result
         };
-        for (jag, class, other) in [(0.0, LoopClass::Gap, LoopClass::Misaligned), (0.25, LoopClass::Misaligned, LoopClass::Gap)] {
+        for (jag, class, other) in [(0.0, LoopClass::Gap, LoopClass::Misaligned), (0.16, LoopClass::Misaligned, LoopClass::Gap)] {
             assert_eq!(zipped(jag, &[class]), 0, "{class:?}");
             assert_eq!(zipped(jag, &[other]), zipped(jag, &[]), "{class:?}");
             assert!(zipped(jag, &[]) > 0, "{class:?}");

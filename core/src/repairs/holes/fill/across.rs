@@ -100,6 +100,7 @@ impl Closing<'_> {
             if let Some(placed) = self.placed.last_mut() {
                 placed.to_be_cut = true;
                 across.push((placed.first..placed.first + placed.count, left));
+                self.doubt_across(work, rim);
             }
         }
         across

@@ -2,11 +2,7 @@
 
 use super::closing::Closing;
 use crate::detect::holes::loops::Loop;
-use crate::repairs::shared::collisions;
-use crate::repairs::shared::work::Work;
 use crate::submesh::Submesh;
-use crate::submesh::components::Reversed;
-use crate::topology::survey::Survey;
 
 /// What is said of two bodies that a strip was put in between.
 pub(crate) fn bridged(submesh: &Submesh, rims: [&Loop; 2]) -> String {
@@ -19,25 +15,28 @@ pub(crate) fn bridged(submesh: &Submesh, rims: [&Loop; 2]) -> String {
     )
 }
 
+/// Places that are named, at most.
+const MOST_NAMED: usize = 5;
+
+/// The doubts, the last of very many as their number.
+pub(crate) fn summed_up(mut doubts: Vec<String>) -> Vec<String> {
+    let more = doubts.len().saturating_sub(MOST_NAMED);
+    if more > 0 {
+        doubts.truncate(MOST_NAMED);
+        doubts.push(format!("and at {more} places more, two bodies were made one"));
+    }
+    doubts
+}
+
 impl Closing<'_> {
-    /// Says of each patch that is to be cut along another body, which its own one did not meet before, that it makes one of both.
-    pub(crate) fn doubt_across(&mut self, survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reversed) {
-        if !self.placed.iter().any(|patch| patch.to_be_cut) {
-            return;
-        }
-        let mut patch_of = vec![None; work.triangles.len()];
-        for (i, patch) in (0..).zip(&self.placed) {
-            patch.triangles().for_each(|t| patch_of[t as usize] = Some(i));
-        }
-        let is_cut = |patch: u32| self.placed[patch as usize].to_be_cut;
-        let crossed = collisions::crossed(survey, work, reversed, &patch_of, is_cut).unwrap_or_default();
-        for (patch, obstacles) in crossed {
-            if !is_cut(patch) || !obstacles.iter().any(|obstacle| obstacle.of_other && !obstacle.met_already) {
-                continue;
-            }
-            let rim = self.rim(self.placed[patch as usize].rims[0]);
-            let [x, y, z] = work.positions[rim.vertices[0] as usize];
-            let length = rim.perimeter(work);
+    /// Says of a patch that is to be cut along another body, which its own one did not meet before, that it makes one of both: as its patches
+    /// were found to when others were tried.
+    pub(crate) fn doubt_across(&mut self, submesh: &Submesh, rim: u32) {
+        let tried = self.placed.iter().filter(|patch| patch.rims.contains(&rim));
+        if tried.flat_map(|patch| &patch.obstacles).any(|obstacle| obstacle.joins) {
+            let rim = self.rim(rim);
+            let [x, y, z] = submesh.positions[rim.vertices[0] as usize];
+            let length = rim.perimeter(submesh);
             self.doubts.push(format!(
                 "the patch over a hole at ({x}, {y}, {z}), {length:.4} around, runs into another body, which becomes one with its own: see whether it should"
             ));

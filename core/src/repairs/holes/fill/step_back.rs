@@ -10,6 +10,7 @@ use crate::repairs::shared::collisions::{self, Obstacle};
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::Reversed;
 use crate::topology::survey::Survey;
+use std::collections::BTreeMap;
 
 /// A patch that crosses anything is made anew by the next method, or around what it crosses, so many times, and is revoked then: one of
 /// many vertices, which takes long, fewer times than a small one.
@@ -36,6 +37,7 @@ impl Closing<'_> {
         work: &mut Work<'_>,
         reversed: &Reversed,
         shaping: Option<ShapeSettings>,
+        threads: usize,
     ) {
         let finer = shaping.map(|settings| ShapeSettings { finer: FINER, ..settings });
         let mut is_new = vec![true; self.placed.len()];
@@ -48,6 +50,10 @@ impl Closing<'_> {
                 return;
             };
             is_new.fill(false);
+            let refined = finer.map_or_else(Vec::new, |settings| {
+                let numbers = self.to_refine(&crossed, round);
+                self.refine((survey, work), &numbers, &settings, threads)
+            });
             for (i, mut obstacles) in crossed {
                 let i = i as usize;
                 if self.placed[i].across {
@@ -57,14 +63,7 @@ impl Closing<'_> {
                     continue;
                 }
                 is_new[i] = true;
-                let runs_into_another = obstacles.iter().any(|obstacle| obstacle.of_other && !obstacle.met_already);
-                if runs_into_another
-                    && round < guard_rounds(&self.placed[i], &self.rims)
-                    && finer.is_some_and(|settings| self.refine(survey, work, i, &settings))
-                {
-                    continue;
-                }
-                if !self.step_back(work, i, obstacles, round) {
+                if refined.binary_search(&i).is_err() && !self.step_back(work, i, obstacles, round) {
                     self.revoke(work, i, &mut is_new);
                 }
             }
@@ -74,26 +73,45 @@ impl Closing<'_> {
         }
     }
 
-    /// Shapes a patch more finely than what is around, once: where flat triangles between the vertices of curved surface cut into what lies close
-    /// by, smaller ones do not.
-    fn refine(&mut self, survey: &Survey<'_>, work: &mut Work<'_>, i: usize, settings: &ShapeSettings) -> bool {
-        let patch = &mut self.placed[i];
-        if std::mem::replace(&mut patch.refined, true) {
-            return false;
+    /// Patches that would make one body of two, and can still be tested once they are shaped anew.
+    fn to_refine(&self, crossed: &BTreeMap<u32, Vec<Obstacle>>, round: usize) -> Vec<usize> {
+        let joins = crossed.iter().filter(|(_, obstacles)| obstacles.iter().any(|obstacle| obstacle.joins));
+        let numbers = joins.map(|(i, _)| *i as usize);
+        numbers.filter(|i| !self.placed[*i].refined && round < guard_rounds(&self.placed[*i], &self.rims)).collect()
+    }
+
+    /// Shapes patches more finely than what is around, each once: where flat triangles between the vertices of curved surface cut into what lies
+    /// close by, smaller ones do not. Returns those that were, ascending.
+    fn refine(
+        &mut self,
+        (survey, work): (&Survey<'_>, &mut Work<'_>),
+        numbers: &[usize],
+        settings: &ShapeSettings,
+        threads: usize,
+    ) -> Vec<usize> {
+        let mut before = Vec::new();
+        for i in numbers {
+            let patch = &mut self.placed[*i];
+            patch.refined = true;
+            let shaped: Vec<_> = patch.triangles().map(|t| work.triangles[t as usize].v).collect();
+            let coarse = std::mem::take(&mut patch.coarse);
+            if !coarse.is_empty() {
+                patch.replace(work, &coarse);
+            }
+            before.push((shaped, coarse));
         }
-        let shaped = patch.triangles().map(|t| work.triangles[t as usize].v).collect::<Vec<_>>();
-        let coarse = std::mem::take(&mut patch.coarse);
-        if !coarse.is_empty() {
-            patch.replace(work, &coarse);
+        fair::smooth(survey, work, &mut self.placed, numbers, settings, threads);
+        let mut finer = Vec::new();
+        for (i, (shaped, coarse)) in numbers.iter().zip(before) {
+            let patch = &mut self.placed[*i];
+            if !patch.coarse.is_empty() {
+                finer.push(*i);
+            } else if !coarse.is_empty() {
+                patch.replace(work, &shaped);
+                patch.coarse = coarse;
+            }
         }
-        fair::smooth(survey, work, std::slice::from_mut(patch), settings, 1);
-        let patch = &mut self.placed[i];
-        let is_finer = !patch.coarse.is_empty();
-        if !is_finer && !coarse.is_empty() {
-            patch.replace(work, &shaped);
-            patch.coarse = coarse;
-        }
-        is_finer
+        finer
     }
 
     /// Gives a patch up. Loops that it closed together are closed each for itself, where that is admitted.

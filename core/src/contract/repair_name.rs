@@ -67,13 +67,15 @@ pub enum RepairName {
     /// Surfaces that shared an edge or a vertex got vertices of their own.
     #[serde(alias = "separated")]
     Separate,
+    /// Places that nothing else made valid were cut out and closed anew.
+    Rebuild,
     /// A region was replaced by a surface around the space that it encloses.
     Wrap,
 }
 
 impl RepairName {
     /// Every kind, in the order of the pipeline.
-    pub const ALL: [Self; 26] = [
+    pub const ALL: [Self; 27] = [
         Self::Degenerate,
         Self::Duplicate,
         Self::CommonWall,
@@ -99,6 +101,7 @@ impl RepairName {
         Self::Enclosed,
         Self::Hidden,
         Self::Separate,
+        Self::Rebuild,
         Self::Wrap,
     ];
 
@@ -130,6 +133,7 @@ impl RepairName {
             Self::Enclosed => "enclosed",
             Self::Hidden => "hidden",
             Self::Separate => "separate",
+            Self::Rebuild => "rebuild",
             Self::Wrap => "wrap",
         }
     }

@@ -454,6 +454,8 @@ pub enum RegionMethod {
     Separated,
     /// It went: a lone sheet, a body in the material of others, or dust that cutting left.
     Dropped,
+    /// It was cut out with a few rings around it, and closed anew.
+    Rebuilt,
     /// It was replaced by a wrap.
     Wrapped,
     /// Nothing was done, or what was done was taken back.

@@ -13,6 +13,7 @@ mod cleanup;
 mod holes;
 mod orient;
 mod pipeline;
+mod rebuild;
 mod separate;
 mod shared;
 mod stitch;

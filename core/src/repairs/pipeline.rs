@@ -27,6 +27,7 @@ use crate::repairs::holes::skirt;
 use crate::repairs::orient::directions;
 use crate::repairs::orient::hollow;
 use crate::repairs::orient::visibility;
+use crate::repairs::rebuild;
 use crate::repairs::separate::pinch_vertices;
 use crate::repairs::shared::context::{Context, Repair};
 use crate::repairs::shared::probes::Probes;
@@ -108,6 +109,7 @@ pub(crate) const ALL: &[Step] = &[
     Do(pinch_vertices::REPAIR),
     // What hung on a body by an edge or a vertex stands for itself now.
     Do(directions::OUTWARD),
+    Do(rebuild::REPAIR),
     Do(wrap::REPAIR),
     Look(measure_bodies),
     Look(measure_skin),

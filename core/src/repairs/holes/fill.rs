@@ -28,9 +28,9 @@ use crate::detect::holes::{
 use crate::repairs::holes::fair;
 use crate::repairs::shared::admission::Admission;
 use crate::repairs::shared::work::Work;
-use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::submesh::near::Tolerance;
+use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::parallel;
 
@@ -145,6 +145,41 @@ pub(crate) fn fill_loops(
         closed.left.push(left(work, chain[0], chain.len() - 1, length, &NO_LOOP));
     }
     closed
+}
+
+/// Closes the loops that run through places that are asked for, each for itself, whatever the profile says of loops: the surface was closed there
+/// before it was cut out. What would cross anything stays open.
+pub(crate) fn close_again(
+    survey: &Survey<'_>,
+    work: &mut Work<'_>,
+    reversed: &Reversed,
+    tolerance: &Tolerance,
+    (profile, is_asked): (&Profile, &dyn Fn(Vertex) -> bool),
+    threads: usize,
+) {
+    let free = Profile {
+        fill_holes: true,
+        close_sheets: true,
+        leave_open: Vec::new(),
+        max_hole_edges: u32::MAX,
+        max_hole_perimeter_relative: f64::INFINITY,
+        max_hole_perimeter_mm: 0.0,
+        ..profile.clone()
+    };
+    let (submesh, edges) = work.edges();
+    let rims: Vec<Loop> =
+        loops::find(submesh, edges).into_iter().filter(|rim| rim.vertices.iter().all(|v| is_asked(*v))).collect();
+    let shapes = Shapes::of(submesh, &rims, threads);
+    let admission = Admission::of(survey, work, &rims, &shapes, reversed, tolerance, (&free, None));
+    let max_edges = profile.max_hole_edges as usize;
+    let mut closing = Closing { admission, max_edges, rims, placed: Vec::new(), open: Vec::new(), joints: Vec::new() };
+    closing.triangulate(work, 0, threads);
+    if let Some(settings) = shape_settings(profile) {
+        fair::smooth(survey, work, &mut closing.placed, &settings, threads);
+    }
+    if profile.check_self_intersections {
+        closing.guard(survey, work, reversed);
+    }
 }
 
 /// Why a chain of boundary edges stays open.

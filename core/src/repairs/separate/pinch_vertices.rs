@@ -106,6 +106,8 @@ pub(crate) fn unpin(
 
 /// Fetches the stars of the neighbours of some vertices, so that what is closed there hangs together with what is around it.
 fn complete_around(survey: &mut Survey<'_>, work: &mut Work<'_>, reversed: &Reversed, vertices: &[Vertex]) {
+    // Copies that found no place.
+    work.forget_unused();
     let around = vertices.iter().flat_map(|v| work.star(*v)).flat_map(|(t, _)| work.triangles[t as usize].v);
     let wanted: BTreeSet<Vertex> = around.filter(|v| !work.complete[*v as usize]).collect();
     if wanted.is_empty() {

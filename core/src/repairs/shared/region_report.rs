@@ -1,4 +1,4 @@
-//! What happened where: every region that was cut, snapped, taken apart, dropped, wrapped or left, for the report.
+//! What happened where: every region that was cut, snapped, taken apart, dropped, rebuilt, wrapped or left, for the report.
 
 use crate::contract::report::{MOST_LISTED, Region, RegionMethod, Regions, SheetDropped, Wrap};
 use crate::geometry::sums::Bounds;

@@ -142,6 +142,34 @@ impl<'a> Work<'a> {
         self.submesh.kill(t);
     }
 
+    /// Lets dead triangles live again, as they were. O(submesh).
+    pub(crate) fn revive(&mut self, dead: impl IntoIterator<Item = u32>) {
+        self.touch();
+        for t in dead {
+            self.note(t);
+            self.submesh.triangles[t as usize].alive = true;
+            self.changed.push(t);
+        }
+        // Lists that were made meanwhile lack them.
+        self.submesh.relink();
+    }
+
+    /// Vertices that no triangle uses were never there, or have nothing there any more: where they are, there may be one of the file whose star is
+    /// not here. Before stars are fetched, while nothing is to be taken back.
+    pub(crate) fn forget_unused(&mut self) {
+        for v in 0..self.submesh.positions.len() as Vertex {
+            if self.submesh.star(v).next().is_none() {
+                self.submesh.complete[v as usize] = false;
+            }
+        }
+    }
+
+    /// A triangle is of this repair's making.
+    pub(crate) fn attribute(&mut self, t: u32, to: RepairName) {
+        self.note(t);
+        self.submesh.triangles[t as usize].origin = Origin::Added(to);
+    }
+
     /// Adds a triangle and returns its number.
     pub(crate) fn add(&mut self, v: [Vertex; 3], origin: Origin, region: u32) -> u32 {
         self.touch();

@@ -266,7 +266,8 @@ mod tests {
         let outline = Some(Bounds { lo: [f32::NEG_INFINITY; 3], hi: [f32::INFINITY, f32::INFINITY, 1.0] });
         let concerns = |outline: Option<Bounds>| {
             let enclosed = Enclosed { outline, ..Enclosed::default() };
-            counts(&cube(), &surface, &enclosed, &cube(), &Profile::default()).len()
+            let evidence = Evidence { enclosed, ..Evidence::default() };
+            counts(&cube(), &surface, &evidence, &cube(), &Profile::default()).len()
         };
         assert_eq!([concerns(None), concerns(outline)], [1, 0]);
     }

@@ -275,6 +275,8 @@ fn measure_skin(cx: &mut Context<'_, '_>) {
     if reach > 0.0 {
         let pieces = cx.pieces();
         let turned = (&cx.reversed, &cx.handed.dropped_by);
-        cx.account.skin = Some(skin::measure(cx.survey, &cx.work, turned, &pieces, &cx.handed.wrapped, reach));
+        cx.handed.explained.sort_unstable();
+        let made = (&cx.handed.wrapped[..], &cx.handed.explained[..]);
+        cx.account.skin = Some(skin::measure(cx.survey, &cx.work, turned, &pieces, made, reach));
     }
 }

@@ -174,7 +174,7 @@ impl Rebuilt {
         cx.handed.unsettled.retain(|left| !is_gone(left.at));
         cx.handed.may_cross &= !self.all;
         cx.account.regions.append(&mut self.regions);
-        cx.changed(Changes::Surface);
+        cx.changed(RepairName::Rebuild, Changes::Surface);
         let pieces = cx.pieces();
         let measure = &cx.survey.measure;
         let (area, volume) = pieces

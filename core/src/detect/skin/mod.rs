@@ -6,7 +6,8 @@
 //! Untouched triangles are the same bytes, so that only what was deleted, moved or added can have done harm: the cost follows the edit. Points are
 //! taken on these triangles, by area ([`samples`]). First their distance from the other surface is looked at ([`near`]); only of those beyond the
 //! limit it is asked whether they can be seen from outside ([`seen`]). *Lost* is what could be seen before and is far from the result; *invented* is
-//! what can be seen in the result and is far from all that was there, less plausible patches ([`patches`]).
+//! what can be seen in the result and is far from all that was there, less plausible patches ([`patches`]). Walls that parts of a body had in common
+//! bound nothing, and are no skin.
 //!
 //! All counts are of points that depend on the mesh alone, so that neither chunks nor threads change them.
 
@@ -37,21 +38,22 @@ const PLACE: f64 = 0.05;
 /// Which region of regular surface was dropped by which repair.
 pub(crate) type DroppedBy = Vec<Option<RepairName>>;
 
-/// What the repairs made of the surface. `reach`: the distance up to which surface is where it was. O(edit × log), and reads the chunks around
+/// What the repairs made of the surface. `explained`: triangles of patches that nothing speaks against, ascending. `reach`: the distance up to
+/// which surface is where it was. O(edit × log), and reads the chunks around
 /// points that are far from what is in the submesh.
 pub(crate) fn measure(
     survey: &Survey<'_>,
     submesh: &Submesh,
     (reversed, dropped_by): (&Reversed, &DroppedBy),
     pieces: &Components,
-    wrapped: &[[[f32; 3]; 3]],
+    (wrapped, explained): (&[[[f32; 3]; 3]], &[u32]),
     reach: f64,
 ) -> Skin {
     let surfaces = Surfaces { survey, submesh, reversed, dropped_by, wrapped };
     let whole = survey.measure.area_of(surfaces.area_before());
     let gone = Samples::gone(&surfaces, reach);
     let lost = change(&surfaces, [Which::Before, Which::After], &gone, reach, whole);
-    let added = Samples::added(&surfaces, &patches::plausible(survey, submesh, pieces, reach), reach);
+    let added = Samples::added(&surfaces, &patches::plausible(survey, submesh, pieces, explained, reach), reach);
     let invented = change(&surfaces, [Which::After, Which::Before], &added, reach, whole);
     Skin { reach, lost, invented }
 }

@@ -12,8 +12,9 @@ use crate::util::union_find::{find, unite};
 /// A patch of this share of its body's area is small against it.
 const SMALL: f64 = 0.02;
 
-/// The triangles of patches that lie in a plane, up to `reach`, or are small against their body; ascending. O(n log n) in the triangles of patches.
-pub(super) fn plausible(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components, reach: f64) -> Vec<u32> {
+/// The triangles of patches that lie in a plane, up to `reach`, are small against their body, or of which some are
+/// `explained`; ascending. O(n log n) in the triangles of patches.
+pub(super) fn plausible(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components, explained: &[u32], reach: f64) -> Vec<u32> {
     let is_of_patch = |t: &u32| submesh.triangles[*t as usize].origin == Origin::Added(RepairName::Fill);
     let all: Vec<u32> = submesh.living().filter(is_of_patch).collect();
     let mut plausible = Vec::new();
@@ -22,7 +23,8 @@ pub(super) fn plausible(survey: &Survey<'_>, submesh: &Submesh, pieces: &Compone
         let piece = pieces.of_triangle[patch[0] as usize];
         let of_body = if piece == NONE { 0 } else { pieces.list[piece as usize].extent.area };
         let is_small = survey.measure.area_of(twice) <= SMALL * survey.measure.area_of(of_body);
-        if is_small || is_flat(submesh, &patch, reach) {
+        let is_explained = patch.iter().any(|t| explained.binary_search(t).is_ok());
+        if is_small || is_explained || is_flat(submesh, &patch, reach) {
             plausible.extend(patch);
         }
     }

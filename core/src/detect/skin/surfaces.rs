@@ -45,11 +45,13 @@ impl Surfaces<'_> {
         }
     }
 
-    /// The triangles that were there and are not there any more, or not as they were, each by its record, with the repair that did it.
+    /// The triangles that were there and are not there any more, or not as they were, each by its record, with the repair that did it; but for walls
+    /// that parts of a body had in common.
     pub(crate) fn each_gone(&self, mut visit: impl FnMut(u32, &Corners, Option<RepairName>)) {
         for t in 0..self.submesh.triangles.len() as u32 {
             let triangle = &self.submesh.triangles[t as usize];
             if let (Origin::Input(record), Some(corners)) = (triangle.origin, self.as_read(triangle.origin))
+                && triangle.by != Some(RepairName::CommonWall)
                 && !(self.submesh.lives(t) && is_same(&corners, &self.submesh.points(t)))
             {
                 visit(record, &corners, triangle.by);

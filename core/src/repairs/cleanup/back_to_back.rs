@@ -37,6 +37,8 @@ impl Pair {
 pub(crate) struct Surplus {
     /// Walls that pieces of surface have in common, whole: each piece is closed with its side of them.
     pub(crate) common: Vec<u32>,
+    /// What is left of such pairs.
+    pub(crate) halves: Vec<u32>,
     /// Others.
     pub(crate) sides: Vec<u32>,
 }
@@ -69,10 +71,10 @@ pub(crate) fn surplus(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, pai
         let is_common = set.gain <= 0 && (set.has_neighbours || is_surrounded[s]);
         let into = if is_common { &mut result.common } else { &mut result.sides };
         of_set.for_each(|(pair, _)| into.extend(pair.all()));
-        result.sides.extend(pieces.halves(submesh, edges, set, &rest));
+        result.halves.extend(pieces.halves(submesh, edges, set, &rest));
     }
-    result.sides.sort_unstable();
-    result.sides.dedup();
+    result.halves.sort_unstable();
+    result.halves.dedup();
     result
 }
 

@@ -72,14 +72,15 @@ pub(crate) fn drop_duplicates(survey: &Survey<'_>, work: &mut Work<'_>, bodies: 
     }
     let (submesh, edges) = work.edges();
     let mut doomed = spare(submesh, edges, &copies);
-    let walls = back_to_back::surplus(survey, submesh, edges, &pairs, &doomed);
-    doomed.extend(&walls.sides);
-    if bodies != Bodies::Keep {
-        doomed.extend(&walls.common);
-    }
+    let surplus = back_to_back::surplus(survey, submesh, edges, &pairs, &doomed);
+    doomed.extend(&surplus.sides);
+    work.is_changed_by(RepairName::Duplicate);
     doomed.iter().for_each(|t| work.kill(*t));
-    let common = if bodies == Bodies::Keep { 0 } else { walls.common.len() as u64 };
-    Dropped { all: doomed.len() as u64, walls: common }
+    let walls = if bodies == Bodies::Keep { &[][..] } else { &surplus.common };
+    work.is_changed_by(RepairName::CommonWall);
+    walls.iter().chain(&surplus.halves).for_each(|t| work.kill(*t));
+    let halves = surplus.halves.len() as u64;
+    Dropped { all: (doomed.len() + walls.len()) as u64 + halves, walls: walls.len() as u64 }
 }
 
 /// As [`by_vertex_set`], of all triangles on the vertices of a changed one. O(stars of the changed ones); of a triangle's three stars

@@ -92,6 +92,8 @@ fn remove_of(survey: &Survey<'_>, work: &mut Work<'_>, through: Through<'_>) -> 
             && !(free && encloses(work, survey.measure.area_of(sheet.area), sheet))
         {
             sheet.seams.iter().for_each(|(e, forward)| uses[*e as usize][usize::from(!forward)] -= 1);
+            // Without a rim of its own it is a wall between parts of a body.
+            work.is_changed_by(if free { RepairName::Surplus } else { RepairName::CommonWall });
             sheet.triangles.iter().for_each(|t| work.kill(*t));
             removed += sheet.triangles.len() as u64;
         }

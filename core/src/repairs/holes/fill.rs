@@ -48,6 +48,7 @@ pub(crate) const REPAIR: Repair = Repair {
         cx.handed.across = closed.across;
         cx.account.doubts.extend(closed.doubts);
         cx.account.doubts.extend(closed.judged.doubts);
+        cx.handed.explained = closed.judged.explained;
         cx.account.explained.area += closed.judged.area;
         cx.account.explained.reached.add(&closed.judged.reached);
         if let Some(meant) = &mut cx.account.enclosed.meant {
@@ -172,13 +173,24 @@ pub(crate) fn close_again(
     let shapes = Shapes::of(submesh, &rims, threads);
     let admission = Admission::of(survey, work, &rims, &shapes, reversed, tolerance, (&free, None));
     let max_edges = profile.max_hole_edges as usize;
-    let mut closing = Closing { admission, max_edges, rims, placed: Vec::new(), open: Vec::new(), joints: Vec::new() };
+    let mut closing = Closing {
+        admission,
+        max_edges,
+        may_add: false,
+        rims,
+        placed: Vec::new(),
+        open: Vec::new(),
+        joints: Vec::new(),
+        doubts: Vec::new(),
+        not_meant: 0.0,
+    };
     closing.triangulate(work, 0, threads);
     if let Some(settings) = shape_settings(profile) {
-        fair::smooth(survey, work, &mut closing.placed, &settings, threads);
+        let all: Vec<usize> = (0..closing.placed.len()).collect();
+        fair::smooth(survey, work, &mut closing.placed, &all, &settings, threads);
     }
     if profile.check_self_intersections {
-        closing.guard(survey, work, reversed);
+        closing.guard(survey, work, reversed, shape_settings(profile), threads);
     }
 }
 

@@ -85,6 +85,8 @@ pub(crate) struct Handed {
     pub(crate) kept_open: Vec<[f32; 3]>,
     /// Patches that cross what is there, and are to be cut. Of the filling, for the resolution.
     pub(crate) across: Vec<PatchAcross>,
+    /// The triangles of patches that nothing speaks against. Of the filling, for the skin.
+    pub(crate) explained: Vec<u32>,
     /// Points in the bodies, before any is cut or removed.
     pub(crate) probes: Option<Probes>,
     /// Bodies that cutting left and no printer can see, which are gone.

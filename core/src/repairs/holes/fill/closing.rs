@@ -43,6 +43,8 @@ pub(crate) struct Judged {
     pub(crate) doubts: Vec<String>,
     /// Area of the patches that nothing speaks against.
     pub(crate) area: f64,
+    /// Their triangles.
+    pub(crate) explained: Vec<u32>,
     /// Around those of them that reach beyond their loops.
     pub(crate) reached: Bounds,
     /// What these enclose more than cones over their loops.

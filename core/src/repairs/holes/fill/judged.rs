@@ -108,6 +108,7 @@ impl Judged {
     fn explain(&mut self, submesh: &Submesh, patch: &Placed) {
         patch.triangles().filter(|t| submesh.lives(*t)).for_each(|t| self.reached.include(&submesh.points(t)));
         self.area += area(submesh, patch);
+        self.explained.extend(patch.triangles());
     }
 
     fn flat(
@@ -137,6 +138,7 @@ impl Judged {
             return None;
         }
         self.area += size;
+        self.explained.extend(patch.triangles());
         None
     }
 }

@@ -80,11 +80,11 @@ impl Said {
     }
 
     /// Does the file say that this is a body? Most triangles have the direction that it has; unless the piece around, of which it is known
-    /// where is out, has as many wrong ones as this would have as a cavity.
-    fn is_a_body(&self, host: Option<&Self>) -> bool {
+    /// where is out, has as many wrong ones, this share, as this would have as a cavity.
+    fn is_a_body(&self, host: Option<f64>) -> bool {
         let (all, own) = (self.triangles as f64, self.share_turned());
         let most = own * all < all / 2.0 - CHANCE * all.sqrt();
-        most && host.map(Self::share_turned).is_none_or(|host| (own - host).abs() <= (1.0 - own - host).abs())
+        most && host.is_none_or(|host| (own - host).abs() <= (1.0 - own - host).abs())
     }
 }
 
@@ -123,7 +123,10 @@ fn meant_for_cavities(
         }
         found.turns[p] = profile.hollow == Hollow::Keep || said[p].is_mixed();
         let host = around.iter().max_by_key(|(o, _)| all_around[*o as usize].around.len());
-        let host = host.map(|(o, _)| &said[*o as usize]);
+        let host = host.map(|(o, _)| match (found.turns[*o as usize], said[*o as usize].share_turned()) {
+            (true, share) => 1.0 - share,
+            (false, share) => share,
+        });
         if found.turns[p] && profile.hollow != Hollow::Keep && said[p].is_a_body(host) {
             found.guessed.push(piece.bounds);
         }
@@ -213,5 +216,13 @@ mod tests {
             (got.result.0, got.defects.cavities)
         };
         assert_eq!([1, 4, 8, 11].map(with_turned), [(0, 0), (1, 1), (0, 1), (0, 1)]);
+    }
+
+    #[test]
+    fn the_file_calls_it_a_body_unless_the_piece_around_has_as_many_wrong_triangles_as_a_cavity_would() {
+        let is_a_body = |turned: u64, host: Option<f64>| Said { triangles: 1000, turned }.is_a_body(host);
+        assert!(is_a_body(400, None) && is_a_body(400, Some(0.375)));
+        assert!(!is_a_body(400, Some(0.625)));
+        assert!(!is_a_body(460, None), "chance");
     }
 }

@@ -34,8 +34,9 @@ pub(crate) const THIN: f64 = 0.02;
 const TORN: f64 = 1.0 / 16.0;
 /// Of what is torn, rims are left open whose patch is at least this share of the surface. Others are holes in the sheet.
 const OF_A_SHEET: f64 = 0.05;
-/// What is less of the whole area than this is as well closed as left open.
-const SUBSTANTIAL: f64 = 0.01;
+/// A torn sheet has at least this share of the whole area, a one-sided one that: smaller parts, which lack faces, are rather closed than lost.
+const SUBSTANTIAL: f64 = 0.05;
+const SUBSTANTIAL_ONE_SIDED: f64 = 0.01;
 /// Components that are looked at triangle by triangle, at most, the largest first, and triangles of all of them: some 100 bytes each.
 const MOST_LOOKED_AT: usize = 256;
 const MOST_TRIANGLES: u64 = 1 << 21;
@@ -213,8 +214,11 @@ impl Mouths {
 
     /// Which components pass through what would close them, or are one-sided and have hardly more than a rim.
     fn torn(&self, survey: &Survey<'_>, submesh: &Submesh, components: &Components, reversed: &Reversed) -> Vec<bool> {
-        let least = SUBSTANTIAL * self.mouths.iter().map(|mouth| mouth.area).sum::<f64>();
-        let may_be = |mouth: &Mouth| mouth.area >= least && mouth.is_wide() && !mouth.is_unclear;
+        let whole: f64 = self.mouths.iter().map(|mouth| mouth.area).sum();
+        let may_be = |mouth: &Mouth| {
+            let least = if mouth.is_one_sided { SUBSTANTIAL_ONE_SIDED } else { SUBSTANTIAL };
+            mouth.area >= least * whole && mouth.is_wide() && !mouth.is_unclear
+        };
         let mut torn: Vec<bool> =
             self.mouths.iter().map(|mouth| may_be(mouth) && mouth.is_one_sided && mouth.cones >= mouth.area).collect();
         let is_asked = |c: &usize| may_be(&self.mouths[*c]) && !torn[*c];

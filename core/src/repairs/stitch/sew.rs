@@ -36,6 +36,9 @@ pub(crate) const REPAIR: Repair = Repair {
 /// From one width to the next.
 const STEP: f64 = 10.0;
 
+/// How often what was of no use is taken out and the rest tried again.
+const TRIES: usize = 8;
+
 /// What was sewn.
 #[derive(Debug, Default)]
 pub(crate) struct Sewn {
@@ -80,7 +83,7 @@ fn split(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile, width: &Wi
     let known = rims::Rims::of(survey, submesh, edges, width, &[]);
     let mut wanted = splits::wanted(submesh, edges, &known);
     let before = work.triangles.clone();
-    for _ in 0..weld::ATTEMPTS {
+    for _ in 0..TRIES {
         if wanted.is_empty() {
             break;
         }
@@ -105,12 +108,19 @@ fn join(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile, width: &Wid
     let (submesh, edges) = work.edges();
     let left_open = zip::left_open(submesh, edges, &width.tolerance, profile);
     let known = rims::Rims::of(survey, submesh, edges, width, &left_open);
-    let matches = known.matches(submesh);
+    let mut matches = known.matches(submesh);
     if matches.is_empty() {
         return None;
     }
     let vertices = boundary_vertices(edges);
-    let (clusters, widest) = clusters::of(submesh, &vertices, &known, &matches);
+    let mut chosen = clusters::of(submesh, &vertices, &known, &matches);
+    for _ in 0..TRIES {
+        if !known.drop_poor(submesh, &chosen.is_used, &mut matches) {
+            break;
+        }
+        chosen = clusters::of(submesh, &vertices, &known, &matches);
+    }
+    let clusters::Chosen { clusters, widest, .. } = chosen;
     let (Welded { vertices, taken_back }, target) = weld::weld_clusters(survey, work, clusters, weld::Moves::Steady);
     if taken_back > 0 {
         tracing::info!(clusters = taken_back, "Joins of rims taken back, since they spoiled triangles around.");

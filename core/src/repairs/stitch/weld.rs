@@ -36,7 +36,7 @@ pub(crate) struct Welded {
 }
 
 /// How often clusters that made a defect are taken out and the rest tried again.
-pub(crate) const ATTEMPTS: usize = 4;
+const ATTEMPTS: usize = 4;
 
 /// Welds boundary vertices. O(n log n) in the boundary.
 pub(crate) fn weld(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) -> Welded {

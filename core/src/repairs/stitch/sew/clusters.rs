@@ -4,9 +4,18 @@ use crate::repairs::stitch::sew::rims::{Match, Rims};
 use crate::submesh::{Submesh, Vertex};
 use crate::util::union_find;
 
-/// Takes the matches in their order where they go with those before; returns the sets of two or more vertices that become one, and the width of the
-/// widest match that was taken.
-pub(crate) fn of(submesh: &Submesh, vertices: &[Vertex], rims: &Rims, matches: &[Match]) -> (Vec<Vec<Vertex>>, f64) {
+/// What is to be joined.
+pub(crate) struct Chosen {
+    /// Sets of two or more vertices that become one.
+    pub(crate) clusters: Vec<Vec<Vertex>>,
+    /// By place in [`Rims::edges`].
+    pub(crate) is_used: Vec<bool>,
+    /// Width of the widest match that was taken.
+    pub(crate) widest: f64,
+}
+
+/// Takes the matches in their order where they go with those before.
+pub(crate) fn of(submesh: &Submesh, vertices: &[Vertex], rims: &Rims, matches: &[Match]) -> Chosen {
     let mut taken = Taken::of(submesh, vertices);
     let mut is_used = vec![false; rims.edges.len()];
     let mut widest = 0.0f64;
@@ -19,7 +28,7 @@ pub(crate) fn of(submesh: &Submesh, vertices: &[Vertex], rims: &Rims, matches: &
             widest = widest.max(*width);
         }
     }
-    (taken.clusters(), widest)
+    Chosen { clusters: taken.clusters(), is_used, widest }
 }
 
 /// Which boundary vertices are one so far.

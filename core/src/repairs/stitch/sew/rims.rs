@@ -7,10 +7,13 @@
 //!   turned over;
 //! * their triangles part: where they end in about the same direction, as the two skins of a thin wall do, they lead away from the edge by
 //!   much more than they lie apart now, as at the edge of a wedge;
+//! * beyond the first step, half of each rim is matched, by length: surfaces that come near each other with a part of their rims only may stand
+//!   side by side;
 //! * not both belong to bodies with holes, unless to the same one or within the first step: there may be a clearance between them. A body
 //!   with holes has more area than a flat piece can have within a rim as long as all of its rims together (the isoperimetric inequality). For
 //!   edges that do not run against each other, as those of the two walls of a clearance, within each rim for itself.
 
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use glam::DVec3;
@@ -34,6 +37,9 @@ const ALIKE: f64 = 0.5;
 
 /// So many times as far as they lie apart.
 const PART: f64 = 4.0;
+
+/// So much of a rim must be matched, beyond the first step.
+const HALF: f64 = 0.5;
 
 /// An edge with more others within reach is in a tangle that nothing is known of.
 const MOST: usize = 64;
@@ -66,6 +72,8 @@ pub(crate) struct Rims {
     /// By vertex: within which distance it may find its partner. 0 but for boundary vertices.
     pub(crate) reach: Vec<f64>,
     of_triangle: Vec<u32>,
+    /// By edge: a vertex of all of its rim.
+    of_rim: Vec<Vertex>,
     /// By component: a body with holes, by all rims together, and by each.
     is_body: Vec<[bool; 2]>,
     is_crack: bool,
@@ -90,8 +98,28 @@ impl Rims {
             }
             rims.push(RimEdge { ends: [from, to], triangle, number, inward: inward(submesh, triangle, [from, to]) });
         }
-        let is_body = bodies(survey, submesh, edges, &components);
-        Self { edges: rims, reach, of_triangle: components.of_triangle, is_body, is_crack: width.is_crack }
+        let rim_of = by_vertex(submesh, edges);
+        let is_body = bodies(survey, submesh, edges, &components, &rim_of);
+        let of_rim = rims.iter().map(|e: &RimEdge| rim_of[e.ends[0] as usize]).collect();
+        Self { edges: rims, reach, of_rim, of_triangle: components.of_triangle, is_body, is_crack: width.is_crack }
+    }
+
+    /// Leaves out the matches on rims of which less than half is used; says if there were any.
+    pub(crate) fn drop_poor(&self, submesh: &Submesh, is_used: &[bool], matches: &mut Vec<Match>) -> bool {
+        if self.is_crack {
+            return false;
+        }
+        let mut shares: BTreeMap<Vertex, [f64; 2]> = BTreeMap::new();
+        for ((edge, rim), is_used) in self.edges.iter().zip(&self.of_rim).zip(is_used) {
+            let length = submesh.distance(edge.ends[0], edge.ends[1]);
+            let [used, all] = shares.entry(*rim).or_default();
+            *used += if *is_used { length } else { 0.0 };
+            *all += length;
+        }
+        let is_poor = |i: u32| shares.get(&self.of_rim[i as usize]).is_some_and(|[used, all]| *used > 0.0 && used / all < HALF);
+        let before = matches.len();
+        matches.retain(|m| !m.edges.iter().any(|i| is_poor(*i)));
+        matches.len() < before
     }
 
     /// May these two edges, which run against each other or not, become one, if their ends lie so far apart?
@@ -152,16 +180,21 @@ impl Rims {
     }
 }
 
+/// By vertex: one of all that hang together with it by boundary edges.
+fn by_vertex(submesh: &Submesh, edges: &Edges) -> Vec<Vertex> {
+    let mut parents: Vec<Vertex> = (0..submesh.positions.len() as u32).collect();
+    for edge in edges.iter().filter(Edge::is_boundary) {
+        union_find::unite(&mut parents, edge.low, edge.high);
+    }
+    (0..parents.len() as u32).map(|v| union_find::find(&mut parents, v)).collect()
+}
+
 /// Which components are bodies with holes, by all rims together and by each.
-fn bodies(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, components: &Components) -> Vec<[bool; 2]> {
-    let rims: Vec<_> = edges.iter().filter(|e| e.is_boundary()).collect();
-    let mut parents: Vec<u32> = (0..submesh.positions.len() as u32).collect();
-    rims.iter().for_each(|e| {
-        union_find::unite(&mut parents, e.low, e.high);
-    });
+fn bodies(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, components: &Components, rim_of: &[Vertex]) -> Vec<[bool; 2]> {
+    let rims = edges.iter().filter(|e| e.is_boundary());
     let of = |e: &Edge<'_>| components.of_triangle[e.uses[0].triangle as usize];
     let mut lengths: Vec<(u32, u32, f64)> =
-        rims.iter().map(|e| (of(e), union_find::find(&mut parents, e.low), submesh.distance(e.low, e.high))).collect();
+        rims.map(|e| (of(&e), rim_of[e.low as usize], submesh.distance(e.low, e.high))).collect();
     lengths.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2)));
     let disc = |perimeter: f64| perimeter * perimeter / (4.0 * PI);
     let sum = |rim: &[(u32, u32, f64)]| rim.iter().map(|(_, _, length)| length).sum::<f64>();

@@ -161,7 +161,7 @@ impl Surface {
                 triangles: part.triangles,
                 sample: part.sample,
                 looked_at: seen.filter(|seen| !seen.is_ambiguous()).map_or(0.0, |_| area),
-                front: seen.filter(|seen| !seen.is_ambiguous()).map_or(0.0, |seen| area * seen.from_the_front()),
+                front: seen.filter(|seen| !seen.is_ambiguous()).map_or(0.0, |seen| area * seen.seen_from_the_front()),
             }
         };
         (0..).zip(&self.parts.list).map(part).collect()
@@ -184,7 +184,7 @@ impl Sightings {
     }
 
     /// The share of points seen from the front, less that of those seen from behind.
-    fn from_the_front(&self) -> f64 {
+    fn seen_from_the_front(&self) -> f64 {
         (self.front as f64 - self.back as f64) / self.points as f64
     }
 }

@@ -35,7 +35,9 @@ const SAME: f64 = 0.9999;
 /// Corners of a plane that need no other witness.
 const CORNERS: usize = 4;
 /// Sine of the turn at a corner, at least.
-const TURN: f64 = 0.01;
+const TURN: f64 = 0.2;
+/// Right angles witness a plane in which they hold along a run that is this wide for its length: beside a shallow arc there are some, too.
+const BROAD: f64 = 0.05;
 
 /// A patch of flat pieces.
 #[derive(Debug)]
@@ -165,11 +167,13 @@ fn witness(piece: &[u32], normal: DVec3, beyond: &[Option<DVec3>], tolerance: f6
         .filter(|[a, b]| (*a as usize) < n && (*a as usize + 1) % n == *b as usize)
         .collect();
     let cosine = |edge: &[u32; 2]| beyond[edge[0] as usize].map(|b| b.dot(normal));
-    let tells = |wanted: &dyn Fn(f64) -> bool| {
+    let tells = |wanted: &dyn Fn(f64) -> bool, broad: f64| {
         let ends = edges.iter().filter(|e| cosine(e).is_some_and(wanted)).flatten().map(|v| place(*v));
-        !matches!(lie(ends.collect::<Vec<_>>().iter().copied(), tolerance), Lie::Line)
+        let ends: Vec<DVec3> = ends.collect();
+        let length = ends.iter().map(|p| p.distance(ends[0])).fold(0.0, f64::max);
+        !matches!(lie(ends.iter().copied(), tolerance.max(broad * length)), Lie::Line)
     };
-    if tells(&|c| c > SAME) {
+    if tells(&|c| c > SAME, 0.0) {
         return Witness::Surface;
     }
     let turns = |i: &usize| {
@@ -183,7 +187,11 @@ fn witness(piece: &[u32], normal: DVec3, beyond: &[Option<DVec3>], tolerance: f6
     if edges.is_empty() || !edges.iter().all(|e| cosine(e).is_none_or(is_square)) {
         return Witness::None;
     }
-    if tells(&is_square) { Witness::Corners } else { Witness::Assumed }
+    match (tells(&is_square, BROAD), tells(&is_square, 0.0)) {
+        (true, _) => Witness::Corners,
+        (false, false) => Witness::Assumed,
+        (false, true) => Witness::None,
+    }
 }
 
 /// Do pieces meet at angles at which no smooth surface is bent?

@@ -74,3 +74,16 @@ fn a_flat_loop_is_no_matter_of_several_planes() {
     let corners: Vec<Point> = corner_lost().iter().map(|(p, _)| *p).collect();
     assert!(!lie_in_a_plane(&corners));
 }
+
+#[test]
+fn a_shallow_arc_is_no_face() {
+    // A square hole in a cylinder's wall, which bulges by a hundredth.
+    let arc = |x: f32| 0.01 - 0.01 * (x - 1.0) * (x - 1.0);
+    let mut rim: Vec<(Point, Point)> = Vec::new();
+    let steps: Vec<f32> = (0..8).map(|i| i as f32 / 4.0).collect();
+    rim.extend(steps.iter().map(|x| ([*x, 0.0, arc(*x)], [*x, -1.0, arc(*x)])));
+    rim.extend(steps.iter().map(|y| ([2.0, *y, 0.0], [3.0, *y, arc(3.0)])));
+    rim.extend(steps.iter().map(|x| ([2.0 - x, 2.0, arc(*x)], [2.0 - x, 3.0, arc(*x)])));
+    rim.extend(steps.iter().map(|y| ([0.0, 2.0 - y, 0.0], [-1.0, 2.0 - y, arc(-1.0)])));
+    assert!(closed(&rim, true).is_none());
+}

@@ -169,3 +169,59 @@ proptest! {
         prop_assert_eq!((got.defects.boundary_edges, got.defects.nonmanifold_edges), (said, 0), "{:?}", got.result);
     }
 }
+
+/// What lies between circles about the axis: radius and height of each, upwards and outwards. The first and last one may be points.
+fn turned(profile: &[[f32; 2]]) -> Vec<Corners> {
+    const SIDES: u32 = 24;
+    let at = |[r, z]: [f32; 2], side: u32| {
+        let turn = std::f32::consts::TAU * (side % SIDES) as f32 / SIDES as f32;
+        [r * turn.cos(), r * turn.sin(), z]
+    };
+    let between = |(low, high): (&[f32; 2], &[f32; 2]), side: u32| {
+        let quad = [at(*low, side), at(*low, side + 1), at(*high, side + 1), at(*high, side)];
+        [[quad[0], quad[1], quad[2]], [quad[0], quad[2], quad[3]]]
+    };
+    let rows = profile.iter().zip(&profile[1..]);
+    let all = rows.flat_map(|row| (0..SIDES).flat_map(move |side| between(row, side)));
+    all.filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]).collect()
+}
+
+#[test]
+fn half_of_a_ball_is_a_doubtful_guess_and_a_tube_is_none() {
+    let judged = |profile: &[[f32; 2]]| after(&turned(profile), |d, _| fill(d, &Profile::default())).result.judged;
+    // From the equator to the pole.
+    let half: Vec<[f32; 2]> = (0..=12)
+        .map(|row| {
+            let turn = std::f32::consts::FRAC_PI_2 * row as f32 / 12.0;
+            [if row == 12 { 0.0 } else { turn.cos() }, turn.sin()]
+        })
+        .collect();
+    let of_half = judged(&half);
+    assert_eq!((of_half.doubts.len(), of_half.area), (1, 0.0));
+    assert!(of_half.doubts[0].contains("mouth"), "{}", of_half.doubts[0]);
+    // The same height in straight rows, without top and bottom.
+    let tube: Vec<[f32; 2]> = (0..=12).map(|row| [1.0, row as f32 / 12.0]).collect();
+    let of_tube = judged(&tube);
+    assert!(of_tube.doubts.is_empty(), "{:?}", of_tube.doubts);
+    // Two polygons of 24 sides.
+    let lids = 24.0 * (std::f64::consts::TAU / 24.0).sin();
+    assert!((of_tube.area - lids).abs() < 1e-4, "{} {lids}", of_tube.area);
+}
+
+#[test]
+fn a_ragged_hole_in_both_skins_of_a_plate_is_no_way_through() {
+    // Squares stand into the hole from all of its sides.
+    let is_tooth =
+        |x: u8, y: u8| ([4, 11].contains(&x) && [5, 7, 9].contains(&y)) || ([4, 11].contains(&y) && [6, 8].contains(&x));
+    let square = |x: u8, y: u8| !((4..12).contains(&x) && (4..12).contains(&y));
+    let ragged = |x: u8, y: u8| square(x, y) || is_tooth(x, y);
+    let methods = |is_there: &dyn Fn(u8, u8) -> bool| {
+        let low = reversed(&plate(16, is_there));
+        let skins = [shifted(&plate(16, is_there), [0.0, 0.0, 0.5]), low].concat();
+        let profile = Profile { max_hole_edges: 60, ..Profile::default() };
+        after(&skins, |d, _| fill(d, &profile)).result.by_method
+    };
+    // The plate's own rim is longer than that.
+    assert_eq!(methods(&ragged), BTreeMap::from([("planar".into(), 2)]));
+    assert_eq!(methods(&square), BTreeMap::from([("annular".into(), 2)]));
+}

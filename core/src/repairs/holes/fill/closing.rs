@@ -21,6 +21,8 @@ pub(crate) struct Closed {
     pub(crate) sheets: Vec<SheetRim>,
     /// A vertex of each loop that was left open on purpose: it was not admitted.
     pub(crate) kept_open: Vec<[f32; 3]>,
+    /// All of these are rims of lone sheets.
+    pub(crate) kept_as_sheets: bool,
     /// Loops that nothing closes which crosses nothing: the triangles of patches that are to be cut along what they cross, and what to say of the
     /// loops if that does not come about.
     pub(crate) across: Vec<PatchAcross>,
@@ -131,6 +133,9 @@ impl Closing<'_> {
         self.open.sort_by_key(|(rim, _)| *rim);
         let kept = self.open.iter().filter(|(_, reason)| matches!(reason, NotFilled::NotAdmitted(_)));
         closed.kept_open = kept.map(|(rim, _)| work.positions[self.rim(*rim).vertices[0] as usize]).collect();
+        let is_sheet = |reason: &NotFilled| matches!(reason, NotFilled::NotAdmitted(NotAdmitted::Sheet));
+        let mut not_admitted = self.open.iter().filter(|(_, reason)| matches!(reason, NotFilled::NotAdmitted(_)));
+        closed.kept_as_sheets = not_admitted.all(|(_, reason)| is_sheet(reason));
         for (i, (rim, reason)) in self.open.iter().enumerate() {
             let rim = self.rim(*rim);
             if matches!(reason, NotFilled::NotAdmitted(NotAdmitted::Sheet)) {

@@ -47,7 +47,8 @@ pub(crate) const REPAIR: Repair = Repair {
             } else {
                 Some(Vec::new())
             };
-            let (kept_open, means) = (&cx.handed.kept_open, (cx.limits.threads, cx.progress));
+            let kept_open = (cx.handed.kept_open.as_slice(), cx.handed.kept_as_sheets || cx.handed.kept_open.is_empty());
+            let means = (cx.limits.threads, cx.progress);
             let wraps = replace(cx.survey, &mut cx.work, &mut cx.reversed, pairs.as_deref(), kept_open, cx.profile, means);
             count = wraps.regions;
             cx.account.wraps = wraps.listed;
@@ -71,14 +72,14 @@ pub(crate) fn is_broken(work: &mut Work<'_>) -> bool {
 }
 
 /// Replaces what is no solid, as far as the profile allows. `pairs`: as [`Overlay::crossing_triangles`] finds them (empty if nobody looked for any);
-/// `kept_open`: a vertex of each loop that was left open on purpose. Reads the chunks where groups have regular surface, and all for every round
+/// `kept_open`: a vertex of each loop that was left open on purpose; `may_be_soup`: none of them but as a sheet's rim. Reads the chunks where groups have regular surface, and all for every round
 /// of wraps.
 pub(crate) fn replace(
     survey: &Survey<'_>,
     work: &mut Work<'_>,
     reversed: &mut Reversed,
     pairs: Option<&[[Which; 2]]>,
-    kept_open: &[[f32; 3]],
+    (kept_open, may_be_soup): (&[[f32; 3]], bool),
     profile: &Profile,
     (threads, progress): (usize, &dyn Progress),
 ) -> Wraps {
@@ -88,9 +89,10 @@ pub(crate) fn replace(
     if !groups.broken.contains(&true) {
         return wraps;
     }
+    let is_soup = may_be_soup && groups.unite_soup(&pieces);
     let (submesh, edges) = work.edges();
     let sheets = Components::of(survey, submesh, edges, reversed, Through::ManifoldEdges);
-    let site = Site { survey, submesh, reversed, pieces: &pieces, sheets: &sheets, profile, threads, progress };
+    let site = Site { survey, submesh, reversed, pieces: &pieces, sheets: &sheets, profile, is_soup, threads, progress };
     let mut outcomes: BTreeMap<Vec<u32>, Outcome> = BTreeMap::new();
     for round in 0..=ROUNDS {
         if progress.cancelled() {

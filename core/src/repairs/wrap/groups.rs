@@ -9,6 +9,9 @@ use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 use std::collections::BTreeMap;
 
+/// A soup has so many open pieces at least, and none of them is more than four times their mean if there are no more.
+const SOUP_PIECES: usize = 16;
+
 /// Which pieces are to be replaced together.
 pub(crate) struct Groups {
     pub(crate) parents: Vec<u32>,
@@ -76,6 +79,22 @@ impl Groups {
             }
         }
         groups
+    }
+
+    /// Makes one group of all open pieces if the surface is a soup of them: many, none of them much of it, and together most of all surface. Each
+    /// for itself bounds nothing, as a sheet does; whether they do together is seen when they are wrapped. Returns whether it is one.
+    pub(crate) fn unite_soup(&mut self, pieces: &Components) -> bool {
+        let area = |piece: &u32| pieces.list[*piece as usize].extent.area;
+        let open: Vec<u32> = (0..pieces.list.len() as u32).filter(|piece| pieces.list[*piece as usize].open).collect();
+        let all: i128 = pieces.list.iter().map(|piece| piece.extent.area).sum();
+        let of_open: i128 = open.iter().map(area).sum();
+        let largest = open.iter().map(area).max().unwrap_or(0);
+        if open.len() < SOUP_PIECES || of_open * 2 <= all || largest * SOUP_PIECES as i128 > of_open * 4 {
+            return false;
+        }
+        open.windows(2).for_each(|pair| self.unite(pair[0], pair[1]));
+        open.iter().for_each(|piece| self.kept[*piece as usize] = false);
+        true
     }
 
     pub(crate) fn unite(&mut self, a: u32, b: u32) {

@@ -31,6 +31,9 @@ const LEAST_CUBES: f64 = 2048.0;
 /// its width.
 const NOTHING: f64 = 1e-3;
 
+/// What a soup winds around what is behind its triangles, on average: 1 if nothing is missing, ½ for sheets that bound nothing.
+const BEHIND: f64 = 0.75;
+
 /// Triangles that are looked at to tell how far a surface moved, at most, by their corners and middles.
 const SAMPLES: usize = 1 << 13;
 
@@ -52,6 +55,8 @@ pub(crate) struct Site<'s, 'a> {
     /// What hangs together through edges of two triangles.
     pub(crate) sheets: &'s Components,
     pub(crate) profile: &'s Profile,
+    /// What is wrapped is a soup: it may be the surfaces of nothing.
+    pub(crate) is_soup: bool,
     pub(crate) threads: usize,
     pub(crate) progress: &'s dyn Progress,
 }
@@ -156,6 +161,10 @@ impl Site<'_, '_> {
             of_turned.for_each(|(_, corners)| corners.swap(1, 2));
             tree = Tree::winding(&triangles);
         }
+        if self.is_soup && !encloses(&triangles, &tree) {
+            outcome.give_up("open surfaces that enclose nothing together");
+            return;
+        }
         let told = &mut outcome.told;
         let cubes = (CUBES * told.area_share).max(LEAST_CUBES) as u32;
         let Some(Wrapping { triangles: new, cell, volume }) = wrap(&triangles, &tree, cubes, self.threads, self.progress) else {
@@ -253,6 +262,24 @@ impl Site<'_, '_> {
             }
         }
     }
+}
+
+/// Does a soup bound something? On the side that its triangles face there is mostly nothing then, and material behind them. O(n log n) for so many
+/// samples at most.
+fn encloses(triangles: &[Corners], tree: &Tree) -> bool {
+    let mut bounds = Bounds::EMPTY;
+    triangles.iter().for_each(|t| bounds.include(t));
+    let off = bounds.diagonal() * 1e-3;
+    let (mut before, mut behind, mut all) = (0.0, 0.0, 0.0);
+    for t in triangles.iter().step_by(triangles.len().div_ceil(SAMPLES).max(1)) {
+        let [a, b, c] = t.map(place);
+        let (middle, vector) = ((a + b + c) / 3.0, (b - a).cross(c - a));
+        let (normal, area) = (vector.normalize_or_zero() * off, vector.length());
+        before += area * tree.winding_number(middle + normal);
+        behind += area * tree.winding_number(middle - normal);
+        all += area;
+    }
+    behind >= BEHIND * all && before <= (1.0 - BEHIND) * all
 }
 
 /// How far a winding number is from 0, 1, 2, …

@@ -26,7 +26,7 @@ fn wrapped(mesh: &[Corners], kept_open: &[[f32; 3]], profile: &Profile, limits: 
     let mut reversed = Reversed::none(&d.survey);
     let work = &mut Work::new(&mut d.submesh);
     let pairs = Overlay::of(&d.survey, work, &reversed).and_then(|overlay| overlay.crossing_triangles(&d.survey, work));
-    let wraps = replace(&d.survey, work, &mut reversed, pairs.as_deref(), kept_open, profile, (limits.threads, &Quiet));
+    let wraps = replace(&d.survey, work, &mut reversed, pairs.as_deref(), (kept_open, false), profile, (limits.threads, &Quiet));
     let edit = Edit::of(&d.survey, &d.submesh, &reversed, &wraps.triangles);
     let output = written(&edit, &input);
     let defects = diagnose(&output).defects;

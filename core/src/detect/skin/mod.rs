@@ -23,6 +23,7 @@ use crate::submesh::components::{Components, Reversed};
 use crate::topology::survey::Survey;
 
 use samples::Samples;
+use seen::OnSurface;
 pub(crate) use surfaces::Surfaces;
 use surfaces::Which;
 
@@ -65,7 +66,8 @@ fn change(surfaces: &Surfaces<'_>, [of, other]: [Which; 2], samples: &Samples, r
     let every = far.len().div_ceil(ASKED).max(1);
     let asked: Vec<u32> = far.into_iter().step_by(every).collect();
     let at = |s: &u32| samples.points[*s as usize];
-    let can_be_seen = seen::from_outside(surfaces, of, &asked.iter().map(at).collect::<Vec<_>>(), reach);
+    let on_surface = |s: &u32| OnSurface { at: at(s), front: samples.fronts[*s as usize] };
+    let can_be_seen = seen::from_outside(surfaces, of, &asked.iter().map(on_surface).collect::<Vec<_>>(), reach);
     let visible: Vec<u32> = asked.into_iter().zip(can_be_seen).filter(|(_, seen)| *seen).map(|(s, _)| s).collect();
     if visible.is_empty() {
         return SkinChange::default();

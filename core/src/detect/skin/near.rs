@@ -31,7 +31,7 @@ pub(super) fn distances(surfaces: &Surfaces<'_>, which: Which, points: &[[f64; 3
     let mut distances = vec![farthest; points.len()];
     let mut left: Vec<u32> = (0..points.len() as u32).collect();
     let mut wide = reach * WIDER;
-    while !left.is_empty() && wide > 0.0 && wide < farthest {
+    while !left.is_empty() && wide > 0.0 {
         let squares = squares_within(surfaces, which, points, &left, (wide, Asked::HowFar));
         let mut squares = squares.into_iter();
         left.retain(|p| {
@@ -39,7 +39,10 @@ pub(super) fn distances(surfaces: &Surfaces<'_>, which: Which, points: &[[f64; 3
             is_near.iter().for_each(|square| distances[*p as usize] = square.sqrt());
             is_near.is_none()
         });
-        wide *= WIDER;
+        if wide >= farthest {
+            break;
+        }
+        wide = (wide * WIDER).min(farthest);
     }
     distances
 }

@@ -1,5 +1,7 @@
 //! Points on triangles, as many as their area asks for.
 
+use glam::DVec3;
+
 use crate::contract::report::RepairName;
 
 use super::surfaces::Surfaces;
@@ -13,13 +15,15 @@ const SPACING: f64 = 0.5;
 #[derive(Default)]
 pub(super) struct Samples {
     pub(super) points: Vec<[f64; 3]>,
+    /// Where the surface faces at each of them.
+    pub(super) fronts: Vec<DVec3>,
     /// The repair that changed the surface there.
     pub(super) causes: Vec<Option<RepairName>>,
     pub(super) area_of_each: f64,
 }
 
 /// Points of one triangle, by the triangle's number.
-type Taken = (u32, Option<RepairName>, Vec<[f64; 3]>);
+type Taken = (u32, (Option<RepairName>, DVec3), Vec<[f64; 3]>);
 
 impl Samples {
     /// On what is not there any more.
@@ -60,7 +64,8 @@ impl Samples {
 
     fn of(taken: Vec<Taken>, area_of_each: f64) -> Self {
         let mut samples = Self { area_of_each, ..Self::default() };
-        for (_, by, points) in taken {
+        for (_, (by, front), points) in taken {
+            samples.fronts.extend(points.iter().map(|_| front));
             samples.causes.extend(points.iter().map(|_| by));
             samples.points.extend(points);
         }
@@ -74,8 +79,9 @@ fn area_of_each(area: f64, reach: f64) -> f64 {
 
 /// Points on a triangle, on average one for each such area. A number of the triangle decides where, and what becomes of the rest of the area.
 fn take(taken: &mut Vec<Taken>, number: u32, corners: &[[f32; 3]; 3], by: Option<RepairName>, each: f64) {
-    let [a, b, c] = corners.map(|p| glam::DVec3::from_array(p.map(f64::from)));
-    let count = (b - a).cross(c - a).length() / 2.0 / each + fraction(number);
+    let [a, b, c] = corners.map(|p| DVec3::from_array(p.map(f64::from)));
+    let front = (b - a).cross(c - a);
+    let count = front.length() / 2.0 / each + fraction(number);
     if !count.is_finite() || count < 1.0 {
         return;
     }
@@ -86,7 +92,7 @@ fn take(taken: &mut Vec<Taken>, number: u32, corners: &[[f32; 3]; 3], by: Option
         let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
         (a + (b - a) * u + (c - a) * v).to_array()
     });
-    taken.push((number, by, points.collect()));
+    taken.push((number, (by, front), points.collect()));
 }
 
 /// A number from 0 to 1 that looks drawn at random.

@@ -1,29 +1,39 @@
 //! Which points of a surface can be seen from outside.
 //!
 //! From each point rays run into fourteen directions: along the axes, a little askew, so that no wall of a part that stands straight holds one,
-//! and towards the corners of a cube. Rays go both ways through a surface, so that it does not matter which side is meant to be outside. A point can
-//! be seen if one of its rays meets nothing. What is next to the point itself does not count.
+//! and towards the corners of a cube. A point can be seen if one of the rays on the front of its surface meets nothing. What is seen from behind only
+//! bounds no material: the part of a cavity that pokes out of its wall. What is next to the point itself does not count.
 //!
 //! A direction is made the upright one by a shear, in which both triangles at an edge still have the same edge; so no ray slips through.
 
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
+use glam::DVec3;
+
 use crate::geometry::position;
 
 use super::surfaces::{Surfaces, Which};
+
+/// A point on a surface.
+#[derive(Clone, Copy)]
+pub(super) struct OnSurface {
+    pub(super) at: [f64; 3],
+    /// Where the surface faces; of any length.
+    pub(super) front: DVec3,
+}
 
 /// The share of the reach within which surface is next to a point.
 const BESIDE: f64 = 0.02;
 
 /// Which of these points, which lie on a surface, can be seen from outside. O(triangles under rays), and reads the file twice at most.
-pub(super) fn from_outside(surfaces: &Surfaces<'_>, which: Which, points: &[[f64; 3]], reach: f64) -> Vec<bool> {
+pub(super) fn from_outside(surfaces: &Surfaces<'_>, which: Which, points: &[OnSurface], reach: f64) -> Vec<bool> {
     let mut seen = vec![false; points.len()];
     for directions in [straight(), corners()] {
         let hidden: Vec<u32> = (0..points.len() as u32).filter(|p| !seen[*p as usize]).collect();
         if hidden.is_empty() {
             break;
         }
-        let here: Vec<[f64; 3]> = hidden.iter().map(|p| points[*p as usize]).collect();
+        let here: Vec<OnSurface> = hidden.iter().map(|p| points[*p as usize]).collect();
         for (p, is_free) in hidden.iter().zip(are_free(surfaces, which, &here, &directions, reach * BESIDE)) {
             seen[*p as usize] = is_free;
         }
@@ -32,7 +42,7 @@ pub(super) fn from_outside(surfaces: &Surfaces<'_>, which: Which, points: &[[f64
 }
 
 /// Does any ray of each point meet nothing?
-fn are_free(surfaces: &Surfaces<'_>, which: Which, points: &[[f64; 3]], directions: &[Direction], beside: f64) -> Vec<bool> {
+fn are_free(surfaces: &Surfaces<'_>, which: Which, points: &[OnSurface], directions: &[Direction], beside: f64) -> Vec<bool> {
     let bundles: Vec<Bundle> = directions.iter().map(|direction| Bundle::of(*direction, points, beside)).collect();
     let meet = |corners: &[[f32; 3]; 3]| {
         let corners = corners.map(|p| p.map(f64::from));
@@ -45,7 +55,11 @@ fn are_free(surfaces: &Surfaces<'_>, which: Which, points: &[[f64; 3]], directio
         |(), _| true,
         |(), triangle, _| meet(&position::corners(&surfaces.survey.records[triangle as usize])),
     );
-    (0..points.len()).map(|p| bundles.iter().any(|bundle| !bundle.met[p].load(Relaxed))).collect()
+    let is_free = |p: usize| {
+        let in_front = bundles.iter().filter(|bundle| bundle.direction.along().dot(points[p].front) > 0.0);
+        in_front.into_iter().any(|bundle| !bundle.met[p].load(Relaxed))
+    };
+    (0..points.len()).map(is_free).collect()
 }
 
 /// A direction, by the axis that it is nearest to.
@@ -59,6 +73,14 @@ struct Direction {
 }
 
 impl Direction {
+    fn along(&self) -> DVec3 {
+        let mut along = [0.0; 3];
+        along[self.axis] = self.way;
+        along[(self.axis + 1) % 3] = self.askew[0];
+        along[(self.axis + 2) % 3] = self.askew[1];
+        DVec3::from_array(along)
+    }
+
     /// The coordinates in a frame in which it is upright.
     fn upright(&self, p: [f64; 3]) -> [f64; 3] {
         let [x, y, z] = [1, 2, 0].map(|k| p[(self.axis + k) % 3]);
@@ -93,8 +115,8 @@ struct Bundle {
 }
 
 impl Bundle {
-    fn of(direction: Direction, points: &[[f64; 3]], beside: f64) -> Self {
-        let from: Vec<[f64; 3]> = points.iter().map(|p| direction.upright(*p)).collect();
+    fn of(direction: Direction, points: &[OnSurface], beside: f64) -> Self {
+        let from: Vec<[f64; 3]> = points.iter().map(|p| direction.upright(p.at)).collect();
         let met = from.iter().map(|_| AtomicBool::new(false)).collect();
         let side = ((from.len() as f64).sqrt() as usize * 4).clamp(1, 512);
         let ends = |k: usize| from.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p[k]), b.max(p[k])));

@@ -45,7 +45,8 @@ impl Surfaces<'_> {
         }
     }
 
-    /// The triangles that were there and are not there any more, or not as they were, each by its record, with the repair that did it; but for walls
+    /// The triangles that were there and are not there any more, or not as they were, turned as they were in the end, each by its record, with the
+    /// repair that did it; but for walls
     /// that parts of a body had in common.
     pub(crate) fn each_gone(&self, mut visit: impl FnMut(u32, &Corners, Option<RepairName>)) {
         for t in 0..self.submesh.triangles.len() as u32 {
@@ -54,7 +55,10 @@ impl Surfaces<'_> {
                 && triangle.by != Some(RepairName::CommonWall)
                 && !(self.submesh.lives(t) && is_same(&corners, &self.submesh.points(t)))
             {
-                visit(record, &corners, triangle.by);
+                let [a, b, c] = corners;
+                let points = self.submesh.points(t);
+                let is_turned = points == [a, c, b] || points == [c, b, a] || points == [b, a, c];
+                visit(record, &if is_turned { [a, c, b] } else { corners }, triangle.by);
             }
         }
     }
@@ -70,7 +74,9 @@ impl Surfaces<'_> {
             |_, _| true,
             |into, place, region| {
                 let by = self.dropped_by.get(region as usize).copied().flatten();
-                visit(into, place, &position::corners(&self.survey.records[place as usize]), by);
+                let [a, b, c] = position::corners(&self.survey.records[place as usize]);
+                let is_turned = self.reversed.regions[region as usize];
+                visit(into, place, &if is_turned { [a, c, b] } else { [a, b, c] }, by);
             },
         )
     }

@@ -53,13 +53,10 @@ impl Owners {
         let volumes = closed.iter().map(|c| c.0.abs()).collect();
         let stands = closed
             .into_iter()
-            .map(|(volume, area, patched)| {
-                let size = ((area + patched) / 2.0).powi(3).sqrt();
-                match volume.abs() >= ROOM * size && patched <= PATCHED * area {
-                    true if (volume > 0.0) == (largest > 0.0) => 1,
-                    true => -1,
-                    false => 0,
-                }
+            .map(|(volume, area, patched)| match stands_for_itself(volume, area, patched) {
+                true if (volume > 0.0) == (largest > 0.0) => 1,
+                true => -1,
+                false => 0,
             })
             .collect();
         Self { of_loop, volumes, stands }
@@ -96,6 +93,12 @@ impl Owners {
     fn way(&self, i: usize) -> i8 {
         self.stands.get(self.of_loop[i] as usize).copied().unwrap_or(0)
     }
+}
+
+/// Does a piece of this area stand for itself that encloses this volume with patches of so much area more?
+pub(crate) fn stands_for_itself(volume: f64, area: f64, patched: f64) -> bool {
+    let size = ((area + patched) / 2.0).powi(3).sqrt();
+    volume.abs() >= ROOM * size && patched <= PATCHED * area
 }
 
 /// Volume under a fan over a loop, seen from a point, and its area.

@@ -61,10 +61,11 @@ const HOLE: f64 = 0.7;
 /// Outlines of holes back to back agree as long as no vertex is farther from the other outline, seen along the axis, than this share of the
 /// larger radius: circles of eight facets do.
 const OUTLINE: f64 = 0.15;
-/// And outlines of openings in two bodies, if these were one: what broke may lean, and be turned aside a little.
-const ALIKE_OUTLINE: f64 = 0.5;
-/// The smaller one of these openings has at least this share of the larger one's area.
-const ALIKE_AREA: f64 = 0.6;
+/// And outlines of openings in two bodies, if these were one, laid upon each other by their centres: what broke may lean, and be turned
+/// aside ...
+const ALIKE_OUTLINE: f64 = 0.35;
+/// ... by so much, at most.
+const ASIDE_OUTLINE: f64 = 0.6;
 /// Sine of the turn at a corner of an outline.
 const CORNER: f64 = 0.3;
 /// An outline is ragged if it turns the other way at this share of its vertices,
@@ -130,7 +131,7 @@ impl Ring {
     /// would lie on each other.
     fn may_join_bodies(&self, rims: [&Shape; 2]) -> bool {
         let [a, b] = rims;
-        let alike = a.area().min(b.area()) >= ALIKE_AREA * a.area().max(b.area()) && outlines_agree(a, b, ALIKE_OUTLINE);
+        let alike = outlines_agree(a, b, b.centre - a.centre, ALIKE_OUTLINE) && outlines_agree(a, b, DVec3::ZERO, ASIDE_OUTLINE);
         let open = alike && rims.iter().all(|rim| rim.continues <= MOSTLY_OPEN);
         match self.missing {
             Missing::Tube | Missing::OneSurface => open,
@@ -334,7 +335,7 @@ fn ring(a: &Shape, b: &Shape) -> Option<Ring> {
     let back_to_back = towards.iter().all(|t| *t < 0.0);
     let are_holes = outer.continues.min(inner.continues) >= HOLE;
     let is_way = back_to_back && are_holes && strip < caps && !(is_ragged(outer) && is_ragged(inner));
-    (is_way && outlines_agree(outer, inner, OUTLINE)).then(|| two_planes(Missing::Through(strip, caps))).flatten()
+    (is_way && outlines_agree(outer, inner, DVec3::ZERO, OUTLINE)).then(|| two_planes(Missing::Through(strip, caps))).flatten()
 }
 
 /// Which of `others` a strip may lead to though two caps have less area, the nearest first.
@@ -381,18 +382,18 @@ fn lies_inside(inner: &Shape, outer: &Shape) -> bool {
     some_points(inner).all(|p| outer.surrounds(p))
 }
 
-/// Is neither outline far from the other, seen along the axis?
-fn outlines_agree(a: &Shape, b: &Shape, share: f64) -> bool {
+/// Is neither outline far from the other, which is moved back by `way`, seen along the axis?
+fn outlines_agree(a: &Shape, b: &Shape, way: DVec3, share: f64) -> bool {
     let reach = share * a.radius().max(b.radius());
     let flat = |p: DVec3| p - a.normal * p.dot(a.normal);
     let is_near = |p: DVec3, other: &Shape| {
         let n = other.points.len();
         (0..n).any(|i| {
-            let [from, to] = [i, (i + 1) % n].map(|i| flat(other.points[i]) - p);
+            let [from, to] = [i, (i + 1) % n].map(|i| flat(other.points[i] - p));
             nearest_of_segment(from, to, DVec3::ZERO).length() <= reach
         })
     };
-    some_points(a).all(|p| is_near(flat(p), b)) && some_points(b).all(|p| is_near(flat(p), a))
+    some_points(a).all(|p| is_near(p + way, b)) && some_points(b).all(|p| is_near(p - way, a))
 }
 
 /// The one is a hole in a surface, the other the rim of a piece.

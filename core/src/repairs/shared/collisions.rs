@@ -6,11 +6,14 @@
 use crate::repairs::shared::pieces::components_of_records;
 use std::collections::{BTreeMap, HashSet};
 
+use crate::detect::holes::owners;
 use crate::geometry::position::Position;
+use crate::geometry::sums::Extent;
 use crate::geometry::tri_tri::Triangle as Corners;
 use crate::repairs::shared::overlay::{Overlay, Standing, Which};
 use crate::repairs::shared::work::Work;
-use crate::submesh::components::{Components, Reversed, Through};
+use crate::submesh::Submesh;
+use crate::submesh::components::{Component, Components, Reversed, Through};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 use crate::util::union_find;
@@ -21,7 +24,8 @@ pub(crate) struct Obstacle {
     pub(crate) corners: Corners,
     /// It belongs to a body that the one whose loop the patch closes runs into already.
     pub(crate) met_already: bool,
-    /// It belongs to a body that neither that one nor what that one runs into has met: with the patch, all of these become one.
+    /// It belongs to a body that neither that one nor what that one runs into has met, and both stand for themselves: with the patch, all of these
+    /// become one.
     pub(crate) joins: bool,
 }
 
@@ -77,6 +81,7 @@ pub(crate) fn crossed(
         Which::Submesh(t) => Some(components.of_triangle[t as usize]),
         Which::Record(record) => of_record.get(&record).copied(),
     };
+    let stands = standing(survey, submesh, &components, patch_of);
     let mut crossed: BTreeMap<u32, Vec<Obstacle>> = BTreeMap::new();
     let mut known = HashSet::new();
     for (patch, of_patch, other) in blamed {
@@ -85,11 +90,28 @@ pub(crate) fn crossed(
         let obstacle = Obstacle {
             corners,
             met_already: of_both.is_some_and(|(a, b)| met.binary_search(&[a, b]).is_ok()),
-            joins: of_both.is_some_and(|(a, b)| union_find::find(&mut groups, a) != union_find::find(&mut groups, b)),
+            joins: of_both.is_some_and(|(a, b)| {
+                stands[a as usize] && stands[b as usize] && union_find::find(&mut groups, a) != union_find::find(&mut groups, b)
+            }),
         };
         if known.insert((patch, corners.map(Position::of), obstacle.met_already)) {
             crossed.entry(patch).or_default().push(obstacle);
         }
     }
     Some(crossed)
+}
+
+/// Which components stand for themselves, as far as they are no patches.
+fn standing(survey: &Survey<'_>, submesh: &Submesh, components: &Components, patch_of: &[Option<u32>]) -> Vec<bool> {
+    let mut patched = vec![0i128; components.list.len()];
+    for t in submesh.living().filter(|t| patch_of[*t as usize].is_some()) {
+        if let Some(sum) = patched.get_mut(components.of_triangle[t as usize] as usize) {
+            *sum += survey.measure.triangle(&submesh.points(t)).area;
+        }
+    }
+    let of = |(c, patched): (&Component, i128)| {
+        let patched = survey.measure.area(Extent { area: patched, volume: 0 });
+        owners::stands_for_itself(survey.measure.volume(c.extent), survey.measure.area(c.extent) - patched, patched)
+    };
+    components.list.iter().zip(patched).map(of).collect()
 }

@@ -294,7 +294,7 @@ mod tests {
             let profile = Profile { leave_open: leave_open.to_vec(), ..Profile::default() };
             after(&open(jag), |d, _| zip(&d.survey, &mut Work::new(&mut d.submesh), &d.tolerance, &profile)).result
         };
-        for (jag, class, other) in [(0.0, LoopClass::Gap, LoopClass::Misaligned), (0.16, LoopClass::Misaligned, LoopClass::Gap)] {
+        for (jag, class, other) in [(0.0, LoopClass::Gap, LoopClass::Misaligned), (0.12, LoopClass::Misaligned, LoopClass::Gap)] {
             assert_eq!(zipped(jag, &[class]), 0, "{class:?}");
             assert_eq!(zipped(jag, &[other]), zipped(jag, &[]), "{class:?}");
             assert!(zipped(jag, &[]) > 0, "{class:?}");

@@ -31,7 +31,7 @@ const WIDE: f64 = 0.25;
 /// on average.
 pub(crate) const THIN: f64 = 0.02;
 /// Torn is what has its front inside on this share of its area at least, and on no more than the rest of it.
-const TORN: f64 = 1.0 / 16.0;
+const TORN: f64 = 1.0 / 32.0;
 /// Of what is torn, rims are left open whose patch is at least this share of the surface. Others are holes in the sheet.
 const OF_A_SHEET: f64 = 0.05;
 /// A torn sheet has at least this share of the whole area, a one-sided one that: smaller parts, which lack faces, are rather closed than lost.
@@ -308,19 +308,20 @@ fn is_torn(mut surface: Vec<Corners>, cones: &[Corners], threads: usize) -> bool
     surface.extend_from_slice(cones);
     let tree = Tree::winding(&surface);
     let step = count.div_ceil(SAMPLES).max(1);
-    // The area of a triangle, and whether the surface winds around what is right behind it.
+    // The area of a triangle, and on which side of it there is material: of one that lies on what closes it, on neither.
     let samples = parallel::map(threads, count.div_ceil(step), |i| {
         let [a, b, c] = surface[i * step].map(place);
-        let normal = (b - a).cross(c - a);
+        let (middle, normal) = ((a + b + c) / 3.0, (b - a).cross(c - a));
         let off = normal.normalize_or_zero() * (OFF * normal.length().sqrt());
-        (normal.length(), tree.winding_number((a + b + c) / 3.0 - off) > 0.5)
+        let is_behind = tree.winding_number(middle - off) > 0.5;
+        (normal.length(), is_behind, !is_behind && tree.winding_number(middle + off) < -0.5)
     });
-    let all: f64 = samples.iter().map(|(area, _)| area).sum();
-    let behind: f64 = samples.iter().filter(|(_, is_inside)| *is_inside).map(|(area, _)| area).sum();
-    behind.min(all - behind) > TORN * all
+    let share =
+        |of: fn(&(f64, bool, bool)) -> bool| samples.iter().filter(|sample| of(sample)).map(|sample| sample.0).sum::<f64>();
+    share(|sample| sample.1).min(share(|sample| sample.2)) > TORN * share(|_| true)
 }
 
-/// How far behind a triangle it is asked, in roots of twice its area.
+/// How far from a triangle it is asked, in roots of twice its area.
 const OFF: f64 = 1e-2;
 
 /// By triangle of the submesh: no orientation satisfies the edges of the surface that it is part of. Empty if that is so nowhere. O(regions + submesh) if any

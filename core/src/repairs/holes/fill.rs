@@ -84,16 +84,7 @@ pub(crate) fn fill_loops(
     let Boundary { loops: rims, chains } = loops::boundary(submesh, edges);
     let shapes = Shapes::of(submesh, &rims, threads);
     let admission = Admission::of(survey, work, &rims, &shapes, reversed, tolerance, (profile, only_loop));
-    let max_edges = profile.max_hole_edges as usize;
-    let mut closing = Closing {
-        admission,
-        max_edges,
-        may_add: profile.patch_shape != PatchShape::Flat,
-        rims: Vec::new(),
-        placed: Vec::new(),
-        open: Vec::new(),
-        joints: Vec::new(),
-    };
+    let mut closing = Closing::of(admission, profile);
     let first = closing.close_together(survey, work, rims, shapes, threads);
     closing.triangulate(work, first, threads);
     closing.close_flat(survey, work);
@@ -116,8 +107,7 @@ pub(crate) fn fill_loops(
     }
     balancing += (across.len() - first_balancing) as u64;
     let judged = closing.judge(survey, work, profile);
-    let mut closed = closing.finish(work);
-    closed.judged = judged;
+    let mut closed = Closed { judged, ..closing.finish(work) };
     if balancing > 0 {
         closed.loops += balancing;
         *closed.by_method.entry(BALANCING.into()).or_insert(0) += balancing;

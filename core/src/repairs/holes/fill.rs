@@ -90,18 +90,7 @@ pub(crate) fn fill_loops(
     let shapes = Shapes::of(submesh, &rims, threads);
     let owners = Owners::of(survey, submesh, edges, reversed, &rims);
     let admission = Admission::of(survey, work, &rims, &shapes, reversed, tolerance, (profile, only_loop));
-    let max_edges = profile.max_hole_edges as usize;
-    let mut closing = Closing {
-        admission,
-        max_edges,
-        may_add: profile.patch_shape != PatchShape::Flat,
-        rims: Vec::new(),
-        placed: Vec::new(),
-        open: Vec::new(),
-        joints: Vec::new(),
-        doubts: Vec::new(),
-        not_meant: 0.0,
-    };
+    let mut closing = Closing::of(admission, profile);
     let first = closing.close_together(survey, work, rims, (shapes, owners), threads);
     closing.triangulate(work, first, threads);
     closing.close_flat(survey, work);
@@ -126,10 +115,9 @@ pub(crate) fn fill_loops(
     }
     balancing += (across.len() - first_balancing) as u64;
     let judged = closing.judge(survey, work, profile);
-    let mut kept = Closed::default();
+    let mut kept = Closed { judged, ..Closed::default() };
     closing.keep_open(work, &mut chains, &mut kept);
     let mut closed = closing.finish(work, kept);
-    closed.judged = judged;
     if balancing > 0 {
         closed.loops += balancing;
         *closed.by_method.entry(BALANCING.into()).or_insert(0) += balancing;
@@ -173,18 +161,9 @@ pub(crate) fn close_again(
         loops::find(submesh, edges).into_iter().filter(|rim| rim.vertices.iter().all(|v| is_asked(*v))).collect();
     let shapes = Shapes::of(submesh, &rims, threads);
     let admission = Admission::of(survey, work, &rims, &shapes, reversed, tolerance, (&free, None));
-    let max_edges = profile.max_hole_edges as usize;
-    let mut closing = Closing {
-        admission,
-        max_edges,
-        may_add: false,
-        rims,
-        placed: Vec::new(),
-        open: Vec::new(),
-        joints: Vec::new(),
-        doubts: Vec::new(),
-        not_meant: 0.0,
-    };
+    let mut closing = Closing::of(admission, profile);
+    closing.may_add = false;
+    closing.rims = rims;
     closing.triangulate(work, 0, threads);
     if let Some(settings) = shape_settings(profile) {
         let all: Vec<usize> = (0..closing.placed.len()).collect();

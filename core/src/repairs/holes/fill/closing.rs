@@ -4,6 +4,7 @@ use super::doubts;
 use crate::algorithms::extend::{self, Extended};
 use crate::algorithms::triangulate::{self, FillSettings, Rim, Unfillable, strip};
 use crate::contract::report::{LoopLeft, MOST_LISTED};
+use crate::contract::settings::{PatchShape, Profile};
 use crate::detect::holes::{self, loops::Loop};
 use crate::geometry::position::Position;
 use crate::geometry::sums::Bounds;
@@ -112,6 +113,14 @@ pub(crate) fn meets_new_edge(submesh: &Submesh, rim: &Loop, triangles: &[[u32; 3
 
 /// Vertices of a small one, at most.
 pub(crate) const SMALL: usize = 64;
+
+impl<'p> Closing<'p> {
+    pub(crate) fn of(admission: Admission<'p>, profile: &Profile) -> Self {
+        let max_edges = profile.max_hole_edges as usize;
+        let may_add = profile.patch_shape != PatchShape::Flat;
+        Self { admission, max_edges, may_add, rims: Vec::new(), placed: Vec::new(), open: Vec::new(), joints: Vec::new() }
+    }
+}
 
 impl Closing<'_> {
     pub(crate) fn rim(&self, rim: u32) -> &Loop {

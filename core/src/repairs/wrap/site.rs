@@ -24,6 +24,9 @@ const MOST_TRIANGLES: u64 = 1 << 22;
 /// Cubes of the lattice that all wraps together take, about; each makes some ten triangles.
 const CUBES: f64 = (1 << 18) as f64;
 
+/// The triangles of a soup, no two of which fit, are known no better than to a part of their size: cubes for each.
+const SOUP_CUBES: f64 = 32.0;
+
 /// And a single one, at least.
 const LEAST_CUBES: f64 = 2048.0;
 
@@ -166,7 +169,8 @@ impl Site<'_, '_> {
             return;
         }
         let told = &mut outcome.told;
-        let cubes = (CUBES * told.area_share).max(LEAST_CUBES) as u32;
+        let most = if self.is_soup { triangles.len() as f64 * SOUP_CUBES } else { CUBES };
+        let cubes = (CUBES * told.area_share).min(most).max(LEAST_CUBES) as u32;
         let Some(Wrapping { triangles: new, cell, volume }) = wrap(&triangles, &tree, cubes, self.threads, self.progress) else {
             outcome.give_up("no lattice can hold it: it has no area, or f32 is too coarse where it lies");
             return;

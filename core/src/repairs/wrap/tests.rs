@@ -26,7 +26,15 @@ fn wrapped(mesh: &[Corners], kept_open: &[[f32; 3]], profile: &Profile, limits: 
     let mut reversed = Reversed::none(&d.survey);
     let work = &mut Work::new(&mut d.submesh);
     let pairs = Overlay::of(&d.survey, work, &reversed).and_then(|overlay| overlay.crossing_triangles(&d.survey, work));
-    let wraps = replace(&d.survey, work, &mut reversed, pairs.as_deref(), (kept_open, false), profile, (limits.threads, &Quiet));
+    let wraps = replace(
+        &d.survey,
+        work,
+        &mut reversed,
+        pairs.as_deref(),
+        (kept_open, kept_open.is_empty()),
+        profile,
+        (limits.threads, &Quiet),
+    );
     let edit = Edit::of(&d.survey, &d.submesh, &reversed, &wraps.triangles);
     let output = written(&edit, &input);
     let defects = diagnose(&output).defects;
@@ -78,6 +86,36 @@ fn what_was_left_open_on_purpose_stays_and_so_does_what_runs_into_it() {
     let got = wrapped(&mesh, &[[0.0, 0.0, 8.0]], &Profile::default(), &limits);
     assert_eq!((got.untouched, got.listed.len()), (22, 1));
     assert!(got.listed[0].left.as_ref().is_some_and(|reason| reason.contains("on purpose")), "{:?}", got.listed);
+}
+
+/// The faces of a box in squares of 1, each triangle a little smaller than it was, so that none meets another one. Every seventh is lost.
+fn loose_box() -> Vec<Corners> {
+    let flat = plate(6, |_, _| true);
+    let places: [fn([f32; 3]) -> [f32; 3]; 3] = [|[x, y, _]| [x, y, 6.0], |[x, y, _]| [6.0, x, y], |[x, y, _]| [y, 6.0, x]];
+    let turned: [fn([f32; 3]) -> [f32; 3]; 3] = [|[x, y, _]| [x, y, 0.0], |[x, y, _]| [0.0, x, y], |[x, y, _]| [y, 0.0, x]];
+    let side = |place: fn([f32; 3]) -> [f32; 3], is_outward: bool| {
+        let faces = flat.iter().map(move |t| t.map(place));
+        faces.map(move |[a, b, c]| if is_outward { [a, b, c] } else { [a, c, b] }).collect::<Vec<Corners>>()
+    };
+    let all = places.into_iter().map(|place| side(place, true)).chain(turned.into_iter().map(|place| side(place, false)));
+    let all: Vec<Corners> = all.flatten().collect();
+    let smaller = |t: &Corners| {
+        let middle: [f32; 3] = std::array::from_fn(|k| (t[0][k] + t[1][k] + t[2][k]) / 3.0);
+        t.map(|p| std::array::from_fn(|k| p[k] + (middle[k] - p[k]) / 64.0))
+    };
+    all.iter().enumerate().filter(|(i, _)| i % 7 != 3).map(|(_, t)| smaller(t)).collect()
+}
+
+#[test]
+fn a_soup_that_encloses_something_is_wrapped_as_one() {
+    let mesh = loose_box();
+    let got = by_default(&mesh);
+    assert!(got.verdict.good && got.listed.len() == 1, "{:?}", got.listed);
+    assert!((got.defects.volume.abs() / 216.0 - 1.0).abs() < 0.05, "{}", got.defects.volume);
+    // One side of the box alone encloses nothing, in however many pieces.
+    let flat: Vec<Corners> = mesh.into_iter().filter(|t| t.iter().all(|p| p[2] == 6.0)).collect();
+    assert!(flat.len() > 40);
+    assert_eq!(by_default(&flat).untouched, flat.len() as u64);
 }
 
 #[test]

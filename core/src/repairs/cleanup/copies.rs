@@ -1,8 +1,7 @@
 //! Copies of triangles that are a little off: all three corners lie near those of another triangle, which faces the same way.
 //!
-//! Only a triangle that continues nothing goes: none of its edges joins it to one other triangle that runs against it. So nothing opens that was
-//! closed. What it lies on may be of the regular surface. Of two that both continue nothing the first stays; they must lie nearer to each other,
-//! since a soup may have layers.
+//! Only a triangle that continues nothing goes: all three edges are its own, so nothing opens. What it lies on may be of the regular surface. Of two
+//! that both continue nothing the first stays; they must lie nearer to each other, since a soup may have layers.
 
 use crate::contract::report::RepairName;
 use crate::contract::settings::Profile;
@@ -68,10 +67,10 @@ pub(crate) fn drop_copies(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &
 
 /// Triangles that continue nothing, by number.
 fn lone(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> Vec<Lone> {
-    let continues = |[a, b]: [Vertex; 2]| edges.between(a, b).is_none_or(|e| e.uses.len() == 2 && !e.is_inconsistent());
+    let is_open = |a: Vertex, b: Vertex| edges.between(a, b).is_some_and(|e| e.is_boundary());
     let is_lone = |t: &u32| {
         let [a, b, c] = submesh.triangles[*t as usize].v;
-        [a, b, c].iter().all(|v| submesh.complete[*v as usize]) && ![[a, b], [b, c], [c, a]].into_iter().any(continues)
+        is_open(a, b) && is_open(b, c) && is_open(c, a)
     };
     let of = |t: u32| {
         let corners = submesh.points(t);

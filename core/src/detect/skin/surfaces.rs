@@ -52,7 +52,7 @@ impl Surfaces<'_> {
         for t in 0..self.submesh.triangles.len() as u32 {
             let triangle = &self.submesh.triangles[t as usize];
             if let (Origin::Input(record), Some(corners)) = (triangle.origin, self.as_read(triangle.origin))
-                && triangle.by != Some(RepairName::CommonWall)
+                && !is_no_harm(triangle.by)
                 && !(self.submesh.lives(t) && is_same(&corners, &self.submesh.points(t)))
             {
                 let [a, b, c] = corners;
@@ -89,7 +89,7 @@ impl Surfaces<'_> {
                 Origin::Added(by) => Some(by),
                 Origin::Input(_) | Origin::Part(_) => triangle.by,
             };
-            if self.as_read(triangle.origin).is_none_or(|corners| !is_same(&corners, &points)) {
+            if !is_no_harm(by) && self.as_read(triangle.origin).is_none_or(|corners| !is_same(&corners, &points)) {
                 visit(t, &points, by);
             }
         }
@@ -112,6 +112,11 @@ impl Surfaces<'_> {
             Origin::Part(_) | Origin::Added(_) => None,
         }
     }
+}
+
+/// Walls that parts of a body had in common bound nothing, and what the profile asked for is as it was asked for.
+fn is_no_harm(by: Option<RepairName>) -> bool {
+    matches!(by, Some(RepairName::CommonWall | RepairName::SheetSolids | RepairName::Skirt))
 }
 
 /// Whichever way round.

@@ -118,7 +118,17 @@ impl<'p> Closing<'p> {
     pub(crate) fn of(admission: Admission<'p>, profile: &Profile) -> Self {
         let max_edges = profile.max_hole_edges as usize;
         let may_add = profile.patch_shape != PatchShape::Flat;
-        Self { admission, max_edges, may_add, rims: Vec::new(), placed: Vec::new(), open: Vec::new(), joints: Vec::new() }
+        Self {
+            admission,
+            max_edges,
+            may_add,
+            rims: Vec::new(),
+            placed: Vec::new(),
+            open: Vec::new(),
+            joints: Vec::new(),
+            doubts: Vec::new(),
+            not_meant: 0.0,
+        }
     }
 }
 

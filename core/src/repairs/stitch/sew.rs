@@ -10,6 +10,7 @@ use crate::contract::report::RepairName;
 use crate::contract::settings::Profile;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
+use crate::repairs::stitch::sew::rims::Width;
 use crate::repairs::stitch::weld::{self, Welded};
 use crate::repairs::stitch::zip;
 use crate::submesh::near::{Tolerance, boundary_vertices};
@@ -68,13 +69,6 @@ pub(crate) fn sew(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Toleranc
         }
     }
     sewn
-}
-
-/// How wide a step is.
-pub(crate) struct Width {
-    pub(crate) tolerance: Tolerance,
-    /// No clearance between bodies is as narrow.
-    pub(crate) is_crack: bool,
 }
 
 /// Splits edges where the vertices of rims differ, and matches and joins then; as [`join`].

@@ -21,10 +21,9 @@ use glam::DVec3;
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::distance::cosine;
 use crate::geometry::sums::Bounds;
-use crate::repairs::stitch::sew::Width;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::submesh::edges::{Edge, Edges};
-use crate::submesh::near::around;
+use crate::submesh::near::{Tolerance, around};
 use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::union_find;
@@ -43,6 +42,13 @@ const HALF: f64 = 0.5;
 
 /// An edge with more others within reach is in a tangle that nothing is known of.
 const MOST: usize = 64;
+
+/// How wide a step is.
+pub(crate) struct Width {
+    pub(crate) tolerance: Tolerance,
+    /// No clearance between bodies is as narrow.
+    pub(crate) is_crack: bool,
+}
 
 /// A boundary edge, as its triangle runs through it.
 #[derive(Clone, Copy, Debug)]

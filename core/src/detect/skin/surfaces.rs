@@ -76,7 +76,9 @@ impl Surfaces<'_> {
                 let by = self.dropped_by.get(region as usize).copied().flatten();
                 let [a, b, c] = position::corners(&self.survey.records[place as usize]);
                 let is_turned = self.reversed.regions[region as usize];
-                visit(into, place, &if is_turned { [a, c, b] } else { [a, b, c] }, by);
+                if !is_no_harm(by) {
+                    visit(into, place, &if is_turned { [a, c, b] } else { [a, b, c] }, by);
+                }
             },
         )
     }

@@ -41,6 +41,11 @@ impl Range {
     }
 }
 
+/// Variables that are settings, each with its name, value and range.
+macro_rules! with_ranges {
+    ($($setting:ident: $range:ident),* $(,)?) => { [$((stringify!($setting), *$setting, Range::$range)),*] };
+}
+
 impl Profile {
     /// Refuses a profile with a setting that is no number, or beyond the values that mean something.
     ///
@@ -98,29 +103,14 @@ impl Profile {
             resolve_crossings: _,
             check_self_intersections: _,
         } = self;
-        [
-            ("weld_relative", *weld_relative, Range::Share),
-            ("weld_max_edge_share", *weld_max_edge_share, Range::Share),
-            ("sew_relative", *sew_relative, Range::Share),
-            ("gap_edge_share", *gap_edge_share, Range::Bound),
-            ("max_hole_perimeter_relative", *max_hole_perimeter_relative, Range::Bound),
-            ("max_hole_perimeter_mm", *max_hole_perimeter_mm, Range::Bound),
-            ("max_gap_mm", *max_gap_mm, Range::Bound),
-            ("max_volume_change", *max_volume_change, Range::Bound),
-            ("max_area_change", *max_area_change, Range::Bound),
-            ("max_box_change_relative", *max_box_change_relative, Range::Bound),
-            ("skin_reach_relative", *skin_reach_relative, Range::Share),
-            ("max_skin_lost", *max_skin_lost, Range::Share),
-            ("max_skin_invented", *max_skin_invented, Range::Share),
-            ("debris_area_share", *debris_area_share, Range::Share),
-            ("sheet_thickness_relative", *sheet_thickness_relative, Range::Share),
-            ("sheet_thickness_mm", *sheet_thickness_mm, Range::Bound),
-            ("max_sheets_share", *max_sheets_share, Range::Share),
-            ("stack_gap_relative", *stack_gap_relative, Range::Share),
-            ("max_separation_relative", *max_separation_relative, Range::Share),
-            ("wrap_max_share", *wrap_max_share, Range::Share),
-            ("wrap_max_move", *wrap_max_move, Range::Bound),
-            ("wrap_review_share", *wrap_review_share, Range::Share),
+        with_ranges![
+            weld_relative: Share, weld_max_edge_share: Share, sew_relative: Share, gap_edge_share: Bound,
+            max_hole_perimeter_relative: Bound, max_hole_perimeter_mm: Bound, max_gap_mm: Bound,
+            max_volume_change: Bound, max_area_change: Bound, max_box_change_relative: Bound,
+            skin_reach_relative: Share, max_skin_lost: Share, max_skin_invented: Share, debris_area_share: Share,
+            sheet_thickness_relative: Share, sheet_thickness_mm: Bound, max_sheets_share: Share,
+            stack_gap_relative: Share, max_separation_relative: Share, wrap_max_share: Share, wrap_max_move: Bound,
+            wrap_review_share: Share,
         ]
     }
 }

@@ -24,8 +24,8 @@ use crate::topology::survey::Survey;
 
 use samples::Samples;
 use seen::OnSurface;
-pub(crate) use surfaces::Surfaces;
-use surfaces::Which;
+pub(crate) use surfaces::DroppedBy;
+use surfaces::{Surfaces, Which};
 
 /// The points whose distance is measured, of those that are farther than the limit.
 const MEASURED: usize = 64;
@@ -35,9 +35,6 @@ const ASKED: usize = 4096;
 const PLACES: usize = 8;
 /// Places are cells of this share of the diagonal.
 const PLACE: f64 = 0.05;
-
-/// Which region of regular surface was dropped by which repair.
-pub(crate) type DroppedBy = Vec<Option<RepairName>>;
 
 /// What the repairs made of the surface. `explained`: triangles of patches that nothing speaks against, ascending. `reach`: the distance up to
 /// which surface is where it was. O(edit × log), and reads the chunks around

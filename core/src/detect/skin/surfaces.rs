@@ -8,9 +8,10 @@ use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 
-use super::DroppedBy;
-
 type Corners = [[f32; 3]; 3];
+
+/// By region of regular surface, the repair that dropped it.
+pub(crate) type DroppedBy = Vec<Option<RepairName>>;
 
 /// A surface: before the repairs, or after them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -46,7 +46,7 @@ pub(crate) const REPAIR: Repair = Repair {
         (cx.handed.kept_open, cx.handed.kept_as_sheets) = (closed.kept_open, closed.kept_as_sheets);
         cx.handed.sheets = closed.sheets;
         cx.handed.across = closed.across;
-        cx.account.doubts.extend(closed.doubts);
+        cx.account.doubts.extend(doubts::summed_up(closed.doubts));
         cx.account.doubts.extend(closed.judged.doubts);
         cx.handed.explained = closed.judged.explained;
         cx.account.explained.area += closed.judged.area;

@@ -3,14 +3,14 @@
 //! A patch was tested against itself and the triangles along its rim when it was made. Here all new triangles are held against everything
 //! else in their boxes, chunk by chunk, exactly ([`crate::detect::fresh`]). Of two patches that cross, the later one is to blame.
 
-use crate::repairs::shared::pieces::components_of_records;
 use std::collections::{BTreeMap, HashSet};
 
 use crate::detect::holes::owners;
 use crate::geometry::position::Position;
 use crate::geometry::sums::Extent;
 use crate::geometry::tri_tri::Triangle as Corners;
-use crate::repairs::shared::overlay::{Overlay, Standing, Which};
+use crate::repairs::shared::overlay::{Overlay, Standing, StandingPair, Which};
+use crate::repairs::shared::pieces::components_of_records;
 use crate::repairs::shared::work::Work;
 use crate::submesh::Submesh;
 use crate::submesh::components::{Component, Components, Reversed, Through};
@@ -43,24 +43,10 @@ pub(crate) fn crossed(
     let patch = |t: u32| patch_of[t as usize];
     let overlay = Overlay::of(survey, submesh, reversed)?;
     let pairs = overlay.met_by(survey, submesh, |t| patch(t).is_some_and(&is_new))?;
-    let owner = |number: Standing| overlay.changed_of(number).and_then(patch);
-    // The patch to blame with one of its triangles, and what that crosses.
-    let mut blamed: Vec<(u32, Standing, Standing)> = Vec::new();
-    for pair in pairs {
-        let [a, b] = pair.triangles;
-        match (owner(a), owner(b)) {
-            (Some(p), Some(q)) if p > q => blamed.push((p, a, b)),
-            (Some(p), Some(q)) if p < q => blamed.push((q, b, a)),
-            // What was accepted crosses neither itself nor its rim.
-            (Some(_), Some(_)) | (None, None) => {}
-            (Some(p), None) => blamed.push((p, a, b)),
-            (None, Some(q)) => blamed.push((q, b, a)),
-        }
-    }
+    let blamed = blamed(&pairs, |number| overlay.changed_of(number).and_then(patch));
     if blamed.is_empty() {
         return Some(BTreeMap::new());
     }
-    blamed.sort_unstable();
     let components = Components::of(survey, submesh, edges, reversed, Through::EveryEdge);
     let met = survey.crossing_pairs.as_deref().unwrap_or_default();
     let others = blamed.iter().filter_map(|(_, _, other)| overlay.record_of(*other));
@@ -99,6 +85,24 @@ pub(crate) fn crossed(
         }
     }
     Some(crossed)
+}
+
+/// Of each pair with a patch in it, the patch to blame with one of its triangles, and what that crosses; ascending.
+fn blamed(pairs: &[StandingPair], owner: impl Fn(Standing) -> Option<u32>) -> Vec<(u32, Standing, Standing)> {
+    let of_pair = |pair: &StandingPair| {
+        let [a, b] = pair.triangles;
+        match (owner(a), owner(b)) {
+            (Some(p), Some(q)) if p > q => Some((p, a, b)),
+            (Some(p), Some(q)) if p < q => Some((q, b, a)),
+            // What was accepted crosses neither itself nor its rim.
+            (Some(_), Some(_)) | (None, None) => None,
+            (Some(p), None) => Some((p, a, b)),
+            (None, Some(q)) => Some((q, b, a)),
+        }
+    };
+    let mut blamed: Vec<_> = pairs.iter().filter_map(of_pair).collect();
+    blamed.sort_unstable();
+    blamed
 }
 
 /// Which components stand for themselves, as far as they are no patches.

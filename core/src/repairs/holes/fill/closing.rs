@@ -1,6 +1,5 @@
 //! The loops of a submesh while they are closed: patches that are in, and loops that are open, with the reason.
 
-use super::doubts;
 use crate::algorithms::extend::{self, Extended};
 use crate::algorithms::triangulate::{self, FillSettings, Rim, Unfillable, strip};
 use crate::contract::report::{LoopLeft, MOST_LISTED};
@@ -188,7 +187,7 @@ impl Closing<'_> {
 
     /// What came of it, after what is `closed` already.
     pub(crate) fn finish(mut self, work: &mut Work<'_>, mut closed: Closed) -> Closed {
-        closed.doubts.extend(doubts::summed_up(std::mem::take(&mut self.doubts)));
+        closed.doubts.append(&mut self.doubts);
         closed.not_meant += self.not_meant;
         for patch in self.placed.iter().filter(|p| p.count > 0) {
             let loops = patch.rims.len() as u64;

@@ -1,8 +1,7 @@
 //! Hollow bodies.
 
-use super::Entry;
 use super::damage::{lose, lose_near, somewhere};
-use super::draft::Draft;
+use super::draft::{Draft, Entry};
 use super::mesh::{Mesh, V, key, minus, plus, times};
 use super::random::Chance;
 use super::shapes::{

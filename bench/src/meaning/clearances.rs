@@ -1,8 +1,7 @@
 //! Parts that are printed in place: bodies with a small gap between them.
 
-use super::Entry;
 use super::damage::{lose, lose_near};
-use super::draft::Draft;
+use super::draft::{Draft, Entry};
 use super::mesh::{Mesh, V};
 use super::random::Chance;
 use super::shapes::{BORE, P, apart, arc, cuboid, cylinder, revolved, sleeve, torus};

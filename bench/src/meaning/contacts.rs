@@ -1,8 +1,7 @@
 //! Bodies that share walls: files of several materials, inlays, stacks.
 
-use super::Entry;
 use super::damage::{flip, lose, lose_near, lose_some, somewhere};
-use super::draft::Draft;
+use super::draft::{Draft, Entry};
 use super::mesh::Mesh;
 use super::random::Chance;
 use super::shapes::{

@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 
 use super::mesh::Mesh;
+use super::random::Chance;
 
 /// A case before it is put in its place.
 pub(super) struct Draft {
@@ -32,3 +33,6 @@ impl Draft {
         Self { keeps_slivers: true, ..self }
     }
 }
+
+/// Name, what is wrong, whether the file decides, and how it is made.
+pub(super) type Entry = (&'static str, &'static str, bool, fn(&mut Chance) -> Draft);

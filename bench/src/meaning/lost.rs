@@ -1,8 +1,7 @@
 //! Large pieces of the surface are missing.
 
-use super::Entry;
 use super::damage::lose_near;
-use super::draft::Draft;
+use super::draft::{Draft, Entry};
 use super::mesh::{Mesh, V, dot, plus, times};
 use super::random::Chance;
 use super::shapes::{LETTERS, LOWER, UPPER, any, apart, arc, blob, cuboid, letter, regular, revolved, smooth, star, tube};

@@ -23,7 +23,7 @@ mod turned;
 use std::ops::RangeInclusive;
 
 use crate::judge::Triangle;
-use draft::Draft;
+use draft::{Draft, Entry};
 use mesh::{Mesh, V, beside, minus, plus, times};
 use random::{Chance, around};
 
@@ -70,9 +70,6 @@ pub fn families() -> impl Iterator<Item = Family> {
         entries.iter().map(move |&(name, about, decides, make)| Family { name, group, about, decides, make })
     })
 }
-
-/// Name, what is wrong, whether the file decides, and how it is made.
-type Entry = (&'static str, &'static str, bool, fn(&mut Chance) -> Draft);
 
 impl Family {
     /// The case of a seed: the same bytes each time.

@@ -1,8 +1,7 @@
 //! What any repair has to do every day.
 
-use super::Entry;
 use super::damage::{double, flip, lose, lose_near, lose_some, slivers, somewhere, split_alone};
-use super::draft::Draft;
+use super::draft::{Draft, Entry};
 use super::mesh::{Mesh, minus, plus, times};
 use super::random::Chance;
 use super::shapes::{any, beside_of, cuboid, cylinder, edged, farthest, reach, smooth, sphere};

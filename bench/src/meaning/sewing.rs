@@ -1,8 +1,7 @@
 //! Surfaces whose pieces do not quite meet.
 
-use super::Entry;
 use super::damage::{double, jitter, lose, unsew};
-use super::draft::Draft;
+use super::draft::{Draft, Entry};
 use super::mesh::{Face, Mesh, dot, plus, times};
 use super::random::Chance;
 use super::shapes::{any, bored_plate, cone, cylinder, edged, sleeve, smooth};

@@ -1,8 +1,7 @@
 //! Surfaces that enclose nothing, and specks.
 
-use super::Entry;
 use super::damage::somewhere;
-use super::draft::Draft;
+use super::draft::{Draft, Entry};
 use super::mesh::{Face, Mesh, V, beside, length, minus, plus, times, unit};
 use super::random::{Chance, around};
 use super::shapes::{any, beside_of, cuboid, edged, sphere};

@@ -1,8 +1,7 @@
 //! Surfaces whose triangles do not say what is outside.
 
-use super::Entry;
 use super::damage::{flip, lose};
-use super::draft::Draft;
+use super::draft::{Draft, Entry};
 use super::mesh::Mesh;
 use super::random::Chance;
 use super::shapes::{any, arc, beside_of, cuboid, revolved, sphere};

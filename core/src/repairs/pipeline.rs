@@ -52,22 +52,11 @@ pub(crate) enum Step {
 
 use Step::{Look, Repair as Do, Rounds};
 
+/// Once: triangles of no area, copies and surplus sheets go.
+const TIDY: Step = Rounds(1, &[Do(degenerate::DEGENERATE), Do(duplicates::DUPLICATE), Do(surplus::REPAIR)]);
+
 /// What lies together becomes one.
-const JOIN: Step = Rounds(
-    4,
-    &[
-        Do(degenerate::DEGENERATE),
-        Do(duplicates::DUPLICATE),
-        Do(surplus::REPAIR),
-        Do(weld::REPAIR),
-        Do(sew::REPAIR),
-        Do(degenerate::DEGENERATE),
-        Do(duplicates::DUPLICATE),
-        Do(surplus::REPAIR),
-        Look(recognise_loops),
-        Do(t_junctions::REPAIR),
-    ],
-);
+const JOIN: Step = Rounds(4, &[TIDY, Do(weld::REPAIR), Do(sew::REPAIR), TIDY, Look(recognise_loops), Do(t_junctions::REPAIR)]);
 
 /// From the file as it came to what is written.
 pub(crate) const ALL: &[Step] = &[
@@ -75,18 +64,14 @@ pub(crate) const ALL: &[Step] = &[
     Do(duplicates::DUPLICATE),
     Do(copies::REPAIR),
     Look(|cx| complete_at_seams(cx.survey, &mut cx.work)),
-    Do(degenerate::DEGENERATE),
-    Do(duplicates::DUPLICATE),
-    Do(surplus::REPAIR),
+    TIDY,
     // What was drawn twice with little between is one surface then, and no overlap.
     Do(weld::REPAIR),
     Do(sew::REPAIR),
     Do(overlaps::REPAIR),
     JOIN,
     Do(zip::REPAIR),
-    Do(degenerate::DEGENERATE),
-    Do(duplicates::DUPLICATE),
-    Do(surplus::REPAIR),
+    TIDY,
     Do(slits::REPAIR),
     Do(debris::REPAIR),
     Do(visibility::REPAIR),
@@ -159,19 +144,13 @@ pub(crate) const RECOGNITION: &[Step] = &[
     Do(duplicates::DUPLICATE),
     Do(copies::REPAIR),
     Look(|cx| complete_at_seams(cx.survey, &mut cx.work)),
-    Do(degenerate::DEGENERATE),
-    Do(duplicates::DUPLICATE),
-    Do(surplus::REPAIR),
+    TIDY,
     Do(weld::REPAIR),
     Do(sew::REPAIR),
-    Do(degenerate::DEGENERATE),
-    Do(duplicates::DUPLICATE),
-    Do(surplus::REPAIR),
+    TIDY,
     Do(overlaps::REPAIR),
     Do(weld::REPAIR),
-    Do(degenerate::DEGENERATE),
-    Do(duplicates::DUPLICATE),
-    Do(surplus::REPAIR),
+    TIDY,
     Look(recognise_loops),
 ];
 

@@ -233,8 +233,8 @@ fn wrap<'py>(
 #[pymodule]
 fn _suture(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    let repairs = RepairName::ALL.map(|name| name.as_str());
-    module.add("ORIGINS", [&arrays::KINDS[..], &repairs].concat())?;
+    let repairs = RepairName::ALL.iter().map(|name| name.as_str());
+    module.add("ORIGINS", arrays::KINDS.iter().copied().chain(repairs).collect::<Vec<_>>())?;
     module.add_function(wrap_pyfunction!(built_in_profile, module)?)?;
     module.add_function(wrap_pyfunction!(inspect, module)?)?;
     module.add_function(wrap_pyfunction!(repair, module)?)?;

@@ -75,7 +75,7 @@ pub enum RepairName {
 
 impl RepairName {
     /// Every kind, in the order of the pipeline.
-    pub const ALL: [Self; 27] = [
+    pub const ALL: &'static [Self] = &[
         Self::Degenerate,
         Self::Duplicate,
         Self::CommonWall,

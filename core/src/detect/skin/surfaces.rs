@@ -16,6 +16,7 @@ pub(crate) type DroppedBy = Vec<Option<RepairName>>;
 /// A surface: before the repairs, or after them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Which {
+    /// What was there, and what the profile asked to be added: what that covers was no skin any more.
     Before,
     After,
 }
@@ -38,7 +39,11 @@ impl Surfaces<'_> {
     /// Visits the triangles of a surface that are not regular.
     pub(crate) fn each_in_memory(&self, which: Which, mut visit: impl FnMut(&Corners)) {
         match which {
-            Which::Before => self.submesh.triangles.iter().filter_map(|t| self.as_read(t.origin)).for_each(|t| visit(&t)),
+            Which::Before => {
+                self.submesh.triangles.iter().filter_map(|t| self.as_read(t.origin)).for_each(|t| visit(&t));
+                let is_asked = |t: &u32| is_asked_for(self.made_by(*t));
+                self.submesh.living().filter(is_asked).for_each(|t| visit(&self.submesh.points(t)));
+            }
             Which::After => {
                 self.submesh.living().for_each(|t| visit(&self.submesh.points(t)));
                 self.wrapped.iter().for_each(visit);
@@ -88,16 +93,22 @@ impl Surfaces<'_> {
     pub(crate) fn each_added(&self, mut visit: impl FnMut(u32, &Corners, Option<RepairName>)) {
         for t in self.submesh.living() {
             let (triangle, points) = (&self.submesh.triangles[t as usize], self.submesh.points(t));
-            let by = match triangle.origin {
-                Origin::Added(by) => Some(by),
-                Origin::Input(_) | Origin::Part(_) => triangle.by,
-            };
+            let by = self.made_by(t);
             if !is_no_harm(by) && self.as_read(triangle.origin).is_none_or(|corners| !is_same(&corners, &points)) {
                 visit(t, &points, by);
             }
         }
         let first = self.submesh.triangles.len() as u32;
         (first..).zip(self.wrapped).for_each(|(n, corners)| visit(n, corners, Some(RepairName::Wrap)));
+    }
+
+    /// The repair that made a triangle what it is.
+    fn made_by(&self, t: u32) -> Option<RepairName> {
+        let triangle = &self.submesh.triangles[t as usize];
+        match triangle.origin {
+            Origin::Added(by) => Some(by),
+            Origin::Input(_) | Origin::Part(_) => triangle.by,
+        }
     }
 
     /// Twice the area of all that was there, in the survey's units.
@@ -119,7 +130,11 @@ impl Surfaces<'_> {
 
 /// Walls that parts of a body had in common bound nothing, and what the profile asked for is as it was asked for.
 fn is_no_harm(by: Option<RepairName>) -> bool {
-    matches!(by, Some(RepairName::CommonWall | RepairName::SheetSolids | RepairName::Skirt))
+    by == Some(RepairName::CommonWall) || is_asked_for(by)
+}
+
+fn is_asked_for(by: Option<RepairName>) -> bool {
+    matches!(by, Some(RepairName::SheetSolids | RepairName::Skirt))
 }
 
 /// Whichever way round.

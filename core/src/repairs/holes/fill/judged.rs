@@ -26,6 +26,8 @@ const DETAIL: f64 = 0.1;
 const ROUGH: f64 = 2.0;
 /// A mouth of less than this share of the body's area is not wide.
 const WIDE: f64 = 0.05;
+/// A patch that continues the surface explains itself below this share of its body's area.
+const WIDEST: f64 = 0.1;
 /// How much the surface goes on across a hole's rim, at least, for the hole to be one in flat surface.
 const HOLE: f64 = 0.7;
 /// A way through takes no more than this share of all volume without a word.
@@ -70,7 +72,7 @@ impl Closing<'_> {
             let doubt = match (patch.planes, patch.rims.as_slice()) {
                 (Some(planes), _) if patch.method == EXTENDED => judged.planes(submesh, patch, planes, body),
                 (_, [_]) if !patch.coarse.is_empty() && area(submesh, patch) >= WIDE * body.area => {
-                    shaped(submesh, patch, body, profile)
+                    judged.shaped(submesh, patch, body, profile)
                 }
                 (_, [rim]) => judged.flat(survey, submesh, (patch, self.rim(*rim)), body, profile),
                 (_, [a, b]) => way_through(submesh, patch, [*a, *b].map(|rim| self.rim(rim)), body),
@@ -141,16 +143,22 @@ impl Judged {
         self.explained.extend(patch.triangles());
         None
     }
-}
 
-/// A patch that continues the surface, and encloses much more, or less, than a flat one would.
-fn shaped(submesh: &Submesh, patch: &Placed, body: Body, profile: &Profile) -> Option<String> {
-    let from = submesh.place(patch.coarse[0][0]);
-    let living = patch.triangles().filter(|t| submesh.lives(*t)).map(|t| submesh.triangles[t as usize].v);
-    let differ = (under(submesh, living, from) - under(submesh, patch.coarse.iter().copied(), from)).abs();
-    let share = differ / body.volume.abs();
-    (share > profile.max_volume_change && !body.is_detail())
-        .then(|| format!("a patch that continues the surface differs from a flat one by {:.1} % of the body", share * 100.0))
+    /// A patch that continues the surface is in doubt if it encloses much more, or less, than a flat one would.
+    fn shaped(&mut self, submesh: &Submesh, patch: &Placed, body: Body, profile: &Profile) -> Option<String> {
+        let from = submesh.place(patch.coarse[0][0]);
+        let living = patch.triangles().filter(|t| submesh.lives(*t)).map(|t| submesh.triangles[t as usize].v);
+        let differ = (under(submesh, living, from) - under(submesh, patch.coarse.iter().copied(), from)).abs();
+        let share = differ / body.volume.abs();
+        if share <= profile.max_volume_change {
+            if area(submesh, patch) < WIDEST * body.area {
+                self.explain(submesh, patch);
+            }
+            return None;
+        }
+        (!body.is_detail())
+            .then(|| format!("a patch that continues the surface differs from a flat one by {:.1} % of the body", share * 100.0))
+    }
 }
 
 /// A way through a wall, which caps on both holes would have left closed.

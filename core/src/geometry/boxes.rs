@@ -6,6 +6,7 @@ use obvhs::bvh2::Bvh2;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 use crate::geometry::sums::Bounds;
+use crate::util::scatter;
 
 /// Many boxes, to be asked which of them meet another one.
 pub(crate) struct BoxTree {
@@ -84,7 +85,7 @@ fn uneven(boxes: &[Bounds]) -> Vec<Aabb> {
         let lo: [f64; 3] = std::array::from_fn(|k| scaled(k, b.lo[k]));
         let hi: [f64; 3] = std::array::from_fn(|k| {
             let size = scaled(k, b.hi[k]) - lo[k];
-            lo[k] + size + (AT_LEAST + size / 64.0) * share(3 * i + k as u64)
+            lo[k] + size + (AT_LEAST + size / 64.0) * scatter::share(3 * i + k as u64)
         });
         Aabb::new(Vec3A::from_array(lo.map(|x| x as f32)), Vec3A::from_array(hi.map(|x| x as f32)))
     };
@@ -93,14 +94,6 @@ fn uneven(boxes: &[Bounds]) -> Vec<Aabb> {
 
 /// By how much the smallest boxes grow, at most; single precision tells it from nothing.
 const AT_LEAST: f64 = 1.0 / (1 << 18) as f64;
-
-/// A share by a number, in no order: the finalizer of SplitMix64 (Steele, Lea and Flood 2014).
-fn share(number: u64) -> f64 {
-    let x = number.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    let x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    let x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    ((x ^ (x >> 31)) >> 40) as f64 / (1u64 << 24) as f64
-}
 
 fn aabb(b: &Bounds) -> Aabb {
     Aabb::new(Vec3A::from_array(b.lo), Vec3A::from_array(b.hi))

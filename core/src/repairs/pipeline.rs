@@ -29,7 +29,7 @@ use crate::repairs::orient::hollow;
 use crate::repairs::orient::visibility;
 use crate::repairs::rebuild;
 use crate::repairs::separate::pinch_vertices;
-use crate::repairs::shared::context::{Context, Repair};
+use crate::repairs::shared::context::{Context, Handed, Repair};
 use crate::repairs::shared::probes::Probes;
 use crate::repairs::stitch::overlaps;
 use crate::repairs::stitch::sew;
@@ -255,7 +255,8 @@ fn measure_skin(cx: &mut Context<'_, '_>) {
         let pieces = cx.pieces();
         let turned = (&cx.reversed, &cx.handed.dropped_by);
         cx.handed.explained.sort_unstable();
-        let made = (&cx.handed.wrapped[..], &cx.handed.explained[..]);
-        cx.account.skin = Some(skin::measure(cx.survey, &cx.work, turned, &pieces, made, reach));
+        let Handed { wrapped, explained, cavities, .. } = &cx.handed;
+        let known = skin::Known { wrapped, explained, cavities };
+        cx.account.skin = Some(skin::measure(cx.survey, &cx.work, turned, &pieces, &known, reach));
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! **In:** closures, keys, counters.
 //! **Out:** threads that are a help and never a need ([`parallel`]), sorts by digits ([`radix`]), disjoint sets ([`union_find`]), numbers
-//! in few bytes ([`varint`]), what a run costs ([`cost`]), counted steps of loops ([`steps`]), what the machine has ([`machine`]).
+//! in few bytes ([`varint`]), what a run costs ([`cost`]), counted steps of loops ([`steps`]), numbers in
+//! no order ([`scatter`]), what the machine has ([`machine`]).
 //! **Promise:** nothing here knows a triangle. Parallel work returns its results in the order of its items, so that no result depends on
 //! the number of threads.
 
@@ -11,6 +12,7 @@ pub(crate) mod ids;
 pub(crate) mod machine;
 pub(crate) mod parallel;
 pub(crate) mod radix;
+pub(crate) mod scatter;
 pub(crate) mod steps;
 pub(crate) mod union_find;
 pub(crate) mod varint;

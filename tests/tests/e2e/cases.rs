@@ -82,7 +82,7 @@ const GOOD: [Case; 16] = [
 
 /// May a person be asked to look for this reason? Of a coarse mesh, what sticks out may have been the box's outermost. The coarsest has one
 /// place for a defect, which is all of it: a fin is more than a thousandth of its skin, and islands lie in a hole of half of it.
-fn may_be_asked(case: Case, triangles: usize, reason: &str) -> bool {
+fn may_be_asked(case: Case, triangles: u64, reason: &str) -> bool {
     match case {
         Case::Fins if triangles == 512 && reason.starts_with("visible surface was lost") => true,
         Case::Islands if triangles == 512 => {

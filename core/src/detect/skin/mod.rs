@@ -18,6 +18,7 @@ mod seen;
 mod surfaces;
 
 use crate::contract::report::{RepairName, Skin, SkinCause, SkinChange, SkinPlace};
+use crate::detect::bodies;
 use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed};
 use crate::topology::survey::Survey;
@@ -36,29 +37,48 @@ const PLACES: usize = 8;
 /// Places are cells of this share of the diagonal.
 const PLACE: f64 = 0.05;
 
-/// What the repairs made of the surface. `explained`: triangles of patches that nothing speaks against, ascending. `reach`: the distance up to
-/// which surface is where it was. O(edit × log), and reads the chunks around
+/// What the repairs know of the surface, beside the submesh.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Known<'a> {
+    /// The triangles of wraps, which are not in the submesh.
+    pub(crate) wrapped: &'a [[[f32; 3]; 3]],
+    /// Triangles of patches that nothing speaks against, ascending.
+    pub(crate) explained: &'a [u32],
+    /// The triangles of cavities that poke out of what they are in: what is inside them is none of the skin, the file itself says so.
+    pub(crate) cavities: &'a [[[f32; 3]; 3]],
+}
+
+/// What the repairs made of the surface. `reach`: the distance up to which surface is where it was. O(edit × log), and reads the chunks around
 /// points that are far from what is in the submesh.
 pub(crate) fn measure(
     survey: &Survey<'_>,
     submesh: &Submesh,
     (reversed, dropped_by): (&Reversed, &DroppedBy),
     pieces: &Components,
-    (wrapped, explained): (&[[[f32; 3]; 3]], &[u32]),
+    known: &Known<'_>,
     reach: f64,
 ) -> Skin {
-    let surfaces = Surfaces { survey, submesh, reversed, dropped_by, wrapped };
+    let surfaces = Surfaces { survey, submesh, reversed, dropped_by, wrapped: known.wrapped };
     let whole = survey.measure.area_of(surfaces.area_before());
     let gone = Samples::gone(&surfaces, reach);
-    let lost = change(&surfaces, [Which::Before, Which::After], &gone, reach, whole);
-    let added = Samples::added(&surfaces, &patches::plausible(survey, submesh, pieces, explained, reach), reach);
-    let invented = change(&surfaces, [Which::After, Which::Before], &added, reach, whole);
+    let lost = change(&surfaces, [Which::Before, Which::After], (&gone, known.cavities), reach, whole);
+    let added = Samples::added(&surfaces, &patches::plausible(survey, submesh, pieces, known.explained, reach), reach);
+    let invented = change(&surfaces, [Which::After, Which::Before], (&added, &[]), reach, whole);
     Skin { reach, lost, invented }
 }
 
-/// What of the samples, which lie on `of`, can be seen there and is far from `other`.
-fn change(surfaces: &Surfaces<'_>, [of, other]: [Which; 2], samples: &Samples, reach: f64, whole: f64) -> SkinChange {
+/// What of the samples, which lie on `of`, can be seen there, is in no cavity, and is far from `other`.
+fn change(
+    surfaces: &Surfaces<'_>,
+    [of, other]: [Which; 2],
+    (samples, cavities): (&Samples, &[[[f32; 3]; 3]]),
+    reach: f64,
+    whole: f64,
+) -> SkinChange {
     let far = near::beyond(surfaces, other, &samples.points, reach);
+    let points: Vec<[f64; 3]> = far.iter().map(|s| samples.points[*s as usize]).collect();
+    let windings = bodies::windings_of(cavities, &points);
+    let far: Vec<u32> = far.into_iter().zip(windings).filter(|(_, winding)| *winding >= 0).map(|(s, _)| s).collect();
     // Of many, a part stands for all: each for as many.
     let every = far.len().div_ceil(ASKED).max(1);
     let asked: Vec<u32> = far.into_iter().step_by(every).collect();

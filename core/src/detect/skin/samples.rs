@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use crate::contract::report::RepairName;
+use crate::util::scatter;
 
 use super::surfaces::Surfaces;
 
@@ -81,23 +82,16 @@ fn area_of_each(area: f64, reach: f64) -> f64 {
 fn take(taken: &mut Vec<Taken>, number: u32, corners: &[[f32; 3]; 3], by: Option<RepairName>, each: f64) {
     let [a, b, c] = corners.map(|p| DVec3::from_array(p.map(f64::from)));
     let front = (b - a).cross(c - a);
-    let count = front.length() / 2.0 / each + fraction(number);
+    let count = front.length() / 2.0 / each + scatter::share(number.into());
     if !count.is_finite() || count < 1.0 {
         return;
     }
     // Roberts' sequence: it fills the square evenly, wherever it ends.
     let points = (1..=count as u32).map(|i| {
-        let along = |step: f64| (fraction(number) + step * f64::from(i)).fract();
+        let along = |step: f64| (scatter::share(number.into()) + step * f64::from(i)).fract();
         let (u, v) = (along(0.754_877_666_246_692_7), along(0.569_840_290_998_053_3));
         let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
         (a + (b - a) * u + (c - a) * v).to_array()
     });
     taken.push((number, (by, front), points.collect()));
-}
-
-/// A number from 0 to 1 that looks drawn at random.
-fn fraction(number: u32) -> f64 {
-    let mixed = (u64::from(number) + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    (mixed >> 11) as f64 / (1u64 << 53) as f64
 }

@@ -17,7 +17,7 @@ fn skin_after(triangles: &[Corners], repair: impl FnOnce(&mut Submesh)) -> Skin 
     repair(&mut d.submesh);
     let reversed = Reversed::none(&d.survey);
     let pieces = Components::of(&d.survey, &d.submesh, &Edges::of(&d.submesh), &reversed, Through::EveryEdge);
-    measure(&d.survey, &d.submesh, (&reversed, &Vec::new()), &pieces, (&[], &[]), 0.01)
+    measure(&d.survey, &d.submesh, (&reversed, &Vec::new()), &pieces, &Known::default(), 0.01)
 }
 
 /// Removes what is a triangle of `these`.

@@ -11,6 +11,9 @@ use crate::util::ids::NONE;
 /// Name of the method that lets flat surface go on to where it meets other.
 pub(crate) const EXTENDED: &str = "planes to where they meet";
 
+/// Name of the method that closes a hole around its islands.
+pub(crate) const ISLANDS: &str = "islands";
+
 /// How much of a guess a patch of planes is.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Planes {

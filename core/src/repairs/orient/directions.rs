@@ -4,6 +4,7 @@ use crate::contract::report::RepairName;
 use crate::geometry::sums::Bounds;
 use crate::repairs::orient::inverted::{Inverted, inverted};
 use crate::repairs::shared::context::{Changes, Done, Repair};
+use crate::repairs::shared::lone_sheets::gather;
 use crate::repairs::shared::work::Work;
 use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed};
@@ -36,6 +37,7 @@ pub(crate) const OUTWARD: Repair = Repair {
             let news: Vec<String> = outward.doubts.into_iter().filter(|doubt| !cx.account.doubts.contains(doubt)).collect();
             cx.account.doubts.extend(news);
             cx.account.enclosed.outline = cx.account.enclosed.outline.or(outward.outline);
+            cx.handed.cavities.extend(outward.cavities);
             cx.found_outward();
         }
         Ok(Done::count(turned, "components that were inside out"))
@@ -153,7 +155,12 @@ pub(crate) struct Outward {
     pub(crate) doubts: Vec<String>,
     /// The box that material is in, if cavities poke out of it.
     pub(crate) outline: Option<Bounds>,
+    /// Cavities that poke out, plainly: their triangles.
+    pub(crate) cavities: Vec<[[f32; 3]; 3]>,
 }
+
+/// More triangles of cavities are not gathered.
+const MOST_GATHERED: u64 = 1 << 18;
 
 /// The closed pieces that are inside out. No look at the file if all enclose positive volume.
 pub(crate) fn inside_out(survey: &Survey<'_>, submesh: &Submesh, reversed: &Reversed, pieces: &Components) -> Inverted {
@@ -167,7 +174,21 @@ pub(crate) fn inside_out(survey: &Survey<'_>, submesh: &Submesh, reversed: &Reve
 pub(crate) fn make_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed, pieces: &Components) -> Outward {
     let found = inside_out(survey, work, reversed, pieces);
     let count = turn(work, reversed, pieces, &found.pieces);
-    Outward { pieces: count, doubts: found.doubts, outline: outline(pieces, &found.poking_out) }
+    let outline = outline(pieces, &found.poking_out);
+    Outward { pieces: count, doubts: found.doubts, outline, cavities: surface_of(survey, work, reversed, pieces, &found.plainly) }
+}
+
+/// The triangles of these pieces, ascending; of none if they are too many.
+fn surface_of(
+    survey: &Survey<'_>,
+    submesh: &Submesh,
+    reversed: &Reversed,
+    pieces: &Components,
+    wanted: &[u32],
+) -> Vec<[[f32; 3]; 3]> {
+    let count: u64 = wanted.iter().map(|piece| pieces.list[*piece as usize].triangles).sum();
+    let wanted: Vec<usize> = wanted.iter().filter(|_| count <= MOST_GATHERED).map(|piece| *piece as usize).collect();
+    gather(survey, submesh, pieces, reversed, &wanted).into_iter().flat_map(|(surface, _)| surface).collect()
 }
 
 /// The box of all pieces but these, where it ends sooner than that of all: to the other sides it is endless. `None`: nowhere.
@@ -201,6 +222,10 @@ pub(crate) fn turn(work: &mut Work<'_>, reversed: &mut Reversed, pieces: &Compon
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contract::progress::Quiet;
+    use crate::contract::report::Outcome;
+    use crate::contract::settings::{Limits, Profile};
+    use crate::engine::mesh::Mesh;
     use crate::repairs::shared::pieces;
     use crate::testing::{After, Corners, after, cube, cuboid, plate, reversed};
 
@@ -283,5 +308,22 @@ mod tests {
             let got = outward(&[cuboid([at, 0.0, 0.0], [at + 1.0, 1.0, 1.0]), right].concat());
             assert_eq!((got.result, got.untouched), (0, 24));
         }
+    }
+
+    /// A cavity that reaches through the floor opens it: the file says so itself, and the floor that is gone is no loss.
+    #[test]
+    fn the_mouth_of_a_cavity_that_pokes_out_is_no_loss() {
+        let lost = |reaches: f32| {
+            let cavity = reversed(&cuboid([2.0, 2.0, -reaches], [4.0, 4.0, 5.0]));
+            let mesh = Mesh::from_triangles(&[cuboid([0.0; 3], [8.0; 3]), cavity].concat()).unwrap();
+            let limits = Limits { threads: 1, ..Limits::default() };
+            let report = crate::repair_mesh(&mesh, &Profile::default(), &limits, &Quiet).unwrap().report;
+            assert_eq!(report.after.map(|after| after.volume), Some(512.0 - 20.0));
+            (report.outcome, report.skin.unwrap().lost.share)
+        };
+        let (outcome, share) = lost(0.25);
+        assert!(outcome == Outcome::Repaired && share < 1e-4, "{outcome:?} {share}");
+        // As much of it is outside as inside: somebody must look.
+        assert_eq!(lost(4.0).0, Outcome::NeedsReview);
     }
 }

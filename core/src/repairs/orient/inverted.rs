@@ -41,6 +41,8 @@ pub(crate) struct Inverted {
     pub(crate) doubts: Vec<String>,
     /// Cavities that cross the walls of others, ascending.
     pub(crate) poking_out: Vec<u32>,
+    /// Those of them that are no guess.
+    pub(crate) plainly: Vec<u32>,
 }
 
 /// What winds around a point, ascending, with winding numbers.
@@ -59,8 +61,8 @@ pub(crate) fn inverted(survey: &Survey<'_>, submesh: &Submesh, pieces: &Componen
         inverted: vec![false; pieces.list.len()],
     };
     all.decide();
-    let (doubts, poking_out) = all.guesses();
-    Inverted { pieces: all.inverted, doubts, poking_out }
+    let guesses = all.guesses();
+    Inverted { pieces: all.inverted, ..guesses }
 }
 
 /// All pieces, and which of them are known to be inside out.
@@ -127,8 +129,8 @@ impl All<'_> {
     }
 
     /// Lines on what was to be guessed, and what was taken for cavities.
-    fn guesses(&self) -> (Vec<String>, Vec<u32>) {
-        let (mut doubts, mut poking_out) = (Vec::new(), Vec::new());
+    fn guesses(&self) -> Inverted {
+        let mut guesses = Inverted::default();
         let closed = self.list.iter().filter(|piece| !piece.open);
         let all: f64 = closed.map(|piece| piece.extent.volume.abs() as f64).sum();
         for c in self.by_points.keys() {
@@ -141,18 +143,20 @@ impl All<'_> {
             };
             let Bounds { lo, hi } = self.list[*c as usize].bounds.normalised();
             let is_large = self.list[*c as usize].extent.volume.abs() as f64 > LEAST * all;
-            if is_large && (was_negative == is_turned || share < PLAINLY) {
+            let is_guess = is_large && (was_negative == is_turned || share < PLAINLY);
+            if is_guess {
                 let share = share * 100.0;
-                doubts.push(format!(
+                guesses.doubts.push(format!(
                     "surface that faces inward crosses other bodies, and {share:.0} % of it lies in their material: it was taken for {meant}, from \
                      {lo:?} to {hi:?}"
                 ));
             }
             if was_negative != is_turned {
-                poking_out.push(*c);
+                guesses.poking_out.push(*c);
+                guesses.plainly.extend((!is_guess).then_some(*c));
             }
         }
-        (doubts, poking_out)
+        guesses
     }
 }
 

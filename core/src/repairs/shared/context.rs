@@ -89,6 +89,8 @@ pub(crate) struct Handed {
     pub(crate) across: Vec<PatchAcross>,
     /// The triangles of patches that nothing speaks against. Of the filling, for the skin.
     pub(crate) explained: Vec<u32>,
+    /// The triangles of cavities that plainly poke out of what they are in. Of the orientation, for the skin.
+    pub(crate) cavities: Vec<[[f32; 3]; 3]>,
     /// Points in the bodies, before any is cut or removed.
     pub(crate) probes: Option<Probes>,
     /// Bodies that cutting left and no printer can see, which are gone.

@@ -12,7 +12,7 @@ use crate::contract::settings::Profile;
 use crate::detect::holes::loops::Loop;
 use crate::geometry::exact::Point;
 use crate::repairs::holes::fair::{Beyond, Gathered};
-use crate::repairs::holes::patches::{EXTENDED, Placed, Planes};
+use crate::repairs::holes::patches::{EXTENDED, ISLANDS, Placed, Planes};
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::submesh::{Submesh, Vertex};
@@ -71,11 +71,10 @@ impl Closing<'_> {
             let body = Body { area: survey.measure.area(extent), volume: survey.measure.volume(extent), all };
             let doubt = match (patch.planes, patch.rims.as_slice()) {
                 (Some(planes), _) if patch.method == EXTENDED => judged.planes(submesh, patch, planes, body),
-                (_, [_]) if !patch.coarse.is_empty() && area(submesh, patch) >= WIDE * body.area => {
-                    judged.shaped(submesh, patch, body, profile)
+                (_, [rim, islands @ ..]) if islands.is_empty() || patch.method == ISLANDS => {
+                    judged.hole(survey, submesh, (patch, self.rim(*rim)), body, profile)
                 }
-                (_, [rim]) => judged.flat(survey, submesh, (patch, self.rim(*rim)), body, profile),
-                (_, [a, b]) => way_through(submesh, patch, [*a, *b].map(|rim| self.rim(rim)), body),
+                (_, [a, b]) => judged.ring(submesh, patch, [*a, *b].map(|rim| self.rim(rim)), body),
                 _ => None,
             };
             judged.doubts.extend(doubt.map(|doubt| format!("{doubt}, at {:?}", submesh.points(first)[0])));
@@ -111,6 +110,31 @@ impl Judged {
         patch.triangles().filter(|t| submesh.lives(*t)).for_each(|t| self.reached.include(&submesh.points(t)));
         self.area += area(submesh, patch);
         self.explained.extend(patch.triangles());
+    }
+
+    /// A patch over a hole, around its islands if there are any.
+    fn hole(
+        &mut self,
+        survey: &Survey<'_>,
+        submesh: &Submesh,
+        (patch, rim): (&Placed, &Loop),
+        body: Body,
+        profile: &Profile,
+    ) -> Option<String> {
+        if patch.coarse.is_empty() || area(submesh, patch) < WIDE * body.area {
+            self.flat(survey, submesh, (patch, rim), body, profile)
+        } else {
+            self.shaped(submesh, patch, body, profile)
+        }
+    }
+
+    /// A ring between two rims.
+    fn ring(&mut self, submesh: &Submesh, patch: &Placed, rims: [&Loop; 2], body: Body) -> Option<String> {
+        let doubt = way_through(submesh, patch, rims, body);
+        if doubt.is_none() && area(submesh, patch) < WIDEST * body.area {
+            self.explain(submesh, patch);
+        }
+        doubt
     }
 
     fn flat(

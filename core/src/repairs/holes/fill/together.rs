@@ -9,7 +9,7 @@ use crate::detect::holes::{
 };
 use crate::repairs::holes::annular;
 use crate::repairs::holes::islands;
-use crate::repairs::holes::patches::Placed;
+use crate::repairs::holes::patches::{ISLANDS, Placed};
 use crate::repairs::shared::work::Work;
 use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
@@ -70,7 +70,7 @@ impl Closing<'_> {
         self.close_touching(work, &mut all);
         self.close_rings(work, partners.rings, &owners, &mut all, threads);
         for group in &islands {
-            self.close_group(work, "islands", group, &mut all);
+            self.close_group(work, ISLANDS, group, &mut all);
         }
         for group in &partners.bored {
             self.close_group(work, "annular", group, &mut all);
@@ -100,7 +100,7 @@ impl Closing<'_> {
             if self.admits(work, &all.group(&numbers))
                 && let Some(patch) = islands::patch_touching(work, &way)
             {
-                all.place(work, &numbers, &patch, "islands");
+                all.place(work, &numbers, &patch, ISLANDS);
             }
         }
     }

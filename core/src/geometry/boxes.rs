@@ -33,13 +33,18 @@ impl BoxTree {
     /// Replaces `found` by the numbers of all boxes that meet `wanted`, ascending: the tree's own order is not to be relied on.
     pub(crate) fn meeting(&self, wanted: &Bounds, found: &mut Vec<u32>) {
         found.clear();
+        self.each_meeting(wanted, |i| found.push(i));
+        found.sort_unstable();
+    }
+
+    /// Visits the numbers of all boxes that meet `wanted`, in an order that is not to be relied on.
+    pub(crate) fn each_meeting(&self, wanted: &Bounds, mut visit: impl FnMut(u32)) {
         self.tree.aabb_traverse(aabb(wanted), |tree, node| {
             let node = &tree.nodes[node as usize];
             let first = node.first_index as usize;
-            found.extend(&tree.primitive_indices[first..first + node.prim_count as usize]);
+            tree.primitive_indices[first..first + node.prim_count as usize].iter().for_each(|i| visit(*i));
             true
         });
-        found.sort_unstable();
     }
 
     /// Does any box but this one meet `wanted`? O(log n) where few do, and where many do.

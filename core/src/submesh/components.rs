@@ -1,10 +1,12 @@
 //! Components: regions of regular surface and triangles of the submesh that hang together through edges.
 
 use super::edges::{Edge, Edges};
+use super::sheets::Sheets;
 use super::{Submesh, Vertex};
 use crate::geometry::sums::{Bounds, Extent};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
+use crate::util::union_find::{find, unite};
 
 /// Which regions of regular surface are reversed, against how they stand in the file, and which go. Triangles of the submesh are turned, or die, in
 /// place.
@@ -59,19 +61,25 @@ pub(crate) enum Through<'a> {
     CoherentEdges,
     /// Through non-manifold edges only between sheets (as given) that are open by themselves: bodies that touch along an edge stay
     /// apart, and what is closed only together stays together.
-    OpenSheets(&'a Components),
+    OpenSheets(&'a Sheets),
 }
 
 impl Through<'_> {
-    /// Does a component reach through this edge to this triangle?
-    pub(crate) fn reaches(self, edge: &Edge<'_>, triangle: u32) -> bool {
+    /// Does a component reach through this edge to all of its triangles, whatever they belong to?
+    pub(crate) fn reaches(self, edge: &Edge<'_>) -> bool {
         match self {
             Self::EveryEdge => true,
-            Self::ManifoldEdges => !edge.is_nonmanifold(),
+            Self::ManifoldEdges | Self::OpenSheets(_) => !edge.is_nonmanifold(),
             Self::CoherentEdges => !edge.is_nonmanifold() && !edge.is_inconsistent(),
-            Self::OpenSheets(sheets) => {
-                !edge.is_nonmanifold() || sheets.list[sheets.of_triangle[triangle as usize] as usize].open
-            }
+        }
+    }
+
+    /// Visits triangles at an edge that hang together through it, by twos.
+    fn joins(self, edge: &Edge<'_>, mut join: impl FnMut(u32, u32)) {
+        if self.reaches(edge) {
+            edge.uses[1..].iter().for_each(|u| join(edge.uses[0].triangle, u.triangle));
+        } else if let Self::OpenSheets(sheets) = self {
+            sheets.join_open(edge, join);
         }
     }
 }
@@ -84,16 +92,13 @@ impl Components {
         for t in submesh.living() {
             let region = submesh.triangles[t as usize].region;
             if region != NONE {
-                crate::util::union_find::unite(&mut parents, region, regions + t);
+                unite(&mut parents, region, regions + t);
             }
         }
         for edge in edges.iter() {
-            let mut reached = edge.uses.iter().filter(|u| through.reaches(&edge, u.triangle));
-            if let Some(first) = reached.next() {
-                reached.for_each(|u| {
-                    crate::util::union_find::unite(&mut parents, regions + first.triangle, regions + u.triangle);
-                });
-            }
+            through.joins(&edge, |a, b| {
+                unite(&mut parents, regions + a, regions + b);
+            });
         }
         let mut all =
             Self { list: Vec::new(), of_region: vec![NONE; regions as usize], of_triangle: vec![NONE; submesh.triangles.len()] };
@@ -101,11 +106,7 @@ impl Components {
         // After a second look, there may be nothing left of a region.
         for p in (0..regions).filter(|p| survey.regions[*p as usize].first != NONE && !reversed.dropped[*p as usize]) {
             let sum = &survey.regions[p as usize];
-            let c = all.number(
-                &mut numbers,
-                crate::util::union_find::find(&mut parents, p),
-                Sample { record: sum.first, in_submesh: None },
-            );
+            let c = all.number(&mut numbers, find(&mut parents, p), Sample { record: sum.first, in_submesh: None });
             all.of_region[p as usize] = c;
             let into = &mut all.list[c as usize];
             into.triangles += sum.triangles;
@@ -115,7 +116,7 @@ impl Components {
         for t in submesh.living() {
             let c = all.number(
                 &mut numbers,
-                crate::util::union_find::find(&mut parents, regions + t),
+                find(&mut parents, regions + t),
                 Sample { record: submesh.record(t), in_submesh: Some(t) },
             );
             all.of_triangle[t as usize] = c;
@@ -135,6 +136,11 @@ impl Components {
             }
         }
         all
+    }
+
+    /// These, between non-manifold edges, as sheets.
+    pub(crate) fn into_sheets(self, edges: &Edges) -> Sheets {
+        Sheets::of(self.of_triangle, self.list.iter().map(|c| c.open).collect(), edges)
     }
 
     fn number(&mut self, numbers: &mut [u32], root: u32, sample: Sample) -> u32 {
@@ -160,7 +166,7 @@ pub(crate) fn boundary_loops(submesh: &Submesh, edges: &Edges) -> u64 {
     for edge in edges.iter().filter(|e| e.is_boundary()) {
         on_boundary[edge.low as usize] = true;
         on_boundary[edge.high as usize] = true;
-        crate::util::union_find::unite(&mut parents, edge.low, edge.high);
+        unite(&mut parents, edge.low, edge.high);
     }
     (0..parents.len()).filter(|v| on_boundary[*v] && parents[*v] == *v as u32).count() as u64
 }
@@ -176,7 +182,7 @@ pub(crate) fn nonmanifold_vertices(submesh: &Submesh, edges: &Edges) -> Vec<Vert
             bad[edge.high as usize] = true;
         } else if let [a, b] = edge.uses {
             for v in [edge.low, edge.high] {
-                crate::util::union_find::unite(&mut parents, corner(a.triangle, v), corner(b.triangle, v));
+                unite(&mut parents, corner(a.triangle, v), corner(b.triangle, v));
             }
         }
     }
@@ -185,7 +191,7 @@ pub(crate) fn nonmanifold_vertices(submesh: &Submesh, edges: &Edges) -> Vec<Vert
             if !submesh.complete[*v as usize] {
                 return false;
             }
-            let mut fans = submesh.star(*v).map(|(t, k)| crate::util::union_find::find(&mut parents, t * 3 + k as u32));
+            let mut fans = submesh.star(*v).map(|(t, k)| find(&mut parents, t * 3 + k as u32));
             bad[*v as usize] || fans.next().is_some_and(|first| fans.any(|f| f != first))
         })
         .collect()
@@ -201,7 +207,7 @@ mod tests {
         let records = records(triangles);
         let d = diagnose(&records);
         let of = |through| Components::of(&d.survey, &d.submesh, &Edges::of(&d.submesh), &Reversed::none(&d.survey), through);
-        let sheets = of(Through::ManifoldEdges);
+        let sheets = of(Through::ManifoldEdges).into_sheets(&Edges::of(&d.submesh));
         [of(Through::EveryEdge), of(Through::ManifoldEdges), of(Through::OpenSheets(&sheets))]
             .map(|c| (c.list.len(), c.list.iter().filter(|c| c.open).count()))
     }

@@ -13,6 +13,7 @@ pub(crate) mod components;
 pub(crate) mod edges;
 pub(crate) mod near;
 pub(crate) mod radial;
+pub(crate) mod sheets;
 
 use std::collections::HashMap;
 

@@ -58,7 +58,9 @@ pub(crate) fn measure(
     known: &Known<'_>,
     reach: f64,
 ) -> Skin {
-    let surfaces = Surfaces { survey, submesh, reversed, dropped_by, wrapped: known.wrapped };
+    let mut of_cavities: Vec<_> = known.cavities.iter().map(surfaces::by_corners).collect();
+    of_cavities.sort_unstable();
+    let surfaces = Surfaces { survey, submesh, reversed, dropped_by, wrapped: known.wrapped, of_cavities };
     let whole = survey.measure.area_of(surfaces.area_before());
     let gone = Samples::gone(&surfaces, reach);
     let lost = change(&surfaces, [Which::Before, Which::After], (&gone, known.cavities), reach, whole);

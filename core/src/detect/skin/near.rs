@@ -70,7 +70,8 @@ fn squares_within(
     }
     let boxes: Vec<Bounds> = of.iter().map(|p| widened(points[*p as usize], reach)).collect();
     let at = |i: u32| DVec3::from_array(points[of[i as usize] as usize]);
-    let mut in_memory = Near::of((0..of.len() as u32).collect());
+    let wanted = Wanted { square: reach * reach, asked };
+    let mut in_memory = Near::of((0..of.len() as u32).collect(), wanted);
     surfaces.each_in_memory(which, |corners| {
         if in_memory.may_meet(&boxes, corners) {
             in_memory.visit(&boxes, at, corners);
@@ -88,7 +89,7 @@ fn squares_within(
         |chunk| {
             let mut here = Vec::new();
             tree.meeting(chunk, &mut here);
-            (!here.is_empty()).then(|| Near::of(here.into_iter().map(|i| left[i as usize]).collect()))
+            (!here.is_empty()).then(|| Near::of(here.into_iter().map(|i| left[i as usize]).collect(), wanted))
         },
         |near, corners| near.may_meet(&boxes, corners),
         |near, triangle, _| near.visit(&boxes, at, &position::corners(&surfaces.survey.records[triangle as usize])),
@@ -97,19 +98,26 @@ fn squares_within(
     squares
 }
 
+/// What is asked of points, and the squared distance beyond which nothing is.
+#[derive(Clone, Copy)]
+struct Wanted {
+    square: f64,
+    asked: Asked,
+}
+
 /// Some of the points, and the nearest that was found to each.
 struct Near {
     here: Vec<u32>,
     squares: Vec<f64>,
     /// Made when the first triangle is seen.
     index: OnceCell<(BoxTree, Grid)>,
-    found: Vec<u32>,
+    wanted: Wanted,
 }
 
 impl Near {
-    fn of(here: Vec<u32>) -> Self {
+    fn of(here: Vec<u32>, wanted: Wanted) -> Self {
         let squares = vec![f64::INFINITY; here.len()];
-        Self { here, squares, index: OnceCell::new(), found: Vec::new() }
+        Self { here, squares, index: OnceCell::new(), wanted }
     }
 
     fn index(&self, boxes: &[Bounds]) -> &(BoxTree, Grid) {
@@ -127,14 +135,24 @@ impl Near {
     }
 
     fn visit(&mut self, boxes: &[Bounds], at: impl Fn(u32) -> DVec3, corners: &[[f32; 3]; 3]) {
-        let mut found = std::mem::take(&mut self.found);
-        self.index(boxes).0.meeting(&Bounds::of(corners), &mut found);
+        let mut squares = std::mem::take(&mut self.squares);
         let triangle = corners.map(place);
-        for i in &found {
-            let square = &mut self.squares[*i as usize];
-            *square = square.min(square_distance(at(self.here[*i as usize]), triangle));
-        }
-        self.found = found;
+        let [a, b, c] = triangle;
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        self.index(boxes).0.each_meeting(&Bounds::of(corners), |i| {
+            let square = &mut squares[i as usize];
+            let most = square.min(self.wanted.square);
+            if self.wanted.asked == Asked::IfAny && *square <= most {
+                return;
+            }
+            let p = at(self.here[i as usize]);
+            // Nothing of a triangle is nearer than its plane, up to rounding.
+            let height = normal.dot(p - a) * (1.0 - 1e-9);
+            if height * height <= most {
+                *square = square.min(square_distance(p, triangle));
+            }
+        });
+        self.squares = squares;
     }
 
     fn put_into(self, squares: &mut [f64]) {

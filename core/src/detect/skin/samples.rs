@@ -16,15 +16,24 @@ const SPACING: f64 = 0.5;
 #[derive(Default)]
 pub(super) struct Samples {
     pub(super) points: Vec<[f64; 3]>,
-    /// Where the surface faces at each of them.
-    pub(super) fronts: Vec<DVec3>,
+    /// Where the surface faces at each of them, if it counts from there only.
+    pub(super) fronts: Vec<Option<DVec3>>,
     /// The repair that changed the surface there.
     pub(super) causes: Vec<Option<RepairName>>,
     pub(super) area_of_each: f64,
 }
 
+type Corners = [[f32; 3]; 3];
+
+/// From where a surface counts.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Side {
+    Front,
+    Both,
+}
+
 /// Points of one triangle, by the triangle's number.
-type Taken = (u32, (Option<RepairName>, DVec3), Vec<[f64; 3]>);
+type Taken = (u32, (Option<RepairName>, Option<DVec3>), Vec<[f64; 3]>);
 
 impl Samples {
     /// On what is not there any more.
@@ -37,10 +46,12 @@ impl Samples {
         let drops = surfaces.reversed.dropped.contains(&true);
         let each = area_of_each(measure.area_of(twice + dropped.sum::<i128>()), reach);
         let mut taken = Vec::new();
-        surfaces.each_gone(|number, corners, by| take(&mut taken, number, corners, by, each));
+        let side = |corners: &Corners| if surfaces.is_of_cavity(corners) { Side::Front } else { Side::Both };
+        surfaces.each_gone(|number, corners, by| take(&mut taken, number, (corners, side(corners)), by, each));
         if drops {
-            let of_chunks =
-                surfaces.each_dropped(|into: &mut Vec<Taken>, number, corners, by| take(into, number, corners, by, each));
+            let of_chunks = surfaces.each_dropped(|into: &mut Vec<Taken>, number, corners, by| {
+                take(into, number, (corners, side(corners)), by, each);
+            });
             taken.extend(of_chunks.into_iter().flatten());
             taken.sort_unstable_by_key(|(number, ..)| *number);
         }
@@ -57,7 +68,7 @@ impl Samples {
         let mut taken = Vec::new();
         surfaces.each_added(|number, corners, by| {
             if counts(number) {
-                take(&mut taken, number, corners, by, each);
+                take(&mut taken, number, (corners, Side::Front), by, each);
             }
         });
         Self::of(taken, each)
@@ -79,7 +90,7 @@ fn area_of_each(area: f64, reach: f64) -> f64 {
 }
 
 /// Points on a triangle, on average one for each such area. A number of the triangle decides where, and what becomes of the rest of the area.
-fn take(taken: &mut Vec<Taken>, number: u32, corners: &[[f32; 3]; 3], by: Option<RepairName>, each: f64) {
+fn take(taken: &mut Vec<Taken>, number: u32, (corners, side): (&Corners, Side), by: Option<RepairName>, each: f64) {
     let [a, b, c] = corners.map(|p| DVec3::from_array(p.map(f64::from)));
     let front = (b - a).cross(c - a);
     let count = front.length() / 2.0 / each + scatter::share(number.into());
@@ -93,5 +104,6 @@ fn take(taken: &mut Vec<Taken>, number: u32, corners: &[[f32; 3]; 3], by: Option
         let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
         (a + (b - a) * u + (c - a) * v).to_array()
     });
+    let front = (side == Side::Front).then_some(front);
     taken.push((number, (by, front), points.collect()));
 }

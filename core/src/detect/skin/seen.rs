@@ -1,8 +1,8 @@
 //! Which points of a surface can be seen from outside.
 //!
 //! From each point rays run into fourteen directions: along the axes, a little askew, so that no wall of a part that stands straight holds one,
-//! and towards the corners of a cube. A point can be seen if one of the rays on the front of its surface meets nothing. What is seen from behind only
-//! bounds no material: the part of a cavity that pokes out of its wall. What is next to the point itself does not count.
+//! and towards the corners of a cube. A point can be seen if one of the rays meets nothing. Of a cavity that pokes out of its wall, and of what is
+//! new, only rays on the front of the surface count: what is seen from behind only bounds no material. What is next to the point itself does not count.
 //!
 //! A direction is made the upright one by a shear, in which both triangles at an edge still have the same edge; so no ray slips through.
 
@@ -18,8 +18,8 @@ use super::surfaces::{Surfaces, Which};
 #[derive(Clone, Copy)]
 pub(super) struct OnSurface {
     pub(super) at: [f64; 3],
-    /// Where the surface faces; of any length.
-    pub(super) front: DVec3,
+    /// Where the surface faces, of any length, if it counts from there only.
+    pub(super) front: Option<DVec3>,
 }
 
 /// The share of the reach within which surface is next to a point.
@@ -56,7 +56,8 @@ fn are_free(surfaces: &Surfaces<'_>, which: Which, points: &[OnSurface], directi
         |(), triangle, _| meet(&position::corners(&surfaces.survey.records[triangle as usize])),
     );
     let is_free = |p: usize| {
-        let in_front = bundles.iter().filter(|bundle| bundle.direction.along().dot(points[p].front) > 0.0);
+        let in_front =
+            bundles.iter().filter(|bundle| points[p].front.is_none_or(|front| bundle.direction.along().dot(front) > 0.0));
         in_front.into_iter().any(|bundle| !bundle.met[p].load(Relaxed))
     };
     (0..points.len()).map(is_free).collect()

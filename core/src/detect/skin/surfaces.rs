@@ -28,12 +28,25 @@ pub(crate) struct Surfaces<'a> {
     pub(crate) reversed: &'a Reversed,
     pub(crate) dropped_by: &'a DroppedBy,
     pub(crate) wrapped: &'a [Corners],
+    /// The triangles of cavities that poke out, each by its corners, whichever way round; ascending.
+    pub(crate) of_cavities: Vec<[[u32; 3]; 3]>,
+}
+
+/// A triangle by its corners, whichever way round.
+pub(crate) fn by_corners(corners: &Corners) -> [[u32; 3]; 3] {
+    let mut key = corners.map(|p| position::canonical(p).map(f32::to_bits));
+    key.sort_unstable();
+    key
 }
 
 impl Surfaces<'_> {
     /// Does a region of regular surface stand there?
     pub(crate) fn has(&self, which: Which, region: u32) -> bool {
         which == Which::Before || !self.reversed.dropped[region as usize]
+    }
+
+    pub(crate) fn is_of_cavity(&self, corners: &Corners) -> bool {
+        !self.of_cavities.is_empty() && self.of_cavities.binary_search(&by_corners(corners)).is_ok()
     }
 
     /// Visits the triangles of a surface that are not regular.

@@ -164,8 +164,7 @@ fn sheets(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, through: Throug
             sheet.anchored |= submesh.triangles[t as usize].v.iter().filter(|v| !submesh.complete[**v as usize]).count() > 1;
         }
     }
-    let is_seam = |used: &Edge<'_>| used.uses.iter().any(|u| !through.reaches(used, u.triangle));
-    for (edge, number) in edges.iter().zip(0..).filter(|(e, _)| is_seam(e)) {
+    for (edge, number) in edges.iter().zip(0..).filter(|(e, _)| !through.reaches(e)) {
         for used in edge.uses {
             sheets[parts.of_triangle[used.triangle as usize] as usize].seams.push((number, used.forward));
         }

@@ -17,7 +17,7 @@ pub(crate) fn pieces(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Revers
     if !edges.any_nonmanifold() {
         return components;
     }
-    Components::of(survey, submesh, edges, reversed, Through::OpenSheets(&components))
+    Components::of(survey, submesh, edges, reversed, Through::OpenSheets(&components.into_sheets(edges)))
 }
 
 /// Removes whole pieces. O(regions + submesh).
@@ -121,4 +121,51 @@ pub(crate) fn components_of_records(
         );
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::pieces;
+    use crate::repairs::shared::work::Work;
+    use crate::testing::{Corners, after, cuboid, reversed};
+
+    /// The volumes of the pieces of surface that stand for themselves, and whether they are open.
+    fn volumes(mesh: &[Corners]) -> Vec<(f64, bool)> {
+        let found = after(mesh, |d, turned| {
+            let pieces = pieces(&d.survey, &mut Work::new(&mut d.submesh), turned);
+            pieces.list.iter().map(|piece| (d.survey.measure.volume(piece.extent), piece.open)).collect::<Vec<_>>()
+        });
+        found.result
+    }
+
+    /// With the walls at x = 1 triangulated in two ways, or in one.
+    fn row(other_way: bool) -> Vec<Vec<Corners>> {
+        let left = cuboid([0.0; 3], [1.0, 1.0, 1.0]);
+        let mut right = cuboid([1.0, 0.0, 0.0], [3.0, 1.0, 1.0]);
+        if other_way {
+            right.retain(|t| !t.iter().all(|p| p[0] == 1.0));
+            let [a, b, c, d] = [[1.0, 0.0, 0.0], [1.0, 0.0, 1.0], [1.0, 1.0, 1.0], [1.0, 1.0, 0.0]];
+            let walls = [vec![[a, b, c], [a, c, d]], vec![[b, c, d], [b, d, a]]];
+            let of_left: Vec<Corners> = left.iter().filter(|t| t.iter().all(|p| p[0] == 1.0)).copied().collect();
+            let is_in_left = |t: &Corners| of_left.iter().any(|l| t.iter().all(|p| l.contains(p)));
+            right.extend(walls.into_iter().find(|wall| !wall.iter().any(is_in_left)).unwrap());
+        }
+        vec![left, right]
+    }
+
+    #[test]
+    fn a_body_and_one_inside_out_beside_it_are_two() {
+        for other_way in [false, true] {
+            let [left, right] = row(other_way).try_into().unwrap();
+            let mut got = volumes(&[left, reversed(&right)].concat());
+            got.sort_by(|a, b| a.0.total_cmp(&b.0));
+            assert_eq!(got, [(-2.0, false), (1.0, false)], "{other_way}");
+        }
+    }
+
+    #[test]
+    fn bodies_that_face_the_same_way_hang_together_by_their_wall() {
+        let together: f64 = volumes(&row(false).concat()).iter().map(|(volume, _)| volume).sum();
+        assert_eq!(together, 3.0);
+    }
 }

@@ -21,6 +21,9 @@ const PATCHED: f64 = 0.4;
 /// An opening is no detail of its piece from this share of the piece's size on: the cube root of its volume, squared.
 const LARGE: f64 = 0.1;
 
+/// A piece of less than this share of all area is a detail, like a screw in a frame: nobody need look at whether it became one with others.
+const DETAIL: f64 = 0.005;
+
 /// The owners of some loops, by loop.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Owners {
@@ -29,6 +32,8 @@ pub(crate) struct Owners {
     volumes: Vec<f64>,
     /// The way that the piece's surface faces: 1 outward, -1 inward, as the largest one faces outward; 0: it does not stand for itself. By piece.
     stands: Vec<i8>,
+    /// By piece.
+    is_detail: Vec<bool>,
 }
 
 impl Owners {
@@ -51,6 +56,7 @@ impl Owners {
             .collect();
         let largest = closed.iter().map(|c| c.0).max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
         let volumes = closed.iter().map(|c| c.0.abs()).collect();
+        let is_detail = are_details(closed.iter().map(|c| c.1));
         let stands = closed
             .into_iter()
             .map(|(volume, area, patched)| match stands_for_itself(volume, area, patched) {
@@ -59,12 +65,12 @@ impl Owners {
                 false => 0,
             })
             .collect();
-        Self { of_loop, volumes, stands }
+        Self { of_loop, volumes, stands, is_detail }
     }
 
     /// All loops are of one piece.
     pub(crate) fn one(loops: usize) -> Self {
-        Self { of_loop: vec![0; loops], volumes: vec![0.0], stands: vec![0] }
+        Self { of_loop: vec![0; loops], volumes: vec![0.0], stands: vec![0], is_detail: vec![false] }
     }
 
     /// Do two loops, by number, belong to one piece?
@@ -77,7 +83,12 @@ impl Owners {
         !self.are_same(a, b) && [a, b].into_iter().all(|i| self.way(i) == 1)
     }
 
-    /// The same, whichever way they face.
+    /// Are they such bodies, and neither of them a detail?
+    pub(crate) fn are_large_bodies(&self, a: usize, b: usize) -> bool {
+        self.are_bodies(a, b) && [a, b].into_iter().all(|i| self.is_detail.get(self.of_loop[i] as usize) == Some(&false))
+    }
+
+    /// Do they belong to different ones, and do both of these stand for themselves, whichever way they face?
     pub(crate) fn stand(&self, a: usize, b: usize) -> bool {
         !self.are_same(a, b) && [a, b].into_iter().all(|i| self.way(i) != 0)
     }
@@ -93,6 +104,12 @@ impl Owners {
     fn way(&self, i: usize) -> i8 {
         self.stands.get(self.of_loop[i] as usize).copied().unwrap_or(0)
     }
+}
+
+/// Which pieces of these areas are details.
+pub(crate) fn are_details(areas: impl Iterator<Item = f64> + Clone) -> Vec<bool> {
+    let all: f64 = areas.clone().sum();
+    areas.map(|area| area < DETAIL * all).collect()
 }
 
 /// Does a piece of this area stand for itself that encloses this volume with patches of so much area more?

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use crate::contract::report::RepairName;
+use crate::geometry::flatness;
 use crate::submesh::components::Components;
 use crate::submesh::{Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
@@ -52,12 +53,10 @@ fn patches(submesh: &Submesh, all: &[u32]) -> Vec<Vec<u32>> {
     patches
 }
 
-/// Do all vertices lie within `reach` of a plane across the mean normal?
+/// Do all vertices lie within `reach` of a plane across the mean normal, or as near as a rim does that was cut by hand?
 fn is_flat(submesh: &Submesh, patch: &[u32], reach: f64) -> bool {
     let corners = |t: &u32| submesh.triangles[*t as usize].v.map(|v| submesh.place(v));
     let normal: DVec3 = patch.iter().map(corners).map(|[a, b, c]| (b - a).cross(c - a)).sum();
-    let Some(normal) = normal.try_normalize() else { return false };
-    let heights = patch.iter().flat_map(corners).map(|p| p.dot(normal));
-    let (lo, hi) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), h| (lo.min(h), hi.max(h)));
-    hi - lo <= 2.0 * reach
+    let height = flatness::height(patch.iter().flat_map(corners), normal);
+    height <= (2.0 * reach).max(flatness::RAGGED * (normal.length() / 2.0).sqrt())
 }

@@ -27,6 +27,8 @@ pub(crate) struct Obstacle {
     /// It belongs to a body that neither that one nor what that one runs into has met, and both stand for themselves: with the patch, all of these
     /// become one.
     pub(crate) joins: bool,
+    /// They do, and neither is a detail.
+    pub(crate) joins_large: bool,
 }
 
 /// For each patch that crosses something what it crosses. `patch_of`: the patch that a triangle of the submesh belongs to; `is_new`: whether
@@ -68,17 +70,20 @@ pub(crate) fn crossed(
         Which::Record(record) => of_record.get(&record).copied(),
     };
     let stands = standing(survey, submesh, &components, patch_of);
+    let is_detail = owners::are_details(components.list.iter().map(|c| survey.measure.area(c.extent)));
     let mut crossed: BTreeMap<u32, Vec<Obstacle>> = BTreeMap::new();
     let mut known = HashSet::new();
     for (patch, of_patch, other) in blamed {
         let corners = overlay.corners(survey, submesh, other);
         let of_both = component(of_patch).zip(component(other)).filter(|(a, b)| *a != NONE && *b != NONE);
+        let joins = of_both.is_some_and(|(a, b)| {
+            stands[a as usize] && stands[b as usize] && union_find::find(&mut groups, a) != union_find::find(&mut groups, b)
+        });
         let obstacle = Obstacle {
             corners,
             met_already: of_both.is_some_and(|(a, b)| met.binary_search(&[a, b]).is_ok()),
-            joins: of_both.is_some_and(|(a, b)| {
-                stands[a as usize] && stands[b as usize] && union_find::find(&mut groups, a) != union_find::find(&mut groups, b)
-            }),
+            joins,
+            joins_large: joins && of_both.is_some_and(|(a, b)| !is_detail[a as usize] && !is_detail[b as usize]),
         };
         if known.insert((patch, corners.map(Position::of), obstacle.met_already)) {
             crossed.entry(patch).or_default().push(obstacle);

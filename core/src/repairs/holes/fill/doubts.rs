@@ -29,11 +29,11 @@ pub(crate) fn summed_up(mut doubts: Vec<String>) -> Vec<String> {
 }
 
 impl Closing<'_> {
-    /// Says of a patch that is to be cut along another body, which its own one did not meet before, that it makes one of both: as its patches
+    /// Says of a patch that is to be cut along another body, which its own one did not meet before, that it makes one of both, unless one is a detail: as its patches
     /// were found to when others were tried.
     pub(crate) fn doubt_across(&mut self, submesh: &Submesh, rim: u32) {
         let tried = self.placed.iter().filter(|patch| patch.rims.contains(&rim));
-        if tried.flat_map(|patch| &patch.obstacles).any(|obstacle| obstacle.joins) {
+        if tried.flat_map(|patch| &patch.obstacles).any(|obstacle| obstacle.joins_large) {
             let rim = self.rim(rim);
             let [x, y, z] = submesh.positions[rim.vertices[0] as usize];
             let length = rim.perimeter(submesh);

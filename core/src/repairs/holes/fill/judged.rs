@@ -7,10 +7,9 @@ use glam::DVec3;
 
 use super::closing::{Closing, Judged};
 use super::mouth;
-use crate::algorithms::extend;
 use crate::contract::settings::Profile;
 use crate::detect::holes::loops::Loop;
-use crate::geometry::exact::Point;
+use crate::geometry::flatness;
 use crate::repairs::holes::fair::{Beyond, Gathered};
 use crate::repairs::holes::patches::{EXTENDED, ISLANDS, Placed, Planes};
 use crate::repairs::shared::work::Work;
@@ -145,7 +144,6 @@ impl Judged {
         body: Body,
         profile: &Profile,
     ) -> Option<String> {
-        let points: Vec<Point> = rim.points(submesh);
         let size = area(submesh, patch);
         if size < WIDE * body.area {
             self.explain(submesh, patch);
@@ -160,7 +158,9 @@ impl Judged {
                 "a mouth of {share:.0} % of its body's area was closed, while the surface is bent there: much more may be missing"
             ));
         }
-        if points.len() > 3 && !extend::lie_in_a_plane(&points) {
+        let normal = directed_area(submesh, rim, submesh.place(rim.vertices[0]));
+        let height = flatness::height(rim.vertices.iter().map(|v| submesh.place(*v)), normal);
+        if height > flatness::RAGGED * normal.length().sqrt() {
             return None;
         }
         self.area += size;

@@ -120,7 +120,7 @@ impl Closing<'_> {
         let pairs: Vec<[&Loop; 2]> = numbers.iter().map(|pair| pair.map(|i| &all.rims[i])).collect();
         annular::bridge(work, &pairs, threads, |work, i, triangles| {
             let [a, b] = numbers[i];
-            if owners.are_bodies(a, b) {
+            if owners.are_large_bodies(a, b) {
                 self.doubts.push(doubts::bridged(work, [&all.rims[a], &all.rims[b]]));
             }
             all.place(work, &numbers[i], triangles, "annular");

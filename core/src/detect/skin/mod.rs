@@ -23,6 +23,7 @@ use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed};
 use crate::topology::survey::Survey;
 
+use patches::Patches;
 use samples::Samples;
 use seen::OnSurface;
 pub(crate) use surfaces::DroppedBy;
@@ -58,13 +59,14 @@ pub(crate) fn measure(
     known: &Known<'_>,
     reach: f64,
 ) -> Skin {
+    let Patches { plausible, holes } = patches::judged(survey, submesh, pieces, known.explained, reach);
     let mut of_cavities: Vec<_> = known.cavities.iter().map(surfaces::by_corners).collect();
     of_cavities.sort_unstable();
-    let surfaces = Surfaces { survey, submesh, reversed, dropped_by, wrapped: known.wrapped, of_cavities };
+    let surfaces = Surfaces { survey, submesh, reversed, dropped_by, wrapped: known.wrapped, holes, of_cavities };
     let whole = survey.measure.area_of(surfaces.area_before());
     let gone = Samples::gone(&surfaces, reach);
-    let lost = change(&surfaces, [Which::Before, Which::After], (&gone, known.cavities), reach, whole);
-    let added = Samples::added(&surfaces, &patches::plausible(survey, submesh, pieces, known.explained, reach), reach);
+    let lost = change(&surfaces, [Which::Closed, Which::After], (&gone, known.cavities), reach, whole);
+    let added = Samples::added(&surfaces, &plausible, reach);
     let invented = change(&surfaces, [Which::After, Which::Before], (&added, &[]), reach, whole);
     Skin { reach, lost, invented }
 }

@@ -13,24 +13,39 @@ use crate::util::union_find::{find, unite};
 /// A patch of this share of its body's area is small against it.
 const SMALL: f64 = 0.02;
 
-/// The triangles of patches that lie in a plane, up to `reach`, are small against their body, or of which some are
-/// `explained`; ascending. O(n log n) in the triangles of patches.
-pub(super) fn plausible(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components, explained: &[u32], reach: f64) -> Vec<u32> {
+/// A patch of this share of its body's area closes a hole. A larger one closes a mouth, and what is seen through that is meant to be.
+const HOLE: f64 = 0.05;
+
+/// Triangles of patches, ascending.
+pub(super) struct Patches {
+    /// Those that lie in a plane, up to a reach, are small against their body, or are explained.
+    pub(super) plausible: Vec<u32>,
+    /// Those that close holes.
+    pub(super) holes: Vec<u32>,
+}
+
+/// Of all patches which are plausible, and which close holes. A patch is explained if some triangle of it is among the `explained` ones.
+/// O(n log n) in the triangles of patches.
+pub(super) fn judged(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components, explained: &[u32], reach: f64) -> Patches {
     let is_of_patch = |t: &u32| submesh.triangles[*t as usize].origin == Origin::Added(RepairName::Fill);
     let all: Vec<u32> = submesh.living().filter(is_of_patch).collect();
-    let mut plausible = Vec::new();
+    let (mut plausible, mut holes) = (Vec::new(), Vec::new());
     for patch in patches(submesh, &all) {
         let twice: i128 = patch.iter().map(|t| survey.measure.triangle(&submesh.points(*t)).area).sum();
         let piece = pieces.of_triangle[patch[0] as usize];
         let of_body = if piece == NONE { 0 } else { pieces.list[piece as usize].extent.area };
-        let is_small = survey.measure.area_of(twice) <= SMALL * survey.measure.area_of(of_body);
+        let share = survey.measure.area_of(twice) / survey.measure.area_of(of_body);
+        if share <= HOLE {
+            holes.extend(&patch);
+        }
         let is_explained = patch.iter().any(|t| explained.binary_search(t).is_ok());
-        if is_small || is_explained || is_flat(submesh, &patch, reach) {
+        if share <= SMALL || is_explained || is_flat(submesh, &patch, reach) {
             plausible.extend(patch);
         }
     }
     plausible.sort_unstable();
-    plausible
+    holes.sort_unstable();
+    Patches { plausible, holes }
 }
 
 /// Triangles that hang together through edges.

@@ -18,6 +18,8 @@ pub(crate) type DroppedBy = Vec<Option<RepairName>>;
 pub(crate) enum Which {
     /// What was there, and what the profile asked to be added: what that covers was no skin any more.
     Before,
+    /// The same, with small holes closed: what can be seen through these only was no skin.
+    Closed,
     After,
 }
 
@@ -28,6 +30,8 @@ pub(crate) struct Surfaces<'a> {
     pub(crate) reversed: &'a Reversed,
     pub(crate) dropped_by: &'a DroppedBy,
     pub(crate) wrapped: &'a [Corners],
+    /// Triangles of the submesh that close small holes.
+    pub(crate) holes: Vec<u32>,
     /// The triangles of cavities that poke out, each by its corners, whichever way round; ascending.
     pub(crate) of_cavities: Vec<[[u32; 3]; 3]>,
 }
@@ -42,7 +46,7 @@ pub(crate) fn by_corners(corners: &Corners) -> [[u32; 3]; 3] {
 impl Surfaces<'_> {
     /// Does a region of regular surface stand there?
     pub(crate) fn has(&self, which: Which, region: u32) -> bool {
-        which == Which::Before || !self.reversed.dropped[region as usize]
+        which != Which::After || !self.reversed.dropped[region as usize]
     }
 
     pub(crate) fn is_of_cavity(&self, corners: &Corners) -> bool {
@@ -52,10 +56,12 @@ impl Surfaces<'_> {
     /// Visits the triangles of a surface that are not regular.
     pub(crate) fn each_in_memory(&self, which: Which, mut visit: impl FnMut(&Corners)) {
         match which {
-            Which::Before => {
+            Which::Before | Which::Closed => {
                 self.submesh.triangles.iter().filter_map(|t| self.as_read(t.origin)).for_each(|t| visit(&t));
                 let is_asked = |t: &u32| is_asked_for(self.made_by(*t));
                 self.submesh.living().filter(is_asked).for_each(|t| visit(&self.submesh.points(t)));
+                let holes = self.holes.iter().filter(|_| which == Which::Closed);
+                holes.for_each(|t| visit(&self.submesh.points(*t)));
             }
             Which::After => {
                 self.submesh.living().for_each(|t| visit(&self.submesh.points(t)));

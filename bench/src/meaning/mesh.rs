@@ -71,6 +71,10 @@ impl Mesh {
         Self(self.0.iter().copied().filter(|face| keep(face)).collect())
     }
 
+    pub(super) fn area(&self) -> f64 {
+        self.0.iter().map(|face| length(face.normal()) / 2.0).sum()
+    }
+
     pub(super) fn volume(&self) -> f64 {
         self.0.iter().map(|face| dot(face.p[0], cross(face.p[1], face.p[2])) / 6.0).sum()
     }

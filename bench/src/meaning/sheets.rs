@@ -12,7 +12,7 @@ pub(super) const FAMILIES: [Entry; 11] = [
     ("moebius-beside", "a Möbius strip beside a body", false, moebius_beside),
     ("terrain-alone", "a sheet of terrain and nothing else: no solid was meant", false, terrain_alone),
     ("folds-alone", "folded sheets and nothing else", false, folds_alone),
-    ("fins", "triangles that stand on edges of the surface", true, fins),
+    ("fins", "triangles that stand on edges of the surface", false, fins),
     ("walls-of-no-thickness", "a wall of one sheet, or of two back to back, on a body", false, walls),
     ("spikes", "needles without thickness", false, spikes),
     ("dust", "closed specks beside a body", true, dust),

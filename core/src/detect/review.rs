@@ -121,9 +121,12 @@ pub(crate) fn counts(before: &Defects, surface: &Bounds, evidence: &Evidence, af
         }
     }
     if let Some([lo, hi]) = after.bounds {
+        // Where a cavity pokes out of the box of all else, it may open that as far as it likes.
         let outline = enclosed.outline.unwrap_or(surface);
-        let before_lo: [f32; 3] = std::array::from_fn(|k| surface.lo[k].max(outline.lo[k]));
-        let before_hi: [f32; 3] = std::array::from_fn(|k| surface.hi[k].min(outline.hi[k]));
+        let before_lo: [f32; 3] =
+            std::array::from_fn(|k| if outline.lo[k] > surface.lo[k] { outline.lo[k].max(lo[k]) } else { surface.lo[k] });
+        let before_hi: [f32; 3] =
+            std::array::from_fn(|k| if outline.hi[k] < surface.hi[k] { outline.hi[k].min(hi[k]) } else { surface.hi[k] });
         let pairs = before_lo.iter().zip(lo).chain(before_hi.iter().zip(hi));
         let most = pairs.map(|(a, b)| (f64::from(*a) - f64::from(b)).abs()).fold(0.0, f64::max);
         if most > profile.max_box_change_relative * surface.diagonal() {
@@ -264,12 +267,15 @@ mod tests {
     fn the_box_of_a_cavity_that_pokes_out_does_not_count() {
         let surface = Bounds { lo: [0.0; 3], hi: [1.0, 1.0, 2.0] };
         let outline = Some(Bounds { lo: [f32::NEG_INFINITY; 3], hi: [f32::INFINITY, f32::INFINITY, 1.0] });
-        let concerns = |outline: Option<Bounds>| {
+        let concerns = |outline: Option<Bounds>, hi: [f32; 3]| {
             let enclosed = Enclosed { outline, ..Enclosed::default() };
             let evidence = Evidence { enclosed, ..Evidence::default() };
-            counts(&cube(), &surface, &evidence, &cube(), &Profile::default()).len()
+            let after = Defects { bounds: Some([[0.0; 3], hi]), ..cube() };
+            counts(&cube(), &surface, &evidence, &after, &Profile::default()).len()
         };
-        assert_eq!([concerns(None), concerns(outline)], [1, 0]);
+        assert_eq!([concerns(None, [1.0; 3]), concerns(outline, [1.0; 3])], [1, 0]);
+        // It has opened the top. Nothing has opened a side, and nothing may grow.
+        assert_eq!([[1.0, 1.0, 0.5], [0.5, 1.0, 1.0], [1.0, 1.0, 1.5]].map(|hi| concerns(outline, hi)), [0, 1, 1]);
     }
 
     #[test]

@@ -14,7 +14,7 @@ use crate::util::union_find::{find, unite};
 const SMALL: f64 = 0.02;
 
 /// A patch of this share of its body's area closes a hole. A larger one closes a mouth, and what is seen through that is meant to be.
-const HOLE: f64 = 0.05;
+const HOLE: f64 = 0.01;
 
 /// Triangles of patches, ascending.
 pub(super) struct Patches {

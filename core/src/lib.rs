@@ -42,6 +42,7 @@ pub use contract::ranges::ProfileError;
 pub use contract::report::{FaceOrigin, RepairName, Report};
 pub use contract::settings::{Bodies, Guarantee, Hollow, Limits, PatchShape, Profile, Sheets, Spill};
 pub use contract::{error, report, settings};
+pub use detect::fidelity::{FIDELITY_RULES, FidelityRule};
 pub use detect::rules::{RULES, Rule};
 pub use engine::memory::RepairedMesh;
 pub use engine::mesh::{Mesh, MeshError, MeshView};

@@ -166,6 +166,9 @@ pub(crate) struct InspectArgs {
     /// Check the certificate in this report, as written by repair or inspect, against the bytes of IN as they are now
     #[arg(long, value_name = "REPORT", conflicts_with_all = ["json", "profile", "no_self_intersections"])]
     pub certificate: Option<PathBuf>,
+    /// Check its second half, too: repair the file that IN was made of anew, and compare
+    #[arg(long, value_name = "FILE", requires = "certificate")]
+    pub original: Option<PathBuf>,
     #[command(flatten)]
     pub spend: Spend,
     /// Print reports as JSON, one a line, instead of tables

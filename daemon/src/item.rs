@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use suture_core::report::{Certificate, Task};
+use suture_core::report::{Certificate, RuleOutcome, Task};
 use suture_core::{ErrorClass, Limits, Profile, Report};
 
 use crate::draft::Draft;
@@ -223,6 +223,7 @@ fn not_placed(path: &Path, error: &std::io::Error) -> Failure {
 pub(crate) fn tell(input: &Path, result: &Result<Box<Report>, Failure>, order: &Order<'_>) -> (String, Option<String>, Exit) {
     match (result, &order.certificate) {
         (Ok(report), Some(certificate)) => {
+            let check = if order.naming.is_some() { check_original } else { check };
             let (text, exit) = check(input, certificate, report);
             (text + "\n", None, exit)
         }
@@ -254,12 +255,53 @@ fn check(input: &Path, certificate: &Certificate, report: &Report) -> (String, E
     }
     let of = format!("of these {} bytes with BLAKE3 {}", certificate.bytes, certificate.blake3);
     if certificate.printable {
-        return (format!("{shown}: the certificate holds: printable, {rules} of {rules} rules passed, {of}"), Exit::Good);
+        let said = said_of_fidelity(certificate);
+        return (format!("{shown}: the certificate holds: printable, {rules} of {rules} rules passed, {of}{said}"), Exit::Good);
     }
     let missing = &certificate.missing;
     let passed = rules.saturating_sub(missing.len());
     let line = format!("{shown}: not certified: {passed} of {rules} rules passed, {of}, but not {}", missing.join(", "));
     (line, Exit::NotGood)
+}
+
+/// What a certificate says of fidelity, which nobody has looked at yet.
+fn said_of_fidelity(certificate: &Certificate) -> String {
+    match &certificate.faithful {
+        None => String::new(),
+        Some(half) if half.failed.is_empty() => "; said to be faithful: --original FILE checks that".into(),
+        Some(half) => format!("; said to need a look, for {}", half.failed.join(", ")),
+    }
+}
+
+/// Whether `certificate` holds for what has just been made of the original, in one line; good only if it says that it is faithful.
+fn check_original(original: &Path, certificate: &Certificate, report: &Report) -> (String, Exit) {
+    let shown = original.display();
+    let contradictions =
+        report.certificate.as_ref().map_or(vec!["nothing comes of it".into()], |now| certificate.contradictions(now));
+    if !contradictions.is_empty() {
+        let line = format!("{shown}: repaired anew, it does not give what the certificate says: {}", contradictions.join("; "));
+        return (line, Exit::NotGood);
+    }
+    match &certificate.faithful {
+        None => (format!("{shown}: repaired anew, it gives the same bytes; nothing was changed"), Exit::Good),
+        Some(half) if half.failed.is_empty() => {
+            let passed = half.rules.iter().filter(|rule| rule.outcome == RuleOutcome::Passed).count();
+            let rest = match half.rules.len() - passed {
+                0 => String::new(),
+                rest => format!(", {rest} with nothing to compare"),
+            };
+            let line =
+                format!("{shown}: repaired anew, it gives the same bytes: faithful, {passed} rules within their limits{rest}");
+            (line, Exit::Good)
+        }
+        Some(half) => {
+            let line = format!(
+                "{shown}: repaired anew, it gives the same bytes, but a person must look, for {}",
+                half.failed.join(", ")
+            );
+            (line, Exit::NotGood)
+        }
+    }
 }
 
 #[cfg(test)]

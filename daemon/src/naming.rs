@@ -72,6 +72,19 @@ impl Naming {
         Ok(naming)
     }
 
+    /// One result, to be called this.
+    pub(crate) fn of_file(output: PathBuf) -> Self {
+        Self {
+            output,
+            folder: false,
+            report: None,
+            several: false,
+            inputs: HashSet::new(),
+            force: false,
+            given: Mutex::default(),
+        }
+    }
+
     fn check_reports(&self, report: &Path) -> Result<(), String> {
         let shown = report.display();
         if self.several {

@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use suture_core::Profile;
 use suture_core::report::Certificate;
 
 use crate::batch::Batch;
@@ -27,32 +28,65 @@ pub(crate) fn repair(args: &RepairArgs) -> Exit {
 
 /// Diagnoses every input, or checks the certificate of one.
 pub(crate) fn inspect(args: &InspectArgs) -> Exit {
-    let certificate = args.certificate.as_deref().map(|report| match args.inputs.as_slice() {
-        [_] => certificate_in(report),
+    let claim = args.certificate.as_deref().map(|report| match args.inputs.as_slice() {
+        [_] => claim_in(report),
         _ => Err("a certificate is of one file: name only that".into()),
     });
-    let order = certificate.transpose().and_then(|certificate| {
+    let order = claim.transpose().and_then(|claim| {
         let mut profile = profiles::of_command(&args.profile, args.no_self_intersections)?;
-        if let Some(certificate) = &certificate {
-            profile.check_self_intersections = certificate.covers_self_intersection();
+        if let Some(claim) = &claim {
+            profile.check_self_intersections = claim.certificate.covers_self_intersection();
         }
-        let limits = args.spend.limits(false);
+        let (limits, certificate) = (args.spend.limits(false), claim.map(|claim| claim.certificate));
         Ok(Order { inputs: &args.inputs, profile, limits, naming: None, certificate, json: args.json })
     });
-    carry_out(order)
+    let exit = carry_out(order);
+    match (&args.certificate, &args.original) {
+        (Some(report), Some(original)) if exit == Exit::Good => again(args, report, original),
+        _ => exit,
+    }
 }
 
-/// The certificate that stands in a report.
-fn certificate_in(report: &Path) -> Result<Certificate, String> {
+/// Repairs the original anew, as the report says that it was done, and holds the certificate against what comes of it.
+fn again(args: &InspectArgs, report: &Path, original: &Path) -> Exit {
+    let inputs = [original.to_owned()];
+    let prepared = claim_in(report).and_then(|claim| {
+        let folder = tempfile::tempdir().map_err(|e| format!("no folder for the repair: {e}"))?;
+        Ok((claim, folder))
+    });
+    let (claim, folder) = match prepared {
+        Ok(prepared) => prepared,
+        Err(line) => return carry_out(Err(line)),
+    };
+    carry_out(Ok(Order {
+        inputs: &inputs,
+        profile: claim.profile,
+        limits: args.spend.limits(false),
+        naming: Some(Naming::of_file(folder.path().join("again.stl"))),
+        certificate: Some(claim.certificate),
+        json: false,
+    }))
+}
+
+/// What a report says of a file: its certificate, and the profile under which it was made.
+struct Claim {
+    profile: Profile,
+    certificate: Certificate,
+}
+
+/// The claim that stands in a report.
+fn claim_in(report: &Path) -> Result<Claim, String> {
     #[derive(serde::Deserialize)]
     struct Part {
+        profile: Profile,
         certificate: Option<Certificate>,
     }
     let shown = report.display();
     let file = std::fs::File::open(report).map_err(|e| format!("{shown}: cannot be read: {e}"))?;
     // A report may list an edit as large as the mesh: it is passed over.
     let part: Part = serde_json::from_reader(std::io::BufReader::new(file)).map_err(|e| format!("{shown}: is no report: {e}"))?;
-    part.certificate.ok_or_else(|| format!("{shown}: has no certificate in it"))
+    let certificate = part.certificate.ok_or_else(|| format!("{shown}: has no certificate in it"))?;
+    Ok(Claim { profile: part.profile, certificate })
 }
 
 fn carry_out(order: Result<Order, String>) -> Exit {

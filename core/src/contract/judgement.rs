@@ -26,7 +26,7 @@ pub struct Verdict {
 }
 
 /// What every rule found in the bytes of one file. The rules are listed in `core/REPORT.md`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Certificate {
     /// Every rule was looked at, and passed.
@@ -42,6 +42,40 @@ pub struct Certificate {
     pub missing: Vec<String>,
     /// Every rule, in the order of the table.
     pub rules: Vec<RuleResult>,
+    /// Whether it is what was meant, of the result of a repair; `None` where nothing was changed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub faithful: Option<Faithful>,
+}
+
+/// What every rule of fidelity measured between a file and what a repair made of it. The rules are listed in `core/REPORT.md`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Faithful {
+    /// BLAKE3 of the file that was repaired, hexadecimal.
+    pub original: String,
+    /// Length of that file.
+    pub bytes: u64,
+    /// Names of the rules whose figure is beyond the profile's limit: a person must look. Absent if there is none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub failed: Vec<String>,
+    /// Every rule, in the order of the table.
+    pub rules: Vec<Fidelity>,
+}
+
+/// What one rule of fidelity measured.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Fidelity {
+    /// Its name.
+    pub rule: String,
+    /// Raised when the rule measures anything else.
+    pub version: u32,
+    /// Whether the figure is within the limit.
+    pub outcome: RuleOutcome,
+    /// A share or a count, as the rule says; `None`: there was nothing to compare with.
+    pub figure: Option<f64>,
+    /// The largest figure that needs no person, of the profile.
+    pub limit: f64,
 }
 
 /// What one rule found.

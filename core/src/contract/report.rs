@@ -1,7 +1,7 @@
 //! The report: what was found, what was done, and the verdict on the bytes written. Documented in `core/REPORT.md`.
 
 pub use crate::contract::edit_report::{EditRecords, EditSummary, FaceOrigin};
-pub use crate::contract::judgement::{Certificate, RuleOutcome, RuleResult, Verdict};
+pub use crate::contract::judgement::{Certificate, Faithful, Fidelity, RuleOutcome, RuleResult, Verdict};
 pub use crate::contract::loop_class::LoopClass;
 pub use crate::contract::repair_name::RepairName;
 pub use crate::contract::skin::{Skin, SkinCause, SkinChange, SkinPlace};

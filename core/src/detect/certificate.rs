@@ -3,7 +3,7 @@
 //! It tells files that were changed or mixed up since; it is no signature, anyone can write one. What it says is made anew from a file's bytes and
 //! compared.
 
-use crate::contract::report::{Certificate, FileFacts, RuleOutcome, RuleResult};
+use crate::contract::report::{Certificate, Faithful, Fidelity, FileFacts, RuleOutcome, RuleResult};
 use crate::detect::rules::{self, Subject};
 
 /// Of the file of these `facts`, whose bytes the counts of `subject` are of.
@@ -18,6 +18,7 @@ pub(crate) fn certify(facts: &FileFacts, subject: &Subject<'_>) -> Certificate {
         triangles: facts.triangles,
         missing,
         rules,
+        faithful: None,
     }
 }
 
@@ -66,11 +67,40 @@ impl Certificate {
         }
         let unknown = self.rules.iter().filter(|then| found.rules.iter().all(|now| now.rule != then.rule));
         all.extend(unknown.map(|then| format!("there is no rule `{}` in this version", then.rule)));
-        if all.is_empty() && self != found {
+        if all.is_empty() && (self.printable, &self.missing) != (found.printable, &found.missing) {
             all.push("what it sums up does not follow from its rules".into());
+        }
+        if let Some(now) = &found.faithful {
+            all.extend(unfaithful(self.faithful.as_ref(), now));
         }
         all
     }
+}
+
+/// What of the second half is not so in the one that a repair has just made.
+fn unfaithful(then: Option<&Faithful>, now: &Faithful) -> Vec<String> {
+    let Some(then) = then else { return vec!["it does not say whether the file is faithful".into()] };
+    if (&then.original, then.bytes) != (&now.original, now.bytes) {
+        return vec![format!("it is of a file that was made of {} bytes with BLAKE3 {}", then.bytes, then.original)];
+    }
+    let of = |rule: &Fidelity| then.rules.iter().find(|then| then.rule == rule.rule);
+    let differs = now.rules.iter().filter(|rule| of(rule) != Some(rule)).map(|rule| match of(rule) {
+        None => format!("it knows no rule `{}`", rule.rule),
+        Some(then) if then.version != rule.version => {
+            format!("it is of version {} of the rule `{}`, which is at {} now", then.version, rule.rule, rule.version)
+        }
+        Some(then) => format!("`{}`: {}, not {}", rule.rule, measured(rule), measured(then)),
+    });
+    let mut all: Vec<String> = differs.collect();
+    if all.is_empty() && then != now {
+        all.push("what it sums up of fidelity does not follow from its rules".into());
+    }
+    all
+}
+
+fn measured(rule: &Fidelity) -> String {
+    let figure = rule.figure.map_or("nothing".into(), |figure| figure.to_string());
+    format!("{} with {figure} of {}", rule.outcome.word(), rule.limit)
 }
 
 fn told(result: &RuleResult) -> String {
@@ -145,5 +175,31 @@ mod tests {
         contradicted(|c| drop(c.rules.pop()), "it knows no rule `positive_volume`");
         contradicted(|c| c.rules.push(RuleResult { rule: "odd".into(), ..c.rules[0].clone() }), "no rule `odd`");
         contradicted(|c| c.printable = false, "does not follow");
+    }
+
+    #[test]
+    fn the_second_half_is_held_against_a_repair_made_anew() {
+        let rule =
+            Fidelity { rule: "skin_lost".into(), version: 1, outcome: RuleOutcome::Passed, figure: Some(0.25), limit: 0.5 };
+        let half = Faithful { original: "cd".into(), bytes: 1000, failed: Vec::new(), rules: vec![rule] };
+        let now = Certificate { faithful: Some(half), ..of(&cube()) };
+        assert!(now.contradictions(&now).is_empty());
+        // An inspection does not know the original, and says nothing of it.
+        assert!(now.contradictions(&of(&cube())).is_empty());
+        assert_eq!(of(&cube()).contradictions(&now), ["it does not say whether the file is faithful"]);
+        let contradicted = |change: fn(&mut Faithful), words: &str| {
+            let mut other = now.clone();
+            other.faithful.iter_mut().for_each(change);
+            let all = other.contradictions(&now);
+            assert!(all.len() == 1 && all[0].contains(words), "{words}: {all:?}");
+        };
+        contradicted(|half| half.original = "ef".into(), "made of 1000 bytes with BLAKE3 ef");
+        contradicted(
+            |half| half.rules[0].figure = Some(0.125),
+            "`skin_lost`: passed with 0.25 of 0.5, not passed with 0.125 of 0.5",
+        );
+        contradicted(|half| half.rules[0].version = 0, "version 0 of the rule `skin_lost`, which is at 1 now");
+        contradicted(|half| half.rules.clear(), "no rule `skin_lost`");
+        contradicted(|half| half.failed = vec!["skin_lost".into()], "does not follow");
     }
 }

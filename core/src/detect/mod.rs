@@ -3,7 +3,7 @@
 //! **In:** a survey and a submesh.
 //! **Out:** counts of defects ([`defects`]), bodies and what lies in what ([`bodies`]), boundary loops by class ([`holes`]); the rules of a
 //! printable file, and what they say of this one ([`rules`], [`verdict`], [`certificate`]); what became of the surface that can be
-//! seen ([`skin`]); what a person should look at ([`review`]).
+//! seen ([`skin`]); the rules of a faithful result, and what a person should look at ([`fidelity`], [`review`]).
 //! **Promise:** nothing is changed. What was not looked at is called unchecked, and is never certified. Verdict and certificate come from
 //! one table.
 
@@ -12,6 +12,7 @@ pub(crate) mod certificate;
 pub(crate) mod coned_volume;
 pub(crate) mod defects;
 pub(crate) mod difference;
+pub(crate) mod fidelity;
 pub(crate) mod fresh;
 pub(crate) mod holes;
 pub(crate) mod review;

@@ -9,6 +9,8 @@ use crate::contract::report::{
 };
 use crate::contract::settings::{Bodies, Hollow, Limits, Profile};
 use crate::detect::certificate;
+use crate::detect::fidelity;
+use crate::detect::fidelity::Measured;
 use crate::detect::review;
 use crate::detect::review::Evidence;
 use crate::detect::rules::Subject;
@@ -134,26 +136,35 @@ pub(crate) fn conclude(report: &mut Report, input: &[Finding], (surface, evidenc
     let flaws = flaws(findings);
     report.verdict = verdict::judge(&defects, &flaws).under(report.profile.guarantee);
     report.outcome = if report.verdict.good { Outcome::Repaired } else { Outcome::NotGood };
+    let mut faithful = None;
     if report.verdict.good {
         let mut surface = *surface;
         surface.add(&evidence.asked.bounds);
         let before = Defects { area: report.before.area + evidence.asked.area, ..report.before.clone() };
-        let mut concerns = review::counts(&before, &surface, evidence, &defects, &report.profile);
-        concerns.extend_from_slice(&evidence.doubts);
-        concerns.extend(report.volumes.iter().flat_map(|volumes| review::volumes(volumes, &report.profile)));
-        concerns.extend(report.skin.iter().flat_map(|skin| review::skin(skin, &report.profile)));
-        concerns.extend(review::sheets(&report.before, &report.sheets_dropped, &report.profile));
-        concerns.extend(review::wraps(&report.wraps, &report.profile));
         // What was closed had to be guessed: nobody knows what stood in the part that is missing.
         let is_open = report.before.boundary_edges > 0;
         let lost = input.iter().filter(|f| f.loss == Loss::Certain || f.loss == Loss::IfOpen && is_open);
-        concerns.extend(lost.map(|f| format!("a part is missing: {}", f.text)));
+        let missing: Vec<String> = lost.map(|f| format!("a part is missing: {}", f.text)).collect();
+        let change = review::Change {
+            before: &before,
+            surface: &surface,
+            evidence,
+            after: &defects,
+            volumes: report.volumes.as_ref(),
+            skin: report.skin.as_ref(),
+            sheets: &report.sheets_dropped,
+            wraps: &report.wraps,
+            missing: &missing,
+        };
+        let measured = review::measure(&change, &report.profile);
+        faithful = Some(fidelity::certify((&report.input.blake3, report.input.bytes), &measured));
+        let concerns: Vec<String> = measured.into_iter().flat_map(Measured::concerns).collect();
         if !concerns.is_empty() {
             report.outcome = Outcome::NeedsReview;
             report.verdict.reasons = concerns;
         }
     }
-    report.certificate = Some(certify(&facts, &defects, &flaws));
+    report.certificate = Some(Certificate { faithful, ..certify(&facts, &defects, &flaws) });
     report.after = Some(defects);
     report.output = Some(facts);
 }

@@ -76,6 +76,31 @@ fn a_certificate_can_be_checked_later() {
     place.suture(["inspect", "out.stl", "holes.stl", "--certificate", "report.json"]).expect(2);
 }
 
+/// The second half is of the original: that is repaired anew, and nothing else gives the same.
+#[test]
+fn the_original_shows_whether_a_result_is_faithful() {
+    let place = Place::new();
+    place.generate(Case::Holes, 600, 1);
+    place.generate(Case::Flipped, 600, 1);
+    place.repair("holes.stl", "out.stl", &["--report", "report.json"]).expect(0);
+    let report: serde_json::Value = serde_json::from_slice(&place.read("report.json")).unwrap();
+    let half = &report["certificate"]["faithful"];
+    assert_eq!(half["original"], report["input"]["blake3"]);
+    assert!(half["rules"].as_array().unwrap().iter().any(|rule| rule["rule"] == "skin_lost" && rule["figure"] == 0.0), "{half}");
+    let check = |original| place.suture(["inspect", "out.stl", "--certificate", "report.json", "--original", original]);
+    let said = check("holes.stl").expect(0).stdout();
+    assert!(said.lines().count() == 2 && said.contains("holes.stl: repaired anew, it gives the same bytes: faithful"), "{said}");
+    assert!(check("flipped.stl").expect(1).stdout().contains("it does not give what the certificate says"));
+    place.suture(["inspect", "out.stl", "--original", "holes.stl"]).expect(2);
+    // A figure that somebody has made smaller.
+    let told = place.read("report.json");
+    let told = String::from_utf8(told).unwrap().replacen("\"limit\":0.001", "\"limit\":0.002", 1);
+    let told = told.replacen("\"limit\": 0.001", "\"limit\": 0.002", 1);
+    place.put("report.json", told.as_bytes());
+    assert!(check("holes.stl").expect(1).stdout().contains("passed with 0 of 0.001, not passed with 0 of 0.002"));
+    assert_eq!(place.names(""), ["flipped.stl", "holes.stl", "out.stl", "report.json"], "nothing temporary is left");
+}
+
 #[test]
 fn without_json_a_table_is_printed() {
     let place = Place::new();

@@ -1,7 +1,7 @@
 //! The surface before and after the repairs.
 
 use crate::contract::report::RepairName;
-use crate::geometry::position;
+use crate::geometry::position::{self, Position};
 use crate::io::record;
 use crate::submesh::components::Reversed;
 use crate::submesh::{Origin, Submesh};
@@ -33,12 +33,12 @@ pub(crate) struct Surfaces<'a> {
     /// Triangles of the submesh that close small holes.
     pub(crate) holes: Vec<u32>,
     /// The triangles of cavities that poke out, each by its corners, whichever way round; ascending.
-    pub(crate) of_cavities: Vec<[[u32; 3]; 3]>,
+    pub(crate) of_cavities: Vec<[Position; 3]>,
 }
 
 /// A triangle by its corners, whichever way round.
-pub(crate) fn by_corners(corners: &Corners) -> [[u32; 3]; 3] {
-    let mut key = corners.map(|p| position::canonical(p).map(f32::to_bits));
+pub(crate) fn by_corners(corners: &Corners) -> [Position; 3] {
+    let mut key = corners.map(Position::of);
     key.sort_unstable();
     key
 }

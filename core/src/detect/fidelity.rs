@@ -1,0 +1,131 @@
+//! What a result must keep of what was there to be called faithful: one table of rules, from which both the review and the certificate are made,
+//! so that they cannot disagree.
+//!
+//! A rule measures one figure, and the profile says how large it may be. Its version is raised when it measures anything else for any file.
+//! `core/REPORT.md` has the same table for readers; a test holds the two together.
+
+use crate::contract::report::{Faithful, Fidelity, RuleOutcome};
+
+/// One rule of the second half of a certificate.
+pub struct FidelityRule {
+    /// Its name, which stays.
+    pub id: &'static str,
+    /// Raised when it measures anything else for any file.
+    pub version: u32,
+    /// What it measures, in one sentence.
+    pub measures: &'static str,
+}
+
+/// All rules, in the order in which reasons are given.
+pub const FIDELITY_RULES: [FidelityRule; 14] = [
+    FidelityRule {
+        id: "volume",
+        version: 1,
+        measures: "Change of the volume, less what counted twice, as a share of what was meant.",
+    },
+    FidelityRule {
+        id: "swallowed",
+        version: 1,
+        measures: "Volume of bodies that lay wholly in the material of others and are gone, as a share of the result's.",
+    },
+    FidelityRule {
+        id: "area",
+        version: 1,
+        measures: "Change of the area, less patches that nothing speaks against, as a share of what there was.",
+    },
+    FidelityRule { id: "box", version: 1, measures: "Largest move of a side of the bounding box, as a share of its diagonal." },
+    FidelityRule { id: "bodies", version: 1, measures: "Bodies that are gone, but for those in the material of others." },
+    FidelityRule { id: "guesses", version: 1, measures: "Guesses that may be wrong." },
+    FidelityRule { id: "bodies_outside", version: 1, measures: "Bodies no point of which is in the result." },
+    FidelityRule {
+        id: "volume_outside",
+        version: 1,
+        measures: "Volume that bodies enclosed and the result does not, as a share, by points in each body.",
+    },
+    FidelityRule {
+        id: "skin_lost",
+        version: 1,
+        measures: "Area that could be seen and is farther than the reach from the result, as a share of all area.",
+    },
+    FidelityRule {
+        id: "skin_invented",
+        version: 1,
+        measures: "Area that can be seen and is farther than the reach from all that was there, less plausible patches, as a share.",
+    },
+    FidelityRule { id: "sheets", version: 1, measures: "Area of open sheets that were dropped, as a share." },
+    FidelityRule {
+        id: "free_sheets",
+        version: 1,
+        measures: "Area of those of them that cross nothing and could be seen, as a share.",
+    },
+    FidelityRule { id: "wrapped", version: 1, measures: "Area that wraps have replaced, as a share." },
+    FidelityRule { id: "missing", version: 1, measures: "Parts that the file itself has lost." },
+];
+
+/// What a rule has measured.
+#[derive(Debug)]
+pub(crate) struct Measured {
+    pub(crate) rule: &'static str,
+    /// `None`: there was nothing to compare with.
+    pub(crate) figure: Option<f64>,
+    pub(crate) limit: f64,
+    /// Each a line for people, if the figure is beyond the limit.
+    pub(crate) words: Vec<String>,
+}
+
+impl Measured {
+    fn outcome(&self) -> RuleOutcome {
+        match self.figure {
+            None => RuleOutcome::Unchecked,
+            Some(figure) if figure > self.limit => RuleOutcome::Failed,
+            Some(_) => RuleOutcome::Passed,
+        }
+    }
+
+    /// Why a person must look; none within the limit.
+    pub(crate) fn concerns(self) -> Vec<String> {
+        if self.outcome() == RuleOutcome::Failed { self.words } else { Vec::new() }
+    }
+}
+
+/// The second half of the certificate of what was made of a file with this hash and length.
+pub(crate) fn certify((original, bytes): (&str, u64), measured: &[Measured]) -> Faithful {
+    let version = |id: &str| FIDELITY_RULES.iter().find(|rule| rule.id == id).map_or(0, |rule| rule.version);
+    let rules: Vec<Fidelity> = measured
+        .iter()
+        .map(|m| Fidelity {
+            rule: m.rule.into(),
+            version: version(m.rule),
+            outcome: m.outcome(),
+            figure: m.figure.filter(|figure| figure.is_finite()),
+            limit: m.limit,
+        })
+        .collect();
+    let failed = rules.iter().filter(|rule| rule.outcome == RuleOutcome::Failed).map(|rule| rule.rule.clone()).collect();
+    Faithful { original: original.into(), bytes, failed, rules }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The table that readers see is this one, rule by rule.
+    #[test]
+    fn the_documents_have_the_same_table() {
+        let rows = FIDELITY_RULES.map(|rule| format!("| `{}` | {} | {} |", rule.id, rule.version, rule.measures));
+        let table = format!("| rule | version | what it measures |\n|---|---|---|\n{}\n\n", rows.join("\n"));
+        assert!(include_str!("../../REPORT.md").contains(&table), "core/REPORT.md should have:\n{table}");
+    }
+
+    #[test]
+    fn a_figure_at_its_limit_passes_and_none_is_unchecked() {
+        let of = |figure: Option<f64>| {
+            let measured = Measured { rule: "volume", figure, limit: 0.5, words: vec!["too much".into()] };
+            let certificate = certify(("ab", 684), std::slice::from_ref(&measured));
+            (certificate.rules[0].outcome, certificate.failed.len(), measured.concerns().len())
+        };
+        assert_eq!(of(Some(0.5)), (RuleOutcome::Passed, 0, 0));
+        assert_eq!(of(Some(0.6)), (RuleOutcome::Failed, 1, 1));
+        assert_eq!(of(None), (RuleOutcome::Unchecked, 0, 0));
+    }
+}

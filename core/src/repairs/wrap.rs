@@ -15,11 +15,11 @@ mod site;
 
 use crate::contract::progress::Progress;
 use crate::contract::report::{MOST_LISTED, RepairName};
-use crate::contract::settings::Guarantee;
+use crate::contract::settings::{Guarantee, Sheets};
 use crate::repairs::shared::context::{Changes, Context, Done, Repair};
 use crate::repairs::shared::pieces;
 use contacts::contacts;
-use groups::Groups;
+use groups::{Groups, Kept};
 use outcome::Outcome;
 pub(crate) use outcome::Wraps;
 use site::Site;
@@ -47,9 +47,11 @@ pub(crate) const REPAIR: Repair = Repair {
             } else {
                 Some(Vec::new())
             };
-            let kept_open = (cx.handed.kept_open.as_slice(), cx.handed.kept_as_sheets || cx.handed.kept_open.is_empty());
+            // Sheets that the profile keeps are kept whatever they run into.
+            let sheets: &[[f32; 3]] = if cx.profile.sheets == Sheets::Keep { &[] } else { &cx.handed.kept_sheets };
+            let kept = Kept { open: &cx.handed.kept_open, sheets };
             let means = (cx.limits.threads, cx.progress);
-            let wraps = replace(cx.survey, &mut cx.work, &mut cx.reversed, pairs.as_deref(), kept_open, cx.profile, means);
+            let wraps = replace(cx.survey, &mut cx.work, &mut cx.reversed, pairs.as_deref(), kept, cx.profile, means);
             count = wraps.regions;
             cx.account.wraps = wraps.listed;
             (cx.handed.wrapped, cx.handed.replaced) = (wraps.triangles, wraps.gone);
@@ -72,24 +74,23 @@ pub(crate) fn is_broken(work: &mut Work<'_>) -> bool {
 }
 
 /// Replaces what is no solid, as far as the profile allows. `pairs`: as [`Overlay::crossing_triangles`] finds them (empty if nobody looked for any);
-/// `kept_open`: a vertex of each loop that was left open on purpose; `may_be_soup`: none of them but as a sheet's rim. Reads the chunks where groups have regular surface, and all for every round
-/// of wraps.
+/// Reads the chunks where groups have regular surface, and all for every round of wraps.
 pub(crate) fn replace(
     survey: &Survey<'_>,
     work: &mut Work<'_>,
     reversed: &mut Reversed,
     pairs: Option<&[[Which; 2]]>,
-    (kept_open, may_be_soup): (&[[f32; 3]], bool),
+    kept: Kept<'_>,
     profile: &Profile,
     (threads, progress): (usize, &dyn Progress),
 ) -> Wraps {
     let pieces = pieces::pieces(survey, work, reversed);
-    let mut groups = Groups::of(survey, work, &pieces, pairs, kept_open);
+    let mut groups = Groups::of(survey, work, &pieces, pairs, kept);
     let mut wraps = Wraps::default();
     if !groups.broken.contains(&true) {
         return wraps;
     }
-    let is_soup = may_be_soup && groups.unite_soup(&pieces);
+    let is_soup = kept.open.len() == kept.sheets.len() && groups.unite_soup(&pieces);
     let (submesh, edges) = work.edges();
     let sheets = Components::of(survey, submesh, edges, reversed, Through::ManifoldEdges);
     let site = Site { survey, submesh, reversed, pieces: &pieces, sheets: &sheets, profile, is_soup, threads, progress };

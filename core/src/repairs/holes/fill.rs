@@ -43,7 +43,7 @@ pub(crate) const REPAIR: Repair = Repair {
             fill_loops(cx.survey, &mut cx.work, &cx.reversed, cx.tolerance, (cx.profile, cx.handed.only_loop), cx.limits.threads);
         let parts: Vec<String> = closed.by_method.iter().map(|(name, count)| format!("{count} {name}")).collect();
         cx.account.loops_left = closed.left;
-        (cx.handed.kept_open, cx.handed.kept_as_sheets) = (closed.kept_open, closed.kept_as_sheets);
+        (cx.handed.kept_open, cx.handed.kept_sheets) = (closed.kept_open, closed.kept_sheets);
         cx.handed.sheets = closed.sheets;
         cx.handed.across = closed.across;
         cx.account.doubts.extend(doubts::summed_up(closed.doubts));
@@ -125,7 +125,6 @@ pub(crate) fn fill_loops(
     closed.left.extend(unclosed.into_iter().take(MOST_LISTED.saturating_sub(closed.left.len())));
     if !profile.fill_holes {
         closed.kept_open.extend(chains.iter().map(|chain| work.positions[chain[0] as usize]));
-        closed.kept_as_sheets = false;
     }
     closed.across = across;
     // Where edges were balanced, they are in the loops there.

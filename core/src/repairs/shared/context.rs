@@ -83,8 +83,8 @@ pub(crate) struct Handed {
     pub(crate) sheets: Vec<SheetRim>,
     /// A vertex of each loop that was left open on purpose. Of the filling, for the wrap.
     pub(crate) kept_open: Vec<[f32; 3]>,
-    /// They are rims of lone sheets, all of them. Of the filling, for the wrap.
-    pub(crate) kept_as_sheets: bool,
+    /// Those of them that are of rims of lone sheets. Of the filling, for the wrap.
+    pub(crate) kept_sheets: Vec<[f32; 3]>,
     /// Patches that cross what is there, and are to be cut. Of the filling, for the resolution.
     pub(crate) across: Vec<PatchAcross>,
     /// The triangles of patches that nothing speaks against. Of the filling, for the skin.

@@ -7,10 +7,18 @@ use crate::repairs::shared::work::Work;
 use crate::submesh::components::{self, Components};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A soup has so many open pieces at least, and none of them is more than four times their mean if there are no more.
 const SOUP_PIECES: usize = 16;
+
+/// Loops that were left open on purpose, each by a vertex.
+#[derive(Clone, Copy)]
+pub(crate) struct Kept<'a> {
+    pub(crate) open: &'a [[f32; 3]],
+    /// Those of them that are rims of lone sheets, and may go with what they run into.
+    pub(crate) sheets: &'a [[f32; 3]],
+}
 
 /// Which pieces are to be replaced together.
 pub(crate) struct Groups {
@@ -19,6 +27,8 @@ pub(crate) struct Groups {
     pub(crate) broken: Vec<bool>,
     /// Pieces with a loop that was left open on purpose.
     pub(crate) kept: Vec<bool>,
+    /// Those of them that are lone sheets.
+    pub(crate) sheets: Vec<bool>,
 }
 
 impl Groups {
@@ -27,7 +37,7 @@ impl Groups {
         work: &mut Work<'_>,
         pieces: &Components,
         pairs: Option<&[[Which; 2]]>,
-        kept_open: &[[f32; 3]],
+        kept: Kept<'_>,
     ) -> Self {
         let (submesh, edges) = work.edges();
         let count = pieces.list.len();
@@ -35,6 +45,7 @@ impl Groups {
             parents: (0..count as u32).collect(),
             broken: pieces.list.iter().map(|piece| piece.open).collect(),
             kept: vec![false; count],
+            sheets: vec![false; count],
         };
         let of = |t: u32| pieces.of_triangle[t as usize];
         for edge in edges.iter().filter(|e| e.uses.len() != 2 || e.is_inconsistent()) {
@@ -71,14 +82,27 @@ impl Groups {
                 groups.broken.fill(true);
             }
         }
-        let mut kept: Vec<Position> = kept_open.iter().copied().map(Position::of).collect();
-        kept.sort_unstable();
-        for t in submesh.living() {
-            if !kept.is_empty() && submesh.points(t).iter().any(|p| kept.binary_search(&Position::of(*p)).is_ok()) {
-                groups.kept[of(t) as usize] = true;
+        if !kept.open.is_empty() {
+            let positions = |places: &[[f32; 3]]| places.iter().map(|p| Position::of(*p)).collect::<BTreeSet<_>>();
+            let [open, sheets] = [kept.open, kept.sheets].map(positions);
+            for t in submesh.living() {
+                for p in submesh.points(t).map(Position::of).iter().filter(|p| open.contains(p)) {
+                    let of_sheet = sheets.contains(p);
+                    groups.sheets[of(t) as usize] |= of_sheet;
+                    groups.kept[of(t) as usize] |= !of_sheet;
+                }
             }
         }
         groups
+    }
+
+    /// Must these pieces stay as they are? Something of them was left open on purpose, or they are lone sheets above all.
+    pub(crate) fn stay(&self, group: &[u32], pieces: &Components) -> bool {
+        let area = |is_counted: &dyn Fn(usize) -> bool| -> i128 {
+            let counted = group.iter().map(|piece| *piece as usize).filter(|piece| is_counted(*piece));
+            counted.map(|piece| pieces.list[piece].extent.area).sum()
+        };
+        group.iter().any(|piece| self.kept[*piece as usize]) || 2 * area(&|piece| self.sheets[piece]) > area(&|_| true)
     }
 
     /// Makes one group of all open pieces if the surface is a soup of them: many, none of them much of it, and together most of all surface. Each
@@ -93,7 +117,7 @@ impl Groups {
             return false;
         }
         open.windows(2).for_each(|pair| self.unite(pair[0], pair[1]));
-        open.iter().for_each(|piece| self.kept[*piece as usize] = false);
+        open.iter().for_each(|piece| self.sheets[*piece as usize] = false);
         true
     }
 

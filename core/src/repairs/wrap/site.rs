@@ -94,7 +94,7 @@ impl Site<'_, '_> {
                 ..Wrap::default()
             };
             let mut outcome = Outcome { told, triangles: Vec::new() };
-            if group.iter().any(|piece| groups.kept[*piece as usize]) {
+            if groups.stay(&group, self.pieces) {
                 outcome.give_up("a loop of it, or of what it runs into, was left open on purpose");
             } else if size.triangles > MOST_TRIANGLES {
                 outcome.give_up("too many triangles to be wrapped");

@@ -21,20 +21,16 @@ struct After {
 
 /// Wraps what is no solid in these triangles, and counts on what would be written.
 fn wrapped(mesh: &[Corners], kept_open: &[[f32; 3]], profile: &Profile, limits: &Limits) -> After {
+    wrapped_with(mesh, Kept { open: kept_open, sheets: &[] }, profile, limits)
+}
+
+fn wrapped_with(mesh: &[Corners], kept: Kept<'_>, profile: &Profile, limits: &Limits) -> After {
     let input = records(mesh);
     let mut d = Diagnosis::of(Path::new("test"), &input, profile, limits, &Quiet).unwrap();
     let mut reversed = Reversed::none(&d.survey);
     let work = &mut Work::new(&mut d.submesh);
     let pairs = Overlay::of(&d.survey, work, &reversed).and_then(|overlay| overlay.crossing_triangles(&d.survey, work));
-    let wraps = replace(
-        &d.survey,
-        work,
-        &mut reversed,
-        pairs.as_deref(),
-        (kept_open, kept_open.is_empty()),
-        profile,
-        (limits.threads, &Quiet),
-    );
+    let wraps = replace(&d.survey, work, &mut reversed, pairs.as_deref(), kept, profile, (limits.threads, &Quiet));
     let edit = Edit::of(&d.survey, &d.submesh, &reversed, &wraps.triangles);
     let output = written(&edit, &input);
     let defects = diagnose(&output).defects;
@@ -86,6 +82,26 @@ fn what_was_left_open_on_purpose_stays_and_so_does_what_runs_into_it() {
     let got = wrapped(&mesh, &[[0.0, 0.0, 8.0]], &Profile::default(), &limits);
     assert_eq!((got.untouched, got.listed.len()), (22, 1));
     assert!(got.listed[0].left.as_ref().is_some_and(|reason| reason.contains("on purpose")), "{:?}", got.listed);
+}
+
+/// A lone sheet stays open; one that runs into what is broken goes with that, unless the profile keeps it.
+#[test]
+fn a_sheet_that_runs_into_a_broken_body_goes_with_it() {
+    let touching = [cuboid([0.0; 3], [4.0; 3]), cuboid([4.0, 4.0, 0.0], [8.0, 8.0, 4.0])].concat();
+    let sheet = shifted(&plate(1, |_, _| true), [-0.25, 1.5, 2.0]);
+    let rim = [sheet[0][0]];
+    let limits = Limits { threads: 1, ..Limits::default() };
+    let after = |sheets: &[[f32; 3]]| {
+        let mesh = [touching.clone(), sheet.clone()].concat();
+        wrapped_with(&mesh, Kept { open: &rim, sheets }, &Profile::default(), &limits)
+    };
+    let got = after(&rim);
+    assert!(got.verdict.good && got.untouched == 0, "{:?}", got.verdict.reasons);
+    let kept = after(&[]);
+    assert!(!kept.verdict.good && kept.untouched == 26, "{}", kept.untouched);
+    // Alone it stays.
+    let alone = wrapped_with(&sheet, Kept { open: &rim, sheets: &rim }, &Profile::default(), &limits);
+    assert!(alone.listed[0].left.as_ref().is_some_and(|reason| reason.contains("on purpose")), "{:?}", alone.listed);
 }
 
 /// The faces of a box in squares of 1, each triangle a little smaller than it was, so that none meets another one. Every seventh is lost.

@@ -73,6 +73,7 @@ impl Closing<'_> {
             let listed = (closed.left.len() < MOST_LISTED).then_some(closed.left.len());
             closed.sheets.push(SheetRim { triangle, edges, listed });
             closed.kept_open.push(submesh.positions[chain[0] as usize]);
+            closed.kept_sheets.push(submesh.positions[chain[0] as usize]);
             if listed.is_some() {
                 let length = chain.windows(2).map(|w| submesh.distance(w[0], w[1])).sum();
                 closed.left.push(left(submesh, chain[0], edges, length, &NotAdmitted::Sheet));

@@ -27,8 +27,8 @@ pub(crate) struct Closed {
     pub(crate) kept_open: Vec<[f32; 3]>,
     /// What is to be said of the guesses.
     pub(crate) judged: Judged,
-    /// All of these are rims of lone sheets.
-    pub(crate) kept_as_sheets: bool,
+    /// Those of these that are rims of lone sheets.
+    pub(crate) kept_sheets: Vec<[f32; 3]>,
     /// Loops that nothing closes which crosses nothing: the triangles of patches that are to be cut along what they cross, and what to say of the
     /// loops if that does not come about.
     pub(crate) across: Vec<PatchAcross>,
@@ -204,9 +204,8 @@ impl Closing<'_> {
         self.open.sort_by_key(|(rim, _)| *rim);
         let kept = self.open.iter().filter(|(_, reason)| matches!(reason, NotFilled::NotAdmitted(_)));
         closed.kept_open.extend(kept.map(|(rim, _)| work.positions[self.rim(*rim).vertices[0] as usize]));
-        let is_sheet = |reason: &NotFilled| matches!(reason, NotFilled::NotAdmitted(NotAdmitted::Sheet));
-        let mut not_admitted = self.open.iter().filter(|(_, reason)| matches!(reason, NotFilled::NotAdmitted(_)));
-        closed.kept_as_sheets = not_admitted.all(|(_, reason)| is_sheet(reason));
+        let sheets = self.open.iter().filter(|(_, reason)| matches!(reason, NotFilled::NotAdmitted(NotAdmitted::Sheet)));
+        closed.kept_sheets.extend(sheets.map(|(rim, _)| work.positions[self.rim(*rim).vertices[0] as usize]));
         for (i, (rim, reason)) in (closed.left.len()..).zip(&self.open) {
             let rim = self.rim(*rim);
             if matches!(reason, NotFilled::NotAdmitted(NotAdmitted::Sheet)) {

@@ -38,6 +38,8 @@ const CORNERS: usize = 4;
 const TURN: f64 = 0.2;
 /// Right angles witness a plane in which they hold along a run that is this wide for its length: beside a shallow arc there are some, too.
 const BROAD: f64 = 0.05;
+/// A plane that no surface lies in is known if the loop has this share of its outline.
+const KNOWN: f64 = 0.5;
 
 /// A patch of flat pieces.
 #[derive(Debug)]
@@ -53,6 +55,13 @@ pub(crate) struct Extended {
     pub(crate) volume: f64,
     /// The volume by which another patch like it differs.
     pub(crate) in_doubt: f64,
+}
+
+impl Extended {
+    /// Does surface lie in each of its planes?
+    fn is_seen(&self) -> bool {
+        !self.assumed && self.pieces[1] == 0
+    }
 }
 
 /// Do all of these places lie in one plane, as well as they are known?
@@ -91,11 +100,15 @@ pub(crate) fn extend(rim: &Rim<'_>, may_add: bool) -> Option<Extended> {
     let show = |points: &[Point], pieces: &[Vec<u32>]| found.extend(accepted(rim, &beyond, tolerance, points, pieces));
     let mut search = Search::new(rim.points, &beyond, tolerance, (centre, radius), show);
     search.may_add = may_add;
+    search.peel_seen();
     search.peel(&outline);
+    if std::env::var("DBG").is_ok() { for f in &found { eprintln!("{:?} {} {}", f.pieces, f.assumed, f.volume); } }
     // Of equal ones the first.
-    let (best, _) = (0..).zip(&found).min_by_key(|(i, patch)| (patch.assumed, patch.pieces, *i)).map(|(i, p)| (i, p.volume))?;
+    let (best, _) = found.iter().enumerate().min_by_key(|(i, patch)| (patch.assumed, !patch.is_seen(), patch.pieces, *i))?;
     let mut best = found.swap_remove(best);
-    best.in_doubt = found.iter().map(|other| (other.volume - best.volume).abs()).fold(0.0, f64::max);
+    // Where surface tells all planes, one that it does not tell may be another guess, but not several.
+    let speaks = |other: &&Extended| !best.is_seen() || other.pieces[1] + usize::from(other.assumed) < 2;
+    best.in_doubt = found.iter().filter(speaks).map(|other| (other.volume - best.volume).abs()).fold(0.0, f64::max);
     Some(best)
 }
 
@@ -151,7 +164,7 @@ fn accepted(rim: &Rim<'_>, beyond: &[Option<DVec3>], tolerance: f64, points: &[P
 /// What tells that there is a plane.
 enum Witness {
     None,
-    /// It holds one line of the loop, at right angles to the surface beyond.
+    /// It holds one line of the loop, or little more, at right angles to the surface beyond.
     Assumed,
     /// Corners of the loop, or right angles.
     Corners,
@@ -176,19 +189,24 @@ fn witness(piece: &[u32], normal: DVec3, beyond: &[Option<DVec3>], tolerance: f6
     if tells(&|c| c > SAME, 0.0) {
         return Witness::Surface;
     }
+    // Most of its outline is to be found yet.
+    let length = |[a, b]: [u32; 2]| place(a).distance(place(b));
+    let known: f64 = edges.iter().map(|edge| length(*edge)).sum();
+    let whole: f64 = (0..piece.len()).map(|i| length([piece[i], piece[(i + 1) % piece.len()]])).sum();
+    let corners = if known < KNOWN * whole { Witness::Assumed } else { Witness::Corners };
     let turns = |i: &usize| {
         let [before, here, after] = [i + piece.len() - 1, *i, i + 1].map(|i| place(piece[i % piece.len()]));
         (here - before).normalize_or_zero().cross((after - here).normalize_or_zero()).length() > TURN
     };
     if (0..piece.len()).filter(|i| (piece[*i] as usize) < n && turns(i)).count() >= CORNERS {
-        return Witness::Corners;
+        return corners;
     }
     let is_square = |c: f64| c > SAME || c.abs() < SQUARE;
     if edges.is_empty() || !edges.iter().all(|e| cosine(e).is_none_or(is_square)) {
         return Witness::None;
     }
     match (tells(&is_square, BROAD), tells(&is_square, 0.0)) {
-        (true, _) => Witness::Corners,
+        (true, _) => corners,
         (false, false) => Witness::Assumed,
         (false, true) => Witness::None,
     }

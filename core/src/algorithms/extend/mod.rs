@@ -18,7 +18,7 @@ use glam::DVec3;
 use super::triangulate::{Rim, directed_area, in_plane, stands};
 use crate::geometry::exact::{Point, at};
 use crate::geometry::sums::step_at;
-use peel::Search;
+use peel::{Search, Shown};
 use runs::{Lie, lie};
 
 /// Vertices of a loop that is looked at.
@@ -38,8 +38,8 @@ const CORNERS: usize = 4;
 const TURN: f64 = 0.2;
 /// Right angles witness a plane in which they hold along a run that is this wide for its length: beside a shallow arc there are some, too.
 const BROAD: f64 = 0.05;
-/// A plane that no surface lies in is known if the loop has this share of its outline.
-const KNOWN: f64 = 0.5;
+/// A plane that no surface lies in is known if the loop has this share of its outline: more than one side of four.
+const KNOWN: f64 = 1.0 / 3.0;
 
 /// A patch of flat pieces.
 #[derive(Debug)]
@@ -49,19 +49,14 @@ pub(crate) struct Extended {
     pub(crate) triangles: Vec<[u32; 3]>,
     /// A piece of it stands at right angles to what is around because nothing says how else.
     pub(crate) assumed: bool,
+    /// The loop runs through the planes of surface beyond it, and through no other.
+    told: bool,
     /// How many pieces there are, and how many of them lie in the plane of no surface.
     pieces: [usize; 2],
     /// What lies under it, seen from the loop's centre.
     pub(crate) volume: f64,
     /// The volume by which another patch like it differs.
     pub(crate) in_doubt: f64,
-}
-
-impl Extended {
-    /// Does surface lie in each of its planes?
-    fn is_seen(&self) -> bool {
-        !self.assumed && self.pieces[1] == 0
-    }
 }
 
 /// Do all of these places lie in one plane, as well as they are known?
@@ -97,34 +92,37 @@ pub(crate) fn extend(rim: &Rim<'_>, may_add: bool) -> Option<Extended> {
         .collect();
     let outline: Vec<u32> = (0..n as u32).collect();
     let mut found: Vec<Extended> = Vec::new();
-    let show = |points: &[Point], pieces: &[Vec<u32>]| found.extend(accepted(rim, &beyond, tolerance, points, pieces));
+    let show = |shown: &Shown<'_>| found.extend(accepted(rim, &beyond, tolerance, shown));
     let mut search = Search::new(rim.points, &beyond, tolerance, (centre, radius), show);
     search.may_add = may_add;
-    search.peel_seen();
+    search.peel_told();
     search.peel(&outline);
-    if std::env::var("DBG").is_ok() { for f in &found { eprintln!("{:?} {} {}", f.pieces, f.assumed, f.volume); } }
     // Of equal ones the first.
-    let (best, _) = found.iter().enumerate().min_by_key(|(i, patch)| (patch.assumed, !patch.is_seen(), patch.pieces, *i))?;
+    let (best, _) = found.iter().enumerate().min_by_key(|(i, patch)| (patch.assumed, !patch.told, patch.pieces, *i))?;
     let mut best = found.swap_remove(best);
     // Where surface tells all planes, one that it does not tell may be another guess, but not several.
-    let speaks = |other: &&Extended| !best.is_seen() || other.pieces[1] + usize::from(other.assumed) < 2;
+    let speaks = |other: &&Extended| !best.told || other.pieces[1] < 2;
     best.in_doubt = found.iter().filter(speaks).map(|other| (other.volume - best.volume).abs()).fold(0.0, f64::max);
     Some(best)
 }
 
 /// These pieces as a patch, if each plane has a witness, they meet at clear angles, and the patch is valid.
-fn accepted(rim: &Rim<'_>, beyond: &[Option<DVec3>], tolerance: f64, points: &[Point], pieces: &[Vec<u32>]) -> Option<Extended> {
+fn accepted(rim: &Rim<'_>, beyond: &[Option<DVec3>], tolerance: f64, shown: &Shown<'_>) -> Option<Extended> {
+    let &Shown { points, pieces, told } = shown;
     if pieces.len() < 2 {
         return None;
     }
     let outlines: Vec<Vec<Point>> = pieces.iter().map(|piece| piece.iter().map(|v| points[*v as usize]).collect()).collect();
     let normals: Vec<DVec3> = outlines.iter().map(|outline| directed_area(outline).normalize_or_zero()).collect();
     let (mut assumed, mut unseen) = (false, 0);
-    for (piece, normal) in pieces.iter().zip(&normals) {
+    for (piece, normal) in pieces.iter().zip(&normals).filter(|_| !told) {
         match witness(piece, *normal, beyond, tolerance, points) {
             Witness::Surface => {}
             Witness::Corners => unseen += 1,
-            Witness::Assumed => assumed = true,
+            Witness::Assumed => {
+                assumed = true;
+                unseen += 1;
+            }
             Witness::None => return None,
         }
     }
@@ -155,6 +153,7 @@ fn accepted(rim: &Rim<'_>, beyond: &[Option<DVec3>], tolerance: f64, points: &[P
         added,
         triangles,
         assumed,
+        told,
         pieces: [pieces.len(), unseen],
         volume,
         in_doubt: 0.0,

@@ -87,3 +87,22 @@ fn a_shallow_arc_is_no_face() {
     rim.extend(steps.iter().map(|y| ([0.0, 2.0 - y, 0.0], [-1.0, 2.0 - y, arc(-1.0)])));
     assert!(closed(&rim, true).is_none());
 }
+
+/// A box's corner that was lost along triangles: five places of the loop lie in a plane, by the way the box was cut up.
+fn corner_lost_along_triangles() -> Vec<(Point, Point)> {
+    vec![
+        ([4.0, 4.0, 0.0], [4.0, 4.0, 3.0]),
+        ([4.0, 2.0, 3.0], [4.0, 0.0, 6.0]),
+        ([4.0, 0.0, 3.0], [2.0, 0.0, 6.0]),
+        ([2.0, 0.0, 3.0], [0.0, 0.0, 3.0]),
+        ([0.0, 0.0, 0.0], [0.0, 4.0, 0.0]),
+        ([2.0, 2.0, 0.0], [0.0, 4.0, 0.0]),
+    ]
+}
+
+#[test]
+fn a_corner_that_surface_tells_is_not_cut_off() {
+    let made = closed(&corner_lost_along_triangles(), true).unwrap();
+    assert_eq!(made.added, [[4.0, 0.0, 0.0]], "{made:?}");
+    assert!(made.told && made.in_doubt == 0.0, "{made:?}");
+}

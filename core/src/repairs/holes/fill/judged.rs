@@ -31,7 +31,7 @@ const WIDEST: f64 = 0.1;
 /// How much the surface goes on across a hole's rim, at least, for the hole to be one in flat surface.
 const HOLE: f64 = 0.7;
 /// A way through that is not drilled takes no more than this share of all volume without a word.
-const WAY_THROUGH: f64 = 0.001;
+const WAY_THROUGH: f64 = 0.01;
 /// Outlines of what is drilled agree, seen along the axis, as well as circles of ten facets do: as a share of the radius.
 const DRILLED: f64 = 0.05;
 /// Points of a rim that are held against the other one, at most.
@@ -241,10 +241,7 @@ fn breaks_off(submesh: &Submesh, rim: &Loop, body: Body) -> bool {
     let across = axis(submesh, rim);
     let is_large = across.length().powi(3) >= LARGE.powi(3) * body.volume * body.volume;
     let height = || flatness::height(rim.vertices.iter().map(|v| submesh.place(*v)), across);
-    !body.is_detail()
-        && is_large
-        && goes_on(submesh, rim).abs() <= END
-        && height() > flatness::RAGGED * across.length().sqrt()
+    !body.is_detail() && is_large && goes_on(submesh, rim).abs() <= END && height() > flatness::RAGGED * across.length().sqrt()
 }
 
 /// How much the surface goes on across a rim: 1 where it is a hole in a plane, 0 where walls stand on it.

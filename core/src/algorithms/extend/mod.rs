@@ -4,8 +4,8 @@
 //! bound what is missing, so the patch is made of them, up to the lines and points where they meet (`peel`): an edge of a box that is lost
 //! is an edge again, and a corner a corner. Coordinates of new vertices are those of the loop's where planes are parallel to an axis.
 //!
-//! Any hexagon is three planes, so that a plane needs a witness: surface that lies in it, a fourth corner of the loop, or right angles to all
-//! surface along it. Floating point finds the patch; whether it is valid is decided with exact predicates. O(n²), for most loops on
+//! Where the loop runs through two or three planes of the surface beyond it, and no others, these tell an edge or a corner. Else any hexagon is three
+//! planes, so that a plane needs a witness: surface that lies in it, a fourth corner of the loop, or right angles to all surface along it. Floating point finds the patch; whether it is valid is decided with exact predicates. O(n²), for most loops on
 //! curved surface O(n).
 
 mod peel;

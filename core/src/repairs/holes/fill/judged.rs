@@ -38,7 +38,7 @@ const DRILLED: f64 = 0.05;
 const MOST_POINTS: usize = 2048;
 /// How much the surface goes on across a rim, at most, where the whole of it ends: at the end of a tube, a beam or a rib.
 const END: f64 = 0.5;
-/// An end of less than this share of its body's size, which is the root of its volume's cube, squared, is a detail.
+/// An end of less than this share of its body's size, the cube root of its volume, squared, is a detail.
 const LARGE: f64 = 0.1;
 /// Sine of the turn at a corner: a circle of ten facets has none.
 const CORNER: f64 = 0.6;
@@ -141,8 +141,12 @@ impl Judged {
 
     /// A ring between two rims.
     fn ring(&mut self, submesh: &Submesh, patch: &Placed, rims: [&Loop; 2], body: Body) -> Option<String> {
-        let doubt = if is_drilled(submesh, rims) { None } else { way_through(submesh, patch, rims, body) };
-        if doubt.is_none() && (is_drilled(submesh, rims) || area(submesh, patch) < WIDEST * body.area) {
+        if is_drilled(submesh, rims) {
+            self.explain(submesh, patch);
+            return None;
+        }
+        let doubt = way_through(submesh, patch, rims, body);
+        if doubt.is_none() && area(submesh, patch) < WIDEST * body.area {
             self.explain(submesh, patch);
         }
         doubt

@@ -40,6 +40,8 @@ const MOST_POINTS: usize = 2048;
 const END: f64 = 0.5;
 /// An end of less than this share of its body's size, the cube root of its volume, squared, is a detail.
 const LARGE: f64 = 0.1;
+/// A rim that rises and falls by more than so many times its height is ragged; that of a saddle does by 4 times.
+const SADDLE: f64 = 5.0;
 /// Sine of the turn at a corner: a circle of ten facets has none.
 const CORNER: f64 = 0.6;
 /// Lines for people, at most.
@@ -239,13 +241,20 @@ fn is_drilled(submesh: &Submesh, rims: [&Loop; 2]) -> bool {
     })
 }
 
-/// Is all of a body cut off there, by no plane? Where walls end at a plane, a face is missing; where they end raggedly, nothing says how far
-/// they went.
+/// Does all of a body end raggedly there? Where walls end at a plane, or at a bent surface, a face is missing; else nothing says how far they went.
 fn breaks_off(submesh: &Submesh, rim: &Loop, body: Body) -> bool {
     let across = axis(submesh, rim);
     let is_large = across.length().powi(3) >= LARGE.powi(3) * body.volume * body.volume;
-    let height = || flatness::height(rim.vertices.iter().map(|v| submesh.place(*v)), across);
-    !body.is_detail() && is_large && goes_on(submesh, rim).abs() <= END && height() > flatness::RAGGED * across.length().sqrt()
+    !body.is_detail() && is_large && goes_on(submesh, rim).abs() <= END && is_ragged(submesh, rim, across)
+}
+
+/// Does a rim rise and fall all along?
+fn is_ragged(submesh: &Submesh, rim: &Loop, across: DVec3) -> bool {
+    let height = flatness::height(rim.vertices.iter().map(|v| submesh.place(*v)), across);
+    let n = rim.vertices.len();
+    let step = |i: usize| submesh.vector(rim.vertices[i], rim.vertices[(i + 1) % n]).dot(across).abs();
+    let way = (0..n).map(step).sum::<f64>() / across.length();
+    height > flatness::RAGGED * across.length().sqrt() && way > SADDLE * height
 }
 
 /// How much the surface goes on across a rim: 1 where it is a hole in a plane, 0 where walls stand on it.

@@ -232,6 +232,9 @@ fn an_end_that_breaks_off_is_a_guess_however_long_the_tube_is() {
     let whole = turned(&rows);
     let judged = |tube: &[Corners]| after(tube, |d, _| fill(d, &Profile::default())).result.judged;
     assert!(judged(&whole).doubts.is_empty());
+    // Cut to fit another tube.
+    let saddle: Vec<Corners> = whole.iter().map(|t| t.map(|[x, y, z]| [x, y, z * (1.0 + 0.01 * (x * x - y * y))])).collect();
+    assert!(judged(&saddle).doubts.is_empty());
     // Of the last row, the triangles that point up are left.
     let points_up = |t: &Corners| t.iter().filter(|p| p[2] > 29.9).count() < 2;
     let ragged: Vec<Corners> = whole.iter().copied().filter(points_up).collect();

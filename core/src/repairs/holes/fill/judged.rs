@@ -20,7 +20,7 @@ use crate::topology::survey::Survey;
 
 /// Patches of planes are in doubt if another one differs by more than this share of all volume.
 const IN_DOUBT: f64 = 0.001;
-/// A body of less than this share of all volume is a detail, which nobody need look at.
+/// A body of less than this share of all volume is a detail, which nobody need look at; so is a corner of this share of its body.
 const DETAIL: f64 = 0.1;
 /// And so many times the share of volume that may change without a word is what a mouth must seem to lack: it is a rough estimate.
 const ROUGH: f64 = 2.0;
@@ -109,6 +109,12 @@ impl Judged {
         }
         if planes.assumed && planes.volume.abs() > IN_DOUBT * body.all {
             return Some("a face of which hardly anything is left was put in at right angles to what is around".into());
+        }
+        if planes.reaches && planes.volume.abs() > DETAIL * body.volume.abs() && !body.is_detail() {
+            let share = planes.volume / body.volume * 100.0;
+            return Some(format!(
+                "planes were let go on to where they meet, around {share:.0} % of the body: they may have ended before"
+            ));
         }
         self.explain(submesh, patch);
         self.volume += planes.volume * body.volume.signum();

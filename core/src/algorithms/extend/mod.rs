@@ -4,8 +4,8 @@
 //! bound what is missing, so the patch is made of them, up to the lines and points where they meet (`peel`): an edge of a box that is lost
 //! is an edge again, and a corner a corner. Coordinates of new vertices are those of the loop's where planes are parallel to an axis.
 //!
-//! Any hexagon is three planes, so that a plane needs a witness: surface that lies in it, a fourth corner of the loop, or right angles to all
-//! surface along it. Floating point finds the patch; whether it is valid is decided with exact predicates. O(n²), for most loops on
+//! Where the loop runs through two or three planes of the surface beyond it, and no others, these tell an edge or a corner. Else any hexagon is three
+//! planes, so that a plane needs a witness: surface that lies in it, a fourth corner of the loop, or right angles to all surface along it. Floating point finds the patch; whether it is valid is decided with exact predicates. O(n²), for most loops on
 //! curved surface O(n).
 
 mod peel;
@@ -18,7 +18,7 @@ use glam::DVec3;
 use super::triangulate::{Rim, directed_area, in_plane, stands};
 use crate::geometry::exact::{Point, at};
 use crate::geometry::sums::step_at;
-use peel::Search;
+use peel::{Search, Shown};
 use runs::{Lie, lie};
 
 /// Vertices of a loop that is looked at.
@@ -38,6 +38,8 @@ const CORNERS: usize = 4;
 const TURN: f64 = 0.2;
 /// Right angles witness a plane in which they hold along a run that is this wide for its length: beside a shallow arc there are some, too.
 const BROAD: f64 = 0.05;
+/// A plane that no surface lies in is known if the loop has this share of its outline: more than one side of four.
+const KNOWN: f64 = 1.0 / 3.0;
 
 /// A patch of flat pieces.
 #[derive(Debug)]
@@ -47,6 +49,8 @@ pub(crate) struct Extended {
     pub(crate) triangles: Vec<[u32; 3]>,
     /// A piece of it stands at right angles to what is around because nothing says how else.
     pub(crate) assumed: bool,
+    /// The loop runs through the planes of surface beyond it, and through no other.
+    told: bool,
     /// How many pieces there are, and how many of them lie in the plane of no surface.
     pieces: [usize; 2],
     /// What lies under it, seen from the loop's centre.
@@ -88,30 +92,37 @@ pub(crate) fn extend(rim: &Rim<'_>, may_add: bool) -> Option<Extended> {
         .collect();
     let outline: Vec<u32> = (0..n as u32).collect();
     let mut found: Vec<Extended> = Vec::new();
-    let show = |points: &[Point], pieces: &[Vec<u32>]| found.extend(accepted(rim, &beyond, tolerance, points, pieces));
+    let show = |shown: &Shown<'_>| found.extend(accepted(rim, &beyond, tolerance, shown));
     let mut search = Search::new(rim.points, &beyond, tolerance, (centre, radius), show);
     search.may_add = may_add;
+    search.peel_told();
     search.peel(&outline);
     // Of equal ones the first.
-    let (best, _) = (0..).zip(&found).min_by_key(|(i, patch)| (patch.assumed, patch.pieces, *i)).map(|(i, p)| (i, p.volume))?;
+    let (best, _) = found.iter().enumerate().min_by_key(|(i, patch)| (patch.assumed, !patch.told, patch.pieces, *i))?;
     let mut best = found.swap_remove(best);
-    best.in_doubt = found.iter().map(|other| (other.volume - best.volume).abs()).fold(0.0, f64::max);
+    // Where surface tells all planes, one that it does not tell may be another guess, but not several.
+    let speaks = |other: &&Extended| !best.told || other.pieces[1] < 2;
+    best.in_doubt = found.iter().filter(speaks).map(|other| (other.volume - best.volume).abs()).fold(0.0, f64::max);
     Some(best)
 }
 
 /// These pieces as a patch, if each plane has a witness, they meet at clear angles, and the patch is valid.
-fn accepted(rim: &Rim<'_>, beyond: &[Option<DVec3>], tolerance: f64, points: &[Point], pieces: &[Vec<u32>]) -> Option<Extended> {
+fn accepted(rim: &Rim<'_>, beyond: &[Option<DVec3>], tolerance: f64, shown: &Shown<'_>) -> Option<Extended> {
+    let &Shown { points, pieces, told } = shown;
     if pieces.len() < 2 {
         return None;
     }
     let outlines: Vec<Vec<Point>> = pieces.iter().map(|piece| piece.iter().map(|v| points[*v as usize]).collect()).collect();
     let normals: Vec<DVec3> = outlines.iter().map(|outline| directed_area(outline).normalize_or_zero()).collect();
     let (mut assumed, mut unseen) = (false, 0);
-    for (piece, normal) in pieces.iter().zip(&normals) {
+    for (piece, normal) in pieces.iter().zip(&normals).filter(|_| !told) {
         match witness(piece, *normal, beyond, tolerance, points) {
             Witness::Surface => {}
             Witness::Corners => unseen += 1,
-            Witness::Assumed => assumed = true,
+            Witness::Assumed => {
+                assumed = true;
+                unseen += 1;
+            }
             Witness::None => return None,
         }
     }
@@ -142,6 +153,7 @@ fn accepted(rim: &Rim<'_>, beyond: &[Option<DVec3>], tolerance: f64, points: &[P
         added,
         triangles,
         assumed,
+        told,
         pieces: [pieces.len(), unseen],
         volume,
         in_doubt: 0.0,
@@ -151,7 +163,7 @@ fn accepted(rim: &Rim<'_>, beyond: &[Option<DVec3>], tolerance: f64, points: &[P
 /// What tells that there is a plane.
 enum Witness {
     None,
-    /// It holds one line of the loop, at right angles to the surface beyond.
+    /// It holds one line of the loop, or little more, at right angles to the surface beyond.
     Assumed,
     /// Corners of the loop, or right angles.
     Corners,
@@ -176,19 +188,24 @@ fn witness(piece: &[u32], normal: DVec3, beyond: &[Option<DVec3>], tolerance: f6
     if tells(&|c| c > SAME, 0.0) {
         return Witness::Surface;
     }
+    // Most of its outline is to be found yet.
+    let length = |[a, b]: [u32; 2]| place(a).distance(place(b));
+    let known: f64 = edges.iter().map(|edge| length(*edge)).sum();
+    let whole: f64 = (0..piece.len()).map(|i| length([piece[i], piece[(i + 1) % piece.len()]])).sum();
+    let corners = if known < KNOWN * whole { Witness::Assumed } else { Witness::Corners };
     let turns = |i: &usize| {
         let [before, here, after] = [i + piece.len() - 1, *i, i + 1].map(|i| place(piece[i % piece.len()]));
         (here - before).normalize_or_zero().cross((after - here).normalize_or_zero()).length() > TURN
     };
     if (0..piece.len()).filter(|i| (piece[*i] as usize) < n && turns(i)).count() >= CORNERS {
-        return Witness::Corners;
+        return corners;
     }
     let is_square = |c: f64| c > SAME || c.abs() < SQUARE;
     if edges.is_empty() || !edges.iter().all(|e| cosine(e).is_none_or(is_square)) {
         return Witness::None;
     }
     match (tells(&is_square, BROAD), tells(&is_square, 0.0)) {
-        (true, _) => Witness::Corners,
+        (true, _) => corners,
         (false, false) => Witness::Assumed,
         (false, true) => Witness::None,
     }

@@ -35,8 +35,17 @@ pub(super) struct Search<'a, F> {
     /// Outlines that were looked at: one comes up again when runs apart are closed in another order.
     seen: Vec<Vec<Position>>,
     pieces: Vec<Vec<u32>>,
-    /// Is shown all vertices and the pieces of each way.
+    /// Is shown each way.
     show: F,
+}
+
+/// A way to take a loop apart.
+pub(super) struct Shown<'a> {
+    /// The loop's vertices, then the new ones.
+    pub(super) points: &'a [Point],
+    pub(super) pieces: &'a [Vec<u32>],
+    /// Surface beyond the loop lies in the plane of each piece.
+    pub(super) told: bool,
 }
 
 /// A run of an outline.
@@ -46,9 +55,47 @@ struct Run {
     plane: Option<Flat>,
 }
 
-impl<'a, F: FnMut(&[Point], &[Vec<u32>])> Search<'a, F> {
+impl<'a, F: FnMut(&Shown<'_>)> Search<'a, F> {
     pub(super) fn new(rim: &[Point], beyond: &'a [Option<DVec3>], tolerance: f64, reach: (DVec3, f64), show: F) -> Self {
         Self { points: rim.to_vec(), beyond, tolerance, reach, may_add: true, seen: Vec::new(), pieces: Vec::new(), show }
+    }
+
+    /// Shows a corner or an edge that surface around it tells: the loop runs through two or three planes of surface beyond it, one after the other.
+    pub(super) fn peel_told(&mut self) {
+        let n = self.beyond.len();
+        let place = |i: usize| at(&self.points[i % n]);
+        let Some(normals) = self.beyond.iter().copied().collect::<Option<Vec<DVec3>>>() else { return };
+        let turns = |i: &usize| normals[*i].dot(normals[(*i + n - 1) % n]) < ALONG;
+        let starts: Vec<usize> = (0..n).filter(turns).collect();
+        let k = starts.len();
+        if !(2..=3).contains(&k) {
+            return;
+        }
+        let mut runs: Vec<Vec<u32>> = Vec::new();
+        let mut planes: Vec<Flat> = Vec::new();
+        for (r, from) in starts.iter().enumerate() {
+            let to = if r + 1 < k { starts[r + 1] } else { starts[0] + n };
+            let flat = Flat { at: place(*from), normal: normals[*from] };
+            if (*from..=to).any(|i| flat.off(place(i)) > self.tolerance) {
+                return;
+            }
+            runs.push((*from..=to).map(|i| (i % n) as u32).collect());
+            planes.push(flat);
+        }
+        if let [a, b, c] = planes[..] {
+            let Some(apex) =
+                meeting(&[a, b, c]).filter(|apex| self.may_add && apex.distance(self.reach.0) <= FARTHEST * self.reach.1)
+            else {
+                return;
+            };
+            if starts.iter().any(|i| place(*i).distance(apex) <= self.tolerance) {
+                return;
+            }
+            let added = self.add(apex);
+            runs.iter_mut().for_each(|run| run.push(added));
+        }
+        (self.show)(&Shown { points: &self.points, pieces: &runs, told: true });
+        self.points.truncate(n);
     }
 
     /// Shows every way to take an outline apart that it finds.
@@ -65,7 +112,7 @@ impl<'a, F: FnMut(&[Point], &[Vec<u32>])> Search<'a, F> {
             Lie::Line => return,
             Lie::Plane(_) => {
                 self.pieces.push(outline.to_vec());
-                (self.show)(&self.points, &self.pieces);
+                (self.show)(&Shown { points: &self.points, pieces: &self.pieces, told: false });
                 self.pieces.pop();
                 return;
             }

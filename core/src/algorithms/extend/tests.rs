@@ -87,3 +87,34 @@ fn a_shallow_arc_is_no_face() {
     rim.extend(steps.iter().map(|y| ([0.0, 2.0 - y, 0.0], [-1.0, 2.0 - y, arc(-1.0)])));
     assert!(closed(&rim, true).is_none());
 }
+
+/// A box's corner that was lost along triangles: five places of the loop lie in a plane, by the way the box was cut up.
+fn corner_lost_along_triangles() -> Vec<(Point, Point)> {
+    vec![
+        ([4.0, 4.0, 0.0], [4.0, 4.0, 3.0]),
+        ([4.0, 2.0, 3.0], [4.0, 0.0, 6.0]),
+        ([4.0, 0.0, 3.0], [2.0, 0.0, 6.0]),
+        ([2.0, 0.0, 3.0], [0.0, 0.0, 3.0]),
+        ([0.0, 0.0, 0.0], [0.0, 4.0, 0.0]),
+        ([2.0, 2.0, 0.0], [0.0, 4.0, 0.0]),
+    ]
+}
+
+#[test]
+fn a_corner_that_surface_tells_is_not_cut_off() {
+    let made = closed(&corner_lost_along_triangles(), true).unwrap();
+    assert_eq!(made.added, [[4.0, 0.0, 0.0]], "{made:?}");
+    assert!(made.told && made.in_doubt == 0.0, "{made:?}");
+}
+
+/// The end of a beam: of its outline, the loop has one side and a part of the next one.
+#[test]
+fn a_face_of_which_the_loop_has_hardly_more_than_an_edge_is_assumed() {
+    for (part, is_known) in [(1.0, false), (5.0, true)] {
+        let places = [[0.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 2.0, part], [-9.0, 1.0, 1.0], [0.0, 2.0, 6.0], [0.0, 0.0, 6.0]];
+        let beyond = [Some(-DVec3::Z), Some(DVec3::Y), None, None];
+        let found = witness(&[0, 1, 2, 4, 5], DVec3::X, &beyond, 1e-5, &places);
+        assert_eq!(matches!(found, Witness::Corners), is_known, "{part}");
+        assert_eq!(matches!(found, Witness::Assumed), !is_known, "{part}");
+    }
+}

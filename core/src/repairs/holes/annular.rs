@@ -273,6 +273,9 @@ mod tests {
     fn assert_bridged_around(got: &After<Closed>, volume: f64) {
         assert_eq!((closed_by(got, "annular"), got.result.loops, got.defects.components), (2, 2, 2), "{:?}", got.result);
         assert!(got.verdict.good && got.result.doubts.is_empty(), "{:?}", got.verdict);
+        // Nobody need look at what was drilled, however large it is.
+        let judged = &got.result.judged;
+        assert!(judged.doubts.is_empty() && judged.explained.len() == 64, "{judged:?}");
         assert!((got.defects.volume / volume - 1.0).abs() < 1e-3, "{} instead of {volume}", got.defects.volume);
     }
 

@@ -60,7 +60,7 @@ pub(crate) fn smooth(
         let beyond = Beyond::of(survey, submesh, batch.iter().map(|i| &placed[*i]));
         let shaped = parallel::map(threads, batch.len(), |i| {
             let region = Gathered::of(submesh, &beyond, &placed[batch[i]]);
-            if is_cut(&region) {
+            if region.is_cut() {
                 return Err(Unshaped::Cut);
             }
             let shaped = fairing::shape(
@@ -82,24 +82,6 @@ pub(crate) fn smooth(
 const FEWEST_CUT: usize = 8;
 /// Vertices next to a rim are as far from its plane as each other if these distances differ by less than this share of the largest.
 const ALIKE: f64 = 0.5;
-
-/// Was the surface cut along a plane, as a scan is at its bottom? Its rim lies in one, and what is next to it anywhere: where rows of vertices
-/// run along the rim, the plane is theirs.
-fn is_cut(region: &Gathered) -> bool {
-    let rim = region.patch.iter().flatten().max().map_or(0, |last| *last as usize + 1);
-    let points = &region.positions[..rim];
-    if rim < FEWEST_CUT || !extend::lie_in_a_plane(points) {
-        return false;
-    }
-    let place = |v: u32| at(&region.positions[v as usize]);
-    let normal: DVec3 = region.patch.iter().map(|t| (place(t[1]) - place(t[0])).cross(place(t[2]) - place(t[0]))).sum();
-    let normal = normal.normalize_or_zero();
-    let is_on_rim = |v: &&u32| (**v as usize) < rim;
-    let next = region.around.iter().filter(|t| t.iter().any(|v| is_on_rim(&v))).flatten().filter(|v| !is_on_rim(v));
-    let heights = next.map(|v| (place(*v) - place(0)).dot(normal).abs());
-    let (least, most) = heights.fold((f64::INFINITY, 0.0_f64), |(least, most), h| (least.min(h), most.max(h)));
-    most > 0.0 && most - least > ALIKE * most
-}
 
 /// Is a patch to be shaped, as far as the triangles of the submesh tell?
 fn is_wanted(submesh: &Submesh, patch: &Placed, finer: f64) -> bool {
@@ -246,6 +228,24 @@ pub(crate) struct Gathered {
 }
 
 impl Gathered {
+    /// Was the surface cut along a plane, as a scan is at its bottom? Its rim lies in one, and what is next to it anywhere: where rows of vertices
+    /// run along the rim, the plane is theirs.
+    pub(crate) fn is_cut(&self) -> bool {
+        let rim = self.patch.iter().flatten().max().map_or(0, |last| *last as usize + 1);
+        let points = &self.positions[..rim];
+        if rim < FEWEST_CUT || !extend::lie_in_a_plane(points) {
+            return false;
+        }
+        let place = |v: u32| at(&self.positions[v as usize]);
+        let normal: DVec3 = self.patch.iter().map(|t| (place(t[1]) - place(t[0])).cross(place(t[2]) - place(t[0]))).sum();
+        let normal = normal.normalize_or_zero();
+        let is_on_rim = |v: &&u32| (**v as usize) < rim;
+        let next = self.around.iter().filter(|t| t.iter().any(|v| is_on_rim(&v))).flatten().filter(|v| !is_on_rim(v));
+        let heights = next.map(|v| (place(*v) - place(0)).dot(normal).abs());
+        let (least, most) = heights.fold((f64::INFINITY, 0.0_f64), |(least, most), h| (least.min(h), most.max(h)));
+        most > 0.0 && most - least > ALIKE * most
+    }
+
     pub(crate) fn of(submesh: &Submesh, beyond: &Beyond, patch: &Placed) -> Self {
         let mut region = Self { positions: Vec::new(), vertices: Vec::new(), patch: Vec::new(), around: Vec::new() };
         let mut numbers: HashMap<Position, u32> = HashMap::new();

@@ -23,6 +23,8 @@ pub(crate) struct Planes {
     pub(crate) volume: f64,
     /// The volume by which another patch like it differs.
     pub(crate) in_doubt: f64,
+    /// Planes meet in new vertices.
+    pub(crate) reaches: bool,
 }
 
 /// A patch that is in the submesh.

@@ -181,7 +181,8 @@ impl Closing<'_> {
         vertices.extend(patch.added.iter().map(|p| work.add_vertex(Position::of(*p))));
         let triangles: Vec<[Vertex; 3]> = patch.triangles.iter().map(|t| t.map(|i| vertices[i as usize])).collect();
         let mut placed = Placed::put_in(work, vec![rim], &triangles, EXTENDED);
-        placed.planes = Some(Planes { assumed: patch.assumed, volume: patch.volume, in_doubt: patch.in_doubt });
+        let reaches = !patch.added.is_empty();
+        placed.planes = Some(Planes { assumed: patch.assumed, volume: patch.volume, in_doubt: patch.in_doubt, reaches });
         self.placed.push(placed);
     }
 

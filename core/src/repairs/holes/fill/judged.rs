@@ -9,6 +9,7 @@ use super::closing::{Closing, Judged};
 use super::mouth;
 use crate::contract::settings::Profile;
 use crate::detect::holes::loops::Loop;
+use crate::geometry::distance::nearest_of_segment;
 use crate::geometry::flatness;
 use crate::repairs::holes::fair::{Beyond, Gathered};
 use crate::repairs::holes::patches::{EXTENDED, ISLANDS, Placed, Planes};
@@ -19,7 +20,7 @@ use crate::topology::survey::Survey;
 
 /// Patches of planes are in doubt if another one differs by more than this share of all volume.
 const IN_DOUBT: f64 = 0.001;
-/// A body of less than this share of all volume is a detail, which nobody need look at.
+/// A body of less than this share of all volume is a detail, which nobody need look at; so is a corner of this share of its body.
 const DETAIL: f64 = 0.1;
 /// And so many times the share of volume that may change without a word is what a mouth must seem to lack: it is a rough estimate.
 const ROUGH: f64 = 2.0;
@@ -29,8 +30,18 @@ const WIDE: f64 = 0.05;
 const WIDEST: f64 = 0.1;
 /// How much the surface goes on across a hole's rim, at least, for the hole to be one in flat surface.
 const HOLE: f64 = 0.7;
-/// A way through takes no more than this share of all volume without a word.
-const WAY_THROUGH: f64 = 0.05;
+/// A way through that is not drilled takes no more than this share of all volume without a word.
+const WAY_THROUGH: f64 = 0.01;
+/// Outlines of what is drilled agree, seen along the axis, as well as circles of ten facets do: as a share of the radius.
+const DRILLED: f64 = 0.05;
+/// Points of a rim that are held against the other one, at most.
+const MOST_POINTS: usize = 2048;
+/// How much the surface goes on across a rim, at most, where the whole of it ends: at the end of a tube, a beam or a rib.
+const END: f64 = 0.5;
+/// An end of less than this share of its body's size, the cube root of its volume, squared, is a detail.
+const LARGE: f64 = 0.1;
+/// A rim that rises and falls by more than so many times its height is ragged; that of a saddle does by 4 times.
+const SADDLE: f64 = 5.0;
 /// Sine of the turn at a corner: a circle of ten facets has none.
 const CORNER: f64 = 0.6;
 /// Lines for people, at most.
@@ -97,7 +108,13 @@ impl Judged {
             ));
         }
         if planes.assumed && planes.volume.abs() > IN_DOUBT * body.all {
-            return Some("a face of which nothing is left was put in at right angles to what is around".into());
+            return Some("a face of which hardly anything is left was put in at right angles to what is around".into());
+        }
+        if planes.reaches && planes.volume.abs() > DETAIL * body.volume.abs() && !body.is_detail() {
+            let share = planes.volume / body.volume * 100.0;
+            return Some(format!(
+                "planes were let go on to where they meet, around {share:.0} % of the body: they may have ended before"
+            ));
         }
         self.explain(submesh, patch);
         self.volume += planes.volume * body.volume.signum();
@@ -120,6 +137,9 @@ impl Judged {
         body: Body,
         profile: &Profile,
     ) -> Option<String> {
+        if breaks_off(submesh, rim, body) {
+            return Some("what ends there breaks off raggedly: it was closed where it does, and more may be missing".into());
+        }
         if patch.coarse.is_empty() || area(submesh, patch) < WIDE * body.area {
             self.flat(survey, submesh, (patch, rim), body, profile)
         } else {
@@ -129,6 +149,10 @@ impl Judged {
 
     /// A ring between two rims.
     fn ring(&mut self, submesh: &Submesh, patch: &Placed, rims: [&Loop; 2], body: Body) -> Option<String> {
+        if is_drilled(submesh, rims) {
+            self.explain(submesh, patch);
+            return None;
+        }
         let doubt = way_through(submesh, patch, rims, body);
         if doubt.is_none() && area(submesh, patch) < WIDEST * body.area {
             self.explain(submesh, patch);
@@ -150,7 +174,8 @@ impl Judged {
             return None;
         }
         let beyond = Beyond::of(survey, submesh, std::iter::once(patch));
-        let more = mouth::beyond(&Gathered::of(submesh, &beyond, patch), size);
+        let around = Gathered::of(submesh, &beyond, patch);
+        let more = if around.is_cut() { 0.0 } else { mouth::beyond(&around, size) };
         let volume = body.volume.abs();
         if !body.is_detail() && more > ROUGH * profile.max_volume_change * volume {
             let share = 100.0 * size / body.area;
@@ -187,22 +212,13 @@ impl Judged {
 
 /// A way through a wall, which caps on both holes would have left closed.
 fn way_through(submesh: &Submesh, patch: &Placed, rims: [&Loop; 2], body: Body) -> Option<String> {
-    let middle = |rim: &Loop| rim.vertices.iter().map(|v| submesh.place(*v)).sum::<DVec3>() / rim.vertices.len() as f64;
-    let axis = |rim: &Loop| directed_area(submesh, rim, middle(rim));
-    let goes_on = |rim: &Loop| {
-        let n = rim.vertices.len();
-        let along = |i: usize| submesh.distance(rim.vertices[i], rim.vertices[(i + 1) % n]);
-        let normal = axis(rim).normalize_or_zero();
-        let sum: f64 = (0..n).map(|i| submesh.normal(rim.triangles[i]).normalize_or_zero().dot(normal) * along(i)).sum();
-        sum >= HOLE * rim.perimeter(submesh)
-    };
-    if !rims.iter().all(|rim| goes_on(rim)) || rims.iter().all(|rim| is_round(submesh, rim)) {
+    if !rims.iter().all(|rim| goes_on(submesh, rim) >= HOLE) {
         return None;
     }
-    let from = middle(rims[0]);
+    let from = middle(submesh, rims[0]);
     let living = patch.triangles().filter(|t| submesh.lives(*t)).map(|t| submesh.triangles[t as usize].v);
     // Cones over the loops; the first one is seen from its own middle.
-    let caps = axis(rims[1]).dot(middle(rims[1]) - from) / 3.0;
+    let caps = axis(submesh, rims[1]).dot(middle(submesh, rims[1]) - from) / 3.0;
     let share = (under(submesh, living, from) - caps).abs() / body.all;
     (share > WAY_THROUGH).then(|| {
         format!(
@@ -210,6 +226,60 @@ fn way_through(submesh: &Submesh, patch: &Placed, rims: [&Loop; 2], body: Body) 
             share * 100.0
         )
     })
+}
+
+/// Are two holes the ends of what was drilled? Both are round, and one lies on the other, seen along the axis.
+fn is_drilled(submesh: &Submesh, rims: [&Loop; 2]) -> bool {
+    if !rims.iter().all(|rim| is_round(submesh, rim) && goes_on(submesh, rim) >= HOLE) {
+        return false;
+    }
+    let (across, along) = (axis(submesh, rims[0]), axis(submesh, rims[0]).normalize_or_zero());
+    let reach = DRILLED * (across.length() / std::f64::consts::PI).sqrt();
+    let seen = |v: Vertex| submesh.place(v) - along * submesh.place(v).dot(along);
+    let is_near = |p: DVec3, other: &Loop| {
+        let n = other.vertices.len();
+        let ends = |i: usize| [i, (i + 1) % n].map(|i| seen(other.vertices[i]));
+        (0..n).map(ends).any(|[a, b]| nearest_of_segment(a, b, p).distance(p) <= reach)
+    };
+    [[0, 1], [1, 0]].map(|pair| pair.map(|k| rims[k])).iter().all(|[a, b]| {
+        let every = a.vertices.len().div_ceil(MOST_POINTS);
+        a.vertices.iter().step_by(every).all(|v| is_near(seen(*v), b))
+    })
+}
+
+/// Does all of a body end raggedly there? Where walls end at a plane, or at a bent surface, a face is missing; else nothing says how far they went.
+fn breaks_off(submesh: &Submesh, rim: &Loop, body: Body) -> bool {
+    let across = axis(submesh, rim);
+    let is_large = across.length().powi(3) >= LARGE.powi(3) * body.volume * body.volume;
+    !body.is_detail() && is_large && goes_on(submesh, rim).abs() <= END && is_ragged(submesh, rim, across)
+}
+
+/// Does a rim rise and fall all along?
+fn is_ragged(submesh: &Submesh, rim: &Loop, across: DVec3) -> bool {
+    let height = flatness::height(rim.vertices.iter().map(|v| submesh.place(*v)), across);
+    let n = rim.vertices.len();
+    let step = |i: usize| submesh.vector(rim.vertices[i], rim.vertices[(i + 1) % n]).dot(across).abs();
+    let way = (0..n).map(step).sum::<f64>() / across.length();
+    height > flatness::RAGGED * across.length().sqrt() && way > SADDLE * height
+}
+
+/// How much the surface goes on across a rim: 1 where it is a hole in a plane, 0 where walls stand on it.
+fn goes_on(submesh: &Submesh, rim: &Loop) -> f64 {
+    let n = rim.vertices.len();
+    let normal = axis(submesh, rim).normalize_or_zero();
+    let along = |i: usize| submesh.distance(rim.vertices[i], rim.vertices[(i + 1) % n]);
+    let sum: f64 = (0..n).map(|i| submesh.normal(rim.triangles[i]).normalize_or_zero().dot(normal) * along(i)).sum();
+    sum / rim.perimeter(submesh).max(f64::MIN_POSITIVE)
+}
+
+/// The middle of a loop's vertices.
+fn middle(submesh: &Submesh, rim: &Loop) -> DVec3 {
+    rim.vertices.iter().map(|v| submesh.place(*v)).sum::<DVec3>() / rim.vertices.len() as f64
+}
+
+/// The directed area of a cap on a loop.
+fn axis(submesh: &Submesh, rim: &Loop) -> DVec3 {
+    directed_area(submesh, rim, middle(submesh, rim))
 }
 
 /// Has a loop no corner, as what is drilled has none?

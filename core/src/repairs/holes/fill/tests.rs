@@ -225,3 +225,20 @@ fn a_ragged_hole_in_both_skins_of_a_plate_is_no_way_through() {
     assert_eq!(methods(&ragged), BTreeMap::from([("planar".into(), 2)]));
     assert_eq!(methods(&square), BTreeMap::from([("annular".into(), 2)]));
 }
+
+#[test]
+fn an_end_that_breaks_off_is_a_guess_however_long_the_tube_is() {
+    let rows: Vec<[f32; 2]> = (0..=60).map(|row| [1.0, row as f32 / 2.0]).collect();
+    let whole = turned(&rows);
+    let judged = |tube: &[Corners]| after(tube, |d, _| fill(d, &Profile::default())).result.judged;
+    assert!(judged(&whole).doubts.is_empty());
+    // Cut to fit another tube.
+    let saddle: Vec<Corners> = whole.iter().map(|t| t.map(|[x, y, z]| [x, y, z * (1.0 + 0.01 * (x * x - y * y))])).collect();
+    assert!(judged(&saddle).doubts.is_empty());
+    // Of the last row, the triangles that point up are left.
+    let points_up = |t: &Corners| t.iter().filter(|p| p[2] > 29.9).count() < 2;
+    let ragged: Vec<Corners> = whole.iter().copied().filter(points_up).collect();
+    assert_eq!(ragged.len() + 24, whole.len());
+    let of_ragged = judged(&ragged);
+    assert!(of_ragged.doubts.len() == 1 && of_ragged.doubts[0].contains("breaks off"), "{:?}", of_ragged.doubts);
+}

@@ -61,7 +61,7 @@ pub(crate) fn drop_duplicates(survey: &Survey<'_>, work: &mut Work<'_>, bodies: 
         let first = work.triangles[group[0].1 as usize].v;
         let (forward, backward): (Vec<u32>, Vec<u32>) =
             group.iter().map(|g| g.1).partition(|t| same_direction(first, work.triangles[*t as usize].v));
-        if backward.is_empty() {
+        if backward.is_empty() && forward.len() > 2 {
             copies.extend(&forward[1..]);
         } else {
             pairs.push(Pair { forward, backward });
@@ -71,16 +71,19 @@ pub(crate) fn drop_duplicates(survey: &Survey<'_>, work: &mut Work<'_>, bodies: 
         return Dropped::default();
     }
     let (submesh, edges) = work.edges();
+    let apart = Pair::set_apart(submesh, edges, &mut pairs);
+    copies.extend(apart.iter().map(|pair| pair.forward[1]));
+    copies.sort_unstable();
     let mut doomed = spare(submesh, edges, &copies);
     let surplus = back_to_back::surplus(survey, submesh, edges, &pairs, &doomed);
     doomed.extend(&surplus.sides);
     work.is_changed_by(RepairName::Duplicate);
     doomed.iter().for_each(|t| work.kill(*t));
-    let walls = if bodies == Bodies::Keep { &[][..] } else { &surplus.common };
+    // Bodies that are kept keep their walls, whole or not.
+    let (walls, halves) = if bodies == Bodies::Keep { (&[][..], &[][..]) } else { (&surplus.common[..], &surplus.halves[..]) };
     work.is_changed_by(RepairName::CommonWall);
-    walls.iter().chain(&surplus.halves).for_each(|t| work.kill(*t));
-    let halves = surplus.halves.len() as u64;
-    Dropped { all: (doomed.len() + walls.len()) as u64 + halves, walls: walls.len() as u64 }
+    walls.iter().chain(halves).for_each(|t| work.kill(*t));
+    Dropped { all: (doomed.len() + walls.len() + halves.len()) as u64, walls: walls.len() as u64 }
 }
 
 /// As [`by_vertex_set`], of all triangles on the vertices of a changed one. O(stars of the changed ones); of a triangle's three stars

@@ -183,8 +183,9 @@ pub(crate) fn skin(skin: &Skin, profile: &Profile) -> Vec<String> {
     lost.into_iter().chain(invented).collect()
 }
 
-/// Whether a person should look at what was dropped of sheets: they may have been meant for walls.
+/// Whether a person should look at what was dropped of sheets: they may have been meant for walls, unless there is material all around them.
 pub(crate) fn sheets(before: &Defects, dropped: &[SheetDropped], profile: &Profile) -> Option<String> {
+    let dropped: Vec<&SheetDropped> = dropped.iter().filter(|sheet| !sheet.in_material).collect();
     let area: f64 = dropped.iter().map(|sheet| sheet.area).sum();
     // Nothing tells against one that crosses nothing and is not hidden but that it is open.
     let free: f64 = dropped.iter().filter(|sheet| !sheet.crosses && !sheet.hidden).map(|sheet| sheet.area).sum();
@@ -335,7 +336,8 @@ mod tests {
     fn dropped_sheets_need_review_beyond_a_share_of_the_area() {
         let before = Defects { area: 600.0, ..cube() };
         let dropped = |area: f64, crosses: bool| {
-            let sheet = SheetDropped { bounds: [[0.0; 3], [1.0; 3]], area, triangles: 2, crosses, hidden: false };
+            let sheet =
+                SheetDropped { bounds: [[0.0; 3], [1.0; 3]], area, triangles: 2, crosses, hidden: false, in_material: false };
             let profile = Profile { max_sheets_share: 0.25, debris_area_share: 0.125, ..Profile::default() };
             sheets(&before, &[sheet.clone(), sheet], &profile)
         };

@@ -300,10 +300,10 @@ mod tests {
         assert_eq!(dropped(&block_and_core().concat(), Bodies::Keep).result, Dropped::default());
     }
 
-    /// However many are turned: pairs and copies in one direction go together.
+    /// However many are turned, pairs and copies in one direction go together.
     #[test]
     fn a_core_with_many_turned_triangles_leaves_no_cavity() {
-        for turned in 1..24usize {
+        for turned in 1..12usize {
             let mut mesh = block_and_core().concat();
             // A step that meets all of them once.
             (0..turned).for_each(|i| mesh[12 + i * 7 % 24].swap(0, 1));

@@ -110,7 +110,7 @@ fn copies_of(submesh: &Submesh, changed: &[u32]) -> Vec<([Vertex; 3], u32)> {
 
 /// Those of the copies without which the surface is no farther from closed. Where two bodies have part of their surface in common, each needs
 /// its own.
-fn spare(submesh: &Submesh, edges: &Edges, copies: &[u32]) -> Vec<u32> {
+pub(crate) fn spare(submesh: &Submesh, edges: &Edges, copies: &[u32]) -> Vec<u32> {
     let mut uses: Vec<(u32, u32, i64)> = Vec::with_capacity(3 * copies.len());
     for (i, t) in (0..).zip(copies) {
         let v = submesh.triangles[*t as usize].v;

@@ -18,6 +18,7 @@ use crate::repairs::shared::context::SheetRim;
 use crate::repairs::shared::context::{Changes, Context, Done, Repair};
 use crate::repairs::shared::lone_sheets;
 use crate::repairs::shared::work::Work;
+use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
@@ -71,6 +72,25 @@ const NEAR: f64 = 0.01;
 const ASKED: usize = 1 << 15;
 const ASKED_OF_ONE: [usize; 2] = [4, 1 << 9];
 
+/// The largest of these sheets, each with its area and component, with points on them.
+fn with_points(
+    survey: &Survey<'_>,
+    submesh: &Submesh,
+    components: &Components,
+    reversed: &Reversed,
+    mut gone: Vec<(i128, usize, SheetDropped)>,
+) -> Vec<(SheetDropped, Vec<[f64; 3]>)> {
+    // Stable: of equal ones the first in the file.
+    gone.sort_by_key(|(area, ..)| std::cmp::Reverse(*area));
+    gone.truncate(MOST_LISTED);
+    let mut listed: Vec<usize> = gone.iter().map(|(_, c, _)| *c).collect();
+    listed.sort_unstable();
+    let most = (ASKED / listed.len().max(1)).clamp(ASKED_OF_ONE[0], ASKED_OF_ONE[1]);
+    let gathered = lone_sheets::gather(survey, submesh, components, reversed, &listed);
+    let points_of = |c: usize| listed.binary_search(&c).map_or(Vec::new(), |place| points_on(&gathered[place].0, most));
+    gone.into_iter().map(|(_, c, sheet)| (sheet, points_of(c))).collect()
+}
+
 /// Drops lone sheets, whose `rims` were left open, and takes their loops off the list of those that are `left`; returns what went, the largest
 /// first, with points on it. O(regions + submesh), and a look at the chunks where such a sheet crosses something.
 pub(crate) fn drop(
@@ -111,7 +131,7 @@ pub(crate) fn drop(
     let are_specks = area(&|c| is_sheet(c) && !crossing[c]) as f64 <= next_to_nothing;
     let all_go = are_specks || profile.guarantee == Guarantee::Wrap;
     let goes = |c: u32| c != NONE && is_sheet(c as usize) && (crossing[c as usize] || all_go);
-    let mut gone: Vec<(i128, usize, SheetDropped)> = (0..components.list.len() as u32)
+    let gone: Vec<(i128, usize, SheetDropped)> = (0..components.list.len() as u32)
         .filter(|c| goes(*c))
         .map(|c| {
             let (sheet, crosses) = (&components.list[c as usize], crossing[c as usize]);
@@ -122,18 +142,7 @@ pub(crate) fn drop(
             (sheet.extent.area, c as usize, dropped)
         })
         .collect();
-    // Stable: of equal ones the first in the file.
-    gone.sort_by_key(|(area, ..)| std::cmp::Reverse(*area));
-    gone.truncate(MOST_LISTED);
-    let mut listed: Vec<usize> = gone.iter().map(|(_, c, _)| *c).collect();
-    listed.sort_unstable();
-    let most = (ASKED / listed.len().max(1)).clamp(ASKED_OF_ONE[0], ASKED_OF_ONE[1]);
-    let points: Vec<Vec<[f64; 3]>> = lone_sheets::gather(survey, submesh, &components, reversed, &listed)
-        .into_iter()
-        .map(|(triangles, _)| points_on(&triangles, most))
-        .collect();
-    let points_of = |c: usize| listed.binary_search(&c).map_or(Vec::new(), |place| points[place].clone());
-    let gone = gone.into_iter().map(|(_, c, sheet)| (sheet, points_of(c))).collect();
+    let gone = with_points(survey, submesh, &components, reversed, gone);
     let closed: Vec<usize> =
         rims.iter().filter(|rim| goes(components.of_triangle[rim.triangle as usize])).filter_map(|rim| rim.listed).collect();
     let mut number = 0..;

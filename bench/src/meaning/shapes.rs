@@ -256,7 +256,10 @@ pub(super) fn bored_plate(chance: &mut Chance) -> Mesh {
     let mut outline = rectangle(width, depth);
     for bore in 0..bores {
         let x = width * ((bore as f64 + 0.5) / bores as f64 - 0.5);
-        let hole = regular(chance.count(16, 32)).placed(chance.from(2.0, 5.0), [x, chance.from(-2.0, 2.0)]);
+        let sides = chance.count(16, 32);
+        // Between two bores, and beside the last one, something is left.
+        let radius = chance.from(2.0, 5.0).min(0.45 * width / bores as f64);
+        let hole = regular(sides).placed(radius, [x, chance.from(-2.0, 2.0)]);
         outline = outline.without(&hole);
     }
     outline.prism(0.0, height)

@@ -335,6 +335,9 @@ pub struct SheetDropped {
     /// Other surface hid it in all directions.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub hidden: bool,
+    /// It lay in the material of the result: nothing is missing without it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub in_material: bool,
 }
 
 /// A region that no repair made a solid. Lengths in the model's units.

@@ -52,7 +52,11 @@ pub const FIDELITY_RULES: [FidelityRule; 14] = [
         version: 1,
         measures: "Area that can be seen and is farther than the reach from all that was there, less plausible patches, as a share.",
     },
-    FidelityRule { id: "sheets", version: 1, measures: "Area of open sheets that were dropped, as a share." },
+    FidelityRule {
+        id: "sheets",
+        version: 1,
+        measures: "Area of open sheets that were dropped, but for those in material, as a share.",
+    },
     FidelityRule {
         id: "free_sheets",
         version: 1,

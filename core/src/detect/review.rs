@@ -243,8 +243,9 @@ fn skin(skin: Option<&Skin>, profile: &Profile) -> [Measured; 2] {
     ]
 }
 
-/// What was dropped of sheets: they may have been meant for walls.
+/// What was dropped of sheets: they may have been meant for walls, unless there is material all around them.
 fn sheets(before: &Defects, dropped: &[SheetDropped], profile: &Profile) -> [Measured; 2] {
+    let dropped: Vec<&SheetDropped> = dropped.iter().filter(|sheet| !sheet.in_material).collect();
     let share = |area: f64| if before.area > 0.0 { area / before.area } else { 0.0 };
     let all: f64 = dropped.iter().map(|sheet| sheet.area).sum();
     // Nothing tells against one that crosses nothing and is not hidden but that it is open.
@@ -434,7 +435,8 @@ mod tests {
     fn dropped_sheets_need_review_beyond_a_share_of_the_area() {
         let before = Defects { area: 600.0, ..cube() };
         let dropped = |area: f64, crosses: bool| {
-            let sheet = SheetDropped { bounds: [[0.0; 3], [1.0; 3]], area, triangles: 2, crosses, hidden: false };
+            let sheet =
+                SheetDropped { bounds: [[0.0; 3], [1.0; 3]], area, triangles: 2, crosses, hidden: false, in_material: false };
             let profile = Profile { max_sheets_share: 0.25, debris_area_share: 0.125, ..Profile::default() };
             sheets(&before, &[sheet.clone(), sheet], &profile).into_iter().flat_map(Measured::concerns).next()
         };

@@ -97,6 +97,7 @@ pub(crate) const ALL: &[Step] = &[
     Do(rebuild::REPAIR),
     Do(wrap::REPAIR),
     Look(measure_bodies),
+    Look(sheets::tell_in_material),
     Look(measure_skin),
 ];
 

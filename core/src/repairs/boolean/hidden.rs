@@ -124,7 +124,14 @@ pub(crate) fn remove(
         } else {
             let bounds = piece.bounds.normalised();
             let (bounds, area) = ([bounds.lo, bounds.hi], survey.measure.area(piece.extent));
-            hidden.sheets.push(SheetDropped { bounds, area, triangles: piece.triangles, crosses: false, hidden: true });
+            hidden.sheets.push(SheetDropped {
+                bounds,
+                area,
+                triangles: piece.triangles,
+                crosses: false,
+                hidden: true,
+                in_material: false,
+            });
         }
         if lies_in_material(piece, around[i].winding()) {
             hidden.expected.volume += volume;
@@ -354,8 +361,14 @@ mod tests {
     fn a_sheet_inside_a_body_goes_and_is_named() {
         let sheet = shifted(&plate(2, |_, _| true), [-1.0, -1.0, 0.5]);
         let got = removed(&[nested(4.0), sheet].concat());
-        let named =
-            SheetDropped { bounds: [[-1.0, -1.0, 0.5], [1.0, 1.0, 0.5]], area: 4.0, triangles: 8, crosses: false, hidden: true };
+        let named = SheetDropped {
+            bounds: [[-1.0, -1.0, 0.5], [1.0, 1.0, 0.5]],
+            area: 4.0,
+            triangles: 8,
+            crosses: false,
+            hidden: true,
+            in_material: false,
+        };
         assert_eq!((got.result.sheets, got.untouched), (vec![named], 12));
         assert!(got.verdict.good, "{:?}", got.verdict);
     }

@@ -9,6 +9,9 @@
 //! * On their own, and not surrounded by other surface, one side stays: a body that was exported with both sides.
 //! * Two triangles on their own enclose nothing: both go.
 //!
+//! Some may be turned. So an edge lacks a partner if an odd number of triangles stand at it, whichever way round, and two in one direction that hang
+//! together with pairs are one, too: the wall between a core and its pocket is of both kinds then.
+//!
 //! Where pairs go, so does what is left of such a pair whose other half is lost: a smaller piece of surface at their edges, if fewer edges lack a
 //! partner without it.
 
@@ -20,7 +23,7 @@ use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 use crate::util::union_find::{find, unite};
 
-/// Triangles on one set of vertices, in both directions.
+/// Triangles on one set of vertices, in both directions; or two in one direction that hang together with such: one of them is turned.
 pub(crate) struct Pair {
     pub(crate) forward: Vec<u32>,
     pub(crate) backward: Vec<u32>,
@@ -29,6 +32,27 @@ pub(crate) struct Pair {
 impl Pair {
     fn all(&self) -> impl Iterator<Item = u32> {
         self.forward.iter().chain(&self.backward).copied()
+    }
+
+    fn is_one_way(&self) -> bool {
+        self.backward.is_empty()
+    }
+
+    /// Copies in one direction of which none hangs together with a pair in both.
+    pub(crate) fn set_apart(submesh: &Submesh, edges: &Edges, pairs: &mut Vec<Self>) -> Vec<Self> {
+        let mut parents: Vec<u32> = (0..pairs.len() as u32).collect();
+        for around in uses(submesh, edges, pairs).chunk_by(|a, b| a.0 == b.0) {
+            around.iter().for_each(|(_, i, _)| {
+                unite(&mut parents, around[0].1, *i);
+            });
+        }
+        let mut is_both_ways = vec![false; pairs.len()];
+        for (i, _) in (0..).zip(pairs.iter()).filter(|(_, pair)| !pair.is_one_way()) {
+            is_both_ways[find(&mut parents, i) as usize] = true;
+        }
+        let mut number = 0..;
+        let is_apart = |_: &mut Self| number.next().is_some_and(|i| !is_both_ways[find(&mut parents, i) as usize]);
+        pairs.extract_if(.., is_apart).collect()
     }
 }
 
@@ -68,7 +92,7 @@ pub(crate) fn surplus(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, pai
             }
             continue;
         }
-        let is_common = set.gain <= 0 && (set.has_neighbours || is_surrounded[s]);
+        let is_common = set.gain <= 0 && set.has_neighbours || is_surrounded[s];
         let into = if is_common { &mut result.common } else { &mut result.sides };
         of_set.for_each(|(pair, _)| into.extend(pair.all()));
         result.halves.extend(pieces.halves(submesh, edges, set, &rest));
@@ -83,7 +107,7 @@ fn side_that_stays(pair: &Pair, votes: i64) -> Option<u32> {
     match votes {
         1.. => pair.forward.first().copied(),
         0 => pair.all().min(),
-        _ => pair.backward.first().copied(),
+        _ => pair.backward.first().or(pair.forward.first()).copied(),
     }
 }
 
@@ -123,15 +147,19 @@ impl Rest {
         uses.map(|u| (u.triangle, if u.forward { 1 } else { -1 }))
     }
 
+    /// One at an edge lacks a partner, whichever way round they are.
+    fn is_odd(&self, edge: &Edge<'_>) -> bool {
+        self.at(edge).count() % 2 == 1
+    }
+
     /// How many more of them use an edge forward than backward.
     fn balance(&self, edge: &Edge<'_>) -> i64 {
         self.at(edge).map(|(_, way)| way).sum()
     }
 }
 
-/// The pairs that hang together through edges, set by set.
-fn sets(submesh: &Submesh, edges: &Edges, pairs: &[Pair], rest: &Rest) -> Vec<Set> {
-    // By edge, the pairs that use it, and whether forward is along it.
+/// By edge, the pairs that use it, and whether forward is along it.
+fn uses(submesh: &Submesh, edges: &Edges, pairs: &[Pair]) -> Vec<(u32, u32, bool)> {
     let mut uses: Vec<(u32, u32, bool)> = Vec::with_capacity(3 * pairs.len());
     for (i, pair) in (0..).zip(pairs) {
         let v = submesh.triangles[pair.forward[0] as usize].v;
@@ -141,6 +169,12 @@ fn sets(submesh: &Submesh, edges: &Edges, pairs: &[Pair], rest: &Rest) -> Vec<Se
         }
     }
     uses.sort_unstable();
+    uses
+}
+
+/// The pairs that hang together through edges, set by set.
+fn sets(submesh: &Submesh, edges: &Edges, pairs: &[Pair], rest: &Rest) -> Vec<Set> {
+    let uses = uses(submesh, edges, pairs);
     let mut parents: Vec<u32> = (0..pairs.len() as u32).collect();
     for around in uses.chunk_by(|a, b| a.0 == b.0) {
         around.iter().for_each(|(_, i, _)| {
@@ -154,12 +188,12 @@ fn sets(submesh: &Submesh, edges: &Edges, pairs: &[Pair], rest: &Rest) -> Vec<Se
         let edge = edges.get(around[0].0 as usize);
         let balance = rest.balance(&edge);
         set.has_neighbours |= rest.at(&edge).next().is_some();
-        if balance != 0 {
+        // Whichever way round they are: one may be turned.
+        let (lacking, sides) = (rest.is_odd(&edge), around.len() % 2 == 1);
+        if lacking {
             set.needy.extend(rest.at(&edge).map(|(t, _)| t));
         }
-        let (lacking, sides) = (balance.abs(), around.len() as i64);
-        let with = if sides < lacking { lacking - sides } else { (lacking + sides) % 2 };
-        set.gain += lacking - with;
+        set.gain += i64::from(lacking) - i64::from(lacking != sides);
         around.iter().for_each(|(_, i, along)| votes[*i as usize] += if *along { -balance } else { balance });
     }
     (0..).zip(votes).for_each(|(i, votes)| sets[find(&mut parents, i) as usize].pairs.push((i, votes)));
@@ -264,6 +298,41 @@ mod tests {
     #[test]
     fn a_core_that_is_kept_keeps_its_skin() {
         assert_eq!(dropped(&block_and_core().concat(), Bodies::Keep).result, Dropped::default());
+    }
+
+    /// However many are turned, pairs and copies in one direction go together.
+    #[test]
+    fn a_core_with_many_turned_triangles_leaves_no_cavity() {
+        for turned in 1..12usize {
+            let mut mesh = block_and_core().concat();
+            // A step that meets all of them once.
+            (0..turned).for_each(|i| mesh[12 + i * 7 % 24].swap(0, 1));
+            let got = dropped(&mesh, Bodies::Union);
+            let (all, triangles) = (got.result, got.defects.triangles);
+            assert_eq!((all, triangles), (Dropped { all: 24, walls: 24 }, 12), "turned: {turned}");
+        }
+    }
+
+    /// A block with a pocket that is open above, and the inlay that fills it, each with the same wall.
+    #[test]
+    fn an_inlay_beside_turned_triangles_leaves_no_pocket() {
+        let is_top = |t: &&Corners| t.iter().all(|p| p[2] == 1.0);
+        let block = cuboid([0.0; 3], [1.0; 3]);
+        let frame: Vec<Corners> = cuboid([-1.0, -1.0, -1.0], [2.0, 2.0, 1.0]).iter().filter(|t| !is_top(t)).copied().collect();
+        let ring = [[-1.0, -1.0], [2.0, -1.0], [2.0, 2.0], [-1.0, 2.0], [0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let at = |i: usize| [ring[i][0], ring[i][1], 1.0f32];
+        let top = (0..4).flat_map(|k| {
+            let (a, b, c, d) = (at(k), at((k + 1) % 4), at(4 + (k + 1) % 4), at(4 + k));
+            [[a, b, c], [a, c, d]]
+        });
+        let pocket: Vec<Corners> = reversed(&block).iter().filter(|t| !is_top(t)).copied().collect();
+        let all = [frame, top.collect(), pocket, block.clone()].concat();
+        for turned in 0..all.len() {
+            let mut mesh = all.clone();
+            mesh[turned].swap(0, 1);
+            let got = dropped(&mesh, Bodies::Union);
+            assert_eq!((got.result, got.defects.triangles), (Dropped { all: 20, walls: 20 }, 20), "turned: {turned}");
+        }
     }
 
     /// Whichever of either is lost, its other half goes, too.

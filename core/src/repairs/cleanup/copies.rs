@@ -2,6 +2,9 @@
 //!
 //! Only a triangle that continues nothing goes: all three edges are its own, so nothing opens. What it lies on may be of the regular surface. Of two
 //! that both continue nothing the first stays; they must lie nearer to each other, since a soup may have layers.
+//!
+//! A copy of which only some corners are off hangs on what it lies on, or on other copies, and continues nothing at one of its edges at least. Such
+//! ones go where the surface is no farther from closed without them, those that hang together at once.
 
 use crate::contract::report::RepairName;
 use crate::contract::settings::Profile;
@@ -9,6 +12,7 @@ use crate::geometry::boxes::BoxTree;
 use crate::geometry::distance::distance;
 use crate::geometry::grid::Grid;
 use crate::geometry::sums::Bounds;
+use crate::repairs::cleanup::duplicates;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
 use crate::submesh::edges::Edges;
@@ -31,6 +35,9 @@ pub(crate) const REPAIR: Repair = Repair {
 /// Of the reach, where both continue nothing.
 const UNSURE: f64 = 0.3;
 
+/// A vertex of more triangles is not looked at for what lies on what.
+const MOST_AROUND: usize = 64;
+
 /// A triangle that continues nothing.
 struct Lone {
     triangle: u32,
@@ -52,9 +59,14 @@ pub(crate) fn drop_copies(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &
     if tolerance.weld <= 0.0 || !edges.iter().any(|e| e.is_boundary()) {
         return 0;
     }
-    let lone = lone(submesh, edges, &Tolerance { weld: widest, edge_share: tolerance.edge_share });
+    let widest = Tolerance { weld: widest, edge_share: tolerance.edge_share };
+    let hanging = duplicates::spare(submesh, edges, &hanging(submesh, edges, &widest));
+    hanging.iter().for_each(|t| work.kill(*t));
+    // What hung on these may hang on nothing now.
+    let (submesh, edges) = work.edges();
+    let lone = lone(submesh, edges, &widest);
     if lone.is_empty() {
-        return 0;
+        return hanging.len() as u64;
     }
     let mut is_copy = on_regular(survey, &lone);
     let tree = BoxTree::new(&lone.iter().map(|l| around(&l.corners[..1], 0.0)).collect::<Vec<_>>());
@@ -62,7 +74,7 @@ pub(crate) fn drop_copies(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &
     on_each_other(&lone, &tree, &mut is_copy);
     let doomed: Vec<u32> = lone.iter().zip(&is_copy).filter(|(_, is_copy)| **is_copy).map(|(l, _)| l.triangle).collect();
     doomed.iter().for_each(|t| work.kill(*t));
-    doomed.len() as u64
+    (hanging.len() + doomed.len()) as u64
 }
 
 /// Triangles that continue nothing, by number.
@@ -74,11 +86,31 @@ fn lone(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> Vec<Lone> {
     };
     let of = |t: u32| {
         let corners = submesh.points(t);
-        let [a, b, c] = corners;
-        let shortest = distance(a, b).min(distance(b, c)).min(distance(c, a));
-        Lone { triangle: t, corners, reach: tolerance.weld.min(tolerance.edge_share * shortest) }
+        Lone { triangle: t, corners, reach: reach(&corners, tolerance) }
     };
     submesh.living().filter(is_lone).map(of).collect()
+}
+
+fn reach(&[a, b, c]: &Corners, tolerance: &Tolerance) -> f64 {
+    let shortest = distance(a, b).min(distance(b, c)).min(distance(c, a));
+    tolerance.weld.min(tolerance.edge_share * shortest)
+}
+
+/// Triangles that lie on another one with which they have a corner in common, and continue nothing at one of their edges, by number. Of two such
+/// ones the later.
+fn hanging(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> Vec<u32> {
+    let hangs = |t: u32| {
+        let [a, b, c] = submesh.triangles[t as usize].v;
+        [[a, b], [b, c], [c, a]].iter().any(|[a, b]| edges.between(*a, *b).is_some_and(|edge| edge.is_boundary()))
+    };
+    let lies_on_another = |t: &u32| {
+        let corners = submesh.points(*t);
+        let own = Lone { triangle: *t, corners, reach: reach(&corners, tolerance) };
+        let is_under = |o: u32| o != *t && own.lies_on(&submesh.points(o), 1.0) && (o < *t || !hangs(o));
+        let stars = submesh.triangles[*t as usize].v.into_iter().filter(|v| submesh.star(*v).nth(MOST_AROUND).is_none());
+        stars.into_iter().any(|v| submesh.star(v).any(|(o, _)| is_under(o)))
+    };
+    submesh.living().filter(|t| hangs(*t) && lies_on_another(t)).collect()
 }
 
 /// Which lie on a triangle of the regular surface.
@@ -162,6 +194,20 @@ mod tests {
             cube().iter().zip(0u8..).flat_map(|(t, i)| shifted(&[*t], [f32::from(i) * 1e-4, 0.0, 0.0])).collect();
         let copies = shifted(&soup, [0.0, 1e-4, 0.0]);
         assert_eq!(dropped(&[soup, copies].concat()), (12, 12));
+    }
+
+    /// Copies of both halves of a side of a cube, each with a corner of its own, have the edge between them in common: neither could go alone.
+    #[test]
+    fn copies_that_hang_together_go_together() {
+        let mut copies = cube()[2..4].to_vec();
+        let common: Vec<[f32; 3]> = copies[0].iter().filter(|p| copies[1].contains(p)).copied().collect();
+        assert_eq!(common.len(), 2);
+        copies.iter_mut().flatten().filter(|p| !common.contains(p)).for_each(|p| p[0] += 1e-3);
+        assert_eq!(dropped(&[cube(), copies.clone()].concat()), (2, 12));
+        assert_eq!(dropped(&[cube(), copies[..1].to_vec()].concat()), (1, 12));
+        // A fin stays.
+        copies.iter_mut().flatten().filter(|p| !common.contains(p)).for_each(|p| p[0] += 0.3);
+        assert_eq!(dropped(&[cube(), copies].concat()), (0, 14));
     }
 
     #[test]

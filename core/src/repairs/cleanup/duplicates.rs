@@ -61,7 +61,7 @@ pub(crate) fn drop_duplicates(survey: &Survey<'_>, work: &mut Work<'_>, bodies: 
         let first = work.triangles[group[0].1 as usize].v;
         let (forward, backward): (Vec<u32>, Vec<u32>) =
             group.iter().map(|g| g.1).partition(|t| same_direction(first, work.triangles[*t as usize].v));
-        if backward.is_empty() {
+        if backward.is_empty() && forward.len() > 2 {
             copies.extend(&forward[1..]);
         } else {
             pairs.push(Pair { forward, backward });
@@ -71,16 +71,19 @@ pub(crate) fn drop_duplicates(survey: &Survey<'_>, work: &mut Work<'_>, bodies: 
         return Dropped::default();
     }
     let (submesh, edges) = work.edges();
+    let apart = Pair::set_apart(submesh, edges, &mut pairs);
+    copies.extend(apart.iter().map(|pair| pair.forward[1]));
+    copies.sort_unstable();
     let mut doomed = spare(submesh, edges, &copies);
     let surplus = back_to_back::surplus(survey, submesh, edges, &pairs, &doomed);
     doomed.extend(&surplus.sides);
     work.is_changed_by(RepairName::Duplicate);
     doomed.iter().for_each(|t| work.kill(*t));
-    let walls = if bodies == Bodies::Keep { &[][..] } else { &surplus.common };
+    // Bodies that are kept keep their walls, whole or not.
+    let (walls, halves) = if bodies == Bodies::Keep { (&[][..], &[][..]) } else { (&surplus.common[..], &surplus.halves[..]) };
     work.is_changed_by(RepairName::CommonWall);
-    walls.iter().chain(&surplus.halves).for_each(|t| work.kill(*t));
-    let halves = surplus.halves.len() as u64;
-    Dropped { all: (doomed.len() + walls.len()) as u64 + halves, walls: walls.len() as u64 }
+    walls.iter().chain(halves).for_each(|t| work.kill(*t));
+    Dropped { all: (doomed.len() + walls.len() + halves.len()) as u64, walls: walls.len() as u64 }
 }
 
 /// As [`by_vertex_set`], of all triangles on the vertices of a changed one. O(stars of the changed ones); of a triangle's three stars
@@ -107,7 +110,7 @@ fn copies_of(submesh: &Submesh, changed: &[u32]) -> Vec<([Vertex; 3], u32)> {
 
 /// Those of the copies without which the surface is no farther from closed. Where two bodies have part of their surface in common, each needs
 /// its own.
-fn spare(submesh: &Submesh, edges: &Edges, copies: &[u32]) -> Vec<u32> {
+pub(crate) fn spare(submesh: &Submesh, edges: &Edges, copies: &[u32]) -> Vec<u32> {
     let mut uses: Vec<(u32, u32, i64)> = Vec::with_capacity(3 * copies.len());
     for (i, t) in (0..).zip(copies) {
         let v = submesh.triangles[*t as usize].v;

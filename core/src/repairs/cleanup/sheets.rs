@@ -6,14 +6,19 @@
 //! model.) One that crosses nothing may be a wall that only was not joined: if it is more than next to nothing, it goes only where whatever is no
 //! solid is replaced by one ([`Guarantee::Wrap`]), and a person is asked to look.
 //!
+//! What lies in the material of the result as a whole is missed by nobody: [`in_material`] tells in the end, and no person is asked.
+//!
 //! A file that holds no body, or in which the sheets have more area than the bodies, keeps them: they are what it is about.
 
 use crate::contract::report::RepairName;
 use crate::contract::report::{LoopLeft, MOST_LISTED, SheetDropped};
 use crate::contract::settings::{Guarantee, Profile, Sheets};
+use crate::detect::bodies;
 use crate::repairs::shared::context::SheetRim;
-use crate::repairs::shared::context::{Changes, Done, Repair};
+use crate::repairs::shared::context::{Changes, Context, Done, Repair};
+use crate::repairs::shared::lone_sheets;
 use crate::repairs::shared::work::Work;
+use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
@@ -26,14 +31,68 @@ pub(crate) const REPAIR: Repair = Repair {
         let rims = std::mem::take(&mut cx.handed.sheets);
         let dropped = drop(cx.survey, &mut cx.work, &mut cx.reversed, &rims, &mut cx.account.loops_left, cx.profile);
         let count = dropped.len() as u64;
+        let (dropped, points): (Vec<SheetDropped>, Vec<Vec<[f64; 3]>>) = dropped.into_iter().unzip();
         cx.account.open_sheets = rims.iter().filter(|rim| cx.work.lives(rim.triangle)).count() as u64;
+        cx.handed.on_sheets = (cx.account.sheets.len(), points);
         cx.account.sheets.extend(dropped);
         Ok(Done::count(count, "open sheets dropped that can be no part of a solid, listed in `sheets_dropped`"))
     },
 };
 
+/// Notes which of the dropped sheets lay in the material that there is in the end: every point that was kept of them. Reads the chunks above these.
+pub(crate) fn tell_in_material(cx: &mut Context<'_, '_>) {
+    let (first, points) = std::mem::take(&mut cx.handed.on_sheets);
+    if points.is_empty() {
+        return;
+    }
+    let (pieces, all) = (cx.pieces(), points.concat());
+    let mut windings = bodies::windings(cx.survey, &cx.work, &pieces, &cx.reversed, &all);
+    windings.iter_mut().zip(bodies::windings_of(&cx.handed.wrapped, &all)).for_each(|(all, more)| *all += more);
+    let mut windings = windings.into_iter();
+    for (sheet, points) in cx.account.sheets[first..].iter_mut().zip(&points) {
+        let outside = windings.by_ref().take(points.len()).filter(|winding| *winding < 1).count();
+        sheet.in_material = outside == 0 && !points.is_empty();
+    }
+}
+
+/// Points of a sheet, at most so many triangles of it: in the middle, and near the corners.
+fn points_on(triangles: &[[[f32; 3]; 3]], most: usize) -> Vec<[f64; 3]> {
+    let of = |[a, b, c]: &[[f32; 3]; 3]| {
+        let near = |p: [f32; 3], middle: [f64; 3]| [0, 1, 2].map(|k| NEAR * middle[k] + (1.0 - NEAR) * f64::from(p[k]));
+        let middle = bodies::inner_point(&[*a, *b, *c]);
+        [middle, near(*a, middle), near(*b, middle), near(*c, middle)]
+    };
+    triangles.iter().step_by(triangles.len().div_ceil(most).max(1)).flat_map(of).collect()
+}
+
+/// How far from a corner a point near it is, against the middle.
+const NEAR: f64 = 0.01;
+
+/// Triangles of all sheets together, and of one, at most and at least, that are asked whether there is material around.
+const ASKED: usize = 1 << 15;
+const ASKED_OF_ONE: [usize; 2] = [4, 1 << 9];
+
+/// The largest of these sheets, each with its area and component, with points on them.
+fn with_points(
+    survey: &Survey<'_>,
+    submesh: &Submesh,
+    components: &Components,
+    reversed: &Reversed,
+    mut gone: Vec<(i128, usize, SheetDropped)>,
+) -> Vec<(SheetDropped, Vec<[f64; 3]>)> {
+    // Stable: of equal ones the first in the file.
+    gone.sort_by_key(|(area, ..)| std::cmp::Reverse(*area));
+    gone.truncate(MOST_LISTED);
+    let mut listed: Vec<usize> = gone.iter().map(|(_, c, _)| *c).collect();
+    listed.sort_unstable();
+    let most = (ASKED / listed.len().max(1)).clamp(ASKED_OF_ONE[0], ASKED_OF_ONE[1]);
+    let gathered = lone_sheets::gather(survey, submesh, components, reversed, &listed);
+    let points_of = |c: usize| listed.binary_search(&c).map_or(Vec::new(), |place| points_on(&gathered[place].0, most));
+    gone.into_iter().map(|(_, c, sheet)| (sheet, points_of(c))).collect()
+}
+
 /// Drops lone sheets, whose `rims` were left open, and takes their loops off the list of those that are `left`; returns what went, the largest
-/// first. O(regions + submesh), and a look at the chunks where such a sheet crosses something.
+/// first, with points on it. O(regions + submesh), and a look at the chunks where such a sheet crosses something.
 pub(crate) fn drop(
     survey: &Survey<'_>,
     work: &mut Work<'_>,
@@ -41,7 +100,7 @@ pub(crate) fn drop(
     rims: &[SheetRim],
     left: &mut Vec<LoopLeft>,
     profile: &Profile,
-) -> Vec<SheetDropped> {
+) -> Vec<(SheetDropped, Vec<[f64; 3]>)> {
     if rims.is_empty() || profile.sheets != Sheets::Drop {
         return Vec::new();
     }
@@ -72,17 +131,18 @@ pub(crate) fn drop(
     let are_specks = area(&|c| is_sheet(c) && !crossing[c]) as f64 <= next_to_nothing;
     let all_go = are_specks || profile.guarantee == Guarantee::Wrap;
     let goes = |c: u32| c != NONE && is_sheet(c as usize) && (crossing[c as usize] || all_go);
-    let mut gone: Vec<(i128, SheetDropped)> = (0..components.list.len() as u32)
+    let gone: Vec<(i128, usize, SheetDropped)> = (0..components.list.len() as u32)
         .filter(|c| goes(*c))
         .map(|c| {
             let (sheet, crosses) = (&components.list[c as usize], crossing[c as usize]);
             let bounds = sheet.bounds.normalised();
             let (bounds, area) = ([bounds.lo, bounds.hi], survey.measure.area(sheet.extent));
-            (sheet.extent.area, SheetDropped { bounds, area, triangles: sheet.triangles, crosses, hidden: false })
+            let triangles = sheet.triangles;
+            let dropped = SheetDropped { bounds, area, triangles, crosses, hidden: false, in_material: false };
+            (sheet.extent.area, c as usize, dropped)
         })
         .collect();
-    // Stable: of equal ones the first in the file.
-    gone.sort_by_key(|(area, _)| std::cmp::Reverse(*area));
+    let gone = with_points(survey, submesh, &components, reversed, gone);
     let closed: Vec<usize> =
         rims.iter().filter(|rim| goes(components.of_triangle[rim.triangle as usize])).filter_map(|rim| rim.listed).collect();
     let mut number = 0..;
@@ -90,7 +150,7 @@ pub(crate) fn drop(
     reversed.dropped.iter_mut().zip(&components.of_region).for_each(|(dropped, c)| *dropped |= goes(*c));
     let doomed: Vec<u32> = submesh.living().filter(|t| goes(components.of_triangle[*t as usize])).collect();
     doomed.into_iter().for_each(|t| work.kill(t));
-    gone.into_iter().take(MOST_LISTED).map(|(_, sheet)| sheet).collect()
+    gone
 }
 
 #[cfg(test)]
@@ -104,7 +164,7 @@ mod tests {
             let work = &mut Work::new(&mut d.submesh);
             let mut closed = fill::fill_loops(&d.survey, work, turned, &d.tolerance, (profile, None), 1);
             let gone = drop(&d.survey, work, turned, &closed.sheets, &mut closed.left, profile);
-            (gone, closed.left.len())
+            (gone.into_iter().map(|(sheet, _)| sheet).collect(), closed.left.len())
         })
     }
 
@@ -121,8 +181,14 @@ mod tests {
     fn a_sheet_that_enters_a_body_goes_and_is_named() {
         let mesh = [body(), entering()].concat();
         let got = dropped(&mesh, &Profile::default());
-        let sheet =
-            SheetDropped { bounds: [[-2.0, 2.0, 0.0], [2.0, 6.0, 0.0]], area: 16.0, triangles: 32, crosses: true, hidden: false };
+        let sheet = SheetDropped {
+            bounds: [[-2.0, 2.0, 0.0], [2.0, 6.0, 0.0]],
+            area: 16.0,
+            triangles: 32,
+            crosses: true,
+            hidden: false,
+            in_material: false,
+        };
         let (gone, left) = got.result;
         assert_eq!((gone, left, got.untouched), (vec![sheet], 0, 12));
         assert!(got.verdict.good, "{:?}", got.verdict);

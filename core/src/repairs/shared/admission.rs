@@ -1,7 +1,7 @@
 //! Which loops may be closed: what the profile admits, and what is no rim of a lone sheet ([`crate::repairs::shared::lone_sheets`]).
 
 use crate::contract::report::LoopClass;
-use crate::contract::settings::Profile;
+use crate::contract::settings::{Bodies, Guarantee, Profile, Sheets};
 use crate::detect::holes::{self, Shapes, loops::Loop};
 pub(crate) use crate::repairs::shared::lone_sheets::THIN;
 use crate::repairs::shared::lone_sheets::{self, Which};
@@ -62,7 +62,10 @@ impl<'p> Admission<'p> {
             refused.extend(left.map(|(rim, class)| (rim.vertices[0], NotAdmitted::Class(class.name()))));
         }
         if !profile.closes_sheets() && profile.fill_holes {
-            let sheets = lone_sheets::recognise(survey, submesh, edges, loops, shapes, reversed, Which::Sheets);
+            // What nobody would miss, closed or not, is not closed where it is dropped.
+            let goes = profile.sheets == Sheets::Drop && profile.guarantee == Guarantee::Wrap && profile.bodies != Bodies::Keep;
+            let which = if goes { Which::Unneeded } else { Which::Sheets };
+            let sheets = lone_sheets::recognise(survey, submesh, edges, loops, shapes, reversed, which);
             refused.extend(sheets.rims.into_iter().map(|v| (v, NotAdmitted::Sheet)));
             one_sided = sheets.one_sided;
         }

@@ -81,6 +81,8 @@ pub(crate) struct Handed {
     pub(crate) has_skirts: bool,
     /// Rims of lone sheets, which no patch closes. Of the filling, for the dropping of sheets.
     pub(crate) sheets: Vec<SheetRim>,
+    /// Points on dropped sheets, sheet by sheet, and where these begin in the account. Of the dropping, for whether they lie in material.
+    pub(crate) on_sheets: (usize, Vec<Vec<[f64; 3]>>),
     /// A vertex of each loop that was left open on purpose. Of the filling, for the wrap.
     pub(crate) kept_open: Vec<[f32; 3]>,
     /// Those of them that are of rims of lone sheets. Of the filling, for the wrap.

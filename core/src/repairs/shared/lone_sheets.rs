@@ -5,6 +5,7 @@
 //! of its surface has material behind it.)
 //!
 //! * **Thin:** the patch would lie back along the surface, and enclose next to nothing for the surface's size.
+//! * **In material:** likewise, but what the patch encloses would be a body in the material of a closed one. Only where sheets are dropped.
 //! * **Torn:** a cone over each rim closes the surface, but a good part of it then has material on its front, where the air should be: the surface
 //!   passes through its own patch, which would cut it into splinters.
 //! * **One-sided:** no orientation satisfies its edges, and, cut open where they disagree, it is torn, or what would close it is larger than it is.
@@ -13,6 +14,7 @@
 use glam::DVec3;
 
 use crate::algorithms::wrap::tree::{Corners, Tree};
+use crate::detect::bodies;
 use crate::detect::holes::{Shapes, loops::Loop};
 use crate::geometry::distance::place;
 use crate::geometry::position::{self, Position};
@@ -47,6 +49,8 @@ const SAMPLES: usize = 1 << 11;
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Which {
     Sheets,
+    /// What would be a body in the material of others as well: it is missed by nobody.
+    Unneeded,
     /// Reliefs as well: what rises from its rim, so that a flat patch would enclose something.
     Reliefs,
 }
@@ -101,6 +105,7 @@ pub(crate) fn recognise(
     let components = Components::of(survey, submesh, edges, reversed, Through::EveryEdge);
     let all = Mouths::of(survey, submesh, edges, &components, (loops, shapes), &one_sided);
     let torn = all.torn(survey, submesh, &components, reversed);
+    let unneeded = if which == Which::Unneeded { all.in_material(survey, submesh, &components, reversed) } else { Vec::new() };
     let mut rims: Vec<u32> = Vec::new();
     for (i, rim) in loops.iter().enumerate() {
         let component = components.of_triangle[rim.triangles[0] as usize];
@@ -108,7 +113,8 @@ pub(crate) fn recognise(
         let lies_back = all.continues[i] < LIES_BACK && all.cone_of[i] >= WIDE * mouth.area;
         let is_of_sheet = all.cone_of[i] >= OF_A_SHEET * mouth.area;
         let is_torn = torn[component as usize];
-        let bounds_nothing = which == Which::Reliefs || mouth.is_thin();
+        let is_unneeded = unneeded.binary_search(&component).is_ok();
+        let bounds_nothing = which == Which::Reliefs || mouth.is_thin() || is_unneeded;
         if lies_back && bounds_nothing || is_torn && (is_of_sheet || mouth.is_one_sided) {
             rims.push(rim.vertices[0]);
         }
@@ -210,6 +216,26 @@ impl Mouths {
             mouth.volume += volume;
             self.cones.extend(cone.into_iter().map(|corners| (component, corners)));
         }
+    }
+
+    /// The components with a wide mouth that would be bodies in the material of closed ones, ascending: all that winds around their triangles in the
+    /// submesh does so as they would themselves.
+    fn in_material(&self, survey: &Survey<'_>, submesh: &Submesh, components: &Components, reversed: &Reversed) -> Vec<u32> {
+        let is_asked = |c: &u32| {
+            let Some(mouth) = self.mouths.get(*c as usize) else { return false };
+            mouth.is_wide() && !mouth.is_unclear && !mouth.is_one_sided && !mouth.is_thin() && components.list[*c as usize].open
+        };
+        let mut asked: Vec<(u32, u32)> =
+            submesh.living().map(|t| (components.of_triangle[t as usize], t)).filter(|(c, _)| is_asked(c)).collect();
+        asked.sort_unstable();
+        let points: Vec<[f64; 3]> = asked.iter().map(|(_, t)| bodies::inner_point(&submesh.points(*t))).collect();
+        let windings = bodies::windings(survey, submesh, components, reversed, &points);
+        let all: Vec<(u32, i32)> = asked.iter().map(|(c, _)| *c).zip(windings).collect();
+        let is_in = |of: &[(u32, i32)]| {
+            let sign = self.mouths[of[0].0 as usize].volume.signum();
+            of.iter().all(|(_, winding)| f64::from(*winding) * sign >= 1.0)
+        };
+        all.chunk_by(|a, b| a.0 == b.0).filter(|of| is_in(of)).map(|of| of[0].0).collect()
     }
 
     /// Which components pass through what would close them, or are one-sided and have hardly more than a rim.

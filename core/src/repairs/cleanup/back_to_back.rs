@@ -38,7 +38,7 @@ impl Pair {
         self.backward.is_empty()
     }
 
-    /// Copies in one direction of which none hangs together with a pair in both.
+    /// Copies in one direction where pairs in both are fewer among what hangs together.
     pub(crate) fn set_apart(submesh: &Submesh, edges: &Edges, pairs: &mut Vec<Self>) -> Vec<Self> {
         let mut parents: Vec<u32> = (0..pairs.len() as u32).collect();
         for around in uses(submesh, edges, pairs).chunk_by(|a, b| a.0 == b.0) {
@@ -46,12 +46,16 @@ impl Pair {
                 unite(&mut parents, around[0].1, *i);
             });
         }
-        let mut is_both_ways = vec![false; pairs.len()];
-        for (i, _) in (0..).zip(pairs.iter()).filter(|(_, pair)| !pair.is_one_way()) {
-            is_both_ways[find(&mut parents, i) as usize] = true;
+        // The more decide: a surface that is there twice, of which some triangles are turned, is no wall.
+        let mut both_ways = vec![0i64; pairs.len()];
+        for (i, pair) in (0..).zip(pairs.iter()) {
+            both_ways[find(&mut parents, i) as usize] += if pair.is_one_way() { -1 } else { 1 };
         }
         let mut number = 0..;
-        let is_apart = |_: &mut Self| number.next().is_some_and(|i| !is_both_ways[find(&mut parents, i) as usize]);
+        let is_apart = |pair: &mut Self| {
+            let of_set = number.next().map_or(0, |i| both_ways[find(&mut parents, i) as usize]);
+            pair.is_one_way() && of_set < 0
+        };
         pairs.extract_if(.., is_apart).collect()
     }
 }

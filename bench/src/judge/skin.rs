@@ -57,8 +57,8 @@ const RAYS: usize = 96;
 const ESCAPE: usize = 2;
 /// Far, as a share of the diagonal.
 const FAR: f64 = 0.005;
-/// A patch of less than this share of the result's surface is small.
-const SMALL: f64 = 0.005;
+/// A patch of less than this share of the result's surface is small: on one side of a cube, a square of a third of its width.
+const SMALL: f64 = 0.02;
 /// Places within this share of the diagonal are one.
 const ONE_PLACE: f64 = 0.1;
 /// Places that are named.

@@ -195,7 +195,7 @@ impl Default for Profile {
             max_area_change: 1.0,
             max_box_change_relative: 0.02,
             skin_reach_relative: 0.005,
-            max_skin_lost: 0.001,
+            max_skin_lost: 0.0005,
             max_skin_invented: 0.01,
             max_bodies_lost: 0,
             debris_triangles: 4,

@@ -24,7 +24,7 @@ pub struct Skin {
 pub struct SkinChange {
     /// The area.
     pub area: f64,
-    /// The same as a fraction of the area of all that was there.
+    /// The same as a fraction of all that could be seen of what was there; below a ten-thousandth, of all that was there.
     pub share: f64,
     /// The largest distance that was measured.
     pub farthest: f64,

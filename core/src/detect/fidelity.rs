@@ -45,12 +45,12 @@ pub const FIDELITY_RULES: [FidelityRule; 14] = [
     FidelityRule {
         id: "skin_lost",
         version: 1,
-        measures: "Area that could be seen and is farther than the reach from the result, as a share of all area.",
+        measures: "Area that could be seen and is farther than the reach from the result, as a share of all that could be seen.",
     },
     FidelityRule {
         id: "skin_invented",
         version: 1,
-        measures: "Area that can be seen and is farther than the reach from all that was there, less plausible patches, as a share.",
+        measures: "Area that can be seen and is farther than the reach from all that was there, less plausible patches, as a share of all that could be seen.",
     },
     FidelityRule {
         id: "sheets",

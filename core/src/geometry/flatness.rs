@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 /// A rim that nobody cut with a plane, as the bottom of a scan, rises and falls by this share of its size: the root of the area across it.
-pub(crate) const RAGGED: f64 = 0.1;
+pub(crate) const RAGGED: f64 = 0.05;
 
 /// How far places reach along a direction of any length; infinite if it has none. O(places).
 pub(crate) fn height(places: impl Iterator<Item = DVec3>, along: DVec3) -> f64 {

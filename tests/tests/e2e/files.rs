@@ -94,10 +94,10 @@ fn the_original_shows_whether_a_result_is_faithful() {
     place.suture(["inspect", "out.stl", "--original", "holes.stl"]).expect(2);
     // A figure that somebody has made smaller.
     let told = place.read("report.json");
-    let told = String::from_utf8(told).unwrap().replacen("\"limit\":0.001", "\"limit\":0.002", 1);
-    let told = told.replacen("\"limit\": 0.001", "\"limit\": 0.002", 1);
+    let told = String::from_utf8(told).unwrap().replacen("\"limit\":0.0005", "\"limit\":0.0007", 1);
+    let told = told.replacen("\"limit\": 0.0005", "\"limit\": 0.0007", 1);
     place.put("report.json", told.as_bytes());
-    assert!(check("holes.stl").expect(1).stdout().contains("passed with 0 of 0.001, not passed with 0 of 0.002"));
+    assert!(check("holes.stl").expect(1).stdout().contains("passed with 0 of 0.0005, not passed with 0 of 0.0007"));
     assert_eq!(place.names(""), ["flipped.stl", "holes.stl", "out.stl", "report.json"], "nothing temporary is left");
 }
 

@@ -33,6 +33,10 @@ use surfaces::{Surfaces, Which};
 const MEASURED: usize = 64;
 /// The points that are asked whether they can be seen.
 const ASKED: usize = 4096;
+/// From this share of all surface on it is asked how much of that can be seen.
+const WORTHWHILE: f64 = 1e-4;
+/// By about so many points.
+const PROBED: f64 = 1024.0;
 /// The places that are listed.
 const PLACES: usize = 8;
 /// Places are cells of this share of the diagonal.
@@ -65,10 +69,24 @@ pub(crate) fn measure(
     let surfaces = Surfaces { survey, submesh, reversed, dropped_by, wrapped: known.wrapped, holes, of_cavities };
     let whole = survey.measure.area_of(surfaces.area_before());
     let gone = Samples::gone(&surfaces, reach);
-    let lost = change(&surfaces, [Which::Closed, Which::After], (&gone, known.cavities), reach, whole);
+    let mut lost = change(&surfaces, [Which::Closed, Which::After], (&gone, known.cavities), reach, whole);
     let added = Samples::added(&surfaces, &plausible, reach);
-    let invented = change(&surfaces, [Which::After, Which::Before], (&added, &[]), reach, whole);
+    let mut invented = change(&surfaces, [Which::After, Which::Before], (&added, &[]), reach, whole);
+    if lost.share.max(invented.share) >= WORTHWHILE {
+        let visible = share_that_is_seen(&surfaces, whole, reach);
+        for change in [&mut lost, &mut invented] {
+            change.share = (change.share / visible).min(1.0);
+        }
+    }
     Skin { reach, lost, invented }
+}
+
+/// The share of all that was there that could be seen; some of it always.
+fn share_that_is_seen(surfaces: &Surfaces<'_>, whole: f64, reach: f64) -> f64 {
+    let all = Samples::all(surfaces, whole / PROBED);
+    let points: Vec<OnSurface> = all.points.iter().map(|at| OnSurface { at: *at, front: None }).collect();
+    let seen = seen::from_outside(surfaces, Which::Closed, &points, reach).into_iter().filter(|seen| *seen).count();
+    (seen.max(1) as f64 / points.len().max(1) as f64).min(1.0)
 }
 
 /// What of the samples, which lie on `of`, can be seen there, is in no cavity, and is far from `other`.

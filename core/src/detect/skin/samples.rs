@@ -58,6 +58,18 @@ impl Samples {
         Self::of(taken, each)
     }
 
+    /// On all that was there, one for each such area.
+    pub(super) fn all(surfaces: &Surfaces<'_>, each: f64) -> Self {
+        let mut taken = Vec::new();
+        surfaces.each_irregular(|number, corners| take(&mut taken, number, (corners, Side::Both), None, each));
+        let of_chunks = surfaces.each_regular(|into: &mut Vec<Taken>, number, corners| {
+            take(into, number, (corners, Side::Both), None, each);
+        });
+        taken.extend(of_chunks.into_iter().flatten());
+        taken.sort_unstable_by_key(|(number, ..)| *number);
+        Self::of(taken, each)
+    }
+
     /// On what was not there before. `but`: triangles of the submesh that none are taken on, ascending.
     pub(super) fn added(surfaces: &Surfaces<'_>, but: &[u32], reach: f64) -> Self {
         let measure = &surfaces.survey.measure;

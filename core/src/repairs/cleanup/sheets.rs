@@ -6,7 +6,7 @@
 //! model.) One that crosses nothing may be a wall that only was not joined: if it is more than next to nothing, it goes only where whatever is no
 //! solid is replaced by one ([`Guarantee::Wrap`]), and a person is asked to look.
 //!
-//! What lies in the material of the result as a whole is missed by nobody: [`in_material`] tells in the end, and no person is asked.
+//! What lies in the material of the result as a whole is missed by nobody: the report says so, and no person is asked.
 //!
 //! A file that holds no body, or in which the sheets have more area than the bodies, keeps them: they are what it is about.
 

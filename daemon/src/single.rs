@@ -32,34 +32,32 @@ pub(crate) fn inspect(args: &InspectArgs) -> Exit {
         [_] => claim_in(report),
         _ => Err("a certificate is of one file: name only that".into()),
     });
-    let order = claim.transpose().and_then(|claim| {
-        let mut profile = profiles::of_command(&args.profile, args.no_self_intersections)?;
-        if let Some(claim) = &claim {
-            profile.check_self_intersections = claim.certificate.covers_self_intersection();
+    let claim = match claim.transpose() {
+        Ok(claim) => claim,
+        Err(line) => return carry_out(Err(line)),
+    };
+    let order = profiles::of_command(&args.profile, args.no_self_intersections).map(|mut profile| {
+        let certificate = claim.as_ref().map(|claim| claim.certificate.clone());
+        if let Some(certificate) = &certificate {
+            profile.check_self_intersections = certificate.covers_self_intersection();
         }
-        let (limits, certificate) = (args.spend.limits(false), claim.map(|claim| claim.certificate));
-        Ok(Order { inputs: &args.inputs, profile, limits, naming: None, certificate, json: args.json })
+        Order { inputs: &args.inputs, profile, limits: args.spend.limits(false), naming: None, certificate, json: args.json }
     });
     let exit = carry_out(order);
-    match (&args.certificate, &args.original) {
-        (Some(report), Some(original)) if exit == Exit::Good => again(args, report, original),
+    match (claim, &args.original) {
+        (Some(claim), Some(original)) if exit == Exit::Good => again(args, claim, original),
         _ => exit,
     }
 }
 
 /// Repairs the original anew, as the report says that it was done, and holds the certificate against what comes of it.
-fn again(args: &InspectArgs, report: &Path, original: &Path) -> Exit {
-    let inputs = [original.to_owned()];
-    let prepared = claim_in(report).and_then(|claim| {
-        let folder = tempfile::tempdir().map_err(|e| format!("no folder for the repair: {e}"))?;
-        Ok((claim, folder))
-    });
-    let (claim, folder) = match prepared {
-        Ok(prepared) => prepared,
-        Err(line) => return carry_out(Err(line)),
+fn again(args: &InspectArgs, claim: Claim, original: &Path) -> Exit {
+    let folder = match tempfile::tempdir() {
+        Ok(folder) => folder,
+        Err(error) => return carry_out(Err(format!("no folder for the repair: {error}"))),
     };
     carry_out(Ok(Order {
-        inputs: &inputs,
+        inputs: &[original.to_owned()],
         profile: claim.profile,
         limits: args.spend.limits(false),
         naming: Some(Naming::of_file(folder.path().join("again.stl"))),

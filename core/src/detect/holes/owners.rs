@@ -96,14 +96,18 @@ impl Owners {
     /// Is an opening of this area no detail of the piece that the loop belongs to? Of a cube its side is as large as the cube's size, of a shaft of
     /// thirty times its radius its end has an eighth of that.
     pub(crate) fn is_large(&self, i: usize, area: f64) -> bool {
-        let volume = self.volumes.get(self.of_loop[i] as usize).copied().unwrap_or(0.0);
-        // area³ of volume², so as to take no cube root.
-        area.powi(3) >= LARGE.powi(3) * volume * volume
+        is_large(area, self.volumes.get(self.of_loop[i] as usize).copied().unwrap_or(0.0))
     }
 
     fn way(&self, i: usize) -> i8 {
         self.stands.get(self.of_loop[i] as usize).copied().unwrap_or(0)
     }
+}
+
+/// Is an opening of this area no detail of a piece of this volume? As [`Owners::is_large`].
+pub(crate) fn is_large(area: f64, volume: f64) -> bool {
+    // area³ of volume², so as to take no cube root.
+    area.powi(3) >= LARGE.powi(3) * volume * volume
 }
 
 /// Which pieces of these areas are details.

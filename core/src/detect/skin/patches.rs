@@ -73,5 +73,5 @@ fn is_flat(submesh: &Submesh, patch: &[u32], reach: f64) -> bool {
     let corners = |t: &u32| submesh.triangles[*t as usize].v.map(|v| submesh.place(v));
     let normal: DVec3 = patch.iter().map(corners).map(|[a, b, c]| (b - a).cross(c - a)).sum();
     let height = flatness::height(patch.iter().flat_map(corners), normal);
-    height <= (2.0 * reach).max(flatness::RAGGED * (normal.length() / 2.0).sqrt())
+    height <= 2.0 * reach || !flatness::is_ragged(height, normal.length() / 2.0)
 }

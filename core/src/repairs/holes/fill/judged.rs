@@ -7,8 +7,10 @@ use glam::DVec3;
 
 use super::closing::{Closing, Judged};
 use super::mouth;
+use crate::algorithms::triangulate;
 use crate::contract::settings::Profile;
 use crate::detect::holes::loops::Loop;
+use crate::detect::holes::owners;
 use crate::geometry::distance::nearest_of_segment;
 use crate::geometry::flatness;
 use crate::repairs::holes::fair::{Beyond, Gathered};
@@ -38,8 +40,6 @@ const DRILLED: f64 = 0.05;
 const MOST_POINTS: usize = 2048;
 /// How much the surface goes on across a rim, at most, where the whole of it ends: at the end of a tube, a beam or a rib.
 const END: f64 = 0.5;
-/// An end of less than this share of its body's size, the cube root of its volume, squared, is a detail.
-const LARGE: f64 = 0.1;
 /// A rim that rises and falls by more than so many times its height is ragged; that of a saddle does by 4 times.
 const SADDLE: f64 = 5.0;
 /// Sine of the turn at a corner: a circle of ten facets has none.
@@ -183,9 +183,8 @@ impl Judged {
                 "a mouth of {share:.0} % of its body's area was closed, while the surface is bent there: much more may be missing"
             ));
         }
-        let normal = directed_area(submesh, rim, submesh.place(rim.vertices[0]));
-        let height = flatness::height(rim.vertices.iter().map(|v| submesh.place(*v)), normal);
-        if height > flatness::RAGGED * normal.length().sqrt() {
+        let across = axis(submesh, rim);
+        if flatness::is_ragged(height(submesh, rim, across), across.length()) {
             return None;
         }
         self.area += size;
@@ -233,7 +232,8 @@ fn is_drilled(submesh: &Submesh, rims: [&Loop; 2]) -> bool {
     if !rims.iter().all(|rim| is_round(submesh, rim) && goes_on(submesh, rim) >= HOLE) {
         return false;
     }
-    let (across, along) = (axis(submesh, rims[0]), axis(submesh, rims[0]).normalize_or_zero());
+    let across = axis(submesh, rims[0]);
+    let along = across.normalize_or_zero();
     let reach = DRILLED * (across.length() / std::f64::consts::PI).sqrt();
     let seen = |v: Vertex| submesh.place(v) - along * submesh.place(v).dot(along);
     let is_near = |p: DVec3, other: &Loop| {
@@ -250,17 +250,19 @@ fn is_drilled(submesh: &Submesh, rims: [&Loop; 2]) -> bool {
 /// Does all of a body end raggedly there? Where walls end at a plane, or at a bent surface, a face is missing; else nothing says how far they went.
 fn breaks_off(submesh: &Submesh, rim: &Loop, body: Body) -> bool {
     let across = axis(submesh, rim);
-    let is_large = across.length().powi(3) >= LARGE.powi(3) * body.volume * body.volume;
-    !body.is_detail() && is_large && goes_on(submesh, rim).abs() <= END && is_ragged(submesh, rim, across)
+    !body.is_detail()
+        && owners::is_large(across.length(), body.volume)
+        && goes_on(submesh, rim).abs() <= END
+        && is_ragged(submesh, rim, across)
 }
 
 /// Does a rim rise and fall all along?
 fn is_ragged(submesh: &Submesh, rim: &Loop, across: DVec3) -> bool {
-    let height = flatness::height(rim.vertices.iter().map(|v| submesh.place(*v)), across);
+    let height = height(submesh, rim, across);
     let n = rim.vertices.len();
     let step = |i: usize| submesh.vector(rim.vertices[i], rim.vertices[(i + 1) % n]).dot(across).abs();
     let way = (0..n).map(step).sum::<f64>() / across.length();
-    height > flatness::RAGGED * across.length().sqrt() && way > SADDLE * height
+    flatness::is_ragged(height, across.length()) && way > SADDLE * height
 }
 
 /// How much the surface goes on across a rim: 1 where it is a hole in a plane, 0 where walls stand on it.
@@ -279,7 +281,12 @@ fn middle(submesh: &Submesh, rim: &Loop) -> DVec3 {
 
 /// The directed area of a cap on a loop.
 fn axis(submesh: &Submesh, rim: &Loop) -> DVec3 {
-    directed_area(submesh, rim, middle(submesh, rim))
+    triangulate::directed_area(&rim.points(submesh))
+}
+
+/// How far a loop rises and falls.
+fn height(submesh: &Submesh, rim: &Loop, across: DVec3) -> f64 {
+    flatness::height(rim.vertices.iter().map(|v| submesh.place(*v)), across)
 }
 
 /// Has a loop no corner, as what is drilled has none?
@@ -287,13 +294,6 @@ fn is_round(submesh: &Submesh, rim: &Loop) -> bool {
     let n = rim.vertices.len();
     let way = |i: usize| submesh.vector(rim.vertices[i % n], rim.vertices[(i + 1) % n]).normalize_or_zero();
     (0..n).all(|i| way(i).dot(way(i + 1)) > 0.0 && way(i).cross(way(i + 1)).length() < CORNER)
-}
-
-/// A loop's directed area about a place.
-fn directed_area(submesh: &Submesh, rim: &Loop, from: DVec3) -> DVec3 {
-    let n = rim.vertices.len();
-    let ends = |i: usize| [rim.vertices[i], rim.vertices[(i + 1) % n]].map(|v| submesh.place(v) - from);
-    (0..n).map(ends).map(|[a, b]| a.cross(b) * 0.5).sum()
 }
 
 /// The signed volume between a place and triangles.

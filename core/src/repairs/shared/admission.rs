@@ -11,6 +11,7 @@ use crate::submesh::components::Reversed;
 use crate::submesh::edges::Edges;
 use crate::submesh::near::Tolerance;
 use crate::topology::survey::Survey;
+use std::collections::BTreeSet;
 
 /// Why a loop is not to be closed.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -39,6 +40,10 @@ pub(crate) struct Admission<'p> {
     refused: Vec<(u32, NotAdmitted)>,
     /// By triangle of the submesh, as far as there are any: it is part of a lone sheet that has one side only.
     one_sided: Vec<bool>,
+    /// By triangle of the submesh: its component.
+    of_triangle: Vec<u32>,
+    /// Components that were joined to others.
+    joined: BTreeSet<u32>,
 }
 
 impl<'p> Admission<'p> {
@@ -56,7 +61,7 @@ impl<'p> Admission<'p> {
         let by_share = profile.max_hole_perimeter_relative * survey.bounds.diagonal();
         let longest = if profile.max_hole_perimeter_mm > 0.0 { by_share.min(profile.max_hole_perimeter_mm) } else { by_share };
         let mut refused = Vec::new();
-        let mut one_sided = Vec::new();
+        let (mut one_sided, mut of_triangle) = (Vec::new(), Vec::new());
         if !profile.leave_open.is_empty() {
             let left = left_open(submesh, edges, loops, tolerance, profile);
             refused.extend(left.map(|(rim, class)| (rim.vertices[0], NotAdmitted::Class(class.name()))));
@@ -67,7 +72,7 @@ impl<'p> Admission<'p> {
             let which = if goes { Which::Unneeded } else { Which::Sheets };
             let sheets = lone_sheets::recognise(survey, submesh, edges, loops, shapes, reversed, which);
             refused.extend(sheets.rims.into_iter().map(|v| (v, NotAdmitted::Sheet)));
-            one_sided = sheets.one_sided;
+            (one_sided, of_triangle) = (sheets.one_sided, sheets.of_triangle);
         }
         if let Some(place) = only_loop {
             // As numbers: −0.0 is 0.0, and no vertex is where NaN is.
@@ -77,7 +82,7 @@ impl<'p> Admission<'p> {
             one_sided.clear();
         }
         refused.sort_by_key(|(v, _)| *v);
-        Self { profile, longest, refused, one_sided }
+        Self { profile, longest, refused, one_sided, of_triangle, joined: BTreeSet::new() }
     }
 
     /// May this loop be closed?
@@ -98,14 +103,23 @@ impl<'p> Admission<'p> {
 
     /// Is this triangle part of a lone sheet that has one side only? Whatever edges it lacks, in loops or not, stay open.
     pub(crate) fn is_one_sided(&self, t: u32) -> bool {
-        self.one_sided.get(t as usize) == Some(&true)
+        self.one_sided.get(t as usize) == Some(&true) && !self.is_joined(t)
     }
 
-    /// These sheets are lone no more.
+    /// These rims became one. Lone sheets that this joins to something are lone no more, whatever other rims they have.
     pub(crate) fn joined(&mut self, rims: &[&Loop]) {
-        let mut firsts: Vec<u32> = rims.iter().map(|rim| rim.vertices[0]).collect();
+        let along = rims.iter().flat_map(|rim| &rim.triangles);
+        let components: BTreeSet<u32> = along.filter_map(|t| self.of_triangle.get(*t as usize).copied()).collect();
+        if components.len() > 1 {
+            self.joined.extend(components);
+        }
+        let mut firsts: Vec<u32> = rims.iter().skip(1).map(|rim| rim.vertices[0]).collect();
         firsts.sort_unstable();
         self.refused.retain(|(v, _)| firsts.binary_search(v).is_err());
+    }
+
+    fn is_joined(&self, t: u32) -> bool {
+        self.of_triangle.get(t as usize).is_some_and(|component| self.joined.contains(component))
     }
 
     fn check_limits(&self, submesh: &Submesh, rim: &Loop) -> Result<(), NotAdmitted> {
@@ -123,7 +137,9 @@ impl<'p> Admission<'p> {
 
     fn refusal(&self, rim: &Loop) -> Option<&NotAdmitted> {
         let at = self.refused.binary_search_by_key(&rim.vertices[0], |(v, _)| *v).ok()?;
-        Some(&self.refused[at].1)
+        let reason = &self.refused[at].1;
+        let is_lone_no_more = matches!(reason, NotAdmitted::Sheet) && self.is_joined(rim.triangles[0]);
+        (!is_lone_no_more).then_some(reason)
     }
 }
 
@@ -137,4 +153,33 @@ pub(crate) fn left_open<'l>(
 ) -> impl Iterator<Item = (&'l Loop, LoopClass)> {
     let classes = holes::classify(submesh, edges, loops, tolerance, profile.gap_edge_share).map(|found| found.class);
     loops.iter().zip(classes).filter(|(_, class)| profile.leave_open.contains(class))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rim(triangles: &[u32]) -> Loop {
+        let vertices = triangles.iter().map(|t| 10 + t).collect();
+        Loop { vertices, triangles: triangles.to_vec(), branches: false, way: 0 }
+    }
+
+    /// A lone sheet of triangles 0 to 2, and triangles 3 to 5 of something else.
+    #[test]
+    fn a_sheet_is_lone_until_a_patch_joins_it_to_something() {
+        let profile = Profile::default();
+        let mut admission = Admission {
+            profile: &profile,
+            longest: f64::INFINITY,
+            refused: vec![(10, NotAdmitted::Sheet)],
+            one_sided: vec![true, true, true, false, false, false],
+            of_triangle: vec![0, 0, 0, 1, 1, 1],
+            joined: BTreeSet::new(),
+        };
+        let [own, of_both] = [rim(&[0, 1, 2]), rim(&[3, 4, 1])];
+        admission.joined(&[&own]);
+        assert!(admission.is_sheet(&own) && admission.is_one_sided(2), "a patch of its own joins it to nothing");
+        admission.joined(&[&of_both]);
+        assert!(!admission.is_sheet(&own) && !admission.is_one_sided(2));
+    }
 }

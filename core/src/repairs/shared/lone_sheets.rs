@@ -62,6 +62,8 @@ pub(crate) struct LoneSheets {
     pub(crate) rims: Vec<u32>,
     /// By triangle of the submesh: it is part of a sheet that has one side only, whose rim may be no loop. Empty: there is none.
     pub(crate) one_sided: Vec<bool>,
+    /// By triangle of the submesh: the component that it is part of.
+    pub(crate) of_triangle: Vec<u32>,
 }
 
 /// What is known of a component.
@@ -125,7 +127,7 @@ pub(crate) fn recognise(
     if !of_one_sided.contains(&true) {
         of_one_sided.clear();
     }
-    LoneSheets { rims, one_sided: of_one_sided }
+    LoneSheets { rims, one_sided: of_one_sided, of_triangle: components.of_triangle }
 }
 
 /// All components, and what closes them.

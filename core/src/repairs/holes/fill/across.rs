@@ -87,9 +87,10 @@ impl Closing<'_> {
     pub(crate) fn close_across(&mut self, work: &mut Work<'_>) -> Vec<PatchAcross> {
         let mut across = Vec::new();
         for (rim, reason) in std::mem::take(&mut self.open) {
+            // The rim of a lone sheet may have been joined to something since.
             let patch = match reason {
-                NotFilled::NotAdmitted(_) => None,
-                NotFilled::Crosses | NotFilled::Method(_) => self.patch_across(work, rim),
+                NotFilled::NotAdmitted(_) if self.admission.check(work, self.rim(rim)).is_err() => None,
+                _ => self.patch_across(work, rim),
             };
             let Some(patch) = patch else {
                 self.open.push((rim, reason));

@@ -138,6 +138,7 @@ impl Closing<'_> {
 
     pub(crate) fn put_in(&mut self, work: &mut Work<'_>, rim: u32, patch: &triangulate::Patch, method: &'static str) {
         let triangles = of_submesh(self.rim(rim), patch);
+        self.admission.joined(&[&self.rims[rim as usize]]);
         self.placed.push(Placed::put_in(work, vec![rim], &triangles, method));
     }
 
@@ -182,6 +183,7 @@ impl Closing<'_> {
         let triangles: Vec<[Vertex; 3]> = patch.triangles.iter().map(|t| t.map(|i| vertices[i as usize])).collect();
         let mut placed = Placed::put_in(work, vec![rim], &triangles, EXTENDED);
         let reaches = !patch.added.is_empty();
+        self.admission.joined(&[&self.rims[rim as usize]]);
         placed.planes = Some(Planes { assumed: patch.assumed, volume: patch.volume, in_doubt: patch.in_doubt, reaches });
         self.placed.push(placed);
     }

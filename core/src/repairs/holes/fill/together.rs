@@ -23,8 +23,8 @@ struct Grouped<'r> {
     done: Vec<Loop>,
     /// Their patches.
     placed: Vec<Placed>,
-    /// Loops that are joined to the first one of their group, which is still to be closed.
-    joined: Vec<&'r Loop>,
+    /// Groups of loops that are closed, or joined.
+    groups: Vec<Vec<&'r Loop>>,
 }
 
 impl<'r> Grouped<'r> {
@@ -38,6 +38,7 @@ impl<'r> Grouped<'r> {
 
     fn take(&mut self, numbers: &[usize]) {
         numbers.iter().for_each(|i| self.taken[*i] = true);
+        self.groups.push(self.group(numbers));
     }
 
     /// Puts in the patch of a group.
@@ -64,7 +65,7 @@ impl Closing<'_> {
         let partners = shapes.partners(&owners);
         drop(shapes);
         let taken = vec![false; rims.len()];
-        let mut all = Grouped { rims: &rims, taken, done: Vec::new(), placed: Vec::new(), joined: Vec::new() };
+        let mut all = Grouped { rims: &rims, taken, done: Vec::new(), placed: Vec::new(), groups: Vec::new() };
         // Before anything is put in: components change by that.
         let islands = islands::groups(survey, work, &rims, &partners.islands, |rim| self.admission.is_sheet(rim));
         self.close_touching(work, &mut all);
@@ -79,8 +80,8 @@ impl Closing<'_> {
             self.rims = rims;
             return 0;
         }
-        let Grouped { mut done, placed, joined, .. } = all;
-        self.admission.joined(&joined);
+        let Grouped { mut done, placed, groups, .. } = all;
+        groups.iter().for_each(|group| self.admission.joined(group));
         let first = done.len();
         let (submesh, edges) = work.edges();
         done.extend(loops::find(submesh, edges));
@@ -138,7 +139,6 @@ impl Closing<'_> {
             None => {
                 all.take(numbers);
                 self.joints.extend(islands::join_all(work, &group));
-                all.joined.extend_from_slice(&group[1..]);
             }
         }
     }

@@ -16,22 +16,32 @@
 //! partner without it.
 
 use crate::detect::bodies;
-use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::submesh::edges::{Edge, Edges};
+use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 use crate::util::union_find::{find, unite};
 
-/// Triangles on one set of vertices, in both directions; or two in one direction that hang together with such: one of them is turned.
+/// Triangles on one set of vertices, in both directions; or two in one direction that hang together with such: one of them is turned. Or the two
+/// sides of a wall ([`super::walls`]).
 pub(crate) struct Pair {
     pub(crate) forward: Vec<u32>,
     pub(crate) backward: Vec<u32>,
+    /// The edges around the forward side of a wall; of triangles on one set of vertices none, since any of them tells.
+    pub(crate) rim: Box<[[Vertex; 2]]>,
 }
 
 impl Pair {
     fn all(&self) -> impl Iterator<Item = u32> {
         self.forward.iter().chain(&self.backward).copied()
+    }
+
+    /// The edges around the forward ones.
+    fn around(&self, submesh: &Submesh) -> impl Iterator<Item = [Vertex; 2]> {
+        let v = submesh.triangles[self.forward[0] as usize].v;
+        let of_triangle = if self.rim.is_empty() { &[0, 1, 2][..] } else { &[] };
+        of_triangle.iter().map(move |k| [v[*k], v[(k + 1) % 3]]).chain(self.rim.iter().copied())
     }
 
     fn is_one_way(&self) -> bool {
@@ -91,8 +101,8 @@ pub(crate) fn surplus(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, pai
         let of_set = set.pairs.iter().map(|(i, votes)| (&pairs[*i as usize], *votes));
         if stays {
             for (pair, votes) in of_set {
-                let one = side_that_stays(pair, votes);
-                result.sides.extend(pair.all().filter(|t| Some(*t) != one));
+                let stays = side_that_stays(pair, votes);
+                result.sides.extend(pair.all().filter(|t| !stays.contains(t)));
             }
             continue;
         }
@@ -107,12 +117,11 @@ pub(crate) fn surplus(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, pai
 }
 
 /// The side that fits the neighbours; the first where they do not tell.
-fn side_that_stays(pair: &Pair, votes: i64) -> Option<u32> {
-    match votes {
-        1.. => pair.forward.first().copied(),
-        0 => pair.all().min(),
-        _ => pair.backward.first().or(pair.forward.first()).copied(),
-    }
+fn side_that_stays(pair: &Pair, votes: i64) -> &[u32] {
+    let (forward, backward) = (&pair.forward[..], &pair.backward[..]);
+    let is_forward = votes > 0 || pair.is_one_way() || votes == 0 && forward.iter().min() < backward.iter().min();
+    let side = if is_forward { forward } else { backward };
+    if pair.rim.is_empty() { &side[..1] } else { side }
 }
 
 /// A set of pairs that hang together.
@@ -166,11 +175,7 @@ impl Rest {
 fn uses(submesh: &Submesh, edges: &Edges, pairs: &[Pair]) -> Vec<(u32, u32, bool)> {
     let mut uses: Vec<(u32, u32, bool)> = Vec::with_capacity(3 * pairs.len());
     for (i, pair) in (0..).zip(pairs) {
-        let v = submesh.triangles[pair.forward[0] as usize].v;
-        for k in 0..3 {
-            let (a, b) = (v[k], v[(k + 1) % 3]);
-            uses.extend(edges.number(a, b).map(|edge| (edge, i, a < b)));
-        }
+        uses.extend(pair.around(submesh).filter_map(|[a, b]| edges.number(a, b).map(|edge| (edge, i, a < b))));
     }
     uses.sort_unstable();
     uses

@@ -7,6 +7,7 @@ use crate::contract::report::RepairName;
 use crate::contract::settings::Bodies;
 use crate::detect::defects::{by_vertex_set, same_direction};
 use crate::repairs::cleanup::back_to_back::{self, Pair};
+use crate::repairs::cleanup::walls;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::{Pass, Work};
 use crate::submesh::edges::Edges;
@@ -51,9 +52,10 @@ pub(crate) struct Dropped {
 /// Removes surplus triangles on the same three vertices. `bodies`: whether walls that bodies have in common may go.
 pub(crate) fn drop_duplicates(survey: &Survey<'_>, work: &mut Work<'_>, bodies: Bodies) -> Dropped {
     // Afterwards no two are on the same vertices, and only a new vertex makes another copy.
-    let candidates = match work.changed_for(Pass::Copies) {
+    let changed = work.changed_for(Pass::Copies);
+    let candidates = match &changed {
         None => by_vertex_set(work),
-        Some(changed) => copies_of(work, &changed),
+        Some(changed) => copies_of(work, changed),
     };
     let mut copies = Vec::new();
     let mut pairs: Vec<Pair> = Vec::new();
@@ -64,9 +66,11 @@ pub(crate) fn drop_duplicates(survey: &Survey<'_>, work: &mut Work<'_>, bodies: 
         if backward.is_empty() && forward.len() > 2 {
             copies.extend(&forward[1..]);
         } else {
-            pairs.push(Pair { forward, backward });
+            pairs.push(Pair { forward, backward, rim: Box::default() });
         }
     }
+    let (submesh, edges) = work.edges();
+    pairs.extend(walls::between(submesh, edges, changed.as_deref(), survey.bounds.diagonal()));
     if pairs.is_empty() && copies.is_empty() {
         return Dropped::default();
     }

@@ -7,3 +7,4 @@ pub(crate) mod degenerate;
 pub(crate) mod duplicates;
 pub(crate) mod sheets;
 pub(crate) mod surplus;
+pub(crate) mod walls;

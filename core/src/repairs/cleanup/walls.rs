@@ -1,7 +1,7 @@
-//! Walls that were drawn twice, each time with other triangles: two triangulations of one flat loop, back to back.
+//! Walls that were drawn twice, each time with other triangles: two flat pieces of surface with one rim, back to back.
 //!
 //! A quad that two bodies have in common is divided by one diagonal in one body, and often by the other one in the other. The two sides have no
-//! triangle in common, but enclose nothing all the same. Only discs without vertices inside are taken for sides, so that both have the same vertices.
+//! triangle in common, but enclose nothing all the same.
 
 use super::back_to_back::Pair;
 use crate::geometry::flatness;
@@ -12,10 +12,12 @@ use std::collections::BTreeMap;
 
 /// A wall is flat if its vertices lie within this share of the model's diagonal: a hundredth of a millimetre, where that is a hundred.
 const FLAT: f64 = 1.0 / 8192.0;
+/// The triangles of a wall face one way: together they have this share of their areas' sum.
+const UNFOLDED: f64 = 0.99;
 /// Edges with more triangles are hubs, and no rims of walls.
 const MOST_USES: usize = 8;
 
-/// A disc between non-manifold edges, all of whose vertices are on its rim.
+/// A piece of surface between non-manifold edges.
 struct Side {
     /// Ascending.
     triangles: Vec<u32>,
@@ -48,7 +50,8 @@ pub(crate) fn between(submesh: &Submesh, edges: &Edges, changed: Option<&[u32]>,
         let one = sides.at(t);
         let Some(other) = sides.opposite(one) else { continue };
         if let (Some(a), Some(b)) = (&sides.found[one.min(other) as usize], &sides.found[one.max(other) as usize])
-            && is_flat(submesh, a, FLAT * diagonal)
+            && a.triangles.len() + b.triangles.len() > 2
+            && [a, b].into_iter().all(|side| is_flat(submesh, side, FLAT * diagonal))
         {
             let wall = || Pair { forward: a.triangles.clone(), backward: b.triangles.clone(), rim: a.rim.clone().into() };
             walls.entry(one.min(other)).or_insert_with(wall);
@@ -91,8 +94,6 @@ impl Sides<'_> {
                 }
             }
         }
-        // As many triangles as edges of the rim but two: they hang together like a tree.
-        is_side &= triangles.len() > 1 && triangles.len() + 2 == rim.len();
         triangles.sort_unstable();
         rim.sort_unstable();
         self.found.push(is_side.then_some(Side { triangles, rim }));
@@ -124,14 +125,15 @@ impl Sides<'_> {
     }
 }
 
-/// Do the vertices of a side lie in a plane, but for so much?
+/// Do the vertices of a side lie in a plane, but for so much, and its triangles side by side?
 fn is_flat(submesh: &Submesh, side: &Side, tolerance: f64) -> bool {
     let normal = |t: &u32| {
         let [a, b, c] = submesh.triangles[*t as usize].v.map(|v| submesh.place(v));
         (b - a).cross(c - a)
     };
-    let normal: DVec3 = side.triangles.iter().map(normal).sum();
-    flatness::height(side.rim.iter().map(|[a, _]| submesh.place(*a)), normal) <= tolerance
+    let (whole, area) = side.triangles.iter().map(normal).fold((DVec3::ZERO, 0.0), |(sum, area), n| (sum + n, area + n.length()));
+    let vertices = side.triangles.iter().flat_map(|t| submesh.triangles[*t as usize].v);
+    whole.length() >= area * UNFOLDED && flatness::height(vertices.map(|v| submesh.place(v)), whole) <= tolerance
 }
 
 #[cfg(test)]
@@ -172,6 +174,20 @@ mod tests {
         let got = dropped(&two(0.0));
         assert_eq!(got.result, Dropped { all: 4, walls: 4 });
         assert!(got.verdict.good && (got.defects.volume - 2.0).abs() < 1e-9, "{:?}", got.defects);
+    }
+
+    /// The same, with a vertex in the middle of one side.
+    #[test]
+    fn a_wall_with_a_vertex_on_one_side_goes() {
+        let mut mesh = two(0.0);
+        let at = mesh.iter().rposition(|t| t.iter().all(|p| p[0] == 1.0)).unwrap();
+        let [a, b, c] = mesh[at];
+        // Between a corner and the middle of the others: a place that f32 holds.
+        let middle = [0, 1, 2].map(|k| a[k] / 2.0 + (b[k] + c[k]) / 4.0);
+        mesh.splice(at..=at, [[a, b, middle], [b, c, middle], [c, a, middle]]);
+        let got = dropped(&mesh);
+        assert_eq!(got.result, Dropped { all: 6, walls: 6 });
+        assert!(got.verdict.good && (got.defects.volume - 2.0).abs() < 1e-6, "{:?}", got.defects);
     }
 
     #[test]

@@ -28,7 +28,7 @@ impl Chapter {
         self.lines.iter().filter_map(|line| if let Line::Session(session) = line { Some(session) } else { None })
     }
 
-    /// What was left out, and why.
+    /// Sides that were left out, and why.
     pub(super) fn skipped(&self) -> impl Iterator<Item = (Side, &str)> {
         self.lines
             .iter()
@@ -194,7 +194,7 @@ impl Book {
         runs.iter().all(|run| run.cost.facts.get(name) == Some(&first)).then_some(first)
     }
 
-    /// What a side made of an input.
+    /// The output that a side made of an input, judged.
     pub(super) fn outcome(&self, input: &Input, side: Side) -> Option<&Outcome> {
         self.chapters.iter().rev().flat_map(|chapter| &chapter.lines).find_map(|line| match line {
             Line::Outcome(outcome) if outcome.input == input.key && outcome.side == side => Some(outcome),

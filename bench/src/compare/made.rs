@@ -7,7 +7,7 @@ use suture_bench::judge::{BodiesFound, Fault, Skin, Solid};
 use super::sides::Side;
 use crate::holes::{Change, Hole, Measured};
 
-/// What one program made of one hole in a known surface.
+/// One program's patch of one hole in a known surface.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Shaped {
     /// [`Surface::name`].
@@ -51,7 +51,7 @@ impl Shaper {
     }
 }
 
-/// What one program made of one real file.
+/// One program's result for one real file with holes.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Closed {
     /// Its name.
@@ -68,7 +68,7 @@ pub(crate) struct Closed {
     pub(crate) named_open: Option<u64>,
 }
 
-/// What is wrong with a file.
+/// Defects of a file.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(crate) struct Found {
     /// By the judge.
@@ -77,7 +77,7 @@ pub(crate) struct Found {
     pub(crate) pairs: Option<u64>,
 }
 
-/// What one program made of one file.
+/// One program's result for one file of which a solid was asked.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Solved {
     /// Its name.
@@ -85,12 +85,12 @@ pub(crate) struct Solved {
     pub(crate) triangles: u64,
     /// Some component of the file encloses something, as it is or when its rims are closed.
     pub(crate) may_be_solid: bool,
-    /// What keeps the file itself from being printed.
+    /// The fault that keeps the file itself from being printed.
     pub(crate) before: Option<String>,
     /// Signed volume of the file; means something only where it is closed and oriented.
     pub(crate) volume: f64,
     pub(crate) side: Side,
-    /// What ran: a version, and the hash of the binary or the script.
+    /// The program that ran: a version, and the hash of the binary or the script.
     pub(crate) program: String,
     /// How the process ended, and with which exit code.
     pub(crate) end: String,
@@ -127,7 +127,7 @@ impl Solved {
         self.after.as_ref().is_some_and(|after| after.fault().is_none())
     }
 
-    /// What keeps it from being printed.
+    /// The fault that keeps it from being printed.
     pub(crate) fn reason(&self) -> String {
         match &self.after {
             Some(after) => after.fault().map_or(String::new(), |fault| match fault {
@@ -160,7 +160,7 @@ impl Report {
     }
 }
 
-/// What one program made of one file whose meaning is known.
+/// The verdict on one program's result for one file whose meaning is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Verdict {
@@ -201,7 +201,7 @@ impl Verdict {
     }
 }
 
-/// What one program made of the files of one family.
+/// One program's results for the files of one family.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Understood {
     pub(crate) family: String,
@@ -209,7 +209,7 @@ pub(crate) struct Understood {
     /// The file alone decides what was meant.
     pub(crate) decides: bool,
     pub(crate) side: Side,
-    /// What ran: a version, and the hash of the binary or the script.
+    /// The program that ran: a version, and the hash of the binary or the script.
     pub(crate) program: String,
     /// Names the files and what they mean.
     pub(crate) cases: String,
@@ -233,13 +233,13 @@ pub(crate) struct Understood {
     pub(crate) bad: Vec<Bad>,
 }
 
-/// What Suture did to the skin of one real file.
+/// The skin of one real file after Suture.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Skinned {
     /// Its name.
     pub(crate) file: String,
     pub(crate) triangles: u64,
-    /// What ran.
+    /// The program that ran.
     pub(crate) program: String,
     /// `None`: it said none, or broke off.
     pub(crate) report: Option<Report>,

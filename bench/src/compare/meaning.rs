@@ -20,7 +20,7 @@ use super::sides::Side;
 use super::way::Way;
 use crate::mesh;
 
-/// What is asked for.
+/// The settings of a run over families.
 pub(crate) struct Asked {
     pub(crate) families: Vec<Family>,
     /// Seeds are from this one on.
@@ -41,7 +41,7 @@ struct Case {
     meant: Meant,
 }
 
-/// What a side made of one file.
+/// The verdict on one file of a side.
 struct Made {
     verdict: Verdict,
     why: String,

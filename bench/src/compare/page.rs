@@ -55,7 +55,7 @@ pub(super) fn page(book: &Book, plots: &[(String, String)]) -> String {
     page
 }
 
-/// What was measured, by whom, and under which licence it comes.
+/// The programs that were measured, and under which licence each comes.
 fn peers(book: &Book) -> String {
     let mut page = String::from("\n## What ran\n\n| name | what it is | licence |\n|---|---|---|\n");
     let inputs = book.inputs();
@@ -114,7 +114,7 @@ fn or_dash(text: Option<String>) -> String {
     text.unwrap_or_else(|| "–".into())
 }
 
-/// What an input is, and a line for each way that ran over it.
+/// Size and kind of an input, and a line for each way that ran over it.
 fn of_input(book: &Book, input: &Input) -> String {
     let name = if input.seed.is_some() { input.case.clone() } else { format!("`{}`", input.case) };
     let files = if input.files > 1 { format!(", {} files", spaced(input.files)) } else { String::new() };
@@ -180,7 +180,7 @@ fn kept(judged: &Judged) -> String {
     if records == corners { records } else { format!("{records} (corners {corners})") }
 }
 
-/// What the project asks of itself, beside what was measured.
+/// The ratios that the project asks of itself, beside those that were measured.
 fn targets(book: &Book) -> String {
     let asked = [
         (Side::PymeshlabCompetent, Side::SutureNoSi, "at least 150"),

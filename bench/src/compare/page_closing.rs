@@ -99,7 +99,7 @@ pub(super) fn shapes(book: &Book) -> String {
     )
 }
 
-/// What the table says of a hole, for each sampling of its rim.
+/// A row of the table: one hole, with figures for each sampling of its rim.
 fn columns((surface, share): (&str, f64), rims: &[Rim]) -> [String; 8] {
     let each = |value: &dyn Fn(&Rim) -> Option<String>| {
         rims.iter().map(|rim| value(rim).unwrap_or_else(|| "–".into())).collect::<Vec<_>>().join(" / ")
@@ -118,7 +118,7 @@ fn columns((surface, share): (&str, f64), rims: &[Rim]) -> [String; 8] {
     ]
 }
 
-/// What became of real files with holes.
+/// The section on real files with holes.
 pub(super) fn files(book: &Book) -> String {
     let lines = last(book, |chapter| chapter.closed().collect());
     let mut rows = String::new();

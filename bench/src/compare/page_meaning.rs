@@ -103,7 +103,7 @@ fn table(families: &Families, sides: &[Side]) -> String {
     text + "\n</details>\n"
 }
 
-/// What Suture called good and is wrong, file by file.
+/// Suture's results that are not as wanted, file by file.
 fn named(families: &Families) -> String {
     let mut rows = String::new();
     for (name, sides) in families {

@@ -63,7 +63,7 @@ pub(crate) struct Input {
     /// In all files together.
     pub(crate) triangles: u64,
     pub(crate) bytes: u64,
-    /// What is wrong with it, where that is known.
+    /// Its defects, where they are known.
     pub(crate) counts: Option<Counts>,
     #[serde(default)]
     pub(crate) injected: BTreeMap<String, u64>,
@@ -92,7 +92,7 @@ pub(crate) struct Run {
     pub(crate) counts_right: Option<bool>,
 }
 
-/// What a side made of an input.
+/// The output that a side made of an input, judged.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Outcome {
     pub(crate) input: String,
@@ -151,7 +151,7 @@ pub(crate) fn is_good(judgement: &Judgement, volume: Option<f64>) -> bool {
 pub(super) struct Journal {
     file: File,
     path: PathBuf,
-    /// What is in it.
+    /// The lines that are in it.
     pub(super) lines: Vec<Line>,
 }
 

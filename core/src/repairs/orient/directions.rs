@@ -24,7 +24,7 @@ pub(crate) const COHERENT: Repair = Repair {
     },
 };
 
-/// What is inside out.
+/// Closed pieces that are inside out.
 pub(crate) const OUTWARD: Repair = Repair {
     name: RepairName::Outward,
     changes: Changes::Outward,
@@ -86,7 +86,7 @@ impl Parity {
     }
 }
 
-/// What was turned.
+/// How many triangles were turned, and how many edges contradict each other still.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Turned {
     pub(crate) triangles: u64,

@@ -46,7 +46,7 @@ const MOST_TRIANGLES: u64 = 1 << 21;
 /// Triangles of a component that are asked what is behind them, at most.
 const SAMPLES: usize = 1 << 11;
 
-/// What counts.
+/// Kinds of sheets that are looked for.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Which {
     Sheets,
@@ -65,13 +65,13 @@ pub(crate) struct LoneSheets {
     pub(crate) one_sided: Vec<bool>,
 }
 
-/// What is known of a component.
+/// Sizes of a component and of the cones that close it, and kinds of its edges.
 #[derive(Clone, Copy, Default)]
 struct Mouth {
     /// Of the surface, and of the cones over its rims.
     area: f64,
     cones: f64,
-    /// What it encloses with them.
+    /// The volume that the surface encloses with them.
     volume: f64,
     is_one_sided: bool,
     /// Several surfaces meet in an edge of it, or edges are in no loop: it is no sheet, or nothing is known of what would close it.

@@ -41,7 +41,7 @@ const BEHIND: f64 = 0.75;
 /// Triangles that are looked at to tell how far a surface moved, at most, by their corners and middles.
 const SAMPLES: usize = 1 << 13;
 
-/// What a group is told by.
+/// Size of a group.
 #[derive(Clone, Copy)]
 pub(crate) struct Size {
     pub(crate) triangles: u64,
@@ -50,13 +50,13 @@ pub(crate) struct Size {
     pub(crate) area: f64,
 }
 
-/// What there is to look at.
+/// The file around the groups that are wrapped.
 pub(crate) struct Site<'s, 'a> {
     pub(crate) survey: &'s Survey<'a>,
     pub(crate) submesh: &'s Submesh,
     pub(crate) reversed: &'s Reversed,
     pub(crate) pieces: &'s Components,
-    /// What hangs together through edges of two triangles.
+    /// Surface that hangs together through edges of two triangles.
     pub(crate) sheets: &'s Components,
     pub(crate) profile: &'s Profile,
     /// What is wrapped is a soup: it may be the surfaces of nothing.

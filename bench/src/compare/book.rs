@@ -95,6 +95,11 @@ impl Book {
         if chapters.is_empty() { Err(Error::NoRuns(folder.into())) } else { Ok(Self { chapters }) }
     }
 
+    /// The lines of the last raw file that has such lines.
+    pub(super) fn last<'a, T>(&'a self, lines: impl Fn(&'a Chapter) -> Vec<T>) -> Vec<T> {
+        self.chapters.iter().rev().map(lines).find(|lines| !lines.is_empty()).unwrap_or_default()
+    }
+
     /// Every input that something ran over: generated ones by case and size, then folders, then files from elsewhere.
     pub(super) fn inputs(&self) -> Vec<&Input> {
         let mut inputs: Vec<&Input> = Vec::new();

@@ -215,6 +215,14 @@ pub(crate) struct Understood {
     pub(crate) cases: String,
     /// Seeds are from this one on.
     pub(crate) first: u64,
+    #[serde(flatten)]
+    pub(crate) tally: Tally,
+    pub(crate) bad: Vec<Bad>,
+}
+
+/// How often a program's results were what, and what they cost.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub(crate) struct Tally {
     pub(crate) seeds: u64,
     pub(crate) right: u64,
     pub(crate) wrong: u64,
@@ -230,7 +238,6 @@ pub(crate) struct Understood {
     pub(crate) right_unprintable: u64,
     pub(crate) seconds: f64,
     pub(crate) slowest: f64,
-    pub(crate) bad: Vec<Bad>,
 }
 
 /// The skin of one real file after Suture.
@@ -279,23 +286,14 @@ impl Understood {
             program,
             cases,
             first: 0,
-            seeds: 0,
-            right: 0,
-            wrong: 0,
-            review_right: 0,
-            review_wrong: 0,
-            withheld: 0,
-            failed: 0,
-            wanted: 0,
-            unprintable: 0,
-            right_unprintable: 0,
-            seconds: 0.0,
-            slowest: 0.0,
+            tally: Tally::default(),
             bad: Vec::new(),
         }
     }
+}
 
-    pub(crate) fn add(&mut self, verdict: Verdict, unprintable: bool, seconds: f64, wanted: bool, bad: Option<Bad>) {
+impl Tally {
+    pub(crate) fn add(&mut self, verdict: Verdict, unprintable: bool, seconds: f64, wanted: bool) {
         let count = match verdict {
             Verdict::Right => &mut self.right,
             Verdict::Wrong => &mut self.wrong,
@@ -311,25 +309,23 @@ impl Understood {
         self.right_unprintable += u64::from(unprintable && verdict == Verdict::Right);
         self.seconds += seconds;
         self.slowest = self.slowest.max(seconds);
-        self.bad.extend(bad);
     }
 
     /// Of all together; `None` of none.
-    pub(crate) fn sum<'a>(lines: impl Iterator<Item = &'a Self>) -> Option<Self> {
-        lines.cloned().reduce(|mut sum, line| {
-            sum.seeds += line.seeds;
-            sum.right += line.right;
-            sum.wrong += line.wrong;
-            sum.review_right += line.review_right;
-            sum.review_wrong += line.review_wrong;
-            sum.withheld += line.withheld;
-            sum.failed += line.failed;
-            sum.wanted += line.wanted;
-            sum.unprintable += line.unprintable;
-            sum.right_unprintable += line.right_unprintable;
-            sum.seconds += line.seconds;
-            sum.slowest = sum.slowest.max(line.slowest);
-            sum
+    pub(crate) fn sum(all: impl Iterator<Item = Self>) -> Option<Self> {
+        all.reduce(|a, b| Self {
+            seeds: a.seeds + b.seeds,
+            right: a.right + b.right,
+            wrong: a.wrong + b.wrong,
+            review_right: a.review_right + b.review_right,
+            review_wrong: a.review_wrong + b.review_wrong,
+            withheld: a.withheld + b.withheld,
+            failed: a.failed + b.failed,
+            wanted: a.wanted + b.wanted,
+            unprintable: a.unprintable + b.unprintable,
+            right_unprintable: a.right_unprintable + b.right_unprintable,
+            seconds: a.seconds + b.seconds,
+            slowest: a.slowest.max(b.slowest),
         })
     }
 

@@ -28,7 +28,7 @@ impl Chapter {
         self.lines.iter().filter_map(|line| if let Line::Session(session) = line { Some(session) } else { None })
     }
 
-    /// What was left out, and why.
+    /// Sides that were left out, and why.
     pub(super) fn skipped(&self) -> impl Iterator<Item = (Side, &str)> {
         self.lines
             .iter()
@@ -93,6 +93,11 @@ impl Book {
         }
         chapters.sort_by_key(|chapter| (chapter.began(), chapter.name.clone()));
         if chapters.is_empty() { Err(Error::NoRuns(folder.into())) } else { Ok(Self { chapters }) }
+    }
+
+    /// The lines of the last raw file that has such lines.
+    pub(super) fn last<'a, T>(&'a self, lines: impl Fn(&'a Chapter) -> Vec<T>) -> Vec<T> {
+        self.chapters.iter().rev().map(lines).find(|lines| !lines.is_empty()).unwrap_or_default()
     }
 
     /// Every input that something ran over: generated ones by case and size, then folders, then files from elsewhere.
@@ -194,7 +199,7 @@ impl Book {
         runs.iter().all(|run| run.cost.facts.get(name) == Some(&first)).then_some(first)
     }
 
-    /// What a side made of an input.
+    /// The output that a side made of an input, judged.
     pub(super) fn outcome(&self, input: &Input, side: Side) -> Option<&Outcome> {
         self.chapters.iter().rev().flat_map(|chapter| &chapter.lines).find_map(|line| match line {
             Line::Outcome(outcome) if outcome.input == input.key && outcome.side == side => Some(outcome),

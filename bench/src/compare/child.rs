@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::Error;
 
-/// What one process cost.
+/// The cost of one process.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Cost {
     /// From before the start until the output was synced.
@@ -35,10 +35,10 @@ pub(crate) struct Cost {
     /// Where its time went, by its own word.
     #[serde(default)]
     pub(crate) stages: Vec<Stage>,
-    /// What it counted.
+    /// Counts of its own, by name.
     #[serde(default)]
     pub(crate) facts: std::collections::BTreeMap<String, u64>,
-    /// What it said on standard error, its end.
+    /// The end of what it said on standard error.
     pub(crate) complaint: String,
 }
 
@@ -121,7 +121,7 @@ fn bytes_under(path: &Path) -> u64 {
     }
 }
 
-/// What the system says of a child that ended.
+/// The system's account of a child that ended.
 struct Waited {
     status: libc::c_int,
     usage: libc::rusage,

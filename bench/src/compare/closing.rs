@@ -8,6 +8,7 @@ use suture_bench::judge;
 
 use super::child;
 use super::error::Error;
+use super::folders::{name_of, read_or_say};
 use super::machine::Machine;
 use super::made::{Closed, Found, Shaped, Shaper};
 use super::programs::Programs;
@@ -218,22 +219,15 @@ pub(crate) fn files(options: &Options, files: &[PathBuf]) -> Result<(), Error> {
     let mut bench = Bench::open(options, &SIDES)?;
     let (input, output) = (bench.folder.path().join("in.stl"), bench.folder.path().join("out.stl"));
     for path in files {
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let is_done = |side: Side| {
-            bench.journal.lines.iter().any(|line| matches!(line, Line::Closed(done) if done.file == name && done.side == side))
-        };
+        let name = name_of(path);
+        let is_done =
+            |side: Side| bench.journal.has(|line| matches!(line, Line::Closed(done) if done.file == name && done.side == side));
         let due: Vec<_> = SIDES.into_iter().filter(|&side| bench.has(side) && !is_done(side)).collect();
         if due.is_empty() {
             continue;
         }
         // All are given the same finite triangles in the same binary format.
-        let triangles = match mesh::read(path) {
-            Ok(triangles) => triangles,
-            Err(_) => {
-                eprintln!("{name} is no STL");
-                continue;
-            }
-        };
+        let Some(triangles) = read_or_say(path) else { continue };
         mesh::write(&input, &triangles).map_err(Error::Mesh)?;
         let open = judge::judge(&input).is_ok_and(|found| found.counts.boundary_edges > 0);
         let Some(before) = open.then(|| bench.look(&input)).flatten() else { continue };

@@ -7,7 +7,7 @@ use suture_bench::judge::{BodiesFound, Fault, Skin, Solid};
 use super::sides::Side;
 use crate::holes::{Change, Hole, Measured};
 
-/// What one program made of one hole in a known surface.
+/// One program's patch of one hole in a known surface.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Shaped {
     /// [`Surface::name`].
@@ -51,7 +51,7 @@ impl Shaper {
     }
 }
 
-/// What one program made of one real file.
+/// One program's result for one real file with holes.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Closed {
     /// Its name.
@@ -68,7 +68,7 @@ pub(crate) struct Closed {
     pub(crate) named_open: Option<u64>,
 }
 
-/// What is wrong with a file.
+/// Defects of a file.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(crate) struct Found {
     /// By the judge.
@@ -77,7 +77,7 @@ pub(crate) struct Found {
     pub(crate) pairs: Option<u64>,
 }
 
-/// What one program made of one file.
+/// One program's result for one file of which a solid was asked.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Solved {
     /// Its name.
@@ -85,12 +85,12 @@ pub(crate) struct Solved {
     pub(crate) triangles: u64,
     /// Some component of the file encloses something, as it is or when its rims are closed.
     pub(crate) may_be_solid: bool,
-    /// What keeps the file itself from being printed.
+    /// The fault that keeps the file itself from being printed.
     pub(crate) before: Option<String>,
     /// Signed volume of the file; means something only where it is closed and oriented.
     pub(crate) volume: f64,
     pub(crate) side: Side,
-    /// What ran: a version, and the hash of the binary or the script.
+    /// The program that ran: a version, and the hash of the binary or the script.
     pub(crate) program: String,
     /// How the process ended, and with which exit code.
     pub(crate) end: String,
@@ -127,7 +127,7 @@ impl Solved {
         self.after.as_ref().is_some_and(|after| after.fault().is_none())
     }
 
-    /// What keeps it from being printed.
+    /// The fault that keeps it from being printed.
     pub(crate) fn reason(&self) -> String {
         match &self.after {
             Some(after) => after.fault().map_or(String::new(), |fault| match fault {
@@ -160,7 +160,7 @@ impl Report {
     }
 }
 
-/// What one program made of one file whose meaning is known.
+/// The verdict on one program's result for one file whose meaning is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Verdict {
@@ -201,7 +201,7 @@ impl Verdict {
     }
 }
 
-/// What one program made of the files of one family.
+/// One program's results for the files of one family.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Understood {
     pub(crate) family: String,
@@ -209,12 +209,20 @@ pub(crate) struct Understood {
     /// The file alone decides what was meant.
     pub(crate) decides: bool,
     pub(crate) side: Side,
-    /// What ran: a version, and the hash of the binary or the script.
+    /// The program that ran: a version, and the hash of the binary or the script.
     pub(crate) program: String,
     /// Names the files and what they mean.
     pub(crate) cases: String,
     /// Seeds are from this one on.
     pub(crate) first: u64,
+    #[serde(flatten)]
+    pub(crate) tally: Tally,
+    pub(crate) bad: Vec<Bad>,
+}
+
+/// How often a program's results were what, and what they cost.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub(crate) struct Tally {
     pub(crate) seeds: u64,
     pub(crate) right: u64,
     pub(crate) wrong: u64,
@@ -230,16 +238,15 @@ pub(crate) struct Understood {
     pub(crate) right_unprintable: u64,
     pub(crate) seconds: f64,
     pub(crate) slowest: f64,
-    pub(crate) bad: Vec<Bad>,
 }
 
-/// What Suture did to the skin of one real file.
+/// The skin of one real file after Suture.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Skinned {
     /// Its name.
     pub(crate) file: String,
     pub(crate) triangles: u64,
-    /// What ran.
+    /// The program that ran.
     pub(crate) program: String,
     /// `None`: it said none, or broke off.
     pub(crate) report: Option<Report>,
@@ -279,23 +286,14 @@ impl Understood {
             program,
             cases,
             first: 0,
-            seeds: 0,
-            right: 0,
-            wrong: 0,
-            review_right: 0,
-            review_wrong: 0,
-            withheld: 0,
-            failed: 0,
-            wanted: 0,
-            unprintable: 0,
-            right_unprintable: 0,
-            seconds: 0.0,
-            slowest: 0.0,
+            tally: Tally::default(),
             bad: Vec::new(),
         }
     }
+}
 
-    pub(crate) fn add(&mut self, verdict: Verdict, unprintable: bool, seconds: f64, wanted: bool, bad: Option<Bad>) {
+impl Tally {
+    pub(crate) fn add(&mut self, verdict: Verdict, unprintable: bool, seconds: f64, wanted: bool) {
         let count = match verdict {
             Verdict::Right => &mut self.right,
             Verdict::Wrong => &mut self.wrong,
@@ -311,25 +309,23 @@ impl Understood {
         self.right_unprintable += u64::from(unprintable && verdict == Verdict::Right);
         self.seconds += seconds;
         self.slowest = self.slowest.max(seconds);
-        self.bad.extend(bad);
     }
 
     /// Of all together; `None` of none.
-    pub(crate) fn sum<'a>(lines: impl Iterator<Item = &'a Self>) -> Option<Self> {
-        lines.cloned().reduce(|mut sum, line| {
-            sum.seeds += line.seeds;
-            sum.right += line.right;
-            sum.wrong += line.wrong;
-            sum.review_right += line.review_right;
-            sum.review_wrong += line.review_wrong;
-            sum.withheld += line.withheld;
-            sum.failed += line.failed;
-            sum.wanted += line.wanted;
-            sum.unprintable += line.unprintable;
-            sum.right_unprintable += line.right_unprintable;
-            sum.seconds += line.seconds;
-            sum.slowest = sum.slowest.max(line.slowest);
-            sum
+    pub(crate) fn sum(all: impl Iterator<Item = Self>) -> Option<Self> {
+        all.reduce(|a, b| Self {
+            seeds: a.seeds + b.seeds,
+            right: a.right + b.right,
+            wrong: a.wrong + b.wrong,
+            review_right: a.review_right + b.review_right,
+            review_wrong: a.review_wrong + b.review_wrong,
+            withheld: a.withheld + b.withheld,
+            failed: a.failed + b.failed,
+            wanted: a.wanted + b.wanted,
+            unprintable: a.unprintable + b.unprintable,
+            right_unprintable: a.right_unprintable + b.right_unprintable,
+            seconds: a.seconds + b.seconds,
+            slowest: a.slowest.max(b.slowest),
         })
     }
 

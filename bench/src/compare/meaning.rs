@@ -4,8 +4,6 @@
 //! left out. A result is called good by the program's own word (Suture's outcome), or, of programs that have none, if it is closed.
 
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use suture_bench::judge::{self, Triangle};
 use suture_bench::meaning::{Family, Meant};
@@ -13,14 +11,15 @@ use suture_bench::meaning::{Family, Meant};
 use super::child;
 use super::closing::{Bench, Options};
 use super::error::Error;
-use super::made::{Bad, Report, Understood, Verdict};
+use super::made::{Bad, Report, Tally, Understood, Verdict};
 use super::programs::Programs;
 use super::record::{Journal, Line};
 use super::sides::Side;
+use super::together;
 use super::way::Way;
 use crate::mesh;
 
-/// What is asked for.
+/// The settings of a run over families.
 pub(crate) struct Asked {
     pub(crate) families: Vec<Family>,
     /// Seeds are from this one on.
@@ -41,13 +40,20 @@ struct Case {
     meant: Meant,
 }
 
-/// What a side made of one file.
+/// The verdict on one file of a side.
 struct Made {
     verdict: Verdict,
     why: String,
     /// It is called good, and cannot be printed.
     unprintable: bool,
     seconds: f64,
+}
+
+impl Made {
+    /// Verdicts where there is nothing to be printed.
+    fn without(seconds: f64) -> impl Fn(Verdict, String) -> Self {
+        move |verdict, why| Self { verdict, why, unprintable: false, seconds }
+    }
 }
 
 /// Has every side repair every case, and adds what came out to the raw file, a line for each family and side.
@@ -68,14 +74,17 @@ pub(crate) fn meaning(options: &Options, asked: &Asked) -> Result<(), Error> {
             }
             let run = Run { programs: &bench.programs, side, family, cases: &cases, options, asked, folder: bench.folder.path() };
             let understood = run.family(program, hash.clone())?;
-            println!("{:24} {:16} {}", family.name, side.facts().name, understood.summary());
+            println!("{:24} {:16} {}", family.name, side.facts().name, understood.tally.summary());
             for bad in &understood.bad {
                 println!("    {} {}: {}", bad.seed, bad.verdict.name(), bad.why);
             }
             bench.journal.write(Line::Understood(understood))?;
         }
     }
-    bench.journal.retain(newest)?;
+    bench.journal.retain_newest(|line| match line {
+        Line::Understood(done) => Some((done.family.clone(), done.side)),
+        _ => None,
+    })?;
     print_totals(&bench.journal, &present);
     Ok(())
 }
@@ -85,32 +94,16 @@ fn print_totals(journal: &Journal, sides: &[Side]) {
         let of_side = |line: &'_ &Understood| line.side == side;
         let lines: Vec<_> = journal.understood().filter(of_side).collect();
         for (word, decides) in [("the file decides", true), ("it does not", false)] {
-            let sum = Understood::sum(lines.iter().copied().filter(|line| line.decides == decides));
+            let sum = Tally::sum(lines.iter().filter(|line| line.decides == decides).map(|line| line.tally));
             println!("{:16} {word:18} {}", side.facts().name, sum.map_or(String::new(), |sum| sum.summary()));
         }
     }
 }
 
-/// Of all lines about a family and a side, the last one; and all other lines.
-fn newest(lines: &[Line]) -> Vec<bool> {
-    let mut seen = std::collections::HashSet::new();
-    let mut keep: Vec<bool> = lines
-        .iter()
-        .rev()
-        .map(|line| match line {
-            Line::Understood(done) => seen.insert((&done.family, done.side)),
-            _ => true,
-        })
-        .collect();
-    keep.reverse();
-    keep
-}
-
 fn is_done(journal: &Journal, family: &Family, side: Side, program: &str, cases: &str) -> bool {
-    journal.lines.iter().any(|line| match line {
-        Line::Understood(done) => {
-            done.family == family.name && done.side == side && done.program == program && done.cases == cases
-        }
+    let asked = (family.name, side, program, cases);
+    journal.has(|line| match line {
+        Line::Understood(done) => (done.family.as_str(), done.side, done.program.as_str(), done.cases.as_str()) == asked,
         _ => false,
     })
 }
@@ -157,42 +150,23 @@ impl Run<'_> {
             let all = self.command(self.cases.len() as u64, &inputs, &outputs);
             child::run(all, None, false, self.options.limit)?;
         }
-        let made = self.each(|case| {
+        let made = together::each(self.cases, self.asked.jobs, |case| {
             let (input, output) = (inputs.join(name(case)), outputs.join(name(case)));
             let made = self.one(case, &input, &output)?;
             self.keep(case, &made, &output)?;
-            Ok(made)
-        })?;
+            Ok::<Made, Error>(made)
+        });
         let mut understood = Understood::new(self.family.name, self.family.group, self.side, program, cases);
         understood.decides = self.family.decides;
         understood.first = self.asked.first;
         for (case, made) in self.cases.iter().zip(made) {
-            let wanted = made.verdict.is_wanted(self.family.decides, !case.meant.intended.is_empty());
+            let made = made?;
+            let wanted = self.is_wanted(case, &made);
             let bad = (!wanted || made.unprintable).then_some(Bad { seed: case.seed, verdict: made.verdict, why: made.why });
-            understood.add(made.verdict, made.unprintable, made.seconds, wanted, bad);
+            understood.tally.add(made.verdict, made.unprintable, made.seconds, wanted);
+            understood.bad.extend(bad);
         }
         Ok(understood)
-    }
-
-    /// In as many threads as are asked for, the results in the order of the cases.
-    fn each(&self, work: impl Fn(&Case) -> Result<Made, Error> + Sync) -> Result<Vec<Made>, Error> {
-        let next = AtomicUsize::new(0);
-        let done = Mutex::new(Vec::new());
-        std::thread::scope(|scope| {
-            for _ in 0..self.asked.jobs {
-                scope.spawn(|| {
-                    while let Some((number, case)) =
-                        Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|n| Some((n, self.cases.get(n)?)))
-                    {
-                        let made = work(case);
-                        done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((number, made));
-                    }
-                });
-            }
-        });
-        let mut done = done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-        done.sort_by_key(|(number, _)| *number);
-        done.into_iter().map(|(_, made)| made).collect()
     }
 
     fn command(&self, files: u64, input: &Path, output: &Path) -> std::process::Command {
@@ -206,7 +180,7 @@ impl Run<'_> {
         }
         let ended = child::run(self.command(1, input, output), Some(output), false, self.options.limit)?;
         let seconds = ended.cost.wall_seconds;
-        let without = |verdict: Verdict, why: String| Made { verdict, why, unprintable: false, seconds };
+        let without = Made::without(seconds);
         if !ended.cost.exited {
             return Ok(without(Verdict::Failed, ended.cost.end));
         }
@@ -231,9 +205,13 @@ impl Run<'_> {
         })
     }
 
+    fn is_wanted(&self, case: &Case, made: &Made) -> bool {
+        made.verdict.is_wanted(self.family.decides, !case.meant.intended.is_empty())
+    }
+
     /// Keeps a case that is not as wanted, and what came out.
     fn keep(&self, case: &Case, made: &Made, output: &Path) -> Result<(), Error> {
-        let wanted = made.verdict.is_wanted(self.family.decides, !case.meant.intended.is_empty());
+        let wanted = self.is_wanted(case, made);
         let Some(folder) = self.asked.keep.as_ref().filter(|_| !wanted || made.unprintable) else { return Ok(()) };
         let name = format!("{}-{}", self.family.name, case.seed);
         write_case(folder, self.family, case.seed, &case.meant)?;
@@ -247,7 +225,7 @@ impl Run<'_> {
 
 /// A result held against what was meant. Of a program without a word of its own, one that is not closed is withheld.
 fn judged(case: &Case, output: &Path, is_peer: bool, seconds: f64) -> Made {
-    let without = |verdict: Verdict, why: String| Made { verdict, why, unprintable: false, seconds };
+    let without = Made::without(seconds);
     let (found, triangles) = match (judge::solid(output), mesh::read(output)) {
         (Ok(found), Ok(triangles)) => (found, triangles),
         _ if is_peer => return without(Verdict::Withheld, "nothing that can be read".into()),

@@ -15,6 +15,7 @@ mod error;
 mod folders;
 mod machine;
 mod made;
+mod markdown;
 pub(crate) mod meaning;
 mod options;
 mod page;
@@ -30,6 +31,7 @@ mod sides;
 pub(crate) mod skin;
 pub(crate) mod solids;
 mod statistics;
+mod together;
 mod trial;
 mod way;
 

@@ -8,7 +8,7 @@ use suture_bench::generate::Case;
 use super::sides::Side;
 use super::way::{Cache, Way};
 
-/// What to compare.
+/// The settings of a comparison.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Options {
     pub(crate) sizes: Vec<u64>,

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::book::{Book, did_its_work};
 use super::child::Cost;
 use super::machine::Machine;
+use super::markdown::{self, or_dash};
 use super::page_arrays;
 use super::page_closing;
 use super::page_meaning;
@@ -55,7 +56,7 @@ pub(super) fn page(book: &Book, plots: &[(String, String)]) -> String {
     page
 }
 
-/// What was measured, by whom, and under which licence it comes.
+/// The programs that were measured, and under which licence each comes.
 fn peers(book: &Book) -> String {
     let mut page = String::from("\n## What ran\n\n| name | what it is | licence |\n|---|---|---|\n");
     let inputs = book.inputs();
@@ -110,11 +111,7 @@ fn date(seconds: u64) -> String {
     format!("{year}-{month:02}-{day:02} {:02}:{:02} UTC", seconds / 3600 % 24, seconds / 60 % 60)
 }
 
-fn or_dash(text: Option<String>) -> String {
-    text.unwrap_or_else(|| "–".into())
-}
-
-/// What an input is, and a line for each way that ran over it.
+/// Size and kind of an input, and a line for each way that ran over it.
 fn of_input(book: &Book, input: &Input) -> String {
     let name = if input.seed.is_some() { input.case.clone() } else { format!("`{}`", input.case) };
     let files = if input.files > 1 { format!(", {} files", spaced(input.files)) } else { String::new() };
@@ -152,7 +149,7 @@ fn of_input(book: &Book, input: &Input) -> String {
             or_dash(book.outcome(input, way.side).map(|outcome| outcome.verdict(input))),
             or_dash(book.outcome(input, way.side).and_then(|outcome| outcome.judged.as_ref()).map(kept)),
         ];
-        let _ = writeln!(page, "| {} |", row.join(" | "));
+        page += &markdown::row(&row);
     }
     for way in book.ways(input) {
         let held = book.spread(input, &way, |cost| cost.facts.get("cgroup peak bytes").map(|bytes| *bytes as f64 / 1e6));
@@ -180,7 +177,7 @@ fn kept(judged: &Judged) -> String {
     if records == corners { records } else { format!("{records} (corners {corners})") }
 }
 
-/// What the project asks of itself, beside what was measured.
+/// The ratios that the project asks of itself, beside those that were measured.
 fn targets(book: &Book) -> String {
     let asked = [
         (Side::PymeshlabCompetent, Side::SutureNoSi, "at least 150"),
@@ -274,7 +271,7 @@ fn searches(book: &Book) -> String {
             count(Side::Inspect),
             count(Side::MeshlibDetect),
         ];
-        let _ = writeln!(rows, "| {} |", row.join(" | "));
+        rows += &markdown::row(&row);
     }
     if rows.is_empty() {
         return rows;

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use super::book::Book;
 use super::child::Cost;
+use super::markdown;
 use super::record::Input;
 use super::sides::Side;
 use super::statistics::{Spread, number, spaced};
@@ -56,7 +57,7 @@ fn table(book: &Book, input: &Input) -> Option<String> {
             runs.len().to_string(),
             book.outcome(input, side).map(|outcome| outcome.verdict(input)).unwrap_or_default(),
         ];
-        let _ = writeln!(table, "| {} |", row.join(" | "));
+        table += &markdown::row(&row);
     }
     if let Some(unlike) = book.fact(input, Side::SutureArrays, "faces unlike the file's") {
         let _ = writeln!(

@@ -1,17 +1,11 @@
 //! The page's sections on how well holes are closed.
 
-use std::fmt::Write;
-
 use super::book::Book;
 use super::closing::PICTURES;
 use super::made::{Closed, Shaped, Shaper};
+use super::markdown::{self, mean_and_worst, or_dash};
 use super::sides::Side;
 use super::statistics::{Spread, spaced};
-
-/// The last file that has what is asked for.
-fn last<'a, T>(book: &'a Book, lines: impl Fn(&'a super::book::Chapter) -> Vec<T>) -> Vec<T> {
-    book.chapters.iter().rev().map(lines).find(|lines| !lines.is_empty()).unwrap_or_default()
-}
 
 /// One rim of one hole, as every program closed it. Distances are lengths of the file.
 struct Rim {
@@ -53,7 +47,7 @@ impl Rim {
 
 /// How true patches are to surfaces that are known.
 pub(super) fn shapes(book: &Book) -> String {
-    let lines = last(book, |chapter| chapter.shaped().collect());
+    let lines = book.last(|chapter| chapter.shaped().collect());
     let mut kinds: Vec<_> = lines.iter().map(|line| (line.surface.as_str(), line.hole.share)).collect();
     kinds.dedup();
     let mut samplings: Vec<_> = lines.iter().map(|line| line.hole.sampling).collect();
@@ -75,7 +69,7 @@ pub(super) fn shapes(book: &Book) -> String {
             .collect();
         kept += rims.iter().filter(|rim| rim.holds()).count();
         all += rims.len();
-        let _ = writeln!(rows, "| {} |", columns(kind, &rims).join(" | "));
+        rows += &markdown::row(&columns(kind, &rims));
     }
     if rows.is_empty() {
         return rows;
@@ -99,11 +93,10 @@ pub(super) fn shapes(book: &Book) -> String {
     )
 }
 
-/// What the table says of a hole, for each sampling of its rim.
+/// A row of the table: one hole, with figures for each sampling of its rim.
 fn columns((surface, share): (&str, f64), rims: &[Rim]) -> [String; 8] {
-    let each = |value: &dyn Fn(&Rim) -> Option<String>| {
-        rims.iter().map(|rim| value(rim).unwrap_or_else(|| "–".into())).collect::<Vec<_>>().join(" / ")
-    };
+    let each =
+        |value: &dyn Fn(&Rim) -> Option<String>| rims.iter().map(|rim| or_dash(value(rim))).collect::<Vec<_>>().join(" / ");
     let far = |value: fn(&Rim) -> Option<f64>| each(&|rim| value(rim).map(|far| format!("{far:.1e}")));
     let angle = |value: fn(&Rim) -> Option<f64>| each(&|rim| value(rim).map(|angle| format!("{angle:.2}")));
     [
@@ -118,14 +111,14 @@ fn columns((surface, share): (&str, f64), rims: &[Rim]) -> [String; 8] {
     ]
 }
 
-/// What became of real files with holes.
+/// The section on real files with holes.
 pub(super) fn files(book: &Book) -> String {
-    let lines = last(book, |chapter| chapter.closed().collect());
+    let lines = book.last(|chapter| chapter.closed().collect());
     let mut rows = String::new();
     for side in [Side::Suture, Side::PymeshlabCompetent, Side::Meshlib] {
         let of: Vec<_> = lines.iter().filter(|line| line.side == side).copied().collect();
         if !of.is_empty() {
-            let _ = writeln!(rows, "| {} |", row(side, &of).join(" | "));
+            rows += &markdown::row(&row(side, &of));
         }
     }
     if rows.is_empty() {
@@ -160,9 +153,7 @@ fn row(side: Side, lines: &[&Closed]) -> Vec<String> {
     let count = |is: &dyn Fn(&&&Closed) -> bool| lines.iter().filter(is).count().to_string();
     let new = |line: &Closed| -> i64 { pairs(line).map_or(0, |(before, after)| after as i64 - before as i64) };
     let mean = |value: fn(&Closed) -> Option<f64>, worst: fn(Spread) -> f64| {
-        let values: Vec<f64> = lines.iter().filter_map(|line| value(line)).collect();
-        let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
-        Spread::of(values).map_or("–".into(), |spread| format!("{:.3} % ({:.2} %)", 100.0 * mean, 100.0 * worst(spread)))
+        mean_and_worst(lines.iter().filter_map(|line| value(line)).collect(), worst)
     };
     let sum = |sign: i64| spaced(lines.iter().map(|line| (sign * new(line)).max(0) as u64).sum());
     vec![

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use super::book::Book;
-use super::made::{Bad, Understood};
+use super::made::{Bad, Tally, Understood};
+use super::markdown::{self, folded, or_dash};
 use super::sides::Side;
 use super::statistics::spaced;
 
@@ -56,7 +57,7 @@ fn totals(families: &Families, sides: &[Side]) -> String {
         for decides in [true, false] {
             let of_side =
                 families.iter().filter_map(|(_, sides)| sides.get(&side).copied()).filter(|line| line.decides == decides);
-            let Some(sum) = Understood::sum(of_side) else { continue };
+            let Some(sum) = Tally::sum(of_side.map(|line| line.tally)) else { continue };
             let share = |count: u64| format!("{} ({:.1} %)", spaced(count), 100.0 * count as f64 / sum.seeds.max(1) as f64);
             let columns = [
                 side.facts().name.to_owned(),
@@ -72,7 +73,7 @@ fn totals(families: &Families, sides: &[Side]) -> String {
                 // Peers work through a family in one process, which is not timed by file.
                 if side.is_suture() { format!("{:.2}", sum.seconds / sum.seeds.max(1) as f64) } else { "–".into() },
             ];
-            let _ = writeln!(text, "| {} |", columns.join(" | "));
+            text += &markdown::row(&columns);
         }
     }
     text
@@ -80,10 +81,8 @@ fn totals(families: &Families, sides: &[Side]) -> String {
 
 /// A row for each family, a column for each side.
 fn table(families: &Families, sides: &[Side]) -> String {
-    let mut text = String::from(
-        "\n<details><summary>Family by family: right / wrong, called good / review / withheld / failed. The file alone decides, but for \
-         those marked ?</summary>\n\n| group | family |",
-    );
+    let summary = "Family by family: right / wrong, called good / review / withheld / failed. The file alone decides, but for those marked ?";
+    let mut text = String::from("| group | family |");
     sides.iter().for_each(|side| text += &format!(" {} |", side.facts().name));
     text += "\n|---|---|";
     sides.iter().for_each(|_| text += "---:|");
@@ -92,18 +91,18 @@ fn table(families: &Families, sides: &[Side]) -> String {
         let Some(first) = of_side.values().next() else { continue };
         let _ = write!(text, "| {} | {name}{} |", first.group, if first.decides { "" } else { " ?" });
         for side in sides {
-            let cell = of_side.get(side).map_or("–".into(), |line| {
-                let review = line.review_right + line.review_wrong;
-                [line.right, line.wrong, review, line.withheld, line.failed].map(|count| count.to_string()).join(" / ")
-            });
+            let cell = or_dash(of_side.get(side).map(|line| {
+                let Tally { right, wrong, review_right, review_wrong, withheld, failed, .. } = line.tally;
+                [right, wrong, review_right + review_wrong, withheld, failed].map(|count| count.to_string()).join(" / ")
+            }));
             let _ = write!(text, " {cell} |");
         }
         text.push('\n');
     }
-    text + "\n</details>\n"
+    folded(summary, &text)
 }
 
-/// What Suture called good and is wrong, file by file.
+/// Suture's results that are not as wanted, file by file.
 fn named(families: &Families) -> String {
     let mut rows = String::new();
     for (name, sides) in families {
@@ -113,7 +112,7 @@ fn named(families: &Families) -> String {
     }
     match rows.as_str() {
         "" => String::new(),
-        _ => format!("\n<details><summary>Suture's that are not as wanted</summary>\n\n{rows}\n</details>\n"),
+        _ => folded("Suture's that are not as wanted", &rows),
     }
 }
 
@@ -130,7 +129,8 @@ mod tests {
         for (seed, &verdict) in verdicts.iter().enumerate() {
             let wanted = verdict.is_wanted(decides, true);
             let bad = (!wanted).then(|| Bad { seed: seed as u64, verdict, why: "because".into() });
-            line.add(verdict, false, 0.5, wanted, bad);
+            line.tally.add(verdict, false, 0.5, wanted);
+            line.bad.extend(bad);
         }
         Line::Understood(line)
     }

@@ -6,6 +6,7 @@ use suture_bench::judge::{Place, Skin};
 
 use super::book::Book;
 use super::made::Skinned;
+use super::markdown;
 
 const ABOUT: &str = "\
 What Suture does to files whose meaning nobody wrote down (`src/judge/skin.rs`, which shares no code with it). *Lost* is the share of the
@@ -20,17 +21,18 @@ const GAINED: f64 = 0.01;
 
 /// The section; empty if there is nothing.
 pub(super) fn skin(book: &Book) -> String {
-    // Of several raw files, the newest.
-    let Some(chapter) = book.chapters.iter().rev().find(|chapter| chapter.skinned().next().is_some()) else {
+    let mut lines = book.last(|chapter| chapter.skinned().collect());
+    if lines.is_empty() {
         return String::new();
-    };
-    let mut lines: Vec<_> = chapter.skinned().collect();
+    }
     let changed = |line: &Skinned| line.skin.as_ref().map_or(0.0, |skin| skin.lost + skin.implausible);
-    let mut page = format!("\n## The skin of real files\n\n{ABOUT}\n{}\n", summary(&lines));
+    let page = format!("\n## The skin of real files\n\n{ABOUT}\n{}\n", summary(&lines));
     lines.sort_by(|a, b| changed(b).total_cmp(&changed(a)).then(a.file.cmp(&b.file)));
     lines.retain(|line| changed(line) > 0.0);
-    page += "\n<details><summary>Files that lost or gained anything</summary>\n\n\
-             | file | triangles | outcome | lost | by | gained | by | flat or small patches | wrapped |\n|---|---:|---|---:|---:|---:|---:|---:|---:|\n";
+    let mut table = String::from(
+        "| file | triangles | outcome | lost | by | gained | by | flat or small patches | wrapped |\n\
+         |---|---:|---|---:|---:|---:|---:|---:|---:|\n",
+    );
     for line in lines {
         let skin = line.skin.clone().unwrap_or_default();
         let percent = |share: f64| format!("{:.3} %", 100.0 * share);
@@ -45,9 +47,9 @@ pub(super) fn skin(book: &Book) -> String {
             percent(skin.invented - skin.implausible),
             percent(line.wrapped),
         ];
-        let _ = writeln!(page, "| {} |", columns.join(" | "));
+        table += &markdown::row(&columns);
     }
-    page + "\n</details>\n"
+    page + &markdown::folded("Files that lost or gained anything", &table)
 }
 
 /// In one paragraph, of all files.

@@ -1,10 +1,10 @@
 //! The page's section on what became of real files when a solid was asked for.
 
 use std::collections::BTreeMap;
-use std::fmt::Write;
 
 use super::book::Book;
 use super::made::Solved;
+use super::markdown::{self, folded, mean_and_worst, or_dash};
 use super::sides::Side;
 use super::statistics::{Spread, number};
 
@@ -40,7 +40,7 @@ pub(super) fn solids(book: &Book) -> String {
     for side in Side::SOLID {
         let lines: Vec<_> = files.values().filter_map(|sides| sides.get(&side).copied()).collect();
         if !lines.is_empty() {
-            let _ = writeln!(page, "| {} |", row(side, &lines).join(" | "));
+            page += &markdown::row(&row(side, &lines));
         }
     }
     page += &beside(&files);
@@ -55,9 +55,7 @@ fn row(side: Side, lines: &[&Solved]) -> Vec<String> {
     let of_report = |is: fn(&Solved) -> bool| if side.is_suture() { count(&is).to_string() } else { "–".into() };
     let (may, both) = (count(&|line| line.may_be_solid), count(&|line| line.may_be_solid && line.is_printable()));
     let mean = |value: fn(&Solved) -> Option<f64>, worst: fn(Spread) -> f64| {
-        let values: Vec<f64> = lines.iter().filter(|line| line.is_printable()).filter_map(|line| value(line)).collect();
-        let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
-        Spread::of(values).map_or("–".into(), |spread| format!("{:.3} % ({:.2} %)", 100.0 * mean, 100.0 * worst(spread)))
+        mean_and_worst(lines.iter().filter(|line| line.is_printable()).filter_map(|line| value(line)).collect(), worst)
     };
     let bodies = |is: fn(&Solved) -> bool| count(&is);
     vec![
@@ -78,8 +76,10 @@ fn row(side: Side, lines: &[&Solved]) -> Vec<String> {
         ),
         mean(|line| line.change.map(|change| change.kept), |spread| spread.least),
         mean(Solved::distance, |spread| spread.most),
-        Spread::of(lines.iter().map(|line| line.seconds))
-            .map_or("–".into(), |spread| format!("{} ({})", number(spread.median), number(spread.most))),
+        or_dash(
+            Spread::of(lines.iter().map(|line| line.seconds))
+                .map(|spread| format!("{} ({})", number(spread.median), number(spread.most))),
+        ),
     ]
 }
 
@@ -108,8 +108,8 @@ fn beside(files: &Files) -> String {
         let ours = suture.is_printable();
         let best = best(sides);
         let figures = |line: &Solved| {
-            let kept = line.change.map_or("–".into(), |change| format!("{:.2}", 100.0 * change.kept));
-            [kept, line.distance().map_or("–".into(), |far| format!("{:.4}", 100.0 * far))]
+            let kept = or_dash(line.change.map(|change| format!("{:.2}", 100.0 * change.kept)));
+            [kept, or_dash(line.distance().map(|far| format!("{:.4}", 100.0 * far)))]
         };
         match best {
             Some(peer) if ours => {
@@ -127,7 +127,7 @@ fn beside(files: &Files) -> String {
             true => "yes",
             false => "no",
         };
-        let theirs = best.map_or(["–".into(), "–".into()], figures);
+        let theirs = best.map_or([or_dash(None), or_dash(None)], figures);
         let columns = [
             format!("`{name}`"),
             suture.triangles.to_string(),
@@ -136,18 +136,17 @@ fn beside(files: &Files) -> String {
             best.map_or("none".into(), |best| best.side.facts().name.into()),
             theirs.join(" | "),
         ];
-        let _ = writeln!(rows, "| {} |", columns.join(" | "));
+        rows += &markdown::row(&columns);
     }
     if rows.is_empty() {
         return rows;
     }
+    let head = "| file | triangles | printable | kept | distance | best peer | kept | distance |\n|---|---:|---|---:|---:|---|---:|---:|\n";
+    let summary = "Beside the best peer, file by file: of those whose output is printable the one nearest to the file. Kept and distance in %.";
     format!(
         "\nOf {both} files both Suture and a peer make something printable: there Suture's is at least as near as the best peer's in \
-         {near}, and keeps at least as many triangles in {keeps}. Of {alone} files only Suture does, and of {none} it does not.\n\n\
-         <details><summary>Beside the best peer, file by file: of those whose output is printable the one nearest to the \
-         file. Kept and distance in %.</summary>\n\n\
-         | file | triangles | printable | kept | distance | best peer | kept | distance |\n|---|---:|---|---:|---:|---|---:|---:|\n\
-         {rows}\n</details>\n"
+         {near}, and keeps at least as many triangles in {keeps}. Of {alone} files only Suture does, and of {none} it does not.\n{}",
+        folded(summary, &format!("{head}{rows}"))
     )
 }
 

@@ -9,7 +9,7 @@ use super::folders::home;
 use super::sides::{NO_SI, Program, SUTURE_PACKAGE, Side};
 use super::way::Way;
 
-/// What is there to be measured.
+/// The programs that are there to be measured.
 pub(super) struct Programs {
     suture: Option<PathBuf>,
     /// This suture knows how to leave the search for self-intersections out.
@@ -148,7 +148,7 @@ fn package(side: Side) -> Option<&'static str> {
     }
 }
 
-/// What a command prints, if it succeeds.
+/// The text that a command prints, if it succeeds.
 pub(super) fn said(command: &mut Command) -> Option<String> {
     let output = command.stderr(Stdio::null()).output().ok().filter(|output| output.status.success())?;
     Some(String::from_utf8_lossy(&output.stdout).trim().into())

@@ -1,6 +1,6 @@
 //! Raw runs: what is kept of a comparison, one JSON object a line, one file a session. Pages and plots are made from these alone.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -63,7 +63,7 @@ pub(crate) struct Input {
     /// In all files together.
     pub(crate) triangles: u64,
     pub(crate) bytes: u64,
-    /// What is wrong with it, where that is known.
+    /// Its defects, where they are known.
     pub(crate) counts: Option<Counts>,
     #[serde(default)]
     pub(crate) injected: BTreeMap<String, u64>,
@@ -92,7 +92,7 @@ pub(crate) struct Run {
     pub(crate) counts_right: Option<bool>,
 }
 
-/// What a side made of an input.
+/// The output that a side made of an input, judged.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Outcome {
     pub(crate) input: String,
@@ -151,7 +151,7 @@ pub(crate) fn is_good(judgement: &Judgement, volume: Option<f64>) -> bool {
 pub(super) struct Journal {
     file: File,
     path: PathBuf,
-    /// What is in it.
+    /// The lines that are in it.
     pub(super) lines: Vec<Line>,
 }
 
@@ -171,8 +171,23 @@ impl Journal {
         self.lines.iter().filter_map(|line| if let Line::Understood(understood) = line { Some(understood) } else { None })
     }
 
+    /// Has such a line been written?
+    pub(super) fn has(&self, is: impl Fn(&Line) -> bool) -> bool {
+        self.lines.iter().any(is)
+    }
+
+    /// Of lines that have the same key, drops all but the last one.
+    pub(super) fn retain_newest(&mut self, key: impl Fn(&Line) -> Option<(String, Side)>) -> Result<(), Error> {
+        self.retain(|lines| {
+            let mut seen = HashSet::new();
+            let mut keep: Vec<bool> = lines.iter().rev().map(|line| key(line).is_none_or(|key| seen.insert(key))).collect();
+            keep.reverse();
+            keep
+        })
+    }
+
     /// Drops those lines that `keep` says no to, in the file as well: all at once, so that it is never half of what it was.
-    pub(super) fn retain(&mut self, keep: impl Fn(&[Line]) -> Vec<bool>) -> Result<(), Error> {
+    fn retain(&mut self, keep: impl Fn(&[Line]) -> Vec<bool>) -> Result<(), Error> {
         let mut kept = keep(&self.lines).into_iter();
         self.lines.retain(|_| kept.next().unwrap_or(true));
         let mut text = String::new();

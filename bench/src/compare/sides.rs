@@ -59,7 +59,7 @@ pub(crate) enum Program {
     Admesh,
 }
 
-/// What is to be known about a side.
+/// Facts about a side.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Facts {
     pub(crate) name: &'static str,
@@ -72,7 +72,7 @@ pub(crate) struct Facts {
     pub(crate) writes: bool,
     /// Its output is judged.
     pub(crate) judged: bool,
-    /// What it is, for the published page.
+    /// Its nature, for the published page.
     pub(crate) about: &'static str,
 }
 
@@ -253,7 +253,7 @@ const TRIMESH_ARRAYS: Facts = Facts {
     ..TRIMESH
 };
 
-/// What pymeshlab's scripts and suture are told.
+/// Arguments of pymeshlab's scripts and of suture.
 const PYMESHLAB_SI: Option<&str> = Some("--self-intersections");
 pub(super) const NO_SI: &str = "--no-self-intersections";
 
@@ -304,7 +304,7 @@ impl Side {
         Self::ARRAYS.contains(&self)
     }
 
-    /// What is to be known about it.
+    /// Facts about it.
     pub(crate) fn facts(self) -> Facts {
         match self {
             Self::Cp => COPY,

@@ -1,18 +1,18 @@
 //! What Suture does to the skin of real files: what could be seen from outside and is gone, and what was never drawn.
 
 use std::path::PathBuf;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use suture_bench::judge;
 
 use super::child;
 use super::closing::{Bench, Options};
 use super::error::Error;
+use super::folders::{name_of, read_or_say};
 use super::made::{Report, Skinned};
 use super::page_skin;
 use super::record::Line;
 use super::sides::Side;
+use super::together;
 use super::way::Way;
 use crate::mesh;
 
@@ -25,13 +25,9 @@ pub(crate) fn skins(options: &Options, files: &[PathBuf], jobs: usize, keep: Opt
     let program = bench.programs.identity(Side::Suture)?;
     let folder = keep.unwrap_or_else(|| bench.folder.path().join("out"));
     std::fs::create_dir_all(&folder).map_err(Error::io("making a folder of outputs"))?;
-    let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let one = |path: &PathBuf| -> Result<Option<Skinned>, Error> {
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let Some(before) = mesh::read(path).ok().filter(|triangles| !triangles.is_empty()) else {
-            eprintln!("{name} is no STL, or an empty one");
-            return Ok(None);
-        };
+        let name = name_of(path);
+        let Some(before) = read_or_say(path) else { return Ok(None) };
         let output = folder.join(&name);
         let command = bench.programs.command(&Way::plain(Side::Suture), 1, path, &output);
         let ended = child::run(command, Some(&output), false, options.limit)?;
@@ -48,20 +44,13 @@ pub(crate) fn skins(options: &Options, files: &[PathBuf], jobs: usize, keep: Opt
             seconds: ended.cost.wall_seconds,
         }))
     };
-    std::thread::scope(|scope| {
-        for _ in 0..jobs {
-            scope.spawn(|| {
-                while let Some(path) = files.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let skinned = one(path);
-                    if let Ok(Some(line)) = &skinned {
-                        println!("{}", page_skin::row(line));
-                    }
-                    done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(skinned);
-                }
-            });
+    let done = together::each(files, jobs, |path| {
+        let skinned = one(path);
+        if let Ok(Some(line)) = &skinned {
+            println!("{}", page_skin::row(line));
         }
+        skinned
     });
-    let done = done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
     let mut lines: Vec<Skinned> = done.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
     lines.sort_by(|a, b| a.file.cmp(&b.file));
     println!("{}", page_skin::summary(&lines.iter().collect::<Vec<_>>()));

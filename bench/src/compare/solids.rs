@@ -1,7 +1,6 @@
 //! What becomes of the files of a folder when every program is asked for a solid: printable or not, what is kept of the surface, how
 //! far it moved, and whether all bodies are still there.
 
-use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use suture_bench::judge::{self, Bodies, Solid};
@@ -9,8 +8,9 @@ use suture_bench::judge::{self, Bodies, Solid};
 use super::child::{self, Ended};
 use super::closing::{Bench, Options};
 use super::error::Error;
+use super::folders::{name_of, read_or_say};
 use super::made::{Report, Solved};
-use super::record::{Journal, Line};
+use super::record::Line;
 use super::sides::Side;
 use super::way::Way;
 use crate::holes;
@@ -29,17 +29,16 @@ pub(crate) fn solids(options: &Options, files: &[PathBuf], sides: &[Side], again
     }
     let (input, output) = (bench.folder.path().join("in.stl"), bench.folder.path().join("out.stl"));
     for path in files {
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let due: Vec<_> =
-            present.iter().filter(|(side, program)| again || !is_done(&bench.journal, &name, *side, program)).collect();
+        let name = name_of(path);
+        let is_done = |side: Side, program: &str| {
+            bench.journal.has(|line| matches!(line, Line::Solved(done) if (done.file.as_str(), done.side, done.program.as_str()) == (&name, side, program)))
+        };
+        let due: Vec<_> = present.iter().filter(|(side, program)| again || !is_done(*side, program)).collect();
         if due.is_empty() {
             continue;
         }
         // All are given the same finite triangles in the same binary format.
-        let Some(triangles) = mesh::read(path).ok().filter(|triangles| !triangles.is_empty()) else {
-            eprintln!("{name} is no STL, or an empty one");
-            continue;
-        };
+        let Some(triangles) = read_or_say(path) else { continue };
         mesh::write(&input, &triangles).map_err(Error::Mesh)?;
         let before = judge::solid(&input).map_err(|error| Error::Mesh(error.to_string()))?;
         let (volume, before) = (before.judgement.volume, before.fault().map(|fault| fault.name().to_owned()));
@@ -75,22 +74,10 @@ pub(crate) fn solids(options: &Options, files: &[PathBuf], sides: &[Side], again
             }
         }
     }
-    bench.journal.retain(newest)
-}
-
-/// Of all lines about a file and a side, the last one; and all other lines.
-fn newest(lines: &[Line]) -> Vec<bool> {
-    let mut seen = HashSet::new();
-    let mut keep: Vec<bool> = lines
-        .iter()
-        .rev()
-        .map(|line| match line {
-            Line::Solved(done) => seen.insert((&done.file, done.side)),
-            _ => true,
-        })
-        .collect();
-    keep.reverse();
-    keep
+    bench.journal.retain_newest(|line| match line {
+        Line::Solved(done) => Some((done.file.clone(), done.side)),
+        _ => None,
+    })
 }
 
 /// The judge's word on an output, and its triangles.
@@ -99,11 +86,4 @@ fn look(output: &Path) -> (Option<Solid>, Option<Vec<mesh::Triangle>>) {
         Ok(found) => (Some(found), mesh::read(output).ok()),
         Err(_) => (None, None),
     }
-}
-
-fn is_done(journal: &Journal, file: &str, side: Side, program: &str) -> bool {
-    journal.lines.iter().any(|line| match line {
-        Line::Solved(done) => done.file == file && done.side == side && done.program == program,
-        _ => false,
-    })
 }

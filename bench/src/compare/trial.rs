@@ -18,7 +18,7 @@ use super::record::{Input, Journal, Line, Outcome, Run, is_good};
 use super::sides::Side;
 use super::way::Way;
 
-/// What one input after the other goes through.
+/// The trials of one input after the other.
 pub(super) struct Trials<'a> {
     options: &'a Options,
     programs: Programs,

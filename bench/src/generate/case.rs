@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use super::defect::Kind;
 use crate::counts::Counts;
 
-/// What to generate.
+/// A kind of mesh to generate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Case {
     /// Nothing wrong.
@@ -162,14 +162,14 @@ pub enum Error {
 /// The result of generating.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// What was written, and what is wrong with it.
+/// A mesh that was written: its case, and the truth about it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Truth {
-    /// What is wrong with it.
+    /// The case: which defects it has.
     pub case: Case,
     /// The seed: equal seeds give equal bytes.
     pub seed: u64,
-    /// What an exact check must find.
+    /// The counts that an exact check must find.
     pub counts: Counts,
     /// How many defects of each kind were injected.
     pub injected: BTreeMap<&'static str, u64>,

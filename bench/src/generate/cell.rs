@@ -3,7 +3,7 @@
 use super::surface::{CELL, Point, Ring, Triangle, on_grid};
 use crate::counts::Counts;
 
-/// Which quads of a cell are meant.
+/// The quads of a cell that are meant.
 pub(super) type Mask = [[bool; CELL]; CELL];
 
 /// 16 × 16 quads. A defect keeps two vertices away from the border, so that the defects of neighbours never touch.
@@ -13,7 +13,7 @@ pub(super) struct Cell {
     pub(super) triangles: [[[Option<Triangle>; 2]; CELL]; CELL],
     /// Written after the cell's own.
     pub(super) extra: Vec<Triangle>,
-    /// What the defect adds to every count but the number of triangles.
+    /// The counts that the defect adds, except for the number of triangles.
     pub(super) counts: Counts,
 }
 

@@ -99,7 +99,7 @@ pub(crate) fn mesh(surface: Surface, hole: Hole) -> Vec<Triangle> {
     triangles
 }
 
-/// What the border's edge from `a` to `b` is closed with.
+/// Closes the border's edge from `a` to `b`: with a triangle, or none, or walls.
 fn close(surface: Surface, a: Point, b: Point, triangles: &mut Vec<Triangle>) {
     match surface {
         Surface::Sphere => triangles.push([b, a, [0.0, 0.0, -1.0]]),

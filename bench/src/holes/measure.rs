@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::surface::{Surface, degrees};
 use crate::mesh::{Triangle, Vector, Welded, cross, dot, length, minus, unit, wide};
 
-/// What a program made of a hole.
+/// A program's patch of a hole, measured.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Measured {
     /// Vertices that the patch has beside the rim's.

@@ -21,7 +21,7 @@ pub(crate) fn measure_file(surface: Surface, before: &[Triangle], after: &Path) 
     measure::measure(surface, before, &mesh::read(after).ok()?)
 }
 
-/// What a repair changed, beside what it was to change.
+/// A repair's changes, beside those that it was to make.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Change {
     /// Share of the input's triangles that are in the output with the same bits, in the same direction.

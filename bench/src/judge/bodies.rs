@@ -24,7 +24,7 @@ struct Inner {
     depth: f64,
 }
 
-/// What became of the bodies.
+/// How many bodies were kept, lost, or lost in part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "compare", derive(serde::Serialize, serde::Deserialize))]
 pub struct Found {

@@ -12,7 +12,7 @@
 
 use super::judgement::Triangle;
 
-/// What a result is beside what was meant.
+/// A result beside the solid that was meant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "compare", derive(serde::Serialize, serde::Deserialize))]
 pub struct Fidelity {

@@ -5,11 +5,11 @@ use crate::counts::Counts;
 /// Three corners.
 pub type Triangle = [[f32; 3]; 3];
 
-/// What a mesh file holds.
+/// Counts and sums of a mesh file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "compare", derive(serde::Serialize, serde::Deserialize))]
 pub struct Judgement {
-    /// What was counted.
+    /// Numbers of triangles and defects.
     pub counts: Counts,
     /// Triangles with a NaN or infinite coordinate.
     pub nonfinite: u64,

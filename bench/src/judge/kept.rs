@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::stl::{RECORD, Records, Result};
 
-/// What makes two records the same.
+/// A key that two records have in common if they are the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Same {
     /// All 50 bytes.
@@ -28,7 +28,7 @@ impl Same {
 pub struct Kept {
     /// Records of the input.
     pub of: u64,
-    /// Those that stand in the output, in the same order.
+    /// The records that stand in the output, in the same order.
     pub in_order: u64,
 }
 

@@ -15,7 +15,7 @@ use super::judgement::Triangle;
 use super::near::Near;
 use crate::space::{Vector, bounds, cross, dot, length, minus, plus, times, unit, wide};
 
-/// What a repair did to the skin.
+/// The skin that a repair lost or invented.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "compare", derive(serde::Serialize, serde::Deserialize))]
 pub struct Skin {
@@ -193,7 +193,7 @@ fn places(points: &[(Point, f64)], seen: f64, diagonal: f64) -> Vec<Place> {
     found
 }
 
-/// Which triangles of the result belong to a plausible patch.
+/// The triangles of the result that belong to a plausible patch.
 struct Patches {
     plausible: HashMap<usize, bool>,
 }

@@ -9,7 +9,7 @@ use super::stl;
 use super::stl::{Result, Soup};
 use super::topology::{Components, examine};
 
-/// What was found in a file.
+/// The judge's findings in a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "compare", derive(serde::Serialize, serde::Deserialize))]
 pub struct Solid {

@@ -78,7 +78,7 @@ fn near_wall(chance: &mut Chance) -> Draft {
     Draft::of(all.clone(), all).within(0.02).bodies(1..=u64::MAX)
 }
 
-/// What is cut, and the outline of the cutter, which fits into it.
+/// A solid that is cut, and the outline of the cutter, which fits into it.
 fn cut(chance: &mut Chance) -> (Mesh, f64, super::shapes::Outline) {
     let height = chance.from(4.0, 12.0);
     let host = match chance.count(0, 3) {

@@ -66,7 +66,7 @@ impl Mesh {
         Self(self.0.iter().copied().chain(others).collect())
     }
 
-    /// Those faces that `keep` says yes to.
+    /// The faces that `keep` says yes to.
     pub(super) fn only(&self, keep: impl Fn(&Face) -> bool) -> Self {
         Self(self.0.iter().copied().filter(|face| keep(face)).collect())
     }

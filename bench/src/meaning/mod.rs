@@ -34,7 +34,7 @@ pub struct Family {
     pub name: &'static str,
     /// The group that it belongs to.
     pub group: &'static str,
-    /// What is wrong, in words.
+    /// The damage, in words.
     pub about: &'static str,
     /// The file alone decides what was meant; else asking a person is as good.
     pub decides: bool,

@@ -97,7 +97,7 @@ pub(super) fn cuboid(lo: V, hi: V) -> Mesh {
     Mesh(faces)
 }
 
-/// What is extruded: an outline, and holes.
+/// A shape to be extruded: an outline, and holes.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Outline {
     /// Counterclockwise.

@@ -21,7 +21,7 @@ pub struct Verdict {
     pub free_of_self_intersection: Option<bool>,
     /// Why it is not good, or why it needs review.
     pub reasons: Vec<String>,
-    /// What was not checked.
+    /// Names of rules that were not checked.
     pub unchecked: Vec<String>,
 }
 
@@ -62,7 +62,7 @@ pub struct Faithful {
     pub rules: Vec<Fidelity>,
 }
 
-/// What one rule of fidelity measured.
+/// The measurement of one rule of fidelity.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Fidelity {
@@ -78,7 +78,7 @@ pub struct Fidelity {
     pub limit: f64,
 }
 
-/// What one rule found.
+/// The finding of one rule.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct RuleResult {

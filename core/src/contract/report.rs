@@ -27,7 +27,7 @@ pub struct Report {
     pub engine_version: String,
     /// `inspect` or `repair`.
     pub task: Task,
-    /// What came of it.
+    /// How the file came out.
     pub outcome: Outcome,
     /// The file read.
     pub input: FileFacts,
@@ -47,7 +47,7 @@ pub struct Report {
     /// Boundary loops of the input, by what kind of opening they are.
     #[serde(default)]
     pub loops: BoundaryLoops,
-    /// What was done, in order.
+    /// The repairs that were made, in order.
     pub repairs: Vec<Repair>,
     /// Boundary loops that were left open, and why (at most 1000 listed).
     pub loops_left: Vec<LoopLeft>,
@@ -96,7 +96,7 @@ pub enum Task {
     Repair,
 }
 
-/// What came of a file.
+/// How a file came out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
@@ -128,7 +128,7 @@ pub struct FileFacts {
     pub bytes: u64,
     /// BLAKE3 of the whole file, hexadecimal.
     pub blake3: String,
-    /// What it was read from.
+    /// The format that it was read from.
     pub format: Format,
     /// Triangle records in the file, non-finite and degenerate ones included.
     pub triangles: u64,
@@ -257,7 +257,7 @@ pub struct Tolerances {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Repair {
-    /// What kind.
+    /// The kind of the repair.
     pub name: RepairName,
     /// How often.
     pub count: u64,
@@ -271,7 +271,7 @@ pub struct Repair {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct BoundaryLoop {
-    /// What kind of opening it is.
+    /// The kind of the opening.
     pub class: LoopClass,
     /// The rule that decided the class, with its measure.
     pub rule: String,
@@ -356,7 +356,7 @@ pub struct Wrap {
     pub area_share: f64,
     /// Edge of the lattice's cubes; 0 if there is no lattice for it.
     pub cell: f64,
-    /// What the wrap encloses.
+    /// The volume that the wrap encloses.
     pub volume: f64,
     /// Largest distance from the old surface to the new one, measured at some of its corners and middles; what had material on both sides is left
     /// out.
@@ -393,7 +393,7 @@ pub struct Volumes {
 pub struct BodyLost {
     /// Smallest and largest coordinates of what was there.
     pub bounds: [[f32; 3]; 2],
-    /// What it enclosed.
+    /// The volume that it enclosed.
     pub volume: f64,
 }
 
@@ -418,7 +418,7 @@ impl Regions {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Region {
-    /// What settled it. (`rung` in schema 1.)
+    /// The method that settled it. (`rung` in schema 1.)
     #[serde(alias = "rung")]
     pub method: RegionMethod,
     /// Smallest and largest coordinates of what it was done to.
@@ -439,7 +439,7 @@ fn is_zero(count: &u32) -> bool {
     *count == 0
 }
 
-/// What settled a region, from the least intrusive to the most.
+/// The method that settled a region, from the least intrusive to the most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -451,7 +451,7 @@ pub enum RegionMethod {
     /// So they were, after bodies that shared surface but for rounding were grown by steps of single precision, each by others.
     #[serde(alias = "spread")]
     Perturbed,
-    /// What kept crossing was taken out, and the small holes were closed.
+    /// Triangles that kept crossing were taken out, and the small holes were closed.
     Refilled,
     /// Surfaces that shared a vertex or an edge were taken apart.
     Separated,

@@ -12,6 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use robust::{Coord, Coord3D};
 
 use crate::geometry::boxes::BoxTree;
+use crate::geometry::ray_grid::RayGrid;
 use crate::geometry::sums::Bounds;
 use crate::io::record;
 use crate::submesh::Submesh;
@@ -19,7 +20,7 @@ use crate::submesh::components::{Component, Components, Reversed, Sample};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 
-/// What lies around a component.
+/// The closed components that lie around a component.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Surroundings {
     /// Components that wind around it, with their winding numbers, ascending.
@@ -203,7 +204,7 @@ pub(crate) fn obstructed(
     let grid = Grid::new(&rays);
     let met: Vec<AtomicBool> = sources.iter().map(|_| AtomicBool::new(false)).collect();
     let meet = |corners: &[[f32; 3]; 3], component: u32| {
-        for r in grid.under(corners).flatten().map(|r| *r as usize) {
+        for r in grid.cells.under(corners).flatten().map(|r| *r as usize) {
             // Whoever meets it first: it is met.
             if sources[r].component != component && !met[r].load(Relaxed) && crossing(corners, rays[r].from) != 0 {
                 met[r].store(true, Relaxed);
@@ -310,7 +311,7 @@ impl Over {
         };
         let mut few = Vec::new();
         let corners = [reach.lo, reach.hi, reach.hi];
-        for ray in grid.under(&corners).flatten().map(|r| &rays[*r as usize]).filter(inside) {
+        for ray in grid.cells.under(&corners).flatten().map(|r| &rays[*r as usize]).filter(inside) {
             if few.len() == Self::FEW {
                 return Some(Self::Many);
             }
@@ -329,7 +330,7 @@ impl Over {
                 let (lo, hi) = ([low(0), low(1)], [high(0), high(1)]);
                 few.iter().any(|[x, y]| (lo[0] <= x[0]) & (hi[0] >= x[1]) & (lo[1] <= y[0]) & (hi[1] >= y[1]))
             }
-            Self::Many => grid.may_meet(corners),
+            Self::Many => grid.cells.may_meet(corners),
         }
     }
 }
@@ -340,36 +341,16 @@ pub(crate) fn around(x: f64) -> [f32; 2] {
     [if f64::from(near) > x { near.next_down() } else { near }, if f64::from(near) < x { near.next_up() } else { near }]
 }
 
-/// Rays by their place seen from above, in a grid of square cells.
+/// Rays in a grid, and where each ray's candidates begin in the table of counts.
 struct Grid {
-    lo: [f64; 2],
-    per_unit: [f64; 2],
-    side: usize,
-    /// Rays by cell, and where each cell's begin.
-    starts: Vec<u32>,
-    order: Vec<u32>,
-    /// Where each ray's candidates begin in the table of counts.
+    cells: RayGrid,
     bases: Vec<u32>,
 }
 
 impl Grid {
     fn new(rays: &[Ray]) -> Self {
         // Several cells a ray, so that most small triangles are over with at the first look.
-        let side = ((rays.len() as f64).sqrt() as usize * 8).clamp(1, 1024);
-        let (mut lo, mut hi) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for ray in rays {
-            for k in 0..2 {
-                lo[k] = lo[k].min(ray.from[k]);
-                hi[k] = hi[k].max(ray.from[k]);
-            }
-        }
-        let per_unit = std::array::from_fn(|k| if hi[k] > lo[k] { side as f64 / (hi[k] - lo[k]) } else { 0.0 });
-        let mut grid = Self { lo, per_unit, side, starts: vec![0; side * side + 1], order: Vec::new(), bases: Vec::new() };
-        let cells: Vec<usize> = rays.iter().map(|r| grid.cell(1, r.from[1]) * side + grid.cell(0, r.from[0])).collect();
-        cells.iter().for_each(|c| grid.starts[c + 1] += 1);
-        (0..side * side).for_each(|c| grid.starts[c + 1] += grid.starts[c]);
-        grid.order = (0..rays.len() as u32).collect();
-        grid.order.sort_by_key(|r| cells[*r as usize]);
+        let mut grid = Self { cells: RayGrid::new(rays.iter().map(|ray| ray.from), 8, 1024), bases: Vec::new() };
         let mut base = 0;
         for ray in rays {
             grid.bases.push(base);
@@ -378,36 +359,9 @@ impl Grid {
         grid
     }
 
-    fn cell(&self, axis: usize, x: f64) -> usize {
-        (((x - self.lo[axis]) * self.per_unit[axis]) as usize).min(self.side - 1)
-    }
-
-    /// The rays in the cells under the box of three corners, row by row.
-    fn under(&self, corners: &[[f32; 3]; 3]) -> impl Iterator<Item = &[u32]> {
-        let span = |k: usize| {
-            let x = corners.map(|c| f64::from(c[k]));
-            (self.cell(k, x[0].min(x[1]).min(x[2])), self.cell(k, x[0].max(x[1]).max(x[2])))
-        };
-        let ((x0, x1), (y0, y1)) = (span(0), span(1));
-        (y0..=y1).map(move |row| {
-            let row = row * self.side;
-            &self.order[self.starts[row + x0] as usize..self.starts[row + x1 + 1] as usize]
-        })
-    }
-
-    /// Is there a ray in the cells under the triangle? Asked of every triangle, so one cell is the case to be fast in.
-    #[inline]
-    fn may_meet(&self, corners: &[[f32; 3]; 3]) -> bool {
-        let cell = |k: usize, x: f32| self.cell(k, f64::from(x));
-        let low = |k: usize| corners[0][k].min(corners[1][k]).min(corners[2][k]);
-        let high = |k: usize| corners[0][k].max(corners[1][k]).max(corners[2][k]);
-        let (x0, x1, y0, y1) = (cell(0, low(0)), cell(0, high(0)), cell(1, low(1)), cell(1, high(1)));
-        (y0..=y1).any(|row| self.starts[row * self.side + x0] != self.starts[row * self.side + x1 + 1])
-    }
-
     /// Reports `(place in the table of counts, signed crossing)` for every ray that asks for `component` and meets the triangle.
     fn cross(&self, rays: &[Ray], corners: &[[f32; 3]; 3], component: u32, hit: &mut dyn FnMut(u32, i32)) {
-        for row in self.under(corners) {
+        for row in self.cells.under(corners) {
             for r in row {
                 let ray = &rays[*r as usize];
                 if let Ok(i) = ray.candidates.binary_search(&component) {

@@ -8,7 +8,7 @@ use crate::io::record::Record;
 pub(crate) struct Difference {
     /// Input records that the written file does not hold, ascending.
     pub(crate) gone: Vec<u32>,
-    /// Those of them that nothing stands in for, ascending.
+    /// Those records that nothing stands in for, ascending.
     pub(crate) deleted: Vec<u32>,
     /// What the written file holds besides untouched records of the input, by ascending place.
     pub(crate) fresh: Vec<(u32, Record)>,

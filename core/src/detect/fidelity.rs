@@ -12,7 +12,7 @@ pub struct FidelityRule {
     pub id: &'static str,
     /// Raised when it measures anything else for any file.
     pub version: u32,
-    /// What it measures, in one sentence.
+    /// The quantity that it measures, in one sentence.
     pub measures: &'static str,
 }
 
@@ -66,7 +66,7 @@ pub const FIDELITY_RULES: [FidelityRule; 14] = [
     FidelityRule { id: "missing", version: 1, measures: "Parts that the file itself has lost." },
 ];
 
-/// What a rule has measured.
+/// The measurement of a rule.
 #[derive(Debug)]
 pub(crate) struct Measured {
     pub(crate) rule: &'static str,

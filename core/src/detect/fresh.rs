@@ -90,7 +90,7 @@ impl Solids {
         Self { all, tree }
     }
 
-    /// Those whose boxes meet `wanted`.
+    /// The triangles whose boxes meet `wanted`.
     fn meeting<'s>(&'s self, wanted: &Bounds, found: &mut Vec<u32>) -> Vec<&'s Solid> {
         found.clear();
         if !self.all.is_empty() {
@@ -100,7 +100,7 @@ impl Solids {
     }
 }
 
-/// What a chunk found.
+/// Findings of a chunk.
 #[derive(Default)]
 struct Found {
     tested: u64,

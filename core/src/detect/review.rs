@@ -11,11 +11,11 @@ use crate::geometry::sums::Bounds;
 /// What the repairs know and a person would want to, beside what can be counted in the result.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Evidence {
-    /// What lay in the material of others.
+    /// Bodies that lay in the material of others.
     pub(crate) enclosed: Enclosed,
     /// Guesses that may be wrong, each a line for people.
     pub(crate) doubts: Vec<String>,
-    /// What explains changes.
+    /// Patches that explain changes.
     pub(crate) explained: Explained,
     /// What the profile asked to be added: it is no reason for a person to look.
     pub(crate) asked: Asked,
@@ -49,7 +49,7 @@ impl Explained {
     }
 }
 
-/// What was added to a file because its profile asked for it.
+/// Surface that was added to a file because its profile asked for it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Asked {
     pub(crate) bounds: Bounds,
@@ -63,7 +63,7 @@ impl Default for Asked {
     }
 }
 
-/// What to say of lone sheets that keep a file from being good.
+/// Words on lone sheets that keep a file from being good.
 pub(crate) fn open_sheets(count: u64) -> Option<String> {
     (count > 0).then(|| {
         format!(
@@ -103,7 +103,7 @@ pub(crate) struct Change<'a> {
     pub(crate) missing: &'a [String],
 }
 
-/// What every rule of fidelity measures, in the order of the table.
+/// The measurements of all rules of fidelity, in the order of the table.
 pub(crate) fn measure(change: &Change<'_>, profile: &Profile) -> Vec<Measured> {
     let mut all = counts(change, profile);
     all.push(noted("guesses", &change.evidence.doubts));
@@ -115,7 +115,7 @@ pub(crate) fn measure(change: &Change<'_>, profile: &Profile) -> Vec<Measured> {
     all
 }
 
-/// What is beyond its limit as soon as there is anything.
+/// A rule that is beyond its limit as soon as there is a line.
 fn noted(rule: &'static str, lines: &[String]) -> Measured {
     Measured { rule, figure: Some(lines.len() as f64), limit: 0.0, words: lines.to_vec() }
 }
@@ -125,7 +125,7 @@ fn measured(rule: &'static str, figure: Option<f64>, limit: f64, words: impl FnO
     Measured { rule, figure, limit, words }
 }
 
-/// What wraps have replaced.
+/// The surface that wraps have replaced.
 fn wraps(wraps: &[Wrap], profile: &Profile) -> Measured {
     let done = || wraps.iter().filter(|wrap| wrap.left.is_none());
     let moved = done().map(|wrap| wrap.moved).fold(0.0, f64::max);
@@ -134,7 +134,7 @@ fn wraps(wraps: &[Wrap], profile: &Profile) -> Measured {
     })
 }
 
-/// What can be counted.
+/// The rules that count something.
 fn counts(change: &Change<'_>, profile: &Profile) -> Vec<Measured> {
     let Change { before, evidence, after, .. } = change;
     let enclosed = &evidence.enclosed;
@@ -202,7 +202,7 @@ fn volume(change: &Change<'_>, profile: &Profile) -> Measured {
     })
 }
 
-/// What left the model of its bodies.
+/// The volume that left the model of its bodies.
 fn volumes(volumes: Option<&Volumes>, profile: &Profile) -> [Measured; 2] {
     let lost = volumes.map(|v| v.lost as f64);
     let outside = volumes.map(|v| if v.volume > 0.0 { v.outside / v.volume } else { 0.0 });
@@ -219,7 +219,7 @@ fn volumes(volumes: Option<&Volumes>, profile: &Profile) -> [Measured; 2] {
     [bodies, volume]
 }
 
-/// What was done to the surface that can be seen.
+/// The surface that can be seen, and was lost or invented.
 fn skin(skin: Option<&Skin>, profile: &Profile) -> [Measured; 2] {
     let words = |change: &SkinChange, what: &str, from: &str| {
         let by: Vec<&str> = change.causes.iter().take(3).map(|cause| cause.repair.as_str()).collect();

@@ -24,7 +24,7 @@ impl Subject<'_> {
     }
 }
 
-/// Which of the verdict's words a rule belongs to.
+/// The word of the verdict that a rule belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Aspect {
     Closed,
@@ -35,7 +35,7 @@ pub(crate) enum Aspect {
     Other,
 }
 
-/// What a rule has found.
+/// The finding of a rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Finding {
     Count(u64),
@@ -58,7 +58,7 @@ pub struct Rule {
     pub id: &'static str,
     /// Raised when it counts anything else for any file.
     pub version: u32,
-    /// What it counts, in one sentence.
+    /// The defect that it counts, in one sentence.
     pub counts: &'static str,
     pub(crate) aspect: Aspect,
     find: fn(&Subject<'_>) -> Finding,
@@ -214,7 +214,7 @@ pub(crate) struct Found {
     finding: Finding,
 }
 
-/// What all rules find.
+/// The findings of all rules.
 pub(crate) fn look(subject: &Subject<'_>) -> Vec<Found> {
     RULES.iter().map(|rule| Found { rule, finding: (rule.find)(subject) }).collect()
 }

@@ -161,7 +161,7 @@ pub(crate) fn second_look(survey: Survey<'_>, expected: Option<&Expectation<'_>>
     Some(Diagnosis::count(survey, submesh, profile).defects)
 }
 
-/// What working out the topology of `records` spools.
+/// The disk space that the topology of `records` takes for a spool.
 pub(crate) fn spool_need(records: &[Record], limits: &Limits) -> Need {
     Need {
         folder: limits.spool_folder(),
@@ -235,7 +235,7 @@ pub(crate) fn open(input: &Path, limits: &Limits, progress: &dyn Progress) -> Re
     MeshFile::open(input, &limits.spool_folder(), limits, progress)
 }
 
-/// What a report is about.
+/// The file that a report is about.
 fn subject(mesh: &MeshFile, blake3: String) -> Input<'_> {
     Input { path: mesh.path(), facts: facts(mesh, blake3), findings: mesh.findings() }
 }

@@ -28,7 +28,7 @@ pub(crate) struct Input<'a> {
     pub(crate) path: &'a Path,
     /// Its hash may be still to come.
     pub(crate) facts: FileFacts,
-    /// What is odd about its file.
+    /// Oddities of its file.
     pub(crate) findings: &'a [Finding],
 }
 
@@ -123,7 +123,7 @@ pub(crate) fn conclude_empty(report: &mut Report) {
     report.verdict.reasons.push("no triangle was left after the repair".into());
 }
 
-/// What is written, or returned.
+/// The file or mesh that is written, or returned.
 pub(crate) struct Written<'a> {
     pub(crate) facts: FileFacts,
     pub(crate) findings: &'a [Finding],
@@ -181,7 +181,7 @@ pub(crate) fn certify(facts: &FileFacts, defects: &Defects, flaws: &[String]) ->
     certificate::certify(facts, &Subject { defects, flaws })
 }
 
-/// What makes a file itself less than flawless.
+/// Findings that make a file itself less than flawless.
 pub(crate) fn flaws(findings: &[Finding]) -> Vec<String> {
     findings.iter().filter(|f| !f.harmless).map(|f| f.text.clone()).collect()
 }

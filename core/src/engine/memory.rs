@@ -23,7 +23,7 @@ use crate::util::parallel;
 /// How errors and reports name what has no path.
 const NAME: &str = "mesh in memory";
 
-/// What a repair made of a mesh in memory.
+/// The mesh that a repair made of one in memory, and its report.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct RepairedMesh {
@@ -31,7 +31,7 @@ pub struct RepairedMesh {
     pub mesh: Mesh,
     /// Where each of its faces comes from.
     pub origins: Vec<FaceOrigin>,
-    /// What was found and done, and the verdict on the mesh.
+    /// The report: all findings and repairs, and the verdict on the mesh.
     pub report: Report,
 }
 

@@ -44,7 +44,7 @@ pub(crate) struct Arrangement {
     pub(crate) cells: u32,
 }
 
-/// What can arrange triangles.
+/// An engine that arranges triangles.
 pub(crate) trait Arrange {
     /// The arrangement of triangles that have an area; `None` if it fails. The same for any number of threads.
     fn arrange(&self, triangles: &[[[f32; 3]; 3]], threads: usize) -> Option<Arrangement>;

@@ -2,7 +2,7 @@
 
 use crate::geometry::tri_tri::{Triangle, boxed_cross};
 
-/// What [`self_crossing`] found.
+/// The findings of [`self_crossing`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SelfCrossing {
     /// No two triangles cross or overlap.

@@ -51,7 +51,7 @@ impl Bounds {
         (0..3).all(|k| self.lo[k] <= other.lo[k] && self.hi[k] >= other.hi[k])
     }
 
-    /// What two boxes have in common; `None` if they do not meet.
+    /// The box that two boxes have in common; `None` if they do not meet.
     pub(crate) fn overlap(&self, other: &Self) -> Option<Self> {
         let lo: [f32; 3] = std::array::from_fn(|k| self.lo[k].max(other.lo[k]));
         let hi: [f32; 3] = std::array::from_fn(|k| self.hi[k].min(other.hi[k]));

@@ -10,7 +10,7 @@ use crate::submesh::components::Reversed;
 use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
 
-/// What happens to an input record that is not untouched.
+/// The change of an input record that is not untouched.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Change {
     Delete,

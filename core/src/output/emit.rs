@@ -32,7 +32,7 @@ const KERNEL_COPY_BYTES: usize = 256 << 10;
 /// Copied inside the kernel at a time, between two looks at how far the disk is behind; whole blocks of a digest.
 const COPY_BYTES: usize = 16 * digest::BLOCK;
 
-/// What a file is to hold.
+/// The bytes that a file is to hold.
 pub(crate) enum Content<'a> {
     /// The input, byte for byte.
     Input,
@@ -55,7 +55,7 @@ fn end_of(records: usize) -> u64 {
     (PREFIX_BYTES + records * size_of::<Record>()) as u64
 }
 
-/// What is known of the output while the input is copied to it.
+/// The output, as far as it is known while the input is copied to it.
 struct Wanted {
     /// So many bytes of the input, at most.
     bytes: AtomicU64,
@@ -144,7 +144,7 @@ struct Sink<'a> {
     file: File,
     waiting: Vec<Piece<'a>>,
     waiting_bytes: usize,
-    /// What is small or not the input's.
+    /// Bytes that are few, or not the input's.
     own: Vec<u8>,
     /// Where in the output that goes which is put next.
     at: u64,

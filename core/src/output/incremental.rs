@@ -130,7 +130,7 @@ impl Disturbed {
         }
     }
 
-    /// Those of which not all triangles are irregular triangles yet.
+    /// The positions of which not all triangles are irregular triangles yet.
     fn newly(&self) -> Vec<[f32; 3]> {
         self.vertices.positions()[self.known..].to_vec()
     }

@@ -37,7 +37,7 @@ enum Expected {
     Fresh(usize),
 }
 
-/// What a written file should hold.
+/// The bytes that a written file should hold.
 pub(crate) struct Expectation<'a> {
     pub(crate) difference: Difference,
     input: &'a [Record],

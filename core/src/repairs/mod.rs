@@ -30,7 +30,7 @@ pub(crate) use crate::repairs::shared::account::Account;
 use crate::repairs::shared::context::Context;
 use crate::submesh::components::Reversed;
 
-/// Which repairs are made.
+/// The repairs that are made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Steps {
     /// Everything that the profile allows.
@@ -41,7 +41,7 @@ pub(crate) enum Steps {
     Orient,
     /// Bodies are united.
     Union,
-    /// What is no solid is replaced.
+    /// Regions that are no solid are replaced.
     Wrap,
 }
 
@@ -57,7 +57,7 @@ impl Steps {
     }
 }
 
-/// What the repairs did; the mesh itself is in the diagnosis' submesh.
+/// The account of all repairs; the mesh itself is in the diagnosis' submesh.
 pub(crate) struct Repaired {
     pub(crate) reversed: Reversed,
     pub(crate) account: Account,

@@ -58,7 +58,7 @@ const EVERYWHERE: f64 = 0.25;
 /// How often places are taken back until what is left stands by itself; then all are.
 const CHECKS: usize = 8;
 
-/// What was cut out and closed.
+/// Count and size of the places that were cut out and closed.
 #[derive(Default)]
 struct Rebuilt {
     places: u64,

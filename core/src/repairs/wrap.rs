@@ -33,7 +33,7 @@ use crate::submesh::components::{self, Components, Reversed, Through};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 
-/// What nothing else made a solid.
+/// Pieces that nothing else made a solid.
 pub(crate) const REPAIR: Repair = Repair {
     name: RepairName::Wrap,
     changes: Changes::Surface,

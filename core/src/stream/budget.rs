@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::contract::error::{Error, Result};
 
-/// What memory is taken for.
+/// The purpose that memory is taken for.
 #[derive(Clone, Copy)]
 pub(crate) enum Purpose {
     /// Lists, spools and the tables that chunks are solved in.

@@ -110,7 +110,7 @@ impl Take for spool::Writer<'_> {
     }
 }
 
-/// What is learnt in passing.
+/// Findings made in passing.
 struct Passing {
     nonfinite: Vec<(u32, u32)>,
     bounds: Bounds,

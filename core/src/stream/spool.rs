@@ -151,7 +151,7 @@ pub(crate) struct Writer<'a> {
     failed: Option<io::Error>,
 }
 
-/// What a writer leaves behind.
+/// The part of a spool that a writer leaves behind.
 pub(crate) struct Part(io::Result<PartSpooled>);
 
 struct PartSpooled {

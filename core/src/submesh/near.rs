@@ -16,7 +16,7 @@ pub(crate) struct Tolerance {
 }
 
 impl Tolerance {
-    /// What holds at `v`.
+    /// The tolerance at `v`.
     pub(crate) fn at(&self, submesh: &Submesh, v: Vertex) -> f64 {
         self.weld.min(submesh.shortest_edge(v) * self.edge_share)
     }

@@ -59,7 +59,7 @@ impl Link {
     }
 }
 
-/// What one chunk contributes.
+/// The contribution of one chunk.
 #[derive(Debug, Default)]
 pub(crate) struct ChunkTopology {
     pub(crate) irregular_triangles: Vec<IrregularTriangle>,
@@ -70,7 +70,7 @@ pub(crate) struct ChunkTopology {
     pub(crate) reach: Bounds,
     /// Positions at home here.
     pub(crate) vertices: u64,
-    /// Those used by a triangle with three distinct vertices.
+    /// The vertices used by a triangle with three distinct vertices.
     pub(crate) vertices_used: u64,
     /// Positions at home here that irregular triangles use.
     pub(crate) irregular_triangle_vertices: u64,

@@ -13,7 +13,7 @@ use crate::topology::region_sums::RegionSums;
 use crate::util::ids::NONE;
 use crate::util::radix;
 
-/// What the chunks said, before it is united.
+/// Regions as the chunks told them, before they are united.
 #[derive(Debug)]
 pub(crate) struct Parts {
     /// The first part of each chunk, and one past the last.

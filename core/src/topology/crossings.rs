@@ -28,7 +28,7 @@ pub(crate) struct Pair {
     pub(crate) contact: Contact,
 }
 
-/// What one chunk, or the whole file, has found.
+/// The crossings of one chunk, or of the whole file.
 #[derive(Debug, Default)]
 pub(crate) struct Crossings {
     /// Pairs that were tested.

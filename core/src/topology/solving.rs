@@ -13,7 +13,7 @@ use crate::topology::chunk::{self, ChunkTopology, Scratch};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What chunks are solved from, and with.
+/// The records and the plan that chunks are solved from, and the limits of that.
 pub(crate) struct Solving<'s, 'a> {
     pub(crate) path: &'s Path,
     pub(crate) records: &'a [Record],
@@ -26,7 +26,7 @@ pub(crate) struct Solving<'s, 'a> {
     pub(crate) progress: &'s dyn Progress,
 }
 
-/// What was found so far that has to be kept.
+/// Findings so far that have to be kept.
 struct Found {
     irregular_triangles: AtomicU64,
     regions: AtomicU64,
@@ -130,7 +130,7 @@ const MOST_SUSPECTS: u64 = 1 << 30;
 /// Stage name under which the survey reports progress.
 const STAGE: &str = "topology";
 
-/// Those of a chunk, of positions by chunk.
+/// The positions of a chunk, of positions by chunk.
 pub(crate) fn at_home(by_home: &[(ChunkId, [f32; 3])], chunk: ChunkId) -> &[(ChunkId, [f32; 3])] {
     let from = by_home.partition_point(|(home, _)| *home < chunk);
     &by_home[from..from + by_home[from..].partition_point(|(home, _)| *home == chunk)]

@@ -21,7 +21,7 @@ pub(crate) struct Ring {
 pub(crate) struct Stars {
     /// Triangles around each vertex.
     counts: Vec<u32>,
-    /// What lies beyond a vertex's count is left from another chunk.
+    /// The ring around each vertex. Entries beyond a vertex's count are left from another chunk.
     rings: Vec<Ring>,
     /// Where a long star begins in `next` and `previous`.
     starts: Vec<u32>,

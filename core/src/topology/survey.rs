@@ -66,12 +66,12 @@ pub(crate) struct Survey<'a> {
     merged: Vec<u32>,
     /// So many of the promoted vertices have divided the surface.
     dividing: usize,
-    /// What was counted while the chunks were solved, and is still held.
+    /// Memory that was counted while the chunks were solved, and is still held.
     budget: Budget,
     threads: usize,
 }
 
-/// What became of regions that were divided.
+/// The fate of regions that were divided.
 pub(crate) struct Division {
     /// The new irregular triangles, ascending, with the regions they belonged to.
     pub(crate) fetched: Vec<(IrregularTriangle, u32)>,
@@ -105,7 +105,7 @@ impl<'a> Survey<'a> {
         Ok(survey)
     }
 
-    /// What is known before chunks are solved.
+    /// A survey before its chunks are solved.
     fn unsolved(records: &'a [Record], guide: Guide<'a>, plan: Plan, mut members: Members, limits: &Limits) -> Self {
         let bounds = members.bounds.normalised();
         let nonfinite = std::mem::take(&mut members.nonfinite);

@@ -53,7 +53,7 @@ pub(crate) struct Extended {
     told: bool,
     /// How many pieces there are, and how many of them lie in the plane of no surface.
     pieces: [usize; 2],
-    /// What lies under it, seen from the loop's centre.
+    /// The volume under it, seen from the loop's centre.
     pub(crate) volume: f64,
     /// The volume by which another patch like it differs.
     pub(crate) in_doubt: f64,
@@ -160,7 +160,7 @@ fn accepted(rim: &Rim<'_>, beyond: &[Option<DVec3>], tolerance: f64, shown: &Sho
     })
 }
 
-/// What tells that there is a plane.
+/// The reason to take it that there is a plane.
 enum Witness {
     None,
     /// It holds one line of the loop, or little more, at right angles to the surface beyond.

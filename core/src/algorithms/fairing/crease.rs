@@ -28,7 +28,7 @@ const MOST_ENDS: usize = 12;
 /// Where a crease ends at the rim: the vertex, and the direction in which it comes in.
 type End = (u32, DVec3);
 
-/// What is sharp.
+/// Sharp edges and corners.
 pub(super) struct Creases {
     /// For each vertex: does curvature not go across it?
     pub(super) sharp: Vec<bool>,

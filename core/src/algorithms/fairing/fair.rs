@@ -12,7 +12,7 @@ use glam::DVec3;
 use super::sheet::Sheet;
 use super::sparse::{Factor, Rows};
 
-/// What is made small.
+/// The energy that is made small.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Energy {
     /// Area, by edges of the same stiffness: needs no geometry to begin with.

@@ -104,7 +104,7 @@ impl<'a> Flips<'a> {
         self.triangles
     }
 
-    /// What is on both sides of an edge; `None` on the rim.
+    /// The triangles on both sides of an edge; `None` on the rim.
     pub(super) fn around(&self, edge: Edge) -> Option<Hinge> {
         Hinge::at(&self.triangles, &self.across, edge)
     }

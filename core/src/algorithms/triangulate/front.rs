@@ -19,7 +19,7 @@ use super::rim::Rim;
 use crate::geometry::exact::{Point, at};
 use crate::geometry::tri_tri::{Triangle, segment_pierces, triangles_cross};
 
-/// Which ear comes first.
+/// The ear that comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Order {
     /// That with the shortest chord: the front shrinks evenly.

@@ -16,7 +16,7 @@ use super::patch::Unfillable;
 use super::rim::Rim;
 use crate::geometry::exact::{at, collinear};
 
-/// What is minimised first.
+/// The weight that is minimised first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Weight {
     /// The sharpest bend, then the area.
@@ -58,7 +58,7 @@ fn bend(a: DVec3, b: DVec3) -> u32 {
     if a == DVec3::ZERO || b == DVec3::ZERO { 0 } else { ((1.0 - a.dot(b)) * BEND_STEPS) as u32 }
 }
 
-/// Which triangles may be used.
+/// The triangles that may be used.
 pub(super) enum Choice<'a, 'b> {
     /// All that have an area and are not folded flat onto the mesh.
     Any,

@@ -22,7 +22,7 @@ pub(crate) struct Rim<'a> {
     pub forbidden: &'a dyn Fn(u32, u32) -> bool,
 }
 
-/// What is wrong with a triangulation.
+/// A fault of a triangulation.
 pub(super) enum Fault {
     /// A triangle or chord that the rim does not admit.
     Inadmissible,
@@ -117,7 +117,7 @@ impl Rim<'_> {
     }
 }
 
-/// What a patch between one rim or several must respect.
+/// The surface that a patch between one rim or several must respect.
 pub(super) struct Surroundings<'a> {
     pub(super) points: &'a [Point],
     /// The mesh's triangles along the rims.

@@ -26,7 +26,7 @@ const ATTEMPTS: usize = 48;
 /// Weight of an edge between the sides, as a share of its square: of strips of equal area and bend, that with the shortest edges.
 const SHORT: f64 = 0.25;
 
-/// What is weighed beside the edges' lengths.
+/// The weight beside the edges' lengths.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Weight {
     /// The area, and how much it bends.
@@ -154,7 +154,7 @@ struct Search<'a> {
     points: &'a [Point],
     around: Surroundings<'a>,
     work: usize,
-    /// What the first path came to grief on.
+    /// The fault that the first path came to grief on.
     fault: Option<Unfillable>,
 }
 

@@ -18,7 +18,7 @@ pub(crate) struct Wrapping {
     pub(crate) triangles: Vec<Corners>,
     /// Edge of a cube of the lattice, in the file's units.
     pub(crate) cell: f64,
-    /// What it encloses, in the file's units, cubed.
+    /// The volume that it encloses, in the file's units, cubed.
     pub(crate) volume: f64,
 }
 

@@ -43,7 +43,7 @@ struct Node {
     count: u32,
 }
 
-/// What a node is seen from afar.
+/// A node as it is seen from afar.
 #[derive(Clone, Default)]
 struct Moments {
     centre: DVec3,
@@ -61,7 +61,7 @@ pub(crate) struct Tree {
     nodes: Vec<Node>,
     /// For each node, where solid angles are asked for.
     moments: Vec<Moments>,
-    /// What closes the surface, where rays are asked.
+    /// The caps that close the surface, where rays are asked.
     caps: Option<Box<Self>>,
 }
 

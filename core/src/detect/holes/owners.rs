@@ -28,7 +28,7 @@ const DETAIL: f64 = 0.005;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Owners {
     of_loop: Vec<u32>,
-    /// What the piece encloses once it is closed, by piece.
+    /// The volume that the piece encloses once it is closed, by piece.
     volumes: Vec<f64>,
     /// The way that the piece's surface faces: 1 outward, -1 inward, as the largest one faces outward; 0: it does not stand for itself. By piece.
     stands: Vec<i8>,
@@ -110,7 +110,7 @@ pub(crate) fn is_large(area: f64, volume: f64) -> bool {
     area.powi(3) >= LARGE.powi(3) * volume * volume
 }
 
-/// Which pieces of these areas are details.
+/// Of pieces of these areas, those that are details.
 pub(crate) fn are_details(areas: impl Iterator<Item = f64> + Clone) -> Vec<bool> {
     let all: f64 = areas.clone().sum();
     areas.map(|area| area < DETAIL * all).collect()

@@ -87,7 +87,7 @@ pub(super) struct Pair {
     pub(super) characteristic_distance: f64,
 }
 
-/// What is missing between two loops.
+/// The surface that is missing between two loops.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Missing {
     /// The end of a wall; the areas of a strip and of two caps.
@@ -295,7 +295,7 @@ fn walls<'s>(
     pairs.collect()
 }
 
-/// What is missing between two loops, if anything is.
+/// The surface that is missing between two loops, if any is.
 fn ring(a: &Shape, b: &Shape) -> Option<Ring> {
     if !face(a, b, OPPOSITE) {
         return None;

@@ -29,7 +29,7 @@ const UNEVEN: f64 = 0.42;
 /// A slit too wide for a gap is none of these below this: its sides are parallel.
 const EVEN: f64 = 0.1;
 
-/// What lies across a loop.
+/// The surface across a loop, as seen from each of its vertices.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sides {
     /// Vertices that are no ends; those of them with a side across; within the share of their edges that a gap may have; and within the weld

@@ -20,7 +20,7 @@ const HOLE: f64 = 0.01;
 pub(super) struct Patches {
     /// Those that lie in a plane, up to a reach, are small against their body, or are explained.
     pub(super) plausible: Vec<u32>,
-    /// Those that close holes.
+    /// Triangles of patches that close holes.
     pub(super) holes: Vec<u32>,
 }
 

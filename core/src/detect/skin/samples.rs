@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::contract::report::RepairName;
 use crate::util::scatter;
 
-use super::surfaces::Surfaces;
+use super::surfaces::{Corners, Surfaces};
 
 /// No more points than about this many are taken on a surface.
 const MOST: f64 = 65_536.0;
@@ -22,8 +22,6 @@ pub(super) struct Samples {
     pub(super) causes: Vec<Option<RepairName>>,
     pub(super) area_of_each: f64,
 }
-
-type Corners = [[f32; 3]; 3];
 
 /// From where a surface counts.
 #[derive(Clone, Copy, PartialEq, Eq)]

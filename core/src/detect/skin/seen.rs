@@ -11,6 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use glam::DVec3;
 
 use crate::geometry::position;
+use crate::geometry::ray_grid::RayGrid;
 
 use super::surfaces::{Surfaces, Which};
 
@@ -108,58 +109,23 @@ struct Bundle {
     /// Where the rays begin, upright.
     from: Vec<[f64; 3]>,
     met: Vec<AtomicBool>,
-    lo: [f64; 2],
-    per_unit: [f64; 2],
-    side: usize,
-    starts: Vec<u32>,
-    order: Vec<u32>,
+    grid: RayGrid,
 }
 
 impl Bundle {
     fn of(direction: Direction, points: &[OnSurface], beside: f64) -> Self {
         let from: Vec<[f64; 3]> = points.iter().map(|p| direction.upright(p.at)).collect();
         let met = from.iter().map(|_| AtomicBool::new(false)).collect();
-        let side = ((from.len() as f64).sqrt() as usize * 4).clamp(1, 512);
-        let ends = |k: usize| from.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p[k]), b.max(p[k])));
-        let ends = [ends(0), ends(1)];
-        let per_unit = ends.map(|(lo, hi)| if hi > lo { side as f64 / (hi - lo) } else { 0.0 });
-        let mut bundle = Self {
-            direction,
-            beside,
-            from,
-            met,
-            lo: ends.map(|(lo, _)| lo),
-            per_unit,
-            side,
-            starts: vec![0; side * side + 1],
-            order: Vec::new(),
-        };
-        let cells: Vec<usize> = bundle.from.iter().map(|p| bundle.cell(1, p[1]) * side + bundle.cell(0, p[0])).collect();
-        cells.iter().for_each(|c| bundle.starts[c + 1] += 1);
-        (0..side * side).for_each(|c| bundle.starts[c + 1] += bundle.starts[c]);
-        bundle.order = (0..cells.len() as u32).collect();
-        bundle.order.sort_by_key(|p| cells[*p as usize]);
-        bundle
-    }
-
-    fn cell(&self, axis: usize, x: f64) -> usize {
-        (((x - self.lo[axis]) * self.per_unit[axis]) as usize).min(self.side - 1)
+        let grid = RayGrid::new(from.iter().copied(), 4, 512);
+        Self { direction, beside, from, met, grid }
     }
 
     /// Notes the rays that a triangle is in the way of.
     fn meet(&self, corners: &[[f64; 3]; 3]) {
         let q = corners.map(|p| self.direction.upright(p));
-        let span = |k: usize| {
-            let (lo, hi) = (q[0][k].min(q[1][k]).min(q[2][k]), q[0][k].max(q[1][k]).max(q[2][k]));
-            (self.cell(k, lo), self.cell(k, hi))
-        };
-        let ((x0, x1), (y0, y1)) = (span(0), span(1));
-        for row in (y0..=y1).map(|y| y * self.side) {
-            let rays = &self.order[self.starts[row + x0] as usize..self.starts[row + x1 + 1] as usize];
-            for ray in rays.iter().map(|r| *r as usize) {
-                if !self.met[ray].load(Relaxed) && is_above(&q, self.from[ray], self.beside) {
-                    self.met[ray].store(true, Relaxed);
-                }
+        for ray in self.grid.under(&q).flatten().map(|r| *r as usize) {
+            if !self.met[ray].load(Relaxed) && is_above(&q, self.from[ray], self.beside) {
+                self.met[ray].store(true, Relaxed);
             }
         }
     }

@@ -8,7 +8,8 @@ use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 
-type Corners = [[f32; 3]; 3];
+/// A triangle by its positions.
+pub(super) type Corners = [[f32; 3]; 3];
 
 /// By region of regular surface, the repair that dropped it.
 pub(crate) type DroppedBy = Vec<Option<RepairName>>;

@@ -233,3 +233,17 @@ fn long_repairs_are_cancelled_in_their_middle() {
         assert!(more < all / 2, "asked {more} times after the end, of {all}");
     }
 }
+
+/// A sheet of side 4 in a block, through its wall, and beside it. Of the first one nothing is missed.
+#[test]
+fn a_sheet_that_goes_is_in_material_only_if_all_of_it_is() {
+    let block = cuboid([0.0; 3], [8.0; 3]);
+    for (along, is_in, outcome) in
+        [(2.0, true, Outcome::Repaired), (5.5, false, Outcome::NeedsReview), (20.0, false, Outcome::NeedsReview)]
+    {
+        let sheet = shifted(&plate(4, |_, _| true), [along, 2.0, 4.5]);
+        let report = repaired(&[block.clone(), sheet].concat()).report;
+        let in_material: Vec<bool> = report.sheets_dropped.iter().map(|sheet| sheet.in_material).collect();
+        assert_eq!((in_material, report.outcome), (vec![is_in], outcome), "{along}");
+    }
+}

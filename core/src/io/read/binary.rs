@@ -14,7 +14,7 @@ const SAMPLES: usize = 1000;
 /// Coordinates of a plausible triangle stay below this. Text read as `f32` mostly does not.
 const PLAUSIBLE_COORDINATE: f32 = 1e10;
 
-/// What of a binary file is triangles.
+/// The part of a binary file that is triangles.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Layout {
     pub(super) triangles: usize,

@@ -10,7 +10,7 @@ use crate::io::record::{self, Point, Record};
 /// Names of solids kept for the report.
 pub(super) const NAMES_KEPT: usize = 5;
 
-/// What a piece of text held, besides triangles.
+/// Counts of a piece of text, besides triangles.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Tally {
     pub(super) facets: u64,

@@ -14,7 +14,7 @@ use std::fs::{File, Metadata, OpenOptions};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
-/// What tells one state of a file from the next.
+/// Properties that tell one state of a file from the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Identity {
     device: u64,
@@ -125,12 +125,12 @@ impl MeshFile {
         matches!(self.source, Source::InPlace(_))
     }
 
-    /// What the file was read as.
+    /// The format that the file was read as.
     pub fn format(&self) -> Format {
         self.format
     }
 
-    /// What is odd about the file; empty for a flawless one.
+    /// Oddities of the file; none of a flawless one.
     pub fn findings(&self) -> &[Finding] {
         &self.findings
     }

@@ -10,7 +10,7 @@ const HEAD: usize = 4096;
 /// Readers that tell text by its bytes look at no more than this.
 const HIGH_BYTES_WITHIN: usize = 1024;
 
-/// What a file is.
+/// The kind of a file.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Binary(Layout),
@@ -22,7 +22,7 @@ pub(super) enum Kind {
 pub(super) struct Text {
     /// Byte of the first token.
     pub(super) start: usize,
-    /// What is odd about its letters and line ends.
+    /// Oddities of its letters and line ends.
     pub(super) findings: Vec<Finding>,
 }
 
@@ -67,7 +67,7 @@ fn text(bytes: &[u8]) -> Option<Text> {
     fits.then(|| Text { start, findings: findings(bytes, body, mark > 0) })
 }
 
-/// What is odd about the letters and line ends near the beginning.
+/// Oddities of the letters and line ends near the beginning.
 fn findings(bytes: &[u8], body: &[u8], mark: bool) -> Vec<Finding> {
     let has = |byte: u8| body.contains(&byte);
     let after_mark = bytes.iter().take(HIGH_BYTES_WITHIN).skip(if mark { 3 } else { 0 });

@@ -26,7 +26,7 @@ pub fn ends_in_zeros(file: &File) -> io::Result<bool> {
     Ok(zeros >= FEWEST_RECORDS * size_of::<Record>() && (content.is_empty() || !is_complete_text(content)))
 }
 
-/// What precedes the zeros at the end, and how many these are.
+/// The bytes before the zeros at the end, and how many zeros there are.
 pub(super) fn split(bytes: &[u8]) -> (&[u8], usize) {
     let mut content = bytes;
     // Whole blocks first, without a branch for each byte: there may be gigabytes of zeros.
@@ -40,7 +40,7 @@ pub(super) fn split(bytes: &[u8]) -> (&[u8], usize) {
     (content.get(..end).unwrap_or_default(), bytes.len() - end)
 }
 
-/// What the end of a binary file's records says.
+/// The finding on the end of a binary file's records.
 pub(super) fn of_records(records: &[Record]) -> Option<Finding> {
     let zeros = split(records.as_flattened()).1 / size_of::<Record>();
     (zeros >= FEWEST_RECORDS).then(|| {
@@ -49,7 +49,7 @@ pub(super) fn of_records(records: &[Record]) -> Option<Finding> {
     })
 }
 
-/// What `zeros` zero bytes behind a text say.
+/// The finding on `zeros` zero bytes behind a text.
 pub(super) fn of_text(text: &[u8], zeros: usize) -> Option<Finding> {
     if zeros == 0 {
         return None;

@@ -36,7 +36,7 @@ pub(super) struct Parsed {
     pub(super) header: [u8; HEADER_BYTES],
 }
 
-/// What reading a text needs to know beside the text.
+/// Paths, limits and progress of reading a text.
 pub(super) struct Context<'a> {
     pub(super) path: &'a Path,
     pub(super) spool: &'a Path,
@@ -179,7 +179,7 @@ fn judge(tally: &Tally, records: u64) -> std::result::Result<(), Rejection> {
     }
 }
 
-/// What is odd about a text's grammar.
+/// Oddities of a text's grammar.
 fn findings(tally: &Tally) -> Vec<Finding> {
     let mut found = Vec::new();
     if tally.cut_off {

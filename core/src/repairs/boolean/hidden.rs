@@ -35,7 +35,7 @@ use crate::submesh::components::{Components, Reversed};
 use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
 
-/// What others hide.
+/// Surface that other surface hides.
 pub(crate) const REPAIR: Repair = Repair {
     name: RepairName::Hidden,
     changes: Changes::Pieces,
@@ -61,7 +61,7 @@ const DIRECTIONS: [Direction; 6] = [
     Direction { axis: 1, backward: true },
 ];
 
-/// What was hidden.
+/// Counts and volumes of the surface that was hidden.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Hidden {
     /// Pieces of any kind.

@@ -91,7 +91,7 @@ impl State<'_, '_, '_> {
     }
 }
 
-/// What hangs together in edges, each in ascending order.
+/// Parts of a region that hang together in edges, each in ascending order.
 fn parts(submesh: &Submesh, region: &[u32]) -> Vec<Vec<u32>> {
     let mut at_edge: BTreeMap<[Vertex; 2], u32> = BTreeMap::new();
     let mut parents: Vec<u32> = (0..region.len() as u32).collect();

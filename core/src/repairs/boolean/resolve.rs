@@ -84,7 +84,7 @@ const FLAKE: f64 = 1.0 / 16.0;
 /// Times that everything is done anew without the clusters that failed.
 const ATTEMPTS: usize = 12;
 
-/// What it takes to look at the file again.
+/// Path, limits and progress with which a file is looked at again.
 pub(crate) struct Means<'a> {
     pub(crate) path: &'a Path,
     pub(crate) limits: &'a Limits,
@@ -143,7 +143,7 @@ pub(crate) fn resolve(
     )
 }
 
-/// What attempts that failed have left.
+/// Clusters that attempts which failed have left.
 #[derive(Default)]
 struct Failed {
     left: Vec<Failure>,

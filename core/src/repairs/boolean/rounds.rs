@@ -38,7 +38,7 @@ const REFILL_AFTER: u32 = 2;
 /// round.
 const FARTHEST: f64 = 1.0 / 256.0;
 
-/// What an attempt goes by.
+/// The engine, the mesh and its pairs that an attempt begins with.
 #[derive(Clone, Copy)]
 pub(crate) struct Attempt<'a> {
     pub(crate) engine: &'a dyn Arrange,

@@ -17,7 +17,7 @@ use crate::submesh::{Submesh, Vertex};
 use crate::util::ids::NONE;
 use crate::util::steps;
 
-/// What becomes of a triangle.
+/// The fate of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fate {
     Stays,

@@ -21,7 +21,7 @@ use crate::repairs::boolean::state::{Met, State, Tried};
 use crate::submesh::Vertex;
 use crate::util::ids::NONE;
 
-/// What a pass changed.
+/// Changes of a pass.
 #[derive(Default)]
 struct Changed {
     /// Triangles that have other corners than before, or are new.
@@ -77,7 +77,7 @@ impl State<'_, '_, '_> {
         around
     }
 
-    /// What a pass has changed since the submesh was marked stays.
+    /// All changes of a pass since the submesh was marked stay.
     pub(crate) fn keep(&mut self, now: Met) -> Met {
         self.work.keep();
         self.unite(&now.crossing);

@@ -78,7 +78,7 @@ impl From<Stuck> for Halted {
 
 pub(crate) type Tried<T> = Result<T, Halted>;
 
-/// What everything was before.
+/// The mesh before an attempt, to go back to.
 pub(crate) struct Before {
     pub(crate) triangles: Vec<Triangle>,
     pub(crate) reversed: Reversed,
@@ -90,7 +90,7 @@ pub(crate) struct Met {
     pub(crate) overlay: Overlay,
 }
 
-/// What was resolved.
+/// Counts and measures of the crossings that were resolved.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Resolved {
     /// Pairs of triangles that crossed.

@@ -8,12 +8,12 @@ use crate::repairs::boolean::clusters::Clusters;
 use crate::submesh::Submesh;
 use crate::util::steps;
 
-/// What was done to one piece of surface, or to several.
+/// The account of one piece of surface, or of several.
 #[derive(Clone, Copy)]
 struct Done {
     /// Around its triangles that crossed something, in whatever round.
     bounds: Bounds,
-    /// Those of the first round.
+    /// The triangles of the first round.
     triangles: u64,
     /// The last round in which any did.
     rounds: u32,

@@ -75,7 +75,7 @@ impl Pair {
 pub(crate) struct Surplus {
     /// Walls that pieces of surface have in common, whole: each piece is closed with its side of them.
     pub(crate) common: Vec<u32>,
-    /// What is left of such pairs.
+    /// The triangles that are left of such pairs.
     pub(crate) halves: Vec<u32>,
     /// Others.
     pub(crate) sides: Vec<u32>,

@@ -113,7 +113,7 @@ fn hanging(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> Vec<u32> 
     submesh.living().filter(|t| hangs(*t) && lies_on_another(t)).collect()
 }
 
-/// Which lie on a triangle of the regular surface.
+/// The patches that lie on a triangle of the regular surface.
 fn on_regular(survey: &Survey<'_>, lone: &[Lone]) -> Vec<bool> {
     let boxes: Vec<Bounds> = lone.iter().map(|l| around(&l.corners, l.reach)).collect();
     let mut everything = Bounds::EMPTY;

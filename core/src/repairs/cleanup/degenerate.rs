@@ -13,7 +13,7 @@ use crate::repairs::shared::work::{Pass, Work};
 use crate::submesh::{Submesh, Vertex};
 use crate::util::steps;
 
-/// What a report says of triangles without area.
+/// The report's note on triangles without area.
 const NOTE: &str = "triangles without area removed, their T-junctions closed";
 
 /// Triangles with a repeated vertex, and with them what of those without area needs no neighbours.

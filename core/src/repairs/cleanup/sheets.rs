@@ -16,7 +16,7 @@ use crate::contract::settings::{Guarantee, Profile, Sheets};
 use crate::detect::bodies;
 use crate::repairs::shared::context::SheetRim;
 use crate::repairs::shared::context::{Changes, Context, Done, Repair};
-use crate::repairs::shared::lone_sheets;
+use crate::repairs::shared::gather::gather;
 use crate::repairs::shared::work::Work;
 use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed, Through};
@@ -86,8 +86,8 @@ fn with_points(
     let mut listed: Vec<usize> = gone.iter().map(|(_, c, _)| *c).collect();
     listed.sort_unstable();
     let most = (ASKED / listed.len().max(1)).clamp(ASKED_OF_ONE[0], ASKED_OF_ONE[1]);
-    let gathered = lone_sheets::gather(survey, submesh, components, reversed, &listed);
-    let points_of = |c: usize| listed.binary_search(&c).map_or(Vec::new(), |place| points_on(&gathered[place].0, most));
+    let gathered = gather(survey, submesh, components, reversed, &listed);
+    let points_of = |c: usize| listed.binary_search(&c).map_or(Vec::new(), |place| points_on(&gathered[place], most));
     gone.into_iter().map(|(_, c, sheet)| (sheet, points_of(c))).collect()
 }
 

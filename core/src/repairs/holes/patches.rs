@@ -40,7 +40,7 @@ pub(crate) struct Placed {
     pub(crate) coarse: Vec<[Vertex; 3]>,
     /// It was shaped more finely since it crossed another body.
     pub(crate) refined: bool,
-    /// What it came to grief on.
+    /// The surface that it came to grief on.
     pub(crate) obstacles: Vec<Obstacle>,
     /// Nothing else was found than a patch that crosses bodies which run into this one already.
     pub(crate) across: bool,

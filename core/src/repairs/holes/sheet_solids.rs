@@ -20,6 +20,7 @@ use crate::geometry::exact::Point;
 use crate::geometry::position::Position;
 use crate::geometry::sums::step_at;
 use crate::repairs::shared::context::{Changes, Context, Done, Repair};
+use crate::repairs::shared::gather::gather;
 use crate::repairs::shared::lone_sheets::{self, LoneSheets, Which};
 use crate::repairs::shared::pieces::take_away;
 use crate::repairs::shared::work::Work;
@@ -68,9 +69,9 @@ fn thicken_all(cx: &mut Context<'_, '_>, thickness: f64) -> u64 {
         goes[component as usize] = true;
     }
     let wanted: Vec<usize> = (0..goes.len()).filter(|c| goes[*c]).collect();
-    let gathered = lone_sheets::gather(cx.survey, &cx.work, &components, &cx.reversed, &wanted);
+    let gathered = gather(cx.survey, &cx.work, &components, &cx.reversed, &wanted);
     let mut walls = Vec::new();
-    for (component, (sheet, _)) in wanted.into_iter().zip(gathered) {
+    for (component, sheet) in wanted.into_iter().zip(gathered) {
         match thicken(&sheet, thickness) {
             Some(wall) => walls.push(wall),
             None => goes[component] = false,

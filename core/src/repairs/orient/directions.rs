@@ -4,7 +4,7 @@ use crate::contract::report::RepairName;
 use crate::geometry::sums::Bounds;
 use crate::repairs::orient::inverted::{Inverted, inverted};
 use crate::repairs::shared::context::{Changes, Done, Repair};
-use crate::repairs::shared::lone_sheets::gather;
+use crate::repairs::shared::gather::gather;
 use crate::repairs::shared::work::Work;
 use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed};
@@ -24,7 +24,7 @@ pub(crate) const COHERENT: Repair = Repair {
     },
 };
 
-/// What is inside out.
+/// Closed pieces that are inside out.
 pub(crate) const OUTWARD: Repair = Repair {
     name: RepairName::Outward,
     changes: Changes::Outward,
@@ -86,7 +86,7 @@ impl Parity {
     }
 }
 
-/// What was turned.
+/// How many triangles were turned, and how many edges contradict each other still.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Turned {
     pub(crate) triangles: u64,
@@ -188,7 +188,7 @@ fn surface_of(
 ) -> Vec<[[f32; 3]; 3]> {
     let count: u64 = wanted.iter().map(|piece| pieces.list[*piece as usize].triangles).sum();
     let wanted: Vec<usize> = wanted.iter().filter(|_| count <= MOST_GATHERED).map(|piece| *piece as usize).collect();
-    gather(survey, submesh, pieces, reversed, &wanted).into_iter().flat_map(|(surface, _)| surface).collect()
+    gather(survey, submesh, pieces, reversed, &wanted).concat()
 }
 
 /// The box of all pieces but these, where it ends sooner than that of all: to the other sides it is endless. `None`: nowhere.

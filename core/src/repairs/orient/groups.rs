@@ -67,7 +67,7 @@ struct Groups<'a> {
     parity: Parity,
 }
 
-/// What is seen of a group, the way round that its root has.
+/// How much of a group is seen from either side, the way round that its root has.
 #[derive(Clone, Copy, Default)]
 struct Seen {
     area: f64,

@@ -61,7 +61,7 @@ struct Found {
     guessed: Vec<Bounds>,
 }
 
-/// What the file says of a piece.
+/// How many triangles of a piece are the file's, and how many of those were turned.
 #[derive(Clone, Copy, Default)]
 struct Said {
     /// Triangles of the file: all, and those that were turned.

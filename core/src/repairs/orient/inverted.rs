@@ -32,7 +32,7 @@ const TOUCHES: f64 = 0.02;
 /// A guess about a piece of less than this share of all volume is not told.
 const LEAST: f64 = 1e-3;
 
-/// What is inside out.
+/// Pieces that are inside out.
 #[derive(Debug, Default)]
 pub(crate) struct Inverted {
     /// By piece.
@@ -41,11 +41,11 @@ pub(crate) struct Inverted {
     pub(crate) doubts: Vec<String>,
     /// Cavities that cross the walls of others, ascending.
     pub(crate) poking_out: Vec<u32>,
-    /// Those of them that are no guess.
+    /// Those pieces that are no guess.
     pub(crate) plainly: Vec<u32>,
 }
 
-/// What winds around a point, ascending, with winding numbers.
+/// The pieces that wind around a point, ascending, with winding numbers.
 type Around = Vec<(u32, i32)>;
 
 /// The closed ones of all `pieces` that are inside out. A look at the chunks where pieces lie in others' boxes, and at those of what crosses.

@@ -54,7 +54,7 @@ const CLEARLY: usize = 2;
 /// A ray begins so far from the surface, as a share of the largest coordinate: what rounding in f64 cannot do, and far less than f32 can tell.
 const OFF: f64 = 1.0 / (1u64 << 40) as f64;
 
-/// What was looked at.
+/// The triangles that were turned, and those that are settled.
 #[derive(Debug, Default)]
 pub(crate) struct Faced {
     /// Triangles that were turned.

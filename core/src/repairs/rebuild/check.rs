@@ -13,7 +13,7 @@ use crate::submesh::components::nonmanifold_vertices;
 use crate::submesh::{Submesh, Vertex};
 use crate::util::union_find;
 
-/// Which place a vertex or a new triangle belongs to.
+/// The place that a vertex or a new triangle belongs to.
 pub(crate) struct Owners {
     of_vertex: HashMap<Vertex, u32>,
     first: u32,
@@ -72,7 +72,7 @@ impl Owners {
     }
 }
 
-/// What came of some places.
+/// The verdict on some places.
 #[derive(Default)]
 pub(crate) struct Verdict {
     /// Where something is wrong still.

@@ -17,7 +17,7 @@ use crate::util::union_find;
 pub(crate) struct Place {
     /// Ascending.
     pub(crate) seeds: Vec<u32>,
-    /// Those of them that cross something or have no area: they cannot stay.
+    /// Those triangles that cross something or have no area: they cannot stay.
     pub(crate) crossing: BTreeSet<u32>,
 }
 

@@ -14,22 +14,22 @@ const MOST_TRIANGLES: usize = 1 << 16;
 /// And this share of all surface.
 const MOST_SHARE: f64 = 0.25;
 
-/// What of the surfaces in a region is not cut out.
+/// The surfaces in a region that are not cut out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stays {
     /// The largest one, if it crosses nothing: the others draw back from it.
     Largest,
-    /// Those that are wholly in it: they are bodies.
+    /// Surfaces that are wholly in it: they are bodies.
     Closed,
 }
 
-/// What is cut out at a place.
+/// The triangles that are cut out at a place.
 pub(crate) struct Cut {
     /// Its number.
     pub(crate) place: u32,
     /// Ascending.
     pub(crate) triangles: Vec<u32>,
-    /// What could have been cut out, and is not.
+    /// Triangles that could have been cut out, and are not.
     pub(crate) stays: Vec<u32>,
     pub(crate) area: f64,
 }
@@ -101,7 +101,7 @@ fn unite(submesh: &Submesh, places: &mut Vec<Place>, regions: Vec<BTreeSet<u32>>
     regions
 }
 
-/// What goes of a region, and what stays. `None`: nothing can.
+/// The triangles of a region that go, and those that stay. `None`: none can go.
 fn divided(
     submesh: &Submesh,
     radial: &RadialPairs,

@@ -126,7 +126,7 @@ impl Of {
 #[derive(Clone, Copy)]
 struct Copy {
     of: Of,
-    /// Which of the places that were tried it has.
+    /// The place of those tried that it has.
     place: usize,
     away: f64,
 }

@@ -10,7 +10,7 @@ use crate::submesh::components::nonmanifold_vertices;
 use crate::submesh::{Submesh, Vertex};
 use std::fmt;
 
-/// What was taken apart.
+/// Counts and distances of the surfaces that were taken apart.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Separated {
     /// Fans that got a copy of their vertex.

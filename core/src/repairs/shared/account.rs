@@ -3,7 +3,7 @@
 use crate::contract::report::{BoundaryLoops, LoopLeft, Region, Repair, RepairName, SheetDropped, Skin, Volumes, Wrap};
 use crate::detect::review::{Asked, Enclosed, Explained};
 
-/// What the report says of the repairs.
+/// All that the report says of the repairs.
 #[derive(Default)]
 pub(crate) struct Account {
     /// By kind, in order of first use.
@@ -12,7 +12,7 @@ pub(crate) struct Account {
     pub(crate) loops: Option<BoundaryLoops>,
     pub(crate) loops_left: Vec<LoopLeft>,
     pub(crate) sheets: Vec<SheetDropped>,
-    /// What lay in the material of others, and is gone.
+    /// Bodies in the material of others, which are gone.
     pub(crate) enclosed: Enclosed,
     /// Guesses of repairs that a person must look at, each a line that names the guess, its place and its size. A good result with any needs review.
     pub(crate) doubts: Vec<String>,
@@ -20,7 +20,7 @@ pub(crate) struct Account {
     pub(crate) explained: Explained,
     /// Rims of lone sheets that stay open.
     pub(crate) open_sheets: u64,
-    /// What the profile asked to be added.
+    /// Surface that was added because the profile asked for it.
     pub(crate) asked: Asked,
     /// What was replaced because nothing else made it a solid, or would have been.
     pub(crate) wraps: Vec<Wrap>,

@@ -32,7 +32,7 @@ pub(crate) enum NotAdmitted {
     Sheet,
 }
 
-/// What decides of a submesh's loops.
+/// The rules of a profile, and the loops that they refuse.
 pub(crate) struct Admission<'p> {
     profile: &'p Profile,
     longest: f64,

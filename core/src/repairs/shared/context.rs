@@ -31,7 +31,7 @@ pub(crate) struct Repair {
     pub(crate) run: for<'c, 'r> fn(&mut Context<'c, 'r>) -> Result<Done>,
 }
 
-/// What a repair may change. It decides what is still known after it.
+/// The parts of a mesh that a repair may change. That decides what is still known after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Changes {
     /// Vertices are merged, or triangles come, go, or are divided.
@@ -44,7 +44,7 @@ pub(crate) enum Changes {
     Outward,
 }
 
-/// What a repair did.
+/// How much a repair did, and the words for it.
 pub(crate) struct Done {
     /// How much, in the unit that the note names.
     pub(crate) count: u64,
@@ -64,13 +64,13 @@ impl Done {
 /// What repairs know of the mesh. It is found out when it is asked for, and forgotten when the mesh changes.
 #[derive(Default)]
 struct Known {
-    /// What stands for itself, and the version of the mesh that it is of.
+    /// The pieces that stand for themselves, and the version of the mesh that they are of.
     pieces: Option<(u64, Rc<Components>)>,
     /// All pieces enclose what they should.
     is_outward: bool,
 }
 
-/// What one repair hands to a later one.
+/// Findings that one repair hands to a later one.
 #[derive(Default)]
 pub(crate) struct Handed {
     /// Only the loop through this place is to be closed. Of the caller, for the filling.

@@ -17,7 +17,8 @@ use crate::algorithms::wrap::tree::{Corners, Tree};
 use crate::detect::bodies;
 use crate::detect::holes::{Shapes, loops::Loop};
 use crate::geometry::distance::place;
-use crate::geometry::position::{self, Position};
+use crate::geometry::position::Position;
+use crate::repairs::shared::gather::gather;
 use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::submesh::edges::Edges;
@@ -45,7 +46,7 @@ const MOST_TRIANGLES: u64 = 1 << 21;
 /// Triangles of a component that are asked what is behind them, at most.
 const SAMPLES: usize = 1 << 11;
 
-/// What counts.
+/// Kinds of sheets that are looked for.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Which {
     Sheets,
@@ -66,13 +67,13 @@ pub(crate) struct LoneSheets {
     pub(crate) of_triangle: Vec<u32>,
 }
 
-/// What is known of a component.
+/// Sizes of a component and of the cones that close it, and kinds of its edges.
 #[derive(Clone, Copy, Default)]
 struct Mouth {
     /// Of the surface, and of the cones over its rims.
     area: f64,
     cones: f64,
-    /// What it encloses with them.
+    /// The volume that the surface encloses with them.
     volume: f64,
     is_one_sided: bool,
     /// Several surfaces meet in an edge of it, or edges are in no loop: it is no sheet, or nothing is known of what would close it.
@@ -261,13 +262,14 @@ impl Mouths {
             fits
         });
         asked.sort_unstable();
-        let mut all = gather(survey, submesh, components, reversed, &asked);
+        let mut cones: Vec<Vec<Corners>> = vec![Vec::new(); asked.len()];
         for (component, corners) in &self.cones {
             if let Ok(place) = asked.binary_search(&(*component as usize)) {
-                all[place].1.push(*corners);
+                cones[place].push(*corners);
             }
         }
-        for (c, (surface, cones)) in asked.into_iter().zip(all) {
+        let surfaces = gather(survey, submesh, components, reversed, &asked);
+        for ((c, surface), cones) in asked.into_iter().zip(surfaces).zip(cones) {
             torn[c] = is_torn(surface, &cones, survey.threads());
         }
         torn
@@ -289,45 +291,6 @@ fn cone(submesh: &Submesh, ways: &[[u32; 2]], from: DVec3) -> (f64, f64, Vec<Cor
         triangles.push([tip.coordinates(), submesh.positions[way[0] as usize], submesh.positions[way[1] as usize]]);
     }
     (volume, area, triangles)
-}
-
-/// The triangles of some components, ascending, in the order of the file as they are turned now, each with room for what closes them.
-pub(crate) fn gather(
-    survey: &Survey<'_>,
-    submesh: &Submesh,
-    components: &Components,
-    reversed: &Reversed,
-    wanted: &[usize],
-) -> Vec<(Vec<Corners>, Vec<Corners>)> {
-    let mut gathered: Vec<(Vec<Corners>, Vec<Corners>)> = wanted.iter().map(|_| (Vec::new(), Vec::new())).collect();
-    if wanted.is_empty() {
-        return gathered;
-    }
-    let group = |component: u32| wanted.binary_search(&(component as usize)).ok();
-    let of_region = |region: u32| group(components.of_region[region as usize]);
-    let found = survey.visit_regular(
-        |region| of_region(region).is_some(),
-        |_| Some(Vec::new()),
-        |_, _| true,
-        |list: &mut Vec<(u32, u32, u32)>, record, region| list.push((record, region, NONE)),
-    );
-    let mut all: Vec<(u32, u32, u32)> = found.into_iter().flatten().collect();
-    let of_triangle = |t: u32| components.of_triangle[t as usize];
-    let in_submesh = submesh.living().filter(|t| of_triangle(*t) != NONE && group(of_triangle(*t)).is_some());
-    all.extend(in_submesh.map(|t| (submesh.record(t), NONE, t)));
-    all.sort_unstable();
-    for (record, region, t) in all {
-        let (place, corners) = if t == NONE {
-            let [a, b, c] = position::corners(&survey.records[record as usize]);
-            (of_region(region), if reversed.regions[region as usize] { [a, c, b] } else { [a, b, c] })
-        } else {
-            (group(of_triangle(t)), submesh.points(t))
-        };
-        if let Some(place) = place {
-            gathered[place].0.push(corners);
-        }
-    }
-    gathered
 }
 
 /// Does a surface, with what closes it, have its front inside on a good part of it?

@@ -4,6 +4,7 @@ pub(crate) mod account;
 pub(crate) mod admission;
 pub(crate) mod collisions;
 pub(crate) mod context;
+pub(crate) mod gather;
 pub(crate) mod lone_sheets;
 pub(crate) mod overlay;
 pub(crate) mod pieces;

@@ -38,7 +38,7 @@ pub(crate) struct Work<'a> {
     by: Option<RepairName>,
 }
 
-/// What it takes to take back everything since a [`Work::mark`].
+/// Triangles as they were at a [`Work::mark`]: enough to take back everything since.
 struct Journal {
     /// How many triangles there were.
     count: usize,
@@ -84,7 +84,7 @@ impl<'a> Work<'a> {
         self.journal = Some(Journal { count: self.submesh.triangles.len(), old: Vec::new() });
     }
 
-    /// What was changed since the mark stays.
+    /// Ends a mark: all changes since stay.
     pub(crate) fn keep(&mut self) {
         self.journal = None;
     }

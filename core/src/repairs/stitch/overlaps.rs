@@ -70,7 +70,7 @@ pub(crate) fn cut_back(survey: &mut Survey<'_>, work: &mut Work<'_>, tolerance: 
     removed
 }
 
-/// Which triangle of the mesh.
+/// A triangle of the mesh: regular, or of the submesh.
 #[derive(Clone, Copy, Debug)]
 enum Number {
     /// The record of a triangle with regular corners only.
@@ -111,7 +111,7 @@ struct Pair {
     lap: bool,
 }
 
-/// What is to be cut off.
+/// The triangles to be cut off.
 struct Cut {
     triangles: Vec<Member>,
     /// Boundary vertices of the piece that is cut and of the other one, if they are to be joined, and within which distance.

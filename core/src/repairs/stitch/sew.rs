@@ -40,7 +40,7 @@ const STEP: f64 = 10.0;
 /// How often what was of no use is taken out and the rest tried again.
 const TRIES: usize = 8;
 
-/// What was sewn.
+/// Counts of the seams that were sewn.
 #[derive(Debug, Default)]
 pub(crate) struct Sewn {
     /// Vertices that became another one.

@@ -62,7 +62,7 @@ pub(crate) fn cut_back(survey: &mut Survey<'_>, work: &mut Work<'_>) -> u64 {
     doomed.len() as u64
 }
 
-/// What crosses at a loop.
+/// Crossings at a loop.
 #[derive(Default)]
 struct SlitSides {
     /// Triangles along it that cross each other.
@@ -129,7 +129,7 @@ impl SlitSides {
     }
 }
 
-/// Which triangles lie along which loop.
+/// The triangles that lie along each loop.
 struct Along {
     /// By vertex: its loop, [`NONE`] or [`SEVERAL`].
     of_vertex: Vec<u32>,

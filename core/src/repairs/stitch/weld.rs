@@ -28,7 +28,7 @@ pub(crate) const REPAIR: Repair = Repair {
     },
 };
 
-/// What the weld did.
+/// Counts of the weld.
 #[derive(Debug, Default)]
 pub(crate) struct Welded {
     pub(crate) vertices: u64,
@@ -51,7 +51,7 @@ pub(crate) fn weld_pairs(survey: &Survey<'_>, work: &mut Work<'_>, pairs: &[(Ver
     weld_clusters(survey, work, clusters, Moves::Any).0
 }
 
-/// What may become of the triangles whose corners move.
+/// The fate of triangles whose corners move.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Moves {
     /// Anything: the way is shorter than any that counts.

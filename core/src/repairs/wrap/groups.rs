@@ -28,7 +28,7 @@ pub(crate) struct Groups {
     pub(crate) broken: Vec<bool>,
     /// Pieces with a loop that was left open on purpose.
     pub(crate) kept: Vec<bool>,
-    /// Those of them that are lone sheets.
+    /// Those pieces that are lone sheets.
     pub(crate) sheets: Vec<bool>,
 }
 

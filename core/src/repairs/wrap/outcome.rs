@@ -4,7 +4,7 @@ use crate::algorithms::wrap::tree::Corners;
 use crate::contract::report::Wrap;
 use crate::geometry::position::Position;
 
-/// What was wrapped.
+/// All wraps of a file: their triangles, and the pieces that they replace.
 #[derive(Default)]
 pub(crate) struct Wraps {
     /// Regions that were replaced, and those that would have been but for a reason.
@@ -16,7 +16,7 @@ pub(crate) struct Wraps {
     pub(crate) gone: Vec<Position>,
 }
 
-/// What came of a group.
+/// The wrap of one group, or why there is none.
 pub(crate) struct Outcome {
     pub(crate) told: Wrap,
     pub(crate) triangles: Vec<Corners>,

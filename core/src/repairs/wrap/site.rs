@@ -8,8 +8,9 @@ use crate::contract::progress::Progress;
 use crate::contract::report::Wrap;
 use crate::contract::settings::Profile;
 use crate::geometry::distance::place;
-use crate::geometry::position::{self};
+use crate::geometry::position;
 use crate::geometry::sums::Bounds;
+use crate::repairs::shared::gather::visit;
 use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed};
 use crate::topology::survey::Survey;
@@ -40,7 +41,7 @@ const BEHIND: f64 = 0.75;
 /// Triangles that are looked at to tell how far a surface moved, at most, by their corners and middles.
 const SAMPLES: usize = 1 << 13;
 
-/// What a group is told by.
+/// Size of a group.
 #[derive(Clone, Copy)]
 pub(crate) struct Size {
     pub(crate) triangles: u64,
@@ -49,13 +50,13 @@ pub(crate) struct Size {
     pub(crate) area: f64,
 }
 
-/// What there is to look at.
+/// The file around the groups that are wrapped.
 pub(crate) struct Site<'s, 'a> {
     pub(crate) survey: &'s Survey<'a>,
     pub(crate) submesh: &'s Submesh,
     pub(crate) reversed: &'s Reversed,
     pub(crate) pieces: &'s Components,
-    /// What hangs together through edges of two triangles.
+    /// Surface that hangs together through edges of two triangles.
     pub(crate) sheets: &'s Components,
     pub(crate) profile: &'s Profile,
     /// What is wrapped is a soup: it may be the surfaces of nothing.
@@ -128,30 +129,11 @@ impl Site<'_, '_> {
         for (group, number) in groups.iter().zip(0..) {
             group.iter().for_each(|piece| group_of[*piece as usize] = number);
         }
-        let of_piece = |piece: u32| if piece == NONE { NONE } else { group_of[piece as usize] };
-        let of_region = |region: u32| of_piece(self.pieces.of_region[region as usize]);
-        let found = self.survey.visit_regular(
-            |region| of_region(region) != NONE,
-            |_| Some(Vec::new()),
-            |_, _| true,
-            |list: &mut Vec<(u32, u32, u32, u32)>, record, region| list.push((of_region(region), record, region, NONE)),
-        );
-        let mut all: Vec<(u32, u32, u32, u32)> = found.into_iter().flatten().collect();
-        let of_triangle = |t: u32| of_piece(self.pieces.of_triangle[t as usize]);
-        let in_submesh = self.submesh.living().filter(|t| of_triangle(*t) != NONE);
-        all.extend(in_submesh.map(|t| (of_triangle(t), self.submesh.record(t), NONE, t)));
-        all.sort_unstable();
         let mut gathered = vec![Vec::new(); groups.len()];
-        for (group, record, region, t) in all {
-            let with_sheet = if t == NONE {
-                let [a, b, c] = position::corners(&self.survey.records[record as usize]);
-                let is_turned = self.reversed.regions[region as usize];
-                (self.sheets.of_region[region as usize], if is_turned { [a, c, b] } else { [a, b, c] })
-            } else {
-                (self.sheets.of_triangle[t as usize], self.submesh.points(t))
-            };
-            gathered[group as usize].push(with_sheet);
-        }
+        let is_wanted = |piece: u32| group_of[piece as usize] != NONE;
+        visit(self.survey, self.submesh, (self.pieces, self.reversed), is_wanted, |piece, part, corners| {
+            gathered[group_of[piece as usize] as usize].push((part.component(self.sheets), corners));
+        });
         gathered
     }
 

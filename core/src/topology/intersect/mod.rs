@@ -129,7 +129,7 @@ impl Finder {
     }
 }
 
-/// Which vertices of each are also vertices of the other.
+/// The vertices of each triangle that are also vertices of the other.
 #[inline(always)]
 fn common_vertices(s: [u32; 3], t: [u32; 3]) -> [[bool; 3]; 2] {
     let among = |v: u32, t: [u32; 3]| (v == t[0]) | (v == t[1]) | (v == t[2]);

@@ -250,7 +250,7 @@ impl Forest {
     }
 }
 
-/// What is asked about rows.
+/// Questions about rows.
 impl Forest {
     #[inline(always)]
     fn lane(&self, row: usize) -> (&Leaf, usize) {
@@ -289,7 +289,7 @@ impl Forest {
     }
 }
 
-/// What is done with overlapping boxes.
+/// The work that is done with overlapping boxes.
 pub(super) trait Visit {
     /// `row` overlaps the rows from `first` on whose bits are set in `lanes`; those in `sharing` (and maybe others, which do not
     /// overlap) have a vertex in common with it. Returns `false` to end the walk.

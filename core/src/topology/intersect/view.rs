@@ -17,7 +17,7 @@ pub(crate) struct CellView<'a> {
     pub(crate) cell: HomeBox,
 }
 
-/// What a cell knows of a vertex.
+/// The state of a vertex in a cell.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub(crate) enum Standing {

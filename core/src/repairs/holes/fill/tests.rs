@@ -226,6 +226,33 @@ fn a_ragged_hole_in_both_skins_of_a_plate_is_no_way_through() {
     assert_eq!(methods(&square), BTreeMap::from([("annular".into(), 2)]));
 }
 
+/// A cube of side 10 in unit squares, of which those of three faces are missing that are less than `missing` from the corner between these.
+fn corner_lost(missing: u8) -> Vec<Corners> {
+    let is_there = |x: u8, y: u8| x + missing < 10 || y + missing < 10;
+    let (whole, part) = (reversed(&plate(10, |_, _| true)), plate(10, is_there));
+    let on = |axis: usize, at: f32, face: &[Corners]| -> Vec<Corners> {
+        let place = |p: [f32; 3]| std::array::from_fn(|k| [at, p[0], p[1]][(k + 3 - axis) % 3]);
+        face.iter().map(|t| t.map(place)).collect()
+    };
+    (0..3).flat_map(|axis| [on(axis, 0.0, &whole), on(axis, 10.0, &part)]).flatten().collect()
+}
+
+/// Half of what is missing counts, as seen from the middle of its rim: 6 % of the cube for squares up to 5 from its corner, 11 % up to 6.
+#[test]
+fn planes_that_are_let_go_on_around_a_tenth_of_the_body_are_a_doubtful_guess() {
+    let doubts = |missing: u8, beside: &[Corners]| {
+        let closed = after(&[&corner_lost(missing), beside].concat(), |d, _| fill(d, &Profile::default())).result;
+        assert_eq!(closed.by_method, BTreeMap::from([("planes to where they meet".into(), 1)]), "{missing}");
+        closed.judged.doubts
+    };
+    assert_eq!(doubts(5, &[]), Vec::<String>::new());
+    let of_six = doubts(6, &[]);
+    assert!(of_six.len() == 1 && of_six[0].contains("around 11 % of the body"), "{of_six:?}");
+    // Nobody need look at a detail: a body of less than a tenth of all volume.
+    let block = |height: f32| cuboid([20.0, 0.0, 0.0], [30.0, 10.0, height]);
+    assert_eq!((doubts(6, &block(89.0)).len(), doubts(6, &block(91.0)).len()), (1, 0));
+}
+
 #[test]
 fn an_end_that_breaks_off_is_a_guess_however_long_the_tube_is() {
     let rows: Vec<[f32; 2]> = (0..=60).map(|row| [1.0, row as f32 / 2.0]).collect();

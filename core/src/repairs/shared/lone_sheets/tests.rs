@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::repairs::shared::work::Work;
-use crate::testing::{Corners, after, cuboid, reversed};
+use crate::testing::{Corners, after, cuboid, reversed, shifted};
 
 /// A grid of quadrangles, 12 by 12, over the unit square.
 fn grid(at: impl Fn(f64, f64) -> [f64; 3]) -> Vec<Corners> {
@@ -19,13 +19,17 @@ fn grid(at: impl Fn(f64, f64) -> [f64; 3]) -> Vec<Corners> {
 
 /// How many rims are those of lone sheets, and how many triangles are of one-sided ones.
 fn found(mesh: &[Corners]) -> (usize, usize) {
+    found_of(mesh, Which::Sheets)
+}
+
+fn found_of(mesh: &[Corners], which: Which) -> (usize, usize) {
     let found = after(mesh, |d, turned| {
         let mut work = Work::new(&mut d.submesh);
         crate::repairs::orient::directions::make_coherent(&d.survey, &mut work, turned, &[]);
         let (submesh, edges) = work.edges();
         let loops = crate::detect::holes::loops::find(submesh, edges);
         let shapes = Shapes::of(submesh, &loops, 1);
-        let sheets = recognise(&d.survey, submesh, edges, &loops, &shapes, turned, Which::Sheets);
+        let sheets = recognise(&d.survey, submesh, edges, &loops, &shapes, turned, which);
         (sheets.rims.len(), sheets.one_sided.iter().filter(|is| **is).count())
     });
     found.result
@@ -43,10 +47,28 @@ fn terrain_is_a_sheet_however_high_it_is() {
     }
 }
 
+/// Half as high as a ball of diameter 1, in the middle of the unit square.
+fn hill() -> Vec<Corners> {
+    grid(|x, y| [x, y, 0.5 * (0.25 - (x - 0.5).powi(2) - (y - 0.5).powi(2)).max(0.0)])
+}
+
 #[test]
 fn a_hill_encloses_enough_to_be_closed() {
-    let hill = grid(|x, y| [x, y, 0.5 * (0.25 - (x - 0.5).powi(2) - (y - 0.5).powi(2)).max(0.0)]);
-    assert_eq!(found(&hill), (0, 0));
+    assert_eq!(found(&hill()), (0, 0));
+}
+
+/// Closed, the hill would be a body: one in the block's material is missed by nobody, if it is wholly in it and the same way round.
+#[test]
+fn what_would_be_a_body_in_the_material_of_another_is_unneeded() {
+    let block = cuboid([-1.0; 3], [2.0; 3]);
+    let unneeded = |hill: &[Corners], around: &[Corners]| found_of(&[around, hill].concat(), Which::Unneeded).0;
+    assert_eq!(unneeded(&hill(), &block), 1);
+    assert_eq!(found(&[block.clone(), hill()].concat()), (0, 0), "it is no sheet");
+    assert_eq!(unneeded(&shifted(&hill(), [1.6, 0.0, 0.0]), &block), 0, "a part of it is outside");
+    assert_eq!(unneeded(&shifted(&hill(), [5.0, 0.0, 0.0]), &block), 0, "all of it is");
+    assert_eq!(unneeded(&reversed(&hill()), &block), 0, "a void in the block");
+    let hollow = [block, reversed(&cuboid([-0.5; 3], [1.5; 3]))].concat();
+    assert_eq!(unneeded(&hill(), &hollow), 0, "in a cavity there is no material");
 }
 
 #[test]

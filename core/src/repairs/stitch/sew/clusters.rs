@@ -4,7 +4,7 @@ use crate::repairs::stitch::sew::rims::{Match, Rims};
 use crate::submesh::{Submesh, Vertex};
 use crate::util::union_find;
 
-/// What is to be joined.
+/// Vertices to be joined.
 pub(crate) struct Chosen {
     /// Sets of two or more vertices that become one.
     pub(crate) clusters: Vec<Vec<Vertex>>,

@@ -34,7 +34,7 @@ pub(crate) fn wanted(submesh: &Submesh, edges: &Edges, rims: &Rims) -> Vec<OnEdg
 struct Along<'r> {
     submesh: &'r Submesh,
     rims: &'r Rims,
-    /// Which vertices lie on which edges, ascending.
+    /// Vertices with the edges that they lie on, ascending.
     places: Vec<(u32, Vertex)>,
     /// The boundary edges at each vertex, ascending.
     at_vertex: Vec<(Vertex, u32)>,

@@ -50,7 +50,7 @@ impl<'a> Diagnosis<'a> {
     }
 
     fn counted(survey: Survey<'a>, submesh: Submesh, edges: &Edges, profile: &Profile) -> Self {
-        let tolerance = tolerance(&survey, profile);
+        let tolerance = tolerance(&survey.bounds, profile);
         let defects = defects::count(&survey, &submesh, edges, &tolerance);
         Self { survey, submesh, tolerance, defects }
     }
@@ -70,13 +70,10 @@ impl<'a> Diagnosis<'a> {
 }
 
 /// Never below what f32 tells apart at the model's coordinates: four steps of the largest one.
-fn tolerance(survey: &Survey<'_>, profile: &Profile) -> Tolerance {
+pub(crate) fn tolerance(bounds: &Bounds, profile: &Profile) -> Tolerance {
     if profile.weld_relative <= 0.0 {
         return Tolerance { weld: 0.0, edge_share: 0.0 };
     }
-    let step = step_at(survey.bounds.largest_coordinate());
-    Tolerance {
-        weld: (profile.weld_relative * survey.bounds.diagonal()).max(4.0 * step),
-        edge_share: profile.weld_max_edge_share,
-    }
+    let step = step_at(bounds.largest_coordinate());
+    Tolerance { weld: (profile.weld_relative * bounds.diagonal()).max(4.0 * step), edge_share: profile.weld_max_edge_share }
 }

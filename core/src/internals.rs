@@ -147,7 +147,7 @@ impl Mesh {
 }
 
 fn gather(records: &[Record], plan: &Plan, limits: &Limits) -> Result<Members> {
-    Members::gather(Path::new("memory"), (records, &Guide::NONE), plan, true, limits, &crate::contract::progress::Quiet)
+    Members::gather(Path::new("memory"), (records, &Guide::NONE), plan, Some(0.0), limits, &crate::contract::progress::Quiet)
 }
 
 fn bounds(record: &Record) -> Bounds {

@@ -52,6 +52,12 @@ fn shown(count: u64) -> String {
     if count == TOO_MANY { "too many".into() } else { show_count(count) }
 }
 
+/// A count of the file as it came, which was not made of all that a weld in the stream set right first.
+fn counted_before(report: &Report, of: fn(&Defects) -> u64) -> String {
+    let count = of(&report.before);
+    if count == 0 && !report.before.at_least.is_empty() { "not counted".into() } else { shown(count) }
+}
+
 /// The whole table, with a final newline.
 pub(crate) fn render(report: &Report) -> String {
     let mut out = String::new();
@@ -228,7 +234,7 @@ fn defects(out: &mut String, report: &Report) {
         Some(after) => {
             line(out, format_args!("  {:width$}  {:>14} {:>14}", "", "before", "after"));
             for (name, of) in rows {
-                let (before, after) = (shown(of(&report.before)), shown(of(after)));
+                let (before, after) = (counted_before(report, *of), shown(of(after)));
                 line(out, format_args!("  {name:width$}  {before:>14} {after:>14}"));
             }
         }

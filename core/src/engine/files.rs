@@ -15,6 +15,7 @@ use crate::detect::review::Evidence;
 use crate::diagnosis::Diagnosis;
 use crate::engine::clock::Clock;
 use crate::engine::judging::{self, Input, Written};
+use crate::engine::welding;
 use crate::geometry::sums::Bounds;
 use crate::io::digest;
 use crate::io::digest::Digest;
@@ -29,6 +30,7 @@ use crate::output::incremental;
 use crate::output::readback::Expectation;
 use crate::repairs::{self, Steps};
 use crate::stream::members;
+use crate::stream::weld::Counts;
 use crate::topology::survey::Survey;
 use crate::util::parallel;
 
@@ -66,14 +68,14 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     let mut clock = Clock::start();
     judging::validate(input, profile)?;
     let limits = &limits.spooling_beside(output);
-    let mesh = open(input, limits, progress)?;
+    let (mesh, welded) = welding::in_the_stream(open(input, limits, progress)?, profile, limits, progress)?;
     clock.stage("read");
     // The output is as large as its input but for what is added; what the input spools is gone by then, but the output spools as much.
     let bytes = (PREFIX_BYTES + size_of_val(mesh.records())) as u64;
     let folder = if emit::is_nameless(output) { limits.spool_folder() } else { folder_of(output).into() };
     disk_space::check(input, &[Need { folder, bytes, what: "the output" }, spool_need(mesh.records(), limits)])?;
     emit::draft(&mesh, output, limits, progress, |draft| {
-        let mended = mend(draft, &mesh, output, profile, limits, progress, &mut clock);
+        let mended = mend(draft, (&mesh, welded.as_ref()), output, profile, limits, progress, &mut clock);
         // What was copied before the input changed is not what is read back: nothing is wrong with the disk.
         let report = mended.map_err(|error| match error {
             Error::Io { .. } if !progress.cancelled() => mesh.check_unchanged().err().unwrap_or(error),
@@ -86,7 +88,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
 /// Makes `draft` the repaired `mesh` and judges what then stands at `output`; cost and stages are still to come.
 fn mend(
     draft: Draft<'_, '_>,
-    mesh: &MeshFile,
+    (mesh, welded): (&MeshFile, Option<&Counts>),
     output: &Path,
     profile: &Profile,
     limits: &Limits,
@@ -106,7 +108,7 @@ fn mend(
     // Of the input's survey, the second look may go on; the memory of its submesh is needed for that of the output.
     let survey = diagnosis.into_survey();
     // Good as it came, or nothing in it could be repaired.
-    let same = edit.is_empty() && judging::flaws(mesh.findings()).is_empty();
+    let same = edit.is_empty() && welded.is_none() && judging::flaws(mesh.findings()).is_empty();
     let expected = if same { None } else { expectation(mesh.records(), &edit, survey.irregular_triangles.len() as u64, limits) };
     let emit = || draft.finish(&if same { Content::Input } else { Content::Edited(&edit) });
     // What the file will hold is looked at while it is written. It counts when the file was read back and does hold that.
@@ -136,6 +138,9 @@ fn mend(
         )?;
     }
     judging::advise(&mut report, &evidence);
+    if let Some(counts) = welded {
+        welding::tell(&mut report, counts, (mesh, &edit));
+    }
     written.durable()?;
     clock.stage("verify");
     mesh.check_unchanged()?;

@@ -12,3 +12,4 @@ mod judging;
 pub(crate) mod memory;
 pub(crate) mod mesh;
 pub mod operations;
+mod welding;

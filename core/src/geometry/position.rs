@@ -41,6 +41,13 @@ impl Position {
         self.0
     }
 
+    /// One number for a table: equal and ordered as the positions are.
+    #[inline]
+    pub(crate) fn key(self) -> u128 {
+        let [x, y, z] = self.bits().map(u128::from);
+        x << 64 | y << 32 | z
+    }
+
     #[inline]
     fn bits(self) -> [u32; 3] {
         bits(self.0)

@@ -77,6 +77,14 @@ pub fn assemble(normal: Point, corners: [Point; 3], attribute: u16) -> Record {
     record
 }
 
+/// Puts one corner elsewhere; all else stays as it is.
+pub(crate) fn put_corner(record: &mut Record, corner: usize, to: Point) {
+    let words = &mut record.as_chunks_mut::<4>().0[3 + 3 * corner..6 + 3 * corner];
+    for (word, value) in words.iter_mut().zip(to) {
+        *word = value.to_le_bytes();
+    }
+}
+
 /// The unit normal by the right-hand rule, computed in `f64` (nothing that `f32` can hold over- or underflows there); zero
 /// where the cross product vanishes or a corner is not finite.
 pub fn unit_normal(corners: [Point; 3]) -> Point {

@@ -129,6 +129,11 @@ impl Edit {
         self.deletions + self.flips + moved
     }
 
+    /// The numbers of all records that are no more what they were, each once.
+    pub(crate) fn gone_records(&self) -> impl Iterator<Item = u32> {
+        self.changes.iter().map(|(t, _)| *t).chain(ones(&self.flipped)).chain(ones(&self.dropped))
+    }
+
     /// Records in the output.
     pub(crate) fn output_records(&self, input_records: usize) -> u64 {
         input_records as u64 - self.deletions + self.added.len() as u64

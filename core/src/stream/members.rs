@@ -16,7 +16,7 @@ use crate::io::disk_space::{self, Need};
 use crate::io::read_ahead::Guide;
 use crate::io::record::{self, Point, Record};
 use crate::stream::columns::{CellColumns, Columns, Extremes};
-use crate::stream::plan::{ChunkId, Plan};
+use crate::stream::plan::{ChunkId, HomeBox, Plan};
 use crate::stream::source::{Mapped, Seen, Spooled};
 use crate::stream::spool::{self, Loaded, Spool, Unsorted};
 use crate::util::parallel;
@@ -133,7 +133,7 @@ impl Passing {
 }
 
 impl Members {
-    /// Reads all records once, or twice if lists turn out to take too much memory. Lists visitors only if asked to.
+    /// Reads all records once, or twice if lists turn out to take too much memory. Lists visitors only if asked to: those that come so near to a cell, 0 for those that meet it.
     ///
     /// # Errors
     /// Where spooling fails.
@@ -141,7 +141,7 @@ impl Members {
         path: &Path,
         (records, guide): (&[Record], &Guide<'_>),
         plan: &Plan,
-        visitors: bool,
+        visitors: Option<f32>,
         limits: &Limits,
         progress: &dyn Progress,
     ) -> Result<Self> {
@@ -159,7 +159,7 @@ impl Members {
     fn list(
         (records, guide): (&[Record], &Guide<'_>),
         plan: &Plan,
-        visitors: bool,
+        visitors: Option<f32>,
         threads: usize,
         most: u64,
         told: &Told<'_>,
@@ -194,7 +194,7 @@ impl Members {
         path: &Path,
         (records, guide): (&[Record], &Guide<'_>),
         plan: &Plan,
-        visitors: bool,
+        visitors: Option<f32>,
         limits: &Limits,
         told: &Told<'_>,
     ) -> Result<Self> {
@@ -216,7 +216,7 @@ impl Members {
                 part
             })
             .collect();
-        Ok(Self::of(Kept::Spool(spool.sorted(parts, plan.chunks())?), passed))
+        Ok(Self::of(Kept::Spool(spool.sorted(parts, plan.chunks(), visitors.unwrap_or(0.0))?), passed))
     }
 
     fn of(kept: Kept, passing: Passing) -> Self {
@@ -359,12 +359,41 @@ impl Told<'_> {
     }
 }
 
-/// The chunks whose cells a triangle's box meets, but for those where its corners are at home.
-fn note_visited(plan: &Plan, corners: &[Point; 3], homes: [ChunkId; 3], visited: &mut Vec<ChunkId>) {
+/// Where triangles are seen by one chunk alone.
+fn well_inside(plan: &Plan, chunk: ChunkId, visitors: Option<f32>) -> CellColumns {
+    CellColumns::of(&plan.home_box(chunk).grown(-visitors.unwrap_or(0.0)))
+}
+
+/// The chunks of three corners, each once.
+fn distinct([a, b, c]: &[ChunkId; 3]) -> Distinct {
+    match (a == b, b == c || a == c) {
+        (true, true) => Distinct { all: [*a; 3], count: 1 },
+        (true, false) => Distinct { all: [*a, *c, *c], count: 2 },
+        (false, true) => Distinct { all: [*a, *b, *b], count: 2 },
+        (false, false) => Distinct { all: [*a, *b, *c], count: 3 },
+    }
+}
+
+/// Up to three chunks.
+struct Distinct {
+    all: [ChunkId; 3],
+    count: usize,
+}
+
+impl Distinct {
+    fn as_slice(&self) -> &[ChunkId] {
+        &self.all[..self.count]
+    }
+}
+
+/// The chunks whose cells come within reach of a triangle's box, but for those where its corners are at home.
+fn note_visited(plan: &Plan, corners: &[Point; 3], homes: [ChunkId; 3], reach: Option<f32>, visited: &mut Vec<ChunkId>) {
     visited.clear();
+    let Some(reach) = reach else { return };
     let mut spread = Bounds::EMPTY;
     spread.include(corners);
-    plan.meeting(spread.lo, spread.hi, &mut |chunk| {
+    let (lo, hi) = HomeBox::around(spread.lo, spread.hi).grown(reach).ends();
+    plan.meeting(lo, hi, &mut |chunk| {
         if !homes.contains(&chunk) {
             visited.push(chunk);
         }
@@ -375,14 +404,14 @@ fn gather_piece(
     (records, guide): (&[Record], &Guide<'_>),
     offset: u32,
     plan: &Plan,
-    visitors: bool,
+    visitors: Option<f32>,
     take: &mut impl Take,
     told: &Told<'_>,
 ) -> Passing {
     let mut passing = Passing::NOTHING;
     let mut visited = Vec::new();
     let mut current = ChunkId(0);
-    let mut cell = CellColumns::of(&plan.home_box(current));
+    let mut cell = well_inside(plan, current, visitors);
     let mut extremes = Extremes::EMPTY;
     let (mut run_start, mut block_start) = (0usize, 0usize);
     for block in guide.blocks(records) {
@@ -412,16 +441,14 @@ fn gather_piece(
             let homes = corners.map(|p| plan.home(p));
             if homes[0] == homes[1] && homes[0] == homes[2] {
                 current = homes[0];
-                cell = CellColumns::of(&plan.home_box(current));
-                run_start = i;
-                continue;
+                cell = well_inside(plan, current, visitors);
+                if cell.holds(&columns) {
+                    run_start = i;
+                    continue;
+                }
             }
-            if visitors {
-                note_visited(plan, &corners, homes, &mut visited);
-            }
-            let [a, b, c] = homes;
-            let distinct = if a == b || b == c { &[a, c][..] } else { &[a, b, c][..if a == c { 2 } else { 3 }] };
-            take.take(distinct, &visited, number, record);
+            note_visited(plan, &corners, homes, visitors, &mut visited);
+            take.take(distinct(&homes).as_slice(), &visited, number, record);
         }
         block_start += block.len();
     }

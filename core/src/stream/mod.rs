@@ -13,3 +13,4 @@ pub(crate) mod plan;
 pub(crate) mod run_list;
 pub(crate) mod source;
 pub(crate) mod spool;
+pub(crate) mod weld;

@@ -23,6 +23,10 @@ impl HomeBox {
     pub(crate) const ALL: Self = Self { lo: [-f32::MAX; 3], hi: [f32::MAX; 3] };
 
     /// Is there a position in both boxes?
+    pub(crate) fn around(lo: [f32; 3], hi: [f32; 3]) -> Self {
+        Self { lo, hi }
+    }
+
     #[cfg(test)]
     pub(crate) fn meets(&self, other: &crate::geometry::sums::Bounds) -> bool {
         (0..3).all(|k| self.lo[k] <= other.hi[k] && self.hi[k] >= other.lo[k])
@@ -34,6 +38,13 @@ impl HomeBox {
     }
 
     /// Comparisons written so that NaN is outside.
+    /// The box with so much more on all sides, or less if that is negative; of what is infinitely wide nothing changes.
+    pub(crate) fn grown(&self, by: f32) -> Self {
+        let away = |x: f32, by: f32| if x.abs() == f32::MAX { x } else { (x + by).clamp(-f32::MAX, f32::MAX) };
+        let out = |x: f32| if by > 0.0 { x.next_up() } else { x };
+        Self { lo: self.lo.map(|x| -out(-away(x, -by))), hi: self.hi.map(|x| out(away(x, by))) }
+    }
+
     #[inline]
     pub(crate) fn holds(&self, p: [f32; 3]) -> bool {
         (0..3).all(|k| (p[k] >= self.lo[k]) & (p[k] <= self.hi[k]))

@@ -23,7 +23,7 @@ use crate::geometry::sums::Bounds;
 use crate::io::record::{Point, Record};
 use crate::io::write_behind::{self, WriteBehind};
 use crate::stream::budget::{Budget, Purpose};
-use crate::stream::plan::{ChunkId, Plan};
+use crate::stream::plan::{ChunkId, HomeBox, Plan};
 
 /// A triangle's number and its corners, bytes 12 to 48 of its record.
 pub(crate) type Entry = [u8; ENTRY];
@@ -120,7 +120,7 @@ impl Unsorted {
     }
 
     /// Joins what was written for consecutive stretches of the input.
-    pub(crate) fn sorted(self, parts: Vec<Part>, chunks: usize) -> Result<Spool> {
+    pub(crate) fn sorted(self, parts: Vec<Part>, chunks: usize, reach: f32) -> Result<Spool> {
         let failed = Error::io(&self.folder, "spooling");
         let mut extents = vec![Vec::new(); chunks >> self.layout.shift];
         let (mut members, mut visitors) = (vec![0u32; chunks], vec![0u32; chunks]);
@@ -137,7 +137,7 @@ impl Unsorted {
         // SAFETY: the file has no name and nobody writes to it any more: no one changes or truncates it.
         let map = || self.behind.finish().and_then(|()| self.file.sync_data()).and_then(|()| unsafe { Mmap::map(&self.file) });
         let map = if self.end.into_inner() > 0 { Some(map().map_err(failed)?) } else { None };
-        Ok(Spool { map, extents, members, visitors, shift: self.layout.shift })
+        Ok(Spool { map, extents, members, visitors, shift: self.layout.shift, reach })
     }
 }
 
@@ -241,6 +241,8 @@ pub(crate) struct Spool {
     members: Vec<u32>,
     visitors: Vec<u32>,
     shift: u32,
+    /// How near to a cell its visitors come.
+    reach: f32,
 }
 
 /// One bucket, sorted into its chunks. Keeps its memory from bucket to bucket.
@@ -328,6 +330,7 @@ impl Spool {
                 if let [Some(home), b, c] = homes
                     && b == homes[0]
                     && c == homes[0]
+                    && (self.reach == 0.0 || !visited)
                 {
                     put(part_of(home));
                     continue;
@@ -342,7 +345,8 @@ impl Spool {
                 if visited {
                     let mut spread = Bounds::EMPTY;
                     spread.include(&corners);
-                    plan.meeting_below(self.shift, bucket, spread.lo, spread.hi, &mut |chunk| {
+                    let (lo, hi) = HomeBox::around(spread.lo, spread.hi).grown(self.reach).ends();
+                    plan.meeting_below(self.shift, bucket, lo, hi, &mut |chunk| {
                         if !homes.contains(&Some(chunk)) {
                             put(part_of(chunk) + 1);
                         }
@@ -384,7 +388,7 @@ mod tests {
             };
             let second = write(400..1000);
             let first = write(0..400);
-            let spool = spool.sorted(vec![first, second], plan.chunks()).unwrap();
+            let spool = spool.sorted(vec![first, second], plan.chunks(), 0.0).unwrap();
             let mut loaded = Loaded::default();
             let mut found = 0;
             for bucket in 0..spool.buckets() {

@@ -93,7 +93,8 @@ impl<'a> Survey<'a> {
         progress.at("plan", 0, records.len() as u64);
         let guide = Guide::new(records.as_flattened(), limits);
         let plan = Plan::new(records, &guide, limits.chunk_triangles);
-        let members = Members::gather(path, (records, &guide), &plan, self_intersections, limits, progress)?;
+        let visitors = self_intersections.then_some(0.0);
+        let members = Members::gather(path, (records, &guide), &plan, visitors, limits, progress)?;
         drop(span);
         let mut survey = Self::unsolved(records, guide, plan, members, limits);
         let scratch = survey.take_tables(path, &survey.budget, limits)?;

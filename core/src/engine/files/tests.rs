@@ -162,3 +162,60 @@ fn the_edges_of_a_soup_are_counted_before_they_are_compared() {
     assert!(matches!(error, Error::Starved { .. }), "{error}");
     assert!(error.to_string().contains("10000 triangles lie at defects, with 30000 edges that only one triangle has"), "{error}");
 }
+
+/// A torus of 2 × 384 × 176 triangles, of which no two share a position: each corner lies up to `jitter` beside its place.
+fn shaken_torus(jitter: f32) -> Vec<Corners> {
+    let (around, across) = (384usize, 176usize);
+    let at = |i: usize, j: usize| {
+        let turn = |k: usize, of: usize| (k % of) as f64 / of as f64 * std::f64::consts::TAU;
+        let ((u, v), wide) = ((turn(i, around), turn(j, across)), 20.0);
+        let from_axis = wide + 8.0 * v.cos();
+        [(from_axis * u.cos()) as f32, (from_axis * u.sin()) as f32, (8.0 * v.sin()) as f32]
+    };
+    let mut number = 0;
+    let mut shaken = |x: f32| {
+        number += 1;
+        x + jitter * (2.0 * crate::util::scatter::share(number) as f32 - 1.0)
+    };
+    let mut all = Vec::new();
+    for (i, j) in (0..around).flat_map(|i| (0..across).map(move |j| (i, j))) {
+        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+        all.extend([[a, b, c], [a, c, d]].map(|t| t.map(|p| p.map(&mut shaken))));
+    }
+    all
+}
+
+/// As one facet after the other is exported by programs that transform each for itself.
+#[test]
+fn a_file_that_shares_no_position_is_welded_in_the_stream() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("part.stl");
+    let mut torus = records(&shaken_torus(1e-4));
+    let n = torus.len() as u64;
+    torus.remove(1000);
+    for mesh in [file(&torus), text(&torus.iter().map(crate::io::record::corners).collect::<Vec<_>>()).into_bytes()] {
+        std::fs::write(&input, mesh).unwrap();
+        let mut outputs = Vec::new();
+        for (threads, chunk_triangles) in [(1, 1 << 20), (2, 5000)] {
+            let limits = Limits { threads, chunk_triangles, ..Limits::default() };
+            let output = folder.path().join(format!("{chunk_triangles}.stl"));
+            let report = repair(&input, &output, &Profile::default(), &limits, &crate::contract::progress::Quiet).unwrap();
+            assert_eq!(report.outcome, Outcome::Repaired, "{:?}", report.verdict);
+            assert_eq!(report.input.blake3, blake3::hash(&std::fs::read(&input).unwrap()).to_hex().to_string());
+            let (before, after) = (&report.before, report.after.as_ref().unwrap());
+            assert_eq!((before.triangles, before.boundary_edges, before.vertices), (n - 1, 3 * (n - 1), 3 * (n - 1)));
+            assert!(before.at_least.iter().any(|name| name == "components"));
+            assert_eq!((after.triangles, after.vertices, after.components, after.euler), (n, n / 2, 1, Some(0)));
+            let weld = report.repairs.iter().find(|repair| repair.name.as_str() == "tolerance_weld").unwrap();
+            // The hole's three corners have one triangle less.
+            assert_eq!(weld.count, 3 * (n - 1) - n / 2);
+            let edit = &report.edit;
+            assert_eq!((edit.deleted, edit.added, edit.untouched + edit.moved), (0, 1, n - 1));
+            assert!(edit.max_move > 1e-4 && edit.max_move < 4e-4, "{edit:?}");
+            outputs.push(std::fs::read(&output).unwrap());
+        }
+        assert!(outputs[0] == outputs[1], "the same bytes for all chunks and threads");
+        std::fs::remove_file(folder.path().join("5000.stl")).unwrap();
+        std::fs::remove_file(folder.path().join("1048576.stl")).unwrap();
+    }
+}

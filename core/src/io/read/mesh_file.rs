@@ -43,6 +43,8 @@ enum Source {
     InPlace(usize),
     /// All of a spool.
     Spooled(Mmap),
+    /// All of a spool of what these became by a weld.
+    Welded(Box<Self>, Mmap),
 }
 
 /// An open mesh file.
@@ -114,9 +116,26 @@ impl MeshFile {
 
     /// The triangles in input order, those with NaN or infinite coordinates included.
     pub fn records(&self) -> &[Record] {
-        match &self.source {
+        self.records_of(&self.source)
+    }
+
+    fn records_of<'s>(&'s self, source: &'s Source) -> &'s [Record] {
+        match source {
             Source::InPlace(triangles) => binary::records(&self.input, *triangles),
-            Source::Spooled(spool) => spool.as_chunks().0,
+            Source::Spooled(spool) | Source::Welded(_, spool) => spool.as_chunks().0,
+        }
+    }
+
+    /// The same file with other corners of its triangles.
+    pub(crate) fn welded(self, records: Mmap) -> Self {
+        Self { source: Source::Welded(Box::new(self.source), records), ..self }
+    }
+
+    /// The triangles as they were before a weld.
+    pub(crate) fn as_it_came(&self) -> &[Record] {
+        match &self.source {
+            Source::Welded(source, _) => self.records_of(source),
+            source => self.records_of(source),
         }
     }
 

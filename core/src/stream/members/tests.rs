@@ -35,7 +35,7 @@ proptest! {
         for spill in [Spill::Never, Spill::Auto, Spill::Always] {
             let limits = Limits { threads, spill, ..Limits::default() };
             let input = (&records[..], &Guide::NONE);
-            let members = Members::gather(Path::new("test"), input, &plan, true, &limits, &crate::contract::progress::Quiet).unwrap();
+            let members = Members::gather(Path::new("test"), input, &plan, Some(0.0), &limits, &crate::contract::progress::Quiet).unwrap();
             let wanted = |c: ChunkId| c.0 % 3 != 1;
             let seen = members.each((&records, &Guide::NONE, &plan), threads, wanted, || (), |(), chunk, seen, visitors| {
                 let list = |source: &Seen<'_>| {
@@ -87,7 +87,7 @@ fn lists_that_take_too_much_are_given_up_for_a_spool() {
     let limits = Limits { threads: 2, memory_bytes: 5 << 18, ..Limits::default() };
     let gathered = |spill| {
         let (input, limits) = ((&records[..], &Guide::NONE), Limits { spill, ..limits.clone() });
-        Members::gather(Path::new("test"), input, &plan, false, &limits, &crate::contract::progress::Quiet).unwrap()
+        Members::gather(Path::new("test"), input, &plan, None, &limits, &crate::contract::progress::Quiet).unwrap()
     };
     let (lists, spooled) = (gathered(Spill::Never), gathered(Spill::Auto));
     assert!(matches!(&lists.kept, Kept::Lists { .. }) && lists.heap_bytes(2) * 3 > limits.memory_bytes / 4);

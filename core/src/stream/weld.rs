@@ -1,0 +1,117 @@
+//! The weld by tolerance in the stream: for files whose triangles hardly share a position, as exporters write them that transform facet by facet.
+//!
+//! **In:** records, a tolerance. **Out:** a copy of the records in which boundary vertices that lie together are one, and what was found on the way.
+//!
+//! Boundary vertices within reach of each other hang together; the reach of a vertex is the tolerance, but no more than a share of the shortest edge
+//! at it. What hangs together becomes one vertex: the one with most triangles, the smallest of equals. What is wider than four tolerances, would take
+//! two corners of one triangle, or stands where too many vertices crowd stays as it is: later repairs look at it.
+//!
+//! A chunk sees all triangles within a margin around its cell, so that it knows whatever hangs together with a position at home in it, or that this
+//! is too wide. It moves the corners at home in it, and no others: each corner of the file is moved once, and the result does not depend on the chunks.
+
+use std::io::Write;
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+
+use memmap2::{Mmap, MmapMut};
+
+use crate::contract::error::{Error, Result};
+use crate::contract::progress::Progress;
+use crate::contract::settings::Limits;
+use crate::io::disk_space::{self, Need};
+use crate::io::read_ahead::Guide;
+use crate::io::record::{self, Record};
+use crate::io::write_behind::WriteBehind;
+use crate::stream::members::Members;
+use crate::stream::plan::Plan;
+
+mod cluster;
+mod look;
+mod reach;
+
+pub(crate) use cluster::Counts;
+use cluster::{Chunk, Move};
+pub(crate) use look::{bounds, shares_nothing};
+pub(crate) use reach::Reach;
+use reach::{CELL, WIDEST};
+
+/// A chunk knows so many tolerances around its cell: whatever hangs together with its own, one step more, and the cells that it touches.
+const MARGIN: f64 = WIDEST + 1.0 + 2.0 * CELL;
+
+/// Records after the weld, and what was done.
+#[derive(Debug)]
+pub(crate) struct Welded {
+    pub(crate) records: Mmap,
+    pub(crate) counts: Counts,
+}
+
+/// Welds `records` into a file without a name. O(n log n) time; memory for chunks and member lists alone.
+///
+/// # Errors
+/// [`Error::NoSpace`] without room for the copy, [`Error::Io`] where it cannot be made.
+pub(crate) fn weld(path: &Path, records: &[Record], reach: Reach, limits: &Limits, progress: &dyn Progress) -> Result<Welded> {
+    let guide = Guide::new(records.as_flattened(), limits);
+    let plan = Plan::new(records, &guide, limits.chunk_triangles);
+    let margin = (MARGIN * reach.weld) as f32;
+    let members = Members::gather(path, (records, &guide), &plan, Some(margin), limits, progress)?;
+    let copy = Mutex::new(copied(path, records, &guide, limits)?);
+    let all = records.len() as u64;
+    let found = members.each(
+        (records, &guide, &plan),
+        limits.threads,
+        |_| true,
+        Chunk::default,
+        |chunk, number, seen, visitors| {
+            if progress.cancelled() {
+                return Counts::default();
+            }
+            let cell = plan.home_box(number);
+            let (moves, counts) = chunk.solve([seen, visitors], cell, margin, reach);
+            apply(&mut copy.lock().unwrap_or_else(PoisonError::into_inner), moves);
+            progress.at("weld", (u64::from(number.0) + 1) * all / plan.chunks() as u64, all);
+            counts
+        },
+    );
+    let mut counts = Counts::default();
+    found.iter().for_each(|found| counts.add(found));
+    counts.triangles = all - members.nonfinite.iter().map(|(_, count)| u64::from(*count)).sum::<u64>();
+    let copy = copy.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let welded = copy.make_read_only().map_err(Error::io(&limits.spool_folder(), "mapping"))?;
+    counts.moved_triangles = differing(records.iter().zip(welded.as_chunks().0));
+    Ok(Welded { records: welded, counts })
+}
+
+/// How many pairs of records are not the same.
+fn differing<'r>(pairs: impl Iterator<Item = (&'r Record, &'r Record)>) -> u64 {
+    pairs.filter(|(a, b)| a != b).count() as u64
+}
+
+/// A copy of the records, in a file without a name.
+fn copied(path: &Path, records: &[Record], guide: &Guide<'_>, limits: &Limits) -> Result<MmapMut> {
+    let folder = limits.spool_folder();
+    let bytes = size_of_val(records) as u64;
+    disk_space::check(path, &[Need { folder: folder.clone(), bytes, what: "the triangles after the weld" }])?;
+    let spooling = || Error::io(&folder, "spooling");
+    let mut file = tempfile::tempfile_in(&folder).map_err(spooling())?;
+    let behind = WriteBehind::new(&file, limits).map_err(spooling())?;
+    for block in guide.blocks(records) {
+        for part in block.as_flattened().chunks(1 << 20) {
+            file.write_all(part).map_err(spooling())?;
+            behind.wrote(part.len() as u64).map_err(spooling())?;
+        }
+    }
+    behind.finish().map_err(spooling())?;
+    // SAFETY: the file has no name and this is its only handle: nobody else changes or truncates it.
+    unsafe { MmapMut::map_mut(&file) }.map_err(Error::io(&folder, "mapping"))
+}
+
+/// Puts corners to where they go.
+fn apply(copy: &mut [u8], moves: &[Move]) {
+    let records = copy.as_chunks_mut::<{ size_of::<Record>() }>().0;
+    for Move { triangle, corner, to } in moves {
+        record::put_corner(&mut records[*triangle as usize], usize::from(*corner), *to);
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -5,15 +5,21 @@
 //! joined to a surface that nobody cut: pieces on top of each other are made one, each knows the input it comes from, and cells are only
 //! told apart as far as the triangles tell.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
+mod cells;
+mod contact;
+mod coplanar;
+mod delaunay;
+mod flat;
+mod network;
+mod point;
+mod rational;
+mod recover;
+mod table;
+mod wide;
 
-use manifold_rust::linalg::Vec3;
-use manifold_rust::robust::cells::{self, VertTables};
-use manifold_rust::robust::exact::rational::{R3, r3_eq};
-use manifold_rust::robust::intersection_graph::{self, EdgeKey, IntersectionGraph};
-
+use crate::geometry::arrange::network::{Network, position};
+use crate::geometry::arrange::rational::Rational;
 use crate::geometry::exact;
-use crate::util::parallel;
 
 /// A part of a triangle, or all of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,60 +56,69 @@ pub(crate) trait Arrange {
     fn arrange(&self, triangles: &[[[f32; 3]; 3]], threads: usize) -> Option<Arrangement>;
 }
 
-/// Rational arithmetic by `manifold-rust`, whose self-union this is the first half of. O(n log n) boxes, then by what intersects: 30 to 100
-/// thousand triangles a second.
-pub(crate) struct Rational;
+/// By planes ([`network`]): points are never made from points, signs come from floating point where it decides. Where coordinates have too many
+/// bits for that, by [`Rational`]: the same result.
+pub(crate) struct Exact;
 
-impl Arrange for Rational {
+impl Arrange for Exact {
     fn arrange(&self, triangles: &[[[f32; 3]; 3]], threads: usize) -> Option<Arrangement> {
-        let soup: Vec<[Vec3; 3]> =
-            triangles.iter().map(|t| t.map(|p| Vec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2])))).collect();
-        // A file that the engine cannot do keeps its crossings; it does not cost the others their worker.
-        let cut = || parallel::in_pool(threads, || intersection_graph::build_graph(&soup, &[]));
-        let graph = catch_unwind(AssertUnwindSafe(cut)).ok()?;
-        catch_unwind(AssertUnwindSafe(|| collect(&graph, triangles))).ok()
+        let Some(network) = Network::build(triangles, threads) else { return Rational.arrange(triangles, threads) };
+        let raw = Raw {
+            points: network.points.iter().map(|p| position(p, network.soup.power)).collect(),
+            exact: network.points.iter().map(|p| p.exact).collect(),
+            pieces: network.pieces,
+        };
+        let side = |source: u32, point: u32| network.soup.plane(source as usize).side(&network.points[point as usize]);
+        Some(raw.finish(triangles, &side))
     }
 }
 
-fn collect(graph: &IntersectionGraph, triangles: &[[[f32; 3]; 3]]) -> Arrangement {
-    let (mut pieces, covered) = flatten(graph, triangles);
-    let cells = number_cells(graph, &mut pieces);
-    let points: Vec<[f64; 3]> = graph.verts_f64.iter().map(|p| [p.x, p.y, p.z]).collect();
-    let is_exact = |(i, p): (usize, &[f64; 3])| {
-        p.iter().all(|x| f64::from(*x as f32) == *x) && r3_eq(&graph.verts[i], &R3::from_vec3(graph.verts_f64[i]))
-    };
-    let exact = points.iter().enumerate().map(is_exact).collect();
-    Arrangement { points, exact, covered, pieces, cells }
+/// Pieces before they are compared.
+struct Raw {
+    points: Vec<[f64; 3]>,
+    exact: Vec<bool>,
+    pieces: Vec<(u32, [u32; 3])>,
+}
+
+impl Raw {
+    /// `side` of a point by the plane of a triangle.
+    fn finish(self, triangles: &[[[f32; 3]; 3]], side: &dyn Fn(u32, u32) -> i8) -> Arrangement {
+        let (mut pieces, covered) = flatten(self.points.len(), &self.pieces, triangles);
+        let cells = cells::number(triangles, &mut pieces, side);
+        let fits = |(p, exact): (&[f64; 3], &bool)| *exact && p.iter().all(|x| f64::from(*x as f32) == *x);
+        let exact = self.points.iter().zip(&self.exact).map(fits).collect();
+        Arrangement { points: self.points, exact, covered, pieces, cells }
+    }
 }
 
 /// The pieces with those on top of each other made one, of the first source; and which sources have lost any by that.
 ///
 /// Two sources that lie in one plane and overlap have the same points and constraints where they do, but perhaps not the same triangles. A
 /// piece lies in another source if all its corners are points of that one, since it is convex and in its plane then.
-fn flatten(graph: &IntersectionGraph, triangles: &[[[f32; 3]; 3]]) -> (Vec<Piece>, Vec<bool>) {
-    let mut sources: Vec<Vec<u32>> = vec![Vec::new(); graph.verts.len()];
-    for piece in &graph.pieces {
-        let source = piece.tri as u32;
-        for v in piece.vi {
+fn flatten(points: usize, all: &[(u32, [u32; 3])], triangles: &[[[f32; 3]; 3]]) -> (Vec<Piece>, Vec<bool>) {
+    let mut sources: Vec<Vec<u32>> = vec![Vec::new(); points];
+    for (source, v) in all {
+        for v in v {
             // By source, as the pieces are.
-            if sources[v as usize].last() != Some(&source) {
-                sources[v as usize].push(source);
+            if sources[*v as usize].last() != Some(source) {
+                sources[*v as usize].push(*source);
             }
         }
     }
     let mut covered = vec![false; triangles.len()];
-    let mut pieces = Vec::with_capacity(graph.pieces.len());
-    for piece in &graph.pieces {
-        let source = piece.tri as u32;
-        let [a, b, c] = piece.vi.map(|v| &sources[v as usize]);
-        let others = || a.iter().filter(|s| **s != source && b.binary_search(s).is_ok() && c.binary_search(s).is_ok());
-        if others().next().is_some_and(|first| *first < source) {
-            covered[piece.tri] = true;
+    let mut pieces = Vec::with_capacity(all.len());
+    for (source, v) in all {
+        let mut lists = v.map(|v| &sources[v as usize]);
+        lists.sort_unstable_by_key(|list| list.len());
+        let [a, b, c] = lists;
+        let others = || a.iter().filter(|s| *s != source && b.binary_search(s).is_ok() && c.binary_search(s).is_ok());
+        if others().next().is_some_and(|first| first < source) {
+            covered[*source as usize] = true;
             continue;
         }
-        let agrees = |other: &u32| agree(&triangles[piece.tri], &triangles[*other as usize]);
+        let agrees = |other: &u32| agree(&triangles[*source as usize], &triangles[*other as usize]);
         let step = 1 + others().map(|other| if agrees(other) { 1 } else { -1 }).sum::<i32>();
-        pieces.push(Piece { source, v: piece.vi, step, cells: [0; 2] });
+        pieces.push(Piece { source: *source, v: *v, step, cells: [0; 2] });
     }
     (pieces, covered)
 }
@@ -114,59 +129,14 @@ fn agree(a: &[[f32; 3]; 3], b: &[[f32; 3]; 3]) -> bool {
     (0..3).any(|axis| turn(a, axis) * turn(b, axis) > 0)
 }
 
-/// Numbers the cells in front of and behind each piece. Around an edge, the space between two neighbouring pieces is one cell.
-fn number_cells(graph: &IntersectionGraph, pieces: &mut [Piece]) -> u32 {
-    // As the engine calls the sides: two numbers a piece, in front of it and behind.
-    let side = |piece: usize, behind: bool| 2 * piece as u32 + u32::from(behind);
-    // A piece that runs with the edge has its front on the side of larger angles.
-    let next_side = |piece: usize, forward: bool| side(piece, !forward);
-    let last_side = |piece: usize, forward: bool| side(piece, forward);
-    let mut parents: Vec<u32> = (0..2 * pieces.len() as u32).collect();
-    let mut uses: Vec<(EdgeKey, usize, bool, u32)> = Vec::with_capacity(3 * pieces.len());
-    for (i, piece) in pieces.iter().enumerate() {
-        for k in 0..3 {
-            let (a, b) = (piece.v[k], piece.v[(k + 1) % 3]);
-            uses.push((intersection_graph::edge_key(a, b), i, a < b, piece.v[(k + 2) % 3]));
-        }
-    }
-    uses.sort_unstable();
-    for around in uses.chunk_by(|a, b| a.0 == b.0).filter(|around| around.len() > 1) {
-        let (low, high) = around[0].0;
-        let Some((fan, groups)) = cells::radial_fan(low, high, around, VertTables::of(graph)) else { continue };
-        for (at, (first, end)) in groups.iter().enumerate() {
-            let one = &fan[*first];
-            for other in &fan[*first..*end] {
-                crate::util::union_find::unite(&mut parents, next_side(one.id, one.forward), next_side(other.id, other.forward));
-                crate::util::union_find::unite(&mut parents, last_side(one.id, one.forward), last_side(other.id, other.forward));
-            }
-            if groups.len() > 1 {
-                let next = &fan[groups[(at + 1) % groups.len()].0];
-                crate::util::union_find::unite(&mut parents, next_side(one.id, one.forward), last_side(next.id, next.forward));
-            }
-        }
-    }
-    let mut numbers = vec![crate::util::ids::NONE; parents.len()];
-    let mut count = 0;
-    for (i, piece) in pieces.iter_mut().enumerate() {
-        for behind in [false, true] {
-            let root = crate::util::union_find::find(&mut parents, side(i, behind)) as usize;
-            if numbers[root] == crate::util::ids::NONE {
-                numbers[root] = count;
-                count += 1;
-            }
-            piece.cells[usize::from(behind)] = numbers[root];
-        }
-    }
-    count
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::testing::{Corners, cuboid, shifted};
+    use proptest::prelude::*;
 
     fn arranged(triangles: &[Corners]) -> Arrangement {
-        Rational.arrange(triangles, 1).unwrap()
+        Exact.arrange(triangles, 1).unwrap()
     }
 
     /// Winding numbers of all cells, cell by cell from one of which it is known.
@@ -242,5 +212,45 @@ mod tests {
             let shared = 2.0 * (x * y + y * z + z * x);
             assert!((union_area(&both) - (48.0 - shared)).abs() < 1e-9, "{by:?}: {}", union_area(&both));
         }
+    }
+
+    /// Soups on grids (flat pieces on each other, corners on edges, points on circles), in general places, and of thin triangles that all but lie
+    /// in one plane.
+    fn soups() -> impl Strategy<Value = Vec<Corners>> {
+        let corner = |size: i32| prop::array::uniform3(-size..=size);
+        let soup = |size: i32, count: usize| prop::collection::vec(prop::array::uniform3(corner(size)), 2..count);
+        let scaled = |t: Vec<[[i32; 3]; 3]>, by: [f32; 3]| -> Vec<Corners> {
+            t.into_iter().map(|t| t.map(|p| std::array::from_fn(|k| p[k] as f32 * by[k]))).collect()
+        };
+        prop_oneof![
+            soup(2, 12).prop_map(move |t| scaled(t, [1.0; 3])),
+            soup(3, 20).prop_map(move |t| scaled(t, [1.0, 1.0, 0.0])),
+            soup(5, 14).prop_map(move |t| scaled(t, [1.0, 0.5, 0.25])),
+            soup(1 << 23, 24).prop_map(move |t| scaled(t, [1e-3, 3e-5, 0.1])),
+            soup(3000, 16).prop_map(move |t| scaled(t, [1.0, 1.0, 1e-9])),
+        ]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(400))]
+        #[test]
+        fn is_what_rational_arithmetic_says(soup in soups()) {
+            let soup: Vec<Corners> = soup.into_iter().filter(|[a, b, c]| !exact::collinear(a, b, c)).collect();
+            prop_assert!(Network::build(&soup, 1).is_some());
+            let (ours, theirs) = (arranged(&soup), Rational.arrange(&soup, 1).unwrap());
+            prop_assert_eq!(&ours.points, &theirs.points);
+            prop_assert_eq!(&ours.exact, &theirs.exact);
+            prop_assert_eq!(&ours.covered, &theirs.covered);
+            prop_assert_eq!(&ours.pieces, &theirs.pieces);
+            prop_assert_eq!(ours.cells, theirs.cells);
+        }
+    }
+
+    #[test]
+    fn coordinates_of_too_many_bits_are_rational() {
+        let soup =
+            [[[1e-30, 0.0, 0.0], [1e30, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0.5, 0.25, -1.0], [0.5, 0.25, 1.0], [3.0, 0.25, 1.0]]];
+        assert!(Network::build(&soup, 1).is_none());
+        assert!(arranged(&soup).pieces.len() > 2);
     }
 }

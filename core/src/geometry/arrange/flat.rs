@@ -12,10 +12,19 @@ const TWICE: usize = 2 * WORDS;
 type Long = Wide<TWICE>;
 type Longer = Wide<{ 2 * TWICE }>;
 
+/// A point's two coordinates, rounded, and what is missing in each.
+#[derive(Clone, Copy)]
+struct Seen {
+    x: f64,
+    y: f64,
+    x_low: f64,
+    y_low: f64,
+}
+
 /// Points of one plane, as seen along an axis.
 pub(crate) struct Flat<'a> {
     points: Vec<&'a Point>,
-    seen: Vec<[[f64; 2]; 2]>,
+    seen: Vec<Seen>,
     /// Of each coordinate, at most.
     error: f64,
     axes: [usize; 2],
@@ -24,8 +33,10 @@ pub(crate) struct Flat<'a> {
 impl<'a> Flat<'a> {
     pub(crate) fn new(points: Vec<&'a Point>, axis: usize) -> Self {
         let axes = [(axis + 1) % 3, (axis + 2) % 3];
-        let seen: Vec<[[f64; 2]; 2]> = points.iter().map(|p| [axes.map(|k| p.high[k]), axes.map(|k| p.low[k])]).collect();
-        let largest = seen.iter().flat_map(|p| p[0]).fold(0.0_f64, |m, x| m.max(x.abs()));
+        let [x, y] = axes;
+        let seen = |p: &&Point| Seen { x: p.high[x], y: p.high[y], x_low: p.low[x], y_low: p.low[y] };
+        let seen: Vec<Seen> = points.iter().map(seen).collect();
+        let largest = seen.iter().fold(0.0_f64, |m, p| m.max(p.x.abs()).max(p.y.abs()));
         // 2⁻⁹⁸, for a difference.
         Self { points, seen, error: largest * (1.0 / (1_u128 << 98) as f64), axes }
     }
@@ -36,7 +47,7 @@ impl<'a> Flat<'a> {
 
     /// The rounded coordinate; rounding keeps order.
     pub(crate) fn at(&self, i: usize) -> [f64; 2] {
-        self.seen[i][0]
+        [self.seen[i].x, self.seen[i].y]
     }
 
     /// By the first coordinate, then the second.
@@ -45,54 +56,71 @@ impl<'a> Flat<'a> {
         a.cmp_along(b, self.axes[0]).then_with(|| a.cmp_along(b, self.axes[1]))
     }
 
-    /// One point less another, each coordinate good to 2⁻⁵² of it and the error.
-    #[inline]
-    fn less(&self, a: usize, b: usize) -> [f64; 2] {
-        let (a, b) = (&self.seen[a], &self.seen[b]);
-        [0, 1].map(|k| {
-            // What the difference loses (Knuth's two-sum).
-            let (x, y) = (a[0][k], b[0][k]);
-            let difference = x - y;
-            let seen = x - difference;
-            let lost = (x - (difference + seen)) + (seen - y);
-            difference + (lost + (a[1][k] - b[1][k]))
-        })
-    }
-
     /// +1 if a, b, c turn to the left, 0 if they are on one line.
     #[inline]
     pub(crate) fn turn(&self, a: usize, b: usize, c: usize) -> i8 {
-        let ([ux, uy], [vx, vy]) = (self.less(b, a), self.less(c, a));
+        match self.certain_turn(a, b, c) {
+            0 => turn_exactly([self.points[a], self.points[b], self.points[c]], self.axes),
+            sign => sign,
+        }
+    }
+
+    /// As [`Flat::turn`]; 0 also if in doubt.
+    #[inline(always)]
+    pub(crate) fn certain_turn(&self, a: usize, b: usize, c: usize) -> i8 {
+        let (a, b, c) = (&self.seen[a], &self.seen[b], &self.seen[c]);
+        let (ux, uy, vx, vy) = (b.right_of(a), b.above(a), c.right_of(a), c.above(a));
         let (p, q) = (ux * vy, uy * vx);
         let lengths = ux.abs() + uy.abs() + vx.abs() + vy.abs() + self.error;
         let error = (p.abs() + q.abs()) * (1.0 / (1_u64 << 49) as f64) + 2.0 * self.error * lengths;
-        if (p - q).abs() > error {
-            if p > q { 1 } else { -1 }
-        } else {
-            turn_exactly([a, b, c].map(|i| self.points[i]), self.axes)
-        }
+        i8::from(p - q > error) - i8::from(q - p > error)
     }
 
     /// +1 if d lies inside of the circle through a, b, c, which turn to the left.
     #[inline]
     pub(crate) fn in_circle(&self, [a, b, c]: [usize; 3], d: usize) -> i8 {
-        let rows = [a, b, c].map(|i| self.less(i, d));
-        let lift = rows.map(|[x, y]| x * x + y * y);
-        let size = rows.as_flattened().iter().fold(self.error, |m, x| m.max(x.abs()));
-        let (mut value, mut magnitude) = (0.0, 0.0);
-        for k in 0..3 {
-            let ([vx, vy], [wx, wy]) = (rows[(k + 1) % 3], rows[(k + 2) % 3]);
-            let (p, q) = (vx * wy, vy * wx);
-            value += lift[k] * (p - q);
-            magnitude += lift[k] * (p.abs() + q.abs());
+        match self.certain_in_circle([a, b, c], d) {
+            0 => in_circle_exactly([self.points[a], self.points[b], self.points[c], self.points[d]], self.axes),
+            sign => sign,
         }
+    }
+
+    #[inline(always)]
+    fn certain_in_circle(&self, [a, b, c]: [usize; 3], d: usize) -> i8 {
+        let (a, b, c, d) = (&self.seen[a], &self.seen[b], &self.seen[c], &self.seen[d]);
+        let (ux, uy, vx, vy) = (a.right_of(d), a.above(d), b.right_of(d), b.above(d));
+        let (wx, wy) = (c.right_of(d), c.above(d));
+        let (u, v, w) = (ux * ux + uy * uy, vx * vx + vy * vy, wx * wx + wy * wy);
+        let (vw, wv, wu, uw, uv, vu) = (vx * wy, vy * wx, wx * uy, wy * ux, ux * vy, uy * vx);
+        let value = u * (vw - wv) + v * (wu - uw) + w * (uv - vu);
+        let magnitude = u * (vw.abs() + wv.abs()) + v * (wu.abs() + uw.abs()) + w * (uv.abs() + vu.abs());
+        let size = ux.abs().max(uy.abs()).max(vx.abs()).max(vy.abs()).max(wx.abs()).max(wy.abs()).max(self.error);
         // The rounding of some ten operations; and 24 products of four such sizes, each of which may be off by the error.
         let error = magnitude * (1.0 / (1_u64 << 48) as f64) + 256.0 * self.error * size * size * size;
-        if value.abs() > error {
-            return if value > 0.0 { 1 } else { -1 };
-        }
-        in_circle_exactly([a, b, c, d].map(|i| self.points[i]), self.axes)
+        i8::from(value > error) - i8::from(-value > error)
     }
+}
+
+impl Seen {
+    /// Differences, good to 2⁻⁵² of themselves and the error.
+    #[inline(always)]
+    fn right_of(&self, other: &Self) -> f64 {
+        difference(self.x, self.x_low, other.x, other.x_low)
+    }
+
+    #[inline(always)]
+    fn above(&self, other: &Self) -> f64 {
+        difference(self.y, self.y_low, other.y, other.y_low)
+    }
+}
+
+#[inline(always)]
+fn difference(x: f64, x_low: f64, y: f64, y_low: f64) -> f64 {
+    // What the difference loses (Knuth's two-sum).
+    let difference = x - y;
+    let seen = x - difference;
+    let lost = (x - (difference + seen)) + (seen - y);
+    difference + (lost + (x_low - y_low))
 }
 
 /// How three points turn, seen along an axis.

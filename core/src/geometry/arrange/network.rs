@@ -249,14 +249,16 @@ impl Builder<'_> {
         for k in 0..3 {
             let (a, b) = (points.len() + k, points.len() + (k + 1) % 3);
             let key = sorted([corners[k], corners[(k + 1) % 3]]);
-            let splits = |p: u32| !key.contains(&p) && is_between(&flat, (a, b), place(p));
-            found.edges.extend(search.within(&flat, (a, b)).map(|p| points[p]).filter(|p| splits(*p)).map(|p| (key, p)));
+            let near = search.within(&flat, (a, b)).filter(|p| flat.certain_turn(a, b, *p) == 0 && !key.contains(&points[*p]));
+            found.edges.extend(near.filter(|p| is_between(&flat, (a, b), *p)).map(|p| (key, points[p])));
         }
         for (s, segment) in segments.iter().enumerate() {
             let (key, ends) = (sorted(segment.ends), (place(segment.ends[0]), place(segment.ends[1])));
-            let on = |p: &u32| known.binary_search(&(s as u32, *p)).is_ok() || is_between(&flat, ends, place(*p));
-            let inner = search.within(&flat, ends).map(|p| points[p]).filter(|p| !key.contains(p));
-            found.segments.extend(inner.filter(on).map(|p| (key, p)));
+            let known = |p: usize| known.binary_search(&(s as u32, points[p])).is_ok();
+            let near = search
+                .within(&flat, ends)
+                .filter(|p| flat.certain_turn(ends.0, ends.1, *p) == 0 && ![ends.0, ends.1].contains(p));
+            found.segments.extend(near.filter(|p| known(*p) || is_between(&flat, ends, *p)).map(|p| (key, points[p])));
         }
         found.points = points;
         found

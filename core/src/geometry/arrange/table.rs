@@ -4,12 +4,13 @@ use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
 use crate::geometry::arrange::point::Point;
+use crate::util::ids::NONE;
 
 /// Points by what they are rounded to. Only asked, never listed.
 #[derive(Default)]
 pub(crate) struct Table {
     pub(crate) points: Vec<Point>,
-    /// The latest point that is rounded so; then the one before, by point.
+    /// The latest point that is rounded so; then, by point, the one before, or [`NONE`].
     latest: HashMap<[u64; 3], u32, BuildHasherDefault<Mix>>,
     before: Vec<u32>,
 }
@@ -18,16 +19,15 @@ impl Table {
     /// The number of a point.
     pub(crate) fn intern(&mut self, point: Point) -> u32 {
         let next = self.points.len() as u32;
-        let latest = self.latest.entry(point.high.map(f64::to_bits)).or_insert(next);
+        let latest = self.latest.entry(point.high.map(f64::to_bits)).or_insert(NONE);
         let mut same = *latest;
-        while same != next {
+        while same != NONE {
             if self.points[same as usize].is(&point) {
                 return same;
             }
             same = self.before[same as usize];
         }
-        // The list ends where a number says its own.
-        self.before.push(if *latest == next { next } else { *latest });
+        self.before.push(*latest);
         *latest = next;
         self.points.push(point);
         next
@@ -54,5 +54,25 @@ impl Hasher for Mix {
     fn write_u64(&mut self, word: u64) {
         let mixed = (self.0 ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         self.0 = mixed ^ mixed >> 32;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::arrange::point::{Plane, on_line};
+
+    /// The line meets planes a third apart and one part in 2⁶⁰ more or less: not one of the points is what it is rounded to.
+    #[test]
+    fn points_that_round_alike_are_told_apart() {
+        let mut table = Table::default();
+        let third = |by: i128| {
+            let height = (1_i128 << 90) / 3 + by;
+            let plane = Plane::of(&[[0, 0, height], [1, 0, height], [0, 1, height]]);
+            on_line(&[[5, 5, 0], [5, 5, 1 << 91]], &plane).unwrap()
+        };
+        for _ in 0..2 {
+            assert_eq!([0, 1, 2, 1].map(|by| table.intern(third(by))), [0, 1, 2, 1]);
+        }
     }
 }

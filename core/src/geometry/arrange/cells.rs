@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use crate::geometry::arrange::{Piece, agree};
+use crate::geometry::arrange::piece::{Piece, agree};
 use crate::util::ids::NONE;
 use crate::util::union_find::{find, unite};
 

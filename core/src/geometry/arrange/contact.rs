@@ -1,63 +1,11 @@
 //! Along which segments two triangles of one soup cut each other.
 
 use std::cmp::Ordering;
-use std::sync::OnceLock;
 
 use crate::geometry::arrange::coplanar;
-use crate::geometry::arrange::point::{BITS, Corner, Plane, Point, cross, on_line};
+use crate::geometry::arrange::point::{Point, cross, on_line};
+use crate::geometry::arrange::soup::{Contact, Soup};
 use crate::geometry::exact;
-
-/// A segment that two triangles have in common: in which order the ends stand depends on their order.
-#[derive(Clone, Debug)]
-pub(crate) struct Contact {
-    pub(crate) ends: [Point; 2],
-    /// For a crossing of two planes, that of the other triangle.
-    pub(crate) edge: Option<[Corner; 2]>,
-}
-
-/// Triangles with their corners in units in which all of these are whole.
-pub(crate) struct Soup<'a> {
-    pub(crate) triangles: &'a [[[f32; 3]; 3]],
-    /// Two to this power is the unit.
-    pub(crate) power: i32,
-    planes: Vec<OnceLock<Box<Plane>>>,
-}
-
-impl<'a> Soup<'a> {
-    /// `None` if coordinates have too many bits between the largest and the smallest.
-    pub(crate) fn new(triangles: &'a [[[f32; 3]; 3]]) -> Option<Self> {
-        let all = || triangles.as_flattened().as_flattened().iter().filter(|x| **x != 0.0).map(|x| parts(*x));
-        let power = all().map(|(mantissa, power)| power + mantissa.trailing_zeros() as i32).min().unwrap_or(0);
-        let top = all().map(|(_, power)| power + 24).max().unwrap_or(0);
-        let planes = (0..triangles.len()).map(|_| OnceLock::new()).collect();
-        (top - power <= BITS as i32).then_some(Self { triangles, power, planes })
-    }
-
-    pub(crate) fn corners(&self, t: usize) -> [Corner; 3] {
-        self.triangles[t].map(|p| p.map(|x| self.whole(x)))
-    }
-
-    fn whole(&self, x: f32) -> i128 {
-        let (mantissa, power) = parts(x);
-        let by = power - self.power;
-        let magnitude = if by >= 0 { i128::from(mantissa) << by } else { i128::from(mantissa) >> -by };
-        if x < 0.0 { -magnitude } else { magnitude }
-    }
-
-    pub(crate) fn plane(&self, t: usize) -> &Plane {
-        self.planes[t].get_or_init(|| Box::new(Plane::of(&self.corners(t))))
-    }
-}
-
-/// The magnitude as a whole number times a power of two; for zero any power.
-fn parts(x: f32) -> (u32, i32) {
-    let (bits, exponent) = (x.to_bits() & 0x7f_ffff, x.to_bits() >> 23 & 0xff);
-    match (bits, exponent) {
-        (0, 0) => (0, 0),
-        (_, 0) => (bits, -149),
-        _ => (bits | 1 << 23, exponent as i32 - 150),
-    }
-}
 
 /// The segments along which two triangles have to be cut for each other. What belongs to any surface is none: a common edge or
 /// corner, a single point, all of the same triangle.

@@ -1,8 +1,8 @@
 //! What two triangles of one plane have in common: the second, clipped by the edges of the first (Sutherland and Hodgman).
 
-use crate::geometry::arrange::contact::{Contact, Soup};
 use crate::geometry::arrange::flat::turn;
 use crate::geometry::arrange::point::{Corner, Point, on_lines, upright_side};
+use crate::geometry::arrange::soup::{Contact, Soup};
 use crate::geometry::exact;
 
 /// A corner of the rest, and the edge that the side from it on lies on.

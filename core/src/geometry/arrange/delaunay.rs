@@ -1,10 +1,9 @@
-//! Constrained Delaunay triangulation of a triangle with points in it: all points, then all constraints.
+//! A Delaunay triangulation of a triangle, to which points are added.
 //!
 //! In steps and ties after that of `manifold-rust` (Lars Brubaker, Apache-2.0), so that the result is the same. Of four points on a circle,
 //! the diagonal with the lowest points in order of coordinates is taken, so that two triangles of one plane are divided alike.
 
 use crate::geometry::arrange::flat::Flat;
-use crate::geometry::arrange::recover;
 use crate::util::ids::NONE;
 
 #[derive(Clone, Copy, Debug)]
@@ -44,34 +43,17 @@ enum Place {
     Outside(usize),
 }
 
-/// The triangles, to the left. The first three points are the corners, all others inside of them or on their sides, all different;
-/// no constraint crosses another, or has a point inside. `None` if that does not hold.
-pub(crate) fn triangulate(flat: &Flat<'_>, constraints: &[(usize, usize)]) -> Option<Vec<[usize; 3]>> {
-    let corners = match flat.turn(0, 1, 2) {
-        0 => return None,
-        1 => [0, 1, 2],
-        _ => [0, 2, 1],
-    };
-    let mut order: Vec<usize> = (0..flat.len()).collect();
-    order.sort_by(|a, b| flat.cmp(*a, *b));
-    let mut rank = vec![0; flat.len()];
-    order.iter().zip(0..).for_each(|(point, place)| rank[*point] = place);
-    let triangles = vec![Tri::new(corners, [NONE; 3], [false; 3])];
-    let mut cdt = Delaunay { flat, triangles, suspects: Vec::new(), latest: vec![0; flat.len()], rank };
-    for p in 3..flat.len() {
-        let first_new = cdt.triangles.len();
-        cdt.insert(p)?;
-        cdt.legalize(first_new);
+impl<'f> Delaunay<'f> {
+    /// The first three points, which turn to the left in this order.
+    pub(crate) fn new(flat: &'f Flat<'f>, corners: [usize; 3]) -> Self {
+        let mut order: Vec<usize> = (0..flat.len()).collect();
+        order.sort_by(|a, b| flat.cmp(*a, *b));
+        let mut rank = vec![0; flat.len()];
+        order.iter().zip(0..).for_each(|(point, place)| rank[*point] = place);
+        let triangles = vec![Tri::new(corners, [NONE; 3], [false; 3])];
+        Self { flat, triangles, suspects: Vec::new(), latest: vec![0; flat.len()], rank }
     }
-    for (a, b) in constraints {
-        let first_new = cdt.triangles.len();
-        recover::constrain(&mut cdt, *a, *b)?;
-        cdt.legalize(first_new);
-    }
-    Some(cdt.triangles.iter().filter(|t| t.alive).map(|t| t.v).collect())
-}
 
-impl Delaunay<'_> {
     pub(crate) fn record(&mut self, t: usize) {
         for v in self.triangles[t].v {
             self.latest[v] = t as u32;
@@ -110,7 +92,8 @@ impl Delaunay<'_> {
         }
     }
 
-    fn insert(&mut self, p: usize) -> Option<()> {
+    /// Adds a point in the triangle or on its border.
+    pub(crate) fn insert(&mut self, p: usize) -> Option<()> {
         let mut at = self.triangles.iter().rposition(|t| t.alive)?;
         // A walk in a Delaunay triangulation comes to no triangle twice.
         for _ in 0..=self.triangles.len() {
@@ -186,7 +169,7 @@ impl Delaunay<'_> {
     }
 
     /// Flips what is not Delaunay, from the new triangles on (Lawson).
-    fn legalize(&mut self, first_new: usize) {
+    pub(crate) fn legalize(&mut self, first_new: usize) {
         self.suspects.extend(first_new..self.triangles.len());
         while let Some(t) = self.suspects.pop() {
             if self.triangles[t].alive && (0..3).any(|side| self.try_flip(t, side)) {

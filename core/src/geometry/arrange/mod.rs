@@ -1,7 +1,7 @@
 //! Exact arrangements: triangles cut along everything they meet, and the cells of space between them.
 //!
-//! After Zhou, Grinspun, Zorin & Jacobson, "Mesh arrangements for solid geometry", ACM TOG 35(4), 2016. The cutting is bought: points are
-//! exact rationals there, so that nothing is decided by a tolerance. What is done here is what a part of a surface needs, whose rim is
+//! After Zhou, Grinspun, Zorin & Jacobson, "Mesh arrangements for solid geometry", ACM TOG 35(4), 2016. Signs are
+//! exact, so that nothing is decided by a tolerance. A part of a surface needs more, whose rim is
 //! joined to a surface that nobody cut: pieces on top of each other are made one, each knows the input it comes from, and cells are only
 //! told apart as far as the triangles tell.
 
@@ -11,50 +11,21 @@ mod coplanar;
 mod delaunay;
 mod flat;
 mod network;
+mod piece;
 mod point;
 mod rational;
+mod raw;
 mod recover;
+mod soup;
 mod table;
+mod triangulate;
 mod wide;
 
 use crate::geometry::arrange::network::{Network, position};
 use crate::geometry::arrange::rational::Rational;
-use crate::geometry::exact;
+use crate::geometry::arrange::raw::Raw;
 
-/// A part of a triangle, or all of it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Piece {
-    /// The first of the triangles that it is part of.
-    pub(crate) source: u32,
-    /// Points of the arrangement, the way round that the source runs.
-    pub(crate) v: [u32; 3],
-    /// Triangles that it is part of and that run as it does, less those that run the other way: by so much the winding number behind it
-    /// is larger than the one in front.
-    pub(crate) step: i32,
-    /// The cells in front of it and behind.
-    pub(crate) cells: [u32; 2],
-}
-
-/// Triangles cut along all their intersections.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Arrangement {
-    /// Rounded to the nearest f64; where a corner of a triangle is, exactly that.
-    pub(crate) points: Vec<[f64; 3]>,
-    /// Which of the points are exactly where they are said to be, in f32; others there are only very near.
-    pub(crate) exact: Vec<bool>,
-    /// By triangle: part of it is a piece of an earlier one, too.
-    pub(crate) covered: Vec<bool>,
-    /// By source. No two of them lie on top of each other, and they meet along whole edges.
-    pub(crate) pieces: Vec<Piece>,
-    /// Numbers of cells are below this. What is one cell of space may have several, if only triangles that are not here show it.
-    pub(crate) cells: u32,
-}
-
-/// What can arrange triangles.
-pub(crate) trait Arrange {
-    /// The arrangement of triangles that have an area; `None` if it fails. The same for any number of threads.
-    fn arrange(&self, triangles: &[[[f32; 3]; 3]], threads: usize) -> Option<Arrangement>;
-}
+pub(crate) use crate::geometry::arrange::piece::{Arrange, Arrangement, Piece};
 
 /// By planes ([`network`]): points are never made from points, signs come from floating point where it decides. Where coordinates have too many
 /// bits for that, by [`Rational`]: the same result.
@@ -73,65 +44,10 @@ impl Arrange for Exact {
     }
 }
 
-/// Pieces before they are compared.
-struct Raw {
-    points: Vec<[f64; 3]>,
-    exact: Vec<bool>,
-    pieces: Vec<(u32, [u32; 3])>,
-}
-
-impl Raw {
-    /// `side` of a point by the plane of a triangle.
-    fn finish(self, triangles: &[[[f32; 3]; 3]], side: &dyn Fn(u32, u32) -> i8) -> Arrangement {
-        let (mut pieces, covered) = flatten(self.points.len(), &self.pieces, triangles);
-        let cells = cells::number(triangles, &mut pieces, side);
-        let fits = |(p, exact): (&[f64; 3], &bool)| *exact && p.iter().all(|x| f64::from(*x as f32) == *x);
-        let exact = self.points.iter().zip(&self.exact).map(fits).collect();
-        Arrangement { points: self.points, exact, covered, pieces, cells }
-    }
-}
-
-/// The pieces with those on top of each other made one, of the first source; and which sources have lost any by that.
-///
-/// Two sources that lie in one plane and overlap have the same points and constraints where they do, but perhaps not the same triangles. A
-/// piece lies in another source if all its corners are points of that one, since it is convex and in its plane then.
-fn flatten(points: usize, all: &[(u32, [u32; 3])], triangles: &[[[f32; 3]; 3]]) -> (Vec<Piece>, Vec<bool>) {
-    let mut sources: Vec<Vec<u32>> = vec![Vec::new(); points];
-    for (source, v) in all {
-        for v in v {
-            // By source, as the pieces are.
-            if sources[*v as usize].last() != Some(source) {
-                sources[*v as usize].push(*source);
-            }
-        }
-    }
-    let mut covered = vec![false; triangles.len()];
-    let mut pieces = Vec::with_capacity(all.len());
-    for (source, v) in all {
-        let mut lists = v.map(|v| &sources[v as usize]);
-        lists.sort_unstable_by_key(|list| list.len());
-        let [a, b, c] = lists;
-        let others = || a.iter().filter(|s| *s != source && b.binary_search(s).is_ok() && c.binary_search(s).is_ok());
-        if others().next().is_some_and(|first| first < source) {
-            covered[*source as usize] = true;
-            continue;
-        }
-        let agrees = |other: &u32| agree(&triangles[*source as usize], &triangles[*other as usize]);
-        let step = 1 + others().map(|other| if agrees(other) { 1 } else { -1 }).sum::<i32>();
-        pieces.push(Piece { source: *source, v: *v, step, cells: [0; 2] });
-    }
-    (pieces, covered)
-}
-
-/// Do two triangles of one plane face the same way? Exact: that of their shadows, along an axis in which they have any.
-fn agree(a: &[[f32; 3]; 3], b: &[[f32; 3]; 3]) -> bool {
-    let turn = |t: &[[f32; 3]; 3], axis: usize| exact::orientation_along(&t[0], &t[1], &t[2], axis);
-    (0..3).any(|axis| turn(a, axis) * turn(b, axis) > 0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::exact;
     use crate::testing::{Corners, cuboid, shifted};
     use proptest::prelude::*;
 

@@ -3,12 +3,13 @@
 //! Segments first, by pairs; then where those of one triangle cross. A point that one triangle finds on an edge or a segment cuts all
 //! triangles that have this edge or segment, so that pieces meet along whole edges. Then each triangle is triangulated by itself.
 
-use crate::geometry::arrange::contact::{Contact, Soup, contact};
+use crate::geometry::arrange::contact::contact;
 use crate::geometry::arrange::coplanar::dominant_axis;
-use crate::geometry::arrange::delaunay;
 use crate::geometry::arrange::flat::Flat;
 use crate::geometry::arrange::point::{Corner, Point, on_line, on_lines, on_planes, scaled};
+use crate::geometry::arrange::soup::{Contact, Soup};
 use crate::geometry::arrange::table::Table;
+use crate::geometry::arrange::triangulate::triangulate;
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::exact;
 use crate::geometry::sums::Bounds;
@@ -285,7 +286,7 @@ impl Builder<'_> {
         let (points, places) = distinct(all);
         let flat = self.flat(t, &points);
         let constraints = self.constraints(&flat, segments, found, splits, &points, &places);
-        let mut pieces = delaunay::triangulate(&flat, &constraints)?;
+        let mut pieces = triangulate(&flat, &constraints)?;
         let plane = self.soup.plane(t);
         if plane.normal[dominant_axis(&self.soup, t)].sign() < 0 {
             pieces.iter_mut().for_each(|v| v.swap(1, 2));

@@ -8,7 +8,8 @@ use manifold_rust::robust::exact::predicates::orient3d_r;
 use manifold_rust::robust::exact::rational::{R3, r3_eq};
 use manifold_rust::robust::intersection_graph::{self, IntersectionGraph};
 
-use crate::geometry::arrange::{Arrange, Arrangement, Raw};
+use crate::geometry::arrange::piece::{Arrange, Arrangement};
+use crate::geometry::arrange::raw::Raw;
 use crate::util::parallel;
 
 /// The first half of a self-union there.

@@ -96,5 +96,5 @@ fn crossing(soup: &Soup<'_>, pair: [usize; 2], sides: [[i8; 3]; 2]) -> Option<Co
     let ([low, high], [other_low, other_high]) = (ends(0)?, ends(1)?);
     let low = if order(&low, &other_low) == Ordering::Less { other_low } else { low };
     let high = if order(&high, &other_high) == Ordering::Greater { other_high } else { high };
-    (order(&low, &high) == Ordering::Less).then(|| Contact { ends: [low, high], edge: None })
+    (order(&low, &high) == Ordering::Less).then_some(Contact { ends: [low, high], edge: None })
 }

@@ -113,8 +113,8 @@ impl Rest {
         let ((x, x_power), (w_rounded, w_power)) = (self.numerator.rounded(), w.rounded());
         let quotient = x / w_rounded;
         // As a whole number of 53 bits times a power of two.
-        let exponent = (quotient.to_bits() >> 52 & 0x7ff) as i32 - 1075;
-        let whole = (quotient.to_bits() & (1 << 52) - 1 | 1 << 52) as i128;
+        let exponent = ((quotient.to_bits() >> 52) & 0x7ff) as i32 - 1075;
+        let whole = ((quotient.to_bits() & ((1 << 52) - 1)) | (1 << 52)) as i128;
         let whole = Int::of(if quotient < 0.0 { -whole } else { whole });
         let power = exponent + x_power - w_power;
         if power < 0 {

@@ -25,7 +25,7 @@ impl<'a> Soup<'a> {
     pub(crate) fn new(triangles: &'a [[[f32; 3]; 3]]) -> Option<Self> {
         let all = || triangles.as_flattened().as_flattened().iter().filter(|x| **x != 0.0).map(|x| parts(*x));
         let power = all().map(|(mantissa, power)| power + mantissa.trailing_zeros() as i32).min().unwrap_or(0);
-        let top = all().map(|(_, power)| power + 24).max().unwrap_or(0);
+        let top = all().map(|(_, power)| power + 53).max().unwrap_or(0);
         let planes = (0..triangles.len()).map(|_| OnceLock::new()).collect();
         (top - power <= BITS as i32).then_some(Self { triangles, power, planes })
     }
@@ -35,6 +35,9 @@ impl<'a> Soup<'a> {
     }
 
     fn whole(&self, x: f32) -> i128 {
+        if x == 0.0 {
+            return 0;
+        }
         let (mantissa, power) = parts(x);
         let by = power - self.power;
         let magnitude = if by >= 0 { i128::from(mantissa) << by } else { i128::from(mantissa) >> -by };
@@ -46,12 +49,8 @@ impl<'a> Soup<'a> {
     }
 }
 
-/// The magnitude as a whole number times a power of two; for zero any power.
-fn parts(x: f32) -> (u32, i32) {
-    let (bits, exponent) = (x.to_bits() & 0x7f_ffff, x.to_bits() >> 23 & 0xff);
-    match (bits, exponent) {
-        (0, 0) => (0, 0),
-        (_, 0) => (bits, -149),
-        _ => (bits | 1 << 23, exponent as i32 - 150),
-    }
+/// The magnitude as a whole number of 53 bits times a power of two; not for zero. (A f32 is never too small for a normal f64.)
+fn parts(x: f32) -> (u64, i32) {
+    let bits = f64::from(x.abs()).to_bits();
+    ((bits & ((1 << 52) - 1)) | (1 << 52), (bits >> 52) as i32 - 1075)
 }

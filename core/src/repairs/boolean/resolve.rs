@@ -21,7 +21,7 @@
 mod tests;
 
 use crate::contract::report::RepairName;
-use crate::geometry::arrange::Rational;
+use crate::geometry::arrange::Exact;
 use crate::repairs::holes::fill;
 use crate::repairs::shared::context::{Changes, Context, Done, Repair};
 use crate::repairs::shared::pieces;
@@ -57,7 +57,7 @@ fn account_for(cx: &mut Context<'_, '_>) -> Result<Done> {
     }
     let across = cx.handed.has_skirts || !cx.handed.across.is_empty();
     let means = Means { path: cx.path, limits: cx.limits, progress: cx.progress };
-    let mut resolved = resolve(&Rational, cx.survey, &mut cx.work, &mut cx.reversed, cx.profile, across, &means)?;
+    let mut resolved = resolve(&Exact, cx.survey, &mut cx.work, &mut cx.reversed, cx.profile, across, &means)?;
     cx.handed.dust = resolved.dust.len() as u64;
     let open = fill::open_again(&mut cx.work, std::mem::take(&mut cx.handed.across), &resolved.taken_part);
     cx.account.take_back(RepairName::Fill, open.len() as u64);

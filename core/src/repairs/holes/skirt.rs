@@ -264,7 +264,7 @@ mod tests {
     use super::*;
     use crate::contract::progress::Quiet;
     use crate::contract::settings::Limits;
-    use crate::geometry::arrange::Rational;
+    use crate::geometry::arrange::Exact;
     use crate::repairs::boolean::resolve;
     use crate::repairs::holes::fill;
     use crate::repairs::orient::directions;
@@ -282,7 +282,7 @@ mod tests {
             directions::make_outward(&d.survey, work, turned, &pieces);
             let limits = Limits { threads: 1, ..Limits::default() };
             let means = resolve::Means { path: Path::new("test"), limits: &limits, progress: &Quiet };
-            resolve::resolve(&Rational, &mut d.survey, work, turned, profile, true, &means).unwrap();
+            resolve::resolve(&Exact, &mut d.survey, work, turned, profile, true, &means).unwrap();
             seated
         })
     }

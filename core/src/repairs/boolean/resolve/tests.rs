@@ -17,7 +17,7 @@ use super::*;
 use crate::contract::progress::Quiet;
 use crate::contract::report::RegionMethod;
 use crate::contract::settings::{Bodies, Limits};
-use crate::geometry::arrange::Rational;
+use crate::geometry::arrange::Exact;
 use crate::repairs::cleanup::duplicates;
 use crate::testing::{After, Corners, after, cube, cuboid, diagnose, records, reversed, shifted};
 
@@ -27,7 +27,7 @@ fn resolved_by(triangles: &[Corners], profile: &Profile) -> After<Resolved> {
         duplicates::drop_duplicates(&d.survey, work, Bodies::Union);
         let limits = Limits { threads: 1, ..Limits::default() };
         let means = Means { path: Path::new("test"), limits: &limits, progress: &Quiet };
-        resolve(&Rational, &mut d.survey, work, turned, profile, false, &means).unwrap()
+        resolve(&Exact, &mut d.survey, work, turned, profile, false, &means).unwrap()
     })
 }
 
@@ -46,7 +46,7 @@ fn what_would_take_more_memory_than_there_is_is_refused() {
             let limits = Limits { threads: 1, memory_bytes, ..Limits::default() };
             let means = Means { path: Path::new("test"), limits: &limits, progress: &Quiet };
             let work = &mut Work::new(&mut d.submesh);
-            resolve(&Rational, &mut d.survey, work, turned, &Profile::default(), false, &means).map(|resolved| resolved.pairs)
+            resolve(&Exact, &mut d.survey, work, turned, &Profile::default(), false, &means).map(|resolved| resolved.pairs)
         })
     };
     let most = Limits::default().memory_bytes;
@@ -303,7 +303,7 @@ fn bodies_whose_faces_lie_in_planes_that_f32_cannot_hold_are_spread_by_some_step
         let levels = vec![Level::Perturbed; pieces.list.len()];
         let profile = Profile::default();
         let (overlay, pairs, levels) = (&overlay, &pairs[..], &levels[..]);
-        let by = Attempt { engine: &Rational, overlay, pairs, levels, profile: &profile, limits: &limits, progress: &Quiet };
+        let by = Attempt { engine: &Exact, overlay, pairs, levels, profile: &profile, limits: &limits, progress: &Quiet };
         let Ok(resolved) = state.attempt(&by) else { panic!("resolved") };
         let regions = state.track.regions(&mut state.clusters);
         assert!(regions.iter().all(|region| region.method == RegionMethod::Perturbed) && regions.len() == 1, "{regions:?}");

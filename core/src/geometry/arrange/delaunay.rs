@@ -65,7 +65,8 @@ impl<'f> Delaunay<'f> {
         let first = self.latest[a] as usize;
         for to_the_left in [true, false] {
             let mut at = first;
-            loop {
+            // Around a point no triangle comes twice.
+            for _ in 0..=self.triangles.len() {
                 if (to_the_left || at != first)
                     && let Some(answer) = ask(at)
                 {

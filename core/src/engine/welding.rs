@@ -10,7 +10,8 @@ use crate::diagnosis;
 use crate::io::read::MeshFile;
 use crate::io::read_ahead::Guide;
 use crate::output::edit::Edit;
-use crate::stream::weld::{self, Counts, Reach};
+use crate::repairs::WELD_NOTE;
+use crate::stream::weld::{self, Counts};
 
 /// Counts that the weld does not make.
 const NOT_COUNTED: [&str; 10] = [
@@ -34,16 +35,13 @@ pub(crate) fn in_the_stream(
     progress: &dyn Progress,
 ) -> Result<(MeshFile, Option<Counts>)> {
     let records = mesh.records();
-    let reach = |bounds: &_| {
-        let near = diagnosis::tolerance(bounds, profile);
-        Reach { weld: near.weld, edge_share: near.edge_share }
-    };
+    let tolerance = |bounds: &_| diagnosis::tolerance(bounds, profile);
     let guide = Guide::new(records.as_flattened(), limits);
-    if limits.list_edit || !weld::shares_nothing(records, &guide, reach) {
+    if limits.list_edit || !weld::shares_nothing(records, &guide, tolerance) {
         return Ok((mesh, None));
     }
-    let reach = reach(&weld::bounds(records, &guide));
-    let welded = weld::weld(mesh.path(), records, reach, limits, progress)?;
+    let tolerance = tolerance(&weld::bounds(records, &guide));
+    let welded = weld::weld(mesh.path(), records, tolerance, limits, progress)?;
     tracing::info!(
         vertices = welded.counts.moved,
         farthest = welded.counts.farthest,
@@ -74,8 +72,8 @@ pub(crate) fn tell(report: &mut Report, counts: &Counts, (mesh, edit): (&MeshFil
     match weld {
         Some(weld) => weld.count += counts.moved,
         None => {
-            let note = "boundary vertices within the weld tolerance, moved to the one with most triangles".into();
-            report.repairs.insert(0, Repair { name: RepairName::ToleranceWeld, count: counts.moved, note, seconds: 0.0 });
+            let (name, note) = (RepairName::ToleranceWeld, WELD_NOTE.into());
+            report.repairs.insert(0, Repair { name, count: counts.moved, note, seconds: 0.0 });
         }
     }
     let (before, after) = (mesh.as_it_came(), mesh.records());

@@ -2,6 +2,15 @@
 
 use glam::DVec3;
 
+/// How near vertices are that become one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Tolerance {
+    /// Never more than this, in the model's units.
+    pub(crate) weld: f64,
+    /// Nor than this share of the shortest edge at a vertex.
+    pub(crate) edge_share: f64,
+}
+
 /// A position in f64.
 pub(crate) fn place(p: [f32; 3]) -> DVec3 {
     DVec3::from_array(p.map(f64::from))

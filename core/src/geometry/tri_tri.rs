@@ -118,18 +118,19 @@ fn meet(a: &Triangle, b: &Triangle, common: [[bool; 3]; 2], touching: bool) -> C
 
 /// The sides of `a`'s plane on which the corners of `b` lie, of which some are `common` to both.
 #[inline]
-fn sides_of(a: &Triangle, b: &Triangle, common: [bool; 3]) -> [i8; 3] {
+pub(crate) fn sides_of(a: &Triangle, b: &Triangle, common: [bool; 3]) -> [i8; 3] {
     let plane = Plane::new(&a[0], &a[1], &a[2]);
     let side = |k: usize| if common[k] { 0 } else { plane.side(&b[k]) };
     [side(0), side(1), side(2)]
 }
 
-/// One corner in the plane, the others on one side of it.
-fn in_a_point(signs: [i8; 3]) -> bool {
+/// Is one corner in the plane, with the others on one side of it?
+pub(crate) fn in_a_point(signs: [i8; 3]) -> bool {
     signs.iter().filter(|&&s| s == 0).count() == 1 && signs.iter().sum::<i8>().abs() == 2
 }
 
-fn one_sided(signs: [i8; 3]) -> bool {
+/// Are all corners on one side of the plane?
+pub(crate) fn one_sided(signs: [i8; 3]) -> bool {
     signs.iter().all(|&s| s > 0) || signs.iter().all(|&s| s < 0)
 }
 

@@ -5,19 +5,24 @@
 //! for its turn, and what is on its way to the disk.
 
 use std::fs::File;
-use std::io;
+use std::io::{self, Write};
+use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 use crossbeam::channel::{Sender, bounded};
 
+use crate::contract::error::{Error, Result};
 use crate::contract::settings::Limits;
 use crate::util::parallel;
 
 /// What is written between two pushes, a share of the budget between these.
 const SMALLEST_STEP: u64 = 64 << 10;
 const LARGEST_STEP: u64 = 32 << 20;
+
+/// Bytes that are appended between two looks at what is dirty.
+const APPENDED_AT_ONCE: usize = 1 << 20;
 
 /// Pushes what is written to one file. Several threads may write.
 pub(crate) struct WriteBehind {
@@ -32,6 +37,15 @@ impl WriteBehind {
     /// For writes to `file`.
     pub(crate) fn new(file: &File, limits: &Limits) -> io::Result<Self> {
         Ok(Self { file: file.try_clone()?, step: step(limits), unsynced: AtomicU64::new(0), syncer: Mutex::new(None) })
+    }
+
+    /// Writes at the end of the file, in parts that are no more than may be dirty.
+    pub(crate) fn append(&self, bytes: &[u8]) -> io::Result<()> {
+        for part in bytes.chunks(APPENDED_AT_ONCE) {
+            (&self.file).write_all(part)?;
+            self.wrote(part.len() as u64)?;
+        }
+        Ok(())
     }
 
     /// To be called after every write of so many `bytes`, best of much less than a step. Waits while the disk is two steps behind.
@@ -61,6 +75,14 @@ impl WriteBehind {
     pub(crate) fn finish(self) -> io::Result<()> {
         self.syncer.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Syncer::finish)
     }
+}
+
+/// A file without a name in a folder for spools.
+pub(crate) fn nameless(folder: &Path, limits: &Limits) -> Result<(File, WriteBehind)> {
+    let making = || Error::io(folder, "making a spool file");
+    let file = tempfile::tempfile_in(folder).map_err(making())?;
+    let behind = WriteBehind::new(&file, limits).map_err(making())?;
+    Ok((file, behind))
 }
 
 /// Bytes written between two pushes.

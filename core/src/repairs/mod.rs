@@ -28,6 +28,7 @@ use crate::contract::settings::{Limits, Profile};
 use crate::diagnosis::Diagnosis;
 pub(crate) use crate::repairs::shared::account::Account;
 use crate::repairs::shared::context::Context;
+pub(crate) use crate::repairs::stitch::weld::NOTE as WELD_NOTE;
 use crate::submesh::components::Reversed;
 
 /// The repairs that are made.

@@ -364,25 +364,13 @@ fn well_inside(plan: &Plan, chunk: ChunkId, visitors: Option<f32>) -> CellColumn
     CellColumns::of(&plan.home_box(chunk).grown(-visitors.unwrap_or(0.0)))
 }
 
-/// The chunks of three corners, each once.
-fn distinct([a, b, c]: &[ChunkId; 3]) -> Distinct {
+/// The chunks of three corners, each once, and how many there are.
+fn distinct([a, b, c]: [ChunkId; 3]) -> ([ChunkId; 3], usize) {
     match (a == b, b == c || a == c) {
-        (true, true) => Distinct { all: [*a; 3], count: 1 },
-        (true, false) => Distinct { all: [*a, *c, *c], count: 2 },
-        (false, true) => Distinct { all: [*a, *b, *b], count: 2 },
-        (false, false) => Distinct { all: [*a, *b, *c], count: 3 },
-    }
-}
-
-/// Up to three chunks.
-struct Distinct {
-    all: [ChunkId; 3],
-    count: usize,
-}
-
-impl Distinct {
-    fn as_slice(&self) -> &[ChunkId] {
-        &self.all[..self.count]
+        (true, true) => ([a; 3], 1),
+        (true, false) => ([a, c, c], 2),
+        (false, true) => ([a, b, b], 2),
+        (false, false) => ([a, b, c], 3),
     }
 }
 
@@ -390,9 +378,7 @@ impl Distinct {
 fn note_visited(plan: &Plan, corners: &[Point; 3], homes: [ChunkId; 3], reach: Option<f32>, visited: &mut Vec<ChunkId>) {
     visited.clear();
     let Some(reach) = reach else { return };
-    let mut spread = Bounds::EMPTY;
-    spread.include(corners);
-    let (lo, hi) = HomeBox::around(spread.lo, spread.hi).grown(reach).ends();
+    let (lo, hi) = HomeBox::around(corners, reach).ends();
     plan.meeting(lo, hi, &mut |chunk| {
         if !homes.contains(&chunk) {
             visited.push(chunk);
@@ -448,7 +434,8 @@ fn gather_piece(
                 }
             }
             note_visited(plan, &corners, homes, visitors, &mut visited);
-            take.take(distinct(&homes).as_slice(), &visited, number, record);
+            let (once, count) = distinct(homes);
+            take.take(&once[..count], &visited, number, record);
         }
         block_start += block.len();
     }

@@ -4,6 +4,7 @@
 //! among three axes and five quantiles where it cuts the fewest sampled triangles, so that flat sheets are not sliced along their
 //! noise. Where the planes lie depends on the number of chunks asked for, and nothing else may depend on that.
 
+use crate::geometry::sums::Bounds;
 use crate::io::read_ahead::ASKED_AT_ONCE;
 use crate::io::read_ahead::Guide;
 use crate::io::record::{self, Record};
@@ -23,12 +24,14 @@ impl HomeBox {
     pub(crate) const ALL: Self = Self { lo: [-f32::MAX; 3], hi: [f32::MAX; 3] };
 
     /// Is there a position in both boxes?
-    pub(crate) fn around(lo: [f32; 3], hi: [f32; 3]) -> Self {
-        Self { lo, hi }
+    /// Around a triangle, wider by `reach` on all sides.
+    pub(crate) fn around(corners: &[[f32; 3]; 3], reach: f32) -> Self {
+        let Bounds { lo, hi } = Bounds::of(corners);
+        Self { lo, hi }.grown(reach)
     }
 
     #[cfg(test)]
-    pub(crate) fn meets(&self, other: &crate::geometry::sums::Bounds) -> bool {
+    pub(crate) fn meets(&self, other: &Bounds) -> bool {
         (0..3).all(|k| self.lo[k] <= other.hi[k] && self.hi[k] >= other.lo[k])
     }
 
@@ -254,7 +257,6 @@ fn partition<T>(items: &mut [T], first: impl Fn(&T) -> bool) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::sums::Bounds;
     use proptest::prelude::*;
 
     fn soup(points: &[[f32; 9]]) -> Vec<Record> {

@@ -19,7 +19,6 @@ use memmap2::{Advice, Mmap};
 
 use crate::contract::error::{Error, Result};
 use crate::contract::settings::Limits;
-use crate::geometry::sums::Bounds;
 use crate::io::record::{Point, Record};
 use crate::io::write_behind::{self, WriteBehind};
 use crate::stream::budget::{Budget, Purpose};
@@ -101,8 +100,7 @@ impl Unsorted {
         budget.take(Purpose::Tables, layout.writers_bytes(plan, limits.threads) + write_behind::most_dirty(limits));
         budget.check(path, || "its triangles have to be sorted by place".into())?;
         let folder = limits.spool_folder();
-        let file = tempfile::tempfile_in(&folder).map_err(Error::io(&folder, "making a spool file"))?;
-        let behind = WriteBehind::new(&file, limits).map_err(Error::io(&folder, "making a spool file"))?;
+        let (file, behind) = write_behind::nameless(&folder, limits)?;
         Ok(Self { layout, folder, file, behind, end: AtomicU64::new(0) })
     }
 
@@ -343,9 +341,7 @@ impl Spool {
                     }
                 }
                 if visited {
-                    let mut spread = Bounds::EMPTY;
-                    spread.include(&corners);
-                    let (lo, hi) = HomeBox::around(spread.lo, spread.hi).grown(self.reach).ends();
+                    let (lo, hi) = HomeBox::around(&corners, self.reach).ends();
                     plan.meeting_below(self.shift, bucket, lo, hi, &mut |chunk| {
                         if !homes.contains(&Some(chunk)) {
                             put(part_of(chunk) + 1);

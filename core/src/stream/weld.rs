@@ -9,7 +9,6 @@
 //! A chunk sees all triangles within a margin around its cell, so that it knows whatever hangs together with a position at home in it, or that this
 //! is too wide. It moves the corners at home in it, and no others: each corner of the file is moved once, and the result does not depend on the chunks.
 
-use std::io::Write;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
@@ -18,10 +17,11 @@ use memmap2::{Mmap, MmapMut};
 use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::settings::Limits;
+use crate::geometry::distance::Tolerance;
 use crate::io::disk_space::{self, Need};
 use crate::io::read_ahead::Guide;
 use crate::io::record::{self, Record};
-use crate::io::write_behind::WriteBehind;
+use crate::io::write_behind;
 use crate::stream::members::Members;
 use crate::stream::plan::Plan;
 
@@ -32,7 +32,6 @@ mod reach;
 pub(crate) use cluster::Counts;
 use cluster::{Chunk, Move};
 pub(crate) use look::{bounds, shares_nothing};
-pub(crate) use reach::Reach;
 use reach::{CELL, WIDEST};
 
 /// A chunk knows so many tolerances around its cell: whatever hangs together with its own, one step more, and the cells that it touches.
@@ -49,7 +48,13 @@ pub(crate) struct Welded {
 ///
 /// # Errors
 /// [`Error::NoSpace`] without room for the copy, [`Error::Io`] where it cannot be made.
-pub(crate) fn weld(path: &Path, records: &[Record], reach: Reach, limits: &Limits, progress: &dyn Progress) -> Result<Welded> {
+pub(crate) fn weld(
+    path: &Path,
+    records: &[Record],
+    reach: Tolerance,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> Result<Welded> {
     let guide = Guide::new(records.as_flattened(), limits);
     let plan = Plan::new(records, &guide, limits.chunk_triangles);
     let margin = (MARGIN * reach.weld) as f32;
@@ -77,13 +82,8 @@ pub(crate) fn weld(path: &Path, records: &[Record], reach: Reach, limits: &Limit
     counts.triangles = all - members.nonfinite.iter().map(|(_, count)| u64::from(*count)).sum::<u64>();
     let copy = copy.into_inner().unwrap_or_else(PoisonError::into_inner);
     let welded = copy.make_read_only().map_err(Error::io(&limits.spool_folder(), "mapping"))?;
-    counts.moved_triangles = differing(records.iter().zip(welded.as_chunks().0));
+    counts.moved_triangles = records.iter().zip(welded.as_chunks().0).filter(|(before, now)| before != now).count() as u64;
     Ok(Welded { records: welded, counts })
-}
-
-/// How many pairs of records are not the same.
-fn differing<'r>(pairs: impl Iterator<Item = (&'r Record, &'r Record)>) -> u64 {
-    pairs.filter(|(a, b)| a != b).count() as u64
 }
 
 /// A copy of the records, in a file without a name.
@@ -91,14 +91,10 @@ fn copied(path: &Path, records: &[Record], guide: &Guide<'_>, limits: &Limits) -
     let folder = limits.spool_folder();
     let bytes = size_of_val(records) as u64;
     disk_space::check(path, &[Need { folder: folder.clone(), bytes, what: "the triangles after the weld" }])?;
+    let (file, behind) = write_behind::nameless(&folder, limits)?;
     let spooling = || Error::io(&folder, "spooling");
-    let mut file = tempfile::tempfile_in(&folder).map_err(spooling())?;
-    let behind = WriteBehind::new(&file, limits).map_err(spooling())?;
     for block in guide.blocks(records) {
-        for part in block.as_flattened().chunks(1 << 20) {
-            file.write_all(part).map_err(spooling())?;
-            behind.wrote(part.len() as u64).map_err(spooling())?;
-        }
+        behind.append(block.as_flattened()).map_err(spooling())?;
     }
     behind.finish().map_err(spooling())?;
     // SAFETY: the file has no name and this is its only handle: nobody else changes or truncates it.

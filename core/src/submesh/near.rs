@@ -3,17 +3,9 @@
 use super::edges::Edges;
 use super::{Submesh, Vertex, distance};
 use crate::geometry::boxes::BoxTree;
+pub(crate) use crate::geometry::distance::Tolerance;
 use crate::geometry::distance::{place, share_along};
 use crate::geometry::sums::Bounds;
-
-/// How near is near.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Tolerance {
-    /// Never more than this, in the model's units.
-    pub(crate) weld: f64,
-    /// Nor than this share of the shortest edge at a vertex.
-    pub(crate) edge_share: f64,
-}
 
 impl Tolerance {
     /// The tolerance at `v`.

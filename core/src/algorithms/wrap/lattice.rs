@@ -3,7 +3,6 @@
 //! Points go by their place in half cubes: corners have even coordinates, centres odd ones.
 
 use std::collections::{HashMap, HashSet};
-use std::hash::{BuildHasherDefault, Hasher};
 
 use glam::DVec3;
 
@@ -12,6 +11,7 @@ use crate::contract::progress::Progress;
 use crate::geometry::distance::place;
 use crate::geometry::sums::Bounds;
 use crate::util::parallel;
+use crate::util::scatter::Hashing;
 
 /// A wrapped surface.
 pub(crate) struct Wrapping {
@@ -173,27 +173,6 @@ fn edge(a: u64, b: u64) -> u64 {
     let way: [i32; 3] = std::array::from_fn(|k| high[k] as i32 - low[k] as i32);
     a.min(b) << 3 | WAYS.iter().position(|w| *w == way).unwrap_or(0) as u64
 }
-
-/// Hashes names, which nobody chooses with malice. What is kept by it is never gone through.
-#[derive(Default)]
-struct Scatter(u64);
-
-impl Hasher for Scatter {
-    fn write(&mut self, bytes: &[u8]) {
-        bytes.iter().for_each(|b| self.write_u64(u64::from(*b)));
-    }
-
-    fn write_u64(&mut self, x: u64) {
-        let x = (self.0 ^ x).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        self.0 = x ^ x >> 32;
-    }
-
-    fn finish(&self) -> u64 {
-        self.0
-    }
-}
-
-type Hashing = BuildHasherDefault<Scatter>;
 
 /// Winding numbers where the surface is.
 struct Field<'l> {

@@ -6,42 +6,29 @@ use crate::geometry::arrange::coplanar;
 use crate::geometry::arrange::point::{Point, cross, on_line};
 use crate::geometry::arrange::soup::{Contact, Soup};
 use crate::geometry::exact;
+use crate::geometry::tri_tri::{self, in_a_point, one_sided, sides_of};
 
 /// The segments along which two triangles have to be cut for each other. What belongs to any surface is none: a common edge or
 /// corner, a single point, all of the same triangle.
 pub(crate) fn contact(soup: &Soup<'_>, first: usize, second: usize) -> Vec<Contact> {
     let (t, u) = (&soup.triangles[first], &soup.triangles[second]);
-    let common = t.iter().filter(|p| u.contains(p)).count();
+    let [of_t, of_u] = tri_tri::common(t, u);
+    let common = of_t.iter().filter(|is| **is).count();
     if common == 3 {
         return Vec::new();
     }
-    let above = sides(t, u);
+    let above = sides_of(t, u, of_u);
     if above == [0; 3] {
         return if coplanar_apart(t, u) { Vec::new() } else { coplanar::overlap(soup, [first, second], common) };
     }
     if common == 2 || one_sided(above) {
         return Vec::new();
     }
-    let below = sides(u, t);
-    if one_sided(below) || at_a_corner(above).is_some() && at_a_corner(below).is_some() || separated(t, u) {
+    let below = sides_of(u, t, of_t);
+    if one_sided(below) || in_a_point(above) && in_a_point(below) || separated(t, u) {
         return Vec::new();
     }
     crossing(soup, [first, second], [below, above]).into_iter().collect()
-}
-
-/// The sides of the corners of `u` by the plane of `t`.
-fn sides(t: &[[f32; 3]; 3], u: &[[f32; 3]; 3]) -> [i8; 3] {
-    let plane = exact::Plane::new(&t[0], &t[1], &t[2]);
-    [0, 1, 2].map(|k| if t.contains(&u[k]) { 0 } else { plane.side(&u[k]) })
-}
-
-fn one_sided(s: [i8; 3]) -> bool {
-    s[0] != 0 && s[0] == s[1] && s[1] == s[2]
-}
-
-/// The corner that alone lies in the other's plane, with the others on one side.
-fn at_a_corner(s: [i8; 3]) -> Option<usize> {
-    (0..3).find(|i| s[*i] == 0 && s[(i + 1) % 3] != 0 && s[(i + 1) % 3] == s[(i + 2) % 3])
 }
 
 /// Does an edge of one have the other triangle strictly beyond it, in the plane of both?

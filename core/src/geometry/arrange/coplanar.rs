@@ -1,4 +1,4 @@
-//! What two triangles of one plane have in common: the second, clipped by the edges of the first (Sutherland and Hodgman).
+//! The overlap of two triangles in one plane: the second, clipped by the edges of the first (Sutherland and Hodgman).
 
 use crate::geometry::arrange::flat::turn;
 use crate::geometry::arrange::point::{Corner, Point, on_lines, upright_side};
@@ -46,7 +46,7 @@ pub(crate) fn dominant_axis(soup: &Soup<'_>, t: usize) -> usize {
     (1..3).fold(0, |best, k| if absolute(k).cmp(&absolute(best)).is_ge() { k } else { best })
 }
 
-/// What is left of an edge, or on it.
+/// The part of a polygon that lies to the left of an edge, or on it.
 fn clipped(rest: &[Corner2], edge: &[Corner; 2], axis: usize) -> Vec<Corner2> {
     let inside: Vec<bool> = rest.iter().map(|c| upright_side(edge, axis, &c.point) <= 0).collect();
     let mut out = Vec::with_capacity(rest.len() + 2);

@@ -27,6 +27,8 @@ pub(crate) struct Flat<'a> {
     seen: Vec<Seen>,
     /// Of each coordinate, at most.
     error: f64,
+    /// The axis along which they are seen, and the others.
+    pub(crate) axis: usize,
     axes: [usize; 2],
 }
 
@@ -38,7 +40,7 @@ impl<'a> Flat<'a> {
         let seen: Vec<Seen> = points.iter().map(seen).collect();
         let largest = seen.iter().fold(0.0_f64, |m, p| m.max(p.x.abs()).max(p.y.abs()));
         // 2⁻⁹⁸, for a difference.
-        Self { points, seen, error: largest * (1.0 / (1_u128 << 98) as f64), axes }
+        Self { points, seen, error: largest * (1.0 / (1_u128 << 98) as f64), axis, axes }
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -63,6 +65,11 @@ impl<'a> Flat<'a> {
             0 => turn_exactly([self.points[a], self.points[b], self.points[c]], self.axes),
             sign => sign,
         }
+    }
+
+    /// Do two segments cross inside of both?
+    pub(crate) fn cross(&self, (a, b): (usize, usize), (c, d): (usize, usize)) -> bool {
+        self.turn(a, b, c) * self.turn(a, b, d) < 0 && self.turn(c, d, a) * self.turn(c, d, b) < 0
     }
 
     /// As [`Flat::turn`]; 0 also if in doubt.
@@ -116,7 +123,7 @@ impl Seen {
 
 #[inline(always)]
 fn difference(x: f64, x_low: f64, y: f64, y_low: f64) -> f64 {
-    // What the difference loses (Knuth's two-sum).
+    // The difference loses something, which is added (Knuth's two-sum).
     let difference = x - y;
     let seen = x - difference;
     let lost = (x - (difference + seen)) + (seen - y);

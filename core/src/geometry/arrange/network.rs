@@ -36,7 +36,7 @@ struct Segment {
 /// Points of an edge or a segment, by its ends: sorted, for searches.
 type Splits = Vec<([u32; 2], u32)>;
 
-/// What one triangle finds: points of it, where they split its edges, where its segments.
+/// Points that one triangle finds, and its edges and segments that they split.
 #[derive(Default)]
 struct Found {
     points: Vec<u32>,
@@ -187,9 +187,8 @@ impl Builder<'_> {
         let plane = |s: &Segment| self.soup.plane(s.other as usize);
         match (&a.edge, &b.edge) {
             (None, None) => {
-                let mut key = self.key(t, pair).map(|t| t as usize);
-                key.sort_unstable();
-                on_planes(self.soup.plane(key[0]), self.soup.plane(key[1]), self.soup.plane(key[2]))
+                let [first, second, third] = self.key(t, pair).map(|t| self.soup.plane(t as usize));
+                on_planes(first, second, third)
             }
             (Some(edge), None) => on_line(edge, plane(b)),
             (None, Some(edge)) => on_line(edge, plane(a)),
@@ -220,7 +219,7 @@ impl Builder<'_> {
             let ([left, low], [_, high]) = (boxes[s][0], boxes[s][1]);
             open.retain(|o| boxes[*o][1][0] >= left);
             for o in &open {
-                if boxes[*o][0][1] <= high && boxes[*o][1][1] >= low && cross(&flat, ends(s), ends(*o)) {
+                if boxes[*o][0][1] <= high && boxes[*o][1][1] >= low && flat.cross(ends(s), ends(*o)) {
                     out.push([s.min(*o) as u32, s.max(*o) as u32]);
                 }
             }
@@ -287,8 +286,7 @@ impl Builder<'_> {
         let flat = self.flat(t, &points);
         let constraints = self.constraints(&flat, segments, found, splits, &points, &places);
         let mut pieces = triangulate(&flat, &constraints)?;
-        let plane = self.soup.plane(t);
-        if plane.normal[dominant_axis(&self.soup, t)].sign() < 0 {
+        if self.soup.plane(t).normal[flat.axis].sign() < 0 {
             pieces.iter_mut().for_each(|v| v.swap(1, 2));
         }
         Some(Cut { points, pieces })
@@ -305,7 +303,7 @@ impl Builder<'_> {
         places: &[(u32, usize)],
     ) -> Vec<(usize, usize)> {
         let place = |p: u32| places.binary_search_by_key(&p, |(p, _)| *p).map_or(0, |i| places[i].1);
-        // What other triangles found here was not looked at in this one.
+        // Points that other triangles found here were not looked at in this one.
         let strange: Vec<usize> = (0..points.len()).filter(|i| found.points.binary_search(&points[*i]).is_err()).collect();
         let mut out = Vec::new();
         for segment in segments {
@@ -323,7 +321,7 @@ impl Builder<'_> {
     }
 }
 
-/// What is different, in the order of the first time; and where each is, sorted.
+/// Each number once, in the order of the first time; and where each is, sorted.
 fn distinct(all: impl Iterator<Item = u32>) -> (Vec<u32>, Vec<(u32, usize)>) {
     let mut seen: Vec<(u32, usize)> = all.zip(0..).collect();
     seen.sort_unstable();
@@ -342,11 +340,6 @@ fn box_of(flat: &Flat<'_>, (a, b): (usize, usize)) -> [[f64; 2]; 2] {
 
 fn is_within([low, high]: &[[f64; 2]; 2], p: [f64; 2]) -> bool {
     (0..2).all(|k| low[k] <= p[k] && p[k] <= high[k])
-}
-
-/// Do two segments cross inside of both?
-fn cross(flat: &Flat<'_>, (a, b): (usize, usize), (c, d): (usize, usize)) -> bool {
-    flat.turn(a, b, c) * flat.turn(a, b, d) < 0 && flat.turn(c, d, a) * flat.turn(c, d, b) < 0
 }
 
 /// Is a point on the segment between two others?

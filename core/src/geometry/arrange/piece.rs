@@ -1,4 +1,4 @@
-//! What an arrangement is.
+//! Arrangements: points, pieces and cells.
 
 use crate::geometry::exact;
 
@@ -31,7 +31,7 @@ pub(crate) struct Arrangement {
     pub(crate) cells: u32,
 }
 
-/// What can arrange triangles.
+/// An engine that arranges triangles.
 pub(crate) trait Arrange {
     /// The arrangement of triangles that have an area; `None` if it fails. The same for any number of threads.
     fn arrange(&self, triangles: &[[[f32; 3]; 3]], threads: usize) -> Option<Arrangement>;

@@ -112,10 +112,8 @@ impl Rest {
         }
         let ((x, x_power), (w_rounded, w_power)) = (self.numerator.rounded(), w.rounded());
         let quotient = x / w_rounded;
-        // As a whole number of 53 bits times a power of two.
-        let exponent = ((quotient.to_bits() >> 52) & 0x7ff) as i32 - 1075;
-        let whole = ((quotient.to_bits() & ((1 << 52) - 1)) | (1 << 52)) as i128;
-        let whole = Int::of(if quotient < 0.0 { -whole } else { whole });
+        let (magnitude, exponent) = parts(quotient);
+        let whole = Int::of(i128::from(magnitude) * if quotient < 0.0 { -1 } else { 1 });
         let power = exponent + x_power - w_power;
         if power < 0 {
             self.numerator = self.numerator.shifted(power.unsigned_abs());
@@ -127,6 +125,12 @@ impl Rest {
         self.scale += power.min(0);
         taken
     }
+}
+
+/// The magnitude as a whole number of 53 bits times a power of two; not for zero, nor for what is too small for all its bits. (No f32 is.)
+pub(crate) fn parts(x: f64) -> (u64, i32) {
+    let bits = x.abs().to_bits();
+    ((bits & ((1 << 52) - 1)) | (1 << 52), (bits >> 52) as i32 - 1075)
 }
 
 /// x · 2^power.

@@ -4,7 +4,7 @@
 use crate::geometry::arrange::delaunay::{Delaunay, Tri};
 use crate::util::ids::NONE;
 
-/// What a constraint runs through: triangles in order, and the points on either side of it.
+/// Triangles that a constraint runs through, in order, and the points on either side of it.
 struct Corridor {
     triangles: Vec<usize>,
     left: Vec<usize>,
@@ -46,7 +46,7 @@ fn corridor(cdt: &Delaunay<'_>, a: usize, b: usize) -> Option<Corridor> {
         let v = cdt.triangles[t].v;
         let opposite = (v.iter().position(|v| *v == a)? + 1) % 3;
         let (u, w) = (v[opposite], v[(opposite + 1) % 3]);
-        (u != b && w != b && crosses(cdt, a, b, u, w)).then_some((t, opposite))
+        (u != b && w != b && cdt.flat.cross((a, b), (u, w))).then_some((t, opposite))
     })?;
     let v = cdt.triangles[t].v;
     let mut corridor = Corridor { triangles: vec![t], left: vec![v[(side + 1) % 3]], right: vec![v[side]] };
@@ -64,16 +64,11 @@ fn corridor(cdt: &Delaunay<'_>, a: usize, b: usize) -> Option<Corridor> {
             -1 => corridor.right.push(w),
             _ => return None,
         }
-        let through = |k: &usize| crosses(cdt, a, b, tri.v[*k], tri.v[(k + 1) % 3]);
+        let through = |k: &usize| cdt.flat.cross((a, b), (tri.v[*k], tri.v[(k + 1) % 3]));
         side = [(back + 1) % 3, (back + 2) % 3].into_iter().find(through)?;
         t = next as usize;
     }
     None
-}
-
-fn crosses(cdt: &Delaunay<'_>, a: usize, b: usize, u: usize, v: usize) -> bool {
-    let turn = |a, b, c| cdt.flat.turn(a, b, c);
-    turn(a, b, u) * turn(a, b, v) < 0 && turn(u, v, a) * turn(u, v, b) < 0
 }
 
 /// Triangulates what lies to the left of an edge, up to a chain of points from its start to its end. (A list of what is to do, since chains may

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use crate::geometry::arrange::point::{BITS, Corner, Plane, Point};
+use crate::geometry::arrange::point::{BITS, Corner, Plane, Point, parts};
 
 /// A segment that two triangles have in common: in which order the ends stand depends on their order.
 #[derive(Clone, Debug)]
@@ -23,7 +23,7 @@ pub(crate) struct Soup<'a> {
 impl<'a> Soup<'a> {
     /// `None` if coordinates have too many bits between the largest and the smallest.
     pub(crate) fn new(triangles: &'a [[[f32; 3]; 3]]) -> Option<Self> {
-        let all = || triangles.as_flattened().as_flattened().iter().filter(|x| **x != 0.0).map(|x| parts(*x));
+        let all = || triangles.as_flattened().as_flattened().iter().filter(|x| **x != 0.0).map(|x| parts(f64::from(*x)));
         let power = all().map(|(mantissa, power)| power + mantissa.trailing_zeros() as i32).min().unwrap_or(0);
         let top = all().map(|(_, power)| power + 53).max().unwrap_or(0);
         let planes = (0..triangles.len()).map(|_| OnceLock::new()).collect();
@@ -38,7 +38,7 @@ impl<'a> Soup<'a> {
         if x == 0.0 {
             return 0;
         }
-        let (mantissa, power) = parts(x);
+        let (mantissa, power) = parts(f64::from(x));
         let by = power - self.power;
         let magnitude = if by >= 0 { i128::from(mantissa) << by } else { i128::from(mantissa) >> -by };
         if x < 0.0 { -magnitude } else { magnitude }
@@ -47,10 +47,4 @@ impl<'a> Soup<'a> {
     pub(crate) fn plane(&self, t: usize) -> &Plane {
         self.planes[t].get_or_init(|| Box::new(Plane::of(&self.corners(t))))
     }
-}
-
-/// The magnitude as a whole number of 53 bits times a power of two; not for zero. (A f32 is never too small for a normal f64.)
-fn parts(x: f32) -> (u64, i32) {
-    let bits = f64::from(x.abs()).to_bits();
-    ((bits & ((1 << 52) - 1)) | (1 << 52), (bits >> 52) as i32 - 1075)
 }

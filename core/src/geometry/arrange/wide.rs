@@ -116,13 +116,8 @@ impl<const N: usize> Wide<N> {
         match (self.negative, other.negative) {
             (false, false) => self.magnitude_cmp(other),
             (true, true) => other.magnitude_cmp(self),
-            (a, _) => {
-                if a {
-                    Ordering::Less
-                } else {
-                    Ordering::Greater
-                }
-            }
+            (true, false) => Ordering::Less,
+            (false, true) => Ordering::Greater,
         }
     }
 

@@ -14,7 +14,7 @@ use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::settings::Limits;
 use crate::io::disk_space::{self, Need};
-use crate::io::write_behind::WriteBehind;
+use crate::io::write_behind;
 
 /// A file is copied into memory if it takes no more than this part of the budget; a larger one is copied into a file without a name.
 const SHARE_OF_MEMORY: u64 = 64;
@@ -58,9 +58,7 @@ impl Foreign<'_> {
     fn in_spool(&self) -> Result<(Mmap, File)> {
         let length = self.length as u64;
         disk_space::check(self.path, &[Need { folder: self.spool.into(), bytes: length, what: "a copy of the file" }])?;
-        let spooling = || Error::io(self.spool, "making a spool file");
-        let mut copy = tempfile::tempfile_in(self.spool).map_err(spooling())?;
-        let behind = WriteBehind::new(&copy, self.limits).map_err(spooling())?;
+        let (mut copy, behind) = write_behind::nameless(self.spool, self.limits)?;
         let mut done = 0;
         while done < length {
             let step =

@@ -4,7 +4,6 @@
 //! spool's dirty pages are written back step by step, since the kernel would otherwise let a share of all memory fill with them.
 
 use std::fs::File;
-use std::io::Write;
 use std::path::Path;
 
 use memmap2::Mmap;
@@ -20,7 +19,7 @@ use crate::contract::progress::Progress;
 use crate::contract::settings::Limits;
 use crate::io::disk_space::{self, Need};
 use crate::io::record::Record;
-use crate::io::write_behind::WriteBehind;
+use crate::io::write_behind::{self, WriteBehind};
 
 /// Text parsed at a time by one thread.
 pub(super) const WINDOW: usize = 1 << 20;
@@ -136,8 +135,7 @@ struct Spool<'a> {
 
 impl<'a> Spool<'a> {
     fn new(context: &Context<'a>) -> Result<Self> {
-        let file = tempfile::tempfile_in(context.spool).map_err(Error::io(context.spool, "making a spool file"))?;
-        let behind = WriteBehind::new(&file, context.limits).map_err(Error::io(context.spool, "making a spool file"))?;
+        let (file, behind) = write_behind::nameless(context.spool, context.limits)?;
         Ok(Self { folder: context.spool, path: context.path, file, behind, records: 0 })
     }
 
@@ -147,11 +145,7 @@ impl<'a> Spool<'a> {
             if self.records > MAX_TRIANGLES {
                 return Err(Rejection::TooMany.at(self.path));
             }
-            // In parts, for a single piece may be more than may be dirty.
-            for part in records.as_flattened().chunks(1 << 20) {
-                self.file.write_all(part).map_err(Error::io(self.folder, "spooling"))?;
-                self.behind.wrote(part.len() as u64).map_err(Error::io(self.folder, "spooling"))?;
-            }
+            self.behind.append(records.as_flattened()).map_err(Error::io(self.folder, "spooling"))?;
         }
         Ok(())
     }

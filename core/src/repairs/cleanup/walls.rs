@@ -37,10 +37,9 @@ struct Sides<'s> {
 /// The walls that triangles are part of: all, or only those of triangles that have `changed`. `diagonal`: the model's. O(triangles between
 /// non-manifold edges × log).
 pub(crate) fn between(submesh: &Submesh, edges: &Edges, changed: Option<&[u32]>, diagonal: f64) -> Vec<Pair> {
-    let is_rim = |edge: &Edge<'_>| (3..=MOST_USES).contains(&edge.uses.len());
     let mut starts: Vec<u32> = match changed {
         Some(changed) => changed.iter().copied().filter(|t| submesh.lives(*t)).collect(),
-        None => edges.iter().filter(is_rim).flat_map(|edge| edge.uses.iter().map(|u| u.triangle)).collect(),
+        None => edges.iter().filter(is_of_rim).flat_map(|edge| edge.uses.iter().map(|u| u.triangle)).collect(),
     };
     starts.sort_unstable();
     starts.dedup();
@@ -58,6 +57,11 @@ pub(crate) fn between(submesh: &Submesh, edges: &Edges, changed: Option<&[u32]>,
         }
     }
     walls.into_values().collect()
+}
+
+/// May an edge be one of a wall's rim?
+fn is_of_rim(edge: &Edge<'_>) -> bool {
+    (3..=MOST_USES).contains(&edge.uses.len())
 }
 
 impl Sides<'_> {
@@ -87,8 +91,8 @@ impl Sides<'_> {
                             triangles.push(beyond);
                         }
                     }
-                    uses => {
-                        is_side &= (3..=MOST_USES).contains(&uses.len());
+                    _ => {
+                        is_side &= is_of_rim(&edge);
                         rim.push([a, b]);
                     }
                 }

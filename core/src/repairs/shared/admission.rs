@@ -44,6 +44,8 @@ pub(crate) struct Admission<'p> {
     of_triangle: Vec<u32>,
     /// Components that were joined to others.
     joined: BTreeSet<u32>,
+    /// First vertices of loops that were joined to another one, and are refused no more.
+    admitted: BTreeSet<u32>,
 }
 
 impl<'p> Admission<'p> {
@@ -82,7 +84,7 @@ impl<'p> Admission<'p> {
             one_sided.clear();
         }
         refused.sort_by_key(|(v, _)| *v);
-        Self { profile, longest, refused, one_sided, of_triangle, joined: BTreeSet::new() }
+        Self { profile, longest, refused, one_sided, of_triangle, joined: BTreeSet::new(), admitted: BTreeSet::new() }
     }
 
     /// May this loop be closed?
@@ -106,16 +108,14 @@ impl<'p> Admission<'p> {
         self.one_sided.get(t as usize) == Some(&true) && !self.is_joined(t)
     }
 
-    /// These rims became one. Lone sheets that this joins to something are lone no more, whatever other rims they have.
+    /// These rims became one. Lone sheets that this joins to something are lone no more, whatever other rims they have. O(rims × log).
     pub(crate) fn joined(&mut self, rims: &[&Loop]) {
         let along = rims.iter().flat_map(|rim| &rim.triangles);
         let components: BTreeSet<u32> = along.filter_map(|t| self.of_triangle.get(*t as usize).copied()).collect();
         if components.len() > 1 {
             self.joined.extend(components);
         }
-        let mut firsts: Vec<u32> = rims.iter().skip(1).map(|rim| rim.vertices[0]).collect();
-        firsts.sort_unstable();
-        self.refused.retain(|(v, _)| firsts.binary_search(v).is_err());
+        self.admitted.extend(rims.iter().skip(1).map(|rim| rim.vertices[0]));
     }
 
     fn is_joined(&self, t: u32) -> bool {
@@ -139,7 +139,7 @@ impl<'p> Admission<'p> {
         let at = self.refused.binary_search_by_key(&rim.vertices[0], |(v, _)| *v).ok()?;
         let reason = &self.refused[at].1;
         let is_lone_no_more = matches!(reason, NotAdmitted::Sheet) && self.is_joined(rim.triangles[0]);
-        (!is_lone_no_more).then_some(reason)
+        (!is_lone_no_more && !self.admitted.contains(&rim.vertices[0])).then_some(reason)
     }
 }
 
@@ -175,6 +175,7 @@ mod tests {
             one_sided: vec![true, true, true, false, false, false],
             of_triangle: vec![0, 0, 0, 1, 1, 1],
             joined: BTreeSet::new(),
+            admitted: BTreeSet::new(),
         };
         let [own, of_both] = [rim(&[0, 1, 2]), rim(&[3, 4, 1])];
         admission.joined(&[&own]);

@@ -14,6 +14,9 @@ use crate::submesh::{Submesh, Triangle, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 
+/// The words for it in a report.
+pub(crate) const NOTE: &str = "boundary vertices within the weld tolerance, moved to the one with most triangles";
+
 /// Boundary vertices within the weld tolerance become one.
 pub(crate) const REPAIR: Repair = Repair {
     name: RepairName::ToleranceWeld,
@@ -23,8 +26,7 @@ pub(crate) const REPAIR: Repair = Repair {
         if welded.taken_back > 0 {
             tracing::info!(clusters = welded.taken_back, "Welds taken back, since they made an edge of more than two triangles.");
         }
-        let note = "boundary vertices within the weld tolerance, moved to the one with most triangles";
-        Ok(Done::count(welded.vertices, note))
+        Ok(Done::count(welded.vertices, NOTE))
     },
 };
 

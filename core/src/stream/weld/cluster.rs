@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use glam::DVec3;
 
-use super::reach::{CELL, Reach, WIDEST};
-use crate::geometry::distance::place;
+use super::reach::{WIDEST, cell_of, cells_near};
+use crate::geometry::distance::{Tolerance, place};
 use crate::geometry::position::Position;
 use crate::geometry::sums::Bounds;
 use crate::io::record::Point;
@@ -93,7 +93,7 @@ pub(super) struct Chunk {
 
 impl Chunk {
     /// Where the corners at home in `cell` go, of triangles that are seen within `margin` of it.
-    pub(super) fn solve(&mut self, seen: [&Seen<'_>; 2], cell: HomeBox, margin: f32, reach: Reach) -> (&[Move], Counts) {
+    pub(super) fn solve(&mut self, seen: [&Seen<'_>; 2], cell: HomeBox, margin: f32, reach: Tolerance) -> (&[Move], Counts) {
         let mut counts = Counts::default();
         self.gather(seen, cell.grown(margin));
         self.measure(cell, reach, &mut counts);
@@ -143,7 +143,7 @@ impl Chunk {
     }
 
     /// Measures how far each vertex reaches, and counts what is at home.
-    fn measure(&mut self, cell: HomeBox, reach: Reach, counts: &mut Counts) {
+    fn measure(&mut self, cell: HomeBox, reach: Tolerance, counts: &mut Counts) {
         for i in 0..self.vertices.len() {
             let Vertex { at, place: here, first, end, .. } = self.vertices[i];
             let mut shortest = f64::INFINITY;
@@ -197,20 +197,15 @@ impl Chunk {
             if reach <= 0.0 || crowds.contains(&own) {
                 continue;
             }
-            let (lo, hi) = (cell_of(here - reach, weld), cell_of(here + reach, weld));
-            for x in lo[0]..=hi[0] {
-                for y in lo[1]..=hi[1] {
-                    for z in lo[2]..=hi[2] {
-                        let mut other = self.heads[bucket([x, y, z])];
-                        while other != NONE {
-                            let nearest = reach.min(self.vertices[other as usize].reach);
-                            if here.distance_squared(self.place(other)) <= nearest * nearest {
-                                unite(&mut self.parents, i, other);
-                                (self.near[i as usize], self.near[other as usize]) = (true, true);
-                            }
-                            other = self.next[other as usize];
-                        }
+            for cell in cells_near(here, reach, weld) {
+                let mut other = self.heads[bucket(cell)];
+                while other != NONE {
+                    let nearest = reach.min(self.vertices[other as usize].reach);
+                    if here.distance_squared(self.place(other)) <= nearest * nearest {
+                        unite(&mut self.parents, i, other);
+                        (self.near[i as usize], self.near[other as usize]) = (true, true);
                     }
+                    other = self.next[other as usize];
                 }
             }
             let head = &mut self.heads[bucket(own)];
@@ -292,10 +287,6 @@ fn count_edge(uses: &[(Position, bool)], counts: &mut Counts) {
     counts.nonmanifold_edges += u64::from(uses.len() > 2);
     counts.inconsistent_edges += u64::from(uses.len() == 2 && forward != 1);
     counts.unbalanced_edges += u64::from(2 * forward != uses.len());
-}
-
-fn cell_of(p: DVec3, weld: f64) -> [i64; 3] {
-    (p / (CELL * weld)).to_array().map(|x| x.floor() as i64)
 }
 
 fn hash([x, y, z]: [i64; 3]) -> u64 {

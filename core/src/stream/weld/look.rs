@@ -2,15 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use glam::DVec3;
+use super::reach::{cell_of, cells_near};
 
-use super::reach::Reach;
-
-use crate::geometry::distance::place;
+use crate::geometry::distance::{Tolerance, place};
 use crate::geometry::position::Position;
 use crate::geometry::sums::Bounds;
 use crate::io::read_ahead::Guide;
 use crate::io::record::{self, Record};
+use crate::stream::columns::{Columns, Extremes};
 use crate::util::scatter;
 
 /// Smaller files are worked on as a whole.
@@ -35,7 +34,7 @@ struct Seen {
 
 /// Are most corners near others, and hardly any where another one is? A look at some triangles of each part of the file; where neighbours are not near each other
 /// in the file, a pass through all of it for the corners in some places. `reach`: by the box of the triangles, of which it is shown some.
-pub(crate) fn shares_nothing(records: &[Record], guide: &Guide<'_>, reach: impl Fn(&Bounds) -> Reach) -> bool {
+pub(crate) fn shares_nothing(records: &[Record], guide: &Guide<'_>, reach: impl Fn(&Bounds) -> Tolerance) -> bool {
     if records.len() < FEWEST {
         return false;
     }
@@ -48,7 +47,7 @@ pub(crate) fn shares_nothing(records: &[Record], guide: &Guide<'_>, reach: impl 
         .collect();
     let mut bounds = Bounds::EMPTY;
     rows.iter().flatten().for_each(|(p, _)| bounds.include(&[p.coordinates()]));
-    let Reach { weld, .. } = reach(&bounds);
+    let Tolerance { weld, .. } = reach(&bounds);
     if weld <= 0.0 {
         return false;
     }
@@ -63,10 +62,10 @@ pub(crate) fn shares_nothing(records: &[Record], guide: &Guide<'_>, reach: impl 
 
 /// The box of all finite triangles.
 pub(crate) fn bounds(records: &[Record], guide: &Guide<'_>) -> Bounds {
-    let mut bounds = Bounds::EMPTY;
-    for record in guide.blocks(records).flatten().filter(|record| record::all_finite(record)) {
-        bounds.include(&record::corners(record));
-    }
+    let (mut bounds, mut extremes) = (Bounds::EMPTY, Extremes::EMPTY);
+    let finite = guide.blocks(records).flatten().filter(|record| record::all_finite(record));
+    finite.for_each(|record| extremes.include(&Columns::of(record)));
+    extremes.add_to(&mut bounds);
     bounds.normalised()
 }
 
@@ -99,20 +98,18 @@ impl Seen {
         corners.sort_unstable();
         corners.dedup();
         self.corners += corners.len();
-        let cell = |p: DVec3| (p / (2.0 * weld)).to_array().map(|x| x.floor() as i64);
         let mut alone: BTreeMap<[i64; 3], Vec<Position>> = BTreeMap::new();
         for group in corners.chunk_by(|a, b| a.0 == b.0) {
             match group {
-                [(p, _)] => alone.entry(cell(place(p.coordinates()))).or_default().push(*p),
+                [(p, _)] => alone.entry(cell_of(place(p.coordinates()), weld)).or_default().push(*p),
                 _ => self.shared += group.len(),
             }
         }
         let is_near = |p: &&Position| {
             let here = place(p.coordinates());
-            let (lo, hi) = (cell(here - weld), cell(here + weld));
-            let cells = (lo[0]..=hi[0]).flat_map(|x| (lo[1]..=hi[1]).flat_map(move |y| (lo[2]..=hi[2]).map(move |z| [x, y, z])));
             let others = |cell| alone.get(&cell).into_iter().flatten();
-            cells.into_iter().any(|cell| others(cell).any(|q| q != *p && here.distance(place(q.coordinates())) <= weld))
+            cells_near(here, weld, weld)
+                .any(|cell| others(cell).any(|q| q != *p && here.distance(place(q.coordinates())) <= weld))
         };
         self.near += alone.values().flatten().filter(is_near).count();
     }

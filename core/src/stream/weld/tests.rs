@@ -6,10 +6,10 @@ use std::path::Path;
 use glam::DVec3;
 use proptest::prelude::*;
 
-use super::{Counts, Reach, WIDEST, look, weld};
+use super::{Counts, WIDEST, look, weld};
 use crate::contract::progress::Quiet;
 use crate::contract::settings::{Limits, Spill};
-use crate::geometry::distance::place;
+use crate::geometry::distance::{Tolerance, place};
 use crate::io::read_ahead::Guide;
 use crate::io::record::{self, Point, Record};
 use crate::util::scatter;
@@ -25,7 +25,7 @@ fn limits(chunk_triangles: u32, threads: usize, spill: Spill) -> Limits {
     Limits { chunk_triangles, threads, spill, ..Limits::default() }
 }
 
-fn welded(records: &[Record], reach: Reach, limits: &Limits) -> (Vec<Record>, Counts) {
+fn welded(records: &[Record], reach: Tolerance, limits: &Limits) -> (Vec<Record>, Counts) {
     let welded = weld(Path::new("test"), records, reach, limits, &Quiet).unwrap();
     (welded.records.as_chunks().0.to_vec(), welded.counts)
 }
@@ -38,7 +38,7 @@ fn at(v: &Key) -> DVec3 {
 }
 
 /// How far each vertex reaches; those that are closed around reach nowhere.
-fn reaches(triangles: &[[Point; 3]], stars: &Stars, reach: Reach) -> BTreeMap<Key, f64> {
+fn reaches(triangles: &[[Point; 3]], stars: &Stars, reach: Tolerance) -> BTreeMap<Key, f64> {
     let of = |(v, star): (&Key, &Vec<(usize, usize)>)| {
         let mut uses: BTreeMap<Key, usize> = BTreeMap::new();
         let mut shortest = f64::INFINITY;
@@ -59,7 +59,7 @@ fn reaches(triangles: &[[Point; 3]], stars: &Stars, reach: Reach) -> BTreeMap<Ke
 }
 
 /// Where every vertex goes, by brute force.
-fn oracle(records: &[Record], reach: Reach) -> Vec<Record> {
+fn oracle(records: &[Record], reach: Tolerance) -> Vec<Record> {
     let triangles: Vec<[Point; 3]> = records.iter().map(record::corners).collect();
     let mut stars = Stars::new();
     for (t, corners) in triangles.iter().enumerate() {
@@ -135,7 +135,7 @@ proptest! {
         threads in 1usize..3,
     ) {
         let records = plate(side, jitter, |n| n % 4 < sound);
-        let reach = Reach { weld: weld_by, edge_share };
+        let reach = Tolerance { weld: weld_by, edge_share };
         let wanted = oracle(&records, reach);
         for (chunk, spill) in [(chunk, Spill::Never), (chunk, Spill::Always), (1 << 20, Spill::Never)] {
             let (got, counts) = welded(&records, reach, &limits(chunk, threads, spill));
@@ -149,7 +149,7 @@ proptest! {
 
 #[test]
 fn a_shaken_plate_becomes_whole_and_is_counted() {
-    let (records, reach) = (plate(8, 1e-3, |_| false), Reach { weld: 0.01, edge_share: 0.25 });
+    let (records, reach) = (plate(8, 1e-3, |_| false), Tolerance { weld: 0.01, edge_share: 0.25 });
     let (got, counts) = welded(&records, reach, &limits(10, 2, Spill::Never));
     let places: BTreeSet<Key> = got.iter().flat_map(record::corners).map(key).collect();
     assert_eq!(places.len(), 81);
@@ -161,7 +161,7 @@ fn a_shaken_plate_becomes_whole_and_is_counted() {
 /// A file in which nothing is shared, in its order or in another one, and one where all is.
 #[test]
 fn a_look_tells_what_shares_nothing() {
-    let reach = |weld: f64| move |_: &_| Reach { weld, edge_share: 0.25 };
+    let reach = |weld: f64| move |_: &_| Tolerance { weld, edge_share: 0.25 };
     let (shaken, sound) = (plate(300, 1e-4, |_| false), plate(300, 0.0, |_| false));
     let tells = |records: &[Record]| look::shares_nothing(records, &Guide::NONE, reach(1e-3));
     let mixed = |records: &[Record]| {

@@ -71,6 +71,7 @@ impl ProfileBuilder {
         skin_reach_relative: f64,
         max_skin_lost: f64,
         max_skin_invented: f64,
+        max_cavities_filled: f64,
         max_bodies_lost: u32,
         debris_triangles: u32,
         debris_area_share: f64,

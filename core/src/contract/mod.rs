@@ -18,3 +18,4 @@ pub(crate) mod repair_name;
 pub mod report;
 pub mod settings;
 pub(crate) mod skin;
+pub(crate) mod volumes;

@@ -61,7 +61,7 @@ impl Profile {
     }
 
     /// Every setting that is not a whole number or a choice, with its range. All fields are named, so that a new one cannot be forgotten here.
-    fn numbers(&self) -> [(&'static str, f64, Range); 22] {
+    fn numbers(&self) -> [(&'static str, f64, Range); 23] {
         let Self {
             name: _,
             weld_relative,
@@ -77,6 +77,7 @@ impl Profile {
             skin_reach_relative,
             max_skin_lost,
             max_skin_invented,
+            max_cavities_filled,
             debris_area_share,
             sheet_thickness_relative,
             sheet_thickness_mm,
@@ -107,7 +108,7 @@ impl Profile {
             weld_relative: Share, weld_max_edge_share: Share, sew_relative: Share, gap_edge_share: Bound,
             max_hole_perimeter_relative: Bound, max_hole_perimeter_mm: Bound, max_gap_mm: Bound,
             max_volume_change: Bound, max_area_change: Bound, max_box_change_relative: Bound,
-            skin_reach_relative: Share, max_skin_lost: Share, max_skin_invented: Share, debris_area_share: Share,
+            skin_reach_relative: Share, max_skin_lost: Share, max_skin_invented: Share, max_cavities_filled: Bound, debris_area_share: Share,
             sheet_thickness_relative: Share, sheet_thickness_mm: Bound, max_sheets_share: Share,
             stack_gap_relative: Share, max_separation_relative: Share, wrap_max_share: Share, wrap_max_move: Bound,
             wrap_review_share: Share,

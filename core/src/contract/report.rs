@@ -5,6 +5,7 @@ pub use crate::contract::judgement::{Certificate, Faithful, Fidelity, RuleOutcom
 pub use crate::contract::loop_class::LoopClass;
 pub use crate::contract::repair_name::RepairName;
 pub use crate::contract::skin::{Skin, SkinCause, SkinChange, SkinPlace};
+pub use crate::contract::volumes::{BodyLost, Volumes};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize, Serializer};
@@ -366,35 +367,6 @@ pub struct Wrap {
     /// Why it was left as it is; `None`: it was replaced.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub left: Option<String>,
-}
-
-/// Whether bodies are still inside of the result: points in each are looked for there. In the file's units, cubed.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[non_exhaustive]
-pub struct Volumes {
-    /// Bodies that were looked for: the largest, at most 4096, each of more than a millionth of the volume of all.
-    pub bodies: u64,
-    /// Points in them.
-    pub points: u64,
-    /// What they enclose, each for itself: what several share counts for each.
-    pub volume: f64,
-    /// Of that, what is outside now, an estimate: of each body the share of its points that are.
-    pub outside: f64,
-    /// Bodies with no point inside.
-    pub lost: u64,
-    /// These, the largest first (at most 1000 listed).
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub listed: Vec<BodyLost>,
-}
-
-/// A body that is not inside of the result.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[non_exhaustive]
-pub struct BodyLost {
-    /// Smallest and largest coordinates of what was there.
-    pub bounds: [[f32; 3]; 2],
-    /// The volume that it enclosed.
-    pub volume: f64,
 }
 
 /// Regions where the surface is not as it was.

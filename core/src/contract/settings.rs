@@ -59,6 +59,8 @@ pub struct Profile {
     /// Largest share of the surface that can be seen and that nothing in the file stood for, flat or small patches left out; beyond it the result
     /// needs review.
     pub max_skin_invented: f64,
+    /// Cavities that become material as a whole may enclose so much without review, as a fraction of the result's volume.
+    pub max_cavities_filled: f64,
     /// Bodies (components that enclose volume) the repair may lose without review.
     pub max_bodies_lost: u32,
     /// Components of fewer triangles than this that stay open after weld and splits are dropped as debris (0: never) ...
@@ -197,6 +199,7 @@ impl Default for Profile {
             skin_reach_relative: 0.005,
             max_skin_lost: 0.0005,
             max_skin_invented: 0.01,
+            max_cavities_filled: 0.01,
             max_bodies_lost: 0,
             debris_triangles: 4,
             debris_area_share: 1e-3,

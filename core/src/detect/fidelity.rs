@@ -17,7 +17,7 @@ pub struct FidelityRule {
 }
 
 /// All rules, in the order in which reasons are given.
-pub const FIDELITY_RULES: [FidelityRule; 14] = [
+pub const FIDELITY_RULES: [FidelityRule; 15] = [
     FidelityRule {
         id: "volume",
         version: 1,
@@ -41,6 +41,11 @@ pub const FIDELITY_RULES: [FidelityRule; 14] = [
         id: "volume_outside",
         version: 1,
         measures: "Volume that bodies enclosed and the result does not, as a share, by points in each body.",
+    },
+    FidelityRule {
+        id: "cavities_filled",
+        version: 1,
+        measures: "Volume of cavities all of which is material now, as a share of the result's, by points in each cavity.",
     },
     FidelityRule {
         id: "skin_lost",

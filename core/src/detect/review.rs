@@ -4,7 +4,7 @@
 //! line means that nobody need look.
 
 use crate::contract::report::{Defects, Region, SheetDropped, Skin, SkinChange, Volumes, Wrap};
-use crate::contract::settings::Profile;
+use crate::contract::settings::{Bodies, Profile};
 use crate::detect::fidelity::Measured;
 use crate::geometry::sums::Bounds;
 
@@ -108,6 +108,7 @@ pub(crate) fn measure(change: &Change<'_>, profile: &Profile) -> Vec<Measured> {
     let mut all = counts(change, profile);
     all.push(noted("guesses", &change.evidence.doubts));
     all.extend(volumes(change.volumes, profile));
+    all.push(cavities(change, profile));
     all.extend(skin(change.skin, profile));
     all.extend(sheets(change.before, change.sheets, profile));
     all.push(wraps(change.wraps, profile));
@@ -217,6 +218,20 @@ fn volumes(volumes: Option<&Volumes>, profile: &Profile) -> [Measured; 2] {
         format!("about {:.1} % of what the bodies enclosed is outside of the result", share * 100.0)
     });
     [bodies, volume]
+}
+
+/// The cavities that are filled, unless that is asked for.
+fn cavities(change: &Change<'_>, profile: &Profile) -> Measured {
+    let all = change.after.volume;
+    let volumes = change.volumes.filter(|_| profile.bodies != Bodies::Visible);
+    let filled = volumes.map(|volumes| if all > 0.0 { volumes.filled / all } else { 0.0 });
+    measured("cavities_filled", filled, profile.max_cavities_filled, |share| {
+        let largest = change.volumes.and_then(|v| v.filled_listed.first()).map_or(String::new(), |cavity| {
+            let [lo, hi] = cavity.bounds;
+            format!(", the largest from {lo:?} to {hi:?}")
+        });
+        format!("cavities of {:.1} % of the volume are filled by what else lies there{largest}", share * 100.0)
+    })
 }
 
 /// The surface that can be seen, and was lost or invented.

@@ -258,6 +258,7 @@ fn unrestricted(name: &str) -> Profile {
         max_volume_change: f64::MAX,
         max_area_change: f64::MAX,
         max_box_change_relative: f64::MAX,
+        max_cavities_filled: f64::MAX,
         max_bodies_lost: u32::MAX,
         skin_reach_relative: 0.0,
         ..Profile::default()

@@ -70,6 +70,7 @@ pub(crate) const ALL: &[Step] = &[
     Do(sew::REPAIR),
     Do(overlaps::REPAIR),
     JOIN,
+    Do(overlaps::copies::REPAIR),
     Do(zip::REPAIR),
     TIDY,
     Do(slits::REPAIR),

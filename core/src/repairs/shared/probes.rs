@@ -7,6 +7,8 @@
 //! are outside.
 //!
 //! A probe lies in material from the start: where its own body winds around it, and all closed pieces together do, so that no cavity holds it.
+//!
+//! Nor may hollow space fill up without a word: so cavities have probes, too, and one of which every probe lies in material in the end is filled.
 
 use std::collections::BTreeSet;
 
@@ -36,22 +38,64 @@ const LEAST_DEPTHS: usize = 4;
 /// The least depth, against the diagonal of its box.
 const LEAST_DEPTH: f64 = 1.0 / 65_536.0;
 
-/// A body, and where its probes are among all.
+/// Cavities of less than this share of what all bodies enclose are not looked for; of others so many, the largest.
+const LEAST_CAVITY: f64 = 1e-3;
+const MOST_CAVITIES: usize = 256;
+
+/// Points of a cavity's box that are tried.
+const IN_CAVITY: usize = 32;
+
+/// A body or a cavity, and where its probes are among all.
 struct Body {
     bounds: Bounds,
     volume: f64,
     probes: std::ops::Range<usize>,
 }
 
-/// The probes of all bodies, the largest first.
+/// The probes of all bodies and cavities, the largest first.
 pub(crate) struct Probes {
     bodies: Vec<Body>,
+    cavities: Vec<Body>,
     points: Vec<[f64; 3]>,
 }
 
 impl Probes {
-    /// Of the closed `pieces` of positive volume. Reads the chunks of the file above the points that are tried.
+    /// Of the closed `pieces`: bodies enclose positive volume, cavities negative. Reads the chunks of the file above the points that are tried.
     pub(crate) fn of(survey: &Survey<'_>, submesh: &Submesh, reversed: &Reversed, pieces: &Components) -> Self {
+        let mut probes = Self::of_bodies(survey, submesh, reversed, pieces);
+        probes.take_cavities(survey, submesh, reversed, pieces);
+        probes
+    }
+
+    /// Points in cavities, whatever else lies there.
+    fn take_cavities(&mut self, survey: &Survey<'_>, submesh: &Submesh, reversed: &Reversed, pieces: &Components) {
+        let all: f64 = self.bodies.iter().map(|body| body.volume).sum();
+        let closed = (0..).zip(&pieces.list).filter(|(_, piece)| !piece.open);
+        let mut list: Vec<(u32, f64)> = closed
+            .map(|(number, piece)| (number, -survey.measure.volume(piece.extent)))
+            .filter(|(_, volume)| *volume > LEAST_CAVITY * all)
+            .collect();
+        list.sort_by(|a, b| b.1.total_cmp(&a.1));
+        list.truncate(MOST_CAVITIES);
+        if list.is_empty() {
+            return;
+        }
+        let bounds = |number: u32| &pieces.list[number as usize].bounds;
+        let tried: Vec<[f64; 3]> = list.iter().flat_map(|(number, _)| points_in(bounds(*number), IN_CAVITY)).collect();
+        let around = bodies::surfaces_around(survey, submesh, pieces, reversed, &tried);
+        let tried: Vec<_> = tried.into_iter().zip(around).collect();
+        for ((number, volume), tried) in list.into_iter().zip(tried.chunks(IN_CAVITY)) {
+            let first = self.points.len();
+            let is_in = |around: &[(u32, i32)]| around.iter().any(|(piece, winding)| *piece == number && *winding < 0);
+            self.points.extend(tried.iter().filter(|(_, around)| is_in(around)).map(|(point, _)| *point));
+            if self.points.len() > first {
+                let bounds = bounds(number).normalised();
+                self.cavities.push(Body { bounds, volume, probes: first..self.points.len() });
+            }
+        }
+    }
+
+    fn of_bodies(survey: &Survey<'_>, submesh: &Submesh, reversed: &Reversed, pieces: &Components) -> Self {
         let volume = |piece: &Component| survey.measure.volume(piece.extent);
         let mut list: Vec<(u32, f64)> = (0..)
             .zip(&pieces.list)
@@ -72,7 +116,7 @@ impl Probes {
         };
         let tried: Vec<Vec<[f64; 3]>> = list.iter().map(|(number, _)| candidates(*number)).collect();
         let mut around = bodies::surfaces_around(survey, submesh, pieces, reversed, &tried.concat()).into_iter();
-        let mut probes = Self { bodies: Vec::new(), points: Vec::new() };
+        let mut probes = Self { bodies: Vec::new(), cavities: Vec::new(), points: Vec::new() };
         for ((number, volume), tried) in list.into_iter().zip(tried) {
             let first = probes.points.len();
             let mut is_deep = false;
@@ -104,7 +148,8 @@ impl Probes {
     ) -> Volumes {
         let mut windings = bodies::windings(survey, submesh, pieces, reversed, &self.points);
         windings.iter_mut().zip(bodies::windings_of(wrapped, &self.points)).for_each(|(all, more)| *all += more);
-        let mut found = Volumes { bodies: self.bodies.len() as u64, points: self.points.len() as u64, ..Volumes::default() };
+        let points = self.bodies.last().map_or(0, |body| body.probes.end) as u64;
+        let mut found = Volumes { bodies: self.bodies.len() as u64, points, ..Volumes::default() };
         for body in &self.bodies {
             let outside = windings[body.probes.clone()].iter().filter(|winding| **winding < 1).count();
             found.volume += body.volume;
@@ -116,6 +161,11 @@ impl Probes {
                     found.listed.push(BodyLost { bounds: [bounds.lo, bounds.hi], volume: *volume });
                 }
             }
+        }
+        for cavity in self.cavities.iter().filter(|cavity| windings[cavity.probes.clone()].iter().all(|winding| *winding > 0)) {
+            let Body { bounds, volume, .. } = cavity;
+            found.filled += volume;
+            found.filled_listed.push(BodyLost { bounds: [bounds.lo, bounds.hi], volume: *volume });
         }
         found
     }
@@ -220,6 +270,18 @@ mod tests {
         let kept = found(&hollow, &[], |_| ());
         assert_eq!((kept.bodies, kept.outside, kept.lost), (1, 0.0, 0));
         assert!(kept.points > 0);
+    }
+
+    /// A cavity is filled by a body that takes all of it, and not by one that passes through.
+    #[test]
+    fn a_cavity_that_becomes_material_is_missed() {
+        let hollow = [cuboid([0.0; 3], [8.0; 3]), reversed(&cuboid([1.0; 3], [7.0; 3]))].concat();
+        let gone = found(&hollow, &[], |turned| turned.dropped[1] = true);
+        assert_eq!((gone.filled, gone.outside), (216.0, 0.0));
+        assert_eq!(gone.filled_listed, [BodyLost { bounds: [[1.0; 3], [7.0; 3]], volume: 216.0 }]);
+        let through = cuboid([3.0, 3.0, 0.5], [5.0, 5.0, 7.5]);
+        assert_eq!(found(&hollow, &through, |_| ()).filled, 0.0);
+        assert_eq!(found(&hollow, &cuboid([0.5; 3], [7.5; 3]), |_| ()).filled, 216.0);
     }
 
     /// The deepest points are too deep in a plate; some are not.

@@ -4,25 +4,25 @@
 //! ends face each other across a gap, which is closed later. A piece that lies on another one as a whole goes as a whole: what was meant is
 //! one surface, drawn twice. A piece on a surface that does not end there is left alone: nothing says that it was to be joined.
 
-use crate::contract::report::RepairName;
-use crate::geometry::distance::place;
-use crate::repairs::shared::context::{Changes, Done, Repair};
+pub(crate) mod copies;
+mod pieces;
+
 use std::collections::{BTreeMap, HashMap};
 
+use crate::contract::report::RepairName;
 use crate::geometry::boxes::BoxTree;
-use crate::geometry::grid::Grid;
 use crate::geometry::position::Position;
 use crate::geometry::sums::Bounds;
-use crate::geometry::tri_tri::Triangle as Corners;
-use crate::io::record;
+use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
 use crate::repairs::stitch::layer::{Facet, Layer, Place, Reach, RimEdge, around};
 use crate::repairs::stitch::weld;
-use crate::submesh::components::{Component, Components, Reversed, Through};
 use crate::submesh::edges::Edges;
 use crate::submesh::near::{Tolerance, boundary_vertices};
 use crate::submesh::{Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
+
+use pieces::{Member, Pieces, widened};
 
 /// Surface that lies on other surface.
 pub(crate) const REPAIR: Repair = Repair {
@@ -34,9 +34,6 @@ pub(crate) const REPAIR: Repair = Repair {
     },
 };
 
-/// Surfaces lie on each other within this share of the diagonals of their boxes together.
-const LAP: f64 = 1e-4;
-
 /// A piece may lap over several others: each takes part in one cut a round, so many times.
 const ROUNDS: usize = 4;
 
@@ -46,9 +43,6 @@ const MOST_PAIRS: usize = 256;
 /// What is cut off must lie on the other piece with this share of its area: surfaces that only cross at a small angle, or large triangles that
 /// lap by little, do not.
 const OVERLAP: f64 = 0.5;
-
-/// Triangles that are looked at together, at most; where there are more, nothing is cut. By count, so that memory decides nothing.
-pub(crate) const MOST: usize = crate::stream::budget::OVERLAPS_LOOKED_FOR;
 
 /// Most triangles that a cut may take; they are worked on in memory.
 const MOST_CUT: usize = 1 << 17;
@@ -70,39 +64,6 @@ pub(crate) fn cut_back(survey: &mut Survey<'_>, work: &mut Work<'_>, tolerance: 
     removed
 }
 
-/// A triangle of the mesh: regular, or of the submesh.
-#[derive(Clone, Copy, Debug)]
-enum Number {
-    /// The record of a triangle with regular corners only.
-    Record(u32),
-    /// A triangle of the submesh.
-    Submesh(u32),
-}
-
-impl Number {
-    fn record(self) -> Option<u32> {
-        match self {
-            Self::Record(record) => Some(record),
-            Self::Submesh(_) => None,
-        }
-    }
-
-    fn submesh(self) -> Option<u32> {
-        match self {
-            Self::Submesh(t) => Some(t),
-            Self::Record(_) => None,
-        }
-    }
-}
-
-/// A triangle of a piece.
-#[derive(Clone, Copy, Debug)]
-struct Member {
-    piece: u32,
-    corners: Corners,
-    number: Number,
-}
-
 /// Two pieces, the smaller one first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Pair {
@@ -116,114 +77,6 @@ struct Cut {
     triangles: Vec<Member>,
     /// Boundary vertices of the piece that is cut and of the other one, if they are to be joined, and within which distance.
     join: Option<([Vec<Vertex>; 2], f64)>,
-}
-
-/// Pieces of surface with what is needed to compare them.
-struct Pieces {
-    components: Components,
-    /// All boundary edges, by piece, with the share of their triangle's height that a reach may have.
-    rims: Vec<(RimEdge, f64)>,
-    /// Diagonals of the boxes.
-    sizes: Vec<f64>,
-    /// What is nearer than this to where a piece ends is a matter of welding.
-    weld: f64,
-}
-
-impl Pieces {
-    fn of(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> Self {
-        let components = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::EveryEdge);
-        let rims = edges.iter().filter(|e| e.is_boundary()).map(|e| {
-            let t = e.uses[0].triangle;
-            let facet = Facet::of(&submesh.points(t), components.of_triangle[t as usize]);
-            let ends = [submesh.place(e.low), submesh.place(e.high)];
-            (RimEdge { ends, normal: facet.normal, piece: facet.piece }, facet.height() * tolerance.edge_share)
-        });
-        let mut rims: Vec<_> = rims.collect();
-        rims.sort_by_key(|(rim, _)| rim.piece);
-        let sizes = components.list.iter().map(|c| c.bounds.diagonal()).collect();
-        Self { components, rims, sizes, weld: tolerance.weld }
-    }
-
-    fn list(&self) -> &[Component] {
-        &self.components.list
-    }
-
-    /// How near two pieces lie on each other, where a triangle of one is so high that it may do so within `most`.
-    fn reach(&self, a: u32, b: u32, most: f64) -> Reach {
-        self.reach_of(self.sizes[a as usize] + self.sizes[b as usize], most)
-    }
-
-    fn reach_of(&self, sizes: f64, most: f64) -> Reach {
-        let rim = (LAP * sizes).max(self.weld);
-        Reach { on: rim.min(most), rim }
-    }
-
-    /// For each piece that ends, the others in whose box it may do so; numbered as the pieces are.
-    fn neighbours(&self) -> Vec<Vec<u32>> {
-        let mut all = vec![Vec::new(); self.list().len()];
-        let mut ends = vec![false; all.len()];
-        self.rims.iter().for_each(|(r, _)| ends[r.piece as usize] = true);
-        if !ends.contains(&true) || all.len() < 2 {
-            return all;
-        }
-        let boxes: Vec<Bounds> = self.list().iter().map(|c| c.bounds).collect();
-        let tree = BoxTree::new(&boxes);
-        let largest = self.sizes.iter().copied().fold(0.0, f64::max);
-        for (a, near) in (0..).zip(&mut all).filter(|(a, _)| ends[*a as usize]) {
-            tree.meeting(&widened(&boxes[a as usize], self.reach_of(self.sizes[a as usize] + largest, f64::INFINITY).rim), near);
-            near.retain(|b| *b != a);
-        }
-        all
-    }
-
-    fn rims_of(&self, piece: u32) -> Vec<RimEdge> {
-        let from = self.rims.partition_point(|(r, _)| r.piece < piece);
-        self.rims[from..].iter().map(|(r, _)| *r).take_while(|r| r.piece == piece).collect()
-    }
-
-    /// All triangles of wanted pieces whose boxes meet one of these; `None` if they are too many.
-    fn gather(
-        &self,
-        survey: &Survey<'_>,
-        submesh: &Submesh,
-        is_wanted: impl Fn(u32) -> bool + Sync,
-        boxes: &[Bounds],
-    ) -> Option<Vec<Member>> {
-        let tree = BoxTree::new(boxes);
-        let mut grid = Grid::default();
-        grid.mark(boxes.iter().copied());
-        let mut everything = Bounds::EMPTY;
-        boxes.iter().for_each(|b| everything.add(b));
-        let meets = |corners: &Corners| {
-            let bounds = Bounds::of(corners);
-            let mut found = Vec::new();
-            grid.may_meet(&bounds) && {
-                tree.meeting(&bounds, &mut found);
-                !found.is_empty()
-            }
-        };
-        let mut all = Vec::new();
-        for t in submesh.living() {
-            let (piece, corners) = (self.components.of_triangle[t as usize], submesh.points(t));
-            if is_wanted(piece) && meets(&corners) {
-                all.push(Member { piece, corners, number: Number::Submesh(t) });
-            }
-        }
-        let of_region = &self.components.of_region;
-        let found = survey.visit_regular(
-            |region| is_wanted(of_region[region as usize]),
-            |reach| reach.overlap(&everything).map(|_| Vec::new()),
-            |_, corners| meets(corners),
-            |found: &mut Vec<(u32, u32)>, triangle, region| found.push((triangle, region)),
-        );
-        let mut regular: Vec<(u32, u32)> = found.into_iter().flatten().collect();
-        regular.sort_unstable();
-        all.extend(regular.into_iter().map(|(record, region)| {
-            let corners = record::corners(&survey.records[record as usize]);
-            Member { piece: of_region[region as usize], corners, number: Number::Record(record) }
-        }));
-        (all.len() <= MOST).then_some(all)
-    }
 }
 
 /// Cuts that can be made side by side: no piece takes part in two of them.
@@ -459,11 +312,6 @@ fn join(survey: &Survey<'_>, work: &mut Work<'_>, [moving, staying]: [&[Vertex];
     }
     pairs.sort_unstable();
     weld::weld_pairs(survey, work, &pairs, reach.weld);
-}
-
-/// Wider on all sides, rounded outward.
-fn widened(b: &Bounds, by: f64) -> Bounds {
-    around(&[place(b.lo), place(b.hi)], by)
 }
 
 #[cfg(test)]

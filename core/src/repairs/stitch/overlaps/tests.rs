@@ -1,4 +1,5 @@
 use super::*;
+use crate::geometry::tri_tri::Triangle as Corners;
 use crate::testing::{After, after, cuboid, plate, reversed, shifted};
 
 /// Two pieces this far apart.

@@ -82,6 +82,8 @@ pub(crate) struct Enclosed {
     pub(crate) regions: Vec<Region>,
     /// Of that volume, bodies that nothing crosses and that lay wholly in the material of another one: each may have been meant for a cavity.
     pub(crate) filled: f64,
+    /// The largest body in the material of others that stays, since nobody knows if it is to go.
+    pub(crate) left: Option<Bounds>,
     /// Beyond this box, there is nothing but cavities that poke out.
     pub(crate) outline: Option<Bounds>,
     /// The volume that the surface meant to enclose before anything was closed, cut or removed; `None` if nobody knows.
@@ -440,7 +442,7 @@ mod tests {
     fn bodies_that_left_the_model_need_review() {
         let profile = Profile { max_volume_change: 0.25, max_bodies_lost: 1, ..Profile::default() };
         let concerns = |lost: u64, outside: f64| {
-            let all = Volumes { bodies: 9, points: 9, volume: 4.0, outside, lost, listed: Vec::new() };
+            let all = Volumes { bodies: 9, points: 9, volume: 4.0, outside, lost, ..Volumes::default() };
             volumes(Some(&all), &profile).into_iter().flat_map(Measured::concerns).count()
         };
         assert_eq!([concerns(0, 0.0), concerns(1, 1.0), concerns(2, 1.0), concerns(0, 1.01)], [0, 0, 1, 1]);

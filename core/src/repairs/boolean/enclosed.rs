@@ -5,9 +5,12 @@
 //! winding number is positive (Jacobson et al., "Robust inside-outside segmentation using generalized winding numbers", ACM TOG 32(4), 2013;
 //! of closed pieces it is an integer). Integers from exact predicates: nothing is decided by a margin.
 //!
-//! What is removed is lost, so that only what the file itself says counts: a piece that was closed or turned by a repair is neither removed nor
-//! does it swallow anything (a vessel whose mouth was closed would swallow what stands in it), and nothing is removed where an open piece
-//! might be the wall of a cavity. A sheet in the material of a body stays: it may be the floor of a hole whose walls lack.
+//! What is removed is lost, so that only what the file itself says counts: a piece that was closed or turned by a repair is not removed, one that was
+//! closed by more than small patches does not swallow anything (a vessel whose mouth was closed would swallow what stands in it), and nothing is
+//! removed where an open piece might be the wall of a cavity. Of a body that stays for that, somebody must see what it is. A sheet in the material of a
+//! body stays: it may be the floor of a hole whose walls lack.
+
+use std::cmp::Reverse;
 
 use crate::contract::report::RepairName;
 use crate::contract::report::{Region, RegionMethod};
@@ -18,7 +21,7 @@ use crate::geometry::boxes::BoxTree;
 use crate::geometry::sums::Bounds;
 use crate::io::record;
 use crate::repairs::shared::context::{Changes, Done, Repair};
-use crate::repairs::shared::pieces::{crossing, lies_in_material, take_away};
+use crate::repairs::shared::pieces::{are_patched, crossing, lies_in_material, take_away};
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed};
 use crate::submesh::{Origin, Submesh};
@@ -41,6 +44,12 @@ pub(crate) const REPAIR: Repair = Repair {
         cx.account.regions.append(&mut enclosed.regions);
         cx.account.enclose(bodies, volume);
         cx.account.enclosed.filled = volume;
+        if let Some(Bounds { lo, hi }) = enclosed.left {
+            cx.account.doubts.push(format!(
+                "a body lies in the material of another one, and a repair has closed or turned one of both: it may stand in a vessel, or bound a hollow; \
+                 the largest is from {lo:?} to {hi:?}"
+            ));
+        }
         let note = format!("bodies in the material of others removed: {bodies}, of {volume:.4} units³ together");
         Ok(Done { changed, ..Done::count(bodies, note) })
     },
@@ -66,21 +75,21 @@ pub(crate) fn remove(
         return enclosed;
     }
     let crossing = crossing(survey, submesh, pieces, crossing_pairs.iter().map(|pair| pair.triangles));
-    let is_as_read = are_as_read(survey, submesh, pieces, reversed);
+    let (is_as_read, is_patched) = (are_as_read(survey, submesh, pieces, reversed), are_patched(survey, submesh, pieces));
     let open: Vec<Bounds> = pieces.list.iter().filter(|piece| piece.open).map(|piece| piece.bounds).collect();
     let open = BoxTree::new(&open);
     let mut met = Vec::new();
-    let is_enclosed: Vec<bool> = (0..pieces.list.len())
-        .map(|i| {
-            let (piece, around) = (&pieces.list[i], &around[i]);
-            open.meeting(&piece.bounds, &mut met);
-            !crossing[i]
-                && met.is_empty()
-                && lies_in_material(piece, around.winding())
-                && is_as_read[i]
-                && around.around.iter().all(|(outer, _)| is_as_read[*outer as usize])
-        })
-        .collect();
+    let mut in_material = |i: usize| {
+        let piece = &pieces.list[i];
+        open.meeting(&piece.bounds, &mut met);
+        !crossing[i] && met.is_empty() && lies_in_material(piece, around[i].winding())
+    };
+    let in_material: Vec<bool> = (0..pieces.list.len()).map(&mut in_material).collect();
+    let is_known = |i: usize| is_as_read[i] && around[i].around.iter().all(|(outer, _)| !is_patched[*outer as usize]);
+    let is_enclosed: Vec<bool> = (0..pieces.list.len()).map(|i| in_material[i] && is_known(i)).collect();
+    let left = (0..pieces.list.len()).filter(|i| in_material[*i] && !is_enclosed[*i]).map(|i| &pieces.list[i]);
+    let largest = left.filter(|piece| piece.extent.volume > 0).max_by_key(|piece| (piece.extent.volume, Reverse(piece.sample)));
+    enclosed.left = largest.map(|piece| piece.bounds.normalised());
     for (piece, _) in pieces.list.iter().zip(&is_enclosed).filter(|(_, gone)| **gone) {
         enclosed.bodies += u64::from(piece.extent.volume > 0);
         enclosed.volume += survey.measure.volume(piece.extent);

@@ -3,6 +3,7 @@
 use crate::contract::report::RepairName;
 use crate::geometry::sums::Bounds;
 use crate::repairs::orient::inverted::{Inverted, inverted};
+use crate::repairs::orient::shells;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::gather::gather;
 use crate::repairs::shared::work::Work;
@@ -172,7 +173,8 @@ pub(crate) fn inside_out(survey: &Survey<'_>, submesh: &Submesh, reversed: &Reve
 
 /// Turns closed ones of all `pieces` inside out where they enclose negative volume and are no cavity.
 pub(crate) fn make_outward(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &mut Reversed, pieces: &Components) -> Outward {
-    let found = inside_out(survey, work, reversed, pieces);
+    let mut found = inside_out(survey, work, reversed, pieces);
+    found.doubts.extend(shells::thin(survey, pieces, &found.pieces));
     let count = turn(work, reversed, pieces, &found.pieces);
     let outline = outline(pieces, &found.poking_out);
     Outward { pieces: count, doubts: found.doubts, outline, cavities: surface_of(survey, work, reversed, pieces, &found.plainly) }

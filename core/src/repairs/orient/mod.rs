@@ -5,4 +5,5 @@ mod groups;
 pub(crate) mod hollow;
 mod inverted;
 mod points;
+mod shells;
 pub(crate) mod visibility;

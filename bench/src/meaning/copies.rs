@@ -1,0 +1,98 @@
+//! Surfaces that are there twice, the second time a little off.
+
+use super::clearances::joint;
+use super::damage::{flip_patch, patch};
+use super::draft::{Draft, Entry};
+use super::mesh::{Mesh, key, minus, plus, times};
+use super::random::Chance;
+use super::turned::{drained, shells};
+
+pub(super) const FAMILIES: [Entry; 2] = [
+    ("part-skin-doubled", "10 to 50 % of a hollow solid's skin twice, the copy off by 6e-5 to 1e-3 of the size", true, part_skin),
+    (
+        "whole-copy-and-flip",
+        "a shell or body of a hollow thing twice, off by 1e-4 to 5e-4, and a patch flipped",
+        true,
+        whole_copy,
+    ),
+];
+
+/// Bodies in one another with clearance, shell by shell from the outside: a host and its cavity, and up to two bodies within, of
+/// which only the last may be massive.
+fn nested(chance: &mut Chance, within: usize) -> Vec<Mesh> {
+    let (outer, inner) = shells(chance);
+    let middle = times(plus(inner.corners()[0], inner.corners()[1]), 0.5);
+    let smaller = |mesh: &Mesh, by: f64| mesh.map(|p| plus(middle, times(minus(p, middle), by)));
+    let mut shells = vec![outer, inner.turned()];
+    for left in (0..within).rev() {
+        let body = smaller(&shells[shells.len() - 1], chance.from(0.6, 0.95)).turned();
+        let cavity = smaller(&body, chance.from(0.7, 0.9)).turned();
+        shells.push(body);
+        if left > 0 || chance.is(0.5) {
+            shells.push(cavity);
+        }
+    }
+    shells
+}
+
+/// One mesh of many.
+fn all(meshes: &[Mesh]) -> Mesh {
+    meshes.iter().fold(Mesh::default(), |all, mesh| all.and(mesh))
+}
+
+/// A hollow thing, its bodies, and the least distance of its surfaces where that may be small.
+fn hollow(chance: &mut Chance) -> (Mesh, u64, f64) {
+    match chance.count(0, 4) {
+        0 => (all(&nested(chance, 0)), 1, f64::INFINITY),
+        1 => (drained(chance), 1, f64::INFINITY),
+        2 => {
+            let (ball, socket, _, gap) = joint(chance);
+            (ball.and(&socket), 2, gap)
+        }
+        _ => {
+            let within = chance.count(1, 2);
+            (all(&nested(chance, within)), 1 + within as u64, f64::INFINITY)
+        }
+    }
+}
+
+/// As much of the intended volume as lies between a surface and its copy: nobody can tell which of both it was.
+fn between(copied: &Mesh, by: f64, intended: &Mesh) -> f64 {
+    (by * copied.area() / intended.volume()).max(0.01)
+}
+
+fn part_skin(chance: &mut Chance) -> Draft {
+    let (body, bodies, room) = hollow(chance);
+    let by = (body.size() * chance.scale(6e-5, 1e-3)).min(room / 4.0);
+    let share = chance.from(0.1, 0.5);
+    let is_of = patch(chance, &body, share);
+    let copied = Mesh(body.0.iter().zip(is_of).filter(|(_, is_of)| *is_of).map(|(face, _)| *face).collect());
+    let copy = match chance.count(0, 2) {
+        0 => copied.moved(times(chance.direction(), by)),
+        way => {
+            let (normals, far) = (body.normals(), if way == 1 { by } else { -by });
+            copied.map(|p| normals.get(&key(p)).map_or(p, |normal| plus(p, times(*normal, far))))
+        }
+    };
+    let tolerance = between(&copied, by, &body);
+    Draft::of(body.and(&copy), body).within(tolerance).bodies(bodies..=bodies)
+}
+
+fn whole_copy(chance: &mut Chance) -> Draft {
+    let within = chance.count(0, 1);
+    let shells = nested(chance, within);
+    let body = all(&shells);
+    // The host with its cavity, the cavity alone, or what lies within.
+    let copied = match chance.count(0, 1 + within) {
+        0 => all(&shells[..2]),
+        1 => shells[1].clone(),
+        _ => all(&shells[2..]),
+    };
+    let by = body.size() * chance.scale(1e-4, 5e-4);
+    let copy = copied.moved(times(chance.direction(), by));
+    let share = chance.from(0.03, 0.2);
+    let damaged =
+        if chance.is(0.5) { body.and(&flip_patch(chance, &copy, share)) } else { flip_patch(chance, &body, share).and(&copy) };
+    let (tolerance, bodies) = (between(&copied, by, &body), 1 + within as u64);
+    Draft::of(damaged, body).within(tolerance).bodies(bodies..=bodies)
+}

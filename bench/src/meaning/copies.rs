@@ -1,13 +1,14 @@
 //! Surfaces that are there twice, the second time a little off.
 
 use super::clearances::joint;
-use super::damage::{flip_patch, patch};
+use super::damage::{flip_patch, lose_some, patch};
 use super::draft::{Draft, Entry};
 use super::mesh::{Mesh, key, minus, plus, times};
 use super::random::Chance;
+use super::shapes::any;
 use super::turned::{drained, shells};
 
-pub(super) const FAMILIES: [Entry; 2] = [
+pub(super) const FAMILIES: [Entry; 5] = [
     ("part-skin-doubled", "10 to 50 % of a hollow solid's skin twice, the copy off by 6e-5 to 1e-3 of the size", true, part_skin),
     (
         "whole-copy-and-flip",
@@ -15,6 +16,19 @@ pub(super) const FAMILIES: [Entry; 2] = [
         true,
         whole_copy,
     ),
+    (
+        "copy-under-skin",
+        "a solid that lost triangles or a face, a copy of it 1e-4 to 1e-3 of the size below its skin",
+        true,
+        under,
+    ),
+    (
+        "copy-under-skin-inside-out",
+        "a solid and a copy 1e-4 to 1e-3 of the size below its skin, both inside out",
+        true,
+        under_turned,
+    ),
+    ("copy-deeper", "either, 1e-3 to 5e-3 below: it may be meant as a thin shell", false, deeper),
 ];
 
 /// Bodies in one another with clearance, shell by shell from the outside: a host and its cavity, and up to two bodies within, of
@@ -95,4 +109,45 @@ fn whole_copy(chance: &mut Chance) -> Draft {
         if chance.is(0.5) { body.and(&flip_patch(chance, &copy, share)) } else { flip_patch(chance, &body, share).and(&copy) };
     let (tolerance, bodies) = (between(&copied, by, &body), 1 + within as u64);
     Draft::of(damaged, body).within(tolerance).bodies(bodies..=bodies)
+}
+
+/// A copy of a solid below its skin, and the solid, which lost something if `is_worn`; both inside out if `is_turned`. What is so near
+/// below is no wall that could be printed, and that both face one way says that it is none.
+fn below(chance: &mut Chance, share: f64, is_worn: bool, is_turned: bool) -> Draft {
+    let body = any(chance);
+    let by = body.size() * share;
+    let normals = body.normals();
+    let copy = body.map(|p| normals.get(&key(p)).map_or(p, |normal| minus(p, times(*normal, by))));
+    let skin = if is_worn { worn(chance, &body) } else { body.clone() };
+    let all = skin.and(&copy);
+    // Where the skin is lost, that of the copy may stand for it.
+    let tolerance = (by * (body.area() - skin.area()) / body.volume()).max(0.01);
+    Draft::of(if is_turned { all.turned() } else { all }, body).within(tolerance)
+}
+
+/// A few triangles are lost, or one of several faces of CAD.
+fn worn(chance: &mut Chance, body: &Mesh) -> Mesh {
+    let part = body.0[chance.count(0, body.0.len() - 1)].part;
+    let left = body.only(|face| face.part != part);
+    if chance.is(0.5) && left.area() > 0.6 * body.area() {
+        return left;
+    }
+    let count = chance.count(1, 5);
+    lose_some(chance, body, count)
+}
+
+fn under(chance: &mut Chance) -> Draft {
+    let share = chance.scale(1e-4, 1e-3);
+    below(chance, share, true, false)
+}
+
+fn under_turned(chance: &mut Chance) -> Draft {
+    let (share, is_worn) = (chance.scale(1e-4, 1e-3), chance.is(0.3));
+    below(chance, share, is_worn, true)
+}
+
+fn deeper(chance: &mut Chance) -> Draft {
+    let (share, is_turned) = (chance.scale(1e-3, 5e-3), chance.is(0.5));
+    let is_worn = !is_turned || chance.is(0.3);
+    below(chance, share, is_worn, is_turned)
 }

@@ -3,7 +3,7 @@
 use super::clearances::joint;
 use super::damage::{flip_patch, lose_some, patch};
 use super::draft::{Draft, Entry};
-use super::mesh::{Mesh, key, minus, plus, times};
+use super::mesh::{Face, Mesh, dot, key, minus, plus, times, unit};
 use super::random::Chance;
 use super::shapes::any;
 use super::turned::{drained, shells};
@@ -111,13 +111,27 @@ fn whole_copy(chance: &mut Chance) -> Draft {
     Draft::of(damaged, body).within(tolerance).bodies(bodies..=bodies)
 }
 
+/// A solid, a copy of it below its skin, and how far below.
+fn shrunk(chance: &mut Chance, share: f64) -> (Mesh, Mesh, f64) {
+    loop {
+        let body = any(chance);
+        let (by, normals) = (body.size() * share, body.normals());
+        let copy = body.map(|p| normals.get(&key(p)).map_or(p, |normal| minus(p, times(*normal, by))));
+        // Not if thin triangles of it fold, or if a corner does not go below each of its triangles.
+        let keeps = |(a, b): (&Face, &Face)| {
+            let is_below = |k: usize| dot(minus(a.p[k], b.p[k]), unit(a.normal())) > 0.1 * by;
+            dot(a.normal(), b.normal()) > 0.5 * dot(a.normal(), a.normal()) && (0..3).all(is_below)
+        };
+        if body.0.iter().zip(&copy.0).all(keeps) {
+            return (body, copy, by);
+        }
+    }
+}
+
 /// A copy of a solid below its skin, and the solid, which lost something if `is_worn`; both inside out if `is_turned`. What is so near
 /// below is no wall that could be printed, and that both face one way says that it is none.
 fn below(chance: &mut Chance, share: f64, is_worn: bool, is_turned: bool) -> Draft {
-    let body = any(chance);
-    let by = body.size() * share;
-    let normals = body.normals();
-    let copy = body.map(|p| normals.get(&key(p)).map_or(p, |normal| minus(p, times(*normal, by))));
+    let (body, copy, by) = shrunk(chance, share);
     let skin = if is_worn { worn(chance, &body) } else { body.clone() };
     let all = skin.and(&copy);
     // Where the skin is lost, that of the copy may stand for it.
@@ -150,4 +164,40 @@ fn deeper(chance: &mut Chance) -> Draft {
     let (share, is_turned) = (chance.scale(1e-3, 5e-3), chance.is(0.5));
     let is_worn = !is_turned || chance.is(0.3);
     below(chance, share, is_worn, is_turned)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_copy_below_the_skin_is_smaller_and_keeps_its_directions() {
+        for seed in 0..40 {
+            let (body, copy, by) = shrunk(&mut Chance::new(seed, 1), 5e-3);
+            let lost = body.volume() - copy.volume();
+            // Less than a layer everywhere, since vertices at edges move aslant.
+            assert!(lost > 0.3 * by * body.area() && lost < 1.05 * by * body.area(), "{seed}: {lost}");
+        }
+    }
+
+    #[test]
+    fn shells_in_one_another_face_out_and_in_by_turns() {
+        for seed in 0..20 {
+            let shells = nested(&mut Chance::new(seed, 1), 2);
+            assert!(shells.len() == 5 || shells.len() == 6);
+            for (k, pair) in shells.windows(2).enumerate() {
+                assert!(pair[0].volume().abs() > 1.05 * pair[1].volume().abs(), "{seed}");
+                assert_eq!(pair[0].volume() > 0.0, k % 2 == 0, "{seed}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_doubled_is_a_tenth_to_a_half() {
+        for seed in 0..20 {
+            let draft = part_skin(&mut Chance::new(seed, 1));
+            let share = draft.damaged.0.len() as f64 / draft.intended.0.len() as f64 - 1.0;
+            assert!(share > 0.05 && share <= 0.51, "{seed}: {share}");
+        }
+    }
 }

@@ -202,15 +202,13 @@ fn beyond_flat(patch: &Mesh) -> f64 {
         for (k, &a) in face.p.iter().enumerate() {
             let b = face.p[(k + 1) % 3];
             if rim.remove(&(key(b), key(a))).is_none() {
-                rim.insert(
-                    (key(a), key(b)),
-                    times(plus(a, b), 0.5 * apart(a, b)).into_iter().chain([apart(a, b)]).collect::<Vec<_>>(),
-                );
+                rim.insert((key(a), key(b)), [a, b]);
             }
         }
     }
-    let sums: [f64; 4] = std::array::from_fn(|k| rim.values().map(|edge| edge[k]).sum());
-    let middle = [sums[0] / sums[3], sums[1] / sums[3], sums[2] / sums[3]];
+    let long: f64 = rim.values().map(|[a, b]| apart(*a, *b)).sum();
+    let sum = rim.values().fold([0.0; 3], |sum, [a, b]| plus(sum, times(plus(*a, *b), 0.5 * apart(*a, *b))));
+    let middle = times(sum, 1.0 / long);
     let solid = |face: &Face| {
         let [a, b, c] = face.p.map(|p| minus(p, middle));
         dot(a, cross(b, c)) / 6.0
@@ -228,5 +226,26 @@ fn across_edges(chance: &mut Chance) -> Draft {
         if is_bent(&lost) && beyond_flat(&lost) > 0.015 * body.volume() {
             return Draft::of(of(false), body).within(0.01).bodies(bodies..=bodies);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a box, a side is flat; a corner's three sides are not, and a straight patch cuts the corner off.
+    #[test]
+    fn what_a_straight_patch_cuts_off() {
+        let cube = cuboid([0.0; 3], [1.0; 3]);
+        let side = cube.only(|face| face.part == 5);
+        assert!(!is_bent(&side) && beyond_flat(&side) < 1e-12);
+        let corner = cube.only(|face| face.part % 2 == 1);
+        assert!(is_bent(&corner) && (beyond_flat(&corner) - 0.5).abs() < 1e-12, "{}", beyond_flat(&corner));
+    }
+
+    #[test]
+    fn a_pocket_is_empty_and_a_step_is_massive() {
+        assert!((stepped([4.0, 4.0, 3.0], 1.0, 2.0).volume() - (48.0 - 8.0)).abs() < 1e-9);
+        assert!((stepped([4.0, 4.0, 3.0], 1.0, -2.0).volume() - (48.0 + 8.0)).abs() < 1e-9);
     }
 }

@@ -278,3 +278,30 @@ fn in_gap(chance: &mut Chance) -> Draft {
     let stray = if chance.is(0.5) { stray.turned() } else { stray };
     Draft::of(body.and(&stray), body).bodies(bodies..=bodies)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::mesh::{cross, dot};
+    use super::*;
+
+    /// Full turns of a closed surface about a point, by solid angles.
+    fn turns(mesh: &Mesh, at: V) -> f64 {
+        let angle = |face: &Face| {
+            let [a, b, c] = face.p.map(|p| unit(minus(p, at)));
+            dot(a, cross(b, c)).atan2(1.0 + dot(a, b) + dot(b, c) + dot(c, a))
+        };
+        mesh.0.iter().map(angle).sum::<f64>() / std::f64::consts::TAU
+    }
+
+    #[test]
+    fn a_patch_in_a_gap_lies_in_no_material() {
+        for seed in 0..60 {
+            let draft = in_gap(&mut Chance::new(seed, 1));
+            let stray = &draft.damaged.0[draft.intended.0.len()..];
+            assert!(!stray.is_empty());
+            for place in stray.iter().flat_map(|face| face.p.into_iter().chain([face.middle()])) {
+                assert!(turns(&draft.intended, place).abs() < 1e-6, "{seed}: {place:?}");
+            }
+        }
+    }
+}

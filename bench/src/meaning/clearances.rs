@@ -19,7 +19,7 @@ pub(super) const FAMILIES: [Entry; 9] = [
 ];
 
 /// A ball on a stem, and the cup around it.
-fn joint(chance: &mut Chance) -> (Mesh, Mesh, f64, f64) {
+pub(super) fn joint(chance: &mut Chance) -> (Mesh, Mesh, f64, f64) {
     let (radius, sides) = (chance.from(5.0, 12.0), 2 * chance.count(9, 16));
     let gap = radius * chance.scale(0.01, 0.06);
     let opening = chance.from(0.1, 0.2);
@@ -37,7 +37,7 @@ fn joint(chance: &mut Chance) -> (Mesh, Mesh, f64, f64) {
 }
 
 /// A pin, and the knuckle around it.
-fn pin(chance: &mut Chance) -> (Mesh, Mesh, f64, f64) {
+pub(super) fn pin(chance: &mut Chance) -> (Mesh, Mesh, f64, f64) {
     let (radius, sides) = (chance.from(2.0, 6.0), 2 * chance.count(8, 18));
     let gap = radius * chance.scale(0.015, 0.1);
     let length = radius * chance.from(2.0, 5.0);

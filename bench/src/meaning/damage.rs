@@ -1,6 +1,8 @@
 //! What goes wrong on the way of a mesh to a file.
 
-use super::mesh::{Face, Mesh, V, minus, plus, times};
+use std::collections::BTreeMap;
+
+use super::mesh::{Face, Mesh, V, key, minus, plus, times};
 use super::random::Chance;
 use super::shapes::apart;
 
@@ -27,6 +29,34 @@ pub(super) fn lose_near(mesh: &Mesh, place: V, radius: f64) -> Mesh {
 /// The middle of any face.
 pub(super) fn somewhere(chance: &mut Chance, mesh: &Mesh) -> V {
     mesh.0[chance.count(0, mesh.0.len() - 1)].middle()
+}
+
+/// So many connected faces about any one, fewer if its shell has no more: whether each face is of them.
+pub(super) fn patch(chance: &mut Chance, mesh: &Mesh, share: f64) -> Vec<bool> {
+    let mut at: BTreeMap<[u64; 3], Vec<usize>> = BTreeMap::new();
+    for (k, face) in mesh.0.iter().enumerate() {
+        face.p.iter().for_each(|&p| at.entry(key(p)).or_default().push(k));
+    }
+    let count = ((mesh.0.len() as f64 * share).round() as usize).max(1);
+    let mut is_of = vec![false; mesh.0.len()];
+    let mut found = vec![chance.count(0, mesh.0.len() - 1)];
+    is_of[found[0]] = true;
+    let mut next = 0;
+    while next < found.len() && found.len() < count {
+        for &k in mesh.0[found[next]].p.iter().flat_map(|&p| &at[&key(p)]) {
+            if found.len() < count && !std::mem::replace(&mut is_of[k], true) {
+                found.push(k);
+            }
+        }
+        next += 1;
+    }
+    is_of
+}
+
+/// A connected patch is turned.
+pub(super) fn flip_patch(chance: &mut Chance, mesh: &Mesh, share: f64) -> Mesh {
+    let is_of = patch(chance, mesh, share);
+    Mesh(mesh.0.iter().zip(is_of).map(|(face, is_of)| if is_of { face.turned() } else { *face }).collect())
 }
 
 /// Each face is turned with this probability.

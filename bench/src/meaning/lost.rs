@@ -1,16 +1,27 @@
 //! Large pieces of the surface are missing.
 
-use super::damage::lose_near;
-use super::draft::{Draft, Entry};
-use super::mesh::{Mesh, V, dot, plus, times};
-use super::random::Chance;
-use super::shapes::{LETTERS, LOWER, UPPER, any, apart, arc, blob, cuboid, letter, regular, revolved, smooth, star, tube};
+use std::collections::BTreeMap;
 
-pub(super) const FAMILIES: [Entry; 10] = [
+use super::clearances::pin;
+use super::damage::{lose_near, patch};
+use super::draft::{Draft, Entry};
+use super::mesh::{Face, Mesh, V, cross, dot, key, minus, plus, times, unit};
+use super::random::Chance;
+use super::shapes::{
+    LETTERS, LOWER, UPPER, any, apart, arc, blob, cuboid, edged, letter, rectangle, regular, revolved, sleeve, smooth, star, tube,
+};
+
+pub(super) const FAMILIES: [Entry; 11] = [
     ("one-face-lost", "a box, prism or cylinder without one of its flat faces", true, one_face),
     ("two-faces-lost", "a box without two adjacent faces", false, two_faces),
     ("corner-lost", "a box without one corner", true, corner),
     ("edge-chipped", "a box without a piece of one edge", true, edge),
+    (
+        "edge-face-lost",
+        "a patch lost across sharp edges (rims, hinges, a box and its lid) that is no flat one",
+        false,
+        across_edges,
+    ),
     ("ends-lost", "a box or prism without top and bottom", true, ends),
     ("tube-ends-lost", "a bent tube or pipe without its ends", true, tube_ends),
     ("plate-both-skins", "a plate that lost both of its skins at one place", false, plate),
@@ -140,6 +151,101 @@ fn scan(chance: &mut Chance) -> Draft {
     let at = extent[0] + (extent[1] - extent[0]) * chance.from(0.1, 0.45);
     // Everything below is pressed flat onto the plane: the bottom is where the form stood.
     let pressed = body.map(|p| if dot(p, to) < at { plus(p, times(to, at - dot(p, to))) } else { p });
-    let is_bottom = |face: &super::mesh::Face| face.p.iter().all(|p| (dot(*p, to) - at).abs() < 1e-9);
+    let is_bottom = |face: &Face| face.p.iter().all(|p| (dot(*p, to) - at).abs() < 1e-9);
     Draft::of(pressed.only(|face| !is_bottom(face)), pressed).within(0.01)
+}
+
+/// A block with a pocket of the given depth in its upper face, or with a step on it.
+fn stepped(size: V, wall: f64, depth: f64) -> Mesh {
+    let ([x, y], z) = ([size[0] / 2.0, size[1] / 2.0], size[2]);
+    let (outer, inner) = (rectangle(2.0 * x, 2.0 * y), rectangle(2.0 * (x - wall), 2.0 * (y - wall)));
+    let block = cuboid([-x, -y, 0.0], [x, y, z]).only(|face| face.part != 5);
+    let ([a, b], low) = (inner.outer[2], z - depth.max(0.0));
+    let step = cuboid([-a, -b, low], [a, b, z + (-depth).max(0.0)]);
+    let step = if depth > 0.0 { step.only(|face| face.part != 5).turned() } else { step.only(|face| face.part != 4) };
+    block.and(&outer.without(&inner).end(z, 0)).and(&step)
+}
+
+/// Bodies with sharp edges.
+fn sharp(chance: &mut Chance) -> (Mesh, u64) {
+    match chance.count(0, 3) {
+        0 => {
+            let (bore, sides) = (chance.from(4.0, 10.0), chance.count(20, 48));
+            let pipe = sleeve(bore, bore + chance.from(0.4, 2.0), 0.0, bore * chance.from(1.0, 8.0), sides);
+            (if chance.is(0.5) { pipe } else { pipe.finer(chance.from(2.0, 5.0)) }, 1)
+        }
+        1 => {
+            let (pin, knuckle, _, _) = pin(chance);
+            (pin.and(&knuckle), 2)
+        }
+        2 => {
+            let (size, wall): (V, f64) = (std::array::from_fn(|_| chance.from(12.0, 30.0)), chance.from(0.8, 2.0));
+            let (open, gap) = (stepped(size, wall, size[2] - wall), chance.from(0.1, 0.4));
+            let lid = stepped([size[0], size[1], wall], wall + gap, -chance.from(1.0, 3.0));
+            let over = lid.map(|[x, y, z]| [x, y, size[2] + gap + wall - z]).turned();
+            (open.and(&over).finer(chance.from(2.0, 30.0)), 2)
+        }
+        _ => (edged(chance), 1),
+    }
+}
+
+/// Whether a patch has two directions that differ by more than 40°.
+fn is_bent(patch: &Mesh) -> bool {
+    let normals: Vec<V> = patch.0.iter().map(|face| unit(face.normal())).collect();
+    normals.iter().any(|normal| dot(*normal, normals[0]) < 0.76)
+}
+
+/// The volume between a patch and what runs straight from its rim to the rim's middle.
+fn beyond_flat(patch: &Mesh) -> f64 {
+    let mut rim = BTreeMap::new();
+    for face in &patch.0 {
+        for (k, &a) in face.p.iter().enumerate() {
+            let b = face.p[(k + 1) % 3];
+            if rim.remove(&(key(b), key(a))).is_none() {
+                rim.insert((key(a), key(b)), [a, b]);
+            }
+        }
+    }
+    let long: f64 = rim.values().map(|[a, b]| apart(*a, *b)).sum();
+    let sum = rim.values().fold([0.0; 3], |sum, [a, b]| plus(sum, times(plus(*a, *b), 0.5 * apart(*a, *b))));
+    let middle = times(sum, 1.0 / long);
+    let solid = |face: &Face| {
+        let [a, b, c] = face.p.map(|p| minus(p, middle));
+        dot(a, cross(b, c)) / 6.0
+    };
+    patch.0.iter().map(solid).sum::<f64>().abs()
+}
+
+fn across_edges(chance: &mut Chance) -> Draft {
+    loop {
+        let (body, bodies) = sharp(chance);
+        let share = chance.from(0.01, 0.12);
+        let is_of = patch(chance, &body, share);
+        let of = |lost| Mesh(body.0.iter().zip(&is_of).filter(|(_, is_of)| **is_of == lost).map(|(face, _)| *face).collect());
+        let lost: Mesh = of(true);
+        if is_bent(&lost) && beyond_flat(&lost) > 0.015 * body.volume() {
+            return Draft::of(of(false), body).within(0.01).bodies(bodies..=bodies);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a box, a side is flat; a corner's three sides are not, and a straight patch cuts the corner off.
+    #[test]
+    fn what_a_straight_patch_cuts_off() {
+        let cube = cuboid([0.0; 3], [1.0; 3]);
+        let side = cube.only(|face| face.part == 5);
+        assert!(!is_bent(&side) && beyond_flat(&side) < 1e-12);
+        let corner = cube.only(|face| face.part % 2 == 1);
+        assert!(is_bent(&corner) && (beyond_flat(&corner) - 0.5).abs() < 1e-12, "{}", beyond_flat(&corner));
+    }
+
+    #[test]
+    fn a_pocket_is_empty_and_a_step_is_massive() {
+        assert!((stepped([4.0, 4.0, 3.0], 1.0, 2.0).volume() - (48.0 - 8.0)).abs() < 1e-9);
+        assert!((stepped([4.0, 4.0, 3.0], 1.0, -2.0).volume() - (48.0 + 8.0)).abs() < 1e-9);
+    }
 }

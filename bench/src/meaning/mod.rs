@@ -8,6 +8,7 @@
 mod cavities;
 mod clearances;
 mod contacts;
+mod copies;
 mod damage;
 mod draft;
 mod ears;
@@ -56,7 +57,7 @@ pub struct Meant {
 
 /// Every family, by group.
 pub fn families() -> impl Iterator<Item = Family> {
-    let groups: [(&'static str, &[Entry]); 8] = [
+    let groups: [(&'static str, &[Entry]); 9] = [
         ("cavities", &cavities::FAMILIES),
         ("shared walls", &contacts::FAMILIES),
         ("clearances", &clearances::FAMILIES),
@@ -64,6 +65,7 @@ pub fn families() -> impl Iterator<Item = Family> {
         ("directions", &turned::FAMILIES),
         ("large losses", &lost::FAMILIES),
         ("sheets and dust", &sheets::FAMILIES),
+        ("copies", &copies::FAMILIES),
         ("ordinary", &ordinary::FAMILIES),
     ];
     groups.into_iter().flat_map(|(group, entries)| {
@@ -121,7 +123,7 @@ fn place(chance: &mut Chance) -> impl Fn(V) -> V + use<> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::judge::{fidelity, judge_triangles};
+    use crate::judge::{fidelity, judge_triangles, volumes};
 
     #[test]
     fn names_are_unique_and_there_are_enough() {
@@ -149,6 +151,8 @@ mod tests {
                 assert_eq!(counts.unbalanced_edges, 0, "{name}: {counts:?}");
                 let own = fidelity(&case.intended, &case.intended);
                 assert!(own.difference < 1e-12 && own.volume > 0.0, "{name}: {own:?}");
+                let bodies = volumes(&case.intended).iter().filter(|volume| **volume > 0.0).count() as u64;
+                assert!(case.bodies.contains(&bodies), "{name}: {bodies} for {:?}", case.bodies);
             }
         }
     }

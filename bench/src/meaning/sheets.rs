@@ -1,12 +1,14 @@
 //! Surfaces that enclose nothing, and specks.
 
-use super::damage::somewhere;
+use super::clearances::{joint, pin};
+use super::damage::{patch, somewhere};
 use super::draft::{Draft, Entry};
 use super::mesh::{Face, Mesh, V, beside, length, minus, plus, times, unit};
 use super::random::{Chance, around};
-use super::shapes::{any, beside_of, cuboid, edged, sphere};
+use super::shapes::{BORE, any, beside_of, cuboid, edged, rectangle, regular, sleeve, sphere, torus};
+use super::turned::shells;
 
-pub(super) const FAMILIES: [Entry; 11] = [
+pub(super) const FAMILIES: [Entry; 12] = [
     ("terrain-beside", "a sheet of terrain beside a body", false, terrain_beside),
     ("folds-beside", "folded sheets beside a body", false, folds_beside),
     ("moebius-beside", "a Möbius strip beside a body", false, moebius_beside),
@@ -17,6 +19,7 @@ pub(super) const FAMILIES: [Entry; 11] = [
     ("spikes", "needles without thickness", false, spikes),
     ("dust", "closed specks beside a body", true, dust),
     ("stray-triangles", "single triangles beside a body", true, strays),
+    ("stray-patch-in-gap", "an open patch in a clearance, a cavity, a bore or a ring, which touches nothing", false, in_gap),
     ("inner-sheets", "sheets within a body, which cannot be seen", true, inner),
 ];
 
@@ -187,4 +190,118 @@ fn inner(chance: &mut Chance) -> Draft {
     let beside = beside_of(&body, &hull, chance.from(1.0, 9.0));
     let all = hull.and(&beside);
     Draft::of(all.and(&sheet), all).bodies(2..=2)
+}
+
+/// A connected piece of a surface.
+fn piece(chance: &mut Chance, surface: &Mesh) -> Mesh {
+    let share = chance.from(0.05, 0.5);
+    let is_of = patch(chance, surface, share);
+    Mesh(surface.0.iter().zip(is_of).filter(|(_, is_of)| *is_of).map(|(face, _)| *face).collect())
+}
+
+/// A flat or waved sheet any way round about a place, which stays within `reach` of it.
+fn loose(chance: &mut Chance, place: V, reach: f64) -> Mesh {
+    let axis = chance.direction();
+    let [x, y] = beside(axis);
+    let (wide, long) = (reach * chance.from(0.3, 1.3), reach * chance.from(0.3, 1.3));
+    let (wave, phase) = (if chance.is(0.5) { 0.0 } else { reach * 0.2 }, chance.from(0.0, 1.0));
+    grid(chance.count(1, 6), |u, v| {
+        let flat = plus(times(x, wide * (u - 0.5)), times(y, long * (v - 0.5)));
+        plus(place, plus(flat, times(axis, wave * around(u + phase).1)))
+    })
+}
+
+/// A ball in its socket, or a pin in its knuckle, and surfaces midway between.
+fn clearance(chance: &mut Chance) -> (Mesh, Mesh) {
+    loop {
+        let is_joint = chance.is(0.5);
+        let (inner, outer, radius, gap) = if is_joint { joint(chance) } else { pin(chance) };
+        let to = (radius + gap / 2.0) / (radius + gap);
+        let [lo, hi] = outer.corners();
+        let (all, wide) = (inner.and(&outer), 1.001 * (radius + gap));
+        let wall = if is_joint {
+            outer.only(|face| face.p.iter().all(|p| length(*p) < wide)).map(|p| times(p, to))
+        } else {
+            let is_within = |p: &V| (p[0] * p[0] + p[1] * p[1]).sqrt() < wide && p[2] > lo[2] && p[2] < hi[2];
+            outer.only(|face| face.p.iter().filter(|p| is_within(p)).count() > 1).map(|[x, y, z]| [x * to, y * to, z])
+        };
+        // Facets of both must leave room between them.
+        if gap > 0.03 * radius && !wall.0.is_empty() {
+            return (all, piece(chance, &wall));
+        }
+    }
+}
+
+/// A ring, a plate with a bore, or a sleeve, and a patch in the hole.
+fn hole(chance: &mut Chance) -> (Mesh, Mesh) {
+    let (sides, bore) = (chance.count(16, 32), chance.from(3.0, 8.0));
+    let high = bore * chance.from(0.5, 4.0);
+    let thick = chance.from(1.0, 4.0);
+    let tube = sleeve(bore, bore + thick, 0.0, high, sides).finer(bore);
+    let (body, height) = match chance.count(0, 2) {
+        0 => (torus(bore + thick, thick, sides, 14), 0.0),
+        1 => {
+            let outline = rectangle(2.0 * bore + chance.from(4.0, 20.0), 2.0 * bore + chance.from(4.0, 20.0));
+            (outline.without(&regular(sides).placed(bore, [0.0; 2])).prism(0.0, high), high / 2.0)
+        }
+        _ => (tube.clone(), high / 2.0),
+    };
+    if height > 0.0 && chance.is(0.5) {
+        let to = chance.from(0.3, 0.95);
+        let wall = tube.only(|face| face.part == BORE).map(|[x, y, z]| [x * to, y * to, height + (z - height) * 0.9]);
+        return (body, piece(chance, &wall));
+    }
+    let stray = loose(chance, [0.0, 0.0, height], 0.9 * bore);
+    (body, stray)
+}
+
+fn in_gap(chance: &mut Chance) -> Draft {
+    let (body, stray, bodies) = match chance.count(0, 2) {
+        0 => {
+            let (body, stray) = clearance(chance);
+            (body, stray, 2)
+        }
+        1 => {
+            let (outer, inner) = shells(chance);
+            let [lo, hi] = inner.corners();
+            let (middle, to) = (times(plus(lo, hi), 0.5), chance.from(0.2, 0.9));
+            let reach = (0..3).map(|k| hi[k] - lo[k]).fold(f64::INFINITY, f64::min) / 2.0;
+            let smaller = inner.map(|p| plus(middle, times(minus(p, middle), to)));
+            let stray = if chance.is(0.5) { piece(chance, &smaller) } else { loose(chance, middle, 0.9 * reach) };
+            (outer.and(&inner.turned()), stray, 1)
+        }
+        _ => {
+            let (body, stray) = hole(chance);
+            (body, stray, 1)
+        }
+    };
+    let stray = if chance.is(0.5) { stray.turned() } else { stray };
+    Draft::of(body.and(&stray), body).bodies(bodies..=bodies)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::mesh::{cross, dot};
+    use super::*;
+
+    /// Full turns of a closed surface about a point, by solid angles.
+    fn turns(mesh: &Mesh, at: V) -> f64 {
+        let angle = |face: &Face| {
+            let [a, b, c] = face.p.map(|p| unit(minus(p, at)));
+            dot(a, cross(b, c)).atan2(1.0 + dot(a, b) + dot(b, c) + dot(c, a))
+        };
+        mesh.0.iter().map(angle).sum::<f64>() / std::f64::consts::TAU
+    }
+
+    #[test]
+    fn a_patch_in_a_gap_lies_in_no_material() {
+        for seed in 0..60 {
+            let draft = in_gap(&mut Chance::new(seed, 1));
+            let stray = &draft.damaged.0[draft.intended.0.len()..];
+            assert!(!stray.is_empty());
+            for place in stray.iter().flat_map(|face| face.p.into_iter().chain([face.middle()])) {
+                assert!(turns(&draft.intended, place).abs() < 1e-6, "{seed}: {place:?}");
+            }
+        }
+    }
 }

@@ -17,7 +17,7 @@ pub(super) const FAMILIES: [Entry; 7] = [
 ];
 
 /// Two shells of one kind.
-fn shells(chance: &mut Chance) -> (Mesh, Mesh) {
+pub(super) fn shells(chance: &mut Chance) -> (Mesh, Mesh) {
     let sides = chance.count(18, 32);
     if chance.is(0.5) {
         let radius = chance.from(8.0, 30.0);
@@ -30,14 +30,19 @@ fn shells(chance: &mut Chance) -> (Mesh, Mesh) {
     }
 }
 
-fn drain(chance: &mut Chance) -> Draft {
+/// A hollow egg with an opening.
+pub(super) fn drained(chance: &mut Chance) -> Mesh {
     let (radius, sides) = (chance.from(8.0, 18.0), 2 * chance.count(10, 16));
     let wall = radius * chance.from(0.05, 0.15);
     let opening = chance.from(0.03, 0.08);
     let mut profile = arc(radius, 0.0, opening, 0.5, sides / 2);
     profile.extend(arc(radius - wall, 0.0, 0.5, opening, sides / 2));
     let tall = chance.from(0.7, 1.5);
-    let body = revolved(&profile, |_| 0, sides).map(|[x, y, z]| [x, y, tall * z]);
+    revolved(&profile, |_| 0, sides).map(|[x, y, z]| [x, y, tall * z])
+}
+
+fn drain(chance: &mut Chance) -> Draft {
+    let body = drained(chance);
     let share = chance.from(0.3, 0.5);
     let flipped = flip(chance, &body, share);
     Draft::of(lose(chance, &flipped, 0.01), body).within(0.03)

@@ -25,7 +25,8 @@ const MOST_MEETINGS: usize = 1 << 24;
 /// nobody knows what is inside of it, or if too many boxes meet.
 ///
 /// A component in the box of another one may be a cavity in it, so the signed volumes of components whose boxes meet are added up. A component
-/// apart from all others counts by its size, since it may be inside out; so do those that are known to be, by component. O(regions + submesh), and what finding the loops costs.
+/// apart from all others counts by its size, since it may be inside out. Where it is known of closed ones which are, by component, they count as they
+/// are turned: less than nothing, if cavities overlap that are larger together than their body. O(regions + submesh), and what finding the loops costs.
 pub(crate) fn coned_volume(
     survey: &Survey<'_>,
     submesh: &Submesh,
@@ -57,11 +58,13 @@ pub(crate) fn coned_volume(
             unite(&mut parents, component as u32, *other);
         }
     }
-    let mut together = vec![0.0; volumes.len()];
+    let mut together = vec![(0.0, !inverted.is_empty()); volumes.len()];
     for (component, volume) in volumes.into_iter().enumerate() {
-        together[find(&mut parents, component as u32) as usize] += volume;
+        let (sum, is_known) = &mut together[find(&mut parents, component as u32) as usize];
+        *sum += volume;
+        *is_known &= !components.list[component].open;
     }
-    Some(together.into_iter().map(f64::abs).sum())
+    Some(together.into_iter().map(|(sum, is_known)| if is_known { sum } else { f64::abs(sum) }).sum())
 }
 
 /// By directed edge that lacks a triangle, a component that it belongs to.
@@ -141,6 +144,14 @@ mod tests {
             // All of it inside out.
             encloses(&reversed(&[&host[..], &cavity].concat()), 26.0);
         }
+    }
+
+    /// A cavity that is drawn twice is taken off twice; what both have in common is given back when they are made one.
+    #[test]
+    fn cavities_that_overlap_may_be_more_than_the_body() {
+        let cavity = |x: f32| reversed(&cuboid([x, 0.5, 0.5], [x + 5.0, 5.5, 5.5]));
+        let mesh = [cuboid([0.0; 3], [6.0; 3]), cavity(0.25), cavity(0.5)].concat();
+        assert_eq!(volume(&mesh, &[false; 3]), Some(216.0 - 250.0));
     }
 
     #[test]

@@ -82,6 +82,8 @@ pub(crate) struct Enclosed {
     pub(crate) regions: Vec<Region>,
     /// Of that volume, bodies that nothing crosses and that lay wholly in the material of another one: each may have been meant for a cavity.
     pub(crate) filled: f64,
+    /// What copies of shells enclosed that went before it was measured what is meant.
+    pub(crate) copied: f64,
     /// The largest body in the material of others that stays, since nobody knows if it is to go.
     pub(crate) left: Option<Bounds>,
     /// Beyond this box, there is nothing but cavities that poke out.
@@ -189,7 +191,9 @@ fn volume(change: &Change<'_>, profile: &Profile) -> Measured {
     let enclosed = &evidence.enclosed;
     // The volume of an open or incoherent surface depends on the origin, and duplicates count twice.
     let has_volume = before.boundary_edges + before.unbalanced_edges + before.nonmanifold_edges + before.inverted_components == 0;
-    let meant = if has_volume { Some(before.volume) } else { enclosed.meant }.filter(|meant| *meant > 0.0);
+    let meant = if has_volume { Some(before.volume - enclosed.copied) } else { enclosed.meant };
+    // Cavities that overlap count twice as well, so that a body may seem to enclose less than nothing.
+    let meant = meant.filter(|meant| meant.max(meant - enclosed.volume) > 0.0);
     let once = meant.map(|meant| meant - enclosed.volume);
     let share = once.map(|once| if once > 0.0 { (after.volume - once).abs() / once } else { f64::INFINITY });
     measured("volume", share, profile.max_volume_change, |share| {

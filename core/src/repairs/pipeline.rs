@@ -26,6 +26,7 @@ use crate::repairs::holes::sheet_solids;
 use crate::repairs::holes::skirt;
 use crate::repairs::orient::directions;
 use crate::repairs::orient::hollow;
+use crate::repairs::orient::shell_copies;
 use crate::repairs::orient::visibility;
 use crate::repairs::rebuild;
 use crate::repairs::separate::pinch_vertices;
@@ -78,10 +79,12 @@ pub(crate) const ALL: &[Step] = &[
     Do(visibility::REPAIR),
     Do(directions::COHERENT),
     Do(sheet_solids::REPAIR),
+    Do(shell_copies::REPAIR),
     Look(measure_volume),
     Do(skirt::REPAIR),
     Do(fill::REPAIR),
     Do(sheets::REPAIR),
+    Do(shell_copies::OF_CLOSED),
     Do(directions::OUTWARD),
     Do(hollow::REPAIR),
     Look(probe_bodies),

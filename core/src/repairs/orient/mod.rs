@@ -5,5 +5,6 @@ mod groups;
 pub(crate) mod hollow;
 mod inverted;
 mod points;
+pub(crate) mod shell_copies;
 mod shells;
 pub(crate) mod visibility;

@@ -6,6 +6,7 @@ mod closing;
 mod doubts;
 mod judged;
 mod mouth;
+mod splinters;
 mod step_back;
 mod strips;
 mod together;
@@ -114,7 +115,9 @@ pub(crate) fn fill_loops(
         unclosed = closing.balance(work, &mut across);
     }
     balancing += (across.len() - first_balancing) as u64;
-    let judged = closing.judge(survey, work, profile);
+    let mut judged = closing.judge(survey, work, profile);
+    let (submesh, edges) = work.edges();
+    judged.doubts.extend(splinters::doubts(survey, submesh, edges));
     let mut kept = Closed { judged, ..Closed::default() };
     closing.keep_open(work, &mut chains, &mut kept);
     let mut closed = closing.finish(work, kept);

@@ -12,6 +12,8 @@ use crate::topology::survey::Survey;
 const NO_WALL: f64 = 1e-3;
 /// ... and hardly one below this share.
 const THIN: f64 = 5e-3;
+/// A body of less than this share of all volume is a speck, of which nothing is told.
+const SPECK: f64 = 1e-3;
 
 /// Shells that lie closely in a larger one: with its number, and how thick the wall between both is. `outer`, `inner`: which closed pieces may be so.
 /// O(n log n).
@@ -61,7 +63,9 @@ pub(crate) fn thin(survey: &Survey<'_>, pieces: &Components, turned: &[bool]) ->
         if is_turned(p) { -volume } else { volume }
     };
     let closed = |p: &usize| !pieces.list[*p].open;
-    let bodies: Vec<usize> = (0..pieces.list.len()).filter(closed).filter(|p| is_turned(*p) && volume(*p) > 0.0).collect();
+    let all: f64 = (0..pieces.list.len()).filter(closed).map(|p| volume(p).abs()).sum();
+    let is_body = |p: &usize| is_turned(*p) && volume(*p) > SPECK * all;
+    let bodies: Vec<usize> = (0..pieces.list.len()).filter(closed).filter(is_body).collect();
     let cavities: Vec<usize> = (0..pieces.list.len()).filter(closed).filter(|p| volume(*p) < 0.0).collect();
     let mut lines = Vec::new();
     let mut last = None;

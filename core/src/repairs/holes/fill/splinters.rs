@@ -1,0 +1,116 @@
+//! Sheets that patches have closed back on themselves, beside other bodies.
+//!
+//! A patch that stands upright on what it closes, or continues it, is the missing face of a body. One under which the surface folds back makes a
+//! splinter of a sheet, which may have bounded nothing: a piece of surface that lies about in a gap. Whose only body is of that shape, as a flat
+//! pyramid without its base, has nothing else to be.
+
+use glam::DVec3;
+
+use crate::contract::report::RepairName;
+use crate::geometry::distance::place;
+use crate::repairs::stitch::layer::Facet;
+use crate::submesh::components::{Component, Components, Reversed, Through};
+use crate::submesh::edges::Edges;
+use crate::submesh::{Origin, Submesh};
+use crate::topology::survey::Survey;
+use crate::util::ids::NONE;
+
+/// A sheet is closed by patches of at least this share of its area then.
+const WIDE: f64 = 0.25;
+/// Mean cosine between the normal of the patches and those of the surface along their rims: between both there are less than 60°. The patches as a whole:
+/// along a ragged rim, single triangles of theirs continue the surface.
+const FOLDED: f64 = -0.5;
+/// A body of less than this share of all volume has others beside it ...
+const BESIDE: f64 = 0.5;
+/// ... and one of less than this share of all area is a speck.
+const SPECK: f64 = 1e-3;
+
+/// What patches are to a body.
+#[derive(Clone, Copy, Default)]
+struct Closed {
+    /// Twice their area, in the survey's units.
+    area: i128,
+    /// Of them together, as long as twice what can be seen of them from there.
+    normal: DVec3,
+    /// The length of their rims, and the surface's normals along these, by length.
+    length: f64,
+    around: DVec3,
+}
+
+/// Lines on such bodies. O(regions + submesh).
+pub(super) fn doubts(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges) -> Vec<String> {
+    let is_patch = |t: u32| submesh.triangles[t as usize].origin == Origin::Added(RepairName::Fill);
+    if !submesh.living().any(is_patch) {
+        return Vec::new();
+    }
+    let bodies = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::EveryEdge);
+    let mut closed = vec![Closed::default(); bodies.list.len()];
+    for t in submesh.living().filter(|t| is_patch(*t) && bodies.of_triangle[*t as usize] != NONE) {
+        let body = &mut closed[bodies.of_triangle[t as usize] as usize];
+        let [a, b, c] = submesh.points(t).map(place);
+        body.area += survey.measure.triangle(&submesh.points(t)).area;
+        body.normal += (b - a).cross(c - a);
+    }
+    let normal = |t: u32| Facet::of(&submesh.points(t), 0).normal;
+    for edge in edges.iter() {
+        if let [a, b] = edge.uses
+            && is_patch(a.triangle) != is_patch(b.triangle)
+            && let Some(body) = closed.get_mut(bodies.of_triangle[a.triangle as usize] as usize)
+        {
+            let length = submesh.distance(edge.low, edge.high);
+            let of_surface = if is_patch(a.triangle) { b } else { a };
+            body.length += length;
+            body.around += length * normal(of_surface.triangle);
+        }
+    }
+    let all_area: i128 = bodies.list.iter().map(|body| body.extent.area).sum();
+    let all_volume: i128 = bodies.list.iter().map(|body| body.extent.volume.abs()).sum();
+    let share = |part: i128, all: i128| part as f64 / all.max(1) as f64;
+    let is_splinter = |(body, closed): &(&Component, &Closed)| {
+        closed.length > 0.0
+            && share(closed.area, body.extent.area) >= WIDE
+            && closed.around.dot(closed.normal.normalize_or_zero()) <= FOLDED * closed.length
+            && share(body.extent.volume.abs(), all_volume) < BESIDE
+            && share(body.extent.area, all_area) > SPECK
+    };
+    let line = |(body, _): (&Component, &Closed)| {
+        let bounds = body.bounds.normalised();
+        format!(
+            "a sheet was closed back on itself, by a patch that lies close to it, and is a body now: it may have bounded nothing; from {:?} to {:?}",
+            bounds.lo, bounds.hi
+        )
+    };
+    bodies.list.iter().zip(&closed).filter(is_splinter).map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contract::settings::Profile;
+    use crate::repairs::holes::fill::fill;
+    use crate::testing::{Corners, after, cuboid, shifted};
+
+    /// A pyramid of this height on a square of 2 by 2, without its base.
+    fn pyramid(height: f32) -> Vec<Corners> {
+        let base = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 2.0, 0.0], [0.0, 2.0, 0.0]];
+        (0..4).map(|k| [base[k], base[(k + 1) % 4], [1.0, 1.0, height]]).collect()
+    }
+
+    fn lines(mesh: &[Corners]) -> usize {
+        let profile = Profile::default();
+        after(mesh, |d, _| {
+            fill(d, &profile);
+            doubts(&d.survey, &d.submesh, &Edges::of(&d.submesh)).len()
+        })
+        .result
+    }
+
+    #[test]
+    fn a_sheet_closed_back_on_itself_beside_a_body_may_bound_nothing() {
+        let body = || shifted(&cuboid([0.0; 3], [4.0; 3]), [9.0, 0.0, 0.0]);
+        assert_eq!(lines(&[pyramid(0.5), body()].concat()), 1);
+        assert_eq!(lines(&pyramid(0.5)), 0, "the only body");
+        assert_eq!(lines(&[pyramid(4.0), body()].concat()), 0, "it is steep");
+        assert_eq!(lines(&[shifted(&cuboid([0.0; 3], [2.0, 2.0, 0.25])[2..], [0.0; 3]), body()].concat()), 0, "a plate");
+    }
+}

@@ -99,7 +99,7 @@ mod tests {
         let triangles: Vec<Corners> = shells.iter().flat_map(shell).collect();
         let limits = Limits { threads: 1, ..Limits::default() };
         let report = crate::repair_mesh(&Mesh::from_triangles(&triangles).unwrap(), profile, &limits, &Quiet).unwrap().report;
-        (report.outcome, report.after.map_or(f64::NAN, |after| after.volume))
+        (report.outcome, report.after.unwrap_or(report.before).volume)
     }
 
     #[test]

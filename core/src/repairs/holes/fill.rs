@@ -3,6 +3,7 @@
 
 mod across;
 mod closing;
+mod creases;
 mod doubts;
 mod judged;
 mod mouth;

@@ -4,8 +4,10 @@
 //! surface is bent there, and its mouth is wide against its body, much more may be missing (`mouth`).
 
 use glam::DVec3;
+use std::collections::BTreeMap;
 
 use super::closing::{Closing, Judged};
+use super::creases::{self, Mouth};
 use super::mouth;
 use crate::algorithms::triangulate;
 use crate::contract::settings::Profile;
@@ -44,6 +46,10 @@ const END: f64 = 0.5;
 const SADDLE: f64 = 5.0;
 /// Sine of the turn at a corner: a circle of ten facets has none.
 const CORNER: f64 = 0.6;
+/// Edges that go on across a hole, or walls from a mouth to one that faces it, are told if they would change a body by more than this share.
+const GOES_ON: f64 = 0.003;
+/// Mouths of one body that are held against each other, at most.
+const MOST_MOUTHS: usize = 64;
 /// Lines for people, at most.
 const MOST_SAID: usize = 20;
 
@@ -58,6 +64,12 @@ struct Body {
 }
 
 impl Body {
+    /// The one that a triangle is of.
+    fn of(survey: &Survey<'_>, bodies: &Components, triangle: u32, all: f64) -> Self {
+        let extent = bodies.list[bodies.of_triangle[triangle as usize] as usize].extent;
+        Self { area: survey.measure.area(extent), volume: survey.measure.volume(extent), all }
+    }
+
     fn is_detail(&self) -> bool {
         self.volume.abs() < DETAIL * self.all
     }
@@ -77,8 +89,7 @@ impl Closing<'_> {
         for patch in self.placed.iter().filter(is_in) {
             // What was split since is elsewhere.
             let Some(first) = patch.triangles().find(|t| submesh.lives(*t)) else { continue };
-            let extent = bodies.list[bodies.of_triangle[first as usize] as usize].extent;
-            let body = Body { area: survey.measure.area(extent), volume: survey.measure.volume(extent), all };
+            let body = Body::of(survey, &bodies, first, all);
             let doubt = match (patch.planes, patch.rims.as_slice()) {
                 (Some(planes), _) if patch.method == EXTENDED => judged.planes(submesh, patch, planes, body),
                 (_, [rim, islands @ ..]) if islands.is_empty() || patch.method == ISLANDS => {
@@ -89,12 +100,55 @@ impl Closing<'_> {
             };
             judged.doubts.extend(doubt.map(|doubt| format!("{doubt}, at {:?}", submesh.points(first)[0])));
         }
+        judged.doubts.extend(self.gone_on(survey, submesh, &bodies, all));
         let more = judged.doubts.len().saturating_sub(MOST_SAID);
         judged.doubts.truncate(MOST_SAID);
         if more > 0 {
             judged.doubts.push(format!("{more} more patches are guesses like these"));
         }
         judged
+    }
+}
+
+impl Closing<'_> {
+    /// Says where sharp edges may go on across holes that were closed flat, and where walls may go on from a mouth to another one. O(patches), and mouths².
+    fn gone_on(&self, survey: &Survey<'_>, submesh: &Submesh, bodies: &Components, all: f64) -> Vec<String> {
+        let mut doubts = Vec::new();
+        let mut mouths: BTreeMap<u32, Vec<Mouth>> = BTreeMap::new();
+        for patch in self.placed.iter().filter(|patch| patch.count > 0 && !patch.across && !patch.to_be_cut) {
+            let [rim] = patch.rims.as_slice() else { continue };
+            let Some(first) = patch.triangles().find(|t| submesh.lives(*t)) else { continue };
+            let (rim, body) = (self.rim(*rim), Body::of(survey, bodies, first, all));
+            // What a hole may hide is small where it is short.
+            let size = rim.perimeter(submesh).powi(3);
+            if body.is_detail() || size < GOES_ON * body.volume.abs() {
+                continue;
+            }
+            let from = middle_of_length(submesh, rim);
+            let living = patch.triangles().filter(|t| submesh.lives(*t)).map(|t| submesh.triangles[t as usize].v);
+            let straight = if patch.method == EXTENDED { creases::STRAIGHT } else { creases::ARC };
+            let share = creases::beyond(submesh, rim, straight, (under(submesh, living, from), from)).abs() / body.volume.abs();
+            if share > GOES_ON {
+                let (share, at) = (share * 100.0, submesh.points(first)[0]);
+                doubts.push(format!(
+                    "sharp edges end at a hole and may go on across it: {share:.1} % of the body would differ, at {at:?}"
+                ));
+            }
+            let of_body = mouths.entry(bodies.of_triangle[first as usize]).or_default();
+            if of_body.len() < MOST_MOUTHS && goes_on(submesh, rim).abs() <= END {
+                let mouth = Mouth { middle: from, axis: axis(submesh, rim), perimeter: rim.perimeter(submesh) };
+                let others = of_body.iter().map(|other| creases::between(&mouth, other));
+                let share = others.fold(0.0, f64::max) / body.volume.abs();
+                if share > GOES_ON {
+                    let (share, at) = (share * 100.0, submesh.points(first)[0]);
+                    doubts.push(format!(
+                        "two mouths of one body face each other: a piece in between may be missing, {share:.1} % of the body, at {at:?}"
+                    ));
+                }
+                of_body.push(mouth);
+            }
+        }
+        doubts
     }
 }
 
@@ -277,6 +331,14 @@ fn goes_on(submesh: &Submesh, rim: &Loop) -> f64 {
 /// The middle of a loop's vertices.
 fn middle(submesh: &Submesh, rim: &Loop) -> DVec3 {
     rim.vertices.iter().map(|v| submesh.place(*v)).sum::<DVec3>() / rim.vertices.len() as f64
+}
+
+/// The middle of a loop's length.
+fn middle_of_length(submesh: &Submesh, rim: &Loop) -> DVec3 {
+    let n = rim.vertices.len();
+    let ends = |i: usize| [i, (i + 1) % n].map(|i| submesh.place(rim.vertices[i]));
+    let sum: DVec3 = (0..n).map(ends).map(|[a, b]| 0.5 * (a + b) * a.distance(b)).sum();
+    sum / rim.perimeter(submesh).max(f64::MIN_POSITIVE)
 }
 
 /// The directed area of a cap on a loop.

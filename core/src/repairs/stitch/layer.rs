@@ -152,6 +152,16 @@ impl Layer {
         pieces.into_iter().map(|piece| (piece, if is_rim(piece) { Place::Rim } else { Place::Inside })).collect()
     }
 
+    /// How far the nearest surface is, up to a limit.
+    pub(crate) fn distance(&self, p: DVec3, most: f64) -> f64 {
+        let mut found = Vec::new();
+        if let Some(tree) = &self.tree {
+            tree.meeting(&around(&[p], most), &mut found);
+        }
+        let squares = found.iter().map(|f| square_distance(p, self.facets[*f as usize].corners));
+        squares.fold(most * most, f64::min).sqrt()
+    }
+
     /// Does a rim run over the inside of a triangle, facing the same way?
     pub(crate) fn ends_over(&self, facet: &Facet, reach: Reach) -> bool {
         let near = self.rims_near(&around(&facet.corners, reach.on));

@@ -6,10 +6,11 @@
 
 use std::collections::BTreeMap;
 
-use super::pieces::{Pieces, widened};
+use super::pieces::{Member, Pieces, widened};
 use super::{Cut, MOST_CUT, MOST_PAIRS, On};
 use crate::contract::report::RepairName;
 use crate::geometry::boxes::BoxTree;
+use crate::geometry::exact::at;
 use crate::geometry::sums::Bounds;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
@@ -23,7 +24,8 @@ pub(crate) const REPAIR: Repair = Repair {
     name: RepairName::Overlap,
     changes: Changes::Surface,
     run: |cx| {
-        let dropped = drop_copies(cx.survey, &mut cx.work, cx.tolerance);
+        let (dropped, doubts) = drop_copies(cx.survey, &mut cx.work, cx.tolerance);
+        cx.account.doubts.extend(doubts);
         Ok(Done::count(dropped, "triangles of sheets that lay on a body as a whole, and face the same way"))
     },
 };
@@ -37,27 +39,37 @@ const WIDTH: f64 = 0.05;
 /// What is nearly closed has no more than so many times its area on the square of its rims' length: a cube without a side has 3.2.
 const CLOSED: f64 = 4.0;
 
-/// Drops sheets that lie as a whole on a body; returns how many triangles went. O(n log n) in the sheets and the surface near them, which is read if
+/// A copy is told if between it and its body there is more than this share of the body's volume.
+const BETWEEN: f64 = 0.01;
+
+/// Drops sheets that lie as a whole on a body; returns how many triangles went, and what a person must look at. O(n log n) in the sheets and the surface near them, which is read if
 /// there are sheets in a body's box.
-fn drop_copies(survey: &mut Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) -> u64 {
+fn drop_copies(survey: &mut Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) -> (u64, Vec<String>) {
     let (submesh, edges) = work.edges();
     if tolerance.edge_share <= 0.0 || !edges.iter().any(|e| e.is_boundary()) {
-        return 0;
+        return (0, Vec::new());
     }
     let pieces = Pieces::of(survey, submesh, edges, tolerance);
     let sheets = Sheets::of(survey, &pieces);
-    let mut cuts: Vec<Cut> = Vec::new();
+    let (mut cuts, mut doubts): (Vec<Cut>, Vec<String>) = (Vec::new(), Vec::new());
     let mut last = None;
     for [sheet, body] in sheets.ending_on(survey, submesh, &pieces).into_iter().take(MOST_PAIRS) {
         if last != Some(sheet)
-            && let Some(cut) = sheets.copy(survey, submesh, &pieces, [sheet, body])
+            && let Some((cut, between)) = sheets.copy(survey, submesh, &pieces, [sheet, body])
         {
+            let share = between / survey.measure.volume(pieces.list()[body as usize].extent).abs();
+            if share > BETWEEN {
+                let (share, at) = (share * 100.0, pieces.list()[sheet as usize].bounds.lo);
+                doubts.push(format!(
+                    "surface was drawn twice, {share:.1} % of the body's volume apart, from {at:?} on: the drawing that is nearly closed was kept"
+                ));
+            }
             cuts.push(cut);
             last = Some(sheet);
         }
     }
     cuts.iter().for_each(|cut| cut.make(survey, work, tolerance));
-    cuts.iter().map(|cut| cut.triangles.len() as u64).sum()
+    (cuts.iter().map(|cut| cut.triangles.len() as u64).sum(), doubts)
 }
 
 /// Sheets, and the bodies that they may be copies of. By piece.
@@ -130,8 +142,8 @@ impl Sheets {
         counts.into_iter().filter(|([sheet, _], on)| *on == all[*sheet as usize]).map(|(pair, _)| pair).collect()
     }
 
-    /// All of a sheet, if it lies on a body.
-    fn copy(&self, survey: &Survey<'_>, submesh: &Submesh, pieces: &Pieces, pair: [u32; 2]) -> Option<Cut> {
+    /// All of a sheet, if it lies on a body, and about the volume between the two.
+    fn copy(&self, survey: &Survey<'_>, submesh: &Submesh, pieces: &Pieces, pair: [u32; 2]) -> Option<(Cut, f64)> {
         let [sheet, body] = pair;
         let reach = self.reach(pieces, pair);
         let near = widened(&pieces.list()[sheet as usize].bounds, reach);
@@ -140,7 +152,15 @@ impl Sheets {
         let layer = Layer::new(under.iter().map(|m| Facet::of(&m.corners, body)).collect(), Vec::new());
         let on = On { layer: &layer, reach, share: f64::INFINITY };
         let is_copy = triangles.len() <= MOST_CUT && triangles.iter().all(|m| on.covers(&Facet::of(&m.corners, sheet)));
-        is_copy.then_some(Cut { triangles, join: None })
+        if !is_copy {
+            return None;
+        }
+        let between = |m: &Member| {
+            let [a, b, c] = m.corners.map(|p| at(&p));
+            0.5 * (b - a).cross(c - a).length() * layer.distance((a + b + c) / 3.0, reach)
+        };
+        let between = triangles.iter().map(between).sum();
+        Some((Cut { triangles, join: None }, between))
     }
 }
 
@@ -152,7 +172,7 @@ mod tests {
     /// On a box of 8 by 8 by 8, on which z is up.
     fn dropped(body: &[Corners], sheet: &[Corners]) -> u64 {
         let mesh = [body, sheet].concat();
-        after(&mesh, |d, _| drop_copies(&mut d.survey, &mut Work::new(&mut d.submesh), &d.tolerance)).result
+        after(&mesh, |d, _| drop_copies(&mut d.survey, &mut Work::new(&mut d.submesh), &d.tolerance)).result.0
     }
 
     fn body() -> Vec<Corners> {
@@ -185,6 +205,19 @@ mod tests {
         // A strip of a tenth of a unit is not wide against a hundredth.
         let strip: Vec<Corners> = sheet.iter().map(|t| t.map(|[x, y, _]| [x / 40.0, y, 0.01])).collect();
         assert_eq!(dropped(&body(), &strip), 0, "narrow");
+    }
+
+    /// A board of 8 by 8 by 0.5 with a copy of its top 0.01 below: one part in fifty of it.
+    #[test]
+    fn a_copy_far_off_against_its_body_is_told() {
+        let told = |low: f32| {
+            let mesh = [cuboid([0.0, 0.0, low], [8.0, 8.0, 0.0]), shifted(&plate(8, |_, _| true), [0.0, 0.0, -0.01])].concat();
+            after(&mesh, |d, _| drop_copies(&mut d.survey, &mut Work::new(&mut d.submesh), &d.tolerance)).result
+        };
+        let (dropped, doubts) = told(-0.5);
+        assert_eq!((dropped, doubts.len()), (128, 1));
+        assert!(doubts[0].contains("2.0 %"), "{doubts:?}");
+        assert_eq!(told(-8.0), (128, Vec::new()));
     }
 
     #[test]

@@ -2,7 +2,8 @@
 //!
 //! A patch that stands upright on what it closes, or continues it, is the missing face of a body. One under which the surface folds back makes a
 //! splinter of a sheet, which may have bounded nothing: a piece of surface that lies about in a gap. Whose only body is of that shape, as a flat
-//! pyramid without its base, has nothing else to be.
+//! pyramid without its base, has nothing else to be. In the space of another body (in its cavity, its bore, or a gap beside it), a bulge
+//! need not be a body, though a patch may close it: only walls that stand upright on the patch are a box without its lid.
 
 use glam::DVec3;
 
@@ -20,6 +21,10 @@ const WIDE: f64 = 0.25;
 /// Mean cosine between the normal of the patches and those of the surface along their rims: between both there are less than 60°. The patches as a whole:
 /// along a ragged rim, single triangles of theirs continue the surface.
 const FOLDED: f64 = -0.5;
+/// And so far from upright in the space of another body, to either side: 9°.
+const LEANS: f64 = 0.15;
+/// The largest bodies, so many of them, are looked at for the space of others.
+const MOST_HOSTS: usize = 64;
 /// A body of less than this share of all volume has others beside it ...
 const BESIDE: f64 = 0.5;
 /// ... and one of less than this share of all area is a speck.
@@ -66,21 +71,36 @@ pub(super) fn doubts(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges) -> V
     let all_area: i128 = bodies.list.iter().map(|body| body.extent.area).sum();
     let all_volume: i128 = bodies.list.iter().map(|body| body.extent.volume.abs()).sum();
     let share = |part: i128, all: i128| part as f64 / all.max(1) as f64;
-    let is_splinter = |(body, closed): &(&Component, &Closed)| {
+    let is_sheet = |(body, closed): &(&Component, &Closed)| {
         closed.length > 0.0
             && share(closed.area, body.extent.area) >= WIDE
-            && closed.around.dot(closed.normal.normalize_or_zero()) <= FOLDED * closed.length
             && share(body.extent.volume.abs(), all_volume) < BESIDE
             && share(body.extent.area, all_area) > SPECK
     };
-    let line = |(body, _): (&Component, &Closed)| {
-        let bounds = body.bounds.normalised();
-        format!(
-            "a sheet was closed back on itself, by a patch that lies close to it, and is a body now: it may have bounded nothing; from {:?} to {:?}",
-            bounds.lo, bounds.hi
-        )
+    let hosts = largest(&bodies);
+    let is_in_another = |body: &Component| {
+        let bounds = &body.bounds;
+        hosts.iter().any(|host| host.extent.area > body.extent.area && host.bounds.contains(bounds))
     };
-    bodies.list.iter().zip(&closed).filter(is_splinter).map(line).collect()
+    let line = |(body, closed): (&Component, &Closed)| {
+        let (bounds, leans) = (body.bounds.normalised(), closed.around.dot(closed.normal.normalize_or_zero()) / closed.length);
+        let how = match leans {
+            _ if leans <= FOLDED => "back on itself, by a patch that lies close to it,",
+            _ if leans.abs() >= LEANS && is_in_another(body) => "in the space of another body",
+            _ => return None,
+        };
+        let (lo, hi) = (bounds.lo, bounds.hi);
+        Some(format!("a sheet was closed {how} and is a body now: it may have bounded nothing; from {lo:?} to {hi:?}"))
+    };
+    bodies.list.iter().zip(&closed).filter(is_sheet).filter_map(line).collect()
+}
+
+/// The bodies of the largest area.
+fn largest(bodies: &Components) -> Vec<&Component> {
+    let mut all: Vec<&Component> = bodies.list.iter().collect();
+    all.sort_by_key(|body| std::cmp::Reverse(body.extent.area));
+    all.truncate(MOST_HOSTS);
+    all
 }
 
 #[cfg(test)]
@@ -103,6 +123,20 @@ mod tests {
             doubts(&d.survey, &d.submesh, &Edges::of(&d.submesh)).len()
         })
         .result
+    }
+
+    /// A low block that narrows to its top, which is lost: 28 % of its area.
+    #[test]
+    fn a_bulge_in_the_space_of_another_body_may_bound_nothing() {
+        let narrows = |t: &Corners| t.map(|[x, y, z]| if z > 0.0 { [0.2 + 0.8 * x, 0.2 + 0.8 * y, z] } else { [x, y, z] });
+        let block = cuboid([0.0; 3], [2.0, 2.0, 0.3]);
+        let is_top = |t: &Corners| t.iter().all(|p| p[2] > 0.0);
+        let bulge: Vec<Corners> = block.iter().filter(|t| !is_top(t)).map(narrows).collect();
+        let body = |low: f32| cuboid([low; 3], [9.0; 3]);
+        assert_eq!(lines(&[bulge.clone(), body(-9.0)].concat()), 1);
+        assert_eq!(lines(&[bulge, body(3.0)].concat()), 0, "beside the other body");
+        let upright: Vec<Corners> = block.into_iter().filter(|t| !is_top(t)).collect();
+        assert_eq!(lines(&[upright, body(-9.0)].concat()), 0, "a box without its lid");
     }
 
     #[test]

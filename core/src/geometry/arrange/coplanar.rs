@@ -1,7 +1,7 @@
 //! The overlap of two triangles in one plane: the second, clipped by the edges of the first (Sutherland and Hodgman).
 
 use crate::geometry::arrange::flat::turn;
-use crate::geometry::arrange::point::{Corner, Point, on_lines, upright_side};
+use crate::geometry::arrange::point::{Corner, Point, on_lines};
 use crate::geometry::arrange::soup::{Contact, Soup};
 use crate::geometry::exact;
 
@@ -48,7 +48,8 @@ pub(crate) fn dominant_axis(soup: &Soup<'_>, t: usize) -> usize {
 
 /// The part of a polygon that lies to the left of an edge, or on it.
 fn clipped(rest: &[Corner2], edge: &[Corner; 2], axis: usize) -> Vec<Corner2> {
-    let inside: Vec<bool> = rest.iter().map(|c| upright_side(edge, axis, &c.point) <= 0).collect();
+    let ends = edge.each_ref().map(Point::corner);
+    let inside: Vec<bool> = rest.iter().map(|c| turn([&ends[0], &ends[1], &c.point], axis) >= 0).collect();
     let mut out = Vec::with_capacity(rest.len() + 2);
     for (k, from) in rest.iter().enumerate() {
         let next = (k + 1) % rest.len();

@@ -9,6 +9,8 @@ use crate::geometry::arrange::point::{Point, WORDS};
 use crate::geometry::arrange::wide::Wide;
 
 const TWICE: usize = 2 * WORDS;
+/// 2⁻¹⁰⁰: four of such numbers have no bit below 2⁻⁶¹².
+const LEAST: f64 = 1.0 / (1_u128 << 100) as f64;
 type Long = Wide<TWICE>;
 type Longer = Wide<{ 2 * TWICE }>;
 
@@ -34,13 +36,10 @@ pub(crate) struct Flat<'a> {
 
 impl<'a> Flat<'a> {
     pub(crate) fn new(points: Vec<&'a Point>, axis: usize) -> Self {
-        let axes = [(axis + 1) % 3, (axis + 2) % 3];
-        let [x, y] = axes;
-        let seen = |p: &&Point| Seen { x: p.high[x], y: p.high[y], x_low: p.low[x], y_low: p.low[y] };
-        let seen: Vec<Seen> = points.iter().map(seen).collect();
-        let largest = seen.iter().fold(0.0_f64, |m, p| m.max(p.x.abs()).max(p.y.abs()));
-        // 2⁻⁹⁸, for a difference.
-        Self { points, seen, error: largest * (1.0 / (1_u128 << 98) as f64), axis, axes }
+        let axes = others(axis);
+        let seen: Vec<Seen> = points.iter().map(|p| Seen::of(p, axes)).collect();
+        let error = error(&seen);
+        Self { points, seen, error, axis, axes }
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -75,12 +74,7 @@ impl<'a> Flat<'a> {
     /// As [`Flat::turn`]; 0 also if in doubt.
     #[inline(always)]
     pub(crate) fn certain_turn(&self, a: usize, b: usize, c: usize) -> i8 {
-        let (a, b, c) = (&self.seen[a], &self.seen[b], &self.seen[c]);
-        let (ux, uy, vx, vy) = (b.right_of(a), b.above(a), c.right_of(a), c.above(a));
-        let (p, q) = (ux * vy, uy * vx);
-        let lengths = ux.abs() + uy.abs() + vx.abs() + vy.abs() + self.error;
-        let error = (p.abs() + q.abs()) * (1.0 / (1_u64 << 49) as f64) + 2.0 * self.error * lengths;
-        i8::from(p - q > error) - i8::from(q - p > error)
+        certain_turn([&self.seen[a], &self.seen[b], &self.seen[c]], self.error)
     }
 
     /// +1 if d lies inside of the circle through a, b, c, which turn to the left.
@@ -109,6 +103,10 @@ impl<'a> Flat<'a> {
 }
 
 impl Seen {
+    fn of(p: &Point, [x, y]: [usize; 2]) -> Self {
+        Self { x: p.high[x], y: p.high[y], x_low: p.low[x], y_low: p.low[y] }
+    }
+
     /// Differences, good to 2⁻⁵² of themselves and the error.
     #[inline(always)]
     fn right_of(&self, other: &Self) -> f64 {
@@ -130,9 +128,34 @@ fn difference(x: f64, x_low: f64, y: f64, y_low: f64) -> f64 {
     difference + (lost + (x_low - y_low))
 }
 
-/// How three points turn, seen along an axis.
+/// The axes that are seen along one.
+fn others(axis: usize) -> [usize; 2] {
+    [(axis + 1) % 3, (axis + 2) % 3]
+}
+
+/// The error of differences of points, at most: 2⁻⁹⁸ of the largest coordinate.
+fn error(seen: &[Seen]) -> f64 {
+    seen.iter().fold(0.0_f64, |m, p| m.max(p.x.abs()).max(p.y.abs())) * (1.0 / (1_u128 << 98) as f64)
+}
+
+/// How three points turn; 0 also if in doubt.
+#[inline(always)]
+fn certain_turn([a, b, c]: [&Seen; 3], of_difference: f64) -> i8 {
+    let (ux, uy, vx, vy) = (b.right_of(a), b.above(a), c.right_of(a), c.above(a));
+    let (p, q) = (ux * vy, uy * vx);
+    let lengths = ux.abs() + uy.abs() + vx.abs() + vy.abs() + of_difference;
+    let error = (p.abs() + q.abs()) * (1.0 / (1_u64 << 49) as f64) + 2.0 * of_difference * lengths;
+    i8::from(p - q > error) - i8::from(q - p > error)
+}
+
+/// How three points turn, seen along an axis: +1 to the left, 0 if they are on one line.
 pub(crate) fn turn(points: [&Point; 3], axis: usize) -> i8 {
-    Flat::new(points.to_vec(), axis).turn(0, 1, 2)
+    let axes = others(axis);
+    let seen = points.map(|p| Seen::of(p, axes));
+    match certain_turn(seen.each_ref(), error(&seen)) {
+        0 => turn_exactly(points, axes),
+        sign => sign,
+    }
 }
 
 /// A coordinate's difference, times both denominators.
@@ -141,8 +164,24 @@ fn less(a: &Point, b: &Point, k: usize) -> Long {
     p.minus(&q)
 }
 
+/// The coordinates of points that are what they are rounded to: predicates on these are cheaper (Shewchuk, "Adaptive precision floating-point arithmetic
+/// and fast robust geometric predicates", 1997). None is so near to zero that what is lost of a product of four would be.
+fn rounded<const N: usize>(points: [&Point; N], axes: [usize; 2]) -> Option<[robust::Coord<f64>; N]> {
+    let [x, y] = axes;
+    let is_whole = |x: f64| x == 0.0 || x.abs() > LEAST;
+    let is_safe = |p: &&Point| p.exact && is_whole(p.high[x]) && is_whole(p.high[y]);
+    points.iter().all(is_safe).then(|| points.map(|p| robust::Coord { x: p.high[x], y: p.high[y] }))
+}
+
+fn sign(x: f64) -> i8 {
+    i8::from(x > 0.0) - i8::from(x < 0.0)
+}
+
 #[cold]
 fn turn_exactly([a, b, c]: [&Point; 3], axes: [usize; 2]) -> i8 {
+    if let Some([a, b, c]) = rounded([a, b, c], axes) {
+        return sign(robust::orient2d(a, b, c));
+    }
     let ([ux, uy], [vx, vy]) = (axes.map(|k| less(b, a, k)), axes.map(|k| less(c, a, k)));
     let (p, q): (Longer, Longer) = (ux.times(&vy), uy.times(&vx));
     p.minus(&q).sign()
@@ -150,6 +189,9 @@ fn turn_exactly([a, b, c]: [&Point; 3], axes: [usize; 2]) -> i8 {
 
 #[cold]
 fn in_circle_exactly([a, b, c, d]: [&Point; 4], axes: [usize; 2]) -> i8 {
+    if let Some([a, b, c, d]) = rounded([a, b, c, d], axes) {
+        return sign(robust::incircle(a, b, c, d));
+    }
     let rows = [a, b, c].map(|p| {
         let scale: Long = p.part(3).times(&d.part(3));
         let [x, y] = axes.map(|k| less(p, d, k));

@@ -219,7 +219,8 @@ impl Builder<'_> {
             let ([left, low], [_, high]) = (boxes[s][0], boxes[s][1]);
             open.retain(|o| boxes[*o][1][0] >= left);
             for o in &open {
-                if boxes[*o][0][1] <= high && boxes[*o][1][1] >= low && flat.cross(ends(s), ends(*o)) {
+                let meet = segments[*o].ends.iter().any(|end| segments[s].ends.contains(end));
+                if !meet && boxes[*o][0][1] <= high && boxes[*o][1][1] >= low && flat.cross(ends(s), ends(*o)) {
                     out.push([s.min(*o) as u32, s.max(*o) as u32]);
                 }
             }

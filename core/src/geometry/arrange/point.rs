@@ -36,7 +36,19 @@ pub(crate) struct Point {
 
 impl Point {
     pub(crate) fn corner(p: &Corner) -> Self {
-        Self::new(p.map(Int::of), Int::of(1))
+        let high = p.map(|x| x as f64);
+        // A corner's coordinates have 24 bits, and zeros behind them.
+        if high.iter().zip(p).any(|(high, x)| *high as i128 != *x) {
+            return Self::new(p.map(Int::of), Int::of(1));
+        }
+        let mut words = Vec::with_capacity(7);
+        let mut ends = [0; 4];
+        for (x, end) in p.iter().map(|x| x.unsigned_abs()).chain([1]).zip(&mut ends) {
+            words.extend([x as u64, (x >> 64) as u64].into_iter().take(if x >> 64 > 0 { 2 } else { usize::from(x > 0) }));
+            *end = words.len() as u8;
+        }
+        let (words, negative) = (words.into_boxed_slice(), p.map(|x| x < 0));
+        Self { words, ends, negative, high, low: [0.0; 3], exact: true }
     }
 
     fn new(x: [Int; 3], w: Int) -> Self {
@@ -211,11 +223,6 @@ pub(crate) fn on_lines(first: &[Corner; 2], second: &[Corner; 2], axis: usize) -
     on_line(first, &Plane::upright(second, axis))
 }
 
-/// The side of a point by the plane through an edge and along an axis: −1 to the left of the edge, seen from the axis' end.
-pub(crate) fn upright_side(edge: &[Corner; 2], axis: usize, p: &Point) -> i8 {
-    Plane::upright(edge, axis).side(p)
-}
-
 /// Where three planes meet; `None` if that is no single point.
 pub(crate) fn on_planes(a: &Plane, b: &Plane, c: &Plane) -> Option<Point> {
     let parts = [cross(&b.normal, &c.normal), cross(&c.normal, &a.normal), cross(&a.normal, &b.normal)];
@@ -240,6 +247,16 @@ mod tests {
             prop_assert_eq!(high, scaled(x as f64 / w as f64, by as i32));
             prop_assert!(low.abs() <= high.abs() * f64::EPSILON / 2.0);
             prop_assert!(!exact || low == 0.0);
+        }
+    }
+
+    proptest! {
+        /// Corners, and whole numbers that no f64 holds.
+        #[test]
+        fn a_corner_is_a_point_over_one(x in prop::array::uniform3(prop_oneof![Just(0), -(1_i128 << 40)..1 << 40, -(1_i128 << 99)..1 << 99]), by in 0_u32..60) {
+            let x = x.map(|x| x >> by << by);
+            let (short, long) = (Point::corner(&x), Point::new(x.map(Int::of), Int::of(1)));
+            prop_assert_eq!(format!("{short:?}"), format!("{long:?}"));
         }
     }
 

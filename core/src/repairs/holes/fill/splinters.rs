@@ -9,6 +9,7 @@ use glam::DVec3;
 
 use crate::contract::report::RepairName;
 use crate::geometry::distance::place;
+use crate::repairs::shared::pieces::crossing;
 use crate::repairs::stitch::layer::Facet;
 use crate::submesh::components::{Component, Components, Reversed, Through};
 use crate::submesh::edges::Edges;
@@ -44,13 +45,50 @@ struct Closed {
 
 /// Lines on such bodies. O(regions + submesh).
 pub(super) fn doubts(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges) -> Vec<String> {
-    let is_patch = |t: u32| submesh.triangles[t as usize].origin == Origin::Added(RepairName::Fill);
-    if !submesh.living().any(is_patch) {
+    if !submesh.living().any(|t| is_patch(submesh, t)) {
         return Vec::new();
     }
     let bodies = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::EveryEdge);
+    let closed = closed(survey, submesh, edges, &bodies);
+    let all_area: i128 = bodies.list.iter().map(|body| body.extent.area).sum();
+    let all_volume: i128 = bodies.list.iter().map(|body| body.extent.volume.abs()).sum();
+    let share = |part: i128, all: i128| part as f64 / all.max(1) as f64;
+    let is_sheet = |body: &Component, closed: &Closed| {
+        closed.length > 0.0
+            && share(closed.area, body.extent.area) >= WIDE
+            && share(body.extent.volume.abs(), all_volume) < BESIDE
+            && share(body.extent.area, all_area) > SPECK
+    };
+    let sheets: Vec<usize> = (0..closed.len()).filter(|c| is_sheet(&bodies.list[*c], &closed[*c])).collect();
+    if sheets.is_empty() {
+        return Vec::new();
+    }
+    // What crosses another body becomes one with it.
+    let pairs = survey.crossing_pairs.as_deref().unwrap_or_default();
+    let crosses = crossing(survey, submesh, &bodies, pairs.iter().map(|pair| pair.triangles));
+    let hosts = largest(&bodies);
+    let is_in_another = |c: usize, body: &Component| {
+        let bounds = &body.bounds;
+        !crosses[c] && hosts.iter().any(|host| host.extent.area > body.extent.area && host.bounds.contains(bounds))
+    };
+    let line = |c: usize| {
+        let (body, closed) = (&bodies.list[c], &closed[c]);
+        let (bounds, leans) = (body.bounds.normalised(), closed.around.dot(closed.normal.normalize_or_zero()) / closed.length);
+        let how = match leans {
+            _ if leans <= FOLDED => "back on itself, by a patch that lies close to it,",
+            _ if leans.abs() >= LEANS && is_in_another(c, body) => "in the space of another body",
+            _ => return None,
+        };
+        let (lo, hi) = (bounds.lo, bounds.hi);
+        Some(format!("a sheet was closed {how} and is a body now: it may have bounded nothing; from {lo:?} to {hi:?}"))
+    };
+    sheets.into_iter().filter_map(line).collect()
+}
+
+/// What patches are to each body.
+fn closed(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, bodies: &Components) -> Vec<Closed> {
     let mut closed = vec![Closed::default(); bodies.list.len()];
-    for t in submesh.living().filter(|t| is_patch(*t) && bodies.of_triangle[*t as usize] != NONE) {
+    for t in submesh.living().filter(|t| is_patch(submesh, *t) && bodies.of_triangle[*t as usize] != NONE) {
         let body = &mut closed[bodies.of_triangle[t as usize] as usize];
         let [a, b, c] = submesh.points(t).map(place);
         body.area += survey.measure.triangle(&submesh.points(t)).area;
@@ -59,40 +97,20 @@ pub(super) fn doubts(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges) -> V
     let normal = |t: u32| Facet::of(&submesh.points(t), 0).normal;
     for edge in edges.iter() {
         if let [a, b] = edge.uses
-            && is_patch(a.triangle) != is_patch(b.triangle)
+            && is_patch(submesh, a.triangle) != is_patch(submesh, b.triangle)
             && let Some(body) = closed.get_mut(bodies.of_triangle[a.triangle as usize] as usize)
         {
             let length = submesh.distance(edge.low, edge.high);
-            let of_surface = if is_patch(a.triangle) { b } else { a };
+            let of_surface = if is_patch(submesh, a.triangle) { b } else { a };
             body.length += length;
             body.around += length * normal(of_surface.triangle);
         }
     }
-    let all_area: i128 = bodies.list.iter().map(|body| body.extent.area).sum();
-    let all_volume: i128 = bodies.list.iter().map(|body| body.extent.volume.abs()).sum();
-    let share = |part: i128, all: i128| part as f64 / all.max(1) as f64;
-    let is_sheet = |(body, closed): &(&Component, &Closed)| {
-        closed.length > 0.0
-            && share(closed.area, body.extent.area) >= WIDE
-            && share(body.extent.volume.abs(), all_volume) < BESIDE
-            && share(body.extent.area, all_area) > SPECK
-    };
-    let hosts = largest(&bodies);
-    let is_in_another = |body: &Component| {
-        let bounds = &body.bounds;
-        hosts.iter().any(|host| host.extent.area > body.extent.area && host.bounds.contains(bounds))
-    };
-    let line = |(body, closed): (&Component, &Closed)| {
-        let (bounds, leans) = (body.bounds.normalised(), closed.around.dot(closed.normal.normalize_or_zero()) / closed.length);
-        let how = match leans {
-            _ if leans <= FOLDED => "back on itself, by a patch that lies close to it,",
-            _ if leans.abs() >= LEANS && is_in_another(body) => "in the space of another body",
-            _ => return None,
-        };
-        let (lo, hi) = (bounds.lo, bounds.hi);
-        Some(format!("a sheet was closed {how} and is a body now: it may have bounded nothing; from {lo:?} to {hi:?}"))
-    };
-    bodies.list.iter().zip(&closed).filter(is_sheet).filter_map(line).collect()
+    closed
+}
+
+fn is_patch(submesh: &Submesh, t: u32) -> bool {
+    submesh.triangles[t as usize].origin == Origin::Added(RepairName::Fill)
 }
 
 /// The bodies of the largest area.
@@ -134,7 +152,9 @@ mod tests {
         let bulge: Vec<Corners> = block.iter().filter(|t| !is_top(t)).map(narrows).collect();
         let body = |low: f32| cuboid([low; 3], [9.0; 3]);
         assert_eq!(lines(&[bulge.clone(), body(-9.0)].concat()), 1);
-        assert_eq!(lines(&[bulge, body(3.0)].concat()), 0, "beside the other body");
+        assert_eq!(lines(&[bulge.clone(), body(3.0)].concat()), 0, "beside the other body");
+        let wall = cuboid([-9.0, 0.5, -9.0], [9.0, 1.5, 9.0]);
+        assert_eq!(lines(&[bulge, wall].concat()), 0, "it crosses the other one");
         let upright: Vec<Corners> = block.into_iter().filter(|t| !is_top(t)).collect();
         assert_eq!(lines(&[upright, body(-9.0)].concat()), 0, "a box without its lid");
     }

@@ -7,6 +7,7 @@ mod creases;
 mod doubts;
 mod judged;
 mod mouth;
+mod opposite;
 mod splinters;
 mod step_back;
 mod strips;

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use super::closing::{Closing, Judged};
 use super::creases::{self, Mouth};
-use super::mouth;
+use super::{mouth, opposite};
 use crate::algorithms::triangulate;
 use crate::contract::settings::Profile;
 use crate::detect::holes::loops::Loop;
@@ -33,21 +33,21 @@ const WIDE: f64 = 0.05;
 /// A patch that continues the surface explains itself below this share of its body's area.
 const WIDEST: f64 = 0.1;
 /// How much the surface goes on across a hole's rim, at least, for the hole to be one in flat surface.
-const HOLE: f64 = 0.7;
+pub(super) const HOLE: f64 = 0.7;
 /// A way through that is not drilled takes no more than this share of all volume without a word.
 const WAY_THROUGH: f64 = 0.01;
 /// Outlines of what is drilled agree, seen along the axis, as well as circles of ten facets do: as a share of the radius.
-const DRILLED: f64 = 0.05;
+pub(super) const DRILLED: f64 = 0.05;
 /// Points of a rim that are held against the other one, at most.
 const MOST_POINTS: usize = 2048;
 /// How much the surface goes on across a rim, at most, where the whole of it ends: at the end of a tube, a beam or a rib.
-const END: f64 = 0.5;
+pub(super) const END: f64 = 0.5;
 /// A rim that rises and falls by more than so many times its height is ragged; that of a saddle does by 4 times.
 const SADDLE: f64 = 5.0;
 /// Sine of the turn at a corner: a circle of ten facets has none.
 const CORNER: f64 = 0.6;
 /// Edges that go on across a hole, or walls from a mouth to one that faces it, are told if they would change a body by more than this share.
-const GOES_ON: f64 = 0.003;
+pub(super) const GOES_ON: f64 = 0.003;
 /// Mouths of one body that are held against each other, at most.
 const MOST_MOUTHS: usize = 64;
 /// Lines for people, at most.
@@ -101,6 +101,7 @@ impl Closing<'_> {
             judged.doubts.extend(doubt.map(|doubt| format!("{doubt}, at {:?}", submesh.points(first)[0])));
         }
         judged.doubts.extend(self.gone_on(survey, submesh, &bodies, all));
+        judged.doubts.extend(opposite::doubt(self, survey, submesh, &bodies));
         let more = judged.doubts.len().saturating_sub(MOST_SAID);
         judged.doubts.truncate(MOST_SAID);
         if more > 0 {
@@ -286,6 +287,11 @@ fn is_drilled(submesh: &Submesh, rims: [&Loop; 2]) -> bool {
     if !rims.iter().all(|rim| is_round(submesh, rim) && goes_on(submesh, rim) >= HOLE) {
         return false;
     }
+    lies_on(submesh, rims)
+}
+
+/// Does each of two loops lie on the other one, seen along the axis of the first?
+pub(super) fn lies_on(submesh: &Submesh, rims: [&Loop; 2]) -> bool {
     let across = axis(submesh, rims[0]);
     let along = across.normalize_or_zero();
     let reach = DRILLED * (across.length() / std::f64::consts::PI).sqrt();
@@ -320,7 +326,7 @@ fn is_ragged(submesh: &Submesh, rim: &Loop, across: DVec3) -> bool {
 }
 
 /// How much the surface goes on across a rim: 1 where it is a hole in a plane, 0 where walls stand on it.
-fn goes_on(submesh: &Submesh, rim: &Loop) -> f64 {
+pub(super) fn goes_on(submesh: &Submesh, rim: &Loop) -> f64 {
     let n = rim.vertices.len();
     let normal = axis(submesh, rim).normalize_or_zero();
     let along = |i: usize| submesh.distance(rim.vertices[i], rim.vertices[(i + 1) % n]);
@@ -334,7 +340,7 @@ fn middle(submesh: &Submesh, rim: &Loop) -> DVec3 {
 }
 
 /// The middle of a loop's length.
-fn middle_of_length(submesh: &Submesh, rim: &Loop) -> DVec3 {
+pub(super) fn middle_of_length(submesh: &Submesh, rim: &Loop) -> DVec3 {
     let n = rim.vertices.len();
     let ends = |i: usize| [i, (i + 1) % n].map(|i| submesh.place(rim.vertices[i]));
     let sum: DVec3 = (0..n).map(ends).map(|[a, b]| 0.5 * (a + b) * a.distance(b)).sum();
@@ -342,7 +348,7 @@ fn middle_of_length(submesh: &Submesh, rim: &Loop) -> DVec3 {
 }
 
 /// The directed area of a cap on a loop.
-fn axis(submesh: &Submesh, rim: &Loop) -> DVec3 {
+pub(super) fn axis(submesh: &Submesh, rim: &Loop) -> DVec3 {
     triangulate::directed_area(&rim.points(submesh))
 }
 
@@ -352,7 +358,7 @@ fn height(submesh: &Submesh, rim: &Loop, across: DVec3) -> f64 {
 }
 
 /// Has a loop no corner, as what is drilled has none?
-fn is_round(submesh: &Submesh, rim: &Loop) -> bool {
+pub(super) fn is_round(submesh: &Submesh, rim: &Loop) -> bool {
     let n = rim.vertices.len();
     let way = |i: usize| submesh.vector(rim.vertices[i % n], rim.vertices[(i + 1) % n]).normalize_or_zero();
     (0..n).all(|i| way(i).dot(way(i + 1)) > 0.0 && way(i).cross(way(i + 1)).length() < CORNER)

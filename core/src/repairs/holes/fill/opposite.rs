@@ -1,0 +1,139 @@
+//! Holes of one outline that lie opposite each other, and were closed each for itself.
+//!
+//! Where the walls of a bore are lost, a block with two holes is left: plugged, it is another part. Where a pin or a standoff between two faces is lost,
+//! each face has a hole: capped, what was one body is two. The same files come of a block, or of two plates, that lost pieces of their skin. So both ways
+//! are guesses, and the larger they are, the more there is to ask.
+
+use glam::DVec3;
+
+use super::closing::Closing;
+use super::judged::{DRILLED, END, GOES_ON, HOLE, axis, goes_on, is_round, lies_on, middle_of_length};
+use crate::detect::holes::loops::Loop;
+use crate::submesh::Submesh;
+use crate::submesh::components::Components;
+use crate::topology::survey::Survey;
+
+/// The largest holes are looked at, so many of them.
+const MOST_HOLES: usize = 256;
+/// Cosine between a hole's axis and the way to the opposite one.
+const ALONG: f64 = 0.97;
+/// Outlines of one shape differ in length by less than this factor.
+const AS_LONG: f64 = 1.1;
+
+/// A hole that was closed for itself.
+struct Hole<'a> {
+    rim: &'a Loop,
+    middle: DVec3,
+    /// The directed area of a cap.
+    axis: DVec3,
+    perimeter: f64,
+    /// How much the surface goes on across it: 1 in a plane, 0 where walls end.
+    goes_on: f64,
+    /// The volume of its body.
+    body: f64,
+    at: [f32; 3],
+}
+
+/// What to say of holes opposite each other, if what lies between them is more than a small share of their body. O(holes² + outlines).
+pub(super) fn doubt(closing: &Closing<'_>, survey: &Survey<'_>, submesh: &Submesh, bodies: &Components) -> Option<String> {
+    let holes = holes(closing, survey, submesh, bodies);
+    let mut pairs: Vec<(f64, [usize; 2])> = Vec::new();
+    for (i, a) in holes.iter().enumerate() {
+        let opposite = (i + 1..holes.len()).filter(|j| are_opposite(submesh, a, &holes[*j]));
+        pairs.extend(opposite.map(|j| (a.middle.distance(holes[j].middle), [i, j])));
+    }
+    // The nearest first, each hole once.
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut is_taken = vec![false; holes.len()];
+    let (mut share, mut first, mut count) = (0.0, None, 0);
+    for (apart, [i, j]) in pairs {
+        if is_taken[i] || is_taken[j] {
+            continue;
+        }
+        (is_taken[i], is_taken[j]) = (true, true);
+        let [a, b] = [&holes[i], &holes[j]];
+        share += a.axis.length().min(b.axis.length()) * apart / a.body.min(b.body);
+        first.get_or_insert([a.at, b.at]);
+        count += 1;
+    }
+    let [a, b] = first.filter(|_| share > GOES_ON)?;
+    Some(format!(
+        "holes lie opposite each other, {count} × two, and were closed each for itself: {:.1} % of the body lies between them, a way through or a pin that \
+         may have lost its walls, as between {a:?} and {b:?}",
+        share * 100.0
+    ))
+}
+
+/// The largest holes that were closed by a patch each.
+fn holes<'a>(closing: &'a Closing<'_>, survey: &Survey<'_>, submesh: &Submesh, bodies: &Components) -> Vec<Hole<'a>> {
+    let mut holes: Vec<Hole<'a>> = Vec::new();
+    for patch in closing.placed.iter().filter(|patch| patch.count > 0 && !patch.across && !patch.to_be_cut) {
+        let [rim] = patch.rims.as_slice() else { continue };
+        let Some(first) = patch.triangles().find(|t| submesh.lives(*t)) else { continue };
+        let rim = closing.rim(*rim);
+        let body = &bodies.list[bodies.of_triangle[first as usize] as usize];
+        holes.push(Hole {
+            rim,
+            middle: middle_of_length(submesh, rim),
+            axis: axis(submesh, rim),
+            perimeter: rim.perimeter(submesh),
+            goes_on: goes_on(submesh, rim),
+            body: survey.measure.volume(body.extent).abs(),
+            at: submesh.points(first)[0],
+        });
+    }
+    holes.sort_by(|a, b| b.axis.length().total_cmp(&a.axis.length()));
+    holes.truncate(MOST_HOLES);
+    holes
+}
+
+/// Does one of two holes lie in flat surface, and the other one, of the same outline or both of them round, on its axis?
+fn are_opposite(submesh: &Submesh, a: &Hole<'_>, b: &Hole<'_>) -> bool {
+    let way = b.middle - a.middle;
+    let along = way.normalize_or_zero();
+    let is_along = |hole: &Hole<'_>| hole.axis.dot(along).abs() > ALONG * hole.axis.length();
+    if a.goes_on.max(b.goes_on) < HOLE || a.goes_on.min(b.goes_on) < -END || !is_along(a) || !is_along(b) {
+        return false;
+    }
+    let radius = (a.axis.length().min(b.axis.length()) / std::f64::consts::PI).sqrt();
+    let is_coaxial = way.reject_from_normalized(a.axis.normalize_or_zero()).length() < DRILLED * radius;
+    let are_alike = a.perimeter < AS_LONG * b.perimeter && b.perimeter < AS_LONG * a.perimeter;
+    is_coaxial && (is_round(submesh, a.rim) && is_round(submesh, b.rim) || are_alike && lies_on(submesh, [a.rim, b.rim]))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::contract::settings::Profile;
+    use crate::repairs::holes::fill::fill;
+    use crate::testing::{Corners, after, cuboid, plate, reversed, shifted};
+
+    /// What is said of two plates of 8 by 8 with a square hole of `wide` each, `apart`, above and below; `turned`, they face each other.
+    fn said(wide: i32, apart: f32, turned: bool) -> usize {
+        let from = 4 - wide / 2;
+        let holed = plate(8, |x, y| !((from..from + wide).contains(&(x as i32)) && (from..from + wide).contains(&(y as i32))));
+        let skins: Vec<Corners> = if turned {
+            let far = cuboid([0.0, 0.0, -4.0], [8.0, 8.0, 0.0]);
+            let without_top = far.into_iter().filter(|t| !t.iter().all(|p| p[2] == 0.0));
+            let lower: Vec<Corners> = without_top.chain(holed.clone()).collect();
+            let upper = reversed(&lower).into_iter().map(|t| t.map(|[x, y, z]| [x, y, apart - z]));
+            lower.iter().copied().chain(upper).collect()
+        } else {
+            let walls = cuboid([0.0, 0.0, 0.0], [8.0, 8.0, apart]).into_iter();
+            let walls = walls.filter(|t| !(t.iter().all(|p| p[2] == 0.0) || t.iter().all(|p| p[2] == apart)));
+            walls.chain(reversed(&holed)).chain(shifted(&holed, [0.0, 0.0, apart])).collect()
+        };
+        let profile = Profile::default();
+        let doubts = after(&skins, |d, _| fill(d, &profile).judged.doubts).result;
+        doubts.iter().filter(|doubt| doubt.contains("opposite each other")).count()
+    }
+
+    #[test]
+    fn a_bore_without_walls_is_told() {
+        assert_eq!(said(2, 6.0, false), 1, "a deep one is plugged");
+    }
+
+    #[test]
+    fn a_pin_without_walls_is_told() {
+        assert_eq!(said(2, 6.0, true), 1);
+    }
+}

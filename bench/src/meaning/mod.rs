@@ -14,6 +14,7 @@ mod draft;
 mod ears;
 mod lost;
 mod mesh;
+mod opposite;
 mod ordinary;
 mod random;
 mod sewing;
@@ -57,7 +58,7 @@ pub struct Meant {
 
 /// Every family, by group.
 pub fn families() -> impl Iterator<Item = Family> {
-    let groups: [(&'static str, &[Entry]); 9] = [
+    let groups: [(&'static str, &[Entry]); 10] = [
         ("cavities", &cavities::FAMILIES),
         ("shared walls", &contacts::FAMILIES),
         ("clearances", &clearances::FAMILIES),
@@ -66,6 +67,7 @@ pub fn families() -> impl Iterator<Item = Family> {
         ("large losses", &lost::FAMILIES),
         ("sheets and dust", &sheets::FAMILIES),
         ("copies", &copies::FAMILIES),
+        ("lost between", &opposite::FAMILIES),
         ("ordinary", &ordinary::FAMILIES),
     ];
     groups.into_iter().flat_map(|(group, entries)| {

@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::links::Best;
 use super::reach::{Cells, hash};
 use crate::geometry::distance::{Tolerance, place};
 use crate::geometry::position::Position;
@@ -91,6 +90,14 @@ impl Vertex {
     pub(super) fn place(&self) -> DVec3 {
         place(self.at.coordinates())
     }
+}
+
+/// The spoke (an edge seen from one of its ends) that is nearest to one.
+#[derive(Clone, Copy)]
+pub(super) enum Best {
+    Unknown,
+    Nothing,
+    Spoke { number: u32, vertex: u32 },
 }
 
 /// The tables of a chunk, used again for the next one.

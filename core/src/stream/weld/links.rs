@@ -5,7 +5,7 @@
 //! are nearest to each other are one edge that came apart: so vertices find together that lie nearer to others than their own corners do to each other,
 //! since the far ends tell the edges apart.
 
-use super::cluster::{Chunk, Vertex};
+use super::cluster::{Best, Chunk, Vertex};
 use super::reach::CROWD;
 use crate::geometry::distance::place;
 use crate::geometry::position::Position;
@@ -25,14 +25,6 @@ struct Spoke {
     place: SpokePlace,
     /// Is it the edge of a triangle with two corners in one place?
     is_void: bool,
-}
-
-/// The spoke that is nearest to one.
-#[derive(Clone, Copy)]
-pub(super) enum Best {
-    Unknown,
-    Nothing,
-    Spoke { number: u32, vertex: u32 },
 }
 
 impl Chunk {

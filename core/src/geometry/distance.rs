@@ -12,8 +12,9 @@ pub(crate) struct Tolerance {
 }
 
 /// A position in f64.
-pub(crate) fn place(p: [f32; 3]) -> DVec3 {
-    DVec3::from_array(p.map(f64::from))
+#[inline]
+pub(crate) fn place([x, y, z]: [f32; 3]) -> DVec3 {
+    DVec3::new(f64::from(x), f64::from(y), f64::from(z))
 }
 
 /// Distance of two positions, in f64.

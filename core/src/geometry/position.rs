@@ -18,6 +18,8 @@ use crate::io::record::{self, Point, Record};
 pub(crate) struct Position(Point);
 
 impl Position {
+    pub(crate) const ORIGIN: Self = Self([0.0; 3]);
+
     /// The position at these coordinates, which are finite.
     #[inline]
     pub(crate) fn of(p: Point) -> Self {
@@ -37,15 +39,9 @@ impl Position {
         (p.map(f64::from) == place && p.iter().all(|x| x.is_finite())).then(|| Self::of(p))
     }
 
+    #[inline]
     pub(crate) fn coordinates(self) -> Point {
         self.0
-    }
-
-    /// One number for a table: equal and ordered as the positions are.
-    #[inline]
-    pub(crate) fn key(self) -> u128 {
-        let [x, y, z] = self.bits().map(u128::from);
-        x << 64 | y << 32 | z
     }
 
     #[inline]
@@ -101,7 +97,7 @@ pub(crate) fn corners(record: &Record) -> [Point; 3] {
 #[inline(always)]
 #[expect(clippy::disallowed_methods, reason = "the one place where coordinates become bits")]
 pub(crate) fn bits(p: Point) -> [u32; 3] {
-    p.map(f32::to_bits)
+    [p[0].to_bits(), p[1].to_bits(), p[2].to_bits()]
 }
 
 #[cfg(test)]

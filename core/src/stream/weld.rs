@@ -3,11 +3,13 @@
 //! **In:** records, a tolerance. **Out:** a copy of the records in which boundary vertices that lie together are one, and what was found on the way.
 //!
 //! Boundary vertices within reach of each other hang together; the reach of a vertex is the tolerance, but no more than a share of the shortest edge
-//! at it. What hangs together becomes one vertex: the one with most triangles, the smallest of equals. What is wider than four tolerances, would take
-//! two corners of one triangle, or stands where too many vertices crowd stays as it is: later repairs look at it.
+//! of the triangles at it. Where that is less, vertices also hang together across edges that came apart, and so do those that crowd in a small cell (`links`). What hangs
+//! together becomes one vertex: the one with most triangles, the smallest of equals. What is wider than four tolerances is split by place, and becomes
+//! one vertex in each cell (`targets`). So a triangle that is smaller than what its corners were moved by loses its area, and its neighbours meet.
 //!
 //! A chunk sees all triangles within a margin around its cell, so that it knows whatever hangs together with a position at home in it, or that this
-//! is too wide. It moves the corners at home in it, and no others: each corner of the file is moved once, and the result does not depend on the chunks.
+//! is too wide, and the same of all that lies in the cells of such positions. It moves the corners at home in it, and no others: each corner of the file
+//! is moved once, and the result does not depend on the chunks.
 
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
@@ -24,18 +26,22 @@ use crate::io::record::{self, Record};
 use crate::io::write_behind;
 use crate::stream::members::Members;
 use crate::stream::plan::Plan;
+use crate::util::parallel;
 
 mod cluster;
+mod links;
 mod look;
 mod reach;
+mod targets;
 
 pub(crate) use cluster::Counts;
 use cluster::{Chunk, Move};
 pub(crate) use look::{bounds, shares_nothing};
 use reach::{CELL, WIDEST};
 
-/// A chunk knows so many tolerances around its cell: whatever hangs together with its own, one step more, and the cells that it touches.
-const MARGIN: f64 = WIDEST + 1.0 + 2.0 * CELL;
+/// A chunk knows so many tolerances around its cell: the cells that it touches (by their diagonal), whatever hangs together with what is there, and how:
+/// one step more, one on to what is as near to that, and some to spare.
+const MARGIN: f64 = 1.75 * CELL + WIDEST + 2.0 + 0.5;
 
 /// Records after the weld, and what was done.
 #[derive(Debug)]
@@ -82,7 +88,7 @@ pub(crate) fn weld(
     counts.triangles = all - members.nonfinite.iter().map(|(_, count)| u64::from(*count)).sum::<u64>();
     let copy = copy.into_inner().unwrap_or_else(PoisonError::into_inner);
     let welded = copy.make_read_only().map_err(Error::io(&limits.spool_folder(), "mapping"))?;
-    counts.moved_triangles = records.iter().zip(welded.as_chunks().0).filter(|(before, now)| before != now).count() as u64;
+    counts.moved_triangles = how_many_differ(records, welded.as_chunks().0, limits.threads);
     Ok(Welded { records: welded, counts })
 }
 
@@ -99,6 +105,15 @@ fn copied(path: &Path, records: &[Record], guide: &Guide<'_>, limits: &Limits) -
     behind.finish().map_err(spooling())?;
     // SAFETY: the file has no name and this is its only handle: nobody else changes or truncates it.
     unsafe { MmapMut::map_mut(&file) }.map_err(Error::io(&folder, "mapping"))
+}
+
+/// How many records are not what they were.
+fn how_many_differ(before: &[Record], now: &[Record], threads: usize) -> u64 {
+    const PIECE: usize = 1 << 15;
+    let differ =
+        |(before, now): (&[Record], &[Record])| before.iter().zip(now).filter(|(before, now)| before != now).count() as u64;
+    let pieces: Vec<_> = before.chunks(PIECE).zip(now.chunks(PIECE)).collect();
+    parallel::map(threads, pieces.len(), |i| differ(pieces[i])).iter().sum()
 }
 
 /// Puts corners to where they go.

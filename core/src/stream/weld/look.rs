@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::reach::{cell_of, cells_near};
-
+use super::reach::Cells;
 use crate::geometry::distance::{Tolerance, place};
 use crate::geometry::position::Position;
 use crate::geometry::sums::Bounds;
@@ -98,18 +97,22 @@ impl Seen {
         corners.sort_unstable();
         corners.dedup();
         self.corners += corners.len();
+        let cells = Cells::new(weld);
         let mut alone: BTreeMap<[i64; 3], Vec<Position>> = BTreeMap::new();
         for group in corners.chunk_by(|a, b| a.0 == b.0) {
             match group {
-                [(p, _)] => alone.entry(cell_of(place(p.coordinates()), weld)).or_default().push(*p),
+                [(p, _)] => alone.entry(cells.of(place(p.coordinates()))).or_default().push(*p),
                 _ => self.shared += group.len(),
             }
         }
         let is_near = |p: &&Position| {
             let here = place(p.coordinates());
             let others = |cell| alone.get(&cell).into_iter().flatten();
-            cells_near(here, weld, weld)
-                .any(|cell| others(cell).any(|q| q != *p && here.distance(place(q.coordinates())) <= weld))
+            let mut is_near = false;
+            cells.near(here, weld, |cell| {
+                is_near |= others(cell).any(|q| q != *p && here.distance(place(q.coordinates())) <= weld)
+            });
+            is_near
         };
         self.near += alone.values().flatten().filter(is_near).count();
     }

@@ -6,7 +6,8 @@ use std::path::Path;
 use glam::DVec3;
 use proptest::prelude::*;
 
-use super::{Counts, WIDEST, look, weld};
+use super::reach::{CROWD, FINER};
+use super::{CELL, Counts, WIDEST, look, weld};
 use crate::contract::progress::Quiet;
 use crate::contract::settings::{Limits, Spill};
 use crate::geometry::distance::{Tolerance, place};
@@ -51,11 +52,86 @@ fn reaches(triangles: &[[Point; 3]], stars: &Stars, reach: Tolerance) -> BTreeMa
                 *uses.entry(other).or_default() += 1;
                 shortest = shortest.min(at(v).distance(at(&other)));
             }
+            shortest = shortest.min(at(&others[0]).distance(at(&others[1])));
         }
         let is_open = uses.values().any(|count| *count == 1);
         (*v, if is_open { reach.weld.min(shortest * reach.edge_share) } else { 0.0 })
     };
     stars.iter().map(of).collect()
+}
+
+/// The cell of a place, of so many to a tolerance.
+fn cell(v: &Key, a_tolerance: f64, weld: f64) -> [i64; 3] {
+    (at(v) * (1.0 / (CELL * weld)) * (a_tolerance * CELL)).to_array().map(|x| x.floor() as i64)
+}
+
+/// For each member of a crowd the one that stands for it.
+fn crowds(reaches: &BTreeMap<Key, f64>, weld: f64) -> BTreeMap<Key, Key> {
+    let mut cells: BTreeMap<[i64; 3], Vec<Key>> = BTreeMap::new();
+    for (v, _) in reaches.iter().filter(|(_, reach)| **reach > 0.0) {
+        cells.entry(cell(v, FINER / CELL, weld)).or_default().push(*v);
+    }
+    let crowds = cells.into_values().filter(|all| all.len() > CROWD);
+    crowds.flat_map(|all| all.clone().into_iter().map(move |v| (v, all[0]))).collect()
+}
+
+/// Which spokes continue each other: pairs of vertices.
+fn along_edges(
+    triangles: &[[Point; 3]],
+    reaches: &BTreeMap<Key, f64>,
+    is_alone: impl Fn(&Key) -> bool,
+    weld: f64,
+) -> Vec<[Key; 2]> {
+    // Near end, far end, does it lead there, triangle.
+    let mut spokes: Vec<(Key, Key, bool, usize)> = Vec::new();
+    for (t, corners) in triangles.iter().enumerate() {
+        let c = corners.map(key);
+        if c[0] != c[1] && c[1] != c[2] && c[2] != c[0] {
+            spokes.extend((0..3).flat_map(|k| [(c[k], c[(k + 1) % 3], true, t), (c[k], c[(k + 2) % 3], false, t)]));
+        }
+    }
+    spokes.retain(|spoke| reaches[&spoke.0] > 0.0 && is_alone(&spoke.0));
+    spokes.sort_unstable();
+    let nearest = |a: &(Key, Key, bool, usize)| {
+        let apart = |b: &(Key, Key, bool, usize)| [at(&a.0).distance_squared(at(&b.0)), at(&a.1).distance_squared(at(&b.1))];
+        let cost = |b: &(Key, Key, bool, usize)| if a.2 == b.2 { 2.0 } else { 1.0 } * (apart(b)[0] + apart(b)[1]);
+        let could = spokes.iter().filter(|b| b.0 != a.0 && b.3 != a.3 && apart(b).iter().all(|d| *d <= weld * weld));
+        could.min_by(|b, c| cost(b).total_cmp(&cost(c)))
+    };
+    let is_short = |v: &Key| reaches[v] < weld;
+    let pairs = spokes.iter().filter(|a| is_short(&a.0)).filter_map(|a| {
+        let b = nearest(a)?;
+        let back = nearest(b)?;
+        ((back.0, back.1, back.2) == (a.0, a.1, a.2)).then_some([a.0, b.0])
+    });
+    pairs.collect()
+}
+
+/// Sets of vertices that hang together.
+fn sets(triangles: &[[Point; 3]], reaches: &BTreeMap<Key, f64>, weld: f64) -> Vec<Vec<Key>> {
+    let crowds = crowds(reaches, weld);
+    let is_alone = |v: &Key| !crowds.contains_key(v);
+    let stands = |v: &Key| crowds.get(v) == Some(v);
+    let mut pairs = along_edges(triangles, reaches, is_alone, weld);
+    pairs.extend(crowds.iter().map(|(v, first)| [*v, *first]));
+    let open: Vec<Key> = reaches.iter().filter(|(_, reach)| **reach > 0.0).map(|(v, _)| *v).collect();
+    for (i, a) in open.iter().enumerate() {
+        for b in &open[..i] {
+            let nearest = if stands(a) || stands(b) { weld } else { reaches[a].min(reaches[b]) };
+            let may = [a, b].iter().all(|v| is_alone(v) || stands(v));
+            if may && at(a).distance_squared(at(b)) <= nearest * nearest {
+                pairs.push([*a, *b]);
+            }
+        }
+    }
+    let mut set_of: BTreeMap<Key, Key> = pairs.iter().flatten().map(|v| (*v, *v)).collect();
+    for [a, b] in &pairs {
+        let (a, b) = (set_of[a], set_of[b]);
+        set_of.values_mut().filter(|set| **set == a).for_each(|set| *set = b);
+    }
+    let mut sets: BTreeMap<Key, Vec<Key>> = BTreeMap::new();
+    set_of.iter().for_each(|(v, set)| sets.entry(*set).or_default().push(*v));
+    sets.into_values().collect()
 }
 
 /// Where every vertex goes, by brute force.
@@ -66,33 +142,22 @@ fn oracle(records: &[Record], reach: Tolerance) -> Vec<Record> {
         (0..3).for_each(|k| stars.entry(key(corners[k])).or_default().push((t, k)));
     }
     let reaches = reaches(&triangles, &stars, reach);
-    let vertices: Vec<Key> = stars.keys().copied().collect();
-    let are_near = |a: &Key, b: &Key| {
-        let nearest = reaches[a].min(reaches[b]);
-        nearest > 0.0 && at(a).distance_squared(at(b)) <= nearest * nearest
-    };
-    let (mut target, mut done): (BTreeMap<Key, Key>, BTreeSet<Key>) = Default::default();
-    for v in &vertices {
-        if !done.insert(*v) {
+    let mut target: BTreeMap<Key, Key> = BTreeMap::new();
+    let mut wide: BTreeMap<[i64; 3], Vec<Key>> = BTreeMap::new();
+    for set in sets(&triangles, &reaches, reach.weld) {
+        let (lo, hi) = set.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), v| (lo.min(at(v)), hi.max(at(v))));
+        if hi.distance(lo) > WIDEST * reach.weld {
+            set.iter().for_each(|v| wide.entry(cell(v, 1.0 / CELL, reach.weld)).or_default().push(*v));
             continue;
         }
-        let mut group = vec![*v];
-        let mut next = 0;
-        while next < group.len() {
-            let near: Vec<Key> = vertices.iter().filter(|w| !done.contains(*w) && are_near(&group[next], w)).copied().collect();
-            done.extend(&near);
-            group.extend(near);
-            next += 1;
-        }
-        let (lo, hi) = group.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), v| (lo.min(at(v)), hi.max(at(v))));
-        let has_two = triangles.iter().any(|t| {
-            let own: BTreeSet<Key> = t.iter().map(|p| key(*p)).filter(|v| group.contains(v)).collect();
-            own.len() > 1
-        });
-        if hi.distance(lo) <= WIDEST * reach.weld && !has_two {
-            let chosen = group.iter().min_by_key(|v| (std::cmp::Reverse(stars[*v].len()), **v)).unwrap();
-            target.extend(group.iter().map(|v| (*v, *chosen)));
-        }
+        let chosen = set.iter().min_by_key(|v| (std::cmp::Reverse(stars[*v].len()), **v)).unwrap();
+        target.extend(set.iter().map(|v| (*v, *chosen)));
+    }
+    for (cell, set) in wide {
+        let middle = (DVec3::from_array(cell.map(|x| x as f64)) + 0.5) / (1.0 / (CELL * reach.weld));
+        let away = |v: &Key| at(v).distance_squared(middle);
+        let chosen = set.iter().min_by(|a, b| away(a).total_cmp(&away(b)).then(a.cmp(b))).unwrap();
+        target.extend(set.iter().map(|v| (*v, *chosen)));
     }
     let mut all = records.to_vec();
     for (v, star) in &stars {
@@ -116,6 +181,32 @@ fn plate(side: usize, jitter: f32, stays: impl Fn(u64) -> bool) -> Vec<Record> {
         let [a, b, c, d] = [at(0, 0), at(1, 0), at(1, 1), at(0, 1)];
         for corners in [[a, b, c], [a, c, d]] {
             all.push(record::encode(corners.map(|p| p.map(&mut shaken)), 0));
+        }
+    }
+    all
+}
+
+/// A sphere of radius 1 by degrees of latitude and longitude, poles off the corners of cells, each corner of each triangle moved by up to `jitter` along
+/// each axis: `rows` from pole to pole, or as many of them as `most`.
+fn globe(rows: usize, columns: usize, most: usize, jitter: f32) -> Vec<Record> {
+    let at = |i: usize, j: usize| {
+        let (t, p) =
+            (i as f64 / rows as f64 * std::f64::consts::PI, (j % columns) as f64 / columns as f64 * std::f64::consts::TAU);
+        let flat = if i.is_multiple_of(rows) { 0.0 } else { t.sin() };
+        [0.11 + flat * p.cos(), 0.13 + flat * p.sin(), 0.17 + t.cos()].map(|x| x as f32)
+    };
+    let mut number = 0;
+    let mut shaken = |x: f32| {
+        number += 1;
+        x + jitter * (2.0 * scatter::share(number) as f32 - 1.0)
+    };
+    let mut all = Vec::new();
+    for (i, j) in (0..rows.min(most)).flat_map(|i| (0..columns).map(move |j| (i, j))) {
+        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+        for (corners, is_left_out) in [([a, b, c], i + 1 == rows), ([a, c, d], i == 0)] {
+            if !is_left_out {
+                all.push(record::encode(corners.map(|p| p.map(&mut shaken)), 0));
+            }
         }
     }
     all
@@ -145,6 +236,54 @@ proptest! {
             prop_assert_eq!(counts.triangles, records.len() as u64);
         }
     }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 16, ..ProptestConfig::default() })]
+    /// About a pole: crowds, edges shorter than what corners were moved by, and what is wider than four tolerances.
+    #[test]
+    fn a_pole_as_by_brute_force_for_any_chunks(
+        rows in 10usize..60,
+        columns in 3usize..80,
+        most in 1usize..4,
+        jitter in prop_oneof![1e-5f32..1e-3, 1e-3f32..2e-2],
+        weld_by in prop_oneof![1e-3f64..1e-2, 1e-2f64..0.3],
+        edge_share in prop_oneof![Just(0.25), Just(1.0)],
+        chunk in 1u32..40,
+        threads in 1usize..3,
+    ) {
+        let records = globe(rows, columns, most, jitter);
+        let reach = Tolerance { weld: weld_by, edge_share };
+        let wanted = oracle(&records, reach);
+        for (chunk, spill) in [(chunk, Spill::Never), (7, Spill::Always), (64, Spill::Never), (1 << 20, Spill::Never)] {
+            let (got, _) = welded(&records, reach, &limits(chunk, threads, spill));
+            prop_assert_eq!(&got, &wanted, "chunks of {}", chunk);
+        }
+    }
+}
+
+/// How often each edge is used: there, less back.
+fn balance(records: &[Record]) -> Vec<i32> {
+    let mut uses: BTreeMap<[Key; 2], i32> = BTreeMap::new();
+    for c in records.iter().map(record::corners).map(|c| c.map(key)) {
+        for [a, b] in [[c[0], c[1]], [c[1], c[2]], [c[2], c[0]]].into_iter().filter(|[a, b]| a != b) {
+            *uses.entry([a.min(b), a.max(b)]).or_default() += if a < b { 1 } else { -1 };
+        }
+    }
+    uses.into_values().collect()
+}
+
+/// Corners of one vertex lie up to 0.7 of an edge apart; at the poles more of them than make a crowd.
+#[test]
+fn a_globe_with_poles_finer_than_its_corners_were_moved_by_stays_closed() {
+    let (rows, columns) = (100, 200);
+    let jitter = (std::f64::consts::PI / 100.0).sin() as f32 * std::f32::consts::TAU / 200.0 * 0.2;
+    let records = globe(rows, columns, rows, jitter);
+    let reach = Tolerance { weld: 4.0 * f64::from(jitter), edge_share: 0.25 };
+    let (got, _) = welded(&records, reach, &limits(500, 2, Spill::Never));
+    let places: BTreeSet<Key> = got.iter().flat_map(record::corners).map(key).collect();
+    assert_eq!(places.len(), 2 + (rows - 1) * columns);
+    assert!(balance(&got).iter().all(|n| *n == 0));
 }
 
 #[test]

@@ -15,6 +15,8 @@ use crate::topology::survey::Survey;
 
 /// The largest holes are looked at, so many of them.
 const MOST_HOLES: usize = 256;
+/// And have so many edges at least: a triangle of a grid that is lost lies opposite to many others.
+const LEAST_EDGES: usize = 4;
 /// Cosine between a hole's axis and the way to the opposite one.
 const ALONG: f64 = 0.97;
 /// Outlines of one shape differ in length by less than this factor.
@@ -71,6 +73,9 @@ fn holes<'a>(closing: &'a Closing<'_>, survey: &Survey<'_>, submesh: &Submesh, b
         let [rim] = patch.rims.as_slice() else { continue };
         let Some(first) = patch.triangles().find(|t| submesh.lives(*t)) else { continue };
         let rim = closing.rim(*rim);
+        if rim.vertices.len() < LEAST_EDGES {
+            continue;
+        }
         let body = &bodies.list[bodies.of_triangle[first as usize] as usize];
         holes.push(Hole {
             rim,
@@ -105,35 +110,57 @@ fn are_opposite(submesh: &Submesh, a: &Hole<'_>, b: &Hole<'_>) -> bool {
 mod tests {
     use crate::contract::settings::Profile;
     use crate::repairs::holes::fill::fill;
-    use crate::testing::{Corners, after, cuboid, plate, reversed, shifted};
+    use crate::testing::{Corners, after, plate, reversed, shifted};
 
-    /// What is said of two plates of 8 by 8 with a square hole of `wide` each, `apart`, above and below; `turned`, they face each other.
-    fn said(wide: i32, apart: f32, turned: bool) -> usize {
-        let from = 4 - wide / 2;
-        let holed = plate(8, |x, y| !((from..from + wide).contains(&(x as i32)) && (from..from + wide).contains(&(y as i32))));
-        let skins: Vec<Corners> = if turned {
-            let far = cuboid([0.0, 0.0, -4.0], [8.0, 8.0, 0.0]);
-            let without_top = far.into_iter().filter(|t| !t.iter().all(|p| p[2] == 0.0));
-            let lower: Vec<Corners> = without_top.chain(holed.clone()).collect();
-            let upper = reversed(&lower).into_iter().map(|t| t.map(|[x, y, z]| [x, y, apart - z]));
-            lower.iter().copied().chain(upper).collect()
-        } else {
-            let walls = cuboid([0.0, 0.0, 0.0], [8.0, 8.0, apart]).into_iter();
-            let walls = walls.filter(|t| !(t.iter().all(|p| p[2] == 0.0) || t.iter().all(|p| p[2] == apart)));
-            walls.chain(reversed(&holed)).chain(shifted(&holed, [0.0, 0.0, apart])).collect()
-        };
-        let profile = Profile::default();
-        let doubts = after(&skins, |d, _| fill(d, &profile).judged.doubts).result;
-        doubts.iter().filter(|doubt| doubt.contains("opposite each other")).count()
+    /// A square hole of 2 by 2 in the middle of a plate of 8 by 8.
+    fn is_whole(x: u8, y: u8) -> bool {
+        !(3..5).contains(&x) || !(3..5).contains(&y)
+    }
+
+    /// A block with these two ends of 8 by 8, from z = 0, and walls of unit width.
+    fn block(lower: &[Corners], upper: &[Corners], high: f32) -> Vec<Corners> {
+        let corners = [[0.0, 0.0], [8.0, 0.0], [8.0, 8.0], [0.0, 8.0]];
+        let mut all = [reversed(lower), shifted(upper, [0.0, 0.0, high])].concat();
+        for k in 0..4 {
+            let (from, to): ([f32; 2], [f32; 2]) = (corners[k], corners[(k + 1) % 4]);
+            let at = |i: f32, z: f32| [from[0] + (to[0] - from[0]) * i / 8.0, from[1] + (to[1] - from[1]) * i / 8.0, z];
+            for i in (0..8).map(|i| i as f32) {
+                let [a, b, c, d] = [at(i, 0.0), at(i + 1.0, 0.0), at(i + 1.0, high), at(i, high)];
+                all.extend([[a, b, c], [a, c, d]]);
+            }
+        }
+        all
+    }
+
+    /// Loops that were closed, and how often opposite holes were told.
+    fn told(mesh: &[Corners]) -> (u64, usize) {
+        let closed = after(mesh, |d, _| fill(d, &Profile::default())).result;
+        let is_of_these = |doubt: &&String| doubt.contains("opposite each other");
+        (closed.loops, closed.judged.doubts.iter().filter(is_of_these).count())
     }
 
     #[test]
     fn a_bore_without_walls_is_told() {
-        assert_eq!(said(2, 6.0, false), 1, "a deep one is plugged");
+        let (whole, holed) = (plate(8, |_, _| true), plate(8, is_whole));
+        assert_eq!(told(&block(&holed, &holed, 6.0)), (2, 1));
+        assert_eq!(told(&block(&holed, &whole, 6.0)), (1, 0), "one hole");
+        let beside = plate(8, |x, y| is_whole(x + 1, y));
+        assert_eq!(told(&block(&holed, &beside, 6.0)), (2, 0), "not on the same axis");
+        let smaller = plate(8, |x, y| x != 3 || y != 3);
+        assert_eq!(told(&block(&smaller, &holed, 6.0)), (2, 0), "not of one outline");
     }
 
     #[test]
     fn a_pin_without_walls_is_told() {
-        assert_eq!(said(2, 6.0, true), 1);
+        let (whole, holed) = (plate(8, |_, _| true), plate(8, is_whole));
+        let far = shifted(&block(&holed, &whole, 2.0), [0.0, 0.0, 8.0]);
+        assert_eq!(told(&[block(&whole, &holed, 2.0), far].concat()), (2, 1));
+    }
+
+    #[test]
+    fn lost_triangles_are_none() {
+        let mut one_lost = plate(8, |_, _| true);
+        one_lost.remove(30);
+        assert_eq!(told(&block(&one_lost, &one_lost, 6.0)), (2, 0));
     }
 }

@@ -48,13 +48,27 @@ impl Pair {
         self.backward.is_empty()
     }
 
-    /// Copies in one direction where pairs in both are fewer among what hangs together.
+    /// Copies in one direction where pairs in both are fewer among what hangs together, or where surface is closed with them, so that none is turned.
     pub(crate) fn set_apart(submesh: &Submesh, edges: &Edges, pairs: &mut Vec<Self>) -> Vec<Self> {
-        let mut parents: Vec<u32> = (0..pairs.len() as u32).collect();
+        let [mut parents, mut patches]: [Vec<u32>; 2] = [(); 2].map(|()| (0..pairs.len() as u32).collect());
+        let mut is_unbalanced = vec![false; pairs.len()];
         for around in uses(submesh, edges, pairs).chunk_by(|a, b| a.0 == b.0) {
+            let one_way = |(_, i, _): &&(u32, u32, bool)| pairs[*i as usize].is_one_way();
+            let is_open = edges.get(around[0].0 as usize).is_unbalanced();
             around.iter().for_each(|(_, i, _)| {
                 unite(&mut parents, around[0].1, *i);
+                is_unbalanced[*i as usize] |= is_open;
             });
+            if let Some((_, first, _)) = around.iter().find(one_way) {
+                around.iter().filter(one_way).for_each(|(_, i, _)| {
+                    unite(&mut patches, *first, *i);
+                });
+            }
+        }
+        // Those that have none in it turned are no part of a wall.
+        let mut is_turned = vec![false; pairs.len()];
+        for i in (0..pairs.len() as u32).filter(|i| is_unbalanced[*i as usize]) {
+            is_turned[find(&mut patches, i) as usize] = true;
         }
         // The more decide: a surface that is there twice, of which some triangles are turned, is no wall.
         let mut both_ways = vec![0i64; pairs.len()];
@@ -63,8 +77,8 @@ impl Pair {
         }
         let mut number = 0..;
         let is_apart = |pair: &mut Self| {
-            let of_set = number.next().map_or(0, |i| both_ways[find(&mut parents, i) as usize]);
-            pair.is_one_way() && of_set < 0
+            let Some(i) = number.next() else { return false };
+            pair.is_one_way() && (both_ways[find(&mut parents, i) as usize] < 0 || !is_turned[find(&mut patches, i) as usize])
         };
         pairs.extract_if(.., is_apart).collect()
     }

@@ -153,6 +153,15 @@ fn a_cavity_that_breaks_through_the_wall_opens_it() {
     assert!((got.defects.volume - (1.0 - 0.25 * 0.75)).abs() < 1e-9, "{}", got.defects.volume);
 }
 
+/// One beside two others, which share a face the same way: its wall with them goes, their face stays with both.
+#[test]
+fn a_wall_in_common_beside_a_face_that_is_there_twice() {
+    let large = cuboid([0.0; 3], [1.0, 2.0, 1.0]);
+    let boxes = [cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 1.0]), large, cuboid([0.0, 1.0, 0.0], [1.0, 2.0, 1.0])];
+    let got = resolved(&boxes.concat());
+    assert!(got.verdict.good && (got.defects.volume - 3.0).abs() < 1e-9, "{}: {:?}", got.defects.volume, got.verdict);
+}
+
 /// Boxes on a grid, some inside out, far from the origin or not.
 fn boxes() -> impl Strategy<Value = Vec<([u8; 3], [u8; 3])>> {
     let corner = || prop::array::uniform3(0u8..4);

@@ -8,6 +8,7 @@ mod doubts;
 mod judged;
 mod mouth;
 mod opposite;
+mod rims;
 mod splinters;
 mod step_back;
 mod strips;

@@ -7,7 +7,7 @@
 use glam::DVec3;
 
 use super::closing::Closing;
-use super::judged::{DRILLED, END, GOES_ON, HOLE, axis, goes_on, is_round, lies_on, middle_of_length};
+use super::rims::{DRILLED, END, GOES_ON, HOLE, axis, goes_on, is_round, lies_on, middle_of_length};
 use crate::detect::holes::loops::Loop;
 use crate::submesh::Submesh;
 use crate::submesh::components::Components;

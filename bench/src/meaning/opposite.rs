@@ -32,10 +32,15 @@ fn sections(chance: &mut Chance) -> Vec<Outline> {
         .collect()
 }
 
+/// The plate with holes of these shapes.
+fn holed(sections: &[Outline]) -> Outline {
+    sections.iter().fold(rectangle(40.0, 20.0), |plate, hole| plate.without(hole))
+}
+
 fn bores(chance: &mut Chance) -> Draft {
     let (sections, high) = (sections(chance), chance.from(2.0, 18.0));
-    let plate = sections.iter().fold(rectangle(40.0, 20.0), |plate, hole| plate.without(hole));
-    let sides = rectangle(40.0, 20.0).prism(0.0, high).only(|face| face.part != LOWER && face.part != UPPER);
+    let plate = holed(&sections);
+    let sides = rectangle(40.0, 20.0).walls(0.0, high);
     let damaged = plate.end(0.0, LOWER).turned().and(&plate.end(high, UPPER)).and(&sides);
     Draft::of(damaged, plate.prism(0.0, high)).within(0.01)
 }
@@ -48,7 +53,7 @@ fn footed(plate: &Outline, low: f64, high: f64) -> Mesh {
 fn pins(chance: &mut Chance) -> Draft {
     let (sections, apart) = (sections(chance), chance.from(4.0, 20.0));
     let (thick, over) = (chance.from(1.5, 4.0), chance.from(1.5, 4.0));
-    let plate = sections.iter().fold(rectangle(40.0, 20.0), |plate, hole| plate.without(hole));
+    let plate = holed(&sections);
     let lower = footed(&plate, -thick, 0.0);
     let upper = footed(&plate, -over, 0.0).map(|[x, y, z]| [x, y, apart - z]).turned();
     let damaged = lower.and(&upper);

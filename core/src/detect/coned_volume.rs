@@ -83,7 +83,7 @@ fn components_at_gaps(edges: &Edges, components: &Components) -> HashMap<(Vertex
 }
 
 /// The signed volume between a place and the cone over a loop from its centroid.
-fn cone(place: DVec3, submesh: &Submesh, rim: &[Vertex]) -> f64 {
+pub(crate) fn cone(place: DVec3, submesh: &Submesh, rim: &[Vertex]) -> f64 {
     let points: Vec<DVec3> =
         rim.iter().map(|v| DVec3::from_array(submesh.positions[*v as usize].map(f64::from)) - place).collect();
     let centroid = points.iter().sum::<DVec3>() / points.len() as f64;
@@ -94,8 +94,9 @@ fn cone(place: DVec3, submesh: &Submesh, rim: &[Vertex]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::position::Position;
     use crate::submesh::components::{Reversed, Through};
-    use crate::testing::{Corners, cube, cuboid, diagnose, records, reversed, shifted};
+    use crate::testing::{Corners, cube, cuboid, diagnose, plate, records, reversed, shifted};
 
     fn volume(triangles: &[Corners], inverted: &[bool]) -> Option<f64> {
         let records = records(triangles);
@@ -117,6 +118,17 @@ mod tests {
         let open = &cuboid([0.0; 3], [1.0, 2.0, 3.0])[2..];
         encloses(open, 6.0);
         encloses(&shifted(open, [64.0, -32.0, 8.0]), 6.0);
+    }
+
+    /// A unit square at height 3, seen from the origin.
+    #[test]
+    fn a_cone_over_a_square() {
+        let records = records(&shifted(&plate(1, |_, _| true), [0.0, 0.0, 3.0]));
+        let submesh = diagnose(&records).submesh;
+        let corners = [[0.0, 0.0, 3.0], [1.0, 0.0, 3.0], [1.0, 1.0, 3.0], [0.0, 1.0, 3.0]];
+        let numbers = submesh.by_position();
+        let square = corners.map(|p| numbers[&Position::of(p)]);
+        assert!((cone(DVec3::ZERO, &submesh, &square) - 1.0).abs() < 1e-12);
     }
 
     #[test]

@@ -18,7 +18,8 @@ pub(crate) fn at(p: &Point) -> DVec3 {
     DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))
 }
 
-fn sign(x: f64) -> i8 {
+/// +1, 0 or −1.
+pub(crate) fn sign(x: f64) -> i8 {
     i8::from(x > 0.0) - i8::from(x < 0.0)
 }
 

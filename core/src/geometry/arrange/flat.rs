@@ -7,6 +7,7 @@ use std::cmp::Ordering;
 
 use crate::geometry::arrange::point::{Point, WORDS};
 use crate::geometry::arrange::wide::Wide;
+use crate::geometry::exact::sign;
 
 const TWICE: usize = 2 * WORDS;
 /// 2⁻¹⁰⁰: four of such numbers have no bit below 2⁻⁶¹².
@@ -171,10 +172,6 @@ fn rounded<const N: usize>(points: [&Point; N], axes: [usize; 2]) -> Option<[rob
     let is_whole = |x: f64| x == 0.0 || x.abs() > LEAST;
     let is_safe = |p: &&Point| p.exact && is_whole(p.high[x]) && is_whole(p.high[y]);
     points.iter().all(is_safe).then(|| points.map(|p| robust::Coord { x: p.high[x], y: p.high[y] }))
-}
-
-fn sign(x: f64) -> i8 {
-    i8::from(x > 0.0) - i8::from(x < 0.0)
 }
 
 #[cold]

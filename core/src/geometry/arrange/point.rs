@@ -36,34 +36,31 @@ pub(crate) struct Point {
 
 impl Point {
     pub(crate) fn corner(p: &Corner) -> Self {
-        let high = p.map(|x| x as f64);
+        let (x, one) = (p.map(Int::of), Int::of(1));
         // A corner's coordinates have 24 bits, and zeros behind them.
-        if high.iter().zip(p).any(|(high, x)| *high as i128 != *x) {
-            return Self::new(p.map(Int::of), Int::of(1));
-        }
-        let mut words = Vec::with_capacity(7);
-        let mut ends = [0; 4];
-        for (x, end) in p.iter().map(|x| x.unsigned_abs()).chain([1]).zip(&mut ends) {
-            words.extend([x as u64, (x >> 64) as u64].into_iter().take(if x >> 64 > 0 { 2 } else { usize::from(x > 0) }));
-            *end = words.len() as u8;
-        }
-        let (words, negative) = (words.into_boxed_slice(), p.map(|x| x < 0));
-        Self { words, ends, negative, high, low: [0.0; 3], exact: true }
+        let is_exact = p.iter().all(|x| *x as f64 as i128 == *x);
+        let rounded = if is_exact { p.map(|x| (x as f64, 0.0, true)) } else { x.map(|x| quotient(&x, &one)) };
+        Self::packed(&x, &one, rounded)
     }
 
     fn new(x: [Int; 3], w: Int) -> Self {
         let (x, w) = if w.sign() < 0 { (x.map(Int::negated), w.negated()) } else { (x, w) };
-        let mut words = Vec::with_capacity(4 * WORDS);
-        let all = [&x[0], &x[1], &x[2], &w];
+        Self::packed(&x, &w, x.map(|x| quotient(&x, &w)))
+    }
+
+    /// Numerators over a positive denominator, with their [`quotient`]s.
+    fn packed(x: &[Int; 3], w: &Int, rounded: [(f64, f64, bool); 3]) -> Self {
+        let all = [&x[0], &x[1], &x[2], w];
+        // Of just this length, so that no other box is needed.
+        let mut words = Vec::with_capacity(all.iter().map(|part| part.words().len()).sum());
         let ends = all.map(|part| {
             words.extend_from_slice(part.words());
             words.len() as u8
         });
-        let rounded = x.map(|x| quotient(&x, &w));
         Self {
             words: words.into_boxed_slice(),
             ends,
-            negative: x.map(|x| x.sign() < 0),
+            negative: x.each_ref().map(|x| x.sign() < 0),
             high: rounded.map(|r| r.0),
             low: rounded.map(|r| r.1),
             exact: rounded.iter().all(|r| r.2),

@@ -65,7 +65,7 @@ impl Pair {
                 });
             }
         }
-        // Those that have none in it turned are no part of a wall.
+        // A patch of copies that closes with what is around has no turned triangle, and is no part of a wall.
         let mut is_turned = vec![false; pairs.len()];
         for i in (0..pairs.len() as u32).filter(|i| is_unbalanced[*i as usize]) {
             is_turned[find(&mut patches, i) as usize] = true;

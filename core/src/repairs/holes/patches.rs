@@ -57,6 +57,16 @@ impl Placed {
         self.first..self.first + self.count
     }
 
+    /// Its triangles that are left: those that were split since are elsewhere.
+    pub(crate) fn living<'s>(&self, submesh: &'s Submesh) -> impl Iterator<Item = u32> + use<'s> {
+        self.triangles().filter(|t| submesh.lives(*t))
+    }
+
+    /// Is it in, and crosses nothing?
+    pub(crate) fn is_in(&self) -> bool {
+        self.count > 0 && !self.across && !self.to_be_cut
+    }
+
     pub(crate) fn holds(&self, t: u32) -> bool {
         (self.first..self.first + self.count).contains(&t)
     }

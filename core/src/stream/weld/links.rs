@@ -16,7 +16,7 @@ const ALONE: u8 = 0;
 const IN_CROWD: u8 = 1;
 const STANDS_FOR_CROWD: u8 = 2;
 
-/// What tells spokes apart, and puts them in order: the end it is seen from, the far end, and whether it leads there in its triangle.
+/// The key that tells spokes apart, and puts them in order: the end it is seen from, the far end, and whether it leads there in its triangle.
 type SpokePlace = (Position, Position, bool);
 
 /// An edge of a triangle, seen from one of its ends.

@@ -48,7 +48,7 @@ impl Chunk {
         self.vertices[vertex as usize].at
     }
 
-    /// What is too wide becomes one vertex in each cell: the one nearest to its middle, the smallest of equals.
+    /// A group that is too wide becomes one vertex in each cell: the one nearest to its middle, the smallest of equals.
     fn move_wide(&mut self, wide: &mut [([i64; 3], u32)], cell: HomeBox, counts: &mut Counts) {
         wide.sort_unstable();
         for group in wide.chunk_by(|a, b| a.0 == b.0) {

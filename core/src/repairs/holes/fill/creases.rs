@@ -1,11 +1,11 @@
 //! Sharp edges that end at a hole: may they go on across it?
 //!
 //! A patch over a hole in flat surface is all that is missing. Where a sharp edge of the surface runs into the hole, and comes out of it elsewhere, the
-//! surface was bent on the way: the edge goes on from the one end to the other. Two mouths of one body that face each other, in which walls end, may
-//! be the ends of a piece that is missing in between.
+//! surface was bent on the way: the edge goes on from the one end to the other.
 
 use glam::DVec3;
 
+use crate::detect::coned_volume::cone;
 use crate::detect::holes::loops::Loop;
 use crate::submesh::{Origin, Submesh, Vertex};
 
@@ -21,10 +21,6 @@ const ALIKE: f64 = 0.3;
 const MOST_ENDS: usize = 16;
 /// Triangles around a vertex, at most: of more, it is no end.
 const MOST_AROUND: usize = 64;
-/// Cosine of the angle by which mouths that face each other lean, on average, at least; the rim of one may be ragged, which turns its axis.
-const FACING: f64 = 0.5;
-/// Areas of mouths that face each other differ by a factor below this one.
-const AS_LARGE: f64 = 3.0;
 
 /// A sharp edge that ends at a rim.
 struct End {
@@ -45,28 +41,9 @@ pub(super) fn beyond(submesh: &Submesh, rim: &Loop, straight: f64, (under, from)
     if chords.is_empty() {
         return 0.0;
     }
-    let place = |i: usize| submesh.place(rim.vertices[i]) - from;
-    let flat: f64 = pieces(rim.vertices.len(), &chords).iter().map(|piece| cone(piece.iter().map(|i| place(*i)))).sum();
+    let of_rim = |piece: &Vec<usize>| piece.iter().map(|i| rim.vertices[*i]).collect::<Vec<Vertex>>();
+    let flat: f64 = pieces(rim.vertices.len(), &chords).iter().map(|piece| cone(from, submesh, &of_rim(piece))).sum();
     flat - under
-}
-
-/// A mouth in which the walls of a body end.
-pub(super) struct Mouth {
-    pub(super) middle: DVec3,
-    /// The directed area of a cap, out of the body.
-    pub(super) axis: DVec3,
-    pub(super) perimeter: f64,
-}
-
-/// The volume between two mouths of one body that face each other; 0 if they do not.
-pub(super) fn between(a: &Mouth, b: &Mouth) -> f64 {
-    let way = b.middle - a.middle;
-    let (along, [one, other]) = (way.normalize_or_zero(), [a.axis.length(), b.axis.length()]);
-    let facing = [a.axis.dot(along) / one, -b.axis.dot(along) / other];
-    let is_facing = facing[0].min(facing[1]) > 0.0 && facing[0] + facing[1] > 2.0 * FACING;
-    let are_alike = one < AS_LARGE * other && other < AS_LARGE * one;
-    let is_near = way.length() < a.perimeter.max(b.perimeter);
-    if is_facing && are_alike && is_near { 0.5 * (one + other) * way.length() } else { 0.0 }
 }
 
 /// The sharp edges that end at a rim, in its order; none if it is rough.
@@ -146,13 +123,6 @@ fn pieces(n: usize, chords: &[[usize; 2]]) -> Vec<Vec<usize>> {
     pieces
 }
 
-/// The volume under triangles from a polygon's middle to its edges, as seen from the origin.
-fn cone(polygon: impl ExactSizeIterator<Item = DVec3> + Clone) -> f64 {
-    let middle = polygon.clone().sum::<DVec3>() / polygon.len() as f64;
-    let next = polygon.clone().cycle().skip(1);
-    polygon.zip(next).map(|(a, b)| middle.cross(a).dot(b) / 6.0).sum()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -186,21 +156,5 @@ mod tests {
         let mut got = pieces(8, &[[1, 4], [5, 7]]);
         got.sort();
         assert_eq!(got, [vec![0, 1, 4, 5, 7], vec![1, 2, 3, 4], vec![5, 6, 7]]);
-    }
-
-    /// A unit square at height 3, seen from the origin.
-    #[test]
-    fn a_cone_over_a_square() {
-        let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]| DVec3::new(x, y, 3.0));
-        assert!((cone(square.into_iter()) - 1.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn mouths_that_face_each_other_enclose_what_may_be_missing() {
-        let mouth = |x: f64, way: f64| Mouth { middle: DVec3::X * x, axis: DVec3::X * way, perimeter: 4.0 };
-        assert!((between(&mouth(0.0, 1.0), &mouth(2.0, -1.0)) - 2.0).abs() < 1e-12);
-        assert_eq!(between(&mouth(0.0, -1.0), &mouth(2.0, 1.0)), 0.0, "ends of a tube");
-        assert_eq!(between(&mouth(0.0, 1.0), &mouth(5.0, -1.0)), 0.0, "too far");
-        assert_eq!(between(&mouth(0.0, 1.0), &mouth(2.0, -4.0)), 0.0, "of another size");
     }
 }

@@ -3,13 +3,14 @@
 //! A flat patch on a flat rim is what is missing if the surface runs straight to the rim, as the walls of a box or a tube do. Where the
 //! surface is bent there, and its mouth is wide against its body, much more may be missing (`mouth`).
 
-use glam::DVec3;
 use std::collections::BTreeMap;
 
+use glam::DVec3;
+
 use super::closing::{Closing, Judged};
-use super::creases::{self, Mouth};
-use super::rims::{END, GOES_ON, HOLE, axis, goes_on, height, is_round, lies_on, middle, middle_of_length};
-use super::{mouth, opposite};
+use super::opposite::{self, Hole};
+use super::rims::{END, GOES_ON, HOLE, axis, goes_on, height, is_round, lies_on, middle};
+use super::{creases, mouth};
 use crate::contract::settings::Profile;
 use crate::detect::holes::loops::Loop;
 use crate::detect::holes::owners;
@@ -66,16 +67,14 @@ impl Closing<'_> {
     /// Judges all patches that are in, and cross nothing. O(submesh), and a look at the surroundings of wide mouths.
     pub(crate) fn judge(&self, survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile) -> Judged {
         let mut judged = Judged::default();
-        let is_in = |patch: &&Placed| patch.count > 0 && !patch.across && !patch.to_be_cut;
-        if !self.placed.iter().any(|patch| is_in(&patch)) {
+        if !self.placed.iter().any(Placed::is_in) {
             return judged;
         }
         let (submesh, edges) = work.edges();
         let bodies = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::EveryEdge);
         let all = bodies.list.iter().map(|c| survey.measure.volume(c.extent).abs()).sum();
-        for patch in self.placed.iter().filter(is_in) {
-            // What was split since is elsewhere.
-            let Some(first) = patch.triangles().find(|t| submesh.lives(*t)) else { continue };
+        for patch in self.placed.iter().filter(|patch| patch.is_in()) {
+            let Some(first) = patch.living(submesh).next() else { continue };
             let body = Body::of(survey, &bodies, first, all);
             let doubt = match (patch.planes, patch.rims.as_slice()) {
                 (Some(planes), _) if patch.method == EXTENDED => judged.planes(submesh, patch, planes, body),
@@ -87,8 +86,10 @@ impl Closing<'_> {
             };
             judged.doubts.extend(doubt.map(|doubt| format!("{doubt}, at {:?}", submesh.points(first)[0])));
         }
-        judged.doubts.extend(self.gone_on(survey, submesh, &bodies, all));
-        judged.doubts.extend(opposite::doubt(self, survey, submesh, &bodies));
+        let holes = opposite::holes(self, survey, submesh, &bodies);
+        let is_detail = |hole: &Hole<'_>| Body::of(survey, &bodies, hole.first, all).is_detail();
+        judged.doubts.extend(gone_on(submesh, &holes, is_detail));
+        judged.doubts.extend(opposite::doubt(submesh, &holes));
         let more = judged.doubts.len().saturating_sub(MOST_SAID);
         judged.doubts.truncate(MOST_SAID);
         if more > 0 {
@@ -98,46 +99,35 @@ impl Closing<'_> {
     }
 }
 
-impl Closing<'_> {
-    /// Says where sharp edges may go on across holes that were closed flat, and where walls may go on from a mouth to another one. O(patches), and mouths².
-    fn gone_on(&self, survey: &Survey<'_>, submesh: &Submesh, bodies: &Components, all: f64) -> Vec<String> {
-        let mut doubts = Vec::new();
-        let mut mouths: BTreeMap<u32, Vec<Mouth>> = BTreeMap::new();
-        for patch in self.placed.iter().filter(|patch| patch.count > 0 && !patch.across && !patch.to_be_cut) {
-            let [rim] = patch.rims.as_slice() else { continue };
-            let Some(first) = patch.triangles().find(|t| submesh.lives(*t)) else { continue };
-            let (rim, body) = (self.rim(*rim), Body::of(survey, bodies, first, all));
-            // What a hole may hide is small where it is short.
-            let size = rim.perimeter(submesh).powi(3);
-            if body.is_detail() || size < GOES_ON * body.volume.abs() {
-                continue;
-            }
-            let from = middle_of_length(submesh, rim);
-            let living = patch.triangles().filter(|t| submesh.lives(*t)).map(|t| submesh.triangles[t as usize].v);
-            let straight = if patch.method == EXTENDED { creases::STRAIGHT } else { creases::ARC };
-            let share = creases::beyond(submesh, rim, straight, (under(submesh, living, from), from)).abs() / body.volume.abs();
-            if share > GOES_ON {
-                let (share, at) = (share * 100.0, submesh.points(first)[0]);
-                doubts.push(format!(
-                    "sharp edges end at a hole and may go on across it: {share:.1} % of the body would differ, at {at:?}"
-                ));
-            }
-            let of_body = mouths.entry(bodies.of_triangle[first as usize]).or_default();
-            if of_body.len() < MOST_MOUTHS && goes_on(submesh, rim).abs() <= END {
-                let mouth = Mouth { middle: from, axis: axis(submesh, rim), perimeter: rim.perimeter(submesh) };
-                let others = of_body.iter().map(|other| creases::between(&mouth, other));
-                let share = others.fold(0.0, f64::max) / body.volume.abs();
-                if share > GOES_ON {
-                    let (share, at) = (share * 100.0, submesh.points(first)[0]);
-                    doubts.push(format!(
-                        "two mouths of one body face each other: a piece in between may be missing, {share:.1} % of the body, at {at:?}"
-                    ));
-                }
-                of_body.push(mouth);
-            }
+/// Says where sharp edges may go on across holes that were closed flat, and where walls may go on from a mouth to another one. O(patches), and mouths².
+fn gone_on(submesh: &Submesh, holes: &[Hole<'_>], is_detail: impl Fn(&Hole<'_>) -> bool) -> Vec<String> {
+    let mut doubts = Vec::new();
+    let mut mouths: BTreeMap<u32, Vec<&Hole<'_>>> = BTreeMap::new();
+    // A short rim hides little.
+    let is_large = |hole: &&Hole<'_>| hole.mouth.perimeter.powi(3) >= GOES_ON * hole.volume;
+    for hole in holes.iter().filter(is_large).filter(|hole| !is_detail(hole)) {
+        let at = submesh.points(hole.first)[0];
+        let told = |volume: f64| Some(volume / hole.volume).filter(|share| *share > GOES_ON).map(|share| share * 100.0);
+        doubts.extend(told(across(submesh, hole)).map(|share| {
+            format!("sharp edges end at a hole and may go on across it: {share:.1} % of the body would differ, at {at:?}")
+        }));
+        let of_body = mouths.entry(hole.body).or_default();
+        if of_body.len() < MOST_MOUTHS && hole.goes_on.abs() <= END {
+            let between = of_body.iter().map(|other| opposite::between(&hole.mouth, &other.mouth)).fold(0.0, f64::max);
+            doubts.extend(told(between).map(|share| {
+                format!("two mouths of one body face each other: a piece in between may be missing, {share:.1} % of the body, at {at:?}")
+            }));
+            of_body.push(hole);
         }
-        doubts
     }
+    doubts
+}
+
+/// The size of the volume by which the body would differ if sharp edges went on across a hole.
+fn across(submesh: &Submesh, hole: &Hole<'_>) -> f64 {
+    let from = hole.mouth.middle;
+    let straight = if hole.patch.method == EXTENDED { creases::STRAIGHT } else { creases::ARC };
+    creases::beyond(submesh, hole.rim, straight, (under_patch(submesh, hole.patch, from), from)).abs()
 }
 
 impl Judged {
@@ -165,7 +155,7 @@ impl Judged {
 
     /// One that nothing speaks against: it is small against its body, or of planes that are known.
     fn explain(&mut self, submesh: &Submesh, patch: &Placed) {
-        patch.triangles().filter(|t| submesh.lives(*t)).for_each(|t| self.reached.include(&submesh.points(t)));
+        patch.living(submesh).for_each(|t| self.reached.include(&submesh.points(t)));
         self.area += area(submesh, patch);
         self.explained.extend(patch.triangles());
     }
@@ -237,8 +227,7 @@ impl Judged {
     /// A patch that continues the surface is in doubt if it encloses much more, or less, than a flat one would.
     fn shaped(&mut self, submesh: &Submesh, patch: &Placed, body: Body, profile: &Profile) -> Option<String> {
         let from = submesh.place(patch.coarse[0][0]);
-        let living = patch.triangles().filter(|t| submesh.lives(*t)).map(|t| submesh.triangles[t as usize].v);
-        let differ = (under(submesh, living, from) - under(submesh, patch.coarse.iter().copied(), from)).abs();
+        let differ = (under_patch(submesh, patch, from) - under(submesh, patch.coarse.iter().copied(), from)).abs();
         let share = differ / body.volume.abs();
         if share <= profile.max_volume_change {
             if area(submesh, patch) < WIDEST * body.area {
@@ -257,10 +246,9 @@ fn way_through(submesh: &Submesh, patch: &Placed, rims: [&Loop; 2], body: Body) 
         return None;
     }
     let from = middle(submesh, rims[0]);
-    let living = patch.triangles().filter(|t| submesh.lives(*t)).map(|t| submesh.triangles[t as usize].v);
     // Cones over the loops; the first one is seen from its own middle.
     let caps = axis(submesh, rims[1]).dot(middle(submesh, rims[1]) - from) / 3.0;
-    let share = (under(submesh, living, from) - caps).abs() / body.all;
+    let share = (under_patch(submesh, patch, from) - caps).abs() / body.all;
     (share > WAY_THROUGH).then(|| {
         format!(
             "two holes back to back were closed as a way through, {:.1} % of all volume; the skins may have been lost",
@@ -295,6 +283,11 @@ fn is_ragged(submesh: &Submesh, rim: &Loop, across: DVec3) -> bool {
     flatness::is_ragged(height, across.length()) && way > SADDLE * height
 }
 
+/// The signed volume between a place and a patch.
+fn under_patch(submesh: &Submesh, patch: &Placed, from: DVec3) -> f64 {
+    under(submesh, patch.living(submesh).map(|t| submesh.triangles[t as usize].v), from)
+}
+
 /// The signed volume between a place and triangles.
 fn under(submesh: &Submesh, triangles: impl Iterator<Item = [Vertex; 3]>, from: DVec3) -> f64 {
     let of = |t: [Vertex; 3]| {
@@ -305,5 +298,5 @@ fn under(submesh: &Submesh, triangles: impl Iterator<Item = [Vertex; 3]>, from: 
 }
 
 fn area(submesh: &Submesh, patch: &Placed) -> f64 {
-    patch.triangles().filter(|t| submesh.lives(*t)).map(|t| submesh.normal(t).length() / 2.0).sum()
+    patch.living(submesh).map(|t| submesh.normal(t).length() / 2.0).sum()
 }

@@ -63,7 +63,7 @@ pub(super) fn doubts(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges) -> V
     if sheets.is_empty() {
         return Vec::new();
     }
-    // What crosses another body becomes one with it.
+    // A sheet that crosses another body becomes one with it.
     let pairs = survey.crossing_pairs.as_deref().unwrap_or_default();
     let crosses = crossing(survey, submesh, &bodies, pairs.iter().map(|pair| pair.triangles));
     let hosts = largest(&bodies);
@@ -85,7 +85,7 @@ pub(super) fn doubts(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges) -> V
     sheets.into_iter().filter_map(line).collect()
 }
 
-/// What patches are to each body.
+/// The patches of each body, summed up.
 fn closed(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, bodies: &Components) -> Vec<Closed> {
     let mut closed = vec![Closed::default(); bodies.list.len()];
     for t in submesh.living().filter(|t| is_patch(submesh, *t) && bodies.of_triangle[*t as usize] != NONE) {

@@ -6,11 +6,10 @@
 
 use std::collections::BTreeMap;
 
-use super::pieces::{Member, Pieces, widened};
+use super::pieces::{Pieces, widened};
 use super::{Cut, MOST_CUT, MOST_PAIRS, On};
 use crate::contract::report::RepairName;
 use crate::geometry::boxes::BoxTree;
-use crate::geometry::exact::at;
 use crate::geometry::sums::Bounds;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
@@ -42,8 +41,8 @@ const CLOSED: f64 = 4.0;
 /// A copy is told if between it and its body there is more than this share of the body's volume.
 const BETWEEN: f64 = 0.01;
 
-/// Drops sheets that lie as a whole on a body; returns how many triangles went, and what a person must look at. O(n log n) in the sheets and the surface near them, which is read if
-/// there are sheets in a body's box.
+/// Drops sheets that lie as a whole on a body; returns how many triangles went, and lines for a person to look at. O(n log n) in the sheets and the
+/// surface near them, which is read if there are sheets in a body's box.
 fn drop_copies(survey: &mut Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) -> (u64, Vec<String>) {
     let (submesh, edges) = work.edges();
     if tolerance.edge_share <= 0.0 || !edges.iter().any(|e| e.is_boundary()) {
@@ -151,15 +150,14 @@ impl Sheets {
         let (triangles, under): (Vec<_>, Vec<_>) = members.into_iter().partition(|member| member.piece == sheet);
         let layer = Layer::new(under.iter().map(|m| Facet::of(&m.corners, body)).collect(), Vec::new());
         let on = On { layer: &layer, reach, share: f64::INFINITY };
-        let is_copy = triangles.len() <= MOST_CUT && triangles.iter().all(|m| on.covers(&Facet::of(&m.corners, sheet)));
-        if !is_copy {
+        if triangles.len() > MOST_CUT {
             return None;
         }
-        let between = |m: &Member| {
-            let [a, b, c] = m.corners.map(|p| at(&p));
-            0.5 * (b - a).cross(c - a).length() * layer.distance((a + b + c) / 3.0, reach)
-        };
-        let between = triangles.iter().map(between).sum();
+        let facets: Vec<Facet> = triangles.iter().map(|m| Facet::of(&m.corners, sheet)).collect();
+        if !facets.iter().all(|facet| on.covers(facet)) {
+            return None;
+        }
+        let between = facets.iter().map(|facet| facet.area() * layer.distance(facet.centre(), reach)).sum();
         Some((Cut { triangles, join: None }, between))
     }
 }

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use robust::{Coord, Coord3D};
 
 use crate::geometry::boxes::BoxTree;
-use crate::geometry::ray_grid::RayGrid;
+use crate::geometry::ray_grid::{RayGrid, flat};
 use crate::geometry::sums::Bounds;
 use crate::io::record;
 use crate::submesh::Submesh;
@@ -166,9 +166,20 @@ pub(crate) struct Direction {
 impl Direction {
     /// The coordinates of a point in a frame in which this is upwards. Exact, and even where coordinates are mirrored, an edge that two triangles
     /// share is the same for both.
+    #[inline(always)]
     pub(crate) fn upright<T: Copy + Neg<Output = T>>(self, p: [T; 3]) -> [T; 3] {
-        let [x, y, z] = [1, 2, 0].map(|k| p[(self.axis + k) % 3]);
+        let [x, y, z] = match self.axis {
+            0 => [p[1], p[2], p[0]],
+            1 => [p[2], p[0], p[1]],
+            _ => p,
+        };
         [x, y, if self.backward { -z } else { z }]
+    }
+
+    /// A triangle's corners in that frame.
+    #[inline(always)]
+    fn upright_corners(self, [a, b, c]: &[[f32; 3]; 3]) -> [[f32; 3]; 3] {
+        [self.upright(*a), self.upright(*b), self.upright(*c)]
     }
 
     fn upright_box(self, of: &Bounds) -> Bounds {
@@ -186,45 +197,76 @@ pub(crate) struct Source {
     pub(crate) component: u32,
 }
 
-/// Which rays meet another component on their way in a direction. Triangles of the submesh count if `counts` says so, all others do; one whose
-/// plane holds the ray, or where it begins, does not. O(triangles under rays), and reads the chunks of the file that the rays may meet.
+/// Which rays meet another component on their way, for each direction. Triangles of the submesh count if `counts` says so, all others do; one whose
+/// plane holds the ray, or where it begins, does not. O(triangles under rays), and reads the chunks of the file that the rays may meet, once.
 pub(crate) fn obstructed(
     survey: &Survey<'_>,
     submesh: &Submesh,
     components: &Components,
-    direction: Direction,
-    sources: &[Source],
+    asked: &[(Direction, Vec<Source>)],
     counts: impl Fn(u32) -> bool,
-) -> Vec<bool> {
-    if sources.is_empty() {
-        return Vec::new();
+) -> Vec<Vec<bool>> {
+    let bundles: Vec<Bundle<'_>> = asked.iter().map(|(direction, sources)| Bundle::of(*direction, sources)).collect();
+    if bundles.iter().any(|bundle| !bundle.rays.is_empty()) {
+        survey.visit_regular(
+            |region| components.of_region[region as usize] != NONE,
+            |reach| {
+                let over = |bundle| Some((bundle, Bundle::over(bundle, reach)?));
+                let over: Vec<(&Bundle<'_>, Over)> = bundles.iter().filter_map(over).collect();
+                (!over.is_empty()).then_some(over)
+            },
+            |over, corners| over.iter().any(|(bundle, over)| bundle.may_meet(over, corners)),
+            |over, triangle, region| {
+                let corners = record::corners(&survey.records[triangle as usize]);
+                let component = components.of_region[region as usize];
+                let under = over.iter().filter(|(bundle, over)| bundle.may_meet(over, &corners));
+                under.for_each(|(bundle, _)| bundle.meet(&corners, component));
+            },
+        );
+        for t in submesh.living().filter(|t| counts(*t)) {
+            bundles.iter().for_each(|bundle| bundle.meet(&submesh.points(t), components.of_triangle[t as usize]));
+        }
     }
-    let rays: Vec<Ray> =
-        sources.iter().map(|source| Ray { from: direction.upright(source.from), candidates: Vec::new() }).collect();
-    let grid = Grid::new(&rays);
-    let met: Vec<AtomicBool> = sources.iter().map(|_| AtomicBool::new(false)).collect();
-    let meet = |corners: &[[f32; 3]; 3], component: u32| {
-        for r in grid.cells.under(corners).flatten().map(|r| *r as usize) {
+    bundles.into_iter().map(|bundle| bundle.met.into_iter().map(AtomicBool::into_inner).collect()).collect()
+}
+
+/// Rays of one direction, and which of them met anything.
+struct Bundle<'a> {
+    direction: Direction,
+    sources: &'a [Source],
+    rays: Vec<Ray>,
+    grid: Grid,
+    met: Vec<AtomicBool>,
+}
+
+impl<'a> Bundle<'a> {
+    fn of(direction: Direction, sources: &'a [Source]) -> Self {
+        let ray = |source: &Source| Ray { from: direction.upright(source.from), candidates: Vec::new() };
+        let rays: Vec<Ray> = sources.iter().map(ray).collect();
+        let met = sources.iter().map(|_| AtomicBool::new(false)).collect();
+        Self { direction, sources, grid: Grid::new(&rays), rays, met }
+    }
+
+    /// The rays that may meet what lies in a box of the file.
+    fn over(&self, reach: &Bounds) -> Option<Over> {
+        Over::new(&self.rays, &self.grid, &self.direction.upright_box(reach))
+    }
+
+    #[inline(always)]
+    fn may_meet(&self, over: &Over, corners: &[[f32; 3]; 3]) -> bool {
+        over.may_meet(&self.grid, &self.direction.upright_corners(corners))
+    }
+
+    fn meet(&self, corners: &[[f32; 3]; 3], component: u32) {
+        let corners = self.direction.upright_corners(corners);
+        for r in self.grid.cells.under(flat(&corners)).flatten().map(|r| *r as usize) {
             // Whoever meets it first: it is met.
-            if sources[r].component != component && !met[r].load(Relaxed) && crossing(corners, rays[r].from) != 0 {
-                met[r].store(true, Relaxed);
+            let is_asked = self.sources[r].component != component && !self.met[r].load(Relaxed);
+            if is_asked && crossing(&corners, self.rays[r].from) != 0 {
+                self.met[r].store(true, Relaxed);
             }
         }
-    };
-    let upright = |corners: &[[f32; 3]; 3]| corners.map(|p| direction.upright(p));
-    survey.visit_regular(
-        |region| components.of_region[region as usize] != NONE,
-        |reach| Over::new(&rays, &grid, &direction.upright_box(reach)),
-        |over, corners| over.may_meet(&grid, &upright(corners)),
-        |_, triangle, region| {
-            let corners = record::corners(&survey.records[triangle as usize]);
-            meet(&upright(&corners), components.of_region[region as usize]);
-        },
-    );
-    for t in submesh.living().filter(|t| counts(*t)) {
-        meet(&upright(&submesh.points(t)), components.of_triangle[t as usize]);
     }
-    met.into_iter().map(AtomicBool::into_inner).collect()
 }
 
 /// Which points surface lies around: in at least four of the six directions along the axes, a ray leaves surface more often than it enters, or
@@ -239,7 +281,7 @@ pub(crate) fn are_surrounded(survey: &Survey<'_>, submesh: &Submesh, points: &[[
         let direction = Direction { axis, backward };
         let rays: Vec<Ray> = points.iter().map(|p| Ray { from: direction.upright(*p), candidates: vec![0] }).collect();
         let grid = Grid::new(&rays);
-        let upright = |corners: &[[f32; 3]; 3]| corners.map(|p| direction.upright(p));
+        let upright = |corners: &[[f32; 3]; 3]| direction.upright_corners(corners);
         let mut windings = vec![0; points.len()];
         let per_chunk = survey.visit_regular(
             |_| true,
@@ -311,7 +353,7 @@ impl Over {
         };
         let mut few = Vec::new();
         let corners = [reach.lo, reach.hi, reach.hi];
-        for ray in grid.cells.under(&corners).flatten().map(|r| &rays[*r as usize]).filter(inside) {
+        for ray in grid.cells.under(flat(&corners)).flatten().map(|r| &rays[*r as usize]).filter(inside) {
             if few.len() == Self::FEW {
                 return Some(Self::Many);
             }
@@ -323,14 +365,14 @@ impl Over {
     /// Asked of every triangle.
     #[inline(always)]
     fn may_meet(&self, grid: &Grid, corners: &[[f32; 3]; 3]) -> bool {
-        let low = |k: usize| corners[0][k].min(corners[1][k]).min(corners[2][k]);
-        let high = |k: usize| corners[0][k].max(corners[1][k]).max(corners[2][k]);
         match self {
             Self::Few(few) => {
+                let low = |k: usize| corners[0][k].min(corners[1][k]).min(corners[2][k]);
+                let high = |k: usize| corners[0][k].max(corners[1][k]).max(corners[2][k]);
                 let (lo, hi) = ([low(0), low(1)], [high(0), high(1)]);
                 few.iter().any(|[x, y]| (lo[0] <= x[0]) & (hi[0] >= x[1]) & (lo[1] <= y[0]) & (hi[1] >= y[1]))
             }
-            Self::Many => grid.cells.may_meet(corners),
+            Self::Many => grid.cells.may_meet(flat(corners)),
         }
     }
 }
@@ -361,7 +403,7 @@ impl Grid {
 
     /// Reports `(place in the table of counts, signed crossing)` for every ray that asks for `component` and meets the triangle.
     fn cross(&self, rays: &[Ray], corners: &[[f32; 3]; 3], component: u32, hit: &mut dyn FnMut(u32, i32)) {
-        for row in self.cells.under(corners) {
+        for row in self.cells.under(flat(corners)) {
             for r in row {
                 let ray = &rays[*r as usize];
                 if let Ok(i) = ray.candidates.binary_search(&component) {
@@ -385,12 +427,12 @@ pub(crate) fn crossing(corners: &[[f32; 3]; 3], p: [f64; 3]) -> i32 {
     let mut winding = 0;
     for k in 0..3 {
         let (a, b) = (q[k], q[(k + 1) % 3]);
-        let flat = |v: [f64; 3]| Coord { x: v[0], y: v[1] };
+        let above = |v: [f64; 3]| Coord { x: v[0], y: v[1] };
         let from = Coord { x: p[0], y: p[1] };
         // Half-open in y, strict in x: an edge shared by two triangles is decided alike for both.
-        if a[1] <= p[1] && b[1] > p[1] && robust::orient2d(flat(a), flat(b), from) > 0.0 {
+        if a[1] <= p[1] && b[1] > p[1] && robust::orient2d(above(a), above(b), from) > 0.0 {
             winding += 1;
-        } else if b[1] <= p[1] && a[1] > p[1] && robust::orient2d(flat(b), flat(a), from) > 0.0 {
+        } else if b[1] <= p[1] && a[1] > p[1] && robust::orient2d(above(b), above(a), from) > 0.0 {
             winding -= 1;
         }
     }

@@ -8,6 +8,18 @@ pub(crate) struct RayGrid {
     /// Rays by cell, and where each cell's begin.
     starts: Vec<u32>,
     order: Vec<u32>,
+    /// A bit for each cell, rows of whole words: is a ray in it? Small enough for the caches, where `starts` is not.
+    taken: Vec<u64>,
+}
+
+/// A box as seen from above: the smaller and the larger of x, and of y.
+pub(crate) type Flat = [[f64; 2]; 2];
+
+/// The box of three corners, seen from above.
+#[inline(always)]
+pub(crate) fn flat<T: Copy + Into<f64>>([a, b, c]: &[[T; 3]; 3]) -> Flat {
+    let span = |a: f64, b: f64, c: f64| [a.min(b).min(c), a.max(b).max(c)];
+    [span(a[0].into(), b[0].into(), c[0].into()), span(a[1].into(), b[1].into(), c[1].into())]
 }
 
 impl RayGrid {
@@ -22,9 +34,13 @@ impl RayGrid {
             }
         }
         let per_unit = std::array::from_fn(|k| if hi[k] > lo[k] { side as f64 / (hi[k] - lo[k]) } else { 0.0 });
-        let mut grid = Self { lo, per_unit, side, starts: vec![0; side * side + 1], order: Vec::new() };
+        let taken = vec![0; side * side.div_ceil(64)];
+        let mut grid = Self { lo, per_unit, side, starts: vec![0; side * side + 1], order: Vec::new(), taken };
         let cells: Vec<usize> = points.map(|p| grid.cell(1, p[1]) * side + grid.cell(0, p[0])).collect();
-        cells.iter().for_each(|c| grid.starts[c + 1] += 1);
+        for cell in &cells {
+            grid.starts[cell + 1] += 1;
+            grid.taken[cell / side * side.div_ceil(64) + cell % side / 64] |= 1 << (cell % side % 64);
+        }
         (0..side * side).for_each(|c| grid.starts[c + 1] += grid.starts[c]);
         grid.order = (0..cells.len() as u32).collect();
         grid.order.sort_by_key(|r| cells[*r as usize]);
@@ -32,37 +48,39 @@ impl RayGrid {
     }
 
     /// Monotonous, so that a ray in a box is in one of the cells between those of its ends.
+    #[inline(always)]
     fn cell(&self, axis: usize, x: f64) -> usize {
-        (((x - self.lo[axis]) * self.per_unit[axis]) as usize).min(self.side - 1)
+        // Through i32, which processors have an instruction for.
+        ((x - self.lo[axis]) * self.per_unit[axis]).clamp(0.0, (self.side - 1) as f64) as i32 as usize
     }
 
-    /// The rays in the cells under the box of three corners, row by row.
-    pub(crate) fn under<T: Copy + Into<f64>>(&self, corners: &[[T; 3]; 3]) -> impl Iterator<Item = &[u32]> + use<'_, T> {
-        let span = |k: usize| {
-            let x: [f64; 3] = corners.map(|c| c[k].into());
-            (self.cell(k, x[0].min(x[1]).min(x[2])), self.cell(k, x[0].max(x[1]).max(x[2])))
-        };
-        let ((x0, x1), (y0, y1)) = (span(0), span(1));
-        (y0..=y1).map(move |row| {
+    /// The rays in the cells under a box, row by row.
+    pub(crate) fn under(&self, [x, y]: Flat) -> impl Iterator<Item = &[u32]> + use<'_> {
+        let (x0, x1) = (self.cell(0, x[0]), self.cell(0, x[1]));
+        (self.cell(1, y[0])..=self.cell(1, y[1])).map(move |row| {
             let row = row * self.side;
             &self.order[self.starts[row + x0] as usize..self.starts[row + x1 + 1] as usize]
         })
     }
 
-    /// Is there a ray in the cells under the triangle? Asked of every triangle, so one cell is the case to be fast in.
-    #[inline]
-    pub(crate) fn may_meet(&self, corners: &[[f32; 3]; 3]) -> bool {
-        let cell = |k: usize, x: f32| self.cell(k, f64::from(x));
-        let low = |k: usize| corners[0][k].min(corners[1][k]).min(corners[2][k]);
-        let high = |k: usize| corners[0][k].max(corners[1][k]).max(corners[2][k]);
-        let (x0, x1, y0, y1) = (cell(0, low(0)), cell(0, high(0)), cell(1, low(1)), cell(1, high(1)));
-        (y0..=y1).any(|row| self.starts[row * self.side + x0] != self.starts[row * self.side + x1 + 1])
+    /// Is there a ray in the cells under a box? Asked of every triangle, so a few cells in one word are the case to be fast in.
+    #[inline(always)]
+    pub(crate) fn may_meet(&self, [x, y]: Flat) -> bool {
+        let (x0, x1) = (self.cell(0, x[0]), self.cell(0, x[1]));
+        let (first, last) = (!0u64 << (x0 % 64), !0u64 >> (63 - x1 % 64));
+        let words = self.side.div_ceil(64);
+        (self.cell(1, y[0])..=self.cell(1, y[1])).any(|row| match &self.taken[row * words + x0 / 64..=row * words + x1 / 64] {
+            [word] => word & first & last != 0,
+            [start, between @ .., end] => start & first | end & last != 0 || between.iter().any(|word| *word != 0),
+            [] => false,
+        })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     /// Rays from the corners of unit squares, four by four, and a triangle in a box of side 2.5.
     #[test]
@@ -71,9 +89,9 @@ mod tests {
         for (times, most) in [(1, 1), (4, 512), (8, 1024)] {
             let grid = RayGrid::new(points.iter().copied(), times, most);
             let looked_at = |by: f32| -> Vec<u32> {
-                let corners = [[by, 0.0, 0.0], [2.5 + by, 0.0, 0.0], [by, 2.5, 0.0]];
-                let mut found = grid.under(&corners).flatten().copied().collect::<Vec<u32>>();
-                assert_eq!(grid.may_meet(&corners), !found.is_empty(), "{times}");
+                let corners = flat(&[[by, 0.0, 0.0], [2.5 + by, 0.0, 0.0], [by, 2.5, 0.0]]);
+                let mut found = grid.under(corners).flatten().copied().collect::<Vec<u32>>();
+                assert_eq!(grid.may_meet(corners), !found.is_empty(), "{times}");
                 found.sort_unstable();
                 found
             };
@@ -86,6 +104,26 @@ mod tests {
             }
         }
         let none = RayGrid::new(std::iter::empty(), 8, 1024);
-        assert_eq!(none.under(&[[0.0_f32; 3]; 3]).flatten().count(), 0);
+        assert_eq!(none.under([[0.0; 2]; 2]).flatten().count(), 0);
+        assert!(!none.may_meet([[0.0; 2]; 2]));
+    }
+
+    proptest! {
+        /// In grids of rows of several words, too.
+        #[test]
+        fn the_bits_say_what_the_cells_hold(
+            points in prop::collection::vec(prop::array::uniform3(0.0f64..9.0), 1..40),
+            boxes in prop::collection::vec(prop::array::uniform4(-1.0f64..10.0), 1..40),
+            times in 1usize..64,
+        ) {
+            let grid = RayGrid::new(points.iter().copied(), times, 1024);
+            for [a, b, c, d] in boxes {
+                let of = [[a.min(b), a.max(b)], [c.min(d), c.max(d)]];
+                let found: Vec<u32> = grid.under(of).flatten().copied().collect();
+                prop_assert_eq!(grid.may_meet(of), !found.is_empty());
+                let is_in = |p: &[f64; 3]| (0..2).all(|k| of[k][0] <= p[k] && p[k] <= of[k][1]);
+                prop_assert!((0..).zip(&points).filter(|(_, p)| is_in(p)).all(|(ray, _)| found.contains(&ray)));
+            }
+        }
     }
 }

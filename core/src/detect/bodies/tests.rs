@@ -59,8 +59,8 @@ fn each_direction_meets_what_lies_there_and_nothing_else() {
             for (other, turned) in (0..3).flat_map(|k| [(k, false), (k, true)]) {
                 let direction = Direction { axis: other, backward: turned };
                 // On grid lines, where rays run through diagonals of faces.
-                let source = |component| [Source { from: [0.0; 3], component }];
-                let met = |component| obstructed(&d.survey, &d.submesh, &components, direction, &source(component), |_| true);
+                let asked = |component| [(direction, vec![Source { from: [0.0; 3], component }])];
+                let met = |component| obstructed(&d.survey, &d.submesh, &components, &asked(component), |_| true).concat();
                 assert_eq!(met(0), [(other, turned) == (axis, backward)], "{direction:?}, towards {by:?}");
                 assert_eq!(met(1), [true], "out of the cube that is not the ray's own");
             }

@@ -11,7 +11,8 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use glam::DVec3;
 
 use crate::geometry::position;
-use crate::geometry::ray_grid::RayGrid;
+use crate::geometry::ray_grid::{RayGrid, flat};
+use crate::geometry::sums::Bounds;
 
 use super::surfaces::{Surfaces, Which};
 
@@ -45,16 +46,18 @@ pub(super) fn from_outside(surfaces: &Surfaces<'_>, which: Which, points: &[OnSu
 /// Does any ray of each point meet nothing?
 fn are_free(surfaces: &Surfaces<'_>, which: Which, points: &[OnSurface], directions: &[Direction], beside: f64) -> Vec<bool> {
     let bundles: Vec<Bundle> = directions.iter().map(|direction| Bundle::of(*direction, points, beside)).collect();
-    let meet = |corners: &[[f32; 3]; 3]| {
-        let corners = corners.map(|p| p.map(f64::from));
-        bundles.iter().for_each(|bundle| bundle.meet(&corners));
-    };
-    surfaces.each_in_memory(which, meet);
+    surfaces.each_in_memory(which, |corners| bundles.iter().for_each(|bundle| bundle.meet(corners)));
     surfaces.survey.visit_regular(
         |region| surfaces.has(which, region),
-        |_| Some(()),
-        |(), _| true,
-        |(), triangle, _| meet(&position::corners(&surfaces.survey.records[triangle as usize])),
+        |reach| {
+            let over: Vec<&Bundle> = bundles.iter().filter(|bundle| bundle.is_over(reach)).collect();
+            (!over.is_empty()).then_some(over)
+        },
+        |over, corners| over.iter().any(|bundle| bundle.may_meet(corners)),
+        |over, triangle, _| {
+            let corners = position::corners(&surfaces.survey.records[triangle as usize]);
+            over.iter().for_each(|bundle| bundle.meet(&corners));
+        },
     );
     let is_free = |p: usize| {
         let in_front =
@@ -84,8 +87,14 @@ impl Direction {
     }
 
     /// The coordinates in a frame in which it is upright.
-    fn upright(&self, p: [f64; 3]) -> [f64; 3] {
-        let [x, y, z] = [1, 2, 0].map(|k| p[(self.axis + k) % 3]);
+    #[inline(always)]
+    fn upright<T: Copy + Into<f64>>(&self, p: [T; 3]) -> [f64; 3] {
+        let p = [p[0].into(), p[1].into(), p[2].into()];
+        let [x, y, z] = match self.axis {
+            0 => [p[1], p[2], p[0]],
+            1 => [p[2], p[0], p[1]],
+            _ => p,
+        };
         let up = z * self.way;
         [x - self.askew[0] * up, y - self.askew[1] * up, up]
     }
@@ -120,10 +129,33 @@ impl Bundle {
         Self { direction, beside, from, met, grid }
     }
 
+    /// May a ray meet what lies in a box? Rays that have met something already count for none.
+    fn is_over(&self, reach: &Bounds) -> bool {
+        let corner = |k: usize| [0, 1, 2].map(|axis| if k >> axis & 1 == 0 { reach.lo[axis] } else { reach.hi[axis] });
+        let corners: [[f64; 3]; 8] = std::array::from_fn(|k| self.direction.upright(corner(k)));
+        let span = |axis: usize| corners.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |s, c| [s[0].min(c[axis]), s[1].max(c[axis])]);
+        let (x, y, top) = (span(0), span(1), span(2)[1]);
+        let is_under = |ray: usize| !self.met[ray].load(Relaxed) && self.from[ray][2] <= top;
+        !reach.is_empty() && self.grid.under([x, y]).flatten().any(|ray| is_under(*ray as usize))
+    }
+
+    #[inline(always)]
+    fn may_meet(&self, corners: &[[f32; 3]; 3]) -> bool {
+        self.grid.may_meet(flat(&self.upright(corners)))
+    }
+
+    #[inline(always)]
+    fn upright(&self, [a, b, c]: &[[f32; 3]; 3]) -> [[f64; 3]; 3] {
+        [self.direction.upright(*a), self.direction.upright(*b), self.direction.upright(*c)]
+    }
+
     /// Notes the rays that a triangle is in the way of.
-    fn meet(&self, corners: &[[f64; 3]; 3]) {
-        let q = corners.map(|p| self.direction.upright(p));
-        for ray in self.grid.under(&q).flatten().map(|r| *r as usize) {
+    fn meet(&self, corners: &[[f32; 3]; 3]) {
+        let q = self.upright(corners);
+        if !self.grid.may_meet(flat(&q)) {
+            return;
+        }
+        for ray in self.grid.under(flat(&q)).flatten().map(|r| *r as usize) {
             if !self.met[ray].load(Relaxed) && is_above(&q, self.from[ray], self.beside) {
                 self.met[ray].store(true, Relaxed);
             }

@@ -180,9 +180,9 @@ fn hidden_pieces(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components) ->
     let is_of_the_file = |t: u32| !matches!(submesh.triangles[t as usize].origin, Origin::Added(_));
     for direction in DIRECTIONS {
         let asked = sources().filter(|(corners, s)| is_hidden[s.component as usize] && !stands_along(corners, direction));
-        let asked: Vec<Source> = asked.map(|(_, source)| source).collect();
-        let met = bodies::obstructed(survey, submesh, pieces, direction, &asked, is_of_the_file);
-        for (source, met) in asked.iter().zip(met) {
+        let asked = [(direction, asked.map(|(_, source)| source).collect::<Vec<Source>>())];
+        let met = bodies::obstructed(survey, submesh, pieces, &asked, is_of_the_file);
+        for (source, met) in asked[0].1.iter().zip(met.into_iter().flatten()) {
             is_hidden[source.component as usize] = met;
         }
     }

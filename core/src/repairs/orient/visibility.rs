@@ -199,8 +199,8 @@ fn seen(
 ) -> BTreeMap<u32, Sightings> {
     let all = first_points(survey, submesh, reversed, parts, asked);
     let off = OFF * f64::from(survey.bounds.largest_coordinate());
-    // By point: is it seen from the front, from behind?
-    let mut sides = vec![[false; 2]; all.len()];
+    // By direction: the points that are not seen edge-on, and whether each shows its back.
+    let (mut towards, mut asked_of) = (Vec::new(), Vec::new());
     for (axis, backward) in (0..3).flat_map(|axis| [(axis, false), (axis, true)]) {
         let direction = Direction { axis, backward };
         let turns = |corners: &[[f32; 3]; 3]| {
@@ -210,21 +210,20 @@ fn seen(
             });
             robust::orient2d(a, b, c) * if backward { -1.0 } else { 1.0 }
         };
-        let towards: Vec<(usize, bool)> = (0..all.len())
-            .map(|i| (i, turns(&all[i].1.corners)))
-            .filter(|(_, turn)| *turn != 0.0)
-            .map(|(i, turn)| (i, turn < 0.0))
-            .collect();
-        let source = |(i, _): &(usize, bool)| {
+        let turned: Vec<(usize, f64)> = (0..all.len()).map(|i| (i, turns(&all[i].1.corners))).filter(|(_, turn)| *turn != 0.0).collect();
+        let source = |(i, _): &(usize, f64)| {
             let mut from = bodies::inner_point(&all[*i].1.corners);
             from[axis] += if backward { -off } else { off };
             Source { from, component: NONE }
         };
-        let sources: Vec<Source> = towards.iter().map(source).collect();
-        let met = bodies::obstructed(survey, submesh, parts, direction, &sources, |_| true);
-        for ((i, is_behind), _) in towards.iter().zip(met).filter(|(_, met)| !met) {
-            sides[*i][usize::from(*is_behind)] = true;
-        }
+        asked_of.push((direction, turned.iter().map(source).collect::<Vec<Source>>()));
+        towards.push(turned);
+    }
+    let met = bodies::obstructed(survey, submesh, parts, &asked_of, |_| true);
+    // By point: is it seen from the front, from behind?
+    let mut sides = vec![[false; 2]; all.len()];
+    for ((i, turn), _) in towards.into_iter().flatten().zip(met.into_iter().flatten()).filter(|(_, met)| !met) {
+        sides[i][usize::from(turn < 0.0)] = true;
     }
     let mut seen: BTreeMap<u32, Sightings> = BTreeMap::new();
     for ((part, _), [front, back]) in all.iter().zip(sides) {

@@ -206,13 +206,13 @@ pub(crate) fn obstructed(
     asked: &[(Direction, Vec<Source>)],
     counts: impl Fn(u32) -> bool,
 ) -> Vec<Vec<bool>> {
-    let bundles: Vec<Bundle<'_>> = asked.iter().map(|(direction, sources)| Bundle::of(*direction, sources)).collect();
+    let bundles: Vec<Bundle> = asked.iter().map(|(direction, sources)| Bundle::of(*direction, sources)).collect();
     if bundles.iter().any(|bundle| !bundle.rays.is_empty()) {
         survey.visit_regular(
             |region| components.of_region[region as usize] != NONE,
             |reach| {
                 let over = |bundle| Some((bundle, Bundle::over(bundle, reach)?));
-                let over: Vec<(&Bundle<'_>, Over)> = bundles.iter().filter_map(over).collect();
+                let over: Vec<(&Bundle, Over)> = bundles.iter().filter_map(over).collect();
                 (!over.is_empty()).then_some(over)
             },
             |over, corners| over.iter().any(|(bundle, over)| bundle.may_meet(over, corners)),
@@ -227,24 +227,27 @@ pub(crate) fn obstructed(
             bundles.iter().for_each(|bundle| bundle.meet(&submesh.points(t), components.of_triangle[t as usize]));
         }
     }
-    bundles.into_iter().map(|bundle| bundle.met.into_iter().map(AtomicBool::into_inner).collect()).collect()
+    bundles.into_iter().map(Bundle::met).collect()
 }
 
-/// Rays of one direction, and which of them met anything.
-struct Bundle<'a> {
+/// Rays of one direction, and which of them met anything; in the order of the grid, so that those under a triangle lie side by side.
+struct Bundle {
     direction: Direction,
-    sources: &'a [Source],
     rays: Vec<Ray>,
     grid: Grid,
+    /// Where the rays begin, upright, and the components that are not in their way.
+    sources: Vec<Source>,
     met: Vec<AtomicBool>,
 }
 
-impl<'a> Bundle<'a> {
-    fn of(direction: Direction, sources: &'a [Source]) -> Self {
+impl Bundle {
+    fn of(direction: Direction, sources: &[Source]) -> Self {
         let ray = |source: &Source| Ray { from: direction.upright(source.from), candidates: Vec::new() };
         let rays: Vec<Ray> = sources.iter().map(ray).collect();
+        let grid = Grid::new(&rays);
         let met = sources.iter().map(|_| AtomicBool::new(false)).collect();
-        Self { direction, sources, grid: Grid::new(&rays), rays, met }
+        let upright = |r: &u32| Source { from: rays[*r as usize].from, component: sources[*r as usize].component };
+        Self { direction, sources: grid.cells.order().iter().map(upright).collect(), grid, rays, met }
     }
 
     /// The rays that may meet what lies in a box of the file.
@@ -259,13 +262,21 @@ impl<'a> Bundle<'a> {
 
     fn meet(&self, corners: &[[f32; 3]; 3], component: u32) {
         let corners = self.direction.upright_corners(corners);
-        for r in self.grid.cells.under(flat(&corners)).flatten().map(|r| *r as usize) {
+        for place in self.grid.cells.places_under(flat(&corners)) {
+            let (source, met) = (&self.sources[place], &self.met[place]);
             // Whoever meets it first: it is met.
-            let is_asked = self.sources[r].component != component && !self.met[r].load(Relaxed);
-            if is_asked && crossing(&corners, self.rays[r].from) != 0 {
-                self.met[r].store(true, Relaxed);
+            if source.component != component && !met.load(Relaxed) && crossing(&corners, source.from) != 0 {
+                met.store(true, Relaxed);
             }
         }
+    }
+
+    /// Which rays met anything, in the order of the sources.
+    fn met(self) -> Vec<bool> {
+        let mut met = vec![false; self.met.len()];
+        let places = self.grid.cells.order().iter().zip(self.met);
+        places.for_each(|(ray, is_met)| met[*ray as usize] = is_met.into_inner());
+        met
     }
 }
 
@@ -353,7 +364,7 @@ impl Over {
         };
         let mut few = Vec::new();
         let corners = [reach.lo, reach.hi, reach.hi];
-        for ray in grid.cells.under(flat(&corners)).flatten().map(|r| &rays[*r as usize]).filter(inside) {
+        for ray in grid.cells.under(flat(&corners)).map(|r| &rays[r]).filter(inside) {
             if few.len() == Self::FEW {
                 return Some(Self::Many);
             }
@@ -403,14 +414,12 @@ impl Grid {
 
     /// Reports `(place in the table of counts, signed crossing)` for every ray that asks for `component` and meets the triangle.
     fn cross(&self, rays: &[Ray], corners: &[[f32; 3]; 3], component: u32, hit: &mut dyn FnMut(u32, i32)) {
-        for row in self.cells.under(flat(corners)) {
-            for r in row {
-                let ray = &rays[*r as usize];
-                if let Ok(i) = ray.candidates.binary_search(&component) {
-                    let w = crossing(corners, ray.from);
-                    if w != 0 {
-                        hit(self.bases[*r as usize] + i as u32, w);
-                    }
+        for r in self.cells.under(flat(corners)) {
+            let ray = &rays[r];
+            if let Ok(i) = ray.candidates.binary_search(&component) {
+                let w = crossing(corners, ray.from);
+                if w != 0 {
+                    hit(self.bases[r] + i as u32, w);
                 }
             }
         }
@@ -419,29 +428,30 @@ impl Grid {
 
 /// How the ray upwards from `p` crosses a triangle: 1 from inside to outside, −1 from outside to inside, 0 not at all. A point on
 /// the triangle's plane does not cross it.
-pub(crate) fn crossing(corners: &[[f32; 3]; 3], p: [f64; 3]) -> i32 {
-    let q = corners.map(|c| c.map(f64::from));
-    if q.iter().all(|c| c[2] < p[2]) {
+pub(crate) fn crossing([a, b, c]: &[[f32; 3]; 3], p: [f64; 3]) -> i32 {
+    if f64::from(a[2].max(b[2]).max(c[2])) < p[2] {
         return 0;
     }
-    let mut winding = 0;
-    for k in 0..3 {
-        let (a, b) = (q[k], q[(k + 1) % 3]);
-        let above = |v: [f64; 3]| Coord { x: v[0], y: v[1] };
-        let from = Coord { x: p[0], y: p[1] };
-        // Half-open in y, strict in x: an edge shared by two triangles is decided alike for both.
-        if a[1] <= p[1] && b[1] > p[1] && robust::orient2d(above(a), above(b), from) > 0.0 {
-            winding += 1;
-        } else if b[1] <= p[1] && a[1] > p[1] && robust::orient2d(above(b), above(a), from) > 0.0 {
-            winding -= 1;
-        }
+    // Half-open in y, strict in x: an edge shared by two triangles is decided alike for both.
+    let begins = |v: &[f32; 3]| f64::from(v[1]) <= p[1];
+    let over = [begins(a), begins(b), begins(c)];
+    if over[0] == over[1] && over[1] == over[2] {
+        return 0;
     }
+    let above = |v: &[f32; 3]| Coord { x: v[0].into(), y: v[1].into() };
+    let from = Coord { x: p[0], y: p[1] };
+    let along = |[a, b]: [&[f32; 3]; 2], over: [bool; 2]| match over {
+        [true, false] if robust::orient2d(above(a), above(b), from) > 0.0 => 1,
+        [false, true] if robust::orient2d(above(b), above(a), from) > 0.0 => -1,
+        _ => 0,
+    };
+    let winding = along([a, b], [over[0], over[1]]) + along([b, c], [over[1], over[2]]) + along([c, a], [over[2], over[0]]);
     if winding == 0 {
         return 0;
     }
-    let at = |v: [f64; 3]| Coord3D { x: v[0], y: v[1], z: v[2] };
+    let at = |v: &[f32; 3]| Coord3D { x: v[0].into(), y: v[1].into(), z: v[2].into() };
     // Positive when p lies below the plane of three corners that run counter-clockwise seen from above.
-    let below = robust::orient3d(at(q[0]), at(q[1]), at(q[2]), at(p));
+    let below = robust::orient3d(at(a), at(b), at(c), Coord3D { x: p[0], y: p[1], z: p[2] });
     if below * f64::from(winding) > 0.0 { winding } else { 0 }
 }
 

@@ -54,13 +54,24 @@ impl RayGrid {
         ((x - self.lo[axis]) * self.per_unit[axis]).clamp(0.0, (self.side - 1) as f64) as i32 as usize
     }
 
-    /// The rays in the cells under a box, row by row.
-    pub(crate) fn under(&self, [x, y]: Flat) -> impl Iterator<Item = &[u32]> + use<'_> {
+    /// The rays in the order of their cells, in which those under a box lie side by side.
+    pub(crate) fn order(&self) -> &[u32] {
+        &self.order
+    }
+
+    /// The rays in the cells under a box, row by row: their places in the order.
+    #[inline(always)]
+    pub(crate) fn places_under(&self, [x, y]: Flat) -> impl Iterator<Item = usize> + use<'_> {
         let (x0, x1) = (self.cell(0, x[0]), self.cell(0, x[1]));
-        (self.cell(1, y[0])..=self.cell(1, y[1])).map(move |row| {
+        (self.cell(1, y[0])..=self.cell(1, y[1])).flat_map(move |row| {
             let row = row * self.side;
-            &self.order[self.starts[row + x0] as usize..self.starts[row + x1 + 1] as usize]
+            self.starts[row + x0] as usize..self.starts[row + x1 + 1] as usize
         })
+    }
+
+    /// The rays in the cells under a box.
+    pub(crate) fn under(&self, of: Flat) -> impl Iterator<Item = usize> + use<'_> {
+        self.places_under(of).map(|place| self.order[place] as usize)
     }
 
     /// Is there a ray in the cells under a box? Asked of every triangle, so a few cells in one word are the case to be fast in.
@@ -88,9 +99,9 @@ mod tests {
         let points: Vec<[f64; 3]> = (0..16).map(|i| [f64::from(i % 4), f64::from(i / 4), 9.0]).collect();
         for (times, most) in [(1, 1), (4, 512), (8, 1024)] {
             let grid = RayGrid::new(points.iter().copied(), times, most);
-            let looked_at = |by: f32| -> Vec<u32> {
+            let looked_at = |by: f32| -> Vec<usize> {
                 let corners = flat(&[[by, 0.0, 0.0], [2.5 + by, 0.0, 0.0], [by, 2.5, 0.0]]);
-                let mut found = grid.under(corners).flatten().copied().collect::<Vec<u32>>();
+                let mut found = grid.under(corners).collect::<Vec<usize>>();
                 assert_eq!(grid.may_meet(corners), !found.is_empty(), "{times}");
                 found.sort_unstable();
                 found
@@ -119,7 +130,7 @@ mod tests {
             let grid = RayGrid::new(points.iter().copied(), times, 1024);
             for [a, b, c, d] in boxes {
                 let of = [[a.min(b), a.max(b)], [c.min(d), c.max(d)]];
-                let found: Vec<u32> = grid.under(of).flatten().copied().collect();
+                let found: Vec<usize> = grid.under(of).collect();
                 prop_assert_eq!(grid.may_meet(of), !found.is_empty());
                 let is_in = |p: &[f64; 3]| (0..2).all(|k| of[k][0] <= p[k] && p[k] <= of[k][1]);
                 prop_assert!((0..).zip(&points).filter(|(_, p)| is_in(p)).all(|(ray, _)| found.contains(&ray)));

@@ -59,12 +59,14 @@ fn are_free(surfaces: &Surfaces<'_>, which: Which, points: &[OnSurface], directi
             over.iter().for_each(|bundle| bundle.meet(&corners));
         },
     );
-    let is_free = |p: usize| {
-        let in_front =
-            bundles.iter().filter(|bundle| points[p].front.is_none_or(|front| bundle.direction.along().dot(front) > 0.0));
-        in_front.into_iter().any(|bundle| !bundle.met[p].load(Relaxed))
-    };
-    (0..points.len()).map(is_free).collect()
+    let mut is_free = vec![false; points.len()];
+    for bundle in bundles {
+        let free = bundle.grid.order().iter().zip(bundle.met).filter(|(_, met)| !met.load(Relaxed));
+        for p in free.map(|(p, _)| *p as usize) {
+            is_free[p] |= points[p].front.is_none_or(|front| bundle.direction.along().dot(front) > 0.0);
+        }
+    }
+    is_free
 }
 
 /// A direction, by the axis that it is nearest to.
@@ -111,7 +113,7 @@ fn corners() -> Vec<Direction> {
     [1.0, -1.0].into_iter().flat_map(towards).collect()
 }
 
-/// Rays of one direction, in a grid of cells seen from above.
+/// Rays of one direction, in a grid of cells seen from above, and in the order of these.
 struct Bundle {
     direction: Direction,
     beside: f64,
@@ -126,7 +128,7 @@ impl Bundle {
         let from: Vec<[f64; 3]> = points.iter().map(|p| direction.upright(p.at)).collect();
         let met = from.iter().map(|_| AtomicBool::new(false)).collect();
         let grid = RayGrid::new(from.iter().copied(), 4, 512);
-        Self { direction, beside, from, met, grid }
+        Self { direction, beside, from: grid.order().iter().map(|r| from[*r as usize]).collect(), met, grid }
     }
 
     /// May a ray meet what lies in a box? Rays that have met something already count for none.
@@ -136,7 +138,7 @@ impl Bundle {
         let span = |axis: usize| corners.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |s, c| [s[0].min(c[axis]), s[1].max(c[axis])]);
         let (x, y, top) = (span(0), span(1), span(2)[1]);
         let is_under = |ray: usize| !self.met[ray].load(Relaxed) && self.from[ray][2] <= top;
-        !reach.is_empty() && self.grid.under([x, y]).flatten().any(|ray| is_under(*ray as usize))
+        !reach.is_empty() && self.grid.places_under([x, y]).any(is_under)
     }
 
     #[inline(always)]
@@ -155,7 +157,7 @@ impl Bundle {
         if !self.grid.may_meet(flat(&q)) {
             return;
         }
-        for ray in self.grid.under(flat(&q)).flatten().map(|r| *r as usize) {
+        for ray in self.grid.places_under(flat(&q)) {
             if !self.met[ray].load(Relaxed) && is_above(&q, self.from[ray], self.beside) {
                 self.met[ray].store(true, Relaxed);
             }

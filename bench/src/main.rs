@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 use compare::{Cache, Judged, Options, Side};
-use suture_bench::generate::{self, Case};
+use suture_bench::generate::{self, Case, Density};
 use suture_bench::judge::{self, Judgement, Same};
 use suture_bench::meaning::{self, Family};
 
@@ -34,6 +34,9 @@ enum Task {
         out: PathBuf,
         #[arg(long, default_value_t = 1)]
         seed: u64,
+        /// sparse: one cell of 512 triangles in ten holds a defect; everywhere: each one does.
+        #[arg(long, default_value = "sparse")]
+        density: Density,
     },
     /// Check a binary STL independently of the engine. Exit code 1: not closed, manifold and oriented.
     Judge {
@@ -125,6 +128,9 @@ struct Compare {
     sizes: Vec<u64>,
     #[arg(long, value_delimiter = ',', default_value = "mixed,clean")]
     cases: Vec<Case>,
+    /// How many cells of 512 triangles hold a defect of their case: sparse (one in ten), everywhere.
+    #[arg(long, value_delimiter = ',', default_value = "sparse")]
+    density: Vec<Density>,
     /// Binary STL files from elsewhere, instead of generated ones.
     #[arg(long, num_args = 1.., conflicts_with_all = ["sizes", "cases"])]
     files: Vec<PathBuf>,
@@ -249,6 +255,9 @@ struct Publish {
     /// The folder of raw files, instead of this crate's `results`. Page and plots are then put there, too.
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,
+    /// Write nothing; exit code 1 if the pages, or the README's table, are not those of the raw runs.
+    #[arg(long)]
+    check: bool,
 }
 
 /// One program, or all.
@@ -266,7 +275,7 @@ impl std::str::FromStr for Peer {
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().task {
-        Task::Generate { case, triangles, out, seed } => generate_file(case, triangles, &out, seed),
+        Task::Generate { case, triangles, out, seed, density } => generate_file(case, density, triangles, &out, seed),
         Task::Judge { file, solid: true, .. } => judge_solid(&file),
         Task::Judge { file, intended: Some(intended), .. } => judge_intended(&file, &intended),
         Task::Judge { file, skin_of: Some(before), .. } => judge_skin(&file, &before),
@@ -281,6 +290,7 @@ fn main() -> ExitCode {
         Task::Meaning(choices) => judge_meaning(choices),
         Task::Meant { folder, which } => write_meant(&folder, &which),
         Task::Skin { folder, jobs, keep, options } => judge_skins(&folder, jobs, keep, options),
+        Task::Publish(Publish { results, check: true }) => check(results.as_deref()),
         Task::Publish(choices) => publish(choices.results.as_deref()).map(|()| ExitCode::SUCCESS),
     };
     done.unwrap_or_else(|error| {
@@ -294,8 +304,8 @@ fn name_and_size<T: std::str::FromStr<Err: std::fmt::Display>>(text: &str) -> Re
     Ok((name.parse().map_err(|e: T::Err| e.to_string())?, size.parse().map_err(|e| format!("{e}"))?))
 }
 
-fn generate_file(case: Case, triangles: u64, out: &Path, seed: u64) -> Result<ExitCode, Box<dyn Error>> {
-    let truth = generate::write_file(case, triangles, seed, out)?;
+fn generate_file(case: Case, density: Density, triangles: u64, out: &Path, seed: u64) -> Result<ExitCode, Box<dyn Error>> {
+    let truth = generate::write_file_at(case, density, triangles, seed, out)?;
     println!("{:#?}\ninjected: {:#?}\nvolume: {}", truth.counts, truth.injected, truth.volume);
     Ok(ExitCode::SUCCESS)
 }
@@ -434,6 +444,7 @@ fn compare_all(choices: Compare) -> Result<ExitCode, Box<dyn Error>> {
     let options = Options {
         sizes: if elsewhere { Vec::new() } else { choices.sizes },
         cases: choices.cases,
+        densities: choices.density,
         files: choices.files,
         many: choices.many,
         up_to: choices.up_to,
@@ -468,13 +479,25 @@ fn without_place(word: String) -> String {
     }
 }
 
+/// Where raw runs are, where their pages belong, and the README that has their table.
+fn places(results: Option<&Path>) -> (PathBuf, PathBuf, Option<PathBuf>) {
+    match results {
+        Some(raw) => (raw.into(), raw.into(), None),
+        None => (compare::results(), compare::home().into(), Some(compare::home().join("../README.md"))),
+    }
+}
+
 /// Publishes this crate's raw runs, or others where they are.
 fn publish(results: Option<&Path>) -> Result<(), Box<dyn Error>> {
-    let into = results.unwrap_or(compare::home());
-    match results {
-        Some(raw) => compare::publish(raw, into, None)?,
-        None => compare::publish(&compare::results(), into, Some(&compare::home().join("../README.md")))?,
-    }
+    let (raw, into, readme) = places(results);
+    compare::publish(&raw, &into, readme.as_deref())?;
     println!("results are in {}", into.join("RESULTS.md").display());
     Ok(())
+}
+
+fn check(results: Option<&Path>) -> Result<ExitCode, Box<dyn Error>> {
+    let (raw, into, readme) = places(results);
+    let outdated = compare::outdated(&raw, &into, readme.as_deref())?;
+    outdated.iter().for_each(|path| println!("{} is not what the raw runs say: publish", path.display()));
+    Ok(ExitCode::from(u8::from(!outdated.is_empty())))
 }

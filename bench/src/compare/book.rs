@@ -112,9 +112,9 @@ impl Book {
         }
         inputs.retain(|input| self.chapters.iter().any(|chapter| chapter.runs(input).next().is_some()));
         inputs.sort_by_key(|input| {
-            let case = Case::ALL.iter().position(|case| case.name() == input.case);
+            let case = input.case.split(' ').next().and_then(|name| Case::ALL.iter().position(|case| case.name() == name));
             // The case that has everything first.
-            let case = if input.case == "mixed" { Some(0) } else { case.map(|at| at + 1) };
+            let case = if input.case.starts_with("mixed") { Some(0) } else { case.map(|at| at + 1) };
             (input.seed.is_none(), input.files > 1, input.size, case, input.key.clone())
         });
         inputs

@@ -11,6 +11,7 @@ mod cache;
 mod cgroup;
 mod child;
 pub(crate) mod closing;
+mod csv;
 mod error;
 mod folders;
 mod machine;
@@ -21,6 +22,7 @@ mod options;
 mod page;
 mod page_arrays;
 mod page_closing;
+mod page_damage;
 mod page_meaning;
 mod page_skin;
 mod page_solids;
@@ -35,10 +37,10 @@ mod together;
 mod trial;
 mod way;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use suture_bench::generate::Case;
+use suture_bench::generate::{Case, Density};
 
 pub(crate) use error::Error;
 pub(crate) use folders::{home, results};
@@ -78,28 +80,62 @@ pub(crate) fn compare(options: &Options) -> Result<(), Error> {
     for &size in &options.sizes {
         let fits = |case: Case| options.up_to.iter().all(|(bounded, most)| *bounded != case || size <= *most);
         for &case in options.cases.iter().filter(|case| fits(**case)) {
-            trial.generated(case, size)?;
+            let asked = |density: &&Density| case.has_density() || **density == Density::Sparse;
+            for &density in options.densities.iter().filter(asked) {
+                trial.generated(case, density, size)?;
+            }
         }
     }
     Ok(())
 }
 
-/// Makes the page (`RESULTS.md`), the plots and the README's table from the raw runs of `raw`, into the folder `into`.
+/// Makes the page (`RESULTS.md`), the table of real files, the plots and the README's table from the raw runs of `raw`, into the folder `into`.
 ///
 /// # Errors
 /// When there are no raw runs, or something cannot be read or written.
 pub(crate) fn publish(raw: &Path, into: &Path, readme: Option<&Path>) -> Result<(), Error> {
-    let book = book::Book::load(raw)?;
     let plots = into.join("plots");
     std::fs::create_dir_all(&plots).map_err(Error::io("making the folder of plots"))?;
-    let drawn = plot::draw(&book, &plots)?;
-    let write = |path: &Path, text: String| std::fs::write(path, text).map_err(Error::io(format!("writing {}", path.display())));
-    write(&into.join("RESULTS.md"), page::page(&book, &drawn))?;
-    if let Some(readme) = readme {
-        let text = std::fs::read_to_string(readme).map_err(Error::io(format!("reading {}", readme.display())))?;
-        if let Some(text) = page::put_in(&text, &page::short(&book)) {
-            write(readme, text)?;
-        }
+    for (path, text) in pages(raw, into, &plots, readme)? {
+        std::fs::write(&path, text).map_err(Error::io(format!("writing {}", path.display())))?;
     }
     Ok(())
+}
+
+/// The published texts that are not those of the raw runs any more; writes nothing there.
+///
+/// # Errors
+/// As [`publish`].
+pub(crate) fn outdated(raw: &Path, into: &Path, readme: Option<&Path>) -> Result<Vec<PathBuf>, Error> {
+    let plots = tempfile::tempdir().map_err(Error::io("making a folder"))?;
+    let mut pages = pages(raw, into, plots.path(), readme)?;
+    pages.retain(|(path, text)| std::fs::read_to_string(path).ok().as_ref() != Some(text));
+    Ok(pages.into_iter().map(|(path, _)| path).collect())
+}
+
+/// What is published, by where it belongs; draws the plots.
+fn pages(raw: &Path, into: &Path, plots: &Path, readme: Option<&Path>) -> Result<Vec<(PathBuf, String)>, Error> {
+    let book = book::Book::load(raw)?;
+    let drawn = plot::draw(&book, plots)?;
+    let mut pages = vec![(into.join("RESULTS.md"), page::page(&book, &drawn))];
+    let files = csv::real_files(&book);
+    if !files.is_empty() {
+        pages.push((raw.join("real-files.csv"), files));
+    }
+    if let Some(readme) = readme {
+        let text = std::fs::read_to_string(readme).map_err(Error::io(format!("reading {}", readme.display())))?;
+        pages.extend(page::put_in(&text, &page::short(&book)).map(|text| (readme.into(), text)));
+    }
+    Ok(pages)
+}
+
+#[cfg(test)]
+mod tests {
+    /// Whoever adds raw runs, or changes a page, publishes.
+    #[test]
+    fn what_is_published_is_what_the_raw_runs_say() {
+        let readme = super::home().join("../README.md");
+        let outdated = super::outdated(&super::results(), super::home(), Some(&readme)).unwrap();
+        assert!(outdated.is_empty(), "`suture-bench publish` makes these anew: {outdated:?}");
+    }
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use suture_bench::generate::Case;
+use suture_bench::generate::{Case, Density};
 
 use super::sides::Side;
 use super::way::{Cache, Way};
@@ -13,6 +13,8 @@ use super::way::{Cache, Way};
 pub(crate) struct Options {
     pub(crate) sizes: Vec<u64>,
     pub(crate) cases: Vec<Case>,
+    /// How dense the defects of each case are, where it has any.
+    pub(crate) densities: Vec<Density>,
     /// Files from elsewhere, instead of generated ones.
     pub(crate) files: Vec<PathBuf>,
     /// Generate a folder of so many files for each size and case.

@@ -8,6 +8,7 @@ use super::machine::Machine;
 use super::markdown::{self, or_dash};
 use super::page_arrays;
 use super::page_closing;
+use super::page_damage;
 use super::page_meaning;
 use super::page_skin;
 use super::page_solids;
@@ -40,6 +41,7 @@ pub(super) fn page(book: &Book, plots: &[(String, String)]) -> String {
         let _ = write!(page, "\n![{caption}](plots/{name})\n\n*{caption}*\n");
     }
     page += &targets(book);
+    page += &page_damage::damage(book);
     page += &flat(book);
     page += &searches(book);
     page += &page_closing::shapes(book);

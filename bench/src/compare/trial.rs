@@ -5,7 +5,7 @@ use std::process::Command;
 
 use serde::Deserialize;
 use suture_bench::Counts;
-use suture_bench::generate::{self, Case};
+use suture_bench::generate::{self, Case, Density};
 use suture_bench::judge;
 
 use super::cache;
@@ -57,11 +57,15 @@ impl<'a> Trials<'a> {
     }
 
     /// Over a generated file, or a folder of them, which is removed afterwards.
-    pub(super) fn generated(&mut self, case: Case, size: u64) -> Result<(), Error> {
+    pub(super) fn generated(&mut self, case: Case, density: Density, size: u64) -> Result<(), Error> {
         let (seed, files) = (self.options.seed, self.options.many.max(1));
+        let name = match density {
+            Density::Sparse => case.name().into(),
+            Density::Everywhere => format!("{case} {}", density.name()),
+        };
         let mut input = Input {
-            key: format!("{case} {size} {files} {seed}"),
-            case: case.name().into(),
+            key: format!("{name} {size} {files} {seed}"),
+            case: name,
             size,
             files,
             seed: Some(seed),
@@ -81,7 +85,7 @@ impl<'a> Trials<'a> {
         }
         for number in 0..files {
             let file = if files == 1 { path.clone() } else { path.join(format!("{number:04}.stl")) };
-            let truth = generate::write_file(case, size, seed + number, &file)?;
+            let truth = generate::write_file_at(case, density, size, seed + number, &file)?;
             input.triangles += truth.counts.triangles;
             input.bytes += std::fs::metadata(&file).map_err(Error::io("looking at an input"))?.len();
             if files == 1 {

@@ -92,6 +92,11 @@ impl Case {
         }
     }
 
+    /// Are there local defects in it, which can be few or many?
+    pub fn has_density(self) -> bool {
+        !self.kinds().is_empty()
+    }
+
     /// The local defects of the case, dealt out in turn.
     pub(super) fn kinds(self) -> &'static [Kind] {
         match self {
@@ -138,6 +143,45 @@ impl std::str::FromStr for Case {
 
     fn from_str(name: &str) -> Result<Self> {
         Self::ALL.into_iter().find(|case| case.name() == name).ok_or_else(|| Error::UnknownCase { name: name.into() })
+    }
+}
+
+/// How many of the cells of 512 triangles hold a defect of the case.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Density {
+    /// About one in ten.
+    #[default]
+    Sparse,
+    /// Every one.
+    Everywhere,
+}
+
+impl Density {
+    /// Every density.
+    pub const ALL: [Self; 2] = [Self::Sparse, Self::Everywhere];
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sparse => "sparse",
+            Self::Everywhere => "everywhere",
+        }
+    }
+
+    pub(super) fn cells_per_defect(self) -> u64 {
+        match self {
+            Self::Sparse => 10,
+            Self::Everywhere => 1,
+        }
+    }
+}
+
+impl std::str::FromStr for Density {
+    type Err = String;
+
+    fn from_str(name: &str) -> std::result::Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|density| density.name() == name);
+        found.ok_or_else(|| format!("the densities are {}", Self::ALL.map(Self::name).join(", ")))
     }
 }
 

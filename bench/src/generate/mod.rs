@@ -1,7 +1,7 @@
 //! Binary STL files of any size with defects that are known exactly, written as a stream in memory that hardly grows with the
 //! size (tables as long as one row and one column of the surface).
 //!
-//! The surface is cut into cells of 512 triangles; about one cell in ten holds one defect, away from the cell's border, so that
+//! The surface is cut into cells of 512 triangles; about one cell in ten, or every one, holds one defect, away from the cell's border, so that
 //! defects never interact and the truth is their sum. Same case, size and seed give the same bytes on every platform.
 
 mod case;
@@ -15,7 +15,7 @@ use std::fs::File;
 use std::io::Write;
 use std::path::Path;
 
-pub use case::{Case, Error, Result, Truth};
+pub use case::{Case, Density, Error, Result, Truth};
 pub(crate) use noise::{Random, turn};
 
 /// Writes about `triangles` triangles (at least one cell of 512; the truth says how many) of `case` as binary STL.
@@ -23,7 +23,7 @@ pub(crate) use noise::{Random, turn};
 /// # Errors
 /// When `out` fails, or when the count does not fit a binary STL.
 pub fn write(case: Case, triangles: u64, seed: u64, out: &mut impl Write) -> Result<Truth> {
-    write::write(case, triangles, seed, out)
+    write::write((case, Density::Sparse), triangles, seed, out)
 }
 
 /// The same, into a file that is created or replaced.
@@ -31,8 +31,16 @@ pub fn write(case: Case, triangles: u64, seed: u64, out: &mut impl Write) -> Res
 /// # Errors
 /// As [`write()`], and when the file cannot be created.
 pub fn write_file(case: Case, triangles: u64, seed: u64, path: &Path) -> Result<Truth> {
+    write_file_at(case, Density::Sparse, triangles, seed, path)
+}
+
+/// The same, with defects as dense as that.
+///
+/// # Errors
+/// As [`write_file`].
+pub fn write_file_at(case: Case, density: Density, triangles: u64, seed: u64, path: &Path) -> Result<Truth> {
     let mut file = File::create(path).map_err(|source| Error::Create { path: path.into(), source })?;
-    let truth = write(case, triangles, seed, &mut file)?;
+    let truth = write::write((case, density), triangles, seed, &mut file)?;
     file.flush()?;
     Ok(truth)
 }
@@ -57,6 +65,19 @@ mod tests {
                 assert_eq!(bytes.len() as u64, 84 + 50 * truth.counts.triangles, "{case} {triangles}");
                 assert!(!bytes.starts_with(b"solid"));
             }
+        }
+    }
+
+    #[test]
+    fn everywhere_is_in_every_cell() {
+        let folder = tempfile::tempdir().unwrap();
+        for case in Case::ALL.into_iter().filter(|case| case.has_density()) {
+            let truth = write_file_at(case, Density::Everywhere, 50_000, 1, &folder.path().join("a.stl")).unwrap();
+            let cells = truth.injected.values().sum::<u64>();
+            let sparse = generated(case, 50_000, 1).1.injected.values().sum::<u64>();
+            // Of two bodies one is sound.
+            let all = if case == Case::TwoBodies { 45 } else { 90 };
+            assert!(cells >= all && cells >= 4 * sparse && truth.sound.len() as u64 <= cells, "{case}: {cells}, {sparse}");
         }
     }
 

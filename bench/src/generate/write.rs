@@ -3,26 +3,23 @@
 use std::collections::BTreeMap;
 use std::io::Write;
 
-use super::case::{Case, Error, Result, Truth};
+use super::case::{Case, Density, Error, Result, Truth};
 use super::cell::{Cell, cross, dot, minus};
 use super::defect::Kind;
 use super::noise::{Permutation, Random, hash, noise, turn};
 use super::surface::{CELL_TRIANGLES, Ring, Triangle, on_grid};
 use crate::counts::Counts;
 
-/// Every tenth cell holds a defect, more in files too small to show every kind.
-const CELLS_PER_DEFECT: u64 = 10;
-
-pub(super) fn write(case: Case, triangles: u64, seed: u64, out: &mut impl Write) -> Result<Truth> {
+pub(super) fn write((case, density): (Case, Density), triangles: u64, seed: u64, out: &mut impl Write) -> Result<Truth> {
     match case {
         Case::HugeFan => huge_fan(triangles, seed, out),
         Case::Shuffled => shuffled(triangles, seed, out),
         Case::TwoBodies => {
             let half = triangles / 2;
             let bodies = [(Ring::new(half, seed, 0.0), &[] as &[Kind]), (Ring::new(half, seed ^ 1, 110.0), case.kinds())];
-            rings(case, seed, &bodies, out)
+            rings((case, density), seed, &bodies, out)
         }
-        _ => rings(case, seed, &[(Ring::new(triangles, seed, 0.0), case.kinds())], out),
+        _ => rings((case, density), seed, &[(Ring::new(triangles, seed, 0.0), case.kinds())], out),
     }
 }
 
@@ -86,9 +83,10 @@ struct Sites {
 }
 
 impl Sites {
-    fn new(kinds: &'static [Kind], seed: u64, cells: u64) -> Self {
+    /// One for so many cells as `density` says, more in files too small to show every kind.
+    fn new(kinds: &'static [Kind], seed: u64, cells: u64, density: Density) -> Self {
         let wanted = 4.max(kinds.len() as u64);
-        Self { kinds, seed, cells, group: (cells / wanted).clamp(1, CELLS_PER_DEFECT) }
+        Self { kinds, seed, cells, group: (cells / wanted).clamp(1, density.cells_per_defect()) }
     }
 
     /// The defect of a cell, with the randomness that shapes it.
@@ -102,7 +100,7 @@ impl Sites {
 }
 
 /// Rings with local defects, and the cases that treat every triangle alike.
-fn rings(case: Case, seed: u64, bodies: &[(Ring, &'static [Kind])], out: &mut impl Write) -> Result<Truth> {
+fn rings((case, density): (Case, Density), seed: u64, bodies: &[(Ring, &'static [Kind])], out: &mut impl Write) -> Result<Truth> {
     let mut truth = Truth {
         case,
         seed,
@@ -113,7 +111,7 @@ fn rings(case: Case, seed: u64, bodies: &[(Ring, &'static [Kind])], out: &mut im
         bodies: bodies.len() as u64,
         extra_bodies: 0,
     };
-    let bodies: Vec<_> = bodies.iter().map(|(ring, kinds)| (ring, Sites::new(kinds, seed, ring.cells()))).collect();
+    let bodies: Vec<_> = bodies.iter().map(|(ring, kinds)| (ring, Sites::new(kinds, seed, ring.cells(), density))).collect();
     for (ring, sites) in &bodies {
         count_damage(ring, sites, &mut truth);
     }
@@ -206,7 +204,7 @@ fn jittered(triangle: &Triangle, index: usize, ring: &Ring, seed: u64) -> Triang
 /// A ring's triangles in random order; the middle quad of a damaged cell is missing.
 fn shuffled(triangles: u64, seed: u64, out: &mut impl Write) -> Result<Truth> {
     let ring = Ring::new(triangles, seed, 0.0);
-    let sites = Sites::new(&[Kind::Hole], seed, ring.cells());
+    let sites = Sites::new(&[Kind::Hole], seed, ring.cells(), Density::Sparse);
     let holes = (0..ring.cells()).filter(|&cell| sites.at(cell).is_some()).count() as u64;
     let mut truth = Truth {
         case: Case::Shuffled,

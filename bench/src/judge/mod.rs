@@ -55,18 +55,18 @@ pub fn volumes(triangles: &[Triangle]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generate::{self, Case};
+    use crate::generate::{self, Case, Density};
 
     /// The generators predict, the judge finds; neither knows how the other counts.
     #[test]
     fn finds_in_every_generated_file_what_was_put_there() {
         let folder = tempfile::tempdir().unwrap();
-        for case in Case::ALL {
+        for (case, density) in Case::ALL.into_iter().flat_map(|case| Density::ALL.map(|density| (case, density))) {
             for (triangles, seed) in [(512, 1), (3_000, 2), (20_000, 3)] {
                 let path = folder.path().join("a.stl");
-                let truth = generate::write_file(case, triangles, seed, &path).unwrap();
+                let truth = generate::write_file_at(case, density, triangles, seed, &path).unwrap();
                 let found = judge(&path).unwrap();
-                assert_eq!(found.counts, truth.counts, "{case}, {triangles} triangles, seed {seed}");
+                assert_eq!(found.counts, truth.counts, "{case} {density:?}, {triangles} triangles, seed {seed}");
                 assert_eq!(found.nonfinite, 0);
             }
         }

@@ -8,8 +8,9 @@ pub(super) const WIDEST: f64 = 4.0;
 pub(super) const CELL: f64 = 2.0;
 /// A cell is so many small ones along each axis.
 pub(super) const FINER: f64 = 8.0;
-/// More vertices in one small cell are a crowd.
-pub(super) const CROWD: usize = 64;
+/// More vertices in one small cell are a crowd: those of one vertex of the model are hardly more than a dozen, so that here several lie nearer to each
+/// other than their corners came apart.
+pub(super) const CROWD: usize = 16;
 
 /// Cells are looked up with so much to spare, in their widths, that rounding misses none.
 const SPARE: f64 = 1e-6;

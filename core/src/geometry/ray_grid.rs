@@ -32,14 +32,16 @@ impl RayGrid {
     }
 
     /// Monotonous, so that a ray in a box is in one of the cells between those of its ends.
+    #[inline]
     fn cell(&self, axis: usize, x: f64) -> usize {
         (((x - self.lo[axis]) * self.per_unit[axis]) as usize).min(self.side - 1)
     }
 
     /// The rays in the cells under the box of three corners, row by row.
+    #[inline]
     pub(crate) fn under<T: Copy + Into<f64>>(&self, corners: &[[T; 3]; 3]) -> impl Iterator<Item = &[u32]> + use<'_, T> {
         let span = |k: usize| {
-            let x: [f64; 3] = corners.map(|c| c[k].into());
+            let x: [f64; 3] = [corners[0][k].into(), corners[1][k].into(), corners[2][k].into()];
             (self.cell(k, x[0].min(x[1]).min(x[2])), self.cell(k, x[0].max(x[1]).max(x[2])))
         };
         let ((x0, x1), (y0, y1)) = (span(0), span(1));

@@ -12,6 +12,7 @@ use glam::DVec3;
 
 use crate::geometry::position;
 use crate::geometry::ray_grid::RayGrid;
+use crate::util::parallel;
 
 use super::surfaces::{Surfaces, Which};
 
@@ -49,7 +50,7 @@ fn are_free(surfaces: &Surfaces<'_>, which: Which, points: &[OnSurface], directi
         let corners = corners.map(|p| p.map(f64::from));
         bundles.iter().for_each(|bundle| bundle.meet(&corners));
     };
-    surfaces.each_in_memory(which, meet);
+    parallel::map(surfaces.survey.threads(), surfaces.parts(), |part| surfaces.each_of_part(which, part, meet));
     surfaces.survey.visit_regular(
         |region| surfaces.has(which, region),
         |_| Some(()),
@@ -84,8 +85,13 @@ impl Direction {
     }
 
     /// The coordinates in a frame in which it is upright.
+    #[inline]
     fn upright(&self, p: [f64; 3]) -> [f64; 3] {
-        let [x, y, z] = [1, 2, 0].map(|k| p[(self.axis + k) % 3]);
+        let [x, y, z] = match self.axis {
+            0 => [p[1], p[2], p[0]],
+            1 => [p[2], p[0], p[1]],
+            _ => p,
+        };
         let up = z * self.way;
         [x - self.askew[0] * up, y - self.askew[1] * up, up]
     }
@@ -122,10 +128,13 @@ impl Bundle {
 
     /// Notes the rays that a triangle is in the way of.
     fn meet(&self, corners: &[[f64; 3]; 3]) {
-        let q = corners.map(|p| self.direction.upright(p));
-        for ray in self.grid.under(&q).flatten().map(|r| *r as usize) {
-            if !self.met[ray].load(Relaxed) && is_above(&q, self.from[ray], self.beside) {
-                self.met[ray].store(true, Relaxed);
+        let [a, b, c] = *corners;
+        let q = [self.direction.upright(a), self.direction.upright(b), self.direction.upright(c)];
+        for rays in self.grid.under(&q) {
+            for ray in rays.iter().map(|r| *r as usize) {
+                if !self.met[ray].load(Relaxed) && is_above(&q, self.from[ray], self.beside) {
+                    self.met[ray].store(true, Relaxed);
+                }
             }
         }
     }

@@ -59,7 +59,15 @@ pub(crate) fn boxed_cross(a: &Triangle, b: &Triangle) -> bool {
 
 /// Which corners of the one are also corners of the other, both ways.
 pub(crate) fn common(a: &Triangle, b: &Triangle) -> [[bool; 3]; 2] {
-    [a.map(|p| b.contains(&p)), b.map(|p| a.contains(&p))]
+    let mut common = [[false; 3]; 2];
+    for (i, p) in a.iter().enumerate() {
+        for (j, q) in b.iter().enumerate() {
+            if p == q {
+                (common[0][i], common[1][j]) = (true, true);
+            }
+        }
+    }
+    common
 }
 
 /// The same where it does not matter whether two triangles touch or are apart, which is often known sooner. Both have an area;
@@ -72,12 +80,16 @@ pub(crate) fn self_intersection(a: &Triangle, b: &Triangle, common: [[bool; 3]; 
 /// Do two edges of two triangles, which are not the same edge, have a stretch in common? [`Contact::Touch`] is told if so: it is no
 /// self-intersection, but what is on the two sides of each of them may not be what it is without the other.
 pub(crate) fn edge_along_edge(a: &Triangle, b: &Triangle) -> Option<Contact> {
-    let edges = |t: &Triangle| [0, 1, 2].map(|k| [t[k], t[(k + 1) % 3]]);
-    let of_b = edges(b);
-    edges(a).iter().any(|e| of_b.iter().any(|f| have_a_stretch_in_common(e, f))).then_some(Contact::Touch)
+    let meets = |i: usize, j: usize| have_a_stretch_in_common([&a[i], &a[(i + 1) % 3]], [&b[j], &b[(j + 1) % 3]]);
+    for i in 0..3 {
+        if meets(i, 0) || meets(i, 1) || meets(i, 2) {
+            return Some(Contact::Touch);
+        }
+    }
+    None
 }
 
-fn have_a_stretch_in_common([a, b]: &[Point; 2], [c, d]: &[Point; 2]) -> bool {
+fn have_a_stretch_in_common([a, b]: [&Point; 2], [c, d]: [&Point; 2]) -> bool {
     let range = |p: &Point, q: &Point, k: usize| (p[k].min(q[k]), p[k].max(q[k]));
     let (mut longest, mut length) = (0, 0.0);
     for k in 0..3 {

@@ -28,10 +28,14 @@ use crate::topology::chunk::IrregularTriangle;
 use crate::topology::survey::Survey;
 use crate::topology::vertex_table::Weld;
 use crate::util::ids::NONE;
+use crate::util::scatter::Hashing;
 use crate::util::steps;
 
 /// A vertex of the submesh.
 pub(crate) type Vertex = u32;
+
+/// Vertices by position.
+pub(crate) type ByPosition = HashMap<Position, Vertex, Hashing>;
 
 /// Where a triangle comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -148,12 +152,21 @@ impl Submesh {
         gathering.finish()
     }
 
-    /// Vertices by position: of several there, one that is used.
-    pub(crate) fn by_position(&self) -> HashMap<Position, Vertex> {
+    /// Vertices by position: of several there, the one that is used last.
+    pub(crate) fn by_position(&self) -> ByPosition {
         steps::count(self.positions.len());
-        let used = self.living().flat_map(|t| self.triangles[t as usize].v);
-        let all = 0..self.positions.len() as Vertex;
-        all.chain(used).map(|v| (Position::of(self.positions[v as usize]), v)).collect()
+        let mut last_use = vec![0; self.positions.len()];
+        for t in self.living() {
+            (1..).zip(self.triangles[t as usize].v).for_each(|(k, v)| last_use[v as usize] = 3 * u64::from(t) + k);
+        }
+        let mut known = ByPosition::with_capacity_and_hasher(self.positions.len(), Hashing::default());
+        for (v, p) in (0..).zip(&self.positions) {
+            let there = known.entry(Position::of(*p)).or_insert(v);
+            if last_use[v as usize] >= last_use[*there as usize] {
+                *there = v;
+            }
+        }
+        known
     }
 
     /// Takes in what [`Survey::promote`] has found for some of its incomplete vertices, which become complete: those that `completed`
@@ -162,7 +175,7 @@ impl Submesh {
         &mut self,
         survey: &Survey<'_>,
         new: &[(IrregularTriangle, u32)],
-        completed: impl FnOnce(&HashMap<Position, Vertex>) -> Vec<Vertex>,
+        completed: impl FnOnce(&ByPosition) -> Vec<Vertex>,
     ) {
         let mut known = self.by_position();
         for (irregular_triangle, region) in new {

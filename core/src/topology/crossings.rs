@@ -18,8 +18,8 @@ pub(crate) fn most_tested(triangles: u64) -> u64 {
     (1 << 30) + 16 * triangles
 }
 
-/// Most pairs of a file that are kept for the second look.
-const MOST_KEPT: usize = 1 << 18;
+/// Most pairs of a file that are kept for the second look, of twelve bytes each.
+const MOST_KEPT: usize = 1 << 20;
 
 /// A pair of triangles that cross or overlap, by number, the smaller one first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -13,6 +13,7 @@ use glam::DVec3;
 use crate::geometry::position;
 use crate::geometry::ray_grid::{RayGrid, flat};
 use crate::geometry::sums::Bounds;
+use crate::util::parallel;
 
 use super::surfaces::{Surfaces, Which};
 
@@ -46,7 +47,8 @@ pub(super) fn from_outside(surfaces: &Surfaces<'_>, which: Which, points: &[OnSu
 /// Does any ray of each point meet nothing?
 fn are_free(surfaces: &Surfaces<'_>, which: Which, points: &[OnSurface], directions: &[Direction], beside: f64) -> Vec<bool> {
     let bundles: Vec<Bundle> = directions.iter().map(|direction| Bundle::of(*direction, points, beside)).collect();
-    surfaces.each_in_memory(which, |corners| bundles.iter().for_each(|bundle| bundle.meet(corners)));
+    let meet = |corners: &[[f32; 3]; 3]| bundles.iter().for_each(|bundle| bundle.meet(corners));
+    parallel::map(surfaces.survey.threads(), surfaces.parts(), |part| surfaces.each_of_part(which, part, meet));
     surfaces.survey.visit_regular(
         |region| surfaces.has(which, region),
         |reach| {

@@ -11,6 +11,9 @@ use crate::util::ids::NONE;
 /// A triangle by its positions.
 pub(super) type Corners = [[f32; 3]; 3];
 
+/// Triangles of the submesh in a part of what is in memory.
+const PART: usize = 8192;
+
 /// By region of regular surface, the repair that dropped it.
 pub(crate) type DroppedBy = Vec<Option<RepairName>>;
 
@@ -56,17 +59,35 @@ impl Surfaces<'_> {
 
     /// Visits the triangles of a surface that are not regular.
     pub(crate) fn each_in_memory(&self, which: Which, mut visit: impl FnMut(&Corners)) {
-        match which {
-            Which::Before | Which::Closed => {
-                self.submesh.triangles.iter().filter_map(|t| self.as_read(t.origin)).for_each(|t| visit(&t));
-                let is_asked = |t: &u32| is_asked_for(self.made_by(*t));
-                self.submesh.living().filter(is_asked).for_each(|t| visit(&self.submesh.points(t)));
-                let holes = self.holes.iter().filter(|_| which == Which::Closed);
-                holes.for_each(|t| visit(&self.submesh.points(*t)));
+        (0..self.parts()).for_each(|part| self.each_of_part(which, part, &mut visit));
+    }
+
+    /// How many parts these have, each for a thread.
+    pub(crate) fn parts(&self) -> usize {
+        1 + self.submesh.triangles.len().div_ceil(PART)
+    }
+
+    /// Visits those of one part.
+    pub(crate) fn each_of_part(&self, which: Which, part: usize, mut visit: impl FnMut(&Corners)) {
+        let Some(part) = part.checked_sub(1) else {
+            match which {
+                Which::Closed => self.holes.iter().for_each(|t| visit(&self.submesh.points(*t))),
+                Which::Before => {}
+                Which::After => self.wrapped.iter().for_each(visit),
             }
-            Which::After => {
-                self.submesh.living().for_each(|t| visit(&self.submesh.points(t)));
-                self.wrapped.iter().for_each(visit);
+            return;
+        };
+        for t in (part * PART..self.submesh.triangles.len().min((part + 1) * PART)).map(|t| t as u32) {
+            let lives = || self.submesh.lives(t);
+            match which {
+                Which::Before | Which::Closed => {
+                    self.as_read(self.submesh.triangles[t as usize].origin).iter().for_each(&mut visit);
+                    if lives() && is_asked_for(self.made_by(t)) {
+                        visit(&self.submesh.points(t));
+                    }
+                }
+                Which::After if lives() => visit(&self.submesh.points(t)),
+                Which::After => {}
             }
         }
     }

@@ -4,6 +4,7 @@ use std::cmp::Ordering;
 
 use crate::geometry::arrange::piece::{Piece, agree};
 use crate::util::ids::NONE;
+use crate::util::radix::sort_by_number;
 use crate::util::union_find::{find, unite};
 
 /// A piece at an edge from a point to a higher one.
@@ -79,20 +80,28 @@ pub(crate) fn number(triangles: &[[[f32; 3]; 3]], pieces: &mut [Piece], side: &d
             uses.push(Use { edge: [a.min(b), a.max(b)], piece: i, forward: a < b, apex: piece.v[(k + 2) % 3] });
         }
     }
-    uses.sort_unstable();
+    // Stably, so that of an edge they stay in the order of the pieces.
+    sort_by_number(&mut uses, |used| used.edge[1]);
+    sort_by_number(&mut uses, |used| used.edge[0]);
     // Two numbers a piece, in front of it and behind. A piece that runs with the edge has its front on the left.
     let left = |u: &Use| 2 * u.piece + u32::from(!u.forward);
     let right = |u: &Use| 2 * u.piece + u32::from(u.forward);
     let mut parents: Vec<u32> = (0..2 * pieces.len() as u32).collect();
     let around = Around { triangles, pieces, side };
     for uses in uses.chunk_by(|a, b| a.edge == b.edge).filter(|uses| uses.len() > 1) {
+        // Two alone are neighbours on both sides, wherever they lie, if not at one place.
+        if let [one, other] = uses
+            && around.half(one, other) != Half::Same
+        {
+            unite(&mut parents, left(one), right(other));
+            unite(&mut parents, left(other), right(one));
+            continue;
+        }
         let fan = if uses.len() == 2 { uses.iter().map(|u| (Half::Same, *u)).collect() } else { around.sorted(uses) };
         let alike = |a: &(Half, Use), b: &(Half, Use)| {
             a.0 == b.0 && (matches!(a.0, Half::Same | Half::Opposite) || around.order(&a.1, &b.1).is_eq())
         };
-        // Two alone are neighbours on both sides, wherever they lie, if not at one place.
-        let apart = uses.len() == 2 && around.half(&uses[0], &uses[1]) != Half::Same;
-        let groups: Vec<&[(Half, Use)]> = if apart { fan.chunks(1).collect() } else { fan.chunk_by(alike).collect() };
+        let groups: Vec<&[(Half, Use)]> = fan.chunk_by(alike).collect();
         for (group, next) in groups.iter().zip(groups.iter().cycle().skip(1)) {
             let one = &group[0].1;
             for (_, other) in &group[1..] {

@@ -3,44 +3,36 @@
 use std::cmp::Ordering;
 
 use crate::geometry::arrange::coplanar;
-use crate::geometry::arrange::point::{Point, cross, on_line};
-use crate::geometry::arrange::soup::{Contact, Soup};
+use crate::geometry::arrange::plane::{across, on_line};
+use crate::geometry::arrange::point::Point;
+use crate::geometry::arrange::soup::{Contact, Contacts, Soup};
 use crate::geometry::exact;
 use crate::geometry::tri_tri::{self, in_a_point, one_sided, sides_of};
 
-/// The segments along which two triangles have to be cut for each other. What belongs to any surface is none: a common edge or
+/// Adds the segments along which two triangles have to be cut for each other. What belongs to any surface is none: a common edge or
 /// corner, a single point, all of the same triangle.
-pub(crate) fn contact(soup: &Soup<'_>, first: usize, second: usize) -> Vec<Contact> {
+pub(crate) fn contact(soup: &Soup<'_>, first: usize, second: usize, into: &mut Contacts) {
     let (t, u) = (&soup.triangles[first], &soup.triangles[second]);
     let [of_t, of_u] = tri_tri::common(t, u);
     let common = of_t.iter().filter(|is| **is).count();
     if common == 3 {
-        return Vec::new();
+        return;
     }
     let above = sides_of(t, u, of_u);
     if above == [0; 3] {
-        return if coplanar_apart(t, u) { Vec::new() } else { coplanar::overlap(soup, [first, second], common) };
+        return coplanar::overlap(soup, [first, second], common, into);
     }
     if common == 2 || one_sided(above) {
-        return Vec::new();
+        return;
     }
     let below = sides_of(u, t, of_t);
     if one_sided(below) || in_a_point(above) && in_a_point(below) || separated(t, u) {
-        return Vec::new();
+        return;
     }
-    crossing(soup, [first, second], [below, above]).into_iter().collect()
-}
-
-/// Does an edge of one have the other triangle strictly beyond it, in the plane of both?
-fn coplanar_apart(t: &[[f32; 3]; 3], u: &[[f32; 3]; 3]) -> bool {
-    (0..3).any(|axis| {
-        let beyond = |t: &[[f32; 3]; 3], u: &[[f32; 3]; 3]| {
-            let own = exact::orientation_along(&t[0], &t[1], &t[2], axis);
-            let out = |k: usize| u.iter().all(|p| exact::orientation_along(&t[k], &t[(k + 1) % 3], p, axis) == -own);
-            own != 0 && (0..3).any(out)
-        };
-        beyond(t, u) || beyond(u, t)
-    })
+    if let Some([low, high]) = crossing(soup, [first, second], [below, above]) {
+        let ends = [into.end_at(low), into.end_at(high)];
+        into.all.push(Contact { other: second as u32, ends, edge: None });
+    }
 }
 
 /// Are they certainly apart along a direction across two edges? (Planes tell them apart before.)
@@ -62,26 +54,25 @@ fn separated(t: &[[f32; 3]; 3], u: &[[f32; 3]; 3]) -> bool {
 }
 
 /// The segment in which two triangles meet whose planes cross, if it has a length. `sides` of the corners of each by the other's plane.
-fn crossing(soup: &Soup<'_>, pair: [usize; 2], sides: [[i8; 3]; 2]) -> Option<Contact> {
+fn crossing(soup: &Soup<'_>, pair: [usize; 2], sides: [[i8; 3]; 2]) -> Option<[Point; 2]> {
     let planes = pair.map(|t| soup.plane(t));
-    let along = cross(&planes[0].normal, &planes[1].normal);
-    let axis = (0..3).max_by_key(|k| along[*k].bits())?;
+    let (axis, direction) = across(planes[0], planes[1])?;
     let order = |a: &Point, b: &Point| {
         let order = a.cmp_along(b, axis);
-        if along[axis].sign() > 0 { order } else { order.reverse() }
+        if direction > 0 { order } else { order.reverse() }
     };
-    let ends = |which: usize| {
+    let ends = |which: usize| -> Option<[Point; 2]> {
         let (corners, s) = (soup.corners(pair[which]), sides[which]);
         let on = (0..3).filter(|i| s[*i] == 0).map(|i| Point::corner(&corners[i]));
         let through = (0..3).filter(|i| s[*i] * s[(i + 1) % 3] < 0);
         let through = through.filter_map(|i| on_line(&[corners[i], corners[(i + 1) % 3]], planes[1 - which]));
-        let found: Vec<Point> = on.chain(through).collect();
-        let (first, last) = (found.first()?, found.last()?);
-        let ends = if order(last, first) == Ordering::Less { [last, first] } else { [first, last] };
-        Some(ends.map(Clone::clone))
+        let mut found = on.chain(through);
+        let first = found.next()?;
+        let last = found.last().unwrap_or_else(|| first.clone());
+        Some(if order(&last, &first) == Ordering::Less { [last, first] } else { [first, last] })
     };
     let ([low, high], [other_low, other_high]) = (ends(0)?, ends(1)?);
     let low = if order(&low, &other_low) == Ordering::Less { other_low } else { low };
     let high = if order(&high, &other_high) == Ordering::Greater { other_high } else { high };
-    (order(&low, &high) == Ordering::Less).then_some(Contact { ends: [low, high], edge: None })
+    (order(&low, &high) == Ordering::Less).then_some([low, high])
 }

@@ -1,103 +1,129 @@
-//! The overlap of two triangles in one plane: the second, clipped by the edges of the first (Sutherland and Hodgman).
+//! The overlap of two triangles in one plane: each edge of one, as far as it lies in the other.
+//!
+//! What is a corner of the overlap is told by the signs of corners by edges, so that no point is made that is not one of its corners.
 
-use crate::geometry::arrange::flat::turn;
-use crate::geometry::arrange::point::{Corner, Point, on_lines};
-use crate::geometry::arrange::soup::{Contact, Soup};
+use crate::geometry::arrange::plane::on_lines;
+use crate::geometry::arrange::soup::{Contact, Contacts, Edge, End, Soup};
 use crate::geometry::exact;
+use crate::util::ids::NONE;
 
-/// A corner of the rest, and the edge that the side from it on lies on.
-#[derive(Clone)]
-struct Corner2 {
-    point: Point,
-    edge: [Corner; 2],
+/// Two triangles that turn to the left, seen along an axis.
+struct Both<'a> {
+    soup: &'a Soup<'a>,
+    axis: usize,
+    pair: [usize; 2],
+    /// By triangle: does it turn to the right, so that its last corners are taken the other way round?
+    turned: [bool; 2],
+    triangles: [[[f32; 3]; 3]; 2],
+    /// How corner i of the other triangle turns from edge k of this one: `signs[this][k][i]`.
+    signs: [[[i8; 3]; 3]; 2],
+    /// By an edge of the first and one of the second: where they cross, among the points, or [`NONE`] as long as nobody asked.
+    crossings: [[u32; 3]; 3],
 }
 
-/// The border of what both cover; `common` corners are those of both.
-pub(crate) fn overlap(soup: &Soup<'_>, pair: [usize; 2], common: usize) -> Vec<Contact> {
-    let axis = dominant_axis(soup, pair[0]);
-    let [clip, subject] = pair.map(|t| {
-        let mut corners = soup.corners(t);
-        let [a, b, c] = &soup.triangles[t];
-        if exact::orientation_along(a, b, c, axis) < 0 {
-            corners.swap(1, 2);
-        }
-        corners
-    });
-    let edge = |c: &[Corner; 3], k: usize| [c[k], c[(k + 1) % 3]];
-    let mut rest: Vec<Corner2> = (0..3).map(|k| Corner2 { point: Point::corner(&subject[k]), edge: edge(&subject, k) }).collect();
-    for k in 0..3 {
-        rest = clipped(&rest, &edge(&clip, k), axis);
-    }
-    let rest = reduced(rest, axis);
-    let side =
-        |k: usize| Contact { ends: [rest[k].point.clone(), rest[(k + 1) % rest.len()].point.clone()], edge: Some(rest[k].edge) };
-    match rest.len() {
-        0 | 1 => Vec::new(),
-        2 if common == 2 => Vec::new(),
-        2 => vec![side(0)],
-        sides => (0..sides).map(side).collect(),
-    }
-}
-
-/// The axis along which a triangle's normal is longest; of equal ones the last.
-pub(crate) fn dominant_axis(soup: &Soup<'_>, t: usize) -> usize {
-    let n = &soup.plane(t).normal;
-    let absolute = |k: usize| if n[k].sign() < 0 { n[k].negated() } else { n[k] };
-    (1..3).fold(0, |best, k| if absolute(k).cmp(&absolute(best)).is_ge() { k } else { best })
-}
-
-/// The part of a polygon that lies to the left of an edge, or on it.
-fn clipped(rest: &[Corner2], edge: &[Corner; 2], axis: usize) -> Vec<Corner2> {
-    let ends = edge.each_ref().map(Point::corner);
-    let inside: Vec<bool> = rest.iter().map(|c| turn([&ends[0], &ends[1], &c.point], axis) >= 0).collect();
-    let mut out = Vec::with_capacity(rest.len() + 2);
-    for (k, from) in rest.iter().enumerate() {
-        let next = (k + 1) % rest.len();
-        if inside[k] != inside[next] {
-            let along = if inside[k] { *edge } else { from.edge };
-            out.extend(on_lines(&from.edge, edge, axis).map(|point| Corner2 { point, edge: along }));
-        }
-        if inside[next] {
-            out.push(rest[next].clone());
+/// Adds the border of what both cover; `common` corners are those of both.
+pub(crate) fn overlap(soup: &Soup<'_>, pair: [usize; 2], common: usize, into: &mut Contacts) {
+    let Some(mut both) = Both::of(soup, pair, common) else { return };
+    let first = into.all.len();
+    for (which, k) in (0..6).map(|i| (i / 3, i % 3)) {
+        let Some(side) = both.side(which, k, into) else { continue };
+        if !into.all[first..].iter().any(|other| is_same(soup, &side, other)) {
+            into.all.push(side);
         }
     }
-    out
+    // Along an edge of both they only touch.
+    if into.all.len() == first + 1 && common == 2 {
+        into.all.truncate(first);
+    }
 }
 
-/// Without corners that are there twice, or between two others; of what is all on one line, the ends.
-fn reduced(corners: Vec<Corner2>, axis: usize) -> Vec<Corner2> {
-    let mut rest: Vec<Corner2> = Vec::with_capacity(corners.len());
-    for corner in corners {
-        match rest.last_mut() {
-            Some(last) if last.point.is(&corner.point) => last.edge = corner.edge,
-            _ => rest.push(corner),
+/// Where edges of both lie on each other, a side is found twice. It ends at corners then.
+fn is_same(soup: &Soup<'_>, one: &Contact, other: &Contact) -> bool {
+    match (one.ends, other.ends) {
+        ([End::Corner(a), End::Corner(b)], [End::Corner(c), End::Corner(d)]) => {
+            let [a, b, c, d] = [a, b, c, d].map(|corner| soup.corner(corner));
+            a == c && b == d || a == d && b == c
         }
+        _ => false,
     }
-    while rest.len() > 1 && rest[0].point.is(&rest[rest.len() - 1].point) {
-        rest.pop();
-    }
-    let count = rest.len();
-    if count <= 2 {
-        return rest;
-    }
-    let corner = |k: usize| &rest[k % count].point;
-    let bends: Vec<bool> = (0..count).map(|k| turn([corner(k + count - 1), corner(k), corner(k + 1)], axis) != 0).collect();
-    if bends.iter().any(|bends| *bends) {
-        return rest.into_iter().zip(bends).filter(|(_, bends)| *bends).map(|(corner, _)| corner).collect();
-    }
-    ends(&rest)
 }
 
-/// The ends of corners on one line, in the direction from the first to the second.
-fn ends(line: &[Corner2]) -> Vec<Corner2> {
-    let Some(k) = (0..3).find(|k| line[0].point.cmp_along(&line[1].point, *k).is_ne()) else { return Vec::new() };
-    let along = |a: &Corner2, b: &Corner2| {
-        let order = a.point.cmp_along(&b.point, k);
-        if line[0].point.cmp_along(&line[1].point, k).is_lt() { order } else { order.reverse() }
-    };
-    let edge = line[0].edge;
-    let (low, high) = line.iter().fold((&line[0], &line[0]), |(low, high), c| {
-        (if along(c, low).is_lt() { c } else { low }, if along(c, high).is_gt() { c } else { high })
-    });
-    [low, high].map(|c| Corner2 { point: c.point.clone(), edge }).to_vec()
+impl<'a> Both<'a> {
+    /// `None` if they are apart, or touch each other in a point or along an edge of both.
+    fn of(soup: &'a Soup<'a>, pair: [usize; 2], common: usize) -> Option<Self> {
+        let axis = soup.plane(pair[0]).axis;
+        let mut triangles = pair.map(|t| soup.triangles[t]);
+        let turned = triangles.each_ref().map(|[a, b, c]| exact::orientation_along(a, b, c, axis) < 0);
+        triangles.iter_mut().zip(turned).filter(|(_, turned)| *turned).for_each(|(t, _)| t.swap(1, 2));
+        let mut signs = [[[0; 3]; 3]; 2];
+        for (this, other) in [(0, 1), (1, 0)] {
+            let (t, u) = (&triangles[this], &triangles[other]);
+            for k in 0..3 {
+                let [from, to] = [&t[k], &t[(k + 1) % 3]];
+                let turn = |p: &[f32; 3]| if p == to { 0 } else { exact::orientation_along(from, to, p, axis) };
+                let of_edge = [turn(&u[0]), turn(&u[1]), turn(&u[2])];
+                let on_line = of_edge.iter().filter(|turn| **turn == 0).count();
+                if of_edge.iter().all(|turn| *turn <= 0) && (on_line < 2 || common == 2) {
+                    return None;
+                }
+                signs[this][k] = of_edge;
+            }
+        }
+        Some(Self { soup, axis, pair, turned, triangles, signs, crossings: [[NONE; 3]; 3] })
+    }
+
+    /// Where corner i of the one is in the soup.
+    fn corner(&self, which: usize, i: usize) -> Edge {
+        let k = if self.turned[which] { (3 - i) % 3 } else { i };
+        Edge { triangle: self.pair[which] as u32, k: k as u8 }
+    }
+
+    /// Where the edge from corner k on of the one is in the soup, whichever way round.
+    fn edge(&self, which: usize, k: usize) -> Edge {
+        self.corner(which, if self.turned[which] { (k + 1) % 3 } else { k })
+    }
+
+    /// Does corner i of the one lie in the other, or on its border?
+    fn holds(&self, which: usize, i: usize) -> bool {
+        self.signs[1 - which].iter().all(|of_edge| of_edge[i] >= 0)
+    }
+
+    /// Where edge k of the one crosses edge j of the other.
+    fn crossing(&mut self, which: usize, k: usize, j: usize, into: &mut Contacts) -> Option<End> {
+        let (a, b) = if which == 0 { (k, j) } else { (j, k) };
+        if self.crossings[a][b] == NONE {
+            let [first, second] = [self.edge(0, a), self.edge(1, b)].map(|edge| self.soup.edge(edge));
+            let point = on_lines(&first, &second, self.axis)?;
+            self.crossings[a][b] = into.points.len() as u32;
+            into.points.push(point);
+        }
+        Some(End::Point(self.crossings[a][b]))
+    }
+
+    /// The part of edge k of the one that lies in the other, if it has a length.
+    fn side(&mut self, which: usize, k: usize, into: &mut Contacts) -> Option<Contact> {
+        let (next, other, of_edge) = ((k + 1) % 3, 1 - which, self.signs[which][k]);
+        let mut corners: [Option<(usize, usize)>; 2] = [None; 2];
+        let mut offer = |corner: (usize, usize)| {
+            let place = |corner: (usize, usize)| self.triangles[corner.0][corner.1];
+            match corners {
+                [None, _] => corners[0] = Some(corner),
+                [Some(first), None] if place(first) != place(corner) => corners[1] = Some(corner),
+                _ => {}
+            }
+        };
+        [k, next].into_iter().filter(|i| self.holds(which, *i)).for_each(|i| offer((which, i)));
+        // The other triangle is convex: its corners on the edge are ends of what both cover, unless the edge ends before.
+        (0..3).filter(|i| of_edge[*i] == 0 && self.holds(other, *i)).for_each(|i| offer((other, i)));
+        let mut ends = corners.map(|corner| corner.map(|(which, i)| End::Corner(self.corner(which, i))));
+        for j in 0..3 {
+            let across = self.signs[other][j];
+            if ends[1].is_none() && of_edge[j] * of_edge[(j + 1) % 3] < 0 && across[k] * across[next] < 0 {
+                let crossing = self.crossing(which, k, j, into);
+                ends[usize::from(ends[0].is_some())] = crossing;
+            }
+        }
+        let edge = Some(self.edge(which, k));
+        Some(Contact { other: self.pair[1] as u32, ends: [ends[0]?, ends[1]?], edge })
+    }
 }

@@ -5,15 +5,16 @@
 
 use std::cmp::Ordering;
 
-use crate::geometry::arrange::point::{Point, WORDS};
-use crate::geometry::arrange::wide::Wide;
+use crate::geometry::arrange::point::Point;
+use crate::geometry::arrange::wide::{WORDS, Wide, product};
 use crate::geometry::exact::sign;
 
 const TWICE: usize = 2 * WORDS;
+/// Words of the numbers of most points: what is made of them is copied less if it has no room for more.
+const SHORT: usize = 2;
+const MEDIUM: usize = 5;
 /// 2⁻¹⁰⁰: four of such numbers have no bit below 2⁻⁶¹².
 const LEAST: f64 = 1.0 / (1_u128 << 100) as f64;
-type Long = Wide<TWICE>;
-type Longer = Wide<{ 2 * TWICE }>;
 
 /// A point's two coordinates, rounded, and what is missing in each.
 #[derive(Clone, Copy)]
@@ -30,9 +31,40 @@ pub(crate) struct Flat<'a> {
     seen: Vec<Seen>,
     /// Of each coordinate, at most.
     error: f64,
-    /// The axis along which they are seen, and the others.
-    pub(crate) axis: usize,
+    /// The axes that are seen.
     axes: [usize; 2],
+    lines: Lines,
+}
+
+/// Which points are known to be on one line.
+#[derive(Default)]
+pub(crate) struct Lines {
+    /// By point its lines, ascending, and where each point's begin.
+    lines: Vec<u32>,
+    starts: Vec<u32>,
+}
+
+impl Lines {
+    /// From points and the lines that they are on.
+    pub(crate) fn of(points: usize, mut on: Vec<(u32, u32)>) -> Self {
+        on.sort_unstable();
+        on.dedup();
+        let mut starts = vec![0; points + 1];
+        on.iter().for_each(|(point, _)| starts[*point as usize + 1] += 1);
+        (0..points).for_each(|point| starts[point + 1] += starts[point]);
+        Self { lines: on.into_iter().map(|(_, line)| line).collect(), starts }
+    }
+
+    fn through(&self, point: usize) -> &[u32] {
+        &self.lines[self.starts[point] as usize..self.starts[point + 1] as usize]
+    }
+
+    fn has(&self, a: usize, b: usize, c: usize) -> bool {
+        !self.lines.is_empty() && {
+            let (b, c) = (self.through(b), self.through(c));
+            self.through(a).iter().any(|line| b.contains(line) && c.contains(line))
+        }
+    }
 }
 
 impl<'a> Flat<'a> {
@@ -40,7 +72,12 @@ impl<'a> Flat<'a> {
         let axes = others(axis);
         let seen: Vec<Seen> = points.iter().map(|p| Seen::of(p, axes)).collect();
         let error = error(&seen);
-        Self { points, seen, error, axis, axes }
+        Self { points, seen, error, axes, lines: Lines::default() }
+    }
+
+    /// The same, where some points are known to be on lines.
+    pub(crate) fn with(self, lines: Lines) -> Self {
+        Self { lines, ..self }
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -62,6 +99,7 @@ impl<'a> Flat<'a> {
     #[inline]
     pub(crate) fn turn(&self, a: usize, b: usize, c: usize) -> i8 {
         match self.certain_turn(a, b, c) {
+            0 if self.lines.has(a, b, c) => 0,
             0 => turn_exactly([self.points[a], self.points[b], self.points[c]], self.axes),
             sign => sign,
         }
@@ -130,7 +168,7 @@ fn difference(x: f64, x_low: f64, y: f64, y_low: f64) -> f64 {
 }
 
 /// The axes that are seen along one.
-fn others(axis: usize) -> [usize; 2] {
+pub(crate) fn others(axis: usize) -> [usize; 2] {
     [(axis + 1) % 3, (axis + 2) % 3]
 }
 
@@ -149,19 +187,9 @@ fn certain_turn([a, b, c]: [&Seen; 3], of_difference: f64) -> i8 {
     i8::from(p - q > error) - i8::from(q - p > error)
 }
 
-/// How three points turn, seen along an axis: +1 to the left, 0 if they are on one line.
-pub(crate) fn turn(points: [&Point; 3], axis: usize) -> i8 {
-    let axes = others(axis);
-    let seen = points.map(|p| Seen::of(p, axes));
-    match certain_turn(seen.each_ref(), error(&seen)) {
-        0 => turn_exactly(points, axes),
-        sign => sign,
-    }
-}
-
 /// A coordinate's difference, times both denominators.
-fn less(a: &Point, b: &Point, k: usize) -> Long {
-    let (p, q): (Long, Long) = (a.part(k).times(&b.part(3)), b.part(k).times(&a.part(3)));
+fn less<const M: usize>(a: &Point, b: &Point, k: usize) -> Wide<M> {
+    let (p, q): (Wide<M>, Wide<M>) = (product(a.part(k), b.part(3)), product(b.part(k), a.part(3)));
     p.minus(&q)
 }
 
@@ -179,9 +207,18 @@ fn turn_exactly([a, b, c]: [&Point; 3], axes: [usize; 2]) -> i8 {
     if let Some([a, b, c]) = rounded([a, b, c], axes) {
         return sign(robust::orient2d(a, b, c));
     }
-    let ([ux, uy], [vx, vy]) = (axes.map(|k| less(b, a, k)), axes.map(|k| less(c, a, k)));
-    let (p, q): (Longer, Longer) = (ux.times(&vy), uy.times(&vx));
-    p.minus(&q).sign()
+    match [a, b, c].map(Point::longest).into_iter().max() {
+        Some(0..=SHORT) => turn_of::<{ 2 * SHORT + 1 }, { 4 * SHORT + 3 }>([a, b, c], axes),
+        Some(0..=MEDIUM) => turn_of::<{ 2 * MEDIUM + 1 }, { 4 * MEDIUM + 3 }>([a, b, c], axes),
+        _ => turn_of::<TWICE, { 2 * TWICE }>([a, b, c], axes),
+    }
+}
+
+/// With so many words for products of two numbers of points, and of four.
+fn turn_of<const TWO: usize, const FOUR: usize>([a, b, c]: [&Point; 3], axes: [usize; 2]) -> i8 {
+    let ([ux, uy], [vx, vy]) = (axes.map(|k| less::<TWO>(b, a, k)), axes.map(|k| less::<TWO>(c, a, k)));
+    let (p, q): (Wide<FOUR>, Wide<FOUR>) = (ux.times(&vy), uy.times(&vx));
+    p.cmp(&q) as i8
 }
 
 #[cold]
@@ -189,17 +226,33 @@ fn in_circle_exactly([a, b, c, d]: [&Point; 4], axes: [usize; 2]) -> i8 {
     if let Some([a, b, c, d]) = rounded([a, b, c, d], axes) {
         return sign(robust::incircle(a, b, c, d));
     }
+    match [a, b, c, d].map(Point::longest).into_iter().max() {
+        Some(0..=SHORT) => {
+            circle_of::<{ 2 * SHORT + 1 }, { 4 * SHORT + 3 }, { 8 * SHORT + 7 }, { 12 * SHORT + 11 }>([a, b, c, d], axes)
+        }
+        Some(0..=MEDIUM) => {
+            circle_of::<{ 2 * MEDIUM + 1 }, { 4 * MEDIUM + 3 }, { 8 * MEDIUM + 7 }, { 12 * MEDIUM + 11 }>([a, b, c, d], axes)
+        }
+        _ => circle_of::<TWICE, { 2 * TWICE }, { 4 * TWICE }, { 6 * TWICE }>([a, b, c, d], axes),
+    }
+}
+
+/// With so many words for products of two numbers of points, of four, eight and twelve.
+fn circle_of<const TWO: usize, const FOUR: usize, const EIGHT: usize, const TWELVE: usize>(
+    [a, b, c, d]: [&Point; 4],
+    axes: [usize; 2],
+) -> i8 {
     let rows = [a, b, c].map(|p| {
-        let scale: Long = p.part(3).times(&d.part(3));
-        let [x, y] = axes.map(|k| less(p, d, k));
-        let (xx, yy): (Longer, Longer) = (x.times(&x), y.times(&y));
-        let (x, y): (Longer, Longer) = (x.times(&scale), y.times(&scale));
+        let scale: Wide<TWO> = product(p.part(3), d.part(3));
+        let [x, y] = axes.map(|k| less::<TWO>(p, d, k));
+        let (xx, yy): (Wide<FOUR>, Wide<FOUR>) = (x.times(&x), y.times(&y));
+        let (x, y): (Wide<FOUR>, Wide<FOUR>) = (x.times(&scale), y.times(&scale));
         (x, y, xx.plus(&yy))
     });
-    let mut sum = Wide::<{ 6 * TWICE }>::ZERO;
+    let mut sum = Wide::<TWELVE>::ZERO;
     for k in 0..3 {
         let (v, w) = (&rows[(k + 1) % 3], &rows[(k + 2) % 3]);
-        let (p, q): (Wide<{ 4 * TWICE }>, Wide<{ 4 * TWICE }>) = (v.0.times(&w.1), v.1.times(&w.0));
+        let (p, q): (Wide<EIGHT>, Wide<EIGHT>) = (v.0.times(&w.1), v.1.times(&w.0));
         sum = sum.plus(&rows[k].2.times(&p.minus(&q)));
     }
     sum.sign()

@@ -8,14 +8,18 @@
 mod cells;
 mod contact;
 mod coplanar;
+mod cuts;
 mod delaunay;
 mod flat;
 mod network;
 mod piece;
+mod plane;
 mod point;
+mod quotient;
 mod rational;
 mod raw;
 mod recover;
+mod small;
 mod soup;
 mod table;
 mod triangulate;
@@ -28,12 +32,13 @@ use crate::geometry::arrange::raw::Raw;
 pub(crate) use crate::geometry::arrange::piece::{Arrange, Arrangement, Piece};
 
 /// By planes ([`network`]): points are never made from points, signs come from floating point where it decides. Where coordinates have too many
-/// bits for that, by [`Rational`]: the same result.
+/// bits for that, by [`Rational`]: the same pieces, in another order.
 pub(crate) struct Exact;
 
 impl Arrange for Exact {
     fn arrange(&self, triangles: &[[[f32; 3]; 3]], threads: usize) -> Option<Arrangement> {
         let Some(network) = Network::build(triangles, threads) else { return Rational.arrange(triangles, threads) };
+        tracing::debug!(triangles = triangles.len(), points = network.points.len(), pieces = network.pieces.len(), "Arranged.");
         let raw = Raw {
             points: network.points.iter().map(|p| position(p, network.soup.power)).collect(),
             exact: network.points.iter().map(|p| p.exact).collect(),
@@ -147,6 +152,29 @@ mod tests {
         ]
     }
 
+    /// The same with points by where they are, pieces by their points, and cells as the pieces come by them: an engine may find them in any order.
+    fn in_order(a: Arrangement) -> Arrangement {
+        let mut order: Vec<usize> = (0..a.points.len()).collect();
+        order.sort_by_key(|p| a.points[*p].map(|x| (x + 0.0).to_bits()));
+        let mut place = vec![0; order.len()];
+        order.iter().zip(0..).for_each(|(point, at)| place[*point] = at);
+        let turned = |v: [u32; 3]| (0..3).map(|k| [v[k], v[(k + 1) % 3], v[(k + 2) % 3]]).min().unwrap();
+        let placed = a.pieces.iter().map(|piece| Piece { v: turned(piece.v.map(|v| place[v as usize])), ..*piece });
+        let mut pieces: Vec<Piece> = placed.collect();
+        pieces.sort_by_key(|piece| (piece.source, piece.v));
+        let mut cells: Vec<u32> = Vec::new();
+        for cell in pieces.iter_mut().flat_map(|piece| &mut piece.cells) {
+            let known = cells.iter().position(|known| known == cell);
+            let number = known.unwrap_or(cells.len());
+            if known.is_none() {
+                cells.push(*cell);
+            }
+            *cell = number as u32;
+        }
+        let points = order.iter().map(|p| a.points[*p]).collect();
+        Arrangement { points, exact: order.iter().map(|p| a.exact[*p]).collect(), pieces, ..a }
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(400))]
         #[test]
@@ -154,6 +182,7 @@ mod tests {
             let soup: Vec<Corners> = soup.into_iter().filter(|[a, b, c]| !exact::collinear(a, b, c)).collect();
             prop_assert!(Network::build(&soup, 1).is_some());
             let (ours, theirs) = (arranged(&soup), Rational.arrange(&soup, 1).unwrap());
+            let (ours, theirs) = (in_order(ours), in_order(theirs));
             prop_assert_eq!(&ours.points, &theirs.points);
             prop_assert_eq!(&ours.exact, &theirs.exact);
             prop_assert_eq!(&ours.covered, &theirs.covered);

@@ -3,16 +3,15 @@
 //! Segments first, by pairs; then where those of one triangle cross. A point that one triangle finds on an edge or a segment cuts all
 //! triangles that have this edge or segment, so that pieces meet along whole edges. Then each triangle is triangulated by itself.
 
-use crate::geometry::arrange::contact::contact;
-use crate::geometry::arrange::coplanar::dominant_axis;
-use crate::geometry::arrange::flat::Flat;
-use crate::geometry::arrange::point::{Corner, Point, on_line, on_lines, on_planes, scaled};
-use crate::geometry::arrange::soup::{Contact, Soup};
+use crate::geometry::arrange::cuts::{Cuts, Segment, Side, sorted};
+use crate::geometry::arrange::flat::{Flat, Lines, others};
+use crate::geometry::arrange::plane::{on_line, on_lines, on_planes};
+use crate::geometry::arrange::point::Point;
+use crate::geometry::arrange::quotient::scaled;
+use crate::geometry::arrange::soup::Soup;
 use crate::geometry::arrange::table::Table;
 use crate::geometry::arrange::triangulate::triangulate;
-use crate::geometry::boxes::BoxTree;
 use crate::geometry::exact;
-use crate::geometry::sums::Bounds;
 use crate::util::ids::NONE;
 use crate::util::parallel;
 
@@ -23,14 +22,6 @@ pub(crate) struct Network<'a> {
     pub(crate) points: Vec<Point>,
     /// The triangle, and the points, the way round that it runs. By triangle.
     pub(crate) pieces: Vec<(u32, [u32; 3])>,
-}
-
-/// A segment in a triangle.
-struct Segment {
-    ends: [u32; 2],
-    /// The other triangle, and if that one lies in the same plane, the edge of either.
-    other: u32,
-    edge: Option<[Corner; 2]>,
 }
 
 /// Points of an edge or a segment, by its ends: sorted, for searches.
@@ -49,8 +40,10 @@ struct Builder<'a> {
     threads: usize,
     table: Table,
     corners: Vec<[u32; 3]>,
+    has_area: Vec<bool>,
     /// By triangle.
     segments: Vec<Vec<Segment>>,
+    sides: Vec<Vec<Side>>,
 }
 
 impl Network<'_> {
@@ -59,10 +52,10 @@ impl Network<'_> {
         let soup = Soup::new(triangles)?;
         let mut table = Table::default();
         let numbers = |t| soup.corners(t).map(|p| table.intern(Point::corner(&p)));
-        let corners = (0..triangles.len()).map(numbers).collect();
-        let segments = (0..triangles.len()).map(|_| Vec::new()).collect();
-        let mut builder = Builder { soup, threads, table, corners, segments };
-        builder.contacts();
+        let corners: Vec<[u32; 3]> = (0..triangles.len()).map(numbers).collect();
+        let has_area: Vec<bool> = triangles.iter().map(|[a, b, c]| !exact::collinear(a, b, c)).collect();
+        let cuts = Cuts::of(&soup, threads, &has_area, &corners, &mut table);
+        let mut builder = Builder { soup, threads, table, corners, has_area, segments: cuts.segments, sides: cuts.sides };
         let found = builder.find();
         let edges = merged(found.iter().map(|f| &f.edges));
         let splits = merged(found.iter().map(|f| &f.segments));
@@ -84,10 +77,6 @@ fn of_ends(splits: &Splits, ends: [u32; 2]) -> impl Iterator<Item = u32> {
     let key = sorted(ends);
     let first = splits.partition_point(|(ends, _)| *ends < key);
     splits[first..].iter().take_while(move |(ends, _)| *ends == key).map(|(_, point)| *point)
-}
-
-fn sorted([a, b]: [u32; 2]) -> [u32; 2] {
-    [a.min(b), a.max(b)]
 }
 
 /// Where a triangle is cut: its points, and pieces of these.
@@ -120,35 +109,6 @@ fn number(numbers: &mut [u32], order: &mut Vec<u32>, p: u32) -> u32 {
 }
 
 impl Builder<'_> {
-    fn has_area(&self, t: usize) -> bool {
-        let [a, b, c] = &self.soup.triangles[t];
-        !exact::collinear(a, b, c)
-    }
-
-    /// Finds the segments of all pairs.
-    fn contacts(&mut self) {
-        let boxes: Vec<Bounds> = self.soup.triangles.iter().map(|t| Bounds::of(t)).collect();
-        let tree = BoxTree::new(&boxes);
-        let of = |near: &mut Vec<u32>, t: usize| -> Vec<(u32, Vec<Contact>)> {
-            if !self.has_area(t) {
-                return Vec::new();
-            }
-            tree.meeting(&boxes[t], near);
-            let later = near.iter().filter(|o| **o as usize > t && self.has_area(**o as usize));
-            later.map(|o| (*o, contact(&self.soup, t, *o as usize))).filter(|(_, c)| !c.is_empty()).collect()
-        };
-        let all = parallel::map_with(self.threads, boxes.len(), Vec::new, of);
-        for (t, contacts) in all.into_iter().enumerate() {
-            for (other, contacts) in contacts {
-                for Contact { ends, edge } in contacts {
-                    let ends = ends.map(|p| self.table.intern(p));
-                    self.segments[t].push(Segment { ends, other, edge });
-                    self.segments[other as usize].push(Segment { ends, other: t as u32, edge });
-                }
-            }
-        }
-    }
-
     /// Finds where segments cross, and what lies on which edge and segment.
     fn find(&mut self) -> Vec<Found> {
         let count = self.segments.len();
@@ -190,14 +150,14 @@ impl Builder<'_> {
                 let [first, second, third] = self.key(t, pair).map(|t| self.soup.plane(t as usize));
                 on_planes(first, second, third)
             }
-            (Some(edge), None) => on_line(edge, plane(b)),
-            (None, Some(edge)) => on_line(edge, plane(a)),
-            (Some(edge), Some(other)) => on_lines(edge, other, dominant_axis(&self.soup, t)),
+            (Some(edge), None) => on_line(&self.soup.edge(*edge), plane(b)),
+            (None, Some(edge)) => on_line(&self.soup.edge(*edge), plane(a)),
+            (Some(edge), Some(other)) => on_lines(&self.soup.edge(*edge), &self.soup.edge(*other), self.soup.plane(t).axis),
         }
     }
 
     fn flat(&self, t: usize, points: &[u32]) -> Flat<'_> {
-        Flat::new(points.iter().map(|p| &self.table.points[*p as usize]).collect(), dominant_axis(&self.soup, t))
+        Flat::new(points.iter().map(|p| &self.table.points[*p as usize]).collect(), self.soup.plane(t).axis)
     }
 
     /// The pairs of segments of a triangle that cross inside of both.
@@ -230,12 +190,12 @@ impl Builder<'_> {
     }
 
     fn found(&self, t: usize, crossings: &[[u32; 2]], numbers: &[u32]) -> Found {
-        let segments = &self.segments[t];
-        if segments.is_empty() {
+        let (segments, sides) = (&self.segments[t], &self.sides[t]);
+        if segments.is_empty() && sides.is_empty() {
             return Found::default();
         }
-        let mut points: Vec<u32> =
-            segments.iter().flat_map(|s| s.ends).chain(numbers.iter().copied().filter(|n| *n != NONE)).collect();
+        let ends = segments.iter().map(|s| s.ends).chain(sides.iter().map(|side| side.0)).flatten();
+        let mut points: Vec<u32> = ends.chain(numbers.iter().copied().filter(|n| *n != NONE)).collect();
         points.sort_unstable();
         points.dedup();
         let corners = self.corners[t];
@@ -250,8 +210,16 @@ impl Builder<'_> {
         for k in 0..3 {
             let (a, b) = (points.len() + k, points.len() + (k + 1) % 3);
             let key = sorted([corners[k], corners[(k + 1) % 3]]);
+            let sides = || sides.iter().filter(|side| usize::from(side.1) == k);
+            let known = |p: usize| sides().any(|side| side.0.contains(&points[p]));
             let near = search.within(&flat, (a, b)).filter(|p| flat.certain_turn(a, b, *p) == 0 && !key.contains(&points[*p]));
-            found.edges.extend(near.filter(|p| is_between(&flat, (a, b), *p)).map(|p| (key, points[p])));
+            let on: Vec<usize> = near.filter(|p| known(*p) || is_between(&flat, (a, b), *p)).collect();
+            for (ends, _) in sides() {
+                let [low, high] = in_order(&flat, ends.map(place));
+                let inside = on.iter().filter(|p| flat.cmp(low, **p).is_lt() && flat.cmp(**p, high).is_lt());
+                found.segments.extend(inside.map(|p| (*ends, points[*p])));
+            }
+            found.edges.extend(on.into_iter().map(|p| (key, points[p])));
         }
         for (s, segment) in segments.iter().enumerate() {
             let (key, ends) = (sorted(segment.ends), (place(segment.ends[0]), place(segment.ends[1])));
@@ -267,30 +235,62 @@ impl Builder<'_> {
 
     fn cut(&self, t: usize, found: &Found, edges: &Splits, splits: &Splits) -> Option<Cut> {
         let (corners, segments) = (self.corners[t], &self.segments[t]);
-        if !self.has_area(t) {
+        if !self.has_area[t] {
             return Some(Cut { points: Vec::new(), pieces: Vec::new() });
         }
         let mut extra: Vec<u32> = Vec::new();
         for k in 0..3 {
             extra.extend(of_ends(edges, [corners[k], corners[(k + 1) % 3]]));
         }
-        segments.iter().for_each(|s| extra.extend(of_ends(splits, s.ends)));
+        let sides = self.sides[t].iter().map(|side| side.0);
+        segments.iter().map(|s| s.ends).chain(sides).for_each(|ends| extra.extend(of_ends(splits, ends)));
         if segments.is_empty() && extra.is_empty() {
             return Some(Cut { points: corners.to_vec(), pieces: vec![[0, 1, 2]] });
         }
+        extra.extend(segments.iter().flat_map(|s| s.ends));
         extra.sort_unstable();
         extra.dedup();
-        let at = |p: u32| &self.table.points[p as usize];
-        extra.sort_by(|a, b| (0..3).map(|k| at(*a).cmp_along(at(*b), k)).find(|o| o.is_ne()).unwrap_or(a.cmp(b)));
-        let all = corners.into_iter().chain(segments.iter().flat_map(|s| s.ends)).chain(extra);
-        let (points, places) = distinct(all);
-        let flat = self.flat(t, &points);
+        extra.retain(|p| !corners.contains(p));
+        self.along_a_curve(t, &mut extra);
+        let points: Vec<u32> = corners.into_iter().chain(extra).collect();
+        let mut places: Vec<(u32, usize)> = points.iter().copied().zip(0..).collect();
+        places.sort_unstable();
+        let flat = self.flat(t, &points).with(self.lines(t, edges, splits, points.len(), &places));
         let constraints = self.constraints(&flat, segments, found, splits, &points, &places);
         let mut pieces = triangulate(&flat, &constraints)?;
-        if self.soup.plane(t).normal[flat.axis].sign() < 0 {
+        if !self.soup.plane(t).looks_along() {
             pieces.iter_mut().for_each(|v| v.swap(1, 2));
         }
         Some(Cut { points, pieces })
+    }
+
+    /// Points of a triangle in an order in which each is near to the one before: so a triangulation that they are added to changes little.
+    fn along_a_curve(&self, t: usize, points: &mut [u32]) {
+        let seen = others(self.soup.plane(t).axis);
+        let at = |p: u32| seen.map(|k| self.table.points[p as usize].high[k]);
+        let corners = self.corners[t].map(at);
+        let place = |p: u32| {
+            let cell = |k: usize| {
+                let [a, b, c] = corners.map(|corner| corner[k]);
+                let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+                ((at(p)[k] - low) / (high - low) * f64::from(u16::MAX)) as u16
+            };
+            spread(cell(0)) << 1 | spread(cell(1))
+        };
+        points.sort_by_cached_key(|p| place(*p));
+    }
+
+    /// What is known to be on the edges and segments of a triangle.
+    fn lines(&self, t: usize, edges: &Splits, splits: &Splits, points: usize, places: &[(u32, usize)]) -> Lines {
+        let corners = self.corners[t];
+        let edges = (0..3).map(|k| ([corners[k], corners[(k + 1) % 3]], edges));
+        let all = edges.chain(self.segments[t].iter().map(|segment| (segment.ends, splits)));
+        let place = |p: u32| places.binary_search_by_key(&p, |(p, _)| *p).ok().map(|i| places[i].1 as u32);
+        let mut on = Vec::new();
+        for (line, (ends, splits)) in (0..).zip(all) {
+            on.extend(of_ends(splits, ends).chain(ends).filter_map(place).map(|p| (p, line)));
+        }
+        Lines::of(points, on)
     }
 
     /// Segments from point to point.
@@ -322,16 +322,10 @@ impl Builder<'_> {
     }
 }
 
-/// Each number once, in the order of the first time; and where each is, sorted.
-fn distinct(all: impl Iterator<Item = u32>) -> (Vec<u32>, Vec<(u32, usize)>) {
-    let mut seen: Vec<(u32, usize)> = all.zip(0..).collect();
-    seen.sort_unstable();
-    seen.dedup_by_key(|(p, _)| *p);
-    seen.sort_unstable_by_key(|(_, first)| *first);
-    let points: Vec<u32> = seen.iter().map(|(p, _)| *p).collect();
-    let mut places: Vec<(u32, usize)> = points.iter().copied().zip(0..).collect();
-    places.sort_unstable();
-    (points, places)
+/// The bits of a number, with one between each two of them.
+fn spread(x: u16) -> u32 {
+    let halves = [(8, 0x00ff_00ff), (4, 0x0f0f_0f0f), (2, 0x3333_3333), (1, 0x5555_5555)];
+    halves.into_iter().fold(u32::from(x), |x, (by, mask)| (x | x << by) & mask)
 }
 
 fn box_of(flat: &Flat<'_>, (a, b): (usize, usize)) -> [[f64; 2]; 2] {
@@ -343,30 +337,37 @@ fn is_within([low, high]: &[[f64; 2]; 2], p: [f64; 2]) -> bool {
     (0..2).all(|k| low[k] <= p[k] && p[k] <= high[k])
 }
 
+fn in_order(flat: &Flat<'_>, [a, b]: [usize; 2]) -> [usize; 2] {
+    if flat.cmp(a, b).is_lt() { [a, b] } else { [b, a] }
+}
+
 /// Is a point on the segment between two others?
 fn is_between(flat: &Flat<'_>, (a, b): (usize, usize), p: usize) -> bool {
-    let (low, high) = if flat.cmp(a, b).is_lt() { (a, b) } else { (b, a) };
+    let [low, high] = in_order(flat, [a, b]);
     flat.turn(a, b, p) == 0 && flat.cmp(low, p).is_lt() && flat.cmp(p, high).is_lt()
 }
 
 /// Points from left to right.
 struct Search {
     order: Vec<usize>,
+    at: Vec<[f64; 2]>,
 }
 
 impl Search {
     fn new(flat: &Flat<'_>, count: usize) -> Self {
         let mut order: Vec<usize> = (0..count).collect();
         order.sort_by(|a, b| flat.at(*a)[0].total_cmp(&flat.at(*b)[0]));
-        Self { order }
+        let at = order.iter().map(|p| flat.at(*p)).collect();
+        Self { order, at }
     }
 
     /// The points in the box of two others.
-    fn within<'s>(&'s self, flat: &'s Flat<'_>, ends: (usize, usize)) -> impl Iterator<Item = usize> + 's {
+    fn within<'s>(&'s self, flat: &Flat<'_>, ends: (usize, usize)) -> impl Iterator<Item = usize> + 's {
         let limits = box_of(flat, ends);
-        let first = self.order.partition_point(|p| flat.at(*p)[0] < limits[0][0]);
-        let near = self.order[first..].iter().copied().take_while(move |p| flat.at(*p)[0] <= limits[1][0]);
-        near.filter(move |p| is_within(&limits, flat.at(*p)))
+        let first = self.at.partition_point(|p| p[0] < limits[0][0]);
+        let count = self.at[first..].partition_point(|p| p[0] <= limits[1][0]);
+        let near = self.at[first..first + count].iter().zip(&self.order[first..]);
+        near.filter(move |(p, _)| limits[0][1] <= p[1] && p[1] <= limits[1][1]).map(|(_, p)| *p)
     }
 }
 

@@ -37,7 +37,7 @@ impl Table {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::arrange::point::{Plane, on_line};
+    use crate::geometry::arrange::plane::{Plane, on_line};
 
     /// The line meets planes a third apart and one part in 2⁶⁰ more or less: not one of the points is what it is rounded to.
     #[test]

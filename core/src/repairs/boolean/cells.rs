@@ -14,6 +14,7 @@ use crate::submesh::Submesh;
 use crate::submesh::components::Reversed;
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
+use crate::util::radix::sort_by_number;
 
 /// The cells of space in front of and behind everything closed.
 ///
@@ -222,7 +223,8 @@ impl CutSurfaces {
             steps.push((front, back, *step));
             steps.push((back, front, -step));
         }
-        steps.sort_unstable();
+        sort_by_number(&mut steps, |(_, back, _)| *back);
+        sort_by_number(&mut steps, |(front, ..)| *front);
         steps.dedup();
         let (surface_of, relative) = (vec![NONE; roots.len()], vec![0; roots.len()]);
         let mut all = Self { roots, surface_of, relative, consistent: Vec::new() };

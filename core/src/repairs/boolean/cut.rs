@@ -6,10 +6,16 @@ use std::ops::Range;
 use crate::geometry::arrange::{Arrange, Arrangement, Piece};
 use crate::geometry::position::Position;
 use crate::repairs::shared::work::Work;
-use crate::submesh::{Submesh, Vertex};
+use crate::submesh::{ByPosition, Submesh, Vertex};
+use crate::util::ids::NONE;
+use crate::util::radix::sort_by_number;
+use crate::util::scatter::Hashing;
 
 /// Times that the triangles to be cut are added to because a neighbour was cut at its edge.
 const GROWTHS: usize = 16;
+
+/// An edge of a piece, by its points, and the piece.
+pub(crate) type EdgeOfPiece = ((u32, u32), u32);
 
 /// The triangles that are cut.
 pub(crate) struct Cut {
@@ -18,11 +24,11 @@ pub(crate) struct Cut {
     pub(crate) arrangement: Arrangement,
     /// By source: where its pieces begin.
     starts: Vec<u32>,
-    /// Points of the arrangement at corners of sources.
-    pub(crate) vertices: HashMap<u32, Vertex>,
-    points: HashMap<Vertex, u32>,
-    /// Edges of pieces, by their points, with their sources.
-    uses: Vec<((u32, u32), u32)>,
+    /// By point of the arrangement: the corner of sources that is there, or [`NONE`].
+    pub(crate) vertices: Vec<Vertex>,
+    points: HashMap<Vertex, u32, Hashing>,
+    /// Edges of pieces, by their points, with these pieces, ascending.
+    uses: Vec<EdgeOfPiece>,
 }
 
 impl Cut {
@@ -65,23 +71,30 @@ impl Cut {
         arrangement.pieces.iter().for_each(|piece| starts[piece.source as usize + 1] += 1);
         (0..sources.len()).for_each(|s| starts[s + 1] += starts[s]);
         let corners = sources.iter().flat_map(|t| submesh.triangles[*t as usize].v);
-        let by_position: HashMap<Position, Vertex> = corners.map(|v| (Position::of(submesh.positions[v as usize]), v)).collect();
+        let by_position: ByPosition = corners.map(|v| (Position::of(submesh.positions[v as usize]), v)).collect();
         let at = |p: &[f64; 3]| by_position.get(&Position::exactly(*p)?).copied();
-        let exact = arrangement.points.iter().zip(&arrangement.exact).zip(0..).filter(|((_, exact), _)| **exact);
-        let vertices: HashMap<u32, Vertex> = exact.filter_map(|((p, _), point)| Some((point, at(p)?))).collect();
-        let points = vertices.iter().map(|(point, v)| (*v, *point)).collect();
-        let edges = |piece: &Piece| {
+        let corner = |(p, exact): (&[f64; 3], &bool)| exact.then(|| at(p)).flatten().unwrap_or(NONE);
+        let vertices: Vec<Vertex> = arrangement.points.iter().zip(&arrangement.exact).map(corner).collect();
+        let points = (0..).zip(&vertices).filter(|(_, v)| **v != NONE).map(|(point, v)| (*v, point)).collect();
+        let edges = |(number, piece): (u32, &Piece)| {
             let v = piece.v;
-            [(v[0], v[1]), (v[1], v[2]), (v[2], v[0])].map(|(a, b)| ((a.min(b), a.max(b)), piece.source))
+            [(v[0], v[1]), (v[1], v[2]), (v[2], v[0])].map(|(a, b)| ((a.min(b), a.max(b)), number))
         };
-        let mut uses: Vec<((u32, u32), u32)> = arrangement.pieces.iter().flat_map(edges).collect();
-        uses.sort_unstable();
+        let mut uses: Vec<EdgeOfPiece> = (0..).zip(&arrangement.pieces).flat_map(edges).collect();
+        // Stably, so that of an edge they stay in the order of the pieces.
+        sort_by_number(&mut uses, |((_, b), _)| *b);
+        sort_by_number(&mut uses, |((a, _), _)| *a);
         Self { sources, arrangement, starts, vertices, points, uses }
     }
 
     /// Where the pieces of a source are.
     pub(crate) fn range(&self, source: usize) -> Range<usize> {
         self.starts[source] as usize..self.starts[source + 1] as usize
+    }
+
+    /// The pieces at each edge.
+    pub(crate) fn at_edges(&self) -> impl Iterator<Item = &[EdgeOfPiece]> {
+        self.uses.chunk_by(|a, b| a.0 == b.0)
     }
 
     /// The pieces of a source.
@@ -104,7 +117,8 @@ impl Cut {
         let [Some(a), Some(b)] = ends.map(|v| self.points.get(&v).copied()) else { return false };
         let key = (a.min(b), a.max(b));
         let first = self.uses.partition_point(|(edge, _)| *edge < key);
-        let around = || self.uses[first..].iter().take_while(|(edge, _)| *edge == key).map(|(_, source)| *source as usize);
+        let here = || self.uses[first..].iter().take_while(|(edge, _)| *edge == key);
+        let around = || here().map(|(_, piece)| self.arrangement.pieces[*piece as usize].source as usize);
         around().any(|s| s == source)
             && around().all(|s| ends.iter().all(|end| submesh.triangles[self.sources[s] as usize].v.contains(end)))
     }

@@ -1,7 +1,5 @@
 //! What stays of the pieces, in f32.
 
-use std::collections::{BTreeSet, HashMap};
-
 use glam::DVec3;
 
 use crate::detect::defects;
@@ -15,6 +13,7 @@ use crate::repairs::cleanup::duplicates;
 use crate::repairs::shared::work::Work;
 use crate::submesh::{Submesh, Vertex};
 use crate::util::ids::NONE;
+use crate::util::radix::sort_by_number;
 use crate::util::steps;
 
 /// The fate of a triangle.
@@ -91,26 +90,29 @@ impl State<'_, '_, '_> {
     /// a point was moved.
     fn put_in(&mut self, cut: &Cut, new: &[(u32, [u32; 3])]) -> f64 {
         let mut displaced = 0f64;
-        let points: BTreeSet<u32> = new.iter().flat_map(|(_, v)| *v).filter(|point| !cut.vertices.contains_key(point)).collect();
-        let cut_from: HashMap<u32, u32> = new.iter().flat_map(|(t, v)| v.map(|point| (point, *t))).collect();
+        let mut points: Vec<u32> = new.iter().flat_map(|(_, v)| *v).filter(|p| cut.vertices[*p as usize] == NONE).collect();
+        points.sort_unstable();
+        points.dedup();
+        let mut cut_from = vec![NONE; cut.vertices.len()];
+        new.iter().for_each(|(t, v)| v.iter().for_each(|point| cut_from[*point as usize] = *t));
         let step = self.step;
         let rounded = |point: u32| Position::of(cut.arrangement.points[point as usize].map(|x| place_of(x, step)));
         // There may be a vertex already, here or elsewhere in the file.
         self.complete(points.iter().map(|point| rounded(*point).coordinates()).collect());
         let mut known = self.work.by_position();
-        let mut vertex_of: HashMap<u32, Vertex> = cut.vertices.clone();
+        let mut vertex_of: Vec<Vertex> = cut.vertices.clone();
         for point in points {
             let position = rounded(point);
             let exact = DVec3::from_array(cut.arrangement.points[point as usize]);
             let by = exact.distance(place(position.coordinates()));
             displaced = displaced.max(by);
-            self.track.moved(&self.clusters, cut_from[&point], by);
+            self.track.moved(&self.clusters, cut_from[point as usize], by);
             let v = *known.entry(position).or_insert_with(|| self.work.add_vertex(position));
-            vertex_of.insert(point, v);
+            vertex_of[point as usize] = v;
         }
         let first = self.work.triangles.len() as u32;
         for (t, points) in new {
-            let v = points.map(|point| vertex_of[&point]);
+            let v = points.map(|point| vertex_of[point as usize]);
             let origin = self.work.triangles[*t as usize].origin.of_part();
             if v[0] != v[1] && v[1] != v[2] && v[2] != v[0] {
                 self.work.add(v, origin, NONE);
@@ -152,7 +154,7 @@ fn whole_sources(submesh: &Submesh, cut: &Cut, fates: &[Fate]) -> Vec<Option<Fat
     let count = cut.sources.len();
     let range = |s: usize| cut.range(s);
     let corners = |s: usize| submesh.triangles[cut.sources[s] as usize].v;
-    let is_corner = |s: usize, point: &u32| cut.vertices.get(point).is_some_and(|v| corners(s).contains(v));
+    let is_corner = |s: usize, point: &u32| corners(s).contains(&cut.vertices[*point as usize]);
     let mut whole: Vec<Option<Fate>> = (0..count)
         .map(|s| {
             let fates = &fates[range(s)];
@@ -169,18 +171,13 @@ fn whole_sources(submesh: &Submesh, cut: &Cut, fates: &[Fate]) -> Vec<Option<Fat
             (!cut.arrangement.covered[s]).then_some(*first)
         })
         .collect();
-    let edge = |v: [u32; 3], k: usize| (v[k].min(v[(k + 1) % 3]), v[k].max(v[(k + 1) % 3]));
-    let mut staying: Vec<((u32, u32), u32)> = Vec::new();
-    for s in 0..count {
-        for (piece, _) in cut.pieces(s).iter().zip(&fates[range(s)]).filter(|(_, f)| **f != Fate::Goes) {
-            staying.extend((0..3).map(|k| (edge(piece.v, k), s as u32)));
-        }
-    }
-    staying.sort_unstable();
-    for around in staying.chunk_by(|a, b| a.0 == b.0).filter(|around| around.len() > 2) {
-        // In the middle of a source, two of its pieces have the edge.
-        for own in around.chunk_by(|a, b| a.1 == b.1).filter(|own| own.len() == 2) {
-            whole[own[0].1 as usize] = None;
+    for around in cut.at_edges().filter(|around| around.len() > 2) {
+        let staying = || around.iter().map(|(_, piece)| *piece as usize).filter(|piece| fates[*piece] != Fate::Goes);
+        if staying().count() > 2 {
+            // In the middle of a source, two of its pieces have the edge.
+            let sources: Vec<u32> = staying().map(|piece| cut.arrangement.pieces[piece].source).collect();
+            let own = sources.chunk_by(|a, b| a == b).filter(|own| own.len() == 2);
+            own.for_each(|own| whole[own[0] as usize] = None);
         }
     }
     let mut uses: Vec<Use> = Vec::new();
@@ -209,7 +206,8 @@ struct Use {
 /// Sources that would stay whole do not, if they are in several pieces and another source ends at a point of theirs that is no corner of theirs:
 /// one that has a corner there, or does not stay whole. O(uses · log): each point is looked at once.
 fn divide_beside(mut uses: Vec<Use>, is_divided: impl Fn(usize) -> bool, stays: &mut [bool]) {
-    uses.sort_unstable();
+    sort_by_number(&mut uses, |used| used.source);
+    sort_by_number(&mut uses, |used| used.point);
     uses.dedup();
     let points: Vec<&[Use]> = uses.chunk_by(|a, b| a.point == b.point).collect();
     let mut points_of: Vec<Vec<u32>> = vec![Vec::new(); stays.len()];

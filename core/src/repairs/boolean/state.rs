@@ -13,6 +13,7 @@ use crate::submesh::components::Reversed;
 use crate::submesh::{Origin, Submesh, Triangle, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
+use crate::util::scatter::Hashing;
 use crate::util::steps;
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap, HashMap, HashSet};
@@ -158,8 +159,12 @@ pub(crate) fn coincident(submesh: &Submesh) -> Vec<[u32; 2]> {
 
 /// The corners of the triangles of some pairs, each once.
 pub(crate) fn corners(survey: &Survey<'_>, submesh: &Submesh, overlay: &Overlay, pairs: &[[Standing; 2]]) -> Vec<[f32; 3]> {
+    // Most are in several pairs.
+    let mut triangles: Vec<Standing> = pairs.as_flattened().to_vec();
+    triangles.sort_unstable();
+    triangles.dedup();
     let mut positions: Vec<[f32; 3]> =
-        pairs.iter().flatten().flat_map(|number| overlay.corners(survey, submesh, *number)).collect();
+        triangles.into_iter().flat_map(|number| overlay.corners(survey, submesh, number)).collect();
     positions.sort_unstable_by_key(|p| Position::of(*p));
     positions.dedup();
     positions
@@ -186,7 +191,7 @@ impl State<'_, '_, '_> {
     /// triangles cross, and yet one side of the one is not one cell. `None` if that is too much work to tell.
     pub(crate) fn with_edges_along(&mut self, overlay: &Overlay, crossing: &BTreeSet<u32>) -> Option<BTreeSet<u32>> {
         let pieces: BTreeSet<u32> = crossing.iter().map(|t| self.clusters.of_triangle[*t as usize]).collect();
-        let (mut seen, mut asked): (HashSet<Vertex>, HashSet<u32>) = Default::default();
+        let (mut seen, mut asked): (HashSet<Vertex, Hashing>, HashSet<u32, Hashing>) = Default::default();
         grown(crossing, |fresh| {
             let corners: BTreeSet<Vertex> = fresh.iter().flat_map(|t| self.work.triangles[*t as usize].v).collect();
             let corners = corners.into_iter().filter(|v| seen.insert(*v));
@@ -224,7 +229,7 @@ impl State<'_, '_, '_> {
     /// Pairs of triangles as the submesh numbers them, where they are fetched to if need be, with all around them.
     pub(crate) fn in_submesh(&mut self, overlay: &Overlay, pairs: &[[Standing; 2]]) -> Vec<[u32; 2]> {
         self.complete(corners(self.survey, self.work, overlay, pairs));
-        let of_record: HashMap<u32, u32> = self
+        let of_record: HashMap<u32, u32, Hashing> = self
             .work
             .living()
             .filter_map(|t| match self.work.triangles[t as usize].origin {
@@ -278,9 +283,9 @@ impl State<'_, '_, '_> {
             Origin::Input(record) | Origin::Part(record) => Some(record),
             Origin::Added(_) => None,
         };
-        let wanted: HashSet<u32> = left.iter().filter_map(|t| record(*t)).collect();
+        let wanted: HashSet<u32, Hashing> = left.iter().filter_map(|t| record(*t)).collect();
         let known = (0..first).filter_map(|t| Some((record(t).filter(|r| wanted.contains(r))?, self.clusters.of_triangle[t])));
-        let piece_of: HashMap<u32, u32> = known.filter(|(_, piece)| *piece != NONE).collect();
+        let piece_of: HashMap<u32, u32, Hashing> = known.filter(|(_, piece)| *piece != NONE).collect();
         let pieces = left.iter().map(|t| record(*t).and_then(|r| piece_of.get(&r).copied()).unwrap_or(NONE));
         self.clusters.of_triangle.extend(pieces.collect::<Vec<_>>());
         left.retain(|t| self.clusters.of_triangle[*t] == NONE);

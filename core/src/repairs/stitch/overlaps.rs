@@ -7,7 +7,7 @@
 pub(crate) mod copies;
 mod pieces;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 use crate::contract::report::RepairName;
 use crate::geometry::boxes::BoxTree;
@@ -19,7 +19,7 @@ use crate::repairs::stitch::layer::{Facet, Layer, Place, Reach, RimEdge, around}
 use crate::repairs::stitch::weld;
 use crate::submesh::edges::Edges;
 use crate::submesh::near::{Tolerance, boundary_vertices};
-use crate::submesh::{Origin, Submesh, Vertex};
+use crate::submesh::{ByPosition, Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
 
 use pieces::{Member, Pieces, widened};
@@ -301,7 +301,7 @@ fn join(survey: &Survey<'_>, work: &mut Work<'_>, [moving, staying]: [&[Vertex];
             .filter(|foot| (seen.at(submesh, v)..=most).contains(&p.distance(*foot)));
         feet.extend(foot.map(|foot| (v, Position::nearest(foot))));
     }
-    let mut known = if feet.is_empty() { HashMap::new() } else { work.by_position() };
+    let mut known = if feet.is_empty() { ByPosition::default() } else { work.by_position() };
     for (v, foot) in feet {
         // Where a vertex is already, the two would be one when the file is read.
         known.entry(foot).or_insert_with(|| {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::geometry::sums::Bounds;
 use crate::repairs::boolean::meetings::meetings;
-use crate::repairs::boolean::rounds::BYTES_PER_PAIR;
+use crate::repairs::boolean::rounds::{BYTES_PER_PAIR, BYTES_PER_TRIANGLE};
 use crate::repairs::boolean::state::{follow_neighbours, grown};
 use crate::repairs::shared::pieces;
 use crate::util::steps;
@@ -54,7 +54,7 @@ fn what_would_take_more_memory_than_there_is_is_refused() {
     let pairs = enough.result.unwrap();
     assert!(enough.verdict.good);
     // The survey has its own budget, which is less than this.
-    let needed = pairs * BYTES_PER_PAIR;
+    let needed = pairs * (BYTES_PER_PAIR + BYTES_PER_TRIANGLE / 2);
     let refused = with(needed).result.unwrap_err().to_string();
     assert!(refused.contains("needs about") && refused.contains("MiB") && refused.contains("--memory"), "{refused}");
 }

@@ -135,7 +135,8 @@ impl Bundle {
     fn is_over(&self, reach: &Bounds) -> bool {
         let corner = |k: usize| [0, 1, 2].map(|axis| if k >> axis & 1 == 0 { reach.lo[axis] } else { reach.hi[axis] });
         let corners: [[f64; 3]; 8] = std::array::from_fn(|k| self.direction.upright(corner(k)));
-        let span = |axis: usize| corners.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |s, c| [s[0].min(c[axis]), s[1].max(c[axis])]);
+        let span =
+            |axis: usize| corners.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |s, c| [s[0].min(c[axis]), s[1].max(c[axis])]);
         let (x, y, top) = (span(0), span(1), span(2)[1]);
         let is_under = |ray: usize| !self.met[ray].load(Relaxed) && self.from[ray][2] <= top;
         !reach.is_empty() && self.grid.places_under([x, y]).any(is_under)

@@ -210,7 +210,8 @@ fn seen(
             });
             robust::orient2d(a, b, c) * if backward { -1.0 } else { 1.0 }
         };
-        let turned: Vec<(usize, f64)> = (0..all.len()).map(|i| (i, turns(&all[i].1.corners))).filter(|(_, turn)| *turn != 0.0).collect();
+        let turned: Vec<(usize, f64)> =
+            (0..all.len()).map(|i| (i, turns(&all[i].1.corners))).filter(|(_, turn)| *turn != 0.0).collect();
         let source = |(i, _): &(usize, f64)| {
             let mut from = bodies::inner_point(&all[*i].1.corners);
             from[axis] += if backward { -off } else { off };

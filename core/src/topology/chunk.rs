@@ -211,12 +211,18 @@ impl Scratch {
         self.hit.clear();
         self.hit.resize(self.triangles.len().div_ceil(64), 0);
         let mut crossings = Crossings::default();
-        let tested = self.finder.pairs(&view, allowance, |i, j, contact| {
-            crossings.add(self.numbers[i as usize], self.numbers[j as usize], contact);
-            for t in [i, j] {
-                self.hit[t as usize / 64] |= 1 << (t % 64);
+        let tested = self.finder.pairs(&view, allowance, |some, others, contact| {
+            crossings.add(some, others, &self.numbers, contact);
+            // Of those of the same vertices the first.
+            for t in [some.first(), others.first()].into_iter().flatten() {
+                self.hit[*t as usize / 64] |= 1 << (t % 64);
             }
         });
+        for same in self.finder.copies().groups() {
+            if self.hit[same[0] as usize / 64] >> (same[0] % 64) & 1 == 1 {
+                same.iter().for_each(|t| self.hit[*t as usize / 64] |= 1 << (t % 64));
+            }
+        }
         let (mut inner, mut across) = (0, Vec::new());
         for (word, hit) in self.hit.iter().enumerate() {
             for t in intersect::bits(*hit).map(|bit| word * 64 + bit) {

@@ -54,10 +54,11 @@ pub(crate) struct Finder {
     by_vertex: Vec<(u32, u32)>,
 }
 
-/// Bytes that a [`Finder`] takes for each triangle of a view: its part of the tree and of the copies, and for up to three vertices each a
-/// view, a standing, a state and a turn.
-pub(crate) const BYTES_PER_TRIANGLE: u64 =
-    tree::BYTES_PER_TRIANGLE + copies::BYTES_PER_TRIANGLE + 3 * (size_of::<stars::View>() as u64 + 3);
+/// Bytes that a [`Finder`] takes for each triangle of a view: its part of the tree, and of the copies.
+pub(crate) const BYTES_PER_TRIANGLE: u64 = tree::BYTES_PER_TRIANGLE + copies::BYTES_PER_TRIANGLE;
+
+/// And for each vertex a view, a standing, a state and a turn.
+pub(crate) const BYTES_PER_VERTEX: u64 = size_of::<stars::View>() as u64 + 3;
 
 impl Finder {
     /// Calls `found` for the self-intersecting pairs that the view's cell owns, each once, in an order that depends on the view: for

@@ -11,6 +11,7 @@ use crate::geometry::sums::{Bounds, Measure};
 use crate::geometry::tri_tri;
 use crate::io::read_ahead::Guide;
 use crate::io::record::{Record, corners};
+use crate::stream::budget::{Budget, Loan};
 use crate::stream::members::Members;
 use crate::stream::plan::{ChunkId, Plan};
 use crate::topology::chunk::Scratch;
@@ -93,18 +94,22 @@ impl Mesh {
 
     /// All that topology decides inside chunks: weld, stars, regions, sums; returns the vertices at home in them.
     pub fn solve(&self) -> u64 {
+        let budget = Budget::new(u64::MAX);
         let solved = self.members.each(
             (&self.records, &Guide::NONE, &self.plan),
             1,
             |_| true,
             Scratch::default,
-            |scratch, chunk, seen, _| scratch.solve(seen, self.plan.home_box(chunk), &self.measure, &[]).vertices,
+            |scratch, chunk, seen, _| {
+                scratch.solve(seen, self.plan.home_box(chunk), &self.measure, &[], &Loan::of(&budget)).vertices
+            },
         );
         solved.into_iter().sum()
     }
 
     /// The same, and the search for self-intersections; returns how many pairs of triangles it tested.
     pub fn solve_and_cross(&self) -> u64 {
+        let budget = Budget::new(u64::MAX);
         let tested = self.members.each(
             (&self.records, &Guide::NONE, &self.plan),
             1,
@@ -112,8 +117,9 @@ impl Mesh {
             Scratch::default,
             |scratch, chunk, seen, visitors| {
                 let cell = self.plan.home_box(chunk);
-                black_box(scratch.solve(seen, cell, &self.measure, &[]));
-                scratch.cross(visitors, cell, u64::MAX).tested
+                let loan = Loan::of(&budget);
+                black_box(scratch.solve(seen, cell, &self.measure, &[], &loan));
+                scratch.cross(visitors, cell, u64::MAX, &loan).tested
             },
         );
         tested.into_iter().sum()

@@ -34,11 +34,7 @@ impl Surroundings {
 }
 
 /// A ray upwards from a point.
-struct Ray {
-    from: [f64; 3],
-    /// Closed components whose crossings count, ascending.
-    candidates: Vec<u32>,
-}
+type Ray = [f64; 3];
 
 /// The surroundings of every component that is asked about; empty for others, and for those in no closed one's box. When at least one box
 /// lies in another, reads the chunks of the file once more that a ray may meet.
@@ -50,9 +46,15 @@ pub(crate) fn surroundings(
     asks: impl Fn(&Component) -> bool,
 ) -> Vec<Surroundings> {
     let mut all = vec![Surroundings::default(); components.list.len()];
-    let (of_rays, rays) = rays(survey, submesh, &components.list, asks);
-    for (component, around) in of_rays.into_iter().zip(count(survey, submesh, components, reversed, &rays)) {
-        all[component as usize].around = around;
+    let list = &components.list;
+    let (of_rays, rays) = rays(survey, submesh, list, asks);
+    let counts = |ray: usize, c: u32| {
+        let inner = of_rays[ray];
+        c != inner && list[c as usize].bounds.contains(&list[inner as usize].bounds)
+    };
+    let found = count(survey, submesh, components, reversed, &rays, counts);
+    for (component, around) in of_rays.iter().zip(found) {
+        all[*component as usize].around = around;
     }
     all
 }
@@ -78,19 +80,16 @@ pub(crate) fn surfaces_around(
     reversed: &Reversed,
     points: &[[f64; 3]],
 ) -> Vec<Vec<(u32, i32)>> {
-    let (closed, tree) = closed_ones(&components.list);
-    let mut found = Vec::new();
-    let rays: Vec<Ray> = points
-        .iter()
-        .map(|from| {
-            let [lo, hi] = [0, 1].map(|side| from.map(|x| around(x)[side]));
-            // What the point is in is met by the box of the f32 around it.
-            tree.meeting(&Bounds { lo, hi }, &mut found);
-            found.sort_unstable();
-            Ray { from: *from, candidates: found.iter().map(|c| closed[*c as usize]).collect() }
-        })
-        .collect();
-    count(survey, submesh, components, reversed, &rays)
+    // What the point is in is met by the box of the f32 around it.
+    let boxes: Vec<Bounds> = points.iter().map(box_around).collect();
+    let counts = |ray: usize, c: u32| components.list[c as usize].bounds.overlap(&boxes[ray]).is_some();
+    count(survey, submesh, components, reversed, points, counts)
+}
+
+/// The box of the f32 around a point.
+fn box_around(point: &[f64; 3]) -> Bounds {
+    let [lo, hi] = [0, 1].map(|side| point.map(|x| around(x)[side]));
+    Bounds { lo, hi }
 }
 
 /// How often closed surfaces of these triangles together wind around each of some points, none of which may lie on one.
@@ -99,53 +98,58 @@ pub(crate) fn windings_of(triangles: &[[[f32; 3]; 3]], points: &[[f64; 3]]) -> V
     if triangles.is_empty() || points.is_empty() {
         return windings;
     }
-    let rays: Vec<Ray> = points.iter().map(|from| Ray { from: *from, candidates: vec![0] }).collect();
-    let grid = Grid::new(&rays);
-    triangles.iter().for_each(|corners| grid.cross(&rays, corners, 0, &mut |at, w| windings[at as usize] += w));
+    let grid = grid_of(points);
+    triangles.iter().for_each(|corners| cross(&grid, points, corners, |_| true, |ray, w| windings[ray] += w));
     windings
 }
 
-/// For each ray the components of its candidates that wind around where it begins, ascending.
+/// For each ray the closed components that wind around where it begins, ascending, of those that `counts` says of the ray by number.
 fn count(
     survey: &Survey<'_>,
     submesh: &Submesh,
     components: &Components,
     reversed: &Reversed,
     rays: &[Ray],
+    counts: impl Fn(usize, u32) -> bool + Sync,
 ) -> Vec<Vec<(u32, i32)>> {
     if rays.is_empty() {
         return Vec::new();
     }
-    let mut asked = vec![false; components.list.len()];
-    rays.iter().flat_map(|r| &r.candidates).for_each(|c| asked[*c as usize] = true);
-    let grid = Grid::new(rays);
-
-    let mut counts = vec![0i32; rays.iter().map(|r| r.candidates.len()).sum()];
+    let grid = grid_of(rays);
+    let is_over =
+        |c: &Component| !c.open && !c.bounds.is_empty() && grid.may_meet(flat(&[c.bounds.lo, c.bounds.hi, c.bounds.hi]));
+    let asked: Vec<bool> = components.list.iter().map(is_over).collect();
     let is_asked = |region: u32| asked.get(components.of_region[region as usize] as usize) == Some(&true);
+    // Ray, component, and what it crosses of that, which makes a sum of integers in the end.
+    type Hits = Vec<(u32, u32, i32)>;
+    let hit = |corners: &[[f32; 3]; 3], component: u32, sign: i32, hits: &mut Hits| {
+        cross(&grid, rays, corners, |ray| counts(ray, component), |ray, w| hits.push((ray as u32, component, sign * w)));
+    };
     let per_chunk = survey.visit_regular(
         is_asked,
-        |reach| Over::new(rays, &grid, reach).map(|over| (over, Vec::new())),
+        |reach| Over::new(rays, &grid, reach).map(|over| (over, Hits::new())),
         |(over, _), corners| over.may_meet(&grid, corners),
-        |(_, hits): &mut (Over, Vec<(u32, i32)>), triangle, region| {
+        |(_, hits): &mut (Over, Hits), triangle, region| {
             let corners = record::corners(&survey.records[triangle as usize]);
             let sign = if reversed.regions[region as usize] { -1 } else { 1 };
-            grid.cross(rays, &corners, components.of_region[region as usize], &mut |at, w| hits.push((at, sign * w)));
+            hit(&corners, components.of_region[region as usize], sign, hits);
         },
     );
-    per_chunk.into_iter().flat_map(|(_, hits)| hits).for_each(|(at, w)| counts[at as usize] += w);
+    let mut hits: Hits = per_chunk.into_iter().flat_map(|(_, hits)| hits).collect();
     for t in submesh.living() {
         let component = components.of_triangle[t as usize];
         if asked[component as usize] {
-            grid.cross(rays, &submesh.points(t), component, &mut |at, w| counts[at as usize] += w);
+            hit(&submesh.points(t), component, 1, &mut hits);
         }
     }
-    let mut at = 0;
-    let around = |ray: &Ray| {
-        let found = &counts[at..at + ray.candidates.len()];
-        at += ray.candidates.len();
-        ray.candidates.iter().zip(found).filter(|(_, w)| **w != 0).map(|(c, w)| (*c, *w)).collect()
-    };
-    rays.iter().map(around).collect()
+    hits.sort_unstable();
+    let mut all = vec![Vec::new(); rays.len()];
+    for same in hits.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+        let (ray, component, _) = same[0];
+        let winding: i32 = same.iter().map(|(.., w)| w).sum();
+        all[ray as usize].extend(Some((component, winding)).filter(|(_, w)| *w != 0));
+    }
+    all
 }
 
 /// The closed components, ascending, and their boxes in that order.
@@ -234,7 +238,7 @@ pub(crate) fn obstructed(
 struct Bundle {
     direction: Direction,
     rays: Vec<Ray>,
-    grid: Grid,
+    grid: RayGrid,
     /// Where the rays begin, upright, and the components that are not in their way.
     sources: Vec<Source>,
     met: Vec<AtomicBool>,
@@ -242,12 +246,11 @@ struct Bundle {
 
 impl Bundle {
     fn of(direction: Direction, sources: &[Source]) -> Self {
-        let ray = |source: &Source| Ray { from: direction.upright(source.from), candidates: Vec::new() };
-        let rays: Vec<Ray> = sources.iter().map(ray).collect();
-        let grid = Grid::new(&rays);
+        let rays: Vec<Ray> = sources.iter().map(|source| direction.upright(source.from)).collect();
+        let grid = grid_of(&rays);
         let met = sources.iter().map(|_| AtomicBool::new(false)).collect();
-        let upright = |r: &u32| Source { from: rays[*r as usize].from, component: sources[*r as usize].component };
-        Self { direction, sources: grid.cells.order().iter().map(upright).collect(), grid, rays, met }
+        let upright = |r: &u32| Source { from: rays[*r as usize], component: sources[*r as usize].component };
+        Self { direction, sources: grid.order().iter().map(upright).collect(), grid, rays, met }
     }
 
     /// The rays that may meet what lies in a box of the file.
@@ -262,7 +265,7 @@ impl Bundle {
 
     fn meet(&self, corners: &[[f32; 3]; 3], component: u32) {
         let corners = self.direction.upright_corners(corners);
-        for place in self.grid.cells.places_under(flat(&corners)) {
+        for place in self.grid.places_under(flat(&corners)) {
             let (source, met) = (&self.sources[place], &self.met[place]);
             // Whoever meets it first: it is met.
             if source.component != component && !met.load(Relaxed) && crossing(&corners, source.from) != 0 {
@@ -274,7 +277,7 @@ impl Bundle {
     /// Which rays met anything, in the order of the sources.
     fn met(self) -> Vec<bool> {
         let mut met = vec![false; self.met.len()];
-        let places = self.grid.cells.order().iter().zip(self.met);
+        let places = self.grid.order().iter().zip(self.met);
         places.for_each(|(ray, is_met)| met[*ray as usize] = is_met.into_inner());
         met
     }
@@ -290,22 +293,23 @@ pub(crate) fn are_surrounded(survey: &Survey<'_>, submesh: &Submesh, points: &[[
     }
     for (axis, backward) in (0..3).flat_map(|axis| [(axis, false), (axis, true)]) {
         let direction = Direction { axis, backward };
-        let rays: Vec<Ray> = points.iter().map(|p| Ray { from: direction.upright(*p), candidates: vec![0] }).collect();
-        let grid = Grid::new(&rays);
+        let rays: Vec<Ray> = points.iter().map(|p| direction.upright(*p)).collect();
+        let grid = grid_of(&rays);
         let upright = |corners: &[[f32; 3]; 3]| direction.upright_corners(corners);
         let mut windings = vec![0; points.len()];
         let per_chunk = survey.visit_regular(
             |_| true,
             |reach| Over::new(&rays, &grid, &direction.upright_box(reach)).map(|over| (over, Vec::new())),
             |(over, _), corners| over.may_meet(&grid, &upright(corners)),
-            |(_, hits): &mut (Over, Vec<(u32, i32)>), triangle, _| {
+            |(_, hits): &mut (Over, Vec<(usize, i32)>), triangle, _| {
                 let corners = record::corners(&survey.records[triangle as usize]);
-                grid.cross(&rays, &upright(&corners), 0, &mut |at, w| hits.push((at, w)));
+                cross(&grid, &rays, &upright(&corners), |_| true, |ray, w| hits.push((ray, w)));
             },
         );
-        per_chunk.into_iter().flat_map(|(_, hits)| hits).for_each(|(at, w)| windings[at as usize] += w);
-        let mut cross = |t| grid.cross(&rays, &upright(&submesh.points(t)), 0, &mut |at, w| windings[at as usize] += w);
-        submesh.living().for_each(&mut cross);
+        per_chunk.into_iter().flat_map(|(_, hits)| hits).for_each(|(ray, w)| windings[ray] += w);
+        for t in submesh.living() {
+            cross(&grid, &rays, &upright(&submesh.points(t)), |_| true, |ray, w| windings[ray] += w);
+        }
         votes.iter_mut().zip(&windings).for_each(|(vote, w)| *vote += i32::from(*w != 0));
     }
     votes.into_iter().map(|votes| votes >= 4).collect()
@@ -317,18 +321,14 @@ fn rays(survey: &Survey<'_>, submesh: &Submesh, list: &[Component], asks: impl F
         return Default::default();
     }
     let (closed, tree) = closed_ones(list);
-    let mut found = Vec::new();
     let (mut of_rays, mut rays) = (Vec::new(), Vec::new());
     for (component, inner) in (0..).zip(list).filter(|(_, inner)| asks(inner)) {
-        tree.meeting(&inner.bounds, &mut found);
-        let around = found.iter().map(|j| closed[*j as usize]);
-        let candidates: Vec<u32> =
-            around.filter(|c| *c != component && list[*c as usize].bounds.contains(&inner.bounds)).collect();
-        if !candidates.is_empty() {
+        let is_around = |c: u32| c != component && list[c as usize].bounds.contains(&inner.bounds);
+        if tree.any_around(&inner.bounds, |j| is_around(closed[j as usize])) {
             let Sample { record, in_submesh } = inner.sample;
             let corners = in_submesh.map_or_else(|| record::corners(&survey.records[record as usize]), |t| submesh.points(t));
             of_rays.push(component);
-            rays.push(Ray { from: inner_point(&corners), candidates });
+            rays.push(inner_point(&corners));
         }
     }
     (of_rays, rays)
@@ -354,28 +354,28 @@ impl Over {
     const FEW: usize = 4;
 
     /// `None`: no ray meets the box.
-    fn new(rays: &[Ray], grid: &Grid, reach: &Bounds) -> Option<Self> {
+    fn new(rays: &[Ray], grid: &RayGrid, reach: &Bounds) -> Option<Self> {
         if reach.is_empty() {
             return None;
         }
         let inside = |ray: &&Ray| {
-            let within = |k: usize| f64::from(reach.lo[k]) <= ray.from[k] && ray.from[k] <= f64::from(reach.hi[k]);
-            within(0) && within(1) && ray.from[2] <= f64::from(reach.hi[2])
+            let within = |k: usize| f64::from(reach.lo[k]) <= ray[k] && ray[k] <= f64::from(reach.hi[k]);
+            within(0) && within(1) && ray[2] <= f64::from(reach.hi[2])
         };
         let mut few = Vec::new();
         let corners = [reach.lo, reach.hi, reach.hi];
-        for ray in grid.cells.under(flat(&corners)).map(|r| &rays[r]).filter(inside) {
+        for ray in grid.under(flat(&corners)).map(|r| &rays[r]).filter(inside) {
             if few.len() == Self::FEW {
                 return Some(Self::Many);
             }
-            few.push([0, 1].map(|k| around(ray.from[k])));
+            few.push([0, 1].map(|k| around(ray[k])));
         }
         (!few.is_empty()).then_some(Self::Few(few))
     }
 
     /// Asked of every triangle.
     #[inline(always)]
-    fn may_meet(&self, grid: &Grid, corners: &[[f32; 3]; 3]) -> bool {
+    fn may_meet(&self, grid: &RayGrid, corners: &[[f32; 3]; 3]) -> bool {
         match self {
             Self::Few(few) => {
                 let low = |k: usize| corners[0][k].min(corners[1][k]).min(corners[2][k]);
@@ -383,7 +383,7 @@ impl Over {
                 let (lo, hi) = ([low(0), low(1)], [high(0), high(1)]);
                 few.iter().any(|[x, y]| (lo[0] <= x[0]) & (hi[0] >= x[1]) & (lo[1] <= y[0]) & (hi[1] >= y[1]))
             }
-            Self::Many => grid.cells.may_meet(flat(corners)),
+            Self::Many => grid.may_meet(flat(corners)),
         }
     }
 }
@@ -394,34 +394,18 @@ pub(crate) fn around(x: f64) -> [f32; 2] {
     [if f64::from(near) > x { near.next_down() } else { near }, if f64::from(near) < x { near.next_up() } else { near }]
 }
 
-/// Rays in a grid, and where each ray's candidates begin in the table of counts.
-struct Grid {
-    cells: RayGrid,
-    bases: Vec<u32>,
+/// Several cells a ray, so that most small triangles are over with at the first look.
+fn grid_of(rays: &[Ray]) -> RayGrid {
+    RayGrid::new(rays.iter().copied(), 8, 1024)
 }
 
-impl Grid {
-    fn new(rays: &[Ray]) -> Self {
-        // Several cells a ray, so that most small triangles are over with at the first look.
-        let mut grid = Self { cells: RayGrid::new(rays.iter().map(|ray| ray.from), 8, 1024), bases: Vec::new() };
-        let mut base = 0;
-        for ray in rays {
-            grid.bases.push(base);
-            base += ray.candidates.len() as u32;
-        }
-        grid
-    }
-
-    /// Reports `(place in the table of counts, signed crossing)` for every ray that asks for `component` and meets the triangle.
-    fn cross(&self, rays: &[Ray], corners: &[[f32; 3]; 3], component: u32, hit: &mut dyn FnMut(u32, i32)) {
-        for r in self.cells.under(flat(corners)) {
-            let ray = &rays[r];
-            if let Ok(i) = ray.candidates.binary_search(&component) {
-                let w = crossing(corners, ray.from);
-                if w != 0 {
-                    hit(self.bases[r] + i as u32, w);
-                }
-            }
+/// Tells `hit` of every ray, by number, that `counts` and crosses the triangle, and how.
+#[inline(always)]
+fn cross(grid: &RayGrid, rays: &[Ray], corners: &[[f32; 3]; 3], counts: impl Fn(usize) -> bool, mut hit: impl FnMut(usize, i32)) {
+    for ray in grid.under(flat(corners)).filter(|ray| counts(*ray)) {
+        let w = crossing(corners, rays[ray]);
+        if w != 0 {
+            hit(ray, w);
         }
     }
 }

@@ -6,7 +6,7 @@ use obvhs::bvh2::Bvh2;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 use crate::geometry::sums::Bounds;
-use crate::util::scatter;
+use crate::util::{scatter, steps};
 
 /// Many boxes, to be asked which of them meet another one.
 pub(crate) struct BoxTree {
@@ -45,6 +45,30 @@ impl BoxTree {
             tree.primitive_indices[first..first + node.prim_count as usize].iter().for_each(|i| visit(*i));
             true
         });
+    }
+
+    /// Is any box `wanted`, of those that may hold `inner`, by number? Parts of the tree that do not hold it are left out, so that among boxes
+    /// of one size, of which each meets all others, few are looked at.
+    pub(crate) fn any_around(&self, inner: &Bounds, wanted: impl Fn(u32) -> bool) -> bool {
+        let inner = aabb(inner);
+        let holds = |of: &Aabb| of.min.cmple(inner.min).all() && of.max.cmpge(inner.max).all();
+        let mut waiting: Vec<u32> = self.tree.nodes.first().map(|_| 0).into_iter().collect();
+        while let Some(node) = waiting.pop().map(|i| &self.tree.nodes[i as usize]) {
+            steps::count(1);
+            if !holds(node.aabb()) {
+                continue;
+            }
+            let first = node.first_index;
+            if !node.is_leaf() {
+                waiting.extend([first, first + 1]);
+                continue;
+            }
+            let here = &self.tree.primitive_indices[first as usize..][..node.prim_count as usize];
+            if here.iter().any(|i| wanted(*i)) {
+                return true;
+            }
+        }
+        false
     }
 
     /// Does any box but this one meet `wanted`? O(log n) where few do, and where many do.
@@ -147,5 +171,23 @@ mod tests {
             }
             prop_assert_eq!(meetings(boxes, u64::MAX), meeting / 2);
         }
+    }
+
+    #[test]
+    fn boxes_around_a_box_are_found_without_a_look_at_all_that_meet_it() {
+        steps::assert_near_linear(500, |n| {
+            let side = (n as f32).sqrt() as i16;
+            let at = |i: usize| [i as i16 % side, -(i as i16 % side), i as i16 / side].map(f32::from);
+            let around = |i: usize, by: f32| Bounds { lo: at(i).map(|x| x - by), hi: at(i).map(|x| x + by) };
+            // Each meets all others, and none holds another one, but for the last.
+            let by = f32::from(side) / 2.0;
+            let mut boxes: Vec<Bounds> = (0..n).map(|i| around(i, by)).collect();
+            boxes.push(around(7, 0.9 * by));
+            let tree = BoxTree::new(&boxes);
+            let is_held = |i: usize| tree.any_around(&boxes[i], |j| j as usize != i && boxes[j as usize].contains(&boxes[i]));
+            let (steps, held) = steps::of(|| (0..boxes.len()).filter(|i| is_held(*i)).collect::<Vec<_>>());
+            assert_eq!(held, [n]);
+            steps
+        });
     }
 }

@@ -70,6 +70,36 @@ impl Budget {
     }
 }
 
+/// Tables that are counted while they grow, and given back together.
+pub(crate) struct Loan<'b> {
+    budget: &'b Budget,
+    taken: AtomicU64,
+}
+
+impl<'b> Loan<'b> {
+    pub(crate) fn of(budget: &'b Budget) -> Self {
+        Self { budget, taken: AtomicU64::new(0) }
+    }
+
+    /// Takes so many `bytes` more; says whether they were there.
+    pub(crate) fn take(&self, bytes: u64) -> bool {
+        self.taken.fetch_add(bytes, Ordering::Relaxed);
+        self.budget.take(Purpose::Tables, bytes);
+        !self.budget.is_exceeded()
+    }
+
+    /// Refuses the work on `path` if something was taken and the budget is exceeded.
+    pub(crate) fn check(&self, path: &Path, what: impl FnOnce() -> String) -> Result<()> {
+        if self.taken.load(Ordering::Relaxed) > 0 { self.budget.check(path, what) } else { Ok(()) }
+    }
+}
+
+impl Drop for Loan<'_> {
+    fn drop(&mut self) {
+        self.budget.give_back(Purpose::Tables, *self.taken.get_mut());
+    }
+}
+
 /// Bytes that a submesh of so many triangles and vertices takes, tables of the repairs and the edit included: measured on a soup, which
 /// has three vertices a triangle (320 bytes each), and on meshes with defects here and there, which have about 0.6 (296).
 pub(crate) fn submesh_bytes(triangles: u64, vertices: u64) -> u64 {

@@ -1,6 +1,6 @@
 //! What lies near the boundary: vertices that should be one, and vertices inside another triangle's edge.
 
-use super::edges::Edges;
+use super::edges::{Edge, Edges};
 use super::{Submesh, Vertex, distance};
 use crate::geometry::boxes::BoxTree;
 pub(crate) use crate::geometry::distance::Tolerance;
@@ -132,6 +132,37 @@ pub(crate) fn noncommon_vertices(submesh: &Submesh, edges: &Edges, tolerance: &T
     on_edges(submesh, edges, |v| tolerance.at(submesh, v))
 }
 
+/// How near a boundary vertex comes to a boundary edge of a triangle that it does not belong to, at least, of those that are within the
+/// tolerance; infinite if none is. Below, there is no weldable vertex and none on an edge.
+pub(crate) fn nearest_edge(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> f64 {
+    let boundary: Vec<Edge<'_>> = edges.iter().filter(|e| e.is_boundary()).collect();
+    if boundary.is_empty() {
+        return f64::INFINITY;
+    }
+    let ends = |e: &Edge<'_>| [e.low, e.high].map(|v| submesh.positions[v as usize]);
+    let tree = BoxTree::new(&boundary.iter().map(|e| around(&ends(e), 0.0)).collect::<Vec<_>>());
+    let mut nearest = f64::INFINITY;
+    for v in boundary_vertices(edges) {
+        if nearest <= 0.0 {
+            break;
+        }
+        let (p, reach) = (submesh.positions[v as usize], tolerance.at(submesh, v).min(nearest));
+        tree.each_meeting(&around(&[p], reach), |i| {
+            let edge = &boundary[i as usize];
+            if !submesh.triangles[edge.uses[0].triangle as usize].v.contains(&v) {
+                let [a, b] = ends(edge);
+                let away = distance_to_line(p, a, b);
+                // What is as near as the tolerance may be farther by rounding.
+                nearest = if away * ALMOST <= reach { nearest.min(away * ALMOST) } else { nearest };
+            }
+        });
+    }
+    nearest
+}
+
+/// Less than rounding makes of a distance.
+const ALMOST: f64 = 1.0 - 1e-9;
+
 /// Foot of `p` on the line a–b as a fraction from a, clamped to the segment, and its distance. 0 for an edge of no length.
 fn project(p: [f32; 3], a: [f32; 3], b: [f32; 3]) -> (f64, f64) {
     let [p, a, b] = [p, a, b].map(place);
@@ -167,6 +198,20 @@ mod tests {
         let records = records(&[BELOW, [tip, [12.0, 10.0, 0.0], [-2.0, 10.0, 0.0]]]);
         let d = diagnose(&records);
         noncommon_vertices(&d.submesh, &Edges::of(&d.submesh), &Tolerance { weld, edge_share: 0.25 })
+    }
+
+    #[test]
+    fn the_nearest_edge_is_told_within_the_tolerance() {
+        let nearest = |tip: f32, weld: f64| {
+            let records = records(&[BELOW, [[3.0, tip, 0.0], [12.0, 10.0, 0.0], [-2.0, 10.0, 0.0]]]);
+            let d = diagnose(&records);
+            nearest_edge(&d.submesh, &Edges::of(&d.submesh), &Tolerance { weld, edge_share: 0.25 })
+        };
+        assert!((nearest(0.5, 1.0) - 0.5).abs() < 1e-6);
+        assert!((nearest(0.5, 0.5) - 0.5).abs() < 1e-6, "as near as the tolerance");
+        assert_eq!(nearest(0.5, 0.4), f64::INFINITY);
+        // A quarter of the shortest edge there.
+        assert_eq!(nearest(4.0, 9.0), f64::INFINITY);
     }
 
     #[test]

@@ -10,14 +10,15 @@
 
 use crate::geometry::sums::{Bounds, Extent, Measure};
 use crate::io::record::Point;
-use crate::stream::budget::{Budget, Purpose};
+use crate::stream::budget::{Budget, Loan, Purpose};
 use crate::stream::plan::HomeBox;
 use crate::stream::source::{Seen, Source, Triangle};
 use crate::topology::crossings::Crossings;
 use crate::topology::intersect::{self, CellView, Finder, Standing};
 use crate::topology::labels::{LabelWriter, Labels};
 use crate::topology::region_sums::{RegionSums, Sum};
-use crate::topology::star::{self, Ring, Stars};
+use crate::topology::room::Room;
+use crate::topology::star::{Ring, Stars};
 use crate::topology::vertex_table::{self, Weld};
 use crate::util::ids::NONE;
 
@@ -126,6 +127,7 @@ pub(crate) struct Scratch {
     finder: Finder,
     /// Members, then visitors, that are in a self-intersection, a bit each.
     hit: Vec<u64>,
+    room: Room,
 }
 
 /// State of a vertex at home here whose star is not regular.
@@ -135,29 +137,31 @@ const AWAY: u32 = NONE - 2;
 /// State of a regular vertex before regions are numbered. Smaller than the others, as the numbers are.
 const SOUND: u32 = 0;
 
-/// Bytes that one worker needs for a chunk of `members` triangles, at most.
-pub(crate) fn scratch_bytes(members: u64) -> u64 {
-    // A triangle has up to three vertices: slots 16 × 3, doubled when full, positions 12, states 4, parents 4; numbers 4, triangles 12.
-    members * (3 * (96 + 12 + 4 + 4 + star::BYTES_PER_VERTEX) + 4 + 12 + star::BYTES_PER_TRIANGLE + intersect::BYTES_PER_TRIANGLE)
-}
-
 impl Scratch {
-    /// Decides everything that can be decided inside the chunk of this cell; the vertices at the positions `cut` count as irregular. O(members).
-    pub(crate) fn solve(&mut self, seen: &Seen<'_>, cell: HomeBox, measure: &Measure, cut: &[Point]) -> ChunkTopology {
+    /// Decides everything that can be decided inside the chunk of this cell; the vertices at the positions `cut` count as irregular.
+    /// Nothing if there is no memory for its vertices. O(members).
+    pub(crate) fn solve(
+        &mut self,
+        seen: &Seen<'_>,
+        cell: HomeBox,
+        measure: &Measure,
+        cut: &[Point],
+        loan: &Loan<'_>,
+    ) -> ChunkTopology {
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("bmi2") {
             // SAFETY: the processor has them.
-            return unsafe { self.solve_avx2(seen, cell, measure, cut) };
+            return unsafe { self.solve_avx2(seen, cell, measure, cut, loan) };
         }
-        self.solve_by(seen, cell, measure, cut, Self::take, Ring::places)
+        self.solve_by(seen, cell, measure, (cut, loan), Self::take, Ring::places)
     }
 
     /// The same code with wider vectors.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,bmi1,bmi2")]
-    fn solve_avx2(&mut self, seen: &Seen<'_>, cell: HomeBox, measure: &Measure, cut: &[Point]) -> ChunkTopology {
+    fn solve_avx2(&mut self, seen: &Seen<'_>, cell: HomeBox, measure: &Measure, cut: &[Point], loan: &Loan<'_>) -> ChunkTopology {
         let take = |scratch: &mut Self, corners: &[[Point; 3]]| scratch.take_avx2(corners);
-        self.solve_by(seen, cell, measure, cut, take, |ring, corner| ring.places_avx2(corner))
+        self.solve_by(seen, cell, measure, (cut, loan), take, |ring, corner| ring.places_avx2(corner))
     }
 
     /// The same as [`Self::take`]: it is called from where the compiler does not see what the processor has.
@@ -174,25 +178,34 @@ impl Scratch {
         seen: &Seen<'_>,
         cell: HomeBox,
         measure: &Measure,
-        cut: &[Point],
+        (cut, loan): (&[Point], &Loan<'_>),
         take: impl Fn(&mut Self, &[[Point; 3]]),
         places: impl Fn(&Ring, u32) -> u32 + Copy,
     ) -> ChunkTopology {
         let total = match seen {
-            Seen::Mapped(source) => self.weld(source, measure, take),
-            Seen::Spooled(source) => self.weld(source, measure, take),
+            Seen::Mapped(source) => self.weld(source, measure, loan, take),
+            Seen::Spooled(source) => self.weld(source, measure, loan, take),
         };
+        if self.room.is_starved() {
+            return ChunkTopology::default();
+        }
         self.judge_stars(cell, cut, places);
         self.collect(measure, total)
     }
 
     /// Finds the self-intersections that the chunk owns, after it was solved; counts little more than `allowance` pairs. The
     /// `visitors` are added to its triangles.
-    pub(crate) fn cross(&mut self, visitors: &Seen<'_>, cell: HomeBox, allowance: u64) -> Crossings {
+    pub(crate) fn cross(&mut self, visitors: &Seen<'_>, cell: HomeBox, allowance: u64, loan: &Loan<'_>) -> Crossings {
         visitors.for_each(|number, triangle| {
-            self.numbers.push(number);
-            self.take(&[triangle.corners()]);
+            if !self.room.is_starved() {
+                self.numbers.push(number);
+                self.take(&[triangle.corners()]);
+                self.room.count(self.vertices.positions().len(), loan);
+            }
         });
+        if self.room.is_starved() {
+            return Crossings::default();
+        }
         self.standing.clear();
         self.standing.extend(self.states.iter().map(|state| match *state {
             AWAY => Standing::Away,
@@ -211,12 +224,18 @@ impl Scratch {
         self.hit.clear();
         self.hit.resize(self.triangles.len().div_ceil(64), 0);
         let mut crossings = Crossings::default();
-        let tested = self.finder.pairs(&view, allowance, |i, j, contact| {
-            crossings.add(self.numbers[i as usize], self.numbers[j as usize], contact);
-            for t in [i, j] {
-                self.hit[t as usize / 64] |= 1 << (t % 64);
+        let tested = self.finder.pairs(&view, allowance, |some, others, contact| {
+            crossings.add(some, others, &self.numbers, contact);
+            // Of those of the same vertices the first.
+            for t in [some.first(), others.first()].into_iter().flatten() {
+                self.hit[*t as usize / 64] |= 1 << (t % 64);
             }
         });
+        for same in self.finder.copies().groups() {
+            if self.hit[same[0] as usize / 64] >> (same[0] % 64) & 1 == 1 {
+                same.iter().for_each(|t| self.hit[*t as usize / 64] |= 1 << (t % 64));
+            }
+        }
         let (mut inner, mut across) = (0, Vec::new());
         for (word, hit) in self.hit.iter().enumerate() {
             for t in intersect::bits(*hit).map(|bit| word * 64 + bit) {
@@ -233,17 +252,27 @@ impl Scratch {
 
     /// Numbers the vertices of all members; returns the sum over them.
     #[inline(always)]
-    fn weld(&mut self, source: &impl Source, measure: &Measure, take: impl Fn(&mut Self, &[[Point; 3]])) -> Extent {
+    fn weld(
+        &mut self,
+        source: &impl Source,
+        measure: &Measure,
+        loan: &Loan<'_>,
+        take: impl Fn(&mut Self, &[[Point; 3]]),
+    ) -> Extent {
         self.numbers.clear();
         self.triangles.clear();
         self.collinear.clear();
         let expected = source.count();
+        self.room.expect(expected as u64);
         // Half a vertex a triangle is the rule; a soup has three, and grows the table.
         self.vertices.reset(expected / 2);
         self.numbers.reserve(expected);
         self.triangles.reserve(expected);
         let (mut corners, mut filled, mut total) = ([[[0f32; 3]; 3]; BATCH], 0, Extent::default());
         source.for_each(|number, triangle| {
+            if self.room.is_starved() {
+                return;
+            }
             self.numbers.push(number);
             corners[filled] = triangle.corners();
             filled += 1;
@@ -251,6 +280,7 @@ impl Scratch {
                 take(self, &corners);
                 total += measure.sum(&corners);
                 filled = 0;
+                self.room.count(self.vertices.positions().len(), loan);
             }
         });
         take(self, &corners[..filled]);

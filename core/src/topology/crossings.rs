@@ -40,6 +40,8 @@ pub(crate) struct Crossings {
     across: Vec<u32>,
     /// All pairs, or if they are too many, the smallest and some more.
     pairs: Vec<Pair>,
+    /// Larger ones are of no interest.
+    most: Option<[u32; 2]>,
 }
 
 impl Crossings {
@@ -48,16 +50,35 @@ impl Crossings {
         4 * self.across.capacity() as u64 + (size_of::<Pair>() * self.pairs.capacity()) as u64
     }
 
-    /// Notes a pair of triangles by number.
-    pub(crate) fn add(&mut self, a: u32, b: u32, contact: Contact) {
+    /// Notes the pairs of one of `some` triangles with one of `others`, or if there are none of these, of each two of the first; both
+    /// are places in `numbers`, and ascend there. Constant time once there are many pairs with smaller numbers.
+    pub(crate) fn add(&mut self, some: &[u32], others: &[u32], numbers: &[u32], contact: Contact) {
+        let [n, m] = [some.len() as u64, others.len() as u64];
+        let pairs = if others.is_empty() { n * (n - 1) / 2 } else { n * m };
         match contact {
-            Contact::Cross => self.crossing_pairs += 1,
-            Contact::Overlap => self.overlapping_pairs += 1,
+            Contact::Cross => self.crossing_pairs += pairs,
+            Contact::Overlap => self.overlapping_pairs += pairs,
             Contact::Apart | Contact::Touch => return,
         }
-        self.pairs.push(Pair { triangles: [a.min(b), a.max(b)], contact });
+        // If there are too many to keep, those to be listed are among the first of each.
+        let most = if self.count() > MOST_KEPT as u64 { LISTED + 1 } else { usize::MAX };
+        for (k, a) in some.iter().take(most).enumerate() {
+            let others = if others.is_empty() { &some[k + 1..] } else { others };
+            for (l, b) in others.iter().take(most).enumerate() {
+                let [a, b] = [numbers[*a as usize], numbers[*b as usize]];
+                let triangles = [a.min(b), a.max(b)];
+                if self.most.is_some_and(|most| triangles > most) {
+                    if l == 0 {
+                        return;
+                    }
+                    break;
+                }
+                self.pairs.push(Pair { triangles, contact });
+            }
+        }
         if self.pairs.len() > 2 * MOST_KEPT {
-            self.keep_smallest(MOST_KEPT);
+            self.keep_smallest(LISTED);
+            self.most = self.pairs.last().map(|pair| pair.triangles);
         }
     }
 
@@ -142,7 +163,8 @@ mod tests {
 
     fn part(tested: u64, pairs: &[[u32; 2]], across: &[u32]) -> Crossings {
         let mut part = Crossings::default();
-        pairs.iter().for_each(|[a, b]| part.add(*a, *b, Contact::Cross));
+        let numbers: Vec<u32> = (0..=MOST_KEPT as u32 + 1).collect();
+        pairs.iter().for_each(|[a, b]| part.add(&[*a], &[*b], &numbers, Contact::Cross));
         part.close(tested, 1, across.to_vec());
         part
     }
@@ -183,5 +205,26 @@ mod tests {
             let (sum, pairs) = Crossings::sum(parts.into_iter(), 1);
             assert_eq!((sum.crossing_pairs, sum.listed.len(), pairs.is_some()), (u64::from(count), LISTED, kept));
         }
+    }
+
+    #[test]
+    fn pairs_of_many_copies_are_counted_and_the_smallest_listed() {
+        // Even and odd ones.
+        let numbers: Vec<u32> = (0..2000).map(|i| 2 * i).chain((0..2000).map(|i| 2 * i + 1)).collect();
+        let [one, other]: [Vec<u32>; 2] = [(0..2000).collect(), (2000..4000).collect()];
+        let list = |sum: &SelfIntersections| sum.listed.clone();
+        let mut part = Crossings::default();
+        part.add(&one, &other, &numbers, Contact::Cross);
+        let (sum, kept) = Crossings::sum([part].into_iter(), 1);
+        assert_eq!((sum.crossing_pairs, kept.is_none()), (4_000_000, true));
+        // Those of triangle 0 with the others.
+        assert_eq!(list(&sum), (0..LISTED as u32).map(|i| [0, 2 * i + 1]).collect::<Vec<_>>());
+        let mut part = Crossings::default();
+        part.add(&other, &[], &numbers, Contact::Overlap);
+        part.add(&one[..2], &other[..3], &numbers, Contact::Cross);
+        let (sum, _) = Crossings::sum([part].into_iter(), 1);
+        assert_eq!((sum.overlapping_pairs, sum.crossing_pairs), (2000 * 1999 / 2, 6));
+        assert_eq!(list(&sum)[..7], [[0, 1], [0, 3], [0, 5], [1, 2], [1, 3], [1, 5], [1, 7]]);
+        assert_eq!(list(&sum).len(), LISTED);
     }
 }

@@ -12,6 +12,7 @@ pub(crate) mod crossings;
 pub(crate) mod intersect;
 pub(crate) mod labels;
 pub(crate) mod region_sums;
+pub(crate) mod room;
 pub(crate) mod solving;
 pub(crate) mod star;
 pub(crate) mod survey;

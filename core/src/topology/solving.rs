@@ -6,10 +6,11 @@ use crate::contract::settings::Limits;
 use crate::geometry::sums::Measure;
 use crate::io::read_ahead::Guide;
 use crate::io::record::Record;
-use crate::stream::budget::{Budget, Purpose};
+use crate::stream::budget::{Budget, Loan, Purpose};
 use crate::stream::members::Members;
 use crate::stream::plan::{ChunkId, Plan};
 use crate::topology::chunk::{self, ChunkTopology, Scratch};
+use crate::topology::room;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -53,6 +54,7 @@ impl Solving<'_, '_> {
     pub(crate) fn all(&self, most_tested: Option<u64>) -> Result<Vec<ChunkTopology>> {
         let (found, [done, tested, kept]) = (Found::new(0, 0), [const { AtomicU64::new(0) }; 3]);
         let all = self.records.len() as u64;
+        let loan = Loan::of(self.budget);
         let chunks = self.members.each(
             (self.records, self.guide, self.plan),
             self.threads,
@@ -63,10 +65,10 @@ impl Solving<'_, '_> {
                     return ChunkTopology::default();
                 }
                 let cell = self.plan.home_box(chunk);
-                let mut topology = scratch.solve(seen, cell, self.measure, &[]);
+                let mut topology = scratch.solve(seen, cell, self.measure, &[], &loan);
                 if let Some(most_tested) = most_tested {
                     let allowance = most_tested.saturating_sub(tested.load(Ordering::Relaxed));
-                    topology.crossings = scratch.cross(visitors, cell, allowance);
+                    topology.crossings = scratch.cross(visitors, cell, allowance, &loan);
                     tested.fetch_add(topology.crossings.tested, Ordering::Relaxed);
                     topology.crossings.keep(&kept);
                 }
@@ -77,7 +79,7 @@ impl Solving<'_, '_> {
                 topology
             },
         );
-        self.check(found)?;
+        self.check(found, &loan)?;
         Ok(chunks)
     }
 
@@ -90,6 +92,7 @@ impl Solving<'_, '_> {
         kept: [u64; 2],
     ) -> Result<Vec<(ChunkId, ChunkTopology)>> {
         let found = Found::new(kept[0], kept[1]);
+        let loan = Loan::of(self.budget);
         let chunks = self.members.each(
             (self.records, self.guide, self.plan),
             self.threads,
@@ -100,21 +103,22 @@ impl Solving<'_, '_> {
                     return (chunk, ChunkTopology::default());
                 }
                 let cut: Vec<[f32; 3]> = at_home(irregular, chunk).iter().map(|(_, p)| *p).collect();
-                let topology = scratch.solve(seen, self.plan.home_box(chunk), self.measure, &cut);
+                let topology = scratch.solve(seen, self.plan.home_box(chunk), self.measure, &cut, &loan);
                 found.add(&topology);
                 topology.take(self.budget);
                 (chunk, topology)
             },
         );
-        self.check(found)?;
+        self.check(found, &loan)?;
         Ok(chunks)
     }
 
     /// Refuses what the chunks found to be too much to keep.
-    fn check(&self, found: Found) -> Result<()> {
+    fn check(&self, found: Found, loan: &Loan<'_>) -> Result<()> {
         if self.progress.cancelled() {
             return Err(Error::cancelled(self.path, STAGE));
         }
+        loan.check(self.path, || "a large chunk has more than one vertex for two triangles".into())?;
         let [irregular_triangles, pieces] = [found.irregular_triangles, found.regions].map(AtomicU64::into_inner);
         self.budget.check(self.path, || {
             format!("at least {irregular_triangles} triangles lie at defects, in {pieces} pieces of surface or more")
@@ -162,7 +166,7 @@ pub(crate) fn take_tables(
     let mut counts: Vec<u64> = (0..plan.chunks()).map(|c| members.count(ChunkId(c as u32))).collect();
     counts.sort_unstable_by(|a, b| b.cmp(a));
     // A thread's tables are as large as its largest chunk, and no two threads work on the same one.
-    let scratch = counts.iter().take(limits.threads).map(|n| chunk::scratch_bytes(*n)).sum::<u64>();
+    let scratch = counts.iter().take(limits.threads).map(|n| room::scratch_bytes(*n)).sum::<u64>();
     budget.take(Purpose::Tables, scratch + members.heap_bytes(limits.threads) + plan.heap_bytes());
     let largest = counts.first().copied().unwrap_or(0);
     budget.check(path, || format!("the largest chunk holds {largest} triangles"))?;

@@ -7,6 +7,7 @@
 //! simple. Each rule's measure goes to the report beside the class.
 
 pub(crate) mod loops;
+mod nearest;
 pub(crate) mod owners;
 mod pairs;
 mod shape;

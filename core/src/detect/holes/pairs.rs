@@ -16,16 +16,17 @@
 //! than the two caps, as a soap film would have it. So a hole in the top and one in the bottom of a box as high as they are wide are two holes.
 //! Nor is there a way through between holes whose outlines are ragged: nobody drills along the edges of triangles.
 
-use std::collections::BTreeMap;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
 
 use glam::DVec3;
 
+use super::nearest::{Near, bounds};
 use super::owners::Owners;
 use super::shape::Shape;
 use crate::contract::report::LoopClass;
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::distance::{cosine, nearest_of_segment};
-use crate::geometry::position::Position;
 use crate::geometry::sums::Bounds;
 
 /// Cosine between the vector areas of loops that belong together, at most.
@@ -219,23 +220,44 @@ fn nearest_rings<'s>(
     shape: impl Fn(usize) -> &'s Shape,
     may_be: impl Fn(usize, usize, &Ring) -> bool,
 ) -> Vec<Option<(usize, Ring)>> {
-    let tree = BoxTree::new(&(0..free.len()).map(|i| bounds(shape(i), 0.0)).collect::<Vec<_>>());
-    let mut found = Vec::new();
-    (0..free.len())
-        .map(|i| {
-            tree.meeting(&bounds(shape(i), FARTHEST * shape(i).radius()), &mut found);
-            // Only of those that it can be a ring with: what else lies near is no reason to leave one open.
-            let others = found.iter().map(|j| *j as usize).filter(|j| *j != i);
-            let mut rings: Vec<(usize, Ring)> =
-                others.filter_map(|j| Some((j, ring(shape(i), shape(j))?))).filter(|(j, ring)| may_be(i, *j, ring)).collect();
-            // Of pipes that end inside each other, the walls are closed, not the rooms between them, however narrow.
-            if rings.iter().any(|(_, ring)| ring.is_wall() && ring.level) {
-                rings.retain(|(_, ring)| ring.missing != Missing::Floor);
-            }
-            let by_distance = rings.into_iter().map(|(j, ring)| (distance(shape(i), shape(j)), j, ring));
-            by_distance.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(_, j, ring)| (j, ring))
-        })
-        .collect()
+    let near = Near::new((0..free.len()).map(&shape));
+    (0..free.len()).map(|i| nearest_ring(i, &near, &shape, &may_be)).collect()
+}
+
+/// The nearest loop that this one is a ring with. Only of those that it can be a ring with: what else lies near is no reason to leave one open.
+fn nearest_ring<'s>(
+    i: usize,
+    near: &Near,
+    shape: impl Fn(usize) -> &'s Shape,
+    may_be: impl Fn(usize, usize, &Ring) -> bool,
+) -> Option<(usize, Ring)> {
+    type Nearest = Option<(f64, usize, Ring)>;
+    let put = |best: &mut Nearest, found: (f64, usize, Ring)| {
+        let is_nearer = |(d, j, _): (f64, usize, Ring)| found.0.total_cmp(&d).then(found.1.cmp(&j)).is_lt();
+        if best.is_none_or(is_nearer) {
+            *best = Some(found);
+        }
+    };
+    let is_settled = |best: &Nearest, bound: f64| best.is_some_and(|(d, ..)| bound > d);
+    // Of pipes that end inside each other, the walls are closed, not the rooms between them, however narrow: no floor counts if there is
+    // a wall whose rims are level.
+    let (mut nearest, mut but_floors, mut level_wall): (Nearest, Nearest, bool) = (None, None, false);
+    let within = bounds(shape(i), FARTHEST * shape(i).radius());
+    for (bound, j) in near.around(i, within, |j| face(shape(i), shape(j), OPPOSITE)) {
+        let is_floor = nearest.is_some_and(|(_, _, ring)| ring.missing == Missing::Floor);
+        if is_settled(&nearest, bound) && (!is_floor || level_wall && is_settled(&but_floors, bound)) {
+            break;
+        }
+        let Some(ring) = ring(shape(i), shape(j)).filter(|ring| may_be(i, j, ring)) else { continue };
+        level_wall |= ring.is_wall() && ring.level;
+        let best = if ring.missing == Missing::Floor { &mut nearest } else { &mut but_floors };
+        if !is_settled(best, bound) {
+            let found = (distance(shape(i), shape(j)), j, ring);
+            put(best, found);
+            put(&mut nearest, found);
+        }
+    }
+    if level_wall { but_floors } else { nearest }.map(|(_, j, ring)| (j, ring))
 }
 
 /// Islands and the holes around them, by place: each with the smallest hole that holds it. What is `taken` is neither.
@@ -248,19 +270,23 @@ fn islands<'s>(
     // A domed island stands out of its hole's box.
     let reaches: Vec<Bounds> = (0..free.len()).map(|i| bounds(shape(i), OFF_PLANE * shape(i).area().sqrt())).collect();
     let tree = BoxTree::new(&reaches);
-    let (mut found, mut islands) = (Vec::new(), Vec::new());
+    // Those that may hold one, the smallest first: radii are not negative, so that their bits are in their order.
+    let by_size = |outer: usize| Reverse((shape(outer).radius().to_bits(), outer));
+    let (mut waiting, mut islands) = (BinaryHeap::new(), Vec::new());
     for inner in 0..free.len() {
-        tree.meeting(&bounds(shape(inner), 0.0), &mut found);
+        if taken[inner] {
+            continue;
+        }
+        waiting.clear();
+        let may_hold = |outer: &usize| !taken[*outer] && is_hole_around(shape(*outer), shape(inner));
+        tree.each_meeting(&bounds(shape(inner), 0.0), |outer| waiting.extend(Some(outer as usize).filter(may_hold).map(by_size)));
         let holds = |outer: usize| {
             outer != inner
-                && !taken[inner]
-                && !taken[outer]
                 && !are_bodies(outer, inner)
                 && holds_island(shape(outer), shape(inner))
                 && ring(shape(outer), shape(inner)).is_none()
         };
-        let around = found.iter().map(|j| *j as usize).filter(|j| holds(*j));
-        let smallest = around.min_by(|a, b| shape(*a).radius().total_cmp(&shape(*b).radius()).then(a.cmp(b)));
+        let smallest = std::iter::from_fn(|| waiting.pop()).map(|Reverse((_, outer))| outer).find(|outer| holds(*outer));
         islands.extend(smallest.map(|outer| [outer, inner]));
     }
     islands
@@ -308,34 +334,37 @@ fn ring(a: &Shape, b: &Shape) -> Option<Ring> {
     let level = depth <= LEVEL * outer.radius();
     let ring = |missing| Some(Ring { missing, one_plane, level, apart });
     let [strip, caps] = closings(outer, inner, depth);
-    let alike = apart < ANNULAR && a.surrounds(b.centre) && b.surrounds(a.centre);
+    let may_be_alike = apart < ANNULAR;
+    let alike = || may_be_alike && a.surrounds(b.centre) && b.surrounds(a.centre);
     let of_thick_wall = || one_plane && is_clear_skin(outer) && is_clear_skin(inner) && lies_inside(inner, outer);
-    if outer.outwards >= SKIN && inner.outwards <= -SKIN && strip < caps && (alike || of_thick_wall()) {
+    if outer.outwards >= SKIN && inner.outwards <= -SKIN && strip < caps && (alike() || of_thick_wall()) {
         return ring(Missing::Wall(strip, caps));
     }
-    if !alike {
+    if !may_be_alike {
         return None;
     }
     let one_surface = outer.continues - inner.continues;
     let skins = outer.outwards.abs().min(inner.outwards.abs()) >= SKIN && outer.outwards * inner.outwards < 0.0;
     if one_plane && one_surface >= ONE_SURFACE && is_hole_around(outer, inner) {
-        return ring(Missing::OneSurface);
+        return alike().then(|| ring(Missing::OneSurface))?;
     }
     let holes = outer.continues + inner.continues > FACING_HOLES;
     if one_plane && skins && !holes {
-        return ring(Missing::Floor);
+        return alike().then(|| ring(Missing::Floor))?;
     }
     let two_planes = |missing| Some(Ring { missing, one_plane: false, level, apart });
     let towards = [outer.vector_area.dot(way), -inner.vector_area.dot(way)];
     let bore = outer.outwards <= -SKIN && inner.outwards <= -SKIN;
     let goes_on = if bore { towards.iter().all(|t| *t < 0.0) } else { towards.iter().all(|t| *t > 0.0) };
     if goes_on && one_surface > WASHER && !holes {
-        return two_planes(Missing::Tube);
+        return alike().then(|| two_planes(Missing::Tube))?;
     }
     let back_to_back = towards.iter().all(|t| *t < 0.0);
     let are_holes = outer.continues.min(inner.continues) >= HOLE;
     let is_way = back_to_back && are_holes && strip < caps && !(is_ragged(outer) && is_ragged(inner));
-    (is_way && outlines_agree(outer, inner, DVec3::ZERO, OUTLINE)).then(|| two_planes(Missing::Through(strip, caps))).flatten()
+    (is_way && alike() && outlines_agree(outer, inner, DVec3::ZERO, OUTLINE))
+        .then(|| two_planes(Missing::Through(strip, caps)))
+        .flatten()
 }
 
 /// Which of `others` a strip may lead to though two caps have less area, the nearest first.
@@ -433,9 +462,4 @@ fn distance(a: &Shape, b: &Shape) -> f64 {
 /// Vertices, or every few if there are very many.
 fn some_points(shape: &Shape) -> impl Iterator<Item = DVec3> + '_ {
     shape.points.iter().step_by(shape.points.len().div_ceil(MOST_POINTS)).copied()
-}
-
-fn bounds(shape: &Shape, by: f64) -> Bounds {
-    let points: Vec<[f32; 3]> = shape.points.iter().map(|p| Position::nearest(*p).coordinates()).collect();
-    crate::submesh::near::around(&points, by)
 }

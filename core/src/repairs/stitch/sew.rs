@@ -13,7 +13,7 @@ use crate::repairs::shared::work::Work;
 use crate::repairs::stitch::sew::rims::Width;
 use crate::repairs::stitch::weld::{self, Welded};
 use crate::repairs::stitch::zip;
-use crate::submesh::near::{Tolerance, boundary_vertices};
+use crate::submesh::near::{Tolerance, boundary_vertices, nearest_edge};
 use crate::topology::survey::Survey;
 
 mod clusters;
@@ -56,6 +56,8 @@ pub(crate) fn sew(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Toleranc
     let gap = if profile.max_gap_mm > 0.0 { profile.max_gap_mm } else { f64::INFINITY };
     let widest = (profile.sew_relative * survey.bounds.diagonal()).min(gap);
     let mut sewn = Sewn::default();
+    // Below this width there is nothing to match and nothing to split; not known where the surface may have changed.
+    let mut least = None;
     // A split leaves short edges, which bound what comes after it: so first whatever needs none, as wide as may be.
     for way in [join, split] {
         let mut width = tolerance.weld;
@@ -63,8 +65,13 @@ pub(crate) fn sew(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Toleranc
         let mut is_crack = true;
         while width > 0.0 && width < widest && work.edges().1.iter().any(|e| e.is_boundary()) {
             width = (STEP * width).min(widest);
-            let tolerance = Tolerance { weld: width, edge_share: tolerance.edge_share };
-            way(survey, work, profile, &Width { tolerance, is_crack }, &mut sewn);
+            let at = |weld| Tolerance { weld, edge_share: tolerance.edge_share };
+            let (submesh, edges) = work.edges();
+            if *least.get_or_insert_with(|| nearest_edge(submesh, edges, &at(widest))) <= width {
+                let before = [sewn.vertices, sewn.splits];
+                way(survey, work, profile, &Width { tolerance: at(width), is_crack }, &mut sewn);
+                least = least.filter(|_| before == [sewn.vertices, sewn.splits]);
+            }
             is_crack = false;
         }
     }

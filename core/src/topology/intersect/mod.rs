@@ -13,10 +13,11 @@
 //! In the order of the work: [`stars`] certifies vertices none of whose triangles can meet, [`tree`] finds pairs of overlapping
 //! boxes, [`narrow`] finds what is clearly apart or clearly crosses, and what is left is decided by exact predicates.
 //!
-//! Work can be quadratic in the size of a defect (a thousand copies of one triangle are half a million pairs), so pairs are
-//! counted. A pair counts when its boxes overlap and it shares no vertex, or the smallest vertex it shares is not certified: a
-//! property of the mesh. The owner counts it.
+//! Work can be quadratic in the size of a defect, so pairs are counted. A pair counts when its boxes overlap and it shares no
+//! vertex, or the smallest vertex it shares is not certified: a property of the mesh. The owner counts it. Of triangles of the same three
+//! vertices ([`copies`]) one is looked at for all, and each of the others counts as one pair.
 
+mod copies;
 mod curve;
 mod lanes;
 mod narrow;
@@ -28,6 +29,7 @@ mod view;
 
 use crate::geometry::tri_tri::Contact;
 use crate::util::ids::NONE;
+use copies::Copies;
 use lanes::{Lanes, Pairs};
 use narrow::Neighbours;
 use stars::Stars;
@@ -46,23 +48,31 @@ pub(crate) struct Finder {
     stars: Stars,
     states: Vec<State>,
     forest: Forest,
+    copies: Copies,
     waiting: Pairs,
     neighbours: Vec<Neighbours>,
     by_vertex: Vec<(u32, u32)>,
 }
 
-/// Bytes that a [`Finder`] takes for each triangle of a view: its part of the tree, and for up to three vertices each a view, a
-/// standing, a state and a turn.
-pub(crate) const BYTES_PER_TRIANGLE: u64 = tree::BYTES_PER_TRIANGLE + 3 * (size_of::<stars::View>() as u64 + 3);
+/// Bytes that a [`Finder`] takes for each triangle of a view: its part of the tree, and of the copies.
+pub(crate) const BYTES_PER_TRIANGLE: u64 = tree::BYTES_PER_TRIANGLE + copies::BYTES_PER_TRIANGLE;
+
+/// And for each vertex a view, a standing, a state and a turn.
+pub(crate) const BYTES_PER_VERTEX: u64 = size_of::<stars::View>() as u64 + 3;
 
 impl Finder {
-    /// Calls `found` for each self-intersecting pair that the view's cell owns, once, the smaller number first; in an order that
-    /// depends on the view. Returns how many pairs were counted; if they are more than `allowance`, it ended early.
+    /// Calls `found` for the self-intersecting pairs that the view's cell owns, each once, in an order that depends on the view: for
+    /// those of one of the first triangles with one of the others, or if there are no others, for each two of the first; both lists
+    /// ascend. Returns how many pairs were counted; if they are more than `allowance`, it ended early.
     ///
     /// O(n log n) besides the pairs of overlapping boxes, of which those around a certified vertex and around a vertex of more
     /// than 256 triangles that is at home elsewhere cost nothing.
-    pub(crate) fn pairs(&mut self, view: &CellView<'_>, allowance: u64, mut found: impl FnMut(u32, u32, Contact)) -> u64 {
+    pub(crate) fn pairs(&mut self, view: &CellView<'_>, allowance: u64, mut found: impl FnMut(&[u32], &[u32], Contact)) -> u64 {
         self.prepare(view);
+        let copies = &self.copies;
+        let mut each = |i: u32, j: u32, contact: Contact| {
+            found(copies.of(i).unwrap_or(&[i]), copies.of(j).unwrap_or(&[j]), contact);
+        };
         self.waiting.clear();
         self.neighbours.clear();
         let mut search = Search {
@@ -73,7 +83,7 @@ impl Finder {
             neighbours: &mut self.neighbours,
             counted: 0,
             allowance,
-            found: &mut found,
+            found: &mut each,
         };
         let walked = Walk::new(&self.forest, &mut search).all();
         search.separate();
@@ -81,8 +91,25 @@ impl Finder {
             search.around_hubs(&self.forest, &mut self.by_vertex);
         }
         search.decide_neighbours();
-        search.counted
+        let mut counted = search.counted;
+        for same in copies.groups() {
+            let smallest = view.triangles[same[0] as usize].into_iter().min_by(|v, w| by_position(view, *v, *w));
+            if smallest.is_some_and(|v| self.states[v as usize] == State::Open) {
+                counted += same.len() as u64 - 1;
+                found(same, &[], Contact::Overlap);
+            }
+        }
+        counted
     }
+
+    /// The triangles of the same vertices in the last view: pairs are found for all of a group, or for none.
+    pub(crate) fn copies(&self) -> &Copies {
+        &self.copies
+    }
+}
+
+fn by_position(view: &CellView<'_>, v: u32, w: u32) -> std::cmp::Ordering {
+    view.positions[v as usize].partial_cmp(&view.positions[w as usize]).unwrap_or(std::cmp::Ordering::Equal)
 }
 
 /// What comes before the walk, compiled for different processors. Sums and products are the same on all of them: in the same order,
@@ -125,7 +152,7 @@ impl Finder {
             Standing::Regular if self.stars.is_certified(v) => State::Certified,
             Standing::Regular | Standing::Irregular => State::Open,
         }));
-        self.forest.build(view, &self.stars, &self.states);
+        self.forest.build(view, &self.stars, &self.states, &mut self.copies);
     }
 }
 

@@ -117,9 +117,13 @@ impl Mesh {
             cell,
         };
         let mut pairs = Vec::new();
-        let tested = finder.pairs(&view, allowance, |i, j, contact| {
-            let [i, j] = [i, j].map(|t| seen[t as usize]);
-            pairs.push((i.min(j), i.max(j), contact));
+        let tested = finder.pairs(&view, allowance, |some, others, contact| {
+            for (k, i) in some.iter().enumerate() {
+                for j in if others.is_empty() { &some[k + 1..] } else { others } {
+                    let [i, j] = [i, j].map(|t| seen[*t as usize]);
+                    pairs.push((i.min(j), i.max(j), contact));
+                }
+            }
         });
         pairs.sort_unstable_by_key(|p| (p.0, p.1));
         (pairs, tested)
@@ -320,14 +324,31 @@ fn faults_around_hubs_are_found_in_any_cell() {
 }
 
 #[test]
-fn copies_end_at_the_allowance() {
-    let soup = vec![FLOOR; 300];
+fn pairs_end_at_the_allowance() {
+    // In one plane, each over the next.
+    let soup: Vec<Triangle> = (0..300).map(|i| FLOOR.map(|[x, y, z]| [x + i as f32 / 256.0, y, z])).collect();
     let (pairs, tested) = whole(&soup);
     assert_eq!((pairs.len() as u64, tested), (300 * 299 / 2, 300 * 299 / 2));
     let (_, tested) = Mesh::new(&soup).pairs_of(&mut Finder::default(), HomeBox::ALL, 1000);
     assert!((1001..300 * 299 / 2).contains(&tested), "{tested}");
     let (all, tested) = Mesh::new(&soup).pairs_of(&mut Finder::default(), HomeBox::ALL, 300 * 299 / 2);
     assert_eq!((all, tested), (pairs, 300 * 299 / 2), "exactly what is allowed");
+}
+
+#[test]
+fn copies_count_once_each() {
+    let [o, x, y] = FLOOR;
+    let mut soup: Vec<Triangle> = (0..300).map(|i| [[o, x, y], [y, o, x], [o, y, x]][i % 3]).collect();
+    let (pairs, tested) = whole(&soup);
+    assert_eq!((pairs.len() as u64, tested), (300 * 299 / 2, 299));
+    assert_eq!(in_cells(&soup, 40), (pairs, tested));
+    // Two that cross all of them, one of which is there twice, and each other.
+    soup.push([[1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [3.0, 3.0, 1.0]]);
+    soup.extend([[[0.5, 1.0, -1.0], [0.5, 1.0, 1.0], [3.0, 1.5, 0.5]]; 2]);
+    let (pairs, tested) = whole(&soup);
+    assert_eq!(pairs, Mesh::new(&soup).by_brute_force());
+    assert!(tested <= 303, "{tested}");
+    assert_eq!(in_cells(&soup, 40), (pairs, tested));
 }
 
 #[test]

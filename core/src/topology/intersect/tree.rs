@@ -18,9 +18,10 @@
 //! A vertex with very many triangles would make as many pairs as their square. Triangles of such a **hub** get a tree of
 //! their own, whose pairs with itself are left to the caller.
 
-use super::curve::Curve;
 use std::ops::Range;
 
+use super::copies::Copies;
+use super::curve::Curve;
 use super::lanes::bits;
 use super::lanes::{self, Boxes, Corners, Lanes, Pairs, Triangles, WIDTH, max, min};
 use super::stars::Stars;
@@ -119,10 +120,11 @@ pub(super) const BYTES_PER_TRIANGLE: u64 =
     (16 + 4 + size_of::<Leaf>() / WIDTH + size_of::<Boxes>().div_ceil(WIDTH * (WIDTH - 1))) as u64;
 
 impl Forest {
-    /// Arranges the triangles that meet the cell. O(triangles).
+    /// Arranges the triangles that meet the cell, but for all `copies` other than the first. O(triangles).
     #[inline(always)]
-    pub(super) fn build(&mut self, view: &CellView<'_>, stars: &Stars, states: &[State]) {
+    pub(super) fn build(&mut self, view: &CellView<'_>, stars: &Stars, states: &[State], copies: &mut Copies) {
         self.collect(view);
+        copies.take_out(view, &mut self.keys);
         let hubs = self.group_by_hub(view, stars, states);
         self.planted = 0;
         self.nodes.clear();

@@ -275,7 +275,7 @@ impl std::str::FromStr for Peer {
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().task {
-        Task::Generate { case, triangles, out, seed, density } => generate_file(case, density, triangles, &out, seed),
+        Task::Generate { case, triangles, out, seed, density } => generate_file((case, density), triangles, &out, seed),
         Task::Judge { file, solid: true, .. } => judge_solid(&file),
         Task::Judge { file, intended: Some(intended), .. } => judge_intended(&file, &intended),
         Task::Judge { file, skin_of: Some(before), .. } => judge_skin(&file, &before),
@@ -479,24 +479,16 @@ fn without_place(word: String) -> String {
     }
 }
 
-/// Where raw runs are, where their pages belong, and the README that has their table.
-fn places(results: Option<&Path>) -> (PathBuf, PathBuf, Option<PathBuf>) {
-    match results {
-        Some(raw) => (raw.into(), raw.into(), None),
-        None => (compare::results(), compare::home().into(), Some(compare::home().join("../README.md"))),
-    }
-}
-
 /// Publishes this crate's raw runs, or others where they are.
 fn publish(results: Option<&Path>) -> Result<(), Box<dyn Error>> {
-    let (raw, into, readme) = places(results);
+    let (raw, into, readme) = compare::places(results);
     compare::publish(&raw, &into, readme.as_deref())?;
     println!("results are in {}", into.join("RESULTS.md").display());
     Ok(())
 }
 
 fn check(results: Option<&Path>) -> Result<ExitCode, Box<dyn Error>> {
-    let (raw, into, readme) = places(results);
+    let (raw, into, readme) = compare::places(results);
     let outdated = compare::outdated(&raw, &into, readme.as_deref())?;
     outdated.iter().for_each(|path| println!("{} is not what the raw runs say: publish", path.display()));
     Ok(ExitCode::from(u8::from(!outdated.is_empty())))

@@ -27,3 +27,11 @@ pub(super) fn read_or_say(path: &Path) -> Option<Vec<Triangle>> {
     }
     triangles
 }
+
+/// Where raw runs are, where their pages belong, and the README that has their table.
+pub(crate) fn places(asked: Option<&Path>) -> (PathBuf, PathBuf, Option<PathBuf>) {
+    match asked {
+        Some(raw) => (raw.into(), raw.into(), None),
+        None => (results(), home().into(), Some(home().join("../README.md"))),
+    }
+}

@@ -43,7 +43,7 @@ use std::time::SystemTime;
 use suture_bench::generate::{Case, Density};
 
 pub(crate) use error::Error;
-pub(crate) use folders::{home, results};
+pub(crate) use folders::{home, places, results};
 pub(crate) use options::Options;
 pub(crate) use record::Judged;
 pub(crate) use sides::Side;

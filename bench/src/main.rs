@@ -275,7 +275,7 @@ impl std::str::FromStr for Peer {
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().task {
-        Task::Generate { case, triangles, out, seed, density } => generate_file((case, density), triangles, &out, seed),
+        Task::Generate { case, triangles, out, seed, density } => generate_file(case, density, triangles, &out, seed),
         Task::Judge { file, solid: true, .. } => judge_solid(&file),
         Task::Judge { file, intended: Some(intended), .. } => judge_intended(&file, &intended),
         Task::Judge { file, skin_of: Some(before), .. } => judge_skin(&file, &before),

@@ -1,4 +1,4 @@
-//! What came out of real files, as comma-separated values: one line a file and program, for others to hold theirs against.
+//! The results on real files as comma-separated values: one line a file and program, for others to hold theirs against.
 
 use super::book::Book;
 use super::made::Solved;

@@ -113,7 +113,7 @@ pub(crate) fn outdated(raw: &Path, into: &Path, readme: Option<&Path>) -> Result
     Ok(pages.into_iter().map(|(path, _)| path).collect())
 }
 
-/// What is published, by where it belongs; draws the plots.
+/// The texts that are published, by where they belong; draws the plots.
 fn pages(raw: &Path, into: &Path, plots: &Path, readme: Option<&Path>) -> Result<Vec<(PathBuf, String)>, Error> {
     let book = book::Book::load(raw)?;
     let drawn = plot::draw(&book, plots)?;

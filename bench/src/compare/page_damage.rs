@@ -1,11 +1,13 @@
 //! The page's section on every kind of damage, sparse and everywhere: one line an input, all programs side by side.
 
+use suture_bench::generate::{Case, Density};
+
 use super::book::{Book, did_its_work};
 use super::child::Cost;
 use super::markdown::{self, or_dash};
 use super::record::{Input, is_good};
 use super::sides::Side;
-use super::statistics::{number, short};
+use super::statistics::{number, short, spaced};
 use super::way::Way;
 
 const ABOUT: &str = "\
@@ -13,9 +15,6 @@ Each case of the generator at one size: about one cell of 512 triangles in ten h
 output is on the disk, warm cache. *× clean*: how many times as long as Suture takes over the clean file of that size in the same session, the search for \
 self-intersections and all repairs included; asked: at most 3. CPU and memory (what the system cannot take back) are Suture's. ✗: the output is \
 not closed, manifold and oriented with the sound model's volume within 1 %, by the same check for all; –: not measured.";
-
-/// The case that others are held against.
-const CLEAN: &str = "clean";
 
 /// The section; empty if no input was measured that has defects everywhere.
 pub(super) fn damage(book: &Book) -> String {
@@ -32,7 +31,7 @@ pub(super) fn damage(book: &Book) -> String {
 }
 
 fn is_everywhere(input: &Input) -> bool {
-    input.case.ends_with(" everywhere")
+    Case::ALL.into_iter().any(|case| Density::Everywhere.of_case(case) == input.case)
 }
 
 /// The programs of which the table has a column of seconds: all that repair, and `cp` to measure them by.
@@ -51,13 +50,13 @@ fn table(book: &Book, inputs: &[&Input]) -> String {
         "---:|".repeat(names.len())
     );
     let ours = Way::plain(Side::Suture);
-    let clean = inputs.iter().find(|input| input.case == CLEAN).and_then(|input| book.wall(input, &ours));
+    let clean = inputs.iter().find(|input| input.case == Case::Clean.name()).and_then(|input| book.wall(input, &ours));
     for input in inputs {
         let of = |value: fn(&Cost) -> Option<f64>| or_dash(book.spread(input, &ours, value).map(|spread| number(spread.median)));
         let times = book.wall(input, &ours).zip(clean).map(|(wall, clean)| number(wall.median / clean.median));
         let mut row = vec![
             input.case.clone(),
-            super::statistics::spaced(input.triangles),
+            spaced(input.triangles),
             or_dash(times),
             of(|cost| Some(cost.cpu_seconds)),
             of(|cost| cost.peak_anonymous_bytes.map(|bytes| bytes as f64 / 1e6)),

@@ -59,10 +59,7 @@ impl<'a> Trials<'a> {
     /// Over a generated file, or a folder of them, which is removed afterwards.
     pub(super) fn generated(&mut self, case: Case, density: Density, size: u64) -> Result<(), Error> {
         let (seed, files) = (self.options.seed, self.options.many.max(1));
-        let name = match density {
-            Density::Sparse => case.name().into(),
-            Density::Everywhere => format!("{case} {}", density.name()),
-        };
+        let name = density.of_case(case);
         let mut input = Input {
             key: format!("{name} {size} {files} {seed}"),
             case: name,

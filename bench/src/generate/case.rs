@@ -168,6 +168,14 @@ impl Density {
         }
     }
 
+    /// The name of a case at this density: its own, if it is sparse.
+    pub fn of_case(self, case: Case) -> String {
+        match self {
+            Self::Sparse => case.name().into(),
+            Self::Everywhere => format!("{case} {}", self.name()),
+        }
+    }
+
     pub(super) fn cells_per_defect(self) -> u64 {
         match self {
             Self::Sparse => 10,

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use robust::{Coord, Coord3D};
 
 use crate::geometry::boxes::BoxTree;
-use crate::geometry::ray_grid::{RayGrid, flat};
+use crate::geometry::ray_grid::{self, RayGrid, flat};
 use crate::geometry::sums::Bounds;
 use crate::io::record;
 use crate::submesh::Submesh;
@@ -80,16 +80,10 @@ pub(crate) fn surfaces_around(
     reversed: &Reversed,
     points: &[[f64; 3]],
 ) -> Vec<Vec<(u32, i32)>> {
-    // What the point is in is met by the box of the f32 around it.
-    let boxes: Vec<Bounds> = points.iter().map(box_around).collect();
+    // The box of the f32 around a point meets every body that the point is in.
+    let boxes: Vec<Bounds> = points.iter().map(|p| box_around(*p, 0.0)).collect();
     let counts = |ray: usize, c: u32| components.list[c as usize].bounds.overlap(&boxes[ray]).is_some();
     count(survey, submesh, components, reversed, points, counts)
-}
-
-/// The box of the f32 around a point.
-fn box_around(point: &[f64; 3]) -> Bounds {
-    let [lo, hi] = [0, 1].map(|side| point.map(|x| around(x)[side]));
-    Bounds { lo, hi }
 }
 
 /// How often closed surfaces of these triangles together wind around each of some points, none of which may lie on one.
@@ -168,15 +162,19 @@ pub(crate) struct Direction {
 }
 
 impl Direction {
+    /// Both directions along each axis.
+    pub(crate) const ALL: [Self; 6] =
+        [Self::of(0, false), Self::of(0, true), Self::of(1, false), Self::of(1, true), Self::of(2, false), Self::of(2, true)];
+
+    const fn of(axis: usize, backward: bool) -> Self {
+        Self { axis, backward }
+    }
+
     /// The coordinates of a point in a frame in which this is upwards. Exact, and even where coordinates are mirrored, an edge that two triangles
     /// share is the same for both.
     #[inline(always)]
     pub(crate) fn upright<T: Copy + Neg<Output = T>>(self, p: [T; 3]) -> [T; 3] {
-        let [x, y, z] = match self.axis {
-            0 => [p[1], p[2], p[0]],
-            1 => [p[2], p[0], p[1]],
-            _ => p,
-        };
+        let [x, y, z] = ray_grid::upright(self.axis, p);
         [x, y, if self.backward { -z } else { z }]
     }
 
@@ -211,19 +209,18 @@ pub(crate) fn obstructed(
     counts: impl Fn(u32) -> bool,
 ) -> Vec<Vec<bool>> {
     let bundles: Vec<Bundle> = asked.iter().map(|(direction, sources)| Bundle::of(*direction, sources)).collect();
-    if bundles.iter().any(|bundle| !bundle.rays.is_empty()) {
+    if bundles.iter().any(|bundle| !bundle.sources.is_empty()) {
         survey.visit_regular(
             |region| components.of_region[region as usize] != NONE,
             |reach| {
-                let over = |bundle| Some((bundle, Bundle::over(bundle, reach)?));
-                let over: Vec<(&Bundle, Over)> = bundles.iter().filter_map(over).collect();
+                let over: Vec<(&Bundle, Over)> = bundles.iter().filter_map(|b| Some((b, b.upright.over(reach)?))).collect();
                 (!over.is_empty()).then_some(over)
             },
-            |over, corners| over.iter().any(|(bundle, over)| bundle.may_meet(over, corners)),
+            |over, corners| over.iter().any(|(bundle, over)| bundle.upright.may_meet(over, corners)),
             |over, triangle, region| {
                 let corners = record::corners(&survey.records[triangle as usize]);
                 let component = components.of_region[region as usize];
-                let under = over.iter().filter(|(bundle, over)| bundle.may_meet(over, &corners));
+                let under = over.iter().filter(|(bundle, over)| bundle.upright.may_meet(over, &corners));
                 under.for_each(|(bundle, _)| bundle.meet(&corners, component));
             },
         );
@@ -234,23 +231,17 @@ pub(crate) fn obstructed(
     bundles.into_iter().map(Bundle::met).collect()
 }
 
-/// Rays of one direction, and which of them met anything; in the order of the grid, so that those under a triangle lie side by side.
-struct Bundle {
+/// Rays of one direction, in a frame in which it is upright.
+struct Upright {
     direction: Direction,
     rays: Vec<Ray>,
     grid: RayGrid,
-    /// Where the rays begin, upright, and the components that are not in their way.
-    sources: Vec<Source>,
-    met: Vec<AtomicBool>,
 }
 
-impl Bundle {
-    fn of(direction: Direction, sources: &[Source]) -> Self {
-        let rays: Vec<Ray> = sources.iter().map(|source| direction.upright(source.from)).collect();
-        let grid = grid_of(&rays);
-        let met = sources.iter().map(|_| AtomicBool::new(false)).collect();
-        let upright = |r: &u32| Source { from: rays[*r as usize], component: sources[*r as usize].component };
-        Self { direction, sources: grid.order().iter().map(upright).collect(), grid, rays, met }
+impl Upright {
+    fn of(direction: Direction, points: impl Iterator<Item = [f64; 3]>) -> Self {
+        let rays: Vec<Ray> = points.map(|p| direction.upright(p)).collect();
+        Self { direction, grid: grid_of(&rays), rays }
     }
 
     /// The rays that may meet what lies in a box of the file.
@@ -262,10 +253,27 @@ impl Bundle {
     fn may_meet(&self, over: &Over, corners: &[[f32; 3]; 3]) -> bool {
         over.may_meet(&self.grid, &self.direction.upright_corners(corners))
     }
+}
+
+/// Such rays, and which of them met anything; in the order of the grid, so that those under a triangle lie side by side.
+struct Bundle {
+    upright: Upright,
+    /// Where the rays begin, upright, and the components that are not in their way.
+    sources: Vec<Source>,
+    met: Vec<AtomicBool>,
+}
+
+impl Bundle {
+    fn of(direction: Direction, sources: &[Source]) -> Self {
+        let upright = Upright::of(direction, sources.iter().map(|source| source.from));
+        let met = sources.iter().map(|_| AtomicBool::new(false)).collect();
+        let source = |r: &u32| Source { from: upright.rays[*r as usize], component: sources[*r as usize].component };
+        Self { sources: upright.grid.order().iter().map(source).collect(), upright, met }
+    }
 
     fn meet(&self, corners: &[[f32; 3]; 3], component: u32) {
-        let corners = self.direction.upright_corners(corners);
-        for place in self.grid.places_under(flat(&corners)) {
+        let corners = self.upright.direction.upright_corners(corners);
+        for place in self.upright.grid.places_under(flat(&corners)) {
             let (source, met) = (&self.sources[place], &self.met[place]);
             // Whoever meets it first: it is met.
             if source.component != component && !met.load(Relaxed) && crossing(&corners, source.from) != 0 {
@@ -277,7 +285,7 @@ impl Bundle {
     /// Which rays met anything, in the order of the sources.
     fn met(self) -> Vec<bool> {
         let mut met = vec![false; self.met.len()];
-        let places = self.grid.order().iter().zip(self.met);
+        let places = self.upright.grid.order().iter().zip(self.met);
         places.for_each(|(ray, is_met)| met[*ray as usize] = is_met.into_inner());
         met
     }
@@ -285,34 +293,36 @@ impl Bundle {
 
 /// Which points surface lies around: in at least four of the six directions along the axes, a ray leaves surface more often than it enters, or
 /// the other way. Neither holes nor a few turned triangles change much of that. O(triangles under rays), and reads the chunks of the
-/// file that the rays may meet, six times.
+/// file that the rays may meet, once.
 pub(crate) fn are_surrounded(survey: &Survey<'_>, submesh: &Submesh, points: &[[f64; 3]]) -> Vec<bool> {
-    let mut votes = vec![0; points.len()];
     if points.is_empty() {
         return Vec::new();
     }
-    for (axis, backward) in (0..3).flat_map(|axis| [(axis, false), (axis, true)]) {
-        let direction = Direction { axis, backward };
-        let rays: Vec<Ray> = points.iter().map(|p| direction.upright(*p)).collect();
-        let grid = grid_of(&rays);
-        let upright = |corners: &[[f32; 3]; 3]| direction.upright_corners(corners);
-        let mut windings = vec![0; points.len()];
-        let per_chunk = survey.visit_regular(
-            |_| true,
-            |reach| Over::new(&rays, &grid, &direction.upright_box(reach)).map(|over| (over, Vec::new())),
-            |(over, _), corners| over.may_meet(&grid, &upright(corners)),
-            |(_, hits): &mut (Over, Vec<(usize, i32)>), triangle, _| {
-                let corners = record::corners(&survey.records[triangle as usize]);
-                cross(&grid, &rays, &upright(&corners), |_| true, |ray, w| hits.push((ray, w)));
-            },
-        );
-        per_chunk.into_iter().flat_map(|(_, hits)| hits).for_each(|(ray, w)| windings[ray] += w);
-        for t in submesh.living() {
-            cross(&grid, &rays, &upright(&submesh.points(t)), |_| true, |ray, w| windings[ray] += w);
-        }
-        votes.iter_mut().zip(&windings).for_each(|(vote, w)| *vote += i32::from(*w != 0));
-    }
-    votes.into_iter().map(|votes| votes >= 4).collect()
+    let all = Direction::ALL.map(|direction| Upright::of(direction, points.iter().copied()));
+    // Direction, ray, and what it crosses.
+    type Hits = Vec<(usize, usize, i32)>;
+    let hit = |way: usize, corners: &[[f32; 3]; 3], hits: &mut Hits| {
+        let Upright { direction, rays, grid } = &all[way];
+        cross(grid, rays, &direction.upright_corners(corners), |_| true, |ray, w| hits.push((way, ray, w)));
+    };
+    let per_chunk = survey.visit_regular(
+        |_| true,
+        |reach| {
+            let over: Vec<(usize, Over)> = (0..all.len()).filter_map(|way| Some((way, all[way].over(reach)?))).collect();
+            (!over.is_empty()).then_some((over, Hits::new()))
+        },
+        |(over, _), corners| over.iter().any(|(way, over)| all[*way].may_meet(over, corners)),
+        |(over, hits), triangle, _| {
+            let corners = record::corners(&survey.records[triangle as usize]);
+            let under = over.iter().filter(|(way, over)| all[*way].may_meet(over, &corners));
+            under.for_each(|(way, _)| hit(*way, &corners, hits));
+        },
+    );
+    let mut hits: Hits = per_chunk.into_iter().flat_map(|(_, hits)| hits).collect();
+    submesh.living().for_each(|t| (0..all.len()).for_each(|way| hit(way, &submesh.points(t), &mut hits)));
+    let mut windings = vec![[0; Direction::ALL.len()]; points.len()];
+    hits.into_iter().for_each(|(way, ray, w)| windings[ray][way] += w);
+    windings.into_iter().map(|of| of.iter().filter(|w| **w != 0).count() >= 4).collect()
 }
 
 /// The components asked about whose boxes lie in closed ones', ascending, and a ray for each.
@@ -392,6 +402,11 @@ impl Over {
 pub(crate) fn around(x: f64) -> [f32; 2] {
     let near = x as f32;
     [if f64::from(near) > x { near.next_down() } else { near }, if f64::from(near) < x { near.next_up() } else { near }]
+}
+
+/// The smallest box of f32 that holds what is so near to a point along each axis.
+pub(crate) fn box_around(p: [f64; 3], by: f64) -> Bounds {
+    Bounds { lo: p.map(|x| around(x - by)[0]), hi: p.map(|x| around(x + by)[1]) }
 }
 
 /// Several cells a ray, so that most small triangles are over with at the first look.

@@ -12,6 +12,16 @@ pub(crate) struct RayGrid {
     taken: Vec<u64>,
 }
 
+/// A point's coordinates with those along an axis as the last ones: that axis is upright then.
+#[inline(always)]
+pub(crate) fn upright<T: Copy>(axis: usize, p: [T; 3]) -> [T; 3] {
+    match axis {
+        0 => [p[1], p[2], p[0]],
+        1 => [p[2], p[0], p[1]],
+        _ => p,
+    }
+}
+
 /// A box as seen from above: the smaller and the larger of x, and of y.
 pub(crate) type Flat = [[f64; 2]; 2];
 
@@ -20,6 +30,12 @@ pub(crate) type Flat = [[f64; 2]; 2];
 pub(crate) fn flat<T: Copy + Into<f64>>([a, b, c]: &[[T; 3]; 3]) -> Flat {
     let span = |a: f64, b: f64, c: f64| [a.min(b).min(c), a.max(b).max(c)];
     [span(a[0].into(), b[0].into(), c[0].into()), span(a[1].into(), b[1].into(), c[1].into())]
+}
+
+/// Words of a row of so many bits.
+#[inline(always)]
+fn words(side: usize) -> usize {
+    side.div_ceil(64)
 }
 
 impl RayGrid {
@@ -34,12 +50,13 @@ impl RayGrid {
             }
         }
         let per_unit = std::array::from_fn(|k| if hi[k] > lo[k] { side as f64 / (hi[k] - lo[k]) } else { 0.0 });
-        let taken = vec![0; side * side.div_ceil(64)];
+        let words = words(side);
+        let taken = vec![0; side * words];
         let mut grid = Self { lo, per_unit, side, starts: vec![0; side * side + 1], order: Vec::new(), taken };
         let cells: Vec<usize> = points.map(|p| grid.cell(1, p[1]) * side + grid.cell(0, p[0])).collect();
         for cell in &cells {
             grid.starts[cell + 1] += 1;
-            grid.taken[cell / side * side.div_ceil(64) + cell % side / 64] |= 1 << (cell % side % 64);
+            grid.taken[cell / side * words + cell % side / 64] |= 1 << (cell % side % 64);
         }
         (0..side * side).for_each(|c| grid.starts[c + 1] += grid.starts[c]);
         grid.order = (0..cells.len() as u32).collect();
@@ -79,7 +96,7 @@ impl RayGrid {
     pub(crate) fn may_meet(&self, [x, y]: Flat) -> bool {
         let (x0, x1) = (self.cell(0, x[0]), self.cell(0, x[1]));
         let (first, last) = (!0u64 << (x0 % 64), !0u64 >> (63 - x1 % 64));
-        let words = self.side.div_ceil(64);
+        let words = words(self.side);
         (self.cell(1, y[0])..=self.cell(1, y[1])).any(|row| match &self.taken[row * words + x0 / 64..=row * words + x1 / 64] {
             [word] => word & first & last != 0,
             [start, between @ .., end] => start & first | end & last != 0 || between.iter().any(|word| *word != 0),

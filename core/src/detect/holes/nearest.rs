@@ -72,7 +72,7 @@ impl Extent {
         (boxes.max(shells) - SLACK * (aside + self.spread[1] + others.spread[1])).max(0.0)
     }
 
-    /// What loops are halved by.
+    /// Loops are halved by these lengths: their middles along an axis, or how large they are.
     fn along(&self, axis: usize) -> [f64; 2] {
         if axis < 3 { self.middles.map(|p| p[axis]) } else { self.spread }
     }

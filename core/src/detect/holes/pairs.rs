@@ -270,7 +270,7 @@ fn islands<'s>(
     // A domed island stands out of its hole's box.
     let reaches: Vec<Bounds> = (0..free.len()).map(|i| bounds(shape(i), OFF_PLANE * shape(i).area().sqrt())).collect();
     let tree = BoxTree::new(&reaches);
-    // Those that may hold one, the smallest first: radii are not negative, so that their bits are in their order.
+    // Loops that may hold an island wait, the smallest first: radii are not negative, so that their bits are in their order.
     let by_size = |outer: usize| Reverse((shape(outer).radius().to_bits(), outer));
     let (mut waiting, mut islands) = (BinaryHeap::new(), Vec::new());
     for inner in 0..free.len() {

@@ -4,7 +4,7 @@ use std::cell::OnceCell;
 
 use glam::DVec3;
 
-use crate::detect::bodies::around;
+use crate::detect::bodies::box_around;
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::distance::{place, square_distance};
 use crate::geometry::grid::Grid;
@@ -68,7 +68,7 @@ fn squares_within(
     if of.is_empty() {
         return squares;
     }
-    let boxes: Vec<Bounds> = of.iter().map(|p| widened(points[*p as usize], reach)).collect();
+    let boxes: Vec<Bounds> = of.iter().map(|p| box_around(points[*p as usize], reach)).collect();
     let at = |i: u32| DVec3::from_array(points[of[i as usize] as usize]);
     let wanted = Wanted { square: reach * reach, asked };
     let mut in_memory = Near::of((0..of.len() as u32).collect(), wanted);
@@ -161,9 +161,4 @@ impl Near {
             *into = into.min(square);
         }
     }
-}
-
-/// The box of what is within `reach` of a point.
-fn widened(p: [f64; 3], reach: f64) -> Bounds {
-    Bounds { lo: p.map(|x| around(x - reach)[0]), hi: p.map(|x| around(x + reach)[1]) }
 }

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use glam::DVec3;
 
 use crate::geometry::position;
-use crate::geometry::ray_grid::{RayGrid, flat};
+use crate::geometry::ray_grid::{RayGrid, flat, upright};
 use crate::geometry::sums::Bounds;
 use crate::util::parallel;
 
@@ -93,12 +93,7 @@ impl Direction {
     /// The coordinates in a frame in which it is upright.
     #[inline(always)]
     fn upright<T: Copy + Into<f64>>(&self, p: [T; 3]) -> [f64; 3] {
-        let p = [p[0].into(), p[1].into(), p[2].into()];
-        let [x, y, z] = match self.axis {
-            0 => [p[1], p[2], p[0]],
-            1 => [p[2], p[0], p[1]],
-            _ => p,
-        };
+        let [x, y, z] = upright(self.axis, [p[0].into(), p[1].into(), p[2].into()]);
         let up = z * self.way;
         [x - self.askew[0] * up, y - self.askew[1] * up, up]
     }

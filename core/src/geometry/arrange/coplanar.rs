@@ -1,6 +1,6 @@
 //! The overlap of two triangles in one plane: each edge of one, as far as it lies in the other.
 //!
-//! What is a corner of the overlap is told by the signs of corners by edges, so that no point is made that is not one of its corners.
+//! The signs of corners by edges tell the corners of the overlap, so that no other point is made.
 
 use crate::geometry::arrange::plane::on_lines;
 use crate::geometry::arrange::soup::{Contact, Contacts, Edge, End, Soup};

@@ -1,4 +1,4 @@
-//! What every triangle is cut along: the segments of all pairs, each once.
+//! The segments that every triangle is cut along: those of all pairs, each once.
 
 use crate::geometry::arrange::contact::contact;
 use crate::geometry::arrange::soup::{Contacts, Edge, End, Soup};

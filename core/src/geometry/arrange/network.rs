@@ -280,7 +280,7 @@ impl Builder<'_> {
         points.sort_by_cached_key(|p| place(*p));
     }
 
-    /// What is known to be on the edges and segments of a triangle.
+    /// The points that are known to be on the edges and segments of a triangle.
     fn lines(&self, t: usize, edges: &Splits, splits: &Splits, points: usize, places: &[(u32, usize)]) -> Lines {
         let corners = self.corners[t];
         let edges = (0..3).map(|k| ([corners[k], corners[(k + 1) % 3]], edges));

@@ -173,7 +173,7 @@ fn hidden_pieces(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components) ->
     for (corners, source) in sources() {
         let is_seen = |direction: &Direction| {
             !stands_along(&corners, *direction)
-                && !tree.meets_another(&extended(bounds_around(source.from), *direction), source.component)
+                && !tree.meets_another(&extended(bodies::box_around(source.from, 0.0), *direction), source.component)
         };
         is_hidden[source.component as usize] = !DIRECTIONS.iter().any(is_seen);
     }
@@ -198,12 +198,6 @@ fn extended(mut of: Bounds, direction: Direction) -> Bounds {
         of.hi[axis] = f32::INFINITY
     }
     of
-}
-
-/// The smallest box of f32 that holds a point.
-fn bounds_around(p: [f64; 3]) -> Bounds {
-    let [lo, hi] = [0, 1].map(|side| p.map(|x| bodies::around(x)[side]));
-    Bounds { lo, hi }
 }
 
 /// Does the triangle's plane hold the direction? Exact.

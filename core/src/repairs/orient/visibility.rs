@@ -201,8 +201,8 @@ fn seen(
     let off = OFF * f64::from(survey.bounds.largest_coordinate());
     // By direction: the points that are not seen edge-on, and whether each shows its back.
     let (mut towards, mut asked_of) = (Vec::new(), Vec::new());
-    for (axis, backward) in (0..3).flat_map(|axis| [(axis, false), (axis, true)]) {
-        let direction = Direction { axis, backward };
+    for direction in Direction::ALL {
+        let Direction { axis, backward } = direction;
         let turns = |corners: &[[f32; 3]; 3]| {
             let [a, b, c] = corners.map(|p| {
                 let [x, y, _] = direction.upright(p.map(f64::from));

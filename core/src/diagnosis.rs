@@ -35,7 +35,11 @@ impl<'a> Diagnosis<'a> {
         limits: &Limits,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let survey = Survey::new(path, records, profile.check_self_intersections, limits, progress)?;
+        Self::after(Survey::new(path, records, profile.check_self_intersections, limits, progress)?, path, profile)
+    }
+
+    /// What a survey comes to.
+    pub(crate) fn after(survey: Survey<'a>, path: &Path, profile: &Profile) -> Result<Self> {
         let submesh = Submesh::gather(&survey);
         let edges = Edges::of(&submesh);
         let boundary_edges = edges.iter().filter(Edge::is_boundary).count() as u64;

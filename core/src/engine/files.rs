@@ -14,6 +14,7 @@ use crate::contract::settings::{Limits, Profile, folder_of};
 use crate::detect::review::Evidence;
 use crate::diagnosis::Diagnosis;
 use crate::engine::clock::Clock;
+use crate::engine::everywhere;
 use crate::engine::judging::{self, Input, Written};
 use crate::engine::welding;
 use crate::geometry::sums::Bounds;
@@ -95,7 +96,8 @@ fn mend(
     progress: &dyn Progress,
     clock: &mut Clock,
 ) -> Result<Report> {
-    let mut diagnosis = Diagnosis::of(mesh.path(), mesh.records(), profile, limits, progress)?;
+    let (survey, set_right) = everywhere::survey(mesh, profile, limits, progress)?;
+    let mut diagnosis = everywhere::diagnose((survey, set_right.as_ref()), mesh, profile, limits, progress)?;
     clock.stage("topology");
     let surface = diagnosis.surface_bounds();
     let input = subject(mesh, String::new());
@@ -107,9 +109,13 @@ fn mend(
     let (edit, evidence) = repaired.unwrap_or_default();
     // Of the input's survey, the second look may go on; the memory of its submesh is needed for that of the output.
     let survey = diagnosis.into_survey();
+    let edit = match &set_right {
+        Some(set_right) => set_right.edit(edit, mesh),
+        None => edit,
+    };
     // Good as it came, or nothing in it could be repaired.
     let same = edit.is_empty() && welded.is_none() && judging::flaws(mesh.findings()).is_empty();
-    let expected = if same { None } else { expectation(mesh.records(), &edit, survey.irregular_triangles.len() as u64, limits) };
+    let expected = if same || set_right.is_some() { None } else { expectation(mesh.records(), &edit, survey.irregular_triangles.len() as u64, limits) };
     let emit = || draft.finish(&if same { Content::Input } else { Content::Edited(&edit) });
     // What the file will hold is looked at while it is written. It counts when the file was read back and does hold that.
     let look = || second_look(survey, expected.as_ref(), profile);
@@ -140,6 +146,9 @@ fn mend(
     judging::advise(&mut report, &evidence);
     if let Some(counts) = welded {
         welding::tell(&mut report, counts, (mesh, &edit));
+    }
+    if let Some(set_right) = &set_right {
+        set_right.tell(&mut report);
     }
     written.durable()?;
     clock.stage("verify");

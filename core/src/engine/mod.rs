@@ -7,6 +7,7 @@
 
 mod clock;
 mod edited_mesh;
+mod everywhere;
 pub(crate) mod files;
 mod judging;
 pub(crate) mod memory;

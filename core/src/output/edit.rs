@@ -80,6 +80,42 @@ impl Edit {
         edit
     }
 
+    /// The same edit in terms of the records that its own come from: those that are `gone` were left out, and those that `turned` had been flipped. Each of them
+    /// a bit for each of so many `records`. O(records).
+    pub(crate) fn over(self, gone: &[u64], turned: &[u64], records: usize) -> Self {
+        let stayed = Stayed::of(gone, records);
+        let mut edit = Self { flipped: turned.to_vec(), added: self.added, max_move: self.max_move, ..Self::default() };
+        let is_left_out = gone.iter().any(|word| *word > 0);
+        edit.dropped = if is_left_out || !self.dropped.is_empty() { gone.to_vec() } else { Vec::new() };
+        ones(&self.flipped).for_each(|t| edit.flip(stayed.record(t)));
+        for t in ones(&self.dropped).map(|t| stayed.record(t)) {
+            edit.dropped[t as usize / 64] |= 1 << (t % 64);
+            edit.flipped[t as usize / 64] &= !(1 << (t % 64));
+        }
+        for (t, change) in self.changes.into_iter().map(|(t, change)| (stayed.record(t), change)) {
+            if change == Change::Flip {
+                edit.flip(t);
+            } else {
+                edit.flipped[t as usize / 64] &= !(1 << (t % 64));
+                edit.changes.push((t, change));
+            }
+        }
+        let of_added = self.added_from.into_iter().map(|from| match from {
+            FaceOrigin::Part(t) => FaceOrigin::Part(stayed.record(t)),
+            other => other,
+        });
+        edit.added_from = of_added.collect();
+        let count = |bits: &[u64]| bits.iter().map(|word| u64::from(word.count_ones())).sum::<u64>();
+        edit.flips = count(&edit.flipped);
+        edit.deletions = count(&edit.dropped) + edit.changes.iter().filter(|c| c.1 == Change::Delete).count() as u64;
+        edit
+    }
+
+    /// Turns a record, or turns it back.
+    fn flip(&mut self, t: u32) {
+        self.flipped[t as usize / 64] ^= 1 << (t % 64);
+    }
+
     fn add(&mut self, corners: [[f32; 3]; 3], attribute: u16, from: FaceOrigin) {
         self.added.push(record::encode(corners, attribute));
         self.added_from.push(from);
@@ -162,10 +198,11 @@ impl Edit {
         let mut added = self.added.iter().zip(&self.added_from);
         let mut start = 0;
         let mut at = 0;
+        // Each is looked for again only once it is passed: every word of bits is read once.
+        let (mut dropped, mut turned) = (next_one(&self.dropped, 0), next_one(&self.flipped, 0));
         while at < records.len() {
             let next_change = changes.peek().map_or(records.len(), |c| c.0 as usize);
-            let dropped = next_one(&self.dropped, at);
-            let next = next_change.min(next_one(&self.flipped, at)).min(dropped);
+            let next = next_change.min(turned).min(dropped);
             if next >= records.len() {
                 break;
             }
@@ -184,6 +221,12 @@ impl Edit {
             })?;
             at = next + 1;
             start = at;
+            if dropped < at {
+                dropped = next_one(&self.dropped, at);
+            }
+            if turned < at {
+                turned = next_one(&self.flipped, at);
+            }
         }
         if start < records.len() {
             step(Step::Untouched(&records[start..]))?;
@@ -224,6 +267,44 @@ impl Edit {
         all.added_from.clone_from(&self.added_from);
         all
     }
+}
+
+/// The records that stayed when others were left out.
+struct Stayed<'g> {
+    gone: &'g [u64],
+    /// How many stayed before each word; empty if all did.
+    before: Vec<u32>,
+}
+
+impl<'g> Stayed<'g> {
+    fn of(gone: &'g [u64], records: usize) -> Self {
+        let mut sum = 0;
+        let words = if gone.iter().all(|word| *word == 0) { 0 } else { records.div_ceil(64) };
+        let before = gone.iter().take(words).map(|word| {
+            let so_far = sum;
+            sum += word.count_zeros();
+            so_far
+        });
+        Self { before: before.collect(), gone }
+    }
+
+    /// The record that was the `t`-th of those that stayed.
+    fn record(&self, t: u32) -> u32 {
+        if self.before.is_empty() {
+            return t;
+        }
+        let word = self.before.partition_point(|before| *before <= t) - 1;
+        let place = nth_one(!self.gone[word], t - self.before[word]);
+        word as u32 * 64 + place
+    }
+}
+
+/// The place of the `n`-th bit that is set, from 0.
+fn nth_one(mut word: u64, n: u32) -> u32 {
+    for _ in 0..n {
+        word &= word - 1;
+    }
+    word.trailing_zeros()
 }
 
 /// What becomes of the input's records, one stretch after the other, and then what is added beyond their places.
@@ -325,6 +406,31 @@ mod tests {
         let edit = Edit::of(&d.survey, &d.submesh, &Reversed { regions: vec![true], dropped: vec![false] }, &[]);
         assert_eq!(written(&edit, &records), records.iter().map(record::flip).collect::<Vec<_>>());
         assert_eq!(edit.listed().flipped, [[0, 11]]);
+    }
+
+    #[test]
+    fn an_edit_of_what_was_set_right_is_told_of_what_it_comes_from() {
+        // Of eight records, 1 and 4 were left out, and 2 and 5 turned: what was worked on is 0 2 3 5 6 7.
+        let input: Vec<Record> = (0..8).map(|i| record::encode(HERE.map(|p| p.map(|x| x + i as f32)), i)).collect();
+        let turned_before = |t: usize| if [2, 5].contains(&t) { record::flip(&input[t]) } else { input[t] };
+        let worked_on: Vec<Record> = [0, 2, 3, 5, 6, 7].map(turned_before).to_vec();
+        let moved = record::encode(THERE, 6);
+        let edit = Edit {
+            changes: vec![(0, Change::Delete), (3, Change::Flip), (4, Change::Move(Box::new(moved)))],
+            flipped: vec![0b100],
+            deletions: 1,
+            flips: 2,
+            ..Edit::default()
+        };
+        let direct = written(&edit, &worked_on);
+        let over = edit.over(&[0b1_0010], &[0b10_0100], input.len());
+        let mut through = written(&over, &input);
+        // Record 5 was turned twice, so it leaves as it came.
+        assert_eq!(through, [record::flip(&input[2]), record::flip(&input[3]), input[5], moved, input[7]]);
+        through[2] = record::flip(&record::flip(&input[5]));
+        assert_eq!(through, direct);
+        let summary = over.summary(input.len());
+        assert_eq!((summary.untouched, summary.deleted, summary.flipped, summary.moved), (2, 3, 2, 1));
     }
 
     proptest! {

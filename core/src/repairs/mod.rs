@@ -26,6 +26,8 @@ use crate::contract::progress::{Latched, Progress};
 use crate::contract::report::{BoundaryLoops, Region, Regions};
 use crate::contract::settings::{Limits, Profile};
 use crate::diagnosis::Diagnosis;
+pub(crate) use crate::repairs::cleanup::duplicates::NOTE as DUPLICATE_NOTE;
+pub(crate) use crate::repairs::orient::directions::NOTE as ORIENT_NOTE;
 pub(crate) use crate::repairs::shared::account::Account;
 use crate::repairs::shared::context::Context;
 pub(crate) use crate::repairs::stitch::weld::NOTE as WELD_NOTE;

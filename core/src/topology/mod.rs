@@ -9,6 +9,7 @@
 pub(crate) mod chunk;
 pub(crate) mod chunk_regions;
 pub(crate) mod crossings;
+pub(crate) mod everywhere;
 pub(crate) mod intersect;
 pub(crate) mod labels;
 pub(crate) mod region_sums;

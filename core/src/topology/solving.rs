@@ -30,17 +30,26 @@ pub(crate) struct Solving<'s, 'a> {
 /// Findings so far that have to be kept.
 struct Found {
     irregular_triangles: AtomicU64,
+    /// Corners that are not regular, each counted where it is at home.
+    irregular_corners: AtomicU64,
     regions: AtomicU64,
 }
 
 impl Found {
     fn new(irregular_triangles: u64, regions: u64) -> Self {
-        Self { irregular_triangles: AtomicU64::new(irregular_triangles), regions: AtomicU64::new(regions) }
+        let [irregular_triangles, irregular_corners, regions] = [irregular_triangles, 0, regions].map(AtomicU64::new);
+        Self { irregular_triangles, irregular_corners, regions }
     }
 
     fn add(&self, topology: &ChunkTopology) {
+        let corners = topology.irregular_triangles.iter().map(|t| u64::from(t.irregular.count_ones())).sum();
+        self.irregular_corners.fetch_add(corners, Ordering::Relaxed);
         self.irregular_triangles.fetch_add(topology.irregular_triangles.len() as u64, Ordering::Relaxed);
         self.regions.fetch_add(topology.regions.len() as u64, Ordering::Relaxed);
+    }
+
+    fn corners(&self) -> u64 {
+        self.irregular_corners.load(Ordering::Relaxed)
     }
 }
 
@@ -50,8 +59,9 @@ impl Solving<'_, '_> {
         self.progress.cancelled() || self.budget.is_exceeded()
     }
 
-    /// All chunks, with the self-intersections that they own if `most_tested` says how many pairs may be tested for that.
-    pub(crate) fn all(&self, most_tested: Option<u64>) -> Result<Vec<ChunkTopology>> {
+    /// All chunks, with the self-intersections that they own if `most_tested` says how many pairs may be tested for that; `None` if more than
+    /// `most_irregular` corners are not regular, in which case little of the work is done.
+    pub(crate) fn all(&self, most_tested: Option<u64>, most_irregular: Option<u64>) -> Result<Option<Vec<ChunkTopology>>> {
         let (found, [done, tested, kept]) = (Found::new(0, 0), [const { AtomicU64::new(0) }; 3]);
         let all = self.records.len() as u64;
         let loan = Loan::of(self.budget);
@@ -61,11 +71,17 @@ impl Solving<'_, '_> {
             |_| true,
             Scratch::default,
             |scratch, chunk, seen, visitors| {
-                if self.is_given_up() {
+                // Too much to keep may be too much that is irregular: the same is found in any memory.
+                let is_all_counted = most_irregular.is_none_or(|most| found.corners() > most);
+                if self.progress.cancelled() || is_all_counted && (most_irregular.is_some() || self.budget.is_exceeded()) {
                     return ChunkTopology::default();
                 }
                 let cell = self.plan.home_box(chunk);
                 let mut topology = scratch.solve(seen, cell, self.measure, &[], &loan);
+                if self.budget.is_exceeded() {
+                    found.add(&topology);
+                    return ChunkTopology::default();
+                }
                 if let Some(most_tested) = most_tested {
                     let allowance = most_tested.saturating_sub(tested.load(Ordering::Relaxed));
                     topology.crossings = scratch.cross(visitors, cell, allowance, &loan);
@@ -79,8 +95,11 @@ impl Solving<'_, '_> {
                 topology
             },
         );
+        if most_irregular.is_some_and(|most| found.corners() > most) && !self.progress.cancelled() {
+            return Ok(None);
+        }
         self.check(found, &loan)?;
-        Ok(chunks)
+        Ok(Some(chunks))
     }
 
     /// Some chunks again, with vertices that count as irregular, by the chunk where they are at home. `kept`: how many irregular triangles and regions there are

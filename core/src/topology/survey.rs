@@ -89,6 +89,32 @@ impl<'a> Survey<'a> {
         limits: &Limits,
         progress: &dyn Progress,
     ) -> Result<Self> {
+        let (survey, _) = Self::of(path, records, self_intersections, None, limits, progress)?;
+        Ok(survey)
+    }
+
+    /// As [`Self::new`]; `None` if more than `most_irregular` corners of triangles are not regular, which is found with less work and memory.
+    pub(crate) fn unless_irregular(
+        path: &Path,
+        records: &'a [Record],
+        self_intersections: bool,
+        most_irregular: u64,
+        limits: &Limits,
+        progress: &dyn Progress,
+    ) -> Result<Option<Self>> {
+        let (survey, is_whole) = Self::of(path, records, self_intersections, Some(most_irregular), limits, progress)?;
+        Ok(is_whole.then_some(survey))
+    }
+
+    /// A survey, and whether it is whole: without `most_irregular` it is.
+    fn of(
+        path: &Path,
+        records: &'a [Record],
+        self_intersections: bool,
+        most_irregular: Option<u64>,
+        limits: &Limits,
+        progress: &dyn Progress,
+    ) -> Result<(Self, bool)> {
         let span = tracing::debug_span!("plan").entered();
         progress.at("plan", 0, records.len() as u64);
         let guide = Guide::new(records.as_flattened(), limits);
@@ -100,10 +126,12 @@ impl<'a> Survey<'a> {
         let scratch = survey.take_tables(path, &survey.budget, limits)?;
         let most_tested = self_intersections.then(|| crossings::most_tested(records.len() as u64));
         let _span = tracing::debug_span!("chunks", count = survey.plan.chunks()).entered();
-        let chunks = survey.solving(path, &survey.budget, progress).all(most_tested)?;
+        let Some(chunks) = survey.solving(path, &survey.budget, progress).all(most_tested, most_irregular)? else {
+            return Ok((survey, false));
+        };
         survey.budget.give_back(Purpose::Tables, scratch);
         survey.merge(chunks, most_tested);
-        Ok(survey)
+        Ok((survey, true))
     }
 
     /// A survey before its chunks are solved.

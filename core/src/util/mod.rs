@@ -1,7 +1,7 @@
 //! Util: what a program needs and a mesh does not.
 //!
 //! **In:** closures, keys, counters.
-//! **Out:** threads that are a help and never a need ([`parallel`]), sorts by digits ([`radix`]), disjoint sets ([`union_find`]), numbers
+//! **Out:** threads that are a help and never a need ([`parallel`]), sorts by digits ([`radix`]), disjoint sets ([`union_find`], and [`parity`] for what agrees or disagrees), numbers
 //! in few bytes ([`varint`]), what a run costs ([`cost`]), counted steps of loops ([`steps`]), numbers in
 //! no order ([`scatter`]), what the machine has ([`machine`]).
 //! **Promise:** nothing here knows a triangle. Parallel work returns its results in the order of its items, so that no result depends on
@@ -11,6 +11,7 @@ pub(crate) mod cost;
 pub(crate) mod ids;
 pub(crate) mod machine;
 pub(crate) mod parallel;
+pub(crate) mod parity;
 pub(crate) mod radix;
 pub(crate) mod scatter;
 pub(crate) mod steps;

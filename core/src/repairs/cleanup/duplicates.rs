@@ -14,6 +14,9 @@ use crate::submesh::edges::Edges;
 use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
 
+/// What the report says of copies that are gone.
+pub(crate) const NOTE: &str = "triangles on the vertices of another one";
+
 /// Copies of triangles.
 pub(crate) const DUPLICATE: Repair = Repair {
     name: RepairName::Duplicate,
@@ -24,7 +27,7 @@ pub(crate) const DUPLICATE: Repair = Repair {
         cx.account.add(RepairName::CommonWall, dropped.walls, note.into(), 0.0);
         Ok(Done {
             changed: dropped.all > 0,
-            ..Done::count(dropped.all - dropped.walls, "triangles on the vertices of another one")
+            ..Done::count(dropped.all - dropped.walls, NOTE)
         })
     },
 };

@@ -11,6 +11,10 @@ use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
+use crate::util::parity::Parity;
+
+/// What the report says of triangles that were turned.
+pub(crate) const NOTE: &str = "triangles turned to agree with their neighbours";
 
 /// Neighbours that disagree.
 pub(crate) const COHERENT: Repair = Repair {
@@ -21,7 +25,7 @@ pub(crate) const COHERENT: Repair = Repair {
         if turned.contradictions > 0 {
             tracing::info!(edges = turned.contradictions, "No orientation satisfies all edges: a surface is one-sided.");
         }
-        Ok(Done::count(turned.triangles, "triangles turned to agree with their neighbours"))
+        Ok(Done::count(turned.triangles, NOTE))
     },
 };
 
@@ -44,48 +48,6 @@ pub(crate) const OUTWARD: Repair = Repair {
         Ok(Done::count(turned, "components that were inside out"))
     },
 };
-
-/// Union-find with the parity of each node against its root.
-pub(crate) struct Parity {
-    parents: Vec<u32>,
-    odd: Vec<bool>,
-}
-
-impl Parity {
-    pub(crate) fn new(nodes: usize) -> Self {
-        Self { parents: (0..nodes as u32).collect(), odd: vec![false; nodes] }
-    }
-
-    /// Root and parity against it. The path is made flat.
-    pub(crate) fn find(&mut self, node: u32) -> (u32, bool) {
-        let (mut root, mut odd) = (node, false);
-        while self.parents[root as usize] != root {
-            odd ^= self.odd[root as usize];
-            root = self.parents[root as usize];
-        }
-        let (mut at, mut rest) = (node, odd);
-        while self.parents[at as usize] != root && at != root {
-            let (up, own) = (self.parents[at as usize], self.odd[at as usize]);
-            self.parents[at as usize] = root;
-            self.odd[at as usize] = rest;
-            rest ^= own;
-            at = up;
-        }
-        (root, odd)
-    }
-
-    /// Says that two nodes agree, or not; `false` if that contradicts what was said before.
-    pub(crate) fn relate(&mut self, a: u32, b: u32, disagree: bool) -> bool {
-        let ((ra, pa), (rb, pb)) = (self.find(a), self.find(b));
-        let odd = pa ^ pb ^ disagree;
-        if ra == rb {
-            return !odd;
-        }
-        self.parents[ra.max(rb) as usize] = ra.min(rb);
-        self.odd[ra.max(rb) as usize] = odd;
-        true
-    }
-}
 
 /// How many triangles were turned, and how many edges contradict each other still.
 #[derive(Clone, Copy, Debug, Default)]
@@ -121,7 +83,7 @@ pub(crate) fn make_coherent(survey: &Survey<'_>, work: &mut Work<'_>, reversed: 
         .map(|p| (p, survey.regions[p as usize].triangles, survey.regions[p as usize].first))
         .chain(submesh.living().map(|t| (regions + t, 1, submesh.record(t))))
         .collect();
-    let mut sides = vec![[(0u64, NONE); 2]; parity.parents.len()];
+    let mut sides = vec![[(0u64, NONE); 2]; parity.nodes()];
     for (node, triangles, record) in &nodes {
         let (root, odd) = parity.find(*node);
         let side = &mut sides[root as usize][usize::from(odd)];

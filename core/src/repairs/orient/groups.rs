@@ -8,7 +8,7 @@
 
 use std::cmp::Reverse;
 
-use crate::repairs::orient::directions::Parity;
+use crate::util::parity::Parity;
 use crate::submesh::components::Sample;
 
 /// A group is plainly seen if one side is by at least one part in so many of what was looked at.

@@ -1,0 +1,133 @@
+//! Files in which most triangles are copies of others, or disagree with their neighbours, are set right in the stream before they are repaired.
+//!
+//! The repairs work on a nameless copy, in which the surface is drawn once and its triangles agree. The edit is told of the input all the same: what a copy
+//! turned and a repair turned back is untouched.
+
+use std::path::Path;
+
+use memmap2::Mmap;
+
+use crate::contract::error::{Error, Result};
+use crate::contract::progress::Progress;
+use crate::contract::report::{Repair, RepairName, Report};
+use crate::contract::settings::{Limits, Profile};
+use crate::diagnosis::Diagnosis;
+use crate::io::disk_space::{self, Need};
+use crate::io::read::MeshFile;
+use crate::io::read_ahead::Guide;
+use crate::io::record::{self, Record};
+use crate::io::write_behind;
+use crate::output::edit::Edit;
+use crate::repairs::{DUPLICATE_NOTE, ORIENT_NOTE};
+use crate::topology::everywhere::{self, Everywhere};
+use crate::topology::survey::Survey;
+
+/// Counts of the input that are those of the copy.
+const NOT_COUNTED: [&str; 8] = [
+    "edges",
+    "boundary_edges",
+    "nonmanifold_edges",
+    "unbalanced_edges",
+    "inconsistent_edges",
+    "nonmanifold_vertices",
+    "duplicates_opposite",
+    "bodies",
+];
+
+/// The records to work on, and how they differ from those of the file.
+pub(crate) struct SetRight {
+    records: Mmap,
+    found: Everywhere,
+}
+
+/// The survey of a file; where most of its corners are not regular, what was set right instead, if anything was.
+pub(crate) fn survey<'m>(
+    mesh: &'m MeshFile,
+    profile: &Profile,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> Result<(Option<Survey<'m>>, Option<SetRight>)> {
+    let (path, records) = (mesh.path(), mesh.records());
+    let Some(most) = everywhere::most_irregular(records.len()) else { return Ok((None, None)) };
+    let survey = Survey::unless_irregular(path, records, profile.check_self_intersections, most, limits, progress)?;
+    if survey.is_some() {
+        return Ok((survey, None));
+    }
+    let Some(found) = everywhere::look(path, records, limits, progress)? else { return Ok((None, None)) };
+    tracing::info!(copies = found.copies, turned = found.turns, "Set right in the stream: most triangles lay at defects.");
+    Ok((None, Some(SetRight { records: copied(path, records, &found, limits)?, found })))
+}
+
+/// The diagnosis of what [`survey`] found.
+pub(crate) fn diagnose<'m>(
+    (survey, set_right): (Option<Survey<'m>>, Option<&'m SetRight>),
+    mesh: &'m MeshFile,
+    profile: &Profile,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> Result<Diagnosis<'m>> {
+    match survey {
+        Some(survey) => Diagnosis::after(survey, mesh.path(), profile),
+        None => Diagnosis::of(mesh.path(), set_right.map_or(mesh.records(), SetRight::records), profile, limits, progress),
+    }
+}
+
+impl SetRight {
+    fn records(&self) -> &[Record] {
+        self.records.as_chunks().0
+    }
+
+    /// An edit of these records as one of the file's.
+    pub(crate) fn edit(&self, edit: Edit, mesh: &MeshFile) -> Edit {
+        edit.over(&self.found.gone, &self.found.turned, mesh.records().len())
+    }
+
+    /// Adds to a report what was done before all else.
+    pub(crate) fn tell(&self, report: &mut Report) {
+        let Everywhere { copies, turns, contradictions, .. } = self.found;
+        let before = &mut report.before;
+        before.triangles += copies;
+        before.duplicates_same += copies;
+        before.inconsistent_edges = before.inconsistent_edges.max(contradictions);
+        before.unbalanced_edges = before.unbalanced_edges.max(contradictions);
+        before.at_least.extend(NOT_COUNTED.map(String::from));
+        before.at_least.sort_unstable();
+        before.at_least.dedup();
+        for (name, count, note) in [(RepairName::Orient, turns, ORIENT_NOTE), (RepairName::Duplicate, copies, DUPLICATE_NOTE)] {
+            match report.repairs.iter_mut().find(|repair| repair.name == name) {
+                Some(repair) => repair.count += count,
+                None if count > 0 => report.repairs.insert(0, Repair { name, count, note: note.into(), seconds: 0.0 }),
+                None => {}
+            }
+        }
+    }
+}
+
+/// The records as they are set right, in a file without a name.
+fn copied(path: &Path, records: &[Record], found: &Everywhere, limits: &Limits) -> Result<Mmap> {
+    const PIECE: usize = 1 << 14;
+    let folder = limits.spool_folder();
+    let bytes = size_of_val(records) as u64 - found.copies * size_of::<Record>() as u64;
+    disk_space::check(path, &[Need { folder: folder.clone(), bytes, what: "the triangles as they are set right" }])?;
+    let (file, behind) = write_behind::nameless(&folder, limits)?;
+    let spooling = || Error::io(&folder, "spooling");
+    let guide = Guide::new(records.as_flattened(), limits);
+    let is_set = |bits: &[u64], t: usize| bits[t / 64] >> (t % 64) & 1 == 1;
+    let (mut piece, mut t) = (Vec::with_capacity(PIECE), 0);
+    for block in guide.blocks(records).flat_map(|block| block.chunks(PIECE)) {
+        piece.clear();
+        for record in block {
+            if !is_set(&found.gone, t) {
+                piece.push(if is_set(&found.turned, t) { record::flip(record) } else { *record });
+            }
+            t += 1;
+        }
+        behind.append(piece.as_flattened()).map_err(spooling())?;
+    }
+    behind.finish().map_err(spooling())?;
+    // SAFETY: the file has no name and this is its only handle: nobody else changes or truncates it.
+    unsafe { Mmap::map(&file) }.map_err(Error::io(&folder, "mapping"))
+}
+
+#[cfg(test)]
+mod tests;

@@ -123,3 +123,25 @@ pub(crate) fn soup() -> impl Strategy<Value = Vec<Corners>> {
         })
         .prop_shuffle()
 }
+
+/// A torus of 2 × 384 × 176 triangles, of which no two share a position: each corner lies up to `jitter` beside its place.
+pub(crate) fn shaken_torus(jitter: f32) -> Vec<Corners> {
+    let (around, across) = (384usize, 176usize);
+    let at = |i: usize, j: usize| {
+        let turn = |k: usize, of: usize| (k % of) as f64 / of as f64 * std::f64::consts::TAU;
+        let ((u, v), wide) = ((turn(i, around), turn(j, across)), 20.0);
+        let from_axis = wide + 8.0 * v.cos();
+        [(from_axis * u.cos()) as f32, (from_axis * u.sin()) as f32, (8.0 * v.sin()) as f32]
+    };
+    let mut number = 0;
+    let mut shaken = |x: f32| {
+        number += 1;
+        x + jitter * (2.0 * crate::util::scatter::share(number) as f32 - 1.0)
+    };
+    let mut all = Vec::new();
+    for (i, j) in (0..around).flat_map(|i| (0..across).map(move |j| (i, j))) {
+        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+        all.extend([[a, b, c], [a, c, d]].map(|t| t.map(|p| p.map(&mut shaken))));
+    }
+    all
+}

@@ -274,9 +274,9 @@ impl Bundle {
     fn meet(&self, corners: &[[f32; 3]; 3], component: u32) {
         let corners = self.upright.direction.upright_corners(corners);
         for place in self.upright.grid.places_under(flat(&corners)) {
-            let (source, met) = (&self.sources[place], &self.met[place]);
-            // Whoever meets it first: it is met.
-            if source.component != component && !met.load(Relaxed) && crossing(&corners, source.from) != 0 {
+            let (met, source) = (&self.met[place], &self.sources[place]);
+            // Whoever meets it first: it is met. Most are, and whether they are lies nearest.
+            if !met.load(Relaxed) && source.component != component && crossing(&corners, source.from) != 0 {
                 met.store(true, Relaxed);
             }
         }
@@ -428,7 +428,8 @@ fn cross(grid: &RayGrid, rays: &[Ray], corners: &[[f32; 3]; 3], counts: impl Fn(
 /// How the ray upwards from `p` crosses a triangle: 1 from inside to outside, −1 from outside to inside, 0 not at all. A point on
 /// the triangle's plane does not cross it.
 pub(crate) fn crossing([a, b, c]: &[[f32; 3]; 3], p: [f64; 3]) -> i32 {
-    if f64::from(a[2].max(b[2]).max(c[2])) < p[2] {
+    let is_beside = f64::from(a[0].max(b[0]).max(c[0])) < p[0] || f64::from(a[0].min(b[0]).min(c[0])) > p[0];
+    if is_beside || f64::from(a[2].max(b[2]).max(c[2])) < p[2] {
         return 0;
     }
     // Half-open in y, strict in x: an edge shared by two triangles is decided alike for both.

@@ -37,6 +37,8 @@ const NOT_COUNTED: [&str; 8] = [
 /// The records to work on, and how they differ from those of the file.
 pub(crate) struct SetRight {
     records: Mmap,
+    /// Of these records, a bit each.
+    turned: Vec<u64>,
     found: Everywhere,
 }
 
@@ -55,7 +57,8 @@ pub(crate) fn survey<'m>(
     }
     let Some(found) = everywhere::look(path, records, limits, progress)? else { return Ok((None, None)) };
     tracing::info!(copies = found.copies, turned = found.turns, "Set right in the stream: most triangles lay at defects.");
-    Ok((None, Some(SetRight { records: copied(path, records, &found, limits)?, found })))
+    let (records, turned) = copied(path, records, &found, limits)?;
+    Ok((None, Some(SetRight { records, turned, found })))
 }
 
 /// The diagnosis of what [`survey`] found.
@@ -66,10 +69,17 @@ pub(crate) fn diagnose<'m>(
     limits: &Limits,
     progress: &dyn Progress,
 ) -> Result<Diagnosis<'m>> {
-    match survey {
-        Some(survey) => Diagnosis::after(survey, mesh.path(), profile),
-        None => Diagnosis::of(mesh.path(), set_right.map_or(mesh.records(), SetRight::records), profile, limits, progress),
-    }
+    let path = mesh.path();
+    let survey = match (survey, set_right) {
+        (Some(survey), _) => survey,
+        (None, None) => Survey::new(path, mesh.records(), profile.check_self_intersections, limits, progress)?,
+        (None, Some(set_right)) => {
+            let mut survey = Survey::new(path, set_right.records(), profile.check_self_intersections, limits, progress)?;
+            survey.turned.clone_from(&set_right.turned);
+            survey
+        }
+    };
+    Diagnosis::after(survey, path, profile)
 }
 
 impl SetRight {
@@ -103,22 +113,27 @@ impl SetRight {
     }
 }
 
-/// The records as they are set right, in a file without a name.
-fn copied(path: &Path, records: &[Record], found: &Everywhere, limits: &Limits) -> Result<Mmap> {
+/// The records as they are set right, in a file without a name, and those of them that were turned.
+fn copied(path: &Path, records: &[Record], found: &Everywhere, limits: &Limits) -> Result<(Mmap, Vec<u64>)> {
     const PIECE: usize = 1 << 14;
     let folder = limits.spool_folder();
-    let bytes = size_of_val(records) as u64 - found.copies * size_of::<Record>() as u64;
+    let left = records.len() - found.copies as usize;
+    let bytes = (left * size_of::<Record>()) as u64;
     disk_space::check(path, &[Need { folder: folder.clone(), bytes, what: "the triangles as they are set right" }])?;
     let (file, behind) = write_behind::nameless(&folder, limits)?;
     let spooling = || Error::io(&folder, "spooling");
     let guide = Guide::new(records.as_flattened(), limits);
     let is_set = |bits: &[u64], t: usize| bits[t / 64] >> (t % 64) & 1 == 1;
     let (mut piece, mut t) = (Vec::with_capacity(PIECE), 0);
+    let (mut turned, mut to) = (vec![0; left.div_ceil(64)], 0);
     for block in guide.blocks(records).flat_map(|block| block.chunks(PIECE)) {
         piece.clear();
         for record in block {
             if !is_set(&found.gone, t) {
-                piece.push(if is_set(&found.turned, t) { record::flip(record) } else { *record });
+                let turns = is_set(&found.turned, t);
+                piece.push(if turns { record::flip(record) } else { *record });
+                turned[to / 64] |= u64::from(turns) << (to % 64);
+                to += 1;
             }
             t += 1;
         }
@@ -126,8 +141,6 @@ fn copied(path: &Path, records: &[Record], found: &Everywhere, limits: &Limits) 
     }
     behind.finish().map_err(spooling())?;
     // SAFETY: the file has no name and this is its only handle: nobody else changes or truncates it.
-    unsafe { Mmap::map(&file) }.map_err(Error::io(&folder, "mapping"))
+    let map = unsafe { Mmap::map(&file) }.map_err(Error::io(&folder, "mapping"))?;
+    Ok((map, turned))
 }
-
-#[cfg(test)]
-mod tests;

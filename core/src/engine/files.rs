@@ -115,7 +115,11 @@ fn mend(
     };
     // Good as it came, or nothing in it could be repaired.
     let same = edit.is_empty() && welded.is_none() && judging::flaws(mesh.findings()).is_empty();
-    let expected = if same || set_right.is_some() { None } else { expectation(mesh.records(), &edit, survey.irregular_triangles.len() as u64, limits) };
+    let expected = if same || set_right.is_some() {
+        None
+    } else {
+        expectation(mesh.records(), &edit, survey.irregular_triangles.len() as u64, limits)
+    };
     let emit = || draft.finish(&if same { Content::Input } else { Content::Edited(&edit) });
     // What the file will hold is looked at while it is written. It counts when the file was read back and does hold that.
     let look = || second_look(survey, expected.as_ref(), profile);

@@ -1,12 +1,16 @@
 //! Which of many boxes meet a box: a bounding volume hierarchy by `obvhs`.
 
-use glam::Vec3A;
+use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
+use crate::geometry::distance::place;
 use crate::geometry::sums::Bounds;
 use crate::util::{scatter, steps};
+
+/// A plane that misses a box by less than this share of the coordinates, more than rounding does, is taken to meet it.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// Many boxes, to be asked which of them meet another one.
 pub(crate) struct BoxTree {
@@ -45,6 +49,38 @@ impl BoxTree {
             tree.primitive_indices[first..first + node.prim_count as usize].iter().for_each(|i| visit(*i));
             true
         });
+    }
+
+    /// Visits the numbers of all boxes that meet a triangle, and maybe of some beside it. A long triangle that lies askew meets few of those that its box
+    /// meets. The box may lie beside its plane, or beside an edge (three of the planes of Akenine-Möller, "Fast 3D triangle-box overlap testing", JGT 6(1), 2001).
+    pub(crate) fn each_along(&self, corners: &[[f32; 3]; 3], mut visit: impl FnMut(u32)) {
+        let wanted = aabb(&Bounds::of(corners));
+        let [a, b, c] = corners.map(place);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let beyond = |from: DVec3, to: DVec3| ((to - from).cross(normal).normalize_or_zero(), from);
+        let planes = [(normal, a), (-normal, a), beyond(a, b), beyond(b, c), beyond(c, a)];
+        let may_meet = |of: &Aabb| {
+            let [lo, hi] = [of.min, of.max].map(|p| place(p.to_array()));
+            planes.iter().all(|(out, at)| {
+                // From the middle of the box, and half of its width along `out`; both doubled.
+                let away = out.dot((lo - at) + (hi - at));
+                let rounding = ROUNDING * out.abs().dot(lo.abs().max(hi.abs()) + at.abs());
+                away <= out.abs().dot(hi - lo) + rounding
+            })
+        };
+        let mut waiting: Vec<u32> = self.tree.nodes.first().map(|_| 0).into_iter().collect();
+        while let Some(node) = waiting.pop().map(|i| &self.tree.nodes[i as usize]) {
+            steps::count(1);
+            if !node.aabb().intersect_aabb(&wanted) || !may_meet(node.aabb()) {
+                continue;
+            }
+            let first = node.first_index;
+            if node.is_leaf() {
+                self.tree.primitive_indices[first as usize..][..node.prim_count as usize].iter().for_each(|i| visit(*i));
+            } else {
+                waiting.extend([first, first + 1]);
+            }
+        }
     }
 
     /// Is any box `wanted`, of those that may hold `inner`, by number? Parts of the tree that do not hold it are left out, so that among boxes
@@ -166,6 +202,19 @@ mod tests {
                 let meets = |b: &Bounds| (0..3).all(|k| b.lo[k] <= wanted.hi[k] && b.hi[k] >= wanted.lo[k]);
                 let want: Vec<u32> = (0..boxes.len() as u32).filter(|i| meets(&boxes[*i as usize])).collect();
                 prop_assert_eq!(&found, &want);
+                // Along a triangle from end to end of the box, whose corners, edges and middle are in some of them.
+                let [lo, hi] = [wanted.lo, wanted.hi];
+                let corners = [lo, hi, [hi[0], lo[1], lo[2]]];
+                found.clear();
+                tree.each_along(&corners, |i| found.push(i));
+                found.sort_unstable();
+                prop_assert!(found.iter().all(|i| want.contains(i)));
+                let holds = |b: &Bounds, p: DVec3| place(b.lo).cmple(p).all() && p.cmple(place(b.hi)).all();
+                for (u, v) in (0..=8).flat_map(|u| (0..=8 - u).map(move |v| (f64::from(u) / 8.0, f64::from(v) / 8.0))) {
+                    let [a, b, c] = corners.map(place);
+                    let p = a + (b - a) * u + (c - a) * v;
+                    prop_assert!((0..boxes.len()).all(|i| !holds(&boxes[i], p) || found.contains(&(i as u32))));
+                }
                 prop_assert_eq!(tree.meets_another(wanted, want[0]), want.len() > 1);
                 meeting += want.len() as u64 - 1;
             }

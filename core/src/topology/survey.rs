@@ -50,6 +50,8 @@ pub(crate) struct Survey<'a> {
     pub(crate) crossing_pairs: Option<Vec<Pair>>,
     /// To be added to the volume in units of `measure`: not 0 only after a second look at what is open in another box.
     pub(crate) volume_beside: f64,
+    /// Records that had been turned before they were surveyed, a bit each; empty if none was.
+    pub(crate) turned: Vec<u64>,
     /// Regular vertices whose triangles were made irregular triangles.
     pub(crate) promoted: Vec<[f32; 3]>,
     /// Distinct positions, and those used by a triangle with three distinct vertices.
@@ -150,6 +152,7 @@ impl<'a> Survey<'a> {
             self_intersections: None,
             crossing_pairs: None,
             volume_beside: 0.0,
+            turned: Vec::new(),
             promoted: Vec::new(),
             vertices: 0,
             vertices_used: 0,
@@ -298,6 +301,11 @@ impl<'a> Survey<'a> {
                 self.irregular_triangles.len()
             )
         })
+    }
+
+    /// Had a record been turned before it was surveyed?
+    pub(crate) fn was_turned(&self, record: u32) -> bool {
+        self.turned.get(record as usize / 64).is_some_and(|word| word >> (record % 64) & 1 == 1)
     }
 
     /// Threads to work with.

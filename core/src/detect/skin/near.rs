@@ -1,6 +1,8 @@
 //! Which points are far from a surface, and how far.
 
-use std::cell::OnceCell;
+use std::sync::OnceLock;
+use std::sync::atomic::AtomicU64;
+use std::sync::atomic::Ordering::Relaxed;
 
 use glam::DVec3;
 
@@ -10,6 +12,7 @@ use crate::geometry::distance::{place, square_distance};
 use crate::geometry::grid::Grid;
 use crate::geometry::position;
 use crate::geometry::sums::Bounds;
+use crate::util::parallel;
 
 use super::surfaces::{Surfaces, Which};
 
@@ -64,60 +67,76 @@ fn squares_within(
     of: &[u32],
     (reach, asked): (f64, Asked),
 ) -> Vec<f64> {
-    let mut squares = vec![f64::INFINITY; of.len()];
     if of.is_empty() {
-        return squares;
+        return Vec::new();
     }
+    let nothing = || AtomicU64::new(bits(f64::INFINITY));
+    let squares: Vec<AtomicU64> = std::iter::repeat_with(nothing).take(of.len()).collect();
     let boxes: Vec<Bounds> = of.iter().map(|p| box_around(points[*p as usize], reach)).collect();
     let at = |i: u32| DVec3::from_array(points[of[i as usize] as usize]);
-    let wanted = Wanted { square: reach * reach, asked };
-    let mut in_memory = Near::of((0..of.len() as u32).collect(), wanted);
-    surfaces.each_in_memory(which, |corners| {
-        if in_memory.may_meet(&boxes, corners) {
-            in_memory.visit(&boxes, at, corners);
-        }
+    let wanted = Wanted { reach, asked };
+    let in_memory = Near::of((0..of.len() as u32).collect(), &squares, wanted);
+    let threads = surfaces.survey.threads();
+    parallel::map(threads, surfaces.parts(), |part| {
+        surfaces.each_of_part(which, part, |corners| {
+            if in_memory.may_meet(&boxes, corners) {
+                in_memory.visit(&boxes, at, corners);
+            }
+        });
     });
-    in_memory.put_into(&mut squares);
-    let is_left = |i: &u32| asked == Asked::HowFar || squares[*i as usize] > reach * reach;
+    let is_left = |i: &u32| asked == Asked::HowFar || value(&squares[*i as usize]) > reach * reach;
     let left: Vec<u32> = (0..of.len() as u32).filter(is_left).collect();
-    if left.is_empty() {
-        return squares;
-    }
     let tree = BoxTree::new(&left.iter().map(|i| boxes[*i as usize]).collect::<Vec<_>>());
-    let per_chunk = surfaces.survey.visit_regular(
-        |region| surfaces.has(which, region),
-        |chunk| {
-            let mut here = Vec::new();
-            tree.meeting(chunk, &mut here);
-            (!here.is_empty()).then(|| Near::of(here.into_iter().map(|i| left[i as usize]).collect(), wanted))
-        },
-        |near, corners| near.may_meet(&boxes, corners),
-        |near, triangle, _| near.visit(&boxes, at, &position::corners(&surfaces.survey.records[triangle as usize])),
-    );
-    per_chunk.into_iter().for_each(|near| near.put_into(&mut squares));
-    squares
+    if !left.is_empty() {
+        surfaces.survey.visit_regular(
+            |region| surfaces.has(which, region),
+            |chunk| {
+                let mut here = Vec::new();
+                tree.meeting(chunk, &mut here);
+                (!here.is_empty()).then(|| Near::of(here.into_iter().map(|i| left[i as usize]).collect(), &squares, wanted))
+            },
+            |near, corners| near.may_meet(&boxes, corners),
+            |near, triangle, _| near.visit(&boxes, at, &position::corners(&surfaces.survey.records[triangle as usize])),
+        );
+    }
+    squares.iter().map(value).collect()
 }
 
-/// What is asked of points, and the squared distance beyond which nothing is.
+/// Squares are not negative, so that their bits are in their order.
+#[expect(clippy::disallowed_methods, reason = "an order of distances, not of positions")]
+fn bits(square: f64) -> u64 {
+    square.to_bits()
+}
+
+fn value(square: &AtomicU64) -> f64 {
+    f64::from_bits(square.load(Relaxed))
+}
+
+/// What is asked of points, and the distance beyond which nothing is.
 #[derive(Clone, Copy)]
 struct Wanted {
-    square: f64,
+    reach: f64,
     asked: Asked,
 }
 
-/// Some of the points, and the nearest that was found to each.
-struct Near {
+/// A triangle that is longer than so many times the reach is compared with points along itself: its box holds much that is far from it.
+const LONG: f64 = 8.0;
+
+/// Rounding of distances, relative, at most.
+const EXACT: f64 = 1.0 - 1e-9;
+
+/// Some of the points; the squared distance of the nearest that was found to each, by whoever found it, is kept with all points'.
+struct Near<'s> {
     here: Vec<u32>,
-    squares: Vec<f64>,
+    squares: &'s [AtomicU64],
     /// Made when the first triangle is seen.
-    index: OnceCell<(BoxTree, Grid)>,
+    index: OnceLock<(BoxTree, Grid)>,
     wanted: Wanted,
 }
 
-impl Near {
-    fn of(here: Vec<u32>, wanted: Wanted) -> Self {
-        let squares = vec![f64::INFINITY; here.len()];
-        Self { here, squares, index: OnceCell::new(), wanted }
+impl<'s> Near<'s> {
+    fn of(here: Vec<u32>, squares: &'s [AtomicU64], wanted: Wanted) -> Self {
+        Self { here, squares, index: OnceLock::new(), wanted }
     }
 
     fn index(&self, boxes: &[Bounds]) -> &(BoxTree, Grid) {
@@ -134,31 +153,35 @@ impl Near {
         self.index(boxes).1.may_meet(&Bounds::of(corners))
     }
 
-    fn visit(&mut self, boxes: &[Bounds], at: impl Fn(u32) -> DVec3, corners: &[[f32; 3]; 3]) {
-        let mut squares = std::mem::take(&mut self.squares);
+    /// A triangle is compared with the points whose boxes it meets, but for those of which something nearer is known than its box or its plane: the
+    /// nearest of all is the same in any order.
+    fn visit(&self, boxes: &[Bounds], at: impl Fn(u32) -> DVec3, corners: &[[f32; 3]; 3]) {
+        let around = Bounds::of(corners);
+        let [lo, hi] = [around.lo, around.hi].map(place);
         let triangle = corners.map(place);
         let [a, b, c] = triangle;
         let normal = (b - a).cross(c - a).normalize_or_zero();
-        self.index(boxes).0.each_meeting(&Bounds::of(corners), |i| {
-            let square = &mut squares[i as usize];
-            let most = square.min(self.wanted.square);
-            if self.wanted.asked == Asked::IfAny && *square <= most {
+        let Wanted { reach, asked } = self.wanted;
+        let compare = |i: u32| {
+            let i = self.here[i as usize];
+            let square = &self.squares[i as usize];
+            let known = value(square);
+            let most = known.min(reach * reach);
+            if asked == Asked::IfAny && known <= most {
                 return;
             }
-            let p = at(self.here[i as usize]);
-            // Nothing of a triangle is nearer than its plane, up to rounding.
-            let height = normal.dot(p - a) * (1.0 - 1e-9);
-            if height * height <= most {
-                *square = square.min(square_distance(p, triangle));
+            let p = at(i);
+            let beside = (lo - p).max(p - hi).max(DVec3::ZERO) * EXACT;
+            let height = normal.dot(p - a) * EXACT;
+            if beside.length_squared() <= most && height * height <= most {
+                square.fetch_min(bits(square_distance(p, triangle)), Relaxed);
             }
-        });
-        self.squares = squares;
-    }
-
-    fn put_into(self, squares: &mut [f64]) {
-        for (i, square) in self.here.iter().zip(self.squares) {
-            let into = &mut squares[*i as usize];
-            *into = into.min(square);
+        };
+        let tree = &self.index(boxes).0;
+        if (hi - lo).max_element() > LONG * reach {
+            tree.each_along(corners, compare);
+        } else {
+            tree.each_meeting(&around, compare);
         }
     }
 }

@@ -57,12 +57,7 @@ impl Surfaces<'_> {
         !self.of_cavities.is_empty() && self.of_cavities.binary_search(&by_corners(corners)).is_ok()
     }
 
-    /// Visits the triangles of a surface that are not regular.
-    pub(crate) fn each_in_memory(&self, which: Which, mut visit: impl FnMut(&Corners)) {
-        (0..self.parts()).for_each(|part| self.each_of_part(which, part, &mut visit));
-    }
-
-    /// How many parts these have, each for a thread.
+    /// How many parts the triangles of a surface have that are not regular, each for a thread.
     pub(crate) fn parts(&self) -> usize {
         1 + self.submesh.triangles.len().div_ceil(PART)
     }

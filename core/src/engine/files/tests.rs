@@ -6,7 +6,7 @@ use super::*;
 use crate::contract::access::Access;
 use crate::contract::report::Outcome;
 use crate::io::record::Record;
-use crate::testing::{Corners, cube, plate, records, shifted};
+use crate::testing::{Corners, cube, cuboid, plate, records, shaken_torus, shifted};
 
 fn file(records: &[Record]) -> Vec<u8> {
     [&[0; 80][..], &(records.len() as u32).to_le_bytes(), records.as_flattened()].concat()
@@ -163,28 +163,6 @@ fn the_edges_of_a_soup_are_counted_before_they_are_compared() {
     assert!(error.to_string().contains("10000 triangles lie at defects, with 30000 edges that only one triangle has"), "{error}");
 }
 
-/// A torus of 2 × 384 × 176 triangles, of which no two share a position: each corner lies up to `jitter` beside its place.
-fn shaken_torus(jitter: f32) -> Vec<Corners> {
-    let (around, across) = (384usize, 176usize);
-    let at = |i: usize, j: usize| {
-        let turn = |k: usize, of: usize| (k % of) as f64 / of as f64 * std::f64::consts::TAU;
-        let ((u, v), wide) = ((turn(i, around), turn(j, across)), 20.0);
-        let from_axis = wide + 8.0 * v.cos();
-        [(from_axis * u.cos()) as f32, (from_axis * u.sin()) as f32, (8.0 * v.sin()) as f32]
-    };
-    let mut number = 0;
-    let mut shaken = |x: f32| {
-        number += 1;
-        x + jitter * (2.0 * crate::util::scatter::share(number) as f32 - 1.0)
-    };
-    let mut all = Vec::new();
-    for (i, j) in (0..around).flat_map(|i| (0..across).map(move |j| (i, j))) {
-        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-        all.extend([[a, b, c], [a, c, d]].map(|t| t.map(|p| p.map(&mut shaken))));
-    }
-    all
-}
-
 /// As one facet after the other is exported by programs that transform each for itself.
 #[test]
 fn a_file_that_shares_no_position_is_welded_in_the_stream() {
@@ -217,5 +195,64 @@ fn a_file_that_shares_no_position_is_welded_in_the_stream() {
         assert!(outputs[0] == outputs[1], "the same bytes for all chunks and threads");
         std::fs::remove_file(folder.path().join("5000.stl")).unwrap();
         std::fs::remove_file(folder.path().join("1048576.stl")).unwrap();
+    }
+}
+
+/// Each body of a file is drawn twice, and a third of its triangles faces the wrong way: nothing of it is regular.
+#[test]
+fn what_is_drawn_twice_and_faces_here_and_there_is_set_right_in_the_stream() {
+    let folder = tempfile::tempdir().unwrap();
+    let (input, output) = (folder.path().join("part.stl"), folder.path().join("out.stl"));
+    let mut torus = shaken_torus(0.0);
+    let n = torus.len() as u64;
+    torus.remove(1000);
+    let is_wrong = |i: usize| crate::util::scatter::share(i as u64) < 1.0 / 3.0;
+    let wrong = (0..torus.len()).filter(|i| is_wrong(*i)).count() as u64;
+    torus.iter_mut().enumerate().filter(|(i, _)| is_wrong(*i)).for_each(|(_, corners)| corners.swap(1, 2));
+    let twice = records(&[&torus[..], &torus].concat());
+    std::fs::write(&input, file(&twice)).unwrap();
+    let mut outputs = Vec::new();
+    // 270,000 triangles of 288 bytes would be 74 MiB.
+    for (threads, chunk_triangles, memory_bytes) in [(1, 1 << 15, 60 << 20), (2, 5000, 1 << 30)] {
+        let limits = Limits { threads, chunk_triangles, memory_bytes, list_edit: true, ..Limits::default() };
+        let report = repair(&input, &output, &Profile::default(), &limits, &crate::contract::progress::Quiet).unwrap();
+        assert_eq!(report.outcome, Outcome::Repaired, "{:?}", report.verdict);
+        let (before, after) = (&report.before, report.after.as_ref().unwrap());
+        assert_eq!((before.triangles, before.duplicates_same), (2 * (n - 1), n - 1));
+        assert!(before.inconsistent_edges > n / 2 && before.at_least.iter().any(|name| name == "nonmanifold_edges"));
+        assert_eq!((after.triangles, after.components, after.euler), (n, 1, Some(0)));
+        let count = |name: &str| report.repairs.iter().find(|repair| repair.name.as_str() == name).map(|repair| repair.count);
+        assert_eq!((count("duplicate"), count("orient")), (Some(n - 1), Some(wrong)));
+        let edit = &report.edit;
+        assert_eq!((edit.untouched, edit.flipped, edit.deleted, edit.added), (n - 1 - wrong, wrong, n - 1, 1));
+        let listed = report.edit_records.as_ref().unwrap();
+        assert_eq!(listed.deleted, [[n as u32 - 1, 2 * n as u32 - 3]]);
+        let flipped: u64 = listed.flipped.iter().map(|[first, last]| u64::from(last - first) + 1).sum();
+        assert_eq!(flipped, wrong);
+        outputs.push(std::fs::read(&output).unwrap());
+        std::fs::remove_file(&output).unwrap();
+    }
+    assert!(outputs[0] == outputs[1], "the same bytes for all chunks and threads");
+    // What faced the right way stands where it stood.
+    let kept = outputs[0][84..].as_chunks::<50>().0.iter().zip(&twice).filter(|(after, before)| after == before).count() as u64;
+    assert_eq!(kept, n - 1 - wrong);
+}
+
+/// Which way a body in the material of another one faces is told by most of its triangles; where the others are many, it is taken for a cavity, and a
+/// person is told. What the stream has turned counts as what the repairs turn.
+#[test]
+fn what_was_turned_in_the_stream_still_says_little_of_a_body_in_another_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let (input, output) = (folder.path().join("part.stl"), folder.path().join("out.stl"));
+    for (share, outcome) in [(0.3, Outcome::NeedsReview), (0.7, Outcome::Repaired)] {
+        let mut torus = shaken_torus(0.0);
+        let is_wrong = |i: usize| crate::util::scatter::share(i as u64) < share;
+        torus.iter_mut().enumerate().filter(|(i, _)| is_wrong(*i)).for_each(|(_, corners)| corners.swap(1, 2));
+        std::fs::write(&input, file(&records(&[cuboid([-50.0; 3], [50.0; 3]), torus].concat()))).unwrap();
+        let report = repair(&input, &output, &Profile::default(), &Limits::default(), &crate::contract::progress::Quiet).unwrap();
+        assert_eq!(report.outcome, outcome, "{:?}", report.verdict);
+        let volume = report.after.unwrap().volume;
+        assert!(volume < 0.98 * 1e6, "the torus is a cavity: {volume}");
+        std::fs::remove_file(&output).unwrap();
     }
 }

@@ -25,10 +25,7 @@ pub(crate) const DUPLICATE: Repair = Repair {
         let dropped = drop_duplicates(cx.survey, &mut cx.work, cx.profile.bodies);
         let note = "triangles of walls that bodies had in common removed: these bodies are one body now";
         cx.account.add(RepairName::CommonWall, dropped.walls, note.into(), 0.0);
-        Ok(Done {
-            changed: dropped.all > 0,
-            ..Done::count(dropped.all - dropped.walls, NOTE)
-        })
+        Ok(Done { changed: dropped.all > 0, ..Done::count(dropped.all - dropped.walls, NOTE) })
     },
 };
 

@@ -8,8 +8,8 @@
 
 use std::cmp::Reverse;
 
-use crate::util::parity::Parity;
 use crate::submesh::components::Sample;
+use crate::util::parity::Parity;
 
 /// A group is plainly seen if one side is by at least one part in so many of what was looked at.
 const PLAINLY: f64 = 8.0;

@@ -7,6 +7,8 @@
 //!
 //! A vessel whose mouth a patch has closed would swallow what stands in it. So nothing is turned in a body of which patches are much.
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 
 use crate::contract::report::RepairName;
@@ -137,10 +139,12 @@ fn meant_for_cavities(
 /// By piece.
 fn said(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components, reversed: &Reversed) -> Vec<Said> {
     let mut said = vec![Said::default(); pieces.list.len()];
+    let turned_before = turned_before(survey, pieces);
     for (region, piece) in pieces.of_region.iter().enumerate().filter(|(_, piece)| **piece != NONE) {
         let (said, triangles) = (&mut said[*piece as usize], survey.regions[region].triangles);
+        let before = turned_before.get(region).copied().unwrap_or(0);
         said.triangles += triangles;
-        said.turned += if reversed.regions[region] { triangles } else { 0 };
+        said.turned += if reversed.regions[region] { triangles - before } else { before };
     }
     for t in submesh.living().filter(|t| pieces.of_triangle[*t as usize] != NONE) {
         let said = &mut said[pieces.of_triangle[t as usize] as usize];
@@ -148,10 +152,26 @@ fn said(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components, reversed: &
             // Its corners may have been welded to others.
             let [now, read] = [submesh.points(t), record::corners(&survey.records[record as usize])].map(normal);
             said.triangles += 1;
-            said.turned += u64::from(now.dot(read) < 0.0);
+            said.turned += u64::from((now.dot(read) < 0.0) != survey.was_turned(record));
         }
     }
     said
+}
+
+/// By region: how many of its triangles had been turned in the stream; nothing if none had.
+fn turned_before(survey: &Survey<'_>, pieces: &Components) -> Vec<u64> {
+    if survey.turned.is_empty() {
+        return Vec::new();
+    }
+    let per_chunk = survey.visit_regular(
+        |region| pieces.of_region[region as usize] != NONE,
+        |_| Some(BTreeMap::<u32, u64>::new()),
+        |_, _| true,
+        |counts, triangle, region| *counts.entry(region).or_default() += u64::from(survey.was_turned(triangle)),
+    );
+    let mut all = vec![0; survey.regions.len()];
+    per_chunk.into_iter().flatten().for_each(|(region, count)| all[region as usize] += count);
+    all
 }
 
 fn normal(corners: [[f32; 3]; 3]) -> DVec3 {

@@ -175,12 +175,8 @@ impl Chunk {
     /// What was found, by pieces in the order in which they are seen.
     fn told(&mut self, contradictions: u64) -> Pieces {
         let count = self.triangles.len();
-        let mut told = Pieces {
-            odd: vec![0; count.div_ceil(64)],
-            copies: vec![0; count.div_ceil(64)],
-            contradictions,
-            ..Pieces::default()
-        };
+        let mut told =
+            Pieces { odd: vec![0; count.div_ceil(64)], copies: vec![0; count.div_ceil(64)], contradictions, ..Pieces::default() };
         let mut labels = LabelWriter::default();
         self.piece_of.clear();
         self.piece_of.resize(count, NONE);

@@ -92,16 +92,22 @@ impl Stream<'_, '_> {
     fn pieces(&self, budget: &Budget, progress: &dyn Progress) -> Vec<Pieces> {
         let (all, done) = (self.records.len() as u64, AtomicU64::new(0));
         let source = (self.records, self.guide, self.plan);
-        self.members.each(source, self.threads, |_| true, Chunk::default, |chunk, number, seen, _| {
-            if progress.cancelled() || budget.is_exceeded() {
-                return Pieces::default();
-            }
-            let pieces = chunk.solve(seen, self.plan.home_box(number));
-            budget.take(Purpose::Surface, heap_bytes(&pieces));
-            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            progress.at(STAGE, done * all / self.plan.chunks() as u64, all);
-            pieces
-        })
+        self.members.each(
+            source,
+            self.threads,
+            |_| true,
+            Chunk::default,
+            |chunk, number, seen, _| {
+                if progress.cancelled() || budget.is_exceeded() {
+                    return Pieces::default();
+                }
+                let pieces = chunk.solve(seen, self.plan.home_box(number));
+                budget.take(Purpose::Surface, heap_bytes(&pieces));
+                let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+                progress.at(STAGE, done * all / self.plan.chunks() as u64, all);
+                pieces
+            },
+        )
     }
 
     /// The records that go, and those that turn. Every chunk that sees a triangle says the same of it.
@@ -110,21 +116,27 @@ impl Stream<'_, '_> {
         let both = [(); 2].map(|()| std::iter::repeat_with(AtomicU64::default).take(words).collect::<Vec<_>>());
         let set = |bits: &[AtomicU64], t: u32| bits[t as usize / 64].fetch_or(1 << (t % 64), Ordering::Relaxed);
         let source = (self.records, self.guide, self.plan);
-        self.members.each(source, self.threads, |_| true, || (), |(), number, seen, _| {
-            let number = number.0 as usize;
-            let told = &chunks[number];
-            let (mut labels, mut i) = (told.labels.iter(), 0);
-            seen.for_each(|t, _| {
-                let fate = fates.get(number, labels.next().unwrap_or(NONE));
-                let [is_odd, is_copy] = [&told.odd, &told.copies].map(|bits| bits[i / 64] >> (i % 64) & 1 == 1);
-                i += 1;
-                if fate.drops_copies && is_copy {
-                    set(&both[0], t);
-                } else if fate.turns == Some(is_odd) {
-                    set(&both[1], t);
-                }
-            });
-        });
+        self.members.each(
+            source,
+            self.threads,
+            |_| true,
+            || (),
+            |(), number, seen, _| {
+                let number = number.0 as usize;
+                let told = &chunks[number];
+                let (mut labels, mut i) = (told.labels.iter(), 0);
+                seen.for_each(|t, _| {
+                    let fate = fates.get(number, labels.next().unwrap_or(NONE));
+                    let [is_odd, is_copy] = [&told.odd, &told.copies].map(|bits| bits[i / 64] >> (i % 64) & 1 == 1);
+                    i += 1;
+                    if fate.drops_copies && is_copy {
+                        set(&both[0], t);
+                    } else if fate.turns == Some(is_odd) {
+                        set(&both[1], t);
+                    }
+                });
+            },
+        );
         both.map(|bits| bits.into_iter().map(AtomicU64::into_inner).collect())
     }
 }

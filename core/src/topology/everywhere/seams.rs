@@ -31,7 +31,8 @@ impl Fates {
             let base = pieces.len() as u32;
             bases.push(base);
             pieces.append(&mut chunk.pieces);
-            seams.extend(std::mem::take(&mut chunk.seams).into_iter().map(|(triangle, piece, odd)| (triangle, base + piece, odd)));
+            seams
+                .extend(std::mem::take(&mut chunk.seams).into_iter().map(|(triangle, piece, odd)| (triangle, base + piece, odd)));
         }
         radix::sort_by_number(&mut seams, |seam| seam.0);
         let mut parity = Parity::new(pieces.len());

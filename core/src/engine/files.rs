@@ -113,16 +113,51 @@ fn mend(
         Some(set_right) => set_right.edit(edit, mesh),
         None => edit,
     };
+    let survey = Some(survey).filter(|_| set_right.is_none());
+    let mended = Mended { edit, evidence, surface, is_welded: welded.is_some() };
+    let written = write(draft, mesh, &mended, survey, &mut report, (output, limits, progress), clock)?;
+    judging::advise(&mut report, &mended.evidence);
+    if let Some(counts) = welded {
+        welding::tell(&mut report, counts, (mesh, &mended.edit));
+    }
+    if let Some(set_right) = &set_right {
+        set_right.tell(&mut report);
+    }
+    written.durable()?;
+    clock.stage("verify");
+    mesh.check_unchanged()?;
+    Ok(report)
+}
+
+/// What the repairs come to.
+struct Mended {
+    edit: Edit,
+    evidence: Evidence,
+    /// The box of the input's surface.
+    surface: Bounds,
+    /// The records are not those of the file.
+    is_welded: bool,
+}
+
+/// Makes `draft` what the edit says, and judges it. `survey`: of the records that the edit is of, if it was made of them.
+fn write(
+    draft: Draft<'_, '_>,
+    mesh: &MeshFile,
+    Mended { edit, evidence, surface, is_welded }: &Mended,
+    survey: Option<Survey<'_>>,
+    report: &mut Report,
+    (output, limits, progress): (&Path, &Limits, &dyn Progress),
+    clock: &mut Clock,
+) -> Result<emit::Written> {
     // Good as it came, or nothing in it could be repaired.
-    let same = edit.is_empty() && welded.is_none() && judging::flaws(mesh.findings()).is_empty();
-    let expected = if same || set_right.is_some() {
-        None
-    } else {
-        expectation(mesh.records(), &edit, survey.irregular_triangles.len() as u64, limits)
-    };
-    let emit = || draft.finish(&if same { Content::Input } else { Content::Edited(&edit) });
+    let same = edit.is_empty() && !is_welded && judging::flaws(mesh.findings()).is_empty();
+    let expected = survey
+        .as_ref()
+        .filter(|_| !same)
+        .and_then(|survey| expectation(mesh.records(), edit, survey.irregular_triangles.len() as u64, limits));
+    let emit = || draft.finish(&if same { Content::Input } else { Content::Edited(edit) });
     // What the file will hold is looked at while it is written. It counts when the file was read back and does hold that.
-    let look = || second_look(survey, expected.as_ref(), profile);
+    let look = || second_look(survey?, expected.as_ref(), &report.profile);
     let threads = if mesh.bytes().len() < HASHED_BY_ONE { 1 } else { limits.threads };
     let (written, looked) = parallel::both(threads, emit, look);
     let (written, mut digest) = written?;
@@ -135,29 +170,12 @@ fn mend(
     report.edit = edit.summary(mesh.records().len());
     report.edit_records = limits.list_edit.then(|| edit.listed());
     if same {
-        confirm_copy(&mut report, mesh, output, limits, progress)?;
+        confirm_copy(report, mesh, output, limits, progress)?;
     } else {
-        verify(
-            &mut report,
-            mesh,
-            (&surface, &evidence),
-            expected.map(|expected| (expected, digest, looked)),
-            output,
-            limits,
-            progress,
-        )?;
+        let known = expected.map(|expected| (expected, digest, looked));
+        verify(report, mesh, (surface, evidence), known, output, limits, progress)?;
     }
-    judging::advise(&mut report, &evidence);
-    if let Some(counts) = welded {
-        welding::tell(&mut report, counts, (mesh, &edit));
-    }
-    if let Some(set_right) = &set_right {
-        set_right.tell(&mut report);
-    }
-    written.durable()?;
-    clock.stage("verify");
-    mesh.check_unchanged()?;
-    Ok(report)
+    Ok(written)
 }
 
 /// What the file will hold after `edit`, where a look at the difference costs less than reading all of it, and its tables fit in memory.

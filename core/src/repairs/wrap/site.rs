@@ -16,6 +16,7 @@ use crate::submesh::components::{Components, Reversed};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 use crate::util::parallel;
+use glam::DVec3;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
@@ -192,15 +193,21 @@ impl Site<'_, '_> {
             let off = self.sheets.list[sheet as usize].bounds.diagonal() * 1e-3;
             // How far winding numbers are from what they may be, as the sheet is and turned, area by area.
             let (mut as_is, mut if_turned) = (0.0, 0.0);
-            for t in corners.iter().step_by(corners.len().div_ceil(LOOKED_AT)) {
-                let [a, b, c] = t.map(place);
-                let vector = (b - a).cross(c - a);
-                let normal = vector.normalize_or_zero();
-                for p in [(a + b + c) / 3.0 + normal * off, (a + b + c) / 3.0 - normal * off] {
-                    let others: f64 = turned.iter().map(|(_, other)| 2.0 * other.winding_number(p)).sum();
-                    let now = tree.winding_number(p) - others;
-                    as_is += vector.length() * from_whole(now);
-                    if_turned += vector.length() * from_whole(now - 2.0 * own.winding_number(p));
+            let looked_at = || corners.iter().step_by(corners.len().div_ceil(LOOKED_AT)).map(|t| t.map(place));
+            let vector = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a);
+            let sides = looked_at().flat_map(|t| {
+                let (middle, off) = ((t[0] + t[1] + t[2]) / 3.0, vector(t).normalize_or_zero() * off);
+                [middle + off, middle - off]
+            });
+            let points: Vec<DVec3> = sides.collect();
+            let [all, alone] = [tree, &own].map(|tree| tree.winding_numbers(&points));
+            let others: Vec<Vec<f64>> = turned.iter().map(|(_, other)| other.winding_numbers(&points)).collect();
+            for (t, first) in looked_at().zip((0..).step_by(2)) {
+                for p in [first, first + 1] {
+                    let others: f64 = others.iter().map(|other| 2.0 * other[p]).sum();
+                    let now = all[p] - others;
+                    as_is += vector(t).length() * from_whole(now);
+                    if_turned += vector(t).length() * from_whole(now - 2.0 * alone[p]);
                 }
             }
             // What makes hardly a difference stays.
@@ -221,9 +228,14 @@ impl Site<'_, '_> {
             let [a, b, c] = t.map(place);
             let (middle, normal) = ((a + b + c) / 3.0, (b - a).cross(c - a).normalize_or_zero());
             let off = normal * (cell / 2.0);
-            [middle, a.lerp(middle, 0.01), b.lerp(middle, 0.01), c.lerp(middle, 0.01)]
+            let points = [middle, a.lerp(middle, 0.01), b.lerp(middle, 0.01), c.lerp(middle, 0.01)];
+            let sides: Vec<DVec3> = points.iter().flat_map(|p| [*p + off, *p - off]).collect();
+            let windings = old_tree.winding_numbers(&sides);
+            points
                 .into_iter()
-                .filter(|p| old_tree.winding_number(*p + off) <= 0.5 || old_tree.winding_number(*p - off) <= 0.5)
+                .zip(windings.chunks(2))
+                .filter(|(_, sides)| sides.iter().any(|winding| *winding <= 0.5))
+                .map(|(p, _)| p)
                 .map(|p| new_tree.distance(p))
                 .fold(0.0, f64::max)
         });
@@ -256,13 +268,18 @@ fn encloses(triangles: &[Corners], tree: &Tree) -> bool {
     let mut bounds = Bounds::EMPTY;
     triangles.iter().for_each(|t| bounds.include(t));
     let off = bounds.diagonal() * 1e-3;
+    let sampled = || triangles.iter().step_by(triangles.len().div_ceil(SAMPLES).max(1)).map(|t| t.map(place));
+    let vector = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a);
+    let sides = sampled().flat_map(|t| {
+        let (middle, normal) = ((t[0] + t[1] + t[2]) / 3.0, vector(t).normalize_or_zero() * off);
+        [middle + normal, middle - normal]
+    });
+    let windings = tree.winding_numbers(&sides.collect::<Vec<_>>());
     let (mut before, mut behind, mut all) = (0.0, 0.0, 0.0);
-    for t in triangles.iter().step_by(triangles.len().div_ceil(SAMPLES).max(1)) {
-        let [a, b, c] = t.map(place);
-        let (middle, vector) = ((a + b + c) / 3.0, (b - a).cross(c - a));
-        let (normal, area) = (vector.normalize_or_zero() * off, vector.length());
-        before += area * tree.winding_number(middle + normal);
-        behind += area * tree.winding_number(middle - normal);
+    for (t, winding) in sampled().zip(windings.chunks(2)) {
+        let area = vector(t).length();
+        before += area * winding[0];
+        behind += area * winding[1];
         all += area;
     }
     behind >= BEHIND * all && before <= (1.0 - BEHIND) * all

@@ -1,4 +1,4 @@
-//! Which of many boxes meet a box: a bounding volume hierarchy by `obvhs`.
+//! Which of many boxes meet a box: a bounding volume hierarchy by `obvhs`, and wide nodes in its order.
 
 use glam::Vec3A;
 use obvhs::aabb::Aabb;
@@ -6,11 +6,13 @@ use obvhs::bvh2::Bvh2;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 use crate::geometry::sums::Bounds;
+use crate::geometry::wide_boxes::WideTree;
 use crate::util::{scatter, steps};
 
 /// Many boxes, to be asked which of them meet another one.
 pub(crate) struct BoxTree {
     tree: Bvh2,
+    wide: WideTree,
 }
 
 impl BoxTree {
@@ -27,7 +29,8 @@ impl BoxTree {
             }
         }
         tree.refit_all();
-        Self { tree }
+        let wide = WideTree::new(in_order(&tree), boxes);
+        Self { tree, wide }
     }
 
     /// Replaces `found` by the numbers of all boxes that meet `wanted`, ascending: the tree's own order is not to be relied on.
@@ -38,13 +41,8 @@ impl BoxTree {
     }
 
     /// Visits the numbers of all boxes that meet `wanted`, in an order that is not to be relied on.
-    pub(crate) fn each_meeting(&self, wanted: &Bounds, mut visit: impl FnMut(u32)) {
-        self.tree.aabb_traverse(aabb(wanted), |tree, node| {
-            let node = &tree.nodes[node as usize];
-            let first = node.first_index as usize;
-            tree.primitive_indices[first..first + node.prim_count as usize].iter().for_each(|i| visit(*i));
-            true
-        });
+    pub(crate) fn each_meeting(&self, wanted: &Bounds, visit: impl FnMut(u32)) {
+        self.wide.each_meeting(wanted, visit);
     }
 
     /// Is any box `wanted`, of those that may hold `inner`, by number? Parts of the tree that do not hold it are left out, so that among boxes
@@ -82,6 +80,21 @@ impl BoxTree {
         });
         meets
     }
+}
+
+/// The boxes from leaf to leaf: those of a node stand together.
+fn in_order(tree: &Bvh2) -> Vec<u32> {
+    let mut order = Vec::with_capacity(tree.primitive_indices.len());
+    let mut waiting: Vec<u32> = tree.nodes.first().map(|_| 0).into_iter().collect();
+    while let Some(node) = waiting.pop().map(|i| &tree.nodes[i as usize]) {
+        let first = node.first_index;
+        if node.is_leaf() {
+            order.extend(&tree.primitive_indices[first as usize..][..node.prim_count as usize]);
+        } else {
+            waiting.extend([first, first + 1]);
+        }
+    }
+    order
 }
 
 /// How many pairs of boxes meet; if that is more than `most`, no less than one more. O(n log n), and what meets along x.
@@ -153,7 +166,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn finds_what_a_plain_loop_finds(points in prop::collection::vec((prop::array::uniform3(-9i8..9), prop::array::uniform3(0u8..5)), 0..60)) {
+        fn finds_what_a_plain_loop_finds(points in prop::collection::vec((prop::array::uniform3(-9i8..9), prop::array::uniform3(0u8..5)), 0..400)) {
             let boxes: Vec<Bounds> = points
                 .iter()
                 .map(|(lo, size)| Bounds { lo: lo.map(f32::from), hi: std::array::from_fn(|k| f32::from(lo[k]) + f32::from(size[k])) })

@@ -34,6 +34,8 @@ pub(super) struct Clearance<'a> {
     work: u32,
     /// Rim edges that passed through the triangles looked at last, the last one first: they often pass through the next one.
     latest: [usize; 3],
+    /// Edges whose neighbouring triangles met those looked at last.
+    met: [usize; 2],
     /// Edges that may meet a triangle with the mesh's triangle beyond.
     near: Vec<usize>,
     /// A triangle was refused because of the mesh.
@@ -48,7 +50,7 @@ impl<'a> Clearance<'a> {
             rim.neighbour(i).map_or(edge, |t| join(&edge, &around(&t)))
         }));
         let work = WORK / (1 + rim.obstacles.len() as u32);
-        Self { rim, boxes, known: Vec::new(), work, latest: [0; 3], near: Vec::new(), mesh_in_the_way: false }
+        Self { rim, boxes, known: Vec::new(), work, latest: [0; 3], met: [0; 2], near: Vec::new(), mesh_in_the_way: false }
     }
 
     /// Corners ascending.
@@ -76,7 +78,12 @@ impl<'a> Clearance<'a> {
             let (a, b) = (rim.points[i], rim.points[next(i)]);
             !plane.has_on_one_side(&[a, b]) && segment_pierces_plane(&a, &b, &corners, &plane)
         };
+        let meets = |i: usize| rim.neighbour(i).is_some_and(|t| !plane.has_on_one_side(&t) && do_cross(&corners, &t));
         if self.latest.iter().any(|i| pierces(*i)) || collinear(&corners[0], &corners[1], &corners[2]) {
+            return false;
+        }
+        // What stands in the way does not have to be told from the mesh any more.
+        if self.mesh_in_the_way && self.met.iter().any(|i| meets(*i)) {
             return false;
         }
         self.near.clear();
@@ -93,8 +100,9 @@ impl<'a> Clearance<'a> {
             self.latest = [i, self.latest[0], self.latest[1]];
             return false;
         }
-        let meets = |i: &usize| rim.neighbour(*i).is_some_and(|t| !plane.has_on_one_side(&t) && do_cross(&corners, &t));
-        let meets_mesh = self.near.iter().any(meets) || rim.meets_obstacle(&corners);
+        let met = self.near.iter().copied().find(|i| meets(*i));
+        self.met = met.map_or(self.met, |i| [i, self.met[0]]);
+        let meets_mesh = met.is_some() || rim.meets_obstacle(&corners);
         self.mesh_in_the_way |= meets_mesh;
         !meets_mesh
     }

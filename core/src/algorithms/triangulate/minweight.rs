@@ -60,30 +60,42 @@ impl Part {
     }
 }
 
-/// The parts, each where those with its first vertex lie side by side, and what a part that holds it asks first of it once more where those
-/// with its last vertex do: the loop over the apexes of a chord runs along a row of each.
+/// Bend and area of a part.
+type Weights = (u32, f64);
+
+/// The parts. The loop over the apexes of a chord runs along a row of those with its first vertex and one of those with its last.
 struct Parts {
     n: usize,
-    rows: Vec<Part>,
-    columns: Vec<(u32, f64)>,
+    rows: Vec<Weights>,
+    columns: Vec<Weights>,
+    apexes: Vec<u32>,
+    normals: Vec<DVec3>,
 }
 
 impl Parts {
     fn none(n: usize) -> Self {
-        Self { n, rows: vec![Part::NONE; n * n], columns: vec![(Part::NONE.bend, Part::NONE.area); n * n] }
+        let none = vec![(Part::NONE.bend, Part::NONE.area); n * n];
+        Self { n, columns: none.clone(), rows: none, apexes: vec![RIM; n * n], normals: vec![DVec3::ZERO; n * n] }
     }
 
-    fn get(&self, i: usize, k: usize) -> &Part {
-        &self.rows[i * self.n + k]
+    fn get(&self, i: usize, k: usize) -> Part {
+        let at = i * self.n + k;
+        let (bend, area) = self.rows[at];
+        Part { bend, area, apex: self.apexes[at], normal: self.normals[at] }
+    }
+
+    fn normal(&self, i: usize, k: usize) -> DVec3 {
+        self.normals[i * self.n + k]
     }
 
     fn set(&mut self, i: usize, k: usize, part: Part) {
-        self.rows[i * self.n + k] = part;
-        self.columns[k * self.n + i] = (part.bend, part.area);
+        let at = i * self.n + k;
+        (self.rows[at], self.apexes[at], self.normals[at]) = ((part.bend, part.area), part.apex, part.normal);
+        self.columns[k * self.n + i] = self.rows[at];
     }
 
-    /// The parts beyond (i, m), and bends and areas of those beyond (m, k), for each m from `first` to k.
-    fn beside(&self, (i, k): (usize, usize), first: usize) -> impl Iterator<Item = (&Part, &(u32, f64))> {
+    /// The weights of the parts beyond (i, m) and (m, k), for each m from `first` to k.
+    fn beside(&self, (i, k): (usize, usize), first: usize) -> impl Iterator<Item = (&Weights, &Weights)> {
         self.rows[i * self.n..][first..k].iter().zip(&self.columns[k * self.n..][first..k])
     }
 }
@@ -174,7 +186,7 @@ impl<'a, 'b> Table<'a, 'b> {
                     continue;
                 }
                 let part = self.best_part(i, k);
-                if !part.weighs_as(self.parts.get(i, k)) {
+                if !part.weighs_as(&self.parts.get(i, k)) {
                     (changed[i][0], changed[k][1]) = (true, true);
                 }
                 self.parts.set(i, k, part);
@@ -197,7 +209,7 @@ impl<'a, 'b> Table<'a, 'b> {
             let length = normal.length();
             part.area += 0.5 * length;
             part.normal = if length > 0.0 { normal / length } else { DVec3::ZERO };
-            for other in [self.parts.get(i, m).normal, self.parts.get(m, k).normal, beyond] {
+            for other in [self.parts.normal(i, m), self.parts.normal(m, k), beyond] {
                 part.bend = part.bend.max(bend(part.normal, other));
             }
             if part.before(&best, self.weight) && self.may_use([i as u32, m as u32, k as u32]) {
@@ -211,7 +223,7 @@ impl<'a, 'b> Table<'a, 'b> {
     fn next_before(&self, best: &Part, (i, k): (usize, usize), from: usize) -> Option<(usize, Part)> {
         for (m, (left, right)) in (from..).zip(self.parts.beside((i, k), from)) {
             steps::count(1);
-            let (bend, area) = (left.bend.max(right.0), left.area + right.1);
+            let (bend, area) = (left.0.max(right.0), left.1 + right.1);
             let part = Part { bend, area, apex: m as u32, normal: DVec3::ZERO };
             if area != f64::INFINITY && part.before(best, self.weight) {
                 return Some((m, part));

@@ -90,13 +90,6 @@ impl Solids {
         let tree = BoxTree::new(&all.iter().map(|f| f.bounds).collect::<Vec<_>>());
         Self { all, tree }
     }
-
-    /// The triangles whose boxes meet `wanted`.
-    fn meeting(&self, wanted: &Bounds) -> Vec<&Solid> {
-        let mut found = Vec::new();
-        self.tree.meeting(wanted, &mut found);
-        found.iter().map(|f| &self.all[*f as usize]).collect()
-    }
 }
 
 /// Findings of a chunk.
@@ -124,26 +117,26 @@ impl Search {
     ) -> Found {
         let mut found = Found::default();
         let (lo, hi) = cell.ends();
-        let here = fresh.meeting(&Bounds { lo, hi });
+        // What else a cell's pairs are of meets the cell, too: the index of all finds it, and other cells' pairs are left to them.
+        let mut here = Vec::new();
+        fresh.tree.meeting(&Bounds { lo, hi }, &mut here);
         if here.is_empty() {
             return found;
         }
-        let boxes: Vec<Bounds> = here.iter().map(|f| f.bounds).collect();
-        let tree = BoxTree::new(&boxes);
         let asked = Asked { cell, meets };
-        for (i, one) in (0..).zip(&here) {
-            self.met.clear();
-            tree.each_meeting(&one.bounds, |j| {
-                if j > i {
-                    self.met.push(j)
-                }
-            });
-            found.test(asked, one, &mut self.met, |j| here[j as usize], true);
-            self.met.clear();
-            beside.tree.each_meeting(&one.bounds, |j| self.met.push(j));
-            found.test(asked, one, &mut self.met, |j| &beside.all[j as usize], true);
+        for i in &here {
+            let one = &fresh.all[*i as usize];
+            for (others, first) in [(fresh, *i + 1), (beside, 0)] {
+                self.met.clear();
+                others.tree.each_meeting(&one.bounds, |j| {
+                    if j >= first {
+                        self.met.push(j)
+                    }
+                });
+                found.test(asked, one, &mut self.met, |j| &others.all[j as usize], true);
+            }
         }
-        self.grid.mark(boxes.iter().copied());
+        self.grid.mark(here.iter().map(|i| fresh.all[*i as usize].bounds));
         for triangles in seen {
             triangles.for_each(|place, triangle| {
                 let corners = triangle.corners();
@@ -152,12 +145,12 @@ impl Search {
                     return;
                 }
                 self.met.clear();
-                tree.each_meeting(&bounds, |i| self.met.push(i));
+                fresh.tree.each_meeting(&bounds, |i| self.met.push(i));
                 if self.met.is_empty() || is_gone(place) {
                     return;
                 }
                 if let Some(one) = Solid::of(place, corners) {
-                    found.test(asked, &one, &mut self.met, |i| here[i as usize], false);
+                    found.test(asked, &one, &mut self.met, |i| &fresh.all[i as usize], false);
                 }
             });
         }

@@ -224,24 +224,34 @@ impl Site<'_, '_> {
     /// nothing.
     pub(crate) fn distances(&self, old: &[Corners], old_tree: &Tree, new: &[Corners], cell: f64) -> (f64, f64) {
         let new_tree = Tree::new(new);
-        let from_old = sampled(old, self.threads, |t| {
-            let [a, b, c] = t.map(place);
-            let (middle, normal) = ((a + b + c) / 3.0, (b - a).cross(c - a).normalize_or_zero());
-            let off = normal * (cell / 2.0);
-            let points = [middle, a.lerp(middle, 0.01), b.lerp(middle, 0.01), c.lerp(middle, 0.01)];
-            let sides: Vec<DVec3> = points.iter().flat_map(|p| [*p + off, *p - off]).collect();
-            let windings = old_tree.winding_numbers(&sides);
-            points
-                .into_iter()
-                .zip(windings.chunks(2))
-                .filter(|(_, sides)| sides.iter().any(|winding| *winding <= 0.5))
-                .map(|(p, _)| p)
-                .map(|p| new_tree.distance(p))
-                .fold(0.0, f64::max)
+        let from_old = sampled(old, self.threads, |triangles| {
+            let mut places: Vec<(DVec3, DVec3)> = Vec::with_capacity(4 * triangles.len());
+            for [a, b, c] in triangles.iter().map(|t| t.map(place)) {
+                let (middle, normal) = ((a + b + c) / 3.0, (b - a).cross(c - a).normalize_or_zero());
+                let four = [middle, a.lerp(middle, 0.01), b.lerp(middle, 0.01), c.lerp(middle, 0.01)];
+                places.extend(four.map(|p| (p, normal * (cell / 2.0))));
+            }
+            let outside = |sides: Vec<DVec3>| old_tree.winding_numbers(&sides).into_iter().map(|winding| winding <= 0.5);
+            let mut bounds = Vec::with_capacity(places.len());
+            let before = outside(places.iter().map(|(p, off)| *p + *off).collect());
+            let inner: Vec<_> = before
+                .zip(places)
+                .filter_map(|(out, place)| {
+                    if out {
+                        bounds.push(place.0);
+                        None
+                    } else {
+                        Some(place)
+                    }
+                })
+                .collect();
+            let behind = outside(inner.iter().map(|(p, off)| *p - *off).collect());
+            bounds.extend(behind.zip(inner).filter_map(|(out, (p, _))| out.then_some(p)));
+            bounds.into_iter().map(|p| new_tree.distance(p)).fold(0.0, f64::max)
         });
-        let from_new = sampled(new, self.threads, |t| {
-            let [a, b, c] = t.map(place);
-            old_tree.distance((a + b + c) / 3.0).max(old_tree.distance(a))
+        let from_new = sampled(new, self.threads, |triangles| {
+            let far = |[a, b, c]: [DVec3; 3]| old_tree.distance((a + b + c) / 3.0).max(old_tree.distance(a));
+            triangles.iter().map(|t| far(t.map(place))).fold(0.0, f64::max)
         });
         (from_old, from_new)
     }
@@ -290,13 +300,14 @@ pub(crate) fn from_whole(winding: f64) -> f64 {
     if winding < 0.0 { -winding } else { (winding - winding.round()).abs() }
 }
 
-/// The largest of `measure` over triangles at even steps through a list.
-pub(crate) fn sampled(triangles: &[Corners], threads: usize, measure: impl Fn(&Corners) -> f64 + Sync) -> f64 {
+/// The largest of `measure` over triangles at even steps through a list, of which it gets some at a time.
+pub(crate) fn sampled(triangles: &[Corners], threads: usize, measure: impl Fn(&[Corners]) -> f64 + Sync) -> f64 {
     const BLOCK: usize = 256;
     let step = triangles.len().div_ceil(SAMPLES).max(1);
     let count = triangles.len().div_ceil(step);
     let blocks = parallel::map(threads, count.div_ceil(BLOCK), |block| {
-        (block * BLOCK..count.min((block + 1) * BLOCK)).map(|i| measure(&triangles[i * step])).fold(0.0, f64::max)
+        let here = block * BLOCK..count.min((block + 1) * BLOCK);
+        measure(&here.map(|i| triangles[i * step]).collect::<Vec<_>>())
     });
     blocks.into_iter().fold(0.0, f64::max)
 }

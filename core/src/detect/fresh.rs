@@ -15,6 +15,7 @@ use crate::io::record;
 use crate::stream::plan::HomeBox;
 use crate::stream::source::{Seen, Source, Triangle};
 use crate::topology::crossings::{Crossings, Pair, most_tested};
+use crate::topology::intersect::leave_out_apart;
 use crate::topology::survey::Survey;
 
 /// All self-intersections of the written file, numbered as its records are; `None` if those of the input are not all known, or too many
@@ -33,7 +34,7 @@ pub(crate) fn self_intersections(survey: &Survey<'_>, difference: &Difference) -
     Some(Crossings::of_pairs(pairs))
 }
 
-/// How two triangles with an area, whose boxes meet, meet in a way that is asked for.
+/// How two triangles with an area, whose boxes meet, meet in a way that is asked for. Those that are apart do not.
 pub(crate) type Meets = fn(&Corners, &Corners) -> Option<Contact>;
 
 /// Crossing or overlapping, as [`Meets`].
@@ -89,15 +90,6 @@ impl Solids {
         let tree = BoxTree::new(&all.iter().map(|f| f.bounds).collect::<Vec<_>>());
         Self { all, tree }
     }
-
-    /// The triangles whose boxes meet `wanted`.
-    fn meeting<'s>(&'s self, wanted: &Bounds, found: &mut Vec<u32>) -> Vec<&'s Solid> {
-        found.clear();
-        if !self.all.is_empty() {
-            self.tree.meeting(wanted, found);
-        }
-        found.iter().map(|f| &self.all[*f as usize]).collect()
-    }
 }
 
 /// Findings of a chunk.
@@ -125,22 +117,26 @@ impl Search {
     ) -> Found {
         let mut found = Found::default();
         let (lo, hi) = cell.ends();
-        let here = fresh.meeting(&Bounds { lo, hi }, &mut self.met);
+        // What else a cell's pairs are of meets the cell, too: the index of all finds it, and other cells' pairs are left to them.
+        let mut here = Vec::new();
+        fresh.tree.meeting(&Bounds { lo, hi }, &mut here);
         if here.is_empty() {
             return found;
         }
-        let boxes: Vec<Bounds> = here.iter().map(|f| f.bounds).collect();
-        let tree = BoxTree::new(&boxes);
-        for (i, one) in here.iter().enumerate() {
-            tree.meeting(&one.bounds, &mut self.met);
-            for other in self.met.iter().filter(|j| **j as usize > i) {
-                found.test(one, here[*other as usize], cell, meets);
-            }
-            for other in beside.meeting(&one.bounds, &mut self.met) {
-                found.test(one, other, cell, meets);
+        let asked = Asked { cell, meets };
+        for i in &here {
+            let one = &fresh.all[*i as usize];
+            for (others, first) in [(fresh, *i + 1), (beside, 0)] {
+                self.met.clear();
+                others.tree.each_meeting(&one.bounds, |j| {
+                    if j >= first {
+                        self.met.push(j)
+                    }
+                });
+                found.test(asked, one, &mut self.met, |j| &others.all[j as usize], true);
             }
         }
-        self.grid.mark(boxes.iter().copied());
+        self.grid.mark(here.iter().map(|i| fresh.all[*i as usize].bounds));
         for triangles in seen {
             triangles.for_each(|place, triangle| {
                 let corners = triangle.corners();
@@ -148,12 +144,13 @@ impl Search {
                 if !self.grid.may_meet(&bounds) {
                     return;
                 }
-                tree.meeting(&bounds, &mut self.met);
+                self.met.clear();
+                fresh.tree.each_meeting(&bounds, |i| self.met.push(i));
                 if self.met.is_empty() || is_gone(place) {
                     return;
                 }
                 if let Some(one) = Solid::of(place, corners) {
-                    self.met.iter().for_each(|f| found.test(here[*f as usize], &one, cell, meets));
+                    found.test(asked, &one, &mut self.met, |i| &fresh.all[i as usize], false);
                 }
             });
         }
@@ -161,16 +158,36 @@ impl Search {
     }
 }
 
+/// What is asked of pairs, and by which cell.
+#[derive(Clone, Copy)]
+struct Asked {
+    cell: HomeBox,
+    meets: Meets,
+}
+
 impl Found {
-    /// Decides a pair whose boxes meet, if the cell owns it.
-    fn test(&mut self, one: &Solid, other: &Solid, cell: HomeBox, meets: Meets) {
-        let lowest = std::array::from_fn(|k| one.bounds.lo[k].max(other.bounds.lo[k]));
-        if !cell.holds(lowest) {
-            return;
-        }
-        self.tested += 1;
-        if let Some(contact) = meets(&one.corners, &other.corners) {
-            self.pairs.push(Pair { triangles: [one.place, other.place], contact });
+    /// Decides the pairs of one triangle with others, whose boxes meet its own, as far as the cell owns them. They may come in any order; pairs are found
+    /// in that of their numbers.
+    fn test<'s>(
+        &mut self,
+        asked: Asked,
+        one: &Solid,
+        others: &mut Vec<u32>,
+        solid: impl Fn(u32) -> &'s Solid,
+        comes_first: bool,
+    ) {
+        others.retain(|other| {
+            let other = &solid(*other).bounds;
+            asked.cell.holds(std::array::from_fn(|k| one.bounds.lo[k].max(other.lo[k])))
+        });
+        self.tested += others.len() as u64;
+        leave_out_apart(&one.corners, others, |other| solid(other).corners);
+        others.sort_unstable();
+        for other in others.iter().map(|other| solid(*other)) {
+            let [a, b] = if comes_first { [one, other] } else { [other, one] };
+            if let Some(contact) = (asked.meets)(&a.corners, &b.corners) {
+                self.pairs.push(Pair { triangles: [a.place, b.place], contact });
+            }
         }
     }
 }

@@ -17,3 +17,4 @@ pub(crate) mod ray_grid;
 pub(crate) mod self_crossing;
 pub(crate) mod sums;
 pub(crate) mod tri_tri;
+mod wide_boxes;

@@ -351,13 +351,18 @@ fn along_each_other(a: &Triangle, b: &Triangle, axis: usize) -> bool {
 /// Does the segment pass through the inside of the triangle, or along it? Touching (an end in the plane, a point of the
 /// triangle's border) is not passing. Exact.
 pub(crate) fn segment_pierces(a: &Point, b: &Point, t: &Triangle) -> bool {
+    segment_pierces_plane(a, b, t, &Plane::new(&t[0], &t[1], &t[2]))
+}
+
+/// The same with the triangle's plane, where it is known.
+pub(crate) fn segment_pierces_plane(a: &Point, b: &Point, t: &Triangle, plane: &Plane<'_>) -> bool {
     for k in 0..3 {
         let (lo, hi) = (t[0][k].min(t[1][k]).min(t[2][k]), t[0][k].max(t[1][k]).max(t[2][k]));
         if a[k].max(b[k]) < lo || a[k].min(b[k]) > hi {
             return false;
         }
     }
-    let (at_a, at_b) = (side(&t[0], &t[1], &t[2], a), side(&t[0], &t[1], &t[2], b));
+    let (at_a, at_b) = (plane.side(a), plane.side(b));
     if at_a != 0 || at_b != 0 {
         let turns = || [0, 1, 2].map(|k| side(a, b, &t[k], &t[(k + 1) % 3]));
         return at_a * at_b < 0 && one_sided(turns());

@@ -46,6 +46,8 @@ impl Edge<'_> {
 /// All edges with a complete end, sorted by ends; one flat table.
 pub(crate) struct Edges {
     ends: Vec<(Vertex, Vertex)>,
+    /// For each low end the number of its first edge, and of the one after the last.
+    firsts: Vec<u32>,
     starts: Vec<u32>,
     uses: Vec<Use>,
     any_nonmanifold: bool,
@@ -79,11 +81,13 @@ impl Edges {
         });
         let mut edges = Self {
             ends: Vec::with_capacity(table.len() / 2),
+            firsts: Vec::with_capacity(submesh.positions.len() + 1),
             starts: vec![0],
             uses: Vec::with_capacity(table.len()),
             any_nonmanifold: false,
         };
         for low in 0..submesh.positions.len() {
+            edges.firsts.push(edges.ends.len() as u32);
             let part = &mut table[starts[low] as usize..starts[low + 1] as usize];
             part.sort_unstable_by_key(|(high, used)| (*high, used.triangle));
             for group in part.chunk_by(|a, b| a.0 == b.0) {
@@ -93,6 +97,7 @@ impl Edges {
                 edges.any_nonmanifold |= group.len() > 2;
             }
         }
+        edges.firsts.push(edges.ends.len() as u32);
         edges
     }
 
@@ -122,7 +127,10 @@ impl Edges {
 
     /// Its number.
     pub(crate) fn number(&self, a: Vertex, b: Vertex) -> Option<u32> {
-        self.ends.binary_search(&(a.min(b), a.max(b))).ok().map(|i| i as u32)
+        let (low, high) = (a.min(b) as usize, a.max(b));
+        let of_low = *self.firsts.get(low)? as usize..*self.firsts.get(low + 1)? as usize;
+        let place = self.ends[of_low.clone()].binary_search_by_key(&high, |(_, high)| *high).ok()?;
+        Some((of_low.start + place) as u32)
     }
 }
 

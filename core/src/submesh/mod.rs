@@ -154,19 +154,37 @@ impl Submesh {
 
     /// Vertices by position: of several there, the one that is used last.
     pub(crate) fn by_position(&self) -> ByPosition {
+        let mut known = ByPosition::with_capacity_and_hasher(self.positions.len(), Hashing::default());
+        self.name_positions(|v, p, last_use| {
+            let there = known.entry(p).or_insert(v);
+            if last_use[v as usize] >= last_use[*there as usize] {
+                *there = v;
+            }
+        });
+        known
+    }
+
+    /// The same of these positions alone.
+    pub(crate) fn by_position_of(&self, wanted: impl Iterator<Item = Position>) -> ByPosition {
+        let mut known: ByPosition = wanted.map(|p| (p, NONE)).collect();
+        if !known.is_empty() {
+            self.name_positions(|v, p, last_use| match known.get_mut(&p) {
+                Some(there) if *there == NONE || last_use[v as usize] >= last_use[*there as usize] => *there = v,
+                _ => {}
+            });
+            known.retain(|_, v| *v != NONE);
+        }
+        known
+    }
+
+    /// Visits all vertices with their positions, and when each was last used.
+    fn name_positions(&self, mut visit: impl FnMut(Vertex, Position, &[u64])) {
         steps::count(self.positions.len());
         let mut last_use = vec![0; self.positions.len()];
         for t in self.living() {
             (1..).zip(self.triangles[t as usize].v).for_each(|(k, v)| last_use[v as usize] = 3 * u64::from(t) + k);
         }
-        let mut known = ByPosition::with_capacity_and_hasher(self.positions.len(), Hashing::default());
-        for (v, p) in (0..).zip(&self.positions) {
-            let there = known.entry(Position::of(*p)).or_insert(v);
-            if last_use[v as usize] >= last_use[*there as usize] {
-                *there = v;
-            }
-        }
-        known
+        (0..).zip(&self.positions).for_each(|(v, p)| visit(v, Position::of(*p), &last_use));
     }
 
     /// Takes in what [`Survey::promote`] has found for some of its incomplete vertices, which become complete: those that `completed`

@@ -3,6 +3,8 @@
 
 use std::ops::ControlFlow;
 
+use glam::Vec4;
+
 use crate::geometry::exact::Point;
 
 /// Lowest and highest coordinates.
@@ -15,8 +17,27 @@ pub(super) fn join(a: &Box3, b: &Box3) -> Box3 {
     ([0, 1, 2].map(|k| a.0[k].min(b.0[k])), [0, 1, 2].map(|k| a.1[k].max(b.1[k])))
 }
 
-fn meet(a: &Box3, b: &Box3) -> bool {
-    (0..3).all(|k| a.0[k] <= b.1[k] && b.0[k] <= a.1[k])
+/// The same, laid out so that two are compared in a few steps.
+#[derive(Clone, Copy)]
+struct Node {
+    lo: Vec4,
+    hi: Vec4,
+}
+
+impl Node {
+    fn of((lo, hi): &Box3) -> Self {
+        let four = |[x, y, z]: [f32; 3]| Vec4::new(x, y, z, 0.0);
+        Self { lo: four(*lo), hi: four(*hi) }
+    }
+
+    fn join(&self, other: &Self) -> Self {
+        Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
+    }
+
+    #[inline(always)]
+    fn meets(&self, other: &Self) -> bool {
+        (self.lo.cmple(other.hi) & other.lo.cmple(self.hi)).all()
+    }
 }
 
 pub(super) fn around(points: &[Point]) -> Box3 {
@@ -26,34 +47,35 @@ pub(super) fn around(points: &[Point]) -> Box3 {
 /// A segment tree of boxes.
 pub(super) struct Boxes {
     /// Node 1 is the root, nodes 2i and 2i + 1 are the children of i, the leaf of item v is `leaves + v`.
-    nodes: Vec<Box3>,
+    nodes: Vec<Node>,
     leaves: usize,
 }
 
 impl Boxes {
     pub(super) fn new(items: impl ExactSizeIterator<Item = Box3>) -> Self {
         let leaves = items.len().next_power_of_two();
-        let mut nodes = vec![EMPTY; 2 * leaves];
+        let mut nodes = vec![Node::of(&EMPTY); 2 * leaves];
         for (leaf, item) in nodes[leaves..].iter_mut().zip(items) {
-            *leaf = item;
+            *leaf = Node::of(&item);
         }
         for node in (1..leaves).rev() {
-            nodes[node] = join(&nodes[2 * node], &nodes[2 * node + 1]);
+            nodes[node] = nodes[2 * node].join(&nodes[2 * node + 1]);
         }
         Self { nodes, leaves }
     }
 
     pub(super) fn set(&mut self, v: usize, item: Box3) {
         let mut node = self.leaves + v;
-        self.nodes[node] = item;
+        self.nodes[node] = Node::of(&item);
         while node > 1 {
             node /= 2;
-            self.nodes[node] = join(&self.nodes[2 * node], &self.nodes[2 * node + 1]);
+            self.nodes[node] = self.nodes[2 * node].join(&self.nodes[2 * node + 1]);
         }
     }
 
     /// Visits the items whose boxes meet `what`, until told to break.
     pub(super) fn near(&self, what: &Box3, mut visit: impl FnMut(usize) -> ControlFlow<()>) -> ControlFlow<()> {
+        let what = Node::of(what);
         // A path down and the siblings beside it: no more than the depth, which is less than 32.
         let mut stack = [0_usize; 34];
         stack[0] = 1;
@@ -61,7 +83,7 @@ impl Boxes {
         while height > 0 {
             height -= 1;
             let node = stack[height];
-            if meet(&self.nodes[node], what) {
+            if self.nodes[node].meets(&what) {
                 if node >= self.leaves {
                     visit(node - self.leaves)?;
                 } else {

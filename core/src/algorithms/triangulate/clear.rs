@@ -1,9 +1,11 @@
 //! Which triangles a valid patch may have at all, as far as the loop and the mesh around it can tell.
 
+use std::ops::ControlFlow;
+
 use super::boxes::{Boxes, around, join};
 use super::rim::Rim;
 use crate::geometry::exact::{Plane, collinear};
-use crate::geometry::tri_tri::{do_cross, segment_pierces};
+use crate::geometry::tri_tri::{do_cross, segment_pierces_plane};
 
 /// Triangles looked at for one loop, divided by how many obstacles each is held against; beyond, none is known to be clear.
 const WORK: u32 = 1_000_000;
@@ -30,6 +32,12 @@ pub(super) struct Clearance<'a> {
     /// By the rank of the triangle among all.
     known: Vec<Known>,
     work: u32,
+    /// Rim edges that passed through the triangles looked at last, the last one first: they often pass through the next one.
+    latest: [usize; 3],
+    /// Edges whose neighbouring triangles met those looked at last.
+    met: [usize; 2],
+    /// Edges that may meet a triangle with the mesh's triangle beyond.
+    near: Vec<usize>,
     /// A triangle was refused because of the mesh.
     pub(super) mesh_in_the_way: bool,
 }
@@ -41,7 +49,8 @@ impl<'a> Clearance<'a> {
             let edge = around(&[rim.points[i], rim.points[(i + 1) % n]]);
             rim.neighbour(i).map_or(edge, |t| join(&edge, &around(&t)))
         }));
-        Self { rim, boxes, known: Vec::new(), work: WORK / (1 + rim.obstacles.len() as u32), mesh_in_the_way: false }
+        let work = WORK / (1 + rim.obstacles.len() as u32);
+        Self { rim, boxes, known: Vec::new(), work, latest: [0; 3], met: [0; 2], near: Vec::new(), mesh_in_the_way: false }
     }
 
     /// Corners ascending.
@@ -67,13 +76,33 @@ impl<'a> Clearance<'a> {
         let plane = Plane::new(&corners[0], &corners[1], &corners[2]);
         let pierces = |i: usize| {
             let (a, b) = (rim.points[i], rim.points[next(i)]);
-            !plane.has_on_one_side(&[a, b]) && segment_pierces(&a, &b, &corners)
+            !plane.has_on_one_side(&[a, b]) && segment_pierces_plane(&a, &b, &corners, &plane)
         };
-        if collinear(&corners[0], &corners[1], &corners[2]) || self.boxes.any_near(&bounds, pierces) {
+        let meets = |i: usize| rim.neighbour(i).is_some_and(|t| !plane.has_on_one_side(&t) && do_cross(&corners, &t));
+        if self.latest.iter().any(|i| pierces(*i)) || collinear(&corners[0], &corners[1], &corners[2]) {
             return false;
         }
-        let meets = |i: usize| rim.neighbour(i).is_some_and(|t| !plane.has_on_one_side(&t) && do_cross(&corners, &t));
-        let meets_mesh = self.boxes.any_near(&bounds, meets) || rim.meets_obstacle(&corners);
+        // What stands in the way does not have to be told from the mesh any more.
+        if self.mesh_in_the_way && self.met.iter().any(|i| meets(*i)) {
+            return false;
+        }
+        self.near.clear();
+        let mut passes = None;
+        let ends = self.boxes.near(&bounds, |i| {
+            if pierces(i) {
+                passes = Some(i);
+                return ControlFlow::Break(());
+            }
+            self.near.push(i);
+            ControlFlow::Continue(())
+        });
+        if let (true, Some(i)) = (ends.is_break(), passes) {
+            self.latest = [i, self.latest[0], self.latest[1]];
+            return false;
+        }
+        let met = self.near.iter().copied().find(|i| meets(*i));
+        self.met = met.map_or(self.met, |i| [i, self.met[0]]);
+        let meets_mesh = met.is_some() || rim.meets_obstacle(&corners);
         self.mesh_in_the_way |= meets_mesh;
         !meets_mesh
     }

@@ -216,7 +216,7 @@ impl<'a> Front<'a> {
         let apexes: Vec<_> = vertices.iter().map(apex).collect();
         let forbidden = |a: u32, b: u32| (self.rim.forbidden)(vertices[a as usize], vertices[b as usize]);
         let rest = Rim { points: &points, apexes: &apexes, obstacles: self.rim.obstacles, forbidden: &forbidden };
-        let triangles = minweight::triangulate(&rest, Weight::Bend, Choice::Clear(&mut Clearance::new(&rest), &[]))?;
+        let triangles = minweight::triangulate(&rest, Weight::Bend, Choice::Clear(&mut Clearance::new(&rest)))?;
         Ok(triangles.into_iter().map(|t| t.map(|v| vertices[v as usize])).collect())
     }
 }

@@ -221,15 +221,15 @@ fn by_weight(rim: &Rim<'_>, weight: Weight, clearance: &mut Clearance<'_>) -> Re
     if rim.accepts(&triangles, false).is_ok() {
         return Ok(triangles);
     }
-    let mut banned = Vec::new();
+    let mut table = minweight::Table::new(rim, weight, Choice::Clear(clearance));
     loop {
-        let triangles = minweight::triangulate(rim, weight, Choice::Clear(clearance, &banned))?;
+        let triangles = table.best()?;
         let crossing = match rim.accepts(&triangles, false) {
             Ok(()) => return Ok(triangles),
-            Err(Fault::Crossing(i, j)) if banned.len() < BAN_WORK / rim.len() => [triangles[i], triangles[j]],
+            Err(Fault::Crossing(i, j)) if table.banned() < BAN_WORK / rim.len() => [triangles[i], triangles[j]],
             Err(fault) => return Err(fault.into()),
         };
-        banned.push(if rim.area(crossing[0]) > rim.area(crossing[1]) { crossing[0] } else { crossing[1] });
+        table.ban(if rim.area(crossing[0]) > rim.area(crossing[1]) { crossing[0] } else { crossing[1] });
     }
 }
 

@@ -137,6 +137,15 @@ impl Lattice {
         DVec3::from_array(std::array::from_fn(|k| (f64::from(p[k]) / self.step - self.origin[k] as f64) / side))
     }
 
+    /// What winds around each of some points, by name.
+    fn windings(&self, tree: &Tree, points: &[u64]) -> Vec<f32> {
+        let points: Vec<[u32; 3]> = points.iter().map(|p| named(*p)).collect();
+        let asked: Vec<DVec3> = points.iter().filter(|p| !self.is_beyond(**p)).map(|p| self.point(*p)).collect();
+        let mut windings = tree.winding_numbers(&asked).into_iter();
+        let of = |p: &[u32; 3]| if self.is_beyond(*p) { 0.0 } else { windings.next().unwrap_or(0.0) as f32 };
+        points.iter().map(of).collect()
+    }
+
     /// Beyond the margin there is nothing, whatever an odd soup may wind around there.
     fn is_beyond(&self, p: [u32; 3]) -> bool {
         (0..3).any(|k| p[k] < 2 || p[k] > self.hi[k])
@@ -221,14 +230,10 @@ impl<'l> Field<'l> {
             points.dedup();
             let blocks = parallel::map(threads, points.len().div_ceil(BLOCK), |block| {
                 let points = &points[block * BLOCK..points.len().min((block + 1) * BLOCK)];
-                let wind = |p: &u64| {
-                    let p = named(*p);
-                    if lattice.is_beyond(p) { 0.0 } else { tree.winding_number(lattice.point(p)) as f32 }
-                };
                 if progress.cancelled() {
                     return vec![0.0; points.len()];
                 }
-                points.iter().map(wind).collect::<Vec<_>>()
+                lattice.windings(tree, points)
             });
             field.winding.extend(points.iter().copied().zip(blocks.into_iter().flatten()));
             let mut next: Vec<u64> =

@@ -24,6 +24,7 @@
 //! kind, as holes have no triangles. By that rule every tetrahedron beside a cut face is looked at if one of the two is: parts of the surface
 //! are found whole or not at all.
 
+mod angle;
 mod lattice;
 pub(crate) mod tree;
 

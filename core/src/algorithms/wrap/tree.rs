@@ -11,26 +11,22 @@
 //! directly.
 //!
 //! **Deterministic.** The tree's shape depends on the triangles and their order alone, a query meets nodes in the tree's order, and all is done
-//! by + − × ÷ √ in f64, which IEEE 754 fixes. A solid angle is twice the argument of a complex number (van Oosterom & Strackee, IEEE Trans.
-//! Biomed. Eng. 30(2), 1983): the numbers of all near triangles are multiplied and the turns of the product counted, so that the angle itself
-//! is needed once a query, from a series of our own rather than from the platform's `atan2`.
+//! by + − × ÷ √ in f64, which IEEE 754 fixes. Solid angles: [`super::angle`].
 
 use glam::DVec3;
 
+pub(crate) use super::angle::Corners;
+use super::angle::{Angle, Angles, Lanes, Moments, WIDTH};
 use crate::detect::bodies;
 use crate::geometry::distance::{place, square_distance};
 use crate::geometry::position::Position;
 use crate::geometry::sums::Bounds;
 
-/// A triangle by its positions.
-pub(crate) type Corners = [[f32; 3]; 3];
-
 /// Triangles in a leaf, at most.
 const LEAF: usize = 8;
 
-/// A node is far from a point beyond so many of its radii. The error of a winding number is then below some 10⁻², which matters only where
-/// it is near ½: in the air of a hole.
-const FAR: f64 = 2.0;
+/// Fewer points are asked for one by one.
+const WORTHWHILE: usize = 3;
 
 /// Nodes stand in the order of a walk that goes down to the first child before the second.
 #[derive(Clone)]
@@ -41,18 +37,6 @@ struct Node {
     /// A leaf's triangles, none for others.
     first: u32,
     count: u32,
-}
-
-/// A node as it is seen from afar.
-#[derive(Clone, Default)]
-struct Moments {
-    centre: DVec3,
-    /// Squared distance beyond which this stands for the triangles.
-    far: f64,
-    /// Sum of the vector areas.
-    dipole: DVec3,
-    /// Vector areas times the places of their triangles: xx, yy, zz, and the sums of xy and yx, yz and zy, zx and xz.
-    spread: [f64; 6],
 }
 
 /// Triangles in a tree of boxes.
@@ -113,6 +97,21 @@ impl Tree {
         }
     }
 
+    /// The same for many points: for each exactly what it is for one. Points that are near each other are asked for together, best in a row.
+    pub(crate) fn winding_numbers(&self, points: &[DVec3]) -> Vec<f64> {
+        let of_eight = |points: &[DVec3]| {
+            if points.len() < WORTHWHILE {
+                return points.iter().map(|p| self.winding_number(*p)).collect::<Vec<_>>();
+            }
+            let passages = |caps: &Self, p: &DVec3| f64::from(self.passages(*p) + caps.passages(*p));
+            match &self.caps {
+                Some(caps) => points.iter().zip(caps.solid_angles(points)).map(|(p, angle)| passages(caps, p) - angle).collect(),
+                None => self.solid_angles(points)[..points.len()].to_vec(),
+            }
+        };
+        points.chunks(WIDTH).flat_map(of_eight).collect()
+    }
+
     /// How often a ray upwards leaves the surface's inside, less how often it enters.
     fn passages(&self, point: DVec3) -> i32 {
         let mut sum = 0;
@@ -152,6 +151,67 @@ impl Tree {
             n += 1;
         }
         near.turns() + far / (4.0 * std::f64::consts::PI)
+    }
+
+    /// The same for up to eight points, bit by bit; those after the last one mean nothing.
+    fn solid_angles(&self, points: &[DVec3]) -> [f64; WIDTH] {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") && is_x86_feature_detected!("avx512dq")
+            {
+                // SAFETY: the processor has what it is compiled for.
+                return unsafe { self.solid_angles_avx512(points) };
+            }
+            if is_x86_feature_detected!("avx2") {
+                // SAFETY: as above.
+                return unsafe { self.solid_angles_avx2(points) };
+            }
+        }
+        self.walk(points)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512vl,avx512dq")]
+    fn solid_angles_avx512(&self, points: &[DVec3]) -> [f64; WIDTH] {
+        self.walk(points)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn solid_angles_avx2(&self, points: &[DVec3]) -> [f64; WIDTH] {
+        self.walk(points)
+    }
+
+    /// Each point takes part at the nodes that [`Tree::solid_angle`] would come to for it.
+    #[inline(always)]
+    fn walk(&self, points: &[DVec3]) -> [f64; WIDTH] {
+        let lanes = Lanes::of(points);
+        let mut far = [0.0; WIDTH];
+        let mut near = Angles::default();
+        // For each point the node at which it goes on.
+        let mut from = [u64::MAX; WIDTH];
+        from[..points.len()].fill(0);
+        let mut n = 0;
+        while n < self.nodes.len() {
+            let (node, moments) = (&self.nodes[n], &self.moments[n]);
+            let takes_part = from.map(|from| from <= n as u64);
+            let is_far = moments.add_far(&lanes, takes_part, &mut far);
+            let mut is_near = [false; WIDTH];
+            for l in 0..WIDTH {
+                from[l] = if is_far[l] { u64::from(node.next) } else { from[l] };
+                is_near[l] = takes_part[l] & !is_far[l];
+            }
+            if !is_near.contains(&true) {
+                n = node.next as usize;
+                continue;
+            }
+            for t in self.leaf(node) {
+                near.add(t, &lanes, is_near);
+            }
+            n += 1;
+        }
+        let near = near.turns();
+        std::array::from_fn(|l| near[l] + far[l] / (4.0 * std::f64::consts::PI))
     }
 
     fn leaf(&self, node: &Node) -> &[Corners] {
@@ -242,104 +302,6 @@ fn split(triangles: &[Corners], centres: &[[f32; 3]], order: &mut [u32], first: 
     nodes[number].next = nodes.len() as u32;
 }
 
-impl Moments {
-    fn of(triangles: &[Corners]) -> Self {
-        let parts = triangles.iter().map(|t| {
-            let [a, b, c] = t.map(place);
-            ((a + b + c) / 3.0, (b - a).cross(c - a) / 2.0)
-        });
-        let (mut centre, mut total) = (DVec3::ZERO, 0.0);
-        for (at, area) in parts.clone() {
-            centre += at * area.length();
-            total += area.length();
-        }
-        let centre = if total > 0.0 { centre / total } else { place(triangles[0][0]) };
-        let mut moments = Self { centre, ..Self::default() };
-        for (at, area) in parts {
-            let by = at - centre;
-            moments.dipole += area;
-            let terms = [
-                area.x * by.x,
-                area.y * by.y,
-                area.z * by.z,
-                area.x * by.y + area.y * by.x,
-                area.y * by.z + area.z * by.y,
-                area.z * by.x + area.x * by.z,
-            ];
-            moments.spread.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
-        }
-        let radius = triangles.iter().flatten().map(|p| (place(*p) - centre).length_squared()).fold(0.0, f64::max);
-        moments.far = FAR * FAR * radius;
-        moments
-    }
-
-    /// The solid angle, seen from where the centre lies in direction `to`.
-    fn seen_along(&self, to: DVec3, square: f64) -> f64 {
-        let cube = square * square.sqrt();
-        let [xx, yy, zz, xy, yz, zx] = self.spread;
-        let bent =
-            xx * to.x * to.x + yy * to.y * to.y + zz * to.z * to.z + xy * to.x * to.y + yz * to.y * to.z + zx * to.z * to.x;
-        (self.dipole.dot(to) + (xx + yy + zz) - 3.0 * bent / square) / cube
-    }
-}
-
-/// A sum of half solid angles, as the argument of a product of complex numbers and how often that went round.
-struct Angle {
-    re: f64,
-    im: f64,
-    rounds: f64,
-}
-
-impl Default for Angle {
-    fn default() -> Self {
-        Self { re: 1.0, im: 0.0, rounds: 0.0 }
-    }
-}
-
-impl Angle {
-    /// Adds a triangle as seen from a point.
-    fn add(&mut self, t: &Corners, from: DVec3) {
-        let (a, b, c) = (place(t[0]) - from, place(t[1]) - from, place(t[2]) - from);
-        let (x, y, z) = (a.length(), b.length(), c.length());
-        let (re, mut im) = (x * y * z + a.dot(b) * z + b.dot(c) * x + c.dot(a) * y, a.dot(b.cross(c)));
-        let hardly = 1e-9 * x * y * z;
-        if re.abs() + im.abs() < hardly {
-            // On an edge: half of what the triangle takes up beside one of its inner points.
-            im = hardly * side(t, from);
-        } else if re < 0.0 && im.abs() < hardly {
-            // Hardly off the triangle: which side it is decides by half a turn, and rays must agree with that.
-            im = im.abs().max(1e-9 * hardly) * side(t, from);
-        }
-        let size = re.abs() + im.abs();
-        if size.is_nan() || size <= 0.0 {
-            // The point is a corner.
-            return;
-        }
-        let (re, im) = (re / size, im / size);
-        let product = (self.re * re - self.im * im, self.re * im + self.im * re);
-        if self.im >= 0.0 && im >= 0.0 && product.1 < 0.0 {
-            self.rounds += 1.0;
-        } else if self.im < 0.0 && im < 0.0 && product.1 >= 0.0 {
-            self.rounds -= 1.0;
-        }
-        let size = product.0.abs() + product.1.abs();
-        (self.re, self.im) = (product.0 / size, product.1 / size);
-    }
-
-    /// In full turns, a sphere's solid angle being one.
-    fn turns(&self) -> f64 {
-        self.rounds + argument(self.re, self.im)
-    }
-}
-
-/// 1 from within, −1 from without; a point in a triangle's plane counts as above it, as it does for a ray upwards.
-fn side(t: &Corners, from: DVec3) -> f64 {
-    let at = |p: DVec3| robust::Coord3D { x: p.x, y: p.y, z: p.z };
-    let [a, b, c] = t.map(place);
-    let below = robust::orient3d(at(a), at(b), at(c), at(from));
-    if below != 0.0 { below.signum() } else { -(b - a).cross(c - a).z.signum() }
-}
-
 /// A triangle over every edge of a surface that is not used equally often both ways, with a corner in the middle of the rim that it belongs to:
 /// together with them the surface is closed. O(n log n).
 fn caps(triangles: &[Corners]) -> Vec<Corners> {
@@ -381,27 +343,6 @@ fn caps(triangles: &[Corners]) -> Vec<Corners> {
         [a.coordinates(), b.coordinates(), (sum / count).to_array().map(|x| x as f32)]
     };
     rim.iter().map(&mut cap).collect()
-}
-
-/// The argument of a complex number in turns, from −½ to ½; to some 10⁻¹⁰.
-fn argument(re: f64, im: f64) -> f64 {
-    let (small, large) = if im.abs() > re.abs() { (re.abs(), im.abs()) } else { (im.abs(), re.abs()) };
-    let t = small / large;
-    // Beyond an eighth of a right angle or so, what is left to a quarter of a half turn.
-    let (base, t) = if t > 0.414 { (std::f64::consts::FRAC_PI_4, (t - 1.0) / (t + 1.0)) } else { (0.0, t) };
-    let square = t * t;
-    let series = (0..12).rev().fold(0.0, |sum, k| {
-        let odd = f64::from(2 * k + 1);
-        (if k % 2 == 0 { 1.0 } else { -1.0 }) / odd + square * sum
-    });
-    let mut angle = base + t * series;
-    if im.abs() > re.abs() {
-        angle = std::f64::consts::FRAC_PI_2 - angle;
-    }
-    if re < 0.0 {
-        angle = std::f64::consts::PI - angle;
-    }
-    (if im < 0.0 { -angle } else { angle }) / (2.0 * std::f64::consts::PI)
 }
 
 /// Where a segment crosses a triangle, as a share of its length, and whether it leaves the inside there. Rims count with a little more, lest

@@ -229,17 +229,20 @@ impl State<'_, '_, '_> {
     /// Pairs of triangles as the submesh numbers them, where they are fetched to if need be, with all around them.
     pub(crate) fn in_submesh(&mut self, overlay: &Overlay, pairs: &[[Standing; 2]]) -> Vec<[u32; 2]> {
         self.complete(corners(self.survey, self.work, overlay, pairs));
-        let of_record: HashMap<u32, u32, Hashing> = self
-            .work
-            .living()
-            .filter_map(|t| match self.work.triangles[t as usize].origin {
-                Origin::Input(record) => Some((record, t)),
-                Origin::Part(_) | Origin::Added(_) => None,
-            })
-            .collect();
+        let wanted = pairs.as_flattened().iter().filter_map(|number| overlay.record_of(*number));
+        let mut of_record: HashMap<u32, u32, Hashing> = wanted.map(|record| (record, NONE)).collect();
+        if !of_record.is_empty() {
+            for t in self.work.living() {
+                if let Origin::Input(record) = self.work.triangles[t as usize].origin
+                    && let Some(there) = of_record.get_mut(&record)
+                {
+                    *there = t;
+                }
+            }
+        }
         let triangle = |number: Standing| match overlay.which(number) {
             Which::Submesh(t) => Some(t),
-            Which::Record(record) => of_record.get(&record).copied(),
+            Which::Record(record) => of_record.get(&record).copied().filter(|t| *t != NONE),
         };
         pairs.iter().filter_map(|[a, b]| Some([triangle(*a)?, triangle(*b)?])).collect()
     }
@@ -248,7 +251,7 @@ impl State<'_, '_, '_> {
     pub(crate) fn complete(&mut self, mut positions: Vec<[f32; 3]>) {
         positions.sort_unstable_by_key(|p| Position::of(*p));
         positions.dedup();
-        let known = self.work.by_position();
+        let known = self.work.by_position_of(positions.iter().copied().map(Position::of));
         positions.retain(|p| known.get(&Position::of(*p)).is_none_or(|v| !self.work.complete[*v as usize]));
         if positions.is_empty() {
             return;

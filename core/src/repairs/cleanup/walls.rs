@@ -7,6 +7,7 @@ use super::back_to_back::Pair;
 use crate::geometry::flatness;
 use crate::submesh::edges::{Edge, Edges};
 use crate::submesh::{Submesh, Vertex};
+use crate::util::ids::NONE;
 use glam::DVec3;
 use std::collections::BTreeMap;
 
@@ -29,8 +30,8 @@ struct Side {
 struct Sides<'s> {
     submesh: &'s Submesh,
     edges: &'s Edges,
-    /// By triangle: number of what was found there.
-    number: BTreeMap<u32, u32>,
+    /// By triangle: number of what was found there, if anything was.
+    number: Vec<u32>,
     found: Vec<Option<Side>>,
 }
 
@@ -43,7 +44,7 @@ pub(crate) fn between(submesh: &Submesh, edges: &Edges, changed: Option<&[u32]>,
     };
     starts.sort_unstable();
     starts.dedup();
-    let mut sides = Sides { submesh, edges, number: BTreeMap::new(), found: Vec::new() };
+    let mut sides = Sides { submesh, edges, number: vec![NONE; submesh.triangles.len()], found: Vec::new() };
     let mut walls: BTreeMap<u32, Pair> = BTreeMap::new();
     for t in starts {
         let one = sides.at(t);
@@ -67,11 +68,11 @@ fn is_of_rim(edge: &Edge<'_>) -> bool {
 impl Sides<'_> {
     /// What a triangle is part of.
     fn at(&mut self, t: u32) -> u32 {
-        if let Some(number) = self.number.get(&t) {
-            return *number;
+        if self.number[t as usize] != NONE {
+            return self.number[t as usize];
         }
         let number = self.found.len() as u32;
-        self.number.insert(t, number);
+        self.number[t as usize] = number;
         let (mut triangles, mut rim, mut next) = (vec![t], Vec::new(), 0);
         let mut is_side = true;
         while let Some(t) = triangles.get(next).copied() {
@@ -87,7 +88,7 @@ impl Sides<'_> {
                     [x, y] => {
                         is_side &= x.forward != y.forward;
                         let beyond = if x.triangle == t { y.triangle } else { x.triangle };
-                        if self.number.insert(beyond, number).is_none() {
+                        if std::mem::replace(&mut self.number[beyond as usize], number) == NONE {
                             triangles.push(beyond);
                         }
                     }

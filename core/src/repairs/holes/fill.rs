@@ -6,6 +6,7 @@ mod closing;
 mod creases;
 mod doubts;
 mod judged;
+mod known;
 mod mouth;
 mod opposite;
 mod rims;

@@ -16,6 +16,7 @@ use crate::submesh::components::{Components, Reversed};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 use crate::util::parallel;
+use glam::DVec3;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
@@ -192,15 +193,21 @@ impl Site<'_, '_> {
             let off = self.sheets.list[sheet as usize].bounds.diagonal() * 1e-3;
             // How far winding numbers are from what they may be, as the sheet is and turned, area by area.
             let (mut as_is, mut if_turned) = (0.0, 0.0);
-            for t in corners.iter().step_by(corners.len().div_ceil(LOOKED_AT)) {
-                let [a, b, c] = t.map(place);
-                let vector = (b - a).cross(c - a);
-                let normal = vector.normalize_or_zero();
-                for p in [(a + b + c) / 3.0 + normal * off, (a + b + c) / 3.0 - normal * off] {
-                    let others: f64 = turned.iter().map(|(_, other)| 2.0 * other.winding_number(p)).sum();
-                    let now = tree.winding_number(p) - others;
-                    as_is += vector.length() * from_whole(now);
-                    if_turned += vector.length() * from_whole(now - 2.0 * own.winding_number(p));
+            let looked_at = || corners.iter().step_by(corners.len().div_ceil(LOOKED_AT)).map(|t| t.map(place));
+            let vector = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a);
+            let sides = looked_at().flat_map(|t| {
+                let (middle, off) = ((t[0] + t[1] + t[2]) / 3.0, vector(t).normalize_or_zero() * off);
+                [middle + off, middle - off]
+            });
+            let points: Vec<DVec3> = sides.collect();
+            let [all, alone] = [tree, &own].map(|tree| tree.winding_numbers(&points));
+            let others: Vec<Vec<f64>> = turned.iter().map(|(_, other)| other.winding_numbers(&points)).collect();
+            for (t, first) in looked_at().zip((0..).step_by(2)) {
+                for p in [first, first + 1] {
+                    let others: f64 = others.iter().map(|other| 2.0 * other[p]).sum();
+                    let now = all[p] - others;
+                    as_is += vector(t).length() * from_whole(now);
+                    if_turned += vector(t).length() * from_whole(now - 2.0 * alone[p]);
                 }
             }
             // What makes hardly a difference stays.
@@ -217,19 +224,34 @@ impl Site<'_, '_> {
     /// nothing.
     pub(crate) fn distances(&self, old: &[Corners], old_tree: &Tree, new: &[Corners], cell: f64) -> (f64, f64) {
         let new_tree = Tree::new(new);
-        let from_old = sampled(old, self.threads, |t| {
-            let [a, b, c] = t.map(place);
-            let (middle, normal) = ((a + b + c) / 3.0, (b - a).cross(c - a).normalize_or_zero());
-            let off = normal * (cell / 2.0);
-            [middle, a.lerp(middle, 0.01), b.lerp(middle, 0.01), c.lerp(middle, 0.01)]
-                .into_iter()
-                .filter(|p| old_tree.winding_number(*p + off) <= 0.5 || old_tree.winding_number(*p - off) <= 0.5)
-                .map(|p| new_tree.distance(p))
-                .fold(0.0, f64::max)
+        let from_old = sampled(old, self.threads, |triangles| {
+            let mut places: Vec<(DVec3, DVec3)> = Vec::with_capacity(4 * triangles.len());
+            for [a, b, c] in triangles.iter().map(|t| t.map(place)) {
+                let (middle, normal) = ((a + b + c) / 3.0, (b - a).cross(c - a).normalize_or_zero());
+                let four = [middle, a.lerp(middle, 0.01), b.lerp(middle, 0.01), c.lerp(middle, 0.01)];
+                places.extend(four.map(|p| (p, normal * (cell / 2.0))));
+            }
+            let outside = |sides: Vec<DVec3>| old_tree.winding_numbers(&sides).into_iter().map(|winding| winding <= 0.5);
+            let mut bounds = Vec::with_capacity(places.len());
+            let before = outside(places.iter().map(|(p, off)| *p + *off).collect());
+            let inner: Vec<_> = before
+                .zip(places)
+                .filter_map(|(out, place)| {
+                    if out {
+                        bounds.push(place.0);
+                        None
+                    } else {
+                        Some(place)
+                    }
+                })
+                .collect();
+            let behind = outside(inner.iter().map(|(p, off)| *p - *off).collect());
+            bounds.extend(behind.zip(inner).filter_map(|(out, (p, _))| out.then_some(p)));
+            bounds.into_iter().map(|p| new_tree.distance(p)).fold(0.0, f64::max)
         });
-        let from_new = sampled(new, self.threads, |t| {
-            let [a, b, c] = t.map(place);
-            old_tree.distance((a + b + c) / 3.0).max(old_tree.distance(a))
+        let from_new = sampled(new, self.threads, |triangles| {
+            let far = |[a, b, c]: [DVec3; 3]| old_tree.distance((a + b + c) / 3.0).max(old_tree.distance(a));
+            triangles.iter().map(|t| far(t.map(place))).fold(0.0, f64::max)
         });
         (from_old, from_new)
     }
@@ -256,13 +278,18 @@ fn encloses(triangles: &[Corners], tree: &Tree) -> bool {
     let mut bounds = Bounds::EMPTY;
     triangles.iter().for_each(|t| bounds.include(t));
     let off = bounds.diagonal() * 1e-3;
+    let sampled = || triangles.iter().step_by(triangles.len().div_ceil(SAMPLES).max(1)).map(|t| t.map(place));
+    let vector = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a);
+    let sides = sampled().flat_map(|t| {
+        let (middle, normal) = ((t[0] + t[1] + t[2]) / 3.0, vector(t).normalize_or_zero() * off);
+        [middle + normal, middle - normal]
+    });
+    let windings = tree.winding_numbers(&sides.collect::<Vec<_>>());
     let (mut before, mut behind, mut all) = (0.0, 0.0, 0.0);
-    for t in triangles.iter().step_by(triangles.len().div_ceil(SAMPLES).max(1)) {
-        let [a, b, c] = t.map(place);
-        let (middle, vector) = ((a + b + c) / 3.0, (b - a).cross(c - a));
-        let (normal, area) = (vector.normalize_or_zero() * off, vector.length());
-        before += area * tree.winding_number(middle + normal);
-        behind += area * tree.winding_number(middle - normal);
+    for (t, winding) in sampled().zip(windings.chunks(2)) {
+        let area = vector(t).length();
+        before += area * winding[0];
+        behind += area * winding[1];
         all += area;
     }
     behind >= BEHIND * all && before <= (1.0 - BEHIND) * all
@@ -273,13 +300,14 @@ pub(crate) fn from_whole(winding: f64) -> f64 {
     if winding < 0.0 { -winding } else { (winding - winding.round()).abs() }
 }
 
-/// The largest of `measure` over triangles at even steps through a list.
-pub(crate) fn sampled(triangles: &[Corners], threads: usize, measure: impl Fn(&Corners) -> f64 + Sync) -> f64 {
+/// The largest of `measure` over triangles at even steps through a list, of which it gets some at a time.
+pub(crate) fn sampled(triangles: &[Corners], threads: usize, measure: impl Fn(&[Corners]) -> f64 + Sync) -> f64 {
     const BLOCK: usize = 256;
     let step = triangles.len().div_ceil(SAMPLES).max(1);
     let count = triangles.len().div_ceil(step);
     let blocks = parallel::map(threads, count.div_ceil(BLOCK), |block| {
-        (block * BLOCK..count.min((block + 1) * BLOCK)).map(|i| measure(&triangles[i * step])).fold(0.0, f64::max)
+        let here = block * BLOCK..count.min((block + 1) * BLOCK);
+        measure(&here.map(|i| triangles[i * step]).collect::<Vec<_>>())
     });
     blocks.into_iter().fold(0.0, f64::max)
 }

@@ -38,6 +38,7 @@ use view::State;
 pub(crate) use view::{CellView, Standing};
 
 pub(crate) use lanes::bits;
+pub(crate) use narrow::leave_out_apart;
 
 /// Pairs with common vertices that are gathered before they are decided.
 const NEIGHBOURS: usize = 128;

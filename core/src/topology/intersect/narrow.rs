@@ -127,6 +127,60 @@ impl Sort for Neighbours {
     }
 }
 
+/// Leaves out of some triangles those that are clearly apart from one; the others keep their order.
+pub(crate) fn leave_out_apart(one: &[[f32; 3]; 3], others: &mut Vec<u32>, corners: impl Fn(u32) -> [[f32; 3]; 3]) {
+    // Fewer are decided sooner one by one.
+    const WORTHWHILE: usize = 4;
+    if others.len() < WORTHWHILE {
+        return;
+    }
+    #[cfg(target_arch = "x86_64")]
+    {
+        if has_avx512() {
+            // SAFETY: the processor has what it is compiled for.
+            return unsafe { leave_out_apart_avx512(one, others, corners) };
+        }
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: as above.
+            return unsafe { leave_out_apart_avx2(one, others, corners) };
+        }
+    }
+    leave_out(one, others, corners);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512vl,avx512bw")]
+fn leave_out_apart_avx512(one: &[[f32; 3]; 3], others: &mut Vec<u32>, corners: impl Fn(u32) -> [[f32; 3]; 3]) {
+    leave_out(one, others, corners);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn leave_out_apart_avx2(one: &[[f32; 3]; 3], others: &mut Vec<u32>, corners: impl Fn(u32) -> [[f32; 3]; 3]) {
+    leave_out(one, others, corners);
+}
+
+#[inline(always)]
+fn leave_out(one: &[[f32; 3]; 3], others: &mut Vec<u32>, corners: impl Fn(u32) -> [[f32; 3]; 3]) {
+    let mut block = Block::EMPTY;
+    (0..WIDTH).for_each(|i| block.a.set(i, one));
+    for by_edges in [false, true] {
+        let mut left = 0;
+        for start in (0..others.len()).step_by(WIDTH) {
+            let count = (others.len() - start).min(WIDTH);
+            for (i, other) in others[start..start + count].iter().enumerate() {
+                block.b.set(i, &corners(*other));
+            }
+            let apart = if by_edges { block.apart_by_edges() } else { block.apart_by_planes() };
+            for (i, apart) in apart.into_iter().enumerate().take(count) {
+                others[left] = others[start + i];
+                left += usize::from(!apart);
+            }
+        }
+        others.truncate(left);
+    }
+}
+
 #[cfg(target_arch = "x86_64")]
 fn has_avx512() -> bool {
     is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") && is_x86_feature_detected!("avx512bw")
@@ -286,6 +340,16 @@ mod tests {
             }
             for pair in all.iter().filter(|pair| !pairs.contains(pair)) {
                 prop_assert!(!contact(*pair).is_crossing());
+            }
+            for i in 0..numbers.len() as u32 {
+                let one = view.corners(numbers[i as usize]);
+                let all: Vec<u32> = (0..numbers.len() as u32).filter(|j| *j != i).collect();
+                let mut left = all.clone();
+                leave_out_apart(&one, &mut left, |j| view.corners(numbers[j as usize]));
+                prop_assert!(left.is_sorted());
+                for j in all.into_iter().filter(|j| left.binary_search(j).is_err()) {
+                    prop_assert_eq!(contact([i, j]), Contact::Apart);
+                }
             }
             let mut narrow = all.clone();
             prop_assert_eq!(<[u32; 2]>::sort(&view, &mut narrow), [crossing, unsure]);

@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::algorithms::wrap::angle::argument;
 use crate::testing::{cuboid, reversed};
 
 #[test]
@@ -62,6 +63,31 @@ fn a_segment_leaves_where_it_passes_a_face_outwards() {
 }
 
 proptest! {
+    /// To the last bit, and with each kind of vectors; on whole numbers, where many points are in a triangle's plane or on it.
+    #[test]
+    fn points_together_get_what_each_gets_alone(
+        triangles in prop::collection::vec(prop::array::uniform3(prop::array::uniform3(-5i8..5)), 1..80),
+        points in prop::collection::vec(prop::array::uniform3(-6i8..6), 1..30),
+        scale in prop_oneof![Just(1.0), Just(0.3)],
+    ) {
+        let triangles: Vec<Corners> = triangles.iter().map(|t| t.map(|p| p.map(f32::from))).collect();
+        let points: Vec<DVec3> = points.iter().map(|p| DVec3::from_array(p.map(f64::from)) * scale).collect();
+        let bits = |of: &[f64]| of.iter().map(|w| w.to_bits()).collect::<Vec<_>>();
+        let tree = Tree::winding(&triangles);
+        let alone: Vec<f64> = points.iter().map(|p| tree.winding_number(*p)).collect();
+        prop_assert_eq!(bits(&tree.winding_numbers(&points)), bits(&alone));
+        let plain = Tree::new(&triangles).with_moments();
+        for points in points.chunks(WIDTH) {
+            let alone: Vec<f64> = points.iter().map(|p| plain.solid_angle(*p)).collect();
+            prop_assert_eq!(bits(&plain.walk(points)[..points.len()]), bits(&alone));
+            #[cfg(target_arch = "x86_64")]
+            if is_x86_feature_detected!("avx2") {
+                // SAFETY: the processor has what it is compiled for.
+                prop_assert_eq!(bits(&unsafe { plain.solid_angles_avx2(points) }[..points.len()]), bits(&alone));
+            }
+        }
+    }
+
     /// Far nodes taken together change little, and the nearest triangle is the nearest.
     #[test]
     fn answers_are_those_of_a_plain_loop(

@@ -1,5 +1,6 @@
 //! The loops of a submesh while they are closed: patches that are in, and loops that are open, with the reason.
 
+use super::known::{self, Around, Known};
 use crate::algorithms::extend::{self, Extended};
 use crate::algorithms::triangulate::{self, FillSettings, Rim, Unfillable, strip};
 use crate::contract::report::{LoopLeft, MOST_LISTED};
@@ -61,6 +62,7 @@ pub(crate) struct Closing<'p> {
     pub(crate) may_add: bool,
     pub(crate) rims: Vec<Loop>,
     pub(crate) placed: Vec<Placed>,
+    pub(crate) known: Known,
     /// Loops, by number, and why they are not closed.
     pub(crate) open: Vec<(u32, NotFilled)>,
     /// Triangles that join the rims of islands to those of their holes, ascending.
@@ -110,6 +112,9 @@ pub(crate) fn meets_new_edge(submesh: &Submesh, rim: &Loop, triangles: &[[u32; 3
     })
 }
 
+/// What closes loops of fewer vertices is not kept.
+const KEPT: usize = 8;
+
 /// Vertices of a small one, at most.
 pub(crate) const SMALL: usize = 64;
 
@@ -123,6 +128,7 @@ impl<'p> Closing<'p> {
             may_add,
             rims: Vec::new(),
             placed: Vec::new(),
+            known: Known::default(),
             open: Vec::new(),
             joints: Vec::new(),
             doubts: Vec::new(),
@@ -146,24 +152,41 @@ impl Closing<'_> {
     pub(crate) fn fill(
         &self,
         submesh: &Submesh,
-        rim: u32,
+        number: u32,
         neighbours: Neighbours,
         obstacles: &[tri_tri::Triangle],
     ) -> Result<triangulate::Patch, NotFilled> {
+        self.admission.check(submesh, self.rim(number))?;
+        let around = self.around(submesh, number, neighbours);
+        let close = |around: &Around| self.close(around, obstacles);
+        if obstacles.is_empty() && around.points.len() >= KEPT {
+            return Ok(self.known.closed(number, around, close)?);
+        }
+        Ok(close(&around)?)
+    }
+
+    fn around(&self, submesh: &Submesh, rim: u32, neighbours: Neighbours) -> Around {
         let rim = self.rim(rim);
-        self.admission.check(submesh, rim)?;
-        let points = rim.points(submesh);
-        let apexes = if neighbours == Neighbours::Heeded { rim.apexes(submesh) } else { Vec::new() };
-        let forbidden = |i: u32, j: u32| are_joined(submesh, rim.vertices[i as usize], rim.vertices[j as usize]);
-        let settings = FillSettings { max_vertices: self.max_edges, ..FillSettings::default() };
-        let of_patch = Rim { points: &points, apexes: &apexes, obstacles, forbidden: &forbidden };
-        if neighbours == Neighbours::Heeded
-            && let Some(patch) = holes::folds(submesh, rim).and_then(|folds| strip::zip(&of_patch, folds).ok())
+        let heeded = neighbours == Neighbours::Heeded;
+        Around {
+            points: rim.points(submesh),
+            apexes: if heeded { rim.apexes(submesh) } else { Vec::new() },
+            folds: if heeded { holes::folds(submesh, rim) } else { None },
+            joined: known::joined(submesh, &rim.vertices),
+            max_vertices: self.max_edges,
+        }
+    }
+
+    fn close(&self, around: &Around, obstacles: &[tri_tri::Triangle]) -> Result<triangulate::Patch, Unfillable> {
+        let forbidden = |i: u32, j: u32| around.joined.binary_search(&(i, j)).is_ok();
+        let settings = FillSettings { max_vertices: around.max_vertices, ..FillSettings::default() };
+        let of_patch = Rim { points: &around.points, apexes: &around.apexes, obstacles, forbidden: &forbidden };
+        if let Some(patch) = around.folds.and_then(|folds| strip::zip(&of_patch, folds).ok())
             && !patch.triangles.iter().any(|t| of_patch.meets_obstacle(&of_patch.corners(*t)))
         {
             return Ok(patch);
         }
-        Ok(triangulate::triangulate(&of_patch, &settings)?)
+        triangulate::triangulate(&of_patch, &settings)
     }
 
     /// A patch of planes that meet where the loop's surface is missing, if the loop tells them.

@@ -1,0 +1,91 @@
+//! Boxes in a tree of wide nodes: sixteen are held against another one in a few steps.
+
+use glam::Vec4;
+
+use crate::geometry::sums::Bounds;
+
+/// Boxes of a node.
+const WIDTH: usize = 16;
+
+/// Sixteen boxes; missing ones meet nothing that is finite.
+struct Node {
+    lo: [[Vec4; WIDTH / 4]; 3],
+    hi: [[Vec4; WIDTH / 4]; 3],
+}
+
+/// A box for each lane.
+struct Wanted {
+    lo: [Vec4; 3],
+    hi: [Vec4; 3],
+}
+
+/// Boxes in an order in which those near each other stand together.
+pub(super) struct WideTree {
+    /// Their numbers.
+    order: Vec<u32>,
+    /// Nodes over the boxes, nodes over these, and so on up to one. What node i is over begins at 16 i.
+    levels: Vec<Vec<Node>>,
+}
+
+impl Node {
+    fn of(boxes: &[Bounds]) -> Self {
+        let end = |k: usize, end: fn(&Bounds) -> [f32; 3], none: f32| {
+            let lane = |l: usize| boxes.get(l).map_or(none, |b| end(b)[k]);
+            std::array::from_fn(|q| Vec4::from_array(std::array::from_fn(|l| lane(4 * q + l))))
+        };
+        Self {
+            lo: std::array::from_fn(|k| end(k, |b| b.lo, f32::INFINITY)),
+            hi: std::array::from_fn(|k| end(k, |b| b.hi, f32::NEG_INFINITY)),
+        }
+    }
+
+    /// Which meet a box, a bit each.
+    #[inline(always)]
+    fn meeting(&self, wanted: &Wanted) -> u32 {
+        let mut lanes = 0;
+        for q in 0..WIDTH / 4 {
+            let along = |k: usize| self.lo[k][q].cmple(wanted.hi[k]) & self.hi[k][q].cmpge(wanted.lo[k]);
+            lanes |= (along(0) & along(1) & along(2)).bitmask() << (4 * q);
+        }
+        lanes
+    }
+}
+
+impl WideTree {
+    pub(super) fn new(order: Vec<u32>, boxes: &[Bounds]) -> Self {
+        let mut below: Vec<Bounds> = order.iter().map(|i| boxes[*i as usize]).collect();
+        let mut levels = Vec::new();
+        while !below.is_empty() {
+            levels.push(below.chunks(WIDTH).map(Node::of).collect());
+            let whole = |boxes: &[Bounds]| {
+                let mut whole = Bounds::EMPTY;
+                boxes.iter().for_each(|b| whole.add(b));
+                whole
+            };
+            below = if below.len() <= WIDTH { Vec::new() } else { below.chunks(WIDTH).map(whole).collect() };
+        }
+        Self { order, levels }
+    }
+
+    /// Visits the numbers of all boxes that meet `wanted`, in an order that is not to be relied on.
+    pub(super) fn each_meeting(&self, wanted: &Bounds, mut visit: impl FnMut(u32)) {
+        let wanted = Wanted { lo: wanted.lo.map(Vec4::splat), hi: wanted.hi.map(Vec4::splat) };
+        if let Some(top) = self.levels.len().checked_sub(1) {
+            self.descend((top, 0), &wanted, &mut visit);
+        }
+    }
+
+    /// As deep as there are levels.
+    fn descend(&self, (level, node): (usize, usize), wanted: &Wanted, visit: &mut impl FnMut(u32)) {
+        let mut lanes = self.levels[level][node].meeting(wanted);
+        while lanes != 0 {
+            let below = node * WIDTH + lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            if level > 0 {
+                self.descend((level - 1, below), wanted, visit);
+            } else if let Some(number) = self.order.get(below) {
+                visit(*number);
+            }
+        }
+    }
+}

@@ -6,6 +6,7 @@
 
 use crate::contract::report::SelfIntersections;
 use crate::detect::difference::Difference;
+use crate::geometry::askew::Askew;
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::grid::Grid;
 use crate::geometry::position::canonical;
@@ -66,6 +67,7 @@ struct Solid {
     place: u32,
     corners: Corners,
     bounds: Bounds,
+    askew: Askew,
 }
 
 impl Solid {
@@ -73,7 +75,12 @@ impl Solid {
         let corners = corners.map(canonical);
         let [a, b, c] = &corners;
         // Two equal corners are collinear with any third.
-        (!crate::geometry::collinear::is_collinear(a, b, c)).then(|| Self { place, corners, bounds: Bounds::of(&corners) })
+        (!crate::geometry::collinear::is_collinear(a, b, c)).then(|| Self {
+            place,
+            corners,
+            bounds: Bounds::of(&corners),
+            askew: Askew::of(&corners),
+        })
     }
 }
 
@@ -169,6 +176,10 @@ impl Found {
             return;
         }
         self.tested += 1;
+        // Most long triangles of a patch that lie in each other's boxes.
+        if one.askew.is_apart(&other.askew) {
+            return;
+        }
         if let Some(contact) = meets(&one.corners, &other.corners) {
             self.pairs.push(Pair { triangles: [one.place, other.place], contact });
         }

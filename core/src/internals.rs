@@ -15,6 +15,7 @@ use crate::stream::budget::{Budget, Loan};
 use crate::stream::members::Members;
 use crate::stream::plan::{ChunkId, Plan};
 use crate::topology::chunk::Scratch;
+use crate::topology::intersect::Effort;
 use crate::topology::vertex_table::{BATCH, Weld};
 
 /// A triangle by the positions of its corners.
@@ -119,7 +120,7 @@ impl Mesh {
                 let cell = self.plan.home_box(chunk);
                 let loan = Loan::of(&budget);
                 black_box(scratch.solve(seen, cell, &self.measure, &[], &loan));
-                scratch.cross(visitors, cell, u64::MAX, &loan).tested
+                scratch.cross(visitors, cell, Effort::ALL, &loan).tested
             },
         );
         tested.into_iter().sum()

@@ -6,6 +6,7 @@
 //! **Promise:** what decides validity is exact; rounding only ever ranks. Nothing here knows a file or a mesh.
 
 pub(crate) mod arrange;
+pub(crate) mod askew;
 pub(crate) mod boxes;
 pub(crate) mod collinear;
 pub(crate) mod distance;

@@ -46,6 +46,11 @@ impl Budget {
         tables.saturating_add(surface).saturating_add(seams.max(defects))
     }
 
+    /// Bytes that may still be taken.
+    pub(crate) fn left(&self) -> u64 {
+        self.limit.saturating_sub(self.total())
+    }
+
     pub(crate) fn is_exceeded(&self) -> bool {
         self.total() > self.limit
     }

@@ -14,7 +14,7 @@ use crate::stream::budget::{Budget, Loan, Purpose};
 use crate::stream::plan::HomeBox;
 use crate::stream::source::{Seen, Source, Triangle};
 use crate::topology::crossings::Crossings;
-use crate::topology::intersect::{self, CellView, Finder, Standing};
+use crate::topology::intersect::{self, CellView, Effort, Finder, Standing};
 use crate::topology::labels::{LabelWriter, Labels};
 use crate::topology::region_sums::{RegionSums, Sum};
 use crate::topology::room::Room;
@@ -94,7 +94,7 @@ impl ChunkTopology {
         // Copied when they are merged; of irregular triangles, one more list is kept.
         let seams =
             size_of::<Link>() * self.links.capacity() + size_of::<IrregularTriangle>() * self.irregular_triangles.capacity();
-        budget.take(Purpose::Seams, 2 * (seams as u64 + self.crossings.heap_bytes()));
+        budget.take(Purpose::Seams, 2 * seams as u64 + self.crossings.seam_bytes());
         budget.take(
             Purpose::Defects,
             crate::stream::budget::submesh_bytes(self.irregular_triangles.len() as u64, self.irregular_triangle_vertices),
@@ -193,9 +193,9 @@ impl Scratch {
         self.collect(measure, total)
     }
 
-    /// Finds the self-intersections that the chunk owns, after it was solved; counts little more than `allowance` pairs. The
+    /// Finds the self-intersections that the chunk owns, after it was solved; counts little more pairs than `effort` allows. The
     /// `visitors` are added to its triangles.
-    pub(crate) fn cross(&mut self, visitors: &Seen<'_>, cell: HomeBox, allowance: u64, loan: &Loan<'_>) -> Crossings {
+    pub(crate) fn cross(&mut self, visitors: &Seen<'_>, cell: HomeBox, effort: Effort, loan: &Loan<'_>) -> Crossings {
         visitors.for_each(|number, triangle| {
             if !self.room.is_starved() {
                 self.numbers.push(number);
@@ -224,7 +224,7 @@ impl Scratch {
         self.hit.clear();
         self.hit.resize(self.triangles.len().div_ceil(64), 0);
         let mut crossings = Crossings::default();
-        let tested = self.finder.pairs(&view, allowance, |some, others, contact| {
+        let tested = self.finder.pairs(&view, effort, |some, others, contact| {
             crossings.add(some, others, &self.numbers, contact);
             // Of those of the same vertices the first.
             for t in [some.first(), others.first()].into_iter().flatten() {

@@ -18,6 +18,12 @@ pub(crate) fn most_tested(triangles: u64) -> u64 {
     (1 << 30) + 16 * triangles
 }
 
+/// Candidate pairs after which boxes are said to select badly: what was found until then is dropped, and the search begins anew with
+/// [slabs](crate::topology::intersect) beside the boxes, which select fewer. So what is found does not depend on this number.
+pub(crate) fn many_tested(triangles: u64) -> u64 {
+    (1 << 22) + 16 * triangles
+}
+
 /// Most pairs of a file that are kept for the second look, of twelve bytes each.
 const MOST_KEPT: usize = 1 << 20;
 
@@ -45,9 +51,9 @@ pub(crate) struct Crossings {
 }
 
 impl Crossings {
-    /// Bytes held.
-    pub(crate) fn heap_bytes(&self) -> u64 {
-        4 * self.across.capacity() as u64 + (size_of::<Pair>() * self.pairs.capacity()) as u64
+    /// Bytes held, and as many in the merge.
+    pub(crate) fn seam_bytes(&self) -> u64 {
+        2 * (4 * self.across.capacity() as u64 + (size_of::<Pair>() * self.pairs.capacity()) as u64)
     }
 
     /// Notes the pairs of one of `some` triangles with one of `others`, or if there are none of these, of each two of the first; both

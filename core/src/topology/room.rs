@@ -21,6 +21,11 @@ pub(crate) fn scratch_bytes(members: u64) -> u64 {
     members * (4 + 12 + star::BYTES_PER_TRIANGLE + intersect::BYTES_PER_TRIANGLE) + expected_vertices(members) * BYTES_PER_VERTEX
 }
 
+/// Bytes that it needs beside these for slabs, where boxes select badly.
+pub(crate) fn askew_bytes(members: u64) -> u64 {
+    members * intersect::SLAB_BYTES_PER_TRIANGLE
+}
+
 /// Vertices that memory was counted for, by one worker.
 #[derive(Default)]
 pub(crate) struct Room {

@@ -8,8 +8,12 @@ use crate::io::read_ahead::Guide;
 use crate::io::record::Record;
 use crate::stream::budget::{Budget, Loan, Purpose};
 use crate::stream::members::Members;
+use crate::stream::plan::HomeBox;
 use crate::stream::plan::{ChunkId, Plan};
+use crate::stream::source::Seen;
 use crate::topology::chunk::{self, ChunkTopology, Scratch};
+use crate::topology::crossings::{self, Crossings};
+use crate::topology::intersect::Effort;
 use crate::topology::room;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -59,9 +63,77 @@ impl Solving<'_, '_> {
         self.progress.cancelled() || self.budget.is_exceeded()
     }
 
-    /// All chunks, with the self-intersections that they own if `most_tested` says how many pairs may be tested for that; `None` if more than
-    /// `most_irregular` corners are not regular, in which case little of the work is done.
-    pub(crate) fn all(&self, most_tested: Option<u64>, most_irregular: Option<u64>) -> Result<Option<Vec<ChunkTopology>>> {
+    /// All chunks, with the self-intersections that they own if these are looked for; `None` if more than `most_irregular` corners are not regular, in
+    /// which case little of the work is done.
+    pub(crate) fn all(&self, self_intersections: bool, most_irregular: Option<u64>) -> Result<Option<Vec<ChunkTopology>>> {
+        let triangles = self.records.len() as u64;
+        if !self_intersections {
+            return self.each(None, most_irregular);
+        }
+        let many = crossings::many_tested(triangles);
+        let Some(mut chunks) = self.each(Some(many), most_irregular)? else { return Ok(None) };
+        if chunks.iter().map(|c| c.crossings.tested).fold(0, u64::saturating_add) > many {
+            self.cross_askew(&mut chunks, crossings::most_tested(triangles))?;
+        }
+        Ok(Some(chunks))
+    }
+
+    /// Looks for the self-intersections once more, where boxes select badly.
+    fn cross_askew(&self, chunks: &mut [ChunkTopology], most_tested: u64) -> Result<()> {
+        let _span = tracing::debug_span!("askew").entered();
+        for chunk in chunks.iter_mut() {
+            self.budget.give_back(Purpose::Seams, std::mem::take(&mut chunk.crossings).seam_bytes());
+        }
+        let more = Tables::fitting(&Tables::counts(self.members, self.plan), self.budget, self.threads, room::askew_bytes);
+        self.budget.take(Purpose::Tables, more.bytes);
+        self.budget.check(self.path, || "many triangles lie askew in each other's boxes".into())?;
+        let [tested, kept] = [const { AtomicU64::new(0) }; 2];
+        let loan = Loan::of(self.budget);
+        let crossings = self.members.each(
+            (self.records, self.guide, self.plan),
+            more.threads,
+            |_| true,
+            Scratch::default,
+            |scratch, chunk, seen, visitors| {
+                if self.is_given_up() {
+                    return Crossings::default();
+                }
+                let cell = self.plan.home_box(chunk);
+                scratch.solve(seen, cell, self.measure, &[], &loan);
+                let crossings = Self::cross(
+                    scratch,
+                    (visitors, cell, &loan),
+                    Effort { allowance: most_tested, askew: true },
+                    [&tested, &kept],
+                );
+                self.budget.take(Purpose::Seams, crossings.seam_bytes());
+                crossings
+            },
+        );
+        let found = Found::new(0, 0);
+        chunks.iter().for_each(|chunk| found.add(chunk));
+        self.check(found, &loan)?;
+        self.budget.give_back(Purpose::Tables, more.bytes);
+        chunks.iter_mut().zip(crossings).for_each(|(chunk, crossings)| chunk.crossings = crossings);
+        Ok(())
+    }
+
+    /// The self-intersections that a solved chunk owns, if all chunks did not count too many pairs yet.
+    fn cross(
+        scratch: &mut Scratch,
+        (visitors, cell, loan): (&Seen<'_>, HomeBox, &Loan<'_>),
+        effort: Effort,
+        [tested, kept]: [&AtomicU64; 2],
+    ) -> Crossings {
+        let allowance = effort.allowance.checked_sub(tested.load(Ordering::Relaxed));
+        let Some(allowance) = allowance else { return Crossings::default() };
+        let mut crossings = scratch.cross(visitors, cell, Effort { allowance, ..effort }, loan);
+        tested.fetch_add(crossings.tested, Ordering::Relaxed);
+        crossings.keep(kept);
+        crossings
+    }
+
+    fn each(&self, many_tested: Option<u64>, most_irregular: Option<u64>) -> Result<Option<Vec<ChunkTopology>>> {
         let (found, [done, tested, kept]) = (Found::new(0, 0), [const { AtomicU64::new(0) }; 3]);
         let all = self.records.len() as u64;
         let loan = Loan::of(self.budget);
@@ -82,11 +154,9 @@ impl Solving<'_, '_> {
                     found.add(&topology);
                     return ChunkTopology::default();
                 }
-                if let Some(most_tested) = most_tested {
-                    let allowance = most_tested.saturating_sub(tested.load(Ordering::Relaxed));
-                    topology.crossings = scratch.cross(visitors, cell, allowance, &loan);
-                    tested.fetch_add(topology.crossings.tested, Ordering::Relaxed);
-                    topology.crossings.keep(&kept);
+                if let Some(allowance) = many_tested {
+                    let effort = Effort { allowance, askew: false };
+                    topology.crossings = Self::cross(scratch, (visitors, cell, &loan), effort, [&tested, &kept]);
                 }
                 found.add(&topology);
                 topology.take(self.budget);
@@ -173,7 +243,31 @@ fn refuse_more_than(path: &Path, most: u64, there: u64, what: &str) -> Result<()
     Err(Error::Refused { path: path.into(), reason: format!("{there} {what}"), advice })
 }
 
-/// Takes what is known to be needed for chunks, and for so many triangles that are `nonfinite`, before the chunks are solved; returns how much of it is free again once they are.
+/// Tables for chunks, one set a thread: bytes, and threads that they are for.
+pub(crate) struct Tables {
+    pub(crate) bytes: u64,
+    pub(crate) threads: usize,
+}
+
+impl Tables {
+    /// Members and visitors of each chunk, most first.
+    fn counts(members: &Members, plan: &Plan) -> Vec<u64> {
+        let mut counts: Vec<u64> = (0..plan.chunks()).map(|c| members.count(ChunkId(c as u32))).collect();
+        counts.sort_unstable_by(|a, b| b.cmp(a));
+        counts
+    }
+
+    /// For as many threads, up to `threads`, as three quarters of the budget have room for, and for one at least; `each` tells the bytes for so many
+    /// triangles. A thread's tables are as large as its largest chunk, and no two threads work on the same one.
+    fn fitting(counts: &[u64], budget: &Budget, threads: usize, each: impl Fn(u64) -> u64) -> Self {
+        let of = |threads: usize| Self { bytes: counts.iter().take(threads).map(|n| each(*n)).sum(), threads };
+        let fits = |tables: &Self| tables.bytes <= budget.left() / 4 * 3;
+        (2..=threads).rev().map(of).find(fits).unwrap_or_else(|| of(1))
+    }
+}
+
+/// Takes what is known to be needed for chunks, and for so many triangles that are `nonfinite`, before the chunks are solved; returns how much of it is
+/// free again once they are, and the threads that may solve them.
 pub(crate) fn take_tables(
     path: &Path,
     budget: &Budget,
@@ -181,15 +275,30 @@ pub(crate) fn take_tables(
     members: &Members,
     nonfinite: u64,
     limits: &Limits,
-) -> Result<u64> {
-    let mut counts: Vec<u64> = (0..plan.chunks()).map(|c| members.count(ChunkId(c as u32))).collect();
-    counts.sort_unstable_by(|a, b| b.cmp(a));
-    // A thread's tables are as large as its largest chunk, and no two threads work on the same one.
-    let scratch = counts.iter().take(limits.threads).map(|n| room::scratch_bytes(*n)).sum::<u64>();
-    budget.take(Purpose::Tables, scratch + members.heap_bytes(limits.threads) + plan.heap_bytes());
+) -> Result<Tables> {
+    let counts = Tables::counts(members, plan);
+    budget.take(Purpose::Tables, members.heap_bytes(limits.threads) + plan.heap_bytes());
+    let tables = Tables::fitting(&counts, budget, limits.threads, room::scratch_bytes);
+    budget.take(Purpose::Tables, tables.bytes);
     let largest = counts.first().copied().unwrap_or(0);
     budget.check(path, || format!("the largest chunk holds {largest} triangles"))?;
     budget.take(Purpose::Defects, nonfinite * crate::stream::budget::BYTES_PER_NONFINITE);
     budget.check(path, || format!("{nonfinite} triangles have coordinates that are no finite numbers"))?;
-    Ok(scratch)
+    Ok(tables)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fewer_threads_solve_what_does_not_fit_many_times() {
+        let threads = |budget: u64, threads: usize| Tables::fitting(&[100, 90, 10], &Budget::new(budget), threads, |n| n).threads;
+        assert_eq!([threads(1000, 1), threads(1000, 3), threads(1000, 8)], [1, 3, 8]);
+        assert_eq!([threads(260, 2), threads(260, 3), threads(250, 2)], [2, 2, 1], "three quarters");
+        assert_eq!([threads(50, 2), threads(50, 1)], [1, 1], "too little for one is another's to refuse");
+        let budget = Budget::new(1000);
+        budget.take(Purpose::Tables, 800);
+        assert_eq!(Tables::fitting(&[100, 90], &budget, 2, |n| n).bytes, 100, "of what is left");
+    }
 }

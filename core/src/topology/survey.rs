@@ -3,7 +3,7 @@
 //! What comes out does not depend on the chunks: the irregular triangles (all triangles around irregular vertices), and the regions of regular
 //! surface, numbered by their smallest triangle. Everything global is proportional to the seams and the defects, not to the file.
 
-use crate::topology::solving::{Solving, at_home, count_of, take_tables};
+use crate::topology::solving::{Solving, Tables, at_home, count_of, take_tables};
 use std::path::Path;
 
 use crate::contract::error::Result;
@@ -125,14 +125,12 @@ impl<'a> Survey<'a> {
         let members = Members::gather(path, (records, &guide), &plan, visitors, limits, progress)?;
         drop(span);
         let mut survey = Self::unsolved(records, guide, plan, members, limits);
-        let scratch = survey.take_tables(path, &survey.budget, limits)?;
-        let most_tested = self_intersections.then(|| crossings::most_tested(records.len() as u64));
+        let tables = survey.take_tables(path, &survey.budget, limits)?;
         let _span = tracing::debug_span!("chunks", count = survey.plan.chunks()).entered();
-        let Some(chunks) = survey.solving(path, &survey.budget, progress).all(most_tested, most_irregular)? else {
-            return Ok((survey, false));
-        };
-        survey.budget.give_back(Purpose::Tables, scratch);
-        survey.merge(chunks, most_tested);
+        let solving = survey.solving(path, (&survey.budget, tables.threads), progress);
+        let Some(chunks) = solving.all(self_intersections, most_irregular)? else { return Ok((survey, false)) };
+        survey.budget.give_back(Purpose::Tables, tables.bytes);
+        survey.merge(chunks, self_intersections);
         Ok((survey, true))
     }
 
@@ -169,15 +167,20 @@ impl<'a> Survey<'a> {
         }
     }
 
-    /// Takes from the budget what is needed before chunks are solved; returns how much of it is free again once they are.
-    fn take_tables(&self, path: &Path, budget: &Budget, limits: &Limits) -> Result<u64> {
+    /// Takes from the budget what is needed before chunks are solved.
+    fn take_tables(&self, path: &Path, budget: &Budget, limits: &Limits) -> Result<Tables> {
         // A copy of the file and its digest may be in the making.
         let beside = write_behind::most_dirty(limits) + digest::heap_bytes(size_of_val(self.records) as u64);
         budget.take(Purpose::Tables, beside);
         take_tables(path, budget, &self.plan, &self.members, count_of(&self.nonfinite), limits)
     }
 
-    fn solving<'s>(&'s self, path: &'s Path, budget: &'s Budget, progress: &'s dyn Progress) -> Solving<'s, 'a> {
+    fn solving<'s>(
+        &'s self,
+        path: &'s Path,
+        (budget, threads): (&'s Budget, usize),
+        progress: &'s dyn Progress,
+    ) -> Solving<'s, 'a> {
         Solving {
             path,
             records: self.records,
@@ -186,13 +189,13 @@ impl<'a> Survey<'a> {
             members: &self.members,
             measure: &self.measure,
             budget,
-            threads: self.threads,
+            threads,
             progress,
         }
     }
 
-    /// Takes in what all chunks found. `most_tested`: pairs that might be tested for self-intersection, if these were looked for.
-    fn merge(&mut self, mut chunks: Vec<ChunkTopology>, most_tested: Option<u64>) {
+    /// Takes in what all chunks found, of self-intersections if these were looked for.
+    fn merge(&mut self, mut chunks: Vec<ChunkTopology>, self_intersections: bool) {
         let span = tracing::debug_span!("merge").entered();
         let mut fresh: Vec<(ChunkId, &mut ChunkTopology)> = (0..).map(ChunkId).zip(&mut chunks).collect();
         let known = (self.records, &self.measure);
@@ -200,7 +203,11 @@ impl<'a> Survey<'a> {
         (self.regions, self.merged) = self.parts.united();
         self.irregular_triangle_regions = self.parts.regions_of(&self.irregular_triangles, &self.merged);
         drop(span);
-        (self.self_intersections, self.crossing_pairs) = summed_crossings(&mut chunks, most_tested);
+        if self_intersections {
+            let parts = chunks.iter_mut().map(|c| std::mem::take(&mut c.crossings));
+            let (summed, pairs) = Crossings::sum(parts, crossings::most_tested(self.records.len() as u64));
+            (self.self_intersections, self.crossing_pairs) = (Some(summed), pairs);
+        }
         self.vertices = chunks.iter().map(|c| c.vertices).sum();
         self.vertices_used = chunks.iter().map(|c| c.vertices_used).sum();
         self.reaches = chunks.iter().map(|c| c.reach).collect();
@@ -219,7 +226,7 @@ impl<'a> Survey<'a> {
     ) -> Result<Division> {
         let _span = tracing::debug_span!("divide", positions = positions.len()).entered();
         let budget = Budget::new(limits.memory_bytes);
-        self.take_tables(path, &budget, limits)?;
+        let threads = self.take_tables(path, &budget, limits)?.threads;
         let fetched = self.beyond_the_submesh(positions);
         let all: Vec<[f32; 3]> = self.promoted.iter().chain(positions).copied().collect();
         let mut is_cut = vec![false; self.plan.chunks()];
@@ -229,8 +236,11 @@ impl<'a> Survey<'a> {
         let kept = (0..self.plan.chunks()).filter(|c| !is_fresh[*c]);
         self.parts.take(&budget, kept.clone().map(|c| &self.labels[c]), self.irregular_triangles.len() as u64);
         let regions = kept.map(|c| self.parts.of_chunk(ChunkId(c as u32)).len() as u64).sum();
-        let mut solved =
-            self.solving(path, &budget, progress).again(&is_fresh, &by_home, [self.irregular_triangles.len() as u64, regions])?;
+        let mut solved = self.solving(path, (&budget, threads), progress).again(
+            &is_fresh,
+            &by_home,
+            [self.irregular_triangles.len() as u64, regions],
+        )?;
         let irregular = self.irregular();
         let mut fresh: Vec<(ChunkId, &mut ChunkTopology)> =
             solved.iter_mut().map(|(chunk, topology)| (*chunk, topology)).collect();
@@ -451,13 +461,6 @@ impl<'a> Survey<'a> {
         all.retain(|(s, _)| self.irregular_triangles.binary_search_by_key(&s.triangle, |t| t.triangle).is_err());
         all
     }
-}
-
-/// What all chunks found of self-intersections; nothing if they were not looked for.
-fn summed_crossings(chunks: &mut [ChunkTopology], most_tested: Option<u64>) -> (Option<SelfIntersections>, Option<Vec<Pair>>) {
-    let Some(most_tested) = most_tested else { return (None, None) };
-    let (summed, pairs) = Crossings::sum(chunks.iter_mut().map(|c| std::mem::take(&mut c.crossings)), most_tested);
-    (Some(summed), pairs)
 }
 
 #[cfg(test)]

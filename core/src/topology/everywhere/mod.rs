@@ -62,10 +62,10 @@ pub(crate) fn look(path: &Path, records: &[Record], limits: &Limits, progress: &
     let plan = Plan::new(records, &guide, limits.chunk_triangles);
     let members = Members::gather(path, (records, &guide), &plan, None, limits, progress)?;
     let budget = Budget::new(limits.memory_bytes);
-    solving::take_tables(path, &budget, &plan, &members, 0, limits)?;
+    let tables = solving::take_tables(path, &budget, &plan, &members, 0, limits)?;
     // Two bits a triangle.
     budget.take(Purpose::Surface, records.len() as u64 / 4);
-    let stream = Stream { records, guide: &guide, plan: &plan, members: &members, threads: limits.threads };
+    let stream = Stream { records, guide: &guide, plan: &plan, members: &members, threads: tables.threads };
     let mut chunks = stream.pieces(&budget, progress);
     if progress.cancelled() {
         return Err(Error::cancelled(path, STAGE));

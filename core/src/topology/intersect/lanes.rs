@@ -64,19 +64,22 @@ impl Triangles {
     }
 }
 
-/// Sixteen boxes; missing ones overlap nothing.
+/// The ends of sixteen bodies along some directions; missing ones overlap nothing.
 #[derive(Clone, Copy)]
-pub(super) struct Boxes {
-    pub(super) lo: [Line; 3],
-    pub(super) hi: [Line; 3],
+pub(super) struct Ends<const N: usize> {
+    pub(super) lo: [Line; N],
+    pub(super) hi: [Line; N],
 }
 
-impl Boxes {
-    pub(super) const EMPTY: Self = Self { lo: [Line([f32::INFINITY; WIDTH]); 3], hi: [Line([f32::NEG_INFINITY; WIDTH]); 3] };
+/// Sixteen boxes.
+pub(super) type Boxes = Ends<3>;
+
+impl<const N: usize> Ends<N> {
+    pub(super) const EMPTY: Self = Self { lo: [Line([f32::INFINITY; WIDTH]); N], hi: [Line([f32::NEG_INFINITY; WIDTH]); N] };
 
     #[inline(always)]
-    pub(super) fn set(&mut self, i: usize, lo: [f32; 3], hi: [f32; 3]) {
-        for k in 0..3 {
+    pub(super) fn set(&mut self, i: usize, lo: [f32; N], hi: [f32; N]) {
+        for k in 0..N {
             self.lo[k].0[i] = lo[k];
             self.hi[k].0[i] = hi[k];
         }
@@ -87,6 +90,19 @@ impl Boxes {
         self.lo[0].0[i] <= self.hi[0].0[i]
     }
 
+    /// The ends of all lanes together.
+    pub(super) fn bounds(&self) -> ([f32; N], [f32; N]) {
+        let (mut lo, mut hi) = ([0.0; N], [0.0; N]);
+        for k in 0..N {
+            let ([a, b, c, d], [e, f, g, h]) = (self.lo[k].quarters(), self.hi[k].quarters());
+            lo[k] = a.min(b).min(c.min(d)).min_element();
+            hi[k] = e.max(f).max(g.max(h)).max_element();
+        }
+        (lo, hi)
+    }
+}
+
+impl Boxes {
     /// Lowest corner of one box.
     #[inline(always)]
     pub(super) fn lo(&self, i: usize) -> [f32; 3] {
@@ -97,17 +113,6 @@ impl Boxes {
     #[inline(always)]
     pub(super) fn hi(&self, i: usize) -> [f32; 3] {
         [self.hi[0].0[i], self.hi[1].0[i], self.hi[2].0[i]]
-    }
-
-    /// The box of all lanes.
-    pub(super) fn bounds(&self) -> ([f32; 3], [f32; 3]) {
-        let (mut lo, mut hi) = ([0.0; 3], [0.0; 3]);
-        for k in 0..3 {
-            let ([a, b, c, d], [e, f, g, h]) = (self.lo[k].quarters(), self.hi[k].quarters());
-            lo[k] = a.min(b).min(c.min(d)).min_element();
-            hi[k] = e.max(f).max(g.max(h)).max_element();
-        }
-        (lo, hi)
     }
 }
 
@@ -166,8 +171,8 @@ impl Default for Pairs {
 
 /// How sixteen lanes are compared.
 pub(super) trait Lanes: Copy {
-    /// The lanes of `boxes` that overlap lane `i` of `of`: on each axis each begins before the other ends.
-    fn overlapping(self, boxes: &Boxes, of: &Boxes, i: usize) -> u32;
+    /// The lanes of `ends` that overlap lane `i` of `of`: along each direction each begins before the other ends.
+    fn overlapping<const N: usize>(self, ends: &Ends<N>, of: &Ends<N>, i: usize) -> u32;
 
     /// The lanes of `corners` that have a vertex of lane `i` of `of`.
     fn sharing(self, corners: &Corners, of: &Corners, i: usize) -> u32;
@@ -182,10 +187,10 @@ pub(super) struct Fours;
 
 impl Lanes for Fours {
     #[inline(always)]
-    fn overlapping(self, boxes: &Boxes, of: &Boxes, i: usize) -> u32 {
+    fn overlapping<const N: usize>(self, ends: &Ends<N>, of: &Ends<N>, i: usize) -> u32 {
         let mut found = [!0_u32; 4];
-        for k in 0..3 {
-            let (begins, ends) = (boxes.lo[k].quarters(), boxes.hi[k].quarters());
+        for k in 0..N {
+            let (begins, ends) = (ends.lo[k].quarters(), ends.hi[k].quarters());
             let (lo, hi) = (Vec4::splat(of.lo[k].0[i]), Vec4::splat(of.hi[k].0[i]));
             for quarter in 0..4 {
                 found[quarter] &= (begins[quarter].cmplt(hi) & ends[quarter].cmpgt(lo)).bitmask();
@@ -224,7 +229,7 @@ pub(super) use wide::{Eights, Sixteens};
 mod wide {
     use std::arch::x86_64::*;
 
-    use super::{Boxes, Corners, Fours, Lanes, Line, Pairs, WIDTH};
+    use super::{Corners, Ends, Fours, Lanes, Line, Pairs, WIDTH};
 
     /// Vectors of eight; there is one only where the processor has AVX2. To be used in functions compiled for it.
     #[derive(Clone, Copy)]
@@ -244,14 +249,14 @@ mod wide {
 
     impl Lanes for Eights {
         #[inline(always)]
-        fn overlapping(self, boxes: &Boxes, of: &Boxes, i: usize) -> u32 {
+        fn overlapping<const N: usize>(self, ends: &Ends<N>, of: &Ends<N>, i: usize) -> u32 {
             let mut found = [0; 2];
             for (half, found) in found.iter_mut().enumerate() {
                 // SAFETY: AVX is there.
                 unsafe {
                     let mut all = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
-                    for k in 0..3 {
-                        let (begins, ends) = (self.halves(&boxes.lo[k])[half], self.halves(&boxes.hi[k])[half]);
+                    for k in 0..N {
+                        let (begins, ends) = (self.halves(&ends.lo[k])[half], self.halves(&ends.hi[k])[half]);
                         let (lo, hi) = (_mm256_set1_ps(of.lo[k].0[i]), _mm256_set1_ps(of.hi[k].0[i]));
                         all = _mm256_and_ps(all, _mm256_cmp_ps::<_CMP_LT_OQ>(begins, hi));
                         all = _mm256_and_ps(all, _mm256_cmp_ps::<_CMP_GT_OQ>(ends, lo));
@@ -307,14 +312,14 @@ mod wide {
 
     impl Lanes for Sixteens {
         #[inline(always)]
-        fn overlapping(self, boxes: &Boxes, of: &Boxes, i: usize) -> u32 {
+        fn overlapping<const N: usize>(self, ends: &Ends<N>, of: &Ends<N>, i: usize) -> u32 {
             let (mut below, mut above) = (!0, !0);
-            for k in 0..3 {
+            for k in 0..N {
                 // SAFETY: AVX-512 is there.
                 unsafe {
                     let (lo, hi) = (_mm512_set1_ps(of.lo[k].0[i]), _mm512_set1_ps(of.hi[k].0[i]));
-                    below = _mm512_mask_cmp_ps_mask::<_CMP_LT_OQ>(below, self.line(&boxes.lo[k]), hi);
-                    above = _mm512_mask_cmp_ps_mask::<_CMP_GT_OQ>(above, self.line(&boxes.hi[k]), lo);
+                    below = _mm512_mask_cmp_ps_mask::<_CMP_LT_OQ>(below, self.line(&ends.lo[k]), hi);
+                    above = _mm512_mask_cmp_ps_mask::<_CMP_GT_OQ>(above, self.line(&ends.hi[k]), lo);
                 }
             }
             u32::from(below & above)

@@ -10,8 +10,8 @@
 //! * a pair that shares none by the cell of the lowest corner of the overlap of their boxes: that point lies in both boxes, so
 //!   both triangles are there, as members or visitors.
 //!
-//! In the order of the work: [`stars`] certifies vertices none of whose triangles can meet, [`tree`] finds pairs of overlapping
-//! boxes, [`narrow`] finds what is clearly apart or clearly crosses, and what is left is decided by exact predicates.
+//! In the order of the work: [`stars`] certifies vertices none of whose triangles can meet, [`tree`] and [`walk`] find pairs of overlapping
+//! boxes (where these select badly, by [`slabs`] as well), [`narrow`] finds what is clearly apart or clearly crosses, and what is left is decided by exact predicates.
 //!
 //! Work can be quadratic in the size of a defect, so pairs are counted. A pair counts when its boxes overlap and it shares no
 //! vertex, or the smallest vertex it shares is not certified: a property of the mesh. The owner counts it. Of triangles of the same three
@@ -21,11 +21,14 @@ mod copies;
 mod curve;
 mod lanes;
 mod narrow;
+mod real;
+mod slabs;
 mod stars;
 #[cfg(test)]
 mod tests;
 mod tree;
 mod view;
+mod walk;
 
 use crate::geometry::tri_tri::Contact;
 use crate::util::ids::NONE;
@@ -33,15 +36,38 @@ use copies::Copies;
 use lanes::{Lanes, Pairs};
 use narrow::Neighbours;
 use stars::Stars;
-use tree::{Forest, Visit, Walk};
+use tree::Forest;
 use view::State;
 pub(crate) use view::{CellView, Standing};
+use walk::{Visit, Walk};
 
 pub(crate) use lanes::bits;
 pub(crate) use narrow::leave_out_apart;
 
 /// Pairs with common vertices that are gathered before they are decided.
 const NEIGHBOURS: usize = 128;
+
+/// How far a search goes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Effort {
+    /// Pairs that may be counted.
+    pub(crate) allowance: u64,
+    /// Boxes select badly: a pair counts, and is tested, only if its [`slabs`] overlap, too. More work for each triangle, and less for each
+    /// pair.
+    pub(crate) askew: bool,
+}
+
+impl Effort {
+    /// Each pair whose boxes overlap.
+    #[cfg(any(test, feature = "internals"))]
+    pub(crate) const ALL: Self = Self { allowance: u64::MAX, askew: false };
+}
+
+/// More than any search allows, so few that no sum of it is too large for a number.
+const TOO_MANY: u64 = 1 << 40;
+
+/// Pairs that a cell may come across that others own, beside 64 for each triangle, before boxes are said to select badly.
+const MOST_BESIDE: u64 = 1 << 22;
 
 /// Finds the self-intersections of one view after the other, and keeps its memory.
 #[derive(Default)]
@@ -58,18 +84,24 @@ pub(crate) struct Finder {
 /// Bytes that a [`Finder`] takes for each triangle of a view: its part of the tree, and of the copies.
 pub(crate) const BYTES_PER_TRIANGLE: u64 = tree::BYTES_PER_TRIANGLE + copies::BYTES_PER_TRIANGLE;
 
+/// And, if askew, its slabs.
+pub(crate) const SLAB_BYTES_PER_TRIANGLE: u64 = tree::SLAB_BYTES_PER_TRIANGLE;
+
 /// And for each vertex a view, a standing, a state and a turn.
 pub(crate) const BYTES_PER_VERTEX: u64 = size_of::<stars::View>() as u64 + 3;
 
 impl Finder {
     /// Calls `found` for the self-intersecting pairs that the view's cell owns, each once, in an order that depends on the view: for
     /// those of one of the first triangles with one of the others, or if there are no others, for each two of the first; both lists
-    /// ascend. Returns how many pairs were counted; if they are more than `allowance`, it ended early.
+    /// ascend. Returns how many pairs were counted; if they are more than allowed, it ended early. What is found does not depend on whether the search is `askew`, what is counted does.
     ///
     /// O(n log n) besides the pairs of overlapping boxes, of which those around a certified vertex and around a vertex of more
     /// than 256 triangles that is at home elsewhere cost nothing.
-    pub(crate) fn pairs(&mut self, view: &CellView<'_>, allowance: u64, mut found: impl FnMut(&[u32], &[u32], Contact)) -> u64 {
+    pub(crate) fn pairs(&mut self, view: &CellView<'_>, effort: Effort, mut found: impl FnMut(&[u32], &[u32], Contact)) -> u64 {
         self.prepare(view);
+        if effort.askew {
+            self.forest.add_slabs(view);
+        }
         let copies = &self.copies;
         let mut each = |i: u32, j: u32, contact: Contact| {
             found(copies.of(i).unwrap_or(&[i]), copies.of(j).unwrap_or(&[j]), contact);
@@ -83,10 +115,16 @@ impl Finder {
             waiting: &mut self.waiting,
             neighbours: &mut self.neighbours,
             counted: 0,
-            allowance,
+            allowance: effort.allowance,
+            beside: 0,
+            most_beside: if effort.askew { u64::MAX } else { MOST_BESIDE + 64 * view.triangles.len() as u64 },
             found: &mut each,
         };
-        let walked = Walk::new(&self.forest, &mut search).all();
+        let walked = if self.forest.has_slabs() {
+            Walk::<_, true>::new(&self.forest, &mut search).all()
+        } else {
+            Walk::<_, false>::new(&self.forest, &mut search).all()
+        };
         search.separate();
         if walked {
             search.around_hubs(&self.forest, &mut self.by_vertex);
@@ -175,6 +213,9 @@ struct Search<'a, F> {
     neighbours: &'a mut Vec<Neighbours>,
     counted: u64,
     allowance: u64,
+    /// Pairs that overlap here and are owned elsewhere; of more than most, all count.
+    beside: u64,
+    most_beside: u64,
     found: &'a mut F,
 }
 
@@ -292,6 +333,10 @@ impl<F: FnMut(u32, u32, Contact)> Search<'_, F> {
             owned += usize::from(forest.owns_pair(row, other));
         }
         self.counted += owned as u64;
+        self.beside += (pairs.len() - owned) as u64;
+        if self.beside > self.most_beside {
+            self.counted = TOO_MANY;
+        }
         let [crossing, unsure] = narrow::sort(view, &mut pairs[..owned]);
         for [i, j] in &pairs[..crossing] {
             found(*i.min(j), *i.max(j), Contact::Cross);

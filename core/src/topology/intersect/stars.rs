@@ -27,16 +27,12 @@
 //!
 //! d is the sum of the unit normals in the order in which the triangles are given, the mesh's; so the certificate is a property
 //! of the mesh, not of the chunk. (Correcting d by the normals it does not go with, as a perceptron does, certified few stars
-//! more and cost more than it saved.)
+//! more and cost more than it saved.) A hub is looked at once more with f64, where the same holds with ε = 2⁻⁵³: coordinates differ by f64 with a
+//! relative error of ε, too.
 
 use super::lanes::{Line, Triangles, WIDTH};
-use super::view::{Batch, CellView};
-
-/// 16ε.
-const ERROR: f32 = 1.0 / (1 << 20) as f32;
-
-/// Turns the view's line away from directions that meshes like: multiples of the axes, of diagonals, of a regular fan.
-const LINE: [f32; 3] = [0.3247, 1.0, -0.7713];
+use super::real::{Real, cross, dot, minus};
+use super::view::{Batch, CellView, Standing};
 
 /// d of a vertex, and the number of triangles around it.
 pub(super) type View = [f32; 4];
@@ -52,20 +48,12 @@ pub(super) struct Stars {
 /// More than once round, or a sign that is not safe.
 const REFUSED: u8 = 3;
 
-#[inline(always)]
-fn minus(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
+/// In place of the turns of a vertex that is looked at in double precision, and less than what is added to it.
+const AGAIN: u8 = 8;
 
-#[inline(always)]
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-#[inline(always)]
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
+/// A vertex with more triangles is looked at in double precision if single precision does not certify it: its sectors may be too narrow for that,
+/// and its triangles make as many pairs as their square.
+pub(super) const HUB: f32 = 256.0;
 
 impl Stars {
     /// Looks at all vertices of the view. O(triangles).
@@ -86,6 +74,14 @@ impl Stars {
                 }
             }
         }
+        self.count_turns(view);
+        self.look_at_hubs(view);
+    }
+
+    /// Counts the sectors across the half line of each vertex.
+    #[inline(always)]
+    fn count_turns(&mut self, view: &CellView<'_>) {
+        let mut batch = Batch::EMPTY;
         self.turns.clear();
         self.turns.resize(view.positions.len(), 0);
         let (mut views, mut solid) = (Triangles::NONE, view.solid_triangles());
@@ -105,6 +101,32 @@ impl Stars {
                 }
             }
         }
+    }
+
+    /// Counts those of hubs that are not certified once more, in double precision.
+    fn look_at_hubs(&mut self, view: &CellView<'_>) {
+        let mut any = false;
+        for (v, standing) in view.standing.iter().enumerate() {
+            if self.views[v][3] > HUB && self.turns[v] != 1 && *standing == Standing::Regular {
+                (self.turns[v], any) = (AGAIN, true);
+            }
+        }
+        if !any {
+            return;
+        }
+        for (_, t) in view.solid_triangles() {
+            let corners = view.corners(t).map(|p| p.map(f64::from));
+            for (k, v) in t.into_iter().enumerate() {
+                if self.turns[v as usize] < AGAIN {
+                    continue;
+                }
+                let [x, y, z, _] = self.views[v as usize].map(f64::from);
+                let way = |to: usize| minus(corners[(k + to) % 3], corners[k]);
+                let turns = &mut self.turns[v as usize];
+                *turns = (*turns + sector(way(1), way(2), [x, y, z]) as u8).min(AGAIN + REFUSED);
+            }
+        }
+        self.turns.iter_mut().filter(|turns| **turns >= AGAIN).for_each(|turns| *turns -= AGAIN);
     }
 
     /// Is the star of a regular vertex certified?
@@ -156,22 +178,22 @@ fn sectors(triangles: &Triangles, views: &Triangles) -> [[u32; WIDTH]; 3] {
 /// The same for one corner, from which the edges go to the next and the previous. Without branches, so that it is compiled to
 /// vectors.
 #[inline(always)]
-fn sector(next: [f32; 3], previous: [f32; 3], along: [f32; 3]) -> u32 {
-    let larger = |a: f32, b: f32| if a > b { a } else { b };
-    let size = larger(larger(along[0].abs(), along[1].abs()), along[2].abs());
+fn sector<T: Real>(next: [T; 3], previous: [T; 3], along: [T; 3]) -> u32 {
+    let larger = |a: T, b: T| if a > b { a } else { b };
+    let size = larger(larger(along[0].size(), along[1].size()), along[2].size());
     // Below this, e could have underflowed.
-    let error = if size > 1e-30 { size * ERROR } else { f32::INFINITY };
-    let line = cross(along, LINE);
-    let length = |e: [f32; 3]| e[0].abs() + e[1].abs() + e[2].abs();
+    let error = if size > T::SHORTEST { size * T::ERROR } else { T::INFINITY };
+    let line = cross(along, T::LINE);
+    let length = |e: [T; 3]| e[0].size() + e[1].size() + e[2].size();
     let (next_length, previous_length) = (length(next), length(previous));
     let area = next_length * previous_length;
     let height = dot(cross(next, previous), along);
     let bound = area * error;
-    let smallest = f32::MIN_POSITIVE;
-    let upward = (height > bound) & (height <= f32::MAX) & (bound > smallest) & (area * ERROR > smallest);
+    let smallest = T::SMALLEST;
+    let upward = (height > bound) & (height <= T::LARGEST) & (bound > smallest) & (area * T::ERROR > smallest);
     let (at_next, at_previous) = (dot(next, line), dot(previous, line));
-    let clear = |at: f32, bound: f32| (at.abs() > bound) & (at.abs() <= f32::MAX) & (bound > smallest);
+    let clear = |at: T, bound: T| (at.size() > bound) & (at.size() <= T::LARGEST) & (bound > smallest);
     let safe = upward & clear(at_next, next_length * error) & clear(at_previous, previous_length * error);
-    let crossing = (at_next < 0.0) & (at_previous > 0.0);
+    let crossing = (at_next < T::ZERO) & (at_previous > T::ZERO);
     if safe { u32::from(crossing) } else { u32::from(REFUSED) }
 }

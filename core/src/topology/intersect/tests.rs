@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use proptest::prelude::*;
 
-use super::{CellView, Finder, Standing};
+use super::{CellView, Effort, Finder, Standing};
 use crate::geometry::collinear::is_collinear;
 use crate::geometry::position::Position;
 use crate::geometry::sums::Bounds;
@@ -72,7 +72,7 @@ impl Mesh {
     }
 
     /// What the cell sees, asked for its pairs; in numbers of the mesh.
-    fn pairs_of(&self, finder: &mut Finder, cell: HomeBox, allowance: u64) -> (Pairs, u64) {
+    fn pairs_of(&self, finder: &mut Finder, cell: HomeBox, effort: Effort) -> (Pairs, u64) {
         let home: Vec<bool> = self.positions.iter().map(|p| cell.holds(*p)).collect();
         let is_member = |t: &u32| {
             let [a, b, c] = self.triangles[*t as usize];
@@ -117,7 +117,7 @@ impl Mesh {
             cell,
         };
         let mut pairs = Vec::new();
-        let tested = finder.pairs(&view, allowance, |some, others, contact| {
+        let tested = finder.pairs(&view, effort, |some, others, contact| {
             for (k, i) in some.iter().enumerate() {
                 for j in if others.is_empty() { &some[k + 1..] } else { others } {
                     let [i, j] = [i, j].map(|t| seen[*t as usize]);
@@ -139,18 +139,21 @@ impl Mesh {
     }
 }
 
+/// With slabs beside the boxes.
+const ASKEW: Effort = Effort { askew: true, ..Effort::ALL };
+
 fn whole(soup: &[Triangle]) -> (Pairs, u64) {
-    Mesh::new(soup).pairs_of(&mut Finder::default(), HomeBox::ALL, u64::MAX)
+    Mesh::new(soup).pairs_of(&mut Finder::default(), HomeBox::ALL, Effort::ALL)
 }
 
 /// The pairs and the count of a mesh cut into cells of about `size` triangles.
-fn in_cells(soup: &[Triangle], size: u32) -> (Pairs, u64) {
+fn in_cells(soup: &[Triangle], size: u32, effort: Effort) -> (Pairs, u64) {
     let records: Vec<record::Record> = soup.iter().map(|t| record::encode(*t, 0)).collect();
     let plan = Plan::new(&records, &crate::io::read_ahead::Guide::NONE, size);
     let (mesh, mut finder) = (Mesh::new(soup), Finder::default());
     let (mut pairs, mut counted) = (Vec::new(), 0);
     for chunk in 0..plan.chunks() as u32 {
-        let (found, tested) = mesh.pairs_of(&mut finder, plan.home_box(ChunkId(chunk)), u64::MAX);
+        let (found, tested) = mesh.pairs_of(&mut finder, plan.home_box(ChunkId(chunk)), effort);
         pairs.extend(found);
         counted += tested;
     }
@@ -161,12 +164,17 @@ fn in_cells(soup: &[Triangle], size: u32) -> (Pairs, u64) {
 /// Whole, and however it is cut, the same as all pairs tested one by one.
 fn agrees(soup: &[Triangle]) -> Result<(), TestCaseError> {
     let expected = Mesh::new(soup).by_brute_force();
-    let (pairs, tested) = whole(soup);
-    prop_assert_eq!(&pairs, &expected);
-    for size in [2, 5, 11] {
-        let (pairs, counted) = in_cells(soup, size);
-        prop_assert_eq!(&pairs, &expected, "in cells of {}", size);
-        prop_assert_eq!(counted, tested, "in cells of {}", size);
+    let mut most = u64::MAX;
+    for effort in [Effort::ALL, ASKEW] {
+        let (pairs, tested) = Mesh::new(soup).pairs_of(&mut Finder::default(), HomeBox::ALL, effort);
+        prop_assert_eq!(&pairs, &expected);
+        prop_assert!(tested <= most, "{} with slabs, {} without", tested, most);
+        most = tested;
+        for size in [2, 5, 11] {
+            let (pairs, counted) = in_cells(soup, size, effort);
+            prop_assert_eq!(&pairs, &expected, "in cells of {}", size);
+            prop_assert_eq!(counted, tested, "in cells of {}", size);
+        }
     }
     Ok(())
 }
@@ -303,8 +311,45 @@ fn two_hubs_joined_along_a_ring_cost_no_more_than_their_triangles() {
     let (pairs, tested) = whole(&soup);
     assert!(pairs.is_empty());
     assert!(tested < 30_000, "{}", tested);
-    let (pairs, counted) = in_cells(&soup, 1000);
+    let (pairs, counted) = in_cells(&soup, 1000, Effort::ALL);
     assert_eq!((pairs.len(), counted), (0, tested));
+}
+
+/// Sectors too narrow for single precision, as those of a fan of a million triangles are.
+#[test]
+fn hubs_with_very_narrow_sectors_are_certified() {
+    let angle = |i: usize| (i / 2) as f64 / 300.0 * std::f64::consts::TAU + (i % 2) as f64 * 7e-7;
+    let ring: Vec<Point> = (0..600).map(|i| [0.0, (angle(i).cos() * 8.0) as f32, (angle(i).sin() * 8.0) as f32]).collect();
+    let soup = fan(BELOW, &ring);
+    let (pairs, tested) = whole(&soup);
+    assert_eq!((pairs.len(), tested), (0, 0));
+    assert_eq!(in_cells(&soup, 60, Effort::ALL), (pairs, tested));
+}
+
+/// A cone's side and its base, and thin rods side by side along a diagonal.
+#[test]
+fn what_lies_askew_in_boxes_of_others_is_told_apart_by_slabs() {
+    let cone = |n: usize| {
+        let ring = ring(n, 1.0, 0.0);
+        let reversed: Vec<Point> = ring.iter().rev().copied().collect();
+        [fan([0.0; 3], &reversed), fan([9.0, 0.0, 0.0], &ring)].concat()
+    };
+    let rods = |n: usize| {
+        let way = |i: usize| [(i % 40) as f32, 0.0, (i / 40) as f32];
+        let rod = |i: usize| {
+            let ends = [[0.0; 3], [0.25, 0.0, 0.0], [0.0, 0.0, 0.25]].map(|p: Point| [0, 1, 2].map(|k| p[k] + way(i)[k]));
+            let ring = [0, 2, 1].map(|k| ends[k]);
+            [fan(ends[0].map(|x| x + 100.0), &ring), vec![ends]].concat()
+        };
+        (0..n / 4).flat_map(rod).collect::<Vec<Triangle>>()
+    };
+    for soup in [cone(1500), rods(3000)] {
+        let (pairs, tested) = whole(&soup);
+        assert!(pairs.is_empty() && tested > 200_000, "{} {tested}", pairs.len());
+        let (pairs, tested) = Mesh::new(&soup).pairs_of(&mut Finder::default(), HomeBox::ALL, ASKEW);
+        assert!(pairs.is_empty() && tested < 10 * soup.len() as u64, "{tested}");
+        assert_eq!(in_cells(&soup, 300, ASKEW), (pairs, tested));
+    }
 }
 
 /// A hub with a fault at its rim: the pairs of its triangles that do not have the hub as their smallest vertex.
@@ -319,7 +364,7 @@ fn faults_around_hubs_are_found_in_any_cell() {
         let expected = Mesh::new(&soup).by_brute_force();
         let (pairs, tested) = whole(&soup);
         assert_eq!(pairs, expected);
-        assert_eq!(in_cells(&soup, 40), (expected, tested));
+        assert_eq!(in_cells(&soup, 40, Effort::ALL), (expected, tested));
     }
 }
 
@@ -329,9 +374,10 @@ fn pairs_end_at_the_allowance() {
     let soup: Vec<Triangle> = (0..300).map(|i| FLOOR.map(|[x, y, z]| [x + i as f32 / 256.0, y, z])).collect();
     let (pairs, tested) = whole(&soup);
     assert_eq!((pairs.len() as u64, tested), (300 * 299 / 2, 300 * 299 / 2));
-    let (_, tested) = Mesh::new(&soup).pairs_of(&mut Finder::default(), HomeBox::ALL, 1000);
+    let (_, tested) = Mesh::new(&soup).pairs_of(&mut Finder::default(), HomeBox::ALL, Effort { allowance: 1000, ..Effort::ALL });
     assert!((1001..300 * 299 / 2).contains(&tested), "{tested}");
-    let (all, tested) = Mesh::new(&soup).pairs_of(&mut Finder::default(), HomeBox::ALL, 300 * 299 / 2);
+    let (all, tested) =
+        Mesh::new(&soup).pairs_of(&mut Finder::default(), HomeBox::ALL, Effort { allowance: 300 * 299 / 2, ..Effort::ALL });
     assert_eq!((all, tested), (pairs, 300 * 299 / 2), "exactly what is allowed");
 }
 
@@ -341,14 +387,14 @@ fn copies_count_once_each() {
     let mut soup: Vec<Triangle> = (0..300).map(|i| [[o, x, y], [y, o, x], [o, y, x]][i % 3]).collect();
     let (pairs, tested) = whole(&soup);
     assert_eq!((pairs.len() as u64, tested), (300 * 299 / 2, 299));
-    assert_eq!(in_cells(&soup, 40), (pairs, tested));
+    assert_eq!(in_cells(&soup, 40, Effort::ALL), (pairs, tested));
     // Two that cross all of them, one of which is there twice, and each other.
     soup.push([[1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [3.0, 3.0, 1.0]]);
     soup.extend([[[0.5, 1.0, -1.0], [0.5, 1.0, 1.0], [3.0, 1.5, 0.5]]; 2]);
     let (pairs, tested) = whole(&soup);
     assert_eq!(pairs, Mesh::new(&soup).by_brute_force());
     assert!(tested <= 303, "{tested}");
-    assert_eq!(in_cells(&soup, 40), (pairs, tested));
+    assert_eq!(in_cells(&soup, 40, Effort::ALL), (pairs, tested));
 }
 
 #[test]

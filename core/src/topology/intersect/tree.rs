@@ -1,9 +1,8 @@
-//! Boxes of triangles in a tree, and all pairs of them that overlap.
+//! Boxes of triangles in a tree.
 //!
 //! Triangles are put in the order of a space-filling curve (Morton, "A computer oriented geodetic data base", IBM 1966) and taken
 //! sixteen at a time; sixteen such groups make a node, and so on: a tree without pointers, in which a box is compared with sixteen
-//! others at once ([`super::lanes`]). The tree is walked against itself, so that boxes of groups that are apart are compared once for all their
-//! triangles.
+//! others at once ([`super::lanes`]).
 //!
 //! Boxes overlap when `lo < hi` holds both ways on each axis, strictly: where one ends at the coordinate at which the other begins,
 //! that plane separates the triangles, and holds a vertex or an edge of each at most, neither of which counts. A
@@ -15,6 +14,8 @@
 //! position that the two share, is in the cell, and as it lies below the upper end of both boxes and not above the cell's,
 //! a part of positive extent is left.
 //!
+//! Where boxes select badly, bodies overlap only if their [`super::slabs`] do, too.
+//!
 //! A vertex with very many triangles would make as many pairs as their square. Triangles of such a **hub** get a tree of
 //! their own, whose pairs with itself are left to the caller.
 
@@ -23,14 +24,12 @@ use std::ops::Range;
 use super::copies::Copies;
 use super::curve::Curve;
 use super::lanes::bits;
-use super::lanes::{self, Boxes, Corners, Lanes, Pairs, Triangles, WIDTH, max, min};
-use super::stars::Stars;
+use super::lanes::{Boxes, Corners, Triangles, WIDTH, max, min};
+use super::slabs::{Slabs, slabs};
+use super::stars::{HUB, Stars};
 use super::view::{Batch, CellView, State};
 use crate::stream::plan::HomeBox;
 use crate::util::ids::NONE;
-
-/// A vertex with more triangles is a hub.
-const HUB: f32 = 256.0;
 
 /// Enough for 2³² triangles, and the crown.
 const LEVELS: usize = 10;
@@ -44,9 +43,9 @@ const OPEN: u8 = 1 << 6;
 
 /// Up to sixteen triangles. A **row** is a place in a leaf: sixteen times the leaf's number, and the lane.
 #[derive(Clone, Copy)]
-struct Leaf {
-    boxes: Boxes,
-    corners: Corners,
+pub(super) struct Leaf {
+    pub(super) boxes: Boxes,
+    pub(super) corners: Corners,
     triangles: [u32; WIDTH],
     /// [`BELOW`] and [`FLAT`], shifted by the axis, and [`OPEN`].
     flags: [u8; WIDTH],
@@ -92,8 +91,8 @@ impl Leaf {
 pub(super) struct Tree {
     /// Where each level starts: level 0 among the leaves, the others among the nodes. The highest, the **crown**, is one node
     /// whose first lane is the box of all.
-    starts: [u32; LEVELS],
-    crown: usize,
+    pub(super) starts: [u32; LEVELS],
+    pub(super) crown: usize,
     pub(super) rows: Range<usize>,
     /// The hub that all its triangles have, or [`NONE`].
     pub(super) hub: u32,
@@ -108,9 +107,12 @@ pub(super) struct Forest {
     /// Tree of each triangle, where there are hubs.
     groups: Vec<u32>,
     /// Those of one tree after those of another, and older ones; a tree's last one may have empty lanes.
-    leaves: Vec<Leaf>,
+    pub(super) leaves: Vec<Leaf>,
     planted: usize,
-    nodes: Vec<Boxes>,
+    pub(super) nodes: Vec<Boxes>,
+    /// The slabs of each leaf and of each node, if they were asked for.
+    pub(super) leaf_slabs: Vec<Slabs>,
+    pub(super) node_slabs: Vec<Slabs>,
     /// Of the ordinary triangles, then of each hub.
     pub(super) trees: Vec<Tree>,
 }
@@ -118,6 +120,10 @@ pub(super) struct Forest {
 /// Bytes of a [`Forest`] for each triangle: two keys, a group, its part of a leaf and of the nodes.
 pub(super) const BYTES_PER_TRIANGLE: u64 =
     (16 + 4 + size_of::<Leaf>() / WIDTH + size_of::<Boxes>().div_ceil(WIDTH * (WIDTH - 1))) as u64;
+
+/// And with slabs: a part of a leaf's and of the nodes'.
+pub(super) const SLAB_BYTES_PER_TRIANGLE: u64 =
+    (size_of::<Slabs>() / WIDTH + size_of::<Slabs>().div_ceil(WIDTH * (WIDTH - 1))) as u64;
 
 impl Forest {
     /// Arranges the triangles that meet the cell, but for all `copies` other than the first. O(triangles).
@@ -128,6 +134,8 @@ impl Forest {
         let hubs = self.group_by_hub(view, stars, states);
         self.planted = 0;
         self.nodes.clear();
+        self.leaf_slabs.clear();
+        self.node_slabs.clear();
         self.trees.clear();
         let mut rest = 0..self.keys.len();
         for (group, hub) in hubs.iter().enumerate() {
@@ -252,6 +260,41 @@ impl Forest {
     }
 }
 
+/// Slabs.
+impl Forest {
+    /// Adds slabs to all trees. O(triangles).
+    #[inline(always)]
+    pub(super) fn add_slabs(&mut self, view: &CellView<'_>) {
+        let mut triangles = Triangles::NONE;
+        self.leaf_slabs.reserve_exact(self.planted);
+        for leaf in &self.leaves[..self.planted] {
+            let count = leaf.triangles.iter().take_while(|t| **t != NONE).count();
+            for (i, t) in leaf.triangles[..count].iter().enumerate() {
+                triangles.set(i, &view.corners(view.triangles[*t as usize]));
+            }
+            self.leaf_slabs.push(slabs(&triangles, count));
+        }
+        self.node_slabs.resize(self.nodes.len(), Slabs::EMPTY);
+        for tree in &self.trees {
+            let mut boxes = tree.rows.len().div_ceil(WIDTH);
+            for level in 1..=tree.crown {
+                let (below, here) = (tree.starts[level - 1] as usize, tree.starts[level] as usize);
+                for i in 0..boxes {
+                    let slabs = if level == 1 { &self.leaf_slabs[below + i] } else { &self.node_slabs[below + i] };
+                    let (lo, hi) = slabs.bounds();
+                    self.node_slabs[here + i / WIDTH].set(i % WIDTH, lo, hi);
+                }
+                boxes = boxes.div_ceil(WIDTH);
+            }
+        }
+    }
+
+    /// Bodies overlap only if their slabs do.
+    pub(super) fn has_slabs(&self) -> bool {
+        !self.leaf_slabs.is_empty()
+    }
+}
+
 /// Questions about rows.
 impl Forest {
     #[inline(always)]
@@ -288,174 +331,5 @@ impl Forest {
         let ((a, i), (b, j)) = (self.lane(row), self.lane(other));
         let begins_before = |a: [f32; 3], b: [f32; 3]| (0..3).all(|k| a[k] < b[k]);
         begins_before(a.boxes.lo(i), b.boxes.hi(j)) && begins_before(b.boxes.lo(j), a.boxes.hi(i))
-    }
-}
-
-/// The work that is done with overlapping boxes.
-pub(super) trait Visit {
-    /// `row` overlaps the rows from `first` on whose bits are set in `lanes`; those in `sharing` (and maybe others, which do not
-    /// overlap) have a vertex in common with it. Returns `false` to end the walk.
-    fn visit(&mut self, with: impl Lanes, row: usize, first: usize, lanes: u32, sharing: u32) -> bool;
-}
-
-/// A node: number of the tree, level, number within the level.
-#[derive(Clone, Copy, PartialEq, Eq)]
-struct At {
-    tree: u32,
-    level: u32,
-    index: u32,
-}
-
-impl At {
-    #[inline(always)]
-    fn child(self, i: usize) -> Self {
-        Self { level: self.level - 1, index: self.index * WIDTH as u32 + i as u32, ..self }
-    }
-}
-
-/// A walk over a forest.
-pub(super) struct Walk<'a, V> {
-    forest: &'a Forest,
-    /// Pairs of nodes whose boxes overlap, or a node and itself, that are yet to be looked into.
-    stack: Vec<[At; 2]>,
-    /// A leaf, and a row that is to be compared with it.
-    rows: Pairs,
-    visit: &'a mut V,
-}
-
-impl<'a, V: Visit> Walk<'a, V> {
-    pub(super) fn new(forest: &'a Forest, visit: &'a mut V) -> Self {
-        Self { forest, stack: Vec::new(), rows: Pairs::default(), visit }
-    }
-
-    /// All overlapping pairs within the tree of ordinary triangles and between trees, but not within that of a hub. `false` when
-    /// it was ended.
-    pub(super) fn all(&mut self) -> bool {
-        #[cfg(target_arch = "x86_64")]
-        {
-            if let Some(lanes) = lanes::Sixteens::detect() {
-                // SAFETY: the processor has what it is compiled for.
-                return unsafe { self.all_avx512(lanes) };
-            }
-            if let Some(lanes) = lanes::Eights::detect() {
-                // SAFETY: as above.
-                return unsafe { self.all_avx2(lanes) };
-            }
-        }
-        self.all_by(lanes::Fours)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f,avx512bw,bmi1,popcnt")]
-    fn all_avx512(&mut self, lanes: lanes::Sixteens) -> bool {
-        self.all_by(lanes)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,bmi1")]
-    fn all_avx2(&mut self, lanes: lanes::Eights) -> bool {
-        self.all_by(lanes)
-    }
-
-    #[inline(always)]
-    fn all_by(&mut self, lanes: impl Lanes) -> bool {
-        let trees = &self.forest.trees;
-        for (i, tree) in trees.iter().enumerate() {
-            for (j, other) in trees.iter().enumerate().skip(i) {
-                let [(a, bounds), (b, others)] = [(i, tree), (j, other)].map(|(i, tree)| {
-                    let crown = At { tree: i as u32, level: tree.crown as u32, index: 0 };
-                    (crown.child(0), self.boxes(crown))
-                });
-                let wanted = if i == j { tree.hub == NONE } else { lanes.overlapping(bounds, others, 0) & 1 != 0 };
-                if wanted && !self.below([a, b], lanes) {
-                    return false;
-                }
-            }
-        }
-        true
-    }
-
-    /// The boxes of what is below a node.
-    #[inline(always)]
-    fn boxes(&self, at: At) -> &'a Boxes {
-        let index = self.forest.trees[at.tree as usize].starts[at.level as usize] as usize + at.index as usize;
-        if at.level == 0 { &self.forest.leaves[index].boxes } else { &self.forest.nodes[index] }
-    }
-
-    /// The boxes among which a node's own is, and its lane.
-    #[inline(always)]
-    fn own_box(&self, at: At) -> (&'a Boxes, usize) {
-        let index = at.index as usize;
-        (self.boxes(At { level: at.level + 1, index: (index / WIDTH) as u32, ..at }), index % WIDTH)
-    }
-
-    /// Pairs of one triangle of each of two nodes, or of two of one.
-    #[inline(always)]
-    fn below(&mut self, pair: [At; 2], lanes: impl Lanes) -> bool {
-        self.stack.clear();
-        self.stack.push(pair);
-        while let Some([a, b]) = self.stack.pop() {
-            if a.level.max(b.level) == 0 {
-                self.leaves(a, b, lanes);
-                if self.rows.is_full() && !self.compare(lanes) {
-                    return false;
-                }
-            } else if a == b {
-                let boxes = self.boxes(a);
-                for i in (0..WIDTH).take_while(|i| boxes.is_set(*i)) {
-                    self.stack.push([a.child(i); 2]);
-                    let later = lanes.overlapping(boxes, boxes, i) & (!1 << i);
-                    self.stack.extend(bits(later).map(|j| [a.child(i), a.child(j)]));
-                }
-            } else {
-                let (a, b) = if a.level < b.level { (b, a) } else { (a, b) };
-                let (boxes, (others, lane)) = (self.boxes(a), self.own_box(b));
-                for i in bits(lanes.overlapping(boxes, others, lane)) {
-                    if a.level > b.level {
-                        self.stack.push([a.child(i), b]);
-                    } else {
-                        let found = lanes.overlapping(self.boxes(b), boxes, i);
-                        self.stack.extend(bits(found).map(|j| [a.child(i), b.child(j)]));
-                    }
-                }
-            }
-        }
-        self.compare(lanes)
-    }
-
-    /// Notes the rows of one leaf that are to be compared with another leaf, or with their own.
-    #[inline(always)]
-    fn leaves(&mut self, a: At, b: At, lanes: impl Lanes) {
-        let number = |at: At| self.forest.trees[at.tree as usize].starts[0] + at.index;
-        let (mut one, mut other) = (number(a), number(b));
-        let mut rows = !0 >> 16;
-        if one != other {
-            // One by one those of the leaf of which fewer meet the other's box.
-            let ((a_boxes, a_lane), (b_boxes, b_lane)) = (self.own_box(a), self.own_box(b));
-            rows = lanes.overlapping(&self.forest.leaves[one as usize].boxes, b_boxes, b_lane);
-            let others = lanes.overlapping(&self.forest.leaves[other as usize].boxes, a_boxes, a_lane);
-            if others.count_ones() < rows.count_ones() {
-                (one, other, rows) = (other, one, others);
-            }
-        }
-        lanes.append(&mut self.rows, other, one * WIDTH as u32, rows);
-    }
-
-    /// Compares the rows that were noted.
-    #[inline(always)]
-    fn compare(&mut self, lanes: impl Lanes) -> bool {
-        let leaves = &self.forest.leaves[..];
-        for [other, row] in self.rows.as_mut_slice().iter().map(|pair| pair.map(|x| x as usize)) {
-            let (leaf, i, theirs) = (&leaves[row / WIDTH], row % WIDTH, &leaves[other]);
-            // Within a leaf, those that come later.
-            let wanted = if other == row / WIDTH { !1 << i } else { !0 };
-            let found = lanes.overlapping(&theirs.boxes, &leaf.boxes, i) & wanted;
-            let sharing = lanes.sharing(&theirs.corners, &leaf.corners, i);
-            if found != 0 && !self.visit.visit(lanes, row, other * WIDTH, found, sharing) {
-                return false;
-            }
-        }
-        self.rows.clear();
-        true
     }
 }

@@ -82,3 +82,26 @@ fn a_cube_is_one_region_and_no_irregular_triangle() {
         assert!((survey.measure.volume(survey.regions[0].extent) - 8.0).abs() < 1e-9);
     }
 }
+
+/// Boxes of a cone's side and of its base overlap in so many pairs that these are looked for askew: with the same pairs, and no others.
+#[test]
+fn chunks_do_not_show_where_boxes_select_badly() {
+    let ring = |i: usize, n: usize| {
+        let angle = (i % n) as f32 / n as f32 * std::f32::consts::TAU;
+        [50.0 * angle.cos(), 50.0 * angle.sin(), 0.0]
+    };
+    let n = 6000;
+    let side = (0..n).map(|i| [[0.0, 0.0, 80.0], ring(i, n), ring(i + 1, n)]);
+    let base = (0..n).map(|i| [[0.0; 3], ring(i + 1, n), ring(i, n)]);
+    let mut triangles: Vec<[[f32; 3]; 3]> = side.chain(base).collect();
+    triangles.extend(cuboid([10.0, 10.0, -3.0], [10.01, 10.01, 3.0]));
+    let records = records(&triangles);
+    let found = [200, 2000, 1 << 20].map(|chunk_triangles| {
+        let limits = Limits { chunk_triangles, threads: 2, ..Limits::default() };
+        let survey = Survey::new(Path::new("cone"), &records, true, &limits, &Quiet).unwrap();
+        (survey.self_intersections, survey.crossing_pairs)
+    });
+    let (summed, pairs) = &found[0];
+    assert!(summed.as_ref().is_some_and(|s| !s.given_up && s.crossing_pairs > 0) && pairs.is_some());
+    assert!(found.iter().all(|f| *f == found[0]));
+}

@@ -103,7 +103,6 @@ fn squares_within(
 }
 
 /// Squares are not negative, so that their bits are in their order.
-#[expect(clippy::disallowed_methods, reason = "an order of distances, not of positions")]
 fn bits(square: f64) -> u64 {
     square.to_bits()
 }

@@ -133,19 +133,22 @@ pub(crate) fn map_with<S, R: Send>(
         let mut s = scratch();
         return (0..count).map(|i| work(&mut s, i)).collect();
     }
+    // Many small items are taken some at a time: each would cost less than to take it, and to put it in its place.
+    let run = (count / (threads * RUNS)).max(1);
     let next = AtomicUsize::new(0);
     let take = || {
         let mut s = scratch();
         let mut done = Vec::new();
         loop {
-            let i = next.fetch_add(1, Ordering::Relaxed);
-            if i >= count {
+            let first = next.fetch_add(run, Ordering::Relaxed);
+            if first >= count {
                 return done;
             }
-            done.push((i, work(&mut s, i)));
+            let results: Vec<R> = (first..count.min(first + run)).map(|i| work(&mut s, i)).collect();
+            done.push((first, results));
         }
     };
-    let mut all: Vec<(usize, R)> = std::thread::scope(|scope| {
+    let mut all: Vec<(usize, Vec<R>)> = std::thread::scope(|scope| {
         let others: Vec<_> = (1..threads).map_while(|_| Builder::new().spawn_scoped(scope, take).ok()).collect();
         let mut all = take();
         for other in others {
@@ -154,9 +157,14 @@ pub(crate) fn map_with<S, R: Send>(
         }
         all
     });
-    all.sort_unstable_by_key(|(i, _)| *i);
-    all.into_iter().map(|(_, r)| r).collect()
+    all.sort_unstable_by_key(|(first, _)| *first);
+    let mut results = Vec::with_capacity(count);
+    all.into_iter().for_each(|(_, of_run)| results.extend(of_run));
+    results
 }
+
+/// So many runs of items a thread, at least, so that what takes long is shared.
+const RUNS: usize = 1024;
 
 #[cfg(test)]
 mod tests {
@@ -168,6 +176,7 @@ mod tests {
     fn results_are_the_same_with_and_without_other_threads() {
         for threads in [1, 2, 5] {
             assert_eq!(map(threads, 7, |i| i * i), [0, 1, 4, 9, 16, 25, 36]);
+            assert_eq!(map(threads, 50_001, |i| i), (0..50_001).collect::<Vec<_>>());
             assert_eq!(both(threads, || 1, || 2), (1, 2));
         }
         assert_eq!(Aside::start("test", || 3).join(), 3);

@@ -4,6 +4,7 @@ use std::cmp::Ordering;
 
 use crate::geometry::arrange::piece::{Piece, agree};
 use crate::util::ids::NONE;
+use crate::util::parallel;
 use crate::util::radix::sort_by_number;
 use crate::util::union_find::{find, unite};
 
@@ -31,7 +32,7 @@ enum Half {
 struct Around<'a> {
     triangles: &'a [[[f32; 3]; 3]],
     pieces: &'a [Piece],
-    side: &'a dyn Fn(u32, u32) -> i8,
+    side: &'a (dyn Fn(u32, u32) -> i8 + Sync),
 }
 
 impl Around<'_> {
@@ -71,8 +72,53 @@ impl Around<'_> {
     }
 }
 
+/// The number of the space to the left of a piece at an edge, as seen along that, and to the right. Each piece has two, in front of it and behind: one that
+/// runs with the edge has its front on the left.
+fn left(u: &Use) -> u32 {
+    2 * u.piece + u32::from(!u.forward)
+}
+
+fn right(u: &Use) -> u32 {
+    2 * u.piece + u32::from(u.forward)
+}
+
+impl Around<'_> {
+    /// Adds which spaces around an edge are one.
+    fn joins(&self, uses: &[Use], joins: &mut Vec<[u32; 2]>) {
+        // Two alone are neighbours on both sides, wherever they lie, if not at one place.
+        if let [one, other] = uses
+            && self.half(one, other) != Half::Same
+        {
+            joins.extend([[left(one), right(other)], [left(other), right(one)]]);
+            return;
+        }
+        let fan = if uses.len() == 2 { uses.iter().map(|u| (Half::Same, *u)).collect() } else { self.sorted(uses) };
+        let alike = |a: &(Half, Use), b: &(Half, Use)| {
+            a.0 == b.0 && (matches!(a.0, Half::Same | Half::Opposite) || self.order(&a.1, &b.1).is_eq())
+        };
+        let groups: Vec<&[(Half, Use)]> = fan.chunk_by(alike).collect();
+        for (group, next) in groups.iter().zip(groups.iter().cycle().skip(1)) {
+            let one = &group[0].1;
+            for (_, other) in &group[1..] {
+                joins.extend([[left(one), left(other)], [right(one), right(other)]]);
+            }
+            if groups.len() > 1 {
+                joins.push([left(one), right(&next[0].1)]);
+            }
+        }
+    }
+}
+
+/// Edges are looked at by so many uses at once.
+const BLOCK: usize = 1 << 12;
+
 /// Numbers the cells in front of and behind each piece. `side` of a point by the plane of a source. Returns how many numbers there are.
-pub(crate) fn number(triangles: &[[[f32; 3]; 3]], pieces: &mut [Piece], side: &dyn Fn(u32, u32) -> i8) -> u32 {
+pub(crate) fn number(
+    triangles: &[[[f32; 3]; 3]],
+    pieces: &mut [Piece],
+    side: &(dyn Fn(u32, u32) -> i8 + Sync),
+    threads: usize,
+) -> u32 {
     let mut uses: Vec<Use> = Vec::with_capacity(3 * pieces.len());
     for (piece, i) in pieces.iter().zip(0..) {
         for k in 0..3 {
@@ -83,35 +129,20 @@ pub(crate) fn number(triangles: &[[[f32; 3]; 3]], pieces: &mut [Piece], side: &d
     // Stably, so that of an edge they stay in the order of the pieces.
     sort_by_number(&mut uses, |used| used.edge[1]);
     sort_by_number(&mut uses, |used| used.edge[0]);
-    // Two numbers a piece, in front of it and behind. A piece that runs with the edge has its front on the left.
-    let left = |u: &Use| 2 * u.piece + u32::from(!u.forward);
-    let right = |u: &Use| 2 * u.piece + u32::from(u.forward);
-    let mut parents: Vec<u32> = (0..2 * pieces.len() as u32).collect();
     let around = Around { triangles, pieces, side };
-    for uses in uses.chunk_by(|a, b| a.edge == b.edge).filter(|uses| uses.len() > 1) {
-        // Two alone are neighbours on both sides, wherever they lie, if not at one place.
-        if let [one, other] = uses
-            && around.half(one, other) != Half::Same
-        {
-            unite(&mut parents, left(one), right(other));
-            unite(&mut parents, left(other), right(one));
-            continue;
-        }
-        let fan = if uses.len() == 2 { uses.iter().map(|u| (Half::Same, *u)).collect() } else { around.sorted(uses) };
-        let alike = |a: &(Half, Use), b: &(Half, Use)| {
-            a.0 == b.0 && (matches!(a.0, Half::Same | Half::Opposite) || around.order(&a.1, &b.1).is_eq())
-        };
-        let groups: Vec<&[(Half, Use)]> = fan.chunk_by(alike).collect();
-        for (group, next) in groups.iter().zip(groups.iter().cycle().skip(1)) {
-            let one = &group[0].1;
-            for (_, other) in &group[1..] {
-                unite(&mut parents, left(one), left(other));
-                unite(&mut parents, right(one), right(other));
-            }
-            if groups.len() > 1 {
-                unite(&mut parents, left(one), right(&next[0].1));
-            }
-        }
+    let joins = parallel::map(threads, uses.len().div_ceil(BLOCK), |block| {
+        // The edges that begin in the block.
+        let begins = |at: usize| at == 0 || uses[at - 1].edge != uses[at].edge;
+        let first = |from: usize| (from..uses.len()).find(|at| begins(*at)).unwrap_or(uses.len());
+        let (from, to) = (first(block * BLOCK), first(((block + 1) * BLOCK).min(uses.len())));
+        let mut joins = Vec::new();
+        let edges = uses[from..to.max(from)].chunk_by(|a, b| a.edge == b.edge);
+        edges.filter(|uses| uses.len() > 1).for_each(|uses| around.joins(uses, &mut joins));
+        joins
+    });
+    let mut parents: Vec<u32> = (0..2 * pieces.len() as u32).collect();
+    for [a, b] in joins.into_iter().flatten() {
+        unite(&mut parents, a, b);
     }
     let mut numbers = vec![NONE; parents.len()];
     let mut count = 0;

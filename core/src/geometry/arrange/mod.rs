@@ -28,6 +28,7 @@ mod wide;
 use crate::geometry::arrange::network::{Network, position};
 use crate::geometry::arrange::rational::Rational;
 use crate::geometry::arrange::raw::Raw;
+use crate::util::parallel;
 
 pub(crate) use crate::geometry::arrange::piece::{Arrange, Arrangement, Piece};
 
@@ -38,14 +39,15 @@ pub(crate) struct Exact;
 impl Arrange for Exact {
     fn arrange(&self, triangles: &[[[f32; 3]; 3]], threads: usize) -> Option<Arrangement> {
         let Some(network) = Network::build(triangles, threads) else { return Rational.arrange(triangles, threads) };
-        tracing::debug!(triangles = triangles.len(), points = network.points.len(), pieces = network.pieces.len(), "Arranged.");
-        let raw = Raw {
-            points: network.points.iter().map(|p| position(p, network.soup.power)).collect(),
-            exact: network.points.iter().map(|p| p.exact).collect(),
-            pieces: network.pieces,
-        };
-        let side = |source: u32, point: u32| network.soup.plane(source as usize).side(&network.points[point as usize]);
-        Some(raw.finish(triangles, &side))
+        tracing::debug!(triangles = triangles.len(), points = network.count(), pieces = network.pieces.len(), "Arranged.");
+        let points = parallel::map(threads, network.count(), |p| {
+            let point = network.point(p as u32);
+            (position(point, network.soup.power), point.exact)
+        });
+        let (points, exact) = points.into_iter().unzip();
+        let side = |source: u32, point: u32| network.soup.plane(source as usize).side(network.point(point));
+        let raw = Raw { points, exact, pieces: &network.pieces };
+        Some(raw.finish(triangles, &side, threads))
     }
 }
 

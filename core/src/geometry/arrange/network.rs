@@ -18,8 +18,9 @@ use crate::util::parallel;
 /// Triangles cut along all that they meet; pieces with points as they were found.
 pub(crate) struct Network<'a> {
     pub(crate) soup: Soup<'a>,
-    /// In the order in which pieces need them.
-    pub(crate) points: Vec<Point>,
+    points: Vec<Point>,
+    /// Those that pieces need, in the order in which they do.
+    order: Vec<u32>,
     /// The triangle, and the points, the way round that it runs. By triangle.
     pub(crate) pieces: Vec<(u32, [u32; 3])>,
 }
@@ -65,6 +66,18 @@ impl Network<'_> {
     }
 }
 
+impl Network<'_> {
+    /// How many points there are.
+    pub(crate) fn count(&self) -> usize {
+        self.order.len()
+    }
+
+    /// A point, as pieces number them.
+    pub(crate) fn point(&self, number: u32) -> &Point {
+        &self.points[self.order[number as usize] as usize]
+    }
+}
+
 fn merged<'s>(all: impl Iterator<Item = &'s Splits>) -> Splits {
     let mut merged = all.flatten().copied().collect::<Splits>();
     merged.sort_unstable();
@@ -95,9 +108,7 @@ fn numbered(builder: Builder<'_>, cut: Vec<Option<Cut>>) -> Option<Network<'_>> 
         let ids: Vec<u32> = cut.points.iter().map(|p| number(&mut numbers, &mut order, *p)).collect();
         pieces.extend(cut.pieces.iter().map(|v| (t, v.map(|v| ids[v]))));
     }
-    let mut all: Vec<Option<Point>> = builder.table.points.into_iter().map(Some).collect();
-    let points = order.iter().filter_map(|p| all[*p as usize].take()).collect();
-    Some(Network { soup: builder.soup, points, pieces })
+    Some(Network { soup: builder.soup, points: builder.table.points, order, pieces })
 }
 
 fn number(numbers: &mut [u32], order: &mut Vec<u32>, p: u32) -> u32 {

@@ -22,17 +22,14 @@ impl Arrange for Rational {
         // A file that the engine cannot do keeps its crossings; it does not cost the others their worker.
         let cut = || parallel::in_pool(threads, || intersection_graph::build_graph(&soup, &[]));
         let graph = catch_unwind(AssertUnwindSafe(cut)).ok()?;
-        catch_unwind(AssertUnwindSafe(|| collect(&graph, &soup, triangles))).ok()
+        catch_unwind(AssertUnwindSafe(|| collect(&graph, &soup, triangles, threads))).ok()
     }
 }
 
-fn collect(graph: &IntersectionGraph, soup: &[[Vec3; 3]], triangles: &[[[f32; 3]; 3]]) -> Arrangement {
+fn collect(graph: &IntersectionGraph, soup: &[[Vec3; 3]], triangles: &[[[f32; 3]; 3]], threads: usize) -> Arrangement {
+    let pieces: Vec<(u32, [u32; 3])> = graph.pieces.iter().map(|piece| (piece.tri as u32, piece.vi)).collect();
     let exact = graph.verts.iter().zip(&graph.verts_f64).map(|(p, rounded)| r3_eq(p, &R3::from_vec3(*rounded)));
-    let raw = Raw {
-        points: graph.verts_f64.iter().map(|p| [p.x, p.y, p.z]).collect(),
-        exact: exact.collect(),
-        pieces: graph.pieces.iter().map(|piece| (piece.tri as u32, piece.vi)).collect(),
-    };
+    let raw = Raw { points: graph.verts_f64.iter().map(|p| [p.x, p.y, p.z]).collect(), exact: exact.collect(), pieces: &pieces };
     let side = |source: u32, point: u32| {
         let [a, b, c] = soup[source as usize].map(R3::from_vec3);
         match orient3d_r(&a, &b, &c, &graph.verts[point as usize]) {
@@ -41,5 +38,5 @@ fn collect(graph: &IntersectionGraph, soup: &[[Vec3; 3]], triangles: &[[[f32; 3]
             Sign::Neg => -1,
         }
     };
-    raw.finish(triangles, &side)
+    raw.finish(triangles, &side, threads)
 }

@@ -6,7 +6,8 @@ use super::{Submesh, Vertex};
 use crate::geometry::sums::{Bounds, Extent};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
-use crate::util::union_find::{find, unite};
+use crate::util::parallel;
+use crate::util::union_find::{self, find, unite};
 
 /// Which regions of regular surface are reversed, against how they stand in the file, and which go. Triangles of the submesh are turned, or die, in
 /// place.
@@ -102,29 +103,27 @@ impl Components {
         }
         let mut all =
             Self { list: Vec::new(), of_region: vec![NONE; regions as usize], of_triangle: vec![NONE; submesh.triangles.len()] };
-        let mut numbers = vec![NONE; parents.len()];
+        let roots = union_find::roots(parents);
+        let mut numbers = vec![NONE; roots.len()];
         // After a second look, there may be nothing left of a region.
         for p in (0..regions).filter(|p| survey.regions[*p as usize].first != NONE && !reversed.dropped[*p as usize]) {
             let sum = &survey.regions[p as usize];
-            let c = all.number(&mut numbers, find(&mut parents, p), Sample { record: sum.first, in_submesh: None });
+            let c = all.number(&mut numbers, roots[p as usize], Sample { record: sum.first, in_submesh: None });
             all.of_region[p as usize] = c;
             let into = &mut all.list[c as usize];
             into.triangles += sum.triangles;
             into.bounds.add(&sum.bounds);
             into.extent += turned(sum.extent, reversed.regions[p as usize]);
         }
-        for t in submesh.living() {
-            let c = all.number(
-                &mut numbers,
-                find(&mut parents, regions + t),
-                Sample { record: submesh.record(t), in_submesh: Some(t) },
-            );
-            all.of_triangle[t as usize] = c;
-            let points = submesh.points(t);
+        for run in runs(survey, submesh, &roots[regions as usize..]) {
+            let c = all.number(&mut numbers, run.root, run.sample);
             let into = &mut all.list[c as usize];
-            into.triangles += 1;
-            into.bounds.include(&points);
-            into.extent += survey.measure.triangle(&points);
+            into.triangles += run.triangles;
+            into.bounds.add(&run.bounds);
+            into.extent += run.extent;
+        }
+        for t in submesh.living() {
+            all.of_triangle[t as usize] = numbers[roots[(regions + t) as usize] as usize];
         }
         for edge in edges.iter().filter(|e| e.is_nonmanifold() || e.is_unbalanced()) {
             // Each component's own uses, forward less backward.
@@ -153,6 +152,40 @@ impl Components {
         component.sample = component.sample.min(sample);
         *number
     }
+}
+
+/// Triangles of one component that follow each other, together.
+struct Run {
+    root: u32,
+    triangles: u64,
+    extent: Extent,
+    bounds: Bounds,
+    /// The smallest.
+    sample: Sample,
+}
+
+/// All living triangles, by their `roots`, in order.
+fn runs(survey: &Survey<'_>, submesh: &Submesh, roots: &[u32]) -> Vec<Run> {
+    const BLOCK: usize = 1 << 14;
+    let of_block = |block: usize| {
+        let mut runs: Vec<Run> = Vec::new();
+        let end = submesh.triangles.len().min((block + 1) * BLOCK);
+        for t in (block * BLOCK..end).map(|t| t as u32).filter(|t| submesh.lives(*t)) {
+            let (root, points) = (roots[t as usize], submesh.points(t));
+            let sample = Sample { record: submesh.record(t), in_submesh: Some(t) };
+            if runs.last().is_none_or(|run| run.root != root) {
+                runs.push(Run { root, triangles: 0, extent: Extent::default(), bounds: Bounds::EMPTY, sample });
+            }
+            if let Some(run) = runs.last_mut() {
+                run.triangles += 1;
+                run.extent += survey.measure.triangle(&points);
+                run.bounds.include(&points);
+                run.sample = run.sample.min(sample);
+            }
+        }
+        runs
+    };
+    parallel::map(survey.threads(), submesh.triangles.len().div_ceil(BLOCK), of_block).into_iter().flatten().collect()
 }
 
 fn turned(extent: Extent, reversed: bool) -> Extent {

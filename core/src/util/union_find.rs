@@ -18,3 +18,12 @@ pub(crate) fn unite(parents: &mut [u32], a: u32, b: u32) -> bool {
     parents[a.max(b) as usize] = a.min(b);
     a != b
 }
+
+/// The root of each. O(n).
+pub(crate) fn roots(mut parents: Vec<u32>) -> Vec<u32> {
+    // A parent is no larger than its child, so that its root is known before.
+    for v in 0..parents.len() {
+        parents[v] = parents[parents[v] as usize];
+    }
+    parents
+}

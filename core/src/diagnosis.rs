@@ -38,7 +38,7 @@ impl<'a> Diagnosis<'a> {
         Self::after(Survey::new(path, records, profile.check_self_intersections, limits, progress)?, path, profile)
     }
 
-    /// What a survey comes to.
+    /// The diagnosis of a survey.
     pub(crate) fn after(survey: Survey<'a>, path: &Path, profile: &Profile) -> Result<Self> {
         let submesh = Submesh::gather(&survey);
         let edges = Edges::of(&submesh);

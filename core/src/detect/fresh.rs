@@ -117,7 +117,7 @@ impl Search {
     ) -> Found {
         let mut found = Found::default();
         let (lo, hi) = cell.ends();
-        // What else a cell's pairs are of meets the cell, too: the index of all finds it, and other cells' pairs are left to them.
+        // Both triangles of a cell's pair meet the cell: the index of all finds the other one, and other cells' pairs are left to them.
         let mut here = Vec::new();
         fresh.tree.meeting(&Bounds { lo, hi }, &mut here);
         if here.is_empty() {
@@ -158,7 +158,7 @@ impl Search {
     }
 }
 
-/// What is asked of pairs, and by which cell.
+/// The question that a cell asks of its pairs.
 #[derive(Clone, Copy)]
 struct Asked {
     cell: HomeBox,

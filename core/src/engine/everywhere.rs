@@ -9,10 +9,10 @@ use memmap2::Mmap;
 
 use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
-use crate::contract::report::{Repair, RepairName, Report};
+use crate::contract::report::{RepairName, Report};
 use crate::contract::settings::{Limits, Profile};
 use crate::diagnosis::Diagnosis;
-use crate::io::disk_space::{self, Need};
+use crate::engine::judging;
 use crate::io::read::MeshFile;
 use crate::io::read_ahead::Guide;
 use crate::io::record::{self, Record};
@@ -21,6 +21,7 @@ use crate::output::edit::Edit;
 use crate::repairs::{DUPLICATE_NOTE, ORIENT_NOTE};
 use crate::topology::everywhere::{self, Everywhere};
 use crate::topology::survey::Survey;
+use crate::util::bits;
 
 /// Counts of the input that are those of the copy.
 const NOT_COUNTED: [&str; 8] = [
@@ -104,10 +105,8 @@ impl SetRight {
         before.at_least.sort_unstable();
         before.at_least.dedup();
         for (name, count, note) in [(RepairName::Orient, turns, ORIENT_NOTE), (RepairName::Duplicate, copies, DUPLICATE_NOTE)] {
-            match report.repairs.iter_mut().find(|repair| repair.name == name) {
-                Some(repair) => repair.count += count,
-                None if count > 0 => report.repairs.insert(0, Repair { name, count, note: note.into(), seconds: 0.0 }),
-                None => {}
+            if count > 0 {
+                judging::add_first(report, name, count, note);
             }
         }
     }
@@ -116,31 +115,28 @@ impl SetRight {
 /// The records as they are set right, in a file without a name, and those of them that were turned.
 fn copied(path: &Path, records: &[Record], found: &Everywhere, limits: &Limits) -> Result<(Mmap, Vec<u64>)> {
     const PIECE: usize = 1 << 14;
-    let folder = limits.spool_folder();
     let left = records.len() - found.copies as usize;
-    let bytes = (left * size_of::<Record>()) as u64;
-    disk_space::check(path, &[Need { folder: folder.clone(), bytes, what: "the triangles as they are set right" }])?;
-    let (file, behind) = write_behind::nameless(&folder, limits)?;
-    let spooling = || Error::io(&folder, "spooling");
+    let need = ((left * size_of::<Record>()) as u64, "the triangles as they are set right");
     let guide = Guide::new(records.as_flattened(), limits);
-    let is_set = |bits: &[u64], t: usize| bits[t / 64] >> (t % 64) & 1 == 1;
     let (mut piece, mut t) = (Vec::with_capacity(PIECE), 0);
     let (mut turned, mut to) = (vec![0; left.div_ceil(64)], 0);
-    for block in guide.blocks(records).flat_map(|block| block.chunks(PIECE)) {
-        piece.clear();
-        for record in block {
-            if !is_set(&found.gone, t) {
-                let turns = is_set(&found.turned, t);
-                piece.push(if turns { record::flip(record) } else { *record });
-                turned[to / 64] |= u64::from(turns) << (to % 64);
-                to += 1;
+    let file = write_behind::spooled(path, limits, need, |append| {
+        for block in guide.blocks(records).flat_map(|block| block.chunks(PIECE)) {
+            piece.clear();
+            for record in block {
+                if !bits::holds(&found.gone, t) {
+                    let turns = bits::holds(&found.turned, t);
+                    piece.push(if turns { record::flip(record) } else { *record });
+                    turned[to / 64] |= u64::from(turns) << (to % 64);
+                    to += 1;
+                }
+                t += 1;
             }
-            t += 1;
+            append(piece.as_flattened())?;
         }
-        behind.append(piece.as_flattened()).map_err(spooling())?;
-    }
-    behind.finish().map_err(spooling())?;
+        Ok(())
+    })?;
     // SAFETY: the file has no name and this is its only handle: nobody else changes or truncates it.
-    let map = unsafe { Mmap::map(&file) }.map_err(Error::io(&folder, "mapping"))?;
+    let map = unsafe { Mmap::map(&file) }.map_err(Error::io(&limits.spool_folder(), "mapping"))?;
     Ok((map, turned))
 }

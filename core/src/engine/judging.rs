@@ -5,7 +5,8 @@ use std::path::Path;
 use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::report::{
-    BoundaryLoops, Certificate, Cost, Defects, EditSummary, FileFacts, Outcome, Regions, Report, SCHEMA_VERSION, Task, Tolerances,
+    BoundaryLoops, Certificate, Cost, Defects, EditSummary, FileFacts, Outcome, Regions, Repair, RepairName, Report,
+    SCHEMA_VERSION, Task, Tolerances,
 };
 use crate::contract::settings::{Bodies, Hollow, Limits, Profile};
 use crate::detect::certificate;
@@ -167,6 +168,14 @@ pub(crate) fn conclude(report: &mut Report, input: &[Finding], (surface, evidenc
     report.certificate = Some(Certificate { faithful, ..certify(&facts, &defects, &flaws) });
     report.after = Some(defects);
     report.output = Some(facts);
+}
+
+/// Adds to a report what the stream did before all repairs: to what the same repair did, or as the first.
+pub(crate) fn add_first(report: &mut Report, name: RepairName, count: u64, note: &str) {
+    match report.repairs.iter_mut().find(|repair| repair.name == name) {
+        Some(repair) => repair.count += count,
+        None => report.repairs.insert(0, Repair { name, count, note: note.into(), seconds: 0.0 }),
+    }
 }
 
 /// Says of a result that is not good what would make it so.

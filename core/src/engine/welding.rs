@@ -4,9 +4,10 @@
 
 use crate::contract::error::Result;
 use crate::contract::progress::Progress;
-use crate::contract::report::{Defects, EditSummary, Repair, RepairName, Report};
+use crate::contract::report::{Defects, EditSummary, RepairName, Report};
 use crate::contract::settings::{Limits, Profile};
 use crate::diagnosis;
+use crate::engine::judging;
 use crate::io::read::MeshFile;
 use crate::io::read_ahead::Guide;
 use crate::output::edit::Edit;
@@ -68,14 +69,7 @@ pub(crate) fn tell(report: &mut Report, counts: &Counts, (mesh, edit): (&MeshFil
         at_least: NOT_COUNTED.map(String::from).to_vec(),
         ..Defects::default()
     };
-    let weld = report.repairs.iter_mut().find(|repair| repair.name == RepairName::ToleranceWeld);
-    match weld {
-        Some(weld) => weld.count += counts.moved,
-        None => {
-            let (name, note) = (RepairName::ToleranceWeld, WELD_NOTE.into());
-            report.repairs.insert(0, Repair { name, count: counts.moved, note, seconds: 0.0 });
-        }
-    }
+    judging::add_first(report, RepairName::ToleranceWeld, counts.moved, WELD_NOTE);
     let (before, after) = (mesh.as_it_came(), mesh.records());
     let twice = edit.gone_records().filter(|t| before.get(*t as usize) != after.get(*t as usize)).count() as u64;
     let only_welded = counts.moved_triangles - twice;

@@ -15,6 +15,7 @@ use crossbeam::channel::{Sender, bounded};
 
 use crate::contract::error::{Error, Result};
 use crate::contract::settings::Limits;
+use crate::io::disk_space::{self, Need};
 use crate::util::parallel;
 
 /// What is written between two pushes, a share of the budget between these.
@@ -83,6 +84,22 @@ pub(crate) fn nameless(folder: &Path, limits: &Limits) -> Result<(File, WriteBeh
     let file = tempfile::tempfile_in(folder).map_err(making())?;
     let behind = WriteBehind::new(&file, limits).map_err(making())?;
     Ok((file, behind))
+}
+
+/// A file without a name where spools go, with what `fill` appends. Without room for so many bytes it is refused, in the name of `path`, before it begins.
+pub(crate) fn spooled(
+    path: &Path,
+    limits: &Limits,
+    (bytes, what): (u64, &'static str),
+    fill: impl FnOnce(&mut dyn FnMut(&[u8]) -> Result<()>) -> Result<()>,
+) -> Result<File> {
+    let folder = limits.spool_folder();
+    disk_space::check(path, &[Need { folder: folder.clone(), bytes, what }])?;
+    let (file, behind) = nameless(&folder, limits)?;
+    let spooling = || Error::io(&folder, "spooling");
+    fill(&mut |bytes| behind.append(bytes).map_err(spooling()))?;
+    behind.finish().map_err(spooling())?;
+    Ok(file)
 }
 
 /// Bytes written between two pushes.

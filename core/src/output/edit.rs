@@ -1,7 +1,5 @@
 //! The sparse edit: which input records leave, turn or change, and what is added. Everything else is untouched.
 
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use crate::contract::report::{EditRecords, EditSummary, FaceOrigin, RepairName};
 use crate::geometry::distance::distance;
 use crate::io::read_ahead::ASKED_AT_ONCE;
@@ -9,6 +7,7 @@ use crate::io::record::{self, Record};
 use crate::submesh::components::Reversed;
 use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
+use crate::util::bits::{self, Shared};
 
 /// The change of an input record that is not untouched.
 #[derive(Clone, Debug, PartialEq)]
@@ -105,9 +104,8 @@ impl Edit {
             other => other,
         });
         edit.added_from = of_added.collect();
-        let count = |bits: &[u64]| bits.iter().map(|word| u64::from(word.count_ones())).sum::<u64>();
-        edit.flips = count(&edit.flipped);
-        edit.deletions = count(&edit.dropped) + edit.changes.iter().filter(|c| c.1 == Change::Delete).count() as u64;
+        edit.flips = bits::count(&edit.flipped);
+        edit.deletions = bits::count(&edit.dropped) + edit.changes.iter().filter(|c| c.1 == Change::Delete).count() as u64;
         edit
     }
 
@@ -321,17 +319,17 @@ pub(crate) fn records_of(survey: &Survey<'_>, wanted: impl Fn(u32) -> bool + Syn
     if !(0..survey.regions.len() as u32).any(&wanted) {
         return (Vec::new(), 0);
     }
-    let bits: Vec<AtomicU64> = std::iter::repeat_with(AtomicU64::default).take(survey.records.len().div_ceil(64)).collect();
+    let records = Shared::none(survey.records.len());
     let counts = survey.visit_regular(
         wanted,
         |_| Some(0),
         |_, _| true,
         |count: &mut u64, triangle, _| {
-            bits[triangle as usize / 64].fetch_or(1 << (triangle % 64), Ordering::Relaxed);
+            records.put(triangle);
             *count += 1;
         },
     );
-    (bits.into_iter().map(AtomicU64::into_inner).collect(), counts.into_iter().sum())
+    (records.into_bits(), counts.into_iter().sum())
 }
 
 /// The first bit that is set from `at` on, or past the end.

@@ -20,7 +20,6 @@ use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::settings::Limits;
 use crate::geometry::distance::Tolerance;
-use crate::io::disk_space::{self, Need};
 use crate::io::read_ahead::Guide;
 use crate::io::record::{self, Record};
 use crate::io::write_behind;
@@ -94,17 +93,12 @@ pub(crate) fn weld(
 
 /// A copy of the records, in a file without a name.
 fn copied(path: &Path, records: &[Record], guide: &Guide<'_>, limits: &Limits) -> Result<MmapMut> {
-    let folder = limits.spool_folder();
-    let bytes = size_of_val(records) as u64;
-    disk_space::check(path, &[Need { folder: folder.clone(), bytes, what: "the triangles after the weld" }])?;
-    let (file, behind) = write_behind::nameless(&folder, limits)?;
-    let spooling = || Error::io(&folder, "spooling");
-    for block in guide.blocks(records) {
-        behind.append(block.as_flattened()).map_err(spooling())?;
-    }
-    behind.finish().map_err(spooling())?;
+    let need = (size_of_val(records) as u64, "the triangles after the weld");
+    let file = write_behind::spooled(path, limits, need, |append| {
+        guide.blocks(records).try_for_each(|block| append(block.as_flattened()))
+    })?;
     // SAFETY: the file has no name and this is its only handle: nobody else changes or truncates it.
-    unsafe { MmapMut::map_mut(&file) }.map_err(Error::io(&folder, "mapping"))
+    unsafe { MmapMut::map_mut(&file) }.map_err(Error::io(&limits.spool_folder(), "mapping"))
 }
 
 /// How many records are not what they were.

@@ -26,6 +26,7 @@ use crate::topology::crossings::{self, Crossings, Pair};
 use crate::topology::labels::Labels;
 use crate::topology::region_sums::RegionSums;
 use crate::topology::vertex_table::{Sieve, Weld};
+use crate::util::bits;
 use crate::util::ids::NONE;
 
 /// Topology of the regular part of a file, and the list of what is not regular.
@@ -315,7 +316,7 @@ impl<'a> Survey<'a> {
 
     /// Had a record been turned before it was surveyed?
     pub(crate) fn was_turned(&self, record: u32) -> bool {
-        self.turned.get(record as usize / 64).is_some_and(|word| word >> (record % 64) & 1 == 1)
+        bits::holds(&self.turned, record as usize)
     }
 
     /// Threads to work with.

@@ -82,7 +82,7 @@ impl<'a> Clearance<'a> {
         if self.latest.iter().any(|i| pierces(*i)) || collinear(&corners[0], &corners[1], &corners[2]) {
             return false;
         }
-        // What stands in the way does not have to be told from the mesh any more.
+        // The mesh is known to be in the way, so it need not be told any more whether rim or mesh refuses a triangle.
         if self.mesh_in_the_way && self.met.iter().any(|i| meets(*i)) {
             return false;
         }

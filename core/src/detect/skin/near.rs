@@ -111,7 +111,7 @@ fn value(square: &AtomicU64) -> f64 {
     f64::from_bits(square.load(Relaxed))
 }
 
-/// What is asked of points, and the distance beyond which nothing is.
+/// The question that is asked of points, and the distance beyond which nothing is.
 #[derive(Clone, Copy)]
 struct Wanted {
     reach: f64,

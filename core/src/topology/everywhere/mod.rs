@@ -20,6 +20,7 @@ use crate::stream::members::Members;
 use crate::stream::plan::Plan;
 use crate::stream::source::Source;
 use crate::topology::solving;
+use crate::util::bits::{self, Shared};
 use crate::util::ids::NONE;
 
 mod chunk;
@@ -74,7 +75,7 @@ pub(crate) fn look(path: &Path, records: &[Record], limits: &Limits, progress: &
     let contradictions = chunks.iter().map(|c| c.contradictions).sum::<u64>();
     let fates = Fates::of(&mut chunks, contradictions as f64 >= CONTRADICTING * records.len() as f64);
     let [gone, turned] = stream.apply(&chunks, &fates);
-    let [copies, turns] = [&gone, &turned].map(|bits| bits.iter().map(|word| u64::from(word.count_ones())).sum::<u64>());
+    let [copies, turns] = [&gone, &turned].map(|records| bits::count(records));
     Ok((copies + turns > 0).then_some(Everywhere { gone, turned, copies, turns, contradictions }))
 }
 
@@ -112,9 +113,7 @@ impl Stream<'_, '_> {
 
     /// The records that go, and those that turn. Every chunk that sees a triangle says the same of it.
     fn apply(&self, chunks: &[Pieces], fates: &Fates) -> [Vec<u64>; 2] {
-        let words = self.records.len().div_ceil(64);
-        let both = [(); 2].map(|()| std::iter::repeat_with(AtomicU64::default).take(words).collect::<Vec<_>>());
-        let set = |bits: &[AtomicU64], t: u32| bits[t as usize / 64].fetch_or(1 << (t % 64), Ordering::Relaxed);
+        let [gone, turned] = [(); 2].map(|()| Shared::none(self.records.len()));
         let source = (self.records, self.guide, self.plan);
         self.members.each(
             source,
@@ -127,17 +126,17 @@ impl Stream<'_, '_> {
                 let (mut labels, mut i) = (told.labels.iter(), 0);
                 seen.for_each(|t, _| {
                     let fate = fates.get(number, labels.next().unwrap_or(NONE));
-                    let [is_odd, is_copy] = [&told.odd, &told.copies].map(|bits| bits[i / 64] >> (i % 64) & 1 == 1);
+                    let [is_odd, is_copy] = [&told.odd, &told.copies].map(|of| bits::holds(of, i));
                     i += 1;
                     if fate.drops_copies && is_copy {
-                        set(&both[0], t);
+                        gone.put(t);
                     } else if fate.turns == Some(is_odd) {
-                        set(&both[1], t);
+                        turned.put(t);
                     }
                 });
             },
         );
-        both.map(|bits| bits.into_iter().map(AtomicU64::into_inner).collect())
+        [gone, turned].map(Shared::into_bits)
     }
 }
 

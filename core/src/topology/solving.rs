@@ -144,8 +144,8 @@ impl Solving<'_, '_> {
             Scratch::default,
             |scratch, chunk, seen, visitors| {
                 // Too much to keep may be too much that is irregular: the same is found in any memory.
-                let is_all_counted = most_irregular.is_none_or(|most| found.corners() > most);
-                if self.progress.cancelled() || is_all_counted && (most_irregular.is_some() || self.budget.is_exceeded()) {
+                let is_enough = most_irregular.map_or_else(|| self.budget.is_exceeded(), |most| found.corners() > most);
+                if self.progress.cancelled() || is_enough {
                     return ChunkTopology::default();
                 }
                 let cell = self.plan.home_box(chunk);

@@ -119,9 +119,10 @@ fn count(
     let hit = |corners: &[[f32; 3]; 3], component: u32, sign: i32, hits: &mut Hits| {
         cross(&grid, rays, corners, |ray| counts(ray, component), |ray, w| hits.push((ray as u32, component, sign * w)));
     };
-    let per_chunk = survey.visit_regular(
+    let per_chunk = survey.visit_regular_near(
         is_asked,
         |reach| Over::new(rays, &grid, reach).map(|over| (over, Hits::new())),
+        |(over, _), bounds| over.may_meet(&grid, &spanning(bounds)),
         |(over, _), corners| over.may_meet(&grid, corners),
         |(_, hits): &mut (Over, Hits), triangle, region| {
             let corners = record::corners(&survey.records[triangle as usize]);
@@ -210,12 +211,13 @@ pub(crate) fn obstructed(
 ) -> Vec<Vec<bool>> {
     let bundles: Vec<Bundle> = asked.iter().map(|(direction, sources)| Bundle::of(*direction, sources)).collect();
     if bundles.iter().any(|bundle| !bundle.sources.is_empty()) {
-        survey.visit_regular(
+        survey.visit_regular_near(
             |region| components.of_region[region as usize] != NONE,
             |reach| {
                 let over: Vec<(&Bundle, Over)> = bundles.iter().filter_map(|b| Some((b, b.upright.over(reach)?))).collect();
                 (!over.is_empty()).then_some(over)
             },
+            |over, bounds| over.iter().any(|(bundle, over)| bundle.upright.may_meet_box(over, bounds)),
             |over, corners| over.iter().any(|(bundle, over)| bundle.upright.may_meet(over, corners)),
             |over, triangle, region| {
                 let corners = record::corners(&survey.records[triangle as usize]);
@@ -252,6 +254,10 @@ impl Upright {
     #[inline(always)]
     fn may_meet(&self, over: &Over, corners: &[[f32; 3]; 3]) -> bool {
         over.may_meet(&self.grid, &self.direction.upright_corners(corners))
+    }
+
+    fn may_meet_box(&self, over: &Over, bounds: &Bounds) -> bool {
+        over.may_meet(&self.grid, &spanning(&self.direction.upright_box(bounds)))
     }
 }
 
@@ -305,12 +311,13 @@ pub(crate) fn are_surrounded(survey: &Survey<'_>, submesh: &Submesh, points: &[[
         let Upright { direction, rays, grid } = &all[way];
         cross(grid, rays, &direction.upright_corners(corners), |_| true, |ray, w| hits.push((way, ray, w)));
     };
-    let per_chunk = survey.visit_regular(
+    let per_chunk = survey.visit_regular_near(
         |_| true,
         |reach| {
             let over: Vec<(usize, Over)> = (0..all.len()).filter_map(|way| Some((way, all[way].over(reach)?))).collect();
             (!over.is_empty()).then_some((over, Hits::new()))
         },
+        |(over, _), bounds| over.iter().any(|(way, over)| all[*way].may_meet_box(over, bounds)),
         |(over, _), corners| over.iter().any(|(way, over)| all[*way].may_meet(over, corners)),
         |(over, hits), triangle, _| {
             let corners = record::corners(&survey.records[triangle as usize]);
@@ -373,8 +380,7 @@ impl Over {
             within(0) && within(1) && ray[2] <= f64::from(reach.hi[2])
         };
         let mut few = Vec::new();
-        let corners = [reach.lo, reach.hi, reach.hi];
-        for ray in grid.under(flat(&corners)).map(|r| &rays[r]).filter(inside) {
+        for ray in grid.under(flat(&spanning(reach))).map(|r| &rays[r]).filter(inside) {
             if few.len() == Self::FEW {
                 return Some(Self::Many);
             }
@@ -396,6 +402,11 @@ impl Over {
             Self::Many => grid.may_meet(flat(corners)),
         }
     }
+}
+
+/// Three points that have this box.
+fn spanning(bounds: &Bounds) -> [[f32; 3]; 3] {
+    [bounds.lo, bounds.hi, bounds.hi]
 }
 
 /// The largest f32 that is not above `x`, and the smallest that is not below.

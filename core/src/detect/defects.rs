@@ -21,7 +21,7 @@ pub(crate) fn count(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, toler
     let (components, by_edges) = parallel::both(
         threads,
         || Components::of(survey, submesh, edges, &reversed, Through::EveryEdge),
-        || count_by_edges(submesh, edges, tolerance),
+        || count_by_edges(submesh, edges, tolerance, threads),
     );
     let degenerate_index = submesh.triangles.len() as u64 - submesh.living().count() as u64;
     let uses: usize = edges.iter().map(|e| e.uses.len()).sum();
@@ -58,7 +58,7 @@ pub(crate) fn count(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, toler
 }
 
 /// What the submesh's edges and triangles tell without what hangs together beyond it.
-fn count_by_edges(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> Defects {
+fn count_by_edges(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance, threads: usize) -> Defects {
     let (duplicates_same, duplicates_opposite) = duplicates(submesh);
     Defects {
         degenerate_area: submesh.living().filter(|t| submesh.is_collinear(*t)).count() as u64,
@@ -70,8 +70,8 @@ fn count_by_edges(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> De
         nonmanifold_vertices: components::nonmanifold_vertices(submesh, edges).len() as u64,
         inconsistent_edges: edges.iter().filter(|e| e.is_inconsistent()).count() as u64,
         unbalanced_edges: edges.iter().filter(|e| e.is_unbalanced()).count() as u64,
-        noncommon_vertices: near::noncommon_vertices(submesh, edges, tolerance).len() as u64,
-        weldable_vertices: near::weldable_vertices(submesh, edges, tolerance).len() as u64,
+        noncommon_vertices: near::noncommon_vertices(submesh, edges, tolerance, threads).len() as u64,
+        weldable_vertices: near::weldable_vertices(submesh, edges, tolerance, threads).len() as u64,
         ..Defects::default()
     }
 }

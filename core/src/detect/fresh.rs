@@ -13,10 +13,11 @@ use crate::geometry::sums::Bounds;
 use crate::geometry::tri_tri::{self, Contact, Triangle as Corners, common};
 use crate::io::record;
 use crate::stream::plan::HomeBox;
-use crate::stream::source::{Seen, Source, Triangle};
+use crate::stream::source::{Seen, Triangle};
 use crate::topology::crossings::{Crossings, Pair, most_tested};
 use crate::topology::intersect::leave_out_apart;
 use crate::topology::survey::Survey;
+use crate::util::parallel;
 
 /// All self-intersections of the written file, numbered as its records are; `None` if those of the input are not all known, or too many
 /// boxes meet. O(n) boxes are held against a grid of the fresh ones around.
@@ -53,7 +54,9 @@ pub(crate) fn met_by(
     triangles: u64,
     meets: Meets,
 ) -> Option<Vec<Pair>> {
-    let [fresh, beside] = [Solids::of(fresh), Solids::of(beside)];
+    let [fresh, beside]: [Vec<(u32, Corners)>; 2] = [fresh.collect(), beside.collect()];
+    let threads = survey.threads();
+    let (fresh, beside) = parallel::both(threads, || Solids::of(&fresh, threads), || Solids::of(&beside, threads));
     let per_chunk =
         survey.each_chunk(Search::default, |search, cell, seen| search.chunk(&fresh, &beside, &is_gone, (cell, meets), seen));
     if per_chunk.iter().map(|found| found.tested).sum::<u64>() > most_tested(triangles) {
@@ -85,8 +88,8 @@ struct Solids {
 }
 
 impl Solids {
-    fn of(triangles: impl Iterator<Item = (u32, Corners)>) -> Self {
-        let all: Vec<Solid> = triangles.filter_map(|(place, corners)| Solid::of(place, corners)).collect();
+    fn of(triangles: &[(u32, Corners)], threads: usize) -> Self {
+        let all = parallel::gather(threads, triangles, |_, (_, (place, corners)), all| all.extend(Solid::of(place, corners)));
         let tree = BoxTree::new(&all.iter().map(|f| f.bounds).collect::<Vec<_>>());
         Self { all, tree }
     }
@@ -137,20 +140,21 @@ impl Search {
             }
         }
         self.grid.mark(here.iter().map(|i| fresh.all[*i as usize].bounds));
+        let Self { met, grid } = self;
         for triangles in seen {
-            triangles.for_each(|place, triangle| {
+            triangles.each_near(&mut found, &|_, bounds| grid.may_meet(bounds), |found, _, place, triangle| {
                 let corners = triangle.corners();
                 let bounds = Bounds::of(&corners);
-                if !self.grid.may_meet(&bounds) {
+                if !grid.may_meet(&bounds) {
                     return;
                 }
-                self.met.clear();
-                fresh.tree.each_meeting(&bounds, |i| self.met.push(i));
-                if self.met.is_empty() || is_gone(place) {
+                met.clear();
+                fresh.tree.each_meeting(&bounds, |i| met.push(i));
+                if met.is_empty() || is_gone(place) {
                     return;
                 }
                 if let Some(one) = Solid::of(place, corners) {
-                    found.test(asked, &one, &mut self.met, |i| &fresh.all[i as usize], false);
+                    found.test(asked, &one, met, |i| &fresh.all[i as usize], false);
                 }
             });
         }

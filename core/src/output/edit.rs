@@ -322,8 +322,7 @@ pub(crate) fn records_of(survey: &Survey<'_>, wanted: impl Fn(u32) -> bool + Syn
     let records = Shared::none(survey.records.len());
     let counts = survey.visit_regular(
         wanted,
-        |_| Some(0),
-        |_, _| true,
+        || 0,
         |count: &mut u64, triangle, _| {
             records.put(triangle);
             *count += 1;

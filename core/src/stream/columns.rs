@@ -46,7 +46,7 @@ impl CellColumns {
     }
 }
 
-/// Smallest and largest coordinates of finite corners.
+/// Smallest and largest coordinates of corners. A record that holds something that is no number may be left out as a whole.
 pub(crate) struct Extremes {
     front: [Vec4; 2],
     back: [Vec4; 2],
@@ -58,8 +58,9 @@ impl Extremes {
 
     #[inline(always)]
     pub(crate) fn include(&mut self, Columns([a, b, c]): &Columns) {
-        self.front = [self.front[0].min(a.min(*b)), self.front[1].max(a.max(*b))];
-        self.back = [self.back[0].min(*c), self.back[1].max(*c)];
+        // In this order: of two values, one of which is no number, the instruction takes the second.
+        self.front = [a.min(*b).min(self.front[0]), a.max(*b).max(self.front[1])];
+        self.back = [c.min(self.back[0]), c.max(self.back[1])];
     }
 
     pub(crate) fn add_to(&self, bounds: &mut Bounds) {

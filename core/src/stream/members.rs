@@ -19,6 +19,7 @@ use crate::stream::columns::{CellColumns, Columns, Extremes};
 use crate::stream::plan::{ChunkId, HomeBox, Plan};
 use crate::stream::source::{Mapped, Seen, Spooled};
 use crate::stream::spool::{self, Loaded, Spool, Unsorted};
+use crate::stream::stretches::{self, Stretches};
 use crate::util::parallel;
 
 /// Who sees what, and what the same pass learns about the whole file.
@@ -39,6 +40,7 @@ enum Kept {
     Lists {
         members: Vec<Vec<RunList>>,
         visitors: Vec<Vec<RunList>>,
+        stretches: Stretches,
     },
     Spool(Spool),
 }
@@ -51,12 +53,17 @@ trait Take {
     fn take(&mut self, members: &[ChunkId], visitors: &[ChunkId], number: u32, record: &Record);
     /// Is it of no use to go on?
     fn given_up(&self) -> bool;
+    /// Told at every [`stretches::SHORTEST`]th record of a piece, with all that follow in it.
+    fn go_on(&mut self, at: usize, rest: &[Record]);
 }
 
 /// Lists of one piece.
 struct Lists<'a> {
     members: Vec<RunList>,
     visitors: Vec<RunList>,
+    /// By stretch, each of so many records.
+    boxes: Vec<Bounds>,
+    stretch: usize,
     /// Bytes not yet counted in `held`.
     uncounted: usize,
     /// Bytes in the lists of all pieces, and how many there may be.
@@ -89,6 +96,12 @@ impl Take for Lists<'_> {
     fn given_up(&self) -> bool {
         is_too_much(self.held, self.most)
     }
+
+    fn go_on(&mut self, at: usize, rest: &[Record]) {
+        if at.is_multiple_of(self.stretch) {
+            self.boxes.push(stretches::bounds(&rest[..rest.len().min(self.stretch)]));
+        }
+    }
 }
 
 /// While a list grows, it takes up to three times its bytes.
@@ -108,6 +121,8 @@ impl Take for spool::Writer<'_> {
     fn given_up(&self) -> bool {
         self.has_failed()
     }
+
+    fn go_on(&mut self, _: usize, _: &[Record]) {}
 }
 
 /// Findings made in passing.
@@ -166,28 +181,33 @@ impl Members {
     ) -> Option<Self> {
         // More pieces than threads only even out the load: lists of all pieces together say the same for any number of pieces.
         let pieces = if records.len() < 1 << 16 { 1 } else { threads * 4 };
+        let stretch = Stretches::length(records.len());
         let held = AtomicU64::new(0);
         let empty = || vec![RunList::default(); plan.chunks()];
-        let results = in_pieces(records, threads, pieces, |piece, offset| {
-            let mut lists = Lists { members: empty(), visitors: empty(), uncounted: 0, held: &held, most };
+        let results = in_pieces((records, stretch), threads, pieces, |piece, offset| {
+            let boxes = Vec::with_capacity(piece.len().div_ceil(stretch));
+            let mut lists = Lists { members: empty(), visitors: empty(), boxes, stretch, uncounted: 0, held: &held, most };
             let passing = gather_piece((piece, guide), offset, plan, visitors, &mut lists, told);
             held.fetch_add(lists.uncounted as u64, Ordering::Relaxed);
             lists.members.iter_mut().chain(&mut lists.visitors).for_each(RunList::shrink);
-            (lists.members, lists.visitors, passing)
+            (lists.members, lists.visitors, lists.boxes, passing)
         });
         if is_too_much(&held, most) {
             return None;
         }
         let (mut all, mut all_visitors) = (vec![Vec::new(); plan.chunks()], vec![Vec::new(); plan.chunks()]);
         let mut passed = Passing::NOTHING;
-        for (members, visitors, passing) in results {
+        let mut boxes = Vec::with_capacity(records.len().div_ceil(stretch));
+        for (members, visitors, own, passing) in results {
             passed.add(passing);
+            boxes.extend(own);
             for (lists, of_chunks) in [(members, &mut all), (visitors, &mut all_visitors)] {
                 let filled = lists.into_iter().zip(of_chunks).filter(|(list, _)| !list.is_empty());
                 filled.for_each(|(list, of_chunk)| of_chunk.push(list));
             }
         }
-        Some(Self::of(Kept::Lists { members: all, visitors: all_visitors }, passed))
+        let stretches = Stretches::new(boxes, stretch);
+        Some(Self::of(Kept::Lists { members: all, visitors: all_visitors, stretches }, passed))
     }
 
     fn spool(
@@ -203,7 +223,7 @@ impl Members {
         disk_space::check(path, &[need])?;
         let spool = Unsorted::new(path, spool::Layout::new(records.len(), plan, limits), plan, limits)?;
         // One piece a thread: every piece ends with extents that are not full.
-        let results = in_pieces(records, limits.threads, limits.threads, |piece, offset| {
+        let results = in_pieces((records, 1), limits.threads, limits.threads, |piece, offset| {
             let mut writer = spool.writer(plan.chunks());
             let passing = gather_piece((piece, guide), offset, plan, visitors, &mut writer, told);
             (writer.finish(), passing)
@@ -233,7 +253,7 @@ impl Members {
         work: impl Fn(&mut S, ChunkId, &Seen<'_>, &Seen<'_>) -> R + Sync,
     ) -> Vec<R> {
         match &self.kept {
-            Kept::Lists { members, visitors } => {
+            Kept::Lists { members, visitors, stretches } => {
                 let chunks: Vec<ChunkId> = (0..members.len() as u32).map(ChunkId).filter(|c| wanted(*c)).collect();
                 let group = guide.group(members.len());
                 let ask = |group: &[ChunkId]| {
@@ -249,7 +269,8 @@ impl Members {
                         let this = groups.next().filter(|_| i == 0);
                         this.into_iter().chain(groups.next()).for_each(ask);
                     }
-                    let seen = [members, visitors].map(|lists| Mapped { records, lists: &lists[chunks[i].0 as usize] });
+                    let seen =
+                        [members, visitors].map(|lists| Mapped { records, lists: &lists[chunks[i].0 as usize], stretches });
                     let [members, visitors] = seen.map(Seen::Mapped);
                     work(scratch, chunks[i], &members, &visitors)
                 })
@@ -273,7 +294,7 @@ impl Members {
     /// How many triangles `chunk` sees, visitors included.
     pub(crate) fn count(&self, chunk: ChunkId) -> u64 {
         match &self.kept {
-            Kept::Lists { members, visitors } => {
+            Kept::Lists { members, visitors, .. } => {
                 let lists = members[chunk.0 as usize].iter().chain(&visitors[chunk.0 as usize]);
                 lists.flat_map(RunList::runs).map(|(_, count)| u64::from(count)).sum()
             }
@@ -284,10 +305,10 @@ impl Members {
     /// Bytes held, with what [`Self::each`] takes on so many threads.
     pub(crate) fn heap_bytes(&self, threads: usize) -> u64 {
         let kept = match &self.kept {
-            Kept::Lists { members, visitors } => {
+            Kept::Lists { members, visitors, stretches } => {
                 let both = || members.iter().chain(visitors);
                 let pieces = both().flatten().map(|l| l.heap_bytes() + size_of::<RunList>()).sum::<usize>();
-                (pieces + both().count() * size_of::<Vec<RunList>>()) as u64
+                (pieces + both().count() * size_of::<Vec<RunList>>() + stretches.heap_bytes()) as u64
             }
             Kept::Spool(spool) => spool.heap_bytes() as u64 + spool.loaded_bytes(threads),
         };
@@ -295,9 +316,14 @@ impl Members {
     }
 }
 
-/// `work(piece, number of its first record)` on `pieces` stretches of the file, results in their order.
-fn in_pieces<R: Send>(records: &[Record], threads: usize, pieces: usize, work: impl Fn(&[Record], u32) -> R + Sync) -> Vec<R> {
-    let size = records.len().div_ceil(pieces.max(1)).max(1);
+/// `work(piece, number of its first record)` on `pieces` parts of the file, which begin at multiples of `whole` records; results in their order.
+fn in_pieces<R: Send>(
+    (records, whole): (&[Record], usize),
+    threads: usize,
+    pieces: usize,
+    work: impl Fn(&[Record], u32) -> R + Sync,
+) -> Vec<R> {
+    let size = records.len().div_ceil(pieces.max(1)).max(1).next_multiple_of(whole);
     parallel::map(threads, records.len().div_ceil(size), |piece| {
         let from = piece * size;
         work(&records[from..records.len().min(from + size)], from as u32)
@@ -353,7 +379,11 @@ impl Told<'_> {
     /// Records between two words.
     const EVERY: usize = 1 << 18;
 
-    fn step(&self) {
+    /// So many records of a piece were seen, a multiple of [`stretches::SHORTEST`].
+    fn at(&self, seen: usize) {
+        if !seen.is_multiple_of(Self::EVERY) {
+            return;
+        }
         let done = self.done.fetch_add(Self::EVERY as u64, Ordering::Relaxed) + Self::EVERY as u64;
         self.progress.at("plan", done.min(self.total), self.total);
     }
@@ -402,8 +432,9 @@ fn gather_piece(
     let (mut run_start, mut block_start) = (0usize, 0usize);
     for block in guide.blocks(records) {
         for (i, record) in (block_start..).zip(block) {
-            if (i + 1).is_multiple_of(Told::EVERY) {
-                told.step();
+            if i.is_multiple_of(stretches::SHORTEST) {
+                take.go_on(i, &records[i..]);
+                told.at(i + stretches::SHORTEST);
             }
             record::prefetch_after(record);
             let columns = Columns::of(record);

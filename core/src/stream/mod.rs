@@ -13,4 +13,5 @@ pub(crate) mod plan;
 pub(crate) mod run_list;
 pub(crate) mod source;
 pub(crate) mod spool;
+pub(crate) mod stretches;
 pub(crate) mod weld;

@@ -1,8 +1,10 @@
 //! Where triangles come from: the records of a mapped file, or the entries of a spool.
 
+use crate::geometry::sums::Bounds;
 use crate::io::record::{self, Point, Record};
 use crate::stream::run_list::RunList;
 use crate::stream::spool::{self, Entry};
+use crate::stream::stretches::Stretches;
 
 /// A triangle where it lies. Its corners are decoded only when they are asked for.
 pub(crate) trait Triangle: Copy {
@@ -40,6 +42,7 @@ pub(crate) struct Mapped<'a> {
     pub(crate) records: &'a [Record],
     /// Each goes on where the one before it ends.
     pub(crate) lists: &'a [RunList],
+    pub(crate) stretches: &'a Stretches,
 }
 
 impl<'a> Source for Mapped<'a> {
@@ -121,6 +124,38 @@ impl<'a> Source for Seen<'a> {
         match self {
             Self::Mapped(source) => source.for_each(|number, record| visit(number, Either::Record(record))),
             Self::Spooled(source) => source.for_each(|number, entry| visit(number, Either::Entry(entry))),
+        }
+    }
+}
+
+impl<'a> Seen<'a> {
+    /// As [`Source::for_each`], each triangle with its place among them. Passes over triangles whose stretch of the file lies in no box that is
+    /// `near`, as far as boxes are known. `state` is at hand for both.
+    #[inline(always)]
+    pub(crate) fn each_near<S>(
+        &self,
+        state: &mut S,
+        near: &impl Fn(&S, &Bounds) -> bool,
+        mut visit: impl FnMut(&mut S, usize, u32, Either<'a>),
+    ) {
+        match self {
+            Self::Mapped(source) => {
+                let mut before = 0;
+                for (first, count) in source.lists.iter().flat_map(RunList::runs) {
+                    source.stretches.each_near((first, count), state, near, |state, from, count| {
+                        let place = before + (from - first) as usize;
+                        for (i, record) in source.records[from as usize..from as usize + count as usize].iter().enumerate() {
+                            record::prefetch_after(record);
+                            visit(state, place + i, from + i as u32, Either::Record(record));
+                        }
+                    });
+                    before += count as usize;
+                }
+            }
+            Self::Spooled(source) => {
+                let all = source.entries.iter().enumerate();
+                all.for_each(|(place, entry)| visit(state, place, spool::number(entry), Either::Entry(entry)));
+            }
         }
     }
 }

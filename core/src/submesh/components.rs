@@ -53,41 +53,29 @@ pub(crate) struct Components {
 
 /// How far a component reaches.
 #[derive(Clone, Copy)]
-pub(crate) enum Through<'a> {
+pub(crate) enum Through {
     /// Through every edge, as the report counts.
     EveryEdge,
     /// Not through non-manifold edges: the sheets between them.
     ManifoldEdges,
     /// Nor through edges whose two triangles disagree on their directions.
     CoherentEdges,
-    /// Through non-manifold edges only between sheets (as given) that are open by themselves: bodies that touch along an edge stay
-    /// apart, and what is closed only together stays together.
-    OpenSheets(&'a Sheets),
 }
 
-impl Through<'_> {
+impl Through {
     /// Does a component reach through this edge to all of its triangles, whatever they belong to?
     pub(crate) fn reaches(self, edge: &Edge<'_>) -> bool {
         match self {
             Self::EveryEdge => true,
-            Self::ManifoldEdges | Self::OpenSheets(_) => !edge.is_nonmanifold(),
+            Self::ManifoldEdges => !edge.is_nonmanifold(),
             Self::CoherentEdges => !edge.is_nonmanifold() && !edge.is_inconsistent(),
-        }
-    }
-
-    /// Visits triangles at an edge that hang together through it, by twos.
-    fn joins(self, edge: &Edge<'_>, mut join: impl FnMut(u32, u32)) {
-        if self.reaches(edge) {
-            edge.uses[1..].iter().for_each(|u| join(edge.uses[0].triangle, u.triangle));
-        } else if let Self::OpenSheets(sheets) = self {
-            sheets.join_open(edge, join);
         }
     }
 }
 
 impl Components {
     /// O(regions + submesh). Components are numbered by their first region, then by their first triangle in the submesh.
-    pub(crate) fn of(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, reversed: &Reversed, through: Through<'_>) -> Self {
+    pub(crate) fn of(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, reversed: &Reversed, through: Through) -> Self {
         let regions = survey.regions.len() as u32;
         let mut parents: Vec<u32> = (0..regions + submesh.triangles.len() as u32).collect();
         for t in submesh.living() {
@@ -96,10 +84,10 @@ impl Components {
                 unite(&mut parents, region, regions + t);
             }
         }
-        for edge in edges.iter() {
-            through.joins(&edge, |a, b| {
-                unite(&mut parents, regions + a, regions + b);
-            });
+        for edge in edges.iter().filter(|edge| through.reaches(edge)) {
+            for other in &edge.uses[1..] {
+                unite(&mut parents, regions + edge.uses[0].triangle, regions + other.triangle);
+            }
         }
         let mut all =
             Self { list: Vec::new(), of_region: vec![NONE; regions as usize], of_triangle: vec![NONE; submesh.triangles.len()] };
@@ -125,21 +113,48 @@ impl Components {
         for t in submesh.living() {
             all.of_triangle[t as usize] = numbers[roots[(regions + t) as usize] as usize];
         }
-        for edge in edges.iter().filter(|e| e.is_nonmanifold() || e.is_unbalanced()) {
-            // Each component's own uses, forward less backward.
-            let mut own: Vec<(u32, i64)> =
-                edge.uses.iter().map(|u| (all.of_triangle[u.triangle as usize], if u.forward { 1 } else { -1 })).collect();
-            own.sort_unstable();
-            for group in own.chunk_by(|a, b| a.0 == b.0) {
-                all.list[group[0].0 as usize].open |= group.iter().map(|g| g.1).sum::<i64>() != 0;
-            }
-        }
+        all.note_open(edges);
         all
     }
 
-    /// These, between non-manifold edges, as sheets.
-    pub(crate) fn into_sheets(self, edges: &Edges) -> Sheets {
-        Sheets::of(self.of_triangle, self.list.iter().map(|c| c.open).collect(), edges)
+    /// Notes which ones are open.
+    fn note_open(&mut self, edges: &Edges) {
+        for edge in edges.iter().filter(|e| e.is_nonmanifold() || e.is_unbalanced()) {
+            // Each component's own uses, forward less backward.
+            let mut own: Vec<(u32, i64)> =
+                edge.uses.iter().map(|u| (self.of_triangle[u.triangle as usize], if u.forward { 1 } else { -1 })).collect();
+            own.sort_unstable();
+            for group in own.chunk_by(|a, b| a.0 == b.0) {
+                self.list[group[0].0 as usize].open |= group.iter().map(|g| g.1).sum::<i64>() != 0;
+            }
+        }
+    }
+
+    /// Of components between non-manifold edges: as they hang together where they are open by themselves, so that bodies that touch along an edge stay
+    /// apart, and what is closed only together stays together. O(components + edges + submesh), without another look at the geometry.
+    pub(crate) fn joined_where_open(self, edges: &Edges) -> Self {
+        let Self { list, of_region, of_triangle } = self;
+        let sheets = Sheets::of(&of_triangle, list.iter().map(|c| c.open).collect(), edges);
+        let mut parents: Vec<u32> = (0..list.len() as u32).collect();
+        for edge in edges.iter().filter(|edge| edge.is_nonmanifold()) {
+            sheets.join_open(&edge, |a, b| {
+                unite(&mut parents, of_triangle[a as usize], of_triangle[b as usize]);
+            });
+        }
+        let roots = union_find::roots(parents);
+        let mut numbers = vec![NONE; list.len()];
+        let mut all = Self { list: Vec::new(), of_region, of_triangle };
+        for (component, root) in list.into_iter().zip(&roots) {
+            let into = all.number(&mut numbers, *root, component.sample);
+            let into = &mut all.list[into as usize];
+            into.triangles += component.triangles;
+            into.bounds.add(&component.bounds);
+            into.extent += component.extent;
+        }
+        let now = |c: u32| roots.get(c as usize).map_or(NONE, |root| numbers[*root as usize]);
+        all.of_region.iter_mut().chain(&mut all.of_triangle).for_each(|c| *c = now(*c));
+        all.note_open(edges);
+        all
     }
 
     fn number(&mut self, numbers: &mut [u32], root: u32, sample: Sample) -> u32 {
@@ -235,14 +250,14 @@ mod tests {
     use super::*;
     use crate::testing::{Corners, cube, cuboid, diagnose, plate, records};
 
-    /// Components through every edge, between sheets, and by [`Through::OpenSheets`]: how many, and how many of them open.
+    /// Components through every edge, between sheets, and joined where these are open: how many, and how many of them open.
     fn counted(triangles: &[Corners]) -> [(usize, usize); 3] {
         let records = records(triangles);
         let d = diagnose(&records);
-        let of = |through| Components::of(&d.survey, &d.submesh, &Edges::of(&d.submesh), &Reversed::none(&d.survey), through);
-        let sheets = of(Through::ManifoldEdges).into_sheets(&Edges::of(&d.submesh));
-        [of(Through::EveryEdge), of(Through::ManifoldEdges), of(Through::OpenSheets(&sheets))]
-            .map(|c| (c.list.len(), c.list.iter().filter(|c| c.open).count()))
+        let edges = Edges::of(&d.submesh);
+        let of = |through| Components::of(&d.survey, &d.submesh, &edges, &Reversed::none(&d.survey), through);
+        let all = [of(Through::EveryEdge), of(Through::ManifoldEdges), of(Through::ManifoldEdges).joined_where_open(&edges)];
+        all.map(|c| (c.list.len(), c.list.iter().filter(|c| c.open).count()))
     }
 
     #[test]

@@ -6,6 +6,8 @@ use crate::geometry::boxes::BoxTree;
 pub(crate) use crate::geometry::distance::Tolerance;
 use crate::geometry::distance::{place, share_along};
 use crate::geometry::sums::Bounds;
+use crate::util::parallel;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 impl Tolerance {
     /// The tolerance at `v`.
@@ -24,7 +26,7 @@ pub(crate) fn boundary_vertices(edges: &Edges) -> Vec<Vertex> {
 
 /// Pairs of boundary vertices, smaller number first, within the tolerance that holds at both; sorted. Vertices joined by an edge
 /// are never within it.
-pub(crate) fn close_pairs(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> Vec<(Vertex, Vertex)> {
+pub(crate) fn close_pairs(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance, threads: usize) -> Vec<(Vertex, Vertex)> {
     let vertices = boundary_vertices(edges);
     if vertices.is_empty() || tolerance.weld <= 0.0 {
         return Vec::new();
@@ -32,16 +34,14 @@ pub(crate) fn close_pairs(submesh: &Submesh, edges: &Edges, tolerance: &Toleranc
     let reach: Vec<f64> = vertices.iter().map(|v| tolerance.at(submesh, *v)).collect();
     let boxes: Vec<Bounds> = vertices.iter().map(|v| around(&[submesh.positions[*v as usize]], 0.0)).collect();
     let tree = BoxTree::new(&boxes);
-    let mut found = Vec::new();
-    let mut pairs = Vec::new();
-    for (i, v) in vertices.iter().enumerate() {
-        tree.meeting(&around(&[submesh.positions[*v as usize]], reach[i]), &mut found);
-        for j in found.iter().map(|j| *j as usize).filter(|j| *j > i) {
-            if submesh.distance(*v, vertices[j]) <= reach[i].min(reach[j]) {
-                pairs.push((*v, vertices[j]));
+    let mut pairs = parallel::gather(threads, &vertices, |met, (i, v), pairs| {
+        tree.meeting(&around(&[submesh.positions[v as usize]], reach[i]), met);
+        for j in met.iter().map(|j| *j as usize).filter(|j| *j > i) {
+            if submesh.distance(v, vertices[j]) <= reach[i].min(reach[j]) {
+                pairs.push((v, vertices[j]));
             }
         }
-    }
+    });
     pairs.sort_unstable();
     pairs
 }
@@ -71,8 +71,8 @@ pub(crate) fn nearest_apart(submesh: &Submesh, vertices: &[Vertex], reach: &[f64
 }
 
 /// Boundary vertices within tolerance of another one.
-pub(crate) fn weldable_vertices(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> Vec<Vertex> {
-    let mut all: Vec<Vertex> = close_pairs(submesh, edges, tolerance).into_iter().flat_map(|(a, b)| [a, b]).collect();
+pub(crate) fn weldable_vertices(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance, threads: usize) -> Vec<Vertex> {
+    let mut all: Vec<Vertex> = close_pairs(submesh, edges, tolerance, threads).into_iter().flat_map(|(a, b)| [a, b]).collect();
     all.sort_unstable();
     all.dedup();
     all
@@ -91,7 +91,7 @@ pub(crate) struct OnEdge {
 
 /// Every boundary vertex that lies within `reach(vertex, edge length)` of the inside of a boundary edge whose triangle it does not
 /// belong to, with its nearest such edge, by edge and place on it.
-pub(crate) fn on_edges(submesh: &Submesh, edges: &Edges, reach: impl Fn(Vertex) -> f64) -> Vec<OnEdge> {
+pub(crate) fn on_edges(submesh: &Submesh, edges: &Edges, reach: impl Fn(Vertex) -> f64 + Sync, threads: usize) -> Vec<OnEdge> {
     let boundary: Vec<u32> = (0..edges.len() as u32).filter(|i| edges.get(*i as usize).is_boundary()).collect();
     if boundary.is_empty() {
         return Vec::new();
@@ -101,13 +101,11 @@ pub(crate) fn on_edges(submesh: &Submesh, edges: &Edges, reach: impl Fn(Vertex) 
         [submesh.positions[e.low as usize], submesh.positions[e.high as usize]]
     };
     let tree = BoxTree::new(&boundary.iter().map(|i| around(&ends(*i), 0.0)).collect::<Vec<_>>());
-    let mut found = Vec::new();
-    let mut all = Vec::new();
-    for v in boundary_vertices(edges) {
+    let mut all = parallel::gather(threads, &boundary_vertices(edges), |met, (_, v), all| {
         let (p, tolerance) = (submesh.positions[v as usize], reach(v));
-        tree.meeting(&around(&[p], tolerance), &mut found);
+        tree.meeting(&around(&[p], tolerance), met);
         let mut nearest: Option<OnEdge> = None;
-        for edge in found.iter().map(|i| boundary[*i as usize]) {
+        for edge in met.iter().map(|i| boundary[*i as usize]) {
             let triangle = edges.get(edge as usize).uses[0].triangle;
             if submesh.triangles[triangle as usize].v.contains(&v) {
                 continue;
@@ -122,42 +120,46 @@ pub(crate) fn on_edges(submesh: &Submesh, edges: &Edges, reach: impl Fn(Vertex) 
             }
         }
         all.extend(nearest);
-    }
+    });
     all.sort_by(|a, b| a.edge.cmp(&b.edge).then(a.at.total_cmp(&b.at)).then(a.vertex.cmp(&b.vertex)));
     all
 }
 
 /// Boundary vertices inside a boundary edge of another triangle (T-junctions), with their edges.
-pub(crate) fn noncommon_vertices(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> Vec<OnEdge> {
-    on_edges(submesh, edges, |v| tolerance.at(submesh, v))
+pub(crate) fn noncommon_vertices(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance, threads: usize) -> Vec<OnEdge> {
+    on_edges(submesh, edges, |v| tolerance.at(submesh, v), threads)
 }
 
 /// How near a boundary vertex comes to a boundary edge of a triangle that it does not belong to, at least, of those that are within the
 /// tolerance; infinite if none is. Below, there is no weldable vertex and none on an edge.
-pub(crate) fn nearest_edge(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> f64 {
+pub(crate) fn nearest_edge(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance, threads: usize) -> f64 {
     let boundary: Vec<Edge<'_>> = edges.iter().filter(|e| e.is_boundary()).collect();
     if boundary.is_empty() {
         return f64::INFINITY;
     }
     let ends = |e: &Edge<'_>| [e.low, e.high].map(|v| submesh.positions[v as usize]);
     let tree = BoxTree::new(&boundary.iter().map(|e| around(&ends(e), 0.0)).collect::<Vec<_>>());
-    let mut nearest = f64::INFINITY;
-    for v in boundary_vertices(edges) {
-        if nearest <= 0.0 {
-            break;
+    // Distances are not negative, so that their bits are in their order.
+    let nearest = AtomicU64::new(f64::INFINITY.to_bits());
+    let known = || f64::from_bits(nearest.load(Relaxed));
+    parallel::gather(threads, &boundary_vertices(edges), |_, (_, v), _: &mut Vec<()>| {
+        if known() <= 0.0 {
+            return;
         }
-        let (p, reach) = (submesh.positions[v as usize], tolerance.at(submesh, v).min(nearest));
+        let (p, reach) = (submesh.positions[v as usize], tolerance.at(submesh, v).min(known()));
         tree.each_meeting(&around(&[p], reach), |i| {
             let edge = &boundary[i as usize];
             if !submesh.triangles[edge.uses[0].triangle as usize].v.contains(&v) {
                 let [a, b] = ends(edge);
                 let away = distance_to_line(p, a, b);
                 // What is as near as the tolerance may be farther by rounding.
-                nearest = if away * ALMOST <= reach { nearest.min(away * ALMOST) } else { nearest };
+                if away * ALMOST <= reach {
+                    nearest.fetch_min((away * ALMOST).to_bits(), Relaxed);
+                }
             }
         });
-    }
-    nearest
+    });
+    known()
 }
 
 /// Less than rounding makes of a distance.
@@ -197,7 +199,7 @@ mod tests {
     fn on_edge(tip: [f32; 3], weld: f64) -> Vec<OnEdge> {
         let records = records(&[BELOW, [tip, [12.0, 10.0, 0.0], [-2.0, 10.0, 0.0]]]);
         let d = diagnose(&records);
-        noncommon_vertices(&d.submesh, &Edges::of(&d.submesh), &Tolerance { weld, edge_share: 0.25 })
+        noncommon_vertices(&d.submesh, &Edges::of(&d.submesh), &Tolerance { weld, edge_share: 0.25 }, 2)
     }
 
     #[test]
@@ -205,7 +207,7 @@ mod tests {
         let nearest = |tip: f32, weld: f64| {
             let records = records(&[BELOW, [[3.0, tip, 0.0], [12.0, 10.0, 0.0], [-2.0, 10.0, 0.0]]]);
             let d = diagnose(&records);
-            nearest_edge(&d.submesh, &Edges::of(&d.submesh), &Tolerance { weld, edge_share: 0.25 })
+            nearest_edge(&d.submesh, &Edges::of(&d.submesh), &Tolerance { weld, edge_share: 0.25 }, 2)
         };
         assert!((nearest(0.5, 1.0) - 0.5).abs() < 1e-6);
         assert!((nearest(0.5, 0.5) - 0.5).abs() < 1e-6, "as near as the tolerance");
@@ -229,7 +231,7 @@ mod tests {
             let small: Corners = [[0.0, 0.1, 0.0], [-size, size, 0.0], [0.0, size, 0.0]];
             let records = records(&[BELOW, small]);
             let d = diagnose(&records);
-            close_pairs(&d.submesh, &Edges::of(&d.submesh), &Tolerance { weld, edge_share: 0.25 }).len()
+            close_pairs(&d.submesh, &Edges::of(&d.submesh), &Tolerance { weld, edge_share: 0.25 }, 2).len()
         };
         assert_eq!(pairs(5.0, 0.2), 1);
         assert_eq!(pairs(5.0, 0.05), 0, "beyond the tolerance");

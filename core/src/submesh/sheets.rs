@@ -7,18 +7,18 @@
 use super::edges::{Edge, Edges, Use};
 
 /// Sheets, and which of them are twins.
-pub(crate) struct Sheets {
-    of_triangle: Vec<u32>,
+pub(crate) struct Sheets<'t> {
+    of_triangle: &'t [u32],
     /// By sheet: it does not use some edge equally often both ways.
     open: Vec<bool>,
     /// By sheet: the first one that has the same rim, directions included.
     twins: Vec<u32>,
 }
 
-impl Sheets {
+impl<'t> Sheets<'t> {
     /// Of components between non-manifold edges: by triangle, which it belongs to, and by component, whether it is open. O(non-manifold
     /// edges × log).
-    pub(crate) fn of(of_triangle: Vec<u32>, open: Vec<bool>, edges: &Edges) -> Self {
+    pub(crate) fn of(of_triangle: &'t [u32], open: Vec<bool>, edges: &Edges) -> Self {
         let mut rims: Vec<(u32, u32, bool)> = Vec::new();
         for (edge, number) in edges.iter().zip(0..).filter(|(edge, _)| edge.uses.len() != 2) {
             rims.extend(edge.uses.iter().map(|u| (of_triangle[u.triangle as usize], number, u.forward)));

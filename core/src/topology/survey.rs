@@ -10,6 +10,7 @@ use crate::contract::error::Result;
 use crate::contract::progress::Progress;
 use crate::contract::report::SelfIntersections;
 use crate::contract::settings::Limits;
+use crate::geometry::grid::Grid;
 use crate::geometry::position;
 use crate::geometry::sums::{Bounds, Measure};
 use crate::io::digest;
@@ -19,7 +20,7 @@ use crate::io::write_behind;
 use crate::stream::budget::{Budget, Purpose};
 use crate::stream::members::Members;
 use crate::stream::plan::{ChunkId, HomeBox, Plan};
-use crate::stream::source::{Seen, Source, Triangle};
+use crate::stream::source::{Seen, Triangle};
 use crate::topology::chunk::{ChunkTopology, IrregularTriangle};
 use crate::topology::chunk_regions::Parts;
 use crate::topology::crossings::{self, Crossings, Pair};
@@ -334,48 +335,52 @@ impl<'a> Survey<'a> {
         &self.merged[self.parts.of_chunk(chunk)]
     }
 
-    /// Visits every triangle with three regular corners whose region is `wanted` and that `passes`, exactly once, with its region: chunks
-    /// in parallel, results in chunk order (which the plan decides: only sums of integers and sets may be made of them). `make` is
-    /// given the box of all regular triangles that a chunk sees, and says `None` if none of them is of interest.
-    /// `passes` is asked first, since it may be cheaper than finding out whose turn it is.
+    /// Visits every triangle with three regular corners whose region is `wanted`, exactly once, with its region: chunks in parallel, results in
+    /// chunk order (which the plan decides: only sums of integers and sets may be made of them).
     pub(crate) fn visit_regular<R: Send>(
         &self,
         wanted: impl Fn(u32) -> bool + Sync,
+        make: impl Fn() -> R + Sync,
+        visit: impl Fn(&mut R, u32, u32) + Sync,
+    ) -> Vec<R> {
+        self.visit_regular_near(wanted, |_| Some(make()), |_, _| true, |_, _| true, visit)
+    }
+
+    /// As [`Self::visit_regular`], those that `pass`. `make` is given the box of all regular triangles that a chunk sees, and says `None` if none of
+    /// them is of interest; `near` is given the box of some of them, and says false only if none in it passes.
+    /// `passes` is asked before it is found out whose turn a triangle is, which may take longer.
+    pub(crate) fn visit_regular_near<R: Send>(
+        &self,
+        wanted: impl Fn(u32) -> bool + Sync,
         make: impl Fn(&Bounds) -> Option<R> + Sync,
+        near: impl Fn(&R, &Bounds) -> bool + Sync,
         passes: impl Fn(&R, &[[f32; 3]; 3]) -> bool + Sync,
         visit: impl Fn(&mut R, u32, u32) + Sync,
     ) -> Vec<R> {
         let makes = |chunk: ChunkId| make(&self.reaches[chunk.0 as usize]);
         let is_wanted = |chunk: ChunkId| self.regions_of(chunk).iter().any(|p| wanted(*p)) && makes(chunk).is_some();
-        let visited = self.members.each(
-            (self.records, &self.guide, &self.plan),
-            self.threads,
-            is_wanted,
-            || (),
-            |(), chunk, seen, _| {
-                let mut result = makes(chunk)?;
-                let regions = self.regions_of(chunk);
-                let cell = self.plan.home_box(chunk);
-                let mut labels = self.labels[chunk.0 as usize].iter();
-                seen.for_each(|triangle, place| {
-                    let region = labels.next().unwrap_or(NONE);
-                    if region == NONE || !wanted(regions[region as usize]) {
-                        return;
-                    }
-                    let corners = place.corners();
-                    if !passes(&result, &corners)
-                        || self.irregular_triangles.binary_search_by_key(&triangle, |s| s.triangle).is_ok()
-                    {
-                        return;
-                    }
-                    // A regular triangle has a label in every chunk that sees it; the lowest of them visits it.
-                    if corners.iter().all(|p| cell.holds(*p)) || corners.iter().all(|p| self.plan.home(*p) >= chunk) {
-                        visit(&mut result, triangle, regions[region as usize]);
-                    }
-                });
-                Some(result)
-            },
-        );
+        let of_chunk = |(): &mut (), chunk: ChunkId, seen: &Seen<'_>, _: &Seen<'_>| {
+            let mut result = makes(chunk)?;
+            let regions = self.regions_of(chunk);
+            let cell = self.plan.home_box(chunk);
+            let mut region_at = self.labels[chunk.0 as usize].by_place();
+            seen.each_near(&mut result, &near, |result, place, number, triangle| {
+                let region = region_at(place);
+                if region == NONE || !wanted(regions[region as usize]) {
+                    return;
+                }
+                let corners = triangle.corners();
+                if !passes(result, &corners) || self.irregular_triangles.binary_search_by_key(&number, |s| s.triangle).is_ok() {
+                    return;
+                }
+                // A regular triangle has a label in every chunk that sees it; the lowest of them visits it.
+                if corners.iter().all(|p| cell.holds(*p)) || corners.iter().all(|p| self.plan.home(*p) >= chunk) {
+                    visit(result, number, regions[region as usize]);
+                }
+            });
+            Some(result)
+        };
+        let visited = self.members.each((self.records, &self.guide, &self.plan), self.threads, is_wanted, || (), of_chunk);
         visited.into_iter().flatten().collect()
     }
 
@@ -432,15 +437,16 @@ impl<'a> Survey<'a> {
             (self.records, &self.guide, &self.plan),
             self.threads,
             |chunk| !at_home(chunk).is_empty(),
-            Sieve::default,
-            |sieve, chunk, seen, _| {
+            <(Sieve, Grid)>::default,
+            |(sieve, grid), chunk, seen, _| {
                 sieve.fill(at_home(chunk).iter().map(|(_, p)| *p));
+                grid.mark(at_home(chunk).iter().map(|(_, p)| Bounds { lo: *p, hi: *p }));
                 let regions = self.regions_of(chunk);
-                let mut labels = self.labels[chunk.0 as usize].iter();
+                let mut region_at = self.labels[chunk.0 as usize].by_place();
                 let mut found = Vec::new();
-                seen.for_each(|triangle, place| {
-                    let region = labels.next().unwrap_or(NONE);
-                    let corners = place.corners();
+                seen.each_near(&mut found, &|_, bounds| grid.may_meet(bounds), |found, place, triangle, record| {
+                    let region = region_at(place);
+                    let corners = record.corners();
                     if !sieve.may_hold(&corners) {
                         return;
                     }

@@ -121,6 +121,23 @@ pub(crate) fn map<R: Send>(threads: usize, count: usize, work: impl Fn(usize) ->
     map_with(threads, count, || (), |(), i| work(i))
 }
 
+/// What `find` finds at each of these, with its place, in order. `find` adds to the second list; it is lent the first one, to be used again.
+pub(crate) fn gather<T: Copy + Sync, R: Send>(
+    threads: usize,
+    all: &[T],
+    find: impl Fn(&mut Vec<u32>, (usize, T), &mut Vec<R>) + Sync,
+) -> Vec<R> {
+    /// What is taken at once.
+    const BLOCK: usize = 1 << 12;
+    let blocks = map_with(threads, all.len().div_ceil(BLOCK), Vec::new, |lent, block| {
+        let mut found = Vec::new();
+        let own = all.iter().copied().enumerate().skip(block * BLOCK).take(BLOCK);
+        own.for_each(|one| find(lent, one, &mut found));
+        found
+    });
+    blocks.into_iter().flatten().collect()
+}
+
 /// As [`map`]; each thread makes one `scratch` and uses it for all its items.
 pub(crate) fn map_with<S, R: Send>(
     threads: usize,

@@ -79,7 +79,7 @@ fn squares_within(
     let threads = surfaces.survey.threads();
     parallel::map(threads, surfaces.parts(), |part| {
         surfaces.each_of_part(which, part, |corners| {
-            if in_memory.may_meet(&boxes, corners) {
+            if in_memory.may_meet(&boxes, &Bounds::of(corners)) {
                 in_memory.visit(&boxes, at, corners);
             }
         });
@@ -88,14 +88,15 @@ fn squares_within(
     let left: Vec<u32> = (0..of.len() as u32).filter(is_left).collect();
     let tree = BoxTree::new(&left.iter().map(|i| boxes[*i as usize]).collect::<Vec<_>>());
     if !left.is_empty() {
-        surfaces.survey.visit_regular(
+        surfaces.survey.visit_regular_near(
             |region| surfaces.has(which, region),
             |chunk| {
                 let mut here = Vec::new();
                 tree.meeting(chunk, &mut here);
                 (!here.is_empty()).then(|| Near::of(here.into_iter().map(|i| left[i as usize]).collect(), &squares, wanted))
             },
-            |near, corners| near.may_meet(&boxes, corners),
+            |near, bounds| near.may_meet(&boxes, bounds),
+            |near, corners| near.may_meet(&boxes, &Bounds::of(corners)),
             |near, triangle, _| near.visit(&boxes, at, &position::corners(&surfaces.survey.records[triangle as usize])),
         );
     }
@@ -148,8 +149,8 @@ impl<'s> Near<'s> {
     }
 
     /// Asked of every triangle.
-    fn may_meet(&self, boxes: &[Bounds], corners: &[[f32; 3]; 3]) -> bool {
-        self.index(boxes).1.may_meet(&Bounds::of(corners))
+    fn may_meet(&self, boxes: &[Bounds], bounds: &Bounds) -> bool {
+        self.index(boxes).1.may_meet(bounds)
     }
 
     /// A triangle is compared with the points whose boxes it meets, but for those of which something nearer is known than its box or its plane: the

@@ -49,12 +49,13 @@ fn are_free(surfaces: &Surfaces<'_>, which: Which, points: &[OnSurface], directi
     let bundles: Vec<Bundle> = directions.iter().map(|direction| Bundle::of(*direction, points, beside)).collect();
     let meet = |corners: &[[f32; 3]; 3]| bundles.iter().for_each(|bundle| bundle.meet(corners));
     parallel::map(surfaces.survey.threads(), surfaces.parts(), |part| surfaces.each_of_part(which, part, meet));
-    surfaces.survey.visit_regular(
+    surfaces.survey.visit_regular_near(
         |region| surfaces.has(which, region),
         |reach| {
             let over: Vec<&Bundle> = bundles.iter().filter(|bundle| bundle.is_over(reach)).collect();
             (!over.is_empty()).then_some(over)
         },
+        |over, bounds| over.iter().any(|bundle| bundle.is_over(bounds)),
         |over, corners| over.iter().any(|bundle| bundle.may_meet(corners)),
         |over, triangle, _| {
             let corners = position::corners(&surfaces.survey.records[triangle as usize]);

@@ -112,8 +112,7 @@ impl Surfaces<'_> {
     ) -> Vec<R> {
         self.survey.visit_regular(
             |region| self.reversed.dropped[region as usize],
-            |_| Some(R::default()),
-            |_, _| true,
+            R::default,
             |into, place, region| {
                 let by = self.dropped_by.get(region as usize).copied().flatten();
                 let [a, b, c] = position::corners(&self.survey.records[place as usize]);
@@ -138,8 +137,7 @@ impl Surfaces<'_> {
     pub(crate) fn each_regular<R: Send + Default>(&self, visit: impl Fn(&mut R, u32, &Corners) + Sync) -> Vec<R> {
         self.survey.visit_regular(
             |_| true,
-            |_| Some(R::default()),
-            |_, _| true,
+            R::default,
             |into, place, _| visit(into, place, &position::corners(&self.survey.records[place as usize])),
         )
     }

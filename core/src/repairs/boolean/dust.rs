@@ -44,9 +44,9 @@ fn is_dust(survey: &Survey<'_>, piece: &Component, all: i128) -> bool {
 }
 
 impl State<'_, '_, '_> {
-    /// Drops dust. `before`: the pieces of surface before they were cut. Returns where each crumb was.
-    pub(crate) fn drop_dust(&mut self, before: &Components) -> Vec<Region> {
-        let pieces = pieces::pieces(self.survey, self.work, self.reversed);
+    /// Drops dust. `before`: the pieces of surface before they were cut; `pieces`: as they are. Returns where each crumb was, and the pieces that
+    /// there are then.
+    pub(crate) fn drop_dust(&mut self, before: &Components, pieces: Components) -> (Vec<Region>, Components) {
         let all = pieces.list.iter().filter(|piece| !piece.open).map(|piece| piece.extent.volume).sum();
         let mut goes: Vec<bool> = pieces.list.iter().map(|piece| !piece.open && is_dust(self.survey, piece, all)).collect();
         let mut is_cut = vec![false; pieces.list.len()];
@@ -67,11 +67,12 @@ impl State<'_, '_, '_> {
             let (method, bounds, count) = (RegionMethod::Dropped, [bounds.lo, bounds.hi], piece.triangles);
             Region { method, bounds, count, rounds: 0, moved: 0.0, reason: None }
         });
-        let regions = regions.collect();
-        if goes.contains(&true) {
-            take_away(self.work, self.reversed, &pieces, &goes);
+        let regions: Vec<Region> = regions.collect();
+        if regions.is_empty() {
+            return (regions, pieces);
         }
-        regions
+        take_away(self.work, self.reversed, &pieces, &goes);
+        (regions, pieces::pieces(self.survey, self.work, self.reversed))
     }
 }
 

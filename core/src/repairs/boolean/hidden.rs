@@ -242,8 +242,7 @@ fn largest_triangles(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components
     let is_asked = |piece: u32| asked.get(piece as usize) == Some(&true);
     let found = survey.visit_regular(
         |region| is_asked(pieces.of_region[region as usize]),
-        |_| Some(HashMap::<u32, Largest>::new()),
-        |_, _| true,
+        HashMap::<u32, Largest>::new,
         |found, triangle, region| {
             let this = Largest::of(&record::corners(&survey.records[triangle as usize]), triangle, None);
             found.entry(pieces.of_region[region as usize]).and_modify(|known| *known = known.or(this)).or_insert(this);

@@ -194,9 +194,9 @@ fn attempt_until_done(mut state: State<'_, '_, '_>, by: &Attempt<'_>, means: &Me
         let taken_part: Vec<bool> = (0..state.work.triangles.len() as u32).map(|t| state.clusters.holds(t)).collect();
         match state.attempt(&Attempt { levels: &failed.levels, ..*by }) {
             Ok(resolved) => {
-                state.drop_specks();
-                let dust = state.drop_dust(&pieces);
-                let (bodies_now, volume_now) = measured(&pieces::pieces(state.survey, state.work, state.reversed));
+                let left = state.drop_specks();
+                let (dust, left) = state.drop_dust(&pieces, left);
+                let (bodies_now, volume_now) = measured(&left);
                 return Ok(Resolved {
                     bodies: bodies.saturating_sub(bodies_now),
                     volume: state.survey.measure.volume(Extent { area: 0, volume: volume - volume_now }),
@@ -250,8 +250,8 @@ fn measured(pieces: &Components) -> (u64, i128) {
 
 impl State<'_, '_, '_> {
     /// Drops closed surfaces of nothing but parts of triangles that are no thicker than what rounding moves: they are nothing but that. So do those
-    /// with other triangles, too, that are far thinner: what was cut off one and is next to nothing.
-    fn drop_specks(&mut self) {
+    /// with other triangles, too, that are far thinner: what was cut off one and is next to nothing. Returns the pieces that there are then.
+    fn drop_specks(&mut self) -> Components {
         let pieces = pieces::pieces(self.survey, self.work, self.reversed);
         let measure = &self.survey.measure;
         let thickness = |piece: &Component| measure.volume(piece.extent).abs() / measure.area(piece.extent);
@@ -273,7 +273,11 @@ impl State<'_, '_, '_> {
             is_speck[piece] || is_flake[piece] && is_cut[piece]
         };
         let specks: Vec<u32> = self.work.living().filter(|t| goes(*t)).collect();
+        if specks.is_empty() {
+            return pieces;
+        }
         specks.into_iter().for_each(|t| self.work.kill(t));
+        pieces::pieces(self.survey, self.work, self.reversed)
     }
 
     /// What a cluster that is left, of these pieces, is told by, once all is as it was; `None` if nothing of it is known.

@@ -130,9 +130,10 @@ fn on_regular(survey: &Survey<'_>, lone: &[Lone]) -> Vec<bool> {
         }
         found
     };
-    let found = survey.visit_regular(
+    let found = survey.visit_regular_near(
         |_| true,
         |reach| reach.overlap(&everything).map(|_| Vec::new()),
+        |_, bounds| grid.may_meet(bounds),
         |_, corners| !lying_on(corners).is_empty(),
         |found: &mut Vec<u32>, triangle, _| {
             found.extend(lying_on(&crate::io::record::corners(&survey.records[triangle as usize])));

@@ -66,7 +66,7 @@ pub(crate) fn remove(survey: &Survey<'_>, work: &mut Work<'_>) -> u64 {
 }
 
 /// Removes surplus sheets that reach through these edges.
-fn remove_of(survey: &Survey<'_>, work: &mut Work<'_>, through: Through<'_>) -> u64 {
+fn remove_of(survey: &Survey<'_>, work: &mut Work<'_>, through: Through) -> u64 {
     let (submesh, edges) = work.edges();
     if !edges.any_nonmanifold() {
         return 0;
@@ -139,7 +139,7 @@ fn encloses(submesh: &Submesh, area: f64, sheet: &Sheet) -> bool {
     cones.sum::<f64>().abs() > admission::THIN * (area / 2.0).powf(1.5)
 }
 
-fn sheets(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, through: Through<'_>) -> Vec<Sheet> {
+fn sheets(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, through: Through) -> Vec<Sheet> {
     let parts = Components::of(survey, submesh, edges, &Reversed::none(survey), through);
     let mut sheets: Vec<Sheet> = parts
         .list

@@ -33,7 +33,7 @@ use crate::detect::holes::{
 use crate::repairs::holes::fair;
 use crate::repairs::shared::admission::Admission;
 use crate::repairs::shared::work::Work;
-use crate::submesh::components::{Components, Reversed, Through};
+use crate::submesh::components::Reversed;
 use crate::submesh::near::Tolerance;
 use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
@@ -120,8 +120,7 @@ pub(crate) fn fill_loops(
     }
     balancing += (across.len() - first_balancing) as u64;
     let mut judged = closing.judge(survey, work, profile);
-    let (submesh, edges) = work.edges();
-    judged.doubts.extend(splinters::doubts(survey, submesh, edges));
+    judged.doubts.extend(splinters::doubts(survey, work));
     let mut kept = Closed { judged, ..Closed::default() };
     closing.keep_open(work, &mut chains, &mut kept);
     let mut closed = closing.finish(work, kept);
@@ -240,8 +239,7 @@ impl Closing<'_> {
         if self.open.is_empty() {
             return;
         }
-        let (submesh, edges) = work.edges();
-        let components = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::EveryEdge);
+        let components = work.components(survey);
         for (rim, reason) in std::mem::take(&mut self.open) {
             let loop_ = self.rim(rim);
             let area = components.list[components.of_triangle[loop_.triangles[0] as usize] as usize].extent.area as f64;

@@ -16,7 +16,6 @@ use crate::geometry::exact::Point;
 use crate::geometry::sums::Bounds;
 use crate::repairs::holes::patches::{are_joined, concatenated};
 use crate::repairs::shared::work::Work;
-use crate::submesh::components::{Components, Reversed, Through};
 use crate::submesh::{Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
@@ -34,8 +33,8 @@ pub(crate) fn groups(
     if pairs.is_empty() && sheets.is_empty() {
         return Vec::new();
     }
-    let (submesh, edges) = work.edges();
-    let components = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::EveryEdge);
+    let components = work.components(survey);
+    let submesh: &Submesh = work;
     let component = |rim: usize| components.of_triangle[rims[rim].triangles[0] as usize];
     let mut loops_of = vec![0u32; components.list.len()];
     (0..rims.len()).for_each(|rim| loops_of[component(rim) as usize] += 1);

@@ -165,8 +165,7 @@ fn turned_before(survey: &Survey<'_>, pieces: &Components) -> Vec<u64> {
     }
     let per_chunk = survey.visit_regular(
         |region| pieces.of_region[region as usize] != NONE,
-        |_| Some(BTreeMap::<u32, u64>::new()),
-        |_, _| true,
+        BTreeMap::<u32, u64>::new,
         |counts, triangle, region| *counts.entry(region).or_default() += u64::from(survey.was_turned(triangle)),
     );
     let mut all = vec![0; survey.regions.len()];

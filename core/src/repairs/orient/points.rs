@@ -87,8 +87,7 @@ pub(crate) fn first_points(
     let wanted: HashSet<u32> = asked.iter().copied().collect();
     let found = survey.visit_regular(
         |region| wanted.contains(&parts.of_region[region as usize]),
-        |_| Some(HashMap::<u32, Vec<Point>>::new()),
-        |_, _| true,
+        HashMap::<u32, Vec<Point>>::new,
         |found, triangle, region| {
             let [a, b, c] = record::corners(&survey.records[triangle as usize]);
             let corners = if reversed.regions[region as usize] { [a, c, b] } else { [a, b, c] };

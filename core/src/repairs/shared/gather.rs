@@ -56,8 +56,7 @@ pub(crate) fn visit(
     let counts = |component: u32| component != NONE && is_wanted(component);
     let found = survey.visit_regular(
         |region| counts(components.of_region[region as usize]),
-        |_| Some(Vec::new()),
-        |_, _| true,
+        Vec::new,
         |list: &mut Vec<(u32, u32, u32)>, record, region| list.push((record, region, NONE)),
     );
     let mut all: Vec<(u32, u32, u32)> = found.into_iter().flatten().collect();

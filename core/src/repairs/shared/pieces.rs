@@ -14,10 +14,7 @@ use crate::util::ids::NONE;
 pub(crate) fn pieces(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reversed) -> Components {
     let (submesh, edges) = work.edges();
     let components = Components::of(survey, submesh, edges, reversed, Through::ManifoldEdges);
-    if !edges.any_nonmanifold() {
-        return components;
-    }
-    Components::of(survey, submesh, edges, reversed, Through::OpenSheets(&components.into_sheets(edges)))
+    if edges.any_nonmanifold() { components.joined_where_open(edges) } else { components }
 }
 
 /// Removes whole pieces. O(regions + submesh).

@@ -4,9 +4,11 @@
 //! has seen everything once looks only at what is new to it the next time.
 
 use std::ops::Deref;
+use std::sync::Arc;
 
 use crate::contract::report::RepairName;
 use crate::geometry::position::Position;
+use crate::submesh::components::{Components, Reversed, Through};
 use crate::submesh::edges::Edges;
 use crate::submesh::{Origin, Submesh, Triangle, Vertex};
 use crate::topology::chunk::IrregularTriangle;
@@ -27,6 +29,7 @@ pub(crate) enum Pass {
 pub(crate) struct Work<'a> {
     submesh: &'a mut Submesh,
     edges: Option<Edges>,
+    components: Option<Arc<Components>>,
     /// Triangles as they were added or got another vertex.
     changed: Vec<u32>,
     /// How many of these each pass has seen; `None`: it has to look at everything.
@@ -56,13 +59,23 @@ impl Deref for Work<'_> {
 
 impl<'a> Work<'a> {
     pub(crate) fn new(submesh: &'a mut Submesh) -> Self {
-        Self { submesh, edges: None, changed: Vec::new(), seen: [None; 3], journal: None, version: 0, by: None }
+        Self { submesh, edges: None, components: None, changed: Vec::new(), seen: [None; 3], journal: None, version: 0, by: None }
     }
 
     /// The mesh with its edges. O(submesh) after a change, O(1) else.
     pub(crate) fn edges(&mut self) -> (&Submesh, &Edges) {
         let edges = self.edges.get_or_insert_with(|| Edges::of(self.submesh));
         (self.submesh, edges)
+    }
+
+    /// What hangs together through edges, as it stands in the file. O(regions + submesh) after a change, O(1) else.
+    pub(crate) fn components(&mut self, survey: &Survey<'_>) -> Arc<Components> {
+        if let Some(known) = &self.components {
+            return known.clone();
+        }
+        let (submesh, edges) = self.edges();
+        let all = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::EveryEdge);
+        self.components.insert(Arc::new(all)).clone()
     }
 
     /// The edges as they are now, to be kept while the mesh changes.
@@ -122,6 +135,7 @@ impl<'a> Work<'a> {
     /// The mesh is about to change.
     fn touch(&mut self) {
         self.edges = None;
+        self.components = None;
         self.version += 1;
     }
 
@@ -247,6 +261,7 @@ impl<'a> Work<'a> {
     /// Gives each triangle that continues a region the one it continues after a [`Survey::divide`].
     pub(crate) fn follow_division(&mut self, survey: &Survey<'_>) {
         debug_assert!(self.journal.is_none(), "a division is not taken back");
+        self.touch();
         for triangle in &mut self.submesh.triangles {
             if triangle.region != NONE {
                 triangle.region = match triangle.origin {

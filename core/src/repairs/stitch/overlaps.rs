@@ -81,11 +81,11 @@ struct Cut {
 
 /// Cuts that can be made side by side: no piece takes part in two of them.
 fn cuts(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) -> Vec<Cut> {
-    let (submesh, edges) = work.edges();
-    if tolerance.edge_share <= 0.0 || !edges.iter().any(|e| e.is_boundary()) {
+    if tolerance.edge_share <= 0.0 || !work.edges().1.iter().any(|e| e.is_boundary()) {
         return Vec::new();
     }
-    let pieces = Pieces::of(survey, submesh, edges, tolerance);
+    let pieces = Pieces::of(survey, work, tolerance);
+    let (submesh, edges) = work.edges();
     let pairs = lapping(survey, submesh, &pieces);
     let mut taken = vec![false; pieces.list().len()];
     let mut cuts = Vec::new();

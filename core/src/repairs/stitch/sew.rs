@@ -6,14 +6,16 @@
 //! closed by a narrower step is not touched by a wider one. Where the vertices of two rims differ, the edges are split first ([`splits`]), and
 //! the splits that close nothing are taken back. What may be matched is said in [`rims`].
 
+use std::rc::Rc;
+
 use crate::contract::report::RepairName;
 use crate::contract::settings::Profile;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::Work;
-use crate::repairs::stitch::sew::rims::Width;
+use crate::repairs::stitch::sew::rims::{Boundary, Rims, Width};
 use crate::repairs::stitch::weld::{self, Welded};
 use crate::repairs::stitch::zip;
-use crate::submesh::near::{Tolerance, boundary_vertices, nearest_edge};
+use crate::submesh::near::{Tolerance, nearest_edge};
 use crate::topology::survey::Survey;
 
 mod clusters;
@@ -58,6 +60,7 @@ pub(crate) fn sew(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Toleranc
     let mut sewn = Sewn::default();
     // Below this width there is nothing to match and nothing to split; not known where the surface may have changed.
     let mut least = None;
+    let mut known = Known::default();
     // A split leaves short edges, which bound what comes after it: so first whatever needs none, as wide as may be.
     for way in [join, split] {
         let mut width = tolerance.weld;
@@ -67,9 +70,9 @@ pub(crate) fn sew(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Toleranc
             width = (STEP * width).min(widest);
             let at = |weld| Tolerance { weld, edge_share: tolerance.edge_share };
             let (submesh, edges) = work.edges();
-            if *least.get_or_insert_with(|| nearest_edge(submesh, edges, &at(widest))) <= width {
+            if *least.get_or_insert_with(|| nearest_edge(submesh, edges, &at(widest), survey.threads())) <= width {
                 let before = [sewn.vertices, sewn.splits];
-                way(survey, work, profile, &Width { tolerance: at(width), is_crack }, &mut sewn);
+                way(survey, (work, &mut known), profile, &Width { tolerance: at(width), is_crack }, &mut sewn);
                 least = least.filter(|_| before == [sewn.vertices, sewn.splits]);
             }
             is_crack = false;
@@ -78,11 +81,30 @@ pub(crate) fn sew(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Toleranc
     sewn
 }
 
+/// The boundary, as long as nothing changes.
+#[derive(Default)]
+struct Known(Option<(u64, Rc<Boundary>)>);
+
+impl Known {
+    fn boundary(&mut self, survey: &Survey<'_>, work: &mut Work<'_>) -> Rc<Boundary> {
+        match &self.0 {
+            Some((version, boundary)) if *version == work.version() => boundary.clone(),
+            _ => self.0.insert((work.version(), Rc::new(Boundary::of(survey, work)))).1.clone(),
+        }
+    }
+}
+
 /// Splits edges where the vertices of rims differ, and matches and joins then; as [`join`].
-fn split(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile, width: &Width, sewn: &mut Sewn) -> Option<Vec<u32>> {
+fn split(
+    survey: &Survey<'_>,
+    (work, known): (&mut Work<'_>, &mut Known),
+    profile: &Profile,
+    width: &Width,
+    sewn: &mut Sewn,
+) -> Option<Vec<u32>> {
+    let boundary = known.boundary(survey, work);
     let (submesh, edges) = work.edges();
-    let known = rims::Rims::of(survey, submesh, edges, width, &[]);
-    let mut wanted = splits::wanted(submesh, edges, &known);
+    let mut wanted = splits::wanted(submesh, edges, &Rims::of(&boundary, submesh, width, &[]), survey.threads());
     let before = work.triangles.clone();
     for _ in 0..TRIES {
         if wanted.is_empty() {
@@ -90,7 +112,7 @@ fn split(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile, width: &Wi
         }
         let made = splits::make(work, &wanted);
         let mut more = Sewn { widest: sewn.widest, ..Sewn::default() };
-        let target = join(survey, work, profile, width, &mut more);
+        let target = join(survey, (work, known), profile, width, &mut more);
         let idle = splits::idle(work, &made, target.as_deref());
         if idle.is_empty() {
             sewn.vertices += more.vertices;
@@ -105,21 +127,27 @@ fn split(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile, width: &Wi
 }
 
 /// Matches edges and joins their ends. Returns where each vertex went, if any did.
-fn join(survey: &Survey<'_>, work: &mut Work<'_>, profile: &Profile, width: &Width, sewn: &mut Sewn) -> Option<Vec<u32>> {
+fn join(
+    survey: &Survey<'_>,
+    (work, known): (&mut Work<'_>, &mut Known),
+    profile: &Profile,
+    width: &Width,
+    sewn: &mut Sewn,
+) -> Option<Vec<u32>> {
+    let boundary = known.boundary(survey, work);
     let (submesh, edges) = work.edges();
     let left_open = zip::left_open(submesh, edges, &width.tolerance, profile);
-    let known = rims::Rims::of(survey, submesh, edges, width, &left_open);
-    let mut matches = known.matches(submesh);
+    let rims = Rims::of(&boundary, submesh, width, &left_open);
+    let mut matches = rims.matches(submesh, survey.threads());
     if matches.is_empty() {
         return None;
     }
-    let vertices = boundary_vertices(edges);
-    let mut chosen = clusters::of(submesh, &vertices, &known, &matches);
+    let mut chosen = clusters::of(submesh, &rims, &matches);
     for _ in 0..TRIES {
-        if !known.drop_poor(submesh, &chosen.is_used, &mut matches) {
+        if !rims.drop_poor(submesh, &chosen.is_used, &mut matches) {
             break;
         }
-        chosen = clusters::of(submesh, &vertices, &known, &matches);
+        chosen = clusters::of(submesh, &rims, &matches);
     }
     let clusters::Chosen { clusters, widest, .. } = chosen;
     let (Welded { vertices, taken_back }, target) = weld::weld_clusters(survey, work, clusters, weld::Moves::Steady);

@@ -12,15 +12,15 @@ pub(crate) const REPAIR: Repair = Repair {
     name: RepairName::TJunction,
     changes: Changes::Surface,
     run: |cx| {
-        let split = split_edges(&mut cx.work, cx.tolerance);
+        let split = split_edges(&mut cx.work, cx.tolerance, cx.survey.threads());
         Ok(Done::count(split, "vertices inside a neighbour's edge, which was split there"))
     },
 };
 
 /// Splits boundary edges at the vertices that lie on them; returns how many vertices that were.
-pub(crate) fn split_edges(work: &mut Work<'_>, tolerance: &Tolerance) -> u64 {
+pub(crate) fn split_edges(work: &mut Work<'_>, tolerance: &Tolerance, threads: usize) -> u64 {
     let (submesh, edges) = work.edges();
-    let on = near::noncommon_vertices(submesh, edges, tolerance);
+    let on = near::noncommon_vertices(submesh, edges, tolerance, threads);
     if on.is_empty() {
         return 0;
     }
@@ -72,7 +72,7 @@ mod tests {
         mesh.extend([[a, b, m], [m, b, c]]);
         let got = after(&mesh, |d, _| {
             assert_eq!((d.defects.boundary_edges, d.defects.noncommon_vertices), (3, 1));
-            split_edges(&mut Work::new(&mut d.submesh), &d.tolerance)
+            split_edges(&mut Work::new(&mut d.submesh), &d.tolerance, 2)
         });
         // No vertex moved: only the neighbour is replaced.
         assert_eq!((got.result, got.untouched, got.defects.triangles), (1, 12, 14));

@@ -43,7 +43,7 @@ const ATTEMPTS: usize = 4;
 /// Welds boundary vertices. O(n log n) in the boundary.
 pub(crate) fn weld(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) -> Welded {
     let (submesh, edges) = work.edges();
-    let pairs = near::close_pairs(submesh, edges, tolerance);
+    let pairs = near::close_pairs(submesh, edges, tolerance, survey.threads());
     weld_pairs(survey, work, &pairs, tolerance.weld)
 }
 

@@ -50,8 +50,7 @@ impl<'o> Accepted<'o> {
         let mut gone: Vec<u32> = of_submesh.map(|t| site.submesh.record(t)).collect();
         let regular = site.survey.visit_regular(
             |region| self.goes(site.pieces.of_region[region as usize]),
-            |_| Some(Vec::new()),
-            |_, _| true,
+            Vec::new,
             |list: &mut Vec<u32>, record, _| list.push(record),
         );
         gone.extend(regular.into_iter().flatten());
@@ -107,9 +106,10 @@ impl<'o> Accepted<'o> {
         }
         let mut bounds = Bounds::EMPTY;
         self.triangles.iter().for_each(|t| bounds.include(t));
-        let touched = site.survey.visit_regular(
+        let touched = site.survey.visit_regular_near(
             |region| !site.reversed.dropped[region as usize] && !self.goes(site.pieces.of_region[region as usize]),
             |reach| reach.overlap(&bounds).map(|_| Vec::new()),
+            |_, some| some.overlap(&bounds).is_some(),
             |_, corners| corners.iter().any(|p| at(*p).is_some()),
             |list: &mut Vec<(u32, u32)>, record, region| list.push((record, region)),
         );

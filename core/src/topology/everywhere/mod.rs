@@ -21,7 +21,6 @@ use crate::stream::plan::Plan;
 use crate::stream::source::Source;
 use crate::topology::solving;
 use crate::util::bits::{self, Shared};
-use crate::util::ids::NONE;
 
 mod chunk;
 mod seams;
@@ -123,9 +122,9 @@ impl Stream<'_, '_> {
             |(), number, seen, _| {
                 let number = number.0 as usize;
                 let told = &chunks[number];
-                let (mut labels, mut i) = (told.labels.iter(), 0);
+                let (mut label, mut i) = (told.labels.by_place(), 0);
                 seen.for_each(|t, _| {
-                    let fate = fates.get(number, labels.next().unwrap_or(NONE));
+                    let fate = fates.get(number, label(i));
                     let [is_odd, is_copy] = [&told.odd, &told.copies].map(|of| bits::holds(of, i));
                     i += 1;
                     if fate.drops_copies && is_copy {

@@ -18,7 +18,7 @@ use crate::geometry::flatness;
 use crate::repairs::holes::fair::{Beyond, Gathered};
 use crate::repairs::holes::patches::{EXTENDED, ISLANDS, Placed, Planes};
 use crate::repairs::shared::work::Work;
-use crate::submesh::components::{Components, Reversed, Through};
+use crate::submesh::components::Components;
 use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
 
@@ -70,8 +70,8 @@ impl Closing<'_> {
         if !self.placed.iter().any(Placed::is_in) {
             return judged;
         }
-        let (submesh, edges) = work.edges();
-        let bodies = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::EveryEdge);
+        let bodies = work.components(survey);
+        let submesh: &Submesh = work;
         let all = bodies.list.iter().map(|c| survey.measure.volume(c.extent).abs()).sum();
         for patch in self.placed.iter().filter(|patch| patch.is_in()) {
             let Some(first) = patch.living(submesh).next() else { continue };

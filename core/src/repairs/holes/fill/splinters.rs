@@ -10,8 +10,9 @@ use glam::DVec3;
 use crate::contract::report::RepairName;
 use crate::geometry::distance::place;
 use crate::repairs::shared::pieces::crossing;
+use crate::repairs::shared::work::Work;
 use crate::repairs::stitch::layer::Facet;
-use crate::submesh::components::{Component, Components, Reversed, Through};
+use crate::submesh::components::{Component, Components};
 use crate::submesh::edges::Edges;
 use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
@@ -44,11 +45,12 @@ struct Closed {
 }
 
 /// Lines on such bodies. O(regions + submesh).
-pub(super) fn doubts(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges) -> Vec<String> {
-    if !submesh.living().any(|t| is_patch(submesh, t)) {
+pub(super) fn doubts(survey: &Survey<'_>, work: &mut Work<'_>) -> Vec<String> {
+    if !work.living().any(|t| is_patch(work, t)) {
         return Vec::new();
     }
-    let bodies = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::EveryEdge);
+    let bodies = work.components(survey);
+    let (submesh, edges) = work.edges();
     let closed = closed(survey, submesh, edges, &bodies);
     let all_area: i128 = bodies.list.iter().map(|body| body.extent.area).sum();
     let all_volume: i128 = bodies.list.iter().map(|body| body.extent.volume.abs()).sum();
@@ -138,7 +140,7 @@ mod tests {
         let profile = Profile::default();
         after(mesh, |d, _| {
             fill(d, &profile);
-            doubts(&d.survey, &d.submesh, &Edges::of(&d.submesh)).len()
+            doubts(&d.survey, &mut Work::new(&mut d.submesh)).len()
         })
         .result
     }

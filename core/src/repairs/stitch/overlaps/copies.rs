@@ -44,11 +44,11 @@ const BETWEEN: f64 = 0.01;
 /// Drops sheets that lie as a whole on a body; returns how many triangles went, and lines for a person to look at. O(n log n) in the sheets and the
 /// surface near them, which is read if there are sheets in a body's box.
 fn drop_copies(survey: &mut Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) -> (u64, Vec<String>) {
-    let (submesh, edges) = work.edges();
-    if tolerance.edge_share <= 0.0 || !edges.iter().any(|e| e.is_boundary()) {
+    if tolerance.edge_share <= 0.0 || !work.edges().1.iter().any(|e| e.is_boundary()) {
         return (0, Vec::new());
     }
-    let pieces = Pieces::of(survey, submesh, edges, tolerance);
+    let pieces = Pieces::of(survey, work, tolerance);
+    let submesh: &Submesh = work;
     let sheets = Sheets::of(survey, &pieces);
     let (mut cuts, mut doubts): (Vec<Cut>, Vec<String>) = (Vec::new(), Vec::new());
     let mut last = None;

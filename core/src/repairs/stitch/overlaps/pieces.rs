@@ -1,15 +1,17 @@
 //! Pieces of surface, and what of them lies in boxes.
 
+use std::sync::Arc;
+
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::distance::place;
 use crate::geometry::grid::Grid;
 use crate::geometry::sums::Bounds;
 use crate::geometry::tri_tri::Triangle as Corners;
 use crate::io::record;
+use crate::repairs::shared::work::Work;
 use crate::repairs::stitch::layer::{Facet, Reach, RimEdge, around};
 use crate::submesh::Submesh;
-use crate::submesh::components::{Component, Components, Reversed, Through};
-use crate::submesh::edges::Edges;
+use crate::submesh::components::{Component, Components};
 use crate::submesh::near::Tolerance;
 use crate::topology::survey::Survey;
 
@@ -54,7 +56,7 @@ pub(super) struct Member {
 
 /// Pieces of surface with what is needed to compare them.
 pub(super) struct Pieces {
-    pub(super) components: Components,
+    pub(super) components: Arc<Components>,
     /// All boundary edges, by piece, with the share of their triangle's height that a reach may have.
     pub(super) rims: Vec<(RimEdge, f64)>,
     /// Diagonals of the boxes.
@@ -64,8 +66,9 @@ pub(super) struct Pieces {
 }
 
 impl Pieces {
-    pub(super) fn of(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> Self {
-        let components = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::EveryEdge);
+    pub(super) fn of(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) -> Self {
+        let components = work.components(survey);
+        let (submesh, edges) = work.edges();
         let rims = edges.iter().filter(|e| e.is_boundary()).map(|e| {
             let t = e.uses[0].triangle;
             let facet = Facet::of(&submesh.points(t), components.of_triangle[t as usize]);
@@ -144,9 +147,10 @@ impl Pieces {
             }
         }
         let of_region = &self.components.of_region;
-        let found = survey.visit_regular(
+        let found = survey.visit_regular_near(
             |region| is_wanted(of_region[region as usize]),
             |reach| reach.overlap(&everything).map(|_| Vec::new()),
+            |_, bounds| grid.may_meet(bounds),
             |_, corners| meets(corners),
             |found: &mut Vec<(u32, u32)>, triangle, region| found.push((triangle, region)),
         );

@@ -8,20 +8,20 @@ use crate::util::union_find;
 pub(crate) struct Chosen {
     /// Sets of two or more vertices that become one.
     pub(crate) clusters: Vec<Vec<Vertex>>,
-    /// By place in [`Rims::edges`].
+    /// By place in [`Boundary::edges`](super::rims::Boundary::edges).
     pub(crate) is_used: Vec<bool>,
     /// Width of the widest match that was taken.
     pub(crate) widest: f64,
 }
 
 /// Takes the matches in their order where they go with those before.
-pub(crate) fn of(submesh: &Submesh, vertices: &[Vertex], rims: &Rims, matches: &[Match]) -> Chosen {
-    let mut taken = Taken::of(submesh, vertices);
-    let mut is_used = vec![false; rims.edges.len()];
+pub(crate) fn of(submesh: &Submesh, rims: &Rims<'_>, matches: &[Match]) -> Chosen {
+    let mut taken = Taken::of(submesh, &rims.boundary.vertices);
+    let mut is_used = vec![false; rims.boundary.edges.len()];
     let mut widest = 0.0f64;
     for Match { width, edges, against } in matches {
         let [i, j] = edges.map(|i| i as usize);
-        let [a, b] = [&rims.edges[i], &rims.edges[j]];
+        let [a, b] = [&rims.boundary.edges[i], &rims.boundary.edges[j]];
         let other = if *against { [b.ends[1], b.ends[0]] } else { b.ends };
         if !is_used[i] && !is_used[j] && a.triangle != b.triangle && taken.edge(a.ends, other, &rims.reach) {
             (is_used[i], is_used[j]) = (true, true);

@@ -15,18 +15,20 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use glam::DVec3;
 
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::distance::cosine;
 use crate::geometry::sums::Bounds;
-use crate::submesh::components::{Components, Reversed, Through};
+use crate::repairs::shared::work::Work;
+use crate::submesh::components::Components;
 use crate::submesh::edges::{Edge, Edges};
-use crate::submesh::near::{Tolerance, around};
+use crate::submesh::near::{Tolerance, around, boundary_vertices};
 use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
-use crate::util::union_find;
+use crate::util::{parallel, union_find};
 
 /// Less evidence, less reach.
 const UNSURE: f64 = 0.1;
@@ -66,48 +68,83 @@ pub(crate) struct RimEdge {
 pub(crate) struct Match {
     /// How far their ends lie apart, at most.
     pub(crate) width: f64,
-    /// By place in [`Rims::edges`].
+    /// By place in [`Boundary::edges`].
     pub(crate) edges: [u32; 2],
     /// They run against each other.
     pub(crate) against: bool,
 }
 
-/// All boundary edges, with what it takes to judge them.
-pub(crate) struct Rims {
+/// All boundary edges of a mesh, with what it takes to judge them at any width.
+pub(crate) struct Boundary {
     pub(crate) edges: Vec<RimEdge>,
-    /// By vertex: within which distance it may find its partner. 0 but for boundary vertices.
-    pub(crate) reach: Vec<f64>,
-    of_triangle: Vec<u32>,
+    /// Their ends, ascending.
+    pub(crate) vertices: Vec<Vertex>,
+    /// By place in `vertices`: the length of the shortest edge there.
+    shortest: Vec<f64>,
+    components: Arc<Components>,
     /// By edge: a vertex of all of its rim.
     of_rim: Vec<Vertex>,
     /// By component: a body with holes, by all rims together, and by each.
     is_body: Vec<[bool; 2]>,
+    /// Of the middles of the edges.
+    middles: BoxTree,
+}
+
+impl Boundary {
+    /// O(n log n) in the boundary, and a few looks at the submesh.
+    pub(crate) fn of(survey: &Survey<'_>, work: &mut Work<'_>) -> Self {
+        let components = work.components(survey);
+        let (submesh, edges) = work.edges();
+        let rim_edge = |(edge, number): (Edge<'_>, u32)| {
+            let (ends, triangle): ([Vertex; 2], u32) = (edge.directed(&edge.uses[0]).into(), edge.uses[0].triangle);
+            RimEdge { ends, triangle, number, inward: inward(submesh, triangle, ends) }
+        };
+        let all: Vec<RimEdge> = edges.iter().zip(0..).filter(|(e, _)| e.is_boundary()).map(rim_edge).collect();
+        let vertices = boundary_vertices(edges);
+        let rim_of = by_vertex(submesh, edges);
+        Self {
+            shortest: vertices.iter().map(|v| submesh.shortest_edge(*v)).collect(),
+            is_body: bodies(survey, submesh, edges, &components, &rim_of),
+            of_rim: all.iter().map(|e| rim_of[e.ends[0] as usize]).collect(),
+            middles: BoxTree::new(&all.iter().map(|e| middle(submesh, e.ends, 0.0)).collect::<Vec<_>>()),
+            edges: all,
+            vertices,
+            components,
+        }
+    }
+}
+
+/// Boundary edges at a width.
+pub(crate) struct Rims<'b> {
+    pub(crate) boundary: &'b Boundary,
+    /// By vertex: within which distance it may find its partner. 0 but for ends of edges that take part.
+    pub(crate) reach: Vec<f64>,
+    /// By edge: it stays open. Empty if none does.
+    stays_open: Vec<bool>,
     is_crack: bool,
 }
 
-impl Rims {
+impl<'b> Rims<'b> {
     /// Without the edges that have both ends among `left_open` (ascending).
-    pub(crate) fn of(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, width: &Width, left_open: &[Vertex]) -> Self {
-        let components = Components::of(survey, submesh, edges, &Reversed::none(survey), Through::EveryEdge);
+    pub(crate) fn of(boundary: &'b Boundary, submesh: &Submesh, width: &Width, left_open: &[Vertex]) -> Self {
+        let is_left = |e: &RimEdge| e.ends.iter().all(|v| left_open.binary_search(v).is_ok());
+        let stays_open = if left_open.is_empty() { Vec::new() } else { boundary.edges.iter().map(is_left).collect() };
         let mut reach = vec![0.0; submesh.positions.len()];
-        let mut rims = Vec::new();
-        for (edge, number) in edges.iter().zip(0..).filter(|(e, _)| e.is_boundary()) {
-            let triangle = edge.uses[0].triangle;
-            let (from, to) = edge.directed(&edge.uses[0]);
-            if [from, to].iter().all(|v| left_open.binary_search(v).is_ok()) {
-                continue;
+        let Tolerance { weld, edge_share } = width.tolerance;
+        let at = |place: usize| weld.min(boundary.shortest[place] * edge_share);
+        if stays_open.is_empty() {
+            boundary.vertices.iter().enumerate().for_each(|(place, v)| reach[*v as usize] = at(place));
+        } else {
+            let taking_part = boundary.edges.iter().zip(&stays_open).filter(|(_, stays)| !**stays);
+            for v in taking_part.flat_map(|(e, _)| e.ends) {
+                reach[v as usize] = boundary.vertices.binary_search(&v).map_or(0.0, at);
             }
-            for v in [from, to] {
-                if reach[v as usize] == 0.0 {
-                    reach[v as usize] = width.tolerance.at(submesh, v);
-                }
-            }
-            rims.push(RimEdge { ends: [from, to], triangle, number, inward: inward(submesh, triangle, [from, to]) });
         }
-        let rim_of = by_vertex(submesh, edges);
-        let is_body = bodies(survey, submesh, edges, &components, &rim_of);
-        let of_rim = rims.iter().map(|e: &RimEdge| rim_of[e.ends[0] as usize]).collect();
-        Self { edges: rims, reach, of_rim, of_triangle: components.of_triangle, is_body, is_crack: width.is_crack }
+        Self { boundary, reach, stays_open, is_crack: width.is_crack }
+    }
+
+    fn takes_part(&self, edge: u32) -> bool {
+        self.stays_open.get(edge as usize) != Some(&true)
     }
 
     /// Leaves out the matches on rims of which less than half is used; says if there were any.
@@ -116,13 +153,15 @@ impl Rims {
             return false;
         }
         let mut shares: BTreeMap<Vertex, [f64; 2]> = BTreeMap::new();
-        for ((edge, rim), is_used) in self.edges.iter().zip(&self.of_rim).zip(is_used) {
+        let all = (0..).zip(&self.boundary.edges).zip(&self.boundary.of_rim).zip(is_used);
+        for (((_, edge), rim), is_used) in all.filter(|(((i, _), _), _)| self.takes_part(*i)) {
             let length = submesh.distance(edge.ends[0], edge.ends[1]);
             let [used, all] = shares.entry(*rim).or_default();
             *used += if *is_used { length } else { 0.0 };
             *all += length;
         }
-        let is_poor = |i: u32| shares.get(&self.of_rim[i as usize]).is_some_and(|[used, all]| *used > 0.0 && used / all < HALF);
+        let is_poor =
+            |i: u32| shares.get(&self.boundary.of_rim[i as usize]).is_some_and(|[used, all]| *used > 0.0 && used / all < HALF);
         let before = matches.len();
         matches.retain(|m| !m.edges.iter().any(|i| is_poor(*i)));
         matches.len() < before
@@ -135,8 +174,8 @@ impl Rims {
             let height = a.inward.length().min(b.inward.length());
             height * (1.0 - alike * alike).max(0.0).sqrt() >= PART * apart
         };
-        let [of_a, of_b] = [a, b].map(|e| self.of_triangle[e.triangle as usize]);
-        let body = |c: u32| self.is_body.get(c as usize).is_some_and(|is| is[usize::from(!against)]);
+        let [of_a, of_b] = [a, b].map(|e| self.boundary.components.of_triangle[e.triangle as usize]);
+        let body = |c: u32| self.boundary.is_body.get(c as usize).is_some_and(|is| is[usize::from(!against)]);
         parts && a.triangle != b.triangle && (self.is_crack || of_a == of_b || !body(of_a) || !body(of_b))
     }
 
@@ -154,29 +193,21 @@ impl Rims {
     }
 
     /// All that may be matched, the nearest first.
-    pub(crate) fn matches(&self, submesh: &Submesh) -> Vec<Match> {
-        let middles: Vec<Bounds> = self.edges.iter().map(|e| middle(submesh, e.ends, 0.0)).collect();
-        if middles.is_empty() {
-            return Vec::new();
-        }
-        let tree = BoxTree::new(&middles);
-        let mut found = Vec::new();
-        let mut all = Vec::new();
-        for (i, edge) in (0..).zip(&self.edges) {
-            let reach = edge.ends.map(|v| self.reach[v as usize]);
-            tree.meeting(&middle(submesh, edge.ends, reach[0].min(reach[1])), &mut found);
-            found.retain(|j| *j > i);
-            if found.len() > MOST {
-                continue;
+    pub(crate) fn matches(&self, submesh: &Submesh, threads: usize) -> Vec<Match> {
+        let mut all = parallel::gather(threads, &self.boundary.edges, |near, (i, edge), all| {
+            let (i, reach) = (i as u32, edge.ends.map(|v| self.reach[v as usize]));
+            self.boundary.middles.meeting(&middle(submesh, edge.ends, reach[0].min(reach[1])), near);
+            near.retain(|j| *j > i && self.takes_part(*j));
+            if self.takes_part(i) && near.len() <= MOST {
+                all.extend(near.iter().filter_map(|j| self.matching(submesh, [i, *j])));
             }
-            all.extend(found.iter().filter_map(|j| self.matching(submesh, [i, *j])));
-        }
+        });
         all.sort_by(|a: &Match, b| a.width.total_cmp(&b.width).then(a.edges.cmp(&b.edges)));
         all
     }
 
     fn matching(&self, submesh: &Submesh, edges: [u32; 2]) -> Option<Match> {
-        let [a, b] = edges.map(|i| &self.edges[i as usize]);
+        let [a, b] = edges.map(|i| &self.boundary.edges[i as usize]);
         let [from, to] = b.ends;
         let (width, against) = match self.apart(submesh, a.ends, [to, from], 1.0) {
             Some(width) => (width, true),

@@ -18,14 +18,14 @@ pub(crate) struct Split {
 }
 
 /// Boundary vertices of other rims on boundary edges, by edge and place on it, which lie at the end of an edge that runs along.
-pub(crate) fn wanted(submesh: &Submesh, edges: &Edges, rims: &Rims) -> Vec<OnEdge> {
-    let on = near::on_edges(submesh, edges, |v| rims.reach[v as usize]);
+pub(crate) fn wanted(submesh: &Submesh, edges: &Edges, rims: &Rims<'_>, threads: usize) -> Vec<OnEdge> {
+    let on = near::on_edges(submesh, edges, |v| rims.reach[v as usize], threads);
     if on.is_empty() {
         return on;
     }
     let mut places: Vec<(u32, Vertex)> = on.iter().map(|on| (on.edge, on.vertex)).collect();
     places.sort_unstable();
-    let mut at_vertex: Vec<(Vertex, u32)> = (0..).zip(&rims.edges).flat_map(|(i, e)| e.ends.map(|v| (v, i))).collect();
+    let mut at_vertex: Vec<(Vertex, u32)> = (0..).zip(&rims.boundary.edges).flat_map(|(i, e)| e.ends.map(|v| (v, i))).collect();
     at_vertex.sort_unstable();
     let along = Along { submesh, rims, places, at_vertex };
     on.iter().copied().filter(|on| along.has_partner(on)).collect()
@@ -33,7 +33,7 @@ pub(crate) fn wanted(submesh: &Submesh, edges: &Edges, rims: &Rims) -> Vec<OnEdg
 
 struct Along<'r> {
     submesh: &'r Submesh,
-    rims: &'r Rims,
+    rims: &'r Rims<'r>,
     /// Vertices with the edges that they lie on, ascending.
     places: Vec<(u32, Vertex)>,
     /// The boundary edges at each vertex, ascending.
@@ -43,11 +43,11 @@ struct Along<'r> {
 impl Along<'_> {
     /// Does a boundary edge at the vertex run along the edge that it lies on?
     fn has_partner(&self, on: &OnEdge) -> bool {
-        let Ok(place) = self.rims.edges.binary_search_by_key(&on.edge, |e| e.number) else { return false };
-        let edge = &self.rims.edges[place];
+        let Ok(place) = self.rims.boundary.edges.binary_search_by_key(&on.edge, |e| e.number) else { return false };
+        let edge = &self.rims.boundary.edges[place];
         let from = self.at_vertex.partition_point(|(v, _)| *v < on.vertex);
         self.at_vertex[from..].iter().take_while(|(v, _)| *v == on.vertex).any(|(_, i)| {
-            let other = &self.rims.edges[*i as usize];
+            let other = &self.rims.boundary.edges[*i as usize];
             let next = if other.ends[0] == on.vertex { other.ends[1] } else { other.ends[0] };
             self.runs_along(edge, other, next).is_some_and(|apart| self.rims.may_join(edge, other, true, apart.max(on.distance)))
         })

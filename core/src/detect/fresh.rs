@@ -17,7 +17,7 @@ use crate::stream::source::{Seen, Triangle};
 use crate::topology::crossings::{Crossings, Pair, most_tested};
 use crate::topology::intersect::leave_out_apart;
 use crate::topology::survey::Survey;
-use crate::util::parallel;
+use crate::util::{parallel, steps};
 
 /// All self-intersections of the written file, numbered as its records are; `None` if those of the input are not all known, or too many
 /// boxes meet. O(n) boxes are held against a grid of the fresh ones around.
@@ -54,9 +54,16 @@ pub(crate) fn met_by(
     triangles: u64,
     meets: Meets,
 ) -> Option<Vec<Pair>> {
-    let [fresh, beside]: [Vec<(u32, Corners)>; 2] = [fresh.collect(), beside.collect()];
     let threads = survey.threads();
-    let (fresh, beside) = parallel::both(threads, || Solids::of(&fresh, threads), || Solids::of(&beside, threads));
+    let fresh = Solids::of(&fresh.collect::<Vec<_>>(), threads);
+    if fresh.all.is_empty() {
+        return Some(Vec::new());
+    }
+    let mut around = Grid::default();
+    around.mark(fresh.all.iter().map(|f| f.bounds));
+    // Often few are fresh of very many.
+    let beside: Vec<_> = beside.filter(|(_, corners)| around.may_meet(&Bounds::of(corners))).collect();
+    let beside = Solids::of(&beside, threads);
     let per_chunk =
         survey.each_chunk(Search::default, |search, cell, seen| search.chunk(&fresh, &beside, &is_gone, (cell, meets), seen));
     if per_chunk.iter().map(|found| found.tested).sum::<u64>() > most_tested(triangles) {
@@ -90,6 +97,7 @@ struct Solids {
 impl Solids {
     fn of(triangles: &[(u32, Corners)], threads: usize) -> Self {
         let all = parallel::gather(threads, triangles, |_, (_, (place, corners)), all| all.extend(Solid::of(place, corners)));
+        steps::count(all.len());
         let tree = BoxTree::new(&all.iter().map(|f| f.bounds).collect::<Vec<_>>());
         Self { all, tree }
     }
@@ -193,5 +201,27 @@ impl Found {
                 self.pairs.push(Pair { triangles: [a.place, b.place], contact });
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{diagnose, plate, records, shifted};
+
+    #[test]
+    fn of_what_is_beside_fresh_triangles_only_what_is_near_is_indexed() {
+        let input = records(&plate(2, |_, _| true));
+        let d = diagnose(&input);
+        let beside = shifted(&plate(60, |_, _| true), [0.0, 0.0, 1.0]);
+        let fresh = [[30.25, 30.25, 0.0], [30.5, 30.25, 0.0], [30.25, 30.5, 2.0]];
+        let numbered = || (1000..).zip(beside.iter().copied());
+        let met = || met_by(&d.survey, std::iter::once((999, fresh)), numbered(), |_| false, 10_000, self_intersection);
+        let (steps, pairs) = steps::of(met);
+        assert!(pairs.is_some_and(|pairs| pairs.iter().any(|pair| pair.triangles[0] == 999)));
+        assert!(steps < 100, "{steps}");
+        let (steps, pairs) =
+            steps::of(|| met_by(&d.survey, std::iter::empty(), numbered(), |_| false, 10_000, self_intersection));
+        assert!(pairs.is_some_and(|pairs| pairs.is_empty()) && steps == 0);
     }
 }

@@ -6,6 +6,7 @@ use crate::geometry::sums::Bounds;
 #[derive(Default)]
 pub(crate) struct Grid {
     lo: [f32; 3],
+    hi: [f32; 3],
     per_unit: [f32; 3],
     /// A bit a cell along x, a word a row, rows along y and then z.
     rows: Vec<u32>,
@@ -18,7 +19,7 @@ impl Grid {
     pub(crate) fn mark(&mut self, boxes: impl Iterator<Item = Bounds> + Clone) {
         let mut all = Bounds::EMPTY;
         boxes.clone().for_each(|b| all.add(&b));
-        self.lo = all.lo;
+        (self.lo, self.hi) = (all.lo, all.hi);
         self.per_unit = std::array::from_fn(|k| {
             let scale = Self::SIDE as f32 / (all.hi[k] - all.lo[k]);
             if scale.is_finite() { scale } else { 0.0 }
@@ -51,6 +52,11 @@ impl Grid {
     /// False only if the box meets none of those that were marked.
     #[inline(always)]
     pub(crate) fn may_meet(&self, bounds: &Bounds) -> bool {
+        // What is beyond all cells would be taken to be in the last ones.
+        let along = |k: usize| (bounds.lo[k] <= self.hi[k]) & (bounds.hi[k] >= self.lo[k]);
+        if !(along(0) & along(1) & along(2)) {
+            return false;
+        }
         let (bits, (y0, y1), (z0, z1)) = self.place(bounds);
         if (y1 - y0) | (z1 - z0) <= 1 {
             // Nearly all of them. Up to four rows, without asking how many.
@@ -97,6 +103,6 @@ mod tests {
         grid.mark([at(0.0), at(100.0)].into_iter());
         assert_eq!([0.0, 50.0, 100.0].map(|x| grid.may_meet(&at(x))), [true, false, true]);
         grid.mark([at(50.0)].into_iter());
-        assert!(grid.may_meet(&at(50.0)));
+        assert_eq!([0.0, 50.0, 100.0].map(|x| grid.may_meet(&at(x))), [false, true, false]);
     }
 }

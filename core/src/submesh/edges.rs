@@ -58,24 +58,13 @@ impl Edges {
     pub(crate) fn of(submesh: &Submesh) -> Self {
         // Counting sort by the low end, then each vertex's few edges by comparison.
         let mut starts = vec![0u32; submesh.positions.len() + 1];
-        let halves = |submesh: &Submesh, visit: &mut dyn FnMut(Vertex, Vertex, Use)| {
-            for t in submesh.living() {
-                let v = submesh.triangles[t as usize].v;
-                for k in 0..3 {
-                    let (a, b) = (v[k], v[(k + 1) % 3]);
-                    if submesh.complete[a as usize] || submesh.complete[b as usize] {
-                        visit(a.min(b), a.max(b), Use { triangle: t, forward: a < b });
-                    }
-                }
-            }
-        };
-        halves(submesh, &mut |low, _, _| starts[low as usize + 1] += 1);
+        each_half(submesh, |low, _, _| starts[low as usize + 1] += 1);
         for v in 1..starts.len() {
             starts[v] += starts[v - 1];
         }
         let mut at = starts.clone();
         let mut table = vec![(0, Use { triangle: 0, forward: false }); *starts.last().unwrap_or(&0) as usize];
-        halves(submesh, &mut |low, high, used| {
+        each_half(submesh, |low, high, used| {
             table[at[low as usize] as usize] = (high, used);
             at[low as usize] += 1;
         });
@@ -89,7 +78,7 @@ impl Edges {
         for low in 0..submesh.positions.len() {
             edges.firsts.push(edges.ends.len() as u32);
             let part = &mut table[starts[low] as usize..starts[low + 1] as usize];
-            part.sort_unstable_by_key(|(high, used)| (*high, used.triangle));
+            sort_by_high(part);
             for group in part.chunk_by(|a, b| a.0 == b.0) {
                 edges.ends.push((low as Vertex, group[0].0));
                 edges.uses.extend(group.iter().map(|g| g.1));
@@ -131,6 +120,37 @@ impl Edges {
         let of_low = *self.firsts.get(low)? as usize..*self.firsts.get(low + 1)? as usize;
         let place = self.ends[of_low.clone()].binary_search_by_key(&high, |(_, high)| *high).ok()?;
         Some((of_low.start + place) as u32)
+    }
+}
+
+/// Visits what each living triangle has of the edges with a complete end, by triangle: the ends, smaller number first, and the use.
+#[inline(always)]
+fn each_half(submesh: &Submesh, mut visit: impl FnMut(Vertex, Vertex, Use)) {
+    for t in submesh.living() {
+        let v = submesh.triangles[t as usize].v;
+        for k in 0..3 {
+            let (a, b) = (v[k], v[(k + 1) % 3]);
+            if submesh.complete[a as usize] || submesh.complete[b as usize] {
+                visit(a.min(b), a.max(b), Use { triangle: t, forward: a < b });
+            }
+        }
+    }
+}
+
+/// Sorts what begins at one vertex by the other end; of one edge the triangles, which ascend, stay in their order.
+fn sort_by_high(part: &mut [(Vertex, Use)]) {
+    /// So many are sorted sooner one by one.
+    const FEW: usize = 16;
+    if part.len() > FEW {
+        part.sort_unstable_by_key(|(high, used)| (*high, used.triangle));
+        return;
+    }
+    for i in 1..part.len() {
+        let mut at = i;
+        while at > 0 && part[at - 1].0 > part[at].0 {
+            part.swap(at - 1, at);
+            at -= 1;
+        }
     }
 }
 

@@ -1,8 +1,7 @@
 //! Which triangles a valid patch may have at all, as far as the loop and the mesh around it can tell.
 
-use std::ops::ControlFlow;
-
-use super::boxes::{Boxes, around, join};
+use super::beside::{Beside, each_bit};
+use super::boxes::around;
 use super::rim::Rim;
 use crate::geometry::exact::{Plane, collinear};
 use crate::geometry::tri_tri::{do_cross, segment_pierces_plane};
@@ -27,8 +26,8 @@ fn rank(triangle: [u32; 3]) -> usize {
 /// patch has another. Each is looked at once, however many triangulations ask.
 pub(super) struct Clearance<'a> {
     rim: &'a Rim<'a>,
-    /// For each rim edge: the edge and the mesh's triangle beyond.
-    boxes: Boxes,
+    /// The rim edges and the mesh's triangles beyond.
+    beside: Beside,
     /// By the rank of the triangle among all.
     known: Vec<Known>,
     work: u32,
@@ -36,21 +35,35 @@ pub(super) struct Clearance<'a> {
     latest: [usize; 3],
     /// Edges whose neighbouring triangles met those looked at last.
     met: [usize; 2],
-    /// Edges that may meet a triangle with the mesh's triangle beyond.
-    near: Vec<usize>,
     /// A triangle was refused because of the mesh.
     pub(super) mesh_in_the_way: bool,
+    /// There is no triangulation of clear triangles, and so no valid one.
+    pub(super) none_is_valid: bool,
 }
 
 impl<'a> Clearance<'a> {
     pub(super) fn new(rim: &'a Rim<'a>) -> Self {
-        let n = rim.len();
-        let boxes = Boxes::new((0..n).map(|i| {
-            let edge = around(&[rim.points[i], rim.points[(i + 1) % n]]);
-            rim.neighbour(i).map_or(edge, |t| join(&edge, &around(&t)))
-        }));
         let work = WORK / (1 + rim.obstacles.len() as u32);
-        Self { rim, boxes, known: Vec::new(), work, latest: [0; 3], met: [0; 2], near: Vec::new(), mesh_in_the_way: false }
+        Self {
+            rim,
+            beside: Beside::of(rim),
+            known: Vec::new(),
+            work,
+            latest: [0; 3],
+            met: [0; 2],
+            mesh_in_the_way: false,
+            none_is_valid: false,
+        }
+    }
+
+    /// A triangulation of clear triangles was looked for, in all that may be used, and there is none. It tells nothing where too many were looked at.
+    pub(super) fn found_none(&mut self) {
+        self.none_is_valid = self.work > 0;
+    }
+
+    /// Is it known not to be clear? Corners ascending.
+    pub(super) fn is_refused(&self, triangle: [u32; 3]) -> bool {
+        self.known.get(rank(triangle)) == Some(&Known::Not)
     }
 
     /// Corners ascending.
@@ -70,7 +83,6 @@ impl<'a> Clearance<'a> {
     fn look(&mut self, triangle: [u32; 3]) -> bool {
         let rim = self.rim;
         let corners = rim.corners(triangle);
-        let bounds = around(&corners);
         let next = |i: usize| (i + 1) % rim.len();
         // Most of what is near lies clearly on one side.
         let plane = Plane::new(&corners[0], &corners[1], &corners[2]);
@@ -86,21 +98,14 @@ impl<'a> Clearance<'a> {
         if self.mesh_in_the_way && self.met.iter().any(|i| meets(*i)) {
             return false;
         }
-        self.near.clear();
-        let mut passes = None;
-        let ends = self.boxes.near(&bounds, |i| {
-            if pierces(i) {
-                passes = Some(i);
-                return ControlFlow::Break(());
-            }
-            self.near.push(i);
-            ControlFlow::Continue(())
-        });
-        if let (true, Some(i)) = (ends.is_break(), passes) {
+        let [may_pierce, may_meet] = self.beside.near(&around(&corners), &plane);
+        let pierced =
+            each_bit(may_pierce).find(|i| segment_pierces_plane(&rim.points[*i], &rim.points[next(*i)], &corners, &plane));
+        if let Some(i) = pierced {
             self.latest = [i, self.latest[0], self.latest[1]];
             return false;
         }
-        let met = self.near.iter().copied().find(|i| meets(*i));
+        let met = each_bit(may_meet).find(|i| rim.neighbour(*i).is_some_and(|t| do_cross(&corners, &t)));
         self.met = met.map_or(self.met, |i| [i, self.met[0]]);
         let meets_mesh = met.is_some() || rim.meets_obstacle(&corners);
         self.mesh_in_the_way |= meets_mesh;

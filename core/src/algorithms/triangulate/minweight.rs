@@ -9,22 +9,18 @@
 //! triangle of the mesh passes through: no valid patch has one. That costs five to ten times the first run, nearly all of it
 //! in exact predicates. O(n³) time, O(n²) memory.
 
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
 use glam::DVec3;
 
 use super::clear::Clearance;
 use super::patch::Unfillable;
 use super::rim::Rim;
+pub(super) use super::weights::Weight;
+use super::weights::{Row, Weights, first_before};
 use crate::geometry::exact::{at, collinear};
 use crate::util::steps;
-
-/// The weight that is minimised first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Weight {
-    /// The sharpest bend, then the area.
-    Bend,
-    /// The area, then the sharpest bend.
-    Area,
-}
 
 /// Steps of 1 − cos of the angle between normals; one step is 14° near flat.
 const BEND_STEPS: f64 = 32.0;
@@ -54,33 +50,44 @@ impl Part {
         }
     }
 
+    /// When its turn comes among others on its chord: the lighter first, of equal ones those that are without their triangles yet, and of these the first.
+    fn turn(&self, weight: Weight, is_whole: bool) -> Turn {
+        // Bits of floats that are not negative are in the order of the floats.
+        let (bend, area) = (u64::from(self.bend), self.area.to_bits());
+        let (first, second) = match weight {
+            Weight::Bend => (bend, area),
+            Weight::Area => (area, bend),
+        };
+        (first, second, is_whole, self.apex)
+    }
+
     /// Does it count for as much where it is a part of another one?
     fn weighs_as(&self, other: &Self) -> bool {
         Self { apex: RIM, ..*self } == Self { apex: RIM, ..*other }
     }
 }
 
-/// Bend and area of a part.
-type Weights = (u32, f64);
+/// Weights, in the order in which they count, of a part with or without its triangle; and its apex.
+type Turn = (u64, u64, bool, u32);
 
 /// The parts. The loop over the apexes of a chord runs along a row of those with its first vertex and one of those with its last.
 struct Parts {
     n: usize,
-    rows: Vec<Weights>,
-    columns: Vec<Weights>,
+    rows: Weights,
+    columns: Weights,
     apexes: Vec<u32>,
     normals: Vec<DVec3>,
 }
 
 impl Parts {
     fn none(n: usize) -> Self {
-        let none = vec![(Part::NONE.bend, Part::NONE.area); n * n];
-        Self { n, columns: none.clone(), rows: none, apexes: vec![RIM; n * n], normals: vec![DVec3::ZERO; n * n] }
+        let none = || Weights::none(n * n);
+        Self { n, rows: none(), columns: none(), apexes: vec![RIM; n * n], normals: vec![DVec3::ZERO; n * n] }
     }
 
     fn get(&self, i: usize, k: usize) -> Part {
         let at = i * self.n + k;
-        let (bend, area) = self.rows[at];
+        let (bend, area) = self.rows.get(at);
         Part { bend, area, apex: self.apexes[at], normal: self.normals[at] }
     }
 
@@ -90,13 +97,20 @@ impl Parts {
 
     fn set(&mut self, i: usize, k: usize, part: Part) {
         let at = i * self.n + k;
-        (self.rows[at], self.apexes[at], self.normals[at]) = ((part.bend, part.area), part.apex, part.normal);
-        self.columns[k * self.n + i] = self.rows[at];
+        (self.apexes[at], self.normals[at]) = (part.apex, part.normal);
+        self.rows.set(at, part.bend, part.area);
+        self.columns.set(k * self.n + i, part.bend, part.area);
+    }
+
+    /// The parts beyond (i, m) and (m, k) as one, without the triangle between them.
+    fn joined(&self, (i, k): (usize, usize), m: usize) -> Part {
+        let (left, right) = (self.rows.get(i * self.n + m), self.columns.get(k * self.n + m));
+        Part { bend: left.0.max(right.0), area: left.1 + right.1, apex: m as u32, normal: DVec3::ZERO }
     }
 
     /// The weights of the parts beyond (i, m) and (m, k), for each m from `first` to k.
-    fn beside(&self, (i, k): (usize, usize), first: usize) -> impl Iterator<Item = (&Weights, &Weights)> {
-        self.rows[i * self.n..][first..k].iter().zip(&self.columns[k * self.n..][first..k])
+    fn beside(&self, (i, k): (usize, usize), first: usize) -> [Row<'_>; 2] {
+        [self.rows.row(i * self.n + first..i * self.n + k), self.columns.row(k * self.n + first..k * self.n + k)]
     }
 }
 
@@ -129,6 +143,8 @@ pub(super) struct Table<'a, 'b> {
     banned: Vec<[u32; 3]>,
     positions: Vec<DVec3>,
     parts: Parts,
+    /// Of no chord; its memory is used again.
+    turns: BinaryHeap<Reverse<Turn>>,
     /// A chord or triangle was refused because of the mesh around.
     mesh_in_the_way: bool,
 }
@@ -148,6 +164,7 @@ impl<'a, 'b> Table<'a, 'b> {
             banned,
             positions: rim.points.iter().map(at).collect(),
             parts: Parts::none(n),
+            turns: BinaryHeap::new(),
             mesh_in_the_way: false,
         };
         for i in 0..n.saturating_sub(1) {
@@ -195,41 +212,87 @@ impl<'a, 'b> Table<'a, 'b> {
     }
 
     fn best_part(&mut self, i: usize, k: usize) -> Part {
-        let mut best = Part::NONE;
         if !self.rim.allows(i as u32, k as u32) {
             self.mesh_in_the_way = true;
+            return Part::NONE;
+        }
+        // The lightest first: what is heavier than one that may be used need not be looked at.
+        let best = self.lightest(i, k);
+        if best.apex == RIM || self.may_use([i as u32, best.apex, k as u32]) {
             return best;
         }
-        // The chord from the last vertex to the first is a rim edge: the mesh goes on beyond it.
-        let beyond = if i == 0 && k + 1 == self.rim.len() { self.rim.normal_beyond(k) } else { DVec3::ZERO };
+        self.next_lightest((i, k), best.apex)
+    }
+
+    /// The best part; of equal ones the first.
+    fn lightest(&self, i: usize, k: usize) -> Part {
+        let mut best = Part::NONE;
         let mut from = i + 1;
-        while let Some((m, mut part)) = self.next_before(&best, (i, k), from) {
-            from = m + 1;
-            let normal = (self.positions[m] - self.positions[i]).cross(self.positions[k] - self.positions[i]);
-            let length = normal.length();
-            part.area += 0.5 * length;
-            part.normal = if length > 0.0 { normal / length } else { DVec3::ZERO };
-            for other in [self.parts.normal(i, m), self.parts.normal(m, k), beyond] {
-                part.bend = part.bend.max(bend(part.normal, other));
-            }
-            if part.before(&best, self.weight) && self.may_use([i as u32, m as u32, k as u32]) {
+        while let Some(part) = self.next_before(&best, (i, k), from) {
+            from = part.apex as usize + 1;
+            let part = self.with_triangle(part, (i, k));
+            if part.before(&best, self.weight) {
                 best = part;
             }
         }
         best
     }
 
-    /// The first apex of a chord from `from` on whose parts alone weigh less than the best, and what they weigh.
-    fn next_before(&self, best: &Part, (i, k): (usize, usize), from: usize) -> Option<(usize, Part)> {
-        for (m, (left, right)) in (from..).zip(self.parts.beside((i, k), from)) {
+    /// The best part whose triangle may be used, where that on the lightest may not.
+    fn next_lightest(&mut self, (i, k): (usize, usize), lightest: u32) -> Part {
+        let mut turns = std::mem::take(&mut self.turns).into_vec();
+        turns.clear();
+        let parts = (i + 1..k).filter(|m| *m as u32 != lightest).map(|m| self.parts.joined((i, k), m));
+        turns.extend(parts.filter(|part| part.area != f64::INFINITY).map(|part| Reverse(part.turn(self.weight, false))));
+        let mut turns = BinaryHeap::from(turns);
+        let mut found = Part::NONE;
+        while let Some(Reverse((.., is_whole, m))) = turns.pop() {
             steps::count(1);
-            let (bend, area) = (left.0.max(right.0), left.1 + right.1);
-            let part = Part { bend, area, apex: m as u32, normal: DVec3::ZERO };
-            if area != f64::INFINITY && part.before(best, self.weight) {
-                return Some((m, part));
+            let triangle = [i as u32, m, k as u32];
+            if if is_whole { !self.may_use(triangle) } else { self.is_refused(triangle) } {
+                continue;
             }
+            let part = self.with_triangle(self.parts.joined((i, k), m as usize), (i, k));
+            if is_whole {
+                found = part;
+                break;
+            }
+            // Its turn comes when nothing is left that may be lighter.
+            turns.push(Reverse(part.turn(self.weight, true)));
         }
-        None
+        self.turns = turns;
+        found
+    }
+
+    /// A part with the triangle on its chord, where what is beyond that is known.
+    fn with_triangle(&self, mut part: Part, (i, k): (usize, usize)) -> Part {
+        let m = part.apex as usize;
+        // The chord from the last vertex to the first is a rim edge: the mesh goes on beyond it.
+        let beyond = if i == 0 && k + 1 == self.rim.len() { self.rim.normal_beyond(k) } else { DVec3::ZERO };
+        let normal = (self.positions[m] - self.positions[i]).cross(self.positions[k] - self.positions[i]);
+        let length = normal.length();
+        part.area += 0.5 * length;
+        part.normal = if length > 0.0 { normal / length } else { DVec3::ZERO };
+        for other in [self.parts.normal(i, m), self.parts.normal(m, k), beyond] {
+            part.bend = part.bend.max(bend(part.normal, other));
+        }
+        part
+    }
+
+    /// The first apex of a chord from `from` on whose parts alone weigh less than the best, and what they weigh.
+    fn next_before(&self, best: &Part, (i, k): (usize, usize), from: usize) -> Option<Part> {
+        let found = first_before(self.parts.beside((i, k), from), (best.bend, best.area), self.weight);
+        steps::count(found.map_or(k - from, |(place, ..)| place + 1));
+        let (place, bend, area) = found?;
+        Some(Part { bend, area, apex: (from + place) as u32, normal: DVec3::ZERO })
+    }
+
+    /// Is it known that a triangle may not be used?
+    fn is_refused(&self, triangle: [u32; 3]) -> bool {
+        match &self.choice {
+            Choice::Clear(clearance) => clearance.is_refused(triangle),
+            Choice::Any => false,
+        }
     }
 
     fn may_use(&mut self, triangle: [u32; 3]) -> bool {

@@ -5,10 +5,12 @@
 //! plane of a nearly planar loop (`planar`); for loops of some hundred vertices the minimum-weight triangulation by dynamic
 //! programming (`minweight`), for larger ones an advancing front (`front`); where these cross themselves, another weight, the
 //! projection of a loop that is not planar, for small loops the front, and at last, for very small ones, any patch (`search`).
+//! Where the triangles that a valid patch may have make no triangulation, none of the rest is tried.
 //!
 //! Floating point only ever ranks patches; whether one is valid is decided with exact predicates. Every ranking uses
 //! + − × ÷ √ alone and every bound of work is a count, so results are the same everywhere.
 
+mod beside;
 mod boxes;
 mod clear;
 pub(crate) mod flips;
@@ -19,6 +21,7 @@ mod planar;
 mod rim;
 mod search;
 pub(crate) mod strip;
+mod weights;
 
 use crate::geometry::exact::Point;
 use crate::geometry::position::Position;
@@ -156,6 +159,7 @@ pub(crate) fn pinched(rim: &Rim<'_>) -> Result<Vec<[u32; 3]>, Unfillable> {
     let rim = &Rim { points: rim.points, apexes: rim.apexes, obstacles: rim.obstacles, forbidden: &forbidden };
     let mut clearance = Clearance::new(rim);
     let mut attempt = |weight| match rim.len() {
+        _ if clearance.none_is_valid => None,
         ..=PINCHED_THOROUGH => by_weight(rim, weight, &mut clearance).ok(),
         _ => minweight::triangulate(rim, weight, Choice::Any).ok().filter(|made| rim.accepts(made, false).is_ok()),
     };
@@ -191,6 +195,9 @@ fn by_methods(rim: &Rim<'_>, settings: &FillSettings) -> Result<Patch, Unfillabl
             Err(other) if reason == Unfillable::Blocked && !(small && other == Unfillable::TooLarge) => reason = other,
             Err(_) => {}
         }
+        if clearance.none_is_valid {
+            break;
+        }
     }
     Err(reason)
 }
@@ -222,6 +229,10 @@ fn by_weight(rim: &Rim<'_>, weight: Weight, clearance: &mut Clearance<'_>) -> Re
         return Ok(triangles);
     }
     let mut table = minweight::Table::new(rim, weight, Choice::Clear(clearance));
+    if let Err(reason) = table.best() {
+        clearance.found_none();
+        return Err(reason);
+    }
     loop {
         let triangles = table.best()?;
         let crossing = match rim.accepts(&triangles, false) {

@@ -6,6 +6,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::geometry::tri_tri::{Sure, sure, sure_of_neighbours};
+use crate::util::steps;
 
 /// Positions on a grid of integers, so that i128 arithmetic is exact and degenerate situations are frequent.
 type Grid = [i32; 3];
@@ -481,4 +482,17 @@ proptest! {
             SelfCrossing::Undecided => prop_assert!(false),
         }
     }
+}
+
+#[test]
+fn where_no_patch_can_be_valid_no_more_are_tried() {
+    let angles = (0..60).map(|i| std::f32::consts::TAU * i as f32 / 60.0);
+    let points: Vec<Point> = angles.map(|angle| [angle.cos(), angle.sin(), 0.0]).collect();
+    let needle = [[0.01, 0.02, -1.0], [0.02, 0.01, -1.0], [0.015, 0.017, 1.0]];
+    let rim = Rim { points: &points, apexes: &[], obstacles: &[needle], forbidden: &|_, _| false };
+    let (one, _) = steps::of(|| minweight::triangulate(&rim, Weight::Bend, Choice::Any).is_ok());
+    let (other, _) = steps::of(|| minweight::triangulate(&rim, Weight::Bend, Choice::Clear(&mut Clearance::new(&rim))).is_ok());
+    let (all, made) = steps::of(|| triangulate(&rim, &FillSettings::default()));
+    assert_eq!(made.err(), Some(Unfillable::Blocked));
+    assert!(all <= one + other, "{all} steps after {one} and {other}");
 }

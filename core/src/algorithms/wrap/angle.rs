@@ -19,7 +19,7 @@ pub(super) const WIDTH: usize = 8;
 
 /// A node is far from a point beyond so many of its radii. The error of a winding number is then below some 10⁻², which matters only where
 /// it is near ½: in the air of a hole.
-const FAR: f64 = 2.0;
+pub(super) const FAR: f64 = 2.0;
 
 /// Points side by side.
 pub(super) struct Lanes([[f64; WIDTH]; 3]);
@@ -47,6 +47,8 @@ pub(super) struct Moments {
     pub(super) centre: DVec3,
     /// Squared distance beyond which this stands for the triangles.
     pub(super) far: f64,
+    /// Of all triangles.
+    pub(super) area: f64,
     /// Sum of the vector areas.
     dipole: DVec3,
     /// Vector areas times the places of their triangles: xx, yy, zz, and the sums of xy and yx, yz and zy, zx and xz.
@@ -65,7 +67,7 @@ impl Moments {
             total += area.length();
         }
         let centre = if total > 0.0 { centre / total } else { place(triangles[0][0]) };
-        let mut moments = Self { centre, ..Self::default() };
+        let mut moments = Self { centre, area: total, ..Self::default() };
         for (at, area) in parts {
             let by = at - centre;
             moments.dipole += area;

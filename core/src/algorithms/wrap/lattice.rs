@@ -137,11 +137,11 @@ impl Lattice {
         DVec3::from_array(std::array::from_fn(|k| (f64::from(p[k]) / self.step - self.origin[k] as f64) / side))
     }
 
-    /// What winds around each of some points, by name.
+    /// What winds around each of some points, by name, or on which side of ½ that is, as [`Tree::windings_or_sides`] says it. Best in the order of [`upright`].
     fn windings(&self, tree: &Tree, points: &[u64]) -> Vec<f32> {
         let points: Vec<[u32; 3]> = points.iter().map(|p| named(*p)).collect();
         let asked: Vec<DVec3> = points.iter().filter(|p| !self.is_beyond(**p)).map(|p| self.point(*p)).collect();
-        let mut windings = tree.winding_numbers(&asked).into_iter();
+        let mut windings = tree.windings_or_sides(&asked).into_iter();
         let of = |p: &[u32; 3]| if self.is_beyond(*p) { 0.0 } else { windings.next().unwrap_or(0.0) as f32 };
         points.iter().map(of).collect()
     }
@@ -170,6 +170,11 @@ fn name(p: [u32; 3]) -> u64 {
     u64::from(p[0]) | u64::from(p[1]) << COORDINATE_BITS | u64::from(p[2]) << (2 * COORDINATE_BITS)
 }
 
+/// Orders names so that points above each other stand in a row, the lowest first.
+fn upright(name: u64) -> u64 {
+    name.rotate_left(64 - 2 * COORDINATE_BITS)
+}
+
 fn named(name: u64) -> [u32; 3] {
     [0, 1, 2].map(|k| (name >> (k * COORDINATE_BITS)) as u32 & ((1 << COORDINATE_BITS) - 1))
 }
@@ -186,7 +191,7 @@ fn edge(a: u64, b: u64) -> u64 {
 /// Winding numbers where the surface is.
 struct Field<'l> {
     lattice: &'l Lattice,
-    /// By point.
+    /// By point; infinite where only the side of ½ is known.
     winding: HashMap<u64, f32, Hashing>,
     /// All cubes that were looked at, ascending, by their lowest corner.
     cubes: Vec<u64>,
@@ -226,7 +231,7 @@ impl<'l> Field<'l> {
                 .flat_map(|cube| points_of(named(*cube)).map(name))
                 .filter(|p| !field.winding.contains_key(p))
                 .collect();
-            points.sort_unstable();
+            points.sort_unstable_by_key(|p| upright(*p));
             points.dedup();
             let blocks = parallel::map(threads, points.len().div_ceil(BLOCK), |block| {
                 let points = &points[block * BLOCK..points.len().min((block + 1) * BLOCK)];
@@ -249,6 +254,14 @@ impl<'l> Field<'l> {
 
     fn is_inside(&self, point: u64) -> bool {
         self.winding.get(&point).is_some_and(|w| *w > 0.5)
+    }
+
+    /// How often the surface winds around a point.
+    fn winding(&self, tree: &Tree, p: [u32; 3]) -> f64 {
+        match self.winding.get(&name(p)) {
+            Some(side) if side.is_infinite() => f64::from(tree.winding_number(self.lattice.point(p)) as f32),
+            known => known.map_or(0.0, |w| f64::from(*w)),
+        }
     }
 
     /// The cubes across faces whose corners and this cube's centre are of both kinds.
@@ -305,10 +318,12 @@ impl<'l> Field<'l> {
         let way = WAYS[(edge & 7) as usize];
         let high: [u32; 3] = std::array::from_fn(|k| low[k].wrapping_add_signed(way[k]));
         let [from, to] = [low, high].map(|p| self.lattice.point(p));
-        let [a, b] = [low, high].map(|p| self.winding.get(&name(p)).map_or(0.0, |w| f64::from(*w)));
-        let rises = b > a;
+        let rises = self.is_inside(name(high));
         let share = if rises { tree.leaves(to, from).map(|s| 1.0 - s) } else { tree.leaves(from, to) };
-        let share = share.unwrap_or_else(|| (a - 0.5) / (a - b));
+        let share = share.unwrap_or_else(|| {
+            let [a, b] = [low, high].map(|p| self.winding(tree, p));
+            (a - 0.5) / (a - b)
+        });
         let is_long = way.contains(&0);
         let steps = if is_long { 2 * self.lattice.half } else { self.lattice.half };
         let least = steps / LEAST_STEPS;

@@ -13,6 +13,8 @@
 //! **Deterministic.** The tree's shape depends on the triangles and their order alone, a query meets nodes in the tree's order, and all is done
 //! by + − × ÷ √ in f64, which IEEE 754 fixes. Solid angles: [`super::angle`].
 
+mod sides;
+
 use glam::DVec3;
 
 pub(crate) use super::angle::Corners;
@@ -21,6 +23,7 @@ use crate::detect::bodies;
 use crate::geometry::distance::{place, square_distance};
 use crate::geometry::position::Position;
 use crate::geometry::sums::Bounds;
+use crate::util::steps;
 
 /// Triangles in a leaf, at most.
 const LEAF: usize = 8;
@@ -245,15 +248,27 @@ impl Tree {
     }
 
     /// The distance of a point from the nearest triangle; infinite if there is none.
+    #[cfg(test)]
     pub(crate) fn distance(&self, point: DVec3) -> f64 {
-        let mut best = f64::INFINITY;
-        if !self.nodes.is_empty() {
-            self.approach(point, 0, &mut best);
-        }
-        best.sqrt()
+        self.square_beyond(point, 0.0).sqrt()
     }
 
-    fn approach(&self, point: DVec3, n: usize, best: &mut f64) {
+    /// The largest of some points' distances; 0 if there are none. Most points need no more than a look at a triangle that is nearer.
+    pub(crate) fn farthest(&self, points: impl IntoIterator<Item = DVec3>) -> f64 {
+        points.into_iter().fold(0.0, |so_far: f64, p| so_far.max(self.square_beyond(p, so_far))).sqrt()
+    }
+
+    /// The square of a point's distance, if that is more than `enough`; else any number from that on up to `enough`.
+    fn square_beyond(&self, point: DVec3, enough: f64) -> f64 {
+        let mut best = f64::INFINITY;
+        if !self.nodes.is_empty() {
+            self.approach((point, enough), 0, &mut best);
+        }
+        best
+    }
+
+    fn approach(&self, (point, enough): (DVec3, f64), n: usize, best: &mut f64) {
+        steps::count(1);
         let node = &self.nodes[n];
         if node.count > 0 {
             for t in self.leaf(node) {
@@ -265,8 +280,8 @@ impl Tree {
         let [a, b] = children.map(|c| square_to_box(point, &self.nodes[c].bounds));
         let order = if b < a { [(children[1], b), (children[0], a)] } else { [(children[0], a), (children[1], b)] };
         for (child, square) in order {
-            if square < *best {
-                self.approach(point, child, best);
+            if square < *best && *best > enough {
+                self.approach((point, enough), child, best);
             }
         }
     }
@@ -283,6 +298,8 @@ fn split(triangles: &[Corners], centres: &[[f32; 3]], order: &mut [u32], first: 
     let number = nodes.len();
     nodes.push(Node { bounds, next: 0, first, count: 0 });
     if order.len() <= LEAF {
+        // Whatever order the selections leave.
+        order.sort_unstable();
         nodes[number].count = order.len() as u32;
     } else {
         let width = |k: usize| spread.hi[k] - spread.lo[k];
@@ -293,9 +310,6 @@ fn split(triangles: &[Corners], centres: &[[f32; 3]], order: &mut [u32], first: 
             p.total_cmp(&q).then(a.cmp(b))
         });
         let (low, high) = order.split_at_mut(half);
-        // Whatever order the selection leaves.
-        low.sort_unstable();
-        high.sort_unstable();
         split(triangles, centres, low, first, nodes);
         split(triangles, centres, high, first + half as u32, nodes);
     }

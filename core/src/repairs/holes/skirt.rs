@@ -130,7 +130,8 @@ fn met(
             of_probe.extend([(c, e); 2]);
         }
     }
-    let pairs = overlay.met_by_others(survey, submesh, &probes, |_| true, |_| false)?;
+    let probes: Vec<(u32, Corners)> = (0..).zip(probes).collect();
+    let pairs = overlay.met_by_others(survey, submesh, (probes.len() as u32, &probes), |_| true, |_| false)?;
     let mut hits: Vec<((u32, u32), Standing)> = pairs
         .into_iter()
         .filter_map(|pair| match pair {

@@ -178,7 +178,7 @@ fn moved(submesh: &Submesh, cut: &Cut, come: &[Corners]) -> f64 {
             let [a, b, c] = t.map(place);
             [a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0]
         });
-        points.map(|p| from.distance(p)).fold(0.0, f64::max)
+        from.farthest(points)
     };
     farthest(&gone, &after).max(farthest(come, &before))
 }

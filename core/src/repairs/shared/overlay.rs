@@ -166,22 +166,22 @@ impl Overlay {
         Some(found.into_iter().map(StandingPair::of).collect())
     }
 
-    /// Which pairs with one of these other triangles, which are not of the surface, cross or overlap. `stays`: whether a changed triangle is
-    /// held against them; `goes`: a record is not. `None` if there are too many to number, or it is too much work to tell. O(boxes around them).
+    /// Which pairs with one of these other triangles, which are not of the surface, cross or overlap. They are some of so many, and go by their numbers
+    /// among these. `stays`: whether a changed triangle is held against them; `goes`: a record is not. `None` if there are too many to number, or it is too much work to tell. O(boxes around them).
     pub(crate) fn met_by_others(
         &self,
         survey: &Survey<'_>,
         submesh: &Submesh,
-        others: &[Corners],
+        (count, others): (u32, &[(u32, Corners)]),
         stays: impl Fn(u32) -> bool,
         goes: impl Fn(u32) -> bool + Sync,
     ) -> Option<Vec<[Held; 2]>> {
         let first = self.records.checked_add(submesh.triangles.len() as u32)?;
-        let total = first.checked_add(u32::try_from(others.len()).ok()?)?;
+        let total = first.checked_add(count)?;
         let beside = self.changed.iter().filter(|t| stays(**t)).map(|t| (self.number(*t), submesh.points(*t)));
         let found = fresh::met_by(
             survey,
-            (first..).zip(others.iter().copied()),
+            others.iter().map(|(number, corners)| (first + number, *corners)),
             beside,
             |record| self.is_gone(record) || goes(record),
             u64::from(total),

@@ -231,7 +231,7 @@ impl Site<'_, '_> {
                 let four = [middle, a.lerp(middle, 0.01), b.lerp(middle, 0.01), c.lerp(middle, 0.01)];
                 places.extend(four.map(|p| (p, normal * (cell / 2.0))));
             }
-            let outside = |sides: Vec<DVec3>| old_tree.winding_numbers(&sides).into_iter().map(|winding| winding <= 0.5);
+            let outside = |sides: Vec<DVec3>| old_tree.windings_or_sides(&sides).into_iter().map(|winding| winding <= 0.5);
             let mut bounds = Vec::with_capacity(places.len());
             let before = outside(places.iter().map(|(p, off)| *p + *off).collect());
             let inner: Vec<_> = before
@@ -247,11 +247,11 @@ impl Site<'_, '_> {
                 .collect();
             let behind = outside(inner.iter().map(|(p, off)| *p - *off).collect());
             bounds.extend(behind.zip(inner).filter_map(|(out, (p, _))| out.then_some(p)));
-            bounds.into_iter().map(|p| new_tree.distance(p)).fold(0.0, f64::max)
+            new_tree.farthest(bounds)
         });
         let from_new = sampled(new, self.threads, |triangles| {
-            let far = |[a, b, c]: [DVec3; 3]| old_tree.distance((a + b + c) / 3.0).max(old_tree.distance(a));
-            triangles.iter().map(|t| far(t.map(place))).fold(0.0, f64::max)
+            let two = |[a, b, c]: [DVec3; 3]| [(a + b + c) / 3.0, a];
+            old_tree.farthest(triangles.iter().flat_map(|t| two(t.map(place))))
         });
         (from_old, from_new)
     }

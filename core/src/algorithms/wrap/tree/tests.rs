@@ -104,3 +104,77 @@ proptest! {
         prop_assert!((tree.distance(p) - nearest).abs() < 1e-9);
     }
 }
+
+/// Boxes in and beside each other, without some of their triangles.
+fn with_holes(missing: &[prop::sample::Index]) -> Vec<Corners> {
+    let mut mesh = [cuboid([0.0; 3], [6.0; 3]), cuboid([4.0; 3], [9.0; 3]), reversed(&cuboid([1.0; 3], [3.0; 3]))].concat();
+    for i in missing {
+        mesh.remove(i.index(mesh.len()));
+    }
+    mesh
+}
+
+proptest! {
+    /// On columns of several points and of one, on corners and edges, too.
+    #[test]
+    fn sides_are_those_of_winding_numbers(
+        missing in prop::collection::vec(any::<prop::sample::Index>(), 0..4),
+        columns in prop::collection::vec(((-2i8..24, -2i8..24), prop::collection::vec(-2i8..24, 1..6)), 1..12),
+    ) {
+        let tree = Tree::winding(&with_holes(&missing));
+        let mut points = Vec::new();
+        for ((x, y), mut zs) in columns {
+            zs.sort_unstable();
+            points.extend(zs.into_iter().map(|z| DVec3::from_array([x, y, z].map(f64::from)) / 2.0));
+        }
+        for (told, p) in tree.windings_or_sides(&points).into_iter().zip(points) {
+            let want = tree.winding_number(p);
+            prop_assert!(if told.is_finite() { told.to_bits() == want.to_bits() } else { (told > 0.0) == (want > 0.5) }, "{told} at {p}");
+        }
+    }
+
+    #[test]
+    fn the_farthest_is_that_of_all_distances(
+        triangles in prop::collection::vec(prop::array::uniform3(prop::array::uniform3(-9i8..9)), 1..60),
+        points in prop::collection::vec(prop::array::uniform3(-12i8..12), 0..20),
+    ) {
+        let triangles: Vec<Corners> = triangles.iter().map(|t| t.map(|p| p.map(f32::from))).collect();
+        let points = || points.iter().map(|p| DVec3::from_array(p.map(f64::from)));
+        let tree = Tree::new(&triangles);
+        let want = points().map(|p| tree.distance(p)).fold(0.0, f64::max);
+        prop_assert_eq!(tree.farthest(points()).to_bits(), want.to_bits());
+    }
+}
+
+/// A block of small triangles with a hole in its roof, far from most points.
+#[test]
+fn what_is_far_from_holes_is_told_in_few_steps() {
+    const SIDE: usize = 40;
+    let mut mesh: Vec<Corners> = Vec::new();
+    let mut quad = |corners: [[usize; 3]; 4]| {
+        let [a, b, c, d] = corners.map(|[x, y, up]| [x as f32, y as f32, if up == 1 { 0.0 } else { -30.0 }]);
+        mesh.extend([[a, b, c], [a, c, d]]);
+    };
+    for (x, y) in (0..SIDE).flat_map(|x| (0..SIDE).map(move |y| (x, y))) {
+        if (x, y) != (20, 20) {
+            quad([[x, y, 1], [x + 1, y, 1], [x + 1, y + 1, 1], [x, y + 1, 1]]);
+        }
+        quad([[x, y, 0], [x, y + 1, 0], [x + 1, y + 1, 0], [x + 1, y, 0]]);
+    }
+    for i in 0..SIDE {
+        quad([[i, 0, 0], [i + 1, 0, 0], [i + 1, 0, 1], [i, 0, 1]]);
+        quad([[i + 1, SIDE, 0], [i, SIDE, 0], [i, SIDE, 1], [i + 1, SIDE, 1]]);
+        quad([[0, i + 1, 0], [0, i, 0], [0, i, 1], [0, i + 1, 1]]);
+        quad([[SIDE, i, 0], [SIDE, i + 1, 0], [SIDE, i + 1, 1], [SIDE, i, 1]]);
+    }
+    let tree = Tree::winding(&mesh);
+    let column: Vec<DVec3> = (1..25).rev().map(|z| DVec3::new(5.5, 5.25, -f64::from(z))).collect();
+    let (steps, told) = steps::of(|| tree.windings_or_sides(&column));
+    assert!(told.iter().all(|w| *w == f64::INFINITY), "{told:?}");
+    assert!(steps < 1000, "{steps}");
+    // The first point tells how far they are, and all others need one way down.
+    let away = || (0..64).map(|k| DVec3::new(5.5, 5.25, 9.0 - f64::from(k) / 8.0));
+    let (one, _) = steps::of(|| tree.farthest(away().take(1)));
+    let (all, _) = steps::of(|| tree.farthest(away()));
+    assert!(2 * all < 64 * one, "{all} after {one}");
+}

@@ -7,6 +7,7 @@
 
 pub(crate) mod arrange;
 pub(crate) mod askew;
+pub(crate) mod axis;
 pub(crate) mod boxes;
 pub(crate) mod collinear;
 pub(crate) mod distance;

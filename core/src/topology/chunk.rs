@@ -18,7 +18,7 @@ use crate::topology::intersect::{self, CellView, Effort, Finder, Standing};
 use crate::topology::labels::{LabelWriter, Labels};
 use crate::topology::region_sums::{RegionSums, Sum};
 use crate::topology::room::Room;
-use crate::topology::star::{Ring, Stars};
+use crate::topology::star::{Hub, Ring, Stars};
 use crate::topology::vertex_table::{self, Weld};
 use crate::util::ids::NONE;
 
@@ -75,6 +75,8 @@ pub(crate) struct ChunkTopology {
     pub(crate) vertices_used: u64,
     /// Positions at home here that irregular triangles use.
     pub(crate) irregular_triangle_vertices: u64,
+    /// The largest hubs at home here.
+    pub(crate) hubs: Vec<Hub>,
     /// Self-intersections that this chunk owns; empty if they were not looked for.
     pub(crate) crossings: Crossings,
 }
@@ -190,7 +192,9 @@ impl Scratch {
             return ChunkTopology::default();
         }
         self.judge_stars(cell, cut, places);
-        self.collect(measure, total)
+        let at_home = |v: usize| self.states[v] != AWAY;
+        let hubs = self.stars.hubs(self.vertices.positions(), at_home);
+        ChunkTopology { hubs, ..self.collect(measure, total) }
     }
 
     /// Finds the self-intersections that the chunk owns, after it was solved; counts little more pairs than `effort` allows. The

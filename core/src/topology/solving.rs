@@ -15,6 +15,7 @@ use crate::topology::chunk::{self, ChunkTopology, Scratch};
 use crate::topology::crossings::{self, Crossings};
 use crate::topology::intersect::Effort;
 use crate::topology::room;
+use crate::topology::star;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -87,6 +88,8 @@ impl Solving<'_, '_> {
         let more = Tables::fitting(&Tables::counts(self.members, self.plan), self.budget, self.threads, room::askew_bytes);
         self.budget.take(Purpose::Tables, more.bytes);
         self.budget.check(self.path, || "many triangles lie askew in each other's boxes".into())?;
+        let around = star::line_of_hubs(chunks.iter().flat_map(|chunk| chunk.hubs.iter().copied()));
+        let effort = Effort { allowance: most_tested, askew: true, around };
         let [tested, kept] = [const { AtomicU64::new(0) }; 2];
         let loan = Loan::of(self.budget);
         let crossings = self.members.each(
@@ -100,12 +103,7 @@ impl Solving<'_, '_> {
                 }
                 let cell = self.plan.home_box(chunk);
                 scratch.solve(seen, cell, self.measure, &[], &loan);
-                let crossings = Self::cross(
-                    scratch,
-                    (visitors, cell, &loan),
-                    Effort { allowance: most_tested, askew: true },
-                    [&tested, &kept],
-                );
+                let crossings = Self::cross(scratch, (visitors, cell, &loan), effort, [&tested, &kept]);
                 self.budget.take(Purpose::Seams, crossings.seam_bytes());
                 crossings
             },
@@ -155,7 +153,7 @@ impl Solving<'_, '_> {
                     return ChunkTopology::default();
                 }
                 if let Some(allowance) = many_tested {
-                    let effort = Effort { allowance, askew: false };
+                    let effort = Effort { allowance, askew: false, around: None };
                     topology.crossings = Self::cross(scratch, (visitors, cell, &loan), effort, [&tested, &kept]);
                 }
                 found.add(&topology);

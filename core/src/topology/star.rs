@@ -3,6 +3,10 @@
 //! Nearly all vertices have at most eight triangles: these have a place of two cache-line halves each, so that no pass is needed to
 //! count them first, and a corner is compared with all others at once. What is around the others is laid out one after another.
 
+use std::cmp::Ordering;
+
+use crate::geometry::axis::Axis;
+use crate::geometry::exact::Point;
 use crate::util::ids::NONE;
 
 /// Most triangles of a short star.
@@ -14,6 +18,34 @@ const SHORT: usize = 8;
 pub(crate) struct Ring {
     next: [u32; SHORT],
     previous: [u32; SHORT],
+}
+
+/// A vertex with very many triangles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Hub {
+    triangles: u32,
+    at: Point,
+}
+
+/// Triangles around a hub, at least.
+const MANY: u32 = 257;
+
+/// The line through the two of all hubs that have the most triangles, and of equal ones the smallest positions.
+pub(crate) fn line_of_hubs(hubs: impl Iterator<Item = Hub>) -> Option<Axis> {
+    match largest(hubs.collect())[..] {
+        [first, second] => Axis::through([first.at, second.at]),
+        _ => None,
+    }
+}
+
+/// Two at most, the largest first. No two hubs are at one place.
+fn largest(mut hubs: Vec<Hub>) -> Vec<Hub> {
+    hubs.sort_unstable_by(|a, b| {
+        let by_place = a.at.iter().zip(&b.at).map(|(p, q)| p.total_cmp(q)).find(|order| order.is_ne());
+        b.triangles.cmp(&a.triangles).then(by_place.unwrap_or(Ordering::Equal))
+    });
+    hubs.truncate(2);
+    hubs
 }
 
 /// The stars of the vertices of one chunk. Keeps its memory from chunk to chunk.
@@ -91,6 +123,12 @@ impl Stars {
     #[inline]
     pub(crate) fn count(&self, v: usize) -> usize {
         self.counts[v] as usize
+    }
+
+    /// The two largest of the hubs that are `wanted`.
+    pub(crate) fn hubs(&self, positions: &[Point], wanted: impl Fn(usize) -> bool) -> Vec<Hub> {
+        let many = self.counts.iter().zip(positions).enumerate().filter(|(v, (n, _))| **n >= MANY && wanted(*v));
+        largest(many.map(|(_, (triangles, at))| Hub { triangles: *triangles, at: *at }).collect())
     }
 
     /// The next and the previous corner of each triangle around `v`, in the order of the triangles.
@@ -234,6 +272,22 @@ mod tests {
             let mut turned = fan(n, 0);
             turned[1].reverse();
             assert!(!is_closed_fan(&turned), "reversed of {n}");
+        }
+    }
+
+    #[test]
+    fn the_two_largest_hubs_are_found() {
+        let hub = |triangles: u32, x: f32| Hub { triangles, at: [1.0, x, 0.0] };
+        let all = [hub(300, 5.0), hub(400, 2.0), hub(500, 3.0), hub(400, -2.0)];
+        assert_eq!(largest(all.to_vec()), [hub(500, 3.0), hub(400, -2.0)]);
+        assert!(line_of_hubs(all.into_iter()).is_some() && line_of_hubs(all.into_iter().take(1)).is_none());
+        for (n, wanted) in [(256, 0), (257, 1)] {
+            let triangles: Vec<[u32; 3]> = fan(n, 1).iter().map(|[next, previous]| [0, *next, *previous]).collect();
+            let mut stars = Stars::default();
+            stars.gather(n as usize + 2, &triangles);
+            let positions: Vec<Point> = (0..n + 2).map(|v| [v as f32, 0.0, 0.0]).collect();
+            assert_eq!(stars.hubs(&positions, |_| true).len(), wanted);
+            assert_eq!(stars.hubs(&positions, |v| v > 0), []);
         }
     }
 

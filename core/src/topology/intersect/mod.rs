@@ -10,7 +10,7 @@
 //! * a pair that shares none by the cell of the lowest corner of the overlap of their boxes: that point lies in both boxes, so
 //!   both triangles are there, as members or visitors.
 //!
-//! In the order of the work: [`stars`] certifies vertices none of whose triangles can meet, [`tree`] and [`walk`] find pairs of overlapping
+//! In the order of the work: [`stars`] and [`hubs`] certify vertices none of whose triangles can meet, [`tree`] and [`walk`] find pairs of overlapping
 //! boxes (where these select badly, by [`slabs`] as well), [`narrow`] finds what is clearly apart or clearly crosses, and what is left is decided by exact predicates.
 //!
 //! Work can be quadratic in the size of a defect, so pairs are counted. A pair counts when its boxes overlap and it shares no
@@ -19,6 +19,7 @@
 
 mod copies;
 mod curve;
+mod hubs;
 mod lanes;
 mod narrow;
 mod real;
@@ -27,9 +28,11 @@ mod stars;
 #[cfg(test)]
 mod tests;
 mod tree;
+mod upward;
 mod view;
 mod walk;
 
+use crate::geometry::axis::Axis;
 use crate::geometry::tri_tri::Contact;
 use crate::util::ids::NONE;
 use copies::Copies;
@@ -55,12 +58,14 @@ pub(crate) struct Effort {
     /// Boxes select badly: a pair counts, and is tested, only if its [`slabs`] overlap, too. More work for each triangle, and less for each
     /// pair.
     pub(crate) askew: bool,
+    /// A line around which triangles may lie at different angles, if askew.
+    pub(crate) around: Option<Axis>,
 }
 
 impl Effort {
     /// Each pair whose boxes overlap.
     #[cfg(any(test, feature = "internals"))]
-    pub(crate) const ALL: Self = Self { allowance: u64::MAX, askew: false };
+    pub(crate) const ALL: Self = Self { allowance: u64::MAX, askew: false, around: None };
 }
 
 /// More than any search allows, so few that no sum of it is too large for a number.
@@ -84,6 +89,9 @@ pub(crate) struct Finder {
 /// Bytes that a [`Finder`] takes for each triangle of a view: its part of the tree, and of the copies.
 pub(crate) const BYTES_PER_TRIANGLE: u64 = tree::BYTES_PER_TRIANGLE + copies::BYTES_PER_TRIANGLE;
 
+/// A look at hubs takes no more, and these are not there meanwhile.
+const _: () = assert!(hubs::BYTES_PER_TRIANGLE <= BYTES_PER_TRIANGLE);
+
 /// And, if askew, its slabs.
 pub(crate) const SLAB_BYTES_PER_TRIANGLE: u64 = tree::SLAB_BYTES_PER_TRIANGLE;
 
@@ -100,7 +108,7 @@ impl Finder {
     pub(crate) fn pairs(&mut self, view: &CellView<'_>, effort: Effort, mut found: impl FnMut(&[u32], &[u32], Contact)) -> u64 {
         self.prepare(view);
         if effort.askew {
-            self.forest.add_slabs(view);
+            self.forest.add_slabs(view, effort.around.as_ref());
         }
         let copies = &self.copies;
         let mut each = |i: u32, j: u32, contact: Contact| {
@@ -154,6 +162,12 @@ fn by_position(view: &CellView<'_>, v: u32, w: u32) -> std::cmp::Ordering {
 /// What comes before the walk, compiled for different processors. Sums and products are the same on all of them: in the same order,
 /// and none fused.
 impl Finder {
+    #[cold]
+    fn look_at_doubtful(&mut self, view: &CellView<'_>, hubs: &[u32]) {
+        (self.forest, self.copies) = Default::default();
+        self.stars.settle(hubs, &hubs::look(view, hubs));
+    }
+
     fn prepare(&mut self, view: &CellView<'_>) {
         #[cfg(target_arch = "x86_64")]
         {
@@ -185,10 +199,15 @@ impl Finder {
     #[inline(always)]
     fn prepare_by(&mut self, view: &CellView<'_>) {
         self.stars.look(view);
+        let doubtful = self.stars.doubtful_hubs(view);
+        if !doubtful.is_empty() {
+            self.look_at_doubtful(view, &doubtful);
+        }
         self.states.clear();
         self.states.extend(view.standing.iter().enumerate().map(|(v, standing)| match standing {
             Standing::Away => State::Away,
             Standing::Regular if self.stars.is_certified(v) => State::Certified,
+            Standing::Irregular if self.stars.is_hub(v) && self.stars.is_certified(v) => State::Certified,
             Standing::Regular | Standing::Irregular => State::Open,
         }));
         self.forest.build(view, &self.stars, &self.states, &mut self.copies);

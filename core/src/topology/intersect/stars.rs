@@ -27,8 +27,7 @@
 //!
 //! d is the sum of the unit normals in the order in which the triangles are given, the mesh's; so the certificate is a property
 //! of the mesh, not of the chunk. (Correcting d by the normals it does not go with, as a perceptron does, certified few stars
-//! more and cost more than it saved.) A hub is looked at once more with f64, where the same holds with ε = 2⁻⁵³: coordinates differ by f64 with a
-//! relative error of ε, too.
+//! more and cost more than it saved.) Where triangles around one vertex are many, [`super::hubs`] looks at them once more.
 
 use super::lanes::{Line, Triangles, WIDTH};
 use super::real::{Real, cross, dot, minus};
@@ -48,12 +47,9 @@ pub(super) struct Stars {
 /// More than once round, or a sign that is not safe.
 const REFUSED: u8 = 3;
 
-/// In place of the turns of a vertex that is looked at in double precision, and less than what is added to it.
-const AGAIN: u8 = 8;
-
-/// A vertex with more triangles is looked at in double precision if single precision does not certify it: its sectors may be too narrow for that,
-/// and its triangles make as many pairs as their square.
-pub(super) const HUB: f32 = 256.0;
+/// A vertex with more triangles is a hub: its sectors may be too narrow for single precision, and its triangles make as many pairs as
+/// their square, so it is worth more than a regular vertex is.
+const HUB: f32 = 256.0;
 
 impl Stars {
     /// Looks at all vertices of the view. O(triangles).
@@ -75,7 +71,6 @@ impl Stars {
             }
         }
         self.count_turns(view);
-        self.look_at_hubs(view);
     }
 
     /// Counts the sectors across the half line of each vertex.
@@ -103,42 +98,33 @@ impl Stars {
         }
     }
 
-    /// Counts those of hubs that are not certified once more, in double precision.
-    fn look_at_hubs(&mut self, view: &CellView<'_>) {
-        let mut any = false;
-        for (v, standing) in view.standing.iter().enumerate() {
-            if self.views[v][3] > HUB && self.turns[v] != 1 && *standing == Standing::Regular {
-                (self.turns[v], any) = (AGAIN, true);
-            }
-        }
-        if !any {
-            return;
-        }
-        for (_, t) in view.solid_triangles() {
-            let corners = view.corners(t).map(|p| p.map(f64::from));
-            for (k, v) in t.into_iter().enumerate() {
-                if self.turns[v as usize] < AGAIN {
-                    continue;
-                }
-                let [x, y, z, _] = self.views[v as usize].map(f64::from);
-                let way = |to: usize| minus(corners[(k + to) % 3], corners[k]);
-                let turns = &mut self.turns[v as usize];
-                *turns = (*turns + sector(way(1), way(2), [x, y, z]) as u8).min(AGAIN + REFUSED);
-            }
-        }
-        self.turns.iter_mut().filter(|turns| **turns >= AGAIN).for_each(|turns| *turns -= AGAIN);
+    /// The hubs at home in the cell that are not regular, or not certified, ascending: [`super::hubs`] may certify them.
+    pub(super) fn doubtful_hubs(&self, view: &CellView<'_>) -> Vec<u32> {
+        let is_doubtful = |v: &usize| match view.standing[*v] {
+            Standing::Away => false,
+            Standing::Irregular => self.is_hub(*v),
+            Standing::Regular => self.is_hub(*v) && self.turns[*v] != 1,
+        };
+        (0..view.standing.len()).filter(is_doubtful).map(|v| v as u32).collect()
     }
 
-    /// Is the star of a regular vertex certified?
+    /// Takes down which of these were certified.
+    pub(super) fn settle(&mut self, hubs: &[u32], certified: &[bool]) {
+        for (v, certified) in hubs.iter().zip(certified) {
+            self.turns[*v as usize] = if *certified { 1 } else { REFUSED };
+        }
+    }
+
+    /// Is the star of a vertex certified, which is regular or a hub?
     #[inline]
     pub(super) fn is_certified(&self, vertex: usize) -> bool {
         self.turns[vertex] == 1
     }
 
-    /// Triangles around a vertex, exact below 2²⁴.
+    /// Has a vertex more than [`HUB`] triangles? (They are counted exactly below 2²⁴.)
     #[inline]
-    pub(super) fn degree(&self, vertex: usize) -> f32 {
-        self.views[vertex][3]
+    pub(super) fn is_hub(&self, vertex: usize) -> bool {
+        self.views[vertex][3] > HUB
     }
 }
 

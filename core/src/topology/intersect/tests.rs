@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use proptest::prelude::*;
 
 use super::{CellView, Effort, Finder, Standing};
+use crate::geometry::axis::Axis;
 use crate::geometry::collinear::is_collinear;
 use crate::geometry::position::Position;
 use crate::geometry::sums::Bounds;
@@ -165,7 +166,8 @@ fn in_cells(soup: &[Triangle], size: u32, effort: Effort) -> (Pairs, u64) {
 fn agrees(soup: &[Triangle]) -> Result<(), TestCaseError> {
     let expected = Mesh::new(soup).by_brute_force();
     let mut most = u64::MAX;
-    for effort in [Effort::ALL, ASKEW] {
+    let around = soup.first().zip(soup.last()).and_then(|(a, b)| Axis::through([a[0], b[1]]));
+    for effort in [Effort::ALL, ASKEW, Effort { around, ..ASKEW }] {
         let (pairs, tested) = Mesh::new(soup).pairs_of(&mut Finder::default(), HomeBox::ALL, effort);
         prop_assert_eq!(&pairs, &expected);
         prop_assert!(tested <= most, "{} with slabs, {} without", tested, most);
@@ -350,6 +352,25 @@ fn what_lies_askew_in_boxes_of_others_is_told_apart_by_slabs() {
         assert!(pairs.is_empty() && tested < 10 * soup.len() as u64, "{tested}");
         assert_eq!(in_cells(&soup, 300, ASKEW), (pairs, tested));
     }
+}
+
+/// Two hubs over one jagged rim, whose triangles lie in each other's boxes.
+#[test]
+fn double_cones_are_told_apart_around_their_axis() {
+    let tips = [[-20.0, 0.0, 0.0], [20.0, 0.0, 0.0]];
+    let jagged = |(i, [_, y, z]): (usize, &Point)| {
+        let times = 4.0 + (i % 16) as f32 / 8.0;
+        [(i * 7 % 5) as f32, y * times, z * times]
+    };
+    let rim: Vec<Point> = ring(3000, 1.0, 0.0).iter().enumerate().map(jagged).collect();
+    let reversed: Vec<Point> = rim.iter().rev().copied().collect();
+    let soup = [&fan(tips[0], &rim)[1..], &fan(tips[1], &reversed)].concat();
+    let around = Effort { around: Axis::through(tips), ..ASKEW };
+    let (pairs, tested) = Mesh::new(&soup).pairs_of(&mut Finder::default(), HomeBox::ALL, around);
+    assert!(pairs.is_empty() && tested < 2 * soup.len() as u64, "{} {tested}", pairs.len());
+    assert_eq!(in_cells(&soup, 300, around), (pairs, tested));
+    let (_, without) = Mesh::new(&soup).pairs_of(&mut Finder::default(), HomeBox::ALL, ASKEW);
+    assert!(without > 20 * tested, "{without} {tested}");
 }
 
 /// A hub with a fault at its rim: the pairs of its triangles that do not have the hub as their smallest vertex.

@@ -26,8 +26,9 @@ use super::curve::Curve;
 use super::lanes::bits;
 use super::lanes::{Boxes, Corners, Triangles, WIDTH, max, min};
 use super::slabs::{Slabs, slabs};
-use super::stars::{HUB, Stars};
+use super::stars::Stars;
 use super::view::{Batch, CellView, State};
+use crate::geometry::axis::Axis;
 use crate::stream::plan::HomeBox;
 use crate::util::ids::NONE;
 
@@ -183,7 +184,7 @@ impl Forest {
 
     /// Brings the triangles of each hub together, keeping their order; the hubs of the groups, the first of which has none.
     fn group_by_hub(&mut self, view: &CellView<'_>, stars: &Stars, states: &[State]) -> Vec<u32> {
-        let is_hub = |v: u32| stars.degree(v as usize) > HUB && states[v as usize] != State::Open;
+        let is_hub = |v: u32| stars.is_hub(v as usize) && states[v as usize] != State::Open;
         let mut hubs = vec![NONE];
         hubs.extend((0..view.positions.len() as u32).filter(|v| is_hub(*v)));
         if hubs.len() == 1 {
@@ -262,9 +263,9 @@ impl Forest {
 
 /// Slabs.
 impl Forest {
-    /// Adds slabs to all trees. O(triangles).
+    /// Adds slabs to all trees, with angles `around` a line. O(triangles).
     #[inline(always)]
-    pub(super) fn add_slabs(&mut self, view: &CellView<'_>) {
+    pub(super) fn add_slabs(&mut self, view: &CellView<'_>, around: Option<&Axis>) {
         let mut triangles = Triangles::NONE;
         self.leaf_slabs.reserve_exact(self.planted);
         for leaf in &self.leaves[..self.planted] {
@@ -272,7 +273,7 @@ impl Forest {
             for (i, t) in leaf.triangles[..count].iter().enumerate() {
                 triangles.set(i, &view.corners(view.triangles[*t as usize]));
             }
-            self.leaf_slabs.push(slabs(&triangles, count));
+            self.leaf_slabs.push(slabs(&triangles, count, around));
         }
         self.node_slabs.resize(self.nodes.len(), Slabs::EMPTY);
         for tree in &self.trees {

@@ -6,6 +6,8 @@
 //!
 //! [`obstructed`] casts rays along any axis in the same way, and asks only if they meet anything.
 
+pub(crate) mod surrounded;
+
 use std::ops::Neg;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -295,41 +297,6 @@ impl Bundle {
         places.for_each(|(ray, is_met)| met[*ray as usize] = is_met.into_inner());
         met
     }
-}
-
-/// Which points surface lies around: in at least four of the six directions along the axes, a ray leaves surface more often than it enters, or
-/// the other way. Neither holes nor a few turned triangles change much of that. O(triangles under rays), and reads the chunks of the
-/// file that the rays may meet, once.
-pub(crate) fn are_surrounded(survey: &Survey<'_>, submesh: &Submesh, points: &[[f64; 3]]) -> Vec<bool> {
-    if points.is_empty() {
-        return Vec::new();
-    }
-    let all = Direction::ALL.map(|direction| Upright::of(direction, points.iter().copied()));
-    // Direction, ray, and what it crosses.
-    type Hits = Vec<(usize, usize, i32)>;
-    let hit = |way: usize, corners: &[[f32; 3]; 3], hits: &mut Hits| {
-        let Upright { direction, rays, grid } = &all[way];
-        cross(grid, rays, &direction.upright_corners(corners), |_| true, |ray, w| hits.push((way, ray, w)));
-    };
-    let per_chunk = survey.visit_regular_near(
-        |_| true,
-        |reach| {
-            let over: Vec<(usize, Over)> = (0..all.len()).filter_map(|way| Some((way, all[way].over(reach)?))).collect();
-            (!over.is_empty()).then_some((over, Hits::new()))
-        },
-        |(over, _), bounds| over.iter().any(|(way, over)| all[*way].may_meet_box(over, bounds)),
-        |(over, _), corners| over.iter().any(|(way, over)| all[*way].may_meet(over, corners)),
-        |(over, hits), triangle, _| {
-            let corners = record::corners(&survey.records[triangle as usize]);
-            let under = over.iter().filter(|(way, over)| all[*way].may_meet(over, &corners));
-            under.for_each(|(way, _)| hit(*way, &corners, hits));
-        },
-    );
-    let mut hits: Hits = per_chunk.into_iter().flat_map(|(_, hits)| hits).collect();
-    submesh.living().for_each(|t| (0..all.len()).for_each(|way| hit(way, &submesh.points(t), &mut hits)));
-    let mut windings = vec![[0; Direction::ALL.len()]; points.len()];
-    hits.into_iter().for_each(|(way, ray, w)| windings[ray][way] += w);
-    windings.into_iter().map(|of| of.iter().filter(|w| **w != 0).count() >= 4).collect()
 }
 
 /// The components asked about whose boxes lie in closed ones', ascending, and a ray for each.

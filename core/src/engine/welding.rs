@@ -8,6 +8,7 @@ use crate::contract::report::{Defects, EditSummary, RepairName, Report};
 use crate::contract::settings::{Limits, Profile};
 use crate::diagnosis;
 use crate::engine::judging;
+use crate::geometry::distance::Tolerance;
 use crate::io::read::MeshFile;
 use crate::io::read_ahead::Guide;
 use crate::output::edit::Edit;
@@ -38,11 +39,20 @@ pub(crate) fn in_the_stream(
     let records = mesh.records();
     let tolerance = |bounds: &_| diagnosis::tolerance(bounds, profile);
     let guide = Guide::new(records.as_flattened(), limits);
-    if limits.list_edit || !weld::shares_nothing(records, &guide, tolerance) {
+    if limits.list_edit {
         return Ok((mesh, None));
     }
-    let tolerance = tolerance(&weld::bounds(records, &guide));
+    let Some(widest) = weld::shares_nothing(records, &guide, tolerance) else { return Ok((mesh, None)) };
+    let of_box = tolerance(&weld::bounds(records, &guide));
+    let tolerance = Tolerance { weld: of_box.weld.min(widest), ..of_box };
     let welded = weld::weld(mesh.path(), records, tolerance, limits, progress)?;
+    if !welded.keeps_all() {
+        tracing::info!(
+            crushed = welded.counts.crushed,
+            "Not welded in the stream: some triangles are as small as what is welded."
+        );
+        return Ok((mesh, None));
+    }
     tracing::info!(
         vertices = welded.counts.moved,
         farthest = welded.counts.farthest,

@@ -74,6 +74,12 @@ pub(crate) fn square_distance(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     rim
 }
 
+/// The length of a triangle's longest edge.
+pub(crate) fn longest_edge(corners: &[[f32; 3]; 3]) -> f64 {
+    let [a, b, c] = corners.map(place);
+    a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a)).sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;

@@ -19,7 +19,8 @@ use memmap2::{Mmap, MmapMut};
 use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::settings::Limits;
-use crate::geometry::distance::Tolerance;
+use crate::geometry::distance::{Tolerance, longest_edge};
+use crate::geometry::position;
 use crate::io::read_ahead::Guide;
 use crate::io::record::{self, Record};
 use crate::io::write_behind;
@@ -42,11 +43,24 @@ use reach::{CELL, WIDEST};
 /// one step more, one on to what is as near to that, and some to spare.
 const MARGIN: f64 = 1.75 * CELL + WIDEST + 2.0 + 0.5;
 
+/// A triangle without an edge longer than so many tolerances is small.
+const SMALL: f64 = 8.0;
+
+/// One triangle of so many may be crushed: more, and the tolerance is too wide for some part of the file.
+const CRUSHED: u64 = 1024;
+
 /// Records after the weld, and what was done.
 #[derive(Debug)]
 pub(crate) struct Welded {
     pub(crate) records: Mmap,
     pub(crate) counts: Counts,
+}
+
+impl Welded {
+    /// Is what was welded still there?
+    pub(crate) fn keeps_all(&self) -> bool {
+        self.counts.crushed * CRUSHED <= self.counts.triangles
+    }
 }
 
 /// Welds `records` into a file without a name. O(n log n) time; memory for chunks and member lists alone.
@@ -87,7 +101,7 @@ pub(crate) fn weld(
     counts.triangles = all - members.nonfinite.iter().map(|(_, count)| u64::from(*count)).sum::<u64>();
     let copy = copy.into_inner().unwrap_or_else(PoisonError::into_inner);
     let welded = copy.make_read_only().map_err(Error::io(&limits.spool_folder(), "mapping"))?;
-    counts.moved_triangles = how_many_differ(records, welded.as_chunks().0, limits.threads);
+    (counts.moved_triangles, counts.crushed) = compared(records, welded.as_chunks().0, reach.weld, limits.threads);
     Ok(Welded { records: welded, counts })
 }
 
@@ -101,13 +115,21 @@ fn copied(path: &Path, records: &[Record], guide: &Guide<'_>, limits: &Limits) -
     unsafe { MmapMut::map_mut(&file) }.map_err(Error::io(&limits.spool_folder(), "mapping"))
 }
 
-/// How many records are not what they were.
-fn how_many_differ(before: &[Record], now: &[Record], threads: usize) -> u64 {
+/// How many records are not what they were, and how many of these were crushed: none of their edges is longer than [`SMALL`] tolerances, and two of their
+/// corners are one now. Slivers are not: they are for the weld to close.
+fn compared(before: &[Record], now: &[Record], weld: f64, threads: usize) -> (u64, u64) {
     const PIECE: usize = 1 << 15;
-    let differ =
-        |(before, now): (&[Record], &[Record])| before.iter().zip(now).filter(|(before, now)| before != now).count() as u64;
+    let is_crushed = |before: &Record, now: &Record| {
+        let [a, b, c] = position::corners(now);
+        (a == b || b == c || c == a) && longest_edge(&record::corners(before)) <= SMALL * weld
+    };
+    let compared = |(before, now): (&[Record], &[Record])| {
+        let differ = || before.iter().zip(now).filter(|(before, now)| before != now);
+        (differ().count() as u64, differ().filter(|(before, now)| is_crushed(before, now)).count() as u64)
+    };
     let pieces: Vec<_> = before.chunks(PIECE).zip(now.chunks(PIECE)).collect();
-    parallel::map(threads, pieces.len(), |i| differ(pieces[i])).iter().sum()
+    let all = parallel::map(threads, pieces.len(), |i| compared(pieces[i]));
+    all.into_iter().fold((0, 0), |sum, of| (sum.0 + of.0, sum.1 + of.1))
 }
 
 /// Puts corners to where they go.

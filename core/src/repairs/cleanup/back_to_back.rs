@@ -16,6 +16,7 @@
 //! partner without it.
 
 use crate::detect::bodies;
+use crate::detect::bodies::surrounded::are_surrounded;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::submesh::edges::{Edge, Edges};
 use crate::submesh::{Submesh, Vertex};
@@ -93,6 +94,8 @@ pub(crate) struct Surplus {
     pub(crate) halves: Vec<u32>,
     /// Others.
     pub(crate) sides: Vec<u32>,
+    /// How many of the common walls are triangles of sets of which many face the same way.
+    pub(crate) unsure: u64,
 }
 
 /// Which triangles of the pairs have to go. `gone`: other triangles that go. O(submesh), and rays through the file where a set may be surrounded.
@@ -107,7 +110,7 @@ pub(crate) fn surplus(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, pai
     let is_needed: Vec<bool> = sets.iter().map(|set| pieces.need(set)).collect();
     let asked: Vec<usize> = (0..sets.len()).filter(|s| !is_needed[*s] && sets[*s].depends_on_place()).collect();
     let point = |s: &usize| bodies::inner_point(&submesh.points(pairs[sets[*s].pairs[0].0 as usize].forward[0]));
-    let found = bodies::are_surrounded(survey, submesh, &asked.iter().map(point).collect::<Vec<_>>());
+    let found = are_surrounded(survey, submesh, &asked.iter().map(point).collect::<Vec<_>>(), |t| rest.holds(t));
     let mut is_surrounded = vec![false; sets.len()];
     asked.iter().zip(found).for_each(|(s, is)| is_surrounded[*s] = is);
     for (s, set) in sets.iter().enumerate() {
@@ -121,6 +124,9 @@ pub(crate) fn surplus(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, pai
             continue;
         }
         let is_common = set.gain <= 0 && set.has_neighbours || is_surrounded[s];
+        if is_common && set.is_mixed(pairs) {
+            result.unsure += 2 * set.pairs.len() as u64;
+        }
         let into = if is_common { &mut result.common } else { &mut result.sides };
         of_set.for_each(|(pair, _)| into.extend(pair.all()));
         result.halves.extend(pieces.halves(submesh, edges, set, &rest));
@@ -156,6 +162,11 @@ impl Set {
     fn depends_on_place(&self) -> bool {
         if self.has_neighbours { self.gain > 0 } else { self.pairs.len() > 1 }
     }
+
+    /// Do a quarter or more of its pairs face one way?
+    fn is_mixed(&self, pairs: &[Pair]) -> bool {
+        4 * self.pairs.iter().filter(|(i, _)| pairs[*i as usize].is_one_way()).count() >= self.pairs.len()
+    }
 }
 
 /// The triangles that are in no pair and stay.
@@ -166,6 +177,10 @@ impl Rest {
         let mut is_rest = vec![true; submesh.triangles.len()];
         pairs.iter().flat_map(Pair::all).chain(gone.iter().copied()).for_each(|t| is_rest[t as usize] = false);
         Self(is_rest)
+    }
+
+    fn holds(&self, t: u32) -> bool {
+        self.0[t as usize]
     }
 
     /// Those at an edge.
@@ -300,6 +315,7 @@ mod tests {
     use crate::repairs::cleanup::duplicates::{Dropped, drop_duplicates};
     use crate::repairs::shared::work::Work;
     use crate::testing::{After, Corners, after, cube, cuboid, reversed, shifted};
+    use crate::util::scatter;
 
     fn dropped(triangles: &[Corners], bodies: Bodies) -> After<Dropped> {
         after(triangles, |d, _| drop_duplicates(&d.survey, &mut Work::new(&mut d.submesh), bodies))
@@ -314,7 +330,7 @@ mod tests {
     #[test]
     fn a_core_that_fills_its_pocket_is_one_with_its_host() {
         let got = dropped(&block_and_core().concat(), Bodies::Union);
-        assert_eq!(got.result, Dropped { all: 24, walls: 24 });
+        assert_eq!(got.result, Dropped { all: 24, walls: 24, unsure: 0 });
         assert!(got.verdict.good && (got.defects.volume - 27.0).abs() < 1e-9, "{:?}", got.defects);
     }
 
@@ -333,7 +349,9 @@ mod tests {
             (0..turned).for_each(|i| mesh[12 + i * 7 % 24].swap(0, 1));
             let got = dropped(&mesh, Bodies::Union);
             let (all, triangles) = (got.result, got.defects.triangles);
-            assert_eq!((all, triangles), (Dropped { all: 24, walls: 24 }, 12), "turned: {turned}");
+            // A quarter or more: it may have been the wall of a cavity.
+            let unsure = if turned < 3 { 0 } else { 24 };
+            assert_eq!((all, triangles), (Dropped { all: 24, walls: 24, unsure }, 12), "turned: {turned}");
         }
     }
 
@@ -355,7 +373,7 @@ mod tests {
             let mut mesh = all.clone();
             mesh[turned].swap(0, 1);
             let got = dropped(&mesh, Bodies::Union);
-            assert_eq!((got.result, got.defects.triangles), (Dropped { all: 20, walls: 20 }, 20), "turned: {turned}");
+            assert_eq!((got.result, got.defects.triangles), (Dropped { all: 20, walls: 20, unsure: 0 }, 20), "turned: {turned}");
         }
     }
 
@@ -387,7 +405,20 @@ mod tests {
         let mut both = [cube(), reversed(&cube())].concat();
         both.remove(15);
         let got = dropped(&both, Bodies::Union);
-        assert_eq!((got.result, got.defects.triangles), (Dropped { all: 11, walls: 0 }, 12));
+        assert_eq!((got.result, got.defects.triangles), (Dropped { all: 11, walls: 0, unsure: 0 }, 12));
+    }
+
+    /// Rays from one of them pass through others, whose triangles face any way.
+    #[test]
+    fn bodies_drawn_twice_with_directions_at_random_all_stay() {
+        for seed in 0..32u64 {
+            let bodies: Vec<Corners> = (0..5u8).flat_map(|i| shifted(&cube(), [3.0 * f32::from(i), 0.0, 0.0])).collect();
+            let mut mesh = [&bodies[..], &bodies[..]].concat();
+            let is_turned = |i: usize| scatter::share(1000 * seed + i as u64) < 0.5;
+            (0..mesh.len()).filter(|i| is_turned(*i)).for_each(|i| mesh[i].swap(0, 1));
+            let got = dropped(&mesh, Bodies::Union);
+            assert_eq!((got.result.walls, got.defects.triangles, got.defects.boundary_edges), (0, 60, 0), "seed {seed}");
+        }
     }
 
     #[test]

@@ -1,13 +1,13 @@
 //! Triangles with a repeated vertex, and several triangles on the same three vertices.
 //!
-//! Of copies in one direction the first stays, unless the surface is closed only with all of them. Of triangles in both directions
-//! [`back_to_back`] says which go.
+//! Of closed surfaces that are drawn again one drawing stays ([`drawn_again`]). Of other copies in one direction the first stays, unless the surface is closed
+//! only with all of them. Of triangles in both directions [`back_to_back`] says which go.
 
 use crate::contract::report::RepairName;
 use crate::contract::settings::Bodies;
 use crate::detect::defects::{by_vertex_set, same_direction};
 use crate::repairs::cleanup::back_to_back::{self, Pair};
-use crate::repairs::cleanup::walls;
+use crate::repairs::cleanup::{drawn_again, walls};
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::work::{Pass, Work};
 use crate::submesh::edges::Edges;
@@ -25,6 +25,12 @@ pub(crate) const DUPLICATE: Repair = Repair {
         let dropped = drop_duplicates(cx.survey, &mut cx.work, cx.profile.bodies);
         let note = "triangles of walls that bodies had in common removed: these bodies are one body now";
         cx.account.add(RepairName::CommonWall, dropped.walls, note.into(), 0.0);
+        if dropped.unsure > 0 {
+            cx.account.doubts.push(format!(
+                "{} triangles of walls in common were removed, many of which face the same way: they may have been the wall of a cavity, drawn twice",
+                dropped.unsure
+            ));
+        }
         Ok(Done { changed: dropped.all > 0, ..Done::count(dropped.all - dropped.walls, NOTE) })
     },
 };
@@ -47,12 +53,33 @@ pub(crate) struct Dropped {
     pub(crate) all: u64,
     /// Of these, walls that two bodies had in common: the bodies are one now.
     pub(crate) walls: u64,
+    /// Of these, such as may have been surface that is drawn twice.
+    pub(crate) unsure: u64,
 }
 
 /// Removes surplus triangles on the same three vertices. `bodies`: whether walls that bodies have in common may go.
 pub(crate) fn drop_duplicates(survey: &Survey<'_>, work: &mut Work<'_>, bodies: Bodies) -> Dropped {
     // Afterwards no two are on the same vertices, and only a new vertex makes another copy.
     let changed = work.changed_for(Pass::Copies);
+    let again = if changed.is_none() { drop_drawn_again(work) } else { 0 };
+    let dropped = drop_others(survey, work, changed, bodies);
+    Dropped { all: dropped.all + again, ..dropped }
+}
+
+/// Removes what is drawn again of closed surfaces.
+fn drop_drawn_again(work: &mut Work<'_>) -> u64 {
+    let (submesh, edges) = work.edges();
+    if !edges.any_nonmanifold() {
+        return 0;
+    }
+    let again = drawn_again::surplus(submesh, edges);
+    work.is_changed_by(RepairName::Duplicate);
+    again.iter().for_each(|t| work.kill(*t));
+    again.len() as u64
+}
+
+/// Removes other triangles on the vertices of another one. `changed`: those that may be.
+fn drop_others(survey: &Survey<'_>, work: &mut Work<'_>, changed: Option<Vec<u32>>, bodies: Bodies) -> Dropped {
     let candidates = match &changed {
         None => by_vertex_set(work),
         Some(changed) => copies_of(work, changed),
@@ -87,7 +114,8 @@ pub(crate) fn drop_duplicates(survey: &Survey<'_>, work: &mut Work<'_>, bodies: 
     let (walls, halves) = if bodies == Bodies::Keep { (&[][..], &[][..]) } else { (&surplus.common[..], &surplus.halves[..]) };
     work.is_changed_by(RepairName::CommonWall);
     walls.iter().chain(halves).for_each(|t| work.kill(*t));
-    Dropped { all: (doomed.len() + walls.len() + halves.len()) as u64, walls: walls.len() as u64 }
+    let unsure = if bodies == Bodies::Keep { 0 } else { surplus.unsure };
+    Dropped { all: (doomed.len() + walls.len() + halves.len()) as u64, walls: walls.len() as u64, unsure }
 }
 
 /// As [`by_vertex_set`], of all triangles on the vertices of a changed one. O(stars of the changed ones); of a triangle's three stars

@@ -177,7 +177,7 @@ mod tests {
     #[test]
     fn a_wall_with_two_diagonals_goes() {
         let got = dropped(&two(0.0));
-        assert_eq!(got.result, Dropped { all: 4, walls: 4 });
+        assert_eq!(got.result, Dropped { all: 4, walls: 4, unsure: 0 });
         assert!(got.verdict.good && (got.defects.volume - 2.0).abs() < 1e-9, "{:?}", got.defects);
     }
 
@@ -191,7 +191,7 @@ mod tests {
         let middle = [0, 1, 2].map(|k| a[k] / 2.0 + (b[k] + c[k]) / 4.0);
         mesh.splice(at..=at, [[a, b, middle], [b, c, middle], [c, a, middle]]);
         let got = dropped(&mesh);
-        assert_eq!(got.result, Dropped { all: 6, walls: 6 });
+        assert_eq!(got.result, Dropped { all: 6, walls: 6, unsure: 0 });
         assert!(got.verdict.good && (got.defects.volume - 2.0).abs() < 1e-6, "{:?}", got.defects);
     }
 
@@ -206,7 +206,7 @@ mod tests {
     #[test]
     fn a_body_with_both_sides_stays_with_one() {
         let got = dropped(&[cube(), other_diagonals(&reversed(&cube()))].concat());
-        assert_eq!(got.result, Dropped { all: 12, walls: 0 });
+        assert_eq!(got.result, Dropped { all: 12, walls: 0, unsure: 0 });
         assert!(got.verdict.good && (got.defects.volume - 1.0).abs() < 1e-9, "{:?}", got.defects);
     }
 }

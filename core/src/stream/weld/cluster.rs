@@ -36,6 +36,8 @@ pub(crate) struct Counts {
     pub(crate) moved: u64,
     pub(crate) farthest: f64,
     pub(crate) moved_triangles: u64,
+    /// Triangles, small all over, that lost their area.
+    pub(crate) crushed: u64,
 }
 
 impl Counts {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::reach::Cells;
-use crate::geometry::distance::{Tolerance, place};
+use crate::geometry::distance::{Tolerance, longest_edge, place};
 use crate::geometry::position::Position;
 use crate::geometry::sums::Bounds;
 use crate::io::read_ahead::Guide;
@@ -31,11 +31,15 @@ struct Seen {
     near: usize,
 }
 
-/// Are most corners near others, and hardly any where another one is? A look at some triangles of each part of the file; where neighbours are not near each other
-/// in the file, a pass through all of it for the corners in some places. `reach`: by the box of the triangles, of which it is shown some.
-pub(crate) fn shares_nothing(records: &[Record], guide: &Guide<'_>, reach: impl Fn(&Bounds) -> Tolerance) -> bool {
+/// One triangle of so many may be smaller than what the weld asks for: by its longest edge, since slivers are for the weld to close.
+const SMALLER: usize = 64;
+
+/// The widest tolerance that triangles are large enough for, if most corners are near others, and hardly any is where another one is. A look at some triangles of
+/// each part of the file; where neighbours are not near each other in the file, a pass through all of it for the corners in some places. `reach`: by the box of the
+/// triangles, of which it is shown some. A box says nothing of the triangles where something lies far off.
+pub(crate) fn shares_nothing(records: &[Record], guide: &Guide<'_>, reach: impl Fn(&Bounds) -> Tolerance) -> Option<f64> {
     if records.len() < FEWEST {
-        return false;
+        return None;
     }
     let step = records.len() / ROWS;
     guide.ask_for((0..ROWS).map(|i| ((i * step) as u32, ROW as u32)));
@@ -46,9 +50,11 @@ pub(crate) fn shares_nothing(records: &[Record], guide: &Guide<'_>, reach: impl 
         .collect();
     let mut bounds = Bounds::EMPTY;
     rows.iter().flatten().for_each(|(p, _)| bounds.include(&[p.coordinates()]));
-    let Tolerance { weld, .. } = reach(&bounds);
+    let Tolerance { weld, edge_share } = reach(&bounds);
+    let widest = edge_share * small(records.chunks(step).take(ROWS).flat_map(|row| &row[..ROW.min(row.len())]));
+    let weld = weld.min(widest);
     if weld <= 0.0 {
-        return false;
+        return None;
     }
     let mut seen = Seen::default();
     rows.into_iter().for_each(|row| seen.look(row, weld));
@@ -56,7 +62,15 @@ pub(crate) fn shares_nothing(records: &[Record], guide: &Guide<'_>, reach: impl 
         seen = Seen::default();
         seen.look(scattered(records, guide, weld), weld);
     }
-    seen.near > seen.corners / 2 && seen.shared < seen.corners / 8
+    (seen.near > seen.corners / 2 && seen.shared < seen.corners / 8).then_some(widest)
+}
+
+/// The longest edge of a small one of some triangles.
+fn small<'r>(records: impl Iterator<Item = &'r Record>) -> f64 {
+    let finite = records.filter(|record| record::all_finite(record));
+    let mut lengths: Vec<f64> = finite.map(|record| longest_edge(&record::corners(record))).collect();
+    lengths.sort_unstable_by(f64::total_cmp);
+    lengths.get(lengths.len() / SMALLER).copied().unwrap_or(0.0)
 }
 
 /// The box of all finite triangles.

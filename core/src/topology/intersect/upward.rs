@@ -58,7 +58,7 @@ fn centroid(polygon: &[[f64; 2]]) -> Option<[f64; 2]> {
     (area > 1e-20).then(|| [0, 1].map(|k| from[k] + at[k] / area))
 }
 
-/// The part of a polygon where line[0] + line[1]·x + line[2]·y is positive.
+/// The part of a polygon where `line[0] + line[1]·x + line[2]·y` is positive.
 fn cut(polygon: &[[f64; 2]], line: [f64; 3]) -> Vec<[f64; 2]> {
     let height = |p: [f64; 2]| line[0] + line[1] * p[0] + line[2] * p[1];
     let mut left = Vec::with_capacity(polygon.len() + 1);

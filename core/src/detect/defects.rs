@@ -90,16 +90,16 @@ fn count_bodies(survey: &Survey<'_>, submesh: &Submesh, components: &Components,
     }
 }
 
+/// The vertices of a triangle, ascending: the same for all triangles on them.
+pub(crate) fn vertex_set(submesh: &Submesh, t: u32) -> [u32; 3] {
+    let mut v = submesh.triangles[t as usize].v;
+    v.sort_unstable();
+    v
+}
+
 /// Living triangles by vertex set: (sorted vertices, number), sorted.
 pub(crate) fn by_vertex_set(submesh: &Submesh) -> Vec<([u32; 3], u32)> {
-    let mut keys: Vec<([u32; 3], u32)> = submesh
-        .living()
-        .map(|t| {
-            let mut v = submesh.triangles[t as usize].v;
-            v.sort_unstable();
-            (v, t)
-        })
-        .collect();
+    let mut keys: Vec<([u32; 3], u32)> = submesh.living().map(|t| (vertex_set(submesh, t), t)).collect();
     radix::sort_by_number(&mut keys, |(v, _)| v[0]);
     keys.chunk_by_mut(|a, b| a.0[0] == b.0[0]).for_each(<[_]>::sort_unstable);
     keys

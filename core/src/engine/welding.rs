@@ -42,7 +42,7 @@ pub(crate) fn in_the_stream(
     if limits.list_edit {
         return Ok((mesh, None));
     }
-    let Some(widest) = weld::shares_nothing(records, &guide, tolerance) else { return Ok((mesh, None)) };
+    let Some(widest) = weld::widest_if_nothing_is_shared(records, &guide, tolerance) else { return Ok((mesh, None)) };
     let of_box = tolerance(&weld::bounds(records, &guide));
     let tolerance = Tolerance { weld: of_box.weld.min(widest), ..of_box };
     let welded = weld::weld(mesh.path(), records, tolerance, limits, progress)?;

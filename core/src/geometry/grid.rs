@@ -52,7 +52,7 @@ impl Grid {
     /// False only if the box meets none of those that were marked.
     #[inline(always)]
     pub(crate) fn may_meet(&self, bounds: &Bounds) -> bool {
-        // What is beyond all cells would be taken to be in the last ones.
+        // A box beyond all cells would be taken to be in the last ones.
         let along = |k: usize| (bounds.lo[k] <= self.hi[k]) & (bounds.hi[k] >= self.lo[k]);
         if !(along(0) & along(1) & along(2)) {
             return false;

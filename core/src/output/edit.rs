@@ -88,7 +88,7 @@ impl Edit {
         edit.dropped = if is_left_out || !self.dropped.is_empty() { gone.to_vec() } else { Vec::new() };
         ones(&self.flipped).for_each(|t| edit.flip(stayed.record(t)));
         for t in ones(&self.dropped).map(|t| stayed.record(t)) {
-            edit.dropped[t as usize / 64] |= 1 << (t % 64);
+            bits::put(&mut edit.dropped, t as usize);
             edit.flipped[t as usize / 64] &= !(1 << (t % 64));
         }
         for (t, change) in self.changes.into_iter().map(|(t, change)| (stayed.record(t), change)) {
@@ -448,7 +448,7 @@ mod tests {
                     2 => edit.changes.push((t as u32, Change::Flip)),
                     3 => edit.changes.push((t as u32, Change::Move(Box::new(moved)))),
                     // Of a reversed region.
-                    _ => edit.flipped[t / 64] |= 1 << (t % 64),
+                    _ => bits::put(&mut edit.flipped, t),
                 }
                 match fate {
                     2 | 4 => want.push(record::flip(&before)),

@@ -36,7 +36,7 @@ mod targets;
 
 pub(crate) use cluster::Counts;
 use cluster::{Chunk, Move};
-pub(crate) use look::{bounds, shares_nothing};
+pub(crate) use look::{bounds, widest_if_nothing_is_shared};
 use reach::{CELL, WIDEST};
 
 /// A chunk knows so many tolerances around its cell: the cells that it touches (by their diagonal), whatever hangs together with what is there, and how:
@@ -124,8 +124,8 @@ fn compared(before: &[Record], now: &[Record], weld: f64, threads: usize) -> (u6
         (a == b || b == c || c == a) && longest_edge(&record::corners(before)) <= SMALL * weld
     };
     let compared = |(before, now): (&[Record], &[Record])| {
-        let differ = || before.iter().zip(now).filter(|(before, now)| before != now);
-        (differ().count() as u64, differ().filter(|(before, now)| is_crushed(before, now)).count() as u64)
+        let differ = before.iter().zip(now).filter(|(before, now)| before != now);
+        differ.fold((0, 0), |(differ, crushed), (before, now)| (differ + 1, crushed + u64::from(is_crushed(before, now))))
     };
     let pieces: Vec<_> = before.chunks(PIECE).zip(now.chunks(PIECE)).collect();
     let all = parallel::map(threads, pieces.len(), |i| compared(pieces[i]));

@@ -20,6 +20,7 @@ use crate::topology::region_sums::{RegionSums, Sum};
 use crate::topology::room::Room;
 use crate::topology::star::{Hub, Ring, Stars};
 use crate::topology::vertex_table::{self, Weld};
+use crate::util::bits;
 use crate::util::ids::NONE;
 
 /// A triangle that goes to the submesh, and which of its corners are irregular here (bit k: corner k).
@@ -232,12 +233,12 @@ impl Scratch {
             crossings.add(some, others, &self.numbers, contact);
             // Of those of the same vertices the first.
             for t in [some.first(), others.first()].into_iter().flatten() {
-                self.hit[*t as usize / 64] |= 1 << (t % 64);
+                bits::put(&mut self.hit, *t as usize);
             }
         });
         for same in self.finder.copies().groups() {
-            if self.hit[same[0] as usize / 64] >> (same[0] % 64) & 1 == 1 {
-                same.iter().for_each(|t| self.hit[*t as usize / 64] |= 1 << (t % 64));
+            if bits::holds(&self.hit, same[0] as usize) {
+                same.iter().for_each(|t| bits::put(&mut self.hit, *t as usize));
             }
         }
         let (mut inner, mut across) = (0, Vec::new());

@@ -8,6 +8,12 @@ pub(crate) fn holds(bits: &[u64], number: usize) -> bool {
     bits.get(number / 64).is_some_and(|word| word >> (number % 64) & 1 == 1)
 }
 
+/// Puts a number into the set, which has room for it.
+#[inline]
+pub(crate) fn put(bits: &mut [u64], number: usize) {
+    bits[number / 64] |= 1 << (number % 64);
+}
+
 /// How many numbers are in the set.
 pub(crate) fn count(bits: &[u64]) -> u64 {
     bits.iter().map(|word| u64::from(word.count_ones())).sum()

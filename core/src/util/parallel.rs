@@ -121,13 +121,13 @@ pub(crate) fn map<R: Send>(threads: usize, count: usize, work: impl Fn(usize) ->
     map_with(threads, count, || (), |(), i| work(i))
 }
 
-/// What `find` finds at each of these, with its place, in order. `find` adds to the second list; it is lent the first one, to be used again.
+/// The findings at each of these, in order. `find` is given one with its place, and adds to the second list; it is lent the first one, to be used again.
 pub(crate) fn gather<T: Copy + Sync, R: Send>(
     threads: usize,
     all: &[T],
     find: impl Fn(&mut Vec<u32>, (usize, T), &mut Vec<R>) + Sync,
 ) -> Vec<R> {
-    /// What is taken at once.
+    /// A thread takes so many at once.
     const BLOCK: usize = 1 << 12;
     let blocks = map_with(threads, all.len().div_ceil(BLOCK), Vec::new, |lent, block| {
         let mut found = Vec::new();

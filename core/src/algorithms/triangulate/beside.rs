@@ -1,4 +1,4 @@
-//! What lies along a loop, laid out so that much of it is held against a triangle at a time.
+//! The edges of a loop and the triangles beyond, laid out so that many are held against a triangle at a time.
 
 use super::boxes::{Box3, around, join};
 use super::rim::Rim;

@@ -1,4 +1,4 @@
-//! What parts of a triangulation weigh, in rows that are looked through many at a time.
+//! The weights of parts of a triangulation, in rows that are looked through many at a time.
 
 use std::ops::Range;
 

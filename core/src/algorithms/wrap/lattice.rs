@@ -137,7 +137,7 @@ impl Lattice {
         DVec3::from_array(std::array::from_fn(|k| (f64::from(p[k]) / self.step - self.origin[k] as f64) / side))
     }
 
-    /// What winds around each of some points, by name, or on which side of ½ that is, as [`Tree::windings_or_sides`] says it. Best in the order of [`upright`].
+    /// The winding numbers of some points, by name, or on which side of ½ they are, as [`Tree::windings_or_sides`] says it. Best in the order of [`upright`].
     fn windings(&self, tree: &Tree, points: &[u64]) -> Vec<f32> {
         let points: Vec<[u32; 3]> = points.iter().map(|p| named(*p)).collect();
         let asked: Vec<DVec3> = points.iter().filter(|p| !self.is_beyond(**p)).map(|p| self.point(*p)).collect();

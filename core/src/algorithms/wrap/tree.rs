@@ -298,7 +298,7 @@ fn split(triangles: &[Corners], centres: &[[f32; 3]], order: &mut [u32], first: 
     let number = nodes.len();
     nodes.push(Node { bounds, next: 0, first, count: 0 });
     if order.len() <= LEAF {
-        // Whatever order the selections leave.
+        // The selections leave them in any order.
         order.sort_unstable();
         nodes[number].count = order.len() as u32;
     } else {

@@ -5,9 +5,9 @@
 //! than once is there as often in one direction as in the other: else it is a body with both sides, or a core and its pocket, and
 //! [`super::back_to_back`] decides. Which way the file's triangles face says nothing else here, since some are turned.
 
-use crate::detect::defects::by_vertex_set;
-use crate::submesh::Submesh;
+use crate::detect::defects::vertex_set;
 use crate::submesh::edges::{Edge, Edges};
+use crate::submesh::{Submesh, Vertex};
 use crate::util::bits;
 
 /// By triangle: which way round it has to be to go with the first one of its surface.
@@ -34,9 +34,8 @@ struct Walk<'m> {
 }
 
 /// The triangles of such surfaces that are to go, ascending: of each set of vertices one stays, as more of the surface is drawn if there is one.
-/// O(submesh), and nothing where no two triangles are on the same vertices.
-pub(crate) fn surplus(submesh: &Submesh, edges: &Edges) -> Vec<u32> {
-    let all = by_vertex_set(submesh);
+/// `all`: the triangles by vertex set. O(submesh).
+pub(crate) fn surplus(submesh: &Submesh, edges: &Edges, all: &[([Vertex; 3], u32)]) -> Vec<u32> {
     let mut walk =
         Walk { submesh, edges, way: vec![Way::Unknown; submesh.triangles.len()], passed: vec![0; edges.len().div_ceil(64)] };
     let mut goes = Vec::new();
@@ -66,7 +65,7 @@ impl Walk<'_> {
                     continue;
                 };
                 if !bits::holds(&self.passed, number as usize) {
-                    self.passed[number as usize / 64] |= 1 << (number % 64);
+                    bits::put(&mut self.passed, number as usize);
                     is_closed &= self.pass(t, &self.edges.get(number as usize), &mut surface);
                 }
             }
@@ -99,16 +98,9 @@ impl Walk<'_> {
 
     /// All triangles of a surface but one on each set of vertices, if it is drawn again.
     fn copies(&self, surface: Vec<u32>) -> Vec<u32> {
-        let mut sets: Vec<([u32; 3], u32)> = surface
-            .into_iter()
-            .map(|t| {
-                let mut v = self.submesh.triangles[t as usize].v;
-                v.sort_unstable();
-                (v, t)
-            })
-            .collect();
+        let mut sets: Vec<([Vertex; 3], u32)> = surface.into_iter().map(|t| (vertex_set(self.submesh, t), t)).collect();
         sets.sort_unstable();
-        let as_drawn = |set: &[([u32; 3], u32)]| set.iter().filter(|(_, t)| self.way[*t as usize] == Way::AsDrawn).count();
+        let as_drawn = |set: &[([Vertex; 3], u32)]| set.iter().filter(|(_, t)| self.way[*t as usize] == Way::AsDrawn).count();
         let (mut more_than_once, mut both_ways, mut more_as_drawn) = (0usize, 0usize, 0isize);
         for set in sets.chunk_by(|a, b| a.0 == b.0) {
             let forward = as_drawn(set);
@@ -134,12 +126,17 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::detect::defects::by_vertex_set;
     use crate::testing::{Corners, cube, cuboid, diagnose, records, reversed, shifted};
+
+    fn surplus_of(submesh: &Submesh) -> Vec<u32> {
+        surplus(submesh, &Edges::of(submesh), &by_vertex_set(submesh))
+    }
 
     fn left(triangles: &[Corners]) -> Vec<Corners> {
         let records = records(triangles);
         let d = diagnose(&records);
-        let goes = surplus(&d.submesh, &Edges::of(&d.submesh));
+        let goes = surplus_of(&d.submesh);
         d.submesh.living().filter(|t| goes.binary_search(t).is_err()).map(|t| d.submesh.points(t)).collect()
     }
 
@@ -179,7 +176,7 @@ mod tests {
         let goes = |mesh: &[Corners]| {
             let records = records(mesh);
             let d = diagnose(&records);
-            surplus(&d.submesh, &Edges::of(&d.submesh))
+            surplus_of(&d.submesh)
         };
         assert!(goes(&[cube(), reversed(&cube())].concat()).is_empty());
         // Two boxes side by side, and two with a bottom in common.

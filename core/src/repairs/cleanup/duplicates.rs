@@ -5,7 +5,7 @@
 
 use crate::contract::report::RepairName;
 use crate::contract::settings::Bodies;
-use crate::detect::defects::{by_vertex_set, same_direction};
+use crate::detect::defects::{by_vertex_set, same_direction, vertex_set};
 use crate::repairs::cleanup::back_to_back::{self, Pair};
 use crate::repairs::cleanup::{drawn_again, walls};
 use crate::repairs::shared::context::{Changes, Done, Repair};
@@ -61,29 +61,38 @@ pub(crate) struct Dropped {
 pub(crate) fn drop_duplicates(survey: &Survey<'_>, work: &mut Work<'_>, bodies: Bodies) -> Dropped {
     // Afterwards no two are on the same vertices, and only a new vertex makes another copy.
     let changed = work.changed_for(Pass::Copies);
-    let again = if changed.is_none() { drop_drawn_again(work) } else { 0 };
-    let dropped = drop_others(survey, work, changed, bodies);
+    let (candidates, again) = match &changed {
+        None => {
+            let mut all = by_vertex_set(work);
+            let again = drop_drawn_again(work, &mut all);
+            (all, again)
+        }
+        Some(changed) => (copies_of(work, changed), 0),
+    };
+    let dropped = drop_others(survey, work, &candidates, changed.as_deref(), bodies);
     Dropped { all: dropped.all + again, ..dropped }
 }
 
-/// Removes what is drawn again of closed surfaces.
-fn drop_drawn_again(work: &mut Work<'_>) -> u64 {
+/// Removes what is drawn again of closed surfaces, and takes it out of all triangles by vertex set.
+fn drop_drawn_again(work: &mut Work<'_>, all: &mut Vec<([Vertex; 3], u32)>) -> u64 {
     let (submesh, edges) = work.edges();
-    if !edges.any_nonmanifold() {
-        return 0;
+    let again = drawn_again::surplus(submesh, edges, all);
+    if !again.is_empty() {
+        work.is_changed_by(RepairName::Duplicate);
+        again.iter().for_each(|t| work.kill(*t));
+        all.retain(|(_, t)| work.lives(*t));
     }
-    let again = drawn_again::surplus(submesh, edges);
-    work.is_changed_by(RepairName::Duplicate);
-    again.iter().for_each(|t| work.kill(*t));
     again.len() as u64
 }
 
-/// Removes other triangles on the vertices of another one. `changed`: those that may be.
-fn drop_others(survey: &Survey<'_>, work: &mut Work<'_>, changed: Option<Vec<u32>>, bodies: Bodies) -> Dropped {
-    let candidates = match &changed {
-        None => by_vertex_set(work),
-        Some(changed) => copies_of(work, changed),
-    };
+/// Removes other triangles on the vertices of another one, of those by vertex set. `changed`: all that have, if not all may be in walls.
+fn drop_others(
+    survey: &Survey<'_>,
+    work: &mut Work<'_>,
+    candidates: &[([Vertex; 3], u32)],
+    changed: Option<&[u32]>,
+    bodies: Bodies,
+) -> Dropped {
     let mut copies = Vec::new();
     let mut pairs: Vec<Pair> = Vec::new();
     for group in candidates.chunk_by(|a, b| a.0 == b.0).filter(|g| g.len() > 1) {
@@ -97,7 +106,7 @@ fn drop_others(survey: &Survey<'_>, work: &mut Work<'_>, changed: Option<Vec<u32
         }
     }
     let (submesh, edges) = work.edges();
-    pairs.extend(walls::between(submesh, edges, changed.as_deref(), survey.bounds.diagonal()));
+    pairs.extend(walls::between(submesh, edges, changed, survey.bounds.diagonal()));
     if pairs.is_empty() && copies.is_empty() {
         return Dropped::default();
     }
@@ -121,12 +130,7 @@ fn drop_others(survey: &Survey<'_>, work: &mut Work<'_>, changed: Option<Vec<u32
 /// As [`by_vertex_set`], of all triangles on the vertices of a changed one. O(stars of the changed ones); of a triangle's three stars
 /// only as much is looked at as the smallest has.
 fn copies_of(submesh: &Submesh, changed: &[u32]) -> Vec<([Vertex; 3], u32)> {
-    let sorted = |t: u32| {
-        let mut v = submesh.triangles[t as usize].v;
-        v.sort_unstable();
-        v
-    };
-    let mut sets: Vec<[Vertex; 3]> = changed.iter().filter(|t| submesh.lives(**t)).map(|t| sorted(*t)).collect();
+    let mut sets: Vec<[Vertex; 3]> = changed.iter().filter(|t| submesh.lives(**t)).map(|t| vertex_set(submesh, *t)).collect();
     sets.sort_unstable();
     sets.dedup();
     let mut all = Vec::new();
@@ -134,7 +138,7 @@ fn copies_of(submesh: &Submesh, changed: &[u32]) -> Vec<([Vertex; 3], u32)> {
         let mut stars = set.map(|v| submesh.star(v));
         let smallest = (0..3).cycle().find(|k| stars[*k].next().is_none()).unwrap_or(0);
         let first = all.len();
-        all.extend(submesh.star(set[smallest]).map(|(t, _)| (set, t)).filter(|(_, t)| sorted(*t) == set));
+        all.extend(submesh.star(set[smallest]).map(|(t, _)| (set, t)).filter(|(_, t)| vertex_set(submesh, *t) == set));
         all[first..].sort_unstable();
     }
     all

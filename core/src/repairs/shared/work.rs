@@ -68,7 +68,7 @@ impl<'a> Work<'a> {
         (self.submesh, edges)
     }
 
-    /// What hangs together through edges, as it stands in the file. O(regions + submesh) after a change, O(1) else.
+    /// The components that hang together through edges, as they stand in the file. O(regions + submesh) after a change, O(1) else.
     pub(crate) fn components(&mut self, survey: &Survey<'_>) -> Arc<Components> {
         if let Some(known) = &self.components {
             return known.clone();

@@ -60,19 +60,19 @@ pub(crate) fn sew(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Toleranc
     let mut sewn = Sewn::default();
     // Below this width there is nothing to match and nothing to split; not known where the surface may have changed.
     let mut least = None;
-    let mut known = Known::default();
+    let mut sewing = Sewing { survey, work, profile, known: None };
     // A split leaves short edges, which bound what comes after it: so first whatever needs none, as wide as may be.
-    for way in [join, split] {
+    for way in [Sewing::join, Sewing::split] {
         let mut width = tolerance.weld;
         // Whatever lies within the first step of each other is one thing to any printer.
         let mut is_crack = true;
-        while width > 0.0 && width < widest && work.edges().1.iter().any(|e| e.is_boundary()) {
+        while width > 0.0 && width < widest && sewing.work.edges().1.iter().any(|e| e.is_boundary()) {
             width = (STEP * width).min(widest);
             let at = |weld| Tolerance { weld, edge_share: tolerance.edge_share };
-            let (submesh, edges) = work.edges();
+            let (submesh, edges) = sewing.work.edges();
             if *least.get_or_insert_with(|| nearest_edge(submesh, edges, &at(widest), survey.threads())) <= width {
                 let before = [sewn.vertices, sewn.splits];
-                way(survey, (work, &mut known), profile, &Width { tolerance: at(width), is_crack }, &mut sewn);
+                way(&mut sewing, &Width { tolerance: at(width), is_crack }, &mut sewn);
                 least = least.filter(|_| before == [sewn.vertices, sewn.splits]);
             }
             is_crack = false;
@@ -81,84 +81,78 @@ pub(crate) fn sew(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Toleranc
     sewn
 }
 
-/// The boundary, as long as nothing changes.
-#[derive(Default)]
-struct Known(Option<(u64, Rc<Boundary>)>);
-
-impl Known {
-    fn boundary(&mut self, survey: &Survey<'_>, work: &mut Work<'_>) -> Rc<Boundary> {
-        match &self.0 {
-            Some((version, boundary)) if *version == work.version() => boundary.clone(),
-            _ => self.0.insert((work.version(), Rc::new(Boundary::of(survey, work)))).1.clone(),
-        }
-    }
+/// The mesh while it is sewn.
+struct Sewing<'s, 'r, 'w> {
+    survey: &'s Survey<'r>,
+    work: &'s mut Work<'w>,
+    profile: &'s Profile,
+    /// The boundary, and the version of the mesh that it is of.
+    known: Option<(u64, Rc<Boundary>)>,
 }
 
-/// Splits edges where the vertices of rims differ, and matches and joins then; as [`join`].
-fn split(
-    survey: &Survey<'_>,
-    (work, known): (&mut Work<'_>, &mut Known),
-    profile: &Profile,
-    width: &Width,
-    sewn: &mut Sewn,
-) -> Option<Vec<u32>> {
-    let boundary = known.boundary(survey, work);
-    let (submesh, edges) = work.edges();
-    let mut wanted = splits::wanted(submesh, edges, &Rims::of(&boundary, submesh, width, &[]), survey.threads());
-    let before = work.triangles.clone();
-    for _ in 0..TRIES {
-        if wanted.is_empty() {
-            break;
+impl Sewing<'_, '_, '_> {
+    fn boundary(&mut self) -> Rc<Boundary> {
+        match &self.known {
+            Some((version, boundary)) if *version == self.work.version() => boundary.clone(),
+            _ => self.known.insert((self.work.version(), Rc::new(Boundary::of(self.survey, self.work)))).1.clone(),
         }
-        let made = splits::make(work, &wanted);
-        let mut more = Sewn { widest: sewn.widest, ..Sewn::default() };
-        let target = join(survey, (work, known), profile, width, &mut more);
-        let idle = splits::idle(work, &made, target.as_deref());
-        if idle.is_empty() {
-            sewn.vertices += more.vertices;
-            sewn.splits += made.len() as u64;
-            sewn.widest = more.widest.max(wanted.iter().map(|on| on.distance).fold(0.0, f64::max));
-            return target;
-        }
-        work.restore(&before);
-        wanted.retain(|on| idle.binary_search(&(on.edge, on.vertex)).is_err());
     }
-    None
-}
 
-/// Matches edges and joins their ends. Returns where each vertex went, if any did.
-fn join(
-    survey: &Survey<'_>,
-    (work, known): (&mut Work<'_>, &mut Known),
-    profile: &Profile,
-    width: &Width,
-    sewn: &mut Sewn,
-) -> Option<Vec<u32>> {
-    let boundary = known.boundary(survey, work);
-    let (submesh, edges) = work.edges();
-    let left_open = zip::left_open(submesh, edges, &width.tolerance, profile);
-    let rims = Rims::of(&boundary, submesh, width, &left_open);
-    let mut matches = rims.matches(submesh, survey.threads());
-    if matches.is_empty() {
-        return None;
-    }
-    let mut chosen = clusters::of(submesh, &rims, &matches);
-    for _ in 0..TRIES {
-        if !rims.drop_poor(submesh, &chosen.is_used, &mut matches) {
-            break;
+    /// Splits edges where the vertices of rims differ, and matches and joins then; as [`Self::join`].
+    fn split(&mut self, width: &Width, sewn: &mut Sewn) -> Option<Vec<u32>> {
+        let boundary = self.boundary();
+        let (submesh, edges) = self.work.edges();
+        let mut wanted = splits::wanted(submesh, edges, &Rims::of(&boundary, submesh, width, &[]), self.survey.threads());
+        let before = self.work.triangles.clone();
+        for _ in 0..TRIES {
+            if wanted.is_empty() {
+                break;
+            }
+            let made = splits::make(self.work, &wanted);
+            let mut more = Sewn { widest: sewn.widest, ..Sewn::default() };
+            let target = self.join(width, &mut more);
+            let idle = splits::idle(self.work, &made, target.as_deref());
+            if idle.is_empty() {
+                sewn.vertices += more.vertices;
+                sewn.splits += made.len() as u64;
+                sewn.widest = more.widest.max(wanted.iter().map(|on| on.distance).fold(0.0, f64::max));
+                return target;
+            }
+            self.work.restore(&before);
+            wanted.retain(|on| idle.binary_search(&(on.edge, on.vertex)).is_err());
         }
-        chosen = clusters::of(submesh, &rims, &matches);
+        None
     }
-    let clusters::Chosen { clusters, widest, .. } = chosen;
-    let (Welded { vertices, taken_back }, target) = weld::weld_clusters(survey, work, clusters, weld::Moves::Steady);
-    if taken_back > 0 {
-        tracing::info!(clusters = taken_back, "Joins of rims taken back, since they spoiled triangles around.");
+
+    /// Matches edges and joins their ends. Returns where each vertex went, if any did.
+    fn join(&mut self, width: &Width, sewn: &mut Sewn) -> Option<Vec<u32>> {
+        let boundary = self.boundary();
+        let (submesh, edges) = self.work.edges();
+        let left_open = zip::left_open(submesh, edges, &width.tolerance, self.profile);
+        let rims = Rims::of(&boundary, submesh, width, &left_open);
+        let mut matches = rims.matches(submesh, self.survey.threads());
+        if matches.is_empty() {
+            return None;
+        }
+        let mut chosen = clusters::of(submesh, &rims, &matches);
+        for _ in 0..TRIES {
+            if !rims.drop_poor(submesh, &chosen.is_used, &mut matches) {
+                break;
+            }
+            chosen = clusters::of(submesh, &rims, &matches);
+        }
+        let clusters::Chosen { clusters, widest, .. } = chosen;
+        let (Welded { vertices, taken_back }, target) =
+            weld::weld_clusters(self.survey, self.work, clusters, weld::Moves::Steady);
+        if taken_back > 0 {
+            tracing::info!(clusters = taken_back, "Joins of rims taken back, since they spoiled triangles around.");
+        }
+        sewn.vertices += vertices;
+        if vertices > 0 {
+            sewn.widest = sewn.widest.max(widest);
+        }
+        target
     }
-    sewn.vertices += vertices;
-    if vertices > 0 {
-        sewn.widest = sewn.widest.max(widest);
-    }
-    target
 }
 
 #[cfg(test)]

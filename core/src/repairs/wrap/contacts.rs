@@ -158,7 +158,7 @@ mod tests {
         let one = plate(20, |_, _| true);
         let far = Bounds { lo: [90.0; 3], hi: [91.0; 3] };
         assert!(exposed(&[&one], [far, Bounds::EMPTY].into_iter()).is_empty());
-        // What stands in its middle meets the triangles there, and another wrap those at one side; numbers go through both.
+        // The piece in its middle meets the triangles there, and another wrap those at one side; numbers go through both.
         let inside = Bounds { lo: [10.25; 3].map(|x| x - 0.125), hi: [10.25; 3] };
         let near = |z: f32| Bounds { lo: [inside.lo[0], inside.lo[1], z], hi: [inside.hi[0], inside.hi[1], z] };
         let found = exposed(&[&one], [near(0.0), near(7.0)].into_iter());

@@ -37,21 +37,23 @@ const SMALLER: usize = 64;
 /// The widest tolerance that triangles are large enough for, if most corners are near others, and hardly any is where another one is. A look at some triangles of
 /// each part of the file; where neighbours are not near each other in the file, a pass through all of it for the corners in some places. `reach`: by the box of the
 /// triangles, of which it is shown some. A box says nothing of the triangles where something lies far off.
-pub(crate) fn shares_nothing(records: &[Record], guide: &Guide<'_>, reach: impl Fn(&Bounds) -> Tolerance) -> Option<f64> {
+pub(crate) fn widest_if_nothing_is_shared(
+    records: &[Record],
+    guide: &Guide<'_>,
+    reach: impl Fn(&Bounds) -> Tolerance,
+) -> Option<f64> {
     if records.len() < FEWEST {
         return None;
     }
     let step = records.len() / ROWS;
     guide.ask_for((0..ROWS).map(|i| ((i * step) as u32, ROW as u32)));
-    let rows: Vec<Vec<(Position, u32)>> = records
-        .chunks(step)
-        .take(ROWS)
-        .map(|row| row.iter().take(ROW).zip(0..).flat_map(|(record, i)| corners(record).map(move |p| (p, i))).collect())
-        .collect();
+    let sample = || records.chunks(step).take(ROWS).map(|row| &row[..ROW.min(row.len())]);
+    let rows: Vec<Vec<(Position, u32)>> =
+        sample().map(|row| row.iter().zip(0..).flat_map(|(record, i)| corners(record).map(move |p| (p, i))).collect()).collect();
     let mut bounds = Bounds::EMPTY;
     rows.iter().flatten().for_each(|(p, _)| bounds.include(&[p.coordinates()]));
     let Tolerance { weld, edge_share } = reach(&bounds);
-    let widest = edge_share * small(records.chunks(step).take(ROWS).flat_map(|row| &row[..ROW.min(row.len())]));
+    let widest = edge_share * small(sample().flatten());
     let weld = weld.min(widest);
     if weld <= 0.0 {
         return None;

@@ -302,7 +302,7 @@ fn a_shaken_plate_becomes_whole_and_is_counted() {
 fn a_look_tells_what_shares_nothing() {
     let reach = |weld: f64| move |_: &_| Tolerance { weld, edge_share: 0.25 };
     let (shaken, sound) = (plate(300, 1e-4, |_| false), plate(300, 0.0, |_| false));
-    let tells = |records: &[Record]| look::shares_nothing(records, &Guide::NONE, reach(1e-3)).is_some();
+    let tells = |records: &[Record]| look::widest_if_nothing_is_shared(records, &Guide::NONE, reach(1e-3)).is_some();
     let mixed = |records: &[Record]| {
         let mut order: Vec<usize> = (0..records.len()).collect();
         order.sort_by(|a, b| scatter::share(*a as u64).total_cmp(&scatter::share(*b as u64)));
@@ -310,7 +310,7 @@ fn a_look_tells_what_shares_nothing() {
     };
     assert!(tells(&shaken) && tells(&mixed(&shaken)));
     assert!(!tells(&sound) && !tells(&mixed(&sound)));
-    assert!(look::shares_nothing(&shaken, &Guide::NONE, reach(0.0)).is_none(), "switched off");
+    assert!(look::widest_if_nothing_is_shared(&shaken, &Guide::NONE, reach(0.0)).is_none(), "switched off");
     assert!(!tells(&shaken[..1000]), "a small file");
 }
 
@@ -319,8 +319,8 @@ fn a_look_tells_what_shares_nothing() {
 fn a_look_asks_no_more_of_triangles_than_they_are_large_enough_for() {
     let shaken = plate(300, 1e-4, |_| false);
     let reach = |weld: f64| move |_: &_| Tolerance { weld, edge_share: 0.25 };
-    let widest = look::shares_nothing(&shaken, &Guide::NONE, reach(1e-3)).unwrap();
-    assert_eq!(look::shares_nothing(&shaken, &Guide::NONE, reach(1e3)), Some(widest));
+    let widest = look::widest_if_nothing_is_shared(&shaken, &Guide::NONE, reach(1e-3)).unwrap();
+    assert_eq!(look::widest_if_nothing_is_shared(&shaken, &Guide::NONE, reach(1e3)), Some(widest));
     let weld = |weld: f64| {
         super::weld(Path::new("test"), &shaken, Tolerance { weld, edge_share: 0.25 }, &limits(1 << 15, 2, Spill::Auto), &Quiet)
             .unwrap()

@@ -16,7 +16,7 @@ use glam::DVec3;
 const SLIGHT: f64 = 0.07;
 
 impl Tree {
-    /// What [`Tree::winding_number`] says of each point; or, where it is known to be more than ½ without that, ∞, and −∞ where it is known not to
+    /// The winding number of each point, as [`Tree::winding_number`] says it; or, where it is known to be more than ½ without that, ∞, and −∞ where it is known not to
     /// be. Points that stand above each other are best in a row, the lowest first.
     pub(crate) fn windings_or_sides(&self, points: &[DVec3]) -> Vec<f64> {
         let Some(caps) = &self.caps else { return self.winding_numbers(points) };

@@ -153,15 +153,14 @@ impl<'b> Rims<'b> {
             return false;
         }
         let mut shares: BTreeMap<Vertex, [f64; 2]> = BTreeMap::new();
-        let all = (0..).zip(&self.boundary.edges).zip(&self.boundary.of_rim).zip(is_used);
-        for (((_, edge), rim), is_used) in all.filter(|(((i, _), _), _)| self.takes_part(*i)) {
-            let length = submesh.distance(edge.ends[0], edge.ends[1]);
-            let [used, all] = shares.entry(*rim).or_default();
-            *used += if *is_used { length } else { 0.0 };
+        let Boundary { edges, of_rim, .. } = self.boundary;
+        for i in (0..edges.len()).filter(|i| self.takes_part(*i as u32)) {
+            let length = submesh.distance(edges[i].ends[0], edges[i].ends[1]);
+            let [used, all] = shares.entry(of_rim[i]).or_default();
+            *used += if is_used[i] { length } else { 0.0 };
             *all += length;
         }
-        let is_poor =
-            |i: u32| shares.get(&self.boundary.of_rim[i as usize]).is_some_and(|[used, all]| *used > 0.0 && used / all < HALF);
+        let is_poor = |i: u32| shares.get(&of_rim[i as usize]).is_some_and(|[used, all]| *used > 0.0 && used / all < HALF);
         let before = matches.len();
         matches.retain(|m| !m.edges.iter().any(|i| is_poor(*i)));
         matches.len() < before

@@ -105,6 +105,23 @@ pub(crate) fn by_vertex_set(submesh: &Submesh) -> Vec<([u32; 3], u32)> {
     keys
 }
 
+/// As [`by_vertex_set`], of all triangles on the vertices of a changed one. O(stars of the changed ones); of a triangle's three stars
+/// only as much is looked at as the smallest has.
+pub(crate) fn by_vertex_set_of(submesh: &Submesh, changed: &[u32]) -> Vec<([u32; 3], u32)> {
+    let mut sets: Vec<[u32; 3]> = changed.iter().filter(|t| submesh.lives(**t)).map(|t| vertex_set(submesh, *t)).collect();
+    sets.sort_unstable();
+    sets.dedup();
+    let mut all = Vec::new();
+    for set in sets {
+        let mut stars = set.map(|v| submesh.star(v));
+        let smallest = (0..3).cycle().find(|k| stars[*k].next().is_none()).unwrap_or(0);
+        let first = all.len();
+        all.extend(submesh.star(set[smallest]).map(|(t, _)| (set, t)).filter(|(_, t)| vertex_set(submesh, *t) == set));
+        all[first..].sort_unstable();
+    }
+    all
+}
+
 /// Whether two triangles on one vertex set run the same way round.
 pub(crate) fn same_direction(a: [u32; 3], b: [u32; 3]) -> bool {
     let k = b.iter().position(|v| *v == a[0]).unwrap_or(0);

@@ -153,12 +153,13 @@ impl Search {
             triangles.each_near(&mut found, &|_, bounds| grid.may_meet(bounds), |found, _, place, triangle| {
                 let corners = triangle.corners();
                 let bounds = Bounds::of(&corners);
-                if !grid.may_meet(&bounds) {
+                // Where much is fresh, most of what was read there is gone.
+                if !grid.may_meet(&bounds) || is_gone(place) {
                     return;
                 }
                 met.clear();
                 fresh.tree.each_meeting(&bounds, |i| met.push(i));
-                if met.is_empty() || is_gone(place) {
+                if met.is_empty() {
                     return;
                 }
                 if let Some(one) = Solid::of(place, corners) {

@@ -27,7 +27,7 @@ use std::collections::BTreeMap;
 
 use crate::contract::settings::Profile;
 use crate::geometry::position::Position;
-use crate::repairs::shared::overlay::{Overlay, Which};
+use crate::repairs::shared::overlay::Which;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{self, Components, Reversed, Through};
 use crate::topology::survey::Survey;
@@ -41,12 +41,7 @@ pub(crate) const REPAIR: Repair = Repair {
         let is_wanted = cx.profile.guarantee == Guarantee::Wrap && (cx.handed.may_cross || is_broken(&mut cx.work));
         let mut count = 0;
         if is_wanted {
-            let pairs = if cx.profile.check_self_intersections {
-                let overlay = Overlay::of(cx.survey, &cx.work, &cx.reversed);
-                overlay.and_then(|overlay| overlay.crossing_triangles(cx.survey, &cx.work))
-            } else {
-                Some(Vec::new())
-            };
+            let pairs = if cx.profile.check_self_intersections { cx.crossing() } else { Some([].into()) };
             // Sheets that the profile keeps are kept whatever they run into.
             let sheets: &[[f32; 3]] = if cx.profile.sheets == Sheets::Keep { &[] } else { &cx.handed.kept_sheets };
             let kept = Kept { open: &cx.handed.kept_open, sheets };

@@ -10,6 +10,7 @@
 //! numbered by the input's order, so nothing that is done here depends on how the file was cut into chunks.
 
 pub(crate) mod components;
+mod crowds;
 pub(crate) mod edges;
 pub(crate) mod near;
 pub(crate) mod radial;
@@ -326,9 +327,23 @@ impl Submesh {
         })
     }
 
-    /// Whether a living triangle holds the edge `a`–`b`. Looks from the end `a`, which must be complete to be sure.
+    /// Living triangles that have both corners, in the order of a star: O(the smaller star). Of two stars it cannot be known beforehand which one
+    /// that is, so both are gone along until one ends.
+    pub(crate) fn at_edge(&self, a: Vertex, b: Vertex) -> impl Iterator<Item = u32> + '_ {
+        let (mut left, mut right) = (self.star(a), self.star(b));
+        let (of, end) = loop {
+            match (left.next(), right.next()) {
+                (None, _) => break (a, b),
+                (_, None) => break (b, a),
+                _ => {}
+            }
+        };
+        self.star(of).map(|(t, _)| t).filter(move |t| self.triangles[*t as usize].v.contains(&end))
+    }
+
+    /// Whether a living triangle holds the edge `a`–`b`. One of the ends must be complete to be sure.
     pub(crate) fn has_edge(&self, a: Vertex, b: Vertex) -> bool {
-        self.star(a).any(|(t, _)| self.triangles[t as usize].v.contains(&b))
+        self.at_edge(a, b).next().is_some()
     }
 
     /// Shortest edge around `v`.

@@ -1,12 +1,13 @@
 //! What lies near the boundary: vertices that should be one, and vertices inside another triangle's edge.
 
+use super::crowds::{Crowds, Member};
 use super::edges::{Edge, Edges};
 use super::{Submesh, Vertex, distance};
 use crate::geometry::boxes::BoxTree;
 pub(crate) use crate::geometry::distance::Tolerance;
 use crate::geometry::distance::{place, share_along};
 use crate::geometry::sums::Bounds;
-use crate::util::parallel;
+use crate::util::{parallel, steps};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 impl Tolerance {
@@ -25,22 +26,23 @@ pub(crate) fn boundary_vertices(edges: &Edges) -> Vec<Vertex> {
 }
 
 /// Pairs of boundary vertices, smaller number first, within the tolerance that holds at both; sorted. Vertices joined by an edge
-/// are never within it.
+/// are never within it. Of a crowd, whose vertices are all within the tolerance of each other, only as many pairs as connect it, and one with each
+/// crowd that it is near to: so many vertices at one place take as many pairs, not their square.
 pub(crate) fn close_pairs(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance, threads: usize) -> Vec<(Vertex, Vertex)> {
     let vertices = boundary_vertices(edges);
     if vertices.is_empty() || tolerance.weld <= 0.0 {
         return Vec::new();
     }
-    let reach: Vec<f64> = vertices.iter().map(|v| tolerance.at(submesh, *v)).collect();
-    let boxes: Vec<Bounds> = vertices.iter().map(|v| around(&[submesh.positions[*v as usize]], 0.0)).collect();
-    let tree = BoxTree::new(&boxes);
-    let mut pairs = parallel::gather(threads, &vertices, |met, (i, v), pairs| {
-        tree.meeting(&around(&[submesh.positions[v as usize]], reach[i]), met);
-        for j in met.iter().map(|j| *j as usize).filter(|j| *j > i) {
-            if submesh.distance(v, vertices[j]) <= reach[i].min(reach[j]) {
-                pairs.push((v, vertices[j]));
-            }
-        }
+    let crowds = Crowds::of(submesh, &vertices, |v| tolerance.at(submesh, v), threads);
+    let tree = BoxTree::new(&crowds.all.iter().map(|crowd| crowd.bounds).collect::<Vec<_>>());
+    let mut pairs = parallel::gather(threads, &crowds.all, |met, (i, crowd), pairs| {
+        pairs.extend(crowds.members(&crowd).windows(2).map(|two| (two[0].vertex, two[1].vertex)));
+        tree.meeting(&wider(&crowd.bounds, crowd.most), met);
+        steps::count(met.len() + crowd.count as usize);
+        // Of two crowds, the one that reaches less far looks for the other.
+        let others = met.iter().map(|j| (*j as usize, &crowds.all[*j as usize]));
+        let others = others.filter(|(j, other)| (crowd.least, i) < (other.least, *j));
+        pairs.extend(others.filter_map(|(_, other)| crowds.pair_of(submesh, &crowd, other)));
     });
     pairs.sort_unstable();
     pairs
@@ -89,8 +91,8 @@ pub(crate) struct OnEdge {
     pub(crate) distance: f64,
 }
 
-/// Every boundary vertex that lies within `reach(vertex, edge length)` of the inside of a boundary edge whose triangle it does not
-/// belong to, with its nearest such edge, by edge and place on it.
+/// Every boundary vertex that lies within its reach of the inside of a boundary edge whose triangle it does not belong to, with its nearest
+/// such edge, by edge and place on it.
 pub(crate) fn on_edges(submesh: &Submesh, edges: &Edges, reach: impl Fn(Vertex) -> f64 + Sync, threads: usize) -> Vec<OnEdge> {
     let boundary: Vec<u32> = (0..edges.len() as u32).filter(|i| edges.get(*i as usize).is_boundary()).collect();
     if boundary.is_empty() {
@@ -101,28 +103,42 @@ pub(crate) fn on_edges(submesh: &Submesh, edges: &Edges, reach: impl Fn(Vertex) 
         [submesh.positions[e.low as usize], submesh.positions[e.high as usize]]
     };
     let tree = BoxTree::new(&boundary.iter().map(|i| around(&ends(*i), 0.0)).collect::<Vec<_>>());
-    let mut all = parallel::gather(threads, &boundary_vertices(edges), |met, (_, v), all| {
-        let (p, tolerance) = (submesh.positions[v as usize], reach(v));
-        tree.meeting(&around(&[p], tolerance), met);
-        let mut nearest: Option<OnEdge> = None;
-        for edge in met.iter().map(|i| boundary[*i as usize]) {
-            let triangle = edges.get(edge as usize).uses[0].triangle;
-            if submesh.triangles[triangle as usize].v.contains(&v) {
-                continue;
-            }
-            let [a, b] = ends(edge);
-            let (at, off) = project(p, a, b);
-            let length = distance(a, b);
-            // Strictly inside, by more than the tolerance: what is nearer to an end is a matter of welding.
-            let inside = at * length > tolerance && (1.0 - at) * length > tolerance;
-            if inside && off <= tolerance && nearest.is_none_or(|n| off < n.distance) {
-                nearest = Some(OnEdge { edge, at, vertex: v, distance: off });
-            }
+    let crowds = Crowds::of(submesh, &boundary_vertices(edges), reach, threads);
+    let mut all = parallel::gather(threads, &crowds.all, |met: &mut Vec<u32>, (_, crowd), all| {
+        tree.meeting(&wider(&crowd.bounds, crowd.most), met);
+        steps::count(met.len());
+        met.iter_mut().for_each(|i| *i = boundary[*i as usize]);
+        if crowd.count > 1 {
+            met.retain(|edge| crowd.may_have_one_on(ends(*edge)));
         }
-        all.extend(nearest);
+        for Member { vertex, reach } in crowds.members(&crowd) {
+            all.extend(nearest_of(submesh, edges, met, *vertex, *reach));
+        }
     });
-    all.sort_by(|a, b| a.edge.cmp(&b.edge).then(a.at.total_cmp(&b.at)).then(a.vertex.cmp(&b.vertex)));
+    all.sort_by(|a: &OnEdge, b| a.edge.cmp(&b.edge).then(a.at.total_cmp(&b.at)).then(a.vertex.cmp(&b.vertex)));
     all
+}
+
+/// The nearest of some boundary edges that a vertex is on, if it is on one.
+pub(super) fn nearest_of(submesh: &Submesh, edges: &Edges, of: &[u32], vertex: Vertex, tolerance: f64) -> Option<OnEdge> {
+    let p = submesh.positions[vertex as usize];
+    let mut nearest: Option<OnEdge> = None;
+    steps::count(of.len());
+    for edge in of {
+        let e = edges.get(*edge as usize);
+        if submesh.triangles[e.uses[0].triangle as usize].v.contains(&vertex) {
+            continue;
+        }
+        let [a, b] = [e.low, e.high].map(|v| submesh.positions[v as usize]);
+        let (at, off) = project(p, a, b);
+        let length = distance(a, b);
+        // Strictly inside, by more than the tolerance: what is nearer to an end is a matter of welding.
+        let inside = at * length > tolerance && (1.0 - at) * length > tolerance;
+        if inside && off <= tolerance && nearest.is_none_or(|n| off < n.distance) {
+            nearest = Some(OnEdge { edge: *edge, at, vertex, distance: off });
+        }
+    }
+    nearest
 }
 
 /// Boundary vertices inside a boundary edge of another triangle (T-junctions), with their edges.
@@ -179,8 +195,11 @@ pub(crate) fn distance_to_line(p: [f32; 3], a: [f32; 3], b: [f32; 3]) -> f64 {
 
 /// The box around some points, wider by `by` on all sides.
 pub(crate) fn around(points: &[[f32; 3]], by: f64) -> Bounds {
-    let mut b = Bounds::EMPTY;
-    b.include(points);
+    wider(&Bounds::of(points), by)
+}
+
+/// A box, wider by `by` on all sides.
+fn wider(b: &Bounds, by: f64) -> Bounds {
     // Rounded outward, so that nothing is missed.
     Bounds {
         lo: b.lo.map(|x| ((f64::from(x) - by) as f32).next_down()),

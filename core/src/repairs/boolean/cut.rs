@@ -127,6 +127,5 @@ impl Cut {
 /// Other triangles at the edge of `t` from its corner `k` on.
 fn beside(submesh: &Submesh, t: u32, k: usize) -> impl Iterator<Item = u32> {
     let v = submesh.triangles[t as usize].v;
-    let end = v[(k + 1) % 3];
-    submesh.star(v[k]).map(|(o, _)| o).filter(move |o| *o != t && submesh.triangles[*o as usize].v.contains(&end))
+    submesh.at_edge(v[k], v[(k + 1) % 3]).filter(move |o| *o != t)
 }

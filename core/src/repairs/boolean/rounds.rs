@@ -10,7 +10,7 @@ use crate::repairs::boolean::cells::SpaceCells;
 use crate::repairs::boolean::cut::Cut;
 use crate::repairs::boolean::meetings::meetings;
 use crate::repairs::boolean::perturb::Level;
-use crate::repairs::boolean::state::{FINEST, Failure, Halted, Met, Resolved, State, Stuck, Tried, WIDER};
+use crate::repairs::boolean::state::{FINEST, Failure, Halted, Met, Resolved, State, Stuck, Tried, WIDER, coincident};
 use crate::repairs::boolean::track::Track;
 use crate::repairs::shared::overlay::{Overlay, Standing};
 use crate::stream::budget;
@@ -65,7 +65,7 @@ impl State<'_, '_, '_> {
     pub(crate) fn attempt(&mut self, by: &Attempt<'_>) -> Tried<Resolved> {
         let mut resolved = Resolved::default();
         self.track = Track::default();
-        let mut crossing = self.crossing(by.overlay, by.pairs, by.profile);
+        let mut crossing = self.crossing(by.overlay, by.pairs, coincident(self.work), by.profile);
         self.unite(&crossing);
         resolved.pairs = crossing.len() as u64;
         let most = crossing.len().max(FEW) * GROWTH;

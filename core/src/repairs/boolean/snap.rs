@@ -47,7 +47,9 @@ impl State<'_, '_, '_> {
             }
             let Changed { triangles, farthest, snapped } = changed;
             self.clean(&triangles.iter().copied().collect::<Vec<_>>());
-            let now = self.met(met.crossing.clone(), profile, |t| t >= first_new || triangles.contains(&t))?;
+            let mut is_changed = vec![false; first_new as usize];
+            triangles.iter().filter(|t| **t < first_new).for_each(|t| is_changed[*t as usize] = true);
+            let now = self.met(met.crossing.clone(), profile, |t| is_changed.get(t as usize) != Some(&false))?;
             tracing::debug!(imprints, pairs = now.crossing.len(), "Drawn near.");
             if now.crossing.len() < met.crossing.len() {
                 displaced = displaced.max(farthest);
@@ -73,7 +75,9 @@ impl State<'_, '_, '_> {
         let corners: BTreeSet<Vertex> = pairs.iter().flatten().flat_map(|t| self.work.triangles[*t as usize].v).collect();
         let stars = corners.iter().flat_map(|v| self.work.star(*v)).map(|(t, _)| t);
         let around: BTreeSet<u32> = stars.filter(|t| self.clusters.holds(*t)).collect();
-        self.complete(around.iter().flat_map(|t| self.work.points(*t)).collect());
+        let corners = around.iter().flat_map(|t| self.work.triangles[*t as usize].v);
+        let missing = corners.filter(|v| !self.work.complete[*v as usize]);
+        self.complete(missing.map(|v| self.work.positions[v as usize]).collect());
         around
     }
 

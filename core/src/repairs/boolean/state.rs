@@ -152,7 +152,15 @@ pub(crate) fn join_in(work: &mut Work<'_>, reversed: &Reversed, t: u32) {
 
 /// Triangles on the same three vertices, by twos: they are in no pair that crosses.
 pub(crate) fn coincident(submesh: &Submesh) -> Vec<[u32; 2]> {
-    let candidates = defects::by_vertex_set(submesh);
+    by_twos(&defects::by_vertex_set(submesh))
+}
+
+/// Those that one of these is on the vertices of.
+fn coincident_with(submesh: &Submesh, triangles: &[u32]) -> Vec<[u32; 2]> {
+    by_twos(&defects::by_vertex_set_of(submesh, triangles))
+}
+
+fn by_twos(candidates: &[([Vertex; 3], u32)]) -> Vec<[u32; 2]> {
     let groups = candidates.chunk_by(|a, b| a.0 == b.0);
     groups.flat_map(|group| group.windows(2).map(|two| [two[0].1, two[1].1])).collect()
 }
@@ -179,7 +187,11 @@ impl State<'_, '_, '_> {
         let overlay = Overlay::of(self.survey, self.work, self.reversed).ok_or_else(too_many)?;
         let met = overlay.met_by(self.survey, self.work, &changed).ok_or_else(too_many)?;
         let pairs: Vec<[Standing; 2]> = met.iter().map(|pair| pair.triangles).collect();
-        let mut crossing = self.crossing(&overlay, &pairs, profile);
+        // Others on the same vertices were a pair before, and are as they were.
+        let mut asked: Vec<u32> = (0..self.work.triangles.len() as u32).filter(|t| changed(*t)).collect();
+        asked.extend(before.as_flattened());
+        let coincident = coincident_with(self.work, &asked);
+        let mut crossing = self.crossing(&overlay, &pairs, coincident, profile);
         crossing.extend(before.into_iter().filter(|pair| pair.iter().all(|t| self.work.lives(*t) && !changed(*t))));
         crossing.iter_mut().for_each(|pair| pair.sort_unstable());
         crossing.sort_unstable();
@@ -208,9 +220,16 @@ impl State<'_, '_, '_> {
     }
 
     /// The pairs of triangles that take part, in the submesh; where bodies are to be kept, only of one and the same.
-    pub(crate) fn crossing(&mut self, overlay: &Overlay, pairs: &[[Standing; 2]], profile: &Profile) -> Vec<[u32; 2]> {
+    /// `coincident`: those on the same vertices.
+    pub(crate) fn crossing(
+        &mut self,
+        overlay: &Overlay,
+        pairs: &[[Standing; 2]],
+        coincident: Vec<[u32; 2]>,
+        profile: &Profile,
+    ) -> Vec<[u32; 2]> {
         let mut crossing = self.in_submesh(overlay, pairs);
-        crossing.extend(coincident(self.work));
+        crossing.extend(coincident);
         crossing.retain(|pair| {
             let [a, b] = pair.map(|t| self.clusters.of_triangle[t as usize]);
             self.clusters.takes_part(a) && self.clusters.takes_part(b) && (profile.bodies != Bodies::Keep || a == b)
@@ -228,7 +247,13 @@ impl State<'_, '_, '_> {
 
     /// Pairs of triangles as the submesh numbers them, where they are fetched to if need be, with all around them.
     pub(crate) fn in_submesh(&mut self, overlay: &Overlay, pairs: &[[Standing; 2]]) -> Vec<[u32; 2]> {
-        self.complete(corners(self.survey, self.work, overlay, pairs));
+        let is_here = |number: &Standing| {
+            overlay
+                .changed_of(*number)
+                .is_some_and(|t| self.work.triangles[t as usize].v.iter().all(|v| self.work.complete[*v as usize]))
+        };
+        let missing: Vec<[Standing; 2]> = pairs.iter().filter(|pair| !pair.iter().all(is_here)).copied().collect();
+        self.complete(corners(self.survey, self.work, overlay, &missing));
         let wanted = pairs.as_flattened().iter().filter_map(|number| overlay.record_of(*number));
         let mut of_record: HashMap<u32, u32, Hashing> = wanted.map(|record| (record, NONE)).collect();
         if !of_record.is_empty() {
@@ -295,8 +320,12 @@ impl State<'_, '_, '_> {
         follow_neighbours(self.work, &left, &mut self.clusters.of_triangle);
     }
 
-    /// Every edge of what takes part must be used as often in one direction as in the other.
+    /// Every edge of what takes part must be used as often in one direction as in the other. They were at a mark of the submesh, if there is one.
     pub(crate) fn check_closed(&mut self) -> Tried<()> {
+        let holds = |t: u32| self.clusters.holds(t);
+        if self.work.edges_since_mark().is_some_and(|edges| edges.into_iter().all(|ends| is_closed_at(self.work, ends, holds))) {
+            return Ok(());
+        }
         let mut triangles = Vec::new();
         let (_, edges) = self.work.edges();
         for edge in edges.iter().filter(|edge| edge.uses.len() != 2 || edge.is_unbalanced()) {
@@ -308,6 +337,22 @@ impl State<'_, '_, '_> {
         }
         if triangles.is_empty() { Ok(()) } else { Err(Stuck { failure: Failure::Opened, triangles }.into()) }
     }
+}
+
+/// Is an edge used as often in one direction as in the other by the triangles that are held? What has no complete end, or two triangles in both
+/// directions, is not asked about.
+fn is_closed_at(submesh: &Submesh, [a, b]: [Vertex; 2], holds: impl Fn(u32) -> bool) -> bool {
+    if !submesh.complete[a as usize] && !submesh.complete[b as usize] {
+        return true;
+    }
+    let (mut all, mut held, mut count) = (0, 0, 0);
+    for t in submesh.at_edge(a, b) {
+        let v = submesh.triangles[t as usize].v;
+        let way = if [(v[0], v[1]), (v[1], v[2]), (v[2], v[0])].contains(&(a, b)) { 1 } else { -1 };
+        (all, count) = (all + way, count + 1);
+        held += if holds(t) { way } else { 0 };
+    }
+    held == 0 || count == 2 && all == 0
 }
 
 /// Gives each of these triangles, ascending, the smallest piece of the triangles at its corners, and so on from neighbour to neighbour. They

@@ -5,7 +5,7 @@
 
 use crate::contract::report::RepairName;
 use crate::contract::settings::Bodies;
-use crate::detect::defects::{by_vertex_set, same_direction, vertex_set};
+use crate::detect::defects::{by_vertex_set, by_vertex_set_of, same_direction};
 use crate::repairs::cleanup::back_to_back::{self, Pair};
 use crate::repairs::cleanup::{drawn_again, walls};
 use crate::repairs::shared::context::{Changes, Done, Repair};
@@ -67,7 +67,7 @@ pub(crate) fn drop_duplicates(survey: &Survey<'_>, work: &mut Work<'_>, bodies: 
             let again = drop_drawn_again(work, &mut all);
             (all, again)
         }
-        Some(changed) => (copies_of(work, changed), 0),
+        Some(changed) => (by_vertex_set_of(work, changed), 0),
     };
     let dropped = drop_others(survey, work, &candidates, changed.as_deref(), bodies);
     Dropped { all: dropped.all + again, ..dropped }
@@ -125,23 +125,6 @@ fn drop_others(
     walls.iter().chain(halves).for_each(|t| work.kill(*t));
     let unsure = if bodies == Bodies::Keep { 0 } else { surplus.unsure };
     Dropped { all: (doomed.len() + walls.len() + halves.len()) as u64, walls: walls.len() as u64, unsure }
-}
-
-/// As [`by_vertex_set`], of all triangles on the vertices of a changed one. O(stars of the changed ones); of a triangle's three stars
-/// only as much is looked at as the smallest has.
-fn copies_of(submesh: &Submesh, changed: &[u32]) -> Vec<([Vertex; 3], u32)> {
-    let mut sets: Vec<[Vertex; 3]> = changed.iter().filter(|t| submesh.lives(**t)).map(|t| vertex_set(submesh, *t)).collect();
-    sets.sort_unstable();
-    sets.dedup();
-    let mut all = Vec::new();
-    for set in sets {
-        let mut stars = set.map(|v| submesh.star(v));
-        let smallest = (0..3).cycle().find(|k| stars[*k].next().is_none()).unwrap_or(0);
-        let first = all.len();
-        all.extend(submesh.star(set[smallest]).map(|(t, _)| (set, t)).filter(|(_, t)| vertex_set(submesh, *t) == set));
-        all[first..].sort_unstable();
-    }
-    all
 }
 
 /// Those of the copies without which the surface is no farther from closed. Where two bodies have part of their surface in common, each needs

@@ -8,6 +8,7 @@ use crate::geometry::flatness;
 use crate::submesh::edges::{Edge, Edges};
 use crate::submesh::{Submesh, Vertex};
 use crate::util::ids::NONE;
+use crate::util::steps;
 use glam::DVec3;
 use std::collections::BTreeMap;
 
@@ -75,7 +76,9 @@ impl Sides<'_> {
         self.number[t as usize] = number;
         let (mut triangles, mut rim, mut next) = (vec![t], Vec::new(), 0);
         let mut is_side = true;
-        while let Some(t) = triangles.get(next).copied() {
+        // What is no side need not be followed to its end.
+        while let (true, Some(t)) = (is_side, triangles.get(next).copied()) {
+            steps::count(1);
             next += 1;
             let v = self.submesh.triangles[t as usize].v;
             for (a, b) in [(v[0], v[1]), (v[1], v[2]), (v[2], v[0])] {
@@ -88,8 +91,10 @@ impl Sides<'_> {
                     [x, y] => {
                         is_side &= x.forward != y.forward;
                         let beyond = if x.triangle == t { y.triangle } else { x.triangle };
-                        if std::mem::replace(&mut self.number[beyond as usize], number) == NONE {
-                            triangles.push(beyond);
+                        match std::mem::replace(&mut self.number[beyond as usize], number) {
+                            NONE => triangles.push(beyond),
+                            // Of what was found to be none.
+                            other => is_side &= other == number,
                         }
                     }
                     _ => {
@@ -146,7 +151,9 @@ mod tests {
     use crate::contract::settings::Bodies;
     use crate::repairs::cleanup::duplicates::{Dropped, drop_duplicates};
     use crate::repairs::shared::work::Work;
-    use crate::testing::{After, Corners, after, cube, cuboid, reversed};
+    use crate::submesh::edges::Edges;
+    use crate::testing::{After, Corners, after, cube, cuboid, diagnose, plate, records, reversed};
+    use crate::util::steps;
 
     fn dropped(mesh: &[Corners]) -> After<Dropped> {
         after(mesh, |d, _| drop_duplicates(&d.survey, &mut Work::new(&mut d.submesh), Bodies::Union))
@@ -193,6 +200,21 @@ mod tests {
         let got = dropped(&mesh);
         assert_eq!(got.result, Dropped { all: 6, walls: 6, unsure: 0 });
         assert!(got.verdict.good && (got.defects.volume - 2.0).abs() < 1e-6, "{:?}", got.defects);
+    }
+
+    #[test]
+    fn what_is_no_side_is_not_followed_to_its_end() {
+        let mut mesh = plate(60, |_, _| true);
+        // A fin on an edge near the rim, where the surface ends.
+        let fin = mesh.iter().flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]);
+        let on = |e: &[[f32; 3]; 2]| e.iter().all(|p| p[1] == 1.0 && (30.0..=31.0).contains(&p[0]));
+        let [a, b] = fin.into_iter().find(on).unwrap();
+        mesh.push([a, b, [30.5, 1.0, 1.0]]);
+        let input = records(&mesh);
+        let d = diagnose(&input);
+        let edges = Edges::of(&d.submesh);
+        let (steps, found) = steps::of(|| super::between(&d.submesh, &edges, None, 60.0));
+        assert!(found.is_empty() && (1..100).contains(&steps), "{steps}");
     }
 
     #[test]

@@ -5,7 +5,7 @@
 use crate::algorithms::triangulate::{Rim, Unfillable, strip};
 use crate::detect::holes::loops::Loop;
 use crate::geometry::exact::Point;
-use crate::repairs::holes::patches::{are_joined, concatenated};
+use crate::repairs::holes::patches::concatenated;
 use crate::repairs::shared::work::Work;
 use crate::submesh::{Submesh, Vertex};
 use crate::util::parallel;
@@ -44,7 +44,7 @@ fn between(submesh: &Submesh, pair: &[&Loop; 2]) -> Result<Vec<[u32; 3]>, Unfill
     // A strip has no chords within a rim.
     let none = |_: u32, _: u32| false;
     let vertices = concatenated(pair);
-    let joined = |i: u32, j: u32| are_joined(submesh, vertices[i as usize], vertices[j as usize]);
+    let joined = |i: u32, j: u32| submesh.has_edge(vertices[i as usize], vertices[j as usize]);
     strip::bridge([&rim(&a, &none), &rim(&b, &none)], &joined)
 }
 

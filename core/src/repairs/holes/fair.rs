@@ -141,8 +141,7 @@ impl Edges {
     /// The triangle beyond each edge of the rim, if there is exactly one.
     fn beyond<'s>(&'s self, submesh: &'s Submesh, patch: &'s Placed) -> impl Iterator<Item = Option<u32>> + 's {
         self.rim.iter().map(|&[a, b]| {
-            let mut there =
-                submesh.star(a).map(|(t, _)| t).filter(|t| !patch.holds(*t) && submesh.triangles[*t as usize].v.contains(&b));
+            let mut there = submesh.at_edge(a, b).filter(|t| !patch.holds(*t));
             there.next().filter(|_| there.next().is_none())
         })
     }

@@ -14,7 +14,7 @@ use crate::detect::holes::loops::Loop;
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::exact::Point;
 use crate::geometry::sums::Bounds;
-use crate::repairs::holes::patches::{are_joined, concatenated};
+use crate::repairs::holes::patches::concatenated;
 use crate::repairs::shared::work::Work;
 use crate::submesh::{Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
@@ -95,7 +95,7 @@ const MAX_TOUCHING: usize = 64;
 /// One patch for a hole and the islands that touch its rim.
 pub(crate) fn patch_touching(submesh: &Submesh, way: &Loop) -> Option<Vec<[Vertex; 3]>> {
     let (points, apexes) = (way.points(submesh), way.apexes(submesh));
-    let forbidden = |i: u32, j: u32| are_joined(submesh, way.vertices[i as usize], way.vertices[j as usize]);
+    let forbidden = |i: u32, j: u32| submesh.has_edge(way.vertices[i as usize], way.vertices[j as usize]);
     let patch = triangulate::pinched(&Rim { points: &points, apexes: &apexes, obstacles: &[], forbidden: &forbidden }).ok()?;
     Some(patch.into_iter().map(|t| t.map(|i| way.vertices[i as usize])).collect())
 }
@@ -120,14 +120,14 @@ pub(crate) fn patch(submesh: &Submesh, group: &[&Loop]) -> Option<Vec<[Vertex; 3
         group.iter().map(|rim| (rim.points(submesh), rim.apexes(submesh))).collect();
     let chords: Vec<_> = group
         .iter()
-        .map(|rim| move |i: u32, j: u32| are_joined(submesh, rim.vertices[i as usize], rim.vertices[j as usize]))
+        .map(|rim| move |i: u32, j: u32| submesh.has_edge(rim.vertices[i as usize], rim.vertices[j as usize]))
         .collect();
     let rims: Vec<Rim<'_>> = shapes
         .iter()
         .zip(&chords)
         .map(|((points, apexes), forbidden)| Rim { points, apexes, obstacles: &[], forbidden })
         .collect();
-    let joined = |i: u32, j: u32| are_joined(submesh, vertices[i as usize], vertices[j as usize]);
+    let joined = |i: u32, j: u32| submesh.has_edge(vertices[i as usize], vertices[j as usize]);
     let patch = triangulate::around_islands(&rims.iter().collect::<Vec<_>>(), &joined).ok()?;
     Some(patch.into_iter().map(|t| t.map(|i| vertices[i as usize])).collect())
 }

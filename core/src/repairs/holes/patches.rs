@@ -108,8 +108,3 @@ pub(crate) fn of_submesh(rim: &Loop, patch: &triangulate::Patch) -> Vec<[Vertex;
 pub(crate) fn concatenated(group: &[&Loop]) -> Vec<Vertex> {
     group.iter().flat_map(|rim| rim.vertices.iter().copied()).collect()
 }
-
-/// Is there an edge between two vertices of loops?
-pub(crate) fn are_joined(submesh: &Submesh, a: Vertex, b: Vertex) -> bool {
-    if submesh.complete[a as usize] { submesh.has_edge(a, b) } else { submesh.has_edge(b, a) }
-}

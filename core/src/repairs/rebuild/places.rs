@@ -6,7 +6,7 @@ use crate::detect::holes::loops;
 use crate::geometry::position::{self, Position};
 use crate::repairs::boolean::resolve::join_in;
 use crate::repairs::shared::context::Context;
-use crate::repairs::shared::overlay::{Overlay, Which};
+use crate::repairs::shared::overlay::Which;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Reversed, nonmanifold_vertices};
 use crate::submesh::{Origin, Vertex};
@@ -57,7 +57,7 @@ pub(crate) fn find(cx: &mut Context<'_, '_>) -> Option<Vec<Place>> {
 
 /// The pairs that cross, all of whose triangles are in the submesh then.
 fn pairs(cx: &mut Context<'_, '_>) -> Option<Vec<[u32; 2]>> {
-    let all = Overlay::of(cx.survey, &cx.work, &cx.reversed)?.crossing_triangles(cx.survey, &cx.work)?;
+    let all = cx.crossing()?;
     let records = || all.iter().flatten().filter_map(|which| which.record());
     complete(cx, records().flat_map(|record| position::corners(&cx.survey.records[record as usize])).collect());
     let wanted: BTreeSet<u32> = all.iter().flatten().filter_map(|which| which.record()).collect();
@@ -70,7 +70,7 @@ fn pairs(cx: &mut Context<'_, '_>) -> Option<Vec<[u32; 2]>> {
         Which::Submesh(t) => Some(t),
         Which::Record(record) => here.get(&record).copied(),
     };
-    Some(all.into_iter().filter_map(|[a, b]| Some([in_submesh(a)?, in_submesh(b)?])).collect())
+    Some(all.iter().filter_map(|[a, b]| Some([in_submesh(*a)?, in_submesh(*b)?])).collect())
 }
 
 /// Triangles that share vertices, or are a pair, together; each list ascending, and the lists by their first ones.

@@ -12,6 +12,7 @@ use crate::detect::skin::DroppedBy;
 use crate::diagnosis::Diagnosis;
 use crate::geometry::position::Position;
 use crate::repairs::shared::account::Account;
+use crate::repairs::shared::overlay::{Overlay, Which};
 use crate::repairs::shared::pieces;
 use crate::repairs::shared::probes::Probes;
 use crate::repairs::shared::region_report::Unsettled;
@@ -61,11 +62,16 @@ impl Done {
     }
 }
 
+/// Pairs of triangles that cross or overlap.
+pub(crate) type CrossingPairs = Rc<[[Which; 2]]>;
+
 /// What repairs know of the mesh. It is found out when it is asked for, and forgotten when the mesh changes.
 #[derive(Default)]
 struct Known {
     /// The pieces that stand for themselves, and the version of the mesh that they are of.
     pieces: Option<(u64, Rc<Components>)>,
+    /// All pairs that cross, if that could be told, and the version that they are of.
+    crossing: Option<(u64, Option<CrossingPairs>)>,
     /// All pieces enclose what they should.
     is_outward: bool,
 }
@@ -189,6 +195,20 @@ impl<'c, 'r> Context<'c, 'r> {
         }
     }
 
+    /// All pairs of triangles that cross or overlap; `None` if that is too much work to tell. A look at what changed after a change, O(1) else.
+    pub(crate) fn crossing(&mut self) -> Option<CrossingPairs> {
+        let version = self.work.version();
+        if let Some((of, known)) = &self.known.crossing
+            && *of == version
+        {
+            return known.clone();
+        }
+        let overlay = Overlay::of(self.survey, &self.work, &self.reversed);
+        let pairs = overlay.and_then(|overlay| overlay.crossing_triangles(self.survey, &self.work)).map(Rc::from);
+        self.known.crossing = Some((version, pairs.clone()));
+        pairs
+    }
+
     /// All pieces are known to enclose what they should.
     pub(crate) fn is_outward(&self) -> bool {
         self.known.is_outward
@@ -200,7 +220,7 @@ impl<'c, 'r> Context<'c, 'r> {
         by.resize(self.reversed.dropped.len(), None);
         let dropped = by.iter_mut().zip(&self.reversed.dropped).filter(|(by, dropped)| **dropped && by.is_none());
         dropped.for_each(|(by, _)| *by = Some(name));
-        self.known.pieces = None;
+        (self.known.pieces, self.known.crossing) = (None, None);
         self.known.is_outward = match changes {
             Changes::Surface | Changes::Directions => false,
             Changes::Pieces => self.known.is_outward,

@@ -97,6 +97,22 @@ impl<'a> Work<'a> {
         self.journal = Some(Journal { count: self.submesh.triangles.len(), old: Vec::new() });
     }
 
+    /// The edges of what has changed since the mark, as they were and as they are, each once; `None` if there is no mark.
+    pub(crate) fn edges_since_mark(&self) -> Option<Vec<[Vertex; 2]>> {
+        let Journal { count, old } = self.journal.as_ref()?;
+        let now = old.iter().map(|(t, _)| *t).chain(*count as u32..self.submesh.triangles.len() as u32);
+        let triangles = old.iter().map(|(_, triangle)| triangle.v).chain(now.map(|t| self.submesh.triangles[t as usize].v));
+        let mut edges: Vec<[Vertex; 2]> = triangles
+            .flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]])
+            .map(|[a, b]| [a.min(b), a.max(b)])
+            .filter(|[a, b]| a != b)
+            .collect();
+        edges.sort_unstable();
+        edges.dedup();
+        steps::count(edges.len());
+        Some(edges)
+    }
+
     /// Ends a mark: all changes since stay.
     pub(crate) fn keep(&mut self) {
         self.journal = None;
@@ -329,6 +345,29 @@ mod tests {
         assert_eq!(disagreeing(&mut work), 0);
         work.flip(3);
         assert_ne!(disagreeing(&mut work), 0);
+    }
+
+    #[test]
+    fn edges_since_a_mark_are_those_of_what_changed() {
+        let records = records(&plate(2, |_, _| true));
+        let mut d = diagnose(&records);
+        let mut work = Work::new(&mut d.submesh);
+        assert_eq!(work.edges_since_mark(), None);
+        work.mark();
+        assert_eq!(work.edges_since_mark(), Some(vec![]));
+        let sorted = |[a, b]: [Vertex; 2]| [a.min(b), a.max(b)];
+        let [a, b, c] = work.triangles[0].v;
+        let mut want = [[a, b], [b, c], [c, a]].map(sorted).to_vec();
+        want.sort_unstable();
+        work.kill(0);
+        assert_eq!(work.edges_since_mark(), Some(want.clone()), "as they were");
+        let other = (0..work.positions.len() as Vertex).find(|v| ![a, b, c].contains(v)).unwrap();
+        work.add([a, b, other], Origin::Added(RepairName::Fill), NONE);
+        want.extend([[b, other], [other, a]].map(sorted));
+        want.sort_unstable();
+        assert_eq!(work.edges_since_mark(), Some(want), "and as they are");
+        work.take_back();
+        assert_eq!(work.edges_since_mark(), None);
     }
 
     #[test]

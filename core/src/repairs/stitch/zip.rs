@@ -180,13 +180,13 @@ fn ends(submesh: &Submesh, edges: &Edges) -> Vec<DVec3> {
 /// Would the mesh stay as valid as it is?
 fn may_merge(submesh: &Submesh, stay: Vertex, go: Vertex) -> bool {
     let corners = |t: u32| submesh.triangles[t as usize].v;
-    if submesh.star(go).any(|(t, _)| corners(t).contains(&stay)) {
+    if submesh.has_edge(go, stay) {
         return false;
     }
     let mut neighbours: Vec<Vertex> = submesh.star(go).flat_map(|(t, _)| corners(t)).filter(|x| *x != go).collect();
     neighbours.sort_unstable();
     neighbours.dedup();
-    let uses = |v: Vertex, x: Vertex| submesh.star(v).filter(|(t, _)| corners(*t).contains(&x)).count();
+    let uses = |v: Vertex, x: Vertex| submesh.at_edge(v, x).count();
     // An edge that both have becomes one.
     let manifold = neighbours.iter().all(|x| {
         let shared = uses(stay, *x);

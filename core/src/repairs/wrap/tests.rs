@@ -9,6 +9,7 @@ use crate::contract::report::{Defects, Verdict};
 use crate::contract::settings::Limits;
 use crate::diagnosis::Diagnosis;
 use crate::output::edit::Edit;
+use crate::repairs::shared::overlay::Overlay;
 use crate::testing::{cuboid, diagnose, plate, records, reversed, shifted, written};
 
 struct After {

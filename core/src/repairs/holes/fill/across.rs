@@ -7,7 +7,6 @@ use crate::contract::report::{LoopLeft, MOST_LISTED};
 use crate::detect::holes::unbalanced::unbalanced;
 use crate::geometry::exact::{self, Point};
 use crate::repairs::cleanup::degenerate;
-use crate::repairs::holes::patches::are_joined;
 use crate::repairs::shared::admission::NotAdmitted;
 use crate::repairs::shared::context::{PatchAcross, SheetRim};
 use crate::repairs::shared::work::Work;
@@ -67,8 +66,9 @@ impl Closing<'_> {
     /// the others.
     pub(crate) fn keep_open(&self, submesh: &Submesh, chains: &mut Vec<Vec<Vertex>>, closed: &mut Closed) {
         chains.retain(|chain| {
-            let along = submesh.star(chain[0]).map(|(t, _)| t).filter(|t| submesh.triangles[*t as usize].v.contains(&chain[1]));
-            let Some(triangle) = along.min().filter(|t| self.admission.is_one_sided(*t)) else { return true };
+            let Some(triangle) = submesh.at_edge(chain[0], chain[1]).min().filter(|t| self.admission.is_one_sided(*t)) else {
+                return true;
+            };
             let edges = chain.len() - 1;
             let listed = (closed.left.len() < MOST_LISTED).then_some(closed.left.len());
             closed.sheets.push(SheetRim { triangle, edges, listed });
@@ -140,7 +140,7 @@ impl Closing<'_> {
         }
         let loop_ = self.rim(rim);
         let points = loop_.points(submesh);
-        let joined = |i: u32, j: u32| are_joined(submesh, loop_.vertices[i as usize], loop_.vertices[j as usize]);
+        let joined = |i: u32, j: u32| submesh.has_edge(loop_.vertices[i as usize], loop_.vertices[j as usize]);
         let any = |forbidden: &dyn Fn(u32, u32) -> bool| {
             triangulate::unchecked(&Rim { points: &points, apexes: &[], obstacles: &[], forbidden })
         };

@@ -9,7 +9,7 @@ use crate::detect::holes::{self, loops::Loop};
 use crate::geometry::position::Position;
 use crate::geometry::sums::Bounds;
 use crate::geometry::tri_tri;
-use crate::repairs::holes::patches::{EXTENDED, Placed, Planes, are_joined, of_submesh};
+use crate::repairs::holes::patches::{EXTENDED, Placed, Planes, of_submesh};
 use crate::repairs::shared::admission::{Admission, NotAdmitted};
 use crate::repairs::shared::context::{PatchAcross, SheetRim};
 use crate::repairs::shared::work::Work;
@@ -195,7 +195,7 @@ impl Closing<'_> {
         self.admission.check(submesh, rim).ok()?;
         let points = rim.points(submesh);
         let apexes = rim.apexes(submesh);
-        let forbidden = |i: u32, j: u32| are_joined(submesh, rim.vertices[i as usize], rim.vertices[j as usize]);
+        let forbidden = |i: u32, j: u32| submesh.has_edge(rim.vertices[i as usize], rim.vertices[j as usize]);
         let of_patch = Rim { points: &points, apexes: &apexes, obstacles: &[], forbidden: &forbidden };
         extend::extend(&of_patch, self.may_add)
     }
@@ -258,12 +258,8 @@ impl Closing<'_> {
             let is_needed = |t: &u32| {
                 let v = work.triangles[*t as usize].v;
                 (0..3).any(|k| {
-                    work.star(v[k]).any(|(other, _)| {
-                        let triangle = &work.triangles[other as usize];
-                        triangle.v.contains(&v[(k + 1) % 3])
-                            && matches!(triangle.origin, Origin::Added(_))
-                            && !idle.contains(&other)
-                    })
+                    work.at_edge(v[k], v[(k + 1) % 3])
+                        .any(|other| matches!(work.triangles[other as usize].origin, Origin::Added(_)) && !idle.contains(&other))
                 })
             };
             let needed: Vec<u32> = idle.iter().copied().filter(is_needed).collect();

@@ -51,7 +51,7 @@ impl Known {
 }
 
 /// The pairs of a loop's vertices with an edge of the mesh between them, by their numbers on the loop, the smaller one first; ascending. Exactly those of
-/// which [`are_joined`](crate::repairs::holes::patches::are_joined) says so.
+/// which [`Submesh::has_edge`] says so.
 pub(crate) fn joined(submesh: &Submesh, vertices: &[Vertex]) -> Vec<(u32, u32)> {
     let mut numbers: Vec<(Vertex, u32)> = vertices.iter().copied().zip(0..).collect();
     numbers.sort_unstable();

@@ -30,7 +30,7 @@ pub(crate) struct Work<'a> {
     submesh: &'a mut Submesh,
     edges: Option<Edges>,
     components: Option<Arc<Components>>,
-    /// Triangles as they were added or got another vertex.
+    /// Triangles as they were added, got another vertex or came to life again. Some may be gone since.
     changed: Vec<u32>,
     /// How many of these each pass has seen; `None`: it has to look at everything.
     seen: [Option<usize>; 3],
@@ -86,7 +86,8 @@ impl<'a> Work<'a> {
     /// What may have changed since `pass` asked last, ascending, each once; `None`: it has to look at everything.
     pub(crate) fn changed_for(&mut self, pass: Pass) -> Option<Vec<u32>> {
         let seen = self.seen[pass as usize].replace(self.changed.len())?;
-        let mut changed = self.changed[seen..].to_vec();
+        let is_there = |t: &u32| (*t as usize) < self.submesh.triangles.len();
+        let mut changed: Vec<u32> = self.changed[seen..].iter().copied().filter(is_there).collect();
         changed.sort_unstable();
         changed.dedup();
         Some(changed)
@@ -131,9 +132,10 @@ impl<'a> Work<'a> {
         self.submesh.triangles.truncate(count + fetched.len());
         for (t, triangle) in old.into_iter().rev() {
             self.submesh.triangles[t as usize] = triangle;
+            self.changed.push(t);
         }
+        self.changed.extend((count as u32..).take(fetched.len()));
         self.touch();
-        self.seen = [None; 3];
         self.submesh.relink();
         (count, fetched)
     }
@@ -264,11 +266,13 @@ impl<'a> Work<'a> {
         self.submesh.relink();
     }
 
-    /// Puts all triangles back to what they were.
+    /// Puts all triangles back to what they were. O(submesh); passes look only at what was another one meanwhile.
     pub(crate) fn restore(&mut self, before: &[Triangle]) {
         self.touch();
         self.journal = None;
-        self.seen = [None; 3];
+        let back = (0..).zip(self.submesh.triangles.iter().zip(before));
+        self.changed.extend(back.filter(|(_, (now, old))| now.v != old.v || now.alive != old.alive).map(|(t, _)| t));
+        self.changed.extend(self.submesh.triangles.len() as u32..before.len() as u32);
         self.submesh.triangles.clear();
         self.submesh.triangles.extend_from_slice(before);
         self.submesh.relink();
@@ -327,8 +331,17 @@ mod tests {
         work.merge(0, 3);
         assert_eq!(work.changed_for(Pass::Copies).map(|c| c.len()), Some(moved.len()));
         let before = work.triangles.clone();
+        let gone = work.add([0, 1, 4], Origin::Added(RepairName::Fill), NONE);
+        assert_eq!(work.changed_for(Pass::Copies), Some(vec![gone]));
+        work.kill(1);
+        work.assign(2, 0, 5);
         work.restore(&before);
-        assert_eq!(work.changed_for(Pass::Copies), None, "what was taken back has to be looked at anew");
+        assert_eq!(work.changed_for(Pass::Copies), Some(vec![1, 2]), "what was put back is looked at anew, the rest is not");
+        work.mark();
+        work.kill(1);
+        work.add([0, 1, 4], Origin::Added(RepairName::Fill), NONE);
+        work.take_back();
+        assert_eq!(work.changed_for(Pass::Copies), Some(vec![1]), "and what was taken back, too");
     }
 
     #[test]

@@ -226,7 +226,7 @@ impl<'a, 'b> Table<'a, 'b> {
 
     /// The best part; of equal ones the first.
     fn lightest(&self, i: usize, k: usize) -> Part {
-        let mut best = Part::NONE;
+        let mut best = self.bound(i, k);
         let mut from = i + 1;
         while let Some(part) = self.next_before(&best, (i, k), from) {
             from = part.apex as usize + 1;
@@ -236,6 +236,21 @@ impl<'a, 'b> Table<'a, 'b> {
             }
         }
         best
+    }
+
+    /// No part, but as heavy as the lighter one of two by a hair more: a chord often has the apex of a chord beside it, and most others are heavier then.
+    fn bound(&self, i: usize, k: usize) -> Part {
+        let mut bound = Part::NONE;
+        for m in [self.parts.apexes[i * self.parts.n + k - 1], self.parts.apexes[(i + 1) * self.parts.n + k]] {
+            if m != RIM && (i + 1..k).contains(&(m as usize)) {
+                let part = self.with_triangle(self.parts.joined((i, k), m as usize), (i, k));
+                if part.before(&bound, self.weight) {
+                    bound = part;
+                }
+            }
+        }
+        // Of weights that are the same the bends are the same, too.
+        Part { area: bound.area.next_up(), apex: RIM, normal: DVec3::ZERO, ..bound }
     }
 
     /// The best part whose triangle may be used, where that on the lightest may not.

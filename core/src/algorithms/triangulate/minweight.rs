@@ -18,21 +18,17 @@ use super::clear::Clearance;
 use super::patch::Unfillable;
 use super::rim::Rim;
 pub(super) use super::weights::Weight;
-use super::weights::{Row, Weights, first_before};
+use super::weights::{self, Chord, Weighs, Weights};
 use crate::geometry::exact::{at, collinear};
 use crate::util::steps;
-
-/// Steps of 1 − cos of the angle between normals; one step is 14° near flat.
-const BEND_STEPS: f64 = 32.0;
 
 const RIM: u32 = u32::MAX;
 
 /// The best triangulation of the part of the polygon beyond the chord (i, k), i < k.
 #[derive(Clone, Copy, PartialEq)]
 struct Part {
-    bend: u32,
-    /// Infinite: the part cannot be triangulated.
-    area: f64,
+    /// With an infinite area the part cannot be triangulated.
+    weighs: Weighs,
     /// The triangle on the chord is (i, apex, k); [`RIM`] for a rim edge.
     apex: u32,
     /// Unit normal of that triangle (for a rim edge: of the mesh's triangle; zero: unknown).
@@ -40,26 +36,7 @@ struct Part {
 }
 
 impl Part {
-    const NONE: Self = Self { bend: u32::MAX, area: f64::INFINITY, apex: RIM, normal: DVec3::ZERO };
-
-    fn before(&self, other: &Self, weight: Weight) -> bool {
-        let (by_bend, by_area) = (self.bend.cmp(&other.bend), self.area.total_cmp(&other.area));
-        match weight {
-            Weight::Bend => by_bend.then(by_area).is_lt(),
-            Weight::Area => by_area.then(by_bend).is_lt(),
-        }
-    }
-
-    /// When its turn comes among others on its chord: the lighter first, of equal ones those that are without their triangles yet, and of these the first.
-    fn turn(&self, weight: Weight, is_whole: bool) -> Turn {
-        // Bits of floats that are not negative are in the order of the floats.
-        let (bend, area) = (u64::from(self.bend), self.area.to_bits());
-        let (first, second) = match weight {
-            Weight::Bend => (bend, area),
-            Weight::Area => (area, bend),
-        };
-        (first, second, is_whole, self.apex)
-    }
+    const NONE: Self = Self { weighs: Weighs::NOTHING_LIKE_IT, apex: RIM, normal: DVec3::ZERO };
 
     /// Does it count for as much where it is a part of another one?
     fn weighs_as(&self, other: &Self) -> bool {
@@ -67,8 +44,17 @@ impl Part {
     }
 }
 
-/// Weights, in the order in which they count, of a part with or without its triangle; and its apex.
-type Turn = (u64, u64, bool, u32);
+/// When the turn of a triangle comes among others on its chord: the lighter first, of equal ones the first. Its weights, in the order in which they count; and its apex.
+type Turn = (u64, u64, u32);
+
+fn turn(weighs: Weighs, apex: u32, weight: Weight) -> Turn {
+    // Bits of floats that are not negative are in the order of the floats.
+    let (bend, area) = (weighs.bend.to_bits(), weighs.area.to_bits());
+    match weight {
+        Weight::Bend => (bend, area, apex),
+        Weight::Area => (area, bend, apex),
+    }
+}
 
 /// The parts. The loop over the apexes of a chord runs along a row of those with its first vertex and one of those with its last.
 struct Parts {
@@ -76,46 +62,25 @@ struct Parts {
     rows: Weights,
     columns: Weights,
     apexes: Vec<u32>,
-    normals: Vec<DVec3>,
 }
 
 impl Parts {
     fn none(n: usize) -> Self {
         let none = || Weights::none(n * n);
-        Self { n, rows: none(), columns: none(), apexes: vec![RIM; n * n], normals: vec![DVec3::ZERO; n * n] }
+        Self { n, rows: none(), columns: none(), apexes: vec![RIM; n * n] }
     }
 
     fn get(&self, i: usize, k: usize) -> Part {
         let at = i * self.n + k;
-        let (bend, area) = self.rows.get(at);
-        Part { bend, area, apex: self.apexes[at], normal: self.normals[at] }
-    }
-
-    fn normal(&self, i: usize, k: usize) -> DVec3 {
-        self.normals[i * self.n + k]
+        Part { weighs: self.rows.get(at), apex: self.apexes[at], normal: self.rows.normal(at) }
     }
 
     fn set(&mut self, i: usize, k: usize, part: Part) {
         let at = i * self.n + k;
-        (self.apexes[at], self.normals[at]) = (part.apex, part.normal);
-        self.rows.set(at, part.bend, part.area);
-        self.columns.set(k * self.n + i, part.bend, part.area);
+        self.apexes[at] = part.apex;
+        self.rows.set(at, part.weighs, part.normal);
+        self.columns.set(k * self.n + i, part.weighs, part.normal);
     }
-
-    /// The parts beyond (i, m) and (m, k) as one, without the triangle between them.
-    fn joined(&self, (i, k): (usize, usize), m: usize) -> Part {
-        let (left, right) = (self.rows.get(i * self.n + m), self.columns.get(k * self.n + m));
-        Part { bend: left.0.max(right.0), area: left.1 + right.1, apex: m as u32, normal: DVec3::ZERO }
-    }
-
-    /// The weights of the parts beyond (i, m) and (m, k), for each m from `first` to k.
-    fn beside(&self, (i, k): (usize, usize), first: usize) -> [Row<'_>; 2] {
-        [self.rows.row(i * self.n + first..i * self.n + k), self.columns.row(k * self.n + first..k * self.n + k)]
-    }
-}
-
-fn bend(a: DVec3, b: DVec3) -> u32 {
-    if a == DVec3::ZERO || b == DVec3::ZERO { 0 } else { ((1.0 - a.dot(b)) * BEND_STEPS) as u32 }
 }
 
 /// The triangles that may be used.
@@ -141,10 +106,12 @@ pub(super) struct Table<'a, 'b> {
     choice: Choice<'a, 'b>,
     /// Triangles that are not used, corners ascending.
     banned: Vec<[u32; 3]>,
-    positions: Vec<DVec3>,
+    /// By coordinate.
+    positions: [Vec<f64>; 3],
     parts: Parts,
-    /// Of no chord; its memory is used again.
+    /// Of no chord; their memory is used again.
     turns: BinaryHeap<Reverse<Turn>>,
+    weighed: Vec<Weighs>,
     /// A chord or triangle was refused because of the mesh around.
     mesh_in_the_way: bool,
 }
@@ -162,13 +129,14 @@ impl<'a, 'b> Table<'a, 'b> {
             weight,
             choice,
             banned,
-            positions: rim.points.iter().map(at).collect(),
+            positions: std::array::from_fn(|k| rim.points.iter().map(|p| at(p)[k]).collect()),
             parts: Parts::none(n),
             turns: BinaryHeap::new(),
+            weighed: Vec::new(),
             mesh_in_the_way: false,
         };
         for i in 0..n.saturating_sub(1) {
-            table.parts.set(i, i + 1, Part { bend: 0, area: 0.0, apex: RIM, normal: rim.normal_beyond(i) });
+            table.parts.set(i, i + 1, Part { weighs: Weighs { bend: 0.0, area: 0.0 }, apex: RIM, normal: rim.normal_beyond(i) });
         }
         for span in 2..n {
             for i in 0..n - span {
@@ -224,82 +192,70 @@ impl<'a, 'b> Table<'a, 'b> {
         self.next_lightest((i, k), best.apex)
     }
 
-    /// The best part; of equal ones the first.
-    fn lightest(&self, i: usize, k: usize) -> Part {
-        let mut best = self.bound(i, k);
-        let mut from = i + 1;
-        while let Some(part) = self.next_before(&best, (i, k), from) {
-            from = part.apex as usize + 1;
-            let part = self.with_triangle(part, (i, k));
-            if part.before(&best, self.weight) {
-                best = part;
-            }
+    /// The triangles on a chord, by their apexes, from the one after its first end on.
+    fn chord(&self, i: usize, k: usize) -> Chord<'_> {
+        let n = self.rim.len();
+        let end = |at: usize| DVec3::from(self.positions.each_ref().map(|all| all[at]));
+        Chord {
+            parts: [self.parts.rows.row(i * n + i + 1..i * n + k), self.parts.columns.row(k * n + i + 1..k * n + k)],
+            apexes: self.positions.each_ref().map(|all| &all[i + 1..k]),
+            ends: [end(i), end(k)],
+            // The chord from the last vertex to the first is a rim edge: the mesh goes on beyond it.
+            beyond: if i == 0 && k + 1 == n { self.rim.normal_beyond(k) } else { DVec3::ZERO },
+            weight: self.weight,
         }
-        best
     }
 
-    /// No part, but as heavy as the lighter one of two by a hair more: a chord often has the apex of a chord beside it, and most others are heavier then.
-    fn bound(&self, i: usize, k: usize) -> Part {
-        let mut bound = Part::NONE;
-        for m in [self.parts.apexes[i * self.parts.n + k - 1], self.parts.apexes[(i + 1) * self.parts.n + k]] {
+    /// The best part; of equal ones the first.
+    fn lightest(&self, i: usize, k: usize) -> Part {
+        steps::count(k - i - 1);
+        let chord = self.chord(i, k);
+        let found = weights::lightest(&chord, self.bound(&chord, (i, k)));
+        found.map_or(Part::NONE, |place| Self::part(&chord, i, place))
+    }
+
+    /// The part whose triangle has the apex at this place.
+    fn part(chord: &Chord<'_>, i: usize, place: usize) -> Part {
+        let (weighs, normal) = weights::with_triangle(chord, place);
+        Part { weighs, apex: (i + 1 + place) as u32, normal }
+    }
+
+    /// Heavier by a hair than the lighter one of two: a chord often has the apex of a chord beside it, and most others need not be weighed then.
+    fn bound(&self, chord: &Chord<'_>, (i, k): (usize, usize)) -> Weighs {
+        let n = self.rim.len();
+        let mut bound = Weighs::NOTHING_LIKE_IT;
+        for m in [self.parts.apexes[i * n + k - 1], self.parts.apexes[(i + 1) * n + k]] {
             if m != RIM && (i + 1..k).contains(&(m as usize)) {
-                let part = self.with_triangle(self.parts.joined((i, k), m as usize), (i, k));
-                if part.before(&bound, self.weight) {
-                    bound = part;
+                let (weighs, _) = weights::with_triangle(chord, m as usize - i - 1);
+                if weighs.is_before(bound, self.weight) {
+                    bound = weighs;
                 }
             }
         }
-        // Of weights that are the same the bends are the same, too.
-        Part { area: bound.area.next_up(), apex: RIM, normal: DVec3::ZERO, ..bound }
+        // One of equal weight is found, too.
+        Weighs { area: bound.area.next_up(), ..bound }
     }
 
     /// The best part whose triangle may be used, where that on the lightest may not.
     fn next_lightest(&mut self, (i, k): (usize, usize), lightest: u32) -> Part {
-        let mut turns = std::mem::take(&mut self.turns).into_vec();
+        let (mut turns, mut weighed) = (std::mem::take(&mut self.turns).into_vec(), std::mem::take(&mut self.weighed));
         turns.clear();
-        let parts = (i + 1..k).filter(|m| *m as u32 != lightest).map(|m| self.parts.joined((i, k), m));
-        turns.extend(parts.filter(|part| part.area != f64::INFINITY).map(|part| Reverse(part.turn(self.weight, false))));
+        weighed.clear();
+        weights::weigh_all(&self.chord(i, k), &mut weighed);
+        let all = (i as u32 + 1..).zip(&weighed).filter(|(m, weighs)| *m != lightest && weighs.area != f64::INFINITY);
+        let all = all.filter(|(m, _)| !self.is_refused([i as u32, *m, k as u32]));
+        turns.extend(all.map(|(m, weighs)| Reverse(turn(*weighs, m, self.weight))));
         let mut turns = BinaryHeap::from(turns);
         let mut found = Part::NONE;
-        while let Some(Reverse((.., is_whole, m))) = turns.pop() {
+        while let Some(Reverse((.., m))) = turns.pop() {
             steps::count(1);
-            let triangle = [i as u32, m, k as u32];
-            if if is_whole { !self.may_use(triangle) } else { self.is_refused(triangle) } {
-                continue;
-            }
-            let part = self.with_triangle(self.parts.joined((i, k), m as usize), (i, k));
-            if is_whole {
-                found = part;
+            if self.may_use([i as u32, m, k as u32]) {
+                found = Self::part(&self.chord(i, k), i, m as usize - i - 1);
                 break;
             }
-            // Its turn comes when nothing is left that may be lighter.
-            turns.push(Reverse(part.turn(self.weight, true)));
         }
-        self.turns = turns;
+        (self.turns, self.weighed) = (turns, weighed);
         found
-    }
-
-    /// A part with the triangle on its chord, where what is beyond that is known.
-    fn with_triangle(&self, mut part: Part, (i, k): (usize, usize)) -> Part {
-        let m = part.apex as usize;
-        // The chord from the last vertex to the first is a rim edge: the mesh goes on beyond it.
-        let beyond = if i == 0 && k + 1 == self.rim.len() { self.rim.normal_beyond(k) } else { DVec3::ZERO };
-        let normal = (self.positions[m] - self.positions[i]).cross(self.positions[k] - self.positions[i]);
-        let length = normal.length();
-        part.area += 0.5 * length;
-        part.normal = if length > 0.0 { normal / length } else { DVec3::ZERO };
-        for other in [self.parts.normal(i, m), self.parts.normal(m, k), beyond] {
-            part.bend = part.bend.max(bend(part.normal, other));
-        }
-        part
-    }
-
-    /// The first apex of a chord from `from` on whose parts alone weigh less than the best, and what they weigh.
-    fn next_before(&self, best: &Part, (i, k): (usize, usize), from: usize) -> Option<Part> {
-        let found = first_before(self.parts.beside((i, k), from), (best.bend, best.area), self.weight);
-        steps::count(found.map_or(k - from, |(place, ..)| place + 1));
-        let (place, bend, area) = found?;
-        Some(Part { bend, area, apex: (from + place) as u32, normal: DVec3::ZERO })
     }
 
     /// Is it known that a triangle may not be used?
@@ -336,7 +292,7 @@ fn collect(parts: &Parts) -> Option<Vec<[u32; 3]>> {
     let mut stack = vec![(0, n - 1)];
     while let Some((i, k)) = stack.pop() {
         let part = parts.get(i, k);
-        if part.area == f64::INFINITY {
+        if part.weighs.area == f64::INFINITY {
             return None;
         }
         if part.apex != RIM {

@@ -22,13 +22,14 @@ use crate::geometry::sums::Bounds;
 use crate::io::record;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::pieces::{are_patched, crossing, lies_in_material, take_away};
+use crate::repairs::shared::unsaid;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Component, Components, Reversed};
 use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 
-/// A body of less than this share of all volume is a speck, of which nothing is told.
+/// Specks of which nothing is told are together no more than this share of all volume.
 const SPECK: f64 = 1e-3;
 
 /// Bodies in the material of others.
@@ -91,9 +92,11 @@ pub(crate) fn remove(
     let is_known = |i: usize| is_as_read[i] && around[i].around.iter().all(|(outer, _)| !is_patched[*outer as usize]);
     let is_enclosed: Vec<bool> = (0..pieces.list.len()).map(|i| in_material[i] && is_known(i)).collect();
     let left = (0..pieces.list.len()).filter(|i| in_material[*i] && !is_enclosed[*i]).map(|i| &pieces.list[i]);
+    let left: Vec<&Component> = left.filter(|piece| piece.extent.volume > 0).collect();
     let all: f64 = pieces.list.iter().map(|piece| piece.extent.volume.abs() as f64).sum();
-    let is_told = |piece: &&Component| piece.extent.volume as f64 > SPECK * all;
-    let largest = left.filter(is_told).max_by_key(|piece| (piece.extent.volume, Reverse(piece.sample)));
+    let told = unsaid::told(&left.iter().map(|piece| piece.extent.volume as f64).collect::<Vec<_>>(), SPECK * all);
+    let left = left.into_iter().zip(told).filter(|(_, told)| *told).map(|(piece, _)| piece);
+    let largest = left.max_by_key(|piece| (piece.extent.volume, Reverse(piece.sample)));
     enclosed.left = largest.map(|piece| piece.bounds.normalised());
     for (piece, _) in pieces.list.iter().zip(&is_enclosed).filter(|(_, gone)| **gone) {
         enclosed.bodies += u64::from(piece.extent.volume > 0);

@@ -16,6 +16,7 @@ use crate::geometry::boxes::BoxTree;
 use crate::geometry::sums::Bounds;
 use crate::repairs::orient::points::spread;
 use crate::repairs::shared::pieces::{are_patched, crossing_pieces};
+use crate::repairs::shared::unsaid;
 use crate::submesh::Submesh;
 use crate::submesh::components::{Component, Components, Reversed};
 use crate::topology::survey::Survey;
@@ -29,7 +30,7 @@ const PLAINLY: f64 = 2.0 / 3.0;
 /// A piece of which no more than this share does is plainly a body: it only touches others.
 const TOUCHES: f64 = 0.02;
 
-/// A guess about a piece of less than this share of all volume is not told.
+/// Pieces whose guesses are not told are together no more than this share of all volume.
 const LEAST: f64 = 1e-3;
 
 /// Pieces that are inside out.
@@ -53,10 +54,12 @@ pub(crate) fn inverted(survey: &Survey<'_>, submesh: &Submesh, pieces: &Componen
     let pairs = survey.crossing_pairs.as_deref().unwrap_or_default().iter().map(|pair| pair.triangles);
     let crossing = crossing_pieces(survey, submesh, pieces, pairs);
     let around = bodies::surroundings(survey, submesh, pieces, reversed, |c| !c.open);
+    let (by_points, unasked) = around_points(survey, submesh, pieces, reversed, &crossing);
     let mut all = All {
         list: &pieces.list,
         around: around.into_iter().map(|around| around.around).collect(),
-        by_points: around_points(survey, submesh, pieces, reversed, &crossing),
+        by_points,
+        unasked,
         crossing,
         inverted: vec![false; pieces.list.len()],
     };
@@ -72,6 +75,8 @@ struct All<'a> {
     around: Vec<Around>,
     /// Of pieces that cross others: what winds around points spread over them.
     by_points: BTreeMap<u32, Vec<Around>>,
+    /// Those that cross others as well, and of which one point has to tell, since they are too many.
+    unasked: Vec<u32>,
     /// The pieces that cross each other.
     crossing: Vec<[u32; 2]>,
     inverted: Vec<bool>,
@@ -130,44 +135,47 @@ impl All<'_> {
 
     /// Lines on what was to be guessed, and what was taken for cavities.
     fn guesses(&self) -> Inverted {
-        let mut guesses = Inverted::default();
         let closed = self.list.iter().filter(|piece| !piece.open);
+        let size = |c: &u32| self.list[*c as usize].extent.volume.abs() as f64;
         let all: f64 = closed.map(|piece| piece.extent.volume.abs() as f64).sum();
-        for c in self.by_points.keys() {
-            let (was_negative, is_turned) = (self.sign(*c) < 0, self.inverted[*c as usize]);
-            let share = self.share_in_material(&self.points(*c));
-            let meant = match (was_negative, is_turned) {
-                (true, true) if share > TOUCHES => "a body",
-                (true, false) | (false, true) => "a cavity",
-                _ => continue,
-            };
-            let Bounds { lo, hi } = self.list[*c as usize].bounds.normalised();
-            let is_large = self.list[*c as usize].extent.volume.abs() as f64 > LEAST * all;
-            let is_guess = is_large && (was_negative == is_turned || share < PLAINLY);
-            if is_guess {
-                let share = share * 100.0;
-                guesses.doubts.push(format!(
-                    "surface that faces inward crosses other bodies, and {share:.0} % of it lies in their material: it was taken for {meant}, from \
-                     {lo:?} to {hi:?}"
-                ));
-            }
-            if was_negative != is_turned {
-                guesses.poking_out.push(*c);
-                guesses.plainly.extend((!is_guess).then_some(*c));
-            }
-        }
-        guesses
+        let guessed: Vec<(u32, String)> =
+            self.by_points.keys().chain(&self.unasked).filter_map(|c| Some((*c, self.guess(*c)?))).collect();
+        let told = unsaid::told(&guessed.iter().map(|(c, _)| size(c)).collect::<Vec<_>>(), LEAST * all);
+        let mut told: Vec<(u32, String)> =
+            guessed.into_iter().zip(told).filter(|(_, told)| *told).map(|(guess, _)| guess).collect();
+        let is_cavity = |c: &&u32| (self.sign(**c) < 0) != self.inverted[**c as usize];
+        let poking_out: Vec<u32> = self.by_points.keys().filter(is_cavity).copied().collect();
+        let plainly = poking_out.iter().copied().filter(|c| told.iter().all(|(other, _)| other != c)).collect();
+        told.sort_by(|a, b| size(&b.0).total_cmp(&size(&a.0)).then(a.0.cmp(&b.0)));
+        let doubts = unsaid::summed_up(told.into_iter().map(|(_, line)| line).collect());
+        Inverted { pieces: Vec::new(), doubts, poking_out, plainly }
+    }
+
+    /// Words on a piece that crosses others and faces inward, if its meaning was to be guessed.
+    fn guess(&self, c: u32) -> Option<String> {
+        let (was_negative, is_turned) = (self.sign(c) < 0, self.inverted[c as usize]);
+        let share = self.by_points.contains_key(&c).then(|| self.share_in_material(&self.points(c)));
+        let meant = match (was_negative, is_turned) {
+            (true, true) if share.is_none_or(|share| share > TOUCHES) => "a body",
+            (true, false) | (false, true) if share.is_none_or(|share| share < PLAINLY) => "a cavity",
+            _ => return None,
+        };
+        let Bounds { lo, hi } = self.list[c as usize].bounds.normalised();
+        let share = share.map_or("an unknown part".into(), |share| format!("{:.0} %", share * 100.0));
+        Some(format!(
+            "surface that faces inward crosses other bodies, and {share} of it lies in their material: it was taken for {meant}, from {lo:?} to {hi:?}"
+        ))
     }
 }
 
-/// For each closed piece that crosses one of opposite sign, and is to be looked at, what winds around points spread over it.
+/// For each closed piece that crosses one of opposite sign, and is to be looked at, what winds around points spread over it; and those that are too many.
 fn around_points(
     survey: &Survey<'_>,
     submesh: &Submesh,
     pieces: &Components,
     reversed: &Reversed,
     crossing: &[[u32; 2]],
-) -> BTreeMap<u32, Vec<Around>> {
+) -> (BTreeMap<u32, Vec<Around>>, Vec<u32>) {
     let list = &pieces.list;
     let sign = |c: u32| if list[c as usize].open { 0 } else { list[c as usize].extent.volume.signum() };
     let opposed = crossing.iter().filter(|[a, b]| sign(*a) * sign(*b) < 0);
@@ -176,14 +184,14 @@ fn around_points(
     asked.dedup();
     let patched = are_patched(survey, submesh, pieces);
     asked.retain(|c| !patched[*c as usize]);
-    asked.truncate(MOST);
+    let unasked = asked.split_off(asked.len().min(MOST));
     let points = spread(survey, submesh, reversed, pieces, &asked);
     let places: Vec<[f64; 3]> = points.iter().map(|(_, place)| *place).collect();
     let mut all: BTreeMap<u32, Vec<Around>> = BTreeMap::new();
     for ((piece, _), around) in points.iter().zip(bodies::surfaces_around(survey, submesh, pieces, reversed, &places)) {
         all.entry(*piece).or_default().push(around);
     }
-    all
+    (all, unasked)
 }
 
 #[cfg(test)]
@@ -226,6 +234,19 @@ mod tests {
     fn of_what_lies_half_in_material_the_larger_part_decides_and_it_is_told() {
         assert_eq!(turned(&[host(), reversed(&bar(12.0))]), (0, 1));
         assert_eq!(turned(&[host(), reversed(&bar(24.0))]), (1, 1));
+    }
+
+    #[test]
+    fn many_guesses_that_are_each_too_small_for_a_word_are_told_together() {
+        // Half in the host's wall, and each less than a thousandth of it.
+        let small = |i: u8| {
+            let (x, y) = (f32::from(i % 6) + 1.0, f32::from(i / 6) + 1.0);
+            reversed(&cuboid([x, y, 7.75], [x + 0.5, y + 0.5, 8.75]))
+        };
+        let with = |count: u8| turned(&[host()].into_iter().chain((0..count).map(small)).collect::<Vec<_>>()).1;
+        assert_eq!(with(1), 0);
+        // Ten are named, the others counted.
+        assert_eq!(with(36), 11);
     }
 
     #[test]

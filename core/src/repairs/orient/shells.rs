@@ -5,6 +5,7 @@
 
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::sums::Bounds;
+use crate::repairs::shared::unsaid;
 use crate::submesh::components::{Component, Components};
 use crate::topology::survey::Survey;
 
@@ -12,7 +13,7 @@ use crate::topology::survey::Survey;
 const NO_WALL: f64 = 1e-3;
 /// ... and hardly one below this share.
 const THIN: f64 = 5e-3;
-/// A body of less than this share of all volume is a speck, of which nothing is told.
+/// Specks of which nothing is told are together no more than this share of all volume.
 const SPECK: f64 = 1e-3;
 
 /// Shells that lie closely in a larger one: with its number, and how thick the wall between both is. `outer`, `inner`: which closed pieces may be so.
@@ -64,21 +65,24 @@ pub(crate) fn thin(survey: &Survey<'_>, pieces: &Components, turned: &[bool]) ->
     };
     let closed = |p: &usize| !pieces.list[*p].open;
     let all: f64 = (0..pieces.list.len()).filter(closed).map(|p| volume(p).abs()).sum();
-    let is_body = |p: &usize| is_turned(*p) && volume(*p) > SPECK * all;
+    let is_body = |p: &usize| is_turned(*p) && volume(*p) > 0.0;
     let bodies: Vec<usize> = (0..pieces.list.len()).filter(closed).filter(is_body).collect();
     let cavities: Vec<usize> = (0..pieces.list.len()).filter(closed).filter(|p| volume(*p) < 0.0).collect();
-    let mut lines = Vec::new();
-    let mut last = None;
+    let mut found: Vec<(usize, f64)> = Vec::new();
     close_in(survey, pieces, (&bodies, &cavities), THIN, |body, _, wall| {
-        if last.replace(body) != Some(body) {
-            let Bounds { lo, hi } = pieces.list[body].bounds.normalised();
-            lines.push(format!(
-                "a body that was inside out has a cavity with a wall of {wall:.2e} around it, which may be a copy of it that is inside out as well: from \
-                 {lo:?} to {hi:?}"
-            ));
+        if found.last().is_none_or(|(last, _)| *last != body) {
+            found.push((body, wall));
         }
     });
-    lines
+    let told = unsaid::told(&found.iter().map(|(body, _)| volume(*body)).collect::<Vec<_>>(), SPECK * all);
+    let line = |(body, wall): (usize, f64)| {
+        let Bounds { lo, hi } = pieces.list[body].bounds.normalised();
+        format!(
+            "a body that was inside out has a cavity with a wall of {wall:.2e} around it, which may be a copy of it that is inside out as well: from \
+             {lo:?} to {hi:?}"
+        )
+    };
+    unsaid::summed_up(found.into_iter().zip(told).filter(|(_, told)| *told).map(|(found, _)| line(found)).collect())
 }
 
 #[cfg(test)]

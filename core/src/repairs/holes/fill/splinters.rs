@@ -10,6 +10,7 @@ use glam::DVec3;
 use crate::contract::report::RepairName;
 use crate::geometry::distance::place;
 use crate::repairs::shared::pieces::crossing;
+use crate::repairs::shared::unsaid;
 use crate::repairs::shared::work::Work;
 use crate::repairs::stitch::layer::Facet;
 use crate::submesh::components::{Component, Components};
@@ -29,7 +30,7 @@ const LEANS: f64 = 0.15;
 const MOST_HOSTS: usize = 64;
 /// A body of less than this share of all volume has others beside it ...
 const BESIDE: f64 = 0.5;
-/// ... and one of less than this share of all area is a speck.
+/// ... and specks of which nothing is told are together no more than this share of all area.
 const SPECK: f64 = 1e-3;
 
 /// What patches are to a body.
@@ -59,7 +60,6 @@ pub(super) fn doubts(survey: &Survey<'_>, work: &mut Work<'_>) -> Vec<String> {
         closed.length > 0.0
             && share(closed.area, body.extent.area) >= WIDE
             && share(body.extent.volume.abs(), all_volume) < BESIDE
-            && share(body.extent.area, all_area) > SPECK
     };
     let sheets: Vec<usize> = (0..closed.len()).filter(|c| is_sheet(&bodies.list[*c], &closed[*c])).collect();
     if sheets.is_empty() {
@@ -73,7 +73,7 @@ pub(super) fn doubts(survey: &Survey<'_>, work: &mut Work<'_>) -> Vec<String> {
         let bounds = &body.bounds;
         !crosses[c] && hosts.iter().any(|host| host.extent.area > body.extent.area && host.bounds.contains(bounds))
     };
-    let line = |c: usize| {
+    let line = |c: usize| -> Option<(usize, String)> {
         let (body, closed) = (&bodies.list[c], &closed[c]);
         let (bounds, leans) = (body.bounds.normalised(), closed.around.dot(closed.normal.normalize_or_zero()) / closed.length);
         let how = match leans {
@@ -82,9 +82,12 @@ pub(super) fn doubts(survey: &Survey<'_>, work: &mut Work<'_>) -> Vec<String> {
             _ => return None,
         };
         let (lo, hi) = (bounds.lo, bounds.hi);
-        Some(format!("a sheet was closed {how} and is a body now: it may have bounded nothing; from {lo:?} to {hi:?}"))
+        Some((c, format!("a sheet was closed {how} and is a body now: it may have bounded nothing; from {lo:?} to {hi:?}")))
     };
-    sheets.into_iter().filter_map(line).collect()
+    let lines: Vec<(usize, String)> = sheets.into_iter().filter_map(line).collect();
+    let areas: Vec<f64> = lines.iter().map(|(c, _)| share(bodies.list[*c].extent.area, all_area)).collect();
+    let told = lines.into_iter().zip(unsaid::told(&areas, SPECK));
+    unsaid::summed_up(told.filter(|(_, told)| *told).map(|((_, line), _)| line).collect())
 }
 
 /// The patches of each body, summed up.

@@ -247,6 +247,12 @@ pub(crate) enum JobsCommand {
         #[arg(value_name = "ID")]
         id: u64,
     },
+    /// Take nothing new, also after a restart, until `resume`; jobs in work are finished
+    Pause,
+    /// Take files again
+    Resume,
+    /// Pause, and wait until no job is in work any more: the machine may be switched off then
+    Drain,
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use suture_core::Profile;
 use crate::cli::WatchArgs;
 use crate::profiles;
 use crate::units::{parse_duration, parse_size, show_size};
+use crate::window::RunWindow;
 
 /// A file as large as this is worked on alone, by all threads and with the whole memory.
 pub(crate) const LARGE: u64 = 64 << 20;
@@ -42,6 +43,8 @@ struct File {
     #[serde(default, deserialize_with = "duration")]
     drain: Option<Duration>,
     time_limit: Option<TimeLimitFile>,
+    run_window: Option<RunWindow>,
+    workers_outside: Option<u16>,
     #[serde(default)]
     profiles: BTreeMap<String, Profile>,
 }
@@ -134,6 +137,9 @@ pub(crate) struct Config {
     /// How long running jobs may go on after the first signal.
     pub drain: Duration,
     pub time_limit: TimeLimit,
+    /// The hours at which all workers work; at others, so many do.
+    pub run_window: RunWindow,
+    pub workers_outside: usize,
     pub profiles: BTreeMap<String, Profile>,
 }
 
@@ -176,6 +182,8 @@ impl Config {
             rescan: None,
             drain: Duration::from_secs(60),
             time_limit: TimeLimit { base: Duration::from_secs(120), per_gib: Duration::from_secs(1200) },
+            run_window: RunWindow::default(),
+            workers_outside: 0,
             profiles: BTreeMap::new(),
         }
     }
@@ -206,6 +214,11 @@ impl Config {
         config.settle = file.settle;
         config.rescan = file.rescan;
         config.drain = file.drain.unwrap_or(config.drain);
+        config.workers_outside = file.workers_outside.map_or(0, usize::from);
+        if config.workers_outside > 0 && file.run_window.is_none() {
+            return Err(fail("`workers_outside` says how many work outside of the hours of `run_window`, which is missing"));
+        }
+        config.run_window = file.run_window.unwrap_or_default();
         if let Some(limit) = file.time_limit {
             config.time_limit.base = limit.base.unwrap_or(config.time_limit.base);
             config.time_limit.per_gib = limit.per_gib.unwrap_or(config.time_limit.per_gib);

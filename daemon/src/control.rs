@@ -17,6 +17,8 @@ use suture_store::{Control, Job, JobId, JobStore, Query, StoreError};
 
 use crate::attempt::Context;
 use crate::fsx::Identity;
+use crate::schedule::{Hold, Standing};
+use crate::standstill;
 
 /// A request is one line of at most this many bytes.
 const LONGEST_WISH: u64 = 4096;
@@ -37,6 +39,12 @@ pub(crate) enum Wish {
     Show(JobId),
     Retry(JobId),
     Cancel(JobId),
+    /// Nothing new is to be taken.
+    Pause,
+    /// It is to be taken again.
+    Resume,
+    /// What keeps the daemon from work?
+    Standing,
 }
 
 /// What comes of it.
@@ -44,16 +52,18 @@ pub(crate) enum Wish {
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Answer {
     Jobs(Vec<Job>),
+    Standing(Standing),
     Failed { line: String, exit_code: u8 },
 }
 
-/// Does what is wished.
+/// Does what is wished of jobs; what is wished of a daemon, one has to do ([`steer`]).
 pub(crate) fn answer(store: &dyn JobStore, wish: &Wish) -> Answer {
     let result = match wish {
         Wish::List => store.list(&Query::default()),
         Wish::Show(id) => store.get(*id).and_then(|job| job.map(|job| vec![job]).ok_or(StoreError::Unknown(*id))),
         Wish::Retry(id) => store.control(*id, Control::Retry).map(|job| vec![job]),
         Wish::Cancel(id) => store.control(*id, Control::Cancel).map(|job| vec![job]),
+        Wish::Pause | Wish::Resume | Wish::Standing => Ok(Vec::new()),
     };
     match result {
         Ok(jobs) => Answer::Jobs(jobs),
@@ -65,6 +75,20 @@ impl Answer {
     pub(crate) fn failed(error: &StoreError) -> Self {
         Self::Failed { line: error.to_string(), exit_code: error.exit_code() }
     }
+}
+
+/// Pauses the daemon or lets it go on, if that is wished, and says how it stands.
+fn steer(context: &Context, wish: &Wish) -> Answer {
+    if let Wish::Pause | Wish::Resume = wish {
+        let paused = *wish == Wish::Pause;
+        if let Err(error) = standstill::set(&context.config.state, paused) {
+            return Answer::Failed { line: format!("the pause cannot be noted: {error}"), exit_code: 75 };
+        }
+        if context.schedule.hold(Hold::Operator, paused.then(|| standstill::WORDS.into())) {
+            tracing::info!(paused, "An operator's wish.");
+        }
+    }
+    Answer::Standing(context.schedule.standing())
 }
 
 fn socket(root: &Path) -> PathBuf {
@@ -184,7 +208,10 @@ fn serve_one(context: &Context, stream: &UnixStream, patience: Duration) -> io::
     BufReader::new(stream.take(LONGEST_WISH)).read_line(&mut line)?;
     let wish: Wish = serde_json::from_str(&line)?;
     let before = if let Wish::Cancel(id) = &wish { context.store.get(*id).ok().flatten() } else { None };
-    let answer = answer(&*context.store, &wish);
+    let answer = match wish {
+        Wish::Pause | Wish::Resume | Wish::Standing => steer(context, &wish),
+        _ => answer(&*context.store, &wish),
+    };
     if let (Some(before), Answer::Jobs(_)) = (&before, &answer) {
         context.sweep(before);
     }

@@ -2,6 +2,7 @@
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use suture_core::Report;
 use suture_store::job::Area;
@@ -13,11 +14,15 @@ use crate::control::{Answer, Wish, answer, ask};
 use crate::exit::Exit;
 use crate::receipt::REPORT;
 use crate::say::{complain, plain};
-use crate::{table, watch, watchdog};
+use crate::schedule::Standing;
+use crate::{standstill, table, watch, watchdog};
 
 /// Does what the command line asks.
 pub(crate) fn run(args: &JobsArgs) -> Exit {
     let wish = match &args.command {
+        JobsCommand::Pause => return paused(&args.dir, true),
+        JobsCommand::Resume => return paused(&args.dir, false),
+        JobsCommand::Drain => return drained(&args.dir),
         JobsCommand::List { .. } => Wish::List,
         JobsCommand::Show { id } => Wish::Show(JobId(*id)),
         JobsCommand::Retry { id } => Wish::Retry(JobId(*id)),
@@ -25,6 +30,7 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
     };
     let mut jobs = match reach(&args.dir, &wish) {
         Ok(Answer::Jobs(jobs)) => jobs,
+        Ok(Answer::Standing(_)) => Vec::new(),
         Ok(Answer::Failed { line, exit_code }) => return fail(&line, exit_code),
         Err((line, exit)) => return fail(&line, exit.code()),
     };
@@ -46,9 +52,71 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
     if jobs.is_empty() && !args.json {
         text = "no jobs\n".into();
     }
+    if let (JobsCommand::List { .. }, false) = (&args.command, args.json) {
+        text.extend(held(&args.dir).iter().map(|why| format!("nothing new is taken: {why}\n")));
+    }
     // A reader that has gone away has seen enough.
     let _ = std::io::stdout().write_all(text.as_bytes());
     Exit::Good
+}
+
+/// Pauses the daemon of a hot folder, or lets it go on; if none runs, the next one.
+fn paused(dir: &Path, paused: bool) -> Exit {
+    let how = if paused { "paused: nothing new is taken" } else { "files are taken again" };
+    match steer(dir, if paused { &Wish::Pause } else { &Wish::Resume }) {
+        Ok(Some(Standing { running, .. })) if paused && running > 0 => say(&format!("{how}; {running} in work will be finished")),
+        Ok(Some(_)) => say(how),
+        Ok(None) => say(&format!("{how}, when a daemon runs again")),
+        Err((line, exit)) => fail(&line, exit.code()),
+    }
+}
+
+/// Pauses, and waits for the jobs in work.
+fn drained(dir: &Path) -> Exit {
+    let mut wish = Wish::Pause;
+    loop {
+        match steer(dir, &wish) {
+            Ok(Some(Standing { running: 1.., .. })) => std::thread::sleep(LOOK_EVERY),
+            Ok(_) => return say("drained: nothing is in work; `suture jobs resume` goes on"),
+            Err((line, exit)) => return fail(&line, exit.code()),
+        }
+        wish = Wish::Standing;
+    }
+}
+
+/// How often a drain looks.
+const LOOK_EVERY: Duration = Duration::from_millis(200);
+
+fn say(line: &str) -> Exit {
+    let _ = writeln!(std::io::stdout(), "{line}");
+    Exit::Good
+}
+
+/// Why a daemon takes nothing new, if one runs and does not, or the next one would not.
+fn held(dir: &Path) -> Vec<String> {
+    match steer(dir, &Wish::Standing) {
+        Ok(Some(standing)) => standing.held,
+        Ok(None) if standstill::is_set(&state_of(dir)) => vec![standstill::WORDS.into()],
+        _ => Vec::new(),
+    }
+}
+
+/// Asks the daemon of a hot folder; without one, notes the wish for the next, and there is no standing.
+fn steer(dir: &Path, wish: &Wish) -> Result<Option<Standing>, (String, Exit)> {
+    match asked(dir, wish)? {
+        Some(Answer::Standing(standing)) => Ok(Some(standing)),
+        Some(Answer::Failed { line, .. }) => Err((line, Exit::TryAgain)),
+        Some(Answer::Jobs(_)) => Err(("the daemon's answer cannot be understood".into(), Exit::TryAgain)),
+        None => {
+            let note = |paused| standstill::set(&state_of(dir), paused);
+            let noted = match wish {
+                Wish::Pause => note(true),
+                Wish::Resume => note(false),
+                _ => Ok(()),
+            };
+            noted.map(|()| None).map_err(|error| (format!("the pause cannot be noted: {error}"), Exit::TryAgain))
+        }
+    }
 }
 
 fn fail(line: &str, code: u8) -> Exit {
@@ -62,21 +130,8 @@ fn fail(line: &str, code: u8) -> Exit {
 
 /// Through the running daemon, or through the store itself.
 pub(crate) fn reach(dir: &Path, wish: &Wish) -> Result<Answer, (String, Exit)> {
-    let refuse = |line: String| (line, Exit::Refused);
-    if !dir.join(".suture").is_dir() {
-        return Err(refuse(format!("{}: is no hot folder (try --dir DIR)", dir.display())));
-    }
-    match ask(dir, wish) {
-        Ok(Some(answer)) => return Ok(answer),
-        Ok(None) => {}
-        Err(error) => {
-            let silent = matches!(error.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut);
-            let line = match silent {
-                true => "the daemon does not answer: it is stopped, or very busy; try again".into(),
-                false => format!("the daemon's answer was cut off or cannot be understood: {error}; try again"),
-            };
-            return Err((line, Exit::TryAgain));
-        }
+    if let Some(answer) = asked(dir, wish)? {
+        return Ok(answer);
     }
     let state = state_of(dir);
     if !state.is_dir() {
@@ -92,8 +147,23 @@ pub(crate) fn reach(dir: &Path, wish: &Wish) -> Result<Answer, (String, Exit)> {
             let unknown = || Answer::failed(&StoreError::Unknown(*id));
             Ok(job.map_or_else(unknown, |job| Answer::Jobs(vec![job])))
         }
-        Wish::Retry(_) | Wish::Cancel(_) => Ok(answer(&SledStore::open(&state).map_err(failed)?, wish)),
+        Wish::Retry(_) | Wish::Cancel(_) | Wish::Pause | Wish::Resume | Wish::Standing => Ok(answer(&SledStore::open(&state).map_err(failed)?, wish)),
     }
+}
+
+/// The running daemon's answer; `None` if none runs.
+fn asked(dir: &Path, wish: &Wish) -> Result<Option<Answer>, (String, Exit)> {
+    if !dir.join(".suture").is_dir() {
+        return Err((format!("{}: is no hot folder (try --dir DIR)", dir.display()), Exit::Refused));
+    }
+    ask(dir, wish).map_err(|error| {
+        let silent = matches!(error.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut);
+        let line = match silent {
+            true => "the daemon does not answer: it is stopped, or very busy; try again".into(),
+            false => format!("the daemon's answer was cut off or cannot be understood: {error}; try again"),
+        };
+        (line, Exit::TryAgain)
+    })
 }
 
 fn state_of(dir: &Path) -> PathBuf {

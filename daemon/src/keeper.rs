@@ -18,6 +18,7 @@ use crate::attempt::{Context, Event};
 use crate::folder::Folder;
 use crate::fsx;
 use crate::scan::Reconciler;
+use crate::schedule::Hold;
 use crate::settle::Rest;
 use crate::signals::Stop;
 
@@ -122,6 +123,7 @@ impl<'a> Keeper<'a> {
             }
             let now = Instant::now();
             self.look_at_disk(now)?;
+            self.look_at_clock();
             for kept in &mut self.folders {
                 kept.turn(self.context, now)?;
             }
@@ -177,7 +179,7 @@ impl<'a> Keeper<'a> {
         if waiting > 0 || self.folders.iter().any(|kept| kept.unavailable) {
             tracing::warn!(
                 jobs = waiting,
-                "Some work is left for the next run: jobs that wait after errors, a full disk, or folders out of reach."
+                "Some work is left for the next run: jobs that wait after errors, a full disk, a pause, the hours of work, or folders out of reach."
             );
             self.context.not_good.store(true, Ordering::Relaxed);
         }
@@ -227,6 +229,16 @@ impl<'a> Keeper<'a> {
         Ok(())
     }
 
+    /// Outside of the hours of work, few slots work, or none.
+    fn look_at_clock(&self) {
+        let config = &self.context.config;
+        let is_open = config.run_window.is_open();
+        if self.context.schedule.limit(if is_open { usize::MAX } else { config.workers_outside }) {
+            let (run_window, workers) = (config.run_window.to_string(), if is_open { config.workers } else { config.workers_outside });
+            tracing::info!(run_window, workers, "The hours of work begin or end; jobs in work are finished.");
+        }
+    }
+
     /// Takes nothing new while the disk is nearly full: a result needs room, and a half-full night is better than a broken one.
     fn look_at_disk(&mut self, now: Instant) -> Result<(), StoreError> {
         if self.disk_looked.is_some_and(|then| now.duration_since(then) < DISK_EVERY) {
@@ -237,7 +249,8 @@ impl<'a> Keeper<'a> {
         self.context.store.check()?;
         let reserve = self.context.config.reserve;
         let full = self.folders.iter().find(|kept| fsx::free_space(&kept.folder.root, reserve) == 0);
-        if self.context.schedule.pause(full.is_some()) != full.is_some() || (first && full.is_some()) {
+        let words = |kept: &Kept| format!("the disk of {} is nearly full", kept.folder.root.display());
+        if self.context.schedule.hold(Hold::Disk, full.map(words)) || (first && full.is_some()) {
             match full {
                 Some(kept) => {
                     let folder = kept.folder.root.display();

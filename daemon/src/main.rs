@@ -35,11 +35,13 @@ mod schedule;
 mod settle;
 mod signals;
 mod single;
+mod standstill;
 mod supervise;
 mod table;
 mod units;
 mod watch;
 mod watchdog;
+mod window;
 mod worker;
 mod writers;
 

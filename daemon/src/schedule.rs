@@ -8,6 +8,7 @@
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use serde::{Deserialize, Serialize};
 use suture_store::Filter;
 
 /// However many small files come, one that runs alone has a turn this often.
@@ -44,6 +45,24 @@ impl Turn {
     }
 }
 
+/// What keeps all slots from work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Hold {
+    /// There is too little room on a disk.
+    Disk,
+    /// An operator wants it so.
+    Operator,
+}
+
+/// What keeps the daemon from work, and how much it does all the same.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Standing {
+    /// Jobs in work.
+    pub running: usize,
+    /// Why nothing new is taken, in words; empty: it is.
+    pub held: Vec<String>,
+}
+
 /// Turns of all slots.
 pub(crate) struct Schedule {
     state: Mutex<State>,
@@ -55,8 +74,10 @@ struct State {
     busy: usize,
     /// One of them wants no company.
     alone: bool,
-    /// Nothing is given out while set (no room on the disk, a folder is gone).
-    paused: bool,
+    /// By [`Hold`]: why nothing is given out, in words.
+    held: [Option<String>; 2],
+    /// So many slots may be at work.
+    most: usize,
     stop: bool,
     /// Raised when there may be something new.
     news: u64,
@@ -88,8 +109,16 @@ pub(crate) struct Given {
 
 impl Schedule {
     pub(crate) fn new() -> Self {
-        let state =
-            State { busy: 0, alone: false, paused: false, stop: false, news: 1, empty: [0; 3], last_alone: Instant::now() };
+        let state = State {
+            busy: 0,
+            alone: false,
+            held: [None, None],
+            most: usize::MAX,
+            stop: false,
+            news: 1,
+            empty: [0; 3],
+            last_alone: Instant::now(),
+        };
         Self { state: Mutex::new(state), wake: Condvar::new() }
     }
 
@@ -140,16 +169,35 @@ impl Schedule {
         self.wake.notify_all();
     }
 
-    /// Gives nothing out while `paused`; returns whether it was so before.
-    pub(crate) fn pause(&self, paused: bool) -> bool {
-        let before = std::mem::replace(&mut self.lock().paused, paused);
+    /// Gives nothing out for this reason, in words, or no longer. Returns whether that is news.
+    pub(crate) fn hold(&self, why: Hold, words: Option<String>) -> bool {
+        let mut state = self.lock();
+        let held = &mut state.held[why as usize];
+        let is_news = held.is_some() != words.is_some();
+        *held = words;
+        drop(state);
         self.wake.notify_all();
-        before
+        is_news
+    }
+
+    /// Lets no more than so many slots work at a time. Returns whether that is news.
+    pub(crate) fn limit(&self, most: usize) -> bool {
+        let before = std::mem::replace(&mut self.lock().most, most);
+        self.wake.notify_all();
+        before != most
     }
 
     /// Is nothing given out for now?
     pub(crate) fn is_paused(&self) -> bool {
-        self.lock().paused
+        let state = self.lock();
+        state.most == 0 || state.held.iter().any(Option::is_some)
+    }
+
+    /// What an operator may want to know.
+    pub(crate) fn standing(&self) -> Standing {
+        let state = self.lock();
+        let hours = (state.most == 0).then(|| "it is outside of the hours of `run_window`".to_owned());
+        Standing { running: state.busy, held: state.held.iter().flatten().cloned().chain(hours).collect() }
     }
 
     /// Gives nothing out any more.
@@ -165,7 +213,7 @@ impl Schedule {
 }
 
 fn choose(state: &State) -> Option<Turn> {
-    if state.paused || state.alone {
+    if state.held.iter().any(Option::is_some) || state.alone || state.busy >= state.most {
         return None;
     }
     let large_waits = state.may_have(Turn::Large);
@@ -222,6 +270,29 @@ mod tests {
         assert_eq!(choose(&s.lock()), Some(Turn::Small), "what came since was not asked for yet");
     }
 
+    #[test]
+    fn nothing_is_given_out_while_one_reason_holds() {
+        let s = Schedule::new();
+        assert!(s.hold(Hold::Disk, Some("full".into())) && s.hold(Hold::Operator, Some("wanted".into())));
+        assert!(!s.hold(Hold::Disk, Some("still full".into())), "no news");
+        assert_eq!(s.standing(), Standing { running: 0, held: vec!["still full".into(), "wanted".into()] });
+        assert!(s.hold(Hold::Disk, None) && s.is_paused() && choose(&s.lock()).is_none());
+        assert!(s.hold(Hold::Operator, None) && !s.is_paused());
+        assert_eq!(s.next().turn, Turn::Small);
+    }
+
+    #[test]
+    fn outside_of_the_hours_fewer_slots_work() {
+        let s = Schedule::new();
+        assert!(s.limit(1) && !s.limit(1) && !s.is_paused());
+        let given = s.next();
+        assert_eq!(choose(&s.lock()), None, "one is at work");
+        s.limit(0);
+        s.done(given, true);
+        assert!(choose(&s.lock()).is_none() && s.is_paused());
+        assert_eq!(s.standing().held.len(), 1);
+    }
+
     /// News that come between a slot's question and its answer are not lost.
     #[test]
     fn an_empty_answer_is_as_old_as_its_question() {
@@ -235,7 +306,7 @@ mod tests {
     #[test]
     fn stopping_ends_every_wait() {
         let s = Schedule::new();
-        s.pause(true);
+        s.hold(Hold::Disk, Some("full".into()));
         std::thread::scope(|scope| {
             let waiting = scope.spawn(|| s.next().turn);
             s.stop();

@@ -25,9 +25,9 @@ use crate::folder::{Folder, FolderError, is_fading};
 use crate::fsx;
 use crate::keeper::Keeper;
 use crate::say::complain;
-use crate::schedule::{Schedule, Turn};
+use crate::schedule::{Hold, Schedule, Turn};
 use crate::signals::Stop;
-use crate::watchdog;
+use crate::{standstill, watchdog};
 
 /// Runs the daemon to its end.
 pub(crate) fn run(args: &WatchArgs) -> Exit {
@@ -174,6 +174,10 @@ impl Daemon {
             not_good: Arc::clone(&self.not_good),
             failed: Mutex::new(None),
         };
+        if standstill::is_set(&self.config.state) {
+            context.schedule.hold(Hold::Operator, Some(standstill::WORDS.into()));
+            tracing::warn!("Nothing new is taken: {}.", standstill::WORDS);
+        }
         if let Err(error) = guarded(|| recover(&context)) {
             return End::Store(error);
         }

@@ -10,6 +10,7 @@ mod e2e {
     mod memory;
     mod same_bytes;
     mod soups;
+    mod steer;
     mod terminal;
     mod watch;
 }

@@ -1,0 +1,117 @@
+//! What an operator and the clock may stop: nothing new is taken then, and `suture jobs list` says why.
+
+use std::process::{Child, Stdio};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use suture_bench::generate::{Case, write};
+use suture_tests::Place;
+
+fn mesh(seed: u64) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    write(Case::Holes, 600, seed, &mut bytes).unwrap();
+    bytes
+}
+
+/// A running daemon, which is killed at the end of its test.
+struct Daemon(Child);
+
+impl Daemon {
+    fn start(place: &Place) -> Self {
+        let mut command = place.command();
+        command.args(["watch", "hot", "--settle", "30ms"]).env("SUTURE_LOG", "off");
+        Self(command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap())
+    }
+}
+
+impl Drop for Daemon {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn wait_until(what: &str, is_so: impl Fn() -> bool) {
+    let began = Instant::now();
+    while !is_so() {
+        assert!(began.elapsed() < Duration::from_secs(60), "{what}");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+fn is_there(place: &Place, name: &str) -> bool {
+    place.at(name).exists()
+}
+
+#[test]
+fn a_pause_holds_over_a_restart_until_an_operator_goes_on() {
+    let place = Place::new();
+    place.put("hot/in/first.stl", &mesh(1));
+    let daemon = Daemon::start(&place);
+    wait_until("the first one", || is_there(&place, "hot/out/first.stl"));
+    let paused = place.suture(["jobs", "pause", "--dir", "hot"]).expect(0);
+    assert!(paused.stdout().starts_with("paused: nothing new is taken"), "{}", paused.stdout());
+    place.put("hot/in/second.stl", &mesh(2));
+    let list = || place.suture(["jobs", "list", "--dir", "hot"]).expect(0).stdout();
+    wait_until("it is seen", || list().contains("second.stl"));
+    drop(daemon);
+    assert!(list().contains("nothing new is taken: an operator has paused it"), "{}", list());
+    let daemon = Daemon::start(&place);
+    // It has had time for much more than this.
+    place.put("hot/in/third.stl", &mesh(3));
+    wait_until("the third is seen", || list().contains("third.stl"));
+    assert!(!is_there(&place, "hot/out/second.stl") && list().contains("nothing new is taken: an operator has paused it"));
+    place.suture(["jobs", "resume", "--dir", "hot"]).expect(0);
+    wait_until("both", || is_there(&place, "hot/out/second.stl") && is_there(&place, "hot/out/third.stl"));
+    assert!(!list().contains("nothing new is taken"), "{}", list());
+    drop(daemon);
+}
+
+#[test]
+fn a_drain_ends_when_nothing_is_in_work() {
+    let place = Place::new();
+    (0..20).for_each(|i| drop(place.put(&format!("hot/in/{i}.stl"), &mesh(i))));
+    let _daemon = Daemon::start(&place);
+    wait_until("work began", || place.at("hot/out").read_dir().is_ok_and(|all| all.count() > 0));
+    let drained = place.suture(["jobs", "drain", "--dir", "hot"]).expect(0);
+    assert!(drained.stdout().starts_with("drained: "), "{}", drained.stdout());
+    let running = place.suture(["jobs", "list", "--state", "running", "--dir", "hot"]).expect(0).stdout();
+    assert!(running.starts_with("no jobs"), "{running}");
+}
+
+#[test]
+fn without_a_daemon_the_next_one_is_paused() {
+    let place = Place::new();
+    place.put("hot/in/part.stl", &mesh(1));
+    place.suture(["jobs", "pause", "--dir", "hot"]).expect(2);
+    place.suture(["watch", "hot", "--once", "--settle", "30ms"]).expect(0);
+    place.suture(["jobs", "pause", "--dir", "hot"]).expect(0);
+    place.put("hot/in/more.stl", &mesh(2));
+    let left = place.suture(["watch", "hot", "--once", "--settle", "30ms"]).expect(1);
+    assert!(left.stderr().contains("an operator has paused it"), "{}", left.stderr());
+    place.suture(["jobs", "resume", "--dir", "hot"]).expect(0);
+    place.suture(["watch", "hot", "--once", "--settle", "30ms"]).expect(0);
+    assert!(is_there(&place, "hot/out/more.stl"));
+}
+
+#[test]
+fn outside_of_the_hours_of_work_files_wait() {
+    let minute = SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_secs() / 60 % (24 * 60);
+    let time = |minute: u64| format!("{:02}:{:02}", minute / 60 % 24, minute % 60);
+    // Three hours from now, and all day but for then.
+    let (closed, open) = (
+        format!("{}-{}", time(minute + 180), time(minute + 240)),
+        format!("{}-{}", time(minute + 240), time(minute + 180)),
+    );
+    let once = |window: &str, more: &str| {
+        let place = Place::new();
+        place.put("hot/in/part.stl", &mesh(1));
+        let text = format!("run_window = \"{window}\"\n{more}\nsettle = \"30ms\"\n[[folders]]\npath = \"hot\"\n");
+        place.put("suture.toml", text.as_bytes());
+        let status = place.command().env("TZ", "UTC").args(["watch", "--once", "--config", "suture.toml"]).status().unwrap();
+        (status.code(), is_there(&place, "hot/out/part.stl"))
+    };
+    assert_eq!(once(&closed, ""), (Some(1), false));
+    assert_eq!(once(&closed, "workers_outside = 1"), (Some(0), true));
+    assert_eq!(once(&open, ""), (Some(0), true));
+    assert_eq!(once("20:00", ""), (Some(2), false), "refused");
+}

@@ -57,6 +57,9 @@ struct FolderFile {
     name: Option<String>,
     /// Profile of files that lie in no sub-folder.
     profile: Option<String>,
+    /// Originals are not moved out of `in/`.
+    #[serde(default)]
+    leave_originals: bool,
 }
 
 #[derive(Debug, Deserialize)]
@@ -99,6 +102,8 @@ pub(crate) struct FolderConfig {
     pub name: String,
     pub path: PathBuf,
     pub profile: String,
+    /// Originals stay in `in/`, which may be read-only.
+    pub leave_originals: bool,
 }
 
 /// How long one attempt may take.
@@ -169,7 +174,7 @@ impl Config {
     /// For one hot folder, everything else by default.
     pub(crate) fn for_folder(dir: &Path) -> Self {
         let limits = suture_core::Limits::default();
-        let folder = FolderConfig { name: name_of(dir), path: dir.to_owned(), profile: "default".into() };
+        let folder = FolderConfig { name: name_of(dir), path: dir.to_owned(), profile: "default".into(), leave_originals: false };
         Self {
             state: default_state(dir),
             folders: vec![folder],
@@ -200,7 +205,8 @@ impl Config {
             if config.folders.iter().any(|other| other.name == name) {
                 return Err(fail(&format!("two folders are called `{name}`; give each a `name` of its own")));
             }
-            config.folders.push(FolderConfig { name, path: folder.path, profile: folder.profile.unwrap_or("default".into()) });
+            let profile = folder.profile.unwrap_or("default".into());
+            config.folders.push(FolderConfig { name, path: folder.path, profile, leave_originals: folder.leave_originals });
         }
         config.state = file.state.unwrap_or(config.state);
         config.workers = file.workers.map_or(config.workers, usize::from);

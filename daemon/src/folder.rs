@@ -32,6 +32,8 @@ pub(crate) struct Folder {
     pub root: PathBuf,
     /// Profile of files that lie in no sub-folder.
     pub profile: String,
+    /// Originals stay in `in/`.
+    pub leave_originals: bool,
     /// What the path stood for at the start.
     id: (u64, u64),
     /// File systems of the parts at the start.
@@ -82,7 +84,8 @@ impl Folder {
         create::replace(&path, pid.as_bytes()).map_err(io(&path, "cannot be written"))?;
         let id = id(&std::fs::metadata(&root).map_err(io(&root, "cannot be looked at"))?);
         let devices = PARTS.map(|part| device(&root.join(part)));
-        Ok(Self { name: config.name.clone(), root, profile: config.profile.clone(), id, devices, lock })
+        let (name, profile, leave_originals) = (config.name.clone(), config.profile.clone(), config.leave_originals);
+        Ok(Self { name, root, profile, leave_originals, id, devices, lock })
     }
 
     /// Is the folder still the one that was opened? A path that leads elsewhere by now (renamed and made anew, a mount that came or went)
@@ -291,7 +294,7 @@ mod tests {
     #[test]
     fn a_folder_has_one_owner() {
         let dir = tempfile::tempdir().unwrap();
-        let config = FolderConfig { name: "a".into(), path: dir.path().into(), profile: "default".into() };
+        let config = FolderConfig { name: "a".into(), path: dir.path().into(), profile: "default".into(), leave_originals: false };
         let first = Folder::open(&config).unwrap();
         assert!(first.inbox().is_dir() && first.out().is_dir());
         match Folder::open(&config) {
@@ -307,7 +310,7 @@ mod tests {
     fn a_folder_is_told_by_its_identity() {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);
-        let config = FolderConfig { name: "a".into(), path: at("hot"), profile: "default".into() };
+        let config = FolderConfig { name: "a".into(), path: at("hot"), profile: "default".into(), leave_originals: false };
         let folder = Folder::open(&config).unwrap();
         folder.check().unwrap();
         std::fs::remove_dir(at("hot/out")).unwrap();
@@ -330,7 +333,7 @@ mod tests {
     #[test]
     fn a_part_that_leads_to_another_is_refused() {
         let dir = tempfile::tempdir().unwrap();
-        let config = FolderConfig { name: "a".into(), path: dir.path().into(), profile: "default".into() };
+        let config = FolderConfig { name: "a".into(), path: dir.path().into(), profile: "default".into(), leave_originals: false };
         for (part, target) in [("out", "in"), ("done", "in"), ("failed", "in/deep")] {
             std::fs::create_dir_all(dir.path().join("in/deep")).unwrap();
             std::os::unix::fs::symlink(target, dir.path().join(part)).unwrap();
@@ -347,7 +350,7 @@ mod tests {
     #[test]
     fn a_folder_within_a_hot_one_is_refused() {
         let dir = tempfile::tempdir().unwrap();
-        let config = |path: PathBuf| FolderConfig { name: "a".into(), path, profile: "default".into() };
+        let config = |path: PathBuf| FolderConfig { name: "a".into(), path, profile: "default".into(), leave_originals: false };
         let _outer = Folder::open(&config(dir.path().into())).unwrap();
         for inner in ["in", "in/sub/deeper", "out"] {
             let opened = Folder::open(&config(dir.path().join(inner)));

@@ -124,6 +124,7 @@ impl<'a> Desk<'a> {
             report_hash: Some(report_hash),
             source_ctime_ns,
             original: Some(names.original),
+            stays: self.folder.leave_originals,
         };
         self.write_receipt(job, &publication, input_hash)?;
         Ok(publication)
@@ -332,7 +333,9 @@ impl<'a> Desk<'a> {
     /// Moves the original to the area of the ending.
     pub(crate) fn move_original(&self, job: &Job) -> Result<Job, PublishError> {
         let State::Published { publication, .. } = &job.state else { return Ok(job.clone()) };
-        let Some(wanted) = &publication.original else { return Ok(self.store.advance(self.claim, Step::Finished)?) };
+        let Some(wanted) = publication.original.as_ref().filter(|_| !publication.stays) else {
+            return Ok(self.store.advance(self.claim, Step::Finished)?);
+        };
         let (from_area, from_path) = job.original();
         let from = self.folder.area(from_area).join(from_path.to_path());
         let area = self.folder.area(publication.ending.area());

@@ -115,6 +115,7 @@ mod tests {
             report_hash: Some(Hash([0xff; 32])),
             source_ctime_ns: Some(i64::MIN),
             original: Some(path.clone()),
+            stays: true,
         };
         let number = u32::MAX;
         let blame =

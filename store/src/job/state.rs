@@ -104,8 +104,11 @@ pub struct Publication {
     /// the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source_ctime_ns: Option<i64>,
-    /// Name of the original in the area of the ending; `None` where originals stay in `in/`.
+    /// Name of the original in the area of the ending; `None` where it could not be moved.
     pub original: Option<RelPath>,
+    /// The original stays where it was dropped: its name only stands for those of report and receipt.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub stays: bool,
 }
 
 /// Longest reason kept, in bytes.
@@ -394,7 +397,9 @@ impl Job {
     /// Where the original is while no claim holds it: area and path in it.
     pub fn original(&self) -> (Area, &RelPath) {
         match (&self.state, &self.moved_to) {
-            (State::Ended { publication: Publication { ending, original: Some(original), .. } }, _) => (ending.area(), original),
+            (State::Ended { publication: Publication { ending, original: Some(original), stays: false, .. } }, _) => {
+                (ending.area(), original)
+            }
             (_, Some((area, path))) => (*area, path),
             (_, None) => (Area::In, &self.source.path),
         }
@@ -404,7 +409,7 @@ impl Job {
     /// back: a new drop), or when the job ended because the file went.
     pub fn answers_for_source(&self) -> bool {
         match &self.state {
-            State::Ended { publication } => publication.original.is_none(),
+            State::Ended { publication } => publication.original.is_none() || publication.stays,
             State::Cancelled { why } => *why == Withdrawal::Operator && self.moved_to.is_none(),
             _ => self.moved_to.is_none(),
         }

@@ -292,7 +292,7 @@ impl Job {
         match &self.state {
             State::Queued { .. } | State::Cancelled { why: Withdrawal::Operator } => {}
             State::Ended { publication } if !publication.ending.is_good() => {
-                if let Some(original) = &publication.original {
+                if let (Some(original), false) = (&publication.original, publication.stays) {
                     self.moved_to = Some((publication.ending.area(), original.clone()));
                 }
             }

@@ -29,6 +29,7 @@ fn publication(ending: Ending, hash: u8) -> Publication {
         report_hash: None,
         source_ctime_ns: None,
         original: Some(path),
+        stays: false,
     }
 }
 

@@ -81,6 +81,7 @@ pub fn result_of(job: &Job, ending: Ending) -> Publication {
         report_hash: Some(Hash([8; 32])),
         source_ctime_ns: None,
         original: Some(job.source.path.clone()),
+        stays: false,
     }
 }
 

@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use suture_store::job::Kind;
+
 use crate::units::{parse_duration, parse_size};
 
 /// A build for crash tests says so, lest it be installed.
@@ -224,13 +226,23 @@ pub(crate) struct JobsArgs {
     pub command: JobsCommand,
 }
 
+/// The word for a job's state, with either dash.
+fn parse_kind(text: &str) -> Result<Kind, String> {
+    let word = text.replace('-', "_");
+    let all = || Kind::ALL.map(Kind::name).join(", ").replace('_', "-");
+    Kind::ALL.into_iter().find(|kind| kind.name() == word).ok_or_else(|| format!("no job is ever `{text}`; states are {}", all()))
+}
+
 #[derive(Debug, Subcommand)]
 pub(crate) enum JobsCommand {
     /// List jobs, the newest last
     List {
-        /// Only jobs in this state, e.g. queued, running, failed
-        #[arg(long, value_name = "STATE")]
-        state: Option<String>,
+        /// Only jobs in this state, e.g. queued, running, failed, needs-review
+        #[arg(long, value_name = "STATE", value_parser = parse_kind)]
+        state: Option<Kind>,
+        /// Only the newest N of them
+        #[arg(long, value_name = "N")]
+        newest: Option<usize>,
     },
     /// Show one job and its report
     Show {
@@ -263,6 +275,13 @@ mod tests {
     #[test]
     fn the_command_line_is_well_formed() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_state_that_is_none_is_refused() {
+        assert!(Cli::try_parse_from(["suture", "jobs", "list", "--state", "needs-review"]).is_ok());
+        let error = Cli::try_parse_from(["suture", "jobs", "list", "--state", "bogus"]).unwrap_err().to_string();
+        assert!(error.contains("no job is ever `bogus`") && error.contains("needs-review"), "{error}");
     }
 
     #[test]

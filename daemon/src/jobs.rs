@@ -4,9 +4,11 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use jiff::Timestamp;
+use jiff::tz::TimeZone;
 use suture_core::Report;
-use suture_store::job::Area;
-use suture_store::{Job, JobId, SledStore, State, StoreError};
+use suture_store::job::{Area, Kind};
+use suture_store::{Job, JobId, SledStore, State, StoreError, Time};
 
 use crate::cli::{JobsArgs, JobsCommand};
 use crate::config::default_state;
@@ -34,8 +36,10 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
         Ok(Answer::Failed { line, exit_code }) => return fail(&line, exit_code),
         Err((line, exit)) => return fail(&line, exit.code()),
     };
-    if let JobsCommand::List { state: Some(state) } = &args.command {
-        jobs.retain(|job| job.kind().name() == state.replace('-', "_"));
+    let summary = summary(&jobs);
+    if let JobsCommand::List { state, newest } = &args.command {
+        jobs.retain(|job| state.is_none_or(|state| job.kind() == state));
+        jobs.drain(..jobs.len().saturating_sub(newest.unwrap_or(usize::MAX)));
     }
     let mut text = String::new();
     for job in &jobs {
@@ -51,6 +55,8 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
     }
     if jobs.is_empty() && !args.json {
         text = "no jobs\n".into();
+    } else if let (JobsCommand::List { .. }, false) = (&args.command, args.json) {
+        text += &format!("{summary}\n");
     }
     if let (JobsCommand::List { .. }, false) = (&args.command, args.json) {
         text.extend(held(&args.dir).iter().map(|why| format!("nothing new is taken: {why}\n")));
@@ -218,20 +224,35 @@ fn area(area: Area) -> &'static str {
 }
 
 fn line(job: &Job) -> String {
-    let source = job.source.path.to_string();
-    format!("{:>6}  {:<12} {:<32} {}\n", job.id.0, job.kind().name(), source, note(job)).trim_end().to_owned() + "\n"
+    let (id, kind, since) = (job.id.0, job.kind().name(), when(job.changed));
+    format!("{id:>6}  {since}  {kind:<12} {:<32} {}", job.source.path.to_string(), note(job)).trim_end().to_owned() + "\n"
+}
+
+/// Day and time where the machine is.
+fn when(time: Time) -> String {
+    let zoned = |at: Timestamp| at.to_zoned(TimeZone::system()).strftime("%Y-%m-%d %H:%M:%S").to_string();
+    i64::try_from(time.0).ok().and_then(|ms| Timestamp::from_millisecond(ms).ok()).map_or_else(|| "?".into(), zoned)
+}
+
+/// How many jobs are in which state.
+fn summary(jobs: &[Job]) -> String {
+    let count = |kind: Kind| jobs.iter().filter(|job| job.kind() == kind).count();
+    let counts = Kind::ALL.into_iter().map(|kind| (kind, count(kind))).filter(|(_, count)| *count > 0);
+    counts.map(|(kind, count)| format!("{count} {}", kind.name())).collect::<Vec<_>>().join(", ")
 }
 
 fn show(dir: &Path, job: &Job) -> String {
     let (place, path) = job.original();
     let mut text = format!(
-        "job {}: {} in {}\n  file      {}/{path}\n  profile   {}\n  attempts  {}\n",
+        "job {}: {} in {}\n  file      {}/{path}\n  profile   {}\n  attempts  {}\n  came      {}\n  changed   {}\n",
         job.id,
         job.kind(),
         job.source.folder,
         area(place),
         job.source.profile,
-        job.attempts
+        job.attempts,
+        when(job.submitted),
+        when(job.changed)
     );
     let note = note(job);
     if !note.is_empty() {

@@ -201,6 +201,23 @@ mod tests {
     }
 
     #[test]
+    fn many_bodies_that_are_each_a_speck_are_told_of() {
+        // Each closed by a patch, so that nobody knows if it is to go, and a five-thousandth of the host.
+        let open = |i: u8| shifted(&nested(0.25), [f32::from(i % 4) - 2.0, f32::from(i / 4) - 2.0, 0.0])[1..].to_vec();
+        let is_told = |count: u8| {
+            let all: Vec<Corners> = std::iter::once(nested(4.0)).chain((0..count).map(open)).flatten().collect();
+            let got = after(&all, |d, turned| {
+                let work = &mut Work::new(&mut d.submesh);
+                fill::fill_loops(&d.survey, work, turned, &d.tolerance, (&Profile::default(), None), 1);
+                let pieces = pieces::pieces(&d.survey, work, turned);
+                remove(&d.survey, work, turned, &pieces, &Profile::default()).left.is_some()
+            });
+            got.result
+        };
+        assert_eq!([1, 16].map(is_told), [false, true]);
+    }
+
+    #[test]
     fn a_body_that_sticks_out_is_not_enclosed() {
         let needle = cuboid([-0.1, -0.1, -1.0], [0.1, 0.1, 5.0]);
         assert_eq!(removed(&[nested(4.0), needle].concat(), Bodies::Union).result.0, 0);

@@ -117,6 +117,7 @@ fn known_jobs(dir: &Path) -> Result<Vec<Job>, String> {
     }
     match jobs::reach(dir, &Wish::List) {
         Ok(Answer::Jobs(jobs)) => Ok(jobs),
+        Ok(Answer::Standing(_)) => Ok(Vec::new()),
         Ok(Answer::Failed { line, .. }) | Err((line, _)) => Err(line),
     }
 }

@@ -294,7 +294,8 @@ mod tests {
     #[test]
     fn a_folder_has_one_owner() {
         let dir = tempfile::tempdir().unwrap();
-        let config = FolderConfig { name: "a".into(), path: dir.path().into(), profile: "default".into(), leave_originals: false };
+        let config =
+            FolderConfig { name: "a".into(), path: dir.path().into(), profile: "default".into(), leave_originals: false };
         let first = Folder::open(&config).unwrap();
         assert!(first.inbox().is_dir() && first.out().is_dir());
         match Folder::open(&config) {
@@ -333,7 +334,8 @@ mod tests {
     #[test]
     fn a_part_that_leads_to_another_is_refused() {
         let dir = tempfile::tempdir().unwrap();
-        let config = FolderConfig { name: "a".into(), path: dir.path().into(), profile: "default".into(), leave_originals: false };
+        let config =
+            FolderConfig { name: "a".into(), path: dir.path().into(), profile: "default".into(), leave_originals: false };
         for (part, target) in [("out", "in"), ("done", "in"), ("failed", "in/deep")] {
             std::fs::create_dir_all(dir.path().join("in/deep")).unwrap();
             std::os::unix::fs::symlink(target, dir.path().join(part)).unwrap();

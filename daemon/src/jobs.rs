@@ -153,7 +153,9 @@ pub(crate) fn reach(dir: &Path, wish: &Wish) -> Result<Answer, (String, Exit)> {
             let unknown = || Answer::failed(&StoreError::Unknown(*id));
             Ok(job.map_or_else(unknown, |job| Answer::Jobs(vec![job])))
         }
-        Wish::Retry(_) | Wish::Cancel(_) | Wish::Pause | Wish::Resume | Wish::Standing => Ok(answer(&SledStore::open(&state).map_err(failed)?, wish)),
+        Wish::Retry(_) | Wish::Cancel(_) | Wish::Pause | Wish::Resume | Wish::Standing => {
+            Ok(answer(&SledStore::open(&state).map_err(failed)?, wish))
+        }
     }
 }
 

@@ -234,7 +234,8 @@ impl<'a> Keeper<'a> {
         let config = &self.context.config;
         let is_open = config.run_window.is_open();
         if self.context.schedule.limit(if is_open { usize::MAX } else { config.workers_outside }) {
-            let (run_window, workers) = (config.run_window.to_string(), if is_open { config.workers } else { config.workers_outside });
+            let (run_window, workers) =
+                (config.run_window.to_string(), if is_open { config.workers } else { config.workers_outside });
             tracing::info!(run_window, workers, "The hours of work begin or end; jobs in work are finished.");
         }
     }

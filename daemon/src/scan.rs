@@ -287,7 +287,13 @@ mod tests {
 
     fn reconciler(root: &Path) -> Reconciler {
         let config = Config::for_folder(root);
-        let folder = Folder::open(&FolderConfig { name: "hot".into(), path: root.into(), profile: "default".into(), leave_originals: false }).unwrap();
+        let folder = Folder::open(&FolderConfig {
+            name: "hot".into(),
+            path: root.into(),
+            profile: "default".into(),
+            leave_originals: false,
+        })
+        .unwrap();
         Reconciler::new(Arc::new(folder), Arc::new(config), Rest { settle: Duration::from_secs(1) })
     }
 

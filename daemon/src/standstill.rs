@@ -23,7 +23,11 @@ pub(crate) fn is_set(state: &Path) -> bool {
 /// As the file system's.
 pub(crate) fn set(state: &Path, paused: bool) -> io::Result<()> {
     let mark = mark(state);
-    if paused { create::mark(&mark)? } else { fsx::remove_if_there(&mark)? }
+    if paused {
+        create::mark(&mark)?
+    } else {
+        fsx::remove_if_there(&mark)?
+    }
     fsx::sync_dir(fsx::folder_of(&mark))
 }
 

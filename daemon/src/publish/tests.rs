@@ -27,7 +27,8 @@ impl Scene {
 
     pub(crate) fn dropped() -> Self {
         let dir = tempfile::tempdir().unwrap();
-        let config = FolderConfig { name: "hot".into(), path: dir.path().into(), profile: "default".into(), leave_originals: false };
+        let config =
+            FolderConfig { name: "hot".into(), path: dir.path().into(), profile: "default".into(), leave_originals: false };
         let folder = Folder::open(&config).unwrap();
         let path = folder.inbox().join("part.stl");
         create::write_new(&path, ORIGINAL).unwrap();

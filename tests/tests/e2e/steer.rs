@@ -57,7 +57,7 @@ fn a_pause_holds_over_a_restart_until_an_operator_goes_on() {
     assert!(list().contains("nothing new is taken: an operator has paused it"), "{}", list());
     let daemon = Daemon::start(&place);
     // It has had time for much more than this.
-    place.put("hot/in/third.stl", &mesh(3));
+    place.put("hot/in/third.stl", &mesh(1));
     wait_until("the third is seen", || list().contains("third.stl"));
     assert!(!is_there(&place, "hot/out/second.stl") && list().contains("nothing new is taken: an operator has paused it"));
     place.suture(["jobs", "resume", "--dir", "hot"]).expect(0);
@@ -125,10 +125,8 @@ fn outside_of_the_hours_of_work_files_wait() {
     let minute = SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_secs() / 60 % (24 * 60);
     let time = |minute: u64| format!("{:02}:{:02}", minute / 60 % 24, minute % 60);
     // Three hours from now, and all day but for then.
-    let (closed, open) = (
-        format!("{}-{}", time(minute + 180), time(minute + 240)),
-        format!("{}-{}", time(minute + 240), time(minute + 180)),
-    );
+    let (closed, open) =
+        (format!("{}-{}", time(minute + 180), time(minute + 240)), format!("{}-{}", time(minute + 240), time(minute + 180)));
     let once = |window: &str, more: &str| {
         let place = Place::new();
         place.put("hot/in/part.stl", &mesh(1));

@@ -30,8 +30,6 @@ const PID: &str = "owner.pid";
 pub(crate) struct Folder {
     pub name: String,
     pub root: PathBuf,
-    /// Profile of files that lie in no sub-folder.
-    pub profile: String,
     /// What the path stood for at the start.
     id: (u64, u64),
     /// File systems of the parts at the start.
@@ -82,7 +80,7 @@ impl Folder {
         create::replace(&path, pid.as_bytes()).map_err(io(&path, "cannot be written"))?;
         let id = id(&std::fs::metadata(&root).map_err(io(&root, "cannot be looked at"))?);
         let devices = PARTS.map(|part| device(&root.join(part)));
-        Ok(Self { name: config.name.clone(), root, profile: config.profile.clone(), id, devices, lock })
+        Ok(Self { name: config.name.clone(), root, id, devices, lock })
     }
 
     /// Is the folder still the one that was opened? A path that leads elsewhere by now (renamed and made anew, a mount that came or went)

@@ -49,11 +49,12 @@ fn inspect_only_in_a_hot_folder_sorts() {
     assert!(place.names("hot/in").is_empty());
 }
 
-/// Each sub-folder of that name has its profile.
+/// Each sub-folder of that name has its profile. Without shaping, only holes that are small against their surface need no look.
 #[test]
 fn fast_and_strict_in_a_hot_folder() {
     let place = Place::new();
-    let holes = mesh(Case::Holes, 1);
+    let (holes, _) = place.generate(Case::Holes, 20_000, 1);
+    let holes = std::fs::read(holes).unwrap();
     for name in ["fast", "strict"] {
         place.put(&format!("hot/in/{name}/holes.stl"), &holes);
     }

@@ -65,7 +65,8 @@ pub fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress: &dyn 
 /// Repairs the file `input` into `output`, which must not exist: the caller owns a temporary name and publishes it. (Or it is an empty file
 /// without a name, which the caller holds open and knows by its path below `/proc`; then [`Limits::spool`] says where there is room.)
 /// The output is synced to disk before this returns, unless [`Limits::defer_sync`] says otherwise. A file that is good as it comes is
-/// copied byte for byte.
+/// copied byte for byte. Where the report has no [`Report::output`], nothing is to be published: no triangle was left, or the file is not good and
+/// the profile repairs nothing ([`Profile::repair`]; then nothing was written).
 ///
 /// # Errors
 /// [`Error`]; what then stands at `output` is incomplete and to be removed.

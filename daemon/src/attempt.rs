@@ -25,6 +25,7 @@ use crate::protocol::Request;
 use crate::publish::{Conclusion, Desk, OUTPUT, discard};
 use crate::publish_error::PublishError;
 use crate::schedule::{Schedule, Turn};
+use crate::settings::Settings;
 use crate::supervise::{Cause, Death, Ended, Worker};
 
 /// Left by a worker that outlived the daemon: the file it worked on did not kill it.
@@ -48,7 +49,7 @@ pub(crate) enum Event {
 pub(crate) struct Context {
     pub store: Arc<dyn JobStore>,
     pub folders: Vec<Arc<Folder>>,
-    pub config: Arc<Config>,
+    pub settings: Arc<Settings>,
     pub schedule: Schedule,
     pub events: Sender<Event>,
     pub once: bool,
@@ -96,6 +97,8 @@ impl Context {
 pub(crate) struct Slot<'a> {
     context: &'a Context,
     worker: Option<Worker>,
+    /// Bytes that the worker may hold.
+    memory: u64,
     served: u32,
     /// A file of the result in work is in its place.
     committed: Cell<bool>,
@@ -103,7 +106,7 @@ pub(crate) struct Slot<'a> {
 
 impl<'a> Slot<'a> {
     pub(crate) fn new(context: &'a Context) -> Self {
-        Self { context, worker: None, served: 0, committed: Cell::new(false) }
+        Self { context, worker: None, memory: 0, served: 0, committed: Cell::new(false) }
     }
 
     /// Works until the schedule says stop.
@@ -117,7 +120,7 @@ impl<'a> Slot<'a> {
                 // Its memory belongs to the large file now.
                 self.worker = None;
             }
-            let claim = self.context.store.claim(&given.turn.filter(self.context.config.large));
+            let claim = self.context.store.claim(&given.turn.filter(self.context.settings.now().large));
             let found = match claim {
                 Ok(Some(claim)) => {
                     crash_point("daemon.claimed");
@@ -249,12 +252,14 @@ impl<'a> Slot<'a> {
 
     fn work(&mut self, folder: &Folder, claim: &Claim, job: &Job, claimed: &Claimed, turn: Turn) -> Worked {
         let context = self.context;
+        // This attempt's to its end, whatever is read meanwhile.
+        let config = context.settings.now();
         // A setting that a person has to mend, or a machine that has no process to give, is no try of the file's.
-        let profile = match find_profile(&context.config, folder, job) {
+        let profile = match find_profile(&config, folder, job) {
             Ok(profile) => profile,
             Err(reason) => return Worked::Step(Step::Wait { reason }),
         };
-        let limits = limits(&context.config, turn);
+        let limits = limits(&config, turn);
         let mut worker = match self.worker(&limits, turn, job) {
             Ok(worker) => worker,
             Err(error) => return Worked::Step(Step::Wait { reason: format!("a worker process cannot be started: {error}") }),
@@ -270,7 +275,7 @@ impl<'a> Slot<'a> {
             }
             lease.get() != Lease::Held || context.halted()
         };
-        let limit = context.config.time_limit.of(job.source.size);
+        let limit = config.time_limit.of(job.source.size);
         tracing::debug!(worker = worker.pid(), attempt = job.attempts.0, "Work begins.");
         let ended = worker.run(&request, Some(limit), &stop, &mut |_, _, _| {});
         crash_point("daemon.worked");
@@ -310,14 +315,15 @@ impl<'a> Slot<'a> {
 
     /// A worker for this job: the slot's own while it is in good shape, or a new one.
     fn worker(&mut self, limits: &Limits, turn: Turn, job: &Job) -> std::io::Result<Worker> {
-        let fresh = turn.is_alone() || job.blame.charges > 0 || self.served >= FILES_PER_WORKER;
+        let other = self.memory != limits.memory_bytes;
+        let fresh = turn.is_alone() || other || job.blame.charges > 0 || self.served >= FILES_PER_WORKER;
         if let Some(mut worker) = self.worker.take().filter(|_| !fresh)
             && worker.is_alive()
         {
             self.served += 1;
             return Ok(worker);
         }
-        self.served = 1;
+        (self.served, self.memory) = (1, limits.memory_bytes);
         Worker::spawn(limits.memory_bytes, limits.threads, !turn.is_alone())
     }
 }

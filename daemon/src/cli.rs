@@ -36,6 +36,8 @@ pub(crate) enum Command {
     /// Serve a hot folder: repair whatever is dropped into DIR/in
     #[command(long_about = WATCH_HELP)]
     Watch(WatchArgs),
+    /// Check a configuration file, or show all settings with their values
+    Config(ConfigArgs),
     /// List, show, retry or cancel the jobs of a hot folder, with or without a running daemon
     Jobs(JobsArgs),
     /// Make a hot folder of small broken meshes, repair them, and show what happened
@@ -49,7 +51,8 @@ const WATCH_HELP: &str = "\
 Serve a hot folder: repair whatever is dropped into DIR/in.
 
 Needs no configuration. These folders are made under DIR:
-  in/          drop files here; a sub-folder's name chooses the profile (default, scan, cautious, or one of your own)
+  in/          drop files here; a sub-folder's name chooses the profile: default, fast, strict,
+               cautious, scan, inspect-only, or one of your own
   out/         results, and only printable ones; a clean file appears here too
   done/        originals of what is in out/
   failed/      originals of what could not be made good, each with its report and the best attempt
@@ -57,7 +60,21 @@ Needs no configuration. These folders are made under DIR:
   .suture/     work in progress and the job store; leave it alone
 
 Nothing is ever overwritten: a second part.stl becomes part~2.stl. Ctrl-C or SIGTERM stops taking files and finishes those in
-work; a second one stops at once, and the files are taken up again at the next start.";
+work; a second one stops at once, and the files are taken up again at the next start. SIGHUP makes a daemon with --config read its file
+anew; a file with a mistake in it changes nothing.";
+
+/// What each profile is for.
+const PROFILE_HELP: &str = "\
+Profile: a name, or a TOML file of settings [default: default]
+
+default       repairs what can be repaired
+fast          leaves out what takes time and no valid surface needs: the search for
+              self-intersections (the verdict calls them unchecked), the shaping of patches
+strict        small mending only; what changes more, or cannot be proved, is a person's
+cautious      welds and drops what is surplus, closes, cuts and wraps nothing
+scan          larger holes and wider gaps, for scanned surfaces
+inspect-only  repairs nothing: a good file is passed on as it is, of any other nothing
+              is written";
 
 /// What the machine may spend; never changes a result.
 #[derive(Args, Debug, Clone)]
@@ -132,13 +149,13 @@ pub(crate) struct RepairArgs {
     /// Write the full report as JSON to this file (for several inputs: into this folder)
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
-    /// Profile: default, scan, cautious, or a TOML file of settings
-    #[arg(long, value_name = "NAME|FILE", default_value = "default")]
+    /// Profile: default, fast, strict, cautious, scan, inspect-only, or a TOML file of settings
+    #[arg(long, value_name = "NAME|FILE", default_value = "default", long_help = PROFILE_HELP, hide_default_value = true)]
     pub profile: String,
     /// Do not look for self-intersections: faster, but the verdict then calls them unchecked
     #[arg(long)]
     pub no_self_intersections: bool,
-    /// What to do with geometry that no repair can turn into a solid [default: the profile's: wrap; strict in cautious]
+    /// What to do with geometry that no repair can turn into a solid [default: the profile's: wrap; strict in strict and cautious]
     #[arg(long, value_enum)]
     pub guarantee: Option<Guarantee>,
     #[command(flatten)]
@@ -159,8 +176,8 @@ pub(crate) struct InspectArgs {
     /// Mesh files (binary or ASCII STL)
     #[arg(required = true, value_name = "IN")]
     pub inputs: Vec<PathBuf>,
-    /// Profile: default, scan, cautious, or a TOML file of settings
-    #[arg(long, value_name = "NAME|FILE", default_value = "default")]
+    /// Profile: default, fast, strict, cautious, scan, inspect-only, or a TOML file of settings
+    #[arg(long, value_name = "NAME|FILE", default_value = "default", long_help = PROFILE_HELP, hide_default_value = true)]
     pub profile: String,
     /// Do not look for self-intersections: faster, but the verdict then calls them unchecked
     #[arg(long)]
@@ -178,7 +195,7 @@ pub(crate) struct InspectArgs {
     pub json: bool,
 }
 
-#[derive(Args, Debug)]
+#[derive(Args, Debug, Clone)]
 pub(crate) struct WatchArgs {
     /// Hot folder to serve; made when missing
     #[arg(value_name = "DIR", required_unless_present = "config", conflicts_with = "config")]
@@ -212,6 +229,26 @@ pub(crate) struct WorkerArgs {
     /// Bytes of memory that the worker may have of the system
     #[arg(long)]
     pub data: u64,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct ConfigArgs {
+    #[command(subcommand)]
+    pub command: ConfigCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum ConfigCommand {
+    /// Say whether `suture watch --config FILE` would take it, or which line is wrong
+    Check {
+        #[arg(value_name = "FILE")]
+        file: PathBuf,
+    },
+    /// Print every setting with its value, as a file; without FILE, those of a folder `prints` by default
+    Print {
+        #[arg(value_name = "FILE")]
+        file: Option<PathBuf>,
+    },
 }
 
 #[derive(Args, Debug)]
@@ -275,6 +312,27 @@ mod tests {
     #[test]
     fn the_command_line_is_well_formed() {
         Cli::command().debug_assert();
+    }
+
+    /// Whoever adds a profile tells of it wherever the others are told of.
+    #[test]
+    fn every_profile_is_told_of() {
+        let readme = include_str!("../../README.md");
+        for name in suture_core::Profile::BUILT_IN {
+            let starts = |text: &str, with: &str| text.lines().any(|line| line.starts_with(with));
+            assert!(starts(PROFILE_HELP, &format!("{name} ")), "{name}");
+            assert!(starts(readme, &format!("| `{name}` |")), "{name}");
+            let command = Cli::command();
+            let profile = |command: &clap::Command| {
+                let argument = command.get_arguments().find(|argument| argument.get_id() == "profile");
+                argument.and_then(|argument| argument.get_help()).map(ToString::to_string)
+            };
+            for short in ["repair", "inspect"].map(|name| command.find_subcommand(name).and_then(profile)) {
+                assert!(short.is_some_and(|help| help.contains(&format!(" {name},"))), "{name}");
+            }
+            let watch = command.find_subcommand("watch").and_then(clap::Command::get_long_about).map(ToString::to_string);
+            assert!(watch.is_some_and(|text| text.contains(&format!(" {name},"))), "{name}");
+        }
     }
 
     #[test]

@@ -81,7 +81,7 @@ impl Answer {
 fn steer(context: &Context, wish: &Wish) -> Answer {
     if let Wish::Pause | Wish::Resume = wish {
         let paused = *wish == Wish::Pause;
-        if let Err(error) = standstill::set(&context.config.state, paused) {
+        if let Err(error) = standstill::set(&context.settings.now().state, paused) {
             return Answer::Failed { line: format!("the pause cannot be noted: {error}"), exit_code: 75 };
         }
         if context.schedule.hold(Hold::Operator, paused.then(|| standstill::WORDS.into())) {

@@ -12,6 +12,7 @@ use crate::config::Config;
 use crate::control::{Answer, Wish};
 use crate::exit::Exit;
 use crate::say::complain;
+use crate::settings::Settings;
 use crate::signals::Stop;
 use crate::{create, fsx, jobs, table, watch};
 
@@ -41,7 +42,7 @@ fn demo() -> Result<Exit, String> {
     let mut config = Config::for_folder(&dir);
     // Nobody writes slowly here.
     config.settle = Some(Duration::from_millis(100));
-    let exit = watch::serve(config, true, &stop, false);
+    let exit = watch::serve(Settings::fixed(config), true, &stop, false);
     if !matches!(exit, Exit::Good | Exit::NotGood) {
         return Ok(exit);
     }

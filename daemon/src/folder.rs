@@ -30,8 +30,6 @@ const PID: &str = "owner.pid";
 pub(crate) struct Folder {
     pub name: String,
     pub root: PathBuf,
-    /// Profile of files that lie in no sub-folder.
-    pub profile: String,
     /// Originals stay in `in/`.
     pub leave_originals: bool,
     /// What the path stood for at the start.
@@ -84,8 +82,8 @@ impl Folder {
         create::replace(&path, pid.as_bytes()).map_err(io(&path, "cannot be written"))?;
         let id = id(&std::fs::metadata(&root).map_err(io(&root, "cannot be looked at"))?);
         let devices = PARTS.map(|part| device(&root.join(part)));
-        let (name, profile, leave_originals) = (config.name.clone(), config.profile.clone(), config.leave_originals);
-        Ok(Self { name, root, profile, leave_originals, id, devices, lock })
+        let (name, leave_originals) = (config.name.clone(), config.leave_originals);
+        Ok(Self { name, root, leave_originals, id, devices, lock })
     }
 
     /// Is the folder still the one that was opened? A path that leads elsewhere by now (renamed and made anew, a mount that came or went)

@@ -19,6 +19,7 @@ use crate::folder::Folder;
 use crate::fsx;
 use crate::scan::Reconciler;
 use crate::schedule::Hold;
+use crate::settings::Reload;
 use crate::settle::Rest;
 use crate::signals::Stop;
 
@@ -53,7 +54,8 @@ type Watching = ManuallyDrop<notify::RecommendedWatcher>;
 struct Kept {
     folder: Arc<Folder>,
     reconciler: Reconciler,
-    rest: Rest,
+    /// The system does not tell of changes.
+    polled: bool,
     rescan: Duration,
     scanned: Option<Instant>,
     looked: Instant,
@@ -82,14 +84,12 @@ impl<'a> Keeper<'a> {
                     }
                 }
             }
-            let default = Rest::by_default(polled, context.once);
-            let rest = context.config.settle.map_or(default, |settle| Rest { settle });
-            let rescan = context.config.rescan.unwrap_or(if polled { RESCAN_POLLED } else { RESCAN });
+            let (rest, rescan) = pace(context, polled);
             tracing::info!(folder = %folder.root.display(), polled, "Serving a hot folder.");
             folders.push(Kept {
                 folder: Arc::clone(folder),
-                reconciler: Reconciler::new(Arc::clone(folder), Arc::clone(&context.config), rest),
-                rest,
+                reconciler: Reconciler::new(Arc::clone(folder), Arc::clone(&context.settings), rest),
+                polled,
                 rescan,
                 scanned: None,
                 looked: Instant::now(),
@@ -121,6 +121,9 @@ impl<'a> Keeper<'a> {
             if self.context.failed.lock().is_ok_and(|failed| failed.is_some()) {
                 return Ok(());
             }
+            if let Some(reload) = self.context.settings.renew() {
+                self.go_by(reload)?;
+            }
             let now = Instant::now();
             self.look_at_disk(now)?;
             self.look_at_clock();
@@ -137,7 +140,7 @@ impl<'a> Keeper<'a> {
     /// Waits for the next thing to do, and takes in what was heard.
     fn listen(&mut self) {
         let settling = self.folders.iter().filter(|kept| kept.reconciler.is_settling());
-        let looks = settling.map(|kept| kept.rest.look_every());
+        let looks = settling.map(|kept| kept.reconciler.rest.look_every());
         let scan = self.folders.iter().filter(|kept| kept.dirty).map(Kept::scan_at_most_every);
         let idle = if self.context.once { IDLE_ONCE } else { IDLE };
         let wait = looks.chain(scan).min().unwrap_or(idle).min(idle);
@@ -206,7 +209,28 @@ impl<'a> Keeper<'a> {
         Ok(())
     }
 
-    /// With `--once`, what waits is tried now: whoever starts a run may have put right what it waits for, and no other run may follow.
+    /// The configuration was read anew: what of it the keeper works by, and what may go on now. Says what came of it, in one line.
+    fn go_by(&mut self, reload: Reload) -> Result<(), StoreError> {
+        match reload {
+            Reload::NoFile => tracing::warn!("SIGHUP changes nothing: this daemon was started without a configuration file."),
+            Reload::Refused(reason) => {
+                tracing::error!(reason, "The configuration was read anew and not taken over; the one before stays in force.");
+            }
+            Reload::Done(changes) => {
+                for kept in &mut self.folders {
+                    (kept.reconciler.rest, kept.rescan) = pace(self.context, kept.polled);
+                }
+                self.disk_looked = None;
+                // Whoever mended a setting need not wait for the next try.
+                self.hasten_waiting()?;
+                let changes = if changes.is_empty() { "none".into() } else { changes.join(", ") };
+                tracing::info!(changes, "The configuration was read anew and is in force.");
+            }
+        }
+        Ok(())
+    }
+
+    /// What waits is tried now: with `--once`, whoever starts a run may have put right what it waits for, and no other run may follow.
     fn hasten_waiting(&self) -> Result<(), StoreError> {
         for job in self.context.store.list(&Query { kinds: vec![Kind::Waiting], ..Query::default() })? {
             control(self.context, job.id, Control::Hasten)?;
@@ -231,7 +255,7 @@ impl<'a> Keeper<'a> {
 
     /// Outside of the hours of work, few slots work, or none.
     fn look_at_clock(&self) {
-        let config = &self.context.config;
+        let config = self.context.settings.now();
         let is_open = config.run_window.is_open();
         if self.context.schedule.limit(if is_open { usize::MAX } else { config.workers_outside }) {
             let (run_window, workers) =
@@ -248,7 +272,7 @@ impl<'a> Keeper<'a> {
         let first = self.disk_looked.is_none();
         self.disk_looked = Some(now);
         self.context.store.check()?;
-        let reserve = self.context.config.reserve;
+        let reserve = self.context.settings.now().reserve;
         let full = self.folders.iter().find(|kept| fsx::free_space(&kept.folder.root, reserve) == 0);
         let words = |kept: &Kept| format!("the disk of {} is nearly full", kept.folder.root.display());
         if self.context.schedule.hold(Hold::Disk, full.map(words)) || (first && full.is_some()) {
@@ -306,13 +330,13 @@ impl Kept {
             if !self.renamed.is_empty() {
                 // Known now, so that it can count; and to be looked at at once.
                 self.reconciler.came_whole(&std::mem::take(&mut self.renamed));
-                self.looked = now.checked_sub(self.rest.look_every()).unwrap_or(self.looked);
+                self.looked = now.checked_sub(self.reconciler.rest.look_every()).unwrap_or(self.looked);
             }
         }
         for id in self.gone.drain(..) {
             control(context, id, Control::Forget)?;
         }
-        if now.duration_since(self.looked) < self.rest.look_every() {
+        if now.duration_since(self.looked) < self.reconciler.rest.look_every() {
             return Ok(());
         }
         self.looked = now;
@@ -350,6 +374,13 @@ impl Kept {
         context.schedule.news();
         Ok(())
     }
+}
+
+/// How long a file must rest in a folder, and the time between full scans.
+fn pace(context: &Context, polled: bool) -> (Rest, Duration) {
+    let config = context.settings.now();
+    let rest = config.settle.map_or(Rest::by_default(polled, context.once), |settle| Rest { settle });
+    (rest, config.rescan.unwrap_or(if polled { RESCAN_POLLED } else { RESCAN }))
 }
 
 fn control(context: &Context, id: suture_store::JobId, wish: Control) -> Result<(), StoreError> {

@@ -32,6 +32,7 @@ mod rights;
 mod say;
 mod scan;
 mod schedule;
+mod settings;
 mod settle;
 mod signals;
 mod single;
@@ -71,6 +72,7 @@ fn main() -> ExitCode {
             }
         },
         Command::Watch(args) => watch::run(args),
+        Command::Config(args) => config::command::run(&args.command),
         Command::Jobs(args) => jobs::run(args),
         Command::Demo => demo::run(),
     };

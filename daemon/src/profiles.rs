@@ -15,11 +15,42 @@ pub(crate) const FOLDER_FILE: &str = ".suture.toml";
 pub(crate) fn parse<T: DeserializeOwned>(text: &str) -> Result<T, String> {
     toml::from_str(text).map_err(|error| {
         let what = error.message().trim_end().replace('\n', ", ");
-        let Some(at) = error.span().and_then(|span| text.get(..span.start)) else { return what };
-        let before = at.matches('\n').count();
-        let shown = text.lines().nth(before).unwrap_or_default().trim();
-        format!("line {}, `{shown}`: {what}", before + 1)
+        match error.span() {
+            Some(span) => with_line(text, span.start, &what),
+            None => what,
+        }
     })
+}
+
+/// What is wrong at this byte of a text, after the number of its line and the line itself.
+pub(crate) fn with_line(text: &str, at: usize, what: &str) -> String {
+    let before = text.get(..at).unwrap_or_default().matches('\n').count();
+    let shown = text.lines().nth(before).unwrap_or_default().trim();
+    format!("line {}, `{shown}`: {what}", before + 1)
+}
+
+/// Where the line begins on which a setting stands, in the table that begins at `from`; else `from`.
+pub(crate) fn place_of(text: &str, from: usize, setting: &str) -> usize {
+    let mut at = from;
+    for (n, line) in text.get(from..).unwrap_or_default().split_inclusive('\n').enumerate() {
+        let words = line.trim_start();
+        if n > 0 && words.starts_with('[') {
+            break;
+        }
+        if words.strip_prefix(setting).is_some_and(|rest| rest.trim_start().starts_with('=')) {
+            return at;
+        }
+        at += line.len();
+    }
+    from
+}
+
+/// Refuses a profile with a setting that means nothing. `from`: where its table begins in the text.
+///
+/// # Errors
+/// One line for people, with the number of the line at fault.
+pub(crate) fn validate(profile: &Profile, text: &str, from: usize) -> Result<(), String> {
+    profile.validate().map_err(|error| with_line(text, place_of(text, from, error.setting), &error.to_string()))
 }
 
 /// Reads a profile file. Unknown settings are errors, with their line; the name is the file's unless it gives one.
@@ -27,9 +58,10 @@ pub(crate) fn parse<T: DeserializeOwned>(text: &str) -> Result<T, String> {
 /// # Errors
 /// A line for people.
 pub(crate) fn from_file(path: &Path) -> Result<Profile, String> {
-    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: cannot read the profile: {e}", path.display()))?;
-    let mut profile: Profile = parse(&text).map_err(|e| format!("{}: {e}", path.display()))?;
-    profile.validate().map_err(|e| format!("{}: {e}", path.display()))?;
+    let wrong = |line: String| format!("{}: {line}", path.display());
+    let text = std::fs::read_to_string(path).map_err(|e| wrong(format!("cannot read the profile: {e}")))?;
+    let mut profile: Profile = parse(&text).map_err(wrong)?;
+    validate(&profile, &text, 0).map_err(wrong)?;
     if profile.name == Profile::default().name {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         profile.name = if stem.starts_with('.') { "folder".into() } else { stem.into_owned() };
@@ -82,8 +114,8 @@ mod tests {
         std::fs::write(&path, "a = [\n1,\n").unwrap();
         let error = from_file(&path).unwrap_err();
         assert!(!error.contains('\n') && error.contains(": line "), "{error}");
-        std::fs::write(&path, "weld_relative = -1.0\n").unwrap();
-        assert!(from_file(&path).unwrap_err().contains("weld_relative"));
+        std::fs::write(&path, "fill_holes = true\n# no weld\nweld_relative = -1.0\n").unwrap();
+        assert!(from_file(&path).unwrap_err().contains("line 3, `weld_relative = -1.0`: `weld_relative` must be"));
         std::fs::write(&path, "max_separation_relative = inf\n").unwrap();
         assert!(from_file(&path).unwrap_err().contains("`max_separation_relative` must be a number from 0 to 1, not inf"));
     }

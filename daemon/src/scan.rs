@@ -12,10 +12,10 @@ use std::time::Instant;
 use suture_store::{JobId, RelPath, Source, Submission};
 
 use crate::claim::Original;
-use crate::config::Config;
 use crate::folder::{Folder, NameKind, is_hot, name_kind};
 use crate::fsx::Identity;
 use crate::profiles;
+use crate::settings::Settings;
 use crate::settle::{Look, Rest, Settling, length_fits};
 use crate::writers::Writers;
 
@@ -36,8 +36,9 @@ enum Entry {
 /// Looks after one hot folder's `in/`.
 pub(crate) struct Reconciler {
     folder: Arc<Folder>,
-    config: Arc<Config>,
-    rest: Rest,
+    settings: Arc<Settings>,
+    /// How long a file must rest.
+    pub rest: Rest,
     entries: BTreeMap<PathBuf, Entry>,
     /// Sub-folders whose unknown profile was named in the log.
     warned: BTreeSet<String>,
@@ -46,8 +47,8 @@ pub(crate) struct Reconciler {
 }
 
 impl Reconciler {
-    pub(crate) fn new(folder: Arc<Folder>, config: Arc<Config>, rest: Rest) -> Self {
-        Self { folder, config, rest, entries: BTreeMap::new(), warned: BTreeSet::new(), unreadable: BTreeSet::new() }
+    pub(crate) fn new(folder: Arc<Folder>, settings: Arc<Settings>, rest: Rest) -> Self {
+        Self { folder, settings, rest, entries: BTreeMap::new(), warned: BTreeSet::new(), unreadable: BTreeSet::new() }
     }
 
     /// A job of an earlier life answers for this file already: it need not settle again, and when the job ends while the folder
@@ -199,9 +200,10 @@ impl Reconciler {
 
     /// A sub-folder's name is the profile's, if there is one of that name.
     fn profile_name(&mut self, path: &RelPath) -> String {
-        let default = self.folder.profile.clone();
+        let config = self.settings.now();
+        let default = config.folder_profile(&self.folder.name).to_owned();
         let Some(name) = Folder::profile_folder(path) else { return default };
-        if self.config.profile(&name).is_some() {
+        if config.profile(&name).is_some() {
             return name;
         }
         let own = self.folder.inbox().join(&name).join(profiles::FOLDER_FILE);
@@ -282,11 +284,11 @@ fn what_else(meta: &Metadata, kind: NameKind, name: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::FolderConfig;
+    use crate::config::{Config, FolderConfig};
     use std::time::Duration;
 
     fn reconciler(root: &Path) -> Reconciler {
-        let config = Config::for_folder(root);
+        let settings = Settings::fixed(Config::for_folder(root));
         let folder = Folder::open(&FolderConfig {
             name: "hot".into(),
             path: root.into(),
@@ -294,7 +296,7 @@ mod tests {
             leave_originals: false,
         })
         .unwrap();
-        Reconciler::new(Arc::new(folder), Arc::new(config), Rest { settle: Duration::from_secs(1) })
+        Reconciler::new(Arc::new(folder), Arc::new(settings), Rest { settle: Duration::from_secs(1) })
     }
 
     /// Three looks, a second apart each.
@@ -356,7 +358,7 @@ mod tests {
         let mut r = reconciler(dir.path());
         mesh(&dir.path().join("in/a.stl"));
         let found = settle(&mut r, Instant::now());
-        let mut next = Reconciler::new(Arc::clone(&r.folder), Arc::clone(&r.config), r.rest);
+        let mut next = Reconciler::new(Arc::clone(&r.folder), Arc::clone(&r.settings), r.rest);
         next.known(&found[0].1.source, JobId(1));
         assert!(settle(&mut next, Instant::now()).is_empty());
         std::fs::write(dir.path().join("in/a.stl"), [0; 85]).unwrap();

@@ -99,7 +99,7 @@ impl Settling {
             Look::IfLengthFits
         } else if self.looks < LOOKS || rested < rest.settle {
             Look::Wait
-        } else if rested < rest.settle * DOUBT {
+        } else if rested < rest.settle.saturating_mul(DOUBT) {
             Look::IfLengthFits
         } else {
             Look::Ready

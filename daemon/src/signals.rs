@@ -1,9 +1,9 @@
-//! Ctrl-C and SIGTERM: how many there have been.
+//! Signals: how many of Ctrl-C and SIGTERM there have been, and whether SIGHUP came.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 /// Set by the first signal to stop; the second ends the process at once (workers die with it).
 #[derive(Clone, Default)]
@@ -30,5 +30,26 @@ impl Stop {
     /// Has there been a signal?
     pub(crate) fn asked(&self) -> bool {
         self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// Set by SIGHUP, which then does not end the process: the configuration is to be read anew.
+#[derive(Default)]
+pub(crate) struct Hangup(Arc<AtomicBool>);
+
+impl Hangup {
+    /// Starts listening.
+    ///
+    /// # Errors
+    /// When the handler cannot be set.
+    pub(crate) fn listen() -> std::io::Result<Self> {
+        let hangup = Self::default();
+        signal_hook::flag::register(SIGHUP, Arc::clone(&hangup.0))?;
+        Ok(hangup)
+    }
+
+    /// Has there been one since the last call?
+    pub(crate) fn came(&self) -> bool {
+        self.0.swap(false, Ordering::Relaxed)
     }
 }

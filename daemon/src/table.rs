@@ -87,7 +87,7 @@ pub(crate) fn render(report: &Report) -> String {
     }
     wraps(&mut out, report);
     pairs_left(&mut out, report);
-    if report.task == Task::Repair && report.outcome != Outcome::Clean {
+    if report.task == Task::Repair && report.outcome != Outcome::Clean && report.profile.repair {
         item(&mut out, "edit", &edit(report));
     }
     let judged = if report.verdict.good { "good" } else { "not good" };
@@ -101,6 +101,8 @@ pub(crate) fn render(report: &Report) -> String {
     item(&mut out, "cost", &rate(report));
     if let Some(output) = &report.output {
         item(&mut out, "wrote", &format!("{} ({})", output.path.display(), show_size(output.bytes)));
+    } else if report.task == Task::Repair {
+        item(&mut out, "wrote", "nothing");
     }
     out
 }
@@ -132,7 +134,7 @@ fn loops(out: &mut String, report: &Report) {
     }
     let classes: Vec<String> = loops.classes.iter().map(|(class, n)| format!("{} {}", show_count(*n), class.name())).collect();
     item(out, "loops", &classes.join(", "));
-    if report.task == Task::Inspect {
+    if report.task == Task::Inspect || !report.profile.repair {
         for l in loops.listed.iter().take(LOOPS_SHOWN) {
             let [x, y, z] = l.at;
             let what = format!("{} of {} edges at ({x}, {y}, {z}): {}", l.class.name(), show_count(l.vertices), l.rule);
@@ -173,6 +175,7 @@ fn pairs_left(out: &mut String, report: &Report) {
 
 fn headline(report: &Report) -> &'static str {
     match (report.task, report.outcome) {
+        (Task::Repair, Outcome::NotGood) if !report.profile.repair => "NOT GOOD, and nothing was repaired",
         (_, Outcome::Clean) => "clean",
         (_, Outcome::Repaired) => "repaired",
         (_, Outcome::NeedsReview) => "NEEDS REVIEW: repaired, but changed more than the profile allows",

@@ -55,6 +55,28 @@ pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
     Duration::try_from_secs_f64(number * factor).map_err(|_| bad())
 }
 
+/// A size as [`parse_size`] reads it, to the byte: `512MiB`, `1500B`.
+pub(crate) fn write_size(bytes: u64) -> String {
+    let units = [(1 << 40, "TiB"), (1 << 30, "GiB"), (1 << 20, "MiB"), (1 << 10, "KiB")];
+    match units.iter().find(|(unit, _)| bytes >= *unit && bytes.is_multiple_of(*unit)) {
+        Some((unit, name)) => format!("{}{name}", bytes / unit),
+        None => format!("{bytes}B"),
+    }
+}
+
+/// A duration as [`parse_duration`] reads it: `2m`, `300ms`, `1.5s`.
+pub(crate) fn write_duration(duration: Duration) -> String {
+    let (seconds, rest) = (duration.as_secs(), duration.subsec_nanos());
+    match (seconds, rest) {
+        (0, 0) => "0s".into(),
+        (0, rest) if rest.is_multiple_of(1_000_000) => format!("{}ms", rest / 1_000_000),
+        (_, 1..) => format!("{}s", duration.as_secs_f64()),
+        (seconds, 0) if seconds.is_multiple_of(3600) => format!("{}h", seconds / 3600),
+        (seconds, 0) if seconds.is_multiple_of(60) => format!("{}m", seconds / 60),
+        (seconds, 0) => format!("{seconds}s"),
+    }
+}
+
 /// `617.0 KB`, `1.2 GB`: decimal, as file managers show it.
 pub(crate) fn show_size(bytes: u64) -> String {
     const UNITS: [&str; 5] = ["B", "KB", "MB", "GB", "TB"];
@@ -113,6 +135,27 @@ mod tests {
         assert_eq!(parse_duration("10"), Ok(Duration::from_secs(10)));
         for bad in ["", "s", "-5s", "5 weeks"] {
             assert!(parse_duration(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read_as_the_same() {
+        for (bytes, text) in [(1, "1B"), (1536, "1536B"), (2048, "2KiB"), (3 << 30, "3GiB"), (1_500_000_000, "1500000000B")] {
+            assert_eq!(write_size(bytes), text);
+            assert_eq!(parse_size(text), Ok(bytes));
+        }
+        let ms = Duration::from_millis;
+        for (duration, text) in [
+            (ms(0), "0s"),
+            (ms(300), "300ms"),
+            (ms(1500), "1.5s"),
+            (ms(90_000), "90s"),
+            (ms(120_000), "2m"),
+            (ms(7_200_000), "2h"),
+            (Duration::from_nanos(1_000_001), "0.001000001s"),
+        ] {
+            assert_eq!(write_duration(duration), text);
+            assert_eq!(parse_duration(text), Ok(duration));
         }
     }
 

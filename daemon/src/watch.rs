@@ -26,31 +26,33 @@ use crate::fsx;
 use crate::keeper::Keeper;
 use crate::say::complain;
 use crate::schedule::{Hold, Schedule, Turn};
-use crate::signals::Stop;
+use crate::settings::Settings;
+use crate::signals::{Hangup, Stop};
 use crate::{standstill, watchdog};
 
 /// Runs the daemon to its end.
 pub(crate) fn run(args: &WatchArgs) -> Exit {
-    let config = match Config::from_args(args) {
-        Ok(config) => config,
-        Err(line) => {
-            complain(&line);
-            return Exit::Refused;
-        }
-    };
-    let stop = match Stop::listen() {
-        Ok(stop) => stop,
+    // First of all: where no one listens, a signal ends the process.
+    let (stop, hangup) = match Stop::listen().and_then(|stop| Ok((stop, Hangup::listen()?))) {
+        Ok(signals) => signals,
         Err(error) => {
             complain(&format_args!("cannot listen for signals: {error}"));
             return Exit::of_start(&error);
         }
     };
-    serve(config, args.once, &stop, true)
+    match Settings::of(args, hangup) {
+        Ok(settings) => serve(settings, args.once, &stop, true),
+        Err(line) => {
+            complain(&line);
+            Exit::Refused
+        }
+    }
 }
 
-/// The same for a configuration at hand. `may_begin_anew`: after an error of the store the program may begin anew, with the arguments it
+/// The same for settings at hand. `may_begin_anew`: after an error of the store the program may begin anew, with the arguments it
 /// was started with.
-pub(crate) fn serve(config: Config, once: bool, stop: &Stop, may_begin_anew: bool) -> Exit {
+pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew: bool) -> Exit {
+    let config = settings.now();
     let mut folders = Vec::new();
     for folder in &config.folders {
         match Folder::open(folder) {
@@ -79,7 +81,8 @@ pub(crate) fn serve(config: Config, once: bool, stop: &Stop, may_begin_anew: boo
         }
     };
     note_state(&config, &folders);
-    let daemon = Daemon { config: Arc::new(config), folders, store, once, lives, not_good, stop: stop.clone(), may_begin_anew };
+    let settings = Arc::new(settings);
+    let daemon = Daemon { settings, folders, store, once, lives, not_good, stop: stop.clone(), may_begin_anew };
     daemon.run()
 }
 
@@ -125,7 +128,7 @@ fn note_state(config: &Config, folders: &[Arc<Folder>]) {
 }
 
 struct Daemon {
-    config: Arc<Config>,
+    settings: Arc<Settings>,
     folders: Vec<Arc<Folder>>,
     store: Arc<SledStore>,
     once: bool,
@@ -166,7 +169,7 @@ impl Daemon {
         let context = Context {
             store: Arc::clone(&self.store) as Arc<dyn JobStore>,
             folders: self.folders.clone(),
-            config: Arc::clone(&self.config),
+            settings: Arc::clone(&self.settings),
             schedule: Schedule::new(),
             events: events.clone(),
             once: self.once,
@@ -174,7 +177,7 @@ impl Daemon {
             not_good: Arc::clone(&self.not_good),
             failed: Mutex::new(None),
         };
-        if standstill::is_set(&self.config.state) {
+        if standstill::is_set(&self.settings.now().state) {
             context.schedule.hold(Hold::Operator, Some(standstill::WORDS.into()));
             tracing::warn!("Nothing new is taken: {}.", standstill::WORDS);
         }
@@ -234,14 +237,15 @@ impl Daemon {
             // The job in work is taken up by the next life.
             worked.unwrap_or_else(|error| context.fail(error));
         };
-        (0..self.config.workers).map(|_| thread("slot").spawn_scoped(scope, slot).map_err(failed)).collect()
+        (0..self.settings.now().workers).map(|_| thread("slot").spawn_scoped(scope, slot).map_err(failed)).collect()
     }
 
     /// Lets running jobs finish, for as long as they are given.
     fn drain(&self, context: &Context, slots: &[ScopedJoinHandle<()>]) {
-        let deadline = Instant::now() + self.config.drain;
+        let deadline = Instant::now().checked_add(self.settings.now().drain);
         while slots.iter().any(|slot| !slot.is_finished()) {
-            if Instant::now() >= deadline && !context.halt.swap(true, Ordering::Relaxed) {
+            let is_over = deadline.is_some_and(|deadline| Instant::now() >= deadline);
+            if is_over && !context.halt.swap(true, Ordering::Relaxed) {
                 tracing::warn!("The time to finish running jobs is over; they go back into the queue.");
             }
             std::thread::sleep(Duration::from_millis(10));

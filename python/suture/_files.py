@@ -48,7 +48,8 @@ def repair_file(
 
     The output appears under its name when it is complete and on the disk, whatever the outcome: look at ``report["outcome"]``. It has the same
     bytes whatever ``memory`` and ``threads`` are. The input is never written to. If there is a file of that name already, it is replaced only
-    if ``replace`` is true.
+    if ``replace`` is true. Where ``report["output"]`` is ``None``, there is none: no triangle was left, or the file is not good and the profile
+    repairs nothing (``"inspect-only"``).
     """
     output = Path(output)
     if not replace and os.path.lexists(output):

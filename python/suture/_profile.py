@@ -7,7 +7,7 @@ from typing import Any
 
 from . import _suture
 
-PROFILES = ("default", "scan", "cautious")
+PROFILES = ("default", "fast", "strict", "cautious", "scan", "inspect-only")
 """Names of the profiles that come with the engine."""
 
 

@@ -115,6 +115,8 @@ class Repair(unittest.TestCase):
         self.assertEqual(suture.built_in_profile("cautious")["guarantee"], "strict")
         for name in suture.PROFILES:
             self.assertEqual(suture.built_in_profile(name)["name"], name)
+        untouched = suture.repair(vertices, faces[:-1], profile="inspect-only")
+        self.assertEqual((untouched.good, len(untouched.faces)), (False, 11))
 
 
 class Arrays(unittest.TestCase):
@@ -245,6 +247,8 @@ class Files(unittest.TestCase):
         with self.assertRaisesRegex(FileExistsError, "never overwritten"):
             suture.repair_file(self.input, self.input, replace=True)
         suture.repair_file(self.output, Path(self.folder.name, "again.stl"))
+        report = suture.repair_file(self.input, Path(self.folder.name, "none.stl"), profile="inspect-only")
+        self.assertEqual((report["outcome"], report["output"]), ("not_good", None))
         suture.repair_file(self.input, self.output, replace=True, profile="cautious")
         self.assertEqual(len(read_stl(self.output)), 11)
         self.assertEqual(self.input.read_bytes(), before)

@@ -3,11 +3,13 @@
 #[cfg(test)]
 mod e2e {
     mod cases;
+    mod config;
     mod files;
     mod interrupted;
     mod malformed;
     mod many;
     mod memory;
+    mod profiles;
     mod same_bytes;
     mod soups;
     mod steer;

@@ -53,6 +53,7 @@ impl ProfileBuilder {
     }
 
     setters! {
+        repair: bool,
         weld_relative: f64,
         weld_max_edge_share: f64,
         sew_relative: f64,

@@ -92,6 +92,7 @@ impl Profile {
             max_bodies_lost: _,
             debris_triangles: _,
             // Choices.
+            repair: _,
             leave_open: _,
             close_sheets: _,
             fill_holes: _,

@@ -32,7 +32,7 @@ pub struct Report {
     pub outcome: Outcome,
     /// The file read.
     pub input: FileFacts,
-    /// The file written, `None` when nothing was (inspection, or no triangle left).
+    /// The file written, `None` when nothing was (inspection, no triangle left, or not good under a profile that repairs nothing).
     pub output: Option<FileFacts>,
     /// Settings that decide the result.
     pub profile: Profile,

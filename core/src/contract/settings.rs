@@ -17,6 +17,8 @@ use crate::contract::loop_class::LoopClass;
 pub struct Profile {
     /// Name shown in reports.
     pub name: String,
+    /// Repair at all. Without, a file that is good as it comes counts as clean, and of any other nothing is written.
+    pub repair: bool,
     /// Boundary vertices closer than this fraction of the diagonal are one vertex. Never below what f32 can tell apart at the
     /// model's coordinates, never above [`Profile::weld_max_edge_share`] of the edges around. 0 switches the weld off.
     pub weld_relative: f64,
@@ -181,6 +183,7 @@ impl Default for Profile {
     fn default() -> Self {
         Self {
             name: "default".into(),
+            repair: true,
             weld_relative: 1e-5,
             weld_max_edge_share: 0.25,
             sew_relative: 0.01,
@@ -223,15 +226,29 @@ impl Default for Profile {
 }
 
 impl Profile {
-    /// The profiles that come with the product, by name: `default`; `scan` (larger holes, wider gaps, for scanned surfaces);
-    /// `cautious` (welds and drops surplus triangles, but closes, cuts and wraps nothing).
+    /// The profiles that come with the product, by name: `default`; `fast` (what takes time and is not needed for a valid surface is left out: the
+    /// search for self-intersections, and the shaping of patches); `strict` (small mending only: whatever changes more, or cannot be proved, is a
+    /// person's to decide); `cautious` (welds and drops surplus triangles, but closes, cuts and wraps nothing); `scan` (larger holes, wider gaps, for
+    /// scanned surfaces); `inspect-only` (repairs nothing).
     pub fn built_in(name: &str) -> Option<Self> {
         let base = Self { name: name.into(), ..Self::default() };
         match name {
             "default" => Some(base),
-            "scan" => {
-                Some(Self { max_hole_edges: 100_000, gap_edge_share: 0.5, max_volume_change: 1.0, debris_triangles: 100, ..base })
-            }
+            "fast" => Some(Self { check_self_intersections: false, patch_shape: PatchShape::Flat, ..base }),
+            "strict" => Some(Self {
+                max_hole_perimeter_relative: 0.25,
+                max_volume_change: 0.01,
+                max_area_change: 0.02,
+                max_box_change_relative: 0.001,
+                skin_reach_relative: 0.001,
+                max_skin_lost: 1e-4,
+                max_skin_invented: 1e-3,
+                max_cavities_filled: 0.0,
+                max_sheets_share: 1e-4,
+                debris_area_share: 1e-4,
+                guarantee: Guarantee::Strict,
+                ..base
+            }),
             "cautious" => Some(Self {
                 fill_holes: false,
                 gap_edge_share: 0.0,
@@ -241,6 +258,10 @@ impl Profile {
                 guarantee: Guarantee::Strict,
                 ..base
             }),
+            "scan" => {
+                Some(Self { max_hole_edges: 100_000, gap_edge_share: 0.5, max_volume_change: 1.0, debris_triangles: 100, ..base })
+            }
+            "inspect-only" => Some(Self { repair: false, ..base }),
             _ => None,
         }
     }
@@ -256,7 +277,7 @@ impl Profile {
     }
 
     /// Names [`Profile::built_in`] knows.
-    pub const BUILT_IN: [&str; 3] = ["default", "scan", "cautious"];
+    pub const BUILT_IN: [&str; 6] = ["default", "fast", "strict", "cautious", "scan", "inspect-only"];
 }
 
 /// What the machine may spend. Never changes a result: too little is an error, not another output.
@@ -330,4 +351,29 @@ impl Limits {
 /// The folder that holds `file`.
 pub(crate) fn folder_of(file: &Path) -> &Path {
     file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_name_has_a_profile_that_is_called_so() {
+        for name in Profile::BUILT_IN {
+            assert_eq!(Profile::built_in(name).unwrap().name, name);
+        }
+        assert_eq!(Profile::built_in("default").unwrap(), Profile::default());
+        assert!(Profile::built_in("inspect_only").is_none());
+    }
+
+    /// Every limit is as tight as the default's, or tighter.
+    #[test]
+    fn the_strict_profile_allows_less() {
+        let [usual, strict] = ["default", "strict"].map(|name| serde_json::to_value(Profile::built_in(name).unwrap()).unwrap());
+        for (setting, limit) in usual.as_object().unwrap().iter().filter(|(setting, _)| setting.starts_with("max_")) {
+            let allowed = strict[setting].as_f64().unwrap();
+            assert!(allowed <= limit.as_f64().unwrap(), "{setting}: {allowed}");
+        }
+        assert_eq!(strict["guarantee"], "strict");
+    }
 }

@@ -69,21 +69,83 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     let mut clock = Clock::start();
     judging::validate(input, profile)?;
     let limits = &limits.spooling_beside(output);
+    if !profile.repair {
+        return pass_on(input, output, profile, limits, progress, clock);
+    }
     let (mesh, welded) = welding::in_the_stream(open(input, limits, progress)?, profile, limits, progress)?;
     clock.stage("read");
+    check_space(&mesh, output, limits)?;
+    emit::draft(&mesh, output, limits, progress, |draft| {
+        let mended = mend(draft, (&mesh, welded.as_ref()), output, profile, limits, progress, &mut clock);
+        let report = mended.map_err(|error| or_changed(error, &mesh, progress))?;
+        clock.close(report, mesh.path(), mesh.records().len())
+    })
+}
+
+/// Is there room for the output of `mesh`, and for what is spooled?
+fn check_space(mesh: &MeshFile, output: &Path, limits: &Limits) -> Result<()> {
     // The output is as large as its input but for what is added; what the input spools is gone by then, but the output spools as much.
     let bytes = (PREFIX_BYTES + size_of_val(mesh.records())) as u64;
     let folder = if emit::is_nameless(output) { limits.spool_folder() } else { folder_of(output).into() };
-    disk_space::check(input, &[Need { folder, bytes, what: "the output" }, spool_need(mesh.records(), limits)])?;
-    emit::draft(&mesh, output, limits, progress, |draft| {
-        let mended = mend(draft, (&mesh, welded.as_ref()), output, profile, limits, progress, &mut clock);
-        // What was copied before the input changed is not what is read back: nothing is wrong with the disk.
-        let report = mended.map_err(|error| match error {
-            Error::Io { .. } if !progress.cancelled() => mesh.check_unchanged().err().unwrap_or(error),
-            other => other,
-        })?;
-        clock.close(report, mesh.path(), mesh.records().len())
-    })
+    disk_space::check(mesh.path(), &[Need { folder, bytes, what: "the output" }, spool_need(mesh.records(), limits)])
+}
+
+/// What was copied before the input changed is not what is read back: nothing is wrong with the disk.
+fn or_changed(error: Error, mesh: &MeshFile, progress: &dyn Progress) -> Error {
+    match error {
+        Error::Io { .. } if !progress.cancelled() => mesh.check_unchanged().err().unwrap_or(error),
+        other => other,
+    }
+}
+
+/// For a profile that repairs nothing: copies `input` into the new file `output` if it is good, and writes nothing if it is not.
+fn pass_on(
+    input: &Path,
+    output: &Path,
+    profile: &Profile,
+    limits: &Limits,
+    progress: &dyn Progress,
+    mut clock: Clock,
+) -> Result<Report> {
+    let mesh = open(input, limits, progress)?;
+    clock.stage("read");
+    check_space(&mesh, output, limits)?;
+    let mut diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
+    clock.stage("topology");
+    let mut report = judging::begin(Task::Repair, &subject(&mesh, String::new()), &diagnosis, profile, limits);
+    if report.verdict.good {
+        drop(diagnosis);
+        copy(&mesh, output, &mut report, limits, progress, &mut clock).map_err(|error| or_changed(error, &mesh, progress))?;
+    } else {
+        report.input.blake3 = hash(&mesh, limits, progress);
+        clock.stage("hash");
+        let facts = report.input.clone();
+        judging::conclude_unchanged(&mut report, &facts, mesh.findings());
+        report.loops = repairs::recognise(&mut diagnosis, mesh.path(), profile, limits, progress)?;
+    }
+    mesh.check_unchanged()?;
+    clock.close(report, mesh.path(), mesh.records().len())
+}
+
+/// Copies a good file, and reads the copy back.
+fn copy(
+    mesh: &MeshFile,
+    output: &Path,
+    report: &mut Report,
+    limits: &Limits,
+    progress: &dyn Progress,
+    clock: &mut Clock,
+) -> Result<()> {
+    let (written, digest) = emit::draft(mesh, output, limits, progress, |draft| draft.finish(&Content::Input))?;
+    report.input.blake3 = digest::hash(mesh.bytes(), &digest);
+    clock.stage("emit");
+    let edit = Edit::default();
+    report.edit = edit.summary(mesh.records().len());
+    report.edit_records = limits.list_edit.then(|| edit.listed());
+    confirm_copy(report, mesh, output, limits, progress)?;
+    written.durable()?;
+    clock.stage("verify");
+    Ok(())
 }
 
 /// Makes `draft` the repaired `mesh` and judges what then stands at `output`; cost and stages are still to come.

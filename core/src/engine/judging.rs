@@ -73,11 +73,14 @@ pub(crate) fn begin(task: Task, input: &Input<'_>, diagnosis: &Diagnosis<'_>, pr
 /// Ends the report of an inspection, or of a mesh that nothing was done to: what was found in the input holds of `facts`.
 pub(crate) fn conclude_unchanged(report: &mut Report, facts: &FileFacts, findings: &[Finding]) {
     report.outcome = if report.verdict.good { Outcome::Clean } else { Outcome::NotGood };
+    if report.task == Task::Repair && !report.verdict.good && !report.profile.repair {
+        report.verdict.reasons.push(format!("nothing was repaired: the profile `{}` says `repair = false`", report.profile.name));
+    }
     report.certificate = Some(certify(facts, &report.before, &flaws(findings)));
 }
 
 /// Repairs what was diagnosed by these steps, if there is anything to be repaired: what is to be edited, and what a
-/// review needs to know. `None`: it is good as it is.
+/// review needs to know. `None`: it is good as it is, or the profile repairs nothing.
 pub(crate) fn repair_diagnosed(
     diagnosis: &mut Diagnosis<'_>,
     steps: Steps,
@@ -92,7 +95,7 @@ pub(crate) fn repair_diagnosed(
         Bodies::Visible => report.before.components > 1,
         Bodies::Keep => profile.hollow == Hollow::Keep && report.before.nested_positive > 0,
     };
-    if report.verdict.good && !holds_more {
+    if !profile.repair || report.verdict.good && !holds_more {
         return Ok(None);
     }
     progress.at("repair", 0, diagnosis.survey.records.len() as u64);

@@ -256,3 +256,66 @@ fn what_was_turned_in_the_stream_still_says_little_of_a_body_in_another_one() {
         std::fs::remove_file(&output).unwrap();
     }
 }
+
+/// The file `part.stl` in a folder, repaired into `out.stl` under a profile that comes with the product.
+fn under(name: &str, bytes: &[u8]) -> (tempfile::TempDir, Report) {
+    let folder = tempfile::tempdir().unwrap();
+    let (input, output) = (folder.path().join("part.stl"), folder.path().join("out.stl"));
+    std::fs::write(&input, bytes).unwrap();
+    let limits = Limits { threads: 2, ..Limits::default() };
+    let profile = Profile::built_in(name).unwrap();
+    let report = repair(&input, &output, &profile, &limits, &crate::contract::progress::Quiet).unwrap();
+    (folder, report)
+}
+
+/// A torus in which so many cells of the surface are missing along either way.
+fn torn_torus(cells: usize) -> Vec<u8> {
+    let torus = shaken_torus(0.0).into_iter().enumerate();
+    file(&records(&torus.filter(|(t, _)| t / 2 / 176 >= cells || t / 2 % 176 >= cells).map(|(_, t)| t).collect::<Vec<_>>()))
+}
+
+/// What is good is passed on byte for byte; of anything else nothing is written, not even where a large file could be copied ahead.
+#[test]
+fn a_profile_that_repairs_nothing_passes_on_or_leaves() {
+    for bytes in [file(&records(&cube())), torn_torus(0), text(&cube()).into_bytes()] {
+        let (folder, report) = under("inspect-only", &bytes);
+        assert_eq!(report.outcome, Outcome::Clean, "{:?}", report.verdict);
+        assert_eq!(std::fs::read(folder.path().join("out.stl")).unwrap(), bytes);
+        let hash = blake3::hash(&bytes).to_hex().to_string();
+        let output = report.output.unwrap();
+        assert_eq!([&report.input.blake3, &output.blake3, &report.certificate.unwrap().blake3], [&hash; 3]);
+        assert_eq!((report.edit.untouched, report.edit.added), (report.input.triangles, 0));
+    }
+    let nested = [cube(), cuboid([0.25; 3], [0.75; 3])].concat();
+    assert_eq!(under("inspect-only", &file(&records(&nested))).1.outcome, Outcome::Clean, "no body is removed");
+    let mut shorn = file(&records(&cube()));
+    shorn.truncate(84 + 50 * 11);
+    for bytes in [file(&records(&cube()[1..])), torn_torus(2), file(&records(&shaken_torus(1e-4)[..20_000])), shorn] {
+        let (folder, report) = under("inspect-only", &bytes);
+        assert_eq!((report.outcome, report.output.is_none(), report.repairs.len()), (Outcome::NotGood, true, 0));
+        assert!(!folder.path().join("out.stl").exists());
+        assert_eq!(report.input.blake3, blake3::hash(&bytes).to_hex().to_string());
+        let last = report.verdict.reasons.last().unwrap();
+        assert!(last.contains("nothing was repaired") && last.contains("inspect-only"), "{last}");
+        assert!(report.verdict.reasons.len() > 1 && !report.certificate.unwrap().printable, "it says what is wrong");
+    }
+}
+
+#[test]
+fn the_fast_profile_leaves_the_search_and_the_shaping_out() {
+    let (_folder, report) = under("fast", &torn_torus(8));
+    assert_eq!((report.outcome, report.verdict.free_of_self_intersection), (Outcome::Repaired, None));
+    assert_eq!(report.verdict.unchecked, ["self-intersection"]);
+    let after = report.after.unwrap();
+    assert_eq!((after.boundary_edges, after.vertices), (0, report.before.vertices), "patches have no vertices of their own");
+    assert!(under("default", &torn_torus(8)).1.after.unwrap().vertices > report.before.vertices);
+}
+
+#[test]
+fn the_strict_profile_mends_what_is_small_and_leaves_the_rest_to_a_person() {
+    let (_folder, small) = under("strict", &torn_torus(2));
+    assert_eq!(small.outcome, Outcome::Repaired, "{:?}", small.verdict);
+    let (_folder, large) = under("strict", &torn_torus(40));
+    assert!(!large.outcome.is_good(), "{:?}", large.verdict);
+    assert!(under("default", &torn_torus(40)).1.verdict.good, "another profile closes it");
+}

@@ -1,0 +1,337 @@
+//! The configuration file. Unknown settings are errors, and every mistake is told with its line.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde::{Deserialize, Deserializer, de};
+use suture_core::Profile;
+use toml::Spanned;
+
+use super::{Config, DEFAULT_PROFILE, FolderConfig, name_of, real};
+use crate::profiles::{self, place_of, with_line};
+use crate::units::{parse_duration, parse_size};
+use crate::window::RunWindow;
+
+/// For what the daemon chooses by itself.
+pub(crate) const AUTO: &str = "auto";
+
+/// As it is written.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    /// Hot folders; the first one's `.suture/` holds the job store unless `state` says otherwise.
+    #[serde(default)]
+    folders: Vec<FolderFile>,
+    state: Option<PathBuf>,
+    workers: Option<Count>,
+    threads: Option<Count>,
+    memory: Option<Size>,
+    large: Option<Size>,
+    reserve: Option<Size>,
+    settle: Option<TimeOrAuto>,
+    rescan: Option<TimeOrAuto>,
+    drain: Option<Time>,
+    time_limit: Option<TimeLimitFile>,
+    run_window: Option<RunWindow>,
+    workers_outside: Option<Spanned<u16>>,
+    #[serde(default)]
+    profiles: BTreeMap<String, Spanned<Profile>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FolderFile {
+    path: Spanned<PathBuf>,
+    /// What jobs call it; its last part unless given.
+    name: Option<Spanned<String>>,
+    /// Profile of files that lie in no sub-folder.
+    profile: Option<Spanned<String>>,
+    /// Originals are not moved out of `in/`.
+    #[serde(default)]
+    leave_originals: bool,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TimeLimitFile {
+    base: Option<Time>,
+    per_gib: Option<Time>,
+}
+
+/// A number, or text with a unit.
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "a whole number, or text with a unit such as \"2GiB\" or \"5s\", is needed here")]
+enum Quantity {
+    Number(u64),
+    Text(String),
+}
+
+impl Quantity {
+    fn read<'de, D: Deserializer<'de>>(d: D) -> Result<String, D::Error> {
+        Self::deserialize(d).map(|quantity| match quantity {
+            Self::Number(n) => n.to_string(),
+            Self::Text(text) => text,
+        })
+    }
+}
+
+/// How many, at least one.
+#[derive(Debug)]
+struct Count(usize);
+
+impl<'de> Deserialize<'de> for Count {
+    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        match u16::deserialize(d)? {
+            0 => Err(de::Error::custom("must be at least 1")),
+            count => Ok(Self(count.into())),
+        }
+    }
+}
+
+/// Bytes.
+#[derive(Debug)]
+struct Size(u64);
+
+impl<'de> Deserialize<'de> for Size {
+    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        parse_size(&Quantity::read(d)?).map(Self).map_err(de::Error::custom)
+    }
+}
+
+#[derive(Debug)]
+struct Time(Duration);
+
+impl<'de> Deserialize<'de> for Time {
+    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        parse_duration(&Quantity::read(d)?).map(Self).map_err(de::Error::custom)
+    }
+}
+
+/// A time, or none: the daemon chooses it by the file system.
+#[derive(Debug)]
+struct TimeOrAuto(Option<Duration>);
+
+impl<'de> Deserialize<'de> for TimeOrAuto {
+    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        match Quantity::read(d)?.as_str() {
+            AUTO => Ok(Self(None)),
+            text => parse_duration(text).map(Some).map(Self).map_err(de::Error::custom),
+        }
+    }
+}
+
+/// Reads a configuration file.
+///
+/// # Errors
+/// One line for people, with the file and the number of the line at fault.
+pub(crate) fn from_file(path: &Path) -> Result<Config, String> {
+    let wrong = |line: String| format!("{}: {line}", path.display());
+    let text = std::fs::read_to_string(path).map_err(|e| wrong(format!("cannot read the configuration: {e}")))?;
+    from_text(&text).map_err(wrong)
+}
+
+/// The same for one that is to be served as it stands: no option of the command line adds to its memory.
+///
+/// # Errors
+/// As [`from_file`].
+pub(crate) fn whole(path: &Path) -> Result<Config, String> {
+    let config = from_file(path)?;
+    config.check_memory().map_err(|what| {
+        let text = std::fs::read_to_string(path).unwrap_or_default();
+        // The one of the two that is there; the later one, if both are.
+        let at = ["memory", "workers"].map(|setting| place_of(&text, 0, setting)).into_iter().max().unwrap_or(0);
+        format!("{}: {}", path.display(), with_line(&text, at, &what))
+    })?;
+    Ok(config)
+}
+
+fn from_text(text: &str) -> Result<Config, String> {
+    let file: File = profiles::parse(text)?;
+    let Some(first) = file.folders.first() else {
+        return Err("`folders` names no hot folder; add `[[folders]]` with a line such as `path = \"prints\"`".into());
+    };
+    let mut config = Config::for_folder(first.path.get_ref());
+    config.profiles = own_profiles(text, file.profiles)?;
+    config.folders = folders(text, &file.folders, &config)?;
+    config.state = file.state.unwrap_or(config.state);
+    config.workers = file.workers.map_or(config.workers, |count| count.0);
+    config.threads = file.threads.map_or(config.threads, |count| count.0);
+    config.memory = file.memory.map_or(config.memory, |size| size.0);
+    config.large = file.large.map_or(config.large, |size| size.0);
+    config.reserve = file.reserve.map_or(config.reserve, |size| size.0);
+    config.settle = file.settle.and_then(|time| time.0);
+    config.rescan = file.rescan.and_then(|time| time.0);
+    config.drain = file.drain.map_or(config.drain, |time| time.0);
+    if let (Some(outside), None) = (&file.workers_outside, &file.run_window) {
+        let what = "says how many work outside of the hours of `run_window`, which is missing; add it, or leave this out";
+        return Err(with_line(text, outside.span().start, what));
+    }
+    config.workers_outside = file.workers_outside.map_or(0, |count| count.into_inner().into());
+    config.run_window = file.run_window.unwrap_or_default();
+    if let Some(TimeLimitFile { base, per_gib }) = file.time_limit {
+        config.time_limit.base = base.map_or(config.time_limit.base, |time| time.0);
+        config.time_limit.per_gib = per_gib.map_or(config.time_limit.per_gib, |time| time.0);
+    }
+    Ok(config)
+}
+
+fn own_profiles(text: &str, of_file: BTreeMap<String, Spanned<Profile>>) -> Result<BTreeMap<String, Profile>, String> {
+    let mut own = BTreeMap::new();
+    for (name, profile) in of_file {
+        let from = profile.span().start;
+        let mut profile = profile.into_inner();
+        profiles::validate(&profile, text, from)?;
+        profile.name.clone_from(&name);
+        own.insert(name, profile);
+    }
+    Ok(own)
+}
+
+/// `config` knows the profiles.
+fn folders(text: &str, of_file: &[FolderFile], config: &Config) -> Result<Vec<FolderConfig>, String> {
+    let mut folders: Vec<FolderConfig> = Vec::new();
+    for folder in of_file {
+        let path = folder.path.get_ref();
+        let name = folder.name.as_ref().map_or_else(|| name_of(path), |name| name.get_ref().clone());
+        if folders.iter().any(|other| other.name == name) {
+            let at = folder.name.as_ref().map_or(folder.path.span(), Spanned::span).start;
+            return Err(with_line(text, at, &format!("two folders are called `{name}`; give each a `name` of its own")));
+        }
+        let profile = folder.profile.as_ref().map_or(DEFAULT_PROFILE, |profile| profile.get_ref().as_str());
+        if let (None, Some(named)) = (config.profile(profile), &folder.profile) {
+            let known: Vec<&str> = config.profiles.keys().map(String::as_str).chain(Profile::BUILT_IN).collect();
+            let what =
+                format!("there is no profile `{profile}`; name one of {}, or add `[profiles.{profile}]`", known.join(", "));
+            return Err(with_line(text, named.span().start, &what));
+        }
+        let leave_originals = folder.leave_originals;
+        folders.push(FolderConfig { name, path: path.clone(), profile: profile.to_owned(), leave_originals });
+    }
+    apart(&folders).map_err(|(folder, what)| {
+        let at = of_file.get(folder).map_or(0, |folder| folder.path.span().start);
+        with_line(text, at, &what)
+    })?;
+    Ok(folders)
+}
+
+/// Are these hot folders that do not lie in one another, whatever their paths are called? A folder that is made only later is told by its
+/// path, through links and `..` as far as there is something. The number of the one that does, and a line for people.
+fn apart(folders: &[FolderConfig]) -> Result<(), (usize, String)> {
+    let real: Vec<PathBuf> = folders.iter().map(|folder| real(&folder.path)).collect();
+    for (i, a) in real.iter().enumerate() {
+        for (j, b) in real.iter().enumerate().filter(|(j, _)| *j != i) {
+            if let (true, Some(inner), Some(outer)) = (a.starts_with(b), folders.get(i), folders.get(j)) {
+                let (shown, other) = (inner.path.display(), outer.path.display());
+                let line = if a == b {
+                    format!("{shown} and {other} are the same folder; remove one of them")
+                } else {
+                    format!(
+                        "{shown} lies in the hot folder {other}, which would take its files; hot folders lie beside each other"
+                    )
+                };
+                return Err((i, line));
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_configuration_with_everything() {
+        let config = from_text(
+            r#"
+            workers = 3
+            memory = "2GiB"
+            settle = "300ms"
+            rescan = 20
+            [time_limit]
+            base = "10s"
+            [[folders]]
+            path = "/srv/a"
+            [[folders]]
+            path = "/srv/b"
+            profile = "resin"
+            [profiles.resin]
+            max_hole_edges = 9
+            "#,
+        )
+        .unwrap();
+        assert_eq!((config.workers, config.memory, config.folders.len()), (3, 2 << 30, 2));
+        assert_eq!((config.settle, config.rescan), (Some(Duration::from_millis(300)), Some(Duration::from_secs(20))));
+        assert_eq!(config.state, Path::new("/srv/a/.suture/state"));
+        assert_eq!([config.folder_profile("a"), config.folder_profile("b")], ["default", "resin"]);
+        let resin = config.profile("resin").unwrap();
+        assert_eq!((resin.name.as_str(), resin.max_hole_edges), ("resin", 9));
+        assert_eq!(config.time_limit.of(1 << 30), Duration::from_secs(1210));
+    }
+
+    /// Each mistake on its own: words for it, which begin with the line, and say what to do.
+    #[test]
+    fn mistakes_are_named_with_their_line() {
+        let mistakes = [
+            (
+                "workers = 2\nworkres = 3\nfolders = []",
+                "line 2, `workres = 3`: unknown field `workres`, expected one of `folders`",
+            ),
+            ("workers = 2\nworkers = 3", "line 2, `workers = 3`: duplicate key"),
+            ("memory = 2GiB", "line 1, `memory = 2GiB`: "),
+            ("memory = \"lots\"\nfolders = [{ path = \"/a\" }]", "line 1, `memory = \"lots\"`: `lots` is not a size (try 512MiB"),
+            ("\nlarge = true", "line 2, `large = true`: a whole number, or text with a unit"),
+            ("settle = \"soon\"", "line 1, `settle = \"soon\"`: `soon` is not a duration (try 5s"),
+            ("threads = 2\nworkers = 0", "line 2, `workers = 0`: must be at least 1"),
+            ("[[folders]]\npaht = \"/a\"", "line 2, `paht = \"/a\"`: unknown field `paht`, expected one of `path`"),
+            ("[[folders]]\nname = \"a\"", "line 1, `[[folders]]`: missing field `path`"),
+            (
+                "[[folders]]\npath = \"/a\"\nprofile = \"nope\"",
+                "line 3, `profile = \"nope\"`: there is no profile `nope`; name one of default, fast",
+            ),
+            (
+                "[[folders]]\npath = \"/x/a\"\n[[folders]]\npath = \"/y/a\"",
+                "line 4, `path = \"/y/a\"`: two folders are called `a`; give each a `name`",
+            ),
+            (
+                "[[folders]]\npath = \"/x\"\nname = \"a\"\n[[folders]]\npath = \"/x/in/b\"",
+                "line 5, `path = \"/x/in/b\"`: /x/in/b lies in the hot folder /x",
+            ),
+            (
+                "folders = [{ path = \"x\" },\n{ path = \"./y/../x\", name = \"b\" }]",
+                "line 1, `folders = [{ path = \"x\" },`: x and ./y/../x are the same folder",
+            ),
+            (
+                "[[folders]]\npath = \"/a\"\n[profiles.resin]\nfill_holes = true\nweld_relative = 7.0",
+                "line 5, `weld_relative = 7.0`: `weld_relative` must be a number from 0 to 1, not 7",
+            ),
+            (
+                "[[folders]]\npath = \"/a\"\n[profiles.resin]\nfill_holse = true",
+                "line 4, `fill_holse = true`: unknown field `fill_holse`",
+            ),
+        ];
+        for (text, words) in mistakes {
+            let error = from_text(text).unwrap_err();
+            assert!(error.starts_with(words), "{words}: {error}");
+        }
+        for text in ["", "folders = []"] {
+            assert!(from_text(text).unwrap_err().contains("no hot folder; add"));
+        }
+    }
+
+    #[test]
+    fn too_little_memory_is_named_with_the_line_that_says_so() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("suture.toml");
+        for (settings, words) in [
+            ("threads = 1\nmemory = \"5MiB\"", "line 2, `memory = \"5MiB\"`: 5.2 MB of memory are too little for 2 workers"),
+            ("workers = 400", "line 1, `workers = 400`: "),
+        ] {
+            std::fs::write(&path, format!("{settings}\n[[folders]]\npath = \"a\"\n")).unwrap();
+            from_file(&path).expect("an option may add to it");
+            let error = whole(&path).unwrap_err();
+            assert!(error.contains(words), "{error}");
+        }
+    }
+}

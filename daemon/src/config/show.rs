@@ -1,0 +1,133 @@
+//! A configuration as text: every setting with its value, as a file that can be read back.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Duration;
+
+use serde::Serialize;
+use suture_core::Profile;
+use toml::Value;
+
+use super::read::AUTO;
+use super::{Config, FolderConfig};
+use crate::units::{write_duration, write_size};
+use crate::window::RunWindow;
+
+/// For whoever reads the text.
+const HEAD: &str = "\
+# Every setting, as it counts. \"auto\": by file system; settle 5s and rescan 60s, on network mounts 30s and 10s; with --once settle 300ms.
+";
+
+/// Settings of one value, each with the value as it stands in a file.
+pub(crate) fn values(config: &Config) -> Vec<(&'static str, String)> {
+    let auto = |time: Option<Duration>| quoted(&time.map_or_else(|| AUTO.into(), write_duration));
+    let mut values = vec![
+        ("memory", quoted(&write_size(config.memory))),
+        ("workers", config.workers.to_string()),
+        ("threads", config.threads.to_string()),
+        ("large", quoted(&write_size(config.large))),
+        ("reserve", quoted(&write_size(config.reserve))),
+        ("settle", auto(config.settle)),
+        ("rescan", auto(config.rescan)),
+        ("drain", quoted(&write_duration(config.drain))),
+        ("time_limit.base", quoted(&write_duration(config.time_limit.base))),
+        ("time_limit.per_gib", quoted(&write_duration(config.time_limit.per_gib))),
+    ];
+    // Without it, all hours are open, and none is outside.
+    if config.run_window != RunWindow::default() {
+        values.push(("run_window", quoted(&config.run_window.to_string())));
+        values.push(("workers_outside", config.workers_outside.to_string()));
+    }
+    values
+}
+
+/// Text as a value of a file.
+fn quoted(text: &str) -> String {
+    Value::String(text.into()).to_string()
+}
+
+fn path(path: &Path) -> String {
+    quoted(&path.to_string_lossy())
+}
+
+/// The whole configuration.
+///
+/// # Errors
+/// A line for people; none as yet.
+pub(crate) fn text(config: &Config) -> Result<String, String> {
+    let mut text = String::from(HEAD);
+    for (name, value) in values(config) {
+        text += &format!("{name} = {value}\n");
+    }
+    text += &format!("state = {}\n", path(&config.state));
+    for FolderConfig { name, path: root, profile, leave_originals } in &config.folders {
+        text += &format!("\n[[folders]]\npath = {}\nname = {}\nprofile = {}\n", path(root), quoted(name), quoted(profile));
+        text += &format!("leave_originals = {leave_originals}\n");
+    }
+    if !config.profiles.is_empty() {
+        text.push('\n');
+        text += &own_profiles(&config.profiles)?;
+    }
+    Ok(text)
+}
+
+/// Profiles with all of their settings. Their names are those of their tables.
+fn own_profiles(profiles: &BTreeMap<String, Profile>) -> Result<String, String> {
+    #[derive(Serialize)]
+    struct Shown {
+        profiles: BTreeMap<String, Profile>,
+    }
+    let mut shown = Shown { profiles: profiles.clone() };
+    for profile in shown.profiles.values_mut() {
+        profile.name.clear();
+    }
+    let text = toml::to_string(&shown).map_err(|error| format!("the profiles cannot be written: {error}"))?;
+    Ok(text.lines().filter(|line| *line != "name = \"\"").map(|line| format!("{line}\n")).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::read;
+
+    fn read_back(config: &Config) -> Config {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("suture.toml");
+        std::fs::write(&file, text(config).unwrap()).unwrap();
+        read::whole(&file).unwrap()
+    }
+
+    #[test]
+    fn the_defaults_are_read_back() {
+        let config = Config::for_folder(Path::new("prints"));
+        assert_eq!(read_back(&config), config);
+        let text = text(&config).unwrap();
+        for line in ["memory = \"1GiB\"", "settle = \"auto\"", "drain = \"1m\"", "state = \"prints/.suture/state\""] {
+            assert!(text.lines().any(|there| there == line), "{line}: {text}");
+        }
+    }
+
+    #[test]
+    fn whatever_is_set_is_read_back() {
+        let mut config = Config::for_folder(Path::new("a \"b\"/'c'\\d\t"));
+        config.state = "/srv/state of 2".into();
+        config.folders.push(FolderConfig {
+            name: "scans & more".into(),
+            path: "scans".into(),
+            profile: "it's mine".into(),
+            leave_originals: true,
+        });
+        (config.run_window, config.workers_outside) = ("20:00-07:00, 12:00-13:00".parse().unwrap(), 1);
+        (config.memory, config.large, config.reserve) = (3 << 30, 1_500_000_000, 1);
+        (config.workers, config.threads) = (7, 3);
+        (config.settle, config.rescan) = (Some(Duration::from_millis(300)), Some(Duration::from_secs(90)));
+        (config.drain, config.time_limit.base) = (Duration::ZERO, Duration::from_millis(1500));
+        for name in ["it's mine", "resin", "default"] {
+            let mut profile = Profile::built_in("strict").unwrap();
+            profile.name = name.into();
+            (profile.weld_relative, profile.max_hole_edges) = (1.25e-7, u32::MAX);
+            config.profiles.insert(name.into(), profile);
+        }
+        assert_eq!(read_back(&config), config);
+    }
+}

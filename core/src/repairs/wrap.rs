@@ -68,7 +68,7 @@ pub(crate) fn is_broken(work: &mut Work<'_>) -> bool {
         || !components::nonmanifold_vertices(submesh, edges).is_empty()
 }
 
-/// Replaces what is no solid, as far as the profile allows. `pairs`: as [`Overlay::crossing_triangles`] finds them (empty if nobody looked for any);
+/// Replaces what is no solid, as far as the profile allows. `pairs`: as [`Overlay::crossing_triangles`](crate::repairs::shared::overlay::Overlay::crossing_triangles) finds them (empty if nobody looked for any);
 /// Reads the chunks where groups have regular surface, and all for every round of wraps.
 pub(crate) fn replace(
     survey: &Survey<'_>,

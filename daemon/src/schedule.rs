@@ -84,6 +84,8 @@ struct State {
     /// `news` when the store last had nothing for a kind of turn.
     empty: [u64; 3],
     last_alone: Instant,
+    /// When idle slots last asked again.
+    asked: Instant,
 }
 
 impl State {
@@ -118,6 +120,7 @@ impl Schedule {
             news: 1,
             empty: [0; 3],
             last_alone: Instant::now(),
+            asked: Instant::now(),
         };
         Self { state: Mutex::new(state), wake: Condvar::new() }
     }
@@ -138,9 +141,11 @@ impl Schedule {
                 state.alone = turn.is_alone();
                 return Given { turn, news: state.news };
             }
-            let (guard, timeout) = self.wake.wait_timeout(state, ASK_EVERY).unwrap_or_else(PoisonError::into_inner);
+            let (guard, _) = self.wake.wait_timeout(state, ASK_EVERY).unwrap_or_else(PoisonError::into_inner);
             state = guard;
-            if timeout.timed_out() {
+            // However often it is woken for nothing.
+            if state.asked.elapsed() >= ASK_EVERY {
+                state.asked = Instant::now();
                 state.news += 1;
             }
         }
@@ -176,15 +181,19 @@ impl Schedule {
         let is_news = held.is_some() != words.is_some();
         *held = words;
         drop(state);
-        self.wake.notify_all();
+        if is_news {
+            self.wake.notify_all();
+        }
         is_news
     }
 
     /// Lets no more than so many slots work at a time. Returns whether that is news.
     pub(crate) fn limit(&self, most: usize) -> bool {
-        let before = std::mem::replace(&mut self.lock().most, most);
-        self.wake.notify_all();
-        before != most
+        let is_news = std::mem::replace(&mut self.lock().most, most) != most;
+        if is_news {
+            self.wake.notify_all();
+        }
+        is_news
     }
 
     /// Is nothing given out for now?

@@ -105,14 +105,10 @@ fn fixed(old: &Config, new: &Config) -> Vec<String> {
 
 /// Every other difference, in words.
 fn changes(old: &Config, new: &Config) -> Vec<String> {
-    let (was, is): (BTreeMap<_, _>, BTreeMap<_, _>) =
-        (show::values(old).into_iter().collect(), show::values(new).into_iter().collect());
-    let mut names: Vec<&str> = show::values(old).into_iter().chain(show::values(new)).map(|(name, _)| name).collect();
-    let mut seen = BTreeSet::new();
-    names.retain(|name| seen.insert(*name));
-    let value = |of: &BTreeMap<&str, String>, name: &str| of.get(name).cloned().unwrap_or_else(|| "none".into());
-    let differ = names.into_iter().map(|name| (name, value(&was, name), value(&is, name))).filter(|(_, was, is)| was != is);
-    let mut changes: Vec<String> = differ.map(|(name, was, is)| format!("{name} {was} -> {is}")).collect();
+    let values = show::values(old).into_iter().zip(show::values(new)).filter(|(was, is)| was != is);
+    let shown = |value: Option<String>| value.unwrap_or_else(|| "none".into());
+    let mut changes: Vec<String> =
+        values.map(|((name, was), (_, is))| format!("{name} {} -> {}", shown(was), shown(is))).collect();
     for folder in &new.folders {
         let was = old.folder_profile(&folder.name);
         if was != folder.profile {

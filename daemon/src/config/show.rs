@@ -18,10 +18,12 @@ const HEAD: &str = "\
 # Every setting, as it counts. \"auto\": by file system; settle 5s and rescan 60s, on network mounts 30s and 10s; with --once settle 300ms.
 ";
 
-/// Settings of one value, each with the value as it stands in a file.
-pub(crate) fn values(config: &Config) -> Vec<(&'static str, String)> {
+/// Settings of one value, each with the value as it stands in a file; `None`: it stands in none. The same names for every configuration.
+pub(crate) fn values(config: &Config) -> Vec<(&'static str, Option<String>)> {
     let auto = |time: Option<Duration>| quoted(&time.map_or_else(|| AUTO.into(), write_duration));
-    let mut values = vec![
+    // Without it, all hours are open, and none is outside.
+    let hours = config.run_window != RunWindow::default();
+    let always = [
         ("memory", quoted(&write_size(config.memory))),
         ("workers", config.workers.to_string()),
         ("threads", config.threads.to_string()),
@@ -33,12 +35,10 @@ pub(crate) fn values(config: &Config) -> Vec<(&'static str, String)> {
         ("time_limit.base", quoted(&write_duration(config.time_limit.base))),
         ("time_limit.per_gib", quoted(&write_duration(config.time_limit.per_gib))),
     ];
-    // Without it, all hours are open, and none is outside.
-    if config.run_window != RunWindow::default() {
-        values.push(("run_window", quoted(&config.run_window.to_string())));
-        values.push(("workers_outside", config.workers_outside.to_string()));
-    }
-    values
+    let of_hours =
+        [("run_window", quoted(&config.run_window.to_string())), ("workers_outside", config.workers_outside.to_string())];
+    let of_hours = of_hours.map(|(name, value)| (name, hours.then_some(value)));
+    always.map(|(name, value)| (name, Some(value))).into_iter().chain(of_hours).collect()
 }
 
 /// Text as a value of a file.
@@ -56,7 +56,7 @@ fn path(path: &Path) -> String {
 /// A line for people; none as yet.
 pub(crate) fn text(config: &Config) -> Result<String, String> {
     let mut text = String::from(HEAD);
-    for (name, value) in values(config) {
+    for (name, value) in values(config).into_iter().filter_map(|(name, value)| Some((name, value?))) {
         text += &format!("{name} = {value}\n");
     }
     text += &format!("state = {}\n", path(&config.state));

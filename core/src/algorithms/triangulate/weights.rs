@@ -19,7 +19,7 @@ const BEND_STEPS: f64 = 32.0;
 /// Triangles that are weighed together.
 const BLOCK: usize = 32;
 
-/// What counts of a part: the sharpest bend in it, in steps, and its area, which is infinite if there is no such part.
+/// The weight of a part: the sharpest bend in it, in steps, and its area, which is infinite if there is no such part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Weighs {
     pub(super) bend: f64,
@@ -102,7 +102,7 @@ pub(super) struct Chord<'a> {
     pub(super) weight: Weight,
 }
 
-/// What the triangle on one of the apexes weighs, with the parts beyond it, and its unit normal.
+/// The weight of the triangle on one of the apexes, with the parts beyond it, and its unit normal.
 pub(super) fn with_triangle(chord: &Chord<'_>, place: usize) -> (Weighs, DVec3) {
     let weighs = Block::default().weigh(chord, place..place + 1).next().unwrap_or(Weighs::NOTHING_LIKE_IT);
     (weighs, DVec3::from(triangle(chord, chord.apexes.map(|all| all[place])).0))
@@ -203,7 +203,7 @@ fn any_before(chord: &Chord<'_>, places: Range<usize>, than: Weighs) -> bool {
     any
 }
 
-/// What some triangles weigh with the parts beyond them. In arrays of their own, so that several are weighed at a time.
+/// The weights of some triangles with the parts beyond them. In arrays of their own, so that several are weighed at a time.
 struct Block {
     bends: [f64; BLOCK],
     areas: [f64; BLOCK],

@@ -155,7 +155,7 @@ pub(crate) fn coincident(submesh: &Submesh) -> Vec<[u32; 2]> {
     by_twos(&defects::by_vertex_set(submesh))
 }
 
-/// Those that one of these is on the vertices of.
+/// As [`coincident`], of triangles on the vertices of one of these.
 fn coincident_with(submesh: &Submesh, triangles: &[u32]) -> Vec<[u32; 2]> {
     by_twos(&defects::by_vertex_set_of(submesh, triangles))
 }

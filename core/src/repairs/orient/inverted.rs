@@ -75,7 +75,7 @@ struct All<'a> {
     around: Vec<Around>,
     /// Of pieces that cross others: what winds around points spread over them.
     by_points: BTreeMap<u32, Vec<Around>>,
-    /// Those that cross others as well, and of which one point has to tell, since they are too many.
+    /// Further pieces that cross others: they are too many for many points each, so that one point tells.
     unasked: Vec<u32>,
     /// The pieces that cross each other.
     crossing: Vec<[u32; 2]>,

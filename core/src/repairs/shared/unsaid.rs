@@ -19,11 +19,16 @@ pub(crate) fn told(parts: &[f64], most: f64) -> Vec<bool> {
 const MOST_LINES: usize = 10;
 
 /// The first lines, and the number of the others.
-pub(crate) fn summed_up(mut lines: Vec<String>) -> Vec<String> {
-    let more = lines.len().saturating_sub(MOST_LINES);
+pub(crate) fn summed_up(lines: Vec<String>) -> Vec<String> {
+    first(lines, MOST_LINES, |more| format!("the same holds for {more} more"))
+}
+
+/// The first lines, at most so many, and one in these words on how many more there are.
+pub(crate) fn first(mut lines: Vec<String>, most: usize, words: impl FnOnce(usize) -> String) -> Vec<String> {
+    let more = lines.len().saturating_sub(most);
     if more > 0 {
-        lines.truncate(MOST_LINES);
-        lines.push(format!("the same holds for {more} more"));
+        lines.truncate(most);
+        lines.push(words(more));
     }
     lines
 }

@@ -2,6 +2,7 @@
 
 use super::closing::Closing;
 use crate::detect::holes::loops::Loop;
+use crate::repairs::shared::unsaid;
 use crate::submesh::Submesh;
 
 /// What is said of two bodies that a strip was put in between.
@@ -19,13 +20,8 @@ pub(crate) fn bridged(submesh: &Submesh, rims: [&Loop; 2]) -> String {
 const MOST_NAMED: usize = 5;
 
 /// The doubts, the last of very many as their number.
-pub(crate) fn summed_up(mut doubts: Vec<String>) -> Vec<String> {
-    let more = doubts.len().saturating_sub(MOST_NAMED);
-    if more > 0 {
-        doubts.truncate(MOST_NAMED);
-        doubts.push(format!("and at {more} places more, two bodies were made one"));
-    }
-    doubts
+pub(crate) fn summed_up(doubts: Vec<String>) -> Vec<String> {
+    unsaid::first(doubts, MOST_NAMED, |more| format!("and at {more} places more, two bodies were made one"))
 }
 
 impl Closing<'_> {

@@ -17,6 +17,7 @@ use crate::detect::holes::owners;
 use crate::geometry::flatness;
 use crate::repairs::holes::fair::{Beyond, Gathered};
 use crate::repairs::holes::patches::{EXTENDED, ISLANDS, Placed, Planes};
+use crate::repairs::shared::unsaid;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::Components;
 use crate::submesh::{Submesh, Vertex};
@@ -90,11 +91,7 @@ impl Closing<'_> {
         let is_detail = |hole: &Hole<'_>| Body::of(survey, &bodies, hole.first, all).is_detail();
         judged.doubts.extend(gone_on(submesh, &holes, is_detail));
         judged.doubts.extend(opposite::doubt(submesh, &holes));
-        let more = judged.doubts.len().saturating_sub(MOST_SAID);
-        judged.doubts.truncate(MOST_SAID);
-        if more > 0 {
-            judged.doubts.push(format!("{more} more patches are guesses like these"));
-        }
+        judged.doubts = unsaid::first(judged.doubts, MOST_SAID, |more| format!("{more} more patches are guesses like these"));
         judged
     }
 }

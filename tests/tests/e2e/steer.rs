@@ -54,6 +54,8 @@ fn a_pause_holds_over_a_restart_until_an_operator_goes_on() {
     let list = || place.suture(["jobs", "list", "--dir", "hot"]).expect(0).stdout();
     wait_until("it is seen", || list().contains("second.stl"));
     drop(daemon);
+    // A worker outlives its daemon by a moment, and holds the store for that long.
+    wait_until("the store is free", || place.suture(["jobs", "list", "--dir", "hot"]).code() == 0);
     assert!(list().contains("nothing new is taken: an operator has paused it"), "{}", list());
     let daemon = Daemon::start(&place);
     // It has had time for much more than this.

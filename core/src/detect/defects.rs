@@ -67,7 +67,7 @@ fn count_by_edges(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance, threa
         boundary_edges: edges.iter().filter(|e| e.is_boundary()).count() as u64,
         boundary_loops: components::boundary_loops(submesh, edges),
         nonmanifold_edges: edges.iter().filter(|e| e.is_nonmanifold()).count() as u64,
-        nonmanifold_vertices: components::nonmanifold_vertices(submesh, edges).len() as u64,
+        nonmanifold_vertices: components::nonmanifold_vertices(submesh, threads).len() as u64,
         inconsistent_edges: edges.iter().filter(|e| e.is_inconsistent()).count() as u64,
         unbalanced_edges: edges.iter().filter(|e| e.is_unbalanced()).count() as u64,
         noncommon_vertices: near::noncommon_vertices(submesh, edges, tolerance, threads).len() as u64,

@@ -49,6 +49,17 @@ impl BoxTree {
         self.wide.each_meeting(wanted, visit);
     }
 
+    /// Replaces `found` by the parts of the tree, of a few boxes each, that `wanted` meets, unless they are more than `most`; says whether they are not.
+    pub(super) fn leaves_meeting(&self, wanted: &Bounds, most: usize, found: &mut Vec<u32>) -> bool {
+        self.wide.leaves_meeting(wanted, most, found)
+    }
+
+    /// As [`Self::each_meeting`], in these parts of the tree only.
+    #[inline(always)]
+    pub(super) fn each_of_leaves(&self, leaves: &[u32], wanted: &Bounds, visit: impl FnMut(u32)) {
+        self.wide.each_of_leaves(leaves, wanted, visit);
+    }
+
     /// Visits the numbers of all boxes that meet a triangle, and maybe of some beside it. A long triangle that lies askew meets few of those that its box
     /// meets. The box may lie beside its plane, or beside an edge (three of the planes of Akenine-Möller, "Fast 3D triangle-box overlap testing", JGT 6(1), 2001).
     pub(crate) fn each_along(&self, corners: &[[f32; 3]; 3], mut visit: impl FnMut(u32)) {

@@ -14,6 +14,7 @@ pub(crate) mod distance;
 pub(crate) mod exact;
 pub(crate) mod flatness;
 pub(crate) mod grid;
+pub(crate) mod places;
 pub(crate) mod position;
 pub(crate) mod ray_grid;
 pub(crate) mod self_crossing;

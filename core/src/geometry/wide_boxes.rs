@@ -71,20 +71,55 @@ impl WideTree {
     pub(super) fn each_meeting(&self, wanted: &Bounds, mut visit: impl FnMut(u32)) {
         let wanted = Wanted { lo: wanted.lo.map(Vec4::splat), hi: wanted.hi.map(Vec4::splat) };
         if let Some(top) = self.levels.len().checked_sub(1) {
-            self.descend((top, 0), &wanted, &mut visit);
+            self.descend((top, 0), &wanted, 0, &mut |place| {
+                if let Some(number) = self.order.get(place) {
+                    visit(*number);
+                }
+            });
         }
     }
 
-    /// As deep as there are levels.
-    fn descend(&self, (level, node): (usize, usize), wanted: &Wanted, visit: &mut impl FnMut(u32)) {
+    /// Replaces `found` by the nodes of sixteen boxes whose own box meets `wanted`, unless they are more than `most`; says whether they are not.
+    pub(super) fn leaves_meeting(&self, wanted: &Bounds, most: usize, found: &mut Vec<u32>) -> bool {
+        found.clear();
+        let of = Wanted { lo: wanted.lo.map(Vec4::splat), hi: wanted.hi.map(Vec4::splat) };
+        match self.levels.len() {
+            0 => {}
+            1 => found.push(0),
+            levels => self.descend((levels - 1, 0), &of, 1, &mut |leaf| {
+                if found.len() <= most {
+                    found.push(leaf as u32);
+                }
+            }),
+        }
+        found.len() <= most
+    }
+
+    /// As [`Self::each_meeting`], in these nodes only.
+    #[inline(always)]
+    pub(super) fn each_of_leaves(&self, leaves: &[u32], wanted: &Bounds, mut visit: impl FnMut(u32)) {
+        let wanted = Wanted { lo: wanted.lo.map(Vec4::splat), hi: wanted.hi.map(Vec4::splat) };
+        for leaf in leaves {
+            let mut lanes = self.levels[0][*leaf as usize].meeting(&wanted);
+            while lanes != 0 {
+                if let Some(number) = self.order.get(*leaf as usize * WIDTH + lanes.trailing_zeros() as usize) {
+                    visit(*number);
+                }
+                lanes &= lanes - 1;
+            }
+        }
+    }
+
+    /// As deep as there are levels above `bottom`: visits what lies below them, by place.
+    fn descend(&self, (level, node): (usize, usize), wanted: &Wanted, bottom: usize, visit: &mut impl FnMut(usize)) {
         let mut lanes = self.levels[level][node].meeting(wanted);
         while lanes != 0 {
             let below = node * WIDTH + lanes.trailing_zeros() as usize;
             lanes &= lanes - 1;
-            if level > 0 {
-                self.descend((level - 1, below), wanted, visit);
-            } else if let Some(number) = self.order.get(below) {
-                visit(*number);
+            if level > bottom {
+                self.descend((level - 1, below), wanted, bottom, visit);
+            } else {
+                visit(below);
             }
         }
     }

@@ -227,7 +227,7 @@ fn probe_bodies(cx: &mut Context<'_, '_>) {
         || cx.before.nested_positive > 0
         || cx.profile.bodies == Bodies::Visible
         || cx.profile.check_self_intersections && cx.survey.crossing_pairs.as_ref().is_none_or(|pairs| !pairs.is_empty())
-        || wrap::is_broken(&mut cx.work);
+        || wrap::is_broken(&mut cx.work, cx.survey.threads());
     if may_lose {
         let pieces = cx.pieces();
         cx.handed.probes = Some(Probes::of(cx.survey, &cx.work, &cx.reversed, &pieces));

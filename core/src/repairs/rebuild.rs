@@ -30,7 +30,8 @@ pub(crate) const REPAIR: Repair = Repair {
     name: RepairName::Rebuild,
     changes: Changes::Surface,
     run: |cx| {
-        let is_wanted = cx.profile.guarantee == Guarantee::Wrap && (cx.handed.may_cross || wrap::is_broken(&mut cx.work));
+        let is_wanted = cx.profile.guarantee == Guarantee::Wrap
+            && (cx.handed.may_cross || wrap::is_broken(&mut cx.work, cx.survey.threads()));
         let rebuilt = if is_wanted { rebuild(cx) } else { Rebuilt::default() };
         let (count, triangles) = (rebuilt.places, rebuilt.triangles);
         rebuilt.tell(cx);

@@ -38,7 +38,8 @@ pub(crate) const REPAIR: Repair = Repair {
     name: RepairName::Wrap,
     changes: Changes::Surface,
     run: |cx| {
-        let is_wanted = cx.profile.guarantee == Guarantee::Wrap && (cx.handed.may_cross || is_broken(&mut cx.work));
+        let is_wanted =
+            cx.profile.guarantee == Guarantee::Wrap && (cx.handed.may_cross || is_broken(&mut cx.work, cx.survey.threads()));
         let mut count = 0;
         if is_wanted {
             let pairs = if cx.profile.check_self_intersections { cx.crossing() } else { Some([].into()) };
@@ -62,10 +63,9 @@ pub(crate) const REPAIR: Repair = Repair {
 const ROUNDS: usize = 8;
 
 /// Is anything of the submesh no closed, coherent, manifold surface? O(submesh).
-pub(crate) fn is_broken(work: &mut Work<'_>) -> bool {
-    let (submesh, edges) = work.edges();
-    edges.iter().any(|edge| edge.uses.len() != 2 || edge.is_unbalanced())
-        || !components::nonmanifold_vertices(submesh, edges).is_empty()
+pub(crate) fn is_broken(work: &mut Work<'_>, threads: usize) -> bool {
+    work.edges().1.iter().any(|edge| edge.uses.len() != 2 || edge.is_unbalanced())
+        || !components::nonmanifold_vertices(work, threads).is_empty()
 }
 
 /// Replaces what is no solid, as far as the profile allows. `pairs`: as [`Overlay::crossing_triangles`](crate::repairs::shared::overlay::Overlay::crossing_triangles) finds them (empty if nobody looked for any);

@@ -130,12 +130,12 @@ impl<'a> Source for Seen<'a> {
 
 impl<'a> Seen<'a> {
     /// As [`Source::for_each`], each triangle with its place among them. Passes over triangles whose stretch of the file lies in no box that is
-    /// `near`, as far as boxes are known. `state` is at hand for both.
+    /// `near`, as far as boxes are known: what `near` does to `state` is there for the triangles of that stretch.
     #[inline(always)]
     pub(crate) fn each_near<S>(
         &self,
         state: &mut S,
-        near: &impl Fn(&S, &Bounds) -> bool,
+        near: &impl Fn(&mut S, &Bounds) -> bool,
         mut visit: impl FnMut(&mut S, usize, u32, Either<'a>),
     ) {
         match self {

@@ -41,7 +41,7 @@ impl Stretches {
         &self,
         (first, count): (u32, u32),
         state: &mut S,
-        near: &impl Fn(&S, &Bounds) -> bool,
+        near: &impl Fn(&mut S, &Bounds) -> bool,
         mut visit: impl FnMut(&mut S, u32, u32),
     ) {
         let (mut at, end) = (first as usize, first as usize + count as usize);
@@ -97,7 +97,7 @@ mod tests {
             let at = |i: usize| Bounds { lo: [i as f32, 0.0, 0.0], hi: [i as f32; 3] };
             let stretches = Stretches::new((0..near.len()).map(at).collect(), 100);
             let mut got = Vec::new();
-            let is_near = |_: &Vec<u32>, b: &Bounds| near[b.lo[0] as usize];
+            let is_near = |_: &mut Vec<u32>, b: &Bounds| near[b.lo[0] as usize];
             stretches.each_near((first, count), &mut got, &is_near, |got, first, count| got.extend(first..first + count));
             let want: Vec<u32> = (first..first + count).filter(|i| near.get(*i as usize / 100) != Some(&false)).collect();
             prop_assert_eq!(got, want);

@@ -7,7 +7,7 @@ use crate::geometry::sums::{Bounds, Extent};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 use crate::util::parallel;
-use crate::util::union_find::{self, find, unite};
+use crate::util::union_find::{self, unite};
 
 /// Which regions of regular surface are reversed, against how they stand in the file, and which go. Triangles of the submesh are turned, or die, in
 /// place.
@@ -219,36 +219,55 @@ pub(crate) fn boundary_loops(submesh: &Submesh, edges: &Edges) -> u64 {
     (0..parents.len()).filter(|v| on_boundary[*v] && parents[*v] == *v as u32).count() as u64
 }
 
-/// Vertices on a non-manifold edge, or with more than one fan. A fan hangs together through two-triangle edges.
-pub(crate) fn nonmanifold_vertices(submesh: &Submesh, edges: &Edges) -> Vec<Vertex> {
-    let mut bad = vec![false; submesh.positions.len()];
-    let mut parents: Vec<u32> = (0..submesh.triangles.len() as u32 * 3).collect();
-    let corner = |t: u32, v: Vertex| t * 3 + submesh.triangles[t as usize].v.iter().position(|w| *w == v).unwrap_or(0) as u32;
-    for edge in edges.iter() {
-        if edge.is_nonmanifold() {
-            bad[edge.low as usize] = true;
-            bad[edge.high as usize] = true;
-        } else if let [a, b] = edge.uses {
-            for v in [edge.low, edge.high] {
-                unite(&mut parents, corner(a.triangle, v), corner(b.triangle, v));
+/// Vertices on a non-manifold edge, or with more than one fan, ascending. A fan hangs together through two-triangle edges. O(stars).
+pub(crate) fn nonmanifold_vertices(submesh: &Submesh, threads: usize) -> Vec<Vertex> {
+    const BLOCK: usize = 1 << 12;
+    let count = submesh.positions.len();
+    let of_block = |around: &mut Around, block: usize| {
+        let own = (block * BLOCK..count.min((block + 1) * BLOCK)).map(|v| v as Vertex);
+        own.filter(|v| submesh.complete[*v as usize] && around.is_nonmanifold(submesh, *v)).collect::<Vec<_>>()
+    };
+    let blocks = parallel::map_with(threads, count.div_ceil(BLOCK), Around::default, of_block);
+    blocks.into_iter().flatten().collect()
+}
+
+/// What stands around a vertex; its space is used again for the next.
+#[derive(Default)]
+struct Around {
+    /// The other ends of the edges there, each with a triangle by its place in the star.
+    ends: Vec<(Vertex, u32)>,
+    /// Triangles that hang together.
+    parents: Vec<u32>,
+}
+
+impl Around {
+    fn is_nonmanifold(&mut self, submesh: &Submesh, vertex: Vertex) -> bool {
+        self.ends.clear();
+        for (place, (t, k)) in (0..).zip(submesh.star(vertex)) {
+            let v = submesh.triangles[t as usize].v;
+            self.ends.extend([(v[(k + 1) % 3], place), (v[(k + 2) % 3], place)]);
+        }
+        self.ends.sort_unstable();
+        let mut fans = self.ends.len() / 2;
+        self.parents.clear();
+        self.parents.extend(0..fans as u32);
+        for edge in self.ends.chunk_by(|a, b| a.0 == b.0) {
+            match edge {
+                [_] => {}
+                [a, b] => fans -= usize::from(unite(&mut self.parents, a.1, b.1)),
+                _ => return true,
             }
         }
+        fans > 1
     }
-    (0..submesh.positions.len() as u32)
-        .filter(|v| {
-            if !submesh.complete[*v as usize] {
-                return false;
-            }
-            let mut fans = submesh.star(*v).map(|(t, k)| find(&mut parents, t * 3 + k as u32));
-            bad[*v as usize] || fans.next().is_some_and(|first| fans.any(|f| f != first))
-        })
-        .collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
-    use crate::testing::{Corners, cube, cuboid, diagnose, plate, records};
+    use crate::testing::{Corners, cube, cuboid, diagnose, plate, records, soup};
 
     /// Components through every edge, between sheets, and joined where these are open: how many, and how many of them open.
     fn counted(triangles: &[Corners]) -> [(usize, usize); 3] {
@@ -258,6 +277,31 @@ mod tests {
         let of = |through| Components::of(&d.survey, &d.submesh, &edges, &Reversed::none(&d.survey), through);
         let all = [of(Through::EveryEdge), of(Through::ManifoldEdges), of(Through::ManifoldEdges).joined_where_open(&edges)];
         all.map(|c| (c.list.len(), c.list.iter().filter(|c| c.open).count()))
+    }
+
+    proptest! {
+        /// As all edges tell it: on one that has not one or two triangles, or between triangles that no such edges lead from one to the other.
+        #[test]
+        fn nonmanifold_vertices_are_those_that_edges_tell(mesh in soup()) {
+            let records = records(&mesh);
+            let d = diagnose(&records);
+            let edges = Edges::of(&d.submesh);
+            let is_nonmanifold = |v: &Vertex| {
+                let star: Vec<u32> = d.submesh.star(*v).map(|(t, _)| t).collect();
+                let at_vertex = || edges.iter().filter(|e| e.low == *v || e.high == *v);
+                let mut reached: Vec<u32> = star.first().copied().into_iter().collect();
+                while let Some(next) = at_vertex().filter(|e| e.uses.len() == 2).find_map(|e| {
+                    let [a, b] = [e.uses[0].triangle, e.uses[1].triangle];
+                    [(a, b), (b, a)].into_iter().find(|(a, b)| reached.contains(a) && !reached.contains(b)).map(|(_, b)| b)
+                }) {
+                    reached.push(next);
+                }
+                at_vertex().any(|e| e.is_nonmanifold()) || reached.len() < star.len()
+            };
+            let all = 0..d.submesh.positions.len() as Vertex;
+            let want: Vec<Vertex> = all.filter(|v| d.submesh.complete[*v as usize]).filter(is_nonmanifold).collect();
+            prop_assert_eq!(nonmanifold_vertices(&d.submesh, 1), want);
+        }
     }
 
     #[test]
@@ -279,12 +323,11 @@ mod tests {
         let ring = records(&plate(3, |x, y| (x, y) != (1, 1)));
         let d = diagnose(&ring);
         assert_eq!(boundary_loops(&d.submesh, &Edges::of(&d.submesh)), 2);
-        assert!(nonmanifold_vertices(&d.submesh, &Edges::of(&d.submesh)).is_empty());
+        assert!(nonmanifold_vertices(&d.submesh, 2).is_empty());
         // Two squares that touch in one corner: two fans there.
         let pinched = records(&plate(2, |x, y| x == y));
         let d = diagnose(&pinched);
-        let bad: Vec<[f32; 3]> =
-            nonmanifold_vertices(&d.submesh, &Edges::of(&d.submesh)).iter().map(|v| d.submesh.positions[*v as usize]).collect();
+        let bad: Vec<[f32; 3]> = nonmanifold_vertices(&d.submesh, 2).iter().map(|v| d.submesh.positions[*v as usize]).collect();
         assert_eq!(bad, [[1.0, 1.0, 0.0]]);
     }
 }

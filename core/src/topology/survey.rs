@@ -347,13 +347,13 @@ impl<'a> Survey<'a> {
     }
 
     /// As [`Self::visit_regular`], those that `pass`. `make` is given the box of all regular triangles that a chunk sees, and says `None` if none of
-    /// them is of interest; `near` is given the box of some of them, and says false only if none in it passes.
+    /// them is of interest; `near` is given the box of some of them before these are visited, and says false only if none in it passes.
     /// `passes` is asked before it is found out whose turn a triangle is, which may take longer.
     pub(crate) fn visit_regular_near<R: Send>(
         &self,
         wanted: impl Fn(u32) -> bool + Sync,
         make: impl Fn(&Bounds) -> Option<R> + Sync,
-        near: impl Fn(&R, &Bounds) -> bool + Sync,
+        near: impl Fn(&mut R, &Bounds) -> bool + Sync,
         passes: impl Fn(&R, &[[f32; 3]; 3]) -> bool + Sync,
         visit: impl Fn(&mut R, u32, u32) + Sync,
     ) -> Vec<R> {

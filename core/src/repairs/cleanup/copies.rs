@@ -10,7 +10,7 @@ use crate::contract::report::RepairName;
 use crate::contract::settings::Profile;
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::distance::distance;
-use crate::geometry::grid::Grid;
+use crate::geometry::places::{Places, Stretch};
 use crate::geometry::sums::Bounds;
 use crate::repairs::cleanup::duplicates;
 use crate::repairs::shared::context::{Changes, Done, Repair};
@@ -116,31 +116,29 @@ fn hanging(submesh: &Submesh, edges: &Edges, tolerance: &Tolerance) -> Vec<u32> 
 /// The patches that lie on a triangle of the regular surface.
 fn on_regular(survey: &Survey<'_>, lone: &[Lone]) -> Vec<bool> {
     let boxes: Vec<Bounds> = lone.iter().map(|l| around(&l.corners, l.reach)).collect();
-    let mut everything = Bounds::EMPTY;
-    boxes.iter().for_each(|b| everything.add(b));
-    let tree = BoxTree::new(&boxes);
-    let mut grid = Grid::default();
-    grid.mark(boxes.iter().copied());
-    let lying_on = |corners: &Corners| {
-        let mut found = Vec::new();
-        let bounds = Bounds::of(corners);
-        if grid.may_meet(&bounds) {
-            tree.meeting(&bounds, &mut found);
-            found.retain(|l| lone[*l as usize].lies_on(corners, 1.0));
-        }
-        found
+    let places = Places::of(&boxes);
+    let lying_on = |stretch: &Stretch, corners: &Corners, visit: &mut dyn FnMut(u32)| {
+        places.each_meeting(stretch, &Bounds::of(corners), |l| {
+            if lone[l as usize].lies_on(corners, 1.0) {
+                visit(l);
+            }
+        });
     };
     let found = survey.visit_regular_near(
         |_| true,
-        |reach| reach.overlap(&everything).map(|_| Vec::new()),
-        |_, bounds| grid.may_meet(bounds),
-        |_, corners| !lying_on(corners).is_empty(),
-        |found: &mut Vec<u32>, triangle, _| {
-            found.extend(lying_on(&crate::io::record::corners(&survey.records[triangle as usize])));
+        |reach| places.within(reach).map(|stretch| (stretch, Vec::new())),
+        |(stretch, _), bounds| places.enter(stretch, bounds),
+        |(stretch, _), corners| {
+            let mut is_under = false;
+            lying_on(stretch, corners, &mut |_| is_under = true);
+            is_under
+        },
+        |(stretch, found): &mut (Stretch, Vec<u32>), triangle, _| {
+            lying_on(stretch, &crate::io::record::corners(&survey.records[triangle as usize]), &mut |l| found.push(l));
         },
     );
     let mut is_copy = vec![false; lone.len()];
-    found.into_iter().flatten().for_each(|l| is_copy[l as usize] = true);
+    found.into_iter().flat_map(|(_, found)| found).for_each(|l| is_copy[l as usize] = true);
     is_copy
 }
 

@@ -14,6 +14,9 @@ use crate::submesh::edges::Edges;
 use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
 
+/// Walls that may have been surface that is drawn twice are told of from this share of all area.
+const SPECK: f64 = 1e-3;
+
 /// What the report says of copies that are gone.
 pub(crate) const NOTE: &str = "triangles on the vertices of another one";
 
@@ -53,7 +56,7 @@ pub(crate) struct Dropped {
     pub(crate) all: u64,
     /// Of these, walls that two bodies had in common: the bodies are one now.
     pub(crate) walls: u64,
-    /// Of these, such as may have been surface that is drawn twice.
+    /// Of these, such as may have been surface that is drawn twice, if they are a considerable part of the surface.
     pub(crate) unsure: u64,
 }
 
@@ -117,14 +120,24 @@ fn drop_others(
     let mut doomed = spare(submesh, edges, &copies);
     let surplus = back_to_back::surplus(survey, submesh, edges, &pairs, &doomed);
     doomed.extend(&surplus.sides);
+    let unsure = if bodies == Bodies::Keep || is_speck(survey, work, &surplus.unsure) { 0 } else { surplus.unsure.len() as u64 };
     work.is_changed_by(RepairName::Duplicate);
     doomed.iter().for_each(|t| work.kill(*t));
     // Bodies that are kept keep their walls, whole or not.
     let (walls, halves) = if bodies == Bodies::Keep { (&[][..], &[][..]) } else { (&surplus.common[..], &surplus.halves[..]) };
     work.is_changed_by(RepairName::CommonWall);
     walls.iter().chain(halves).for_each(|t| work.kill(*t));
-    let unsure = if bodies == Bodies::Keep { 0 } else { surplus.unsure };
     Dropped { all: (doomed.len() + walls.len() + halves.len()) as u64, walls: walls.len() as u64, unsure }
+}
+
+/// Are these triangles together no more than a speck of the surface? O(submesh), if there are any.
+fn is_speck(survey: &Survey<'_>, work: &mut Work<'_>, triangles: &[u32]) -> bool {
+    if triangles.is_empty() {
+        return true;
+    }
+    let all: i128 = work.components(survey).list.iter().map(|piece| piece.extent.area).sum();
+    let part: i128 = triangles.iter().map(|t| survey.measure.triangle(&work.points(*t)).area).sum();
+    part as f64 <= SPECK * all as f64
 }
 
 /// Those of the copies without which the surface is no farther from closed. Where two bodies have part of their surface in common, each needs

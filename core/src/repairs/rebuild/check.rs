@@ -89,7 +89,7 @@ pub(crate) fn verdict(cx: &mut Context<'_, '_>, cuts: &[Cut], owners: &Owners, f
         return verdict;
     }
     let there: BTreeSet<u32> = cuts.iter().map(|cut| cut.place).collect();
-    let mut blamed = wrong(&mut cx.work, owners, first);
+    let mut blamed = wrong(&mut cx.work, owners, first, cx.survey.threads());
     tracing::debug!(places = ?blamed, "Places where the surface is no manifold.");
     blamed.extend(taken(cx, owners));
     verdict.blamed = blamed.intersection(&there).copied().collect();
@@ -121,7 +121,7 @@ pub(crate) fn verdict(cx: &mut Context<'_, '_>, cuts: &[Cut], owners: &Owners, f
 }
 
 /// Places with an edge that has not two coherent triangles, a vertex of several fans, or a triangle of no area.
-fn wrong(work: &mut Work<'_>, owners: &Owners, first: u32) -> BTreeSet<u32> {
+fn wrong(work: &mut Work<'_>, owners: &Owners, first: u32, threads: usize) -> BTreeSet<u32> {
     let (submesh, edges) = work.edges();
     let mut wrong: BTreeSet<u32> = BTreeSet::new();
     for edge in edges.iter().filter(|e| e.uses.len() != 2 || e.is_inconsistent()) {
@@ -130,7 +130,7 @@ fn wrong(work: &mut Work<'_>, owners: &Owners, first: u32) -> BTreeSet<u32> {
             wrong.extend([a, b]);
         }
     }
-    wrong.extend(nonmanifold_vertices(submesh, edges).into_iter().filter_map(|v| owners.of_vertex(v)));
+    wrong.extend(nonmanifold_vertices(submesh, threads).into_iter().filter_map(|v| owners.of_vertex(v)));
     let new = (first..submesh.triangles.len() as u32).filter(|t| submesh.lives(*t));
     wrong.extend(new.filter(|t| submesh.is_collinear(*t)).filter_map(|t| owners.of_new(t)));
     wrong

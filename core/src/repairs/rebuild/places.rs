@@ -41,7 +41,7 @@ pub(crate) fn find(cx: &mut Context<'_, '_>) -> Option<Vec<Place>> {
     let wrong = wrong.filter(|e| !left_open.contains(&[e.low, e.high]));
     let mut seeds: BTreeSet<u32> = wrong.flat_map(|e| e.uses).map(|used| used.triangle).collect();
     let on_purpose: BTreeSet<Vertex> = left_open.iter().flatten().copied().collect();
-    for v in nonmanifold_vertices(submesh, edges) {
+    for v in nonmanifold_vertices(submesh, cx.survey.threads()) {
         if !on_purpose.contains(&v) {
             seeds.extend(submesh.star(v).map(|(t, _)| t));
         }

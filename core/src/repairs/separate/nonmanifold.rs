@@ -59,14 +59,13 @@ const MOST_PAIRS: usize = 1 << 20;
 
 /// Takes surfaces apart at all vertices where that is possible. O(submesh) and a look at all boxes around what moves, if anything does.
 pub(crate) fn separate(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reversed, profile: &Profile) -> Separated {
-    let (submesh, edges) = work.edges();
-    let vertices = if profile.separate { nonmanifold_vertices(submesh, edges) } else { Vec::new() };
+    let vertices = if profile.separate { nonmanifold_vertices(work, survey.threads()) } else { Vec::new() };
     if vertices.is_empty() {
         return Separated::default();
     }
     let before = Before {
-        triangles: submesh.triangles.clone(),
-        taken: submesh.positions.iter().copied().map(Position::of).collect(),
+        triangles: work.triangles.clone(),
+        taken: work.positions.iter().copied().map(Position::of).collect(),
         farthest: profile.max_separation_relative * survey.bounds.diagonal(),
     };
     let mut from = BTreeMap::new();
@@ -78,10 +77,9 @@ pub(crate) fn separate(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reve
         let copies = std::mem::take(&mut apart.copies);
         let first = apart.first;
         if blamed.is_empty() {
-            let (submesh, edges) = work.edges();
-            let mut done = Separated::default().but(submesh, &nonmanifold_vertices(submesh, edges));
+            let mut done = Separated::default().but(work, &nonmanifold_vertices(work, survey.threads()));
             let away: Vec<f64> = copies.iter().map(|copy| copy.away).collect();
-            done.regions = regions(submesh, first, &away);
+            done.regions = regions(work, first, &away);
             for copy in copies {
                 *if copy.of.is_edge() { &mut done.edges } else { &mut done.vertices } += 1;
                 done.farthest = done.farthest.max(copy.away);

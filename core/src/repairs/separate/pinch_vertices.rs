@@ -64,8 +64,7 @@ pub(crate) fn unpin(
     if separated.left == 0 {
         return;
     }
-    let (submesh, edges) = work.edges();
-    let vertices = nonmanifold_vertices(submesh, edges);
+    let vertices = nonmanifold_vertices(work, survey.threads());
     complete_around(survey, work, reversed, &vertices[..vertices.len().min(MOST)]);
     let (submesh, edges) = work.edges();
     let radial = RadialPairs::of(submesh, edges);
@@ -84,7 +83,7 @@ pub(crate) fn unpin(
         let (added_by, regions) = put_in(work, &all);
         match blamed(survey, work, reversed, first, &added_by, &met_before) {
             Some(blamed) if blamed.is_empty() => {
-                separated.closed(work, regions);
+                separated.closed(survey, work, regions);
                 return;
             }
             Some(blamed) => {
@@ -183,7 +182,8 @@ fn blamed(
     let (submesh, edges) = work.edges();
     let of_pairs = edges.iter().filter(|edge| edge.uses.len() > 2).flat_map(|edge| edge.uses).map(|used| used.triangle);
     blamed.extend(of_pairs.filter_map(by));
-    let met: HashSet<Vertex> = nonmanifold_vertices(submesh, edges).into_iter().filter(|v| !met_before.contains(v)).collect();
+    let met: HashSet<Vertex> =
+        nonmanifold_vertices(submesh, survey.threads()).into_iter().filter(|v| !met_before.contains(v)).collect();
     blamed.extend(added.filter(|t| submesh.triangles[*t as usize].v.iter().any(|v| met.contains(v))).filter_map(by));
     let overlay = Overlay::of(survey, submesh, reversed)?;
     let pairs = overlay.met_by(survey, submesh, |t| t >= first)?;

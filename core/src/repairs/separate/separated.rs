@@ -8,6 +8,7 @@ use crate::repairs::shared::region_report::Unsettled;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::nonmanifold_vertices;
 use crate::submesh::{Submesh, Vertex};
+use crate::topology::survey::Survey;
 use std::fmt;
 
 /// Counts and distances of the surfaces that were taken apart.
@@ -31,12 +32,11 @@ pub(crate) struct Separated {
 
 impl Separated {
     /// Some fans were closed without their vertex.
-    pub(crate) fn closed(&mut self, work: &mut Work<'_>, mut regions: Vec<Region>) {
+    pub(crate) fn closed(&mut self, survey: &Survey<'_>, work: &Work<'_>, mut regions: Vec<Region>) {
         self.removed += regions.len() as u64;
         self.farthest = regions.iter().fold(self.farthest, |farthest, region| farthest.max(region.moved));
         self.regions.append(&mut regions);
-        let (submesh, edges) = work.edges();
-        *self = std::mem::take(self).but(submesh, &nonmanifold_vertices(submesh, edges));
+        *self = std::mem::take(self).but(work, &nonmanifold_vertices(work, survey.threads()));
     }
 
     /// At these vertices surfaces still meet.

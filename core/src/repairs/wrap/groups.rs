@@ -53,7 +53,7 @@ impl Groups {
             edge.uses.windows(2).for_each(|pair| groups.unite(of(pair[0].triangle), of(pair[1].triangle)));
             edge.uses.iter().for_each(|u| groups.broken[of(u.triangle) as usize] = true);
         }
-        for v in components::nonmanifold_vertices(submesh, edges) {
+        for v in components::nonmanifold_vertices(submesh, survey.threads()) {
             let around: Vec<u32> = submesh.star(v).map(|(t, _)| of(t)).collect();
             around.iter().for_each(|piece| groups.broken[*piece as usize] = true);
             around.windows(2).for_each(|pair| groups.unite(pair[0], pair[1]));

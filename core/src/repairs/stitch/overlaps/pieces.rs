@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::distance::place;
-use crate::geometry::grid::Grid;
+use crate::geometry::places::{Places, Stretch};
 use crate::geometry::sums::Bounds;
 use crate::geometry::tri_tri::Triangle as Corners;
 use crate::io::record;
@@ -14,6 +14,7 @@ use crate::submesh::Submesh;
 use crate::submesh::components::{Component, Components};
 use crate::submesh::near::Tolerance;
 use crate::topology::survey::Survey;
+use crate::util::parallel;
 
 /// Surfaces lie on each other within this share of the diagonals of their boxes together.
 const LAP: f64 = 1e-4;
@@ -126,35 +127,24 @@ impl Pieces {
         is_wanted: impl Fn(u32) -> bool + Sync,
         boxes: &[Bounds],
     ) -> Option<Vec<Member>> {
-        let tree = BoxTree::new(boxes);
-        let mut grid = Grid::default();
-        grid.mark(boxes.iter().copied());
-        let mut everything = Bounds::EMPTY;
-        boxes.iter().for_each(|b| everything.add(b));
-        let meets = |corners: &Corners| {
-            let bounds = Bounds::of(corners);
-            let mut found = Vec::new();
-            grid.may_meet(&bounds) && {
-                tree.meeting(&bounds, &mut found);
-                !found.is_empty()
-            }
-        };
-        let mut all = Vec::new();
-        for t in submesh.living() {
+        let places = Places::of(boxes);
+        let everywhere = Stretch::default();
+        let living: Vec<u32> = submesh.living().collect();
+        let mut all = parallel::gather(survey.threads(), &living, |_, (_, t), all| {
             let (piece, corners) = (self.components.of_triangle[t as usize], submesh.points(t));
-            if is_wanted(piece) && meets(&corners) {
+            if is_wanted(piece) && places.meet(&everywhere, &Bounds::of(&corners)) {
                 all.push(Member { piece, corners, number: Number::Submesh(t) });
             }
-        }
+        });
         let of_region = &self.components.of_region;
         let found = survey.visit_regular_near(
             |region| is_wanted(of_region[region as usize]),
-            |reach| reach.overlap(&everything).map(|_| Vec::new()),
-            |_, bounds| grid.may_meet(bounds),
-            |_, corners| meets(corners),
-            |found: &mut Vec<(u32, u32)>, triangle, region| found.push((triangle, region)),
+            |reach| places.within(reach).map(|stretch| (stretch, Vec::new())),
+            |(stretch, _), bounds| places.enter(stretch, bounds),
+            |(stretch, _), corners| places.meet(stretch, &Bounds::of(corners)),
+            |(_, found): &mut (Stretch, Vec<(u32, u32)>), triangle, region| found.push((triangle, region)),
         );
-        let mut regular: Vec<(u32, u32)> = found.into_iter().flatten().collect();
+        let mut regular: Vec<(u32, u32)> = found.into_iter().flat_map(|(_, found)| found).collect();
         regular.sort_unstable();
         all.extend(regular.into_iter().map(|(record, region)| {
             let corners = record::corners(&survey.records[record as usize]);

@@ -101,16 +101,15 @@ impl Boundary {
         };
         let all: Vec<RimEdge> = edges.iter().zip(0..).filter(|(e, _)| e.is_boundary()).map(rim_edge).collect();
         let vertices = boundary_vertices(edges);
-        let rim_of = by_vertex(submesh, edges);
-        Self {
-            shortest: vertices.iter().map(|v| submesh.shortest_edge(*v)).collect(),
-            is_body: bodies(survey, submesh, edges, &components, &rim_of),
-            of_rim: all.iter().map(|e| rim_of[e.ends[0] as usize]).collect(),
-            middles: BoxTree::new(&all.iter().map(|e| middle(submesh, e.ends, 0.0)).collect::<Vec<_>>()),
-            edges: all,
-            vertices,
-            components,
-        }
+        let middles = || BoxTree::new(&all.iter().map(|e| middle(submesh, e.ends, 0.0)).collect::<Vec<_>>());
+        let rims = || {
+            let rim_of = by_vertex(submesh, edges);
+            let of_rim = all.iter().map(|e| rim_of[e.ends[0] as usize]).collect();
+            (of_rim, bodies(survey, submesh, edges, &components, &rim_of))
+        };
+        let (middles, (of_rim, is_body)) = parallel::both(survey.threads(), middles, rims);
+        let shortest = vertices.iter().map(|v| submesh.shortest_edge(*v)).collect();
+        Self { edges: all, vertices, shortest, components, of_rim, is_body, middles }
     }
 }
 

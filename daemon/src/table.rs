@@ -118,7 +118,7 @@ fn wraps(out: &mut String, report: &Report) {
         );
         match &wrap.left {
             Some(reason) => item(out, "left", &format!("no solid: {what}: {reason}")),
-            None => item(out, "wrapped", &format!("{what}, moved by up to {:.4}", wrap.moved)),
+            None => item(out, "wrapped", &format!("{what}, moved by up to {:.3e}", wrap.moved)),
         }
     }
     if report.wraps.len() > LOOPS_SHOWN {

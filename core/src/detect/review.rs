@@ -7,6 +7,7 @@ use crate::contract::report::{Defects, Region, SheetDropped, Skin, SkinChange, V
 use crate::contract::settings::{Bodies, Profile};
 use crate::detect::fidelity::Measured;
 use crate::geometry::sums::Bounds;
+use crate::util::words::{Short, span};
 
 /// What the repairs know and a person would want to, beside what can be counted in the result.
 #[derive(Clone, Debug, Default)]
@@ -133,9 +134,9 @@ fn measured(rule: &'static str, figure: Option<f64>, limit: f64, words: impl FnO
 /// The surface that wraps have replaced.
 fn wraps(wraps: &[Wrap], profile: &Profile) -> Measured {
     let done = || wraps.iter().filter(|wrap| wrap.left.is_none());
-    let moved = done().map(|wrap| wrap.moved).fold(0.0, f64::max);
+    let moved = Short(done().map(|wrap| wrap.moved).fold(0.0, f64::max));
     measured("wrapped", Some(done().map(|wrap| wrap.area_share).sum()), profile.wrap_review_share, |share| {
-        format!("{:.1} % of the surface was replaced by wraps, and moved by up to {moved:.4}", share * 100.0)
+        format!("{:.1} % of the surface was replaced by wraps, and moved by up to {moved}", share * 100.0)
     })
 }
 
@@ -164,7 +165,7 @@ fn area(change: &Change<'_>, profile: &Profile) -> Measured {
     let share = |after: f64| (after - before) / before;
     let (all, unexplained) = (share(after), share(after - change.evidence.explained.area));
     measured("area", (before > 0.0).then_some(all.abs().min(unexplained.abs())), profile.max_area_change, |_| {
-        format!("the area changed by {:.1} %, from {before} to {after}", all * 100.0)
+        format!("the area changed by {:.1} %, from {} to {}", all * 100.0, Short(before), Short(after))
     })
 }
 
@@ -182,7 +183,9 @@ fn outline(change: &Change<'_>, profile: &Profile) -> Measured {
     });
     let diagonal = surface.diagonal();
     let share = most.map(|most| if most > 0.0 { most / diagonal } else { 0.0 });
-    measured("box", share, profile.max_box_change_relative, |_| format!("the bounding box moved by {}", most.unwrap_or(0.0)))
+    measured("box", share, profile.max_box_change_relative, |_| {
+        format!("the bounding box moved by {}", Short(most.unwrap_or(0.0)))
+    })
 }
 
 /// The change of the volume. What lay in the material of others was counted twice.
@@ -197,13 +200,14 @@ fn volume(change: &Change<'_>, profile: &Profile) -> Measured {
     let once = meant.map(|meant| meant - enclosed.volume);
     let share = once.map(|once| if once > 0.0 { (after.volume - once).abs() / once } else { f64::INFINITY });
     measured("volume", share, profile.max_volume_change, |share| {
-        let (twice, after) = (enclosed.volume, after.volume);
+        let (twice, after) = (Short(enclosed.volume), Short(after.volume));
         match (meant, once) {
             (Some(meant), Some(once)) if once <= 0.0 => {
+                let meant = Short(meant);
                 format!("the file enclosed {meant}; of that, {twice} was counted twice, and the result encloses {after}")
             }
             (_, once) => {
-                format!("the volume changed by {:.1} %, from {} to {after}", share * 100.0, once.unwrap_or(0.0))
+                format!("the volume changed by {:.1} %, from {} to {after}", share * 100.0, Short(once.unwrap_or(0.0)))
             }
         }
     })
@@ -214,10 +218,9 @@ fn volumes(volumes: Option<&Volumes>, profile: &Profile) -> [Measured; 2] {
     let lost = volumes.map(|v| v.lost as f64);
     let outside = volumes.map(|v| if v.volume > 0.0 { v.outside / v.volume } else { 0.0 });
     let bodies = measured("bodies_outside", lost, f64::from(profile.max_bodies_lost), |lost| {
-        let largest = volumes.and_then(|v| v.listed.first()).map_or(String::new(), |body| {
-            let [lo, hi] = body.bounds;
-            format!(", the largest from {lo:?} to {hi:?} of {:.4} units³", body.volume)
-        });
+        let largest = volumes
+            .and_then(|v| v.listed.first())
+            .map_or(String::new(), |body| format!(", the largest {} of {} units³", span(body.bounds), Short(body.volume)));
         format!("{lost} of {} bodies are not inside the result{largest}", volumes.map_or(0, |v| v.bodies))
     });
     let volume = measured("volume_outside", outside, profile.max_volume_change, |share| {
@@ -232,10 +235,10 @@ fn cavities(change: &Change<'_>, profile: &Profile) -> Measured {
     let volumes = change.volumes.filter(|_| profile.bodies != Bodies::Visible);
     let filled = volumes.map(|volumes| if all > 0.0 { volumes.filled / all } else { 0.0 });
     measured("cavities_filled", filled, profile.max_cavities_filled, |share| {
-        let largest = change.volumes.and_then(|v| v.filled_listed.first()).map_or(String::new(), |cavity| {
-            let [lo, hi] = cavity.bounds;
-            format!(", the largest from {lo:?} to {hi:?}")
-        });
+        let largest = change
+            .volumes
+            .and_then(|v| v.filled_listed.first())
+            .map_or(String::new(), |cavity| format!(", the largest {}", span(cavity.bounds)));
         format!("cavities of {:.1} % of the volume are filled by what else lies there{largest}", share * 100.0)
     })
 }
@@ -244,13 +247,10 @@ fn cavities(change: &Change<'_>, profile: &Profile) -> Measured {
 fn skin(skin: Option<&Skin>, profile: &Profile) -> [Measured; 2] {
     let words = |change: &SkinChange, what: &str, from: &str| {
         let by: Vec<&str> = change.causes.iter().take(3).map(|cause| cause.repair.as_str()).collect();
-        let place = change.places.first().map_or(String::new(), |place| {
-            let [lo, hi] = place.bounds;
-            format!(", most of it from {lo:?} to {hi:?}")
-        });
+        let place = change.places.first().map_or(String::new(), |place| format!(", most of it {}", span(place.bounds)));
         let share = change.share * 100.0;
-        let (by, farthest) = (by.join(", "), change.farthest);
-        format!("{what} by {by}: {share:.2} % of the surface, up to {farthest:.4} away from {from}{place}")
+        let (by, farthest) = (by.join(", "), Short(change.farthest));
+        format!("{what} by {by}: {share:.2} % of the surface, up to {farthest} away from {from}{place}")
     };
     let of = |rule, change: Option<&SkinChange>, limit, what, from| {
         measured(rule, change.map(|change| change.share), limit, |_| {
@@ -271,10 +271,7 @@ fn sheets(before: &Defects, dropped: &[SheetDropped], profile: &Profile) -> [Mea
     let all: f64 = dropped.iter().map(|sheet| sheet.area).sum();
     // Nothing tells against one that crosses nothing and is not hidden but that it is open.
     let free: f64 = dropped.iter().filter(|sheet| !sheet.crosses && !sheet.hidden).map(|sheet| sheet.area).sum();
-    let largest = dropped.first().map_or(String::new(), |sheet| {
-        let [lo, hi] = sheet.bounds;
-        format!(", the largest from {lo:?} to {hi:?}")
-    });
+    let largest = dropped.first().map_or(String::new(), |sheet| format!(", the largest {}", span(sheet.bounds)));
     let count = dropped.len();
     let words =
         |share: f64| format!("open sheets dropped that bound nothing, {count} of {:.1} % of the area{largest}", share * 100.0);

@@ -21,6 +21,7 @@ use crate::geometry::sums::Bounds;
 use crate::repairs::holes::fill;
 use crate::repairs::shared::context::{Changes, Context, Done, Repair};
 use crate::repairs::wrap;
+use crate::util::words::Short;
 use check::{Owners, Verdict};
 use places::Place;
 use regions::{Cut, Stays};
@@ -186,8 +187,8 @@ impl Rebuilt {
         let moved = self.moved / cx.survey.bounds.diagonal();
         if area.max(volume).max(moved) > cx.profile.wrap_review_share {
             cx.account.doubts.push(format!(
-                "{} places that nothing else made valid were cut out and closed anew: {:.2} % of the surface, which moved by up to {:.4}, and {:.2} % of the volume",
-                self.places, area * 100.0, self.moved, volume * 100.0
+                "{} places that nothing else made valid were cut out and closed anew: {:.2} % of the surface, which moved by up to {}, and {:.2} % of the volume",
+                self.places, area * 100.0, Short(self.moved), volume * 100.0
             ));
         }
     }

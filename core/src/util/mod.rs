@@ -3,7 +3,7 @@
 //! **In:** closures, keys, counters.
 //! **Out:** threads that are a help and never a need ([`parallel`]), sorts by digits ([`radix`]), disjoint sets ([`union_find`], and [`parity`] for what agrees or disagrees), numbers
 //! in few bytes ([`varint`]), what a run costs ([`cost`]), counted steps of loops ([`steps`]), numbers in
-//! no order ([`scatter`]), sets of numbers ([`bits`]), what the machine has ([`machine`]).
+//! no order ([`scatter`]), sets of numbers ([`bits`]), what the machine has ([`machine`]), numbers as people read them ([`words`]).
 //! **Promise:** nothing here knows a triangle. Parallel work returns its results in the order of its items, so that no result depends on
 //! the number of threads.
 
@@ -18,3 +18,4 @@ pub(crate) mod scatter;
 pub(crate) mod steps;
 pub(crate) mod union_find;
 pub(crate) mod varint;
+pub(crate) mod words;

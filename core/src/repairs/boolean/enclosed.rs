@@ -28,6 +28,7 @@ use crate::submesh::components::{Component, Components, Reversed};
 use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
+use crate::util::words::{Short, span};
 
 /// Specks of which nothing is told are together no more than this share of all volume.
 const SPECK: f64 = 1e-3;
@@ -48,13 +49,14 @@ pub(crate) const REPAIR: Repair = Repair {
         cx.account.regions.append(&mut enclosed.regions);
         cx.account.enclose(bodies, volume);
         cx.account.enclosed.filled = volume;
-        if let Some(Bounds { lo, hi }) = enclosed.left {
+        if let Some(bounds) = enclosed.left {
             cx.account.doubts.push(format!(
                 "a body lies in the material of another one, and a repair has closed or turned one of both: it may stand in a vessel, or bound a hollow; \
-                 the largest is from {lo:?} to {hi:?}"
+                 the largest is {}",
+                span([bounds.lo, bounds.hi])
             ));
         }
-        let note = format!("bodies in the material of others removed: {bodies}, of {volume:.4} units³ together");
+        let note = format!("bodies in the material of others removed: {bodies}, of {} units³ together", Short(volume));
         Ok(Done { changed, ..Done::count(bodies, note) })
     },
 };

@@ -34,6 +34,7 @@ use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed};
 use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
+use crate::util::words::Short;
 
 /// Surface that other surface hides.
 pub(crate) const REPAIR: Repair = Repair {
@@ -81,9 +82,10 @@ pub(crate) struct Hidden {
 impl std::fmt::Display for Hidden {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let others = self.pieces - self.bodies - self.cavities;
-        let Self { bodies, volume, cavities, filled, .. } = self;
-        write!(f, "pieces of surface removed that others hide in all six directions; bodies: {bodies}, of {volume:.4} units³, ")?;
-        write!(f, "cavities, which are filled thereby: {cavities}, of {filled:.4} units³, sheets and others: {others}")
+        let Self { bodies, cavities, .. } = self;
+        let (volume, filled) = (Short(self.volume), Short(self.filled));
+        write!(f, "pieces of surface removed that others hide in all six directions; bodies: {bodies}, of {volume} units³, ")?;
+        write!(f, "cavities, which are filled thereby: {cavities}, of {filled} units³, sheets and others: {others}")
     }
 }
 

@@ -46,6 +46,7 @@ use crate::submesh::components::{Component, Components, Reversed};
 use crate::submesh::{Origin, Vertex};
 use crate::topology::survey::{Division, Survey};
 use crate::util::ids::NONE;
+use crate::util::words::Short;
 
 /// Surfaces that cross each other, and the patches that were to be cut.
 pub(crate) const REPAIR: Repair = Repair { name: RepairName::SelfIntersection, changes: Changes::Surface, run: account_for };
@@ -72,8 +73,10 @@ fn account_for(cx: &mut Context<'_, '_>) -> Result<Done> {
     cx.handed.intersections_left.extend(left);
     let Resolved { pairs, rounds, displaced, bodies, volume, .. } = resolved;
     let note = format!(
-        "pairs of triangles that crossed; rounds: {rounds}, vertices moved by at most {displaced:e}, bodies that became part of others: \
-         {bodies}, with {volume:.4} units³ of them"
+        "pairs of triangles that crossed; rounds: {rounds}, vertices moved by at most {}, bodies that became part of others: \
+         {bodies}, with {} units³ of them",
+        Short(displaced),
+        Short(volume)
     );
     Ok(Done { changed, ..Done::count(pairs, note) })
 }

@@ -25,6 +25,7 @@ use crate::submesh::components::{Components, Reversed};
 use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
+use crate::util::words::{Short, span};
 
 /// Bodies in the material of others that become cavities.
 pub(crate) const REPAIR: Repair = Repair { name: RepairName::Hollow, changes: Changes::Outward, run };
@@ -41,13 +42,14 @@ fn run(cx: &mut Context<'_, '_>) -> crate::contract::error::Result<Done> {
     // It was counted as material, and is taken off now; or the other way round.
     cx.account.enclose(count, 2.0 * (hollow + filled));
     for bounds in guessed {
-        let Bounds { lo, hi } = bounds.normalised();
+        let bounds = bounds.normalised();
         cx.account.doubts.push(format!(
             "most triangles of a body in the material of another one say that it is one, others that it is a cavity, which it was taken for: \
-             from {lo:?} to {hi:?}"
+             {}",
+            span([bounds.lo, bounds.hi])
         ));
     }
-    Ok(Done::count(count, format!("bodies in the material of others turned into cavities, of {hollow:.4} units³ together")))
+    Ok(Done::count(count, format!("bodies in the material of others turned into cavities, of {} units³ together", Short(hollow))))
 }
 
 /// A piece of which more than this share of the triangles was turned, and more than this share was not, says nothing of its direction.

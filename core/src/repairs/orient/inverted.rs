@@ -20,6 +20,7 @@ use crate::repairs::shared::unsaid;
 use crate::submesh::Submesh;
 use crate::submesh::components::{Component, Components, Reversed};
 use crate::topology::survey::Survey;
+use crate::util::words::span;
 
 /// Pieces that cross others of opposite sign and are looked at point by point: the largest. Of others one point tells.
 const MOST: usize = 1024;
@@ -160,10 +161,11 @@ impl All<'_> {
             (true, false) | (false, true) if share.is_none_or(|share| share < PLAINLY) => "a cavity",
             _ => return None,
         };
-        let Bounds { lo, hi } = self.list[c as usize].bounds.normalised();
+        let bounds = self.list[c as usize].bounds.normalised();
         let share = share.map_or("an unknown part".into(), |share| format!("{:.0} %", share * 100.0));
         Some(format!(
-            "surface that faces inward crosses other bodies, and {share} of it lies in their material: it was taken for {meant}, from {lo:?} to {hi:?}"
+            "surface that faces inward crosses other bodies, and {share} of it lies in their material: it was taken for {meant}, {}",
+            span([bounds.lo, bounds.hi])
         ))
     }
 }

@@ -4,10 +4,10 @@
 //! turned with it: the file does not tell, so it is told (`thin`).
 
 use crate::geometry::boxes::BoxTree;
-use crate::geometry::sums::Bounds;
 use crate::repairs::shared::unsaid;
 use crate::submesh::components::{Component, Components};
 use crate::topology::survey::Survey;
+use crate::util::words::span;
 
 /// A wall is none if it is thinner than this share of the diagonal of its body's box ...
 const NO_WALL: f64 = 1e-3;
@@ -76,10 +76,10 @@ pub(crate) fn thin(survey: &Survey<'_>, pieces: &Components, turned: &[bool]) ->
     });
     let told = unsaid::told(&found.iter().map(|(body, _)| volume(*body)).collect::<Vec<_>>(), SPECK * all);
     let line = |(body, wall): (usize, f64)| {
-        let Bounds { lo, hi } = pieces.list[body].bounds.normalised();
+        let bounds = pieces.list[body].bounds.normalised();
         format!(
-            "a body that was inside out has a cavity with a wall of {wall:.2e} around it, which may be a copy of it that is inside out as well: from \
-             {lo:?} to {hi:?}"
+            "a body that was inside out has a cavity with a wall of {wall:.2e} around it, which may be a copy of it that is inside out as well: {}",
+            span([bounds.lo, bounds.hi])
         )
     };
     unsaid::summed_up(found.into_iter().zip(told).filter(|(_, told)| *told).map(|(found, _)| line(found)).collect())

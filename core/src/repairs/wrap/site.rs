@@ -16,6 +16,7 @@ use crate::submesh::components::{Components, Reversed};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 use crate::util::parallel;
+use crate::util::words::Short;
 use glam::DVec3;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -168,7 +169,7 @@ impl Site<'_, '_> {
         outcome.triangles = new;
         let farthest = self.profile.wrap_max_move * self.survey.bounds.diagonal();
         if outcome.told.moved > farthest {
-            outcome.give_up(&format!("the surface would move by more than the profile's {farthest:.4}"));
+            outcome.give_up(&format!("the surface would move by more than the profile's {}", Short(farthest)));
         }
     }
 

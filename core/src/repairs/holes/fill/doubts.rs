@@ -4,15 +4,16 @@ use super::closing::Closing;
 use crate::detect::holes::loops::Loop;
 use crate::repairs::shared::unsaid;
 use crate::submesh::Submesh;
+use crate::util::words::{At, Short};
 
 /// What is said of two bodies that a strip was put in between.
 pub(crate) fn bridged(submesh: &Submesh, rims: [&Loop; 2]) -> String {
     let first = |rim: &Loop| submesh.place(rim.vertices[0]);
     let (from, others) = (first(rims[0]), &rims[1].vertices);
     let apart = others.iter().map(|v| submesh.place(*v).distance(from)).fold(f64::INFINITY, f64::min);
-    let [x, y, z] = submesh.positions[rims[0].vertices[0] as usize];
+    let (at, apart) = (At(submesh.positions[rims[0].vertices[0] as usize]), Short(apart));
     format!(
-        "two bodies were joined by a strip at ({x}, {y}, {z}), over {apart:.4}: each could also be closed by itself; see whether they were one"
+        "two bodies were joined by a strip at {at}, over {apart}: each could also be closed by itself; see whether they were one"
     )
 }
 
@@ -31,10 +32,9 @@ impl Closing<'_> {
         let tried = self.placed.iter().filter(|patch| patch.rims.contains(&rim));
         if tried.flat_map(|patch| &patch.obstacles).any(|obstacle| obstacle.joins_large) {
             let rim = self.rim(rim);
-            let [x, y, z] = submesh.positions[rim.vertices[0] as usize];
-            let length = rim.perimeter(submesh);
+            let (at, length) = (At(submesh.positions[rim.vertices[0] as usize]), Short(rim.perimeter(submesh)));
             self.doubts.push(format!(
-                "the patch over a hole at ({x}, {y}, {z}), {length:.4} around, runs into another body, which becomes one with its own: see whether it should"
+                "the patch over a hole at {at}, {length} around, runs into another body, which becomes one with its own: see whether it should"
             ));
         }
     }

@@ -22,6 +22,7 @@ use crate::repairs::shared::work::Work;
 use crate::submesh::components::Components;
 use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
+use crate::util::words::At;
 
 /// Patches of planes are in doubt if another one differs by more than this share of all volume.
 const IN_DOUBT: f64 = 0.001;
@@ -85,7 +86,7 @@ impl Closing<'_> {
                 (_, [a, b]) => judged.ring(submesh, patch, [*a, *b].map(|rim| self.rim(rim)), body),
                 _ => None,
             };
-            judged.doubts.extend(doubt.map(|doubt| format!("{doubt}, at {:?}", submesh.points(first)[0])));
+            judged.doubts.extend(doubt.map(|doubt| format!("{doubt}, at {}", At(submesh.points(first)[0]))));
         }
         let holes = opposite::holes(self, survey, submesh, &bodies);
         let is_detail = |hole: &Hole<'_>| Body::of(survey, &bodies, hole.first, all).is_detail();
@@ -103,16 +104,18 @@ fn gone_on(submesh: &Submesh, holes: &[Hole<'_>], is_detail: impl Fn(&Hole<'_>) 
     // A short rim hides little.
     let is_large = |hole: &&Hole<'_>| hole.mouth.perimeter.powi(3) >= GOES_ON * hole.volume;
     for hole in holes.iter().filter(is_large).filter(|hole| !is_detail(hole)) {
-        let at = submesh.points(hole.first)[0];
+        let at = At(submesh.points(hole.first)[0]);
         let told = |volume: f64| Some(volume / hole.volume).filter(|share| *share > GOES_ON).map(|share| share * 100.0);
         doubts.extend(told(across(submesh, hole)).map(|share| {
-            format!("sharp edges end at a hole and may go on across it: {share:.1} % of the body would differ, at {at:?}")
+            format!("sharp edges end at a hole and may go on across it: {share:.1} % of the body would differ, at {at}")
         }));
         let of_body = mouths.entry(hole.body).or_default();
         if of_body.len() < MOST_MOUTHS && hole.goes_on.abs() <= END {
             let between = of_body.iter().map(|other| opposite::between(&hole.mouth, &other.mouth)).fold(0.0, f64::max);
             doubts.extend(told(between).map(|share| {
-                format!("two mouths of one body face each other: a piece in between may be missing, {share:.1} % of the body, at {at:?}")
+                format!(
+                    "two mouths of one body face each other: a piece in between may be missing, {share:.1} % of the body, at {at}"
+                )
             }));
             of_body.push(hole);
         }

@@ -18,6 +18,7 @@ use crate::submesh::edges::Edges;
 use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
+use crate::util::words::span;
 
 /// A sheet is closed by patches of at least this share of its area then.
 const WIDE: f64 = 0.25;
@@ -81,8 +82,10 @@ pub(super) fn doubts(survey: &Survey<'_>, work: &mut Work<'_>) -> Vec<String> {
             _ if leans.abs() >= LEANS && is_in_another(c, body) => "in the space of another body",
             _ => return None,
         };
-        let (lo, hi) = (bounds.lo, bounds.hi);
-        Some((c, format!("a sheet was closed {how} and is a body now: it may have bounded nothing; from {lo:?} to {hi:?}")))
+        Some((
+            c,
+            format!("a sheet was closed {how} and is a body now: it may have bounded nothing; {}", span([bounds.lo, bounds.hi])),
+        ))
     };
     let lines: Vec<(usize, String)> = sheets.into_iter().filter_map(line).collect();
     let areas: Vec<f64> = lines.iter().map(|(c, _)| share(bodies.list[*c].extent.area, all_area)).collect();

@@ -8,16 +8,16 @@ use jiff::Timestamp;
 use jiff::tz::TimeZone;
 use suture_core::Report;
 use suture_store::job::{Area, Kind};
-use suture_store::{Job, JobId, SledStore, State, StoreError, Time};
+use suture_store::{Job, JobId, State, Time};
 
 use crate::cli::{JobsArgs, JobsCommand};
-use crate::config::default_state;
-use crate::control::{Answer, Wish, answer, ask};
+use crate::control::{DaemonWish, JobsWish};
 use crate::exit::Exit;
+use crate::reach::{self, Failure};
 use crate::receipt::REPORT;
 use crate::say::{complain, plain};
 use crate::schedule::Standing;
-use crate::{standstill, table, watch, watchdog};
+use crate::{standstill, table};
 
 /// Does what the command line asks.
 pub(crate) fn run(args: &JobsArgs) -> Exit {
@@ -25,16 +25,14 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
         JobsCommand::Pause => return paused(&args.dir, true),
         JobsCommand::Resume => return paused(&args.dir, false),
         JobsCommand::Drain => return drained(&args.dir),
-        JobsCommand::List { .. } => Wish::List,
-        JobsCommand::Show { id } => Wish::Show(JobId(*id)),
-        JobsCommand::Retry { id } => Wish::Retry(JobId(*id)),
-        JobsCommand::Cancel { id } => Wish::Cancel(JobId(*id)),
+        JobsCommand::List { .. } => JobsWish::List,
+        JobsCommand::Show { id } => JobsWish::Show(JobId(*id)),
+        JobsCommand::Retry { id } => JobsWish::Retry(JobId(*id)),
+        JobsCommand::Cancel { id } => JobsWish::Cancel(JobId(*id)),
     };
-    let mut jobs = match reach(&args.dir, &wish) {
-        Ok(Answer::Jobs(jobs)) => jobs,
-        Ok(Answer::Standing(_)) => Vec::new(),
-        Ok(Answer::Failed { line, exit_code }) => return fail(&line, exit_code),
-        Err((line, exit)) => return fail(&line, exit.code()),
+    let mut jobs = match reach::jobs(&args.dir, &wish) {
+        Ok(jobs) => jobs,
+        Err(failure) => return fail(&failure),
     };
     let summary = summary(&jobs);
     if let JobsCommand::List { state, newest } = &args.command {
@@ -69,24 +67,24 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
 /// Pauses the daemon of a hot folder, or lets it go on; if none runs, the next one.
 fn paused(dir: &Path, paused: bool) -> Exit {
     let how = if paused { "paused: nothing new is taken" } else { "files are taken again" };
-    match steer(dir, if paused { &Wish::Pause } else { &Wish::Resume }) {
+    match reach::daemon(dir, &if paused { DaemonWish::Pause } else { DaemonWish::Resume }) {
         Ok(Some(Standing { running, .. })) if paused && running > 0 => say(&format!("{how}; {running} in work will be finished")),
         Ok(Some(_)) => say(how),
         Ok(None) => say(&format!("{how}, when a daemon runs again")),
-        Err((line, exit)) => fail(&line, exit.code()),
+        Err(failure) => fail(&failure),
     }
 }
 
 /// Pauses, and waits for the jobs in work.
 fn drained(dir: &Path) -> Exit {
-    let mut wish = Wish::Pause;
+    let mut wish = DaemonWish::Pause;
     loop {
-        match steer(dir, &wish) {
+        match reach::daemon(dir, &wish) {
             Ok(Some(Standing { running: 1.., .. })) => std::thread::sleep(LOOK_EVERY),
             Ok(_) => return say("drained: nothing is in work; `suture jobs resume` goes on"),
-            Err((line, exit)) => return fail(&line, exit.code()),
+            Err(failure) => return fail(&failure),
         }
-        wish = Wish::Standing;
+        wish = DaemonWish::Standing;
     }
 }
 
@@ -98,87 +96,17 @@ fn say(line: &str) -> Exit {
     Exit::Good
 }
 
+fn fail(failure: &Failure) -> Exit {
+    complain(&failure.line);
+    failure.exit
+}
+
 /// Why a daemon takes nothing new, if one runs and does not, or the next one would not.
 fn held(dir: &Path) -> Vec<String> {
-    match steer(dir, &Wish::Standing) {
+    match reach::daemon(dir, &DaemonWish::Standing) {
         Ok(Some(standing)) => standing.held,
-        Ok(None) if standstill::is_set(&state_of(dir)) => vec![standstill::WORDS.into()],
+        Ok(None) if standstill::is_set(&reach::state_of(dir)) => vec![standstill::WORDS.into()],
         _ => Vec::new(),
-    }
-}
-
-/// Asks the daemon of a hot folder; without one, notes the wish for the next, and there is no standing.
-fn steer(dir: &Path, wish: &Wish) -> Result<Option<Standing>, (String, Exit)> {
-    match asked(dir, wish)? {
-        Some(Answer::Standing(standing)) => Ok(Some(standing)),
-        Some(Answer::Failed { line, .. }) => Err((line, Exit::TryAgain)),
-        Some(Answer::Jobs(_)) => Err(("the daemon's answer cannot be understood".into(), Exit::TryAgain)),
-        None => {
-            let note = |paused| standstill::set(&state_of(dir), paused);
-            let noted = match wish {
-                Wish::Pause => note(true),
-                Wish::Resume => note(false),
-                _ => Ok(()),
-            };
-            noted.map(|()| None).map_err(|error| (format!("the pause cannot be noted: {error}"), Exit::TryAgain))
-        }
-    }
-}
-
-fn fail(line: &str, code: u8) -> Exit {
-    complain(&line);
-    match code {
-        73 => Exit::Owned,
-        75 => Exit::TryAgain,
-        _ => Exit::Refused,
-    }
-}
-
-/// Through the running daemon, or through the store itself.
-pub(crate) fn reach(dir: &Path, wish: &Wish) -> Result<Answer, (String, Exit)> {
-    if let Some(answer) = asked(dir, wish)? {
-        return Ok(answer);
-    }
-    let state = state_of(dir);
-    if !state.is_dir() {
-        return Ok(Answer::Jobs(Vec::new()));
-    }
-    watchdog::start(|| watch::end_hanging()).map_err(|error| (format!("no thread can be started: {error}"), Exit::TryAgain))?;
-    let failed = |error: StoreError| (error.to_string(), if error.exit_code() == 73 { Exit::Owned } else { Exit::TryAgain });
-    // To look needs no right to write, and no room.
-    match wish {
-        Wish::List => Ok(Answer::Jobs(SledStore::peek(&state).map_err(failed)?)),
-        Wish::Show(id) => {
-            let job = SledStore::peek(&state).map_err(failed)?.into_iter().find(|job| job.id == *id);
-            let unknown = || Answer::failed(&StoreError::Unknown(*id));
-            Ok(job.map_or_else(unknown, |job| Answer::Jobs(vec![job])))
-        }
-        Wish::Retry(_) | Wish::Cancel(_) | Wish::Pause | Wish::Resume | Wish::Standing => {
-            Ok(answer(&SledStore::open(&state).map_err(failed)?, wish))
-        }
-    }
-}
-
-/// The running daemon's answer; `None` if none runs.
-fn asked(dir: &Path, wish: &Wish) -> Result<Option<Answer>, (String, Exit)> {
-    if !dir.join(".suture").is_dir() {
-        return Err((format!("{}: is no hot folder (try --dir DIR)", dir.display()), Exit::Refused));
-    }
-    ask(dir, wish).map_err(|error| {
-        let silent = matches!(error.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut);
-        let line = match silent {
-            true => "the daemon does not answer: it is stopped, or very busy; try again".into(),
-            false => format!("the daemon's answer was cut off or cannot be understood: {error}; try again"),
-        };
-        (line, Exit::TryAgain)
-    })
-}
-
-fn state_of(dir: &Path) -> PathBuf {
-    use std::os::unix::ffi::OsStringExt;
-    match std::fs::read(dir.join(".suture").join("state-path")) {
-        Ok(path) => std::ffi::OsString::from_vec(path).into(),
-        Err(_) => default_state(dir),
     }
 }
 

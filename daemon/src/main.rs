@@ -27,6 +27,7 @@ mod profiles;
 mod protocol;
 mod publish;
 mod publish_error;
+mod reach;
 mod receipt;
 mod rights;
 mod say;

@@ -15,16 +15,16 @@ use suture_store::Lease;
 use suture_store::job::{Death as StoreDeath, Duty, Kind, Withdrawal};
 use suture_store::{Claim, Ending, Job, JobStore, State, Step, StoreError, crash_point};
 
+use crate::choice;
 use crate::claim::{CLAIMED, Claimed, Unclaimed, claim};
 use crate::config::Config;
 use crate::create;
 use crate::folder::Folder;
 use crate::fsx::Identity;
-use crate::profiles;
 use crate::protocol::Request;
 use crate::publish::{Conclusion, Desk, OUTPUT, discard};
 use crate::publish_error::PublishError;
-use crate::schedule::{Schedule, Turn};
+use crate::schedule::{Schedule, Turn, Waits};
 use crate::settings::Settings;
 use crate::supervise::{Cause, Death, Ended, Worker};
 
@@ -111,30 +111,30 @@ impl<'a> Slot<'a> {
 
     /// Works until the schedule says stop.
     pub(crate) fn run(&mut self) {
+        let context = self.context;
+        let filter = |turn: Turn| turn.filter(context.settings.now().large);
+        let look = || Waits::of(|turn| context.store.waiting(&filter(turn)));
         loop {
-            let given = self.context.schedule.next();
-            if given.turn == Turn::Stop {
-                return;
-            }
-            if given.turn.is_alone() {
+            let turn = match context.schedule.next(&look) {
+                Ok(Turn::Stop) => return,
+                Ok(turn) => turn,
+                Err(error) => return context.fail(error),
+            };
+            if turn.is_alone() {
                 // Its memory belongs to the large file now.
                 self.worker = None;
             }
-            let claim = self.context.store.claim(&given.turn.filter(self.context.settings.now().large));
-            let found = match claim {
+            match context.store.claim(&filter(turn)) {
                 Ok(Some(claim)) => {
                     crash_point("daemon.claimed");
                     let job = claim.job.clone();
-                    self.finish(&claim, job, given.turn);
-                    true
+                    self.finish(&claim, job, turn);
                 }
-                Ok(None) => false,
-                Err(error) => {
-                    self.context.fail(error);
-                    false
-                }
-            };
-            self.context.schedule.done(given, found);
+                // Another slot was faster.
+                Ok(None) => {}
+                Err(error) => context.fail(error),
+            }
+            context.schedule.done(turn);
         }
     }
 
@@ -255,7 +255,7 @@ impl<'a> Slot<'a> {
         // This attempt's to its end, whatever is read meanwhile.
         let config = context.settings.now();
         // A setting that a person has to mend, or a machine that has no process to give, is no try of the file's.
-        let profile = match find_profile(&config, folder, job) {
+        let profile = match choice::profile(&config, folder, job) {
             Ok(profile) => profile,
             Err(reason) => return Worked::Step(Step::Wait { reason }),
         };
@@ -389,19 +389,6 @@ fn limits(config: &Config, turn: Turn) -> Limits {
     let alone = turn.is_alone();
     let memory = if alone { config.memory } else { config.memory / config.workers.max(1) as u64 };
     Limits::default().with_memory(memory).with_threads(if alone { config.threads } else { 1 })
-}
-
-/// The settings for a file: of its folder or one above it, else by name.
-fn find_profile(config: &Config, folder: &Folder, job: &Job) -> Result<Profile, String> {
-    let inbox = folder.inbox();
-    let path = inbox.join(job.source.path.to_path());
-    for above in path.ancestors().skip(1).take_while(|above| above.starts_with(&inbox)) {
-        let own = above.join(profiles::FOLDER_FILE);
-        if own.is_file() {
-            return profiles::from_file(&own);
-        }
-    }
-    config.profile(&job.source.profile).ok_or_else(|| format!("there is no profile `{}` any more", job.source.profile))
 }
 
 /// Is the output the very file that the worker wrote, synced and read back?

@@ -14,7 +14,7 @@ use std::time::Duration;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use suture_store::{Control, Job, JobId, JobStore, Query, StoreError};
+use suture_store::{Control, Job, JobId, JobStore, Priority, Query, StoreError};
 
 use crate::attempt::Context;
 use crate::fsx::Identity;
@@ -40,6 +40,8 @@ pub(crate) enum JobsWish {
     Show(JobId),
     Retry(JobId),
     Cancel(JobId),
+    /// It is wanted sooner, or later.
+    Rank(JobId, Priority),
 }
 
 /// What is asked of a daemon: only one that runs can answer.
@@ -121,6 +123,7 @@ pub(crate) fn answer(store: &dyn JobStore, wish: &JobsWish) -> Result<Vec<Job>, 
         JobsWish::Show(id) => store.get(*id)?.ok_or(StoreError::Unknown(*id))?,
         JobsWish::Retry(id) => store.control(*id, Control::Retry)?,
         JobsWish::Cancel(id) => store.control(*id, Control::Cancel)?,
+        JobsWish::Rank(id, priority) => store.control(*id, Control::Rank(*priority))?,
     };
     Ok(vec![one])
 }
@@ -145,7 +148,7 @@ fn change(context: &Context, wish: &JobsWish) -> Result<Vec<Job>, Refusal> {
     if let Some(before) = &before {
         context.sweep(before);
     }
-    if let JobsWish::Retry(id) | JobsWish::Cancel(id) = wish {
+    if let JobsWish::Retry(id) | JobsWish::Cancel(id) | JobsWish::Rank(id, _) = wish {
         tracing::info!(job = id.0, ?wish, "An operator's wish.");
         context.schedule.news();
     }
@@ -308,12 +311,15 @@ mod tests {
             mtime_ns: 4,
             profile: "default".into(),
         };
-        store.submit(&[Submission { source, foreign: None }]).unwrap();
+        store.submit(&[Submission { source, foreign: None, priority: Priority::default() }]).unwrap();
         let id = JobId(1);
         assert!(answer(&store, &JobsWish::List).is_ok_and(|jobs| jobs.len() == 1 && jobs[0].id == id));
         let refused = |wish| answer(&store, &wish).is_err_and(|refusal| refusal.exit_code == 2);
         assert!(refused(JobsWish::Show(JobId(9))));
+        let ranked = answer(&store, &JobsWish::Rank(id, Priority::HIGHEST)).unwrap();
+        assert_eq!(ranked[0].priority, Priority::HIGHEST);
         answer(&store, &JobsWish::Cancel(id)).unwrap();
+        assert!(refused(JobsWish::Rank(id, Priority::LOWEST)), "it waits no longer");
         assert!(refused(JobsWish::Cancel(id)), "it is cancelled already");
     }
 

@@ -29,6 +29,7 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
         JobsCommand::Show { id } => JobsWish::Show(JobId(*id)),
         JobsCommand::Retry { id } => JobsWish::Retry(JobId(*id)),
         JobsCommand::Cancel { id } => JobsWish::Cancel(JobId(*id)),
+        JobsCommand::Priority { id, priority } => JobsWish::Rank(JobId(*id), *priority),
     };
     let mut jobs = match reach::jobs(&args.dir, &wish) {
         Ok(jobs) => jobs,
@@ -155,7 +156,9 @@ fn area(area: Area) -> &'static str {
 
 fn line(job: &Job) -> String {
     let (id, kind, since) = (job.id.0, job.kind().name(), when(job.changed));
-    format!("{id:>6}  {since}  {kind:<12} {:<32} {}", job.source.path.to_string(), note(job)).trim_end().to_owned() + "\n"
+    let priority = if job.priority.is_default() { String::new() } else { format!("priority {}  ", job.priority) };
+    let line = format!("{id:>6}  {since}  {kind:<12} {:<32} {priority}{}", job.source.path.to_string(), note(job));
+    line.trim_end().to_owned() + "\n"
 }
 
 /// Day and time where the machine is.
@@ -174,12 +177,13 @@ fn summary(jobs: &[Job]) -> String {
 fn show(dir: &Path, job: &Job) -> String {
     let (place, path) = job.original();
     let mut text = format!(
-        "job {}: {} in {}\n  file      {}/{path}\n  profile   {}\n  attempts  {}\n  came      {}\n  changed   {}\n",
+        "job {}: {} in {}\n  file      {}/{path}\n  profile   {}\n  priority  {}\n  attempts  {}\n  came      {}\n  changed   {}\n",
         job.id,
         job.kind(),
         job.source.folder,
         area(place),
         job.source.profile,
+        job.priority,
         job.attempts,
         when(job.submitted),
         when(job.changed)

@@ -155,7 +155,9 @@ fn through_store(state: &Path, wish: &JobsWish) -> Result<Vec<Job>, Unread> {
             let job = SledStore::peek(state).map_err(held)?.into_iter().find(|job| job.id == *id);
             Ok(vec![job.ok_or(StoreError::Unknown(*id))?])
         }
-        JobsWish::Retry(_) | JobsWish::Cancel(_) => Ok(answer(&SledStore::open(state).map_err(held)?, wish)?),
+        JobsWish::Retry(_) | JobsWish::Cancel(_) | JobsWish::Rank(..) => {
+            Ok(answer(&SledStore::open(state).map_err(held)?, wish)?)
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use std::sync::{Arc, RwLock};
 use crate::id::{Clock, Epoch, JobId, Seq, SystemClock};
 use crate::job::{Job, Kind, Step, Testimony};
 use crate::queue::Queue;
-use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted};
+use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted, Waiting};
 use crate::tables::{Put, Table, Tables, Visit};
 
 /// A [`JobStore`] that forgets everything when it is dropped.
@@ -90,6 +90,10 @@ impl JobStore for MemoryStore {
 
     fn claim(&self, want: &Filter) -> Result<Option<Claim>, StoreError> {
         self.queue.claim(want)
+    }
+
+    fn waiting(&self, want: &Filter) -> Result<Option<Waiting>, StoreError> {
+        self.queue.waiting(want)
     }
 
     fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError> {

@@ -35,7 +35,7 @@ use std::sync::Arc;
 use crate::id::{Clock, JobId, SystemClock};
 use crate::job::{Job, Kind, Step, Testimony};
 use crate::queue::Queue;
-use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted};
+use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted, Waiting};
 
 mod files;
 #[cfg(test)]
@@ -122,6 +122,10 @@ impl JobStore for SledStore {
 
     fn claim(&self, want: &Filter) -> Result<Option<Claim>, StoreError> {
         self.queue.claim(want)
+    }
+
+    fn waiting(&self, want: &Filter) -> Result<Option<Waiting>, StoreError> {
+        self.queue.waiting(want)
     }
 
     fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError> {

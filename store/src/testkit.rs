@@ -19,10 +19,11 @@ type Check = fn(&mut dyn Subject, &ManualClock) -> Result<(), StoreError>;
 /// # Panics
 /// When the store does not do what [`JobStore`] promises.
 pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
-    let checks: [(&str, Check); 15] = [
+    let checks: [(&str, Check); 16] = [
         ("submission is idempotent", claims::submission_is_idempotent),
         ("a file that came back is new", claims::a_file_that_came_back_is_new),
         ("the oldest that fits is claimed", claims::the_oldest_that_fits_is_claimed),
+        ("the more urgent goes first", claims::the_more_urgent_goes_first),
         ("the whole way", claims::the_whole_way),
         ("claims are fenced", claims::claims_are_fenced),
         ("pauses are kept", claims::pauses_are_kept),

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::blame::{Blame, Death};
 use super::kind::Kind;
 use super::pauses::BACKOFF_CAP_MS;
+use super::priority::Priority;
 use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Seq, Time, Token};
 use crate::path::RelPath;
 
@@ -252,6 +253,9 @@ pub struct Job {
     /// Where the original is while no claim holds it, if it is not at its source (after a retry of a failed job).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moved_to: Option<(Area, RelPath)>,
+    /// How soon it is wanted.
+    #[serde(default, skip_serializing_if = "Priority::is_default")]
+    pub priority: Priority,
     /// Where it stands.
     pub state: State,
     /// Attempts so far.
@@ -271,6 +275,9 @@ pub struct Job {
     pub note: String,
     /// When the file was found.
     pub submitted: Time,
+    /// When an operator wanted it tried once more.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub retried: Option<Time>,
     /// When its state changed last.
     pub changed: Time,
     /// The transition that made it what it is.
@@ -293,6 +300,7 @@ impl Job {
             id,
             source,
             moved_to: None,
+            priority: Priority::default(),
             state,
             attempts: Attempt(0),
             blame: Blame::default(),
@@ -301,6 +309,7 @@ impl Job {
             work: None,
             note: String::new(),
             submitted: now,
+            retried: None,
             changed: now,
             seq: Seq(0),
         }
@@ -362,6 +371,11 @@ impl Job {
             State::Published { .. } => Duty::MoveOriginal,
             State::Noticed { .. } | State::Ended { .. } | State::Cancelled { .. } => Duty::Rest,
         }
+    }
+
+    /// Since when it waits for its turn: pauses and attempts in between do not make it younger.
+    pub fn waits_since(&self) -> Time {
+        self.retried.unwrap_or(self.submitted)
     }
 
     /// End of the pause it is in: queued after an error, or parked.

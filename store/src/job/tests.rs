@@ -91,6 +91,7 @@ fn events() -> impl Strategy<Value = Event> {
         1 => Just(Event::Cancel),
         1 => Just(Event::Forget),
         1 => Just(Event::Hasten),
+        1 => (0..=9_i64).prop_map(|n| Event::Rank(Priority::try_from(n).unwrap())),
     ]
 }
 

@@ -24,6 +24,8 @@ use crate::fsx::Identity;
 use crate::protocol::Request;
 use crate::publish::{Conclusion, Desk, OUTPUT, discard};
 use crate::publish_error::PublishError;
+use crate::receipt::ReusedFrom;
+use crate::reuse::Sought;
 use crate::schedule::{Schedule, Turn, Waits};
 use crate::settings::Settings;
 use crate::supervise::{Cause, Death, Ended, Worker};
@@ -235,9 +237,10 @@ impl<'a> Slot<'a> {
                 let worked = self.work(folder, token, job, &claimed, turn);
                 let desk = Desk::new(&*context.store, folder, token, &self.committed);
                 match worked {
-                    Worked::Report { report, written } => match verify(&report, written.as_ref(), &work) {
+                    Worked::Report { report, written, reused } => match verify(&report, written.as_ref(), &work) {
                         Ok(()) => {
-                            return desk.intend(job, &Conclusion::Report { report, ctime_ns: claimed.ctime_ns() }).map(Some);
+                            let conclusion = Conclusion::Report { report, ctime_ns: claimed.ctime_ns(), reused };
+                            return desk.intend(job, &conclusion).map(Some);
                         }
                         Err(reason) => Step::Environment { reason },
                     },
@@ -259,6 +262,9 @@ impl<'a> Slot<'a> {
             Ok(profile) => profile,
             Err(reason) => return Worked::Step(Step::Wait { reason }),
         };
+        if let Some(copied) = self.copied(&config, folder, claim, job, claimed, &profile) {
+            return copied;
+        }
         let limits = limits(&config, turn);
         let mut worker = match self.worker(&limits, turn, job) {
             Ok(worker) => worker,
@@ -293,10 +299,34 @@ impl<'a> Slot<'a> {
             Ended::Stopped => self.stopped(folder, claim, lease.get()),
             Ended::Died(death) if !changed || !matches!(death.cause, Cause::Fault(_)) => died(&death, turn),
             _ if changed => Worked::Step(Step::Withdrawn(Withdrawal::Changed)),
-            Ended::Done { report, written } => Worked::Report { report, written },
+            Ended::Done { report, written } => Worked::Report { report, written, reused: None },
             Ended::Failed { class, message } => failed(class, &message, &request.shown_input, turn),
             Ended::Died(death) => died(&death, turn),
         }
+    }
+
+    /// Has a copy of an earlier result instead, where there is one for this file; after a person's retry, it is worked on in any case.
+    fn copied(
+        &self,
+        config: &Config,
+        folder: &Folder,
+        claim: &Claim,
+        job: &Job,
+        claimed: &Claimed,
+        profile: &Profile,
+    ) -> Option<Worked> {
+        if !config.reuse || job.retried.is_some() {
+            return None;
+        }
+        let (context, work) = (self.context, folder.work(claim.token));
+        let sought = Sought { store: &*context.store, folders: &context.folders, job, profile };
+        // A store that fails here fails at the next step too, and is dealt with there.
+        let copied = sought.copy(&work.join(CLAIMED), &work.join(OUTPUT), &|| context.halted()).ok()??;
+        Some(match claimed.is_unchanged() {
+            Ok(true) => Worked::Report { report: copied.report, written: Some(copied.written), reused: Some(copied.from) },
+            Ok(false) => Worked::Step(Step::Withdrawn(Withdrawal::Changed)),
+            Err(error) => Worked::Step(Step::Environment { reason: format!("the file cannot be looked at: {error}") }),
+        })
     }
 
     /// The worker was stopped: what that means for the job.
@@ -333,6 +363,8 @@ enum Worked {
     Report {
         report: Box<Report>,
         written: Option<Identity>,
+        /// Nothing was computed.
+        reused: Option<ReusedFrom>,
     },
     None(Ending, String),
     Step(Step),
@@ -418,7 +450,8 @@ pub(crate) fn remove_work(work: &Path) {
 fn tell(job: &Job) {
     match &job.state {
         State::Ended { publication } if publication.ending.is_good() => {
-            tracing::info!(ending = ?publication.ending, output = publication.output.as_ref().map(tracing::field::display), "Done.");
+            let output = publication.output.as_ref().map(tracing::field::display);
+            tracing::info!(ending = ?publication.ending, output, reused = publication.reused.map(|job| job.0), "Done.");
         }
         State::Ended { publication } => {
             tracing::warn!(ending = ?publication.ending, reason = publication.reason, "Ended without a good result.");

@@ -90,6 +90,8 @@ pub(crate) struct Config {
     /// The hours at which all workers work; at others, so many do.
     pub run_window: RunWindow,
     pub workers_outside: usize,
+    /// What was made of the same content before is not made once more.
+    pub reuse: bool,
     pub profiles: BTreeMap<String, OwnProfile>,
 }
 
@@ -111,6 +113,7 @@ impl Config {
             time_limit: TimeLimit { base: Duration::from_secs(120), per_gib: Duration::from_secs(1200) },
             run_window: RunWindow::default(),
             workers_outside: 0,
+            reuse: true,
             profiles: BTreeMap::new(),
         }
     }

@@ -115,14 +115,22 @@ fn held(dir: &Path) -> Vec<String> {
 #[derive(serde::Serialize)]
 struct Shown<'a> {
     kind: &'static str,
+    /// The job of whose result its own is a copy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reused: Option<JobId>,
     #[serde(flatten)]
     job: &'a Job,
 }
 
 impl<'a> Shown<'a> {
     fn new(job: &'a Job) -> Self {
-        Self { kind: job.kind().name(), job }
+        Self { kind: job.kind().name(), reused: reused(job), job }
     }
+}
+
+/// The job of whose result this one's is a copy.
+fn reused(job: &Job) -> Option<JobId> {
+    job.publication().and_then(|publication| publication.reused)
 }
 
 /// What there is to add to a job's state.
@@ -132,7 +140,11 @@ fn note(job: &Job) -> String {
         State::Running { cancel: true, .. } => "being stopped".into(),
         State::Ended { publication } => match (&publication.output, publication.reason.is_empty()) {
             (Some(output), true) => {
-                format!("→ {}/{output}", if publication.ending.is_good() { "out" } else { area(publication.ending.area()) })
+                let copied = publication.reused.map(|job| format!(", reused from job {job}")).unwrap_or_default();
+                format!(
+                    "→ {}/{output}{copied}",
+                    if publication.ending.is_good() { "out" } else { area(publication.ending.area()) }
+                )
             }
             _ => publication.reason.clone(),
         },
@@ -167,11 +179,16 @@ fn when(time: Time) -> String {
     i64::try_from(time.0).ok().and_then(|ms| Timestamp::from_millisecond(ms).ok()).map_or_else(|| "?".into(), zoned)
 }
 
-/// How many jobs are in which state.
+/// How many jobs are in which state, and of how many of them the result is a copy.
 fn summary(jobs: &[Job]) -> String {
-    let count = |kind: Kind| jobs.iter().filter(|job| job.kind() == kind).count();
-    let counts = Kind::ALL.into_iter().map(|kind| (kind, count(kind))).filter(|(_, count)| *count > 0);
-    counts.map(|(kind, count)| format!("{count} {}", kind.name())).collect::<Vec<_>>().join(", ")
+    let count =
+        |kind: Kind, copied: bool| jobs.iter().filter(|job| job.kind() == kind && (!copied || reused(job).is_some())).count();
+    let words = |kind: Kind| match (count(kind, false), count(kind, true)) {
+        (0, _) => None,
+        (all, 0) => Some(format!("{all} {}", kind.name())),
+        (all, copies) => Some(format!("{all} {} ({copies} reused)", kind.name())),
+    };
+    Kind::ALL.into_iter().filter_map(words).collect::<Vec<_>>().join(", ")
 }
 
 fn show(dir: &Path, job: &Job) -> String {

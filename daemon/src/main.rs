@@ -31,6 +31,7 @@ mod publish;
 mod publish_error;
 mod reach;
 mod receipt;
+mod reuse;
 mod rights;
 mod say;
 mod scan;

@@ -42,6 +42,10 @@ number! {
     Seq(u64)
 }
 number! {
+    /// A digest of all that decides a result. It finds results that may be alike; that they are, whoever takes one sees for itself.
+    Recipe(u64)
+}
+number! {
     /// Milliseconds since 1970 by the store's clock. For people and for pauses; nothing's correctness rests on it.
     Time(u64)
 }

@@ -25,7 +25,7 @@ mod tables;
 pub mod testkit;
 
 pub use crash::crash_point;
-pub use id::{Attempt, Boot, Clock, Epoch, Hash, JobId, Seq, SystemClock, Time, Token};
+pub use id::{Attempt, Boot, Clock, Epoch, Hash, JobId, Recipe, Seq, SystemClock, Time, Token};
 pub use job::{Ending, Job, Kind, Priority, Publication, Source, State, Step};
 pub use memory::MemoryStore;
 pub use path::RelPath;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Bound;
 use std::sync::{Arc, RwLock};
 
-use crate::id::{Clock, Epoch, JobId, Seq, SystemClock};
+use crate::id::{Clock, Epoch, JobId, Recipe, Seq, SystemClock};
 use crate::job::{Job, Kind, Step, Testimony};
 use crate::queue::Queue;
 use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted, Waiting};
@@ -118,6 +118,10 @@ impl JobStore for MemoryStore {
 
     fn list(&self, query: &Query) -> Result<Vec<Job>, StoreError> {
         self.queue.list(query)
+    }
+
+    fn results(&self, size: u64, recipe: Option<Recipe>) -> Result<Vec<Job>, StoreError> {
+        self.queue.results(size, recipe)
     }
 
     fn check(&self) -> Result<(), StoreError> {

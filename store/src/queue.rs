@@ -1,4 +1,4 @@
-//! The queue's logic over four ordered tables, shared by every store that is embedded in the daemon.
+//! The queue's logic over five ordered tables, shared by every store that is embedded in the daemon.
 //!
 //! | table    | key                                                                     | value                     |
 //! |----------|-------------------------------------------------------------------------|---------------------------|
@@ -6,6 +6,7 @@
 //! | jobs     | job number                                                              | the [`Job`]               |
 //! | by_state | kind, then what that kind is searched by (see [`index`])                | nothing                   |
 //! | by_key   | identity of the file: device, inode, size, mtime, folder, path          | number of its latest job  |
+//! | by_recipe | size of the source, recipe, job number (see [`results`]) of jobs whose result others may have | nothing   |
 //!
 //! Numbers in keys are big-endian. The job, its index entries and the head change in one transaction of the tables. One lock
 //! orders the transitions; becoming durable happens outside of it, so that transitions of several threads share one sync. Which job is
@@ -17,7 +18,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use serde::{Deserialize, Serialize};
 
 use crate::crash::crash_point;
-use crate::id::{Clock, Epoch, JobId, Seq, Time, Token};
+use crate::id::{Clock, Epoch, JobId, Recipe, Seq, Time, Token};
 use crate::job::{Event, Illegal, Job, Kind, Source, State, Step, Testimony};
 use crate::path::MAX_SOURCE;
 use crate::record;
@@ -26,6 +27,7 @@ use crate::tables::{Put, Table, Tables};
 
 mod index;
 mod line;
+mod results;
 
 use line::{Line, Now};
 
@@ -166,6 +168,9 @@ impl<T: Tables> Queue<T> {
             let key = to.id.0.to_be_bytes().to_vec();
             let value = record::encode(Table::Jobs, &key, to)?;
             puts.push(Put { table: Table::Jobs, key, value: Some(value) });
+            if let Some(recipe) = to.offers() {
+                puts.push(Put { table: Table::ByRecipe, key: results::key(to, recipe), value: Some(Vec::new()) });
+            }
             if let Some(from) = from {
                 let count = counts.entry(from.kind()).or_default();
                 *count = count.saturating_sub(1);
@@ -420,6 +425,17 @@ impl<T: Tables> JobStore for Queue<T> {
                 if jobs.len() == limit {
                     break;
                 }
+            }
+        }
+        Ok(jobs)
+    }
+
+    fn results(&self, size: u64, recipe: Option<Recipe>) -> Result<Vec<Job>, StoreError> {
+        let mut jobs = Vec::new();
+        for id in results::latest(&self.tables, size, recipe)? {
+            let job = self.known(id)?;
+            if job.source.size == size && job.offers().is_some_and(|offered| recipe.is_none_or(|recipe| recipe == offered)) {
+                jobs.push(job);
             }
         }
         Ok(jobs)

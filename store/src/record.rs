@@ -75,13 +75,14 @@ fn name(table: Table, key: &[u8]) -> String {
         },
         Table::ByState => "by_state".to_owned(),
         Table::ByKey => "by_key".to_owned(),
+        Table::ByRecipe => "by_recipe".to_owned(),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Seq, Time, Token};
+    use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Recipe, Seq, Time, Token};
     use crate::job::{Area, Blame, Ending, Hold, Job, MAX_REASON, Parked, Priority, Publication, Source, State, one_line};
     use crate::path::{MAX_NAMED, MAX_SOURCE, RelPath};
 
@@ -113,6 +114,8 @@ mod tests {
             output: Some(path.clone()),
             output_hash: Some(Hash([0xff; 32])),
             report_hash: Some(Hash([0xff; 32])),
+            recipe: Some(Recipe(u64::MAX)),
+            reused: Some(JobId(u64::MAX)),
             source_ctime_ns: Some(i64::MIN),
             original: Some(path.clone()),
             stays: true,

@@ -2,8 +2,11 @@
 
 use std::path::PathBuf;
 
-use crate::id::{Epoch, JobId, Seq, Token};
+use crate::id::{Epoch, JobId, Recipe, Seq, Token};
 use crate::job::{Illegal, Job, Kind, Priority, Source, Step, Testimony};
+
+/// As many results alike are named as it makes sense to look at.
+pub const MOST_RESULTS: usize = 8;
 
 /// A durable job queue. A returned `Ok` means that the change survives a crash of process or machine; an `Err` that it did not
 /// happen or, for [`StoreError::Backend`], [`StoreError::Io`] and [`StoreError::Poisoned`] only, that this is unknown until the
@@ -69,6 +72,13 @@ pub trait JobStore: Send + Sync {
     /// # Errors
     /// Store errors only.
     fn list(&self, query: &Query) -> Result<Vec<Job>, StoreError>;
+
+    /// Jobs with good results for sources of `size` bytes that others may have a copy of: those made by `recipe`, the latest first, at most
+    /// [`MOST_RESULTS`]; without a recipe any one of them, if there is one.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn results(&self, size: u64, recipe: Option<Recipe>) -> Result<Vec<Job>, StoreError>;
 
     /// Is the store still where it was opened?
     ///

@@ -11,6 +11,7 @@ mod e2e {
     mod memory;
     mod profiles;
     mod queue;
+    mod reuse;
     mod same_bytes;
     mod soups;
     mod steer;

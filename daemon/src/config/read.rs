@@ -37,6 +37,7 @@ struct File {
     time_limit: Option<TimeLimitFile>,
     run_window: Option<RunWindow>,
     workers_outside: Option<Spanned<u16>>,
+    reuse: Option<bool>,
     #[serde(default)]
     profiles: BTreeMap<String, Spanned<OwnProfile>>,
 }
@@ -173,6 +174,7 @@ fn from_text(text: &str) -> Result<Config, String> {
         return Err(with_line(text, outside.span().start, what));
     }
     config.workers_outside = file.workers_outside.map_or(0, |count| count.into_inner().into());
+    config.reuse = file.reuse.unwrap_or(config.reuse);
     config.run_window = file.run_window.unwrap_or_default();
     if let Some(TimeLimitFile { base, per_gib }) = file.time_limit {
         config.time_limit.base = base.map_or(config.time_limit.base, |time| time.0);

@@ -32,6 +32,7 @@ pub(crate) fn values(config: &Config) -> Vec<(&'static str, Option<String>)> {
         ("settle", auto(config.settle)),
         ("rescan", auto(config.rescan)),
         ("drain", quoted(&write_duration(config.drain))),
+        ("reuse", config.reuse.to_string()),
         ("time_limit.base", quoted(&write_duration(config.time_limit.base))),
         ("time_limit.per_gib", quoted(&write_duration(config.time_limit.per_gib))),
     ];
@@ -123,7 +124,7 @@ mod tests {
         });
         (config.run_window, config.workers_outside) = ("20:00-07:00, 12:00-13:00".parse().unwrap(), 1);
         (config.memory, config.large, config.reserve) = (3 << 30, 1_500_000_000, 1);
-        (config.workers, config.threads) = (7, 3);
+        (config.workers, config.threads, config.reuse) = (7, 3, false);
         (config.settle, config.rescan) = (Some(Duration::from_millis(300)), Some(Duration::from_secs(90)));
         (config.drain, config.time_limit.base) = (Duration::ZERO, Duration::from_millis(1500));
         for name in ["it's mine", "resin", "default"] {

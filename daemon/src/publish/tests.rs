@@ -59,7 +59,7 @@ impl Scene {
         report.output.as_mut().unwrap().blake3 = fsx::hash(&output).unwrap().to_string();
         report.input.blake3 = Hash(*blake3::hash(ORIGINAL).as_bytes()).to_string();
         let ctime_ns = Identity::of(&self.folder.work(self.claim.token).join(CLAIMED)).unwrap().ctime_ns;
-        self.desk().intend(&self.claim.job, &Conclusion::Report { report: Box::new(report), ctime_ns }).unwrap()
+        self.desk().intend(&self.claim.job, &Conclusion::Report { report: Box::new(report), ctime_ns, reused: None }).unwrap()
     }
 
     /// Does what is owed until nothing is.

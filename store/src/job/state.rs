@@ -6,7 +6,7 @@ use super::blame::{Blame, Death};
 use super::kind::Kind;
 use super::pauses::BACKOFF_CAP_MS;
 use super::priority::Priority;
-use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Seq, Time, Token};
+use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Recipe, Seq, Time, Token};
 use crate::path::RelPath;
 
 /// The dropped file, as it was when it came to rest.
@@ -101,6 +101,12 @@ pub struct Publication {
     pub output_hash: Option<Hash>,
     /// Of the bytes of the report.
     pub report_hash: Option<Hash>,
+    /// Of a good result: what it was made of, and with.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recipe: Option<Recipe>,
+    /// The job whose result was copied, so that nothing was computed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reused: Option<JobId>,
     /// Last change of the original's inode, in nanoseconds since 1970, when its result was found. If it still has it, its content is
     /// the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -391,6 +397,16 @@ impl Job {
         match &self.state {
             State::Publishing { publication, .. } | State::Published { publication, .. } | State::Ended { publication } => {
                 Some(publication)
+            }
+            _ => None,
+        }
+    }
+
+    /// What the result that it has left is made of, if others may have a copy of it: it is done, and has an output.
+    pub fn offers(&self) -> Option<Recipe> {
+        match &self.state {
+            State::Ended { publication } if publication.ending.is_good() && publication.output_hash.is_some() => {
+                publication.recipe
             }
             _ => None,
         }

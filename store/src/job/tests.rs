@@ -27,6 +27,8 @@ fn publication(ending: Ending, hash: u8) -> Publication {
         output: Some(path.clone()),
         output_hash: Some(Hash([hash; 32])),
         report_hash: None,
+        recipe: None,
+        reused: None,
         source_ctime_ns: None,
         original: Some(path),
         stays: false,

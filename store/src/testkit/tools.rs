@@ -85,6 +85,8 @@ pub fn result_of(job: &Job, ending: Ending) -> Publication {
         output: Some(job.source.path.clone()),
         output_hash: Some(Hash([7; 32])),
         report_hash: Some(Hash([8; 32])),
+        recipe: None,
+        reused: None,
         source_ctime_ns: None,
         original: Some(job.source.path.clone()),
         stays: false,

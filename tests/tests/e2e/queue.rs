@@ -1,5 +1,8 @@
 //! Who goes first: priorities of folders, of profiles and by an operator's word.
 
+use std::process::Child;
+use std::time::{Duration, Instant};
+
 use serde_json::Value;
 use suture_bench::generate::{Case, write};
 use suture_tests::Place;
@@ -8,6 +11,16 @@ fn mesh(triangles: u64, seed: u64) -> Vec<u8> {
     let mut bytes = Vec::new();
     write(Case::Clean, triangles, seed, &mut bytes).unwrap();
     bytes
+}
+
+/// Killed at the end of its test.
+struct Daemon(Child);
+
+impl Drop for Daemon {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
 }
 
 /// `suture jobs list --json`, by number.
@@ -60,6 +73,24 @@ fn the_more_urgent_goes_first() {
     assert_eq!(order, expected);
     let late = rank("plain.stl", "9").expect(2).stderr();
     assert!(late.contains("a job that is done cannot be given a priority"), "{late}");
+}
+
+/// The daemon does it while it runs.
+#[test]
+fn a_running_daemon_is_told() {
+    let place = Place::new();
+    place.suture(["watch", "hot", "--once"]).expect(0);
+    place.suture(["jobs", "pause", "--dir", "hot"]).expect(0);
+    place.put("hot/in/part.stl", &mesh(600, 1));
+    let _daemon = Daemon(place.command().args(["watch", "hot", "--settle", "30ms"]).spawn().unwrap());
+    let began = Instant::now();
+    while jobs(&place).is_empty() && began.elapsed().as_secs() < 60 {
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let asked = ["8", "10"].map(|priority| place.suture(["jobs", "priority", "1", priority, "--dir", "hot"]));
+    let line = line_of(&place, "part.stl");
+    assert_eq!((asked[0].code(), asked[1].code()), (0, 2));
+    assert!(line.contains("queued") && line.contains("priority 8"), "{line}");
 }
 
 /// What is not said is not shown.

@@ -114,8 +114,8 @@ impl<'a> Slot<'a> {
     /// Works until the schedule says stop.
     pub(crate) fn run(&mut self) {
         let context = self.context;
-        let filter = |turn: Turn| turn.filter(context.settings.now().large);
-        let look = || Waits::of(|turn| context.store.waiting(&filter(turn)));
+        let large = || context.settings.now().large;
+        let look = || Waits::of(&*context.store, large());
         loop {
             let turn = match context.schedule.next(&look) {
                 Ok(Turn::Stop) => return,
@@ -126,7 +126,7 @@ impl<'a> Slot<'a> {
                 // Its memory belongs to the large file now.
                 self.worker = None;
             }
-            match context.store.claim(&filter(turn)) {
+            match context.store.claim(&turn.filter(large())) {
                 Ok(Some(claim)) => {
                     crash_point("daemon.claimed");
                     let job = claim.job.clone();

@@ -11,7 +11,7 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
-use suture_store::{Filter, Waiting};
+use suture_store::{Filter, JobStore, StoreError, Waiting};
 
 /// However many small files of its priority come, one that runs alone has a turn this often.
 const ALONE_AT_LEAST_EVERY: Duration = Duration::from_secs(300);
@@ -87,18 +87,21 @@ struct State {
 /// What waits for each kind of turn.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Waits {
+    /// A result that is only to be brought into place.
+    pub parked: bool,
     pub small: Option<Waiting>,
     pub large: Option<Waiting>,
     pub alone: Option<Waiting>,
 }
 
 impl Waits {
-    /// As the store has it; `ask` asks it.
+    /// As the store has it. `large`: from this size on a file is worked on alone.
     ///
     /// # Errors
     /// As the store's.
-    pub(crate) fn of<E>(ask: impl Fn(Turn) -> Result<Option<Waiting>, E>) -> Result<Self, E> {
-        Ok(Self { small: ask(Turn::Small)?, large: ask(Turn::Large)?, alone: ask(Turn::Alone)? })
+    pub(crate) fn of(store: &dyn JobStore, large: u64) -> Result<Self, StoreError> {
+        let of = |turn: Turn| store.waiting(&turn.filter(large));
+        Ok(Self { parked: store.has_parked()?, small: of(Turn::Small)?, large: of(Turn::Large)?, alone: of(Turn::Alone)? })
     }
 }
 
@@ -209,6 +212,9 @@ impl State {
 
 /// Who is next. `overdue`: none has run alone for long.
 fn choose(busy: usize, overdue: bool, waits: &Waits) -> Option<Turn> {
+    if waits.parked {
+        return Some(Turn::Small);
+    }
     let alone = match (waits.large, waits.alone) {
         (Some(large), Some(alone)) => {
             let turn = if alone.aged > large.aged { Turn::Alone } else { Turn::Large };
@@ -242,7 +248,7 @@ mod tests {
 
     fn waits(small: i64, large: i64, alone: i64) -> Waits {
         let of = |number| if number == 0 { None } else { waiting(number, number) };
-        Waits { small: of(small), large: of(large), alone: of(alone) }
+        Waits { parked: false, small: of(small), large: of(large), alone: of(alone) }
     }
 
     fn next(s: &Schedule, waits: Waits) -> Turn {
@@ -284,6 +290,12 @@ mod tests {
         assert_eq!(choose(0, false, &waits(0, 5, 6)), Some(Turn::Alone));
     }
 
+    /// There is little to do for it, so that it is in no one's way, and no one is in its.
+    #[test]
+    fn what_is_parked_waits_for_no_one() {
+        assert_eq!(choose(1, true, &Waits { parked: true, ..waits(5, 9, 0) }), Some(Turn::Small));
+    }
+
     /// Among their like, small ones go first, but for one turn now and then.
     #[test]
     fn a_large_one_has_a_turn_now_and_then() {
@@ -295,7 +307,7 @@ mod tests {
     /// A row of large files that have waited for hours is no reason to keep a small one waiting; nor do urgent ones keep one waiting for ever.
     #[test]
     fn who_has_waited_becomes_one_of_the_others() {
-        let old = |small, large| Waits { small, large, alone: None };
+        let old = |small, large| Waits { small, large, ..Waits::default() };
         assert_eq!(choose(0, false, &old(waiting(5, 5), waiting(5, 9))), Some(Turn::Small));
         assert_eq!(choose(0, true, &old(waiting(5, 5), waiting(5, 9))), Some(Turn::Large));
         assert_eq!(choose(0, true, &old(waiting(9, 9), waiting(0, 8))), Some(Turn::Small));

@@ -10,7 +10,7 @@
 //!
 //! Numbers in keys are big-endian. The job, its index entries and the head change in one transaction of the tables. One lock
 //! orders the transitions; becoming durable happens outside of it, so that transitions of several threads share one sync. Which job is
-//! claimed next is told by a [`line`] of all that may be, in memory, made anew at each opening.
+//! claimed next is told by a [`mod@line`] of all that may be, in memory, made anew at each opening.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -324,6 +324,10 @@ impl<T: Tables> JobStore for Queue<T> {
         self.commit(inner, head, &[(Some(&before), &job)], Vec::new())?;
         self.settle(head)?;
         Ok(Some(Claim { id, token, job }))
+    }
+
+    fn has_parked(&self) -> Result<bool, StoreError> {
+        Ok(self.lock().line.has_parked(self.now()))
     }
 
     fn waiting(&self, want: &Filter) -> Result<Option<Waiting>, StoreError> {

@@ -124,6 +124,10 @@ impl JobStore for SledStore {
         self.queue.claim(want)
     }
 
+    fn has_parked(&self) -> Result<bool, StoreError> {
+        self.queue.has_parked()
+    }
+
     fn waiting(&self, want: &Filter) -> Result<Option<Waiting>, StoreError> {
         self.queue.waiting(want)
     }

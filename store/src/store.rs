@@ -28,7 +28,13 @@ pub trait JobStore: Send + Sync {
     /// Store errors only.
     fn claim(&self, want: &Filter) -> Result<Option<Claim>, StoreError>;
 
-    /// How soon those jobs are wanted that a claim with `want` may give now; `None` when there is none.
+    /// Will the next claim give a parked job, whatever is wanted?
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn has_parked(&self) -> Result<bool, StoreError>;
+
+    /// How soon those jobs are wanted that a claim with `want` may give now, parked ones left out; `None` when there is none.
     ///
     /// # Errors
     /// Store errors only.

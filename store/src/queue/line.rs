@@ -199,12 +199,14 @@ impl Line {
         all.max_by_key(|(priority, id)| (*priority, Reverse(*id))).map(|(_, id)| id)
     }
 
-    /// How soon those that `want` allows are wanted.
+    /// May a parked job be tried again?
+    pub(super) fn has_parked(&self, now: Now) -> bool {
+        over(&self.parked, now.wall).next().is_some()
+    }
+
+    /// How soon those that `want` allows are wanted; parked ones left out.
     pub(super) fn waiting(&mut self, want: &Filter, now: Now) -> Option<Waiting> {
         self.age(now.ticks);
-        if over(&self.parked, now.wall).next().is_some() {
-            return Some(Waiting { highest: Priority::HIGHEST, aged: Priority::HIGHEST });
-        }
         let ready = self.by_base.first(want).zip(self.by_aged.first(want)).map(|((base, _), (aged, _))| (base, aged));
         let all = self.rested(want, now).map(|(_, entry)| (entry.base, entry.aged(now.ticks))).chain(ready);
         let highest = all.reduce(|(base, aged), (other, other_aged)| (base.max(other), aged.max(other_aged)));

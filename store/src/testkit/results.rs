@@ -23,8 +23,9 @@ pub(super) fn a_result_that_cannot_be_placed_is_parked(subject: &mut dyn Subject
     // Others go on meanwhile; when its pause is over, it is given to whoever asks.
     let between = claim_any(store)?;
     assert_eq!(between.id, other);
-    assert_eq!(store.claim(&Filter::default())?, None);
+    assert_eq!((store.claim(&Filter::default())?, store.has_parked()?), (None, false));
     clock.pass(crate::job::PARK_MS);
+    assert_eq!((store.has_parked()?, store.waiting(&Filter::default())?), (true, None));
     let again = store.claim(&Filter { size: (1 << 40, u64::MAX), alone: false })?.ok_or(StoreError::Unknown(id))?;
     assert_eq!((again.id, again.job.duty(), again.job.attempts), (id, Duty::Place, Attempt(1)));
     assert_eq!(again.job.work, Some(claim.token), "the work folder is still that of the worker");

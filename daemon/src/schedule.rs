@@ -11,7 +11,7 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
-use suture_store::{Filter, JobStore, StoreError, Waiting};
+use suture_store::{Filter, JobStore, Priority, StoreError, Waiting};
 
 /// However many small files of its priority come, one that runs alone has a turn this often.
 const ALONE_AT_LEAST_EVERY: Duration = Duration::from_secs(300);
@@ -217,7 +217,9 @@ fn choose(busy: usize, overdue: bool, waits: &Waits) -> Option<Turn> {
     }
     let alone = match (waits.large, waits.alone) {
         (Some(large), Some(alone)) => {
-            let turn = if alone.aged > large.aged { Turn::Alone } else { Turn::Large };
+            // Suspects come last, but come: who has risen as far as that goes has waited for long enough.
+            let risen = alone.aged == Priority::HIGHEST && alone.highest < Priority::HIGHEST;
+            let turn = if alone.aged > large.aged || risen { Turn::Alone } else { Turn::Large };
             Some((turn, Waiting { highest: large.highest.max(alone.highest), aged: large.aged.max(alone.aged) }))
         }
         (large, alone) => large.map(|large| (Turn::Large, large)).or(alone.map(|alone| (Turn::Alone, alone))),
@@ -236,8 +238,6 @@ fn choose(busy: usize, overdue: bool, waits: &Waits) -> Option<Turn> {
 #[cfg(test)]
 mod tests {
     use std::convert::Infallible;
-
-    use suture_store::Priority;
 
     use super::*;
 
@@ -314,6 +314,9 @@ mod tests {
         assert_eq!(choose(0, true, &old(waiting(9, 9), waiting(0, 9))), Some(Turn::Large));
         assert_eq!(choose(0, false, &old(waiting(0, 8), waiting(9, 9))), Some(Turn::Large));
         assert_eq!(choose(0, false, &old(waiting(0, 9), waiting(9, 9))), Some(Turn::Small));
+        let suspect = |alone| Waits { large: waiting(9, 9), alone, ..Waits::default() };
+        assert_eq!(choose(0, false, &suspect(waiting(5, 8))), Some(Turn::Large));
+        assert_eq!(choose(0, false, &suspect(waiting(5, 9))), Some(Turn::Alone));
     }
 
     #[test]

@@ -15,16 +15,18 @@ use suture_store::Lease;
 use suture_store::job::{Death as StoreDeath, Duty, Kind, Withdrawal};
 use suture_store::{Claim, Ending, Job, JobStore, State, Step, StoreError, crash_point};
 
+use crate::choice;
 use crate::claim::{CLAIMED, Claimed, Unclaimed, claim};
 use crate::config::Config;
 use crate::create;
 use crate::folder::Folder;
 use crate::fsx::Identity;
-use crate::profiles;
 use crate::protocol::Request;
 use crate::publish::{Conclusion, Desk, OUTPUT, discard};
 use crate::publish_error::PublishError;
-use crate::schedule::{Schedule, Turn};
+use crate::receipt::ReusedFrom;
+use crate::reuse::Sought;
+use crate::schedule::{Schedule, Turn, Waits};
 use crate::settings::Settings;
 use crate::supervise::{Cause, Death, Ended, Worker};
 
@@ -111,30 +113,30 @@ impl<'a> Slot<'a> {
 
     /// Works until the schedule says stop.
     pub(crate) fn run(&mut self) {
+        let context = self.context;
+        let large = || context.settings.now().large;
+        let look = || Waits::of(&*context.store, large());
         loop {
-            let given = self.context.schedule.next();
-            if given.turn == Turn::Stop {
-                return;
-            }
-            if given.turn.is_alone() {
+            let turn = match context.schedule.next(&look) {
+                Ok(Turn::Stop) => return,
+                Ok(turn) => turn,
+                Err(error) => return context.fail(error),
+            };
+            if turn.is_alone() {
                 // Its memory belongs to the large file now.
                 self.worker = None;
             }
-            let claim = self.context.store.claim(&given.turn.filter(self.context.settings.now().large));
-            let found = match claim {
+            match context.store.claim(&turn.filter(large())) {
                 Ok(Some(claim)) => {
                     crash_point("daemon.claimed");
                     let job = claim.job.clone();
-                    self.finish(&claim, job, given.turn);
-                    true
+                    self.finish(&claim, job, turn);
                 }
-                Ok(None) => false,
-                Err(error) => {
-                    self.context.fail(error);
-                    false
-                }
-            };
-            self.context.schedule.done(given, found);
+                // Another slot was faster.
+                Ok(None) => {}
+                Err(error) => context.fail(error),
+            }
+            context.schedule.done(turn);
         }
     }
 
@@ -235,9 +237,10 @@ impl<'a> Slot<'a> {
                 let worked = self.work(folder, token, job, &claimed, turn);
                 let desk = Desk::new(&*context.store, folder, token, &self.committed);
                 match worked {
-                    Worked::Report { report, written } => match verify(&report, written.as_ref(), &work) {
+                    Worked::Report { report, written, reused } => match verify(&report, written.as_ref(), &work) {
                         Ok(()) => {
-                            return desk.intend(job, &Conclusion::Report { report, ctime_ns: claimed.ctime_ns() }).map(Some);
+                            let conclusion = Conclusion::Report { report, ctime_ns: claimed.ctime_ns(), reused };
+                            return desk.intend(job, &conclusion).map(Some);
                         }
                         Err(reason) => Step::Environment { reason },
                     },
@@ -255,10 +258,13 @@ impl<'a> Slot<'a> {
         // This attempt's to its end, whatever is read meanwhile.
         let config = context.settings.now();
         // A setting that a person has to mend, or a machine that has no process to give, is no try of the file's.
-        let profile = match find_profile(&config, folder, job) {
+        let profile = match choice::profile(&config, folder, job) {
             Ok(profile) => profile,
             Err(reason) => return Worked::Step(Step::Wait { reason }),
         };
+        if let Some(copied) = self.copied(&config, folder, claim, job, claimed, &profile) {
+            return copied;
+        }
         let limits = limits(&config, turn);
         let mut worker = match self.worker(&limits, turn, job) {
             Ok(worker) => worker,
@@ -293,10 +299,34 @@ impl<'a> Slot<'a> {
             Ended::Stopped => self.stopped(folder, claim, lease.get()),
             Ended::Died(death) if !changed || !matches!(death.cause, Cause::Fault(_)) => died(&death, turn),
             _ if changed => Worked::Step(Step::Withdrawn(Withdrawal::Changed)),
-            Ended::Done { report, written } => Worked::Report { report, written },
+            Ended::Done { report, written } => Worked::Report { report, written, reused: None },
             Ended::Failed { class, message } => failed(class, &message, &request.shown_input, turn),
             Ended::Died(death) => died(&death, turn),
         }
+    }
+
+    /// Has a copy of an earlier result instead, where there is one for this file; after a person's retry, it is worked on in any case.
+    fn copied(
+        &self,
+        config: &Config,
+        folder: &Folder,
+        claim: &Claim,
+        job: &Job,
+        claimed: &Claimed,
+        profile: &Profile,
+    ) -> Option<Worked> {
+        if !config.reuse || job.retried.is_some() {
+            return None;
+        }
+        let (context, work) = (self.context, folder.work(claim.token));
+        let sought = Sought { store: &*context.store, folders: &context.folders, job, profile };
+        // A store that fails here fails at the next step too, and is dealt with there.
+        let copied = sought.copy(&work.join(CLAIMED), &work.join(OUTPUT), &|| context.halted()).ok()??;
+        Some(match claimed.is_unchanged() {
+            Ok(true) => Worked::Report { report: copied.report, written: Some(copied.written), reused: Some(copied.from) },
+            Ok(false) => Worked::Step(Step::Withdrawn(Withdrawal::Changed)),
+            Err(error) => Worked::Step(Step::Environment { reason: format!("the file cannot be looked at: {error}") }),
+        })
     }
 
     /// The worker was stopped: what that means for the job.
@@ -333,6 +363,8 @@ enum Worked {
     Report {
         report: Box<Report>,
         written: Option<Identity>,
+        /// Nothing was computed.
+        reused: Option<ReusedFrom>,
     },
     None(Ending, String),
     Step(Step),
@@ -391,19 +423,6 @@ fn limits(config: &Config, turn: Turn) -> Limits {
     Limits::default().with_memory(memory).with_threads(if alone { config.threads } else { 1 })
 }
 
-/// The settings for a file: of its folder or one above it, else by name.
-fn find_profile(config: &Config, folder: &Folder, job: &Job) -> Result<Profile, String> {
-    let inbox = folder.inbox();
-    let path = inbox.join(job.source.path.to_path());
-    for above in path.ancestors().skip(1).take_while(|above| above.starts_with(&inbox)) {
-        let own = above.join(profiles::FOLDER_FILE);
-        if own.is_file() {
-            return profiles::from_file(&own);
-        }
-    }
-    config.profile(&job.source.profile).ok_or_else(|| format!("there is no profile `{}` any more", job.source.profile))
-}
-
 /// Is the output the very file that the worker wrote, synced and read back?
 fn verify(report: &Report, written: Option<&Identity>, work: &Path) -> Result<(), String> {
     match (&report.output, written) {
@@ -431,7 +450,8 @@ pub(crate) fn remove_work(work: &Path) {
 fn tell(job: &Job) {
     match &job.state {
         State::Ended { publication } if publication.ending.is_good() => {
-            tracing::info!(ending = ?publication.ending, output = publication.output.as_ref().map(tracing::field::display), "Done.");
+            let output = publication.output.as_ref().map(tracing::field::display);
+            tracing::info!(ending = ?publication.ending, output, reused = publication.reused.map(|job| job.0), "Done.");
         }
         State::Ended { publication } => {
             tracing::warn!(ending = ?publication.ending, reason = publication.reason, "Ended without a good result.");

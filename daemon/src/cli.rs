@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use suture_store::Priority;
 use suture_store::job::Kind;
 
 use crate::units::{parse_duration, parse_size};
@@ -38,7 +39,7 @@ pub(crate) enum Command {
     Watch(WatchArgs),
     /// Check a configuration file, or show all settings with their values
     Config(ConfigArgs),
-    /// List, show, retry or cancel the jobs of a hot folder, with or without a running daemon
+    /// List, show, retry, rank or cancel the jobs of a hot folder, with or without a running daemon
     Jobs(JobsArgs),
     /// Make a hot folder of small broken meshes, repair them, and show what happened
     Demo,
@@ -270,6 +271,11 @@ fn parse_kind(text: &str) -> Result<Kind, String> {
     Kind::ALL.into_iter().find(|kind| kind.name() == word).ok_or_else(|| format!("no job is ever `{text}`; states are {}", all()))
 }
 
+fn parse_priority(text: &str) -> Result<Priority, String> {
+    let number: i64 = text.parse().map_err(|_| format!("`{text}` is no priority; try a whole number from 0 to 9"))?;
+    Priority::try_from(number).map_err(|error| error.to_string())
+}
+
 #[derive(Debug, Subcommand)]
 pub(crate) enum JobsCommand {
     /// List jobs, the newest last
@@ -295,6 +301,14 @@ pub(crate) enum JobsCommand {
     Cancel {
         #[arg(value_name = "ID")]
         id: u64,
+    },
+    /// Have a waiting file taken sooner, or later
+    Priority {
+        #[arg(value_name = "ID")]
+        id: u64,
+        /// 0 to 9, the higher the sooner; files have 5 unless the configuration says otherwise
+        #[arg(value_name = "N", value_parser = parse_priority, allow_negative_numbers = true)]
+        priority: Priority,
     },
     /// Take nothing new, also after a restart, until `resume`; jobs in work are finished
     Pause,

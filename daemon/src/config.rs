@@ -6,7 +6,9 @@ use std::path::{Component, Path, PathBuf};
 use std::time::Duration;
 
 use suture_core::Profile;
+use suture_store::Priority;
 
+use crate::own_profile::OwnProfile;
 use crate::units::show_size;
 use crate::window::RunWindow;
 
@@ -32,6 +34,21 @@ pub(crate) struct FolderConfig {
     pub profile: String,
     /// Originals stay in `in/`, which may be read-only.
     pub leave_originals: bool,
+    /// How soon files are wanted whose profile says nothing of that.
+    pub priority: Priority,
+}
+
+impl FolderConfig {
+    /// A folder of which nothing more is said.
+    pub(crate) fn of(path: &Path) -> Self {
+        Self {
+            name: name_of(path),
+            path: path.to_owned(),
+            profile: DEFAULT_PROFILE.into(),
+            leave_originals: false,
+            priority: Priority::default(),
+        }
+    }
 }
 
 /// How long one attempt may take.
@@ -73,18 +90,18 @@ pub(crate) struct Config {
     /// The hours at which all workers work; at others, so many do.
     pub run_window: RunWindow,
     pub workers_outside: usize,
-    pub profiles: BTreeMap<String, Profile>,
+    /// What was made of the same content before is not made once more.
+    pub reuse: bool,
+    pub profiles: BTreeMap<String, OwnProfile>,
 }
 
 impl Config {
     /// For one hot folder, everything else by default.
     pub(crate) fn for_folder(dir: &Path) -> Self {
         let limits = suture_core::Limits::default();
-        let folder =
-            FolderConfig { name: name_of(dir), path: dir.to_owned(), profile: DEFAULT_PROFILE.into(), leave_originals: false };
         Self {
             state: default_state(dir),
-            folders: vec![folder],
+            folders: vec![FolderConfig::of(dir)],
             workers: 2,
             threads: limits.threads,
             memory: limits.memory_bytes,
@@ -96,6 +113,7 @@ impl Config {
             time_limit: TimeLimit { base: Duration::from_secs(120), per_gib: Duration::from_secs(1200) },
             run_window: RunWindow::default(),
             workers_outside: 0,
+            reuse: true,
             profiles: BTreeMap::new(),
         }
     }
@@ -115,7 +133,7 @@ impl Config {
 
     /// A profile of the configuration's, or a built-in one.
     pub(crate) fn profile(&self, name: &str) -> Option<Profile> {
-        self.profiles.get(name).cloned().or_else(|| Profile::built_in(name))
+        self.profiles.get(name).map(|own| own.profile.clone()).or_else(|| Profile::built_in(name))
     }
 
     /// The profile of files that lie in no sub-folder of a hot folder.

@@ -1,5 +1,5 @@
 //! How `suture jobs` reaches the jobs: through a socket in the hot folder while its daemon runs (the store has one owner), else
-//! by opening the store. Either way the same [`Wish`] gets the same [`Answer`].
+//! by opening the store ([`crate::reach`]). Either way the same [`JobsWish`] is answered alike; a [`DaemonWish`] only a daemon can answer.
 
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, Read, Write};
@@ -12,8 +12,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use suture_store::{Control, Job, JobId, JobStore, Query, StoreError};
+use suture_store::{Control, Job, JobId, JobStore, Priority, Query, StoreError};
 
 use crate::attempt::Context;
 use crate::fsx::Identity;
@@ -31,64 +32,127 @@ const LOOK_EVERY: Duration = Duration::from_millis(100);
 /// Requests answered at the same time; further ones wait.
 const AT_ONCE: usize = 16;
 
-/// What an operator wants.
+/// What is asked of the jobs: whoever has the store can answer ([`answer`]).
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Wish {
+pub(crate) enum JobsWish {
     List,
     Show(JobId),
     Retry(JobId),
     Cancel(JobId),
+    /// It is wanted sooner, or later.
+    Rank(JobId, Priority),
+}
+
+/// What is asked of a daemon: only one that runs can answer.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum DaemonWish {
     /// Nothing new is to be taken.
     Pause,
     /// It is to be taken again.
     Resume,
-    /// What keeps the daemon from work?
+    /// What keeps it from work?
     Standing,
 }
 
-/// What comes of it.
-#[derive(Debug, Serialize, Deserialize)]
+/// One line on the socket.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Answer {
-    Jobs(Vec<Job>),
-    Standing(Standing),
-    Failed { line: String, exit_code: u8 },
+pub(crate) enum Request {
+    Jobs(JobsWish),
+    Daemon(DaemonWish),
 }
 
-/// Does what is wished of jobs; what is wished of a daemon, one has to do ([`steer`]).
-pub(crate) fn answer(store: &dyn JobStore, wish: &Wish) -> Answer {
-    let result = match wish {
-        Wish::List => store.list(&Query::default()),
-        Wish::Show(id) => store.get(*id).and_then(|job| job.map(|job| vec![job]).ok_or(StoreError::Unknown(*id))),
-        Wish::Retry(id) => store.control(*id, Control::Retry).map(|job| vec![job]),
-        Wish::Cancel(id) => store.control(*id, Control::Cancel).map(|job| vec![job]),
-        Wish::Pause | Wish::Resume | Wish::Standing => Ok(Vec::new()),
+impl From<JobsWish> for Request {
+    fn from(wish: JobsWish) -> Self {
+        Self::Jobs(wish)
+    }
+}
+
+impl From<DaemonWish> for Request {
+    fn from(wish: DaemonWish) -> Self {
+        Self::Daemon(wish)
+    }
+}
+
+/// A wish, and what is answered to it.
+pub(crate) trait Wish: Clone + Into<Request> {
+    type Answer: DeserializeOwned;
+
+    /// Does it leave everything as it is?
+    fn only_looks(&self) -> bool;
+}
+
+impl Wish for JobsWish {
+    type Answer = Vec<Job>;
+
+    fn only_looks(&self) -> bool {
+        matches!(self, Self::List | Self::Show(_))
+    }
+}
+
+impl Wish for DaemonWish {
+    type Answer = Standing;
+
+    fn only_looks(&self) -> bool {
+        *self == Self::Standing
+    }
+}
+
+/// A wish that cannot be granted: a line for people, and the exit code for it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Refusal {
+    pub line: String,
+    pub exit_code: u8,
+}
+
+impl From<StoreError> for Refusal {
+    fn from(error: StoreError) -> Self {
+        Self { line: error.to_string(), exit_code: error.exit_code() }
+    }
+}
+
+/// Does what is wished of jobs.
+///
+/// # Errors
+/// When there is no such job, or the store cannot do it.
+pub(crate) fn answer(store: &dyn JobStore, wish: &JobsWish) -> Result<Vec<Job>, Refusal> {
+    let one = match wish {
+        JobsWish::List => return Ok(store.list(&Query::default())?),
+        JobsWish::Show(id) => store.get(*id)?.ok_or(StoreError::Unknown(*id))?,
+        JobsWish::Retry(id) => store.control(*id, Control::Retry)?,
+        JobsWish::Cancel(id) => store.control(*id, Control::Cancel)?,
+        JobsWish::Rank(id, priority) => store.control(*id, Control::Rank(*priority))?,
     };
-    match result {
-        Ok(jobs) => Answer::Jobs(jobs),
-        Err(error) => Answer::failed(&error),
-    }
-}
-
-impl Answer {
-    pub(crate) fn failed(error: &StoreError) -> Self {
-        Self::Failed { line: error.to_string(), exit_code: error.exit_code() }
-    }
+    Ok(vec![one])
 }
 
 /// Pauses the daemon or lets it go on, if that is wished, and says how it stands.
-fn steer(context: &Context, wish: &Wish) -> Answer {
-    if let Wish::Pause | Wish::Resume = wish {
-        let paused = *wish == Wish::Pause;
-        if let Err(error) = standstill::set(&context.settings.now().state, paused) {
-            return Answer::Failed { line: format!("the pause cannot be noted: {error}"), exit_code: 75 };
-        }
+fn steer(context: &Context, wish: &DaemonWish) -> Result<Standing, Refusal> {
+    if let DaemonWish::Pause | DaemonWish::Resume = wish {
+        let paused = *wish == DaemonWish::Pause;
+        standstill::set(&context.settings.now().state, paused)
+            .map_err(|error| Refusal { line: format!("the pause cannot be noted: {error}"), exit_code: 75 })?;
         if context.schedule.hold(Hold::Operator, paused.then(|| standstill::WORDS.into())) {
             tracing::info!(paused, "An operator's wish.");
         }
     }
-    Answer::Standing(context.schedule.standing())
+    Ok(context.schedule.standing())
+}
+
+/// Does what is wished of jobs while the daemon works on them.
+fn change(context: &Context, wish: &JobsWish) -> Result<Vec<Job>, Refusal> {
+    let before = if let JobsWish::Cancel(id) = wish { context.store.get(*id).ok().flatten() } else { None };
+    let jobs = answer(&*context.store, wish)?;
+    if let Some(before) = &before {
+        context.sweep(before);
+    }
+    if let JobsWish::Retry(id) | JobsWish::Cancel(id) | JobsWish::Rank(id, _) = wish {
+        tracing::info!(job = id.0, ?wish, "An operator's wish.");
+        context.schedule.news();
+    }
+    Ok(jobs)
 }
 
 fn socket(root: &Path) -> PathBuf {
@@ -206,21 +270,12 @@ fn serve_one(context: &Context, stream: &UnixStream, patience: Duration) -> io::
     stream.set_write_timeout(Some(patience))?;
     let mut line = String::new();
     BufReader::new(stream.take(LONGEST_WISH)).read_line(&mut line)?;
-    let wish: Wish = serde_json::from_str(&line)?;
-    let before = if let Wish::Cancel(id) = &wish { context.store.get(*id).ok().flatten() } else { None };
-    let answer = match wish {
-        Wish::Pause | Wish::Resume | Wish::Standing => steer(context, &wish),
-        _ => answer(&*context.store, &wish),
-    };
-    if let (Some(before), Answer::Jobs(_)) = (&before, &answer) {
-        context.sweep(before);
-    }
-    if let (Wish::Retry(id) | Wish::Cancel(id), Answer::Jobs(_)) = (&wish, &answer) {
-        tracing::info!(job = id.0, ?wish, "An operator's wish.");
-        context.schedule.news();
-    }
+    let request: Request = serde_json::from_str(&line)?;
     let mut out = io::BufWriter::new(stream);
-    serde_json::to_writer(&mut out, &answer)?;
+    match request {
+        Request::Jobs(wish) => serde_json::to_writer(&mut out, &change(context, &wish))?,
+        Request::Daemon(wish) => serde_json::to_writer(&mut out, &steer(context, &wish))?,
+    }
     out.flush()
 }
 
@@ -228,11 +283,12 @@ fn serve_one(context: &Context, stream: &UnixStream, patience: Duration) -> io::
 ///
 /// # Errors
 /// When one does, but not in a way that can be understood.
-pub(crate) fn ask(root: &Path, wish: &Wish) -> io::Result<Option<Answer>> {
+pub(crate) fn ask<W: Wish>(root: &Path, wish: &W) -> io::Result<Option<Result<W::Answer, Refusal>>> {
     let Ok(mut stream) = short(&socket(root), |path| UnixStream::connect(path)) else { return Ok(None) };
     stream.set_read_timeout(Some(PATIENCE))?;
     stream.set_write_timeout(Some(PATIENCE))?;
-    let mut line = serde_json::to_vec(wish)?;
+    let request: Request = wish.clone().into();
+    let mut line = serde_json::to_vec(&request)?;
     line.push(b'\n');
     stream.write_all(&line)?;
     Ok(Some(serde_json::from_reader(BufReader::new(stream))?))
@@ -255,18 +311,22 @@ mod tests {
             mtime_ns: 4,
             profile: "default".into(),
         };
-        store.submit(&[Submission { source, foreign: None }]).unwrap();
+        store.submit(&[Submission { source, foreign: None, priority: Priority::default() }]).unwrap();
         let id = JobId(1);
-        assert!(matches!(answer(&store, &Wish::List), Answer::Jobs(jobs) if jobs.len() == 1 && jobs[0].id == id));
-        assert!(matches!(answer(&store, &Wish::Show(JobId(9))), Answer::Failed { exit_code: 2, .. }));
-        assert!(matches!(answer(&store, &Wish::Cancel(id)), Answer::Jobs(_)));
-        assert!(matches!(answer(&store, &Wish::Cancel(id)), Answer::Failed { exit_code: 2, .. }), "it is cancelled already");
+        assert!(answer(&store, &JobsWish::List).is_ok_and(|jobs| jobs.len() == 1 && jobs[0].id == id));
+        let refused = |wish| answer(&store, &wish).is_err_and(|refusal| refusal.exit_code == 2);
+        assert!(refused(JobsWish::Show(JobId(9))));
+        let ranked = answer(&store, &JobsWish::Rank(id, Priority::HIGHEST)).unwrap();
+        assert_eq!(ranked[0].priority, Priority::HIGHEST);
+        answer(&store, &JobsWish::Cancel(id)).unwrap();
+        assert!(refused(JobsWish::Rank(id, Priority::LOWEST)), "it waits no longer");
+        assert!(refused(JobsWish::Cancel(id)), "it is cancelled already");
     }
 
     #[test]
     fn no_daemon_no_answer() {
         let dir = tempfile::tempdir().unwrap();
         std::fs::create_dir(dir.path().join(".suture")).unwrap();
-        assert!(ask(dir.path(), &Wish::List).unwrap().is_none());
+        assert!(ask(dir.path(), &JobsWish::List).unwrap().is_none());
     }
 }

@@ -103,14 +103,28 @@ pub(crate) fn write_new_json<T: Serialize>(path: &Path, value: &T, sync: bool) -
 ///
 /// # Errors
 /// As [`create_anew`], `read` and `write`. A part that was written goes away.
-pub(crate) fn copy_new(mut from: &File, to: &Path) -> io::Result<File> {
-    let mut copy = create_anew(to)?;
-    let copied = match rustix::fs::ioctl_ficlone(&copy, from) {
-        Ok(()) => Ok(()),
-        Err(_) => io::copy(&mut from, &mut copy).map(drop),
-    };
-    match copied.and_then(|()| rights::like_original(&copy, &from.metadata()?)) {
+pub(crate) fn copy_new(from: &File, to: &Path) -> io::Result<File> {
+    let copy = copy_content(from, to)?;
+    match from.metadata().and_then(|original| rights::like_original(&copy, &original)) {
         Ok(()) => Ok(copy),
+        Err(error) => {
+            let _ = fsx::remove_if_there(to);
+            Err(error)
+        }
+    }
+}
+
+/// The same without the original's time, owner and mode.
+///
+/// # Errors
+/// As [`copy_new`].
+pub(crate) fn copy_content(mut from: &File, to: &Path) -> io::Result<File> {
+    let mut copy = create_anew(to)?;
+    if rustix::fs::ioctl_ficlone(&copy, from).is_ok() {
+        return Ok(copy);
+    }
+    match io::copy(&mut from, &mut copy) {
+        Ok(_) => Ok(copy),
         Err(error) => {
             let _ = fsx::remove_if_there(to);
             Err(error)

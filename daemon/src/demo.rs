@@ -9,12 +9,12 @@ use suture_core::Report;
 use suture_store::{Job, JobId, State};
 
 use crate::config::Config;
-use crate::control::{Answer, Wish};
+use crate::control::JobsWish;
 use crate::exit::Exit;
 use crate::say::complain;
 use crate::settings::Settings;
 use crate::signals::Stop;
-use crate::{create, fsx, jobs, table, watch};
+use crate::{create, fsx, jobs, reach, table, watch};
 
 mod meshes;
 
@@ -116,11 +116,7 @@ fn known_jobs(dir: &Path) -> Result<Vec<Job>, String> {
     if !dir.join(".suture").is_dir() {
         return Ok(Vec::new());
     }
-    match jobs::reach(dir, &Wish::List) {
-        Ok(Answer::Jobs(jobs)) => Ok(jobs),
-        Ok(Answer::Standing(_)) => Ok(Vec::new()),
-        Ok(Answer::Failed { line, .. }) | Err((line, _)) => Err(line),
-    }
+    reach::jobs(dir, &JobsWish::List).map_err(|failure| failure.line)
 }
 
 fn tell(dir: &Path, job: &Job) {

@@ -292,8 +292,7 @@ mod tests {
     #[test]
     fn a_folder_has_one_owner() {
         let dir = tempfile::tempdir().unwrap();
-        let config =
-            FolderConfig { name: "a".into(), path: dir.path().into(), profile: "default".into(), leave_originals: false };
+        let config = FolderConfig::of(dir.path());
         let first = Folder::open(&config).unwrap();
         assert!(first.inbox().is_dir() && first.out().is_dir());
         match Folder::open(&config) {
@@ -309,7 +308,7 @@ mod tests {
     fn a_folder_is_told_by_its_identity() {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);
-        let config = FolderConfig { name: "a".into(), path: at("hot"), profile: "default".into(), leave_originals: false };
+        let config = FolderConfig::of(&at("hot"));
         let folder = Folder::open(&config).unwrap();
         folder.check().unwrap();
         std::fs::remove_dir(at("hot/out")).unwrap();
@@ -332,8 +331,7 @@ mod tests {
     #[test]
     fn a_part_that_leads_to_another_is_refused() {
         let dir = tempfile::tempdir().unwrap();
-        let config =
-            FolderConfig { name: "a".into(), path: dir.path().into(), profile: "default".into(), leave_originals: false };
+        let config = FolderConfig::of(dir.path());
         for (part, target) in [("out", "in"), ("done", "in"), ("failed", "in/deep")] {
             std::fs::create_dir_all(dir.path().join("in/deep")).unwrap();
             std::os::unix::fs::symlink(target, dir.path().join(part)).unwrap();
@@ -350,7 +348,7 @@ mod tests {
     #[test]
     fn a_folder_within_a_hot_one_is_refused() {
         let dir = tempfile::tempdir().unwrap();
-        let config = |path: PathBuf| FolderConfig { name: "a".into(), path, profile: "default".into(), leave_originals: false };
+        let config = |path: PathBuf| FolderConfig::of(&path);
         let _outer = Folder::open(&config(dir.path().into())).unwrap();
         for inner in ["in", "in/sub/deeper", "out"] {
             let opened = Folder::open(&config(dir.path().join(inner)));

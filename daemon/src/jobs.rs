@@ -8,16 +8,16 @@ use jiff::Timestamp;
 use jiff::tz::TimeZone;
 use suture_core::Report;
 use suture_store::job::{Area, Kind};
-use suture_store::{Job, JobId, SledStore, State, StoreError, Time};
+use suture_store::{Job, JobId, State, Time};
 
 use crate::cli::{JobsArgs, JobsCommand};
-use crate::config::default_state;
-use crate::control::{Answer, Wish, answer, ask};
+use crate::control::{DaemonWish, JobsWish};
 use crate::exit::Exit;
+use crate::reach::{self, Failure};
 use crate::receipt::REPORT;
 use crate::say::{complain, plain};
 use crate::schedule::Standing;
-use crate::{standstill, table, watch, watchdog};
+use crate::{standstill, table};
 
 /// Does what the command line asks.
 pub(crate) fn run(args: &JobsArgs) -> Exit {
@@ -25,16 +25,15 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
         JobsCommand::Pause => return paused(&args.dir, true),
         JobsCommand::Resume => return paused(&args.dir, false),
         JobsCommand::Drain => return drained(&args.dir),
-        JobsCommand::List { .. } => Wish::List,
-        JobsCommand::Show { id } => Wish::Show(JobId(*id)),
-        JobsCommand::Retry { id } => Wish::Retry(JobId(*id)),
-        JobsCommand::Cancel { id } => Wish::Cancel(JobId(*id)),
+        JobsCommand::List { .. } => JobsWish::List,
+        JobsCommand::Show { id } => JobsWish::Show(JobId(*id)),
+        JobsCommand::Retry { id } => JobsWish::Retry(JobId(*id)),
+        JobsCommand::Cancel { id } => JobsWish::Cancel(JobId(*id)),
+        JobsCommand::Priority { id, priority } => JobsWish::Rank(JobId(*id), *priority),
     };
-    let mut jobs = match reach(&args.dir, &wish) {
-        Ok(Answer::Jobs(jobs)) => jobs,
-        Ok(Answer::Standing(_)) => Vec::new(),
-        Ok(Answer::Failed { line, exit_code }) => return fail(&line, exit_code),
-        Err((line, exit)) => return fail(&line, exit.code()),
+    let mut jobs = match reach::jobs(&args.dir, &wish) {
+        Ok(jobs) => jobs,
+        Err(failure) => return fail(&failure),
     };
     let summary = summary(&jobs);
     if let JobsCommand::List { state, newest } = &args.command {
@@ -69,24 +68,24 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
 /// Pauses the daemon of a hot folder, or lets it go on; if none runs, the next one.
 fn paused(dir: &Path, paused: bool) -> Exit {
     let how = if paused { "paused: nothing new is taken" } else { "files are taken again" };
-    match steer(dir, if paused { &Wish::Pause } else { &Wish::Resume }) {
+    match reach::daemon(dir, &if paused { DaemonWish::Pause } else { DaemonWish::Resume }) {
         Ok(Some(Standing { running, .. })) if paused && running > 0 => say(&format!("{how}; {running} in work will be finished")),
         Ok(Some(_)) => say(how),
         Ok(None) => say(&format!("{how}, when a daemon runs again")),
-        Err((line, exit)) => fail(&line, exit.code()),
+        Err(failure) => fail(&failure),
     }
 }
 
 /// Pauses, and waits for the jobs in work.
 fn drained(dir: &Path) -> Exit {
-    let mut wish = Wish::Pause;
+    let mut wish = DaemonWish::Pause;
     loop {
-        match steer(dir, &wish) {
+        match reach::daemon(dir, &wish) {
             Ok(Some(Standing { running: 1.., .. })) => std::thread::sleep(LOOK_EVERY),
             Ok(_) => return say("drained: nothing is in work; `suture jobs resume` goes on"),
-            Err((line, exit)) => return fail(&line, exit.code()),
+            Err(failure) => return fail(&failure),
         }
-        wish = Wish::Standing;
+        wish = DaemonWish::Standing;
     }
 }
 
@@ -98,87 +97,17 @@ fn say(line: &str) -> Exit {
     Exit::Good
 }
 
+fn fail(failure: &Failure) -> Exit {
+    complain(&failure.line);
+    failure.exit
+}
+
 /// Why a daemon takes nothing new, if one runs and does not, or the next one would not.
 fn held(dir: &Path) -> Vec<String> {
-    match steer(dir, &Wish::Standing) {
+    match reach::daemon(dir, &DaemonWish::Standing) {
         Ok(Some(standing)) => standing.held,
-        Ok(None) if standstill::is_set(&state_of(dir)) => vec![standstill::WORDS.into()],
+        Ok(None) if standstill::is_set(&reach::state_of(dir)) => vec![standstill::WORDS.into()],
         _ => Vec::new(),
-    }
-}
-
-/// Asks the daemon of a hot folder; without one, notes the wish for the next, and there is no standing.
-fn steer(dir: &Path, wish: &Wish) -> Result<Option<Standing>, (String, Exit)> {
-    match asked(dir, wish)? {
-        Some(Answer::Standing(standing)) => Ok(Some(standing)),
-        Some(Answer::Failed { line, .. }) => Err((line, Exit::TryAgain)),
-        Some(Answer::Jobs(_)) => Err(("the daemon's answer cannot be understood".into(), Exit::TryAgain)),
-        None => {
-            let note = |paused| standstill::set(&state_of(dir), paused);
-            let noted = match wish {
-                Wish::Pause => note(true),
-                Wish::Resume => note(false),
-                _ => Ok(()),
-            };
-            noted.map(|()| None).map_err(|error| (format!("the pause cannot be noted: {error}"), Exit::TryAgain))
-        }
-    }
-}
-
-fn fail(line: &str, code: u8) -> Exit {
-    complain(&line);
-    match code {
-        73 => Exit::Owned,
-        75 => Exit::TryAgain,
-        _ => Exit::Refused,
-    }
-}
-
-/// Through the running daemon, or through the store itself.
-pub(crate) fn reach(dir: &Path, wish: &Wish) -> Result<Answer, (String, Exit)> {
-    if let Some(answer) = asked(dir, wish)? {
-        return Ok(answer);
-    }
-    let state = state_of(dir);
-    if !state.is_dir() {
-        return Ok(Answer::Jobs(Vec::new()));
-    }
-    watchdog::start(|| watch::end_hanging()).map_err(|error| (format!("no thread can be started: {error}"), Exit::TryAgain))?;
-    let failed = |error: StoreError| (error.to_string(), if error.exit_code() == 73 { Exit::Owned } else { Exit::TryAgain });
-    // To look needs no right to write, and no room.
-    match wish {
-        Wish::List => Ok(Answer::Jobs(SledStore::peek(&state).map_err(failed)?)),
-        Wish::Show(id) => {
-            let job = SledStore::peek(&state).map_err(failed)?.into_iter().find(|job| job.id == *id);
-            let unknown = || Answer::failed(&StoreError::Unknown(*id));
-            Ok(job.map_or_else(unknown, |job| Answer::Jobs(vec![job])))
-        }
-        Wish::Retry(_) | Wish::Cancel(_) | Wish::Pause | Wish::Resume | Wish::Standing => {
-            Ok(answer(&SledStore::open(&state).map_err(failed)?, wish))
-        }
-    }
-}
-
-/// The running daemon's answer; `None` if none runs.
-fn asked(dir: &Path, wish: &Wish) -> Result<Option<Answer>, (String, Exit)> {
-    if !dir.join(".suture").is_dir() {
-        return Err((format!("{}: is no hot folder (try --dir DIR)", dir.display()), Exit::Refused));
-    }
-    ask(dir, wish).map_err(|error| {
-        let silent = matches!(error.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut);
-        let line = match silent {
-            true => "the daemon does not answer: it is stopped, or very busy; try again".into(),
-            false => format!("the daemon's answer was cut off or cannot be understood: {error}; try again"),
-        };
-        (line, Exit::TryAgain)
-    })
-}
-
-fn state_of(dir: &Path) -> PathBuf {
-    use std::os::unix::ffi::OsStringExt;
-    match std::fs::read(dir.join(".suture").join("state-path")) {
-        Ok(path) => std::ffi::OsString::from_vec(path).into(),
-        Err(_) => default_state(dir),
     }
 }
 
@@ -186,14 +115,22 @@ fn state_of(dir: &Path) -> PathBuf {
 #[derive(serde::Serialize)]
 struct Shown<'a> {
     kind: &'static str,
+    /// The job of whose result its own is a copy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reused: Option<JobId>,
     #[serde(flatten)]
     job: &'a Job,
 }
 
 impl<'a> Shown<'a> {
     fn new(job: &'a Job) -> Self {
-        Self { kind: job.kind().name(), job }
+        Self { kind: job.kind().name(), reused: reused(job), job }
     }
+}
+
+/// The job of whose result this one's is a copy.
+fn reused(job: &Job) -> Option<JobId> {
+    job.publication().and_then(|publication| publication.reused)
 }
 
 /// What there is to add to a job's state.
@@ -203,7 +140,11 @@ fn note(job: &Job) -> String {
         State::Running { cancel: true, .. } => "being stopped".into(),
         State::Ended { publication } => match (&publication.output, publication.reason.is_empty()) {
             (Some(output), true) => {
-                format!("→ {}/{output}", if publication.ending.is_good() { "out" } else { area(publication.ending.area()) })
+                let copied = publication.reused.map(|job| format!(", reused from job {job}")).unwrap_or_default();
+                format!(
+                    "→ {}/{output}{copied}",
+                    if publication.ending.is_good() { "out" } else { area(publication.ending.area()) }
+                )
             }
             _ => publication.reason.clone(),
         },
@@ -227,7 +168,9 @@ fn area(area: Area) -> &'static str {
 
 fn line(job: &Job) -> String {
     let (id, kind, since) = (job.id.0, job.kind().name(), when(job.changed));
-    format!("{id:>6}  {since}  {kind:<12} {:<32} {}", job.source.path.to_string(), note(job)).trim_end().to_owned() + "\n"
+    let priority = if job.priority.is_default() { String::new() } else { format!("priority {}  ", job.priority) };
+    let line = format!("{id:>6}  {since}  {kind:<12} {:<32} {priority}{}", job.source.path.to_string(), note(job));
+    line.trim_end().to_owned() + "\n"
 }
 
 /// Day and time where the machine is.
@@ -236,22 +179,28 @@ fn when(time: Time) -> String {
     i64::try_from(time.0).ok().and_then(|ms| Timestamp::from_millisecond(ms).ok()).map_or_else(|| "?".into(), zoned)
 }
 
-/// How many jobs are in which state.
+/// How many jobs are in which state, and of how many of them the result is a copy.
 fn summary(jobs: &[Job]) -> String {
-    let count = |kind: Kind| jobs.iter().filter(|job| job.kind() == kind).count();
-    let counts = Kind::ALL.into_iter().map(|kind| (kind, count(kind))).filter(|(_, count)| *count > 0);
-    counts.map(|(kind, count)| format!("{count} {}", kind.name())).collect::<Vec<_>>().join(", ")
+    let count =
+        |kind: Kind, copied: bool| jobs.iter().filter(|job| job.kind() == kind && (!copied || reused(job).is_some())).count();
+    let words = |kind: Kind| match (count(kind, false), count(kind, true)) {
+        (0, _) => None,
+        (all, 0) => Some(format!("{all} {}", kind.name())),
+        (all, copies) => Some(format!("{all} {} ({copies} reused)", kind.name())),
+    };
+    Kind::ALL.into_iter().filter_map(words).collect::<Vec<_>>().join(", ")
 }
 
 fn show(dir: &Path, job: &Job) -> String {
     let (place, path) = job.original();
     let mut text = format!(
-        "job {}: {} in {}\n  file      {}/{path}\n  profile   {}\n  attempts  {}\n  came      {}\n  changed   {}\n",
+        "job {}: {} in {}\n  file      {}/{path}\n  profile   {}\n  priority  {}\n  attempts  {}\n  came      {}\n  changed   {}\n",
         job.id,
         job.kind(),
         job.source.folder,
         area(place),
         job.source.profile,
+        job.priority,
         job.attempts,
         when(job.submitted),
         when(job.changed)

@@ -5,6 +5,8 @@ use std::path::Path;
 use serde::de::DeserializeOwned;
 use suture_core::Profile;
 
+use crate::own_profile::OwnProfile;
+
 /// Settings that a folder of `in/` may carry for itself.
 pub(crate) const FOLDER_FILE: &str = ".suture.toml";
 
@@ -53,20 +55,29 @@ pub(crate) fn validate(profile: &Profile, text: &str, from: usize) -> Result<(),
     profile.validate().map_err(|error| with_line(text, place_of(text, from, error.setting), &error.to_string()))
 }
 
+/// The engine's settings in a profile file.
+///
+/// # Errors
+/// As [`own_from_file`].
+pub(crate) fn from_file(path: &Path) -> Result<Profile, String> {
+    own_from_file(path).map(|own| own.profile)
+}
+
 /// Reads a profile file. Unknown settings are errors, with their line; the name is the file's unless it gives one.
 ///
 /// # Errors
 /// A line for people.
-pub(crate) fn from_file(path: &Path) -> Result<Profile, String> {
+pub(crate) fn own_from_file(path: &Path) -> Result<OwnProfile, String> {
     let wrong = |line: String| format!("{}: {line}", path.display());
     let text = std::fs::read_to_string(path).map_err(|e| wrong(format!("cannot read the profile: {e}")))?;
-    let mut profile: Profile = parse(&text).map_err(wrong)?;
-    validate(&profile, &text, 0).map_err(wrong)?;
+    let mut own: OwnProfile = parse(&text).map_err(wrong)?;
+    let profile = &mut own.profile;
+    validate(profile, &text, 0).map_err(wrong)?;
     if profile.name == Profile::default().name {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         profile.name = if stem.starts_with('.') { "folder".into() } else { stem.into_owned() };
     }
-    Ok(profile)
+    Ok(own)
 }
 
 /// A built-in name, or else a file.

@@ -24,7 +24,8 @@ use crate::fsx::{self, Identity};
 use crate::names::{BEST, COMPANION, Names, VERSIONS, best_of, companions, first, no_free_name, with_suffix};
 use crate::place::{Item, Move, Placed, stage};
 use crate::publish_error::{PublishError, io_at};
-use crate::receipt::{NoReport, RECEIPT, REPORT, Receipt};
+use crate::receipt::{NoReport, RECEIPT, REPORT, Receipt, ReusedFrom, ReusedReport};
+use crate::reuse::recipe_of;
 use crate::rights::Rights;
 
 /// Names of an attempt's files in its folder.
@@ -35,7 +36,8 @@ const RECEIPT_FILE: &str = "receipt.json";
 /// What came of the work, before names are chosen.
 pub(crate) enum Conclusion {
     /// The engine's report; the output, if any, is in the attempt's folder. `ctime_ns`: last change of the original's inode then.
-    Report { report: Box<Report>, ctime_ns: i64 },
+    /// `reused`: of whose result both are copies.
+    Report { report: Box<Report>, ctime_ns: i64, reused: Option<ReusedFrom> },
     /// No report of the engine's.
     None { ending: Ending, reason: String },
 }
@@ -90,7 +92,7 @@ impl<'a> Desk<'a> {
         let work = self.work(job);
         let (ending, reason, output_hash, input_hash, source_ctime_ns) = match result {
             Conclusion::None { ending, reason } => (*ending, reason.clone(), None, None, None),
-            Conclusion::Report { report, ctime_ns } => {
+            Conclusion::Report { report, ctime_ns, .. } => {
                 let ending = ending_of(report);
                 let reason = if ending.is_good() { String::new() } else { report.verdict.reasons.join("; ") };
                 let output = report.output.as_ref().and_then(|facts| facts.blake3.parse::<Hash>().ok());
@@ -102,18 +104,24 @@ impl<'a> Desk<'a> {
         let target = if ending.is_good() { self.folder.out() } else { self.folder.area(ending.area()) };
         let shown_source = self.folder.inbox().join(job.source.path.to_path()).display().to_string();
         let report_path = work.join(REPORT_FILE);
+        let (mut recipe, mut copied) = (None, None);
         let report_hash = match result {
             Conclusion::None { .. } => {
                 let how = format!("suture jobs retry {} --dir {} works on it once more", job.id, self.folder.root.display());
                 rewrite(&report_path, &NoReport::new(job, shown_source, ending, &reason, how))?
             }
-            Conclusion::Report { report, .. } => {
+            Conclusion::Report { report, reused, .. } => {
+                recipe = ending.is_good().then(|| recipe_of(report));
+                copied = reused.as_ref().map(|from| from.job);
                 let mut report = report.clone();
                 report.input.path = shown_source.into();
                 if let (Some(facts), Some(name)) = (&mut report.output, &names.output) {
                     facts.path = target.join(name.to_path()).display().to_string().into();
                 }
-                rewrite(&report_path, &report)?
+                match reused {
+                    None => rewrite(&report_path, &report)?,
+                    Some(reused) => rewrite(&report_path, &ReusedReport { report: &report, reused })?,
+                }
             }
         };
         let publication = Publication {
@@ -122,6 +130,8 @@ impl<'a> Desk<'a> {
             output: names.output,
             output_hash,
             report_hash: Some(report_hash),
+            recipe,
+            reused: copied,
             source_ctime_ns,
             original: Some(names.original),
             stays: self.folder.leave_originals,
@@ -148,6 +158,7 @@ impl<'a> Desk<'a> {
             output: p.output.as_ref().map(ToString::to_string),
             output_blake3: p.output_hash,
             report_blake3: p.report_hash,
+            reused: p.reused,
         };
         rewrite(&self.work(job).join(RECEIPT_FILE), &receipt).map(drop)
     }

@@ -2,8 +2,9 @@
 //! for which the engine has none to give. With them the file system alone tells what was done, whatever becomes of the store.
 
 use serde::Serialize;
+use suture_core::Report;
 use suture_core::report::SCHEMA_VERSION;
-use suture_store::{Ending, Hash, Job};
+use suture_store::{Ending, Hash, Job, JobId};
 
 /// Appended to the result's name.
 pub(crate) const RECEIPT: &str = ".suture.json";
@@ -34,6 +35,26 @@ pub(crate) struct Receipt<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub output_blake3: Option<Hash>,
     pub report_blake3: Option<Hash>,
+    /// The job whose result was copied: nothing was computed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reused: Option<JobId>,
+}
+
+/// A report of the engine's on a result that was not computed: it is the earlier job's, with the names of this one.
+#[derive(Debug, Serialize)]
+pub(crate) struct ReusedReport<'a> {
+    #[serde(flatten)]
+    pub report: &'a Report,
+    pub reused: &'a ReusedFrom,
+}
+
+/// Where a result comes from that was not computed.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct ReusedFrom {
+    pub job: JobId,
+    /// Its hot folder, and the name of its result below `out/`.
+    pub folder: String,
+    pub output: String,
 }
 
 /// The report of a file that never got as far as the engine's own: unreadable, refused, put off for good, or quarantined.

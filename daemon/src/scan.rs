@@ -11,6 +11,7 @@ use std::time::Instant;
 
 use suture_store::{JobId, RelPath, Source, Submission};
 
+use crate::choice;
 use crate::claim::Original;
 use crate::folder::{Folder, NameKind, is_hot, name_kind};
 use crate::fsx::Identity;
@@ -142,7 +143,8 @@ impl Reconciler {
             match RelPath::from_path(&path) {
                 Ok(name) => {
                     let source = self.source(name, &identity);
-                    submissions.push((path, Submission { source, foreign }));
+                    let priority = choice::priority(&self.settings.now(), &self.folder, &source.path, &source.profile);
+                    submissions.push((path, Submission { source, foreign, priority }));
                 }
                 Err(error) => self.give_up(&path, identity, &error.to_string()),
             }
@@ -289,13 +291,7 @@ mod tests {
 
     fn reconciler(root: &Path) -> Reconciler {
         let settings = Settings::fixed(Config::for_folder(root));
-        let folder = Folder::open(&FolderConfig {
-            name: "hot".into(),
-            path: root.into(),
-            profile: "default".into(),
-            leave_originals: false,
-        })
-        .unwrap();
+        let folder = Folder::open(&FolderConfig { name: "hot".into(), ..FolderConfig::of(root) }).unwrap();
         Reconciler::new(Arc::new(folder), Arc::new(settings), Rest { settle: Duration::from_secs(1) })
     }
 

@@ -2,16 +2,18 @@
 //! the whole memory: two of them at once would only fight for the same processors. A suspect (a file that was running when the
 //! daemon died, twice) runs alone too, after everything else.
 //!
-//! So that small files do not wait behind a row of huge ones, a large file's turn comes when no small one waits, or when none
-//! has had a turn for [`ALONE_AT_LEAST_EVERY`]; that bounds the large ones' wait as well.
+//! The higher priority goes first. So that small files do not wait behind a row of huge ones, of equal priority a large file's turn comes
+//! when no small one waits, or when none has had a turn for [`ALONE_AT_LEAST_EVERY`]. A job's priority grows while it waits (the store's
+//! business): who has risen by that is the equal of those who were asked for sooner, but not before them, so that a row of huge files
+//! grows no more urgent than small ones only because huge ones always wait.
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
-use suture_store::Filter;
+use suture_store::{Filter, JobStore, Priority, StoreError, Waiting};
 
-/// However many small files come, one that runs alone has a turn this often.
+/// However many small files of its priority come, one that runs alone has a turn this often.
 const ALONE_AT_LEAST_EVERY: Duration = Duration::from_secs(300);
 /// How often an idle slot asks again: pauses after errors end without anyone's word.
 const ASK_EVERY: Duration = Duration::from_secs(1);
@@ -79,49 +81,34 @@ struct State {
     /// So many slots may be at work.
     most: usize,
     stop: bool,
-    /// Raised when there may be something new.
-    news: u64,
-    /// `news` when the store last had nothing for a kind of turn.
-    empty: [u64; 3],
     last_alone: Instant,
-    /// When idle slots last asked again.
-    asked: Instant,
 }
 
-impl State {
-    fn may_have(&self, turn: Turn) -> bool {
-        self.empty.get(index(turn)).is_some_and(|empty| *empty < self.news)
+/// What waits for each kind of turn.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Waits {
+    /// A result that is only to be brought into place.
+    pub parked: bool,
+    pub small: Option<Waiting>,
+    pub large: Option<Waiting>,
+    pub alone: Option<Waiting>,
+}
+
+impl Waits {
+    /// As the store has it. `large`: from this size on a file is worked on alone.
+    ///
+    /// # Errors
+    /// As the store's.
+    pub(crate) fn of(store: &dyn JobStore, large: u64) -> Result<Self, StoreError> {
+        let of = |turn: Turn| store.waiting(&turn.filter(large));
+        Ok(Self { parked: store.has_parked()?, small: of(Turn::Small)?, large: of(Turn::Large)?, alone: of(Turn::Alone)? })
     }
-}
-
-fn index(turn: Turn) -> usize {
-    match turn {
-        Turn::Small | Turn::Stop => 0,
-        Turn::Large => 1,
-        Turn::Alone => 2,
-    }
-}
-
-/// A turn, and what was known when it was given.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Given {
-    pub turn: Turn,
-    news: u64,
 }
 
 impl Schedule {
     pub(crate) fn new() -> Self {
-        let state = State {
-            busy: 0,
-            alone: false,
-            held: [None, None],
-            most: usize::MAX,
-            stop: false,
-            news: 1,
-            empty: [0; 3],
-            last_alone: Instant::now(),
-            asked: Instant::now(),
-        };
+        let state =
+            State { busy: 0, alone: false, held: [None, None], most: usize::MAX, stop: false, last_alone: Instant::now() };
         Self { state: Mutex::new(state), wake: Condvar::new() }
     }
 
@@ -129,40 +116,35 @@ impl Schedule {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for this slot's turn. After anything but [`Turn::Stop`], [`Schedule::done`] must follow.
-    pub(crate) fn next(&self) -> Given {
+    /// Waits for this slot's turn; `look` tells what waits. After anything but [`Turn::Stop`], [`Schedule::done`] must follow.
+    ///
+    /// # Errors
+    /// As `look`.
+    pub(crate) fn next<E>(&self, look: &dyn Fn() -> Result<Waits, E>) -> Result<Turn, E> {
         let mut state = self.lock();
         loop {
             if state.stop {
-                return Given { turn: Turn::Stop, news: state.news };
+                return Ok(Turn::Stop);
             }
-            if let Some(turn) = choose(&state) {
+            if state.may_give()
+                && let Some(turn) = choose(state.busy, state.last_alone.elapsed() >= ALONE_AT_LEAST_EVERY, &look()?)
+            {
                 state.busy += 1;
                 state.alone = turn.is_alone();
-                return Given { turn, news: state.news };
+                return Ok(turn);
             }
-            let (guard, _) = self.wake.wait_timeout(state, ASK_EVERY).unwrap_or_else(PoisonError::into_inner);
-            state = guard;
-            // However often it is woken for nothing.
-            if state.asked.elapsed() >= ASK_EVERY {
-                state.asked = Instant::now();
-                state.news += 1;
-            }
+            // However often it is woken for nothing, pauses end and jobs grow older meanwhile.
+            (state, _) = self.wake.wait_timeout(state, ASK_EVERY).unwrap_or_else(PoisonError::into_inner);
         }
     }
 
-    /// The slot's turn is over; `found`: there was something to claim.
-    pub(crate) fn done(&self, given: Given, found: bool) {
+    /// The slot's turn is over.
+    pub(crate) fn done(&self, turn: Turn) {
         let mut state = self.lock();
         state.busy = state.busy.saturating_sub(1);
-        if given.turn.is_alone() {
+        if turn.is_alone() {
             state.alone = false;
-        }
-        if given.turn.is_alone() {
             state.last_alone = Instant::now();
-        }
-        if !found && let Some(empty) = state.empty.get_mut(index(given.turn)) {
-            *empty = given.news;
         }
         drop(state);
         self.wake.notify_all();
@@ -170,7 +152,8 @@ impl Schedule {
 
     /// There may be something new to claim.
     pub(crate) fn news(&self) {
-        self.lock().news += 1;
+        // Whoever looked before that waits by now.
+        drop(self.lock());
         self.wake.notify_all();
     }
 
@@ -221,62 +204,119 @@ impl Schedule {
     }
 }
 
-fn choose(state: &State) -> Option<Turn> {
-    if state.held.iter().any(Option::is_some) || state.alone || state.busy >= state.most {
-        return None;
+impl State {
+    fn may_give(&self) -> bool {
+        self.held.iter().all(Option::is_none) && !self.alone && self.busy < self.most
     }
-    let large_waits = state.may_have(Turn::Large);
-    let overdue = (large_waits || state.may_have(Turn::Alone)) && state.last_alone.elapsed() >= ALONE_AT_LEAST_EVERY;
-    if state.may_have(Turn::Small) && !overdue {
+}
+
+/// Who is next. `overdue`: none has run alone for long.
+fn choose(busy: usize, overdue: bool, waits: &Waits) -> Option<Turn> {
+    if waits.parked {
         return Some(Turn::Small);
     }
-    if state.busy > 0 {
-        return None;
+    let alone = match (waits.large, waits.alone) {
+        (Some(large), Some(alone)) => {
+            // Suspects come last, but come: who has risen as far as that goes has waited for long enough.
+            let risen = alone.aged == Priority::HIGHEST && alone.highest < Priority::HIGHEST;
+            let turn = if alone.aged > large.aged || risen { Turn::Alone } else { Turn::Large };
+            Some((turn, Waiting { highest: large.highest.max(alone.highest), aged: large.aged.max(alone.aged) }))
+        }
+        (large, alone) => large.map(|large| (Turn::Large, large)).or(alone.map(|alone| (Turn::Alone, alone))),
+    };
+    match (waits.small, alone) {
+        (Some(small), Some((turn, alone))) => {
+            // Only who was asked for sooner goes first for it; whoever has merely waited goes first among their like.
+            let first = alone.highest > small.aged || (overdue && small.highest <= alone.aged);
+            if !first { Some(Turn::Small) } else { (busy == 0).then_some(turn) }
+        }
+        (Some(_), None) => Some(Turn::Small),
+        (None, alone) => alone.filter(|_| busy == 0).map(|(turn, _)| turn),
     }
-    if large_waits {
-        return Some(Turn::Large);
-    }
-    state.may_have(Turn::Alone).then_some(Turn::Alone)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::convert::Infallible;
+
     use super::*;
+
+    fn waiting(highest: i64, aged: i64) -> Option<Waiting> {
+        let priority = |number| Priority::try_from(number).unwrap();
+        Some(Waiting { highest: priority(highest), aged: priority(aged) })
+    }
+
+    fn waits(small: i64, large: i64, alone: i64) -> Waits {
+        let of = |number| if number == 0 { None } else { waiting(number, number) };
+        Waits { parked: false, small: of(small), large: of(large), alone: of(alone) }
+    }
+
+    fn next(s: &Schedule, waits: Waits) -> Turn {
+        s.next(&|| Ok::<_, Infallible>(waits)).unwrap()
+    }
 
     #[test]
     fn small_ones_run_beside_each_other_a_large_one_alone() {
         let s = Schedule::new();
-        let (a, b) = (s.next(), s.next());
-        assert_eq!((a.turn, b.turn), (Turn::Small, Turn::Small));
-        s.done(a, true);
+        let both = waits(5, 5, 0);
+        assert_eq!([next(&s, both), next(&s, both)], [Turn::Small, Turn::Small]);
+        s.done(Turn::Small);
         // Nothing small is left, but one still runs: the large one must wait for it.
-        let c = s.next();
-        s.done(c, false);
-        assert_eq!(choose(&s.lock()), None);
-        s.done(b, true);
-        let large = s.next();
-        assert_eq!(large.turn, Turn::Large);
-        s.news();
-        assert_eq!(choose(&s.lock()), None, "nothing beside a large one");
-        s.done(large, true);
-        assert_eq!(s.next().turn, Turn::Small, "a small one that came meanwhile is before the next large one");
+        assert_eq!(choose(1, false, &waits(0, 5, 0)), None);
+        s.done(Turn::Small);
+        assert_eq!(next(&s, waits(0, 5, 0)), Turn::Large);
+        assert!(!s.lock().may_give(), "nothing beside a large one");
+        s.done(Turn::Large);
+        assert_eq!(next(&s, both), Turn::Small, "a small one that came meanwhile is before the next large one");
     }
 
     #[test]
     fn suspects_come_last_and_alone() {
         let s = Schedule::new();
-        for expected in [Turn::Small, Turn::Large] {
-            let given = s.next();
-            assert_eq!(given.turn, expected);
-            s.done(given, false);
+        for (waits, turn) in [(waits(5, 5, 5), Turn::Small), (waits(0, 5, 5), Turn::Large), (waits(0, 0, 5), Turn::Alone)] {
+            assert_eq!((next(&s, waits), s.busy()), (turn, 1));
+            s.done(turn);
         }
-        let suspect = s.next();
-        assert_eq!(suspect.turn, Turn::Alone);
-        assert_eq!(s.busy(), 1);
-        s.done(suspect, false);
-        assert_eq!(choose(&s.lock()), None, "there was nothing for anyone");
-        s.news();
-        assert_eq!(choose(&s.lock()), Some(Turn::Small), "what came since was not asked for yet");
+        assert_eq!(choose(0, false, &Waits::default()), None, "there is nothing for anyone");
+    }
+
+    /// Higher first, whatever its size; but no one else begins what would keep it waiting.
+    #[test]
+    fn the_more_urgent_goes_first() {
+        assert_eq!(choose(0, false, &waits(5, 6, 0)), Some(Turn::Large));
+        assert_eq!(choose(1, false, &waits(5, 6, 0)), None, "the slots empty for it");
+        assert_eq!(choose(0, true, &waits(6, 5, 5)), Some(Turn::Small), "not even then");
+        assert_eq!(choose(0, false, &waits(5, 5, 6)), Some(Turn::Alone));
+        assert_eq!(choose(0, false, &waits(0, 5, 6)), Some(Turn::Alone));
+    }
+
+    /// There is little to do for it, so that it is in no one's way, and no one is in its.
+    #[test]
+    fn what_is_parked_waits_for_no_one() {
+        assert_eq!(choose(1, true, &Waits { parked: true, ..waits(5, 9, 0) }), Some(Turn::Small));
+    }
+
+    /// Among their like, small ones go first, but for one turn now and then.
+    #[test]
+    fn a_large_one_has_a_turn_now_and_then() {
+        assert_eq!(choose(0, true, &waits(5, 5, 0)), Some(Turn::Large));
+        assert_eq!(choose(1, true, &waits(5, 5, 0)), None);
+        assert_eq!(choose(0, true, &waits(5, 0, 5)), Some(Turn::Alone));
+    }
+
+    /// A row of large files that have waited for hours is no reason to keep a small one waiting; nor do urgent ones keep one waiting for ever.
+    #[test]
+    fn who_has_waited_becomes_one_of_the_others() {
+        let old = |small, large| Waits { small, large, ..Waits::default() };
+        assert_eq!(choose(0, false, &old(waiting(5, 5), waiting(5, 9))), Some(Turn::Small));
+        assert_eq!(choose(0, true, &old(waiting(5, 5), waiting(5, 9))), Some(Turn::Large));
+        assert_eq!(choose(0, true, &old(waiting(9, 9), waiting(0, 8))), Some(Turn::Small));
+        assert_eq!(choose(0, true, &old(waiting(9, 9), waiting(0, 9))), Some(Turn::Large));
+        assert_eq!(choose(0, false, &old(waiting(0, 8), waiting(9, 9))), Some(Turn::Large));
+        assert_eq!(choose(0, false, &old(waiting(0, 9), waiting(9, 9))), Some(Turn::Small));
+        let suspect = |alone| Waits { large: waiting(9, 9), alone, ..Waits::default() };
+        assert_eq!(choose(0, false, &suspect(waiting(5, 8))), Some(Turn::Large));
+        assert_eq!(choose(0, false, &suspect(waiting(5, 9))), Some(Turn::Alone));
     }
 
     #[test]
@@ -285,31 +325,38 @@ mod tests {
         assert!(s.hold(Hold::Disk, Some("full".into())) && s.hold(Hold::Operator, Some("wanted".into())));
         assert!(!s.hold(Hold::Disk, Some("still full".into())), "no news");
         assert_eq!(s.standing(), Standing { running: 0, held: vec!["still full".into(), "wanted".into()] });
-        assert!(s.hold(Hold::Disk, None) && s.is_paused() && choose(&s.lock()).is_none());
+        assert!(s.hold(Hold::Disk, None) && s.is_paused() && !s.lock().may_give());
         assert!(s.hold(Hold::Operator, None) && !s.is_paused());
-        assert_eq!(s.next().turn, Turn::Small);
+        assert_eq!(next(&s, waits(5, 0, 0)), Turn::Small);
     }
 
     #[test]
     fn outside_of_the_hours_fewer_slots_work() {
         let s = Schedule::new();
         assert!(s.limit(1) && !s.limit(1) && !s.is_paused());
-        let given = s.next();
-        assert_eq!(choose(&s.lock()), None, "one is at work");
+        let turn = next(&s, waits(5, 0, 0));
+        assert!(!s.lock().may_give(), "one is at work");
         s.limit(0);
-        s.done(given, true);
-        assert!(choose(&s.lock()).is_none() && s.is_paused());
+        s.done(turn);
+        assert!(!s.lock().may_give() && s.is_paused());
         assert_eq!(s.standing().held.len(), 1);
     }
 
-    /// News that come between a slot's question and its answer are not lost.
+    /// Who waits for work is told of news at once.
     #[test]
-    fn an_empty_answer_is_as_old_as_its_question() {
+    fn news_wake_who_waits() {
         let s = Schedule::new();
-        let given = s.next();
-        s.news();
-        s.done(given, false);
-        assert_eq!(s.next().turn, Turn::Small);
+        let there = std::sync::atomic::AtomicBool::new(false);
+        let look = || Ok::<_, Infallible>(waits(i64::from(there.load(std::sync::atomic::Ordering::Relaxed)), 0, 0));
+        std::thread::scope(|scope| {
+            let waiting = scope.spawn(|| s.next(&look).unwrap());
+            let began = Instant::now();
+            std::thread::sleep(Duration::from_millis(100));
+            there.store(true, std::sync::atomic::Ordering::Relaxed);
+            s.news();
+            assert_eq!(waiting.join().unwrap(), Turn::Small);
+            assert!(began.elapsed() < ASK_EVERY, "it was not woken");
+        });
     }
 
     #[test]
@@ -317,7 +364,7 @@ mod tests {
         let s = Schedule::new();
         s.hold(Hold::Disk, Some("full".into()));
         std::thread::scope(|scope| {
-            let waiting = scope.spawn(|| s.next().turn);
+            let waiting = scope.spawn(|| next(&s, waits(5, 5, 5)));
             s.stop();
             assert_eq!(waiting.join().unwrap(), Turn::Stop);
         });

@@ -114,6 +114,10 @@ fn changes(old: &Config, new: &Config) -> Vec<String> {
         if was != folder.profile {
             changes.push(format!("the profile of folder {} {was} -> {}", folder.name, folder.profile));
         }
+        let was = old.folders.iter().find(|known| known.name == folder.name).map_or(folder.priority, |known| known.priority);
+        if was != folder.priority {
+            changes.push(format!("the priority of folder {} {was} -> {}", folder.name, folder.priority));
+        }
     }
     let names: BTreeSet<&String> = old.profiles.keys().chain(new.profiles.keys()).collect();
     for name in names {
@@ -160,6 +164,7 @@ mod tests {
     #[test]
     fn what_changed_is_in_force_and_told() {
         let text = FIRST.replace("1GiB", "2GiB").replace("= 9", "= 8").replace("\"resin\"", "\"thin\"");
+        let text = text.replace("profile = \"thin\"", "profile = \"thin\"\npriority = 7");
         let text = format!("settle = \"1s\"\ndrain = 5\ntime_limit.base = \"1h\"\n{text}[profiles.thin]\n");
         let (reload, before, after) = reloaded(&text, &[]);
         let expected = [
@@ -168,6 +173,7 @@ mod tests {
             "drain \"1m\" -> \"5s\"",
             "time_limit.base \"2m\" -> \"1h\"",
             "the profile of folder a resin -> thin",
+            "the priority of folder a 5 -> 7",
             "profile resin changed",
             "profile thin added",
         ];

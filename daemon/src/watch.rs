@@ -177,10 +177,6 @@ impl Daemon {
             not_good: Arc::clone(&self.not_good),
             failed: Mutex::new(None),
         };
-        if standstill::is_set(&self.settings.now().state) {
-            context.schedule.hold(Hold::Operator, Some(standstill::WORDS.into()));
-            tracing::warn!("Nothing new is taken: {}.", standstill::WORDS);
-        }
         if let Err(error) = guarded(|| recover(&context)) {
             return End::Store(error);
         }
@@ -228,6 +224,11 @@ impl Daemon {
                 }
                 Err(error) => tracing::warn!(%error, "`suture jobs` cannot reach this daemon."),
             }
+        }
+        // Only now: whoever found no one to answer has noted the pause before this look, or is answered.
+        if standstill::is_set(&self.settings.now().state) {
+            context.schedule.hold(Hold::Operator, Some(standstill::WORDS.into()));
+            tracing::warn!("Nothing new is taken: {}.", standstill::WORDS);
         }
         let slot = || {
             let worked = guarded(|| {

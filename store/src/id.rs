@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::sync::OnceLock;
+use std::time::Instant;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
@@ -39,6 +40,10 @@ number! {
 number! {
     /// The number of a transition: every durable change has the next one.
     Seq(u64)
+}
+number! {
+    /// A digest of all that decides a result. It finds results that may be alike; that they are, whoever takes one sees for itself.
+    Recipe(u64)
 }
 number! {
     /// Milliseconds since 1970 by the store's clock. For people and for pauses; nothing's correctness rests on it.
@@ -85,6 +90,8 @@ pub trait Clock: Send + Sync {
     fn now(&self) -> Time;
     /// Which start of the machine this is.
     fn boot(&self) -> Boot;
+    /// Milliseconds by a clock that only goes forward, from any beginning; nothing sets it.
+    fn ticks(&self) -> u64;
 }
 
 /// The system's wall clock.
@@ -105,6 +112,11 @@ impl Clock for SystemClock {
             let digits: String = id.chars().filter(char::is_ascii_hexdigit).take(16).collect();
             Boot(u64::from_str_radix(&digits, 16).unwrap_or(0))
         })
+    }
+
+    fn ticks(&self) -> u64 {
+        static BEGAN: OnceLock<Instant> = OnceLock::new();
+        u64::try_from(BEGAN.get_or_init(Instant::now).elapsed().as_millis()).unwrap_or(u64::MAX)
     }
 }
 

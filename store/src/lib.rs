@@ -25,9 +25,9 @@ mod tables;
 pub mod testkit;
 
 pub use crash::crash_point;
-pub use id::{Attempt, Boot, Clock, Epoch, Hash, JobId, Seq, SystemClock, Time, Token};
-pub use job::{Ending, Job, Kind, Publication, Source, State, Step};
+pub use id::{Attempt, Boot, Clock, Epoch, Hash, JobId, Recipe, Seq, SystemClock, Time, Token};
+pub use job::{Ending, Job, Kind, Priority, Publication, Source, State, Step};
 pub use memory::MemoryStore;
 pub use path::RelPath;
 pub use sled_store::{Opening, SledStore};
-pub use store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted};
+pub use store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted, Waiting};

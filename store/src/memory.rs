@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::ops::Bound;
 use std::sync::{Arc, RwLock};
 
-use crate::id::{Clock, Epoch, JobId, Seq, SystemClock};
+use crate::id::{Clock, Epoch, JobId, Recipe, Seq, SystemClock};
 use crate::job::{Job, Kind, Step, Testimony};
 use crate::queue::Queue;
-use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted};
+use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted, Waiting};
 use crate::tables::{Put, Table, Tables, Visit};
 
 /// A [`JobStore`] that forgets everything when it is dropped.
@@ -92,6 +92,14 @@ impl JobStore for MemoryStore {
         self.queue.claim(want)
     }
 
+    fn has_parked(&self) -> Result<bool, StoreError> {
+        self.queue.has_parked()
+    }
+
+    fn waiting(&self, want: &Filter) -> Result<Option<Waiting>, StoreError> {
+        self.queue.waiting(want)
+    }
+
     fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError> {
         self.queue.heartbeat(claim)
     }
@@ -114,6 +122,10 @@ impl JobStore for MemoryStore {
 
     fn list(&self, query: &Query) -> Result<Vec<Job>, StoreError> {
         self.queue.list(query)
+    }
+
+    fn results(&self, size: u64, recipe: Option<Recipe>) -> Result<Vec<Job>, StoreError> {
+        self.queue.results(size, recipe)
     }
 
     fn check(&self) -> Result<(), StoreError> {

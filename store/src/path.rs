@@ -10,13 +10,16 @@ use std::path::{Component, Path, PathBuf};
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-/// Longest path in its text form, in bytes. Four of them, with everything else a job holds, stay below a record's 4 KiB; a
+/// Longest path in its text form, in bytes; a
 /// single name of 255 bytes, none of them valid UTF-8, fits.
 pub const MAX_TEXT: usize = 640;
 
-/// Longest path of a dropped file, in its text form: what a result's name adds to it (`~99999`, `.best`, each byte as two digits)
-/// still fits a [`RelPath`], so that no file is taken for which there are no names.
-pub const MAX_SOURCE: usize = MAX_TEXT - 32;
+/// Longest path of a dropped file, in its text form.
+pub const MAX_SOURCE: usize = MAX_NAMED - 32;
+
+/// Longest path of what is made of a dropped file: what a name adds to it (`~99999`, `.best`, each byte as two digits) still fits, so
+/// that no file is taken for which there are no names. Shorter than [`MAX_TEXT`], since a record has come to hold more than its paths.
+pub(crate) const MAX_NAMED: usize = MAX_TEXT - 28;
 
 /// A relative path without `.`, `..`, empty parts or NUL.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -1,4 +1,4 @@
-//! The queue's logic over four ordered tables, shared by every store that is embedded in the daemon.
+//! The queue's logic over five ordered tables, shared by every store that is embedded in the daemon.
 //!
 //! | table    | key                                                                     | value                     |
 //! |----------|-------------------------------------------------------------------------|---------------------------|
@@ -6,9 +6,11 @@
 //! | jobs     | job number                                                              | the [`Job`]               |
 //! | by_state | kind, then what that kind is searched by (see [`index`])                | nothing                   |
 //! | by_key   | identity of the file: device, inode, size, mtime, folder, path          | number of its latest job  |
+//! | by_recipe | size of the source, recipe, job number (see [`results`]) of jobs whose result others may have | nothing   |
 //!
 //! Numbers in keys are big-endian. The job, its index entries and the head change in one transaction of the tables. One lock
-//! orders the transitions; becoming durable happens outside of it, so that transitions of several threads share one sync.
+//! orders the transitions; becoming durable happens outside of it, so that transitions of several threads share one sync. Which job is
+//! claimed next is told by a [`mod@line`] of all that may be, in memory, made anew at each opening.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -16,14 +18,18 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use serde::{Deserialize, Serialize};
 
 use crate::crash::crash_point;
-use crate::id::{Clock, Epoch, JobId, Seq, Time, Token};
+use crate::id::{Clock, Epoch, JobId, Recipe, Seq, Time, Token};
 use crate::job::{Event, Illegal, Job, Kind, Source, State, Step, Testimony};
 use crate::path::MAX_SOURCE;
 use crate::record;
-use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted};
+use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted, Waiting};
 use crate::tables::{Put, Table, Tables};
 
 mod index;
+mod line;
+mod results;
+
+use line::{Line, Now};
 
 /// Longest folder or profile name, as it stands in a record.
 pub(crate) const MAX_NAME: usize = 64;
@@ -42,6 +48,7 @@ pub(crate) struct Head {
 struct Inner {
     head: Head,
     counts: BTreeMap<Kind, u64>,
+    line: Line,
 }
 
 /// The queue over `T`.
@@ -81,13 +88,15 @@ impl<T: Tables> Queue<T> {
         head.epoch.0 += 1;
         head.seq.0 += 1;
         let counts = index::count(&tables)?;
-        let queue = Self { tables, inner: Mutex::new(Inner { head, counts }), clock };
+        let queue = Self { tables, inner: Mutex::new(Inner { head, counts, line: Line::default() }), clock };
+        let now = queue.now();
         for kind in Kind::ALL.into_iter().filter(|kind| kind.is_live()) {
             for id in index::ids(&queue.tables, kind)? {
                 let job = queue.job(id)?.ok_or_else(|| record::corrupt(&format!("job {id}"), "it is missing"))?;
                 if job.kind() != kind {
                     return Err(record::corrupt(&format!("job {id}"), "its state and the index disagree"));
                 }
+                queue.lock().line.update(&job, now);
             }
         }
         crash_point("store.open.checked");
@@ -119,6 +128,10 @@ impl<T: Tables> Queue<T> {
     fn lock(&self) -> MutexGuard<'_, Inner> {
         // The guarded values change only after a write succeeded, by plain assignments: a panic elsewhere leaves them whole.
         self.inner.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+
+    fn now(&self) -> Now {
+        Now { wall: self.clock.now(), ticks: self.clock.ticks() }
     }
 
     fn job(&self, id: JobId) -> Result<Option<Job>, StoreError> {
@@ -155,6 +168,9 @@ impl<T: Tables> Queue<T> {
             let key = to.id.0.to_be_bytes().to_vec();
             let value = record::encode(Table::Jobs, &key, to)?;
             puts.push(Put { table: Table::Jobs, key, value: Some(value) });
+            if let Some(recipe) = to.offers() {
+                puts.push(Put { table: Table::ByRecipe, key: results::key(to, recipe), value: Some(Vec::new()) });
+            }
             if let Some(from) = from {
                 let count = counts.entry(from.kind()).or_default();
                 *count = count.saturating_sub(1);
@@ -163,7 +179,9 @@ impl<T: Tables> Queue<T> {
         }
         puts.push(head_put(&head)?);
         self.tables.write(puts, head.seq)?;
-        *inner = Inner { head, counts };
+        (inner.head, inner.counts) = (head, counts);
+        let now = self.now();
+        changes.iter().for_each(|(_, to)| inner.line.update(to, now));
         drop(inner);
         crash_point("store.commit.written");
         Ok(())
@@ -212,6 +230,7 @@ impl<T: Tables> Queue<T> {
                 None => Job::queued(id, source, now),
                 Some(what) => Job::noticed(id, source, what, now),
             };
+            job.priority = submission.priority;
             job.seq = head.seq;
             jobs.push(job);
             keys.insert(key, id);
@@ -292,19 +311,27 @@ impl<T: Tables> JobStore for Queue<T> {
 
     fn claim(&self, want: &Filter) -> Result<Option<Claim>, StoreError> {
         self.tables.sound()?;
-        let now = self.clock.now();
-        let inner = self.lock();
-        let Some(id) = index::first_due(&self.tables, want, now)? else { return Ok(None) };
+        let mut inner = self.lock();
+        let now = self.now();
+        let Some(id) = inner.line.first(want, now) else { return Ok(None) };
         let before = self.known(id)?;
         let mut head = inner.head;
         head.seq.0 += 1;
         let token = Token(head.seq.0);
         let event = Event::Claim { epoch: head.epoch, token, boot: self.clock.boot() };
-        let mut job = before.after(&event, now).map_err(|source| StoreError::Illegal { id, source })?;
+        let mut job = before.after(&event, now.wall).map_err(|source| StoreError::Illegal { id, source })?;
         job.seq = head.seq;
         self.commit(inner, head, &[(Some(&before), &job)], Vec::new())?;
         self.settle(head)?;
         Ok(Some(Claim { id, token, job }))
+    }
+
+    fn has_parked(&self) -> Result<bool, StoreError> {
+        Ok(self.lock().line.has_parked(self.now()))
+    }
+
+    fn waiting(&self, want: &Filter) -> Result<Option<Waiting>, StoreError> {
+        Ok(self.lock().line.waiting(want, self.now()))
     }
 
     fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError> {
@@ -332,6 +359,7 @@ impl<T: Tables> JobStore for Queue<T> {
                 Control::Cancel => Event::Cancel,
                 Control::Forget => Event::Forget,
                 Control::Hasten => Event::Hasten,
+                Control::Rank(priority) => Event::Rank(priority),
             })
         })
     }
@@ -401,6 +429,17 @@ impl<T: Tables> JobStore for Queue<T> {
                 if jobs.len() == limit {
                     break;
                 }
+            }
+        }
+        Ok(jobs)
+    }
+
+    fn results(&self, size: u64, recipe: Option<Recipe>) -> Result<Vec<Job>, StoreError> {
+        let mut jobs = Vec::new();
+        for id in results::latest(&self.tables, size, recipe)? {
+            let job = self.known(id)?;
+            if job.source.size == size && job.offers().is_some_and(|offered| recipe.is_none_or(|recipe| recipe == offered)) {
+                jobs.push(job);
             }
         }
         Ok(jobs)

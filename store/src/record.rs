@@ -75,20 +75,21 @@ fn name(table: Table, key: &[u8]) -> String {
         },
         Table::ByState => "by_state".to_owned(),
         Table::ByKey => "by_key".to_owned(),
+        Table::ByRecipe => "by_recipe".to_owned(),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Seq, Time, Token};
-    use crate::job::{Area, Blame, Ending, Hold, Job, MAX_REASON, Parked, Publication, Source, State, one_line};
-    use crate::path::{MAX_SOURCE, MAX_TEXT, RelPath};
+    use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Recipe, Seq, Time, Token};
+    use crate::job::{Area, Blame, Ending, Hold, Job, MAX_REASON, Parked, Priority, Publication, Source, State, one_line};
+    use crate::path::{MAX_NAMED, MAX_SOURCE, RelPath};
 
     /// Everything a job can hold, as long as it can be: no transition can fail for want of room.
     #[test]
     fn the_largest_job_fits() {
-        let path = RelPath::new("p".repeat(MAX_TEXT)).unwrap();
+        let path = RelPath::new("p".repeat(MAX_NAMED)).unwrap();
         let name = "n".repeat(crate::queue::MAX_NAME - 2);
         let reason = one_line(&"\"".repeat(2 * MAX_REASON));
         let source = Source {
@@ -113,6 +114,8 @@ mod tests {
             output: Some(path.clone()),
             output_hash: Some(Hash([0xff; 32])),
             report_hash: Some(Hash([0xff; 32])),
+            recipe: Some(Recipe(u64::MAX)),
+            reused: Some(JobId(u64::MAX)),
             source_ctime_ns: Some(i64::MIN),
             original: Some(path.clone()),
             stays: true,
@@ -126,6 +129,8 @@ mod tests {
         job.attempts = Attempt(number);
         job.blame = blame;
         job.needs_all = true;
+        job.priority = Priority::HIGHEST;
+        job.retried = Some(Time(u64::MAX));
         job.parked = Some(Parked { until: Some(Time(u64::MAX)), tries: number, committed: false });
         job.work = Some(Token(u64::MAX));
         job.note = reason;
@@ -165,6 +170,7 @@ mod tests {
         let bytes = [&MAGIC[..], &1_u16.to_be_bytes(), &crc.to_be_bytes(), json.as_bytes()].concat();
         let job: Job = decode(Table::Jobs, &key, &bytes).unwrap();
         assert_eq!((job.kind(), job.blame.deaths, job.hold().unwrap().boot), (crate::job::Kind::Publishing, 1, Boot(0)));
+        assert_eq!((job.priority, job.waits_since()), (Priority::default(), Time(5)));
     }
 
     #[test]

@@ -6,7 +6,7 @@
 //! |------------------|----------------------------------------------------------------------------------------------------|
 //! | `LOCK`           | locked by the daemon that owns the folder; its process number as text                              |
 //! | `SEQ`            | how far the store got: `suture-seq 1 <epoch> <transition> <crc32>`; see below                      |
-//! | `db/`            | the sled database: trees `meta`, `jobs`, `by_state`, `by_key`, laid out as [`crate::queue`] says   |
+//! | `db/`            | the sled database: trees `meta`, `jobs`, `by_state`, `by_key`, `by_recipe`: see [`crate::queue`]   |
 //! | `db.trial/`      | only while a damaged database is being examined                                                    |
 //! | `corrupt-<ms>/`  | a damaged database that was replaced; for people                                                   |
 //!
@@ -32,10 +32,10 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::id::{Clock, JobId, SystemClock};
+use crate::id::{Clock, JobId, Recipe, SystemClock};
 use crate::job::{Job, Kind, Step, Testimony};
 use crate::queue::Queue;
-use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted};
+use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted, Waiting};
 
 mod files;
 #[cfg(test)]
@@ -124,6 +124,14 @@ impl JobStore for SledStore {
         self.queue.claim(want)
     }
 
+    fn has_parked(&self) -> Result<bool, StoreError> {
+        self.queue.has_parked()
+    }
+
+    fn waiting(&self, want: &Filter) -> Result<Option<Waiting>, StoreError> {
+        self.queue.waiting(want)
+    }
+
     fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError> {
         self.queue.heartbeat(claim)
     }
@@ -146,6 +154,10 @@ impl JobStore for SledStore {
 
     fn list(&self, query: &Query) -> Result<Vec<Job>, StoreError> {
         self.queue.list(query)
+    }
+
+    fn results(&self, size: u64, recipe: Option<Recipe>) -> Result<Vec<Job>, StoreError> {
+        self.queue.results(size, recipe)
     }
 
     fn check(&self) -> Result<(), StoreError> {

@@ -2,8 +2,11 @@
 
 use std::path::PathBuf;
 
-use crate::id::{Epoch, JobId, Seq, Token};
-use crate::job::{Illegal, Job, Kind, Source, Step, Testimony};
+use crate::id::{Epoch, JobId, Recipe, Seq, Token};
+use crate::job::{Illegal, Job, Kind, Priority, Source, Step, Testimony};
+
+/// As many results alike are named as it makes sense to look at.
+pub const MOST_RESULTS: usize = 8;
 
 /// A durable job queue. A returned `Ok` means that the change survives a crash of process or machine; an `Err` that it did not
 /// happen or, for [`StoreError::Backend`], [`StoreError::Io`] and [`StoreError::Poisoned`] only, that this is unknown until the
@@ -16,13 +19,26 @@ pub trait JobStore: Send + Sync {
     /// [`StoreError::TooLong`] names a file whose path, folder or profile does not fit a record; nothing is taken in then.
     fn submit(&self, found: &[Submission]) -> Result<Vec<Submitted>, StoreError>;
 
-    /// Claims the oldest job that `want` allows, counting the attempt. `None` when there is none. With `want.alone` only jobs that
+    /// Claims the job that is next of those that `want` allows, counting the attempt: the one of the highest priority, as it counts
+    /// after its wait ([`crate::job::AGEING_MS`]), and of these the oldest. `None` when there is none. With `want.alone` only jobs that
     /// must run alone are given; the caller sees to it that nothing else runs. A parked job whose pause is over is given to anyone,
     /// first: it needs no worker.
     ///
     /// # Errors
     /// Store errors only.
     fn claim(&self, want: &Filter) -> Result<Option<Claim>, StoreError>;
+
+    /// Will the next claim give a parked job, whatever is wanted?
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn has_parked(&self) -> Result<bool, StoreError>;
+
+    /// How soon those jobs are wanted that a claim with `want` may give now, parked ones left out; `None` when there is none.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn waiting(&self, want: &Filter) -> Result<Option<Waiting>, StoreError>;
 
     /// Does the claim still hold, and does anyone want it stopped? Extends the claim where claims expire.
     ///
@@ -63,6 +79,13 @@ pub trait JobStore: Send + Sync {
     /// Store errors only.
     fn list(&self, query: &Query) -> Result<Vec<Job>, StoreError>;
 
+    /// Jobs with good results for sources of `size` bytes that others may have a copy of: those made by `recipe`, the latest first, at most
+    /// [`MOST_RESULTS`]; without a recipe any one of them, if there is one.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn results(&self, size: u64, recipe: Option<Recipe>) -> Result<Vec<Job>, StoreError>;
+
     /// Is the store still where it was opened?
     ///
     /// # Errors
@@ -83,6 +106,8 @@ pub struct Submission {
     pub source: Source,
     /// `Some`: not a format that is repaired; what it is instead. It is recorded and left where it is.
     pub foreign: Option<String>,
+    /// How soon it is wanted.
+    pub priority: Priority,
 }
 
 /// What became of a submission.
@@ -108,6 +133,15 @@ impl Default for Filter {
     fn default() -> Self {
         Self { size: (0, u64::MAX), alone: false }
     }
+}
+
+/// The highest priorities among jobs that may be claimed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Waiting {
+    /// Of those that someone asked for.
+    pub highest: Priority,
+    /// As they count after their wait.
+    pub aged: Priority,
 }
 
 /// The right to work on a job, until it ends, is handed back, or the daemon dies.
@@ -143,6 +177,8 @@ pub enum Control {
     Forget,
     /// End the pause of a job that waits; its blame stays.
     Hasten,
+    /// Take a job that is queued or waits sooner, or later.
+    Rank(Priority),
 }
 
 /// A job whose daemon died.

@@ -19,10 +19,11 @@ type Check = fn(&mut dyn Subject, &ManualClock) -> Result<(), StoreError>;
 /// # Panics
 /// When the store does not do what [`JobStore`] promises.
 pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
-    let checks: [(&str, Check); 15] = [
+    let checks: [(&str, Check); 17] = [
         ("submission is idempotent", claims::submission_is_idempotent),
         ("a file that came back is new", claims::a_file_that_came_back_is_new),
         ("the oldest that fits is claimed", claims::the_oldest_that_fits_is_claimed),
+        ("the more urgent goes first", claims::the_more_urgent_goes_first),
         ("the whole way", claims::the_whole_way),
         ("claims are fenced", claims::claims_are_fenced),
         ("pauses are kept", claims::pauses_are_kept),
@@ -32,6 +33,7 @@ pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
         ("suspects run alone", deaths::suspects_run_alone),
         ("power cuts blame no one", deaths::power_cuts_blame_no_one),
         ("a result that cannot be placed is parked", results::a_result_that_cannot_be_placed_is_parked),
+        ("good results are found by what made them", results::good_results_are_found_by_what_made_them),
         ("results on their way are finished", results::results_on_their_way_are_finished),
         ("lists and counts agree", results::lists_and_counts_agree),
         ("threads get different jobs", results::threads_get_different_jobs),

@@ -44,6 +44,13 @@ pub fn six() -> Files {
     ])
 }
 
+/// These, and the content of the clean one once more, under a name that comes later: its result is a copy.
+pub fn with_a_double(mut files: Files) -> Files {
+    let clean = files.get(Path::new("clean.stl")).cloned().unwrap_or_default();
+    files.insert("double.stl".into(), clean);
+    files
+}
+
 impl Scene {
     /// With these files dropped.
     ///

@@ -104,6 +104,40 @@ fn killed_at_every_step() {
     });
 }
 
+/// A folder in which one result is in place, and a file of the same content has been dropped.
+fn drop_a_second(hot: &Hot) {
+    drop_one(hot);
+    assert_eq!(hot.once(None).code(), Some(0), "the first is done");
+    hot.put("again/second.stl", &mesh(Case::Clean, 1));
+}
+
+/// The result is copied, not computed; wherever the daemon dies, it is there once, and the first one is as it was.
+#[test]
+fn killed_at_every_step_of_a_copy() {
+    let hot = Hot::new(with_crash_points());
+    drop_a_second(&hot);
+    let trace = hot.path().join("trace");
+    let status = hot.watch(&["--once"]).env("SUTURE_CRASH_TRACE", &trace).status().expect("the daemon starts");
+    assert_eq!(status.code(), Some(0));
+    let trace = std::fs::read_to_string(trace).expect("a trace");
+    assert!(trace.contains("daemon.reused\n") && !trace.contains("daemon.worked\n"), "{trace}");
+    let (expected, passes) = (state(&hot), trace.lines().count() as u64);
+    assert_eq!(expected["out"]["again/second.stl"], expected["out"]["part.stl"]);
+    let steps: Vec<u64> = (1..=passes).collect();
+    on_two_threads(&steps, |&step| {
+        let hot = Hot::new(with_crash_points());
+        drop_a_second(&hot);
+        let what = format!("killed at pass {step} of {passes}");
+        let killed = was_killed(hot.once(Some(step)));
+        assert!(killed || step + 8 > passes, "{what}: was not");
+        assert_eq!(hot.once(None).code(), Some(0), "{what}: the next run fails");
+        assert_eq!(state(&hot), expected, "{what}");
+        assert_at_rest(&hot, &what);
+        let copied = hot.jobs().iter().filter(|job| job["reused"] == 1).count();
+        assert_eq!((copied, hot.jobs().len()), (1, 2), "{what}: it was not copied");
+    });
+}
+
 #[test]
 fn killed_at_pairs_of_steps() {
     let (expected, passes) = reference(drop_one);

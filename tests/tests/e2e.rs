@@ -10,6 +10,8 @@ mod e2e {
     mod many;
     mod memory;
     mod profiles;
+    mod queue;
+    mod reuse;
     mod same_bytes;
     mod soups;
     mod steer;

@@ -20,7 +20,7 @@ use std::time::Duration;
 
 use suture_tests::binary::suture;
 use suture_tests::oracle::Expected;
-use suture_tests::scene::{Scene, six};
+use suture_tests::scene::{Scene, six, with_a_double};
 use suture_tests::trace::count::Counter;
 use suture_tests::trace::{Fault, run};
 
@@ -30,9 +30,9 @@ const LIMIT: Duration = Duration::from_secs(60);
 
 #[test]
 fn any_call_may_fail() {
-    let files = six();
+    let files = with_a_double(six());
     let expected = Expected::of(suture(), &files);
-    assert_eq!(expected.good(), 4, "clean, repaired, of another profile, of an odd name");
+    assert_eq!(expected.good(), 5, "clean, its double, repaired, of another profile, of an odd name");
     if let Some(line) = std::env::var_os("SUTURE_FAULT") {
         let fault: Fault = line.to_str().expect("a line").parse().expect("a fault");
         let tried = sweep::try_one(&expected, &files, &fault);
@@ -53,6 +53,8 @@ fn count(files: &suture_tests::scene::Files) -> plan::Counts {
     let ended = run(&scene.once(), &scene.errors(), LIMIT, &mut counter).expect("the daemon can be traced");
     assert_eq!((ended.status.code(), ended.left), (Some(1), 0), "{ended:?}");
     assert!(!counter.counts.is_empty(), "no call was counted");
+    let jobs = scene.jobs().expect("jobs can be listed");
+    assert!(jobs.iter().any(|job| job["reused"].is_u64()), "nothing was copied: {jobs:?}");
     eprintln!(
         "calls: {}",
         counter.counts.iter().map(|((role, kind), n)| format!("{role} {kind} {n}")).collect::<Vec<_>>().join(", ")

@@ -18,7 +18,7 @@ use std::time::Instant;
 use suture_tests::binary::suture;
 use suture_tests::disk::Kind;
 use suture_tests::oracle::Expected;
-use suture_tests::scene::{Files, six};
+use suture_tests::scene::{Files, six, with_a_double};
 
 use record::Record;
 use replay::Replay;
@@ -26,10 +26,10 @@ use replay::Replay;
 /// Replays of each lane without `SUTURE_EXHAUSTIVE`.
 const SAMPLE: usize = 60;
 
-/// One that is clean, one that is repaired, in a sub-folder, and one that cannot be read.
-fn three() -> Files {
-    let wanted = ["clean.stl", "scan/part.stl", "picture.stl"];
-    six().into_iter().filter(|(name, _)| wanted.iter().any(|wanted| name.as_os_str() == *wanted)).collect()
+/// One that is clean, its double, one that is repaired, in a sub-folder, and one that cannot be read.
+fn four() -> Files {
+    let wanted = ["clean.stl", "double.stl", "scan/part.stl", "picture.stl"];
+    with_a_double(six()).into_iter().filter(|(name, _)| wanted.iter().any(|wanted| name.as_os_str() == *wanted)).collect()
 }
 
 /// The disk keeps its word, and does no more.
@@ -45,9 +45,9 @@ fn power_may_go_at_any_moment_of_a_journal() {
 }
 
 fn power_goes(kind: Kind) {
-    let files = three();
+    let files = four();
     let expected = Expected::of(suture(), &files);
-    assert_eq!(expected.good(), 2);
+    assert_eq!(expected.good(), 3);
     let seed = seed();
     let lanes = 2;
     let (start, found) = (Instant::now(), Mutex::new(Found::default()));

@@ -58,7 +58,7 @@ mod tests {
         let line = |config: &Config| found(Path::new("s.toml"), config);
         assert_eq!(line(&config), "s.toml: good: 1 folder (prints), no profile of its own");
         for name in ["resin", "thin"] {
-            config.profiles.insert(name.into(), suture_core::Profile::default());
+            config.profiles.insert(name.into(), crate::own_profile::OwnProfile::default());
         }
         assert_eq!(line(&config), "s.toml: good: 1 folder (prints), 2 profiles (resin, thin)");
     }

@@ -6,9 +6,11 @@ use std::time::Duration;
 
 use serde::{Deserialize, Deserializer, de};
 use suture_core::Profile;
+use suture_store::Priority;
 use toml::Spanned;
 
 use super::{Config, DEFAULT_PROFILE, FolderConfig, name_of, real};
+use crate::own_profile::OwnProfile;
 use crate::profiles::{self, place_of, with_line};
 use crate::units::{parse_duration, parse_size};
 use crate::window::RunWindow;
@@ -35,8 +37,9 @@ struct File {
     time_limit: Option<TimeLimitFile>,
     run_window: Option<RunWindow>,
     workers_outside: Option<Spanned<u16>>,
+    reuse: Option<bool>,
     #[serde(default)]
-    profiles: BTreeMap<String, Spanned<Profile>>,
+    profiles: BTreeMap<String, Spanned<OwnProfile>>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -50,6 +53,9 @@ struct FolderFile {
     /// Originals are not moved out of `in/`.
     #[serde(default)]
     leave_originals: bool,
+    /// How soon its files are wanted.
+    #[serde(default)]
+    priority: Priority,
 }
 
 #[derive(Debug, Deserialize)]
@@ -168,6 +174,7 @@ fn from_text(text: &str) -> Result<Config, String> {
         return Err(with_line(text, outside.span().start, what));
     }
     config.workers_outside = file.workers_outside.map_or(0, |count| count.into_inner().into());
+    config.reuse = file.reuse.unwrap_or(config.reuse);
     config.run_window = file.run_window.unwrap_or_default();
     if let Some(TimeLimitFile { base, per_gib }) = file.time_limit {
         config.time_limit.base = base.map_or(config.time_limit.base, |time| time.0);
@@ -176,16 +183,16 @@ fn from_text(text: &str) -> Result<Config, String> {
     Ok(config)
 }
 
-fn own_profiles(text: &str, of_file: BTreeMap<String, Spanned<Profile>>) -> Result<BTreeMap<String, Profile>, String> {
-    let mut own = BTreeMap::new();
-    for (name, profile) in of_file {
-        let from = profile.span().start;
-        let mut profile = profile.into_inner();
-        profiles::validate(&profile, text, from)?;
-        profile.name.clone_from(&name);
-        own.insert(name, profile);
+fn own_profiles(text: &str, of_file: BTreeMap<String, Spanned<OwnProfile>>) -> Result<BTreeMap<String, OwnProfile>, String> {
+    let mut all = BTreeMap::new();
+    for (name, own) in of_file {
+        let from = own.span().start;
+        let mut own = own.into_inner();
+        profiles::validate(&own.profile, text, from)?;
+        own.profile.name.clone_from(&name);
+        all.insert(name, own);
     }
-    Ok(own)
+    Ok(all)
 }
 
 /// `config` knows the profiles.
@@ -205,8 +212,8 @@ fn folders(text: &str, of_file: &[FolderFile], config: &Config) -> Result<Vec<Fo
                 format!("there is no profile `{profile}`; name one of {}, or add `[profiles.{profile}]`", known.join(", "));
             return Err(with_line(text, named.span().start, &what));
         }
-        let leave_originals = folder.leave_originals;
-        folders.push(FolderConfig { name, path: path.clone(), profile: profile.to_owned(), leave_originals });
+        let (leave_originals, priority) = (folder.leave_originals, folder.priority);
+        folders.push(FolderConfig { name, path: path.clone(), profile: profile.to_owned(), leave_originals, priority });
     }
     apart(&folders).map_err(|(folder, what)| {
         let at = of_file.get(folder).map_or(0, |folder| folder.path.span().start);
@@ -305,6 +312,14 @@ mod tests {
             (
                 "[[folders]]\npath = \"/a\"\n[profiles.resin]\nfill_holes = true\nweld_relative = 7.0",
                 "line 5, `weld_relative = 7.0`: `weld_relative` must be a number from 0 to 1, not 7",
+            ),
+            (
+                "[[folders]]\npriority = 12\npath = \"/a\"",
+                "line 2, `priority = 12`: a priority is a whole number from 0 to 9, the higher the sooner, not 12",
+            ),
+            (
+                "[[folders]]\npath = \"/a\"\n[profiles.resin]\nfill_holes = true\npriority = -2",
+                "line 5, `priority = -2`: a priority is a whole number",
             ),
             (
                 "[[folders]]\npath = \"/a\"\n[profiles.resin]\nfill_holse = true",

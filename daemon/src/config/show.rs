@@ -5,11 +5,11 @@ use std::path::Path;
 use std::time::Duration;
 
 use serde::Serialize;
-use suture_core::Profile;
 use toml::Value;
 
 use super::read::AUTO;
 use super::{Config, FolderConfig};
+use crate::own_profile::OwnProfile;
 use crate::units::{write_duration, write_size};
 use crate::window::RunWindow;
 
@@ -32,6 +32,7 @@ pub(crate) fn values(config: &Config) -> Vec<(&'static str, Option<String>)> {
         ("settle", auto(config.settle)),
         ("rescan", auto(config.rescan)),
         ("drain", quoted(&write_duration(config.drain))),
+        ("reuse", config.reuse.to_string()),
         ("time_limit.base", quoted(&write_duration(config.time_limit.base))),
         ("time_limit.per_gib", quoted(&write_duration(config.time_limit.per_gib))),
     ];
@@ -60,9 +61,9 @@ pub(crate) fn text(config: &Config) -> Result<String, String> {
         text += &format!("{name} = {value}\n");
     }
     text += &format!("state = {}\n", path(&config.state));
-    for FolderConfig { name, path: root, profile, leave_originals } in &config.folders {
+    for FolderConfig { name, path: root, profile, leave_originals, priority } in &config.folders {
         text += &format!("\n[[folders]]\npath = {}\nname = {}\nprofile = {}\n", path(root), quoted(name), quoted(profile));
-        text += &format!("leave_originals = {leave_originals}\n");
+        text += &format!("leave_originals = {leave_originals}\npriority = {priority}\n");
     }
     if !config.profiles.is_empty() {
         text.push('\n');
@@ -72,14 +73,14 @@ pub(crate) fn text(config: &Config) -> Result<String, String> {
 }
 
 /// Profiles with all of their settings. Their names are those of their tables.
-fn own_profiles(profiles: &BTreeMap<String, Profile>) -> Result<String, String> {
+fn own_profiles(profiles: &BTreeMap<String, OwnProfile>) -> Result<String, String> {
     #[derive(Serialize)]
     struct Shown {
-        profiles: BTreeMap<String, Profile>,
+        profiles: BTreeMap<String, OwnProfile>,
     }
     let mut shown = Shown { profiles: profiles.clone() };
-    for profile in shown.profiles.values_mut() {
-        profile.name.clear();
+    for own in shown.profiles.values_mut() {
+        own.profile.name.clear();
     }
     let text = toml::to_string(&shown).map_err(|error| format!("the profiles cannot be written: {error}"))?;
     Ok(text.lines().filter(|line| *line != "name = \"\"").map(|line| format!("{line}\n")).collect())
@@ -87,6 +88,9 @@ fn own_profiles(profiles: &BTreeMap<String, Profile>) -> Result<String, String> 
 
 #[cfg(test)]
 mod tests {
+    use suture_core::Profile;
+    use suture_store::Priority;
+
     use super::*;
     use crate::config::read;
 
@@ -116,17 +120,19 @@ mod tests {
             path: "scans".into(),
             profile: "it's mine".into(),
             leave_originals: true,
+            priority: Priority::HIGHEST,
         });
         (config.run_window, config.workers_outside) = ("20:00-07:00, 12:00-13:00".parse().unwrap(), 1);
         (config.memory, config.large, config.reserve) = (3 << 30, 1_500_000_000, 1);
-        (config.workers, config.threads) = (7, 3);
+        (config.workers, config.threads, config.reuse) = (7, 3, false);
         (config.settle, config.rescan) = (Some(Duration::from_millis(300)), Some(Duration::from_secs(90)));
         (config.drain, config.time_limit.base) = (Duration::ZERO, Duration::from_millis(1500));
         for name in ["it's mine", "resin", "default"] {
             let mut profile = Profile::built_in("strict").unwrap();
             profile.name = name.into();
             (profile.weld_relative, profile.max_hole_edges) = (1.25e-7, u32::MAX);
-            config.profiles.insert(name.into(), profile);
+            let priority = (name == "resin").then_some(Priority::LOWEST);
+            config.profiles.insert(name.into(), OwnProfile { profile, priority });
         }
         assert_eq!(read_back(&config), config);
     }

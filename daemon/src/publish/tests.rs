@@ -3,7 +3,7 @@
 use super::*;
 use crate::config::FolderConfig;
 use std::sync::Arc;
-use suture_store::{Filter, MemoryStore, Source, Submission, SystemClock};
+use suture_store::{Filter, MemoryStore, Priority, Source, Submission, SystemClock};
 
 /// A hot folder with one dropped file, claimed in the store.
 pub(crate) struct Scene {
@@ -27,8 +27,7 @@ impl Scene {
 
     pub(crate) fn dropped() -> Self {
         let dir = tempfile::tempdir().unwrap();
-        let config =
-            FolderConfig { name: "hot".into(), path: dir.path().into(), profile: "default".into(), leave_originals: false };
+        let config = FolderConfig { name: "hot".into(), ..FolderConfig::of(dir.path()) };
         let folder = Folder::open(&config).unwrap();
         let path = folder.inbox().join("part.stl");
         create::write_new(&path, ORIGINAL).unwrap();
@@ -43,7 +42,7 @@ impl Scene {
             profile: "default".into(),
         };
         let store = MemoryStore::new(Arc::new(SystemClock));
-        store.submit(&[Submission { source, foreign: None }]).unwrap();
+        store.submit(&[Submission { source, foreign: None, priority: Priority::default() }]).unwrap();
         let claim = store.claim(&Filter::default()).unwrap().unwrap();
         Self { _dir: dir, folder, store, claim, committed: Cell::new(false) }
     }
@@ -60,7 +59,7 @@ impl Scene {
         report.output.as_mut().unwrap().blake3 = fsx::hash(&output).unwrap().to_string();
         report.input.blake3 = Hash(*blake3::hash(ORIGINAL).as_bytes()).to_string();
         let ctime_ns = Identity::of(&self.folder.work(self.claim.token).join(CLAIMED)).unwrap().ctime_ns;
-        self.desk().intend(&self.claim.job, &Conclusion::Report { report: Box::new(report), ctime_ns }).unwrap()
+        self.desk().intend(&self.claim.job, &Conclusion::Report { report: Box::new(report), ctime_ns, reused: None }).unwrap()
     }
 
     /// Does what is owed until nothing is.

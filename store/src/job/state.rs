@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::blame::{Blame, Death};
 use super::kind::Kind;
 use super::pauses::BACKOFF_CAP_MS;
-use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Seq, Time, Token};
+use super::priority::Priority;
+use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Recipe, Seq, Time, Token};
 use crate::path::RelPath;
 
 /// The dropped file, as it was when it came to rest.
@@ -100,6 +101,12 @@ pub struct Publication {
     pub output_hash: Option<Hash>,
     /// Of the bytes of the report.
     pub report_hash: Option<Hash>,
+    /// Of a good result: what it was made of, and with.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recipe: Option<Recipe>,
+    /// The job whose result was copied, so that nothing was computed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reused: Option<JobId>,
     /// Last change of the original's inode, in nanoseconds since 1970, when its result was found. If it still has it, its content is
     /// the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -252,6 +259,9 @@ pub struct Job {
     /// Where the original is while no claim holds it, if it is not at its source (after a retry of a failed job).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moved_to: Option<(Area, RelPath)>,
+    /// How soon it is wanted.
+    #[serde(default, skip_serializing_if = "Priority::is_default")]
+    pub priority: Priority,
     /// Where it stands.
     pub state: State,
     /// Attempts so far.
@@ -271,6 +281,9 @@ pub struct Job {
     pub note: String,
     /// When the file was found.
     pub submitted: Time,
+    /// When an operator wanted it tried once more.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub retried: Option<Time>,
     /// When its state changed last.
     pub changed: Time,
     /// The transition that made it what it is.
@@ -293,6 +306,7 @@ impl Job {
             id,
             source,
             moved_to: None,
+            priority: Priority::default(),
             state,
             attempts: Attempt(0),
             blame: Blame::default(),
@@ -301,6 +315,7 @@ impl Job {
             work: None,
             note: String::new(),
             submitted: now,
+            retried: None,
             changed: now,
             seq: Seq(0),
         }
@@ -364,6 +379,11 @@ impl Job {
         }
     }
 
+    /// Since when it waits for its turn: pauses and attempts in between do not make it younger.
+    pub fn waits_since(&self) -> Time {
+        self.retried.unwrap_or(self.submitted)
+    }
+
     /// End of the pause it is in: queued after an error, or parked.
     pub fn pause(&self) -> Option<Time> {
         match self.state {
@@ -377,6 +397,16 @@ impl Job {
         match &self.state {
             State::Publishing { publication, .. } | State::Published { publication, .. } | State::Ended { publication } => {
                 Some(publication)
+            }
+            _ => None,
+        }
+    }
+
+    /// What the result that it has left is made of, if others may have a copy of it: it is done, and has an output.
+    pub fn offers(&self) -> Option<Recipe> {
+        match &self.state {
+            State::Ended { publication } if publication.ending.is_good() && publication.output_hash.is_some() => {
+                publication.recipe
             }
             _ => None,
         }

@@ -3,6 +3,7 @@
 use super::blame::{Blame, Death, KILLS_FREE, Testimony};
 use super::kind::Kind;
 use super::pauses::{BACKOFF_CAP_MS, BACKOFF_MS, ENVIRONMENT_RETRIES, PARK_CAP_MS, PARK_MS, WAIT_MS};
+use super::priority::Priority;
 use super::state::{Ending, Hold, Job, Parked, Publication, State, Step, Withdrawal, one_line};
 use crate::id::{Boot, Epoch, Time, Token};
 
@@ -26,6 +27,8 @@ pub enum Event {
     Forget,
     /// Its pause is over before its time.
     Hasten,
+    /// An operator wants it sooner, or later.
+    Rank(Priority),
 }
 
 /// An event that cannot happen in this state. Nothing was changed.
@@ -66,6 +69,7 @@ impl Event {
             Self::Cancel => "cancelled",
             Self::Forget => "forgotten",
             Self::Hasten => "hastened",
+            Self::Rank(_) => "given a priority",
         }
     }
 }
@@ -93,7 +97,7 @@ impl Job {
             Event::Interrupted { alone, testimony } => next.interrupt(*alone, *testimony).ok_or(illegal)?,
             Event::Reclaim { .. } if self.rests_parked() => return Err(illegal),
             Event::Reclaim { epoch, token } => next.reclaim(*epoch, *token).ok_or(illegal)?,
-            Event::Retry => next.retry().ok_or(illegal)?,
+            Event::Retry => next.retry(now).ok_or(illegal)?,
             Event::Cancel if next.rests_parked() => next.give_up()?,
             Event::Cancel => match &mut next.state {
                 State::Queued { .. } | State::Noticed { .. } => next.state = State::Cancelled { why: Withdrawal::Operator },
@@ -102,6 +106,10 @@ impl Job {
             },
             Event::Hasten => match &mut next.state {
                 State::Queued { not_before } if not_before.is_some() => *not_before = None,
+                _ => return Err(illegal),
+            },
+            Event::Rank(priority) => match next.state {
+                State::Queued { .. } => next.priority = *priority,
                 _ => return Err(illegal),
             },
             Event::Forget => match next.state {
@@ -284,7 +292,7 @@ impl Job {
         }
     }
 
-    fn retry(&mut self) -> Option<()> {
+    fn retry(&mut self, now: Time) -> Option<()> {
         if self.rests_parked() {
             self.parked = self.parked.map(|parked| Parked { until: Some(Time(0)), ..parked });
             return Some(());
@@ -299,6 +307,7 @@ impl Job {
             _ => return None,
         }
         self.blame = Blame::default();
+        self.retried = Some(now);
         self.state = NOW;
         Some(())
     }

@@ -27,6 +27,8 @@ fn publication(ending: Ending, hash: u8) -> Publication {
         output: Some(path.clone()),
         output_hash: Some(Hash([hash; 32])),
         report_hash: None,
+        recipe: None,
+        reused: None,
         source_ctime_ns: None,
         original: Some(path),
         stays: false,
@@ -91,6 +93,7 @@ fn events() -> impl Strategy<Value = Event> {
         1 => Just(Event::Cancel),
         1 => Just(Event::Forget),
         1 => Just(Event::Hasten),
+        1 => (0..=9_i64).prop_map(|n| Event::Rank(Priority::try_from(n).unwrap())),
     ]
 }
 

@@ -1,17 +1,17 @@
-//! The index by state. Keys begin with the kind's tag; what follows is what that kind is searched by:
+//! The index by state: how many jobs there are of a kind, and which. Who of them is next is [`super::line`]'s to say. Keys begin with the
+//! kind's tag; what follows is the job number, and what earlier versions searched by, which can go on with this store:
 //!
-//! * queued, queued alone: class of the size (its number of binary digits, one byte) · job number · size. So a claim that wants sizes
-//!   in a range looks at one entry for each class, not at every job.
+//! * queued, queued alone: class of the size (its number of binary digits, one byte) · job number · size.
 //! * waiting: end of the pause · job number · 1 if it must run alone · size.
 //! * parked: end of the pause · job number.
 //! * all others: job number.
 
 use std::collections::BTreeMap;
 
-use crate::id::{JobId, Time};
-use crate::job::{BACKOFF_CAP_MS, Job, Kind, State};
+use crate::id::JobId;
+use crate::job::{Job, Kind, State};
 use crate::record::corrupt;
-use crate::store::{Filter, StoreError};
+use crate::store::StoreError;
 use crate::tables::{Table, Tables};
 
 /// Written to disk: a kind's tag never changes its meaning.
@@ -34,7 +34,8 @@ fn tag(kind: Kind) -> u8 {
     }
 }
 
-fn class(size: u64) -> u8 {
+/// Class of a size: its number of binary digits.
+pub(super) fn class(size: u64) -> u8 {
     // At most 64.
     (u64::BITS - size.leading_zeros()) as u8
 }
@@ -100,85 +101,4 @@ pub(super) fn count(tables: &dyn Tables) -> Result<BTreeMap<Kind, u64>, StoreErr
         counts.insert(kind, count);
     }
     Ok(counts)
-}
-
-/// The oldest job that `want` allows and that is due at `now`. Parked jobs come first: there is little to do for them.
-pub(super) fn first_due(tables: &dyn Tables, want: &Filter, now: Time) -> Result<Option<JobId>, StoreError> {
-    if let Some(id) = first_parked(tables, now)? {
-        return Ok(Some(id));
-    }
-    let ready = first_ready(tables, want)?;
-    let rested = first_rested(tables, want, now)?;
-    Ok([ready, rested].into_iter().flatten().min())
-}
-
-fn first_ready(tables: &dyn Tables, want: &Filter) -> Result<Option<JobId>, StoreError> {
-    let tag = tag(if want.alone { Kind::Alone } else { Kind::Queued });
-    let (least, most) = want.size;
-    let mut best: Option<JobId> = None;
-    let mut from = class(least);
-    let last = class(most);
-    // One scan for each class that has jobs: it ends at the first job that fits, or at the first of a later class.
-    while from <= last {
-        let mut seen = None;
-        tables.scan(Table::ByState, &[tag, from], &[tag, last + 1], &mut |key, _| {
-            let here = key.get(1).copied().ok_or_else(|| corrupt("by_state", "a key is too short"))?;
-            if *seen.get_or_insert(here) != here {
-                return Ok(false);
-            }
-            let size = number(key, 10)?;
-            if size < least || size > most {
-                return Ok(true);
-            }
-            let id = JobId(number(key, 2)?);
-            best = Some(best.map_or(id, |best| best.min(id)));
-            Ok(false)
-        })?;
-        match seen {
-            Some(here) => from = here + 1,
-            None => break,
-        }
-    }
-    Ok(best)
-}
-
-/// Keys of `kind` whose pause is over at `now`: it ended, or it ends later than any pause may (the clock has jumped).
-fn rested(
-    tables: &dyn Tables,
-    kind: Kind,
-    now: Time,
-    each: &mut dyn FnMut(&[u8]) -> Result<bool, StoreError>,
-) -> Result<(), StoreError> {
-    let tag = tag(kind);
-    let at = |time: u64| [&[tag][..], &time.to_be_bytes()].concat();
-    let over = (at(0), at(now.0.saturating_add(1)));
-    let beyond = (at(now.plus_ms(BACKOFF_CAP_MS).0.saturating_add(1)), vec![tag + 1]);
-    for (from, to) in [over, beyond] {
-        tables.scan(Table::ByState, &from, &to, &mut |key, _| each(key))?;
-    }
-    Ok(())
-}
-
-fn first_parked(tables: &dyn Tables, now: Time) -> Result<Option<JobId>, StoreError> {
-    let mut first = None;
-    rested(tables, Kind::Parked, now, &mut |key| {
-        first = first.or(Some(JobId(number(key, id_at(Kind::Parked))?)));
-        Ok(false)
-    })?;
-    Ok(first)
-}
-
-/// The oldest job whose pause is over.
-fn first_rested(tables: &dyn Tables, want: &Filter, now: Time) -> Result<Option<JobId>, StoreError> {
-    let mut best: Option<JobId> = None;
-    rested(tables, Kind::Waiting, now, &mut |key| {
-        let id = JobId(number(key, id_at(Kind::Waiting))?);
-        let alone = key.get(17).is_some_and(|flag| *flag == 1);
-        let size = number(key, 18)?;
-        if alone == want.alone && (want.size.0..=want.size.1).contains(&size) {
-            best = Some(best.map_or(id, |best| best.min(id)));
-        }
-        Ok(true)
-    })?;
-    Ok(best)
 }

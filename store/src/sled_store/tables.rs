@@ -1,4 +1,4 @@
-//! The four tables as sled trees, and the one place where they become durable.
+//! The five tables as sled trees, and the one place where they become durable.
 
 use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -35,6 +35,7 @@ struct Handles {
     jobs: sled::Tree,
     by_state: sled::Tree,
     by_key: sled::Tree,
+    by_recipe: sled::Tree,
 }
 
 impl Drop for SledTables {
@@ -105,13 +106,14 @@ impl SledTables {
                 .map_err(failed)?;
             crash_point("store.open.sled");
             let tree = |name: &str| db.open_tree(name).map_err(failed);
-            let (meta, jobs, by_state, by_key) = (tree("meta")?, tree("jobs")?, tree("by_state")?, tree("by_key")?);
+            let (meta, jobs) = (tree("meta")?, tree("jobs")?);
+            let (by_state, by_key, by_recipe) = (tree("by_state")?, tree("by_key")?, tree("by_recipe")?);
             let path = dir.join("db");
             let file = File::open(&path).map_err(io(&path, "opening the database file"))?;
             Ok(Self {
                 state: state.to_owned(),
                 dir: dir.to_owned(),
-                handles: Some(Handles { db, meta, jobs, by_state, by_key }),
+                handles: Some(Handles { db, meta, jobs, by_state, by_key, by_recipe }),
                 file,
                 progress: Mutex::default(),
                 synced: Condvar::new(),
@@ -135,6 +137,7 @@ impl SledTables {
             Table::Jobs => &handles.jobs,
             Table::ByState => &handles.by_state,
             Table::ByKey => &handles.by_key,
+            Table::ByRecipe => &handles.by_recipe,
         })
     }
 
@@ -205,16 +208,17 @@ impl Tables for SledTables {
 
     fn write(&self, puts: Vec<Put>, seq: Seq) -> Result<(), StoreError> {
         self.sound()?;
-        let Handles { meta, jobs, by_state, by_key, .. } = self.handles()?;
-        let trees = (meta, jobs, by_state, by_key);
+        let Handles { meta, jobs, by_state, by_key, by_recipe, .. } = self.handles()?;
+        let trees = (meta, jobs, by_state, by_key, by_recipe);
         let written = guarded(|| {
-            let result: TransactionResult<(), ()> = trees.transaction(|(meta, jobs, by_state, by_key)| {
+            let result: TransactionResult<(), ()> = trees.transaction(|(meta, jobs, by_state, by_key, by_recipe)| {
                 for put in &puts {
                     let tree = match put.table {
                         Table::Meta => meta,
                         Table::Jobs => jobs,
                         Table::ByState => by_state,
                         Table::ByKey => by_key,
+                        Table::ByRecipe => by_recipe,
                     };
                     match &put.value {
                         Some(value) => tree.insert(put.key.as_slice(), value.as_slice())?,

@@ -2,10 +2,11 @@
 
 use crate::id::{Attempt, JobId, Time};
 use crate::job::{
-    Area, BACKOFF_CAP_MS, BACKOFF_MS, Death, Duty, ENVIRONMENT_RETRIES, Ending, Illegal, Job, Kind, State, Step, Withdrawal,
+    AGEING_MS, Area, BACKOFF_CAP_MS, BACKOFF_MS, Death, Duty, ENVIRONMENT_RETRIES, Ending, Illegal, Job, Kind, Priority, State,
+    Step, Withdrawal,
 };
 use crate::path::RelPath;
-use crate::store::{Filter, Lease, Query, StoreError};
+use crate::store::{Control, Filter, JobStore, Lease, Query, StoreError, Submission};
 
 use super::tools::{ManualClock, Subject, claim_any, finish, job, named, no_one_is_innocent, result_of, submit_one};
 
@@ -74,6 +75,42 @@ pub(super) fn the_oldest_that_fits_is_claimed(subject: &mut dyn Subject, _: &Man
     assert_eq!(take(0, 0)?, Some(6));
     assert_eq!(take(0, u64::MAX)?, Some(7));
     assert_eq!(take(0, u64::MAX)?, None);
+    Ok(())
+}
+
+/// Under every store, and over restarts: the line is made anew then.
+pub(super) fn the_more_urgent_goes_first(subject: &mut dyn Subject, clock: &ManualClock) -> Result<(), StoreError> {
+    let priority = |number: i64| Priority::try_from(number).unwrap_or_default();
+    let submit = |store: &dyn JobStore, name: &str, number| {
+        store.submit(&[Submission { priority: priority(number), ..named(name, 84)? }]).map(|_| ())
+    };
+    let store = subject.store();
+    for (name, number) in [("1.stl", 5), ("2.stl", 0), ("3.stl", 9), ("4.stl", 5)] {
+        submit(store, name, number)?;
+    }
+    let fits = |store: &dyn JobStore| store.waiting(&Filter::default()).map(|waiting| waiting.map(|waiting| waiting.highest));
+    assert_eq!(fits(store)?, Some(priority(9)));
+    assert_eq!(claim_any(store)?.id, JobId(3));
+    assert_eq!(fits(store)?, Some(priority(5)));
+    assert_eq!(store.control(JobId(4), Control::Rank(priority(6)))?.priority, priority(6));
+    subject.restart();
+    let store = subject.store();
+    store.recover(&no_one_is_innocent)?;
+    assert_eq!((job(store, JobId(3))?.priority, job(store, JobId(4))?.priority), (priority(9), priority(6)));
+    // What waits rises, also over a restart; what comes later is behind it.
+    clock.pass(3 * AGEING_MS);
+    subject.restart();
+    let store = subject.store();
+    submit(store, "5.stl", 4)?;
+    submit(store, "6.stl", 3)?;
+    let mut order = Vec::new();
+    while let Some(claim) = store.claim(&Filter::default())? {
+        order.push(claim.id.0);
+        let late = store.control(claim.id, Control::Rank(priority(9)));
+        assert!(matches!(late, Err(StoreError::Illegal { source: Illegal::State { .. }, .. })), "{late:?}");
+    }
+    assert_eq!(order, [3, 4, 1, 5, 2, 6], "9, 6 + 3, 5 + 3, 4, 0 + 3, 3");
+    assert_eq!(store.waiting(&Filter::default())?, None);
     Ok(())
 }
 

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use crate::id::{Attempt, JobId};
-use crate::job::{Duty, Ending, Illegal, Kind, State, Step};
-use crate::store::{Filter, Lease, Query, StoreError};
+use crate::id::{Attempt, Hash, JobId, Recipe};
+use crate::job::{Duty, Ending, Illegal, Kind, Publication, State, Step};
+use crate::store::{Filter, JobStore, Lease, MOST_RESULTS, Query, StoreError};
 
 use super::tools::{ManualClock, Subject, claim_any, finish, job, named, no_one_is_innocent, result_of, submit_one};
 
@@ -23,8 +23,9 @@ pub(super) fn a_result_that_cannot_be_placed_is_parked(subject: &mut dyn Subject
     // Others go on meanwhile; when its pause is over, it is given to whoever asks.
     let between = claim_any(store)?;
     assert_eq!(between.id, other);
-    assert_eq!(store.claim(&Filter::default())?, None);
+    assert_eq!((store.claim(&Filter::default())?, store.has_parked()?), (None, false));
     clock.pass(crate::job::PARK_MS);
+    assert_eq!((store.has_parked()?, store.waiting(&Filter::default())?), (true, None));
     let again = store.claim(&Filter { size: (1 << 40, u64::MAX), alone: false })?.ok_or(StoreError::Unknown(id))?;
     assert_eq!((again.id, again.job.duty(), again.job.attempts), (id, Duty::Place, Attempt(1)));
     assert_eq!(again.job.work, Some(claim.token), "the work folder is still that of the worker");
@@ -37,6 +38,47 @@ pub(super) fn a_result_that_cannot_be_placed_is_parked(subject: &mut dyn Subject
     assert_eq!(again.id, id);
     store.advance(&again, Step::Placed)?;
     assert_eq!(store.advance(&again, Step::Finished)?.kind(), Kind::Done);
+    Ok(())
+}
+
+/// Good ones alone, by size and recipe, the latest first; never one that is only on its way.
+pub(super) fn good_results_are_found_by_what_made_them(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), StoreError> {
+    let (one, other) = (Recipe(7), Recipe(u64::MAX));
+    let end = |store: &dyn JobStore, size, ending, recipe, output_hash: Option<Hash>| {
+        let claim = store.claim(&Filter { size: (size, size), alone: false })?.ok_or(StoreError::Unknown(JobId(0)))?;
+        let publication = Publication { recipe, output_hash, ..result_of(&claim.job, ending) };
+        store.advance(&claim, Step::Intend(publication))?;
+        store.advance(&claim, Step::Placed)?;
+        assert!(!store.results(size, recipe)?.iter().any(|job| job.id == claim.id), "it has not ended");
+        store.advance(&claim, Step::Finished)
+    };
+    let store = subject.store();
+    let hash = Some(Hash([7; 32]));
+    let mut made = Vec::new();
+    for (size, ending, recipe, output_hash) in [
+        (84, Ending::Repaired, Some(one), hash),
+        (84, Ending::NeedsReview, Some(one), hash),
+        (84, Ending::NotGood, Some(one), hash),
+        (84, Ending::Clean, Some(other), hash),
+        (84, Ending::Clean, Some(one), None),
+        (84, Ending::Clean, None, hash),
+        (134, Ending::Clean, Some(one), hash),
+        (84, Ending::Clean, Some(one), hash),
+    ] {
+        made.push(submit_one(store, &format!("{}.stl", made.len()), size)?);
+        end(store, size, ending, recipe, output_hash)?;
+    }
+    subject.restart();
+    let store = subject.store();
+    let found = |size, recipe| Ok::<_, StoreError>(store.results(size, recipe)?.iter().map(|job| job.id.0).collect::<Vec<_>>());
+    assert_eq!((found(84, Some(one))?, found(84, Some(other))?, found(134, Some(one))?), (vec![8, 1], vec![4], vec![7]));
+    assert_eq!((found(84, None)?.len(), found(134, None)?, found(85, None)?), (1, vec![7], vec![]));
+    assert_eq!((found(84, Some(Recipe(8)))?, found(134, Some(other))?), (vec![], vec![]));
+    for more in 0..MOST_RESULTS {
+        submit_one(store, &format!("more{more}.stl"), 84)?;
+        end(store, 84, Ending::Clean, Some(one), hash)?;
+    }
+    assert_eq!(found(84, Some(one))?, [16, 15, 14, 13, 12, 11, 10, 9]);
     Ok(())
 }
 

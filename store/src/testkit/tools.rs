@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::id::{Boot, Clock, Hash, JobId, Time};
-use crate::job::{Ending, Job, Publication, Source, Step, Testimony};
+use crate::job::{Ending, Job, Priority, Publication, Source, Step, Testimony};
 use crate::path::{PathError, RelPath};
 use crate::store::{Claim, Filter, JobStore, StoreError, Submission};
 
@@ -11,16 +11,17 @@ use crate::store::{Claim, Filter, JobStore, StoreError, Submission};
 #[derive(Debug)]
 pub struct ManualClock {
     now: AtomicU64,
+    ticks: AtomicU64,
     boot: AtomicU64,
 }
 
 impl ManualClock {
     /// A clock at `now`.
     pub fn new(now: Time) -> Self {
-        Self { now: AtomicU64::new(now.0), boot: AtomicU64::new(1) }
+        Self { now: AtomicU64::new(now.0), ticks: AtomicU64::new(0), boot: AtomicU64::new(1) }
     }
 
-    /// Sets it, forwards or backwards.
+    /// Sets it, forwards or backwards. The clock that only goes forward knows nothing of it.
     pub fn set(&self, now: Time) {
         self.now.store(now.0, Ordering::SeqCst);
     }
@@ -28,6 +29,7 @@ impl ManualClock {
     /// Lets `ms` pass.
     pub fn pass(&self, ms: u64) {
         self.now.fetch_add(ms, Ordering::SeqCst);
+        self.ticks.fetch_add(ms, Ordering::SeqCst);
     }
 
     /// The machine goes down and comes up again.
@@ -43,6 +45,10 @@ impl Clock for ManualClock {
 
     fn boot(&self) -> Boot {
         Boot(self.boot.load(Ordering::SeqCst))
+    }
+
+    fn ticks(&self) -> u64 {
+        self.ticks.load(Ordering::SeqCst)
     }
 }
 
@@ -68,7 +74,7 @@ pub fn dropped(name: &str, size: u64) -> Result<Submission, PathError> {
         mtime_ns: 1_700_000_000_000_000_000,
         profile: "default".into(),
     };
-    Ok(Submission { source, foreign: None })
+    Ok(Submission { source, foreign: None, priority: Priority::default() })
 }
 
 /// A result of `ending` under the names of the source.
@@ -79,6 +85,8 @@ pub fn result_of(job: &Job, ending: Ending) -> Publication {
         output: Some(job.source.path.clone()),
         output_hash: Some(Hash([7; 32])),
         report_hash: Some(Hash([8; 32])),
+        recipe: None,
+        reused: None,
         source_ctime_ns: None,
         original: Some(job.source.path.clone()),
         stays: false,

@@ -39,6 +39,8 @@ impl Record {
         let names = journal.inputs.clone();
         let ended = run(&scene.once(), &scene.errors(), LIMIT, &mut journal).expect("the daemon can be traced");
         assert_eq!((ended.status.code(), ended.left), (Some(1), 0), "{ended:?}");
+        let jobs = scene.jobs().expect("jobs can be listed");
+        assert!(jobs.iter().any(|job| job["reused"].is_u64()), "nothing was copied: {jobs:?}");
         let folders = names.keys().flat_map(|path| path.ancestors().skip(1)).filter(|path| !path.as_os_str().is_empty());
         let folders: BTreeSet<PathBuf> = folders.map(Path::to_owned).collect();
         let start = Tree { folders, names, bytes: BTreeMap::new() };

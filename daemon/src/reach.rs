@@ -1,0 +1,221 @@
+//! The way of `suture jobs` to the jobs of a hot folder: through its daemon while one runs, else through the store itself.
+//!
+//! While a daemon starts it has the store and does not answer yet, and while one ends, or a worker outlives a killed one, the store is
+//! held for a moment longer than anyone answers. Whoever asks then waits for [`PATIENCE`], and asks again.
+
+use std::ffi::OsString;
+use std::io::ErrorKind;
+use std::os::unix::ffi::OsStringExt;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use suture_store::{Job, SledStore, StoreError};
+
+use crate::config::default_state;
+use crate::control::{DaemonWish, JobsWish, Refusal, Wish, answer, ask};
+use crate::exit::Exit;
+use crate::schedule::Standing;
+use crate::{standstill, watch, watchdog};
+
+/// How long a store that is held while no one answers is waited for.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// How often it is asked for meanwhile.
+const ASK_EVERY: Duration = Duration::from_millis(50);
+
+/// What the end of the other side looks like.
+const CUT_OFF: [ErrorKind; 3] = [ErrorKind::UnexpectedEof, ErrorKind::ConnectionReset, ErrorKind::BrokenPipe];
+
+/// Why nothing came of it: a line for people, and how the program ends.
+#[derive(Debug)]
+pub(crate) struct Failure {
+    pub line: String,
+    pub exit: Exit,
+}
+
+impl Failure {
+    fn try_again(line: String) -> Self {
+        Self { line, exit: Exit::TryAgain }
+    }
+}
+
+impl From<Refusal> for Failure {
+    fn from(Refusal { line, exit_code }: Refusal) -> Self {
+        let exit = match exit_code {
+            73 => Exit::Owned,
+            75 => Exit::TryAgain,
+            _ => Exit::Refused,
+        };
+        Self { line, exit }
+    }
+}
+
+impl From<StoreError> for Failure {
+    fn from(error: StoreError) -> Self {
+        Refusal::from(error).into()
+    }
+}
+
+/// Does what is wished of the jobs of a hot folder.
+///
+/// # Errors
+/// When `dir` is no hot folder, there is no such job, or neither a daemon answers nor the store can be opened.
+pub(crate) fn jobs(dir: &Path, wish: &JobsWish) -> Result<Vec<Job>, Failure> {
+    if let Some(jobs) = through_daemon(dir, wish)? {
+        return Ok(jobs);
+    }
+    let state = state_of(dir);
+    if !state.is_dir() {
+        return Ok(Vec::new());
+    }
+    watchdog::start(|| watch::end_hanging())
+        .map_err(|error| Failure::try_again(format!("no thread can be started: {error}; try again")))?;
+    let asked = Instant::now();
+    loop {
+        match through_store(&state, wish) {
+            Ok(jobs) => return Ok(jobs),
+            Err(Unread::Failed(failure)) => return Err(failure),
+            Err(Unread::Held(pid)) if asked.elapsed() >= PATIENCE => return Err(held(dir, pid)),
+            Err(Unread::Held(_)) => std::thread::sleep(ASK_EVERY),
+        }
+        if let Some(jobs) = through_daemon(dir, wish)? {
+            return Ok(jobs);
+        }
+    }
+}
+
+/// Does what is wished of the daemon of a hot folder, and says how it stands; without one, notes the wish for the next, and there is no
+/// standing.
+///
+/// # Errors
+/// When `dir` is no hot folder, the daemon does not answer, or the wish cannot be noted.
+pub(crate) fn daemon(dir: &Path, wish: &DaemonWish) -> Result<Option<Standing>, Failure> {
+    if let Some(standing) = through_daemon(dir, wish)? {
+        return Ok(Some(standing));
+    }
+    let note = |paused| standstill::set(&state_of(dir), paused);
+    let noted = match wish {
+        DaemonWish::Pause => note(true),
+        DaemonWish::Resume => note(false),
+        DaemonWish::Standing => return Ok(None),
+    };
+    noted.map_err(|error| Failure::try_again(format!("the pause cannot be noted: {error}")))?;
+    // One that began to answer meanwhile may have looked for a note before there was one.
+    through_daemon(dir, wish)
+}
+
+/// Where the job store of a hot folder is.
+pub(crate) fn state_of(dir: &Path) -> PathBuf {
+    match std::fs::read(dir.join(".suture").join("state-path")) {
+        Ok(path) => OsString::from_vec(path).into(),
+        Err(_) => default_state(dir),
+    }
+}
+
+/// The running daemon's answer; `None` if none runs.
+fn through_daemon<W: Wish>(dir: &Path, wish: &W) -> Result<Option<W::Answer>, Failure> {
+    if !dir.join(".suture").is_dir() {
+        return Err(Failure { line: format!("{}: is no hot folder (try --dir DIR)", dir.display()), exit: Exit::Refused });
+    }
+    match ask(dir, wish) {
+        Ok(answer) => Ok(answer.transpose()?),
+        Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+            Err(Failure::try_again("the daemon does not answer: it is stopped, or very busy; try again".into()))
+        }
+        // It died over it; what only looks can be asked of the next one.
+        Err(error) if CUT_OFF.contains(&error.kind()) && wish.only_looks() => Ok(None),
+        Err(error) => {
+            let line = format!("the daemon's answer was cut off or cannot be understood: {error}; try again");
+            Err(Failure::try_again(line))
+        }
+    }
+}
+
+/// Why the store says nothing.
+enum Unread {
+    /// Someone has it, who may be about to answer, or to let go of it.
+    Held(Option<u32>),
+    Failed(Failure),
+}
+
+impl<E: Into<Failure>> From<E> for Unread {
+    fn from(error: E) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+fn through_store(state: &Path, wish: &JobsWish) -> Result<Vec<Job>, Unread> {
+    let held = |error| match error {
+        StoreError::Locked { pid, .. } => Unread::Held(pid),
+        error => Unread::from(error),
+    };
+    // To look needs no right to write, and no room.
+    match wish {
+        JobsWish::List => SledStore::peek(state).map_err(held),
+        JobsWish::Show(id) => {
+            let job = SledStore::peek(state).map_err(held)?.into_iter().find(|job| job.id == *id);
+            Ok(vec![job.ok_or(StoreError::Unknown(*id))?])
+        }
+        JobsWish::Retry(_) | JobsWish::Cancel(_) | JobsWish::Rank(..) => {
+            Ok(answer(&SledStore::open(state).map_err(held)?, wish)?)
+        }
+    }
+}
+
+fn held(dir: &Path, pid: Option<u32>) -> Failure {
+    let who = pid.map(|pid| format!(" (process {pid})")).unwrap_or_default();
+    Failure::try_again(format!(
+        "{}: a daemon{who} has had the job store for {} s and does not answer: it is starting, ending or stopped; try again",
+        dir.display(),
+        PATIENCE.as_secs()
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hot() -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::create_dir(dir.path().join(".suture")).unwrap();
+        dir
+    }
+
+    /// The store is let go of after a while, as by a daemon that ends.
+    #[test]
+    fn a_store_that_is_held_is_waited_for() {
+        let dir = hot();
+        let store = SledStore::open(&state_of(dir.path())).unwrap();
+        let asked = Instant::now();
+        let jobs = std::thread::scope(|scope| {
+            let asking = scope.spawn(|| jobs(dir.path(), &JobsWish::List));
+            std::thread::sleep(Duration::from_millis(300));
+            assert!(!asking.is_finished(), "it gave up at once");
+            drop(store);
+            asking.join().unwrap()
+        });
+        assert!(jobs.unwrap().is_empty() && asked.elapsed() < PATIENCE);
+    }
+
+    /// One line, and what to do.
+    #[test]
+    fn a_store_that_stays_held_is_said_so() {
+        let dir = hot();
+        let _store = SledStore::open(&state_of(dir.path())).unwrap();
+        let asked = Instant::now();
+        let failure = jobs(dir.path(), &JobsWish::List).unwrap_err();
+        assert!(asked.elapsed() >= PATIENCE && failure.exit == Exit::TryAgain);
+        let pid = std::process::id().to_string();
+        assert!(
+            failure.line.contains(&pid) && failure.line.ends_with("try again") && !failure.line.contains('\n'),
+            "{failure:?}"
+        );
+    }
+
+    #[test]
+    fn a_folder_that_is_not_hot_is_refused_at_once() {
+        let dir = tempfile::tempdir().unwrap();
+        assert_eq!(jobs(dir.path(), &JobsWish::List).unwrap_err().exit, Exit::Refused);
+        assert_eq!(daemon(dir.path(), &DaemonWish::Pause).unwrap_err().exit, Exit::Refused);
+        assert!(!dir.path().join(".suture").exists());
+    }
+}

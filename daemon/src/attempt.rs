@@ -84,7 +84,7 @@ impl Context {
     }
 
     /// Has the store failed?
-    fn has_failed(&self) -> bool {
+    pub(crate) fn has_failed(&self) -> bool {
         self.failed.lock().is_ok_and(|failed| failed.is_some())
     }
 

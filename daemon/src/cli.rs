@@ -38,6 +38,8 @@ pub(crate) enum Command {
     Watch(WatchArgs),
     /// Check a configuration file, or show all settings with their values
     Config(ConfigArgs),
+    /// Say which files and records a configuration's `[keep]` would let go now, and why; changes nothing
+    Retention(RetentionArgs),
     /// List, show, retry or cancel the jobs of a hot folder, with or without a running daemon
     Jobs(JobsArgs),
     /// Make a hot folder of small broken meshes, repair them, and show what happened
@@ -249,6 +251,13 @@ pub(crate) enum ConfigCommand {
         #[arg(value_name = "FILE")]
         file: Option<PathBuf>,
     },
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct RetentionArgs {
+    /// Configuration file (TOML), as for `suture watch --config`
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
 }
 
 #[derive(Args, Debug)]

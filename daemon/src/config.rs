@@ -1,5 +1,5 @@
 //! What the daemon works by. A hot folder needs no settings; a TOML file may name several folders, profiles and limits: [`read`] reads it,
-//! [`show`] writes one, [`command`] does either for people.
+//! [`show`] writes one, [`command`] does either for people. [`keep`] is what goes by itself.
 
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -9,8 +9,10 @@ use suture_core::Profile;
 
 use crate::units::show_size;
 use crate::window::RunWindow;
+use keep::Keep;
 
 pub(crate) mod command;
+pub(crate) mod keep;
 pub(crate) mod read;
 pub(crate) mod show;
 
@@ -73,6 +75,8 @@ pub(crate) struct Config {
     /// The hours at which all workers work; at others, so many do.
     pub run_window: RunWindow,
     pub workers_outside: usize,
+    /// What goes by itself, and when.
+    pub keep: Keep,
     pub profiles: BTreeMap<String, Profile>,
 }
 
@@ -96,6 +100,7 @@ impl Config {
             time_limit: TimeLimit { base: Duration::from_secs(120), per_gib: Duration::from_secs(1200) },
             run_window: RunWindow::default(),
             workers_outside: 0,
+            keep: Keep::default(),
             profiles: BTreeMap::new(),
         }
     }

@@ -159,6 +159,18 @@ pub(crate) fn reach(dir: &Path, wish: &Wish) -> Result<Answer, (String, Exit)> {
     }
 }
 
+/// All jobs of the store of a hot folder, by number.
+///
+/// # Errors
+/// A line for people, and what it comes to.
+pub(crate) fn all(dir: &Path) -> Result<Vec<Job>, (String, Exit)> {
+    match reach(dir, &Wish::List)? {
+        Answer::Jobs(jobs) => Ok(jobs),
+        Answer::Standing(_) => Ok(Vec::new()),
+        Answer::Failed { line, .. } => Err((line, Exit::TryAgain)),
+    }
+}
+
 /// The running daemon's answer; `None` if none runs.
 fn asked(dir: &Path, wish: &Wish) -> Result<Option<Answer>, (String, Exit)> {
     if !dir.join(".suture").is_dir() {

@@ -28,6 +28,7 @@ mod protocol;
 mod publish;
 mod publish_error;
 mod receipt;
+mod retention;
 mod rights;
 mod say;
 mod scan;
@@ -73,6 +74,7 @@ fn main() -> ExitCode {
         },
         Command::Watch(args) => watch::run(args),
         Command::Config(args) => config::command::run(&args.command),
+        Command::Retention(args) => retention::command::run(&args.file, &jobs::all),
         Command::Jobs(args) => jobs::run(args),
         Command::Demo => demo::run(),
     };

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use crossbeam::channel::unbounded;
 use suture_store::job::{Kind, Testimony};
-use suture_store::{JobStore, Query, SledStore, StoreError, crash_point};
+use suture_store::{Clock, JobStore, Query, SledStore, StoreError, SystemClock, crash_point};
 
 use crate::again::Lives;
 use crate::attempt::{Context, IN_HAND, Slot, WITNESS, remove_work};
@@ -24,6 +24,8 @@ use crate::exit::Exit;
 use crate::folder::{Folder, FolderError, is_fading};
 use crate::fsx;
 use crate::keeper::Keeper;
+use crate::retention::sweep::Sweeper;
+use crate::retention::turns::Moment;
 use crate::say::complain;
 use crate::schedule::{Hold, Schedule, Turn};
 use crate::settings::Settings;
@@ -191,7 +193,10 @@ impl Daemon {
             let kept = threads.and_then(|slots| guarded(|| keeper.keep()).map(|()| slots));
             context.schedule.stop();
             match kept {
-                Ok(slots) => self.drain(&context, &slots),
+                Ok(slots) => {
+                    self.drain(&context, &slots);
+                    self.sweep_once(&context);
+                }
                 Err(error) => context.fail(error),
             }
             ended.store(true, Ordering::Relaxed);
@@ -229,6 +234,14 @@ impl Daemon {
                 Err(error) => tracing::warn!(%error, "`suture jobs` cannot reach this daemon."),
             }
         }
+        let sweep = move || {
+            let clock = || Moment { steady: Instant::now(), wall: SystemClock.now() };
+            let swept = guarded(|| sweeper(context).tend(&clock, &|| ended.load(Ordering::Relaxed) || context.has_failed()));
+            swept.unwrap_or_else(|error| context.fail(error));
+        };
+        if !self.once {
+            thread("sweeper").spawn_scoped(scope, sweep).map(drop).map_err(failed)?;
+        }
         let slot = || {
             let worked = guarded(|| {
                 Slot::new(context).run();
@@ -238,6 +251,15 @@ impl Daemon {
             worked.unwrap_or_else(|error| context.fail(error));
         };
         (0..self.settings.now().workers).map(|_| thread("slot").spawn_scoped(scope, slot).map_err(failed)).collect()
+    }
+
+    /// With `--once`, what is to go goes at the end, if all came to it.
+    fn sweep_once(&self, context: &Context) {
+        let stop = || self.stop.asked() || context.has_failed();
+        if self.once && !stop() {
+            let swept = guarded(|| sweeper(context).sweep(SystemClock.now(), &stop).map(drop));
+            swept.unwrap_or_else(|error| context.fail(error));
+        }
     }
 
     /// Lets running jobs finish, for as long as they are given.
@@ -251,6 +273,11 @@ impl Daemon {
             std::thread::sleep(Duration::from_millis(10));
         }
     }
+}
+
+/// Whoever lets go what is to go.
+fn sweeper(context: &Context) -> Sweeper<'_> {
+    Sweeper::new(&*context.store, &context.folders, &context.settings)
 }
 
 /// A thread that ends in a panic, for want of another thread or by a defect, must not leave the others waiting: the daemon ends with it,

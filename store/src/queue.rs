@@ -23,6 +23,7 @@ use crate::record;
 use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted};
 use crate::tables::{Put, Table, Tables};
 
+mod forget;
 mod index;
 
 /// Longest folder or profile name, as it stands in a record.
@@ -408,6 +409,10 @@ impl<T: Tables> JobStore for Queue<T> {
 
     fn check(&self) -> Result<(), StoreError> {
         self.tables.sound()
+    }
+
+    fn forget(&self, ids: &[JobId]) -> Result<u64, StoreError> {
+        self.drop_records(ids)
     }
 
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {

@@ -10,6 +10,7 @@ mod e2e {
     mod many;
     mod memory;
     mod profiles;
+    mod retention;
     mod same_bytes;
     mod soups;
     mod steer;

@@ -13,6 +13,7 @@ use suture_store::{RelPath, Token};
 use crate::config::FolderConfig;
 use crate::create;
 use crate::fsx::{self, Identity};
+use crate::receipt::{RECEIPT, REPORT};
 use crate::rights;
 
 /// Part of a hot folder that holds results.
@@ -242,7 +243,9 @@ pub(crate) fn name_kind(name: &OsStr) -> NameKind {
     const ENDINGS: [&str; 9] = [".part", ".tmp", ".temp", ".crdownload", ".partial", ".filepart", ".download", ".swp", "~"];
     const LITTER: [&str; 4] = ["thumbs.db", "desktop.ini", "@eadir", "lost+found"];
     let hidden = lower.starts_with('.') || lower.starts_with("~$") || lower.starts_with('#');
-    if hidden || ENDINGS.iter().any(|ending| lower.ends_with(ending)) || LITTER.contains(&lower.as_str()) {
+    // What this program puts beside results, and someone copies back with them.
+    let ours = lower.ends_with(REPORT) || lower.ends_with(RECEIPT);
+    if hidden || ours || ENDINGS.iter().any(|ending| lower.ends_with(ending)) || LITTER.contains(&lower.as_str()) {
         return NameKind::Ignored;
     }
     if lower.ends_with(".stl") { NameKind::Mesh } else { NameKind::Foreign }
@@ -279,9 +282,18 @@ mod tests {
         for mesh in ["part.stl", "PART.STL", "a b$.Stl", "CON.stl"] {
             assert_eq!(name_kind(OsStr::new(mesh)), NameKind::Mesh, "{mesh}");
         }
-        for ignored in
-            [".part.stl", "part.stl.crdownload", "part.stl.part", "~$part.stl", "part.stl~", "Thumbs.db", "@eaDir", "x.TMP"]
-        {
+        for ignored in [
+            ".part.stl",
+            "part.stl.crdownload",
+            "part.stl.part",
+            "part.stl.report.json",
+            "part.stl.suture.json",
+            "~$part.stl",
+            "part.stl~",
+            "Thumbs.db",
+            "@eaDir",
+            "x.TMP",
+        ] {
             assert_eq!(name_kind(OsStr::new(ignored)), NameKind::Ignored, "{ignored}");
         }
         for foreign in ["part.obj", "notes.txt", "stl"] {

@@ -12,11 +12,12 @@ use crossbeam::channel::{Receiver, RecvTimeoutError, Sender};
 use notify::event::{EventKind, ModifyKind, RenameMode};
 use notify::{RecursiveMode, Watcher};
 use suture_store::job::{Area, Kind};
-use suture_store::{Clock, Control, Query, StoreError, SystemClock, crash_point};
+use suture_store::{Clock, Control, JobId, Query, StoreError, SystemClock, crash_point};
 
 use crate::attempt::{Context, Event};
 use crate::folder::Folder;
 use crate::fsx;
+use crate::orders::Orders;
 use crate::scan::Reconciler;
 use crate::schedule::Hold;
 use crate::settings::Reload;
@@ -35,6 +36,8 @@ const IDLE_ONCE: Duration = Duration::from_millis(20);
 const DISK_EVERY: Duration = Duration::from_secs(5);
 /// With `--once`, a result that cannot be brought into place is tried so often before it is left for the next run.
 const TRIES_ONCE: u32 = 4;
+/// Jobs that are read at a time.
+const PAGE: usize = 1000;
 
 /// The thread that looks after the folders.
 pub(crate) struct Keeper<'a> {
@@ -54,6 +57,7 @@ type Watching = ManuallyDrop<notify::RecommendedWatcher>;
 struct Kept {
     folder: Arc<Folder>,
     reconciler: Reconciler,
+    orders: Orders,
     /// The system does not tell of changes.
     polled: bool,
     rescan: Duration,
@@ -62,7 +66,7 @@ struct Kept {
     dirty: bool,
     unavailable: bool,
     /// Files that were only noticed, and are gone.
-    gone: Vec<suture_store::JobId>,
+    gone: Vec<JobId>,
     /// Names that were renamed into place since the last scan.
     renamed: Vec<PathBuf>,
     scan_takes: Duration,
@@ -89,6 +93,7 @@ impl<'a> Keeper<'a> {
             folders.push(Kept {
                 folder: Arc::clone(folder),
                 reconciler: Reconciler::new(Arc::clone(folder), Arc::clone(&context.settings), rest),
+                orders: Orders::new(Arc::clone(folder), Arc::clone(&context.settings)),
                 polled,
                 rescan,
                 scanned: None,
@@ -109,6 +114,7 @@ impl<'a> Keeper<'a> {
     /// When the store failed.
     pub(crate) fn keep(&mut self) -> Result<(), StoreError> {
         self.remember_live()?;
+        self.remember_orders()?;
         self.forget_noticed()?;
         if self.context.once {
             self.hasten_waiting()?;
@@ -131,7 +137,8 @@ impl<'a> Keeper<'a> {
                 kept.turn(self.context, now)?;
             }
             if self.context.once && self.is_finished()? {
-                return Ok(());
+                // Nothing comes any more.
+                return self.folders.iter_mut().try_for_each(|kept| kept.sum_up(self.context, now, Duration::ZERO));
             }
             self.listen();
         }
@@ -155,6 +162,7 @@ impl<'a> Keeper<'a> {
                 Ok(Event::Ended { folder, path }) => {
                     if let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == folder) {
                         kept.reconciler.ended(&path);
+                        kept.orders.ended(&path, Instant::now());
                         kept.dirty = true;
                     }
                 }
@@ -207,6 +215,21 @@ impl<'a> Keeper<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Orders of an earlier life, some of which may lack their summary.
+    fn remember_orders(&mut self) -> Result<(), StoreError> {
+        let (now, mut after) = (Instant::now(), JobId(0));
+        loop {
+            let page = self.context.store.list(&Query { after, limit: PAGE, ..Query::default() })?;
+            let Some(last) = page.last() else { return Ok(()) };
+            after = last.id;
+            for job in &page {
+                if let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == job.source.folder) {
+                    kept.orders.remember(job, now);
+                }
+            }
+        }
     }
 
     /// The configuration was read anew: what of it the keeper works by, and what may go on now. Says what came of it, in one line.
@@ -318,6 +341,12 @@ impl Kept {
         }
     }
 
+    /// Sums up the orders that are done, and of which nothing changed for `rest`.
+    fn sum_up(&mut self, context: &Context, now: Instant, rest: Duration) -> Result<(), StoreError> {
+        let reconciler = &self.reconciler;
+        self.orders.sum_up(&*context.store, now, rest, &|order| reconciler.is_settling_below(order))
+    }
+
     /// Scans and looks, as far as either is due.
     fn turn(&mut self, context: &Context, now: Instant) -> Result<(), StoreError> {
         let since = self.scanned.map(|then| now.duration_since(then));
@@ -336,6 +365,7 @@ impl Kept {
         for id in self.gone.drain(..) {
             control(context, id, Control::Forget)?;
         }
+        self.sum_up(context, now, self.reconciler.rest.settle)?;
         if now.duration_since(self.looked) < self.reconciler.rest.look_every() {
             return Ok(());
         }
@@ -352,6 +382,7 @@ impl Kept {
                     if let (Some(what), true) = (&submission.foreign, answer.new) {
                         tracing::info!(job = answer.id.0, file = %submission.source.path, what, "Left where it is.");
                     }
+                    self.orders.came(&submission.source.path, answer.id, now);
                     self.reconciler.submitted(path, submission, answer.id);
                 }
             }
@@ -361,6 +392,7 @@ impl Kept {
                     match context.store.submit(std::slice::from_ref(submission)) {
                         Ok(answer) => {
                             for answer in answer {
+                                self.orders.came(&submission.source.path, answer.id, now);
                                 self.reconciler.submitted(path, submission, answer.id);
                             }
                         }
@@ -383,7 +415,7 @@ fn pace(context: &Context, polled: bool) -> (Rest, Duration) {
     (rest, config.rescan.unwrap_or(if polled { RESCAN_POLLED } else { RESCAN }))
 }
 
-fn control(context: &Context, id: suture_store::JobId, wish: Control) -> Result<(), StoreError> {
+fn control(context: &Context, id: JobId, wish: Control) -> Result<(), StoreError> {
     match context.store.control(id, wish) {
         Err(error) if !error.is_callers() => Err(error),
         // An operator was faster.

@@ -22,6 +22,7 @@ mod keeper;
 mod logging;
 mod names;
 mod naming;
+mod orders;
 mod place;
 mod profiles;
 mod protocol;

@@ -185,6 +185,13 @@ impl Reconciler {
         self.entries.values().any(|entry| matches!(entry, Entry::Settling { .. }))
     }
 
+    /// Is anything below this sub-folder on its way to rest, or cannot be seen?
+    pub(crate) fn is_settling_below(&self, folder: &Path) -> bool {
+        let below = self.entries.range(folder.to_owned()..).take_while(|(path, _)| path.starts_with(folder));
+        let hidden = self.unreadable.iter().any(|path| path.starts_with(folder) || folder.starts_with(path));
+        hidden || below.into_iter().any(|(_, entry)| matches!(entry, Entry::Settling { .. }))
+    }
+
     fn source(&mut self, path: RelPath, identity: &Identity) -> Source {
         let profile = self.profile_name(&path);
         Source {

@@ -9,6 +9,7 @@ mod e2e {
     mod malformed;
     mod many;
     mod memory;
+    mod orders;
     mod profiles;
     mod retention;
     mod same_bytes;

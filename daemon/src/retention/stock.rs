@@ -14,6 +14,7 @@ use crate::config::keep::Keep;
 use crate::folder::{NameKind, is_hot, name_kind};
 use crate::fsx::{self, Identity};
 use crate::names::{best_of, with_suffix};
+use crate::orders::summary;
 use crate::receipt::{RECEIPT, REPORT};
 
 /// Sub-folders are searched to this depth.
@@ -59,6 +60,7 @@ impl Stock {
         if results {
             let out = Area::read(root, OUT)?;
             out.receipts().for_each(|(base, receipt)| out.told_by(&base, &receipt, &mut stock.pieces));
+            out.summaries(&mut stock.pieces);
         }
         if originals {
             Area::read(root, DONE)?.originals(&[], &mut stock);
@@ -149,6 +151,17 @@ impl Area {
         }
         if there.is_none() {
             add(What::Receipt, &beside, own.size, None);
+        }
+    }
+
+    /// Summaries of orders, which no receipt speaks of.
+    fn summaries(&self, pieces: &mut Vec<Piece>) {
+        for (path, found) in &self.files {
+            let name = path.file_name().unwrap_or_default().as_encoded_bytes();
+            if name.starts_with(b"order.report") && name.ends_with(b".json") && summary::read(&self.root.join(path)).is_some() {
+                let (path, since) = (Path::new(self.name).join(path), time(found.mtime_ns));
+                pieces.push(Piece { what: What::Report, path, bytes: found.size, since, hash: None });
+            }
         }
     }
 

@@ -35,7 +35,9 @@ fn row(source: &str, kind: &str, result: &str) -> (String, String, String) {
 #[test]
 fn an_order_is_summed_up_when_it_is_done_and_when_a_file_comes_later() {
     let place = Place::new();
-    for (name, bytes) in [("a.stl", mesh(1)), ("deep/b.stl", mesh(2)), ("bad.stl", PICTURE.to_vec()), ("notes.txt", b"by air".to_vec())] {
+    for (name, bytes) in
+        [("a.stl", mesh(1)), ("deep/b.stl", mesh(2)), ("bad.stl", PICTURE.to_vec()), ("notes.txt", b"by air".to_vec())]
+    {
         place.put(&format!("hot/in/order-123/{name}"), &bytes);
     }
     let ran = once(&place).expect(1);

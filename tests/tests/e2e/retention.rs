@@ -84,6 +84,7 @@ fn results_and_reports_go_when_they_are_old() {
         "out/new.stl.suture.json",
         "out/order/b.stl",
         "out/order/b.stl.suture.json",
+        "out/order/order.report.json",
     ];
     assert_eq!(all(&place), left);
     assert_eq!(place.read("hot/out/order/b.stl"), b"as a person made it");

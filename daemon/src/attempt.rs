@@ -2,6 +2,7 @@
 //! serves many small files; a crash then costs the file that was being worked on, and a new process.
 
 use std::cell::Cell;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::Mutex;
@@ -57,6 +58,8 @@ pub(crate) struct Context {
     pub halt: AtomicBool,
     /// A job ended not good, or could not be ended.
     pub not_good: Arc<AtomicBool>,
+    /// Folders that are out of reach, and why.
+    pub away: Mutex<BTreeMap<String, String>>,
     /// The store failed; every thread ends.
     pub failed: Mutex<Option<StoreError>>,
 }

@@ -1,22 +1,21 @@
 //! The thread that looks after the hot folders: it scans them when something happened or it is time, tells the store of files that came to
 //! rest ([`crate::scan`]), and sees to it that there is room on the disk.
 
-use std::mem::ManuallyDrop;
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::io;
+use std::os::unix::fs::MetadataExt;
+use std::path::PathBuf;
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
+use std::sync::{Arc, PoisonError};
+use std::time::{Duration, Instant, SystemTime};
 
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender};
-use notify::event::{EventKind, ModifyKind, RenameMode};
-use notify::{RecursiveMode, Watcher};
 use suture_store::job::{Area, Kind};
 use suture_store::{Clock, Control, JobId, Query, StoreError, SystemClock, crash_point};
 
 use crate::attempt::{Context, Event};
 use crate::folder::Folder;
 use crate::fsx;
+use crate::hints::{Watching, watcher};
 use crate::orders::Orders;
 use crate::scan::Reconciler;
 use crate::schedule::Hold;
@@ -27,6 +26,8 @@ use crate::signals::Stop;
 /// Full scans, where the system tells of changes and where it does not.
 const RESCAN: Duration = Duration::from_secs(60);
 const RESCAN_POLLED: Duration = Duration::from_secs(10);
+/// A folder that is away is looked for this often.
+const LOOK_FOR: Duration = Duration::from_secs(2);
 /// Hints within this time are one.
 const SCAN_AT_MOST_EVERY: Duration = Duration::from_millis(50);
 /// How often the keeper looks about when nothing happens: for signals, and with `--once` for the end of all work.
@@ -45,13 +46,8 @@ pub(crate) struct Keeper<'a> {
     inbox: Receiver<Event>,
     stop: &'a Stop,
     folders: Vec<Kept>,
-    /// Keeps telling of changes as long as it lives.
-    _watchers: Vec<Watching>,
     disk_looked: Option<Instant>,
 }
-
-/// Tells of changes until the process ends.
-type Watching = ManuallyDrop<notify::RecommendedWatcher>;
 
 /// A folder under the keeper's eyes.
 struct Kept {
@@ -60,6 +56,9 @@ struct Kept {
     orders: Orders,
     /// The system does not tell of changes.
     polled: bool,
+    /// Keeps telling of changes, as long as it lives, of what `in/` stood for then.
+    watching: Option<Watching>,
+    watched: Option<(u64, u64, Option<SystemTime>)>,
     rescan: Duration,
     scanned: Option<Instant>,
     looked: Instant,
@@ -73,28 +72,18 @@ struct Kept {
 }
 
 impl<'a> Keeper<'a> {
-    /// Begins to listen; `inbox` receives what `events` is told.
-    pub(crate) fn new(context: &'a Context, events: Sender<Event>, inbox: Receiver<Event>, stop: &'a Stop) -> Self {
-        let mut watchers = Vec::new();
+    /// Begins to listen; `inbox` receives what the context's events are told.
+    pub(crate) fn new(context: &'a Context, inbox: Receiver<Event>, stop: &'a Stop) -> Self {
         let mut folders = Vec::new();
         for folder in &context.folders {
-            let mut polled = fsx::needs_polling(&folder.inbox());
-            if !polled {
-                match watcher(&folder.inbox(), events.clone()) {
-                    Ok(watcher) => watchers.push(watcher),
-                    Err(error) => {
-                        tracing::warn!(folder = %folder.root.display(), %error, "The system does not tell of changes; polling.");
-                        polled = true;
-                    }
-                }
-            }
-            let (rest, rescan) = pace(context, polled);
-            tracing::info!(folder = %folder.root.display(), polled, "Serving a hot folder.");
-            folders.push(Kept {
+            let (rest, rescan) = pace(context, false);
+            let mut kept = Kept {
                 folder: Arc::clone(folder),
                 reconciler: Reconciler::new(Arc::clone(folder), Arc::clone(&context.settings), rest),
                 orders: Orders::new(Arc::clone(folder), Arc::clone(&context.settings)),
-                polled,
+                polled: false,
+                watching: None,
+                watched: None,
                 rescan,
                 scanned: None,
                 looked: Instant::now(),
@@ -103,9 +92,14 @@ impl<'a> Keeper<'a> {
                 gone: Vec::new(),
                 renamed: Vec::new(),
                 scan_takes: Duration::ZERO,
-            });
+            };
+            if folder.check().is_ok() {
+                kept.watch(context);
+                tracing::info!(folder = %folder.root.display(), polled = kept.polled, "Serving a hot folder.");
+            }
+            folders.push(kept);
         }
-        Self { context, inbox, stop, folders, _watchers: watchers, disk_looked: None }
+        Self { context, inbox, stop, folders, disk_looked: None }
     }
 
     /// Keeps the folders until there is a reason to end.
@@ -324,21 +318,52 @@ impl Kept {
         SCAN_AT_MOST_EVERY.max(self.scan_takes * 10)
     }
 
-    fn scan(&mut self, now: Instant) {
-        let found = self.folder.check().and_then(|()| self.reconciler.scan(now).map_err(|error| error.to_string()));
+    /// Has the system tell of changes in `in/`, as it is now, and of another one that takes its place.
+    fn watch(&mut self, context: &Context) {
+        let inbox = self.folder.inbox();
+        // A number of an inode is soon given again.
+        let there = std::fs::metadata(&inbox).ok().map(|found| (found.dev(), found.ino(), found.created().ok()));
+        if self.watched.is_some() && self.watched == there {
+            return;
+        }
+        (self.watched, self.watching, self.polled) = (there, None, fsx::needs_polling(&inbox));
+        if !self.polled {
+            match watcher(&self.folder, context.events.clone()) {
+                Ok(watching) => self.watching = Some(watching),
+                Err(error) => {
+                    tracing::warn!(folder = %self.folder.root.display(), %error, "The system does not tell of changes; polling.");
+                    self.polled = true;
+                }
+            }
+        }
+        (self.reconciler.rest, self.rescan) = pace(context, self.polled);
+    }
+
+    fn scan(&mut self, context: &Context, now: Instant) {
+        let here = self.folder.check().or_else(|_| self.folder.regain());
+        let found = here.and_then(|()| self.reconciler.scan(now).map_err(|error| self.unreadable(&error)));
+        let mut away = context.away.lock().unwrap_or_else(PoisonError::into_inner);
         match found {
             Ok(gone) => {
+                away.remove(&self.folder.name);
                 if std::mem::take(&mut self.unavailable) {
                     tracing::info!(folder = %self.folder.root.display(), "The folder is back.");
                 }
                 self.gone.extend(gone);
+                self.watch(context);
             }
             Err(error) => {
+                self.watched = None;
                 if !std::mem::replace(&mut self.unavailable, true) {
                     tracing::error!(folder = %self.folder.root.display(), error, "The folder cannot be served; the others go on.");
                 }
+                away.insert(self.folder.name.clone(), error);
             }
         }
+    }
+
+    fn unreadable(&self, error: &io::Error) -> String {
+        format!("{}: cannot be read: {error}", self.folder.inbox().display())
     }
 
     /// Sums up the orders that are done, and of which nothing changed for `rest`.
@@ -350,11 +375,12 @@ impl Kept {
     /// Scans and looks, as far as either is due.
     fn turn(&mut self, context: &Context, now: Instant) -> Result<(), StoreError> {
         let since = self.scanned.map(|then| now.duration_since(then));
-        let due = since.is_none_or(|since| since >= self.rescan || (self.dirty && since >= self.scan_at_most_every()));
+        let rescan = if self.unavailable { self.rescan.min(LOOK_FOR) } else { self.rescan };
+        let due = since.is_none_or(|since| since >= rescan || (self.dirty && since >= self.scan_at_most_every()));
         if due {
             self.scanned = Some(now);
             self.dirty = false;
-            self.scan(now);
+            self.scan(context, now);
             self.scan_takes = now.elapsed();
             if !self.renamed.is_empty() {
                 // Known now, so that it can count; and to be looked at at once.
@@ -421,32 +447,4 @@ fn control(context: &Context, id: JobId, wish: Control) -> Result<(), StoreError
         // An operator was faster.
         _ => Ok(()),
     }
-}
-
-/// Passes on that something happened, and which names were renamed into place.
-fn watcher(inbox: &Path, events: Sender<Event>) -> notify::Result<Watching> {
-    let mut watcher = notify::recommended_watcher(move |event: notify::Result<notify::Event>| {
-        let hint = match event {
-            Ok(event) if matches!(event.kind, EventKind::Access(_)) => return,
-            Ok(event) => match event.kind {
-                EventKind::Modify(ModifyKind::Name(RenameMode::To)) => Event::Hint { renamed: event.paths },
-                EventKind::Modify(ModifyKind::Name(RenameMode::Both)) => {
-                    Event::Hint { renamed: event.paths.into_iter().skip(1).collect() }
-                }
-                _ => Event::Hint { renamed: Vec::new() },
-            },
-            // Lost events and the like: look for oneself.
-            Err(_) => Event::Hint { renamed: Vec::new() },
-        };
-        // The daemon is ending.
-        let _ = events.send(hint);
-    })?;
-    // notify 8.2 says nothing where its thread cannot start, and panics at the next word, and again when it is dropped: it is asked
-    // something harmless first, and never dropped (the process ends with it).
-    let watching = catch_unwind(AssertUnwindSafe(|| {
-        watcher.configure(notify::Config::default())?;
-        watcher.watch(inbox, RecursiveMode::Recursive)
-    }));
-    let watcher = ManuallyDrop::new(watcher);
-    watching.unwrap_or_else(|_| Err(notify::Error::generic("its thread could not start"))).map(|()| watcher)
 }

@@ -16,6 +16,8 @@ mod draft;
 mod exit;
 mod folder;
 mod fsx;
+mod ground;
+mod hints;
 mod item;
 mod jobs;
 mod keeper;

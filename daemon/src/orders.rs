@@ -180,7 +180,7 @@ mod tests {
 
     fn orders_at(root: &Path) -> Orders {
         let (name, profile) = ("hot".into(), "default".into());
-        let folder = Folder::open(&FolderConfig { name, path: root.into(), profile, leave_originals: false }).unwrap();
+        let folder = Folder::open(&FolderConfig { name, path: root.into(), profile, leave_originals: false }, None).unwrap();
         Orders::new(Arc::new(folder), Arc::new(Settings::fixed(Config::for_folder(root))))
     }
 

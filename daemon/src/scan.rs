@@ -296,12 +296,10 @@ mod tests {
 
     fn reconciler(root: &Path) -> Reconciler {
         let settings = Settings::fixed(Config::for_folder(root));
-        let folder = Folder::open(&FolderConfig {
-            name: "hot".into(),
-            path: root.into(),
-            profile: "default".into(),
-            leave_originals: false,
-        })
+        let folder = Folder::open(
+            &FolderConfig { name: "hot".into(), path: root.into(), profile: "default".into(), leave_originals: false },
+            None,
+        )
         .unwrap();
         Reconciler::new(Arc::new(folder), Arc::new(settings), Rest { settle: Duration::from_secs(1) })
     }

@@ -17,12 +17,13 @@ use suture_store::{Clock, JobStore, Query, SledStore, StoreError, SystemClock, c
 use crate::again::Lives;
 use crate::attempt::{Context, IN_HAND, Slot, WITNESS, remove_work};
 use crate::cli::WatchArgs;
-use crate::config::{Config, default_state};
+use crate::config::{Config, default_state, real};
 use crate::control::Door;
 use crate::create;
 use crate::exit::Exit;
 use crate::folder::{Folder, FolderError, is_fading};
 use crate::fsx;
+use crate::ground::{note_traces, read_traces};
 use crate::keeper::Keeper;
 use crate::retention::sweep::Sweeper;
 use crate::retention::turns::Moment;
@@ -31,6 +32,9 @@ use crate::schedule::{Hold, Schedule, Turn};
 use crate::settings::Settings;
 use crate::signals::{Hangup, Stop};
 use crate::{standstill, watchdog};
+
+/// How often what is gone is looked for.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// Runs the daemon to its end.
 pub(crate) fn run(args: &WatchArgs) -> Exit {
@@ -55,9 +59,9 @@ pub(crate) fn run(args: &WatchArgs) -> Exit {
 /// was started with.
 pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew: bool) -> Exit {
     let config = settings.now();
-    let mut folders = Vec::new();
+    let (mut folders, known) = (Vec::new(), read_traces(&config.state));
     for folder in &config.folders {
-        match Folder::open(folder) {
+        match Folder::open(folder, known.get(&folder.name)) {
             Ok(folder) => folders.push(Arc::new(folder)),
             Err(error) => {
                 complain(&error);
@@ -83,6 +87,7 @@ pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew:
         }
     };
     note_state(&config, &folders);
+    note_folders(&config, &folders);
     let settings = Arc::new(settings);
     let daemon = Daemon { settings, folders, store, once, lives, not_good, stop: stop.clone(), may_begin_anew };
     daemon.run()
@@ -115,7 +120,7 @@ fn store_failed(error: &StoreError) -> Exit {
 
 /// Tells `suture jobs` where the store is, if it is not where it would look.
 fn note_state(config: &Config, folders: &[Arc<Folder>]) {
-    for folder in folders {
+    for folder in folders.iter().filter(|folder| folder.check().is_ok()) {
         let note = folder.root.join(".suture").join("state-path");
         let state = std::path::absolute(&config.state).unwrap_or_else(|_| config.state.clone());
         let result = if state == default_state(&folder.root) {
@@ -126,6 +131,14 @@ fn note_state(config: &Config, folders: &[Arc<Folder>]) {
         if let Err(error) = result {
             tracing::warn!(%error, file = %note.display(), "The place of the job store could not be noted.");
         }
+    }
+}
+
+/// Notes what tells the folders again, so that the next daemon knows one whose mount is gone.
+fn note_folders(config: &Config, folders: &[Arc<Folder>]) {
+    let traces = folders.iter().map(|folder| (folder.name.clone(), folder.trace())).collect();
+    if let Err(error) = note_traces(&config.state, &traces) {
+        tracing::warn!(%error, "What tells the folders again could not be noted.");
     }
 }
 
@@ -158,11 +171,25 @@ impl Daemon {
             End::Rest => Exit::Good,
             End::Store(error) => {
                 tracing::error!(%error, "The job store failed.");
+                self.wait_for_mount();
                 if self.may_begin_anew {
                     lives.begin_another(born.elapsed(), self.not_good.load(Ordering::Relaxed), &|| self.stop.asked());
                 }
                 store_failed(&error)
             }
+        }
+    }
+
+    /// If the store went with the mount that its folder lay on, a new life would find an empty folder, and take it.
+    fn wait_for_mount(&self) {
+        let state = real(&self.settings.now().state);
+        let folder = self.folders.iter().find(|folder| state.starts_with(real(&folder.root)));
+        let mut told = false;
+        while let Some(reason) = folder.and_then(|folder| folder.missing()).filter(|_| !self.once && !self.stop.asked()) {
+            if !std::mem::replace(&mut told, true) {
+                tracing::error!(reason, "The mount of the job store is gone; waiting for it.");
+            }
+            std::thread::sleep(LOOK_EVERY);
         }
     }
 
@@ -173,10 +200,11 @@ impl Daemon {
             folders: self.folders.clone(),
             settings: Arc::clone(&self.settings),
             schedule: Schedule::new(),
-            events: events.clone(),
+            events,
             once: self.once,
             halt: AtomicBool::new(false),
             not_good: Arc::clone(&self.not_good),
+            away: Mutex::default(),
             failed: Mutex::new(None),
         };
         if standstill::is_set(&self.settings.now().state) {
@@ -186,7 +214,7 @@ impl Daemon {
         if let Err(error) = guarded(|| recover(&context)) {
             return End::Store(error);
         }
-        let mut keeper = Keeper::new(&context, events, inbox, &self.stop);
+        let mut keeper = Keeper::new(&context, inbox, &self.stop);
         let ended = AtomicBool::new(false);
         std::thread::scope(|scope| {
             let threads = self.start(scope, &context, &ended);
@@ -220,19 +248,14 @@ impl Daemon {
         let thread = |name: &str| Builder::new().name(name.into());
         let failed = |source| StoreError::Io { path: "thread".into(), action: "starting one", source };
         for folder in &self.folders {
-            match Door::open(&folder.root) {
-                Ok(door) => {
-                    let serve = move || {
-                        let served = guarded(|| {
-                            door.serve(context, &|| ended.load(Ordering::Relaxed));
-                            Ok(())
-                        });
-                        served.unwrap_or_else(|error| context.fail(error));
-                    };
-                    thread("door").spawn_scoped(scope, serve).map(drop).map_err(failed)?;
-                }
-                Err(error) => tracing::warn!(%error, "`suture jobs` cannot reach this daemon."),
-            }
+            let serve = move || {
+                let served = guarded(|| {
+                    answer_at(folder, context, &|| ended.load(Ordering::Relaxed));
+                    Ok(())
+                });
+                served.unwrap_or_else(|error| context.fail(error));
+            };
+            thread("door").spawn_scoped(scope, serve).map(drop).map_err(failed)?;
         }
         let sweep = move || {
             let clock = || Moment { steady: Instant::now(), wall: SystemClock.now() };
@@ -272,6 +295,22 @@ impl Daemon {
             }
             std::thread::sleep(Duration::from_millis(10));
         }
+    }
+}
+
+/// Answers `suture jobs` at one folder, until `ended`. A folder that was away gets a new door.
+fn answer_at(folder: &Folder, context: &Context, ended: &dyn Fn() -> bool) {
+    let mut told = false;
+    while !ended() {
+        let door = folder.check().ok().map(|()| Door::open(&folder.root));
+        match door {
+            Some(Ok(door)) => door.serve(context, &|| ended() || (door.is_lost() && folder.check().is_ok())),
+            Some(Err(error)) if !std::mem::replace(&mut told, true) => {
+                tracing::warn!(%error, "`suture jobs` cannot reach this daemon.");
+            }
+            _ => {}
+        }
+        std::thread::sleep(LOOK_EVERY);
     }
 }
 

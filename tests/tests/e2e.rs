@@ -2,6 +2,7 @@
 
 #[cfg(test)]
 mod e2e {
+    mod away;
     mod cases;
     mod config;
     mod files;

@@ -244,7 +244,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let config =
             FolderConfig { name: "hot".into(), path: dir.path().into(), profile: "default".into(), leave_originals: false };
-        let folder = Folder::open(&config).unwrap();
+        let folder = Folder::open(&config, None).unwrap();
         let mine = dir.path().join("out/order").join(SUMMARY);
         std::fs::create_dir_all(fsx::folder_of(&mine)).unwrap();
         std::fs::write(&mine, b"{\"mine\": true}").unwrap();

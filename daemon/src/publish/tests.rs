@@ -29,7 +29,7 @@ impl Scene {
         let dir = tempfile::tempdir().unwrap();
         let config =
             FolderConfig { name: "hot".into(), path: dir.path().into(), profile: "default".into(), leave_originals: false };
-        let folder = Folder::open(&config).unwrap();
+        let folder = Folder::open(&config, None).unwrap();
         let path = folder.inbox().join("part.stl");
         create::write_new(&path, ORIGINAL).unwrap();
         let found = Identity::of(&path).unwrap();

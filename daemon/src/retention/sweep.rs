@@ -225,7 +225,7 @@ mod tests {
         fn new() -> Self {
             let dir = tempfile::tempdir().unwrap();
             let (name, path, profile) = ("hot".into(), dir.path().join("hot"), "default".into());
-            let folder = Folder::open(&FolderConfig { name, path, profile, leave_originals: false }).unwrap();
+            let folder = Folder::open(&FolderConfig { name, path, profile, leave_originals: false }, None).unwrap();
             let scene = Self { dir, folders: vec![Arc::new(folder)], store: MemoryStore::new(Arc::new(SystemClock)) };
             let hash = blake3::hash(b"result").to_hex();
             let receipt = format!(

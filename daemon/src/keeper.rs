@@ -8,7 +8,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
-use crossbeam::channel::{Receiver, RecvTimeoutError, Sender};
+use crossbeam::channel::{Receiver, RecvTimeoutError};
 use suture_store::job::{Area, Kind};
 use suture_store::{Clock, Control, JobId, Query, StoreError, SystemClock, crash_point};
 
@@ -47,7 +47,12 @@ pub(crate) struct Keeper<'a> {
     stop: &'a Stop,
     folders: Vec<Kept>,
     disk_looked: Option<Instant>,
+    /// It was within the hours of work at the last look.
+    is_open: bool,
 }
+
+/// Has the daemon be ready for so many workers.
+pub(crate) type Raise<'a> = &'a dyn Fn(usize) -> Result<(), StoreError>;
 
 /// A folder under the keeper's eyes.
 struct Kept {
@@ -99,14 +104,16 @@ impl<'a> Keeper<'a> {
             }
             folders.push(kept);
         }
-        Self { context, inbox, stop, folders, disk_looked: None }
+        Self { context, inbox, stop, folders, disk_looked: None, is_open: true }
     }
 
     /// Keeps the folders until there is a reason to end.
     ///
     /// # Errors
     /// When the store failed.
-    pub(crate) fn keep(&mut self) -> Result<(), StoreError> {
+    pub(crate) fn keep(&mut self, raise: Raise) -> Result<(), StoreError> {
+        self.look_at_clock();
+        raise(self.context.settings.now().workers)?;
         self.remember_live()?;
         self.remember_orders()?;
         self.forget_noticed()?;
@@ -123,6 +130,7 @@ impl<'a> Keeper<'a> {
             }
             if let Some(reload) = self.context.settings.renew() {
                 self.go_by(reload)?;
+                raise(self.context.settings.now().workers)?;
             }
             let now = Instant::now();
             self.look_at_disk(now)?;
@@ -270,13 +278,14 @@ impl<'a> Keeper<'a> {
         Ok(())
     }
 
-    /// Outside of the hours of work, few slots work, or none.
-    fn look_at_clock(&self) {
+    /// As many slots work as there are to be workers; outside of the hours of work few, or none.
+    fn look_at_clock(&mut self) {
         let config = self.context.settings.now();
         let is_open = config.run_window.is_open();
-        if self.context.schedule.limit(if is_open { usize::MAX } else { config.workers_outside }) {
-            let (run_window, workers) =
-                (config.run_window.to_string(), if is_open { config.workers } else { config.workers_outside });
+        let workers = if is_open { config.workers } else { config.workers_outside };
+        self.context.schedule.limit(workers);
+        if std::mem::replace(&mut self.is_open, is_open) != is_open {
+            let run_window = config.run_window.to_string();
             tracing::info!(run_window, workers, "The hours of work begin or end; jobs in work are finished.");
         }
     }

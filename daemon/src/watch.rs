@@ -6,7 +6,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, ScopedJoinHandle};
 use std::time::{Duration, Instant};
 
@@ -217,11 +217,12 @@ impl Daemon {
         let mut keeper = Keeper::new(&context, inbox, &self.stop);
         let ended = AtomicBool::new(false);
         std::thread::scope(|scope| {
+            let slots = Slots { scope, context: &context, threads: Mutex::default() };
             let threads = self.start(scope, &context, &ended);
-            let kept = threads.and_then(|slots| guarded(|| keeper.keep()).map(|()| slots));
+            let kept = threads.and_then(|()| guarded(|| keeper.keep(&|workers| slots.raise(workers))));
             context.schedule.stop();
             match kept {
-                Ok(slots) => {
+                Ok(()) => {
                     self.drain(&context, &slots);
                     self.sweep_once(&context);
                 }
@@ -238,15 +239,13 @@ impl Daemon {
 }
 
 impl Daemon {
-    /// Starts the threads that work on jobs, and one a folder that answers `suture jobs`.
+    /// Starts the thread that lets go what is to go, and one a folder that answers `suture jobs`.
     fn start<'s>(
         &'s self,
         scope: &'s std::thread::Scope<'s, '_>,
         context: &'s Context,
         ended: &'s AtomicBool,
-    ) -> Result<Vec<ScopedJoinHandle<'s, ()>>, StoreError> {
-        let thread = |name: &str| Builder::new().name(name.into());
-        let failed = |source| StoreError::Io { path: "thread".into(), action: "starting one", source };
+    ) -> Result<(), StoreError> {
         for folder in &self.folders {
             let serve = move || {
                 let served = guarded(|| {
@@ -255,7 +254,7 @@ impl Daemon {
                 });
                 served.unwrap_or_else(|error| context.fail(error));
             };
-            thread("door").spawn_scoped(scope, serve).map(drop).map_err(failed)?;
+            thread("door").spawn_scoped(scope, serve).map(drop).map_err(no_thread)?;
         }
         let sweep = move || {
             let clock = || Moment { steady: Instant::now(), wall: SystemClock.now() };
@@ -263,17 +262,9 @@ impl Daemon {
             swept.unwrap_or_else(|error| context.fail(error));
         };
         if !self.once {
-            thread("sweeper").spawn_scoped(scope, sweep).map(drop).map_err(failed)?;
+            thread("sweeper").spawn_scoped(scope, sweep).map(drop).map_err(no_thread)?;
         }
-        let slot = || {
-            let worked = guarded(|| {
-                Slot::new(context).run();
-                Ok(())
-            });
-            // The job in work is taken up by the next life.
-            worked.unwrap_or_else(|error| context.fail(error));
-        };
-        (0..self.settings.now().workers).map(|_| thread("slot").spawn_scoped(scope, slot).map_err(failed)).collect()
+        Ok(())
     }
 
     /// With `--once`, what is to go goes at the end, if all came to it.
@@ -286,15 +277,58 @@ impl Daemon {
     }
 
     /// Lets running jobs finish, for as long as they are given.
-    fn drain(&self, context: &Context, slots: &[ScopedJoinHandle<()>]) {
+    fn drain(&self, context: &Context, slots: &Slots) {
         let deadline = Instant::now().checked_add(self.settings.now().drain);
-        while slots.iter().any(|slot| !slot.is_finished()) {
+        while slots.are_at_work() {
             let is_over = deadline.is_some_and(|deadline| Instant::now() >= deadline);
             if is_over && !context.halt.swap(true, Ordering::Relaxed) {
                 tracing::warn!("The time to finish running jobs is over; they go back into the queue.");
             }
             std::thread::sleep(Duration::from_millis(10));
         }
+    }
+}
+
+fn thread(name: &str) -> Builder {
+    Builder::new().name(name.into())
+}
+
+fn no_thread(source: std::io::Error) -> StoreError {
+    StoreError::Io { path: "thread".into(), action: "starting one", source }
+}
+
+/// The threads that work on jobs.
+struct Slots<'s, 'e> {
+    scope: &'s std::thread::Scope<'s, 'e>,
+    context: &'s Context,
+    threads: Mutex<Vec<ScopedJoinHandle<'s, ()>>>,
+}
+
+impl<'s> Slots<'s, '_> {
+    fn threads(&self) -> MutexGuard<'_, Vec<ScopedJoinHandle<'s, ()>>> {
+        self.threads.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Sees to it that there are so many. Those that are there stay: the schedule lets no more work than may.
+    fn raise(&self, workers: usize) -> Result<(), StoreError> {
+        let context = self.context;
+        let mut threads = self.threads();
+        while threads.len() < workers {
+            let slot = move || {
+                let worked = guarded(|| {
+                    Slot::new(context).run();
+                    Ok(())
+                });
+                // The job in work is taken up by the next life.
+                worked.unwrap_or_else(|error| context.fail(error));
+            };
+            threads.push(thread("slot").spawn_scoped(self.scope, slot).map_err(no_thread)?);
+        }
+        Ok(())
+    }
+
+    fn are_at_work(&self) -> bool {
+        self.threads().iter().any(|slot| !slot.is_finished())
     }
 }
 

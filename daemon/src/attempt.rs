@@ -58,8 +58,8 @@ pub(crate) struct Context {
     pub halt: AtomicBool,
     /// A job ended not good, or could not be ended.
     pub not_good: Arc<AtomicBool>,
-    /// Folders that are out of reach, and why.
-    pub away: Mutex<BTreeMap<String, String>>,
+    /// By hot folder: what of it is out of reach, and why.
+    pub away: Mutex<BTreeMap<String, Vec<String>>>,
     /// The store failed; every thread ends.
     pub failed: Mutex<Option<StoreError>>,
 }

@@ -23,8 +23,19 @@ const VERSION: &str = if cfg!(feature = "crash-points") {
 #[derive(Debug, Parser)]
 #[command(name = "suture", version = VERSION, max_term_width = 100, disable_help_subcommand = true)]
 pub(crate) struct Cli {
+    /// How log lines on standard error look; auto: text on a terminal, JSON otherwise
+    #[arg(long, value_name = "FORMAT", value_enum, default_value = "auto", global = true, hide_default_value = true)]
+    pub log_format: LogFormat,
     #[command(subcommand)]
     pub command: Command,
+}
+
+/// How log lines look.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LogFormat {
+    Auto,
+    Text,
+    Json,
 }
 
 #[derive(Debug, Subcommand)]

@@ -88,7 +88,7 @@ fn steer(context: &Context, wish: &Wish) -> Answer {
             tracing::info!(paused, "An operator's wish.");
         }
     }
-    let away = context.away.lock().unwrap_or_else(PoisonError::into_inner).values().cloned().collect();
+    let away = context.away.lock().unwrap_or_else(PoisonError::into_inner).values().flatten().cloned().collect();
     Answer::Standing(Standing { away, ..context.schedule.standing() })
 }
 

@@ -191,6 +191,16 @@ pub(crate) enum NameKind {
     Foreign,
 }
 
+/// Is that the name of a file that someone surely meant to have repaired: a mesh, whatever its format, or an archive of some?
+pub(crate) fn is_meant(name: &OsStr) -> bool {
+    const FORMATS: [&str; 18] = [
+        "stl", "3mf", "obj", "ply", "off", "amf", "zip", "gz", "7z", "step", "stp", "iges", "igs", "gltf", "glb", "dae", "fbx",
+        "x3d",
+    ];
+    let lower = name.to_string_lossy().to_ascii_lowercase();
+    lower.rsplit_once('.').is_some_and(|(_, extension)| FORMATS.contains(&extension))
+}
+
 /// Tells names apart. Temporary names are those of browsers, copy programs, editors, office programs and file servers.
 pub(crate) fn name_kind(name: &OsStr) -> NameKind {
     let lossy = name.to_string_lossy();
@@ -231,6 +241,13 @@ mod tests {
         }
         for foreign in ["part.obj", "notes.txt", "stl"] {
             assert_eq!(name_kind(OsStr::new(foreign)), NameKind::Foreign, "{foreign}");
+        }
+    }
+
+    #[test]
+    fn meshes_of_other_formats_are_meant_notes_are_not() {
+        for (name, meant) in [("a.3mf", true), ("A.OBJ", true), ("link.stl", true), ("notes.txt", false), ("obj", false)] {
+            assert_eq!(is_meant(OsStr::new(name)), meant, "{name}");
         }
     }
 

@@ -10,10 +10,10 @@ use std::time::{Duration, Instant, SystemTime};
 
 use crossbeam::channel::{Receiver, RecvTimeoutError};
 use suture_store::job::{Area, Kind};
-use suture_store::{Clock, Control, JobId, Query, StoreError, SystemClock, crash_point};
+use suture_store::{Clock, Control, Job, JobId, Query, StoreError, SystemClock, crash_point};
 
 use crate::attempt::{Context, Event};
-use crate::folder::Folder;
+use crate::folder::{Folder, is_meant};
 use crate::fsx;
 use crate::hints::{Watching, watcher};
 use crate::orders::Orders;
@@ -196,7 +196,21 @@ impl<'a> Keeper<'a> {
             );
             self.context.not_good.store(true, Ordering::Relaxed);
         }
+        self.tell_of_foreign()?;
         Ok(true)
+    }
+
+    /// With `--once`: files that someone meant to have repaired, and that are left where they are, are not good.
+    fn tell_of_foreign(&self) -> Result<(), StoreError> {
+        let noticed = self.context.store.list(&Query { kinds: vec![Kind::Noticed], ..Query::default() })?;
+        let meant = |job: &&Job| job.source.path.to_path().file_name().is_some_and(is_meant);
+        let left_out = self.folders.iter().map(|kept| kept.reconciler.left_out().len()).sum::<usize>();
+        let files = noticed.iter().filter(meant).count() + left_out;
+        if files > 0 {
+            tracing::warn!(files, "Files are left where they are; `suture jobs list --state noticed` says why.");
+            self.context.not_good.store(true, Ordering::Relaxed);
+        }
+        Ok(())
     }
 
     /// Is a parked job tried once more, with `--once`? What an earlier run left was tried often; but the world may be another one now.
@@ -354,7 +368,7 @@ impl Kept {
         let mut away = context.away.lock().unwrap_or_else(PoisonError::into_inner);
         match found {
             Ok(gone) => {
-                away.remove(&self.folder.name);
+                away.insert(self.folder.name.clone(), self.reconciler.left_out());
                 if std::mem::take(&mut self.unavailable) {
                     tracing::info!(folder = %self.folder.root.display(), "The folder is back.");
                 }
@@ -366,7 +380,7 @@ impl Kept {
                 if !std::mem::replace(&mut self.unavailable, true) {
                     tracing::error!(folder = %self.folder.root.display(), error, "The folder cannot be served; the others go on.");
                 }
-                away.insert(self.folder.name.clone(), error);
+                away.insert(self.folder.name.clone(), vec![error]);
             }
         }
     }
@@ -415,7 +429,7 @@ impl Kept {
                 crash_point("daemon.submitted");
                 for ((path, submission), answer) in paths.iter().zip(&found).zip(submitted) {
                     if let (Some(what), true) = (&submission.foreign, answer.new) {
-                        tracing::info!(job = answer.id.0, file = %submission.source.path, what, "Left where it is.");
+                        tracing::warn!(job = answer.id.0, file = %submission.source.path, what, "Left where it is.");
                     }
                     self.orders.came(&submission.source.path, answer.id, now);
                     self.reconciler.submitted(path, submission, answer.id);

@@ -31,6 +31,7 @@ mod protocol;
 mod publish;
 mod publish_error;
 mod receipt;
+mod remove;
 mod retention;
 mod rights;
 mod say;
@@ -41,6 +42,7 @@ mod settle;
 mod signals;
 mod single;
 mod standstill;
+mod superseded;
 mod supervise;
 mod table;
 mod units;
@@ -59,12 +61,13 @@ use exit::Exit;
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    logging::start(match cli.command {
+    let level = match cli.command {
         Command::Watch(_) => "info",
         // It shows results, good or bad, by itself.
         Command::Demo => "error",
         _ => "warn",
-    });
+    };
+    logging::start(level, cli.log_format);
     let exit = match &cli.command {
         Command::Repair(args) => single::repair(args),
         Command::Inspect(args) => single::inspect(args),

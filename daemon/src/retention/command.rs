@@ -9,12 +9,12 @@ use suture_store::{Clock, Job, SystemClock, Time};
 use super::archive::Archive;
 use super::history::past_of;
 use super::plan::{Going, What, going};
-use super::remove::ours;
 use super::stock::Stock;
 use crate::config::keep::Keep;
 use crate::config::{Config, FolderConfig, read};
 use crate::exit::Exit;
 use crate::fsx;
+use crate::remove::ours;
 use crate::say::{complain, plain};
 use crate::units::show_size;
 

@@ -5,8 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
-use suture_store::{Hash, RelPath, Time};
+use suture_store::{RelPath, Time};
 
 use super::archive::is_aside;
 use super::plan::{Piece, What};
@@ -15,12 +14,10 @@ use crate::folder::{NameKind, is_hot, name_kind};
 use crate::fsx::{self, Identity};
 use crate::names::{best_of, with_suffix};
 use crate::orders::summary;
-use crate::receipt::{RECEIPT, REPORT};
+use crate::receipt::{self, RECEIPT, REPORT, Told};
 
 /// Sub-folders are searched to this depth.
 const DEPTH: usize = 64;
-/// No receipt is as long.
-const LONGEST_RECEIPT: u64 = 64 << 10;
 /// Result and receipt are put in their places one after the other. A best attempt that was renamed, linked or given away later than this
 /// may be someone's by now: it may even have been dropped again.
 const TOGETHER_NS: i64 = 60_000_000_000;
@@ -29,15 +26,6 @@ const TOGETHER_NS: i64 = 60_000_000_000;
 const OUT: &str = "out";
 const DONE: &str = "done";
 const MIXED: [&str; 2] = ["failed", "quarantine"];
-
-/// The part of a receipt that is needed here.
-#[derive(Deserialize)]
-struct Receipt {
-    receipt_version: u32,
-    output: Option<RelPath>,
-    output_blake3: Option<Hash>,
-    report_blake3: Option<Hash>,
-}
 
 /// The files of a hot folder that may go.
 #[derive(Debug, Default)]
@@ -118,19 +106,15 @@ impl Area {
     }
 
     /// Names that receipts stand beside, and what these say. One that cannot be read, or is of another version, says nothing.
-    fn receipts(&self) -> impl Iterator<Item = (PathBuf, Receipt)> {
-        self.files.iter().filter_map(|(path, found)| {
+    fn receipts(&self) -> impl Iterator<Item = (PathBuf, Told)> {
+        self.files.keys().filter_map(|path| {
             let base = path.to_str()?.strip_suffix(RECEIPT)?;
-            if found.size > LONGEST_RECEIPT {
-                return None;
-            }
-            let receipt: Receipt = serde_json::from_slice(&std::fs::read(self.root.join(path)).ok()?).ok()?;
-            (receipt.receipt_version == 1).then(|| (PathBuf::from(base), receipt))
+            Some((PathBuf::from(base), receipt::read(&self.root.join(path))?))
         })
     }
 
     /// The files that a receipt beside `base` speaks of: its result, its report, and itself once the result is gone.
-    fn told_by(&self, base: &Path, receipt: &Receipt, pieces: &mut Vec<Piece>) {
+    fn told_by(&self, base: &Path, receipt: &Told, pieces: &mut Vec<Piece>) {
         let beside = with_suffix(base, RECEIPT);
         let Some(own) = self.files.get(&beside) else { return };
         let since = time(own.mtime_ns);

@@ -11,12 +11,12 @@ use suture_store::{Job, JobStore, Query, StoreError, Time};
 use super::archive::{Archive, Stays, give_back};
 use super::history::past;
 use super::plan::{Going, What, going};
-use super::remove::remove;
 use super::stock::Stock;
 use super::turns::{Moment, Turns};
 use crate::config::keep::Keep;
 use crate::folder::Folder;
 use crate::fsx::{self, Identity};
+use crate::remove::remove;
 use crate::settings::Settings;
 
 /// How often a sweeper looks whether it is its turn, or is to end.
@@ -181,7 +181,7 @@ fn let_go(
     archive: Option<&Result<Archive, String>>,
 ) -> Result<Option<PathBuf>, Stays> {
     if going.piece.what != What::Original {
-        return remove(path, going.piece.hash).map(|()| None);
+        return remove(path, going.piece.hash).map(|()| None).map_err(Stays::This);
     }
     match archive {
         Some(Ok(archive)) => archive.take(path, &Path::new(&folder.name).join(&going.piece.path)).map(Some),

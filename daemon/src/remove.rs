@@ -5,7 +5,6 @@ use std::path::Path;
 
 use suture_store::Hash;
 
-use super::archive::Stays;
 use crate::claim::Original;
 use crate::fsx::Identity;
 
@@ -26,14 +25,14 @@ pub(crate) fn ours(path: &Path, hash: Option<Hash>) -> io::Result<Option<Identit
 /// Removes it.
 ///
 /// # Errors
-/// When it stays, and why.
-pub(crate) fn remove(path: &Path, hash: Option<Hash>) -> Result<(), Stays> {
-    let failed = |error: io::Error| Stays::This(error.to_string());
+/// When it stays, and why, in words.
+pub(crate) fn remove(path: &Path, hash: Option<Hash>) -> Result<(), String> {
+    let failed = |error: io::Error| error.to_string();
     let Some(identity) = ours(path, hash).map_err(failed)? else {
-        return Err(Stays::This("someone has changed it since".into()));
+        return Err("someone has changed it since".into());
     };
     if Identity::of(path).map_err(failed)? != identity {
-        return Err(Stays::This("another file has taken its name".into()));
+        return Err("another file has taken its name".into());
     }
     std::fs::remove_file(path).map_err(failed)
 }
@@ -48,7 +47,7 @@ mod tests {
         let path = dir.path().join("a.stl");
         let hash = Some(Hash(*blake3::hash(b"ours").as_bytes()));
         std::fs::write(&path, b"ours, and more").unwrap();
-        assert!(matches!(remove(&path, hash), Err(Stays::This(why)) if why.contains("changed")));
+        assert!(matches!(remove(&path, hash), Err(why) if why.contains("changed")));
         std::fs::rename(&path, dir.path().join("b")).unwrap();
         std::os::unix::fs::symlink("b", &path).unwrap();
         assert!(remove(&path, hash).is_err(), "a link is not followed");

@@ -36,6 +36,9 @@ use crate::{standstill, watchdog};
 /// How often what is gone is looked for.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
+/// Bytes that must be free for the store to be opened again.
+const ROOM: u64 = 256 << 10;
+
 /// Runs the daemon to its end.
 pub(crate) fn run(args: &WatchArgs) -> Exit {
     // First of all: where no one listens, a signal ends the process.
@@ -171,7 +174,7 @@ impl Daemon {
             End::Rest => Exit::Good,
             End::Store(error) => {
                 tracing::error!(%error, "The job store failed.");
-                self.wait_for_mount();
+                self.wait_for_store();
                 if self.may_begin_anew {
                     lives.begin_another(born.elapsed(), self.not_good.load(Ordering::Relaxed), &|| self.stop.asked());
                 }
@@ -180,14 +183,17 @@ impl Daemon {
         }
     }
 
-    /// If the store went with the mount that its folder lay on, a new life would find an empty folder, and take it.
-    fn wait_for_mount(&self) {
+    /// Waits until there is room for the store, and the mount that its folder lies on: a new life could do nothing on a full disk, and would
+    /// take the bare folder under a mount for an empty one.
+    fn wait_for_store(&self) {
         let state = real(&self.settings.now().state);
         let folder = self.folders.iter().find(|folder| state.starts_with(real(&folder.root)));
+        let full = || (fsx::free_space(&state, 0) < ROOM).then(|| format!("the disk of {} is full", state.display()));
+        let why = || folder.and_then(|folder| folder.missing()).or_else(full);
         let mut told = false;
-        while let Some(reason) = folder.and_then(|folder| folder.missing()).filter(|_| !self.once && !self.stop.asked()) {
+        while let Some(reason) = why().filter(|_| !self.once && !self.stop.asked()) {
             if !std::mem::replace(&mut told, true) {
-                tracing::error!(reason, "The mount of the job store is gone; waiting for it.");
+                tracing::error!(reason, "The job store waits; nothing is done until it can be opened again.");
             }
             std::thread::sleep(LOOK_EVERY);
         }

@@ -22,6 +22,9 @@ use crate::settings::Settings;
 /// How often a sweeper looks whether it is its turn, or is to end.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
+/// How often ended jobs are counted between sweeps.
+const COUNT_EVERY: Duration = Duration::from_secs(60);
+
 /// Lets go what is to go of some hot folders and their store.
 pub(crate) struct Sweeper<'a> {
     store: &'a dyn JobStore,
@@ -53,15 +56,35 @@ impl<'a> Sweeper<'a> {
     /// # Errors
     /// Store errors only.
     pub(crate) fn tend(&mut self, clock: &dyn Fn() -> Moment, ended: &dyn Fn() -> bool) -> Result<(), StoreError> {
-        let mut turns = Turns::new(clock());
+        let (mut turns, mut counted) = (Turns::new(clock()), clock().steady);
         while !ended() {
             std::thread::sleep(LOOK_EVERY);
             let now = clock();
             if turns.is_due(now) {
                 self.sweep(now.wall, ended)?;
+            } else if now.steady.duration_since(counted) >= COUNT_EVERY {
+                counted = now.steady;
+                self.count(now.wall)?;
             }
         }
         Ok(())
+    }
+
+    /// Keeps the store bounded between two sweeps, however many jobs end: by their number, which no clock tells.
+    fn count(&self, now: Time) -> Result<u64, StoreError> {
+        let keep = Keep { history: None, ..self.settings.now().keep.clone() };
+        let ended: u64 = self.store.counts()?.iter().filter(|(kind, _)| kind.is_at_rest()).map(|(_, count)| count).sum();
+        if ended > keep.history_jobs.saturating_add(keep.history_jobs / 10) { self.forget(&keep, now) } else { Ok(0) }
+    }
+
+    fn forget(&self, keep: &Keep, now: Time) -> Result<u64, StoreError> {
+        let mut forgotten = 0;
+        for past in past(self.store, keep, now, &|job| self.is_needed(job))? {
+            let jobs = self.store.forget(&past.ids)?;
+            tracing::info!(jobs, reason = past.why, "Old jobs are forgotten; their files stay as they are.");
+            forgotten += jobs;
+        }
+        Ok(forgotten)
     }
 
     /// One sweep of everything, until `stop`.
@@ -81,11 +104,7 @@ impl<'a> Sweeper<'a> {
             }
         }
         if !stop() {
-            for past in past(self.store, &keep, now, &|job| self.is_needed(job))? {
-                let jobs = self.store.forget(&past.ids)?;
-                tracing::info!(jobs, reason = past.why, "Old jobs are forgotten; their files stay as they are.");
-                swept.forgotten += jobs;
-            }
+            swept.forgotten = self.forget(&keep, now)?;
         }
         Ok(swept)
     }
@@ -315,6 +334,23 @@ mod tests {
         std::fs::write(scene.at("hot/out/a.stl"), b"result").unwrap();
         assert_eq!(scene.sweeps(&scene.everything(), &[99]), [swept(0, 0)]);
         assert!(scene.is_there("hot/out/a.stl") && scene.is_there("old/out/a.stl"));
+    }
+
+    #[test]
+    fn the_store_is_bounded_between_sweeps() {
+        let scene = Scene::new();
+        let mut config = Config::for_folder(&scene.at("hot"));
+        config.keep.history_jobs = 10;
+        let settings = Settings::fixed(config);
+        let sweeper = Sweeper::new(&scene.store, &scene.folders, &settings);
+        for n in 1..=12 {
+            let (path, folder, profile) = (RelPath::new(format!("{n}.stl")).unwrap(), "hot".into(), "default".into());
+            let source = Source { folder, path, dev: 1, ino: n, size: 84, mtime_ns: 1, profile };
+            let id = scene.store.submit(&[Submission { source, foreign: None }]).unwrap()[0].id;
+            scene.store.control(id, suture_store::Control::Cancel).unwrap();
+            // One more than a tenth too many, and it is back at its bound.
+            assert_eq!(sweeper.count(Time(0)).unwrap(), if n == 12 { 2 } else { 0 });
+        }
     }
 
     /// Without its record, a cancelled file that still lies there would be taken again.

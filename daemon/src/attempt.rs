@@ -14,7 +14,7 @@ use suture_core::report::Task;
 use suture_core::{ErrorClass, Limits, Profile, Report};
 use suture_store::Lease;
 use suture_store::job::{Death as StoreDeath, Duty, Kind, Withdrawal};
-use suture_store::{Claim, Ending, Job, JobStore, State, Step, StoreError, crash_point};
+use suture_store::{Claim, Ending, Job, JobId, JobStore, State, Step, StoreError, crash_point};
 
 use crate::claim::{CLAIMED, Claimed, Unclaimed, claim};
 use crate::config::Config;
@@ -43,7 +43,7 @@ pub(crate) enum Event {
     /// The system noticed changes; these names were renamed into place.
     Hint { renamed: Vec<PathBuf> },
     /// A job came to its end, and answers for its name no longer.
-    Ended { folder: String, path: PathBuf },
+    Ended { folder: String, path: PathBuf, id: JobId },
 }
 
 /// What all threads of the daemon share.
@@ -196,7 +196,8 @@ impl<'a> Slot<'a> {
             _ => {}
         }
         // The receiver outlives the slots; if not, no one needs to know.
-        let _ = self.context.events.send(Event::Ended { folder: job.source.folder.clone(), path: job.source.path.to_path() });
+        let (folder, path, id) = (job.source.folder.clone(), job.source.path.to_path(), job.id);
+        let _ = self.context.events.send(Event::Ended { folder, path, id });
     }
 
     /// The next step; `None` when the claim is lost.

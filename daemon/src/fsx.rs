@@ -35,6 +35,11 @@ impl Identity {
         Ok(Self::from(&std::fs::symlink_metadata(path)?))
     }
 
+    /// The same, seen under the same path, where the file system may have been mounted anew in between: as another device.
+    pub(crate) fn same_but_for_device(&self, other: &Self) -> bool {
+        (self.ino, self.size, self.mtime_ns) == (other.ino, other.size, other.mtime_ns)
+    }
+
     /// The same file with the same content, as far as can be told when it was renamed in between.
     pub(crate) fn same_content(&self, other: &Self) -> bool {
         (self.dev, self.ino, self.size, self.mtime_ns) == (other.dev, other.ino, other.size, other.mtime_ns)

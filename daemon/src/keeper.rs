@@ -115,7 +115,7 @@ impl<'a> Keeper<'a> {
         self.look_at_clock();
         raise(self.context.settings.now().workers)?;
         self.remember_live()?;
-        self.remember_orders()?;
+        self.remember_past()?;
         self.forget_noticed()?;
         if self.context.once {
             self.hasten_waiting()?;
@@ -161,10 +161,10 @@ impl<'a> Keeper<'a> {
                         kept.hint(&renamed);
                     }
                 }
-                Ok(Event::Ended { folder, path }) => {
+                Ok(Event::Ended { folder, path, id }) => {
                     if let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == folder) {
                         kept.reconciler.ended(&path);
-                        kept.orders.ended(&path, Instant::now());
+                        kept.orders.ended(&path, id, Instant::now());
                         kept.dirty = true;
                     }
                 }
@@ -233,8 +233,9 @@ impl<'a> Keeper<'a> {
         Ok(())
     }
 
-    /// Orders of an earlier life, some of which may lack their summary.
-    fn remember_orders(&mut self) -> Result<(), StoreError> {
+    /// Orders of an earlier life, some of which may lack their summary; and originals that were left in their places, which the store knows by
+    /// their device, and that may be another one by now.
+    fn remember_past(&mut self) -> Result<(), StoreError> {
         let (now, mut after) = (Instant::now(), JobId(0));
         loop {
             let page = self.context.store.list(&Query { after, limit: PAGE, ..Query::default() })?;
@@ -243,6 +244,9 @@ impl<'a> Keeper<'a> {
             for job in &page {
                 if let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == job.source.folder) {
                     kept.orders.remember(job, now);
+                    if job.kind().is_at_rest() && job.answers_for_source() {
+                        kept.reconciler.known(&job.source, job.id);
+                    }
                 }
             }
         }
@@ -365,10 +369,13 @@ impl Kept {
     fn scan(&mut self, context: &Context, now: Instant) {
         let here = self.folder.check().or_else(|_| self.folder.regain());
         let found = here.and_then(|()| self.reconciler.scan(now).map_err(|error| self.unreadable(&error)));
-        let mut away = context.away.lock().unwrap_or_else(PoisonError::into_inner);
+        let away = match &found {
+            Ok(_) => self.reconciler.left_out(),
+            Err(error) => vec![error.clone()],
+        };
+        context.away.lock().unwrap_or_else(PoisonError::into_inner).insert(self.folder.name.clone(), away);
         match found {
             Ok(gone) => {
-                away.insert(self.folder.name.clone(), self.reconciler.left_out());
                 if std::mem::take(&mut self.unavailable) {
                     tracing::info!(folder = %self.folder.root.display(), "The folder is back.");
                 }
@@ -380,7 +387,6 @@ impl Kept {
                 if !std::mem::replace(&mut self.unavailable, true) {
                     tracing::error!(folder = %self.folder.root.display(), error, "The folder cannot be served; the others go on.");
                 }
-                away.insert(self.folder.name.clone(), vec![error]);
             }
         }
     }

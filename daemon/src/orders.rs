@@ -20,6 +20,9 @@ use summary::Summary;
 
 pub(crate) mod summary;
 
+/// Of more orders than this, those that are done are not kept in memory.
+const MOST: usize = 10_000;
+
 /// The orders of a hot folder.
 pub(crate) struct Orders {
     folder: Arc<Folder>,
@@ -74,9 +77,9 @@ impl Orders {
     }
 
     /// The job of a file ended.
-    pub(crate) fn ended(&mut self, path: &Path, now: Instant) {
-        if let Some(order) = RelPath::from_path(path).ok().and_then(|path| self.order_of(&path)) {
-            self.pending.insert(order, now);
+    pub(crate) fn ended(&mut self, path: &Path, id: JobId, now: Instant) {
+        if let Ok(path) = RelPath::from_path(path) {
+            self.came(&path, id, now);
         }
     }
 
@@ -102,7 +105,11 @@ impl Orders {
                 self.pending.insert(order, now);
             }
         }
-        if self.pending.is_empty() && self.seen > self.mark {
+        if self.members.len() > MOST {
+            // Summaries on the disk tell of their files; what comes later is added.
+            self.members.retain(|order, _| self.pending.contains_key(order));
+        }
+        if self.pending.is_empty() && self.seen > self.mark && self.folder.check().is_ok() {
             match write_mark(&mark_of(&self.folder), self.seen) {
                 Ok(()) => self.mark = self.seen,
                 // Summaries are made once more, and say the same.
@@ -246,7 +253,7 @@ mod tests {
         finish(&store);
         assert!(!look(&store, &mut orders, 10, false), "one waits still");
         finish(&store);
-        orders.ended(Path::new("order/bc.stl"), start + Duration::from_secs(11));
+        orders.ended(Path::new("order/bc.stl"), JobId(2), start + Duration::from_secs(11));
         assert!(!look(&store, &mut orders, 15, false), "not quiet for long enough");
         assert!(!look(&store, &mut orders, 17, true), "another one is on its way");
         assert!(look(&store, &mut orders, 30, false));

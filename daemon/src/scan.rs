@@ -89,9 +89,9 @@ impl Reconciler {
             let known = match self.entries.get(&path) {
                 // Its identity is looked at where it settles.
                 Some(Entry::Settling { .. }) => true,
-                // A claim's hard link changes ctime, which says nothing here.
+                // A claim's hard link changes ctime, which says nothing here; nor does the number of a device.
                 Some(Entry::Submitted { identity: old, .. } | Entry::Unrecordable { identity: old, .. }) => {
-                    old.same_content(&identity)
+                    old.same_but_for_device(&identity)
                 }
                 None => false,
             };
@@ -406,6 +406,22 @@ mod tests {
         let left = r.left_out();
         assert_eq!(left.len(), 2, "{left:?}");
         assert!(left[0].ends_with("it lies deeper than 64 folders") && left[1].contains("c.stl: longer than"), "{left:?}");
+    }
+
+    /// An original that is left in its place, on a disk that is another device since: taken once.
+    #[test]
+    fn a_file_of_a_disk_that_was_mounted_anew_is_known() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut r = reconciler(dir.path());
+        mesh(&dir.path().join("in/a.stl"));
+        let mut source = settle(&mut r, Instant::now()).remove(0).1.source;
+        source.dev += 1;
+        let mut next = Reconciler::new(Arc::clone(&r.folder), Arc::clone(&r.settings), r.rest);
+        next.known(&source, JobId(1));
+        assert!(settle(&mut next, Instant::now()).is_empty());
+        source.ino += 1;
+        next.known(&source, JobId(1));
+        assert!(!settle(&mut next, Instant::now()).is_empty(), "another file");
     }
 
     #[test]

@@ -186,9 +186,8 @@ impl<'a> Sweeper<'a> {
 fn is_gone(folder: &Folder, job: &Job) -> bool {
     let source = &job.source;
     let found = fsx::look(&folder.inbox().join(source.path.to_path()));
-    let same = |found: &Identity| {
-        (found.dev, found.ino, found.size, found.mtime_ns) == (source.dev, source.ino, source.size, source.mtime_ns)
-    };
+    // Its disk may be another device since.
+    let same = |found: &Identity| (found.ino, found.size, found.mtime_ns) == (source.ino, source.size, source.mtime_ns);
     folder.check().is_ok() && folder.inbox().is_dir() && found.is_ok_and(|found| found.as_ref().is_none_or(|found| !same(found)))
 }
 
@@ -360,7 +359,7 @@ mod tests {
         let found = Identity::of(&scene.at("hot/in/new.stl")).unwrap();
         let job = |name: &str, ino| {
             let (path, folder, profile) = (RelPath::new(name).unwrap(), "hot".into(), "default".into());
-            let source = Source { folder, path, dev: found.dev, ino, size: found.size, mtime_ns: found.mtime_ns, profile };
+            let source = Source { folder, path, dev: found.dev + 1, ino, size: found.size, mtime_ns: found.mtime_ns, profile };
             let id = scene.store.submit(&[Submission { source, foreign: None }]).unwrap()[0].id;
             scene.store.control(id, suture_store::Control::Cancel).unwrap();
             id

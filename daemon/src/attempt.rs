@@ -2,6 +2,7 @@
 //! serves many small files; a crash then costs the file that was being worked on, and a new process.
 
 use std::cell::Cell;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::Mutex;
@@ -13,7 +14,7 @@ use suture_core::report::Task;
 use suture_core::{ErrorClass, Limits, Profile, Report};
 use suture_store::Lease;
 use suture_store::job::{Death as StoreDeath, Duty, Kind, Withdrawal};
-use suture_store::{Claim, Ending, Job, JobStore, State, Step, StoreError, crash_point};
+use suture_store::{Claim, Ending, Job, JobId, JobStore, State, Step, StoreError, crash_point};
 
 use crate::choice;
 use crate::claim::{CLAIMED, Claimed, Unclaimed, claim};
@@ -44,7 +45,7 @@ pub(crate) enum Event {
     /// The system noticed changes; these names were renamed into place.
     Hint { renamed: Vec<PathBuf> },
     /// A job came to its end, and answers for its name no longer.
-    Ended { folder: String, path: PathBuf },
+    Ended { folder: String, path: PathBuf, id: JobId },
 }
 
 /// What all threads of the daemon share.
@@ -59,6 +60,8 @@ pub(crate) struct Context {
     pub halt: AtomicBool,
     /// A job ended not good, or could not be ended.
     pub not_good: Arc<AtomicBool>,
+    /// By hot folder: what of it is out of reach, and why.
+    pub away: Mutex<BTreeMap<String, Vec<String>>>,
     /// The store failed; every thread ends.
     pub failed: Mutex<Option<StoreError>>,
 }
@@ -86,7 +89,7 @@ impl Context {
     }
 
     /// Has the store failed?
-    fn has_failed(&self) -> bool {
+    pub(crate) fn has_failed(&self) -> bool {
         self.failed.lock().is_ok_and(|failed| failed.is_some())
     }
 
@@ -195,7 +198,8 @@ impl<'a> Slot<'a> {
             _ => {}
         }
         // The receiver outlives the slots; if not, no one needs to know.
-        let _ = self.context.events.send(Event::Ended { folder: job.source.folder.clone(), path: job.source.path.to_path() });
+        let (folder, path, id) = (job.source.folder.clone(), job.source.path.to_path(), job.id);
+        let _ = self.context.events.send(Event::Ended { folder, path, id });
     }
 
     /// The next step; `None` when the claim is lost.

@@ -53,7 +53,7 @@ mod tests {
         let number = |n| Priority::try_from(n).unwrap();
         let dir = tempfile::tempdir().unwrap();
         let mut config = Config::for_folder(dir.path());
-        let folder = Folder::open(&config.folders[0]).unwrap();
+        let folder = Folder::open(&config.folders[0], None).unwrap();
         let write = |name: &str, text: &str| {
             std::fs::create_dir_all(folder.inbox().join(name)).unwrap();
             std::fs::write(folder.inbox().join(name).join(profiles::FOLDER_FILE), text).unwrap();

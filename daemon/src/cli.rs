@@ -24,8 +24,19 @@ const VERSION: &str = if cfg!(feature = "crash-points") {
 #[derive(Debug, Parser)]
 #[command(name = "suture", version = VERSION, max_term_width = 100, disable_help_subcommand = true)]
 pub(crate) struct Cli {
+    /// How log lines on standard error look; auto: text on a terminal, JSON otherwise
+    #[arg(long, value_name = "FORMAT", value_enum, default_value = "auto", global = true, hide_default_value = true)]
+    pub log_format: LogFormat,
     #[command(subcommand)]
     pub command: Command,
+}
+
+/// How log lines look.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LogFormat {
+    Auto,
+    Text,
+    Json,
 }
 
 #[derive(Debug, Subcommand)]
@@ -39,6 +50,8 @@ pub(crate) enum Command {
     Watch(WatchArgs),
     /// Check a configuration file, or show all settings with their values
     Config(ConfigArgs),
+    /// Say which files and records a configuration's `[keep]` would let go now, and why; changes nothing
+    Retention(RetentionArgs),
     /// List, show, retry, rank or cancel the jobs of a hot folder, with or without a running daemon
     Jobs(JobsArgs),
     /// Make a hot folder of small broken meshes, repair them, and show what happened
@@ -250,6 +263,13 @@ pub(crate) enum ConfigCommand {
         #[arg(value_name = "FILE")]
         file: Option<PathBuf>,
     },
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct RetentionArgs {
+    /// Configuration file (TOML), as for `suture watch --config`
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
 }
 
 #[derive(Args, Debug)]

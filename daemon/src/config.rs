@@ -1,5 +1,5 @@
 //! What the daemon works by. A hot folder needs no settings; a TOML file may name several folders, profiles and limits: [`read`] reads it,
-//! [`show`] writes one, [`command`] does either for people.
+//! [`show`] writes one, [`command`] does either for people. [`keep`] is what goes by itself.
 
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -11,8 +11,10 @@ use suture_store::Priority;
 use crate::own_profile::OwnProfile;
 use crate::units::show_size;
 use crate::window::RunWindow;
+use keep::Keep;
 
 pub(crate) mod command;
+pub(crate) mod keep;
 pub(crate) mod read;
 pub(crate) mod show;
 
@@ -92,6 +94,8 @@ pub(crate) struct Config {
     pub workers_outside: usize,
     /// What was made of the same content before is not made once more.
     pub reuse: bool,
+    /// What goes by itself, and when.
+    pub keep: Keep,
     pub profiles: BTreeMap<String, OwnProfile>,
 }
 
@@ -114,6 +118,7 @@ impl Config {
             run_window: RunWindow::default(),
             workers_outside: 0,
             reuse: true,
+            keep: Keep::default(),
             profiles: BTreeMap::new(),
         }
     }

@@ -7,8 +7,8 @@ use std::net::Shutdown;
 use std::os::fd::AsRawFd;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, PoisonError};
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -138,7 +138,8 @@ fn steer(context: &Context, wish: &DaemonWish) -> Result<Standing, Refusal> {
             tracing::info!(paused, "An operator's wish.");
         }
     }
-    Ok(context.schedule.standing())
+    let away = context.away.lock().unwrap_or_else(PoisonError::into_inner).values().flatten().cloned().collect();
+    Ok(Standing { away, ..context.schedule.standing() })
 }
 
 /// Does what is wished of jobs while the daemon works on them.
@@ -232,6 +233,12 @@ impl Door {
         });
     }
 
+    /// Has its name gone, as with a folder that was unmounted, so that nobody can knock?
+    pub(crate) fn is_lost(&self) -> bool {
+        let there = Identity::of(&self.path).ok().zip(self.made);
+        there.is_none_or(|(now, made)| (now.dev, now.ino) != (made.dev, made.ino))
+    }
+
     /// Waits a while for a knock.
     fn someone_knocks(&self) -> bool {
         let mut knocks = [PollFd::new(&self.listener, PollFlags::IN)];
@@ -249,7 +256,7 @@ impl Door {
 impl Drop for Door {
     fn drop(&mut self) {
         // A left-over socket is recognised by nobody answering.
-        if Identity::of(&self.path).ok().zip(self.made).is_some_and(|(now, made)| (now.dev, now.ino) == (made.dev, made.ino)) {
+        if !self.is_lost() {
             let _ = std::fs::remove_file(&self.path);
         }
     }

@@ -1,89 +1,53 @@
 //! One hot folder on disk: its parts, its owner, and what its names mean.
 
 use std::ffi::OsStr;
-use std::fs::{File, TryLockError};
-use std::io;
-use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use suture_store::job::Area;
 use suture_store::{RelPath, Token};
 
 use crate::config::FolderConfig;
-use crate::create;
-use crate::fsx::{self, Identity};
-use crate::rights;
+pub(crate) use crate::ground::{FolderError, is_fading, make_parent};
+use crate::ground::{Ground, LOCK, PARTS, PRIVATE, Trace, id};
+use crate::receipt::{RECEIPT, REPORT};
 
 /// Part of a hot folder that holds results.
 const OUT: &str = "out";
-/// Work in progress and the job store.
-const PRIVATE: &str = ".suture";
-/// All parts of a hot folder.
-const PARTS: [&str; 6] = ["in", OUT, "done", "failed", "quarantine", ".suture/work"];
-/// Locked by the daemon that serves the folder, and its process number.
-const LOCK: &str = "owner";
-const PID: &str = "owner.pid";
 
-/// A hot folder that this process serves: it holds the lock as long as it lives.
+/// A hot folder that this process serves: it holds the lock as long as it lives. One that is away is told by what it left behind.
 #[derive(Debug)]
 pub(crate) struct Folder {
     pub name: String,
     pub root: PathBuf,
     /// Originals stay in `in/`.
     pub leave_originals: bool,
-    /// What the path stood for at the start.
-    id: (u64, u64),
-    /// File systems of the parts at the start.
-    devices: [Option<u64>; PARTS.len()],
-    lock: File,
-}
-
-fn id(meta: &std::fs::Metadata) -> (u64, u64) {
-    (meta.dev(), meta.ino())
-}
-
-/// Why a folder cannot be served.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum FolderError {
-    #[error("{} is served by another daemon{}", root.display(), pid.map(|pid| format!(" (process {pid})")).unwrap_or_default())]
-    Owned { root: PathBuf, pid: Option<u32> },
-    #[error("{} lies in the hot folder {}, which would take its files; put it beside that one, or remove {}/.suture if that is none any more", root.display(), outer.display(), outer.display())]
-    Within { root: PathBuf, outer: PathBuf },
-    #[error("{} and {} are one folder, or one lies in the other: results would be taken for drops", a.display(), b.display())]
-    Mixed { a: PathBuf, b: PathBuf },
-    #[error("{}: {action}: {source}", path.display())]
-    Io { path: PathBuf, action: &'static str, source: io::Error },
+    ground: Mutex<Result<Ground, Trace>>,
 }
 
 impl Folder {
-    /// Makes the parts that are missing and takes the folder's lock, which the system releases when the process ends.
+    /// Makes the parts that are missing and takes the folder's lock, which the system releases when the process ends. `known`: what told the
+    /// folder of that name when it was served last. If its mount is gone, nothing is made, and it is away until it is back.
     ///
     /// # Errors
     /// When another daemon serves it, or it cannot be made.
-    pub(crate) fn open(config: &FolderConfig) -> Result<Self, FolderError> {
-        let io = |path: &Path, action| {
-            let path = path.to_owned();
-            move |source| FolderError::Io { path, action, source }
-        };
+    pub(crate) fn open(config: &FolderConfig, known: Option<&Trace>) -> Result<Self, FolderError> {
         // Made once as an absolute path: the process may be asked to look again after hours.
-        let root = std::path::absolute(&config.path).map_err(io(&config.path, "cannot be found"))?;
-        if let Some(outer) = outer_folder(&root) {
-            return Err(FolderError::Within { root, outer });
-        }
-        parts_apart(&root)?;
-        for part in PARTS {
-            let path = root.join(part);
-            make_folder(&path).map_err(io(&path, "cannot be made"))?;
-        }
-        let lock = take_lock(&root)?;
-        let pid = format!("{}\n", std::process::id());
-        let path = root.join(PRIVATE).join(PID);
-        create::replace(&path, pid.as_bytes()).map_err(io(&path, "cannot be written"))?;
-        let id = id(&std::fs::metadata(&root).map_err(io(&root, "cannot be looked at"))?);
-        let devices = PARTS.map(|part| device(&root.join(part)));
+        let absolute = std::path::absolute(&config.path);
+        let root = absolute.map_err(|source| {
+            let path = config.path.clone();
+            FolderError::Io { path, action: "cannot be found", source }
+        })?;
+        let ground = match known.filter(|known| known.missing(&root).is_some()) {
+            Some(known) => Err(known.clone()),
+            None => Ok(take(&root)?),
+        };
         let (name, leave_originals) = (config.name.clone(), config.leave_originals);
-        Ok(Self { name, root, leave_originals, id, devices, lock })
+        Ok(Self { name, root, leave_originals, ground: Mutex::new(ground) })
+    }
+
+    fn ground(&self) -> MutexGuard<'_, Result<Ground, Trace>> {
+        self.ground.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Is the folder still the one that was opened? A path that leads elsewhere by now (renamed and made anew, a mount that came or went)
@@ -92,28 +56,49 @@ impl Folder {
     /// # Errors
     /// A line for people.
     pub(crate) fn check(&self) -> Result<(), String> {
-        let shown = self.root.display();
-        let there = std::fs::metadata(&self.root).map_err(|error| format!("{shown}: the hot folder is out of reach: {error}"))?;
-        let lock = Identity::of(&self.root.join(PRIVATE).join(LOCK));
-        let held = self.lock.metadata().map(|meta| id(&meta));
-        let same_lock = matches!((&lock, &held), (Ok(lock), Ok(held)) if (lock.dev, lock.ino) == *held);
-        if id(&there) != self.id || !same_lock {
-            return Err(format!(
-                "{shown}: is another folder than at the start (moved, removed or made anew); put it back, or start again"
-            ));
+        match &*self.ground() {
+            Ok(ground) => ground.check(&self.root),
+            Err(trace) => Err(self.away(trace)),
         }
-        let ids = PARTS.map(|part| std::fs::metadata(self.root.join(part)).ok().map(|meta| id(&meta)));
-        for (i, (part, device_then)) in PARTS.iter().zip(self.devices).enumerate() {
-            // A part that was removed is made again where it is needed.
-            let Some(now) = ids[i] else { continue };
-            let part = self.root.join(part);
-            if Some(now.0) != device_then {
-                return Err(format!("{}: is on another file system than at the start: a mount came or went", part.display()));
-            }
-            if let Some(other) = ids.iter().take(i).position(|other| *other == Some(now)) {
-                return Err(FolderError::Mixed { a: self.root.join(PARTS[other]), b: part }.to_string());
-            }
+    }
+
+    fn away(&self, trace: &Trace) -> String {
+        trace.missing(&self.root).unwrap_or_else(|| format!("{}: the hot folder is coming back", self.root.display()))
+    }
+
+    /// What tells the folder again.
+    pub(crate) fn trace(&self) -> Trace {
+        match &*self.ground() {
+            Ok(ground) => ground.trace().clone(),
+            Err(trace) => trace.clone(),
         }
+    }
+
+    /// Is the mount gone that the folder lay on? In words.
+    pub(crate) fn missing(&self) -> Option<String> {
+        self.trace().missing(&self.root)
+    }
+
+    /// Takes the folder again if it was away and is back: it has its own mark, whatever its device is by now.
+    ///
+    /// # Errors
+    /// A line for people: why it is not served.
+    pub(crate) fn regain(&self) -> Result<(), String> {
+        let mut ground = self.ground();
+        let trace = match &*ground {
+            Ok(here) => {
+                let why = here.check(&self.root);
+                if why.is_ok() || !here.is_left(&self.root) || !here.trace().leads_here(&self.root) {
+                    return why;
+                }
+                here.trace().clone()
+            }
+            Err(trace) => trace.clone(),
+        };
+        if let Some(missing) = trace.missing(&self.root) {
+            return Err(missing);
+        }
+        *ground = Ok(take(&self.root).map_err(|error| error.to_string())?);
         Ok(())
     }
 
@@ -186,42 +171,13 @@ fn parts_apart(root: &Path) -> Result<(), FolderError> {
     Ok(())
 }
 
-fn device(path: &Path) -> Option<u64> {
-    std::fs::metadata(path).ok().map(|meta| meta.dev())
-}
-
-/// The lock of the hot folder, which the system releases when the process ends.
-fn take_lock(root: &Path) -> Result<File, FolderError> {
-    let path = root.join(PRIVATE).join(LOCK);
-    let io = |action| {
-        let path = path.clone();
-        move |source| FolderError::Io { path, action, source }
-    };
-    let lock = create::lock_file(&path).map_err(io("cannot be opened"))?;
-    let asked = Instant::now();
-    loop {
-        match lock.try_lock() {
-            Ok(()) => return Ok(lock),
-            Err(TryLockError::WouldBlock) => {
-                // A lock without a readable number is a lock all the same.
-                let text = std::fs::read_to_string(root.join(PRIVATE).join(PID)).unwrap_or_default();
-                let pid = text.trim().parse().ok();
-                if !is_fading(pid, asked) {
-                    return Err(FolderError::Owned { root: root.to_owned(), pid });
-                }
-                std::thread::sleep(Duration::from_millis(10));
-            }
-            Err(TryLockError::Error(source)) => return Err(io("cannot be locked")(source)),
-        }
+/// Makes a folder's parts and takes it, if it may be a hot one.
+fn take(root: &Path) -> Result<Ground, FolderError> {
+    if let Some(outer) = outer_folder(root) {
+        return Err(FolderError::Within { root: root.to_owned(), outer });
     }
-}
-
-/// Is a lock's owner dead, and the lock about to go? A daemon that is killed just as it starts a worker leaves the lock to that
-/// process for the moment before it notices.
-pub(crate) fn is_fading(pid: Option<u32>, asked: Instant) -> bool {
-    let pid = pid.and_then(|pid| i32::try_from(pid).ok()).and_then(rustix::process::Pid::from_raw);
-    let dead = pid.is_some_and(|pid| rustix::process::test_kill_process(pid) == Err(rustix::io::Errno::SRCH));
-    dead && asked.elapsed() < Duration::from_secs(2)
+    parts_apart(root)?;
+    Ground::take(root)
 }
 
 /// What a name in `in/` is.
@@ -235,6 +191,16 @@ pub(crate) enum NameKind {
     Foreign,
 }
 
+/// Is that the name of a file that someone surely meant to have repaired: a mesh, whatever its format, or an archive of some?
+pub(crate) fn is_meant(name: &OsStr) -> bool {
+    const FORMATS: [&str; 18] = [
+        "stl", "3mf", "obj", "ply", "off", "amf", "zip", "gz", "7z", "step", "stp", "iges", "igs", "gltf", "glb", "dae", "fbx",
+        "x3d",
+    ];
+    let lower = name.to_string_lossy().to_ascii_lowercase();
+    lower.rsplit_once('.').is_some_and(|(_, extension)| FORMATS.contains(&extension))
+}
+
 /// Tells names apart. Temporary names are those of browsers, copy programs, editors, office programs and file servers.
 pub(crate) fn name_kind(name: &OsStr) -> NameKind {
     let lossy = name.to_string_lossy();
@@ -242,32 +208,12 @@ pub(crate) fn name_kind(name: &OsStr) -> NameKind {
     const ENDINGS: [&str; 9] = [".part", ".tmp", ".temp", ".crdownload", ".partial", ".filepart", ".download", ".swp", "~"];
     const LITTER: [&str; 4] = ["thumbs.db", "desktop.ini", "@eadir", "lost+found"];
     let hidden = lower.starts_with('.') || lower.starts_with("~$") || lower.starts_with('#');
-    if hidden || ENDINGS.iter().any(|ending| lower.ends_with(ending)) || LITTER.contains(&lower.as_str()) {
+    // What this program puts beside results, and someone copies back with them.
+    let ours = lower.ends_with(REPORT) || lower.ends_with(RECEIPT);
+    if hidden || ours || ENDINGS.iter().any(|ending| lower.ends_with(ending)) || LITTER.contains(&lower.as_str()) {
         return NameKind::Ignored;
     }
     if lower.ends_with(".stl") { NameKind::Mesh } else { NameKind::Foreign }
-}
-
-/// Makes the folder a path will stand in, durably where it is new.
-///
-/// # Errors
-/// As `mkdir` and `fsync`.
-pub(crate) fn make_parent(path: &Path) -> io::Result<()> {
-    make_folder(fsx::folder_of(path))
-}
-
-/// Makes a folder and those above it, each durable in the one it lies in, with its group.
-fn make_folder(path: &Path) -> io::Result<()> {
-    // Only what the system says is not there is made: an error is no absence.
-    match std::fs::metadata(path) {
-        Ok(there) if there.is_dir() => return Ok(()),
-        Ok(_) => return Err(io::ErrorKind::NotADirectory.into()),
-        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
-        Err(_) => {}
-    }
-    make_parent(path)?;
-    rights::make_folder(path)?;
-    fsx::sync_dir(fsx::folder_of(path))
 }
 
 #[cfg(test)]
@@ -279,9 +225,18 @@ mod tests {
         for mesh in ["part.stl", "PART.STL", "a b$.Stl", "CON.stl"] {
             assert_eq!(name_kind(OsStr::new(mesh)), NameKind::Mesh, "{mesh}");
         }
-        for ignored in
-            [".part.stl", "part.stl.crdownload", "part.stl.part", "~$part.stl", "part.stl~", "Thumbs.db", "@eaDir", "x.TMP"]
-        {
+        for ignored in [
+            ".part.stl",
+            "part.stl.crdownload",
+            "part.stl.part",
+            "part.stl.report.json",
+            "part.stl.suture.json",
+            "~$part.stl",
+            "part.stl~",
+            "Thumbs.db",
+            "@eaDir",
+            "x.TMP",
+        ] {
             assert_eq!(name_kind(OsStr::new(ignored)), NameKind::Ignored, "{ignored}");
         }
         for foreign in ["part.obj", "notes.txt", "stl"] {
@@ -290,17 +245,24 @@ mod tests {
     }
 
     #[test]
+    fn meshes_of_other_formats_are_meant_notes_are_not() {
+        for (name, meant) in [("a.3mf", true), ("A.OBJ", true), ("link.stl", true), ("notes.txt", false), ("obj", false)] {
+            assert_eq!(is_meant(OsStr::new(name)), meant, "{name}");
+        }
+    }
+
+    #[test]
     fn a_folder_has_one_owner() {
         let dir = tempfile::tempdir().unwrap();
         let config = FolderConfig::of(dir.path());
-        let first = Folder::open(&config).unwrap();
+        let first = Folder::open(&config, None).unwrap();
         assert!(first.inbox().is_dir() && first.out().is_dir());
-        match Folder::open(&config) {
+        match Folder::open(&config, None) {
             Err(FolderError::Owned { pid, .. }) => assert_eq!(pid, Some(std::process::id())),
             other => panic!("{other:?}"),
         }
         drop(first);
-        Folder::open(&config).unwrap();
+        Folder::open(&config, None).unwrap();
     }
 
     /// D5: neither a folder that was made anew under the old name nor a store that was removed is taken for the one that was opened.
@@ -309,7 +271,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);
         let config = FolderConfig::of(&at("hot"));
-        let folder = Folder::open(&config).unwrap();
+        let folder = Folder::open(&config, None).unwrap();
         folder.check().unwrap();
         std::fs::remove_dir(at("hot/out")).unwrap();
         folder.check().expect("a part may be made again");
@@ -317,7 +279,7 @@ mod tests {
         assert!(folder.check().unwrap_err().contains("out of reach"));
         std::fs::create_dir(at("hot")).unwrap();
         assert!(folder.check().unwrap_err().contains("another folder"));
-        Folder::open(&config).expect("it is another folder, and another daemon's to serve");
+        Folder::open(&config, None).expect("it is another folder, and another daemon's to serve");
         assert!(folder.check().is_err());
         std::fs::remove_dir_all(at("hot")).unwrap();
         std::fs::rename(at("old"), at("hot")).unwrap();
@@ -325,6 +287,51 @@ mod tests {
         std::fs::remove_dir_all(at("hot/.suture")).unwrap();
         std::fs::create_dir_all(at("hot/.suture/work")).unwrap();
         assert!(folder.check().is_err(), "the store went with it");
+    }
+
+    /// A bare folder under a mount that is gone is not the folder: nothing is made in it, nothing in it believed.
+    #[test]
+    fn a_folder_is_away_until_it_is_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        let config = FolderConfig::of(&at("hot"));
+        let here = Folder::open(&config, None).unwrap().trace();
+        let text = serde_json::to_string(&here).unwrap();
+        let mut there: serde_json::Value = serde_json::from_str(&text).unwrap();
+        there["mount"] = "/mnt/disk".into();
+        let there: Trace = serde_json::from_value(there).unwrap();
+        Folder::open(&config, Some(&there)).unwrap().check().expect("it has its mark");
+        std::fs::rename(at("hot"), at("disk")).unwrap();
+        std::fs::create_dir_all(at("hot/in")).unwrap();
+        let folder = Folder::open(&config, Some(&there)).unwrap();
+        for why in [folder.check(), folder.regain(), folder.missing().map_or(Ok(()), Err)] {
+            assert!(why.unwrap_err().contains("the mount /mnt/disk is not there"));
+        }
+        assert!(!at("hot/out").exists() && !at("hot/.suture").exists());
+        std::fs::remove_dir_all(at("hot")).unwrap();
+        std::fs::rename(at("disk"), at("hot")).unwrap();
+        folder.regain().unwrap();
+        folder.check().unwrap();
+        assert!(matches!(Folder::open(&config, None), Err(FolderError::Owned { .. })), "its lock is held");
+    }
+
+    /// A disk that is mounted again may be another device: the folder is told by its mark.
+    #[test]
+    fn a_folder_with_its_mark_is_the_folder_whatever_its_inode() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        let config = FolderConfig::of(&at("hot"));
+        let folder = Folder::open(&config, None).unwrap();
+        std::fs::rename(at("hot"), at("old")).unwrap();
+        std::fs::create_dir_all(at("hot/.suture")).unwrap();
+        assert!(folder.regain().unwrap_err().contains("another folder"));
+        std::fs::write(at("hot/.suture/id"), "some other\n").unwrap();
+        assert!(folder.regain().is_err());
+        std::fs::copy(at("old/.suture/id"), at("hot/.suture/id")).unwrap();
+        assert!(folder.check().is_err());
+        folder.regain().unwrap();
+        folder.check().unwrap();
+        assert!(at("hot/out").is_dir());
     }
 
     /// `out/` or `done/` that leads to `in/` made results of results, without end.
@@ -335,10 +342,10 @@ mod tests {
         for (part, target) in [("out", "in"), ("done", "in"), ("failed", "in/deep")] {
             std::fs::create_dir_all(dir.path().join("in/deep")).unwrap();
             std::os::unix::fs::symlink(target, dir.path().join(part)).unwrap();
-            assert!(matches!(Folder::open(&config), Err(FolderError::Mixed { .. })), "{part} -> {target}");
+            assert!(matches!(Folder::open(&config, None), Err(FolderError::Mixed { .. })), "{part} -> {target}");
             std::fs::remove_file(dir.path().join(part)).unwrap();
         }
-        let folder = Folder::open(&config).unwrap();
+        let folder = Folder::open(&config, None).unwrap();
         std::fs::remove_dir(dir.path().join("out")).unwrap();
         std::os::unix::fs::symlink("in", dir.path().join("out")).unwrap();
         assert!(folder.check().unwrap_err().contains("results would be taken for drops"), "while it is served, too");
@@ -349,13 +356,13 @@ mod tests {
     fn a_folder_within_a_hot_one_is_refused() {
         let dir = tempfile::tempdir().unwrap();
         let config = |path: PathBuf| FolderConfig::of(&path);
-        let _outer = Folder::open(&config(dir.path().into())).unwrap();
+        let _outer = Folder::open(&config(dir.path().into()), None).unwrap();
         for inner in ["in", "in/sub/deeper", "out"] {
-            let opened = Folder::open(&config(dir.path().join(inner)));
+            let opened = Folder::open(&config(dir.path().join(inner)), None);
             assert!(matches!(opened, Err(FolderError::Within { .. })), "{inner}: {opened:?}");
             assert!(!dir.path().join("in/sub").exists(), "nothing was made");
         }
-        Folder::open(&config(dir.path().join("beside"))).expect("not in a part");
+        Folder::open(&config(dir.path().join("beside")), None).expect("not in a part");
     }
 
     #[test]

@@ -35,6 +35,11 @@ impl Identity {
         Ok(Self::from(&std::fs::symlink_metadata(path)?))
     }
 
+    /// The same, seen under the same path, where the file system may have been mounted anew in between: as another device.
+    pub(crate) fn same_but_for_device(&self, other: &Self) -> bool {
+        (self.ino, self.size, self.mtime_ns) == (other.ino, other.size, other.mtime_ns)
+    }
+
     /// The same file with the same content, as far as can be told when it was renamed in between.
     pub(crate) fn same_content(&self, other: &Self) -> bool {
         (self.dev, self.ino, self.size, self.mtime_ns) == (other.dev, other.ino, other.size, other.mtime_ns)
@@ -118,11 +123,34 @@ pub(crate) fn free_space(folder: &Path, reserve: u64) -> u64 {
 
 /// Does the folder lie on a network or user-space file system, whose changes the kernel does not tell us of?
 pub(crate) fn needs_polling(folder: &Path) -> bool {
-    // NFS, SMB, SMB2, CIFS, FUSE, 9P, Ceph, AFS, Lustre, GPFS (`linux/magic.h` and the file systems' own headers).
-    const NETWORK: [u32; 10] =
-        [0x6969, 0x517B, 0xFE53_4D42, 0xFF53_4D42, 0x6573_5546, 0x0102_1997, 0x00C3_6400, 0x5346_414F, 0x0BD0_0BD0, 0x4750_4653];
     // The field's type differs between platforms; the magic numbers are 32 bits wide.
-    rustix::fs::statfs(folder).is_ok_and(|fs| NETWORK.contains(&(fs.f_type as u32)))
+    rustix::fs::statfs(folder).is_ok_and(|fs| is_remote(fs.f_type as u32))
+}
+
+/// Is that the magic number of a file system that others change behind the kernel's back?
+fn is_remote(f_type: u32) -> bool {
+    // By `linux/magic.h` and the file systems' own headers.
+    const REMOTE: [u32; 18] = [
+        0x6969,      // NFS
+        0x517B,      // SMB
+        0xFE53_4D42, // SMB2
+        0xFF53_4D42, // CIFS
+        0x6573_5546, // FUSE
+        0x0102_1997, // 9P
+        0x00C3_6400, // Ceph
+        0x5346_414F, // OpenAFS
+        0x6B41_4653, // AFS
+        0x7375_7245, // Coda
+        0x564C,      // NCP
+        0x7461_636F, // OCFS2
+        0x0116_1970, // GFS2
+        0x0BD0_0BD0, // Lustre
+        0x4750_4653, // GPFS
+        0x1983_0326, // BeeGFS
+        0x786F_4256, // folders of a VirtualBox host
+        0xBACB_ACBC, // folders of a VMware host
+    ];
+    REMOTE.contains(&f_type)
 }
 
 /// `part.stl`, `part~2.stl`, `part~3.stl`, …: the `n`-th name for a file, `n` from 1, cut so that `reserve` more bytes fit into
@@ -167,6 +195,21 @@ pub(crate) fn exists(path: &Path) -> io::Result<bool> {
 mod tests {
     use super::*;
     use crate::create;
+
+    /// As `statfs` says them: of what others change, and of disks and memory here.
+    #[test]
+    fn what_others_change_is_polled() {
+        for remote in [0x6969, 0xFE53_4D42, 0xFF53_4D42, 0x6573_5546, 0x0102_1997, 0x786F_4256] {
+            assert!(is_remote(remote), "{remote:x}");
+        }
+        // ext4, XFS, Btrfs, tmpfs, overlay, F2FS, ZFS, exFAT, NTFS.
+        for here in
+            [0xEF53, 0x5846_5342, 0x9123_683E, 0x0102_1994, 0x794C_7630, 0xF2F5_2010, 0x2FC1_2FC1, 0x2011_BAB0, 0x5346_544E]
+        {
+            assert!(!is_remote(here), "{here:x}");
+        }
+        assert!(!needs_polling(Path::new("/proc")) && !needs_polling(Path::new("/nowhere/at/all")));
+    }
 
     #[test]
     fn renaming_never_replaces() {

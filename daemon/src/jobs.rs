@@ -58,7 +58,9 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
         text += &format!("{summary}\n");
     }
     if let (JobsCommand::List { .. }, false) = (&args.command, args.json) {
-        text.extend(held(&args.dir).iter().map(|why| format!("nothing new is taken: {why}\n")));
+        let Standing { held, away, .. } = standing(&args.dir);
+        text.extend(held.iter().map(|why| format!("nothing new is taken: {why}\n")));
+        text.extend(away.iter().map(|why| format!("out of reach: {}\n", plain(why))));
     }
     // A reader that has gone away has seen enough.
     let _ = std::io::stdout().write_all(text.as_bytes());
@@ -102,13 +104,23 @@ fn fail(failure: &Failure) -> Exit {
     failure.exit
 }
 
-/// Why a daemon takes nothing new, if one runs and does not, or the next one would not.
-fn held(dir: &Path) -> Vec<String> {
+/// What keeps a daemon from work, if one runs and something does, or would keep the next one.
+fn standing(dir: &Path) -> Standing {
     match reach::daemon(dir, &DaemonWish::Standing) {
-        Ok(Some(standing)) => standing.held,
-        Ok(None) if standstill::is_set(&reach::state_of(dir)) => vec![standstill::WORDS.into()],
-        _ => Vec::new(),
+        Ok(Some(standing)) => standing,
+        Ok(None) if standstill::is_set(&reach::state_of(dir)) => {
+            Standing { held: vec![standstill::WORDS.into()], ..Standing::default() }
+        }
+        _ => Standing::default(),
     }
+}
+
+/// All jobs of the store of a hot folder, by number.
+///
+/// # Errors
+/// A line for people, and what it comes to.
+pub(crate) fn all(dir: &Path) -> Result<Vec<Job>, (String, Exit)> {
+    reach::jobs(dir, &JobsWish::List).map_err(|failure| (failure.line, failure.exit))
 }
 
 /// A job with what its state implies.

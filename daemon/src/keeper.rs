@@ -1,22 +1,22 @@
 //! The thread that looks after the hot folders: it scans them when something happened or it is time, tells the store of files that came to
 //! rest ([`crate::scan`]), and sees to it that there is room on the disk.
 
-use std::mem::ManuallyDrop;
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::io;
+use std::os::unix::fs::MetadataExt;
+use std::path::PathBuf;
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
+use std::sync::{Arc, PoisonError};
+use std::time::{Duration, Instant, SystemTime};
 
-use crossbeam::channel::{Receiver, RecvTimeoutError, Sender};
-use notify::event::{EventKind, ModifyKind, RenameMode};
-use notify::{RecursiveMode, Watcher};
+use crossbeam::channel::{Receiver, RecvTimeoutError};
 use suture_store::job::{Area, Kind};
-use suture_store::{Clock, Control, Query, StoreError, SystemClock, crash_point};
+use suture_store::{Clock, Control, Job, JobId, Query, StoreError, SystemClock, crash_point};
 
 use crate::attempt::{Context, Event};
-use crate::folder::Folder;
+use crate::folder::{Folder, is_meant};
 use crate::fsx;
+use crate::hints::{Watching, watcher};
+use crate::orders::Orders;
 use crate::scan::Reconciler;
 use crate::schedule::Hold;
 use crate::settings::Reload;
@@ -26,6 +26,8 @@ use crate::signals::Stop;
 /// Full scans, where the system tells of changes and where it does not.
 const RESCAN: Duration = Duration::from_secs(60);
 const RESCAN_POLLED: Duration = Duration::from_secs(10);
+/// A folder that is away is looked for this often.
+const LOOK_FOR: Duration = Duration::from_secs(2);
 /// Hints within this time are one.
 const SCAN_AT_MOST_EVERY: Duration = Duration::from_millis(50);
 /// How often the keeper looks about when nothing happens: for signals, and with `--once` for the end of all work.
@@ -35,6 +37,8 @@ const IDLE_ONCE: Duration = Duration::from_millis(20);
 const DISK_EVERY: Duration = Duration::from_secs(5);
 /// With `--once`, a result that cannot be brought into place is tried so often before it is left for the next run.
 const TRIES_ONCE: u32 = 4;
+/// Jobs that are read at a time.
+const PAGE: usize = 1000;
 
 /// The thread that looks after the folders.
 pub(crate) struct Keeper<'a> {
@@ -42,54 +46,49 @@ pub(crate) struct Keeper<'a> {
     inbox: Receiver<Event>,
     stop: &'a Stop,
     folders: Vec<Kept>,
-    /// Keeps telling of changes as long as it lives.
-    _watchers: Vec<Watching>,
     disk_looked: Option<Instant>,
+    /// It was within the hours of work at the last look.
+    is_open: bool,
 }
 
-/// Tells of changes until the process ends.
-type Watching = ManuallyDrop<notify::RecommendedWatcher>;
+/// Has the daemon be ready for so many workers.
+pub(crate) type Raise<'a> = &'a dyn Fn(usize) -> Result<(), StoreError>;
 
 /// A folder under the keeper's eyes.
 struct Kept {
     folder: Arc<Folder>,
     reconciler: Reconciler,
+    orders: Orders,
     /// The system does not tell of changes.
     polled: bool,
+    /// Keeps telling of changes, as long as it lives, of what `in/` stood for then.
+    watching: Option<Watching>,
+    watched: Option<(u64, u64, Option<SystemTime>)>,
     rescan: Duration,
     scanned: Option<Instant>,
     looked: Instant,
     dirty: bool,
     unavailable: bool,
     /// Files that were only noticed, and are gone.
-    gone: Vec<suture_store::JobId>,
+    gone: Vec<JobId>,
     /// Names that were renamed into place since the last scan.
     renamed: Vec<PathBuf>,
     scan_takes: Duration,
 }
 
 impl<'a> Keeper<'a> {
-    /// Begins to listen; `inbox` receives what `events` is told.
-    pub(crate) fn new(context: &'a Context, events: Sender<Event>, inbox: Receiver<Event>, stop: &'a Stop) -> Self {
-        let mut watchers = Vec::new();
+    /// Begins to listen; `inbox` receives what the context's events are told.
+    pub(crate) fn new(context: &'a Context, inbox: Receiver<Event>, stop: &'a Stop) -> Self {
         let mut folders = Vec::new();
         for folder in &context.folders {
-            let mut polled = fsx::needs_polling(&folder.inbox());
-            if !polled {
-                match watcher(&folder.inbox(), events.clone()) {
-                    Ok(watcher) => watchers.push(watcher),
-                    Err(error) => {
-                        tracing::warn!(folder = %folder.root.display(), %error, "The system does not tell of changes; polling.");
-                        polled = true;
-                    }
-                }
-            }
-            let (rest, rescan) = pace(context, polled);
-            tracing::info!(folder = %folder.root.display(), polled, "Serving a hot folder.");
-            folders.push(Kept {
+            let (rest, rescan) = pace(context, false);
+            let mut kept = Kept {
                 folder: Arc::clone(folder),
                 reconciler: Reconciler::new(Arc::clone(folder), Arc::clone(&context.settings), rest),
-                polled,
+                orders: Orders::new(Arc::clone(folder), Arc::clone(&context.settings)),
+                polled: false,
+                watching: None,
+                watched: None,
                 rescan,
                 scanned: None,
                 looked: Instant::now(),
@@ -98,17 +97,25 @@ impl<'a> Keeper<'a> {
                 gone: Vec::new(),
                 renamed: Vec::new(),
                 scan_takes: Duration::ZERO,
-            });
+            };
+            if folder.check().is_ok() {
+                kept.watch(context);
+                tracing::info!(folder = %folder.root.display(), polled = kept.polled, "Serving a hot folder.");
+            }
+            folders.push(kept);
         }
-        Self { context, inbox, stop, folders, _watchers: watchers, disk_looked: None }
+        Self { context, inbox, stop, folders, disk_looked: None, is_open: true }
     }
 
     /// Keeps the folders until there is a reason to end.
     ///
     /// # Errors
     /// When the store failed.
-    pub(crate) fn keep(&mut self) -> Result<(), StoreError> {
+    pub(crate) fn keep(&mut self, raise: Raise) -> Result<(), StoreError> {
+        self.look_at_clock();
+        raise(self.context.settings.now().workers)?;
         self.remember_live()?;
+        self.remember_past()?;
         self.forget_noticed()?;
         if self.context.once {
             self.hasten_waiting()?;
@@ -123,6 +130,7 @@ impl<'a> Keeper<'a> {
             }
             if let Some(reload) = self.context.settings.renew() {
                 self.go_by(reload)?;
+                raise(self.context.settings.now().workers)?;
             }
             let now = Instant::now();
             self.look_at_disk(now)?;
@@ -131,7 +139,8 @@ impl<'a> Keeper<'a> {
                 kept.turn(self.context, now)?;
             }
             if self.context.once && self.is_finished()? {
-                return Ok(());
+                // Nothing comes any more.
+                return self.folders.iter_mut().try_for_each(|kept| kept.sum_up(self.context, now, Duration::ZERO));
             }
             self.listen();
         }
@@ -152,9 +161,10 @@ impl<'a> Keeper<'a> {
                         kept.hint(&renamed);
                     }
                 }
-                Ok(Event::Ended { folder, path }) => {
+                Ok(Event::Ended { folder, path, id }) => {
                     if let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == folder) {
                         kept.reconciler.ended(&path);
+                        kept.orders.ended(&path, id, Instant::now());
                         kept.dirty = true;
                     }
                 }
@@ -186,7 +196,21 @@ impl<'a> Keeper<'a> {
             );
             self.context.not_good.store(true, Ordering::Relaxed);
         }
+        self.tell_of_foreign()?;
         Ok(true)
+    }
+
+    /// With `--once`: files that someone meant to have repaired, and that are left where they are, are not good.
+    fn tell_of_foreign(&self) -> Result<(), StoreError> {
+        let noticed = self.context.store.list(&Query { kinds: vec![Kind::Noticed], ..Query::default() })?;
+        let meant = |job: &&Job| job.source.path.to_path().file_name().is_some_and(is_meant);
+        let left_out = self.folders.iter().map(|kept| kept.reconciler.left_out().len()).sum::<usize>();
+        let files = noticed.iter().filter(meant).count() + left_out;
+        if files > 0 {
+            tracing::warn!(files, "Files are left where they are; `suture jobs list --state noticed` says why.");
+            self.context.not_good.store(true, Ordering::Relaxed);
+        }
+        Ok(())
     }
 
     /// Is a parked job tried once more, with `--once`? What an earlier run left was tried often; but the world may be another one now.
@@ -207,6 +231,25 @@ impl<'a> Keeper<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Orders of an earlier life, some of which may lack their summary; and originals that were left in their places, which the store knows by
+    /// their device, and that may be another one by now.
+    fn remember_past(&mut self) -> Result<(), StoreError> {
+        let (now, mut after) = (Instant::now(), JobId(0));
+        loop {
+            let page = self.context.store.list(&Query { after, limit: PAGE, ..Query::default() })?;
+            let Some(last) = page.last() else { return Ok(()) };
+            after = last.id;
+            for job in &page {
+                if let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == job.source.folder) {
+                    kept.orders.remember(job, now);
+                    if job.kind().is_at_rest() && job.answers_for_source() {
+                        kept.reconciler.known(&job.source, job.id);
+                    }
+                }
+            }
+        }
     }
 
     /// The configuration was read anew: what of it the keeper works by, and what may go on now. Says what came of it, in one line.
@@ -253,13 +296,14 @@ impl<'a> Keeper<'a> {
         Ok(())
     }
 
-    /// Outside of the hours of work, few slots work, or none.
-    fn look_at_clock(&self) {
+    /// As many slots work as there are to be workers; outside of the hours of work few, or none.
+    fn look_at_clock(&mut self) {
         let config = self.context.settings.now();
         let is_open = config.run_window.is_open();
-        if self.context.schedule.limit(if is_open { usize::MAX } else { config.workers_outside }) {
-            let (run_window, workers) =
-                (config.run_window.to_string(), if is_open { config.workers } else { config.workers_outside });
+        let workers = if is_open { config.workers } else { config.workers_outside };
+        self.context.schedule.limit(workers);
+        if std::mem::replace(&mut self.is_open, is_open) != is_open {
+            let run_window = config.run_window.to_string();
             tracing::info!(run_window, workers, "The hours of work begin or end; jobs in work are finished.");
         }
     }
@@ -301,16 +345,45 @@ impl Kept {
         SCAN_AT_MOST_EVERY.max(self.scan_takes * 10)
     }
 
-    fn scan(&mut self, now: Instant) {
-        let found = self.folder.check().and_then(|()| self.reconciler.scan(now).map_err(|error| error.to_string()));
+    /// Has the system tell of changes in `in/`, as it is now, and of another one that takes its place.
+    fn watch(&mut self, context: &Context) {
+        let inbox = self.folder.inbox();
+        // A number of an inode is soon given again.
+        let there = std::fs::metadata(&inbox).ok().map(|found| (found.dev(), found.ino(), found.created().ok()));
+        if self.watched.is_some() && self.watched == there {
+            return;
+        }
+        (self.watched, self.watching, self.polled) = (there, None, fsx::needs_polling(&inbox));
+        if !self.polled {
+            match watcher(&self.folder, context.events.clone()) {
+                Ok(watching) => self.watching = Some(watching),
+                Err(error) => {
+                    tracing::warn!(folder = %self.folder.root.display(), %error, "The system does not tell of changes; polling.");
+                    self.polled = true;
+                }
+            }
+        }
+        (self.reconciler.rest, self.rescan) = pace(context, self.polled);
+    }
+
+    fn scan(&mut self, context: &Context, now: Instant) {
+        let here = self.folder.check().or_else(|_| self.folder.regain());
+        let found = here.and_then(|()| self.reconciler.scan(now).map_err(|error| self.unreadable(&error)));
+        let away = match &found {
+            Ok(_) => self.reconciler.left_out(),
+            Err(error) => vec![error.clone()],
+        };
+        context.away.lock().unwrap_or_else(PoisonError::into_inner).insert(self.folder.name.clone(), away);
         match found {
             Ok(gone) => {
                 if std::mem::take(&mut self.unavailable) {
                     tracing::info!(folder = %self.folder.root.display(), "The folder is back.");
                 }
                 self.gone.extend(gone);
+                self.watch(context);
             }
             Err(error) => {
+                self.watched = None;
                 if !std::mem::replace(&mut self.unavailable, true) {
                     tracing::error!(folder = %self.folder.root.display(), error, "The folder cannot be served; the others go on.");
                 }
@@ -318,14 +391,25 @@ impl Kept {
         }
     }
 
+    fn unreadable(&self, error: &io::Error) -> String {
+        format!("{}: cannot be read: {error}", self.folder.inbox().display())
+    }
+
+    /// Sums up the orders that are done, and of which nothing changed for `rest`.
+    fn sum_up(&mut self, context: &Context, now: Instant, rest: Duration) -> Result<(), StoreError> {
+        let reconciler = &self.reconciler;
+        self.orders.sum_up(&*context.store, now, rest, &|order| reconciler.is_settling_below(order))
+    }
+
     /// Scans and looks, as far as either is due.
     fn turn(&mut self, context: &Context, now: Instant) -> Result<(), StoreError> {
         let since = self.scanned.map(|then| now.duration_since(then));
-        let due = since.is_none_or(|since| since >= self.rescan || (self.dirty && since >= self.scan_at_most_every()));
+        let rescan = if self.unavailable { self.rescan.min(LOOK_FOR) } else { self.rescan };
+        let due = since.is_none_or(|since| since >= rescan || (self.dirty && since >= self.scan_at_most_every()));
         if due {
             self.scanned = Some(now);
             self.dirty = false;
-            self.scan(now);
+            self.scan(context, now);
             self.scan_takes = now.elapsed();
             if !self.renamed.is_empty() {
                 // Known now, so that it can count; and to be looked at at once.
@@ -336,6 +420,7 @@ impl Kept {
         for id in self.gone.drain(..) {
             control(context, id, Control::Forget)?;
         }
+        self.sum_up(context, now, self.reconciler.rest.settle)?;
         if now.duration_since(self.looked) < self.reconciler.rest.look_every() {
             return Ok(());
         }
@@ -350,8 +435,9 @@ impl Kept {
                 crash_point("daemon.submitted");
                 for ((path, submission), answer) in paths.iter().zip(&found).zip(submitted) {
                     if let (Some(what), true) = (&submission.foreign, answer.new) {
-                        tracing::info!(job = answer.id.0, file = %submission.source.path, what, "Left where it is.");
+                        tracing::warn!(job = answer.id.0, file = %submission.source.path, what, "Left where it is.");
                     }
+                    self.orders.came(&submission.source.path, answer.id, now);
                     self.reconciler.submitted(path, submission, answer.id);
                 }
             }
@@ -361,6 +447,7 @@ impl Kept {
                     match context.store.submit(std::slice::from_ref(submission)) {
                         Ok(answer) => {
                             for answer in answer {
+                                self.orders.came(&submission.source.path, answer.id, now);
                                 self.reconciler.submitted(path, submission, answer.id);
                             }
                         }
@@ -383,38 +470,10 @@ fn pace(context: &Context, polled: bool) -> (Rest, Duration) {
     (rest, config.rescan.unwrap_or(if polled { RESCAN_POLLED } else { RESCAN }))
 }
 
-fn control(context: &Context, id: suture_store::JobId, wish: Control) -> Result<(), StoreError> {
+fn control(context: &Context, id: JobId, wish: Control) -> Result<(), StoreError> {
     match context.store.control(id, wish) {
         Err(error) if !error.is_callers() => Err(error),
         // An operator was faster.
         _ => Ok(()),
     }
-}
-
-/// Passes on that something happened, and which names were renamed into place.
-fn watcher(inbox: &Path, events: Sender<Event>) -> notify::Result<Watching> {
-    let mut watcher = notify::recommended_watcher(move |event: notify::Result<notify::Event>| {
-        let hint = match event {
-            Ok(event) if matches!(event.kind, EventKind::Access(_)) => return,
-            Ok(event) => match event.kind {
-                EventKind::Modify(ModifyKind::Name(RenameMode::To)) => Event::Hint { renamed: event.paths },
-                EventKind::Modify(ModifyKind::Name(RenameMode::Both)) => {
-                    Event::Hint { renamed: event.paths.into_iter().skip(1).collect() }
-                }
-                _ => Event::Hint { renamed: Vec::new() },
-            },
-            // Lost events and the like: look for oneself.
-            Err(_) => Event::Hint { renamed: Vec::new() },
-        };
-        // The daemon is ending.
-        let _ = events.send(hint);
-    })?;
-    // notify 8.2 says nothing where its thread cannot start, and panics at the next word, and again when it is dropped: it is asked
-    // something harmless first, and never dropped (the process ends with it).
-    let watching = catch_unwind(AssertUnwindSafe(|| {
-        watcher.configure(notify::Config::default())?;
-        watcher.watch(inbox, RecursiveMode::Recursive)
-    }));
-    let watcher = ManuallyDrop::new(watcher);
-    watching.unwrap_or_else(|_| Err(notify::Error::generic("its thread could not start"))).map(|()| watcher)
 }

@@ -17,12 +17,15 @@ mod draft;
 mod exit;
 mod folder;
 mod fsx;
+mod ground;
+mod hints;
 mod item;
 mod jobs;
 mod keeper;
 mod logging;
 mod names;
 mod naming;
+mod orders;
 mod own_profile;
 mod place;
 mod profiles;
@@ -31,6 +34,8 @@ mod publish;
 mod publish_error;
 mod reach;
 mod receipt;
+mod remove;
+mod retention;
 mod reuse;
 mod rights;
 mod say;
@@ -41,6 +46,7 @@ mod settle;
 mod signals;
 mod single;
 mod standstill;
+mod superseded;
 mod supervise;
 mod table;
 mod units;
@@ -59,12 +65,13 @@ use exit::Exit;
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    logging::start(match cli.command {
+    let level = match cli.command {
         Command::Watch(_) => "info",
         // It shows results, good or bad, by itself.
         Command::Demo => "error",
         _ => "warn",
-    });
+    };
+    logging::start(level, cli.log_format);
     let exit = match &cli.command {
         Command::Repair(args) => single::repair(args),
         Command::Inspect(args) => single::inspect(args),
@@ -77,6 +84,7 @@ fn main() -> ExitCode {
         },
         Command::Watch(args) => watch::run(args),
         Command::Config(args) => config::command::run(&args.command),
+        Command::Retention(args) => retention::command::run(&args.file, &jobs::all),
         Command::Jobs(args) => jobs::run(args),
         Command::Demo => demo::run(),
     };

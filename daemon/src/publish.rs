@@ -24,9 +24,10 @@ use crate::fsx::{self, Identity};
 use crate::names::{BEST, COMPANION, Names, VERSIONS, best_of, companions, first, no_free_name, with_suffix};
 use crate::place::{Item, Move, Placed, stage};
 use crate::publish_error::{PublishError, io_at};
-use crate::receipt::{NoReport, RECEIPT, REPORT, Receipt, ReusedFrom, ReusedReport};
+use crate::receipt::{NoReport, RECEIPT, RECEIPT_VERSION, REPORT, Receipt, ReusedFrom, ReusedReport};
 use crate::reuse::recipe_of;
 use crate::rights::Rights;
+use crate::superseded;
 
 /// Names of an attempt's files in its folder.
 pub(crate) const OUTPUT: &str = "out.stl";
@@ -76,6 +77,7 @@ impl<'a> Desk<'a> {
             Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(io_at(&work)(e)),
             _ => {}
         }
+        superseded::clear(self.folder, job);
         let publication = self.prepare(job, result)?;
         // The files' names in it, and its own: without them the intent would be of nothing.
         for folder in [work.as_path(), fsx::folder_of(&work)] {
@@ -143,7 +145,7 @@ impl<'a> Desk<'a> {
     fn write_receipt(&self, job: &Job, p: &Publication, source_blake3: Option<Hash>) -> Result<(), PublishError> {
         let hold = job.hold().copied();
         let receipt = Receipt {
-            receipt_version: 1,
+            receipt_version: RECEIPT_VERSION,
             job: job.id.0,
             attempt: job.attempts.0,
             epoch: hold.map_or(0, |hold| hold.epoch.0),

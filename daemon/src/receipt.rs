@@ -1,10 +1,15 @@
 //! The small files that stand beside a result: the receipt (which job made it, from what, into what), and the report of a file
 //! for which the engine has none to give. With them the file system alone tells what was done, whatever becomes of the store.
 
-use serde::Serialize;
+use std::io::BufReader;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
 use suture_core::Report;
 use suture_core::report::SCHEMA_VERSION;
-use suture_store::{Ending, Hash, Job, JobId};
+use suture_store::{Ending, Hash, Job, JobId, RelPath};
+
+use crate::create;
 
 /// Appended to the result's name.
 pub(crate) const RECEIPT: &str = ".suture.json";
@@ -55,6 +60,34 @@ pub(crate) struct ReusedFrom {
     /// Its hot folder, and the name of its result below `out/`.
     pub folder: String,
     pub output: String,
+}
+
+/// The version of a [`Receipt`].
+pub(crate) const RECEIPT_VERSION: u32 = 1;
+/// No receipt is as long, in bytes.
+const LONGEST: u64 = 64 << 10;
+
+/// A receipt that was read again, as far as anyone needs it.
+#[derive(Debug, Deserialize)]
+pub(crate) struct Told {
+    receipt_version: u32,
+    #[serde(default)]
+    pub job: u64,
+    #[serde(default)]
+    pub folder: String,
+    #[serde(default)]
+    pub source: String,
+    pub output: Option<RelPath>,
+    pub output_blake3: Option<Hash>,
+    pub report_blake3: Option<Hash>,
+}
+
+/// The receipt in a file; `None` where there is none, or one of another version. A link is not followed.
+pub(crate) fn read(path: &Path) -> Option<Told> {
+    let file = create::open_to_read(path).ok()?;
+    let fits = file.metadata().is_ok_and(|meta| meta.is_file() && meta.len() <= LONGEST);
+    let told: Told = fits.then(|| serde_json::from_reader(BufReader::new(file)).ok())??;
+    (told.receipt_version == RECEIPT_VERSION).then_some(told)
 }
 
 /// The report of a file that never got as far as the engine's own: unreadable, refused, put off for good, or quarantined.

@@ -176,7 +176,7 @@ mod tests {
     impl Kitchen {
         fn new(ending: Ending, change: impl Fn(&mut Report)) -> Self {
             let dir = tempfile::tempdir().unwrap();
-            let folder = Folder::open(&FolderConfig { name: "hot".into(), ..FolderConfig::of(dir.path()) }).unwrap();
+            let folder = Folder::open(&FolderConfig { name: "hot".into(), ..FolderConfig::of(dir.path()) }, None).unwrap();
             let mut report = crate::table::tests::sample(Outcome::Repaired);
             (report.engine_version, report.profile) = (ENGINE.into(), Profile::default());
             report.input.blake3 = hash(DROPPED).to_string();

@@ -20,8 +20,11 @@ use crate::settings::Settings;
 use crate::settle::{Look, Rest, Settling, length_fits};
 use crate::writers::Writers;
 
-/// Sub-folders are searched to this depth.
-const DEPTH: usize = 8;
+/// Sub-folders are searched to this depth: more than a path that a record can hold has room for in practice.
+const DEPTH: usize = 64;
+
+/// So many names that cannot be taken are told of.
+const LEFT_OUT: usize = 20;
 
 /// What is known of one name in `in/`.
 #[derive(Debug)]
@@ -30,8 +33,8 @@ enum Entry {
     Settling { state: Settling, foreign: Option<String> },
     /// A job answers for it.
     Submitted { id: JobId, identity: Identity, foreign: bool },
-    /// It cannot become a job; said once.
-    Unrecordable { identity: Identity },
+    /// It cannot become a job, for this reason; said once in the log.
+    Unrecordable { identity: Identity, reason: String },
 }
 
 /// Looks after one hot folder's `in/`.
@@ -43,13 +46,13 @@ pub(crate) struct Reconciler {
     entries: BTreeMap<PathBuf, Entry>,
     /// Sub-folders whose unknown profile was named in the log.
     warned: BTreeSet<String>,
-    /// Sub-folders that could not be read: what is in them is not gone.
-    unreadable: BTreeSet<PathBuf>,
+    /// Sub-folders that could not be read, and why: what is in them is not gone.
+    unreadable: BTreeMap<PathBuf, String>,
 }
 
 impl Reconciler {
     pub(crate) fn new(folder: Arc<Folder>, settings: Arc<Settings>, rest: Rest) -> Self {
-        Self { folder, settings, rest, entries: BTreeMap::new(), warned: BTreeSet::new(), unreadable: BTreeSet::new() }
+        Self { folder, settings, rest, entries: BTreeMap::new(), warned: BTreeSet::new(), unreadable: BTreeMap::new() }
     }
 
     /// A job of an earlier life answers for this file already: it need not settle again, and when the job ends while the folder
@@ -69,15 +72,15 @@ impl Reconciler {
         let mut found = Found::default();
         found.walk(&self.folder.inbox(), Path::new(""), DEPTH)?;
         for (path, reason) in &found.unreadable {
-            if !self.unreadable.contains(path) {
+            if !self.unreadable.contains_key(path) {
                 tracing::warn!(sub_folder = %path.display(), reason, "A sub-folder cannot be read.");
             }
         }
-        self.unreadable = found.unreadable.into_keys().collect();
+        self.unreadable = found.unreadable;
         let (unreadable, found) = (&self.unreadable, found.files);
         let mut gone = Vec::new();
         self.entries.retain(|path, entry| {
-            let stays = found.contains_key(path) || unreadable.iter().any(|folder| path.starts_with(folder));
+            let stays = found.contains_key(path) || unreadable.keys().any(|folder| path.starts_with(folder));
             if let (false, Entry::Submitted { id, foreign: true, .. }) = (stays, entry) {
                 gone.push(*id);
             }
@@ -87,9 +90,9 @@ impl Reconciler {
             let known = match self.entries.get(&path) {
                 // Its identity is looked at where it settles.
                 Some(Entry::Settling { .. }) => true,
-                // A claim's hard link changes ctime, which says nothing here.
-                Some(Entry::Submitted { identity: old, .. } | Entry::Unrecordable { identity: old }) => {
-                    old.same_content(&identity)
+                // A claim's hard link changes ctime, which says nothing here; nor does the number of a device.
+                Some(Entry::Submitted { identity: old, .. } | Entry::Unrecordable { identity: old, .. }) => {
+                    old.same_but_for_device(&identity)
                 }
                 None => false,
             };
@@ -174,7 +177,7 @@ impl Reconciler {
 
     fn give_up(&mut self, path: &Path, identity: Identity, reason: &str) {
         tracing::warn!(folder = %self.folder.name, file = %path.display(), reason, "A file cannot be taken and stays where it is.");
-        self.entries.insert(path.to_owned(), Entry::Unrecordable { identity });
+        self.entries.insert(path.to_owned(), Entry::Unrecordable { identity, reason: reason.to_owned() });
     }
 
     /// A job ended: should its name be seen again, it is a new drop.
@@ -185,6 +188,25 @@ impl Reconciler {
     /// Is anything on its way to rest?
     pub(crate) fn is_settling(&self) -> bool {
         self.entries.values().any(|entry| matches!(entry, Entry::Settling { .. }))
+    }
+
+    /// A line for each name in `in/` that cannot be taken, a few at most.
+    pub(crate) fn left_out(&self) -> Vec<String> {
+        let inbox = self.folder.inbox();
+        let line = |path: &Path, reason: &str| format!("{}: {reason}", inbox.join(path).display());
+        let folders = self.unreadable.iter().map(|(path, reason)| line(path, reason));
+        let files = self.entries.iter().filter_map(|(path, entry)| match entry {
+            Entry::Unrecordable { reason, .. } => Some(line(path, reason)),
+            _ => None,
+        });
+        folders.chain(files).take(LEFT_OUT).collect()
+    }
+
+    /// Is anything below this sub-folder on its way to rest, or cannot be seen?
+    pub(crate) fn is_settling_below(&self, folder: &Path) -> bool {
+        let below = self.entries.range(folder.to_owned()..).take_while(|(path, _)| path.starts_with(folder));
+        let hidden = self.unreadable.keys().any(|path| path.starts_with(folder) || folder.starts_with(path));
+        hidden || below.into_iter().any(|(_, entry)| matches!(entry, Entry::Settling { .. }))
     }
 
     fn source(&mut self, path: RelPath, identity: &Identity) -> Source {
@@ -250,9 +272,9 @@ impl Found {
                     continue;
                 }
                 // A sub-folder that cannot be read does not hide the others.
-                if depth > 0
-                    && let Err(error) = self.walk(root, &path, depth - 1)
-                {
+                if depth == 0 {
+                    self.unreadable.insert(path, format!("it lies deeper than {DEPTH} folders"));
+                } else if let Err(error) = self.walk(root, &path, depth - 1) {
                     self.unreadable.insert(path, error.to_string());
                 }
                 continue;
@@ -291,7 +313,7 @@ mod tests {
 
     fn reconciler(root: &Path) -> Reconciler {
         let settings = Settings::fixed(Config::for_folder(root));
-        let folder = Folder::open(&FolderConfig { name: "hot".into(), ..FolderConfig::of(root) }).unwrap();
+        let folder = Folder::open(&FolderConfig { name: "hot".into(), ..FolderConfig::of(root) }, None).unwrap();
         Reconciler::new(Arc::new(folder), Arc::new(settings), Rest { settle: Duration::from_secs(1) })
     }
 
@@ -360,6 +382,44 @@ mod tests {
         std::fs::write(dir.path().join("in/a.stl"), [0; 85]).unwrap();
         next.scan(Instant::now()).unwrap();
         assert!(next.is_settling(), "another content is another drop");
+    }
+
+    #[test]
+    fn deep_folders_are_searched_and_what_cannot_be_taken_is_told_of() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut r = reconciler(dir.path());
+        let inbox = dir.path().join("in");
+        let deep = |depth: usize| inbox.join("d/".repeat(depth));
+        std::fs::create_dir_all(deep(DEPTH + 2)).unwrap();
+        mesh(&deep(12).join("a.stl"));
+        mesh(&deep(DEPTH).join("b.stl"));
+        mesh(&deep(DEPTH + 1).join("lost.stl"));
+        let long = inbox.join("n".repeat(250)).join("n".repeat(250)).join("n".repeat(200));
+        std::fs::create_dir_all(&long).unwrap();
+        mesh(&long.join("c.stl"));
+        let start = Instant::now();
+        let found = settle(&mut r, start);
+        let names: BTreeSet<_> = found.iter().map(|(path, _)| path.file_name().unwrap().to_owned()).collect();
+        assert_eq!(names.into_iter().collect::<Vec<_>>(), ["a.stl", "b.stl"]);
+        let left = r.left_out();
+        assert_eq!(left.len(), 2, "{left:?}");
+        assert!(left[0].ends_with("it lies deeper than 64 folders") && left[1].contains("c.stl: longer than"), "{left:?}");
+    }
+
+    /// An original that is left in its place, on a disk that is another device since: taken once.
+    #[test]
+    fn a_file_of_a_disk_that_was_mounted_anew_is_known() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut r = reconciler(dir.path());
+        mesh(&dir.path().join("in/a.stl"));
+        let mut source = settle(&mut r, Instant::now()).remove(0).1.source;
+        source.dev += 1;
+        let mut next = Reconciler::new(Arc::clone(&r.folder), Arc::clone(&r.settings), r.rest);
+        next.known(&source, JobId(1));
+        assert!(settle(&mut next, Instant::now()).is_empty());
+        source.ino += 1;
+        next.known(&source, JobId(1));
+        assert!(!settle(&mut next, Instant::now()).is_empty(), "another file");
     }
 
     #[test]

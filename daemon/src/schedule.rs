@@ -63,6 +63,9 @@ pub(crate) struct Standing {
     pub running: usize,
     /// Why nothing new is taken, in words; empty: it is.
     pub held: Vec<String>,
+    /// Why folders are out of reach, in words.
+    #[serde(default)]
+    pub away: Vec<String>,
 }
 
 /// Turns of all slots.
@@ -189,7 +192,8 @@ impl Schedule {
     pub(crate) fn standing(&self) -> Standing {
         let state = self.lock();
         let hours = (state.most == 0).then(|| "it is outside of the hours of `run_window`".to_owned());
-        Standing { running: state.busy, held: state.held.iter().flatten().cloned().chain(hours).collect() }
+        let held = state.held.iter().flatten().cloned().chain(hours).collect();
+        Standing { running: state.busy, held, away: Vec::new() }
     }
 
     /// Gives nothing out any more.
@@ -324,7 +328,7 @@ mod tests {
         let s = Schedule::new();
         assert!(s.hold(Hold::Disk, Some("full".into())) && s.hold(Hold::Operator, Some("wanted".into())));
         assert!(!s.hold(Hold::Disk, Some("still full".into())), "no news");
-        assert_eq!(s.standing(), Standing { running: 0, held: vec!["still full".into(), "wanted".into()] });
+        assert_eq!(s.standing().held, ["still full", "wanted"]);
         assert!(s.hold(Hold::Disk, None) && s.is_paused() && !s.lock().may_give());
         assert!(s.hold(Hold::Operator, None) && !s.is_paused());
         assert_eq!(next(&s, waits(5, 0, 0)), Turn::Small);

@@ -84,14 +84,11 @@ fn from_args(args: &WatchArgs) -> Result<Config, String> {
     Ok(config)
 }
 
-/// What differs and cannot change while the daemon runs: it holds the lock of each folder and of the store, and a thread for each worker.
+/// What differs and cannot change while the daemon runs: it holds the lock of each folder and of the store.
 fn fixed(old: &Config, new: &Config) -> Vec<String> {
     let mut fixed = Vec::new();
     if real(&old.state) != real(&new.state) {
         fixed.push("`state`".to_owned());
-    }
-    if old.workers != new.workers {
-        fixed.push("`workers`".to_owned());
     }
     let places = |config: &Config| -> BTreeMap<String, (PathBuf, bool)> {
         config.folders.iter().map(|folder| (folder.name.clone(), (real(&folder.path), folder.leave_originals))).collect()
@@ -165,10 +162,11 @@ mod tests {
     fn what_changed_is_in_force_and_told() {
         let text = FIRST.replace("1GiB", "2GiB").replace("= 9", "= 8").replace("\"resin\"", "\"thin\"");
         let text = text.replace("profile = \"thin\"", "profile = \"thin\"\npriority = 7");
-        let text = format!("settle = \"1s\"\ndrain = 5\ntime_limit.base = \"1h\"\n{text}[profiles.thin]\n");
+        let text = format!("workers = 3\nsettle = \"1s\"\ndrain = 5\ntime_limit.base = \"1h\"\n{text}[profiles.thin]\n");
         let (reload, before, after) = reloaded(&text, &[]);
         let expected = [
             "memory \"1GiB\" -> \"2GiB\"",
+            "workers 2 -> 3",
             "settle \"auto\" -> \"1s\"",
             "drain \"1m\" -> \"5s\"",
             "time_limit.base \"2m\" -> \"1h\"",
@@ -216,7 +214,6 @@ mod tests {
         let first = FIRST.replace("1GiB", "2GiB");
         for (text, words) in [
             (format!("state = \"/nowhere/state\"\n{first}"), "changes `state`"),
-            (format!("workers = 3\n{first}"), "changes `workers`"),
             (format!("{first}[[folders]]\npath = \"/nowhere/b\"\n"), "changes the folder `b`"),
             (first.replace("/nowhere/a", "/nowhere/c"), "changes `state`, the folder `a`, the folder `c`"),
             (first.replace("profile =", "name = \"d\"\nprofile ="), "changes the folder `a`, the folder `d`"),

@@ -38,7 +38,7 @@ pub(crate) fn parse_size(text: &str) -> Result<u64, String> {
     Ok(bytes as u64)
 }
 
-/// A duration from `5s`, `300ms`, `2m`, `1h`, `10` (seconds).
+/// A duration from `5s`, `300ms`, `2m`, `1h`, `90d`, `10` (seconds).
 ///
 /// # Errors
 /// A line for people when the text is no duration.
@@ -50,6 +50,7 @@ pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
         "" | "s" => 1.0,
         "m" | "min" => 60.0,
         "h" => 3600.0,
+        "d" => 24.0 * 3600.0,
         _ => return Err(bad()),
     };
     Duration::try_from_secs_f64(number * factor).map_err(|_| bad())
@@ -71,6 +72,7 @@ pub(crate) fn write_duration(duration: Duration) -> String {
         (0, 0) => "0s".into(),
         (0, rest) if rest.is_multiple_of(1_000_000) => format!("{}ms", rest / 1_000_000),
         (_, 1..) => format!("{}s", duration.as_secs_f64()),
+        (seconds, 0) if seconds.is_multiple_of(24 * 3600) => format!("{}d", seconds / (24 * 3600)),
         (seconds, 0) if seconds.is_multiple_of(3600) => format!("{}h", seconds / 3600),
         (seconds, 0) if seconds.is_multiple_of(60) => format!("{}m", seconds / 60),
         (seconds, 0) => format!("{seconds}s"),

@@ -6,29 +6,38 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, ScopedJoinHandle};
 use std::time::{Duration, Instant};
 
 use crossbeam::channel::unbounded;
 use suture_store::job::{Kind, Testimony};
-use suture_store::{JobStore, Query, SledStore, StoreError, crash_point};
+use suture_store::{Clock, JobStore, Query, SledStore, StoreError, SystemClock, crash_point};
 
 use crate::again::Lives;
 use crate::attempt::{Context, IN_HAND, Slot, WITNESS, remove_work};
 use crate::cli::WatchArgs;
-use crate::config::{Config, default_state};
+use crate::config::{Config, default_state, real};
 use crate::control::Door;
 use crate::create;
 use crate::exit::Exit;
 use crate::folder::{Folder, FolderError, is_fading};
 use crate::fsx;
+use crate::ground::{note_traces, read_traces};
 use crate::keeper::Keeper;
+use crate::retention::sweep::Sweeper;
+use crate::retention::turns::Moment;
 use crate::say::complain;
 use crate::schedule::{Hold, Schedule, Turn};
 use crate::settings::Settings;
 use crate::signals::{Hangup, Stop};
 use crate::{standstill, watchdog};
+
+/// How often what is gone is looked for.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
+
+/// Bytes that must be free for the store to be opened again.
+const ROOM: u64 = 256 << 10;
 
 /// Runs the daemon to its end.
 pub(crate) fn run(args: &WatchArgs) -> Exit {
@@ -53,9 +62,9 @@ pub(crate) fn run(args: &WatchArgs) -> Exit {
 /// was started with.
 pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew: bool) -> Exit {
     let config = settings.now();
-    let mut folders = Vec::new();
+    let (mut folders, known) = (Vec::new(), read_traces(&config.state));
     for folder in &config.folders {
-        match Folder::open(folder) {
+        match Folder::open(folder, known.get(&folder.name)) {
             Ok(folder) => folders.push(Arc::new(folder)),
             Err(error) => {
                 complain(&error);
@@ -81,6 +90,7 @@ pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew:
         }
     };
     note_state(&config, &folders);
+    note_folders(&config, &folders);
     let settings = Arc::new(settings);
     let daemon = Daemon { settings, folders, store, once, lives, not_good, stop: stop.clone(), may_begin_anew };
     daemon.run()
@@ -113,7 +123,7 @@ fn store_failed(error: &StoreError) -> Exit {
 
 /// Tells `suture jobs` where the store is, if it is not where it would look.
 fn note_state(config: &Config, folders: &[Arc<Folder>]) {
-    for folder in folders {
+    for folder in folders.iter().filter(|folder| folder.check().is_ok()) {
         let note = folder.root.join(".suture").join("state-path");
         let state = std::path::absolute(&config.state).unwrap_or_else(|_| config.state.clone());
         let result = if state == default_state(&folder.root) {
@@ -124,6 +134,14 @@ fn note_state(config: &Config, folders: &[Arc<Folder>]) {
         if let Err(error) = result {
             tracing::warn!(%error, file = %note.display(), "The place of the job store could not be noted.");
         }
+    }
+}
+
+/// Notes what tells the folders again, so that the next daemon knows one whose mount is gone.
+fn note_folders(config: &Config, folders: &[Arc<Folder>]) {
+    let traces = folders.iter().map(|folder| (folder.name.clone(), folder.trace())).collect();
+    if let Err(error) = note_traces(&config.state, &traces) {
+        tracing::warn!(%error, "What tells the folders again could not be noted.");
     }
 }
 
@@ -156,11 +174,28 @@ impl Daemon {
             End::Rest => Exit::Good,
             End::Store(error) => {
                 tracing::error!(%error, "The job store failed.");
+                self.wait_for_store();
                 if self.may_begin_anew {
                     lives.begin_another(born.elapsed(), self.not_good.load(Ordering::Relaxed), &|| self.stop.asked());
                 }
                 store_failed(&error)
             }
+        }
+    }
+
+    /// Waits until there is room for the store, and the mount that its folder lies on: a new life could do nothing on a full disk, and would
+    /// take the bare folder under a mount for an empty one.
+    fn wait_for_store(&self) {
+        let state = real(&self.settings.now().state);
+        let folder = self.folders.iter().find(|folder| state.starts_with(real(&folder.root)));
+        let full = || (fsx::free_space(&state, 0) < ROOM).then(|| format!("the disk of {} is full", state.display()));
+        let why = || folder.and_then(|folder| folder.missing()).or_else(full);
+        let mut told = false;
+        while let Some(reason) = why().filter(|_| !self.once && !self.stop.asked()) {
+            if !std::mem::replace(&mut told, true) {
+                tracing::error!(reason, "The job store waits; nothing is done until it can be opened again.");
+            }
+            std::thread::sleep(LOOK_EVERY);
         }
     }
 
@@ -171,23 +206,28 @@ impl Daemon {
             folders: self.folders.clone(),
             settings: Arc::clone(&self.settings),
             schedule: Schedule::new(),
-            events: events.clone(),
+            events,
             once: self.once,
             halt: AtomicBool::new(false),
             not_good: Arc::clone(&self.not_good),
+            away: Mutex::default(),
             failed: Mutex::new(None),
         };
         if let Err(error) = guarded(|| recover(&context)) {
             return End::Store(error);
         }
-        let mut keeper = Keeper::new(&context, events, inbox, &self.stop);
+        let mut keeper = Keeper::new(&context, inbox, &self.stop);
         let ended = AtomicBool::new(false);
         std::thread::scope(|scope| {
+            let slots = Slots { scope, context: &context, threads: Mutex::default() };
             let threads = self.start(scope, &context, &ended);
-            let kept = threads.and_then(|slots| guarded(|| keeper.keep()).map(|()| slots));
+            let kept = threads.and_then(|()| guarded(|| keeper.keep(&|workers| slots.raise(workers))));
             context.schedule.stop();
             match kept {
-                Ok(slots) => self.drain(&context, &slots),
+                Ok(()) => {
+                    self.drain(&context, &slots);
+                    self.sweep_once(&context);
+                }
                 Err(error) => context.fail(error),
             }
             ended.store(true, Ordering::Relaxed);
@@ -201,50 +241,49 @@ impl Daemon {
 }
 
 impl Daemon {
-    /// Starts the threads that work on jobs, and one a folder that answers `suture jobs`.
+    /// Starts the thread that lets go what is to go, and one a folder that answers `suture jobs`.
     fn start<'s>(
         &'s self,
         scope: &'s std::thread::Scope<'s, '_>,
         context: &'s Context,
         ended: &'s AtomicBool,
-    ) -> Result<Vec<ScopedJoinHandle<'s, ()>>, StoreError> {
-        let thread = |name: &str| Builder::new().name(name.into());
-        let failed = |source| StoreError::Io { path: "thread".into(), action: "starting one", source };
+    ) -> Result<(), StoreError> {
         for folder in &self.folders {
-            match Door::open(&folder.root) {
-                Ok(door) => {
-                    let serve = move || {
-                        let served = guarded(|| {
-                            door.serve(context, &|| ended.load(Ordering::Relaxed));
-                            Ok(())
-                        });
-                        served.unwrap_or_else(|error| context.fail(error));
-                    };
-                    thread("door").spawn_scoped(scope, serve).map(drop).map_err(failed)?;
-                }
-                Err(error) => tracing::warn!(%error, "`suture jobs` cannot reach this daemon."),
-            }
+            let serve = move || {
+                let served = guarded(|| {
+                    answer_at(folder, context, &|| ended.load(Ordering::Relaxed));
+                    Ok(())
+                });
+                served.unwrap_or_else(|error| context.fail(error));
+            };
+            thread("door").spawn_scoped(scope, serve).map(drop).map_err(no_thread)?;
         }
-        // Only now: whoever found no one to answer has noted the pause before this look, or is answered.
-        if standstill::is_set(&self.settings.now().state) {
-            context.schedule.hold(Hold::Operator, Some(standstill::WORDS.into()));
-            tracing::warn!("Nothing new is taken: {}.", standstill::WORDS);
-        }
-        let slot = || {
-            let worked = guarded(|| {
-                Slot::new(context).run();
-                Ok(())
-            });
-            // The job in work is taken up by the next life.
-            worked.unwrap_or_else(|error| context.fail(error));
+        // Before anything is taken, whether a door opens or not.
+        look_for_pause(context);
+        let sweep = move || {
+            let clock = || Moment { steady: Instant::now(), wall: SystemClock.now() };
+            let swept = guarded(|| sweeper(context).tend(&clock, &|| ended.load(Ordering::Relaxed) || context.has_failed()));
+            swept.unwrap_or_else(|error| context.fail(error));
         };
-        (0..self.settings.now().workers).map(|_| thread("slot").spawn_scoped(scope, slot).map_err(failed)).collect()
+        if !self.once {
+            thread("sweeper").spawn_scoped(scope, sweep).map(drop).map_err(no_thread)?;
+        }
+        Ok(())
+    }
+
+    /// With `--once`, what is to go goes at the end, if all came to it.
+    fn sweep_once(&self, context: &Context) {
+        let stop = || self.stop.asked() || context.has_failed();
+        if self.once && !stop() {
+            let swept = guarded(|| sweeper(context).sweep(SystemClock.now(), &stop).map(drop));
+            swept.unwrap_or_else(|error| context.fail(error));
+        }
     }
 
     /// Lets running jobs finish, for as long as they are given.
-    fn drain(&self, context: &Context, slots: &[ScopedJoinHandle<()>]) {
+    fn drain(&self, context: &Context, slots: &Slots) {
         let deadline = Instant::now().checked_add(self.settings.now().drain);
-        while slots.iter().any(|slot| !slot.is_finished()) {
+        while slots.are_at_work() {
             let is_over = deadline.is_some_and(|deadline| Instant::now() >= deadline);
             if is_over && !context.halt.swap(true, Ordering::Relaxed) {
                 tracing::warn!("The time to finish running jobs is over; they go back into the queue.");
@@ -252,6 +291,82 @@ impl Daemon {
             std::thread::sleep(Duration::from_millis(10));
         }
     }
+}
+
+fn thread(name: &str) -> Builder {
+    Builder::new().name(name.into())
+}
+
+fn no_thread(source: std::io::Error) -> StoreError {
+    StoreError::Io { path: "thread".into(), action: "starting one", source }
+}
+
+/// The threads that work on jobs.
+struct Slots<'s, 'e> {
+    scope: &'s std::thread::Scope<'s, 'e>,
+    context: &'s Context,
+    threads: Mutex<Vec<ScopedJoinHandle<'s, ()>>>,
+}
+
+impl<'s> Slots<'s, '_> {
+    fn threads(&self) -> MutexGuard<'_, Vec<ScopedJoinHandle<'s, ()>>> {
+        self.threads.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Sees to it that there are so many. Those that are there stay: the schedule lets no more work than may.
+    fn raise(&self, workers: usize) -> Result<(), StoreError> {
+        let context = self.context;
+        let mut threads = self.threads();
+        while threads.len() < workers {
+            let slot = move || {
+                let worked = guarded(|| {
+                    Slot::new(context).run();
+                    Ok(())
+                });
+                // The job in work is taken up by the next life.
+                worked.unwrap_or_else(|error| context.fail(error));
+            };
+            threads.push(thread("slot").spawn_scoped(self.scope, slot).map_err(no_thread)?);
+        }
+        Ok(())
+    }
+
+    fn are_at_work(&self) -> bool {
+        self.threads().iter().any(|slot| !slot.is_finished())
+    }
+}
+
+/// Takes nothing new where an operator has noted that for the next daemon.
+fn look_for_pause(context: &Context) {
+    let is_set = standstill::is_set(&context.settings.now().state);
+    if is_set && context.schedule.hold(Hold::Operator, Some(standstill::WORDS.into())) {
+        tracing::warn!("Nothing new is taken: {}.", standstill::WORDS);
+    }
+}
+
+/// Answers `suture jobs` at one folder, until `ended`. A folder that was away gets a new door.
+fn answer_at(folder: &Folder, context: &Context, ended: &dyn Fn() -> bool) {
+    let mut told = false;
+    while !ended() {
+        let door = folder.check().ok().map(|()| Door::open(&folder.root));
+        match door {
+            Some(Ok(door)) => {
+                // Again: whoever found no door has noted the pause before this look, or is answered.
+                look_for_pause(context);
+                door.serve(context, &|| ended() || (door.is_lost() && folder.check().is_ok()));
+            }
+            Some(Err(error)) if !std::mem::replace(&mut told, true) => {
+                tracing::warn!(%error, "`suture jobs` cannot reach this daemon.");
+            }
+            _ => {}
+        }
+        std::thread::sleep(LOOK_EVERY);
+    }
+}
+
+/// Whoever lets go what is to go.
+fn sweeper(context: &Context) -> Sweeper<'_> {
+    Sweeper::new(&*context.store, &context.folders, &context.settings)
 }
 
 /// A thread that ends in a panic, for want of another thread or by a defect, must not leave the others waiting: the daemon ends with it,

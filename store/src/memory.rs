@@ -132,6 +132,10 @@ impl JobStore for MemoryStore {
         Ok(())
     }
 
+    fn forget(&self, ids: &[JobId]) -> Result<u64, StoreError> {
+        self.queue.forget(ids)
+    }
+
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {
         self.queue.counts()
     }

@@ -25,8 +25,10 @@ use crate::record;
 use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted, Waiting};
 use crate::tables::{Put, Table, Tables};
 
+mod forget;
 mod index;
 mod line;
+mod offered;
 mod results;
 
 use line::{Line, Now};
@@ -435,18 +437,15 @@ impl<T: Tables> JobStore for Queue<T> {
     }
 
     fn results(&self, size: u64, recipe: Option<Recipe>) -> Result<Vec<Job>, StoreError> {
-        let mut jobs = Vec::new();
-        for id in results::latest(&self.tables, size, recipe)? {
-            let job = self.known(id)?;
-            if job.source.size == size && job.offers().is_some_and(|offered| recipe.is_none_or(|recipe| recipe == offered)) {
-                jobs.push(job);
-            }
-        }
-        Ok(jobs)
+        self.offered(size, recipe)
     }
 
     fn check(&self) -> Result<(), StoreError> {
         self.tables.sound()
+    }
+
+    fn forget(&self, ids: &[JobId]) -> Result<u64, StoreError> {
+        self.drop_records(ids)
     }
 
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {

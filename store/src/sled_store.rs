@@ -164,6 +164,10 @@ impl JobStore for SledStore {
         files::check_lock(&self.state, &self.lock.0)
     }
 
+    fn forget(&self, ids: &[JobId]) -> Result<u64, StoreError> {
+        self.queue.forget(ids)
+    }
+
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {
         self.queue.counts()
     }

@@ -92,6 +92,13 @@ pub trait JobStore: Send + Sync {
     /// [`StoreError::Unusable`] when it was moved or removed meanwhile: what is written to it, no one finds again.
     fn check(&self) -> Result<(), StoreError>;
 
+    /// Removes the records of jobs that are at rest ([`Kind::is_at_rest`]), durably; any other stays. Returns how many were removed. The
+    /// caller sees to it that none of them answers for a file that still lies where it was dropped: it would be taken for a new one.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn forget(&self, ids: &[JobId]) -> Result<u64, StoreError>;
+
     /// How many jobs there are of each kind, in the order of [`Kind::ALL`].
     ///
     /// # Errors

@@ -7,6 +7,7 @@ use crate::store::StoreError;
 
 mod claims;
 mod deaths;
+mod history;
 mod results;
 mod tools;
 
@@ -19,7 +20,7 @@ type Check = fn(&mut dyn Subject, &ManualClock) -> Result<(), StoreError>;
 /// # Panics
 /// When the store does not do what [`JobStore`] promises.
 pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
-    let checks: [(&str, Check); 17] = [
+    let checks: [(&str, Check); 19] = [
         ("submission is idempotent", claims::submission_is_idempotent),
         ("a file that came back is new", claims::a_file_that_came_back_is_new),
         ("the oldest that fits is claimed", claims::the_oldest_that_fits_is_claimed),
@@ -37,6 +38,8 @@ pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
         ("results on their way are finished", results::results_on_their_way_are_finished),
         ("lists and counts agree", results::lists_and_counts_agree),
         ("threads get different jobs", results::threads_get_different_jobs),
+        ("what is at rest can be forgotten", history::what_is_at_rest_can_be_forgotten),
+        ("forgetting one job leaves the next of its file", history::forgetting_one_job_leaves_the_next_of_its_file),
     ];
     for (name, check) in checks {
         let clock = Arc::new(ManualClock::new(Time(1_000_000)));

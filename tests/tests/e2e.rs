@@ -2,6 +2,7 @@
 
 #[cfg(test)]
 mod e2e {
+    mod away;
     mod cases;
     mod config;
     mod files;
@@ -9,8 +10,10 @@ mod e2e {
     mod malformed;
     mod many;
     mod memory;
+    mod orders;
     mod profiles;
     mod queue;
+    mod retention;
     mod reuse;
     mod same_bytes;
     mod soups;

@@ -9,6 +9,7 @@ use suture_core::Profile;
 use suture_store::Priority;
 use toml::Spanned;
 
+use super::keep::{Bound, Keep};
 use super::{Config, DEFAULT_PROFILE, FolderConfig, name_of, real};
 use crate::own_profile::OwnProfile;
 use crate::profiles::{self, place_of, with_line};
@@ -38,6 +39,7 @@ struct File {
     run_window: Option<RunWindow>,
     workers_outside: Option<Spanned<u16>>,
     reuse: Option<bool>,
+    keep: Option<Spanned<KeepFile>>,
     #[serde(default)]
     profiles: BTreeMap<String, Spanned<OwnProfile>>,
 }
@@ -63,6 +65,21 @@ struct FolderFile {
 struct TimeLimitFile {
     base: Option<Time>,
     per_gib: Option<Time>,
+}
+
+/// Files have no bound unless it is said.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct KeepFile {
+    results: Option<Time>,
+    results_size: Option<Size>,
+    reports: Option<Time>,
+    reports_size: Option<Size>,
+    originals: Option<Time>,
+    originals_size: Option<Size>,
+    archive: Option<PathBuf>,
+    history: Option<Time>,
+    history_jobs: Option<Count64>,
 }
 
 /// A number, or text with a unit.
@@ -91,6 +108,19 @@ impl<'de> Deserialize<'de> for Count {
         match u16::deserialize(d)? {
             0 => Err(de::Error::custom("must be at least 1")),
             count => Ok(Self(count.into())),
+        }
+    }
+}
+
+/// How many, at least one, of what there may be very many.
+#[derive(Debug)]
+struct Count64(u64);
+
+impl<'de> Deserialize<'de> for Count64 {
+    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        match u64::deserialize(d)? {
+            0 => Err(de::Error::custom("must be at least 1")),
+            count => Ok(Self(count)),
         }
     }
 }
@@ -176,11 +206,49 @@ fn from_text(text: &str) -> Result<Config, String> {
     config.workers_outside = file.workers_outside.map_or(0, |count| count.into_inner().into());
     config.reuse = file.reuse.unwrap_or(config.reuse);
     config.run_window = file.run_window.unwrap_or_default();
+    if let Some(of_file) = file.keep {
+        config.keep = keep(text, of_file, &config.folders)?;
+    }
     if let Some(TimeLimitFile { base, per_gib }) = file.time_limit {
         config.time_limit.base = base.map_or(config.time_limit.base, |time| time.0);
         config.time_limit.per_gib = per_gib.map_or(config.time_limit.per_gib, |time| time.0);
     }
     Ok(config)
+}
+
+fn keep(text: &str, of_file: Spanned<KeepFile>, folders: &[FolderConfig]) -> Result<Keep, String> {
+    let (from, of_file) = (of_file.span().start, of_file.into_inner());
+    let bound = |age: Option<Time>, size: Option<Size>| Bound { age: age.map(|age| age.0), size: size.map(|size| size.0) };
+    let keep = Keep {
+        results: bound(of_file.results, of_file.results_size),
+        reports: bound(of_file.reports, of_file.reports_size),
+        originals: bound(of_file.originals, of_file.originals_size),
+        archive: of_file.archive,
+        history: of_file.history.map(|time| time.0),
+        history_jobs: of_file.history_jobs.map_or(Keep::default().history_jobs, |count| count.0),
+    };
+    let wrong = |setting, what: &str| Err(with_line(text, place_of(text, from, setting), what));
+    match &keep.archive {
+        None if !keep.originals.is_open() => wrong(
+            "originals",
+            "an original is never deleted, only moved to an archive; add `archive = \"/path\"`, or leave this out",
+        ),
+        Some(archive) => {
+            let archive = real(archive);
+            let near = |folder: &&FolderConfig| {
+                let root = real(&folder.path);
+                archive.starts_with(&root) || root.starts_with(&archive)
+            };
+            match folders.iter().find(near) {
+                Some(folder) => wrong(
+                    "archive",
+                    &format!("it must lie beside the hot folder {}, not in it or around it", folder.path.display()),
+                ),
+                None => Ok(keep),
+            }
+        }
+        None => Ok(keep),
+    }
 }
 
 fn own_profiles(text: &str, of_file: BTreeMap<String, Spanned<OwnProfile>>) -> Result<BTreeMap<String, OwnProfile>, String> {
@@ -314,6 +382,27 @@ mod tests {
                 "line 5, `weld_relative = 7.0`: `weld_relative` must be a number from 0 to 1, not 7",
             ),
             (
+                "[[folders]]\npath = \"/a\"\n[profiles.resin]\nfill_holse = true",
+                "line 4, `fill_holse = true`: unknown field `fill_holse`",
+            ),
+        ];
+        assert_named(&mistakes);
+        for text in ["", "folders = []"] {
+            assert!(from_text(text).unwrap_err().contains("no hot folder; add"));
+        }
+    }
+
+    fn assert_named(mistakes: &[(&str, &str)]) {
+        for (text, words) in mistakes {
+            let error = from_text(text).unwrap_err();
+            assert!(error.starts_with(words), "{words}: {error}");
+        }
+    }
+
+    #[test]
+    fn mistakes_of_priorities_and_of_what_goes_by_itself_are_named_too() {
+        assert_named(&[
+            (
                 "[[folders]]\npriority = 12\npath = \"/a\"",
                 "line 2, `priority = 12`: a priority is a whole number from 0 to 9, the higher the sooner, not 12",
             ),
@@ -322,17 +411,15 @@ mod tests {
                 "line 5, `priority = -2`: a priority is a whole number",
             ),
             (
-                "[[folders]]\npath = \"/a\"\n[profiles.resin]\nfill_holse = true",
-                "line 4, `fill_holse = true`: unknown field `fill_holse`",
+                "[[folders]]\npath = \"/a\"\n[keep]\nresults = \"1d\"\noriginals = \"2d\"",
+                "line 5, `originals = \"2d\"`: an original is never deleted, only moved to an archive; add",
             ),
-        ];
-        for (text, words) in mistakes {
-            let error = from_text(text).unwrap_err();
-            assert!(error.starts_with(words), "{words}: {error}");
-        }
-        for text in ["", "folders = []"] {
-            assert!(from_text(text).unwrap_err().contains("no hot folder; add"));
-        }
+            (
+                "keep.archive = \"/a/done/x\"\n[[folders]]\npath = \"/a\"",
+                "line 1, `keep.archive = \"/a/done/x\"`: it must lie beside the hot folder /a",
+            ),
+            ("[[folders]]\npath = \"/a\"\n[keep]\nhistory_jobs = 0", "line 4, `history_jobs = 0`: must be at least 1"),
+        ]);
     }
 
     #[test]

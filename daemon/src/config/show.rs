@@ -7,6 +7,7 @@ use std::time::Duration;
 use serde::Serialize;
 use toml::Value;
 
+use super::keep::Keep;
 use super::read::AUTO;
 use super::{Config, FolderConfig};
 use crate::own_profile::OwnProfile;
@@ -39,7 +40,24 @@ pub(crate) fn values(config: &Config) -> Vec<(&'static str, Option<String>)> {
     let of_hours =
         [("run_window", quoted(&config.run_window.to_string())), ("workers_outside", config.workers_outside.to_string())];
     let of_hours = of_hours.map(|(name, value)| (name, hours.then_some(value)));
-    always.map(|(name, value)| (name, Some(value))).into_iter().chain(of_hours).collect()
+    always.map(|(name, value)| (name, Some(value))).into_iter().chain(of_hours).chain(kept(&config.keep)).collect()
+}
+
+/// What goes by itself, as far as anything does.
+fn kept(keep: &Keep) -> [(&'static str, Option<String>); 9] {
+    let age = |time: Option<Duration>| time.map(|time| quoted(&write_duration(time)));
+    let size = |bytes: Option<u64>| bytes.map(|bytes| quoted(&write_size(bytes)));
+    [
+        ("keep.results", age(keep.results.age)),
+        ("keep.results_size", size(keep.results.size)),
+        ("keep.reports", age(keep.reports.age)),
+        ("keep.reports_size", size(keep.reports.size)),
+        ("keep.originals", age(keep.originals.age)),
+        ("keep.originals_size", size(keep.originals.size)),
+        ("keep.archive", keep.archive.as_deref().map(path)),
+        ("keep.history", age(keep.history)),
+        ("keep.history_jobs", Some(keep.history_jobs.to_string())),
+    ]
 }
 
 /// Text as a value of a file.
@@ -92,6 +110,7 @@ mod tests {
     use suture_store::Priority;
 
     use super::*;
+    use crate::config::keep::Bound;
     use crate::config::read;
 
     fn read_back(config: &Config) -> Config {
@@ -127,6 +146,14 @@ mod tests {
         (config.workers, config.threads, config.reuse) = (7, 3, false);
         (config.settle, config.rescan) = (Some(Duration::from_millis(300)), Some(Duration::from_secs(90)));
         (config.drain, config.time_limit.base) = (Duration::ZERO, Duration::from_millis(1500));
+        config.keep = Keep {
+            results: Bound { age: Some(Duration::from_secs(90 * 24 * 3600)), size: Some(5 << 40) },
+            reports: Bound { age: Some(Duration::from_secs(25 * 3600)), size: Some(1) },
+            originals: Bound { age: Some(Duration::ZERO), size: None },
+            archive: Some("/srv/the \"archive\"".into()),
+            history: Some(Duration::from_secs(1)),
+            history_jobs: 3,
+        };
         for name in ["it's mine", "resin", "default"] {
             let mut profile = Profile::built_in("strict").unwrap();
             profile.name = name.into();

@@ -28,7 +28,7 @@ impl Scene {
     pub(crate) fn dropped() -> Self {
         let dir = tempfile::tempdir().unwrap();
         let config = FolderConfig { name: "hot".into(), ..FolderConfig::of(dir.path()) };
-        let folder = Folder::open(&config).unwrap();
+        let folder = Folder::open(&config, None).unwrap();
         let path = folder.inbox().join("part.stl");
         create::write_new(&path, ORIGINAL).unwrap();
         let found = Identity::of(&path).unwrap();

@@ -80,6 +80,11 @@ impl Kind {
         self.is_queued() || self.is_held() || self == Self::Parked
     }
 
+    /// Is it over, unless an operator wants it tried again?
+    pub fn is_at_rest(self) -> bool {
+        !self.is_live() && self != Self::Noticed
+    }
+
     /// Waiting for a claim.
     pub fn is_queued(self) -> bool {
         matches!(self, Self::Queued | Self::Waiting | Self::Alone)

@@ -201,11 +201,9 @@ fn f26_a_running_daemon_reads_its_configuration_anew() {
     assert_eq!(daemon.drop_in("resin/b.stl", &holes), "failed", "the old one is in force");
 
     // What needs a restart keeps all the rest from changing.
-    for (lines, words) in [("workers = 1", "`workers`"), ("state = \"elsewhere\"", "`state`")] {
-        place.put("suture.toml", configuration(lines, true).as_bytes());
-        let line = daemon.hang_up("not taken over");
-        assert!(line["reason"].as_str().unwrap().contains(&format!("only a restart of the daemon changes {words}")), "{line}");
-    }
+    place.put("suture.toml", configuration("state = \"elsewhere\"", true).as_bytes());
+    let line = daemon.hang_up("not taken over");
+    assert!(line["reason"].as_str().unwrap().contains("only a restart of the daemon changes `state`"), "{line}");
     assert_eq!(daemon.drop_in("resin/c.stl", &holes), "failed");
 
     place.put("suture.toml", configuration("settle = \"60ms\"", true).as_bytes());
@@ -216,6 +214,29 @@ fn f26_a_running_daemon_reads_its_configuration_anew() {
     );
     assert_eq!(daemon.drop_in("resin/d.stl", &holes), "done", "the new one is in force");
     assert!(place.at("hot/out/resin/d.stl").exists());
+    daemon.end();
+}
+
+/// More workers, and fewer: so many files are worked on at a time, without a restart.
+#[test]
+fn the_number_of_workers_is_read_anew() {
+    let place = Place::new();
+    let configuration = |workers: usize| format!("settle = \"30ms\"\nworkers = {workers}\n[[folders]]\npath = \"hot\"\n");
+    place.put("suture.toml", configuration(1).as_bytes());
+    let daemon = Daemon::start(&place, &["--config", "suture.toml"]);
+    let slots = || {
+        let tasks = std::fs::read_dir(format!("/proc/{}/task", daemon.child.id())).unwrap().flatten();
+        tasks.filter(|task| std::fs::read_to_string(task.path().join("comm")).is_ok_and(|name| name.trim() == "slot")).count()
+    };
+    assert_eq!(slots(), 1);
+    for (workers, threads) in [(3, 3), (2, 3)] {
+        place.put("suture.toml", configuration(workers).as_bytes());
+        daemon.hang_up("is in force");
+        await_that("the threads are there", || slots() == threads);
+        for n in 0..8 {
+            daemon.drop_in(&format!("{workers}-{n}.stl"), &mesh(Case::Holes, n));
+        }
+    }
     daemon.end();
 }
 

@@ -218,3 +218,66 @@ fn the_next_run_tries_what_waits() {
     once(&place).expect(0);
     assert_eq!(jobs(&place).remove(0).1["kind"], "done");
 }
+
+/// However often a file is tried again, it has one name, one report, one receipt and one best attempt.
+#[test]
+fn trying_again_leaves_no_litter() {
+    let place = Place::new();
+    place.put("hot/in/sheet.stl", &lone_sheet());
+    once(&place).expect(1);
+    let failed = place.names("hot/failed");
+    assert!(failed.contains(&"sheet.best.stl".to_owned()), "{failed:?}");
+    for _ in 0..3 {
+        place.suture(["jobs", "retry", "1", "--dir", "hot"]).expect(0);
+        once(&place).expect(1);
+        assert_eq!(place.names("hot/failed"), failed);
+    }
+    assert_eq!(place.read("hot/failed/sheet.stl"), lone_sheet());
+    // Good at last, by another profile: nothing of the failures is left.
+    let config = "settle = \"30ms\"\n[[folders]]\npath = \"hot\"\n[profiles.default]\nsheets = \"thicken\"\n";
+    place.put("suture.toml", config.as_bytes());
+    place.suture(["jobs", "retry", "1", "--dir", "hot"]).expect(0);
+    place.suture(["watch", "--once", "--config", "suture.toml"]).expect(0);
+    assert_eq!((place.names("hot/failed"), place.names("hot/done")), (vec![], vec!["sheet.stl".to_owned()]));
+}
+
+/// What someone meant to have repaired, and is left, is no success; notes beside it are none of our business.
+#[test]
+fn meshes_that_are_left_are_code_1() {
+    let place = Place::new();
+    place.put("hot/in/notes.txt", b"by air");
+    place.put("hot/in/d/d/d/d/d/d/d/d/d/d/d/d/part.stl", &mesh(Case::Holes, 1));
+    once(&place).expect(0);
+    assert!(place.at("hot/done/d/d/d/d/d/d/d/d/d/d/d/d/part.stl").exists());
+    place.put("hot/in/part.3mf", b"PK");
+    for _ in 0..2 {
+        let ran = once(&place).expect(1);
+        assert!(ran.stderr().contains("Files are left where they are"), "{}", ran.stderr());
+    }
+    std::fs::remove_file(place.at("hot/in/part.3mf")).unwrap();
+    once(&place).expect(0);
+    let long = format!("hot/in/{}", format!("{}/", "n".repeat(200)).repeat(4));
+    place.put(&format!("{long}part.stl"), &mesh(Case::Holes, 1));
+    once(&place).expect(1);
+}
+
+#[test]
+fn log_lines_look_as_they_are_asked_to() {
+    let place = Place::new();
+    place.put("hot/in/a.stl", &mesh(Case::Holes, 1));
+    for (format, json) in [("auto", true), ("json", true), ("text", false)] {
+        let ran = place.suture(["watch", "hot", "--once", "--log-format", format]).expect(0);
+        let served = ran.stderr().lines().find(|line| line.contains("Serving a hot folder")).unwrap().to_owned();
+        assert_eq!(serde_json::from_str::<Value>(&served).is_ok(), json, "{format}: {served}");
+        assert!(!served.contains('\u{1b}'), "no colours where there is no terminal: {served}");
+    }
+}
+
+#[test]
+fn a_state_that_no_job_is_ever_in_is_refused() {
+    let place = Place::new();
+    place.put("hot/in/a.stl", &mesh(Case::Holes, 1));
+    once(&place).expect(0);
+    let ran = place.suture(["jobs", "list", "--dir", "hot", "--state", "bogus"]).expect(2);
+    assert!(ran.stdout().is_empty() && ran.stderr().contains("no job is ever `bogus`"), "{}", ran.stderr());
+}

@@ -110,3 +110,37 @@ fn kill_while_crossing(seed: u64) -> u64 {
     daemon.stop();
     kills
 }
+
+/// The hot folder, with the job store in it, is unmounted while the daemon runs, and mounted again: nothing is made in the bare folder meanwhile.
+#[test]
+fn unmounted_and_mounted_again() {
+    if !is_root("mounts") {
+        return;
+    }
+    let mut stage = Stage::new();
+    stage.lines += "rescan = \"500ms\"\n";
+    let disk = stage.at("disk");
+    std::fs::create_dir_all(disk.join("in")).unwrap();
+    let mount = Mount::bind(&disk, &stage.at("hot"));
+    stage.put("before.stl", &holes(600, 1));
+    let mut daemon = stage.serve();
+    stage.wait_done(30, &mut daemon);
+    drop(mount);
+    let bare = || std::fs::read_dir(stage.at("hot")).unwrap().flatten().map(|entry| entry.file_name()).collect::<Vec<_>>();
+    std::fs::write(stage.hot("in/stranger.stl"), holes(600, 3)).unwrap();
+    std::thread::sleep(Duration::from_secs(12));
+    daemon.tend();
+    assert_eq!((bare(), stage.files("in").len()), (vec!["in".into()], 1), "{}", stage.log());
+    std::fs::remove_file(stage.hot("in/stranger.stl")).unwrap();
+    let _mount = Mount::bind(&disk, &stage.at("hot"));
+    stage.put("after.stl", &holes(600, 2));
+    let took = stage.wait_done(60, &mut daemon);
+    stage.assert_done();
+    assert_eq!(daemon.restarts, 0, "{}", stage.log());
+    daemon.stop();
+    row(
+        "mounts",
+        "hot/ unmounted for 12 s, then mounted again",
+        &format!("bare folder left alone, served again after {:.1} s", took.as_secs_f64()),
+    );
+}

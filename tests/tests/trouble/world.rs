@@ -38,6 +38,15 @@ impl Mount {
         Self { at: at.to_owned() }
     }
 
+    /// Shows a folder at `at`, too, as a mount of its own.
+    pub(crate) fn bind(from: &Path, at: &Path) -> Self {
+        let [from, path] = [from, at].map(|path| c_string(path.as_os_str().as_bytes()));
+        // SAFETY: the pointers are to strings that outlive the call, or null where the call ignores them.
+        let done = unsafe { libc::mount(from.as_ptr(), path.as_ptr(), std::ptr::null(), libc::MS_BIND, std::ptr::null()) };
+        assert_eq!(done, 0, "mount: {}", std::io::Error::last_os_error());
+        Self { at: at.to_owned() }
+    }
+
     /// From now on nothing can be written to it.
     pub(crate) fn make_read_only(&self) {
         let path = c_string(self.at.as_os_str().as_bytes());

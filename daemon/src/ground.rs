@@ -1,0 +1,358 @@
+//! The ground that a hot folder stands on: what its path stood for when it was taken, so that another folder under that path is never
+//! believed. A path may lead elsewhere at any time: renamed and made anew, a mount that came or went. An unmounted folder looks like an empty one.
+//!
+//! A folder is told by device and inode while a daemon serves it, and by a mark of its own, `.suture/id`, when it comes back after it was
+//! away: a disk that is mounted again may have another device. A folder without its mark that lies on another mount than before is one whose mount
+//! is missing; on the same mount it was removed and made anew.
+
+use std::collections::BTreeMap;
+use std::fs::{File, Metadata, TryLockError};
+use std::io;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use rustix::fs::{AtFlags, CWD, StatxAttributes, StatxFlags};
+use serde::{Deserialize, Serialize};
+
+use crate::fsx::{self, Identity};
+use crate::{create, rights};
+
+/// All parts of a hot folder.
+pub(crate) const PARTS: [&str; 6] = ["in", "out", "done", "failed", "quarantine", ".suture/work"];
+/// Work in progress and the job store.
+pub(crate) const PRIVATE: &str = ".suture";
+/// Locked by the daemon that serves the folder, and its process number.
+pub(crate) const LOCK: &str = "owner";
+const PID: &str = "owner.pid";
+/// Tells the folder from every other one.
+const MARK: &str = "id";
+
+/// Why a folder cannot be served.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum FolderError {
+    #[error("{} is served by another daemon{}", root.display(), pid.map(|pid| format!(" (process {pid})")).unwrap_or_default())]
+    Owned { root: PathBuf, pid: Option<u32> },
+    #[error("{} lies in the hot folder {}, which would take its files; put it beside that one, or remove {}/.suture if that is none any more", root.display(), outer.display(), outer.display())]
+    Within { root: PathBuf, outer: PathBuf },
+    #[error("{} and {} are one folder, or one lies in the other: results would be taken for drops", a.display(), b.display())]
+    Mixed { a: PathBuf, b: PathBuf },
+    #[error("{}: {action}: {source}", path.display())]
+    Io { path: PathBuf, action: &'static str, source: io::Error },
+}
+
+/// What tells a hot folder again.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Trace {
+    /// Its own mark.
+    mark: String,
+    /// The mount it lies on.
+    mount: PathBuf,
+    /// Parts of it that are on other file systems.
+    #[serde(default)]
+    apart: Vec<String>,
+}
+
+impl Trace {
+    /// Is it this folder that the path leads to?
+    pub(crate) fn leads_here(&self, root: &Path) -> bool {
+        read_mark(root).is_some_and(|mark| mark == self.mark)
+    }
+
+    /// Why the folder is not there, or not whole: a mount is gone that it, or a part of it, lay on. `None` where all is there, or was made anew.
+    pub(crate) fn missing(&self, root: &Path) -> Option<String> {
+        const DO: &str = "mount it, or remove the file `folders` beside the job store if this is another folder";
+        if self.leads_here(root) {
+            let on_its_own = |part: &&String| device(&root.join(part)).is_some_and(|part| Some(part) != device(root));
+            let bare = self.apart.iter().find(|part| !on_its_own(part))?;
+            return Some(format!("{}: the file system is not there that it was; {DO}", root.join(bare).display()));
+        }
+        let gone = mount_of(root).is_ok_and(|mount| mount != self.mount);
+        let (shown, was) = (root.display(), self.mount.display());
+        gone.then(|| format!("{shown}: the mount {was} is not there that it lay on; {DO}"))
+    }
+}
+
+/// A hot folder that was taken: it is this process's as long as this lives.
+#[derive(Debug)]
+pub(crate) struct Ground {
+    id: (u64, u64),
+    /// File systems of the parts at the start.
+    devices: [Option<u64>; PARTS.len()],
+    trace: Trace,
+    lock: File,
+}
+
+pub(crate) fn id(meta: &Metadata) -> (u64, u64) {
+    (meta.dev(), meta.ino())
+}
+
+impl Ground {
+    /// Makes the parts that are missing and takes the folder's lock, which the system releases when the process ends.
+    ///
+    /// # Errors
+    /// When another daemon serves it, or it cannot be made.
+    pub(crate) fn take(root: &Path) -> Result<Self, FolderError> {
+        let io = |path: &Path, action| {
+            let path = path.to_owned();
+            move |source| FolderError::Io { path, action, source }
+        };
+        for part in PARTS {
+            let path = root.join(part);
+            make_folder(&path).map_err(io(&path, "cannot be made"))?;
+        }
+        let lock = take_lock(root)?;
+        let pid = format!("{}\n", std::process::id());
+        let path = root.join(PRIVATE).join(PID);
+        create::replace(&path, pid.as_bytes()).map_err(io(&path, "cannot be written"))?;
+        let id = id(&std::fs::metadata(root).map_err(io(root, "cannot be looked at"))?);
+        let devices = PARTS.map(|part| device(&root.join(part)));
+        let mount = mount_of(root).map_err(io(root, "cannot be looked at"))?;
+        let path = root.join(PRIVATE).join(MARK);
+        let mark = mark(root, id).map_err(io(&path, "cannot be written"))?;
+        let apart = PARTS.iter().zip(devices).filter(|(_, device)| *device != Some(id.0)).map(|(part, _)| (*part).to_owned());
+        Ok(Self { id, devices, trace: Trace { mark, mount, apart: apart.collect() }, lock })
+    }
+
+    /// What tells it again.
+    pub(crate) fn trace(&self) -> &Trace {
+        &self.trace
+    }
+
+    /// Is the folder still the one that was taken?
+    ///
+    /// # Errors
+    /// A line for people.
+    pub(crate) fn check(&self, root: &Path) -> Result<(), String> {
+        self.leads_here(root).map_err(|line| self.trace.missing(root).unwrap_or(line))?;
+        let ids = PARTS.map(|part| std::fs::metadata(root.join(part)).ok().map(|meta| id(&meta)));
+        for (i, (part, device_then)) in PARTS.iter().zip(self.devices).enumerate() {
+            // A part that was removed is made again where it is needed.
+            let Some(now) = ids[i] else { continue };
+            let part = root.join(part);
+            if Some(now.0) != device_then {
+                return Err(format!("{}: is on another file system than at the start: a mount came or went", part.display()));
+            }
+            if let Some(other) = ids.iter().take(i).position(|other| *other == Some(now)) {
+                return Err(FolderError::Mixed { a: root.join(PARTS[other]), b: part }.to_string());
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Ground {
+    /// Does the path lead to the folder that was taken?
+    ///
+    /// # Errors
+    /// A line for people.
+    fn leads_here(&self, root: &Path) -> Result<(), String> {
+        let shown = root.display();
+        let there = std::fs::metadata(root).map_err(|error| format!("{shown}: the hot folder is out of reach: {error}"))?;
+        let lock = Identity::of(&root.join(PRIVATE).join(LOCK));
+        let held = self.lock.metadata().map(|meta| id(&meta));
+        let same_lock = matches!((&lock, &held), (Ok(lock), Ok(held)) if (lock.dev, lock.ino) == *held);
+        if id(&there) != self.id || !same_lock {
+            return Err(format!(
+                "{shown}: is another folder than at the start (moved, removed or made anew); put it back, or start again"
+            ));
+        }
+        Ok(())
+    }
+
+    /// Is it away, and another one to be taken for it when that has its mark?
+    pub(crate) fn is_left(&self, root: &Path) -> bool {
+        self.leads_here(root).is_err()
+    }
+}
+
+fn device(path: &Path) -> Option<u64> {
+    std::fs::metadata(path).ok().map(|meta| meta.dev())
+}
+
+fn read_mark(root: &Path) -> Option<String> {
+    std::fs::read_to_string(root.join(PRIVATE).join(MARK)).ok().map(|text| text.trim().to_owned())
+}
+
+/// The folder's mark, made if it has none. It need not be secret, only another than that of any folder that may come under the same path.
+fn mark(root: &Path, id: (u64, u64)) -> io::Result<String> {
+    if let Some(mark) = read_mark(root).filter(|mark| !mark.is_empty()) {
+        return Ok(mark);
+    }
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default().as_nanos();
+    let mark = blake3::hash(format!("{id:?} {now} {} {}", std::process::id(), root.display()).as_bytes()).to_hex();
+    let mark = mark.as_str().get(..32).unwrap_or_default().to_owned();
+    let path = root.join(PRIVATE).join(MARK);
+    create::replace(&path, format!("{mark}\n").as_bytes())?;
+    fsx::sync_dir(fsx::folder_of(&path))?;
+    Ok(mark)
+}
+
+/// The root of the mount that a path lies on, or would lie on if it were there.
+fn mount_of(path: &Path) -> io::Result<PathBuf> {
+    let mut there = None;
+    for above in path.ancestors() {
+        match above.canonicalize() {
+            Ok(real) => {
+                there = Some(real);
+                break;
+            }
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            Err(error) => return Err(error),
+        }
+    }
+    let there = there.unwrap_or_else(|| "/".into());
+    for above in there.ancestors() {
+        if is_mount_root(above)? {
+            return Ok(above.to_owned());
+        }
+    }
+    Ok("/".into())
+}
+
+fn is_mount_root(path: &Path) -> io::Result<bool> {
+    let here = rustix::fs::statx(CWD, path, AtFlags::empty(), StatxFlags::BASIC_STATS)?;
+    if here.stx_attributes_mask.contains(StatxAttributes::MOUNT_ROOT) {
+        return Ok(here.stx_attributes.contains(StatxAttributes::MOUNT_ROOT));
+    }
+    // An older system: a mount of part of the same file system goes unnoticed.
+    Ok(path.parent().is_none_or(|above| device(above) != device(path)))
+}
+
+/// The lock of the hot folder, which the system releases when the process ends.
+fn take_lock(root: &Path) -> Result<File, FolderError> {
+    let path = root.join(PRIVATE).join(LOCK);
+    let io = |action| {
+        let path = path.clone();
+        move |source| FolderError::Io { path, action, source }
+    };
+    let lock = create::lock_file(&path).map_err(io("cannot be opened"))?;
+    let asked = Instant::now();
+    loop {
+        match lock.try_lock() {
+            Ok(()) => return Ok(lock),
+            Err(TryLockError::WouldBlock) => {
+                // A lock without a readable number is a lock all the same.
+                let text = std::fs::read_to_string(root.join(PRIVATE).join(PID)).unwrap_or_default();
+                let pid = text.trim().parse().ok();
+                if !is_fading(pid, asked) {
+                    return Err(FolderError::Owned { root: root.to_owned(), pid });
+                }
+                std::thread::sleep(Duration::from_millis(10));
+            }
+            Err(TryLockError::Error(source)) => return Err(io("cannot be locked")(source)),
+        }
+    }
+}
+
+/// Is a lock's owner dead, and the lock about to go? A daemon that is killed just as it starts a worker leaves the lock to that
+/// process for the moment before it notices.
+pub(crate) fn is_fading(pid: Option<u32>, asked: Instant) -> bool {
+    let pid = pid.and_then(|pid| i32::try_from(pid).ok()).and_then(rustix::process::Pid::from_raw);
+    let dead = pid.is_some_and(|pid| rustix::process::test_kill_process(pid) == Err(rustix::io::Errno::SRCH));
+    dead && asked.elapsed() < Duration::from_secs(2)
+}
+
+/// Makes the folder a path will stand in, durably where it is new.
+///
+/// # Errors
+/// As `mkdir` and `fsync`.
+pub(crate) fn make_parent(path: &Path) -> io::Result<()> {
+    make_folder(fsx::folder_of(path))
+}
+
+/// Makes a folder and those above it, each durable in the one it lies in, with its group.
+fn make_folder(path: &Path) -> io::Result<()> {
+    // Only what the system says is not there is made: an error is no absence.
+    match std::fs::metadata(path) {
+        Ok(there) if there.is_dir() => return Ok(()),
+        Ok(_) => return Err(io::ErrorKind::NotADirectory.into()),
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+        Err(_) => {}
+    }
+    make_parent(path)?;
+    rights::make_folder(path)?;
+    fsx::sync_dir(fsx::folder_of(path))
+}
+
+/// Hot folders by their names, as they were served last.
+pub(crate) type Traces = BTreeMap<String, Trace>;
+
+/// Where they are written, for the next daemon of a job store.
+fn traces_of(state: &Path) -> PathBuf {
+    state.with_file_name("folders")
+}
+
+/// Those that were noted beside a job store; none, where none can be read.
+pub(crate) fn read_traces(state: &Path) -> Traces {
+    let text = std::fs::read_to_string(traces_of(state)).unwrap_or_default();
+    serde_json::from_str(&text).unwrap_or_default()
+}
+
+/// Notes them beside a job store.
+///
+/// # Errors
+/// As the file system's.
+pub(crate) fn note_traces(state: &Path, traces: &Traces) -> io::Result<()> {
+    let path = traces_of(state);
+    if read_traces(state) == *traces {
+        return Ok(());
+    }
+    create::replace(&path, &serde_json::to_vec_pretty(traces)?)?;
+    fsx::sync_dir(fsx::folder_of(&path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_has_a_mark_of_its_own_that_stays() {
+        let dir = tempfile::tempdir().unwrap();
+        let [a, b] = ["a", "b"].map(|name| dir.path().join(name));
+        let trace = |root: &Path| Ground::take(root).unwrap().trace().clone();
+        let (first, other) = (trace(&a), trace(&b));
+        assert_eq!(first, trace(&a));
+        assert_ne!(first.mark, other.mark);
+        assert!(first.leads_here(&a) && !first.leads_here(&b));
+        std::fs::rename(&a, dir.path().join("moved")).unwrap();
+        assert!(!first.leads_here(&a) && first.leads_here(&dir.path().join("moved")));
+    }
+
+    /// Made anew on the same mount is one thing, a mount that is gone another.
+    #[test]
+    fn a_mount_that_is_gone_is_told_from_a_folder_that_was_made_anew() {
+        let dir = tempfile::tempdir().unwrap();
+        let root = dir.path().join("hot");
+        let trace = Ground::take(&root).unwrap().trace().clone();
+        let elsewhere = Trace { mount: "/mnt/of a disk".into(), ..trace.clone() };
+        assert!(trace.apart.is_empty());
+        let apart = Trace { apart: vec!["out".into()], ..trace.clone() };
+        assert!(apart.missing(&root).unwrap().contains("hot/out: the file system is not there"), "the bare folder under a mount");
+        assert_eq!((trace.missing(&root), elsewhere.missing(&root)), (None, None), "its mark is there");
+        std::fs::remove_dir_all(&root).unwrap();
+        assert_eq!(trace.missing(&root), None);
+        assert!(elsewhere.missing(&root).unwrap().contains("the mount /mnt/of a disk is not there"));
+        std::fs::create_dir_all(root.join("in")).unwrap();
+        assert!(elsewhere.missing(&root).is_some(), "the bare folder under a mount is not the folder");
+    }
+
+    #[test]
+    fn mounts_are_found_above_what_is_not_there() {
+        assert_eq!(mount_of(Path::new("/proc/self/nothing/at/all")).unwrap(), Path::new("/proc"));
+        assert!(is_mount_root(Path::new("/")).unwrap() && is_mount_root(Path::new("/proc")).unwrap());
+        let dir = tempfile::tempdir().unwrap();
+        assert!(!is_mount_root(dir.path()).unwrap());
+    }
+
+    #[test]
+    fn traces_are_noted_beside_the_store() {
+        let dir = tempfile::tempdir().unwrap();
+        let state = dir.path().join("state");
+        assert!(read_traces(&state).is_empty());
+        let trace = Trace { mark: "m".into(), mount: "/mnt".into(), apart: vec!["out".into()] };
+        let traces = Traces::from([("hot".to_owned(), trace)]);
+        note_traces(&state, &traces).unwrap();
+        assert_eq!(read_traces(&state), traces);
+    }
+}

@@ -1,0 +1,57 @@
+//! The end of a record: jobs at rest leave the store, with all that points to them. Their numbers are never used again.
+
+use super::{Queue, head_put, identity, index, results};
+use crate::crash::crash_point;
+use crate::id::JobId;
+use crate::record;
+use crate::store::StoreError;
+use crate::tables::{Put, Table, Tables};
+
+/// Jobs removed by one transaction of the tables.
+const CHUNK: usize = 1000;
+
+impl<T: Tables> Queue<T> {
+    /// As [`crate::JobStore::forget`].
+    pub(super) fn drop_records(&self, ids: &[JobId]) -> Result<u64, StoreError> {
+        self.tables.sound()?;
+        let mut removed = 0;
+        for chunk in ids.chunks(CHUNK) {
+            removed += self.drop_chunk(chunk)?;
+        }
+        Ok(removed)
+    }
+
+    fn drop_chunk(&self, ids: &[JobId]) -> Result<u64, StoreError> {
+        let mut inner = self.lock();
+        let (mut head, mut counts) = (inner.head, inner.counts.clone());
+        let (mut puts, mut removed) = (Vec::new(), 0);
+        let none = |table, key| Put { table, key, value: None };
+        for id in ids {
+            let Some(job) = self.job(*id)?.filter(|job| job.kind().is_at_rest()) else { continue };
+            puts.push(none(Table::ByState, index::key(&job)));
+            puts.push(none(Table::Jobs, id.0.to_be_bytes().to_vec()));
+            puts.extend(job.offers().map(|recipe| none(Table::ByRecipe, results::key(&job, recipe))));
+            // A later job of the same file has the entry by now.
+            let key = identity(&job.source);
+            let latest = self.tables.get(Table::ByKey, &key)?;
+            let latest = latest.map(|bytes| record::decode::<JobId>(Table::ByKey, &key, &bytes)).transpose()?;
+            if latest == Some(*id) {
+                puts.push(none(Table::ByKey, key));
+            }
+            let count = counts.entry(job.kind()).or_default();
+            *count = count.saturating_sub(1);
+            removed += 1;
+        }
+        if removed == 0 {
+            return Ok(0);
+        }
+        head.seq.0 += 1;
+        puts.push(head_put(&head)?);
+        self.tables.write(puts, head.seq)?;
+        (inner.head, inner.counts) = (head, counts);
+        drop(inner);
+        crash_point("store.commit.written");
+        self.settle(head)?;
+        Ok(removed)
+    }
+}

@@ -372,7 +372,7 @@ fn what_cannot_be_seen_goes_if_the_profile_says_so() {
         let report = place.repair("in.stl", "out.stl", &options).expect(0).report();
         assert_eq!((&report["outcome"], &report["after"]["bodies"]), (&"repaired".into(), &2.into()), "{report}");
         let note = report["repairs"][0]["note"].as_str().unwrap();
-        assert!(note.contains("bodies: 1, of 1.0000") && note.contains("thereby: 1, of 27.0000"), "{note}");
+        assert!(note.contains("bodies: 1, of 1 units³") && note.contains("thereby: 1, of 27 units³"), "{note}");
         assert_eq!(stl::records(&place.read("out.stl")), stl::records(&stl::mesh(&seen)));
     }
     assert_eq!(place.repair("in.stl", "kept.stl", &[]).expect(0).report()["outcome"], "clean");

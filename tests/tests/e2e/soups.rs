@@ -139,7 +139,9 @@ fn holds(triangles: &[Triangle]) -> Result<(), TestCaseError> {
             (judged.counts.closed(), judged.counts.manifold(), judged.counts.oriented())
         );
         prop_assert!(!verdict.good || (judged.sound() && judged.volume > 0.0), "called good: {:?}", judged);
-        if verdict.good {
+        // Of a body that was kept in the material of another one, since a repair has closed one of both, the result no longer tells that.
+        let is_kept = verdict.reasons.iter().any(|reason| reason.starts_with("a body lies in the material of another one"));
+        if verdict.good && !is_kept {
             let again = folder.path().join("again.stl");
             let report = repaired(&output, &again, 1 << 20, 1);
             prop_assert!(report.outcome == Outcome::Clean && std::fs::read(&again).unwrap() == written, "not left alone");
@@ -162,6 +164,13 @@ fn holds(triangles: &[Triangle]) -> Result<(), TestCaseError> {
         }
     }
     Ok(())
+}
+
+/// A box that lacks a triangle, and a body in its material: one of them is asked about, and may go when the result comes back.
+#[test]
+fn of_a_body_in_a_box_that_lacks_a_triangle() {
+    let boxes = [cuboid([1.0, 2.0, 2.0], [4.0, 5.0, 5.0]), cuboid([2.0, 3.0, 3.0], [3.0, 4.0, 4.0])].concat();
+    holds(&boxes[1..]).unwrap();
 }
 
 /// Half as many soups as usual, since each is repaired a dozen times; PROPTEST_CASES makes them more.

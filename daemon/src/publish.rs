@@ -78,6 +78,7 @@ impl<'a> Desk<'a> {
             _ => {}
         }
         superseded::clear(self.folder, job);
+        crash_point("daemon.superseded");
         let publication = self.prepare(job, result)?;
         // The files' names in it, and its own: without them the intent would be of nothing.
         for folder in [work.as_path(), fsx::folder_of(&work)] {

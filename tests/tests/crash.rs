@@ -331,3 +331,49 @@ fn killers_cost_themselves_only() {
     good.sort();
     assert_eq!(place.names("out"), good);
 }
+
+/// Killed between any two steps of an original's way to the archive: it is whole in one place or the other, and in the end there once.
+#[test]
+fn killed_on_the_way_to_the_archive() {
+    let keep = "settle = \"30ms\"\n[keep]\noriginals = \"0s\"\narchive = ";
+    for point in ["retention.staged", "retention.archived", "retention.aside"] {
+        let hot = Hot::new(with_crash_points());
+        drop_one(&hot);
+        assert!(hot.once(None).success());
+        let archive = tempfile::tempdir().expect("a folder");
+        std::fs::write(archive.path().join(".suture-archive"), b"").expect("a mark");
+        let lines = format!("{keep}{:?}", archive.path());
+        let status = hot.configured(&lines).env("SUTURE_CRASH_AT", format!("{point}:1")).status().expect("the daemon starts");
+        assert!(was_killed(status), "{point}: {status}");
+        let archived = || std::fs::read(archive.path().join(format!("{}/done/part.stl", name_of(&hot)))).ok();
+        let whole = mesh(Case::Clean, 1);
+        let copies = hot.tree("done").into_values().chain(archived()).filter(|bytes| *bytes == whole).count();
+        assert!(copies > 0, "{point}: the original is lost");
+        assert!(hot.configured(&lines).status().expect("the daemon starts").success(), "{point}");
+        assert!(archived() == Some(whole), "{point}: it is not whole in the archive");
+        assert_eq!(hot.tree("done").len(), 0, "{point}: it is here still");
+        let left = std::fs::read_dir(archive.path().join(name_of(&hot)).join("done")).expect("a folder").count();
+        assert_eq!(left, 1, "{point}: a stage is left");
+        assert_at_rest(&hot, point);
+    }
+}
+
+fn name_of(hot: &Hot) -> String {
+    hot.path().file_name().expect("a name").to_string_lossy().into_owned()
+}
+
+/// Killed when the report of an earlier attempt has gone, and the new one is not there yet.
+#[test]
+fn killed_over_a_retry() {
+    let hot = Hot::new(with_crash_points());
+    hot.put("picture.stl", b"\x89PNG\r\n\x1a\nendsolid");
+    assert_eq!(hot.once(None).code(), Some(1));
+    let expected = state(&hot);
+    assert!(hot.ask(&["retry", "1"]));
+    let status = hot.watch(&["--once"]).env("SUTURE_CRASH_AT", "daemon.superseded:1").status().expect("the daemon starts");
+    assert!(was_killed(status), "{status}");
+    assert_eq!(hot.tree("failed").len(), 1, "the original is there");
+    assert!(hot.once(None).code().is_some_and(|code| code < 2));
+    assert_eq!(state(&hot), expected);
+    assert_at_rest(&hot, "a retry");
+}

@@ -16,6 +16,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use rustix::fs::Advice;
+use suture_store::crash_point;
 
 use crate::claim::Original;
 use crate::create;
@@ -89,6 +90,7 @@ impl Archive {
         let to = self.root.join(at);
         let copied = make_parent(&to).and_then(|()| self.copy(&original, &to, hash));
         let to = copied.map_err(|error| Stays::All(format!("the archive cannot be written: {error}")))?;
+        crash_point("retention.archived");
         remove(from, &identity).map_err(this("it is in the archive, but cannot be removed here"))?;
         Ok(to)
     }
@@ -117,6 +119,7 @@ impl Archive {
                     return Err(io::Error::other("the copy is not what was copied"));
                 }
                 staged = true;
+                crash_point("retention.staged");
             }
             match fsx::rename_new(&stage, &to) {
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
@@ -149,6 +152,7 @@ fn hash_of(mut file: &File) -> io::Result<blake3::Hash> {
 fn remove(from: &Path, copied: &Identity) -> io::Result<()> {
     let aside = aside(from);
     fsx::rename_new(from, &aside)?;
+    crash_point("retention.aside");
     if !Identity::of(&aside)?.same_content(copied) {
         fsx::rename_new(&aside, from)?;
         return Err(io::Error::other("another file has taken its name"));

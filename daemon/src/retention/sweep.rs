@@ -138,9 +138,13 @@ impl<'a> Sweeper<'a> {
         swept: &mut Swept,
     ) -> Result<(), String> {
         folder.check()?;
-        let stock = Stock::of(&folder.root, keep).map_err(|error| format!("it cannot be read: {error}"))?;
-        for path in &stock.aside {
-            give_back(&folder.root.join(path)).map_err(|error| format!("{}: {error}", path.display()))?;
+        let look = || Stock::of(&folder.root, keep).map_err(|error| format!("it cannot be read: {error}"));
+        let mut stock = look()?;
+        if !stock.aside.is_empty() {
+            for path in &stock.aside {
+                give_back(&folder.root.join(path)).map_err(|error| format!("{}: {error}", path.display()))?;
+            }
+            stock = look()?;
         }
         let mut archive = keep.archive().map(Archive::open);
         for going in going(stock.pieces, keep, now) {

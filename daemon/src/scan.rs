@@ -232,7 +232,7 @@ impl Reconciler {
         }
         let own = self.folder.inbox().join(&name).join(profiles::FOLDER_FILE);
         if !own.exists() && self.warned.insert(name.clone()) {
-            tracing::warn!(folder = %self.folder.name, sub_folder = name, profile = default, "No profile has this sub-folder's name.");
+            tracing::info!(folder = %self.folder.name, sub_folder = name, profile = default, "No profile has this sub-folder's name: it is an order.");
         }
         default
     }

@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn another_file_of_that_name_is_not_claimed() {
+    fn f22_another_file_of_that_name_is_not_claimed() {
         let scene = Scene::dropped();
         let path = scene.folder.inbox().join("part.stl");
         let work = scene.folder.work(scene.claim.token);
@@ -222,7 +222,7 @@ mod tests {
 
     /// In place, by a new name or by none at all.
     #[test]
-    fn a_change_is_noticed() {
+    fn f22_a_change_is_noticed() {
         for change in ["write", "rename", "remove"] {
             let scene = Scene::dropped();
             let path = scene.folder.inbox().join("part.stl");

@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_has_one_owner() {
+    fn f17_a_folder_has_one_owner() {
         let dir = tempfile::tempdir().unwrap();
         let config = FolderConfig::of(dir.path());
         let first = Folder::open(&config, None).unwrap();
@@ -291,7 +291,7 @@ mod tests {
 
     /// A bare folder under a mount that is gone is not the folder: nothing is made in it, nothing in it believed.
     #[test]
-    fn a_folder_is_away_until_it_is_back() {
+    fn f25_a_folder_is_away_until_it_is_back() {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);
         let config = FolderConfig::of(&at("hot"));
@@ -317,7 +317,7 @@ mod tests {
 
     /// A disk that is mounted again may be another device: the folder is told by its mark.
     #[test]
-    fn a_folder_with_its_mark_is_the_folder_whatever_its_inode() {
+    fn f25_a_folder_with_its_mark_is_the_folder_whatever_its_inode() {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);
         let config = FolderConfig::of(&at("hot"));

@@ -198,7 +198,7 @@ mod tests {
 
     /// As `statfs` says them: of what others change, and of disks and memory here.
     #[test]
-    fn what_others_change_is_polled() {
+    fn f18_what_others_change_is_polled() {
         for remote in [0x6969, 0xFE53_4D42, 0xFF53_4D42, 0x6573_5546, 0x0102_1997, 0x786F_4256] {
             assert!(is_remote(remote), "{remote:x}");
         }
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn names_count_up_and_fit() {
+    fn f23_names_count_up_and_fit() {
         assert_eq!(versioned(OsStr::new("part.stl"), 1, 12), "part.stl");
         assert_eq!(versioned(OsStr::new("part.stl"), 2, 12), "part~2.stl");
         assert_eq!(versioned(OsStr::new("part.STL"), 3, 12), "part~3.STL");

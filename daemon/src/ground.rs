@@ -321,7 +321,7 @@ mod tests {
 
     /// Made anew on the same mount is one thing, a mount that is gone another.
     #[test]
-    fn a_mount_that_is_gone_is_told_from_a_folder_that_was_made_anew() {
+    fn f25_a_mount_that_is_gone_is_told_from_a_folder_that_was_made_anew() {
         let dir = tempfile::tempdir().unwrap();
         let root = dir.path().join("hot");
         let trace = Ground::take(&root).unwrap().trace().clone();

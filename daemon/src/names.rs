@@ -79,7 +79,7 @@ mod tests {
 
     /// D2: the longest path that is taken, dropped again and again, finds a name each time; so does one of another encoding.
     #[test]
-    fn the_longest_paths_have_many_names() {
+    fn f23_the_longest_paths_have_many_names() {
         let folder = "d".repeat(MAX_SOURCE - 6);
         let long = RelPath::new(format!("{folder}/a.stl")).unwrap();
         let odd = RelPath::new([vec![0xE9; 200], b"/".to_vec(), vec![0xE9; 80], b".stl".to_vec()].concat()).unwrap();

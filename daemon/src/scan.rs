@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn meshes_settle_foreign_files_are_noticed_links_are_not_followed() {
+    fn f24_meshes_settle_foreign_files_are_noticed_links_are_not_followed() {
         let dir = tempfile::tempdir().unwrap();
         let mut r = reconciler(dir.path());
         let inbox = dir.path().join("in");
@@ -423,7 +423,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_that_is_gone_is_not_empty() {
+    fn f25_a_folder_that_is_gone_is_not_empty() {
         let dir = tempfile::tempdir().unwrap();
         let mut r = reconciler(dir.path());
         mesh(&dir.path().join("in/a.stl"));

@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mistake_leaves_all_as_it_was() {
+    fn f26_a_mistake_leaves_all_as_it_was() {
         for (text, words) in [
             (format!("memroy = 1\n{FIRST}"), "line 1, `memroy = 1`"),
             (FIRST.replace("[profiles.resin]", "[profiles.other]"), "there is no profile `resin`"),
@@ -210,7 +210,7 @@ mod tests {
 
     /// Nothing of it, not even what could change.
     #[test]
-    fn what_needs_a_restart_is_named_and_nothing_is_taken_over() {
+    fn f26_what_needs_a_restart_is_named_and_nothing_is_taken_over() {
         let first = FIRST.replace("1GiB", "2GiB");
         for (text, words) in [
             (format!("state = \"/nowhere/state\"\n{first}"), "changes `state`"),

@@ -149,7 +149,7 @@ mod tests {
 
     /// A look every second: ready when three seconds have passed since the last change, not before.
     #[test]
-    fn a_growing_file_starts_over() {
+    fn f21_a_growing_file_starts_over() {
         let start = Instant::now();
         let at = |s| start + Duration::from_secs(s);
         let mut file = Settling::new(identity(1), at(0));
@@ -163,7 +163,7 @@ mod tests {
 
     /// Two looks far apart are not enough: the machine may have slept in between.
     #[test]
-    fn time_alone_is_no_rest() {
+    fn f15_time_alone_is_no_rest() {
         let start = Instant::now();
         let mut file = Settling::new(identity(1), start);
         assert_eq!(file.look(identity(1), start + Duration::from_secs(100), REST), Look::Wait);
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn renamed_into_place_counts_at_once() {
+    fn f22_renamed_into_place_counts_at_once() {
         let start = Instant::now();
         let mut file = Settling::new(identity(1), start);
         file.came_whole();
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn lengths_of_complete_files() {
+    fn f21_lengths_of_complete_files() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a");
         let fits = |bytes: &[u8]| {

@@ -364,7 +364,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_operators_kill_is_not_the_files_fault() {
+    fn f03_an_operators_kill_is_not_the_files_fault() {
         let death = |cause| Death { cause, last_words: String::new() };
         assert!(!death(Cause::Killed(9)).blames_file());
         assert!(!death(Cause::Killed(15)).blames_file());
@@ -383,7 +383,7 @@ mod tests {
     }
 
     #[test]
-    fn only_a_death_for_memory_is_starved() {
+    fn f10_only_a_death_for_memory_is_starved() {
         let class = |cause| Death { cause, last_words: String::new() }.class();
         assert_eq!(class(Cause::Memory), ErrorClass::Starved);
         for cause in [Cause::Fault(11), Cause::Internal(101), Cause::Time(Duration::from_secs(1))] {
@@ -393,7 +393,7 @@ mod tests {
     }
 
     #[test]
-    fn a_time_limit_says_how_far_the_work_was() {
+    fn f11_a_time_limit_says_how_far_the_work_was() {
         let line = |last_words| Death { cause: Cause::Time(Duration::from_secs(120)), last_words }.line();
         assert!(line(how_far("topology", 43, 100)).contains(", with 43 % of its stage `topology` done; a larger `time_limit`"));
         assert!(line(how_far("repair", 0, 7)).contains(", in its stage `repair`; a larger"));

@@ -224,6 +224,8 @@ mod hook {
             }
         }
         if name.contains("!hang!") {
+            // Something that the worker started is to go with it.
+            let _ = std::process::Command::new("sleep").arg("10").status();
             std::thread::sleep(Duration::from_secs(3600));
         }
         if name.contains("!slow!") {

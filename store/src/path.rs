@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn hostile_names_are_one_line_of_text() {
+    fn f23_hostile_names_are_one_line_of_text() {
         let path = RelPath::new(*b"a\nb\"\\50%\xff.stl").unwrap();
         assert_eq!(path.to_string(), "a%0Ab%22%5C50%25%FF.stl");
         // "ÄÖÜ" in Latin-1: no byte of it is UTF-8.
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn the_longest_name_fits_whatever_its_bytes() {
+    fn f23_the_longest_name_fits_whatever_its_bytes() {
         assert!(RelPath::new([0xff; 255]).is_ok());
         assert_eq!(RelPath::new([b'a'; MAX_TEXT + 1]), Err(PathError::TooLong));
     }

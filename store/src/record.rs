@@ -141,8 +141,9 @@ mod tests {
         assert_eq!(decode::<Job>(Table::Jobs, &key, &bytes).unwrap(), job);
     }
 
+    /// F29, and F5.
     #[test]
-    fn records_of_another_time_or_place_are_told_apart() {
+    fn f29_records_of_another_time_or_place_are_told_apart() {
         let bytes = encode(Table::Meta, b"head", &7_u32).unwrap();
         assert_eq!(decode::<u32>(Table::Meta, b"head", &bytes).unwrap(), 7);
         let damaged = |result: Result<u32, StoreError>| assert!(matches!(result, Err(StoreError::Corrupt { .. })), "{result:?}");
@@ -160,7 +161,7 @@ mod tests {
 
     /// A job as version 1 wrote it, without what was added since.
     #[test]
-    fn jobs_of_schema_1_stay_readable() {
+    fn f29_jobs_of_schema_1_stay_readable() {
         let json = r#"{"id":7,"source":{"folder":"hot","path":"part.stl","dev":1,"ino":2,"size":84,"mtime_ns":3,"profile":"default"},
             "state":{"publishing":{"hold":{"attempt":1,"epoch":2,"token":9,"alone":false},"publication":{"ending":"clean","reason":"",
             "output":"part.stl","output_hash":null,"report_hash":null,"original":"part.stl"}}},"attempts":1,

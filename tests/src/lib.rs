@@ -10,6 +10,7 @@ pub mod hot;
 pub mod oracle;
 pub mod place;
 pub mod scene;
+pub mod served;
 pub mod stl;
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 pub mod trace;

@@ -3,6 +3,9 @@
 //!
 //! `SUTURE_EXHAUSTIVE=1` tries every pair of steps and the full number of random kills.
 
+#[path = "crash/deaths.rs"]
+mod deaths;
+
 use std::collections::BTreeMap;
 use std::os::unix::process::ExitStatusExt;
 use std::process::Child;
@@ -39,6 +42,13 @@ fn assert_at_rest(hot: &Hot, what: &str) {
         let kind = job["kind"].as_str().expect("a kind");
         assert!(matches!(kind, "done" | "failed" | "needs_review"), "{what}: {job}");
         assert_eq!(job["blame"]["charges"], 0, "{what}: {job}");
+    }
+}
+
+/// No file was taken into work more often than the kills explain.
+fn assert_attempts(hot: &Hot, kills: u64, what: &str) {
+    for job in hot.jobs() {
+        assert!(job["attempts"].as_u64().is_some_and(|attempts| attempts <= 1 + kills), "{what}: {job}");
     }
 }
 
@@ -88,7 +98,7 @@ fn was_killed(status: std::process::ExitStatus) -> bool {
 }
 
 #[test]
-fn killed_at_every_step() {
+fn f01_killed_at_every_step() {
     let (expected, passes) = reference(drop_two);
     let steps: Vec<u64> = (1..=passes).collect();
     on_two_threads(&steps, |&step| {
@@ -101,6 +111,7 @@ fn killed_at_every_step() {
         assert!(hot.once(None).code().is_some_and(|code| code < 2), "{what}: the next run fails");
         assert_eq!(state(&hot), expected, "{what}");
         assert_at_rest(&hot, &what);
+        assert_attempts(&hot, 1, &what);
     });
 }
 
@@ -113,7 +124,7 @@ fn drop_a_second(hot: &Hot) {
 
 /// The result is copied, not computed; wherever the daemon dies, it is there once, and the first one is as it was.
 #[test]
-fn killed_at_every_step_of_a_copy() {
+fn f01_killed_at_every_step_of_a_copy() {
     let hot = Hot::new(with_crash_points());
     drop_a_second(&hot);
     let trace = hot.path().join("trace");
@@ -133,13 +144,14 @@ fn killed_at_every_step_of_a_copy() {
         assert_eq!(hot.once(None).code(), Some(0), "{what}: the next run fails");
         assert_eq!(state(&hot), expected, "{what}");
         assert_at_rest(&hot, &what);
+        assert_attempts(&hot, 1, &what);
         let copied = hot.jobs().iter().filter(|job| job["reused"] == 1).count();
         assert_eq!((copied, hot.jobs().len()), (1, 2), "{what}: it was not copied");
     });
 }
 
 #[test]
-fn killed_at_pairs_of_steps() {
+fn f01_killed_at_pairs_of_steps() {
     let (expected, passes) = reference(drop_one);
     let pairs: Vec<(u64, u64)> = (1..=passes)
         .flat_map(|first| (1..=passes).map(move |second| (first, second)))
@@ -156,6 +168,7 @@ fn killed_at_pairs_of_steps() {
         assert_eq!(hot.once(None).code(), Some(0), "{what}: the last run fails");
         assert_eq!(state(&hot), expected, "{what}");
         assert_at_rest(&hot, &what);
+        assert_attempts(&hot, 2, &what);
     });
 }
 
@@ -222,10 +235,10 @@ impl Victim {
     }
 }
 
-/// Small files and some that take a third of a second, while the daemon and its workers are killed again and again: no file is blamed,
-/// and none ends twice. `SUTURE_KILLS` sets how many kills there are, `SUTURE_SEED` which.
+/// F2, and F3: small files and some that take a third of a second, while the daemon and its workers are killed again and again: no file is
+/// blamed, and none ends twice. `SUTURE_KILLS` sets how many kills there are, `SUTURE_SEED` which.
 #[test]
-fn killed_at_random() {
+fn f02_killed_at_random() {
     let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
     let kills = number("SUTURE_KILLS").unwrap_or(if exhaustive() { 10_000 } else { 24 });
     let seed = number("SUTURE_SEED").unwrap_or(0x5EED);
@@ -271,10 +284,10 @@ fn killed_at_random() {
     println!("seed {seed}: {kills} kills over {} drops in {:.0} s", originals.len(), started.elapsed().as_secs_f64());
 }
 
-/// Files that abort their worker, hang in it, eat its memory, try to kill the daemon (which their worker may not), or whose answer
-/// kills it: each is quarantined after a few attempts, and the others are repaired.
+/// F10, F11 and F12: files that abort their worker, hang in it, eat its memory, try to kill the daemon (which their worker may not), or whose
+/// answer kills it: each is quarantined after a few attempts, and the others are repaired.
 #[test]
-fn killers_are_quarantined_and_the_others_go_on() {
+fn f10_killers_are_quarantined_and_the_others_go_on() {
     let hot = Hot::new(with_crash_points());
     let killers = ["a!abort!.stl", "b!hang!.stl", "c!memory!.stl", "d!kill-daemon!.stl", "e!panic!.stl", "f!kill-parent!.stl"];
     let originals: Tree = killers.iter().map(|name| ((*name).to_owned(), mesh(Case::Holes, 1))).collect();
@@ -308,7 +321,7 @@ fn killers_are_quarantined_and_the_others_go_on() {
 
 /// On the command line, too, a file that kills its worker costs itself only, wherever it stands among the others.
 #[test]
-fn killers_cost_themselves_only() {
+fn f12_killers_cost_themselves_only() {
     let place = Place::new();
     let names: Vec<String> = (0..30u64)
         .map(|k| match k {

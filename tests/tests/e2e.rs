@@ -3,13 +3,18 @@
 #[cfg(test)]
 mod e2e {
     mod away;
+    mod blind;
+    mod burst;
     mod cases;
     mod config;
     mod files;
+    mod hostile;
     mod interrupted;
+    mod lost_state;
     mod malformed;
     mod many;
     mod memory;
+    mod odd_names;
     mod orders;
     mod profiles;
     mod queue;
@@ -17,7 +22,9 @@ mod e2e {
     mod reuse;
     mod same_bytes;
     mod soups;
+    mod specials;
     mod steer;
     mod terminal;
+    mod twice;
     mod watch;
 }

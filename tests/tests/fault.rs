@@ -29,7 +29,7 @@ use suture_tests::trace::{Fault, run};
 const LIMIT: Duration = Duration::from_secs(60);
 
 #[test]
-fn any_call_may_fail() {
+fn f08_any_call_may_fail() {
     let files = with_a_double(six());
     let expected = Expected::of(suture(), &files);
     assert_eq!(expected.good(), 5, "clean, its double, repaired, of another profile, of an odd name");

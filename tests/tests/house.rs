@@ -1,6 +1,9 @@
-//! The rules of the house, read from the source: files import each other in no circle, nor do folders, those of the engine import only those above them and state their contract, and no
-//! file or function is too long to be read in one go.
+//! The rules of the house, read from the source: files import each other in no circle, nor do folders, those of the engine import only those
+//! above them and state their contract, and no file or function is too long to be read in one go. And every fault that the daemon is built
+//! against has a test of its number.
 
+#[path = "house/faults.rs"]
+mod faults;
 #[path = "house/imports.rs"]
 mod imports;
 #[path = "house/lengths.rs"]
@@ -155,4 +158,38 @@ fn no_file_and_no_function_is_too_long() {
         long.extend(lengths::beyond(&sources(of_crate), LONGEST_FILE, LONGEST_FUNCTION));
     }
     assert!(long.is_empty(), "{long:#?}");
+}
+
+/// Faults without a test, and why there is none.
+const WITHOUT: [(u32, &str); 2] = [(28, "there is no web service yet"), (30, "there are no webhooks yet")];
+
+/// The last fault.
+const FAULTS: u32 = 30;
+
+#[test]
+fn every_fault_has_a_test_of_its_number() {
+    let mut proofs = faults::Proofs::new();
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+    CRATES.iter().map(|of_crate| sources(of_crate)).chain([tests]).for_each(|folder| faults::gather(&folder, &mut proofs));
+    let without: BTreeSet<u32> = WITHOUT.iter().map(|(number, _)| *number).collect();
+    let missing: Vec<_> = (1..=FAULTS).filter(|number| !proofs.contains_key(number) && !without.contains(number)).collect();
+    assert!(missing.is_empty(), "no test is named after {missing:?}");
+    let surplus: Vec<_> =
+        proofs.iter().filter(|(number, _)| without.contains(number) || !(1..=FAULTS).contains(*number)).collect();
+    assert!(surplus.is_empty(), "there are tests of faults that are said to have none, or that nobody knows: {surplus:?}");
+    let map = std::fs::read_to_string(sources("core").join("../../ARCHITECTURE.md")).expect("the map");
+    let named: BTreeSet<&str> = map.split('`').filter(|part| faults::number_of(part).is_some()).collect();
+    let there: BTreeSet<&str> = proofs.values().flatten().map(String::as_str).collect();
+    let differ: Vec<_> = named.symmetric_difference(&there).collect();
+    assert!(differ.is_empty(), "in ARCHITECTURE.md or in the sources, but not in both: {differ:?}");
+}
+
+#[test]
+fn tests_of_faults_are_found() {
+    let text = "fn f01_helper() {}\n#[test]\nfn f02_a() {\n    #[test]\n    #[cfg(unix)]\n    fn f03_b(x in 0..3) {\n#[test]\nlet x;\nfn f04_c() {}";
+    assert_eq!(faults::tests_in(text), ["f02_a", "f03_b"]);
+    assert_eq!(
+        ["f07_a", "f7_a", "f107_a", "fast", "f07_", "from_a"].map(faults::number_of),
+        [Some(7), None, None, None, None, None]
+    );
 }

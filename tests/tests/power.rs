@@ -34,13 +34,13 @@ fn four() -> Files {
 
 /// The disk keeps its word, and does no more.
 #[test]
-fn power_may_go_at_any_moment() {
+fn f09_power_may_go_at_any_moment() {
     power_goes(Kind::Strict);
 }
 
 /// The disk has a journal, as most have.
 #[test]
-fn power_may_go_at_any_moment_of_a_journal() {
+fn f09_power_may_go_at_any_moment_of_a_journal() {
     power_goes(Kind::Journal);
 }
 

@@ -112,7 +112,7 @@ fn a_name_that_is_taken_meanwhile_is_not_touched() {
 
 /// A new drop of the same name while the old one is worked on: each is its own.
 #[test]
-fn a_new_drop_of_the_same_name_stays() {
+fn f22_a_new_drop_of_the_same_name_stays() {
     let scene = Scene::new();
     let job = scene.intended();
     let path = scene.folder.inbox().join("part.stl");
@@ -160,7 +160,7 @@ fn a_file_without_a_result_fails_with_a_reason() {
 
 /// D6: a copier that goes on after its pause keeps inode and size, and may set the time back: the result of the half is not published.
 #[test]
-fn a_file_that_changed_before_its_result_is_placed_is_withdrawn() {
+fn f22_a_file_that_changed_before_its_result_is_placed_is_withdrawn() {
     let scene = Scene::new();
     let job = scene.intended();
     let path = scene.folder.inbox().join("part.stl");

@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_was_set_back_forgets_nothing_for_its_age() {
+    fn f15_a_clock_that_was_set_back_forgets_nothing_for_its_age() {
         let (store, _) = ten_days();
         assert!(past(&store, &keep(Some(0), 9), Time(0), &|_| false).unwrap().is_empty());
     }

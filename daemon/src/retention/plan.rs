@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_was_set_back_lets_everything_stay() {
+    fn f15_a_clock_that_was_set_back_lets_everything_stay() {
         let keep = Keep { results: Bound { age: days(1), size: Some(1) }, ..Keep::default() };
         let all = || vec![piece(What::Result, "a", 10, 5), piece(What::Result, "b", 10, 3)];
         assert!(named(all(), &keep, Time(0)).is_empty());

@@ -57,7 +57,7 @@ mod tests {
     const START: u64 = 1_000_000_000;
 
     #[test]
-    fn each_hour_after_a_while_and_not_after_a_jump() {
+    fn f15_each_hour_after_a_while_and_not_after_a_jump() {
         let begin = Instant::now();
         // Seconds by both clocks.
         let at = |steady: u64, wall: i64| Moment {

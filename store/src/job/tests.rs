@@ -259,7 +259,7 @@ fn daemon_dies(alone: bool, testimony: Testimony) -> impl Fn(Token) -> Event {
 }
 
 #[test]
-fn one_crash_and_two_deaths_of_the_daemon_in_its_hands_are_three() {
+fn f12_one_crash_and_two_deaths_of_the_daemon_in_its_hands_are_three() {
     let mut job = run(&fresh(), dies(Death::Signal(6)));
     job = run(&job, daemon_dies(true, Testimony::InHand));
     assert_eq!(job.kind(), Kind::Queued);
@@ -354,7 +354,7 @@ fn the_pause_of_a_waiting_job_can_be_ended() {
 
 /// A file that its share of the memory was too small for runs once more, alone, and is blamed for nothing.
 #[test]
-fn a_file_that_needs_all_memory_runs_alone() {
+fn f10_a_file_that_needs_all_memory_runs_alone() {
     let job = run(&fresh(), |token| Event::Step { token, step: Step::NeedsAll });
     assert_eq!((job.kind(), job.blame), (Kind::Alone, Blame::default()));
     let alone = job.after(&Event::Claim { epoch: Epoch(1), token: Token(9), boot: Boot(1) }, job.changed).unwrap();
@@ -363,7 +363,7 @@ fn a_file_that_needs_all_memory_runs_alone() {
 }
 
 #[test]
-fn kills_from_outside_slow_a_job_down_but_never_end_it() {
+fn f03_kills_from_outside_slow_a_job_down_but_never_end_it() {
     let mut job = fresh();
     for kill in 1..=100 {
         job = run(&job, dies(Death::Killed(15)));

@@ -317,7 +317,7 @@ mod tests {
     /// A clock that is set back or forward changes no age that was counted, and one that was wrong at the start does not keep anyone from
     /// rising.
     #[test]
-    fn clocks_that_jump_keep_no_one_waiting() {
+    fn f15_clocks_that_jump_keep_no_one_waiting() {
         for wall in [Time(0), Time(u64::MAX)] {
             let mut line = line(&[job(1, 10, 0, 0)]);
             let waiting = |line: &mut Line, ticks| line.waiting(&any(), Now { wall, ticks }).unwrap().aged;

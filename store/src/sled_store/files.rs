@@ -221,7 +221,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_mark_is_whole_or_damaged_never_another() {
+    fn f05_the_mark_is_whole_or_damaged_never_another() {
         let state = tempfile::tempdir().unwrap();
         assert_eq!(read_mark(state.path()).unwrap(), Mark::Missing);
         write_mark(state.path(), Epoch(3), Seq(1234)).unwrap();
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn only_torn_snapshots_go() {
+    fn f04_only_torn_snapshots_go() {
         let db = tempfile::tempdir().unwrap();
         for name in ["db", "conf", "snap.0000", "snap.0001.generating", "other.generating"] {
             std::fs::write(db.path().join(name), "").unwrap();

@@ -72,7 +72,7 @@ fn finish(store: &SledStore, claim: &Claim, from: Kind) {
 
 fn start(state: &Path) -> Command {
     let mut command = Command::new(std::env::current_exe().unwrap());
-    let test = "sled_store::kill_tests::whatever_was_acknowledged_survives_a_kill";
+    let test = "sled_store::kill_tests::f02_whatever_was_acknowledged_survives_a_kill";
     command.args(["--exact", test, "--nocapture"]).env(VICTIM, state).stdout(Stdio::piped()).stderr(Stdio::null());
     command
 }
@@ -121,7 +121,7 @@ fn check(state: &Path, said: &Said) {
 }
 
 #[test]
-fn whatever_was_acknowledged_survives_a_kill() {
+fn f02_whatever_was_acknowledged_survives_a_kill() {
     if let Some(state) = std::env::var_os(VICTIM) {
         return victim(Path::new(&state));
     }
@@ -157,7 +157,7 @@ fn whatever_was_acknowledged_survives_a_kill() {
 
 /// A kill while the database is made: nothing was acknowledged, so that a torn one may be set aside, but it must open.
 #[test]
-fn a_store_that_was_never_finished_opens() {
+fn f02_a_store_that_was_never_finished_opens() {
     let folder = tempfile::tempdir().unwrap();
     for kill in 0..30 {
         let state = folder.path().join(kill.to_string());
@@ -182,7 +182,7 @@ fn a_store_that_was_never_finished_opens() {
 /// F1 for the store: every crash point that an ordinary run passes, the first and a later time, on one state after another.
 #[cfg(feature = "crash-points")]
 #[test]
-fn every_crash_point_leaves_a_store_that_opens() {
+fn f01_every_crash_point_leaves_a_store_that_opens() {
     let folder = tempfile::tempdir().unwrap();
     let trace = folder.path().join("trace");
     let first = folder.path().join("first");

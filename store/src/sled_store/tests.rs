@@ -40,7 +40,7 @@ fn submit(store: &SledStore, name: &str) -> JobId {
 
 /// F4: a kill while sled wrote its snapshot.
 #[test]
-fn a_torn_snapshot_does_not_keep_the_store_shut() {
+fn f04_a_torn_snapshot_does_not_keep_the_store_shut() {
     let state = tempfile::tempdir().unwrap();
     let id = submit(&SledStore::open(state.path()).unwrap(), "part.stl");
     std::fs::write(state.path().join("db/snap.FFFFFFFFFFFFFFF0.generating"), b"torn").unwrap();
@@ -52,7 +52,7 @@ fn a_torn_snapshot_does_not_keep_the_store_shut() {
 
 /// F16: two daemons, one state folder.
 #[test]
-fn a_second_daemon_is_told_who_owns_the_store() {
+fn f16_a_second_daemon_is_told_who_owns_the_store() {
     let state = tempfile::tempdir().unwrap();
     let first = SledStore::open(state.path()).unwrap();
     let second = SledStore::open(state.path()).err().unwrap();
@@ -86,7 +86,7 @@ fn a_database_that_is_held_is_not_taken_for_damaged() {
 
 /// F5: a record that the database hands out damaged.
 #[test]
-fn a_flipped_bit_is_an_error_not_another_value() {
+fn f05_a_flipped_bit_is_an_error_not_another_value() {
     let state = tempfile::tempdir().unwrap();
     let store = SledStore::open(state.path()).unwrap();
     let id = submit(&store, "part.stl");
@@ -111,7 +111,7 @@ fn a_flipped_bit_is_an_error_not_another_value() {
 
 /// F5: the database opens, but an acknowledged transition is not in it.
 #[test]
-fn a_store_that_went_back_in_time_is_refused() {
+fn f05_a_store_that_went_back_in_time_is_refused() {
     let state = tempfile::tempdir().unwrap();
     submit(&SledStore::open(state.path()).unwrap(), "a.stl");
     let older = state.path().join("older");
@@ -157,7 +157,7 @@ fn a_restored_database_is_found_where_the_crash_left_it() {
 
 /// F6: the whole state folder is gone: a new store, without complaint.
 #[test]
-fn an_empty_folder_is_a_new_store() {
+fn f06_an_empty_folder_is_a_new_store() {
     let state = tempfile::tempdir().unwrap();
     let path = state.path().join("deep/state");
     submit(&SledStore::open(&path).unwrap(), "a.stl");
@@ -189,7 +189,7 @@ fn snapshots(state: &Path) -> Vec<PathBuf> {
 
 /// F5: the snapshot is damaged, the log is whole: everything comes back.
 #[test]
-fn a_damaged_snapshot_is_made_anew_from_the_log() {
+fn f05_a_damaged_snapshot_is_made_anew_from_the_log() {
     let state = tempfile::tempdir().unwrap();
     for name in ["a.stl", "b.stl", "c.stl"] {
         // Each opening writes a snapshot of what the one before left.
@@ -214,7 +214,7 @@ fn a_damaged_snapshot_is_made_anew_from_the_log() {
 
 /// F5: the log is cut: what is left is older than what was acknowledged, and is refused, as often as it is asked.
 #[test]
-fn a_cut_log_is_refused_and_left_as_it_is() {
+fn f05_a_cut_log_is_refused_and_left_as_it_is() {
     let state = tempfile::tempdir().unwrap();
     let store = SledStore::open(state.path()).unwrap();
     let found: Vec<_> = (0..500).map(|at| dropped(&format!("{at}.stl"), at).unwrap()).collect();
@@ -234,8 +234,9 @@ fn a_cut_log_is_refused_and_left_as_it_is() {
     }
 }
 
+/// F7, and F8: the first error ends it, whatever it was.
 #[test]
-fn a_poisoned_store_does_nothing_and_loses_nothing() {
+fn f07_a_poisoned_store_does_nothing_and_loses_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let state = folder.path().join("state");
     let store = SledStore::open(&state).unwrap();
@@ -260,7 +261,7 @@ fn a_poisoned_store_does_nothing_and_loses_nothing() {
 
 /// F5: damage anywhere in the files. Either everything is there as it was, or the store says that it cannot be trusted.
 #[test]
-fn damage_on_disk_is_never_silent() {
+fn f05_damage_on_disk_is_never_silent() {
     let folder = tempfile::tempdir().unwrap();
     let sound = folder.path().join("sound");
     let store = SledStore::open(&sound).unwrap();
@@ -323,7 +324,7 @@ fn a_peek_writes_nothing() {
 
 /// D5: a store whose folder was removed, or made anew, is not opened again as an empty one.
 #[test]
-fn a_store_that_was_taken_away_is_not_begun_anew() {
+fn f06_a_store_that_was_taken_away_is_not_begun_anew() {
     let dir = tempfile::tempdir().unwrap();
     let state = dir.path().join("state");
     let store = SledStore::open(&state).unwrap();

@@ -49,7 +49,7 @@ fn listed(place: &Place) -> String {
 
 /// The mount of one of two folders is not there when the daemon starts, but for the bare folder that it is mounted on.
 #[test]
-fn a_folder_whose_mount_is_missing_is_not_taken_for_an_empty_one() {
+fn f25_a_folder_whose_mount_is_missing_is_not_taken_for_an_empty_one() {
     let place = Place::new();
     let config = "settle = \"30ms\"\nstate = \"state/jobs\"\n[[folders]]\npath = \"hot\"\n[[folders]]\npath = \"scans\"\n";
     place.put("suture.toml", config.as_bytes());
@@ -83,7 +83,7 @@ fn a_folder_whose_mount_is_missing_is_not_taken_for_an_empty_one() {
 
 /// `in/` that is made anew is seen at once, not with the next full scan.
 #[test]
-fn a_folder_for_drops_that_is_made_anew_is_watched() {
+fn f25_a_folder_for_drops_that_is_made_anew_is_watched() {
     let place = Place::new();
     place.put("hot/in/a.stl", &mesh(1));
     let _daemon = Daemon::start(&place, &["hot", "--settle", "30ms"]);

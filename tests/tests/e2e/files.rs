@@ -147,7 +147,7 @@ fn nothing_is_overwritten() {
 
 /// A link that leads nowhere is a name that is taken, too; an input may be behind one.
 #[test]
-fn links_are_names() {
+fn f24_links_are_names() {
     let place = Place::new();
     place.generate(Case::Holes, 600, 1);
     std::os::unix::fs::symlink("nowhere.stl", place.at("out.stl")).unwrap();
@@ -160,7 +160,7 @@ fn links_are_names() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn names_need_not_be_utf_8() {
+fn f23_names_need_not_be_utf_8() {
     use std::ffi::OsStr;
     use std::os::unix::ffi::OsStrExt;
     let place = Place::new();

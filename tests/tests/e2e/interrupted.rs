@@ -68,7 +68,7 @@ fn by_a_signal() {
 }
 
 #[test]
-fn by_the_death_of_the_worker() {
+fn f03_by_the_death_of_the_worker() {
     let place = Place::new();
     let (child, worker) = at_work(&place);
     kill_process(worker, Signal::KILL).unwrap();
@@ -97,7 +97,7 @@ fn assert_goes(worker: Pid) {
 /// From the first record to the last stage, by a signal and by a kill, of binary files and of text (which is spooled): either the whole
 /// result is there or nothing, and no process is left.
 #[test]
-fn at_any_moment() {
+fn f02_at_any_moment() {
     const MOMENTS: u32 = 8;
     for text in [false, true] {
         let place = Place::new();
@@ -168,7 +168,7 @@ fn among_many_files() {
 }
 
 #[test]
-fn by_a_cut_in_the_mapped_file() {
+fn f22_by_a_cut_in_the_mapped_file() {
     let place = Place::new();
     let (child, _) = at_work(&place);
     File::options().write(true).open(place.at("mixed.stl")).unwrap().set_len(1_000).unwrap();
@@ -176,7 +176,7 @@ fn by_a_cut_in_the_mapped_file() {
 }
 
 #[test]
-fn by_a_change_of_the_file() {
+fn f22_by_a_change_of_the_file() {
     let place = Place::new();
     let (child, _) = at_work(&place);
     File::options().write(true).open(place.at("mixed.stl")).unwrap().set_modified(std::time::SystemTime::UNIX_EPOCH).unwrap();

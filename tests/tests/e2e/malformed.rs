@@ -75,14 +75,14 @@ fn header_that_begins_with_solid() {
 }
 
 #[test]
-fn count_left_open() {
+fn f14_count_left_open() {
     for count in [0, u32::MAX] {
         closed_box_in(&with_count(count, &records(&solid_box())), &["count", "12"]);
     }
 }
 
 #[test]
-fn count_too_large_or_too_small() {
+fn f14_count_too_large_or_too_small() {
     closed_box_in(&with_count(100, &records(&solid_box())), &["100", "12"]);
     closed_box_in(&with_count(10, &records(&solid_box())), &["10", "12"]);
 }

@@ -23,7 +23,7 @@ fn watched(mut child: std::process::Child) -> (std::process::Output, u64) {
 }
 
 #[test]
-fn a_million_triangles_within_64_mib_or_refused() {
+fn f10_a_million_triangles_within_64_mib_or_refused() {
     const BUDGET: u64 = 64 << 20;
     let place = Place::new();
     for case in [Case::Mixed, Case::Shuffled, Case::Soup] {

@@ -89,7 +89,7 @@ fn a_pause_holds_over_a_restart_until_an_operator_goes_on() {
 }
 
 #[test]
-fn a_drain_ends_when_nothing_is_in_work() {
+fn f27_a_drain_ends_when_nothing_is_in_work() {
     let place = Place::new();
     (0..20).for_each(|i| drop(place.put(&format!("hot/in/{i}.stl"), &mesh(i))));
     let _daemon = Daemon::start(&place);

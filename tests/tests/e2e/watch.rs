@@ -169,8 +169,9 @@ fn sub_folder_names_the_profile() {
     assert_eq!(profiles, [("cautious/holes.stl".into(), "cautious".into()), ("order 7/holes.stl".into(), "default".into())]);
 }
 
+/// F16, and F17.
 #[test]
-fn folder_in_use_is_code_73() {
+fn f16_folder_in_use_is_code_73() {
     let place = Place::new();
     place.put("hot/in/notes.txt", b"");
     let mut daemon = place.command().args(["watch", "hot"]).spawn().unwrap();

@@ -108,9 +108,9 @@ fn no_input_inode_is_opened_for_writing_in_quarantine() {
     assert!(with_kind(&scene, "quarantined").len() >= 3, "{:?}", kinds(&scene));
 }
 
-/// Errors on the way of a result into its place, and one of a worker: its job waits, and is cancelled.
+/// F8: errors on the way of a result into its place, and one of a worker: its job waits, and is cancelled.
 #[test]
-fn no_input_inode_is_opened_for_writing_after_errors() {
+fn f08_no_input_inode_is_opened_for_writing_after_errors() {
     for call in ["fsync", "create", "open", "rename"] {
         for n in [5, 8, 11, 14, 17, 20] {
             let scene = Scene::new(suture(), &six());
@@ -127,9 +127,9 @@ fn no_input_inode_is_opened_for_writing_after_errors() {
     assert_untouched(&scene, &scene.once(), None, &mut |_| {});
 }
 
-/// Files that change while they are worked on.
+/// F22: files that change while they are worked on.
 #[test]
-fn no_input_inode_is_opened_for_writing_when_it_changes() {
+fn f22_no_input_inode_is_opened_for_writing_when_it_changes() {
     let scene = Scene::new(suture(), &six());
     let changed = scene.path().join("in/clean.stl");
     let mut times = 0;

@@ -13,7 +13,7 @@ const YEAR: Duration = Duration::from_secs(365 * 86_400);
 
 /// The wall clock of other processes cannot be moved without moving the machine's; files may come from machines whose clock is wrong.
 #[test]
-fn files_of_other_times() {
+fn f15_files_of_other_times() {
     let stage = Stage::new();
     let now = SystemTime::now();
     let times = [
@@ -39,7 +39,7 @@ fn files_of_other_times() {
 
 /// Between two lives of the daemon the monotonic clock jumps ten years ahead, and back (another boot of the machine).
 #[test]
-fn monotonic_clock_jumps_between_lives() {
+fn f15_monotonic_clock_jumps_between_lives() {
     if !is_root("clock") {
         return;
     }
@@ -69,7 +69,7 @@ fn monotonic_clock_jumps_between_lives() {
 
 /// 40 million triangles, 2 GB.
 #[test]
-fn forty_million_triangles() {
+fn f20_forty_million_triangles() {
     if std::env::var_os("SUTURE_EXHAUSTIVE").is_none() {
         row("huge", "40 M triangles", "skipped: only with SUTURE_EXHAUSTIVE=1");
         return;

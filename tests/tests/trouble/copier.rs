@@ -16,7 +16,7 @@ fn slow_stage() -> Stage {
 
 /// The file stays open all the time: it is not taken before it is whole.
 #[test]
-fn pause_with_the_file_open() {
+fn f21_pause_with_the_file_open() {
     let stage = slow_stage();
     let whole = holes(4000, 1);
     stage.expect("part.stl", &whole);
@@ -42,7 +42,7 @@ fn pause_with_the_file_open() {
 
 /// The copier closes the file during the pause, and opens it by its name for the rest; if it is gone, it copies it anew.
 #[test]
-fn pause_with_the_file_closed() {
+fn f21_pause_with_the_file_closed() {
     for cut in ["in a row of records", "at a record's end", "with half a header"] {
         let stage = slow_stage();
         let whole = holes(4000, 1);

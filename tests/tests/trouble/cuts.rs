@@ -11,9 +11,9 @@ use crate::world::processes_of;
 
 const CUTS: u32 = 6;
 
-/// The machine is cut off six times while it works on one long file: the file is not to blame.
+/// F2: the machine is cut off six times while it works on one long file: the file is not to blame.
 #[test]
-fn six_power_cuts_during_one_long_file() {
+fn f02_six_power_cuts_during_one_long_file() {
     let stage = Stage::new();
     // However fast the machine, some size takes a while.
     let size = [100_000, 400_000, 1_600_000].into_iter().find(|size| {
@@ -56,7 +56,7 @@ fn six_power_cuts_during_one_long_file() {
 
 /// Files that kill their worker, or the daemon, end in quarantine, and their reports say how to go on.
 #[test]
-fn poison_is_quarantined_and_says_how_to_go_on() {
+fn f12_poison_is_quarantined_and_says_how_to_go_on() {
     for poison in ["a!abort!.stl", "d!kill-daemon!.stl"] {
         let stage = Stage::of(with_crash_points());
         stage.put(poison, &holes(600, 1));

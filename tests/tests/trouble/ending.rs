@@ -25,7 +25,7 @@ fn served() -> Stage {
 }
 
 #[test]
-fn without_its_socket() {
+fn f27_without_its_socket() {
     let stage = served();
     let mut daemon = stage.serve();
     stage.wait_done(30, &mut daemon);
@@ -35,7 +35,7 @@ fn without_its_socket() {
 }
 
 #[test]
-fn with_its_folder_renamed() {
+fn f27_with_its_folder_renamed() {
     let stage = served();
     let mut daemon = stage.serve();
     stage.wait_done(30, &mut daemon);
@@ -46,7 +46,7 @@ fn with_its_folder_renamed() {
 }
 
 #[test]
-fn with_a_silent_client_that_holds_no_one_up() {
+fn f27_with_a_silent_client_that_holds_no_one_up() {
     let stage = served();
     let mut daemon = stage.serve();
     stage.wait_done(30, &mut daemon);

@@ -54,7 +54,7 @@ fn parts_are_other_file_systems() {
 
 /// Killed at random moments, with every part on a file system of its own.
 #[test]
-fn killed_while_files_cross() {
+fn f02_killed_while_files_cross() {
     if !is_root("mounts") {
         return;
     }
@@ -113,7 +113,7 @@ fn kill_while_crossing(seed: u64) -> u64 {
 
 /// The hot folder, with the job store in it, is unmounted while the daemon runs, and mounted again: nothing is made in the bare folder meanwhile.
 #[test]
-fn unmounted_and_mounted_again() {
+fn f25_unmounted_and_mounted_again() {
     if !is_root("mounts") {
         return;
     }

@@ -19,7 +19,7 @@ fn make_anew(stage: &Stage) {
 
 /// Renamed away while files wait, and back.
 #[test]
-fn renamed_and_back() {
+fn f25_renamed_and_back() {
     let stage = waiting();
     let mut daemon = stage.serve();
     std::fs::rename(stage.at("hot"), stage.at("moved")).unwrap();
@@ -32,9 +32,9 @@ fn renamed_and_back() {
     row("renamed", "away for 1.5 s while files wait, then back", &format!("done {:.0} s after, once each", took.as_secs_f64()));
 }
 
-/// Renamed and made anew: the daemon touches nothing in the new folder, and a second one may serve that. Files in the old one wait.
+/// F25, and F17: renamed and made anew. The daemon touches nothing in the new folder, and a second one may serve that. Files in the old one wait.
 #[test]
-fn renamed_and_made_anew() {
+fn f25_renamed_and_made_anew() {
     let stage = waiting();
     let mut first = stage.serve();
     std::fs::rename(stage.at("hot"), stage.at("moved")).unwrap();
@@ -69,7 +69,7 @@ fn renamed_and_made_anew() {
 
 /// The whole folder goes while the daemon runs. It ends with 75 and a line, or serves what is made in its place.
 #[test]
-fn removed_while_running() {
+fn f25_removed_while_running() {
     let mut stage = Stage::new();
     stage.lines += "rescan = \"500ms\"\n";
     stage.put("before.stl", &holes(600, 1));
@@ -97,7 +97,7 @@ fn removed_while_running() {
 
 /// Only the private part goes, with the job store and the lock in it, while files wait.
 #[test]
-fn private_part_removed() {
+fn f06_private_part_removed() {
     let stage = waiting();
     let mut daemon = stage.serve();
     std::thread::sleep(Duration::from_millis(300));

@@ -12,7 +12,7 @@ fn large() -> Vec<u8> {
 }
 
 #[test]
-fn inodes_run_out() {
+fn f07_inodes_run_out() {
     if !is_root("inodes run out") {
         return;
     }
@@ -58,7 +58,7 @@ fn few_inodes(free: usize) {
 }
 
 #[test]
-fn bytes_run_out() {
+fn f07_bytes_run_out() {
     if !is_root("bytes run out") {
         return;
     }
@@ -155,7 +155,7 @@ fn whole_disk_full() {
 /// A quota stops a write in its midst on a disk with room. A limit of the size of files does the same to every process, and needs no
 /// kernel that was built with quotas.
 #[test]
-fn a_quota_stops_writes() {
+fn f07_a_quota_stops_writes() {
     let stage = Stage::new();
     let mut command = stage.watch(&[]);
     // SAFETY: between fork and exec only async-signal-safe calls are made: two plain system calls.

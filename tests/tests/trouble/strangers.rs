@@ -17,7 +17,7 @@ fn mode(path: impl AsRef<std::path::Path>, mode: u32) {
 
 /// Originals in a folder that the daemon may not write to cannot be moved away: their jobs wait, and hold no one up.
 #[test]
-fn a_sub_folder_of_another_user() {
+fn f25_a_sub_folder_of_another_user() {
     if !is_root("strangers") {
         return;
     }
@@ -59,7 +59,7 @@ fn a_sub_folder_of_another_user() {
 
 /// A result that cannot be placed is parked; it can be cancelled, and the other is placed once that is possible.
 #[test]
-fn a_folder_of_results_that_may_not_be_written_to() {
+fn f25_a_folder_of_results_that_may_not_be_written_to() {
     if !is_root("strangers") {
         return;
     }
@@ -141,7 +141,7 @@ fn results_have_the_rights_of_their_originals() {
 
 /// A sub-folder that cannot be read is named once, not at every scan.
 #[test]
-fn an_unreadable_sub_folder_is_logged_once() {
+fn f25_an_unreadable_sub_folder_is_logged_once() {
     if !is_root("strangers") {
         return;
     }
@@ -169,7 +169,7 @@ fn an_unreadable_sub_folder_is_logged_once() {
 
 /// Looking at jobs needs no right to write.
 #[test]
-fn jobs_are_listed_on_a_read_only_mount() {
+fn f25_jobs_are_listed_on_a_read_only_mount() {
     if !is_root("strangers") {
         return;
     }

@@ -51,7 +51,7 @@ fn raw_controls(seen: &[u8]) -> Vec<String> {
 }
 
 #[test]
-fn no_name_steers_a_terminal() {
+fn f23_no_name_steers_a_terminal() {
     let stage = Stage::new();
     let mesh = holes(600, 1);
     stage.put(EVIL, &mesh);

@@ -37,7 +37,7 @@ fn survive(bytes: &[u8]) -> std::result::Result<(), TestCaseError> {
 
 /// A cut file gives a beginning of what the whole gives, or nothing: never a triangle that was not there.
 #[test]
-fn cutting_anywhere_invents_nothing() {
+fn f13_cutting_anywhere_invents_nothing() {
     for seed in seeds() {
         let whole = open(&seed).unwrap();
         for length in 0..seed.len() {
@@ -62,12 +62,12 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
 
     #[test]
-    fn any_bytes_are_survived(bytes in prop::collection::vec(any::<u8>(), 0..600)) {
+    fn f13_any_bytes_are_survived(bytes in prop::collection::vec(any::<u8>(), 0..600)) {
         survive(&bytes)?;
     }
 
     #[test]
-    fn any_bytes_between_facets_are_survived(bytes in prop::collection::vec(any::<u8>(), 0..200), at in 0usize..1000) {
+    fn f13_any_bytes_between_facets_are_survived(bytes in prop::collection::vec(any::<u8>(), 0..200), at in 0usize..1000) {
         let mut text = tetrahedron_text().into_bytes();
         let at = at % text.len();
         text.splice(at..at, bytes);
@@ -76,7 +76,7 @@ proptest! {
 
     /// Byte flips, cuts, insertions, doublings: what copying, transfer and editors do to files.
     #[test]
-    fn mutated_files_are_survived(
+    fn f13_mutated_files_are_survived(
         seed in 0usize..7, edits in prop::collection::vec((0u8..5, any::<usize>(), any::<u8>(), 0usize..80), 1..8),
     ) {
         let mut bytes = seeds().swap_remove(seed);

@@ -1,0 +1,93 @@
+//! A daemon at work in a place, and how to wait for what it does.
+
+use std::fs::File;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use crate::Place;
+
+/// What is sure to come is waited for so long.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Waits for what is sure to come; how long it took.
+///
+/// # Panics
+/// When it does not come.
+pub fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) -> Duration {
+    let began = Instant::now();
+    while !is_so() {
+        assert!(began.elapsed() < PATIENCE, "in vain: {what}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    began.elapsed()
+}
+
+/// A running daemon, which is killed when it is dropped. Its log is a file of the place.
+pub struct Served<'a> {
+    place: &'a Place,
+    log: String,
+    child: Child,
+}
+
+impl<'a> Served<'a> {
+    /// Starts `suture watch` with these arguments, and waits until it serves a folder.
+    ///
+    /// # Panics
+    /// When it does not.
+    pub fn start(place: &'a Place, arguments: &[&str], log: &str) -> Self {
+        let mut command = place.command();
+        command.arg("watch").args(arguments);
+        Self::of(place, command, log)
+    }
+
+    /// Starts a daemon by this command, and waits until it serves a folder.
+    ///
+    /// # Panics
+    /// When it does not.
+    pub fn of(place: &'a Place, mut command: Command, log: &str) -> Self {
+        let file = File::create(place.at(log)).expect("the log can be made");
+        let child = command.stdout(Stdio::null()).stderr(file).spawn().expect("the daemon can be started");
+        let served = Self { place, log: log.to_owned(), child };
+        wait_until("the daemon serves its folder", || !served.lines("Serving a hot folder.").is_empty());
+        served
+    }
+
+    /// Its process.
+    pub fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Lines of its log that hold these words.
+    ///
+    /// # Panics
+    /// When one of them is no JSON.
+    pub fn lines(&self, words: &str) -> Vec<Value> {
+        let log = String::from_utf8_lossy(&self.place.read(&self.log)).into_owned();
+        // The last line may be half written.
+        let whole = log.rsplit_once('\n').map_or("", |(whole, _)| whole);
+        whole
+            .lines()
+            .filter(|line| line.contains(words))
+            .map(|line| serde_json::from_str(line).expect("a line of JSON"))
+            .collect()
+    }
+}
+
+impl Drop for Served<'_> {
+    fn drop(&mut self) {
+        // It may have ended.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// What `suture jobs list --json` says of a hot folder of the place.
+///
+/// # Panics
+/// When it cannot be had.
+pub fn jobs(place: &Place, folder: &str) -> Vec<Value> {
+    let listed = place.suture(["jobs", "list", "--json", "--dir", folder]).expect(0).stdout();
+    listed.lines().map(|line| serde_json::from_str(line).expect("a line of JSON")).collect()
+}

@@ -77,7 +77,7 @@ Nothing is ever overwritten: a second part.stl becomes part~2.stl. Ctrl-C or SIG
 work; a second one stops at once, and the files are taken up again at the next start. SIGHUP makes a daemon with --config read its file
 anew; a file with a mistake in it changes nothing.";
 
-/// What each profile is for.
+/// The purpose of each profile.
 const PROFILE_HELP: &str = "\
 Profile: a name, or a TOML file of settings [default: default]
 

@@ -1,4 +1,4 @@
-//! What the daemon works by. A hot folder needs no settings; a TOML file may name several folders, profiles and limits: [`read`] reads it,
+//! The settings that the daemon works by. A hot folder needs no settings; a TOML file may name several folders, profiles and limits: [`read`] reads it,
 //! [`show`] writes one, [`command`] does either for people. [`keep`] is what goes by itself.
 
 use std::collections::BTreeMap;
@@ -29,7 +29,7 @@ const LEAST_MEMORY: u64 = 4 << 20;
 /// A hot folder to serve.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FolderConfig {
-    /// What jobs call it.
+    /// The name that jobs call it by.
     pub name: String,
     pub path: PathBuf,
     /// Profile of files that lie in no sub-folder.
@@ -68,7 +68,7 @@ impl TimeLimit {
     }
 }
 
-/// What the daemon works by.
+/// The settings that the daemon works by.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Config {
     pub folders: Vec<FolderConfig>,
@@ -92,7 +92,7 @@ pub(crate) struct Config {
     /// The hours at which all workers work; at others, so many do.
     pub run_window: RunWindow,
     pub workers_outside: usize,
-    /// What was made of the same content before is not made once more.
+    /// A result that was made of the same content before is copied, not made once more.
     pub reuse: bool,
     /// What goes by itself, and when.
     pub keep: Keep,

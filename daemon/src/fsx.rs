@@ -108,8 +108,16 @@ pub(crate) fn remove_if_there(path: &Path) -> io::Result<()> {
 /// # Errors
 /// As `open` and `read`.
 pub(crate) fn hash(path: &Path) -> io::Result<Hash> {
+    hash_of(&File::open(path)?)
+}
+
+/// The same of a file that is open, from where its handle stands.
+///
+/// # Errors
+/// As `read`.
+pub(crate) fn hash_of(file: &File) -> io::Result<Hash> {
     let mut hasher = blake3::Hasher::new();
-    hasher.update_reader(File::open(path)?)?;
+    hasher.update_reader(file)?;
     Ok(Hash(*hasher.finalize().as_bytes()))
 }
 

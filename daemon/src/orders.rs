@@ -180,7 +180,7 @@ fn write_mark(path: &Path, seq: Seq) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use suture_store::{Control, Filter, MemoryStore, Priority, Publication, Source, Step, Submission, SystemClock};
+    use suture_store::{Control, Filter, MemoryStore, Priority, Source, Step, Submission, SystemClock};
 
     use super::*;
     use crate::config::{Config, FolderConfig};
@@ -200,19 +200,7 @@ mod tests {
 
     fn finish(store: &MemoryStore) {
         let claim = store.claim(&Filter::default()).unwrap().unwrap();
-        let path = claim.job.source.path.clone();
-        let publication = Publication {
-            ending: suture_store::Ending::Clean,
-            reason: String::new(),
-            output: Some(path.clone()),
-            output_hash: None,
-            report_hash: None,
-            source_ctime_ns: None,
-            original: Some(path),
-            stays: false,
-            recipe: None,
-            reused: None,
-        };
+        let publication = summary::tests::publication(claim.job.source.path.clone(), suture_store::Ending::Clean);
         for step in [Step::Intend(publication), Step::Placed, Step::Finished] {
             store.advance(&claim, step).unwrap();
         }

@@ -6,7 +6,7 @@ use std::path::Path;
 use suture_store::Hash;
 
 use crate::claim::Original;
-use crate::fsx::Identity;
+use crate::fsx::{self, Identity};
 
 /// The file at `path`, if it still has the content that its receipt speaks of; a link is not followed.
 ///
@@ -16,9 +16,7 @@ pub(crate) fn ours(path: &Path, hash: Option<Hash>) -> io::Result<Option<Identit
     let file = Original::open(path)?;
     let identity = file.identity()?;
     let Some(hash) = hash else { return Ok(Some(identity)) };
-    let mut hasher = blake3::Hasher::new();
-    hasher.update_reader(file.file())?;
-    let same = hasher.finalize().as_bytes() == &hash.0 && file.identity()? == identity;
+    let same = fsx::hash_of(file.file())? == hash && file.identity()? == identity;
     Ok(same.then_some(identity))
 }
 

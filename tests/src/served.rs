@@ -1,9 +1,10 @@
 //! A daemon at work in a place, and how to wait for what it does.
 
 use std::fs::File;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
+use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
 use crate::Place;
@@ -46,17 +47,41 @@ impl<'a> Served<'a> {
     ///
     /// # Panics
     /// When it does not.
-    pub fn of(place: &'a Place, mut command: Command, log: &str) -> Self {
-        let file = File::create(place.at(log)).expect("the log can be made");
-        let child = command.stdout(Stdio::null()).stderr(file).spawn().expect("the daemon can be started");
-        let served = Self { place, log: log.to_owned(), child };
+    pub fn of(place: &'a Place, command: Command, log: &str) -> Self {
+        let served = Self::begin(place, command, log);
         wait_until("the daemon serves its folder", || !served.lines("Serving a hot folder.").is_empty());
         served
+    }
+
+    /// Starts a daemon by this command, and waits for nothing.
+    ///
+    /// # Panics
+    /// When it cannot be started.
+    pub fn begin(place: &'a Place, mut command: Command, log: &str) -> Self {
+        let file = File::create(place.at(log)).expect("the log can be made");
+        let child = command.stdout(Stdio::null()).stderr(file).spawn().expect("the daemon can be started");
+        Self { place, log: log.to_owned(), child }
     }
 
     /// Its process.
     pub fn pid(&self) -> u32 {
         self.child.id()
+    }
+
+    /// Sends it a signal.
+    ///
+    /// # Panics
+    /// When it has ended.
+    pub fn signal(&self, signal: Signal) {
+        kill_process(Pid::from_child(&self.child), signal).expect("the daemon lives");
+    }
+
+    /// Waits for its end.
+    ///
+    /// # Panics
+    /// When it cannot be waited for.
+    pub fn ended(mut self) -> ExitStatus {
+        self.child.wait().expect("the daemon can be waited for")
     }
 
     /// Lines of its log that hold these words.

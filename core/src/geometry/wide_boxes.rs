@@ -19,6 +19,13 @@ struct Wanted {
     hi: [Vec4; 3],
 }
 
+impl Wanted {
+    #[inline(always)]
+    fn of(bounds: &Bounds) -> Self {
+        Self { lo: bounds.lo.map(Vec4::splat), hi: bounds.hi.map(Vec4::splat) }
+    }
+}
+
 /// Boxes in an order in which those near each other stand together.
 pub(super) struct WideTree {
     /// Their numbers.
@@ -69,7 +76,7 @@ impl WideTree {
 
     /// Visits the numbers of all boxes that meet `wanted`, in an order that is not to be relied on.
     pub(super) fn each_meeting(&self, wanted: &Bounds, mut visit: impl FnMut(u32)) {
-        let wanted = Wanted { lo: wanted.lo.map(Vec4::splat), hi: wanted.hi.map(Vec4::splat) };
+        let wanted = Wanted::of(wanted);
         if let Some(top) = self.levels.len().checked_sub(1) {
             self.descend((top, 0), &wanted, 0, &mut |place| {
                 if let Some(number) = self.order.get(place) {
@@ -82,7 +89,7 @@ impl WideTree {
     /// Replaces `found` by the nodes of sixteen boxes whose own box meets `wanted`, unless they are more than `most`; says whether they are not.
     pub(super) fn leaves_meeting(&self, wanted: &Bounds, most: usize, found: &mut Vec<u32>) -> bool {
         found.clear();
-        let of = Wanted { lo: wanted.lo.map(Vec4::splat), hi: wanted.hi.map(Vec4::splat) };
+        let of = Wanted::of(wanted);
         match self.levels.len() {
             0 => {}
             1 => found.push(0),
@@ -98,7 +105,7 @@ impl WideTree {
     /// As [`Self::each_meeting`], in these nodes only.
     #[inline(always)]
     pub(super) fn each_of_leaves(&self, leaves: &[u32], wanted: &Bounds, mut visit: impl FnMut(u32)) {
-        let wanted = Wanted { lo: wanted.lo.map(Vec4::splat), hi: wanted.hi.map(Vec4::splat) };
+        let wanted = Wanted::of(wanted);
         for leaf in leaves {
             let mut lanes = self.levels[0][*leaf as usize].meeting(&wanted);
             while lanes != 0 {

@@ -231,7 +231,7 @@ pub(crate) fn nonmanifold_vertices(submesh: &Submesh, threads: usize) -> Vec<Ver
     blocks.into_iter().flatten().collect()
 }
 
-/// What stands around a vertex; its space is used again for the next.
+/// The edges and triangles around a vertex; their space is used again for the next.
 #[derive(Default)]
 struct Around {
     /// The other ends of the edges there, each with a triangle by its place in the star.

@@ -48,7 +48,7 @@ struct File {
 #[serde(deny_unknown_fields)]
 struct FolderFile {
     path: Spanned<PathBuf>,
-    /// What jobs call it; its last part unless given.
+    /// The name that jobs call it by; its last part unless given.
     name: Option<Spanned<String>>,
     /// Profile of files that lie in no sub-folder.
     profile: Option<Spanned<String>>,

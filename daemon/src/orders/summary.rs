@@ -186,11 +186,27 @@ pub(crate) fn read(path: &Path) -> Option<Summary> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use suture_store::{Ending, JobId, Publication, Source};
 
     use super::*;
     use crate::config::FolderConfig;
+
+    /// Of a job whose file was at this path.
+    pub(in crate::orders) fn publication(path: RelPath, ending: Ending) -> Publication {
+        Publication {
+            ending,
+            reason: if ending.is_good() { String::new() } else { "not closed".into() },
+            output: ending.is_good().then(|| path.clone()),
+            output_hash: None,
+            report_hash: None,
+            source_ctime_ns: None,
+            original: Some(path),
+            stays: false,
+            recipe: None,
+            reused: None,
+        }
+    }
 
     fn job(id: u64, path: &str, ending: Option<Ending>) -> Job {
         let path = RelPath::new(path).unwrap();
@@ -204,18 +220,7 @@ mod tests {
             profile: "default".into(),
         };
         let Some(ending) = ending else { return Job::noticed(JobId(id), source, "a .obj file", Time(id)) };
-        let publication = Publication {
-            ending,
-            reason: if ending.is_good() { String::new() } else { "not closed".into() },
-            output: ending.is_good().then(|| path.clone()),
-            output_hash: None,
-            report_hash: None,
-            source_ctime_ns: None,
-            original: Some(path),
-            stays: false,
-            recipe: None,
-            reused: None,
-        };
+        let publication = publication(path, ending);
         Job { state: State::Ended { publication }, ..Job::queued(JobId(id), source, Time(id)) }
     }
 

@@ -16,6 +16,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use rustix::fs::Advice;
+use suture_store::Hash;
 use suture_store::crash_point;
 
 use crate::claim::Original;
@@ -96,7 +97,7 @@ impl Archive {
     }
 
     /// A copy under a name that no other content has, durable and read back.
-    fn copy(&self, original: &Original, to: &Path, hash: blake3::Hash) -> io::Result<PathBuf> {
+    fn copy(&self, original: &Original, to: &Path, hash: Hash) -> io::Result<PathBuf> {
         let (folder, name) = (fsx::folder_of(to), to.file_name().unwrap_or_default());
         let stage = folder.join(STAGE);
         let mut staged = false;
@@ -132,20 +133,19 @@ impl Archive {
 }
 
 /// Of what the file holds on the disk: it is synced, and what memory has of it is dropped first, as far as the system does that.
-fn hash_synced(file: &File) -> io::Result<blake3::Hash> {
+fn hash_synced(file: &File) -> io::Result<Hash> {
     file.sync_all()?;
     let _ = rustix::fs::fadvise(file, 0, None, Advice::DontNeed);
     hash_of(file)
 }
 
 /// Of the whole file, wherever its handle stands; the handle stands at its beginning afterwards.
-fn hash_of(mut file: &File) -> io::Result<blake3::Hash> {
+fn hash_of(mut file: &File) -> io::Result<Hash> {
     use std::io::{Seek, SeekFrom};
     file.seek(SeekFrom::Start(0))?;
-    let mut hasher = blake3::Hasher::new();
-    hasher.update_reader(file)?;
+    let hash = fsx::hash_of(file)?;
     file.seek(SeekFrom::Start(0))?;
-    Ok(hasher.finalize())
+    Ok(hash)
 }
 
 /// Removes the file that was copied, and no other that has taken its name.

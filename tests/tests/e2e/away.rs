@@ -1,44 +1,10 @@
 //! Folders that go and come back: unmounted, removed, made anew.
 
-use std::process::{Child, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use suture_bench::generate::{Case, write};
 use suture_tests::Place;
-
-fn mesh(seed: u64) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    write(Case::Holes, 600, seed, &mut bytes).unwrap();
-    bytes
-}
-
-/// A running daemon, which is killed at the end of its test.
-struct Daemon(Child);
-
-impl Daemon {
-    fn start(place: &Place, arguments: &[&str]) -> Self {
-        let mut command = place.command();
-        command.arg("watch").args(arguments).env("SUTURE_LOG", "off");
-        Self(command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap())
-    }
-}
-
-impl Drop for Daemon {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// Waits for what is sure to come; how long it took.
-fn wait_until(what: &str, is_so: impl Fn() -> bool) -> Duration {
-    let began = Instant::now();
-    while !is_so() {
-        assert!(began.elapsed() < Duration::from_secs(60), "in vain: {what}");
-        std::thread::sleep(Duration::from_millis(50));
-    }
-    began.elapsed()
-}
+use suture_tests::hot::holes;
+use suture_tests::served::{Served, wait_until};
 
 /// `suture jobs list`, once the daemon answers.
 fn listed(place: &Place) -> String {
@@ -53,20 +19,20 @@ fn f25_a_folder_whose_mount_is_missing_is_not_taken_for_an_empty_one() {
     let place = Place::new();
     let config = "settle = \"30ms\"\nstate = \"state/jobs\"\n[[folders]]\npath = \"hot\"\n[[folders]]\npath = \"scans\"\n";
     place.put("suture.toml", config.as_bytes());
-    place.put("scans/in/a.stl", &mesh(1));
+    place.put("scans/in/a.stl", &holes(1));
     place.suture(["watch", "--once", "--config", "suture.toml"]).expect(0);
     // As if it had lain on another mount; and that is gone, with a file waiting on it.
     let mut noted: serde_json::Value = serde_json::from_slice(&place.read("state/folders")).unwrap();
     noted["scans"]["mount"] = "/mnt/disk".into();
     place.put("state/folders", noted.to_string().as_bytes());
     std::fs::rename(place.at("scans"), place.at("disk")).unwrap();
-    place.put("disk/in/b.stl", &mesh(2));
-    place.put("scans/in/c.stl", &mesh(3));
+    place.put("disk/in/b.stl", &holes(2));
+    place.put("scans/in/c.stl", &holes(3));
 
     let once = place.suture(["watch", "--once", "--config", "suture.toml"]).expect(1);
     assert!(once.stderr().contains("the mount /mnt/disk is not there"), "{}", once.stderr());
-    let _daemon = Daemon::start(&place, &["--config", "suture.toml"]);
-    place.put("hot/in/d.stl", &mesh(4));
+    let _daemon = Served::start(&place, &["--config", "suture.toml"], "log");
+    place.put("hot/in/d.stl", &holes(4));
     wait_until("the other folder is served", || place.at("hot/done/d.stl").exists());
     let list = listed(&place);
     assert!(list.contains("out of reach: ") && list.contains("scans: the mount /mnt/disk is not there"), "{list}");
@@ -85,15 +51,15 @@ fn f25_a_folder_whose_mount_is_missing_is_not_taken_for_an_empty_one() {
 #[test]
 fn f25_a_folder_for_drops_that_is_made_anew_is_watched() {
     let place = Place::new();
-    place.put("hot/in/a.stl", &mesh(1));
-    let _daemon = Daemon::start(&place, &["hot", "--settle", "30ms"]);
+    place.put("hot/in/a.stl", &holes(1));
+    let _daemon = Served::start(&place, &["hot", "--settle", "30ms"], "log");
     wait_until("the first file", || place.at("hot/done/a.stl").exists());
     std::fs::remove_dir(place.at("hot/in")).unwrap();
     wait_until("it is missed", || listed(&place).contains("out of reach: "));
     std::fs::create_dir(place.at("hot/in")).unwrap();
     wait_until("it is back", || !listed(&place).contains("out of reach"));
     for (seed, name) in [(2, "b.stl"), (3, "c.stl")] {
-        place.put(&format!("hot/in/{name}"), &mesh(seed));
+        place.put(&format!("hot/in/{name}"), &holes(seed));
         let took = wait_until(name, || place.at(&format!("hot/done/{name}")).exists());
         assert!(took < Duration::from_secs(15), "{name}: {took:?}");
     }

@@ -5,18 +5,12 @@ use std::os::unix::process::CommandExt;
 use std::process::Command;
 use std::time::Duration;
 
-use suture_bench::generate::{Case, write};
 use suture_tests::Place;
+use suture_tests::hot::holes;
 use suture_tests::served::{Served, jobs, wait_until};
 
 /// As the configuration says.
 const RESCAN: Duration = Duration::from_secs(2);
-
-fn mesh(seed: u64) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    write(Case::Holes, 600, seed, &mut bytes).unwrap();
-    bytes
-}
 
 /// This system call fails in the process that the command starts, and in those that it starts itself.
 fn fail(command: &mut Command, call: libc::c_long, errno: i32) {
@@ -53,7 +47,7 @@ fn found_without(call: libc::c_long, errno: i32) {
     assert_eq!(daemon.lines("The system does not tell of changes; polling.").len(), 1);
     let names = ["a.stl", "new/c.stl", "sub/b.stl"];
     for (seed, name) in (1..).zip(names) {
-        let (dropped, path) = (place.put("dropped", &mesh(seed)), place.at("hot/in").join(name));
+        let (dropped, path) = (place.put("dropped", &holes(seed)), place.at("hot/in").join(name));
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::rename(dropped, path).unwrap();
         let took = wait_until(name, || place.at("hot/done").join(name).exists());

@@ -1,56 +1,38 @@
 //! The configuration: `suture config check|print`, and a running daemon that reads it anew.
 
-use std::fs::File;
-use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::Signal;
 use serde_json::Value;
 use suture_bench::generate::Case;
 use suture_tests::Place;
 use suture_tests::hot::mesh;
+use suture_tests::served::{Served, wait_until};
 
-/// Waits for what is sure to come.
-fn await_that(what: &str, mut is_so: impl FnMut() -> bool) {
-    let start = Instant::now();
-    while !is_so() {
-        assert!(start.elapsed() < Duration::from_secs(60), "in vain: {what}");
-        std::thread::sleep(Duration::from_millis(20));
-    }
-}
-
-/// A daemon at work in a place, which writes its log to `log`.
+/// A daemon at work in a place.
 struct Daemon<'a> {
     place: &'a Place,
-    child: Child,
+    served: Served<'a>,
 }
 
 impl<'a> Daemon<'a> {
     fn start(place: &'a Place, arguments: &[&str]) -> Self {
-        let log = File::create(place.at("log")).unwrap();
-        let child = place.command().arg("watch").args(arguments).stdout(Stdio::null()).stderr(log).spawn().unwrap();
-        let daemon = Self { place, child };
-        await_that("it serves the folder", || daemon.lines("Serving a hot folder.").len() == 1);
-        daemon
+        Self { place, served: Served::start(place, arguments, "log") }
     }
 
-    /// Lines of its log that hold these words.
     fn lines(&self, words: &str) -> Vec<Value> {
-        let log = String::from_utf8(self.place.read("log")).unwrap();
-        // The last line may be half written.
-        let whole = log.rsplit_once('\n').map_or("", |(whole, _)| whole);
-        whole.lines().filter(|line| line.contains(words)).map(|line| serde_json::from_str(line).unwrap()).collect()
+        self.served.lines(words)
     }
 
     fn signal(&self, signal: Signal) {
-        kill_process(Pid::from_child(&self.child), signal).unwrap();
+        self.served.signal(signal);
     }
 
     /// Sends SIGHUP; the one line that says what came of it.
     fn hang_up(&self, words: &str) -> Value {
         let before = self.lines(words).len();
         self.signal(Signal::HUP);
-        await_that(words, || self.lines(words).len() > before);
+        wait_until(words, || self.lines(words).len() > before);
         assert_eq!(self.lines(words).len(), before + 1);
         self.lines(words).remove(before)
     }
@@ -62,25 +44,17 @@ impl<'a> Daemon<'a> {
         std::fs::create_dir_all(self.place.at(&format!("hot/in/{name}")).parent().unwrap()).unwrap();
         std::fs::rename(self.place.at("drop.part"), self.place.at(&format!("hot/in/{name}"))).unwrap();
         let mut came = None;
-        await_that(name, || {
+        wait_until(name, || {
             came = ["done", "failed"].into_iter().find(|part| self.place.at(&format!("hot/{part}/{name}")).exists());
             came.is_some()
         });
         came.unwrap()
     }
 
-    fn end(mut self) {
+    fn end(self) {
         self.signal(Signal::TERM);
-        let status = self.child.wait().unwrap();
+        let status = self.served.ended();
         assert_eq!(status.code(), Some(0), "{status}");
-    }
-}
-
-impl Drop for Daemon<'_> {
-    fn drop(&mut self) {
-        // Of a test that failed.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }
 
@@ -225,14 +199,14 @@ fn the_number_of_workers_is_read_anew() {
     place.put("suture.toml", configuration(1).as_bytes());
     let daemon = Daemon::start(&place, &["--config", "suture.toml"]);
     let slots = || {
-        let tasks = std::fs::read_dir(format!("/proc/{}/task", daemon.child.id())).unwrap().flatten();
+        let tasks = std::fs::read_dir(format!("/proc/{}/task", daemon.served.pid())).unwrap().flatten();
         tasks.filter(|task| std::fs::read_to_string(task.path().join("comm")).is_ok_and(|name| name.trim() == "slot")).count()
     };
     assert_eq!(slots(), 1);
     for (workers, threads) in [(3, 3), (2, 3)] {
         place.put("suture.toml", configuration(workers).as_bytes());
         daemon.hang_up("is in force");
-        await_that("the threads are there", || slots() == threads);
+        wait_until("the threads are there", || slots() == threads);
         for n in 0..8 {
             daemon.drop_in(&format!("{workers}-{n}.stl"), &mesh(Case::Holes, n));
         }
@@ -249,11 +223,11 @@ fn reading_anew_tries_what_waits() {
     place.put("hot/in/mine/part.stl", &mesh(Case::Holes, 1));
     let daemon = Daemon::start(&place, &["--config", "suture.toml", "--settle", "50ms"]);
     let list = || place.suture(["jobs", "list", "--dir", "hot"]).expect(0).stdout();
-    await_that("it waits", || list().contains("waiting"));
+    wait_until("it waits", || list().contains("waiting"));
     std::fs::remove_file(place.at("hot/in/mine/.suture.toml")).unwrap();
     assert_eq!(daemon.hang_up("is in force")["changes"], "none");
     let start = Instant::now();
-    await_that("it is done", || place.at("hot/done/mine/part.stl").exists());
+    wait_until("it is done", || place.at("hot/done/mine/part.stl").exists());
     assert!(start.elapsed() < Duration::from_secs(10), "it waited for its own time, 15 s");
     daemon.end();
 }

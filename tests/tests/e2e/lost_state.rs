@@ -2,17 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use suture_bench::generate::{Case, write};
 use suture_tests::Place;
+use suture_tests::hot::holes;
 use suture_tests::served::jobs;
 
 const PICTURE: &[u8] = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR";
-
-fn mesh(seed: u64) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    write(Case::Holes, 600, seed, &mut bytes).unwrap();
-    bytes
-}
 
 /// Every file of the hot folder that users see, with its bytes.
 fn files(place: &Place) -> BTreeMap<String, Vec<u8>> {
@@ -26,12 +20,12 @@ fn f06_what_is_finished_is_not_done_again_when_the_state_is_lost() {
         let place = Place::new();
         place.put("suture.toml", format!("{settings}settle = \"30ms\"\n[[folders]]\npath = \"hot\"\n").as_bytes());
         let once = |code| place.suture(["watch", "--once", "--config", "suture.toml"]).expect(code);
-        place.put("hot/in/a.stl", &mesh(1));
-        place.put("hot/in/order/b.stl", &mesh(2));
+        place.put("hot/in/a.stl", &holes(1));
+        place.put("hot/in/order/b.stl", &holes(2));
         place.put("hot/in/bad.stl", PICTURE);
         once(1);
         let before = files(&place);
-        place.put("hot/in/c.stl", &mesh(3));
+        place.put("hot/in/c.stl", &holes(3));
         std::fs::remove_dir_all(place.at(lost)).unwrap();
         once(0);
         let mut after = files(&place);

@@ -1,17 +1,11 @@
 //! The files of a sub-folder belong together: one summary tells what became of an order.
 
 use serde_json::Value;
-use suture_bench::generate::{Case, write};
+use suture_tests::hot::holes;
 use suture_tests::{Place, Ran};
 
 const SUMMARY: &str = "hot/out/order-123/order.report.json";
 const PICTURE: &[u8] = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR";
-
-fn mesh(seed: u64) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    write(Case::Holes, 600, seed, &mut bytes).unwrap();
-    bytes
-}
 
 fn once(place: &Place) -> Ran {
     place.suture(["watch", "hot", "--once", "--settle", "30ms"])
@@ -36,7 +30,7 @@ fn row(source: &str, kind: &str, result: &str) -> (String, String, String) {
 fn an_order_is_summed_up_when_it_is_done_and_when_a_file_comes_later() {
     let place = Place::new();
     for (name, bytes) in
-        [("a.stl", mesh(1)), ("deep/b.stl", mesh(2)), ("bad.stl", PICTURE.to_vec()), ("notes.txt", b"by air".to_vec())]
+        [("a.stl", holes(1)), ("deep/b.stl", holes(2)), ("bad.stl", PICTURE.to_vec()), ("notes.txt", b"by air".to_vec())]
     {
         place.put(&format!("hot/in/order-123/{name}"), &bytes);
     }
@@ -58,8 +52,8 @@ fn an_order_is_summed_up_when_it_is_done_and_when_a_file_comes_later() {
     assert!(told.len() == 1 && told[0].contains("4 files: 1 noticed, 2 done, 1 failed (order-123/bad.stl: "), "{told:?}");
 
     // The failed one, mended, and one more.
-    place.put("hot/in/order-123/bad.stl", &mesh(3));
-    place.put("hot/in/order-123/c.stl", &mesh(4));
+    place.put("hot/in/order-123/bad.stl", &holes(3));
+    place.put("hot/in/order-123/c.stl", &holes(4));
     once(&place).expect(0);
     expected[1] = row("order-123/bad.stl", "done", "out/order-123/bad.stl");
     expected.insert(2, row("order-123/c.stl", "done", "out/order-123/c.stl"));
@@ -73,7 +67,7 @@ fn an_order_is_summed_up_when_it_is_done_and_when_a_file_comes_later() {
 #[test]
 fn a_summary_that_was_not_made_is_made_in_the_next_life() {
     let place = Place::new();
-    place.put("hot/in/order-123/a.stl", &mesh(1));
+    place.put("hot/in/order-123/a.stl", &holes(1));
     once(&place).expect(0);
     let before = place.read(SUMMARY);
     std::fs::remove_file(place.at(SUMMARY)).unwrap();
@@ -87,9 +81,9 @@ fn a_summary_that_was_not_made_is_made_in_the_next_life() {
 #[test]
 fn a_profiles_folder_is_no_order_and_a_summary_is_no_drop() {
     let place = Place::new();
-    place.put("hot/in/scan/a.stl", &mesh(1));
-    place.put("hot/in/scan/order-7/b.stl", &mesh(2));
-    place.put("hot/in/c.stl", &mesh(3));
+    place.put("hot/in/scan/a.stl", &holes(1));
+    place.put("hot/in/scan/order-7/b.stl", &holes(2));
+    place.put("hot/in/c.stl", &holes(3));
     once(&place).expect(0);
     let summaries = |part: &str| -> Vec<String> {
         place.names(part).into_iter().filter(|name| name.ends_with("order.report.json")).collect()

@@ -3,16 +3,10 @@
 use std::fs::File;
 use std::time::{Duration, SystemTime};
 
-use suture_bench::generate::{Case, write};
+use suture_tests::hot::holes;
 use suture_tests::{Place, Ran};
 
 const DAY: Duration = Duration::from_secs(24 * 3600);
-
-fn mesh(seed: u64) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    write(Case::Holes, 600, seed, &mut bytes).unwrap();
-    bytes
-}
 
 /// Works once through the hot folder, by a configuration with these lines in `[keep]`, and more in `[[folders]]`.
 fn once(place: &Place, keep: &str, folder: &str) -> Ran {
@@ -33,8 +27,8 @@ fn all(place: &Place) -> Vec<String> {
 /// Two good files and one that fails, worked on 100 days ago.
 fn of_old() -> Place {
     let place = Place::new();
-    place.put("hot/in/a.stl", &mesh(1));
-    place.put("hot/in/order/b.stl", &mesh(2));
+    place.put("hot/in/a.stl", &holes(1));
+    place.put("hot/in/order/b.stl", &holes(2));
     place.put("hot/in/bad.stl", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR");
     once(&place, "", "").expect(1);
     for receipt in ["out/a.stl", "out/order/b.stl", "failed/bad.stl"] {
@@ -56,7 +50,7 @@ fn by_default_nothing_goes() {
 fn results_and_reports_go_when_they_are_old() {
     let place = of_old();
     // Of today, and someone's work.
-    place.put("hot/in/new.stl", &mesh(3));
+    place.put("hot/in/new.stl", &holes(3));
     place.put("hot/out/order/b.stl", b"as a person made it");
     let before = all(&place);
     place.put("suture.toml", b"[keep]\nresults = \"30d\"\nreports = \"60d\"\n[[folders]]\npath = \"hot\"\n");
@@ -93,7 +87,7 @@ fn results_and_reports_go_when_they_are_old() {
 #[test]
 fn of_too_many_bytes_the_oldest_go() {
     let place = of_old();
-    place.put("hot/in/new.stl", &mesh(3));
+    place.put("hot/in/new.stl", &holes(3));
     make_old(&place, "hot/out/order/b.stl.suture.json", 101);
     let size = place.read("hot/out/a.stl").len();
     // Room for one of three; but one is of today.
@@ -136,12 +130,12 @@ fn old_jobs_are_forgotten_and_nothing_is_taken_twice() {
     once(&place, "history_jobs = 1", "").expect(0);
     let listed = || place.suture(["jobs", "list", "--dir", "hot"]).expect(0).stdout();
     assert_eq!(listed().lines().count(), 2, "the newest, and the summary: {}", listed());
-    place.put("hot/in/c.stl", &mesh(4));
+    place.put("hot/in/c.stl", &holes(4));
     once(&place, "history = \"0s\"", "").expect(0);
     assert_eq!(listed(), "no jobs\n");
     // Originals that are left in their place are remembered for as long as they lie there.
     let place = Place::new();
-    place.put("hot/in/a.stl", &mesh(1));
+    place.put("hot/in/a.stl", &holes(1));
     for _ in 0..3 {
         once(&place, "history = \"0s\"\nhistory_jobs = 1", "leave_originals = true").expect(0);
     }

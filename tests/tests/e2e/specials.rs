@@ -7,15 +7,9 @@ use std::os::unix::net::UnixListener;
 use std::path::Path;
 use std::time::Duration;
 
-use suture_bench::generate::{Case, write};
 use suture_tests::Place;
+use suture_tests::hot::holes;
 use suture_tests::served::{Served, jobs, wait_until};
-
-fn mesh(seed: u64) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    write(Case::Holes, 600, seed, &mut bytes).unwrap();
-    bytes
-}
 
 fn make_pipe(path: &Path) {
     let path = CString::new(path.as_os_str().as_bytes()).unwrap();
@@ -29,8 +23,8 @@ fn f24_links_pipes_and_sockets_are_left_and_told_of_once() {
     let place = Place::new();
     let config = "settle = \"30ms\"\nrescan = \"300ms\"\n[[folders]]\npath = \"hot\"\n";
     place.put("suture.toml", config.as_bytes());
-    place.put("linked.stl", &mesh(1));
-    place.put("named.stl", &mesh(2));
+    place.put("linked.stl", &holes(1));
+    place.put("named.stl", &holes(2));
     let inbox = place.at("hot/in");
     std::fs::create_dir_all(&inbox).unwrap();
     symlink(place.at("linked.stl"), inbox.join("link.stl")).unwrap();
@@ -52,6 +46,6 @@ fn f24_links_pipes_and_sockets_are_left_and_told_of_once() {
     let expected = [("folder.stl", a_link), ("link.stl", a_link), ("pipe.stl", "a pipe"), ("socket.stl", "a socket")];
     assert_eq!(told, expected.map(|(file, what)| (file.to_owned(), what.to_owned())));
     assert_eq!(place.names("hot/out"), ["second.stl", "second.stl.report.json", "second.stl.suture.json"]);
-    assert_eq!((place.read("linked.stl"), place.read("named.stl")), (mesh(1), mesh(2)));
+    assert_eq!((place.read("linked.stl"), place.read("named.stl")), (holes(1), holes(2)));
     assert_eq!(noticed(), 4);
 }

@@ -1,41 +1,16 @@
 //! What an operator and the clock may stop: nothing new is taken then, and `suture jobs list` says why.
 
-use std::process::{Child, Stdio};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use suture_bench::generate::{Case, write};
 use suture_tests::Place;
+use suture_tests::hot::holes;
+use suture_tests::served::{Served, wait_until};
 
-fn mesh(seed: u64) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    write(Case::Holes, 600, seed, &mut bytes).unwrap();
-    bytes
-}
-
-/// A running daemon, which is killed at the end of its test.
-struct Daemon(Child);
-
-impl Daemon {
-    fn start(place: &Place) -> Self {
-        let mut command = place.command();
-        command.args(["watch", "hot", "--settle", "30ms"]).env("SUTURE_LOG", "off");
-        Self(command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap())
-    }
-}
-
-impl Drop for Daemon {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-fn wait_until(what: &str, is_so: impl Fn() -> bool) {
-    let began = Instant::now();
-    while !is_so() {
-        assert!(began.elapsed() < Duration::from_secs(60), "{what}");
-        std::thread::sleep(Duration::from_millis(50));
-    }
+/// A daemon that begins to serve `hot`.
+fn begin(place: &Place) -> Served<'_> {
+    let mut command = place.command();
+    command.args(["watch", "hot", "--settle", "30ms"]);
+    Served::begin(place, command, "log")
 }
 
 fn is_there(place: &Place, name: &str) -> bool {
@@ -50,9 +25,9 @@ fn listed(place: &Place) -> String {
 #[test]
 fn a_list_waits_while_the_store_changes_hands() {
     let place = Place::new();
-    (0..4).for_each(|i| drop(place.put(&format!("hot/in/{i}.stl"), &mesh(i))));
+    (0..4).for_each(|i| drop(place.put(&format!("hot/in/{i}.stl"), &holes(i))));
     for round in 0..10 {
-        let daemon = Daemon::start(&place);
+        let daemon = begin(&place);
         if round > 0 {
             listed(&place);
         }
@@ -67,19 +42,19 @@ fn a_list_waits_while_the_store_changes_hands() {
 #[test]
 fn a_pause_holds_over_a_restart_until_an_operator_goes_on() {
     let place = Place::new();
-    place.put("hot/in/first.stl", &mesh(1));
-    let daemon = Daemon::start(&place);
+    place.put("hot/in/first.stl", &holes(1));
+    let daemon = begin(&place);
     wait_until("the first one", || is_there(&place, "hot/out/first.stl"));
     let paused = place.suture(["jobs", "pause", "--dir", "hot"]).expect(0);
     assert!(paused.stdout().starts_with("paused: nothing new is taken"), "{}", paused.stdout());
-    place.put("hot/in/second.stl", &mesh(2));
+    place.put("hot/in/second.stl", &holes(2));
     let list = || listed(&place);
     wait_until("it is seen", || list().contains("second.stl"));
     drop(daemon);
     assert!(list().contains("nothing new is taken: an operator has paused it"), "{}", list());
-    let daemon = Daemon::start(&place);
+    let daemon = begin(&place);
     // It has had time for much more than this.
-    place.put("hot/in/third.stl", &mesh(1));
+    place.put("hot/in/third.stl", &holes(1));
     wait_until("the third is seen", || list().contains("third.stl"));
     assert!(!is_there(&place, "hot/out/second.stl") && list().contains("nothing new is taken: an operator has paused it"));
     place.suture(["jobs", "resume", "--dir", "hot"]).expect(0);
@@ -91,8 +66,8 @@ fn a_pause_holds_over_a_restart_until_an_operator_goes_on() {
 #[test]
 fn f27_a_drain_ends_when_nothing_is_in_work() {
     let place = Place::new();
-    (0..20).for_each(|i| drop(place.put(&format!("hot/in/{i}.stl"), &mesh(i))));
-    let _daemon = Daemon::start(&place);
+    (0..20).for_each(|i| drop(place.put(&format!("hot/in/{i}.stl"), &holes(i))));
+    let _daemon = begin(&place);
     wait_until("work began", || place.at("hot/out").read_dir().is_ok_and(|all| all.count() > 0));
     let drained = place.suture(["jobs", "drain", "--dir", "hot"]).expect(0);
     assert!(drained.stdout().starts_with("drained: "), "{}", drained.stdout());
@@ -103,11 +78,11 @@ fn f27_a_drain_ends_when_nothing_is_in_work() {
 #[test]
 fn without_a_daemon_the_next_one_is_paused() {
     let place = Place::new();
-    place.put("hot/in/part.stl", &mesh(1));
+    place.put("hot/in/part.stl", &holes(1));
     place.suture(["jobs", "pause", "--dir", "hot"]).expect(2);
     place.suture(["watch", "hot", "--once", "--settle", "30ms"]).expect(0);
     place.suture(["jobs", "pause", "--dir", "hot"]).expect(0);
-    place.put("hot/in/more.stl", &mesh(2));
+    place.put("hot/in/more.stl", &holes(2));
     let left = place.suture(["watch", "hot", "--once", "--settle", "30ms"]).expect(1);
     assert!(left.stderr().contains("an operator has paused it"), "{}", left.stderr());
     place.suture(["jobs", "resume", "--dir", "hot"]).expect(0);
@@ -118,7 +93,7 @@ fn without_a_daemon_the_next_one_is_paused() {
 #[test]
 fn originals_that_are_left_are_taken_once() {
     let place = Place::new();
-    let (good, sheet) = (mesh(1), b"solid nothing\nendsolid nothing\n");
+    let (good, sheet) = (holes(1), b"solid nothing\nendsolid nothing\n");
     place.put("hot/in/order/part.stl", &good);
     place.put("hot/in/empty.stl", sheet);
     place.put("suture.toml", b"settle = \"30ms\"\n[[folders]]\npath = \"hot\"\nleave_originals = true\n");
@@ -137,7 +112,7 @@ fn originals_that_are_left_are_taken_once() {
     once(1);
     assert_eq!(left().1, 4, "what is done is not retried");
     // Another content is another job.
-    place.put("hot/in/order/part.stl", &mesh(2));
+    place.put("hot/in/order/part.stl", &holes(2));
     once(0);
     assert_eq!((left().1, place.names("hot/in").len()), (7, 2));
 }
@@ -151,7 +126,7 @@ fn outside_of_the_hours_of_work_files_wait() {
         (format!("{}-{}", time(minute + 180), time(minute + 240)), format!("{}-{}", time(minute + 240), time(minute + 180)));
     let once = |window: &str, more: &str| {
         let place = Place::new();
-        place.put("hot/in/part.stl", &mesh(1));
+        place.put("hot/in/part.stl", &holes(1));
         let text = format!("run_window = \"{window}\"\n{more}\nsettle = \"30ms\"\n[[folders]]\npath = \"hot\"\n");
         place.put("suture.toml", text.as_bytes());
         let status = place.command().env("TZ", "UTC").args(["watch", "--once", "--config", "suture.toml"]).status().unwrap();

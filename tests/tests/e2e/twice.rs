@@ -2,15 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use suture_bench::generate::{Case, write};
 use suture_tests::Place;
+use suture_tests::hot::holes;
 use suture_tests::served::{Served, jobs, wait_until};
-
-fn mesh(seed: u64) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    write(Case::Holes, 600, seed, &mut bytes).unwrap();
-    bytes
-}
 
 fn configure(place: &Place, name: &str, state: &str, folder: &str) {
     let text = format!("settle = \"30ms\"\nstate = \"{state}\"\n[[folders]]\npath = \"{folder}\"\n");
@@ -43,11 +37,11 @@ fn f16_a_second_daemon_of_one_store_ends_at_once() {
     let place = Place::new();
     configure(&place, "a.toml", "state/jobs", "hot");
     configure(&place, "b.toml", "state/jobs", "other");
-    place.put("other/in/b.stl", &mesh(2));
+    place.put("other/in/b.stl", &holes(2));
     let first = Served::start(&place, &["--config", "a.toml"], "log");
     assert_refused(&place, "b.toml", first.pid());
     assert_eq!(place.names("other"), ["in/b.stl"], "it takes nothing");
-    place.put("hot/in/a.stl", &mesh(1));
+    place.put("hot/in/a.stl", &holes(1));
     wait_done(&place, "hot");
     drop(first);
     place.suture(["watch", "--once", "--config", "b.toml"]).expect(0);
@@ -63,10 +57,10 @@ fn f17_a_second_daemon_of_one_folder_ends_at_once_and_begins_when_the_first_is_k
     let first = Served::start(&place, &["--config", "a.toml"], "log");
     assert_refused(&place, "b.toml", first.pid());
     assert!(!place.at("second").exists(), "it makes nothing");
-    place.put("hot/in/a.stl", &mesh(1));
+    place.put("hot/in/a.stl", &holes(1));
     wait_done(&place, "hot");
     drop(first);
-    place.put("hot/in/b.stl", &mesh(2));
+    place.put("hot/in/b.stl", &holes(2));
     place.suture(["watch", "--once", "--config", "b.toml"]).expect(0);
     assert_eq!(meshes(&place, "hot/out"), ["a.stl", "b.stl"]);
     assert_eq!(meshes(&place, "hot/done"), ["a.stl", "b.stl"]);

@@ -177,10 +177,14 @@ impl<'a> Keeper<'a> {
     /// With `--once`: is everything that came to rest finished?
     fn is_finished(&self) -> Result<bool, StoreError> {
         let folders_rest = self.folders.iter().all(|kept| !kept.dirty && (kept.unavailable || !kept.reconciler.is_settling()));
-        if !folders_rest || !self.inbox.is_empty() || self.context.schedule.busy() > 0 {
+        let counts = self.context.store.counts()?;
+        if !folders_rest || self.context.schedule.busy() > 0 || !self.inbox.is_empty() {
             return Ok(false);
         }
-        let counts = self.context.store.counts()?;
+        // A slot that began or ended between these looks changed the counts: what it did is to be heard of first.
+        if self.context.store.counts()? != counts {
+            return Ok(false);
+        }
         let of = |wanted: fn(Kind) -> bool| counts.iter().filter(|(kind, _)| wanted(*kind)).map(|(_, n)| n).sum::<u64>();
         if of(|kind| matches!(kind, Kind::Queued | Kind::Alone)) > 0 && !self.context.schedule.is_paused() {
             return Ok(false);

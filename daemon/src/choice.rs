@@ -1,6 +1,7 @@
 //! Which settings count for a file: those of its folder in `in/`, or of the nearest one above it that has some, else those of the profile
 //! that its first sub-folder or the hot folder names.
 
+use std::io;
 use std::path::PathBuf;
 
 use suture_core::Profile;
@@ -8,14 +9,20 @@ use suture_store::{Job, Priority, RelPath};
 
 use crate::config::Config;
 use crate::folder::Folder;
+use crate::fsx;
 use crate::profiles;
 
-/// The nearest file of settings for a file of `in/`.
-fn nearest(folder: &Folder, path: &RelPath) -> Option<PathBuf> {
+/// The nearest file of settings for a file of `in/`. One that cannot be looked at is no reason to take another.
+fn nearest(folder: &Folder, path: &RelPath) -> io::Result<Option<PathBuf>> {
     let inbox = folder.inbox();
     let path = inbox.join(path.to_path());
-    let above = path.ancestors().skip(1).take_while(|above| above.starts_with(&inbox));
-    above.map(|above| above.join(profiles::FOLDER_FILE)).find(|own| own.is_file())
+    for above in path.ancestors().skip(1).take_while(|above| above.starts_with(&inbox)) {
+        let own = above.join(profiles::FOLDER_FILE);
+        if fsx::is_file(&own)? {
+            return Ok(Some(own));
+        }
+    }
+    Ok(None)
 }
 
 /// The profile to repair a file with.
@@ -23,7 +30,8 @@ fn nearest(folder: &Folder, path: &RelPath) -> Option<PathBuf> {
 /// # Errors
 /// A line for people, when a person has to mend a setting first.
 pub(crate) fn profile(config: &Config, folder: &Folder, job: &Job) -> Result<Profile, String> {
-    match nearest(folder, &job.source.path) {
+    let own = nearest(folder, &job.source.path);
+    match own.map_err(|error| format!("the settings of its folder cannot be looked at: {error}"))? {
         Some(own) => profiles::from_file(&own),
         None => {
             let name = &job.source.profile;
@@ -35,8 +43,9 @@ pub(crate) fn profile(config: &Config, folder: &Folder, job: &Job) -> Result<Pro
 /// How soon a file is wanted: its profile says it, else its hot folder. What is wrong in a profile is told when the file is to be repaired.
 pub(crate) fn priority(config: &Config, folder: &Folder, path: &RelPath, profile: &str) -> Priority {
     let of_profile = match nearest(folder, path) {
-        Some(own) => profiles::own_from_file(&own).ok().and_then(|own| own.priority),
-        None => config.profiles.get(profile).and_then(|own| own.priority),
+        Err(_) => None,
+        Ok(Some(own)) => profiles::own_from_file(&own).ok().and_then(|own| own.priority),
+        Ok(None) => config.profiles.get(profile).and_then(|own| own.priority),
     };
     let of_folder = config.folders.iter().find(|known| known.name == folder.name).map(|known| known.priority);
     of_profile.or(of_folder).unwrap_or_default()

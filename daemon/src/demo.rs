@@ -79,7 +79,7 @@ fn farewell(dir: &Path, id: u64) {
 /// `./demo` where that can be made or was made by us before, else a temporary folder that stays.
 fn folder() -> Result<PathBuf, String> {
     let here = PathBuf::from("demo");
-    let ours = here.join(".suture").is_dir();
+    let ours = fsx::is_folder(&here.join(".suture")).unwrap_or(false);
     if ours || (fsx::exists(&here).is_ok_and(|there| !there) && std::fs::create_dir(&here).is_ok()) {
         let probe = create::temporary_in(&here);
         if create::write_new(&probe, b"").is_ok() && fsx::remove_if_there(&probe).is_ok() {
@@ -113,7 +113,8 @@ fn drop_files(inbox: &Path) -> Result<usize, String> {
 }
 
 fn known_jobs(dir: &Path) -> Result<Vec<Job>, String> {
-    if !dir.join(".suture").is_dir() {
+    let is_new = fsx::is_folder(&dir.join(".suture")).map(|there| !there);
+    if is_new.map_err(|error| format!("{}: cannot be looked at: {error}", dir.display()))? {
         return Ok(Vec::new());
     }
     reach::jobs(dir, &JobsWish::List).map_err(|failure| failure.line)

@@ -33,7 +33,7 @@ impl Draft {
         let kind = match create::nameless(folder) {
             Ok(file) => Kind::Nameless(file),
             // How file systems (and old kernels) say that they know nothing of it.
-            Err(Errno::OPNOTSUPP | Errno::ISDIR | Errno::INVAL | Errno::NOENT) if folder.is_dir() => {
+            Err(Errno::OPNOTSUPP | Errno::ISDIR | Errno::INVAL | Errno::NOENT) if fsx::is_folder(folder)? => {
                 Kind::Named(create::temporary_in(folder))
             }
             Err(error) => return Err(error.into()),

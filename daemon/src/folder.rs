@@ -1,6 +1,7 @@
 //! One hot folder on disk: its parts, its owner, and what its names mean.
 
 use std::ffi::OsStr;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -8,6 +9,7 @@ use suture_store::job::Area;
 use suture_store::{RelPath, Token};
 
 use crate::config::FolderConfig;
+use crate::fsx;
 pub(crate) use crate::ground::{FolderError, is_fading, make_parent};
 use crate::ground::{Ground, LOCK, PARTS, PRIVATE, Trace, id};
 use crate::receipt::{RECEIPT, REPORT};
@@ -88,7 +90,7 @@ impl Folder {
         let trace = match &*ground {
             Ok(here) => {
                 let why = here.check(&self.root);
-                if why.is_ok() || !here.is_left(&self.root) || !here.trace().leads_here(&self.root) {
+                if why.is_ok() || !here.is_left(&self.root) || !here.trace().leads_here(&self.root).unwrap_or(false) {
                     return why;
                 }
                 here.trace().clone()
@@ -142,38 +144,61 @@ impl Folder {
 }
 
 /// Is a folder a hot one?
-pub(crate) fn is_hot(path: &Path) -> bool {
-    path.join(PRIVATE).join(LOCK).exists()
+///
+/// # Errors
+/// As `stat`.
+pub(crate) fn is_hot(path: &Path) -> io::Result<bool> {
+    Ok(fsx::behind(&path.join(PRIVATE).join(LOCK))?.is_some())
+}
+
+/// Where a path leads, if that is anywhere.
+fn real(path: &Path) -> Result<Option<PathBuf>, FolderError> {
+    match path.canonicalize() {
+        Ok(real) => Ok(Some(real)),
+        Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
+        Err(source) => Err(FolderError::Io { path: path.to_owned(), action: "cannot be looked at", source }),
+    }
 }
 
 /// The hot folder in a part of which `root` lies.
-fn outer_folder(root: &Path) -> Option<PathBuf> {
-    // A folder that is not there yet lies where the one above it does.
-    let real = root.ancestors().find_map(|above| Some(above.canonicalize().ok()?.join(root.strip_prefix(above).ok()?)))?;
-    let is_outer = |above: &&Path| is_hot(above) && PARTS.iter().any(|part| real.starts_with(above.join(part)));
-    real.ancestors().skip(1).find(is_outer).map(Path::to_owned)
+fn outer_folder(root: &Path) -> Result<Option<PathBuf>, FolderError> {
+    for there in root.ancestors() {
+        // A folder that is not there yet lies where the one above it does.
+        let (Some(above), Ok(below)) = (real(there)?, root.strip_prefix(there)) else { continue };
+        let root = above.join(below);
+        for outer in root.ancestors().skip(1).filter(|outer| PARTS.iter().any(|part| root.starts_with(outer.join(part)))) {
+            let looked = is_hot(outer);
+            if looked.map_err(|source| FolderError::Io { path: outer.to_owned(), action: "cannot be looked at", source })? {
+                return Ok(Some(outer.to_owned()));
+            }
+        }
+        break;
+    }
+    Ok(None)
 }
 
 /// No part may be another one, or lie in it, by links or mounts: what is put into `out/` would appear in `in/`, without end.
 fn parts_apart(root: &Path) -> Result<(), FolderError> {
-    let places = PARTS.map(|part| {
+    let mut seen: Vec<(PathBuf, PathBuf, (u64, u64))> = Vec::with_capacity(PARTS.len());
+    for part in PARTS {
         let path = root.join(part);
-        (path.canonicalize().ok(), std::fs::metadata(&path).ok().map(|meta| id(&meta)))
-    });
-    for (i, (a, a_id)) in places.iter().enumerate() {
-        for (j, (b, b_id)) in places.iter().enumerate().take(i) {
-            let nested = a.as_ref().zip(b.as_ref()).is_some_and(|(a, b)| a.starts_with(b) || b.starts_with(a));
-            if nested || (a_id.is_some() && a_id == b_id) {
-                return Err(FolderError::Mixed { a: root.join(PARTS[j]), b: root.join(PARTS[i]) });
-            }
+        let found =
+            fsx::behind(&path).map_err(|source| FolderError::Io { path: path.clone(), action: "cannot be looked at", source })?;
+        let (Some(found), Some(real)) = (found, real(&path)?) else { continue };
+        let here = id(&found);
+        let is_mixed =
+            |(_, other, there): &&(PathBuf, PathBuf, _)| real.starts_with(other) || other.starts_with(&real) || *there == here;
+        if let Some((other, ..)) = seen.iter().find(is_mixed) {
+            return Err(FolderError::Mixed { a: other.clone(), b: path });
         }
+        seen.push((path, real, here));
     }
     Ok(())
 }
 
 /// Makes a folder's parts and takes it, if it may be a hot one.
 fn take(root: &Path) -> Result<Ground, FolderError> {
-    if let Some(outer) = outer_folder(root) {
+    if let Some(outer) = outer_folder(root)? {
         return Err(FolderError::Within { root: root.to_owned(), outer });
     }
     parts_apart(root)?;

@@ -2,7 +2,7 @@
 //! What is written is written by [`crate::create`].
 
 use std::ffi::{OsStr, OsString};
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::os::unix::fs::MetadataExt;
@@ -46,8 +46,8 @@ impl Identity {
     }
 }
 
-impl From<&std::fs::Metadata> for Identity {
-    fn from(m: &std::fs::Metadata) -> Self {
+impl From<&Metadata> for Identity {
+    fn from(m: &Metadata) -> Self {
         let ns = |seconds: i64, nanos: i64| seconds.saturating_mul(1_000_000_000).saturating_add(nanos);
         Self {
             dev: m.dev(),
@@ -189,6 +189,46 @@ pub(crate) fn look(path: &Path) -> io::Result<Option<Identity>> {
         Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
         Err(e) => Err(e),
     }
+}
+
+/// What the path leads to, links followed; `None` where that is nothing.
+///
+/// # Errors
+/// As `stat`.
+pub(crate) fn behind(path: &Path) -> io::Result<Option<Metadata>> {
+    match std::fs::metadata(path) {
+        Ok(found) => Ok(Some(found)),
+        Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
+        Err(e) => Err(e),
+    }
+}
+
+/// The text in a file; `None` where there is no such file.
+///
+/// # Errors
+/// As `open` and `read`, and when it is no text.
+pub(crate) fn text_if_there(path: &Path) -> io::Result<Option<String>> {
+    match std::fs::read_to_string(path) {
+        Ok(text) => Ok(Some(text)),
+        Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
+        Err(e) => Err(e),
+    }
+}
+
+/// Does the path lead to a folder?
+///
+/// # Errors
+/// As [`behind`].
+pub(crate) fn is_folder(path: &Path) -> io::Result<bool> {
+    Ok(behind(path)?.is_some_and(|found| found.is_dir()))
+}
+
+/// Does the path lead to a regular file?
+///
+/// # Errors
+/// As [`behind`].
+pub(crate) fn is_file(path: &Path) -> io::Result<bool> {
+    Ok(behind(path)?.is_some_and(|found| found.is_file()))
 }
 
 /// Is there anything of that name?

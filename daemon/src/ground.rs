@@ -55,21 +55,35 @@ pub(crate) struct Trace {
 
 impl Trace {
     /// Is it this folder that the path leads to?
-    pub(crate) fn leads_here(&self, root: &Path) -> bool {
-        read_mark(root).is_some_and(|mark| mark == self.mark)
+    ///
+    /// # Errors
+    /// When the folder's mark cannot be read: that is no answer.
+    pub(crate) fn leads_here(&self, root: &Path) -> io::Result<bool> {
+        Ok(read_mark(root)?.is_some_and(|mark| mark == self.mark))
     }
 
-    /// Why the folder is not there, or not whole: a mount is gone that it, or a part of it, lay on. `None` where all is there, or was made anew.
+    /// Why the folder is not there, or not whole: a mount is gone that it, or a part of it, lay on, or nobody can tell. `None` where all is
+    /// there, or was made anew.
     pub(crate) fn missing(&self, root: &Path) -> Option<String> {
+        self.gone(root).unwrap_or_else(|error| Some(format!("{}: the hot folder cannot be looked at: {error}", root.display())))
+    }
+
+    fn gone(&self, root: &Path) -> io::Result<Option<String>> {
         const DO: &str = "mount it, or remove the file `folders` beside the job store if this is another folder";
-        if self.leads_here(root) {
-            let on_its_own = |part: &&String| device(&root.join(part)).is_some_and(|part| Some(part) != device(root));
-            let bare = self.apart.iter().find(|part| !on_its_own(part))?;
-            return Some(format!("{}: the file system is not there that it was; {DO}", root.join(bare).display()));
+        if self.leads_here(root)? {
+            let here = device(root)?;
+            for part in &self.apart {
+                let part = root.join(part);
+                let there = device(&part)?;
+                if there.is_none() || there == here {
+                    return Ok(Some(format!("{}: the file system is not there that it was; {DO}", part.display())));
+                }
+            }
+            return Ok(None);
         }
-        let gone = mount_of(root).is_ok_and(|mount| mount != self.mount);
+        let gone = mount_of(root)? != self.mount;
         let (shown, was) = (root.display(), self.mount.display());
-        gone.then(|| format!("{shown}: the mount {was} is not there that it lay on; {DO}"))
+        Ok(gone.then(|| format!("{shown}: the mount {was} is not there that it lay on; {DO}")))
     }
 }
 
@@ -78,7 +92,7 @@ impl Trace {
 pub(crate) struct Ground {
     id: (u64, u64),
     /// File systems of the parts at the start.
-    devices: [Option<u64>; PARTS.len()],
+    devices: [u64; PARTS.len()],
     trace: Trace,
     lock: File,
 }
@@ -106,11 +120,15 @@ impl Ground {
         let path = root.join(PRIVATE).join(PID);
         create::replace(&path, pid.as_bytes()).map_err(io(&path, "cannot be written"))?;
         let id = id(&std::fs::metadata(root).map_err(io(root, "cannot be looked at"))?);
-        let devices = PARTS.map(|part| device(&root.join(part)));
+        let mut devices = [id.0; PARTS.len()];
+        for (device, part) in devices.iter_mut().zip(PARTS) {
+            let path = root.join(part);
+            *device = std::fs::metadata(&path).map_err(io(&path, "cannot be looked at"))?.dev();
+        }
         let mount = mount_of(root).map_err(io(root, "cannot be looked at"))?;
         let path = root.join(PRIVATE).join(MARK);
         let mark = mark(root, id).map_err(io(&path, "cannot be written"))?;
-        let apart = PARTS.iter().zip(devices).filter(|(_, device)| *device != Some(id.0)).map(|(part, _)| (*part).to_owned());
+        let apart = PARTS.iter().zip(devices).filter(|(_, device)| *device != id.0).map(|(part, _)| (*part).to_owned());
         Ok(Self { id, devices, trace: Trace { mark, mount, apart: apart.collect() }, lock })
     }
 
@@ -125,17 +143,19 @@ impl Ground {
     /// A line for people.
     pub(crate) fn check(&self, root: &Path) -> Result<(), String> {
         self.leads_here(root).map_err(|line| self.trace.missing(root).unwrap_or(line))?;
-        let ids = PARTS.map(|part| std::fs::metadata(root.join(part)).ok().map(|meta| id(&meta)));
-        for (i, (part, device_then)) in PARTS.iter().zip(self.devices).enumerate() {
-            // A part that was removed is made again where it is needed.
-            let Some(now) = ids[i] else { continue };
+        let mut seen: Vec<(PathBuf, (u64, u64))> = Vec::with_capacity(PARTS.len());
+        for (part, device_then) in PARTS.iter().zip(self.devices) {
             let part = root.join(part);
-            if Some(now.0) != device_then {
+            let found = fsx::behind(&part).map_err(|error| format!("{}: cannot be looked at: {error}", part.display()))?;
+            // A part that was removed is made again where it is needed.
+            let Some(now) = found.map(|meta| id(&meta)) else { continue };
+            if now.0 != device_then {
                 return Err(format!("{}: is on another file system than at the start: a mount came or went", part.display()));
             }
-            if let Some(other) = ids.iter().take(i).position(|other| *other == Some(now)) {
-                return Err(FolderError::Mixed { a: root.join(PARTS[other]), b: part }.to_string());
+            if let Some((other, _)) = seen.iter().find(|(_, id)| *id == now) {
+                return Err(FolderError::Mixed { a: other.clone(), b: part }.to_string());
             }
+            seen.push((part, now));
         }
         Ok(())
     }
@@ -166,17 +186,18 @@ impl Ground {
     }
 }
 
-fn device(path: &Path) -> Option<u64> {
-    std::fs::metadata(path).ok().map(|meta| meta.dev())
+/// The file system a path leads to, if it leads anywhere.
+fn device(path: &Path) -> io::Result<Option<u64>> {
+    Ok(fsx::behind(path)?.map(|found| found.dev()))
 }
 
-fn read_mark(root: &Path) -> Option<String> {
-    std::fs::read_to_string(root.join(PRIVATE).join(MARK)).ok().map(|text| text.trim().to_owned())
+fn read_mark(root: &Path) -> io::Result<Option<String>> {
+    Ok(fsx::text_if_there(&root.join(PRIVATE).join(MARK))?.map(|text| text.trim().to_owned()))
 }
 
 /// The folder's mark, made if it has none. It need not be secret, only another than that of any folder that may come under the same path.
 fn mark(root: &Path, id: (u64, u64)) -> io::Result<String> {
-    if let Some(mark) = read_mark(root).filter(|mark| !mark.is_empty()) {
+    if let Some(mark) = read_mark(root)?.filter(|mark| !mark.is_empty()) {
         return Ok(mark);
     }
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default().as_nanos();
@@ -216,7 +237,8 @@ fn is_mount_root(path: &Path) -> io::Result<bool> {
         return Ok(here.stx_attributes.contains(StatxAttributes::MOUNT_ROOT));
     }
     // An older system: a mount of part of the same file system goes unnoticed.
-    Ok(path.parent().is_none_or(|above| device(above) != device(path)))
+    let Some(above) = path.parent() else { return Ok(true) };
+    Ok(device(above)? != device(path)?)
 }
 
 /// The lock of the hot folder, which the system releases when the process ends.
@@ -283,10 +305,15 @@ fn traces_of(state: &Path) -> PathBuf {
     state.with_file_name("folders")
 }
 
-/// Those that were noted beside a job store; none, where none can be read.
-pub(crate) fn read_traces(state: &Path) -> Traces {
-    let text = std::fs::read_to_string(traces_of(state)).unwrap_or_default();
-    serde_json::from_str(&text).unwrap_or_default()
+/// The traces that were noted beside a job store; none, where nothing was noted.
+///
+/// # Errors
+/// When they cannot be read: without them a bare folder under a mount would be taken for the hot folder.
+pub(crate) fn read_traces(state: &Path) -> Result<Traces, FolderError> {
+    let path = traces_of(state);
+    let io = |action| move |source| FolderError::Io { path: traces_of(state), action, source };
+    let Some(text) = fsx::text_if_there(&path).map_err(io("cannot be read"))? else { return Ok(Traces::new()) };
+    serde_json::from_str(&text).map_err(|error| io("is damaged; remove it once all hot folders are mounted")(error.into()))
 }
 
 /// Notes them beside a job store.
@@ -295,7 +322,7 @@ pub(crate) fn read_traces(state: &Path) -> Traces {
 /// As the file system's.
 pub(crate) fn note_traces(state: &Path, traces: &Traces) -> io::Result<()> {
     let path = traces_of(state);
-    if read_traces(state) == *traces {
+    if read_traces(state).is_ok_and(|noted| noted == *traces) {
         return Ok(());
     }
     create::replace(&path, &serde_json::to_vec_pretty(traces)?)?;
@@ -314,9 +341,9 @@ mod tests {
         let (first, other) = (trace(&a), trace(&b));
         assert_eq!(first, trace(&a));
         assert_ne!(first.mark, other.mark);
-        assert!(first.leads_here(&a) && !first.leads_here(&b));
+        assert!(first.leads_here(&a).unwrap() && !first.leads_here(&b).unwrap());
         std::fs::rename(&a, dir.path().join("moved")).unwrap();
-        assert!(!first.leads_here(&a) && first.leads_here(&dir.path().join("moved")));
+        assert!(!first.leads_here(&a).unwrap() && first.leads_here(&dir.path().join("moved")).unwrap());
     }
 
     /// Made anew on the same mount is one thing, a mount that is gone another.
@@ -349,10 +376,12 @@ mod tests {
     fn traces_are_noted_beside_the_store() {
         let dir = tempfile::tempdir().unwrap();
         let state = dir.path().join("state");
-        assert!(read_traces(&state).is_empty());
+        assert!(read_traces(&state).unwrap().is_empty());
         let trace = Trace { mark: "m".into(), mount: "/mnt".into(), apart: vec!["out".into()] };
         let traces = Traces::from([("hot".to_owned(), trace)]);
         note_traces(&state, &traces).unwrap();
-        assert_eq!(read_traces(&state), traces);
+        assert_eq!(read_traces(&state).unwrap(), traces);
+        std::fs::write(traces_of(&state), "{").unwrap();
+        assert!(read_traces(&state).unwrap_err().to_string().contains("folders: is damaged; remove it"), "never none");
     }
 }

@@ -13,6 +13,7 @@ use suture_store::{Job, JobId, State, Time};
 use crate::cli::{JobsArgs, JobsCommand};
 use crate::control::{DaemonWish, JobsWish};
 use crate::exit::Exit;
+use crate::fsx;
 use crate::reach::{self, Failure};
 use crate::receipt::REPORT;
 use crate::say::{complain, plain};
@@ -108,7 +109,7 @@ fn fail(failure: &Failure) -> Exit {
 fn standing(dir: &Path) -> Standing {
     match reach::daemon(dir, &DaemonWish::Standing) {
         Ok(Some(standing)) => standing,
-        Ok(None) if standstill::is_set(&reach::state_of(dir)) => {
+        Ok(None) if reach::state_of(dir).and_then(|state| standstill::is_set(&state)).is_ok_and(|paused| paused) => {
             Standing { held: vec![standstill::WORDS.into()], ..Standing::default() }
         }
         _ => Standing::default(),
@@ -222,7 +223,7 @@ fn show(dir: &Path, job: &Job) -> String {
         text += &format!("  note      {note}\n");
     }
     // With several folders to a store, it may be in another one.
-    if let Some(path) = report_path(dir, job).filter(|path| path.exists()) {
+    if let Some(path) = report_path(dir, job).filter(|path| fsx::exists(path).unwrap_or(false)) {
         text += &format!("  report    {}\n", plain(&path.display().to_string()));
         if let Ok(bytes) = std::fs::read(&path)
             && let Ok(report) = serde_json::from_slice::<Report>(&bytes)

@@ -291,7 +291,7 @@ impl<'a> Keeper<'a> {
         for job in self.context.store.list(&Query { kinds: vec![Kind::Noticed], ..Query::default() })? {
             if let Some(kept) = self.folders.iter().find(|kept| kept.folder.name == job.source.folder)
                 && kept.folder.check().is_ok()
-                && kept.folder.inbox().is_dir()
+                && fsx::is_folder(&kept.folder.inbox()).is_ok_and(|there| there)
                 && fsx::exists(&kept.folder.inbox().join(job.source.path.to_path())).is_ok_and(|there| !there)
             {
                 control(self.context, job.id, Control::Forget)?;

@@ -39,10 +39,10 @@ impl Naming {
     /// A line for people when the command line asks for what cannot be.
     pub(crate) fn new(args: &RepairArgs) -> Result<Self, String> {
         let (output, several) = (args.output.clone(), args.inputs.len() > 1);
-        let folder = output.is_dir();
+        let folder = is_folder(&output)?;
         let shown = output.display();
         if !folder && several {
-            return Err(match output.exists() {
+            return Err(match fsx::exists(&output).unwrap_or(true) {
                 true => format!("{shown}: is no folder; several inputs need a folder to go to"),
                 false => format!("{shown}: no such folder; several inputs need one that exists"),
             });
@@ -50,10 +50,18 @@ impl Naming {
         if !folder && output.as_os_str().as_encoded_bytes().ends_with(b"/") {
             return Err(format!("{shown}: no such folder"));
         }
-        if !folder && !fsx::folder_of(&output).is_dir() {
+        if !folder && !is_folder(fsx::folder_of(&output))? {
             return Err(format!("{shown}: its folder does not exist"));
         }
-        let ids = args.inputs.iter().filter_map(|input| std::fs::metadata(input).ok()).map(|m| id(&m)).collect();
+        let mut ids = HashSet::new();
+        for input in &args.inputs {
+            match fsx::behind(input) {
+                Ok(found) => ids.extend(found.as_ref().map(id)),
+                // It may be the very file that is to be replaced.
+                Err(error) if args.force => return Err(unseen(input, &error)),
+                Err(_) => {}
+            }
+        }
         let naming = Self {
             output,
             folder,
@@ -88,16 +96,16 @@ impl Naming {
     fn check_reports(&self, report: &Path) -> Result<(), String> {
         let shown = report.display();
         if self.several {
-            return if report.is_dir() {
+            return if is_folder(report)? {
                 Ok(())
             } else {
                 Err(format!("{shown}: with several inputs --report must be an existing folder"))
             };
         }
-        if report.is_dir() {
+        if is_folder(report)? {
             return Err(format!("{shown}: is a folder; name a file for the report"));
         }
-        if !fsx::folder_of(report).is_dir() {
+        if !is_folder(fsx::folder_of(report))? {
             return Err(format!("{shown}: its folder does not exist"));
         }
         self.check(report)?;
@@ -154,7 +162,7 @@ impl Naming {
     pub(crate) fn check(&self, target: &Path) -> Result<(), String> {
         let shown = target.display();
         let exists = || Err(format!("{shown}: exists already; choose another name or add --force"));
-        let Ok(there) = std::fs::metadata(target) else {
+        let Some(there) = fsx::behind(target).map_err(|error| unseen(target, &error))? else {
             // A link that leads nowhere would be replaced, too.
             return if !is_free(target) && !self.force { exists() } else { Ok(()) };
         };
@@ -171,6 +179,14 @@ impl Naming {
     pub(crate) fn is_folder(&self) -> bool {
         self.folder
     }
+}
+
+fn is_folder(path: &Path) -> Result<bool, String> {
+    fsx::is_folder(path).map_err(|error| unseen(path, &error))
+}
+
+fn unseen(path: &Path, error: &std::io::Error) -> String {
+    format!("{}: cannot be looked at: {error}", path.display())
 }
 
 /// A name that cannot be looked at is not free.

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::de::DeserializeOwned;
 use suture_core::Profile;
 
+use crate::fsx;
 use crate::own_profile::OwnProfile;
 
 /// Settings that a folder of `in/` may carry for itself.
@@ -89,7 +90,7 @@ pub(crate) fn from_name_or_file(text: &str) -> Result<Profile, String> {
         return Ok(profile);
     }
     let path = Path::new(text);
-    if path.is_file() {
+    if fsx::is_file(path).map_err(|error| format!("{text}: cannot be looked at: {error}"))? {
         return from_file(path);
     }
     Err(format!("there is no profile `{text}`: neither a file nor one of {}", Profile::BUILT_IN.join(", ")))

@@ -4,7 +4,7 @@
 //! held for a moment longer than anyone answers. Whoever asks then waits for [`PATIENCE`], and asks again.
 
 use std::ffi::OsString;
-use std::io::ErrorKind;
+use std::io::{self, ErrorKind};
 use std::os::unix::ffi::OsStringExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -14,6 +14,7 @@ use suture_store::{Job, SledStore, StoreError};
 use crate::config::default_state;
 use crate::control::{DaemonWish, JobsWish, Refusal, Wish, answer, ask};
 use crate::exit::Exit;
+use crate::fsx;
 use crate::schedule::Standing;
 use crate::{standstill, watch, watchdog};
 
@@ -63,8 +64,8 @@ pub(crate) fn jobs(dir: &Path, wish: &JobsWish) -> Result<Vec<Job>, Failure> {
     if let Some(jobs) = through_daemon(dir, wish)? {
         return Ok(jobs);
     }
-    let state = state_of(dir);
-    if !state.is_dir() {
+    let state = state_of(dir).map_err(|error| unseen(dir, &error))?;
+    if !fsx::is_folder(&state).map_err(|error| unseen(&state, &error))? {
         return Ok(Vec::new());
     }
     watchdog::start(|| watch::end_hanging())
@@ -92,7 +93,7 @@ pub(crate) fn daemon(dir: &Path, wish: &DaemonWish) -> Result<Option<Standing>, 
     if let Some(standing) = through_daemon(dir, wish)? {
         return Ok(Some(standing));
     }
-    let note = |paused| standstill::set(&state_of(dir), paused);
+    let note = |paused| standstill::set(&state_of(dir)?, paused);
     let noted = match wish {
         DaemonWish::Pause => note(true),
         DaemonWish::Resume => note(false),
@@ -104,16 +105,24 @@ pub(crate) fn daemon(dir: &Path, wish: &DaemonWish) -> Result<Option<Standing>, 
 }
 
 /// Where the job store of a hot folder is.
-pub(crate) fn state_of(dir: &Path) -> PathBuf {
+///
+/// # Errors
+/// When the note of its place cannot be read: another store would answer for other jobs.
+pub(crate) fn state_of(dir: &Path) -> io::Result<PathBuf> {
     match std::fs::read(dir.join(".suture").join("state-path")) {
-        Ok(path) => OsString::from_vec(path).into(),
-        Err(_) => default_state(dir),
+        Ok(path) => Ok(OsString::from_vec(path).into()),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(default_state(dir)),
+        Err(error) => Err(error),
     }
+}
+
+fn unseen(path: &Path, error: &io::Error) -> Failure {
+    Failure::try_again(format!("{}: cannot be looked at: {error}; try again", path.display()))
 }
 
 /// The running daemon's answer; `None` if none runs.
 fn through_daemon<W: Wish>(dir: &Path, wish: &W) -> Result<Option<W::Answer>, Failure> {
-    if !dir.join(".suture").is_dir() {
+    if !fsx::is_folder(&dir.join(".suture")).map_err(|error| unseen(dir, &error))? {
         return Err(Failure { line: format!("{}: is no hot folder (try --dir DIR)", dir.display()), exit: Exit::Refused });
     }
     match ask(dir, wish) {
@@ -184,7 +193,7 @@ mod tests {
     #[test]
     fn a_store_that_is_held_is_waited_for() {
         let dir = hot();
-        let store = SledStore::open(&state_of(dir.path())).unwrap();
+        let store = SledStore::open(&state_of(dir.path()).unwrap()).unwrap();
         let asked = Instant::now();
         let jobs = std::thread::scope(|scope| {
             let asking = scope.spawn(|| jobs(dir.path(), &JobsWish::List));
@@ -200,7 +209,7 @@ mod tests {
     #[test]
     fn a_store_that_stays_held_is_said_so() {
         let dir = hot();
-        let _store = SledStore::open(&state_of(dir.path())).unwrap();
+        let _store = SledStore::open(&state_of(dir.path()).unwrap()).unwrap();
         let asked = Instant::now();
         let failure = jobs(dir.path(), &JobsWish::List).unwrap_err();
         assert!(asked.elapsed() >= PATIENCE && failure.exit == Exit::TryAgain);

@@ -14,7 +14,7 @@ use suture_store::{JobId, RelPath, Source, Submission};
 use crate::choice;
 use crate::claim::Original;
 use crate::folder::{Folder, NameKind, is_hot, name_kind};
-use crate::fsx::Identity;
+use crate::fsx::{self, Identity};
 use crate::profiles;
 use crate::settings::Settings;
 use crate::settle::{Look, Rest, Settling, length_fits};
@@ -231,7 +231,7 @@ impl Reconciler {
             return name;
         }
         let own = self.folder.inbox().join(&name).join(profiles::FOLDER_FILE);
-        if !own.exists() && self.warned.insert(name.clone()) {
+        if fsx::exists(&own).is_ok_and(|there| !there) && self.warned.insert(name.clone()) {
             tracing::info!(folder = %self.folder.name, sub_folder = name, profile = default, "No profile has this sub-folder's name: it is an order.");
         }
         default
@@ -267,15 +267,15 @@ impl Found {
             let path = below.join(&name);
             if meta.is_dir() {
                 // Someone else's files.
-                if is_hot(&root.join(&path)) {
-                    self.unreadable.insert(path, "it is a hot folder of its own".into());
-                    continue;
-                }
                 // A sub-folder that cannot be read does not hide the others.
-                if depth == 0 {
-                    self.unreadable.insert(path, format!("it lies deeper than {DEPTH} folders"));
-                } else if let Err(error) = self.walk(root, &path, depth - 1) {
-                    self.unreadable.insert(path, error.to_string());
+                let walked = match is_hot(&root.join(&path)) {
+                    Ok(true) => Err("it is a hot folder of its own".into()),
+                    Ok(false) if depth == 0 => Err(format!("it lies deeper than {DEPTH} folders")),
+                    Ok(false) => self.walk(root, &path, depth - 1).map_err(|error| error.to_string()),
+                    Err(error) => Err(error.to_string()),
+                };
+                if let Err(why) = walked {
+                    self.unreadable.insert(path, why);
                 }
                 continue;
             }

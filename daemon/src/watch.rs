@@ -62,20 +62,17 @@ pub(crate) fn run(args: &WatchArgs) -> Exit {
 /// was started with.
 pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew: bool) -> Exit {
     let config = settings.now();
-    let (mut folders, known) = (Vec::new(), read_traces(&config.state));
-    for folder in &config.folders {
-        match Folder::open(folder, known.get(&folder.name)) {
-            Ok(folder) => folders.push(Arc::new(folder)),
-            Err(error) => {
-                complain(&error);
-                return match &error {
-                    FolderError::Owned { .. } => Exit::Owned,
-                    FolderError::Within { .. } | FolderError::Mixed { .. } => Exit::Refused,
-                    FolderError::Io { source, .. } => Exit::of_start(source),
-                };
-            }
+    let folders = match open_all(&config) {
+        Ok(folders) => folders,
+        Err(error) => {
+            complain(&error);
+            return match &error {
+                FolderError::Owned { .. } => Exit::Owned,
+                FolderError::Within { .. } | FolderError::Mixed { .. } => Exit::Refused,
+                FolderError::Io { source, .. } => Exit::of_start(source),
+            };
         }
-    }
+    };
     let (lives, not_good) = (Lives::so_far(), Arc::<AtomicBool>::default());
     if let Err(error) = watch_store(lives, &not_good, stop, may_begin_anew) {
         complain(&format_args!("no thread can be started: {error}; try again, or raise the limit of processes"));
@@ -94,6 +91,12 @@ pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew:
     let settings = Arc::new(settings);
     let daemon = Daemon { settings, folders, store, once, lives, not_good, stop: stop.clone(), may_begin_anew };
     daemon.run()
+}
+
+/// The hot folders, each taken or known to be away.
+fn open_all(config: &Config) -> Result<Vec<Arc<Folder>>, FolderError> {
+    let known = read_traces(&config.state)?;
+    config.folders.iter().map(|folder| Folder::open(folder, known.get(&folder.name)).map(Arc::new)).collect()
 }
 
 /// When a call into the job database hangs, the program begins anew, if it may, or ends.
@@ -338,7 +341,10 @@ impl<'s> Slots<'s, '_> {
 
 /// Takes nothing new where an operator has noted that for the next daemon.
 fn look_for_pause(context: &Context) {
-    let is_set = standstill::is_set(&context.settings.now().state);
+    let is_set = standstill::is_set(&context.settings.now().state).unwrap_or_else(|error| {
+        tracing::error!(%error, "Whether an operator paused the work cannot be told; it counts as paused: `suture jobs resume` ends that.");
+        true
+    });
     if is_set && context.schedule.hold(Hold::Operator, Some(standstill::WORDS.into())) {
         tracing::warn!("Nothing new is taken: {}.", standstill::WORDS);
     }

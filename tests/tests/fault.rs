@@ -46,6 +46,15 @@ fn f08_any_call_may_fail() {
     assert_eq!(failures, 0, "see the lines above");
 }
 
+/// A part of the folder that could not be looked at once counted as a file system that is gone, in this run and, as it was noted so, in
+/// each one after it.
+#[test]
+fn f08_a_look_that_fails_at_the_start_is_no_absence() {
+    let files = with_a_double(six());
+    let failures = sweep::sweep(&Expected::of(suture(), &files), &files, &plan::first_looks());
+    assert_eq!(failures, 0, "see the lines above");
+}
+
 /// Calls of an undisturbed run.
 fn count(files: &suture_tests::scene::Files) -> plan::Counts {
     let scene = Scene::new(suture(), files);

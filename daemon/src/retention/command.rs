@@ -81,7 +81,11 @@ fn of_folder(folder: &FolderConfig, keep: &Keep, now: Time) -> Result<String, St
 fn of_history(config: &Config, now: Time, jobs: Jobs) -> Result<String, (String, Exit)> {
     let mut text = String::new();
     // All folders have one store.
-    let Some(first) = config.folders.first().filter(|first| first.path.join(".suture").is_dir()) else { return Ok(text) };
+    let Some(first) = config.folders.first() else { return Ok(text) };
+    let served = fsx::is_folder(&first.path.join(".suture"));
+    if !served.map_err(|error| (format!("{}: cannot be looked at: {error}", first.path.display()), Exit::TryAgain))? {
+        return Ok(text);
+    }
     let jobs = jobs(&first.path)?;
     let is_needed = |job: &Job| {
         let folder = config.folders.iter().find(|folder| folder.name == job.source.folder);

@@ -93,7 +93,7 @@ impl Area {
             let path = below.join(entry.file_name());
             let kind = entry.file_type()?;
             if kind.is_dir() {
-                if depth > 0 && !is_hot(&self.root.join(&path)) {
+                if depth > 0 && !is_hot(&self.root.join(&path))? {
                     self.walk(&path, depth - 1)?;
                 }
             } else if kind.is_file()

@@ -192,7 +192,9 @@ fn is_gone(folder: &Folder, job: &Job) -> bool {
     let found = fsx::look(&folder.inbox().join(source.path.to_path()));
     // Its disk may be another device since.
     let same = |found: &Identity| (found.ino, found.size, found.mtime_ns) == (source.ino, source.size, source.mtime_ns);
-    folder.check().is_ok() && folder.inbox().is_dir() && found.is_ok_and(|found| found.as_ref().is_none_or(|found| !same(found)))
+    folder.check().is_ok()
+        && fsx::is_folder(&folder.inbox()).is_ok_and(|there| there)
+        && found.is_ok_and(|found| found.as_ref().is_none_or(|found| !same(found)))
 }
 
 /// Lets one file go; where it is now, if it is an original.

@@ -171,13 +171,22 @@ pub(super) fn list(dir: &Path) -> Result<Vec<PathBuf>, StoreError> {
     }
 }
 
+/// Is there anything of that name? An error is no absence.
+pub(super) fn is_there(path: &Path) -> Result<bool, StoreError> {
+    path.try_exists().map_err(io(path, "looking at"))
+}
+
+fn is_folder(path: &Path) -> Result<bool, StoreError> {
+    Ok(std::fs::symlink_metadata(path).map_err(io(path, "looking at"))?.is_dir())
+}
+
 /// Copies the folder `from`, but for what `leave_out` names, to the new folder `to`.
 pub(super) fn copy_dir(from: &Path, to: &Path, leave_out: fn(&Path) -> bool) -> Result<(), StoreError> {
     std::fs::create_dir(to).map_err(io(to, "making the folder"))?;
     for path in list(from)?.into_iter().filter(|path| !leave_out(path)) {
         let Some(name) = path.file_name() else { continue };
         let target = to.join(name);
-        if path.is_dir() {
+        if is_folder(&path)? {
             copy_dir(&path, &target, leave_out)?;
         } else {
             let mut from = File::open(&path).map_err(io(&path, "copying"))?;
@@ -207,7 +216,7 @@ pub(super) fn make_folder(path: &Path) -> Result<(), StoreError> {
 /// Makes everything in `dir` durable.
 pub(super) fn sync_all(dir: &Path) -> Result<(), StoreError> {
     for path in list(dir)? {
-        if path.is_dir() {
+        if is_folder(&path)? {
             sync_all(&path)?;
         } else {
             File::open(&path).and_then(|file| file.sync_all()).map_err(io(&path, "syncing"))?;

@@ -67,7 +67,7 @@ pub(super) fn peek(state: &Path) -> Result<Vec<Job>, StoreError> {
     if let Some(pid) = files::owner(state)? {
         return Err(StoreError::Locked { path: state.to_owned(), pid });
     }
-    if !dir.exists() {
+    if !files::is_there(&dir)? {
         return Ok(Vec::new());
     }
     let temporary = tempfile::tempdir().map_err(io(&std::env::temp_dir(), "making a temporary folder"))?;
@@ -81,8 +81,8 @@ pub(super) fn peek(state: &Path) -> Result<Vec<Job>, StoreError> {
 /// acknowledged yet, before there is a database.
 fn prepare(state: &Path) -> Result<Mark, StoreError> {
     let (dir, trial) = (state.join("db"), state.join("db.trial"));
-    if trial.exists() {
-        if dir.exists() {
+    if files::is_there(&trial)? {
+        if files::is_there(&dir)? {
             std::fs::remove_dir_all(&trial).map_err(io(&trial, "removing"))?;
         } else {
             // The database is moved away only after the copy was found good.
@@ -90,7 +90,7 @@ fn prepare(state: &Path) -> Result<Mark, StoreError> {
         }
     }
     let mark = files::read_mark(state)?;
-    if mark == Mark::Missing && !dir.exists() {
+    if mark == Mark::Missing && !files::is_there(&dir)? {
         files::write_mark(state, Epoch(0), Seq(0))?;
         return Ok(Mark::Reached(Epoch(0), Seq(0)));
     }

@@ -10,6 +10,8 @@ pub(crate) type Counts = BTreeMap<(Role, &'static str), u64>;
 
 /// Faults tried without `SUTURE_EXHAUSTIVE`.
 const SAMPLE: usize = 80;
+/// Looks before the first file is seen, and some more.
+const FIRST_LOOKS: u64 = 100;
 /// Runs differ in a few calls: the plan goes a little further than the run that was counted.
 const BEYOND: u64 = 2;
 
@@ -32,6 +34,11 @@ pub(crate) fn all(counts: &Counts) -> Vec<Fault> {
     // The short runs first.
     plan.sort_by_key(|fault| fault.when != When::Once);
     plan
+}
+
+/// Of the daemon's first looks at its folders, each fails once: they tell it which folders these are for the rest of its life.
+pub(crate) fn first_looks() -> Vec<Fault> {
+    (1..=FIRST_LOOKS).map(|n| fault(Some(Role::Daemon), "stat", n, What::Errno(libc::ENOMEM), When::Once)).collect()
 }
 
 fn at(kind: &Kind, role: Role, n: u64, plan: &mut Vec<Fault>) {

@@ -54,6 +54,8 @@ pub(crate) enum Command {
     Retention(RetentionArgs),
     /// List, show, retry, rank or cancel the jobs of a hot folder, with or without a running daemon
     Jobs(JobsArgs),
+    /// Draw a mesh, or one before and after its repair side by side, as PNG
+    Picture(PictureArgs),
     /// Make a hot folder of small broken meshes, repair them, and show what happened
     Demo,
     /// Work on requests from standard input (started by the supervisor)
@@ -207,6 +209,40 @@ pub(crate) struct InspectArgs {
     /// Print reports as JSON, one a line, instead of tables
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct PictureArgs {
+    /// A mesh file, or two: before and after. Of two, what goes is violet, what is new green. The outside is grey, the inside orange, edges of
+    /// only one triangle red
+    #[arg(required = true, num_args = 1..=2, value_name = "IN")]
+    pub inputs: Vec<PathBuf>,
+    /// The PNG to write
+    #[arg(short, long, value_name = "OUT")]
+    pub output: PathBuf,
+    /// Replace OUT if it exists
+    #[arg(long)]
+    pub force: bool,
+    /// Pixels of each mesh
+    #[arg(long, value_name = "WxH", value_parser = parse_pixels, default_value = "800x600")]
+    pub size: (usize, usize),
+    /// Where the eye is, in degrees: around z from the x axis, and above the horizon [default: where most changes are seen]
+    #[arg(long, value_name = "AROUND,ABOVE", value_parser = parse_eye, allow_hyphen_values = true)]
+    pub eye: Option<(f64, f64)>,
+    #[command(flatten)]
+    pub spend: Spend,
+}
+
+fn parse_pixels(text: &str) -> Result<(usize, usize), String> {
+    let pair = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    pair.filter(|(w, h)| (16..=2048).contains(w) && (16..=2048).contains(h))
+        .ok_or_else(|| "width and height, each from 16 to 2048, like 800x600".into())
+}
+
+fn parse_eye(text: &str) -> Result<(f64, f64), String> {
+    let number = |text: &str| text.trim().parse().ok().filter(|x: &f64| x.abs() <= 360.0);
+    let pair = text.split_once(',').and_then(|(around, above)| Some((number(around)?, number(above)?)));
+    pair.ok_or_else(|| "two angles in degrees, like -60,30".into())
 }
 
 #[derive(Args, Debug, Clone)]

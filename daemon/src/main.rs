@@ -29,6 +29,7 @@ mod names;
 mod naming;
 mod orders;
 mod own_profile;
+mod picture;
 mod place;
 mod profiles;
 mod protocol;
@@ -88,6 +89,7 @@ fn main() -> ExitCode {
         Command::Config(args) => config::command::run(&args.command),
         Command::Retention(args) => retention::command::run(&args.file, &jobs::all),
         Command::Jobs(args) => jobs::run(args),
+        Command::Picture(args) => picture::command::run(args),
         Command::Demo => demo::run(),
     };
     exit.into()

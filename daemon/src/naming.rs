@@ -53,24 +53,9 @@ impl Naming {
         if !folder && !is_folder(fsx::folder_of(&output))? {
             return Err(format!("{shown}: its folder does not exist"));
         }
-        let mut ids = HashSet::new();
-        for input in &args.inputs {
-            match fsx::behind(input) {
-                Ok(found) => ids.extend(found.as_ref().map(id)),
-                // It may be the very file that is to be replaced.
-                Err(error) if args.force => return Err(unseen(input, &error)),
-                Err(_) => {}
-            }
-        }
-        let naming = Self {
-            output,
-            folder,
-            report: args.report.clone(),
-            several,
-            inputs: ids,
-            force: args.force,
-            given: Mutex::default(),
-        };
+        let inputs = ids_of(&args.inputs, args.force)?;
+        let (report, force) = (args.report.clone(), args.force);
+        let naming = Self { output, folder, report, several, inputs, force, given: Mutex::default() };
         if !folder {
             naming.check(&naming.output)?;
         }
@@ -179,6 +164,27 @@ impl Naming {
     pub(crate) fn is_folder(&self) -> bool {
         self.folder
     }
+}
+
+/// May what is made of all these inputs be written to `output`? As [`Naming::check`].
+///
+/// # Errors
+/// A line for people.
+pub(crate) fn check_one(inputs: &[PathBuf], output: &Path, force: bool) -> Result<(), String> {
+    Naming { inputs: ids_of(inputs, force)?, force, ..Naming::of_file(output.to_owned()) }.check(output)
+}
+
+fn ids_of(inputs: &[PathBuf], force: bool) -> Result<HashSet<(u64, u64)>, String> {
+    let mut ids = HashSet::new();
+    for input in inputs {
+        match fsx::behind(input) {
+            Ok(found) => ids.extend(found.as_ref().map(id)),
+            // It may be the very file that is to be replaced.
+            Err(error) if force => return Err(unseen(input, &error)),
+            Err(_) => {}
+        }
+    }
+    Ok(ids)
 }
 
 fn is_folder(path: &Path) -> Result<bool, String> {

@@ -16,6 +16,7 @@ mod e2e {
     mod memory;
     mod odd_names;
     mod orders;
+    mod pictures;
     mod profiles;
     mod queue;
     mod retention;

@@ -1,0 +1,50 @@
+//! `suture picture`: what it draws, what it refuses, and that it never takes a name that is taken.
+
+use suture_bench::generate::Case;
+use suture_tests::{Place, Ran};
+
+fn picture(place: &Place, arguments: &[&str]) -> Ran {
+    place.suture([&["picture", "--size", "64x48"], arguments].concat())
+}
+
+/// Width and height, as they stand in the file.
+fn size(png: &[u8]) -> (u32, u32) {
+    assert_eq!(&png[..8], b"\x89PNG\r\n\x1a\n");
+    let number = |at: usize| u32::from_be_bytes(png[at..at + 4].try_into().unwrap());
+    (number(16), number(20))
+}
+
+#[test]
+fn one_mesh_or_two_become_a_picture() {
+    let place = Place::new();
+    place.generate(Case::Holes, 2_000, 1);
+    place.repair("holes.stl", "fixed.stl", &[]).expect(0);
+    picture(&place, &["holes.stl", "-o", "one.png"]).expect(0);
+    picture(&place, &["holes.stl", "fixed.stl", "-o", "two.png", "--threads", "1"]).expect(0);
+    picture(&place, &["holes.stl", "fixed.stl", "-o", "again.png", "--threads", "3"]).expect(0);
+    assert_eq!(size(&place.read("one.png")), (64, 48));
+    assert_eq!(size(&place.read("two.png")), (128, 48));
+    assert_eq!(place.read("two.png"), place.read("again.png"), "the same whatever the threads");
+}
+
+#[test]
+fn what_is_no_mesh_or_would_replace_something_is_refused() {
+    let place = Place::new();
+    let (input, _) = place.generate(Case::Clean, 600, 1);
+    let before = std::fs::read(&input).unwrap();
+    place.put("text.stl", b"not a mesh");
+    place.put("there.png", b"mine");
+    for (arguments, words) in [
+        (&["text.stl", "-o", "a.png"][..], "text.stl"),
+        (&["nothing.stl", "-o", "a.png"], "nothing.stl"),
+        (&["clean.stl", "-o", "there.png"], "exists already"),
+        (&["clean.stl", "-o", "clean.stl", "--force"], "never overwritten"),
+    ] {
+        let ran = picture(&place, arguments);
+        assert_eq!((ran.code(), ran.stderr().contains(words)), (2, true), "{arguments:?}: {}", ran.stderr());
+    }
+    assert_eq!((place.read("there.png"), std::fs::read(&input).unwrap()), (b"mine".to_vec(), before));
+    assert!(!place.names("").iter().any(|name| name.contains("a.png") || name.contains("tmp")), "{:?}", place.names(""));
+    picture(&place, &["clean.stl", "-o", "there.png", "--force"]).expect(0);
+    assert_eq!(size(&place.read("there.png")), (64, 48));
+}

@@ -54,6 +54,8 @@ pub(crate) enum Command {
     Retention(RetentionArgs),
     /// List, show, retry, rank or cancel the jobs of a hot folder, with or without a running daemon
     Jobs(JobsArgs),
+    /// Make a page for a browser of a report, with a picture before and after
+    Report(ReportArgs),
     /// Draw a mesh, or one before and after its repair side by side, as PNG
     Picture(PictureArgs),
     /// Make a hot folder of small broken meshes, repair them, and show what happened
@@ -209,6 +211,24 @@ pub(crate) struct InspectArgs {
     /// Print reports as JSON, one a line, instead of tables
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct ReportArgs {
+    /// A report, as written by repair or inspect, or by the daemon beside a result
+    #[arg(value_name = "REPORT")]
+    pub report: PathBuf,
+    /// The files to draw, before and after [default: those that the report names, where they are unchanged]
+    #[arg(num_args = 0..=2, value_name = "MESH")]
+    pub files: Vec<PathBuf>,
+    /// The page to write
+    #[arg(short, long, value_name = "OUT")]
+    pub output: PathBuf,
+    /// Replace OUT if it exists
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub spend: Spend,
 }
 
 #[derive(Args, Debug)]

@@ -66,6 +66,22 @@ pub(crate) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
     std::fs::rename(&temporary, path)
 }
 
+/// Writes a file that a person asked for, whole or not at all; what has the name is replaced only by force.
+///
+/// # Errors
+/// As [`write_new`] and `rename`; [`io::ErrorKind::AlreadyExists`] where the name is taken.
+pub(crate) fn place(path: &Path, bytes: &[u8], force: bool) -> io::Result<()> {
+    if force {
+        return replace(path, bytes);
+    }
+    let temporary = temporary_in(fsx::folder_of(path));
+    let placed = write_new(&temporary, bytes).and_then(|()| fsx::rename_new(&temporary, path));
+    if placed.is_err() {
+        let _ = fsx::remove_if_there(&temporary);
+    }
+    placed
+}
+
 /// Makes an empty file that need not survive the machine; one that is there already will do.
 ///
 /// # Errors

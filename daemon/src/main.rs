@@ -21,6 +21,7 @@ mod folder;
 mod fsx;
 mod ground;
 mod hints;
+mod html;
 mod item;
 mod jobs;
 mod keeper;
@@ -89,6 +90,7 @@ fn main() -> ExitCode {
         Command::Config(args) => config::command::run(&args.command),
         Command::Retention(args) => retention::command::run(&args.file, &jobs::all),
         Command::Jobs(args) => jobs::run(args),
+        Command::Report(args) => html::command::run(args),
         Command::Picture(args) => picture::command::run(args),
         Command::Demo => demo::run(),
     };

@@ -220,31 +220,34 @@ fn edit(report: &Report) -> String {
     parts.join(", ")
 }
 
-fn defects(out: &mut String, report: &Report) {
+/// A count before and after; `None` where there is no other file afterwards.
+pub(crate) struct Counted {
+    pub(crate) name: &'static str,
+    pub(crate) before: String,
+    pub(crate) after: Option<String>,
+}
+
+/// The counts that are worth a row.
+pub(crate) fn rows(report: &Report) -> Vec<Counted> {
     let after = report.after.as_ref().filter(|_| report.task == Task::Repair);
     let differs = |of: fn(&Defects) -> u64| after.is_some_and(|after| of(after) != of(&report.before));
-    let rows: Vec<&Row> = ROWS
-        .iter()
+    ROWS.iter()
         .enumerate()
         .filter(|(i, (_, of))| if *i < FIRST_DESCRIPTION { of(&report.before) > 0 || differs(*of) } else { differs(*of) })
-        .map(|(_, row)| row)
-        .collect();
-    if rows.is_empty() {
-        return;
+        .map(|(_, (name, of))| Counted { name, before: counted_before(report, *of), after: after.map(|after| shown(of(after))) })
+        .collect()
+}
+
+fn defects(out: &mut String, report: &Report) {
+    let rows = rows(report);
+    let width = rows.iter().map(|row| row.name.chars().count()).max().unwrap_or(0);
+    if rows.iter().any(|row| row.after.is_some()) {
+        line(out, format_args!("  {:width$}  {:>14} {:>14}", "", "before", "after"));
     }
-    let width = rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
-    match after {
-        Some(after) => {
-            line(out, format_args!("  {:width$}  {:>14} {:>14}", "", "before", "after"));
-            for (name, of) in rows {
-                let (before, after) = (counted_before(report, *of), shown(of(after)));
-                line(out, format_args!("  {name:width$}  {before:>14} {after:>14}"));
-            }
-        }
-        None => {
-            for (name, of) in rows {
-                line(out, format_args!("  {name:width$}  {:>14}", shown(of(&report.before))));
-            }
+    for Counted { name, before, after } in rows {
+        match after {
+            Some(after) => line(out, format_args!("  {name:width$}  {before:>14} {after:>14}")),
+            None => line(out, format_args!("  {name:width$}  {before:>14}")),
         }
     }
 }

@@ -16,8 +16,11 @@ mod known;
 mod parts;
 
 use std::io;
+use std::path::Path;
 
+use suture_core::read::MeshFile;
 use suture_core::record::{self, Point, Record};
+use suture_core::{Access, Limits, Quiet};
 
 pub(crate) use camera::Eye;
 use camera::{Bounds, Camera};
@@ -68,6 +71,17 @@ impl Picture {
         writer.finish()?;
         Ok(bytes)
     }
+}
+
+/// Opens a mesh to draw it, for a process that does nothing else meanwhile.
+///
+/// # Errors
+/// A line for people.
+pub(crate) fn open(path: &Path, limits: &Limits) -> Result<MeshFile, String> {
+    let mut limits = limits.clone();
+    // SAFETY: this process does nothing else. If someone truncates the file, SIGBUS ends it; a change is found out by `check_unchanged`.
+    limits.access = unsafe { Access::mapped() };
+    MeshFile::open(path, &std::env::temp_dir(), &limits, &Quiet).map_err(|error| error.to_string())
 }
 
 /// Draws one mesh, or two side by side, before and after a repair. `None` where no triangle is finite.

@@ -48,3 +48,25 @@ fn what_is_no_mesh_or_would_replace_something_is_refused() {
     picture(&place, &["clean.stl", "-o", "there.png", "--force"]).expect(0);
     assert_eq!(size(&place.read("there.png")), (64, 48));
 }
+
+/// The page holds the picture, the counts and the verdict, and needs nothing from elsewhere.
+#[test]
+fn a_report_becomes_a_page() {
+    let place = Place::new();
+    place.generate(Case::Holes, 2_000, 1);
+    place.repair("holes.stl", "fixed.stl", &["--report", place.at("holes.json").to_str().unwrap()]).expect(0);
+    let page = |arguments: &[&str]| place.suture([&["report"], arguments].concat());
+    page(&["holes.json", "-o", "holes.html"]).expect(0);
+    let text = String::from_utf8(place.read("holes.html")).unwrap();
+    for words in ["<h1>holes.stl</h1>", "Repaired", "boundary edges", "data:image/png;base64,iVBORw0KGgo", "Left: as it came."] {
+        assert!(text.contains(words), "lacks {words:?}");
+    }
+    assert!(!text.contains("<script") && !text.contains("http://") && !text.contains("https://") && !text.contains("src=\"/"));
+    assert_eq!(page(&["holes.json", "-o", "holes.html"]).code(), 2, "the name is taken");
+    assert_eq!(page(&["holes.stl", "-o", "other.html"]).code(), 2, "no report");
+    assert_eq!(page(&["holes.json", "-o", "holes.stl", "--force"]).code(), 2, "an input is never overwritten");
+    // Another file stands under the name that the report has: no picture, lest it be taken for the one that was repaired.
+    place.put("holes.stl", b"solid\nendsolid\n");
+    page(&["holes.json", "-o", "without.html"]).expect(0);
+    assert!(!String::from_utf8(place.read("without.html")).unwrap().contains("<img"));
+}

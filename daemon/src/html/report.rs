@@ -1,0 +1,303 @@
+//! What became of one file, for a person who decides what to do with it.
+
+use maud::{Markup, html};
+use suture_core::Report;
+use suture_core::report::{FileFacts, Outcome, RegionMethod, RuleOutcome, SkinChange, Task};
+
+use super::page;
+use crate::say::plain;
+use crate::table;
+use crate::units::{show_count, show_seconds, show_size};
+
+/// Rows of a long table that are shown.
+const MOST_ROWS: usize = 200;
+
+/// The page of a report. `picture`: a PNG of the file, or of the file and its result side by side, as base64.
+pub(super) fn whole(report: &Report, picture: Option<&str>) -> Markup {
+    let name = name(report);
+    page(
+        &format!("{name}: {}", headline(report).0),
+        &html! {
+            h1 { (name) }
+            (outcome(report))
+            @if let Some(picture) = picture { (figure(picture, report.output.is_some())) }
+            (defects(report))
+            (repairs(report))
+            (places(report))
+            (rules(report))
+            (facts(report))
+        },
+    )
+}
+
+fn name(report: &Report) -> String {
+    let path = &report.input.path;
+    plain(&path.file_name().unwrap_or(path.as_os_str()).to_string_lossy())
+}
+
+/// The outcome in a word, its class, and what to do.
+fn headline(report: &Report) -> (&'static str, &'static str, &'static str) {
+    match (report.outcome, report.task) {
+        (Outcome::Clean, _) => ("Clean", "good", "It is sound as it came. Print it."),
+        (Outcome::Repaired, _) => ("Repaired", "good", "The result passed every check of its profile. Print the result."),
+        (Outcome::NeedsReview, _) => (
+            "Needs review",
+            "review",
+            "It is printable, but the repair changed more than the profile allows without a person. Look at the picture and the reasons, then use the result or not.",
+        ),
+        (Outcome::NotGood, Task::Inspect) => ("Not good", "bad", "It needs repair before it can be printed."),
+        (Outcome::NotGood, Task::Repair) if !report.profile.repair => {
+            ("Not good", "bad", "Its profile repairs nothing. Repair it under another one, or send it back.")
+        }
+        (Outcome::NotGood, Task::Repair) => (
+            "Not good after repair",
+            "bad",
+            "Do not print it. Ask for another file, or try another profile; the reasons are below.",
+        ),
+    }
+}
+
+fn outcome(report: &Report) -> Markup {
+    let (word, class, todo) = headline(report);
+    html! {
+        div class={ "outcome " (class) } role="status" {
+            strong { (word) }
+            p { (todo) }
+            p { "The file that was judged is " (report.verdict.statement) "." }
+            @if !report.verdict.reasons.is_empty() {
+                ul { @for reason in &report.verdict.reasons { li { (plain(reason)) } } }
+            }
+        }
+    }
+}
+
+fn figure(picture: &str, is_pair: bool) -> Markup {
+    let words = if is_pair { "Left: as it came. Right: the result." } else { "As it came." };
+    html! {
+        figure {
+            img alt=(words) src={ "data:image/png;base64," (picture) };
+            figcaption {
+                (words)
+                (key("#b0bece", "outside")) (key("#f09632", "inside")) (key("#d60a28", "edge of one triangle"))
+                @if is_pair { (key("#b284d6", "goes")) (key("#5cb870", "new")) }
+            }
+        }
+    }
+}
+
+fn key(colour: &str, words: &str) -> Markup {
+    html! { span class="key" style={ "background:" (colour) } {} (words) }
+}
+
+fn defects(report: &Report) -> Markup {
+    let rows = table::rows(report);
+    html! {
+        h2 { "Defects" }
+        @if rows.is_empty() { p { "None." } } @else {
+            table {
+                thead { tr { th scope="col" { "Count" } th scope="col" class="n" { "before" } @if report.after.is_some() { th scope="col" class="n" { "after" } } } }
+                tbody { @for row in rows { tr {
+                    th scope="row" { (row.name) }
+                    td class="n" { (row.before) }
+                    @if report.after.is_some() { td class="n" { (row.after.unwrap_or_default()) } }
+                } } }
+            }
+        }
+        @for finding in &report.input.findings { p { "The file: " (plain(finding)) } }
+    }
+}
+
+fn repairs(report: &Report) -> Markup {
+    let edit = &report.edit;
+    html! {
+        @if !report.repairs.is_empty() {
+            h2 { "Repairs" }
+            table {
+                thead { tr { th scope="col" { "Repair" } th scope="col" class="n" { "times" } th scope="col" { "How" } } }
+                tbody { @for repair in &report.repairs { tr {
+                    th scope="row" { (repair.name.as_str().replace('_', " ")) }
+                    td class="n" { (show_count(repair.count)) }
+                    td { (plain(&repair.note)) }
+                } } }
+            }
+            p { (show_count(edit.untouched)) " triangles are untouched, " (show_count(edit.deleted)) " deleted, " (show_count(edit.flipped)) " flipped, "
+                (show_count(edit.moved)) " moved, " (show_count(edit.added)) " added." }
+        }
+        @if let Some(skin) = &report.skin { (skin_of("Surface that was lost", &skin.lost)) (skin_of("Surface that was invented", &skin.invented)) }
+    }
+}
+
+fn skin_of(title: &str, change: &SkinChange) -> Markup {
+    html! {
+        @if change.area > 0.0 {
+            h2 { (title) }
+            p { (number(change.area)) " square units, " (number(change.share * 100.0)) " % of what can be seen, up to " (number(change.farthest)) " off." }
+            ul { @for place in &change.places { li { (number(place.area)) " square units in the box " (corners(&place.bounds)) } } }
+        }
+    }
+}
+
+/// Loops that stayed open, and regions that were changed or left.
+fn places(report: &Report) -> Markup {
+    let regions = &report.regions;
+    html! {
+        @if !report.loops_left.is_empty() {
+            h2 { "Left open" }
+            table {
+                thead { tr { th scope="col" { "At" } th scope="col" class="n" { "edges" } th scope="col" { "Why" } } }
+                tbody { @for left in report.loops_left.iter().take(MOST_ROWS) { tr {
+                    td { (point(&left.at)) } td class="n" { (show_count(left.edges)) } td { (plain(&left.reason)) }
+                } } }
+            }
+        }
+        @if !regions.listed.is_empty() {
+            details {
+                summary { (show_count(regions.total)) " regions were changed or left" }
+                table {
+                    thead { tr { th scope="col" { "Method" } th scope="col" { "Box" } th scope="col" class="n" { "triangles" } th scope="col" class="n" { "moved" } } }
+                    tbody { @for region in regions.listed.iter().take(MOST_ROWS) { tr {
+                        td { (method(region.method)) @if let Some(why) = &region.reason { ": " (plain(why)) } }
+                        td { (corners(&region.bounds)) } td class="n" { (show_count(region.count)) } td class="n" { (number(region.moved)) }
+                    } } }
+                }
+            }
+        }
+    }
+}
+
+fn method(method: RegionMethod) -> &'static str {
+    match method {
+        RegionMethod::Cut => "cut",
+        RegionMethod::Snapped => "snapped",
+        RegionMethod::Perturbed => "perturbed",
+        RegionMethod::Refilled => "refilled",
+        RegionMethod::Separated => "separated",
+        RegionMethod::Dropped => "dropped",
+        RegionMethod::Rebuilt => "rebuilt",
+        RegionMethod::Wrapped => "wrapped",
+        RegionMethod::Left => "left",
+        _ => "changed",
+    }
+}
+
+fn rules(report: &Report) -> Markup {
+    let Some(certificate) = &report.certificate else { return html! {} };
+    let words = |outcome: RuleOutcome| match outcome {
+        RuleOutcome::Passed => "passed",
+        RuleOutcome::Failed => "FAILED",
+        RuleOutcome::Unchecked => "not checked",
+    };
+    html! {
+        details {
+            summary { "Every rule: " @if certificate.printable { "all passed" } @else { "not all passed" } }
+            table {
+                thead { tr { th scope="col" { "Rule" } th scope="col" { "Outcome" } th scope="col" class="n" { "count or figure" } th scope="col" class="n" { "limit" } } }
+                tbody {
+                    @for rule in &certificate.rules { tr {
+                        th scope="row" { (rule.rule.replace('_', " ")) } td { (words(rule.outcome)) }
+                        td class="n" { @if let Some(count) = rule.count { (show_count(count)) } } td class="n" { "0" }
+                    } }
+                    @for rule in certificate.faithful.iter().flat_map(|faithful| &faithful.rules) { tr {
+                        th scope="row" { (rule.rule.replace('_', " ")) } td { (words(rule.outcome)) }
+                        td class="n" { @if let Some(figure) = rule.figure { (number(figure)) } } td class="n" { (number(rule.limit)) }
+                    } }
+                }
+            }
+        }
+    }
+}
+
+fn facts(report: &Report) -> Markup {
+    let file = |title: &str, facts: &FileFacts| {
+        html! { tr {
+            th scope="row" { (title) }
+            td { (plain(&facts.path.to_string_lossy())) br; (show_count(facts.triangles)) " triangles, " (show_size(facts.bytes)) br; "BLAKE3 " code { (facts.blake3) } }
+        } }
+    };
+    let measure = report.after.as_ref().unwrap_or(&report.before);
+    html! {
+        h2 { "Files" }
+        table { tbody {
+            (file("as it came", &report.input))
+            @if let Some(output) = &report.output { (file("result", output)) }
+            @if let Some(bounds) = &measure.bounds { tr { th scope="row" { "size" } td { (size(bounds)) " units" } } }
+            tr { th scope="row" { "area, volume" } td { (number(measure.area)) ", " (number(measure.volume)) } }
+            tr { th scope="row" { "profile" } td { (plain(&report.profile.name)) } }
+            tr { th scope="row" { "cost" } td { (show_seconds(report.cost.wall_seconds)) ", peak " (show_size(report.cost.peak_anonymous_bytes)) } }
+            tr { th scope="row" { "engine" } td { "Suture " (report.engine_version) } }
+        } }
+    }
+}
+
+/// Five digits, as people read them.
+fn number(value: f64) -> String {
+    if value == 0.0 {
+        return "0".into();
+    }
+    let digits = (4 - value.abs().log10().floor().clamp(-300.0, 300.0) as i32).clamp(0, 9) as usize;
+    let far = value.abs() < 1e-4 || value.abs() >= 1e9;
+    if far { format!("{value:.3e}") } else { format!("{value:.digits$}") }
+}
+
+fn point(p: &[f32; 3]) -> String {
+    let [x, y, z] = p.map(|x| number(x.into()));
+    format!("({x}, {y}, {z})")
+}
+
+fn corners([lo, hi]: &[[f32; 3]; 2]) -> String {
+    format!("{} to {}", point(lo), point(hi))
+}
+
+fn size([lo, hi]: &[[f32; 3]; 2]) -> String {
+    let [x, y, z] = std::array::from_fn(|k| number(f64::from(hi[k]) - f64::from(lo[k])));
+    format!("{x} × {y} × {z}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::table::tests::sample;
+
+    #[test]
+    fn each_outcome_says_what_to_do() {
+        for (outcome, words) in [
+            (Outcome::Clean, "Print it."),
+            (Outcome::Repaired, "Print the result."),
+            (Outcome::NeedsReview, "Look at the picture"),
+            (Outcome::NotGood, "Do not print it."),
+        ] {
+            let text = whole(&sample(outcome), None).into_string();
+            assert!(text.contains(words) && text.contains("<h1>part.stl</h1>"), "{text}");
+            assert!(!text.contains("<img") && !text.contains("<script"), "no picture, no script");
+        }
+    }
+
+    /// Names, headers and notes come from whoever sent the file.
+    #[test]
+    fn nothing_in_a_report_is_markup() {
+        let evil = "<img src=x onerror=alert(1)>\"'&";
+        let mut report = sample(Outcome::NeedsReview);
+        report.input.path = evil.into();
+        report.input.findings.push(evil.into());
+        report.verdict.reasons.push(format!("{evil}\u{202E}"));
+        report.profile.name = evil.into();
+        let text = whole(&report, None).into_string();
+        assert!(!text.contains("<img") && !text.contains('\u{202E}'), "{text}");
+        assert_eq!(text.matches("&lt;img src=x").count(), 6, "title, heading, finding, reason, file, profile: {text}");
+    }
+
+    #[test]
+    fn numbers_have_five_digits() {
+        for (value, text) in [
+            (0.0, "0"),
+            (1234.567, "1234.6"),
+            (0.012_345_678, "0.012346"),
+            (-7.0, "-7.0000"),
+            (1e-9, "1.000e-9"),
+            (2.5e12, "2.500e12"),
+            (123_456.0, "123456"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
+}

@@ -7,7 +7,7 @@ use suture_core::Report;
 use suture_core::report::{Defects, Format, Outcome, SelfIntersections, Task};
 
 use crate::say::plain;
-use crate::units::{show_count, show_seconds, show_size};
+use crate::units::{show_box, show_count, show_seconds, show_size};
 
 /// Boundary loops, and pairs that intersect, listed before the table refers to the report.
 const LOOPS_SHOWN: usize = 5;
@@ -110,10 +110,10 @@ pub(crate) fn render(report: &Report) -> String {
 /// The largest regions that were wrapped, or would have been.
 fn wraps(out: &mut String, report: &Report) {
     for wrap in report.wraps.iter().take(LOOPS_SHOWN) {
-        let [lo, hi] = wrap.bounds;
         let what = format!(
-            "{} triangles from {lo:?} to {hi:?}, {:.1} % of the surface",
+            "{} triangles from {}, {:.1} % of the surface",
             show_count(wrap.replaced),
+            show_box(&wrap.bounds),
             wrap.area_share * 100.0
         );
         match &wrap.left {

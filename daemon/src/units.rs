@@ -115,6 +115,27 @@ pub(crate) fn show_count(count: u64) -> String {
     out
 }
 
+/// Five digits, as people read them.
+pub(crate) fn show_number(value: f64) -> String {
+    if value == 0.0 {
+        return "0".into();
+    }
+    let digits = (4 - value.abs().log10().floor().clamp(-300.0, 300.0) as i32).clamp(0, 9) as usize;
+    let far = value.abs() < 1e-4 || value.abs() >= 1e9;
+    if far { format!("{value:.3e}") } else { format!("{value:.digits$}") }
+}
+
+/// A place.
+pub(crate) fn show_point(p: &[f32; 3]) -> String {
+    let [x, y, z] = p.map(|x| show_number(x.into()));
+    format!("({x}, {y}, {z})")
+}
+
+/// A box.
+pub(crate) fn show_box([lo, hi]: &[[f32; 3]; 2]) -> String {
+    format!("{} to {}", show_point(lo), show_point(hi))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -168,5 +189,20 @@ mod tests {
         assert_eq!(show_count(1_234_567), "1 234 567");
         assert_eq!(show_count(999), "999");
         assert_eq!(show_seconds(125.0), "2 min 05 s");
+    }
+
+    #[test]
+    fn numbers_have_five_digits() {
+        for (value, text) in [
+            (0.0, "0"),
+            (1234.567, "1234.6"),
+            (0.012_345_678, "0.012346"),
+            (-7.0, "-7.0000"),
+            (1e-9, "1.000e-9"),
+            (2.5e12, "2.500e12"),
+            (123_456.0, "123456"),
+        ] {
+            assert_eq!(show_number(value), text);
+        }
     }
 }

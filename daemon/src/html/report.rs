@@ -7,7 +7,7 @@ use suture_core::report::{FileFacts, Outcome, RegionMethod, RuleOutcome, SkinCha
 use super::page;
 use crate::say::plain;
 use crate::table;
-use crate::units::{show_count, show_seconds, show_size};
+use crate::units::{show_box, show_count, show_number, show_point, show_seconds, show_size};
 
 /// Rows of a long table that are shown.
 const MOST_ROWS: usize = 200;
@@ -131,8 +131,8 @@ fn skin_of(title: &str, change: &SkinChange) -> Markup {
     html! {
         @if change.area > 0.0 {
             h2 { (title) }
-            p { (number(change.area)) " square units, " (number(change.share * 100.0)) " % of what can be seen, up to " (number(change.farthest)) " off." }
-            ul { @for place in &change.places { li { (number(place.area)) " square units in the box " (corners(&place.bounds)) } } }
+            p { (show_number(change.area)) " square units, " (show_number(change.share * 100.0)) " % of what can be seen, up to " (show_number(change.farthest)) " off." }
+            ul { @for place in &change.places { li { (show_number(place.area)) " square units in the box " (show_box(&place.bounds)) } } }
         }
     }
 }
@@ -146,7 +146,7 @@ fn places(report: &Report) -> Markup {
             table {
                 thead { tr { th scope="col" { "At" } th scope="col" class="n" { "edges" } th scope="col" { "Why" } } }
                 tbody { @for left in report.loops_left.iter().take(MOST_ROWS) { tr {
-                    td { (point(&left.at)) } td class="n" { (show_count(left.edges)) } td { (plain(&left.reason)) }
+                    td { (show_point(&left.at)) } td class="n" { (show_count(left.edges)) } td { (plain(&left.reason)) }
                 } } }
             }
         }
@@ -157,7 +157,7 @@ fn places(report: &Report) -> Markup {
                     thead { tr { th scope="col" { "Method" } th scope="col" { "Box" } th scope="col" class="n" { "triangles" } th scope="col" class="n" { "moved" } } }
                     tbody { @for region in regions.listed.iter().take(MOST_ROWS) { tr {
                         td { (method(region.method)) @if let Some(why) = &region.reason { ": " (plain(why)) } }
-                        td { (corners(&region.bounds)) } td class="n" { (show_count(region.count)) } td class="n" { (number(region.moved)) }
+                        td { (show_box(&region.bounds)) } td class="n" { (show_count(region.count)) } td class="n" { (show_number(region.moved)) }
                     } } }
                 }
             }
@@ -199,7 +199,7 @@ fn rules(report: &Report) -> Markup {
                     } }
                     @for rule in certificate.faithful.iter().flat_map(|faithful| &faithful.rules) { tr {
                         th scope="row" { (rule.rule.replace('_', " ")) } td { (words(rule.outcome)) }
-                        td class="n" { @if let Some(figure) = rule.figure { (number(figure)) } } td class="n" { (number(rule.limit)) }
+                        td class="n" { @if let Some(figure) = rule.figure { (show_number(figure)) } } td class="n" { (show_number(rule.limit)) }
                     } }
                 }
             }
@@ -221,7 +221,7 @@ fn facts(report: &Report) -> Markup {
             (file("as it came", &report.input))
             @if let Some(output) = &report.output { (file("result", output)) }
             @if let Some(bounds) = &measure.bounds { tr { th scope="row" { "size" } td { (size(bounds)) " units" } } }
-            tr { th scope="row" { "area, volume" } td { (number(measure.area)) ", " (number(measure.volume)) } }
+            tr { th scope="row" { "area, volume" } td { (show_number(measure.area)) ", " (show_number(measure.volume)) } }
             tr { th scope="row" { "profile" } td { (plain(&report.profile.name)) } }
             tr { th scope="row" { "cost" } td { (show_seconds(report.cost.wall_seconds)) ", peak " (show_size(report.cost.peak_anonymous_bytes)) } }
             tr { th scope="row" { "engine" } td { "Suture " (report.engine_version) } }
@@ -229,27 +229,8 @@ fn facts(report: &Report) -> Markup {
     }
 }
 
-/// Five digits, as people read them.
-fn number(value: f64) -> String {
-    if value == 0.0 {
-        return "0".into();
-    }
-    let digits = (4 - value.abs().log10().floor().clamp(-300.0, 300.0) as i32).clamp(0, 9) as usize;
-    let far = value.abs() < 1e-4 || value.abs() >= 1e9;
-    if far { format!("{value:.3e}") } else { format!("{value:.digits$}") }
-}
-
-fn point(p: &[f32; 3]) -> String {
-    let [x, y, z] = p.map(|x| number(x.into()));
-    format!("({x}, {y}, {z})")
-}
-
-fn corners([lo, hi]: &[[f32; 3]; 2]) -> String {
-    format!("{} to {}", point(lo), point(hi))
-}
-
 fn size([lo, hi]: &[[f32; 3]; 2]) -> String {
-    let [x, y, z] = std::array::from_fn(|k| number(f64::from(hi[k]) - f64::from(lo[k])));
+    let [x, y, z] = std::array::from_fn(|k| show_number(f64::from(hi[k]) - f64::from(lo[k])));
     format!("{x} × {y} × {z}")
 }
 
@@ -284,20 +265,5 @@ mod tests {
         let text = whole(&report, None).into_string();
         assert!(!text.contains("<img") && !text.contains('\u{202E}'), "{text}");
         assert_eq!(text.matches("&lt;img src=x").count(), 6, "title, heading, finding, reason, file, profile: {text}");
-    }
-
-    #[test]
-    fn numbers_have_five_digits() {
-        for (value, text) in [
-            (0.0, "0"),
-            (1234.567, "1234.6"),
-            (0.012_345_678, "0.012346"),
-            (-7.0, "-7.0000"),
-            (1e-9, "1.000e-9"),
-            (2.5e12, "2.500e12"),
-            (123_456.0, "123456"),
-        ] {
-            assert_eq!(number(value), text);
-        }
     }
 }

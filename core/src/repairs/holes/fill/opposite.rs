@@ -14,6 +14,7 @@ use crate::repairs::holes::patches::Placed;
 use crate::submesh::Submesh;
 use crate::submesh::components::Components;
 use crate::topology::survey::Survey;
+use crate::util::words::At;
 
 /// The largest holes are looked at, so many of them.
 const MOST_HOLES: usize = 256;
@@ -101,8 +102,10 @@ pub(super) fn doubt(submesh: &Submesh, holes: &[Hole<'_>]) -> Option<String> {
     let [a, b] = first.filter(|_| share > GOES_ON)?;
     Some(format!(
         "holes lie opposite each other, {count} × two, and were closed each for itself: {:.1} % of the body lies between them, a way through or a pin that \
-         may have lost its walls, as between {a:?} and {b:?}",
-        share * 100.0
+         may have lost its walls, as between {} and {}",
+        share * 100.0,
+        At(a),
+        At(b)
     ))
 }
 

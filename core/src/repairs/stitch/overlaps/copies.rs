@@ -17,6 +17,7 @@ use crate::repairs::stitch::layer::{Facet, Layer, Reach, RimEdge, around};
 use crate::submesh::Submesh;
 use crate::submesh::near::Tolerance;
 use crate::topology::survey::Survey;
+use crate::util::words::At;
 
 /// Sheets that are copies.
 pub(crate) const REPAIR: Repair = Repair {
@@ -60,7 +61,8 @@ fn drop_copies(survey: &mut Survey<'_>, work: &mut Work<'_>, tolerance: &Toleran
             if share > BETWEEN {
                 let (share, at) = (share * 100.0, pieces.list()[sheet as usize].bounds.lo);
                 doubts.push(format!(
-                    "surface was drawn twice, {share:.1} % of the body's volume apart, from {at:?} on: the drawing that is nearly closed was kept"
+                    "surface was drawn twice, {share:.1} % of the body's volume apart, from {} on: the drawing that is nearly closed was kept",
+                    At(at)
                 ));
             }
             cuts.push(cut);

@@ -22,6 +22,7 @@ use crate::config::Config;
 use crate::create;
 use crate::folder::Folder;
 use crate::fsx::Identity;
+use crate::past::Unread;
 use crate::protocol::Request;
 use crate::publish::{Conclusion, Desk, OUTPUT, discard};
 use crate::publish_error::PublishError;
@@ -62,6 +63,8 @@ pub(crate) struct Context {
     pub not_good: Arc<AtomicBool>,
     /// By hot folder: what of it is out of reach, and why.
     pub away: Mutex<BTreeMap<String, Vec<String>>>,
+    /// What earlier stores left and was not read yet.
+    pub unread: Unread,
     /// The store failed; every thread ends.
     pub failed: Mutex<Option<StoreError>>,
 }

@@ -27,6 +27,7 @@ mod names;
 mod naming;
 mod orders;
 mod own_profile;
+mod past;
 mod place;
 mod profiles;
 mod protocol;

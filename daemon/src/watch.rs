@@ -25,6 +25,8 @@ use crate::folder::{Folder, FolderError, is_fading};
 use crate::fsx;
 use crate::ground::{note_traces, read_traces};
 use crate::keeper::Keeper;
+use crate::past::Unread;
+use crate::publish_error::PublishError;
 use crate::retention::sweep::Sweeper;
 use crate::retention::turns::Moment;
 use crate::say::complain;
@@ -201,6 +203,10 @@ impl Daemon {
 
     fn live(&self) -> End {
         let (events, inbox) = unbounded();
+        let unread = match Unread::of(&*self.store, &self.folders) {
+            Ok(unread) => unread,
+            Err(error) => return End::Store(error),
+        };
         let context = Context {
             store: Arc::clone(&self.store) as Arc<dyn JobStore>,
             folders: self.folders.clone(),
@@ -211,6 +217,7 @@ impl Daemon {
             halt: AtomicBool::new(false),
             not_good: Arc::clone(&self.not_good),
             away: Mutex::default(),
+            unread,
             failed: Mutex::new(None),
         };
         if let Err(error) = guarded(|| recover(&context)) {
@@ -402,6 +409,14 @@ fn recover(context: &Context) -> Result<(), StoreError> {
             return Ok(());
         }
     }
+    // Before anything is cleared away: what is under way is known by its work folder.
+    for folder in context.folders.iter().filter(|folder| folder.check().is_ok()) {
+        match context.unread.read(&*context.store, folder) {
+            Err(PublishError::Store(error)) => return Err(error),
+            Err(error) => tracing::error!(%error, "What an earlier job store left cannot be read; it is tried again."),
+            Ok(_) => {}
+        }
+    }
     let held: Vec<_> = context
         .store
         .list(&Query {
@@ -411,7 +426,7 @@ fn recover(context: &Context) -> Result<(), StoreError> {
         .iter()
         .filter_map(|job| job.work.map(|token| token.to_string()))
         .collect();
-    for folder in &context.folders {
+    for folder in context.folders.iter().filter(|folder| folder.check().is_ok() && !context.unread.has(folder)) {
         // Without jobs under claim, every folder in there is a left-over.
         for entry in std::fs::read_dir(folder.work_root()).into_iter().flatten().flatten() {
             if !held.iter().any(|token| entry.file_name().to_str() == Some(token)) {

@@ -24,6 +24,7 @@
 
 mod blame;
 mod kind;
+mod past;
 mod pauses;
 mod priority;
 mod state;
@@ -33,6 +34,7 @@ mod tests;
 
 pub use blame::{Blame, CHARGES, DEATHS_ALONE, DEATHS_TO_SUSPECT, Death, KILLS_FREE, Testimony};
 pub use kind::Kind;
+pub use past::{Past, Reached};
 pub use pauses::{BACKOFF_CAP_MS, BACKOFF_MS, ENVIRONMENT_RETRIES, PARK_CAP_MS, PARK_MS, WAIT_MS};
 pub use priority::{AGEING_MS, NoPriority, Priority};
 pub use state::{Area, Duty, Ending, Hold, Job, MAX_REASON, Parked, Publication, Source, State, Step, Withdrawal, one_line};

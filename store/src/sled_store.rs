@@ -10,8 +10,8 @@
 //! | `db.trial/`      | only while a damaged database is being examined                                                    |
 //! | `corrupt-<ms>/`  | a damaged database that was replaced; for people                                                   |
 //!
-//! Trees `folders` and `outbox` are reserved. Values are records (`crate::record`: magic, schema version, checksum, JSON, at most
-//! 4 KiB); whatever is larger (reports, meshes) is a file elsewhere.
+//! Trees `folders` and `outbox` are reserved. Values are records (`crate::record`: magic, schema version, checksum, JSON, little more
+//! than 4 KiB at most); whatever is larger (reports, meshes) is a file elsewhere.
 //!
 //! **Durable** means: transaction over the trees, then `flush`, then `fdatasync` of the database file through a handle of our own,
 //! since sled's flush is a `sync_file_range`, which neither empties the drive's cache nor orders anything. Transitions of several
@@ -33,7 +33,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::id::{Clock, JobId, Recipe, SystemClock};
-use crate::job::{Job, Kind, Step, Testimony};
+use crate::job::{Job, Kind, Past, Step, Testimony};
 use crate::queue::Queue;
 use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted, Waiting};
 
@@ -166,6 +166,18 @@ impl JobStore for SledStore {
 
     fn forget(&self, ids: &[JobId]) -> Result<u64, StoreError> {
         self.queue.forget(ids)
+    }
+
+    fn is_unfilled(&self) -> Result<bool, StoreError> {
+        self.queue.is_unfilled()
+    }
+
+    fn restore(&self, past: &[Past]) -> Result<Vec<JobId>, StoreError> {
+        self.queue.restore(past)
+    }
+
+    fn set_filled(&self) -> Result<(), StoreError> {
+        self.queue.set_filled()
     }
 
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {

@@ -5,6 +5,8 @@
 
 #[path = "crash/deaths.rs"]
 mod deaths;
+#[path = "crash/lost.rs"]
+mod lost;
 
 use std::collections::BTreeMap;
 use std::os::unix::process::ExitStatusExt;

@@ -34,6 +34,7 @@ mod protocol;
 mod publish;
 mod publish_error;
 mod reach;
+mod rebuild;
 mod receipt;
 mod remove;
 mod retention;

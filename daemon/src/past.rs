@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use suture_store::job::Area;
-use suture_store::{Job, JobId, JobStore, Past, Publication, Query, RelPath, StoreError, Token};
+use suture_store::{Job, JobId, JobStore, Past, Publication, Query, Reached, RelPath, StoreError, Token};
 
 use crate::folder::{Folder, is_hot};
 use crate::fsx;
@@ -31,6 +31,14 @@ const DEPTH: usize = 64;
 /// Hot folders in which an earlier store may have left something that was not read yet.
 #[derive(Debug, Default)]
 pub(crate) struct Unread(Mutex<BTreeSet<String>>);
+
+/// Which jobs are taken in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Which {
+    All,
+    /// Those of which nothing is left to do: what is, is the daemon's, which knows how the folder is served.
+    AtRest,
+}
 
 impl Unread {
     /// All of them, if the store was begun anew.
@@ -62,7 +70,7 @@ impl Unread {
             return Ok(0);
         }
         orders::forget_mark(folder).map_err(io_at(&folder.root))?;
-        let jobs = fill(store, folder)?;
+        let jobs = fill(store, folder, Which::All)?;
         if jobs > 0 {
             tracing::info!(folder = %folder.root.display(), jobs, "The job store is a new one; what earlier ones knew was read from receipts.");
         }
@@ -108,7 +116,7 @@ fn place_of(area: Area) -> &'static str {
 ///
 /// # Errors
 /// As [`Unread::read`].
-fn fill(store: &dyn JobStore, folder: &Folder) -> Result<usize, PublishError> {
+pub(crate) fn fill(store: &dyn JobStore, folder: &Folder, which: Which) -> Result<usize, PublishError> {
     let mut known = BTreeSet::new();
     each_job(store, &mut |job| {
         if job.source.folder == folder.name {
@@ -117,9 +125,11 @@ fn fill(store: &dyn JobStore, folder: &Folder) -> Result<usize, PublishError> {
             known.extend(job.publication().map(|publication| key(&job.source.path, publication)).into_iter().chain(earlier));
         }
     })?;
-    let mut filling = Filling { store, folder, known, waiting: Vec::new(), taken: 0 };
+    let mut filling = Filling { store, folder, which, known, waiting: Vec::new(), taken: 0 };
     filling.placed()?;
-    filling.on_the_way()?;
+    if which == Which::All {
+        filling.on_the_way()?;
+    }
     filling.take_in()?;
     Ok(filling.taken)
 }
@@ -135,6 +145,7 @@ struct Found {
 struct Filling<'a> {
     store: &'a dyn JobStore,
     folder: &'a Folder,
+    which: Which,
     known: BTreeSet<(&'static str, RelPath)>,
     waiting: Vec<Past>,
     taken: usize,
@@ -183,7 +194,8 @@ impl Filling<'_> {
     }
 
     fn add(&mut self, past: Past) -> Result<(), PublishError> {
-        if !self.known.insert(key(&past.source.path, &past.publication)) {
+        let is_wanted = self.which == Which::All || past.reached == Reached::Ended;
+        if !is_wanted || !self.known.insert(key(&past.source.path, &past.publication)) {
             return Ok(());
         }
         self.waiting.push(past);

@@ -8,7 +8,7 @@
 //! | `SEQ`            | how far the store got: `suture-seq 1 <epoch> <transition> <crc32>`; see below                      |
 //! | `db/`            | the sled database: trees `meta`, `jobs`, `by_state`, `by_key`, `by_recipe`: see [`crate::queue`]   |
 //! | `db.trial/`      | only while a damaged database is being examined                                                    |
-//! | `corrupt-<ms>/`  | a damaged database that was replaced; for people                                                   |
+//! | `corrupt-<ms>/`  | a damaged database that was replaced, alone or with its `SEQ`; for people                          |
 //!
 //! Trees `folders` and `outbox` are reserved. Values are records (`crate::record`: magic, schema version, checksum, JSON, little more
 //! than 4 KiB at most); whatever is larger (reports, meshes) is a file elsewhere.
@@ -98,6 +98,16 @@ impl SledStore {
     /// [`StoreError::Locked`] while a daemon owns the folder; else as [`SledStore::open`].
     pub fn peek(state: &Path) -> Result<Vec<Job>, StoreError> {
         open::peek(state)
+    }
+
+    /// Moves a database that cannot be trusted aside, with the mark of how far it got, so that a new one can be begun; where they are now.
+    /// `None`: the database is sound, and nothing was changed.
+    ///
+    /// # Errors
+    /// [`StoreError::Locked`] while a daemon owns the folder; else whatever keeps it from being looked at, or moved.
+    pub fn set_aside(state: &Path) -> Result<Option<PathBuf>, StoreError> {
+        let _lock = Lock(files::lock(state)?);
+        open::set_untrusted_aside(state, &(Arc::new(SystemClock) as Arc<dyn Clock>))
     }
 
     /// What the opening met.

@@ -251,7 +251,7 @@ pub enum StoreError {
     Poisoned { reason: String },
 
     /// A record is damaged: its checksum, its version or its content is wrong.
-    #[error("the job database holds a damaged record ({what}): {reason}")]
+    #[error("the job database holds a damaged record ({what}): {reason}; `suture jobs rebuild` begins a new one from receipts")]
     Corrupt { what: String, reason: String },
 
     /// The database was written by a newer version of this program.

@@ -18,6 +18,7 @@ mod e2e {
     mod orders;
     mod profiles;
     mod queue;
+    mod rebuild;
     mod retention;
     mod reuse;
     mod same_bytes;

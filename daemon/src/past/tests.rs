@@ -82,7 +82,7 @@ fn f06_jobs_come_back_with_their_endings() {
     let again = store.control(JobId(9), Control::Retry).unwrap();
     assert_eq!((again.kind(), again.original().0, again.attempts.0), (Kind::Queued, Area::Failed, 2));
     // Who reads once more, after a crash, finds nothing new; and a store that was not begun anew reads nothing.
-    assert_eq!(fill(&store, &hall.folder).unwrap(), 0);
+    assert_eq!(fill(&store, &hall.folder, Which::All).unwrap(), 0);
     hall.receipt("out/e.stl", 5, "e.stl", "clean", ",\"output\":\"e.stl\"");
     assert_eq!(hall.read(&store).len(), 4);
 }
@@ -151,6 +151,7 @@ fn f06_an_original_that_was_to_be_moved_is_moved() {
         hall.put(&format!("out/{name}.stl"), bytes.as_bytes());
     }
     let store = MemoryStore::default();
+    assert_eq!(fill(&store, &hall.folder, Which::AtRest).unwrap(), 3, "what is left to do is the daemon's");
     let kinds: Vec<_> = hall.read(&store).into_iter().map(|job| job.1).collect();
     assert_eq!(kinds, [Kind::Parked, Kind::Done, Kind::Done, Kind::Done]);
     let job = store.get(JobId(1)).unwrap().unwrap();

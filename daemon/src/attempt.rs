@@ -85,7 +85,8 @@ impl Context {
 
     /// Clears away what a parked job that was just given up had ready; `job` is the job as it was before.
     pub(crate) fn sweep(&self, job: &Job) {
-        if let (Kind::Parked, Some(folder)) = (job.kind(), self.folder(job)) {
+        // Another daemon may have the folder, and a work folder of that name in it.
+        if let (Kind::Parked, Some(folder)) = (job.kind(), self.folder(job).filter(|folder| folder.check().is_ok())) {
             discard(folder, job);
             remove_work(&folder.work(job.work_token()));
         }
@@ -193,7 +194,9 @@ impl<'a> Slot<'a> {
             // Its result is in there.
             return;
         }
-        remove_work(&folder.work(work));
+        if folder.check().is_ok() {
+            remove_work(&folder.work(work));
+        }
         crash_point("daemon.swept");
         match &job.state {
             State::Ended { publication } if !publication.ending.is_good() => self.context.not_good.store(true, Ordering::Relaxed),
@@ -231,6 +234,8 @@ impl<'a> Slot<'a> {
     fn attempt(&mut self, folder: &Folder, token: &Claim, job: &Job, turn: Turn) -> Result<Option<Job>, PublishError> {
         let context = self.context;
         let work = folder.work(token.token);
+        // The token is new: a folder of that name was left by the daemon of another store, which had the hot folder before.
+        remove_work(&work);
         let step = match claim(folder, job, &work) {
             Err(Unclaimed::Withdrawn(why)) => {
                 // Of the right folder.

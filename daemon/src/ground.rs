@@ -54,6 +54,17 @@ pub(crate) struct Trace {
 }
 
 impl Trace {
+    /// What tells a folder that another daemon serves, as far as can be seen.
+    ///
+    /// # Errors
+    /// As the file system's.
+    pub(crate) fn of_other(root: &Path) -> io::Result<Self> {
+        let here = device(root);
+        let apart = PARTS.iter().filter(|part| device(&root.join(part)).is_some_and(|part| Some(part) != here));
+        let apart = apart.map(|part| (*part).to_owned()).collect();
+        Ok(Self { mark: read_mark(root).unwrap_or_default(), mount: mount_of(root)?, apart })
+    }
+
     /// Is it this folder that the path leads to?
     pub(crate) fn leads_here(&self, root: &Path) -> bool {
         read_mark(root).is_some_and(|mark| mark == self.mark)

@@ -64,20 +64,17 @@ pub(crate) fn run(args: &WatchArgs) -> Exit {
 /// was started with.
 pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew: bool) -> Exit {
     let config = settings.now();
-    let (mut folders, known) = (Vec::new(), read_traces(&config.state));
-    for folder in &config.folders {
-        match Folder::open(folder, known.get(&folder.name)) {
-            Ok(folder) => folders.push(Arc::new(folder)),
-            Err(error) => {
-                complain(&error);
-                return match &error {
-                    FolderError::Owned { .. } => Exit::Owned,
-                    FolderError::Within { .. } | FolderError::Mixed { .. } => Exit::Refused,
-                    FolderError::Io { source, .. } => Exit::of_start(source),
-                };
-            }
+    let folders = match open_folders(&config) {
+        Ok(folders) => folders,
+        Err(error) => {
+            complain(&error);
+            return match &error {
+                FolderError::Owned { .. } => Exit::Owned,
+                FolderError::Within { .. } | FolderError::Mixed { .. } => Exit::Refused,
+                FolderError::Io { source, .. } => Exit::of_start(source),
+            };
         }
-    }
+    };
     let (lives, not_good) = (Lives::so_far(), Arc::<AtomicBool>::default());
     if let Err(error) = watch_store(lives, &not_good, stop, may_begin_anew) {
         complain(&format_args!("no thread can be started: {error}; try again, or raise the limit of processes"));
@@ -96,6 +93,26 @@ pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew:
     let settings = Arc::new(settings);
     let daemon = Daemon { settings, folders, store, once, lives, not_good, stop: stop.clone(), may_begin_anew };
     daemon.run()
+}
+
+/// Takes the folders that are to be served. One that another daemon serves is away, as long as there is one that is not.
+fn open_folders(config: &Config) -> Result<Vec<Arc<Folder>>, FolderError> {
+    let (mut folders, mut owned, known) = (Vec::new(), None, read_traces(&config.state));
+    let mut served = 0;
+    for folder in &config.folders {
+        let opened = match Folder::open(folder, known.get(&folder.name)) {
+            Err(error @ FolderError::Owned { .. }) => {
+                owned.get_or_insert(error);
+                Folder::of_other(folder)?
+            }
+            opened => opened.inspect(|_| served += 1)?,
+        };
+        folders.push(Arc::new(opened));
+    }
+    match owned {
+        Some(error) if served == 0 => Err(error),
+        _ => Ok(folders),
+    }
 }
 
 /// When a call into the job database hangs, the program begins anew, if it may, or ends.
@@ -385,7 +402,8 @@ fn guarded(work: impl FnOnce() -> Result<(), StoreError>) -> Result<(), StoreErr
 
 /// Takes up what an earlier life left, and clears its work folders away.
 fn recover(context: &Context) -> Result<(), StoreError> {
-    let folder = |name: &str| context.folders.iter().find(|folder| folder.name == name);
+    // What lies in a folder that is another daemon's for now tells nothing of this one's jobs.
+    let folder = |name: &str| context.folders.iter().find(|folder| folder.name == name && folder.check().is_ok());
     let testimony = |job: &suture_store::Job| {
         let work = job.work.and_then(|work| Some(folder(&job.source.folder)?.work(work)));
         let there = |name: &str| work.as_ref().is_some_and(|work| fsx::exists(&work.join(name)).unwrap_or(false));

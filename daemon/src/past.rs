@@ -179,7 +179,11 @@ impl Filling<'_> {
     /// Those whose receipts are in the folders of their attempts still.
     fn on_the_way(&mut self) -> Result<(), PublishError> {
         let root = self.folder.work_root();
-        let entries: Vec<_> = std::fs::read_dir(&root).and_then(Iterator::collect).map_err(io_at(&root))?;
+        let entries: Vec<_> = match std::fs::read_dir(&root).and_then(Iterator::collect) {
+            // It is made where it is needed.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+            entries => entries.map_err(io_at(&root))?,
+        };
         for entry in entries {
             let Some(token) = entry.file_name().to_str().and_then(|name| name.parse().ok()).map(Token) else { continue };
             let path = entry.path().join(RECEIPT_FILE);

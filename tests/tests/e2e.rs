@@ -10,6 +10,7 @@ mod e2e {
     mod files;
     mod hostile;
     mod interrupted;
+    mod json;
     mod lost_state;
     mod malformed;
     mod many;

@@ -22,6 +22,7 @@ use crate::config::Config;
 use crate::create;
 use crate::folder::Folder;
 use crate::fsx::Identity;
+use crate::past::Unread;
 use crate::protocol::Request;
 use crate::publish::{Conclusion, Desk, OUTPUT, discard};
 use crate::publish_error::PublishError;
@@ -62,6 +63,8 @@ pub(crate) struct Context {
     pub not_good: Arc<AtomicBool>,
     /// By hot folder: what of it is out of reach, and why.
     pub away: Mutex<BTreeMap<String, Vec<String>>>,
+    /// What earlier stores left and was not read yet.
+    pub unread: Unread,
     /// The store failed; every thread ends.
     pub failed: Mutex<Option<StoreError>>,
 }
@@ -82,7 +85,8 @@ impl Context {
 
     /// Clears away what a parked job that was just given up had ready; `job` is the job as it was before.
     pub(crate) fn sweep(&self, job: &Job) {
-        if let (Kind::Parked, Some(folder)) = (job.kind(), self.folder(job)) {
+        // Another daemon may have the folder, and a work folder of that name in it.
+        if let (Kind::Parked, Some(folder)) = (job.kind(), self.folder(job).filter(|folder| folder.check().is_ok())) {
             discard(folder, job);
             remove_work(&folder.work(job.work_token()));
         }
@@ -190,7 +194,9 @@ impl<'a> Slot<'a> {
             // Its result is in there.
             return;
         }
-        remove_work(&folder.work(work));
+        if folder.check().is_ok() {
+            remove_work(&folder.work(work));
+        }
         crash_point("daemon.swept");
         match &job.state {
             State::Ended { publication } if !publication.ending.is_good() => self.context.not_good.store(true, Ordering::Relaxed),
@@ -228,6 +234,8 @@ impl<'a> Slot<'a> {
     fn attempt(&mut self, folder: &Folder, token: &Claim, job: &Job, turn: Turn) -> Result<Option<Job>, PublishError> {
         let context = self.context;
         let work = folder.work(token.token);
+        // The token is new: a folder of that name was left by the daemon of another store, which had the hot folder before.
+        remove_work(&work);
         let step = match claim(folder, job, &work) {
             Err(Unclaimed::Withdrawn(why)) => {
                 // Of the right folder.

@@ -392,6 +392,8 @@ pub(crate) enum JobsCommand {
     Resume,
     /// Pause, and wait until no job is in work any more: the machine may be switched off then
     Drain,
+    /// Keep a damaged job store aside, and begin a new one from the receipts beside the results; no daemon may run
+    Rebuild,
 }
 
 #[cfg(test)]

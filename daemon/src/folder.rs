@@ -48,6 +48,17 @@ impl Folder {
         Ok(Self { name, root, leave_originals, ground: Mutex::new(ground) })
     }
 
+    /// One that another daemon serves: it is away until that one lets go of it.
+    ///
+    /// # Errors
+    /// When it cannot be looked at.
+    pub(crate) fn of_other(config: &FolderConfig) -> Result<Self, FolderError> {
+        let io = |source| FolderError::Io { path: config.path.clone(), action: "cannot be looked at", source };
+        let root = std::path::absolute(&config.path).map_err(io)?;
+        let trace = Trace::of_other(&root).map_err(io)?;
+        Ok(Self { name: config.name.clone(), root, leave_originals: config.leave_originals, ground: Mutex::new(Err(trace)) })
+    }
+
     fn ground(&self) -> MutexGuard<'_, Result<Ground, Trace>> {
         self.ground.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -286,8 +297,14 @@ mod tests {
             Err(FolderError::Owned { pid, .. }) => assert_eq!(pid, Some(std::process::id())),
             other => panic!("{other:?}"),
         }
+        let other = Folder::of_other(&config).unwrap();
+        let why = [other.check(), other.regain()].map(Result::unwrap_err);
+        assert!(why[1].contains("is served by another daemon"), "{why:?}");
         drop(first);
-        Folder::open(&config, None).unwrap();
+        assert!(other.check().is_err(), "it is not taken by a look");
+        other.regain().unwrap();
+        other.check().unwrap();
+        assert!(matches!(Folder::open(&config, None), Err(FolderError::Owned { .. })));
     }
 
     /// D5: neither a folder that was made anew under the old name nor a store that was removed is taken for the one that was opened.

@@ -54,6 +54,22 @@ pub(crate) struct Trace {
 }
 
 impl Trace {
+    /// What tells a folder that another daemon serves, as far as can be seen.
+    ///
+    /// # Errors
+    /// As the file system's.
+    pub(crate) fn of_other(root: &Path) -> io::Result<Self> {
+        let here = device(root)?;
+        let mut apart = Vec::new();
+        for part in PARTS {
+            let there = device(&root.join(part))?;
+            if there.is_some() && there != here {
+                apart.push(part.to_owned());
+            }
+        }
+        Ok(Self { mark: read_mark(root)?.unwrap_or_default(), mount: mount_of(root)?, apart })
+    }
+
     /// Is it this folder that the path leads to?
     ///
     /// # Errors

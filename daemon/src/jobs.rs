@@ -15,6 +15,7 @@ use crate::control::{DaemonWish, JobsWish};
 use crate::exit::Exit;
 use crate::fsx;
 use crate::reach::{self, Failure};
+use crate::rebuild::{Rebuilt, rebuild};
 use crate::receipt::REPORT;
 use crate::say::{complain, plain};
 use crate::schedule::Standing;
@@ -26,6 +27,7 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
         JobsCommand::Pause => return paused(&args.dir, true),
         JobsCommand::Resume => return paused(&args.dir, false),
         JobsCommand::Drain => return drained(&args.dir),
+        JobsCommand::Rebuild => return rebuilt(&args.dir),
         JobsCommand::List { .. } => JobsWish::List,
         JobsCommand::Show { id } => JobsWish::Show(JobId(*id)),
         JobsCommand::Retry { id } => JobsWish::Retry(JobId(*id)),
@@ -89,6 +91,17 @@ fn drained(dir: &Path) -> Exit {
             Err(failure) => return fail(&failure),
         }
         wish = DaemonWish::Standing;
+    }
+}
+
+/// Begins a new store in the place of a damaged one.
+fn rebuilt(dir: &Path) -> Exit {
+    match rebuild(dir) {
+        Ok(Rebuilt { aside, jobs }) => say(&format!(
+            "{jobs} jobs came back from receipts; the damaged store is kept in {}. The next `suture watch` takes up what waits in in/",
+            plain(&aside.display().to_string())
+        )),
+        Err(failure) => fail(&failure),
     }
 }
 

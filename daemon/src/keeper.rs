@@ -17,6 +17,8 @@ use crate::folder::{Folder, is_meant};
 use crate::fsx;
 use crate::hints::{Watching, watcher};
 use crate::orders::Orders;
+use crate::past::each_job;
+use crate::publish_error::PublishError;
 use crate::scan::Reconciler;
 use crate::schedule::Hold;
 use crate::settings::Reload;
@@ -37,8 +39,6 @@ const IDLE_ONCE: Duration = Duration::from_millis(20);
 const DISK_EVERY: Duration = Duration::from_secs(5);
 /// With `--once`, a result that cannot be brought into place is tried so often before it is left for the next run.
 const TRIES_ONCE: u32 = 4;
-/// Jobs that are read at a time.
-const PAGE: usize = 1000;
 
 /// The thread that looks after the folders.
 pub(crate) struct Keeper<'a> {
@@ -240,20 +240,8 @@ impl<'a> Keeper<'a> {
     /// Orders of an earlier life, some of which may lack their summary; and originals that were left in their places, which the store knows by
     /// their device, and that may be another one by now.
     fn remember_past(&mut self) -> Result<(), StoreError> {
-        let (now, mut after) = (Instant::now(), JobId(0));
-        loop {
-            let page = self.context.store.list(&Query { after, limit: PAGE, ..Query::default() })?;
-            let Some(last) = page.last() else { return Ok(()) };
-            after = last.id;
-            for job in &page {
-                if let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == job.source.folder) {
-                    kept.orders.remember(job, now);
-                    if job.kind().is_at_rest() && job.answers_for_source() {
-                        kept.reconciler.known(&job.source, job.id);
-                    }
-                }
-            }
-        }
+        let (now, folders) = (Instant::now(), &mut self.folders);
+        each_job(&*self.context.store, &mut |job| folders.iter_mut().for_each(|kept| kept.remember(job, now)))
     }
 
     /// The configuration was read anew: what of it the keeper works by, and what may go on now. Says what came of it, in one line.
@@ -370,8 +358,33 @@ impl Kept {
         (self.reconciler.rest, self.rescan) = pace(context, self.polled);
     }
 
-    fn scan(&mut self, context: &Context, now: Instant) {
-        let here = self.folder.check().or_else(|_| self.folder.regain());
+    /// A job of an earlier life, if it is of this folder.
+    fn remember(&mut self, job: &Job, now: Instant) {
+        if job.source.folder == self.folder.name {
+            self.orders.remember(job, now);
+            if job.kind().is_at_rest() && job.answers_for_source() {
+                self.reconciler.known(&job.source, job.id);
+            }
+        }
+    }
+
+    /// Reads what earlier stores left, in a folder that was away when the daemon began.
+    fn recall(&mut self, context: &Context, now: Instant) -> Result<(), PublishError> {
+        if context.unread.read(&*context.store, &self.folder)? > 0 {
+            each_job(&*context.store, &mut |job| self.remember(job, now))?;
+            context.schedule.news();
+        }
+        Ok(())
+    }
+
+    fn scan(&mut self, context: &Context, now: Instant) -> Result<(), StoreError> {
+        let mut here = self.folder.check().or_else(|_| self.folder.regain());
+        if here.is_ok() {
+            here = match self.recall(context, now) {
+                Err(PublishError::Store(error)) => return Err(error),
+                read => read.map_err(|error| error.to_string()),
+            };
+        }
         let found = here.and_then(|()| self.reconciler.scan(now).map_err(|error| self.unreadable(&error)));
         let away = match &found {
             Ok(_) => self.reconciler.left_out(),
@@ -393,6 +406,7 @@ impl Kept {
                 }
             }
         }
+        Ok(())
     }
 
     fn unreadable(&self, error: &io::Error) -> String {
@@ -413,7 +427,7 @@ impl Kept {
         if due {
             self.scanned = Some(now);
             self.dirty = false;
-            self.scan(context, now);
+            self.scan(context, now)?;
             self.scan_takes = now.elapsed();
             if !self.renamed.is_empty() {
                 // Known now, so that it can count; and to be looked at at once.

@@ -167,6 +167,14 @@ fn mark_of(folder: &Folder) -> PathBuf {
     folder.root.join(".suture").join("orders")
 }
 
+/// Forgets which transitions are in summaries: they were another store's.
+///
+/// # Errors
+/// As `unlink`.
+pub(crate) fn forget_mark(folder: &Folder) -> io::Result<()> {
+    fsx::remove_if_there(&mark_of(folder))
+}
+
 /// Nothing, where none can be read: then all orders are looked at.
 fn read_mark(path: &Path) -> Seq {
     let text = std::fs::read_to_string(path).unwrap_or_default();

@@ -33,6 +33,9 @@ pub(crate) enum Placed {
     Missing,
 }
 
+/// Says of an original's hidden name that it was set aside there.
+pub(crate) const ASIDE: &str = "aside";
+
 /// The hidden name of a job's file on its way into `folder`; `what` tells the files of a job apart.
 pub(crate) fn stage(folder: &Path, job: Token, what: &str) -> PathBuf {
     folder.join(OsString::from(format!(".suture-{job}-{what}.tmp")))
@@ -128,7 +131,7 @@ impl Move<'_> {
     /// As `rename`, `link`, and copying.
     pub(crate) fn run(&self) -> io::Result<Placed> {
         let stage = stage(fsx::folder_of(self.to), self.work, "original");
-        let aside = self::stage(fsx::folder_of(self.from), self.work, "aside");
+        let aside = self::stage(fsx::folder_of(self.from), self.work, ASIDE);
         if fsx::exists(&self.mark())? {
             if self.is_ours(&aside)? {
                 std::fs::remove_file(&aside)?;

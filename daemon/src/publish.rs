@@ -32,7 +32,7 @@ use crate::superseded;
 /// Names of an attempt's files in its folder.
 pub(crate) const OUTPUT: &str = "out.stl";
 const REPORT_FILE: &str = "report.json";
-const RECEIPT_FILE: &str = "receipt.json";
+pub(crate) const RECEIPT_FILE: &str = "receipt.json";
 
 /// What came of the work, before names are chosen.
 pub(crate) enum Conclusion {
@@ -156,8 +156,13 @@ impl<'a> Desk<'a> {
             folder: &job.source.folder,
             source: job.source.path.to_string(),
             source_bytes: job.source.size,
+            source_mtime_ns: job.source.mtime_ns,
             source_blake3,
             profile: &job.source.profile,
+            moved_from: &job.moved_to,
+            original: p.original.as_ref().filter(|_| !p.stays),
+            stays: p.stays,
+            work: job.work_token(),
             output: p.output.as_ref().map(ToString::to_string),
             output_blake3: p.output_hash,
             report_blake3: p.report_hash,

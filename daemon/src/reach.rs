@@ -116,7 +116,8 @@ pub(crate) fn state_of(dir: &Path) -> io::Result<PathBuf> {
     }
 }
 
-fn unseen(path: &Path, error: &io::Error) -> Failure {
+/// Nothing can be told of a path: try again.
+pub(crate) fn unseen(path: &Path, error: &io::Error) -> Failure {
     Failure::try_again(format!("{}: cannot be looked at: {error}; try again", path.display()))
 }
 

@@ -1,13 +1,14 @@
 //! The small files that stand beside a result: the receipt (which job made it, from what, into what), and the report of a file
 //! for which the engine has none to give. With them the file system alone tells what was done, whatever becomes of the store.
 
-use std::io::BufReader;
+use std::io::{self, BufReader};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use suture_core::Report;
 use suture_core::report::SCHEMA_VERSION;
-use suture_store::{Ending, Hash, Job, JobId, RelPath};
+use suture_store::job::Area;
+use suture_store::{Ending, Hash, Job, JobId, RelPath, Token};
 
 use crate::create;
 
@@ -31,9 +32,21 @@ pub(crate) struct Receipt<'a> {
     pub folder: &'a str,
     pub source: String,
     pub source_bytes: u64,
+    /// Its last modification, in nanoseconds since 1970.
+    pub source_mtime_ns: i64,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub source_blake3: Option<Hash>,
     pub profile: &'a str,
+    /// Where the original was, if that is not where it was dropped (after a retry).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub moved_from: &'a Option<(Area, RelPath)>,
+    /// Where it goes: its name in the area of the ending, unless it stays where it was dropped.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub original: Option<&'a RelPath>,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub stays: bool,
+    /// The folder of `.suture/work/` in which the attempt's files are until each is in its place.
+    pub work: Token,
     /// Name of the result: below `out/` when it is good, else beside this receipt.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub output: Option<String>,
@@ -76,18 +89,50 @@ pub(crate) struct Told {
     #[serde(default)]
     pub folder: String,
     #[serde(default)]
-    pub source: String,
+    pub source: Option<RelPath>,
     pub output: Option<RelPath>,
     pub output_blake3: Option<Hash>,
     pub report_blake3: Option<Hash>,
+    #[serde(default)]
+    pub attempt: u32,
+    pub ending: Option<Ending>,
+    #[serde(default)]
+    pub reason: String,
+    #[serde(default)]
+    pub source_bytes: u64,
+    pub source_mtime_ns: Option<i64>,
+    pub source_blake3: Option<Hash>,
+    #[serde(default)]
+    pub profile: String,
+    pub moved_from: Option<(Area, RelPath)>,
+    pub original: Option<RelPath>,
+    #[serde(default)]
+    pub stays: bool,
+    pub work: Option<Token>,
+    pub reused: Option<JobId>,
 }
 
 /// The receipt in a file; `None` where there is none, or one of another version. A link is not followed.
 pub(crate) fn read(path: &Path) -> Option<Told> {
-    let file = create::open_to_read(path).ok()?;
-    let fits = file.metadata().is_ok_and(|meta| meta.is_file() && meta.len() <= LONGEST);
-    let told: Told = fits.then(|| serde_json::from_reader(BufReader::new(file)).ok())??;
-    (told.receipt_version == RECEIPT_VERSION).then_some(told)
+    try_read(path).ok()
+}
+
+/// The same, and why there is none.
+///
+/// # Errors
+/// As `open` and `read`; of kind `InvalidData` or `UnexpectedEof` where the file is no receipt of this version.
+pub(crate) fn try_read(path: &Path) -> io::Result<Told> {
+    let file = create::open_to_read(path)?;
+    let meta = file.metadata()?;
+    let damaged = |why: &str| io::Error::new(io::ErrorKind::InvalidData, why.to_owned());
+    if !meta.is_file() || meta.len() > LONGEST {
+        return Err(damaged("it is no receipt"));
+    }
+    let told: Told = serde_json::from_reader(BufReader::new(file))?;
+    match told.receipt_version {
+        RECEIPT_VERSION => Ok(told),
+        other => Err(damaged(&format!("it has version {other}; this program knows version {RECEIPT_VERSION}"))),
+    }
 }
 
 /// The report of a file that never got as far as the engine's own: unreadable, refused, put off for good, or quarantined.

@@ -19,7 +19,7 @@ pub(crate) fn clear(folder: &Folder, job: &Job) {
     let base = root.join(path.to_path());
     let receipt = with_suffix(&base, RECEIPT);
     let Some(told) = receipt::read(&receipt) else { return };
-    if (told.job, &told.folder, &told.source) != (job.id.0, &job.source.folder, &job.source.path.to_string()) {
+    if (told.job, &told.folder, told.source.as_ref()) != (job.id.0, &job.source.folder, Some(&job.source.path)) {
         return;
     }
     let best = told.output.filter(|output: &RelPath| *output == best_of(path)).map(|output| root.join(output.to_path()));

@@ -25,6 +25,8 @@ use crate::folder::{Folder, FolderError, is_fading};
 use crate::fsx;
 use crate::ground::{note_traces, read_traces};
 use crate::keeper::Keeper;
+use crate::past::Unread;
+use crate::publish_error::PublishError;
 use crate::retention::sweep::Sweeper;
 use crate::retention::turns::Moment;
 use crate::say::complain;
@@ -62,7 +64,7 @@ pub(crate) fn run(args: &WatchArgs) -> Exit {
 /// was started with.
 pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew: bool) -> Exit {
     let config = settings.now();
-    let folders = match open_all(&config) {
+    let folders = match open_folders(&config) {
         Ok(folders) => folders,
         Err(error) => {
             complain(&error);
@@ -93,10 +95,24 @@ pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew:
     daemon.run()
 }
 
-/// The hot folders, each taken or known to be away.
-fn open_all(config: &Config) -> Result<Vec<Arc<Folder>>, FolderError> {
-    let known = read_traces(&config.state)?;
-    config.folders.iter().map(|folder| Folder::open(folder, known.get(&folder.name)).map(Arc::new)).collect()
+/// Takes the folders that are to be served. One that another daemon serves is away, as long as there is one that is not.
+fn open_folders(config: &Config) -> Result<Vec<Arc<Folder>>, FolderError> {
+    let (mut folders, mut owned, known) = (Vec::new(), None, read_traces(&config.state)?);
+    let mut served = 0;
+    for folder in &config.folders {
+        let opened = match Folder::open(folder, known.get(&folder.name)) {
+            Err(error @ FolderError::Owned { .. }) => {
+                owned.get_or_insert(error);
+                Folder::of_other(folder)?
+            }
+            opened => opened.inspect(|_| served += 1)?,
+        };
+        folders.push(Arc::new(opened));
+    }
+    match owned {
+        Some(error) if served == 0 => Err(error),
+        _ => Ok(folders),
+    }
 }
 
 /// When a call into the job database hangs, the program begins anew, if it may, or ends.
@@ -204,6 +220,10 @@ impl Daemon {
 
     fn live(&self) -> End {
         let (events, inbox) = unbounded();
+        let unread = match Unread::of(&*self.store, &self.folders) {
+            Ok(unread) => unread,
+            Err(error) => return End::Store(error),
+        };
         let context = Context {
             store: Arc::clone(&self.store) as Arc<dyn JobStore>,
             folders: self.folders.clone(),
@@ -214,6 +234,7 @@ impl Daemon {
             halt: AtomicBool::new(false),
             not_good: Arc::clone(&self.not_good),
             away: Mutex::default(),
+            unread,
             failed: Mutex::new(None),
         };
         if let Err(error) = guarded(|| recover(&context)) {
@@ -384,7 +405,8 @@ fn guarded(work: impl FnOnce() -> Result<(), StoreError>) -> Result<(), StoreErr
 
 /// Takes up what an earlier life left, and clears its work folders away.
 fn recover(context: &Context) -> Result<(), StoreError> {
-    let folder = |name: &str| context.folders.iter().find(|folder| folder.name == name);
+    // What lies in a folder that is another daemon's for now tells nothing of this one's jobs.
+    let folder = |name: &str| context.folders.iter().find(|folder| folder.name == name && folder.check().is_ok());
     let testimony = |job: &suture_store::Job| {
         let work = job.work.and_then(|work| Some(folder(&job.source.folder)?.work(work)));
         let there = |name: &str| work.as_ref().is_some_and(|work| fsx::exists(&work.join(name)).unwrap_or(false));
@@ -408,6 +430,14 @@ fn recover(context: &Context) -> Result<(), StoreError> {
             return Ok(());
         }
     }
+    // Before anything is cleared away: what is under way is known by its work folder.
+    for folder in context.folders.iter().filter(|folder| folder.check().is_ok()) {
+        match context.unread.read(&*context.store, folder) {
+            Err(PublishError::Store(error)) => return Err(error),
+            Err(error) => tracing::error!(%error, "What an earlier job store left cannot be read; it is tried again."),
+            Ok(_) => {}
+        }
+    }
     let held: Vec<_> = context
         .store
         .list(&Query {
@@ -417,7 +447,7 @@ fn recover(context: &Context) -> Result<(), StoreError> {
         .iter()
         .filter_map(|job| job.work.map(|token| token.to_string()))
         .collect();
-    for folder in &context.folders {
+    for folder in context.folders.iter().filter(|folder| folder.check().is_ok() && !context.unread.has(folder)) {
         // Without jobs under claim, every folder in there is a left-over.
         for entry in std::fs::read_dir(folder.work_root()).into_iter().flatten().flatten() {
             if !held.iter().any(|token| entry.file_name().to_str() == Some(token)) {

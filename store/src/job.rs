@@ -18,12 +18,14 @@
 //! the file when the worker died of the file: a signal of its own making, the time limit, the memory limit. The second charge
 //! quarantines. A kill from outside is never charged, and a death of the machine (another boot id) never is.
 //! When the daemon dies, its running jobs are interrupted; after the second such death, or one of the machine, a job must run alone. Only
-//! a death of the daemon while it reads what the worker of a file that runs alone has to say is the file's ([`Testimony::InHand`]):
-//! [`DEATHS_ALONE`] of them, charges included, quarantine. A witness that the file was innocent (its worker outlived the daemon)
+//! a death of the daemon while it reads what the file's worker has to say is the file's ([`Testimony::InHand`]): after the first a job runs
+//! alone, and [`DEATHS_IN_HAND`] of them, charges included, quarantine, if [`DEATHS_ALONE`] of them were without company. So a file that
+//! kills the daemon has three attempts, and one that only ran beside it is cleared by its own next run. A witness that the file was innocent (its worker outlived the daemon)
 //! leaves no mark.
 
 mod blame;
 mod kind;
+mod past;
 mod pauses;
 mod priority;
 mod state;
@@ -31,8 +33,9 @@ mod step;
 #[cfg(test)]
 mod tests;
 
-pub use blame::{Blame, CHARGES, DEATHS_ALONE, DEATHS_TO_SUSPECT, Death, KILLS_FREE, Testimony};
+pub use blame::{Blame, CHARGES, DEATHS_ALONE, DEATHS_IN_HAND, DEATHS_TO_SUSPECT, Death, KILLS_FREE, Testimony};
 pub use kind::Kind;
+pub use past::{Past, Reached};
 pub use pauses::{BACKOFF_CAP_MS, BACKOFF_MS, ENVIRONMENT_RETRIES, PARK_CAP_MS, PARK_MS, WAIT_MS};
 pub use priority::{AGEING_MS, NoPriority, Priority};
 pub use state::{Area, Duty, Ending, Hold, Job, MAX_REASON, Parked, Publication, Source, State, Step, Withdrawal, one_line};

@@ -5,7 +5,7 @@ use std::ops::Bound;
 use std::sync::{Arc, RwLock};
 
 use crate::id::{Clock, Epoch, JobId, Recipe, Seq, SystemClock};
-use crate::job::{Job, Kind, Step, Testimony};
+use crate::job::{Job, Kind, Past, Step, Testimony};
 use crate::queue::Queue;
 use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted, Waiting};
 use crate::tables::{Put, Table, Tables, Visit};
@@ -134,6 +134,18 @@ impl JobStore for MemoryStore {
 
     fn forget(&self, ids: &[JobId]) -> Result<u64, StoreError> {
         self.queue.forget(ids)
+    }
+
+    fn is_unfilled(&self) -> Result<bool, StoreError> {
+        self.queue.is_unfilled()
+    }
+
+    fn restore(&self, past: &[Past]) -> Result<Vec<JobId>, StoreError> {
+        self.queue.restore(past)
+    }
+
+    fn set_filled(&self) -> Result<(), StoreError> {
+        self.queue.set_filled()
     }
 
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {

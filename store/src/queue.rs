@@ -2,7 +2,7 @@
 //!
 //! | table    | key                                                                     | value                     |
 //! |----------|-------------------------------------------------------------------------|---------------------------|
-//! | meta     | `head`                                                                  | [`Head`]                  |
+//! | meta     | `head`; `unfilled` (see `past`)                                         | [`Head`]; `true`          |
 //! | jobs     | job number                                                              | the [`Job`]               |
 //! | by_state | kind, then what that kind is searched by (see [`index`])                | nothing                   |
 //! | by_key   | identity of the file: device, inode, size, mtime, folder, path          | number of its latest job  |
@@ -18,8 +18,8 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use serde::{Deserialize, Serialize};
 
 use crate::crash::crash_point;
-use crate::id::{Clock, Epoch, JobId, Recipe, Seq, Time, Token};
-use crate::job::{Event, Illegal, Job, Kind, Source, State, Step, Testimony};
+use crate::id::{Clock, Epoch, JobId, Recipe, Seq, Token};
+use crate::job::{Event, Illegal, Job, Kind, Past, Source, State, Step, Testimony};
 use crate::path::MAX_SOURCE;
 use crate::record;
 use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted, Waiting};
@@ -29,6 +29,8 @@ mod forget;
 mod index;
 mod line;
 mod offered;
+mod past;
+mod recover;
 mod results;
 
 use line::{Line, Now};
@@ -38,6 +40,8 @@ pub(crate) const MAX_NAME: usize = 64;
 /// Jobs taken in by one transaction of the tables.
 const SUBMIT_CHUNK: usize = 1000;
 const HEAD: &[u8] = b"head";
+/// Is there in a store that was begun anew, as long as what earlier ones knew was not read.
+const UNFILLED: &[u8] = b"unfilled";
 
 /// What there is one of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -86,7 +90,9 @@ pub(crate) fn all_jobs(tables: &dyn Tables) -> Result<Vec<Job>, StoreError> {
 impl<T: Tables> Queue<T> {
     /// Begins a new epoch, durably, after checking every job that is not at rest.
     pub(crate) fn open(tables: T, clock: Arc<dyn Clock>) -> Result<Self, StoreError> {
-        let mut head = read_head(&tables)?.unwrap_or_default();
+        let earlier = read_head(&tables)?;
+        let unfilled = earlier.is_none().then(unfilled_put).transpose()?;
+        let mut head = earlier.unwrap_or_default();
         head.epoch.0 += 1;
         head.seq.0 += 1;
         let counts = index::count(&tables)?;
@@ -102,7 +108,7 @@ impl<T: Tables> Queue<T> {
             }
         }
         crash_point("store.open.checked");
-        queue.tables.write(vec![head_put(&head)?], head.seq)?;
+        queue.tables.write(unfilled.into_iter().chain([head_put(&head)?]).collect(), head.seq)?;
         crash_point("store.open.epoch");
         queue.tables.settle((head.epoch, head.seq))?;
         crash_point("store.open.done");
@@ -257,34 +263,6 @@ impl<T: Tables> Queue<T> {
         let id: JobId = record::decode(Table::ByKey, key, &bytes)?;
         Ok(self.job(id)?.filter(Job::answers_for_source).map(|job| job.id))
     }
-
-    /// Jobs under a claim of an earlier epoch.
-    fn orphans(&self, epoch: Epoch) -> Result<Vec<Job>, StoreError> {
-        let mut orphans = Vec::new();
-        for kind in Kind::ALL.into_iter().filter(|kind| kind.is_held()) {
-            for id in index::ids(&self.tables, kind)? {
-                let job = self.known(id)?;
-                if job.hold().is_some_and(|hold| hold.epoch < epoch) {
-                    orphans.push(job);
-                }
-            }
-        }
-        orphans.sort_by_key(|job| job.id);
-        Ok(orphans)
-    }
-
-    /// Parked jobs, before and after their pause was ended: with a new daemon there may be a new world.
-    fn wake_parked(&self, head: &mut Head, now: Time) -> Result<Vec<(Job, Job)>, StoreError> {
-        let mut woken = Vec::new();
-        for id in index::ids(&self.tables, Kind::Parked)? {
-            let before = self.known(id)?;
-            let mut after = before.after(&Event::Retry, now).map_err(|source| StoreError::Illegal { id, source })?;
-            head.seq.0 += 1;
-            after.seq = head.seq;
-            woken.push((before, after));
-        }
-        Ok(woken)
-    }
 }
 
 impl<T: Tables> JobStore for Queue<T> {
@@ -367,39 +345,7 @@ impl<T: Tables> JobStore for Queue<T> {
     }
 
     fn recover(&self, testimony: &dyn Fn(&Job) -> Testimony) -> Result<Vec<Recovered>, StoreError> {
-        self.tables.sound()?;
-        let now = self.clock.now();
-        // The witness may look at files and call back: not under the lock. No one else can touch what an earlier epoch holds,
-        // but for an operator's cancel, which is why the jobs are read again below.
-        let suspects = self.orphans(self.epoch())?;
-        let running = |job: &Job| matches!(job.state, State::Running { .. });
-        let one_ran = suspects.iter().filter(|job| running(job)).count() == 1;
-        // What was being published is company, too, unless the job was claimed to run alone: that a publication is stuck must not
-        // save a file that kills the daemon again and again.
-        let alone = |job: &Job| one_ran && (suspects.len() == 1 || job.hold().is_some_and(|hold| hold.alone));
-        let boot = self.clock.boot();
-        let fell = |job: &Job| job.hold().is_some_and(|hold| hold.boot.differs(boot));
-        let say = |job: &Job| if fell(job) { Testimony::Machine } else { testimony(job) };
-        let said: BTreeMap<JobId, Testimony> = suspects.iter().filter(|job| running(job)).map(|job| (job.id, say(job))).collect();
-
-        let inner = self.lock();
-        let mut head = inner.head;
-        let orphans = self.orphans(head.epoch)?;
-        let mut recovered = Vec::with_capacity(orphans.len());
-        for job in &orphans {
-            let testimony = said.get(&job.id).copied().unwrap_or(Testimony::None);
-            recovered.push(take_back(job, &mut head, alone(job), testimony, now)?);
-        }
-        let parked = self.wake_parked(&mut head, now)?;
-        if recovered.is_empty() && parked.is_empty() {
-            return Ok(recovered);
-        }
-        // All in one transaction: whether a job was alone can only be told while none of them is taken back yet.
-        let mut changes: Vec<_> = orphans.iter().zip(&recovered).map(|(from, to)| (Some(from), &to.job)).collect();
-        changes.extend(parked.iter().map(|(from, to)| (Some(from), to)));
-        self.commit(inner, head, &changes, Vec::new())?;
-        self.settle(head)?;
-        Ok(recovered)
+        self.take_back_all(testimony)
     }
 
     fn get(&self, id: JobId) -> Result<Option<Job>, StoreError> {
@@ -448,33 +394,30 @@ impl<T: Tables> JobStore for Queue<T> {
         self.drop_records(ids)
     }
 
+    fn is_unfilled(&self) -> Result<bool, StoreError> {
+        self.lacks_past()
+    }
+
+    fn restore(&self, past: &[Past]) -> Result<Vec<JobId>, StoreError> {
+        self.take_back_past(past)
+    }
+
+    fn set_filled(&self) -> Result<(), StoreError> {
+        self.has_past()
+    }
+
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {
         let inner = self.lock();
         Ok(Kind::ALL.into_iter().map(|kind| (kind, inner.counts.get(&kind).copied().unwrap_or(0))).collect())
     }
 }
 
-/// One orphan after the death of its daemon; counts on in `head`.
-fn take_back(job: &Job, head: &mut Head, alone: bool, testimony: Testimony, now: Time) -> Result<Recovered, StoreError> {
-    let illegal = |source| StoreError::Illegal { id: job.id, source };
-    let void = job.hold().map(|hold| hold.token).unwrap_or_default();
-    head.seq.0 += 1;
-    let mut after = match job.state {
-        State::Running { .. } => job.after(&Event::Interrupted { alone, testimony }, now).map_err(illegal)?,
-        _ => job.clone(),
-    };
-    let token = Token(head.seq.0);
-    let held = after.hold().is_some();
-    if held {
-        after = after.after(&Event::Reclaim { epoch: head.epoch, token }, now).map_err(illegal)?;
-    }
-    after.seq = head.seq;
-    let claim = held.then(|| Claim { id: job.id, token, job: after.clone() });
-    Ok(Recovered { job: after, void, claim })
-}
-
 fn head_put(head: &Head) -> Result<Put, StoreError> {
     Ok(Put { table: Table::Meta, key: HEAD.to_vec(), value: Some(record::encode(Table::Meta, HEAD, head)?) })
+}
+
+fn unfilled_put() -> Result<Put, StoreError> {
+    Ok(Put { table: Table::Meta, key: UNFILLED.to_vec(), value: Some(record::encode(Table::Meta, UNFILLED, &true)?) })
 }
 
 fn fits(what: &str, name: &str) -> Result<(), StoreError> {

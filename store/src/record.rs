@@ -12,7 +12,7 @@ use crate::tables::Table;
 /// Version of what the JSON means. Raised when an older program would misread it.
 pub(crate) const SCHEMA: u16 = 2;
 /// Largest record in bytes. The database would put values from a quarter of its segment on into files of their own.
-pub(crate) const MAX: usize = 4096;
+pub(crate) const MAX: usize = 4224;
 
 const MAGIC: &[u8; 4] = b"SUTR";
 const HEADER: usize = 10;
@@ -121,8 +121,8 @@ mod tests {
             stays: true,
         };
         let number = u32::MAX;
-        let blame =
-            Blame { charges: number, deaths: number, deaths_alone: number, environment: number, kills: number, machine: number };
+        let (deaths, deaths_alone, in_hand, machine) = (number, number, u8::MAX, number);
+        let blame = Blame { charges: number, deaths, deaths_alone, in_hand, machine, environment: number, kills: number };
         let mut job = Job::queued(JobId(u64::MAX), source, Time(u64::MAX));
         job.moved_to = Some((Area::Quarantine, path));
         job.state = State::Publishing { hold, publication };

@@ -8,10 +8,10 @@
 //! | `SEQ`            | how far the store got: `suture-seq 1 <epoch> <transition> <crc32>`; see below                      |
 //! | `db/`            | the sled database: trees `meta`, `jobs`, `by_state`, `by_key`, `by_recipe`: see [`crate::queue`]   |
 //! | `db.trial/`      | only while a damaged database is being examined                                                    |
-//! | `corrupt-<ms>/`  | a damaged database that was replaced; for people                                                   |
+//! | `corrupt-<ms>/`  | a damaged database that was replaced, alone or with its `SEQ`; for people                          |
 //!
-//! Trees `folders` and `outbox` are reserved. Values are records (`crate::record`: magic, schema version, checksum, JSON, at most
-//! 4 KiB); whatever is larger (reports, meshes) is a file elsewhere.
+//! Trees `folders` and `outbox` are reserved. Values are records (`crate::record`: magic, schema version, checksum, JSON, little more
+//! than 4 KiB at most); whatever is larger (reports, meshes) is a file elsewhere.
 //!
 //! **Durable** means: transaction over the trees, then `flush`, then `fdatasync` of the database file through a handle of our own,
 //! since sled's flush is a `sync_file_range`, which neither empties the drive's cache nor orders anything. Transitions of several
@@ -33,7 +33,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::id::{Clock, JobId, Recipe, SystemClock};
-use crate::job::{Job, Kind, Step, Testimony};
+use crate::job::{Job, Kind, Past, Step, Testimony};
 use crate::queue::Queue;
 use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted, Waiting};
 
@@ -98,6 +98,16 @@ impl SledStore {
     /// [`StoreError::Locked`] while a daemon owns the folder; else as [`SledStore::open`].
     pub fn peek(state: &Path) -> Result<Vec<Job>, StoreError> {
         open::peek(state)
+    }
+
+    /// Moves a database that cannot be trusted aside, with the mark of how far it got, so that a new one can be begun; where they are now.
+    /// `None`: the database is sound, and nothing was changed.
+    ///
+    /// # Errors
+    /// [`StoreError::Locked`] while a daemon owns the folder; else whatever keeps it from being looked at, or moved.
+    pub fn set_aside(state: &Path) -> Result<Option<PathBuf>, StoreError> {
+        let _lock = Lock(files::lock(state)?);
+        open::set_untrusted_aside(state, &(Arc::new(SystemClock) as Arc<dyn Clock>))
     }
 
     /// What the opening met.
@@ -166,6 +176,18 @@ impl JobStore for SledStore {
 
     fn forget(&self, ids: &[JobId]) -> Result<u64, StoreError> {
         self.queue.forget(ids)
+    }
+
+    fn is_unfilled(&self) -> Result<bool, StoreError> {
+        self.queue.is_unfilled()
+    }
+
+    fn restore(&self, past: &[Past]) -> Result<Vec<JobId>, StoreError> {
+        self.queue.restore(past)
+    }
+
+    fn set_filled(&self) -> Result<(), StoreError> {
+        self.queue.set_filled()
     }
 
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {

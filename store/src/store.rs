@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::id::{Epoch, JobId, Recipe, Seq, Token};
-use crate::job::{Illegal, Job, Kind, Priority, Source, Step, Testimony};
+use crate::job::{Illegal, Job, Kind, Past, Priority, Source, Step, Testimony};
 
 /// As many results alike are named as it makes sense to look at.
 pub const MOST_RESULTS: usize = 8;
@@ -98,6 +98,26 @@ pub trait JobStore: Send + Sync {
     /// # Errors
     /// Store errors only.
     fn forget(&self, ids: &[JobId]) -> Result<u64, StoreError>;
+
+    /// Was the store begun anew, so that what earlier ones knew may still lie in the hot folders? Until [`JobStore::set_filled`], over
+    /// any number of lives.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn is_unfilled(&self) -> Result<bool, StoreError>;
+
+    /// Takes jobs of an earlier store in, durably; each keeps its number if that is free. Their new numbers, in the order of `past`. The
+    /// caller sees to it that none of them is here already.
+    ///
+    /// # Errors
+    /// [`StoreError::TooLong`] when one does not fit a record; nothing is taken in then.
+    fn restore(&self, past: &[Past]) -> Result<Vec<JobId>, StoreError>;
+
+    /// Nothing of earlier stores is left to be read.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn set_filled(&self) -> Result<(), StoreError>;
 
     /// How many jobs there are of each kind, in the order of [`Kind::ALL`].
     ///
@@ -231,7 +251,7 @@ pub enum StoreError {
     Poisoned { reason: String },
 
     /// A record is damaged: its checksum, its version or its content is wrong.
-    #[error("the job database holds a damaged record ({what}): {reason}")]
+    #[error("the job database holds a damaged record ({what}): {reason}; `suture jobs rebuild` begins a new one from receipts")]
     Corrupt { what: String, reason: String },
 
     /// The database was written by a newer version of this program.

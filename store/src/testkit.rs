@@ -8,6 +8,7 @@ use crate::store::StoreError;
 mod claims;
 mod deaths;
 mod history;
+mod past;
 mod results;
 mod tools;
 
@@ -20,7 +21,7 @@ type Check = fn(&mut dyn Subject, &ManualClock) -> Result<(), StoreError>;
 /// # Panics
 /// When the store does not do what [`JobStore`] promises.
 pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
-    let checks: [(&str, Check); 19] = [
+    let checks: [(&str, Check); 22] = [
         ("submission is idempotent", claims::submission_is_idempotent),
         ("a file that came back is new", claims::a_file_that_came_back_is_new),
         ("the oldest that fits is claimed", claims::the_oldest_that_fits_is_claimed),
@@ -32,6 +33,7 @@ pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
         ("the operator's wishes", deaths::the_operators_wishes),
         ("death of the daemon", deaths::death_of_the_daemon),
         ("suspects run alone", deaths::suspects_run_alone),
+        ("who ran beside a killer is innocent", deaths::who_ran_beside_a_killer_is_innocent),
         ("power cuts blame no one", deaths::power_cuts_blame_no_one),
         ("a result that cannot be placed is parked", results::a_result_that_cannot_be_placed_is_parked),
         ("good results are found by what made them", results::good_results_are_found_by_what_made_them),
@@ -40,6 +42,8 @@ pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
         ("threads get different jobs", results::threads_get_different_jobs),
         ("what is at rest can be forgotten", history::what_is_at_rest_can_be_forgotten),
         ("forgetting one job leaves the next of its file", history::forgetting_one_job_leaves_the_next_of_its_file),
+        ("a new store says so", past::a_new_store_says_so),
+        ("jobs of an earlier store come back", past::jobs_of_an_earlier_store_come_back),
     ];
     for (name, check) in checks {
         let clock = Arc::new(ManualClock::new(Time(1_000_000)));

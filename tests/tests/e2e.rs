@@ -10,6 +10,7 @@ mod e2e {
     mod files;
     mod hostile;
     mod interrupted;
+    mod json;
     mod lost_state;
     mod malformed;
     mod many;
@@ -19,6 +20,7 @@ mod e2e {
     mod pictures;
     mod profiles;
     mod queue;
+    mod rebuild;
     mod retention;
     mod reuse;
     mod same_bytes;

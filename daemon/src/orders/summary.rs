@@ -164,7 +164,8 @@ impl Summary {
                     continue;
                 };
                 self.remember(&earlier, is_known);
-                if earlier == self {
+                // That it was said later is nothing new.
+                if earlier == (Self { changed: earlier.changed, ..self.clone() }) {
                     return Ok((self, path, false));
                 }
             }

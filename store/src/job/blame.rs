@@ -4,9 +4,12 @@ use serde::{Deserialize, Serialize};
 
 /// Charged attempts after which a file is quarantined.
 pub const CHARGES: u32 = 2;
-/// Deaths of the daemon of what this file's worker said, with nothing else running, after which the file is quarantined.
-pub const DEATHS_ALONE: u32 = 3;
-/// Deaths of the daemon, for whatever reason, after which a file must run alone.
+/// Deaths of the daemon of what this file's worker said, after which the file is quarantined: at least [`DEATHS_ALONE`] of them with nothing
+/// else running.
+pub const DEATHS_IN_HAND: u32 = 3;
+/// So many of these deaths that there was no company to take the blame, charged attempts included.
+pub const DEATHS_ALONE: u32 = 2;
+/// Deaths of the daemon, for whatever reason, after which a file must run alone. One is enough if it was of what its worker said.
 pub const DEATHS_TO_SUSPECT: u32 = 2;
 /// Kills from outside after which the next start waits; they never end a job.
 pub const KILLS_FREE: u32 = 3;
@@ -33,6 +36,9 @@ pub struct Blame {
     pub deaths: u32,
     /// Those of them that were the file's: the daemon was reading its worker's answer, and nothing else ran.
     pub deaths_alone: u32,
+    /// Deaths of the daemon while it read its worker's answer, in company or not.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub in_hand: u8,
     /// Deaths of the machine while it ran. They are never the file's; it runs alone afterwards, so that it cannot take others along.
     #[serde(default)]
     pub machine: u32,
@@ -45,13 +51,21 @@ pub struct Blame {
 impl Blame {
     /// Must it run alone?
     pub fn is_suspect(&self) -> bool {
-        self.deaths >= DEATHS_TO_SUSPECT || self.machine > 0
+        self.deaths >= DEATHS_TO_SUSPECT || self.in_hand > 0 || self.machine > 0
     }
 
     /// Has it killed too often?
     pub fn is_condemned(&self) -> bool {
-        self.charges >= CHARGES || self.charges.saturating_add(self.deaths_alone) >= DEATHS_ALONE
+        let alone = self.charges.saturating_add(self.deaths_alone);
+        // Older records count those alone only.
+        let all = self.charges.saturating_add(self.deaths_alone.max(self.in_hand.into()));
+        self.charges >= CHARGES || (alone >= DEATHS_ALONE && all >= DEATHS_IN_HAND)
     }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde gives a reference")]
+fn is_none(count: &u8) -> bool {
+    *count == 0
 }
 
 /// How a worker process died.

@@ -275,8 +275,9 @@ impl Job {
             Testimony::Machine => blame.machine = blame.machine.saturating_add(1),
             Testimony::None | Testimony::InHand => {
                 blame.deaths = blame.deaths.saturating_add(1);
-                let found = alone && testimony == Testimony::InHand;
-                blame.deaths_alone = blame.deaths_alone.saturating_add(u32::from(found));
+                let in_hand = testimony == Testimony::InHand;
+                blame.in_hand = blame.in_hand.saturating_add(in_hand.into());
+                blame.deaths_alone = blame.deaths_alone.saturating_add(u32::from(alone && in_hand));
             }
         }
         self.state = if cancel { State::Cancelled { why: Withdrawal::Operator } } else { self.judge(hold) };

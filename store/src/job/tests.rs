@@ -173,16 +173,24 @@ fn check_parking(before: &Job, event: &Event, after: &Job) -> Result<(), TestCas
 }
 
 fn check_bounds(job: &Job) -> Result<(), TestCaseError> {
-    let Blame { charges, deaths_alone, deaths, .. } = job.blame;
-    prop_assert!(charges <= 2 && deaths_alone <= 3 && charges + deaths_alone <= 3 && deaths_alone <= deaths);
+    let Blame { charges, deaths_alone, in_hand, deaths, .. } = job.blame;
+    prop_assert!(
+        charges <= 2
+            && deaths_alone <= 3
+            && charges + deaths_alone <= 3
+            && deaths_alone <= in_hand.into()
+            && u32::from(in_hand) <= deaths
+    );
+    let in_hand = u32::from(in_hand);
+    let is_proved = charges + deaths_alone >= 2 && charges + in_hand >= 3;
     if matches!(job.kind(), Kind::Queued | Kind::Waiting | Kind::Alone) {
-        prop_assert!(charges <= 1 && charges + deaths_alone <= 2, "it would be tried too often");
+        prop_assert!(charges <= 1 && !is_proved, "it would be tried too often");
     }
     if let State::Concluded { ending: Ending::Quarantined, .. } = job.state {
-        prop_assert!(charges == 2 || charges + deaths_alone == 3, "quarantined without reason");
+        prop_assert!(charges == 2 || is_proved, "quarantined without reason");
     }
     if let State::Running { hold, .. } = &job.state {
-        prop_assert_eq!(hold.alone, deaths >= 2 || job.blame.machine > 0 || job.needs_all);
+        prop_assert_eq!(hold.alone, deaths >= 2 || in_hand > 0 || job.blame.machine > 0 || job.needs_all);
         prop_assert_eq!(hold.attempt, job.attempts);
     }
     Ok(())
@@ -262,9 +270,22 @@ fn daemon_dies(alone: bool, testimony: Testimony) -> impl Fn(Token) -> Event {
 fn f12_one_crash_and_two_deaths_of_the_daemon_in_its_hands_are_three() {
     let mut job = run(&fresh(), dies(Death::Signal(6)));
     job = run(&job, daemon_dies(true, Testimony::InHand));
-    assert_eq!(job.kind(), Kind::Queued);
+    assert_eq!(job.kind(), Kind::Alone);
     job = run(&job, daemon_dies(true, Testimony::InHand));
     assert_eq!((job.kind(), job.attempts), (Kind::Concluded, Attempt(3)));
+}
+
+/// Wherever it begins: in company once, or alone from the start.
+#[test]
+fn f12_a_file_that_kills_the_daemon_has_three_attempts() {
+    for alone in [false, true] {
+        let mut job = run(&fresh(), daemon_dies(alone, Testimony::InHand));
+        for _ in 0..2 {
+            assert_eq!(job.kind(), Kind::Alone);
+            job = run(&job, daemon_dies(true, Testimony::InHand));
+        }
+        assert_eq!((job.kind(), job.attempts), (Kind::Concluded, Attempt(3)), "alone at first: {alone}");
+    }
 }
 
 #[test]

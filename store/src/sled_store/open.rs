@@ -169,11 +169,40 @@ fn set_aside(state: &Path, mark: Mark, damage: &StoreError, aside: &Path) -> Res
     files::sync_dir(state)
 }
 
+/// Moves the database in `state`, whose lock is held, and its mark into a folder of their own, if it is damaged or went back in time. `None`: it
+/// is sound.
+///
+/// # Errors
+/// When it cannot be looked at for another reason, or not moved.
+pub(super) fn set_untrusted_aside(state: &Path, clock: &Arc<dyn Clock>) -> Result<Option<PathBuf>, StoreError> {
+    let looked = queue(state, clock).and_then(|(queue, _)| crate::queue::all_jobs(queue.tables()).map(drop));
+    match looked {
+        Ok(()) => return Ok(None),
+        Err(StoreError::Unusable { .. } | StoreError::RolledBack { .. } | StoreError::Corrupt { .. }) => {}
+        Err(error) if is_damage(&error) => {}
+        Err(error) => return Err(error),
+    }
+    let aside = state.join(format!("corrupt-{}", clock.now()));
+    files::make_folder(&aside)?;
+    // The mark last: a database without it would be believed.
+    for name in ["db.trial", "db", "SEQ"] {
+        let (from, to) = (state.join(name), aside.join(name));
+        match std::fs::rename(&from, &to) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+            moved => moved.map_err(io(&from, "setting aside"))?,
+        }
+        files::sync_dir(&aside)?;
+        files::sync_dir(state)?;
+        crash_point("store.aside.moved");
+    }
+    Ok(Some(aside))
+}
+
 /// How to go on without the database.
 fn advice(state: &Path) -> String {
     format!(
-        "no mesh is lost: originals are in the hot folders, and each result has its receipt beside it. To begin anew, move {} away \
-         and start again; files that still stand in in/ are then taken as new",
+        "no mesh is lost: originals are in the hot folders, and each result has its receipt beside it. To begin anew, run `suture jobs \
+         rebuild --dir DIR` for the hot folder DIR, which keeps what is in {} aside and takes the jobs from receipts",
         state.display()
     )
 }

@@ -234,6 +234,25 @@ fn f05_a_cut_log_is_refused_and_left_as_it_is() {
     }
 }
 
+/// F5: what cannot be trusted is kept, with its mark, and a new store is begun; what is sound, or someone's, stays as it is.
+#[test]
+fn f05_a_damaged_store_is_set_aside_and_a_sound_one_is_not() {
+    let state = tempfile::tempdir().unwrap();
+    let store = SledStore::open(state.path()).unwrap();
+    submit(&store, "a.stl");
+    assert!(matches!(SledStore::set_aside(state.path()), Err(StoreError::Locked { .. })));
+    drop(store);
+    assert_eq!(SledStore::set_aside(state.path()).unwrap(), None);
+    assert_eq!(SledStore::peek(state.path()).unwrap().len(), 1);
+    let log = state.path().join("db/db");
+    File::options().write(true).open(&log).unwrap().set_len(100).unwrap();
+    assert!(SledStore::open(state.path()).is_err());
+    let aside = SledStore::set_aside(state.path()).unwrap().unwrap();
+    assert!(aside.starts_with(state.path()) && aside.join("db/db").exists() && aside.join("SEQ").exists());
+    let store = SledStore::open(state.path()).unwrap();
+    assert!(store.is_unfilled().unwrap() && store.list(&Query::default()).unwrap().is_empty());
+}
+
 /// F7, and F8: the first error ends it, whatever it was.
 #[test]
 fn f07_a_poisoned_store_does_nothing_and_loses_nothing() {

@@ -141,6 +141,35 @@ pub(super) fn suspects_run_alone(subject: &mut dyn Subject, clock: &ManualClock)
     Ok(())
 }
 
+/// A file that kills the daemon in company, and the next two times alone: three attempts. Who ran beside it runs beside others again, but for one
+/// whose answer was read in the same instant: that one has its next run alone, and is cleared by it.
+pub(super) fn who_ran_beside_a_killer_is_innocent(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), StoreError> {
+    let names = ["killer.stl", "read.stl", "beside.stl"];
+    for name in names {
+        submit_one(subject.store(), name, 84)?;
+        claim_any(subject.store())?;
+    }
+    let [killer, read, beside] = [JobId(1), JobId(2), JobId(3)];
+    subject.restart();
+    subject.store().recover(&|job| if job.id == beside { Testimony::None } else { Testimony::InHand })?;
+    let store = subject.store();
+    let kinds = [killer, read, beside].map(|id| job(store, id).map(|job| job.kind()).ok());
+    assert_eq!(kinds, [Some(Kind::Alone), Some(Kind::Alone), Some(Kind::Queued)]);
+    let suspects = Filter { alone: true, ..Filter::default() };
+    for death in 2..=3 {
+        let claim = subject.store().claim(&suspects)?.ok_or(StoreError::Unknown(killer))?;
+        assert_eq!((claim.id, claim.job.attempts), (killer, Attempt(death)));
+        subject.restart();
+        subject.store().recover(&|_| Testimony::InHand)?;
+    }
+    let store = subject.store();
+    assert_eq!(job(store, killer)?.kind(), Kind::Concluded);
+    let claim = store.claim(&suspects)?.ok_or(StoreError::Unknown(read))?;
+    assert_eq!((claim.id, finish(store, &claim, Ending::Clean, true)?.kind()), (read, Kind::Done));
+    assert_eq!(claim_any(store)?.id, beside);
+    Ok(())
+}
+
 /// Whatever a witness says, another life of the machine is not the file's doing.
 pub(super) fn power_cuts_blame_no_one(subject: &mut dyn Subject, clock: &ManualClock) -> Result<(), StoreError> {
     let id = submit_one(subject.store(), "long.stl", 84)?;

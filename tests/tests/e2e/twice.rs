@@ -65,5 +65,41 @@ fn f17_a_second_daemon_of_one_folder_ends_at_once_and_begins_when_the_first_is_k
     assert_eq!(meshes(&place, "hot/out"), ["a.stl", "b.stl"]);
     assert_eq!(meshes(&place, "hot/done"), ["a.stl", "b.stl"]);
     let paths: Vec<_> = jobs(&place, "hot").iter().map(|job| job["source"]["path"].clone()).collect();
-    assert_eq!(paths, ["b.stl"], "the store of the second");
+    assert_eq!(paths, ["a.stl", "b.stl"], "the store of the second, which knows the first one's by its receipt");
+}
+
+/// With several folders, the others are served; the owned one is said to be out of reach, and taken when it is free.
+#[test]
+fn f17_the_other_folders_are_served_when_one_is_another_daemons() {
+    let place = Place::new();
+    configure(&place, "a.toml", "first/jobs", "hot");
+    let text = "settle = \"30ms\"\nstate = \"second/jobs\"\n[[folders]]\npath = \"hot\"\n[[folders]]\npath = \"other\"\n";
+    place.put("b.toml", text.as_bytes());
+    let first = Served::start(&place, &["--config", "a.toml"], "log");
+    let owner = format!("(process {})", first.pid());
+    place.put("other/in/b.stl", &holes(2));
+    // A folder of an attempt of the first one's, under a number that the second gives as well.
+    for token in 1..40 {
+        place.put(&format!("hot/.suture/work/{token}/in-hand"), b"");
+    }
+    let once = place.suture(["watch", "--once", "--config", "b.toml"]).expect(1);
+    assert!(once.stderr().contains(&owner), "{}", once.stderr());
+    assert_eq!(meshes(&place, "other/out"), ["b.stl"]);
+    let second = Served::start(&place, &["--config", "b.toml"], "log of the second");
+    wait_until("it says who has the folder", || {
+        second.lines("The folder cannot be served").iter().any(|line| line["level"] == "ERROR")
+    });
+    let listed = || place.suture(["jobs", "list", "--dir", "other"]).expect(0).stdout();
+    wait_until("it is listed", || listed().contains("out of reach") && listed().contains(&owner));
+    place.put("other/in/c.stl", &holes(1));
+    wait_until("the other folder is served", || meshes(&place, "other/out").len() == 2);
+    let stands = |token: u32| place.at(&format!("hot/.suture/work/{token}/in-hand")).exists();
+    assert!((1..40).all(stands), "work of the first one was cleared away");
+    place.put("hot/in/a.stl", &holes(1));
+    wait_done(&place, "hot");
+    assert_eq!((meshes(&place, "hot/out"), meshes(&place, "hot/done")), (vec!["a.stl".into()], vec!["a.stl".into()]));
+    drop(first);
+    place.put("hot/in/d.stl", &holes(2));
+    wait_until("the second has the folder", || meshes(&place, "hot/out").len() == 2);
+    assert!(!listed().contains("out of reach"), "{}", listed());
 }

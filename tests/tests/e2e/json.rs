@@ -1,0 +1,74 @@
+//! What `suture jobs list --json` says, held against its description.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+use suture_tests::Place;
+use suture_tests::hot::holes;
+use suture_tests::served::jobs;
+
+const PAGE: &str = include_str!("../../../docs/JOBS.md");
+
+/// Names of fields in the first column of the table; of those that are always there, or of all.
+fn described(always: bool) -> BTreeSet<String> {
+    let rows = PAGE.lines().filter_map(|line| line.strip_prefix("| ")).filter(|row| row.starts_with('`'));
+    let wanted = rows.filter(|row| !always || row.split('|').nth(1).is_some_and(|column| column.contains("**yes**")));
+    let names = wanted.filter_map(|row| row.split('|').next()).flat_map(|column| column.split('`').skip(1).step_by(2));
+    names.map(str::to_owned).collect()
+}
+
+/// The fields of a line that hold no others, by their paths. Those of a claim and of a publication are called the same in every state.
+fn fields(value: &Value, path: &str, found: &mut BTreeSet<String>) {
+    match value.as_object().filter(|fields| !fields.is_empty()) {
+        Some(fields_of) => {
+            for (name, value) in fields_of {
+                let path = match name.as_str() {
+                    "hold" | "publication" => name.clone(),
+                    _ if path.is_empty() => name.clone(),
+                    _ => format!("{path}.{name}"),
+                };
+                fields(value, &path, found);
+            }
+        }
+        None => drop(found.insert(path.to_owned())),
+    }
+}
+
+/// Jobs of many fates: each field of each is described, and what is said to be there always is.
+#[test]
+fn every_field_of_a_job_is_described() {
+    let place = Place::new();
+    let once = |code| place.suture(["watch", "hot", "--once", "--settle", "30ms"]).expect(code);
+    let ask = |words: &[&str]| place.suture(["jobs", "--dir", "hot"].iter().chain(words)).expect(0);
+    place.put("hot/in/a.stl", &holes(1));
+    place.put("hot/in/bad.stl", b"no mesh at all");
+    place.put("hot/in/notes.txt", b"a note");
+    once(1);
+    place.put("hot/in/b.stl", &holes(1));
+    once(0);
+    let number =
+        |name: &str| jobs(&place, "hot").iter().find(|job| job["source"]["path"] == name).expect("a job")["id"].to_string();
+    ask(&["retry", &number("bad.stl")]);
+    ask(&["priority", &number("bad.stl"), "7"]);
+    let (mut seen, mut kinds) = (BTreeSet::new(), BTreeSet::new());
+    for line in [jobs(&place, "hot"), {
+        once(1);
+        jobs(&place, "hot")
+    }]
+    .concat()
+    {
+        let mut found = BTreeSet::new();
+        fields(&line, "", &mut found);
+        let has = |name: &String| found.contains(name) || line.get(name).is_some();
+        assert!(described(true).iter().all(has), "{line}");
+        kinds.insert(line["kind"].as_str().expect("a word").to_owned());
+        seen.append(&mut found);
+    }
+    let described = described(false);
+    assert_eq!(seen.difference(&described).collect::<Vec<_>>(), Vec::<&String>::new(), "not described");
+    for name in ["reused", "retried", "priority", "moved_to", "publication.output", "publication.recipe", "state.noticed.reason"]
+    {
+        assert!(seen.contains(name), "no job has {name}: {seen:?}");
+    }
+    assert!(kinds.iter().all(|kind| PAGE.contains(&format!("`{kind}`"))), "{kinds:?}");
+}

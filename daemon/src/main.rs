@@ -44,6 +44,8 @@ mod schedule;
 mod settings;
 mod settle;
 mod signals;
+#[cfg(test)]
+mod simulation;
 mod single;
 mod standstill;
 mod superseded;
@@ -54,6 +56,7 @@ mod watch;
 mod watchdog;
 mod window;
 mod worker;
+mod world;
 mod writers;
 
 use std::process::ExitCode;

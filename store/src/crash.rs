@@ -6,15 +6,18 @@
 //! * `SUTURE_CRASH_TRACE=file` appends each pass's name to `file`, one a line: how a test learns which points there are and how
 //!   often a run passes them.
 //!
-//! Without the feature [`crash_point`] is an empty function.
+//! With the feature `testkit` a test learns of the passes of its own thread (`testkit::at_crash_points`). Without either [`crash_point`] is an
+//! empty function.
 
 /// Names this place. Names are `crate.step`, lower case.
-#[cfg(not(feature = "crash-points"))]
 #[inline(always)]
-pub fn crash_point(_name: &'static str) {}
-
-#[cfg(feature = "crash-points")]
-pub use armed::crash_point;
+#[cfg_attr(not(any(feature = "crash-points", feature = "testkit")), allow(unused_variables, reason = "it is empty then"))]
+pub fn crash_point(name: &'static str) {
+    #[cfg(feature = "testkit")]
+    crate::testkit::pass_crash_point(name);
+    #[cfg(feature = "crash-points")]
+    armed::crash_point(name);
+}
 
 #[cfg(feature = "crash-points")]
 mod armed {
@@ -44,7 +47,7 @@ mod armed {
     }
 
     /// Names this place; kills the process here when the environment says so.
-    pub fn crash_point(name: &'static str) {
+    pub(super) fn crash_point(name: &'static str) {
         let plan = plan();
         if let Some(trace) = &plan.trace {
             let mut file = trace.lock().unwrap_or_else(std::sync::PoisonError::into_inner);

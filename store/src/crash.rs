@@ -14,9 +14,37 @@
 #[cfg_attr(not(any(feature = "crash-points", feature = "testkit")), allow(unused_variables, reason = "it is empty then"))]
 pub fn crash_point(name: &'static str) {
     #[cfg(feature = "testkit")]
-    crate::testkit::pass_crash_point(name);
+    watched::pass(name);
     #[cfg(feature = "crash-points")]
     armed::crash_point(name);
+}
+
+#[cfg(feature = "testkit")]
+pub use watched::at_crash_points;
+
+#[cfg(feature = "testkit")]
+mod watched {
+    use std::cell::RefCell;
+    use std::rc::Rc;
+
+    type Watch = Rc<dyn Fn(&'static str)>;
+
+    thread_local! {
+        static WATCH: RefCell<Option<Watch>> = const { RefCell::new(None) };
+    }
+
+    /// Has `watch` be called with the name of each crash point that this thread passes, or no one any more. It may unwind: so a
+    /// simulation ends a daemon without ending the process.
+    pub fn at_crash_points(watch: Option<Watch>) {
+        WATCH.with(|slot| *slot.borrow_mut() = watch);
+    }
+
+    pub(super) fn pass(name: &'static str) {
+        let watch = WATCH.with(|slot| slot.borrow().clone());
+        if let Some(watch) = watch {
+            watch(name);
+        }
+    }
 }
 
 #[cfg(feature = "crash-points")]

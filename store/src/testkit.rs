@@ -6,15 +6,13 @@ use crate::id::{Clock, Time};
 use crate::store::StoreError;
 
 mod claims;
-mod crashes;
 mod deaths;
 mod history;
 mod results;
 mod tools;
 
-pub use crashes::at_crash_points;
 #[cfg(feature = "testkit")]
-pub(crate) use crashes::pass_crash_point;
+pub use crate::crash::at_crash_points;
 pub use tools::{ManualClock, Subject, dropped, result_of};
 
 type Check = fn(&mut dyn Subject, &ManualClock) -> Result<(), StoreError>;

@@ -8,15 +8,14 @@ use super::matter::{FATES, Fate};
 use super::plan::{LEFT, Plan};
 use super::stage::{Scale, Stage};
 use super::watched;
+use crate::world::World;
 
 const SCALE: Scale = Scale { meanwhile: 3000, seconds: 8, watch_order: false, tend: Duration::from_secs(1800) };
 /// Some days before summer time ends.
 const BEGIN: &str = "2099-10-22T12:00:00";
 const NIGHTS: u64 = 7;
-/// Drops come in bursts, in the afternoon and all through the night.
-const AFTERNOON: u64 = 8;
-const NIGHT: u64 = 20;
-const BURST: Duration = Duration::from_secs(1800);
+/// Drops come in bursts, in the afternoon, which wait for the night, and all through the night.
+const BURSTS: [(u64, Duration); 2] = [(8, Duration::from_secs(3600)), (60, Duration::from_secs(600))];
 /// What the daemon may need, in bytes.
 const MOST_MEMORY: u64 = 200 << 20;
 const MOST_STORE: u64 = 64 << 20;
@@ -64,10 +63,11 @@ impl Stage {
     fn go_on(&self, time: Duration) {
         let end = self.sky.passed() + time;
         while self.sky.passed() < end {
-            if self.chance(|chance| chance.one_in(400)) {
+            if self.chance(|chance| chance.one_in(150)) {
                 self.survive(|| self.trouble_of_a_week());
             }
-            self.round(Duration::from_secs(10), 40);
+            let open = self.life().context.settings.now().run_window.is_open(&|| self.sky.local());
+            self.round(Duration::from_secs(if open { 20 } else { 300 }), 40);
         }
         // Nothing goes on for a whole burst.
         self.survive(|| self.end_trouble());
@@ -75,14 +75,19 @@ impl Stage {
 
     fn week(&self, jobs: u64) -> u64 {
         let (mut number, mut store) = (0, 0);
-        let burst = jobs / (NIGHTS * (AFTERNOON + NIGHT));
+        let bursts: u64 = BURSTS.iter().map(|(bursts, _)| bursts).sum();
+        let burst = jobs / (NIGHTS * bursts);
         for night in 0..NIGHTS {
             let began = self.sky.passed();
-            for _ in 0..AFTERNOON + NIGHT {
-                let left = jobs - number;
-                self.burst(if night + 1 == NIGHTS && left < 2 * burst { left } else { burst }, &mut number);
-                self.go_on(BURST);
+            for (bursts, time) in BURSTS {
+                for _ in 0..bursts {
+                    self.burst(burst, &mut number);
+                    self.go_on(time);
+                }
                 store = store.max(size(&self.place.state()));
+            }
+            if night + 1 == NIGHTS {
+                self.burst(jobs - number, &mut number);
             }
             self.come_to_rest();
             store = store.max(size(&self.place.state()));

@@ -17,6 +17,9 @@ use crate::receipt;
 /// Where originals are.
 const AREAS: [&str; 4] = ["in", "done", "failed", "quarantine"];
 
+/// No age counts unless the clock has gone steadily for so long.
+const STEADY: Duration = Duration::from_secs(600);
+
 /// How many originals of a content lie in each area.
 type Places = BTreeMap<Key, [u64; AREAS.len()]>;
 
@@ -68,6 +71,7 @@ impl Stage {
         for path in gone {
             let Some(seen) = oracle.results.remove(&path) else { continue };
             assert!(now.saturating_sub(seen.since) > bound, "{} went before its time", path.display());
+            assert!(self.sky.steady_for() >= STEADY, "{} went by a clock that jumped", path.display());
             *oracle.swept.entry((seen.folder, seen.matter)).or_default() += 1;
             let left = oracle.standing.get_mut(&seen.matter).is_some_and(|paths| paths.remove(&path) && !paths.is_empty());
             if !left {

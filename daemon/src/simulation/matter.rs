@@ -78,9 +78,10 @@ pub(super) struct Matter {
 /// Bytes of a header and of a record.
 const HEAD: usize = 84;
 const RECORD: usize = 50;
-/// Records of files that are small, and of those that are large for the simulated configuration.
+/// Records of files that are small, and of those that are large for the simulated configuration, at least; and so many more, less one.
 const SMALL: usize = 2;
 const LARGE: usize = 90;
+const MORE: usize = 40;
 
 impl Matter {
     /// As it is dropped: a binary STL by its length.
@@ -96,7 +97,7 @@ impl Matter {
     fn bytes(self, side: &str) -> Vec<u8> {
         let letter = FATES.iter().find(|(fate, _)| *fate == self.fate).map_or('?', |(_, letter)| *letter);
         let size = if self.large { 'L' } else { 's' };
-        let records = if self.large { LARGE } else { SMALL };
+        let records = if self.large { LARGE } else { SMALL } + self.serial as usize % MORE;
         let mut bytes = format!("sim {letter} {:09} {size} {side}", self.serial).into_bytes();
         bytes.resize(HEAD - 4, b' ');
         bytes.extend((records as u32).to_le_bytes());

@@ -31,20 +31,20 @@ const BEGINNINGS: [&str; 3] = ["2099-03-28T22:00:00", "2099-10-24T20:00:00", "20
 const NIGHT: Scale = Scale { meanwhile: 12, seconds: 30, watch_order: true, tend: Duration::from_secs(50) };
 /// Without a job that goes on for so long, all has come to rest: longer than any file settles.
 const QUIET: Duration = Duration::from_secs(60);
-/// All comes to rest within this.
-const PATIENCE: Duration = Duration::from_secs(4 * 24 * 3600);
+/// All comes to rest within this, of the hours of work.
+const PATIENCE: Duration = Duration::from_secs(12 * 3600);
 
 impl Stage {
     /// Time goes by, the daemon does what it can do now.
     fn round(&self, time: Duration, turns: usize) {
         self.sky.pass(time);
         self.survive(|| {
-            self.life().keep();
+            self.keep();
             for _ in 0..turns {
                 if !self.life().work() {
                     break;
                 }
-                self.life().keep();
+                self.keep();
             }
             self.tend();
         });
@@ -61,12 +61,16 @@ impl Stage {
         self.say(|| "all is to come to rest".into());
         self.is_closing.set(true);
         self.active.set(self.sky.passed());
-        let began = self.sky.passed();
+        let mut worked = Duration::ZERO;
         while !self.live().is_empty() || self.sky.passed() - self.active.get() < QUIET {
-            assert!(self.sky.passed() - began < PATIENCE, "it does not come to rest: {:?}", self.live());
+            assert!(worked < PATIENCE, "it does not come to rest: {:?}", self.live());
             let open = self.life().context.settings.now().run_window.is_open(&|| self.sky.local());
             let step = Duration::from_secs(if open || self.live().is_empty() { 5 } else { 600 });
+            let began = self.sky.passed();
             self.round(step, 1000);
+            if open {
+                worked += self.sky.passed() - began;
+            }
         }
         self.is_closing.set(false);
         self.say(|| "all is at rest".into());

@@ -10,7 +10,7 @@ use super::matter::{Fate, Matter};
 use super::plan::FOLDERS;
 use super::stage::Stage;
 use crate::control::JobsWish;
-use crate::world::{Share, World};
+use crate::world::Share;
 
 /// A file that was dropped.
 #[derive(Clone, Debug)]
@@ -118,9 +118,7 @@ impl Oracle {
     pub(super) fn begins(&mut self, stage: &Stage, matter: Matter, share: Share) -> u64 {
         let life = stage.life();
         let config = life.context.settings.now();
-        assert!(config.run_window.is_open(&|| stage.sky.local()), "{matter:?}: nothing begins outside of the hours of work");
         assert!(!stage.sky.is_full(), "{matter:?}: nothing begins while the disk is full");
-        assert!(!crate::standstill::is_set(&config.state), "{matter:?}: nothing begins while an operator wants that");
         let alone = usize::from(!share.many);
         assert!(
             self.busy[1] == 0 && (alone == 0 || self.busy[0] == 0),
@@ -161,13 +159,14 @@ impl Oracle {
         let now = life.context.world.wall();
         let running = life.store().list(&Query { kinds: vec![Kind::Running], ..Query::default() }).unwrap();
         let Some(taken) = running.iter().max_by_key(|job| job.work) else { return };
-        if taken.source.size != matter.dropped().len() as u64 || matter.large || taken.must_run_alone() {
+        let small = |job: &Job| job.source.size < life.context.settings.now().large && !job.must_run_alone();
+        if taken.source.size != matter.dropped().len() as u64 || !small(taken) {
             return;
         }
         for job in life.store().list(&Query { kinds: vec![Kind::Queued], ..Query::default() }).unwrap() {
             let first = job.priority >= taken.priority && job.id < taken.id && job.retried.is_none() && taken.retried.is_none();
-            let ready = matches!(job.state, State::Queued { not_before: None }) && job.is_due(now) && !job.must_run_alone();
-            let same = job.source.size == taken.source.size && taken.attempts.0 == 1;
+            let ready = matches!(job.state, State::Queued { not_before: None }) && job.is_due(now) && small(&job);
+            let same = taken.attempts.0 == 1;
             // Who came with the same priority, or a higher one, and sooner, is never behind.
             assert!(!(first && ready && same) || job.submitted > taken.submitted, "{} waits longer than {}", job.id, taken.id);
         }

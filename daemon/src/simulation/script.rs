@@ -112,7 +112,11 @@ impl Stage {
         if recent == 0 {
             return None;
         }
-        let number = oracle.versions.len() - 1 - self.chance(|chance| chance.index(recent));
+        // Whoever meddles with files does it, as luck has it, with the one that is in work.
+        let held = self.in_hand.borrow();
+        let is_held = |version: &Version| held.iter().any(|path| *path == self.place.inbox(version.folder).join(&version.name));
+        let in_hand = oracle.versions.iter().rposition(is_held).filter(|_| self.chance(|chance| chance.one_in(2)));
+        let number = in_hand.unwrap_or_else(|| oracle.versions.len() - 1 - self.chance(|chance| chance.index(recent)));
         let version = &oracle.versions[number];
         if self.away.get() == Some(version.folder) || version.gone {
             return None;
@@ -165,7 +169,7 @@ impl Stage {
 
     /// Something that operators or the machine do, between the steps of the daemon.
     pub(super) fn trouble(&self) {
-        match self.chance(|chance| chance.below(13)) {
+        match self.chance(|chance| chance.below(14)) {
             0 | 1 => self.pause(None),
             2 => self.wish(&Kind::ALL, JobsWish::Cancel),
             3 => self.wish(&[Kind::Failed, Kind::Quarantined, Kind::Cancelled], JobsWish::Retry),
@@ -189,8 +193,8 @@ impl Stage {
                 self.say(|| format!("a kill after {passes} crash points"));
                 self.until_kill.set(passes);
             }
-            10 => self.jump(),
-            11 => self.reload(),
+            10 | 11 => self.jump(),
+            12 => self.reload(),
             _ => {
                 let strikes = self.chance(|chance| chance.between(1, 4)) as u32;
                 self.say(|| format!("{strikes} workers cannot be started"));

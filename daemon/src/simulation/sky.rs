@@ -32,6 +32,10 @@ struct State {
     born: Duration,
     boot: u64,
     full: bool,
+    /// Since when it has been full, or has not.
+    since: Duration,
+    /// When the clock on the wall jumped last, by more than a minute.
+    jumped: Option<Duration>,
     /// So many workers cannot be started.
     strikes: u32,
 }
@@ -42,8 +46,19 @@ impl Sky {
         let zone = TimeZone::posix(ZONE).unwrap();
         let civil: jiff::civil::DateTime = wall.parse().unwrap();
         let wall = civil.to_zoned(zone.clone()).unwrap().timestamp().as_millisecond() as u64;
-        let (began, passed, born) = (Instant::now(), Duration::ZERO, Duration::ZERO);
-        Arc::new(Self(Mutex::new(State { zone, began, passed, wall, born, boot: 1, full: false, strikes: 0 })))
+        let (began, passed, born, since) = (Instant::now(), Duration::ZERO, Duration::ZERO, Duration::ZERO);
+        Arc::new(Self(Mutex::new(State {
+            zone,
+            began,
+            passed,
+            wall,
+            born,
+            boot: 1,
+            full: false,
+            since,
+            jumped: None,
+            strikes: 0,
+        })))
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -66,6 +81,9 @@ impl Sky {
     pub(super) fn jump(&self, ms: i64) {
         let mut state = self.state();
         state.wall = state.wall.saturating_add_signed(ms);
+        if ms.abs() > 60_000 {
+            state.jumped = Some(state.passed);
+        }
     }
 
     /// Another life of the daemon begins; of the machine, too?
@@ -76,11 +94,26 @@ impl Sky {
     }
 
     pub(super) fn set_full(&self, full: bool) {
-        self.state().full = full;
+        let mut state = self.state();
+        if state.full != full {
+            (state.full, state.since) = (full, state.passed);
+        }
     }
 
     pub(super) fn is_full(&self) -> bool {
         self.state().full
+    }
+
+    /// For how long the disk has been full; `None`: it is not.
+    pub(super) fn full_for(&self) -> Option<Duration> {
+        let state = self.state();
+        state.full.then(|| state.passed - state.since)
+    }
+
+    /// For how long the clock on the wall has gone steadily.
+    pub(super) fn steady_for(&self) -> Duration {
+        let state = self.state();
+        state.passed - state.jumped.unwrap_or_default()
     }
 
     /// The next workers cannot be started.

@@ -21,8 +21,10 @@ use super::sky::Sky;
 use crate::fsx::Identity;
 use crate::protocol::Request;
 use crate::supervise::{Cause, Death, Ended};
-use crate::world::Share;
+use crate::world::{Share, World};
 
+/// The keeper looks at the disk's room this often.
+const DISK_EVERY: Duration = Duration::from_secs(5);
 /// So many steps are told of when something is wrong.
 const TOLD: usize = 80;
 
@@ -62,6 +64,10 @@ pub(super) struct Stage {
     pub active: Cell<Duration>,
     /// When the sweeper looked last.
     pub tended: Cell<Duration>,
+    /// Dropped files in work, and the last ones that were.
+    pub in_hand: RefCell<VecDeque<PathBuf>>,
+    /// The keeper has had time to see that the disk is full.
+    seen_full: Cell<bool>,
     /// The hot folder that is away.
     pub away: Cell<Option<usize>>,
     sample: OnceCell<Report>,
@@ -94,6 +100,8 @@ impl Stage {
             is_closing: Cell::new(false),
             active: Cell::new(Duration::ZERO),
             tended: Cell::new(Duration::ZERO),
+            in_hand: RefCell::default(),
+            seen_full: Cell::new(false),
             away: Cell::new(None),
             sample: OnceCell::new(),
         });
@@ -185,6 +193,9 @@ impl Stage {
         if name.starts_with("store.") && !name.starts_with("store.commit") {
             return;
         }
+        if name == "daemon.claimed" {
+            self.may_claim();
+        }
         match self.until_kill.get() {
             0 => {}
             1 => {
@@ -216,6 +227,7 @@ impl Stage {
         let Ok(bytes) = std::fs::read(&request.input) else { return failed(ErrorClass::Environment, "it cannot be read") };
         let Some((matter, false)) = Matter::read(&bytes) else { return failed(ErrorClass::Unreadable, "it is no mesh") };
         let runs = self.oracle.borrow_mut().begins(self, matter, share);
+        self.hold(PathBuf::from(&request.shown_input));
         let witness = Witness { stage: self, path: request.witness.clone() };
         let needed = self.needed(matter.fate);
         self.say(|| format!("work on {matter:?}, run {runs}, for {} s", needed.as_secs_f64()));
@@ -281,9 +293,31 @@ impl Stage {
         if !self.is_closing.get() && self.chance(|chance| chance.one_in(self.scale.meanwhile * 30)) {
             self.die();
         }
-        let life = self.life();
-        life.keep();
-        life.work();
+        self.keep();
+        self.life().work();
+    }
+
+    /// The keeper looks at everything.
+    pub(super) fn keep(&self) {
+        self.life().keep();
+        self.seen_full.set(self.sky.full_for().is_some_and(|time| time >= DISK_EVERY));
+    }
+
+    /// Nothing is claimed while there is a reason not to, be it only to be brought into place.
+    fn may_claim(&self) {
+        let config = self.life().context.settings.now();
+        assert!(config.run_window.is_open(&|| self.sky.local()), "nothing is claimed outside of the hours of work");
+        assert!(!self.seen_full.get(), "nothing is claimed while the disk is full");
+        assert!(!crate::standstill::is_set(&config.state), "nothing is claimed while an operator wants that");
+    }
+
+    /// Notes that a dropped file is in work.
+    fn hold(&self, path: PathBuf) {
+        let mut held = self.in_hand.borrow_mut();
+        held.push_back(path);
+        if held.len() > 2 {
+            held.pop_front();
+        }
     }
 }
 

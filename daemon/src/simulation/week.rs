@@ -10,7 +10,7 @@ use super::stage::{Scale, Stage};
 use super::watched;
 use crate::world::World;
 
-const SCALE: Scale = Scale { meanwhile: 3000, seconds: 8, watch_order: false, tend: Duration::from_secs(1800) };
+const SCALE: Scale = Scale { meanwhile: 3000, seconds: 3, watch_order: false, tend: Duration::from_secs(1800) };
 /// Some days before summer time ends.
 const BEGIN: &str = "2099-10-22T12:00:00";
 const NIGHTS: u64 = 7;

@@ -57,9 +57,15 @@ impl Stage {
         }
         self.tended.set(passed);
         self.note_results();
+        let age = self.life().context.settings.now().keep.results.age;
+        self.sweep.set(Some((self.sky.now().0, age.map_or(u64::MAX, |age| age.as_millis() as u64))));
         self.life().sweep();
-        let (now, days) = (self.sky.now().0, self.life().context.settings.now().keep.results.age);
-        let bound = days.map_or(u64::MAX, |days| days.as_millis() as u64);
+        self.judge_sweep();
+    }
+
+    /// Looks at what the last sweep let go, be it that the daemon was killed in the midst of it.
+    pub(super) fn judge_sweep(&self) {
+        let Some((now, bound)) = self.sweep.take() else { return };
         let mut oracle = self.oracle.borrow_mut();
         let away = self.away.get();
         let gone: Vec<PathBuf> = oracle

@@ -19,6 +19,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::rc::Rc;
 use std::time::Duration;
 
+use chance::Chance;
 use plan::Plan;
 use stage::{Scale, Stage};
 use suture_store::job::Kind;
@@ -125,8 +126,36 @@ fn night(seed: u64, steps: u32) -> String {
 
 #[test]
 fn nights_of_many_seeds() {
-    for seed in 0..12 {
+    for seed in 0..9 {
         night(seed, 120);
+    }
+}
+
+/// Hours of work that are shorter or longer in the night in which summer time begins or ends, and a clock that is set by minutes up to a year.
+#[test]
+fn f15_summer_time_and_clocks_that_jump_lose_no_job_and_keep_none_waiting() {
+    for (seed, begin) in (0..).zip(BEGINNINGS) {
+        let plan = |_: &mut Chance| Plan {
+            workers: 2,
+            window: Some("01:30-03:30"),
+            priorities: [5, 5],
+            drain: 60,
+            results: 3,
+            history_jobs: 30_000,
+        };
+        let stage = Stage::new(seed, begin, NIGHT, plan);
+        watched(seed, &stage, |stage| {
+            for step in 0..200 {
+                if step % 5 == 0 {
+                    stage.drop_files(1);
+                }
+                stage.round(Duration::from_secs(240), 3);
+                if step % 20 == 7 {
+                    stage.jump();
+                }
+            }
+            stage.come_to_rest();
+        });
     }
 }
 

@@ -256,7 +256,7 @@ impl Stage {
         self.away.set(Some(folder));
     }
 
-    fn jump(&self) {
+    pub(super) fn jump(&self) {
         let ms = self.chance(|chance| {
             let longest = chance.pick(&[120_000, 7_200_000, DAY_MS, 365 * DAY_MS]);
             chance.between(0, 2 * longest as u64) as i64 - longest

@@ -66,6 +66,8 @@ pub(super) struct Stage {
     pub tended: Cell<Duration>,
     /// Dropped files in work, and the last ones that were.
     pub in_hand: RefCell<VecDeque<PathBuf>>,
+    /// What the clock on the wall showed at a sweep of which no one has looked what it let go, and after how many milliseconds results may go.
+    pub sweep: Cell<Option<(u64, u64)>>,
     /// The keeper has had time to see that the disk is full.
     seen_full: Cell<bool>,
     /// The hot folder that is away.
@@ -101,6 +103,7 @@ impl Stage {
             active: Cell::new(Duration::ZERO),
             tended: Cell::new(Duration::ZERO),
             in_hand: RefCell::default(),
+            sweep: Cell::new(None),
             seen_full: Cell::new(false),
             away: Cell::new(None),
             sample: OnceCell::new(),
@@ -162,6 +165,7 @@ impl Stage {
     /// The daemon is dead; the next one begins, and may die at that.
     pub(super) fn rise(&self, reboot: bool) {
         self.bring_back();
+        self.judge_sweep();
         loop {
             if let Some(life) = self.life.take() {
                 assert_eq!(Rc::strong_count(&life), 1, "nothing of it goes on");

@@ -67,7 +67,7 @@ impl Stage {
                 self.survive(|| self.trouble_of_a_week());
             }
             let open = self.life().context.settings.now().run_window.is_open(&|| self.sky.local());
-            self.round(Duration::from_secs(if open { 20 } else { 300 }), 40);
+            self.round(Duration::from_secs(if open { 20 } else { 300 }), 400);
         }
         // Nothing goes on for a whole burst.
         self.survive(|| self.end_trouble());

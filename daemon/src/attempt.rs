@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crossbeam::channel::Sender;
 use suture_core::report::Task;
@@ -30,7 +30,8 @@ use crate::receipt::ReusedFrom;
 use crate::reuse::Sought;
 use crate::schedule::{Schedule, Turn, Waits};
 use crate::settings::Settings;
-use crate::supervise::{Cause, Death, Ended, Worker};
+use crate::supervise::{Cause, Death, Ended};
+use crate::world::{Hand, Share, World};
 
 /// Left by a worker that outlived the daemon: the file it worked on did not kill it.
 pub(crate) const WITNESS: &str = "outlived";
@@ -51,6 +52,7 @@ pub(crate) enum Event {
 
 /// What all threads of the daemon share.
 pub(crate) struct Context {
+    pub world: Arc<dyn World>,
     pub store: Arc<dyn JobStore>,
     pub folders: Vec<Arc<Folder>>,
     pub settings: Arc<Settings>,
@@ -97,15 +99,19 @@ impl Context {
         self.failed.lock().is_ok_and(|failed| failed.is_some())
     }
 
+    fn waits(&self) -> Result<Waits, StoreError> {
+        Waits::of(&*self.store, self.settings.now().large)
+    }
+
     fn halted(&self) -> bool {
         self.halt.load(Ordering::Relaxed)
     }
 }
 
 /// A thread that works on jobs.
-pub(crate) struct Slot<'a> {
-    context: &'a Context,
-    worker: Option<Worker>,
+pub(crate) struct Slot {
+    context: Arc<Context>,
+    worker: Option<Box<dyn Hand>>,
     /// Bytes that the worker may hold.
     memory: u64,
     served: u32,
@@ -113,38 +119,50 @@ pub(crate) struct Slot<'a> {
     committed: Cell<bool>,
 }
 
-impl<'a> Slot<'a> {
-    pub(crate) fn new(context: &'a Context) -> Self {
-        Self { context, worker: None, memory: 0, served: 0, committed: Cell::new(false) }
+impl Slot {
+    pub(crate) fn new(context: &Arc<Context>) -> Self {
+        Self { context: Arc::clone(context), worker: None, memory: 0, served: 0, committed: Cell::new(false) }
     }
 
     /// Works until the schedule says stop.
     pub(crate) fn run(&mut self) {
-        let context = self.context;
-        let large = || context.settings.now().large;
-        let look = || Waits::of(&*context.store, large());
         loop {
-            let turn = match context.schedule.next(&look) {
+            match self.context.schedule.next(&|| self.context.waits()) {
                 Ok(Turn::Stop) => return,
-                Ok(turn) => turn,
-                Err(error) => return context.fail(error),
-            };
-            if turn.is_alone() {
-                // Its memory belongs to the large file now.
-                self.worker = None;
+                Ok(turn) => self.take(turn),
+                Err(error) => return self.context.fail(error),
             }
-            match context.store.claim(&turn.filter(large())) {
-                Ok(Some(claim)) => {
-                    crash_point("daemon.claimed");
-                    let job = claim.job.clone();
-                    self.finish(&claim, job, turn);
-                }
-                // Another slot was faster.
-                Ok(None) => {}
-                Err(error) => context.fail(error),
-            }
-            context.schedule.done(turn);
         }
+    }
+
+    /// Works on one job, if it has a turn now. Returns whether it had one.
+    #[cfg(test)]
+    pub(crate) fn try_turn(&mut self) -> bool {
+        match self.context.schedule.try_next(&|| self.context.waits()) {
+            Ok(None | Some(Turn::Stop)) => return false,
+            Ok(Some(turn)) => self.take(turn),
+            Err(error) => self.context.fail(error),
+        }
+        true
+    }
+
+    /// Takes its turn: the job that is next.
+    fn take(&mut self, turn: Turn) {
+        if turn.is_alone() {
+            // Its memory belongs to the large file now.
+            self.worker = None;
+        }
+        match self.context.store.claim(&turn.filter(self.context.settings.now().large)) {
+            Ok(Some(claim)) => {
+                crash_point("daemon.claimed");
+                let job = claim.job.clone();
+                self.finish(&claim, job, turn);
+            }
+            // Another slot was faster.
+            Ok(None) => {}
+            Err(error) => self.context.fail(error),
+        }
+        self.context.schedule.done(turn);
     }
 
     /// Does what the job is owed until nothing is owed under this claim; the same after a crash as in normal work. Nothing is tried
@@ -210,7 +228,7 @@ impl<'a> Slot<'a> {
 
     /// The next step; `None` when the claim is lost.
     fn step(&mut self, claim: &Claim, job: &Job, turn: Turn) -> Result<Option<Job>, PublishError> {
-        let context = self.context;
+        let context = Arc::clone(&self.context);
         let Some(folder) = context.folder(job) else {
             return Err(PublishError::Folder(format!("the hot folder `{}` is not in the configuration", job.source.folder)));
         };
@@ -232,11 +250,11 @@ impl<'a> Slot<'a> {
 
     /// Lets a worker loose on the file, and says what came of it.
     fn attempt(&mut self, folder: &Folder, token: &Claim, job: &Job, turn: Turn) -> Result<Option<Job>, PublishError> {
-        let context = self.context;
+        let context = Arc::clone(&self.context);
         let work = folder.work(token.token);
         // The token is new: a folder of that name was left by the daemon of another store, which had the hot folder before.
         remove_work(&work);
-        let step = match claim(folder, job, &work) {
+        let step = match claim(folder, job, &work, context.world.room(&folder.root, 0)) {
             Err(Unclaimed::Withdrawn(why)) => {
                 // Of the right folder.
                 folder.check().map_err(PublishError::Folder)?;
@@ -266,7 +284,7 @@ impl<'a> Slot<'a> {
     }
 
     fn work(&mut self, folder: &Folder, claim: &Claim, job: &Job, claimed: &Claimed, turn: Turn) -> Worked {
-        let context = self.context;
+        let context = Arc::clone(&self.context);
         // This attempt's to its end, whatever is read meanwhile.
         let config = context.settings.now();
         // A setting that a person has to mend, or a machine that has no process to give, is no try of the file's.
@@ -283,11 +301,12 @@ impl<'a> Slot<'a> {
             Err(error) => return Worked::Step(Step::Wait { reason: format!("a worker process cannot be started: {error}") }),
         };
         let request = request(folder, claim, job, profile, limits);
-        let asked = Cell::new(Instant::now());
+        let asked = Cell::new(context.world.steady());
         let lease = Cell::new(Lease::Held);
         let stop = || {
-            if asked.get().elapsed() >= ASK_EVERY {
-                asked.set(Instant::now());
+            let now = context.world.steady();
+            if now.duration_since(asked.get()) >= ASK_EVERY {
+                asked.set(now);
                 // A store that fails here fails at the next step too, and is dealt with there.
                 lease.set(context.store.heartbeat(claim).unwrap_or(Lease::Held));
             }
@@ -295,7 +314,7 @@ impl<'a> Slot<'a> {
         };
         let limit = config.time_limit.of(job.source.size);
         tracing::debug!(worker = worker.pid(), attempt = job.attempts.0, "Work begins.");
-        let ended = worker.run(&request, Some(limit), &stop, &mut |_, _, _| {});
+        let ended = worker.run(&request, limit, &stop);
         crash_point("daemon.worked");
         if matches!(ended, Ended::Done { .. } | Ended::Failed { .. }) && !turn.is_alone() {
             self.worker = Some(worker);
@@ -330,7 +349,7 @@ impl<'a> Slot<'a> {
         if !config.reuse || job.retried.is_some() {
             return None;
         }
-        let (context, work) = (self.context, folder.work(claim.token));
+        let (context, work) = (&self.context, folder.work(claim.token));
         let sought = Sought { store: &*context.store, folders: &context.folders, job, profile };
         // A store that fails here fails at the next step too, and is dealt with there.
         let copied = sought.copy(&work.join(CLAIMED), &work.join(OUTPUT), &|| context.halted()).ok()??;
@@ -356,7 +375,7 @@ impl<'a> Slot<'a> {
     }
 
     /// A worker for this job: the slot's own while it is in good shape, or a new one.
-    fn worker(&mut self, limits: &Limits, turn: Turn, job: &Job) -> std::io::Result<Worker> {
+    fn worker(&mut self, limits: &Limits, turn: Turn, job: &Job) -> std::io::Result<Box<dyn Hand>> {
         let other = self.memory != limits.memory_bytes;
         let fresh = turn.is_alone() || other || job.blame.charges > 0 || self.served >= FILES_PER_WORKER;
         if let Some(mut worker) = self.worker.take().filter(|_| !fresh)
@@ -366,7 +385,8 @@ impl<'a> Slot<'a> {
             return Ok(worker);
         }
         (self.served, self.memory) = (1, limits.memory_bytes);
-        Worker::spawn(limits.memory_bytes, limits.threads, !turn.is_alone())
+        let share = Share { memory: limits.memory_bytes, threads: limits.threads, many: !turn.is_alone() };
+        self.context.world.hire(share)
     }
 }
 

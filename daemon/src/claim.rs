@@ -117,16 +117,16 @@ pub(crate) fn is_source(found: &Identity, job: &Job) -> bool {
     (same_inode || job.moved_to.is_some()) && (found.size, found.mtime_ns) == (source.size, source.mtime_ns)
 }
 
-/// Takes the job's original into `work`, which is made.
+/// Takes the job's original into `work`, which is made. `free`: bytes that may still be written there.
 ///
 /// # Errors
 /// When the file is gone or another one, or the world does not allow it.
-pub(crate) fn claim(folder: &Folder, job: &Job, work: &Path) -> Result<Claimed, Unclaimed> {
+pub(crate) fn claim(folder: &Folder, job: &Job, work: &Path, free: u64) -> Result<Claimed, Unclaimed> {
     let (area, path) = job.original();
     let original = open(&folder.area(area).join(path.to_path()))?;
     let before = look(&original, job)?;
     // Room for the result and for what the engine puts aside: a large file must not fill the disk half way.
-    let (needed, free) = (before.size.saturating_mul(3), fsx::free_space(&folder.root, 0));
+    let needed = before.size.saturating_mul(3);
     if free < needed {
         let (needed, free) = (show_size(needed), show_size(free));
         return Err(Unclaimed::Shortage(format!("the disk has room for {free} more; this file may need {needed}")));
@@ -191,8 +191,11 @@ mod tests {
         let work = scene.folder.work(scene.claim.token);
         let content = || std::fs::read(scene.folder.inbox().join("part.stl")).unwrap();
         let before = content();
-        claim(&scene.folder, &scene.claim.job, &work).unwrap();
-        assert!(matches!(claim(&scene.folder, &scene.claim.job, &work), Err(Unclaimed::Environment(_))), "the folder is not new");
+        claim(&scene.folder, &scene.claim.job, &work, u64::MAX).unwrap();
+        assert!(
+            matches!(claim(&scene.folder, &scene.claim.job, &work, u64::MAX), Err(Unclaimed::Environment(_))),
+            "the folder is not new"
+        );
         assert_eq!(content(), before);
         // A second name that is there already, of the original itself.
         let original = Original::open(&scene.folder.inbox().join("part.stl")).unwrap();
@@ -208,7 +211,7 @@ mod tests {
         let scene = Scene::dropped();
         let path = scene.folder.inbox().join("part.stl");
         let work = scene.folder.work(scene.claim.token);
-        let claim = || claim(&scene.folder, &scene.claim.job, &work);
+        let claim = || claim(&scene.folder, &scene.claim.job, &work, u64::MAX);
         std::fs::rename(&path, scene.folder.inbox().join("mine")).unwrap();
         assert!(matches!(claim(), Err(Unclaimed::Withdrawn(Withdrawal::Vanished))));
         std::os::unix::fs::symlink("mine", &path).unwrap();
@@ -226,7 +229,7 @@ mod tests {
         for change in ["write", "rename", "remove"] {
             let scene = Scene::dropped();
             let path = scene.folder.inbox().join("part.stl");
-            let claimed = claim(&scene.folder, &scene.claim.job, &scene.folder.work(scene.claim.token)).unwrap();
+            let claimed = claim(&scene.folder, &scene.claim.job, &scene.folder.work(scene.claim.token), u64::MAX).unwrap();
             assert!(claimed.is_unchanged().unwrap());
             std::thread::sleep(std::time::Duration::from_millis(20));
             match change {

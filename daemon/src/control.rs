@@ -129,7 +129,7 @@ pub(crate) fn answer(store: &dyn JobStore, wish: &JobsWish) -> Result<Vec<Job>, 
 }
 
 /// Pauses the daemon or lets it go on, if that is wished, and says how it stands.
-fn steer(context: &Context, wish: &DaemonWish) -> Result<Standing, Refusal> {
+pub(crate) fn steer(context: &Context, wish: &DaemonWish) -> Result<Standing, Refusal> {
     if let DaemonWish::Pause | DaemonWish::Resume = wish {
         let paused = *wish == DaemonWish::Pause;
         standstill::set(&context.settings.now().state, paused)
@@ -143,7 +143,7 @@ fn steer(context: &Context, wish: &DaemonWish) -> Result<Standing, Refusal> {
 }
 
 /// Does what is wished of jobs while the daemon works on them.
-fn change(context: &Context, wish: &JobsWish) -> Result<Vec<Job>, Refusal> {
+pub(crate) fn change(context: &Context, wish: &JobsWish) -> Result<Vec<Job>, Refusal> {
     let before = if let JobsWish::Cancel(id) = wish { context.store.get(*id).ok().flatten() } else { None };
     let jobs = answer(&*context.store, wish)?;
     if let Some(before) = &before {

@@ -4,16 +4,15 @@
 use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
 use crossbeam::channel::{Receiver, RecvTimeoutError};
 use suture_store::job::{Area, Kind};
-use suture_store::{Clock, Control, Job, JobId, Query, StoreError, SystemClock, crash_point};
+use suture_store::{Control, Job, JobId, Query, StoreError, crash_point};
 
 use crate::attempt::{Context, Event};
-use crate::folder::{Folder, is_meant};
+use crate::folder::Folder;
 use crate::fsx;
 use crate::hints::{Watching, watcher};
 use crate::orders::Orders;
@@ -24,6 +23,8 @@ use crate::schedule::Hold;
 use crate::settings::Reload;
 use crate::settle::Rest;
 use crate::signals::Stop;
+
+mod once;
 
 /// Full scans, where the system tells of changes and where it does not.
 const RESCAN: Duration = Duration::from_secs(60);
@@ -37,14 +38,12 @@ const IDLE: Duration = Duration::from_millis(200);
 const IDLE_ONCE: Duration = Duration::from_millis(20);
 /// Free space is looked at this often.
 const DISK_EVERY: Duration = Duration::from_secs(5);
-/// With `--once`, a result that cannot be brought into place is tried so often before it is left for the next run.
-const TRIES_ONCE: u32 = 4;
 
 /// The thread that looks after the folders.
-pub(crate) struct Keeper<'a> {
-    context: &'a Context,
+pub(crate) struct Keeper {
+    context: Arc<Context>,
     inbox: Receiver<Event>,
-    stop: &'a Stop,
+    stop: Stop,
     folders: Vec<Kept>,
     disk_looked: Option<Instant>,
     /// It was within the hours of work at the last look.
@@ -76,10 +75,10 @@ struct Kept {
     scan_takes: Duration,
 }
 
-impl<'a> Keeper<'a> {
+impl Keeper {
     /// Begins to listen; `inbox` receives what the context's events are told.
-    pub(crate) fn new(context: &'a Context, inbox: Receiver<Event>, stop: &'a Stop) -> Self {
-        let mut folders = Vec::new();
+    pub(crate) fn new(context: &Arc<Context>, inbox: Receiver<Event>, stop: &Stop) -> Self {
+        let (mut folders, now) = (Vec::new(), context.world.steady());
         for folder in &context.folders {
             let (rest, rescan) = pace(context, false);
             let mut kept = Kept {
@@ -91,7 +90,7 @@ impl<'a> Keeper<'a> {
                 watched: None,
                 rescan,
                 scanned: None,
-                looked: Instant::now(),
+                looked: now,
                 dirty: true,
                 unavailable: false,
                 gone: Vec::new(),
@@ -104,6 +103,7 @@ impl<'a> Keeper<'a> {
             }
             folders.push(kept);
         }
+        let (context, stop) = (Arc::clone(context), stop.clone());
         Self { context, inbox, stop, folders, disk_looked: None, is_open: true }
     }
 
@@ -112,6 +112,18 @@ impl<'a> Keeper<'a> {
     /// # Errors
     /// When the store failed.
     pub(crate) fn keep(&mut self, raise: Raise) -> Result<(), StoreError> {
+        self.begin(raise)?;
+        while !self.is_over() && !self.pass(raise)? {
+            self.listen(self.pause());
+        }
+        Ok(())
+    }
+
+    /// Takes up what an earlier life left in the folders.
+    ///
+    /// # Errors
+    /// When the store failed.
+    pub(crate) fn begin(&mut self, raise: Raise) -> Result<(), StoreError> {
         self.look_at_clock();
         raise(self.context.settings.now().workers)?;
         self.remember_live()?;
@@ -120,39 +132,51 @@ impl<'a> Keeper<'a> {
         if self.context.once {
             self.hasten_waiting()?;
         }
-        loop {
-            if self.stop.asked() {
-                tracing::info!("Stopping: running jobs are finished, nothing new is taken.");
-                return Ok(());
-            }
-            if self.context.failed.lock().is_ok_and(|failed| failed.is_some()) {
-                return Ok(());
-            }
-            if let Some(reload) = self.context.settings.renew() {
-                self.go_by(reload)?;
-                raise(self.context.settings.now().workers)?;
-            }
-            let now = Instant::now();
-            self.look_at_disk(now)?;
-            self.look_at_clock();
-            for kept in &mut self.folders {
-                kept.turn(self.context, now)?;
-            }
-            if self.context.once && self.is_finished()? {
-                // Nothing comes any more.
-                return self.folders.iter_mut().try_for_each(|kept| kept.sum_up(self.context, now, Duration::ZERO));
-            }
-            self.listen();
-        }
+        Ok(())
     }
 
-    /// Waits for the next thing to do, and takes in what was heard.
-    fn listen(&mut self) {
+    /// Is there a reason to end?
+    fn is_over(&self) -> bool {
+        let stopped = self.stop.asked();
+        if stopped {
+            tracing::info!("Stopping: running jobs are finished, nothing new is taken.");
+        }
+        stopped || self.context.has_failed()
+    }
+
+    /// Looks at everything once. Returns whether nothing comes any more, with `--once`.
+    ///
+    /// # Errors
+    /// When the store failed.
+    pub(crate) fn pass(&mut self, raise: Raise) -> Result<bool, StoreError> {
+        if let Some(reload) = self.context.settings.renew() {
+            self.go_by(reload)?;
+            raise(self.context.settings.now().workers)?;
+        }
+        let now = self.context.world.steady();
+        self.look_at_disk(now)?;
+        self.look_at_clock();
+        for kept in &mut self.folders {
+            kept.turn(&self.context, now)?;
+        }
+        let finished = self.context.once && self.is_finished()?;
+        if finished {
+            self.folders.iter_mut().try_for_each(|kept| kept.sum_up(&self.context, now, Duration::ZERO))?;
+        }
+        Ok(finished)
+    }
+
+    /// How long it may wait for the next thing to do.
+    fn pause(&self) -> Duration {
         let settling = self.folders.iter().filter(|kept| kept.reconciler.is_settling());
         let looks = settling.map(|kept| kept.reconciler.rest.look_every());
         let scan = self.folders.iter().filter(|kept| kept.dirty).map(Kept::scan_at_most_every);
         let idle = if self.context.once { IDLE_ONCE } else { IDLE };
-        let wait = looks.chain(scan).min().unwrap_or(idle).min(idle);
+        looks.chain(scan).min().unwrap_or(idle).min(idle)
+    }
+
+    /// Waits for the next thing to do, at most so long, and takes in what was heard.
+    pub(crate) fn listen(&mut self, wait: Duration) {
         let mut next = self.inbox.recv_timeout(wait);
         loop {
             match next {
@@ -164,7 +188,7 @@ impl<'a> Keeper<'a> {
                 Ok(Event::Ended { folder, path, id }) => {
                     if let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == folder) {
                         kept.reconciler.ended(&path);
-                        kept.orders.ended(&path, id, Instant::now());
+                        kept.orders.ended(&path, id, self.context.world.steady());
                         kept.dirty = true;
                     }
                 }
@@ -172,56 +196,6 @@ impl<'a> Keeper<'a> {
             }
             next = self.inbox.try_recv().map_err(|_| RecvTimeoutError::Timeout);
         }
-    }
-
-    /// With `--once`: is everything that came to rest finished?
-    fn is_finished(&self) -> Result<bool, StoreError> {
-        let folders_rest = self.folders.iter().all(|kept| !kept.dirty && (kept.unavailable || !kept.reconciler.is_settling()));
-        let counts = self.context.store.counts()?;
-        if !folders_rest || self.context.schedule.busy() > 0 || !self.inbox.is_empty() {
-            return Ok(false);
-        }
-        // A slot that began or ended between these looks changed the counts: what it did is to be heard of first.
-        if self.context.store.counts()? != counts {
-            return Ok(false);
-        }
-        let of = |wanted: fn(Kind) -> bool| counts.iter().filter(|(kind, _)| wanted(*kind)).map(|(_, n)| n).sum::<u64>();
-        if of(|kind| matches!(kind, Kind::Queued | Kind::Alone)) > 0 && !self.context.schedule.is_paused() {
-            return Ok(false);
-        }
-        if of(|kind| kind == Kind::Parked) > 0 && !self.context.schedule.is_paused() && self.may_move_on()? {
-            return Ok(false);
-        }
-        let waiting = of(Kind::is_live);
-        if waiting > 0 || self.folders.iter().any(|kept| kept.unavailable) {
-            tracing::warn!(
-                jobs = waiting,
-                "Some work is left for the next run: jobs that wait after errors, a full disk, a pause, the hours of work, or folders out of reach."
-            );
-            self.context.not_good.store(true, Ordering::Relaxed);
-        }
-        self.tell_of_foreign()?;
-        Ok(true)
-    }
-
-    /// With `--once`: files that someone meant to have repaired, and that are left where they are, are not good.
-    fn tell_of_foreign(&self) -> Result<(), StoreError> {
-        let noticed = self.context.store.list(&Query { kinds: vec![Kind::Noticed], ..Query::default() })?;
-        let meant = |job: &&Job| job.source.path.to_path().file_name().is_some_and(is_meant);
-        let left_out = self.folders.iter().map(|kept| kept.reconciler.left_out().len()).sum::<usize>();
-        let files = noticed.iter().filter(meant).count() + left_out;
-        if files > 0 {
-            tracing::warn!(files, "Files are left where they are; `suture jobs list --state noticed` says why.");
-            self.context.not_good.store(true, Ordering::Relaxed);
-        }
-        Ok(())
-    }
-
-    /// Is a parked job tried once more, with `--once`? What an earlier run left was tried often; but the world may be another one now.
-    fn may_move_on(&self) -> Result<bool, StoreError> {
-        let now = SystemClock.now();
-        let parked = self.context.store.list(&Query { kinds: vec![Kind::Parked], ..Query::default() })?;
-        Ok(parked.iter().any(|job| job.is_due(now) || job.parked.is_some_and(|parked| parked.tries < TRIES_ONCE)))
     }
 
     /// Jobs of an earlier life whose files still wait in `in/`.
@@ -240,7 +214,7 @@ impl<'a> Keeper<'a> {
     /// Orders of an earlier life, some of which may lack their summary; and originals that were left in their places, which the store knows by
     /// their device, and that may be another one by now.
     fn remember_past(&mut self) -> Result<(), StoreError> {
-        let (now, folders) = (Instant::now(), &mut self.folders);
+        let (now, folders) = (self.context.world.steady(), &mut self.folders);
         each_job(&*self.context.store, &mut |job| folders.iter_mut().for_each(|kept| kept.remember(job, now)))
     }
 
@@ -253,7 +227,7 @@ impl<'a> Keeper<'a> {
             }
             Reload::Done(changes) => {
                 for kept in &mut self.folders {
-                    (kept.reconciler.rest, kept.rescan) = pace(self.context, kept.polled);
+                    (kept.reconciler.rest, kept.rescan) = pace(&self.context, kept.polled);
                 }
                 self.disk_looked = None;
                 // Whoever mended a setting need not wait for the next try.
@@ -268,7 +242,7 @@ impl<'a> Keeper<'a> {
     /// What waits is tried now: with `--once`, whoever starts a run may have put right what it waits for, and no other run may follow.
     fn hasten_waiting(&self) -> Result<(), StoreError> {
         for job in self.context.store.list(&Query { kinds: vec![Kind::Waiting], ..Query::default() })? {
-            control(self.context, job.id, Control::Hasten)?;
+            control(&self.context, job.id, Control::Hasten)?;
         }
         self.context.schedule.news();
         Ok(())
@@ -282,7 +256,7 @@ impl<'a> Keeper<'a> {
                 && fsx::is_folder(&kept.folder.inbox()).is_ok_and(|there| there)
                 && fsx::exists(&kept.folder.inbox().join(job.source.path.to_path())).is_ok_and(|there| !there)
             {
-                control(self.context, job.id, Control::Forget)?;
+                control(&self.context, job.id, Control::Forget)?;
             }
         }
         Ok(())
@@ -291,7 +265,7 @@ impl<'a> Keeper<'a> {
     /// As many slots work as there are to be workers; outside of the hours of work few, or none.
     fn look_at_clock(&mut self) {
         let config = self.context.settings.now();
-        let is_open = config.run_window.is_open();
+        let is_open = config.run_window.is_open(&|| self.context.world.local());
         let workers = if is_open { config.workers } else { config.workers_outside };
         self.context.schedule.limit(workers);
         if std::mem::replace(&mut self.is_open, is_open) != is_open {
@@ -309,7 +283,7 @@ impl<'a> Keeper<'a> {
         self.disk_looked = Some(now);
         self.context.store.check()?;
         let reserve = self.context.settings.now().reserve;
-        let full = self.folders.iter().find(|kept| fsx::free_space(&kept.folder.root, reserve) == 0);
+        let full = self.folders.iter().find(|kept| self.context.world.room(&kept.folder.root, reserve) == 0);
         let words = |kept: &Kept| format!("the disk of {} is nearly full", kept.folder.root.display());
         if self.context.schedule.hold(Hold::Disk, full.map(words)) || (first && full.is_some()) {
             match full {
@@ -345,7 +319,7 @@ impl Kept {
         if self.watched.is_some() && self.watched == there {
             return;
         }
-        (self.watched, self.watching, self.polled) = (there, None, fsx::needs_polling(&inbox));
+        (self.watched, self.watching, self.polled) = (there, None, !context.world.tells_of(&inbox));
         if !self.polled {
             match watcher(&self.folder, context.events.clone()) {
                 Ok(watching) => self.watching = Some(watching),
@@ -428,7 +402,7 @@ impl Kept {
             self.scanned = Some(now);
             self.dirty = false;
             self.scan(context, now)?;
-            self.scan_takes = now.elapsed();
+            self.scan_takes = context.world.steady().duration_since(now);
             if !self.renamed.is_empty() {
                 // Known now, so that it can count; and to be looked at at once.
                 self.reconciler.came_whole(&std::mem::take(&mut self.renamed));

@@ -50,6 +50,8 @@ mod schedule;
 mod settings;
 mod settle;
 mod signals;
+#[cfg(test)]
+mod simulation;
 mod single;
 mod standstill;
 mod superseded;
@@ -60,6 +62,7 @@ mod watch;
 mod watchdog;
 mod window;
 mod worker;
+mod world;
 mod writers;
 
 use std::process::ExitCode;

@@ -7,11 +7,13 @@
 //! business): who has risen by that is the equal of those who were asked for sooner, but not before them, so that a row of huge files
 //! grows no more urgent than small ones only because huge ones always wait.
 
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 use suture_store::{Filter, JobStore, Priority, StoreError, Waiting};
+
+use crate::world::World;
 
 /// However many small files of its priority come, one that runs alone has a turn this often.
 const ALONE_AT_LEAST_EVERY: Duration = Duration::from_secs(300);
@@ -72,6 +74,7 @@ pub(crate) struct Standing {
 pub(crate) struct Schedule {
     state: Mutex<State>,
     wake: Condvar,
+    world: Arc<dyn World>,
 }
 
 struct State {
@@ -109,10 +112,10 @@ impl Waits {
 }
 
 impl Schedule {
-    pub(crate) fn new() -> Self {
-        let state =
-            State { busy: 0, alone: false, held: [None, None], most: usize::MAX, stop: false, last_alone: Instant::now() };
-        Self { state: Mutex::new(state), wake: Condvar::new() }
+    pub(crate) fn new(world: Arc<dyn World>) -> Self {
+        let last_alone = world.steady();
+        let state = State { busy: 0, alone: false, held: [None, None], most: usize::MAX, stop: false, last_alone };
+        Self { state: Mutex::new(state), wake: Condvar::new(), world }
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -126,14 +129,7 @@ impl Schedule {
     pub(crate) fn next<E>(&self, look: &dyn Fn() -> Result<Waits, E>) -> Result<Turn, E> {
         let mut state = self.lock();
         loop {
-            if state.stop {
-                return Ok(Turn::Stop);
-            }
-            if state.may_give()
-                && let Some(turn) = choose(state.busy, state.last_alone.elapsed() >= ALONE_AT_LEAST_EVERY, &look()?)
-            {
-                state.busy += 1;
-                state.alone = turn.is_alone();
+            if let Some(turn) = state.give(self.world.steady(), look)? {
                 return Ok(turn);
             }
             // However often it is woken for nothing, pauses end and jobs grow older meanwhile.
@@ -141,13 +137,23 @@ impl Schedule {
         }
     }
 
+    /// The same without waiting: `None` where no turn is to be had now.
+    ///
+    /// # Errors
+    /// As `look`.
+    #[cfg(test)]
+    pub(crate) fn try_next<E>(&self, look: &dyn Fn() -> Result<Waits, E>) -> Result<Option<Turn>, E> {
+        self.lock().give(self.world.steady(), look)
+    }
+
     /// The slot's turn is over.
     pub(crate) fn done(&self, turn: Turn) {
+        let now = self.world.steady();
         let mut state = self.lock();
         state.busy = state.busy.saturating_sub(1);
         if turn.is_alone() {
             state.alone = false;
-            state.last_alone = Instant::now();
+            state.last_alone = now;
         }
         drop(state);
         self.wake.notify_all();
@@ -209,6 +215,23 @@ impl Schedule {
 }
 
 impl State {
+    /// A turn for one slot more, if there is one now.
+    fn give<E>(&mut self, now: Instant, look: &dyn Fn() -> Result<Waits, E>) -> Result<Option<Turn>, E> {
+        if self.stop {
+            return Ok(Some(Turn::Stop));
+        }
+        if !self.may_give() {
+            return Ok(None);
+        }
+        let overdue = now.duration_since(self.last_alone) >= ALONE_AT_LEAST_EVERY;
+        let turn = choose(self.busy, overdue, &look()?);
+        if let Some(turn) = turn {
+            self.busy += 1;
+            self.alone = turn.is_alone();
+        }
+        Ok(turn)
+    }
+
     fn may_give(&self) -> bool {
         self.held.iter().all(Option::is_none) && !self.alone && self.busy < self.most
     }
@@ -244,6 +267,11 @@ mod tests {
     use std::convert::Infallible;
 
     use super::*;
+    use crate::world::Machine;
+
+    fn schedule() -> Schedule {
+        Schedule::new(Arc::new(Machine))
+    }
 
     fn waiting(highest: i64, aged: i64) -> Option<Waiting> {
         let priority = |number| Priority::try_from(number).unwrap();
@@ -261,7 +289,7 @@ mod tests {
 
     #[test]
     fn small_ones_run_beside_each_other_a_large_one_alone() {
-        let s = Schedule::new();
+        let s = schedule();
         let both = waits(5, 5, 0);
         assert_eq!([next(&s, both), next(&s, both)], [Turn::Small, Turn::Small]);
         s.done(Turn::Small);
@@ -276,7 +304,7 @@ mod tests {
 
     #[test]
     fn suspects_come_last_and_alone() {
-        let s = Schedule::new();
+        let s = schedule();
         for (waits, turn) in [(waits(5, 5, 5), Turn::Small), (waits(0, 5, 5), Turn::Large), (waits(0, 0, 5), Turn::Alone)] {
             assert_eq!((next(&s, waits), s.busy()), (turn, 1));
             s.done(turn);
@@ -325,7 +353,7 @@ mod tests {
 
     #[test]
     fn nothing_is_given_out_while_one_reason_holds() {
-        let s = Schedule::new();
+        let s = schedule();
         assert!(s.hold(Hold::Disk, Some("full".into())) && s.hold(Hold::Operator, Some("wanted".into())));
         assert!(!s.hold(Hold::Disk, Some("still full".into())), "no news");
         assert_eq!(s.standing().held, ["still full", "wanted"]);
@@ -336,7 +364,7 @@ mod tests {
 
     #[test]
     fn outside_of_the_hours_fewer_slots_work() {
-        let s = Schedule::new();
+        let s = schedule();
         assert!(s.limit(1) && !s.limit(1) && !s.is_paused());
         let turn = next(&s, waits(5, 0, 0));
         assert!(!s.lock().may_give(), "one is at work");
@@ -349,7 +377,7 @@ mod tests {
     /// Who waits for work is told of news at once.
     #[test]
     fn news_wake_who_waits() {
-        let s = Schedule::new();
+        let s = schedule();
         let there = std::sync::atomic::AtomicBool::new(false);
         let look = || Ok::<_, Infallible>(waits(i64::from(there.load(std::sync::atomic::Ordering::Relaxed)), 0, 0));
         std::thread::scope(|scope| {
@@ -365,7 +393,7 @@ mod tests {
 
     #[test]
     fn stopping_ends_every_wait() {
-        let s = Schedule::new();
+        let s = schedule();
         s.hold(Hold::Disk, Some("full".into()));
         std::thread::scope(|scope| {
             let waiting = scope.spawn(|| next(&s, waits(5, 5, 5)));

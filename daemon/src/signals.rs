@@ -34,7 +34,7 @@ impl Stop {
 }
 
 /// Set by SIGHUP, which then does not end the process: the configuration is to be read anew.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Hangup(Arc<AtomicBool>);
 
 impl Hangup {
@@ -46,6 +46,12 @@ impl Hangup {
         let hangup = Self::default();
         signal_hook::flag::register(SIGHUP, Arc::clone(&hangup.0))?;
         Ok(hangup)
+    }
+
+    /// As if it came.
+    #[cfg(test)]
+    pub(crate) fn raise(&self) {
+        self.0.store(true, Ordering::Relaxed);
     }
 
     /// Has there been one since the last call?

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use crossbeam::channel::unbounded;
 use suture_store::job::{Kind, Testimony};
-use suture_store::{Clock, JobStore, Query, SledStore, StoreError, SystemClock, crash_point};
+use suture_store::{JobStore, Query, SledStore, StoreError, crash_point};
 
 use crate::again::Lives;
 use crate::attempt::{Context, IN_HAND, Slot, WITNESS, remove_work};
@@ -33,6 +33,7 @@ use crate::say::complain;
 use crate::schedule::{Hold, Schedule, Turn};
 use crate::settings::Settings;
 use crate::signals::{Hangup, Stop};
+use crate::world::{Machine, World};
 use crate::{standstill, watchdog};
 
 /// How often what is gone is looked for.
@@ -224,11 +225,13 @@ impl Daemon {
             Ok(unread) => unread,
             Err(error) => return End::Store(error),
         };
-        let context = Context {
+        let world: Arc<dyn World> = Arc::new(Machine);
+        let context = Arc::new(Context {
+            schedule: Schedule::new(Arc::clone(&world)),
+            world,
             store: Arc::clone(&self.store) as Arc<dyn JobStore>,
             folders: self.folders.clone(),
             settings: Arc::clone(&self.settings),
-            schedule: Schedule::new(),
             events,
             once: self.once,
             halt: AtomicBool::new(false),
@@ -236,7 +239,7 @@ impl Daemon {
             away: Mutex::default(),
             unread,
             failed: Mutex::new(None),
-        };
+        });
         if let Err(error) = guarded(|| recover(&context)) {
             return End::Store(error);
         }
@@ -285,8 +288,8 @@ impl Daemon {
         // Before anything is taken, whether a door opens or not.
         look_for_pause(context);
         let sweep = move || {
-            let clock = || Moment { steady: Instant::now(), wall: SystemClock.now() };
-            let swept = guarded(|| sweeper(context).tend(&clock, &|| ended.load(Ordering::Relaxed) || context.has_failed()));
+            let swept =
+                guarded(|| sweeper(context).tend(&|| moment(context), &|| ended.load(Ordering::Relaxed) || context.has_failed()));
             swept.unwrap_or_else(|error| context.fail(error));
         };
         if !self.once {
@@ -299,7 +302,7 @@ impl Daemon {
     fn sweep_once(&self, context: &Context) {
         let stop = || self.stop.asked() || context.has_failed();
         if self.once && !stop() {
-            let swept = guarded(|| sweeper(context).sweep(SystemClock.now(), &stop).map(drop));
+            let swept = guarded(|| sweeper(context).sweep(context.world.wall(), &stop).map(drop));
             swept.unwrap_or_else(|error| context.fail(error));
         }
     }
@@ -328,7 +331,7 @@ fn no_thread(source: std::io::Error) -> StoreError {
 /// The threads that work on jobs.
 struct Slots<'s, 'e> {
     scope: &'s std::thread::Scope<'s, 'e>,
-    context: &'s Context,
+    context: &'s Arc<Context>,
     threads: Mutex<Vec<ScopedJoinHandle<'s, ()>>>,
 }
 
@@ -361,7 +364,7 @@ impl<'s> Slots<'s, '_> {
 }
 
 /// Takes nothing new where an operator has noted that for the next daemon.
-fn look_for_pause(context: &Context) {
+pub(crate) fn look_for_pause(context: &Context) {
     let is_set = standstill::is_set(&context.settings.now().state).unwrap_or_else(|error| {
         tracing::error!(%error, "Whether an operator paused the work cannot be told; it counts as paused: `suture jobs resume` ends that.");
         true
@@ -392,8 +395,13 @@ fn answer_at(folder: &Folder, context: &Context, ended: &dyn Fn() -> bool) {
 }
 
 /// Whoever lets go what is to go.
-fn sweeper(context: &Context) -> Sweeper<'_> {
-    Sweeper::new(&*context.store, &context.folders, &context.settings)
+pub(crate) fn sweeper(context: &Context) -> Sweeper {
+    Sweeper::new(Arc::clone(&context.store), context.folders.clone(), Arc::clone(&context.settings), moment(context))
+}
+
+/// What time it is.
+pub(crate) fn moment(context: &Context) -> Moment {
+    Moment { steady: context.world.steady(), wall: context.world.wall() }
 }
 
 /// A thread that ends in a panic, for want of another thread or by a defect, must not leave the others waiting: the daemon ends with it,
@@ -404,7 +412,7 @@ fn guarded(work: impl FnOnce() -> Result<(), StoreError>) -> Result<(), StoreErr
 }
 
 /// Takes up what an earlier life left, and clears its work folders away.
-fn recover(context: &Context) -> Result<(), StoreError> {
+pub(crate) fn recover(context: &Arc<Context>) -> Result<(), StoreError> {
     // What lies in a folder that is another daemon's for now tells nothing of this one's jobs.
     let folder = |name: &str| context.folders.iter().find(|folder| folder.name == name && folder.check().is_ok());
     let testimony = |job: &suture_store::Job| {

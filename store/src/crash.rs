@@ -6,15 +6,46 @@
 //! * `SUTURE_CRASH_TRACE=file` appends each pass's name to `file`, one a line: how a test learns which points there are and how
 //!   often a run passes them.
 //!
-//! Without the feature [`crash_point`] is an empty function.
+//! With the feature `testkit` a test learns of the passes of its own thread (`testkit::at_crash_points`). Without either [`crash_point`] is an
+//! empty function.
 
 /// Names this place. Names are `crate.step`, lower case.
-#[cfg(not(feature = "crash-points"))]
 #[inline(always)]
-pub fn crash_point(_name: &'static str) {}
+#[cfg_attr(not(any(feature = "crash-points", feature = "testkit")), allow(unused_variables, reason = "it is empty then"))]
+pub fn crash_point(name: &'static str) {
+    #[cfg(feature = "testkit")]
+    watched::pass(name);
+    #[cfg(feature = "crash-points")]
+    armed::crash_point(name);
+}
 
-#[cfg(feature = "crash-points")]
-pub use armed::crash_point;
+#[cfg(feature = "testkit")]
+pub use watched::at_crash_points;
+
+#[cfg(feature = "testkit")]
+mod watched {
+    use std::cell::RefCell;
+    use std::rc::Rc;
+
+    type Watch = Rc<dyn Fn(&'static str)>;
+
+    thread_local! {
+        static WATCH: RefCell<Option<Watch>> = const { RefCell::new(None) };
+    }
+
+    /// Has `watch` be called with the name of each crash point that this thread passes, or no one any more. It may unwind: so a
+    /// simulation ends a daemon without ending the process.
+    pub fn at_crash_points(watch: Option<Watch>) {
+        WATCH.with(|slot| *slot.borrow_mut() = watch);
+    }
+
+    pub(super) fn pass(name: &'static str) {
+        let watch = WATCH.with(|slot| slot.borrow().clone());
+        if let Some(watch) = watch {
+            watch(name);
+        }
+    }
+}
 
 #[cfg(feature = "crash-points")]
 mod armed {
@@ -44,7 +75,7 @@ mod armed {
     }
 
     /// Names this place; kills the process here when the environment says so.
-    pub fn crash_point(name: &'static str) {
+    pub(super) fn crash_point(name: &'static str) {
         let plan = plan();
         if let Some(trace) = &plan.trace {
             let mut file = trace.lock().unwrap_or_else(std::sync::PoisonError::into_inner);

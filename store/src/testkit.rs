@@ -12,6 +12,8 @@ mod past;
 mod results;
 mod tools;
 
+#[cfg(feature = "testkit")]
+pub use crate::crash::at_crash_points;
 pub use tools::{ManualClock, Subject, dropped, result_of};
 
 type Check = fn(&mut dyn Subject, &ManualClock) -> Result<(), StoreError>;

@@ -21,7 +21,7 @@ impl Scene {
     /// Taken into work, as an attempt leaves it to the desk.
     fn new() -> Self {
         let scene = Self::dropped();
-        crate::claim::claim(&scene.folder, &scene.claim.job, &scene.folder.work(scene.claim.token)).unwrap();
+        crate::claim::claim(&scene.folder, &scene.claim.job, &scene.folder.work(scene.claim.token), u64::MAX).unwrap();
         scene
     }
 

@@ -68,6 +68,20 @@ impl Stock {
     }
 }
 
+/// Originals of the hot folder at `root` that a kill left under a hidden name, below it.
+///
+/// # Errors
+/// When a folder cannot be read.
+pub(crate) fn left_aside(root: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut all = Vec::new();
+    for name in [DONE, MIXED[0], MIXED[1]] {
+        let area = Area::read(root, name)?;
+        let hidden = area.files.into_keys().filter(|path| path.file_name().is_some_and(is_aside));
+        all.extend(hidden.map(|path| Path::new(name).join(path)));
+    }
+    Ok(all)
+}
+
 /// The files of one part of a hot folder.
 struct Area {
     name: &'static str,

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use suture_store::job::{Area, Kind};
 use suture_store::{Job, JobStore, Query, StoreError, Time};
@@ -11,7 +11,7 @@ use suture_store::{Job, JobStore, Query, StoreError, Time};
 use super::archive::{Archive, Stays, give_back};
 use super::history::past;
 use super::plan::{Going, What, going};
-use super::stock::Stock;
+use super::stock::{Stock, left_aside};
 use super::turns::{Moment, Turns};
 use crate::config::keep::Keep;
 use crate::folder::Folder;
@@ -26,14 +26,19 @@ const LOOK_EVERY: Duration = Duration::from_millis(200);
 const COUNT_EVERY: Duration = Duration::from_secs(60);
 
 /// Lets go what is to go of some hot folders and their store.
-pub(crate) struct Sweeper<'a> {
-    store: &'a dyn JobStore,
-    folders: &'a [Arc<Folder>],
-    settings: &'a Settings,
+pub(crate) struct Sweeper {
+    store: Arc<dyn JobStore>,
+    folders: Vec<Arc<Folder>>,
+    settings: Arc<Settings>,
     /// Files that stayed, as they were then: they are not looked at again until they change.
     stayed: BTreeMap<PathBuf, Identity>,
     /// Lines of the last sweep that need not be said again.
     told: BTreeSet<String>,
+    turns: Turns,
+    /// Hot folders in which this sweeper has given originals their names back.
+    righted: BTreeSet<String>,
+    /// When ended jobs were counted last.
+    counted: Instant,
 }
 
 /// What a sweep did.
@@ -46,9 +51,10 @@ pub(crate) struct Swept {
     pub forgotten: u64,
 }
 
-impl<'a> Sweeper<'a> {
-    pub(crate) fn new(store: &'a dyn JobStore, folders: &'a [Arc<Folder>], settings: &'a Settings) -> Self {
-        Self { store, folders, settings, stayed: BTreeMap::new(), told: BTreeSet::new() }
+impl Sweeper {
+    pub(crate) fn new(store: Arc<dyn JobStore>, folders: Vec<Arc<Folder>>, settings: Arc<Settings>, now: Moment) -> Self {
+        let (stayed, told, righted, turns) = (BTreeMap::new(), BTreeSet::new(), BTreeSet::new(), Turns::new(now));
+        Self { store, folders, settings, stayed, told, turns, righted, counted: now.steady }
     }
 
     /// Sweeps whenever it is time to, until `ended`.
@@ -56,18 +62,41 @@ impl<'a> Sweeper<'a> {
     /// # Errors
     /// Store errors only.
     pub(crate) fn tend(&mut self, clock: &dyn Fn() -> Moment, ended: &dyn Fn() -> bool) -> Result<(), StoreError> {
-        let (mut turns, mut counted) = (Turns::new(clock()), clock().steady);
         while !ended() {
             std::thread::sleep(LOOK_EVERY);
-            let now = clock();
-            if turns.is_due(now) {
-                self.sweep(now.wall, ended)?;
-            } else if now.steady.duration_since(counted) >= COUNT_EVERY {
-                counted = now.steady;
-                self.count(now.wall)?;
-            }
+            self.look(clock(), ended)?;
         }
         Ok(())
+    }
+
+    /// Sweeps if it is time to, until `ended`.
+    ///
+    /// # Errors
+    /// Store errors only.
+    pub(crate) fn look(&mut self, now: Moment, ended: &dyn Fn() -> bool) -> Result<(), StoreError> {
+        self.set_right();
+        if self.turns.is_due(now) {
+            self.sweep(now.wall, ended)?;
+        } else if now.steady.duration_since(self.counted) >= COUNT_EVERY {
+            self.counted = now.steady;
+            self.count(now.wall)?;
+        }
+        Ok(())
+    }
+
+    /// Originals that an earlier life left under a hidden name on their way to the archive get their names back, whether they are to go there still or
+    /// not: at once, since no one else would find them.
+    fn set_right(&mut self) {
+        for folder in &self.folders {
+            if self.righted.contains(&folder.name) || folder.check().is_err() {
+                continue;
+            }
+            // What cannot be done now is tried at the next look.
+            let set_right = |left: Vec<PathBuf>| left.iter().all(|path| give_back(&folder.root.join(path)).is_ok());
+            if left_aside(&folder.root).is_ok_and(set_right) {
+                self.righted.insert(folder.name.clone());
+            }
+        }
     }
 
     /// Keeps the store bounded between two sweeps, however many jobs end: by their number, which no clock tells.
@@ -79,7 +108,7 @@ impl<'a> Sweeper<'a> {
 
     fn forget(&self, keep: &Keep, now: Time) -> Result<u64, StoreError> {
         let mut forgotten = 0;
-        for past in past(self.store, keep, now, &|job| self.is_needed(job))? {
+        for past in past(&*self.store, keep, now, &|job| self.is_needed(job))? {
             let jobs = self.store.forget(&past.ids)?;
             tracing::info!(jobs, reason = past.why, "Old jobs are forgotten; their files stay as they are.");
             forgotten += jobs;
@@ -92,11 +121,12 @@ impl<'a> Sweeper<'a> {
     /// # Errors
     /// Store errors only.
     pub(crate) fn sweep(&mut self, now: Time, stop: &dyn Fn() -> bool) -> Result<Swept, StoreError> {
+        self.set_right();
         // Of this sweep to its end, whatever is read meanwhile.
         let keep = self.settings.now().keep.clone();
         let (mut swept, busy, said) = (Swept::default(), self.busy()?, std::mem::take(&mut self.told));
-        for folder in self.folders {
-            if let Err(line) = self.files(folder, &keep, now, &busy, stop, &mut swept) {
+        for folder in self.folders.clone() {
+            if let Err(line) = self.files(&folder, &keep, now, &busy, stop, &mut swept) {
                 if !said.contains(&line) {
                     tracing::warn!(folder = %folder.root.display(), reason = line, "Retention: nothing more goes for now.");
                 }
@@ -242,14 +272,14 @@ mod tests {
     struct Scene {
         dir: tempfile::TempDir,
         folders: Vec<Arc<Folder>>,
-        store: MemoryStore,
+        store: Arc<MemoryStore>,
     }
 
     impl Scene {
         fn new() -> Self {
             let dir = tempfile::tempdir().unwrap();
             let folder = Folder::open(&FolderConfig::of(&dir.path().join("hot")), None).unwrap();
-            let scene = Self { dir, folders: vec![Arc::new(folder)], store: MemoryStore::new(Arc::new(SystemClock)) };
+            let scene = Self { dir, folders: vec![Arc::new(folder)], store: Arc::new(MemoryStore::new(Arc::new(SystemClock))) };
             let hash = blake3::hash(b"result").to_hex();
             let receipt = format!(
                 "{{\"receipt_version\":1,\"output\":\"a.stl\",\"output_blake3\":\"{hash}\",\"report_blake3\":\"{hash}\"}}"
@@ -272,11 +302,16 @@ mod tests {
             self.dir.path().join(name)
         }
 
+        fn sweeper(&self, config: Config) -> Sweeper {
+            let store = Arc::<MemoryStore>::clone(&self.store);
+            let now = Moment { steady: Instant::now(), wall: SystemClock.now() };
+            Sweeper::new(store, self.folders.clone(), Arc::new(Settings::fixed(config)), now)
+        }
+
         fn sweeps(&self, keep: &Keep, days: &[u64]) -> Vec<Swept> {
             let mut config = Config::for_folder(&self.at("hot"));
             config.keep = keep.clone();
-            let settings = Settings::fixed(config);
-            let mut sweeper = Sweeper::new(&self.store, &self.folders, &settings);
+            let mut sweeper = self.sweeper(config);
             let later = |days: &u64| SystemClock.now().plus_ms(days * DAY + 1000);
             days.iter().map(|days| sweeper.sweep(later(days), &|| false).unwrap()).collect()
         }
@@ -309,6 +344,18 @@ mod tests {
     fn nothing_goes_unless_it_is_said() {
         let scene = Scene::new();
         assert_eq!(scene.sweeps(&Keep::default(), &[9999]), [swept(0, 0)]);
+    }
+
+    /// A kill left it under a hidden name, and the archive is none any more.
+    #[test]
+    fn an_original_that_was_left_aside_is_given_back_at_once() {
+        let scene = Scene::new();
+        std::fs::rename(scene.at("hot/done/a.stl"), scene.at("hot/done/.suture-archived-a.stl")).unwrap();
+        let mut sweeper = scene.sweeper(Config::for_folder(&scene.at("hot")));
+        let now = Moment { steady: Instant::now(), wall: SystemClock.now() };
+        sweeper.look(now, &|| false).unwrap();
+        assert_eq!(std::fs::read(scene.at("hot/done/a.stl")).unwrap(), b"original");
+        assert!(!scene.is_there("hot/done/.suture-archived-a.stl"));
     }
 
     /// Neither is a disk that is not mounted an archive, nor does it keep results from going.
@@ -345,8 +392,7 @@ mod tests {
         let scene = Scene::new();
         let mut config = Config::for_folder(&scene.at("hot"));
         config.keep.history_jobs = 10;
-        let settings = Settings::fixed(config);
-        let sweeper = Sweeper::new(&scene.store, &scene.folders, &settings);
+        let sweeper = scene.sweeper(config);
         for n in 1..=12 {
             let (path, folder, profile) = (RelPath::new(format!("{n}.stl")).unwrap(), "hot".into(), "default".into());
             let source = Source { folder, path, dev: 1, ino: n, size: 84, mtime_ns: 1, profile };

@@ -10,7 +10,7 @@ use super::tools::{ManualClock, Subject, claim_any, job, named, no_one_is_innoce
 fn past(name: &str, id: u64, reached: Reached, ending: Ending) -> Result<Past, StoreError> {
     let source = named(name, 84)?.source;
     let publication = result_of(&Job::queued(JobId(id), source.clone(), Time(5)), ending);
-    let work = (reached != Reached::Ended).then_some(Token(900 + id));
+    let work = (reached != Reached::Ended).then_some(Token(900_u64.wrapping_add(id)));
     Ok(Past { id: JobId(id), source, moved_to: None, publication, attempts: Attempt(2), work, ended: Time(5), reached })
 }
 

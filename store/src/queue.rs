@@ -22,15 +22,20 @@ use crate::id::{Clock, Epoch, JobId, Recipe, Seq, Time, Token};
 use crate::job::{Event, Illegal, Job, Kind, Source, State, Step, Testimony};
 use crate::path::MAX_SOURCE;
 use crate::record;
-use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted, Waiting};
+use crate::store::{
+    Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
+};
 use crate::tables::{Put, Table, Tables};
 
+mod by_key;
 mod forget;
 mod index;
 mod line;
 mod offered;
+mod page;
 mod results;
 
+use by_key::identity;
 use line::{Line, Now};
 
 /// Longest folder or profile name, as it stands in a record.
@@ -251,13 +256,6 @@ impl<T: Tables> Queue<T> {
         Ok(Some(head))
     }
 
-    /// The job that answers for the file with this identity already.
-    fn answering(&self, key: &[u8]) -> Result<Option<JobId>, StoreError> {
-        let Some(bytes) = self.tables.get(Table::ByKey, key)? else { return Ok(None) };
-        let id: JobId = record::decode(Table::ByKey, key, &bytes)?;
-        Ok(self.job(id)?.filter(Job::answers_for_source).map(|job| job.id))
-    }
-
     /// Jobs under a claim of an earlier epoch.
     fn orphans(&self, epoch: Epoch) -> Result<Vec<Job>, StoreError> {
         let mut orphans = Vec::new();
@@ -436,6 +434,14 @@ impl<T: Tables> JobStore for Queue<T> {
         Ok(jobs)
     }
 
+    fn page(&self, look: &Look) -> Result<Page, StoreError> {
+        self.latest(look)
+    }
+
+    fn find(&self, source: &Source) -> Result<Option<JobId>, StoreError> {
+        self.latest_of(source)
+    }
+
     fn results(&self, size: u64, recipe: Option<Recipe>) -> Result<Vec<Job>, StoreError> {
         self.offered(size, recipe)
     }
@@ -480,18 +486,4 @@ fn head_put(head: &Head) -> Result<Put, StoreError> {
 fn fits(what: &str, name: &str) -> Result<(), StoreError> {
     let length = serde_json::to_string(name).map_or(usize::MAX, |text| text.len());
     if length > MAX_NAME { Err(StoreError::TooLong { what: format!("{what} {name:?}") }) } else { Ok(()) }
-}
-
-/// What makes a dropped file that file. The profile is not part of it: a changed setting does not make a new drop.
-fn identity(source: &Source) -> Vec<u8> {
-    let folder = source.folder.as_bytes();
-    let mut key = Vec::with_capacity(40 + folder.len() + source.path.as_bytes().len());
-    for number in [source.dev, source.ino, source.size] {
-        key.extend_from_slice(&number.to_be_bytes());
-    }
-    key.extend_from_slice(&source.mtime_ns.to_be_bytes());
-    key.extend_from_slice(&(folder.len() as u64).to_be_bytes());
-    key.extend_from_slice(folder);
-    key.extend_from_slice(source.path.as_bytes());
-    key
 }

@@ -1,6 +1,7 @@
 //! The end of a record: jobs at rest leave the store, with all that points to them. Their numbers are never used again.
 
-use super::{Queue, head_put, identity, index, results};
+use super::by_key::identity;
+use super::{Queue, head_put, index, results};
 use crate::crash::crash_point;
 use crate::id::JobId;
 use crate::record;

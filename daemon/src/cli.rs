@@ -9,8 +9,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use suture_store::Priority;
 use suture_store::job::Kind;
 
-use crate::config::api::parse_listen;
-use crate::units::{parse_duration, parse_size};
+use crate::units::{parse_duration, parse_listen, parse_size};
 
 /// A build for crash tests says so, lest it be installed.
 const VERSION: &str = if cfg!(feature = "crash-points") {

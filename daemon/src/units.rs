@@ -1,5 +1,6 @@
-//! Sizes and durations as people write them: `512MiB`, `1.5 GB`, `5s`, `2m`, `300ms`; a bare number is bytes or seconds.
+//! Sizes and durations as people write them: `512MiB`, `1.5 GB`, `5s`, `2m`, `300ms`; a bare number is bytes or seconds. And addresses.
 
+use std::net::SocketAddr;
 use std::time::Duration;
 
 /// Splits `text` into its number and its unit.
@@ -113,6 +114,14 @@ pub(crate) fn show_count(count: u64) -> String {
         out.push(c);
     }
     out
+}
+
+/// An address to listen at.
+///
+/// # Errors
+/// A line for people.
+pub(crate) fn parse_listen(text: &str) -> Result<SocketAddr, String> {
+    text.parse().map_err(|_| format!("`{text}` is no address with a port (try 127.0.0.1:7878)"))
 }
 
 #[cfg(test)]

@@ -109,11 +109,10 @@ impl Come {
     /// As `mkdir`, `rename` and `fsync`; of kind `AlreadyExists` when thousands of such names are taken.
     pub(crate) fn place(mut self, folder: &Folder, path: &RelPath, key: Option<&Key>) -> io::Result<RelPath> {
         let wanted = path.to_path();
-        let (below, name) = (fsx::folder_of(&wanted), wanted.file_name().unwrap_or_default());
-        make_way(&folder.inbox(), below)?;
+        let name = wanted.file_name().unwrap_or_default();
+        make_way(&folder.inbox(), wanted.parent().unwrap_or(Path::new("")))?;
         for n in 1..=MOST_NAMES {
-            let path = RelPath::from_path(&below.join(fsx::versioned(name, n, 0)).components().collect::<PathBuf>())
-                .map_err(io::Error::other)?;
+            let path = RelPath::from_path(&wanted.with_file_name(fsx::versioned(name, n, 0))).map_err(io::Error::other)?;
             let to = folder.inbox().join(path.to_path());
             if fsx::exists(&to)? {
                 continue;
@@ -245,6 +244,8 @@ mod tests {
             );
         }
         assert_eq!(std::fs::read_dir(folder.uploads()).unwrap().count(), 1, "the notes alone");
+        let plain = come(&folder, b"three").place(&folder, &destination("part.stl").unwrap(), None).unwrap();
+        assert_eq!(plain.to_string(), "part.stl");
         let _half = std::mem::ManuallyDrop::new(Coming::begin(&folder).unwrap());
         drop(Coming::begin(&folder).unwrap());
         assert_eq!(std::fs::read_dir(folder.uploads()).unwrap().count(), 2);

@@ -28,6 +28,7 @@ mod metrics;
 mod patience;
 mod problem;
 mod routes;
+mod seats;
 mod server;
 mod shared;
 mod shown;
@@ -35,6 +36,7 @@ mod status;
 mod stream;
 mod tokens;
 mod upload;
+mod verified;
 
 use shared::Shared;
 use tokens::Tokens;

@@ -35,7 +35,6 @@ mod offered;
 mod page;
 mod results;
 
-use by_key::identity;
 use line::{Line, Now};
 
 /// Longest folder or profile name, as it stands in a record.
@@ -224,7 +223,7 @@ impl<T: Tables> Queue<T> {
         let mut jobs: Vec<Job> = Vec::new();
         let mut keys = BTreeMap::new();
         for submission in found {
-            let key = identity(&submission.source);
+            let key = by_key::key(&submission.source);
             if let Some(id) = keys.get(&key).copied().map_or_else(|| self.answering(&key), |id| Ok(Some(id)))? {
                 answers.push(Submitted { id, new: false });
                 continue;
@@ -254,6 +253,13 @@ impl<T: Tables> Queue<T> {
         let changes: Vec<_> = jobs.iter().map(|job| (None, job)).collect();
         self.commit(inner, head, &changes, puts)?;
         Ok(Some(head))
+    }
+
+    /// The job that answers for the file with this identity already.
+    fn answering(&self, key: &[u8]) -> Result<Option<JobId>, StoreError> {
+        let Some(bytes) = self.tables.get(Table::ByKey, key)? else { return Ok(None) };
+        let id: JobId = record::decode(Table::ByKey, key, &bytes)?;
+        Ok(self.job(id)?.filter(Job::answers_for_source).map(|job| job.id))
     }
 
     /// Jobs under a claim of an earlier epoch.

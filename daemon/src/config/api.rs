@@ -41,17 +41,10 @@ impl Api {
     }
 }
 
-/// An address to listen at.
-///
-/// # Errors
-/// A line for people.
-pub(crate) fn parse_listen(text: &str) -> Result<SocketAddr, String> {
-    text.parse().map_err(|_| format!("`{text}` is no address with a port (try 127.0.0.1:7878)"))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::units::parse_listen;
 
     #[test]
     fn beyond_this_machine_only_with_tokens() {

@@ -10,12 +10,12 @@ use suture_core::Profile;
 use suture_store::Priority;
 use toml::Spanned;
 
-use super::api::{Api, parse_listen};
+use super::api::Api;
 use super::keep::{Bound, Keep};
 use super::{Config, DEFAULT_PROFILE, FolderConfig, name_of, real};
 use crate::own_profile::OwnProfile;
 use crate::profiles::{self, place_of, with_line};
-use crate::units::{parse_duration, parse_size};
+use crate::units::{parse_duration, parse_listen, parse_size};
 use crate::window::RunWindow;
 
 /// For what the daemon chooses by itself.

@@ -1,19 +1,18 @@
 //! The files that a job has left, and only those: a name in a hot folder is anyone's to take, so that bytes are sent only after their digest was found to be
 //! the published one. That is remembered for as long as the file is not touched.
 
-use std::collections::HashMap;
 use std::fs::File;
 use std::io;
 use std::os::unix::fs::FileExt;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use axum::body::{Body, Bytes};
 use axum::extract::{Path, State};
 use axum::http::header::{CONTENT_DISPOSITION, CONTENT_LENGTH, CONTENT_TYPE, ETAG, IF_NONE_MATCH};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
-use suture_store::{Hash, Job, JobId, State as JobState};
+use suture_store::{Hash, Job, State as JobState};
 use tokio::sync::mpsc::{Sender, channel};
 use tokio::task::spawn_blocking;
 
@@ -26,37 +25,11 @@ use super::flow::Flow;
 use super::jobs::{id_of, job_of};
 use super::problem::Problem;
 use super::shared::Shared;
+use super::verified::Which;
 
 /// Bytes that are read at a time, and those that are hashed.
 const CHUNK: usize = 256 << 10;
 const HASHED: usize = 4 << 20;
-/// Files that are remembered.
-const REMEMBERED: usize = 1024;
-
-/// A file of a job.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-enum Which {
-    Result,
-    Report,
-}
-
-/// Files that were found to be what their jobs left.
-#[derive(Default)]
-pub(super) struct Verified(Mutex<HashMap<(JobId, Which), Identity>>);
-
-impl Verified {
-    fn has(&self, key: (JobId, Which), found: &Identity) -> bool {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).get(&key) == Some(found)
-    }
-
-    fn add(&self, key: (JobId, Which), found: Identity) {
-        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if known.len() >= REMEMBERED {
-            known.clear();
-        }
-        known.insert(key, found);
-    }
-}
 
 /// A file that is open, and how it was found.
 struct Opened {

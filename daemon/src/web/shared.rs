@@ -7,10 +7,9 @@ use tokio::sync::Semaphore;
 use crate::attempt::Context;
 use crate::config::api::Api;
 
-use super::files::Verified;
-use super::stream;
+use super::seats::{LISTENERS, Uploads};
 use super::tokens::Tokens;
-use super::upload::Uploads;
+use super::verified::Verified;
 
 /// What every handler has.
 pub(super) struct Shared {
@@ -26,6 +25,13 @@ pub(super) struct Shared {
 
 impl Shared {
     pub(super) fn new(context: Arc<Context>, api: Api, tokens: Tokens) -> Self {
-        Self { context, api, tokens, verified: Verified::default(), uploads: Arc::default(), listeners: stream::seats() }
+        Self {
+            context,
+            api,
+            tokens,
+            verified: Verified::default(),
+            uploads: Arc::default(),
+            listeners: Arc::new(Semaphore::new(LISTENERS)),
+        }
     }
 }

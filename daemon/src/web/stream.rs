@@ -9,9 +9,9 @@ use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
+use tokio::sync::OwnedSemaphorePermit;
 use tokio::sync::broadcast::error::RecvError;
 use tokio::sync::mpsc::{Sender, channel};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::timeout;
 
 use crate::event_bus::{Bus, Listening, Message};
@@ -19,24 +19,18 @@ use crate::event_metrics::Count;
 
 use super::flow::Flow;
 use super::problem::Problem;
+use super::seats::LISTENERS;
 use super::shared::Shared;
 
-/// Listeners at a time.
-pub(super) const AT_ONCE: usize = 64;
 /// How often something is said, if only that nothing is.
 const ALIVE_EVERY: Duration = Duration::from_secs(15);
 /// Pieces that wait for a client.
 const AHEAD: usize = 32;
 
-/// Seats of listeners.
-pub(super) fn seats() -> Arc<Semaphore> {
-    Arc::new(Semaphore::new(AT_ONCE))
-}
-
 /// `GET /v1/events`.
 pub(super) async fn events(State(shared): State<Arc<Shared>>, headers: HeaderMap) -> Result<Response, Problem> {
     let seat = Arc::clone(&shared.listeners).try_acquire_owned();
-    let seat = seat.map_err(|_| Problem::unavailable(format!("{AT_ONCE} are listening already; try again")))?;
+    let seat = seat.map_err(|_| Problem::unavailable(format!("{LISTENERS} are listening already; try again")))?;
     let bus = Arc::clone(&shared.context.bus);
     let listening = bus.listen(last_heard(&headers)).ok_or_else(|| Problem::unavailable("no one can listen"))?;
     let (sender, pieces) = channel(AHEAD);

@@ -3,10 +3,9 @@
 //! A body goes to the disk as it comes, a piece at a time, bounded in length, by the room on the disk, and in time. The answer has the job's number: the
 //! thread that looks after the folders gives it ([`crate::handed`]).
 
-use std::collections::BTreeSet;
 use std::io;
 use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::multipart::Multipart;
@@ -16,7 +15,6 @@ use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 use suture_store::{JobId, Priority, RelPath};
-use tokio::sync::Semaphore;
 use tokio::time::timeout;
 
 use crate::attempt::{Context, Event};
@@ -29,50 +27,14 @@ use super::ask::{PATIENCE, ask};
 use super::intake::{Source, spool};
 use super::jobs::{job_of, parameters, wished};
 use super::problem::Problem;
+use super::seats::Taken;
 use super::shared::Shared;
 use super::shown::Shown;
 
-/// Uploads at a time.
-const AT_ONCE: usize = 8;
 /// Longest key in bytes.
 const LONGEST_KEY: usize = 255;
 /// Parts of a form before the file.
 const MOST_PARTS: usize = 16;
-
-/// Uploads under way.
-pub(super) struct Uploads {
-    pub seats: Semaphore,
-    keys: Mutex<BTreeSet<Key>>,
-}
-
-impl Default for Uploads {
-    fn default() -> Self {
-        Self { seats: Semaphore::new(AT_ONCE), keys: Mutex::default() }
-    }
-}
-
-/// A key whose upload is under way, until its file has its place, whether the client is still there or not.
-struct Taken {
-    uploads: Arc<Uploads>,
-    key: Key,
-}
-
-impl Uploads {
-    fn take(self: &Arc<Self>, key: Key) -> Result<Taken, Problem> {
-        let mut keys = self.keys.lock().unwrap_or_else(PoisonError::into_inner);
-        if !keys.insert(key.clone()) {
-            return Err(Problem::conflict("an upload with this `Idempotency-Key` is under way; ask again when it is done"));
-        }
-        drop(keys);
-        Ok(Taken { uploads: Arc::clone(self), key })
-    }
-}
-
-impl Drop for Taken {
-    fn drop(&mut self) {
-        self.uploads.keys.lock().unwrap_or_else(PoisonError::into_inner).remove(&self.key);
-    }
-}
 
 /// What comes with a body.
 #[derive(Debug, Deserialize)]

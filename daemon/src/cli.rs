@@ -233,7 +233,7 @@ pub(crate) struct WatchArgs {
     /// How long a file must be at rest before it is taken, e.g. 5s
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     pub settle: Option<Duration>,
-    /// Serve the HTTP interface here, e.g. 127.0.0.1:7878; beyond this machine only with tokens (see [api] in the configuration)
+    /// Serve the HTTP interface here, e.g. 127.0.0.1:7878; beyond this machine only with tokens, which a configuration names
     #[arg(long, value_name = "ADDR", value_parser = parse_listen)]
     pub listen: Option<SocketAddr>,
 }

@@ -64,8 +64,8 @@ fn metrics_and_the_log_agree() {
     let place = Place::new();
     let daemon = Served::start(&place, &LISTENING, "log");
     let client = Client::of(&daemon);
-    (0..3).for_each(|i| drop(place.put(&format!("hot/in/{i}.stl"), &holes(i))));
-    place.put("hot/in/same.stl", &holes(0));
+    (1..=3).for_each(|i| drop(place.put(&format!("hot/in/{i}.stl"), &holes(i))));
+    place.put("hot/in/same.stl", &holes(1));
     place.put("hot/in/picture.stl", b"\x89PNG\r\n\x1a\nendsolid");
     wait_until("all are done", || daemon.lines("Done.").len() == 4 && daemon.lines("Ended without").len() == 1);
     let text = String::from_utf8(client.get("/metrics").expect(200).body).unwrap();

@@ -1,4 +1,4 @@
-//! What happens to jobs and folders: each thing is one value, which writes its line of the log and counts in the metrics, so that the two never differ, and
+//! Events of jobs and folders: each thing that happens is one value, which writes its line of the log and counts in the metrics, so that the two never differ, and
 //! which says what those who listen are told.
 
 use serde_json::{Value, json};
@@ -30,7 +30,7 @@ pub(crate) enum Happening<'a> {
     FolderBack { name: &'a str, root: &'a std::path::Path },
 }
 
-/// What those who listen are told: a name, and what there is to say.
+/// A word to those who listen: a name, and what there is to say.
 pub(crate) type Told = (&'static str, Value);
 
 impl Happening<'_> {
@@ -83,7 +83,7 @@ impl Happening<'_> {
         }
     }
 
-    /// What listeners are told, if anything.
+    /// The word to listeners, if there is one.
     pub(crate) fn told(&self) -> Option<Told> {
         Some(match self {
             Self::Came { id, submission } => {

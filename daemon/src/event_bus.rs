@@ -54,9 +54,9 @@ pub(crate) struct Bus {
     publishing: Mutex<BTreeMap<JobId, Instant>>,
 }
 
-/// What a listener gets.
+/// A listener's side.
 pub(crate) struct Listening {
-    /// What it has missed since it listened last.
+    /// All that it has missed since it listened last.
     pub missed: Vec<Arc<Message>>,
     /// Something between is not known any more.
     pub lost: bool,

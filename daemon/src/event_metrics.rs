@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// What only grows.
+/// Numbers that only grow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Count {
     JobsFinished,
@@ -19,7 +19,7 @@ pub(crate) enum Count {
     EventsLost,
 }
 
-/// What is measured again and again.
+/// Measurements that are made again and again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Timing {
     JobDuration,
@@ -163,7 +163,7 @@ pub(crate) fn written(labels: &[Label<'_>]) -> String {
     labels.iter().map(|(name, value)| format!("{name}=\"{}\"", escaped(value))).collect::<Vec<_>>().join(",")
 }
 
-/// What a family of values is.
+/// The head of a family of values.
 pub(crate) fn head(text: &mut String, (name, help): (&str, &str), kind: &str) {
     // Writing to a string cannot fail.
     let _ = writeln!(text, "# HELP {name} {help}\n# TYPE {name} {kind}");

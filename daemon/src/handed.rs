@@ -6,7 +6,7 @@ use tokio::sync::oneshot;
 
 use crate::fsx::Identity;
 
-/// What is handed over.
+/// A file that is handed over.
 #[derive(Debug)]
 pub(crate) struct Handed {
     /// The hot folder's name, and the file's below its `in/`.

@@ -1,4 +1,4 @@
-//! What a finished job has left in its hot folder, and where.
+//! The files that a finished job has left in its hot folder.
 
 use std::path::{Path, PathBuf};
 

@@ -269,7 +269,7 @@ impl Reconciler {
 fn complete(inbox: &Path, below: &Path) -> Result<Identity, Untaken> {
     let unseen = |error: io::Error| Untaken::Unavailable(format!("the file cannot be looked at: {error}"));
     let name = below.file_name().unwrap_or_default();
-    // What the scan would not find is not there: no link is followed on the way.
+    // A file that the scan would not find is not there: no link is followed on the way.
     for folder in below.ancestors().skip(1).filter(|folder| !folder.as_os_str().is_empty()) {
         let found = fsx::look(&inbox.join(folder)).map_err(unseen)?;
         let is_folder = found.is_some() && std::fs::symlink_metadata(inbox.join(folder)).is_ok_and(|meta| meta.is_dir());

@@ -173,7 +173,7 @@ pub(crate) fn destination(text: &str) -> Result<RelPath, String> {
     }
 }
 
-/// What was noted of a key.
+/// The note of a key.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Noted {
     /// Below `in/`.
@@ -191,7 +191,7 @@ impl Key {
         Self(keys(folder).join(blake3::hash(text.as_bytes()).to_hex().as_str()))
     }
 
-    /// What was noted of it, if anything was.
+    /// The note of it, if there is one.
     ///
     /// # Errors
     /// When that cannot be read: then no one knows.

@@ -18,7 +18,7 @@ pub struct Client {
     pub address: String,
 }
 
-/// What came back.
+/// An answer.
 #[derive(Debug)]
 pub struct Answer {
     /// The code of its status; 0 when the connection was closed without an answer.

@@ -8,7 +8,7 @@ use axum::body::Bytes;
 use hyper::body::{Body, Frame, SizeHint};
 use tokio::sync::mpsc::Receiver;
 
-/// What comes in pieces from somewhere else.
+/// Pieces that come from somewhere else.
 pub(super) struct Flow {
     pieces: Receiver<io::Result<Bytes>>,
     /// Bytes still to come, where that is known.

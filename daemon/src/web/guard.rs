@@ -1,4 +1,4 @@
-//! What every request passes, and every answer.
+//! The gate that every request passes, and every answer.
 //!
 //! * The name by which a client calls this machine must be a known one: a page of someone else's, whose name was made to lead here, asks by
 //!   that name. Addresses need no list: no one but us has them.

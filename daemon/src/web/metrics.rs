@@ -86,7 +86,7 @@ fn process(text: &mut String, context: &Context) {
     gauge(text, ("suture_build_info", "The program."), [(build, 1.0)]);
     let words = ("process_start_time_seconds", "When this life of the daemon began.");
     gauge(text, words, [(vec![], context.bus.life as f64 / 1000.0)]);
-    // What the system does not say is left out.
+    // Values that the system does not tell are left out.
     let read = |name: &str| std::fs::read_to_string(Path::new("/proc/self").join(name)).unwrap_or_default();
     let statm = read("statm");
     let mut pages = statm.split(' ').map(|pages| pages.parse::<u64>().ok());

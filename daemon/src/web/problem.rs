@@ -63,7 +63,7 @@ impl From<StoreError> for Problem {
             StoreError::Unknown(_) => Self::missing(error.to_string()),
             StoreError::TooLong { .. } => Self::bad(error.to_string()),
             _ if error.is_callers() => Self::conflict(error.to_string()),
-            // What lies on whose disk is no client's business.
+            // Paths of this machine are no client's business.
             _ => Self::unavailable("the job store does not answer for now; try again"),
         }
     }

@@ -22,7 +22,7 @@ use super::upload::submit;
 
 type Route = (&'static str, MethodRouter<Arc<Shared>>);
 
-/// What a program needs to know of all this; written by hand, and held to the routes and to every answer by tests.
+/// The interface as a program reads it; written by hand, and held to the routes and to every answer by tests.
 const OPENAPI: &str = include_str!("openapi.json");
 
 /// `GET /v1/openapi.json`.
@@ -54,7 +54,7 @@ fn all() -> Vec<Route> {
 pub(super) fn router(shared: Arc<Shared>) -> Router {
     let router = all().into_iter().fold(Router::new(), |router, (path, methods)| router.route(path, methods));
     let router = router.fallback(async || StatusCode::NOT_FOUND);
-    // What comes is bounded where it is read.
+    // Bodies are bounded where they are read.
     let router = router.layer(DefaultBodyLimit::disable());
     router.layer(from_fn_with_state(Arc::clone(&shared), guard)).with_state(shared)
 }

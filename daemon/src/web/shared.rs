@@ -1,4 +1,4 @@
-//! What all answers are made of.
+//! The state that all answers are made of.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use super::seats::{LISTENERS, Uploads};
 use super::tokens::Tokens;
 use super::verified::Verified;
 
-/// What every handler has.
+/// The state that every handler has.
 pub(super) struct Shared {
     pub context: Arc<Context>,
     pub api: Api,

@@ -28,7 +28,7 @@ pub(super) struct Status {
     running: usize,
     /// Why nothing new is taken; empty: it is.
     held: Vec<String>,
-    /// What is out of reach.
+    /// All that is out of reach, in words.
     away: Vec<String>,
     /// How many jobs there are in each state.
     jobs: BTreeMap<&'static str, u64>,

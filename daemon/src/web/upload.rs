@@ -36,7 +36,7 @@ const LONGEST_KEY: usize = 255;
 /// Parts of a form before the file.
 const MOST_PARTS: usize = 16;
 
-/// What comes with a body.
+/// Parameters that come with a body.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Wanted {

@@ -39,7 +39,7 @@ impl<T: Tables> Queue<T> {
         }
         ids.sort_unstable_by(|a, b| b.cmp(a));
         ids.dedup();
-        // What lies before those is not all known.
+        // Not all that lies before those is known.
         let is_cut = ids.len() >= most;
         ids.truncate(most);
         let last = ids.last().copied();

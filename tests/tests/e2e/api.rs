@@ -53,7 +53,7 @@ fn jobs_are_listed_and_their_files_are_sent() {
     assert_eq!(Some(tag.trim_matches('"')), job["result"]["blake3"].as_str());
     assert!(client.send("GET", &result, &[("If-None-Match", &tag)], b"").expect(304).body.is_empty());
     assert!(client.send("HEAD", &result, &[], b"").expect(200).body.is_empty());
-    // What someone else has put in its place is not sent.
+    // Another file in its place is not sent.
     std::fs::write(place.at(&format!("hot/out/{name}")), "mine").unwrap();
     client.get(&result).expect(409);
     std::fs::remove_file(place.at(&format!("hot/out/{name}"))).unwrap();

@@ -1,4 +1,4 @@
-//! What a daemon tells of its work: events as they happen, metrics, and the document of its interface.
+//! A daemon tells of its work: events as they happen, metrics, and the document of its interface.
 
 use std::io::{BufRead, BufReader, Write};
 

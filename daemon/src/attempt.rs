@@ -20,12 +20,16 @@ use crate::choice;
 use crate::claim::{CLAIMED, Claimed, Unclaimed, claim};
 use crate::config::Config;
 use crate::create;
+use crate::event::Happening;
+use crate::event_bus::Bus;
 use crate::folder::Folder;
 use crate::fsx::Identity;
+use crate::handed::Handed;
 use crate::past::Unread;
 use crate::protocol::Request;
 use crate::publish::{Conclusion, Desk, OUTPUT, discard};
 use crate::publish_error::PublishError;
+use crate::pulse::Pulse;
 use crate::receipt::ReusedFrom;
 use crate::reuse::Sought;
 use crate::schedule::{Schedule, Turn, Waits};
@@ -48,6 +52,8 @@ pub(crate) enum Event {
     Hint { renamed: Vec<PathBuf> },
     /// A job came to its end, and answers for its name no longer.
     Ended { folder: String, path: PathBuf, id: JobId },
+    /// Someone hands a file over, and waits for its job.
+    Handed(Handed),
 }
 
 /// What all threads of the daemon share.
@@ -69,6 +75,10 @@ pub(crate) struct Context {
     pub unread: Unread,
     /// The store failed; every thread ends.
     pub failed: Mutex<Option<StoreError>>,
+    /// For who asks from outside.
+    pub pulse: Pulse,
+    /// Where everything that happens is told.
+    pub bus: Arc<Bus>,
 }
 
 impl Context {
@@ -206,7 +216,6 @@ impl Slot {
     }
 
     fn close(&self, job: &Job, work: suture_store::Token) {
-        tell(job);
         let Some(folder) = self.context.folder(job) else { return };
         if job.kind() == Kind::Parked {
             // Its result is in there.
@@ -269,6 +278,9 @@ impl Slot {
                 match worked {
                     Worked::Report { report, written, reused } => match verify(&report, written.as_ref(), &work) {
                         Ok(()) => {
+                            if reused.is_none() {
+                                context.bus.tell(&Happening::Reported { report: &report });
+                            }
                             let conclusion = Conclusion::Report { report, ctime_ns: claimed.ctime_ns(), reused };
                             return desk.intend(job, &conclusion).map(Some);
                         }
@@ -314,7 +326,8 @@ impl Slot {
         };
         let limit = config.time_limit.of(job.source.size);
         tracing::debug!(worker = worker.pid(), attempt = job.attempts.0, "Work begins.");
-        let ended = worker.run(&request, limit, &stop);
+        let ended =
+            worker.run(&request, limit, &stop, &mut |stage, done, total| context.bus.progress(job.id, stage, done, total));
         crash_point("daemon.worked");
         if matches!(ended, Ended::Done { .. } | Ended::Failed { .. }) && !turn.is_alone() {
             self.worker = Some(worker);
@@ -474,25 +487,6 @@ pub(crate) fn remove_work(work: &Path) {
     match std::fs::remove_dir_all(work) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
             tracing::warn!(%error, folder = %work.display(), "A work folder could not be removed; the next start does it.");
-        }
-        _ => {}
-    }
-}
-
-fn tell(job: &Job) {
-    match &job.state {
-        State::Ended { publication } if publication.ending.is_good() => {
-            let output = publication.output.as_ref().map(tracing::field::display);
-            tracing::info!(ending = ?publication.ending, output, reused = publication.reused.map(|job| job.0), "Done.");
-        }
-        State::Ended { publication } => {
-            tracing::warn!(ending = ?publication.ending, reason = publication.reason, "Ended without a good result.");
-        }
-        State::Cancelled { why } => tracing::info!(?why, "Taken back."),
-        State::Queued { .. } => tracing::info!(reason = job.note, "Back in the queue."),
-        // Said once; `suture jobs` tells of every further try.
-        _ if job.kind() == Kind::Parked && job.parked.is_some_and(|parked| parked.tries == 1) => {
-            tracing::error!(reason = job.note, "The result cannot be brought into place; it is kept, and tried again.");
         }
         _ => {}
     }

@@ -1,5 +1,6 @@
 //! The command line: what can be said, with help for each word of it. Meaning is given in the modules named after the commands.
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -8,7 +9,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use suture_store::Priority;
 use suture_store::job::Kind;
 
-use crate::units::{parse_duration, parse_size};
+use crate::units::{parse_duration, parse_listen, parse_size};
 
 /// A build for crash tests says so, lest it be installed.
 const VERSION: &str = if cfg!(feature = "crash-points") {
@@ -288,6 +289,9 @@ pub(crate) struct WatchArgs {
     /// How long a file must be at rest before it is taken, e.g. 5s
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     pub settle: Option<Duration>,
+    /// Serve the HTTP interface here, e.g. 127.0.0.1:7878; beyond this machine only with tokens, which a configuration names
+    #[arg(long, value_name = "ADDR", value_parser = parse_listen)]
+    pub listen: Option<SocketAddr>,
 }
 
 /// What the supervisor tells a worker of itself.

@@ -1,5 +1,5 @@
 //! The settings that the daemon works by. A hot folder needs no settings; a TOML file may name several folders, profiles and limits: [`read`] reads it,
-//! [`show`] writes one, [`command`] does either for people. [`keep`] is what goes by itself.
+//! [`show`] writes one, [`command`] does either for people. [`keep`] is what goes by itself, [`api`] the web interface.
 
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -11,8 +11,10 @@ use suture_store::Priority;
 use crate::own_profile::OwnProfile;
 use crate::units::show_size;
 use crate::window::RunWindow;
+use api::Api;
 use keep::Keep;
 
+pub(crate) mod api;
 pub(crate) mod command;
 pub(crate) mod keep;
 pub(crate) mod read;
@@ -96,6 +98,8 @@ pub(crate) struct Config {
     pub reuse: bool,
     /// What goes by itself, and when.
     pub keep: Keep,
+    /// The web interface; `None`: there is none.
+    pub api: Option<Api>,
     pub profiles: BTreeMap<String, OwnProfile>,
 }
 
@@ -119,6 +123,7 @@ impl Config {
             workers_outside: 0,
             reuse: true,
             keep: Keep::default(),
+            api: None,
             profiles: BTreeMap::new(),
         }
     }

@@ -129,6 +129,9 @@ pub(crate) fn answer(store: &dyn JobStore, wish: &JobsWish) -> Result<Vec<Job>, 
 }
 
 /// Pauses the daemon or lets it go on, if that is wished, and says how it stands.
+///
+/// # Errors
+/// When the pause cannot be noted.
 pub(crate) fn steer(context: &Context, wish: &DaemonWish) -> Result<Standing, Refusal> {
     if let DaemonWish::Pause | DaemonWish::Resume = wish {
         let paused = *wish == DaemonWish::Pause;
@@ -143,14 +146,16 @@ pub(crate) fn steer(context: &Context, wish: &DaemonWish) -> Result<Standing, Re
 }
 
 /// Does what is wished of jobs while the daemon works on them.
+///
+/// # Errors
+/// As [`answer`].
 pub(crate) fn change(context: &Context, wish: &JobsWish) -> Result<Vec<Job>, Refusal> {
     let before = if let JobsWish::Cancel(id) = wish { context.store.get(*id).ok().flatten() } else { None };
     let jobs = answer(&*context.store, wish)?;
     if let Some(before) = &before {
         context.sweep(before);
     }
-    if let JobsWish::Retry(id) | JobsWish::Cancel(id) | JobsWish::Rank(id, _) = wish {
-        tracing::info!(job = id.0, ?wish, "An operator's wish.");
+    if let JobsWish::Retry(_) | JobsWish::Cancel(_) | JobsWish::Rank(..) = wish {
         context.schedule.news();
     }
     Ok(jobs)

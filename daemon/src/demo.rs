@@ -14,7 +14,7 @@ use crate::exit::Exit;
 use crate::say::complain;
 use crate::settings::Settings;
 use crate::signals::Stop;
-use crate::{create, fsx, jobs, reach, table, watch};
+use crate::{create, fsx, left, reach, table, watch};
 
 mod meshes;
 
@@ -125,7 +125,7 @@ fn tell(dir: &Path, job: &Job) {
     let State::Ended { publication } = &job.state else {
         return say(format_args!("{name:<16} {}", job.kind()));
     };
-    let report = jobs::report_path(dir, job).and_then(|path| std::fs::read(path).ok());
+    let report = left::report_path(dir, job).and_then(|path| std::fs::read(path).ok());
     let Some(report) = report.and_then(|bytes| serde_json::from_slice::<Report>(&bytes).ok()) else {
         say(format_args!("{name:<16} {}\n{:16} reason  {}", job.kind(), "", publication.reason));
         return;

@@ -140,6 +140,11 @@ impl Folder {
         self.root.join(PRIVATE).join("work")
     }
 
+    /// Where files that come by the web are, on their way into `in/`.
+    pub(crate) fn uploads(&self) -> PathBuf {
+        self.root.join(PRIVATE).join("upload")
+    }
+
     /// The folder of one attempt.
     pub(crate) fn work(&self, token: Token) -> PathBuf {
         self.work_root().join(token.to_string())

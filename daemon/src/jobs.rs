@@ -1,22 +1,22 @@
 //! `suture jobs`: what became of every dropped file, and what an operator may want of it.
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
 use suture_core::Report;
-use suture_store::job::{Area, Kind};
+use suture_store::job::Kind;
 use suture_store::{Job, JobId, State, Time};
 
 use crate::cli::{JobsArgs, JobsCommand};
 use crate::control::{DaemonWish, JobsWish};
 use crate::exit::Exit;
 use crate::fsx;
+use crate::left::{area, report_path};
 use crate::reach::{self, Failure};
 use crate::rebuild::{Rebuilt, rebuild};
-use crate::receipt::REPORT;
 use crate::say::{complain, plain};
 use crate::schedule::Standing;
 use crate::{standstill, table};
@@ -183,15 +183,6 @@ fn note(job: &Job) -> String {
     }
 }
 
-fn area(area: Area) -> &'static str {
-    match area {
-        Area::In => "in",
-        Area::Done => "done",
-        Area::Failed => "failed",
-        Area::Quarantine => "quarantine",
-    }
-}
-
 fn line(job: &Job) -> String {
     let (id, kind, since) = (job.id.0, job.kind().name(), when(job.changed));
     let priority = if job.priority.is_default() { String::new() } else { format!("priority {}  ", job.priority) };
@@ -246,17 +237,4 @@ fn show(dir: &Path, job: &Job) -> String {
         }
     }
     text
-}
-
-/// Where the report of a finished job is.
-pub(crate) fn report_path(dir: &Path, job: &Job) -> Option<PathBuf> {
-    let State::Ended { publication } = &job.state else { return None };
-    let (folder, base) = if publication.ending.is_good() {
-        ("out", publication.output.as_ref()?)
-    } else {
-        (area(publication.ending.area()), publication.original.as_ref()?)
-    };
-    let mut name = dir.join(folder).join(base.to_path()).into_os_string();
-    name.push(REPORT);
-    Some(name.into())
 }

@@ -12,8 +12,10 @@ use suture_store::job::{Area, Kind};
 use suture_store::{Control, Job, JobId, Query, StoreError, crash_point};
 
 use crate::attempt::{Context, Event};
+use crate::event::Happening;
 use crate::folder::Folder;
 use crate::fsx;
+use crate::handed::Handed;
 use crate::hints::{Watching, watcher};
 use crate::orders::Orders;
 use crate::past::each_job;
@@ -23,6 +25,7 @@ use crate::schedule::Hold;
 use crate::settings::Reload;
 use crate::settle::Rest;
 use crate::signals::Stop;
+use crate::taking::take;
 
 mod once;
 
@@ -45,6 +48,7 @@ pub(crate) struct Keeper {
     inbox: Receiver<Event>,
     stop: Stop,
     folders: Vec<Kept>,
+    handed: Vec<Handed>,
     disk_looked: Option<Instant>,
     /// It was within the hours of work at the last look.
     is_open: bool,
@@ -104,7 +108,7 @@ impl Keeper {
             folders.push(kept);
         }
         let (context, stop) = (Arc::clone(context), stop.clone());
-        Self { context, inbox, stop, folders, disk_looked: None, is_open: true }
+        Self { context, inbox, stop, folders, handed: Vec::new(), disk_looked: None, is_open: true }
     }
 
     /// Keeps the folders until there is a reason to end.
@@ -153,7 +157,13 @@ impl Keeper {
             self.go_by(reload)?;
             raise(self.context.settings.now().workers)?;
         }
+        for handed in std::mem::take(&mut self.handed) {
+            if let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == handed.folder) {
+                take(&self.context, &mut kept.reconciler, &mut kept.orders, handed)?;
+            }
+        }
         let now = self.context.world.steady();
+        self.context.pulse.beat();
         self.look_at_disk(now)?;
         self.look_at_clock();
         for kept in &mut self.folders {
@@ -192,6 +202,7 @@ impl Keeper {
                         kept.dirty = true;
                     }
                 }
+                Ok(Event::Handed(handed)) => self.handed.push(handed),
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => return,
             }
             next = self.inbox.try_recv().map_err(|_| RecvTimeoutError::Timeout);
@@ -365,10 +376,12 @@ impl Kept {
             Err(error) => vec![error.clone()],
         };
         context.away.lock().unwrap_or_else(PoisonError::into_inner).insert(self.folder.name.clone(), away);
+        context.pulse.scanned(&self.folder.name, context.world.steady().duration_since(now));
         match found {
             Ok(gone) => {
                 if std::mem::take(&mut self.unavailable) {
-                    tracing::info!(folder = %self.folder.root.display(), "The folder is back.");
+                    let (name, root) = (&self.folder.name, &self.folder.root);
+                    context.bus.tell(&Happening::FolderBack { name, root });
                 }
                 self.gone.extend(gone);
                 self.watch(context);
@@ -376,7 +389,8 @@ impl Kept {
             Err(error) => {
                 self.watched = None;
                 if !std::mem::replace(&mut self.unavailable, true) {
-                    tracing::error!(folder = %self.folder.root.display(), error, "The folder cannot be served; the others go on.");
+                    let (name, root) = (&self.folder.name, &self.folder.root);
+                    context.bus.tell(&Happening::FolderAway { name, root, why: &error });
                 }
             }
         }
@@ -426,9 +440,6 @@ impl Kept {
             Ok(submitted) => {
                 crash_point("daemon.submitted");
                 for ((path, submission), answer) in paths.iter().zip(&found).zip(submitted) {
-                    if let (Some(what), true) = (&submission.foreign, answer.new) {
-                        tracing::warn!(job = answer.id.0, file = %submission.source.path, what, "Left where it is.");
-                    }
                     self.orders.came(&submission.source.path, answer.id, now);
                     self.reconciler.submitted(path, submission, answer.id);
                 }

@@ -15,6 +15,7 @@ use crate::choice;
 use crate::claim::Original;
 use crate::folder::{Folder, NameKind, is_hot, name_kind};
 use crate::fsx::{self, Identity};
+use crate::handed::{Handed, Untaken};
 use crate::profiles;
 use crate::settings::Settings;
 use crate::settle::{Look, Rest, Settling, length_fits};
@@ -167,6 +168,32 @@ impl Reconciler {
         }
     }
 
+    /// A file that someone says is whole, ready to be submitted. One that this program has put there is taken as it was then.
+    ///
+    /// # Errors
+    /// When there is no file that could be taken.
+    pub(crate) fn hand_over(&mut self, handed: &Handed) -> Result<Submission, Untaken> {
+        let away = self.folder.check();
+        away.map_err(Untaken::Unavailable)?;
+        let identity = match handed.placed {
+            Some(identity) => identity,
+            None => complete(&self.folder.inbox(), &handed.path.to_path())?,
+        };
+        let source = self.source(handed.path.clone(), &identity);
+        let priority = choice::priority(&self.settings.now(), &self.folder, &source.path, &source.profile);
+        Ok(Submission { source, foreign: None, priority })
+    }
+
+    /// Does this very file lie where it was dropped?
+    ///
+    /// # Errors
+    /// When that cannot be told: an error is no absence.
+    pub(crate) fn is_there(&self, source: &Source) -> io::Result<bool> {
+        let found = fsx::look(&self.folder.inbox().join(source.path.to_path()))?;
+        let Source { dev, ino, size, mtime_ns, .. } = *source;
+        Ok(found.is_some_and(|found| found.same_content(&Identity { dev, ino, size, mtime_ns, ctime_ns: 0 })))
+    }
+
     /// The store cannot hold a record of this file; it stays where it is, and is named once.
     pub(crate) fn refused(&mut self, path: &Path, reason: &str) {
         if let Some(Entry::Settling { state, .. }) = self.entries.get(path) {
@@ -236,6 +263,37 @@ impl Reconciler {
         }
         default
     }
+}
+
+/// A mesh below `in/` to which nothing is added any more.
+fn complete(inbox: &Path, below: &Path) -> Result<Identity, Untaken> {
+    let unseen = |error: io::Error| Untaken::Unavailable(format!("the file cannot be looked at: {error}"));
+    let name = below.file_name().unwrap_or_default();
+    // A file that the scan would not find is not there: no link is followed on the way.
+    for folder in below.ancestors().skip(1).filter(|folder| !folder.as_os_str().is_empty()) {
+        let found = fsx::look(&inbox.join(folder)).map_err(unseen)?;
+        let is_folder = found.is_some() && std::fs::symlink_metadata(inbox.join(folder)).is_ok_and(|meta| meta.is_dir());
+        let hidden = folder.file_name().is_some_and(|name| name_kind(name) == NameKind::Ignored);
+        if !is_folder || hidden || is_hot(&inbox.join(folder)).map_err(unseen)? {
+            return Err(Untaken::Missing);
+        }
+    }
+    let full = inbox.join(below);
+    if fsx::look(&full).map_err(unseen)?.is_none() {
+        return Err(Untaken::Missing);
+    }
+    let meta = std::fs::symlink_metadata(&full).map_err(unseen)?;
+    let kind = name_kind(name);
+    let else_it_is = || if meta.is_dir() { Some("a folder".into()) } else { what_else(&meta, kind, &name.to_string_lossy()) };
+    match (kind, else_it_is()) {
+        (NameKind::Ignored, _) => return Err(Untaken::NoMesh("a temporary or hidden file, which is not taken".into())),
+        (_, Some(words)) => return Err(Untaken::NoMesh(words)),
+        (_, None) => {}
+    }
+    let file = Original::open(&full).map_err(unseen)?;
+    let identity = file.identity().map_err(unseen)?;
+    let whole = length_fits(file.file()).map_err(unseen)? && !Writers::default().has(file.file(), &identity);
+    if whole { Ok(identity) } else { Err(Untaken::Unfinished) }
 }
 
 /// What lies in a folder.

@@ -194,6 +194,11 @@ impl Schedule {
         state.most == 0 || state.held.iter().any(Option::is_some)
     }
 
+    /// Why nothing is given out for this reason, in words, if it holds.
+    pub(crate) fn held(&self, why: Hold) -> Option<String> {
+        self.lock().held[why as usize].clone()
+    }
+
     /// What an operator may want to know.
     pub(crate) fn standing(&self) -> Standing {
         let state = self.lock();

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, PoisonError, RwLock};
 
 use crate::cli::WatchArgs;
+use crate::config::api::Api;
 use crate::config::{Config, read, real, show};
 use crate::signals::Hangup;
 
@@ -81,6 +82,11 @@ fn from_args(args: &WatchArgs) -> Result<Config, String> {
     config.threads = args.threads.map_or(config.threads, usize::from);
     config.settle = args.settle.or(config.settle);
     config.check_memory()?;
+    if let Some(listen) = args.listen {
+        let api = config.api.take().unwrap_or_else(|| Api::at(listen));
+        config.api = Some(Api { listen, ..api });
+    }
+    config.api.as_ref().map_or(Ok(()), Api::check)?;
     Ok(config)
 }
 
@@ -89,6 +95,9 @@ fn fixed(old: &Config, new: &Config) -> Vec<String> {
     let mut fixed = Vec::new();
     if real(&old.state) != real(&new.state) {
         fixed.push("`state`".to_owned());
+    }
+    if old.api != new.api {
+        fixed.push("`[api]`".to_owned());
     }
     let places = |config: &Config| -> BTreeMap<String, (PathBuf, bool)> {
         config.folders.iter().map(|folder| (folder.name.clone(), (real(&folder.path), folder.leave_originals))).collect()
@@ -214,6 +223,7 @@ mod tests {
         let first = FIRST.replace("1GiB", "2GiB");
         for (text, words) in [
             (format!("state = \"/nowhere/state\"\n{first}"), "changes `state`"),
+            (format!("{first}[api]\nlisten = \"127.0.0.1:1\"\n"), "changes `[api]`"),
             (format!("{first}[[folders]]\npath = \"/nowhere/b\"\n"), "changes the folder `b`"),
             (first.replace("/nowhere/a", "/nowhere/c"), "changes `state`, the folder `a`, the folder `c`"),
             (first.replace("profile =", "name = \"d\"\nprofile ="), "changes the folder `a`, the folder `d`"),

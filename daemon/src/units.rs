@@ -1,5 +1,6 @@
-//! Sizes and durations as people write them: `512MiB`, `1.5 GB`, `5s`, `2m`, `300ms`; a bare number is bytes or seconds.
+//! Sizes and durations as people write them: `512MiB`, `1.5 GB`, `5s`, `2m`, `300ms`; a bare number is bytes or seconds. And addresses.
 
+use std::net::SocketAddr;
 use std::time::Duration;
 
 /// Splits `text` into its number and its unit.
@@ -134,6 +135,14 @@ pub(crate) fn show_point(p: &[f32; 3]) -> String {
 /// A box.
 pub(crate) fn show_box([lo, hi]: &[[f32; 3]; 2]) -> String {
     format!("{} to {}", show_point(lo), show_point(hi))
+}
+
+/// An address to listen at.
+///
+/// # Errors
+/// A line for people.
+pub(crate) fn parse_listen(text: &str) -> Result<SocketAddr, String> {
+    text.parse().map_err(|_| format!("`{text}` is no address with a port (try 127.0.0.1:7878)"))
 }
 
 #[cfg(test)]

@@ -20,6 +20,8 @@ use crate::cli::WatchArgs;
 use crate::config::{Config, default_state, real};
 use crate::control::Door;
 use crate::create;
+use crate::event_bus::Bus;
+use crate::event_store::Heard;
 use crate::exit::Exit;
 use crate::folder::{Folder, FolderError, is_fading};
 use crate::fsx;
@@ -27,14 +29,16 @@ use crate::ground::{note_traces, read_traces};
 use crate::keeper::Keeper;
 use crate::past::Unread;
 use crate::publish_error::PublishError;
+use crate::pulse::Pulse;
 use crate::retention::sweep::Sweeper;
 use crate::retention::turns::Moment;
 use crate::say::complain;
 use crate::schedule::{Hold, Schedule, Turn};
 use crate::settings::Settings;
 use crate::signals::{Hangup, Stop};
+use crate::web::Web;
 use crate::world::{Machine, World};
-use crate::{standstill, watchdog};
+use crate::{standstill, uploads, watchdog};
 
 /// How often what is gone is looked for.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
@@ -76,6 +80,13 @@ pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew:
             };
         }
     };
+    let web = match config.api.as_ref().map(Web::bind).transpose() {
+        Ok(web) => web,
+        Err((line, error)) => {
+            complain(&line);
+            return Exit::of_start(&error);
+        }
+    };
     let (lives, not_good) = (Lives::so_far(), Arc::<AtomicBool>::default());
     if let Err(error) = watch_store(lives, &not_good, stop, may_begin_anew) {
         complain(&format_args!("no thread can be started: {error}; try again, or raise the limit of processes"));
@@ -92,7 +103,7 @@ pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew:
     note_state(&config, &folders);
     note_folders(&config, &folders);
     let settings = Arc::new(settings);
-    let daemon = Daemon { settings, folders, store, once, lives, not_good, stop: stop.clone(), may_begin_anew };
+    let daemon = Daemon { settings, folders, store, web, once, lives, not_good, stop: stop.clone(), may_begin_anew };
     daemon.run()
 }
 
@@ -169,6 +180,7 @@ struct Daemon {
     settings: Arc<Settings>,
     folders: Vec<Arc<Folder>>,
     store: Arc<SledStore>,
+    web: Option<Web>,
     once: bool,
     lives: Lives,
     /// A job ended not good, in any life.
@@ -225,11 +237,13 @@ impl Daemon {
             Ok(unread) => unread,
             Err(error) => return End::Store(error),
         };
+        let bus = Arc::new(Bus::new(self.web.is_some()));
+        let store = Arc::clone(&self.store) as Arc<dyn JobStore>;
         let world: Arc<dyn World> = Arc::new(Machine);
         let context = Arc::new(Context {
             schedule: Schedule::new(Arc::clone(&world)),
             world,
-            store: Arc::clone(&self.store) as Arc<dyn JobStore>,
+            store: Arc::new(Heard::new(store, Arc::clone(&bus))),
             folders: self.folders.clone(),
             settings: Arc::clone(&self.settings),
             events,
@@ -239,10 +253,16 @@ impl Daemon {
             away: Mutex::default(),
             unread,
             failed: Mutex::new(None),
+            pulse: Pulse::new(),
+            bus,
         });
         if let Err(error) = guarded(|| recover(&context)) {
             return End::Store(error);
         }
+        let web = match self.web.as_ref().map(|web| web.start(&context)).transpose() {
+            Ok(web) => web,
+            Err(error) => return End::Store(no_thread(error)),
+        };
         let mut keeper = Keeper::new(&context, inbox, &self.stop);
         let ended = AtomicBool::new(false);
         std::thread::scope(|scope| {
@@ -250,6 +270,7 @@ impl Daemon {
             let threads = self.start(scope, &context, &ended);
             let kept = threads.and_then(|()| guarded(|| keeper.keep(&|workers| slots.raise(workers))));
             context.schedule.stop();
+            context.pulse.end();
             match kept {
                 Ok(()) => {
                     self.drain(&context, &slots);
@@ -259,6 +280,9 @@ impl Daemon {
             }
             ended.store(true, Ordering::Relaxed);
         });
+        if let Some(web) = web {
+            web.stop();
+        }
         let failed = context.failed.lock().map_or_else(|poisoned| poisoned.into_inner().take(), |mut failed| failed.take());
         match failed {
             Some(error) => End::Store(error),
@@ -455,7 +479,11 @@ pub(crate) fn recover(context: &Arc<Context>) -> Result<(), StoreError> {
         .iter()
         .filter_map(|job| job.work.map(|token| token.to_string()))
         .collect();
-    for folder in context.folders.iter().filter(|folder| folder.check().is_ok() && !context.unread.has(folder)) {
+    for folder in context.folders.iter().filter(|folder| folder.check().is_ok()) {
+        uploads::clear(folder);
+        if context.unread.has(folder) {
+            continue;
+        }
         // Without jobs under claim, every folder in there is a left-over.
         for entry in std::fs::read_dir(folder.work_root()).into_iter().flatten().flatten() {
             if !held.iter().any(|token| entry.file_name().to_str() == Some(token)) {

@@ -20,9 +20,13 @@ pub(crate) trait Hand {
     /// Is it there, waiting for a request?
     fn is_alive(&mut self) -> bool;
 
-    /// Works on one request, at most `limit` long, until `stop` says so. After anything but an answer the worker is gone.
-    fn run(&mut self, request: &Request, limit: Duration, stop: &dyn Fn() -> bool) -> Ended;
+    /// Works on one request, at most `limit` long, until `stop` says so, and tells `told` where the work stands: stage, done, total. After anything
+    /// but an answer the worker is gone.
+    fn run(&mut self, request: &Request, limit: Duration, stop: &dyn Fn() -> bool, told: Telling<'_>) -> Ended;
 }
+
+/// Hears where work stands.
+pub(crate) type Telling<'a> = &'a mut dyn FnMut(&str, u64, u64);
 
 /// What a worker gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,8 +101,8 @@ impl Hand for Worker {
         Worker::is_alive(self)
     }
 
-    fn run(&mut self, request: &Request, limit: Duration, stop: &dyn Fn() -> bool) -> Ended {
-        Worker::run(self, request, Some(limit), stop, &mut |_, _, _| {})
+    fn run(&mut self, request: &Request, limit: Duration, stop: &dyn Fn() -> bool, told: Telling<'_>) -> Ended {
+        Worker::run(self, request, Some(limit), stop, told)
     }
 }
 
@@ -121,17 +125,25 @@ mod tests {
             "fsx::needs_polling",
         ];
         // Command lines and workers, which no daemon decides by; locks of other processes; the room of an archive; a daemon's beginning and end;
-        // and the thread that looks whether the others hang.
-        const APART: [&str; 11] = [
+        // the thread that looks whether the others hang; and how long things took, and the web, which are told of and decide nothing.
+        const APART: [&str; 19] = [
             "bar.rs",
+            "event_bus.rs",
+            "event_store.rs",
             "ground.rs",
             "item.rs",
+            "pulse.rs",
             "reach.rs",
             "retention/archive.rs",
             "retention/command.rs",
             "supervise.rs",
+            "uploads.rs",
             "watch.rs",
             "watchdog.rs",
+            "web.rs",
+            "web/intake.rs",
+            "web/metrics.rs",
+            "web/status.rs",
             "worker.rs",
             "world.rs",
         ];

@@ -31,4 +31,6 @@ pub use job::{Ending, Job, Kind, Past, Priority, Publication, Reached, Source, S
 pub use memory::MemoryStore;
 pub use path::RelPath;
 pub use sled_store::{Opening, SledStore};
-pub use store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted, Waiting};
+pub use store::{
+    Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
+};

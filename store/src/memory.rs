@@ -5,9 +5,11 @@ use std::ops::Bound;
 use std::sync::{Arc, RwLock};
 
 use crate::id::{Clock, Epoch, JobId, Recipe, Seq, SystemClock};
-use crate::job::{Job, Kind, Past, Step, Testimony};
+use crate::job::{Job, Kind, Past, Source, Step, Testimony};
 use crate::queue::Queue;
-use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted, Waiting};
+use crate::store::{
+    Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
+};
 use crate::tables::{Put, Table, Tables, Visit};
 
 /// A [`JobStore`] that forgets everything when it is dropped.
@@ -57,6 +59,17 @@ impl Tables for Memory {
         let entries = self.0.read().unwrap_or_else(std::sync::PoisonError::into_inner);
         for ((here, key), value) in entries.range((Bound::Included((table, from.to_vec())), Bound::Unbounded)) {
             if *here != table || (!to.is_empty() && key.as_slice() >= to) || !each(key, value)? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn scan_back(&self, table: Table, from: &[u8], to: &[u8], each: Visit<'_>) -> Result<(), StoreError> {
+        let entries = self.0.read().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let range = (Bound::Included((table, from.to_vec())), Bound::Excluded((table, to.to_vec())));
+        for ((_, key), value) in entries.range(range).rev() {
+            if !each(key, value)? {
                 break;
             }
         }
@@ -122,6 +135,14 @@ impl JobStore for MemoryStore {
 
     fn list(&self, query: &Query) -> Result<Vec<Job>, StoreError> {
         self.queue.list(query)
+    }
+
+    fn page(&self, look: &Look) -> Result<Page, StoreError> {
+        self.queue.page(look)
+    }
+
+    fn find(&self, source: &Source) -> Result<Option<JobId>, StoreError> {
+        self.queue.find(source)
     }
 
     fn results(&self, size: u64, recipe: Option<Recipe>) -> Result<Vec<Job>, StoreError> {

@@ -22,13 +22,17 @@ use crate::id::{Clock, Epoch, JobId, Recipe, Seq, Token};
 use crate::job::{Event, Illegal, Job, Kind, Past, Source, State, Step, Testimony};
 use crate::path::MAX_SOURCE;
 use crate::record;
-use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted, Waiting};
+use crate::store::{
+    Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
+};
 use crate::tables::{Put, Table, Tables};
 
+mod by_key;
 mod forget;
 mod index;
 mod line;
 mod offered;
+mod page;
 mod past;
 mod recover;
 mod results;
@@ -225,7 +229,7 @@ impl<T: Tables> Queue<T> {
         let mut jobs: Vec<Job> = Vec::new();
         let mut keys = BTreeMap::new();
         for submission in found {
-            let key = identity(&submission.source);
+            let key = by_key::key(&submission.source);
             if let Some(id) = keys.get(&key).copied().map_or_else(|| self.answering(&key), |id| Ok(Some(id)))? {
                 answers.push(Submitted { id, new: false });
                 continue;
@@ -382,6 +386,14 @@ impl<T: Tables> JobStore for Queue<T> {
         Ok(jobs)
     }
 
+    fn page(&self, look: &Look) -> Result<Page, StoreError> {
+        self.latest(look)
+    }
+
+    fn find(&self, source: &Source) -> Result<Option<JobId>, StoreError> {
+        self.latest_of(source)
+    }
+
     fn results(&self, size: u64, recipe: Option<Recipe>) -> Result<Vec<Job>, StoreError> {
         self.offered(size, recipe)
     }
@@ -423,18 +435,4 @@ fn unfilled_put() -> Result<Put, StoreError> {
 fn fits(what: &str, name: &str) -> Result<(), StoreError> {
     let length = serde_json::to_string(name).map_or(usize::MAX, |text| text.len());
     if length > MAX_NAME { Err(StoreError::TooLong { what: format!("{what} {name:?}") }) } else { Ok(()) }
-}
-
-/// What makes a dropped file that file. The profile is not part of it: a changed setting does not make a new drop.
-fn identity(source: &Source) -> Vec<u8> {
-    let folder = source.folder.as_bytes();
-    let mut key = Vec::with_capacity(40 + folder.len() + source.path.as_bytes().len());
-    for number in [source.dev, source.ino, source.size] {
-        key.extend_from_slice(&number.to_be_bytes());
-    }
-    key.extend_from_slice(&source.mtime_ns.to_be_bytes());
-    key.extend_from_slice(&(folder.len() as u64).to_be_bytes());
-    key.extend_from_slice(folder);
-    key.extend_from_slice(source.path.as_bytes());
-    key
 }

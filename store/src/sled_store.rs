@@ -33,9 +33,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::id::{Clock, JobId, Recipe, SystemClock};
-use crate::job::{Job, Kind, Past, Step, Testimony};
+use crate::job::{Job, Kind, Past, Source, Step, Testimony};
 use crate::queue::Queue;
-use crate::store::{Claim, Control, Filter, JobStore, Lease, Query, Recovered, StoreError, Submission, Submitted, Waiting};
+use crate::store::{
+    Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
+};
 
 mod files;
 #[cfg(test)]
@@ -164,6 +166,14 @@ impl JobStore for SledStore {
 
     fn list(&self, query: &Query) -> Result<Vec<Job>, StoreError> {
         self.queue.list(query)
+    }
+
+    fn page(&self, look: &Look) -> Result<Page, StoreError> {
+        self.queue.page(look)
+    }
+
+    fn find(&self, source: &Source) -> Result<Option<JobId>, StoreError> {
+        self.queue.find(source)
     }
 
     fn results(&self, size: u64, recipe: Option<Recipe>) -> Result<Vec<Job>, StoreError> {

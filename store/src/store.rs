@@ -79,6 +79,18 @@ pub trait JobStore: Send + Sync {
     /// Store errors only.
     fn list(&self, query: &Query) -> Result<Vec<Job>, StoreError>;
 
+    /// Jobs, the latest first, a page at a time: however many there are, little is read for it.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn page(&self, look: &Look) -> Result<Page, StoreError>;
+
+    /// The latest job of this very file, whether it still answers for it or not; `None` when there was none, or it was forgotten.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn find(&self, source: &Source) -> Result<Option<JobId>, StoreError>;
+
     /// Jobs with good results for sources of `size` bytes that others may have a copy of: those made by `recipe`, the latest first, at most
     /// [`MOST_RESULTS`]; without a recipe any one of them, if there is one.
     ///
@@ -228,6 +240,31 @@ pub struct Query {
     pub after: JobId,
     /// At most so many; 0: all.
     pub limit: usize,
+}
+
+/// Records that are read for one page, at most.
+pub const PAGE_READS: usize = 1000;
+
+/// Which jobs to show, the latest first.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Look {
+    /// Of these kinds; empty: of any.
+    pub kinds: Vec<Kind>,
+    /// Of this hot folder; `None`: of any.
+    pub folder: Option<String>,
+    /// With a smaller number than this; `None`: from the latest on.
+    pub before: Option<JobId>,
+    /// At most so many.
+    pub limit: usize,
+}
+
+/// Jobs by number, descending.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Page {
+    /// Fewer than were wanted, or none, where the search ended early: see `next`.
+    pub jobs: Vec<Job>,
+    /// There may be more before this one; `None`: there are none.
+    pub next: Option<JobId>,
 }
 
 /// What can go wrong with a store.

@@ -26,6 +26,8 @@ pub(crate) trait Tables: Send + Sync {
     fn get(&self, table: Table, key: &[u8]) -> Result<Option<Vec<u8>>, StoreError>;
     /// Entries from `from` on, `to` not included (no bound when empty), in order, until `each` says `false`.
     fn scan(&self, table: Table, from: &[u8], to: &[u8], each: Visit<'_>) -> Result<(), StoreError>;
+    /// Entries below `to`, down to `from`, in reverse order, until `each` says `false`.
+    fn scan_back(&self, table: Table, from: &[u8], to: &[u8], each: Visit<'_>) -> Result<(), StoreError>;
     /// All of `puts`, or none.
     fn write(&self, puts: Vec<Put>, seq: Seq) -> Result<(), StoreError>;
     /// Returns when every write up to `seq` is durable.

@@ -8,6 +8,7 @@ use crate::store::StoreError;
 mod claims;
 mod deaths;
 mod history;
+mod pages;
 mod past;
 mod results;
 mod tools;
@@ -23,7 +24,7 @@ type Check = fn(&mut dyn Subject, &ManualClock) -> Result<(), StoreError>;
 /// # Panics
 /// When the store does not do what [`JobStore`] promises.
 pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
-    let checks: [(&str, Check); 22] = [
+    let checks: [(&str, Check); 24] = [
         ("submission is idempotent", claims::submission_is_idempotent),
         ("a file that came back is new", claims::a_file_that_came_back_is_new),
         ("the oldest that fits is claimed", claims::the_oldest_that_fits_is_claimed),
@@ -41,6 +42,8 @@ pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
         ("good results are found by what made them", results::good_results_are_found_by_what_made_them),
         ("results on their way are finished", results::results_on_their_way_are_finished),
         ("lists and counts agree", results::lists_and_counts_agree),
+        ("pages are the latest first", pages::pages_are_the_latest_first),
+        ("a file's latest job is found", pages::a_files_latest_job_is_found),
         ("threads get different jobs", results::threads_get_different_jobs),
         ("what is at rest can be forgotten", history::what_is_at_rest_can_be_forgotten),
         ("forgetting one job leaves the next of its file", history::forgetting_one_job_leaves_the_next_of_its_file),

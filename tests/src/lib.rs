@@ -7,6 +7,8 @@ pub mod binary;
 pub mod disk;
 pub mod edit;
 pub mod hot;
+pub mod http;
+pub mod openapi;
 pub mod oracle;
 pub mod place;
 pub mod scene;

@@ -77,7 +77,12 @@ impl Place {
 
     /// `suture`, about to run in the folder, its output captured.
     pub fn command(&self) -> Command {
-        let mut command = Command::new(suture());
+        self.command_of(suture())
+    }
+
+    /// The same for another build of it.
+    pub fn command_of(&self, binary: &Path) -> Command {
+        let mut command = Command::new(binary);
         command.current_dir(self.0.path()).env_remove("SUTURE_LOG").env_remove("RUST_LOG");
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         command

@@ -2,12 +2,14 @@
 
 #[cfg(test)]
 mod e2e {
+    mod api;
     mod away;
     mod blind;
     mod burst;
     mod cases;
     mod config;
     mod files;
+    mod heard;
     mod hostile;
     mod interrupted;
     mod json;
@@ -23,6 +25,7 @@ mod e2e {
     mod rebuild;
     mod retention;
     mod reuse;
+    mod rude;
     mod same_bytes;
     mod soups;
     mod specials;
@@ -30,4 +33,5 @@ mod e2e {
     mod terminal;
     mod twice;
     mod watch;
+    mod web;
 }

@@ -1,6 +1,7 @@
 //! The configuration file. Unknown settings are errors, and every mistake is told with its line.
 
 use std::collections::BTreeMap;
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -9,11 +10,12 @@ use suture_core::Profile;
 use suture_store::Priority;
 use toml::Spanned;
 
+use super::api::Api;
 use super::keep::{Bound, Keep};
 use super::{Config, DEFAULT_PROFILE, FolderConfig, name_of, real};
 use crate::own_profile::OwnProfile;
 use crate::profiles::{self, place_of, with_line};
-use crate::units::{parse_duration, parse_size};
+use crate::units::{parse_duration, parse_listen, parse_size};
 use crate::window::RunWindow;
 
 /// For what the daemon chooses by itself.
@@ -40,6 +42,7 @@ struct File {
     workers_outside: Option<Spanned<u16>>,
     reuse: Option<bool>,
     keep: Option<Spanned<KeepFile>>,
+    api: Option<Spanned<ApiFile>>,
     #[serde(default)]
     profiles: BTreeMap<String, Spanned<OwnProfile>>,
 }
@@ -80,6 +83,26 @@ struct KeepFile {
     archive: Option<PathBuf>,
     history: Option<Time>,
     history_jobs: Option<Count64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ApiFile {
+    listen: Listen,
+    token_file: Option<PathBuf>,
+    #[serde(default)]
+    hosts: Vec<String>,
+    max_upload: Option<Size>,
+}
+
+/// An address to listen at.
+#[derive(Debug)]
+struct Listen(SocketAddr);
+
+impl<'de> Deserialize<'de> for Listen {
+    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        parse_listen(&String::deserialize(d)?).map(Self).map_err(de::Error::custom)
+    }
 }
 
 /// A number, or text with a unit.
@@ -209,6 +232,7 @@ fn from_text(text: &str) -> Result<Config, String> {
     if let Some(of_file) = file.keep {
         config.keep = keep(text, of_file, &config.folders)?;
     }
+    config.api = file.api.map(|of_file| api(text, of_file)).transpose()?;
     if let Some(TimeLimitFile { base, per_gib }) = file.time_limit {
         config.time_limit.base = base.map_or(config.time_limit.base, |time| time.0);
         config.time_limit.per_gib = per_gib.map_or(config.time_limit.per_gib, |time| time.0);
@@ -249,6 +273,14 @@ fn keep(text: &str, of_file: Spanned<KeepFile>, folders: &[FolderConfig]) -> Res
         }
         None => Ok(keep),
     }
+}
+
+fn api(text: &str, of_file: Spanned<ApiFile>) -> Result<Api, String> {
+    let (from, of_file) = (of_file.span().start, of_file.into_inner());
+    let mut api = Api { token_file: of_file.token_file, hosts: of_file.hosts, ..Api::at(of_file.listen.0) };
+    api.max_upload = of_file.max_upload.map_or(api.max_upload, |size| size.0);
+    api.check().map_err(|what| with_line(text, place_of(text, from, "listen"), &what))?;
+    Ok(api)
 }
 
 fn own_profiles(text: &str, of_file: BTreeMap<String, Spanned<OwnProfile>>) -> Result<BTreeMap<String, OwnProfile>, String> {
@@ -418,6 +450,11 @@ mod tests {
                 "keep.archive = \"/a/done/x\"\n[[folders]]\npath = \"/a\"",
                 "line 1, `keep.archive = \"/a/done/x\"`: it must lie beside the hot folder /a",
             ),
+            (
+                "[[folders]]\npath = \"/a\"\n[api]\nhosts = []\nlisten = \"0.0.0.0:80\"",
+                "line 5, `listen = \"0.0.0.0:80\"`: everyone in the network reaches 0.0.0.0:80, so it needs tokens",
+            ),
+            ("[[folders]]\npath = \"/a\"\n[api]\nlisten = \"here\"", "line 4, `listen = \"here\"`: `here` is no address"),
             ("[[folders]]\npath = \"/a\"\n[keep]\nhistory_jobs = 0", "line 4, `history_jobs = 0`: must be at least 1"),
         ]);
     }

@@ -7,6 +7,7 @@ use std::time::Duration;
 use serde::Serialize;
 use toml::Value;
 
+use super::api::Api;
 use super::keep::Keep;
 use super::read::AUTO;
 use super::{Config, FolderConfig};
@@ -40,7 +41,13 @@ pub(crate) fn values(config: &Config) -> Vec<(&'static str, Option<String>)> {
     let of_hours =
         [("run_window", quoted(&config.run_window.to_string())), ("workers_outside", config.workers_outside.to_string())];
     let of_hours = of_hours.map(|(name, value)| (name, hours.then_some(value)));
-    always.map(|(name, value)| (name, Some(value))).into_iter().chain(of_hours).chain(kept(&config.keep)).collect()
+    always
+        .map(|(name, value)| (name, Some(value)))
+        .into_iter()
+        .chain(of_hours)
+        .chain(kept(&config.keep))
+        .chain(web(config.api.as_ref()))
+        .collect()
 }
 
 /// What goes by itself, as far as anything does.
@@ -57,6 +64,17 @@ fn kept(keep: &Keep) -> [(&'static str, Option<String>); 9] {
         ("keep.archive", keep.archive.as_deref().map(path)),
         ("keep.history", age(keep.history)),
         ("keep.history_jobs", Some(keep.history_jobs.to_string())),
+    ]
+}
+
+/// The web interface, if there is one.
+fn web(api: Option<&Api>) -> [(&'static str, Option<String>); 4] {
+    let hosts = |api: &Api| format!("[{}]", api.hosts.iter().map(|host| quoted(host)).collect::<Vec<_>>().join(", "));
+    [
+        ("api.listen", api.map(|api| quoted(&api.listen.to_string()))),
+        ("api.token_file", api.and_then(|api| api.token_file.as_deref()).map(path)),
+        ("api.hosts", api.map(hosts)),
+        ("api.max_upload", api.map(|api| quoted(&write_size(api.max_upload)))),
     ]
 }
 
@@ -154,6 +172,12 @@ mod tests {
             history: Some(Duration::from_secs(1)),
             history_jobs: 3,
         };
+        config.api = Some(Api {
+            token_file: Some("/etc/suture \"tokens\"".into()),
+            hosts: vec!["farm".into(), "farm.example".into()],
+            max_upload: 7 << 20,
+            ..Api::at("0.0.0.0:80".parse().unwrap())
+        });
         for name in ["it's mine", "resin", "default"] {
             let mut profile = Profile::built_in("strict").unwrap();
             profile.name = name.into();

@@ -217,7 +217,7 @@ impl Sweeper {
 }
 
 /// Is the file gone from `in/` for which a job answers? What cannot be seen is not gone.
-fn is_gone(folder: &Folder, job: &Job) -> bool {
+pub(crate) fn is_gone(folder: &Folder, job: &Job) -> bool {
     let source = &job.source;
     let found = fsx::look(&folder.inbox().join(source.path.to_path()));
     // Its disk may be another device since.

@@ -13,9 +13,12 @@ use super::plan::Place;
 use super::sky::Sky;
 use crate::attempt::{Context, Slot};
 use crate::cli::{Cli, Command};
+use crate::event_bus::Bus;
+use crate::event_store::Heard;
 use crate::folder::Folder;
 use crate::keeper::Keeper;
 use crate::past::Unread;
+use crate::pulse::Pulse;
 use crate::retention::sweep::Sweeper;
 use crate::schedule::Schedule;
 use crate::settings::Settings;
@@ -46,12 +49,13 @@ impl Life {
         let folders: Vec<_> = config.folders.iter().map(|folder| Arc::new(Folder::open(folder, None).unwrap())).collect();
         let store = SledStore::open_with(&config.state, Arc::<Sky>::clone(sky)).unwrap();
         let unread = Unread::of(&store, &folders).unwrap();
+        let bus = Arc::new(Bus::new(false));
         let (events, inbox) = unbounded();
         let world: Arc<dyn World> = Arc::<Sky>::clone(sky);
         let context = Arc::new(Context {
             schedule: Schedule::new(Arc::clone(&world)),
             world,
-            store: Arc::new(store),
+            store: Arc::new(Heard::new(Arc::new(store), Arc::clone(&bus))),
             folders,
             settings,
             events,
@@ -60,6 +64,8 @@ impl Life {
             not_good: Arc::default(),
             away: Mutex::default(),
             unread,
+            pulse: Pulse::new(),
+            bus,
             failed: Mutex::new(None),
         });
         recover(&context).unwrap();

@@ -12,7 +12,7 @@ use suture_store::{Boot, Clock, Time};
 use super::stage;
 use crate::protocol::Request;
 use crate::supervise::Ended;
-use crate::world::{Hand, Share, World};
+use crate::world::{Hand, Share, Telling, World};
 
 /// Summer time as in the middle of Europe.
 const ZONE: &str = "CET-1CEST,M3.5.0,M10.5.0/3";
@@ -182,7 +182,7 @@ impl Hand for Puppet {
         true
     }
 
-    fn run(&mut self, request: &Request, limit: Duration, stop: &dyn Fn() -> bool) -> Ended {
+    fn run(&mut self, request: &Request, limit: Duration, stop: &dyn Fn() -> bool, _: Telling<'_>) -> Ended {
         stage::current().work(self.0, request, limit, stop)
     }
 }

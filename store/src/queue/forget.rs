@@ -1,6 +1,6 @@
 //! The end of a record: jobs at rest leave the store, with all that points to them. Their numbers are never used again.
 
-use super::{Queue, head_put, identity, index, results};
+use super::{Queue, by_key, head_put, index, results};
 use crate::crash::crash_point;
 use crate::id::JobId;
 use crate::record;
@@ -32,7 +32,7 @@ impl<T: Tables> Queue<T> {
             puts.push(none(Table::Jobs, id.0.to_be_bytes().to_vec()));
             puts.extend(job.offers().map(|recipe| none(Table::ByRecipe, results::key(&job, recipe))));
             // A later job of the same file has the entry by now.
-            let key = identity(&job.source);
+            let key = by_key::key(&job.source);
             let latest = self.tables.get(Table::ByKey, &key)?;
             let latest = latest.map(|bytes| record::decode::<JobId>(Table::ByKey, &key, &bytes)).transpose()?;
             if latest == Some(*id) {

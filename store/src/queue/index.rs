@@ -89,6 +89,31 @@ pub(super) fn ids(tables: &dyn Tables, kind: Kind) -> Result<Vec<JobId>, StoreEr
     Ok(ids)
 }
 
+/// Numbers of the latest jobs of `kind` before one, descending, at most `most`. Where the key begins with something else than the number, all
+/// keys of the kind are looked at, or those of each size class that are needed.
+pub(super) fn latest(tables: &dyn Tables, kind: Kind, before: JobId, most: usize) -> Result<Vec<JobId>, StoreError> {
+    let mut ids = Vec::new();
+    let mut below = |prefix: &[u8]| {
+        let to = [prefix, &before.0.to_be_bytes()].concat();
+        let mut left = most;
+        tables.scan_back(Table::ByState, prefix, &to, &mut |key, _| {
+            if left > 0 {
+                ids.push(JobId(number(key, id_at(kind))?));
+                left -= 1;
+            }
+            Ok(left > 0)
+        })
+    };
+    match kind {
+        Kind::Waiting | Kind::Parked => ids = self::ids(tables, kind)?.into_iter().filter(|id| *id < before).collect(),
+        Kind::Queued | Kind::Alone => (0..=class(u64::MAX)).try_for_each(|class| below(&[tag(kind), class]))?,
+        _ => below(&[tag(kind)])?,
+    }
+    ids.sort_unstable_by(|a, b| b.cmp(a));
+    ids.truncate(most);
+    Ok(ids)
+}
+
 /// How many jobs there are of each kind.
 pub(super) fn count(tables: &dyn Tables) -> Result<BTreeMap<Kind, u64>, StoreError> {
     let mut counts = BTreeMap::new();

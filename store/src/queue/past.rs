@@ -5,7 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Queue, SUBMIT_CHUNK, UNFILLED, fits, head_put, identity};
+use super::{Queue, SUBMIT_CHUNK, UNFILLED, by_key, fits, head_put};
 use crate::id::{JobId, Token};
 use crate::job::{Job, Past, one_line};
 use crate::path::{MAX_NAMED, MAX_SOURCE, RelPath};
@@ -66,7 +66,7 @@ impl<T: Tables> Queue<T> {
             head.seq.0 = head.seq.0.max(work) + 1;
             job.seq = head.seq;
             if job.source.ino != 0 {
-                keys.insert(identity(&job.source), id);
+                keys.insert(by_key::key(&job.source), id);
             }
             jobs.push(job);
         }

@@ -206,6 +206,17 @@ impl Tables for SledTables {
         Ok(())
     }
 
+    fn scan_back(&self, table: Table, from: &[u8], to: &[u8], each: Visit<'_>) -> Result<(), StoreError> {
+        let tree = self.tree(table)?;
+        let mut entries = tree.range(from..to);
+        while let Some(entry) = guarded(|| entries.next_back().transpose().map_err(failed)).map_err(|error| self.poison(error))? {
+            if !each(&entry.0, &entry.1)? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
     fn write(&self, puts: Vec<Put>, seq: Seq) -> Result<(), StoreError> {
         self.sound()?;
         let Handles { meta, jobs, by_state, by_key, by_recipe, .. } = self.handles()?;

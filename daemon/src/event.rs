@@ -1,0 +1,196 @@
+//! Events of jobs and folders: each thing that happens is one value, which writes its line of the log and counts in the metrics, so that the two never differ, and
+//! which says what those who listen are told.
+
+use serde_json::{Value, json};
+use suture_core::Report;
+use suture_core::report::Defects;
+use suture_store::job::Death;
+use suture_store::{Control, Ending, Job, JobId, Kind, Publication, State, Step, Submission};
+
+use crate::event_metrics::{Count, Metrics, Timing};
+
+/// Something that happened.
+#[derive(Debug)]
+pub(crate) enum Happening<'a> {
+    /// A file was found, and has a job.
+    Came { id: JobId, submission: &'a Submission },
+    /// A worker has it.
+    Began { job: &'a Job },
+    /// The engine has made a result of it.
+    Reported { report: &'a Report },
+    /// It went on by this step, to where it stands now.
+    Moved { job: &'a Job, step: &'a Step },
+    /// An operator, or the daemon itself, wanted this of it.
+    Wished { job: &'a Job, wish: Control },
+    /// Its record is gone.
+    Forgotten { id: JobId },
+    /// A hot folder is out of reach.
+    FolderAway { name: &'a str, root: &'a std::path::Path, why: &'a str },
+    /// It is back.
+    FolderBack { name: &'a str, root: &'a std::path::Path },
+}
+
+/// A word to those who listen: a name, and what there is to say.
+pub(crate) type Told = (&'static str, Value);
+
+impl Happening<'_> {
+    /// Writes the line of the log, if there is one.
+    pub(crate) fn log(&self) {
+        match self {
+            Self::Came { id, submission } => {
+                if let Some(what) = &submission.foreign {
+                    tracing::warn!(job = id.0, file = %submission.source.path, what, "Left where it is.");
+                }
+            }
+            Self::Moved { job, step } => log_moved(job, step),
+            Self::Wished { job, wish } => {
+                if matches!(wish, Control::Retry | Control::Cancel | Control::Rank(_)) {
+                    tracing::info!(job = job.id.0, ?wish, "An operator's wish.");
+                }
+            }
+            Self::FolderAway { root, why, .. } => {
+                tracing::error!(folder = %root.display(), error = why, "The folder cannot be served; the others go on.");
+            }
+            Self::FolderBack { root, .. } => tracing::info!(folder = %root.display(), "The folder is back."),
+            Self::Began { .. } | Self::Reported { .. } | Self::Forgotten { .. } => {}
+        }
+    }
+
+    /// Counts.
+    pub(crate) fn count(&self, metrics: &Metrics) {
+        match self {
+            Self::Began { job } if matches!(job.state, State::Running { .. }) => {
+                metrics.add(Count::JobAttempts, &[], 1);
+                let waited = job.changed.0.saturating_sub(job.waits_since().0);
+                metrics.observe(Timing::JobDuration, &[("stage", "queue")], waited as f64 / 1000.0);
+            }
+            Self::Reported { report } => count_report(metrics, report),
+            Self::Moved { job, step } => {
+                if let Some(reason) = failure(step) {
+                    metrics.add(Count::JobFailures, &[("reason", reason)], 1);
+                }
+                if let State::Ended { publication } = &job.state {
+                    count_ended(metrics, job, publication);
+                }
+            }
+            // Given up, when its result was in place already.
+            Self::Wished { job, wish: Control::Cancel } => {
+                if let State::Ended { publication } = &job.state {
+                    count_ended(metrics, job, publication);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// The word to listeners, if there is one.
+    pub(crate) fn told(&self) -> Option<Told> {
+        Some(match self {
+            Self::Came { id, submission } => {
+                let state = if submission.foreign.is_some() { Kind::Noticed } else { Kind::Queued };
+                let source = &submission.source;
+                ("job", json!({"job": id, "state": state.name(), "folder": source.folder, "file": source.path}))
+            }
+            Self::Began { job } | Self::Moved { job, .. } | Self::Wished { job, .. } => ("job", of_job(job)),
+            Self::Forgotten { id } => ("forgotten", json!({"job": id})),
+            Self::FolderAway { name, .. } => ("folder", json!({"folder": name, "reachable": false})),
+            Self::FolderBack { name, .. } => ("folder", json!({"folder": name, "reachable": true})),
+            Self::Reported { .. } => return None,
+        })
+    }
+}
+
+fn of_job(job: &Job) -> Value {
+    let mut told = json!({"job": job.id, "state": job.kind().name(), "folder": job.source.folder, "file": job.source.path});
+    if let (State::Ended { publication }, Some(told)) = (&job.state, told.as_object_mut()) {
+        told.insert("ending".into(), json!(publication.ending));
+        told.insert("reason".into(), json!(publication.reason));
+    }
+    told
+}
+
+/// The end of an attempt, of a job, or of what was to be its end.
+fn log_moved(job: &Job, step: &Step) {
+    match &job.state {
+        State::Ended { publication } if publication.ending.is_good() => {
+            let output = publication.output.as_ref().map(tracing::field::display);
+            tracing::info!(ending = ?publication.ending, output, reused = publication.reused.map(|job| job.0), "Done.");
+        }
+        State::Ended { publication } => {
+            tracing::warn!(ending = ?publication.ending, reason = publication.reason, "Ended without a good result.");
+        }
+        State::Cancelled { why } => tracing::info!(?why, "Taken back."),
+        State::Queued { .. } => tracing::info!(reason = job.note, "Back in the queue."),
+        // Said once; `suture jobs` tells of every further try.
+        _ if matches!(step, Step::Park { .. }) && job.parked.is_some_and(|parked| parked.tries == 1) => {
+            tracing::error!(reason = job.note, "The result cannot be brought into place; it is kept, and tried again.");
+        }
+        _ => {}
+    }
+}
+
+/// Why an attempt came to nothing, in a word.
+fn failure(step: &Step) -> Option<&'static str> {
+    match step {
+        Step::Died(death) => Some(match death {
+            Death::TimeLimit => "timeout",
+            Death::MemoryLimit => "memory",
+            _ => "signal",
+        }),
+        Step::Environment { .. } => Some("io"),
+        Step::Intend(publication) => match publication.ending {
+            Ending::Unreadable => Some("parse"),
+            Ending::Refused => Some("refused"),
+            Ending::NotGood => Some("verify"),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+fn count_ended(metrics: &Metrics, job: &Job, publication: &Publication) {
+    let result = match publication.ending {
+        _ if publication.reused.is_some() => "reused",
+        Ending::Clean => "ok",
+        Ending::Repaired => "repaired",
+        Ending::NeedsReview => "needs_review",
+        Ending::Quarantined => "quarantined",
+        Ending::NotGood | Ending::Unreadable | Ending::Refused | Ending::Environment => "failed",
+    };
+    let (folder, profile) = (job.source.folder.as_str(), job.source.profile.as_str());
+    metrics.add(Count::JobsFinished, &[("folder", folder), ("profile", profile), ("result", result)], 1);
+    metrics.add(Count::InputBytes, &[], job.source.size);
+}
+
+fn count_report(metrics: &Metrics, report: &Report) {
+    metrics.add(Count::Triangles, &[("direction", "in")], report.input.triangles);
+    if let Some(output) = &report.output {
+        metrics.add(Count::Triangles, &[("direction", "out")], output.triangles);
+        metrics.add(Count::OutputBytes, &[], output.bytes);
+    }
+    for (kind, count) in defects(&report.before) {
+        metrics.add(Count::DefectsFound, &[("kind", kind)], count);
+    }
+    for (kind, count) in report.after.iter().flat_map(defects) {
+        metrics.add(Count::DefectsLeft, &[("kind", kind)], count);
+    }
+    for stage in &report.stages {
+        metrics.observe(Timing::JobDuration, &[("stage", &stage.name)], stage.seconds);
+    }
+    metrics.observe(Timing::WorkerMaxRss, &[], report.cost.peak_resident_bytes as f64);
+}
+
+/// Kinds of defects, and how many there are.
+fn defects(of: &Defects) -> [(&'static str, u64); 9] {
+    [
+        ("boundary_loop", of.boundary_loops),
+        ("nonmanifold_edge", of.nonmanifold_edges),
+        ("nonmanifold_vertex", of.nonmanifold_vertices),
+        ("inconsistent_edge", of.inconsistent_edges),
+        ("inverted_component", of.inverted_components),
+        ("degenerate", of.degenerate_index + of.degenerate_area),
+        ("duplicate", of.duplicates_same + of.duplicates_opposite),
+        ("nonfinite", of.nonfinite),
+        ("self_intersection", of.self_intersections.as_ref().map_or(0, |found| found.triangles)),
+    ]
+}

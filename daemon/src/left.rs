@@ -1,0 +1,39 @@
+//! The files that a finished job has left in its hot folder.
+
+use std::path::{Path, PathBuf};
+
+use suture_store::job::Area;
+use suture_store::{Job, RelPath, State};
+
+use crate::receipt::REPORT;
+
+/// The folder of an area, below its hot folder.
+pub(crate) fn area(area: Area) -> &'static str {
+    match area {
+        Area::In => "in",
+        Area::Done => "done",
+        Area::Failed => "failed",
+        Area::Quarantine => "quarantine",
+    }
+}
+
+/// Where the result of a finished job of the hot folder `dir` is: a good one in `out/`, else the best attempt beside the original.
+pub(crate) fn result_path(dir: &Path, job: &Job) -> Option<PathBuf> {
+    let State::Ended { publication } = &job.state else { return None };
+    let output = publication.output.as_ref()?;
+    let folder = if publication.ending.is_good() { "out" } else { area(publication.ending.area()) };
+    Some(dir.join(folder).join(output.to_path()))
+}
+
+/// Where the report of a finished job of the hot folder `dir` is.
+pub(crate) fn report_path(dir: &Path, job: &Job) -> Option<PathBuf> {
+    let State::Ended { publication } = &job.state else { return None };
+    let (folder, base): (_, &RelPath) = if publication.ending.is_good() {
+        ("out", publication.output.as_ref()?)
+    } else {
+        (area(publication.ending.area()), publication.original.as_ref()?)
+    };
+    let mut name = dir.join(folder).join(base.to_path()).into_os_string();
+    name.push(REPORT);
+    Some(name.into())
+}

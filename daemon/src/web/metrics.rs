@@ -1,0 +1,107 @@
+//! `GET /metrics`: what was counted, and how things stand now, in the text format that Prometheus reads.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use axum::extract::State;
+use axum::http::header::CONTENT_TYPE;
+use axum::response::{IntoResponse, Response};
+use suture_store::job::Kind;
+use suture_store::{Clock, Query, SystemClock};
+
+use crate::attempt::Context;
+use crate::event_metrics::{Label, head, sample, written};
+use crate::fsx;
+
+use super::ask::ask;
+use super::problem::Problem;
+use super::shared::Shared;
+
+/// `GET /metrics`.
+pub(super) async fn metrics(State(shared): State<Arc<Shared>>) -> Result<Response, Problem> {
+    let text = ask(&shared.context, |context| {
+        let mut text = context.bus.metrics.text();
+        jobs(&mut text, context)?;
+        folders(&mut text, context);
+        process(&mut text, context);
+        Ok(text)
+    })
+    .await?;
+    Ok(([(CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text).into_response())
+}
+
+/// A family of values, as they are now.
+fn gauge<'a>(text: &mut String, words: (&str, &str), values: impl IntoIterator<Item = (Vec<Label<'a>>, f64)>) {
+    head(text, words, "gauge");
+    values.into_iter().for_each(|(labels, value)| sample(text, words.0, &written(&labels), value));
+}
+
+fn jobs(text: &mut String, context: &Context) -> Result<(), Problem> {
+    let counts = context.store.counts()?;
+    let of_states = counts.iter().map(|(kind, count)| (vec![("state", kind.name())], *count as f64));
+    gauge(text, ("suture_jobs", "Jobs in each state."), of_states);
+    let kinds = vec![Kind::Queued, Kind::Waiting, Kind::Alone];
+    let oldest = context.store.list(&Query { kinds, limit: 1, ..Query::default() })?;
+    let waits = oldest.first().map_or(0, |job| SystemClock.now().0.saturating_sub(job.waits_since().0));
+    let words = ("suture_queue_oldest_seconds", "How long the oldest job that waits has waited.");
+    gauge(text, words, [(vec![], waits as f64 / 1000.0)]);
+    let busy = context.schedule.busy();
+    let idle = context.settings.now().workers.saturating_sub(busy);
+    let of_workers = [(vec![("state", "busy")], busy as f64), (vec![("state", "idle")], idle as f64)];
+    gauge(text, ("suture_workers", "Workers in each state."), of_workers);
+    Ok(())
+}
+
+fn folders(text: &mut String, context: &Context) {
+    let all = || context.folders.iter().map(|folder| (vec![("folder", folder.name.as_str())], folder));
+    let up = all().map(|(labels, folder)| (labels, f64::from(u8::from(folder.check().is_ok()))));
+    gauge(text, ("suture_folder_up", "Is the hot folder within reach?"), up);
+    let scans = || all().filter_map(|(labels, folder)| Some((labels, context.pulse.scan_of(&folder.name)?)));
+    let took = scans().map(|(labels, scan)| (labels, scan.took.as_secs_f64()));
+    gauge(text, ("suture_folder_scan_seconds", "How long the last look at the folder took."), took);
+    let words = ("suture_folder_last_scan_timestamp_seconds", "When the folder was looked at last.");
+    gauge(text, words, scans().map(|(labels, scan)| (labels, scan.at.0 as f64 / 1000.0)));
+    let config = context.settings.now();
+    let free = |path: &Path| fsx::free_space(path, 0) as f64;
+    let of_folders =
+        context.folders.iter().map(|folder| (vec![("role", "folder"), ("folder", folder.name.as_str())], free(&folder.root)));
+    let of_state = [(vec![("role", "state")], free(&config.state))];
+    gauge(text, ("suture_disk_free_bytes", "Free space on the disks."), of_folders.chain(of_state));
+    gauge(text, ("suture_store_size_bytes", "Size of the job store."), [(vec![], size_of(&config.state) as f64)]);
+}
+
+/// Bytes of all files of a small folder.
+fn size_of(folder: &Path) -> u64 {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let size = |entry: std::fs::DirEntry| match entry.metadata() {
+        Ok(meta) if meta.is_dir() => size_of(&entry.path()),
+        Ok(meta) => meta.len(),
+        Err(_) => 0,
+    };
+    entries.map(size).sum()
+}
+
+fn process(text: &mut String, context: &Context) {
+    let build = vec![("version", env!("CARGO_PKG_VERSION"))];
+    gauge(text, ("suture_build_info", "The program."), [(build, 1.0)]);
+    let words = ("process_start_time_seconds", "When this life of the daemon began.");
+    gauge(text, words, [(vec![], context.bus.life as f64 / 1000.0)]);
+    // Values that the system does not tell are left out.
+    let read = |name: &str| std::fs::read_to_string(Path::new("/proc/self").join(name)).unwrap_or_default();
+    let statm = read("statm");
+    let mut pages = statm.split(' ').map(|pages| pages.parse::<u64>().ok());
+    let page = rustix::param::page_size() as f64;
+    let memory = |pages: Option<Option<u64>>| pages.flatten().map(|pages| (vec![], pages as f64 * page));
+    gauge(text, ("process_virtual_memory_bytes", "Virtual memory of the daemon."), memory(pages.next()));
+    gauge(text, ("process_resident_memory_bytes", "Resident memory of the daemon."), memory(pages.next()));
+    let open = std::fs::read_dir("/proc/self/fd").map(|files| files.count()).ok();
+    gauge(text, ("process_open_fds", "Open files of the daemon."), open.map(|open| (vec![], open as f64)));
+    let stat = read("stat");
+    // Behind the name in brackets: user and system time are the twelfth and thirteenth.
+    let ticks: Vec<u64> =
+        stat.rsplit(") ").next().unwrap_or_default().split(' ').skip(11).take(2).filter_map(|n| n.parse().ok()).collect();
+    let seconds = ticks.iter().sum::<u64>() as f64 / rustix::param::clock_ticks_per_second() as f64;
+    let words = ("process_cpu_seconds_total", "Processor time of the daemon, without its workers.");
+    head(text, words, "counter");
+    sample(text, words.0, "", seconds);
+}

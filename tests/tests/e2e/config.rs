@@ -202,7 +202,7 @@ fn the_number_of_workers_is_read_anew() {
         let tasks = std::fs::read_dir(format!("/proc/{}/task", daemon.served.pid())).unwrap().flatten();
         tasks.filter(|task| std::fs::read_to_string(task.path().join("comm")).is_ok_and(|name| name.trim() == "slot")).count()
     };
-    assert_eq!(slots(), 1);
+    wait_until("the thread is there", || slots() == 1);
     for (workers, threads) in [(3, 3), (2, 3)] {
         place.put("suture.toml", configuration(workers).as_bytes());
         daemon.hang_up("is in force");

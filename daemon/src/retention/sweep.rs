@@ -54,7 +54,10 @@ pub(crate) struct Swept {
 impl Sweeper {
     pub(crate) fn new(store: Arc<dyn JobStore>, folders: Vec<Arc<Folder>>, settings: Arc<Settings>, now: Moment) -> Self {
         let (stayed, told, righted, turns) = (BTreeMap::new(), BTreeSet::new(), BTreeSet::new(), Turns::new(now));
-        Self { store, folders, settings, stayed, told, turns, righted, counted: now.steady }
+        let mut sweeper = Self { store, folders, settings, stayed, told, turns, righted, counted: now.steady };
+        // Before a sweep asks for the time: a file that gets its name back is as old as that.
+        sweeper.set_right();
+        sweeper
     }
 
     /// Sweeps whenever it is time to, until `ended`.
@@ -121,7 +124,6 @@ impl Sweeper {
     /// # Errors
     /// Store errors only.
     pub(crate) fn sweep(&mut self, now: Time, stop: &dyn Fn() -> bool) -> Result<Swept, StoreError> {
-        self.set_right();
         // Of this sweep to its end, whatever is read meanwhile.
         let keep = self.settings.now().keep.clone();
         let (mut swept, busy, said) = (Swept::default(), self.busy()?, std::mem::take(&mut self.told));

@@ -71,7 +71,7 @@ pub(crate) struct Context {
     pub not_good: Arc<AtomicBool>,
     /// By hot folder: what of it is out of reach, and why.
     pub away: Mutex<BTreeMap<String, Vec<String>>>,
-    /// What earlier stores left and was not read yet.
+    /// Folders in which earlier stores left something that was not read yet.
     pub unread: Unread,
     /// The store failed; every thread ends.
     pub failed: Mutex<Option<StoreError>>,

@@ -48,14 +48,13 @@ impl Folder {
         Ok(Self { name, root, leave_originals, ground: Mutex::new(ground) })
     }
 
-    /// One that another daemon serves: it is away until that one lets go of it.
+    /// A folder that another daemon serves: it is away until that one lets go of it.
     ///
     /// # Errors
     /// When it cannot be looked at.
     pub(crate) fn of_other(config: &FolderConfig) -> Result<Self, FolderError> {
-        let io = |source| FolderError::Io { path: config.path.clone(), action: "cannot be looked at", source };
-        let root = std::path::absolute(&config.path).map_err(io)?;
-        let trace = Trace::of_other(&root).map_err(io)?;
+        let root = std::path::absolute(&config.path).map_err(FolderError::unseen(&config.path))?;
+        let trace = Trace::of_other(&root).map_err(FolderError::unseen(&root))?;
         Ok(Self { name: config.name.clone(), root, leave_originals: config.leave_originals, ground: Mutex::new(Err(trace)) })
     }
 
@@ -169,11 +168,7 @@ pub(crate) fn is_hot(path: &Path) -> io::Result<bool> {
 
 /// Where a path leads, if that is anywhere.
 fn real(path: &Path) -> Result<Option<PathBuf>, FolderError> {
-    match path.canonicalize() {
-        Ok(real) => Ok(Some(real)),
-        Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
-        Err(source) => Err(FolderError::Io { path: path.to_owned(), action: "cannot be looked at", source }),
-    }
+    fsx::if_there(path.canonicalize()).map_err(FolderError::unseen(path))
 }
 
 /// The hot folder in a part of which `root` lies.
@@ -183,8 +178,7 @@ fn outer_folder(root: &Path) -> Result<Option<PathBuf>, FolderError> {
         let (Some(above), Ok(below)) = (real(there)?, root.strip_prefix(there)) else { continue };
         let root = above.join(below);
         for outer in root.ancestors().skip(1).filter(|outer| PARTS.iter().any(|part| root.starts_with(outer.join(part)))) {
-            let looked = is_hot(outer);
-            if looked.map_err(|source| FolderError::Io { path: outer.to_owned(), action: "cannot be looked at", source })? {
+            if is_hot(outer).map_err(FolderError::unseen(outer))? {
                 return Ok(Some(outer.to_owned()));
             }
         }
@@ -198,8 +192,7 @@ fn parts_apart(root: &Path) -> Result<(), FolderError> {
     let mut seen: Vec<(PathBuf, PathBuf, (u64, u64))> = Vec::with_capacity(PARTS.len());
     for part in PARTS {
         let path = root.join(part);
-        let found =
-            fsx::behind(&path).map_err(|source| FolderError::Io { path: path.clone(), action: "cannot be looked at", source })?;
+        let found = fsx::behind(&path).map_err(FolderError::unseen(&path))?;
         let (Some(found), Some(real)) = (found, real(&path)?) else { continue };
         let here = id(&found);
         let is_mixed =

@@ -178,29 +178,33 @@ pub(crate) fn versioned(name: &OsStr, n: u32, reserve: usize) -> OsString {
     OsString::from_vec([stem, tilde.as_bytes(), &extension].concat())
 }
 
+/// The answer of a call; `None` where the system says that nothing is there. An error is no absence.
+///
+/// # Errors
+/// The call's, all others.
+pub(crate) fn if_there<T>(answer: io::Result<T>) -> io::Result<Option<T>> {
+    match answer {
+        Ok(there) => Ok(Some(there)),
+        Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
+        Err(e) => Err(e),
+    }
+}
+
 /// What is under that name, be it a dangling link; `None` where there is nothing. That nothing is there is said by the system, never
 /// taken from an error.
 ///
 /// # Errors
 /// As `lstat`.
 pub(crate) fn look(path: &Path) -> io::Result<Option<Identity>> {
-    match Identity::of(path) {
-        Ok(found) => Ok(Some(found)),
-        Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
-        Err(e) => Err(e),
-    }
+    if_there(Identity::of(path))
 }
 
-/// What the path leads to, links followed; `None` where that is nothing.
+/// The file or folder that the path leads to, links followed; `None` where that is nothing.
 ///
 /// # Errors
 /// As `stat`.
 pub(crate) fn behind(path: &Path) -> io::Result<Option<Metadata>> {
-    match std::fs::metadata(path) {
-        Ok(found) => Ok(Some(found)),
-        Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
-        Err(e) => Err(e),
-    }
+    if_there(std::fs::metadata(path))
 }
 
 /// The text in a file; `None` where there is no such file.
@@ -208,11 +212,7 @@ pub(crate) fn behind(path: &Path) -> io::Result<Option<Metadata>> {
 /// # Errors
 /// As `open` and `read`, and when it is no text.
 pub(crate) fn text_if_there(path: &Path) -> io::Result<Option<String>> {
-    match std::fs::read_to_string(path) {
-        Ok(text) => Ok(Some(text)),
-        Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
-        Err(e) => Err(e),
-    }
+    if_there(std::fs::read_to_string(path))
 }
 
 /// Does the path lead to a folder?

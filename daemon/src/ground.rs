@@ -41,6 +41,14 @@ pub(crate) enum FolderError {
     Io { path: PathBuf, action: &'static str, source: io::Error },
 }
 
+impl FolderError {
+    /// Of a path that cannot be looked at.
+    pub(crate) fn unseen(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Io { path, action: "cannot be looked at", source }
+    }
+}
+
 /// What tells a hot folder again.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Trace {
@@ -54,7 +62,7 @@ pub(crate) struct Trace {
 }
 
 impl Trace {
-    /// What tells a folder that another daemon serves, as far as can be seen.
+    /// The trace of a folder that another daemon serves, as far as can be seen.
     ///
     /// # Errors
     /// As the file system's.
@@ -135,13 +143,13 @@ impl Ground {
         let pid = format!("{}\n", std::process::id());
         let path = root.join(PRIVATE).join(PID);
         create::replace(&path, pid.as_bytes()).map_err(io(&path, "cannot be written"))?;
-        let id = id(&std::fs::metadata(root).map_err(io(root, "cannot be looked at"))?);
+        let id = id(&std::fs::metadata(root).map_err(FolderError::unseen(root))?);
         let mut devices = [id.0; PARTS.len()];
         for (device, part) in devices.iter_mut().zip(PARTS) {
             let path = root.join(part);
-            *device = std::fs::metadata(&path).map_err(io(&path, "cannot be looked at"))?.dev();
+            *device = std::fs::metadata(&path).map_err(FolderError::unseen(&path))?.dev();
         }
-        let mount = mount_of(root).map_err(io(root, "cannot be looked at"))?;
+        let mount = mount_of(root).map_err(FolderError::unseen(root))?;
         let path = root.join(PRIVATE).join(MARK);
         let mark = mark(root, id).map_err(io(&path, "cannot be written"))?;
         let apart = PARTS.iter().zip(devices).filter(|(_, device)| *device != id.0).map(|(part, _)| (*part).to_owned());

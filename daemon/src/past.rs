@@ -97,7 +97,7 @@ pub(crate) fn each_job(store: &dyn JobStore, each: &mut dyn FnMut(&Job)) -> Resu
     }
 }
 
-/// What tells the result of a job from all others of its folder: the area, and the name that report and receipt are named after.
+/// The key that tells the result of a job from all others of its folder: the area, and the name that report and receipt are named after.
 fn key(source: &RelPath, p: &Publication) -> (&'static str, RelPath) {
     let base = p.output.as_ref().filter(|_| p.ending.is_good()).or(p.original.as_ref()).unwrap_or(source);
     (place_of(p.ending.area()), base.clone())
@@ -120,7 +120,7 @@ pub(crate) fn fill(store: &dyn JobStore, folder: &Folder, which: Which) -> Resul
     let mut known = BTreeSet::new();
     each_job(store, &mut |job| {
         if job.source.folder == folder.name {
-            // One that is worked on once more has its receipt still.
+            // A job that is worked on once more has its receipt still.
             let earlier = job.moved_to.as_ref().map(|(area, path)| (place_of(*area), path.clone()));
             known.extend(job.publication().map(|publication| key(&job.source.path, publication)).into_iter().chain(earlier));
         }

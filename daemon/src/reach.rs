@@ -109,11 +109,8 @@ pub(crate) fn daemon(dir: &Path, wish: &DaemonWish) -> Result<Option<Standing>, 
 /// # Errors
 /// When the note of its place cannot be read: another store would answer for other jobs.
 pub(crate) fn state_of(dir: &Path) -> io::Result<PathBuf> {
-    match std::fs::read(dir.join(".suture").join("state-path")) {
-        Ok(path) => Ok(OsString::from_vec(path).into()),
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(default_state(dir)),
-        Err(error) => Err(error),
-    }
+    let noted = fsx::if_there(std::fs::read(dir.join(".suture").join("state-path")))?;
+    Ok(noted.map_or_else(|| default_state(dir), |path| OsString::from_vec(path).into()))
 }
 
 /// Nothing can be told of a path: try again.

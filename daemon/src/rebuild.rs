@@ -61,8 +61,7 @@ pub(crate) fn rebuild(dir: &Path) -> Result<Rebuilt, Failure> {
 fn served_as(dir: &Path, state: &Path) -> Result<FolderConfig, FolderError> {
     let plain = FolderConfig::of(dir);
     for (name, trace) in read_traces(state)? {
-        let is_it = trace.leads_here(dir);
-        if is_it.map_err(|source| FolderError::Io { path: dir.to_owned(), action: "cannot be looked at", source })? {
+        if trace.leads_here(dir).map_err(FolderError::unseen(dir))? {
             return Ok(FolderConfig { name, ..plain });
         }
     }

@@ -251,11 +251,7 @@ impl<T: Tables> Queue<T> {
         if jobs.is_empty() {
             return Ok(None);
         }
-        let mut puts = Vec::with_capacity(4 * jobs.len());
-        for (key, id) in keys {
-            let value = record::encode(Table::ByKey, &key, &id)?;
-            puts.push(Put { table: Table::ByKey, key, value: Some(value) });
-        }
+        let puts = by_key::puts(keys)?;
         let changes: Vec<_> = jobs.iter().map(|job| (None, job)).collect();
         self.commit(inner, head, &changes, puts)?;
         Ok(Some(head))

@@ -1,4 +1,4 @@
-//! What became of one file, for a person who decides what to do with it.
+//! The page of one file: what became of it, for a person who decides what to do with it.
 
 use maud::{Markup, html};
 use suture_core::Report;

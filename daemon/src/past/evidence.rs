@@ -1,4 +1,4 @@
-//! What one receipt, and the files that it speaks of, tell of a job.
+//! A job, as one receipt and the files that it speaks of tell of it.
 
 use std::io;
 use std::path::{Path, PathBuf};

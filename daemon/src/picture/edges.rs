@@ -2,6 +2,7 @@
 
 use suture_core::record::{self, Point, Record};
 
+use super::mix::mix;
 use super::parts::side_by_side;
 
 /// Lines beyond these would only hide the picture.
@@ -14,10 +15,7 @@ fn key(p: Point) -> [u32; 3] {
 
 fn hash([a, b]: [Point; 2]) -> u64 {
     let (a, b) = (key(a), key(b));
-    a.min(b).into_iter().chain(a.max(b)).fold(0x9E37_79B9_7F4A_7C15_u64, |hash, word| {
-        let hash = (hash ^ u64::from(word)).wrapping_mul(0xD6E8_FEB8_6659_FD93);
-        hash ^ hash >> 32
-    })
+    mix(a.min(b).into_iter().chain(a.max(b)))
 }
 
 fn edges_of(record: &Record) -> impl Iterator<Item = [Point; 2]> {

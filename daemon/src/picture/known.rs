@@ -5,8 +5,9 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use suture_core::record::Record;
+use suture_core::record::{self, Record};
 
+use super::mix::mix;
 use super::parts::side_by_side;
 
 const BITS_EACH: usize = 16;
@@ -18,15 +19,9 @@ pub(super) struct Known {
     words: Vec<AtomicU64>,
 }
 
-/// Mixes the bytes of the corners; normal and attribute do not count.
+/// Of the corners; normal and attribute do not count.
 fn hash(record: &Record) -> u64 {
-    let mut hash = 0x9E37_79B9_7F4A_7C15_u64;
-    for four in record[12..48].chunks_exact(4) {
-        let word = four.iter().rev().fold(0_u64, |word, byte| word << 8 | u64::from(*byte));
-        hash = (hash ^ word).wrapping_mul(0xD6E8_FEB8_6659_FD93);
-        hash ^= hash >> 32;
-    }
-    hash
+    mix(record::corners(record).into_iter().flatten().map(f32::to_bits))
 }
 
 impl Known {

@@ -13,6 +13,7 @@ mod canvas;
 pub(crate) mod command;
 mod edges;
 mod known;
+mod mix;
 mod parts;
 
 use std::io;
@@ -87,8 +88,6 @@ pub(crate) fn open(path: &Path, limits: &Limits) -> Result<MeshFile, String> {
 /// Draws one mesh, or two side by side, before and after a repair. `None` where no triangle is finite.
 pub(crate) fn draw(meshes: &[&[Record]], options: &Options) -> Option<Picture> {
     let threads = options.threads.max(1);
-    let as_it_is = |p: &Point| p.map(f64::from);
-    let bounds = meshes.iter().filter_map(|mesh| Bounds::of(mesh, threads, as_it_is)).reduce(Bounds::and)?;
     let known: Vec<Option<Known>> = match meshes {
         [before, after] => [after, before].map(|other| Known::of(other, threads, options.memory / 4)).into(),
         _ => meshes.iter().map(|_| None).collect(),
@@ -99,7 +98,7 @@ pub(crate) fn draw(meshes: &[&[Record]], options: &Options) -> Option<Picture> {
         .enumerate()
         .map(|(i, (records, others))| Panel { records, others: others.as_ref(), is_after: i > 0 })
         .collect();
-    let eye = options.eye.unwrap_or_else(|| choose(&panels, &bounds, threads));
+    let eye = options.eye.unwrap_or_else(|| choose(&panels, threads));
     let (width, height) = options.size;
     let camera = Camera::fitted(eye, meshes, threads, width * SAMPLES, height * SAMPLES)?;
     let mut picture =
@@ -115,13 +114,16 @@ pub(crate) fn draw(meshes: &[&[Record]], options: &Options) -> Option<Picture> {
 }
 
 /// Where most of what changed is seen; the first of several.
-fn choose(panels: &[Panel<'_>], bounds: &Bounds, threads: usize) -> Eye {
+fn choose(panels: &[Panel<'_>], threads: usize) -> Eye {
     let is_large = panels.iter().map(|panel| panel.records.len()).sum::<usize>() > MOST_TO_CHOOSE;
     if is_large || panels.iter().all(|panel| panel.others.is_none()) {
         return Eye::USUAL;
     }
+    let as_it_is = |p: &Point| p.map(f64::from);
+    let bounds = panels.iter().filter_map(|panel| Bounds::of(panel.records, threads, as_it_is)).reduce(Bounds::and);
+    let Some(bounds) = bounds else { return Eye::USUAL };
     let seen = |eye: Eye| {
-        let camera = Camera::new(eye, bounds, SMALL.0, SMALL.1);
+        let camera = Camera::new(eye, &bounds, SMALL.0, SMALL.1);
         panels.iter().map(|panel| panel.changes_seen(&camera, threads)).sum::<usize>()
     };
     let mut best = (0, Eye::USUAL);

@@ -1,6 +1,12 @@
 //! Whose job is whose file: the key by what makes a file that file.
 
+use std::collections::BTreeMap;
+
+use crate::id::JobId;
 use crate::job::Source;
+use crate::record;
+use crate::store::StoreError;
+use crate::tables::{Put, Table};
 
 /// What makes a dropped file that file. The profile is not part of it: a changed setting does not make a new drop.
 pub(super) fn key(source: &Source) -> Vec<u8> {
@@ -14,4 +20,13 @@ pub(super) fn key(source: &Source) -> Vec<u8> {
     key.extend_from_slice(folder);
     key.extend_from_slice(source.path.as_bytes());
     key
+}
+
+/// Entries of the table: whose job each file is from now on.
+pub(super) fn puts(keys: BTreeMap<Vec<u8>, JobId>) -> Result<Vec<Put>, StoreError> {
+    let put = |(key, id): (Vec<u8>, JobId)| {
+        let value = record::encode(Table::ByKey, &key, &id)?;
+        Ok(Put { table: Table::ByKey, key, value: Some(value) })
+    };
+    keys.into_iter().map(put).collect()
 }

@@ -9,7 +9,6 @@ use super::{Queue, SUBMIT_CHUNK, UNFILLED, by_key, fits, head_put};
 use crate::id::{JobId, Token};
 use crate::job::{Job, Past, one_line};
 use crate::path::{MAX_NAMED, MAX_SOURCE, RelPath};
-use crate::record;
 use crate::store::StoreError;
 use crate::tables::{Put, Table, Tables};
 
@@ -70,11 +69,7 @@ impl<T: Tables> Queue<T> {
             }
             jobs.push(job);
         }
-        let mut puts = Vec::with_capacity(4 * jobs.len());
-        for (key, id) in keys {
-            let value = record::encode(Table::ByKey, &key, &id)?;
-            puts.push(Put { table: Table::ByKey, key, value: Some(value) });
-        }
+        let puts = by_key::puts(keys)?;
         let changes: Vec<_> = jobs.iter().map(|job| (None, job)).collect();
         self.commit(inner, head, &changes, puts)?;
         self.settle(head)?;

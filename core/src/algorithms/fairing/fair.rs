@@ -31,18 +31,23 @@ pub(super) struct Lists {
 
 impl Lists {
     pub(super) fn triangles_at(vertices: usize, triangles: &[[u32; 3]]) -> Self {
-        let mut starts = vec![0_u32; vertices + 1];
-        for v in triangles.iter().flatten() {
+        Self::by(vertices, triangles.iter())
+    }
+
+    /// By number below `count`, the sets that hold it, in their order.
+    fn by<'s, const N: usize>(count: usize, sets: impl Iterator<Item = &'s [u32; N]> + Clone) -> Self {
+        let mut starts = vec![0_u32; count + 1];
+        for v in sets.clone().flatten() {
             starts[*v as usize + 1] += 1;
         }
-        for v in 0..vertices {
+        for v in 0..count {
             starts[v + 1] += starts[v];
         }
         let mut next = starts.clone();
-        let mut items = vec![0; 3 * triangles.len()];
-        for (i, t) in triangles.iter().enumerate() {
-            for &v in t {
-                items[next[v as usize] as usize] = i as u32;
+        let mut items = vec![0; starts[count] as usize];
+        for (set, i) in sets.zip(0..) {
+            for &v in set {
+                items[next[v as usize] as usize] = i;
                 next[v as usize] += 1;
             }
         }
@@ -77,37 +82,42 @@ fn cotangent(a: DVec3, b: DVec3) -> f64 {
     }
 }
 
+/// The forms of an energy: it is ½ hᵀ W h of values h, which are linear in the vertices' positions.
+#[derive(Default)]
+struct Forms {
+    /// By value: what it takes of the new vertices.
+    of_new: Rows,
+    /// The values of the surface as it is.
+    values: Vec<DVec3>,
+    /// W.
+    weights: Rows,
+}
+
+impl Forms {
+    /// Adds the value Σ `weight` x over vertices.
+    fn push(&mut self, sheet: &Sheet<'_>, value: &[(u32, f64)]) {
+        self.values.push(value.iter().map(|(v, weight)| sheet.points[*v as usize] * *weight).sum());
+        let held = sheet.held as u32;
+        self.of_new.push(value.iter().filter(|(v, _)| *v >= held).map(|(v, weight)| (v - held, *weight)));
+    }
+}
+
 /// Moves the new vertices to where the energy is smallest, measured on the surface as it is now. `sharp`: vertices over which curvature
 /// does not go on, by number. `None` where the system cannot be solved reliably. Gives how far the vertices moved, root mean square.
 pub(super) fn solve(sheet: &mut Sheet<'_>, sharp: &[bool], energy: Energy) -> Option<f64> {
     let all: Vec<[u32; 3]> = sheet.all().collect();
     let (held, free) = (sheet.held, sheet.points.len() - sheet.held);
-    let column = |v: u32| if v as usize >= held { v - held as u32 } else { v + free as u32 };
-    let columns = sheet.points.len();
-    let at = Lists::triangles_at(columns, &all);
-    let (inner, outer) = match energy {
-        Energy::Membrane => membrane(sheet, &all, &at, column),
-        Energy::Plate | Energy::Curvature => curvature(sheet, &all, &at, sharp, energy, column),
+    let at = Lists::triangles_at(sheet.points.len(), &all);
+    let forms = match energy {
+        Energy::Membrane => membrane(sheet, &all, &at),
+        Energy::Plate | Energy::Curvature => curvature(sheet, &all, &at, sharp, energy),
     };
-    // inner: rows of H; outer: the weights between them.
-    let weighted = outer.times(outer.len(), &inner, columns);
-    let matrix = inner.transposed(columns).times(free, &weighted, columns);
-    let position = |c: u32| sheet.points[if (c as usize) < free { c as usize + held } else { c as usize - free }];
-    let mut square = Rows::default();
+    let by_vertex = forms.of_new.transposed(free);
+    let square = by_vertex.times(free, &forms.weights.times(forms.weights.len(), &forms.of_new, free), free);
     // What is solved for is how far vertices move, so that rounding is relative to that.
-    let mut sides: Vec<DVec3> = Vec::with_capacity(free);
-    let mut size: f64 = 0.0;
-    for i in 0..free {
-        let mut force = DVec3::ZERO;
-        let mut gross = 0.0;
-        for (c, value) in matrix.row(i) {
-            force -= position(c) * value;
-            gross += value.abs();
-        }
-        size = size.max(gross);
-        sides.push(force);
-        square.push(matrix.row(i).filter(|(c, _)| (*c as usize) < free));
-    }
+    let weighted: Vec<DVec3> = forms.weights.of(&forms.values);
+    let sides: Vec<DVec3> = by_vertex.of(&weighted).into_iter().map(|force| -force).collect();
+    let size = (0..free).map(|i| square.row(i).map(|(_, value)| value.abs()).sum()).fold(0.0, f64::max);
     let factor = Factor::new(&square, &sheet.points[held..], ENTRIES)?;
     let mut moves = factor.solve(&sides);
     let rest = |moves: &[DVec3]| -> Vec<DVec3> {
@@ -131,32 +141,26 @@ pub(super) fn solve(sheet: &mut Sheet<'_>, sharp: &[bool], energy: Energy) -> Op
 }
 
 /// Differences along the edges at new vertices.
-fn membrane(sheet: &Sheet<'_>, all: &[[u32; 3]], at: &Lists, column: impl Fn(u32) -> u32) -> (Rows, Rows) {
-    let (mut inner, mut outer) = (Rows::default(), Rows::default());
+fn membrane(sheet: &Sheet<'_>, all: &[[u32; 3]], at: &Lists) -> Forms {
+    let mut forms = Forms::default();
     for v in sheet.held as u32..sheet.points.len() as u32 {
         for &i in at.of(v) {
             let t = all[i as usize];
             let Some(k) = t.iter().position(|&w| w == v) else { continue };
-            outer.push([(inner.len() as u32, 1.0)]);
-            inner.push([(column(v), 1.0), (column(t[(k + 1) % 3]), -1.0)]);
+            forms.weights.push([(forms.values.len() as u32, 1.0)]);
+            forms.push(sheet, &[(v, 1.0), (t[(k + 1) % 3], -1.0)]);
         }
     }
-    (inner, outer)
+    forms
 }
 
-fn curvature(
-    sheet: &Sheet<'_>,
-    all: &[[u32; 3]],
-    at: &Lists,
-    sharp: &[bool],
-    energy: Energy,
-    column: impl Fn(u32) -> u32,
-) -> (Rows, Rows) {
+/// Mean curvature at vertices, or its change between them.
+fn curvature(sheet: &Sheet<'_>, all: &[[u32; 3]], at: &Lists, sharp: &[bool], energy: Energy) -> Forms {
     let n = sheet.points.len();
     let wanted = wanted(sheet, all, at);
     let mut number = vec![NONE; n];
     let mut areas = Vec::new();
-    let mut inner = Rows::default();
+    let mut forms = Forms::default();
     let mut row = Stencil::default();
     for v in 0..n as u32 {
         if !wanted[v as usize] || sharp[v as usize] {
@@ -164,19 +168,19 @@ fn curvature(
         }
         let area = at.of(v).iter().map(|&i| sheet.normal(all[i as usize]).length()).sum::<f64>() / 6.0;
         if row.quadratic(sheet, all, at, sharp, v) {
-            number[v as usize] = inner.len() as u32;
+            number[v as usize] = forms.values.len() as u32;
             areas.push(area);
-            inner.push(row.entries.iter().map(|(w, value)| (column(*w), *value)));
+            forms.push(sheet, &row.entries);
         }
     }
-    let mut outer = Rows::default();
     if energy == Energy::Plate {
-        for (i, area) in areas.iter().enumerate() {
-            outer.push([(i as u32, *area)]);
+        for (i, area) in (0..).zip(areas) {
+            forms.weights.push([(i, area)]);
         }
-        return (inner, outer);
+    } else {
+        forms.weights = differences_of(sheet, all, &number, areas.len() as u32);
     }
-    (inner, differences_of(sheet, all, &number, areas.len() as u32))
+    forms
 }
 
 /// By vertex: its mean curvature H is wanted. Those of new vertices, of the rim, and of one ring beyond.
@@ -197,7 +201,8 @@ fn wanted(sheet: &Sheet<'_>, all: &[[u32; 3]], at: &Lists) -> Vec<bool> {
 
 /// Differences between the rows of neighbours, weighted by cotangents. `number`: the row of each vertex; so many `rows` there are.
 fn differences_of(sheet: &Sheet<'_>, all: &[[u32; 3]], number: &[u32], rows: u32) -> Rows {
-    let mut between: Vec<(u32, u32, f64)> = Vec::new();
+    // Each edge of each triangle, with its weight.
+    let mut between: Vec<([u32; 2], f64)> = Vec::with_capacity(3 * all.len());
     for t in all {
         let of = t.map(|v| number[v as usize]);
         if of.contains(&NONE) {
@@ -207,18 +212,29 @@ fn differences_of(sheet: &Sheet<'_>, all: &[[u32; 3]], number: &[u32], rows: u32
         for k in 0..3 {
             let (a, b, c) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]);
             let weight = (0.5 * cotangent(a - c, b - c)).max(LEAST);
-            let (i, j) = (of[k], of[(k + 1) % 3]);
-            between.extend([(i, j, -weight), (j, i, -weight), (i, i, weight), (j, j, weight)]);
+            between.push(([of[k], of[(k + 1) % 3]], weight));
         }
     }
-    between.sort_by_key(|(i, j, _)| (*i, *j));
-    let mut rest = between.as_slice();
+    let at = Lists::by(rows as usize, between.iter().map(|(ends, _)| ends));
     let mut outer = Rows::default();
+    let mut row: Vec<(u32, f64)> = Vec::new();
     for i in 0..rows {
-        let own = rest.partition_point(|e| e.0 == i);
-        let (here, after) = rest.split_at(own);
-        outer.push(here.chunk_by(|a, b| a.1 == b.1).map(|same| (same[0].1, same.iter().map(|e| e.2).sum())));
-        rest = after;
+        row.clear();
+        row.push((i, 0.0));
+        for &e in at.of(i) {
+            let ([a, b], weight) = between[e as usize];
+            let other = a ^ b ^ i;
+            row[0].1 += weight;
+            match row.iter_mut().find(|(j, _)| *j == other) {
+                Some((_, sum)) => *sum -= weight,
+                None => row.push((other, -weight)),
+            }
+        }
+        if row.len() == 1 {
+            row.clear();
+        }
+        row.sort_unstable_by_key(|(j, _)| *j);
+        outer.push(row.iter().copied());
     }
     outer
 }
@@ -228,6 +244,8 @@ fn differences_of(sheet: &Sheet<'_>, all: &[[u32; 3]], number: &[u32], rows: u32
 struct Stencil {
     entries: Vec<(u32, f64)>,
     near: Vec<u32>,
+    /// By vertex: the last vertex that it was near to.
+    near_to: Vec<u32>,
 }
 
 impl Stencil {
@@ -239,6 +257,8 @@ impl Stencil {
         }
         self.near.clear();
         self.near.push(v);
+        self.near_to.resize(sheet.points.len(), NONE);
+        self.near_to[v as usize] = v;
         // Vertices around come from outside, with their noise: more of them even it out. Among new ones, a narrow stencil keeps the
         // matrix sparse.
         let least = if (v as usize) < sheet.fixed { 12 } else { 6 };
@@ -252,7 +272,8 @@ impl Stencil {
                 }
                 for &i in at.of(w) {
                     for x in all[i as usize] {
-                        if !self.near.contains(&x) {
+                        if self.near_to[x as usize] != v {
+                            self.near_to[x as usize] = v;
                             self.near.push(x);
                         }
                     }

@@ -34,6 +34,11 @@ impl Rows {
         self.columns[range.clone()].iter().copied().zip(self.values[range].iter().copied())
     }
 
+    /// The product with a vector of points.
+    pub(super) fn of(&self, points: &[DVec3]) -> Vec<DVec3> {
+        (0..self.len()).map(|i| self.row(i).map(|(column, value)| points[column as usize] * value).sum()).collect()
+    }
+
     /// `columns`: how many there are.
     pub(super) fn transposed(&self, columns: usize) -> Self {
         let mut next = vec![0; columns + 1];

@@ -75,7 +75,6 @@ fn name(table: Table, key: &[u8]) -> String {
         },
         Table::ByState => "by_state".to_owned(),
         Table::ByKey => "by_key".to_owned(),
-        Table::ByRecipe => "by_recipe".to_owned(),
     }
 }
 
@@ -137,7 +136,6 @@ mod tests {
         job.seq = Seq(u64::MAX);
         let key = job.id.0.to_be_bytes();
         let bytes = encode(Table::Jobs, &key, &job).unwrap();
-        eprintln!("SIZE {}", bytes.len());
         assert_eq!(decode::<Job>(Table::Jobs, &key, &bytes).unwrap(), job);
     }
 

@@ -179,7 +179,7 @@ impl<T: Tables> Queue<T> {
             }
             puts.push(Put { table: Table::ByState, key: new, value: Some(Vec::new()) });
             let key = to.id.0.to_be_bytes().to_vec();
-            let value = record::encode(Table::Jobs, &key, to)?;
+            let value = record::encode_job(&key, to)?;
             puts.push(Put { table: Table::Jobs, key, value: Some(value) });
             if let Some(from) = from {
                 let count = counts.entry(from.kind()).or_default();
@@ -342,6 +342,7 @@ impl<T: Tables> JobStore for Queue<T> {
                 Control::Forget => Event::Forget,
                 Control::Hasten => Event::Hasten,
                 Control::Rank(priority) => Event::Rank(priority),
+                Control::Decide(decision) => Event::Decide(decision),
             })
         })
     }

@@ -51,6 +51,7 @@ fn work(store: &SledStore) {
             source_ctime_ns: Some(1_700_000_000_123_456_789),
             original: name,
             stays: false,
+            decision: None,
         };
         for step in [Step::Intend(publication), Step::Placed, Step::Finished] {
             store.advance(&claim, step).unwrap();

@@ -250,6 +250,7 @@ impl Slot {
             (Duty::Intend, State::Concluded { ending, reason, .. }) => {
                 desk.intend(job, &Conclusion::None { ending: *ending, reason: reason.clone() })?
             }
+            (Duty::Intend, State::Approved { publication, .. }) => desk.intend_approved(job, publication)?,
             (Duty::Place, _) => desk.place(job)?,
             (Duty::MoveOriginal, _) => desk.move_original(job)?,
             _ => return Ok(None),

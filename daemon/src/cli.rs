@@ -356,6 +356,17 @@ fn parse_priority(text: &str) -> Result<Priority, String> {
     Priority::try_from(number).map_err(|error| error.to_string())
 }
 
+/// Who decides, and what they add.
+#[derive(Args, Debug)]
+pub(crate) struct Said {
+    /// Who decides; receipt and report name them
+    #[arg(long = "as", value_name = "NAME", default_value = "local")]
+    pub by: String,
+    /// What there is to add
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    pub note: String,
+}
+
 #[derive(Debug, Subcommand)]
 pub(crate) enum JobsCommand {
     /// List jobs, the newest last
@@ -381,6 +392,20 @@ pub(crate) enum JobsCommand {
     Cancel {
         #[arg(value_name = "ID")]
         id: u64,
+    },
+    /// Publish the best attempt of a job that needs review, as it was judged
+    Approve {
+        #[arg(value_name = "ID")]
+        id: u64,
+        #[command(flatten)]
+        said: Said,
+    },
+    /// Say that the result of a job that needs review is not to be used; all stays in failed/
+    Reject {
+        #[arg(value_name = "ID")]
+        id: u64,
+        #[command(flatten)]
+        said: Said,
     },
     /// Have a waiting file taken sooner, or later
     Priority {

@@ -14,10 +14,12 @@ use std::time::Duration;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use suture_store::{Control, Job, JobId, JobStore, Priority, Query, StoreError};
+use suture_store::{Control, Decision, Job, JobId, JobStore, Kind, Priority, Query, StoreError, Verdict};
 
 use crate::attempt::Context;
 use crate::fsx::Identity;
+use crate::left::result_path;
+use crate::publish::approved::unfit;
 use crate::schedule::{Hold, Standing};
 use crate::standstill;
 
@@ -42,6 +44,8 @@ pub(crate) enum JobsWish {
     Cancel(JobId),
     /// It is wanted sooner, or later.
     Rank(JobId, Priority),
+    /// A person says whether a result that needs review is to be used.
+    Decide(JobId, Decision),
 }
 
 /// What is asked of a daemon: only one that runs can answer.
@@ -124,8 +128,44 @@ pub(crate) fn answer(store: &dyn JobStore, wish: &JobsWish) -> Result<Vec<Job>, 
         JobsWish::Retry(id) => store.control(*id, Control::Retry)?,
         JobsWish::Cancel(id) => store.control(*id, Control::Cancel)?,
         JobsWish::Rank(id, priority) => store.control(*id, Control::Rank(*priority))?,
+        JobsWish::Decide(id, decision) => {
+            store.get(*id)?.ok_or(StoreError::Unknown(*id)).map_err(Refusal::from).and_then(|job| open_to(&job, decision))?;
+            store.control(*id, Control::Decide(decision.clone()))?
+        }
     };
     Ok(vec![one])
+}
+
+/// Refuses a decision over a job of which the same was said before, or of which there is nothing to decide, in words that tell why.
+fn open_to(job: &Job, decision: &Decision) -> Result<(), Refusal> {
+    let refuse = |line: String| Err(Refusal { line, exit_code: 2 });
+    match (job.decision(), job.kind()) {
+        (Some(said), _) if said.verdict == Verdict::Approved || said.verdict == decision.verdict => {
+            refuse(format!("job {} was {} already, by {}", job.id, said.verdict.name(), said.by))
+        }
+        (_, Kind::NeedsReview | Kind::Rejected) => Ok(()),
+        (_, kind) => refuse(format!("job {} is {kind}; only what needs review can be {}", job.id, decision.verdict.name())),
+    }
+}
+
+/// Is the best attempt of a job that needs review still what was judged? Looked at now, so that whoever approves it hears of it.
+///
+/// # Errors
+/// When it is not, or cannot be looked at.
+fn is_as_judged(context: &Context, job: &Job) -> Result<(), Refusal> {
+    let folder = context.folders.iter().find(|folder| folder.name == job.source.folder);
+    let path = folder.and_then(|folder| result_path(&folder.root, job));
+    let (Kind::NeedsReview | Kind::Rejected, Some(path), Some(hash)) =
+        (job.kind(), path, job.publication().and_then(|publication| publication.output_hash))
+    else {
+        return Ok(());
+    };
+    let why = match unfit(&path, hash) {
+        Ok(None) => return Ok(()),
+        Ok(Some(why)) => why.to_owned(),
+        Err(error) => format!("{}: {error}", path.display()),
+    };
+    Err(Refusal { line: format!("job {} cannot be approved: {why}", job.id), exit_code: 2 })
 }
 
 /// Pauses the daemon or lets it go on, if that is wished, and says how it stands.
@@ -151,11 +191,14 @@ pub(crate) fn steer(context: &Context, wish: &DaemonWish) -> Result<Standing, Re
 /// As [`answer`].
 pub(crate) fn change(context: &Context, wish: &JobsWish) -> Result<Vec<Job>, Refusal> {
     let before = if let JobsWish::Cancel(id) = wish { context.store.get(*id).ok().flatten() } else { None };
+    if let JobsWish::Decide(id, Decision { verdict: Verdict::Approved, .. }) = wish {
+        context.store.get(*id)?.map_or(Ok(()), |job| is_as_judged(context, &job))?;
+    }
     let jobs = answer(&*context.store, wish)?;
     if let Some(before) = &before {
         context.sweep(before);
     }
-    if let JobsWish::Retry(_) | JobsWish::Cancel(_) | JobsWish::Rank(..) = wish {
+    if let JobsWish::Retry(_) | JobsWish::Cancel(_) | JobsWish::Rank(..) | JobsWish::Decide(..) = wish {
         context.schedule.news();
     }
     Ok(jobs)

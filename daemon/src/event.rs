@@ -21,7 +21,7 @@ pub(crate) enum Happening<'a> {
     /// It went on by this step, to where it stands now.
     Moved { job: &'a Job, step: &'a Step },
     /// An operator, or the daemon itself, wanted this of it.
-    Wished { job: &'a Job, wish: Control },
+    Wished { job: &'a Job, wish: &'a Control },
     /// Its record is gone.
     Forgotten { id: JobId },
     /// A hot folder is out of reach.
@@ -44,7 +44,7 @@ impl Happening<'_> {
             }
             Self::Moved { job, step } => log_moved(job, step),
             Self::Wished { job, wish } => {
-                if matches!(wish, Control::Retry | Control::Cancel | Control::Rank(_)) {
+                if matches!(wish, Control::Retry | Control::Cancel | Control::Rank(_) | Control::Decide(_)) {
                     tracing::info!(job = job.id.0, ?wish, "An operator's wish.");
                 }
             }

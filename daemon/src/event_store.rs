@@ -92,9 +92,10 @@ impl JobStore for Heard {
     }
 
     fn control(&self, id: JobId, wish: Control) -> Result<Job, StoreError> {
+        let told = wish.clone();
         let job = self.write(|store| store.control(id, wish))?;
         self.note(&job);
-        self.bus.tell(&Happening::Wished { job: &job, wish });
+        self.bus.tell(&Happening::Wished { job: &job, wish: &told });
         Ok(job)
     }
 

@@ -8,9 +8,9 @@ use jiff::Timestamp;
 use jiff::tz::TimeZone;
 use suture_core::Report;
 use suture_store::job::Kind;
-use suture_store::{Job, JobId, State, Time};
+use suture_store::{Decision, Job, JobId, State, Time, Verdict};
 
-use crate::cli::{JobsArgs, JobsCommand};
+use crate::cli::{JobsArgs, JobsCommand, Said};
 use crate::control::{DaemonWish, JobsWish};
 use crate::exit::Exit;
 use crate::fsx;
@@ -32,6 +32,14 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
         JobsCommand::Show { id } => JobsWish::Show(JobId(*id)),
         JobsCommand::Retry { id } => JobsWish::Retry(JobId(*id)),
         JobsCommand::Cancel { id } => JobsWish::Cancel(JobId(*id)),
+        JobsCommand::Approve { id, said } => match decided(*id, Verdict::Approved, said) {
+            Ok(wish) => wish,
+            Err(failure) => return fail(&failure),
+        },
+        JobsCommand::Reject { id, said } => match decided(*id, Verdict::Rejected, said) {
+            Ok(wish) => wish,
+            Err(failure) => return fail(&failure),
+        },
         JobsCommand::Priority { id, priority } => JobsWish::Rank(JobId(*id), *priority),
     };
     let mut jobs = match reach::jobs(&args.dir, &wish) {
@@ -68,6 +76,13 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
     // A reader that has gone away has seen enough.
     let _ = std::io::stdout().write_all(text.as_bytes());
     Exit::Good
+}
+
+/// A person's decision.
+fn decided(id: u64, verdict: Verdict, said: &Said) -> Result<JobsWish, Failure> {
+    let decision = Decision::new(verdict, &said.by, &said.note);
+    let decision = decision.map_err(|error| Failure { line: error.to_string(), exit: Exit::Refused })?;
+    Ok(JobsWish::Decide(JobId(id), decision))
 }
 
 /// Pauses the daemon of a hot folder, or lets it go on; if none runs, the next one.
@@ -174,6 +189,7 @@ fn note(job: &Job) -> String {
             }
             _ => publication.reason.clone(),
         },
+        State::Approved { .. } if job.note.is_empty() => "approved; it is published next, by the daemon that runs".into(),
         State::Cancelled { why } => match why {
             suture_store::job::Withdrawal::Operator => "by an operator".into(),
             suture_store::job::Withdrawal::Changed => "the file changed; it is a new job".into(),
@@ -183,10 +199,23 @@ fn note(job: &Job) -> String {
     }
 }
 
+/// Who decided, in words.
+fn decision(job: &Job) -> String {
+    let word = |said: &Decision| {
+        let note = if said.note.is_empty() { String::new() } else { format!(": {}", said.note) };
+        format!("{} by {} at {}{note}", said.verdict.name(), said.by, when(said.at))
+    };
+    job.decision().map(word).unwrap_or_default()
+}
+
 fn line(job: &Job) -> String {
     let (id, kind, since) = (job.id.0, job.kind().name(), when(job.changed));
     let priority = if job.priority.is_default() { String::new() } else { format!("priority {}  ", job.priority) };
-    let line = format!("{id:>6}  {since}  {kind:<12} {:<32} {priority}{}", job.source.path.to_string(), note(job));
+    let note = note(job);
+    let said =
+        job.decision().map(|said| format!("{}{} by {}", if note.is_empty() { "" } else { ", " }, said.verdict.name(), said.by));
+    let line =
+        format!("{id:>6}  {since}  {kind:<12} {:<32} {priority}{note}{}", job.source.path.to_string(), said.unwrap_or_default());
     line.trim_end().to_owned() + "\n"
 }
 
@@ -222,9 +251,10 @@ fn show(dir: &Path, job: &Job) -> String {
         when(job.submitted),
         when(job.changed)
     );
-    let note = note(job);
-    if !note.is_empty() {
-        text += &format!("  note      {note}\n");
+    for (name, words) in [("note", note(job)), ("decision", decision(job))] {
+        if !words.is_empty() {
+            text += &format!("  {name:<8}  {words}\n");
+        }
     }
     // With several folders to a store, it may be in another one.
     if let Some(path) = report_path(dir, job).filter(|path| fsx::exists(path).unwrap_or(false)) {

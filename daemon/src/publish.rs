@@ -72,14 +72,25 @@ impl<'a> Desk<'a> {
 
     /// Writes report and receipt, chooses names, and makes the intent durable.
     pub(crate) fn intend(&self, job: &Job, result: &Conclusion) -> Result<Job, PublishError> {
-        let work = self.work(job);
-        match std::fs::create_dir(&work) {
-            Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(io_at(&work)(e)),
-            _ => {}
-        }
+        self.begin(job)?;
         superseded::clear(self.folder, job);
         crash_point("daemon.superseded");
         let publication = self.prepare(job, result)?;
+        self.intend_durably(job, publication)
+    }
+
+    /// The attempt's folder, made when there is none.
+    fn begin(&self, job: &Job) -> Result<PathBuf, PublishError> {
+        let work = self.work(job);
+        match std::fs::create_dir(&work) {
+            Err(e) if e.kind() != io::ErrorKind::AlreadyExists => Err(io_at(&work)(e)),
+            _ => Ok(work),
+        }
+    }
+
+    /// The intent, the files of which are in the attempt's folder.
+    fn intend_durably(&self, job: &Job, publication: Publication) -> Result<Job, PublishError> {
+        let work = self.work(job);
         // The files' names in it, and its own: without them the intent would be of nothing.
         for folder in [work.as_path(), fsx::folder_of(&work)] {
             fsx::sync_dir(folder).map_err(io_at(folder))?;
@@ -138,6 +149,7 @@ impl<'a> Desk<'a> {
             source_ctime_ns,
             original: Some(names.original),
             stays: self.folder.leave_originals,
+            decision: None,
         };
         self.write_receipt(job, &publication, input_hash)?;
         Ok(publication)
@@ -167,6 +179,7 @@ impl<'a> Desk<'a> {
             output_blake3: p.output_hash,
             report_blake3: p.report_hash,
             reused: p.reused,
+            decision: p.decision.as_ref(),
         };
         rewrite(&self.work(job).join(RECEIPT_FILE), &receipt).map(drop)
     }
@@ -452,5 +465,6 @@ fn rewrite<T: Serialize>(path: &Path, value: &T) -> Result<Hash, PublishError> {
     write().map_err(io_at(path))
 }
 
+pub(crate) mod approved;
 #[cfg(test)]
 pub(crate) mod tests;

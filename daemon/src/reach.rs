@@ -162,7 +162,7 @@ fn through_store(state: &Path, wish: &JobsWish) -> Result<Vec<Job>, Unread> {
             let job = SledStore::peek(state).map_err(held)?.into_iter().find(|job| job.id == *id);
             Ok(vec![job.ok_or(StoreError::Unknown(*id))?])
         }
-        JobsWish::Retry(_) | JobsWish::Cancel(_) | JobsWish::Rank(..) => {
+        JobsWish::Retry(_) | JobsWish::Cancel(_) | JobsWish::Rank(..) | JobsWish::Decide(..) => {
             Ok(answer(&SledStore::open(state).map_err(held)?, wish)?)
         }
     }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use suture_core::Report;
 use suture_core::report::SCHEMA_VERSION;
 use suture_store::job::Area;
-use suture_store::{Ending, Hash, Job, JobId, RelPath, Token};
+use suture_store::{Decision, Ending, Hash, Job, JobId, RelPath, Token};
 
 use crate::create;
 
@@ -56,6 +56,9 @@ pub(crate) struct Receipt<'a> {
     /// The job whose result was copied: nothing was computed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reused: Option<JobId>,
+    /// Who approved a result that was not found good.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub decision: Option<&'a Decision>,
 }
 
 /// A report of the engine's on a result that was not computed: it is the earlier job's, with the names of this one.
@@ -110,6 +113,7 @@ pub(crate) struct Told {
     pub stays: bool,
     pub work: Option<Token>,
     pub reused: Option<JobId>,
+    pub decision: Option<Decision>,
 }
 
 /// The receipt in a file; `None` where there is none, or one of another version. A link is not followed.

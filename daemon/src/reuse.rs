@@ -209,6 +209,7 @@ mod tests {
                 source_ctime_ns: None,
                 original: Some(claim.job.source.path.clone()),
                 stays: false,
+                decision: None,
             };
             let steps = [Step::Intend(publication), Step::Placed, Step::Finished];
             let [.., job] = steps.map(|step| store.advance(&claim, step).unwrap());

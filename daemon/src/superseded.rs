@@ -5,6 +5,7 @@
 
 use std::path::Path;
 
+use suture_store::job::Area;
 use suture_store::{Job, RelPath};
 
 use crate::folder::Folder;
@@ -14,8 +15,14 @@ use crate::remove::remove;
 
 /// Removes it. To be called when the new result is durable in its attempt's folder, and before its names are chosen.
 pub(crate) fn clear(folder: &Folder, job: &Job) {
-    let Some((area, path)) = &job.moved_to else { return };
-    let root = folder.area(*area);
+    if let Some((area, path)) = &job.moved_to {
+        clear_beside(folder, job, *area, path);
+    }
+}
+
+/// The same for what stands beside the original of this name, or under its name where it stays in `in/`.
+pub(crate) fn clear_beside(folder: &Folder, job: &Job, area: Area, path: &RelPath) {
+    let root = folder.area(area);
     let base = root.join(path.to_path());
     let receipt = with_suffix(&base, RECEIPT);
     let Some(told) = receipt::read(&receipt) else { return };
@@ -44,7 +51,6 @@ pub(crate) fn clear(folder: &Folder, job: &Job) {
 
 #[cfg(test)]
 mod tests {
-    use suture_store::job::Area;
     use suture_store::{JobId, Source, Time};
 
     use super::*;

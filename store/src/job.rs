@@ -7,6 +7,8 @@
 //!    ▲ ▲                │ │                 ▲  │
 //!    │ └──died, back────┘ └─condemned─► Concluded (result known, no worker needed, names not yet chosen)
 //!    └───retry (operator)── Ended (not good), Cancelled
+//!
+//!  Ended (needs review) ──approve (a person)──► Approved ──intend──► Publishing …
 //! ```
 //! A job that is Concluded, Publishing or Published and cannot go on (a folder that may not be written, a foreign mount) is *parked*
 //! in its state: no one holds it, its reason is in its note, and it is claimed again after a pause.
@@ -24,6 +26,7 @@
 //! leaves no mark.
 
 mod blame;
+mod decision;
 mod kind;
 mod past;
 mod pauses;
@@ -34,6 +37,7 @@ mod step;
 mod tests;
 
 pub use blame::{Blame, CHARGES, DEATHS_ALONE, DEATHS_IN_HAND, DEATHS_TO_SUSPECT, Death, KILLS_FREE, Testimony};
+pub use decision::{Decision, MAX_BY, NoDecision, Verdict};
 pub use kind::Kind;
 pub use past::{Past, Reached};
 pub use pauses::{BACKOFF_CAP_MS, BACKOFF_MS, ENVIRONMENT_RETRIES, PARK_CAP_MS, PARK_MS, WAIT_MS};

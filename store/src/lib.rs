@@ -27,7 +27,7 @@ pub mod testkit;
 
 pub use crash::crash_point;
 pub use id::{Attempt, Boot, Clock, Epoch, Hash, JobId, Recipe, Seq, SystemClock, Time, Token};
-pub use job::{Ending, Job, Kind, Past, Priority, Publication, Reached, Source, State, Step};
+pub use job::{Decision, Ending, Job, Kind, Past, Priority, Publication, Reached, Source, State, Step, Verdict};
 pub use memory::MemoryStore;
 pub use path::RelPath;
 pub use sled_store::{Opening, SledStore};

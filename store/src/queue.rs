@@ -1,4 +1,4 @@
-//! The queue's logic over five ordered tables, shared by every store that is embedded in the daemon.
+//! The queue's logic over four ordered tables, shared by every store that is embedded in the daemon.
 //!
 //! | table    | key                                                                     | value                     |
 //! |----------|-------------------------------------------------------------------------|---------------------------|
@@ -6,11 +6,10 @@
 //! | jobs     | job number                                                              | the [`Job`]               |
 //! | by_state | kind, then what that kind is searched by (see [`index`])                | nothing                   |
 //! | by_key   | identity of the file: device, inode, size, mtime, folder, path          | number of its latest job  |
-//! | by_recipe | size of the source, recipe, job number (see [`results`]) of jobs whose result others may have | nothing   |
 //!
 //! Numbers in keys are big-endian. The job, its index entries and the head change in one transaction of the tables. One lock
 //! orders the transitions; becoming durable happens outside of it, so that transitions of several threads share one sync. Which job is
-//! claimed next is told by a [`mod@line`] of all that may be, in memory, made anew at each opening.
+//! claimed next is told by a [`mod@line`] of all that may be, and whose result others may have by [`results`]: in memory, made anew at each opening.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -31,13 +30,13 @@ mod by_key;
 mod forget;
 mod index;
 mod line;
-mod offered;
 mod page;
 mod past;
 mod recover;
 mod results;
 
 use line::{Line, Now};
+use results::Results;
 
 /// Longest folder or profile name, as it stands in a record.
 pub(crate) const MAX_NAME: usize = 64;
@@ -59,6 +58,7 @@ struct Inner {
     head: Head,
     counts: BTreeMap<Kind, u64>,
     line: Line,
+    results: Results,
 }
 
 /// The queue over `T`.
@@ -100,7 +100,8 @@ impl<T: Tables> Queue<T> {
         head.epoch.0 += 1;
         head.seq.0 += 1;
         let counts = index::count(&tables)?;
-        let queue = Self { tables, inner: Mutex::new(Inner { head, counts, line: Line::default() }), clock };
+        let results = Results::of(&tables)?;
+        let queue = Self { tables, inner: Mutex::new(Inner { head, counts, line: Line::default(), results }), clock };
         let now = queue.now();
         for kind in Kind::ALL.into_iter().filter(|kind| kind.is_live()) {
             for id in index::ids(&queue.tables, kind)? {
@@ -178,11 +179,8 @@ impl<T: Tables> Queue<T> {
             }
             puts.push(Put { table: Table::ByState, key: new, value: Some(Vec::new()) });
             let key = to.id.0.to_be_bytes().to_vec();
-            let value = record::encode(Table::Jobs, &key, to)?;
+            let value = record::encode_job(&key, to)?;
             puts.push(Put { table: Table::Jobs, key, value: Some(value) });
-            if let Some(recipe) = to.offers() {
-                puts.push(Put { table: Table::ByRecipe, key: results::key(to, recipe), value: Some(Vec::new()) });
-            }
             if let Some(from) = from {
                 let count = counts.entry(from.kind()).or_default();
                 *count = count.saturating_sub(1);
@@ -193,7 +191,11 @@ impl<T: Tables> Queue<T> {
         self.tables.write(puts, head.seq)?;
         (inner.head, inner.counts) = (head, counts);
         let now = self.now();
-        changes.iter().for_each(|(_, to)| inner.line.update(to, now));
+        for (from, to) in changes {
+            inner.line.update(to, now);
+            from.iter().for_each(|from| inner.results.remove(from));
+            inner.results.add(to);
+        }
         drop(inner);
         crash_point("store.commit.written");
         Ok(())
@@ -340,6 +342,7 @@ impl<T: Tables> JobStore for Queue<T> {
                 Control::Forget => Event::Forget,
                 Control::Hasten => Event::Hasten,
                 Control::Rank(priority) => Event::Rank(priority),
+                Control::Decide(decision) => Event::Decide(decision),
             })
         })
     }

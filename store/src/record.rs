@@ -6,13 +6,16 @@
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use crate::job::{Job, State};
 use crate::store::StoreError;
 use crate::tables::Table;
 
 /// Version of what the JSON means. Raised when an older program would misread it.
-pub(crate) const SCHEMA: u16 = 2;
+pub(crate) const SCHEMA: u16 = 3;
+/// That of a record in which nothing is that version 2 did not know, so that a program of then goes on with it.
+const PLAIN: u16 = 2;
 /// Largest record in bytes. The database would put values from a quarter of its segment on into files of their own.
-pub(crate) const MAX: usize = 4224;
+pub(crate) const MAX: usize = 4608;
 
 const MAGIC: &[u8; 4] = b"SUTR";
 const HEADER: usize = 10;
@@ -32,19 +35,28 @@ fn checksum(table: Table, key: &[u8], schema: u16, json: &[u8]) -> u32 {
     crc.finalize()
 }
 
+/// `job` as a record under `key`.
+pub(crate) fn encode_job(key: &[u8], job: &Job) -> Result<Vec<u8>, StoreError> {
+    encode_as(if let State::Approved { .. } = job.state { SCHEMA } else { PLAIN }, Table::Jobs, key, job)
+}
+
 /// `value` as a record under `key` of `table`.
 pub(crate) fn encode<T: Serialize>(table: Table, key: &[u8], value: &T) -> Result<Vec<u8>, StoreError> {
+    encode_as(PLAIN, table, key, value)
+}
+
+fn encode_as<T: Serialize>(schema: u16, table: Table, key: &[u8], value: &T) -> Result<Vec<u8>, StoreError> {
     let too_long = || StoreError::TooLong { what: name(table, key) };
     let mut bytes = Vec::with_capacity(1024);
     bytes.extend_from_slice(MAGIC);
-    bytes.extend_from_slice(&SCHEMA.to_be_bytes());
+    bytes.extend_from_slice(&schema.to_be_bytes());
     bytes.extend_from_slice(&[0; 4]);
     serde_json::to_writer(&mut bytes, value).map_err(|_| too_long())?;
     if bytes.len() > MAX {
         return Err(too_long());
     }
     let (header, json) = bytes.split_at_mut(HEADER);
-    header.split_at_mut(6).1.copy_from_slice(&checksum(table, key, SCHEMA, json).to_be_bytes());
+    header.split_at_mut(6).1.copy_from_slice(&checksum(table, key, schema, json).to_be_bytes());
     Ok(bytes)
 }
 
@@ -75,7 +87,6 @@ fn name(table: Table, key: &[u8]) -> String {
         },
         Table::ByState => "by_state".to_owned(),
         Table::ByKey => "by_key".to_owned(),
-        Table::ByRecipe => "by_recipe".to_owned(),
     }
 }
 
@@ -83,7 +94,9 @@ fn name(table: Table, key: &[u8]) -> String {
 mod tests {
     use super::*;
     use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Recipe, Seq, Time, Token};
-    use crate::job::{Area, Blame, Ending, Hold, Job, MAX_REASON, Parked, Priority, Publication, Source, State, one_line};
+    use crate::job::{
+        Area, Blame, Decision, Ending, Hold, MAX_BY, MAX_REASON, Parked, Priority, Publication, Source, Verdict, one_line,
+    };
     use crate::path::{MAX_NAMED, MAX_SOURCE, RelPath};
 
     /// Everything a job can hold, as long as it can be: no transition can fail for want of room.
@@ -119,6 +132,10 @@ mod tests {
             source_ctime_ns: Some(i64::MIN),
             original: Some(path.clone()),
             stays: true,
+            decision: Some(Decision {
+                at: Time(u64::MAX),
+                ..Decision::new(Verdict::Rejected, &"b".repeat(MAX_BY), &reason).unwrap()
+            }),
         };
         let number = u32::MAX;
         let (deaths, deaths_alone, in_hand, machine) = (number, number, u8::MAX, number);
@@ -136,8 +153,7 @@ mod tests {
         job.note = reason;
         job.seq = Seq(u64::MAX);
         let key = job.id.0.to_be_bytes();
-        let bytes = encode(Table::Jobs, &key, &job).unwrap();
-        eprintln!("SIZE {}", bytes.len());
+        let bytes = encode_job(&key, &job).unwrap();
         assert_eq!(decode::<Job>(Table::Jobs, &key, &bytes).unwrap(), job);
     }
 
@@ -152,11 +168,11 @@ mod tests {
         damaged(decode(Table::Meta, b"head", b""));
         // A record of a later version, whole in itself.
         let mut later = bytes;
-        later[5] = 3;
-        let crc = checksum(Table::Meta, b"head", 3, b"7");
+        later[5] = 4;
+        let crc = checksum(Table::Meta, b"head", 4, b"7");
         later[6..10].copy_from_slice(&crc.to_be_bytes());
         let result = decode::<u32>(Table::Meta, b"head", &later);
-        assert!(matches!(result, Err(StoreError::Newer { found: 3, known: SCHEMA })), "{result:?}");
+        assert!(matches!(result, Err(StoreError::Newer { found: 4, known: SCHEMA })), "{result:?}");
     }
 
     /// A job as version 1 wrote it, without what was added since.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::id::{Epoch, JobId, Recipe, Seq, Token};
-use crate::job::{Illegal, Job, Kind, Past, Priority, Source, Step, Testimony};
+use crate::job::{Decision, Illegal, Job, Kind, Past, Priority, Source, Step, Testimony};
 
 /// As many results alike are named as it makes sense to look at.
 pub const MOST_RESULTS: usize = 8;
@@ -206,7 +206,7 @@ pub enum Lease {
 }
 
 /// An operator's wish.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Control {
     /// Try again: a job that ended without a good result, was cancelled, or waits. Its blame is forgotten.
     Retry,
@@ -218,6 +218,8 @@ pub enum Control {
     Hasten,
     /// Take a job that is queued or waits sooner, or later.
     Rank(Priority),
+    /// Publish the best attempt of a job that needs review, as it was judged, or say that it is not to be used.
+    Decide(Decision),
 }
 
 /// A job whose daemon died.

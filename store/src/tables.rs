@@ -3,14 +3,13 @@
 use crate::id::{Epoch, Seq};
 use crate::store::StoreError;
 
-/// One of the five tables.
+/// One of the four tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Table {
     Meta,
     Jobs,
     ByState,
     ByKey,
-    ByRecipe,
 }
 
 /// A change of one entry; without a value the entry goes.

@@ -3,6 +3,8 @@
 //!
 //! `SUTURE_EXHAUSTIVE=1` tries every pair of steps and the full number of random kills.
 
+#[path = "crash/approved.rs"]
+mod approved;
 #[path = "crash/deaths.rs"]
 mod deaths;
 #[path = "crash/lost.rs"]

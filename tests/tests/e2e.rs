@@ -25,6 +25,7 @@ mod e2e {
     mod rebuild;
     mod retention;
     mod reuse;
+    mod review;
     mod rude;
     mod same_bytes;
     mod soups;

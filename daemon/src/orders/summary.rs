@@ -204,6 +204,7 @@ pub(super) mod tests {
             source_ctime_ns: None,
             original: Some(path),
             stays: false,
+            decision: None,
             recipe: None,
             reused: None,
         }

@@ -152,6 +152,7 @@ impl Evidence<'_> {
             source_ctime_ns,
             original: None,
             stays: false,
+            decision: told.decision.clone(),
         }
     }
 

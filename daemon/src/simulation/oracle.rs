@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use suture_store::job::{Kind, Withdrawal};
-use suture_store::{Job, JobId, Query, State};
+use suture_store::{Job, JobId, Query, State, Verdict};
 
 use super::matter::{Fate, Matter};
 use super::plan::FOLDERS;
@@ -48,6 +48,8 @@ pub(super) struct Oracle {
     pub swept: BTreeMap<Key, u64>,
     /// Where results of each content are.
     pub standing: BTreeMap<Matter, BTreeSet<PathBuf>>,
+    /// How often someone approved what is not good by itself.
+    pub approved: BTreeMap<Key, u64>,
     serials: u32,
     ticks: u64,
     kills: u64,
@@ -109,8 +111,12 @@ impl Oracle {
             .iter()
             .rev()
             .find(|version| version.ino == job.source.ino && FOLDERS[version.folder] == job.source.folder);
-        if let (Some(version), JobsWish::Retry(_)) = (version, wish) {
-            *self.retries.entry(version.matter.serial).or_default() += 1;
+        match (version, wish) {
+            (Some(version), JobsWish::Retry(_)) => *self.retries.entry(version.matter.serial).or_default() += 1,
+            (Some(version), JobsWish::Decide(_, said)) if said.verdict == Verdict::Approved => {
+                *self.approved.entry((version.folder, version.matter)).or_default() += 1;
+            }
+            _ => {}
         }
     }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
 
 use suture_store::job::Kind;
-use suture_store::{Clock, JobId, Priority, Query};
+use suture_store::{Clock, Decision, JobId, Priority, Query, Verdict};
 
 use super::matter::{FATES, Fate, Matter};
 use super::oracle::Version;
@@ -169,10 +169,10 @@ impl Stage {
 
     /// Something that operators or the machine do, between the steps of the daemon.
     pub(super) fn trouble(&self) {
-        match self.chance(|chance| chance.below(14)) {
+        match self.chance(|chance| chance.below(17)) {
             0 | 1 => self.pause(None),
             2 => self.wish(&Kind::ALL, JobsWish::Cancel),
-            3 => self.wish(&[Kind::Failed, Kind::Quarantined, Kind::Cancelled], JobsWish::Retry),
+            3 => self.wish(&[Kind::Failed, Kind::Rejected, Kind::Quarantined, Kind::Cancelled], JobsWish::Retry),
             4 => {
                 let priority = self.chance(|chance| Priority::try_from(chance.below(10) as i64).unwrap());
                 self.wish(&[Kind::Queued], |id| JobsWish::Rank(id, priority));
@@ -195,12 +195,20 @@ impl Stage {
             }
             10 | 11 => self.jump(),
             12 => self.reload(),
+            13 | 14 => self.decide(Verdict::Approved),
+            15 => self.decide(Verdict::Rejected),
             _ => {
                 let strikes = self.chance(|chance| chance.between(1, 4)) as u32;
                 self.say(|| format!("{strikes} workers cannot be started"));
                 self.sky.strike(strikes);
             }
         }
+    }
+
+    /// A person has looked at what needs review.
+    fn decide(&self, verdict: Verdict) {
+        let said = Decision::new(verdict, "Ada", "").unwrap();
+        self.wish(&[Kind::NeedsReview, Kind::Rejected], |id| JobsWish::Decide(id, said.clone()));
     }
 
     /// Such trouble as a week has: what is reloaded says the same.

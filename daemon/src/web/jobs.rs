@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use axum::Json;
-use axum::body::{Body, to_bytes};
+use axum::body::{Body, Bytes, to_bytes};
 use axum::extract::{Path, Query, State};
 use axum::http::{StatusCode, Uri};
 use serde::{Deserialize, Serialize};
-use suture_store::{Job, JobId, Kind, Look, Priority, StoreError};
+use suture_store::{Decision, Job, JobId, Kind, Look, Priority, StoreError, Verdict};
 use tokio::time::timeout;
 
 use crate::attempt::Context;
@@ -152,17 +152,66 @@ pub(super) async fn rank(State(shared): State<Arc<Shared>>, Path(id): Path<Strin
     wish(&shared, &id, move |job| Ok(JobsWish::Rank(job.id, priority))).await
 }
 
+/// Who decides, and what they add.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Said {
+    #[serde(default = "someone")]
+    by: String,
+    #[serde(default)]
+    note: String,
+}
+
+fn someone() -> String {
+    "local".into()
+}
+
+/// `POST /v1/jobs/{id}/approve`: its best attempt is published, as it was judged.
+pub(super) async fn approve(
+    State(shared): State<Arc<Shared>>,
+    Path(id): Path<String>,
+    body: Body,
+) -> Result<Json<Shown>, Problem> {
+    decide(&shared, &id, body, Verdict::Approved).await
+}
+
+/// `POST /v1/jobs/{id}/reject`: its result is not to be used.
+pub(super) async fn reject(
+    State(shared): State<Arc<Shared>>,
+    Path(id): Path<String>,
+    body: Body,
+) -> Result<Json<Shown>, Problem> {
+    decide(&shared, &id, body, Verdict::Rejected).await
+}
+
+async fn decide(shared: &Shared, id: &str, body: Body, verdict: Verdict) -> Result<Json<Shown>, Problem> {
+    let Said { by, note } = match read_wish(body).await? {
+        // Nothing need be said.
+        bytes if bytes.is_empty() => Said { by: someone(), note: String::new() },
+        bytes => understood(&bytes)?,
+    };
+    let decision = Decision::new(verdict, &by, &note).map_err(|error| Problem::bad(error.to_string()))?;
+    wish(shared, id, move |job| Ok(JobsWish::Decide(job.id, decision))).await
+}
+
 /// A small body of JSON.
 ///
 /// # Errors
 /// When it is too long, comes too slowly, or does not say what it should.
 pub(super) async fn wished<T: serde::de::DeserializeOwned>(body: Body) -> Result<T, Problem> {
+    understood(&read_wish(body).await?)
+}
+
+fn understood<T: serde::de::DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
+    serde_json::from_slice(bytes).map_err(|error| Problem::bad(format!("the request is not the JSON that is needed: {error}")))
+}
+
+async fn read_wish(body: Body) -> Result<Bytes, Problem> {
     let too_slow = || Problem::new(StatusCode::REQUEST_TIMEOUT, "the request did not come in time");
     let read = timeout(PATIENCE, to_bytes(body, LONGEST_WISH)).await.map_err(|_| too_slow())?;
-    let bytes = read.map_err(|_| {
+    read.map_err(|_| {
         Problem::new(StatusCode::PAYLOAD_TOO_LARGE, format!("the request is longer than {LONGEST_WISH} bytes, or was cut off"))
-    })?;
-    serde_json::from_slice(&bytes).map_err(|error| Problem::bad(format!("the request is not the JSON that is needed: {error}")))
+    })
 }
 
 /// `DELETE /v1/jobs/{id}`: the record of a job at rest goes; its files stay.

@@ -47,6 +47,8 @@ fn all() -> Vec<Route> {
         ("/v1/jobs/{id}/cancel", post(jobs::cancel)),
         ("/v1/jobs/{id}/release", post(jobs::release)),
         ("/v1/jobs/{id}/priority", post(jobs::rank)),
+        ("/v1/jobs/{id}/approve", post(jobs::approve)),
+        ("/v1/jobs/{id}/reject", post(jobs::reject)),
     ]
 }
 

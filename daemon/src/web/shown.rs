@@ -3,7 +3,7 @@
 use jiff::Timestamp;
 use serde::Serialize;
 use suture_store::job::Withdrawal;
-use suture_store::{Ending, Hash, Job, JobId, Kind, Priority, State, Time};
+use suture_store::{Decision, Ending, Hash, Job, JobId, Kind, Priority, State, Time, Verdict};
 
 use crate::event_bus::{Bus, Progress};
 
@@ -41,6 +41,25 @@ pub(super) struct Shown {
     /// The job of whose result its own is a copy.
     #[serde(skip_serializing_if = "Option::is_none")]
     reused: Option<JobId>,
+    /// What a person said of a result that needed review.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    decision: Option<Said>,
+}
+
+/// A person's decision.
+#[derive(Serialize)]
+struct Said {
+    verdict: Verdict,
+    by: String,
+    #[serde(skip_serializing_if = "String::is_empty")]
+    note: String,
+    at: String,
+}
+
+impl From<&Decision> for Said {
+    fn from(said: &Decision) -> Self {
+        Self { verdict: said.verdict, by: said.by.clone(), note: said.note.clone(), at: when(said.at) }
+    }
 }
 
 /// How far a job is.
@@ -87,6 +106,7 @@ impl From<&Job> for Shown {
             reason: reason(job),
             result: left,
             reused: ended.and_then(|publication| publication.reused),
+            decision: job.decision().map(Said::from),
         }
     }
 }

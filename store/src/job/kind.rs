@@ -30,6 +30,8 @@ pub enum Kind {
     Failed,
     /// Good, but a person must look; in `failed/`.
     NeedsReview,
+    /// A person has looked, and does not want it; in `failed/`.
+    Rejected,
     /// It crashed or hung the repair.
     Quarantined,
     /// It was withdrawn.
@@ -38,7 +40,7 @@ pub enum Kind {
 
 impl Kind {
     /// All of them, in the order of a job's life.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Noticed,
         Self::Queued,
         Self::Waiting,
@@ -51,6 +53,7 @@ impl Kind {
         Self::Done,
         Self::Failed,
         Self::NeedsReview,
+        Self::Rejected,
         Self::Quarantined,
         Self::Cancelled,
     ];
@@ -70,6 +73,7 @@ impl Kind {
             Self::Done => "done",
             Self::Failed => "failed",
             Self::NeedsReview => "needs_review",
+            Self::Rejected => "rejected",
             Self::Quarantined => "quarantined",
             Self::Cancelled => "cancelled",
         }

@@ -1,7 +1,7 @@
 //! A job whose record was lost, as the files that it left tell of it.
 
 use super::state::{Area, Hold, Job, Parked, Publication, Source, State};
-use crate::id::{Attempt, Boot, Epoch, JobId, Time, Token};
+use crate::id::{Attempt, JobId, Time, Token};
 use crate::path::RelPath;
 
 /// How far a job had come.
@@ -40,8 +40,7 @@ impl Past {
     /// Its job, under this number. What is still to be done waits for whoever claims it.
     pub(crate) fn job(&self, id: JobId) -> Job {
         let publication = self.publication.clone();
-        // Of no life of any daemon: a claim puts its own in the place of this one.
-        let hold = Hold { attempt: self.attempts, epoch: Epoch(0), token: Token(0), alone: false, boot: Boot(0) };
+        let hold = Hold::none(self.attempts);
         let mut job = Job::queued(id, self.source.clone(), self.ended);
         let committed = self.reached == Reached::Published;
         job.parked = (self.reached != Reached::Ended).then_some(Parked { until: Some(Time(0)), tries: 0, committed });

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::blame::{Blame, Death};
+use super::decision::{Decision, Verdict};
 use super::kind::Kind;
 use super::pauses::BACKOFF_CAP_MS;
 use super::priority::Priority;
@@ -116,6 +117,9 @@ pub struct Publication {
     /// The original stays where it was dropped: its name only stands for those of report and receipt.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub stays: bool,
+    /// What a person has said of a result that needed review.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub decision: Option<Decision>,
 }
 
 /// Longest reason kept, in bytes.
@@ -161,6 +165,13 @@ pub struct Hold {
     pub boot: Boot,
 }
 
+impl Hold {
+    /// Of no life of any daemon: a claim puts its own in the place of this one.
+    pub(super) fn none(attempt: Attempt) -> Self {
+        Self { attempt, epoch: Epoch(0), token: Token(0), alone: false, boot: Boot(0) }
+    }
+}
+
 /// A result that could not be brought into place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Parked {
@@ -186,6 +197,8 @@ pub enum State {
     Running { hold: Hold, cancel: bool },
     /// The result is known and needs no worker; its names are not chosen yet.
     Concluded { hold: Hold, ending: Ending, reason: String },
+    /// A person approved the best attempt, which `publication` says how to know; its names in `out/` are not chosen yet.
+    Approved { hold: Hold, publication: Publication },
     /// The intent is durable; files are being put in place.
     Publishing { hold: Hold, publication: Publication },
     /// The result is in place; the original has still to be moved.
@@ -228,6 +241,8 @@ pub enum Step {
     Finished,
     /// The intended files are neither in place nor under their temporary names: the work must be done again.
     Lost,
+    /// What a person approved is not there any more as it was judged: it is not published.
+    Unfit { reason: String },
 }
 
 /// What the outside world owes a job now.
@@ -330,11 +345,12 @@ impl Job {
             State::Queued { not_before: None } if self.must_run_alone() => Kind::Alone,
             State::Queued { not_before: None } => Kind::Queued,
             State::Running { .. } => Kind::Running,
-            State::Concluded { .. } => Kind::Concluded,
+            State::Concluded { .. } | State::Approved { .. } => Kind::Concluded,
             State::Publishing { .. } => Kind::Publishing,
             State::Published { .. } => Kind::Published,
             State::Ended { publication } => match publication.ending {
                 Ending::Clean | Ending::Repaired => Kind::Done,
+                Ending::NeedsReview if publication.decision.is_some() => Kind::Rejected,
                 Ending::NeedsReview => Kind::NeedsReview,
                 Ending::Quarantined => Kind::Quarantined,
                 Ending::NotGood | Ending::Unreadable | Ending::Refused | Ending::Environment => Kind::Failed,
@@ -359,6 +375,7 @@ impl Job {
             _ if self.rests_parked() => None,
             State::Running { hold, .. }
             | State::Concluded { hold, .. }
+            | State::Approved { hold, .. }
             | State::Publishing { hold, .. }
             | State::Published { hold, .. } => Some(hold),
             State::Noticed { .. } | State::Queued { .. } | State::Ended { .. } | State::Cancelled { .. } => None,
@@ -372,7 +389,7 @@ impl Job {
             State::Queued { .. } => Duty::Queue,
             State::Running { cancel: false, .. } => Duty::Run,
             State::Running { cancel: true, .. } => Duty::Stop,
-            State::Concluded { .. } => Duty::Intend,
+            State::Concluded { .. } | State::Approved { .. } => Duty::Intend,
             State::Publishing { .. } => Duty::Place,
             State::Published { .. } => Duty::MoveOriginal,
             State::Noticed { .. } | State::Ended { .. } | State::Cancelled { .. } => Duty::Rest,
@@ -400,6 +417,20 @@ impl Job {
             }
             _ => None,
         }
+    }
+
+    /// What a person has said of its result.
+    pub fn decision(&self) -> Option<&Decision> {
+        match &self.state {
+            State::Approved { publication, .. } => publication.decision.as_ref(),
+            _ => self.publication()?.decision.as_ref(),
+        }
+    }
+
+    /// Is its best attempt on its way into `out/`, since a person approved it?
+    pub(super) fn is_being_approved(&self) -> bool {
+        let approved = self.decision().is_some_and(|decision| decision.verdict == Verdict::Approved);
+        approved && !matches!(self.state, State::Ended { .. })
     }
 
     /// What the result that it has left is made of, if others may have a copy of it: it is done, and has an output.

@@ -1,6 +1,7 @@
 //! Which event may follow which state, and what comes of it.
 
 use super::blame::{Blame, Death, KILLS_FREE, Testimony};
+use super::decision::{Decision, Verdict};
 use super::kind::Kind;
 use super::pauses::{BACKOFF_CAP_MS, BACKOFF_MS, ENVIRONMENT_RETRIES, PARK_CAP_MS, PARK_MS, WAIT_MS};
 use super::priority::Priority;
@@ -29,6 +30,8 @@ pub enum Event {
     Hasten,
     /// An operator wants it sooner, or later.
     Rank(Priority),
+    /// A person says whether a result that needs review is to be used.
+    Decide(Decision),
 }
 
 /// An event that cannot happen in this state. Nothing was changed.
@@ -40,6 +43,12 @@ pub enum Illegal {
     /// Too late to take it back.
     #[error("its result is in place already; the rest of it is brought into place as soon as that is possible")]
     Committed,
+    /// A person wants it published, and so it is.
+    #[error("it was approved, and is being published; that cannot be taken back")]
+    Approved,
+    /// Nothing of it could be published.
+    #[error("it has left no best attempt that could be approved; `suture jobs retry` works on it once more")]
+    NoAttempt,
     /// The claim is not the job's current one.
     #[error("the claim is void: the job was given to another worker since")]
     Fenced,
@@ -62,6 +71,7 @@ impl Event {
                 Step::Redirect { .. } => "redirected",
                 Step::Finished => "finished",
                 Step::Lost => "lost",
+                Step::Unfit { .. } => "found unfit",
             },
             Self::Interrupted { .. } => "interrupted",
             Self::Reclaim { .. } => "claimed again",
@@ -70,6 +80,7 @@ impl Event {
             Self::Forget => "forgotten",
             Self::Hasten => "hastened",
             Self::Rank(_) => "given a priority",
+            Self::Decide(decision) => decision.verdict.name(),
         }
     }
 }
@@ -98,6 +109,7 @@ impl Job {
             Event::Reclaim { .. } if self.rests_parked() => return Err(illegal),
             Event::Reclaim { epoch, token } => next.reclaim(*epoch, *token).ok_or(illegal)?,
             Event::Retry => next.retry(now).ok_or(illegal)?,
+            Event::Cancel if next.is_being_approved() => return Err(Illegal::Approved),
             Event::Cancel if next.rests_parked() => next.give_up()?,
             Event::Cancel => match &mut next.state {
                 State::Queued { .. } | State::Noticed { .. } => next.state = State::Cancelled { why: Withdrawal::Operator },
@@ -112,6 +124,7 @@ impl Job {
                 State::Queued { .. } => next.priority = *priority,
                 _ => return Err(illegal),
             },
+            Event::Decide(decision) => next.decide(decision, now).ok_or(illegal)??,
             Event::Forget => match next.state {
                 State::Noticed { .. } => next.state = State::Cancelled { why: Withdrawal::Vanished },
                 _ => return Err(illegal),
@@ -126,6 +139,9 @@ impl Job {
         }
         if let Some(parked) = &mut self.parked {
             parked.until = None;
+            if let State::Approved { .. } = self.state {
+                self.work.get_or_insert(token);
+            }
             return self.reclaim(epoch, token);
         }
         self.attempts = self.attempts.next();
@@ -151,7 +167,10 @@ impl Job {
 
     fn reclaim(&mut self, epoch: Epoch, token: Token) -> Option<()> {
         match &mut self.state {
-            State::Concluded { hold, .. } | State::Publishing { hold, .. } | State::Published { hold, .. } => {
+            State::Concluded { hold, .. }
+            | State::Approved { hold, .. }
+            | State::Publishing { hold, .. }
+            | State::Published { hold, .. } => {
                 hold.epoch = epoch;
                 hold.token = token;
                 Some(())
@@ -197,6 +216,17 @@ impl Job {
             (State::Concluded { ending, .. }, Step::Intend(publication)) if publication.ending == ending => {
                 publishing(hold, publication)
             }
+            (State::Approved { publication: judged, .. }, Step::Intend(publication))
+                if (publication.output_hash, &publication.decision) == (judged.output_hash, &judged.decision) =>
+            {
+                publishing(hold, publication)
+            }
+            (State::Approved { publication, .. }, Step::Unfit { reason }) => {
+                let told = publication.reason.strip_prefix(reason.as_str()).unwrap_or(&publication.reason);
+                let told = told.trim_start_matches("; ");
+                let reason = one_line(&if told.is_empty() { reason.clone() } else { format!("{reason}; {told}") });
+                State::Ended { publication: Publication { decision: None, reason, ..publication } }
+            }
             (State::Publishing { publication, .. }, Step::Placed) => State::Published { hold, publication },
             // The file changed before anything of its result was in place.
             (State::Publishing { .. }, Step::Withdrawn(why)) => State::Cancelled { why: *why },
@@ -220,7 +250,7 @@ impl Job {
     }
 
     fn park(&mut self, reason: &str, committed: bool, now: Time) -> Option<()> {
-        if !matches!(self.state, State::Concluded { .. } | State::Publishing { .. } | State::Published { .. }) {
+        if matches!(self.state, State::Running { .. }) {
             return None;
         }
         self.note = one_line(reason);
@@ -291,6 +321,32 @@ impl Job {
         } else {
             NOW
         }
+    }
+
+    /// `None`: there is nothing to decide.
+    fn decide(&mut self, decision: &Decision, now: Time) -> Option<Result<(), Illegal>> {
+        let State::Ended { publication } = &mut self.state else { return None };
+        let is_open = publication.decision.as_ref().is_none_or(|earlier| earlier.verdict != decision.verdict);
+        if publication.ending != Ending::NeedsReview || !is_open {
+            return None;
+        }
+        let decision = Some(Decision { at: now, ..decision.clone() });
+        if decision.as_ref().is_some_and(|decision| decision.verdict == Verdict::Rejected) {
+            publication.decision = decision;
+            return Some(Ok(()));
+        }
+        if publication.output.is_none() || publication.output_hash.is_none() {
+            return Some(Err(Illegal::NoAttempt));
+        }
+        let publication = Publication { decision, ..publication.clone() };
+        if let (Some(original), false) = (&publication.original, publication.stays) {
+            self.moved_to = Some((publication.ending.area(), original.clone()));
+        }
+        self.note.clear();
+        self.state = State::Approved { hold: Hold::none(self.attempts), publication };
+        // For whoever comes next, now.
+        self.parked = Some(Parked { until: Some(Time(0)), tries: 0, committed: false });
+        Some(Ok(()))
     }
 
     fn retry(&mut self, now: Time) -> Option<()> {

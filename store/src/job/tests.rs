@@ -6,6 +6,10 @@ use super::*;
 use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Time, Token};
 use crate::path::RelPath;
 
+mod decisions;
+
+use decisions::{approved, check_decision, said};
+
 fn fresh() -> Job {
     let source = Source {
         folder: "hot".into(),
@@ -32,6 +36,7 @@ fn publication(ending: Ending, hash: u8) -> Publication {
         source_ctime_ns: None,
         original: Some(path),
         stays: false,
+        decision: None,
     }
 }
 
@@ -71,6 +76,8 @@ fn steps() -> impl Strategy<Value = Step> {
         1 => Just(Step::Withdrawn(Withdrawal::Changed)),
         1 => Just(Step::Withdrawn(Withdrawal::Vanished)),
         4 => (endings(), 0_u8..3).prop_map(|(ending, hash)| Step::Intend(publication(ending, hash))),
+        1 => (0_u8..3).prop_map(|hash| Step::Intend(approved(hash, Time(0)))),
+        1 => Just(Step::Unfit { reason: "someone has changed it since".into() }),
         4 => Just(Step::Placed),
         1 => Just(Step::Redirect { original: path }),
         4 => Just(Step::Finished),
@@ -93,6 +100,7 @@ fn events() -> impl Strategy<Value = Event> {
         1 => Just(Event::Cancel),
         1 => Just(Event::Forget),
         1 => Just(Event::Hasten),
+        2 => prop_oneof![Just(Verdict::Approved), Just(Verdict::Rejected)].prop_map(|verdict| Event::Decide(said(verdict))),
         1 => (0..=9_i64).prop_map(|n| Event::Rank(Priority::try_from(n).unwrap())),
     ]
 }
@@ -103,7 +111,14 @@ fn real(event: &Event, job: &Job, next: u64) -> Event {
         Event::Claim { epoch, boot, .. } => Event::Claim { epoch: *epoch, token: Token(next), boot: *boot },
         Event::Reclaim { epoch, .. } => Event::Reclaim { epoch: *epoch, token: Token(next) },
         Event::Step { token: Token(1), step } => {
-            Event::Step { token: job.hold().map_or(Token(0), |hold| hold.token), step: step.clone() }
+            let mut step = step.clone();
+            // What is approved has the time at which it was.
+            if let (Step::Intend(Publication { decision: Some(said), .. }), State::Approved { publication, .. }) =
+                (&mut step, &job.state)
+            {
+                said.at = publication.decision.as_ref().map_or(Time(0), |decision| decision.at);
+            }
+            Event::Step { token: job.hold().map_or(Token(0), |hold| hold.token), step }
         }
         other => other.clone(),
     }
@@ -119,14 +134,17 @@ fn check_transition(before: &Job, event: &Event, after: &Job) -> Result<(), Test
 
     // At rest means at rest: only an operator wakes a job, and never one with a good result.
     if before.duty() == Duty::Rest {
-        prop_assert!(matches!(event, Event::Retry | Event::Cancel | Event::Forget));
+        prop_assert!(matches!(event, Event::Retry | Event::Cancel | Event::Forget | Event::Decide(_)));
         prop_assert!(before.kind() != Kind::Done);
     }
     // What is intended is what is placed and what the job ends with.
     if let (State::Publishing { publication: intent, .. }, State::Published { publication, .. }) = (&before.state, &after.state) {
         prop_assert_eq!(intent, publication);
     }
-    if let State::Ended { publication } = &after.state {
+    check_decision(before, event, after)?;
+    if let (State::Ended { publication }, State::Running { .. } | State::Queued { .. } | State::Published { .. }) =
+        (&after.state, &before.state)
+    {
         let State::Published { publication: placed, .. } = &before.state else {
             return Err(TestCaseError::fail("it ended without having been published"));
         };
@@ -157,8 +175,10 @@ fn check_parking(before: &Job, event: &Event, after: &Job) -> Result<(), TestCas
     let state = |job: &Job| std::mem::discriminant(&job.state);
     if after.kind() == Kind::Parked {
         prop_assert!(after.hold().is_none() && after.duty() == Duty::Queue && after.pause().is_some());
-        prop_assert!(before.work == after.work && state(before) == state(after));
-        let by = matches!(event, Event::Retry | Event::Step { step: Step::Park { .. }, .. });
+        prop_assert!(before.work == after.work);
+        let approved = matches!(after.state, State::Approved { .. });
+        prop_assert!(state(before) == state(after) || approved);
+        let by = matches!(event, Event::Retry | Event::Decide(_) | Event::Step { step: Step::Park { .. }, .. });
         prop_assert!(by, "parked by {:?}", event);
     }
     if before.kind() == Kind::Parked {

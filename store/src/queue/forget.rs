@@ -1,6 +1,6 @@
 //! The end of a record: jobs at rest leave the store, with all that points to them. Their numbers are never used again.
 
-use super::{Queue, by_key, head_put, index, results};
+use super::{Queue, by_key, head_put, index};
 use crate::crash::crash_point;
 use crate::id::JobId;
 use crate::record;
@@ -24,13 +24,12 @@ impl<T: Tables> Queue<T> {
     fn drop_chunk(&self, ids: &[JobId]) -> Result<u64, StoreError> {
         let mut inner = self.lock();
         let (mut head, mut counts) = (inner.head, inner.counts.clone());
-        let (mut puts, mut removed) = (Vec::new(), 0);
+        let (mut puts, mut removed) = (Vec::new(), Vec::new());
         let none = |table, key| Put { table, key, value: None };
         for id in ids {
             let Some(job) = self.job(*id)?.filter(|job| job.kind().is_at_rest()) else { continue };
             puts.push(none(Table::ByState, index::key(&job)));
             puts.push(none(Table::Jobs, id.0.to_be_bytes().to_vec()));
-            puts.extend(job.offers().map(|recipe| none(Table::ByRecipe, results::key(&job, recipe))));
             // A later job of the same file has the entry by now.
             let key = by_key::key(&job.source);
             let latest = self.tables.get(Table::ByKey, &key)?;
@@ -40,18 +39,19 @@ impl<T: Tables> Queue<T> {
             }
             let count = counts.entry(job.kind()).or_default();
             *count = count.saturating_sub(1);
-            removed += 1;
+            removed.push(job);
         }
-        if removed == 0 {
+        if removed.is_empty() {
             return Ok(0);
         }
         head.seq.0 += 1;
         puts.push(head_put(&head)?);
         self.tables.write(puts, head.seq)?;
         (inner.head, inner.counts) = (head, counts);
+        removed.iter().for_each(|job| inner.results.remove(job));
         drop(inner);
         crash_point("store.commit.written");
         self.settle(head)?;
-        Ok(removed)
+        Ok(removed.len() as u64)
     }
 }

@@ -31,6 +31,7 @@ fn tag(kind: Kind) -> u8 {
         Kind::Quarantined => 12,
         Kind::Cancelled => 13,
         Kind::Parked => 14,
+        Kind::Rejected => 15,
     }
 }
 

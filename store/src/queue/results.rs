@@ -1,29 +1,67 @@
-//! Good results by what they were made of: how a job finds one that it can have a copy of. The job numbers in the keys count down, so that
-//! the latest come first.
+//! Good results by what they were made of: how a job finds one that it can have a copy of. In memory, made anew at each opening: such keys are in no
+//! order, and on disk every entry would come to a page of its own. That took more room than the jobs themselves (measured).
 
+use std::cmp::Reverse;
+use std::collections::BTreeSet;
+
+use super::Queue;
 use crate::id::{JobId, Recipe};
 use crate::job::Job;
-use crate::record::corrupt;
+use crate::record;
 use crate::store::{MOST_RESULTS, StoreError};
 use crate::tables::{Table, Tables};
 
-/// The entry of a job.
-pub(super) fn key(job: &Job, Recipe(recipe): Recipe) -> Vec<u8> {
-    [job.source.size, recipe, !job.id.0].iter().flat_map(|number| number.to_be_bytes()).collect()
+/// Size of the source, recipe and job of each good result, the latest first.
+#[derive(Default)]
+pub(super) struct Results(BTreeSet<(u64, Recipe, Reverse<JobId>)>);
+
+impl Results {
+    /// Those of all jobs. A damaged record offers nothing; whoever asks for its job hears of it.
+    pub(super) fn of(tables: &dyn Tables) -> Result<Self, StoreError> {
+        let mut results = Self::default();
+        tables.scan(Table::Jobs, &[], &[], &mut |key, value| {
+            match record::decode::<Job>(Table::Jobs, key, value) {
+                Ok(job) => results.add(&job),
+                Err(error) => tracing::warn!(%error, "A job at rest cannot be read."),
+            }
+            Ok(true)
+        })?;
+        Ok(results)
+    }
+
+    /// A job came, or changed.
+    pub(super) fn add(&mut self, job: &Job) {
+        self.0.extend(job.offers().map(|recipe| (job.source.size, recipe, Reverse(job.id))));
+    }
+
+    /// A job changes, or goes.
+    pub(super) fn remove(&mut self, job: &Job) {
+        if let Some(recipe) = job.offers() {
+            self.0.remove(&(job.source.size, recipe, Reverse(job.id)));
+        }
+    }
+
+    /// The latest jobs of this size and recipe, the latest first; without a recipe, one of this size.
+    fn latest(&self, size: u64, recipe: Option<Recipe>) -> Vec<JobId> {
+        let (from, to) = recipe.map_or((Recipe(0), Recipe(u64::MAX)), |recipe| (recipe, recipe));
+        let range = (size, from, Reverse(JobId(u64::MAX)))..=(size, to, Reverse(JobId(0)));
+        let most = if recipe.is_some() { MOST_RESULTS } else { 1 };
+        self.0.range(range).take(most).map(|(_, _, id)| id.0).collect()
+    }
 }
 
-/// The latest jobs that have an entry for this size and recipe, the latest first; without a recipe, one that has an entry for this size.
-pub(super) fn latest(tables: &dyn Tables, size: u64, recipe: Option<Recipe>) -> Result<Vec<JobId>, StoreError> {
-    let (numbers, most) = ([Some(size), recipe.map(|recipe| recipe.0)], if recipe.is_some() { MOST_RESULTS } else { 1 });
-    let from: Vec<u8> = numbers.into_iter().flatten().flat_map(u64::to_be_bytes).collect();
-    let mut latest = Vec::new();
-    tables.scan(Table::ByRecipe, &from, &[], &mut |key, _| {
-        if !key.starts_with(&from) {
-            return Ok(false);
+impl<T: Tables> Queue<T> {
+    /// As [`crate::JobStore::results`].
+    pub(super) fn offered(&self, size: u64, recipe: Option<Recipe>) -> Result<Vec<Job>, StoreError> {
+        let ids = self.lock().results.latest(size, recipe);
+        let mut jobs = Vec::new();
+        for id in ids {
+            // It may have been forgotten meanwhile.
+            let Some(job) = self.job(id)? else { continue };
+            if job.source.size == size && job.offers().is_some_and(|offered| recipe.is_none_or(|recipe| recipe == offered)) {
+                jobs.push(job);
+            }
         }
-        let id = key.get(16..24).and_then(|id| id.try_into().ok()).map(u64::from_be_bytes);
-        latest.push(JobId(!id.ok_or_else(|| corrupt("by_recipe", "a key is too short"))?));
-        Ok(latest.len() < most)
-    })?;
-    Ok(latest)
+        Ok(jobs)
+    }
 }

@@ -1,4 +1,4 @@
-//! The five tables as sled trees, and the one place where they become durable.
+//! The four tables as sled trees, and the one place where they become durable.
 
 use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -35,7 +35,6 @@ struct Handles {
     jobs: sled::Tree,
     by_state: sled::Tree,
     by_key: sled::Tree,
-    by_recipe: sled::Tree,
 }
 
 impl Drop for SledTables {
@@ -107,13 +106,15 @@ impl SledTables {
             crash_point("store.open.sled");
             let tree = |name: &str| db.open_tree(name).map_err(failed);
             let (meta, jobs) = (tree("meta")?, tree("jobs")?);
-            let (by_state, by_key, by_recipe) = (tree("by_state")?, tree("by_key")?, tree("by_recipe")?);
+            let (by_state, by_key) = (tree("by_state")?, tree("by_key")?);
+            // Earlier versions kept an index of results here. They make it anew, empty, when they are gone back to.
+            db.drop_tree("by_recipe").map_err(failed)?;
             let path = dir.join("db");
             let file = File::open(&path).map_err(io(&path, "opening the database file"))?;
             Ok(Self {
                 state: state.to_owned(),
                 dir: dir.to_owned(),
-                handles: Some(Handles { db, meta, jobs, by_state, by_key, by_recipe }),
+                handles: Some(Handles { db, meta, jobs, by_state, by_key }),
                 file,
                 progress: Mutex::default(),
                 synced: Condvar::new(),
@@ -124,6 +125,12 @@ impl SledTables {
     #[cfg(test)]
     pub(super) fn raw_jobs(&self) -> &sled::Tree {
         &self.handles.as_ref().unwrap().jobs
+    }
+
+    #[cfg(test)]
+    pub(super) fn names(&self) -> Vec<String> {
+        let names = self.handles.as_ref().unwrap().db.tree_names();
+        names.iter().map(|name| String::from_utf8_lossy(name).into_owned()).collect()
     }
 
     fn handles(&self) -> Result<&Handles, StoreError> {
@@ -137,7 +144,6 @@ impl SledTables {
             Table::Jobs => &handles.jobs,
             Table::ByState => &handles.by_state,
             Table::ByKey => &handles.by_key,
-            Table::ByRecipe => &handles.by_recipe,
         })
     }
 
@@ -219,17 +225,16 @@ impl Tables for SledTables {
 
     fn write(&self, puts: Vec<Put>, seq: Seq) -> Result<(), StoreError> {
         self.sound()?;
-        let Handles { meta, jobs, by_state, by_key, by_recipe, .. } = self.handles()?;
-        let trees = (meta, jobs, by_state, by_key, by_recipe);
+        let Handles { meta, jobs, by_state, by_key, .. } = self.handles()?;
+        let trees = (meta, jobs, by_state, by_key);
         let written = guarded(|| {
-            let result: TransactionResult<(), ()> = trees.transaction(|(meta, jobs, by_state, by_key, by_recipe)| {
+            let result: TransactionResult<(), ()> = trees.transaction(|(meta, jobs, by_state, by_key)| {
                 for put in &puts {
                     let tree = match put.table {
                         Table::Meta => meta,
                         Table::Jobs => jobs,
                         Table::ByState => by_state,
                         Table::ByKey => by_key,
-                        Table::ByRecipe => by_recipe,
                     };
                     match &put.value {
                         Some(value) => tree.insert(put.key.as_slice(), value.as_slice())?,

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use super::files::{self, Mark};
 use super::*;
 use crate::id::{Epoch, Seq};
-use crate::testkit::{Subject, conformance, dropped};
+use crate::job::{Ending, Publication};
+use crate::testkit::{Subject, conformance, dropped, result_of};
 
 struct OnDisk {
     state: tempfile::TempDir,
@@ -355,4 +356,28 @@ fn f06_a_store_that_was_taken_away_is_not_begun_anew() {
     std::fs::remove_dir(&state).unwrap();
     std::fs::rename(dir.path().join("away"), &state).unwrap();
     store.check().unwrap();
+}
+
+/// Earlier versions had an index of results on disk.
+#[test]
+fn f29_an_index_of_an_earlier_version_goes_and_results_are_found_without_it() {
+    let state = tempfile::tempdir().unwrap();
+    let store = SledStore::open(state.path()).unwrap();
+    let id = submit(&store, "part.stl");
+    let claim = store.claim(&Filter::default()).unwrap().unwrap();
+    let publication = Publication { recipe: Some(Recipe(7)), ..result_of(&claim.job, Ending::Repaired) };
+    for step in [Step::Intend(publication), Step::Placed, Step::Finished] {
+        store.advance(&claim, step).unwrap();
+    }
+    drop(store);
+    let earlier = sled::Config::new().path(state.path().join("db")).segment_size(64 << 10).open().unwrap();
+    earlier.open_tree("by_recipe").unwrap().insert([0; 24], b"").unwrap();
+    drop(earlier);
+    for _ in 0..2 {
+        let store = SledStore::open(state.path()).unwrap();
+        assert!(!store.queue.tables().names().contains(&"by_recipe".to_owned()));
+        let found = store.results(84, Some(Recipe(7))).unwrap();
+        assert_eq!(found.iter().map(|job| job.id).collect::<Vec<_>>(), [id]);
+        assert!(store.results(84, Some(Recipe(8))).unwrap().is_empty());
+    }
 }

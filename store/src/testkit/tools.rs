@@ -90,6 +90,7 @@ pub fn result_of(job: &Job, ending: Ending) -> Publication {
         source_ctime_ns: None,
         original: Some(job.source.path.clone()),
         stays: false,
+        decision: None,
     }
 }
 

@@ -1,12 +1,13 @@
-//! The queue's logic over five ordered tables, shared by every store that is embedded in the daemon.
+//! The queue's logic over six ordered tables, shared by every store that is embedded in the daemon.
 //!
 //! | table    | key                                                                     | value                     |
 //! |----------|-------------------------------------------------------------------------|---------------------------|
-//! | meta     | `head`; `unfilled` (see `past`)                                         | [`Head`]; `true`          |
+//! | meta     | `head`; `unfilled` (see `past`); `subscribers` (see [`outbox`])         | [`Head`]; `true`; names and transitions |
 //! | jobs     | job number                                                              | the [`Job`]               |
 //! | by_state | kind, then what that kind is searched by (see [`index`])                | nothing                   |
 //! | by_key   | identity of the file: device, inode, size, mtime, folder, path          | number of its latest job  |
 //! | by_recipe | size of the source, recipe, job number (see [`results`]) of jobs whose result others may have | nothing   |
+//! | outbox   | number of the transition in which a job ended                           | the [`Job`] as it was then |
 //!
 //! Numbers in keys are big-endian. The job, its index entries and the head change in one transaction of the tables. One lock
 //! orders the transitions; becoming durable happens outside of it, so that transitions of several threads share one sync. Which job is
@@ -32,6 +33,7 @@ mod forget;
 mod index;
 mod line;
 mod offered;
+mod outbox;
 mod page;
 mod past;
 mod recover;
@@ -59,6 +61,7 @@ struct Inner {
     head: Head,
     counts: BTreeMap<Kind, u64>,
     line: Line,
+    subscribers: outbox::Subscribers,
 }
 
 /// The queue over `T`.
@@ -99,8 +102,8 @@ impl<T: Tables> Queue<T> {
         let mut head = earlier.unwrap_or_default();
         head.epoch.0 += 1;
         head.seq.0 += 1;
-        let counts = index::count(&tables)?;
-        let queue = Self { tables, inner: Mutex::new(Inner { head, counts, line: Line::default() }), clock };
+        let (counts, subscribers) = (index::count(&tables)?, outbox::subscribers(&tables)?);
+        let queue = Self { tables, inner: Mutex::new(Inner { head, counts, line: Line::default(), subscribers }), clock };
         let now = queue.now();
         for kind in Kind::ALL.into_iter().filter(|kind| kind.is_live()) {
             for id in index::ids(&queue.tables, kind)? {
@@ -183,6 +186,7 @@ impl<T: Tables> Queue<T> {
             if let Some(recipe) = to.offers() {
                 puts.push(Put { table: Table::ByRecipe, key: results::key(to, recipe), value: Some(Vec::new()) });
             }
+            puts.extend(outbox::entry(&inner.subscribers, *from, to)?);
             if let Some(from) = from {
                 let count = counts.entry(from.kind()).or_default();
                 *count = count.saturating_sub(1);
@@ -412,6 +416,22 @@ impl<T: Tables> JobStore for Queue<T> {
 
     fn set_filled(&self) -> Result<(), StoreError> {
         self.has_past()
+    }
+
+    fn subscribe(&self, names: &[String]) -> Result<(), StoreError> {
+        self.set_subscribers(names)
+    }
+
+    fn notices(&self, name: &str, most: usize) -> Result<Vec<Job>, StoreError> {
+        self.not_heard(name, most)
+    }
+
+    fn acknowledge(&self, name: &str, seq: Seq) -> Result<(), StoreError> {
+        self.has_heard(name, seq)
+    }
+
+    fn backlog(&self, name: &str) -> Result<u64, StoreError> {
+        self.count_not_heard(name)
     }
 
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {

@@ -3,7 +3,7 @@
 use crate::id::{Epoch, Seq};
 use crate::store::StoreError;
 
-/// One of the five tables.
+/// One of the six tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Table {
     Meta,
@@ -11,6 +11,7 @@ pub(crate) enum Table {
     ByState,
     ByKey,
     ByRecipe,
+    Outbox,
 }
 
 /// A change of one entry; without a value the entry goes.

@@ -1,4 +1,4 @@
-//! The five tables as sled trees, and the one place where they become durable.
+//! The six tables as sled trees, and the one place where they become durable.
 
 use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -36,6 +36,7 @@ struct Handles {
     by_state: sled::Tree,
     by_key: sled::Tree,
     by_recipe: sled::Tree,
+    outbox: sled::Tree,
 }
 
 impl Drop for SledTables {
@@ -108,12 +109,13 @@ impl SledTables {
             let tree = |name: &str| db.open_tree(name).map_err(failed);
             let (meta, jobs) = (tree("meta")?, tree("jobs")?);
             let (by_state, by_key, by_recipe) = (tree("by_state")?, tree("by_key")?, tree("by_recipe")?);
+            let outbox = tree("outbox")?;
             let path = dir.join("db");
             let file = File::open(&path).map_err(io(&path, "opening the database file"))?;
             Ok(Self {
                 state: state.to_owned(),
                 dir: dir.to_owned(),
-                handles: Some(Handles { db, meta, jobs, by_state, by_key, by_recipe }),
+                handles: Some(Handles { db, meta, jobs, by_state, by_key, by_recipe, outbox }),
                 file,
                 progress: Mutex::default(),
                 synced: Condvar::new(),
@@ -138,6 +140,7 @@ impl SledTables {
             Table::ByState => &handles.by_state,
             Table::ByKey => &handles.by_key,
             Table::ByRecipe => &handles.by_recipe,
+            Table::Outbox => &handles.outbox,
         })
     }
 
@@ -219,10 +222,10 @@ impl Tables for SledTables {
 
     fn write(&self, puts: Vec<Put>, seq: Seq) -> Result<(), StoreError> {
         self.sound()?;
-        let Handles { meta, jobs, by_state, by_key, by_recipe, .. } = self.handles()?;
-        let trees = (meta, jobs, by_state, by_key, by_recipe);
+        let Handles { meta, jobs, by_state, by_key, by_recipe, outbox, .. } = self.handles()?;
+        let trees = (meta, jobs, by_state, by_key, by_recipe, outbox);
         let written = guarded(|| {
-            let result: TransactionResult<(), ()> = trees.transaction(|(meta, jobs, by_state, by_key, by_recipe)| {
+            let result: TransactionResult<(), ()> = trees.transaction(|(meta, jobs, by_state, by_key, by_recipe, outbox)| {
                 for put in &puts {
                     let tree = match put.table {
                         Table::Meta => meta,
@@ -230,6 +233,7 @@ impl Tables for SledTables {
                         Table::ByState => by_state,
                         Table::ByKey => by_key,
                         Table::ByRecipe => by_recipe,
+                        Table::Outbox => outbox,
                     };
                     match &put.value {
                         Some(value) => tree.insert(put.key.as_slice(), value.as_slice())?,

@@ -7,6 +7,8 @@
 mod deaths;
 #[path = "crash/lost.rs"]
 mod lost;
+#[path = "crash/told.rs"]
+mod told;
 
 use std::collections::BTreeMap;
 use std::os::unix::process::ExitStatusExt;

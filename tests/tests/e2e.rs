@@ -27,10 +27,12 @@ mod e2e {
     mod reuse;
     mod rude;
     mod same_bytes;
+    mod service;
     mod soups;
     mod specials;
     mod steer;
     mod terminal;
+    mod told;
     mod twice;
     mod watch;
     mod web;

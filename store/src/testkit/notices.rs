@@ -18,10 +18,7 @@ fn told(store: &dyn JobStore, name: &str) -> Result<Vec<Job>, StoreError> {
     Ok(notices)
 }
 
-pub(super) fn ends_are_told_until_they_are_acknowledged(
-    subject: &mut dyn Subject,
-    _: &ManualClock,
-) -> Result<(), StoreError> {
+pub(super) fn ends_are_told_until_they_are_acknowledged(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), StoreError> {
     let store = subject.store();
     let both = ["farm", "shop"].map(String::from);
     ends(store, "before.stl", Ending::Clean)?;
@@ -49,10 +46,7 @@ pub(super) fn ends_are_told_until_they_are_acknowledged(
 }
 
 /// A retry, and the end of a record, change nothing of what was to be told.
-pub(super) fn notices_outlive_what_becomes_of_their_jobs(
-    subject: &mut dyn Subject,
-    _: &ManualClock,
-) -> Result<(), StoreError> {
+pub(super) fn notices_outlive_what_becomes_of_their_jobs(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), StoreError> {
     let store = subject.store();
     store.subscribe(&["farm".into()])?;
     let failed = ends(store, "a.stl", Ending::NotGood)?;

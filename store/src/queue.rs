@@ -32,6 +32,7 @@ mod by_key;
 mod forget;
 mod index;
 mod line;
+mod notices;
 mod offered;
 mod outbox;
 mod page;

@@ -74,7 +74,7 @@ fn page(text: &str, rows: usize, columns: usize) -> String {
     let mut page = String::from("\x1b[H");
     for (n, line) in text.lines().take(rows).enumerate() {
         let cut: String = line.chars().take(columns).collect();
-        page += if n == 0 { "" } else { "\r\n" };
+        page += if n == 0 { "" } else { "\n" };
         page += &format!("{cut}\x1b[K");
     }
     page + "\x1b[J"
@@ -123,7 +123,7 @@ mod tests {
 
     #[test]
     fn a_page_fits_its_terminal() {
-        assert_eq!(page("one\nzwölf\nthree\n", 2, 4), "\x1b[Hone\x1b[K\r\nzwöl\x1b[K\x1b[J");
+        assert_eq!(page("one\nzwölf\nthree\n", 2, 4), "\x1b[Hone\x1b[K\nzwöl\x1b[K\x1b[J");
         assert_eq!(page("", 2, 4), "\x1b[H\x1b[J");
     }
 }

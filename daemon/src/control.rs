@@ -7,8 +7,8 @@ use std::net::Shutdown;
 use std::os::fd::AsRawFd;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, PoisonError};
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -18,6 +18,7 @@ use suture_store::{Control, Decision, Job, JobId, JobStore, Kind, Priority, Quer
 
 use crate::attempt::Context;
 use crate::fsx::Identity;
+use crate::glance::{Glance, standing};
 use crate::left::result_path;
 use crate::publish::approved::unfit;
 use crate::schedule::{Hold, Standing};
@@ -60,12 +61,17 @@ pub(crate) enum DaemonWish {
     Standing,
 }
 
+/// A look at all of a daemon.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct GlanceWish;
+
 /// One line on the socket.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Request {
     Jobs(JobsWish),
     Daemon(DaemonWish),
+    Glance(GlanceWish),
 }
 
 impl From<JobsWish> for Request {
@@ -77,6 +83,12 @@ impl From<JobsWish> for Request {
 impl From<DaemonWish> for Request {
     fn from(wish: DaemonWish) -> Self {
         Self::Daemon(wish)
+    }
+}
+
+impl From<GlanceWish> for Request {
+    fn from(wish: GlanceWish) -> Self {
+        Self::Glance(wish)
     }
 }
 
@@ -101,6 +113,14 @@ impl Wish for DaemonWish {
 
     fn only_looks(&self) -> bool {
         *self == Self::Standing
+    }
+}
+
+impl Wish for GlanceWish {
+    type Answer = Glance;
+
+    fn only_looks(&self) -> bool {
+        true
     }
 }
 
@@ -181,8 +201,7 @@ pub(crate) fn steer(context: &Context, wish: &DaemonWish) -> Result<Standing, Re
             tracing::info!(paused, "An operator's wish.");
         }
     }
-    let away = context.away.lock().unwrap_or_else(PoisonError::into_inner).values().flatten().cloned().collect();
-    Ok(Standing { away, ..context.schedule.standing() })
+    Ok(standing(context)?)
 }
 
 /// Does what is wished of jobs while the daemon works on them.
@@ -330,6 +349,7 @@ fn serve_one(context: &Context, stream: &UnixStream, patience: Duration) -> io::
     match request {
         Request::Jobs(wish) => serde_json::to_writer(&mut out, &change(context, &wish))?,
         Request::Daemon(wish) => serde_json::to_writer(&mut out, &steer(context, &wish))?,
+        Request::Glance(GlanceWish) => serde_json::to_writer(&mut out, &Glance::of(context).map_err(Refusal::from))?,
     }
     out.flush()
 }

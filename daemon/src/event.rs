@@ -24,10 +24,24 @@ pub(crate) enum Happening<'a> {
     Wished { job: &'a Job, wish: &'a Control },
     /// Its record is gone.
     Forgotten { id: JobId },
+    /// A target has heard of a job's end.
+    Delivered { parcel: Parcel<'a>, note: &'a str },
+    /// It has not yet, after so many tries.
+    NotDelivered { parcel: Parcel<'a>, why: &'a str, tries: u32 },
+    /// It never will.
+    GivenUp { parcel: Parcel<'a>, why: &'a str },
     /// A hot folder is out of reach.
     FolderAway { name: &'a str, root: &'a std::path::Path, why: &'a str },
     /// It is back.
     FolderBack { name: &'a str, root: &'a std::path::Path },
+}
+
+/// Word of a job's end, on its way out.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Parcel<'a> {
+    /// Name of a webhook, or `on_done`.
+    pub target: &'a str,
+    pub job: JobId,
 }
 
 /// A word to those who listen: a name, and what there is to say.
@@ -52,7 +66,27 @@ impl Happening<'_> {
                 tracing::error!(folder = %root.display(), error = why, "The folder cannot be served; the others go on.");
             }
             Self::FolderBack { root, .. } => tracing::info!(folder = %root.display(), "The folder is back."),
-            Self::Began { .. } | Self::Reported { .. } | Self::Forgotten { .. } => {}
+            Self::Delivered { parcel: Parcel { target, job }, note } => {
+                tracing::info!(job = job.0, target_name = target, note, "A job's end was told.");
+            }
+            Self::GivenUp { parcel: Parcel { target, job }, why } => {
+                tracing::error!(
+                    job = job.0,
+                    target_name = target,
+                    reason = why,
+                    "A job's end could not be told; it is given up."
+                );
+            }
+            // Said once; metrics and `suture jobs list` tell of it for as long as it lasts.
+            Self::NotDelivered { parcel: Parcel { target, job }, why, tries: 1 } => {
+                tracing::warn!(
+                    job = job.0,
+                    target_name = target,
+                    reason = why,
+                    "A job's end could not be told; it is tried again."
+                );
+            }
+            Self::Began { .. } | Self::Reported { .. } | Self::Forgotten { .. } | Self::NotDelivered { .. } => {}
         }
     }
 
@@ -73,6 +107,9 @@ impl Happening<'_> {
                     count_ended(metrics, job, publication);
                 }
             }
+            Self::Delivered { parcel, .. } => count_parcel(metrics, parcel, "delivered"),
+            Self::NotDelivered { parcel, .. } => count_parcel(metrics, parcel, "retried"),
+            Self::GivenUp { parcel, .. } => count_parcel(metrics, parcel, "given_up"),
             // Given up, when its result was in place already.
             Self::Wished { job, wish: Control::Cancel } => {
                 if let State::Ended { publication } = &job.state {
@@ -95,7 +132,7 @@ impl Happening<'_> {
             Self::Forgotten { id } => ("forgotten", json!({"job": id})),
             Self::FolderAway { name, .. } => ("folder", json!({"folder": name, "reachable": false})),
             Self::FolderBack { name, .. } => ("folder", json!({"folder": name, "reachable": true})),
-            Self::Reported { .. } => return None,
+            Self::Reported { .. } | Self::Delivered { .. } | Self::NotDelivered { .. } | Self::GivenUp { .. } => return None,
         })
     }
 }
@@ -160,6 +197,10 @@ fn count_ended(metrics: &Metrics, job: &Job, publication: &Publication) {
     let (folder, profile) = (job.source.folder.as_str(), job.source.profile.as_str());
     metrics.add(Count::JobsFinished, &[("folder", folder), ("profile", profile), ("result", result)], 1);
     metrics.add(Count::InputBytes, &[], job.source.size);
+}
+
+fn count_parcel(metrics: &Metrics, parcel: &Parcel<'_>, result: &str) {
+    metrics.add(Count::Deliveries, &[("target", parcel.target), ("result", result)], 1);
 }
 
 fn count_report(metrics: &Metrics, report: &Report) {

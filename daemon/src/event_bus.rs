@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use suture_store::{Clock, JobId, SystemClock};
 use tokio::sync::broadcast::{Receiver, Sender, channel};
 
+use crate::bar::Standing;
 use crate::event::Happening;
 use crate::event_metrics::{Metrics, Timing};
 
@@ -36,6 +37,13 @@ pub(crate) struct Progress {
     pub percent: u8,
 }
 
+/// A job in work.
+struct Far {
+    progress: Progress,
+    whole: Standing,
+    told: Instant,
+}
+
 struct Line {
     last: u64,
     kept: VecDeque<Arc<Message>>,
@@ -49,7 +57,7 @@ pub(crate) struct Bus {
     /// `None`: no one can listen.
     listeners: Option<Sender<Arc<Message>>>,
     line: Mutex<Line>,
-    progress: Mutex<BTreeMap<JobId, (Progress, Instant)>>,
+    progress: Mutex<BTreeMap<JobId, Far>>,
     /// Results on their way into their places.
     publishing: Mutex<BTreeMap<JobId, Instant>>,
 }
@@ -115,10 +123,12 @@ impl Bus {
     pub(crate) fn progress(&self, id: JobId, stage: &str, done: u64, total: u64) {
         let percent = if total == 0 { 0 } else { (done.min(total) as u128 * 100 / total as u128).try_into().unwrap_or(100) };
         let mut all = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
-        let told = all.get(&id).map(|(_, told)| *told);
+        let (told, mut whole) = all.remove(&id).map(|far| (far.told, far.whole)).unzip();
+        whole.get_or_insert_default().at(stage, done, total, true);
         let is_due = told.is_none_or(|told| told.elapsed() >= PROGRESS_EVERY);
         let when = if is_due { Instant::now() } else { told.unwrap_or_else(Instant::now) };
-        all.insert(id, (Progress { stage: stage.to_owned(), percent }, when));
+        let progress = Progress { stage: stage.to_owned(), percent };
+        all.insert(id, Far { progress, whole: whole.unwrap_or_default(), told: when });
         drop(all);
         if let (true, Some(listeners)) = (is_due, &self.listeners) {
             self.send(listeners, "progress", &json!({"job": id, "stage": stage, "percent": percent}));
@@ -127,7 +137,12 @@ impl Bus {
 
     /// How far a job is, if that is known.
     pub(crate) fn progress_of(&self, id: JobId) -> Option<Progress> {
-        self.progress.lock().unwrap_or_else(PoisonError::into_inner).get(&id).map(|(progress, _)| progress.clone())
+        self.progress.lock().unwrap_or_else(PoisonError::into_inner).get(&id).map(|far| far.progress.clone())
+    }
+
+    /// About how many seconds are left of a job that has been in work for so many.
+    pub(crate) fn left(&self, id: JobId, seconds: u64) -> Option<u64> {
+        self.progress.lock().unwrap_or_else(PoisonError::into_inner).get(&id)?.whole.left(seconds)
     }
 
     /// A job is not in work any more.

@@ -17,6 +17,7 @@ pub(crate) enum Count {
     DefectsLeft,
     StoreErrors,
     EventsLost,
+    Deliveries,
 }
 
 /// Measurements that are made again and again.
@@ -28,7 +29,7 @@ pub(crate) enum Timing {
 }
 
 impl Count {
-    const ALL: [Self; 10] = [
+    const ALL: [Self; 11] = [
         Self::JobsFinished,
         Self::JobFailures,
         Self::JobAttempts,
@@ -39,6 +40,7 @@ impl Count {
         Self::DefectsLeft,
         Self::StoreErrors,
         Self::EventsLost,
+        Self::Deliveries,
     ];
 
     fn words(self) -> (&'static str, &'static str) {
@@ -53,6 +55,9 @@ impl Count {
             Self::DefectsLeft => ("suture_defects_left_total", "Defects left in outputs, by kind."),
             Self::StoreErrors => ("suture_store_errors_total", "Errors of the job store."),
             Self::EventsLost => ("suture_events_lost_total", "Events that slow listeners have missed."),
+            Self::Deliveries => {
+                ("suture_webhook_deliveries_total", "Messages to webhooks, and runs of `on_done`, by target and result.")
+            }
         }
     }
 }

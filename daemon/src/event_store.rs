@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use suture_store::job::Testimony;
 use suture_store::{
-    Claim, Control, Filter, Job, JobId, JobStore, Kind, Lease, Look, Page, Past, Query, Recipe, Recovered, Source, State, Step,
-    StoreError, Submission, Submitted, Waiting,
+    Claim, Control, Filter, Job, JobId, JobStore, Kind, Lease, Look, Page, Past, Query, Recipe, Recovered, Seq, Source, State,
+    Step, StoreError, Submission, Submitted, Waiting,
 };
 
 use crate::event::Happening;
@@ -148,6 +148,22 @@ impl JobStore for Heard {
             }
         }
         Ok(forgotten)
+    }
+
+    fn subscribe(&self, names: &[String]) -> Result<(), StoreError> {
+        self.read(self.store.subscribe(names))
+    }
+
+    fn notices(&self, name: &str, most: usize) -> Result<Vec<Job>, StoreError> {
+        self.read(self.store.notices(name, most))
+    }
+
+    fn acknowledge(&self, name: &str, seq: Seq) -> Result<(), StoreError> {
+        self.write(|store| store.acknowledge(name, seq))
+    }
+
+    fn backlog(&self, name: &str) -> Result<u64, StoreError> {
+        self.read(self.store.backlog(name))
     }
 
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {

@@ -69,8 +69,9 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
         text += &format!("{summary}\n");
     }
     if let (JobsCommand::List { .. }, false) = (&args.command, args.json) {
-        let Standing { held, away, .. } = standing(&args.dir);
+        let Standing { held, away, untold, .. } = standing(&args.dir);
         text.extend(held.iter().map(|why| format!("nothing new is taken: {why}\n")));
+        text.extend(untold.iter().map(|who| format!("not told yet: {}\n", plain(who))));
         text.extend(away.iter().map(|why| format!("out of reach: {}\n", plain(why))));
     }
     // A reader that has gone away has seen enough.
@@ -208,7 +209,8 @@ fn decision(job: &Job) -> String {
     job.decision().map(word).unwrap_or_default()
 }
 
-fn line(job: &Job) -> String {
+/// A job in one line.
+pub(crate) fn line(job: &Job) -> String {
     let (id, kind, since) = (job.id.0, job.kind().name(), when(job.changed));
     let priority = if job.priority.is_default() { String::new() } else { format!("priority {}  ", job.priority) };
     let note = note(job);
@@ -220,7 +222,7 @@ fn line(job: &Job) -> String {
 }
 
 /// Day and time where the machine is.
-fn when(time: Time) -> String {
+pub(crate) fn when(time: Time) -> String {
     let zoned = |at: Timestamp| at.to_zoned(TimeZone::system()).strftime("%Y-%m-%d %H:%M:%S").to_string();
     i64::try_from(time.0).ok().and_then(|ms| Timestamp::from_millisecond(ms).ok()).map_or_else(|| "?".into(), zoned)
 }

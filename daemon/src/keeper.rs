@@ -156,6 +156,7 @@ impl Keeper {
         if let Some(reload) = self.context.settings.renew() {
             self.go_by(reload)?;
             raise(self.context.settings.now().workers)?;
+            self.context.pulse.reloaded();
         }
         for handed in std::mem::take(&mut self.handed) {
             if let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == handed.folder) {

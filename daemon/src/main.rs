@@ -14,6 +14,7 @@ mod config;
 mod confine;
 mod control;
 mod create;
+mod deliver;
 mod demo;
 mod draft;
 mod event;
@@ -23,6 +24,7 @@ mod event_store;
 mod exit;
 mod folder;
 mod fsx;
+mod glance;
 mod ground;
 mod handed;
 mod hints;
@@ -32,6 +34,8 @@ mod jobs;
 mod keeper;
 mod left;
 mod logging;
+mod manager;
+mod manual;
 mod names;
 mod naming;
 mod orders;
@@ -56,17 +60,20 @@ mod scan;
 mod schedule;
 mod settings;
 mod settle;
+mod shown;
 mod signals;
 #[cfg(test)]
 mod simulation;
 mod single;
 mod standstill;
+mod status;
 mod superseded;
 mod supervise;
 mod table;
 mod taking;
 mod units;
 mod uploads;
+mod url;
 mod watch;
 mod watchdog;
 mod web;
@@ -105,6 +112,10 @@ fn main() -> ExitCode {
         Command::Config(args) => config::command::run(&args.command),
         Command::Retention(args) => retention::command::run(&args.file, &jobs::all),
         Command::Jobs(args) => jobs::run(args),
+        Command::Status(args) => status::run(args),
+        Command::Top(args) => status::top::run(args),
+        Command::Completions(args) => manual::completions(args),
+        Command::Man(args) => manual::man(args),
         Command::Report(args) => html::command::run(args),
         Command::Picture(args) => picture::command::run(args),
         Command::Demo => demo::run(),

@@ -12,9 +12,10 @@ use std::time::{Duration, Instant};
 use suture_store::{Job, SledStore, StoreError};
 
 use crate::config::default_state;
-use crate::control::{DaemonWish, JobsWish, Refusal, Wish, answer, ask};
+use crate::control::{DaemonWish, GlanceWish, JobsWish, Refusal, Wish, answer, ask};
 use crate::exit::Exit;
 use crate::fsx;
+use crate::glance::Glance;
 use crate::schedule::Standing;
 use crate::{standstill, watch, watchdog};
 
@@ -102,6 +103,20 @@ pub(crate) fn daemon(dir: &Path, wish: &DaemonWish) -> Result<Option<Standing>, 
     noted.map_err(|error| Failure::try_again(format!("the pause cannot be noted: {error}")))?;
     // One that began to answer meanwhile may have looked for a note before there was one.
     through_daemon(dir, wish)
+}
+
+/// How the daemon of a hot folder stands, or its store, if none runs.
+///
+/// # Errors
+/// When `dir` is no hot folder, or neither a daemon answers nor the store can be read.
+pub(crate) fn glance(dir: &Path) -> Result<Glance, Failure> {
+    if let Some(glance) = through_daemon(dir, &GlanceWish)? {
+        return Ok(glance);
+    }
+    let jobs = jobs(dir, &JobsWish::List)?;
+    let state = state_of(dir).map_err(|error| unseen(dir, &error))?;
+    let paused = standstill::is_set(&state).map_err(|error| unseen(&state, &error))?;
+    Ok(Glance::of_jobs(jobs, paused.then(|| standstill::WORDS.into()).into_iter().collect(), &state))
 }
 
 /// Where the job store of a hot folder is.

@@ -68,6 +68,9 @@ pub(crate) struct Standing {
     /// Why folders are out of reach, in words.
     #[serde(default)]
     pub away: Vec<String>,
+    /// Who could not be told of ends of jobs yet, in words.
+    #[serde(default)]
+    pub untold: Vec<String>,
 }
 
 /// Turns of all slots.
@@ -204,7 +207,7 @@ impl Schedule {
         let state = self.lock();
         let hours = (state.most == 0).then(|| "it is outside of the hours of `run_window`".to_owned());
         let held = state.held.iter().flatten().cloned().chain(hours).collect();
-        Standing { running: state.busy, held, away: Vec::new() }
+        Standing { running: state.busy, held, ..Standing::default() }
     }
 
     /// Gives nothing out any more.

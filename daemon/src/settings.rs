@@ -125,6 +125,9 @@ fn changes(old: &Config, new: &Config) -> Vec<String> {
             changes.push(format!("the priority of folder {} {was} -> {}", folder.name, folder.priority));
         }
     }
+    if old.events != new.events {
+        changes.push("who hears of the ends of jobs".into());
+    }
     let names: BTreeSet<&String> = old.profiles.keys().chain(new.profiles.keys()).collect();
     for name in names {
         match (old.profiles.get(name), new.profiles.get(name)) {

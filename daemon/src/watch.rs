@@ -17,16 +17,16 @@ use suture_store::{JobStore, Query, SledStore, StoreError, crash_point};
 use crate::again::Lives;
 use crate::attempt::{Context, IN_HAND, Slot, WITNESS, remove_work};
 use crate::cli::WatchArgs;
-use crate::config::{Config, default_state, real};
+use crate::config::{Config, real};
 use crate::control::Door;
-use crate::create;
 use crate::event_bus::Bus;
 use crate::event_store::Heard;
 use crate::exit::Exit;
 use crate::folder::{Folder, FolderError, is_fading};
 use crate::fsx;
-use crate::ground::{note_traces, read_traces};
+use crate::ground::read_traces;
 use crate::keeper::Keeper;
+use crate::manager::Manager;
 use crate::past::Unread;
 use crate::publish_error::PublishError;
 use crate::pulse::Pulse;
@@ -38,7 +38,11 @@ use crate::settings::Settings;
 use crate::signals::{Hangup, Stop};
 use crate::web::Web;
 use crate::world::{Machine, World};
-use crate::{standstill, uploads, watchdog};
+use crate::{deliver, standstill, uploads, watchdog};
+
+mod notes;
+
+use notes::{note_folders, note_state};
 
 /// How often what is gone is looked for.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
@@ -103,7 +107,8 @@ pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew:
     note_state(&config, &folders);
     note_folders(&config, &folders);
     let settings = Arc::new(settings);
-    let daemon = Daemon { settings, folders, store, web, once, lives, not_good, stop: stop.clone(), may_begin_anew };
+    let manager = Manager::of_environment();
+    let daemon = Daemon { settings, folders, store, web, manager, once, lives, not_good, stop: stop.clone(), may_begin_anew };
     daemon.run()
 }
 
@@ -152,35 +157,12 @@ fn store_failed(error: &StoreError) -> Exit {
     }
 }
 
-/// Tells `suture jobs` where the store is, if it is not where it would look.
-fn note_state(config: &Config, folders: &[Arc<Folder>]) {
-    for folder in folders.iter().filter(|folder| folder.check().is_ok()) {
-        let note = folder.root.join(".suture").join("state-path");
-        let state = std::path::absolute(&config.state).unwrap_or_else(|_| config.state.clone());
-        let result = if state == default_state(&folder.root) {
-            fsx::remove_if_there(&note)
-        } else {
-            create::replace(&note, state.as_os_str().as_encoded_bytes())
-        };
-        if let Err(error) = result {
-            tracing::warn!(%error, file = %note.display(), "The place of the job store could not be noted.");
-        }
-    }
-}
-
-/// Notes what tells the folders again, so that the next daemon knows one whose mount is gone.
-fn note_folders(config: &Config, folders: &[Arc<Folder>]) {
-    let traces = folders.iter().map(|folder| (folder.name.clone(), folder.trace())).collect();
-    if let Err(error) = note_traces(&config.state, &traces) {
-        tracing::warn!(%error, "What tells the folders again could not be noted.");
-    }
-}
-
 struct Daemon {
     settings: Arc<Settings>,
     folders: Vec<Arc<Folder>>,
     store: Arc<SledStore>,
     web: Option<Web>,
+    manager: Manager,
     once: bool,
     lives: Lives,
     /// A job ended not good, in any life.
@@ -227,6 +209,7 @@ impl Daemon {
             if !std::mem::replace(&mut told, true) {
                 tracing::error!(reason, "The job store waits; nothing is done until it can be opened again.");
             }
+            self.manager.beat(Instant::now());
             std::thread::sleep(LOOK_EVERY);
         }
     }
@@ -256,7 +239,8 @@ impl Daemon {
             pulse: Pulse::new(),
             bus,
         });
-        if let Err(error) = guarded(|| recover(&context)) {
+        // Before anything can come to its end.
+        if let Err(error) = guarded(|| deliver::subscribe(&context).and_then(|()| recover(&context))) {
             return End::Store(error);
         }
         let web = match self.web.as_ref().map(|web| web.start(&context)).transpose() {
@@ -275,6 +259,7 @@ impl Daemon {
                 Ok(()) => {
                     self.drain(&context, &slots);
                     self.sweep_once(&context);
+                    self.tell_once(&context);
                 }
                 Err(error) => context.fail(error),
             }
@@ -316,10 +301,22 @@ impl Daemon {
                 guarded(|| sweeper(context).tend(&|| moment(context), &|| ended.load(Ordering::Relaxed) || context.has_failed()));
             swept.unwrap_or_else(|error| context.fail(error));
         };
+        let manage = move || self.manager.tell(context, &|| ended.load(Ordering::Relaxed) || context.has_failed());
+        thread("manager").spawn_scoped(scope, manage).map(drop).map_err(no_thread)?;
+        let tell = move || guarded(|| deliver::serve(context, ended)).unwrap_or_else(|error| context.fail(error));
+        thread("deliver").spawn_scoped(scope, tell).map(drop).map_err(no_thread)?;
         if !self.once {
             thread("sweeper").spawn_scoped(scope, sweep).map(drop).map_err(no_thread)?;
         }
         Ok(())
+    }
+
+    /// With `--once`, who is to hear of ends of jobs does at the end, as far as they can be reached.
+    fn tell_once(&self, context: &Context) {
+        let stop = || self.stop.asked() || context.has_failed();
+        if self.once {
+            guarded(|| deliver::settle(context, &stop)).unwrap_or_else(|error| context.fail(error));
+        }
     }
 
     /// With `--once`, what is to go goes at the end, if all came to it.
@@ -331,10 +328,11 @@ impl Daemon {
         }
     }
 
-    /// Lets running jobs finish, for as long as they are given.
+    /// Lets running jobs and a running command finish, for as long as they are given.
     fn drain(&self, context: &Context, slots: &Slots) {
         let deadline = Instant::now().checked_add(self.settings.now().drain);
-        while slots.are_at_work() {
+        let waits = || slots.are_at_work() || (context.pulse.has_command() && !context.halt.load(Ordering::Relaxed));
+        while waits() {
             let is_over = deadline.is_some_and(|deadline| Instant::now() >= deadline);
             if is_over && !context.halt.swap(true, Ordering::Relaxed) {
                 tracing::warn!("The time to finish running jobs is over; they go back into the queue.");

@@ -31,7 +31,6 @@ mod routes;
 mod seats;
 mod server;
 mod shared;
-mod shown;
 mod status;
 mod stream;
 mod tokens;

@@ -169,6 +169,22 @@ impl JobStore for MemoryStore {
         self.queue.set_filled()
     }
 
+    fn subscribe(&self, names: &[String]) -> Result<(), StoreError> {
+        self.queue.subscribe(names)
+    }
+
+    fn notices(&self, name: &str, most: usize) -> Result<Vec<Job>, StoreError> {
+        self.queue.notices(name, most)
+    }
+
+    fn acknowledge(&self, name: &str, seq: Seq) -> Result<(), StoreError> {
+        self.queue.acknowledge(name, seq)
+    }
+
+    fn backlog(&self, name: &str) -> Result<u64, StoreError> {
+        self.queue.backlog(name)
+    }
+
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {
         self.queue.counts()
     }

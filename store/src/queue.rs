@@ -1,11 +1,12 @@
-//! The queue's logic over four ordered tables, shared by every store that is embedded in the daemon.
+//! The queue's logic over five ordered tables, shared by every store that is embedded in the daemon.
 //!
 //! | table    | key                                                                     | value                     |
 //! |----------|-------------------------------------------------------------------------|---------------------------|
-//! | meta     | `head`; `unfilled` (see `past`)                                         | [`Head`]; `true`          |
+//! | meta     | `head`; `unfilled` (see `past`); `subscribers` (see [`outbox`])         | [`Head`]; `true`; names and transitions |
 //! | jobs     | job number                                                              | the [`Job`]               |
 //! | by_state | kind, then what that kind is searched by (see [`index`])                | nothing                   |
 //! | by_key   | identity of the file: device, inode, size, mtime, folder, path          | number of its latest job  |
+//! | outbox   | number of the transition in which a job ended                           | the [`Job`] as it was then |
 //!
 //! Numbers in keys are big-endian. The job, its index entries and the head change in one transaction of the tables. One lock
 //! orders the transitions; becoming durable happens outside of it, so that transitions of several threads share one sync. Which job is
@@ -30,6 +31,8 @@ mod by_key;
 mod forget;
 mod index;
 mod line;
+mod notices;
+mod outbox;
 mod page;
 mod past;
 mod recover;
@@ -59,6 +62,7 @@ struct Inner {
     counts: BTreeMap<Kind, u64>,
     line: Line,
     results: Results,
+    subscribers: outbox::Subscribers,
 }
 
 /// The queue over `T`.
@@ -99,9 +103,10 @@ impl<T: Tables> Queue<T> {
         let mut head = earlier.unwrap_or_default();
         head.epoch.0 += 1;
         head.seq.0 += 1;
-        let counts = index::count(&tables)?;
+        let (counts, subscribers) = (index::count(&tables)?, outbox::subscribers(&tables)?);
         let results = Results::of(&tables)?;
-        let queue = Self { tables, inner: Mutex::new(Inner { head, counts, line: Line::default(), results }), clock };
+        let inner = Inner { head, counts, line: Line::default(), results, subscribers };
+        let queue = Self { tables, inner: Mutex::new(inner), clock };
         let now = queue.now();
         for kind in Kind::ALL.into_iter().filter(|kind| kind.is_live()) {
             for id in index::ids(&queue.tables, kind)? {
@@ -181,6 +186,7 @@ impl<T: Tables> Queue<T> {
             let key = to.id.0.to_be_bytes().to_vec();
             let value = record::encode_job(&key, to)?;
             puts.push(Put { table: Table::Jobs, key, value: Some(value) });
+            puts.extend(outbox::entry(&inner.subscribers, *from, to)?);
             if let Some(from) = from {
                 let count = counts.entry(from.kind()).or_default();
                 *count = count.saturating_sub(1);
@@ -415,6 +421,22 @@ impl<T: Tables> JobStore for Queue<T> {
 
     fn set_filled(&self) -> Result<(), StoreError> {
         self.has_past()
+    }
+
+    fn subscribe(&self, names: &[String]) -> Result<(), StoreError> {
+        self.set_subscribers(names)
+    }
+
+    fn notices(&self, name: &str, most: usize) -> Result<Vec<Job>, StoreError> {
+        self.not_heard(name, most)
+    }
+
+    fn acknowledge(&self, name: &str, seq: Seq) -> Result<(), StoreError> {
+        self.has_heard(name, seq)
+    }
+
+    fn backlog(&self, name: &str) -> Result<u64, StoreError> {
+        self.count_not_heard(name)
     }
 
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {

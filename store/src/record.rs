@@ -87,6 +87,7 @@ fn name(table: Table, key: &[u8]) -> String {
         },
         Table::ByState => "by_state".to_owned(),
         Table::ByKey => "by_key".to_owned(),
+        Table::Outbox => "outbox".to_owned(),
     }
 }
 

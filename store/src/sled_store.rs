@@ -6,11 +6,11 @@
 //! |------------------|----------------------------------------------------------------------------------------------------|
 //! | `LOCK`           | locked by the daemon that owns the folder; its process number as text                              |
 //! | `SEQ`            | how far the store got: `suture-seq 1 <epoch> <transition> <crc32>`; see below                      |
-//! | `db/`            | the sled database: trees `meta`, `jobs`, `by_state`, `by_key`: see [`crate::queue`]   |
+//! | `db/`            | the sled database: trees `meta`, `jobs`, `by_state`, `by_key`, `outbox`: see [`crate::queue`]   |
 //! | `db.trial/`      | only while a damaged database is being examined                                                    |
 //! | `corrupt-<ms>/`  | a damaged database that was replaced, alone or with its `SEQ`; for people                          |
 //!
-//! Trees `folders` and `outbox` are reserved. Values are records (`crate::record`: magic, schema version, checksum, JSON, little more
+//! The tree `folders` is reserved. Values are records (`crate::record`: magic, schema version, checksum, JSON, little more
 //! than 4 KiB at most); whatever is larger (reports, meshes) is a file elsewhere.
 //!
 //! **Durable** means: transaction over the trees, then `flush`, then `fdatasync` of the database file through a handle of our own,
@@ -32,7 +32,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::id::{Clock, JobId, Recipe, SystemClock};
+use crate::id::{Clock, JobId, Recipe, Seq, SystemClock};
 use crate::job::{Job, Kind, Past, Source, Step, Testimony};
 use crate::queue::Queue;
 use crate::store::{
@@ -200,6 +200,22 @@ impl JobStore for SledStore {
 
     fn set_filled(&self) -> Result<(), StoreError> {
         self.queue.set_filled()
+    }
+
+    fn subscribe(&self, names: &[String]) -> Result<(), StoreError> {
+        self.queue.subscribe(names)
+    }
+
+    fn notices(&self, name: &str, most: usize) -> Result<Vec<Job>, StoreError> {
+        self.queue.notices(name, most)
+    }
+
+    fn acknowledge(&self, name: &str, seq: Seq) -> Result<(), StoreError> {
+        self.queue.acknowledge(name, seq)
+    }
+
+    fn backlog(&self, name: &str) -> Result<u64, StoreError> {
+        self.queue.backlog(name)
     }
 
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {

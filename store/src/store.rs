@@ -7,6 +7,8 @@ use crate::job::{Decision, Illegal, Job, Kind, Past, Priority, Source, Step, Tes
 
 /// As many results alike are named as it makes sense to look at.
 pub const MOST_RESULTS: usize = 8;
+/// So many may hear of the ends of jobs.
+pub const MOST_SUBSCRIBERS: usize = 32;
 
 /// A durable job queue. A returned `Ok` means that the change survives a crash of process or machine; an `Err` that it did not
 /// happen or, for [`StoreError::Backend`], [`StoreError::Io`] and [`StoreError::Poisoned`] only, that this is unknown until the
@@ -130,6 +132,33 @@ pub trait JobStore: Send + Sync {
     /// # Errors
     /// Store errors only.
     fn set_filled(&self) -> Result<(), StoreError>;
+
+    /// These, and no others, are to hear of every job that comes to its end from now on, durably; at most [`MOST_SUBSCRIBERS`]. Who is one
+    /// already keeps what was not acknowledged yet.
+    ///
+    /// # Errors
+    /// [`StoreError::TooLong`] when there are too many, or a name does not fit a record.
+    fn subscribe(&self, names: &[String]) -> Result<(), StoreError>;
+
+    /// Jobs as they stood when they came to their end ([`Job::seq`] tells one end from another), which the subscriber of that name has not
+    /// acknowledged: the oldest first, at most `most`. Each of them is durable. Later changes of the job, also the end of its record, change
+    /// nothing here.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn notices(&self, name: &str, most: usize) -> Result<Vec<Job>, StoreError>;
+
+    /// That subscriber needs no notice up to this one any more, durably.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn acknowledge(&self, name: &str, seq: Seq) -> Result<(), StoreError>;
+
+    /// How many notices that subscriber has not acknowledged.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn backlog(&self, name: &str) -> Result<u64, StoreError>;
 
     /// How many jobs there are of each kind, in the order of [`Kind::ALL`].
     ///

@@ -3,13 +3,14 @@
 use crate::id::{Epoch, Seq};
 use crate::store::StoreError;
 
-/// One of the four tables.
+/// One of the five tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Table {
     Meta,
     Jobs,
     ByState,
     ByKey,
+    Outbox,
 }
 
 /// A change of one entry; without a value the entry goes.

@@ -11,6 +11,7 @@ pub mod http;
 pub mod openapi;
 pub mod oracle;
 pub mod place;
+pub mod receiver;
 pub mod scene;
 pub mod served;
 pub mod stl;

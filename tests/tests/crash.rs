@@ -9,6 +9,8 @@ mod approved;
 mod deaths;
 #[path = "crash/lost.rs"]
 mod lost;
+#[path = "crash/told.rs"]
+mod told;
 
 use std::collections::BTreeMap;
 use std::os::unix::process::ExitStatusExt;

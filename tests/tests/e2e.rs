@@ -19,6 +19,7 @@ mod e2e {
     mod memory;
     mod odd_names;
     mod orders;
+    mod package;
     mod pictures;
     mod profiles;
     mod queue;
@@ -28,10 +29,12 @@ mod e2e {
     mod review;
     mod rude;
     mod same_bytes;
+    mod service;
     mod soups;
     mod specials;
     mod steer;
     mod terminal;
+    mod told;
     mod twice;
     mod watch;
     mod web;

@@ -11,6 +11,7 @@ use suture_store::Priority;
 use toml::Spanned;
 
 use super::api::Api;
+use super::events::{self, OnDoneFile, WebhookFile};
 use super::keep::{Bound, Keep};
 use super::{Config, DEFAULT_PROFILE, FolderConfig, name_of, real};
 use crate::own_profile::OwnProfile;
@@ -43,6 +44,9 @@ struct File {
     reuse: Option<bool>,
     keep: Option<Spanned<KeepFile>>,
     api: Option<Spanned<ApiFile>>,
+    #[serde(default)]
+    webhook: Vec<Spanned<WebhookFile>>,
+    on_done: Option<OnDoneFile>,
     #[serde(default)]
     profiles: BTreeMap<String, Spanned<OwnProfile>>,
 }
@@ -233,6 +237,7 @@ fn from_text(text: &str) -> Result<Config, String> {
         config.keep = keep(text, of_file, &config.folders)?;
     }
     config.api = file.api.map(|of_file| api(text, of_file)).transpose()?;
+    config.events = events::read(text, file.webhook, file.on_done)?;
     if let Some(TimeLimitFile { base, per_gib }) = file.time_limit {
         config.time_limit.base = base.map_or(config.time_limit.base, |time| time.0);
         config.time_limit.per_gib = per_gib.map_or(config.time_limit.per_gib, |time| time.0);

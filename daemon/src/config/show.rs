@@ -8,6 +8,7 @@ use serde::Serialize;
 use toml::Value;
 
 use super::api::Api;
+use super::events::{Events, Occasion, OnDone, Webhook};
 use super::keep::Keep;
 use super::read::AUTO;
 use super::{Config, FolderConfig};
@@ -101,11 +102,28 @@ pub(crate) fn text(config: &Config) -> Result<String, String> {
         text += &format!("\n[[folders]]\npath = {}\nname = {}\nprofile = {}\n", path(root), quoted(name), quoted(profile));
         text += &format!("leave_originals = {leave_originals}\npriority = {priority}\n");
     }
+    text += &told(&config.events);
     if !config.profiles.is_empty() {
         text.push('\n');
         text += &own_profiles(&config.profiles)?;
     }
     Ok(text)
+}
+
+/// Who hears of the ends of jobs.
+pub(crate) fn told(events: &Events) -> String {
+    let list = |words: &mut dyn Iterator<Item = &str>| format!("[{}]", words.map(quoted).collect::<Vec<_>>().join(", "));
+    let mut text = String::new();
+    for Webhook { name, url, secret_file, events } in &events.webhooks {
+        text += &format!("\n[[webhook]]\nname = {}\nurl = {}\n", quoted(name), quoted(&url.to_string()));
+        text += &secret_file.as_deref().map(|file| format!("secret_file = {}\n", path(file))).unwrap_or_default();
+        text += &format!("events = {}\n", list(&mut events.iter().copied().map(Occasion::word)));
+    }
+    if let Some(OnDone { command, when, time_limit }) = &events.on_done {
+        text += &format!("\n[on_done]\ncommand = {}\n", list(&mut command.iter().map(String::as_str)));
+        text += &format!("when = {}\ntime_limit = {}\n", quoted(when.word()), quoted(&write_duration(*time_limit)));
+    }
+    text
 }
 
 /// Profiles with all of their settings. Their names are those of their tables.
@@ -128,8 +146,10 @@ mod tests {
     use suture_store::Priority;
 
     use super::*;
+    use crate::config::events::When;
     use crate::config::keep::Bound;
     use crate::config::read;
+    use crate::url::Url;
 
     fn read_back(config: &Config) -> Config {
         let dir = tempfile::tempdir().unwrap();
@@ -177,6 +197,19 @@ mod tests {
             hosts: vec!["farm".into(), "farm.example".into()],
             max_upload: 7 << 20,
             ..Api::at("0.0.0.0:80".parse().unwrap())
+        });
+        config.events.webhooks = ["http://farm/a?\"b\"", "http://[::1]:9000/"]
+            .map(|url| Webhook {
+                name: url.into(),
+                url: Url::parse(url).unwrap(),
+                secret_file: Some("/etc/a \"secret\"".into()),
+                events: vec![Occasion::NeedsReview, Occasion::Failed],
+            })
+            .to_vec();
+        config.events.on_done = Some(OnDone {
+            command: ["a \"program\"", "{output}.gcode", "-"].map(String::from).to_vec(),
+            when: When::Always,
+            time_limit: Duration::from_secs(90),
         });
         for name in ["it's mine", "resin", "default"] {
             let mut profile = Profile::built_in("strict").unwrap();

@@ -1,14 +1,13 @@
 //! Is it alive, is it ready? For service managers and load balancers.
 
-use std::sync::{Arc, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::Json;
 use axum::extract::State;
 use serde::Serialize;
 
-use crate::attempt::Context;
-use crate::schedule::Hold;
+use crate::glance::unready;
 
 use super::ask::ask;
 use super::problem::Problem;
@@ -34,22 +33,4 @@ pub(super) async fn livez(State(shared): State<Arc<Shared>>) -> Result<Json<Heal
 pub(super) async fn readyz(State(shared): State<Arc<Shared>>) -> Result<Json<Health>, Problem> {
     let why = ask(&shared.context, |context| Ok(unready(context))).await?;
     why.map_or(Ok(Json(Health { status: "ready" })), |why| Err(Problem::unavailable(why)))
-}
-
-/// Why the daemon is not ready, in words.
-pub(super) fn unready(context: &Context) -> Option<String> {
-    if context.pulse.is_ending() {
-        return Some("the daemon ends".into());
-    }
-    if context.has_failed() || context.store.check().is_err() {
-        return Some("the job store is to be opened again".into());
-    }
-    if let Some(folder) = context.folders.iter().find(|folder| context.pulse.scan_of(&folder.name).is_none()) {
-        return Some(format!("the folder `{}` was not looked at yet", folder.name));
-    }
-    let away = context.away.lock().unwrap_or_else(PoisonError::into_inner);
-    if context.folders.iter().all(|folder| folder.check().is_err() && away.get(&folder.name).is_some_and(|why| !why.is_empty())) {
-        return Some("every folder is out of reach".into());
-    }
-    context.schedule.held(Hold::Disk)
 }

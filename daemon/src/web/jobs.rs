@@ -17,7 +17,7 @@ use crate::retention::sweep::is_gone;
 use super::ask::{PATIENCE, ask};
 use super::problem::Problem;
 use super::shared::Shared;
-use super::shown::Shown;
+use crate::shown::Shown;
 
 /// Jobs on a page unless someone asks for another number, and at most.
 const PAGE: usize = 50;

@@ -7,11 +7,12 @@ use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
 use suture_store::job::Kind;
-use suture_store::{Clock, Query, SystemClock};
+use suture_store::{Clock, Query, StoreError, SystemClock};
 
 use crate::attempt::Context;
 use crate::event_metrics::{Label, head, sample, written};
 use crate::fsx;
+use crate::glance::size_of;
 
 use super::ask::ask;
 use super::problem::Problem;
@@ -22,6 +23,7 @@ pub(super) async fn metrics(State(shared): State<Arc<Shared>>) -> Result<Respons
     let text = ask(&shared.context, |context| {
         let mut text = context.bus.metrics.text();
         jobs(&mut text, context)?;
+        targets(&mut text, context)?;
         folders(&mut text, context);
         process(&mut text, context);
         Ok(text)
@@ -52,6 +54,14 @@ fn jobs(text: &mut String, context: &Context) -> Result<(), Problem> {
     Ok(())
 }
 
+fn targets(text: &mut String, context: &Context) -> Result<(), Problem> {
+    let config = context.settings.now();
+    let pending = config.events.names().map(|name| Ok((vec![("target", name)], context.store.backlog(name)? as f64)));
+    let pending = pending.collect::<Result<Vec<_>, StoreError>>()?;
+    gauge(text, ("suture_webhook_pending", "Ends of jobs that a target was not told of yet."), pending);
+    Ok(())
+}
+
 fn folders(text: &mut String, context: &Context) {
     let all = || context.folders.iter().map(|folder| (vec![("folder", folder.name.as_str())], folder));
     let up = all().map(|(labels, folder)| (labels, f64::from(u8::from(folder.check().is_ok()))));
@@ -68,17 +78,6 @@ fn folders(text: &mut String, context: &Context) {
     let of_state = [(vec![("role", "state")], free(&config.state))];
     gauge(text, ("suture_disk_free_bytes", "Free space on the disks."), of_folders.chain(of_state));
     gauge(text, ("suture_store_size_bytes", "Size of the job store."), [(vec![], size_of(&config.state) as f64)]);
-}
-
-/// Bytes of all files of a small folder.
-fn size_of(folder: &Path) -> u64 {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let size = |entry: std::fs::DirEntry| match entry.metadata() {
-        Ok(meta) if meta.is_dir() => size_of(&entry.path()),
-        Ok(meta) => meta.len(),
-        Err(_) => 0,
-    };
-    entries.map(size).sum()
 }
 
 fn process(text: &mut String, context: &Context) {

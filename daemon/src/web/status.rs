@@ -8,12 +8,10 @@ use axum::extract::State;
 use serde::Serialize;
 
 use crate::attempt::Context;
-use crate::control::{DaemonWish, steer};
-use crate::fsx;
+use crate::glance::Glance;
 use crate::schedule::Standing;
 
 use super::ask::ask;
-use super::health::unready;
 use super::problem::Problem;
 use super::shared::Shared;
 
@@ -30,6 +28,8 @@ pub(super) struct Status {
     held: Vec<String>,
     /// All that is out of reach, in words.
     away: Vec<String>,
+    /// Who could not be told of ends of jobs yet, in words.
+    untold: Vec<String>,
     /// How many jobs there are in each state.
     jobs: BTreeMap<&'static str, u64>,
     folders: Vec<Served>,
@@ -49,22 +49,18 @@ pub(super) async fn status(State(shared): State<Arc<Shared>>) -> Result<Json<Sta
 }
 
 fn of(context: &Context) -> Result<Status, Problem> {
-    let Standing { running, held, away } = steer(context, &DaemonWish::Standing)?;
-    let reserve = context.settings.now().reserve;
-    let served = |folder: &Arc<crate::folder::Folder>| Served {
-        name: folder.name.clone(),
-        reachable: folder.check().is_ok(),
-        free_bytes: fsx::free_space(&folder.root, reserve),
-    };
-    let reason = unready(context);
+    let Glance { ready, reason, standing: Standing { running, held, away, untold }, jobs, folders, .. } = Glance::of(context)?;
+    let served =
+        |folder: crate::glance::Served| Served { name: folder.name, reachable: folder.reachable, free_bytes: folder.free_bytes };
     Ok(Status {
         version: env!("CARGO_PKG_VERSION"),
-        ready: reason.is_none(),
+        ready,
         reason,
         running,
         held,
         away,
-        jobs: context.store.counts()?.into_iter().map(|(kind, count)| (kind.name(), count)).collect(),
-        folders: context.folders.iter().map(served).collect(),
+        untold,
+        jobs: jobs.into_iter().map(|(kind, count)| (kind.name(), count)).collect(),
+        folders: folders.into_iter().map(served).collect(),
     })
 }

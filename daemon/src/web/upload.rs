@@ -29,7 +29,7 @@ use super::jobs::{job_of, parameters, wished};
 use super::problem::Problem;
 use super::seats::Taken;
 use super::shared::Shared;
-use super::shown::Shown;
+use crate::shown::Shown;
 
 /// Longest key in bytes.
 const LONGEST_KEY: usize = 255;

@@ -1,4 +1,4 @@
-//! The four tables as sled trees, and the one place where they become durable.
+//! The five tables as sled trees, and the one place where they become durable.
 
 use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -35,6 +35,7 @@ struct Handles {
     jobs: sled::Tree,
     by_state: sled::Tree,
     by_key: sled::Tree,
+    outbox: sled::Tree,
 }
 
 impl Drop for SledTables {
@@ -106,7 +107,7 @@ impl SledTables {
             crash_point("store.open.sled");
             let tree = |name: &str| db.open_tree(name).map_err(failed);
             let (meta, jobs) = (tree("meta")?, tree("jobs")?);
-            let (by_state, by_key) = (tree("by_state")?, tree("by_key")?);
+            let (by_state, by_key, outbox) = (tree("by_state")?, tree("by_key")?, tree("outbox")?);
             // Earlier versions kept an index of results here. They make it anew, empty, when they are gone back to.
             db.drop_tree("by_recipe").map_err(failed)?;
             let path = dir.join("db");
@@ -114,7 +115,7 @@ impl SledTables {
             Ok(Self {
                 state: state.to_owned(),
                 dir: dir.to_owned(),
-                handles: Some(Handles { db, meta, jobs, by_state, by_key }),
+                handles: Some(Handles { db, meta, jobs, by_state, by_key, outbox }),
                 file,
                 progress: Mutex::default(),
                 synced: Condvar::new(),
@@ -144,6 +145,7 @@ impl SledTables {
             Table::Jobs => &handles.jobs,
             Table::ByState => &handles.by_state,
             Table::ByKey => &handles.by_key,
+            Table::Outbox => &handles.outbox,
         })
     }
 
@@ -225,16 +227,17 @@ impl Tables for SledTables {
 
     fn write(&self, puts: Vec<Put>, seq: Seq) -> Result<(), StoreError> {
         self.sound()?;
-        let Handles { meta, jobs, by_state, by_key, .. } = self.handles()?;
-        let trees = (meta, jobs, by_state, by_key);
+        let Handles { meta, jobs, by_state, by_key, outbox, .. } = self.handles()?;
+        let trees = (meta, jobs, by_state, by_key, outbox);
         let written = guarded(|| {
-            let result: TransactionResult<(), ()> = trees.transaction(|(meta, jobs, by_state, by_key)| {
+            let result: TransactionResult<(), ()> = trees.transaction(|(meta, jobs, by_state, by_key, outbox)| {
                 for put in &puts {
                     let tree = match put.table {
                         Table::Meta => meta,
                         Table::Jobs => jobs,
                         Table::ByState => by_state,
                         Table::ByKey => by_key,
+                        Table::Outbox => outbox,
                     };
                     match &put.value {
                         Some(value) => tree.insert(put.key.as_slice(), value.as_slice())?,

@@ -9,7 +9,7 @@ use crate::event_bus::{Bus, Progress};
 
 /// A job.
 #[derive(Serialize)]
-pub(super) struct Shown {
+pub(crate) struct Shown {
     id: JobId,
     state: &'static str,
     folder: String,
@@ -113,7 +113,7 @@ impl From<&Job> for Shown {
 
 impl Shown {
     /// With what is known of work that goes on.
-    pub(super) fn now(job: &Job, bus: &Bus) -> Self {
+    pub(crate) fn now(job: &Job, bus: &Bus) -> Self {
         let progress = bus.progress_of(job.id).filter(|_| job.kind() == Kind::Running);
         Self { progress: progress.map(|Progress { stage, percent }| Far { stage, percent }), ..Self::from(job) }
     }
@@ -133,7 +133,7 @@ fn reason(job: &Job) -> String {
 }
 
 /// Day and time as RFC 3339 writes them, in UTC.
-pub(super) fn when(time: Time) -> String {
+pub(crate) fn when(time: Time) -> String {
     let stamp = i64::try_from(time.0).ok().and_then(|ms| Timestamp::from_millisecond(ms).ok());
     stamp.unwrap_or(Timestamp::UNIX_EPOCH).to_string()
 }

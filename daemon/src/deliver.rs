@@ -1,0 +1,241 @@
+//! Events out: webhooks and the command of `[on_done]` hear of every job that has ended, at least once.
+//!
+//! The store keeps each end for every *target* until that has it ([`suture_store::JobStore::notices`]): written with the job's end itself, it survives whatever
+//! the job and the daemon meet. Each target has a thread, which takes its notices in order, and tries the oldest until it is delivered or given up
+//! ([`pace`]); what happens to one is no other's trouble, and no job's. Between a delivery and the note of it the daemon may die: then the same message goes
+//! out once more, under the same id.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{Builder, Scope, ScopedJoinHandle};
+use std::time::Duration;
+
+use suture_store::{Job, StoreError, crash_point};
+
+use crate::attempt::Context;
+use crate::config::events::{Events, OnDone, Webhook};
+use crate::event::{Happening, Parcel};
+
+mod command;
+mod http;
+mod message;
+mod pace;
+mod webhook;
+
+use message::Message;
+use pace::{Next, Outcome};
+
+/// How often a target looks for something to tell, and whoever waits whether that is over.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
+/// Notices read at a time.
+const PAGE: usize = 64;
+/// Of more that wait for one target, the oldest are given up: a receiver that is gone for good must not fill the disk.
+const MOST: u64 = 10_000;
+
+/// Who is told.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Target {
+    Webhook(Webhook),
+    Command(OnDone),
+}
+
+impl Target {
+    fn all(events: &Events) -> Vec<Self> {
+        let webhooks = events.webhooks.iter().cloned().map(Self::Webhook);
+        webhooks.chain(events.on_done.clone().map(Self::Command)).collect()
+    }
+
+    fn name(&self) -> &str {
+        match self {
+            Self::Webhook(webhook) => &webhook.name,
+            Self::Command(_) => OnDone::NAME,
+        }
+    }
+
+    fn wants(&self, message: &Message<'_>) -> bool {
+        match self {
+            Self::Webhook(webhook) => webhook.events.contains(&message.event),
+            Self::Command(_) => true,
+        }
+    }
+}
+
+/// Has the store keep what the targets of the configuration are to hear, from now on.
+///
+/// # Errors
+/// When the store failed.
+pub(crate) fn subscribe(context: &Context) -> Result<(), StoreError> {
+    let names: Vec<String> = context.settings.now().events.names().map(String::from).collect();
+    context.store.subscribe(&names)
+}
+
+/// Serves all targets until `ended`, those too that a configuration names that is read meanwhile.
+///
+/// # Errors
+/// When the store failed, or no thread is to be had.
+pub(crate) fn serve(context: &Context, ended: &AtomicBool) -> Result<(), StoreError> {
+    std::thread::scope(|scope| {
+        let mut threads: BTreeMap<String, ScopedJoinHandle<'_, ()>> = BTreeMap::new();
+        let mut known = context.settings.now().events.clone();
+        while !is_over(context, ended) {
+            let events = context.settings.now().events.clone();
+            if events != known {
+                subscribe(context)?;
+                context.pulse.keep_troubles(&|name| events.names().any(|there| there == name));
+                known = events;
+            }
+            threads.retain(|_, thread| !thread.is_finished());
+            for target in Target::all(&known) {
+                if !threads.contains_key(target.name()) {
+                    threads.insert(target.name().to_owned(), begin(scope, context, ended, target)?);
+                }
+            }
+            std::thread::sleep(LOOK_EVERY);
+        }
+        Ok(())
+    })
+}
+
+fn is_over(context: &Context, ended: &AtomicBool) -> bool {
+    ended.load(Ordering::Relaxed) || context.has_failed()
+}
+
+fn begin<'s>(
+    scope: &'s Scope<'s, '_>,
+    context: &'s Context,
+    ended: &'s AtomicBool,
+    target: Target,
+) -> Result<ScopedJoinHandle<'s, ()>, StoreError> {
+    let tell = move || {
+        let stop = || is_over(context, ended) || !Target::all(&context.settings.now().events).contains(&target);
+        if let Err(error) = (Teller { context, target: &target, stop: &stop }).tell() {
+            context.fail(error);
+        }
+    };
+    let started = Builder::new().name("teller".into()).spawn_scoped(scope, tell);
+    started.map_err(|source| StoreError::Io { path: "thread".into(), action: "starting one", source })
+}
+
+/// Waits until every target has all that there is for it, or is in trouble: what is left then waits for the next daemon.
+pub(crate) fn settle(context: &Context, stop: &dyn Fn() -> bool) -> Result<(), StoreError> {
+    let names: Vec<String> = context.settings.now().events.names().map(String::from).collect();
+    for name in names {
+        while !stop() && context.store.backlog(&name)? > 0 && !context.pulse.has_trouble(&name) {
+            std::thread::sleep(LOOK_EVERY);
+        }
+    }
+    Ok(())
+}
+
+/// Tells one target.
+struct Teller<'a> {
+    context: &'a Context,
+    target: &'a Target,
+    stop: &'a dyn Fn() -> bool,
+}
+
+impl Teller<'_> {
+    fn tell(&self) -> Result<(), StoreError> {
+        while !(self.stop)() {
+            if !self.may_begin() {
+                std::thread::sleep(LOOK_EVERY);
+                continue;
+            }
+            let notices = self.context.store.notices(self.target.name(), PAGE)?;
+            if notices.is_empty() {
+                std::thread::sleep(LOOK_EVERY);
+            }
+            let mut passed_over = None;
+            for job in &notices {
+                let root = self.context.folders.iter().find(|folder| folder.name == job.source.folder);
+                let message = Message::of(job, root.map(|folder| folder.root.as_path()));
+                match message.filter(|message| self.target.wants(message)) {
+                    None => passed_over = Some(job.seq),
+                    Some(message) if self.bring(&message)? => passed_over = None,
+                    // What it was is read again: much may have been given up meanwhile.
+                    Some(_) => break,
+                }
+            }
+            if let Some(seq) = passed_over {
+                self.context.store.acknowledge(self.target.name(), seq)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Tries one message until it is delivered or given up; `false`: it is neither, and something else has to be done first.
+    fn bring(&self, message: &Message<'_>) -> Result<bool, StoreError> {
+        let (name, mut tries) = (self.target.name(), 0);
+        while !(self.stop)() && self.may_begin() {
+            tries += 1;
+            let next = self.attempt(message).after(tries, &message.id);
+            if next == Next::Stop {
+                return Ok(false);
+            }
+            self.told(message.job, &next, tries);
+            if let Next::Wait { why, pause } = next {
+                self.context.pulse.trouble(name, why);
+                if self.give_up_oldest()? {
+                    return Ok(false);
+                }
+                self.wait(pause);
+                continue;
+            }
+            crash_point("daemon.told");
+            self.context.store.acknowledge(name, message.job.seq)?;
+            self.context.pulse.no_trouble(name);
+            crash_point("daemon.acknowledged");
+            return Ok(true);
+        }
+        Ok(false)
+    }
+
+    fn attempt(&self, message: &Message<'_>) -> Outcome {
+        let world = &*self.context.world;
+        match self.target {
+            Target::Webhook(hook) => webhook::send(hook, &message.id, &message.body(), world, self.stop),
+            Target::Command(on_done) => {
+                self.context.pulse.command(true);
+                let outcome = command::run(on_done, message, world, self.stop);
+                self.context.pulse.command(false);
+                outcome
+            }
+        }
+    }
+
+    /// A daemon that ends begins no command: the next one does. With `--once`, its end is when they are run.
+    fn may_begin(&self) -> bool {
+        matches!(self.target, Target::Webhook(_)) || self.context.once || !self.context.pulse.is_ending()
+    }
+
+    fn told(&self, job: &Job, next: &Next, tries: u32) {
+        let parcel = Parcel { target: self.target.name(), job: job.id };
+        self.context.bus.tell(&match next {
+            Next::Done { note } => Happening::Delivered { parcel, note },
+            Next::GiveUp { why } => Happening::GivenUp { parcel, why },
+            Next::Wait { why, .. } => Happening::NotDelivered { parcel, why, tries },
+            Next::Stop => return,
+        });
+    }
+
+    /// Lets go what is too much for a target that takes nothing. Returns whether there was any.
+    fn give_up_oldest(&self) -> Result<bool, StoreError> {
+        let (store, name) = (&self.context.store, self.target.name());
+        let surplus = store.backlog(name)?.saturating_sub(MOST);
+        let oldest = store.notices(name, usize::try_from(surplus).unwrap_or(usize::MAX).min(PAGE))?;
+        for job in &oldest {
+            let why = "more than 10000 messages wait for this target";
+            self.context.bus.tell(&Happening::GivenUp { parcel: Parcel { target: name, job: job.id }, why });
+        }
+        oldest.last().map_or(Ok(()), |last| store.acknowledge(name, last.seq))?;
+        Ok(!oldest.is_empty())
+    }
+
+    fn wait(&self, pause: Duration) {
+        let world = &self.context.world;
+        let began = world.steady();
+        while !(self.stop)() && world.steady().duration_since(began) < pause {
+            std::thread::sleep(LOOK_EVERY.min(pause));
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! How the daemon stands, at a glance: what it does, what came last, what a person should look at, and what keeps it from work.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::PoisonError;
+
+use serde::{Deserialize, Serialize};
+use suture_store::{Job, JobId, Kind, Look, Query, StoreError, Time};
+
+use crate::attempt::Context;
+use crate::schedule::{Hold, Standing};
+
+/// So many jobs of a sort are named.
+const NAMED: usize = 5;
+/// What ended last is looked for among so many that came last.
+const LATEST: usize = 50;
+
+/// A daemon, or the store of one that does not run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Glance {
+    pub version: String,
+    /// The daemon's life began then; `None`: none runs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub since: Option<Time>,
+    pub ready: bool,
+    /// Why not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    #[serde(flatten)]
+    pub standing: Standing,
+    /// How many jobs there are of each kind.
+    pub jobs: BTreeMap<Kind, u64>,
+    /// Jobs in work.
+    pub work: Vec<Work>,
+    /// What ended last, the latest first.
+    pub last: Vec<Job>,
+    /// What a person should look at, the latest first.
+    pub review: Vec<Job>,
+    pub folders: Vec<Served>,
+    pub store_bytes: u64,
+}
+
+/// A job in work.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Work {
+    pub job: JobId,
+    pub folder: String,
+    pub file: String,
+    pub kind: Kind,
+    /// Bytes of the file.
+    pub size: u64,
+    pub seconds: u64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stage: Option<String>,
+    /// Of the stage.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub percent: Option<u8>,
+    /// About so many are left.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seconds_left: Option<u64>,
+}
+
+/// A hot folder.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Served {
+    pub name: String,
+    pub path: PathBuf,
+    pub reachable: bool,
+    /// Bytes that results may still fill.
+    pub free_bytes: u64,
+}
+
+impl Glance {
+    /// Of a daemon that runs.
+    ///
+    /// # Errors
+    /// When the store failed.
+    pub(crate) fn of(context: &Context) -> Result<Self, StoreError> {
+        let (store, config) = (&context.store, context.settings.now());
+        let reason = unready(context);
+        let held = Kind::ALL.into_iter().filter(|kind| kind.is_held()).collect();
+        let of = |kinds, limit| Ok::<_, StoreError>(store.page(&Look { kinds, limit, ..Look::default() })?.jobs);
+        let served = |folder: &std::sync::Arc<crate::folder::Folder>| Served {
+            name: folder.name.clone(),
+            path: std::path::absolute(&folder.root).unwrap_or_else(|_| folder.root.clone()),
+            reachable: folder.check().is_ok(),
+            free_bytes: context.world.room(&folder.root, config.reserve),
+        };
+        Ok(Self {
+            version: env!("CARGO_PKG_VERSION").into(),
+            since: Some(Time(context.bus.life)),
+            ready: reason.is_none(),
+            reason,
+            standing: standing(context)?,
+            jobs: store.counts()?.into_iter().collect(),
+            work: store.list(&Query { kinds: held, ..Query::default() })?.iter().map(|job| work(context, job)).collect(),
+            last: latest(of(Kind::ALL.into_iter().filter(|kind| kind.is_at_rest()).collect(), LATEST)?),
+            review: of(vec![Kind::NeedsReview], NAMED)?,
+            folders: context.folders.iter().map(served).collect(),
+            store_bytes: size_of(&config.state),
+        })
+    }
+
+    /// Of these jobs, of a store that no daemon has.
+    pub(crate) fn of_jobs(mut jobs: Vec<Job>, held: Vec<String>, state: &Path) -> Self {
+        let mut counts: BTreeMap<Kind, u64> = Kind::ALL.map(|kind| (kind, 0)).into();
+        jobs.iter().for_each(|job| *counts.entry(job.kind()).or_default() += 1);
+        jobs.retain(|job| job.kind().is_at_rest());
+        jobs.reverse();
+        let review = jobs.iter().filter(|job| job.kind() == Kind::NeedsReview).take(NAMED).cloned().collect();
+        Self {
+            version: env!("CARGO_PKG_VERSION").into(),
+            standing: Standing { held, ..Standing::default() },
+            jobs: counts,
+            last: latest(jobs.into_iter().take(LATEST).collect()),
+            review,
+            store_bytes: size_of(state),
+            ..Self::default()
+        }
+    }
+}
+
+fn latest(mut jobs: Vec<Job>) -> Vec<Job> {
+    jobs.sort_by_key(|job| std::cmp::Reverse(job.changed));
+    jobs.into_iter().take(NAMED).collect()
+}
+
+fn work(context: &Context, job: &Job) -> Work {
+    let seconds = context.world.wall().0.saturating_sub(job.changed.0) / 1000;
+    let progress = context.bus.progress_of(job.id).filter(|_| job.kind() == Kind::Running);
+    Work {
+        job: job.id,
+        folder: job.source.folder.clone(),
+        file: job.source.path.to_string(),
+        kind: job.kind(),
+        size: job.source.size,
+        seconds,
+        stage: progress.as_ref().map(|progress| progress.stage.clone()),
+        percent: progress.as_ref().map(|progress| progress.percent),
+        seconds_left: progress.and_then(|_| context.bus.left(job.id, seconds)),
+    }
+}
+
+/// What keeps the daemon from work.
+///
+/// # Errors
+/// When the store failed.
+pub(crate) fn standing(context: &Context) -> Result<Standing, StoreError> {
+    let away = context.away.lock().unwrap_or_else(PoisonError::into_inner).values().flatten().cloned().collect();
+    let untold = context.pulse.all_troubles().into_iter();
+    let untold = untold.map(|(name, why)| Ok(format!("{name}: {} to be told: {why}", context.store.backlog(&name)?)));
+    let untold = untold.collect::<Result<_, StoreError>>()?;
+    Ok(Standing { away, untold, ..context.schedule.standing() })
+}
+
+/// Why the daemon is not ready for files, in words.
+pub(crate) fn unready(context: &Context) -> Option<String> {
+    if context.pulse.is_ending() {
+        return Some("the daemon ends".into());
+    }
+    if context.has_failed() || context.store.check().is_err() {
+        return Some("the job store is to be opened again".into());
+    }
+    if let Some(folder) = context.folders.iter().find(|folder| context.pulse.scan_of(&folder.name).is_none()) {
+        return Some(format!("the folder `{}` was not looked at yet", folder.name));
+    }
+    let away = context.away.lock().unwrap_or_else(PoisonError::into_inner);
+    if context.folders.iter().all(|folder| folder.check().is_err() && away.get(&folder.name).is_some_and(|why| !why.is_empty())) {
+        return Some("every folder is out of reach".into());
+    }
+    context.schedule.held(Hold::Disk)
+}
+
+/// Bytes of all files of a small folder.
+pub(crate) fn size_of(folder: &Path) -> u64 {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let size = |entry: std::fs::DirEntry| match entry.metadata() {
+        Ok(meta) if meta.is_dir() => size_of(&entry.path()),
+        Ok(meta) => meta.len(),
+        Err(_) => 0,
+    };
+    entries.map(size).sum()
+}

@@ -1,0 +1,174 @@
+//! `suture status`: how a hot folder's daemon stands, on one screen; [`top`] shows it anew each second.
+
+use std::io::Write;
+use std::path::Path;
+
+use suture_store::{Kind, Time};
+
+use crate::cli::service::StatusArgs;
+use crate::exit::Exit;
+use crate::glance::{Glance, Work};
+use crate::jobs::{line, when};
+use crate::reach;
+use crate::say::{complain, plain};
+use crate::units::{show_seconds, show_size};
+
+pub(crate) mod top;
+
+/// Shows it once.
+pub(crate) fn run(args: &StatusArgs) -> Exit {
+    let glance = match reach::glance(&args.dir) {
+        Ok(glance) => glance,
+        Err(failure) => {
+            complain(&failure.line);
+            return failure.exit;
+        }
+    };
+    let text = match args.json {
+        true => serde_json::to_string(&glance).unwrap_or_default() + "\n",
+        false => screen(&args.dir, &glance),
+    };
+    // A reader that has gone away has seen enough.
+    let _ = std::io::stdout().write_all(text.as_bytes());
+    if args.ready && !glance.ready { Exit::NotGood } else { Exit::Good }
+}
+
+/// All of it, in lines.
+fn screen(dir: &Path, glance: &Glance) -> String {
+    let dir = plain(&dir.display().to_string());
+    let mut text = match (&glance.since, &glance.reason) {
+        (None, _) => format!("{dir}: no daemon runs; this is what its job store says\n"),
+        (Some(since), reason) => {
+            let how = reason.as_ref().map_or_else(|| "ready".into(), |why| format!("not ready: {}", plain(why)));
+            format!("{dir}: suture {} runs since {}, {how}\n", plain(&glance.version), when(*since))
+        }
+    };
+    let counts = |of: fn(Kind) -> bool| {
+        let some = glance.jobs.iter().filter(|(kind, count)| of(**kind) && **count > 0);
+        let all: Vec<String> = some.map(|(kind, count)| format!("{count} {kind}")).collect();
+        if all.is_empty() { "none".into() } else { all.join(", ") }
+    };
+    text += &format!("  waiting   {}\n", counts(|kind| !kind.is_held() && !kind.is_at_rest()));
+    text += &format!("  in work   {}\n", counts(Kind::is_held));
+    text.extend(glance.work.iter().map(at_work));
+    text += &format!("  ended     {}\n", counts(Kind::is_at_rest));
+    let held = glance.standing.held.iter().map(|why| ("nothing new is taken", why));
+    let away = glance.standing.away.iter().map(|why| ("out of reach", why));
+    let untold = glance.standing.untold.iter().map(|who| ("not told yet", who));
+    text.extend(held.chain(away).chain(untold).map(|(what, why)| format!("  {what}: {}\n", plain(why))));
+    for folder in &glance.folders {
+        let room = if folder.reachable { format!("{} free", show_size(folder.free_bytes)) } else { "out of reach".into() };
+        let path = plain(&folder.path.display().to_string());
+        text += &format!("  folder    {}: {room}  {path}\n", plain(&folder.name));
+    }
+    text += &format!("  job store {}\n", show_size(glance.store_bytes));
+    for (head, jobs) in [("ended last", &glance.last), ("to be looked at", &glance.review)] {
+        if !jobs.is_empty() {
+            text += &format!("\n{head}\n");
+            text.extend(jobs.iter().map(line));
+        }
+    }
+    text
+}
+
+fn at_work(work: &Work) -> String {
+    let stage = match (&work.stage, work.percent) {
+        (Some(stage), Some(percent)) => format!("{} {percent} %", plain(stage)),
+        _ => work.kind.name().into(),
+    };
+    let left = work.seconds_left.map(|left| format!(", about {} left", seconds(left))).unwrap_or_default();
+    let (size, so_far) = (show_size(work.size), seconds(work.seconds));
+    format!("{:>6}    {:<32} {size:>9}  {stage}, for {so_far}{left}\n", work.job.0, plain(&work.file))
+}
+
+fn seconds(seconds: u64) -> String {
+    if seconds < 60 { format!("{seconds} s") } else { show_seconds(seconds as f64) }
+}
+
+/// Nothing is known: for whoever shows it again and again.
+fn unknown(dir: &Path, why: &str) -> String {
+    format!("{}: {}\n  at {}\n", plain(&dir.display().to_string()), plain(why), when(now()))
+}
+
+fn now() -> Time {
+    use crate::world::World;
+    crate::world::Machine.wall()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::glance::Served;
+    use crate::schedule::Standing;
+    use suture_store::{Job, JobId, RelPath, Source};
+
+    fn job(name: &[u8]) -> Job {
+        let (folder, profile) = ("hot".to_owned(), "default".to_owned());
+        let source = Source { folder, path: RelPath::new(name).unwrap(), dev: 1, ino: 2, size: 84, mtime_ns: 4, profile };
+        Job::queued(JobId(7), source, Time(1_700_000_000_123))
+    }
+
+    fn glance() -> Glance {
+        let work = Work {
+            job: JobId(9),
+            folder: "hot".into(),
+            file: "big.stl".into(),
+            kind: Kind::Running,
+            size: 84_000_000,
+            seconds: 7,
+            stage: Some("topology".into()),
+            percent: Some(45),
+            seconds_left: Some(12),
+        };
+        Glance {
+            version: "1".into(),
+            since: Some(Time(1_700_000_000_123)),
+            ready: true,
+            standing: Standing {
+                running: 1,
+                held: vec!["an operator".into()],
+                away: vec!["a \u{1b}[2J mount".into()],
+                untold: vec!["farm: 3 to be told".into()],
+            },
+            jobs: [(Kind::Queued, 3), (Kind::Running, 1), (Kind::Done, 5), (Kind::Failed, 0)].into(),
+            work: vec![work],
+            last: vec![job(b"last.stl")],
+            review: vec![job(b"odd\x1b.stl")],
+            folders: vec![Served { name: "hot".into(), path: "/srv/hot".into(), reachable: true, free_bytes: 1 << 30 }],
+            store_bytes: 4096,
+            ..Glance::default()
+        }
+    }
+
+    #[test]
+    fn all_of_it_is_on_one_screen() {
+        let text = screen(Path::new("hot"), &glance());
+        for words in [
+            "hot: suture 1 runs since 20",
+            ", ready\n",
+            "waiting   3 queued\n",
+            "in work   1 running\n",
+            "9    big.stl",
+            "topology 45 %, for 7 s, about 12 s left\n",
+            "ended     5 done\n",
+            "nothing new is taken: an operator\n",
+            "out of reach: a ",
+            "not told yet: farm: 3 to be told\n",
+            "folder    hot: 1.1 GB free  /srv/hot\n",
+            "ended last\n",
+            "last.stl",
+            "to be looked at\n",
+            "odd%1B.stl",
+        ] {
+            assert!(text.contains(words), "{words}: {text}");
+        }
+        assert!(!text.contains('\u{1b}'), "no name steers a terminal");
+    }
+
+    /// Through the socket it comes as it went.
+    #[test]
+    fn it_is_read_back() {
+        let text = serde_json::to_string(&glance()).unwrap();
+        assert_eq!(serde_json::from_str::<Glance>(&text).unwrap(), glance());
+    }
+}

@@ -1,0 +1,40 @@
+//! What subscribers have not heard yet: each job as it stood when it came to its end, under the number of that transition. It is written in the
+//! transaction in which the job ends, so that neither is there without the other, and it goes when all subscribers have it. Where no one
+//! subscribes, nothing is kept.
+//!
+//! [`super::notices`] reads it. The entry `subscribers` of the table `meta` says who has heard of what. An older program neither reads nor adds to either.
+
+use std::collections::BTreeMap;
+
+use crate::id::Seq;
+use crate::job::{Job, State};
+use crate::record;
+use crate::store::StoreError;
+use crate::tables::{Put, Table, Tables};
+
+pub(super) const SUBSCRIBERS: &[u8] = b"subscribers";
+
+/// Who subscribes, and the last transition that each has heard of.
+pub(super) type Subscribers = BTreeMap<String, Seq>;
+
+/// Those of earlier lives.
+pub(super) fn subscribers(tables: &dyn Tables) -> Result<Subscribers, StoreError> {
+    let bytes = tables.get(Table::Meta, SUBSCRIBERS)?;
+    bytes.map_or_else(|| Ok(Subscribers::new()), |bytes| record::decode(Table::Meta, SUBSCRIBERS, &bytes))
+}
+
+/// The key of the entry of a transition.
+pub(super) fn key(seq: Seq) -> [u8; 8] {
+    seq.0.to_be_bytes()
+}
+
+/// The entry of this change, if it is a job's end and someone is to hear of it. A job that comes back from an earlier store ended long ago.
+pub(super) fn entry(subscribers: &Subscribers, from: Option<&Job>, to: &Job) -> Result<Option<Put>, StoreError> {
+    let ends = matches!(to.state, State::Ended { .. }) && from.is_some_and(|from| from.state != to.state);
+    if subscribers.is_empty() || !ends {
+        return Ok(None);
+    }
+    let key = key(to.seq);
+    let value = record::encode(Table::Outbox, &key, to)?;
+    Ok(Some(Put { table: Table::Outbox, key: key.to_vec(), value: Some(value) }))
+}

@@ -4,11 +4,9 @@ use std::io::Write;
 use std::path::Path;
 use std::time::Duration;
 
-use jiff::Timestamp;
-use jiff::tz::TimeZone;
 use suture_core::Report;
 use suture_store::job::Kind;
-use suture_store::{Job, JobId, State, Time};
+use suture_store::{Job, JobId, State};
 
 use crate::cli::{JobsArgs, JobsCommand};
 use crate::control::{DaemonWish, JobsWish};
@@ -19,6 +17,7 @@ use crate::reach::{self, Failure};
 use crate::rebuild::{Rebuilt, rebuild};
 use crate::say::{complain, plain};
 use crate::schedule::Standing;
+use crate::units::show_when;
 use crate::{standstill, table};
 
 /// Does what the command line asks.
@@ -184,16 +183,10 @@ fn note(job: &Job) -> String {
 }
 
 fn line(job: &Job) -> String {
-    let (id, kind, since) = (job.id.0, job.kind().name(), when(job.changed));
+    let (id, kind, since) = (job.id.0, job.kind().name(), show_when(job.changed.0));
     let priority = if job.priority.is_default() { String::new() } else { format!("priority {}  ", job.priority) };
     let line = format!("{id:>6}  {since}  {kind:<12} {:<32} {priority}{}", job.source.path.to_string(), note(job));
     line.trim_end().to_owned() + "\n"
-}
-
-/// Day and time where the machine is.
-fn when(time: Time) -> String {
-    let zoned = |at: Timestamp| at.to_zoned(TimeZone::system()).strftime("%Y-%m-%d %H:%M:%S").to_string();
-    i64::try_from(time.0).ok().and_then(|ms| Timestamp::from_millisecond(ms).ok()).map_or_else(|| "?".into(), zoned)
 }
 
 /// How many jobs are in which state, and of how many of them the result is a copy.
@@ -219,8 +212,8 @@ fn show(dir: &Path, job: &Job) -> String {
         job.source.profile,
         job.priority,
         job.attempts,
-        when(job.submitted),
-        when(job.changed)
+        show_when(job.submitted.0),
+        show_when(job.changed.0)
     );
     let note = note(job);
     if !note.is_empty() {

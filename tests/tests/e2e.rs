@@ -19,6 +19,7 @@ mod e2e {
     mod memory;
     mod odd_names;
     mod orders;
+    mod pages;
     mod pictures;
     mod profiles;
     mod queue;

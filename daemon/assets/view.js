@@ -4,10 +4,35 @@ import * as THREE from "./three/three.module.min.js";
 const MAGIC = 0x31545553; // "SUT1"
 const COLOURS = { lost: 0x8e24aa, invented: 0x00843d, open: 0xd60a28, changed: 0x1565c0, found: 0xb36b00 };
 const TURN = Math.PI / 36; // for a key
+const REST = 3000; // milliseconds
+const TRIES = 20;
 const NAMES = { before: "As it came", after: "Result" };
 
+const rest = () => new Promise((done) => setTimeout(done, REST));
+
+// Others may be drawing: whoever is told to try again does.
+async function ask(address) {
+  for (let tries = 1; ; tries++) {
+    const answer = await fetch(address);
+    if (answer.status !== 503 || tries === TRIES) return answer;
+    await rest();
+  }
+}
+
+// The same for pictures.
+async function see(image) {
+  for (let tries = 1; tries < TRIES; tries++) {
+    await image.decode().catch(() => {});
+    if (image.naturalWidth) return;
+    const answer = await fetch(image.src);
+    if (!answer.ok && answer.status !== 503) return;
+    if (!answer.ok) await rest();
+    image.src = image.getAttribute("src");
+  }
+}
+
 async function load(job, side) {
-  const answer = await fetch(`/v1/jobs/${job}/view?side=${side}`);
+  const answer = await ask(`/v1/jobs/${job}/view?side=${side}`);
   if (!answer.ok) throw new Error((await answer.json()).detail);
   const bytes = await answer.arrayBuffer();
   const [magic, vertices, triangles, low, high] = new Uint32Array(bytes, 0, 5);
@@ -271,6 +296,10 @@ class View {
 }
 
 function begin() {
+  for (const image of document.querySelectorAll("figure img:not([data-begun])")) {
+    image.dataset.begun = "";
+    see(image);
+  }
   for (const root of document.querySelectorAll("[data-view]:not([data-begun])")) {
     root.dataset.begun = "";
     new View(root).start();

@@ -6,7 +6,7 @@ use std::io;
 use suture_core::read::MeshFile;
 
 use super::coarse::Coarse;
-use super::{Options, draw, open};
+use super::{Eye, Options, draw, open};
 use crate::cli::DrawArgs;
 use crate::exit::Exit;
 use crate::say::complain;
@@ -16,6 +16,8 @@ use crate::{confine, create};
 const NICE: i32 = 10;
 /// Pixels of each mesh.
 const SIZE: (usize, usize) = (640, 480);
+/// Beyond so many triangles, whoever waits is shown the usual side: looking for the best one takes as long as sixteen pictures.
+const MOST_TO_CHOOSE: usize = 3_000_000;
 
 /// Draws what the daemon asks for.
 pub(crate) fn run(args: &DrawArgs) -> Exit {
@@ -43,7 +45,9 @@ fn made(args: &DrawArgs) -> Result<(), String> {
         (true, [mesh]) => Coarse::of(mesh, limits.threads).ok_or_else(nothing)?.bytes(),
         (true, _) => return Err("only one mesh at a time is made coarse".into()),
         (false, meshes) => {
-            let options = Options { size: SIZE, eye: None, threads: limits.threads, memory: limits.memory_bytes };
+            let is_large = meshes.iter().map(|mesh| mesh.len()).sum::<usize>() > MOST_TO_CHOOSE;
+            let eye = is_large.then_some(Eye::USUAL);
+            let options = Options { size: SIZE, eye, threads: limits.threads, memory: limits.memory_bytes };
             draw(meshes, &options).ok_or_else(nothing)?.png().map_err(|error| error.to_string())?
         }
     };

@@ -5,6 +5,7 @@ use std::io;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
+use std::sync::Arc;
 use std::thread::{Builder, sleep};
 use std::time::{Duration, Instant};
 
@@ -17,6 +18,7 @@ use super::problem::Problem;
 use super::shared::Shared;
 use crate::exit::Exit;
 use crate::fsx::{self, Identity};
+use crate::schedule::Hold;
 use crate::supervise::room_of;
 
 /// Bytes that a drawing may hold by its own count.
@@ -59,28 +61,37 @@ pub(super) async fn drawing(shared: &Shared, id: JobId, what: What, of: &[Known]
     if shared.drawings.is_impossible(&name) {
         return Err(never());
     }
-    let mut found = Vec::new();
-    for known in of {
-        found.push((known.path.clone(), opened_as(shared, id, known.clone()).await?.found));
+    if shared.context.schedule.held(Hold::Disk).is_some() {
+        return Err(Problem::unavailable("there is no room for pictures for now; what is done of files comes first"));
     }
     let seat = shared.drawings.turn().await?;
     // Whoever had the seat may have made this one.
     if let Some(kept) = kept(shared, &path).await? {
         return Ok((kept, name));
     }
+    let mut found = Vec::new();
+    for known in of {
+        found.push((known.path.clone(), opened_as(shared, id, known.clone()).await?.found));
+    }
     let (tell, told) = oneshot::channel();
     let task = Task { what, found, path: path.clone(), _seat: seat };
+    let (drawings, key) = (Arc::clone(&shared.drawings), name.clone());
+    let work = move || {
+        let done = task.run();
+        if matches!(done, Err(Failure::Never)) {
+            drawings.set_impossible(key);
+        }
+        // The client may have gone.
+        let _ = tell.send(done);
+    };
     // A thread of its own: the system ends the process with the thread that started it.
-    let begun = Builder::new().name("drawing".into()).spawn(move || drop(tell.send(task.run())));
+    let begun = Builder::new().name("drawing".into()).spawn(work);
     let failure = || Problem::unavailable("no picture can be made for now; try again");
     begun.map_err(|_| failure())?;
     match told.await.map_err(|_| failure())? {
         Ok(()) => Ok((kept(shared, &path).await?.ok_or_else(failure)?, name)),
         Err(Failure::NotNow) => Err(failure()),
-        Err(Failure::Never) => {
-            shared.drawings.set_impossible(name);
-            Err(never())
-        }
+        Err(Failure::Never) => Err(never()),
     }
 }
 
@@ -145,7 +156,8 @@ impl Task {
     /// How the process ended; `None`: it took too long.
     fn draw(&self) -> io::Result<Option<ExitStatus>> {
         let mut command = Command::new("/proc/self/exe");
-        command.arg0("suture").arg("draw").env("RUST_BACKTRACE", "0");
+        // A text file becomes records in a file without a name, which is to lie where there is room.
+        command.arg0("suture").arg("draw").env("RUST_BACKTRACE", "0").env("TMPDIR", fsx::folder_of(&self.path));
         command.args(["--parent", &std::process::id().to_string(), "--data", &room_of(MEMORY, THREADS).to_string()]);
         command.args(["--memory", &MEMORY.to_string(), "--threads", &THREADS.to_string()]);
         if self.what == What::Mesh {

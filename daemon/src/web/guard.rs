@@ -12,7 +12,7 @@ use std::net::{IpAddr, Ipv6Addr};
 use std::sync::Arc;
 
 use axum::extract::{Request, State};
-use axum::http::header::{ACCEPT, CACHE_CONTROL, CONTENT_TYPE, HOST, ORIGIN, WWW_AUTHENTICATE};
+use axum::http::header::{ACCEPT, ALLOW, CACHE_CONTROL, CONTENT_TYPE, HOST, ORIGIN, RETRY_AFTER, WWW_AUTHENTICATE};
 use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
@@ -57,11 +57,14 @@ pub(super) async fn guard(State(shared): State<Arc<Shared>>, request: Request, n
         // The library's own words.
         let allow = response.headers_mut().remove("allow");
         response = Problem::new(status, words(status)).into_response();
-        response.headers_mut().extend(allow.map(|allow| (axum::http::header::ALLOW, allow)));
+        response.headers_mut().extend(allow.map(|allow| (ALLOW, allow)));
     }
     let detail = response.extensions_mut().remove::<Detail>();
     if let Some(Detail(detail)) = detail.filter(|_| for_a_person) {
-        response = pages::sorry(status, &detail);
+        let mut page = pages::sorry(status, &detail);
+        let kept = [ALLOW, RETRY_AFTER].map(|name| (response.headers_mut().remove(&name), name));
+        page.headers_mut().extend(kept.into_iter().filter_map(|(value, name)| Some((name, value?))));
+        response = page;
     }
     let is_page = response.extensions().get::<ForPeople>().is_some();
     let headers = response.headers_mut();

@@ -27,8 +27,10 @@ pub(super) struct Shared {
     pub listeners: Arc<Semaphore>,
     /// Seats of those who show a token.
     pub logins: Semaphore,
-    pub drawings: Drawings,
-    pub tally: Tally,
+    /// Who draws for pages.
+    pub drawings: Arc<Drawings>,
+    /// How many jobs ended in the last day.
+    pub tally: Arc<Tally>,
 }
 
 impl Shared {
@@ -46,8 +48,8 @@ impl Shared {
             uploads: Arc::default(),
             listeners: Arc::new(Semaphore::new(LISTENERS)),
             logins: Semaphore::new(LOGINS),
-            drawings: Drawings::default(),
-            tally: Tally::default(),
+            drawings: Arc::default(),
+            tally: Arc::default(),
         })
     }
 }

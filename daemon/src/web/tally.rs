@@ -1,7 +1,9 @@
 //! How many jobs ended in the last day, and how. All records are read for it, so that it is counted now and then: as often as it takes little of the machine's
-//! time. A page never waits for a count that someone else makes.
+//! time. A page waits for it only
+//! where it takes next to nothing.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::Builder;
 use std::time::{Duration, Instant};
 
 use suture_store::{Ending, Look, State, StoreError};
@@ -15,6 +17,8 @@ const AT_A_TIME: usize = 500;
 const MOST: usize = 200_000;
 /// A count stands for so many times as long as it took.
 const SHARE: u32 = 30;
+/// What takes no longer, a page waits for.
+const SHORT: Duration = Duration::from_millis(20);
 
 /// Jobs that ended in the last day.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -62,22 +66,45 @@ impl Tally {
     ///
     /// # Errors
     /// As the store's.
-    pub(super) fn of(&self, context: &Context) -> Result<Ended, StoreError> {
-        let last = || self.last.lock().unwrap_or_else(PoisonError::into_inner);
+    pub(super) fn of(self: &Arc<Self>, context: &Arc<Context>) -> Result<Ended, StoreError> {
         let now = context.world.steady();
-        let known =
-            last().as_ref().map(|counted| (counted.ended, now.saturating_duration_since(counted.at) < SHARE * counted.took));
-        if let Some((ended, true)) = known {
+        let Some((ended, age, took)) = self.known(now) else {
+            // The first count is waited for.
+            let _turn = self.counting.lock().unwrap_or_else(PoisonError::into_inner);
+            return self.count(context);
+        };
+        if age < SHARE * took {
             return Ok(ended);
         }
-        // The first one is waited for.
-        let turn = if known.is_some() { self.counting.try_lock().ok() } else { self.counting.lock().ok() };
-        if let (None, Some((ended, _))) = (&turn, known) {
-            return Ok(ended);
+        if took < SHORT {
+            return self.count(context);
         }
+        let (tally, other) = (Arc::clone(self), Arc::clone(context));
+        let count = move || {
+            // Someone else may count already; a store that does not answer, the next page tells of.
+            if let Ok(_turn) = tally.counting.try_lock() {
+                let _ = tally.count(&other);
+            }
+        };
+        // Where no thread is to be had, the next page tries again.
+        let _ = Builder::new().name("tally".into()).spawn(count);
+        Ok(ended)
+    }
+
+    fn last(&self) -> MutexGuard<'_, Option<Counted>> {
+        self.last.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The last count, its age, and how long it took.
+    fn known(&self, now: Instant) -> Option<(Ended, Duration, Duration)> {
+        self.last().as_ref().map(|counted| (counted.ended, now.saturating_duration_since(counted.at), counted.took))
+    }
+
+    fn count(&self, context: &Context) -> Result<Ended, StoreError> {
+        let begun = context.world.steady();
         let ended = count(context)?;
         let at = context.world.steady();
-        *last() = Some(Counted { at, took: at.saturating_duration_since(now), ended });
+        *self.last() = Some(Counted { at, took: at.saturating_duration_since(begun), ended });
         Ok(ended)
     }
 }

@@ -38,7 +38,7 @@ struct Night {
 }
 
 impl Night {
-    fn of(context: &Context, tally: &Tally) -> Result<Self, Problem> {
+    fn of(context: &Arc<Context>, tally: &Arc<Tally>) -> Result<Self, Problem> {
         let latest = |kinds: &[Kind]| {
             let look = Look { kinds: kinds.to_vec(), limit: MOST_ROWS, ..Look::default() };
             context.store.page(&look).map(|page| page.jobs)
@@ -59,7 +59,7 @@ impl Night {
 /// `GET /`.
 pub(super) async fn night(State(shared): State<Arc<Shared>>, headers: HeaderMap) -> Result<Response, Problem> {
     let all = Arc::clone(&shared);
-    let night = ask(&shared.context, move |context| Night::of(context, &all.tally)).await?;
+    let night = ask(&shared.context, move |_| Night::of(&all.context, &all.tally)).await?;
     let body = html! {
         h1 { "Overview" }
         div id="night" data-live {

@@ -75,6 +75,9 @@ pub(crate) enum Command {
     /// Work on requests from standard input (started by the supervisor)
     #[command(hide = true)]
     Worker(WorkerArgs),
+    /// Draw a mesh for a page (started by the daemon)
+    #[command(hide = true)]
+    Draw(DrawArgs),
 }
 
 const WATCH_HELP: &str = "\
@@ -314,6 +317,24 @@ pub(crate) struct WorkerArgs {
     /// Bytes of memory that the worker may have of the system
     #[arg(long)]
     pub data: u64,
+}
+
+/// What the daemon wants drawn.
+#[derive(Args, Debug)]
+pub(crate) struct DrawArgs {
+    #[command(flatten)]
+    pub worker: WorkerArgs,
+    #[command(flatten)]
+    pub spend: Spend,
+    /// One mesh with few triangles, instead of a picture
+    #[arg(long)]
+    pub coarse: bool,
+    /// The file to write
+    #[arg(long)]
+    pub output: PathBuf,
+    /// A mesh, or two: before and after
+    #[arg(required = true, num_args = 1..=2)]
+    pub inputs: Vec<PathBuf>,
 }
 
 #[derive(Args, Debug)]

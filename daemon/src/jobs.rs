@@ -4,11 +4,9 @@ use std::io::Write;
 use std::path::Path;
 use std::time::Duration;
 
-use jiff::Timestamp;
-use jiff::tz::TimeZone;
 use suture_core::Report;
 use suture_store::job::Kind;
-use suture_store::{Decision, Job, JobId, State, Time, Verdict};
+use suture_store::{Decision, Job, JobId, State, Verdict};
 
 use crate::cli::{JobsArgs, JobsCommand, Said};
 use crate::control::{DaemonWish, JobsWish};
@@ -19,6 +17,7 @@ use crate::reach::{self, Failure};
 use crate::rebuild::{Rebuilt, rebuild};
 use crate::say::{complain, plain};
 use crate::schedule::Standing;
+use crate::units::show_when;
 use crate::{standstill, table};
 
 /// Does what the command line asks.
@@ -204,14 +203,14 @@ fn note(job: &Job) -> String {
 fn decision(job: &Job) -> String {
     let word = |said: &Decision| {
         let note = if said.note.is_empty() { String::new() } else { format!(": {}", said.note) };
-        format!("{} by {} at {}{note}", said.verdict.name(), said.by, when(said.at))
+        format!("{} by {} at {}{note}", said.verdict.name(), said.by, show_when(said.at.0))
     };
     job.decision().map(word).unwrap_or_default()
 }
 
 /// A job in one line.
 pub(crate) fn line(job: &Job) -> String {
-    let (id, kind, since) = (job.id.0, job.kind().name(), when(job.changed));
+    let (id, kind, since) = (job.id.0, job.kind().name(), show_when(job.changed.0));
     let priority = if job.priority.is_default() { String::new() } else { format!("priority {}  ", job.priority) };
     let note = note(job);
     let said =
@@ -219,12 +218,6 @@ pub(crate) fn line(job: &Job) -> String {
     let line =
         format!("{id:>6}  {since}  {kind:<12} {:<32} {priority}{note}{}", job.source.path.to_string(), said.unwrap_or_default());
     line.trim_end().to_owned() + "\n"
-}
-
-/// Day and time where the machine is.
-pub(crate) fn when(time: Time) -> String {
-    let zoned = |at: Timestamp| at.to_zoned(TimeZone::system()).strftime("%Y-%m-%d %H:%M:%S").to_string();
-    i64::try_from(time.0).ok().and_then(|ms| Timestamp::from_millisecond(ms).ok()).map_or_else(|| "?".into(), zoned)
 }
 
 /// How many jobs are in which state, and of how many of them the result is a copy.
@@ -250,8 +243,8 @@ fn show(dir: &Path, job: &Job) -> String {
         job.source.profile,
         job.priority,
         job.attempts,
-        when(job.submitted),
-        when(job.changed)
+        show_when(job.submitted.0),
+        show_when(job.changed.0)
     );
     for (name, words) in [("note", note(job)), ("decision", decision(job))] {
         if !words.is_empty() {

@@ -118,6 +118,7 @@ fn main() -> ExitCode {
         Command::Man(args) => manual::man(args),
         Command::Report(args) => html::command::run(args),
         Command::Picture(args) => picture::command::run(args),
+        Command::Draw(args) => picture::confined::run(args),
         Command::Demo => demo::run(),
     };
     exit.into()

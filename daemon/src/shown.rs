@@ -119,7 +119,8 @@ impl Shown {
     }
 }
 
-fn reason(job: &Job) -> String {
+/// Why it stands where it stands: a line for people, empty where there is nothing to say.
+pub(super) fn reason(job: &Job) -> String {
     match &job.state {
         State::Noticed { reason } => reason.clone(),
         State::Ended { publication } => publication.reason.clone(),

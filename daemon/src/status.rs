@@ -8,10 +8,10 @@ use suture_store::{Kind, Time};
 use crate::cli::service::StatusArgs;
 use crate::exit::Exit;
 use crate::glance::{Glance, Work};
-use crate::jobs::{line, when};
+use crate::jobs::line;
 use crate::reach;
 use crate::say::{complain, plain};
-use crate::units::{show_seconds, show_size};
+use crate::units::{show_seconds, show_size, show_when};
 
 pub(crate) mod top;
 
@@ -40,7 +40,7 @@ fn screen(dir: &Path, glance: &Glance) -> String {
         (None, _) => format!("{dir}: no daemon runs; this is what its job store says\n"),
         (Some(since), reason) => {
             let how = reason.as_ref().map_or_else(|| "ready".into(), |why| format!("not ready: {}", plain(why)));
-            format!("{dir}: suture {} runs since {}, {how}\n", plain(&glance.version), when(*since))
+            format!("{dir}: suture {} runs since {}, {how}\n", plain(&glance.version), show_when(since.0))
         }
     };
     let counts = |of: fn(Kind) -> bool| {
@@ -87,7 +87,7 @@ fn seconds(seconds: u64) -> String {
 
 /// Nothing is known: for whoever shows it again and again.
 fn unknown(dir: &Path, why: &str) -> String {
-    format!("{}: {}\n  at {}\n", plain(&dir.display().to_string()), plain(why), when(now()))
+    format!("{}: {}\n  at {}\n", plain(&dir.display().to_string()), plain(why), show_when(now().0))
 }
 
 fn now() -> Time {

@@ -141,6 +141,12 @@ fn name_of(signal: i32) -> String {
     }
 }
 
+/// Bytes that a process may have of the system, which holds so many by its own count. That count is what it keeps to; the limit only catches what
+/// escapes it. Stacks, allocator slack and code are not in that count.
+pub(crate) fn room_of(memory: u64, threads: usize) -> u64 {
+    memory.saturating_add(memory / 4).saturating_add(256 << 20).saturating_add(threads as u64 * (8 << 20))
+}
+
 /// A running worker process. Dropping it kills it and waits for its end.
 pub(crate) struct Worker {
     child: Child,
@@ -160,9 +166,7 @@ impl Worker {
     /// # Errors
     /// When the process cannot be started.
     pub(crate) fn spawn(memory: u64, threads: usize, many: bool) -> io::Result<Self> {
-        // The engine keeps to its budget by its own count; the limit only catches what escapes it. Stacks, allocator slack and
-        // code are not in that count.
-        let data = memory.saturating_add(memory / 4).saturating_add(256 << 20).saturating_add(threads as u64 * (8 << 20));
+        let data = room_of(memory, threads);
         // The running binary itself, even when a newer one has taken its name meanwhile.
         let mut command = Command::new("/proc/self/exe");
         command.arg0("suture").arg("worker").env("RUST_BACKTRACE", "0");

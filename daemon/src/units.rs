@@ -3,6 +3,9 @@
 use std::net::SocketAddr;
 use std::time::Duration;
 
+use jiff::Timestamp;
+use jiff::tz::TimeZone;
+
 /// Splits `text` into its number and its unit.
 fn split(text: &str) -> Option<(f64, &str)> {
     let text = text.trim();
@@ -135,6 +138,12 @@ pub(crate) fn show_point(p: &[f32; 3]) -> String {
 /// A box.
 pub(crate) fn show_box([lo, hi]: &[[f32; 3]; 2]) -> String {
     format!("{} to {}", show_point(lo), show_point(hi))
+}
+
+/// Day and time where the machine is, of milliseconds since 1970.
+pub(crate) fn show_when(ms: u64) -> String {
+    let zoned = |at: Timestamp| at.to_zoned(TimeZone::system()).strftime("%Y-%m-%d %H:%M:%S").to_string();
+    i64::try_from(ms).ok().and_then(|ms| Timestamp::from_millisecond(ms).ok()).map_or_else(|| "?".into(), zoned)
 }
 
 /// An address to listen at.

@@ -18,6 +18,7 @@ use crate::attempt::Context;
 use crate::config::api::Api;
 
 mod ask;
+mod drawing;
 mod files;
 mod flow;
 mod guard;
@@ -25,14 +26,19 @@ mod health;
 mod intake;
 mod jobs;
 mod metrics;
+mod pages;
 mod patience;
+mod preview;
 mod problem;
+mod reported;
 mod routes;
 mod seats;
 mod server;
+mod sessions;
 mod shared;
 mod status;
 mod stream;
+mod tally;
 mod tokens;
 mod upload;
 mod verified;
@@ -73,7 +79,7 @@ impl Web {
     /// When no thread is to be had.
     pub(crate) fn start(&self, context: &Arc<Context>) -> io::Result<Serving> {
         let ended = Arc::<AtomicBool>::default();
-        let shared = Arc::new(Shared::new(Arc::clone(context), self.api.clone(), self.tokens.clone()));
+        let shared = Arc::new(Shared::new(Arc::clone(context), self.api.clone(), self.tokens.clone())?);
         let (listener, stop) = (self.listener.try_clone()?, Arc::clone(&ended));
         let address = self.listener.local_addr().unwrap_or(self.api.listen);
         tracing::info!(%address, "Serving the web interface.");

@@ -12,6 +12,9 @@ use crate::served::{Served, wait_until};
 /// An answer is waited for so long.
 const PATIENCE: Duration = Duration::from_secs(60);
 
+/// A browser wants pages.
+const BROWSER: (&str, &str) = ("Accept", "text/html,application/xhtml+xml,*/*;q=0.8");
+
 /// A client of one daemon.
 pub struct Client {
     /// Where the daemon listens.
@@ -54,6 +57,36 @@ impl Client {
     /// # Panics
     /// When no whole answer comes.
     pub fn send(&self, method: &str, path: &str, headers: &[(&str, &str)], body: &[u8]) -> Answer {
+        let answer = self.ask(method, path, headers, body);
+        // A head that is too long never gets as far as the handlers.
+        if ![0, 431].contains(&answer.status) {
+            assert_fits(method, path, &answer);
+        }
+        answer
+    }
+
+    /// Asks as a person's browser does. What comes back is for people, and no document describes it.
+    ///
+    /// # Panics
+    /// When no whole answer comes.
+    pub fn browse(&self, path: &str) -> Answer {
+        self.ask("GET", path, &[BROWSER], b"")
+    }
+
+    /// Sends a form as a page of the daemon does, with headers beside those that every browser sends.
+    ///
+    /// # Panics
+    /// When no whole answer comes.
+    pub fn submit(&self, path: &str, headers: &[(&str, &str)], form: &str) -> Answer {
+        let kind = ("Content-Type", "application/x-www-form-urlencoded");
+        self.ask("POST", path, &[&[BROWSER, kind], headers].concat(), form.as_bytes())
+    }
+
+    /// Sends a request, with headers beside those that every request has, and a body.
+    ///
+    /// # Panics
+    /// When no whole answer comes.
+    pub fn ask(&self, method: &str, path: &str, headers: &[(&str, &str)], body: &[u8]) -> Answer {
         let has = |name: &str| headers.iter().any(|(there, _)| there.eq_ignore_ascii_case(name));
         let mut head = format!("{method} {path} HTTP/1.1\r\nConnection: close\r\n");
         if !has("host") {
@@ -63,12 +96,7 @@ impl Client {
             head += &format!("Content-Length: {}\r\n", body.len());
         }
         head.extend(headers.iter().map(|(name, value)| format!("{name}: {value}\r\n")));
-        let answer = self.raw(&[head.as_bytes(), b"\r\n", body].concat());
-        // A head that is too long never gets as far as the handlers.
-        if ![0, 431].contains(&answer.status) {
-            assert_fits(method, path, &answer);
-        }
-        answer
+        self.raw(&[head.as_bytes(), b"\r\n", body].concat())
     }
 
     /// Sends bytes, whatever they are, and takes what comes.
@@ -145,6 +173,14 @@ impl Answer {
     pub fn expect(self, status: u16) -> Self {
         assert_eq!(self.status, status, "{:?}: {}", self.headers, String::from_utf8_lossy(&self.body));
         self
+    }
+
+    /// The body as text.
+    ///
+    /// # Panics
+    /// When it is none.
+    pub fn text(&self) -> &str {
+        std::str::from_utf8(&self.body).expect("text")
     }
 
     /// The body as JSON.

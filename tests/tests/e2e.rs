@@ -20,6 +20,7 @@ mod e2e {
     mod odd_names;
     mod orders;
     mod package;
+    mod pages;
     mod pictures;
     mod profiles;
     mod queue;

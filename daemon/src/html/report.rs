@@ -20,14 +20,21 @@ pub(super) fn whole(report: &Report, picture: Option<&str>) -> Markup {
         &html! {
             h1 { (name) }
             (outcome(report))
-            @if let Some(picture) = picture { (figure(picture, report.output.is_some())) }
-            (defects(report))
-            (repairs(report))
-            (places(report))
-            (rules(report))
-            (facts(report))
+            @if let Some(picture) = picture { (figure(&format!("data:image/png;base64,{picture}"), report.output.is_some())) }
+            (details(report))
         },
     )
+}
+
+/// All there is to say beside the outcome and the picture.
+pub(crate) fn details(report: &Report) -> Markup {
+    html! {
+        (defects(report))
+        (repairs(report))
+        (places(report))
+        (rules(report))
+        (facts(report))
+    }
 }
 
 fn name(report: &Report) -> String {
@@ -63,30 +70,39 @@ fn outcome(report: &Report) -> Markup {
         div class={ "outcome " (class) } role="status" {
             strong { (word) }
             p { (todo) }
-            p { "The file that was judged is " (report.verdict.statement) "." }
-            @if !report.verdict.reasons.is_empty() {
-                ul { @for reason in &report.verdict.reasons { li { (plain(reason)) } } }
-            }
+            (verdict(report))
         }
     }
 }
 
-fn figure(picture: &str, is_pair: bool) -> Markup {
+/// What the file that was judged is, and all reasons for it.
+pub(crate) fn verdict(report: &Report) -> Markup {
+    html! {
+        p { "The file that was judged is " (report.verdict.statement) "." }
+        @if !report.verdict.reasons.is_empty() {
+            ul { @for reason in &report.verdict.reasons { li { (plain(reason)) } } }
+        }
+    }
+}
+
+/// The picture at that address. `is_pair`: it shows the file and its result side by side.
+pub(crate) fn figure(address: &str, is_pair: bool) -> Markup {
     let words = if is_pair { "Left: as it came. Right: the result." } else { "As it came." };
     html! {
         figure {
-            img alt=(words) src={ "data:image/png;base64," (picture) };
+            img alt=(words) src=(address);
             figcaption {
                 (words)
-                (key("#b0bece", "outside")) (key("#f09632", "inside")) (key("#d60a28", "edge of one triangle"))
-                @if is_pair { (key("#b284d6", "goes")) (key("#5cb870", "new")) }
+                (key("outside", "outside")) (key("inside", "inside")) (key("edge", "edge of one triangle"))
+                @if is_pair { (key("goes", "goes")) (key("new", "new")) }
             }
         }
     }
 }
 
-fn key(colour: &str, words: &str) -> Markup {
-    html! { span class="key" style={ "background:" (colour) } {} (words) }
+/// A colour, and what it stands for.
+pub(crate) fn key(class: &str, words: &str) -> Markup {
+    html! { span class={ "key " (class) } {} (words) }
 }
 
 fn defects(report: &Report) -> Markup {
@@ -165,7 +181,8 @@ fn places(report: &Report) -> Markup {
     }
 }
 
-fn method(method: RegionMethod) -> &'static str {
+/// What was done to a region, in a word.
+pub(crate) fn method(method: RegionMethod) -> &'static str {
     match method {
         RegionMethod::Cut => "cut",
         RegionMethod::Snapped => "snapped",

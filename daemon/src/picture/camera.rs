@@ -49,6 +49,11 @@ impl Bounds {
         }
     }
 
+    /// Its lower and its upper corner.
+    pub(super) fn ends(&self) -> [[f64; 3]; 2] {
+        [self.lo, self.hi]
+    }
+
     fn corners(&self) -> [[f64; 3]; 8] {
         std::array::from_fn(|i| std::array::from_fn(|k| if i >> k & 1 == 0 { self.lo[k] } else { self.hi[k] }))
     }

@@ -10,7 +10,9 @@
 
 mod camera;
 mod canvas;
+mod coarse;
 pub(crate) mod command;
+pub(crate) mod confined;
 mod edges;
 mod known;
 mod mix;

@@ -12,11 +12,13 @@ use axum::extract::{Path, State};
 use axum::http::header::{CONTENT_DISPOSITION, CONTENT_LENGTH, CONTENT_TYPE, ETAG, IF_NONE_MATCH};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
-use suture_store::{Hash, Job, State as JobState};
+use suture_store::{Hash, Job, JobId, State as JobState};
 use tokio::sync::mpsc::{Sender, channel};
 use tokio::task::spawn_blocking;
 
+use crate::attempt::Context;
 use crate::create;
+use crate::folder::Folder;
 use crate::fsx::Identity;
 use crate::left::{report_path, result_path};
 
@@ -31,10 +33,18 @@ use super::verified::Which;
 const CHUNK: usize = 256 << 10;
 const HASHED: usize = 4 << 20;
 
+/// A file of a job, and the digest of its bytes.
+#[derive(Clone, Debug)]
+pub(super) struct Known {
+    pub which: Which,
+    pub path: PathBuf,
+    pub hash: Hash,
+}
+
 /// A file that is open, and how it was found.
-struct Opened {
-    file: Arc<File>,
-    found: Identity,
+pub(super) struct Opened {
+    pub file: Arc<File>,
+    pub found: Identity,
     published: Hash,
     name: String,
 }
@@ -57,40 +67,70 @@ pub(super) async fn report(
     send(&shared, &id, Which::Report, &headers).await
 }
 
-async fn send(shared: &Shared, id: &str, which: Which, headers: &HeaderMap) -> Result<Response, Problem> {
-    let id = id_of(id)?;
-    let opened = ask(&shared.context, move |context| {
+/// The file that a job has left, found to be the published one.
+///
+/// # Errors
+/// When it has left none, or it is not in its place.
+pub(super) async fn opened(shared: &Shared, id: JobId, which: Which) -> Result<Opened, Problem> {
+    let known = ask(&shared.context, move |context| {
         let job = job_of(context, id)?;
-        let folder = context.folders.iter().find(|folder| folder.name == job.source.folder);
-        let folder = folder.ok_or_else(|| Problem::missing(format!("the folder of job {id} is not served any more")))?;
-        folder.check().map_err(|_| Problem::unavailable(format!("the folder of job {id} is out of reach")))?;
-        let (path, published) = place(&folder.root, &job, which)?;
-        open(path, published)
-    })
-    .await?;
-    if !shared.verified.has((id, which), &opened.found) {
+        let (path, hash) = place(&folder_of(context, &job)?.root, &job, which)?;
+        Ok(Known { which, path, hash })
+    });
+    opened_as(shared, id, known.await?).await
+}
+
+/// The file of a job that is known, found to have those bytes.
+///
+/// # Errors
+/// When it is not in its place.
+pub(super) async fn opened_as(shared: &Shared, id: JobId, known: Known) -> Result<Opened, Problem> {
+    let key = (id, known.which);
+    let opened = ask(&shared.context, move |_| open(known.path, known.hash)).await?;
+    if !shared.verified.has(key, &opened.found) {
         let told = hash(&opened).await.map_err(unreadable)?;
         if told != opened.published || look(&opened.file).map_err(unreadable)? != opened.found {
             return Err(Problem::conflict(format!("the file of that name is not any more what job {id} has left")));
         }
-        shared.verified.add((id, which), opened.found);
+        shared.verified.add(key, opened.found);
     }
-    let tag = format!("\"{}\"", opened.published);
+    Ok(opened)
+}
+
+/// The hot folder of a job.
+///
+/// # Errors
+/// When it is not served any more, or out of reach.
+pub(super) fn folder_of<'a>(context: &'a Context, job: &Job) -> Result<&'a Folder, Problem> {
+    let id = job.id;
+    let folder = context.folders.iter().find(|folder| folder.name == job.source.folder);
+    let folder = folder.ok_or_else(|| Problem::missing(format!("the folder of job {id} is not served any more")))?;
+    folder.check().map_err(|_| Problem::unavailable(format!("the folder of job {id} is out of reach")))?;
+    Ok(folder)
+}
+
+async fn send(shared: &Shared, id: &str, which: Which, headers: &HeaderMap) -> Result<Response, Problem> {
+    let opened = opened(shared, id_of(id)?, which).await?;
+    let kind = if which == Which::Report { "application/json" } else { "model/stl" };
+    let (tag, name) = (format!("\"{}\"", opened.published), escaped(&opened.name));
+    Ok(answer(opened, tag, kind, Some(format!("attachment; filename*=UTF-8''{name}")), headers))
+}
+
+/// An answer of a file's bytes, unless the client has them. `tag`: no other bytes have it.
+pub(super) fn answer(
+    opened: Opened,
+    tag: String,
+    kind: &'static str,
+    disposition: Option<String>,
+    headers: &HeaderMap,
+) -> Response {
     let has_it = headers.get(IF_NONE_MATCH).and_then(|value| value.to_str().ok()).is_some_and(|known| known.contains(&tag));
     if has_it {
-        return Ok((StatusCode::NOT_MODIFIED, [(ETAG, tag)]).into_response());
+        return (StatusCode::NOT_MODIFIED, [(ETAG, tag)]).into_response();
     }
-    let kind = match which {
-        Which::Result => "model/stl",
-        Which::Report => "application/json",
-    };
-    let head = [
-        (ETAG, tag),
-        (CONTENT_TYPE, kind.to_owned()),
-        (CONTENT_LENGTH, opened.found.size.to_string()),
-        (CONTENT_DISPOSITION, format!("attachment; filename*=UTF-8''{}", escaped(&opened.name))),
-    ];
-    Ok((head, Body::new(flow_of(opened))).into_response())
+    let head = [(ETAG, tag), (CONTENT_TYPE, kind.to_owned()), (CONTENT_LENGTH, opened.found.size.to_string())];
+    let disposition = disposition.map(|words| [(CONTENT_DISPOSITION, words)]);
+    (head, disposition, Body::new(flow_of(opened))).into_response()
 }
 
 fn unreadable(error: io::Error) -> Problem {
@@ -105,11 +145,16 @@ fn place(root: &std::path::Path, job: &Job, which: Which) -> Result<(PathBuf, Ha
     let (path, hash) = match which {
         Which::Result => (result_path(root, job), publication.output_hash),
         Which::Report => (report_path(root, job), publication.report_hash),
+        Which::Original => (None, None),
     };
     path.zip(hash).ok_or_else(|| Problem::missing(format!("job {} has left no such file", job.id)))
 }
 
-fn open(path: PathBuf, published: Hash) -> Result<Opened, Problem> {
+/// Opens a file that is to have these bytes.
+///
+/// # Errors
+/// When it is not there, or no file.
+pub(super) fn open(path: PathBuf, published: Hash) -> Result<Opened, Problem> {
     let gone = |_| Problem::new(StatusCode::GONE, "the file is not in its place any more");
     let file = create::open_to_read(&path).map_err(gone)?;
     let meta = file.metadata().map_err(unreadable)?;
@@ -124,8 +169,8 @@ fn look(file: &File) -> io::Result<Identity> {
     Ok(Identity::from(&file.metadata()?))
 }
 
-/// A name as a header may hold it.
-fn escaped(name: &str) -> String {
+/// A name as a header or an address may hold it.
+pub(super) fn escaped(name: &str) -> String {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~".contains(&byte);
     name.bytes().map(|byte| if plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") }).collect()
 }

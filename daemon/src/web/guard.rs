@@ -2,50 +2,73 @@
 //!
 //! * The name by which a client calls this machine must be a known one: a page of someone else's, whose name was made to lead here, asks by
 //!   that name. Addresses need no list: no one but us has them.
-//! * Where there are tokens, all but the two questions after health need one.
+//! * Where there are tokens, all but the two questions after health need one, or a session that was opened with one; so that one can be opened, `/login` and the
+//!   files that every page is made of need none.
 //! * What changes anything is refused when a browser says, or its `Origin` shows, that a page of someone else's sent it.
-//! * Every answer forbids browsers to guess, embed or run anything; every error is a [`Problem`].
+//! * Every answer forbids browsers to guess, embed or run anything, but for scripts of ours in pages of ours; every error is a [`Problem`], which a person reads on
+//!   a page.
 
 use std::net::{IpAddr, Ipv6Addr};
 use std::sync::Arc;
 
 use axum::extract::{Request, State};
-use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE, HOST, ORIGIN, WWW_AUTHENTICATE};
+use axum::http::header::{ACCEPT, ALLOW, CACHE_CONTROL, CONTENT_TYPE, HOST, ORIGIN, RETRY_AFTER, WWW_AUTHENTICATE};
 use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
-use super::problem::{PROBLEM, Problem};
+use super::pages::{self, ForPeople};
+use super::problem::{Detail, PROBLEM, Problem};
 use super::shared::Shared;
 
-/// Said with every answer.
-const HEADERS: [(&str, &str); 5] = [
-    ("content-security-policy", "default-src 'none'; frame-ancestors 'none'; sandbox"),
-    ("cross-origin-resource-policy", "same-origin"),
-    ("referrer-policy", "no-referrer"),
-    ("x-content-type-options", "nosniff"),
-    ("x-frame-options", "DENY"),
+/// Said with every answer to programs.
+const TO_PROGRAMS: [(&str, &str); 2] =
+    [("content-security-policy", "default-src 'none'; frame-ancestors 'none'; sandbox"), ("referrer-policy", "no-referrer")];
+/// Said with every page: all that it needs is ours, and nothing stands in it that a browser would run. Without a referrer, browsers would not say either whose
+/// page a form is of.
+const TO_PEOPLE: [(&str, &str); 2] = [
+    (
+        "content-security-policy",
+        "default-src 'none'; style-src 'self'; img-src 'self'; script-src 'self'; connect-src 'self'; form-action 'self'; base-uri 'none'; \
+         frame-ancestors 'none'",
+    ),
+    ("referrer-policy", "same-origin"),
 ];
+/// Said with every answer.
+const TO_ALL: [(&str, &str); 3] =
+    [("cross-origin-resource-policy", "same-origin"), ("x-content-type-options", "nosniff"), ("x-frame-options", "DENY")];
 
 /// Paths that need no token.
-pub(super) const OPEN: [&str; 2] = ["/livez", "/readyz"];
+pub(super) const OPEN: [&str; 3] = ["/livez", "/readyz", pages::LOGIN];
 
 /// The one way in, and out.
 pub(super) async fn guard(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
+    let for_a_person = wants_page(request.headers());
     let mut response = match admit(&shared, &request) {
         Ok(()) => next.run(request).await,
+        Err(problem) if problem.status() == StatusCode::UNAUTHORIZED && for_a_person => pages::lead(&request),
         Err(problem) => problem.into_response(),
     };
     let status = response.status();
     let is_error = status.is_client_error() || status.is_server_error();
-    if is_error && response.headers().get(CONTENT_TYPE).is_none_or(|kind| kind != PROBLEM) {
+    let is_ours = response.extensions().get::<ForPeople>().is_some()
+        || response.headers().get(CONTENT_TYPE).is_some_and(|kind| kind == PROBLEM);
+    if is_error && !is_ours {
         // The library's own words.
         let allow = response.headers_mut().remove("allow");
         response = Problem::new(status, words(status)).into_response();
-        response.headers_mut().extend(allow.map(|allow| (axum::http::header::ALLOW, allow)));
+        response.headers_mut().extend(allow.map(|allow| (ALLOW, allow)));
     }
+    let detail = response.extensions_mut().remove::<Detail>();
+    if let Some(Detail(detail)) = detail.filter(|_| for_a_person) {
+        let mut page = pages::sorry(status, &detail);
+        let kept = [ALLOW, RETRY_AFTER].map(|name| (response.headers_mut().remove(&name), name));
+        page.headers_mut().extend(kept.into_iter().filter_map(|(value, name)| Some((name, value?))));
+        response = page;
+    }
+    let is_page = response.extensions().get::<ForPeople>().is_some();
     let headers = response.headers_mut();
-    for (name, value) in HEADERS {
+    for (name, value) in if is_page { TO_PEOPLE } else { TO_PROGRAMS }.into_iter().chain(TO_ALL) {
         headers.insert(name, HeaderValue::from_static(value));
     }
     headers.entry(CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
@@ -73,7 +96,10 @@ fn admit(shared: &Shared, request: &Request) -> Result<(), Problem> {
             "this daemon is not called so; add the name to `hosts` in `[api]` of its configuration",
         ));
     }
-    if !OPEN.contains(&request.uri().path()) && !shared.tokens.allow(headers) {
+    let path = request.uri().path();
+    let is_open = OPEN.contains(&path) || path.starts_with(pages::ASSETS);
+    let is_allowed = || shared.tokens.allow(headers) || shared.sessions.has(headers, shared.context.world.steady());
+    if !is_open && !is_allowed() {
         let detail = "a token is needed, as `Authorization: Bearer TOKEN` or `X-API-Key: TOKEN`";
         return Err(Problem::new(StatusCode::UNAUTHORIZED, detail));
     }
@@ -82,6 +108,11 @@ fn admit(shared: &Shared, request: &Request) -> Result<(), Problem> {
         return Err(Problem::new(StatusCode::FORBIDDEN, "a page of another site may not change anything here"));
     }
     Ok(())
+}
+
+/// Is it a person's browser that asks?
+fn wants_page(headers: &HeaderMap) -> bool {
+    headers.get(ACCEPT).and_then(|kinds| kinds.to_str().ok()).is_some_and(|kinds| kinds.contains("text/html"))
 }
 
 /// The name that the client calls this machine by, with its port.

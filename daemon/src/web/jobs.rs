@@ -26,15 +26,15 @@ const LONGEST_PAGE: usize = 500;
 const LONGEST_WISH: usize = 64 << 10;
 
 /// Which jobs are asked for.
-#[derive(Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Wanted {
+pub(super) struct Wanted {
     /// Names of states, with commas.
-    state: Option<String>,
-    folder: Option<String>,
+    pub state: Option<String>,
+    pub folder: Option<String>,
     limit: Option<usize>,
     /// The `next` of the page before.
-    cursor: Option<JobId>,
+    pub cursor: Option<JobId>,
 }
 
 impl Wanted {
@@ -70,16 +70,25 @@ pub(super) fn parameters<T: serde::de::DeserializeOwned>(uri: &Uri) -> Result<T,
 
 /// `GET /v1/jobs`: a page of jobs, the latest first.
 pub(super) async fn list(State(shared): State<Arc<Shared>>, uri: Uri) -> Result<Json<Page>, Problem> {
-    let look = parameters::<Wanted>(&uri)?.look()?;
-    let known = |name: &String| shared.context.folders.iter().any(|folder| folder.name == *name);
-    if let Some(name) = look.folder.as_ref().filter(|name| !known(name)) {
-        return Err(Problem::bad(format!("there is no folder `{name}`")));
-    }
-    let page = ask(&shared.context, move |context| Ok(context.store.page(&look)?)).await?;
+    let wanted = parameters::<Wanted>(&uri)?;
+    let page = ask(&shared.context, move |context| page_of(context, wanted)).await?;
     Ok(Json(Page {
         jobs: page.jobs.iter().map(|job| Shown::now(job, &shared.context.bus)).collect(),
         next: page.next.map(|id| id.to_string()),
     }))
+}
+
+/// The jobs that are asked for.
+///
+/// # Errors
+/// When the question is wrong, or the store does not answer.
+pub(super) fn page_of(context: &Context, wanted: Wanted) -> Result<suture_store::Page, Problem> {
+    let look = wanted.look()?;
+    let known = |name: &String| context.folders.iter().any(|folder| folder.name == *name);
+    if let Some(name) = look.folder.as_ref().filter(|name| !known(name)) {
+        return Err(Problem::bad(format!("there is no folder `{name}`")));
+    }
+    Ok(context.store.page(&look)?)
 }
 
 /// The number in a path.
@@ -106,19 +115,32 @@ pub(super) async fn show(State(shared): State<Arc<Shared>>, Path(id): Path<Strin
     Ok(Json(Shown::now(&job, &shared.context.bus)))
 }
 
-/// Does what is wished of a job that is there.
+/// Does what is wished of a job that is there; the job afterwards.
+///
+/// # Errors
+/// When there is no such job, or the wish does not fit it.
+pub(super) async fn grant(
+    shared: &Shared,
+    id: &str,
+    of: impl FnOnce(&Job) -> Result<JobsWish, Problem> + Send + 'static,
+) -> Result<Job, Problem> {
+    let id = id_of(id)?;
+    ask(&shared.context, move |context| {
+        let wish = of(&job_of(context, id)?)?;
+        let changed = change(context, &wish)?;
+        changed.into_iter().next().ok_or_else(|| StoreError::Unknown(id).into())
+    })
+    .await
+}
+
+/// The same, and the job as it is shown.
 async fn wish(
     shared: &Shared,
     id: &str,
     of: impl FnOnce(&Job) -> Result<JobsWish, Problem> + Send + 'static,
 ) -> Result<Json<Shown>, Problem> {
-    let id = id_of(id)?;
-    let job = ask(&shared.context, move |context| {
-        let wish = of(&job_of(context, id)?)?;
-        let changed = change(context, &wish)?;
-        changed.into_iter().next().ok_or_else(|| StoreError::Unknown(id).into())
-    });
-    Ok(Json(Shown::now(&job.await?, &shared.context.bus)))
+    let job = grant(shared, id, of).await?;
+    Ok(Json(Shown::now(&job, &shared.context.bus)))
 }
 
 /// `POST /v1/jobs/{id}/retry`: it is tried again.
@@ -133,11 +155,18 @@ pub(super) async fn cancel(State(shared): State<Arc<Shared>>, Path(id): Path<Str
 
 /// `POST /v1/jobs/{id}/release`: it leaves the quarantine, and is tried again.
 pub(super) async fn release(State(shared): State<Arc<Shared>>, Path(id): Path<String>) -> Result<Json<Shown>, Problem> {
-    let release = |job: &Job| match job.kind() {
+    wish(&shared, &id, released).await
+}
+
+/// What releases a job.
+///
+/// # Errors
+/// When it is not in quarantine.
+pub(super) fn released(job: &Job) -> Result<JobsWish, Problem> {
+    match job.kind() {
         Kind::Quarantined => Ok(JobsWish::Retry(job.id)),
         kind => Err(Problem::conflict(format!("job {} is {kind}, not in quarantine", job.id))),
-    };
-    wish(&shared, &id, release).await
+    }
 }
 
 #[derive(Deserialize)]
@@ -185,7 +214,7 @@ pub(super) async fn reject(
 }
 
 async fn decide(shared: &Shared, id: &str, body: Body, verdict: Verdict) -> Result<Json<Shown>, Problem> {
-    let Said { by, note } = match read_wish(body).await? {
+    let Said { by, note } = match short(body).await? {
         // Nothing need be said.
         bytes if bytes.is_empty() => Said { by: someone(), note: String::new() },
         bytes => understood(&bytes)?,
@@ -199,14 +228,18 @@ async fn decide(shared: &Shared, id: &str, body: Body, verdict: Verdict) -> Resu
 /// # Errors
 /// When it is too long, comes too slowly, or does not say what it should.
 pub(super) async fn wished<T: serde::de::DeserializeOwned>(body: Body) -> Result<T, Problem> {
-    understood(&read_wish(body).await?)
+    understood(&short(body).await?)
 }
 
 fn understood<T: serde::de::DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
     serde_json::from_slice(bytes).map_err(|error| Problem::bad(format!("the request is not the JSON that is needed: {error}")))
 }
 
-async fn read_wish(body: Body) -> Result<Bytes, Problem> {
+/// A small body, whole.
+///
+/// # Errors
+/// When it is too long, or comes too slowly.
+pub(super) async fn short(body: Body) -> Result<Bytes, Problem> {
     let too_slow = || Problem::new(StatusCode::REQUEST_TIMEOUT, "the request did not come in time");
     let read = timeout(PATIENCE, to_bytes(body, LONGEST_WISH)).await.map_err(|_| too_slow())?;
     read.map_err(|_| {

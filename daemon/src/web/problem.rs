@@ -20,6 +20,10 @@ pub(super) struct Problem {
     detail: String,
 }
 
+/// The line for people, beside an answer that is a problem.
+#[derive(Clone)]
+pub(super) struct Detail(pub String);
+
 /// As it is sent.
 #[derive(Serialize)]
 struct Shown<'a> {
@@ -34,6 +38,11 @@ impl Problem {
     /// With this status. `detail`: a line for people, with what to do.
     pub(super) fn new(status: StatusCode, detail: impl Into<String>) -> Self {
         Self { status, detail: detail.into() }
+    }
+
+    /// The status that it is sent with.
+    pub(super) fn status(&self) -> StatusCode {
+        self.status
     }
 
     /// The request is wrong.
@@ -81,6 +90,7 @@ impl IntoResponse for Problem {
         let shown = Shown { kind: "about:blank", title, status: self.status.as_u16(), detail: &self.detail };
         let body = serde_json::to_vec(&shown).unwrap_or_default();
         let mut response = (self.status, [(CONTENT_TYPE, PROBLEM)], body).into_response();
+        response.extensions_mut().insert(Detail(self.detail));
         if self.status == StatusCode::SERVICE_UNAVAILABLE {
             response.headers_mut().insert(RETRY_AFTER, TRY_AGAIN);
         }

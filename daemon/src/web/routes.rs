@@ -15,6 +15,8 @@ use super::guard::guard;
 use super::health::{livez, readyz};
 use super::jobs;
 use super::metrics::metrics;
+use super::pages;
+use super::preview;
 use super::shared::Shared;
 use super::status::status;
 use super::stream::events;
@@ -43,6 +45,8 @@ fn all() -> Vec<Route> {
         ("/v1/jobs/{id}", get(jobs::show).delete(jobs::forget)),
         ("/v1/jobs/{id}/result", get(files::result)),
         ("/v1/jobs/{id}/report", get(files::report)),
+        ("/v1/jobs/{id}/preview", get(preview::preview)),
+        ("/v1/jobs/{id}/view", get(preview::view)),
         ("/v1/jobs/{id}/retry", post(jobs::retry)),
         ("/v1/jobs/{id}/cancel", post(jobs::cancel)),
         ("/v1/jobs/{id}/release", post(jobs::release)),
@@ -54,7 +58,7 @@ fn all() -> Vec<Route> {
 
 /// The way from requests to answers.
 pub(super) fn router(shared: Arc<Shared>) -> Router {
-    let router = all().into_iter().fold(Router::new(), |router, (path, methods)| router.route(path, methods));
+    let router = all().into_iter().chain(pages::all()).fold(Router::new(), |router, (path, methods)| router.route(path, methods));
     let router = router.fallback(async || StatusCode::NOT_FOUND);
     // Bodies are bounded where they are read.
     let router = router.layer(DefaultBodyLimit::disable());

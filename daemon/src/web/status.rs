@@ -17,30 +17,30 @@ use super::shared::Shared;
 
 #[derive(Serialize)]
 pub(super) struct Status {
-    version: &'static str,
-    ready: bool,
+    pub version: &'static str,
+    pub ready: bool,
     /// Why not.
     #[serde(skip_serializing_if = "Option::is_none")]
-    reason: Option<String>,
+    pub reason: Option<String>,
     /// Jobs in work.
-    running: usize,
+    pub running: usize,
     /// Why nothing new is taken; empty: it is.
-    held: Vec<String>,
+    pub held: Vec<String>,
     /// All that is out of reach, in words.
-    away: Vec<String>,
+    pub away: Vec<String>,
     /// Who could not be told of ends of jobs yet, in words.
-    untold: Vec<String>,
+    pub untold: Vec<String>,
     /// How many jobs there are in each state.
-    jobs: BTreeMap<&'static str, u64>,
-    folders: Vec<Served>,
+    pub jobs: BTreeMap<&'static str, u64>,
+    pub folders: Vec<Served>,
 }
 
 #[derive(Serialize)]
-struct Served {
-    name: String,
-    reachable: bool,
+pub(super) struct Served {
+    pub name: String,
+    pub reachable: bool,
     /// Bytes that results may still fill.
-    free_bytes: u64,
+    pub free_bytes: u64,
 }
 
 /// `GET /v1/status`.
@@ -48,7 +48,11 @@ pub(super) async fn status(State(shared): State<Arc<Shared>>) -> Result<Json<Sta
     ask(&shared.context, of).await.map(Json)
 }
 
-fn of(context: &Context) -> Result<Status, Problem> {
+/// How it stands now.
+///
+/// # Errors
+/// When the store does not answer.
+pub(super) fn of(context: &Context) -> Result<Status, Problem> {
     let Glance { ready, reason, standing: Standing { running, held, away, untold }, jobs, folders, .. } = Glance::of(context)?;
     let served =
         |folder: crate::glance::Served| Served { name: folder.name, reachable: folder.reachable, free_bytes: folder.free_bytes };

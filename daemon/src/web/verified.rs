@@ -15,6 +15,8 @@ const REMEMBERED: usize = 1024;
 pub(super) enum Which {
     Result,
     Report,
+    /// As it came.
+    Original,
 }
 
 /// Files that were found to be what their jobs left.

@@ -1,0 +1,56 @@
+//! `suture draw`: what the daemon's pages show, made in a process of its own, which is started by the daemon, never by hand. A mesh that is cut short while it is
+//! mapped, needs too much memory or takes too long costs a picture, never the daemon.
+
+use std::io;
+
+use suture_core::read::MeshFile;
+
+use super::coarse::Coarse;
+use super::{Eye, Options, draw, open};
+use crate::cli::DrawArgs;
+use crate::exit::Exit;
+use crate::say::complain;
+use crate::{confine, create};
+
+/// Files come first: whoever draws steps back.
+const NICE: i32 = 10;
+/// Pixels of each mesh.
+const SIZE: (usize, usize) = (640, 480);
+/// Beyond so many triangles, whoever waits is shown the usual side: looking for the best one takes as long as sixteen pictures.
+const MOST_TO_CHOOSE: usize = 3_000_000;
+
+/// Draws what the daemon asks for.
+pub(crate) fn run(args: &DrawArgs) -> Exit {
+    let bound = confine::bind(&args.worker).and_then(|()| rustix::process::nice(NICE).map_err(io::Error::from));
+    if let Err(error) = bound {
+        complain(&error);
+        return Exit::Cut;
+    }
+    confine::confine();
+    match made(args) {
+        Ok(()) => Exit::Good,
+        Err(line) => {
+            complain(&line);
+            Exit::Refused
+        }
+    }
+}
+
+fn made(args: &DrawArgs) -> Result<(), String> {
+    let limits = args.spend.limits(false);
+    let meshes = args.inputs.iter().map(|path| open(path, &limits)).collect::<Result<Vec<MeshFile>, _>>()?;
+    let records: Vec<_> = meshes.iter().map(MeshFile::records).collect();
+    let nothing = || "no triangle has finite coordinates".to_owned();
+    let bytes = match (args.coarse, records.as_slice()) {
+        (true, [mesh]) => Coarse::of(mesh, limits.threads).ok_or_else(nothing)?.bytes(),
+        (true, _) => return Err("only one mesh at a time is made coarse".into()),
+        (false, meshes) => {
+            let is_large = meshes.iter().map(|mesh| mesh.len()).sum::<usize>() > MOST_TO_CHOOSE;
+            let eye = is_large.then_some(Eye::USUAL);
+            let options = Options { size: SIZE, eye, threads: limits.threads, memory: limits.memory_bytes };
+            draw(meshes, &options).ok_or_else(nothing)?.png().map_err(|error| error.to_string())?
+        }
+    };
+    meshes.iter().try_for_each(MeshFile::check_unchanged).map_err(|error| error.to_string())?;
+    create::place(&args.output, &bytes, false).map_err(|error| format!("the picture cannot be written: {error}"))
+}

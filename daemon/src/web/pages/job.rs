@@ -1,0 +1,123 @@
+//! `/jobs/{id}`: what became of one file, why, and what a person can do with it.
+
+use std::sync::Arc;
+
+use axum::extract::{Path, State};
+use axum::http::HeaderMap;
+use axum::response::Response;
+use maud::{Markup, html};
+use suture_core::Report;
+use suture_core::report::Outcome;
+use suture_store::{Job, State as JobState};
+
+use super::actions::forms;
+use super::frame::Frame;
+use super::night::progress;
+use super::places;
+use super::words::{advice, state, time};
+use crate::html::report;
+use crate::left::area;
+use crate::say::plain;
+use crate::shown::reason;
+use crate::units::show_size;
+use crate::web::ask::ask;
+use crate::web::jobs::{id_of, job_of};
+use crate::web::problem::Problem;
+use crate::web::reported::report_of;
+use crate::web::shared::Shared;
+
+/// `GET /jobs/{id}`.
+pub(super) async fn job(
+    State(shared): State<Arc<Shared>>,
+    Path(id): Path<String>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let id = id_of(&id)?;
+    let job = ask(&shared.context, move |context| job_of(context, id)).await?;
+    let has_ended = matches!(job.state, JobState::Ended { .. });
+    // A report that is gone, or speaks of no mesh, is no reason to say nothing.
+    let report = if has_ended { report_of(&shared, id).await.ok().flatten() } else { None };
+    let frame = Frame::of(&shared, &headers);
+    let name = plain(&job.source.path.to_string());
+    let body = html! {
+        p { a href="/jobs" { "All jobs" } }
+        h1 { (name) }
+        div id="job" data-live {
+            (standing(&job))
+            @if job.kind().is_held() { p { (progress(&job, &shared.context.bus)) } }
+            ul class="actions" { (forms(&frame, &job)) (downloads(&job)) }
+        }
+        // It stays as it is once it is there, so that no one is disturbed who looks at it.
+        div id="report" data-live="once" { @if let Some(report) = &report { (reported(&job, report)) } }
+        div id="facts" data-live { (facts(&job)) }
+        script type="module" src="/assets/view.js" {}
+    };
+    Ok(frame.page("", &format!("{name}: {}", state(&job).0), &body))
+}
+
+/// Where it stands, why, and what to do.
+fn standing(job: &Job) -> Markup {
+    let (words, class) = state(job);
+    let (why, advice) = (reason(job), advice(job));
+    html! {
+        div class={ "outcome " (class) } role="status" {
+            strong { (words) }
+            @if !why.is_empty() { p { "Why: " (plain(&why)) } }
+            @if !advice.is_empty() { p { "What to do: " (plain(&advice)) } }
+        }
+    }
+}
+
+fn downloads(job: &Job) -> Markup {
+    let JobState::Ended { publication } = &job.state else { return html! {} };
+    html! {
+        @if publication.output_hash.is_some() {
+            li { a class="button" href={ "/v1/jobs/" (job.id) "/result" } download { @if publication.ending.is_good() { "Download the result" } @else { "Download the best attempt" } } }
+        }
+        @if publication.report_hash.is_some() { li { a class="button" href={ "/v1/jobs/" (job.id) "/report" } download { "Download the report (JSON)" } } }
+    }
+}
+
+fn facts(job: &Job) -> Markup {
+    let (place, path) = job.original();
+    let fact = |name: &str, value: Markup| html! { dt { (name) } dd { (value) } };
+    let text = |text: String| html! { (plain(&text)) };
+    html! {
+        h2 { "The job" }
+        dl class="facts" {
+            (fact("Number", html! { (job.id) }))
+            (fact("Folder", text(job.source.folder.clone())))
+            @if let JobState::Ended { publication } = &job.state {
+                @if let Some(output) = &publication.output {
+                    (fact(if publication.ending.is_good() { "Result" } else { "Best attempt" },
+                        text(format!("{}/{output}", if publication.ending.is_good() { "out" } else { area(publication.ending.area()) }))))
+                }
+                @if let Some(other) = publication.reused { (fact("Copied from", html! { a href={ "/jobs/" (other) } { "job " (other) } })) }
+            }
+            @if let Some(said) = job.decision() {
+                (fact("Decision", html! { (plain(&format!("{} by {}", said.verdict.name(), said.by))) ", " (time(said.at)) @if !said.note.is_empty() { ": " (plain(&said.note)) } }))
+            }
+            (fact("Original", text(format!("{}/{path}", area(place)))))
+            (fact("Size", text(show_size(job.source.size))))
+            (fact("Profile", text(job.source.profile.clone())))
+            (fact("Priority", html! { (job.priority) }))
+            (fact("Attempts", html! { (job.attempts.0) }))
+            (fact("Dropped", time(job.submitted)))
+            (fact("Changed", time(job.changed)))
+            @if let Some(pause) = job.pause() { (fact("Tried again", time(pause))) }
+        }
+    }
+}
+
+fn reported(job: &Job, report: &Report) -> Markup {
+    let is_pair = report.output.is_some() && report.outcome != Outcome::Clean;
+    let side = if is_pair { "both" } else { "before" };
+    html! {
+        h2 { "The verdict" }
+        (report::verdict(report))
+        h2 { "Pictures" }
+        (report::figure(&format!("/v1/jobs/{}/preview?side={side}", job.id), is_pair))
+        (places::view(job.id, report, is_pair))
+        (report::details(report))
+    }
+}

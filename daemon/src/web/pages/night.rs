@@ -1,0 +1,176 @@
+//! `/`: how the night went, for whoever comes in the morning. First what needs a person, with what to do; then what goes on; then the figures.
+
+use std::sync::Arc;
+
+use axum::extract::State;
+use axum::http::HeaderMap;
+use axum::response::Response;
+use maud::{Markup, html};
+use suture_store::{Job, Kind, Look};
+
+use super::frame::Frame;
+use super::history::{link, list_of};
+use super::words::{advice, mark, time};
+use crate::attempt::Context;
+use crate::event_bus::Bus;
+use crate::say::plain;
+use crate::shown::reason;
+use crate::units::{show_count, show_size};
+use crate::web::ask::ask;
+use crate::web::problem::Problem;
+use crate::web::shared::Shared;
+use crate::web::status::{self, Status};
+use crate::web::tally::{Ended, Tally};
+
+/// Jobs that a person must look at.
+const NEED_SOMEONE: [Kind; 5] = [Kind::NeedsReview, Kind::Failed, Kind::Quarantined, Kind::Parked, Kind::Noticed];
+/// Jobs that someone works on.
+const IN_WORK: [Kind; 4] = [Kind::Running, Kind::Concluded, Kind::Publishing, Kind::Published];
+const WAITING: [Kind; 3] = [Kind::Queued, Kind::Waiting, Kind::Alone];
+/// Rows of a table on this page.
+const MOST_ROWS: usize = 25;
+
+struct Night {
+    status: Status,
+    need_someone: Vec<Job>,
+    in_work: Vec<Job>,
+    ended: Ended,
+}
+
+impl Night {
+    fn of(context: &Arc<Context>, tally: &Arc<Tally>) -> Result<Self, Problem> {
+        let latest = |kinds: &[Kind]| {
+            let look = Look { kinds: kinds.to_vec(), limit: MOST_ROWS, ..Look::default() };
+            context.store.page(&look).map(|page| page.jobs)
+        };
+        Ok(Self {
+            status: status::of(context)?,
+            need_someone: latest(&NEED_SOMEONE)?,
+            in_work: latest(&IN_WORK)?,
+            ended: tally.of(context)?,
+        })
+    }
+
+    fn count(&self, kinds: &[Kind]) -> u64 {
+        kinds.iter().filter_map(|kind| self.status.jobs.get(kind.name())).sum()
+    }
+}
+
+/// `GET /`.
+pub(super) async fn night(State(shared): State<Arc<Shared>>, headers: HeaderMap) -> Result<Response, Problem> {
+    let all = Arc::clone(&shared);
+    let night = ask(&shared.context, move |_| Night::of(&all.context, &all.tally)).await?;
+    let body = html! {
+        h1 { "Overview" }
+        div id="night" data-live {
+            (standing(&night))
+            (need_someone(&night))
+            (in_work(&night, &shared.context.bus))
+            (last_day(&night))
+            (folders(&night.status))
+        }
+    };
+    Ok(Frame::of(&shared, &headers).page("/", "Overview", &body))
+}
+
+/// In a line: does anything need a person?
+fn standing(night: &Night) -> Markup {
+    let count = night.count(&NEED_SOMEONE);
+    let Status { held, away, reason, .. } = &night.status;
+    let is_held = !held.is_empty() || !away.is_empty() || reason.is_some();
+    let (class, words) = match (count, is_held) {
+        (0, false) => ("good", "Nothing needs you.".to_owned()),
+        (0, true) => ("review", "No file needs you, but the daemon does not do all of its work.".to_owned()),
+        (1, _) => ("review", "One file needs you.".to_owned()),
+        (count, _) => ("review", format!("{} files need you.", show_count(count))),
+    };
+    html! {
+        div class={ "outcome " (class) } role="status" {
+            strong { (words) }
+            @if is_held { ul {
+                @for why in held { li { "Nothing new is taken: " (plain(why)) "." } }
+                @for why in away { li { "Out of reach: " (plain(why)) ". Suture goes on with this folder when it is back." } }
+                @if let (Some(why), true) = (reason, held.is_empty() && away.is_empty()) { li { "Not ready: " (plain(why)) "." } }
+            } }
+        }
+    }
+}
+
+fn need_someone(night: &Night) -> Markup {
+    let more = night.count(&NEED_SOMEONE).saturating_sub(night.need_someone.len() as u64);
+    html! {
+        @if !night.need_someone.is_empty() {
+            h2 { "What needs you" }
+            div class="wide" { table {
+                thead { tr { th scope="col" { "File" } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Why" } th scope="col" { "What to do" } } }
+                tbody { @for job in &night.need_someone { tr {
+                    td class="file" { (link(job)) } td { (mark(job)) } td class="time" { (time(job.changed)) } td { (plain(&reason(job))) } td { (plain(&advice(job))) }
+                } } }
+            } }
+            @if more > 0 { p { a href=(list_of(&NEED_SOMEONE)) { (show_count(more)) " more" } } }
+        }
+    }
+}
+
+fn in_work(night: &Night, bus: &Bus) -> Markup {
+    let waiting = night.count(&WAITING);
+    html! {
+        h2 { "In work" }
+        @if night.in_work.is_empty() { p { "Nothing is in work." } } @else {
+            div class="wide" { table {
+                thead { tr { th scope="col" { "File" } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Progress" } } }
+                tbody { @for job in &night.in_work { tr {
+                    td class="file" { (link(job)) } td { (mark(job)) } td class="time" { (time(job.changed)) } td { (progress(job, bus)) }
+                } } }
+            } }
+        }
+        p { @if waiting == 0 { "No file waits." } @else {
+            a href=(list_of(&WAITING)) { @if waiting == 1 { "One file waits" } @else { (show_count(waiting)) " files wait" } } "."
+        } }
+    }
+}
+
+/// How far a job in work is; a script keeps it current.
+pub(super) fn progress(job: &Job, bus: &Bus) -> Markup {
+    let far = bus.progress_of(job.id).filter(|_| job.kind() == Kind::Running);
+    let (stage, percent) = far.map_or((String::new(), 0), |far| (far.stage, far.percent));
+    html! {
+        span data-progress=(job.id) {
+            progress max="100" value=(percent) aria-label={ "Progress of job " (job.id) } {} " "
+            span { @if stage.is_empty() { "begun" } @else { (plain(&stage.replace('_', " "))) ", " (percent) " %" } }
+        }
+    }
+}
+
+fn last_day(night: &Night) -> Markup {
+    let Ended { clean, repaired, reused, needs_review, failed, quarantined } = night.ended;
+    let entry = |count: u64, class: &str, words: &str, kind: Kind| {
+        html! { li class=[(count > 0).then_some(class)] { b { (show_count(count)) } @if count > 0 { a href=(list_of(&[kind])) { (words) } } @else { (words) } } }
+    };
+    html! {
+        h2 { "Ended in the last 24 hours" }
+        ul class="counts" {
+            (entry(clean, "good", "clean", Kind::Done))
+            (entry(repaired, "good", "repaired", Kind::Done))
+            (entry(needs_review, "review", "need review", Kind::NeedsReview))
+            (entry(failed, "bad", "failed", Kind::Failed))
+            (entry(quarantined, "bad", "in quarantine", Kind::Quarantined))
+        }
+        @if reused > 0 { p { (show_count(reused)) " of them are copies of earlier results." } }
+    }
+}
+
+fn folders(status: &Status) -> Markup {
+    html! {
+        h2 { "Folders" }
+        div class="wide" { table {
+            thead { tr { th scope="col" { "Folder" } th scope="col" { "In reach" } th scope="col" class="n" { "Free for results" } } }
+            tbody { @for folder in &status.folders { tr {
+                th scope="row" { (plain(&folder.name)) }
+                td { @if folder.reachable { "yes" } @else { span class="state bad" { "no" } } }
+                td class="n" { (show_size(folder.free_bytes)) }
+            } } }
+        } }
+        p class="soft" { "Suture " (status.version) }
+    }
+}

@@ -1,0 +1,90 @@
+//! A job in words for people: where it stands, and what to do.
+
+use maud::{Markup, html};
+use suture_store::{Ending, Job, Kind, State, Time};
+
+use crate::left::area;
+use crate::shown::when;
+use crate::units::show_when;
+
+/// Where a job stands, and the class of that.
+pub(super) fn state(job: &Job) -> (&'static str, &'static str) {
+    match (job.kind(), &job.state) {
+        (Kind::Done, State::Ended { publication }) if publication.ending == Ending::Clean => ("Clean", "good"),
+        (Kind::Done, _) => ("Repaired", "good"),
+        (kind, _) => (label(kind), class(kind)),
+    }
+}
+
+/// A state in words.
+pub(super) fn label(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Noticed => "Not taken",
+        Kind::Queued => "Waiting",
+        Kind::Waiting => "Waiting, tried again later",
+        Kind::Alone => "Waiting to run alone",
+        Kind::Running => "In work",
+        Kind::Concluded | Kind::Publishing | Kind::Published => "Almost done",
+        Kind::Parked => "Ready, but held up",
+        Kind::Done => "Done",
+        Kind::Failed => "Failed",
+        Kind::NeedsReview => "Needs review",
+        Kind::Rejected => "Rejected",
+        Kind::Quarantined => "In quarantine",
+        Kind::Cancelled => "Cancelled",
+    }
+}
+
+/// Is it good, to be looked at, or bad?
+pub(super) fn class(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Done => "good",
+        Kind::Noticed | Kind::Parked | Kind::NeedsReview => "review",
+        Kind::Failed | Kind::Quarantined => "bad",
+        _ => "",
+    }
+}
+
+/// The state as a mark.
+pub(super) fn mark(job: &Job) -> Markup {
+    let (words, class) = state(job);
+    html! { span class={ "state " (class) } { (words) } }
+}
+
+/// What a person does with it now; empty: nothing.
+pub(super) fn advice(job: &Job) -> String {
+    match (&job.state, job.kind()) {
+        (_, Kind::Rejected) => "Ask for a better file. Choose “Approve” if you want the result after all.".into(),
+        (State::Ended { publication }, _) => ended(job, publication.ending),
+        (_, Kind::Noticed) => "Suture repairs STL files only. Move this file out of in/, or export it as STL and drop it again.".into(),
+        (_, Kind::Parked) => {
+            "The result is ready, but cannot be put in its place. Remove the reason (free space, rights of the folder); Suture tries again by itself.".into()
+        }
+        (_, Kind::Waiting) => "Nothing, unless the reason stays. Suture tries again by itself.".into(),
+        (State::Cancelled { .. }, _) => "Nothing. Choose “Try again” if you want it after all.".into(),
+        _ => String::new(),
+    }
+}
+
+fn ended(job: &Job, ending: Ending) -> String {
+    match ending {
+        Ending::Clean | Ending::Repaired => "Print the result.".into(),
+        Ending::NeedsReview => {
+            let best = job.publication().and_then(|publication| publication.output.as_ref());
+            let best = best.map(|name| format!(" ({}/{name})", area(ending.area()))).unwrap_or_default();
+            format!("Look at the pictures and the reasons. Is the result{best} what the file was meant to be? Then approve it, and it is published. If not, reject it, and ask for a better file.")
+        }
+        Ending::NotGood => "Do not print it. Ask for another file, or drop it again into the folder of another profile.".into(),
+        Ending::Unreadable => "It is not a mesh that Suture can read. Open the file, or ask for it again.".into(),
+        Ending::Refused => "It needs more than this machine allows (see the reason). Raise that limit and try again, or ask for a simpler file.".into(),
+        Ending::Environment => "The file is not to blame. Remove the reason (disk, rights), then try again.".into(),
+        Ending::Quarantined => {
+            "It crashed or blocked the repair each time. Release it to try once more, for example after an update; else ask for another file.".into()
+        }
+    }
+}
+
+/// A time, for people and for programs.
+pub(super) fn time(time: Time) -> Markup {
+    html! { time datetime=(when(time)) { (show_when(time.0)) } }
+}

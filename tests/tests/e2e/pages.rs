@@ -1,7 +1,7 @@
 //! Pages for people: what they say, and that no name of a file, no page of another site and no one without a token gets anything out of them.
 
 use suture_tests::Place;
-use suture_tests::hot::holes;
+use suture_tests::hot::{doubtful, holes};
 use suture_tests::http::{Answer, Client};
 use suture_tests::served::{Served, wait_until};
 
@@ -246,4 +246,39 @@ fn pictures_are_of_the_bytes_that_were_published() {
 fn width(picture: &Answer) -> u32 {
     assert_eq!(&picture.body[..8], b"\x89PNG\r\n\x1a\n");
     u32::from_be_bytes(picture.body[16..20].try_into().unwrap())
+}
+
+#[test]
+fn a_person_decides_on_the_page_of_a_job() {
+    let place = Place::new();
+    for name in ["first", "second"] {
+        place.put(&format!("hot/in/{name}.stl"), &doubtful());
+    }
+    let (_daemon, client) = begin(&place, &[]);
+    wait_until("both need review", || client.get("/v1/status").json()["jobs"]["needs_review"] == 2);
+    let files = |id: u64| client.get(&format!("/v1/jobs/{id}")).json()["file"].as_str().unwrap_or_default().to_owned();
+    let best = place.read(&format!("hot/failed/{}", files(1).replace(".stl", ".best.stl")));
+    let page = client.browse("/jobs/1").expect(200);
+    assert_is_page(&page);
+    assert!(page.text().contains("formaction=\"/jobs/1/approve\"") && page.text().contains("formaction=\"/jobs/1/reject\""));
+    let word = field(&page, "word");
+    let decide =
+        |id: u64, action: &str, rest: &str| client.submit(&format!("/jobs/{id}/{action}"), &[], &format!("word={word}{rest}"));
+    // Someone has to stand for it.
+    assert_is_page(&decide(1, "approve", "&by=&note=").expect(400));
+    assert_eq!(client.get("/v1/jobs/1").json()["state"], "needs_review");
+    decide(1, "approve", "&by=Ada+Lovelace&note=the+hole+%3Cb%3Ewas%3C%2Fb%3E+meant").expect(303);
+    wait_for(&client, 1, "done");
+    assert_eq!(place.read(&format!("hot/out/{}", files(1))), best);
+    let page = client.browse("/jobs/1").expect(200);
+    for words in ["approved by Ada Lovelace", "the hole &lt;b&gt;was&lt;/b&gt; meant"] {
+        assert!(page.text().contains(words), "{words}: {}", page.text());
+    }
+    assert!(!page.text().contains("/approve"), "there is nothing to decide");
+    decide(2, "reject", "&by=Ada").expect(303);
+    wait_for(&client, 2, "rejected");
+    let page = client.browse("/jobs/2").expect(200);
+    assert!(page.text().contains("Ask for a better file.") && page.text().contains("/jobs/2/approve"), "{}", page.text());
+    assert!(!page.text().contains("/jobs/2/reject"));
+    assert!(client.browse("/").text().contains("Nothing needs you."), "whoever rejected it knows");
 }

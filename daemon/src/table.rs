@@ -65,6 +65,7 @@ pub(crate) fn render(report: &Report) -> String {
     if report.outcome == Outcome::Clean && report.input.findings.is_empty() {
         let copied = if report.output.is_some() { ", copied byte for byte" } else { "" };
         line(&mut out, format_args!("{name}: clean{copied} ({}; {}; {})", size(report), report.verdict.statement, rate(report)));
+        hints(&mut out, report);
         return out;
     }
     line(&mut out, format_args!("{name}: {} ({})", headline(report), size(report)));
@@ -98,6 +99,7 @@ pub(crate) fn render(report: &Report) -> String {
     if let Some(certificate) = report.certificate.as_ref().filter(|c| report.verdict.good && !c.printable) {
         item(&mut out, "", &format!("not certified, for want of: {}", certificate.missing.join(", ")));
     }
+    hints(&mut out, report);
     item(&mut out, "cost", &rate(report));
     if let Some(output) = &report.output {
         item(&mut out, "wrote", &format!("{} ({})", output.path.display(), show_size(output.bytes)));
@@ -105,6 +107,12 @@ pub(crate) fn render(report: &Report) -> String {
         item(&mut out, "wrote", "nothing");
     }
     out
+}
+
+fn hints(out: &mut String, report: &Report) {
+    for hint in &report.hints {
+        item(out, "hint", &hint.text);
+    }
 }
 
 /// The largest regions that were wrapped, or would have been.
@@ -279,7 +287,17 @@ pub(crate) mod tests {
         report.after = Some(Defects::default());
         report.verdict.good = outcome.is_good();
         report.certificate = None;
+        report.hints.clear();
         report
+    }
+
+    #[test]
+    fn hints_are_given_of_clean_files_too() {
+        for outcome in [Outcome::Clean, Outcome::Repaired] {
+            let mut report = sample(outcome);
+            report.hints.push(serde_json::from_str(r#"{"kind": "inches", "text": "it is small"}"#).unwrap());
+            assert!(render(&report).contains("\n  hint    it is small\n"), "{}", render(&report));
+        }
     }
 
     #[test]

@@ -91,6 +91,7 @@ impl ProfileBuilder {
         wrap_review_share: f64,
         resolve_crossings: bool,
         check_self_intersections: bool,
+        build_volume_mm: [f64; 3],
     }
 }
 

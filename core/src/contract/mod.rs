@@ -10,6 +10,7 @@ pub(crate) mod builder;
 pub(crate) mod edit_report;
 pub mod error;
 pub(crate) mod finite;
+pub(crate) mod hint;
 pub(crate) mod judgement;
 pub(crate) mod loop_class;
 pub(crate) mod progress;

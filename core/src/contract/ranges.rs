@@ -52,7 +52,8 @@ impl Profile {
     /// # Errors
     /// [`ProfileError`] names the first of these settings, its value and its range.
     pub fn validate(&self) -> Result<(), ProfileError> {
-        for (setting, value, range) in self.numbers() {
+        let sides = self.build_volume_mm.map(|side| ("build_volume_mm", side, Range::Bound));
+        for (setting, value, range) in self.numbers().into_iter().chain(sides) {
             if !range.contains(value) {
                 return Err(ProfileError { setting, value, range: range.words() });
             }
@@ -60,7 +61,7 @@ impl Profile {
         Ok(())
     }
 
-    /// Every setting that is not a whole number or a choice, with its range. All fields are named, so that a new one cannot be forgotten here.
+    /// Every setting that is one number, not a whole one and not a choice, with its range. All fields are named, so that a new one cannot be forgotten here.
     fn numbers(&self) -> [(&'static str, f64, Range); 23] {
         let Self {
             name: _,
@@ -91,6 +92,8 @@ impl Profile {
             max_hole_edges: _,
             max_bodies_lost: _,
             debris_triangles: _,
+            // Several numbers.
+            build_volume_mm: _,
             // Choices.
             repair: _,
             leave_open: _,
@@ -159,6 +162,17 @@ mod tests {
             for value in [0.0, 0.5, 1.0] {
                 with(setting, value).validate().unwrap();
             }
+        }
+    }
+
+    #[test]
+    fn each_side_of_a_printer_is_a_length() {
+        for k in 0..3 {
+            let mut profile = Profile::default();
+            profile.build_volume_mm[k] = 250.0;
+            profile.validate().unwrap();
+            profile.build_volume_mm[k] = -1.0;
+            assert_eq!(profile.validate().unwrap_err().setting, "build_volume_mm");
         }
     }
 

@@ -1,6 +1,7 @@
 //! The report: what was found, what was done, and the verdict on the bytes written. Documented in `core/REPORT.md`.
 
 pub use crate::contract::edit_report::{EditRecords, EditSummary, FaceOrigin};
+pub use crate::contract::hint::{Hint, HintKind};
 pub use crate::contract::judgement::{Certificate, Faithful, Fidelity, RuleOutcome, RuleResult, Verdict};
 pub use crate::contract::loop_class::LoopClass;
 pub use crate::contract::repair_name::RepairName;
@@ -81,6 +82,9 @@ pub struct Report {
     /// What every rule found in them; `None` where nothing was written.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub certificate: Option<Certificate>,
+    /// What a person may want to know of a good file, too.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub hints: Vec<Hint>,
     /// Seconds by stage, in order.
     pub stages: Vec<Stage>,
     /// Where the time went and what it cost.

@@ -102,6 +102,8 @@ pub struct Profile {
     pub resolve_crossings: bool,
     /// Look for triangles that cross or overlap each other, in the input and in the output; without, the verdict calls it unchecked.
     pub check_self_intersections: bool,
+    /// Room in the printer, along each axis in the file's units: a part that does not fit gets a hint. 0: as long as anyone likes.
+    pub build_volume_mm: [f64; 3],
 }
 
 /// What to do with geometry that no repair can turn into a solid.
@@ -221,6 +223,7 @@ impl Default for Profile {
             wrap_review_share: 0.01,
             resolve_crossings: true,
             check_self_intersections: true,
+            build_volume_mm: [0.0; 3],
         }
     }
 }

@@ -14,6 +14,7 @@ pub(crate) mod defects;
 pub(crate) mod difference;
 pub(crate) mod fidelity;
 pub(crate) mod fresh;
+pub(crate) mod hints;
 pub(crate) mod holes;
 pub(crate) mod review;
 pub(crate) mod rules;

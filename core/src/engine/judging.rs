@@ -12,6 +12,7 @@ use crate::contract::settings::{Bodies, Hollow, Limits, Profile};
 use crate::detect::certificate;
 use crate::detect::fidelity;
 use crate::detect::fidelity::Measured;
+use crate::detect::hints::hints;
 use crate::detect::review;
 use crate::detect::review::Evidence;
 use crate::detect::rules::Subject;
@@ -65,6 +66,7 @@ pub(crate) fn begin(task: Task, input: &Input<'_>, diagnosis: &Diagnosis<'_>, pr
         edit_records: None,
         verdict: verdict::judge(&diagnosis.defects, &flaws(input.findings)).under(profile.guarantee),
         certificate: None,
+        hints: Vec::new(),
         stages: Vec::new(),
         cost: Cost::default(),
     }
@@ -77,6 +79,7 @@ pub(crate) fn conclude_unchanged(report: &mut Report, facts: &FileFacts, finding
         report.verdict.reasons.push(format!("nothing was repaired: the profile `{}` says `repair = false`", report.profile.name));
     }
     report.certificate = Some(certify(facts, &report.before, &flaws(findings)));
+    report.hints = hints(&report.before, &report.profile);
 }
 
 /// Repairs what was diagnosed by these steps, if there is anything to be repaired: what is to be edited, and what a
@@ -169,6 +172,7 @@ pub(crate) fn conclude(report: &mut Report, input: &[Finding], (surface, evidenc
         }
     }
     report.certificate = Some(Certificate { faithful, ..certify(&facts, &defects, &flaws) });
+    report.hints = hints(&defects, &report.profile);
     report.after = Some(defects);
     report.output = Some(facts);
 }

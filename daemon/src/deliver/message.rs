@@ -156,6 +156,7 @@ pub(super) mod tests {
             source_ctime_ns: None,
             original: Some(path),
             stays: false,
+            decision: None,
         };
         job.state = State::Ended { publication };
         job.seq = Seq(9);

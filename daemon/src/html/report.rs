@@ -82,6 +82,7 @@ pub(crate) fn verdict(report: &Report) -> Markup {
         @if !report.verdict.reasons.is_empty() {
             ul { @for reason in &report.verdict.reasons { li { (plain(reason)) } } }
         }
+        @for hint in &report.hints { p { "Note: " (plain(&hint.text)) "." } }
     }
 }
 

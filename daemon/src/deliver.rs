@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{Builder, Scope, ScopedJoinHandle};
 use std::time::Duration;
 
-use suture_store::{Job, StoreError, crash_point};
+use suture_store::{Job, JobStore, StoreError, crash_point};
 
 use crate::attempt::Context;
 use crate::config::events::{Events, OnDone, Webhook};
@@ -60,7 +60,7 @@ impl Target {
     }
 }
 
-/// Has the store keep what the targets of the configuration are to hear, from now on.
+/// Has the store keep what the targets of the configuration are to hear, from now on. For whoever has just read that configuration.
 ///
 /// # Errors
 /// When the store failed.
@@ -80,7 +80,6 @@ pub(crate) fn serve(context: &Context, ended: &AtomicBool) -> Result<(), StoreEr
         while !is_over(context, ended) {
             let events = context.settings.now().events.clone();
             if events != known {
-                subscribe(context)?;
                 context.pulse.keep_troubles(&|name| events.names().any(|there| there == name));
                 known = events;
             }
@@ -220,15 +219,14 @@ impl Teller<'_> {
 
     /// Lets go what is too much for a target that takes nothing. Returns whether there was any.
     fn give_up_oldest(&self) -> Result<bool, StoreError> {
-        let (store, name) = (&self.context.store, self.target.name());
-        let surplus = store.backlog(name)?.saturating_sub(MOST);
-        let oldest = store.notices(name, usize::try_from(surplus).unwrap_or(usize::MAX).min(PAGE))?;
+        let (store, target) = (&*self.context.store, self.target.name());
+        let oldest = surplus(store, target, MOST)?;
+        let Some(last) = oldest.last() else { return Ok(false) };
         for job in &oldest {
-            let why = "more than 10000 messages wait for this target";
-            self.context.bus.tell(&Happening::GivenUp { parcel: Parcel { target: name, job: job.id }, why });
+            let why = &format!("more than {MOST} messages wait for this target");
+            self.context.bus.tell(&Happening::GivenUp { parcel: Parcel { target, job: job.id }, why });
         }
-        oldest.last().map_or(Ok(()), |last| store.acknowledge(name, last.seq))?;
-        Ok(!oldest.is_empty())
+        store.acknowledge(target, last.seq).map(|()| true)
     }
 
     fn wait(&self, pause: Duration) {
@@ -237,5 +235,38 @@ impl Teller<'_> {
         while !(self.stop)() && world.steady().duration_since(began) < pause {
             std::thread::sleep(LOOK_EVERY.min(pause));
         }
+    }
+}
+
+/// The oldest notices of a target, if there are more than `most`: those beyond, a page of them at most.
+fn surplus(store: &dyn JobStore, target: &str, most: u64) -> Result<Vec<Job>, StoreError> {
+    let beyond = store.backlog(target)?.saturating_sub(most);
+    store.notices(target, usize::try_from(beyond).unwrap_or(usize::MAX).min(PAGE))
+}
+
+#[cfg(test)]
+mod tests {
+    use suture_store::testkit::{dropped, result_of};
+    use suture_store::{Ending, Filter, MemoryStore, Step};
+
+    use super::*;
+
+    #[test]
+    fn of_too_many_the_oldest_are_given_up() {
+        let store = MemoryStore::default();
+        store.subscribe(&["farm".into()]).unwrap();
+        let mut ends = Vec::new();
+        for n in 0..7 {
+            store.submit(&[dropped(&format!("{n}.stl"), 84).unwrap()]).unwrap();
+            let claim = store.claim(&Filter::default()).unwrap().unwrap();
+            store.advance(&claim, Step::Intend(result_of(&claim.job, Ending::Clean))).unwrap();
+            store.advance(&claim, Step::Placed).unwrap();
+            ends.push(store.advance(&claim, Step::Finished).unwrap());
+        }
+        assert_eq!(surplus(&store, "farm", 7).unwrap(), []);
+        assert_eq!(surplus(&store, "farm", 5).unwrap(), ends[..2]);
+        store.acknowledge("farm", ends[1].seq).unwrap();
+        assert_eq!(surplus(&store, "farm", 5).unwrap(), []);
+        assert_eq!(store.notices("farm", PAGE).unwrap(), ends[2..]);
     }
 }

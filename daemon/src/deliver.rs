@@ -6,6 +6,8 @@
 //! out once more, under the same id.
 
 use std::collections::BTreeMap;
+use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{Builder, Scope, ScopedJoinHandle};
 use std::time::Duration;
@@ -27,6 +29,8 @@ use pace::{Next, Outcome};
 
 /// How often a target looks for something to tell, and whoever waits whether that is over.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
+/// Rest after an internal error.
+const REST: Duration = Duration::from_secs(1);
 /// Notices read at a time.
 const PAGE: usize = 64;
 /// Of more that wait for one target, the oldest are given up: a receiver that is gone for good must not fill the disk.
@@ -70,10 +74,7 @@ pub(crate) fn subscribe(context: &Context) -> Result<(), StoreError> {
 }
 
 /// Serves all targets until `ended`, those too that a configuration names that is read meanwhile.
-///
-/// # Errors
-/// When the store failed, or no thread is to be had.
-pub(crate) fn serve(context: &Context, ended: &AtomicBool) -> Result<(), StoreError> {
+pub(crate) fn serve(context: &Context, ended: &AtomicBool) {
     std::thread::scope(|scope| {
         let mut threads: BTreeMap<String, ScopedJoinHandle<'_, ()>> = BTreeMap::new();
         let mut known = context.settings.now().events.clone();
@@ -85,14 +86,18 @@ pub(crate) fn serve(context: &Context, ended: &AtomicBool) -> Result<(), StoreEr
             }
             threads.retain(|_, thread| !thread.is_finished());
             for target in Target::all(&known) {
-                if !threads.contains_key(target.name()) {
-                    threads.insert(target.name().to_owned(), begin(scope, context, ended, target)?);
+                let name = target.name().to_owned();
+                if threads.contains_key(&name) {
+                    continue;
+                }
+                match begin(scope, context, ended, target) {
+                    Ok(thread) => drop(threads.insert(name, thread)),
+                    Err(source) => context.fail(StoreError::Io { path: "thread".into(), action: "starting one", source }),
                 }
             }
             std::thread::sleep(LOOK_EVERY);
         }
-        Ok(())
-    })
+    });
 }
 
 fn is_over(context: &Context, ended: &AtomicBool) -> bool {
@@ -104,15 +109,20 @@ fn begin<'s>(
     context: &'s Context,
     ended: &'s AtomicBool,
     target: Target,
-) -> Result<ScopedJoinHandle<'s, ()>, StoreError> {
+) -> io::Result<ScopedJoinHandle<'s, ()>> {
     let tell = move || {
         let stop = || is_over(context, ended) || !Target::all(&context.settings.now().events).contains(&target);
-        if let Err(error) = (Teller { context, target: &target, stop: &stop }).tell() {
-            context.fail(error);
+        let teller = Teller { context, target: &target, stop: &stop };
+        match catch_unwind(AssertUnwindSafe(|| teller.tell())) {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => context.fail(error),
+            Err(_) => {
+                tracing::error!("A thread that tells of jobs ended in an internal error, and is begun anew.");
+                std::thread::sleep(REST);
+            }
         }
     };
-    let started = Builder::new().name("teller".into()).spawn_scoped(scope, tell);
-    started.map_err(|source| StoreError::Io { path: "thread".into(), action: "starting one", source })
+    Builder::new().name("teller".into()).spawn_scoped(scope, tell)
 }
 
 /// Waits until every target has all that there is for it, or is in trouble: what is left then waits for the next daemon.

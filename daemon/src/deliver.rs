@@ -6,11 +6,13 @@
 //! out once more, under the same id.
 
 use std::collections::BTreeMap;
+use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{Builder, Scope, ScopedJoinHandle};
 use std::time::Duration;
 
-use suture_store::{Job, StoreError, crash_point};
+use suture_store::{Job, JobStore, StoreError, crash_point};
 
 use crate::attempt::Context;
 use crate::config::events::{Events, OnDone, Webhook};
@@ -27,6 +29,8 @@ use pace::{Next, Outcome};
 
 /// How often a target looks for something to tell, and whoever waits whether that is over.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
+/// Rest after an internal error.
+const REST: Duration = Duration::from_secs(1);
 /// Notices read at a time.
 const PAGE: usize = 64;
 /// Of more that wait for one target, the oldest are given up: a receiver that is gone for good must not fill the disk.
@@ -60,7 +64,7 @@ impl Target {
     }
 }
 
-/// Has the store keep what the targets of the configuration are to hear, from now on.
+/// Has the store keep what the targets of the configuration are to hear, from now on. For whoever has just read that configuration.
 ///
 /// # Errors
 /// When the store failed.
@@ -70,30 +74,30 @@ pub(crate) fn subscribe(context: &Context) -> Result<(), StoreError> {
 }
 
 /// Serves all targets until `ended`, those too that a configuration names that is read meanwhile.
-///
-/// # Errors
-/// When the store failed, or no thread is to be had.
-pub(crate) fn serve(context: &Context, ended: &AtomicBool) -> Result<(), StoreError> {
+pub(crate) fn serve(context: &Context, ended: &AtomicBool) {
     std::thread::scope(|scope| {
         let mut threads: BTreeMap<String, ScopedJoinHandle<'_, ()>> = BTreeMap::new();
         let mut known = context.settings.now().events.clone();
         while !is_over(context, ended) {
             let events = context.settings.now().events.clone();
             if events != known {
-                subscribe(context)?;
                 context.pulse.keep_troubles(&|name| events.names().any(|there| there == name));
                 known = events;
             }
             threads.retain(|_, thread| !thread.is_finished());
             for target in Target::all(&known) {
-                if !threads.contains_key(target.name()) {
-                    threads.insert(target.name().to_owned(), begin(scope, context, ended, target)?);
+                let name = target.name().to_owned();
+                if threads.contains_key(&name) {
+                    continue;
+                }
+                match begin(scope, context, ended, target) {
+                    Ok(thread) => drop(threads.insert(name, thread)),
+                    Err(source) => context.fail(StoreError::Io { path: "thread".into(), action: "starting one", source }),
                 }
             }
             std::thread::sleep(LOOK_EVERY);
         }
-        Ok(())
-    })
+    });
 }
 
 fn is_over(context: &Context, ended: &AtomicBool) -> bool {
@@ -105,15 +109,20 @@ fn begin<'s>(
     context: &'s Context,
     ended: &'s AtomicBool,
     target: Target,
-) -> Result<ScopedJoinHandle<'s, ()>, StoreError> {
+) -> io::Result<ScopedJoinHandle<'s, ()>> {
     let tell = move || {
         let stop = || is_over(context, ended) || !Target::all(&context.settings.now().events).contains(&target);
-        if let Err(error) = (Teller { context, target: &target, stop: &stop }).tell() {
-            context.fail(error);
+        let teller = Teller { context, target: &target, stop: &stop };
+        match catch_unwind(AssertUnwindSafe(|| teller.tell())) {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => context.fail(error),
+            Err(_) => {
+                tracing::error!("A thread that tells of jobs ended in an internal error, and is begun anew.");
+                std::thread::sleep(REST);
+            }
         }
     };
-    let started = Builder::new().name("teller".into()).spawn_scoped(scope, tell);
-    started.map_err(|source| StoreError::Io { path: "thread".into(), action: "starting one", source })
+    Builder::new().name("teller".into()).spawn_scoped(scope, tell)
 }
 
 /// Waits until every target has all that there is for it, or is in trouble: what is left then waits for the next daemon.
@@ -220,15 +229,14 @@ impl Teller<'_> {
 
     /// Lets go what is too much for a target that takes nothing. Returns whether there was any.
     fn give_up_oldest(&self) -> Result<bool, StoreError> {
-        let (store, name) = (&self.context.store, self.target.name());
-        let surplus = store.backlog(name)?.saturating_sub(MOST);
-        let oldest = store.notices(name, usize::try_from(surplus).unwrap_or(usize::MAX).min(PAGE))?;
+        let (store, target) = (&*self.context.store, self.target.name());
+        let oldest = surplus(store, target, MOST)?;
+        let Some(last) = oldest.last() else { return Ok(false) };
         for job in &oldest {
-            let why = "more than 10000 messages wait for this target";
-            self.context.bus.tell(&Happening::GivenUp { parcel: Parcel { target: name, job: job.id }, why });
+            let why = &format!("more than {MOST} messages wait for this target");
+            self.context.bus.tell(&Happening::GivenUp { parcel: Parcel { target, job: job.id }, why });
         }
-        oldest.last().map_or(Ok(()), |last| store.acknowledge(name, last.seq))?;
-        Ok(!oldest.is_empty())
+        store.acknowledge(target, last.seq).map(|()| true)
     }
 
     fn wait(&self, pause: Duration) {
@@ -237,5 +245,38 @@ impl Teller<'_> {
         while !(self.stop)() && world.steady().duration_since(began) < pause {
             std::thread::sleep(LOOK_EVERY.min(pause));
         }
+    }
+}
+
+/// The oldest notices of a target, if there are more than `most`: those beyond, a page of them at most.
+fn surplus(store: &dyn JobStore, target: &str, most: u64) -> Result<Vec<Job>, StoreError> {
+    let beyond = store.backlog(target)?.saturating_sub(most);
+    store.notices(target, usize::try_from(beyond).unwrap_or(usize::MAX).min(PAGE))
+}
+
+#[cfg(test)]
+mod tests {
+    use suture_store::testkit::{dropped, result_of};
+    use suture_store::{Ending, Filter, MemoryStore, Step};
+
+    use super::*;
+
+    #[test]
+    fn of_too_many_the_oldest_are_given_up() {
+        let store = MemoryStore::default();
+        store.subscribe(&["farm".into()]).unwrap();
+        let mut ends = Vec::new();
+        for n in 0..7 {
+            store.submit(&[dropped(&format!("{n}.stl"), 84).unwrap()]).unwrap();
+            let claim = store.claim(&Filter::default()).unwrap().unwrap();
+            store.advance(&claim, Step::Intend(result_of(&claim.job, Ending::Clean))).unwrap();
+            store.advance(&claim, Step::Placed).unwrap();
+            ends.push(store.advance(&claim, Step::Finished).unwrap());
+        }
+        assert_eq!(surplus(&store, "farm", 7).unwrap(), []);
+        assert_eq!(surplus(&store, "farm", 5).unwrap(), ends[..2]);
+        store.acknowledge("farm", ends[1].seq).unwrap();
+        assert_eq!(surplus(&store, "farm", 5).unwrap(), []);
+        assert_eq!(store.notices("farm", PAGE).unwrap(), ends[2..]);
     }
 }

@@ -12,6 +12,7 @@ use suture_store::job::{Area, Kind};
 use suture_store::{Control, Job, JobId, Query, StoreError, crash_point};
 
 use crate::attempt::{Context, Event};
+use crate::deliver;
 use crate::event::Happening;
 use crate::folder::Folder;
 use crate::fsx;
@@ -242,6 +243,7 @@ impl Keeper {
                     (kept.reconciler.rest, kept.rescan) = pace(&self.context, kept.polled);
                 }
                 self.disk_looked = None;
+                deliver::subscribe(&self.context)?;
                 // Whoever mended a setting need not wait for the next try.
                 self.hasten_waiting()?;
                 let changes = if changes.is_empty() { "none".into() } else { changes.join(", ") };

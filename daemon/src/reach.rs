@@ -7,6 +7,7 @@ use std::ffi::OsString;
 use std::io::{self, ErrorKind};
 use std::os::unix::ffi::OsStringExt;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use suture_store::{Job, SledStore, StoreError};
@@ -69,8 +70,7 @@ pub(crate) fn jobs(dir: &Path, wish: &JobsWish) -> Result<Vec<Job>, Failure> {
     if !fsx::is_folder(&state).map_err(|error| unseen(&state, &error))? {
         return Ok(Vec::new());
     }
-    watchdog::start(|| watch::end_hanging())
-        .map_err(|error| Failure::try_again(format!("no thread can be started: {error}; try again")))?;
+    watched().map_err(|error| Failure::try_again(format!("no thread can be started: {error}; try again")))?;
     let asked = Instant::now();
     loop {
         match through_store(&state, wish) {
@@ -83,6 +83,12 @@ pub(crate) fn jobs(dir: &Path, wish: &JobsWish) -> Result<Vec<Job>, Failure> {
             return Ok(jobs);
         }
     }
+}
+
+/// Has a hanging database end this process. Once is enough, however often it is asked.
+fn watched() -> io::Result<()> {
+    static WATCHED: AtomicBool = AtomicBool::new(false);
+    if WATCHED.swap(true, Ordering::Relaxed) { Ok(()) } else { watchdog::start(|| watch::end_hanging()) }
 }
 
 /// Does what is wished of the daemon of a hot folder, and says how it stands; without one, notes the wish for the next, and there is no

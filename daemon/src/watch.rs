@@ -4,10 +4,8 @@
 //! A *life* begins with the store's recovery and ends with a signal, with the end of all work (`--once`), or with an error of the
 //! store; after the last the program begins anew ([`crate::again`]).
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread::{Builder, ScopedJoinHandle};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use crossbeam::channel::unbounded;
@@ -41,8 +39,10 @@ use crate::world::{Machine, World};
 use crate::{deliver, standstill, uploads, watchdog};
 
 mod notes;
+mod threads;
 
 use notes::{note_folders, note_state};
+use threads::{Slots, guarded, no_thread, thread};
 
 /// How often what is gone is looked for.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
@@ -250,7 +250,7 @@ impl Daemon {
         let mut keeper = Keeper::new(&context, inbox, &self.stop);
         let ended = AtomicBool::new(false);
         std::thread::scope(|scope| {
-            let slots = Slots { scope, context: &context, threads: Mutex::default() };
+            let slots = Slots::new(scope, &context);
             let threads = self.start(scope, &context, &ended);
             let kept = threads.and_then(|()| guarded(|| keeper.keep(&|workers| slots.raise(workers))));
             context.schedule.stop();
@@ -303,7 +303,13 @@ impl Daemon {
         };
         let manage = move || self.manager.tell(context, &|| ended.load(Ordering::Relaxed) || context.has_failed());
         thread("manager").spawn_scoped(scope, manage).map(drop).map_err(no_thread)?;
-        let tell = move || guarded(|| deliver::serve(context, ended)).unwrap_or_else(|error| context.fail(error));
+        let tell = move || {
+            let told = guarded(|| {
+                deliver::serve(context, ended);
+                Ok(())
+            });
+            told.unwrap_or_else(|error| context.fail(error));
+        };
         thread("deliver").spawn_scoped(scope, tell).map(drop).map_err(no_thread)?;
         if !self.once {
             thread("sweeper").spawn_scoped(scope, sweep).map(drop).map_err(no_thread)?;
@@ -339,49 +345,6 @@ impl Daemon {
             }
             std::thread::sleep(Duration::from_millis(10));
         }
-    }
-}
-
-fn thread(name: &str) -> Builder {
-    Builder::new().name(name.into())
-}
-
-fn no_thread(source: std::io::Error) -> StoreError {
-    StoreError::Io { path: "thread".into(), action: "starting one", source }
-}
-
-/// The threads that work on jobs.
-struct Slots<'s, 'e> {
-    scope: &'s std::thread::Scope<'s, 'e>,
-    context: &'s Arc<Context>,
-    threads: Mutex<Vec<ScopedJoinHandle<'s, ()>>>,
-}
-
-impl<'s> Slots<'s, '_> {
-    fn threads(&self) -> MutexGuard<'_, Vec<ScopedJoinHandle<'s, ()>>> {
-        self.threads.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Sees to it that there are so many. Those that are there stay: the schedule lets no more work than may.
-    fn raise(&self, workers: usize) -> Result<(), StoreError> {
-        let context = self.context;
-        let mut threads = self.threads();
-        while threads.len() < workers {
-            let slot = move || {
-                let worked = guarded(|| {
-                    Slot::new(context).run();
-                    Ok(())
-                });
-                // The job in work is taken up by the next life.
-                worked.unwrap_or_else(|error| context.fail(error));
-            };
-            threads.push(thread("slot").spawn_scoped(self.scope, slot).map_err(no_thread)?);
-        }
-        Ok(())
-    }
-
-    fn are_at_work(&self) -> bool {
-        self.threads().iter().any(|slot| !slot.is_finished())
     }
 }
 
@@ -424,13 +387,6 @@ pub(crate) fn sweeper(context: &Context) -> Sweeper {
 /// What time it is.
 pub(crate) fn moment(context: &Context) -> Moment {
     Moment { steady: context.world.steady(), wall: context.world.wall() }
-}
-
-/// A thread that ends in a panic, for want of another thread or by a defect, must not leave the others waiting: the daemon ends with it,
-/// and begins anew.
-fn guarded(work: impl FnOnce() -> Result<(), StoreError>) -> Result<(), StoreError> {
-    catch_unwind(AssertUnwindSafe(work))
-        .unwrap_or_else(|_| Err(StoreError::Poisoned { reason: "a thread of the daemon ended in an internal error".into() }))
 }
 
 /// Takes up what an earlier life left, and clears its work folders away.

@@ -21,8 +21,9 @@ use crate::web::problem::Problem;
 use crate::web::shared::Shared;
 
 /// Choices of states: words, and names with commas.
-const CHOICES: [(&str, &[Kind]); 8] = [
+const CHOICES: [(&str, &[Kind]); 9] = [
     ("Need review", &[Kind::NeedsReview]),
+    ("Rejected", &[Kind::Rejected]),
     ("Failed", &[Kind::Failed]),
     ("In quarantine", &[Kind::Quarantined]),
     ("Done", &[Kind::Done]),

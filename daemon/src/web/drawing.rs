@@ -25,7 +25,7 @@ use crate::supervise::room_of;
 const MEMORY: u64 = 256 << 20;
 const THREADS: usize = 2;
 /// How long it may take, and how often its end is looked for.
-const LIMIT: Duration = Duration::from_secs(60);
+const LIMIT: Duration = Duration::from_secs(180);
 const LOOK_EVERY: Duration = Duration::from_millis(10);
 /// How often a drawing is tried.
 const TRIES: u32 = 3;

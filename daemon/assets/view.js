@@ -202,7 +202,7 @@ class View {
       box.expandByScalar(this.size / 150);
       const colour = COLOURS[item.dataset.kind] ?? 0x333333;
       const extent = box.getSize(new THREE.Vector3());
-      const material = new THREE.MeshBasicMaterial({ color: colour, transparent: true, opacity: 0.28, depthWrite: false });
+      const material = new THREE.MeshBasicMaterial({ color: colour, transparent: true, opacity: 0, depthWrite: false });
       const marker = new THREE.Mesh(new THREE.BoxGeometry(extent.x, extent.y, extent.z), material);
       box.getCenter(marker.position);
       marker.add(new THREE.LineSegments(new THREE.EdgesGeometry(marker.geometry), new THREE.LineBasicMaterial({ color: colour })));
@@ -211,7 +211,10 @@ class View {
       button.setAttribute("aria-pressed", "false");
       button.append(...item.childNodes);
       item.append(button);
-      const place = { marker, button, box, side: item.dataset.side };
+      // What is large would hide all else.
+      const share = extent.length() / this.size;
+      const place = { marker, button, box, share, faint: share > 0.25 ? 0 : 0.25, side: item.dataset.side };
+      material.opacity = place.faint;
       button.addEventListener("click", () => this.choose(place, true));
       this.markers.push(place);
       this.scene.add(marker);
@@ -223,9 +226,10 @@ class View {
     const at = new THREE.Vector2(((event.clientX - left) / width) * 2 - 1, 1 - ((event.clientY - top) / height) * 2);
     const ray = new THREE.Raycaster();
     ray.setFromCamera(at, this.camera);
-    const hits = this.markers.flatMap((place) => ray.intersectObject(place.marker, false).map((hit) => ({ place, far: hit.distance })));
-    hits.sort((a, b) => a.far - b.far);
-    if (hits.length) this.choose(hits[0].place, false);
+    // The smallest: it may lie in a large one.
+    const hits = this.markers.filter((place) => ray.intersectObject(place.marker, false).length > 0);
+    hits.sort((a, b) => a.share - b.share);
+    if (hits.length) this.choose(hits[0], false);
   }
 
   // Shows one place; `go`: the camera comes near.
@@ -233,7 +237,7 @@ class View {
     for (const other of this.markers) {
       const isIt = other === place;
       other.button.setAttribute("aria-pressed", String(isIt));
-      other.marker.material.opacity = isIt ? 0.55 : 0.28;
+      other.marker.material.opacity = isIt ? Math.max(0.15, 2 * other.faint) : other.faint;
     }
     place.button.scrollIntoView({ block: "nearest" });
     if (this.sides.includes(place.side)) await this.show(place.side);

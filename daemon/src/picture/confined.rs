@@ -29,28 +29,31 @@ pub(crate) fn run(args: &DrawArgs) -> Exit {
     confine::confine();
     match made(args) {
         Ok(()) => Exit::Good,
-        Err(line) => {
+        Err((exit, line)) => {
             complain(&line);
-            Exit::Refused
+            exit
         }
     }
 }
 
-fn made(args: &DrawArgs) -> Result<(), String> {
+/// What went wrong is the mesh's fault, or trying again may help.
+fn made(args: &DrawArgs) -> Result<(), (Exit, String)> {
+    let fault = |line: String| (Exit::Refused, line);
     let limits = args.spend.limits(false);
-    let meshes = args.inputs.iter().map(|path| open(path, &limits)).collect::<Result<Vec<MeshFile>, _>>()?;
+    let meshes = args.inputs.iter().map(|path| open(path, &limits)).collect::<Result<Vec<MeshFile>, _>>().map_err(fault)?;
     let records: Vec<_> = meshes.iter().map(MeshFile::records).collect();
     let nothing = || "no triangle has finite coordinates".to_owned();
     let bytes = match (args.coarse, records.as_slice()) {
-        (true, [mesh]) => Coarse::of(mesh, limits.threads).ok_or_else(nothing)?.bytes(),
-        (true, _) => return Err("only one mesh at a time is made coarse".into()),
+        (true, [mesh]) => Coarse::of(mesh, limits.threads).ok_or_else(nothing).map_err(fault)?.bytes(),
+        (true, _) => return Err(fault("only one mesh at a time is made coarse".into())),
         (false, meshes) => {
             let is_large = meshes.iter().map(|mesh| mesh.len()).sum::<usize>() > MOST_TO_CHOOSE;
             let eye = is_large.then_some(Eye::USUAL);
             let options = Options { size: SIZE, eye, threads: limits.threads, memory: limits.memory_bytes };
-            draw(meshes, &options).ok_or_else(nothing)?.png().map_err(|error| error.to_string())?
+            draw(meshes, &options).ok_or_else(nothing).map_err(fault)?.png().map_err(|error| fault(error.to_string()))?
         }
     };
-    meshes.iter().try_for_each(MeshFile::check_unchanged).map_err(|error| error.to_string())?;
-    create::place(&args.output, &bytes, false).map_err(|error| format!("the picture cannot be written: {error}"))
+    let later = |line: String| (Exit::TryAgain, line);
+    meshes.iter().try_for_each(MeshFile::check_unchanged).map_err(|error| later(error.to_string()))?;
+    create::place(&args.output, &bytes, false).map_err(|error| later(format!("the picture cannot be written: {error}")))
 }

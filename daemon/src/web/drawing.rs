@@ -25,8 +25,10 @@ use crate::supervise::room_of;
 const MEMORY: u64 = 256 << 20;
 const THREADS: usize = 2;
 /// How long it may take, and how often its end is looked for.
-const LIMIT: Duration = Duration::from_secs(60);
+const LIMIT: Duration = Duration::from_secs(180);
 const LOOK_EVERY: Duration = Duration::from_millis(10);
+/// How often a drawing is tried.
+const TRIES: u32 = 3;
 /// Bytes that are kept altogether.
 const KEPT: u64 = 256 << 20;
 
@@ -130,7 +132,7 @@ struct Task {
 impl Task {
     fn run(&self) -> Result<(), Failure> {
         let folder = fsx::folder_of(&self.path);
-        let made = std::fs::create_dir_all(folder).and_then(|()| self.draw());
+        let made = std::fs::create_dir_all(folder).and_then(|()| self.drawn());
         let status = made.map_err(|error| {
             tracing::warn!(%error, "No picture can be made.");
             Failure::NotNow
@@ -146,11 +148,28 @@ impl Task {
                 let _ = fsx::remove_if_there(&self.path);
                 Err(Failure::NotNow)
             }
-            Some((Some(code), _)) if code != i32::from(Exit::Refused.code()) => Err(Failure::NotNow),
+            Some((Some(code), _)) if [Exit::Cut, Exit::TryAgain].map(|exit| i32::from(exit.code())).contains(&code) => {
+                Err(Failure::NotNow)
+            }
             // Someone killed it.
             Some((_, Some(9 | 15))) => Err(Failure::NotNow),
-            _ => Err(Failure::Never),
+            ended => {
+                tracing::info!(?ended, file = %self.path.display(), "No picture can be made of a mesh.");
+                Err(Failure::Never)
+            }
         }
+    }
+
+    /// Draws until a process does not want to be tried again. The original of a job that has just ended loses a second name in the work folder, which looks as
+    /// if it had changed.
+    fn drawn(&self) -> io::Result<Option<ExitStatus>> {
+        for _ in 1..TRIES {
+            let status = self.draw()?;
+            if status.and_then(|status| status.code()) != Some(Exit::TryAgain.code().into()) {
+                return Ok(status);
+            }
+        }
+        self.draw()
     }
 
     /// How the process ended; `None`: it took too long.

@@ -32,6 +32,8 @@ use super::verified::Which;
 /// Bytes that are read at a time, and those that are hashed.
 const CHUNK: usize = 256 << 10;
 const HASHED: usize = 4 << 20;
+/// How often a file that changes meanwhile is read.
+const TRIES: u32 = 3;
 
 /// A file of a job, and the digest of its bytes.
 #[derive(Clone, Debug)]
@@ -86,15 +88,22 @@ pub(super) async fn opened(shared: &Shared, id: JobId, which: Which) -> Result<O
 /// When it is not in its place.
 pub(super) async fn opened_as(shared: &Shared, id: JobId, known: Known) -> Result<Opened, Problem> {
     let key = (id, known.which);
-    let opened = ask(&shared.context, move |_| open(known.path, known.hash)).await?;
-    if !shared.verified.has(key, &opened.found) {
-        let told = hash(&opened).await.map_err(unreadable)?;
-        if told != opened.published || look(&opened.file).map_err(unreadable)? != opened.found {
-            return Err(Problem::conflict(format!("the file of that name is not any more what job {id} has left")));
+    for _ in 0..TRIES {
+        let known = known.clone();
+        let opened = ask(&shared.context, move |_| open(known.path, known.hash)).await?;
+        if shared.verified.has(key, &opened.found) {
+            return Ok(opened);
         }
-        shared.verified.add(key, opened.found);
+        if hash(&opened).await.map_err(unreadable)? != opened.published {
+            break;
+        }
+        // Another name of it may have come or gone meanwhile, as in the work folder of a job that has just ended.
+        if look(&opened.file).map_err(unreadable)? == opened.found {
+            shared.verified.add(key, opened.found);
+            return Ok(opened);
+        }
     }
-    Ok(opened)
+    Err(Problem::conflict(format!("the file of that name is not any more what job {id} has left")))
 }
 
 /// The hot folder of a job.

@@ -84,6 +84,14 @@ fn pages_say_what_became_of_every_file() {
         client.get(path).expect(status);
     }
     client.ask("POST", "/jobs/2/destroy", &[("Accept", "text/html")], b"").expect(404);
+    place.suture(["jobs", "pause", "--dir", "hot"]).expect(0);
+    place.put("hot/in/later.stl", &holes(2));
+    wait_for(&client, 4, "queued");
+    let night = client.browse("/").expect(200);
+    for words in ["Nothing new is taken: ", "One file waits", "in reach"] {
+        assert!(night.text().to_lowercase().contains(&words.to_lowercase()), "{words}: {}", night.text());
+    }
+    assert!(client.browse("/jobs/4").expect(200).text().contains("action=\"/jobs/4/cancel\""));
 }
 
 #[test]

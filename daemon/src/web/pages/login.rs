@@ -73,6 +73,7 @@ pub(super) async fn login(State(shared): State<Arc<Shared>>, body: Body) -> Resu
     let Shown { token, next } = fields(body).await?;
     let _seat = shared.logins.try_acquire().map_err(|_| Problem::unavailable("too many sign in at once; try again"))?;
     if !shared.tokens.are_opened_by(token.trim()) {
+        tracing::warn!("A wrong token was shown at the page to sign in.");
         sleep(DELAY).await;
         return Ok(page(StatusCode::FORBIDDEN, &next, "This is not one of the tokens. Try again."));
     }

@@ -71,8 +71,8 @@ fn ended(job: &Job, ending: Ending) -> String {
         Ending::Clean | Ending::Repaired => "Print the result.".into(),
         Ending::NeedsReview => {
             let best = job.publication().and_then(|publication| publication.output.as_ref());
-            let best = best.map(|name| format!(" ({}/{name})", area(ending.area()))).unwrap_or_default();
-            format!("Look at the pictures and the reasons. Is the result{best} what the file was meant to be? Then approve it, and it is published. If not, reject it, and ask for a better file.")
+            let best = best.map_or_else(|| "the result".to_owned(), |name| format!("{}/{name}", area(ending.area())));
+            format!("Look at the pictures and the reasons. If {best} is what the file was meant to be, approve it: then it is published. If not, reject it, and ask for a better file.")
         }
         Ending::NotGood => "Do not print it. Ask for another file, or drop it again into the folder of another profile.".into(),
         Ending::Unreadable => "It is not a mesh that Suture can read. Open the file, or ask for it again.".into(),
@@ -87,4 +87,54 @@ fn ended(job: &Job, ending: Ending) -> String {
 /// A time, for people and for programs.
 pub(super) fn time(time: Time) -> Markup {
     html! { time datetime=(when(time)) { (show_when(time.0)) } }
+}
+
+#[cfg(test)]
+mod tests {
+    use suture_store::job::{Parked, Withdrawal};
+    use suture_store::{JobId, Publication, RelPath, Source};
+
+    use super::*;
+
+    fn job() -> Job {
+        let path = RelPath::new(*b"a.stl").unwrap();
+        let source = Source { folder: "hot".into(), path, dev: 1, ino: 2, size: 84, mtime_ns: 4, profile: "default".into() };
+        Job::queued(JobId(7), source, Time(0))
+    }
+
+    fn ended(ending: Ending) -> Job {
+        let output = Some(RelPath::new(*b"a.best.stl").unwrap());
+        let publication = Publication {
+            ending,
+            reason: String::new(),
+            output,
+            output_hash: None,
+            report_hash: None,
+            recipe: None,
+            reused: None,
+            source_ctime_ns: None,
+            original: None,
+            stays: false,
+        };
+        Job { state: State::Ended { publication }, ..job() }
+    }
+
+    /// Whoever comes in the morning knows of each file what to do with it.
+    #[test]
+    fn whatever_has_come_to_rest_has_advice() {
+        use Ending::{Clean, Environment, NeedsReview, NotGood, Quarantined, Refused, Repaired, Unreadable};
+        let all = [Clean, Repaired, NeedsReview, NotGood, Unreadable, Refused, Environment, Quarantined].map(ended);
+        let noticed = Job::noticed(JobId(1), job().source, "a picture", Time(0));
+        let parked = Job { parked: Some(Parked { until: Some(Time(9)), tries: 1, committed: false }), ..job() };
+        let cancelled = Job { state: State::Cancelled { why: Withdrawal::Operator }, ..job() };
+        for job in all.iter().chain([&noticed, &parked, &cancelled]) {
+            assert!(!advice(job).is_empty(), "{:?}", job.state);
+        }
+        assert_eq!(parked.kind(), Kind::Parked);
+        assert!(advice(&all[2]).contains("failed/a.best.stl"));
+        assert_eq!(advice(&job()), "", "what waits needs no one");
+        // What is good, to be looked at, or bad is told by more than its colour.
+        let words: std::collections::BTreeSet<_> = Kind::ALL.iter().map(|kind| (label(*kind), class(*kind))).collect();
+        assert_eq!(words.iter().map(|(word, _)| word).collect::<std::collections::BTreeSet<_>>().len(), words.len());
+    }
 }

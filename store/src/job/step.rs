@@ -5,7 +5,8 @@ use super::decision::{Decision, Verdict};
 use super::kind::Kind;
 use super::pauses::{BACKOFF_CAP_MS, BACKOFF_MS, ENVIRONMENT_RETRIES, PARK_CAP_MS, PARK_MS, WAIT_MS};
 use super::priority::Priority;
-use super::state::{Ending, Hold, Job, Parked, Publication, State, Step, Withdrawal, one_line};
+use super::state::{Ending, Hold, Job, Parked, Publication, State, Step, Withdrawal};
+use super::words::one_line;
 use crate::id::{Boot, Epoch, Time, Token};
 
 /// Something that happens to a job.

@@ -24,7 +24,9 @@ fn reference() -> (BTreeMap<&'static str, Tree>, u64) {
     let status = hot.watch(&["--once"]).env("SUTURE_CRASH_TRACE", &trace).status().expect("the daemon starts");
     assert_eq!(status.code(), Some(0));
     let trace = std::fs::read_to_string(trace).expect("a trace");
-    for point in ["approved_copied", "superseded", "result_durable", "intent_durable", "output_placed", "original_durable", "done"] {
+    for point in
+        ["approved_copied", "superseded", "result_durable", "intent_durable", "output_placed", "original_durable", "done"]
+    {
         assert!(trace.contains(&format!("daemon.{point}\n")), "no run passes {point}");
     }
     assert!(!trace.contains("daemon.worked\n"), "nothing is computed");

@@ -120,7 +120,7 @@ pub struct Publication {
     pub stays: bool,
     /// What a person has said of a result that needed review.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub decision: Option<Decision>,
+    pub decision: Option<Box<Decision>>,
 }
 
 /// Why a job was cancelled.
@@ -408,8 +408,8 @@ impl Job {
     /// What a person has said of its result.
     pub fn decision(&self) -> Option<&Decision> {
         match &self.state {
-            State::Approved { publication, .. } => publication.decision.as_ref(),
-            _ => self.publication()?.decision.as_ref(),
+            State::Approved { publication, .. } => publication.decision.as_deref(),
+            _ => self.publication()?.decision.as_deref(),
         }
     }
 

@@ -331,8 +331,9 @@ impl Job {
         if publication.ending != Ending::NeedsReview || !is_open {
             return None;
         }
-        let decision = Some(Decision { at: now, ..decision.clone() });
-        if decision.as_ref().is_some_and(|decision| decision.verdict == Verdict::Rejected) {
+        let rejected = decision.verdict == Verdict::Rejected;
+        let decision = Some(Box::new(Decision { at: now, ..decision.clone() }));
+        if rejected {
             publication.decision = decision;
             return Some(Ok(()));
         }

@@ -30,6 +30,7 @@ mod by_key;
 mod forget;
 mod index;
 mod line;
+mod offered;
 mod page;
 mod past;
 mod recover;

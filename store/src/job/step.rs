@@ -217,17 +217,7 @@ impl Job {
             (State::Concluded { ending, .. }, Step::Intend(publication)) if publication.ending == ending => {
                 publishing(hold, publication)
             }
-            (State::Approved { publication: judged, .. }, Step::Intend(publication))
-                if (publication.output_hash, &publication.decision) == (judged.output_hash, &judged.decision) =>
-            {
-                publishing(hold, publication)
-            }
-            (State::Approved { publication, .. }, Step::Unfit { reason }) => {
-                let told = publication.reason.strip_prefix(reason.as_str()).unwrap_or(&publication.reason);
-                let told = told.trim_start_matches("; ");
-                let reason = one_line(&if told.is_empty() { reason.clone() } else { format!("{reason}; {told}") });
-                State::Ended { publication: Publication { decision: None, reason, ..publication } }
-            }
+            (State::Approved { publication, .. }, step) => approved(hold, publication, step)?,
             (State::Publishing { publication, .. }, Step::Placed) => State::Published { hold, publication },
             // The file changed before anything of its result was in place.
             (State::Publishing { .. }, Step::Withdrawn(why)) => State::Cancelled { why: *why },
@@ -369,6 +359,23 @@ impl Job {
         self.retried = Some(now);
         self.state = NOW;
         Some(())
+    }
+}
+
+/// What comes of an approved result: exactly what was judged is published, or nothing.
+fn approved(hold: Hold, judged: Publication, step: &Step) -> Option<State> {
+    match step {
+        Step::Intend(publication)
+            if (publication.output_hash, &publication.decision) == (judged.output_hash, &judged.decision) =>
+        {
+            Some(publishing(hold, publication))
+        }
+        Step::Unfit { reason } => {
+            let told = judged.reason.strip_prefix(reason.as_str()).unwrap_or(&judged.reason).trim_start_matches("; ");
+            let reason = one_line(&if told.is_empty() { reason.clone() } else { format!("{reason}; {told}") });
+            Some(State::Ended { publication: Publication { decision: None, reason, ..judged } })
+        }
+        _ => None,
     }
 }
 

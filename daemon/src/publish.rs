@@ -179,7 +179,7 @@ impl<'a> Desk<'a> {
             output_blake3: p.output_hash,
             report_blake3: p.report_hash,
             reused: p.reused,
-            decision: p.decision.as_ref(),
+            decision: p.decision.as_deref(),
         };
         rewrite(&self.work(job).join(RECEIPT_FILE), &receipt).map(drop)
     }

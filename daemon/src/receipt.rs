@@ -113,7 +113,7 @@ pub(crate) struct Told {
     pub stays: bool,
     pub work: Option<Token>,
     pub reused: Option<JobId>,
-    pub decision: Option<Decision>,
+    pub decision: Option<Box<Decision>>,
 }
 
 /// The receipt in a file; `None` where there is none, or one of another version. A link is not followed.

@@ -35,6 +35,7 @@ mod state;
 mod step;
 #[cfg(test)]
 mod tests;
+mod words;
 
 pub use blame::{Blame, CHARGES, DEATHS_ALONE, DEATHS_IN_HAND, DEATHS_TO_SUSPECT, Death, KILLS_FREE, Testimony};
 pub use decision::{Decision, MAX_BY, NoDecision, Verdict};
@@ -42,5 +43,6 @@ pub use kind::Kind;
 pub use past::{Past, Reached};
 pub use pauses::{BACKOFF_CAP_MS, BACKOFF_MS, ENVIRONMENT_RETRIES, PARK_CAP_MS, PARK_MS, WAIT_MS};
 pub use priority::{AGEING_MS, NoPriority, Priority};
-pub use state::{Area, Duty, Ending, Hold, Job, MAX_REASON, Parked, Publication, Source, State, Step, Withdrawal, one_line};
+pub use state::{Area, Duty, Ending, Hold, Job, Parked, Publication, Source, State, Step, Withdrawal};
 pub use step::{Event, Illegal};
+pub use words::{MAX_REASON, one_line};

@@ -32,6 +32,7 @@ mod forget;
 mod index;
 mod line;
 mod notices;
+mod offered;
 mod outbox;
 mod page;
 mod past;

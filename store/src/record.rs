@@ -133,10 +133,10 @@ mod tests {
             source_ctime_ns: Some(i64::MIN),
             original: Some(path.clone()),
             stays: true,
-            decision: Some(Decision {
+            decision: Some(Box::new(Decision {
                 at: Time(u64::MAX),
                 ..Decision::new(Verdict::Rejected, &"b".repeat(MAX_BY), &reason).unwrap()
-            }),
+            })),
         };
         let number = u32::MAX;
         let (deaths, deaths_alone, in_hand, machine) = (number, number, u8::MAX, number);

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// So many jobs at rest are remembered unless the configuration says otherwise: about 50 MiB of store.
-const HISTORY_JOBS: u64 = 30_000;
+/// So many jobs at rest are remembered unless the configuration says otherwise: about 40 MiB of store.
+pub(crate) const HISTORY_JOBS: u64 = 20_000;
 
 /// How long, and how much of it, something stays. `None`: without a bound.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -100,7 +100,7 @@ impl Desk<'_> {
             return Ok(Some(NO_REPORT));
         }
         let Some(mut told) = of_it(&earlier)? else { return Ok(Some(NO_REPORT)) };
-        sign(&mut told, judged.decision.as_ref());
+        sign(&mut told, judged.decision.as_deref());
         rewrite(&report, &told)?;
         Ok(None)
     }

@@ -247,10 +247,17 @@ impl Stage {
         }
         let job = &jobs[self.chance(|chance| chance.index(jobs.len()))];
         let wish = wish(job.id);
+        // A kill may come when the store has it, and before anyone hears of it.
+        let decides = matches!(wish, JobsWish::Decide(..));
+        if decides {
+            self.oracle.borrow_mut().wished(job, &wish);
+        }
         // It may be too late for it.
         if change(&life.context, &wish).is_ok() {
             self.say(|| format!("{wish:?}, {}", job.source.path));
-            self.oracle.borrow_mut().wished(job, &wish);
+            if !decides {
+                self.oracle.borrow_mut().wished(job, &wish);
+            }
         }
     }
 

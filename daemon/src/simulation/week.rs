@@ -8,6 +8,7 @@ use super::matter::{FATES, Fate};
 use super::plan::{LEFT, Plan};
 use super::stage::{Scale, Stage};
 use super::watched;
+use crate::config::keep::HISTORY_JOBS;
 use crate::world::World;
 
 const SCALE: Scale = Scale { meanwhile: 3000, seconds: 3, watch_order: false, tend: Duration::from_secs(1800) };
@@ -22,7 +23,7 @@ const MOST_STORE: u64 = 64 << 20;
 
 fn plan(_: &mut Chance) -> Plan {
     let (workers, window) = (3, Some("20:00-07:00"));
-    Plan { workers, window, priorities: [5, 5], drain: 60, results: 2, history_jobs: 30_000 }
+    Plan { workers, window, priorities: [5, 5], drain: 60, results: 2, history_jobs: HISTORY_JOBS }
 }
 
 /// Bytes of all files below a folder.

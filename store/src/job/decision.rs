@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::state::{MAX_REASON, one_line};
+use super::words::{MAX_REASON, one_line};
 use crate::id::Time;
 
 /// Longest name of who decides, in bytes.

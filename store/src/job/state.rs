@@ -7,6 +7,7 @@ use super::decision::{Decision, Verdict};
 use super::kind::Kind;
 use super::pauses::BACKOFF_CAP_MS;
 use super::priority::Priority;
+use super::words::one_line;
 use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Recipe, Seq, Time, Token};
 use crate::path::RelPath;
 
@@ -94,7 +95,7 @@ impl Ending {
 pub struct Publication {
     /// How the job ends.
     pub ending: Ending,
-    /// One line for people; empty when there is nothing to add. Cut to [`MAX_REASON`] bytes.
+    /// One line for people; empty when there is nothing to add. Cut to [`MAX_REASON`](super::MAX_REASON) bytes.
     pub reason: String,
     /// The repaired mesh.
     pub output: Option<RelPath>,
@@ -119,22 +120,7 @@ pub struct Publication {
     pub stays: bool,
     /// What a person has said of a result that needed review.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub decision: Option<Decision>,
-}
-
-/// Longest reason kept, in bytes.
-pub const MAX_REASON: usize = 200;
-
-/// Cuts `text` to one line of at most [`MAX_REASON`] bytes, in characters that a record need not escape.
-pub fn one_line(text: &str) -> String {
-    let plain = |c: char| match c {
-        '"' => '\'',
-        '\\' => '/',
-        c if c.is_control() => ' ',
-        c => c,
-    };
-    let clean: String = text.chars().map(plain).collect();
-    clean.get(..clean.floor_char_boundary(MAX_REASON)).unwrap_or_default().to_owned()
+    pub decision: Option<Box<Decision>>,
 }
 
 /// Why a job was cancelled.
@@ -422,8 +408,8 @@ impl Job {
     /// What a person has said of its result.
     pub fn decision(&self) -> Option<&Decision> {
         match &self.state {
-            State::Approved { publication, .. } => publication.decision.as_ref(),
-            _ => self.publication()?.decision.as_ref(),
+            State::Approved { publication, .. } => publication.decision.as_deref(),
+            _ => self.publication()?.decision.as_deref(),
         }
     }
 

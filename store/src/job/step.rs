@@ -5,7 +5,8 @@ use super::decision::{Decision, Verdict};
 use super::kind::Kind;
 use super::pauses::{BACKOFF_CAP_MS, BACKOFF_MS, ENVIRONMENT_RETRIES, PARK_CAP_MS, PARK_MS, WAIT_MS};
 use super::priority::Priority;
-use super::state::{Ending, Hold, Job, Parked, Publication, State, Step, Withdrawal, one_line};
+use super::state::{Ending, Hold, Job, Parked, Publication, State, Step, Withdrawal};
+use super::words::one_line;
 use crate::id::{Boot, Epoch, Time, Token};
 
 /// Something that happens to a job.
@@ -216,17 +217,7 @@ impl Job {
             (State::Concluded { ending, .. }, Step::Intend(publication)) if publication.ending == ending => {
                 publishing(hold, publication)
             }
-            (State::Approved { publication: judged, .. }, Step::Intend(publication))
-                if (publication.output_hash, &publication.decision) == (judged.output_hash, &judged.decision) =>
-            {
-                publishing(hold, publication)
-            }
-            (State::Approved { publication, .. }, Step::Unfit { reason }) => {
-                let told = publication.reason.strip_prefix(reason.as_str()).unwrap_or(&publication.reason);
-                let told = told.trim_start_matches("; ");
-                let reason = one_line(&if told.is_empty() { reason.clone() } else { format!("{reason}; {told}") });
-                State::Ended { publication: Publication { decision: None, reason, ..publication } }
-            }
+            (State::Approved { publication, .. }, step) => approved(hold, publication, step)?,
             (State::Publishing { publication, .. }, Step::Placed) => State::Published { hold, publication },
             // The file changed before anything of its result was in place.
             (State::Publishing { .. }, Step::Withdrawn(why)) => State::Cancelled { why: *why },
@@ -330,8 +321,9 @@ impl Job {
         if publication.ending != Ending::NeedsReview || !is_open {
             return None;
         }
-        let decision = Some(Decision { at: now, ..decision.clone() });
-        if decision.as_ref().is_some_and(|decision| decision.verdict == Verdict::Rejected) {
+        let rejected = decision.verdict == Verdict::Rejected;
+        let decision = Some(Box::new(Decision { at: now, ..decision.clone() }));
+        if rejected {
             publication.decision = decision;
             return Some(Ok(()));
         }
@@ -367,6 +359,23 @@ impl Job {
         self.retried = Some(now);
         self.state = NOW;
         Some(())
+    }
+}
+
+/// What comes of an approved result: exactly what was judged is published, or nothing.
+fn approved(hold: Hold, judged: Publication, step: &Step) -> Option<State> {
+    match step {
+        Step::Intend(publication)
+            if (publication.output_hash, &publication.decision) == (judged.output_hash, &judged.decision) =>
+        {
+            Some(publishing(hold, publication))
+        }
+        Step::Unfit { reason } => {
+            let told = judged.reason.strip_prefix(reason.as_str()).unwrap_or(&judged.reason).trim_start_matches("; ");
+            let reason = one_line(&if told.is_empty() { reason.clone() } else { format!("{reason}; {told}") });
+            Some(State::Ended { publication: Publication { decision: None, reason, ..judged } })
+        }
+        _ => None,
     }
 }
 

@@ -1,10 +1,9 @@
-//! Good results by what they were made of: how a job finds one that it can have a copy of. In memory, made anew at each opening: such keys are in no
+//! Good results by what they were made of: how a job finds one that it can have a copy of (`offered`). In memory, made anew at each opening: such keys are in no
 //! order, and on disk every entry would come to a page of its own. That took more room than the jobs themselves (measured).
 
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
 
-use super::Queue;
 use crate::id::{JobId, Recipe};
 use crate::job::Job;
 use crate::record;
@@ -42,26 +41,10 @@ impl Results {
     }
 
     /// The latest jobs of this size and recipe, the latest first; without a recipe, one of this size.
-    fn latest(&self, size: u64, recipe: Option<Recipe>) -> Vec<JobId> {
+    pub(super) fn latest(&self, size: u64, recipe: Option<Recipe>) -> Vec<JobId> {
         let (from, to) = recipe.map_or((Recipe(0), Recipe(u64::MAX)), |recipe| (recipe, recipe));
         let range = (size, from, Reverse(JobId(u64::MAX)))..=(size, to, Reverse(JobId(0)));
         let most = if recipe.is_some() { MOST_RESULTS } else { 1 };
         self.0.range(range).take(most).map(|(_, _, id)| id.0).collect()
-    }
-}
-
-impl<T: Tables> Queue<T> {
-    /// As [`crate::JobStore::results`].
-    pub(super) fn offered(&self, size: u64, recipe: Option<Recipe>) -> Result<Vec<Job>, StoreError> {
-        let ids = self.lock().results.latest(size, recipe);
-        let mut jobs = Vec::new();
-        for id in ids {
-            // It may have been forgotten meanwhile.
-            let Some(job) = self.job(id)? else { continue };
-            if job.source.size == size && job.offers().is_some_and(|offered| recipe.is_none_or(|recipe| recipe == offered)) {
-                jobs.push(job);
-            }
-        }
-        Ok(jobs)
     }
 }

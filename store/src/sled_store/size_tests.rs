@@ -7,7 +7,7 @@ use crate::id::Hash;
 use crate::job::{Ending, Priority, Publication};
 use crate::path::RelPath;
 
-/// The store is to stay below 64 MiB with 30,000 jobs that have ended: 2.2 KB for each. Here sled has no time to clean up.
+/// The store is to stay below 64 MiB with 20,000 jobs that have ended. Here sled has no time to clean up.
 const MOST_FOR_A_JOB: u64 = 3200;
 const HISTORY: u64 = 3000;
 /// Dropped at a time.

@@ -9,7 +9,7 @@ pub(super) fn said(verdict: Verdict) -> Decision {
 /// What is intended of a best attempt that was approved then.
 pub(super) fn approved(hash: u8, at: Time) -> Publication {
     let decision = Decision { at, ..said(Verdict::Approved) };
-    Publication { decision: Some(decision), ..publication(Ending::Repaired, hash) }
+    Publication { decision: Some(Box::new(decision)), ..publication(Ending::Repaired, hash) }
 }
 
 /// Only what a person approved is published though it was not found good, and exactly that; what is decided is remembered.

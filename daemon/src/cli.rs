@@ -10,7 +10,7 @@ use suture_store::Priority;
 use suture_store::job::Kind;
 
 use crate::units::{parse_duration, parse_listen, parse_size};
-use service::{CompletionsArgs, ManArgs, StatusArgs, TopArgs};
+use service::{CompletionsArgs, ManArgs, NightArgs, StatusArgs, TopArgs};
 
 pub(crate) mod service;
 
@@ -62,6 +62,8 @@ pub(crate) enum Command {
     Status(StatusArgs),
     /// Show that anew each second, until `q`
     Top(TopArgs),
+    /// Write what became of the last night's files: a page for a browser, or a table for a spreadsheet
+    Night(NightArgs),
     /// Make a page for a browser of a report, with a picture before and after
     Report(ReportArgs),
     /// Draw a mesh, or one before and after its repair side by side, as PNG

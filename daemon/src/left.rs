@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use suture_store::job::Area;
-use suture_store::{Job, RelPath, State};
+use suture_store::{Job, Publication, RelPath, State};
 
 use crate::receipt::REPORT;
 
@@ -20,6 +20,16 @@ pub(crate) fn area(area: Area) -> &'static str {
 /// Where the result of a finished job of the hot folder `dir` is: a good one in `out/`, else the best attempt beside the original.
 pub(crate) fn result_path(dir: &Path, job: &Job) -> Option<PathBuf> {
     let State::Ended { publication } = &job.state else { return None };
+    result_of(dir, publication)
+}
+
+/// The best attempt and the report that a person approved, and that are still to be published, below the hot folder `dir`.
+pub(crate) fn approved(dir: &Path, job: &Job) -> [Option<PathBuf>; 2] {
+    let State::Approved { publication, .. } = &job.state else { return [None, None] };
+    [result_of(dir, publication), report_of(dir, publication)]
+}
+
+fn result_of(dir: &Path, publication: &Publication) -> Option<PathBuf> {
     let output = publication.output.as_ref()?;
     let folder = if publication.ending.is_good() { "out" } else { area(publication.ending.area()) };
     Some(dir.join(folder).join(output.to_path()))
@@ -28,6 +38,10 @@ pub(crate) fn result_path(dir: &Path, job: &Job) -> Option<PathBuf> {
 /// Where the report of a finished job of the hot folder `dir` is.
 pub(crate) fn report_path(dir: &Path, job: &Job) -> Option<PathBuf> {
     let State::Ended { publication } = &job.state else { return None };
+    report_of(dir, publication)
+}
+
+fn report_of(dir: &Path, publication: &Publication) -> Option<PathBuf> {
     let (folder, base): (_, &RelPath) = if publication.ending.is_good() {
         ("out", publication.output.as_ref()?)
     } else {

@@ -116,6 +116,7 @@ fn main() -> ExitCode {
         Command::Top(args) => status::top::run(args),
         Command::Completions(args) => manual::completions(args),
         Command::Man(args) => manual::man(args),
+        Command::Night(args) => html::night::run(args, &jobs::all),
         Command::Report(args) => html::command::run(args),
         Command::Picture(args) => picture::command::run(args),
         Command::Draw(args) => picture::confined::run(args),

@@ -120,7 +120,7 @@ impl Shown {
 }
 
 /// Why it stands where it stands: a line for people, empty where there is nothing to say.
-pub(super) fn reason(job: &Job) -> String {
+pub(crate) fn reason(job: &Job) -> String {
     match &job.state {
         State::Noticed { reason } => reason.clone(),
         State::Ended { publication } => publication.reason.clone(),

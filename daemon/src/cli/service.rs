@@ -1,8 +1,11 @@
 //! The command line of what runs beside the daemon: how it stands, and what a packager needs.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::Args;
+
+use crate::units::parse_duration;
 
 #[derive(Args, Debug)]
 pub(crate) struct StatusArgs {
@@ -22,6 +25,22 @@ pub(crate) struct TopArgs {
     /// The hot folder
     #[arg(long, value_name = "DIR", default_value = ".")]
     pub dir: PathBuf,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct NightArgs {
+    /// The hot folder
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub dir: PathBuf,
+    /// The file to write: .html is a page for a browser, .csv a table for a spreadsheet
+    #[arg(short, long, value_name = "OUT")]
+    pub output: PathBuf,
+    /// Jobs that ended in so long a time until now; those that need a person are there whatever their age
+    #[arg(long, value_name = "TIME", default_value = "24h", value_parser = parse_duration)]
+    pub since: Duration,
+    /// Replace OUT if it exists
+    #[arg(long)]
+    pub force: bool,
 }
 
 #[derive(Args, Debug)]

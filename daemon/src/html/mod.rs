@@ -2,7 +2,9 @@
 //! markup.
 
 pub(crate) mod command;
+pub(crate) mod night;
 pub(crate) mod report;
+pub(crate) mod words;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 

@@ -16,6 +16,7 @@ use super::turns::{Moment, Turns};
 use crate::config::keep::Keep;
 use crate::folder::Folder;
 use crate::fsx::{self, Identity};
+use crate::left::approved;
 use crate::remove::remove;
 use crate::settings::Settings;
 
@@ -141,16 +142,17 @@ impl Sweeper {
         Ok(swept)
     }
 
-    /// Originals outside of `in/` that are to be worked on once more.
+    /// Originals outside of `in/` that are to be worked on once more, and best attempts that are to be published, with their reports.
     fn busy(&self) -> Result<BTreeSet<PathBuf>, StoreError> {
         let kinds = Kind::ALL.into_iter().filter(|kind| kind.is_live()).collect();
         let jobs = self.store.list(&Query { kinds, ..Query::default() })?;
-        let place = |job: &Job| {
+        let places = |job: &Job| {
             let folder = self.folders.iter().find(|folder| folder.name == job.source.folder)?;
             let (area, path) = job.original();
-            (area != Area::In).then(|| folder.area(area).join(path.to_path()))
+            let original = (area != Area::In).then(|| folder.area(area).join(path.to_path()));
+            Some(approved(&folder.root, job).into_iter().flatten().chain(original))
         };
-        Ok(jobs.iter().filter_map(place).collect())
+        Ok(jobs.iter().filter_map(places).flatten().collect())
     }
 
     /// Does a file lie in `in/` for which this job answers, as far as is known?

@@ -265,8 +265,7 @@ impl Stage {
             // What an operator took back stays in `in/`, where originals stay all are.
             let waits = places.get(key).map_or(0, |at| at[0]);
             let approved = oracle.approved.get(key).copied().unwrap_or(0);
-            // A best attempt that was approved may go by its age before a slot takes it: it needs review again then.
-            let least = if key.1.fate.is_good() { wanted.saturating_sub(waits) } else { 0 };
+            let least = if key.1.fate.is_good() { wanted.saturating_sub(waits) } else { approved };
             let most = if key.1.fate.is_good() { wanted + slack } else { approved };
             if made < least || made > most {
                 return Err(format!("{key:?}: {made} results of {least} to {most}"));

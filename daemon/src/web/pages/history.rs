@@ -10,7 +10,7 @@ use maud::{Markup, html};
 use suture_store::{Job, JobId, Kind};
 
 use super::frame::Frame;
-use super::words::{mark, time};
+use crate::html::words::{mark, time};
 use crate::say::plain;
 use crate::shown::reason;
 use crate::units::show_count;

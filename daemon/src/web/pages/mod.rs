@@ -15,7 +15,6 @@ mod job;
 mod login;
 mod night;
 mod places;
-mod words;
 
 pub(super) use frame::{ForPeople, sorry};
 pub(super) use login::{ASSETS, LOGIN, lead};

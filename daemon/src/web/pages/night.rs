@@ -10,9 +10,9 @@ use suture_store::{Job, Kind, Look};
 
 use super::frame::Frame;
 use super::history::{link, list_of};
-use super::words::{advice, mark, time};
 use crate::attempt::Context;
 use crate::event_bus::Bus;
+use crate::html::words::{NEED_SOMEONE, advice, mark, time};
 use crate::say::plain;
 use crate::shown::reason;
 use crate::units::{show_count, show_size};
@@ -22,8 +22,6 @@ use crate::web::shared::Shared;
 use crate::web::status::{self, Status};
 use crate::web::tally::{Ended, Tally};
 
-/// Jobs that a person must look at.
-const NEED_SOMEONE: [Kind; 5] = [Kind::NeedsReview, Kind::Failed, Kind::Quarantined, Kind::Parked, Kind::Noticed];
 /// Jobs that someone works on.
 const IN_WORK: [Kind; 4] = [Kind::Running, Kind::Concluded, Kind::Publishing, Kind::Published];
 const WAITING: [Kind; 3] = [Kind::Queued, Kind::Waiting, Kind::Alone];
@@ -76,8 +74,8 @@ pub(super) async fn night(State(shared): State<Arc<Shared>>, headers: HeaderMap)
 /// In a line: does anything need a person?
 fn standing(night: &Night) -> Markup {
     let count = night.count(&NEED_SOMEONE);
-    let Status { held, away, reason, .. } = &night.status;
-    let is_held = !held.is_empty() || !away.is_empty() || reason.is_some();
+    let Status { held, away, untold, reason, .. } = &night.status;
+    let is_held = !held.is_empty() || !away.is_empty() || !untold.is_empty() || reason.is_some();
     let (class, words) = match (count, is_held) {
         (0, false) => ("good", "Nothing needs you.".to_owned()),
         (0, true) => ("review", "No file needs you, but the daemon does not do all of its work.".to_owned()),
@@ -90,6 +88,7 @@ fn standing(night: &Night) -> Markup {
             @if is_held { ul {
                 @for why in held { li { "Nothing new is taken: " (plain(why)) "." } }
                 @for why in away { li { "Out of reach: " (plain(why)) ". Suture goes on with this folder when it is back." } }
+                @for who in untold { li { "Not told yet: " (plain(who)) "." } }
                 @if let (Some(why), true) = (reason, held.is_empty() && away.is_empty()) { li { "Not ready: " (plain(why)) "." } }
             } }
         }

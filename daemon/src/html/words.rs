@@ -7,8 +7,11 @@ use crate::left::area;
 use crate::shown::when;
 use crate::units::show_when;
 
+/// Jobs that a person must look at.
+pub(crate) const NEED_SOMEONE: [Kind; 5] = [Kind::NeedsReview, Kind::Failed, Kind::Quarantined, Kind::Parked, Kind::Noticed];
+
 /// Where a job stands, and the class of that.
-pub(super) fn state(job: &Job) -> (&'static str, &'static str) {
+pub(crate) fn state(job: &Job) -> (&'static str, &'static str) {
     match (job.kind(), &job.state) {
         (Kind::Done, State::Ended { publication }) if publication.ending == Ending::Clean => ("Clean", "good"),
         (Kind::Done, _) => ("Repaired", "good"),
@@ -17,7 +20,7 @@ pub(super) fn state(job: &Job) -> (&'static str, &'static str) {
 }
 
 /// A state in words.
-pub(super) fn label(kind: Kind) -> &'static str {
+pub(crate) fn label(kind: Kind) -> &'static str {
     match kind {
         Kind::Noticed => "Not taken",
         Kind::Queued => "Waiting",
@@ -36,7 +39,7 @@ pub(super) fn label(kind: Kind) -> &'static str {
 }
 
 /// Is it good, to be looked at, or bad?
-pub(super) fn class(kind: Kind) -> &'static str {
+pub(crate) fn class(kind: Kind) -> &'static str {
     match kind {
         Kind::Done => "good",
         Kind::Noticed | Kind::Parked | Kind::NeedsReview => "review",
@@ -46,13 +49,13 @@ pub(super) fn class(kind: Kind) -> &'static str {
 }
 
 /// The state as a mark.
-pub(super) fn mark(job: &Job) -> Markup {
+pub(crate) fn mark(job: &Job) -> Markup {
     let (words, class) = state(job);
     html! { span class={ "state " (class) } { (words) } }
 }
 
 /// What a person does with it now; empty: nothing.
-pub(super) fn advice(job: &Job) -> String {
+pub(crate) fn advice(job: &Job) -> String {
     match (&job.state, job.kind()) {
         (_, Kind::Rejected) => "Ask for a better file. Choose “Approve” if you want the result after all.".into(),
         (State::Ended { publication }, _) => ended(job, publication.ending),
@@ -85,7 +88,7 @@ fn ended(job: &Job, ending: Ending) -> String {
 }
 
 /// A time, for people and for programs.
-pub(super) fn time(time: Time) -> Markup {
+pub(crate) fn time(time: Time) -> Markup {
     html! { time datetime=(when(time)) { (show_when(time.0)) } }
 }
 
@@ -115,6 +118,7 @@ mod tests {
             source_ctime_ns: None,
             original: None,
             stays: false,
+            decision: None,
         };
         Job { state: State::Ended { publication }, ..job() }
     }

@@ -34,7 +34,7 @@ fn scale(defects: &Defects, extents: [f64; 3]) -> Option<Hint> {
     // What is open encloses nothing certain, but no more than its box.
     let volume = if defects.boundary_edges == 0 { defects.volume.abs() } else { of_box };
     let (kind, unit, factor) = match volume {
-        v if !(v > 0.0) => return None,
+        v if v <= 0.0 || v.is_nan() => return None,
         v if v < MAY_BE_METRES => (HintKind::Metres, "metres", 1000.0),
         v if v < MAY_BE_INCHES => (HintKind::Inches, "inches", 25.4),
         _ => return None,

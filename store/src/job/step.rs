@@ -366,7 +366,8 @@ impl Job {
 fn approved(hold: Hold, judged: Publication, step: &Step) -> Option<State> {
     match step {
         Step::Intend(publication)
-            if (publication.output_hash, &publication.decision) == (judged.output_hash, &judged.decision) =>
+            if publication.ending == Ending::Repaired
+                && (publication.output_hash, &publication.decision) == (judged.output_hash, &judged.decision) =>
         {
             Some(publishing(hold, publication))
         }

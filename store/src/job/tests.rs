@@ -259,6 +259,9 @@ proptest! {
                 }
                 (Duty::Run, _) => Step::Intend(publication(Ending::Clean, 1)),
                 (Duty::Intend, State::Concluded { ending, .. }) => Step::Intend(publication(*ending, 1)),
+                (Duty::Intend, State::Approved { publication, .. }) => {
+                    Step::Intend(Publication { ending: Ending::Repaired, ..publication.clone() })
+                }
                 (Duty::Stop, _) => Step::Cancelled,
                 (Duty::Place, _) => Step::Placed,
                 (Duty::MoveOriginal, _) => Step::Finished,

@@ -422,8 +422,10 @@ fn f03_kills_from_outside_slow_a_job_down_but_never_end_it() {
 fn reasons_are_one_line_and_short() {
     assert_eq!(one_line("a\nb\t\"c\\"), "a b 'c/");
     let long = "é".repeat(MAX_REASON);
-    assert_eq!(one_line(&long).len(), MAX_REASON);
-    assert_eq!(one_line(&format!("x{long}")).len(), MAX_REASON - 1, "never half a character");
+    let cut = one_line(&long);
+    assert!(cut.ends_with("é…") && cut.len() == MAX_REASON - 1, "never half a character: {cut}");
+    assert_eq!(one_line(&format!("x{long}")).len(), MAX_REASON);
+    assert_eq!(one_line(&cut), cut, "it is cut once");
 }
 
 #[test]

@@ -3,6 +3,8 @@
 /// Longest reason kept, in bytes.
 pub const MAX_REASON: usize = 200;
 
+const CUT: &str = "…";
+
 /// Cuts `text` to one line of at most [`MAX_REASON`] bytes, in characters that a record need not escape.
 pub fn one_line(text: &str) -> String {
     let plain = |c: char| match c {
@@ -12,5 +14,10 @@ pub fn one_line(text: &str) -> String {
         c => c,
     };
     let clean: String = text.chars().map(plain).collect();
-    clean.get(..clean.floor_char_boundary(MAX_REASON)).unwrap_or_default().to_owned()
+    if clean.len() <= MAX_REASON {
+        return clean;
+    }
+    // Whoever reads it sees that there was more.
+    let room = clean.floor_char_boundary(MAX_REASON - CUT.len());
+    clean.get(..room).unwrap_or_default().to_owned() + CUT
 }

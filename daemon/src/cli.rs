@@ -321,7 +321,7 @@ pub(crate) struct WorkerArgs {
     pub data: u64,
 }
 
-/// What the daemon wants drawn.
+/// A drawing that the daemon asks for.
 #[derive(Args, Debug)]
 pub(crate) struct DrawArgs {
     #[command(flatten)]
@@ -396,7 +396,7 @@ pub(crate) struct Said {
     /// Who decides; receipt and report name them
     #[arg(long = "as", value_name = "NAME", default_value = "local")]
     pub by: String,
-    /// What there is to add
+    /// Words to go with it
     #[arg(long, value_name = "TEXT", default_value = "")]
     pub note: String,
 }

@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::PoisonError;
+use std::sync::{Arc, PoisonError};
 
 use serde::{Deserialize, Serialize};
 use suture_store::{Job, JobId, Kind, Look, Query, StoreError, Time};
 
 use crate::attempt::Context;
+use crate::folder::Folder;
 use crate::schedule::{Hold, Standing};
 
 /// So many jobs of a sort are named.
@@ -80,23 +81,17 @@ impl Glance {
         let reason = unready(context);
         let held = Kind::ALL.into_iter().filter(|kind| kind.is_held()).collect();
         let of = |kinds, limit| Ok::<_, StoreError>(store.page(&Look { kinds, limit, ..Look::default() })?.jobs);
-        let served = |folder: &std::sync::Arc<crate::folder::Folder>| Served {
-            name: folder.name.clone(),
-            path: std::path::absolute(&folder.root).unwrap_or_else(|_| folder.root.clone()),
-            reachable: folder.check().is_ok(),
-            free_bytes: context.world.room(&folder.root, config.reserve),
-        };
         Ok(Self {
             version: env!("CARGO_PKG_VERSION").into(),
             since: Some(Time(context.bus.life)),
             ready: reason.is_none(),
             reason,
             standing: standing(context)?,
-            jobs: store.counts()?.into_iter().collect(),
+            jobs: counts(context)?,
             work: store.list(&Query { kinds: held, ..Query::default() })?.iter().map(|job| work(context, job)).collect(),
             last: latest(of(Kind::ALL.into_iter().filter(|kind| kind.is_at_rest()).collect(), LATEST)?),
             review: of(vec![Kind::NeedsReview], NAMED)?,
-            folders: context.folders.iter().map(served).collect(),
+            folders: folders(context),
             store_bytes: size_of(&config.state),
         })
     }
@@ -139,6 +134,26 @@ fn work(context: &Context, job: &Job) -> Work {
         percent: progress.as_ref().map(|progress| progress.percent),
         seconds_left: progress.and_then(|_| context.bus.left(job.id, seconds)),
     }
+}
+
+/// How many jobs there are of each kind.
+///
+/// # Errors
+/// When the store failed.
+pub(crate) fn counts(context: &Context) -> Result<BTreeMap<Kind, u64>, StoreError> {
+    Ok(context.store.counts()?.into_iter().collect())
+}
+
+/// The hot folders, as they are now.
+pub(crate) fn folders(context: &Context) -> Vec<Served> {
+    let reserve = context.settings.now().reserve;
+    let served = |folder: &Arc<Folder>| Served {
+        name: folder.name.clone(),
+        path: std::path::absolute(&folder.root).unwrap_or_else(|_| folder.root.clone()),
+        reachable: folder.check().is_ok(),
+        free_bytes: context.world.room(&folder.root, reserve),
+    };
+    context.folders.iter().map(served).collect()
 }
 
 /// What keeps the daemon from work.

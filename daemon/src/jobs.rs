@@ -203,7 +203,7 @@ fn note(job: &Job) -> String {
 fn decision(job: &Job) -> String {
     let word = |said: &Decision| {
         let note = if said.note.is_empty() { String::new() } else { format!(": {}", said.note) };
-        format!("{} by {} at {}{note}", said.verdict.name(), said.by, show_when(said.at.0))
+        format!("{said} at {}{note}", show_when(said.at.0))
     };
     job.decision().map(word).unwrap_or_default()
 }
@@ -213,8 +213,7 @@ pub(crate) fn line(job: &Job) -> String {
     let (id, kind, since) = (job.id.0, job.kind().name(), show_when(job.changed.0));
     let priority = if job.priority.is_default() { String::new() } else { format!("priority {}  ", job.priority) };
     let note = note(job);
-    let said =
-        job.decision().map(|said| format!("{}{} by {}", if note.is_empty() { "" } else { ", " }, said.verdict.name(), said.by));
+    let said = job.decision().map(|said| format!("{}{said}", if note.is_empty() { "" } else { ", " }));
     let line =
         format!("{id:>6}  {since}  {kind:<12} {:<32} {priority}{note}{}", job.source.path.to_string(), said.unwrap_or_default());
     line.trim_end().to_owned() + "\n"

@@ -2,17 +2,17 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What a person may want to know, and no repair changes. It decides neither verdict nor outcome.
+/// Something that a person may want to know, and that no repair changes. It decides neither verdict nor outcome.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Hint {
-    /// What it is about.
+    /// Its subject.
     pub kind: HintKind,
     /// A line for people.
     pub text: String,
 }
 
-/// What a hint is about.
+/// The subject of a hint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]

@@ -82,7 +82,7 @@ pub struct Report {
     /// What every rule found in them; `None` where nothing was written.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub certificate: Option<Certificate>,
-    /// What a person may want to know of a good file, too.
+    /// Notes for people, of good files, too.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub hints: Vec<Hint>,
     /// Seconds by stage, in order.

@@ -31,7 +31,7 @@ pub(crate) fn hints(defects: &Defects, profile: &Profile) -> Vec<Hint> {
 /// Was it drawn in other units? An STL does not say; printers take them for millimetres.
 fn scale(defects: &Defects, extents: [f64; 3]) -> Option<Hint> {
     let of_box = extents.iter().product::<f64>();
-    // What is open encloses nothing certain, but no more than its box.
+    // An open surface encloses nothing certain, but no more than its box.
     let volume = if defects.boundary_edges == 0 { defects.volume.abs() } else { of_box };
     let (kind, unit, factor) = match volume {
         v if v <= 0.0 || v.is_nan() => return None,

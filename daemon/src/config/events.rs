@@ -62,7 +62,7 @@ pub(crate) struct Webhook {
     pub url: Url,
     /// Holds the secret that messages are signed with; `None`: they are not signed.
     pub secret_file: Option<PathBuf>,
-    /// What it wants to hear of.
+    /// The events that it is told of.
     pub events: Vec<Occasion>,
 }
 

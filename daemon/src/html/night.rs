@@ -6,7 +6,7 @@ use maud::{Markup, html};
 use suture_store::{Job, Kind, Time};
 
 use super::page;
-use super::words::{NEED_SOMEONE, advice, mark, state, time};
+use super::words::{NEED_SOMEONE, advice, how_many_need_you, mark, state, time};
 use crate::cli::service::NightArgs;
 use crate::create;
 use crate::exit::Exit;
@@ -53,17 +53,12 @@ fn parted(mut jobs: Vec<Job>, since: Time) -> (Vec<Job>, Vec<Job>) {
 
 fn whole(need: &[Job], ended: &[Job]) -> Markup {
     let count = |kind: Kind| ended.iter().filter(|job| job.kind() == kind).count() as u64;
-    let words = match need.len() as u64 {
-        0 => "Nothing needs you.".to_owned(),
-        1 => "One file needs you.".to_owned(),
-        many => format!("{} files need you.", show_count(many)),
-    };
     page(
         "The night",
         &html! {
             h1 { "The night" }
             div class={ "outcome " (if need.is_empty() { "good" } else { "review" }) } role="status" {
-                strong { (words) }
+                strong { (how_many_need_you(need.len() as u64)) }
                 p { (show_count(count(Kind::Done))) " done, " (show_count(count(Kind::Rejected))) " rejected, " (show_count(count(Kind::Cancelled))) " cancelled." }
             }
             @if !need.is_empty() { h2 { "What needs you" } (rows(need, true)) }
@@ -93,7 +88,7 @@ fn table(dir: &Path, jobs: &[Job]) -> String {
     const HEAD: &str = "job,folder,file,state,words,dropped,changed,bytes,attempts,profile,reason,result,decision\r\n";
     jobs.iter().fold(HEAD.to_owned(), |mut text, job| {
         let result = result_path(dir, job).map(|path| path.display().to_string()).unwrap_or_default();
-        let decision = job.decision().map(|said| format!("{} by {}", said.verdict.name(), said.by)).unwrap_or_default();
+        let decision = job.decision().map(ToString::to_string).unwrap_or_default();
         let fields = [
             job.id.to_string(),
             job.source.folder.clone(),

@@ -5,10 +5,19 @@ use suture_store::{Ending, Job, Kind, State, Time};
 
 use crate::left::area;
 use crate::shown::when;
-use crate::units::show_when;
+use crate::units::{show_count, show_when};
 
 /// Jobs that a person must look at.
 pub(crate) const NEED_SOMEONE: [Kind; 5] = [Kind::NeedsReview, Kind::Failed, Kind::Quarantined, Kind::Parked, Kind::Noticed];
+
+/// How many of these there are, as the first line of a morning.
+pub(crate) fn how_many_need_you(count: u64) -> String {
+    match count {
+        0 => "Nothing needs you.".into(),
+        1 => "One file needs you.".into(),
+        count => format!("{} files need you.", show_count(count)),
+    }
+}
 
 /// Where a job stands, and the class of that.
 pub(crate) fn state(job: &Job) -> (&'static str, &'static str) {

@@ -1,6 +1,6 @@
 //! A week, with as many jobs as there are: how long it takes, and how much memory and store the daemon needs for it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use super::chance::Chance;
@@ -9,6 +9,7 @@ use super::plan::{LEFT, Plan};
 use super::stage::{Scale, Stage};
 use super::watched;
 use crate::config::keep::HISTORY_JOBS;
+use crate::glance::size_of;
 use crate::world::World;
 
 const SCALE: Scale = Scale { meanwhile: 3000, seconds: 3, watch_order: false, tend: Duration::from_secs(1800) };
@@ -24,17 +25,6 @@ const MOST_STORE: u64 = 64 << 20;
 fn plan(_: &mut Chance) -> Plan {
     let (workers, window) = (3, Some("20:00-07:00"));
     Plan { workers, window, priorities: [5, 5], drain: 60, results: 2, history_jobs: HISTORY_JOBS }
-}
-
-/// Bytes of all files below a folder.
-fn size(folder: &Path) -> u64 {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let of = |entry: std::fs::DirEntry| match entry.metadata() {
-        Ok(meta) if meta.is_dir() => size(&entry.path()),
-        Ok(meta) => meta.len(),
-        Err(_) => 0,
-    };
-    entries.map(of).sum()
 }
 
 /// The most memory that this process ever held, in bytes.
@@ -85,13 +75,13 @@ impl Stage {
                     self.burst(burst, &mut number);
                     self.go_on(time);
                 }
-                store = store.max(size(&self.place.state()));
+                store = store.max(size_of(&self.place.state()));
             }
             if night + 1 == NIGHTS {
                 self.burst(jobs - number, &mut number);
             }
             self.come_to_rest();
-            store = store.max(size(&self.place.state()));
+            store = store.max(size_of(&self.place.state()));
             let (spent, peak) = (self.sky.passed() - began, peak() >> 20);
             eprintln!(
                 "night {night}: {number} dropped, at rest after {} h, at most {peak} MiB, store {} KiB",

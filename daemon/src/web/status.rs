@@ -8,7 +8,7 @@ use axum::extract::State;
 use serde::Serialize;
 
 use crate::attempt::Context;
-use crate::glance::Glance;
+use crate::glance;
 use crate::schedule::Standing;
 
 use super::ask::ask;
@@ -53,18 +53,19 @@ pub(super) async fn status(State(shared): State<Arc<Shared>>) -> Result<Json<Sta
 /// # Errors
 /// When the store does not answer.
 pub(super) fn of(context: &Context) -> Result<Status, Problem> {
-    let Glance { ready, reason, standing: Standing { running, held, away, untold }, jobs, folders, .. } = Glance::of(context)?;
+    let Standing { running, held, away, untold } = glance::standing(context)?;
     let served =
-        |folder: crate::glance::Served| Served { name: folder.name, reachable: folder.reachable, free_bytes: folder.free_bytes };
+        |folder: glance::Served| Served { name: folder.name, reachable: folder.reachable, free_bytes: folder.free_bytes };
+    let reason = glance::unready(context);
     Ok(Status {
         version: env!("CARGO_PKG_VERSION"),
-        ready,
+        ready: reason.is_none(),
         reason,
         running,
         held,
         away,
         untold,
-        jobs: jobs.into_iter().map(|(kind, count)| (kind.name(), count)).collect(),
-        folders: folders.into_iter().map(served).collect(),
+        jobs: glance::counts(context)?.into_iter().map(|(kind, count)| (kind.name(), count)).collect(),
+        folders: glance::folders(context).into_iter().map(served).collect(),
     })
 }

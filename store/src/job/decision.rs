@@ -1,5 +1,7 @@
 //! What a person says of a result that needs review.
 
+use std::fmt::{Display, Formatter};
+
 use serde::{Deserialize, Serialize};
 
 use super::words::{MAX_REASON, one_line};
@@ -35,11 +37,18 @@ pub struct Decision {
     pub verdict: Verdict,
     /// Who said so: a name, as it was given.
     pub by: String,
-    /// What there is to add.
+    /// Words to go with it.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub note: String,
     /// When the store took it down.
     pub at: Time,
+}
+
+impl Display for Decision {
+    /// The verdict, and who said so.
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} by {}", self.verdict.name(), self.by)
+    }
 }
 
 /// A decision that cannot be taken down.

@@ -24,16 +24,12 @@ pub(super) enum Energy {
 }
 
 /// For each vertex, the triangles at it; or its neighbours.
-pub(super) struct Lists {
+struct Lists {
     starts: Vec<u32>,
     items: Vec<u32>,
 }
 
 impl Lists {
-    pub(super) fn triangles_at(vertices: usize, triangles: &[[u32; 3]]) -> Self {
-        Self::by(vertices, triangles.iter())
-    }
-
     /// By number below `count`, the sets that hold it, in their order.
     fn by<'s, const N: usize>(count: usize, sets: impl Iterator<Item = &'s [u32; N]> + Clone) -> Self {
         let mut starts = vec![0_u32; count + 1];
@@ -54,7 +50,7 @@ impl Lists {
         Self { starts, items }
     }
 
-    pub(super) fn of(&self, v: u32) -> &[u32] {
+    fn of(&self, v: u32) -> &[u32] {
         &self.items[self.starts[v as usize] as usize..self.starts[v as usize + 1] as usize]
     }
 }
@@ -107,7 +103,7 @@ impl Forms {
 pub(super) fn solve(sheet: &mut Sheet<'_>, sharp: &[bool], energy: Energy) -> Option<f64> {
     let all: Vec<[u32; 3]> = sheet.all().collect();
     let (held, free) = (sheet.held, sheet.points.len() - sheet.held);
-    let at = Lists::triangles_at(sheet.points.len(), &all);
+    let at = Lists::by(sheet.points.len(), all.iter());
     let forms = match energy {
         Energy::Membrane => membrane(sheet, &all, &at),
         Energy::Plate | Energy::Curvature => curvature(sheet, &all, &at, sharp, energy),

@@ -95,7 +95,7 @@ fn facts(job: &Job) -> Markup {
                 @if let Some(other) = publication.reused { (fact("Copied from", html! { a href={ "/jobs/" (other) } { "job " (other) } })) }
             }
             @if let Some(said) = job.decision() {
-                (fact("Decision", html! { (plain(&format!("{} by {}", said.verdict.name(), said.by))) ", " (time(said.at)) @if !said.note.is_empty() { ": " (plain(&said.note)) } }))
+                (fact("Decision", html! { (plain(&said.to_string())) ", " (time(said.at)) @if !said.note.is_empty() { ": " (plain(&said.note)) } }))
             }
             (fact("Original", text(format!("{}/{path}", area(place)))))
             (fact("Size", text(show_size(job.source.size))))

@@ -12,7 +12,7 @@ use super::frame::Frame;
 use super::history::{link, list_of};
 use crate::attempt::Context;
 use crate::event_bus::Bus;
-use crate::html::words::{NEED_SOMEONE, advice, mark, time};
+use crate::html::words::{NEED_SOMEONE, advice, how_many_need_you, mark, time};
 use crate::say::plain;
 use crate::shown::reason;
 use crate::units::{show_count, show_size};
@@ -77,10 +77,9 @@ fn standing(night: &Night) -> Markup {
     let Status { held, away, untold, reason, .. } = &night.status;
     let is_held = !held.is_empty() || !away.is_empty() || !untold.is_empty() || reason.is_some();
     let (class, words) = match (count, is_held) {
-        (0, false) => ("good", "Nothing needs you.".to_owned()),
+        (0, false) => ("good", how_many_need_you(0)),
         (0, true) => ("review", "No file needs you, but the daemon does not do all of its work.".to_owned()),
-        (1, _) => ("review", "One file needs you.".to_owned()),
-        (count, _) => ("review", format!("{} files need you.", show_count(count))),
+        (count, _) => ("review", how_many_need_you(count)),
     };
     html! {
         div class={ "outcome " (class) } role="status" {

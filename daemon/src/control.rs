@@ -2,7 +2,7 @@
 //! by opening the store ([`crate::reach`]). Either way the same [`JobsWish`] is answered alike; a [`DaemonWish`] only a daemon can answer.
 
 use std::collections::VecDeque;
-use std::io::{self, BufRead, BufReader, Read, Write};
+use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::Shutdown;
 use std::os::fd::AsRawFd;
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -357,9 +357,14 @@ fn serve_one(context: &Context, stream: &UnixStream, patience: Duration) -> io::
 /// Asks the daemon of a hot folder; `None` when none answers.
 ///
 /// # Errors
-/// When one does, but not in a way that can be understood.
+/// When it cannot be told whether one runs, or one does and answers in no way that can be understood.
 pub(crate) fn ask<W: Wish>(root: &Path, wish: &W) -> io::Result<Option<Result<W::Answer, Refusal>>> {
-    let Ok(mut stream) = short(&socket(root), |path| UnixStream::connect(path)) else { return Ok(None) };
+    let mut stream = match short(&socket(root), |path| UnixStream::connect(path)) {
+        Ok(stream) => stream,
+        // No socket, or one that a daemon left behind. Any other error says nothing of a daemon.
+        Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::ConnectionRefused) => return Ok(None),
+        Err(error) => return Err(error),
+    };
     stream.set_read_timeout(Some(PATIENCE))?;
     stream.set_write_timeout(Some(PATIENCE))?;
     let request: Request = wish.clone().into();
@@ -403,5 +408,12 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         std::fs::create_dir(dir.path().join(".suture")).unwrap();
         assert!(ask(dir.path(), &JobsWish::List).unwrap().is_none());
+        // One that was left behind: no one listens there.
+        drop(UnixListener::bind(socket(dir.path())).unwrap());
+        assert!(ask(dir.path(), &JobsWish::List).unwrap().is_none());
+        // A file that is no socket, and a folder that cannot be looked into, tell nothing.
+        let elsewhere = tempfile::tempdir().unwrap();
+        std::fs::write(elsewhere.path().join(".suture"), b"").unwrap();
+        assert!(ask(elsewhere.path(), &JobsWish::List).is_err());
     }
 }

@@ -63,24 +63,37 @@ impl From<StoreError> for Failure {
 /// # Errors
 /// When `dir` is no hot folder, there is no such job, or neither a daemon answers nor the store can be opened.
 pub(crate) fn jobs(dir: &Path, wish: &JobsWish) -> Result<Vec<Job>, Failure> {
-    if let Some(jobs) = through_daemon(dir, wish)? {
-        return Ok(jobs);
+    Ok(match daemon_or_store(dir, wish, wish)? {
+        Answered::Daemon(jobs) | Answered::Store(jobs) => jobs,
+    })
+}
+
+/// Who answered: only the store's answer says that no daemon ran.
+enum Answered<A> {
+    Daemon(A),
+    Store(Vec<Job>),
+}
+
+/// Asks the daemon for `asked`; while none answers, the store for `instead`, until one of them can tell.
+fn daemon_or_store<W: Wish>(dir: &Path, asked: &W, instead: &JobsWish) -> Result<Answered<W::Answer>, Failure> {
+    if let Some(answer) = through_daemon(dir, asked)? {
+        return Ok(Answered::Daemon(answer));
     }
     let state = state_of(dir).map_err(|error| unseen(dir, &error))?;
     if !fsx::is_folder(&state).map_err(|error| unseen(&state, &error))? {
-        return Ok(Vec::new());
+        return Ok(Answered::Store(Vec::new()));
     }
     watched().map_err(|error| Failure::try_again(format!("no thread can be started: {error}; try again")))?;
-    let asked = Instant::now();
+    let began = Instant::now();
     loop {
-        match through_store(&state, wish) {
-            Ok(jobs) => return Ok(jobs),
+        match through_store(&state, instead) {
+            Ok(jobs) => return Ok(Answered::Store(jobs)),
             Err(Unread::Failed(failure)) => return Err(failure),
-            Err(Unread::Held(pid)) if asked.elapsed() >= PATIENCE => return Err(held(dir, pid)),
+            Err(Unread::Held(pid)) if began.elapsed() >= PATIENCE => return Err(held(dir, pid)),
             Err(Unread::Held(_)) => std::thread::sleep(ASK_EVERY),
         }
-        if let Some(jobs) = through_daemon(dir, wish)? {
-            return Ok(jobs);
+        if let Some(answer) = through_daemon(dir, asked)? {
+            return Ok(Answered::Daemon(answer));
         }
     }
 }
@@ -116,10 +129,10 @@ pub(crate) fn daemon(dir: &Path, wish: &DaemonWish) -> Result<Option<Standing>, 
 /// # Errors
 /// When `dir` is no hot folder, or neither a daemon answers nor the store can be read.
 pub(crate) fn glance(dir: &Path) -> Result<Glance, Failure> {
-    if let Some(glance) = through_daemon(dir, &GlanceWish)? {
-        return Ok(glance);
-    }
-    let jobs = jobs(dir, &JobsWish::List)?;
+    let jobs = match daemon_or_store(dir, &GlanceWish, &JobsWish::List)? {
+        Answered::Daemon(glance) => return Ok(glance),
+        Answered::Store(jobs) => jobs,
+    };
     let state = state_of(dir).map_err(|error| unseen(dir, &error))?;
     let paused = standstill::is_set(&state).map_err(|error| unseen(&state, &error))?;
     Ok(Glance::of_jobs(jobs, paused.then(|| standstill::WORDS.into()).into_iter().collect(), &state))
@@ -148,6 +161,10 @@ fn through_daemon<W: Wish>(dir: &Path, wish: &W) -> Result<Option<W::Answer>, Fa
         Ok(answer) => Ok(answer.transpose()?),
         Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
             Err(Failure::try_again("the daemon does not answer: it is stopped, or very busy; try again".into()))
+        }
+        Err(error) if error.kind() == ErrorKind::PermissionDenied => {
+            let line = format!("{}: no right to ask its daemon ({error}); run this as the daemon's user", dir.display());
+            Err(Failure { line, exit: Exit::Refused })
         }
         // It died over it; what only looks can be asked of the next one.
         Err(error) if CUT_OFF.contains(&error.kind()) && wish.only_looks() => Ok(None),
@@ -200,6 +217,11 @@ fn held(dir: &Path, pid: Option<u32>) -> Failure {
 
 #[cfg(test)]
 mod tests {
+    use std::io::{BufRead, BufReader};
+    use std::os::unix::net::UnixListener;
+
+    use suture_store::Time;
+
     use super::*;
 
     fn hot() -> tempfile::TempDir {
@@ -237,6 +259,24 @@ mod tests {
             failure.line.contains(&pid) && failure.line.ends_with("try again") && !failure.line.contains('\n'),
             "{failure:?}"
         );
+    }
+
+    /// A daemon that starts has the store before it answers. Who asks then is told of a daemon that runs.
+    #[test]
+    fn a_daemon_that_begins_to_answer_is_not_taken_for_none() {
+        let dir = hot();
+        let _store = SledStore::open(&state_of(dir.path()).unwrap()).unwrap();
+        let glance = std::thread::scope(|scope| {
+            let asking = scope.spawn(|| glance(dir.path()));
+            std::thread::sleep(Duration::from_millis(300));
+            let listener = UnixListener::bind(dir.path().join(".suture/control.sock")).unwrap();
+            let (stream, _) = listener.accept().unwrap();
+            BufReader::new(&stream).read_line(&mut String::new()).unwrap();
+            let runs = Glance { since: Some(Time(7)), ..Glance::default() };
+            serde_json::to_writer(stream, &Ok::<_, Refusal>(runs)).unwrap();
+            asking.join().unwrap()
+        });
+        assert_eq!(glance.unwrap().since, Some(Time(7)));
     }
 
     #[test]

@@ -1,16 +1,16 @@
-//! The queue's logic over five ordered tables, shared by every store that is embedded in the daemon.
+//! The queue's logic over four ordered tables, shared by every store that is embedded in the daemon.
 //!
 //! | table    | key                                                                     | value                     |
 //! |----------|-------------------------------------------------------------------------|---------------------------|
 //! | meta     | `head`; `unfilled` (see `past`); `subscribers` (see [`outbox`])         | [`Head`]; `true`; names and transitions |
 //! | jobs     | job number                                                              | the [`Job`]               |
 //! | by_state | kind, then what that kind is searched by (see [`index`])                | nothing                   |
-//! | by_key   | identity of the file: device, inode, size, mtime, folder, path          | number of its latest job  |
 //! | outbox   | number of the transition in which a job ended                           | the [`Job`] as it was then |
 //!
 //! Numbers in keys are big-endian. The job, its index entries and the head change in one transaction of the tables. One lock
 //! orders the transitions; becoming durable happens outside of it, so that transitions of several threads share one sync. Which job is
-//! claimed next is told by a [`mod@line`] of all that may be, and whose result others may have by [`results`]: in memory, made anew at each opening.
+//! claimed next is told by a [`mod@line`] of all that may be, whose result others may have by [`results`], and whose job is whose file by [`files`]: in
+//! memory, made anew at each opening.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -27,7 +27,7 @@ use crate::store::{
 };
 use crate::tables::{Put, Table, Tables};
 
-mod by_key;
+mod files;
 mod forget;
 mod index;
 mod line;
@@ -39,6 +39,7 @@ mod past;
 mod recover;
 mod results;
 
+use files::{Files, Identity};
 use line::{Line, Now};
 use results::Results;
 
@@ -63,7 +64,22 @@ struct Inner {
     counts: BTreeMap<Kind, u64>,
     line: Line,
     results: Results,
+    files: Files,
     subscribers: outbox::Subscribers,
+}
+
+impl Inner {
+    /// A job came, or changed.
+    fn learn(&mut self, job: &Job) {
+        self.results.add(job);
+        self.files.add(job);
+    }
+
+    /// A job changes, or goes.
+    fn lose(&mut self, job: &Job) {
+        self.results.remove(job);
+        self.files.remove(job);
+    }
 }
 
 /// The queue over `T`.
@@ -96,6 +112,22 @@ pub(crate) fn all_jobs(tables: &dyn Tables) -> Result<Vec<Job>, StoreError> {
     Ok(jobs)
 }
 
+/// What is told from memory, of all jobs. A damaged record offers no result and answers for no file; whoever asks for its job hears of it.
+fn told_from_memory(tables: &dyn Tables) -> Result<(Results, Files), StoreError> {
+    let (mut results, mut files) = (Results::default(), Files::default());
+    tables.scan(Table::Jobs, &[], &[], &mut |key, value| {
+        match record::decode(Table::Jobs, key, value) {
+            Ok(job) => {
+                results.add(&job);
+                files.add(&job);
+            }
+            Err(error) => tracing::warn!(%error, "A job at rest cannot be read."),
+        }
+        Ok(true)
+    })?;
+    Ok((results, files))
+}
+
 impl<T: Tables> Queue<T> {
     /// Begins a new epoch, durably, after checking every job that is not at rest.
     pub(crate) fn open(tables: T, clock: Arc<dyn Clock>) -> Result<Self, StoreError> {
@@ -105,8 +137,8 @@ impl<T: Tables> Queue<T> {
         head.epoch.0 += 1;
         head.seq.0 += 1;
         let (counts, subscribers) = (index::count(&tables)?, outbox::subscribers(&tables)?);
-        let results = Results::of(&tables)?;
-        let inner = Inner { head, counts, line: Line::default(), results, subscribers };
+        let (results, files) = told_from_memory(&tables)?;
+        let inner = Inner { head, counts, line: Line::default(), results, files, subscribers };
         let queue = Self { tables, inner: Mutex::new(inner), clock };
         let now = queue.now();
         for kind in Kind::ALL.into_iter().filter(|kind| kind.is_live()) {
@@ -167,15 +199,9 @@ impl<T: Tables> Queue<T> {
         self.job(id)?.ok_or(StoreError::Unknown(id))
     }
 
-    /// Makes the changes `from → to` (and `more`) durable. `head` is the head they leave.
-    fn commit(
-        &self,
-        mut inner: MutexGuard<'_, Inner>,
-        head: Head,
-        changes: &[(Option<&Job>, &Job)],
-        more: Vec<Put>,
-    ) -> Result<(), StoreError> {
-        let mut puts = more;
+    /// Writes the changes `from → to`. `head` is the head they leave.
+    fn commit(&self, mut inner: MutexGuard<'_, Inner>, head: Head, changes: &[(Option<&Job>, &Job)]) -> Result<(), StoreError> {
+        let mut puts = Vec::new();
         let mut counts = inner.counts.clone();
         for (from, to) in changes {
             let old = from.map(index::key);
@@ -200,8 +226,8 @@ impl<T: Tables> Queue<T> {
         let now = self.now();
         for (from, to) in changes {
             inner.line.update(to, now);
-            from.iter().for_each(|from| inner.results.remove(from));
-            inner.results.add(to);
+            from.iter().for_each(|from| inner.lose(from));
+            inner.learn(to);
         }
         drop(inner);
         crash_point("store.commit.written");
@@ -219,7 +245,7 @@ impl<T: Tables> Queue<T> {
         let after = event(&before, &head).and_then(|event| before.after(&event, now));
         let mut after = after.map_err(|source| StoreError::Illegal { id, source })?;
         after.seq = head.seq;
-        self.commit(inner, head, &[(Some(&before), &after)], Vec::new())?;
+        self.commit(inner, head, &[(Some(&before), &after)])?;
         self.settle(head)?;
         Ok(after)
     }
@@ -238,8 +264,8 @@ impl<T: Tables> Queue<T> {
         let mut jobs: Vec<Job> = Vec::new();
         let mut keys = BTreeMap::new();
         for submission in found {
-            let key = by_key::key(&submission.source);
-            if let Some(id) = keys.get(&key).copied().map_or_else(|| self.answering(&key), |id| Ok(Some(id)))? {
+            let file = Identity::from(&submission.source);
+            if let Some(id) = keys.get(&file).copied().map_or_else(|| self.answering(&inner, &file), |id| Ok(Some(id)))? {
                 answers.push(Submitted { id, new: false });
                 continue;
             }
@@ -254,23 +280,30 @@ impl<T: Tables> Queue<T> {
             job.priority = submission.priority;
             job.seq = head.seq;
             jobs.push(job);
-            keys.insert(key, id);
+            keys.insert(file, id);
             answers.push(Submitted { id, new: true });
         }
         if jobs.is_empty() {
             return Ok(None);
         }
-        let puts = by_key::puts(keys)?;
         let changes: Vec<_> = jobs.iter().map(|job| (None, job)).collect();
-        self.commit(inner, head, &changes, puts)?;
+        self.commit(inner, head, &changes)?;
         Ok(Some(head))
     }
 
-    /// The job that answers for the file with this identity already.
-    fn answering(&self, key: &[u8]) -> Result<Option<JobId>, StoreError> {
-        let Some(bytes) = self.tables.get(Table::ByKey, key)? else { return Ok(None) };
-        let id: JobId = record::decode(Table::ByKey, key, &bytes)?;
-        Ok(self.job(id)?.filter(Job::answers_for_source).map(|job| job.id))
+    /// The latest job of a file.
+    fn latest_of(&self, inner: &Inner, file: &Identity<'_>) -> Result<Option<Job>, StoreError> {
+        for id in inner.files.candidates(file) {
+            if let Some(job) = self.job(id)?.filter(|job| Identity::from(&job.source) == *file) {
+                return Ok(Some(job));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The job that answers for this file already.
+    fn answering(&self, inner: &Inner, file: &Identity<'_>) -> Result<Option<JobId>, StoreError> {
+        Ok(self.latest_of(inner, file)?.filter(Job::answers_for_source).map(|job| job.id))
     }
 }
 
@@ -310,7 +343,7 @@ impl<T: Tables> JobStore for Queue<T> {
         let event = Event::Claim { epoch: head.epoch, token, boot: self.clock.boot() };
         let mut job = before.after(&event, now.wall).map_err(|source| StoreError::Illegal { id, source })?;
         job.seq = head.seq;
-        self.commit(inner, head, &[(Some(&before), &job)], Vec::new())?;
+        self.commit(inner, head, &[(Some(&before), &job)])?;
         self.settle(head)?;
         Ok(Some(Claim { id, token, job }))
     }
@@ -397,7 +430,7 @@ impl<T: Tables> JobStore for Queue<T> {
     }
 
     fn find(&self, source: &Source) -> Result<Option<JobId>, StoreError> {
-        self.latest_of(source)
+        Ok(self.latest_of(&self.lock(), &source.into())?.map(|job| job.id))
     }
 
     fn results(&self, size: u64, recipe: Option<Recipe>) -> Result<Vec<Job>, StoreError> {
@@ -447,7 +480,7 @@ impl<T: Tables> JobStore for Queue<T> {
 }
 
 fn head_put(head: &Head) -> Result<Put, StoreError> {
-    Ok(Put { table: Table::Meta, key: HEAD.to_vec(), value: Some(record::encode(Table::Meta, HEAD, head)?) })
+    Ok(Put { table: Table::Meta, key: HEAD.to_vec(), value: Some(record::encode_head(HEAD, head)?) })
 }
 
 fn unfilled_put() -> Result<Put, StoreError> {

@@ -11,9 +11,14 @@ use crate::store::StoreError;
 use crate::tables::Table;
 
 /// Version of what the JSON means. Raised when an older program would misread it.
-pub(crate) const SCHEMA: u16 = 3;
-/// That of a record in which nothing is that version 2 did not know, so that a program of then goes on with it.
+pub(crate) const SCHEMA: u16 = 4;
+/// That of a record in which nothing is that version 2 did not know.
 const PLAIN: u16 = 2;
+/// That of a job that was approved.
+const APPROVED: u16 = 3;
+/// That of the head: from version 4 on, whose job is whose file stands in the jobs alone. An earlier program would look for it in an index that is
+/// gone, and take each file that waits for a new one: the head's schema has it refuse the store.
+const HEAD: u16 = 4;
 /// Largest record in bytes. The database would put values from a quarter of its segment on into files of their own.
 pub(crate) const MAX: usize = 4608;
 
@@ -37,7 +42,12 @@ fn checksum(table: Table, key: &[u8], schema: u16, json: &[u8]) -> u32 {
 
 /// `job` as a record under `key`.
 pub(crate) fn encode_job(key: &[u8], job: &Job) -> Result<Vec<u8>, StoreError> {
-    encode_as(if let State::Approved { .. } = job.state { SCHEMA } else { PLAIN }, Table::Jobs, key, job)
+    encode_as(if let State::Approved { .. } = job.state { APPROVED } else { PLAIN }, Table::Jobs, key, job)
+}
+
+/// The head as a record under `key`.
+pub(crate) fn encode_head<T: Serialize>(key: &[u8], head: &T) -> Result<Vec<u8>, StoreError> {
+    encode_as(HEAD, Table::Meta, key, head)
 }
 
 /// `value` as a record under `key` of `table`.
@@ -86,7 +96,6 @@ fn name(table: Table, key: &[u8]) -> String {
             Err(_) => "a job under a key that is no number".to_owned(),
         },
         Table::ByState => "by_state".to_owned(),
-        Table::ByKey => "by_key".to_owned(),
         Table::Outbox => "outbox".to_owned(),
     }
 }
@@ -165,15 +174,15 @@ mod tests {
         assert_eq!(decode::<u32>(Table::Meta, b"head", &bytes).unwrap(), 7);
         let damaged = |result: Result<u32, StoreError>| assert!(matches!(result, Err(StoreError::Corrupt { .. })), "{result:?}");
         damaged(decode(Table::Meta, b"tail", &bytes));
-        damaged(decode(Table::ByKey, b"head", &bytes));
+        damaged(decode(Table::Outbox, b"head", &bytes));
         damaged(decode(Table::Meta, b"head", b""));
         // A record of a later version, whole in itself.
         let mut later = bytes;
-        later[5] = 4;
-        let crc = checksum(Table::Meta, b"head", 4, b"7");
+        later[5] = 5;
+        let crc = checksum(Table::Meta, b"head", 5, b"7");
         later[6..10].copy_from_slice(&crc.to_be_bytes());
         let result = decode::<u32>(Table::Meta, b"head", &later);
-        assert!(matches!(result, Err(StoreError::Newer { found: 4, known: SCHEMA })), "{result:?}");
+        assert!(matches!(result, Err(StoreError::Newer { found: 5, known: SCHEMA })), "{result:?}");
     }
 
     /// A job as version 1 wrote it, without what was added since.

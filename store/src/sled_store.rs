@@ -6,7 +6,7 @@
 //! |------------------|----------------------------------------------------------------------------------------------------|
 //! | `LOCK`           | locked by the daemon that owns the folder; its process number as text                              |
 //! | `SEQ`            | how far the store got: `suture-seq 1 <epoch> <transition> <crc32>`; see below                      |
-//! | `db/`            | the sled database: trees `meta`, `jobs`, `by_state`, `by_key`, `outbox`: see [`crate::queue`]   |
+//! | `db/`            | the sled database: trees `meta`, `jobs`, `by_state`, `outbox`: see [`crate::queue`]   |
 //! | `db.trial/`      | only while a damaged database is being examined                                                    |
 //! | `corrupt-<ms>/`  | a damaged database that was replaced, alone or with its `SEQ`; for people                          |
 //!

@@ -1,9 +1,8 @@
 //! The end of a record: jobs at rest leave the store, with all that points to them. Their numbers are never used again.
 
-use super::{Queue, by_key, head_put, index};
+use super::{Queue, head_put, index};
 use crate::crash::crash_point;
 use crate::id::JobId;
-use crate::record;
 use crate::store::StoreError;
 use crate::tables::{Put, Table, Tables};
 
@@ -30,13 +29,6 @@ impl<T: Tables> Queue<T> {
             let Some(job) = self.job(*id)?.filter(|job| job.kind().is_at_rest()) else { continue };
             puts.push(none(Table::ByState, index::key(&job)));
             puts.push(none(Table::Jobs, id.0.to_be_bytes().to_vec()));
-            // A later job of the same file has the entry by now.
-            let key = by_key::key(&job.source);
-            let latest = self.tables.get(Table::ByKey, &key)?;
-            let latest = latest.map(|bytes| record::decode::<JobId>(Table::ByKey, &key, &bytes)).transpose()?;
-            if latest == Some(*id) {
-                puts.push(none(Table::ByKey, key));
-            }
             let count = counts.entry(job.kind()).or_default();
             *count = count.saturating_sub(1);
             removed.push(job);
@@ -48,7 +40,7 @@ impl<T: Tables> Queue<T> {
         puts.push(head_put(&head)?);
         self.tables.write(puts, head.seq)?;
         (inner.head, inner.counts) = (head, counts);
-        removed.iter().for_each(|job| inner.results.remove(job));
+        removed.iter().for_each(|job| inner.lose(job));
         drop(inner);
         crash_point("store.commit.written");
         self.settle(head)?;

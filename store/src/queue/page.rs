@@ -1,8 +1,8 @@
 //! Pages of jobs for people, the latest first, at a cost that does not grow with the store.
 
-use super::{Queue, by_key, index};
+use super::{Queue, index};
 use crate::id::JobId;
-use crate::job::{Job, Source};
+use crate::job::Job;
 use crate::record;
 use crate::store::{Look, PAGE_READS, Page, StoreError};
 use crate::tables::{Table, Tables};
@@ -51,13 +51,5 @@ impl<T: Tables> Queue<T> {
         }
         page.next = last.filter(|_| is_cut);
         Ok(page)
-    }
-
-    /// As [`crate::JobStore::find`].
-    pub(super) fn latest_of(&self, source: &Source) -> Result<Option<JobId>, StoreError> {
-        let key = by_key::key(source);
-        let Some(bytes) = self.tables.get(Table::ByKey, &key)? else { return Ok(None) };
-        let id = record::decode(Table::ByKey, &key, &bytes)?;
-        Ok(self.job(id)?.map(|job| job.id))
     }
 }

@@ -3,9 +3,9 @@
 //! The entry `unfilled` of the table `meta` is made with the first head, and goes when nothing is left to be read. As long as it is there, a
 //! daemon that was interrupted over it reads once more.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
-use super::{Queue, SUBMIT_CHUNK, UNFILLED, by_key, fits, head_put};
+use super::{Queue, SUBMIT_CHUNK, UNFILLED, fits, head_put};
 use crate::id::{JobId, Token};
 use crate::job::{Job, Past, one_line};
 use crate::path::{MAX_NAMED, MAX_SOURCE, RelPath};
@@ -51,7 +51,7 @@ impl<T: Tables> Queue<T> {
     fn restore_chunk(&self, past: &[Past]) -> Result<Vec<JobId>, StoreError> {
         let inner = self.lock();
         let mut head = inner.head;
-        let (mut jobs, mut keys, mut taken) = (Vec::<Job>::new(), BTreeMap::new(), BTreeSet::new());
+        let (mut jobs, mut taken) = (Vec::<Job>::new(), BTreeSet::new());
         for one in past {
             let is_number = (1..=HIGHEST).contains(&one.id.0);
             let is_free = is_number && !taken.contains(&one.id) && self.job(one.id)?.is_none();
@@ -64,14 +64,10 @@ impl<T: Tables> Queue<T> {
             let Token(work) = job.work.unwrap_or_default();
             head.seq.0 = head.seq.0.max(work) + 1;
             job.seq = head.seq;
-            if job.source.ino != 0 {
-                keys.insert(by_key::key(&job.source), id);
-            }
             jobs.push(job);
         }
-        let puts = by_key::puts(keys)?;
         let changes: Vec<_> = jobs.iter().map(|job| (None, job)).collect();
-        self.commit(inner, head, &changes, puts)?;
+        self.commit(inner, head, &changes)?;
         self.settle(head)?;
         Ok(jobs.iter().map(|job| job.id).collect())
     }

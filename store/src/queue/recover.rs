@@ -41,7 +41,7 @@ impl<T: Tables> Queue<T> {
         // All in one transaction: whether a job was alone can only be told while none of them is taken back yet.
         let mut changes: Vec<_> = orphans.iter().zip(&recovered).map(|(from, to)| (Some(from), &to.job)).collect();
         changes.extend(parked.iter().map(|(from, to)| (Some(from), to)));
-        self.commit(inner, head, &changes, Vec::new())?;
+        self.commit(inner, head, &changes)?;
         self.settle(head)?;
         Ok(recovered)
     }

@@ -6,28 +6,13 @@ use std::collections::BTreeSet;
 
 use crate::id::{JobId, Recipe};
 use crate::job::Job;
-use crate::record;
-use crate::store::{MOST_RESULTS, StoreError};
-use crate::tables::{Table, Tables};
+use crate::store::MOST_RESULTS;
 
 /// Size of the source, recipe and job of each good result, the latest first.
 #[derive(Default)]
 pub(super) struct Results(BTreeSet<(u64, Recipe, Reverse<JobId>)>);
 
 impl Results {
-    /// Those of all jobs. A damaged record offers nothing; whoever asks for its job hears of it.
-    pub(super) fn of(tables: &dyn Tables) -> Result<Self, StoreError> {
-        let mut results = Self::default();
-        tables.scan(Table::Jobs, &[], &[], &mut |key, value| {
-            match record::decode::<Job>(Table::Jobs, key, value) {
-                Ok(job) => results.add(&job),
-                Err(error) => tracing::warn!(%error, "A job at rest cannot be read."),
-            }
-            Ok(true)
-        })?;
-        Ok(results)
-    }
-
     /// A job came, or changed.
     pub(super) fn add(&mut self, job: &Job) {
         self.0.extend(job.offers().map(|recipe| (job.source.size, recipe, Reverse(job.id))));

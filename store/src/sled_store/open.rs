@@ -53,6 +53,7 @@ pub(super) fn queue(state: &Path, clock: &Arc<dyn Clock>) -> Result<(Queue<SledT
     files::sync_all(&dir)?;
     files::sync_dir(state)?;
     let queue = Queue::open(tables, Arc::clone(clock))?;
+    queue.tables().drop_earlier_indexes()?;
     opening.epoch = queue.epoch();
     Ok((queue, opening))
 }

@@ -1,4 +1,4 @@
-//! The five tables as sled trees, and the one place where they become durable.
+//! The four tables as sled trees, and the one place where they become durable.
 
 use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -14,6 +14,8 @@ use crate::stall::Call;
 use crate::store::StoreError;
 use crate::tables::{Put, Table, Tables, Visit};
 
+/// Indexes of earlier versions: of results, and of files.
+const EARLIER_INDEXES: [&str; 2] = ["by_recipe", "by_key"];
 /// Transitions between two marks in `SEQ`.
 const MARK_EVERY: u64 = 64;
 
@@ -34,7 +36,6 @@ struct Handles {
     meta: sled::Tree,
     jobs: sled::Tree,
     by_state: sled::Tree,
-    by_key: sled::Tree,
     outbox: sled::Tree,
 }
 
@@ -107,20 +108,24 @@ impl SledTables {
             crash_point("store.open.sled");
             let tree = |name: &str| db.open_tree(name).map_err(failed);
             let (meta, jobs) = (tree("meta")?, tree("jobs")?);
-            let (by_state, by_key, outbox) = (tree("by_state")?, tree("by_key")?, tree("outbox")?);
-            // Earlier versions kept an index of results here. They make it anew, empty, when they are gone back to.
-            db.drop_tree("by_recipe").map_err(failed)?;
+            let (by_state, outbox) = (tree("by_state")?, tree("outbox")?);
             let path = dir.join("db");
             let file = File::open(&path).map_err(io(&path, "opening the database file"))?;
             Ok(Self {
                 state: state.to_owned(),
                 dir: dir.to_owned(),
-                handles: Some(Handles { db, meta, jobs, by_state, by_key, outbox }),
+                handles: Some(Handles { db, meta, jobs, by_state, outbox }),
                 file,
                 progress: Mutex::default(),
                 synced: Condvar::new(),
             })
         })
+    }
+
+    /// Removes the indexes that earlier versions kept on disk. The head that is durable by now keeps these versions away from here.
+    pub(super) fn drop_earlier_indexes(&self) -> Result<(), StoreError> {
+        let db = &self.handles()?.db;
+        guarded(|| EARLIER_INDEXES.iter().try_for_each(|name| db.drop_tree(name).map(drop).map_err(failed)))
     }
 
     #[cfg(test)]
@@ -144,7 +149,6 @@ impl SledTables {
             Table::Meta => &handles.meta,
             Table::Jobs => &handles.jobs,
             Table::ByState => &handles.by_state,
-            Table::ByKey => &handles.by_key,
             Table::Outbox => &handles.outbox,
         })
     }
@@ -227,16 +231,15 @@ impl Tables for SledTables {
 
     fn write(&self, puts: Vec<Put>, seq: Seq) -> Result<(), StoreError> {
         self.sound()?;
-        let Handles { meta, jobs, by_state, by_key, outbox, .. } = self.handles()?;
-        let trees = (meta, jobs, by_state, by_key, outbox);
+        let Handles { meta, jobs, by_state, outbox, .. } = self.handles()?;
+        let trees = (meta, jobs, by_state, outbox);
         let written = guarded(|| {
-            let result: TransactionResult<(), ()> = trees.transaction(|(meta, jobs, by_state, by_key, outbox)| {
+            let result: TransactionResult<(), ()> = trees.transaction(|(meta, jobs, by_state, outbox)| {
                 for put in &puts {
                     let tree = match put.table {
                         Table::Meta => meta,
                         Table::Jobs => jobs,
                         Table::ByState => by_state,
-                        Table::ByKey => by_key,
                         Table::Outbox => outbox,
                     };
                     match &put.value {

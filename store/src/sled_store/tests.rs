@@ -358,9 +358,9 @@ fn f06_a_store_that_was_taken_away_is_not_begun_anew() {
     store.check().unwrap();
 }
 
-/// Earlier versions had an index of results on disk.
+/// Earlier versions had indexes of results and of files on disk.
 #[test]
-fn f29_an_index_of_an_earlier_version_goes_and_results_are_found_without_it() {
+fn f29_indexes_of_earlier_versions_go_and_all_is_found_without_them() {
     let state = tempfile::tempdir().unwrap();
     let store = SledStore::open(state.path()).unwrap();
     let id = submit(&store, "part.stl");
@@ -371,11 +371,18 @@ fn f29_an_index_of_an_earlier_version_goes_and_results_are_found_without_it() {
     }
     drop(store);
     let earlier = sled::Config::new().path(state.path().join("db")).segment_size(64 << 10).open().unwrap();
-    earlier.open_tree("by_recipe").unwrap().insert([0; 24], b"").unwrap();
+    // Their programs refuse what has lost them.
+    let head = earlier.open_tree("meta").unwrap().get(b"head").unwrap().unwrap();
+    assert_eq!(head[4..6], [0, 4]);
+    for name in ["by_recipe", "by_key"] {
+        earlier.open_tree(name).unwrap().insert([0; 24], b"").unwrap();
+    }
     drop(earlier);
     for _ in 0..2 {
         let store = SledStore::open(state.path()).unwrap();
-        assert!(!store.queue.tables().names().contains(&"by_recipe".to_owned()));
+        assert!(!store.queue.tables().names().iter().any(|name| name.starts_with("by_") && name != "by_state"));
+        let file = store.get(id).unwrap().unwrap().source;
+        assert_eq!(store.find(&file).unwrap(), Some(id));
         let found = store.results(84, Some(Recipe(7))).unwrap();
         assert_eq!(found.iter().map(|job| job.id).collect::<Vec<_>>(), [id]);
         assert!(store.results(84, Some(Recipe(8))).unwrap().is_empty());

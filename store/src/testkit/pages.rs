@@ -71,6 +71,8 @@ pub(super) fn a_files_latest_job_is_found(subject: &mut dyn Subject, _: &ManualC
     assert_eq!(store.find(&other)?, None);
     store.control(second, Control::Cancel)?;
     store.forget(&[second])?;
+    assert_eq!(store.find(&source)?, Some(first), "the latest that is known");
+    store.forget(&[first])?;
     assert_eq!(store.find(&source)?, None);
     Ok(())
 }

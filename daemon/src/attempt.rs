@@ -13,8 +13,8 @@ use crossbeam::channel::Sender;
 use suture_core::report::Task;
 use suture_core::{ErrorClass, Limits, Profile, Report};
 use suture_store::Lease;
-use suture_store::job::{Death as StoreDeath, Duty, Kind, Withdrawal};
-use suture_store::{Claim, Ending, Job, JobId, JobStore, State, Step, StoreError, crash_point};
+use suture_store::job::{Duty, Kind, Withdrawal};
+use suture_store::{Claim, Job, JobId, JobStore, State, Step, StoreError, crash_point};
 
 use crate::choice;
 use crate::claim::{CLAIMED, Claimed, Unclaimed, claim};
@@ -30,12 +30,15 @@ use crate::protocol::Request;
 use crate::publish::{Conclusion, Desk, OUTPUT, discard};
 use crate::publish_error::PublishError;
 use crate::pulse::Pulse;
-use crate::receipt::ReusedFrom;
 use crate::reuse::Sought;
 use crate::schedule::{Schedule, Turn, Waits};
 use crate::settings::Settings;
-use crate::supervise::{Cause, Death, Ended};
+use crate::supervise::{Cause, Ended};
 use crate::world::{Hand, Share, World};
+
+mod worked;
+
+use worked::Worked;
 
 /// Left by a worker that outlived the daemon: the file it worked on did not kill it.
 pub(crate) const WITNESS: &str = "outlived";
@@ -127,11 +130,20 @@ pub(crate) struct Slot {
     served: u32,
     /// A file of the result in work is in its place.
     committed: Cell<bool>,
+    /// It has a turn, and its file is not computed yet.
+    computes: Cell<bool>,
 }
 
 impl Slot {
     pub(crate) fn new(context: &Arc<Context>) -> Self {
-        Self { context: Arc::clone(context), worker: None, memory: 0, served: 0, committed: Cell::new(false) }
+        Self {
+            context: Arc::clone(context),
+            worker: None,
+            memory: 0,
+            served: 0,
+            committed: Cell::new(false),
+            computes: Cell::new(false),
+        }
     }
 
     /// Works until the schedule says stop.
@@ -158,6 +170,7 @@ impl Slot {
 
     /// Takes its turn: the job that is next.
     fn take(&mut self, turn: Turn) {
+        self.computes.set(true);
         if turn.is_alone() {
             // Its memory belongs to the large file now.
             self.worker = None;
@@ -172,7 +185,15 @@ impl Slot {
             Ok(None) => {}
             Err(error) => self.context.fail(error),
         }
+        self.computed();
         self.context.schedule.done(turn);
+    }
+
+    /// What is left of its turn is waiting for the disk: another slot may compute.
+    fn computed(&self) {
+        if self.computes.take() {
+            self.context.schedule.computed();
+        }
     }
 
     /// Does what the job is owed until nothing is owed under this claim; the same after a crash as in normal work. Nothing is tried
@@ -243,9 +264,12 @@ impl Slot {
         };
         // What is there, and what is missing, is believed of the right folder only.
         folder.check().map_err(PublishError::Folder)?;
+        if job.duty() == Duty::Run {
+            return self.attempt(folder, claim, job, turn);
+        }
+        self.computed();
         let desk = Desk::new(&*context.store, folder, claim, &self.committed);
         let next = match (job.duty(), &job.state) {
-            (Duty::Run, _) => return self.attempt(folder, claim, job, turn),
             (Duty::Stop, _) => context.store.advance(claim, Step::Cancelled)?,
             (Duty::Intend, State::Concluded { ending, reason, .. }) => {
                 desk.intend(job, &Conclusion::None { ending: *ending, reason: reason.clone() })?
@@ -275,6 +299,7 @@ impl Slot {
             Ok(claimed) => {
                 crash_point("daemon.linked");
                 let worked = self.work(folder, token, job, &claimed, turn);
+                self.computed();
                 let desk = Desk::new(&*context.store, folder, token, &self.committed);
                 match worked {
                     Worked::Report { report, written, reused } => match verify(&report, written.as_ref(), &work) {
@@ -342,11 +367,11 @@ impl Slot {
         };
         match ended {
             Ended::Stopped => self.stopped(folder, claim, lease.get()),
-            Ended::Died(death) if !changed || !matches!(death.cause, Cause::Fault(_)) => died(&death, turn),
+            Ended::Died(death) if !changed || !matches!(death.cause, Cause::Fault(_)) => Worked::died(&death, turn),
             _ if changed => Worked::Step(Step::Withdrawn(Withdrawal::Changed)),
             Ended::Done { report, written } => Worked::Report { report, written, reused: None },
-            Ended::Failed { class, message } => failed(class, &message, &request.shown_input, turn),
-            Ended::Died(death) => died(&death, turn),
+            Ended::Failed { class, message } => Worked::failed(class, &message, &request.shown_input, turn),
+            Ended::Died(death) => Worked::died(&death, turn),
         }
     }
 
@@ -402,47 +427,6 @@ impl Slot {
         let share = Share { memory: limits.memory_bytes, threads: limits.threads, many: !turn.is_alone() };
         self.context.world.hire(share)
     }
-}
-
-/// How an attempt went.
-enum Worked {
-    Report {
-        report: Box<Report>,
-        written: Option<Identity>,
-        /// Nothing was computed.
-        reused: Option<ReusedFrom>,
-    },
-    None(Ending, String),
-    Step(Step),
-    /// The claim is void.
-    Lost,
-}
-
-/// The engine refused the file, or failed over it: what that means for the job.
-fn failed(class: ErrorClass, message: &str, shown_input: &str, turn: Turn) -> Worked {
-    // Whoever reads it knows which file it is about.
-    let reason = message.strip_prefix(&format!("{shown_input}: ")).unwrap_or(message).to_owned();
-    match class {
-        ErrorClass::Unreadable => Worked::None(Ending::Unreadable, reason),
-        ErrorClass::Starved if !turn.is_alone() => Worked::Step(Step::NeedsAll),
-        ErrorClass::Refused | ErrorClass::Starved => Worked::None(Ending::Refused, reason),
-        ErrorClass::Environment => Worked::Step(Step::Environment { reason }),
-        ErrorClass::Shortage => Worked::Step(Step::Wait { reason }),
-        ErrorClass::Changed => Worked::Step(Step::Withdrawn(Withdrawal::Changed)),
-    }
-}
-
-fn died(death: &Death, turn: Turn) -> Worked {
-    tracing::warn!(reason = death.line(), blame = death.blames_file(), "A worker process died.");
-    Worked::Step(match death.cause {
-        Cause::Fault(signal) => Step::Died(StoreDeath::Signal(signal)),
-        Cause::Internal(code) => Step::Died(StoreDeath::Exit(code)),
-        Cause::Memory if !turn.is_alone() => Step::NeedsAll,
-        Cause::Memory => Step::Died(StoreDeath::MemoryLimit),
-        Cause::Machine | Cause::Cut => Step::Environment { reason: death.line() },
-        Cause::Time(_) => Step::Died(StoreDeath::TimeLimit),
-        Cause::Killed(signal) => Step::Died(StoreDeath::Killed(signal)),
-    })
 }
 
 /// What a worker is to do for a job.

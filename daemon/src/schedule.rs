@@ -1,4 +1,5 @@
-//! Who may claim what, and when. Small files run side by side, one thread each. A large file runs alone, by all threads and with
+//! Who may claim what, and when. Small files run side by side, one thread each; while a result is brought into place, which is waiting for the
+//! disk, the next file is computed. A large file runs alone, by all threads and with
 //! the whole memory: two of them at once would only fight for the same processors. A suspect (a file that was running when the
 //! daemon died, twice) runs alone too, after everything else.
 //!
@@ -83,11 +84,13 @@ pub(crate) struct Schedule {
 struct State {
     /// Slots at work.
     busy: usize,
+    /// Those of them that compute, or are about to.
+    computing: usize,
     /// One of them wants no company.
     alone: bool,
     /// By [`Hold`]: why nothing is given out, in words.
     held: [Option<String>; 2],
-    /// So many slots may be at work.
+    /// So many slots may compute.
     most: usize,
     stop: bool,
     last_alone: Instant,
@@ -117,7 +120,7 @@ impl Waits {
 impl Schedule {
     pub(crate) fn new(world: Arc<dyn World>) -> Self {
         let last_alone = world.steady();
-        let state = State { busy: 0, alone: false, held: [None, None], most: usize::MAX, stop: false, last_alone };
+        let state = State { busy: 0, computing: 0, alone: false, held: [None, None], most: usize::MAX, stop: false, last_alone };
         Self { state: Mutex::new(state), wake: Condvar::new(), world }
     }
 
@@ -125,7 +128,7 @@ impl Schedule {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for this slot's turn; `look` tells what waits. After anything but [`Turn::Stop`], [`Schedule::done`] must follow.
+    /// Waits for this slot's turn; `look` tells what waits. After anything but [`Turn::Stop`], [`Schedule::computed`] and [`Schedule::done`] must follow.
     ///
     /// # Errors
     /// As `look`.
@@ -147,6 +150,14 @@ impl Schedule {
     #[cfg(test)]
     pub(crate) fn try_next<E>(&self, look: &dyn Fn() -> Result<Waits, E>) -> Result<Option<Turn>, E> {
         self.lock().give(self.world.steady(), look)
+    }
+
+    /// The slot computes no longer: another one may.
+    pub(crate) fn computed(&self) {
+        let mut state = self.lock();
+        state.computing = state.computing.saturating_sub(1);
+        drop(state);
+        self.wake.notify_all();
     }
 
     /// The slot's turn is over.
@@ -182,7 +193,7 @@ impl Schedule {
         is_news
     }
 
-    /// Lets no more than so many slots work at a time. Returns whether that is news.
+    /// Lets no more than so many slots compute at a time. Returns whether that is news.
     pub(crate) fn limit(&self, most: usize) -> bool {
         let is_news = std::mem::replace(&mut self.lock().most, most) != most;
         if is_news {
@@ -220,6 +231,11 @@ impl Schedule {
     pub(crate) fn busy(&self) -> usize {
         self.lock().busy
     }
+
+    /// How many slots compute.
+    pub(crate) fn computing(&self) -> usize {
+        self.lock().computing
+    }
 }
 
 impl State {
@@ -235,13 +251,14 @@ impl State {
         let turn = choose(self.busy, overdue, &look()?);
         if let Some(turn) = turn {
             self.busy += 1;
+            self.computing += 1;
             self.alone = turn.is_alone();
         }
         Ok(turn)
     }
 
     fn may_give(&self) -> bool {
-        self.held.iter().all(Option::is_none) && !self.alone && self.busy < self.most
+        self.held.iter().all(Option::is_none) && !self.alone && self.computing < self.most
     }
 }
 
@@ -300,21 +317,41 @@ mod tests {
         let s = schedule();
         let both = waits(5, 5, 0);
         assert_eq!([next(&s, both), next(&s, both)], [Turn::Small, Turn::Small]);
+        s.computed();
         s.done(Turn::Small);
         // Nothing small is left, but one still runs: the large one must wait for it.
         assert_eq!(choose(1, false, &waits(0, 5, 0)), None);
+        s.computed();
         s.done(Turn::Small);
         assert_eq!(next(&s, waits(0, 5, 0)), Turn::Large);
         assert!(!s.lock().may_give(), "nothing beside a large one");
+        s.computed();
         s.done(Turn::Large);
         assert_eq!(next(&s, both), Turn::Small, "a small one that came meanwhile is before the next large one");
+    }
+
+    /// To bring a result into place is no reason to let a processor wait. A large file does wait: its turn is alone.
+    #[test]
+    fn the_next_is_computed_while_a_result_is_brought_into_place() {
+        let s = schedule();
+        s.limit(1);
+        assert_eq!(next(&s, waits(5, 5, 0)), Turn::Small);
+        assert!(!s.lock().may_give());
+        s.computed();
+        assert_eq!((s.computing(), s.standing().running), (0, 1));
+        assert_eq!(s.try_next(&|| Ok::<_, Infallible>(waits(0, 5, 0))), Ok(None));
+        assert_eq!(next(&s, waits(5, 5, 0)), Turn::Small);
+        s.computed();
+        [Turn::Small; 2].into_iter().for_each(|turn| s.done(turn));
+        assert_eq!(next(&s, waits(0, 5, 0)), Turn::Large);
     }
 
     #[test]
     fn suspects_come_last_and_alone() {
         let s = schedule();
         for (waits, turn) in [(waits(5, 5, 5), Turn::Small), (waits(0, 5, 5), Turn::Large), (waits(0, 0, 5), Turn::Alone)] {
-            assert_eq!((next(&s, waits), s.busy()), (turn, 1));
+            assert_eq!((next(&s, waits), s.computing()), (turn, 1));
+            s.computed();
             s.done(turn);
         }
         assert_eq!(choose(0, false, &Waits::default()), None, "there is nothing for anyone");

@@ -40,11 +40,12 @@ impl<'s, 'e> Slots<'s, 'e> {
         self.threads.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Sees to it that there are so many. Those that are there stay: the schedule lets no more work than may.
+    /// Sees to it that so many can compute, and as many bring a result into place meanwhile. Those that are there stay: the schedule lets no more
+    /// compute than may.
     pub(super) fn raise(&self, workers: usize) -> Result<(), StoreError> {
         let context = self.context;
         let mut threads = self.threads();
-        while threads.len() < workers {
+        while threads.len() < 2 * workers {
             let slot = move || {
                 let worked = guarded(|| {
                     Slot::new(context).run();

@@ -47,7 +47,7 @@ fn jobs(text: &mut String, context: &Context) -> Result<(), Problem> {
     let waits = oldest.first().map_or(0, |job| SystemClock.now().0.saturating_sub(job.waits_since().0));
     let words = ("suture_queue_oldest_seconds", "How long the oldest job that waits has waited.");
     gauge(text, words, [(vec![], waits as f64 / 1000.0)]);
-    let busy = context.schedule.busy();
+    let busy = context.schedule.computing();
     let idle = context.settings.now().workers.saturating_sub(busy);
     let of_workers = [(vec![("state", "busy")], busy as f64), (vec![("state", "idle")], idle as f64)];
     gauge(text, ("suture_workers", "Workers in each state."), of_workers);

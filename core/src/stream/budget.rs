@@ -111,13 +111,6 @@ pub(crate) fn submesh_bytes(triangles: u64, vertices: u64) -> u64 {
     288 * triangles + 12 * vertices
 }
 
-/// Bytes that a submesh of so many triangles and vertices takes when its holes are filled and its crossings are yet to be cut: the tables of the repairs
-/// before are gone, and those of the edit are yet to come. Measured on 200 M triangles with defects here and there: 586 MB in all with 3.8 M triangles in the
-/// submesh.
-pub(crate) fn mended_submesh_bytes(triangles: u64, vertices: u64) -> u64 {
-    140 * triangles + 12 * vertices
-}
-
 /// Bytes that a triangle to be deleted for its coordinates takes: its run in the lists that are found and merged, and its change, in a list
 /// that may grow once more.
 pub(crate) const BYTES_PER_NONFINITE: u64 = 4 * 8 + 3 * 24;

@@ -89,17 +89,8 @@ const BATCH: usize = vertex_table::BATCH / 3;
 pub(crate) const BYTES_PER_REGION: u64 = 3 * size_of::<RegionSums>() as u64 + 160;
 
 impl ChunkTopology {
-    /// Counts what it takes now and will take once it is merged, and its irregular triangles in the submesh.
-    pub(crate) fn take(&self, budget: &Budget) {
-        self.take_merged(budget);
-        budget.take(
-            Purpose::Defects,
-            crate::stream::budget::submesh_bytes(self.irregular_triangles.len() as u64, self.irregular_triangle_vertices),
-        );
-    }
-
     /// Counts what it takes now and will take once it is merged.
-    pub(crate) fn take_merged(&self, budget: &Budget) {
+    pub(crate) fn take(&self, budget: &Budget) {
         let labels = self.labels.heap_bytes();
         let fixed = size_of::<Self>() as u64;
         budget.take(Purpose::Surface, fixed + labels + self.regions.capacity() as u64 * BYTES_PER_REGION);
@@ -107,6 +98,10 @@ impl ChunkTopology {
         let seams =
             size_of::<Link>() * self.links.capacity() + size_of::<IrregularTriangle>() * self.irregular_triangles.capacity();
         budget.take(Purpose::Seams, 2 * seams as u64 + self.crossings.seam_bytes());
+        budget.take(
+            Purpose::Defects,
+            crate::stream::budget::submesh_bytes(self.irregular_triangles.len() as u64, self.irregular_triangle_vertices),
+        );
     }
 
     /// Gives back what growing left over.

@@ -41,9 +41,8 @@ struct Found {
 }
 
 impl Found {
-    /// Nothing yet, beside so many regions that are kept.
-    fn beside(regions: u64) -> Self {
-        let [irregular_triangles, irregular_corners, regions] = [0, 0, regions].map(AtomicU64::new);
+    fn new(irregular_triangles: u64, regions: u64) -> Self {
+        let [irregular_triangles, irregular_corners, regions] = [irregular_triangles, 0, regions].map(AtomicU64::new);
         Self { irregular_triangles, irregular_corners, regions }
     }
 
@@ -109,7 +108,7 @@ impl Solving<'_, '_> {
                 crossings
             },
         );
-        let found = Found::beside(0);
+        let found = Found::new(0, 0);
         chunks.iter().for_each(|chunk| found.add(chunk));
         self.check(found, &loan)?;
         self.budget.give_back(Purpose::Tables, more.bytes);
@@ -133,7 +132,7 @@ impl Solving<'_, '_> {
     }
 
     fn each(&self, many_tested: Option<u64>, most_irregular: Option<u64>) -> Result<Option<Vec<ChunkTopology>>> {
-        let (found, [done, tested, kept]) = (Found::beside(0), [const { AtomicU64::new(0) }; 3]);
+        let (found, [done, tested, kept]) = (Found::new(0, 0), [const { AtomicU64::new(0) }; 3]);
         let all = self.records.len() as u64;
         let loan = Loan::of(self.budget);
         let chunks = self.members.each(
@@ -171,15 +170,15 @@ impl Solving<'_, '_> {
         Ok(Some(chunks))
     }
 
-    /// Some chunks again, with vertices that count as irregular, by the chunk where they are at home. `kept`: how many regions there are beside what is
-    /// found. Most of the irregular triangles are in the submesh already, and not counted once more: the caller knows how many are new.
+    /// Some chunks again, with vertices that count as irregular, by the chunk where they are at home. `kept`: how many irregular triangles and regions there are
+    /// beside what is found.
     pub(crate) fn again(
         &self,
         is_wanted: &[bool],
         irregular: &[(ChunkId, [f32; 3])],
-        kept: u64,
+        kept: [u64; 2],
     ) -> Result<Vec<(ChunkId, ChunkTopology)>> {
-        let found = Found::beside(kept);
+        let found = Found::new(kept[0], kept[1]);
         let loan = Loan::of(self.budget);
         let chunks = self.members.each(
             (self.records, self.guide, self.plan),
@@ -193,7 +192,7 @@ impl Solving<'_, '_> {
                 let cut: Vec<[f32; 3]> = at_home(irregular, chunk).iter().map(|(_, p)| *p).collect();
                 let topology = scratch.solve(seen, self.plan.home_box(chunk), self.measure, &cut, &loan);
                 found.add(&topology);
-                topology.take_merged(self.budget);
+                topology.take(self.budget);
                 (chunk, topology)
             },
         );

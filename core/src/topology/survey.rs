@@ -17,7 +17,7 @@ use crate::io::digest;
 use crate::io::read_ahead::Guide;
 use crate::io::record::{self, Record};
 use crate::io::write_behind;
-use crate::stream::budget::{Budget, Purpose, submesh_bytes};
+use crate::stream::budget::{Budget, Purpose};
 use crate::stream::members::Members;
 use crate::stream::plan::{ChunkId, HomeBox, Plan};
 use crate::stream::source::{Seen, Triangle};
@@ -238,7 +238,11 @@ impl<'a> Survey<'a> {
         let kept = (0..self.plan.chunks()).filter(|c| !is_fresh[*c]);
         self.parts.take(&budget, kept.clone().map(|c| &self.labels[c]), self.irregular_triangles.len() as u64);
         let regions = kept.map(|c| self.parts.of_chunk(ChunkId(c as u32)).len() as u64).sum();
-        let mut solved = self.solving(path, (&budget, threads), progress).again(&is_fresh, &by_home, regions)?;
+        let mut solved = self.solving(path, (&budget, threads), progress).again(
+            &is_fresh,
+            &by_home,
+            [self.irregular_triangles.len() as u64, regions],
+        )?;
         let irregular = self.irregular();
         let mut fresh: Vec<(ChunkId, &mut ChunkTopology)> =
             solved.iter_mut().map(|(chunk, topology)| (*chunk, topology)).collect();
@@ -246,11 +250,6 @@ impl<'a> Survey<'a> {
         let (parts, irregular_triangles) =
             self.parts.renewed(known, self.irregular_triangles.clone(), &mut fresh, |chunk| is_cut[chunk]);
         let (regions, merged) = parts.united();
-        let new = (irregular_triangles.len() - self.irregular_triangles.len()) as u64;
-        budget.take(Purpose::Defects, submesh_bytes(new, new));
-        budget.check(path, || {
-            format!("{} triangles lie at defects and where surface crosses surface", irregular_triangles.len())
-        })?;
         self.promoted.extend(positions.iter().filter(|p| irregular.find(**p).is_none()));
         self.dividing = self.promoted.len();
         // By what was true before.

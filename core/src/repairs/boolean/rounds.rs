@@ -102,7 +102,7 @@ impl State<'_, '_, '_> {
     fn check_memory(&self, crossing: &[[u32; 2]], triangles: usize, limits: &Limits) -> Tried<()> {
         let meetings = meetings(|t| Bounds::of(&self.work.points(t)), crossing);
         let meetings = meetings.map_err(|worst| Stuck { failure: Failure::TooMany, triangles: vec![worst] })?;
-        let needed = budget::mended_submesh_bytes(self.work.triangles.len() as u64, self.work.positions.len() as u64)
+        let needed = budget::submesh_bytes(self.work.triangles.len() as u64, self.work.positions.len() as u64)
             + meetings * BYTES_PER_MEETING
             + crossing.len() as u64 * BYTES_PER_PAIR
             + triangles as u64 * BYTES_PER_TRIANGLE;

@@ -105,24 +105,3 @@ fn chunks_do_not_show_where_boxes_select_badly() {
     assert!(summed.as_ref().is_some_and(|s| !s.given_up && s.crossing_pairs > 0) && pairs.is_some());
     assert!(found.iter().all(|f| *f == found[0]));
 }
-
-/// What lies in the submesh already is not counted once more when surface is divided.
-#[test]
-fn to_divide_takes_memory_for_what_is_new() {
-    let apart = (0..20_000_u16)
-        .map(|i| [[0.0; 3], [0.4, 0.0, 0.0], [0.0, 0.4, 0.0]].map(|p: [f32; 3]| [p[0] + f32::from(i), p[1], p[2]]));
-    let triangles: Vec<[[f32; 3]; 3]> = apart.chain(cuboid([0.0, 5.0, 0.0], [20_000.0, 7.0, 2.0])).collect();
-    let records = records(&triangles);
-    let path = Path::new("test");
-    let limits = Limits { threads: 1, chunk_triangles: u32::MAX, ..Limits::default() };
-    let mut survey = Survey::new(path, &records, false, &limits, &Quiet).unwrap();
-    assert_eq!(survey.irregular_triangles.len(), 20_000);
-    let taken = limits.memory_bytes - survey.budget.left();
-    let tight = Limits { memory_bytes: taken + (1 << 20), ..limits };
-    assert!(submesh_bytes(20_000, 20_000) > 5 << 20, "counted twice, they would not fit");
-    survey.divide(path, &[[0.0, 5.0, 0.0]], &tight, &Quiet).unwrap();
-    assert!(survey.irregular_triangles.len() > 20_000);
-    let less = Limits { memory_bytes: submesh_bytes(20_000, 20_000), ..tight };
-    let error = survey.divide(path, &[[20_000.0, 7.0, 2.0]], &less, &Quiet).err().unwrap();
-    assert_eq!(error.class(), crate::contract::error::ErrorClass::Starved);
-}

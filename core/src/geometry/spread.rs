@@ -6,8 +6,9 @@ use crate::geometry::distance::place;
 use crate::util::scatter;
 
 /// Points of a triangle, on average one for each such area. A number of the triangle decides where, and what becomes of the rest of the area.
+#[inline]
 pub(crate) fn points(corners: &[[f32; 3]; 3], number: u32, each: f64) -> impl Iterator<Item = DVec3> {
-    let [a, b, c] = corners.map(place);
+    let (a, b, c) = (place(corners[0]), place(corners[1]), place(corners[2]));
     let begin = scatter::share(number.into());
     let count = (b - a).cross(c - a).length() / 2.0 / each + begin;
     let count = if count.is_finite() { count as u32 } else { 0 };

@@ -3,6 +3,8 @@
 //! There are cells of several sizes, and a triangle is looked up among those that are no smaller than itself: in at most eight, whatever
 //! its size.
 
+use glam::DVec3;
+
 use super::sphere::Places;
 use crate::util::bits;
 
@@ -10,8 +12,8 @@ use crate::util::bits;
 const GROWTH: f64 = 4.0;
 /// Sizes, at most. A triangle that is larger than the largest may meet anything.
 const MOST_SIZES: usize = 24;
-/// Bits of the hash: a mebibyte for all cells.
-const HASH_BITS: u32 = 23;
+/// Bits of the hash: half a mebibyte for all cells, which stays in the cache.
+const HASH_BITS: u32 = 22;
 
 /// Cells that some boxes touch.
 pub(super) struct Cells {
@@ -48,11 +50,14 @@ impl Cells {
 
     /// The first and the last cell along each axis. Monotonous, so that boxes that meet share a cell.
     fn ends(&self, of: &Places, size: usize) -> [[i64; 3]; 2] {
-        of.map(|p| (p * self.per_unit[size]).floor().to_array().map(|x| x as i64))
+        let per_unit = self.per_unit[size];
+        let cell = |p: DVec3| [floor(p.x * per_unit), floor(p.y * per_unit), floor(p.z * per_unit)];
+        [cell(of[0]), cell(of[1])]
     }
 }
 
 /// Visits cells by their hash until `visit` says that it is enough; says whether it did.
+#[inline]
 fn each([x0, y0, z0]: [i64; 3], [x1, y1, z1]: [i64; 3], size: usize, mut visit: impl FnMut(usize) -> bool) -> bool {
     for z in z0..=z1 {
         for y in y0..=y1 {
@@ -66,16 +71,24 @@ fn each([x0, y0, z0]: [i64; 3], [x1, y1, z1]: [i64; 3], size: usize, mut visit: 
     false
 }
 
-fn hash(cell: [i64; 4]) -> usize {
+/// The whole number below; without SSE 4.1, the processor has no instruction for it.
+#[inline]
+fn floor(x: f64) -> i64 {
+    let towards_zero = x as i64;
+    towards_zero.saturating_sub(i64::from(towards_zero as f64 > x))
+}
+
+#[inline]
+fn hash([x, y, z, size]: [i64; 4]) -> usize {
     const ODD: [u64; 4] = [0x9e37_79b9_7f4a_7c15, 0xc2b2_ae3d_27d4_eb4f, 0x1656_67b1_9e37_79f9, 0xff51_afd7_ed55_8ccd];
-    let mixed = cell.iter().zip(ODD).fold(0, |mixed: u64, (x, odd)| mixed.wrapping_add((*x as u64).wrapping_mul(odd)));
+    let term = |x: i64, odd: u64| (x as u64).wrapping_mul(odd);
+    let mixed = term(x, ODD[0]).wrapping_add(term(y, ODD[1])).wrapping_add(term(z, ODD[2])).wrapping_add(term(size, ODD[3]));
     let mixed = (mixed ^ mixed >> 29).wrapping_mul(ODD[3]);
     (mixed >> (64 - HASH_BITS)) as usize
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
     use proptest::prelude::*;
 
     use super::*;

@@ -6,6 +6,8 @@
 use std::sync::atomic::AtomicU64;
 use std::sync::atomic::Ordering::Relaxed;
 
+use glam::DVec3;
+
 use super::cells::Cells;
 use super::sphere::{Around, Places, Sample, Touch};
 use crate::contract::progress::Progress;
@@ -13,11 +15,10 @@ use crate::contract::settings::Limits;
 use crate::detect::bodies::box_around;
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::distance::place;
-use crate::geometry::position;
 use crate::geometry::spread;
 use crate::geometry::sums::Bounds;
 use crate::io::read_ahead::Guide;
-use crate::io::record::{self, Record};
+use crate::io::record::{self, Point, Record};
 use crate::util::parallel;
 
 /// Records that a thread takes at a time, at least ...
@@ -58,10 +59,9 @@ impl Surface<'_> {
         let of_blocks = self.each_block(|first, records| {
             let mut samples = Vec::new();
             for (of, record) in (first..).zip(records) {
-                let corners = position::corners(record);
-                let [a, b, c] = corners.map(place);
-                let inward = -(b - a).cross(c - a).normalize_or_zero();
-                samples.extend(spread::points(&corners, of, area).map(|at| Sample { at, inward, of }));
+                let corners = record::corners(record);
+                // Most triangles have none.
+                samples.extend(spread::points(&corners, of, area).map(|at| Sample { at, inward: inward(&corners), of }));
             }
             samples
         });
@@ -79,6 +79,12 @@ impl Surface<'_> {
         });
         (steps.into_inner() <= MOST_STEPS).then(|| near.found.into_iter().map(Found::into_around).collect())
     }
+}
+
+/// Into the material behind a triangle.
+fn inward(corners: &[Point; 3]) -> DVec3 {
+    let [a, b, c] = corners.map(place);
+    -(b - a).cross(c - a).normalize_or_zero()
 }
 
 /// Samples by place, and what was found of each so far.
@@ -106,9 +112,8 @@ impl<'s> Near<'s> {
     fn visit(&self, first: u32, records: &[Record]) -> u64 {
         let mut steps = 0;
         for (number, record) in (first..).zip(records) {
-            let corners = position::corners(record);
-            let triangle = corners.map(place);
-            let [a, b, c] = triangle;
+            let corners = record::corners(record);
+            let triangle @ [a, b, c] = [place(corners[0]), place(corners[1]), place(corners[2])];
             let around: Places = [a.min(b).min(c), a.max(b).max(c)];
             if !self.cells.may_meet(&around) || !record::all_finite(record) {
                 continue;
@@ -116,8 +121,7 @@ impl<'s> Near<'s> {
             self.tree.each_meeting(&Bounds::of(&corners), |i| {
                 steps += 1;
                 let sample = &self.samples[i as usize];
-                let meets = |[lo, hi]: &Places| lo.cmple(around[1]).all() && hi.cmpge(around[0]).all();
-                if sample.of == number || !sample.ways(self.most).iter().any(meets) {
+                if sample.of == number || !sample.has_ahead(&triangle, &around, self.most) {
                     return;
                 }
                 steps += STEPS_OF_TOUCH;

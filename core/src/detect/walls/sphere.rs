@@ -63,6 +63,18 @@ impl Sample {
         })
     }
 
+    /// May a triangle, of which this is the box, meet one of these ways? What is beside the sample rather than ahead of it does not.
+    #[inline]
+    pub(super) fn has_ahead(&self, [a, b, c]: &[DVec3; 3], around: &Places, most: f64) -> bool {
+        let depth = |p: &DVec3| (*p - self.at).dot(self.inward);
+        let deepest = depth(a).max(depth(b)).max(depth(c));
+        let beside = (around[0] - self.at).max(self.at - around[1]).max(DVec3::ZERO);
+        // A way to this depth is longer than that by the cosine of 15° at most.
+        deepest > 0.0
+            && beside.length_squared() * (STRAIGHT * (1.0 - 1e-6)) <= deepest * deepest
+            && self.ways(most).iter().any(|[lo, hi]| lo.cmple(around[1]).all() && hi.cmpge(around[0]).all())
+    }
+
     /// The middle of the sphere of this diameter.
     pub(super) fn middle(&self, diameter: f64) -> DVec3 {
         self.at + self.inward * (diameter / 2.0)
@@ -162,7 +174,7 @@ mod tests {
     /// What is touched apart meets a box on the way there.
         #[test]
         fn ways_hold_all_that_is_straight_ahead(
-            inward in prop::array::uniform3(-1.0f64..1.0), aside in prop::array::uniform3(-1.0f64..1.0), depth in 0.0f64..1.0, lean in 0.0f64..1.0,
+            inward in prop::array::uniform3(-1.0f64..1.0), aside in prop::array::uniform3(-1.0f64..1.0), depth in 0.001f64..1.0, lean in 0.0f64..1.0,
         ) {
             let sample = Sample { at: DVec3::new(3.0, -2.0, 1.0), inward: DVec3::from_array(inward).normalize_or(DVec3::X), of: 0 };
             let aside = (DVec3::from_array(aside) - sample.inward * DVec3::from_array(aside).dot(sample.inward)).normalize_or_zero();
@@ -171,6 +183,7 @@ mod tests {
             let p = sample.at + way;
             let is_held = sample.ways(1.0).iter().any(|[lo, hi]| p.cmpge(*lo).all() && p.cmple(*hi).all());
             prop_assert!(is_held || !is_in_sphere);
+            prop_assert!(sample.has_ahead(&[p; 3], &[p; 2], 1.0) || !is_in_sphere);
         }
     }
 

@@ -208,12 +208,11 @@ fn what_was_not_looked_for_is_told() {
 /// What is found around each sample when every triangle is looked at.
 fn by_force(records: &[Record], samples: &[Sample], most: f64) -> Vec<Option<f64>> {
     let around = |sample: &Sample| {
-        let ways = sample.ways(most);
         let mut around = Around { wall: f64::INFINITY, other: (f64::INFINITY, false), depth: f64::INFINITY };
         for (number, record) in (0..).zip(records) {
             let triangle = crate::geometry::position::corners(record).map(place);
             let [lo, hi] = [triangle[0].min(triangle[1]).min(triangle[2]), triangle[0].max(triangle[1]).max(triangle[2])];
-            let is_near = ways.iter().any(|[from, to]| lo.cmple(*to).all() && hi.cmpge(*from).all());
+            let is_near = sample.has_ahead(&triangle, &[lo, hi], most);
             let Some(touch) = (number != sample.of && is_near).then(|| sample.touch(&triangle, most)).flatten() else { continue };
             if touch.is_opposite && touch.is_apart {
                 around.wall = around.wall.min(touch.diameter);

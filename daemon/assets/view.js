@@ -2,7 +2,7 @@
 import * as THREE from "./three/three.module.min.js";
 
 const MAGIC = 0x31545553; // "SUT1"
-const COLOURS = { lost: 0x8e24aa, invented: 0x00843d, open: 0xd60a28, changed: 0x1565c0, found: 0xb36b00 };
+const COLOURS = { lost: 0x8e24aa, invented: 0x00843d, open: 0xd60a28, changed: 0x1565c0, found: 0xb36b00, thin: 0x5d4037 };
 const TURN = Math.PI / 36; // for a key
 const REST = 3000; // milliseconds
 const TRIES = 20;

@@ -92,6 +92,7 @@ impl ProfileBuilder {
         resolve_crossings: bool,
         check_self_intersections: bool,
         build_volume_mm: [f64; 3],
+        thin_wall_mm: f64,
     }
 }
 

@@ -25,4 +25,6 @@ pub enum HintKind {
     BuildVolume,
     /// It has so many triangles that slicers are slow.
     ManyTriangles,
+    /// Walls are thinner than [`crate::Profile::thin_wall_mm`], or it was not possible to look for them.
+    ThinWalls,
 }

@@ -19,4 +19,5 @@ pub(crate) mod repair_name;
 pub mod report;
 pub mod settings;
 pub(crate) mod skin;
+pub(crate) mod thin_walls;
 pub(crate) mod volumes;

@@ -62,7 +62,7 @@ impl Profile {
     }
 
     /// Every setting that is one number, not a whole one and not a choice, with its range. All fields are named, so that a new one cannot be forgotten here.
-    fn numbers(&self) -> [(&'static str, f64, Range); 23] {
+    fn numbers(&self) -> [(&'static str, f64, Range); 24] {
         let Self {
             name: _,
             weld_relative,
@@ -88,6 +88,7 @@ impl Profile {
             wrap_max_share,
             wrap_max_move,
             wrap_review_share,
+            thin_wall_mm,
             // Counts: each value of their type means something, 0 and the largest included.
             max_hole_edges: _,
             max_bodies_lost: _,
@@ -115,7 +116,7 @@ impl Profile {
             skin_reach_relative: Share, max_skin_lost: Share, max_skin_invented: Share, max_cavities_filled: Bound, debris_area_share: Share,
             sheet_thickness_relative: Share, sheet_thickness_mm: Bound, max_sheets_share: Share,
             stack_gap_relative: Share, max_separation_relative: Share, wrap_max_share: Share, wrap_max_move: Bound,
-            wrap_review_share: Share,
+            wrap_review_share: Share, thin_wall_mm: Bound,
         ]
     }
 }

@@ -6,6 +6,7 @@ pub use crate::contract::judgement::{Certificate, Faithful, Fidelity, RuleOutcom
 pub use crate::contract::loop_class::LoopClass;
 pub use crate::contract::repair_name::RepairName;
 pub use crate::contract::skin::{Skin, SkinCause, SkinChange, SkinPlace};
+pub use crate::contract::thin_walls::{ThinPlace, ThinWalls};
 pub use crate::contract::volumes::{BodyLost, Volumes};
 use std::path::{Path, PathBuf};
 
@@ -85,6 +86,9 @@ pub struct Report {
     /// Notes for people, of good files, too.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub hints: Vec<Hint>,
+    /// Walls thinner than the profile's minimum; `None` if there is no minimum, or a hint says why it was not looked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thin_walls: Option<ThinWalls>,
     /// Seconds by stage, in order.
     pub stages: Vec<Stage>,
     /// Where the time went and what it cost.

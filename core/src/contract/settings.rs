@@ -104,6 +104,8 @@ pub struct Profile {
     pub check_self_intersections: bool,
     /// Room in the printer, along each axis in the file's units: a part that does not fit gets a hint. 0: as long as anyone likes.
     pub build_volume_mm: [f64; 3],
+    /// Walls thinner than this, in the file's units, are looked for in the result, and get a hint. 0: they are not.
+    pub thin_wall_mm: f64,
 }
 
 /// What to do with geometry that no repair can turn into a solid.
@@ -224,6 +226,7 @@ impl Default for Profile {
             resolve_crossings: true,
             check_self_intersections: true,
             build_volume_mm: [0.0; 3],
+            thin_wall_mm: 0.0,
         }
     }
 }

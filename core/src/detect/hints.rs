@@ -1,9 +1,9 @@
 //! Hints: what a person may want to know of a good file, too, and no repair changes. They decide nothing.
 
 use crate::contract::hint::{Hint, HintKind};
-use crate::contract::report::Defects;
+use crate::contract::report::{Defects, ThinWalls};
 use crate::contract::settings::Profile;
-use crate::util::words::Short;
+use crate::util::words::{At, Short};
 
 /// A part that encloses less, in mm³, may be drawn in inches; the bounds at which PrusaSlicer asks (`volume_threshold_inches`, a cube of about
 /// two, and `volume_threshold_meters`).
@@ -62,6 +62,24 @@ fn room(extents: [f64; 3], printer: [f64; 3]) -> Option<Hint> {
     Some(Hint { kind: HintKind::BuildVolume, text })
 }
 
+/// The hint on walls that were looked for, if some are thin, or why it was not looked for them.
+pub(crate) fn walls(found: &Result<ThinWalls, String>) -> Option<Hint> {
+    let text = match found {
+        Err(why) => format!("thin walls were not looked for: {why}"),
+        Ok(found) => {
+            let thinnest = found.places.first()?;
+            let percent = found.share * 100.0;
+            let share = if percent < 1.0 { "less than 1".to_owned() } else { format!("about {}", percent.round()) };
+            let (minimum, thickness) = (Short(found.minimum), Short(thinnest.thickness));
+            format!(
+                "walls are thinner than {minimum} mm (`thin_wall_mm`) at {share} % of the surface; the thinnest measured is {thickness} mm at {}",
+                At(thinnest.at)
+            )
+        }
+    };
+    Some(Hint { kind: HintKind::ThinWalls, text })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -110,6 +128,21 @@ mod tests {
                 && text([250.0, 250.0, 0.0]).ends_with("if it is turned")
         );
         assert!(text([250.0, 210.0, 220.0]).ends_with("however it is turned by right angles"));
+    }
+
+    #[test]
+    fn thin_walls_are_told_of_with_the_thinnest() {
+        let found = |share: f64, places: &str| {
+            serde_json::from_str(&format!(r#"{{"minimum": 0.8, "points": 9, "share": {share}, "places": [{places}]}}"#)).unwrap()
+        };
+        let place = r#"{"at": [1.0, 2.5, -3.0], "thickness": 0.31}"#;
+        let text = |found: Result<ThinWalls, String>| walls(&found).map(|hint| hint.text);
+        let told = text(Ok(found(0.034, place))).unwrap();
+        assert!(told.contains("thinner than 0.8 mm") && told.contains("about 3 %"), "{told}");
+        assert!(told.ends_with("is 0.31 mm at [1, 2.5, -3]"), "{told}");
+        assert!(text(Ok(found(0.001, place))).unwrap().contains("less than 1 %"));
+        assert_eq!(text(Ok(found(0.0, ""))), None);
+        assert!(text(Err("for a reason".into())).unwrap().ends_with("not looked for: for a reason"));
     }
 
     #[test]

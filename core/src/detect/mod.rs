@@ -3,7 +3,8 @@
 //! **In:** a survey and a submesh.
 //! **Out:** counts of defects ([`defects`]), bodies and what lies in what ([`bodies`]), boundary loops by class ([`holes`]); the rules of a
 //! printable file, and what they say of this one ([`rules`], [`verdict`], [`certificate`]); what became of the surface that can be
-//! seen ([`skin`]); the rules of a faithful result, and what a person should look at ([`fidelity`], [`review`]).
+//! seen ([`skin`]); the rules of a faithful result, and what a person should look at ([`fidelity`], [`review`]); what a person may want to
+//! know of a good file, too ([`hints`], [`walls`]).
 //! **Promise:** nothing is changed. What was not looked at is called unchecked, and is never certified. Verdict and certificate come from
 //! one table.
 
@@ -20,3 +21,4 @@ pub(crate) mod review;
 pub(crate) mod rules;
 pub(crate) mod skin;
 pub(crate) mod verdict;
+pub(crate) mod walls;

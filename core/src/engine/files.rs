@@ -12,6 +12,7 @@ use crate::contract::progress::Progress;
 use crate::contract::report::{Defects, FileFacts, Report, Task};
 use crate::contract::settings::{Limits, Profile, folder_of};
 use crate::detect::review::Evidence;
+use crate::detect::walls::Surface;
 use crate::diagnosis::Diagnosis;
 use crate::engine::clock::Clock;
 use crate::engine::everywhere;
@@ -58,6 +59,8 @@ pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress
     let facts = report.input.clone();
     judging::conclude_unchanged(&mut report, &facts, mesh.findings());
     report.loops = repairs::recognise(&mut diagnosis, mesh.path(), profile, limits, progress)?;
+    drop(diagnosis);
+    judging::look_for_thin_walls(&mut report, &Surface { records: mesh.records(), limits, progress })?;
     clock.close(report, mesh.path(), mesh.records().len())
 }
 
@@ -277,7 +280,7 @@ fn confirm_copy(report: &mut Report, input: &MeshFile, output: &Path, limits: &L
     }
     judging::conclude_unchanged(report, &facts, written.findings());
     report.output = Some(facts);
-    Ok(())
+    judging::look_for_thin_walls(report, &Surface { records: written.records(), limits, progress })
 }
 
 /// Reads the written file again and judges it, against the box of the input's surface and the bodies in it that lay in others.
@@ -300,9 +303,9 @@ fn verify(
     };
     let (blake3, defects) = look_again(known, &written, &report.profile, limits, progress)?;
     let facts = facts(&written, blake3);
-    let written = Written { facts, findings: written.findings(), defects };
-    judging::conclude(report, input.findings(), (surface, evidence), written);
-    Ok(())
+    let judged = Written { facts, findings: written.findings(), defects };
+    judging::conclude(report, input.findings(), (surface, evidence), judged);
+    judging::look_for_thin_walls(report, &Surface { records: written.records(), limits, progress })
 }
 
 /// The hash and the defects of a written file: what was `known` of it before, if it holds what it should, or else by a survey of its own.

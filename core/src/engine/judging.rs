@@ -12,11 +12,13 @@ use crate::contract::settings::{Bodies, Hollow, Limits, Profile};
 use crate::detect::certificate;
 use crate::detect::fidelity;
 use crate::detect::fidelity::Measured;
-use crate::detect::hints::hints;
+use crate::detect::hints;
 use crate::detect::review;
 use crate::detect::review::Evidence;
 use crate::detect::rules::Subject;
 use crate::detect::verdict;
+use crate::detect::walls;
+use crate::detect::walls::Surface;
 use crate::diagnosis::Diagnosis;
 use crate::geometry::sums::Bounds;
 use crate::io::read::{Finding, Loss};
@@ -67,6 +69,7 @@ pub(crate) fn begin(task: Task, input: &Input<'_>, diagnosis: &Diagnosis<'_>, pr
         verdict: verdict::judge(&diagnosis.defects, &flaws(input.findings)).under(profile.guarantee),
         certificate: None,
         hints: Vec::new(),
+        thin_walls: None,
         stages: Vec::new(),
         cost: Cost::default(),
     }
@@ -79,7 +82,7 @@ pub(crate) fn conclude_unchanged(report: &mut Report, facts: &FileFacts, finding
         report.verdict.reasons.push(format!("nothing was repaired: the profile `{}` says `repair = false`", report.profile.name));
     }
     report.certificate = Some(certify(facts, &report.before, &flaws(findings)));
-    report.hints = hints(&report.before, &report.profile);
+    report.hints = hints::hints(&report.before, &report.profile);
 }
 
 /// Repairs what was diagnosed by these steps, if there is anything to be repaired: what is to be edited, and what a
@@ -172,10 +175,35 @@ pub(crate) fn conclude(report: &mut Report, input: &[Finding], (surface, evidenc
         }
     }
     report.certificate = Some(Certificate { faithful, ..certify(&facts, &defects, &flaws) });
-    report.hints = hints(&defects, &report.profile);
+    report.hints = hints::hints(&defects, &report.profile);
     report.after = Some(defects);
     report.output = Some(facts);
 }
+
+/// Adds to a report that has its verdict what there is to say of thin walls in the surface that it is of, if the profile asks for that.
+pub(crate) fn look_for_thin_walls(report: &mut Report, surface: &Surface<'_>) -> Result<()> {
+    let minimum = report.profile.thin_wall_mm;
+    if minimum == 0.0 {
+        return Ok(());
+    }
+    surface.progress.at(WALLS, 0, surface.records.len() as u64);
+    let defects = report.after.as_ref().unwrap_or(&report.before);
+    let bounds = defects.bounds.map_or(Bounds::EMPTY, |[lo, hi]| Bounds { lo, hi });
+    let found = if report.verdict.closed && report.verdict.oriented {
+        walls::measure(surface, (&bounds, defects.area), minimum)
+    } else {
+        Err("its surface does not enclose material everywhere".into())
+    };
+    if surface.progress.cancelled() {
+        return Err(Error::cancelled(&report.input.path, WALLS));
+    }
+    report.hints.extend(hints::walls(&found));
+    report.thin_walls = found.ok();
+    Ok(())
+}
+
+/// The stage in which thin walls are looked for.
+const WALLS: &str = "walls";
 
 /// Adds to a report what the stream did before all repairs: to what the same repair did, or as the first.
 pub(crate) fn add_first(report: &mut Report, name: RepairName, count: u64, note: &str) {

@@ -6,6 +6,7 @@ use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::report::{Defects, FaceOrigin, FileFacts, Format, Report, Task};
 use crate::contract::settings::{Limits, Profile};
+use crate::detect::walls::Surface;
 use crate::diagnosis::Diagnosis;
 use crate::engine::clock::Clock;
 use crate::engine::edited_mesh::EditedMesh;
@@ -94,6 +95,8 @@ pub(crate) fn inspect(mesh: MeshView<'_>, profile: &Profile, limits: &Limits, pr
     let mut report = judging::begin(Task::Inspect, &input, &diagnosis, profile, limits);
     judging::conclude_unchanged(&mut report, &facts, &[]);
     report.loops = repairs::recognise(&mut diagnosis, Held::path(), profile, limits, progress)?;
+    drop(diagnosis);
+    judging::look_for_thin_walls(&mut report, &Surface { records: &held.records, limits, progress })?;
     clock.close(report, Held::path(), held.records.len())
 }
 
@@ -130,6 +133,7 @@ pub(crate) fn repair(
         clock.stage("hash");
         let facts = report.input.clone();
         judging::conclude_unchanged(&mut report, &facts, &[]);
+        judging::look_for_thin_walls(&mut report, &Surface { records: &held.records, limits, progress })?;
         judging::advise(&mut report, &evidence);
         report.output = Some(facts);
         let origins = (0..faces as u32).map(FaceOrigin::Input).collect();
@@ -151,6 +155,7 @@ pub(crate) fn repair(
         let defects = judged(looked, &records, profile, limits, progress)?;
         let facts = facts(&records, files::hash_of(records.as_flattened(), limits));
         judging::conclude(&mut report, &[], (&surface, &evidence), Written { facts, findings: &[], defects });
+        judging::look_for_thin_walls(&mut report, &Surface { records: &records, limits, progress })?;
     }
     judging::advise(&mut report, &evidence);
     clock.stage("verify");

@@ -154,10 +154,11 @@ fn skin_of(title: &str, change: &SkinChange) -> Markup {
     }
 }
 
-/// Loops that stayed open, and regions that were changed or left.
+/// Loops that stayed open, regions that were changed or left, and walls that are thin.
 fn places(report: &Report) -> Markup {
     let regions = &report.regions;
     html! {
+        (thin_walls(report))
         @if !report.loops_left.is_empty() {
             h2 { "Left open" }
             table {
@@ -178,6 +179,19 @@ fn places(report: &Report) -> Markup {
                     } } }
                 }
             }
+        }
+    }
+}
+
+fn thin_walls(report: &Report) -> Markup {
+    let Some(walls) = report.thin_walls.as_ref().filter(|walls| !walls.places.is_empty()) else { return html! {} };
+    html! {
+        h2 { "Thin walls" }
+        table {
+            thead { tr { th scope="col" { "At" } th scope="col" class="n" { "thickness" } th scope="col" class="n" { "wanted" } } }
+            tbody { @for place in &walls.places { tr {
+                td { (show_point(&place.at)) } td class="n" { (show_number(place.thickness)) } td class="n" { (show_number(walls.minimum)) }
+            } } }
         }
     }
 }
@@ -269,6 +283,16 @@ mod tests {
             assert!(text.contains(words) && text.contains("<h1>part.stl</h1>"), "{text}");
             assert!(!text.contains("<img") && !text.contains("<script"), "no picture, no script");
         }
+    }
+
+    #[test]
+    fn thin_walls_have_their_places() {
+        let mut report = sample(Outcome::Clean);
+        assert!(!whole(&report, None).into_string().contains("Thin walls"));
+        let walls = r#"{"minimum": 0.8, "points": 100, "share": 0.03, "places": [{"at": [1.5, 2.5, 3.5], "thickness": 0.31}]}"#;
+        report.thin_walls = serde_json::from_str(walls).unwrap();
+        let text = whole(&report, None).into_string();
+        assert!(text.contains("Thin walls") && text.contains("0.31") && text.contains("1.5, 2.5, 3.5"), "{text}");
     }
 
     /// Names, headers and notes come from whoever sent the file.

@@ -69,3 +69,37 @@ fn fast_and_strict_in_a_hot_folder() {
     assert_eq!((&strict["profile"]["guarantee"], &strict["profile"]["max_volume_change"]), (&"strict".into(), &0.01.into()));
     assert_eq!(strict["verdict"]["unchecked"], json!([]));
 }
+
+/// A hint on walls is the same whatever the limits, is shown to people, and changes no byte.
+#[test]
+fn thin_walls_are_told_of_and_change_nothing() {
+    let place = Place::new();
+    place.generate(Case::Holes, 24_000, 7);
+    place.put("walls.toml", b"thin_wall_mm = 25.0\n");
+    let input = format!("{}.stl", Case::Holes);
+    let run = |profile: &str, chunk: &str, threads: &str, memory: &str, spill: &str| {
+        let limits = ["--chunk-triangles", chunk, "--threads", threads, "--memory", memory, "--spill", spill];
+        let options = [&["--profile", profile, "--force", "--report", "report.json"][..], &limits[..]].concat();
+        let said = place.repair(&input, "out.stl", &options).expect(0).stdout();
+        let report: Value = serde_json::from_slice(&place.read("report.json")).unwrap();
+        (report["thin_walls"].clone(), report["hints"].clone(), place.read("out.stl"), said)
+    };
+    let (walls, hints, bytes, said) = run("walls.toml", "100000", "1", "1GiB", "never");
+    assert!(walls["points"].as_u64() > Some(1000) && walls["share"].as_f64() > Some(0.0), "{walls}");
+    assert!(said.contains("  hint    walls are thinner than 25 mm"), "{said}");
+    for (chunk, threads, memory, spill) in
+        [("64", "2", "64MiB", "always"), ("1000", "2", "1GiB", "auto"), ("100000", "2", "64MiB", "never")]
+    {
+        let other = run("walls.toml", chunk, threads, memory, spill);
+        assert!(
+            other.2 == bytes && (&other.0, &other.1) == (&walls, &hints),
+            "{threads} threads, {memory}: {} instead of {walls}",
+            other.0
+        );
+    }
+    let without = run("default", "100000", "2", "1GiB", "never");
+    assert!(without.2 == bytes && without.0.is_null() && !without.3.contains("walls"), "{}", without.3);
+    run("walls.toml", "100000", "2", "1GiB", "never");
+    place.suture(["report", "report.json", "-o", "page.html"]).expect(0);
+    assert!(String::from_utf8(place.read("page.html")).unwrap().contains("Thin walls"));
+}

@@ -3,7 +3,8 @@
 use glam::DVec3;
 
 use crate::contract::report::RepairName;
-use crate::util::scatter;
+use crate::geometry::distance::place;
+use crate::geometry::spread;
 
 use super::surfaces::{Corners, Surfaces};
 
@@ -99,21 +100,13 @@ fn area_of_each(area: f64, reach: f64) -> f64 {
     (area / MOST).max((reach * SPACING) * (reach * SPACING))
 }
 
-/// Points on a triangle, on average one for each such area. A number of the triangle decides where, and what becomes of the rest of the area.
+/// Points on a triangle, on average one for each such area.
 fn take(taken: &mut Vec<Taken>, number: u32, (corners, side): (&Corners, Side), by: Option<RepairName>, each: f64) {
-    let [a, b, c] = corners.map(|p| DVec3::from_array(p.map(f64::from)));
-    let front = (b - a).cross(c - a);
-    let count = front.length() / 2.0 / each + scatter::share(number.into());
-    if !count.is_finite() || count < 1.0 {
+    let points: Vec<[f64; 3]> = spread::points(corners, number, each).map(|p| p.to_array()).collect();
+    if points.is_empty() {
         return;
     }
-    // Roberts' sequence: it fills the square evenly, wherever it ends.
-    let points = (1..=count as u32).map(|i| {
-        let along = |step: f64| (scatter::share(number.into()) + step * f64::from(i)).fract();
-        let (u, v) = (along(0.754_877_666_246_692_7), along(0.569_840_290_998_053_3));
-        let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
-        (a + (b - a) * u + (c - a) * v).to_array()
-    });
-    let front = (side == Side::Front).then_some(front);
-    taken.push((number, (by, front), points.collect()));
+    let [a, b, c] = corners.map(place);
+    let front = (side == Side::Front).then_some((b - a).cross(c - a));
+    taken.push((number, (by, front), points));
 }

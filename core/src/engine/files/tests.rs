@@ -4,7 +4,8 @@ use std::os::unix::fs::FileExt;
 
 use super::*;
 use crate::contract::access::Access;
-use crate::contract::report::Outcome;
+use crate::contract::progress::Quiet;
+use crate::contract::report::{Hint, HintKind, Outcome};
 use crate::io::record::Record;
 use crate::testing::{Corners, cube, cuboid, plate, records, shaken_torus, shifted};
 
@@ -65,7 +66,7 @@ fn mapped_and_copied_files_give_the_same_bytes() {
             for threads in [1, 2] {
                 let limits = Limits { threads, memory_bytes, access, ..Limits::default() };
                 let output = folder.path().join(format!("{}.stl", outputs.len()));
-                let report = repair(&input, &output, &Profile::default(), &limits, &crate::contract::progress::Quiet).unwrap();
+                let report = repair(&input, &output, &Profile::default(), &limits, &Quiet).unwrap();
                 assert_eq!(report.input.blake3, blake3::hash(&std::fs::read(&input).unwrap()).to_hex().to_string());
                 outputs.push(std::fs::read(&output).unwrap());
                 std::fs::remove_file(&output).unwrap();
@@ -91,11 +92,11 @@ fn a_file_whose_last_records_are_zeros_is_never_good() {
         [(binary, "its last 12 of 24 records are zeros"), (text, "bytes are zeros, as in a file that was cut off")]
     {
         std::fs::write(&input, bytes).unwrap();
-        let inspected = inspect(&input, &profile, &limits, &crate::contract::progress::Quiet).unwrap();
+        let inspected = inspect(&input, &profile, &limits, &Quiet).unwrap();
         assert_eq!(inspected.outcome, Outcome::NotGood);
         assert!(inspected.verdict.reasons.iter().any(|reason| reason.contains(said)), "{:?}", inspected.verdict);
         let output = folder.path().join(&said[..9]);
-        let repaired = repair(&input, &output, &profile, &limits, &crate::contract::progress::Quiet).unwrap();
+        let repaired = repair(&input, &output, &profile, &limits, &Quiet).unwrap();
         assert_eq!((repaired.outcome, repaired.verdict.good), (Outcome::NeedsReview, true), "the half itself is closed");
         assert!(repaired.verdict.reasons.iter().any(|r| r.starts_with("a part is missing") && r.contains(said)), "{repaired:?}");
     }
@@ -106,7 +107,7 @@ fn a_few_zero_records_are_an_exporters() {
     let folder = tempfile::tempdir().unwrap();
     let (input, output) = (folder.path().join("part.stl"), folder.path().join("out.stl"));
     std::fs::write(&input, file(&[&records(&cube())[..], &[[0; 50]; 7]].concat())).unwrap();
-    let repaired = repair(&input, &output, &Profile::default(), &Limits::default(), &crate::contract::progress::Quiet).unwrap();
+    let repaired = repair(&input, &output, &Profile::default(), &Limits::default(), &Quiet).unwrap();
     assert_eq!((repaired.outcome, repaired.input.findings.len()), (Outcome::Repaired, 0));
 }
 
@@ -154,7 +155,7 @@ fn the_edges_of_a_soup_are_counted_before_they_are_compared() {
     std::fs::write(&input, file(&records(&soup))).unwrap();
     let inspected = |memory_bytes| {
         let limits = Limits { threads: 1, memory_bytes, chunk_triangles: 1024, ..Limits::default() };
-        inspect(&input, &Profile::default(), &limits, &crate::contract::progress::Quiet)
+        inspect(&input, &Profile::default(), &limits, &Quiet)
     };
     assert_eq!(inspected(64 << 20).unwrap().before.boundary_edges, 30_000);
     // 30,000 edges of 640 bytes are 19 MiB; what is kept of the triangles is 4 MiB.
@@ -177,7 +178,7 @@ fn a_file_that_shares_no_position_is_welded_in_the_stream() {
         for (threads, chunk_triangles) in [(1, 1 << 20), (2, 5000)] {
             let limits = Limits { threads, chunk_triangles, ..Limits::default() };
             let output = folder.path().join(format!("{chunk_triangles}.stl"));
-            let report = repair(&input, &output, &Profile::default(), &limits, &crate::contract::progress::Quiet).unwrap();
+            let report = repair(&input, &output, &Profile::default(), &limits, &Quiet).unwrap();
             assert_eq!(report.outcome, Outcome::Repaired, "{:?}", report.verdict);
             assert_eq!(report.input.blake3, blake3::hash(&std::fs::read(&input).unwrap()).to_hex().to_string());
             let (before, after) = (&report.before, report.after.as_ref().unwrap());
@@ -215,7 +216,7 @@ fn what_is_drawn_twice_and_faces_here_and_there_is_set_right_in_the_stream() {
     // 270,000 triangles of 288 bytes would be 74 MiB.
     for (threads, chunk_triangles, memory_bytes) in [(1, 1 << 15, 60 << 20), (2, 5000, 1 << 30)] {
         let limits = Limits { threads, chunk_triangles, memory_bytes, list_edit: true, ..Limits::default() };
-        let report = repair(&input, &output, &Profile::default(), &limits, &crate::contract::progress::Quiet).unwrap();
+        let report = repair(&input, &output, &Profile::default(), &limits, &Quiet).unwrap();
         assert_eq!(report.outcome, Outcome::Repaired, "{:?}", report.verdict);
         let (before, after) = (&report.before, report.after.as_ref().unwrap());
         assert_eq!((before.triangles, before.duplicates_same), (2 * (n - 1), n - 1));
@@ -249,7 +250,7 @@ fn what_was_turned_in_the_stream_still_says_little_of_a_body_in_another_one() {
         let is_wrong = |i: usize| crate::util::scatter::share(i as u64) < share;
         torus.iter_mut().enumerate().filter(|(i, _)| is_wrong(*i)).for_each(|(_, corners)| corners.swap(1, 2));
         std::fs::write(&input, file(&records(&[cuboid([-50.0; 3], [50.0; 3]), torus].concat()))).unwrap();
-        let report = repair(&input, &output, &Profile::default(), &Limits::default(), &crate::contract::progress::Quiet).unwrap();
+        let report = repair(&input, &output, &Profile::default(), &Limits::default(), &Quiet).unwrap();
         assert_eq!(report.outcome, outcome, "{:?}", report.verdict);
         let volume = report.after.unwrap().volume;
         assert!(volume < 0.98 * 1e6, "the torus is a cavity: {volume}");
@@ -264,7 +265,7 @@ fn under(name: &str, bytes: &[u8]) -> (tempfile::TempDir, Report) {
     std::fs::write(&input, bytes).unwrap();
     let limits = Limits { threads: 2, ..Limits::default() };
     let profile = Profile::built_in(name).unwrap();
-    let report = repair(&input, &output, &profile, &limits, &crate::contract::progress::Quiet).unwrap();
+    let report = repair(&input, &output, &profile, &limits, &Quiet).unwrap();
     (folder, report)
 }
 
@@ -318,4 +319,54 @@ fn the_strict_profile_mends_what_is_small_and_leaves_the_rest_to_a_person() {
     let (_folder, large) = under("strict", &torn_torus(40));
     assert!(!large.outcome.is_good(), "{:?}", large.verdict);
     assert!(under("default", &torn_torus(40)).1.verdict.good, "another profile closes it");
+}
+
+/// A plate of half a unit, in two files: as it is, and without one of its triangles.
+#[test]
+fn walls_are_looked_at_in_the_result() {
+    let folder = tempfile::tempdir().unwrap();
+    let [input, output] = ["part.stl", "out.stl"].map(|name| folder.path().join(name));
+    let plate = cuboid([0.0; 3], [40.0, 30.0, 0.5]);
+    let asked = Profile { thin_wall_mm: 0.8, ..Profile::default() };
+    let is_of_walls = |hint: &Hint| hint.kind == HintKind::ThinWalls;
+    for triangles in [&plate[..], &plate[1..]] {
+        std::fs::write(&input, file(&records(triangles))).unwrap();
+        let repaired = |profile: &Profile| {
+            let report = repair(&input, &output, profile, &Limits::default(), &Quiet).unwrap();
+            let bytes = std::fs::read(&output).unwrap();
+            std::fs::remove_file(&output).unwrap();
+            (report, bytes)
+        };
+        let (report, bytes) = repaired(&asked);
+        let walls = report.thin_walls.unwrap();
+        assert!(walls.share > 0.9 && (walls.places[0].thickness - 0.5).abs() < 1e-6, "{walls:?}");
+        assert!(report.hints.iter().any(is_of_walls) && report.verdict.good);
+        let (unasked, same) = repaired(&Profile::default());
+        assert!(bytes == same && unasked.thin_walls.is_none() && !unasked.hints.iter().any(is_of_walls));
+        assert_eq!(unasked.outcome, report.outcome, "a hint changes nothing");
+    }
+    // Looked at as it is, the second one is open.
+    let report = inspect(&input, &asked, &Limits::default(), &Quiet).unwrap();
+    let told: Vec<&str> = report.hints.iter().filter(|hint| is_of_walls(hint)).map(|hint| hint.text.as_str()).collect();
+    assert!(report.thin_walls.is_none() && told.len() == 1 && told[0].contains("not looked for"), "{told:?}");
+}
+
+/// Told to end when it begins with walls.
+#[test]
+fn who_looks_at_walls_can_be_told_to_end() {
+    struct Ends(std::sync::atomic::AtomicBool);
+    impl Progress for Ends {
+        fn at(&self, stage: &'static str, _: u64, _: u64) {
+            self.0.fetch_or(stage == "walls", std::sync::atomic::Ordering::Relaxed);
+        }
+        fn cancelled(&self) -> bool {
+            self.0.load(std::sync::atomic::Ordering::Relaxed)
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("part.stl");
+    std::fs::write(&input, file(&records(&cube()))).unwrap();
+    let asked = Profile { thin_wall_mm: 0.8, ..Profile::default() };
+    let error = inspect(&input, &asked, &Limits::default(), &Ends(false.into())).unwrap_err();
+    assert!(error.is_cancellation(), "{error}");
 }

@@ -1,5 +1,5 @@
 //! Places of a report, for people and for the view that can be turned: defects that were found, regions that were changed, surface that was lost or invented, loops
-//! that stayed open. Without a script they are a list; the script makes a button of each.
+//! that stayed open, walls that are thin. Without a script they are a list; the script makes a button of each.
 
 use maud::{Markup, html};
 use suture_core::Report;
@@ -25,7 +25,7 @@ struct Group {
     places: Vec<(Corners, String)>,
 }
 
-fn groups(report: &Report) -> [Group; 5] {
+fn groups(report: &Report, is_pair: bool) -> [Group; 6] {
     let skin = |changes: &[suture_core::report::SkinPlace]| -> Vec<(Corners, String)> {
         changes.iter().map(|place| (place.bounds, format!("{} square units", show_number(place.area)))).collect()
     };
@@ -43,18 +43,21 @@ fn groups(report: &Report) -> [Group; 5] {
     let found = report.loops.listed.iter();
     let found = found
         .map(|hole| ([hole.at; 2], format!("{} of {} edges", hole.class.name().replace('_', " "), show_count(hole.vertices))));
+    let thin = report.thin_walls.iter().flat_map(|walls| &walls.places);
+    let thin = thin.map(|place| ([place.at; 2], format!("{} units thick", show_number(place.thickness))));
     [
         Group { class: "lost", title: "Surface that was lost", side: "before", places: lost },
         Group { class: "invented", title: "Surface that was invented", side: "after", places: invented },
         Group { class: "open", title: "Left as it was", side: "after", places: open.chain(regions(true)).collect() },
         Group { class: "changed", title: "Regions that were changed", side: "after", places: regions(false).collect() },
         Group { class: "found", title: "Openings that were found", side: "before", places: found.collect() },
+        Group { class: "thin", title: "Thin walls", side: if is_pair { "after" } else { "before" }, places: thin.collect() },
     ]
 }
 
 /// The place of the view, and the list beside it.
 pub(super) fn view(id: JobId, report: &Report, is_pair: bool) -> Markup {
-    let groups = groups(report);
+    let groups = groups(report, is_pair);
     let all: usize = groups.iter().map(|group| group.places.len()).sum();
     html! {
         section aria-labelledby="places" {

@@ -56,7 +56,7 @@ pub(crate) struct Numbers {
 }
 
 impl Numbers {
-    /// What these counts come to.
+    /// The sums of these counts.
     pub(crate) fn of(counts: &BTreeMap<Kind, u64>) -> Self {
         let sum = |is: fn(Kind) -> bool| counts.iter().filter(|(kind, _)| is(**kind)).map(|(_, count)| count).sum();
         Self {

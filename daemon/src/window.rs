@@ -202,7 +202,7 @@ mod tests {
             let looks = (0..hours * 60).map(|minute| from.checked_add(jiff::SignedDuration::from_mins(minute)).unwrap());
             looks.filter_map(|now| window.closed(TimeOfDay::SEVEN, &now)).collect::<std::collections::BTreeSet<_>>().len()
         };
-        // One before the first look, and one each night.
+        // The end before the first look, and that of the night.
         assert_eq!(ends("2026-03-28T12:00:00", 24), 2);
         assert_eq!(ends("2026-10-24T12:00:00", 24), 2);
         assert_eq!(ends("2026-06-10T12:00:00", 24), 2);

@@ -1,4 +1,4 @@
-//! What subscribers are told: ends of jobs, and news of the service itself.
+//! Notices for subscribers: ends of jobs, and news of the service itself.
 
 use std::collections::BTreeMap;
 
@@ -41,11 +41,11 @@ pub struct Word {
     pub seq: Seq,
     /// When they came.
     pub at: Time,
-    /// What they are.
+    /// The news themselves.
     pub news: News,
 }
 
-/// What a subscriber has not heard yet.
+/// Something that a subscriber has not heard yet.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Notice {
     /// A job, as it stood when it came to its end.

@@ -141,7 +141,7 @@ pub trait JobStore: Send + Sync {
     /// [`StoreError::TooLong`] when there are too many, or a name does not fit a record.
     fn subscribe(&self, names: &[String]) -> Result<(), StoreError>;
 
-    /// What the subscriber of that name has not acknowledged, the oldest first, at most `most`: jobs as they stood when they came to their end, and
+    /// Notices that the subscriber of that name has not acknowledged, the oldest first, at most `most`: jobs as they stood when they came to their end, and
     /// news of the service. Each of them is durable. Later changes of a job, also the end of its record, change nothing here.
     ///
     /// # Errors

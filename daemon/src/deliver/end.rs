@@ -1,4 +1,4 @@
-//! What is told of a job that has ended: all of it is of the job as it stood then, and of the files that it has left.
+//! The message of a job that has ended: all of it is of the job as it stood then, and of the files that it has left.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! What is told: the end of a job, or news of the service itself.
+//! Messages: each is of the end of a job, or of news of the service itself.
 
 use std::path::{Path, PathBuf};
 

@@ -48,13 +48,13 @@ impl Nights {
     }
 }
 
-/// What is to be done of nights.
+/// Work to be done of nights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Due {
     Nothing,
     /// The next night is counted from now.
     Begin,
-    /// One is to be told of.
+    /// A night is to be told of.
     Over {
         since: Time,
     },

@@ -1,4 +1,4 @@
-//! What was told last of the service itself, so that nothing is told twice, also not by another life of the daemon. Each folder that is away has
+//! Marks of what was told last of the service itself, so that nothing is told twice, also not by another life of the daemon. Each folder that is away has
 //! an entry of its own in the table `meta`, and the end of the last night has one; the entry and the word of it for subscribers are one transaction.
 
 use std::sync::MutexGuard;
@@ -24,16 +24,18 @@ impl<T: Tables> Queue<T> {
     pub(super) fn tell_of(&self, news: &News) -> Result<bool, StoreError> {
         self.tables.sound()?;
         let (inner, now) = (self.lock(), self.clock.now());
-        let (key, mark, is_known): (_, _, fn(Option<Time>, &News) -> bool) = match news {
-            News::FolderAway { folder, .. } => (away(folder), Some(now), |mark, _| mark.is_some()),
-            News::FolderBack { folder } => (away(folder), None, |mark, _| mark.is_none()),
-            News::Night { until, .. } => (
-                NIGHT.to_vec(),
-                Some(*until),
-                |mark, news| matches!(news, News::Night { until, .. } if mark.is_some_and(|told| told >= *until)),
-            ),
+        let (key, mark) = match news {
+            News::FolderAway { folder, .. } => (away(folder), Some(now)),
+            News::FolderBack { folder } => (away(folder), None),
+            News::Night { until, .. } => (NIGHT.to_vec(), Some(*until)),
         };
-        if is_known(self.mark(&key)?, news) {
+        let told = self.mark(&key)?;
+        let is_known = match news {
+            News::FolderAway { .. } => told.is_some(),
+            News::FolderBack { .. } => told.is_none(),
+            News::Night { until, .. } => told.is_some_and(|told| told >= *until),
+        };
+        if is_known {
             return Ok(false);
         }
         let mut news = news.clone();

@@ -1,4 +1,4 @@
-//! What subscribers have not heard yet: each job as it stood when it came to its end, under the number of that transition, and news of the service
+//! Notices that subscribers have not heard yet: each job as it stood when it came to its end, under the number of that transition, and news of the service
 //! itself, under the number of theirs ([`super::marks`]). An entry is written in the transaction in which the job ends, so that neither is there without
 //! the other, and it goes when all subscribers have it. Where no one subscribes, nothing is kept.
 //!

@@ -1,4 +1,4 @@
-//! Those who are to hear of ends of jobs, and of news, hear of each, whatever becomes of the daemon or of the job.
+//! Whoever is to hear of ends of jobs, and of news, hears of each, whatever becomes of the daemon or of the job.
 
 use crate::id::{Seq, Time};
 use crate::job::{Ending, Job, Kind};

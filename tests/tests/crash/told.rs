@@ -88,7 +88,8 @@ impl Two {
 
     fn daemon(&self) -> Command {
         self.hot.configured(&format!(
-            "settle = \"30ms\"\n[[webhook]]\nurl = \"http://{}/\"\nevents = [\"folder_away\", \"folder_back\"]\n[[folders]]\npath = {:?}\n",
+            "settle = \"30ms\"\nstate = {:?}\n[[webhook]]\nurl = \"http://{}/\"\nevents = [\"folder_away\", \"folder_back\"]\n[[folders]]\npath = {:?}\n",
+            self.hot.path().join(".suture/state"),
             self.receiver.address,
             self.beside.path().join("scans")
         ))

@@ -22,7 +22,7 @@ fn configure(place: &Place, first: &str, receiver: &Receiver, events: &str) {
     );
 }
 
-/// What came, each once: a message that came again has the same id.
+/// Messages that came, each once: a message that came again has the same id.
 fn came(receiver: &Receiver) -> Vec<Value> {
     let mut all: Vec<Value> = Vec::new();
     for message in receiver.came() {

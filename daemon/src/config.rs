@@ -1,6 +1,6 @@
 //! The settings that the daemon works by. A hot folder needs no settings; a TOML file may name several folders, profiles and limits: [`read`] reads it,
 //! [`show`] writes one, [`command`] does either for people. [`keep`] is what goes by itself, [`api`] the web interface, [`events`] who hears of
-//! the ends of jobs.
+//! what happens.
 
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -11,7 +11,7 @@ use suture_store::Priority;
 
 use crate::own_profile::OwnProfile;
 use crate::units::show_size;
-use crate::window::RunWindow;
+use crate::window::{RunWindow, TimeOfDay};
 use api::Api;
 use events::Events;
 use keep::Keep;
@@ -97,6 +97,8 @@ pub(crate) struct Config {
     /// The hours at which all workers work; at others, so many do.
     pub run_window: RunWindow,
     pub workers_outside: usize,
+    /// When a night ends that no hours of work end.
+    pub night_ends: TimeOfDay,
     /// A result that was made of the same content before is copied, not made once more.
     pub reuse: bool,
     /// What goes by itself, and when.
@@ -126,6 +128,7 @@ impl Config {
             time_limit: TimeLimit { base: Duration::from_secs(120), per_gib: Duration::from_secs(1200) },
             run_window: RunWindow::default(),
             workers_outside: 0,
+            night_ends: TimeOfDay::SEVEN,
             reuse: true,
             keep: Keep::default(),
             api: None,

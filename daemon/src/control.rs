@@ -19,7 +19,7 @@ use suture_store::{Control, Decision, Job, JobId, JobStore, Kind, Priority, Quer
 use crate::attempt::Context;
 use crate::fsx::Identity;
 use crate::glance::{Glance, standing};
-use crate::left::result_path;
+use crate::left::{area, result_path};
 use crate::publish::approved::unfit;
 use crate::schedule::{Hold, Standing};
 use crate::standstill;
@@ -145,7 +145,10 @@ pub(crate) fn answer(store: &dyn JobStore, wish: &JobsWish) -> Result<Vec<Job>, 
     let one = match wish {
         JobsWish::List => return Ok(store.list(&Query::default())?),
         JobsWish::Show(id) => store.get(*id)?.ok_or(StoreError::Unknown(*id))?,
-        JobsWish::Retry(id) => store.control(*id, Control::Retry)?,
+        JobsWish::Retry(id) => {
+            store.get(*id)?.ok_or(StoreError::Unknown(*id)).map_err(Refusal::from).and_then(|job| unless_done(&job))?;
+            store.control(*id, Control::Retry)?
+        }
         JobsWish::Cancel(id) => store.control(*id, Control::Cancel)?,
         JobsWish::Rank(id, priority) => store.control(*id, Control::Rank(*priority))?,
         JobsWish::Decide(id, decision) => {
@@ -154,6 +157,20 @@ pub(crate) fn answer(store: &dyn JobStore, wish: &JobsWish) -> Result<Vec<Job>, 
         }
     };
     Ok(vec![one])
+}
+
+/// Refuses to try a job again whose result is in place, and says how its file is repaired anew: people use that result, and receipt and report speak of it.
+fn unless_done(job: &Job) -> Result<(), Refusal> {
+    let (Kind::Done, Some(output)) = (job.kind(), job.publication().and_then(|publication| publication.output.as_ref())) else {
+        return Ok(());
+    };
+    let ((place, original), id) = (job.original(), job.id);
+    let line = format!(
+        "job {id} is done, and its result is out/{output}; to have the file repaired anew, take that result out of out/, and drop a copy of {}/{original} \
+         (if it is not there, of the one in the archive) into in/ under a name of its own",
+        area(place)
+    );
+    Err(Refusal { line, exit_code: 2 })
 }
 
 /// Refuses a decision over a job of which the same was said before, or of which there is nothing to decide, in words that tell why.
@@ -377,7 +394,8 @@ pub(crate) fn ask<W: Wish>(root: &Path, wish: &W) -> io::Result<Option<Result<W:
 #[cfg(test)]
 mod tests {
     use super::*;
-    use suture_store::{MemoryStore, RelPath, Source, Submission, SystemClock};
+    use suture_store::testkit::{dropped, result_of};
+    use suture_store::{Ending, Filter, MemoryStore, RelPath, Source, Step, Submission, SystemClock};
 
     #[test]
     fn wishes_are_answered_or_refused_with_a_code() {
@@ -401,6 +419,24 @@ mod tests {
         answer(&store, &JobsWish::Cancel(id)).unwrap();
         assert!(refused(JobsWish::Rank(id, Priority::LOWEST)), "it waits no longer");
         assert!(refused(JobsWish::Cancel(id)), "it is cancelled already");
+    }
+
+    /// A result that is in place stays; whoever wants another one is told how.
+    #[test]
+    fn what_is_done_is_not_tried_again_and_it_is_said_what_to_do() {
+        let store = MemoryStore::default();
+        store.submit(&[dropped("part.stl", 84).unwrap()]).unwrap();
+        let claim = store.claim(&Filter::default()).unwrap().unwrap();
+        store.advance(&claim, Step::Intend(result_of(&claim.job, Ending::Clean))).unwrap();
+        store.advance(&claim, Step::Placed).unwrap();
+        let done = store.advance(&claim, Step::Finished).unwrap();
+        let refused = answer(&store, &JobsWish::Retry(done.id)).unwrap_err();
+        for words in
+            ["job 1 is done, and its result is out/part.stl", "take that result out of out/", "drop a copy of done/part.stl"]
+        {
+            assert!(refused.line.contains(words), "{}", refused.line);
+        }
+        assert_eq!((refused.exit_code, store.get(done.id).unwrap()), (2, Some(done)));
     }
 
     #[test]

@@ -1,7 +1,7 @@
-//! Events out: webhooks and the command of `[on_done]` hear of every job that has ended, at least once.
+//! Events out: webhooks and the command of `[on_done]` hear of every job that has ended, at least once; webhooks, if they want it, of nights and folders, too.
 //!
-//! The store keeps each end for every *target* until that has it ([`suture_store::JobStore::notices`]): written with the job's end itself, it survives whatever
-//! the job and the daemon meet. Each target has a thread, which takes its notices in order, and tries the oldest until it is delivered or given up
+//! The store keeps each of these for every *target* until that has it ([`suture_store::JobStore::notices`]): written with the job's end itself, it survives
+//! whatever the job and the daemon meet. Each target has a thread, which takes its notices in order, and tries the oldest until it is delivered or given up
 //! ([`pace`]); what happens to one is no other's trouble, and no job's. Between a delivery and the note of it the daemon may die: then the same message goes
 //! out once more, under the same id.
 
@@ -12,13 +12,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{Builder, Scope, ScopedJoinHandle};
 use std::time::Duration;
 
-use suture_store::{Job, JobStore, StoreError, crash_point};
+use suture_store::{JobStore, Notice, Seq, StoreError, crash_point};
 
 use crate::attempt::Context;
-use crate::config::events::{Events, OnDone, Webhook};
+use crate::config::events::{Events, Occasion, OnDone, Webhook};
 use crate::event::{Happening, Parcel};
 
 mod command;
+mod end;
 mod http;
 mod message;
 mod pace;
@@ -58,10 +59,15 @@ impl Target {
 
     fn wants(&self, message: &Message<'_>) -> bool {
         match self {
-            Self::Webhook(webhook) => webhook.events.contains(&message.event),
-            Self::Command(_) => true,
+            Self::Webhook(webhook) => webhook.events.contains(&message.event()),
+            Self::Command(_) => matches!(message, Message::End(_)),
         }
     }
+}
+
+/// Does any target of the configuration want to hear of such an occasion?
+pub(crate) fn is_wanted(context: &Context, occasion: Occasion) -> bool {
+    context.settings.now().events.webhooks.iter().any(|webhook| webhook.events.contains(&occasion))
 }
 
 /// Has the store keep what the targets of the configuration are to hear, from now on. For whoever has just read that configuration.
@@ -117,7 +123,7 @@ fn begin<'s>(
             Ok(Ok(())) => {}
             Ok(Err(error)) => context.fail(error),
             Err(_) => {
-                tracing::error!("A thread that tells of jobs ended in an internal error, and is begun anew.");
+                tracing::error!("A thread that tells of events ended in an internal error, and is begun anew.");
                 std::thread::sleep(REST);
             }
         }
@@ -155,12 +161,10 @@ impl Teller<'_> {
                 std::thread::sleep(LOOK_EVERY);
             }
             let mut passed_over = None;
-            for job in &notices {
-                let root = self.context.folders.iter().find(|folder| folder.name == job.source.folder);
-                let message = Message::of(job, root.map(|folder| folder.root.as_path()));
-                match message.filter(|message| self.target.wants(message)) {
-                    None => passed_over = Some(job.seq),
-                    Some(message) if self.bring(&message)? => passed_over = None,
+            for notice in &notices {
+                match self.message(notice).filter(|message| self.target.wants(message)) {
+                    None => passed_over = Some(notice.seq()),
+                    Some(message) if self.bring(&message, notice.seq())? => passed_over = None,
                     // What it was is read again: much may have been given up meanwhile.
                     Some(_) => break,
                 }
@@ -172,16 +176,21 @@ impl Teller<'_> {
         Ok(())
     }
 
+    fn message<'n>(&'n self, notice: &'n Notice) -> Option<Message<'n>> {
+        let folders = &self.context.folders;
+        Message::of(notice, &|name| folders.iter().find(|folder| folder.name == name).map(|folder| folder.root.as_path()))
+    }
+
     /// Tries one message until it is delivered or given up; `false`: it is neither, and something else has to be done first.
-    fn bring(&self, message: &Message<'_>) -> Result<bool, StoreError> {
-        let (name, mut tries) = (self.target.name(), 0);
+    fn bring(&self, message: &Message<'_>, seq: Seq) -> Result<bool, StoreError> {
+        let (name, id, mut tries) = (self.target.name(), message.id(), 0);
         while !(self.stop)() && self.may_begin() {
             tries += 1;
-            let next = self.attempt(message).after(tries, &message.id);
+            let next = self.attempt(message, &id).after(tries, &id);
             if next == Next::Stop {
                 return Ok(false);
             }
-            self.told(message.job, &next, tries);
+            self.told(message, &next, tries);
             if let Next::Wait { why, pause } = next {
                 self.context.pulse.trouble(name, why);
                 if self.give_up_oldest()? {
@@ -191,7 +200,7 @@ impl Teller<'_> {
                 continue;
             }
             crash_point("daemon.told");
-            self.context.store.acknowledge(name, message.job.seq)?;
+            self.context.store.acknowledge(name, seq)?;
             self.context.pulse.no_trouble(name);
             crash_point("daemon.acknowledged");
             return Ok(true);
@@ -199,16 +208,17 @@ impl Teller<'_> {
         Ok(false)
     }
 
-    fn attempt(&self, message: &Message<'_>) -> Outcome {
+    fn attempt(&self, message: &Message<'_>, id: &str) -> Outcome {
         let world = &*self.context.world;
-        match self.target {
-            Target::Webhook(hook) => webhook::send(hook, &message.id, &message.body(), world, self.stop),
-            Target::Command(on_done) => {
+        match (self.target, message) {
+            (Target::Webhook(hook), message) => webhook::send(hook, id, &message.body(), world, self.stop),
+            (Target::Command(on_done), Message::End(end)) => {
                 self.context.pulse.command(true);
-                let outcome = command::run(on_done, message, world, self.stop);
+                let outcome = command::run(on_done, end, world, self.stop);
                 self.context.pulse.command(false);
                 outcome
             }
+            (Target::Command(_), Message::Word(_)) => Outcome::Delivered { note: "it is run of jobs alone".into() },
         }
     }
 
@@ -217,8 +227,8 @@ impl Teller<'_> {
         matches!(self.target, Target::Webhook(_)) || self.context.once || !self.context.pulse.is_ending()
     }
 
-    fn told(&self, job: &Job, next: &Next, tries: u32) {
-        let parcel = Parcel { target: self.target.name(), job: job.id };
+    fn told(&self, message: &Message<'_>, next: &Next, tries: u32) {
+        let parcel = self.parcel(message);
         self.context.bus.tell(&match next {
             Next::Done { note } => Happening::Delivered { parcel, note },
             Next::GiveUp { why } => Happening::GivenUp { parcel, why },
@@ -227,16 +237,20 @@ impl Teller<'_> {
         });
     }
 
+    fn parcel(&self, message: &Message<'_>) -> Parcel<'_> {
+        Parcel { target: self.target.name(), event: message.event().word(), job: message.job() }
+    }
+
     /// Lets go what is too much for a target that takes nothing. Returns whether there was any.
     fn give_up_oldest(&self) -> Result<bool, StoreError> {
         let (store, target) = (&*self.context.store, self.target.name());
         let oldest = surplus(store, target, MOST)?;
         let Some(last) = oldest.last() else { return Ok(false) };
-        for job in &oldest {
-            let why = &format!("more than {MOST} messages wait for this target");
-            self.context.bus.tell(&Happening::GivenUp { parcel: Parcel { target, job: job.id }, why });
+        let why = &format!("more than {MOST} messages wait for this target");
+        for message in oldest.iter().filter_map(|notice| self.message(notice)) {
+            self.context.bus.tell(&Happening::GivenUp { parcel: self.parcel(&message), why });
         }
-        store.acknowledge(target, last.seq).map(|()| true)
+        store.acknowledge(target, last.seq()).map(|()| true)
     }
 
     fn wait(&self, pause: Duration) {
@@ -249,7 +263,7 @@ impl Teller<'_> {
 }
 
 /// The oldest notices of a target, if there are more than `most`: those beyond, a page of them at most.
-fn surplus(store: &dyn JobStore, target: &str, most: u64) -> Result<Vec<Job>, StoreError> {
+fn surplus(store: &dyn JobStore, target: &str, most: u64) -> Result<Vec<Notice>, StoreError> {
     let beyond = store.backlog(target)?.saturating_sub(most);
     store.notices(target, usize::try_from(beyond).unwrap_or(usize::MAX).min(PAGE))
 }
@@ -271,11 +285,11 @@ mod tests {
             let claim = store.claim(&Filter::default()).unwrap().unwrap();
             store.advance(&claim, Step::Intend(result_of(&claim.job, Ending::Clean))).unwrap();
             store.advance(&claim, Step::Placed).unwrap();
-            ends.push(store.advance(&claim, Step::Finished).unwrap());
+            ends.push(Notice::End(store.advance(&claim, Step::Finished).unwrap().into()));
         }
         assert_eq!(surplus(&store, "farm", 7).unwrap(), []);
         assert_eq!(surplus(&store, "farm", 5).unwrap(), ends[..2]);
-        store.acknowledge("farm", ends[1].seq).unwrap();
+        store.acknowledge("farm", ends[1].seq()).unwrap();
         assert_eq!(surplus(&store, "farm", 5).unwrap(), []);
         assert_eq!(store.notices("farm", PAGE).unwrap(), ends[2..]);
     }

@@ -24,7 +24,7 @@ pub(crate) enum Happening<'a> {
     Wished { job: &'a Job, wish: &'a Control },
     /// Its record is gone.
     Forgotten { id: JobId },
-    /// A target has heard of a job's end.
+    /// A target was told of an event.
     Delivered { parcel: Parcel<'a>, note: &'a str },
     /// It has not yet, after so many tries.
     NotDelivered { parcel: Parcel<'a>, why: &'a str, tries: u32 },
@@ -36,12 +36,14 @@ pub(crate) enum Happening<'a> {
     FolderBack { name: &'a str, root: &'a std::path::Path },
 }
 
-/// Word of a job's end, on its way out.
+/// Word of an event, on its way out.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Parcel<'a> {
     /// Name of a webhook, or `on_done`.
     pub target: &'a str,
-    pub job: JobId,
+    pub event: &'static str,
+    /// The job that it is of.
+    pub job: Option<JobId>,
 }
 
 /// A word to those who listen: a name, and what there is to say.
@@ -66,25 +68,17 @@ impl Happening<'_> {
                 tracing::error!(folder = %root.display(), error = why, "The folder cannot be served; the others go on.");
             }
             Self::FolderBack { root, .. } => tracing::info!(folder = %root.display(), "The folder is back."),
-            Self::Delivered { parcel: Parcel { target, job }, note } => {
-                tracing::info!(job = job.0, target_name = target, note, "A job's end was told.");
+            Self::Delivered { parcel: Parcel { target, event, job }, note } => {
+                tracing::info!(job = number(job), event, target_name = target, note, "An event was told.");
             }
-            Self::GivenUp { parcel: Parcel { target, job }, why } => {
-                tracing::error!(
-                    job = job.0,
-                    target_name = target,
-                    reason = why,
-                    "A job's end could not be told; it is given up."
-                );
+            Self::GivenUp { parcel: Parcel { target, event, job }, why } => {
+                let job = number(job);
+                tracing::error!(job, event, target_name = target, reason = why, "An event could not be told; it is given up.");
             }
             // Said once; metrics and `suture jobs list` tell of it for as long as it lasts.
-            Self::NotDelivered { parcel: Parcel { target, job }, why, tries: 1 } => {
-                tracing::warn!(
-                    job = job.0,
-                    target_name = target,
-                    reason = why,
-                    "A job's end could not be told; it is tried again."
-                );
+            Self::NotDelivered { parcel: Parcel { target, event, job }, why, tries: 1 } => {
+                let job = number(job);
+                tracing::warn!(job, event, target_name = target, reason = why, "An event could not be told; it is tried again.");
             }
             Self::Began { .. } | Self::Reported { .. } | Self::Forgotten { .. } | Self::NotDelivered { .. } => {}
         }
@@ -135,6 +129,10 @@ impl Happening<'_> {
             Self::Reported { .. } | Self::Delivered { .. } | Self::NotDelivered { .. } | Self::GivenUp { .. } => return None,
         })
     }
+}
+
+fn number(job: &Option<JobId>) -> Option<u64> {
+    job.map(|job| job.0)
 }
 
 fn of_job(job: &Job) -> Value {

@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use suture_store::job::Testimony;
 use suture_store::{
-    Claim, Control, Filter, Job, JobId, JobStore, Kind, Lease, Look, Page, Past, Query, Recipe, Recovered, Seq, Source, State,
-    Step, StoreError, Submission, Submitted, Waiting,
+    Claim, Control, Filter, Job, JobId, JobStore, Kind, Lease, Look, News, Notice, Page, Past, Query, Recipe, Recovered, Seq,
+    Source, State, Step, StoreError, Submission, Submitted, Time, Waiting,
 };
 
 use crate::event::Happening;
@@ -154,7 +154,7 @@ impl JobStore for Heard {
         self.read(self.store.subscribe(names))
     }
 
-    fn notices(&self, name: &str, most: usize) -> Result<Vec<Job>, StoreError> {
+    fn notices(&self, name: &str, most: usize) -> Result<Vec<Notice>, StoreError> {
         self.read(self.store.notices(name, most))
     }
 
@@ -164,6 +164,18 @@ impl JobStore for Heard {
 
     fn backlog(&self, name: &str) -> Result<u64, StoreError> {
         self.read(self.store.backlog(name))
+    }
+
+    fn tell(&self, news: &News) -> Result<bool, StoreError> {
+        self.read(self.store.tell(news))
+    }
+
+    fn last_night(&self) -> Result<Option<Time>, StoreError> {
+        self.read(self.store.last_night())
+    }
+
+    fn begin_night(&self, at: Time) -> Result<(), StoreError> {
+        self.read(self.store.begin_night(at))
     }
 
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {

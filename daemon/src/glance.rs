@@ -9,7 +9,9 @@ use suture_store::{Job, JobId, Kind, Look, Query, StoreError, Time};
 
 use crate::attempt::Context;
 use crate::folder::Folder;
+use crate::say::plain;
 use crate::schedule::{Hold, Standing};
+use crate::units::show_seconds;
 
 /// So many jobs of a sort are named.
 const NAMED: usize = 5;
@@ -59,6 +61,22 @@ pub(crate) struct Work {
     /// About so many are left.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seconds_left: Option<u64>,
+}
+
+impl Work {
+    /// How far it is, in words.
+    pub(crate) fn words(&self) -> String {
+        let stage = match (&self.stage, self.percent) {
+            (Some(stage), Some(percent)) => format!("{} {percent} %", plain(stage)),
+            _ => self.kind.name().into(),
+        };
+        let left = self.seconds_left.map(|left| format!(", about {} left", seconds(left))).unwrap_or_default();
+        format!("{stage}, for {}{left}", seconds(self.seconds))
+    }
+}
+
+fn seconds(seconds: u64) -> String {
+    if seconds < 60 { format!("{seconds} s") } else { show_seconds(seconds as f64) }
 }
 
 /// A hot folder.

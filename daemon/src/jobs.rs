@@ -12,6 +12,7 @@ use crate::cli::{JobsArgs, JobsCommand, Said};
 use crate::control::{DaemonWish, JobsWish};
 use crate::exit::Exit;
 use crate::fsx;
+use crate::glance::Work;
 use crate::left::{area, report_path};
 use crate::reach::{self, Failure};
 use crate::rebuild::{Rebuilt, rebuild};
@@ -50,17 +51,15 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
         jobs.retain(|job| state.is_none_or(|state| job.kind() == state));
         jobs.drain(..jobs.len().saturating_sub(newest.unwrap_or(usize::MAX)));
     }
+    let work = at_work(&args.dir, &jobs);
     let mut text = String::new();
     for job in &jobs {
-        if args.json {
-            text += &serde_json::to_string(&Shown::new(job)).unwrap_or_default();
-            text.push('\n');
-        } else {
-            text += &match args.command {
-                JobsCommand::Show { .. } => show(&args.dir, job),
-                _ => line(job),
-            };
-        }
+        let work = work.iter().find(|work| work.job == job.id);
+        text += &match &args.command {
+            _ if args.json => serde_json::to_string(&Shown::new(job, work)).unwrap_or_default() + "\n",
+            JobsCommand::Show { .. } => show(&args.dir, job, work),
+            _ => line_of(job, work),
+        };
     }
     if jobs.is_empty() && !args.json {
         text = "no jobs\n".into();
@@ -76,6 +75,12 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
     // A reader that has gone away has seen enough.
     let _ = std::io::stdout().write_all(text.as_bytes());
     Exit::Good
+}
+
+/// How far those of these jobs are that are in work, as far as a daemon says so.
+fn at_work(dir: &Path, jobs: &[Job]) -> Vec<Work> {
+    let any = jobs.iter().any(|job| job.kind() == Kind::Running);
+    if any { reach::work(dir).unwrap_or_default() } else { Vec::new() }
 }
 
 /// A person's decision.
@@ -159,13 +164,28 @@ struct Shown<'a> {
     /// The job of whose result its own is a copy.
     #[serde(skip_serializing_if = "Option::is_none")]
     reused: Option<JobId>,
+    /// How far its work is, once that is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    progress: Option<Far<'a>>,
     #[serde(flatten)]
     job: &'a Job,
 }
 
+/// How far work is.
+#[derive(serde::Serialize)]
+struct Far<'a> {
+    stage: &'a str,
+    /// Of the stage.
+    percent: u8,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seconds_left: Option<u64>,
+}
+
 impl<'a> Shown<'a> {
-    fn new(job: &'a Job) -> Self {
-        Self { kind: job.kind().name(), reused: reused(job), job }
+    fn new(job: &'a Job, work: Option<&'a Work>) -> Self {
+        let far =
+            |work: &'a Work| Some(Far { stage: work.stage.as_ref()?, percent: work.percent?, seconds_left: work.seconds_left });
+        Self { kind: job.kind().name(), reused: reused(job), progress: work.and_then(far), job }
     }
 }
 
@@ -210,9 +230,15 @@ fn decision(job: &Job) -> String {
 
 /// A job in one line.
 pub(crate) fn line(job: &Job) -> String {
+    line_of(job, None)
+}
+
+/// The same, with how far it is.
+fn line_of(job: &Job, work: Option<&Work>) -> String {
     let (id, kind, since) = (job.id.0, job.kind().name(), show_when(job.changed.0));
     let priority = if job.priority.is_default() { String::new() } else { format!("priority {}  ", job.priority) };
-    let note = note(job);
+    let words = [work.map(Work::words).unwrap_or_default(), note(job)];
+    let note = words.iter().filter(|words| !words.is_empty()).map(String::as_str).collect::<Vec<_>>().join(", ");
     let said = job.decision().map(|said| format!("{}{said}", if note.is_empty() { "" } else { ", " }));
     let line =
         format!("{id:>6}  {since}  {kind:<12} {:<32} {priority}{note}{}", job.source.path.to_string(), said.unwrap_or_default());
@@ -231,7 +257,7 @@ fn summary(jobs: &[Job]) -> String {
     Kind::ALL.into_iter().filter_map(words).collect::<Vec<_>>().join(", ")
 }
 
-fn show(dir: &Path, job: &Job) -> String {
+fn show(dir: &Path, job: &Job, work: Option<&Work>) -> String {
     let (place, path) = job.original();
     let mut text = format!(
         "job {}: {} in {}\n  file      {}/{path}\n  profile   {}\n  priority  {}\n  attempts  {}\n  came      {}\n  changed   {}\n",
@@ -245,7 +271,8 @@ fn show(dir: &Path, job: &Job) -> String {
         show_when(job.submitted.0),
         show_when(job.changed.0)
     );
-    for (name, words) in [("note", note(job)), ("decision", decision(job))] {
+    let progress = work.map(Work::words).unwrap_or_default();
+    for (name, words) in [("progress", progress), ("note", note(job)), ("decision", decision(job))] {
         if !words.is_empty() {
             text += &format!("  {name:<8}  {words}\n");
         }

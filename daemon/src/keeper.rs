@@ -28,7 +28,10 @@ use crate::settle::Rest;
 use crate::signals::Stop;
 use crate::taking::take;
 
+mod news;
 mod once;
+
+use news::{Nights, Told};
 
 /// Full scans, where the system tells of changes and where it does not.
 const RESCAN: Duration = Duration::from_secs(60);
@@ -51,6 +54,7 @@ pub(crate) struct Keeper {
     folders: Vec<Kept>,
     handed: Vec<Handed>,
     disk_looked: Option<Instant>,
+    nights: Nights,
     /// It was within the hours of work at the last look.
     is_open: bool,
 }
@@ -73,6 +77,7 @@ struct Kept {
     looked: Instant,
     dirty: bool,
     unavailable: bool,
+    told: Told,
     /// Files that were only noticed, and are gone.
     gone: Vec<JobId>,
     /// Names that were renamed into place since the last scan.
@@ -98,6 +103,7 @@ impl Keeper {
                 looked: now,
                 dirty: true,
                 unavailable: false,
+                told: Told::default(),
                 gone: Vec::new(),
                 renamed: Vec::new(),
                 scan_takes: Duration::ZERO,
@@ -108,8 +114,8 @@ impl Keeper {
             }
             folders.push(kept);
         }
-        let (context, stop) = (Arc::clone(context), stop.clone());
-        Self { context, inbox, stop, folders, handed: Vec::new(), disk_looked: None, is_open: true }
+        let (nights, context, stop) = (Nights::new(context), Arc::clone(context), stop.clone());
+        Self { context, inbox, stop, folders, handed: Vec::new(), disk_looked: None, nights, is_open: true }
     }
 
     /// Keeps the folders until there is a reason to end.
@@ -168,6 +174,7 @@ impl Keeper {
         self.context.pulse.beat();
         self.look_at_disk(now)?;
         self.look_at_clock();
+        self.nights.look(&self.context, now)?;
         for kept in &mut self.folders {
             kept.turn(&self.context, now)?;
         }
@@ -395,9 +402,10 @@ impl Kept {
                     let (name, root) = (&self.folder.name, &self.folder.root);
                     context.bus.tell(&Happening::FolderAway { name, root, why: &error });
                 }
+                return self.told.tell(context, &self.folder.name, Some(&error));
             }
         }
-        Ok(())
+        self.told.tell(context, &self.folder.name, None)
     }
 
     fn unreadable(&self, error: &io::Error) -> String {

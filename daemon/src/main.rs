@@ -38,6 +38,7 @@ mod manager;
 mod manual;
 mod names;
 mod naming;
+mod night;
 mod orders;
 mod own_profile;
 mod past;

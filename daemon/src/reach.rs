@@ -16,7 +16,7 @@ use crate::config::default_state;
 use crate::control::{DaemonWish, GlanceWish, JobsWish, Refusal, Wish, answer, ask};
 use crate::exit::Exit;
 use crate::fsx;
-use crate::glance::Glance;
+use crate::glance::{Glance, Work};
 use crate::schedule::Standing;
 use crate::{standstill, watch, watchdog};
 
@@ -136,6 +136,14 @@ pub(crate) fn glance(dir: &Path) -> Result<Glance, Failure> {
     let state = state_of(dir).map_err(|error| unseen(dir, &error))?;
     let paused = standstill::is_set(&state).map_err(|error| unseen(&state, &error))?;
     Ok(Glance::of_jobs(jobs, paused.then(|| standstill::WORDS.into()).into_iter().collect(), &state))
+}
+
+/// The jobs that the daemon of a hot folder has in work; none, if none runs.
+///
+/// # Errors
+/// When `dir` is no hot folder, or the daemon does not answer.
+pub(crate) fn work(dir: &Path) -> Result<Vec<Work>, Failure> {
+    Ok(through_daemon(dir, &GlanceWish)?.map(|glance| glance.work).unwrap_or_default())
 }
 
 /// Where the job store of a hot folder is.

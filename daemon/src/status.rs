@@ -11,7 +11,7 @@ use crate::glance::{Glance, Work};
 use crate::jobs::line;
 use crate::reach;
 use crate::say::{complain, plain};
-use crate::units::{show_seconds, show_size, show_when};
+use crate::units::{show_size, show_when};
 
 pub(crate) mod top;
 
@@ -72,17 +72,7 @@ fn screen(dir: &Path, glance: &Glance) -> String {
 }
 
 fn at_work(work: &Work) -> String {
-    let stage = match (&work.stage, work.percent) {
-        (Some(stage), Some(percent)) => format!("{} {percent} %", plain(stage)),
-        _ => work.kind.name().into(),
-    };
-    let left = work.seconds_left.map(|left| format!(", about {} left", seconds(left))).unwrap_or_default();
-    let (size, so_far) = (show_size(work.size), seconds(work.seconds));
-    format!("{:>6}    {:<32} {size:>9}  {stage}, for {so_far}{left}\n", work.job.0, plain(&work.file))
-}
-
-fn seconds(seconds: u64) -> String {
-    if seconds < 60 { format!("{seconds} s") } else { show_seconds(seconds as f64) }
+    format!("{:>6}    {:<32} {:>9}  {}\n", work.job.0, plain(&work.file), show_size(work.size), work.words())
 }
 
 /// Nothing is known: for whoever shows it again and again.

@@ -15,6 +15,7 @@ pub mod crash;
 pub mod id;
 pub mod job;
 mod memory;
+mod news;
 pub mod path;
 mod queue;
 mod record;
@@ -29,6 +30,7 @@ pub use crash::crash_point;
 pub use id::{Attempt, Boot, Clock, Epoch, Hash, JobId, Recipe, Seq, SystemClock, Time, Token};
 pub use job::{Decision, Ending, Job, Kind, Past, Priority, Publication, Reached, Source, State, Step, Verdict};
 pub use memory::MemoryStore;
+pub use news::{News, Notice, Word};
 pub use path::RelPath;
 pub use sled_store::{Opening, SledStore};
 pub use store::{

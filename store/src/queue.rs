@@ -3,9 +3,10 @@
 //! | table    | key                                                                     | value                     |
 //! |----------|-------------------------------------------------------------------------|---------------------------|
 //! | meta     | `head`; `unfilled` (see `past`); `subscribers` (see [`outbox`])         | [`Head`]; `true`; names and transitions |
+//! | meta     | `night`, `away/` and a folder's name (see `marks`)                      | times                     |
 //! | jobs     | job number                                                              | the [`Job`]               |
 //! | by_state | kind, then what that kind is searched by (see [`index`])                | nothing                   |
-//! | outbox   | number of the transition in which a job ended                           | the [`Job`] as it was then |
+//! | outbox   | number of the transition in which a job ended, or of news               | the [`Job`] as it was then; a `Word` |
 //!
 //! Numbers in keys are big-endian. The job, its index entries and the head change in one transaction of the tables. One lock
 //! orders the transitions; becoming durable happens outside of it, so that transitions of several threads share one sync. Which job is
@@ -18,9 +19,9 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use serde::{Deserialize, Serialize};
 
 use crate::crash::crash_point;
-use crate::id::{Clock, Epoch, JobId, Recipe, Seq, Token};
+use crate::id::{Clock, Epoch, JobId, Recipe, Seq, Time, Token};
 use crate::job::{Event, Illegal, Job, Kind, Past, Source, State, Step, Testimony};
-use crate::path::MAX_SOURCE;
+use crate::news::{News, Notice};
 use crate::record;
 use crate::store::{
     Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
@@ -31,6 +32,7 @@ mod files;
 mod forget;
 mod index;
 mod line;
+mod marks;
 mod notices;
 mod offered;
 mod outbox;
@@ -38,6 +40,7 @@ mod page;
 mod past;
 mod recover;
 mod results;
+mod submit;
 
 use files::{Files, Identity};
 use line::{Line, Now};
@@ -45,8 +48,6 @@ use results::Results;
 
 /// Longest folder or profile name, as it stands in a record.
 pub(crate) const MAX_NAME: usize = 64;
-/// Jobs taken in by one transaction of the tables.
-const SUBMIT_CHUNK: usize = 1000;
 const HEAD: &[u8] = b"head";
 /// Is there in a store that was begun anew, as long as what earlier ones knew was not read.
 const UNFILLED: &[u8] = b"unfilled";
@@ -256,41 +257,6 @@ impl<T: Tables> Queue<T> {
         Ok(())
     }
 
-    /// Takes in one chunk; answers and head in return.
-    fn submit_chunk(&self, found: &[Submission], answers: &mut Vec<Submitted>) -> Result<Option<Head>, StoreError> {
-        let now = self.clock.now();
-        let inner = self.lock();
-        let mut head = inner.head;
-        let mut jobs: Vec<Job> = Vec::new();
-        let mut keys = BTreeMap::new();
-        for submission in found {
-            let file = Identity::from(&submission.source);
-            if let Some(id) = keys.get(&file).copied().map_or_else(|| self.answering(&inner, &file), |id| Ok(Some(id)))? {
-                answers.push(Submitted { id, new: false });
-                continue;
-            }
-            head.seq.0 += 1;
-            head.last_job.0 += 1;
-            let id = head.last_job;
-            let source = submission.source.clone();
-            let mut job = match &submission.foreign {
-                None => Job::queued(id, source, now),
-                Some(what) => Job::noticed(id, source, what, now),
-            };
-            job.priority = submission.priority;
-            job.seq = head.seq;
-            jobs.push(job);
-            keys.insert(file, id);
-            answers.push(Submitted { id, new: true });
-        }
-        if jobs.is_empty() {
-            return Ok(None);
-        }
-        let changes: Vec<_> = jobs.iter().map(|job| (None, job)).collect();
-        self.commit(inner, head, &changes)?;
-        Ok(Some(head))
-    }
-
     /// The latest job of a file.
     fn latest_of(&self, inner: &Inner, file: &Identity<'_>) -> Result<Option<Job>, StoreError> {
         for id in inner.files.candidates(file) {
@@ -309,26 +275,7 @@ impl<T: Tables> Queue<T> {
 
 impl<T: Tables> JobStore for Queue<T> {
     fn submit(&self, found: &[Submission]) -> Result<Vec<Submitted>, StoreError> {
-        self.tables.sound()?;
-        for submission in found {
-            let path = &submission.source.path;
-            if path.to_string().len() > MAX_SOURCE {
-                return Err(StoreError::TooLong {
-                    what: format!("the path of {} bytes that begins with {}", path.as_bytes().len(), path.beginning()),
-                });
-            }
-            fits("the folder's name", &submission.source.folder)?;
-            fits("the profile's name", &submission.source.profile)?;
-        }
-        let mut answers = Vec::with_capacity(found.len());
-        let mut last = None;
-        for chunk in found.chunks(SUBMIT_CHUNK) {
-            last = self.submit_chunk(chunk, &mut answers)?.or(last);
-        }
-        // What was known already may be another thread's, not yet durable: settle in any case.
-        let head = last.unwrap_or_else(|| self.lock().head);
-        self.settle(head)?;
-        Ok(answers)
+        self.take_in(found)
     }
 
     fn claim(&self, want: &Filter) -> Result<Option<Claim>, StoreError> {
@@ -461,7 +408,7 @@ impl<T: Tables> JobStore for Queue<T> {
         self.set_subscribers(names)
     }
 
-    fn notices(&self, name: &str, most: usize) -> Result<Vec<Job>, StoreError> {
+    fn notices(&self, name: &str, most: usize) -> Result<Vec<Notice>, StoreError> {
         self.not_heard(name, most)
     }
 
@@ -471,6 +418,18 @@ impl<T: Tables> JobStore for Queue<T> {
 
     fn backlog(&self, name: &str) -> Result<u64, StoreError> {
         self.count_not_heard(name)
+    }
+
+    fn tell(&self, news: &News) -> Result<bool, StoreError> {
+        self.tell_of(news)
+    }
+
+    fn last_night(&self) -> Result<Option<Time>, StoreError> {
+        self.night_mark()
+    }
+
+    fn begin_night(&self, at: Time) -> Result<(), StoreError> {
+        self.set_night_mark(at)
     }
 
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {

@@ -7,11 +7,12 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::job::{Job, State};
+use crate::news::{Notice, Word};
 use crate::store::StoreError;
 use crate::tables::Table;
 
 /// Version of what the JSON means. Raised when an older program would misread it.
-pub(crate) const SCHEMA: u16 = 4;
+pub(crate) const SCHEMA: u16 = 5;
 /// That of a record in which nothing is that version 2 did not know.
 const PLAIN: u16 = 2;
 /// That of a job that was approved.
@@ -19,6 +20,8 @@ const APPROVED: u16 = 3;
 /// That of the head: from version 4 on, whose job is whose file stands in the jobs alone. An earlier program would look for it in an index that is
 /// gone, and take each file that waits for a new one: the head's schema has it refuse the store.
 const HEAD: u16 = 4;
+/// That of news of the service in the outbox, where an earlier program would look for a job.
+const WORD: u16 = 5;
 /// Largest record in bytes. The database would put values from a quarter of its segment on into files of their own.
 pub(crate) const MAX: usize = 4608;
 
@@ -50,6 +53,11 @@ pub(crate) fn encode_head<T: Serialize>(key: &[u8], head: &T) -> Result<Vec<u8>,
     encode_as(HEAD, Table::Meta, key, head)
 }
 
+/// News as a record under `key`.
+pub(crate) fn encode_word(key: &[u8], word: &Word) -> Result<Vec<u8>, StoreError> {
+    encode_as(WORD, Table::Outbox, key, word)
+}
+
 /// `value` as a record under `key` of `table`.
 pub(crate) fn encode<T: Serialize>(table: Table, key: &[u8], value: &T) -> Result<Vec<u8>, StoreError> {
     encode_as(PLAIN, table, key, value)
@@ -72,6 +80,23 @@ fn encode_as<T: Serialize>(schema: u16, table: Table, key: &[u8], value: &T) -> 
 
 /// The value of the record `bytes` under `key` of `table`.
 pub(crate) fn decode<T: DeserializeOwned>(table: Table, key: &[u8], bytes: &[u8]) -> Result<T, StoreError> {
+    read(table, key, opened(table, key, bytes)?.1)
+}
+
+/// The notice in the record `bytes` under `key` of the outbox.
+pub(crate) fn decode_notice(key: &[u8], bytes: &[u8]) -> Result<Notice, StoreError> {
+    match opened(Table::Outbox, key, bytes)? {
+        (WORD, json) => read(Table::Outbox, key, json).map(Notice::Word),
+        (_, json) => read(Table::Outbox, key, json).map(|job| Notice::End(Box::new(job))),
+    }
+}
+
+fn read<T: DeserializeOwned>(table: Table, key: &[u8], json: &[u8]) -> Result<T, StoreError> {
+    serde_json::from_slice(json).map_err(|error| corrupt(&name(table, key), &error.to_string()))
+}
+
+/// Schema and JSON of a sound record.
+fn opened<'a>(table: Table, key: &[u8], bytes: &'a [u8]) -> Result<(u16, &'a [u8]), StoreError> {
     let fail = |reason: &str| corrupt(&name(table, key), reason);
     let (header, json) = bytes.split_at_checked(HEADER).ok_or_else(|| fail("it is too short"))?;
     let [m0, m1, m2, m3, s0, s1, c0, c1, c2, c3] = *header else { return Err(fail("it is too short")) };
@@ -85,7 +110,7 @@ pub(crate) fn decode<T: DeserializeOwned>(table: Table, key: &[u8], bytes: &[u8]
     if schema > SCHEMA {
         return Err(StoreError::Newer { found: schema, known: SCHEMA });
     }
-    serde_json::from_slice(json).map_err(|error| fail(&error.to_string()))
+    Ok((schema, json))
 }
 
 fn name(table: Table, key: &[u8]) -> String {
@@ -107,6 +132,7 @@ mod tests {
     use crate::job::{
         Area, Blame, Decision, Ending, Hold, MAX_BY, MAX_REASON, Parked, Priority, Publication, Source, Verdict, one_line,
     };
+    use crate::news::News;
     use crate::path::{MAX_NAMED, MAX_SOURCE, RelPath};
 
     /// Everything a job can hold, as long as it can be: no transition can fail for want of room.
@@ -178,11 +204,11 @@ mod tests {
         damaged(decode(Table::Meta, b"head", b""));
         // A record of a later version, whole in itself.
         let mut later = bytes;
-        later[5] = 5;
-        let crc = checksum(Table::Meta, b"head", 5, b"7");
+        later[5] = 6;
+        let crc = checksum(Table::Meta, b"head", 6, b"7");
         later[6..10].copy_from_slice(&crc.to_be_bytes());
         let result = decode::<u32>(Table::Meta, b"head", &later);
-        assert!(matches!(result, Err(StoreError::Newer { found: 5, known: SCHEMA })), "{result:?}");
+        assert!(matches!(result, Err(StoreError::Newer { found: 6, known: SCHEMA })), "{result:?}");
     }
 
     /// A job as version 1 wrote it, without what was added since.
@@ -193,11 +219,52 @@ mod tests {
             "output":"part.stl","output_hash":null,"report_hash":null,"original":"part.stl"}}},"attempts":1,
             "blame":{"charges":0,"deaths":1,"deaths_alone":0,"environment":0,"kills":0},"work":9,"submitted":5,"changed":6,"seq":11}"#;
         let key = 7_u64.to_be_bytes();
-        let crc = checksum(Table::Jobs, &key, 1, json.as_bytes());
-        let bytes = [&MAGIC[..], &1_u16.to_be_bytes(), &crc.to_be_bytes(), json.as_bytes()].concat();
-        let job: Job = decode(Table::Jobs, &key, &bytes).unwrap();
+        let job: Job = decode(Table::Jobs, &key, &written(Table::Jobs, &key, 1, json)).unwrap();
         assert_eq!((job.kind(), job.blame.deaths, job.hold().unwrap().boot), (crate::job::Kind::Publishing, 1, Boot(0)));
         assert_eq!((job.priority, job.waits_since()), (Priority::default(), Time(5)));
+    }
+
+    /// A record as it lies on the disk.
+    fn written(table: Table, key: &[u8], schema: u16, json: &str) -> Vec<u8> {
+        let crc = checksum(table, key, schema, json.as_bytes());
+        [&MAGIC[..], &schema.to_be_bytes(), &crc.to_be_bytes(), json.as_bytes()].concat()
+    }
+
+    /// An end of a job as version 2 kept it for subscribers, and a word as version 5 does: later programs go on reading them, and one that knows
+    /// jobs alone says that it does not know the word.
+    #[test]
+    fn f29_what_is_to_be_told_stays_readable() {
+        let key = 12_u64.to_be_bytes();
+        let end = r#"{"id":7,"source":{"folder":"hot","path":"part.stl","dev":1,"ino":2,"size":84,"mtime_ns":3,"profile":"default"},
+            "state":{"ended":{"publication":{"ending":"repaired","reason":"","output":"part.stl","output_hash":null,"report_hash":null,
+            "original":"part.stl"}}},"attempts":1,"blame":{"charges":0,"deaths":0,"deaths_alone":0,"environment":0,"kills":0},"work":9,
+            "submitted":5,"changed":6,"seq":12}"#;
+        let Notice::End(job) = decode_notice(&key, &written(Table::Outbox, &key, 2, end)).unwrap() else { panic!("an end") };
+        assert_eq!((job.kind(), job.seq, job.publication().unwrap().ending), (crate::job::Kind::Done, Seq(12), Ending::Repaired));
+        let night = r#"{"seq":12,"at":7,"news":{"night":{"since":1,"until":6,"jobs":{"done":3,"needs_review":1}}}}"#;
+        let Notice::Word(word) = decode_notice(&key, &written(Table::Outbox, &key, 5, night)).unwrap() else { panic!("a word") };
+        let jobs = [(crate::job::Kind::Done, 3), (crate::job::Kind::NeedsReview, 1)].into();
+        assert_eq!(word, Word { seq: Seq(12), at: Time(7), news: News::Night { since: Time(1), until: Time(6), jobs } });
+        let away = r#"{"seq":12,"at":7,"news":{"folder_away":{"folder":"hot","reason":"gone"}}}"#;
+        assert_eq!(decode_notice(&key, &written(Table::Outbox, &key, 5, away)).unwrap().seq(), Seq(12));
+        let bytes = encode_word(&key, &word).unwrap();
+        assert_eq!(decode_notice(&key, &bytes).unwrap(), Notice::Word(word));
+        let schema = u16::from_be_bytes([bytes[4], bytes[5]]);
+        assert!([PLAIN, APPROVED, HEAD].iter().all(|earlier| schema > *earlier), "an earlier program takes it for no job");
+    }
+
+    /// Whatever is to be told has room, so that a folder that goes can always be told of.
+    #[test]
+    fn the_largest_word_fits() {
+        let longest = "\"".repeat(2 * MAX_REASON);
+        let folder = "n".repeat(crate::queue::MAX_NAME - 2);
+        let jobs = crate::job::Kind::ALL.map(|kind| (kind, u64::MAX)).into();
+        for news in [
+            News::FolderAway { folder, reason: one_line(&longest) },
+            News::Night { since: Time(u64::MAX), until: Time(u64::MAX), jobs },
+        ] {
+            encode_word(&u64::MAX.to_be_bytes(), &Word { seq: Seq(u64::MAX), at: Time(u64::MAX), news }).unwrap();
+        }
     }
 
     #[test]

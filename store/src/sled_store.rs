@@ -32,8 +32,9 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::id::{Clock, JobId, Recipe, Seq, SystemClock};
+use crate::id::{Clock, JobId, Recipe, Seq, SystemClock, Time};
 use crate::job::{Job, Kind, Past, Source, Step, Testimony};
+use crate::news::{News, Notice};
 use crate::queue::Queue;
 use crate::store::{
     Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
@@ -206,7 +207,7 @@ impl JobStore for SledStore {
         self.queue.subscribe(names)
     }
 
-    fn notices(&self, name: &str, most: usize) -> Result<Vec<Job>, StoreError> {
+    fn notices(&self, name: &str, most: usize) -> Result<Vec<Notice>, StoreError> {
         self.queue.notices(name, most)
     }
 
@@ -216,6 +217,18 @@ impl JobStore for SledStore {
 
     fn backlog(&self, name: &str) -> Result<u64, StoreError> {
         self.queue.backlog(name)
+    }
+
+    fn tell(&self, news: &News) -> Result<bool, StoreError> {
+        self.queue.tell(news)
+    }
+
+    fn last_night(&self) -> Result<Option<Time>, StoreError> {
+        self.queue.last_night()
+    }
+
+    fn begin_night(&self, at: Time) -> Result<(), StoreError> {
+        self.queue.begin_night(at)
     }
 
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {

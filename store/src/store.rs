@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use crate::id::{Epoch, JobId, Recipe, Seq, Token};
+use crate::id::{Epoch, JobId, Recipe, Seq, Time, Token};
 use crate::job::{Decision, Illegal, Job, Kind, Past, Priority, Source, Step, Testimony};
+use crate::news::{News, Notice};
 
 /// As many results alike are named as it makes sense to look at.
 pub const MOST_RESULTS: usize = 8;
@@ -133,20 +134,19 @@ pub trait JobStore: Send + Sync {
     /// Store errors only.
     fn set_filled(&self) -> Result<(), StoreError>;
 
-    /// These, and no others, are to hear of every job that comes to its end from now on, durably; at most [`MOST_SUBSCRIBERS`]. Who is one
+    /// These, and no others, are to hear of every job that comes to its end from now on, and of news of the service, durably; at most [`MOST_SUBSCRIBERS`]. Who is one
     /// already keeps what was not acknowledged yet.
     ///
     /// # Errors
     /// [`StoreError::TooLong`] when there are too many, or a name does not fit a record.
     fn subscribe(&self, names: &[String]) -> Result<(), StoreError>;
 
-    /// Jobs as they stood when they came to their end ([`Job::seq`] tells one end from another), which the subscriber of that name has not
-    /// acknowledged: the oldest first, at most `most`. Each of them is durable. Later changes of the job, also the end of its record, change
-    /// nothing here.
+    /// Notices that the subscriber of that name has not acknowledged, the oldest first, at most `most`: jobs as they stood when they came to their end, and
+    /// news of the service. Each of them is durable. Later changes of a job, also the end of its record, change nothing here.
     ///
     /// # Errors
     /// Store errors only.
-    fn notices(&self, name: &str, most: usize) -> Result<Vec<Job>, StoreError>;
+    fn notices(&self, name: &str, most: usize) -> Result<Vec<Notice>, StoreError>;
 
     /// That subscriber needs no notice up to this one any more, durably.
     ///
@@ -159,6 +159,25 @@ pub trait JobStore: Send + Sync {
     /// # Errors
     /// Store errors only.
     fn backlog(&self, name: &str) -> Result<u64, StoreError>;
+
+    /// Has every subscriber hear these news, durably, unless it is known already that it is so: the folder is away, or is not, as the last word of
+    /// it said, in whatever life of the daemon; or a night was told of that ended no earlier. Returns whether they were news.
+    ///
+    /// # Errors
+    /// [`StoreError::TooLong`] when the folder's name does not fit a record.
+    fn tell(&self, news: &News) -> Result<bool, StoreError>;
+
+    /// The end of the night that was told last; `None`: nights are not counted yet.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn last_night(&self) -> Result<Option<Time>, StoreError>;
+
+    /// The next night counts from here, and none before it is told any more, durably.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn begin_night(&self, at: Time) -> Result<(), StoreError>;
 
     /// How many jobs there are of each kind, in the order of [`Kind::ALL`].
     ///

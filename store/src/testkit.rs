@@ -25,7 +25,7 @@ type Check = fn(&mut dyn Subject, &ManualClock) -> Result<(), StoreError>;
 /// # Panics
 /// When the store does not do what [`JobStore`] promises.
 pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
-    let checks: [(&str, Check); 27] = [
+    let checks: [(&str, Check); 28] = [
         ("submission is idempotent", claims::submission_is_idempotent),
         ("a file that came back is new", claims::a_file_that_came_back_is_new),
         ("the oldest that fits is claimed", claims::the_oldest_that_fits_is_claimed),
@@ -50,6 +50,7 @@ pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
         ("forgetting one job leaves the next of its file", history::forgetting_one_job_leaves_the_next_of_its_file),
         ("ends are told until they are acknowledged", notices::ends_are_told_until_they_are_acknowledged),
         ("notices outlive what becomes of their jobs", notices::notices_outlive_what_becomes_of_their_jobs),
+        ("news are told once", notices::news_are_told_once),
         ("who does not subscribe costs nothing", notices::who_does_not_subscribe_costs_nothing),
         ("a new store says so", past::a_new_store_says_so),
         ("jobs of an earlier store come back", past::jobs_of_an_earlier_store_come_back),

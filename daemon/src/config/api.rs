@@ -11,7 +11,7 @@ const MAX_UPLOAD: u64 = 4 << 30;
 pub(crate) struct Api {
     /// Where it listens.
     pub listen: SocketAddr,
-    /// A file with one token a line; without it, everyone who reaches the address may ask everything.
+    /// A file with one token a line, each with a name if it has one; without it, everyone who reaches the address may ask everything.
     pub token_file: Option<PathBuf>,
     /// Names by which clients may call this machine, beside `localhost` and addresses.
     pub hosts: Vec<String>,

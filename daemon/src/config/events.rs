@@ -1,10 +1,10 @@
-//! Who hears of the ends of jobs: `[[webhook]]` and `[on_done]` in the configuration, as they are written and as they count.
+//! Who hears of the ends of jobs, and of the service itself: `[[webhook]]` and `[on_done]` in the configuration, as they are written and as they count.
 
 use std::path::PathBuf;
 use std::time::Duration;
 
 use serde::{Deserialize, Deserializer, Serialize, de};
-use suture_store::{Job, Kind};
+use suture_store::{Job, Kind, News};
 use toml::Spanned;
 
 use crate::profiles::{place_of, with_line};
@@ -18,7 +18,7 @@ const MOST: usize = 16;
 /// Longest name of a webhook, in bytes.
 const LONGEST_NAME: usize = 48;
 
-/// How a job ended, as far as others may want to hear of it.
+/// How a job ended, or what happened to the service, as far as others may want to hear of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Occasion {
@@ -27,10 +27,16 @@ pub(crate) enum Occasion {
     NeedsReview,
     Failed,
     Quarantined,
+    /// A night is over.
+    Night,
+    FolderAway,
+    FolderBack,
 }
 
 impl Occasion {
-    pub(crate) const ALL: [Self; 4] = [Self::Finished, Self::NeedsReview, Self::Failed, Self::Quarantined];
+    /// The ends of jobs: a webhook hears of these unless it says what of. Others have no job in their message, which a receiver of earlier versions
+    /// may rely on.
+    pub(crate) const ENDS: [Self; 4] = [Self::Finished, Self::NeedsReview, Self::Failed, Self::Quarantined];
 
     /// Of a job as it stood at its end; `None` for any other.
     pub(crate) fn of(job: &Job) -> Option<Self> {
@@ -43,6 +49,15 @@ impl Occasion {
         }
     }
 
+    /// Of news.
+    pub(crate) fn of_news(news: &News) -> Self {
+        match news {
+            News::Night { .. } => Self::Night,
+            News::FolderAway { .. } => Self::FolderAway,
+            News::FolderBack { .. } => Self::FolderBack,
+        }
+    }
+
     /// The word for it.
     pub(crate) fn word(self) -> &'static str {
         match self {
@@ -50,6 +65,9 @@ impl Occasion {
             Self::NeedsReview => "needs_review",
             Self::Failed => "failed",
             Self::Quarantined => "quarantined",
+            Self::Night => "night",
+            Self::FolderAway => "folder_away",
+            Self::FolderBack => "folder_back",
         }
     }
 }
@@ -157,9 +175,9 @@ pub(crate) fn read(text: &str, webhooks: Vec<Spanned<WebhookFile>>, on_done: Opt
         if all.len() == MOST {
             return Err(wrong("url", &format!("there are more than {MOST} webhooks; let one receiver pass messages on")));
         }
-        let events = of_file.events.unwrap_or_else(|| Occasion::ALL.to_vec());
+        let events = of_file.events.unwrap_or_else(|| Occasion::ENDS.to_vec());
         if events.is_empty() {
-            return Err(wrong("events", "it names no event; leave it out for all of them"));
+            return Err(wrong("events", "it names no event; leave it out for all ends of jobs"));
         }
         all.push(Webhook { name, url, secret_file: of_file.secret_file, events });
     }
@@ -215,7 +233,7 @@ mod tests {
     fn little_has_to_be_said() {
         let events = read_from("[[webhook]]\nurl = \"http://farm:9000/x\"\n[on_done]\ncommand = [\"/bin/true\"]\n").unwrap();
         let [hook] = events.webhooks.as_slice() else { panic!("{events:?}") };
-        assert_eq!((hook.name.as_str(), hook.events.as_slice()), ("farm:9000", Occasion::ALL.as_slice()));
+        assert_eq!((hook.name.as_str(), hook.events.as_slice()), ("farm:9000", Occasion::ENDS.as_slice()));
         let on_done = events.on_done.clone().unwrap();
         assert_eq!((on_done.when, on_done.time_limit), (When::Certified, Duration::from_secs(600)));
         assert_eq!(events.names().collect::<Vec<_>>(), ["farm:9000", "on_done"]);

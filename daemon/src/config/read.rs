@@ -17,7 +17,7 @@ use super::{Config, DEFAULT_PROFILE, FolderConfig, name_of, real};
 use crate::own_profile::OwnProfile;
 use crate::profiles::{self, place_of, with_line};
 use crate::units::{parse_duration, parse_listen, parse_size};
-use crate::window::RunWindow;
+use crate::window::{RunWindow, TimeOfDay};
 
 /// For what the daemon chooses by itself.
 pub(crate) const AUTO: &str = "auto";
@@ -41,6 +41,7 @@ struct File {
     time_limit: Option<TimeLimitFile>,
     run_window: Option<RunWindow>,
     workers_outside: Option<Spanned<u16>>,
+    night_ends: Option<TimeOfDay>,
     reuse: Option<bool>,
     keep: Option<Spanned<KeepFile>>,
     api: Option<Spanned<ApiFile>>,
@@ -233,6 +234,7 @@ fn from_text(text: &str) -> Result<Config, String> {
     config.workers_outside = file.workers_outside.map_or(0, |count| count.into_inner().into());
     config.reuse = file.reuse.unwrap_or(config.reuse);
     config.run_window = file.run_window.unwrap_or_default();
+    config.night_ends = file.night_ends.unwrap_or(config.night_ends);
     if let Some(of_file) = file.keep {
         config.keep = keep(text, of_file, &config.folders)?;
     }
@@ -396,6 +398,7 @@ mod tests {
             ("\nlarge = true", "line 2, `large = true`: a whole number, or text with a unit"),
             ("settle = \"soon\"", "line 1, `settle = \"soon\"`: `soon` is not a duration (try 5s"),
             ("threads = 2\nworkers = 0", "line 2, `workers = 0`: must be at least 1"),
+            ("night_ends = \"7\"", "line 1, `night_ends = \"7\"`: `7` is no time of day; write it as in \"07:00\""),
             ("[[folders]]\npaht = \"/a\"", "line 2, `paht = \"/a\"`: unknown field `paht`, expected one of `path`"),
             ("[[folders]]\nname = \"a\"", "line 1, `[[folders]]`: missing field `path`"),
             (

@@ -36,6 +36,7 @@ pub(crate) fn values(config: &Config) -> Vec<(&'static str, Option<String>)> {
         ("rescan", auto(config.rescan)),
         ("drain", quoted(&write_duration(config.drain))),
         ("reuse", config.reuse.to_string()),
+        ("night_ends", quoted(&config.night_ends.to_string())),
         ("time_limit.base", quoted(&write_duration(config.time_limit.base))),
         ("time_limit.per_gib", quoted(&write_duration(config.time_limit.per_gib))),
     ];
@@ -180,6 +181,7 @@ mod tests {
             priority: Priority::HIGHEST,
         });
         (config.run_window, config.workers_outside) = ("20:00-07:00, 12:00-13:00".parse().unwrap(), 1);
+        config.night_ends = "06:30".parse().unwrap();
         (config.memory, config.large, config.reserve) = (3 << 30, 1_500_000_000, 1);
         (config.workers, config.threads, config.reuse) = (7, 3, false);
         (config.settle, config.rescan) = (Some(Duration::from_millis(300)), Some(Duration::from_secs(90)));
@@ -203,7 +205,7 @@ mod tests {
                 name: url.into(),
                 url: Url::parse(url).unwrap(),
                 secret_file: Some("/etc/a \"secret\"".into()),
-                events: vec![Occasion::NeedsReview, Occasion::Failed],
+                events: vec![Occasion::NeedsReview, Occasion::Night, Occasion::FolderAway, Occasion::FolderBack],
             })
             .to_vec();
         config.events.on_done = Some(OnDone {

@@ -13,7 +13,7 @@ use std::time::Duration;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Pid, Signal, kill_process_group};
 
-use super::message::Message;
+use super::end::End;
 use super::pace::Outcome;
 use crate::config::events::{OnDone, When, placeholders};
 use crate::say::plain;
@@ -29,13 +29,13 @@ const TRY_AGAIN: i32 = 75;
 const FOR_THE_DAEMON: [&str; 5] = ["NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID", "LISTEN_FDS", "LISTEN_PID"];
 
 /// Runs it once, if it is to be run of this.
-pub(super) fn run(on_done: &OnDone, message: &Message<'_>, world: &dyn World, is_cut: &dyn Fn() -> bool) -> Outcome {
+pub(super) fn run(on_done: &OnDone, end: &End<'_>, world: &dyn World, is_cut: &dyn Fn() -> bool) -> Outcome {
     if on_done.when == When::Certified
-        && let Err(why) = message.holds()
+        && let Err(why) = end.holds()
     {
         return Outcome::Delivered { note: format!("it is not run: {why}") };
     }
-    let (mut child, mut said) = match start(on_done, message) {
+    let (mut child, mut said) = match start(on_done, end) {
         Ok(started) => started,
         Err(error) => return Outcome::Again { why: format!("it cannot be started: {error}"), after: None },
     };
@@ -67,18 +67,18 @@ fn how(status: ExitStatus) -> String {
 }
 
 /// What is known for each placeholder, in their order.
-fn values(message: &Message<'_>) -> [(&'static str, OsString); 8] {
+fn values(end: &End<'_>) -> [(&'static str, OsString); 8] {
     let path = |path: &Option<PathBuf>| path.as_ref().map(|path| path.clone().into_os_string()).unwrap_or_default();
-    let ending = message.job.publication().and_then(|publication| serde_json::to_value(publication.ending).ok());
+    let ending = end.job.publication().and_then(|publication| serde_json::to_value(publication.ending).ok());
     let ending = ending.as_ref().and_then(|ending| ending.as_str()).unwrap_or_default().to_owned();
     [
-        ("output", path(&message.paths.output)),
-        ("report", path(&message.paths.report)),
-        ("original", path(&message.paths.original)),
-        ("folder", message.job.source.folder.clone().into()),
-        ("file", message.job.source.path.to_path().into_os_string()),
-        ("job", message.job.id.to_string().into()),
-        ("event", message.event.word().into()),
+        ("output", path(&end.paths.output)),
+        ("report", path(&end.paths.report)),
+        ("original", path(&end.paths.original)),
+        ("folder", end.job.source.folder.clone().into()),
+        ("file", end.job.source.path.to_path().into_os_string()),
+        ("job", end.job.id.to_string().into()),
+        ("event", end.event.word().into()),
         ("ending", ending.into()),
     ]
 }
@@ -97,8 +97,8 @@ fn filled(word: &str, values: &[(&str, OsString)]) -> OsString {
     OsString::from_vec(whole)
 }
 
-fn start(on_done: &OnDone, message: &Message<'_>) -> io::Result<(Child, Said)> {
-    let values = values(message);
+fn start(on_done: &OnDone, end: &End<'_>) -> io::Result<(Child, Said)> {
+    let values = values(end);
     let mut words = on_done.command.iter().map(|word| filled(word, &values));
     let (reader, writer) = io::pipe()?;
     let mut command = Command::new(words.next().unwrap_or_default());
@@ -109,7 +109,7 @@ fn start(on_done: &OnDone, message: &Message<'_>) -> io::Result<(Child, Said)> {
     for (name, value) in &values {
         command.env(format!("SUTURE_{}", name.to_uppercase()), value);
     }
-    command.env("SUTURE_DELIVERY", OsStr::new(&message.id));
+    command.env("SUTURE_DELIVERY", OsStr::new(&end.id));
     // The command's own ends of the pipe go with it: what is left is the child's.
     Ok((command.spawn()?, Said { from: Some(reader), kept: VecDeque::new() }))
 }
@@ -174,7 +174,7 @@ mod tests {
 
     use suture_store::Ending;
 
-    use super::super::message::tests::ended;
+    use super::super::end::tests::ended;
     use super::*;
     use crate::world::Machine;
 
@@ -182,7 +182,7 @@ mod tests {
         let command = words.iter().map(|word| (*word).to_owned()).collect();
         let on_done = OnDone { command, when: When::Always, time_limit };
         let job = ended(Ending::Repaired, None, None);
-        run(&on_done, &Message::of(&job, Some(Path::new("/srv/hot"))).unwrap(), &Machine, is_cut)
+        run(&on_done, &End::of(&job, Some(Path::new("/srv/hot"))).unwrap(), &Machine, is_cut)
     }
 
     fn shell(script: &str) -> Outcome {
@@ -243,7 +243,7 @@ mod tests {
     fn without_a_certificate_it_is_not_run() {
         let on_done = OnDone { command: vec!["/nowhere".into()], when: When::Certified, time_limit: Duration::ZERO };
         let job = ended(Ending::NeedsReview, None, None);
-        let outcome = run(&on_done, &Message::of(&job, None).unwrap(), &Machine, &|| false);
+        let outcome = run(&on_done, &End::of(&job, None).unwrap(), &Machine, &|| false);
         assert!(matches!(outcome, Outcome::Delivered { note } if note.contains("not run: it has no good result")));
     }
 }

@@ -1,207 +1,145 @@
-//! What is told of a job that has ended: all of it is of the job as it stood then, and of the files that it has left.
+//! Messages: each is of the end of a job, or of news of the service itself.
 
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use suture_core::Report;
-use suture_core::report::Certificate;
-use suture_store::{Hash, Job};
+use suture_store::{Job, JobId, News, Notice, Word};
 
+use super::end::{End, id, lossy};
 use crate::config::events::Occasion;
-use crate::create;
-use crate::fsx;
-use crate::left::{area, report_path, result_path};
-use crate::shown::{Shown, when};
-
-/// No report that counts is as long, in bytes.
-const LONGEST_REPORT: u64 = 256 << 20;
+use crate::night::Numbers;
+use crate::shown::when;
 
 /// A message, of whatever way it goes.
-pub(super) struct Message<'a> {
-    pub id: String,
-    pub event: Occasion,
-    pub job: &'a Job,
-    pub paths: Paths,
+pub(super) enum Message<'a> {
+    End(End<'a>),
+    Word(Told<'a>),
 }
 
-/// The files that the job has left, by their full names; what there is none of is missing.
-#[derive(Default, Serialize)]
-pub(super) struct Paths {
-    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "lossy")]
-    pub output: Option<PathBuf>,
-    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "lossy")]
-    pub report: Option<PathBuf>,
-    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "lossy")]
-    pub original: Option<PathBuf>,
+/// News, with the folder that they are of, if that is still served.
+pub(super) struct Told<'a> {
+    word: &'a Word,
+    root: Option<PathBuf>,
 }
 
-fn lossy<S: serde::Serializer>(path: &Option<PathBuf>, to: S) -> Result<S::Ok, S::Error> {
-    path.as_ref().map(|path| path.to_string_lossy()).serialize(to)
-}
-
-/// As it is sent.
+/// News as they are sent.
 #[derive(Serialize)]
 struct Body<'a> {
-    id: &'a str,
+    id: String,
     event: Occasion,
     time: String,
-    /// As `GET /v1/jobs/ID` has it.
-    job: Shown,
-    /// Of the result; missing where there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
-    certificate: Option<Half>,
-    paths: &'a Paths,
+    folder: Option<FolderShown<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    night: Option<NightShown>,
 }
 
-/// The half of a certificate that says whether the file is printable.
 #[derive(Serialize)]
-struct Half {
-    printable: bool,
-    /// Rules that were not passed, or not looked at.
-    missing: Vec<String>,
-    blake3: String,
+struct FolderShown<'a> {
+    name: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "lossy")]
+    path: Option<PathBuf>,
+    /// Why it is away.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reason: Option<&'a str>,
+}
+
+#[derive(Serialize)]
+struct NightShown {
+    since: String,
+    until: String,
+    #[serde(flatten)]
+    numbers: Numbers,
 }
 
 impl<'a> Message<'a> {
-    /// Of a job as it stood at its end; `None` where it stood at none. `root`: its hot folder, if that is still served.
-    pub(super) fn of(job: &'a Job, root: Option<&Path>) -> Option<Self> {
-        let paths = root.map_or_else(Paths::default, |root| {
-            let root = std::path::absolute(root).unwrap_or_else(|_| root.to_owned());
-            let (place, name) = job.original();
-            let original = Some(root.join(area(place)).join(name.to_path()));
-            Paths { output: result_path(&root, job), report: report_path(&root, job), original }
-        });
-        // A store that is begun anew counts from the start, but the time goes on.
-        let id = format!("{:x}-{}", job.changed.0, job.seq.0);
-        Some(Self { id, event: Occasion::of(job)?, job, paths })
+    /// Of what a target has not heard; `None` where there is nothing to tell. `root`: where a hot folder of that name is, if it is served.
+    pub(super) fn of(notice: &'a Notice, root: &dyn Fn(&str) -> Option<&'a Path>) -> Option<Self> {
+        match notice {
+            Notice::End(job) => End::of(job, root(&job.source.folder)).map(Self::End),
+            Notice::Word(word) => {
+                let folder = match &word.news {
+                    News::FolderAway { folder, .. } | News::FolderBack { folder } => root(folder),
+                    News::Night { .. } => None,
+                };
+                let root = folder.map(|root| std::path::absolute(root).unwrap_or_else(|_| root.to_owned()));
+                Some(Self::Word(Told { word, root }))
+            }
+        }
     }
 
-    /// The message as JSON.
+    /// The same at each try, and of no other message.
+    pub(super) fn id(&self) -> String {
+        match self {
+            Self::End(end) => end.id.clone(),
+            Self::Word(Told { word, .. }) => id(word.at, word.seq),
+        }
+    }
+
+    pub(super) fn event(&self) -> Occasion {
+        match self {
+            Self::End(end) => end.event,
+            Self::Word(Told { word, .. }) => Occasion::of_news(&word.news),
+        }
+    }
+
+    /// The job that it is of.
+    pub(super) fn job(&self) -> Option<JobId> {
+        match self {
+            Self::End(End { job: Job { id, .. }, .. }) => Some(*id),
+            Self::Word(_) => None,
+        }
+    }
+
+    /// As JSON.
     pub(super) fn body(&self) -> Vec<u8> {
-        let half = |of: Certificate| Half { printable: of.printable, missing: of.missing, blake3: of.blake3 };
-        let body = Body {
-            id: &self.id,
-            event: self.event,
-            time: when(self.job.changed),
-            job: Shown::from(self.job),
-            certificate: self.certificate().ok().map(half),
-            paths: &self.paths,
+        match self {
+            Self::End(end) => end.body(),
+            // Names, numbers and words can always be written.
+            Self::Word(told) => serde_json::to_vec(&self.shown(told)).unwrap_or_default(),
+        }
+    }
+
+    fn shown<'b>(&self, told: &'b Told<'_>) -> Body<'b> {
+        let path = || told.root.clone();
+        let (folder, night) = match &told.word.news {
+            News::FolderAway { folder, reason } => (Some(FolderShown { name: folder, path: path(), reason: Some(reason) }), None),
+            News::FolderBack { folder } => (Some(FolderShown { name: folder, path: path(), reason: None }), None),
+            News::Night { since, until, jobs } => {
+                (None, Some(NightShown { since: when(*since), until: when(*until), numbers: Numbers::of(jobs) }))
+            }
         };
-        // Names, numbers and words can always be written.
-        serde_json::to_vec(&body).unwrap_or_default()
+        Body { id: self.id(), event: self.event(), time: when(told.word.at), folder, night }
     }
-
-    /// The certificate in the report that the job has left.
-    fn certificate(&self) -> Result<Certificate, String> {
-        let publication = self.job.publication();
-        let published = publication.and_then(|publication| publication.report_hash);
-        let path = self.paths.report.as_deref().ok_or("it has left no report")?;
-        let file = as_published(path, published).map_err(|why| format!("its report {why}"))?;
-        let report: Report = serde_json::from_reader(std::io::BufReader::new(file.take(LONGEST_REPORT)))
-            .map_err(|error| format!("its report cannot be read: {error}"))?;
-        report.certificate.ok_or_else(|| "its report has no certificate".into())
-    }
-
-    /// Is the result good, does its certificate say of every rule that it passed, and is it of the bytes that stand there now? If not, why.
-    pub(super) fn holds(&self) -> Result<(), String> {
-        let publication = self.job.publication().filter(|publication| publication.ending.is_good());
-        let (publication, path) = publication.zip(self.paths.output.as_deref()).ok_or("it has no good result")?;
-        let certificate = self.certificate()?;
-        if !certificate.printable {
-            return Err(format!("its certificate lacks {}", certificate.missing.join(", ")));
-        }
-        if publication.output_hash.map(|hash| hash.to_string()).as_deref() != Some(&certificate.blake3) {
-            return Err("its certificate is of other bytes".into());
-        }
-        as_published(path, publication.output_hash).map(drop).map_err(|why| format!("its result {why}"))
-    }
-}
-
-/// The file of that name, at its beginning, if it has the content that was published.
-fn as_published(path: &Path, published: Option<Hash>) -> Result<std::fs::File, String> {
-    use std::io::Seek;
-    let gone = |error: std::io::Error| format!("is not in its place any more: {error}");
-    let mut file = create::open_to_read(path).map_err(gone)?;
-    if !file.metadata().map_err(gone)?.is_file() {
-        return Err("is no file any more".into());
-    }
-    let found = fsx::hash_of(&file).map_err(gone)?;
-    if Some(found) != published {
-        return Err("was changed since".into());
-    }
-    file.rewind().map_err(gone)?;
-    Ok(file)
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
+    use suture_store::{Kind, Seq, Time};
+
     use super::*;
-    use suture_store::{Ending, JobId, Publication, RelPath, Seq, Source, State, Time};
 
-    /// A job of `a\nb.stl` that has ended, with files of its own in `out/` and `done/`.
-    pub(in crate::deliver) fn ended(ending: Ending, output_hash: Option<Hash>, report_hash: Option<Hash>) -> Job {
-        let path = RelPath::new(*b"a\nb.stl").unwrap();
-        let source =
-            Source { folder: "hot".into(), path: path.clone(), dev: 1, ino: 2, size: 84, mtime_ns: 4, profile: "default".into() };
-        let mut job = Job::queued(JobId(7), source, Time(1_700_000_000_123));
-        let publication = Publication {
-            ending,
-            reason: String::new(),
-            output: Some(path.clone()),
-            output_hash,
-            report_hash,
-            recipe: None,
-            reused: None,
-            source_ctime_ns: None,
-            original: Some(path),
-            stays: false,
-            decision: None,
-        };
-        job.state = State::Ended { publication };
-        job.seq = Seq(9);
-        job
+    fn body(news: News) -> serde_json::Value {
+        let notice = Notice::Word(Word { seq: Seq(9), at: Time(1_700_000_000_123), news });
+        let message = Message::of(&notice, &|name| (name == "hot").then_some(Path::new("/srv/hot"))).unwrap();
+        assert_eq!((message.id(), message.job()), ("18bcfe5687b-9".into(), None));
+        serde_json::from_slice(&message.body()).unwrap()
     }
 
     #[test]
-    fn a_message_says_what_what_of_and_where() {
-        let job = ended(Ending::Repaired, None, None);
-        let message = Message::of(&job, Some(Path::new("/srv/hot"))).unwrap();
-        let body: serde_json::Value = serde_json::from_slice(&message.body()).unwrap();
-        assert_eq!(message.id, "18bcfe5687b-9");
-        assert_eq!((&body["id"], &body["event"]), (&"18bcfe5687b-9".into(), &"finished".into()));
-        assert_eq!((&body["job"]["id"], &body["job"]["file"]), (&7.into(), &"a%0Ab.stl".into()));
-        assert_eq!(body["time"], "2023-11-14T22:13:20.123Z");
-        assert_eq!(body["paths"]["output"], "/srv/hot/out/a\nb.stl");
-        assert_eq!(body["paths"]["report"], "/srv/hot/out/a\nb.stl.report.json");
-        assert_eq!(body["paths"]["original"], "/srv/hot/done/a\nb.stl");
-        assert!(body.get("certificate").is_none());
-        let queued = Job::queued(job.id, job.source.clone(), job.changed);
-        assert!(Message::of(&queued, None).is_none(), "it has not ended");
+    fn news_say_what_what_of_and_when() {
+        let (id, time) = ("18bcfe5687b-9", "2023-11-14T22:13:20.123Z");
+        let away = body(News::FolderAway { folder: "hot".into(), reason: "it is gone".into() });
+        let folder = serde_json::json!({"name": "hot", "path": "/srv/hot", "reason": "it is gone"});
+        assert_eq!(away, serde_json::json!({"id": id, "event": "folder_away", "time": time, "folder": folder}));
+        let back = body(News::FolderBack { folder: "old".into() });
+        assert_eq!(back, serde_json::json!({"id": id, "event": "folder_back", "time": time, "folder": {"name": "old"}}));
+        let jobs = [(Kind::Done, 5), (Kind::Failed, 2), (Kind::Noticed, 1), (Kind::Queued, 7)].into();
+        let night = body(News::Night { since: Time(0), until: Time(1_700_000_000_000), jobs });
+        assert_eq!((&night["event"], &night["id"], &night["time"]), (&"night".into(), &id.into(), &time.into()));
+        let night = &night["night"];
+        assert_eq!((&night["since"], &night["until"]), (&"1970-01-01T00:00:00Z".into(), &"2023-11-14T22:13:20Z".into()));
+        assert_eq!((&night["need_someone"], &night["waiting"], &night["in_work"]), (&3.into(), &7.into(), &0.into()));
+        assert_eq!((&night["jobs"]["done"], &night["jobs"]["rejected"]), (&5.into(), &0.into()));
     }
-
-    /// Whoever has changed a result, or its report, runs no command with it.
-    #[test]
-    fn only_the_bytes_that_were_published_hold() {
-        let dir = tempfile::tempdir().unwrap();
-        let out = dir.path().join("out");
-        std::fs::create_dir(&out).unwrap();
-        let hash = |bytes: &[u8]| Hash(*blake3::hash(bytes).as_bytes());
-        let holds = |report: &[u8], result: &[u8], ending| {
-            std::fs::write(out.join("a\nb.stl"), result).unwrap();
-            std::fs::write(out.join("a\nb.stl.report.json"), report).unwrap();
-            let job = ended(ending, Some(hash(b"mesh")), Some(hash(REPORT.as_bytes())));
-            Message::of(&job, Some(dir.path())).unwrap().holds()
-        };
-        assert!(holds(b"{}", b"mesh", Ending::Repaired).unwrap_err().contains("its report was changed since"));
-        assert!(holds(REPORT.as_bytes(), b"mesh", Ending::NeedsReview).unwrap_err().contains("no good result"));
-        assert!(holds(REPORT.as_bytes(), b"mesh", Ending::Repaired).unwrap_err().contains("cannot be read"));
-        std::fs::remove_file(out.join("a\nb.stl.report.json")).unwrap();
-        std::os::unix::fs::symlink("/etc/hostname", out.join("a\nb.stl.report.json")).unwrap();
-        let job = ended(Ending::Repaired, None, None);
-        let why = Message::of(&job, Some(dir.path())).unwrap().holds().unwrap_err();
-        assert!(why.contains("not in its place"), "{why}");
-    }
-
-    const REPORT: &str = "{\"certificate\": 7}";
 }

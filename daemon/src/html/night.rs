@@ -6,11 +6,12 @@ use maud::{Markup, html};
 use suture_store::{Job, Kind, Time};
 
 use super::page;
-use super::words::{NEED_SOMEONE, advice, how_many_need_you, mark, state, time};
+use super::words::{advice, how_many_need_you, mark, state, time};
 use crate::cli::service::NightArgs;
 use crate::create;
 use crate::exit::Exit;
 use crate::left::result_path;
+use crate::night::{Part, part};
 use crate::say::{complain, plain};
 use crate::shown::{self, reason};
 use crate::units::show_count;
@@ -46,9 +47,8 @@ fn write(args: &NightArgs, all: All<'_>) -> Result<(), (String, Exit)> {
 /// Jobs that need a person, however old; and others that ended since then. The latest first.
 fn parted(mut jobs: Vec<Job>, since: Time) -> (Vec<Job>, Vec<Job>) {
     jobs.reverse();
-    let (need, mut rest): (Vec<Job>, Vec<Job>) = jobs.into_iter().partition(|job| NEED_SOMEONE.contains(&job.kind()));
-    rest.retain(|job| job.kind().is_at_rest() && job.changed >= since);
-    (need, rest)
+    let mut of = |wanted| jobs.extract_if(.., |job| part(job, &(since..)) == Some(wanted)).collect();
+    (of(Part::NeedsSomeone), of(Part::Ended))
 }
 
 fn whole(need: &[Job], ended: &[Job]) -> Markup {

@@ -7,9 +7,6 @@ use crate::left::area;
 use crate::shown::when;
 use crate::units::{show_count, show_when};
 
-/// Jobs that a person must look at.
-pub(crate) const NEED_SOMEONE: [Kind; 5] = [Kind::NeedsReview, Kind::Failed, Kind::Quarantined, Kind::Parked, Kind::Noticed];
-
 /// How many of these there are, as the first line of a morning.
 pub(crate) fn how_many_need_you(count: u64) -> String {
     match count {

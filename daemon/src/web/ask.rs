@@ -21,8 +21,8 @@ pub(super) async fn ask<T: Send + 'static>(
     context: &Arc<Context>,
     question: impl FnOnce(&Context) -> Result<T, Problem> + Send + 'static,
 ) -> Result<T, Problem> {
-    let context = Arc::clone(context);
-    match timeout(PATIENCE, spawn_blocking(move || question(&context))).await {
+    let (context, span) = (Arc::clone(context), tracing::Span::current());
+    match timeout(PATIENCE, spawn_blocking(move || span.in_scope(|| question(&context)))).await {
         Ok(Ok(answer)) => answer,
         // The panic is in the log.
         Ok(Err(_)) => Err(Problem::new(axum::http::StatusCode::INTERNAL_SERVER_ERROR, "an internal error; the log says more")),

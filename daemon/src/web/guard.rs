@@ -3,7 +3,7 @@
 //! * The name by which a client calls this machine must be a known one: a page of someone else's, whose name was made to lead here, asks by
 //!   that name. Addresses need no list: no one but us has them.
 //! * Where there are tokens, all but the two questions after health need one, or a session that was opened with one; so that one can be opened, `/login` and the
-//!   files that every page is made of need none.
+//!   files that every page is made of need none. Whoever is let in has the name of their token with them, and lines of the log say it.
 //! * What changes anything is refused when a browser says, or its `Origin` shows, that a page of someone else's sent it.
 //! * Every answer forbids browsers to guess, embed or run anything, but for scripts of ours in pages of ours; every error is a [`Problem`], which a person reads on
 //!   a page.
@@ -16,10 +16,12 @@ use axum::http::header::{ACCEPT, ALLOW, CACHE_CONTROL, CONTENT_TYPE, HOST, ORIGI
 use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use tracing::Instrument;
 
 use super::pages::{self, ForPeople};
 use super::problem::{Detail, PROBLEM, Problem};
 use super::shared::Shared;
+use super::tokens::Caller;
 
 /// Said with every answer to programs.
 const TO_PROGRAMS: [(&str, &str); 2] =
@@ -42,10 +44,14 @@ const TO_ALL: [(&str, &str); 3] =
 pub(super) const OPEN: [&str; 3] = ["/livez", "/readyz", pages::LOGIN];
 
 /// The one way in, and out.
-pub(super) async fn guard(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
+pub(super) async fn guard(State(shared): State<Arc<Shared>>, mut request: Request, next: Next) -> Response {
     let for_a_person = wants_page(request.headers());
     let mut response = match admit(&shared, &request) {
-        Ok(()) => next.run(request).await,
+        Ok(caller) => {
+            let span = caller.span();
+            request.extensions_mut().insert(caller);
+            next.run(request).instrument(span).await
+        }
         Err(problem) if problem.status() == StatusCode::UNAUTHORIZED && for_a_person => pages::lead(&request),
         Err(problem) => problem.into_response(),
     };
@@ -86,7 +92,7 @@ fn words(status: StatusCode) -> &'static str {
     }
 }
 
-fn admit(shared: &Shared, request: &Request) -> Result<(), Problem> {
+fn admit(shared: &Shared, request: &Request) -> Result<Caller, Problem> {
     let headers = request.headers();
     let host = host(request.uri(), headers).ok_or_else(|| Problem::bad("the request names no host, or several"))?;
     if !is_known(host, &shared.api.hosts) {
@@ -98,16 +104,16 @@ fn admit(shared: &Shared, request: &Request) -> Result<(), Problem> {
     }
     let path = request.uri().path();
     let is_open = OPEN.contains(&path) || path.starts_with(pages::ASSETS);
-    let is_allowed = || shared.tokens.allow(headers) || shared.sessions.has(headers, shared.context.world.steady());
-    if !is_open && !is_allowed() {
+    let in_session = || shared.sessions.of(headers, shared.context.world.steady());
+    let caller = shared.tokens.admit(headers).or_else(in_session).or_else(|| is_open.then(Caller::default)).ok_or_else(|| {
         let detail = "a token is needed, as `Authorization: Bearer TOKEN` or `X-API-Key: TOKEN`";
-        return Err(Problem::new(StatusCode::UNAUTHORIZED, detail));
-    }
+        Problem::new(StatusCode::UNAUTHORIZED, detail)
+    })?;
     let looks = matches!(*request.method(), Method::GET | Method::HEAD | Method::OPTIONS);
     if !looks && !is_own(headers, host) {
         return Err(Problem::new(StatusCode::FORBIDDEN, "a page of another site may not change anything here"));
     }
-    Ok(())
+    Ok(caller)
 }
 
 /// Is it a person's browser that asks?

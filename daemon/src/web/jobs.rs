@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use axum::Json;
 use axum::body::{Body, Bytes, to_bytes};
 use axum::extract::{Path, Query, State};
 use axum::http::{StatusCode, Uri};
+use axum::{Extension, Json};
 use serde::{Deserialize, Serialize};
 use suture_store::{Decision, Job, JobId, Kind, Look, Priority, StoreError, Verdict};
 use tokio::time::timeout;
@@ -17,6 +17,7 @@ use crate::retention::sweep::is_gone;
 use super::ask::{PATIENCE, ask};
 use super::problem::Problem;
 use super::shared::Shared;
+use super::tokens::Caller;
 use crate::shown::Shown;
 
 /// Jobs on a page unless someone asks for another number, and at most.
@@ -199,27 +200,30 @@ fn someone() -> String {
 pub(super) async fn approve(
     State(shared): State<Arc<Shared>>,
     Path(id): Path<String>,
+    Extension(caller): Extension<Caller>,
     body: Body,
 ) -> Result<Json<Shown>, Problem> {
-    decide(&shared, &id, body, Verdict::Approved).await
+    decide(&shared, &id, &caller, body, Verdict::Approved).await
 }
 
 /// `POST /v1/jobs/{id}/reject`: its result is not to be used.
 pub(super) async fn reject(
     State(shared): State<Arc<Shared>>,
     Path(id): Path<String>,
+    Extension(caller): Extension<Caller>,
     body: Body,
 ) -> Result<Json<Shown>, Problem> {
-    decide(&shared, &id, body, Verdict::Rejected).await
+    decide(&shared, &id, &caller, body, Verdict::Rejected).await
 }
 
-async fn decide(shared: &Shared, id: &str, body: Body, verdict: Verdict) -> Result<Json<Shown>, Problem> {
+async fn decide(shared: &Shared, id: &str, caller: &Caller, body: Body, verdict: Verdict) -> Result<Json<Shown>, Problem> {
     let Said { by, note } = match short(body).await? {
         // Nothing need be said.
         bytes if bytes.is_empty() => Said { by: someone(), note: String::new() },
         bytes => understood(&bytes)?,
     };
-    let decision = Decision::new(verdict, &by, &note).map_err(|error| Problem::bad(error.to_string()))?;
+    let decision =
+        Decision::new(verdict, caller.name().unwrap_or(&by), &note).map_err(|error| Problem::bad(error.to_string()))?;
     wish(shared, id, move |job| Ok(JobsWish::Decide(job.id, decision))).await
 }
 

@@ -9,6 +9,8 @@ use axum::http::header::COOKIE;
 use axum::http::{HeaderMap, HeaderValue};
 use rustix::rand::{GetRandomFlags, getrandom};
 
+use super::tokens::Caller;
+
 /// Sessions at a time; a further one ends the oldest.
 const MOST: usize = 256;
 /// A session that is not used for so long is over.
@@ -18,6 +20,7 @@ const NAME: &str = "suture-session";
 
 struct Session {
     name: blake3::Hash,
+    caller: Caller,
     used: Instant,
 }
 
@@ -37,28 +40,28 @@ impl Sessions {
         Ok(Self { secret: random()?, open: Mutex::default() })
     }
 
-    /// Opens one; the cookie to set.
+    /// Opens one for whoever has shown a token; the cookie to set.
     ///
     /// # Errors
     /// When the system has nothing random.
-    pub(super) fn open(&self, now: Instant) -> io::Result<HeaderValue> {
+    pub(super) fn open(&self, caller: Caller, now: Instant) -> io::Result<HeaderValue> {
         let name = blake3::Hash::from(random()?).to_hex();
         let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
         if open.len() >= MOST {
             open.remove(0);
         }
-        open.push(Session { name: blake3::hash(name.as_bytes()), used: now });
+        open.push(Session { name: blake3::hash(name.as_bytes()), caller, used: now });
         HeaderValue::try_from(format!("{NAME}={name}; Path=/; HttpOnly; SameSite=Strict")).map_err(io::Error::other)
     }
 
-    /// Is the browser that sent these headers in an open session?
-    pub(super) fn has(&self, headers: &HeaderMap, now: Instant) -> bool {
-        let Some(given) = cookie(headers).map(|name| blake3::hash(name.as_bytes())) else { return false };
+    /// Whoever opened the session that the browser which sent these headers is in, if it is in one.
+    pub(super) fn of(&self, headers: &HeaderMap, now: Instant) -> Option<Caller> {
+        let given = cookie(headers).map(|name| blake3::hash(name.as_bytes()))?;
         let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
         open.retain(|session| now.saturating_duration_since(session.used) < REST);
-        let Some(session) = open.iter_mut().find(|session| session.name == given) else { return false };
+        let session = open.iter_mut().find(|session| session.name == given)?;
         session.used = now;
-        true
+        Some(session.caller.clone())
     }
 
     /// Ends the session that sent these headers; the cookie to set.
@@ -104,33 +107,38 @@ mod tests {
         HeaderMap::from_iter([(COOKIE, format!("other=1; {pair}").parse().unwrap())])
     }
 
+    fn has(sessions: &Sessions, headers: &HeaderMap, now: Instant) -> bool {
+        sessions.of(headers, now).is_some()
+    }
+
     #[test]
     fn a_session_is_open_until_it_is_closed_or_rests() {
         let (sessions, now) = (Sessions::new().unwrap(), Instant::now());
-        let (first, second) = (sessions.open(now).unwrap(), sessions.open(now).unwrap());
+        let (first, second) = (sessions.open(Caller::default(), now).unwrap(), sessions.open(Caller::default(), now).unwrap());
         assert_ne!(first, second);
         assert!(first.to_str().unwrap().contains("HttpOnly; SameSite=Strict"));
-        assert!(sessions.has(&with(&first), now) && !sessions.has(&HeaderMap::new(), now));
-        assert!(!sessions.has(&with(&HeaderValue::from_static("suture-session=")), now));
-        assert!(!Sessions::new().unwrap().has(&with(&first), now), "of another life");
+        assert!(has(&sessions, &with(&first), now) && !has(&sessions, &HeaderMap::new(), now));
+        assert!(!has(&sessions, &with(&HeaderValue::from_static("suture-session=")), now));
+        assert!(!has(&Sessions::new().unwrap(), &with(&first), now), "of another life");
         sessions.close(&with(&first));
-        assert!(!sessions.has(&with(&first), now) && sessions.has(&with(&second), now));
-        assert!(sessions.has(&with(&second), now + REST - Duration::from_secs(1)), "used again");
-        assert!(sessions.has(&with(&second), now + REST), "so that it goes on");
-        assert!(!sessions.has(&with(&second), now + 3 * REST));
+        assert!(!has(&sessions, &with(&first), now) && has(&sessions, &with(&second), now));
+        assert!(has(&sessions, &with(&second), now + REST - Duration::from_secs(1)), "used again");
+        assert!(has(&sessions, &with(&second), now + REST), "so that it goes on");
+        assert!(!has(&sessions, &with(&second), now + 3 * REST));
     }
 
     #[test]
     fn so_many_are_open_and_no_more() {
         let (sessions, now) = (Sessions::new().unwrap(), Instant::now());
-        let all: Vec<_> = (0..=MOST).map(|_| sessions.open(now).unwrap()).collect();
-        assert!(!sessions.has(&with(&all[0]), now) && all[1..].iter().all(|cookie| sessions.has(&with(cookie), now)));
+        let all: Vec<_> = (0..=MOST).map(|_| sessions.open(Caller::default(), now).unwrap()).collect();
+        assert!(!has(&sessions, &with(&all[0]), now) && all[1..].iter().all(|cookie| has(&sessions, &with(cookie), now)));
     }
 
     #[test]
     fn the_word_of_a_form_is_of_one_session_and_one_life() {
         let (sessions, now) = (Sessions::new().unwrap(), Instant::now());
-        let (one, other) = (with(&sessions.open(now).unwrap()), with(&sessions.open(now).unwrap()));
+        let (one, other) =
+            (with(&sessions.open(Caller::default(), now).unwrap()), with(&sessions.open(Caller::default(), now).unwrap()));
         let word = sessions.form_word(&one);
         assert!(sessions.is_form_word(&one, &word));
         for (headers, given) in [(&one, ""), (&other, &word), (&HeaderMap::new(), &word)] {

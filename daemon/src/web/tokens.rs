@@ -1,4 +1,4 @@
-//! Who may ask: whoever has one of the tokens, if there are any.
+//! Who may ask: whoever has one of the tokens, if there are any; and by which name, if the token has one.
 
 use std::io;
 use std::path::Path;
@@ -6,16 +6,41 @@ use std::sync::Arc;
 
 use axum::http::HeaderMap;
 use axum::http::header::AUTHORIZATION;
+use suture_store::{Decision, Verdict};
+use tracing::Span;
 
 /// A shorter token could be guessed.
 const SHORTEST: usize = 16;
 
-/// Digests of the tokens: comparing two takes as long whatever they are.
+/// Whoever asks, by the name of their token.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Caller(Option<Arc<str>>);
+
+impl Caller {
+    /// Under this name is done what they do, whatever they say; `None`: the token has none, and their word counts.
+    pub(super) fn name(&self) -> Option<&str> {
+        self.0.as_deref()
+    }
+
+    /// Has lines of the log say who it was.
+    pub(super) fn span(&self) -> Span {
+        self.name().map_or_else(Span::none, |by| tracing::info_span!("asked", by))
+    }
+}
+
+/// A token: its digest, since comparing two of them takes as long whatever they are.
+struct Known {
+    digest: blake3::Hash,
+    caller: Caller,
+}
+
+/// The tokens that open; without any, everyone may ask.
 #[derive(Clone)]
-pub(crate) struct Tokens(Option<Arc<[blake3::Hash]>>);
+pub(crate) struct Tokens(Option<Arc<[Known]>>);
 
 impl Tokens {
-    /// Reads one token a line; lines that are empty or begin with `#` are left out. Without a file, no token is needed.
+    /// Reads one token a line, with its name and a colon before it if it has one; lines that are empty or begin with `#` are left out. Without a file, no
+    /// token is needed.
     ///
     /// # Errors
     /// A line for people, and what kept it.
@@ -28,15 +53,27 @@ impl Tokens {
 
     fn parse(text: &str) -> Result<Self, String> {
         let lines = text.lines().map(str::trim).enumerate().filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
-        let mut all = Vec::new();
-        for (number, token) in lines {
+        let mut all: Vec<Known> = Vec::new();
+        for (number, line) in lines {
+            let wrong = |what: &str| format!("line {}: {what}", number + 1);
+            let (name, token) = match line.split_once(':') {
+                Some((name, token)) => (Some(name.trim()), token.trim()),
+                None => (None, line),
+            };
             if token.len() < SHORTEST || !token.bytes().all(|byte| byte.is_ascii_graphic()) {
-                let number = number + 1;
-                return Err(format!(
-                    "line {number}: a token is one word of {SHORTEST} characters at least (try `openssl rand -hex 32`)"
-                ));
+                return Err(wrong(&format!(
+                    "a token is one word of {SHORTEST} characters at least (try `openssl rand -hex 32`), after a name and a colon if it has a name"
+                )));
             }
-            all.push(blake3::hash(token.as_bytes()));
+            // A name must do for a decision.
+            if let Some(Err(error)) = name.map(|name| Decision::new(Verdict::Approved, name, "")) {
+                return Err(wrong(&format!("before the colon stands no name: {error}")));
+            }
+            let known = Known { digest: blake3::hash(token.as_bytes()), caller: Caller(name.map(Arc::from)) };
+            if all.iter().any(|other| other.digest == known.digest && other.caller != known.caller) {
+                return Err(wrong("this token has another name on another line; give each its own"));
+            }
+            all.push(known);
         }
         if all.is_empty() { Err("holds no token (try `openssl rand -hex 32`)".into()) } else { Ok(Self(Some(all.into()))) }
     }
@@ -46,16 +83,17 @@ impl Tokens {
         self.0.is_some()
     }
 
-    /// Is it one of them?
-    pub(crate) fn are_opened_by(&self, token: &str) -> bool {
+    /// Whose token is it, if it is one of them?
+    pub(crate) fn opened_by(&self, token: &str) -> Option<Caller> {
         let given = blake3::hash(token.as_bytes());
-        self.0.iter().flat_map(|known| known.iter()).fold(false, |any, known| any | (*known == given))
+        let all = self.0.iter().flat_map(|known| known.iter());
+        all.fold(None, |found, known| if known.digest == given { Some(&known.caller) } else { found }).cloned()
     }
 
-    /// Does whoever sent these headers have one, where one is needed? As `Authorization: Bearer TOKEN` or `X-API-Key: TOKEN`.
-    pub(crate) fn allow(&self, headers: &HeaderMap) -> bool {
+    /// Whoever sent these headers, if they have one, or none is needed. As `Authorization: Bearer TOKEN` or `X-API-Key: TOKEN`.
+    pub(crate) fn admit(&self, headers: &HeaderMap) -> Option<Caller> {
         if !self.are_needed() {
-            return true;
+            return Some(Caller::default());
         }
         let bearer = headers.get(AUTHORIZATION).and_then(|value| value.to_str().ok()).and_then(|value| {
             let (scheme, token) = value.split_once(' ')?;
@@ -63,7 +101,7 @@ impl Tokens {
         });
         let key = headers.get("x-api-key").and_then(|value| value.to_str().ok());
         // Each with each, so that nothing is told by how long it took.
-        bearer.into_iter().chain(key).fold(false, |any, token| any | self.are_opened_by(token))
+        bearer.into_iter().chain(key).map(|token| self.opened_by(token)).fold(None, Option::or)
     }
 }
 
@@ -83,7 +121,7 @@ mod tests {
             ("authorization", "bearer fedcba9876543210"),
             ("x-api-key", "fedcba9876543210"),
         ] {
-            assert!(tokens.allow(&headers(name, value)), "{name}: {value}");
+            assert_eq!(tokens.admit(&headers(name, value)), Some(Caller::default()), "{name}: {value}");
         }
         for (name, value) in [
             ("authorization", "Basic 0123456789abcdef"),
@@ -93,10 +131,24 @@ mod tests {
             ("x-api-key", "# of the farm"),
             ("cookie", "0123456789abcdef"),
         ] {
-            assert!(!tokens.allow(&headers(name, value)), "{name}: {value}");
+            assert_eq!(tokens.admit(&headers(name, value)), None, "{name}: {value}");
         }
-        assert!(!tokens.allow(&HeaderMap::new()));
-        assert!(Tokens::of(None).is_ok_and(|none| none.allow(&HeaderMap::new())));
+        assert_eq!(tokens.admit(&HeaderMap::new()), None);
+        assert!(Tokens::of(None).is_ok_and(|none| none.admit(&HeaderMap::new()) == Some(Caller::default())));
+    }
+
+    #[test]
+    fn a_token_may_have_a_name() {
+        let tokens = Tokens::parse("0123456789abcdef\nAda Lovelace: fedcba9876543210\nshop:a:b:0123456789abcdef\n").unwrap();
+        let of = |token: &str| tokens.opened_by(token).map(|caller| caller.name().map(str::to_owned));
+        assert_eq!(of("0123456789abcdef"), Some(None));
+        assert_eq!(of("fedcba9876543210"), Some(Some("Ada Lovelace".into())));
+        assert_eq!(of("a:b:0123456789abcdef"), Some(Some("shop".into())), "the first colon ends the name");
+        for token in ["Ada Lovelace: fedcba9876543210", "Ada Lovelace:fedcba9876543210", "Ada Lovelace", ""] {
+            assert_eq!(of(token), None, "{token}");
+        }
+        let key = headers("x-api-key", "fedcba9876543210");
+        assert_eq!(tokens.admit(&key).unwrap().name(), Some("Ada Lovelace"));
     }
 
     #[test]
@@ -106,5 +158,10 @@ mod tests {
         {
             assert!(Tokens::parse(text).err().unwrap().starts_with(words), "{text}");
         }
+        let long = format!("{}:0123456789abcdef", "n".repeat(65));
+        for text in ["Ada:short", ":0123456789abcdef", &long, "Ada:0123456789abcdef\nGrace:0123456789abcdef"] {
+            assert!(Tokens::parse(text).err().unwrap().starts_with("line "), "{text}");
+        }
+        assert!(Tokens::parse("Ada:0123456789abcdef\nAda:fedcba9876543210").is_ok(), "one may have two");
     }
 }

@@ -6,7 +6,7 @@ use super::outbox::{SUBSCRIBERS, Subscribers, key};
 use super::{Inner, Queue, fits, head_put};
 use crate::crash::crash_point;
 use crate::id::Seq;
-use crate::job::Job;
+use crate::news::Notice;
 use crate::record;
 use crate::store::{MOST_SUBSCRIBERS, StoreError};
 use crate::tables::{Put, Table, Tables};
@@ -59,21 +59,21 @@ impl<T: Tables> Queue<T> {
     }
 
     /// As [`crate::JobStore::notices`].
-    pub(super) fn not_heard(&self, name: &str, most: usize) -> Result<Vec<Job>, StoreError> {
+    pub(super) fn not_heard(&self, name: &str, most: usize) -> Result<Vec<Notice>, StoreError> {
         let inner = self.lock();
         let (heard, head) = (inner.subscribers.get(name).copied(), inner.head);
         drop(inner);
-        let mut jobs = Vec::new();
-        let Some(heard) = heard.filter(|_| most > 0) else { return Ok(jobs) };
+        let mut notices = Vec::new();
+        let Some(heard) = heard.filter(|_| most > 0) else { return Ok(notices) };
         self.tables.scan(Table::Outbox, &key(Seq(heard.0 + 1)), &key(Seq(head.seq.0 + 1)), &mut |key, value| {
-            jobs.push(record::decode(Table::Outbox, key, value)?);
-            Ok(jobs.len() < most)
+            notices.push(record::decode_notice(key, value)?);
+            Ok(notices.len() < most)
         })?;
         // A kill of the machine must not take back what someone has been told.
-        if !jobs.is_empty() {
+        if !notices.is_empty() {
             self.settle(head)?;
         }
-        Ok(jobs)
+        Ok(notices)
     }
 
     /// As [`crate::JobStore::backlog`].

@@ -1,13 +1,17 @@
-//! What subscribers have not heard yet: each job as it stood when it came to its end, under the number of that transition. It is written in the
-//! transaction in which the job ends, so that neither is there without the other, and it goes when all subscribers have it. Where no one
-//! subscribes, nothing is kept.
+//! Notices that subscribers have not heard yet: each job as it stood when it came to its end, under the number of that transition, and news of the service
+//! itself, under the number of theirs ([`super::marks`]). An entry is written in the transaction in which the job ends, so that neither is there without
+//! the other, and it goes when all subscribers have it. Where no one subscribes, nothing is kept.
 //!
-//! [`super::notices`] reads it. The entry `subscribers` of the table `meta` says who has heard of what. An older program neither reads nor adds to either.
+//! News lie among the ends, since all are told in one order and under one mark of each subscriber. They have a schema of their own: a program that
+//! knows jobs alone refuses them by name, instead of calling the store damaged.
+//!
+//! [`super::notices`] reads it. The entry `subscribers` of the table `meta` says who has heard of what.
 
 use std::collections::BTreeMap;
 
 use crate::id::Seq;
 use crate::job::{Job, State};
+use crate::news::Word;
 use crate::record;
 use crate::store::StoreError;
 use crate::tables::{Put, Table, Tables};
@@ -36,5 +40,15 @@ pub(super) fn entry(subscribers: &Subscribers, from: Option<&Job>, to: &Job) -> 
     }
     let key = key(to.seq);
     let value = record::encode(Table::Outbox, &key, to)?;
+    Ok(Some(Put { table: Table::Outbox, key: key.to_vec(), value: Some(value) }))
+}
+
+/// The entry of these news, if someone is to hear of them.
+pub(super) fn word(subscribers: &Subscribers, word: &Word) -> Result<Option<Put>, StoreError> {
+    if subscribers.is_empty() {
+        return Ok(None);
+    }
+    let key = key(word.seq);
+    let value = record::encode_word(&key, word)?;
     Ok(Some(Put { table: Table::Outbox, key: key.to_vec(), value: Some(value) }))
 }

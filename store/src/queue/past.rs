@@ -5,7 +5,8 @@
 
 use std::collections::BTreeSet;
 
-use super::{Queue, SUBMIT_CHUNK, UNFILLED, fits, head_put};
+use super::submit::CHUNK;
+use super::{Queue, UNFILLED, fits, head_put};
 use crate::id::{JobId, Token};
 use crate::job::{Job, Past, one_line};
 use crate::path::{MAX_NAMED, MAX_SOURCE, RelPath};
@@ -42,7 +43,7 @@ impl<T: Tables> Queue<T> {
         self.tables.sound()?;
         past.iter().try_for_each(can_be_recorded)?;
         let mut ids = Vec::with_capacity(past.len());
-        for chunk in past.chunks(SUBMIT_CHUNK) {
+        for chunk in past.chunks(CHUNK) {
             ids.extend(self.restore_chunk(chunk)?);
         }
         Ok(ids)

@@ -1,7 +1,8 @@
-//! Those who are to hear of ends of jobs hear of each, whatever becomes of the daemon or of the job.
+//! Whoever is to hear of ends of jobs, and of news, hears of each, whatever becomes of the daemon or of the job.
 
-use crate::id::Seq;
+use crate::id::{Seq, Time};
 use crate::job::{Ending, Job, Kind};
+use crate::news::{News, Notice, Word};
 use crate::store::{Control, JobStore, StoreError};
 
 use super::tools::{ManualClock, Subject, claim_any, finish, submit_one};
@@ -12,10 +13,12 @@ fn ends(store: &dyn JobStore, name: &str, ending: Ending) -> Result<Job, StoreEr
     finish(store, &claim_any(store)?, ending, true)
 }
 
+/// Ends that the subscriber has not heard of, where there are no news.
 fn told(store: &dyn JobStore, name: &str) -> Result<Vec<Job>, StoreError> {
     let notices = store.notices(name, 100)?;
     assert_eq!(store.backlog(name)?, notices.len() as u64);
-    Ok(notices)
+    let job = |notice| if let Notice::End(job) = notice { *job } else { panic!("{notice:?}") };
+    Ok(notices.into_iter().map(job).collect())
 }
 
 pub(super) fn ends_are_told_until_they_are_acknowledged(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), StoreError> {
@@ -29,7 +32,7 @@ pub(super) fn ends_are_told_until_they_are_acknowledged(subject: &mut dyn Subjec
     for name in &both {
         assert_eq!(told(store, name)?, [first.clone(), second.clone()], "{name}");
     }
-    assert_eq!(store.notices("farm", 1)?.first(), Some(&first));
+    assert_eq!(store.notices("farm", 1)?, [Notice::End(first.clone().into())]);
     store.acknowledge("farm", first.seq)?;
     subject.restart();
     let store = subject.store();
@@ -56,6 +59,57 @@ pub(super) fn notices_outlive_what_becomes_of_their_jobs(subject: &mut dyn Subje
     assert_eq!(store.forget(&[done.id])?, 1);
     subject.restart();
     assert_eq!(told(subject.store(), "farm")?, [failed, done]);
+    Ok(())
+}
+
+/// A folder that goes and comes, and the ends of nights: each is told in its place among the ends of jobs, and once, whatever is said again and by
+/// whichever life.
+pub(super) fn news_are_told_once(subject: &mut dyn Subject, clock: &ManualClock) -> Result<(), StoreError> {
+    let away = |folder: &str| News::FolderAway { folder: folder.into(), reason: "it is\ngone".into() };
+    let back = |folder: &str| News::FolderBack { folder: folder.into() };
+    let night = |since, until| News::Night { since: Time(since), until: Time(until), jobs: [(Kind::Done, 1)].into() };
+    let store = subject.store();
+    store.subscribe(&["farm".into()])?;
+    assert!(!store.tell(&back("hot"))?, "it was never away");
+    assert!(store.tell(&away("hot"))? && store.tell(&away("cold"))? && !store.tell(&away("hot"))?);
+    let job = ends(store, "a.stl", Ending::Clean)?;
+    subject.restart();
+    let store = subject.store();
+    assert!(!store.tell(&away("hot"))?, "another life knows it");
+    clock.pass(5);
+    assert!(store.tell(&back("hot"))? && !store.tell(&back("hot"))? && store.tell(&away("hot"))?);
+    assert_eq!(store.last_night()?, None);
+    store.begin_night(Time(100))?;
+    assert!(!store.tell(&night(90, 100))? && store.tell(&night(100, 200))? && !store.tell(&night(100, 200))?);
+    subject.restart();
+    let store = subject.store();
+    assert!(!store.tell(&night(100, 200))? && !store.tell(&night(100, 199))?);
+    assert_eq!(store.last_night()?, Some(Time(200)));
+    let notices = store.notices("farm", 100)?;
+    let clean = |notice: &Notice| match notice {
+        Notice::Word(Word { news: News::FolderAway { folder, reason }, .. }) => format!("{folder} away: {reason}"),
+        Notice::Word(Word { news: News::FolderBack { folder }, at, .. }) => format!("{folder} back at {}", at.0),
+        Notice::Word(Word { news: News::Night { since, until, .. }, .. }) => format!("night {} to {}", since.0, until.0),
+        Notice::End(job) => format!("end of {}", job.id),
+    };
+    let end = format!("end of {}", job.id);
+    let expected = [
+        "hot away: it is gone",
+        "cold away: it is gone",
+        &end,
+        "hot back at 1000005",
+        "hot away: it is gone",
+        "night 100 to 200",
+    ];
+    assert_eq!(notices.iter().map(clean).collect::<Vec<_>>(), expected);
+    assert!(notices.is_sorted_by(|a, b| a.seq() < b.seq()));
+    store.acknowledge("farm", notices[4].seq())?;
+    assert_eq!(store.notices("farm", 100)?, notices[5..]);
+    // Without anyone who listens, what is so is still known.
+    store.subscribe(&[])?;
+    assert!(store.tell(&back("hot"))?);
+    store.subscribe(&["farm".into()])?;
+    assert!(!store.tell(&back("hot"))? && store.notices("farm", 100)?.is_empty());
     Ok(())
 }
 

@@ -1,4 +1,4 @@
-//! Whoever is to hear of ends of jobs hears of each, wherever the daemon was killed: at least once, and under one id.
+//! Whoever is to hear of ends of jobs, and of news, hears of each, wherever the daemon was killed: at least once, and under one id.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
@@ -63,6 +63,100 @@ fn f30_killed_at_every_step_each_end_is_told() {
         for told in [came(&receiver), ran(&hot)] {
             assert_eq!(told.keys().cloned().collect::<BTreeSet<_>>(), jobs, "{what}");
             assert!(told.values().all(|ids| ids.len() == 1), "{what}: {told:?}");
+        }
+    });
+}
+
+/// A hot folder, and another one beside it that can be taken away.
+struct Two {
+    hot: Hot,
+    beside: tempfile::TempDir,
+    receiver: Receiver,
+}
+
+impl Two {
+    /// Both have been served once.
+    fn served() -> Self {
+        let two = Self {
+            hot: Hot::new(with_crash_points()),
+            beside: tempfile::tempdir().expect("a temporary folder"),
+            receiver: Receiver::start(),
+        };
+        assert!(two.daemon().status().expect("it starts").success());
+        two
+    }
+
+    fn daemon(&self) -> Command {
+        self.hot.configured(&format!(
+            "settle = \"30ms\"\nstate = {:?}\n[[webhook]]\nurl = \"http://{}/\"\nevents = [\"folder_away\", \"folder_back\"]\n[[folders]]\npath = {:?}\n",
+            self.hot.path().join(".suture/state"),
+            self.receiver.address,
+            self.beside.path().join("scans")
+        ))
+    }
+
+    /// The disk of the other folder is not mounted any more: the bare folder under it is there.
+    fn take_away(&self) {
+        let noted = self.hot.path().join(".suture/folders");
+        let text = std::fs::read(&noted).expect("a note of the folders");
+        let mut traces: serde_json::Value = serde_json::from_slice(&text).expect("JSON");
+        traces["scans"]["mount"] = "/mnt/disk".into();
+        std::fs::write(&noted, traces.to_string()).expect("the note can be written");
+        std::fs::rename(self.beside.path().join("scans"), self.beside.path().join("disk")).expect("a folder");
+        std::fs::create_dir(self.beside.path().join("scans")).expect("a folder");
+    }
+
+    fn bring_back(&self) {
+        std::fs::remove_dir(self.beside.path().join("scans")).expect("an empty folder");
+        std::fs::rename(self.beside.path().join("disk"), self.beside.path().join("scans")).expect("a folder");
+    }
+
+    /// Ids by event, as the receiver was told them.
+    fn came(&self) -> BTreeMap<String, BTreeSet<String>> {
+        let mut all: BTreeMap<_, BTreeSet<_>> = BTreeMap::new();
+        for message in self.receiver.came() {
+            let event = message.json()["event"].as_str().unwrap_or_default().to_owned();
+            all.entry(event).or_default().insert(message.header("suture-delivery").to_owned());
+        }
+        all
+    }
+
+    /// Crash points of a run.
+    fn passes(&self) -> u64 {
+        let trace = self.hot.path().join("trace");
+        self.daemon().env("SUTURE_CRASH_TRACE", &trace).status().expect("it starts");
+        let passed = std::fs::read_to_string(&trace).expect("a trace");
+        std::fs::remove_file(trace).expect("it can go");
+        assert!(["daemon.told\n", "daemon.acknowledged\n"].iter().all(|point| passed.matches(point).count() == 1), "{passed}");
+        passed.lines().count() as u64
+    }
+}
+
+/// A folder that goes and comes back is told of, each once and under one id.
+#[test]
+fn f30_killed_at_every_step_news_are_told_once() {
+    let two = Two::served();
+    two.take_away();
+    let away = two.passes();
+    two.bring_back();
+    let passes = two.passes().max(away);
+    let steps: Vec<u64> = (1..=passes).collect();
+    on_two_threads(&steps, |&step| {
+        let two = Two::served();
+        let mut known = Vec::new();
+        for (event, change) in [("folder_away", Two::take_away as fn(&Two)), ("folder_back", Two::bring_back)] {
+            change(&two);
+            let what = format!("{event}, killed at pass {step} of {passes}");
+            let first = two.daemon().env("SUTURE_CRASH_AT", format!("*:{step}")).status().expect("it starts");
+            assert!(was_killed(first) || step + 8 > passes, "{what}: was not");
+            for _ in 0..2 {
+                let status = two.daemon().status().expect("it starts");
+                assert!(status.code().is_some_and(|code| code < 2), "{what}: {status}");
+            }
+            known.push(event.to_owned());
+            let came = two.came();
+            assert_eq!(came.keys().cloned().collect::<Vec<_>>(), known, "{what}");
+            assert!(came.values().all(|ids| ids.len() == 1), "{what}: {came:?}");
         }
     });
 }

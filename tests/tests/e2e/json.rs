@@ -3,9 +3,10 @@
 use std::collections::BTreeSet;
 
 use serde_json::Value;
+use suture_bench::generate::{Case, write};
 use suture_tests::Place;
 use suture_tests::hot::holes;
-use suture_tests::served::jobs;
+use suture_tests::served::{Served, jobs, wait_until};
 
 const PAGE: &str = include_str!("../../../docs/JOBS.md");
 
@@ -71,4 +72,37 @@ fn every_field_of_a_job_is_described() {
         assert!(seen.contains(name), "no job has {name}: {seen:?}");
     }
     assert!(kinds.iter().all(|kind| PAGE.contains(&format!("`{kind}`"))), "{kinds:?}");
+}
+
+/// How far a job in work is, is said of it, in both forms; of any other nothing.
+#[test]
+fn the_progress_of_work_is_listed() {
+    let place = Place::new();
+    let mut large = Vec::new();
+    write(Case::Holes, 600_000, 1, &mut large).expect("a mesh is generated into memory");
+    place.put("suture.toml", b"settle = \"30ms\"\nreuse = false\n[[folders]]\npath = \"hot\"\n");
+    let _daemon = Served::start(&place, &["--config", "suture.toml"], "log");
+    let (mut dropped, mut listed, mut shown) = (0, None, String::new());
+    // Its work may be over before anyone has looked: then there is another.
+    wait_until("both are seen", || {
+        let all = jobs(&place, "hot");
+        if all.iter().filter(|job| job["kind"] == "done").count() == dropped {
+            dropped += 1;
+            place.put(&format!("hot/in/large{dropped}.stl"), &large);
+        }
+        let far = all.iter().find(|job| job["kind"] == "running" && job.get("progress").is_some());
+        listed = listed.take().or(far.cloned());
+        let line = place.suture(["jobs", "list", "--dir", "hot"]).expect(0).stdout();
+        let line = line.lines().find(|line| line.contains(" running ") && line.contains(" %, for "));
+        shown = line.map_or(std::mem::take(&mut shown), str::to_owned);
+        listed.is_some() && !shown.is_empty()
+    });
+    let listed = listed.expect("a job in work");
+    assert!(listed["progress"]["stage"].as_str().is_some_and(|stage| !stage.is_empty()), "{listed}");
+    assert!(listed["progress"]["percent"].as_u64().is_some_and(|percent| percent <= 100), "{listed}");
+    let mut found = BTreeSet::new();
+    fields(&listed, "", &mut found);
+    assert_eq!(found.difference(&described(false)).collect::<Vec<_>>(), Vec::<&String>::new(), "not described");
+    wait_until("all are done", || jobs(&place, "hot").iter().all(|job| job["kind"] == "done"));
+    assert!(jobs(&place, "hot").iter().all(|job| job.get("progress").is_none()));
 }

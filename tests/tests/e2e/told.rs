@@ -156,7 +156,7 @@ fn f30_redirects_are_not_followed_and_who_is_busy_is_asked_later() {
     let asked = Instant::now();
     wait_until("it is told", || receiver.came().len() == 3);
     assert!(asked.elapsed() > Duration::from_secs(3), "{:?}", asked.elapsed());
-    wait_until("it is noted", || daemon.lines("A job's end was told.").len() == 1);
+    wait_until("it is noted", || daemon.lines("An event was told.").len() == 1);
     assert!(elsewhere.came().is_empty());
     let ids: BTreeSet<_> = receiver.came().iter().map(|message| message.header("suture-delivery").to_owned()).collect();
     assert_eq!(ids.len(), 1);
@@ -298,7 +298,7 @@ fn the_receiver_of_the_recipes_takes_what_is_signed_and_nothing_else() {
     let daemon = start(&place, "log");
     place.put("hot/in/part.stl", &holes(1));
     let text = |name: &str| String::from_utf8_lossy(&place.read(name)).into_owned();
-    wait_until("it is told", || !daemon.lines("A job's end was told.").is_empty());
+    wait_until("it is told", || !daemon.lines("An event was told.").is_empty());
     wait_until("the forger is refused", || text("asked").contains("\" 401 "));
     let said = text("said");
     receiver.kill().unwrap();
@@ -309,6 +309,6 @@ fn the_receiver_of_the_recipes_takes_what_is_signed_and_nothing_else() {
         "{said}"
     );
     assert!(out.is_file());
-    let told = daemon.lines("A job's end was told.");
+    let told = daemon.lines("An event was told.");
     assert!(told.iter().all(|line| line["target_name"] == "farm"), "{told:?}");
 }

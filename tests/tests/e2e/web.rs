@@ -1,6 +1,7 @@
 //! The web interface: who may ask, and how it is asked after the daemon's health.
 
 use suture_tests::Place;
+use suture_tests::hot::{doubtful, holes};
 use suture_tests::http::Client;
 use suture_tests::served::{Served, wait_until};
 
@@ -65,6 +66,75 @@ fn f28_beyond_this_machine_only_with_a_token() {
     assert_eq!(of(&[("X-API-Key", TOKEN), ("Host", "evil.example")]), 421);
     assert_eq!(of(&[("X-API-Key", TOKEN), ("Host", "a"), ("Host", "b")]), 400);
     client.get("/livez").expect(200);
+}
+
+/// Under the name of the token, whatever the client says; a token without a name leaves it to the client.
+#[test]
+fn what_is_done_with_a_named_token_is_done_under_its_name() {
+    const ADA: &str = "fedcba9876543210fedcba9876543210";
+    let place = Place::new();
+    place.put("tokens", format!("{TOKEN}\nAda <Lovelace>: {ADA}\n").as_bytes());
+    let settings = "settle = \"30ms\"\n[api]\nlisten = \"127.0.0.1:0\"\ntoken_file = \"tokens\"\n[[folders]]\npath = \"hot\"\n";
+    place.put("suture.toml", settings.as_bytes());
+    let daemon = Served::start(&place, &["--config", "suture.toml"], "log");
+    let client = Client::of(&daemon);
+    for n in 1..=3 {
+        place.put(&format!("hot/in/{n}.stl"), &doubtful());
+    }
+    let by = |token: &'static str| {
+        let client = &client;
+        move |method: &str, path: &str, body: &str| client.send(method, path, &[("X-API-Key", token)], body.as_bytes())
+    };
+    let (ada, other) = (by(ADA), by(TOKEN));
+    let state = |id: u64| other("GET", &format!("/v1/jobs/{id}"), "").json()["state"].to_string();
+    wait_until("all need review", || (1..=3).all(|id| state(id).contains("needs_review")));
+    let said =
+        |answer: suture_tests::http::Answer| answer.expect(200).json()["decision"]["by"].as_str().unwrap_or_default().to_owned();
+    assert_eq!(said(ada("POST", "/v1/jobs/1/reject", "{\"by\": \"Grace\"}")), "Ada <Lovelace>");
+    assert_eq!(said(other("POST", "/v1/jobs/2/reject", "{\"by\": \"Grace\"}")), "Grace");
+    ada("POST", "/v1/jobs/1/retry", "").expect(200);
+    ada("POST", "/v1/jobs?name=good.stl", "no mesh").expect(202);
+    other("POST", "/v1/jobs/2/retry", "").expect(200);
+    // A browser that has signed in with it.
+    let signed = client.submit("/login", &[], &format!("token={ADA}")).expect(303);
+    let cookie = signed.header("set-cookie").unwrap().split(';').next().unwrap().to_owned();
+    let page = client.ask("GET", "/jobs/3", &[("Cookie", &cookie), ("Accept", "text/html")], b"").expect(200);
+    assert!(page.text().contains("You decide as <strong>Ada &lt;Lovelace&gt;</strong>"), "{}", page.text());
+    let word = page.text().split("name=\"word\" value=\"").nth(1).unwrap().split('"').next().unwrap().to_owned();
+    client.submit("/jobs/3/reject", &[("Cookie", &cookie)], &format!("word={word}&by=Grace")).expect(303);
+    let decided = other("GET", "/v1/jobs/3", "").json();
+    assert_eq!((&decided["state"], &decided["decision"]["by"]), (&"rejected".into(), &"Ada <Lovelace>".into()));
+    // The log says who: of decisions, of other wishes, and of files that came.
+    let of = |words: &str, job: &str| {
+        let lines = daemon.lines(words);
+        let line = lines.iter().find(|line| job.is_empty() || line["job"] == 1 && line["wish"] == *job);
+        line.map(|line| line["span"]["by"].clone()).unwrap_or_default()
+    };
+    assert_eq!(of("An operator's wish.", "Retry"), "Ada <Lovelace>");
+    assert_eq!(of("A file came by the web.", ""), "Ada <Lovelace>");
+    let wishes = daemon.lines("An operator's wish.");
+    let unnamed: Vec<_> = wishes.iter().filter(|line| line["job"] == 2).collect();
+    assert!(unnamed.len() == 2 && unnamed.iter().all(|line| line.get("span").is_none()), "{unnamed:?}");
+}
+
+/// A job that is done is not tried again, and the line says how its file is repaired anew.
+#[test]
+fn a_retry_of_what_is_done_is_refused_and_says_what_to_do() {
+    let place = Place::new();
+    let daemon = Served::start(&place, &["hot", "--settle", "30ms", "--listen", "127.0.0.1:0"], "log");
+    let client = Client::of(&daemon);
+    place.put("hot/in/order/part.stl", &holes(1));
+    wait_until("it is done", || client.get("/v1/jobs/1").json()["state"] == "done");
+    let words = ["is done, and its result is out/order/part.stl", "drop a copy of done/order/part.stl"];
+    let refused = client.send("POST", "/v1/jobs/1/retry", &[], b"").expect(409).json()["detail"].to_string();
+    let said = place.suture(["jobs", "retry", "1", "--dir", "hot"]).expect(2).stderr();
+    assert!(words.iter().all(|words| refused.contains(words) && said.contains(words)) && said.lines().count() == 1, "{said}");
+    // Whoever does what it says has it repaired anew, not copied.
+    std::fs::rename(place.at("hot/out/order/part.stl"), place.at("earlier.stl")).unwrap();
+    std::fs::copy(place.at("hot/done/order/part.stl"), place.at("hot/in/order/anew.stl")).unwrap();
+    wait_until("it is repaired anew", || client.get("/v1/jobs/2").json()["state"] == "done");
+    let anew = client.get("/v1/jobs/2").json();
+    assert!(anew.get("reused").is_none() && place.read("hot/out/order/anew.stl") == place.read("earlier.stl"), "{anew}");
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use axum::Extension;
 use axum::body::Body;
 use axum::extract::{Path, State};
 use axum::http::header::LOCATION;
@@ -15,9 +16,11 @@ use suture_store::{Decision, Job, Kind, Verdict};
 
 use super::frame::Frame;
 use crate::control::JobsWish;
+use crate::say::plain;
 use crate::web::jobs::{grant, parameters, released, short};
 use crate::web::problem::Problem;
 use crate::web::shared::Shared;
+use crate::web::tokens::Caller;
 
 /// Something to be done with a job.
 struct Action {
@@ -89,7 +92,9 @@ pub(super) fn forms(frame: &Frame, job: &Job) -> Markup {
             li class="decision" {
                 form method="post" action=(address(first)) {
                     (frame.field())
-                    label { "Your name " input name="by" required maxlength=(MAX_BY) autocomplete="name"; }
+                    @if let Some(name) = frame.caller.name() { p { "You decide as " strong { (plain(name)) } "." } } @else {
+                        label { "Your name " input name="by" required maxlength=(MAX_BY) autocomplete="name"; }
+                    }
                     label { "Note (not needed) " input name="note" maxlength=(MAX_REASON); }
                     @for action in &signed { button formaction=(address(action)) { (action.label) } }
                 }
@@ -115,12 +120,16 @@ struct Sent {
 pub(super) async fn act(
     State(shared): State<Arc<Shared>>,
     Path((id, action)): Path<(String, String)>,
+    Extension(caller): Extension<Caller>,
     headers: HeaderMap,
     body: Body,
 ) -> Result<Response, Problem> {
     let action = ALL.iter().find(|known| known.name == action).ok_or_else(|| Problem::missing("there is no such action"))?;
-    let sent: Sent = form(body).await?;
+    let mut sent: Sent = form(body).await?;
     check_word(&shared, &headers, &sent.word)?;
+    if let Some(name) = caller.name() {
+        name.clone_into(&mut sent.by);
+    }
     let job = grant(&shared, &id, move |job| (action.wish)(job, &sent)).await?;
     Ok(see(&format!("/jobs/{}", job.id)))
 }

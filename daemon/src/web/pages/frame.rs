@@ -6,6 +6,7 @@ use axum::response::{IntoResponse, Response};
 use maud::{DOCTYPE, Markup, html};
 
 use crate::web::shared::Shared;
+use crate::web::tokens::Caller;
 
 /// Marks an answer as a page for people, which may have a style and scripts of ours.
 #[derive(Clone, Copy)]
@@ -16,13 +17,15 @@ pub(super) struct Frame {
     /// The word that its forms carry.
     pub word: String,
     in_session: bool,
+    /// Whoever is signed in.
+    pub caller: Caller,
 }
 
 impl Frame {
     /// For the browser that sent these headers.
     pub(super) fn of(shared: &Shared, headers: &HeaderMap) -> Self {
-        let in_session = shared.tokens.are_needed() && shared.sessions.has(headers, shared.context.world.steady());
-        Self { word: shared.sessions.form_word(headers), in_session }
+        let session = shared.tokens.are_needed().then(|| shared.sessions.of(headers, shared.context.world.steady())).flatten();
+        Self { word: shared.sessions.form_word(headers), in_session: session.is_some(), caller: session.unwrap_or_default() }
     }
 
     /// A page; `here`: its address, if the head leads to it.

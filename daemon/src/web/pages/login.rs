@@ -72,12 +72,12 @@ struct Shown {
 pub(super) async fn login(State(shared): State<Arc<Shared>>, body: Body) -> Result<Response, Problem> {
     let Shown { token, next } = fields(body).await?;
     let _seat = shared.logins.try_acquire().map_err(|_| Problem::unavailable("too many sign in at once; try again"))?;
-    if !shared.tokens.are_opened_by(token.trim()) {
+    let Some(caller) = shared.tokens.opened_by(token.trim()) else {
         tracing::warn!("A wrong token was shown at the page to sign in.");
         sleep(DELAY).await;
         return Ok(page(StatusCode::FORBIDDEN, &next, "This is not one of the tokens. Try again."));
-    }
-    let cookie = shared.sessions.open(shared.context.world.steady());
+    };
+    let cookie = shared.sessions.open(caller, shared.context.world.steady());
     let cookie = cookie.map_err(|_| Problem::unavailable("no session can be opened for now; try again"))?;
     let mut response = see(if is_ours(&next) { &next } else { "/" });
     response.headers_mut().insert(SET_COOKIE, cookie);

@@ -97,7 +97,7 @@ fn table(jobs: &[Job], of_folders: bool) -> Markup {
         div class="wide" { table {
             thead { tr {
                 th scope="col" class="n" { "Job" } th scope="col" { "File" } @if of_folders { th scope="col" { "Folder" } }
-                th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Why" }
+                th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Why, or a note" }
             } }
             tbody { @for job in jobs { tr {
                 td class="n" { (job.id) }

@@ -16,8 +16,8 @@ use crate::left::{area, report_path};
 use crate::reach::{self, Failure};
 use crate::rebuild::{Rebuilt, rebuild};
 use crate::say::{complain, plain};
-use crate::shown::hint;
 use crate::schedule::Standing;
+use crate::shown::hint;
 use crate::units::show_when;
 use crate::{standstill, table};
 

@@ -87,6 +87,11 @@ impl Settling {
         long && !std::mem::replace(&mut self.told, true)
     }
 
+    /// Was that said?
+    pub(crate) fn was_told(&self) -> bool {
+        self.told
+    }
+
     /// Looks again.
     pub(crate) fn look(&mut self, identity: Identity, now: Instant, rest: Rest) -> Look {
         if identity != self.identity {

@@ -95,8 +95,8 @@ fn rows<'a>(jobs: impl IntoIterator<Item = &'a Job>, of_folders: bool, is_advise
                 @if is_advised { th scope="col" { "What to do" } }
             } }
             tbody { @for job in jobs { tr {
-                td { (plain(&job.source.path.to_string())) } @if of_folders { td { (plain(&job.source.folder)) } } td { (mark(job)) } td { (time(job.changed)) } td { (plain(&reason(job))) }
-                @if is_advised { td { (plain(&advice(job))) } }
+                td class="file" { (plain(&job.source.path.to_string())) } @if of_folders { td { (plain(&job.source.folder)) } } td { (mark(job)) } td class="time" { (time(job.changed)) } td class="why" { (plain(&reason(job))) }
+                @if is_advised { td class="why" { (plain(&advice(job))) } }
             } } }
         }
     }

@@ -99,3 +99,15 @@ fn a_file_that_is_gone_cannot_be_tried_again() {
     assert!(page.text().contains("Drop the file again") && !page.text().contains("/retry"), "{}", page.text());
     client.send("POST", "/v1/jobs/1/retry", &[], b"").expect(409);
 }
+
+/// A file that is renamed into place counts as whole at once; what is none all the same does not lie there for ever, unsaid.
+#[test]
+fn a_picture_that_is_renamed_into_place_fails_with_a_reason() {
+    let place = Place::new();
+    let (_daemon, client) = served(&place, "[[folders]]\npath = \"hot\"");
+    wait_until("it is ready", || client.get("/readyz").status == 200);
+    let dropped = place.put("hot/in/part.stl.part", b"\x89PNG\r\n\x1a\n");
+    std::fs::rename(dropped, place.at("hot/in/part.stl")).unwrap();
+    wait_until("it has failed", || client.get("/v1/status").json()["jobs"]["failed"] == 1);
+    assert!(client.browse("/").expect(200).text().contains("part.stl"));
+}

@@ -105,7 +105,7 @@ fn table(jobs: &[Job], of_folders: bool) -> Markup {
                 @if of_folders { td { (plain(&job.source.folder)) } }
                 td { (mark(job)) }
                 td class="time" { (time(job.changed)) }
-                td { (plain(&reason(job))) @if let Some(other) = job.publication().and_then(|publication| publication.reused) { " Copy of the result of " a href={ "/jobs/" (other) } { "job " (other) } "." } }
+                td class="why" { (plain(&reason(job))) @if let Some(other) = job.publication().and_then(|publication| publication.reused) { " Copy of the result of " a href={ "/jobs/" (other) } { "job " (other) } "." } }
             } } }
         } }
     }

@@ -134,7 +134,7 @@ fn advised(jobs: &[Job], of_folders: bool) -> Markup {
         div class="wide" { table {
             thead { tr { th scope="col" { "File" } @if of_folders { th scope="col" { "Folder" } } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Why" } th scope="col" { "What to do" } } }
             tbody { @for job in jobs { tr {
-                td class="file" { (link(job)) } @if of_folders { td { (plain(&job.source.folder)) } } td { (mark(job)) } td class="time" { (time(job.changed)) } td { (plain(&reason(job))) } td { (plain(&brief_advice(job))) }
+                td class="file" { (link(job)) } @if of_folders { td { (plain(&job.source.folder)) } } td { (mark(job)) } td class="time" { (time(job.changed)) } td class="why" { (plain(&reason(job))) } td class="why" { (plain(&brief_advice(job))) }
             } } }
         } }
     }
@@ -149,7 +149,7 @@ fn put_off(night: &Night) -> Markup {
             div class="wide" { table {
                 thead { tr { th scope="col" { "File" } @if night.of_folders() { th scope="col" { "Folder" } } th scope="col" { "Since" } th scope="col" { "Why" } th scope="col" { "Tried again" } } }
                 tbody { @for job in &night.put_off { tr {
-                    td class="file" { (link(job)) } @if night.of_folders() { td { (plain(&job.source.folder)) } } td class="time" { (time(job.changed)) } td { (plain(&reason(job))) } td class="time" { @if let Some(pause) = job.pause() { (time(pause)) } }
+                    td class="file" { (link(job)) } @if night.of_folders() { td { (plain(&job.source.folder)) } } td class="time" { (time(job.changed)) } td class="why" { (plain(&reason(job))) } td class="time" { @if let Some(pause) = job.pause() { (time(pause)) } }
                 } } }
             } }
             @if more > 0 { p { a href=(list_of(&[Kind::Waiting])) { (show_count(more)) " more" } } }

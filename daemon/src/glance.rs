@@ -169,7 +169,8 @@ pub(crate) fn folders(context: &Context) -> Vec<Served> {
         name: folder.name.clone(),
         path: std::path::absolute(&folder.root).unwrap_or_else(|_| folder.root.clone()),
         reachable: folder.check().is_ok(),
-        free_bytes: context.world.room(&folder.root, reserve),
+        // A full disk of results holds up as much as a full one of the folder.
+        free_bytes: context.world.room(&folder.root, reserve).min(context.world.room(&folder.out(), reserve)),
     };
     context.folders.iter().map(served).collect()
 }
@@ -181,7 +182,8 @@ pub(crate) fn folders(context: &Context) -> Vec<Served> {
 pub(crate) fn standing(context: &Context) -> Result<Standing, StoreError> {
     let away = context.away.lock().unwrap_or_else(PoisonError::into_inner).values().flatten().cloned().collect();
     let untold = context.pulse.all_troubles().into_iter();
-    let untold = untold.map(|(name, why)| Ok(format!("{name}: {} to be told: {why}", context.store.backlog(&name)?)));
+    let untold =
+        untold.map(|(name, why)| Ok(format!("`{name}` has not heard of {} ends of jobs: {why}", context.store.backlog(&name)?)));
     let untold = untold.collect::<Result<_, StoreError>>()?;
     Ok(Standing { away, untold, ..context.schedule.standing() })
 }

@@ -18,6 +18,7 @@ use crate::reach::{self, Failure};
 use crate::rebuild::{Rebuilt, rebuild};
 use crate::say::{complain, plain};
 use crate::schedule::Standing;
+use crate::shown::hint;
 use crate::units::show_when;
 use crate::{standstill, table};
 
@@ -200,10 +201,11 @@ fn note(job: &Job) -> String {
         State::Noticed { reason } => reason.clone(),
         State::Running { cancel: true, .. } => "being stopped".into(),
         State::Ended { publication } => match (&publication.output, publication.reason.is_empty()) {
-            (Some(output), true) => {
+            (Some(output), is_all) if is_all || publication.ending.is_good() => {
                 let copied = publication.reused.map(|job| format!(", reused from job {job}")).unwrap_or_default();
+                let note = hint(job).map(|note| format!("; note: {note}")).unwrap_or_default();
                 format!(
-                    "→ {}/{output}{copied}",
+                    "→ {}/{output}{copied}{note}",
                     if publication.ending.is_good() { "out" } else { area(publication.ending.area()) }
                 )
             }

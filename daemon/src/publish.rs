@@ -108,7 +108,8 @@ impl<'a> Desk<'a> {
             Conclusion::None { ending, reason } => (*ending, reason.clone(), None, None, None),
             Conclusion::Report { report, ctime_ns, .. } => {
                 let ending = ending_of(report);
-                let reason = if ending.is_good() { String::new() } else { report.verdict.reasons.join("; ") };
+                let hints = || report.hints.iter().map(|hint| hint.text.as_str()).collect::<Vec<_>>().join("; ");
+                let reason = if ending.is_good() { hints() } else { report.verdict.reasons.join("; ") };
                 let output = report.output.as_ref().and_then(|facts| facts.blake3.parse::<Hash>().ok());
                 (ending, reason, output, report.input.blake3.parse::<Hash>().ok(), Some(*ctime_ns))
             }

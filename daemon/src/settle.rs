@@ -87,6 +87,11 @@ impl Settling {
         long && !std::mem::replace(&mut self.told, true)
     }
 
+    /// Was that said?
+    pub(crate) fn was_told(&self) -> bool {
+        self.told
+    }
+
     /// Looks again.
     pub(crate) fn look(&mut self, identity: Identity, now: Instant, rest: Rest) -> Look {
         if identity != self.identity {
@@ -95,14 +100,14 @@ impl Settling {
         }
         self.looks = self.looks.saturating_add(1);
         let rested = now.duration_since(self.since);
-        if self.renamed {
-            Look::IfLengthFits
-        } else if self.looks < LOOKS || rested < rest.settle {
-            Look::Wait
-        } else if rested < rest.settle.saturating_mul(DOUBT) {
+        let has_rested = self.looks >= LOOKS && rested >= rest.settle;
+        if has_rested && rested >= rest.settle.saturating_mul(DOUBT) {
+            // Also where it came by a rename: whoever did that may have renamed what is no mesh.
+            Look::Ready
+        } else if has_rested || self.renamed {
             Look::IfLengthFits
         } else {
-            Look::Ready
+            Look::Wait
         }
     }
 }
@@ -176,6 +181,18 @@ mod tests {
         let mut file = Settling::new(identity(1), start);
         file.came_whole();
         assert_eq!(file.look(identity(1), start, REST), Look::IfLengthFits);
+    }
+
+    /// A picture that is renamed to `part.stl` does not lie in the folder for ever.
+    #[test]
+    fn f22_what_is_renamed_into_place_and_is_no_mesh_is_taken_too() {
+        let start = Instant::now();
+        let mut file = Settling::new(identity(1), start);
+        file.came_whole();
+        for s in 1..18 {
+            assert_eq!(file.look(identity(1), start + Duration::from_secs(s), REST), Look::IfLengthFits);
+        }
+        assert_eq!(file.look(identity(1), start + Duration::from_secs(18), REST), Look::Ready);
     }
 
     #[test]

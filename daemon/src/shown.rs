@@ -133,6 +133,12 @@ pub(crate) fn reason(job: &Job) -> String {
     }
 }
 
+/// What a person may want to know of a good result before it is printed.
+pub(crate) fn hint(job: &Job) -> Option<&str> {
+    let State::Ended { publication } = &job.state else { return None };
+    Some(publication.reason.as_str()).filter(|reason| publication.ending.is_good() && !reason.is_empty())
+}
+
 /// Day and time as RFC 3339 writes them, in UTC.
 pub(crate) fn when(time: Time) -> String {
     let stamp = i64::try_from(time.0).ok().and_then(|ms| Timestamp::from_millisecond(ms).ok());

@@ -17,6 +17,7 @@ mod e2e {
     mod malformed;
     mod many;
     mod memory;
+    mod morning;
     mod news;
     mod night;
     mod odd_names;

@@ -246,7 +246,7 @@ fn cavities(change: &Change<'_>, profile: &Profile) -> Measured {
 /// The surface that can be seen, and was lost or invented.
 fn skin(skin: Option<&Skin>, profile: &Profile) -> [Measured; 2] {
     let words = |change: &SkinChange, what: &str, from: &str| {
-        let by: Vec<&str> = change.causes.iter().take(3).map(|cause| cause.repair.as_str()).collect();
+        let by: Vec<String> = change.causes.iter().take(3).map(|cause| cause.repair.as_str().replace('_', " ")).collect();
         let place = change.places.first().map_or(String::new(), |place| format!(", most of it {}", span(place.bounds)));
         let share = change.share * 100.0;
         let (by, farthest) = (by.join(", "), Short(change.farthest));

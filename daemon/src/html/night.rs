@@ -13,7 +13,7 @@ use crate::exit::Exit;
 use crate::left::result_path;
 use crate::night::{Part, part};
 use crate::say::{complain, plain};
-use crate::shown::{self, reason};
+use crate::shown::{self, hint, reason};
 use crate::units::show_count;
 use crate::world::{Machine, World};
 
@@ -33,26 +33,43 @@ pub(crate) fn run(args: &NightArgs, all: All<'_>) -> Exit {
 
 fn write(args: &NightArgs, all: All<'_>) -> Result<(), (String, Exit)> {
     let ending = args.output.extension().unwrap_or_default().to_ascii_lowercase();
-    let make: fn(&Path, &[Job], &[Job]) -> String = match ending.to_str() {
-        Some("html" | "htm") => |_, need, ended| whole(need, ended).into_string(),
-        Some("csv") => |dir, need, ended| table(dir, &[need, ended].concat()),
+    let make: fn(&Night) -> String = match ending.to_str() {
+        Some("html" | "htm") => |night| whole(night).into_string(),
+        Some("csv") => |night| table(&[night.need.as_slice(), &night.ended].concat()),
         _ => return Err((format!("{}: name it .html or .csv", args.output.display()), Exit::Refused)),
     };
     let since = Time(Machine.wall().0.saturating_sub(u64::try_from(args.since.as_millis()).unwrap_or(u64::MAX)));
-    let (need, ended) = parted(all(&args.dir)?, since);
-    create::place(&args.output, make(&args.dir, &need, &ended).as_bytes(), args.force)
+    let night = Night::of(all(&args.dir)?, since);
+    create::place(&args.output, make(&night).as_bytes(), args.force)
         .map_err(|error| (format!("{}: cannot be written: {error}", args.output.display()), Exit::Refused))
 }
 
-/// Jobs that need a person, however old; and others that ended since then. The latest first.
-fn parted(mut jobs: Vec<Job>, since: Time) -> (Vec<Job>, Vec<Job>) {
-    jobs.reverse();
-    let mut of = |wanted| jobs.extract_if(.., |job| part(job, &(since..)) == Some(wanted)).collect();
-    (of(Part::NeedsSomeone), of(Part::Ended))
+/// The jobs of a night, the latest first.
+struct Night {
+    /// Those that need a person, however old.
+    need: Vec<Job>,
+    /// Others that ended in the night.
+    ended: Vec<Job>,
+    /// How many are not over.
+    live: u64,
+    /// Are they of several folders, so that a name does not say which file it is?
+    of_folders: bool,
 }
 
-fn whole(need: &[Job], ended: &[Job]) -> Markup {
+impl Night {
+    fn of(mut jobs: Vec<Job>, since: Time) -> Self {
+        jobs.reverse();
+        let of_folders = jobs.first().is_some_and(|first| jobs.iter().any(|job| job.source.folder != first.source.folder));
+        let mut of = |wanted| jobs.extract_if(.., |job| part(job, &(since..)) == Some(wanted)).collect::<Vec<_>>();
+        let (need, ended, live) = (of(Part::NeedsSomeone), of(Part::Ended), of(Part::Lives).len() as u64);
+        Self { need, ended, live, of_folders }
+    }
+}
+
+fn whole(night: &Night) -> Markup {
+    let Night { need, ended, live, of_folders } = night;
     let count = |kind: Kind| ended.iter().filter(|job| job.kind() == kind).count() as u64;
+    let (noted, others): (Vec<&Job>, Vec<&Job>) = ended.iter().partition(|job| hint(job).is_some());
     page(
         "The night",
         &html! {
@@ -60,34 +77,37 @@ fn whole(need: &[Job], ended: &[Job]) -> Markup {
             div class={ "outcome " (if need.is_empty() { "good" } else { "review" }) } role="status" {
                 strong { (how_many_need_you(need.len() as u64)) }
                 p { (show_count(count(Kind::Done))) " done, " (show_count(count(Kind::Rejected))) " rejected, " (show_count(count(Kind::Cancelled))) " cancelled." }
+                @if *live > 0 { p { (show_count(*live)) " not over yet: they wait or are in work." } }
             }
-            @if !need.is_empty() { h2 { "What needs you" } (rows(need, true)) }
-            @if !ended.is_empty() { h2 { "What else ended" } (rows(ended, false)) }
+            @if !need.is_empty() { h2 { "What needs you" } (rows(need, *of_folders, true)) }
+            @if !noted.is_empty() { h2 { "Good, with a note" } (rows(noted, *of_folders, true)) }
+            @if !others.is_empty() { h2 { "What else ended" } (rows(others, *of_folders, false)) }
         },
     )
 }
 
 /// `is_advised`: with what to do.
-fn rows(jobs: &[Job], is_advised: bool) -> Markup {
+fn rows<'a>(jobs: impl IntoIterator<Item = &'a Job>, of_folders: bool, is_advised: bool) -> Markup {
     html! {
         table {
             thead { tr {
-                th scope="col" { "File" } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Why" }
+                th scope="col" { "File" } @if of_folders { th scope="col" { "Folder" } } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Why" }
                 @if is_advised { th scope="col" { "What to do" } }
             } }
             tbody { @for job in jobs { tr {
-                td { (plain(&job.source.path.to_string())) } td { (mark(job)) } td { (time(job.changed)) } td { (plain(&reason(job))) }
-                @if is_advised { td { (plain(&advice(job))) } }
+                td class="file" { (plain(&job.source.path.to_string())) } @if of_folders { td { (plain(&job.source.folder)) } } td { (mark(job)) } td class="time" { (time(job.changed)) } td class="why" { (plain(&reason(job))) }
+                @if is_advised { td class="why" { (plain(&advice(job))) } }
             } } }
         }
     }
 }
 
 /// As RFC 4180 has it.
-fn table(dir: &Path, jobs: &[Job]) -> String {
+fn table(jobs: &[Job]) -> String {
     const HEAD: &str = "job,folder,file,state,words,dropped,changed,bytes,attempts,profile,reason,result,decision\r\n";
     jobs.iter().fold(HEAD.to_owned(), |mut text, job| {
-        let result = result_path(dir, job).map(|path| path.display().to_string()).unwrap_or_default();
+        // Below its hot folder, whose name stands beside it: a store may serve several.
+        let result = result_path(Path::new(""), job).map(|path| path.display().to_string()).unwrap_or_default();
         let decision = job.decision().map(ToString::to_string).unwrap_or_default();
         let fields = [
             job.id.to_string(),

@@ -1,10 +1,11 @@
 //! A job in words for people: where it stands, and what to do.
 
 use maud::{Markup, html};
+use suture_store::job::Withdrawal;
 use suture_store::{Ending, Job, Kind, State, Time};
 
 use crate::left::area;
-use crate::shown::when;
+use crate::shown::{hint, when};
 use crate::units::{show_count, show_when};
 
 /// How many of these there are, as the first line of a morning.
@@ -70,20 +71,33 @@ pub(crate) fn advice(job: &Job) -> String {
             "The result is ready, but cannot be put in its place. Remove the reason (free space, rights of the folder); Suture tries again by itself.".into()
         }
         (_, Kind::Waiting) => "Nothing, unless the reason stays. Suture tries again by itself.".into(),
-        (State::Cancelled { .. }, _) => "Nothing. Choose “Try again” if you want it after all.".into(),
+        (State::Cancelled { why }, _) => match why {
+            Withdrawal::Operator => "Nothing. Choose “Try again” if you want it after all.".into(),
+            Withdrawal::Changed => "Nothing. The file as it is now has a job of its own.".into(),
+            Withdrawal::Vanished => "Nothing. Drop the file again if you miss its result.".into(),
+        },
         _ => String::new(),
+    }
+}
+
+/// The same beside a link to the job's page, which says all of it.
+pub(crate) fn brief_advice(job: &Job) -> String {
+    match job.kind() {
+        Kind::NeedsReview => "Open it and look at the pictures; then approve or reject it.".into(),
+        _ => advice(job),
     }
 }
 
 fn ended(job: &Job, ending: Ending) -> String {
     match ending {
+        Ending::Clean | Ending::Repaired if hint(job).is_some() => "Read the note. If the part is as it was meant, print the result.".into(),
         Ending::Clean | Ending::Repaired => "Print the result.".into(),
         Ending::NeedsReview => {
             let best = job.publication().and_then(|publication| publication.output.as_ref());
             let best = best.map_or_else(|| "the result".to_owned(), |name| format!("{}/{name}", area(ending.area())));
             format!("Look at the pictures and the reasons. If {best} is what the file was meant to be, approve it: then it is published. If not, reject it, and ask for a better file.")
         }
-        Ending::NotGood => "Do not print it. Ask for another file, or drop it again into the folder of another profile.".into(),
+        Ending::NotGood => "Do not print it. Its report says what is wrong, and where. Ask for another file, or drop it again into the folder of another profile.".into(),
         Ending::Unreadable => "It is not a mesh that Suture can read. Open the file, or ask for it again.".into(),
         Ending::Refused => "It needs more than this machine allows (see the reason). Raise that limit and try again, or ask for a simpler file.".into(),
         Ending::Environment => "The file is not to blame. Remove the reason (disk, rights), then try again.".into(),
@@ -100,7 +114,7 @@ pub(crate) fn time(time: Time) -> Markup {
 
 #[cfg(test)]
 mod tests {
-    use suture_store::job::{Parked, Withdrawal};
+    use suture_store::job::Parked;
     use suture_store::{JobId, Publication, RelPath, Source};
 
     use super::*;

@@ -6,9 +6,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::Builder;
 use std::time::{Duration, Instant};
 
-use suture_store::{Ending, Look, State, StoreError};
+use suture_store::{Ending, Job, Look, State, StoreError};
 
 use crate::attempt::Context;
+use crate::shown::hint;
 
 /// Counted are jobs of so many milliseconds.
 const DAY_MS: u64 = 24 * 3600 * 1000;
@@ -17,11 +18,13 @@ const AT_A_TIME: usize = 500;
 const MOST: usize = 200_000;
 /// A count stands for so many times as long as it took.
 const SHARE: u32 = 30;
+/// Good results with a note that are kept, and so shown.
+pub(super) const MOST_NOTED: usize = 25;
 /// What takes no longer, a page waits for.
 const SHORT: Duration = Duration::from_millis(20);
 
 /// Jobs that ended in the last day.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Ended {
     /// Good as they came.
     pub clean: u64,
@@ -31,10 +34,15 @@ pub(super) struct Ended {
     pub needs_review: u64,
     pub failed: u64,
     pub quarantined: u64,
+    /// Good results of which a person may want to know something before they print them; and the latest of these.
+    pub noted: u64,
+    pub latest_noted: Vec<Job>,
 }
 
 impl Ended {
-    fn add(&mut self, ending: Ending, is_copy: bool) {
+    fn add(&mut self, job: &Job) {
+        let State::Ended { publication } = &job.state else { return };
+        let (ending, is_copy) = (publication.ending, publication.reused.is_some());
         let count = match ending {
             Ending::Clean => &mut self.clean,
             Ending::Repaired => &mut self.repaired,
@@ -44,6 +52,12 @@ impl Ended {
         };
         *count += 1;
         self.reused += u64::from(is_copy);
+        if hint(job).is_some() {
+            self.noted += 1;
+            if self.latest_noted.len() < MOST_NOTED {
+                self.latest_noted.push(job.clone());
+            }
+        }
     }
 }
 
@@ -97,14 +111,14 @@ impl Tally {
 
     /// The last count, its age, and how long it took.
     fn known(&self, now: Instant) -> Option<(Ended, Duration, Duration)> {
-        self.last().as_ref().map(|counted| (counted.ended, now.saturating_duration_since(counted.at), counted.took))
+        self.last().as_ref().map(|counted| (counted.ended.clone(), now.saturating_duration_since(counted.at), counted.took))
     }
 
     fn count(&self, context: &Context) -> Result<Ended, StoreError> {
         let begun = context.world.steady();
         let ended = count(context)?;
         let at = context.world.steady();
-        *self.last() = Some(Counted { at, took: at.saturating_duration_since(begun), ended });
+        *self.last() = Some(Counted { at, took: at.saturating_duration_since(begun), ended: ended.clone() });
         Ok(ended)
     }
 }
@@ -116,9 +130,7 @@ fn count(context: &Context) -> Result<Ended, StoreError> {
     for _ in 0..MOST / AT_A_TIME {
         let page = context.store.page(&look)?;
         for job in page.jobs.iter().filter(|job| job.changed.0 >= since) {
-            if let State::Ended { publication } = &job.state {
-                ended.add(publication.ending, publication.reused.is_some());
-            }
+            ended.add(job);
         }
         look.before = page.next;
         if look.before.is_none() {

@@ -94,11 +94,11 @@ impl Death {
 impl std::fmt::Display for Death {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Signal(signal) => write!(f, "its worker died of signal {signal}"),
-            Self::Exit(code) => write!(f, "its worker ended with code {code}"),
-            Self::TimeLimit => f.write_str("its worker reached the time limit"),
-            Self::MemoryLimit => f.write_str("its worker reached the memory limit"),
-            Self::Killed(signal) => write!(f, "its worker was killed from outside with signal {signal}"),
+            Self::Signal(signal) => write!(f, "the repair crashed on it (signal {signal})"),
+            Self::Exit(code) => write!(f, "the repair ended in an error of its own on it (code {code})"),
+            Self::TimeLimit => f.write_str("the repair did not come to an end within its time limit"),
+            Self::MemoryLimit => f.write_str("the repair needed more memory than it may have"),
+            Self::Killed(signal) => write!(f, "the repair was killed from outside (signal {signal})"),
         }
     }
 }

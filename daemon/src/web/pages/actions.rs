@@ -11,8 +11,8 @@ use axum::response::{IntoResponse, Response};
 use maud::{Markup, html};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
-use suture_store::job::{MAX_BY, MAX_REASON};
-use suture_store::{Decision, Job, Kind, Verdict};
+use suture_store::job::{MAX_BY, MAX_REASON, Withdrawal};
+use suture_store::{Decision, Job, Kind, State as JobState, Verdict};
 
 use super::frame::Frame;
 use crate::control::JobsWish;
@@ -28,7 +28,7 @@ struct Action {
     name: &'static str,
     label: &'static str,
     /// Is it offered?
-    fits: fn(Kind) -> bool,
+    fits: fn(&Job) -> bool,
     /// Is it a decision, under which a name stands?
     is_signed: bool,
     wish: fn(&Job, &Sent) -> Result<JobsWish, Problem>,
@@ -39,14 +39,14 @@ const ALL: [Action; 5] = [
     Action {
         name: "approve",
         label: "Approve",
-        fits: |kind| matches!(kind, Kind::NeedsReview | Kind::Rejected),
+        fits: |job| matches!(job.kind(), Kind::NeedsReview | Kind::Rejected),
         is_signed: true,
         wish: |job, sent| decided(job, sent, Verdict::Approved),
     },
     Action {
         name: "reject",
         label: "Reject",
-        fits: |kind| kind == Kind::NeedsReview,
+        fits: |job| job.kind() == Kind::NeedsReview,
         is_signed: true,
         wish: |job, sent| decided(job, sent, Verdict::Rejected),
     },
@@ -60,14 +60,14 @@ const ALL: [Action; 5] = [
     Action {
         name: "release",
         label: "Release from quarantine",
-        fits: |kind| kind == Kind::Quarantined,
+        fits: |job| job.kind() == Kind::Quarantined,
         is_signed: false,
         wish: |job, _| released(job),
     },
     Action {
         name: "cancel",
         label: "Cancel",
-        fits: Kind::is_live,
+        fits: |job| job.kind().is_live(),
         is_signed: false,
         wish: |job, _| Ok(JobsWish::Cancel(job.id)),
     },
@@ -78,13 +78,17 @@ fn decided(job: &Job, sent: &Sent, verdict: Verdict) -> Result<JobsWish, Problem
     Ok(JobsWish::Decide(job.id, decision))
 }
 
-fn can_be_retried(kind: Kind) -> bool {
-    matches!(kind, Kind::Failed | Kind::NeedsReview | Kind::Rejected | Kind::Cancelled | Kind::Waiting)
+fn can_be_retried(job: &Job) -> bool {
+    match (&job.state, job.kind()) {
+        // Its file is not there any more, or has a job of its own.
+        (JobState::Cancelled { why }, _) => *why == Withdrawal::Operator,
+        (_, kind) => matches!(kind, Kind::Failed | Kind::NeedsReview | Kind::Rejected | Kind::Waiting | Kind::Parked),
+    }
 }
 
 /// Forms for all that fits a job.
 pub(super) fn forms(frame: &Frame, job: &Job) -> Markup {
-    let offered = || ALL.iter().filter(|action| (action.fits)(job.kind()));
+    let offered = || ALL.iter().filter(|action| (action.fits)(job));
     let address = |action: &Action| format!("/jobs/{}/{}", job.id, action.name);
     let signed: Vec<&Action> = offered().filter(|action| action.is_signed).collect();
     html! {

@@ -97,7 +97,7 @@ fn table(jobs: &[Job], of_folders: bool) -> Markup {
         div class="wide" { table {
             thead { tr {
                 th scope="col" class="n" { "Job" } th scope="col" { "File" } @if of_folders { th scope="col" { "Folder" } }
-                th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Why" }
+                th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Why, or a note" }
             } }
             tbody { @for job in jobs { tr {
                 td class="n" { (job.id) }
@@ -105,7 +105,7 @@ fn table(jobs: &[Job], of_folders: bool) -> Markup {
                 @if of_folders { td { (plain(&job.source.folder)) } }
                 td { (mark(job)) }
                 td class="time" { (time(job.changed)) }
-                td { (plain(&reason(job))) @if let Some(other) = job.publication().and_then(|publication| publication.reused) { " Copy of the result of " a href={ "/jobs/" (other) } { "job " (other) } "." } }
+                td class="why" { (plain(&reason(job))) @if let Some(other) = job.publication().and_then(|publication| publication.reused) { " Copy of the result of " a href={ "/jobs/" (other) } { "job " (other) } "." } }
             } } }
         } }
     }

@@ -12,13 +12,13 @@ use suture_store::{Job, State as JobState};
 
 use super::actions::forms;
 use super::frame::Frame;
-use super::night::progress;
+use super::night::{self, progress};
 use super::places;
 use crate::html::report;
 use crate::html::words::{advice, state, time};
 use crate::left::area;
 use crate::say::plain;
-use crate::shown::reason;
+use crate::shown::{hint, reason};
 use crate::units::show_size;
 use crate::web::ask::ask;
 use crate::web::jobs::{id_of, job_of};
@@ -49,7 +49,7 @@ pub(super) async fn job(
         }
         // It stays as it is once it is there, so that no one is disturbed who looks at it.
         div id="report" data-live="once" { @if let Some(report) = &report { (reported(&job, report)) } }
-        div id="facts" data-live { (facts(&job)) }
+        div id="facts" data-live { (facts(&job, &night::place_of(&shared.context, &job.source.folder))) }
         script type="module" src="/assets/view.js" {}
     };
     Ok(frame.page("", &format!("{name}: {}", state(&job).0), &body))
@@ -62,7 +62,7 @@ fn standing(job: &Job) -> Markup {
     html! {
         div class={ "outcome " (class) } role="status" {
             strong { (words) }
-            @if !why.is_empty() { p { "Why: " (plain(&why)) } }
+            @if !why.is_empty() { p { (if hint(job).is_some() { "Note: " } else { "Why: " }) (plain(&why)) } }
             @if !advice.is_empty() { p { "What to do: " (plain(&advice)) } }
         }
     }
@@ -78,15 +78,16 @@ fn downloads(job: &Job) -> Markup {
     }
 }
 
-fn facts(job: &Job) -> Markup {
-    let (place, path) = job.original();
+/// `place`: where its hot folder is.
+fn facts(job: &Job, place: &str) -> Markup {
+    let (part, path) = job.original();
     let fact = |name: &str, value: Markup| html! { dt { (name) } dd { (value) } };
     let text = |text: String| html! { (plain(&text)) };
     html! {
         h2 { "The job" }
         dl class="facts" {
             (fact("Number", html! { (job.id) }))
-            (fact("Folder", text(job.source.folder.clone())))
+            (fact("Folder", html! { (plain(&job.source.folder)) @if !place.is_empty() { ": " (place) } }))
             @if let JobState::Ended { publication } = &job.state {
                 @if let Some(output) = &publication.output {
                     (fact(if publication.ending.is_good() { "Result" } else { "Best attempt" },
@@ -97,7 +98,7 @@ fn facts(job: &Job) -> Markup {
             @if let Some(said) = job.decision() {
                 (fact("Decision", html! { (plain(&said.to_string())) ", " (time(said.at)) @if !said.note.is_empty() { ": " (plain(&said.note)) } }))
             }
-            (fact("Original", text(format!("{}/{path}", area(place)))))
+            (fact("Original", text(format!("{}/{path}", area(part)))))
             (fact("Size", text(show_size(job.source.size))))
             (fact("Profile", text(job.source.profile.clone())))
             (fact("Priority", html! { (job.priority) }))

@@ -12,7 +12,7 @@ use super::frame::Frame;
 use super::history::{link, list_of};
 use crate::attempt::Context;
 use crate::event_bus::Bus;
-use crate::html::words::{advice, how_many_need_you, mark, time};
+use crate::html::words::{brief_advice, how_many_need_you, mark, time};
 use crate::night::NEED_SOMEONE;
 use crate::say::plain;
 use crate::shown::reason;
@@ -33,6 +33,8 @@ struct Night {
     status: Status,
     need_someone: Vec<Job>,
     in_work: Vec<Job>,
+    /// What came back from an attempt, and waits for the next.
+    put_off: Vec<Job>,
     ended: Ended,
 }
 
@@ -46,12 +48,18 @@ impl Night {
             status: status::of(context)?,
             need_someone: latest(&NEED_SOMEONE)?,
             in_work: latest(&IN_WORK)?,
+            put_off: latest(&[Kind::Waiting])?,
             ended: tally.of(context)?,
         })
     }
 
     fn count(&self, kinds: &[Kind]) -> u64 {
         kinds.iter().filter_map(|kind| self.status.jobs.get(kind.name())).sum()
+    }
+
+    /// Does a name of a file not say of which folder it is?
+    fn of_folders(&self) -> bool {
+        self.status.folders.len() > 1
     }
 }
 
@@ -64,9 +72,11 @@ pub(super) async fn night(State(shared): State<Arc<Shared>>, headers: HeaderMap)
         div id="night" data-live {
             (standing(&night))
             (need_someone(&night))
+            (noted(&night))
             (in_work(&night, &shared.context.bus))
+            (put_off(&night))
             (last_day(&night))
-            (folders(&night.status))
+            (folders(&night.status, &shared.context))
         }
     };
     Ok(Frame::of(&shared, &headers).page("/", "Overview", &body))
@@ -87,8 +97,8 @@ fn standing(night: &Night) -> Markup {
             strong { (words) }
             @if is_held { ul {
                 @for why in held { li { "Nothing new is taken: " (plain(why)) "." } }
-                @for why in away { li { "Out of reach: " (plain(why)) ". Suture goes on with this folder when it is back." } }
-                @for who in untold { li { "Not told yet: " (plain(who)) "." } }
+                @for why in away { li { "Out of reach: " (plain(why)) ". Suture goes on with it by itself when that is mended." } }
+                @for who in untold { li { (plain(who)) ". Suture tells it again by itself." } }
                 @if let (Some(why), true) = (reason, held.is_empty() && away.is_empty()) { li { "Not ready: " (plain(why)) "." } }
             } }
         }
@@ -100,13 +110,50 @@ fn need_someone(night: &Night) -> Markup {
     html! {
         @if !night.need_someone.is_empty() {
             h2 { "What needs you" }
+            (advised(&night.need_someone, night.of_folders()))
+            @if more > 0 { p { a href=(list_of(&NEED_SOMEONE)) { (show_count(more)) " more" } } }
+        }
+    }
+}
+
+/// Good results of the last day that a person may want to look at first.
+fn noted(night: &Night) -> Markup {
+    let Ended { noted, latest_noted, .. } = &night.ended;
+    let more = noted.saturating_sub(latest_noted.len() as u64);
+    html! {
+        @if !latest_noted.is_empty() {
+            h2 { "Good, with a note" }
+            (advised(latest_noted, night.of_folders()))
+            @if more > 0 { p { a href=(list_of(&[Kind::Done])) { (show_count(more)) " more among all that is done" } } }
+        }
+    }
+}
+
+/// Jobs with why they stand where they stand, and what to do.
+fn advised(jobs: &[Job], of_folders: bool) -> Markup {
+    html! {
+        div class="wide" { table {
+            thead { tr { th scope="col" { "File" } @if of_folders { th scope="col" { "Folder" } } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Why" } th scope="col" { "What to do" } } }
+            tbody { @for job in jobs { tr {
+                td class="file" { (link(job)) } @if of_folders { td { (plain(&job.source.folder)) } } td { (mark(job)) } td class="time" { (time(job.changed)) } td class="why" { (plain(&reason(job))) } td class="why" { (plain(&brief_advice(job))) }
+            } } }
+        } }
+    }
+}
+
+/// What Suture tries again by itself, and why it has to.
+fn put_off(night: &Night) -> Markup {
+    let more = night.count(&[Kind::Waiting]).saturating_sub(night.put_off.len() as u64);
+    html! {
+        @if !night.put_off.is_empty() {
+            h2 { "Tried again later" }
             div class="wide" { table {
-                thead { tr { th scope="col" { "File" } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Why" } th scope="col" { "What to do" } } }
-                tbody { @for job in &night.need_someone { tr {
-                    td class="file" { (link(job)) } td { (mark(job)) } td class="time" { (time(job.changed)) } td { (plain(&reason(job))) } td { (plain(&advice(job))) }
+                thead { tr { th scope="col" { "File" } @if night.of_folders() { th scope="col" { "Folder" } } th scope="col" { "Since" } th scope="col" { "Why" } th scope="col" { "Tried again" } } }
+                tbody { @for job in &night.put_off { tr {
+                    td class="file" { (link(job)) } @if night.of_folders() { td { (plain(&job.source.folder)) } } td class="time" { (time(job.changed)) } td class="why" { (plain(&reason(job))) } td class="time" { @if let Some(pause) = job.pause() { (time(pause)) } }
                 } } }
             } }
-            @if more > 0 { p { a href=(list_of(&NEED_SOMEONE)) { (show_count(more)) " more" } } }
+            @if more > 0 { p { a href=(list_of(&[Kind::Waiting])) { (show_count(more)) " more" } } }
         }
     }
 }
@@ -117,9 +164,9 @@ fn in_work(night: &Night, bus: &Bus) -> Markup {
         h2 { "In work" }
         @if night.in_work.is_empty() { p { "Nothing is in work." } } @else {
             div class="wide" { table {
-                thead { tr { th scope="col" { "File" } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Progress" } } }
+                thead { tr { th scope="col" { "File" } @if night.of_folders() { th scope="col" { "Folder" } } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Progress" } } }
                 tbody { @for job in &night.in_work { tr {
-                    td class="file" { (link(job)) } td { (mark(job)) } td class="time" { (time(job.changed)) } td { (progress(job, bus)) }
+                    td class="file" { (link(job)) } @if night.of_folders() { td { (plain(&job.source.folder)) } } td { (mark(job)) } td class="time" { (time(job.changed)) } td { (progress(job, bus)) }
                 } } }
             } }
         }
@@ -127,6 +174,13 @@ fn in_work(night: &Night, bus: &Bus) -> Markup {
             a href=(list_of(&WAITING)) { @if waiting == 1 { "One file waits" } @else { (show_count(waiting)) " files wait" } } "."
         } }
     }
+}
+
+/// Where a hot folder is.
+pub(super) fn place_of(context: &Context, name: &str) -> String {
+    let folder = context.folders.iter().find(|folder| folder.name == name);
+    let full = folder.map(|folder| std::path::absolute(&folder.root).unwrap_or_else(|_| folder.root.clone()));
+    full.map(|path| plain(&path.display().to_string())).unwrap_or_default()
 }
 
 /// How far a job in work is; a script keeps it current.
@@ -142,7 +196,7 @@ pub(super) fn progress(job: &Job, bus: &Bus) -> Markup {
 }
 
 fn last_day(night: &Night) -> Markup {
-    let Ended { clean, repaired, reused, needs_review, failed, quarantined } = night.ended;
+    let Ended { clean, repaired, reused, needs_review, failed, quarantined, .. } = night.ended;
     let entry = |count: u64, class: &str, words: &str, kind: Kind| {
         html! { li class=[(count > 0).then_some(class)] { b { (show_count(count)) } @if count > 0 { a href=(list_of(&[kind])) { (words) } } @else { (words) } } }
     };
@@ -159,13 +213,14 @@ fn last_day(night: &Night) -> Markup {
     }
 }
 
-fn folders(status: &Status) -> Markup {
+fn folders(status: &Status, context: &Context) -> Markup {
     html! {
         h2 { "Folders" }
         div class="wide" { table {
-            thead { tr { th scope="col" { "Folder" } th scope="col" { "In reach" } th scope="col" class="n" { "Free for results" } } }
+            thead { tr { th scope="col" { "Folder" } th scope="col" { "Where" } th scope="col" { "In reach" } th scope="col" class="n" { "Free for results" } } }
             tbody { @for folder in &status.folders { tr {
                 th scope="row" { (plain(&folder.name)) }
+                td class="file" { (place_of(context, &folder.name)) }
                 td { @if folder.reachable { "yes" } @else { span class="state bad" { "no" } } }
                 td class="n" { (show_size(folder.free_bytes)) }
             } } }

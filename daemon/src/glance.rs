@@ -181,10 +181,14 @@ pub(crate) fn folders(context: &Context) -> Vec<Served> {
 /// When the store failed.
 pub(crate) fn standing(context: &Context) -> Result<Standing, StoreError> {
     let away = context.away.lock().unwrap_or_else(PoisonError::into_inner).values().flatten().cloned().collect();
-    let untold = context.pulse.all_troubles().into_iter();
-    let untold =
-        untold.map(|(name, why)| Ok(format!("`{name}` has not heard of {} ends of jobs: {why}", context.store.backlog(&name)?)));
-    let untold = untold.collect::<Result<_, StoreError>>()?;
+    let words = |(name, why): (String, String)| {
+        let events = match context.store.backlog(&name)? {
+            1 => "one event".to_owned(),
+            more => format!("{more} events"),
+        };
+        Ok(format!("`{name}` has not heard of {events}: {why}"))
+    };
+    let untold = context.pulse.all_troubles().into_iter().map(words).collect::<Result<_, StoreError>>()?;
     Ok(Standing { away, untold, ..context.schedule.standing() })
 }
 

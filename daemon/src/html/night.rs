@@ -6,7 +6,7 @@ use maud::{Markup, html};
 use suture_store::{Job, Kind, Time};
 
 use super::page;
-use super::words::{advice, how_many_need_you, mark, state, time};
+use super::words::{advice, how_many_need_you, mark, of_which_kind, state, time};
 use crate::cli::service::NightArgs;
 use crate::create;
 use crate::exit::Exit;
@@ -76,6 +76,7 @@ fn whole(night: &Night) -> Markup {
             h1 { "The night" }
             div class={ "outcome " (if need.is_empty() { "good" } else { "review" }) } role="status" {
                 strong { (how_many_need_you(need.len() as u64)) }
+                @if !need.is_empty() { p { (of_which_kind(|kind| need.iter().filter(|job| job.kind() == kind).count() as u64)) "." } }
                 p { (show_count(count(Kind::Done))) " done, " (show_count(count(Kind::Rejected))) " rejected, " (show_count(count(Kind::Cancelled))) " cancelled." }
                 @if *live > 0 { p { (show_count(*live)) " not over yet: they wait or are in work." } }
             }

@@ -17,6 +17,13 @@ pub(crate) fn how_many_need_you(count: u64) -> String {
     }
 }
 
+/// How many of them are of which kind, in a line: pictures among the drops are no reason to hurry.
+pub(crate) fn of_which_kind(count: impl Fn(Kind) -> u64) -> String {
+    let counts = NEED_SOMEONE.map(|kind| (kind, count(kind)));
+    let some = counts.iter().filter(|(_, count)| *count > 0);
+    some.map(|(kind, count)| format!("{}: {}", label(*kind), show_count(*count))).collect::<Vec<_>>().join("; ")
+}
+
 /// Where a job stands, and the class of that.
 pub(crate) fn state(job: &Job) -> (&'static str, &'static str) {
     match (job.kind(), &job.state) {

@@ -73,8 +73,11 @@ fn folders(text: &mut String, context: &Context) {
     gauge(text, words, scans().map(|(labels, scan)| (labels, scan.at.0 as f64 / 1000.0)));
     let config = context.settings.now();
     let free = |path: &Path| fsx::free_space(path, 0) as f64;
-    let of_folders =
-        context.folders.iter().map(|folder| (vec![("role", "folder"), ("folder", folder.name.as_str())], free(&folder.root)));
+    // Results may lie on a disk of their own.
+    let of_folders = context.folders.iter().flat_map(|folder| {
+        let of = |role, path: &Path| (vec![("role", role), ("folder", folder.name.as_str())], free(path));
+        [of("folder", &folder.root), of("results", &folder.out())]
+    });
     let of_state = [(vec![("role", "state")], free(&config.state))];
     gauge(text, ("suture_disk_free_bytes", "Free space on the disks."), of_folders.chain(of_state));
     gauge(text, ("suture_store_size_bytes", "Size of the job store."), [(vec![], size_of(&config.state) as f64)]);

@@ -93,6 +93,7 @@ fn metrics_and_the_log_agree() {
         "process_cpu_seconds_total",
         "suture_store_size_bytes",
         "suture_disk_free_bytes{role=\"state\"}",
+        "suture_disk_free_bytes{role=\"results\",folder=\"hot\"}",
     ] {
         assert!(value(name) > 0.0, "{name}");
     }

@@ -13,7 +13,15 @@ fn a_night_is_a_page_or_a_table() {
     let night = |rest: &[&str]| place.suture([&["night", "--dir", "hot"], rest].concat());
     night(&["-o", "night.html"]).expect(0);
     let page = String::from_utf8(place.read("night.html")).unwrap();
-    for words in ["2 files need you.", "Needs review", "doubtful.stl", "=1+1,&lt;b&gt;.stl", "1 done", "good.stl", "Repaired"] {
+    for words in [
+        "2 files need you.",
+        "Needs review: 1; Failed: 1.",
+        "doubtful.stl",
+        "=1+1,&lt;b&gt;.stl",
+        "1 done",
+        "good.stl",
+        "Repaired",
+    ] {
         assert!(page.contains(words), "{words}: {page}");
     }
     assert!(!page.contains("<script") && !page.contains("<b>.stl"));

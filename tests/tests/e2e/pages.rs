@@ -61,8 +61,14 @@ fn pages_say_what_became_of_every_file() {
     wait_for(&client, 3, "noticed");
     let night = client.browse("/").expect(200);
     assert_is_page(&night);
-    for words in ["2 files need you.", "picture.stl", "part.3mf", "<b>1</b><a href=\"/jobs?state=failed\">failed</a>", "only STL"]
-    {
+    for words in [
+        "2 files need you.",
+        "Failed: 1; Not taken: 1.",
+        "picture.stl",
+        "part.3mf",
+        "<b>1</b><a href=\"/jobs?state=failed\">failed</a>",
+        "only STL",
+    ] {
         assert!(night.text().contains(words), "{words}: {}", night.text());
     }
     assert!(!night.text().contains("good.stl"), "it needs no one");

@@ -12,7 +12,7 @@ use super::frame::Frame;
 use super::history::{link, list_of};
 use crate::attempt::Context;
 use crate::event_bus::Bus;
-use crate::html::words::{brief_advice, how_many_need_you, mark, time};
+use crate::html::words::{brief_advice, how_many_need_you, mark, of_which_kind, time};
 use crate::night::NEED_SOMEONE;
 use crate::say::plain;
 use crate::shown::reason;
@@ -95,6 +95,7 @@ fn standing(night: &Night) -> Markup {
     html! {
         div class={ "outcome " (class) } role="status" {
             strong { (words) }
+            @if count > 0 { p { (of_which_kind(|kind| night.count(&[kind]))) "." } }
             @if is_held { ul {
                 @for why in held { li { "Nothing new is taken: " (plain(why)) "." } }
                 @for why in away { li { "Out of reach: " (plain(why)) ". Suture goes on with it by itself when that is mended." } }

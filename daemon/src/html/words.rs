@@ -5,6 +5,7 @@ use suture_store::job::Withdrawal;
 use suture_store::{Ending, Job, Kind, State, Time};
 
 use crate::left::area;
+use crate::night::NEED_SOMEONE;
 use crate::shown::{hint, when};
 use crate::units::{show_count, show_when};
 

@@ -74,6 +74,8 @@ pub(crate) struct Context {
     pub not_good: Arc<AtomicBool>,
     /// By hot folder: what of it is out of reach, and why.
     pub away: Mutex<BTreeMap<String, Vec<String>>>,
+    /// By hot folder of which nothing new is taken for want of room: in words.
+    pub full: Mutex<BTreeMap<String, String>>,
     /// Folders in which earlier stores left something that was not read yet.
     pub unread: Unread,
     /// The store failed; every thread ends.
@@ -87,6 +89,12 @@ pub(crate) struct Context {
 impl Context {
     fn folder(&self, job: &Job) -> Option<&Arc<Folder>> {
         self.folders.iter().find(|folder| folder.name == job.source.folder)
+    }
+
+    /// Bytes that results of a hot folder may still fill, on its disk and on that of its results.
+    pub(crate) fn room(&self, folder: &Folder) -> u64 {
+        let reserve = self.settings.now().reserve;
+        self.world.room(&folder.root, reserve).min(self.world.room(&folder.out(), reserve))
     }
 
     /// The store failed: everything stops, so that it can be opened again.
@@ -112,7 +120,11 @@ impl Context {
         self.failed.lock().is_ok_and(|failed| failed.is_some())
     }
 
-    fn waits(&self) -> Result<Waits, StoreError> {
+    /// Jobs that a slot may have now.
+    ///
+    /// # Errors
+    /// When the store failed.
+    pub(crate) fn waits(&self) -> Result<Waits, StoreError> {
         Waits::of(&*self.store, self.settings.now().large)
     }
 

@@ -1,5 +1,6 @@
 //! The job store, seen by the [`Bus`]: every change that became durable is told there, by whomever it was made. Nothing else is added to it.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -77,6 +78,10 @@ impl JobStore for Heard {
 
     fn waiting(&self, want: &Filter) -> Result<Option<Waiting>, StoreError> {
         self.read(self.store.waiting(want))
+    }
+
+    fn shut(&self, folders: &BTreeSet<String>) {
+        self.store.shut(folders);
     }
 
     fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError> {

@@ -164,13 +164,11 @@ pub(crate) fn counts(context: &Context) -> Result<BTreeMap<Kind, u64>, StoreErro
 
 /// The hot folders, as they are now.
 pub(crate) fn folders(context: &Context) -> Vec<Served> {
-    let reserve = context.settings.now().reserve;
     let served = |folder: &Arc<Folder>| Served {
         name: folder.name.clone(),
         path: std::path::absolute(&folder.root).unwrap_or_else(|_| folder.root.clone()),
         reachable: folder.check().is_ok(),
-        // A full disk of results holds up as much as a full one of the folder.
-        free_bytes: context.world.room(&folder.root, reserve).min(context.world.room(&folder.out(), reserve)),
+        free_bytes: context.room(folder),
     };
     context.folders.iter().map(served).collect()
 }
@@ -180,7 +178,13 @@ pub(crate) fn folders(context: &Context) -> Vec<Served> {
 /// # Errors
 /// When the store failed.
 pub(crate) fn standing(context: &Context) -> Result<Standing, StoreError> {
-    let away = context.away.lock().unwrap_or_else(PoisonError::into_inner).values().flatten().cloned().collect();
+    let away = context.away.lock().unwrap_or_else(PoisonError::into_inner).values().flatten().cloned().collect::<Vec<_>>();
+    let mut full: Vec<String> = context.full.lock().unwrap_or_else(PoisonError::into_inner).values().cloned().collect();
+    if context.schedule.held(Hold::Disk).is_some() {
+        // All of them, which is said already.
+        full.clear();
+    }
+    let away = away.into_iter().chain(full.iter().map(|words| format!("{words}; nothing new is taken there"))).collect();
     let words = |(name, why): (String, String)| {
         let events = match context.store.backlog(&name)? {
             1 => "one event".to_owned(),

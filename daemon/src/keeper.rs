@@ -22,7 +22,6 @@ use crate::orders::Orders;
 use crate::past::each_job;
 use crate::publish_error::PublishError;
 use crate::scan::Reconciler;
-use crate::schedule::Hold;
 use crate::settings::Reload;
 use crate::settle::Rest;
 use crate::signals::Stop;
@@ -30,6 +29,7 @@ use crate::taking::take;
 
 mod news;
 mod once;
+mod room;
 
 use news::{Nights, Told};
 
@@ -43,8 +43,6 @@ const SCAN_AT_MOST_EVERY: Duration = Duration::from_millis(50);
 /// How often the keeper looks about when nothing happens: for signals, and with `--once` for the end of all work.
 const IDLE: Duration = Duration::from_millis(200);
 const IDLE_ONCE: Duration = Duration::from_millis(20);
-/// Free space is looked at this often.
-const DISK_EVERY: Duration = Duration::from_secs(5);
 
 /// The thread that looks after the folders.
 pub(crate) struct Keeper {
@@ -293,29 +291,6 @@ impl Keeper {
             let run_window = config.run_window.to_string();
             tracing::info!(run_window, workers, "The hours of work begin or end; jobs in work are finished.");
         }
-    }
-
-    /// Takes nothing new while the disk is nearly full: a result needs room, and a half-full night is better than a broken one.
-    fn look_at_disk(&mut self, now: Instant) -> Result<(), StoreError> {
-        if self.disk_looked.is_some_and(|then| now.duration_since(then) < DISK_EVERY) {
-            return Ok(());
-        }
-        let first = self.disk_looked.is_none();
-        self.disk_looked = Some(now);
-        self.context.store.check()?;
-        let reserve = self.context.settings.now().reserve;
-        let full = self.folders.iter().find(|kept| self.context.world.room(&kept.folder.root, reserve) == 0);
-        let words = |kept: &Kept| format!("the disk of {} is nearly full", kept.folder.root.display());
-        if self.context.schedule.hold(Hold::Disk, full.map(words)) || (first && full.is_some()) {
-            match full {
-                Some(kept) => {
-                    let folder = kept.folder.root.display();
-                    tracing::warn!(%folder, "The disk is nearly full; nothing new is taken.");
-                }
-                None => tracing::info!("There is room on the disk again."),
-            }
-        }
-        Ok(())
     }
 }
 

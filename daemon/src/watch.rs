@@ -234,6 +234,7 @@ impl Daemon {
             halt: AtomicBool::new(false),
             not_good: Arc::clone(&self.not_good),
             away: Mutex::default(),
+            full: Mutex::default(),
             unread,
             failed: Mutex::new(None),
             pulse: Pulse::new(),

@@ -1,6 +1,6 @@
 //! The store's model: the same queue over tables in memory. For tests, and for runs that need not outlive the process.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Bound;
 use std::sync::{Arc, RwLock};
 
@@ -112,6 +112,10 @@ impl JobStore for MemoryStore {
 
     fn waiting(&self, want: &Filter) -> Result<Option<Waiting>, StoreError> {
         self.queue.waiting(want)
+    }
+
+    fn shut(&self, folders: &BTreeSet<String>) {
+        self.queue.shut(folders);
     }
 
     fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError> {

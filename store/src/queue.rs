@@ -13,7 +13,7 @@
 //! claimed next is told by a [`mod@line`] of all that may be, whose result others may have by [`results`], and whose job is whose file by [`files`]: in
 //! memory, made anew at each opening.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use serde::{Deserialize, Serialize};
@@ -301,6 +301,10 @@ impl<T: Tables> JobStore for Queue<T> {
 
     fn waiting(&self, want: &Filter) -> Result<Option<Waiting>, StoreError> {
         Ok(self.lock().line.waiting(want, self.now()))
+    }
+
+    fn shut(&self, folders: &BTreeSet<String>) {
+        self.lock().line.shut(folders);
     }
 
     fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError> {

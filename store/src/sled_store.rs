@@ -28,6 +28,7 @@
 //! or advanced. It is opened anew, as a new epoch, by a new process, or by the same one with a new program: handles of a database in
 //! doubt are not dropped, since sled waits at their end, now and then, for a write that never comes.
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -145,6 +146,10 @@ impl JobStore for SledStore {
 
     fn waiting(&self, want: &Filter) -> Result<Option<Waiting>, StoreError> {
         self.queue.waiting(want)
+    }
+
+    fn shut(&self, folders: &BTreeSet<String>) {
+        self.queue.shut(folders);
     }
 
     fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError> {

@@ -1,5 +1,6 @@
 //! What a durable job queue must promise.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use crate::id::{Epoch, JobId, Recipe, Seq, Time, Token};
@@ -42,6 +43,9 @@ pub trait JobStore: Send + Sync {
     /// # Errors
     /// Store errors only.
     fn waiting(&self, want: &Filter) -> Result<Option<Waiting>, StoreError>;
+
+    /// Gives no job of these hot folders out until this is said again, without them. It is forgotten with the store's end.
+    fn shut(&self, folders: &BTreeSet<String>);
 
     /// Does the claim still hold, and does anyone want it stopped? Extends the claim where claims expire.
     ///

@@ -1,5 +1,6 @@
 //! With `--once` the daemon ends by itself: when everything that came to rest is finished, or waits for what no waiting here brings.
 
+use std::sync::PoisonError;
 use std::sync::atomic::Ordering;
 
 use suture_store::job::Kind;
@@ -24,7 +25,7 @@ impl Keeper {
             return Ok(false);
         }
         let of = |wanted: fn(Kind) -> bool| counts.iter().filter(|(kind, _)| wanted(*kind)).map(|(_, n)| n).sum::<u64>();
-        if of(|kind| matches!(kind, Kind::Queued | Kind::Alone)) > 0 && !self.context.schedule.is_paused() {
+        if !self.context.schedule.is_paused() && self.context.waits()?.is_anyone() {
             return Ok(false);
         }
         if of(|kind| kind == Kind::Parked) > 0 && !self.context.schedule.is_paused() && self.may_move_on()? {
@@ -59,6 +60,8 @@ impl Keeper {
     fn may_move_on(&self) -> Result<bool, StoreError> {
         let now = self.context.world.wall();
         let parked = self.context.store.list(&Query { kinds: vec![Kind::Parked], ..Query::default() })?;
-        Ok(parked.iter().any(|job| job.is_due(now) || job.parked.is_some_and(|parked| parked.tries < TRIES_ONCE)))
+        let full = self.context.full.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut parked = parked.iter().filter(|job| !full.contains_key(&job.source.folder));
+        Ok(parked.any(|job| job.is_due(now) || job.parked.is_some_and(|parked| parked.tries < TRIES_ONCE)))
     }
 }

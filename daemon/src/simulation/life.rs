@@ -63,6 +63,7 @@ impl Life {
             halt: false.into(),
             not_good: Arc::default(),
             away: Mutex::default(),
+            full: Mutex::default(),
             unread,
             pulse: Pulse::new(),
             bus,

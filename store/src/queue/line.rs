@@ -39,6 +39,8 @@ enum Place {
 #[derive(Clone, Debug)]
 struct Entry {
     place: Place,
+    /// Its hot folder's place among [`Line::folders`].
+    folder: usize,
     alone: bool,
     size: u64,
     base: Priority,
@@ -106,13 +108,25 @@ impl Order {
     }
 }
 
+/// The ready jobs of a hot folder.
+#[derive(Default)]
+struct Folder {
+    name: String,
+    /// None of its jobs is claimed.
+    is_shut: bool,
+    /// By their own priority, and by what they count as.
+    by_base: Order,
+    by_aged: Order,
+}
+
 /// All jobs that are not at rest.
 #[derive(Default)]
 pub(super) struct Line {
     entries: BTreeMap<JobId, Entry>,
-    /// Ready ones, by their own priority, and by what they count as.
-    by_base: Order,
-    by_aged: Order,
+    /// Few: each look goes over them.
+    folders: Vec<Folder>,
+    /// Names of folders that are shut, those without a job too.
+    shut: BTreeSet<String>,
     /// When a ready one counts for one step more.
     rises: BTreeSet<(u64, JobId)>,
     resting: BTreeSet<(Time, JobId)>,
@@ -138,18 +152,44 @@ impl Line {
             None => (now.wall.0.saturating_sub(from.0).min(OLDEST_MS), now.ticks),
         };
         let (alone, size, base) = (job.must_run_alone(), job.source.size, job.priority);
-        let mut entry = Entry { place, alone, size, base, aged: base, from, age, came };
+        let folder = self.folder(&job.source.folder);
+        let mut entry = Entry { place, folder, alone, size, base, aged: base, from, age, came };
         entry.aged = entry.aged(now.ticks);
         self.enter(job.id, &entry, now.ticks);
         self.entries.insert(job.id, entry);
+    }
+
+    fn folder(&mut self, name: &str) -> usize {
+        self.folders.iter().position(|folder| folder.name == name).unwrap_or_else(|| {
+            let is_shut = self.shut.contains(name);
+            self.folders.push(Folder { name: name.to_owned(), is_shut, ..Folder::default() });
+            self.folders.len() - 1
+        })
+    }
+
+    /// Has no job of these hot folders claimed until others, or none, are shut.
+    pub(super) fn shut(&mut self, folders: &BTreeSet<String>) {
+        self.shut.clone_from(folders);
+        self.folders.iter_mut().for_each(|folder| folder.is_shut = folders.contains(&folder.name));
+    }
+
+    fn open(&self) -> impl Iterator<Item = &Folder> {
+        self.folders.iter().filter(|folder| !folder.is_shut)
+    }
+
+    /// Is it a job of a folder that is open?
+    fn is_open(&self, id: JobId) -> bool {
+        self.entries.get(&id).is_some_and(|entry| self.folders.get(entry.folder).is_some_and(|folder| !folder.is_shut))
     }
 
     fn enter(&mut self, id: JobId, entry: &Entry, ticks: u64) {
         match entry.place {
             Place::Held => {}
             Place::Ready => {
-                self.by_base.0.insert(Order::key(id, entry, entry.base), entry.size);
-                self.by_aged.0.insert(Order::key(id, entry, entry.aged), entry.size);
+                if let Some(folder) = self.folders.get_mut(entry.folder) {
+                    folder.by_base.0.insert(Order::key(id, entry, entry.base), entry.size);
+                    folder.by_aged.0.insert(Order::key(id, entry, entry.aged), entry.size);
+                }
                 if entry.aged < Priority::HIGHEST {
                     self.rises.insert((rise(entry, ticks), id));
                 }
@@ -163,8 +203,10 @@ impl Line {
         match entry.place {
             Place::Held => {}
             Place::Ready => {
-                self.by_base.0.remove(&Order::key(id, entry, entry.base));
-                self.by_aged.0.remove(&Order::key(id, entry, entry.aged));
+                if let Some(folder) = self.folders.get_mut(entry.folder) {
+                    folder.by_base.0.remove(&Order::key(id, entry, entry.base));
+                    folder.by_aged.0.remove(&Order::key(id, entry, entry.aged));
+                }
                 if entry.aged < Priority::HIGHEST {
                     self.rises.remove(&(rise_after(entry, entry.aged.above(entry.base)), id));
                 }
@@ -179,43 +221,49 @@ impl Line {
         while let Some((at, id)) = self.rises.first().copied().filter(|(at, _)| *at <= ticks) {
             self.rises.remove(&(at, id));
             let Some(entry) = self.entries.get_mut(&id) else { continue };
-            self.by_aged.0.remove(&Order::key(id, entry, entry.aged));
+            let Some(folder) = self.folders.get_mut(entry.folder) else { continue };
+            folder.by_aged.0.remove(&Order::key(id, entry, entry.aged));
             entry.aged = entry.aged(ticks);
-            self.by_aged.0.insert(Order::key(id, entry, entry.aged), entry.size);
+            folder.by_aged.0.insert(Order::key(id, entry, entry.aged), entry.size);
             if entry.aged < Priority::HIGHEST {
                 self.rises.insert((rise(entry, ticks), id));
             }
         }
     }
 
-    /// The job that is to be claimed next of those that `want` allows.
+    /// The job that is to be claimed next of those that `want` allows, and whose folder is open.
     pub(super) fn first(&mut self, want: &Filter, now: Now) -> Option<JobId> {
         self.age(now.ticks);
-        if let Some((_, id)) = over(&self.parked, now.wall).next() {
-            return Some(*id);
+        if let Some(id) = self.unparked(now) {
+            return Some(id);
         }
         let rested = self.rested(want, now).map(|(id, entry)| (entry.aged(now.ticks), id));
-        let all = rested.chain(self.by_aged.first(want));
+        let all = rested.chain(self.open().filter_map(|folder| folder.by_aged.first(want)));
         all.max_by_key(|(priority, id)| (*priority, Reverse(*id))).map(|(_, id)| id)
     }
 
     /// May a parked job be tried again?
     pub(super) fn has_parked(&self, now: Now) -> bool {
-        over(&self.parked, now.wall).next().is_some()
+        self.unparked(now).is_some()
+    }
+
+    fn unparked(&self, now: Now) -> Option<JobId> {
+        over(&self.parked, now.wall).map(|(_, id)| *id).find(|id| self.is_open(*id))
     }
 
     /// How soon those that `want` allows are wanted; parked ones left out.
     pub(super) fn waiting(&mut self, want: &Filter, now: Now) -> Option<Waiting> {
         self.age(now.ticks);
-        let ready = self.by_base.first(want).zip(self.by_aged.first(want)).map(|((base, _), (aged, _))| (base, aged));
+        let ready = |folder: &Folder| Some((folder.by_base.first(want)?.0, folder.by_aged.first(want)?.0));
+        let ready = self.open().filter_map(ready);
         let all = self.rested(want, now).map(|(_, entry)| (entry.base, entry.aged(now.ticks))).chain(ready);
         let highest = all.reduce(|(base, aged), (other, other_aged)| (base.max(other), aged.max(other_aged)));
         highest.map(|(highest, aged)| Waiting { highest, aged })
     }
 
-    /// Jobs whose pause is over.
+    /// Jobs whose pause is over, of folders that are open.
     fn rested(&self, want: &Filter, now: Now) -> impl Iterator<Item = (JobId, &Entry)> {
-        let entry = |(_, id): &(Time, JobId)| Some((*id, self.entries.get(id)?));
+        let entry = |(_, id): &(Time, JobId)| Some((*id, self.entries.get(id).filter(|_| self.is_open(*id))?));
         over(&self.resting, now.wall).filter_map(entry).filter(|(_, entry)| entry.fits(want))
     }
 }
@@ -283,6 +331,26 @@ mod tests {
         let mut line = line(&jobs);
         assert_eq!(order(&mut line, &Filter { alone: true, ..any() }, 1), [0; 0]);
         assert_eq!(order(&mut line, &Filter { size: (9000, 9000), alone: false }, 1), [2]);
+    }
+
+    /// A folder whose disk is full holds up no other, whatever waits there.
+    #[test]
+    fn a_folder_that_is_shut_lets_the_others_go_on() {
+        let of = |folder: &str, mut job: Job| {
+            job.source.folder = folder.into();
+            job
+        };
+        let jobs = [of("full", job(1, 10, 9, 0)), of("other", job(2, 10, 5, 0)), of("full", job(3, 10, 5, 0))];
+        let mut line = line(&jobs);
+        line.shut(&["full", "late"].map(String::from).into());
+        assert_eq!(line.waiting(&any(), at(1)).map(|waiting| waiting.highest), Some(Priority::try_from(5).unwrap()));
+        assert_eq!((line.first(&any(), at(1)), line.has_parked(at(1))), (Some(JobId(2)), false));
+        line.update(&of("late", job(4, 10, 9, 0)), at(1));
+        assert_eq!(line.first(&any(), at(1)), Some(JobId(2)), "it was shut before it had a job");
+        // What rose meanwhile has its place when the folder is open again.
+        line.shut(&BTreeSet::from(["late".into()]));
+        assert_eq!(order(&mut line, &any(), 9 * AGEING_MS), [1, 2, 3]);
+        assert!(line.first(&any(), at(1)).is_none() && line.waiting(&any(), at(1)).is_none());
     }
 
     /// A flood of urgent files cannot keep one waiting for ever: after nine steps it is as high as any, and older.

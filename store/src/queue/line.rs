@@ -375,7 +375,8 @@ mod tests {
         assert_eq!(line.first(&any(), at(AGEING_MS + 1)), Some(JobId(2)), "it has risen, too");
         assert_eq!(line.waiting(&any(), at(2 * AGEING_MS)), Some(Waiting { highest: priority(6), aged: priority(7) }));
         assert_eq!(order(&mut line, &any(), 100 * AGEING_MS), [1, 2]);
-        assert!(line.rises.is_empty() && line.by_base.0.is_empty() && line.by_aged.0.is_empty());
+        let is_empty = |folder: &Folder| folder.by_base.0.is_empty() && folder.by_aged.0.is_empty();
+        assert!(line.rises.is_empty() && line.folders.iter().all(is_empty));
     }
 
     fn priority(number: i64) -> Priority {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What was found of walls thinner than [`crate::Profile::thin_wall_mm`]. Measured at points spread over the surface by area, so that a place smaller than
+/// Walls thinner than [`crate::Profile::thin_wall_mm`]. Measured at points spread over the surface by area, so that a place smaller than
 /// the distance between them may be missed. In the file's units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]

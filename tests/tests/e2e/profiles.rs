@@ -75,7 +75,7 @@ fn fast_and_strict_in_a_hot_folder() {
 fn thin_walls_are_told_of_and_change_nothing() {
     let place = Place::new();
     place.generate(Case::Holes, 24_000, 7);
-    place.put("walls.toml", b"thin_wall_mm = 25.0\n");
+    place.put("walls.toml", b"thin_wall_mm = 28.0\n");
     let input = format!("{}.stl", Case::Holes);
     let run = |profile: &str, chunk: &str, threads: &str, memory: &str, spill: &str| {
         let limits = ["--chunk-triangles", chunk, "--threads", threads, "--memory", memory, "--spill", spill];
@@ -86,7 +86,7 @@ fn thin_walls_are_told_of_and_change_nothing() {
     };
     let (walls, hints, bytes, said) = run("walls.toml", "100000", "1", "1GiB", "never");
     assert!(walls["points"].as_u64() > Some(1000) && walls["share"].as_f64() > Some(0.0), "{walls}");
-    assert!(said.contains("  hint    walls are thinner than 25 mm"), "{said}");
+    assert!(said.contains("  hint    walls are thinner than 28 mm"), "{said}");
     for (chunk, threads, memory, spill) in
         [("64", "2", "64MiB", "always"), ("1000", "2", "1GiB", "auto"), ("100000", "2", "64MiB", "never")]
     {

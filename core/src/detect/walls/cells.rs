@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// What meets a marked box is never told to be far, whatever the sizes.
+        /// A box that meets a marked one is never told to be far, whatever the sizes.
         #[test]
         fn what_meets_a_box_may_meet_one(
             lo in prop::array::uniform3(-9.0f64..9.0), size in prop::array::uniform3(0.0f64..1.0),

@@ -16,7 +16,7 @@ use crate::geometry::sums::Bounds;
 pub(crate) use near::Surface;
 
 /// About so many points are looked at; with fewer, a small place on a large part would often be missed.
-const POINTS: f64 = 8192.0;
+const POINTS: f64 = 4096.0;
 /// No more than one on a square of this share of the minimum ...
 const SPACING: f64 = 0.25;
 /// ... but for so many.

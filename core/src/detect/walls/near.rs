@@ -26,7 +26,7 @@ const SMALLEST_BLOCK: usize = 1024;
 /// ... so that there are about so many blocks at most, each of which has a list of its own.
 const MOST_BLOCKS: usize = 1 << 14;
 /// Steps of work, at most; a minimum as large as a large model would take hours. They are counted, and the same in any order.
-const MOST_STEPS: u64 = 1 << 27;
+const MOST_STEPS: u64 = 1 << 25;
 /// Steps for a triangle that a sphere is shrunk to, beside one for each that is in a box with a sample.
 const STEPS_OF_TOUCH: u64 = 8;
 
@@ -68,7 +68,7 @@ impl Surface<'_> {
         of_blocks.into_iter().flatten().collect()
     }
 
-    /// What is around each sample, for spheres of a diameter of `most`; `None` if that is too much. `size`: of the surface's box, at most.
+    /// All that is around each sample, for spheres of a diameter of `most`; `None` if that is too much. `size`: of the surface's box, at most.
     pub(super) fn around(&self, samples: &[Sample], most: f64, size: f64) -> Option<Vec<Around>> {
         let near = Near::of(samples, most, size);
         let steps = AtomicU64::new(0);

@@ -4,23 +4,23 @@
 //! CAD & Applications 13(2), 2016; the step is that of Ma, Bae and Choi, "3D medial axis point approximation using nearest neighbors and the
 //! normal field", The Visual Computer 28, 2012). At a sharp edge it shrinks to nothing, and that is no wall. The two points where it touches tell:
 //! seen from its middle, they are apart by 180° less the angle of the edge (the separation angle of Foskey, Lin and Manocha, "Efficient computation
-//! of a simplified medial axis", JCISE 3(4), 2003). A wall has them at least 150° apart.
+//! of a simplified medial axis", JCISE 3(4), 2003). A wall has them at least 160° apart.
 
 use glam::DVec3;
 
 use crate::geometry::distance::nearest_of_triangle;
 
-/// The square of the cosine of 15°: a way into the material that leaves the normal by no more ends 150° from where it began, seen from the middle of the sphere.
-const STRAIGHT: f64 = 0.933_012_701_892_219_3;
-/// The tangent of 15°.
-const WIDENING: f64 = 0.267_949_192_431_122_7;
-/// The sine times the cosine of 15°: no such way of a sphere of diameter 1 leads farther aside.
-const WIDEST: f64 = 0.25;
-/// The cosine of 30°: triangles that face each other by this are touched by one sphere 150° apart.
-const FACING: f64 = 0.866_025_403_784_438_6;
+/// The square of the cosine of 10°: a way into the material that leaves the normal by no more ends 160° from where it began, seen from the middle of the sphere.
+const STRAIGHT: f64 = 0.969_846_310_392_954_1;
+/// The tangent of 10°.
+const WIDENING: f64 = 0.176_326_980_708_464_98;
+/// The sine times the cosine of 10°: no such way of a sphere of diameter 1 leads farther aside.
+const WIDEST: f64 = 0.171_010_071_662_834_36;
+/// The cosine of 20°: triangles that face each other by this are touched by one sphere 160° apart.
+const FACING: f64 = 0.939_692_620_785_908_4;
 /// Shrinking ends here; it is nearly always over after a few steps.
 const MOST_STEPS: usize = 48;
-/// What is in the sphere by less than this share of its radius is not in it.
+/// A point that is in the sphere by less than this share of its radius is not in it.
 const ROUNDING: f64 = 1e-9;
 /// Pieces of the way through the wall, each with a box of its own.
 const PIECES: usize = 4;
@@ -35,14 +35,14 @@ pub(super) struct Sample {
     pub(super) of: u32,
 }
 
-/// What there is of one triangle within the largest sphere that is asked for.
+/// One triangle, as far as it is within the largest sphere that is asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Touch {
     /// The diameter of the sphere that touches it.
     pub(super) diameter: f64,
-    /// It is touched at least 150° from the sample.
+    /// It is touched at least 160° from the sample.
     pub(super) is_apart: bool,
-    /// It faces the other way than the surface at the sample does, by at least 150°.
+    /// It faces the other way than the surface at the sample does, by at least 160°.
     pub(super) is_opposite: bool,
     /// How deep in the material the way straight inward crosses it, if it does.
     pub(super) depth: Option<f64>,
@@ -52,7 +52,7 @@ pub(super) struct Touch {
 pub(super) type Places = [DVec3; 2];
 
 impl Sample {
-    /// Boxes around all ways that leave the normal by at most 15°, as far as a sphere of diameter `most` reaches; and a little more.
+    /// Boxes around all ways that leave the normal by at most 10°, as far as a sphere of diameter `most` reaches; and a little more.
     pub(super) fn ways(&self, most: f64) -> [Places; PIECES] {
         let across = (DVec3::ONE - self.inward * self.inward).max(DVec3::ZERO).map(f64::sqrt);
         std::array::from_fn(|i| {
@@ -69,7 +69,7 @@ impl Sample {
         let depth = |p: &DVec3| (*p - self.at).dot(self.inward);
         let deepest = depth(a).max(depth(b)).max(depth(c));
         let beside = (around[0] - self.at).max(self.at - around[1]).max(DVec3::ZERO);
-        // A way to this depth is longer than that by the cosine of 15° at most.
+        // A way to this depth is longer than that by the cosine of 10° at most.
         deepest > 0.0
             && beside.length_squared() * (STRAIGHT * (1.0 - 1e-6)) <= deepest * deepest
             && self.ways(most).iter().any(|[lo, hi]| lo.cmple(around[1]).all() && hi.cmpge(around[0]).all())
@@ -171,7 +171,7 @@ mod tests {
             prop_assert!((found - want).abs() < 1e-6, "{found} instead of {want}");
         }
 
-    /// What is touched apart meets a box on the way there.
+    /// A point that is touched apart lies in a box on the way there.
         #[test]
         fn ways_hold_all_that_is_straight_ahead(
             inward in prop::array::uniform3(-1.0f64..1.0), aside in prop::array::uniform3(-1.0f64..1.0), depth in 0.001f64..1.0, lean in 0.0f64..1.0,

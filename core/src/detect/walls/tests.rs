@@ -40,7 +40,7 @@ fn is_about(value: f64, expected: f64) -> bool {
     (value - expected).abs() < 0.02 * expected
 }
 
-/// What an outline in x and r around the z axis sweeps, seen from outside if the outline runs upwards on the outside.
+/// The surface that an outline in r and z sweeps around the z axis, seen from outside if the outline runs upwards on the outside.
 fn turned(outline: &[[f64; 2]], steps: u32) -> Vec<Corners> {
     let at = |[r, z]: [f64; 2], i: u32| {
         let angle = TAU * f64::from(i % steps) / f64::from(steps);
@@ -121,7 +121,7 @@ fn edges_and_thick_bodies_are_no_walls() {
     assert_eq!(thin(&cuboid([0.0; 3], [10.0; 3]), 0.8), nothing);
     assert_eq!(thin(&divided(&cuboid([0.0; 3], [10.0; 3]), 6), 0.8), nothing);
     assert_eq!(thin(&ball(10.0, 64), 0.8), nothing);
-    for angle in [35.0, 45.0, 60.0] {
+    for angle in [25.0, 45.0, 60.0] {
         assert_eq!(thin(&wedge(angle, 10.0), 0.8), nothing, "{angle}°");
         assert_eq!(thin(&divided(&wedge(angle, 10.0), 5), 0.8), nothing, "{angle}°");
     }
@@ -159,7 +159,7 @@ fn a_groove_leaves_a_thin_wall() {
     let groove: Vec<Corners> =
         reversed(&sides.collect::<Vec<_>>()).into_iter().chain(reversed(&ends.collect::<Vec<_>>())).collect();
     let (share, thinnest) = thin(&groove, 0.8);
-    assert!((0.4..0.45).contains(&thinnest) && (0.001..0.05).contains(&share), "{share}, {thinnest}");
+    assert!((0.4..0.45).contains(&thinnest) && (0.0005..0.05).contains(&share), "{share}, {thinnest}");
 }
 
 #[test]
@@ -205,7 +205,7 @@ fn what_was_not_looked_for_is_told() {
     assert_eq!(thin(&cube, 1e300).0, 1.0, "all of a small cube is thinner than that");
 }
 
-/// What is found around each sample when every triangle is looked at.
+/// All that is found around each sample when every triangle is looked at.
 fn by_force(records: &[Record], samples: &[Sample], most: f64) -> Vec<Option<f64>> {
     let around = |sample: &Sample| {
         let mut around = Around { wall: f64::INFINITY, other: (f64::INFINITY, false), depth: f64::INFINITY };

@@ -292,7 +292,7 @@ mod tests {
         let walls = r#"{"minimum": 0.8, "points": 100, "share": 0.03, "places": [{"at": [1.5, 2.5, 3.5], "thickness": 0.31}]}"#;
         report.thin_walls = serde_json::from_str(walls).unwrap();
         let text = whole(&report, None).into_string();
-        assert!(text.contains("Thin walls") && text.contains("0.31") && text.contains("1.5, 2.5, 3.5"), "{text}");
+        assert!(text.contains("Thin walls") && text.contains("0.31000") && text.contains("(1.5000, 2.5000, 3.5000)"), "{text}");
     }
 
     /// Names, headers and notes come from whoever sent the file.

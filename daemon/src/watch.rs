@@ -270,10 +270,7 @@ impl Daemon {
             web.stop();
         }
         let failed = context.failed.lock().map_or_else(|poisoned| poisoned.into_inner().take(), |mut failed| failed.take());
-        match failed {
-            Some(error) => End::Store(error),
-            None => End::Rest,
-        }
+        failed.map_or(End::Rest, End::Store)
     }
 }
 

@@ -86,7 +86,7 @@ fn thin_walls_are_told_of_and_change_nothing() {
     };
     let (walls, hints, bytes, said) = run("walls.toml", "100000", "1", "1GiB", "never");
     assert!(walls["points"].as_u64() > Some(1000) && walls["share"].as_f64() > Some(0.0), "{walls}");
-    assert!(said.contains("  hint    walls are thinner than 28 mm"), "{said}");
+    assert!(said.contains("walls are thinner than 28 mm"), "{said}");
     for (chunk, threads, memory, spill) in
         [("64", "2", "64MiB", "always"), ("1000", "2", "1GiB", "auto"), ("100000", "2", "64MiB", "never")]
     {

@@ -120,11 +120,7 @@ impl Context {
         self.failed.lock().is_ok_and(|failed| failed.is_some())
     }
 
-    /// Jobs that a slot may have now.
-    ///
-    /// # Errors
-    /// When the store failed.
-    pub(crate) fn waits(&self) -> Result<Waits, StoreError> {
+    fn waits(&self) -> Result<Waits, StoreError> {
         Waits::of(&*self.store, self.settings.now().large)
     }
 

@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 
 use rustix::fs::{AtFlags, CWD, StatxAttributes, StatxFlags};
 use serde::{Deserialize, Serialize};
+use suture_core::ErrorClass;
 
 use crate::fsx::{self, Identity};
 use crate::{create, rights};
@@ -42,6 +43,15 @@ pub(crate) enum FolderError {
 }
 
 impl FolderError {
+    /// Can the folder be served later, without anyone's change of the settings: when another daemon ends, or there is room again?
+    pub(crate) fn passes(&self) -> bool {
+        match self {
+            Self::Owned { .. } => true,
+            Self::Io { source, .. } => ErrorClass::of(source) == ErrorClass::Shortage,
+            Self::Within { .. } | Self::Mixed { .. } => false,
+        }
+    }
+
     /// Of a path that cannot be looked at.
     pub(crate) fn unseen(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();

@@ -115,11 +115,6 @@ impl Waits {
         let of = |turn: Turn| store.waiting(&turn.filter(large));
         Ok(Self { parked: store.has_parked()?, small: of(Turn::Small)?, large: of(Turn::Large)?, alone: of(Turn::Alone)? })
     }
-
-    /// Is there a file to be computed?
-    pub(crate) fn is_anyone(&self) -> bool {
-        [self.small, self.large, self.alone].iter().any(Option::is_some)
-    }
 }
 
 impl Schedule {

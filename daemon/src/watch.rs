@@ -114,19 +114,19 @@ pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew:
 
 /// Takes the folders that are to be served. One that another daemon serves is away, as long as there is one that is not.
 fn open_folders(config: &Config) -> Result<Vec<Arc<Folder>>, FolderError> {
-    let (mut folders, mut owned, known) = (Vec::new(), None, read_traces(&config.state)?);
+    let (mut folders, mut away, known) = (Vec::new(), None, read_traces(&config.state)?);
     let mut served = 0;
     for folder in &config.folders {
         let opened = match Folder::open(folder, known.get(&folder.name)) {
-            Err(error @ FolderError::Owned { .. }) => {
-                owned.get_or_insert(error);
+            Err(error) if error.passes() => {
+                away.get_or_insert(error);
                 Folder::of_other(folder)?
             }
             opened => opened.inspect(|_| served += 1)?,
         };
         folders.push(Arc::new(opened));
     }
-    match owned {
+    match away {
         Some(error) if served == 0 => Err(error),
         _ => Ok(folders),
     }

@@ -11,6 +11,8 @@ use crate::folder::is_meant;
 
 /// A result that cannot be brought into place is tried so often before it is left for the next run.
 const TRIES_ONCE: u32 = 4;
+/// Jobs that a slot may take.
+const QUEUED: [Kind; 2] = [Kind::Queued, Kind::Alone];
 
 impl Keeper {
     /// With `--once`: is everything that came to rest finished?
@@ -25,7 +27,8 @@ impl Keeper {
             return Ok(false);
         }
         let of = |wanted: fn(Kind) -> bool| counts.iter().filter(|(kind, _)| wanted(*kind)).map(|(_, n)| n).sum::<u64>();
-        if !self.context.schedule.is_paused() && self.context.waits()?.is_anyone() {
+        let queued = of(|kind| QUEUED.contains(&kind));
+        if queued > 0 && !self.context.schedule.is_paused() && self.may_begin(queued)? {
             return Ok(false);
         }
         if of(|kind| kind == Kind::Parked) > 0 && !self.context.schedule.is_paused() && self.may_move_on()? {
@@ -54,6 +57,16 @@ impl Keeper {
             self.context.not_good.store(true, Ordering::Relaxed);
         }
         Ok(())
+    }
+
+    /// Is one of so many queued jobs of a folder whose disk has room, or taken by now?
+    fn may_begin(&self, queued: u64) -> Result<bool, StoreError> {
+        let full = self.context.full.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if full.is_empty() {
+            return Ok(true);
+        }
+        let jobs = self.context.store.list(&Query { kinds: QUEUED.into(), ..Query::default() })?;
+        Ok(jobs.len() as u64 != queued || jobs.iter().any(|job| !full.contains_key(&job.source.folder)))
     }
 
     /// Is a parked job tried once more, with `--once`? What an earlier run left was tried often; but the world may be another one now.

@@ -40,12 +40,13 @@ impl<'s, 'e> Slots<'s, 'e> {
         self.threads.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Sees to it that so many can compute, and as many bring a result into place meanwhile. Those that are there stay: the schedule lets no more
-    /// compute than may.
+    /// Sees to it that so many can compute, and as many bring a result into place meanwhile; with one worker, one job is done after the other. Those that
+    /// are there stay: the schedule lets no more compute than may.
     pub(super) fn raise(&self, workers: usize) -> Result<(), StoreError> {
         let context = self.context;
         let mut threads = self.threads();
-        while threads.len() < 2 * workers {
+        let most = if workers == 1 { 1 } else { 2 * workers };
+        while threads.len() < most {
             let slot = move || {
                 let worked = guarded(|| {
                     Slot::new(context).run();

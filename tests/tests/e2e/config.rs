@@ -202,8 +202,8 @@ fn the_number_of_workers_is_read_anew() {
         let tasks = std::fs::read_dir(format!("/proc/{}/task", daemon.served.pid())).unwrap().flatten();
         tasks.filter(|task| std::fs::read_to_string(task.path().join("comm")).is_ok_and(|name| name.trim() == "slot")).count()
     };
+    wait_until("the thread is there", || slots() == 1);
     // As many compute as there are workers, and as many bring results into place meanwhile.
-    wait_until("the threads are there", || slots() == 2);
     for (workers, threads) in [(3, 6), (2, 6)] {
         place.put("suture.toml", configuration(workers).as_bytes());
         daemon.hang_up("is in force");

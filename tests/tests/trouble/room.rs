@@ -104,23 +104,29 @@ fn said(stage: &Stage, folder: &str) -> String {
     String::from_utf8_lossy(&listed.stdout).lines().filter(|line| line.contains("nearly full")).collect()
 }
 
-/// Two folders, of which one has a full disk: the other one goes on.
+/// Two folders, of which one has a disk that is nearly full, and then full to the last byte when the daemon begins: the other one goes on.
 fn full_beside() {
     let mut stage = Stage::new();
     let other = stage.at("other");
-    let _mount = Mount::tmpfs(&other, "size=2m", 0);
-    std::fs::create_dir(other.join("in")).unwrap();
+    let _mount = Mount::tmpfs(&other, "size=8m", 0);
+    let state = stage.at("state");
+    stage.lines = stage.lines.replace("reserve = 1\n", &format!("reserve = \"1MiB\"\nstate = {state:?}\n"));
     stage.lines += &format!("[[folders]]\npath = {other:?}\n");
-    std::fs::write(other.join("in/waits.stl"), large()).unwrap();
-    let filler = other.join("filler");
-    fill_bytes(&filler);
-    let mut daemon = stage.start(stage.watch(&[]));
+    let mut daemon = stage.serve();
+    let [filler, more] = ["filler", "more"].map(|name| other.join(name));
+    std::fs::write(&filler, vec![1; 8_000_000]).unwrap();
     stage.wait("it is said", 20, || said(&stage, "hot").contains("other is nearly full; nothing new is taken there"));
+    std::fs::write(other.join("in/waits.stl"), large()).unwrap();
     stage.put("part.stl", &large());
     let beside = stage.wait_done(30, &mut daemon);
     assert_eq!(stage.kind("waits.stl"), "queued", "it is not tried in vain");
+    daemon.stop();
+    fill_bytes(&more);
+    let mut daemon = stage.start(stage.watch(&[]));
+    stage.put("second.stl", &holes(4000, 2));
+    stage.wait_done(30, &mut daemon);
     assert!(!other.join("out/waits.stl").exists() && other.join("in/waits.stl").exists());
-    std::fs::remove_file(filler).unwrap();
+    [filler, more].into_iter().for_each(|filler| std::fs::remove_file(filler).unwrap());
     let took = stage.wait("it is done", 40, || stage.kind("waits.stl") == "done");
     assert!(said(&stage, "hot").is_empty() && daemon.restarts == 0);
     daemon.stop();

@@ -2,7 +2,7 @@
 //! serves many small files; a crash then costs the file that was being worked on, and a new process.
 
 use std::cell::Cell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::Mutex;
@@ -74,8 +74,8 @@ pub(crate) struct Context {
     pub not_good: Arc<AtomicBool>,
     /// By hot folder: what of it is out of reach, and why.
     pub away: Mutex<BTreeMap<String, Vec<String>>>,
-    /// By hot folder of which nothing new is taken for want of room: in words.
-    pub full: Mutex<BTreeMap<String, String>>,
+    /// Names of hot folders of which nothing new is taken for want of room.
+    pub full: Mutex<BTreeSet<String>>,
     /// Folders in which earlier stores left something that was not read yet.
     pub unread: Unread,
     /// The store failed; every thread ends.
@@ -197,7 +197,7 @@ impl Slot {
         self.context.schedule.done(turn);
     }
 
-    /// What is left of its turn is waiting for the disk: another slot may compute.
+    /// The rest of its turn is waiting for the disk: another slot may compute.
     fn computed(&self) {
         if self.computes.take() {
             self.context.schedule.computed();

@@ -146,7 +146,7 @@ pub(crate) fn answer(store: &dyn JobStore, wish: &JobsWish) -> Result<Vec<Job>, 
         JobsWish::List => return Ok(store.list(&Query::default())?),
         JobsWish::Show(id) => store.get(*id)?.ok_or(StoreError::Unknown(*id))?,
         JobsWish::Retry(id) => {
-            store.get(*id)?.ok_or(StoreError::Unknown(*id)).map_err(Refusal::from).and_then(|job| unless_done(&job))?;
+            unless_done(&store.get(*id)?.ok_or(StoreError::Unknown(*id))?)?;
             store.control(*id, Control::Retry)?
         }
         JobsWish::Cancel(id) => store.control(*id, Control::Cancel)?,
@@ -444,7 +444,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         std::fs::create_dir(dir.path().join(".suture")).unwrap();
         assert!(ask(dir.path(), &JobsWish::List).unwrap().is_none());
-        // One that was left behind: no one listens there.
+        // A socket that was left behind: no one listens there.
         drop(UnixListener::bind(socket(dir.path())).unwrap());
         assert!(ask(dir.path(), &JobsWish::List).unwrap().is_none());
         // A file that is no socket, and a folder that cannot be looked into, tell nothing.

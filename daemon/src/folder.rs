@@ -114,6 +114,11 @@ impl Folder {
         Ok(())
     }
 
+    /// Why nothing new is taken of it when its disk, or that of its results, has no room, in words.
+    pub(crate) fn nearly_full(&self) -> String {
+        format!("the disk of {} is nearly full", self.root.display())
+    }
+
     /// Where files are dropped.
     pub(crate) fn inbox(&self) -> PathBuf {
         self.root.join("in")

@@ -178,13 +178,13 @@ pub(crate) fn folders(context: &Context) -> Vec<Served> {
 /// # Errors
 /// When the store failed.
 pub(crate) fn standing(context: &Context) -> Result<Standing, StoreError> {
-    let away = context.away.lock().unwrap_or_else(PoisonError::into_inner).values().flatten().cloned().collect::<Vec<_>>();
-    let mut full: Vec<String> = context.full.lock().unwrap_or_else(PoisonError::into_inner).values().cloned().collect();
-    if context.schedule.held(Hold::Disk).is_some() {
-        // All of them, which is said already.
-        full.clear();
+    let mut away: Vec<String> = context.away.lock().unwrap_or_else(PoisonError::into_inner).values().flatten().cloned().collect();
+    // Where every disk is full, that is said already.
+    if context.schedule.held(Hold::Disk).is_none() {
+        let full = context.full.lock().unwrap_or_else(PoisonError::into_inner);
+        let full = context.folders.iter().filter(|folder| full.contains(&folder.name));
+        away.extend(full.map(|folder| format!("{}; nothing new is taken there", folder.nearly_full())));
     }
-    let away = away.into_iter().chain(full.iter().map(|words| format!("{words}; nothing new is taken there"))).collect();
     let words = |(name, why): (String, String)| {
         let events = match context.store.backlog(&name)? {
             1 => "one event".to_owned(),

@@ -133,7 +133,7 @@ pub(crate) fn reason(job: &Job) -> String {
     }
 }
 
-/// What a person may want to know of a good result before it is printed.
+/// The note on a good result, for a person to read before it is printed.
 pub(crate) fn hint(job: &Job) -> Option<&str> {
     let State::Ended { publication } = &job.state else { return None };
     Some(publication.reason.as_str()).filter(|reason| publication.ending.is_good() && !reason.is_empty())

@@ -113,7 +113,7 @@ pub(crate) fn all_jobs(tables: &dyn Tables) -> Result<Vec<Job>, StoreError> {
     Ok(jobs)
 }
 
-/// What is told from memory, of all jobs. A damaged record offers no result and answers for no file; whoever asks for its job hears of it.
+/// The indexes that are kept in memory, of all jobs. A damaged record offers no result and answers for no file; whoever asks for its job hears of it.
 fn told_from_memory(tables: &dyn Tables) -> Result<(Results, Files), StoreError> {
     let (mut results, mut files) = (Results::default(), Files::default());
     tables.scan(Table::Jobs, &[], &[], &mut |key, value| {

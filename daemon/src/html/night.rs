@@ -46,7 +46,7 @@ fn write(args: &NightArgs, all: All<'_>) -> Result<(), (String, Exit)> {
 
 /// The jobs of a night, the latest first.
 struct Night {
-    /// Those that need a person, however old.
+    /// Jobs that need a person, however old.
     need: Vec<Job>,
     /// Others that ended in the night.
     ended: Vec<Job>,

@@ -66,7 +66,7 @@ impl Keeper {
             return Ok(true);
         }
         let jobs = self.context.store.list(&Query { kinds: QUEUED.into(), ..Query::default() })?;
-        Ok(jobs.len() as u64 != queued || jobs.iter().any(|job| !full.contains_key(&job.source.folder)))
+        Ok(jobs.len() as u64 != queued || jobs.iter().any(|job| !full.contains(&job.source.folder)))
     }
 
     /// Is a parked job tried once more, with `--once`? What an earlier run left was tried often; but the world may be another one now.
@@ -74,7 +74,7 @@ impl Keeper {
         let now = self.context.world.wall();
         let parked = self.context.store.list(&Query { kinds: vec![Kind::Parked], ..Query::default() })?;
         let full = self.context.full.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut parked = parked.iter().filter(|job| !full.contains_key(&job.source.folder));
+        let mut parked = parked.iter().filter(|job| !full.contains(&job.source.folder));
         Ok(parked.any(|job| job.is_due(now) || job.parked.is_some_and(|parked| parked.tries < TRIES_ONCE)))
     }
 }

@@ -1,7 +1,6 @@
 //! Room on the disks: a result needs some, and a half-full night is better than a broken one. A folder whose disk is nearly full waits; the others go on.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::collections::BTreeSet;
 use std::sync::PoisonError;
 use std::time::{Duration, Instant};
 
@@ -22,24 +21,22 @@ impl Keeper {
         self.disk_looked = Some(now);
         let context = &self.context;
         context.store.check()?;
-        let folders = self.folders.iter().map(|kept| &kept.folder).filter(|folder| context.room(folder) == 0);
-        let words = |root: &Path| format!("the disk of {} is nearly full", root.display());
-        let full: BTreeMap<String, String> = folders.map(|folder| (folder.name.clone(), words(&folder.root))).collect();
-        let all_are_full = full.len() == self.folders.len();
-        context.schedule.hold(Hold::Disk, full.values().next().filter(|_| all_are_full).cloned());
-        let before = {
-            let mut known = context.full.lock().unwrap_or_else(PoisonError::into_inner);
-            std::mem::replace(&mut *known, full.clone())
-        };
-        if before != full {
-            context.store.shut(&full.keys().cloned().collect::<BTreeSet<_>>());
+        let folders: Vec<_> = self.folders.iter().map(|kept| &kept.folder).filter(|folder| context.room(folder) == 0).collect();
+        let all_are_full = folders.len() == self.folders.len();
+        context.schedule.hold(Hold::Disk, folders.first().filter(|_| all_are_full).map(|folder| folder.nearly_full()));
+        let full: BTreeSet<String> = folders.iter().map(|folder| folder.name.clone()).collect();
+        let mut known = context.full.lock().unwrap_or_else(PoisonError::into_inner);
+        if *known != full {
+            context.store.shut(&full);
+            for folder in full.difference(&known) {
+                tracing::warn!(folder, "A disk is nearly full; nothing new is taken of its folder.");
+            }
+            for folder in known.difference(&full) {
+                tracing::info!(folder, "There is room on the disk again.");
+            }
+            *known = full;
+            drop(known);
             context.schedule.news();
-        }
-        for (folder, words) in full.iter().filter(|(folder, _)| !before.contains_key(*folder)) {
-            tracing::warn!(folder, reason = words, "A disk is nearly full; nothing new is taken of its folder.");
-        }
-        for folder in before.keys().filter(|folder| !full.contains_key(*folder)) {
-            tracing::info!(folder, "There is room on the disk again.");
         }
         Ok(())
     }

@@ -8,7 +8,7 @@ use crate::id::JobId;
 use crate::job::{Job, Source};
 use crate::path::RelPath;
 
-/// What makes a dropped file that file. The profile is not part of it: a changed setting does not make a new drop.
+/// The identity of a dropped file. The profile is not part of it: a changed setting does not make a new drop.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) struct Identity<'a> {
     dev: u64,

@@ -112,8 +112,6 @@ impl Order {
 #[derive(Default)]
 struct Folder {
     name: String,
-    /// None of its jobs is claimed.
-    is_shut: bool,
     /// By their own priority, and by what they count as.
     by_base: Order,
     by_aged: Order,
@@ -125,7 +123,7 @@ pub(super) struct Line {
     entries: BTreeMap<JobId, Entry>,
     /// Few: each look goes over them.
     folders: Vec<Folder>,
-    /// Names of folders that are shut, those without a job too.
+    /// Names of folders of which no job is claimed, those without a job too.
     shut: BTreeSet<String>,
     /// When a ready one counts for one step more.
     rises: BTreeSet<(u64, JobId)>,
@@ -161,8 +159,7 @@ impl Line {
 
     fn folder(&mut self, name: &str) -> usize {
         self.folders.iter().position(|folder| folder.name == name).unwrap_or_else(|| {
-            let is_shut = self.shut.contains(name);
-            self.folders.push(Folder { name: name.to_owned(), is_shut, ..Folder::default() });
+            self.folders.push(Folder { name: name.to_owned(), ..Folder::default() });
             self.folders.len() - 1
         })
     }
@@ -170,16 +167,16 @@ impl Line {
     /// Has no job of these hot folders claimed until others, or none, are shut.
     pub(super) fn shut(&mut self, folders: &BTreeSet<String>) {
         self.shut.clone_from(folders);
-        self.folders.iter_mut().for_each(|folder| folder.is_shut = folders.contains(&folder.name));
     }
 
     fn open(&self) -> impl Iterator<Item = &Folder> {
-        self.folders.iter().filter(|folder| !folder.is_shut)
+        self.folders.iter().filter(|folder| !self.shut.contains(&folder.name))
     }
 
     /// Is it a job of a folder that is open?
     fn is_open(&self, id: JobId) -> bool {
-        self.entries.get(&id).is_some_and(|entry| self.folders.get(entry.folder).is_some_and(|folder| !folder.is_shut))
+        let folder = self.entries.get(&id).and_then(|entry| self.folders.get(entry.folder));
+        folder.is_some_and(|folder| !self.shut.contains(&folder.name))
     }
 
     fn enter(&mut self, id: JobId, entry: &Entry, ticks: u64) {

@@ -33,7 +33,7 @@ struct Night {
     status: Status,
     need_someone: Vec<Job>,
     in_work: Vec<Job>,
-    /// What came back from an attempt, and waits for the next.
+    /// Jobs that came back from an attempt, and wait for the next.
     put_off: Vec<Job>,
     ended: Ended,
 }
@@ -142,7 +142,7 @@ fn advised(jobs: &[Job], of_folders: bool) -> Markup {
     }
 }
 
-/// What Suture tries again by itself, and why it has to.
+/// Jobs that Suture tries again by itself, and why it has to.
 fn put_off(night: &Night) -> Markup {
     let more = night.count(&[Kind::Waiting]).saturating_sub(night.put_off.len() as u64);
     html! {

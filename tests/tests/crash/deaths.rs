@@ -104,7 +104,8 @@ fn f12_attempts_are_counted_over_restarts() {
         let hot = Hot::new(with_crash_points());
         let original = mesh(Case::Holes, 1);
         hot.put("a!abort!.stl", &original);
-        let mut command = hot.watch(&["--once"]);
+        // With more workers, the next attempt may begin before the daemon is killed.
+        let mut command = hot.watch(&["--once", "--workers", "1"]);
         assert!(was_killed(command.env("SUTURE_CRASH_AT", point).status().unwrap()), "{point}: it was not killed");
         hot.put("part.stl", &mesh(Case::Holes, 2));
         assert_eq!(hot.once(None).code(), Some(1), "{point}");

@@ -73,7 +73,7 @@ fn components_at_gaps(edges: &Edges, components: &Components) -> HashMap<(Vertex
     for edge in edges.iter().filter(Edge::is_unbalanced) {
         for used in edge.uses {
             let (from, to) = edge.directed(used);
-            let component = components.of_triangle[used.triangle as usize];
+            let component = components.of_triangle[used.triangle() as usize];
             if component != NONE {
                 of_edges.entry((to, from)).or_insert(component);
             }

@@ -8,8 +8,11 @@ use crate::submesh::components::{self, Components, Reversed, Through};
 use crate::submesh::edges::Edges;
 use crate::submesh::near::{self, Tolerance};
 use crate::topology::survey::Survey;
+use crate::util::bits;
 use crate::util::parallel;
 use crate::util::radix;
+use crate::util::scatter::Hashing;
+use std::hash::BuildHasher;
 
 /// Submeshs of fewer triangles are counted by one thread: starting another would take longer.
 const COUNTED_BY_ONE: usize = 4096;
@@ -105,6 +108,24 @@ pub(crate) fn by_vertex_set(submesh: &Submesh) -> Vec<([u32; 3], u32)> {
     keys
 }
 
+/// As [`by_vertex_set`], without nearly all triangles that are alone on their vertices.
+pub(crate) fn shared_vertex_sets(submesh: &Submesh) -> Vec<([u32; 3], u32)> {
+    let sets = || submesh.living().map(|t| (vertex_set(submesh, t), t));
+    let slots = (8 * submesh.triangles.len()).next_power_of_two().max(64);
+    let slot = |v: &[u32; 3]| Hashing::default().hash_one(v) as usize & (slots - 1);
+    let [mut once, mut again] = [const { Vec::new() }; 2].map(|mut bits: Vec<u64>| {
+        bits.resize(slots / 64, 0);
+        bits
+    });
+    for at in sets().map(|(v, _)| slot(&v)) {
+        let known = if bits::holds(&once, at) { &mut again } else { &mut once };
+        bits::put(known, at);
+    }
+    let mut keys: Vec<([u32; 3], u32)> = sets().filter(|(v, _)| bits::holds(&again, slot(v))).collect();
+    keys.sort_unstable();
+    keys
+}
+
 /// As [`by_vertex_set`], of all triangles on the vertices of a changed one. O(stars of the changed ones); of a triangle's three stars
 /// only as much is looked at as the smallest has.
 pub(crate) fn by_vertex_set_of(submesh: &Submesh, changed: &[u32]) -> Vec<([u32; 3], u32)> {
@@ -131,7 +152,7 @@ pub(crate) fn same_direction(a: [u32; 3], b: [u32; 3]) -> bool {
 /// Triangles whose vertex set stands earlier: (with that direction, only in the other one).
 fn duplicates(submesh: &Submesh) -> (u64, u64) {
     let (mut same, mut opposite) = (0, 0);
-    for group in by_vertex_set(submesh).chunk_by(|a, b| a.0 == b.0) {
+    for group in shared_vertex_sets(submesh).chunk_by(|a, b| a.0 == b.0) {
         let corners = |g: &([u32; 3], u32)| submesh.triangles[g.1 as usize].v;
         for (i, later) in group.iter().enumerate().skip(1) {
             if group[..i].iter().any(|earlier| same_direction(corners(earlier), corners(later))) {

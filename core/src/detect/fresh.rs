@@ -4,28 +4,33 @@
 //! Every fresh triangle is tested against everything whose box meets its own, chunk by chunk: the cell that has the lowest corner of the
 //! boxes' overlap owns the pair, and both triangles are there as members or visitors.
 
+mod placed;
+
 use crate::contract::report::SelfIntersections;
 use crate::detect::difference::Difference;
+pub(crate) use crate::detect::fresh::placed::Listed;
+use crate::detect::fresh::placed::Placed;
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::grid::Grid;
 use crate::geometry::position::canonical;
 use crate::geometry::sums::Bounds;
 use crate::geometry::tri_tri::{self, Contact, Triangle as Corners, common};
 use crate::io::record;
-use crate::stream::plan::HomeBox;
+use crate::stream::plan::{ChunkId, HomeBox};
 use crate::stream::source::{Seen, Triangle};
 use crate::topology::crossings::{Crossings, Pair, most_tested};
 use crate::topology::intersect::leave_out_apart;
 use crate::topology::survey::Survey;
-use crate::util::{parallel, steps};
+use crate::util::steps;
 
 /// All self-intersections of the written file, numbered as its records are; `None` if those of the input are not all known, or too many
 /// boxes meet. O(n) boxes are held against a grid of the fresh ones around.
 pub(crate) fn self_intersections(survey: &Survey<'_>, difference: &Difference) -> Option<SelfIntersections> {
     let is_gone = |place: u32| difference.gone.binary_search(&place).is_ok();
     let known = survey.crossing_pairs.as_ref()?.iter().filter(|pair| !pair.triangles.iter().any(|t| is_gone(*t)));
-    let fresh = difference.fresh.iter().map(|(place, record)| (*place, record::corners(record)));
-    let new = met_by(survey, fresh, std::iter::empty(), is_gone, difference.written_records as u64, self_intersection)?;
+    let of = |i: usize| (difference.fresh[i].0, record::corners(&difference.fresh[i].1));
+    let fresh = Listed { count: difference.fresh.len(), of: &of };
+    let new = met_by(survey, fresh, Listed::NONE, is_gone, difference.written_records as u64, self_intersection)?;
     let mut pairs: Vec<Pair> = known.copied().chain(new).collect();
     for pair in &mut pairs {
         // The numbers keep their order.
@@ -44,32 +49,41 @@ pub(crate) fn self_intersection(a: &Corners, b: &Corners) -> Option<Contact> {
 }
 
 /// All pairs in which one of the `fresh` triangles meets another of them, one of those `beside`, or one of the input that is not gone, in the
-/// way that is asked for; `None` if too many boxes meet for a file of so many triangles. Triangles go by numbers that no other one has. O(n) boxes where a
-/// chunk holds a fresh one are held against a grid of these.
+/// way that is asked for; `None` if too many boxes meet for a file of so many triangles. O(n) boxes where a chunk holds a fresh one are held
+/// against a grid of these. Memory of a chunk's, and [`placed`]'s.
 pub(crate) fn met_by(
     survey: &Survey<'_>,
-    fresh: impl Iterator<Item = (u32, Corners)>,
-    beside: impl Iterator<Item = (u32, Corners)>,
+    fresh: Listed<'_>,
+    beside: Listed<'_>,
     is_gone: impl Fn(u32) -> bool + Sync,
     triangles: u64,
     meets: Meets,
 ) -> Option<Vec<Pair>> {
-    let threads = survey.threads();
-    let fresh = Solids::of(&fresh.collect::<Vec<_>>(), threads);
-    if fresh.all.is_empty() {
+    if fresh.count == 0 {
         return Some(Vec::new());
     }
     let mut around = Grid::default();
-    around.mark(fresh.all.iter().map(|f| f.bounds));
+    around.mark(fresh.bounds());
     // Often few are fresh of very many.
-    let beside: Vec<_> = beside.filter(|(_, corners)| around.may_meet(&Bounds::of(corners))).collect();
-    let beside = Solids::of(&beside, threads);
-    let per_chunk =
-        survey.each_chunk(Search::default, |search, cell, seen| search.chunk(&fresh, &beside, &is_gone, (cell, meets), seen));
+    let here = [
+        Here { all: fresh, placed: Placed::of(survey.plan(), fresh, |_| true) },
+        Here { all: beside, placed: Placed::of(survey.plan(), beside, |bounds| around.may_meet(bounds)) },
+    ];
+    let per_chunk = survey.each_chunk(
+        |chunk| here[0].placed.may_meet(chunk),
+        Search::default,
+        |search, chunk, seen| search.chunk(&here, &is_gone, (chunk, meets), seen),
+    );
     if per_chunk.iter().map(|found| found.tested).sum::<u64>() > most_tested(triangles) {
         return None;
     }
     Some(per_chunk.into_iter().flat_map(|found| found.pairs).collect())
+}
+
+/// Triangles, and the chunks they meet.
+struct Here<'a> {
+    all: Listed<'a>,
+    placed: Placed,
 }
 
 /// A triangle that has an area, with its box.
@@ -95,8 +109,14 @@ struct Solids {
 }
 
 impl Solids {
-    fn of(triangles: &[(u32, Corners)], threads: usize) -> Self {
-        let all = parallel::gather(threads, triangles, |_, (_, (place, corners)), all| all.extend(Solid::of(place, corners)));
+    /// Those of a chunk's that are `wanted`, in their order.
+    fn of(here: &Here<'_>, (chunk, cell): (ChunkId, &Bounds), lent: &mut Vec<u32>, wanted: impl Fn(&Bounds) -> bool) -> Self {
+        here.placed.meeting(chunk, cell, lent);
+        let all = lent.iter().filter_map(|i| {
+            let (place, corners) = (here.all.of)(*i as usize);
+            Solid::of(place, corners).filter(|solid| wanted(&solid.bounds))
+        });
+        let all: Vec<Solid> = all.collect();
         steps::count(all.len());
         let tree = BoxTree::new(&all.iter().map(|f| f.bounds).collect::<Vec<_>>());
         Self { all, tree }
@@ -120,24 +140,24 @@ struct Search {
 impl Search {
     fn chunk(
         &mut self,
-        fresh: &Solids,
-        beside: &Solids,
+        [fresh, beside]: &[Here<'_>; 2],
         is_gone: &impl Fn(u32) -> bool,
-        (cell, meets): (HomeBox, Meets),
+        ((chunk, cell), meets): ((ChunkId, HomeBox), Meets),
         seen: [&Seen<'_>; 2],
     ) -> Found {
         let mut found = Found::default();
         let (lo, hi) = cell.ends();
-        // Both triangles of a cell's pair meet the cell: the index of all finds the other one, and other cells' pairs are left to them.
-        let mut here = Vec::new();
-        fresh.tree.meeting(&Bounds { lo, hi }, &mut here);
-        if here.is_empty() {
+        let ends = Bounds { lo, hi };
+        // Both triangles of a cell's pair meet the cell; other cells' pairs are left to them.
+        let fresh = Solids::of(fresh, (chunk, &ends), &mut self.met, |_| true);
+        if fresh.all.is_empty() {
             return found;
         }
+        self.grid.mark(fresh.all.iter().map(|f| f.bounds));
+        let beside = Solids::of(beside, (chunk, &ends), &mut self.met, |bounds| self.grid.may_meet(bounds));
         let asked = Asked { cell, meets };
-        for i in &here {
-            let one = &fresh.all[*i as usize];
-            for (others, first) in [(fresh, *i + 1), (beside, 0)] {
+        for (i, one) in (0..).zip(&fresh.all) {
+            for (others, first) in [(&fresh, i + 1), (&beside, 0)] {
                 self.met.clear();
                 others.tree.each_meeting(&one.bounds, |j| {
                     if j >= first {
@@ -147,7 +167,6 @@ impl Search {
                 found.test(asked, one, &mut self.met, |j| &others.all[j as usize], true);
             }
         }
-        self.grid.mark(here.iter().map(|i| fresh.all[*i as usize].bounds));
         let Self { met, grid } = self;
         for triangles in seen {
             triangles.each_near(&mut found, &|_, bounds| grid.may_meet(bounds), |found, _, place, triangle| {
@@ -216,13 +235,13 @@ mod tests {
         let d = diagnose(&input);
         let beside = shifted(&plate(60, |_, _| true), [0.0, 0.0, 1.0]);
         let fresh = [[30.25, 30.25, 0.0], [30.5, 30.25, 0.0], [30.25, 30.5, 2.0]];
-        let numbered = || (1000..).zip(beside.iter().copied());
-        let met = || met_by(&d.survey, std::iter::once((999, fresh)), numbered(), |_| false, 10_000, self_intersection);
+        let (one, numbered) = (|_| (999, fresh), |i: usize| (1000 + i as u32, beside[i]));
+        let numbered = Listed { count: beside.len(), of: &numbered };
+        let met = || met_by(&d.survey, Listed { count: 1, of: &one }, numbered, |_| false, 10_000, self_intersection);
         let (steps, pairs) = steps::of(met);
         assert!(pairs.is_some_and(|pairs| pairs.iter().any(|pair| pair.triangles[0] == 999)));
         assert!(steps < 100, "{steps}");
-        let (steps, pairs) =
-            steps::of(|| met_by(&d.survey, std::iter::empty(), numbered(), |_| false, 10_000, self_intersection));
+        let (steps, pairs) = steps::of(|| met_by(&d.survey, Listed::NONE, numbered, |_| false, 10_000, self_intersection));
         assert!(pairs.is_some_and(|pairs| pairs.is_empty()) && steps == 0);
     }
 }

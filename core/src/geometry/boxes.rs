@@ -1,4 +1,4 @@
-//! Which of many boxes meet a box: a bounding volume hierarchy by `obvhs`, and wide nodes in its order.
+//! Which of many boxes meet a box: wide nodes, in the order of bounding volume hierarchies by `obvhs`.
 
 use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
@@ -8,33 +8,30 @@ use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use crate::geometry::distance::place;
 use crate::geometry::sums::Bounds;
 use crate::geometry::wide_boxes::WideTree;
-use crate::util::{scatter, steps};
+use crate::util::scatter;
 
 /// A plane that misses a box by less than this share of the coordinates, more than rounding does, is taken to meet it.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
-/// Many boxes, to be asked which of them meet another one.
+/// So many boxes are brought into their order at a time, in memory for these alone. A power of the width of a node.
+const AT_ONCE: usize = 1 << 12;
+
+/// Many boxes, to be asked which of them meet another one. About 28 bytes a box.
 pub(crate) struct BoxTree {
-    tree: Bvh2,
     wide: WideTree,
 }
 
 impl BoxTree {
     /// O(n log n).
     pub(crate) fn new(boxes: &[Bounds]) -> Self {
-        let numbers = (0..boxes.len() as u32).collect();
-        let uneven = uneven(boxes);
-        let mut tree = PlocBuilder::new().build(PlocSearchDistance::Minimum, &uneven, numbers, SortPrecision::U64, 0);
-        for node in tree.nodes.iter_mut().filter(|node| node.is_leaf()) {
-            let first = node.first_index as usize;
-            let here = tree.primitive_indices[first..first + node.prim_count as usize].iter().map(|i| aabb(&boxes[*i as usize]));
-            if let Some(whole) = here.reduce(|a, b| a.union(&b)) {
-                node.set_aabb(whole);
-            }
-        }
-        tree.refit_all();
-        let wide = WideTree::new(in_order(&tree), boxes);
-        Self { tree, wide }
+        let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
+        halve(boxes, &mut order, &mut |group| {
+            let own: Vec<Bounds> = group.iter().map(|i| boxes[*i as usize]).collect();
+            let places = in_order(&hierarchy(&own));
+            let numbers: Vec<u32> = places.into_iter().map(|place| group[place as usize]).collect();
+            group.copy_from_slice(&numbers);
+        });
+        Self { wide: WideTree::new(order, boxes) }
     }
 
     /// Replaces `found` by the numbers of all boxes that meet `wanted`, ascending: the tree's own order is not to be relied on.
@@ -63,13 +60,12 @@ impl BoxTree {
     /// Visits the numbers of all boxes that meet a triangle, and maybe of some beside it. A long triangle that lies askew meets few of those that its box
     /// meets. The box may lie beside its plane, or beside an edge (three of the planes of Akenine-Möller, "Fast 3D triangle-box overlap testing", JGT 6(1), 2001).
     pub(crate) fn each_along(&self, corners: &[[f32; 3]; 3], mut visit: impl FnMut(u32)) {
-        let wanted = aabb(&Bounds::of(corners));
         let [a, b, c] = corners.map(place);
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let beyond = |from: DVec3, to: DVec3| ((to - from).cross(normal).normalize_or_zero(), from);
         let planes = [(normal, a), (-normal, a), beyond(a, b), beyond(b, c), beyond(c, a)];
-        let may_meet = |of: &Aabb| {
-            let [lo, hi] = [of.min, of.max].map(|p| place(p.to_array()));
+        let may_meet = |of: &Bounds| {
+            let [lo, hi] = [of.lo, of.hi].map(place);
             planes.iter().all(|(out, at)| {
                 // From the middle of the box, and half of its width along `out`; both doubled.
                 let away = out.dot((lo - at) + (hi - at));
@@ -77,56 +73,47 @@ impl BoxTree {
                 away <= out.abs().dot(hi - lo) + rounding
             })
         };
-        let mut waiting: Vec<u32> = self.tree.nodes.first().map(|_| 0).into_iter().collect();
-        while let Some(node) = waiting.pop().map(|i| &self.tree.nodes[i as usize]) {
-            steps::count(1);
-            if !node.aabb().intersect_aabb(&wanted) || !may_meet(node.aabb()) {
-                continue;
-            }
-            let first = node.first_index;
-            if node.is_leaf() {
-                self.tree.primitive_indices[first as usize..][..node.prim_count as usize].iter().for_each(|i| visit(*i));
-            } else {
-                waiting.extend([first, first + 1]);
-            }
-        }
+        self.wide.each_that(&Bounds::of(corners), may_meet, &mut visit);
     }
 
     /// Is any box `wanted`, of those that may hold `inner`, by number? Parts of the tree that do not hold it are left out, so that among boxes
     /// of one size, of which each meets all others, few are looked at.
-    pub(crate) fn any_around(&self, inner: &Bounds, wanted: impl Fn(u32) -> bool) -> bool {
-        let inner = aabb(inner);
-        let holds = |of: &Aabb| of.min.cmple(inner.min).all() && of.max.cmpge(inner.max).all();
-        let mut waiting: Vec<u32> = self.tree.nodes.first().map(|_| 0).into_iter().collect();
-        while let Some(node) = waiting.pop().map(|i| &self.tree.nodes[i as usize]) {
-            steps::count(1);
-            if !holds(node.aabb()) {
-                continue;
-            }
-            let first = node.first_index;
-            if !node.is_leaf() {
-                waiting.extend([first, first + 1]);
-                continue;
-            }
-            let here = &self.tree.primitive_indices[first as usize..][..node.prim_count as usize];
-            if here.iter().any(|i| wanted(*i)) {
-                return true;
-            }
-        }
-        false
+    pub(crate) fn any_around(&self, inner: &Bounds, wanted: impl FnMut(u32) -> bool) -> bool {
+        self.wide.any_around(inner, wanted)
     }
 
     /// Does any box but this one meet `wanted`? O(log n) where few do, and where many do.
     pub(crate) fn meets_another(&self, wanted: &Bounds, but: u32) -> bool {
-        let mut meets = false;
-        self.tree.aabb_traverse(aabb(wanted), |tree, node| {
-            let node = &tree.nodes[node as usize];
-            let first = node.first_index as usize;
-            meets |= tree.primitive_indices[first..first + node.prim_count as usize].iter().any(|i| *i != but);
-            !meets
-        });
-        meets
+        self.wide.any_meeting(wanted, |i| i != but)
     }
+}
+
+/// Gives `order` boxes near each other, so many at a time: halves by the middles of the boxes, along the longest side of these, and halves of these.
+fn halve(boxes: &[Bounds], order: &mut [u32], visit: &mut impl FnMut(&mut [u32])) {
+    if order.len() <= AT_ONCE {
+        return visit(order);
+    }
+    // Twice that.
+    let middle = |i: u32, k: usize| f64::from(boxes[i as usize].lo[k]) + f64::from(boxes[i as usize].hi[k]);
+    let width = |k: usize| {
+        let middles = order.iter().map(|i| middle(*i, k));
+        let (lo, hi) = middles.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), x| (lo.min(x), hi.max(x)));
+        hi - lo
+    };
+    let widths: [f64; 3] = std::array::from_fn(width);
+    let axis = (1..3).fold(0, |longest, k| if widths[k] > widths[longest] { k } else { longest });
+    // Whole groups below, so that no node is of two.
+    let half = (order.len() / 2).next_multiple_of(AT_ONCE).min(order.len() - 1);
+    order.select_nth_unstable_by(half, |a, b| middle(*a, axis).total_cmp(&middle(*b, axis)).then(a.cmp(b)));
+    let (below, above) = order.split_at_mut(half);
+    halve(boxes, below, visit);
+    halve(boxes, above, visit);
+}
+
+/// A hierarchy over a few boxes.
+fn hierarchy(boxes: &[Bounds]) -> Bvh2 {
+    let numbers = (0..boxes.len() as u32).collect();
+    PlocBuilder::new().build(PlocSearchDistance::Minimum, &uneven(boxes), numbers, SortPrecision::U64, 0)
 }
 
 /// The boxes from leaf to leaf: those of a node stand together.
@@ -184,13 +171,10 @@ fn uneven(boxes: &[Bounds]) -> Vec<Aabb> {
 /// By how much the smallest boxes grow, at most; single precision tells it from nothing.
 const AT_LEAST: f64 = 1.0 / (1 << 18) as f64;
 
-fn aabb(b: &Bounds) -> Aabb {
-    Aabb::new(Vec3A::from_array(b.lo), Vec3A::from_array(b.hi))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::util::steps;
     use proptest::prelude::*;
 
     /// Boxes at one place, in an even row, and so large and small that their areas are none in single precision: the tree's depth is a
@@ -202,7 +186,7 @@ mod tests {
         };
         for (step, size) in [(0.0, 1.0), (1.0, 1.0), (1e30, 1e38), (0.0, 0.0), (0.0, 1e-42), (0.0, f32::INFINITY)] {
             let boxes = row(step, size);
-            let passes = BoxTree::new(&boxes).tree.depth(0);
+            let passes = hierarchy(&boxes).depth(0);
             assert!(passes < 64, "{passes} for boxes of {size} every {step}");
             let mut found = Vec::new();
             BoxTree::new(&boxes).meeting(&boxes[7], &mut found);

@@ -3,6 +3,7 @@
 use glam::Vec4;
 
 use crate::geometry::sums::Bounds;
+use crate::util::steps;
 
 /// Boxes of a node.
 const WIDTH: usize = 16;
@@ -56,6 +57,22 @@ impl Node {
         }
         lanes
     }
+
+    /// Which hold a box, a bit each.
+    #[inline(always)]
+    fn around(&self, inner: &Wanted) -> u32 {
+        let mut lanes = 0;
+        for q in 0..WIDTH / 4 {
+            let along = |k: usize| self.lo[k][q].cmple(inner.lo[k]) & self.hi[k][q].cmpge(inner.hi[k]);
+            lanes |= (along(0) & along(1) & along(2)).bitmask() << (4 * q);
+        }
+        lanes
+    }
+
+    fn bounds(&self, lane: usize) -> Bounds {
+        let end = |of: &[[Vec4; WIDTH / 4]; 3]| std::array::from_fn(|k| of[k][lane / 4][lane % 4]);
+        Bounds { lo: end(&self.lo), hi: end(&self.hi) }
+    }
 }
 
 impl WideTree {
@@ -77,13 +94,47 @@ impl WideTree {
     /// Visits the numbers of all boxes that meet `wanted`, in an order that is not to be relied on.
     pub(super) fn each_meeting(&self, wanted: &Bounds, mut visit: impl FnMut(u32)) {
         let wanted = Wanted::of(wanted);
-        if let Some(top) = self.levels.len().checked_sub(1) {
-            self.descend((top, 0), &wanted, 0, &mut |place| {
-                if let Some(number) = self.order.get(place) {
-                    visit(*number);
-                }
-            });
-        }
+        self.any(&|node| node.meeting(&wanted), &mut |number| {
+            visit(number);
+            false
+        });
+    }
+
+    /// As [`Self::each_meeting`], without the parts of the tree whose boxes do not `pass`.
+    pub(super) fn each_that(&self, wanted: &Bounds, passes: impl Fn(&Bounds) -> bool, visit: &mut impl FnMut(u32)) {
+        let wanted = Wanted::of(wanted);
+        let lanes = |node: &Node| {
+            steps::count(1);
+            let meeting = node.meeting(&wanted);
+            (0..WIDTH).filter(|l| meeting >> l & 1 == 1 && !passes(&node.bounds(*l))).fold(meeting, |lanes, l| lanes & !(1 << l))
+        };
+        self.any(&lanes, &mut |number| {
+            visit(number);
+            false
+        });
+    }
+
+    /// Is any box that meets `wanted` asked for, by number?
+    pub(super) fn any_meeting(&self, wanted: &Bounds, mut is_asked_for: impl FnMut(u32) -> bool) -> bool {
+        let wanted = Wanted::of(wanted);
+        self.any(&|node| node.meeting(&wanted), &mut is_asked_for)
+    }
+
+    /// Is any box that holds `inner` asked for, by number?
+    pub(super) fn any_around(&self, inner: &Bounds, mut is_asked_for: impl FnMut(u32) -> bool) -> bool {
+        let inner = Wanted::of(inner);
+        let lanes = |node: &Node| {
+            steps::count(1);
+            node.around(&inner)
+        };
+        self.any(&lanes, &mut is_asked_for)
+    }
+
+    /// Visits the numbers of boxes below the `lanes` of nodes, until it is told to stop; says whether it was.
+    #[inline(always)]
+    fn any(&self, lanes: &impl Fn(&Node) -> u32, visit: &mut impl FnMut(u32) -> bool) -> bool {
+        let Some(top) = self.levels.len().checked_sub(1) else { return false };
+        self.descend((top, 0), lanes, 0, &mut |place| self.order.get(place).is_some_and(|number| visit(*number)))
     }
 
     /// Replaces `found` by the nodes of sixteen boxes whose own box meets `wanted`, unless they are more than `most`; says whether they are not.
@@ -93,11 +144,12 @@ impl WideTree {
         match self.levels.len() {
             0 => {}
             1 => found.push(0),
-            levels => self.descend((levels - 1, 0), &of, 1, &mut |leaf| {
-                if found.len() <= most {
+            levels => {
+                self.descend((levels - 1, 0), &|node| node.meeting(&of), 1, &mut |leaf| {
                     found.push(leaf as u32);
-                }
-            }),
+                    found.len() > most
+                });
+            }
         }
         found.len() <= most
     }
@@ -117,17 +169,23 @@ impl WideTree {
         }
     }
 
-    /// As deep as there are levels above `bottom`: visits what lies below them, by place.
-    fn descend(&self, (level, node): (usize, usize), wanted: &Wanted, bottom: usize, visit: &mut impl FnMut(usize)) {
-        let mut lanes = self.levels[level][node].meeting(wanted);
-        while lanes != 0 {
-            let below = node * WIDTH + lanes.trailing_zeros() as usize;
-            lanes &= lanes - 1;
-            if level > bottom {
-                self.descend((level - 1, below), wanted, bottom, visit);
-            } else {
-                visit(below);
+    /// As deep as there are levels above `bottom`: visits what lies below the `lanes` of nodes, by place, until it is told to stop; says whether it was.
+    fn descend(
+        &self,
+        (level, node): (usize, usize),
+        lanes: &impl Fn(&Node) -> u32,
+        bottom: usize,
+        visit: &mut impl FnMut(usize) -> bool,
+    ) -> bool {
+        let mut left = lanes(&self.levels[level][node]);
+        while left != 0 {
+            let below = node * WIDTH + left.trailing_zeros() as usize;
+            left &= left - 1;
+            let stops = if level > bottom { self.descend((level - 1, below), lanes, bottom, visit) } else { visit(below) };
+            if stops {
+                return true;
             }
         }
+        false
     }
 }

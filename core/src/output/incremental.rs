@@ -27,9 +27,10 @@ pub(crate) fn is_worthwhile(gone: u64, added: u64, input_records: usize) -> bool
 }
 
 /// Bytes that a look takes where an edit of so many records was made among so many irregular triangles: measured at defects here and there (200 M triangles,
-/// 1.5 M of them irregular: 490 bytes each), with all that is kept of the input, and what lies around patches, which becomes irregular for the look.
+/// 3 M of them irregular, 2 M changed: 200 bytes each; 20 M: 250), with all that is kept of the input, and what lies around patches, which becomes irregular
+/// for the look.
 pub(crate) fn bytes(irregular_triangles: u64, changed: u64) -> u64 {
-    512 * (irregular_triangles + changed)
+    256 * (irregular_triangles + changed)
 }
 
 /// Suspects that need no place in the budget: about 20 MB.
@@ -88,7 +89,7 @@ struct Disturbed {
 impl Disturbed {
     fn of(survey: &Survey<'_>, difference: &Difference) -> Self {
         let mut vertices = Weld::default();
-        vertices.reset(survey.irregular_triangles.len() + 3 * (difference.gone.len() + difference.fresh.len()));
+        vertices.reset((survey.irregular_triangles.len() + difference.gone.len() + difference.fresh.len()) / 2);
         let corners =
             |irregular_triangle: &IrregularTriangle| record::corners(&survey.records[irregular_triangle.triangle as usize]);
         for irregular_triangle in &survey.irregular_triangles {
@@ -234,7 +235,7 @@ impl Disturbed {
         let mut parents: Vec<u32> = (0..submesh.triangles.len() as u32).collect();
         for edge in edges.iter() {
             edge.uses[1..].iter().for_each(|u| {
-                crate::util::union_find::unite(&mut parents, edge.uses[0].triangle, u.triangle);
+                crate::util::union_find::unite(&mut parents, edge.uses[0].triangle(), u.triangle());
             });
         }
         let mut around = vec![NONE; submesh.positions.len()];
@@ -280,7 +281,7 @@ impl Disturbed {
 /// (Stokes). None for closed surfaces.
 fn vector_area(submesh: &Submesh, edges: &Edges) -> [f64; 3] {
     let bounding = edges.iter().filter(|e| e.is_unbalanced()).map(|e| {
-        let net: f64 = e.uses.iter().map(|u| if u.forward { 1.0 } else { -1.0 }).sum();
+        let net: f64 = e.uses.iter().map(|u| if u.forward() { 1.0 } else { -1.0 }).sum();
         net * submesh.place(e.low).cross(submesh.place(e.high)) / 2.0
     });
     bounding.sum::<DVec3>().to_array()

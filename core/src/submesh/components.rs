@@ -86,7 +86,7 @@ impl Components {
         }
         for edge in edges.iter().filter(|edge| through.reaches(edge)) {
             for other in &edge.uses[1..] {
-                unite(&mut parents, regions + edge.uses[0].triangle, regions + other.triangle);
+                unite(&mut parents, regions + edge.uses[0].triangle(), regions + other.triangle());
             }
         }
         let mut all =
@@ -122,7 +122,7 @@ impl Components {
         for edge in edges.iter().filter(|e| e.is_nonmanifold() || e.is_unbalanced()) {
             // Each component's own uses, forward less backward.
             let mut own: Vec<(u32, i64)> =
-                edge.uses.iter().map(|u| (self.of_triangle[u.triangle as usize], if u.forward { 1 } else { -1 })).collect();
+                edge.uses.iter().map(|u| (self.of_triangle[u.triangle() as usize], if u.forward() { 1 } else { -1 })).collect();
             own.sort_unstable();
             for group in own.chunk_by(|a, b| a.0 == b.0) {
                 self.list[group[0].0 as usize].open |= group.iter().map(|g| g.1).sum::<i64>() != 0;
@@ -291,7 +291,7 @@ mod tests {
                 let at_vertex = || edges.iter().filter(|e| e.low == *v || e.high == *v);
                 let mut reached: Vec<u32> = star.first().copied().into_iter().collect();
                 while let Some(next) = at_vertex().filter(|e| e.uses.len() == 2).find_map(|e| {
-                    let [a, b] = [e.uses[0].triangle, e.uses[1].triangle];
+                    let [a, b] = [e.uses[0].triangle(), e.uses[1].triangle()];
                     [(a, b), (b, a)].into_iter().find(|(a, b)| reached.contains(a) && !reached.contains(b)).map(|(_, b)| b)
                 }) {
                     reached.push(next);

@@ -2,12 +2,23 @@
 
 use super::{Submesh, Vertex};
 
-/// A triangle's use of an edge.
+/// A triangle's use of an edge: the triangle, and a bit for its direction. (No submesh is of 2^31 triangles: its corners have numbers of 32 bits.)
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Use {
-    pub(crate) triangle: u32,
+pub(crate) struct Use(u32);
+
+impl Use {
+    fn new(triangle: u32, forward: bool) -> Self {
+        Self(triangle << 1 | u32::from(forward))
+    }
+
+    pub(crate) fn triangle(self) -> u32 {
+        self.0 >> 1
+    }
+
     /// The triangle runs from the edge's `low` end to its `high` end.
-    pub(crate) forward: bool,
+    pub(crate) fn forward(self) -> bool {
+        self.0 & 1 == 1
+    }
 }
 
 /// An edge: its ends, smaller number first, and all its triangles, ascending.
@@ -29,17 +40,17 @@ impl Edge<'_> {
 
     /// Two triangles that run through it in the same direction.
     pub(crate) fn is_inconsistent(&self) -> bool {
-        self.uses.len() == 2 && self.uses[0].forward == self.uses[1].forward
+        self.uses.len() == 2 && self.uses[0].forward() == self.uses[1].forward()
     }
 
     /// Not used equally often in both directions.
     pub(crate) fn is_unbalanced(&self) -> bool {
-        self.uses.iter().filter(|u| u.forward).count() * 2 != self.uses.len()
+        self.uses.iter().filter(|u| u.forward()).count() * 2 != self.uses.len()
     }
 
     /// Start and end in the direction of `used`.
     pub(crate) fn directed(&self, used: &Use) -> (Vertex, Vertex) {
-        if used.forward { (self.low, self.high) } else { (self.high, self.low) }
+        if used.forward() { (self.low, self.high) } else { (self.high, self.low) }
     }
 }
 
@@ -63,23 +74,30 @@ impl Edges {
             starts[v] += starts[v - 1];
         }
         let mut at = starts.clone();
-        let mut table = vec![(0, Use { triangle: 0, forward: false }); *starts.last().unwrap_or(&0) as usize];
+        let mut table = vec![(0, Use(0)); *starts.last().unwrap_or(&0) as usize];
         each_half(submesh, |low, high, used| {
             table[at[low as usize] as usize] = (high, used);
             at[low as usize] += 1;
         });
+        drop(at);
+        let groups = |low: usize| starts[low] as usize..starts[low + 1] as usize;
+        let mut count = 0;
+        for low in 0..submesh.positions.len() {
+            let part = &mut table[groups(low)];
+            sort_by_high(part);
+            count += part.chunk_by(|a, b| a.0 == b.0).count();
+        }
         let mut edges = Self {
-            ends: Vec::with_capacity(table.len() / 2),
+            ends: Vec::with_capacity(count),
             firsts: Vec::with_capacity(submesh.positions.len() + 1),
-            starts: vec![0],
+            starts: Vec::with_capacity(count + 1),
             uses: Vec::with_capacity(table.len()),
             any_nonmanifold: false,
         };
+        edges.starts.push(0);
         for low in 0..submesh.positions.len() {
             edges.firsts.push(edges.ends.len() as u32);
-            let part = &mut table[starts[low] as usize..starts[low + 1] as usize];
-            sort_by_high(part);
-            for group in part.chunk_by(|a, b| a.0 == b.0) {
+            for group in table[groups(low)].chunk_by(|a, b| a.0 == b.0) {
                 edges.ends.push((low as Vertex, group[0].0));
                 edges.uses.extend(group.iter().map(|g| g.1));
                 edges.starts.push(edges.uses.len() as u32);
@@ -131,7 +149,7 @@ fn each_half(submesh: &Submesh, mut visit: impl FnMut(Vertex, Vertex, Use)) {
         for k in 0..3 {
             let (a, b) = (v[k], v[(k + 1) % 3]);
             if submesh.complete[a as usize] || submesh.complete[b as usize] {
-                visit(a.min(b), a.max(b), Use { triangle: t, forward: a < b });
+                visit(a.min(b), a.max(b), Use::new(t, a < b));
             }
         }
     }
@@ -142,7 +160,7 @@ fn sort_by_high(part: &mut [(Vertex, Use)]) {
     /// So many are sorted sooner one by one.
     const FEW: usize = 16;
     if part.len() > FEW {
-        part.sort_unstable_by_key(|(high, used)| (*high, used.triangle));
+        part.sort_unstable_by_key(|(high, used)| (*high, used.triangle()));
         return;
     }
     for i in 1..part.len() {

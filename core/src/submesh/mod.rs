@@ -29,6 +29,7 @@ use crate::topology::chunk::IrregularTriangle;
 use crate::topology::survey::Survey;
 use crate::topology::vertex_table::Weld;
 use crate::util::ids::NONE;
+use crate::util::lean;
 use crate::util::scatter::Hashing;
 use crate::util::steps;
 
@@ -197,11 +198,12 @@ impl Submesh {
         completed: impl FnOnce(&ByPosition) -> Vec<Vertex>,
     ) {
         let mut known = self.by_position();
+        self.triangles.reserve_exact(new.len());
         for (irregular_triangle, region) in new {
             let v = corners(survey.records, irregular_triangle.triangle).map(|p| {
                 let position = Position::of(p);
                 *known.entry(position).or_insert_with(|| {
-                    self.positions.push(position.coordinates());
+                    lean::push(&mut self.positions, position.coordinates());
                     self.complete.push(false);
                     self.positions.len() as Vertex - 1
                 })
@@ -223,6 +225,7 @@ impl Submesh {
         self.heads.clear();
         self.heads.resize(self.positions.len(), NONE);
         self.nexts.clear();
+        self.nexts.reserve_exact(self.triangles.len() * 3);
         self.nexts.resize(self.triangles.len() * 3, NONE);
         steps::count(self.triangles.len());
         for t in 0..self.triangles.len() {
@@ -243,8 +246,8 @@ impl Submesh {
     /// Adds a triangle and returns its number.
     pub(crate) fn add(&mut self, v: [Vertex; 3], origin: Origin, region: u32) -> u32 {
         let t = self.triangles.len();
-        self.triangles.push(Triangle { v, origin, region, alive: true, by: None });
-        self.nexts.extend([NONE; 3]);
+        lean::push(&mut self.triangles, Triangle { v, origin, region, alive: true, by: None });
+        (0..3).for_each(|_| lean::push(&mut self.nexts, NONE));
         self.link(t);
         t as u32
     }

@@ -126,7 +126,7 @@ pub(super) fn nearest_of(submesh: &Submesh, edges: &Edges, of: &[u32], vertex: V
     steps::count(of.len());
     for edge in of {
         let e = edges.get(*edge as usize);
-        if submesh.triangles[e.uses[0].triangle as usize].v.contains(&vertex) {
+        if submesh.triangles[e.uses[0].triangle() as usize].v.contains(&vertex) {
             continue;
         }
         let [a, b] = [e.low, e.high].map(|v| submesh.positions[v as usize]);
@@ -165,7 +165,7 @@ pub(crate) fn nearest_edge(submesh: &Submesh, edges: &Edges, tolerance: &Toleran
         let (p, reach) = (submesh.positions[v as usize], tolerance.at(submesh, v).min(known()));
         tree.each_meeting(&around(&[p], reach), |i| {
             let edge = &boundary[i as usize];
-            if !submesh.triangles[edge.uses[0].triangle as usize].v.contains(&v) {
+            if !submesh.triangles[edge.uses[0].triangle() as usize].v.contains(&v) {
                 let [a, b] = ends(edge);
                 let away = distance_to_line(p, a, b);
                 // What is as near as the tolerance may be farther by rounding.

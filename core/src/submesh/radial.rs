@@ -22,8 +22,8 @@ impl Half {
     /// The edge as its triangle has it.
     pub(crate) fn of(submesh: &Submesh, edge: &Edge<'_>, used: &Use) -> Self {
         let (start, _) = edge.directed(used);
-        let corner = submesh.triangles[used.triangle as usize].v.iter().position(|v| *v == start).unwrap_or(0);
-        Self { triangle: used.triangle, corner }
+        let corner = submesh.triangles[used.triangle() as usize].v.iter().position(|v| *v == start).unwrap_or(0);
+        Self { triangle: used.triangle(), corner }
     }
 
     fn number(self) -> u32 {
@@ -87,17 +87,17 @@ impl RadialPairs {
 /// seen from the edge's low end turning left. None if two triangles lie in one direction from the edge.
 fn radial_pairs<'e>(submesh: &Submesh, edge: &Edge<'e>) -> Vec<[&'e Use; 2]> {
     if let [a, b] = edge.uses {
-        return vec![if a.forward { [b, a] } else { [a, b] }];
+        return vec![if a.forward() { [b, a] } else { [a, b] }];
     }
     let ends = [edge.low, edge.high].map(|v| submesh.positions[v as usize]);
     let apexes = edge.uses.iter().map(|u| {
-        let apex = submesh.triangles[u.triangle as usize].v.into_iter().find(|v| *v != edge.low && *v != edge.high);
+        let apex = submesh.triangles[u.triangle() as usize].v.into_iter().find(|v| *v != edge.low && *v != edge.high);
         submesh.positions[apex.unwrap_or(edge.low) as usize]
     });
     let Some(order) = around(&ends, &apexes.collect::<Vec<Point>>()) else { return Vec::new() };
     // Material begins behind a triangle that runs against the edge's direction, and ends behind the others. The radial sweep starts where the fewest
     // wedges are open.
-    let begins = |i: usize| !edge.uses[i].forward;
+    let begins = |i: usize| !edge.uses[i].forward();
     let (mut open, mut least, mut first) = (0_i64, 0, 0);
     for (place, i) in order.iter().enumerate() {
         open += if begins(*i) { 1 } else { -1 };
@@ -171,7 +171,7 @@ mod tests {
         let mut pairs: Vec<[u32; 2]> = radial_pairs(&d.submesh, &edge)
             .iter()
             .map(|pair| {
-                let mut places = pair.map(|used| d.submesh.record(used.triangle));
+                let mut places = pair.map(|used| d.submesh.record(used.triangle()));
                 places.sort_unstable();
                 places
             })

@@ -21,7 +21,7 @@ impl<'t> Sheets<'t> {
     pub(crate) fn of(of_triangle: &'t [u32], open: Vec<bool>, edges: &Edges) -> Self {
         let mut rims: Vec<(u32, u32, bool)> = Vec::new();
         for (edge, number) in edges.iter().zip(0..).filter(|(edge, _)| edge.uses.len() != 2) {
-            rims.extend(edge.uses.iter().map(|u| (of_triangle[u.triangle as usize], number, u.forward)));
+            rims.extend(edge.uses.iter().map(|u| (of_triangle[u.triangle() as usize], number, u.forward())));
         }
         rims.sort_unstable();
         let mut of_sheets: Vec<&[(u32, u32, bool)]> = rims.chunk_by(|a, b| a.0 == b.0).collect();
@@ -37,14 +37,15 @@ impl<'t> Sheets<'t> {
 
     /// Visits the triangles at an edge that hang together through it, by twos.
     pub(crate) fn join_open(&self, edge: &Edge<'_>, mut join: impl FnMut(u32, u32)) {
-        let sheet = |u: &Use| self.of_triangle[u.triangle as usize];
-        let balance = |of: u32| edge.uses.iter().filter(|u| sheet(u) == of).map(|u| if u.forward { 1 } else { -1 }).sum::<i32>();
+        let sheet = |u: &Use| self.of_triangle[u.triangle() as usize];
+        let balance =
+            |of: u32| edge.uses.iter().filter(|u| sheet(u) == of).map(|u| if u.forward() { 1 } else { -1 }).sum::<i32>();
         let needs_others = |u: &&Use| self.open[sheet(u) as usize] && balance(sheet(u)) != 0;
         let uses: Vec<Use> = edge.uses.iter().filter(needs_others).copied().collect();
         if let Some(pairs) = self.by_twins(&uses) {
             pairs.into_iter().for_each(|[a, b]| join(a, b));
         } else if let Some((first, others)) = uses.split_first() {
-            others.iter().for_each(|u| join(first.triangle, u.triangle));
+            others.iter().for_each(|u| join(first.triangle(), u.triangle()));
         }
     }
 
@@ -54,7 +55,7 @@ impl<'t> Sheets<'t> {
         let [_, _, _, _] = uses else { return None };
         let sheet = |t: u32| self.of_triangle[t as usize];
         let side = |forward: bool| -> Option<[u32; 2]> {
-            let mut side = uses.iter().filter(|u| u.forward == forward).map(|u| u.triangle);
+            let mut side = uses.iter().filter(|u| u.forward() == forward).map(|u| u.triangle());
             let mut pair = [side.next()?, side.next()?];
             pair.sort_by_key(|t| sheet(*t));
             Some(pair)

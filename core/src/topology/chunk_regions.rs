@@ -127,6 +127,12 @@ impl Parts {
         irregular_triangles.iter().map(part).map(|known| known.map_or(NONE, |(_, part)| merged[*part as usize])).collect()
     }
 
+    /// Bytes held.
+    pub(crate) fn heap_bytes(&self) -> u64 {
+        let seams = size_of_val(&*self.neighbours) + size_of_val(&*self.of_irregular_triangles);
+        (seams + size_of_val(&*self.bases) + size_of_val(&*self.sums)) as u64
+    }
+
     /// Counts what is kept, with the labels of the chunks that are.
     pub(crate) fn take<'l>(&self, budget: &Budget, labels: impl Iterator<Item = &'l Labels>, irregular_triangles: u64) {
         let labels: u64 = labels.map(Labels::heap_bytes).sum();

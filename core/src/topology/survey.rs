@@ -236,7 +236,7 @@ impl<'a> Survey<'a> {
         let is_fresh = self.parts.with_neighbours(&is_cut);
         let by_home = self.by_home(&all);
         let kept = (0..self.plan.chunks()).filter(|c| !is_fresh[*c]);
-        self.parts.take(&budget, kept.clone().map(|c| &self.labels[c]), self.irregular_triangles.len() as u64);
+        self.parts.take(&budget, kept.clone().map(|c| &self.labels[c]), self.irregular_elsewhere(&is_fresh));
         let regions = kept.map(|c| self.parts.of_chunk(ChunkId(c as u32)).len() as u64).sum();
         let mut solved = self.solving(path, (&budget, threads), progress).again(
             &is_fresh,
@@ -261,6 +261,22 @@ impl<'a> Survey<'a> {
             self.labels[chunk.0 as usize] = topology.labels;
         }
         Ok(Division { fetched, divided_from })
+    }
+
+    /// Irregular triangles that none of these chunks tells of.
+    fn irregular_elsewhere(&self, chunks: &[bool]) -> u64 {
+        let is_told = |s: &&IrregularTriangle| {
+            let corners = position::corners(&self.records[s.triangle as usize]);
+            (0..3).filter(|k| s.irregular >> k & 1 == 1).any(|k| chunks[self.plan.home(corners[k]).0 as usize])
+        };
+        self.irregular_triangles.iter().filter(|s| !is_told(s)).count() as u64
+    }
+
+    /// Bytes held, but for irregular triangles.
+    pub(crate) fn heap_bytes(&self) -> u64 {
+        let labels: u64 = self.labels.iter().map(Labels::heap_bytes).sum();
+        let regions = size_of_val(&*self.regions) + size_of_val(&*self.merged) + size_of_val(&*self.turned);
+        self.plan.heap_bytes() + self.members.heap_bytes(self.threads) + labels + self.parts.heap_bytes() + regions as u64
     }
 
     /// The corners of irregular triangles that are irregular.
@@ -384,20 +400,26 @@ impl<'a> Survey<'a> {
         visited.into_iter().flatten().collect()
     }
 
-    /// `work` on every chunk: its cell, its members, and its visitors, which there are if self-intersections were looked for. Results by
+    /// `work` on every wanted chunk: its cell, its members, and its visitors, which there are if self-intersections were looked for. Results by
     /// chunk, so only sums and sets may be made of them.
     pub(crate) fn each_chunk<S, R: Send>(
         &self,
+        wanted: impl Fn(ChunkId) -> bool + Sync,
         scratch: impl Fn() -> S + Sync,
-        work: impl Fn(&mut S, HomeBox, [&Seen<'_>; 2]) -> R + Sync,
+        work: impl Fn(&mut S, (ChunkId, HomeBox), [&Seen<'_>; 2]) -> R + Sync,
     ) -> Vec<R> {
         self.members.each(
             (self.records, &self.guide, &self.plan),
             self.threads,
-            |_| true,
+            wanted,
             scratch,
-            |scratch, chunk, members, visitors| work(scratch, self.plan.home_box(chunk), [members, visitors]),
+            |scratch, chunk, members, visitors| work(scratch, (chunk, self.plan.home_box(chunk)), [members, visitors]),
         )
+    }
+
+    /// The cells of the chunks.
+    pub(crate) fn plan(&self) -> &Plan {
+        &self.plan
     }
 
     /// Makes irregular triangles of all triangles around the regular vertices at `positions`, and returns the new ones, ascending.

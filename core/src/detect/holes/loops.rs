@@ -124,7 +124,7 @@ fn lacking(submesh: &Submesh, edge: &Edge<'_>) -> Option<Rim> {
         _ => return None,
     };
     let (to, from) = edge.directed(&used);
-    Some(Rim { from, to, triangle: used.triangle, branches: edge.uses.len() > 1 })
+    Some(Rim { from, to, triangle: used.triangle(), branches: edge.uses.len() > 1 })
 }
 
 /// The triangle of a non-manifold edge that is left when the others are paired around it, each with the one that faces its back: two such
@@ -138,12 +138,12 @@ fn unpaired(submesh: &Submesh, edge: &Edge<'_>) -> Option<Use> {
         .iter()
         .map(|used| {
             let ends = [edge.low, edge.high];
-            let apex = submesh.triangles[used.triangle as usize].v.into_iter().find(|v| !ends.contains(v)).unwrap_or(edge.low);
+            let apex = submesh.triangles[used.triangle() as usize].v.into_iter().find(|v| !ends.contains(v)).unwrap_or(edge.low);
             let out = submesh.place(apex) - submesh.place(edge.low);
             (diamond_angle(out.dot(u), out.dot(w)), *used)
         })
         .collect();
-    around.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.triangle.cmp(&b.1.triangle)));
+    around.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.triangle().cmp(&b.1.triangle())));
     // Seen along the edge, a triangle that runs through it forward has the solid before it, in the order of angles; the other kind behind.
     // Twice around, so that a pair across the start is found.
     let n = around.len();
@@ -153,7 +153,7 @@ fn unpaired(submesh: &Submesh, edge: &Edge<'_>) -> Option<Use> {
         if paired[i] {
             continue;
         }
-        if !around[i].1.forward {
+        if !around[i].1.forward() {
             if !waiting.contains(&i) {
                 waiting.push(i);
             }
@@ -249,7 +249,7 @@ fn fans(submesh: &Submesh, edges: &Edges, v: Vertex) -> Vec<(u32, u32)> {
     for t in &star {
         for w in submesh.triangles[*t as usize].v.into_iter().filter(|w| *w != v) {
             if let Some([a, b]) = edges.between(v, w).map(|e| e.uses) {
-                crate::util::union_find::unite(&mut parents, number(a.triangle), number(b.triangle));
+                crate::util::union_find::unite(&mut parents, number(a.triangle()), number(b.triangle()));
             }
         }
     }

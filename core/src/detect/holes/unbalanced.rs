@@ -16,7 +16,7 @@ const MOST_LOOKED_AT: usize = 1 << 22;
 pub(crate) fn unbalanced<'l>(submesh: &Submesh, edges: &Edges, apart_from: impl Iterator<Item = &'l Loop>) -> Vec<Vec<Vertex>> {
     let mut ways: BTreeMap<Vertex, Vec<Vertex>> = BTreeMap::new();
     for edge in edges.iter().filter(Edge::is_unbalanced) {
-        let forward = edge.uses.iter().filter(|used| used.forward).count();
+        let forward = edge.uses.iter().filter(|used| used.forward()).count();
         let backward = edge.uses.len() - forward;
         let (from, to) = if forward > backward { (edge.high, edge.low) } else { (edge.low, edge.high) };
         ways.entry(from).or_default().extend(std::iter::repeat_n(to, forward.abs_diff(backward)));

@@ -158,8 +158,8 @@ fn the_edges_of_a_soup_are_counted_before_they_are_compared() {
         inspect(&input, &Profile::default(), &limits, &Quiet)
     };
     assert_eq!(inspected(64 << 20).unwrap().before.boundary_edges, 30_000);
-    // 30,000 edges of 640 bytes are 19 MiB; what is kept of the triangles is 4 MiB.
-    let error = inspected(20 << 20).unwrap_err();
+    // 30,000 edges of 352 bytes are 10 MiB; what is kept of the triangles is 2 MiB.
+    let error = inspected(12 << 20).unwrap_err();
     assert!(matches!(error, Error::Starved { .. }), "{error}");
     assert!(error.to_string().contains("10000 triangles lie at defects, with 30000 edges that only one triangle has"), "{error}");
 }

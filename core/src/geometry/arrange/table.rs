@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use crate::geometry::arrange::point::Point;
 use crate::util::ids::NONE;
+use crate::util::lean;
 use crate::util::scatter::Hashing;
 
 /// Points by what they are rounded to. Only asked, never listed.
@@ -27,9 +28,9 @@ impl Table {
             }
             same = self.before[same as usize];
         }
-        self.before.push(*latest);
+        lean::push(&mut self.before, *latest);
         *latest = next;
-        self.points.push(point);
+        lean::push(&mut self.points, point);
         next
     }
 }

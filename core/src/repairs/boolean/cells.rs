@@ -2,7 +2,7 @@
 
 use crate::repairs::shared::pieces;
 use crate::util::union_find;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use glam::DVec3;
 
@@ -12,19 +12,22 @@ use crate::repairs::boolean::cut::Cut;
 use crate::repairs::shared::work::Work;
 use crate::submesh::Submesh;
 use crate::submesh::components::Reversed;
+use crate::submesh::edges::Edges;
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
-use crate::util::radix::sort_by_number;
+use crate::util::lean;
+use crate::util::scatter::Hashing;
 
 /// The cells of space in front of and behind everything closed.
 ///
 /// Nodes: those of the arrangement, then two for each region, then two for each triangle of the submesh, front and back.
 pub(crate) struct SpaceCells {
-    parents: Vec<u32>,
+    /// By node: the node that stands for its cell.
+    roots: Vec<u32>,
     cells: u32,
     pub(crate) regions: u32,
-    /// Front, back, and by how much the winding number is larger there.
-    steps: Vec<(u32, u32, i32)>,
+    /// Nodes in front of what was not cut: the next one is behind, where the winding number is larger by one.
+    fronts: Vec<u32>,
 }
 
 impl SpaceCells {
@@ -32,10 +35,9 @@ impl SpaceCells {
         let (submesh, edges) = work.edges();
         let (cells, regions) = (cut.arrangement.cells, survey.regions.len() as u32);
         let nodes = cells + 2 * regions + 2 * submesh.triangles.len() as u32;
-        let mut sides = Self { parents: (0..nodes).collect(), cells, regions, steps: Vec::new() };
+        let mut sides = Self { roots: (0..nodes).collect(), cells, regions, fronts: Vec::new() };
         for p in (0..regions).filter(|p| clusters.holds_region(*p)) {
-            let [front, back] = sides.of_region(p);
-            sides.steps.push((front, back, 1));
+            sides.fronts.push(sides.of_region(p)[0]);
         }
         let source_of = |t: u32| cut.sources.binary_search(&t).ok();
         for t in submesh.living().filter(|t| clusters.holds(*t)) {
@@ -43,7 +45,7 @@ impl SpaceCells {
             let source = source_of(t);
             let own = sides.of_triangle(t);
             if source.is_none() {
-                sides.steps.push((own[0], own[1], 1));
+                lean::push(&mut sides.fronts, own[0]);
             }
             // A regular corner's star was not cut.
             if triangle.region == NONE || triangle.v.iter().all(|v| submesh.complete[*v as usize]) {
@@ -55,22 +57,29 @@ impl SpaceCells {
                 Some(s) => cut.pieces(s).iter().for_each(|piece| sides.join(piece.cells, region)),
             }
         }
-        for piece in &cut.arrangement.pieces {
-            sides.steps.push((piece.cells[0], piece.cells[1], piece.step));
+        sides.join_along(submesh, edges, cut, clusters);
+        for node in 0..nodes {
+            sides.roots[node as usize] = union_find::find(&mut sides.roots, node);
         }
+        sides
+    }
+
+    /// Joins the sides of what shares an edge and was not cut there.
+    fn join_along(&mut self, submesh: &Submesh, edges: &Edges, cut: &Cut, clusters: &Clusters) {
+        let source_of = |t: u32| cut.sources.binary_search(&t).ok();
         'edges: for edge in edges.iter() {
             let [a, b] = edge.uses else { continue };
-            let sources = [source_of(a.triangle), source_of(b.triangle)];
-            if sources.iter().all(Option::is_some) || !clusters.holds(a.triangle) || !clusters.holds(b.triangle) {
+            let sources = [source_of(a.triangle()), source_of(b.triangle())];
+            if sources.iter().all(Option::is_some) || !clusters.holds(a.triangle()) || !clusters.holds(b.triangle()) {
                 continue;
             }
             let mut of = [[0; 2]; 2];
             for (i, used) in [a, b].into_iter().enumerate() {
-                let v = submesh.triangles[used.triangle as usize].v;
+                let v = submesh.triangles[used.triangle() as usize].v;
                 let (from, _) = edge.directed(used);
                 let k = v.iter().position(|w| *w == from).unwrap_or(0);
                 match sources[i] {
-                    None => of[i] = sides.of_triangle(used.triangle),
+                    None => of[i] = self.of_triangle(used.triangle()),
                     Some(s) => match cut.whole_edge(submesh, s, k) {
                         Some(piece) => of[i] = piece.cells,
                         // Covered by another one.
@@ -81,9 +90,8 @@ impl SpaceCells {
             if edge.is_inconsistent() {
                 of[1].swap(0, 1);
             }
-            sides.join(of[0], of[1]);
+            self.join(of[0], of[1]);
         }
-        sides
     }
 
     pub(crate) fn of_region(&self, region: u32) -> [u32; 2] {
@@ -96,11 +104,31 @@ impl SpaceCells {
     }
 
     fn join(&mut self, a: [u32; 2], b: [u32; 2]) {
-        union_find::unite(&mut self.parents, a[0], b[0]);
-        union_find::unite(&mut self.parents, a[1], b[1]);
+        union_find::unite(&mut self.roots, a[0], b[0]);
+        union_find::unite(&mut self.roots, a[1], b[1]);
     }
 
-    /// The winding number at each node whose cell the cut surface tells of; `None` at others, and where that contradicts itself.
+    /// The steps of the winding number, each in both directions and once: from the cell of a root to that of another one, and how much larger it is there.
+    fn steps(&self, cut: &Cut) -> Vec<(u32, u32, i32)> {
+        // Very many are between the same two cells.
+        let mut steps = Vec::new();
+        let mut most = 1 << 16;
+        let whole = self.fronts.iter().map(|front| ([*front, front + 1], 1));
+        for ([front, back], step) in whole.chain(cut.arrangement.pieces.iter().map(|piece| (piece.cells, piece.step))) {
+            let [front, back] = [front, back].map(|node| self.roots[node as usize]);
+            steps.extend([(front, back, step), (back, front, -step)]);
+            if steps.len() >= most {
+                steps.sort_unstable();
+                steps.dedup();
+                most = most.max(2 * steps.len());
+            }
+        }
+        steps.sort_unstable();
+        steps.dedup();
+        steps
+    }
+
+    /// The winding numbers of the cells that the cut surface tells of, but for those where that contradicts itself.
     pub(crate) fn windings(
         &self,
         survey: &Survey<'_>,
@@ -109,7 +137,7 @@ impl SpaceCells {
         cut: &Cut,
         crossing: &BTreeSet<u32>,
         clusters: &Clusters,
-    ) -> Vec<Option<i32>> {
+    ) -> Windings<'_> {
         let pieces = pieces::pieces(survey, work, reversed);
         let submesh: &Submesh = work;
         let surfaces = CutSurfaces::of(self, cut);
@@ -118,22 +146,19 @@ impl SpaceCells {
         let found = bodies::windings(survey, submesh, &pieces, reversed, &points);
         let mut bases: Vec<Option<i32>> = vec![None; surfaces.consistent.len()];
         for (sample, winding) in samples.iter().zip(found) {
-            if let Some(surface) = surfaces.at(sample.node).filter(|surface| surfaces.consistent[*surface]) {
-                bases[surface] = Some(winding - surfaces.winding(sample.node));
+            if let Some(cell) = surfaces.cell(sample.node).filter(|cell| surfaces.consistent[cell.surface]) {
+                bases[cell.surface] = Some(winding - cell.relative);
             }
         }
         // What lies in the material of others would go: it is resolved for itself, and it is asked later if it is to go.
         let mut least: Vec<i32> = vec![i32::MAX; bases.len()];
-        let absolute = |node: u32| {
-            let surface = surfaces.at(node)?;
-            Some((surface, bases[surface]? + surfaces.winding(node)))
-        };
-        let nodes = || 0..surfaces.roots.len() as u32;
-        for (surface, winding) in nodes().filter_map(absolute) {
+        let absolute = |cell: &Cell| Some((cell.surface, bases[cell.surface]? + cell.relative));
+        for (surface, winding) in surfaces.cells.iter().filter_map(absolute) {
             least[surface] = least[surface].min(winding);
         }
-        let own = |node: u32| absolute(node).map(|(surface, winding)| winding - least[surface].max(0));
-        nodes().map(own).collect()
+        let own = |cell: &Cell| absolute(cell).map(|(surface, winding)| winding - least[surface].max(0));
+        let of_cells = surfaces.cells.iter().map(own).collect();
+        Windings { roots: &self.roots, of_root: surfaces.of_root, of_cells }
     }
 
     /// For each surface that was cut one of its triangles: one that crosses nothing if there is any, of the largest, of the first.
@@ -202,32 +227,42 @@ fn in_front(corners: [DVec3; 3]) -> (f64, [f64; 3]) {
     (area, (point + normal / area.max(f64::MIN_POSITIVE) * (largest * 9.1e-13)).to_array())
 }
 
+/// Winding numbers by cell.
+pub(crate) struct Windings<'c> {
+    roots: &'c [u32],
+    of_root: HashMap<u32, u32, Hashing>,
+    of_cells: Vec<Option<i32>>,
+}
+
+impl Windings<'_> {
+    /// In the cell of a node, if it is known.
+    pub(crate) fn at(&self, node: u32) -> Option<i32> {
+        self.of_cells[*self.of_root.get(&self.roots[node as usize])? as usize]
+    }
+}
+
+/// A cell along a surface that was cut.
+#[derive(Clone, Copy)]
+struct Cell {
+    surface: usize,
+    /// Its winding number against that of the first cell along the surface.
+    relative: i32,
+}
+
 /// Surfaces that were cut and hang together, each with the winding numbers of the cells along it against that of its first one.
-struct CutSurfaces {
-    /// By node: the node that stands for its cell.
-    roots: Vec<u32>,
-    /// By root.
-    surface_of: Vec<u32>,
-    relative: Vec<i32>,
+struct CutSurfaces<'c> {
+    roots: &'c [u32],
+    /// By root the place in the list.
+    of_root: HashMap<u32, u32, Hashing>,
+    cells: Vec<Cell>,
     /// By surface: all ways to a cell say the same of it.
     consistent: Vec<bool>,
 }
 
-impl CutSurfaces {
-    fn of(sides: &SpaceCells, cut: &Cut) -> Self {
-        let mut parents = sides.parents.clone();
-        let roots: Vec<u32> = (0..parents.len() as u32).map(|node| union_find::find(&mut parents, node)).collect();
-        let mut steps: Vec<(u32, u32, i32)> = Vec::with_capacity(2 * sides.steps.len());
-        for (front, back, step) in &sides.steps {
-            let (front, back) = (roots[*front as usize], roots[*back as usize]);
-            steps.push((front, back, *step));
-            steps.push((back, front, -step));
-        }
-        sort_by_number(&mut steps, |(_, back, _)| *back);
-        sort_by_number(&mut steps, |(front, ..)| *front);
-        steps.dedup();
-        let (surface_of, relative) = (vec![NONE; roots.len()], vec![0; roots.len()]);
-        let mut all = Self { roots, surface_of, relative, consistent: Vec::new() };
+impl<'c> CutSurfaces<'c> {
+    fn of(sides: &'c SpaceCells, cut: &Cut) -> Self {
+        let steps = sides.steps(cut);
+        let mut all = Self { roots: &sides.roots, of_root: HashMap::default(), cells: Vec::new(), consistent: Vec::new() };
         for piece in &cut.arrangement.pieces {
             all.follow(all.roots[piece.cells[0] as usize], &steps);
         }
@@ -236,35 +271,35 @@ impl CutSurfaces {
 
     /// Goes along a surface from one of its cells, unless it is known already.
     fn follow(&mut self, start: u32, steps: &[(u32, u32, i32)]) {
-        if self.surface_of[start as usize] != NONE {
+        if self.of_root.contains_key(&start) {
             return;
         }
         let surface = self.consistent.len();
         self.consistent.push(true);
-        self.surface_of[start as usize] = surface as u32;
-        let mut waiting = vec![start];
-        while let Some(at) = waiting.pop() {
+        self.of_root.insert(start, self.cells.len() as u32);
+        self.cells.push(Cell { surface, relative: 0 });
+        let mut waiting = vec![(start, 0)];
+        while let Some((at, winding)) = waiting.pop() {
             let first = steps.partition_point(|s| s.0 < at);
             for (_, to, step) in steps[first..].iter().take_while(|s| s.0 == at) {
-                let (to, winding) = (*to as usize, self.relative[at as usize] + step);
-                if self.surface_of[to] == NONE {
-                    self.surface_of[to] = surface as u32;
-                    self.relative[to] = winding;
-                    waiting.push(to as u32);
-                } else if self.relative[to] != winding {
+                let relative = winding + step;
+                let place = *self.of_root.entry(*to).or_insert(self.cells.len() as u32) as usize;
+                if place == self.cells.len() {
+                    self.cells.push(Cell { surface, relative });
+                    waiting.push((*to, relative));
+                } else if self.cells[place].relative != relative {
                     self.consistent[surface] = false;
                 }
             }
         }
     }
 
-    /// The surface along which a node's cell lies.
-    fn at(&self, node: u32) -> Option<usize> {
-        self.surface_of.get(self.roots[node as usize] as usize).filter(|s| **s != NONE).map(|s| *s as usize)
+    fn cell(&self, node: u32) -> Option<&Cell> {
+        self.of_root.get(&self.roots[node as usize]).map(|place| &self.cells[*place as usize])
     }
 
-    /// Of a node's cell, against the first one along its surface.
-    fn winding(&self, node: u32) -> i32 {
-        self.relative[self.roots[node as usize] as usize]
+    /// The surface along which a node's cell lies.
+    fn at(&self, node: u32) -> Option<usize> {
+        self.cell(node).map(|cell| cell.surface)
     }
 }

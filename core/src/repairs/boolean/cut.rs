@@ -41,12 +41,15 @@ impl Cut {
         in_play: impl Fn(u32) -> bool,
         threads: usize,
     ) -> Option<Self> {
-        let (submesh, edges) = work.edges();
+        let (_, edges) = work.edges();
         let in_play = |t: &u32| in_play(*t);
         let mut sources = crossing.clone();
         for edge in edges.iter().filter(|edge| edge.is_nonmanifold()) {
-            sources.extend(edge.uses.iter().map(|u| u.triangle).filter(in_play));
+            sources.extend(edge.uses.iter().map(|u| u.triangle()).filter(in_play));
         }
+        // Arranging takes much itself.
+        work.forget_edges();
+        let submesh: &Submesh = work;
         crossing.iter().for_each(|t| sources.extend((0..3).flat_map(|k| beside(submesh, *t, k)).filter(in_play)));
         for _ in 0..GROWTHS {
             let list: Vec<u32> = sources.iter().copied().collect();

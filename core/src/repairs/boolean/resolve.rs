@@ -118,7 +118,7 @@ pub(crate) fn resolve(
         return Ok(Resolved::default());
     }
     divide(survey, work, reversed, corners(survey, work, &overlay, &pairs), means)?;
-    let before = Before { triangles: work.triangles.clone(), reversed: reversed.clone() };
+    let before = Before { triangles: work.snapshot(), reversed: reversed.clone() };
     let largest = above(survey.bounds.largest_coordinate());
     let state = State {
         survey,
@@ -228,6 +228,7 @@ fn divide(
     positions: Vec<[f32; 3]>,
     means: &Means<'_>,
 ) -> Result<()> {
+    work.forget_edges();
     let Division { fetched, divided_from } = survey.divide(means.path, &positions, means.limits, means.progress)?;
     let first = work.extend_at(survey, &fetched, &positions);
     for t in first..work.triangles.len() as u32 {

@@ -24,12 +24,16 @@ const GROWTH: usize = 4;
 const FEW: usize = 1024;
 
 /// What cutting takes beside the submesh, for each of these meetings, for each pair that crosses and for each triangle of such. Measured: 160 MB for
-/// 49 000 triangles in 112 000 pairs, most of which overlap, 105 MB for 30 000 triangles in as many pairs that cross.
+/// 49 000 triangles in 112 000 pairs, most of which overlap; for as many triangles as pairs 160 MB (100 000, large ones) and 240 MB (110 000, small ones,
+/// with as many again around them).
 const BYTES_PER_MEETING: u64 = 48;
 
-pub(crate) const BYTES_PER_PAIR: u64 = 1024;
+pub(crate) const BYTES_PER_PAIR: u64 = 1280;
 
-pub(crate) const BYTES_PER_TRIANGLE: u64 = 3072;
+pub(crate) const BYTES_PER_TRIANGLE: u64 = 1280;
+
+/// What a triangle that is cut leaves: this many pieces, or nearly.
+const PIECES: u64 = 4;
 
 const WIDEST: f64 = 1.0 / 4096.0;
 
@@ -102,10 +106,12 @@ impl State<'_, '_, '_> {
     fn check_memory(&self, crossing: &[[u32; 2]], triangles: usize, limits: &Limits) -> Tried<()> {
         let meetings = meetings(|t| Bounds::of(&self.work.points(t)), crossing);
         let meetings = meetings.map_err(|worst| Stuck { failure: Failure::TooMany, triangles: vec![worst] })?;
-        let needed = budget::submesh_bytes(self.work.triangles.len() as u64, self.work.positions.len() as u64)
+        let (all, vertices) = (self.work.triangles.len() as u64, self.work.positions.len() as u64);
+        let cutting = budget::bare_submesh_bytes(all, vertices)
             + meetings * BYTES_PER_MEETING
             + crossing.len() as u64 * BYTES_PER_PAIR
             + triangles as u64 * BYTES_PER_TRIANGLE;
+        let needed = self.survey.heap_bytes() + cutting.max(budget::submesh_bytes(all + triangles as u64 * PIECES, vertices));
         if needed > limits.memory_bytes { Err(Halted::NoMemory { needed, triangles }) } else { Ok(()) }
     }
 

@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::detect::defects;
 use crate::geometry::distance::place;
 use crate::geometry::position::Position;
-use crate::repairs::boolean::cells::SpaceCells;
+use crate::repairs::boolean::cells::{SpaceCells, Windings};
 use crate::repairs::boolean::cut::Cut;
 use crate::repairs::boolean::state::{Failure, State, Stuck, Tried};
 use crate::repairs::cleanup::degenerate;
@@ -39,8 +39,8 @@ fn fate(front: Option<i32>, back: Option<i32>) -> Fate {
 
 impl State<'_, '_, '_> {
     /// Makes of the submesh what the windings say. Returns how far new vertices were moved.
-    pub(crate) fn apply(&mut self, cut: &Cut, sides: &SpaceCells, windings: &[Option<i32>]) -> Tried<f64> {
-        let of = |[front, back]: [u32; 2]| fate(windings[front as usize], windings[back as usize]);
+    pub(crate) fn apply(&mut self, cut: &Cut, sides: &SpaceCells, windings: &Windings<'_>) -> Tried<f64> {
+        let of = |[front, back]: [u32; 2]| fate(windings.at(front), windings.at(back));
         let fates: Vec<Fate> = cut.arrangement.pieces.iter().map(|piece| of(piece.cells)).collect();
         let unknown = cut.arrangement.pieces.iter().zip(&fates).filter(|(_, fate)| **fate == Fate::Unknown);
         let triangles: Vec<u32> = unknown.map(|(piece, _)| cut.sources[piece.source as usize]).collect();
@@ -99,7 +99,7 @@ impl State<'_, '_, '_> {
         let rounded = |point: u32| Position::of(cut.arrangement.points[point as usize].map(|x| place_of(x, step)));
         // There may be a vertex already, here or elsewhere in the file.
         self.complete(points.iter().map(|point| rounded(*point).coordinates()).collect());
-        let mut known = self.work.by_position();
+        let mut known = self.work.by_position_of(points.iter().map(|point| rounded(*point)));
         let mut vertex_of: Vec<Vertex> = cut.vertices.clone();
         for point in points {
             let position = rounded(point);

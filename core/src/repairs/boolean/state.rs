@@ -8,9 +8,10 @@ use crate::repairs::boolean::clusters::Clusters;
 use crate::repairs::boolean::track::Track;
 use crate::repairs::shared::overlay::{Overlay, Standing, Which};
 use crate::repairs::shared::region_report::Unsettled;
+use crate::repairs::shared::snapshot::Snapshot;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::Reversed;
-use crate::submesh::{Origin, Submesh, Triangle, Vertex};
+use crate::submesh::{Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 use crate::util::scatter::Hashing;
@@ -81,7 +82,7 @@ pub(crate) type Tried<T> = Result<T, Halted>;
 
 /// The mesh before an attempt, to go back to.
 pub(crate) struct Before {
-    pub(crate) triangles: Vec<Triangle>,
+    pub(crate) triangles: Snapshot,
     pub(crate) reversed: Reversed,
 }
 
@@ -152,7 +153,7 @@ pub(crate) fn join_in(work: &mut Work<'_>, reversed: &Reversed, t: u32) {
 
 /// Triangles on the same three vertices, by twos: they are in no pair that crosses.
 pub(crate) fn coincident(submesh: &Submesh) -> Vec<[u32; 2]> {
-    by_twos(&defects::by_vertex_set(submesh))
+    by_twos(&defects::shared_vertex_sets(submesh))
 }
 
 /// As [`coincident`], of triangles on the vertices of one of these.
@@ -329,10 +330,10 @@ impl State<'_, '_, '_> {
         let mut triangles = Vec::new();
         let (_, edges) = self.work.edges();
         for edge in edges.iter().filter(|edge| edge.uses.len() != 2 || edge.is_unbalanced()) {
-            let own = || edge.uses.iter().filter(|used| self.clusters.holds(used.triangle));
-            let balance: i64 = own().map(|used| if used.forward { 1 } else { -1 }).sum();
+            let own = || edge.uses.iter().filter(|used| self.clusters.holds(used.triangle()));
+            let balance: i64 = own().map(|used| if used.forward() { 1 } else { -1 }).sum();
             if balance != 0 {
-                triangles.extend(own().map(|used| used.triangle));
+                triangles.extend(own().map(|used| used.triangle()));
             }
         }
         if triangles.is_empty() { Ok(()) } else { Err(Stuck { failure: Failure::Opened, triangles }.into()) }

@@ -185,8 +185,8 @@ impl Rest {
 
     /// Those at an edge.
     fn at<'e>(&'e self, edge: &Edge<'e>) -> impl Iterator<Item = (u32, i64)> + 'e {
-        let uses = edge.uses.iter().filter(|u| self.0[u.triangle as usize]);
-        uses.map(|u| (u.triangle, if u.forward { 1 } else { -1 }))
+        let uses = edge.uses.iter().filter(|u| self.0[u.triangle() as usize]);
+        uses.map(|u| (u.triangle(), if u.forward() { 1 } else { -1 }))
     }
 
     /// One at an edge lacks a partner, whichever way round they are.

@@ -78,18 +78,18 @@ impl Walk<'_> {
         let submesh = self.submesh;
         let apex = |t: u32| submesh.triangles[t as usize].v.into_iter().find(|v| ![edge.low, edge.high].contains(v));
         let own = apex(t);
-        let is_forward = |t: u32| edge.uses.iter().any(|u| u.triangle == t && u.forward);
+        let is_forward = |t: u32| edge.uses.iter().any(|u| u.triangle() == t && u.forward());
         let along = is_forward(t) == (self.way[t as usize] == Way::AsDrawn);
         let (mut other, mut is_closed) = (None, true);
         for used in edge.uses {
-            let beyond = apex(used.triangle);
+            let beyond = apex(used.triangle());
             if beyond != own {
                 is_closed &= other.is_none_or(|known| known == beyond);
                 other = Some(beyond);
             }
-            let way = Way::of(used.forward == (along == (beyond == own)));
-            match std::mem::replace(&mut self.way[used.triangle as usize], way) {
-                Way::Unknown => surface.push(used.triangle),
+            let way = Way::of(used.forward() == (along == (beyond == own)));
+            match std::mem::replace(&mut self.way[used.triangle() as usize], way) {
+                Way::Unknown => surface.push(used.triangle()),
                 known => is_closed &= known == way,
             }
         }

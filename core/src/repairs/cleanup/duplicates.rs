@@ -161,7 +161,7 @@ pub(crate) fn spare(submesh: &Submesh, edges: &Edges, copies: &[u32]) -> Vec<u32
     // By set of copies that hang together: by how much more often its edges are used one way than the other without it, against now.
     let mut worse = vec![0i64; copies.len()];
     for around in uses.chunk_by(|a, b| a.0 == b.0) {
-        let now: i64 = edges.get(around[0].0 as usize).uses.iter().map(|u| if u.forward { 1 } else { -1 }).sum();
+        let now: i64 = edges.get(around[0].0 as usize).uses.iter().map(|u| if u.forward() { 1 } else { -1 }).sum();
         let without = now - around.iter().map(|(_, _, way)| way).sum::<i64>();
         worse[crate::util::union_find::find(&mut parents, around[0].1) as usize] += without.abs() - now.abs();
     }

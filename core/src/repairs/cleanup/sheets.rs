@@ -109,7 +109,7 @@ pub(crate) fn drop(
     // Nothing else of a lone sheet is open than the rims of sheets.
     let mut open_edges = vec![0usize; components.list.len()];
     for edge in edges.iter().filter(|e| e.is_boundary()) {
-        open_edges[components.of_triangle[edge.uses[0].triangle as usize] as usize] += 1;
+        open_edges[components.of_triangle[edge.uses[0].triangle() as usize] as usize] += 1;
     }
     let mut rim_edges = vec![0usize; open_edges.len()];
     for rim in rims {

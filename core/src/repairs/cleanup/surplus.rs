@@ -78,7 +78,7 @@ fn remove_of(survey: &Survey<'_>, work: &mut Work<'_>, through: Through) -> u64 
     let mut uses: Vec<[u32; 2]> = edges
         .iter()
         .map(|e| {
-            let forward = e.uses.iter().filter(|u| u.forward).count() as u32;
+            let forward = e.uses.iter().filter(|u| u.forward()).count() as u32;
             [forward, e.uses.len() as u32 - forward]
         })
         .collect();
@@ -166,11 +166,11 @@ fn sheets(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, through: Throug
     }
     for (edge, number) in edges.iter().zip(0..).filter(|(e, _)| !through.reaches(e)) {
         for used in edge.uses {
-            sheets[parts.of_triangle[used.triangle as usize] as usize].seams.push((number, used.forward));
+            sheets[parts.of_triangle[used.triangle() as usize] as usize].seams.push((number, used.forward()));
         }
     }
     for edge in edges.iter().filter(|e| e.is_boundary()) {
-        let rim = &mut sheets[parts.of_triangle[edge.uses[0].triangle as usize] as usize].rim;
+        let rim = &mut sheets[parts.of_triangle[edge.uses[0].triangle() as usize] as usize].rim;
         rim.0 += submesh.place(edge.low) + submesh.place(edge.high);
         rim.1 += 2.0;
     }
@@ -191,8 +191,8 @@ pub(crate) fn wanted_stars(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges
         .iter()
         .filter(|e| e.is_nonmanifold())
         .flat_map(|e| e.uses)
-        .filter(|u| !goes_on[sheets.of_triangle[u.triangle as usize] as usize])
-        .flat_map(|u| submesh.triangles[u.triangle as usize].v)
+        .filter(|u| !goes_on[sheets.of_triangle[u.triangle() as usize] as usize])
+        .flat_map(|u| submesh.triangles[u.triangle() as usize].v)
         .filter(|v| !submesh.complete[*v as usize])
         .collect();
     wanted.sort_unstable();

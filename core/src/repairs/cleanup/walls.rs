@@ -41,7 +41,7 @@ struct Sides<'s> {
 pub(crate) fn between(submesh: &Submesh, edges: &Edges, changed: Option<&[u32]>, diagonal: f64) -> Vec<Pair> {
     let mut starts: Vec<u32> = match changed {
         Some(changed) => changed.iter().copied().filter(|t| submesh.lives(*t)).collect(),
-        None => edges.iter().filter(is_of_rim).flat_map(|edge| edge.uses.iter().map(|u| u.triangle)).collect(),
+        None => edges.iter().filter(is_of_rim).flat_map(|edge| edge.uses.iter().map(|u| u.triangle())).collect(),
     };
     starts.sort_unstable();
     starts.dedup();
@@ -89,8 +89,8 @@ impl Sides<'_> {
                 };
                 match edge.uses {
                     [x, y] => {
-                        is_side &= x.forward != y.forward;
-                        let beyond = if x.triangle == t { y.triangle } else { x.triangle };
+                        is_side &= x.forward() != y.forward();
+                        let beyond = if x.triangle() == t { y.triangle() } else { x.triangle() };
                         match std::mem::replace(&mut self.number[beyond as usize], number) {
                             NONE => triangles.push(beyond),
                             // Of what was found to be none.
@@ -118,9 +118,9 @@ impl Sides<'_> {
         let edge = self.edges.get(self.edges.number(a, b)? as usize);
         let (mut others, mut same) = (Vec::new(), 0);
         for u in edge.uses {
-            let number = self.at(u.triangle);
+            let number = self.at(u.triangle());
             let Some(side) = &self.found[number as usize] else { continue };
-            if u.forward == forward {
+            if u.forward() == forward {
                 same += u32::from(side.rim == rim);
             } else {
                 let mut turned: Vec<[Vertex; 2]> = side.rim.iter().map(|[a, b]| [*b, *a]).collect();

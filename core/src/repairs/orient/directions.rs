@@ -72,8 +72,8 @@ pub(crate) fn make_coherent(survey: &Survey<'_>, work: &mut Work<'_>, reversed: 
     let mut turned = Turned::default();
     for edge in edges.iter() {
         if let [a, b] = edge.uses
-            && settled.get(a.triangle as usize) != Some(&true)
-            && !parity.relate(regions + a.triangle, regions + b.triangle, edge.is_inconsistent())
+            && settled.get(a.triangle() as usize) != Some(&true)
+            && !parity.relate(regions + a.triangle(), regions + b.triangle(), edge.is_inconsistent())
         {
             turned.contradictions += 1;
         }

@@ -127,11 +127,11 @@ impl Surface {
             match edge.uses {
                 [_] => {}
                 [a, b] => {
-                    let beside = area(a.triangle).min(area(b.triangle));
-                    let [a, b] = [a, b].map(|used| parts.of_triangle[used.triangle as usize]);
+                    let beside = area(a.triangle()).min(area(b.triangle()));
+                    let [a, b] = [a, b].map(|used| parts.of_triangle[used.triangle() as usize]);
                     *between.entry([a.min(b), a.max(b)]).or_insert(0) += beside;
                 }
-                uses => uses.iter().for_each(|used| at_odds[sheets.of_triangle[used.triangle as usize] as usize] = true),
+                uses => uses.iter().for_each(|used| at_odds[sheets.of_triangle[used.triangle() as usize] as usize] = true),
             }
         }
         let links = between.into_iter().filter(|([a, b], _)| a != b);

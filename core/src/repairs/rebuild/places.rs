@@ -39,7 +39,7 @@ pub(crate) fn find(cx: &mut Context<'_, '_>) -> Option<Vec<Place>> {
     }
     let wrong = edges.iter().filter(|e| e.uses.len() != 2 || e.is_inconsistent());
     let wrong = wrong.filter(|e| !left_open.contains(&[e.low, e.high]));
-    let mut seeds: BTreeSet<u32> = wrong.flat_map(|e| e.uses).map(|used| used.triangle).collect();
+    let mut seeds: BTreeSet<u32> = wrong.flat_map(|e| e.uses).map(|used| used.triangle()).collect();
     let on_purpose: BTreeSet<Vertex> = left_open.iter().flatten().copied().collect();
     for v in nonmanifold_vertices(submesh, cx.survey.threads()) {
         if !on_purpose.contains(&v) {

@@ -23,6 +23,7 @@ use crate::geometry::position::{self, Position};
 use crate::geometry::sums::step_at;
 use crate::geometry::tri_tri::{Contact, Triangle as Corners, triangles_cross};
 use crate::repairs::shared::overlay::{Overlay, Which};
+use crate::repairs::shared::snapshot::Snapshot;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Reversed, nonmanifold_vertices};
 use crate::submesh::edges::Edge;
@@ -64,7 +65,7 @@ pub(crate) fn separate(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reve
         return Separated::default();
     }
     let before = Before {
-        triangles: work.triangles.clone(),
+        triangles: work.snapshot(),
         taken: work.positions.iter().copied().map(Position::of).collect(),
         farthest: profile.max_separation_relative * survey.bounds.diagonal(),
     };
@@ -99,7 +100,7 @@ pub(crate) fn separate(survey: &Survey<'_>, work: &mut Work<'_>, reversed: &Reve
 
 /// The submesh as it was.
 struct Before {
-    triangles: Vec<Triangle>,
+    triangles: Snapshot,
     /// Positions of its vertices.
     taken: HashSet<Position>,
     /// How far the profile lets a copy go.
@@ -248,7 +249,7 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
         let crowded =
             edges.iter().filter(|e| e.is_nonmanifold() && [e.low, e.high].iter().all(|v| radial.fans(submesh, *v).is_some()));
         let in_order = |edge: Edge<'_>| {
-            let forward = edge.uses.iter().filter(|u| u.forward);
+            let forward = edge.uses.iter().filter(|u| u.forward());
             let mut pairs: Vec<[Half; 2]> = forward
                 .filter_map(|u| {
                     let half = Half::of(submesh, &edge, u);
@@ -384,7 +385,7 @@ impl<'w, 's, 'b> Apart<'w, 's, 'b> {
     }
 
     fn points_before(&self, t: u32) -> Corners {
-        self.before.triangles[t as usize].v.map(|v| self.work.positions[v as usize])
+        self.before.triangles.corners(t).map(|v| self.work.positions[v as usize])
     }
 
     fn add(&mut self, copy: Copy, position: Point) -> Vertex {

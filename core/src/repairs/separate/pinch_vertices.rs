@@ -20,7 +20,7 @@ use crate::repairs::shared::overlay::Overlay;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Reversed, nonmanifold_vertices};
 use crate::submesh::radial::RadialPairs;
-use crate::submesh::{Origin, Submesh, Triangle, Vertex};
+use crate::submesh::{Origin, Submesh, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 
@@ -73,7 +73,7 @@ pub(crate) fn unpin(
     for v in vertices.iter().take(MOST) {
         all.extend(Pinned::at(submesh, &radial, *v, limit).map(|pinned| (*v, pinned)));
     }
-    let before: Vec<Triangle> = submesh.triangles.clone();
+    let before = work.snapshot();
     let met_before: HashSet<Vertex> = vertices.iter().copied().collect();
     for _ in 0..ROUNDS {
         if all.is_empty() {
@@ -180,7 +180,7 @@ fn blamed(
     let added = first..work.triangles.len() as u32;
     let mut blamed: BTreeSet<Vertex> = added.clone().filter(|t| work.is_collinear(*t)).filter_map(by).collect();
     let (submesh, edges) = work.edges();
-    let of_pairs = edges.iter().filter(|edge| edge.uses.len() > 2).flat_map(|edge| edge.uses).map(|used| used.triangle);
+    let of_pairs = edges.iter().filter(|edge| edge.uses.len() > 2).flat_map(|edge| edge.uses).map(|used| used.triangle());
     blamed.extend(of_pairs.filter_map(by));
     let met: HashSet<Vertex> =
         nonmanifold_vertices(submesh, survey.threads()).into_iter().filter(|v| !met_before.contains(v)).collect();

@@ -191,7 +191,7 @@ impl Mouths {
     ) {
         let mut rest: Vec<(u32, [u32; 2])> = Vec::new();
         for edge in edges.iter().filter(|edge| edge.is_unbalanced() || edge.is_nonmanifold()) {
-            let component = components.of_triangle[edge.uses[0].triangle as usize];
+            let component = components.of_triangle[edge.uses[0].triangle() as usize];
             let Some(mouth) = self.mouths.get_mut(component as usize) else { continue };
             mouth.is_unclear |= edge.is_nonmanifold();
             if !edge.is_unbalanced() {
@@ -338,7 +338,7 @@ fn one_sided(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges) -> Vec<bool>
     }
     for edge in edges.iter() {
         if let [a, b] = edge.uses {
-            relate(regions + a.triangle, regions + b.triangle, edge.is_inconsistent());
+            relate(regions + a.triangle(), regions + b.triangle(), edge.is_inconsistent());
         }
     }
     let mut is_one_sided = |t: u32| {

@@ -10,5 +10,6 @@ pub(crate) mod overlay;
 pub(crate) mod pieces;
 pub(crate) mod probes;
 pub(crate) mod region_report;
+pub(crate) mod snapshot;
 pub(crate) mod unsaid;
 pub(crate) mod work;

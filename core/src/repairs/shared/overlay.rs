@@ -1,6 +1,6 @@
 //! The surface as the repairs have left it: the file's records, less those that are gone, with what the submesh has instead.
 
-use crate::detect::fresh;
+use crate::detect::fresh::{self, Listed};
 use crate::geometry::position;
 use crate::geometry::tri_tri::{self, Contact, Triangle as Corners};
 use crate::io::record;
@@ -102,6 +102,11 @@ impl Overlay {
         self.records + changed
     }
 
+    /// Changed triangles by their places in a list.
+    fn numbered(&self, submesh: &Submesh, list: &[u32]) -> impl Fn(usize) -> (u32, Corners) + Sync {
+        move |i| (self.number(list[i]), submesh.points(list[i]))
+    }
+
     /// The record or the triangle of the submesh that a number stands for.
     pub(crate) fn which(&self, number: Standing) -> Which {
         match self.changed_of(number) {
@@ -154,11 +159,12 @@ impl Overlay {
         submesh: &Submesh,
         fresh: impl Fn(u32) -> bool,
     ) -> Option<Vec<StandingPair>> {
-        let numbered = |t: &u32| (self.number(*t), submesh.points(*t));
+        let (fresh, beside): (Vec<u32>, Vec<u32>) = self.changed.iter().partition(|t| fresh(**t));
+        let [of_fresh, of_beside] = [&fresh, &beside].map(|list| self.numbered(submesh, list));
         let found = fresh::met_by(
             survey,
-            self.changed.iter().filter(|t| fresh(**t)).map(numbered),
-            self.changed.iter().filter(|t| !fresh(**t)).map(numbered),
+            Listed { count: fresh.len(), of: &of_fresh },
+            Listed { count: beside.len(), of: &of_beside },
             |place| self.is_gone(place),
             u64::from(self.records) + submesh.triangles.len() as u64,
             fresh::self_intersection,
@@ -178,11 +184,12 @@ impl Overlay {
     ) -> Option<Vec<[Held; 2]>> {
         let first = self.records.checked_add(submesh.triangles.len() as u32)?;
         let total = first.checked_add(count)?;
-        let beside = self.changed.iter().filter(|t| stays(**t)).map(|t| (self.number(*t), submesh.points(*t)));
+        let beside: Vec<u32> = self.changed.iter().copied().filter(|t| stays(*t)).collect();
+        let (of_beside, of_others) = (self.numbered(submesh, &beside), |i: usize| (first + others[i].0, others[i].1));
         let found = fresh::met_by(
             survey,
-            others.iter().map(|(number, corners)| (first + number, *corners)),
-            beside,
+            Listed { count: others.len(), of: &of_others },
+            Listed { count: beside.len(), of: &of_beside },
             |record| self.is_gone(record) || goes(record),
             u64::from(total),
             fresh::self_intersection,
@@ -203,10 +210,13 @@ impl Overlay {
         };
         let mut asked: Vec<u32> = of.iter().filter_map(|t| as_read(*t)).collect();
         asked.sort_unstable();
+        let beside: Vec<u32> = self.changed.iter().copied().filter(|t| of.binary_search(t).is_err()).collect();
+        let of_fresh = |i: usize| (as_read(of[i]).unwrap_or(self.number(of[i])), submesh.points(of[i]));
+        let of_beside = self.numbered(submesh, &beside);
         let found = fresh::met_by(
             survey,
-            of.iter().map(|t| (as_read(*t).unwrap_or(self.number(*t)), submesh.points(*t))),
-            self.changed.iter().filter(|t| of.binary_search(t).is_err()).map(|t| (self.number(*t), submesh.points(*t))),
+            Listed { count: of.len(), of: &of_fresh },
+            Listed { count: beside.len(), of: &of_beside },
             |place| self.is_gone(place) || asked.binary_search(&place).is_ok(),
             u64::from(self.records) + submesh.triangles.len() as u64,
             tri_tri::edge_along_edge,

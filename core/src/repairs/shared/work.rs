@@ -8,12 +8,14 @@ use std::sync::Arc;
 
 use crate::contract::report::RepairName;
 use crate::geometry::position::Position;
+use crate::repairs::shared::snapshot::Snapshot;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::submesh::edges::Edges;
 use crate::submesh::{Origin, Submesh, Triangle, Vertex};
 use crate::topology::chunk::IrregularTriangle;
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
+use crate::util::lean;
 use crate::util::steps;
 
 /// A pass that makes sure of something about every triangle, or every set of three vertices, which holds until one of the triangles
@@ -35,6 +37,8 @@ pub(crate) struct Work<'a> {
     /// How many of these each pass has seen; `None`: it has to look at everything.
     seen: [Option<usize>; 3],
     journal: Option<Journal>,
+    /// Triangles that were attributed to a repair, with their origin before.
+    attributed: Vec<(u32, Origin)>,
     /// Counts the changes.
     version: u64,
     /// Who changes it.
@@ -59,7 +63,17 @@ impl Deref for Work<'_> {
 
 impl<'a> Work<'a> {
     pub(crate) fn new(submesh: &'a mut Submesh) -> Self {
-        Self { submesh, edges: None, components: None, changed: Vec::new(), seen: [None; 3], journal: None, version: 0, by: None }
+        Self {
+            submesh,
+            edges: None,
+            components: None,
+            changed: Vec::new(),
+            seen: [None; 3],
+            journal: None,
+            attributed: Vec::new(),
+            version: 0,
+            by: None,
+        }
     }
 
     /// The mesh with its edges. O(submesh) after a change, O(1) else.
@@ -81,6 +95,11 @@ impl<'a> Work<'a> {
     /// The edges as they are now, to be kept while the mesh changes.
     pub(crate) fn take_edges(&mut self) -> Edges {
         self.edges.take().unwrap_or_else(|| Edges::of(self.submesh))
+    }
+
+    /// Gives the memory of edges and components back, before it is needed for what changes the mesh.
+    pub(crate) fn forget_edges(&mut self) {
+        (self.edges, self.components) = (None, None);
     }
 
     /// What may have changed since `pass` asked last, ascending, each once; `None`: it has to look at everything.
@@ -199,14 +218,15 @@ impl<'a> Work<'a> {
     /// A triangle is of this repair's making.
     pub(crate) fn attribute(&mut self, t: u32, to: RepairName) {
         self.note(t);
-        self.submesh.triangles[t as usize].origin = Origin::Added(to);
+        let origin = &mut self.submesh.triangles[t as usize].origin;
+        self.attributed.push((t, std::mem::replace(origin, Origin::Added(to))));
     }
 
     /// Adds a triangle and returns its number.
     pub(crate) fn add(&mut self, v: [Vertex; 3], origin: Origin, region: u32) -> u32 {
         self.touch();
         let t = self.submesh.add(v, origin, region);
-        self.changed.push(t);
+        lean::push(&mut self.changed, t);
         t
     }
 
@@ -266,15 +286,16 @@ impl<'a> Work<'a> {
         self.submesh.relink();
     }
 
+    /// All triangles as they are, to be put back to.
+    pub(crate) fn snapshot(&self) -> Snapshot {
+        Snapshot::of(&self.submesh.triangles, self.attributed.len())
+    }
+
     /// Puts all triangles back to what they were. O(submesh); passes look only at what was another one meanwhile.
-    pub(crate) fn restore(&mut self, before: &[Triangle]) {
+    pub(crate) fn restore(&mut self, before: &Snapshot) {
         self.touch();
         self.journal = None;
-        let back = (0..).zip(self.submesh.triangles.iter().zip(before));
-        self.changed.extend(back.filter(|(_, (now, old))| now.v != old.v || now.alive != old.alive).map(|(t, _)| t));
-        self.changed.extend(self.submesh.triangles.len() as u32..before.len() as u32);
-        self.submesh.triangles.clear();
-        self.submesh.triangles.extend_from_slice(before);
+        self.changed.extend(before.put_back(&mut self.submesh.triangles, &mut self.attributed));
         self.submesh.relink();
     }
 
@@ -330,7 +351,7 @@ mod tests {
         let moved: Vec<u32> = work.star(3).map(|(t, _)| t).collect();
         work.merge(0, 3);
         assert_eq!(work.changed_for(Pass::Copies).map(|c| c.len()), Some(moved.len()));
-        let before = work.triangles.clone();
+        let before = work.snapshot();
         let gone = work.add([0, 1, 4], Origin::Added(RepairName::Fill), NONE);
         assert_eq!(work.changed_for(Pass::Copies), Some(vec![gone]));
         work.kill(1);

@@ -100,10 +100,12 @@ impl Sewing<'_, '_, '_> {
 
     /// Splits edges where the vertices of rims differ, and matches and joins then; as [`Self::join`].
     fn split(&mut self, width: &Width, sewn: &mut Sewn) -> Option<Vec<u32>> {
-        let boundary = self.boundary();
-        let (submesh, edges) = self.work.edges();
-        let mut wanted = splits::wanted(submesh, edges, &Rims::of(&boundary, submesh, width, &[]), self.survey.threads());
-        let before = self.work.triangles.clone();
+        let mut wanted = {
+            let boundary = self.boundary();
+            let (submesh, edges) = self.work.edges();
+            splits::wanted(submesh, edges, &Rims::of(&boundary, submesh, width, &[]), self.survey.threads())
+        };
+        let before = self.work.snapshot();
         for _ in 0..TRIES {
             if wanted.is_empty() {
                 break;
@@ -142,6 +144,12 @@ impl Sewing<'_, '_, '_> {
             chosen = clusters::of(submesh, &rims, &matches);
         }
         let clusters::Chosen { clusters, widest, .. } = chosen;
+        if !clusters.is_empty() {
+            // It will be another one.
+            drop((rims, matches));
+            drop(boundary);
+            self.known = None;
+        }
         let (Welded { vertices, taken_back }, target) =
             weld::weld_clusters(self.survey, self.work, clusters, weld::Moves::Steady);
         if taken_back > 0 {

@@ -28,7 +28,7 @@ pub(crate) fn split_edges(work: &mut Work<'_>, tolerance: &Tolerance, threads: u
     let mut count = 0;
     for group in on.chunk_by(|a, b| a.edge == b.edge) {
         let edge = edges.get(group[0].edge as usize);
-        let t = edge.uses[0].triangle;
+        let t = edge.uses[0].triangle();
         if !work.triangles[t as usize].alive {
             continue;
         }

@@ -7,10 +7,11 @@ use crate::contract::report::RepairName;
 use crate::contract::settings::Bodies;
 use crate::geometry::distance::cosine;
 use crate::repairs::shared::context::{Changes, Done, Repair};
+use crate::repairs::shared::snapshot::Snapshot;
 use crate::repairs::shared::work::Work;
 use crate::submesh::edges::Edges;
 use crate::submesh::near::{self, Tolerance};
-use crate::submesh::{Submesh, Triangle, Vertex};
+use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 
@@ -77,7 +78,7 @@ pub(crate) fn weld_clusters(
         return (result, None);
     }
     let edges = work.take_edges();
-    let before = work.triangles.clone();
+    let before = work.snapshot();
     for _ in 0..ATTEMPTS {
         if clusters.is_empty() {
             return (result, None);
@@ -104,12 +105,13 @@ pub(crate) fn weld_clusters(
 }
 
 /// Marks the clusters with a corner of a triangle that was turned over or flattened.
-fn spoiled(submesh: &Submesh, before: &[Triangle], clusters: &[Vec<Vertex>], bad: &mut [bool]) {
+fn spoiled(submesh: &Submesh, before: &Snapshot, clusters: &[Vec<Vertex>], bad: &mut [bool]) {
     let of_vertex = of_vertices(submesh.positions.len(), clusters);
     let normal = |v: [Vertex; 3]| submesh.vector(v[0], v[1]).cross(submesh.vector(v[0], v[2]));
-    for (old, now) in before.iter().zip(&submesh.triangles).filter(|(old, now)| now.alive && old.v != now.v) {
-        if cosine(normal(old.v), normal(now.v)) < STEADY {
-            for v in old.v {
+    let both = (0..before.len() as u32).map(|t| before.corners(t)).zip(&submesh.triangles);
+    for (old, now) in both.filter(|(old, now)| now.alive && *old != now.v) {
+        if cosine(normal(old), normal(now.v)) < STEADY {
+            for v in old {
                 if let Some(b) = bad.get_mut(of_vertex[v as usize] as usize) {
                     *b = true;
                 }

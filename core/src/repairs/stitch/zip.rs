@@ -61,7 +61,7 @@ pub(crate) fn zip(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Toleranc
     if pairs.is_empty() {
         return 0;
     }
-    let before = work.triangles.clone();
+    let before = work.snapshot();
     for _ in 0..ATTEMPTS {
         let merged = merge(work, &pairs);
         let bad: BTreeSet<[Vertex; 2]> =
@@ -163,7 +163,7 @@ fn fans(submesh: &Submesh, v: Vertex) -> usize {
 fn ends(submesh: &Submesh, edges: &Edges) -> Vec<DVec3> {
     let mut all = vec![DVec3::ZERO; submesh.positions.len()];
     for edge in edges.iter().filter(Edge::is_boundary) {
-        let t = edge.uses[0].triangle;
+        let t = edge.uses[0].triangle();
         let Some(apex) = submesh.triangles[t as usize].v.into_iter().find(|v| *v != edge.low && *v != edge.high) else {
             continue;
         };

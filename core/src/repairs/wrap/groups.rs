@@ -50,8 +50,8 @@ impl Groups {
         };
         let of = |t: u32| pieces.of_triangle[t as usize];
         for edge in edges.iter().filter(|e| e.uses.len() != 2 || e.is_inconsistent()) {
-            edge.uses.windows(2).for_each(|pair| groups.unite(of(pair[0].triangle), of(pair[1].triangle)));
-            edge.uses.iter().for_each(|u| groups.broken[of(u.triangle) as usize] = true);
+            edge.uses.windows(2).for_each(|pair| groups.unite(of(pair[0].triangle()), of(pair[1].triangle())));
+            edge.uses.iter().for_each(|u| groups.broken[of(u.triangle()) as usize] = true);
         }
         for v in components::nonmanifold_vertices(submesh, survey.threads()) {
             let around: Vec<u32> = submesh.star(v).map(|(t, _)| of(t)).collect();

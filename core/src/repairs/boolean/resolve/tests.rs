@@ -304,7 +304,7 @@ fn bodies_whose_faces_lie_in_planes_that_f32_cannot_hold_are_spread_by_some_step
             first_triangle: work.triangles.len() as u32,
             first_vertex: work.positions.len() as Vertex,
             step: above(survey.bounds.largest_coordinate()) * FINEST,
-            before: Before { triangles: work.triangles.clone(), reversed: turned.clone() },
+            before: Before { triangles: work.snapshot(), reversed: turned.clone() },
             survey,
             work,
             reversed: turned,

@@ -105,13 +105,13 @@ fn closed(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, bodies: &Compon
     let normal = |t: u32| Facet::of(&submesh.points(t), 0).normal;
     for edge in edges.iter() {
         if let [a, b] = edge.uses
-            && is_patch(submesh, a.triangle) != is_patch(submesh, b.triangle)
-            && let Some(body) = closed.get_mut(bodies.of_triangle[a.triangle as usize] as usize)
+            && is_patch(submesh, a.triangle()) != is_patch(submesh, b.triangle())
+            && let Some(body) = closed.get_mut(bodies.of_triangle[a.triangle() as usize] as usize)
         {
             let length = submesh.distance(edge.low, edge.high);
-            let of_surface = if is_patch(submesh, a.triangle) { b } else { a };
+            let of_surface = if is_patch(submesh, a.triangle()) { b } else { a };
             body.length += length;
-            body.around += length * normal(of_surface.triangle);
+            body.around += length * normal(of_surface.triangle());
         }
     }
     closed

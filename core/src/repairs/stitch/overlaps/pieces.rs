@@ -12,6 +12,7 @@ use crate::repairs::shared::work::Work;
 use crate::repairs::stitch::layer::{Facet, Reach, RimEdge, around};
 use crate::submesh::Submesh;
 use crate::submesh::components::{Component, Components};
+use crate::submesh::edges::Edge;
 use crate::submesh::near::Tolerance;
 use crate::topology::survey::Survey;
 use crate::util::parallel;
@@ -70,13 +71,15 @@ impl Pieces {
     pub(super) fn of(survey: &Survey<'_>, work: &mut Work<'_>, tolerance: &Tolerance) -> Self {
         let components = work.components(survey);
         let (submesh, edges) = work.edges();
-        let rims = edges.iter().filter(|e| e.is_boundary()).map(|e| {
-            let t = e.uses[0].triangle;
+        let boundary = || edges.iter().filter(Edge::is_boundary);
+        let of_edge = |e: Edge<'_>| {
+            let t = e.uses[0].triangle();
             let facet = Facet::of(&submesh.points(t), components.of_triangle[t as usize]);
             let ends = [submesh.place(e.low), submesh.place(e.high)];
             (RimEdge { ends, normal: facet.normal, piece: facet.piece }, facet.height() * tolerance.edge_share)
-        });
-        let mut rims: Vec<_> = rims.collect();
+        };
+        let mut rims = Vec::with_capacity(boundary().count());
+        rims.extend(boundary().map(of_edge));
         rims.sort_by_key(|(rim, _)| rim.piece);
         let sizes = components.list.iter().map(|c| c.bounds.diagonal()).collect();
         Self { components, rims, sizes, weld: tolerance.weld }

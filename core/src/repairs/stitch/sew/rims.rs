@@ -96,10 +96,11 @@ impl Boundary {
         let components = work.components(survey);
         let (submesh, edges) = work.edges();
         let rim_edge = |(edge, number): (Edge<'_>, u32)| {
-            let (ends, triangle): ([Vertex; 2], u32) = (edge.directed(&edge.uses[0]).into(), edge.uses[0].triangle);
+            let (ends, triangle): ([Vertex; 2], u32) = (edge.directed(&edge.uses[0]).into(), edge.uses[0].triangle());
             RimEdge { ends, triangle, number, inward: inward(submesh, triangle, ends) }
         };
-        let all: Vec<RimEdge> = edges.iter().zip(0..).filter(|(e, _)| e.is_boundary()).map(rim_edge).collect();
+        let mut all: Vec<RimEdge> = Vec::with_capacity(edges.iter().filter(Edge::is_boundary).count());
+        all.extend(edges.iter().zip(0..).filter(|(e, _)| e.is_boundary()).map(rim_edge));
         let vertices = boundary_vertices(edges);
         let middles = || BoxTree::new(&all.iter().map(|e| middle(submesh, e.ends, 0.0)).collect::<Vec<_>>());
         let rims = || {
@@ -227,7 +228,7 @@ fn by_vertex(submesh: &Submesh, edges: &Edges) -> Vec<Vertex> {
 /// Which components are bodies with holes, by all rims together and by each.
 fn bodies(survey: &Survey<'_>, submesh: &Submesh, edges: &Edges, components: &Components, rim_of: &[Vertex]) -> Vec<[bool; 2]> {
     let rims = edges.iter().filter(|e| e.is_boundary());
-    let of = |e: &Edge<'_>| components.of_triangle[e.uses[0].triangle as usize];
+    let of = |e: &Edge<'_>| components.of_triangle[e.uses[0].triangle() as usize];
     let mut lengths: Vec<(u32, u32, f64)> =
         rims.map(|e| (of(&e), rim_of[e.low as usize], submesh.distance(e.low, e.high))).collect();
     lengths.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2)));

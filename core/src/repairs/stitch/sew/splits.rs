@@ -78,7 +78,7 @@ pub(crate) fn make(work: &mut Work<'_>, wanted: &[OnEdge]) -> Vec<Split> {
     let mut made = Vec::new();
     for group in wanted.chunk_by(|a, b| a.edge == b.edge) {
         let edge = edges.get(group[0].edge as usize);
-        let t = edge.uses[0].triangle;
+        let t = edge.uses[0].triangle();
         if !work.triangles[t as usize].alive {
             continue;
         }

@@ -2,6 +2,8 @@
 
 use std::io::{BufRead, BufReader, Write};
 
+use rustix::process::Signal;
+use suture_bench::generate::Case;
 use suture_tests::Place;
 use suture_tests::hot::holes;
 use suture_tests::http::Client;
@@ -98,6 +100,41 @@ fn metrics_and_the_log_agree() {
         assert!(value(name) > 0.0, "{name}");
     }
     assert!(!text.contains(".stl"), "no file's name");
+}
+
+/// The store comes back from half a snapshot, from its loss, and from a kill in the midst of work; a start after a good end counts nothing.
+#[test]
+fn f04_recoveries_of_the_store_are_counted() {
+    let place = Place::new();
+    let recoveries = |daemon: &Served| {
+        let text = String::from_utf8(Client::of(daemon).get("/metrics").expect(200).body).unwrap();
+        let value = |kind: &str| -> u64 {
+            let name = format!("suture_store_recoveries_total{{kind=\"{kind}\"}} ");
+            text.lines().find_map(|line| line.strip_prefix(&name)?.parse().ok()).unwrap_or_else(|| panic!("{kind}: {text}"))
+        };
+        ["torn_snapshot", "damage", "receipts", "unfinished"].map(value)
+    };
+    let serve = || Served::start(&place, &LISTENING, "log");
+    let daemon = serve();
+    place.put("hot/in/part.stl", &holes(1));
+    wait_until("it is done", || !daemon.lines("Done.").is_empty());
+    assert_eq!(recoveries(&daemon), [0, 0, 0, 0]);
+    daemon.signal(Signal::TERM);
+    assert!(daemon.ended().success());
+    assert_eq!(recoveries(&serve()), [0, 0, 0, 0], "a good end");
+    place.put("hot/.suture/state/db/snap.0000000000000001.generating", b"half");
+    assert_eq!(recoveries(&serve()), [1, 0, 0, 0]);
+    std::fs::remove_dir_all(place.at("hot/.suture/state")).unwrap();
+    let daemon = serve();
+    assert_eq!(recoveries(&daemon), [0, 0, 1, 0]);
+    // Killed while a worker has it: large enough to be seen at that.
+    std::fs::rename(place.generate(Case::Mixed, 300_000, 1).0, place.at("hot/in/large.stl")).unwrap();
+    let client = Client::of(&daemon);
+    wait_until("it is in work", || {
+        client.get("/v1/jobs?state=running").json()["jobs"].as_array().is_some_and(|jobs| !jobs.is_empty())
+    });
+    drop(daemon);
+    assert_eq!(recoveries(&serve()), [0, 0, 0, 1]);
 }
 
 #[test]

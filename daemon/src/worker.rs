@@ -5,13 +5,14 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use suture_core::report::Task;
-use suture_core::{Access, Error, Progress, Report};
+use suture_core::{Access, Error, ErrorClass, Progress, Report};
 
 use crate::cli::WorkerArgs;
 use crate::confine;
 use crate::create;
 use crate::fsx::Identity;
 use crate::protocol::{Message, Request};
+use crate::units::show_size;
 
 /// Progress is told at most this often, and at the beginning of a stage.
 const PROGRESS_EVERY: Duration = Duration::from_millis(100);
@@ -72,14 +73,30 @@ fn say(message: &Message) -> io::Result<()> {
 fn answer(request: &Request) -> Message {
     #[cfg(feature = "crash-points")]
     hook::act(request);
+    let length = std::fs::metadata(&request.input).map_or(0, |meta| meta.len());
+    let bound = confine::bound_files(confine::file_bound(length, request.limits.memory_bytes));
     match work(request) {
         Ok(report) => {
             let output = request.output.as_deref().filter(|_| report.output.is_some());
             let written = output.and_then(|path| std::fs::metadata(path).ok()).map(|meta| Identity::from(&meta));
             Message::Done { report: Box::new(report), written }
         }
+        Err(error) if is_too_large(&error) => Message::Failed {
+            // Another try would write as much.
+            class: ErrorClass::Refused,
+            message: format!("{}; {}", named(&error, request), too_large(bound)),
+        },
         Err(error) => Message::Failed { class: error.class(), message: named(&error, request) },
     }
+}
+
+/// Would a file have grown beyond what is allowed, here or by its file system?
+fn is_too_large(error: &Error) -> bool {
+    matches!(error, Error::Io { source, .. } if source.kind() == io::ErrorKind::FileTooLarge)
+}
+
+fn too_large(bound: u64) -> String {
+    format!("no file of this work may have more than {}, and its file system may allow less", show_size(bound))
 }
 
 /// The error's line, with the file's own name instead of the claimed or temporary one.

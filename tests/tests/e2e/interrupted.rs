@@ -3,12 +3,13 @@
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Child, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, kill_process};
 use suture_bench::generate::Case;
-use suture_tests::hot::mesh;
+use suture_tests::hot::{holes, mesh};
+use suture_tests::served::jobs;
 use suture_tests::{Place, stl};
 
 /// `suture repair` of a file large enough to be caught at work, and its worker, which has mapped it.
@@ -54,6 +55,47 @@ fn assert_ends(place: &Place, mut child: Child, code: i32, words: &str) {
 
 fn is_there(process: Pid) -> bool {
     Path::new(&format!("/proc/{}", process.as_raw_nonzero())).exists()
+}
+
+/// No core dump, few open files, and files of a size that follows from the input's and the memory's.
+#[test]
+fn a_worker_is_bounded() {
+    let place = Place::new();
+    let (mut child, worker) = at_work(&place);
+    let limits = std::fs::read_to_string(format!("/proc/{}/limits", worker.as_raw_nonzero())).unwrap();
+    kill_process(Pid::from_child(&child), Signal::KILL).unwrap();
+    child.wait().unwrap();
+    let limit =
+        |name: &str| limits.lines().find_map(|line| line.strip_prefix(name)?.split_whitespace().next()?.parse::<u64>().ok());
+    assert_eq!((limit("Max core file size"), limit("Max open files")), (Some(0), Some(256)), "{limits}");
+    let input = place.read("mixed.stl").len() as u64;
+    assert_eq!(limit("Max file size"), Some(8 * input + (4 << 30) + (64 << 20)), "{limits}");
+}
+
+/// What is written grows beyond what is allowed: the file fails at once with a line that says so, and the next one is done.
+#[test]
+fn work_that_would_write_too_much_fails_with_a_line() {
+    const MOST: u64 = 8 << 20;
+    let place = Place::new();
+    place.put("hot/in/small.stl", &holes(1));
+    std::fs::rename(place.generate(Case::Mixed, 300_000, 1).0, place.at("hot/in/large.stl")).unwrap();
+    let limited = |words: &[&str]| {
+        let mut command = Command::new("prlimit");
+        command.current_dir(place.at("")).arg(format!("--fsize={MOST}")).arg(suture_tests::binary::suture()).args(words);
+        command.output().unwrap()
+    };
+    let words = "no file of this work may have more than 8.4 MB, and its file system may allow less";
+    let ended = limited(&["repair", "hot/in/large.stl", "-o", "out.stl"]);
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert!(ended.status.code() == Some(2) && said.lines().count() == 1 && said.contains(words), "{}: {said}", ended.status);
+    assert!(!place.at("out.stl").exists());
+    let ended = limited(&["watch", "hot", "--once", "--settle", "30ms", "--workers", "1"]);
+    assert_eq!(ended.status.code(), Some(1), "{}", String::from_utf8_lossy(&ended.stderr));
+    let listed = jobs(&place, "hot");
+    let of = |name: &str| listed.iter().find(|job| job["source"]["path"] == name).unwrap();
+    assert_eq!((&of("small.stl")["kind"], &of("large.stl")["kind"]), (&"done".into(), &"failed".into()), "{listed:?}");
+    assert_eq!(of("large.stl")["attempts"], 1);
+    assert!(of("large.stl")["state"].to_string().contains(words), "{}", of("large.stl"));
 }
 
 #[test]

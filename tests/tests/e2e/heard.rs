@@ -2,13 +2,13 @@
 
 use std::io::{BufRead, BufReader, Write};
 
-use rustix::process::Signal;
+use rustix::process::{Signal, kill_process};
 use suture_bench::generate::Case;
 use suture_tests::Place;
 use suture_tests::hot::holes;
 use suture_tests::http::Client;
 use suture_tests::openapi::document;
-use suture_tests::served::{Served, wait_until};
+use suture_tests::served::{Served, wait_until, worker_of};
 
 const LISTENING: [&str; 5] = ["hot", "--settle", "30ms", "--listen", "127.0.0.1:0"];
 
@@ -127,13 +127,13 @@ fn f04_recoveries_of_the_store_are_counted() {
     std::fs::remove_dir_all(place.at("hot/.suture/state")).unwrap();
     let daemon = serve();
     assert_eq!(recoveries(&daemon), [0, 0, 1, 0]);
-    // Killed while a worker has it: large enough to be seen at that.
+    // Killed while a worker has it, which is stopped over it.
     std::fs::rename(place.generate(Case::Mixed, 300_000, 1).0, place.at("hot/in/large.stl")).unwrap();
-    let client = Client::of(&daemon);
-    wait_until("it is in work", || {
-        client.get("/v1/jobs?state=running").json()["jobs"].as_array().is_some_and(|jobs| !jobs.is_empty())
-    });
+    let at_work = || worker_of(daemon.pid(), "/.suture/work/");
+    wait_until("it is in work", || at_work().is_some_and(|worker| kill_process(worker, Signal::STOP).is_ok()));
+    let worker = at_work().expect("it was stopped before it had an answer");
     drop(daemon);
+    kill_process(worker, Signal::CONT).unwrap();
     assert_eq!(recoveries(&serve()), [0, 0, 0, 1]);
 }
 

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use rustix::process::{Pid, Signal, kill_process};
 use suture_bench::generate::Case;
 use suture_tests::hot::{holes, mesh};
-use suture_tests::served::jobs;
+use suture_tests::served::{children_of, jobs, worker_of};
 use suture_tests::{Place, stl};
 
 /// `suture repair` of a file large enough to be caught at work, and its worker, which has mapped it.
@@ -28,20 +28,6 @@ fn at_work(place: &Place) -> (Child, Pid) {
     }
     child.kill().unwrap();
     panic!("no worker has mapped the file: {}", child.wait().unwrap());
-}
-
-/// The children of all threads of a process.
-fn children_of(process: u32) -> Vec<Pid> {
-    let threads = std::fs::read_dir(format!("/proc/{process}/task")).into_iter().flatten().flatten();
-    let children = threads.filter_map(|thread| std::fs::read_to_string(thread.path().join("children")).ok());
-    let pids = |list: String| list.split_whitespace().filter_map(|pid| pid.parse().ok()).collect::<Vec<i32>>();
-    children.flat_map(pids).filter_map(Pid::from_raw).collect()
-}
-
-/// The child of a process that has mapped a file of this name.
-fn worker_of(process: u32, name: &str) -> Option<Pid> {
-    let maps = |child: &Pid| std::fs::read_to_string(format!("/proc/{}/maps", child.as_raw_nonzero()));
-    children_of(process).into_iter().find(|child| maps(child).is_ok_and(|maps| maps.contains(name)))
 }
 
 /// Waits for the end, which must be code 2 or 130 with one line of these words, and nothing in the folder but the input.

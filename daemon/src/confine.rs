@@ -30,9 +30,6 @@ pub(crate) fn bind(args: &WorkerArgs) -> io::Result<()> {
     setrlimit(Resource::Core, limit(0))?;
     setrlimit(Resource::Data, limit(args.data))?;
     setrlimit(Resource::Nofile, lowered(getrlimit(Resource::Nofile), OPEN_FILES))?;
-    // A limit that someone set for all of us stays the most that `bound_files` allows.
-    let files = getrlimit(Resource::Fsize).current;
-    setrlimit(Resource::Fsize, Rlimit { current: files, maximum: files })?;
     // A write beyond the limit fails, and says so, instead of ending the process.
     // SAFETY: no handler is installed; the disposition of a signal that nothing else here uses is set.
     unsafe { libc::signal(libc::SIGXFSZ, libc::SIG_IGN) };
@@ -52,14 +49,35 @@ pub(crate) fn file_bound(input: u64, memory: u64) -> u64 {
     input.saturating_mul(8).saturating_add(memory.saturating_mul(4)).saturating_add(64 << 20)
 }
 
-/// Lets no file grow beyond so many bytes from now on; how many it is now, since less may be allowed. A system that refuses leaves it as it is.
-pub(crate) fn bound_files(bytes: u64) -> u64 {
-    let maximum = getrlimit(Resource::Fsize).maximum;
-    let most = maximum.map_or(bytes, |maximum| maximum.min(bytes));
-    if let Err(error) = setrlimit(Resource::Fsize, Rlimit { current: Some(most), maximum }) {
-        tracing::debug!(%error, "The size of a worker's files is not bounded.");
+/// The limit of the size of files that this process writes.
+pub(crate) struct Files {
+    /// What someone set for all of us.
+    outside: Option<u64>,
+    /// What is in force, as far as we know.
+    set: Option<u64>,
+}
+
+impl Files {
+    /// As it was inherited.
+    pub(crate) fn inherited() -> Self {
+        let now = getrlimit(Resource::Fsize).current;
+        Self { outside: now, set: now }
     }
-    most
+
+    /// Lets no file grow beyond so many bytes from now on; how many it is, since someone else may allow less. A system that refuses leaves it as it is.
+    pub(crate) fn bound(&mut self, bytes: u64) -> u64 {
+        let now = getrlimit(Resource::Fsize);
+        if now.current != self.set {
+            // Changed from outside while we live (`prlimit`).
+            self.outside = now.current;
+        }
+        let most = self.outside.map_or(bytes, |outside| outside.min(bytes));
+        match setrlimit(Resource::Fsize, Rlimit { current: Some(most), maximum: now.maximum }) {
+            Ok(()) => self.set = Some(most),
+            Err(error) => tracing::debug!(%error, "The size of a worker's files is not bounded."),
+        }
+        most
+    }
 }
 
 /// Confines this process, before it has other threads. A system that refuses (an old kernel, a sandbox) leaves it as it is.

@@ -10,7 +10,7 @@ use suture_store::Priority;
 use suture_store::job::Kind;
 
 use crate::units::{parse_duration, parse_listen, parse_size};
-use service::{CompletionsArgs, ManArgs, NightArgs, StatusArgs, TopArgs};
+use service::{CompletionsArgs, ManArgs, NightArgs, StatusArgs, StoreArgs, TopArgs};
 
 pub(crate) mod service;
 
@@ -58,6 +58,8 @@ pub(crate) enum Command {
     Retention(RetentionArgs),
     /// List, show, retry, rank or cancel the jobs of a hot folder, with or without a running daemon
     Jobs(JobsArgs),
+    /// Check every record of a hot folder's job store, or write all of its jobs as JSON
+    Store(StoreArgs),
     /// Show how a hot folder's daemon stands: its queue, what is in work, what ended last, what keeps it from work
     Status(StatusArgs),
     /// Show that anew each second, until `q`

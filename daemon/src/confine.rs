@@ -1,10 +1,10 @@
-//! What a worker may not do, whatever a file makes of it: outlive its supervisor, take more memory than it was given, leave a core dump, or
-//! send signals to other processes. So no file can kill the daemon, and a death of the daemon while a file was worked on is not the file's
+//! What a worker may not do, whatever a file makes of it: outlive its supervisor, take more memory than it was given, write a file without end, open
+//! files without end, leave a core dump, or send signals to other processes. So no file can kill the daemon, and a death of the daemon while a file was worked on is not the file's
 //! doing. And where the system runs out of memory, a worker goes first.
 
 use std::io;
 
-use rustix::process::{Resource, Rlimit, Signal, getppid, set_parent_process_death_signal, setrlimit};
+use rustix::process::{Resource, Rlimit, Signal, getppid, getrlimit, set_parent_process_death_signal, setrlimit};
 use rustix::thread::set_no_new_privs;
 
 use crate::cli::WorkerArgs;
@@ -13,7 +13,10 @@ use crate::create;
 /// Added to the system's own count of who should go first (from −1000 to 1000).
 const OUT_OF_MEMORY_SCORE: &str = "500";
 
-/// Binds this process to its supervisor and to its memory.
+/// Files that a worker may have open. It was never seen to have more than eleven.
+const OPEN_FILES: u64 = 256;
+
+/// Binds this process to its supervisor, to its memory, and to few open files.
 ///
 /// # Errors
 /// When the supervisor is gone already, or the system refuses.
@@ -26,7 +29,55 @@ pub(crate) fn bind(args: &WorkerArgs) -> io::Result<()> {
     let limit = |bytes| Rlimit { current: Some(bytes), maximum: Some(bytes) };
     setrlimit(Resource::Core, limit(0))?;
     setrlimit(Resource::Data, limit(args.data))?;
+    setrlimit(Resource::Nofile, lowered(getrlimit(Resource::Nofile), OPEN_FILES))?;
+    // A write beyond the limit fails, and says so, instead of ending the process.
+    // SAFETY: no handler is installed; the disposition of a signal that nothing else here uses is set.
+    unsafe { libc::signal(libc::SIGXFSZ, libc::SIG_IGN) };
     Ok(())
+}
+
+/// These limits, or less.
+fn lowered(now: Rlimit, most: u64) -> Rlimit {
+    let lower = |limit: Option<u64>| Some(limit.map_or(most, |limit| limit.min(most)));
+    Rlimit { current: lower(now.current), maximum: lower(now.maximum) }
+}
+
+/// Bytes that any file may have that is written for an input of so many bytes within so much memory. A triangle of the input takes at most 50 bytes in a
+/// file, and a few times that where large ones are sorted by place (twice, measured); in the input it takes 50, or not much less as text. Whatever is
+/// added or listed was held in memory, and takes at most four times its room there.
+pub(crate) fn file_bound(input: u64, memory: u64) -> u64 {
+    input.saturating_mul(8).saturating_add(memory.saturating_mul(4)).saturating_add(64 << 20)
+}
+
+/// The limit of the size of files that this process writes.
+pub(crate) struct Files {
+    /// What someone set for all of us.
+    outside: Option<u64>,
+    /// What is in force, as far as we know.
+    set: Option<u64>,
+}
+
+impl Files {
+    /// As it was inherited.
+    pub(crate) fn inherited() -> Self {
+        let now = getrlimit(Resource::Fsize).current;
+        Self { outside: now, set: now }
+    }
+
+    /// Lets no file grow beyond so many bytes from now on; how many it is, since someone else may allow less. A system that refuses leaves it as it is.
+    pub(crate) fn bound(&mut self, bytes: u64) -> u64 {
+        let now = getrlimit(Resource::Fsize);
+        if now.current != self.set {
+            // Changed from outside while we live (`prlimit`).
+            self.outside = now.current;
+        }
+        let most = self.outside.map_or(bytes, |outside| outside.min(bytes));
+        match setrlimit(Resource::Fsize, Rlimit { current: Some(most), maximum: now.maximum }) {
+            Ok(()) => self.set = Some(most),
+            Err(error) => tracing::debug!(%error, "The size of a worker's files is not bounded."),
+        }
+        most
+    }
 }
 
 /// Confines this process, before it has other threads. A system that refuses (an old kernel, a sandbox) leaves it as it is.
@@ -95,4 +146,26 @@ fn program(pid: u32) -> Vec<libc::sock_filter> {
         give(libc::SECCOMP_RET_ALLOW),
     ]);
     program
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_is_only_ever_lowered() {
+        let limits = |current, maximum| Rlimit { current, maximum };
+        let pair = |limits: Rlimit| (limits.current, limits.maximum);
+        assert_eq!(pair(lowered(limits(None, None), 256)), (Some(256), Some(256)));
+        assert_eq!(pair(lowered(limits(Some(1024), None), 256)), (Some(256), Some(256)));
+        assert_eq!(pair(lowered(limits(Some(64), Some(128)), 256)), (Some(64), Some(128)));
+    }
+
+    #[test]
+    fn files_may_be_as_large_as_the_work_can_make_them() {
+        assert!(file_bound(0, 0) > 1 << 20, "a report of nothing");
+        let (input, memory) = (10 << 30, 1 << 30);
+        assert!(file_bound(input, memory) >= 8 * input + 4 * memory);
+        assert_eq!(file_bound(u64::MAX, 1), u64::MAX);
+    }
 }

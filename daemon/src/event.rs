@@ -34,6 +34,53 @@ pub(crate) enum Happening<'a> {
     FolderAway { name: &'a str, root: &'a std::path::Path, why: &'a str },
     /// It is back.
     FolderBack { name: &'a str, root: &'a std::path::Path },
+    /// The job store came back.
+    StoreRecovered(Recovery<'a>),
+}
+
+/// From what the job store came back, and how.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Recovery<'a> {
+    /// A kill had left half a snapshot of the database. The store itself has logged that.
+    TornSnapshot,
+    /// The database was damaged, and made anew from its own log, or from nothing where nothing had been in it. Logged by the store, too.
+    Damage,
+    /// It was lost, or kept aside: so many jobs came back from receipts in this folder.
+    Receipts { folder: &'a std::path::Path, jobs: usize },
+    /// A daemon ended in the midst of so many jobs.
+    Unfinished { jobs: usize },
+}
+
+impl Recovery<'_> {
+    const KINDS: [&'static str; 4] = ["torn_snapshot", "damage", "receipts", "unfinished"];
+
+    fn kind(self) -> &'static str {
+        let [torn_snapshot, damage, receipts, unfinished] = Self::KINDS;
+        match self {
+            Self::TornSnapshot => torn_snapshot,
+            Self::Damage => damage,
+            Self::Receipts { .. } => receipts,
+            Self::Unfinished { .. } => unfinished,
+        }
+    }
+
+    fn log(self) {
+        match self {
+            Self::TornSnapshot | Self::Damage => {}
+            Self::Receipts { folder, jobs } => {
+                let folder = folder.display();
+                tracing::info!(%folder, jobs, "The job store is a new one; what earlier ones knew was read from receipts.");
+            }
+            Self::Unfinished { jobs } => tracing::info!(jobs, "The daemon ended without finishing; its jobs go on."),
+        }
+    }
+}
+
+/// Counts from nothing what is rare, so that the first time is a change that alerts see.
+pub(crate) fn begin(metrics: &Metrics) {
+    for kind in Recovery::KINDS {
+        metrics.add(Count::StoreRecoveries, &[("kind", kind)], 0);
+    }
 }
 
 /// Word of an event, on its way out.
@@ -67,6 +114,7 @@ impl Happening<'_> {
             Self::FolderAway { root, why, .. } => {
                 tracing::error!(folder = %root.display(), error = why, "The folder cannot be served; the others go on.");
             }
+            Self::StoreRecovered(how) => how.log(),
             Self::FolderBack { root, .. } => tracing::info!(folder = %root.display(), "The folder is back."),
             Self::Delivered { parcel: Parcel { target, event, job }, note } => {
                 tracing::info!(job = number(job), event, target_name = target, note, "An event was told.");
@@ -104,6 +152,7 @@ impl Happening<'_> {
             Self::Delivered { parcel, .. } => count_parcel(metrics, parcel, "delivered"),
             Self::NotDelivered { parcel, .. } => count_parcel(metrics, parcel, "retried"),
             Self::GivenUp { parcel, .. } => count_parcel(metrics, parcel, "given_up"),
+            Self::StoreRecovered(how) => metrics.add(Count::StoreRecoveries, &[("kind", how.kind())], 1),
             // Given up, when its result was in place already.
             Self::Wished { job, wish: Control::Cancel } => {
                 if let State::Ended { publication } = &job.state {
@@ -126,7 +175,11 @@ impl Happening<'_> {
             Self::Forgotten { id } => ("forgotten", json!({"job": id})),
             Self::FolderAway { name, .. } => ("folder", json!({"folder": name, "reachable": false})),
             Self::FolderBack { name, .. } => ("folder", json!({"folder": name, "reachable": true})),
-            Self::Reported { .. } | Self::Delivered { .. } | Self::NotDelivered { .. } | Self::GivenUp { .. } => return None,
+            Self::Reported { .. }
+            | Self::Delivered { .. }
+            | Self::NotDelivered { .. }
+            | Self::GivenUp { .. }
+            | Self::StoreRecovered(_) => return None,
         })
     }
 }

@@ -10,7 +10,7 @@ use suture_store::{Clock, JobId, SystemClock};
 use tokio::sync::broadcast::{Receiver, Sender, channel};
 
 use crate::bar::Standing;
-use crate::event::Happening;
+use crate::event::{self, Happening};
 use crate::event_metrics::{Metrics, Timing};
 
 /// So many are kept for listeners that come back.
@@ -77,7 +77,9 @@ impl Bus {
         let listeners = heard.then(|| channel(BEHIND).0);
         let line = Mutex::new(Line { last: 0, kept: VecDeque::new() });
         let life = SystemClock.now().0;
-        Self { metrics: Metrics::default(), life, listeners, line, progress: Mutex::default(), publishing: Mutex::default() }
+        let metrics = Metrics::default();
+        event::begin(&metrics);
+        Self { metrics, life, listeners, line, progress: Mutex::default(), publishing: Mutex::default() }
     }
 
     /// It happened.

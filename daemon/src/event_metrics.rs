@@ -16,6 +16,7 @@ pub(crate) enum Count {
     DefectsFound,
     DefectsLeft,
     StoreErrors,
+    StoreRecoveries,
     EventsLost,
     Deliveries,
 }
@@ -29,7 +30,7 @@ pub(crate) enum Timing {
 }
 
 impl Count {
-    const ALL: [Self; 11] = [
+    const ALL: [Self; 12] = [
         Self::JobsFinished,
         Self::JobFailures,
         Self::JobAttempts,
@@ -39,6 +40,7 @@ impl Count {
         Self::DefectsFound,
         Self::DefectsLeft,
         Self::StoreErrors,
+        Self::StoreRecoveries,
         Self::EventsLost,
         Self::Deliveries,
     ];
@@ -54,6 +56,10 @@ impl Count {
             Self::DefectsFound => ("suture_defects_found_total", "Defects found in inputs, by kind."),
             Self::DefectsLeft => ("suture_defects_left_total", "Defects left in outputs, by kind."),
             Self::StoreErrors => ("suture_store_errors_total", "Errors of the job store."),
+            Self::StoreRecoveries => (
+                "suture_store_recoveries_total",
+                "How often the job store came back after damage, loss or an end in the midst of work.",
+            ),
             Self::EventsLost => ("suture_events_lost_total", "Events that slow listeners have missed."),
             Self::Deliveries => {
                 ("suture_webhook_deliveries_total", "Messages to webhooks, and runs of `on_done`, by target and result.")

@@ -55,9 +55,9 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
     let work = at_work(&args.dir, &jobs);
     let mut text = String::new();
     for job in &jobs {
-        let work = work.iter().find(|work| work.job == job.id);
+        let work = work_of(job, &work);
         text += &match &args.command {
-            _ if args.json => serde_json::to_string(&Shown::new(job, work)).unwrap_or_default() + "\n",
+            _ if args.json => as_json(job, work),
             JobsCommand::Show { .. } => show(&args.dir, job, work),
             _ => line_of(job, work),
         };
@@ -82,6 +82,25 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
 fn at_work(dir: &Path, jobs: &[Job]) -> Vec<Work> {
     let any = jobs.iter().any(|job| job.kind() == Kind::Running);
     if any { reach::work(dir).unwrap_or_default() } else { Vec::new() }
+}
+
+fn work_of<'a>(job: &Job, work: &'a [Work]) -> Option<&'a Work> {
+    work.iter().find(|work| work.job == job.id)
+}
+
+/// A job as a line of JSON.
+fn as_json(job: &Job, work: Option<&Work>) -> String {
+    serde_json::to_string(&Shown::new(job, work)).unwrap_or_default() + "\n"
+}
+
+/// All jobs of a hot folder, as `list --json` prints them.
+///
+/// # Errors
+/// As [`reach::jobs`].
+pub(crate) fn all_as_json(dir: &Path) -> Result<String, Failure> {
+    let jobs = reach::jobs(dir, &JobsWish::List)?;
+    let work = at_work(dir, &jobs);
+    Ok(jobs.iter().map(|job| as_json(job, work_of(job, &work))).collect())
 }
 
 /// A person's decision.

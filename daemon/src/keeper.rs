@@ -340,7 +340,7 @@ impl Kept {
 
     /// Reads what earlier stores left, in a folder that was away when the daemon began.
     fn recall(&mut self, context: &Context, now: Instant) -> Result<(), PublishError> {
-        if context.unread.read(&*context.store, &self.folder)? > 0 {
+        if context.unread.read(&*context.store, &self.folder, &context.bus)? > 0 {
             each_job(&*context.store, &mut |job| self.remember(job, now))?;
             context.schedule.news();
         }

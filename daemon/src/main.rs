@@ -68,6 +68,7 @@ mod simulation;
 mod single;
 mod standstill;
 mod status;
+mod store;
 mod superseded;
 mod supervise;
 mod table;
@@ -96,6 +97,8 @@ fn main() -> ExitCode {
         Command::Watch(_) => "info",
         // It shows results, good or bad, by itself.
         Command::Demo => "error",
+        // It says itself what it finds; the store would tell of a copy.
+        Command::Store(_) => "off",
         _ => "warn",
     };
     logging::start(level, cli.log_format);
@@ -113,6 +116,7 @@ fn main() -> ExitCode {
         Command::Config(args) => config::command::run(&args.command),
         Command::Retention(args) => retention::command::run(&args.file, &jobs::all),
         Command::Jobs(args) => jobs::run(args),
+        Command::Store(args) => store::run(args),
         Command::Status(args) => status::run(args),
         Command::Top(args) => status::top::run(args),
         Command::Completions(args) => manual::completions(args),

@@ -13,6 +13,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use suture_store::job::Area;
 use suture_store::{Job, JobId, JobStore, Past, Publication, Query, Reached, RelPath, StoreError, Token};
 
+use crate::event::{Happening, Recovery};
+use crate::event_bus::Bus;
 use crate::folder::{Folder, is_hot};
 use crate::fsx;
 use crate::orders;
@@ -65,14 +67,14 @@ impl Unread {
     ///
     /// # Errors
     /// Those of the store; where the folder cannot be read it is to be tried again, since what cannot be seen may be finished.
-    pub(crate) fn read(&self, store: &dyn JobStore, folder: &Folder) -> Result<usize, PublishError> {
+    pub(crate) fn read(&self, store: &dyn JobStore, folder: &Folder, bus: &Bus) -> Result<usize, PublishError> {
         if !self.has(folder) {
             return Ok(0);
         }
         orders::forget_mark(folder).map_err(io_at(&folder.root))?;
         let jobs = fill(store, folder, Which::All)?;
         if jobs > 0 {
-            tracing::info!(folder = %folder.root.display(), jobs, "The job store is a new one; what earlier ones knew was read from receipts.");
+            bus.tell(&Happening::StoreRecovered(Recovery::Receipts { folder: &folder.root, jobs }));
         }
         let mut names = self.names();
         names.remove(&folder.name);

@@ -83,7 +83,7 @@ fn daemon_or_store<W: Wish>(dir: &Path, asked: &W, instead: &JobsWish) -> Result
     if !fsx::is_folder(&state).map_err(|error| unseen(&state, &error))? {
         return Ok(Answered::Store(Vec::new()));
     }
-    watched().map_err(|error| Failure::try_again(format!("no thread can be started: {error}; try again")))?;
+    watched()?;
     let began = Instant::now();
     loop {
         match through_store(&state, instead) {
@@ -99,9 +99,13 @@ fn daemon_or_store<W: Wish>(dir: &Path, asked: &W, instead: &JobsWish) -> Result
 }
 
 /// Has a hanging database end this process. Once is enough, however often it is asked.
-fn watched() -> io::Result<()> {
+///
+/// # Errors
+/// When there is no thread for that.
+pub(crate) fn watched() -> Result<(), Failure> {
     static WATCHED: AtomicBool = AtomicBool::new(false);
-    if WATCHED.swap(true, Ordering::Relaxed) { Ok(()) } else { watchdog::start(|| watch::end_hanging()) }
+    let started = if WATCHED.swap(true, Ordering::Relaxed) { Ok(()) } else { watchdog::start(|| watch::end_hanging()) };
+    started.map_err(|error| Failure::try_again(format!("no thread can be started: {error}; try again")))
 }
 
 /// Does what is wished of the daemon of a hot folder, and says how it stands; without one, notes the wish for the next, and there is no
@@ -160,11 +164,20 @@ pub(crate) fn unseen(path: &Path, error: &io::Error) -> Failure {
     Failure::try_again(format!("{}: cannot be looked at: {error}; try again", path.display()))
 }
 
+/// Refuses what is no hot folder.
+///
+/// # Errors
+/// When it is none, or cannot be looked at.
+pub(crate) fn must_be_hot(dir: &Path) -> Result<(), Failure> {
+    if fsx::is_folder(&dir.join(".suture")).map_err(|error| unseen(dir, &error))? {
+        return Ok(());
+    }
+    Err(Failure { line: format!("{}: is no hot folder (try --dir DIR)", dir.display()), exit: Exit::Refused })
+}
+
 /// The running daemon's answer; `None` if none runs.
 fn through_daemon<W: Wish>(dir: &Path, wish: &W) -> Result<Option<W::Answer>, Failure> {
-    if !fsx::is_folder(&dir.join(".suture")).map_err(|error| unseen(dir, &error))? {
-        return Err(Failure { line: format!("{}: is no hot folder (try --dir DIR)", dir.display()), exit: Exit::Refused });
-    }
+    must_be_hot(dir)?;
     match ask(dir, wish) {
         Ok(answer) => Ok(answer.transpose()?),
         Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {

@@ -10,12 +10,10 @@ use suture_store::SledStore;
 use crate::config::FolderConfig;
 use crate::exit::Exit;
 use crate::folder::{Folder, FolderError};
-use crate::fsx;
 use crate::ground::read_traces;
 use crate::past::{Which, fill};
 use crate::publish_error::PublishError;
-use crate::reach::{Failure, state_of, unseen};
-use crate::{watch, watchdog};
+use crate::reach::{Failure, must_be_hot, state_of, unseen, watched};
 
 /// What came of it.
 pub(crate) struct Rebuilt {
@@ -30,11 +28,8 @@ pub(crate) struct Rebuilt {
 /// # Errors
 /// When `dir` is no hot folder, a daemon serves it or has the store, the store is sound, or cannot be moved.
 pub(crate) fn rebuild(dir: &Path) -> Result<Rebuilt, Failure> {
-    if !fsx::is_folder(&dir.join(".suture")).map_err(|error| unseen(dir, &error))? {
-        return Err(Failure { line: format!("{}: is no hot folder (try --dir DIR)", dir.display()), exit: Exit::Refused });
-    }
-    watchdog::start(|| watch::end_hanging())
-        .map_err(|error| Failure { line: format!("no thread can be started: {error}; try again"), exit: Exit::TryAgain })?;
+    must_be_hot(dir)?;
+    watched()?;
     let state = state_of(dir).map_err(|error| unseen(dir, &error))?;
     // Held until all is done: no daemon begins meanwhile.
     let folder = served_as(dir, &state).and_then(|config| Folder::open(&config, None)).map_err(|error| Failure {

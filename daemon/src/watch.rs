@@ -10,13 +10,14 @@ use std::time::{Duration, Instant};
 
 use crossbeam::channel::unbounded;
 use suture_store::job::{Kind, Testimony};
-use suture_store::{JobStore, Query, SledStore, StoreError, crash_point};
+use suture_store::{JobStore, Opening, Query, SledStore, StoreError, crash_point};
 
 use crate::again::Lives;
 use crate::attempt::{Context, IN_HAND, Slot, WITNESS, remove_work};
 use crate::cli::WatchArgs;
 use crate::config::{Config, real};
 use crate::control::Door;
+use crate::event::{Happening, Recovery};
 use crate::event_bus::Bus;
 use crate::event_store::Heard;
 use crate::exit::Exit;
@@ -221,6 +222,7 @@ impl Daemon {
             Err(error) => return End::Store(error),
         };
         let bus = Arc::new(Bus::new(self.web.is_some()));
+        tell_opening(&bus, self.store.opening());
         let store = Arc::clone(&self.store) as Arc<dyn JobStore>;
         let world: Arc<dyn World> = Arc::new(Machine);
         let context = Arc::new(Context {
@@ -346,6 +348,13 @@ impl Daemon {
     }
 }
 
+/// Tells what the store met when it was opened.
+fn tell_opening(bus: &Bus, opening: &Opening) {
+    let torn = (opening.torn_snapshots > 0).then_some(Recovery::TornSnapshot);
+    let damage = opening.set_aside.is_some().then_some(Recovery::Damage);
+    torn.into_iter().chain(damage).for_each(|how| bus.tell(&Happening::StoreRecovered(how)));
+}
+
 /// Takes nothing new where an operator has noted that for the next daemon.
 pub(crate) fn look_for_pause(context: &Context) {
     let is_set = standstill::is_set(&context.settings.now().state).unwrap_or_else(|error| {
@@ -403,7 +412,7 @@ pub(crate) fn recover(context: &Arc<Context>) -> Result<(), StoreError> {
     let recovered = context.store.recover(&testimony)?;
     crash_point("daemon.recovered");
     if !recovered.is_empty() {
-        tracing::info!(jobs = recovered.len(), "The daemon ended without finishing; its jobs go on.");
+        context.bus.tell(&Happening::StoreRecovered(Recovery::Unfinished { jobs: recovered.len() }));
     }
     let mut slot = Slot::new(context);
     for found in recovered {
@@ -416,7 +425,7 @@ pub(crate) fn recover(context: &Arc<Context>) -> Result<(), StoreError> {
     }
     // Before anything is cleared away: what is under way is known by its work folder.
     for folder in context.folders.iter().filter(|folder| folder.check().is_ok()) {
-        match context.unread.read(&*context.store, folder) {
+        match context.unread.read(&*context.store, folder, &context.bus) {
             Err(PublishError::Store(error)) => return Err(error),
             Err(error) => tracing::error!(%error, "What an earlier job store left cannot be read; it is tried again."),
             Ok(_) => {}

@@ -5,13 +5,14 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use suture_core::report::Task;
-use suture_core::{Access, Error, Progress, Report};
+use suture_core::{Access, Error, ErrorClass, Progress, Report};
 
 use crate::cli::WorkerArgs;
 use crate::confine;
 use crate::create;
 use crate::fsx::Identity;
 use crate::protocol::{Message, Request};
+use crate::units::show_size;
 
 /// Progress is told at most this often, and at the beginning of a stage.
 const PROGRESS_EVERY: Duration = Duration::from_millis(100);
@@ -27,13 +28,14 @@ pub(crate) fn serve(args: &WorkerArgs) -> io::Result<()> {
     confine::bind(args)?;
     confine::confine();
     name_want_of_memory();
+    let mut files = confine::Files::inherited();
     for line in io::stdin().lock().lines() {
         let request: Request = serde_json::from_str(&line?)?;
         say(&Message::Begun)?;
         orphan::work_begins(request.witness.as_deref());
         // The peak of this file, not of the process's life; a kernel that refuses leaves the report with the latter.
         let _ = create::tell_kernel("clear_refs", "5");
-        let answer = answer(&request);
+        let answer = answer(&request, &mut files);
         orphan::work_begins(None);
         if let Some(witness) = &request.witness {
             // Not synced: a machine that goes down takes this word with it, and the file stays a suspect.
@@ -69,17 +71,38 @@ fn say(message: &Message) -> io::Result<()> {
     out.flush()
 }
 
-fn answer(request: &Request) -> Message {
+fn answer(request: &Request, files: &mut confine::Files) -> Message {
     #[cfg(feature = "crash-points")]
     hook::act(request);
+    let length = std::fs::metadata(&request.input).map_or(0, |meta| meta.len());
+    let wanted = confine::file_bound(length, request.limits.memory_bytes);
+    let most = files.bound(wanted);
     match work(request) {
         Ok(report) => {
             let output = request.output.as_deref().filter(|_| report.output.is_some());
             let written = output.and_then(|path| std::fs::metadata(path).ok()).map(|meta| Identity::from(&meta));
             Message::Done { report: Box::new(report), written }
         }
+        Err(error) if is_too_large(&error) => too_large(&named(&error, request), wanted, most),
         Err(error) => Message::Failed { class: error.class(), message: named(&error, request) },
     }
+}
+
+/// Would a file have grown beyond what is allowed, here or by its file system?
+fn is_too_large(error: &Error) -> bool {
+    matches!(error, Error::Io { source, .. } if source.kind() == io::ErrorKind::FileTooLarge)
+}
+
+/// The answer then. `wanted` bytes are what the work can need; less than that is someone's limit for all of us, which they may raise.
+fn too_large(line: &str, wanted: u64, most: u64) -> Message {
+    let size = show_size(most);
+    if most < wanted {
+        let message = format!("{line}; the limit of the size of files is {size} here: raise it (`ulimit -f`)");
+        return Message::Failed { class: ErrorClass::Environment, message };
+    }
+    // Another try would write as much.
+    let message = format!("{line}; no file of this work may have more than {size}, and its file system may allow less");
+    Message::Failed { class: ErrorClass::Refused, message }
 }
 
 /// The error's line, with the file's own name instead of the claimed or temporary one.
@@ -239,6 +262,21 @@ mod tests {
     use std::sync::mpsc::channel;
 
     use super::*;
+
+    /// What grows beyond all need fails for good; where someone's limit is in the way, that may change.
+    #[test]
+    fn a_file_that_grows_too_large_is_refused_unless_someone_can_raise_the_limit() {
+        let told = |wanted, most| match too_large("part.stl: writing failed", wanted, most) {
+            Message::Failed { class, message } => (class, message),
+            other => panic!("{other:?}"),
+        };
+        let (class, line) = told(5_000_000, 5_000_000);
+        assert!(class == ErrorClass::Refused && line.contains("no file of this work may have more than 5.0 MB"), "{line}");
+        let (class, line) = told(5_000_000, 1_000_000);
+        assert!(class == ErrorClass::Environment && line.contains("is 1.0 MB here: raise it (`ulimit -f`)"), "{line}");
+        let io = |errno| Error::Io { path: "a".into(), action: "writing", source: io::Error::from_raw_os_error(errno) };
+        assert_eq!([libc::EFBIG, libc::ENOSPC].map(|errno| is_too_large(&io(errno))), [true, false]);
+    }
 
     /// Wherever another version of the library panics, this fails.
     #[test]

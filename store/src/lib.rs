@@ -32,7 +32,7 @@ pub use job::{Decision, Ending, Job, Kind, Past, Priority, Publication, Reached,
 pub use memory::MemoryStore;
 pub use news::{News, Notice, Word};
 pub use path::RelPath;
-pub use sled_store::{Opening, SledStore};
+pub use sled_store::{Opening, SledStore, Verified};
 pub use store::{
     Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
 };

@@ -36,6 +36,11 @@ impl MemoryStore {
         Self::over(self.queue.into_tables(), self.clock)
     }
 
+    #[cfg(test)]
+    pub(crate) fn tables(&self) -> &dyn Tables {
+        self.queue.tables()
+    }
+
     fn over(tables: Memory, clock: Arc<dyn Clock>) -> Self {
         // Opening fails only over damaged records or failing I/O; memory has neither.
         match Queue::open(tables, Arc::clone(&clock)) {

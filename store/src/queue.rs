@@ -28,6 +28,7 @@ use crate::store::{
 };
 use crate::tables::{Put, Table, Tables};
 
+pub(crate) mod check;
 mod files;
 mod forget;
 mod index;

@@ -51,7 +51,7 @@ mod tables;
 #[cfg(test)]
 mod tests;
 
-pub use open::Opening;
+pub use open::{Opening, Verified};
 use tables::SledTables;
 
 /// The embedded [`JobStore`].
@@ -104,6 +104,15 @@ impl SledStore {
     /// [`StoreError::Locked`] while a daemon owns the folder; else as [`SledStore::open`].
     pub fn peek(state: &Path) -> Result<Vec<Job>, StoreError> {
         open::peek(state)
+    }
+
+    /// Looks at every record of the store in `state`, on a copy in a temporary folder: nothing of the store is changed.
+    ///
+    /// # Errors
+    /// [`StoreError::Locked`] while a daemon owns the folder, [`StoreError::Newer`], and what keeps the files from being read. Damage is a
+    /// finding, not an error.
+    pub fn verify(state: &Path) -> Result<Verified, StoreError> {
+        open::verify(state, &(Arc::new(SystemClock) as Arc<dyn Clock>))
     }
 
     /// Moves a database that cannot be trusted aside, with the mark of how far it got, so that a new one can be begun; where they are now.

@@ -25,6 +25,20 @@ pub fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) -> Duration {
     began.elapsed()
 }
 
+/// The children of all threads of a process.
+pub fn children_of(process: u32) -> Vec<Pid> {
+    let threads = std::fs::read_dir(format!("/proc/{process}/task")).into_iter().flatten().flatten();
+    let children = threads.filter_map(|thread| std::fs::read_to_string(thread.path().join("children")).ok());
+    let pids = |list: String| list.split_whitespace().filter_map(|pid| pid.parse().ok()).collect::<Vec<i32>>();
+    children.flat_map(pids).filter_map(Pid::from_raw).collect()
+}
+
+/// The child of a process that has mapped a file of this name.
+pub fn worker_of(process: u32, name: &str) -> Option<Pid> {
+    let maps = |child: &Pid| std::fs::read_to_string(format!("/proc/{}/maps", child.as_raw_nonzero()));
+    children_of(process).into_iter().find(|child| maps(child).is_ok_and(|maps| maps.contains(name)))
+}
+
 /// A running daemon, which is killed when it is dropped. Its log is a file of the place.
 pub struct Served<'a> {
     place: &'a Place,

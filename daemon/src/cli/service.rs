@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::Args;
+use clap::{Args, Subcommand};
 
 use crate::units::parse_duration;
 
@@ -41,6 +41,30 @@ pub(crate) struct NightArgs {
     /// Replace OUT if it exists
     #[arg(long)]
     pub force: bool,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct StoreArgs {
+    /// The hot folder
+    #[arg(long, value_name = "DIR", default_value = ".", global = true)]
+    pub dir: PathBuf,
+    #[command(subcommand)]
+    pub command: StoreCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum StoreCommand {
+    /// Look at every record: say what is wrong and what to do, end with 1 if anything is, and change nothing; no daemon may run
+    Verify,
+    /// Write all jobs as JSON, one a line, as `jobs list --json` prints them; with or without a running daemon
+    Export {
+        /// The file to write, whole or not at all [default: standard output]
+        #[arg(short, long, value_name = "OUT")]
+        output: Option<PathBuf>,
+        /// Replace OUT if it exists
+        #[arg(long, requires = "output")]
+        force: bool,
+    },
 }
 
 #[derive(Args, Debug)]

@@ -43,7 +43,7 @@ impl Hall {
     /// What a new store knows after reading: numbers, states, paths, and where the originals are.
     fn read(&self, store: &MemoryStore) -> Vec<(u64, Kind, String, String)> {
         let unread = Unread::of(store, std::slice::from_ref(&self.folder)).unwrap();
-        unread.read(store, &self.folder).unwrap();
+        unread.read(store, &self.folder, &Bus::new(false)).unwrap();
         assert!(!unread.has(&self.folder) && !store.is_unfilled().unwrap());
         let mut jobs = Vec::new();
         each_job(store, &mut |job| {

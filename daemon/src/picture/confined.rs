@@ -40,6 +40,8 @@ pub(crate) fn run(args: &DrawArgs) -> Exit {
 fn made(args: &DrawArgs) -> Result<(), (Exit, String)> {
     let fault = |line: String| (Exit::Refused, line);
     let limits = args.spend.limits(false);
+    let length = args.inputs.iter().map(|path| std::fs::metadata(path).map_or(0, |meta| meta.len())).sum();
+    confine::Files::inherited().bound(confine::file_bound(length, limits.memory_bytes));
     let meshes = args.inputs.iter().map(|path| open(path, &limits)).collect::<Result<Vec<MeshFile>, _>>().map_err(fault)?;
     let records: Vec<_> = meshes.iter().map(MeshFile::records).collect();
     let nothing = || "no triangle has finite coordinates".to_owned();

@@ -80,6 +80,12 @@ fn id_at(kind: Kind) -> usize {
     }
 }
 
+/// The job that an entry is of, and the kind that it says; `None`: it cannot be understood.
+pub(super) fn told(key: &[u8]) -> Option<(JobId, Kind)> {
+    let kind = Kind::ALL.into_iter().find(|kind| key.first() == Some(&tag(*kind)))?;
+    Some((JobId(number(key, id_at(kind)).ok()?), kind))
+}
+
 /// Numbers of the jobs of `kind`, in index order.
 pub(super) fn ids(tables: &dyn Tables, kind: Kind) -> Result<Vec<JobId>, StoreError> {
     let mut ids = Vec::new();

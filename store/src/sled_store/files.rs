@@ -189,11 +189,25 @@ pub(super) fn copy_dir(from: &Path, to: &Path, leave_out: fn(&Path) -> bool) -> 
         if is_folder(&path)? {
             copy_dir(&path, &target, leave_out)?;
         } else {
-            let mut from = File::open(&path).map_err(io(&path, "copying"))?;
-            std::io::copy(&mut from, &mut create_new(&target)?).map_err(io(&path, "copying"))?;
+            copy_file(&path, &target)?;
         }
     }
     Ok(())
+}
+
+fn copy_file(from: &Path, to: &Path) -> Result<(), StoreError> {
+    let mut file = File::open(from).map_err(io(from, "copying"))?;
+    std::io::copy(&mut file, &mut create_new(to)?).map(drop).map_err(io(from, "copying"))
+}
+
+/// Copies all that an opening of the store in `from` looks at into the empty folder `to`.
+pub(super) fn copy_state(from: &Path, to: &Path) -> Result<(), StoreError> {
+    for name in ["db", "db.trial"] {
+        if is_there(&from.join(name))? {
+            copy_dir(&from.join(name), &to.join(name), |_| false)?;
+        }
+    }
+    if is_there(&from.join("SEQ"))? { copy_file(&from.join("SEQ"), &to.join("SEQ")) } else { Ok(()) }
 }
 
 /// Makes a folder and those above it, each durable in the one it lies in.

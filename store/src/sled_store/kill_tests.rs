@@ -106,8 +106,9 @@ fn listen(ears: &mut BufReader<ChildStdout>, most: usize, said: &mut Said) -> us
     lines
 }
 
-/// Opens the store and looks for everything that was said.
+/// Looks at every record, opens the store and looks for everything that was said.
 fn check(state: &Path, said: &Said) {
+    assert_eq!(SledStore::verify(state).unwrap().wrong, Vec::<String>::new());
     let store = SledStore::open(state).unwrap();
     assert_eq!(store.opening().set_aside, None, "a kill does not damage the database");
     let jobs: BTreeMap<u64, Job> = store.list(&Query::default()).unwrap().into_iter().map(|job| (job.id.0, job)).collect();

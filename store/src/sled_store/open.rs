@@ -10,6 +10,7 @@ use super::tables::{self, SledTables};
 use crate::crash::crash_point;
 use crate::id::{Clock, Epoch, Seq};
 use crate::job::Job;
+use crate::queue::check::check as check_records;
 use crate::queue::{Queue, read_head};
 use crate::store::StoreError;
 
@@ -76,6 +77,78 @@ pub(super) fn peek(state: &Path) -> Result<Vec<Job>, StoreError> {
     files::copy_dir(&dir, &copy, |path| path.extension().is_some_and(|ext| ext == "generating"))?;
     let tables = SledTables::open(temporary.path(), &copy)?;
     crate::queue::all_jobs(&tables)
+}
+
+/// What a look at every record of a store found.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Verified {
+    /// Jobs in it.
+    pub jobs: u64,
+    /// All that was looked at: records and entries of indexes.
+    pub records: u64,
+    /// What the next opening mends by itself; nothing is lost by it. A line each.
+    pub mends: Vec<String>,
+    /// What is not as it must be. A line each; where there is any, a new store is to be begun.
+    pub wrong: Vec<String>,
+    /// What to do then.
+    pub advice: String,
+}
+
+/// Does with a copy of `state` what a daemon does when it begins, then looks at every record.
+pub(super) fn verify(state: &Path, clock: &Arc<dyn Clock>) -> Result<Verified, StoreError> {
+    let temporary = tempfile::tempdir().map_err(io(&std::env::temp_dir(), "making a temporary folder"))?;
+    let copy = temporary.path();
+    let mark = files::read_mark(state)?;
+    if let Some(pid) = files::owner(state)? {
+        return Err(StoreError::Locked { path: state.to_owned(), pid });
+    }
+    files::copy_state(state, copy)?;
+    // Someone may have had it meanwhile.
+    let pid = files::owner(state)?;
+    if pid.is_some() || files::read_mark(state)? != mark {
+        return Err(StoreError::Locked { path: state.to_owned(), pid: pid.flatten() });
+    }
+    let mut verified = Verified { advice: advice(state), ..Verified::default() };
+    if mark == Mark::Damaged {
+        verified.mends.push("SEQ, which says how far the store got, is damaged; it is written anew".into());
+    }
+    let checked = match queue(copy, clock) {
+        Ok((queue, opening)) => {
+            let (torn, aside) = (opening.torn_snapshots > 0, opening.set_aside.is_some());
+            verified.mends.extend(torn.then(|| "a kill left half of a snapshot; it is removed".to_owned()));
+            let whole = "the database is damaged; it is made anew from its own log, which is whole";
+            verified.mends.extend(aside.then(|| whole.to_owned()));
+            check_records(queue.tables())
+        }
+        // Told at the first such record: there may be more.
+        Err(error @ StoreError::Corrupt { .. }) => SledTables::open(copy, &copy.join("db"))
+            .and_then(|tables| check_records(&tables))
+            .and_then(|checked| if checked.wrong.is_empty() { Err(error) } else { Ok(checked) }),
+        Err(error) => Err(error),
+    };
+    match checked {
+        Ok(checked) => (verified.jobs, verified.records, verified.wrong) = (checked.jobs, checked.records, checked.wrong),
+        Err(error) => verified.wrong.push(damage(error)?),
+    }
+    Ok(verified)
+}
+
+/// Damage in words, without the place and without advice; `None`: it is no damage.
+fn damage_of(error: &StoreError) -> Option<String> {
+    match error {
+        StoreError::Unusable { reason, .. } => Some(format!("the database does not open: {reason}")),
+        StoreError::RolledBack { found, reached, .. } => {
+            let [found, reached] = [found, reached].map(|(epoch, seq)| format!("epoch {epoch}, change {seq}"));
+            Some(format!("the database went back in time: it ends at {found}, but {reached} were reached"))
+        }
+        StoreError::Corrupt { what, reason } => Some(format!("{what}: {reason}")),
+        error => is_damage(error).then(|| error.to_string()),
+    }
+}
+
+/// The same; any other error is passed on.
+fn damage(error: StoreError) -> Result<String, StoreError> {
+    damage_of(&error).ok_or(error)
 }
 
 /// Makes the folder fit for sled: an examination that a crash cut short is ended, and a first `SEQ` says that nothing was
@@ -161,7 +234,8 @@ fn set_aside(state: &Path, mark: Mark, damage: &StoreError, aside: &Path) -> Res
     let examined = SledTables::open(state, &trial).and_then(|tables| check(state, &tables, mark));
     if let Err(error) = examined {
         std::fs::remove_dir_all(&trial).map_err(io(&trial, "removing"))?;
-        return Err(unusable(format!("{damage}; without its snapshot: {error}")));
+        let rest = damage_of(&error).unwrap_or_else(|| error.to_string());
+        return Err(unusable(format!("{damage}; without its snapshot: {rest}")));
     }
     files::sync_all(&trial)?;
     std::fs::rename(&dir, aside).map_err(io(&dir, "setting aside"))?;
@@ -176,12 +250,11 @@ fn set_aside(state: &Path, mark: Mark, damage: &StoreError, aside: &Path) -> Res
 /// # Errors
 /// When it cannot be looked at for another reason, or not moved.
 pub(super) fn set_untrusted_aside(state: &Path, clock: &Arc<dyn Clock>) -> Result<Option<PathBuf>, StoreError> {
-    let looked = queue(state, clock).and_then(|(queue, _)| crate::queue::all_jobs(queue.tables()).map(drop));
+    let looked = queue(state, clock).and_then(|(queue, _)| check_records(queue.tables()));
     match looked {
-        Ok(()) => return Ok(None),
-        Err(StoreError::Unusable { .. } | StoreError::RolledBack { .. } | StoreError::Corrupt { .. }) => {}
-        Err(error) if is_damage(&error) => {}
-        Err(error) => return Err(error),
+        Ok(checked) if checked.wrong.is_empty() => return Ok(None),
+        Ok(_) => {}
+        Err(error) => drop(damage(error)?),
     }
     let aside = state.join(format!("corrupt-{}", clock.now()));
     files::make_folder(&aside)?;

@@ -7,6 +7,7 @@ use super::files::{self, Mark};
 use super::*;
 use crate::id::{Epoch, Seq};
 use crate::job::{Ending, Publication};
+use crate::tables::{Put, Table, Tables};
 use crate::testkit::{Subject, conformance, dropped, result_of};
 
 struct OnDisk {
@@ -22,6 +23,7 @@ impl Subject for OnDisk {
 
     fn restart(&mut self) {
         drop(self.store.take());
+        assert_eq!(SledStore::verify(self.state.path()).unwrap().wrong, Vec::<String>::new());
         self.store = Some(SledStore::open_with(self.state.path(), Arc::clone(&self.clock)).unwrap());
     }
 }
@@ -204,6 +206,11 @@ fn f05_a_damaged_snapshot_is_made_anew_from_the_log() {
         bytes[middle] ^= 0xff;
         std::fs::write(path, bytes).unwrap();
     }
+    let found = SledStore::verify(state.path()).unwrap();
+    assert!(
+        found.wrong.is_empty() && found.mends.len() == 1 && found.mends[0].contains("made anew from its own log"),
+        "{found:?}"
+    );
     let store = SledStore::open(state.path()).unwrap();
     let aside = store.opening().set_aside.clone().unwrap();
     assert!(aside.join("db").exists(), "the damaged one is kept");
@@ -252,6 +259,78 @@ fn f05_a_damaged_store_is_set_aside_and_a_sound_one_is_not() {
     assert!(aside.starts_with(state.path()) && aside.join("db/db").exists() && aside.join("SEQ").exists());
     let store = SledStore::open(state.path()).unwrap();
     assert!(store.is_unfilled().unwrap() && store.list(&Query::default()).unwrap().is_empty());
+}
+
+/// Every file of a state folder.
+fn everything(state: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut all = Vec::new();
+    for path in files::list(state).unwrap() {
+        if path.is_dir() {
+            all.extend(everything(&path));
+        } else {
+            let bytes = std::fs::read(&path).unwrap();
+            all.push((path, bytes));
+        }
+    }
+    all.sort();
+    all
+}
+
+/// F5: what is wrong is said, what mends itself is told apart from it, and nothing is changed. A store is begun anew exactly where something is
+/// wrong.
+#[test]
+fn f05_a_look_at_every_record_says_what_is_wrong_and_changes_nothing() {
+    let cut = |state: &Path| File::options().write(true).open(state.join("db/db")).unwrap().set_len(100).unwrap();
+    let damage_record = |state: &Path| {
+        let store = SledStore::open(state).unwrap();
+        let jobs = store.queue.tables().raw_jobs();
+        let mut bytes = jobs.get(1_u64.to_be_bytes()).unwrap().unwrap().to_vec();
+        bytes[20] ^= 1;
+        jobs.insert(1_u64.to_be_bytes(), bytes).unwrap();
+    };
+    let lose_entry = |state: &Path| {
+        let store = SledStore::open(state).unwrap();
+        store.control(JobId(1), Control::Cancel).unwrap();
+        let key = [&[13][..], &1_u64.to_be_bytes()].concat();
+        store.queue.tables().write(vec![Put { table: Table::ByState, key, value: None }], store.queue.reached().1).unwrap();
+    };
+    type Damage<'a> = &'a dyn Fn(&Path);
+    let cases: [(&str, Damage<'_>, &str, &str); 7] = [
+        ("none", &|_| {}, "", ""),
+        (
+            "torn snapshot",
+            &|state| std::fs::write(state.join("db/snap.F0.generating"), b"half").unwrap(),
+            "half of a snapshot",
+            "",
+        ),
+        ("damaged mark", &|state| std::fs::write(state.join("SEQ"), b"suture").unwrap(), "SEQ", ""),
+        ("cut log", &cut, "", "the database went back in time: it ends at epoch 0"),
+        ("lost", &|state| std::fs::remove_dir_all(state.join("db")).unwrap(), "", "the database went back in time"),
+        ("record", &damage_record, "", "job 1: "),
+        ("index", &lose_entry, "", "by_state: no entry says that job 1 is cancelled"),
+    ];
+    for (what, damage, mends, wrong) in cases {
+        let folder = tempfile::tempdir().unwrap();
+        let state = folder.path().join("state");
+        let store = SledStore::open(&state).unwrap();
+        submit(&store, "a.stl");
+        submit(&store, "b.stl");
+        assert!(matches!(SledStore::verify(&state), Err(StoreError::Locked { pid: Some(_), .. })), "{what}");
+        drop(store);
+        damage(&state);
+        let before = everything(&state);
+        let found = SledStore::verify(&state).unwrap();
+        assert!(everything(&state) == before, "{what}");
+        let fits = |lines: &[String], words: &str| {
+            if words.is_empty() { lines.is_empty() } else { lines.len() == 1 && lines[0].contains(words) }
+        };
+        assert!(fits(&found.mends, mends) && fits(&found.wrong, wrong), "{what}: {found:?}");
+        assert!(!wrong.is_empty() || (found.jobs, found.records) == (2, 6), "{what}: {found:?}");
+        assert_eq!(SledStore::set_aside(&state).unwrap().is_some(), !wrong.is_empty(), "{what}");
+    }
+    let empty = tempfile::tempdir().unwrap();
+    assert_eq!(SledStore::verify(empty.path()).unwrap().wrong, Vec::<String>::new());
+    assert!(files::list(empty.path()).unwrap().is_empty());
 }
 
 /// F7, and F8: the first error ends it, whatever it was.

@@ -2,11 +2,13 @@
 
 use std::io::{BufRead, BufReader, Write};
 
+use rustix::process::{Signal, kill_process};
+use suture_bench::generate::Case;
 use suture_tests::Place;
 use suture_tests::hot::holes;
 use suture_tests::http::Client;
 use suture_tests::openapi::document;
-use suture_tests::served::{Served, wait_until};
+use suture_tests::served::{Served, wait_until, worker_of};
 
 const LISTENING: [&str; 5] = ["hot", "--settle", "30ms", "--listen", "127.0.0.1:0"];
 
@@ -98,6 +100,41 @@ fn metrics_and_the_log_agree() {
         assert!(value(name) > 0.0, "{name}");
     }
     assert!(!text.contains(".stl"), "no file's name");
+}
+
+/// The store comes back from half a snapshot, from its loss, and from a kill in the midst of work; a start after a good end counts nothing.
+#[test]
+fn f04_recoveries_of_the_store_are_counted() {
+    let place = Place::new();
+    let recoveries = |daemon: &Served| {
+        let text = String::from_utf8(Client::of(daemon).get("/metrics").expect(200).body).unwrap();
+        let value = |kind: &str| -> u64 {
+            let name = format!("suture_store_recoveries_total{{kind=\"{kind}\"}} ");
+            text.lines().find_map(|line| line.strip_prefix(&name)?.parse().ok()).unwrap_or_else(|| panic!("{kind}: {text}"))
+        };
+        ["torn_snapshot", "damage", "receipts", "unfinished"].map(value)
+    };
+    let serve = || Served::start(&place, &LISTENING, "log");
+    let daemon = serve();
+    place.put("hot/in/part.stl", &holes(1));
+    wait_until("it is done", || !daemon.lines("Done.").is_empty());
+    assert_eq!(recoveries(&daemon), [0, 0, 0, 0]);
+    daemon.signal(Signal::TERM);
+    assert!(daemon.ended().success());
+    assert_eq!(recoveries(&serve()), [0, 0, 0, 0], "a good end");
+    place.put("hot/.suture/state/db/snap.0000000000000001.generating", b"half");
+    assert_eq!(recoveries(&serve()), [1, 0, 0, 0]);
+    std::fs::remove_dir_all(place.at("hot/.suture/state")).unwrap();
+    let daemon = serve();
+    assert_eq!(recoveries(&daemon), [0, 0, 1, 0]);
+    // Killed while a worker has it, which is stopped over it.
+    std::fs::rename(place.generate(Case::Mixed, 300_000, 1).0, place.at("hot/in/large.stl")).unwrap();
+    let at_work = || worker_of(daemon.pid(), "/.suture/work/");
+    wait_until("it is in work", || at_work().is_some_and(|worker| kill_process(worker, Signal::STOP).is_ok()));
+    let worker = at_work().expect("it was stopped before it had an answer");
+    drop(daemon);
+    kill_process(worker, Signal::CONT).unwrap();
+    assert_eq!(recoveries(&serve()), [0, 0, 0, 1]);
 }
 
 #[test]

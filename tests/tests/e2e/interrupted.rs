@@ -8,7 +8,8 @@ use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, kill_process};
 use suture_bench::generate::Case;
-use suture_tests::hot::mesh;
+use suture_tests::hot::{holes, mesh};
+use suture_tests::served::{Served, children_of, jobs, wait_until, worker_of};
 use suture_tests::{Place, stl};
 
 /// `suture repair` of a file large enough to be caught at work, and its worker, which has mapped it.
@@ -29,20 +30,6 @@ fn at_work(place: &Place) -> (Child, Pid) {
     panic!("no worker has mapped the file: {}", child.wait().unwrap());
 }
 
-/// The children of all threads of a process.
-fn children_of(process: u32) -> Vec<Pid> {
-    let threads = std::fs::read_dir(format!("/proc/{process}/task")).into_iter().flatten().flatten();
-    let children = threads.filter_map(|thread| std::fs::read_to_string(thread.path().join("children")).ok());
-    let pids = |list: String| list.split_whitespace().filter_map(|pid| pid.parse().ok()).collect::<Vec<i32>>();
-    children.flat_map(pids).filter_map(Pid::from_raw).collect()
-}
-
-/// The child of a process that has mapped a file of this name.
-fn worker_of(process: u32, name: &str) -> Option<Pid> {
-    let maps = |child: &Pid| std::fs::read_to_string(format!("/proc/{}/maps", child.as_raw_nonzero()));
-    children_of(process).into_iter().find(|child| maps(child).is_ok_and(|maps| maps.contains(name)))
-}
-
 /// Waits for the end, which must be code 2 or 130 with one line of these words, and nothing in the folder but the input.
 fn assert_ends(place: &Place, mut child: Child, code: i32, words: &str) {
     let status = child.wait().unwrap();
@@ -54,6 +41,46 @@ fn assert_ends(place: &Place, mut child: Child, code: i32, words: &str) {
 
 fn is_there(process: Pid) -> bool {
     Path::new(&format!("/proc/{}", process.as_raw_nonzero())).exists()
+}
+
+/// No core dump, few open files, and files of a size that follows from the input's and the memory's.
+#[test]
+fn a_worker_is_bounded() {
+    let place = Place::new();
+    let (mut child, worker) = at_work(&place);
+    let limits = std::fs::read_to_string(format!("/proc/{}/limits", worker.as_raw_nonzero())).unwrap();
+    kill_process(Pid::from_child(&child), Signal::KILL).unwrap();
+    child.wait().unwrap();
+    let limit =
+        |name: &str| limits.lines().find_map(|line| line.strip_prefix(name)?.split_whitespace().next()?.parse::<u64>().ok());
+    assert_eq!((limit("Max core file size"), limit("Max open files")), (Some(0), Some(256)), "{limits}");
+    let input = place.read("mixed.stl").len() as u64;
+    assert_eq!(limit("Max file size"), Some(8 * input + (4 << 30) + (64 << 20)), "{limits}");
+}
+
+/// What is written grows beyond a limit: no signal ends the worker, the file has its line, and others are done.
+#[test]
+fn work_that_would_write_too_much_fails_with_a_line() {
+    const MOST: u64 = 8 << 20;
+    let place = Place::new();
+    let limited = |words: &[&str]| {
+        let mut command = place.command_of(Path::new("prlimit"));
+        command.arg(format!("--fsize={MOST}")).arg(suture_tests::binary::suture()).args(words);
+        command
+    };
+    let words = "the limit of the size of files is 8.4 MB here: raise it (`ulimit -f`)";
+    let large = place.generate(Case::Mixed, 300_000, 1).0;
+    let ended = limited(&["repair", "mixed.stl", "-o", "out.stl"]).output().unwrap();
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert!(ended.status.code() == Some(2) && said.lines().count() == 1 && said.contains(words), "{}: {said}", ended.status);
+    assert!(!place.at("out.stl").exists());
+    place.put("hot/in/small.stl", &holes(1));
+    std::fs::rename(large, place.at("hot/in/large.stl")).unwrap();
+    let _daemon = Served::of(&place, limited(&["watch", "hot", "--settle", "30ms", "--workers", "1"]), "log");
+    let job = |name: &str| jobs(&place, "hot").into_iter().find(|job| job["source"]["path"] == name).unwrap_or_default();
+    wait_until("the small one is done", || job("small.stl")["kind"] == "done");
+    wait_until("the large one has its line", || job("large.stl")["note"].to_string().contains(words));
+    assert_eq!(job("large.stl")["kind"], "waiting");
 }
 
 #[test]

@@ -51,9 +51,9 @@ pub(crate) fn file_bound(input: u64, memory: u64) -> u64 {
 
 /// The limit of the size of files that this process writes.
 pub(crate) struct Files {
-    /// What someone set for all of us.
+    /// Someone else set this for all of us.
     outside: Option<u64>,
-    /// What is in force, as far as we know.
+    /// This is in force, as far as we know.
     set: Option<u64>,
 }
 

@@ -52,7 +52,7 @@ fn owned(dir: &Path, pid: Option<u32>) -> Failure {
     Failure { line, exit: Exit::Owned }
 }
 
-/// What was found, for people.
+/// The findings, for people.
 fn said(place: &str, found: &Verified) -> String {
     let Verified { jobs, records, mends, wrong, advice } = found;
     let all = format!("{} jobs, {} records", show_count(*jobs), show_count(*records));

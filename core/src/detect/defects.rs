@@ -113,10 +113,8 @@ pub(crate) fn shared_vertex_sets(submesh: &Submesh) -> Vec<([u32; 3], u32)> {
     let sets = || submesh.living().map(|t| (vertex_set(submesh, t), t));
     let slots = (8 * submesh.triangles.len()).next_power_of_two().max(64);
     let slot = |v: &[u32; 3]| Hashing::default().hash_one(v) as usize & (slots - 1);
-    let [mut once, mut again] = [const { Vec::new() }; 2].map(|mut bits: Vec<u64>| {
-        bits.resize(slots / 64, 0);
-        bits
-    });
+    let mut once = vec![0u64; slots / 64];
+    let mut again = once.clone();
     for at in sets().map(|(v, _)| slot(&v)) {
         let known = if bits::holds(&once, at) { &mut again } else { &mut once };
         bits::put(known, at);

@@ -129,16 +129,18 @@ impl Parts {
 
     /// Bytes held.
     pub(crate) fn heap_bytes(&self) -> u64 {
-        let seams = size_of_val(&*self.neighbours) + size_of_val(&*self.of_irregular_triangles);
-        (seams + size_of_val(&*self.bases) + size_of_val(&*self.sums)) as u64
+        self.seam_bytes() + (size_of_val(&*self.bases) + size_of_val(&*self.sums)) as u64
+    }
+
+    fn seam_bytes(&self) -> u64 {
+        (size_of_val(&*self.neighbours) + size_of_val(&*self.of_irregular_triangles)) as u64
     }
 
     /// Counts what is kept, with the labels of the chunks that are.
     pub(crate) fn take<'l>(&self, budget: &Budget, labels: impl Iterator<Item = &'l Labels>, irregular_triangles: u64) {
         let labels: u64 = labels.map(Labels::heap_bytes).sum();
         budget.take(Purpose::Surface, labels + self.sums.len() as u64 * chunk::BYTES_PER_REGION);
-        let seams = size_of_val(&*self.neighbours) + size_of_val(&*self.of_irregular_triangles);
-        budget.take(Purpose::Seams, 2 * seams as u64);
+        budget.take(Purpose::Seams, 2 * self.seam_bytes());
         budget.take(Purpose::Defects, crate::stream::budget::submesh_bytes(irregular_triangles, irregular_triangles));
     }
 }

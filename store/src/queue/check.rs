@@ -12,7 +12,7 @@ use crate::record;
 use crate::store::StoreError;
 use crate::tables::{Table, Tables};
 
-/// What a look at every record found.
+/// The findings of a look at every record.
 #[derive(Debug, Default)]
 pub(crate) struct Checked {
     pub(crate) jobs: u64,

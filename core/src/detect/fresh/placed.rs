@@ -70,17 +70,20 @@ impl Placed {
     pub(super) fn meeting(&self, chunk: ChunkId, cell: &Bounds, found: &mut Vec<u32>) {
         self.tree.meeting(cell, found);
         found.iter_mut().for_each(|i| *i = self.wide[*i as usize]);
-        let chunk = chunk.0 as usize;
-        let first = chunk.checked_sub(1).map_or(0, |before| self.ends[before]);
-        found.extend(&self.of_chunks[first as usize..self.ends[chunk] as usize]);
+        found.extend(self.part(chunk));
         found.sort_unstable();
     }
 
     /// False only if no triangle meets the cell of this chunk.
     pub(super) fn may_meet(&self, chunk: ChunkId) -> bool {
+        !self.wide.is_empty() || !self.part(chunk).is_empty()
+    }
+
+    /// The triangles that meet few cells, one of them this chunk's.
+    fn part(&self, chunk: ChunkId) -> &[u32] {
         let chunk = chunk.0 as usize;
         let first = chunk.checked_sub(1).map_or(0, |before| self.ends[before]);
-        !self.wide.is_empty() || first < self.ends[chunk]
+        &self.of_chunks[first as usize..self.ends[chunk] as usize]
     }
 }
 

@@ -32,7 +32,7 @@ pub(crate) const BYTES_PER_PAIR: u64 = 1280;
 
 pub(crate) const BYTES_PER_TRIANGLE: u64 = 1280;
 
-/// What a triangle that is cut leaves: this many pieces, or nearly.
+/// Cutting leaves about so many pieces of a triangle.
 const PIECES: u64 = 4;
 
 const WIDEST: f64 = 1.0 / 4096.0;

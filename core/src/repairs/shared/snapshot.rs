@@ -8,7 +8,7 @@ use crate::submesh::{Origin, Triangle, Vertex};
 pub(crate) struct Snapshot {
     corners: Vec<[Vertex; 3]>,
     states: Vec<(bool, Option<RepairName>)>,
-    /// Those that were fetched since.
+    /// Triangles that were fetched since.
     fetched: Vec<Triangle>,
     /// So many triangles had been attributed to a repair.
     attributed: usize,

@@ -171,8 +171,7 @@ impl<'a> Work<'a> {
 
     /// The mesh is about to change.
     fn touch(&mut self) {
-        self.edges = None;
-        self.components = None;
+        self.forget_edges();
         self.version += 1;
     }
 

@@ -12,7 +12,7 @@ use crate::geometry::tri_tri;
 use crate::io::read_ahead::Guide;
 use crate::io::record::{Record, corners};
 use crate::stream::budget::{Budget, Loan};
-use crate::stream::members::Members;
+use crate::stream::members::{Members, Reads};
 use crate::stream::plan::{ChunkId, Plan};
 use crate::topology::chunk::Scratch;
 use crate::topology::intersect::Effort;
@@ -99,7 +99,7 @@ impl Mesh {
         let solved = self.members.each(
             (&self.records, &Guide::NONE, &self.plan),
             1,
-            |_| true,
+            (Reads::Chunks, |_| true),
             Scratch::default,
             |scratch, chunk, seen, _| {
                 scratch.solve(seen, self.plan.home_box(chunk), &self.measure, &[], &Loan::of(&budget)).vertices
@@ -114,7 +114,7 @@ impl Mesh {
         let tested = self.members.each(
             (&self.records, &Guide::NONE, &self.plan),
             1,
-            |_| true,
+            (Reads::Chunks, |_| true),
             Scratch::default,
             |scratch, chunk, seen, visitors| {
                 let cell = self.plan.home_box(chunk);

@@ -12,10 +12,10 @@ use crate::io::record::Record;
 use crate::util::machine;
 
 /// Records that the disk is asked for together where the file does not stay in the page cache.
-pub(crate) const ASKED_AT_ONCE: usize = 8192;
+const ASKED_AT_ONCE: usize = 8192;
 
 /// Stretches closer than this are read as one: a seek costs more.
-const GAP: usize = 16 << 10;
+const GAP: usize = 64 << 10;
 const PAGE: usize = 4096;
 /// So little is not worth asking what the machine has left.
 const ALWAYS_STAYS: usize = 16 << 20;
@@ -70,6 +70,22 @@ impl<'a> Guide<'a> {
                 self.advise(from, to, Advice::WillNeed);
             }
         }
+    }
+
+    /// The same items in the same order; the disk is asked for the records they are about, a block of items before they come.
+    pub(crate) fn ahead<T>(
+        &self,
+        mut items: impl Iterator<Item = T>,
+        number: impl Fn(&T) -> Option<u32>,
+    ) -> impl Iterator<Item = T> {
+        let mut block = move || {
+            let block: Vec<T> = items.by_ref().take(ASKED_AT_ONCE).collect();
+            self.ask_for(block.iter().filter_map(&number).map(|number| (number, 1)));
+            block
+        };
+        let mut soon = block();
+        let blocks = std::iter::from_fn(move || (!soon.is_empty()).then(|| std::mem::replace(&mut soon, block())));
+        blocks.flatten()
     }
 
     /// Cuts a part of the map, as something else than bytes, into blocks to be read one after the other, and asks for each of them while
@@ -135,8 +151,9 @@ mod tests {
 
     #[test]
     fn what_is_near_is_read_as_one() {
-        let mut stretches = [(50_000, 50_100), (0, 10), (10, 20), (2, 4), (50_100 + GAP, 90_000), (90_001 + GAP, 90_002 + GAP)];
-        assert_eq!(joined(&mut stretches), [(0, 20), (50_000, 90_000), (90_001 + GAP, 90_002 + GAP)]);
+        let mut stretches =
+            [(100_000, 100_100), (0, 10), (10, 20), (2, 4), (100_100 + GAP, 190_000), (190_001 + GAP, 190_002 + GAP)];
+        assert_eq!(joined(&mut stretches), [(0, 20), (100_000, 190_000), (190_001 + GAP, 190_002 + GAP)]);
     }
 
     #[test]

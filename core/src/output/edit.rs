@@ -2,10 +2,9 @@
 
 use crate::contract::report::{EditRecords, EditSummary, FaceOrigin, RepairName};
 use crate::geometry::distance::distance;
-use crate::io::read_ahead::ASKED_AT_ONCE;
 use crate::io::record::{self, Record};
 use crate::submesh::components::Reversed;
-use crate::submesh::{Origin, Submesh};
+use crate::submesh::{Origin, Since, Submesh};
 use crate::topology::survey::Survey;
 use crate::util::bits::{self, Shared};
 
@@ -47,17 +46,14 @@ impl Edit {
         edit.changes.reserve_exact(survey.nonfinite.iter().map(|r| r.1 as usize).sum());
         edit.changes
             .extend(survey.nonfinite.iter().flat_map(|(first, count)| *first..*first + *count).map(|t| (t, Change::Delete)));
-        for (i, triangle) in submesh.triangles.iter().enumerate() {
-            if i % ASKED_AT_ONCE == 0 {
-                let soon = submesh.triangles[i..].iter().take(ASKED_AT_ONCE);
-                survey.ask_for(soon.filter_map(|t| match t.origin {
-                    Origin::Input(record) | Origin::Part(record) => Some(record),
-                    Origin::Added(_) => None,
-                }));
-            }
-            let points = || submesh.points(i as u32);
+        for i in submesh.beside_records(survey) {
+            let triangle = &submesh.triangles[i as usize];
+            let points = || submesh.points(i);
             match triangle.origin {
-                Origin::Input(t) if triangle.alive => edit.compare(survey.records, t, points()),
+                Origin::Input(t) if triangle.alive && triangle.since != Since::Same => {
+                    edit.compare(survey.records, (submesh, i), t)
+                }
+                Origin::Input(_) if triangle.alive => {}
                 Origin::Input(t) => edit.changes.push((t, Change::Delete)),
                 Origin::Part(t) if triangle.alive => {
                     edit.add(points(), record::attribute(&survey.records[t as usize]), FaceOrigin::Part(t));
@@ -134,8 +130,9 @@ impl Edit {
     }
 
     /// Notes how a living triangle differs from its record, if it does.
-    fn compare(&mut self, records: &[Record], t: u32, now: [[f32; 3]; 3]) {
-        let before = record::corners(&records[t as usize]);
+    fn compare(&mut self, records: &[Record], (submesh, i): (&Submesh, u32), t: u32) {
+        let now = submesh.points(i);
+        let Some(before) = submesh.as_read(records, i) else { return };
         // Comparing as numbers: −0.0 is 0.0.
         if before == now {
             return;
@@ -365,6 +362,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::geometry::position::Position;
     use crate::testing::{Corners, cube, diagnose, plate, records, written};
 
     const HERE: Corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
@@ -377,7 +375,7 @@ mod tests {
         let mut d = diagnose(&records);
         let none = Reversed::none(&d.survey);
         for flipped in [1, 0] {
-            d.submesh.triangles[3].v.swap(1, 2);
+            d.submesh.triangles[3].turn();
             let summary = Edit::of(&d.survey, &d.submesh, &none, &[]).summary(records.len());
             assert_eq!((summary.flipped, summary.untouched), (flipped, 8 - flipped));
         }
@@ -389,7 +387,8 @@ mod tests {
         let records = records(&plate(2, |_, _| true));
         let mut d = diagnose(&records);
         let middle = d.submesh.positions.iter().position(|p| *p == [1.0, 1.0, 0.0]).unwrap();
-        d.submesh.positions[middle] = [1.0, 1.0, 0.5];
+        let above = d.submesh.add_vertex(Position::of([1.0, 1.0, 0.5]));
+        d.submesh.merge(above, middle as u32);
         let edit = Edit::of(&d.survey, &d.submesh, &Reversed::none(&d.survey), &[]);
         let summary = edit.summary(records.len());
         // Six of eight triangles meet in the middle of the plate.

@@ -16,7 +16,6 @@ use crate::geometry::sums::{Bounds, Measure};
 use crate::io::record;
 use crate::submesh::edges::Edges;
 use crate::submesh::{Gathering, Submesh, has_repeated};
-use crate::topology::chunk::IrregularTriangle;
 use crate::topology::survey::Survey;
 use crate::topology::vertex_table::Weld;
 use crate::util::ids::NONE;
@@ -90,10 +89,8 @@ impl Disturbed {
     fn of(survey: &Survey<'_>, difference: &Difference) -> Self {
         let mut vertices = Weld::default();
         vertices.reset((survey.irregular_triangles.len() + difference.gone.len() + difference.fresh.len()) / 2);
-        let corners =
-            |irregular_triangle: &IrregularTriangle| record::corners(&survey.records[irregular_triangle.triangle as usize]);
-        for irregular_triangle in &survey.irregular_triangles {
-            for p in (0..3).filter(|k| irregular_triangle.irregular >> k & 1 == 1).map(|k| corners(irregular_triangle)[k]) {
+        for (irregular_triangle, corners) in survey.irregular_corners() {
+            for p in (0..3).filter(|k| irregular_triangle.irregular >> k & 1 == 1).map(|k| corners[k]) {
                 vertices.vertex(p);
             }
         }
@@ -101,10 +98,10 @@ impl Disturbed {
         let mut was_regular = vec![false; known];
         survey.promoted.iter().filter_map(|p| vertices.find(*p)).for_each(|v| was_regular[v as usize] = true);
         // Triangles with a repeated vertex are irregular triangles, whatever their vertices are.
-        survey.irregular_triangles.iter().map(corners).filter(|c| !is_distinct(c)).flatten().for_each(|p| {
+        survey.irregular_corners().map(|(_, c)| c).filter(|c| !is_distinct(c)).flatten().for_each(|p| {
             vertices.vertex(p);
         });
-        for t in &difference.gone {
+        for t in survey.ahead(difference.gone.iter(), |t| Some(**t)) {
             let record = &survey.records[*t as usize];
             if record::all_finite(record) {
                 record::corners(record).into_iter().for_each(|p| {
@@ -154,16 +151,8 @@ impl Disturbed {
             this.of_triangles.push(at);
             gathering.add(place, corners, complete, region);
         };
-        for (i, (irregular_triangle, region)) in
-            survey.irregular_triangles.iter().zip(&survey.irregular_triangle_regions).enumerate()
-        {
-            if i % crate::io::read_ahead::ASKED_AT_ONCE == 0 {
-                survey.ask_for(
-                    survey.irregular_triangles[i..].iter().take(crate::io::read_ahead::ASKED_AT_ONCE).map(|s| s.triangle),
-                );
-            }
+        for ((irregular_triangle, corners), region) in survey.irregular_corners().zip(&survey.irregular_triangle_regions) {
             let place = irregular_triangle.triangle;
-            let corners = record::corners(&survey.records[place as usize]);
             let at = self.at(corners);
             note(&mut self.in_input, at, &corners);
             self.of_irregular_triangles.push(at);

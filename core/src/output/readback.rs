@@ -204,6 +204,7 @@ mod tests {
     use super::*;
     use crate::contract::progress::Quiet;
     use crate::contract::report::RepairName;
+    use crate::geometry::position::Position;
     use crate::submesh::components::Reversed;
     use crate::testing::{Corners, cube, diagnose, plate, records, shifted, written};
 
@@ -229,9 +230,11 @@ mod tests {
             let of_record = |t: u32| d.submesh.triangles.iter().position(|u| u.record() == t).unwrap() as u32;
             let go: Vec<u32> = go.iter().map(|t| of_record(*t)).collect();
             go.iter().for_each(|t| d.submesh.kill(*t));
-            d.submesh.triangles[last].v.swap(1, 2);
+            d.submesh.triangles[last].turn();
             let corner = d.submesh.triangles[3].v[0];
-            d.submesh.positions[corner as usize][2] += 0.25;
+            let [x, y, z] = d.submesh.positions[corner as usize];
+            let above = d.submesh.add_vertex(Position::of([x, y, z + 0.25]));
+            d.submesh.merge(above, corner);
             d.submesh.add([0, 2, 5], crate::submesh::Origin::Added(RepairName::Fill), crate::util::ids::NONE);
             let edit = Edit::of(&d.survey, &d.submesh, &Reversed::none(&d.survey), &[]);
             let output = written(&edit, &input);

@@ -45,6 +45,15 @@ enum Kept {
     Spool(Spool),
 }
 
+/// What of its chunks a pass reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Reads {
+    /// All: some chunks are asked for while those before them are worked on.
+    Chunks,
+    /// What [`Seen::each_near`] finds near, and asks for itself.
+    Near,
+}
+
 /// Takes down who sees what in one stretch of the file.
 trait Take {
     /// Triangles that are members of this chunk alone.
@@ -248,14 +257,14 @@ impl Members {
         &self,
         (records, guide, plan): (&[Record], &Guide<'_>, &Plan),
         threads: usize,
-        wanted: impl Fn(ChunkId) -> bool + Sync,
+        (reads, wanted): (Reads, impl Fn(ChunkId) -> bool + Sync),
         scratch: impl Fn() -> S + Sync,
         work: impl Fn(&mut S, ChunkId, &Seen<'_>, &Seen<'_>) -> R + Sync,
     ) -> Vec<R> {
         match &self.kept {
             Kept::Lists { members, visitors, stretches } => {
                 let chunks: Vec<ChunkId> = (0..members.len() as u32).map(ChunkId).filter(|c| wanted(*c)).collect();
-                let group = guide.group(members.len());
+                let group = guide.group(members.len()).filter(|_| reads == Reads::Chunks);
                 let ask = |group: &[ChunkId]| {
                     let lists = group.iter().flat_map(|c| members[c.0 as usize].iter().chain(&visitors[c.0 as usize]));
                     guide.ask_for(lists.flat_map(RunList::runs));
@@ -269,8 +278,12 @@ impl Members {
                         let this = groups.next().filter(|_| i == 0);
                         this.into_iter().chain(groups.next()).for_each(ask);
                     }
-                    let seen =
-                        [members, visitors].map(|lists| Mapped { records, lists: &lists[chunks[i].0 as usize], stretches });
+                    let seen = [members, visitors].map(|lists| Mapped {
+                        records,
+                        lists: &lists[chunks[i].0 as usize],
+                        stretches,
+                        guide,
+                    });
                     let [members, visitors] = seen.map(Seen::Mapped);
                     work(scratch, chunks[i], &members, &visitors)
                 })

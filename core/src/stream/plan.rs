@@ -5,7 +5,6 @@
 //! noise. Where the planes lie depends on the number of chunks asked for, and nothing else may depend on that.
 
 use crate::geometry::sums::Bounds;
-use crate::io::read_ahead::ASKED_AT_ONCE;
 use crate::io::read_ahead::Guide;
 use crate::io::record::{self, Record};
 
@@ -184,19 +183,15 @@ fn sample(records: &[Record], guide: &Guide<'_>, chunks: u64) -> Vec<Sample> {
     let n = records.len() as u64;
     let wanted = chunks * if guide.is_needed() { SAMPLES_PER_CHUNK / 4 } else { SAMPLES_PER_CHUNK };
     let step = (n / wanted.max(1)).max(1);
-    let numbers: Vec<u32> = (0..n).step_by(step as usize).map(|t| t as u32).collect();
-    let mut samples = Vec::with_capacity(numbers.len());
-    for part in numbers.chunks(ASKED_AT_ONCE) {
-        guide.ask_for(part.iter().map(|t| (*t, 1)));
-        samples.extend(part.iter().filter_map(|t| {
-            let c = record::corners(&records[*t as usize]);
-            c.iter().flatten().all(|x| x.is_finite()).then(|| Sample {
-                lo: std::array::from_fn(|k| c[0][k].min(c[1][k]).min(c[2][k])),
-                hi: std::array::from_fn(|k| c[0][k].max(c[1][k]).max(c[2][k])),
-            })
-        }));
-    }
-    samples
+    let numbers = guide.ahead((0..n).step_by(step as usize).map(|t| t as u32), |t| Some(*t));
+    let samples = numbers.filter_map(|t| {
+        let c = record::corners(&records[t as usize]);
+        c.iter().flatten().all(|x| x.is_finite()).then(|| Sample {
+            lo: std::array::from_fn(|k| c[0][k].min(c[1][k]).min(c[2][k])),
+            hi: std::array::from_fn(|k| c[0][k].max(c[1][k]).max(c[2][k])),
+        })
+    });
+    samples.collect()
 }
 
 /// The plane, inside `cell`, that cuts the fewest samples; slightly prefers the middle. O(samples).

@@ -1,6 +1,7 @@
 //! Where triangles come from: the records of a mapped file, or the entries of a spool.
 
 use crate::geometry::sums::Bounds;
+use crate::io::read_ahead::Guide;
 use crate::io::record::{self, Point, Record};
 use crate::stream::run_list::RunList;
 use crate::stream::spool::{self, Entry};
@@ -43,6 +44,20 @@ pub(crate) struct Mapped<'a> {
     /// Each goes on where the one before it ends.
     pub(crate) lists: &'a [RunList],
     pub(crate) stretches: &'a Stretches,
+    pub(crate) guide: &'a Guide<'a>,
+}
+
+impl Mapped<'_> {
+    /// Asks the disk for what is [near](Seen::each_near), where that is read anew: often a small part of the chunk.
+    fn ask_for<S>(&self, state: &mut S, near: &impl Fn(&mut S, &Bounds) -> bool) {
+        if self.guide.is_needed() {
+            let mut parts = Vec::new();
+            for run in self.lists.iter().flat_map(RunList::runs) {
+                self.stretches.each_near(run, state, near, |_, from, count| parts.push((from, count)));
+            }
+            self.guide.ask_for(parts.into_iter());
+        }
+    }
 }
 
 impl<'a> Source for Mapped<'a> {
@@ -130,7 +145,7 @@ impl<'a> Source for Seen<'a> {
 
 impl<'a> Seen<'a> {
     /// As [`Source::for_each`], each triangle with its place among them. Passes over triangles whose stretch of the file lies in no box that is
-    /// `near`, as far as boxes are known: what `near` does to `state` is there for the triangles of that stretch.
+    /// `near`, as far as boxes are known: what `near` does to `state` is there for the triangles of that stretch. It may be asked twice.
     #[inline(always)]
     pub(crate) fn each_near<S>(
         &self,
@@ -140,6 +155,7 @@ impl<'a> Seen<'a> {
     ) {
         match self {
             Self::Mapped(source) => {
+                source.ask_for(state, near);
                 let mut before = 0;
                 for (first, count) in source.lists.iter().flat_map(RunList::runs) {
                     source.stretches.each_near((first, count), state, near, |state, from, count| {

@@ -24,7 +24,7 @@ use crate::geometry::position;
 use crate::io::read_ahead::Guide;
 use crate::io::record::{self, Record};
 use crate::io::write_behind;
-use crate::stream::members::Members;
+use crate::stream::members::{Members, Reads};
 use crate::stream::plan::Plan;
 use crate::util::parallel;
 
@@ -83,7 +83,7 @@ pub(crate) fn weld(
     let found = members.each(
         (records, &guide, &plan),
         limits.threads,
-        |_| true,
+        (Reads::Chunks, |_| true),
         Chunk::default,
         |chunk, number, seen, visitors| {
             if progress.cancelled() {

@@ -22,8 +22,7 @@ use glam::DVec3;
 
 use crate::contract::repair_name::RepairName;
 use crate::geometry::distance::{distance, place};
-use crate::geometry::position::Position;
-use crate::io::read_ahead::ASKED_AT_ONCE;
+use crate::geometry::position::{self, Position};
 use crate::io::record::{self, Record};
 use crate::topology::chunk::IrregularTriangle;
 use crate::topology::survey::Survey;
@@ -60,10 +59,20 @@ impl Origin {
     }
 }
 
+/// How a triangle differs from the record it was gathered from: so that nobody has to read that again to find out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Since {
+    Same,
+    Turned,
+    /// It has had another vertex, or is no triangle of the file.
+    Other,
+}
+
 /// A triangle of the submesh.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Triangle {
     pub(crate) v: [Vertex; 3],
+    pub(crate) since: Since,
     pub(crate) origin: Origin,
     /// The region of regular surface it continues coherently, or [`NONE`].
     pub(crate) region: u32,
@@ -73,6 +82,20 @@ pub(crate) struct Triangle {
 }
 
 impl Triangle {
+    fn of_record(v: [Vertex; 3], record: u32, region: u32) -> Self {
+        Self { v, since: Since::Same, origin: Origin::Input(record), region, alive: true, by: None }
+    }
+
+    /// Turns it over.
+    pub(crate) fn turn(&mut self) {
+        self.v.swap(1, 2);
+        self.since = match self.since {
+            Since::Same => Since::Turned,
+            Since::Turned => Since::Same,
+            Since::Other => Since::Other,
+        };
+    }
+
     /// The record it comes from; past all records for a new one.
     pub(crate) fn record(&self) -> u32 {
         match self.origin {
@@ -105,7 +128,7 @@ impl Gathering {
         for (k, vertex) in v.iter().enumerate() {
             self.complete[*vertex as usize] |= complete >> k & 1 == 1;
         }
-        self.triangles.push(Triangle { v, origin: Origin::Input(place), region, alive: true, by: None });
+        self.triangles.push(Triangle::of_record(v, place, region));
     }
 
     pub(crate) fn finish(self) -> Submesh {
@@ -118,7 +141,7 @@ impl Gathering {
 
 /// The mesh under repair.
 pub(crate) struct Submesh {
-    /// The coordinates of [`Position`]s: without −0.0.
+    /// The coordinates of [`Position`]s: without −0.0. No vertex moves: a corner that moves gets another vertex, and [`Since`] says so.
     pub(crate) positions: Vec<[f32; 3]>,
     /// The whole star is here.
     pub(crate) complete: Vec<bool>,
@@ -138,20 +161,19 @@ impl Submesh {
     /// Gathers the irregular triangles of `survey`. O(irregular triangles).
     pub(crate) fn gather(survey: &Survey<'_>) -> Self {
         let mut gathering = Gathering::of(survey.irregular_triangles.len());
-        for (i, (irregular_triangle, region)) in
-            survey.irregular_triangles.iter().zip(&survey.irregular_triangle_regions).enumerate()
-        {
-            if i % ASKED_AT_ONCE == 0 {
-                survey.ask_for(survey.irregular_triangles[i..].iter().take(ASKED_AT_ONCE).map(|s| s.triangle));
-            }
-            gathering.add(
-                irregular_triangle.triangle,
-                corners(survey.records, irregular_triangle.triangle),
-                irregular_triangle.irregular,
-                *region,
-            );
+        for ((irregular_triangle, corners), region) in survey.irregular_corners().zip(&survey.irregular_triangle_regions) {
+            gathering.add(irregular_triangle.triangle, corners, irregular_triangle.irregular, *region);
         }
         gathering.finish()
+    }
+
+    /// The numbers of all triangles; the disk is asked beforehand for the records of those that have had another vertex than theirs.
+    pub(crate) fn beside_records(&self, survey: &Survey<'_>) -> impl Iterator<Item = u32> {
+        survey.ahead(0..self.triangles.len() as u32, |t| {
+            let triangle = &self.triangles[*t as usize];
+            let has_record = triangle.since == Since::Other && !matches!(triangle.origin, Origin::Added(_));
+            has_record.then(|| triangle.record())
+        })
     }
 
     /// Vertices by position: of several there, the one that is used last.
@@ -208,13 +230,7 @@ impl Submesh {
                     self.positions.len() as Vertex - 1
                 })
             });
-            self.triangles.push(Triangle {
-                v,
-                origin: Origin::Input(irregular_triangle.triangle),
-                region: *region,
-                alive: true,
-                by: None,
-            });
+            self.triangles.push(Triangle::of_record(v, irregular_triangle.triangle, *region));
         }
         completed(&known).into_iter().for_each(|v| self.complete[v as usize] = true);
         self.relink();
@@ -246,7 +262,7 @@ impl Submesh {
     /// Adds a triangle and returns its number.
     pub(crate) fn add(&mut self, v: [Vertex; 3], origin: Origin, region: u32) -> u32 {
         let t = self.triangles.len();
-        lean::push(&mut self.triangles, Triangle { v, origin, region, alive: true, by: None });
+        lean::push(&mut self.triangles, Triangle { v, since: Since::Other, origin, region, alive: true, by: None });
         (0..3).for_each(|_| lean::push(&mut self.nexts, NONE));
         self.link(t);
         t as u32
@@ -270,11 +286,24 @@ impl Submesh {
         while corner != NONE {
             let at = corner as usize;
             corner = self.nexts[at];
-            let v = &mut self.triangles[at / 3].v;
-            v[corner_of(v, go, at)] = stay;
+            let triangle = &mut self.triangles[at / 3];
+            triangle.v[corner_of(&triangle.v, go, at)] = stay;
+            triangle.since = Since::Other;
             self.nexts[at] = self.heads[stay as usize];
             self.heads[stay as usize] = at as u32;
         }
+    }
+
+    /// A triangle of the file as its record has it, which is read only if it has had another vertex since; `None` if it is none.
+    pub(crate) fn as_read(&self, records: &[Record], t: u32) -> Option<[[f32; 3]; 3]> {
+        let triangle = &self.triangles[t as usize];
+        let Origin::Input(record) = triangle.origin else { return None };
+        let [a, b, c] = self.points(t);
+        Some(match triangle.since {
+            Since::Same => [a, b, c],
+            Since::Turned => [a, c, b],
+            Since::Other => corners(records, record).map(position::canonical),
+        })
     }
 
     pub(crate) fn points(&self, t: u32) -> [[f32; 3]; 3] {

@@ -7,7 +7,7 @@ use crate::geometry::sums::Measure;
 use crate::io::read_ahead::Guide;
 use crate::io::record::Record;
 use crate::stream::budget::{Budget, Loan, Purpose};
-use crate::stream::members::Members;
+use crate::stream::members::{Members, Reads};
 use crate::stream::plan::HomeBox;
 use crate::stream::plan::{ChunkId, Plan};
 use crate::stream::source::Seen;
@@ -95,7 +95,7 @@ impl Solving<'_, '_> {
         let crossings = self.members.each(
             (self.records, self.guide, self.plan),
             more.threads,
-            |_| true,
+            (Reads::Chunks, |_| true),
             Scratch::default,
             |scratch, chunk, seen, visitors| {
                 if self.is_given_up() {
@@ -138,7 +138,7 @@ impl Solving<'_, '_> {
         let chunks = self.members.each(
             (self.records, self.guide, self.plan),
             self.threads,
-            |_| true,
+            (Reads::Chunks, |_| true),
             Scratch::default,
             |scratch, chunk, seen, visitors| {
                 // Too much to keep may be too much that is irregular: the same is found in any memory.
@@ -183,7 +183,7 @@ impl Solving<'_, '_> {
         let chunks = self.members.each(
             (self.records, self.guide, self.plan),
             self.threads,
-            |chunk| is_wanted[chunk.0 as usize],
+            (Reads::Chunks, |chunk| is_wanted[chunk.0 as usize]),
             Scratch::default,
             |scratch, chunk, seen, _| {
                 if self.is_given_up() {

@@ -18,7 +18,7 @@ use crate::io::read_ahead::Guide;
 use crate::io::record::{self, Record};
 use crate::io::write_behind;
 use crate::stream::budget::{Budget, Purpose};
-use crate::stream::members::Members;
+use crate::stream::members::{Members, Reads};
 use crate::stream::plan::{ChunkId, HomeBox, Plan};
 use crate::stream::source::{Seen, Triangle};
 use crate::topology::chunk::{ChunkTopology, IrregularTriangle};
@@ -265,11 +265,12 @@ impl<'a> Survey<'a> {
 
     /// Irregular triangles that none of these chunks tells of.
     fn irregular_elsewhere(&self, chunks: &[bool]) -> u64 {
-        let is_told = |s: &&IrregularTriangle| {
-            let corners = position::corners(&self.records[s.triangle as usize]);
-            (0..3).filter(|k| s.irregular >> k & 1 == 1).any(|k| chunks[self.plan.home(corners[k]).0 as usize])
+        let is_told = |s: &IrregularTriangle, corners: [[f32; 3]; 3]| {
+            (0..3)
+                .filter(|k| s.irregular >> k & 1 == 1)
+                .any(|k| chunks[self.plan.home(position::canonical(corners[k])).0 as usize])
         };
-        self.irregular_triangles.iter().filter(|s| !is_told(s)).count() as u64
+        self.irregular_corners().filter(|(s, corners)| !is_told(s, *corners)).count() as u64
     }
 
     /// Bytes held, but for irregular triangles.
@@ -283,8 +284,7 @@ impl<'a> Survey<'a> {
     fn irregular(&self) -> Weld {
         let mut irregular = Weld::default();
         irregular.reset(self.irregular_triangles.len());
-        for irregular_triangle in &self.irregular_triangles {
-            let corners = record::corners(&self.records[irregular_triangle.triangle as usize]);
+        for (irregular_triangle, corners) in self.irregular_corners() {
             (0..3).filter(|k| irregular_triangle.irregular >> k & 1 == 1).for_each(|k| {
                 irregular.vertex(corners[k]);
             });
@@ -295,7 +295,8 @@ impl<'a> Survey<'a> {
     /// The regions of some triangles with a regular corner.
     fn regions_at(&self, triangles: impl Iterator<Item = u32>) -> Vec<u32> {
         let triangles: Vec<u32> = triangles.collect();
-        let positions: Vec<[f32; 3]> = triangles.iter().flat_map(|t| position::corners(&self.records[*t as usize])).collect();
+        let read = self.ahead(triangles.iter(), |t| Some(**t));
+        let positions: Vec<[f32; 3]> = read.flat_map(|t| position::corners(&self.records[*t as usize])).collect();
         // Around positions that are not regular there may be triangles of no region, or of the submesh.
         let around = self.beyond_the_submesh(&positions);
         let region = |t: u32| match self.irregular_triangles.binary_search_by_key(&t, |s| s.triangle) {
@@ -341,9 +342,15 @@ impl<'a> Survey<'a> {
         self.threads
     }
 
-    /// Asks the disk for these records, which are about to be looked at.
-    pub(crate) fn ask_for(&self, numbers: impl Iterator<Item = u32>) {
-        self.guide.ask_for(numbers.map(|number| (number, 1)));
+    /// As [`Guide::ahead`] of the file's records.
+    pub(crate) fn ahead<T>(&self, items: impl Iterator<Item = T>, number: impl Fn(&T) -> Option<u32>) -> impl Iterator<Item = T> {
+        self.guide.ahead(items, number)
+    }
+
+    /// The irregular triangles with the corners of their records, ascending.
+    pub(crate) fn irregular_corners(&self) -> impl Iterator<Item = (&IrregularTriangle, [[f32; 3]; 3])> {
+        let all = self.ahead(self.irregular_triangles.iter(), |s| Some(s.triangle));
+        all.map(|s| (s, record::corners(&self.records[s.triangle as usize])))
     }
 
     /// Merged regions of a chunk, by the chunk's own numbers.
@@ -375,9 +382,14 @@ impl<'a> Survey<'a> {
     ) -> Vec<R> {
         let makes = |chunk: ChunkId| make(&self.reaches[chunk.0 as usize]);
         let is_wanted = |chunk: ChunkId| self.regions_of(chunk).iter().any(|p| wanted(*p)) && makes(chunk).is_some();
-        let of_chunk = |(): &mut (), chunk: ChunkId, seen: &Seen<'_>, _: &Seen<'_>| {
+        let of_chunk = |around: &mut Grid, chunk: ChunkId, seen: &Seen<'_>, _: &Seen<'_>| {
             let mut result = makes(chunk)?;
             let regions = self.regions_of(chunk);
+            // Many a region that is wanted is a small part of its chunk.
+            let mine: Vec<Bounds> = regions.iter().filter(|r| wanted(**r)).map(|r| self.regions[*r as usize].bounds).collect();
+            let is_everywhere = mine.iter().any(|bounds| bounds.contains(&self.reaches[chunk.0 as usize]));
+            around.mark(mine.iter().copied().filter(|_| !is_everywhere));
+            let near = |result: &mut R, bounds: &Bounds| (is_everywhere || around.may_meet(bounds)) && near(result, bounds);
             let cell = self.plan.home_box(chunk);
             let mut region_at = self.labels[chunk.0 as usize].by_place();
             seen.each_near(&mut result, &near, |result, place, number, triangle| {
@@ -396,7 +408,13 @@ impl<'a> Survey<'a> {
             });
             Some(result)
         };
-        let visited = self.members.each((self.records, &self.guide, &self.plan), self.threads, is_wanted, || (), of_chunk);
+        let visited = self.members.each(
+            (self.records, &self.guide, &self.plan),
+            self.threads,
+            (Reads::Near, is_wanted),
+            Grid::default,
+            of_chunk,
+        );
         visited.into_iter().flatten().collect()
     }
 
@@ -411,7 +429,7 @@ impl<'a> Survey<'a> {
         self.members.each(
             (self.records, &self.guide, &self.plan),
             self.threads,
-            wanted,
+            (Reads::Near, wanted),
             scratch,
             |scratch, chunk, members, visitors| work(scratch, (chunk, self.plan.home_box(chunk)), [members, visitors]),
         )
@@ -427,7 +445,7 @@ impl<'a> Survey<'a> {
     pub(crate) fn promote(&mut self, positions: &[[f32; 3]]) -> Vec<(IrregularTriangle, u32)> {
         self.promoted.extend(positions);
         let new = self.beyond_the_submesh(positions);
-        for (irregular_triangle, region) in &new {
+        for (irregular_triangle, region) in self.guide.ahead(new.iter(), |(s, _)| Some(s.triangle)) {
             let sum = &mut self.regions[*region as usize];
             let extent = self.measure.triangle(&record::corners(&self.records[irregular_triangle.triangle as usize]));
             sum.triangles -= 1;
@@ -458,7 +476,7 @@ impl<'a> Survey<'a> {
         let found = self.members.each(
             (self.records, &self.guide, &self.plan),
             self.threads,
-            |chunk| !at_home(chunk).is_empty(),
+            (Reads::Near, |chunk| !at_home(chunk).is_empty()),
             <(Sieve, Grid)>::default,
             |(sieve, grid), chunk, seen, _| {
                 sieve.fill(at_home(chunk).iter().map(|(_, p)| *p));

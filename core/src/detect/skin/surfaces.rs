@@ -2,7 +2,6 @@
 
 use crate::contract::report::RepairName;
 use crate::geometry::position::{self, Position};
-use crate::io::record;
 use crate::submesh::components::Reversed;
 use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
@@ -76,7 +75,7 @@ impl Surfaces<'_> {
             let lives = || self.submesh.lives(t);
             match which {
                 Which::Before | Which::Closed => {
-                    self.as_read(self.submesh.triangles[t as usize].origin).iter().for_each(&mut visit);
+                    self.submesh.as_read(self.survey.records, t).iter().for_each(&mut visit);
                     if lives() && is_asked_for(self.made_by(t)) {
                         visit(&self.submesh.points(t));
                     }
@@ -91,16 +90,16 @@ impl Surfaces<'_> {
     /// repair that did it; but for walls
     /// that parts of a body had in common.
     pub(crate) fn each_gone(&self, mut visit: impl FnMut(u32, &Corners, Option<RepairName>)) {
-        for t in 0..self.submesh.triangles.len() as u32 {
+        for t in self.submesh.beside_records(self.survey) {
             let triangle = &self.submesh.triangles[t as usize];
-            if let (Origin::Input(record), Some(corners)) = (triangle.origin, self.as_read(triangle.origin))
+            if let Some(corners) = self.submesh.as_read(self.survey.records, t)
                 && !is_no_harm(triangle.by)
                 && !(self.submesh.lives(t) && is_same(&corners, &self.submesh.points(t)))
             {
                 let [a, b, c] = corners;
                 let points = self.submesh.points(t);
                 let is_turned = points == [a, c, b] || points == [c, b, a] || points == [b, a, c];
-                visit(record, &if is_turned { [a, c, b] } else { corners }, triangle.by);
+                visit(triangle.record(), &if is_turned { [a, c, b] } else { corners }, triangle.by);
             }
         }
     }
@@ -126,9 +125,9 @@ impl Surfaces<'_> {
 
     /// The triangles of the file that are in memory, each by its record.
     pub(crate) fn each_irregular(&self, mut visit: impl FnMut(u32, &Corners)) {
-        for triangle in &self.submesh.triangles {
-            if let (Origin::Input(record), Some(corners)) = (triangle.origin, self.as_read(triangle.origin)) {
-                visit(record, &corners);
+        for t in self.submesh.beside_records(self.survey) {
+            if let Some(corners) = self.submesh.as_read(self.survey.records, t) {
+                visit(self.submesh.record(t), &corners);
             }
         }
     }
@@ -144,10 +143,10 @@ impl Surfaces<'_> {
 
     /// The triangles that were not there as they are, each by a number of its own, with the repair that made them.
     pub(crate) fn each_added(&self, mut visit: impl FnMut(u32, &Corners, Option<RepairName>)) {
-        for t in self.submesh.living() {
-            let (triangle, points) = (&self.submesh.triangles[t as usize], self.submesh.points(t));
-            let by = self.made_by(t);
-            if !is_no_harm(by) && self.as_read(triangle.origin).is_none_or(|corners| !is_same(&corners, &points)) {
+        for t in self.submesh.beside_records(self.survey).filter(|t| self.submesh.lives(*t)) {
+            let (points, by) = (self.submesh.points(t), self.made_by(t));
+            let as_read = || self.submesh.as_read(self.survey.records, t);
+            if !is_no_harm(by) && as_read().is_none_or(|corners| !is_same(&corners, &points)) {
                 visit(t, &points, by);
             }
         }
@@ -168,16 +167,9 @@ impl Surfaces<'_> {
     pub(crate) fn area_before(&self) -> i128 {
         let measure = &self.survey.measure;
         let regular: i128 = self.survey.regions.iter().filter(|r| r.first != NONE).map(|r| r.extent.area).sum();
-        let irregular = self.submesh.triangles.iter().filter_map(|t| self.as_read(t.origin));
+        let triangles = self.submesh.beside_records(self.survey);
+        let irregular = triangles.filter_map(|t| self.submesh.as_read(self.survey.records, t));
         regular + irregular.map(|corners| measure.triangle(&corners).area).sum::<i128>()
-    }
-
-    /// A triangle as the file has it; `None` for one that it does not have.
-    fn as_read(&self, origin: Origin) -> Option<Corners> {
-        match origin {
-            Origin::Input(place) => Some(record::corners(&self.survey.records[place as usize]).map(position::canonical)),
-            Origin::Part(_) | Origin::Added(_) => None,
-        }
     }
 }
 

@@ -19,7 +19,6 @@ use crate::detect::bodies;
 use crate::detect::review::Enclosed;
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::sums::Bounds;
-use crate::io::record;
 use crate::repairs::shared::context::{Changes, Done, Repair};
 use crate::repairs::shared::pieces::{are_patched, crossing, lies_in_material, take_away};
 use crate::repairs::shared::unsaid;
@@ -119,11 +118,11 @@ fn are_as_read(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components, reve
     let mut as_read = vec![true; pieces.list.len()];
     let turned = pieces.of_region.iter().zip(&reversed.regions).filter(|(piece, turned)| **turned && **piece != NONE);
     turned.for_each(|(piece, _)| as_read[*piece as usize] = false);
-    for t in submesh.living() {
+    for t in submesh.beside_records(survey).filter(|t| submesh.lives(*t)) {
         let is_as_read = match submesh.triangles[t as usize].origin {
-            Origin::Input(record) => {
+            Origin::Input(_) => {
                 let [a, b, c] = submesh.points(t);
-                record::corners(&survey.records[record as usize]) != [a, c, b]
+                submesh.as_read(survey.records, t) != Some([a, c, b])
             }
             Origin::Part(_) => true,
             Origin::Added(_) => false,

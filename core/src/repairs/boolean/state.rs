@@ -292,7 +292,7 @@ impl State<'_, '_, '_> {
             // They are no part of their region any more, whatever becomes of the attempt.
             if region != NONE {
                 if self.before.reversed.regions[region as usize] {
-                    triangle.v.swap(1, 2);
+                    triangle.turn();
                 }
                 triangle.alive = !self.before.reversed.dropped[region as usize];
             }

@@ -201,7 +201,7 @@ impl Beyond {
         let numbers: HashMap<Position, Vertex> = next.iter().zip(&positions).map(|(v, p)| (Position::of(*p), *v)).collect();
         let found = survey.beyond_the_submesh(&positions);
         let mut beyond = Self { of_vertex: Vec::new(), corners: Vec::with_capacity(found.len()) };
-        for (number, (irregular_triangle, _)) in (0..).zip(&found) {
+        for (number, (irregular_triangle, _)) in (0..).zip(survey.ahead(found.iter(), |(s, _)| Some(s.triangle))) {
             let corners = position::corners(&survey.records[irregular_triangle.triangle as usize]);
             let at = corners.iter().filter_map(|p| numbers.get(&Position::of(*p)));
             beyond.of_vertex.extend(at.map(|v| (*v, number)));

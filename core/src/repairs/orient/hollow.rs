@@ -17,12 +17,11 @@ use crate::detect::bodies;
 use crate::geometry::boxes::BoxTree;
 use crate::geometry::distance::place;
 use crate::geometry::sums::Bounds;
-use crate::io::record;
 use crate::repairs::orient::directions::turn;
 use crate::repairs::shared::context::{Changes, Context, Done, Repair};
 use crate::repairs::shared::pieces::{are_patched, crossing};
+use crate::submesh::Submesh;
 use crate::submesh::components::{Components, Reversed};
-use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
 use crate::util::words::{Short, span};
@@ -148,13 +147,13 @@ fn said(survey: &Survey<'_>, submesh: &Submesh, pieces: &Components, reversed: &
         said.triangles += triangles;
         said.turned += if reversed.regions[region] { triangles - before } else { before };
     }
-    for t in submesh.living().filter(|t| pieces.of_triangle[*t as usize] != NONE) {
+    for t in submesh.beside_records(survey).filter(|t| submesh.lives(*t) && pieces.of_triangle[*t as usize] != NONE) {
         let said = &mut said[pieces.of_triangle[t as usize] as usize];
-        if let Origin::Input(record) = submesh.triangles[t as usize].origin {
+        if let Some(read) = submesh.as_read(survey.records, t) {
             // Its corners may have been welded to others.
-            let [now, read] = [submesh.points(t), record::corners(&survey.records[record as usize])].map(normal);
+            let [now, read] = [submesh.points(t), read].map(normal);
             said.triangles += 1;
-            said.turned += u64::from((now.dot(read) < 0.0) != survey.was_turned(record));
+            said.turned += u64::from((now.dot(read) < 0.0) != survey.was_turned(submesh.record(t)));
         }
     }
     said

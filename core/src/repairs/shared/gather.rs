@@ -63,7 +63,7 @@ pub(crate) fn visit(
     let in_submesh = submesh.living().filter(|t| counts(components.of_triangle[*t as usize]));
     all.extend(in_submesh.map(|t| (submesh.record(t), NONE, t)));
     all.sort_unstable();
-    for (record, region, t) in all {
+    for (record, region, t) in survey.ahead(all.into_iter(), |(record, _, t)| (*t == NONE).then_some(*record)) {
         let (part, corners) = if t == NONE {
             let [a, b, c] = position::corners(&survey.records[record as usize]);
             (Part::Region(region), if reversed.regions[region as usize] { [a, c, b] } else { [a, b, c] })

@@ -3,7 +3,6 @@
 use crate::detect::fresh::{self, Listed};
 use crate::geometry::position;
 use crate::geometry::tri_tri::{self, Contact, Triangle as Corners};
-use crate::io::record;
 use crate::output::edit;
 use crate::submesh::components::Reversed;
 use crate::submesh::{Origin, Submesh};
@@ -70,11 +69,12 @@ impl Overlay {
         let records = survey.records.len() as u32;
         records.checked_add(submesh.triangles.len() as u32)?;
         let (mut gone, mut changed) = (Vec::new(), Vec::new());
-        for t in 0..submesh.triangles.len() as u32 {
+        for t in submesh.beside_records(survey) {
             let (triangle, lives) = (&submesh.triangles[t as usize], submesh.lives(t));
             let stands = match triangle.origin {
                 Origin::Input(place) => {
-                    let stands = lives && same_corners(record::corners(&survey.records[place as usize]), submesh.points(t));
+                    let is_as_read = |read| same_corners(read, submesh.points(t));
+                    let stands = lives && submesh.as_read(survey.records, t).is_some_and(is_as_read);
                     if !stands {
                         gone.push(place);
                     }

@@ -104,9 +104,9 @@ pub(crate) fn components_of_records(
             found.insert(record, components.of_triangle[t]);
         }
     }
-    let positions: Vec<[f32; 3]> = wanted
-        .iter()
-        .filter(|record| !found.contains_key(record))
+    let beyond = wanted.iter().filter(|record| !found.contains_key(record));
+    let positions: Vec<[f32; 3]> = survey
+        .ahead(beyond, |record| Some(**record))
         .map(|record| position::corners(&survey.records[*record as usize])[0])
         .collect();
     if !positions.is_empty() {

@@ -1,13 +1,13 @@
 //! The triangles of a submesh as they were, to go back to: half of what a copy of them takes.
 
 use crate::contract::repair_name::RepairName;
-use crate::submesh::{Origin, Triangle, Vertex};
+use crate::submesh::{Origin, Since, Triangle, Vertex};
 
 /// Triangles as they were at `Work::snapshot`. Where they come from and which regions they continue is not kept: that does not change, but for
 /// what `Work` notes.
 pub(crate) struct Snapshot {
     corners: Vec<[Vertex; 3]>,
-    states: Vec<(bool, Option<RepairName>)>,
+    states: Vec<(bool, Option<RepairName>, Since)>,
     /// Triangles that were fetched since.
     fetched: Vec<Triangle>,
     /// So many triangles had been attributed to a repair.
@@ -17,7 +17,7 @@ pub(crate) struct Snapshot {
 impl Snapshot {
     pub(super) fn of(triangles: &[Triangle], attributed: usize) -> Self {
         let corners = triangles.iter().map(|t| t.v).collect();
-        let states = triangles.iter().map(|t| (t.alive, t.by)).collect();
+        let states = triangles.iter().map(|t| (t.alive, t.by, t.since)).collect();
         Self { corners, states, fetched: Vec::new(), attributed }
     }
 
@@ -54,8 +54,8 @@ impl Snapshot {
             triangles[t as usize].origin = origin;
         }
         triangles.truncate(self.corners.len());
-        for (triangle, (v, (alive, by))) in triangles.iter_mut().zip(self.corners.iter().zip(&self.states)) {
-            *triangle = Triangle { v: *v, alive: *alive, by: *by, ..*triangle };
+        for (triangle, (v, (alive, by, since))) in triangles.iter_mut().zip(self.corners.iter().zip(&self.states)) {
+            *triangle = Triangle { v: *v, since: *since, alive: *alive, by: *by, ..*triangle };
         }
         triangles.extend_from_slice(&self.fetched);
         others

@@ -11,7 +11,7 @@ use crate::geometry::position::Position;
 use crate::repairs::shared::snapshot::Snapshot;
 use crate::submesh::components::{Components, Reversed, Through};
 use crate::submesh::edges::Edges;
-use crate::submesh::{Origin, Submesh, Triangle, Vertex};
+use crate::submesh::{Origin, Since, Submesh, Triangle, Vertex};
 use crate::topology::chunk::IrregularTriangle;
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
@@ -254,7 +254,7 @@ impl<'a> Work<'a> {
     pub(crate) fn flip(&mut self, t: u32) {
         self.touch();
         self.note(t);
-        self.submesh.triangles[t as usize].v.swap(1, 2);
+        self.submesh.triangles[t as usize].turn();
     }
 
     /// Lets all triangles use `target[v]` instead of `v`. Their star lists are as they were until [`Self::relink`].
@@ -265,8 +265,8 @@ impl<'a> Work<'a> {
             let v = old.map(|v| target[v as usize]);
             if v != old {
                 self.note(t);
-                self.submesh.triangles[t as usize].v = v;
-                self.submesh.triangles[t as usize].by = self.by;
+                let triangle = &mut self.submesh.triangles[t as usize];
+                (triangle.v, triangle.since, triangle.by) = (v, Since::Other, self.by);
                 self.changed.push(t);
             }
         }
@@ -276,8 +276,9 @@ impl<'a> Work<'a> {
     pub(crate) fn assign(&mut self, t: u32, corner: usize, v: Vertex) {
         self.touch();
         self.note(t);
-        self.submesh.triangles[t as usize].v[corner] = v;
-        self.submesh.triangles[t as usize].by = self.by;
+        let triangle = &mut self.submesh.triangles[t as usize];
+        triangle.v[corner] = v;
+        (triangle.since, triangle.by) = (Since::Other, self.by);
         self.changed.push(t);
     }
 
@@ -334,6 +335,7 @@ impl<'a> Work<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::record::corners;
     use crate::testing::{diagnose, plate, records};
     use crate::util::ids::NONE;
 
@@ -443,6 +445,38 @@ mod tests {
             steps - work.triangles.len() as u64
         };
         assert_eq!(steps_for(8), steps_for(32));
+    }
+
+    /// Whatever was done to it, and taken back.
+    #[test]
+    fn a_triangle_of_the_file_is_known_as_it_was_read() {
+        let records = records(&plate(3, |_, _| true));
+        let mut d = diagnose(&records);
+        let mut work = Work::new(&mut d.submesh);
+        let holds = |work: &Work<'_>| {
+            let of_file =
+                (0..work.triangles.len() as u32).filter(|t| matches!(work.triangles[*t as usize].origin, Origin::Input(_)));
+            of_file.clone().all(|t| work.as_read(&records, t) == Some(corners(&records[work.record(t) as usize])))
+                && of_file.count() > 9
+        };
+        let snapshot = work.snapshot();
+        work.flip(2);
+        assert!(holds(&work) && work.points(2) != corners(&records[2]));
+        work.mark();
+        let high = work.add_vertex(Position::of([1.0, 1.0, 2.0]));
+        work.merge(high, work.triangles[0].v[0]);
+        work.assign(5, 1, high);
+        work.flip(5);
+        work.kill(7);
+        assert!(holds(&work));
+        work.take_back();
+        assert!(holds(&work) && work.triangles[5].since == Since::Same && work.triangles[2].since == Since::Turned);
+        let all: Vec<Vertex> = (0..work.positions.len() as Vertex).map(|v| if v < 4 { high } else { v }).collect();
+        work.move_to(&all);
+        work.flip(9);
+        assert!(holds(&work) && work.triangles.iter().any(|t| t.since == Since::Other));
+        work.restore(&snapshot);
+        assert!(holds(&work) && work.triangles.iter().all(|t| t.since == Since::Same));
     }
 
     #[test]

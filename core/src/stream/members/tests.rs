@@ -37,7 +37,7 @@ proptest! {
             let input = (&records[..], &Guide::NONE);
             let members = Members::gather(Path::new("test"), input, &plan, Some(0.0), &limits, &crate::contract::progress::Quiet).unwrap();
             let wanted = |c: ChunkId| c.0 % 3 != 1;
-            let seen = members.each((&records, &Guide::NONE, &plan), threads, wanted, || (), |(), chunk, seen, visitors| {
+            let seen = members.each((&records, &Guide::NONE, &plan), threads, (Reads::Chunks, wanted), || (), |(), chunk, seen, visitors| {
                 let list = |source: &Seen<'_>| {
                     let mut all = Vec::new();
                     source.for_each(|number, triangle| all.push((number, triangle.corners())));

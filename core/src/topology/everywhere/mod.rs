@@ -16,7 +16,7 @@ use crate::contract::settings::Limits;
 use crate::io::read_ahead::Guide;
 use crate::io::record::Record;
 use crate::stream::budget::{Budget, Purpose};
-use crate::stream::members::Members;
+use crate::stream::members::{Members, Reads};
 use crate::stream::plan::Plan;
 use crate::stream::source::Source;
 use crate::topology::solving;
@@ -92,22 +92,16 @@ impl Stream<'_, '_> {
     fn pieces(&self, budget: &Budget, progress: &dyn Progress) -> Vec<Pieces> {
         let (all, done) = (self.records.len() as u64, AtomicU64::new(0));
         let source = (self.records, self.guide, self.plan);
-        self.members.each(
-            source,
-            self.threads,
-            |_| true,
-            Chunk::default,
-            |chunk, number, seen, _| {
-                if progress.cancelled() || budget.is_exceeded() {
-                    return Pieces::default();
-                }
-                let pieces = chunk.solve(seen, self.plan.home_box(number));
-                budget.take(Purpose::Surface, heap_bytes(&pieces));
-                let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-                progress.at(STAGE, done * all / self.plan.chunks() as u64, all);
-                pieces
-            },
-        )
+        self.members.each(source, self.threads, (Reads::Chunks, |_| true), Chunk::default, |chunk, number, seen, _| {
+            if progress.cancelled() || budget.is_exceeded() {
+                return Pieces::default();
+            }
+            let pieces = chunk.solve(seen, self.plan.home_box(number));
+            budget.take(Purpose::Surface, heap_bytes(&pieces));
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            progress.at(STAGE, done * all / self.plan.chunks() as u64, all);
+            pieces
+        })
     }
 
     /// The records that go, and those that turn. Every chunk that sees a triangle says the same of it.
@@ -117,7 +111,7 @@ impl Stream<'_, '_> {
         self.members.each(
             source,
             self.threads,
-            |_| true,
+            (Reads::Chunks, |_| true),
             || (),
             |(), number, seen, _| {
                 let number = number.0 as usize;

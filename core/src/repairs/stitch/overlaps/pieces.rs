@@ -149,7 +149,7 @@ impl Pieces {
         );
         let mut regular: Vec<(u32, u32)> = found.into_iter().flat_map(|(_, found)| found).collect();
         regular.sort_unstable();
-        all.extend(regular.into_iter().map(|(record, region)| {
+        all.extend(survey.ahead(regular.into_iter(), |(record, _)| Some(*record)).map(|(record, region)| {
             let corners = record::corners(&survey.records[record as usize]);
             Member { piece: of_region[region as usize], corners, number: Number::Record(record) }
         }));

@@ -30,9 +30,10 @@ async function renew() {
         // Whoever is about to press a button in it is not disturbed.
         const isBusy = part.contains(document.activeElement);
         const isLeft = part.dataset.live === "once" && part.children.length > 0;
-        if (!fresh || isLeft || fresh.innerHTML === part.innerHTML) continue;
-        if (isBusy) isBehind = true;
-        else part.replaceChildren(...fresh.childNodes);
+        if (fresh && !isLeft && fresh.innerHTML !== part.innerHTML) {
+          if (isBusy) isBehind = true;
+          else part.replaceChildren(...fresh.childNodes);
+        }
       }
       document.dispatchEvent(new Event("renewed"));
     }

@@ -4,6 +4,7 @@
 const REST = 700; // milliseconds in which changes are gathered
 let waiting = false;
 let asked = false;
+let isBehind = false; // a part was left as it was, since someone stood in it
 
 function show({ job, stage, percent }) {
   const place = document.querySelector(`[data-progress="${Number(job)}"]`);
@@ -29,7 +30,10 @@ async function renew() {
         // Whoever is about to press a button in it is not disturbed.
         const isBusy = part.contains(document.activeElement);
         const isLeft = part.dataset.live === "once" && part.children.length > 0;
-        if (fresh && !isBusy && !isLeft && fresh.innerHTML !== part.innerHTML) part.replaceChildren(...fresh.childNodes);
+        if (fresh && !isLeft && fresh.innerHTML !== part.innerHTML) {
+          if (isBusy) isBehind = true;
+          else part.replaceChildren(...fresh.childNodes);
+        }
       }
       document.dispatchEvent(new Event("renewed"));
     }
@@ -43,6 +47,12 @@ async function renew() {
 if (document.querySelector("[data-live]")) {
   const own = location.pathname.match(/^\/jobs\/(\d+)$/);
   const events = new EventSource("/v1/events");
+  // What happened between the making of this page and the begin of the stream is in no event.
+  events.addEventListener("open", renew);
+  document.addEventListener("focusout", () => {
+    if (isBehind) renew();
+    isBehind = false;
+  });
   events.addEventListener("progress", (event) => show(JSON.parse(event.data)));
   events.addEventListener("job", (event) => {
     if (!own || String(JSON.parse(event.data).job) === own[1]) renew();

@@ -184,7 +184,8 @@ fn through_daemon<W: Wish>(dir: &Path, wish: &W) -> Result<Option<W::Answer>, Fa
             Err(Failure::try_again("the daemon does not answer: it is stopped, or very busy; try again".into()))
         }
         Err(error) if error.kind() == ErrorKind::PermissionDenied => {
-            let line = format!("{}: no right to ask its daemon ({error}); run this as the daemon's user", dir.display());
+            let line =
+                format!("{}: no right to ask its daemon ({error}); run this as the daemon's user, or as root", dir.display());
             Err(Failure { line, exit: Exit::Refused })
         }
         // It died over it; what only looks can be asked of the next one.

@@ -46,6 +46,7 @@ fn write(args: &NightArgs, all: All<'_>) -> Result<(), (String, Exit)> {
 
 /// The jobs of a night, the latest first.
 struct Night {
+    since: Time,
     /// Jobs that need a person, however old.
     need: Vec<Job>,
     /// Others that ended in the night.
@@ -62,12 +63,12 @@ impl Night {
         let of_folders = jobs.first().is_some_and(|first| jobs.iter().any(|job| job.source.folder != first.source.folder));
         let mut of = |wanted| jobs.extract_if(.., |job| part(job, &(since..)) == Some(wanted)).collect::<Vec<_>>();
         let (need, ended, live) = (of(Part::NeedsSomeone), of(Part::Ended), of(Part::Lives).len() as u64);
-        Self { need, ended, live, of_folders }
+        Self { since, need, ended, live, of_folders }
     }
 }
 
 fn whole(night: &Night) -> Markup {
-    let Night { need, ended, live, of_folders } = night;
+    let Night { since, need, ended, live, of_folders } = night;
     let count = |kind: Kind| ended.iter().filter(|job| job.kind() == kind).count() as u64;
     let (noted, others): (Vec<&Job>, Vec<&Job>) = ended.iter().partition(|job| hint(job).is_some());
     page(
@@ -77,29 +78,35 @@ fn whole(night: &Night) -> Markup {
             div class={ "outcome " (if need.is_empty() { "good" } else { "review" }) } role="status" {
                 strong { (how_many_need_you(need.len() as u64)) }
                 @if !need.is_empty() { p { (of_which_kind(|kind| need.iter().filter(|job| job.kind() == kind).count() as u64)) "." } }
-                p { (show_count(count(Kind::Done))) " done, " (show_count(count(Kind::Rejected))) " rejected, " (show_count(count(Kind::Cancelled))) " cancelled." }
+                p { "Since " (time(*since)) ": " (show_count(count(Kind::Done))) " done, " (show_count(count(Kind::Rejected))) " rejected, " (show_count(count(Kind::Cancelled))) " cancelled." }
                 @if *live > 0 { p { (show_count(*live)) " not over yet: they wait or are in work." } }
             }
-            @if !need.is_empty() { h2 { "What needs you" } (rows(need, *of_folders, true)) }
-            @if !noted.is_empty() { h2 { "Good, with a note" } (rows(noted, *of_folders, true)) }
-            @if !others.is_empty() { h2 { "What else ended" } (rows(others, *of_folders, false)) }
+            @if !need.is_empty() {
+                h2 { "What needs you" }
+                (rows(need, *of_folders, "Why", true))
+                @if need.iter().any(|job| job.kind() == Kind::NeedsReview) {
+                    p { "Where to decide: on the daemon’s page of that job, or with " code { "suture jobs approve" } " or " code { "suture jobs reject" } " and the job’s number." }
+                }
+            }
+            @if !noted.is_empty() { h2 { "Good, with a note" } (rows(noted, *of_folders, "Note", true)) }
+            @if !others.is_empty() { h2 { "What else ended" } (rows(others, *of_folders, "Why", false)) }
         },
     )
 }
 
-/// `is_advised`: with what to do.
-fn rows<'a>(jobs: impl IntoIterator<Item = &'a Job>, of_folders: bool, is_advised: bool) -> Markup {
+/// `said`: what is to be said of each; `is_advised`: with what to do.
+fn rows<'a>(jobs: impl IntoIterator<Item = &'a Job>, of_folders: bool, said: &str, is_advised: bool) -> Markup {
     html! {
-        table {
+        div class="wide" { table {
             thead { tr {
-                th scope="col" { "File" } @if of_folders { th scope="col" { "Folder" } } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Why" }
+                th scope="col" class="n" { "Job" } th scope="col" { "File" } @if of_folders { th scope="col" { "Folder" } } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { (said) }
                 @if is_advised { th scope="col" { "What to do" } }
             } }
             tbody { @for job in jobs { tr {
-                td class="file" { (plain(&job.source.path.to_string())) } @if of_folders { td { (plain(&job.source.folder)) } } td { (mark(job)) } td class="time" { (time(job.changed)) } td class="why" { (plain(&reason(job))) }
+                td class="n" { (job.id) } td class="file" { (plain(&job.source.path.to_string())) } @if of_folders { td { (plain(&job.source.folder)) } } td { (mark(job)) } td class="time" { (time(job.changed)) } td class="why" { (plain(&reason(job))) }
                 @if is_advised { td class="why" { (plain(&advice(job))) } }
             } } }
-        }
+        } }
     }
 }
 

@@ -78,12 +78,20 @@ fn outcome(report: &Report) -> Markup {
 /// What the file that was judged is, and all reasons for it.
 pub(crate) fn verdict(report: &Report) -> Markup {
     html! {
-        p { "The file that was judged is " (report.verdict.statement) "." }
-        @if !report.verdict.reasons.is_empty() {
-            ul { @for reason in &report.verdict.reasons { li { (plain(reason)) } } }
-        }
+        (statement(report))
+        @if !report.verdict.reasons.is_empty() { (reasons(&report.verdict.reasons)) }
         @for hint in &report.hints { p { "Note: " (plain(&hint.text)) "." } }
     }
+}
+
+/// What the file that was judged is.
+pub(crate) fn statement(report: &Report) -> Markup {
+    html! { p { "The file that was judged is " (report.verdict.statement) "." } }
+}
+
+/// Reasons, one below the other.
+pub(crate) fn reasons(reasons: &[String]) -> Markup {
+    html! { ul { @for reason in reasons { li { (plain(reason)) } } } }
 }
 
 /// The picture at that address. `is_pair`: it shows the file and its result side by side.
@@ -94,8 +102,8 @@ pub(crate) fn figure(address: &str, is_pair: bool) -> Markup {
             img alt=(words) src=(address);
             figcaption {
                 (words)
-                (key("outside", "outside")) (key("inside", "inside")) (key("edge", "edge of one triangle"))
-                @if is_pair { (key("goes", "goes")) (key("new", "new")) }
+                (key("outside", "outside")) (key("inside", "inside")) (key("edge", "open edge"))
+                @if is_pair { (key("goes", "removed")) (key("new", "added")) }
             }
         }
     }
@@ -243,7 +251,7 @@ fn facts(report: &Report) -> Markup {
     let file = |title: &str, facts: &FileFacts| {
         html! { tr {
             th scope="row" { (title) }
-            td { (plain(&facts.path.to_string_lossy())) br; (show_count(facts.triangles)) " triangles, " (show_size(facts.bytes)) br; "BLAKE3 " code { (facts.blake3) } }
+            td class="file" { (plain(&facts.path.to_string_lossy())) br; (show_count(facts.triangles)) " triangles, " (show_size(facts.bytes)) br; "BLAKE3 " code { (facts.blake3) } }
         } }
     };
     let measure = report.after.as_ref().unwrap_or(&report.before);
@@ -255,7 +263,7 @@ fn facts(report: &Report) -> Markup {
             @if let Some(bounds) = &measure.bounds { tr { th scope="row" { "size" } td { (size(bounds)) " units" } } }
             tr { th scope="row" { "area, volume" } td { (show_number(measure.area)) ", " (show_number(measure.volume)) } }
             tr { th scope="row" { "profile" } td { (plain(&report.profile.name)) } }
-            tr { th scope="row" { "cost" } td { (show_seconds(report.cost.wall_seconds)) ", peak " (show_size(report.cost.peak_anonymous_bytes)) } }
+            tr { th scope="row" { "time, memory" } td { (show_seconds(report.cost.wall_seconds)) ", at most " (show_size(report.cost.peak_anonymous_bytes)) } }
             tr { th scope="row" { "engine" } td { "Suture " (report.engine_version) } }
         } }
     }

@@ -32,6 +32,7 @@ fn a_good_result_with_a_note_is_told_of() {
     for words in ["Nothing needs you.", "Good, with a note", "tiny.stl", "was it drawn in inches?", "Read the note."] {
         assert!(night.text().contains(words), "{words}: {}", night.text());
     }
+    assert!(night.text().contains("<th scope=\"col\">Note</th>") && !night.text().contains("<th scope=\"col\">Why</th>"));
     assert!(!night.text().contains("good.stl"));
     let all = client.browse("/jobs").expect(200);
     assert!(all.text().contains("was it drawn in inches?"), "{}", all.text());

@@ -15,6 +15,10 @@ fn a_night_is_a_page_or_a_table() {
     let page = String::from_utf8(place.read("night.html")).unwrap();
     for words in [
         "2 files need you.",
+        "Since <time",
+        "<code>suture jobs approve</code>",
+        "<th scope=\"col\" class=\"n\">Job</th>",
+        "<div class=\"wide\">",
         "Needs review: 1; Failed: 1.",
         "doubtful.stl",
         "=1+1,&lt;b&gt;.stl",

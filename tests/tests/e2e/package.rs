@@ -89,6 +89,10 @@ fn the_unit_lets_the_daemon_write_where_its_configuration_says_and_nowhere_else(
     {
         assert_eq!(values(&unit, setting), [value], "{setting}");
     }
+    // A bare system has a shell and systemd, but no procps, so no `/bin/kill`.
+    for program in ["ExecStart", "ExecStartPre", "ExecReload"].iter().flat_map(|setting| values(&unit, setting)) {
+        assert!(["/usr/bin/suture ", "/bin/sh "].iter().any(|there| program.starts_with(there)), "{program}");
+    }
     assert!(!values(&unit, "WatchdogSec").is_empty() && !values(&unit, "MemoryMax").is_empty());
 }
 

@@ -275,6 +275,17 @@ fn a_person_decides_on_the_page_of_a_job() {
     let page = client.browse("/jobs/1").expect(200);
     assert_is_page(&page);
     assert!(page.text().contains("formaction=\"/jobs/1/approve\"") && page.text().contains("formaction=\"/jobs/1/reject\""));
+    // All reasons stand where one looks first, whole and once.
+    let reasons = client.get("/v1/jobs/1/report").json()["verdict"]["reasons"].as_array().unwrap().clone();
+    assert!(!reasons.is_empty() && page.text().contains("<p>Why:</p><ul><li>"), "{}", page.text());
+    for reason in reasons {
+        assert_eq!(
+            page.text().matches(&format!("<li>{}</li>", reason.as_str().unwrap())).count(),
+            1,
+            "{reason}: {}",
+            page.text()
+        );
+    }
     let word = field(&page, "word");
     let decide =
         |id: u64, action: &str, rest: &str| client.submit(&format!("/jobs/{id}/{action}"), &[], &format!("word={word}{rest}"));

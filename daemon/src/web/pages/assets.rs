@@ -14,7 +14,8 @@ const WORDS: &str = "text/plain; charset=utf-8";
 const FRESH: &str = "no-cache";
 
 /// Name, kind, content.
-const ALL: [(&str, &str, &[u8]); 5] = [
+const ALL: [(&str, &str, &[u8]); 6] = [
+    ("icon.svg", "image/svg+xml", include_bytes!("../../../assets/icon.svg")),
     ("live.js", SCRIPT, include_bytes!("../../../assets/live.js")),
     ("view.js", SCRIPT, include_bytes!("../../../assets/view.js")),
     ("three/three.module.min.js", SCRIPT, include_bytes!("../../../assets/three/three.module.min.js")),
@@ -54,6 +55,21 @@ mod tests {
         assert!(String::from_utf8_lossy(of("three/LICENSE")).contains("The MIT License"));
     }
 
+    /// What ends between the making of a page and the begin of its stream would be shown as in work for ever; so would what ends while
+    /// someone stands in it.
+    #[test]
+    fn a_page_is_renewed_when_its_stream_begins_and_when_it_is_left() {
+        let text = include_str!("../../../assets/live.js");
+        assert!(text.contains("addEventListener(\"open\", renew)") && text.contains("addEventListener(\"focusout\""));
+    }
+
+    /// Colours of the system on paper of ours, or the other way round, cannot be read in the dark: a report says both.
+    #[test]
+    fn reports_have_ink_and_paper_by_day_and_in_the_dark() {
+        assert_eq!((STYLE.matches("--ink:").count(), STYLE.matches("--paper:").count()), (2, 2));
+        assert!(STYLE.contains("background:var(--paper);color:var(--ink)") && STYLE.contains(":focus-visible{outline:3px"));
+    }
+
     /// Scripts of ours ask this daemon and no one else.
     #[test]
     fn nothing_comes_from_elsewhere() {
@@ -62,6 +78,8 @@ mod tests {
             let text = String::from_utf8_lossy(content);
             assert!(!text.contains("http:") && !text.contains("https:") && !text.contains("innerHTML ="), "{name}");
         }
+        let (_, _, icon) = ALL.into_iter().find(|(known, ..)| *known == "icon.svg").unwrap();
+        assert!(!String::from_utf8_lossy(icon).contains("href"));
         assert!(!PAGES.contains("url(") && !STYLE.contains("url(") && !PAGES.contains("@import"));
     }
 }

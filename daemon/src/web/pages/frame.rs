@@ -70,6 +70,7 @@ fn respond(status: StatusCode, title: &str, head: &Markup, body: &Markup) -> Res
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 title { (title) " – Suture" }
+                link rel="icon" href="/assets/icon.svg" type="image/svg+xml";
                 link rel="stylesheet" href="/assets/suture.css";
                 script src="/assets/live.js" defer {}
             }

@@ -39,30 +39,39 @@ pub(super) async fn job(
     let report = if has_ended { report_of(&shared, id).await.ok().flatten() } else { None };
     let frame = Frame::of(&shared, &headers);
     let name = plain(&job.source.path.to_string());
+    let reasons = whole_reasons(&job, report.as_ref());
     let body = html! {
         p { a href="/jobs" { "All jobs" } }
         h1 { (name) }
         div id="job" data-live {
-            (standing(&job))
+            (standing(&job, reasons))
             @if job.kind().is_held() { p { (progress(&job, &shared.context.bus)) } }
             ul class="actions" { (forms(&frame, &job)) (downloads(&job)) }
         }
         // It stays as it is once it is there, so that no one is disturbed who looks at it.
-        div id="report" data-live="once" { @if let Some(report) = &report { (reported(&job, report)) } }
+        div id="report" data-live="once" { @if let Some(report) = &report { (reported(&job, report, !reasons.is_empty())) } }
         div id="facts" data-live { (facts(&job, &night::place_of(&shared.context, &job.source.folder))) }
         script type="module" src="/assets/view.js" {}
     };
     Ok(frame.page("", &format!("{name}: {}", state(&job).0), &body))
 }
 
+/// The reasons of a report, if they are why the job stands where it stands: the job's own line holds the begin of them only.
+fn whole_reasons<'a>(job: &Job, report: Option<&'a Report>) -> &'a [String] {
+    let line = reason(job);
+    let begin = line.strip_suffix('…').unwrap_or(&line);
+    let reasons = report.map_or(&[][..], |report| &report.verdict.reasons);
+    if !begin.is_empty() && reasons.join("; ").starts_with(begin) { reasons } else { &[] }
+}
+
 /// Where it stands, why, and what to do.
-fn standing(job: &Job) -> Markup {
+fn standing(job: &Job, reasons: &[String]) -> Markup {
     let (words, class) = state(job);
     let (why, advice) = (reason(job), advice(job));
     html! {
         div class={ "outcome " (class) } role="status" {
             strong { (words) }
-            @if !why.is_empty() { p { (if hint(job).is_some() { "Note: " } else { "Why: " }) (plain(&why)) } }
+            @if !reasons.is_empty() { p { "Why:" } (report::reasons(reasons)) } @else if !why.is_empty() { p { (if hint(job).is_some() { "Note: " } else { "Why: " }) (plain(&why)) } }
             @if !advice.is_empty() { p { "What to do: " (plain(&advice)) } }
         }
     }
@@ -104,18 +113,19 @@ fn facts(job: &Job, place: &str) -> Markup {
             (fact("Priority", html! { (job.priority) }))
             (fact("Attempts", html! { (job.attempts.0) }))
             (fact("Dropped", time(job.submitted)))
-            (fact("Changed", time(job.changed)))
+            (fact("Last change", time(job.changed)))
             @if let Some(pause) = job.pause() { (fact("Tried again", time(pause))) }
         }
     }
 }
 
-fn reported(job: &Job, report: &Report) -> Markup {
+/// `is_explained`: the reasons stand above.
+fn reported(job: &Job, report: &Report, is_explained: bool) -> Markup {
     let is_pair = report.output.is_some() && report.outcome != Outcome::Clean;
     let side = if is_pair { "both" } else { "before" };
     html! {
         h2 { "The verdict" }
-        (report::verdict(report))
+        @if is_explained { (report::statement(report)) } @else { (report::verdict(report)) }
         h2 { "Pictures" }
         (report::figure(&format!("/v1/jobs/{}/preview?side={side}", job.id), is_pair))
         (places::view(job.id, report, is_pair))

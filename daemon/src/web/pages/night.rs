@@ -111,7 +111,7 @@ fn need_someone(night: &Night) -> Markup {
     html! {
         @if !night.need_someone.is_empty() {
             h2 { "What needs you" }
-            (advised(&night.need_someone, night.of_folders()))
+            (advised(&night.need_someone, night.of_folders(), "Why"))
             @if more > 0 { p { a href=(list_of(&NEED_SOMEONE)) { (show_count(more)) " more" } } }
         }
     }
@@ -124,17 +124,17 @@ fn noted(night: &Night) -> Markup {
     html! {
         @if !latest_noted.is_empty() {
             h2 { "Good, with a note" }
-            (advised(latest_noted, night.of_folders()))
+            (advised(latest_noted, night.of_folders(), "Note"))
             @if more > 0 { p { a href=(list_of(&[Kind::Done])) { (show_count(more)) " more among all that is done" } } }
         }
     }
 }
 
-/// Jobs with why they stand where they stand, and what to do.
-fn advised(jobs: &[Job], of_folders: bool) -> Markup {
+/// Jobs with what is to be said of each (`said`: what that is), and what to do.
+fn advised(jobs: &[Job], of_folders: bool, said: &str) -> Markup {
     html! {
         div class="wide" { table {
-            thead { tr { th scope="col" { "File" } @if of_folders { th scope="col" { "Folder" } } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Why" } th scope="col" { "What to do" } } }
+            thead { tr { th scope="col" { "File" } @if of_folders { th scope="col" { "Folder" } } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { (said) } th scope="col" { "What to do" } } }
             tbody { @for job in jobs { tr {
                 td class="file" { (link(job)) } @if of_folders { td { (plain(&job.source.folder)) } } td { (mark(job)) } td class="time" { (time(job.changed)) } td class="why" { (plain(&reason(job))) } td class="why" { (plain(&brief_advice(job))) }
             } } }
@@ -165,7 +165,7 @@ fn in_work(night: &Night, bus: &Bus) -> Markup {
         h2 { "In work" }
         @if night.in_work.is_empty() { p { "Nothing is in work." } } @else {
             div class="wide" { table {
-                thead { tr { th scope="col" { "File" } @if night.of_folders() { th scope="col" { "Folder" } } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Progress" } } }
+                thead { tr { th scope="col" { "File" } @if night.of_folders() { th scope="col" { "Folder" } } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Stage, and how far" } } }
                 tbody { @for job in &night.in_work { tr {
                     td class="file" { (link(job)) } @if night.of_folders() { td { (plain(&job.source.folder)) } } td { (mark(job)) } td class="time" { (time(job.changed)) } td { (progress(job, bus)) }
                 } } }

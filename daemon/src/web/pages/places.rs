@@ -3,7 +3,7 @@
 
 use maud::{Markup, html};
 use suture_core::Report;
-use suture_core::report::RegionMethod;
+use suture_core::report::{LoopClass, RegionMethod};
 use suture_store::JobId;
 
 use crate::html::report::{key, method};
@@ -41,8 +41,7 @@ fn groups(report: &Report, is_pair: bool) -> [Group; 6] {
     let open =
         report.loops_left.iter().map(|left| ([left.at; 2], format!("loop of {} edges: {}", show_count(left.edges), left.reason)));
     let found = report.loops.listed.iter();
-    let found = found
-        .map(|hole| ([hole.at; 2], format!("{} of {} edges", hole.class.name().replace('_', " "), show_count(hole.vertices))));
+    let found = found.map(|hole| ([hole.at; 2], format!("{} of {} edges", opening(hole.class), show_count(hole.vertices))));
     let thin = report.thin_walls.iter().flat_map(|walls| &walls.places);
     let thin = thin.map(|place| ([place.at; 2], format!("{} units thick", show_number(place.thickness))));
     [
@@ -53,6 +52,14 @@ fn groups(report: &Report, is_pair: bool) -> [Group; 6] {
         Group { class: "found", title: "Openings that were found", side: "before", places: found.collect() },
         Group { class: "thin", title: "Thin walls", side: if is_pair { "after" } else { "before" }, places: thin.collect() },
     ]
+}
+
+/// A kind of opening for people who do not know how openings are sorted.
+fn opening(class: LoopClass) -> String {
+    match class {
+        LoopClass::Simple => "hole".into(),
+        other => format!("opening ({})", other.name().replace('_', " ")),
+    }
 }
 
 /// The place of the view, and the list beside it.

@@ -8,6 +8,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use suture_store::job::Area;
 use suture_store::{RelPath, Token};
 
+use crate::alike::Alike;
 use crate::config::FolderConfig;
 use crate::config::taken::OnTaken;
 use crate::fsx;
@@ -27,6 +28,8 @@ pub(crate) struct Folder {
     pub leave_originals: bool,
     /// For a result whose name is taken.
     pub on_taken: OnTaken,
+    /// Names of results that other systems take for the same.
+    pub alike: Alike,
     ground: Mutex<Result<Ground, Trace>>,
 }
 
@@ -62,7 +65,7 @@ impl Folder {
 
     fn at(root: PathBuf, config: &FolderConfig, ground: Result<Ground, Trace>) -> Self {
         let FolderConfig { name, leave_originals, on_taken, .. } = config.clone();
-        Self { name, root, leave_originals, on_taken, ground: Mutex::new(ground) }
+        Self { name, root, leave_originals, on_taken, alike: Alike::default(), ground: Mutex::new(ground) }
     }
 
     fn ground(&self) -> MutexGuard<'_, Result<Ground, Trace>> {

@@ -217,7 +217,7 @@ impl<'a> Desk<'a> {
                 Some(hash) => Ok(fsx::hash(path)? == hash),
                 None => Ok(true),
             };
-            match item.place(&is_it).map_err(io_at(&piece.to))? {
+            match self.put(&item, i == 0 && publication.output.is_some(), &is_it)? {
                 Placed::Now => crash_point(piece.point),
                 Placed::Before => {}
                 Placed::Taken if i == 0 && self.was_begun(&pieces)? => {

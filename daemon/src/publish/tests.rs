@@ -151,6 +151,18 @@ fn f23_a_name_that_is_taken_meanwhile_fails_or_is_skipped_as_the_folder_says() {
     }
 }
 
+/// Two results whose names a system that is blind to case takes for the same, chosen at the same time: the second to be placed gets another.
+#[test]
+fn f23_a_name_like_one_that_was_placed_meanwhile_is_not_taken() {
+    let scene = Scene::new();
+    let job = scene.intended();
+    create::write_new(&scene.folder.out().join("PART.stl"), b"theirs").unwrap();
+    let job = scene.finish(job);
+    assert_eq!((scene.read("out/PART.stl"), scene.read("out/part.stl")), (b"theirs".to_vec(), Vec::new()));
+    assert_eq!((scene.read("out/part~2.stl"), scene.read("done/part.stl")), (REPAIRED.to_vec(), ORIGINAL.to_vec()));
+    assert_eq!(job.publication().unwrap().output.as_ref().unwrap().name(), b"part~2.stl");
+}
+
 /// A new drop of the same name while the old one is worked on: each is its own.
 #[test]
 fn f22_a_new_drop_of_the_same_name_stays() {

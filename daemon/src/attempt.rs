@@ -306,6 +306,10 @@ impl Slot {
             Err(Unclaimed::Shortage(reason)) => Step::Wait { reason },
             Ok(claimed) => {
                 crash_point("daemon.linked");
+                let desk = Desk::new(&*context.store, folder, token, &self.committed);
+                if let Some(barred) = desk.barred(job)? {
+                    return desk.intend(job, &barred).map(Some);
+                }
                 let worked = self.work(folder, token, job, &claimed, turn);
                 self.computed();
                 let desk = Desk::new(&*context.store, folder, token, &self.committed);

@@ -15,6 +15,7 @@ use crate::window::{RunWindow, TimeOfDay};
 use api::Api;
 use events::Events;
 use keep::Keep;
+use taken::OnTaken;
 
 pub(crate) mod api;
 pub(crate) mod command;
@@ -22,6 +23,7 @@ pub(crate) mod events;
 pub(crate) mod keep;
 pub(crate) mod read;
 pub(crate) mod show;
+pub(crate) mod taken;
 
 /// A file as large as this is worked on alone, by all threads and with the whole memory.
 pub(crate) const LARGE: u64 = 64 << 20;
@@ -43,6 +45,8 @@ pub(crate) struct FolderConfig {
     pub leave_originals: bool,
     /// How soon files are wanted whose profile says nothing of that.
     pub priority: Priority,
+    /// For a result whose name is taken.
+    pub on_taken: OnTaken,
 }
 
 impl FolderConfig {
@@ -54,6 +58,7 @@ impl FolderConfig {
             profile: DEFAULT_PROFILE.into(),
             leave_originals: false,
             priority: Priority::default(),
+            on_taken: OnTaken::default(),
         }
     }
 }

@@ -14,7 +14,7 @@ use std::time::Duration;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use suture_store::{Control, Decision, Job, JobId, JobStore, Kind, Priority, Query, StoreError, Verdict};
+use suture_store::{Control, Decision, Ending, Job, JobId, JobStore, Kind, Priority, Query, StoreError, Verdict};
 
 use crate::attempt::Context;
 use crate::fsx::Identity;
@@ -161,10 +161,17 @@ pub(crate) fn answer(store: &dyn JobStore, wish: &JobsWish) -> Result<Vec<Job>, 
 
 /// Refuses to try a job again whose result is in place, and says how its file is repaired anew: people use that result, and receipt and report speak of it.
 fn unless_done(job: &Job) -> Result<(), Refusal> {
-    let (Kind::Done, Some(output)) = (job.kind(), job.publication().and_then(|publication| publication.output.as_ref())) else {
-        return Ok(());
-    };
+    let Some(publication) = job.publication().filter(|_| job.kind() == Kind::Done) else { return Ok(()) };
     let ((place, original), id) = (job.original(), job.id);
+    if publication.ending == Ending::Skipped {
+        let line = format!(
+            "job {id} was skipped ({}); take that out of out/, and drop a copy of {}/{original} into in/",
+            publication.reason,
+            area(place)
+        );
+        return Err(Refusal { line, exit_code: 2 });
+    }
+    let Some(output) = &publication.output else { return Ok(()) };
     let line = format!(
         "job {id} is done, and its result is out/{output}; to have the file repaired anew, take that result out of out/, and drop a copy of {}/{original} \
          (if it is not there, of the one in the archive) into in/ under a name of its own",

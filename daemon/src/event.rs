@@ -200,6 +200,9 @@ fn of_job(job: &Job) -> Value {
 /// The end of an attempt, of a job, or of what was to be its end.
 fn log_moved(job: &Job, step: &Step) {
     match &job.state {
+        State::Ended { publication } if publication.ending == Ending::Skipped => {
+            tracing::info!(ending = ?publication.ending, reason = publication.reason, "Skipped.");
+        }
         State::Ended { publication } if publication.ending.is_good() => {
             let output = publication.output.as_ref().map(tracing::field::display);
             tracing::info!(ending = ?publication.ending, output, reused = publication.reused.map(|job| job.0), "Done.");
@@ -229,6 +232,7 @@ fn failure(step: &Step) -> Option<&'static str> {
         Step::Intend(publication) => match publication.ending {
             Ending::Unreadable => Some("parse"),
             Ending::Refused => Some("refused"),
+            Ending::NameTaken => Some("name_taken"),
             Ending::NotGood => Some("verify"),
             _ => None,
         },
@@ -240,10 +244,11 @@ fn count_ended(metrics: &Metrics, job: &Job, publication: &Publication) {
     let result = match publication.ending {
         _ if publication.reused.is_some() => "reused",
         Ending::Clean => "ok",
+        Ending::Skipped => "skipped",
         Ending::Repaired => "repaired",
         Ending::NeedsReview => "needs_review",
         Ending::Quarantined => "quarantined",
-        Ending::NotGood | Ending::Unreadable | Ending::Refused | Ending::Environment => "failed",
+        Ending::NotGood | Ending::Unreadable | Ending::Refused | Ending::NameTaken | Ending::Environment => "failed",
     };
     let (folder, profile) = (job.source.folder.as_str(), job.source.profile.as_str());
     metrics.add(Count::JobsFinished, &[("folder", folder), ("profile", profile), ("result", result)], 1);

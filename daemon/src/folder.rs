@@ -8,7 +8,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use suture_store::job::Area;
 use suture_store::{RelPath, Token};
 
+use crate::alike::Alike;
 use crate::config::FolderConfig;
+use crate::config::taken::OnTaken;
 use crate::fsx;
 pub(crate) use crate::ground::{FolderError, is_fading, make_parent};
 use crate::ground::{Ground, LOCK, PARTS, PRIVATE, Trace, id};
@@ -24,6 +26,10 @@ pub(crate) struct Folder {
     pub root: PathBuf,
     /// Originals stay in `in/`.
     pub leave_originals: bool,
+    /// For a result whose name is taken.
+    pub on_taken: OnTaken,
+    /// Names of results that other systems take for the same.
+    pub alike: Alike,
     ground: Mutex<Result<Ground, Trace>>,
 }
 
@@ -44,8 +50,7 @@ impl Folder {
             Some(known) => Err(known.clone()),
             None => Ok(take(&root)?),
         };
-        let (name, leave_originals) = (config.name.clone(), config.leave_originals);
-        Ok(Self { name, root, leave_originals, ground: Mutex::new(ground) })
+        Ok(Self::at(root, config, ground))
     }
 
     /// A folder that another daemon serves: it is away until that one lets go of it.
@@ -55,7 +60,12 @@ impl Folder {
     pub(crate) fn of_other(config: &FolderConfig) -> Result<Self, FolderError> {
         let root = std::path::absolute(&config.path).map_err(FolderError::unseen(&config.path))?;
         let trace = Trace::of_other(&root).map_err(FolderError::unseen(&root))?;
-        Ok(Self { name: config.name.clone(), root, leave_originals: config.leave_originals, ground: Mutex::new(Err(trace)) })
+        Ok(Self::at(root, config, Err(trace)))
+    }
+
+    fn at(root: PathBuf, config: &FolderConfig, ground: Result<Ground, Trace>) -> Self {
+        let FolderConfig { name, leave_originals, on_taken, .. } = config.clone();
+        Self { name, root, leave_originals, on_taken, alike: Alike::default(), ground: Mutex::new(ground) }
     }
 
     fn ground(&self) -> MutexGuard<'_, Result<Ground, Trace>> {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use suture_store::job::Area;
-use suture_store::{Job, Publication, RelPath, State};
+use suture_store::{Job, Publication, State};
 
 use crate::receipt::REPORT;
 
@@ -42,12 +42,8 @@ pub(crate) fn report_path(dir: &Path, job: &Job) -> Option<PathBuf> {
 }
 
 fn report_of(dir: &Path, publication: &Publication) -> Option<PathBuf> {
-    let (folder, base): (_, &RelPath) = if publication.ending.is_good() {
-        ("out", publication.output.as_ref()?)
-    } else {
-        (area(publication.ending.area()), publication.original.as_ref()?)
-    };
-    let mut name = dir.join(folder).join(base.to_path()).into_os_string();
+    let folder = if publication.ending.is_good() { "out" } else { area(publication.ending.area()) };
+    let mut name = dir.join(folder).join(publication.base()?.to_path()).into_os_string();
     name.push(REPORT);
     Some(name.into())
 }

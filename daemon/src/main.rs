@@ -4,6 +4,7 @@
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests may ask whether a file is there"))]
 
 mod again;
+mod alike;
 mod attempt;
 mod bar;
 mod batch;

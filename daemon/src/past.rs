@@ -101,8 +101,7 @@ pub(crate) fn each_job(store: &dyn JobStore, each: &mut dyn FnMut(&Job)) -> Resu
 
 /// The key that tells the result of a job from all others of its folder: the area, and the name that report and receipt are named after.
 fn key(source: &RelPath, p: &Publication) -> (&'static str, RelPath) {
-    let base = p.output.as_ref().filter(|_| p.ending.is_good()).or(p.original.as_ref()).unwrap_or(source);
-    (place_of(p.ending.area()), base.clone())
+    (place_of(p.ending.area()), p.base().unwrap_or(source).clone())
 }
 
 /// Where results go whose originals go to this area.

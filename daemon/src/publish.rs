@@ -15,13 +15,13 @@ use serde::Serialize;
 use suture_core::Report;
 use suture_core::report::Outcome;
 use suture_store::job::Withdrawal;
-use suture_store::{Claim, Ending, Hash, Job, JobStore, Publication, RelPath, State, Step, crash_point};
+use suture_store::{Claim, Ending, Hash, Job, JobStore, Publication, State, Step, crash_point};
 
 use crate::claim::{CLAIMED, Original, is_source};
 use crate::create;
 use crate::folder::{Folder, make_parent};
 use crate::fsx::{self, Identity};
-use crate::names::{BEST, COMPANION, Names, VERSIONS, best_of, companions, first, no_free_name, with_suffix};
+use crate::names::{VERSIONS, first, no_free_name, with_suffix};
 use crate::place::{Item, Move, Placed, stage};
 use crate::publish_error::{PublishError, io_at};
 use crate::receipt::{NoReport, RECEIPT, RECEIPT_VERSION, REPORT, Receipt, ReusedFrom, ReusedReport};
@@ -41,6 +41,13 @@ pub(crate) enum Conclusion {
     Report { report: Box<Report>, ctime_ns: i64, reused: Option<ReusedFrom> },
     /// No report of the engine's.
     None { ending: Ending, reason: String },
+}
+
+impl Conclusion {
+    /// Is there a result for `out/`?
+    fn is_good(&self) -> bool {
+        matches!(self, Self::Report { report, .. } if ending_of(report).is_good())
+    }
 }
 
 /// One job at the end of its way.
@@ -75,7 +82,8 @@ impl<'a> Desk<'a> {
         self.begin(job)?;
         superseded::clear(self.folder, job);
         crash_point("daemon.superseded");
-        let publication = self.prepare(job, result)?;
+        let barred = if result.is_good() { self.barred(job)? } else { None };
+        let publication = self.prepare(job, barred.as_ref().unwrap_or(result))?;
         self.intend_durably(job, publication)
     }
 
@@ -122,7 +130,10 @@ impl<'a> Desk<'a> {
         let (mut recipe, mut copied) = (None, None);
         let report_hash = match result {
             Conclusion::None { .. } => {
-                let how = format!("suture jobs retry {} --dir {} works on it once more", job.id, self.folder.root.display());
+                let how = match ending {
+                    Ending::Skipped => "take that out of out/, and drop the file again".into(),
+                    _ => format!("suture jobs retry {} --dir {} works on it once more", job.id, self.folder.root.display()),
+                };
                 rewrite(&report_path, &NoReport::new(job, shown_source, ending, &reason, how))?
             }
             Conclusion::Report { report, reused, .. } => {
@@ -185,30 +196,6 @@ impl<'a> Desk<'a> {
         rewrite(&self.work(job).join(RECEIPT_FILE), &receipt).map(drop)
     }
 
-    /// The first free names for a result.
-    fn names(&self, job: &Job, ending: Ending, output: bool) -> Result<Names, PublishError> {
-        let (now_area, now_path) = job.original();
-        let area = self.folder.area(ending.area());
-        let here = |path: &RelPath| now_area == ending.area() && now_path == path;
-        let free_in = |base: &Path, path: &Path| fsx::exists(&base.join(path)).map(|there| !there);
-        let original_free = |path: &RelPath| Ok(here(path) || free_in(&area, &path.to_path())?);
-        let alone = |base: &Path, path: &RelPath| {
-            let [report, receipt] = companions(path);
-            Ok::<bool, io::Error>(free_in(base, &report)? && free_in(base, &receipt)?)
-        };
-        if ending.is_good() {
-            let out = self.folder.out();
-            let free = |path: &RelPath| Ok(free_in(&out, &path.to_path())? && alone(&out, path)?);
-            let result = first(&job.source.path, COMPANION, free)?;
-            return Ok(Names { output: Some(result), original: first(&job.source.path, 0, original_free)? });
-        }
-        let path = if now_area == ending.area() { now_path } else { &job.source.path };
-        let original = first(path, COMPANION + BEST.len(), |path| {
-            Ok(original_free(path)? && alone(&area, path)? && free_in(&area, &best_of(path).to_path())?)
-        })?;
-        Ok(Names { output: output.then(|| best_of(&original)), original })
-    }
-
     /// Renames the files of the intent into place.
     pub(crate) fn place(&self, job: &Job) -> Result<Job, PublishError> {
         let State::Publishing { publication, .. } = &job.state else { return Ok(job.clone()) };
@@ -230,7 +217,7 @@ impl<'a> Desk<'a> {
                 Some(hash) => Ok(fsx::hash(path)? == hash),
                 None => Ok(true),
             };
-            match item.place(&is_it).map_err(io_at(&piece.to))? {
+            match self.put(&item, i == 0 && publication.output.is_some(), &is_it)? {
                 Placed::Now => crash_point(piece.point),
                 Placed::Before => {}
                 Placed::Taken if i == 0 && self.was_begun(&pieces)? => {
@@ -321,9 +308,18 @@ impl<'a> Desk<'a> {
         Ok(())
     }
 
-    /// Someone took the name of the intent: another one, said in a new intent. Report and receipt are written anew, since they
-    /// name it.
+    /// Someone took the name of the intent: another one, said in a new intent, or no result where the folder wants no second one. Report and
+    /// receipt are written anew, since they name it. What a person approved is published in any case.
     fn choose_again(&self, job: &Job, old: &Publication) -> Result<Job, PublishError> {
+        if old.ending.is_good()
+            && old.output.is_some()
+            && old.decision.is_none()
+            && let Some(barred) = self.barred(job)?
+        {
+            discard(self.folder, job);
+            let publication = self.prepare(job, &barred)?;
+            return self.intend_durably(job, publication);
+        }
         let names = self.names(job, old.ending, old.output.is_some())?;
         let work = self.work(job);
         let path = work.join(REPORT_FILE);
@@ -405,12 +401,8 @@ impl<'a> Desk<'a> {
 
 /// Where the result's files stand, and the name that report and receipt are named after.
 fn base(folder: &Folder, job: &Job, p: &Publication) -> (PathBuf, PathBuf) {
-    let original = || p.original.as_ref().unwrap_or(&job.source.path).to_path();
-    match (&p.output, p.ending.is_good()) {
-        (Some(output), true) => (folder.out(), output.to_path()),
-        (None, true) => (folder.out(), original()),
-        (_, false) => (folder.area(p.ending.area()), original()),
-    }
+    let area = if p.ending.is_good() { folder.out() } else { folder.area(p.ending.area()) };
+    (area, p.base().unwrap_or(&job.source.path).to_path())
 }
 
 /// The files of an intent, the most important first.
@@ -467,5 +459,6 @@ fn rewrite<T: Serialize>(path: &Path, value: &T) -> Result<Hash, PublishError> {
 }
 
 pub(crate) mod approved;
+mod called;
 #[cfg(test)]
 pub(crate) mod tests;

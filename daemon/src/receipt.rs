@@ -139,13 +139,13 @@ pub(crate) fn try_read(path: &Path) -> io::Result<Told> {
     }
 }
 
-/// The report of a file that never got as far as the engine's own: unreadable, refused, put off for good, or quarantined.
+/// The report of a file without one of the engine's: unreadable, refused, put off for good, quarantined, or without a name for its result.
 #[derive(Debug, Serialize)]
 pub(crate) struct NoReport<'a> {
     schema_version: u32,
     engine_version: &'static str,
     task: &'static str,
-    /// `unreadable`, `refused`, `environment` or `quarantined`.
+    /// `unreadable`, `refused`, `environment`, `quarantined`, `name_taken` or `skipped`.
     outcome: Ending,
     input: NoReportInput,
     reason: &'a str,

@@ -7,7 +7,8 @@ use std::sync::{Arc, PoisonError, RwLock};
 
 use crate::cli::WatchArgs;
 use crate::config::api::Api;
-use crate::config::{Config, read, real, show};
+use crate::config::taken::OnTaken;
+use crate::config::{Config, FolderConfig, read, real, show};
 use crate::signals::Hangup;
 
 /// The configuration in force, and where it comes from.
@@ -99,8 +100,9 @@ fn fixed(old: &Config, new: &Config) -> Vec<String> {
     if old.api != new.api {
         fixed.push("`[api]`".to_owned());
     }
-    let places = |config: &Config| -> BTreeMap<String, (PathBuf, bool)> {
-        config.folders.iter().map(|folder| (folder.name.clone(), (real(&folder.path), folder.leave_originals))).collect()
+    let places = |config: &Config| -> BTreeMap<String, (PathBuf, bool, OnTaken)> {
+        let of = |folder: &FolderConfig| (real(&folder.path), folder.leave_originals, folder.on_taken);
+        config.folders.iter().map(|folder| (folder.name.clone(), of(folder))).collect()
     };
     let (was, is) = (places(old), places(new));
     let names: BTreeSet<&String> = was.keys().chain(is.keys()).collect();

@@ -136,7 +136,8 @@ pub(crate) fn reason(job: &Job) -> String {
 /// The note on a good result, for a person to read before it is printed.
 pub(crate) fn hint(job: &Job) -> Option<&str> {
     let State::Ended { publication } = &job.state else { return None };
-    Some(publication.reason.as_str()).filter(|reason| publication.ending.is_good() && !reason.is_empty())
+    Some(publication.reason.as_str())
+        .filter(|reason| publication.output.is_some() && publication.ending.is_good() && !reason.is_empty())
 }
 
 /// Day and time as RFC 3339 writes them, in UTC.

@@ -12,7 +12,7 @@ use crate::store::StoreError;
 use crate::tables::Table;
 
 /// Version of what the JSON means. Raised when an older program would misread it.
-pub(crate) const SCHEMA: u16 = 5;
+pub(crate) const SCHEMA: u16 = 6;
 /// That of a record in which nothing is that version 2 did not know.
 const PLAIN: u16 = 2;
 /// That of a job that was approved.
@@ -22,6 +22,8 @@ const APPROVED: u16 = 3;
 const HEAD: u16 = 4;
 /// That of news of the service in the outbox, where an earlier program would look for a job.
 const WORD: u16 = 5;
+/// That of a job that ends for want of a name, an end that an earlier program does not know.
+const NAMELESS: u16 = 6;
 /// Largest record in bytes. The database would put values from a quarter of its segment on into files of their own.
 pub(crate) const MAX: usize = 4608;
 
@@ -45,7 +47,13 @@ fn checksum(table: Table, key: &[u8], schema: u16, json: &[u8]) -> u32 {
 
 /// `job` as a record under `key`.
 pub(crate) fn encode_job(key: &[u8], job: &Job) -> Result<Vec<u8>, StoreError> {
-    encode_as(if let State::Approved { .. } = job.state { APPROVED } else { PLAIN }, Table::Jobs, key, job)
+    let is_nameless = job.publication().is_some_and(|publication| publication.ending.is_for_want_of_a_name());
+    let schema = match job.state {
+        State::Approved { .. } => APPROVED,
+        _ if is_nameless => NAMELESS,
+        _ => PLAIN,
+    };
+    encode_as(schema, Table::Jobs, key, job)
 }
 
 /// The head as a record under `key`.
@@ -204,11 +212,11 @@ mod tests {
         damaged(decode(Table::Meta, b"head", b""));
         // A record of a later version, whole in itself.
         let mut later = bytes;
-        later[5] = 6;
-        let crc = checksum(Table::Meta, b"head", 6, b"7");
+        later[5] = 7;
+        let crc = checksum(Table::Meta, b"head", 7, b"7");
         later[6..10].copy_from_slice(&crc.to_be_bytes());
         let result = decode::<u32>(Table::Meta, b"head", &later);
-        assert!(matches!(result, Err(StoreError::Newer { found: 6, known: SCHEMA })), "{result:?}");
+        assert!(matches!(result, Err(StoreError::Newer { found: 7, known: SCHEMA })), "{result:?}");
     }
 
     /// A job as version 1 wrote it, without what was added since.

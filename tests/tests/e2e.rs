@@ -37,6 +37,7 @@ mod e2e {
     mod soups;
     mod specials;
     mod steer;
+    mod taken;
     mod terminal;
     mod told;
     mod twice;

@@ -13,6 +13,7 @@ use toml::Spanned;
 use super::api::Api;
 use super::events::{self, OnDoneFile, WebhookFile};
 use super::keep::{Bound, Keep};
+use super::taken::OnTaken;
 use super::{Config, DEFAULT_PROFILE, FolderConfig, name_of, real};
 use crate::own_profile::OwnProfile;
 use crate::profiles::{self, place_of, with_line};
@@ -66,6 +67,9 @@ struct FolderFile {
     /// How soon its files are wanted.
     #[serde(default)]
     priority: Priority,
+    /// For a result whose name is taken.
+    #[serde(default)]
+    on_taken: OnTaken,
 }
 
 #[derive(Debug, Deserialize)]
@@ -319,8 +323,9 @@ fn folders(text: &str, of_file: &[FolderFile], config: &Config) -> Result<Vec<Fo
                 format!("there is no profile `{profile}`; name one of {}, or add `[profiles.{profile}]`", known.join(", "));
             return Err(with_line(text, named.span().start, &what));
         }
-        let (leave_originals, priority) = (folder.leave_originals, folder.priority);
-        folders.push(FolderConfig { name, path: path.clone(), profile: profile.to_owned(), leave_originals, priority });
+        let (leave_originals, priority, on_taken) = (folder.leave_originals, folder.priority, folder.on_taken);
+        let (path, profile) = (path.clone(), profile.to_owned());
+        folders.push(FolderConfig { name, path, profile, leave_originals, priority, on_taken });
     }
     apart(&folders).map_err(|(folder, what)| {
         let at = of_file.get(folder).map_or(0, |folder| folder.path.span().start);

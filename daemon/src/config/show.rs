@@ -99,9 +99,10 @@ pub(crate) fn text(config: &Config) -> Result<String, String> {
         text += &format!("{name} = {value}\n");
     }
     text += &format!("state = {}\n", path(&config.state));
-    for FolderConfig { name, path: root, profile, leave_originals, priority } in &config.folders {
+    for FolderConfig { name, path: root, profile, leave_originals, priority, on_taken } in &config.folders {
         text += &format!("\n[[folders]]\npath = {}\nname = {}\nprofile = {}\n", path(root), quoted(name), quoted(profile));
         text += &format!("leave_originals = {leave_originals}\npriority = {priority}\n");
+        text += &format!("on_taken = {}\n", quoted(on_taken.name()));
     }
     text += &told(&config.events);
     if !config.profiles.is_empty() {
@@ -150,6 +151,7 @@ mod tests {
     use crate::config::events::When;
     use crate::config::keep::Bound;
     use crate::config::read;
+    use crate::config::taken::OnTaken;
     use crate::url::Url;
 
     fn read_back(config: &Config) -> Config {
@@ -179,6 +181,7 @@ mod tests {
             profile: "it's mine".into(),
             leave_originals: true,
             priority: Priority::HIGHEST,
+            on_taken: OnTaken::Skip,
         });
         (config.run_window, config.workers_outside) = ("20:00-07:00, 12:00-13:00".parse().unwrap(), 1);
         config.night_ends = "06:30".parse().unwrap();

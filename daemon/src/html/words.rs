@@ -29,6 +29,7 @@ pub(crate) fn of_which_kind(count: impl Fn(Kind) -> u64) -> String {
 pub(crate) fn state(job: &Job) -> (&'static str, &'static str) {
     match (job.kind(), &job.state) {
         (Kind::Done, State::Ended { publication }) if publication.ending == Ending::Clean => ("Clean", "good"),
+        (Kind::Done, State::Ended { publication }) if publication.ending == Ending::Skipped => ("Skipped", "good"),
         (Kind::Done, _) => ("Repaired", "good"),
         (kind, _) => (label(kind), class(kind)),
     }
@@ -105,6 +106,8 @@ fn ended(job: &Job, ending: Ending) -> String {
             let best = best.map_or_else(|| "the result".to_owned(), |name| format!("{}/{name}", area(ending.area())));
             format!("Look at the pictures and the reasons. If {best} is what the file was meant to be, approve it: then it is published. If not, reject it, and ask for a better file.")
         }
+        Ending::Skipped => "Use what is there. If that is not it, take it out of out/, and drop this file again.".into(),
+        Ending::NameTaken => "Look at what has that name in out/. Take it away, then try again; or give the file another name, and drop it again.".into(),
         Ending::NotGood => "Do not print it. Its report says what is wrong, and where. Ask for another file, or drop it again into the folder of another profile.".into(),
         Ending::Unreadable => "It is not a mesh that Suture can read. Open the file, or ask for it again.".into(),
         Ending::Refused => "It needs more than this machine allows (see the reason). Raise that limit and try again, or ask for a simpler file.".into(),
@@ -154,8 +157,9 @@ mod tests {
     /// Whoever comes in the morning knows of each file what to do with it.
     #[test]
     fn whatever_has_come_to_rest_has_advice() {
-        use Ending::{Clean, Environment, NeedsReview, NotGood, Quarantined, Refused, Repaired, Unreadable};
-        let all = [Clean, Repaired, NeedsReview, NotGood, Unreadable, Refused, Environment, Quarantined].map(ended);
+        use Ending::{Clean, Environment, NameTaken, NeedsReview, NotGood, Quarantined, Refused, Repaired, Skipped, Unreadable};
+        let all =
+            [Clean, Repaired, NeedsReview, NotGood, Unreadable, Refused, Environment, Quarantined, Skipped, NameTaken].map(ended);
         let noticed = Job::noticed(JobId(1), job().source, "a picture", Time(0));
         let parked = Job { parked: Some(Parked { until: Some(Time(9)), tries: 1, committed: false }), ..job() };
         let cancelled = Job { state: State::Cancelled { why: Withdrawal::Operator }, ..job() };

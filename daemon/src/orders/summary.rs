@@ -66,9 +66,8 @@ impl Line {
             State::Ended { publication } => {
                 let good = publication.ending.is_good();
                 let place = if good { "out" } else { name(publication.ending.area()) };
-                let base = if good { &publication.output } else { &publication.original };
                 result = publication.output.as_ref().map(|output| format!("{place}/{output}"));
-                report = base.as_ref().map(|base| format!("{place}/{base}{REPORT}"));
+                report = publication.base().map(|base| format!("{place}/{base}{REPORT}"));
                 reason.clone_from(&publication.reason);
             }
             State::Noticed { reason: what } => reason.clone_from(what),

@@ -2,8 +2,9 @@
 
 use super::*;
 use crate::config::FolderConfig;
+use crate::config::taken::OnTaken;
 use std::sync::Arc;
-use suture_store::{Filter, MemoryStore, Priority, Source, Submission, SystemClock};
+use suture_store::{Filter, MemoryStore, Priority, RelPath, Source, Submission, SystemClock};
 
 /// A hot folder with one dropped file, claimed in the store.
 pub(crate) struct Scene {
@@ -20,14 +21,22 @@ const REPAIRED: &[u8] = b"as repaired";
 impl Scene {
     /// Taken into work, as an attempt leaves it to the desk.
     fn new() -> Self {
-        let scene = Self::dropped();
+        Self::new_where(OnTaken::Version)
+    }
+
+    fn new_where(on_taken: OnTaken) -> Self {
+        let scene = Self::dropped_where(on_taken);
         crate::claim::claim(&scene.folder, &scene.claim.job, &scene.folder.work(scene.claim.token), u64::MAX).unwrap();
         scene
     }
 
     pub(crate) fn dropped() -> Self {
+        Self::dropped_where(OnTaken::Version)
+    }
+
+    fn dropped_where(on_taken: OnTaken) -> Self {
         let dir = tempfile::tempdir().unwrap();
-        let config = FolderConfig { name: "hot".into(), ..FolderConfig::of(dir.path()) };
+        let config = FolderConfig { name: "hot".into(), on_taken, ..FolderConfig::of(dir.path()) };
         let folder = Folder::open(&config, None).unwrap();
         let path = folder.inbox().join("part.stl");
         create::write_new(&path, ORIGINAL).unwrap();
@@ -108,6 +117,50 @@ fn a_name_that_is_taken_meanwhile_is_not_touched() {
     assert_eq!(report.output.unwrap().path, scene.folder.out().join("part~2.stl"));
     let State::Ended { publication } = job.state else { panic!("{:?}", job.state) };
     assert_eq!(publication.output.unwrap().name(), b"part~2.stl");
+}
+
+/// Where no second result is wanted, one whose name is taken after it was chosen is given up: what is there stays, and so does the original.
+#[test]
+fn f23_a_name_that_is_taken_meanwhile_fails_or_is_skipped_as_the_folder_says() {
+    for (on_taken, ending, report) in [
+        (OnTaken::Fail, Ending::NameTaken, "failed/part.stl.report.json"),
+        (OnTaken::Skip, Ending::Skipped, "out/part~2.stl.report.json"),
+    ] {
+        for killed in [false, true] {
+            let scene = Scene::new_where(on_taken);
+            let mut job = scene.intended();
+            let theirs = scene.folder.out().join("part.stl");
+            create::write_new(&theirs, b"theirs").unwrap();
+            if killed {
+                // The new intent is durable, and a later life goes on from there.
+                job = scene.desk().place(&job).unwrap();
+                assert!(matches!(&job.state, State::Publishing { publication, .. } if publication.ending == ending));
+            }
+            let job = scene.finish(job);
+            let State::Ended { publication } = &job.state else { panic!("{:?}", job.state) };
+            assert_eq!((publication.ending, &publication.output), (ending, &None));
+            assert!(publication.reason.contains("out/part.stl is there already"), "{}", publication.reason);
+            assert_eq!(scene.read("out/part.stl"), b"theirs");
+            let place = if on_taken == OnTaken::Skip { "done/part~2.stl" } else { "failed/part.stl" };
+            assert_eq!(scene.read(place), ORIGINAL);
+            let told: serde_json::Value = serde_json::from_slice(&scene.read(report)).unwrap();
+            assert_eq!(told["reason"], publication.reason.as_str());
+            let receipt: serde_json::Value = serde_json::from_slice(&scene.read(&report.replace("report", "suture"))).unwrap();
+            assert_eq!(receipt["output"], serde_json::Value::Null);
+        }
+    }
+}
+
+/// Two results whose names a system that is blind to case takes for the same, chosen at the same time: the second to be placed gets another.
+#[test]
+fn f23_a_name_like_one_that_was_placed_meanwhile_is_not_taken() {
+    let scene = Scene::new();
+    let job = scene.intended();
+    create::write_new(&scene.folder.out().join("PART.stl"), b"theirs").unwrap();
+    let job = scene.finish(job);
+    assert_eq!((scene.read("out/PART.stl"), scene.read("out/part.stl")), (b"theirs".to_vec(), Vec::new()));
+    assert_eq!((scene.read("out/part~2.stl"), scene.read("done/part.stl")), (REPAIRED.to_vec(), ORIGINAL.to_vec()));
+    assert_eq!(job.publication().unwrap().output.as_ref().unwrap().name(), b"part~2.stl");
 }
 
 /// A new drop of the same name while the old one is worked on: each is its own.

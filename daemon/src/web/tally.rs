@@ -29,7 +29,9 @@ pub(super) struct Ended {
     /// Good as they came.
     pub clean: u64,
     pub repaired: u64,
-    /// Of both: copies of earlier results.
+    /// Not repaired, since there is a result of that name.
+    pub skipped: u64,
+    /// Of those that are clean or repaired: copies of earlier results.
     pub reused: u64,
     pub needs_review: u64,
     pub failed: u64,
@@ -46,9 +48,10 @@ impl Ended {
         let count = match ending {
             Ending::Clean => &mut self.clean,
             Ending::Repaired => &mut self.repaired,
+            Ending::Skipped => &mut self.skipped,
             Ending::NeedsReview => &mut self.needs_review,
             Ending::Quarantined => &mut self.quarantined,
-            Ending::NotGood | Ending::Unreadable | Ending::Refused | Ending::Environment => &mut self.failed,
+            Ending::NotGood | Ending::Unreadable | Ending::Refused | Ending::NameTaken | Ending::Environment => &mut self.failed,
         };
         *count += 1;
         self.reused += u64::from(is_copy);

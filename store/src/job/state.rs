@@ -52,6 +52,8 @@ pub enum Ending {
     Clean,
     /// Repaired, and good.
     Repaired,
+    /// Not repaired, since its result would have a name that is taken, and its folder wants no second one.
+    Skipped,
     /// Repaired, but a person must look.
     NeedsReview,
     /// Not good under the profile after all repairs.
@@ -60,6 +62,8 @@ pub enum Ending {
     Unreadable,
     /// Beyond a stated limit.
     Refused,
+    /// Its result would have a name that is taken, and its folder wants a person to see to that.
+    NameTaken,
     /// The world around the file failed too often.
     Environment,
     /// It killed its worker, or the daemon, too often.
@@ -70,15 +74,22 @@ impl Ending {
     /// Where the original goes.
     pub fn area(self) -> Area {
         match self {
-            Self::Clean | Self::Repaired => Area::Done,
-            Self::NeedsReview | Self::NotGood | Self::Unreadable | Self::Refused | Self::Environment => Area::Failed,
+            Self::Clean | Self::Repaired | Self::Skipped => Area::Done,
+            Self::NeedsReview | Self::NotGood | Self::Unreadable | Self::Refused | Self::NameTaken | Self::Environment => {
+                Area::Failed
+            }
             Self::Quarantined => Area::Quarantine,
         }
     }
 
-    /// Does its result belong into `out/`?
+    /// Does what it leaves belong into `out/`?
     pub fn is_good(self) -> bool {
         self.area() == Area::Done
+    }
+
+    /// Reached since the name of a result is taken: there is no result then.
+    pub fn is_for_want_of_a_name(self) -> bool {
+        matches!(self, Self::Skipped | Self::NameTaken)
     }
 
     /// Reached without a result of the engine: there is nothing that running again after lost files would bring back.
@@ -121,6 +132,19 @@ pub struct Publication {
     /// What a person has said of a result that needed review.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub decision: Option<Box<Decision>>,
+}
+
+impl Publication {
+    /// The name that report and receipt are named after: the result's in `out/`, else the original's.
+    pub fn base(&self) -> Option<&RelPath> {
+        self.output.as_ref().filter(|_| self.ending.is_good()).or(self.original.as_ref())
+    }
+
+    /// Does it take the place of `earlier`, whose name was taken before anything of it was in place? What a person approved has no such end.
+    pub(super) fn gives_way(&self, earlier: &Self) -> bool {
+        let is_open = earlier.ending.is_good() && earlier.decision.is_none();
+        is_open && self.ending.is_for_want_of_a_name() && self.output.is_none() && self.output_hash.is_none()
+    }
 }
 
 /// Why a job was cancelled.
@@ -335,11 +359,11 @@ impl Job {
             State::Publishing { .. } => Kind::Publishing,
             State::Published { .. } => Kind::Published,
             State::Ended { publication } => match publication.ending {
-                Ending::Clean | Ending::Repaired => Kind::Done,
+                Ending::Clean | Ending::Repaired | Ending::Skipped => Kind::Done,
                 Ending::NeedsReview if publication.decision.is_some() => Kind::Rejected,
                 Ending::NeedsReview => Kind::NeedsReview,
                 Ending::Quarantined => Kind::Quarantined,
-                Ending::NotGood | Ending::Unreadable | Ending::Refused | Ending::Environment => Kind::Failed,
+                Ending::NotGood | Ending::Unreadable | Ending::Refused | Ending::NameTaken | Ending::Environment => Kind::Failed,
             },
             State::Cancelled { .. } => Kind::Cancelled,
         }

@@ -208,9 +208,10 @@ impl Job {
             (State::Running { .. }, Step::Intend(publication)) if !publication.ending.is_condemned() => {
                 publishing(hold, publication)
             }
-            // Another name may be chosen, but not another result.
+            // Another name may be chosen, or the result be given up for want of one, but there is no other result.
             (State::Publishing { publication: earlier, .. }, Step::Intend(publication))
-                if (publication.ending, publication.output_hash) == (earlier.ending, earlier.output_hash) =>
+                if (publication.ending, publication.output_hash) == (earlier.ending, earlier.output_hash)
+                    || publication.gives_way(&earlier) =>
             {
                 publishing(hold, publication)
             }

@@ -50,6 +50,9 @@ fn dropped() -> Files {
     (0..).zip(names).map(|(number, name)| (PathBuf::from(OsStr::from_bytes(&name)), cube(number))).collect()
 }
 
+/// Those of which a system that is blind to case, or to how an accent is spelt, sees one; and the name that one of them may get instead.
+const TWINS: [&str; 6] = ["part~2.stl", "\u{e9}t\u{e9}.stl", "e\u{301}te\u{301}.stl", "part.stl", "Part.stl", "PART.STL"];
+
 /// JSON without a control character that would steer whoever prints it.
 fn document(out: &Files, result: &Path, ending: &str) -> Value {
     let name: OsString = [result.as_os_str(), OsStr::new(ending)].into_iter().collect();
@@ -77,7 +80,8 @@ fn f23_each_name_has_a_result_of_its_own() {
         let (result, original) = (named(&results), named(&done));
         assert!(result.len() == 1 && original.len() == 1, "{name:?}: {result:?}, {original:?}");
         if name.as_os_str().len() < LONGEST {
-            assert_eq!((&result[0], &original[0]), (name, name));
+            assert_eq!(&original[0], name);
+            assert!(result[0] == *name || TWINS.iter().any(|twin| Path::new(twin) == name), "{name:?}: {result:?}");
         }
         let report = document(&out, &result[0], ".report.json");
         let shown = |part: &str, name: &Path| scene.path().join(part).join(name).to_string_lossy().into_owned();
@@ -88,6 +92,9 @@ fn f23_each_name_has_a_result_of_its_own() {
         let receipt = document(&out, &result[0], ".suture.json");
         assert_eq!(receipt["output_blake3"], report["output"]["blake3"]);
     }
+    let seen: BTreeSet<String> =
+        results.keys().map(|name| name.to_string_lossy().to_lowercase().replace("e\u{301}", "\u{e9}")).collect();
+    assert_eq!(seen.len(), results.len(), "no result hides another: {seen:?}");
     let jobs = scene.jobs().unwrap();
     let named: BTreeSet<&str> = jobs.iter().map(|job| job["source"]["path"].as_str().unwrap()).collect();
     assert_eq!((jobs.len(), named.len()), (dropped.len(), dropped.len()), "no two of them look alike: {named:?}");

@@ -197,7 +197,7 @@ pub(super) fn progress(job: &Job, bus: &Bus) -> Markup {
 }
 
 fn last_day(night: &Night) -> Markup {
-    let Ended { clean, repaired, reused, needs_review, failed, quarantined, .. } = night.ended;
+    let Ended { clean, repaired, skipped, reused, needs_review, failed, quarantined, .. } = night.ended;
     let entry = |count: u64, class: &str, words: &str, kind: Kind| {
         html! { li class=[(count > 0).then_some(class)] { b { (show_count(count)) } @if count > 0 { a href=(list_of(&[kind])) { (words) } } @else { (words) } } }
     };
@@ -206,6 +206,7 @@ fn last_day(night: &Night) -> Markup {
         ul class="counts" {
             (entry(clean, "good", "clean", Kind::Done))
             (entry(repaired, "good", "repaired", Kind::Done))
+            @if skipped > 0 { (entry(skipped, "good", "skipped", Kind::Done)) }
             (entry(needs_review, "review", "need review", Kind::NeedsReview))
             (entry(failed, "bad", "failed", Kind::Failed))
             (entry(quarantined, "bad", "in quarantine", Kind::Quarantined))

@@ -5,6 +5,7 @@
 //! users need root: without it a scenario says so and is skipped. `SUTURE_EXHAUSTIVE=1` adds what takes minutes or much disk.
 
 #![cfg(target_os = "linux")]
+#![allow(clippy::unwrap_used, reason = "a scenario that cannot be set up has failed")]
 
 #[path = "trouble/clock.rs"]
 mod clock;

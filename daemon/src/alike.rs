@@ -31,7 +31,7 @@ struct Known {
     held: HashMap<(PathBuf, u64), (u64, u32)>,
 }
 
-/// What is in a folder: for all names that are alike, the digest of one.
+/// The names in a folder: for all that are alike, the digest of one.
 #[derive(Debug, Default)]
 struct Listed {
     names: HashMap<u64, u64>,
@@ -55,7 +55,7 @@ impl Alike {
     /// # Errors
     /// When the folder cannot be read.
     pub(crate) fn has_twin(&self, path: &Path) -> io::Result<bool> {
-        self.known().has_twin(fsx::folder_of(path), path.file_name().unwrap_or_default())
+        self.known().has_twin(fsx::folder_of(path), digests(path.file_name().unwrap_or_default()))
     }
 
     /// Takes the name of `path`, for a file that gets it next; `None` where there is another one like it.
@@ -64,11 +64,11 @@ impl Alike {
     /// When the folder cannot be read.
     pub(crate) fn hold(&self, path: &Path) -> io::Result<Option<Held<'_>>> {
         let (folder, name) = (fsx::folder_of(path), path.file_name().unwrap_or_default());
+        let (alike, exact) = digests(name);
         let mut known = self.known();
-        if known.has_twin(folder, name)? {
+        if known.has_twin(folder, (alike, exact))? {
             return Ok(None);
         }
-        let (alike, exact) = (digest(&folded(name)), digest(name.as_encoded_bytes()));
         if let Some(listed) = known.folders.get_mut(folder) {
             listed.names.insert(alike, exact);
         }
@@ -91,8 +91,7 @@ impl Drop for Held<'_> {
 }
 
 impl Known {
-    fn has_twin(&mut self, folder: &Path, name: &OsStr) -> io::Result<bool> {
-        let (alike, exact) = (digest(&folded(name)), digest(name.as_encoded_bytes()));
+    fn has_twin(&mut self, folder: &Path, (alike, exact): (u64, u64)) -> io::Result<bool> {
         if self.held.get(&(folder.to_owned(), alike)).is_some_and(|(held, _)| *held != exact) {
             return Ok(true);
         }
@@ -118,11 +117,16 @@ impl Listed {
     fn read(folder: &Path) -> io::Result<Self> {
         let mut names = HashMap::new();
         for entry in fsx::if_there(std::fs::read_dir(folder))?.into_iter().flatten() {
-            let name = entry?.file_name();
-            names.insert(digest(&folded(&name)), digest(name.as_encoded_bytes()));
+            let (alike, exact) = digests(&entry?.file_name());
+            names.insert(alike, exact);
         }
         Ok(Self { names, looks: 0 })
     }
+}
+
+/// Of all names that are alike, and of this very name.
+fn digests(name: &OsStr) -> (u64, u64) {
+    (digest(&folded(name)), digest(name.as_encoded_bytes()))
 }
 
 fn digest(bytes: &[u8]) -> u64 {
@@ -185,7 +189,7 @@ mod tests {
         assert!(!alike.has_twin(&at("none/Part.stl")).unwrap(), "no folder, no twin");
     }
 
-    /// What someone else puts into a full folder is seen after some looks, and what is put there by this daemon at once.
+    /// A name that someone else puts into a full folder is seen after some looks, and a name of this daemon at once.
     #[test]
     fn f23_a_full_folder_is_not_read_for_each_name() {
         let dir = tempfile::tempdir().unwrap();

@@ -332,18 +332,14 @@ fn reader(read: impl FnOnce() + Send + 'static) -> io::Result<JoinHandle<()>> {
 fn read_answer(line: &[u8], request: &Request) -> serde_json::Result<Message> {
     let is_answer = line.starts_with(br#"{"done"#) || line.starts_with(br#"{"failed"#);
     let mark = request.mark.as_deref().filter(|_| is_answer);
-    // The worker's witness serves as the mark meanwhile: some file systems look for a free place among all files that went lately, so that
-    // every file that comes and goes makes the next ones slower. Without a mark the death that may follow is nobody's.
-    let witness = request.witness.as_deref();
-    let is_lent = mark.zip(witness).is_some_and(|(mark, witness)| fsx::rename_new(witness, mark).is_ok());
-    let _ = mark.filter(|_| !is_lent).map(create::mark);
+    // Without a mark the death that may follow is nobody's.
+    let _ = mark.map(create::mark);
     #[cfg(feature = "crash-points")]
     if request.shown_input.contains("!kill-daemon!") && is_answer {
         let _ = rustix::process::kill_process(rustix::process::getpid(), Signal::KILL);
     }
     let message = serde_json::from_slice(line);
-    let is_back = is_lent && mark.zip(witness).is_some_and(|(mark, witness)| fsx::rename_new(mark, witness).is_ok());
-    let _ = mark.filter(|_| !is_back).map(fsx::remove_if_there);
+    let _ = mark.map(fsx::remove_if_there);
     message
 }
 

@@ -4,7 +4,7 @@ use crate::contract::report::{EditRecords, EditSummary, FaceOrigin, RepairName};
 use crate::geometry::distance::distance;
 use crate::io::record::{self, Record};
 use crate::submesh::components::Reversed;
-use crate::submesh::{Origin, Since, Submesh};
+use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
 use crate::util::bits::{self, Shared};
 
@@ -50,10 +50,7 @@ impl Edit {
             let triangle = &submesh.triangles[i as usize];
             let points = || submesh.points(i);
             match triangle.origin {
-                Origin::Input(t) if triangle.alive && triangle.since != Since::Same => {
-                    edit.compare(survey.records, (submesh, i), t)
-                }
-                Origin::Input(_) if triangle.alive => {}
+                Origin::Input(_) if triangle.alive => edit.compare(survey.records, submesh, i),
                 Origin::Input(t) => edit.changes.push((t, Change::Delete)),
                 Origin::Part(t) if triangle.alive => {
                     edit.add(points(), record::attribute(&survey.records[t as usize]), FaceOrigin::Part(t));
@@ -130,8 +127,8 @@ impl Edit {
     }
 
     /// Notes how a living triangle differs from its record, if it does.
-    fn compare(&mut self, records: &[Record], (submesh, i): (&Submesh, u32), t: u32) {
-        let now = submesh.points(i);
+    fn compare(&mut self, records: &[Record], submesh: &Submesh, i: u32) {
+        let (now, t) = (submesh.points(i), submesh.record(i));
         let Some(before) = submesh.as_read(records, i) else { return };
         // Comparing as numbers: −0.0 is 0.0.
         if before == now {

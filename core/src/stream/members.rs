@@ -45,12 +45,12 @@ enum Kept {
     Spool(Spool),
 }
 
-/// What of its chunks a pass reads.
+/// The part of its chunks that a pass reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Reads {
     /// All: some chunks are asked for while those before them are worked on.
     Chunks,
-    /// What [`Seen::each_near`] finds near, and asks for itself.
+    /// The stretches that [`Seen::each_near`] finds near, and asks for itself.
     Near,
 }
 

@@ -306,6 +306,12 @@ impl Submesh {
         })
     }
 
+    /// Is it a living triangle of the file with the corners of its record, whichever way round? Reads that as [`Self::as_read`] does.
+    pub(crate) fn stands(&self, records: &[Record], t: u32) -> bool {
+        let now = self.points(t);
+        self.lives(t) && self.as_read(records, t).is_some_and(|[a, b, c]| [a, b, c] == now || [a, c, b] == now)
+    }
+
     pub(crate) fn points(&self, t: u32) -> [[f32; 3]; 3] {
         self.triangles[t as usize].v.map(|v| self.positions[v as usize])
     }

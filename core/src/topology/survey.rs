@@ -420,7 +420,8 @@ impl<'a> Survey<'a> {
         visited.into_iter().flatten().collect()
     }
 
-    /// `work` on every wanted chunk: its cell, its members, and its visitors, which there are if self-intersections were looked for. Results by
+    /// `work` on every wanted chunk: its cell, its members, and its visitors, which there are if self-intersections were looked for; the disk is
+    /// asked only for what [`Seen::each_near`] visits. Results by
     /// chunk, so only sums and sets may be made of them.
     pub(crate) fn each_chunk<S, R: Send>(
         &self,

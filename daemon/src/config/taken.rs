@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-/// What is there stays in any case.
+/// The file that has the name stays in any case.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum OnTaken {

@@ -94,7 +94,7 @@ impl Surfaces<'_> {
             let triangle = &self.submesh.triangles[t as usize];
             if let Some(corners) = self.submesh.as_read(self.survey.records, t)
                 && !is_no_harm(triangle.by)
-                && !(self.submesh.lives(t) && is_same(&corners, &self.submesh.points(t)))
+                && !self.submesh.stands(self.survey.records, t)
             {
                 let [a, b, c] = corners;
                 let points = self.submesh.points(t);
@@ -145,8 +145,7 @@ impl Surfaces<'_> {
     pub(crate) fn each_added(&self, mut visit: impl FnMut(u32, &Corners, Option<RepairName>)) {
         for t in self.submesh.beside_records(self.survey).filter(|t| self.submesh.lives(*t)) {
             let (points, by) = (self.submesh.points(t), self.made_by(t));
-            let as_read = || self.submesh.as_read(self.survey.records, t);
-            if !is_no_harm(by) && as_read().is_none_or(|corners| !is_same(&corners, &points)) {
+            if !is_no_harm(by) && !self.submesh.stands(self.survey.records, t) {
                 visit(t, &points, by);
             }
         }
@@ -180,9 +179,4 @@ fn is_no_harm(by: Option<RepairName>) -> bool {
 
 fn is_asked_for(by: Option<RepairName>) -> bool {
     matches!(by, Some(RepairName::SheetSolids | RepairName::Skirt))
-}
-
-/// Whichever way round.
-fn is_same(a: &Corners, b: &Corners) -> bool {
-    a == b || [a[0], a[2], a[1]] == *b
 }

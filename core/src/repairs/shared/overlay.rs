@@ -70,19 +70,13 @@ impl Overlay {
         records.checked_add(submesh.triangles.len() as u32)?;
         let (mut gone, mut changed) = (Vec::new(), Vec::new());
         for t in submesh.beside_records(survey) {
-            let (triangle, lives) = (&submesh.triangles[t as usize], submesh.lives(t));
-            let stands = match triangle.origin {
-                Origin::Input(place) => {
-                    let is_as_read = |read| same_corners(read, submesh.points(t));
-                    let stands = lives && submesh.as_read(survey.records, t).is_some_and(is_as_read);
-                    if !stands {
-                        gone.push(place);
-                    }
-                    stands
-                }
-                Origin::Part(_) | Origin::Added(_) => false,
-            };
-            if lives && !stands {
+            let stands = submesh.stands(survey.records, t);
+            if let Origin::Input(place) = submesh.triangles[t as usize].origin
+                && !stands
+            {
+                gone.push(place);
+            }
+            if submesh.lives(t) && !stands {
                 changed.push(t);
             }
         }
@@ -223,9 +217,4 @@ impl Overlay {
         )?;
         Some(found.into_iter().map(|pair| StandingPair::of(pair).triangles).collect())
     }
-}
-
-/// Comparing as numbers, whichever way round.
-fn same_corners(a: Corners, b: Corners) -> bool {
-    a == b || [a[0], a[2], a[1]] == b
 }

@@ -447,7 +447,7 @@ mod tests {
         assert_eq!(steps_for(8), steps_for(32));
     }
 
-    /// Whatever was done to it, and taken back.
+    /// A change of any kind leaves that true, and so does taking it back.
     #[test]
     fn a_triangle_of_the_file_is_known_as_it_was_read() {
         let records = records(&plate(3, |_, _| true));

@@ -1,4 +1,4 @@
-//! What lies around regular vertices: their stars are in the file alone, and are fetched from it.
+//! Stars of regular vertices: they are in the file alone, and are fetched from it.
 
 use super::Survey;
 use crate::geometry::grid::Grid;

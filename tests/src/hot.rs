@@ -54,8 +54,16 @@ impl Hot {
     /// # Panics
     /// When the configuration cannot be written.
     pub fn configured(&self, lines: &str) -> Command {
+        self.configured_folder(lines, "")
+    }
+
+    /// As [`Self::configured`], with these lines about the folder.
+    ///
+    /// # Panics
+    /// When the configuration cannot be written.
+    pub fn configured_folder(&self, lines: &str, of_folder: &str) -> Command {
         let file = self.path().join("suture.toml");
-        let text = format!("{lines}\n[[folders]]\npath = {:?}\n", self.path());
+        let text = format!("{lines}\n[[folders]]\npath = {:?}\n{of_folder}\n", self.path());
         std::fs::write(&file, text).expect("the configuration can be written");
         let mut command = Command::new(&self.binary);
         command.args(["watch", "--once", "--config"]).arg(file);

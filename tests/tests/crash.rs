@@ -9,6 +9,8 @@ mod approved;
 mod deaths;
 #[path = "crash/lost.rs"]
 mod lost;
+#[path = "crash/taken.rs"]
+mod taken;
 #[path = "crash/told.rs"]
 mod told;
 

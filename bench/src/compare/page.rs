@@ -290,7 +290,7 @@ fn searches(book: &Book) -> String {
 pub(super) fn short(book: &Book) -> String {
     let sides = [Side::SutureNoSi, Side::Suture, Side::PymeshlabPlain, Side::PymeshlabCompetent, Side::Meshlib, Side::CpSynced];
     let inputs: Vec<_> = book.inputs().into_iter().filter(|input| input.seed.is_some() && input.files == 1).collect();
-    let inputs = inputs.iter().filter(|input| input.size >= 1_000_000 || input.case == "soup");
+    let inputs = inputs.iter().filter(|input| input.size >= 1_000_000);
     let mut rows: Vec<_> = inputs.filter(|input| book.wall(input, &Way::plain(Side::PymeshlabPlain)).is_some()).collect();
     rows.sort_by_key(|input| std::cmp::Reverse(input.size));
     let shown: Vec<_> =

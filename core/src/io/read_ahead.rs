@@ -88,35 +88,27 @@ impl<'a> Guide<'a> {
         blocks.flatten()
     }
 
-    /// Cuts a part of the map, as something else than bytes, into blocks to be read one after the other, and asks for each of them while
-    /// the one before it is worked on. All of it is one block where nothing needs to be asked for.
+    /// Cuts a part of the map, as something else than bytes, into blocks to be read one after the other, each [in order](Self::in_order): others
+    /// may read elsewhere in the map meanwhile. All of it is one block where all of it stays.
     pub(crate) fn blocks<T>(self, part: &'a [T]) -> impl Iterator<Item = &'a [T]> {
         let size = if self.is_needed() { (BLOCK / size_of::<T>()).max(1) } else { part.len().max(1) };
-        let start = (part.as_ptr() as usize).saturating_sub(self.bytes.as_ptr() as usize);
-        let ask = move |block: usize| {
-            if self.is_needed() {
-                let at = |block: usize| start + (block * size).min(part.len()) * size_of::<T>();
-                self.advise(at(block), at(block + 1), Advice::WillNeed);
-            }
-        };
-        ask(0);
+        let mut in_order = None;
         part.chunks(size).enumerate().map(move |(i, block)| {
-            ask(i + 1);
+            // The one before ends first, which is about this block, too.
+            drop(in_order.take());
+            in_order = Some(self.in_order(&part[i * size..part.len().min((i + 2) * size)]));
             block
         })
     }
 
-    /// For reading that goes straight on with gaps: asks for a block or two beyond `part`, a part of the map. `asked` is how far that was
-    /// done before, 0 to begin with.
-    pub(crate) fn keep_ahead(&self, asked: &mut usize, part: &[u8]) {
-        if self.is_needed() {
-            let start = (part.as_ptr() as usize).saturating_sub(self.bytes.as_ptr() as usize);
-            *asked = (*asked).max(start);
-            while *asked < (start + part.len() + BLOCK).min(self.bytes.len()) {
-                self.advise(*asked, *asked + BLOCK, Advice::WillNeed);
-                *asked += BLOCK;
-            }
-        }
+    /// Until the result is dropped, the system reads ahead by itself in this part of the map, which is read in order, maybe with gaps. In order it
+    /// guesses right, and it reads, charges and gives up pages by the hundred then (large folios: XFS since Linux 5.18, ext4 since 6.16).
+    /// Measured, 2.5 GB, ext4, 6.18, a cgroup of 272 MiB, two threads: 0.37 s of system time, 1.23 s where each block is asked for.
+    pub(crate) fn in_order<T>(self, part: &[T]) -> InOrder<'a> {
+        let from = (part.as_ptr() as usize).saturating_sub(self.bytes.as_ptr() as usize);
+        let order = InOrder { guide: self, from, to: from + size_of_val(part) };
+        order.advise(Advice::Normal);
+        order
     }
 
     /// Only advice: without it the reading is slower.
@@ -129,6 +121,28 @@ impl<'a> Guide<'a> {
             // that hold these bytes, the first one from its beginning.
             let _ = unsafe { rustix::mm::madvise(start as *mut std::ffi::c_void, length, advice) };
         }
+    }
+}
+
+/// A part of a map that is read in order.
+#[derive(Debug)]
+pub(crate) struct InOrder<'a> {
+    guide: Guide<'a>,
+    from: usize,
+    to: usize,
+}
+
+impl InOrder<'_> {
+    fn advise(&self, advice: Advice) {
+        if self.guide.is_needed() {
+            self.guide.advise(self.from, self.to, advice);
+        }
+    }
+}
+
+impl Drop for InOrder<'_> {
+    fn drop(&mut self) {
+        self.advise(Advice::Random);
     }
 }
 
@@ -168,10 +182,6 @@ mod tests {
             assert!(got.concat() == records);
             let tail: Vec<u8> = guide.blocks(&bytes[bytes.len() - 7..]).flatten().copied().collect();
             assert_eq!(tail, [399_999u32 as u8; 7]);
-            let mut asked = 0;
-            guide.keep_ahead(&mut asked, &bytes[..100]);
-            guide.keep_ahead(&mut asked, &bytes[5000..6000]);
-            assert_eq!(asked, if room.is_some() { 2 * BLOCK } else { 0 }, "the block of the part, and one more");
             assert_eq!(guide.blocks(&records[..0]).map(<[Record]>::len).sum::<usize>(), 0);
         }
     }
@@ -183,5 +193,44 @@ mod tests {
         assert_eq!(Guide { bytes: &bytes, room: Some(0) }.group(1000), Some(250), "4 of 16 MiB");
         assert_eq!(Guide { bytes: &bytes, room: Some(0) }.group(1), Some(1));
         assert!(!Guide::new(&bytes[..100], &Limits { memory_bytes: 1 << 20, ..Limits::default() }).is_needed());
+    }
+
+    /// Whether the system reads only what is asked for at this address of a map.
+    fn is_random(at: *const u8) -> bool {
+        let maps = std::fs::read_to_string("/proc/self/smaps").unwrap();
+        let mut holds = false;
+        for line in maps.lines() {
+            let range = line.split_once(' ').and_then(|(range, _)| range.split_once('-'));
+            let ends = range.map(|(from, to)| [from, to].map(|end| usize::from_str_radix(end, 16)));
+            match (ends, line.strip_prefix("VmFlags:")) {
+                (Some([Ok(from), Ok(to)]), _) => holds = (from..to).contains(&(at as usize)),
+                (_, Some(flags)) if holds => return flags.split(' ').any(|flag| flag == "rr"),
+                _ => {}
+            }
+        }
+        panic!("no map is there");
+    }
+
+    #[test]
+    fn the_system_reads_ahead_in_this_block_and_the_next_alone() {
+        let file = tempfile::tempfile().unwrap();
+        file.set_len(5 * BLOCK as u64).unwrap();
+        // SAFETY: nobody else knows the file.
+        let map = unsafe { memmap2::Mmap::map(&file) }.unwrap();
+        let guide = Guide { bytes: &map, room: Some(0) };
+        guide.advise(0, map.len(), Advice::Random);
+        let random = || -> Vec<bool> { map.chunks(BLOCK).map(|block| is_random(block.as_ptr())).collect() };
+        let mut blocks = guide.blocks(&map[BLOCK..]);
+        assert_eq!(random(), [true; 5]);
+        blocks.next();
+        assert_eq!(random(), [true, false, false, true, true]);
+        blocks.next();
+        assert_eq!(random(), [true, true, false, false, true]);
+        drop(blocks);
+        assert_eq!(random(), [true; 5]);
+        let part = guide.in_order(&map[..3 * BLOCK]);
+        assert_eq!(random(), [false, false, false, true, true]);
+        drop(part);
+        assert_eq!(random(), [true; 5]);
     }
 }

@@ -116,7 +116,7 @@ impl Draft<'_, '_> {
                 Sink::create(mesh, output, limits, progress)?.copy(limits, wanted)?
             }
         };
-        sink.hold(content)?;
+        sink.hold(content, limits)?;
         Ok((sink.finish(limits)?, digest))
     }
 }
@@ -151,9 +151,6 @@ struct Sink<'a> {
     /// So many bytes at the beginning are the input's already.
     copied: u64,
     behind: WriteBehind,
-    /// How the input is read where it is not copied inside the kernel, and how far that was asked for.
-    guide: Guide<'a>,
-    asked: usize,
     progress: &'a dyn Progress,
 }
 
@@ -161,7 +158,6 @@ impl<'a> Sink<'a> {
     fn create(mesh: &'a MeshFile, path: &'a Path, limits: &Limits, progress: &'a dyn Progress) -> Result<Self> {
         let file = create(path).map_err(Error::io(path, "creating"))?;
         let behind = WriteBehind::new(&file, limits).map_err(Error::io(path, "creating"))?;
-        let guide = Guide::new(mesh.records().as_flattened(), limits);
         Ok(Self {
             mesh,
             path,
@@ -173,8 +169,6 @@ impl<'a> Sink<'a> {
             at: 0,
             copied: 0,
             behind,
-            guide,
-            asked: 0,
             progress,
         })
     }
@@ -205,8 +199,9 @@ impl<'a> Sink<'a> {
     }
 
     /// Writes what is not there yet.
-    fn hold(&mut self, content: &Content<'_>) -> Result<()> {
+    fn hold(&mut self, content: &Content<'_>, limits: &Limits) -> Result<()> {
         let records = self.mesh.records();
+        let _put = Guide::new(records.as_flattened(), limits).in_order(records);
         let Content::Edited(edit) = content else { return self.put_input(self.mesh.bytes()) };
         let count = edit.output_records(records.len());
         let count = u32::try_from(count).map_err(|_| Error::Refused {
@@ -244,9 +239,6 @@ impl<'a> Sink<'a> {
                 self.file.seek(SeekFrom::Start(self.at)).map_err(|e| self.failed(e))?;
                 self.tell(self.at);
             }
-        }
-        if bytes.len() < KERNEL_COPY_BYTES {
-            self.guide.keep_ahead(&mut self.asked, bytes);
         }
         self.put_bytes(bytes)
     }

@@ -131,17 +131,16 @@ impl<'a> Expectation<'a> {
         by_one: bool,
     ) -> Option<Digest> {
         let bytes = written.bytes();
-        let input_guide = Guide::new(self.input.as_flattened(), limits);
+        let _compared = Guide::new(self.input.as_flattened(), limits).in_order(self.input);
         let value = |number: usize, block: &[u8]| match (self.compare(number * digest::BLOCK, block), digest.get(number)) {
             (Compared::Different, _) => None,
             // Shorter ones end with the file, and the input may go on.
             (Compared::InPlace, Some(known)) if block.len() == digest::BLOCK => Some(*known),
             _ => Some(digest::value(number, block)),
         };
-        let (mut values, mut asked) = (Vec::with_capacity(bytes.len().div_ceil(digest::BLOCK)), 0);
+        let mut values = Vec::with_capacity(bytes.len().div_ceil(digest::BLOCK));
         for window in Guide::new(bytes, limits).blocks(bytes).flat_map(|block| block.chunks(WINDOW)) {
             let first = values.len();
-            input_guide.keep_ahead(&mut asked, self.input_behind(first * digest::BLOCK, window.len()));
             let value = |(i, block): (usize, &[u8])| value(first + i, block);
             values.extend(if by_one {
                 window.chunks(digest::BLOCK).enumerate().map(value).collect::<Option<Vec<_>>>()?
@@ -157,17 +156,6 @@ impl<'a> Expectation<'a> {
     fn first_stretch(&self, at: usize) -> usize {
         let record = at.saturating_sub(PREFIX_BYTES) / size_of::<Record>();
         self.stretches.partition_point(|s| s.first + s.count <= record)
-    }
-
-    /// What so many bytes of the written file from `at` on are compared with in the input, or about that.
-    fn input_behind(&self, at: usize, bytes: usize) -> &[u8] {
-        let from = self.stretches[self.first_stretch(at)..].iter().find_map(|s| match s.expected {
-            Expected::Input(from) => Some((from * size_of::<Record>()).max(at.saturating_sub(PREFIX_BYTES))),
-            Expected::Fresh(_) => None,
-        });
-        let input = self.input.as_flattened();
-        let from = from.unwrap_or(input.len()).min(input.len());
-        &input[from..(from + bytes).min(input.len())]
     }
 
     /// Compares the bytes of the written file from `at` on, but not what stands before the first record.

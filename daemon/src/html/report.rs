@@ -75,7 +75,7 @@ fn outcome(report: &Report) -> Markup {
     }
 }
 
-/// What the file that was judged is, and all reasons for it.
+/// The verdict on the file that was judged, and all reasons for it.
 pub(crate) fn verdict(report: &Report) -> Markup {
     html! {
         (statement(report))
@@ -84,7 +84,7 @@ pub(crate) fn verdict(report: &Report) -> Markup {
     }
 }
 
-/// What the file that was judged is.
+/// The statement of the verdict.
 pub(crate) fn statement(report: &Report) -> Markup {
     html! { p { "The file that was judged is " (report.verdict.statement) "." } }
 }

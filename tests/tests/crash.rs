@@ -16,7 +16,7 @@ mod told;
 
 use std::collections::BTreeMap;
 use std::os::unix::process::ExitStatusExt;
-use std::process::Child;
+use std::process::{Child, Command, ExitStatus};
 use std::time::{Duration, Instant};
 
 use suture_bench::generate::Case;
@@ -70,14 +70,21 @@ fn drop_one(hot: &Hot) {
     hot.put("part.stl", &mesh(Case::Clean, 1));
 }
 
+/// Runs the daemon over the folder; how it ends, and the crash points it passes, a line each.
+fn traced(hot: &Hot, mut daemon: Command) -> (ExitStatus, String) {
+    let trace = hot.path().join("trace");
+    let status = daemon.env("SUTURE_CRASH_TRACE", &trace).status().expect("the daemon starts");
+    let passed = std::fs::read_to_string(&trace).expect("a trace");
+    std::fs::remove_file(trace).expect("it can go");
+    (status, passed)
+}
+
 /// The state after a run without kills, and the number of crash points it passes.
 fn reference(put: fn(&Hot)) -> (BTreeMap<&'static str, Tree>, u64) {
     let hot = Hot::new(with_crash_points());
     put(&hot);
-    let trace = hot.path().join("trace");
-    let status = hot.watch(&["--once"]).env("SUTURE_CRASH_TRACE", &trace).status().expect("the daemon starts");
+    let (status, trace) = traced(&hot, hot.watch(&["--once"]));
     assert!(status.code().is_some_and(|code| code < 2), "{status}");
-    let trace = std::fs::read_to_string(trace).expect("a trace");
     for point in
         ["submitted", "claimed", "linked", "worked", "result_durable", "intent_durable", "report_placed", "done", "swept"]
     {
@@ -101,7 +108,7 @@ fn on_two_threads<T: Sync>(cases: &[T], run: impl Fn(&T) + Sync) {
     });
 }
 
-fn was_killed(status: std::process::ExitStatus) -> bool {
+fn was_killed(status: ExitStatus) -> bool {
     status.signal() == Some(9)
 }
 
@@ -135,10 +142,8 @@ fn drop_a_second(hot: &Hot) {
 fn f01_killed_at_every_step_of_a_copy() {
     let hot = Hot::new(with_crash_points());
     drop_a_second(&hot);
-    let trace = hot.path().join("trace");
-    let status = hot.watch(&["--once"]).env("SUTURE_CRASH_TRACE", &trace).status().expect("the daemon starts");
+    let (status, trace) = traced(&hot, hot.watch(&["--once"]));
     assert_eq!(status.code(), Some(0));
-    let trace = std::fs::read_to_string(trace).expect("a trace");
     assert!(trace.contains("daemon.reused\n") && !trace.contains("daemon.worked\n"), "{trace}");
     let (expected, passes) = (state(&hot), trace.lines().count() as u64);
     assert_eq!(expected["out"]["again/second.stl"], expected["out"]["part.stl"]);
@@ -343,7 +348,7 @@ fn f12_killers_cost_themselves_only() {
         place.put(name, &mesh(Case::Holes, seed));
     }
     std::fs::create_dir(place.at("out")).expect("a folder for results");
-    let mut command = std::process::Command::new(with_crash_points());
+    let mut command = Command::new(with_crash_points());
     command.current_dir(place.at("")).args(["repair", "--threads", "2", "-o", "out"]).args(&names).env("SUTURE_LOG", "off");
     let output = command.output().expect("the binary starts");
     let said = String::from_utf8_lossy(&output.stderr);

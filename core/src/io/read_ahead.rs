@@ -3,7 +3,7 @@
 //! A chunk's triangles lie in stretches of some kilobytes all over a part of the file, samples for the plan a page here and there, and
 //! each thread reads a part of its own. The system, seeing faults at all these places, reads megabytes around each: a file of twice the
 //! cache was read seven times over. So where it matters it is told not to guess, and asked for what is wanted a little before it is
-//! wanted: every page is read about once a pass.
+//! wanted: every page is read about once a pass. Where a pass goes on in order, the system guesses right, and is left to it.
 
 use rustix::mm::Advice;
 
@@ -22,7 +22,7 @@ const ALWAYS_STAYS: usize = 16 << 20;
 /// Bytes of a group of chunks; two are asked for at a time.
 const SMALLEST_GROUP: u64 = 4 << 20;
 const LARGEST_GROUP: u64 = 64 << 20;
-/// Bytes asked for at a time where reading goes straight on.
+/// Bytes of a block where reading goes straight on.
 const BLOCK: usize = 8 << 20;
 
 /// How one map is read from now on.

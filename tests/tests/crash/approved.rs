@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use suture_tests::binary::with_crash_points;
 use suture_tests::hot::{Hot, Tree, doubtful};
 
-use crate::{assert_at_rest, exhaustive, on_two_threads, state, was_killed};
+use crate::{assert_at_rest, exhaustive, on_two_threads, state, traced, was_killed};
 
 /// A folder in which one file needs review, and a person has approved its best attempt; that.
 fn approved() -> (Hot, Vec<u8>) {
@@ -20,10 +20,8 @@ fn approved() -> (Hot, Vec<u8>) {
 /// The state after a run without kills, and the number of crash points it passes.
 fn reference() -> (BTreeMap<&'static str, Tree>, u64) {
     let (hot, best) = approved();
-    let trace = hot.path().join("trace");
-    let status = hot.watch(&["--once"]).env("SUTURE_CRASH_TRACE", &trace).status().expect("the daemon starts");
+    let (status, trace) = traced(&hot, hot.watch(&["--once"]));
     assert_eq!(status.code(), Some(0));
-    let trace = std::fs::read_to_string(trace).expect("a trace");
     for point in
         ["approved_copied", "superseded", "result_durable", "intent_durable", "output_placed", "original_durable", "done"]
     {

@@ -7,11 +7,11 @@ use std::process::Command;
 use suture_tests::binary::with_crash_points;
 use suture_tests::hot::{Hot, Tree, holes};
 
-use crate::{assert_at_rest, assert_attempts, on_two_threads, state, was_killed};
+use crate::{assert_at_rest, assert_attempts, on_two_threads, state, traced, was_killed};
 
 const THEIRS: &[u8] = b"theirs";
 
-/// What a folder does with a drop whose result's name is taken.
+/// A folder's rule for a drop whose result's name is taken, and the end of such a drop.
 #[derive(Clone, Copy, Debug)]
 struct Rule {
     on_taken: &'static str,
@@ -41,10 +41,9 @@ impl Rule {
     /// The state after a run without kills over what `drop` made, and the number of crash points it passes.
     fn reference(self, drop: fn() -> Hot) -> (BTreeMap<&'static str, Tree>, u64) {
         let hot = drop();
-        let trace = hot.path().join("trace");
-        let status = self.daemon(&hot).env("SUTURE_CRASH_TRACE", &trace).status().expect("the daemon starts");
+        let (status, trace) = traced(&hot, self.daemon(&hot));
         assert!(status.code().is_some_and(|code| code < 2), "{self:?}: {status}");
-        (state(&hot), std::fs::read_to_string(trace).expect("a trace").lines().count() as u64)
+        (state(&hot), trace.lines().count() as u64)
     }
 }
 

@@ -7,7 +7,7 @@ use suture_tests::binary::with_crash_points;
 use suture_tests::hot::Hot;
 use suture_tests::receiver::Receiver;
 
-use crate::{assert_at_rest, drop_two, on_two_threads, was_killed};
+use crate::{assert_at_rest, drop_two, on_two_threads, traced, was_killed};
 
 fn daemon(hot: &Hot, receiver: &Receiver) -> Command {
     let ran = hot.path().join("ran");
@@ -42,9 +42,8 @@ fn f30_killed_at_every_step_each_end_is_told() {
     let hot = Hot::new(with_crash_points());
     let receiver = Receiver::start();
     drop_two(&hot);
-    let trace = hot.path().join("trace");
-    assert_eq!(daemon(&hot, &receiver).env("SUTURE_CRASH_TRACE", &trace).status().expect("it starts").code(), Some(1));
-    let trace = std::fs::read_to_string(trace).expect("a trace");
+    let (status, trace) = traced(&hot, daemon(&hot, &receiver));
+    assert_eq!(status.code(), Some(1));
     assert!(["daemon.told\n", "daemon.acknowledged\n"].iter().all(|point| trace.matches(point).count() == 4), "{trace}");
     assert_eq!((receiver.came().len(), ran(&hot).len()), (2, 2));
     let passes = trace.lines().count() as u64;
@@ -123,10 +122,7 @@ impl Two {
 
     /// Crash points of a run.
     fn passes(&self) -> u64 {
-        let trace = self.hot.path().join("trace");
-        self.daemon().env("SUTURE_CRASH_TRACE", &trace).status().expect("it starts");
-        let passed = std::fs::read_to_string(&trace).expect("a trace");
-        std::fs::remove_file(trace).expect("it can go");
+        let (_, passed) = traced(&self.hot, self.daemon());
         assert!(["daemon.told\n", "daemon.acknowledged\n"].iter().all(|point| passed.matches(point).count() == 1), "{passed}");
         passed.lines().count() as u64
     }

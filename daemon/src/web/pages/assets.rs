@@ -55,8 +55,8 @@ mod tests {
         assert!(String::from_utf8_lossy(of("three/LICENSE")).contains("The MIT License"));
     }
 
-    /// What ends between the making of a page and the begin of its stream would be shown as in work for ever; so would what ends while
-    /// someone stands in it.
+    /// A job that ends between the making of a page and the begin of its stream would be shown as in work for ever; so would a job that
+    /// ends while someone stands in its part of the page.
     #[test]
     fn a_page_is_renewed_when_its_stream_begins_and_when_it_is_left() {
         let text = include_str!("../../../assets/live.js");

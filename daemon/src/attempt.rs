@@ -34,10 +34,12 @@ use crate::reuse::Sought;
 use crate::schedule::{Schedule, Turn, Waits};
 use crate::settings::Settings;
 use crate::supervise::{Cause, Ended};
-use crate::world::{Hand, Share, World};
+use crate::world::World;
 
+mod staff;
 mod worked;
 
+use staff::Staff;
 use worked::Worked;
 
 /// Left by a worker that outlived the daemon: the file it worked on did not kill it.
@@ -46,8 +48,6 @@ pub(crate) const WITNESS: &str = "outlived";
 pub(crate) const IN_HAND: &str = "in-hand";
 /// How often a running job asks whether anyone wants it stopped.
 const ASK_EVERY: Duration = Duration::from_millis(500);
-/// A worker process is replaced after so many files, so that nothing can pile up in it for months.
-const FILES_PER_WORKER: u32 = 500;
 /// What happened, for the thread that looks after the folders.
 #[derive(Debug)]
 pub(crate) enum Event {
@@ -91,8 +91,11 @@ impl Context {
         self.folders.iter().find(|folder| folder.name == job.source.folder)
     }
 
-    /// Bytes that results of a hot folder may still fill, on its disk and on that of its results.
+    /// Bytes that results of a hot folder may still fill, on its disk and on that of its results; boundless where they do not say.
     pub(crate) fn room(&self, folder: &Folder) -> u64 {
+        if folder.silence().is_some() {
+            return u64::MAX;
+        }
         let reserve = self.settings.now().reserve;
         self.world.room(&folder.root, reserve).min(self.world.room(&folder.out(), reserve))
     }
@@ -120,6 +123,11 @@ impl Context {
         self.failed.lock().is_ok_and(|failed| failed.is_some())
     }
 
+    /// Is the hot folder out of reach whose attempts are below `work_root`?
+    fn is_away(&self, work_root: &Path) -> bool {
+        self.folders.iter().any(|folder| folder.work_root() == work_root && folder.check().is_err())
+    }
+
     fn waits(&self) -> Result<Waits, StoreError> {
         Waits::of(&*self.store, self.settings.now().large)
     }
@@ -132,10 +140,7 @@ impl Context {
 /// A thread that works on jobs.
 pub(crate) struct Slot {
     context: Arc<Context>,
-    worker: Option<Box<dyn Hand>>,
-    /// Bytes that the worker may hold.
-    memory: u64,
-    served: u32,
+    staff: Staff,
     /// A file of the result in work is in its place.
     committed: Cell<bool>,
     /// It has a turn, and its file is not computed yet.
@@ -144,14 +149,7 @@ pub(crate) struct Slot {
 
 impl Slot {
     pub(crate) fn new(context: &Arc<Context>) -> Self {
-        Self {
-            context: Arc::clone(context),
-            worker: None,
-            memory: 0,
-            served: 0,
-            committed: Cell::new(false),
-            computes: Cell::new(false),
-        }
+        Self { context: Arc::clone(context), staff: Staff::default(), committed: Cell::new(false), computes: Cell::new(false) }
     }
 
     /// Works until the schedule says stop.
@@ -181,7 +179,7 @@ impl Slot {
         self.computes.set(true);
         if turn.is_alone() {
             // Its memory belongs to the large file now.
-            self.worker = None;
+            self.staff.dismiss();
         }
         match self.context.store.claim(&turn.filter(self.context.settings.now().large)) {
             Ok(Some(claim)) => {
@@ -346,10 +344,11 @@ impl Slot {
             return copied;
         }
         let limits = limits(&config, turn);
-        let mut worker = match self.worker(&limits, turn, job) {
-            Ok(worker) => worker,
-            Err(error) => return Worked::Step(Step::Wait { reason: format!("a worker process cannot be started: {error}") }),
-        };
+        let mut worker =
+            match self.staff.worker(&*context.world, &limits, turn, job, folder, |work_root| context.is_away(work_root)) {
+                Ok(worker) => worker,
+                Err(error) => return Worked::Step(Step::Wait { reason: format!("a worker process cannot be started: {error}") }),
+            };
         let request = request(folder, claim, job, profile, limits);
         let asked = Cell::new(context.world.steady());
         let lease = Cell::new(Lease::Held);
@@ -367,9 +366,7 @@ impl Slot {
         let ended =
             worker.run(&request, limit, &stop, &mut |stage, done, total| context.bus.progress(job.id, stage, done, total));
         crash_point("daemon.worked");
-        if matches!(ended, Ended::Done { .. } | Ended::Failed { .. }) && !turn.is_alone() {
-            self.worker = Some(worker);
-        }
+        self.staff.take_back(worker, &ended, turn);
         let changed = match claimed.is_unchanged() {
             Ok(unchanged) => !unchanged,
             Err(error) => {
@@ -423,21 +420,6 @@ impl Slot {
             Lease::Lost => Worked::Lost,
             Lease::Held => Worked::Step(Step::HandBack),
         }
-    }
-
-    /// A worker for this job: the slot's own while it is in good shape, or a new one.
-    fn worker(&mut self, limits: &Limits, turn: Turn, job: &Job) -> std::io::Result<Box<dyn Hand>> {
-        let other = self.memory != limits.memory_bytes;
-        let fresh = turn.is_alone() || other || job.blame.charges > 0 || self.served >= FILES_PER_WORKER;
-        if let Some(mut worker) = self.worker.take().filter(|_| !fresh)
-            && worker.is_alive()
-        {
-            self.served += 1;
-            return Ok(worker);
-        }
-        (self.served, self.memory) = (1, limits.memory_bytes);
-        let share = Share { memory: limits.memory_bytes, threads: limits.threads, many: !turn.is_alone() };
-        self.context.world.hire(share)
     }
 }
 

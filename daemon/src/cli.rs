@@ -321,6 +321,9 @@ pub(crate) struct WorkerArgs {
     /// Bytes of memory that the worker may have of the system
     #[arg(long)]
     pub data: u64,
+    /// A folder that the worker may read and write; once one is named, it reaches nothing else
+    #[arg(long = "within")]
+    pub within: Vec<PathBuf>,
 }
 
 /// A drawing that the daemon asks for.

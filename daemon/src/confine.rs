@@ -3,12 +3,14 @@
 //! doing. And where the system runs out of memory, a worker goes first.
 
 use std::io;
+use std::path::PathBuf;
 
+use landlock::RulesetStatus;
 use rustix::process::{Resource, Rlimit, Signal, getppid, getrlimit, set_parent_process_death_signal, setrlimit};
 use rustix::thread::set_no_new_privs;
 
 use crate::cli::WorkerArgs;
-use crate::create;
+use crate::{create, fence};
 
 /// Added to the system's own count of who should go first (from −1000 to 1000).
 const OUT_OF_MEMORY_SCORE: &str = "500";
@@ -81,9 +83,15 @@ impl Files {
 }
 
 /// Confines this process, before it has other threads. A system that refuses (an old kernel, a sandbox) leaves it as it is.
-pub(crate) fn confine() {
+/// `reads`: files that it is to read beyond its fence.
+pub(crate) fn confine(args: &WorkerArgs, reads: &[PathBuf]) {
     if let Err(error) = create::tell_kernel("oom_score_adj", OUT_OF_MEMORY_SCORE) {
         tracing::debug!(%error, "The system will not let a worker go first when memory is short.");
+    }
+    match fence::keep_within(&args.within, reads) {
+        Ok(RulesetStatus::FullyEnforced) => {}
+        Ok(status) => tracing::debug!(?status, "The system does not keep a worker within all of its fence."),
+        Err(error) => tracing::debug!(%error, "A worker has no fence."),
     }
     let confined = set_no_new_privs(true).map_err(io::Error::from).and_then(|()| forbid_signals());
     if let Err(error) = confined {

@@ -3,7 +3,7 @@
 use std::ffi::OsStr;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 use suture_store::job::Area;
 use suture_store::{RelPath, Token};
@@ -15,6 +15,7 @@ use crate::fsx;
 pub(crate) use crate::ground::{FolderError, is_fading, make_parent};
 use crate::ground::{Ground, LOCK, PARTS, PRIVATE, Trace, id};
 use crate::receipt::{RECEIPT, REPORT};
+use crate::sentinel::{Answer, Sentinel};
 
 /// Part of a hot folder that holds results.
 const OUT: &str = "out";
@@ -31,6 +32,7 @@ pub(crate) struct Folder {
     /// Names of results that other systems take for the same.
     pub alike: Alike,
     ground: Mutex<Result<Ground, Trace>>,
+    sentinel: OnceLock<Sentinel>,
 }
 
 impl Folder {
@@ -40,17 +42,29 @@ impl Folder {
     /// # Errors
     /// When another daemon serves it, or it cannot be made.
     pub(crate) fn open(config: &FolderConfig, known: Option<&Trace>) -> Result<Self, FolderError> {
-        // Made once as an absolute path: the process may be asked to look again after hours.
-        let absolute = std::path::absolute(&config.path);
-        let root = absolute.map_err(|source| {
-            let path = config.path.clone();
-            FolderError::Io { path, action: "cannot be found", source }
-        })?;
+        let root = absolute(config)?;
         let ground = match known.filter(|known| known.missing(&root).is_some()) {
             Some(known) => Err(known.clone()),
             None => Ok(take(&root)?),
         };
         Ok(Self::at(root, config, ground))
+    }
+
+    /// As [`Folder::open`], but nothing waits for a folder that hangs, now or later: it is away until it answers.
+    ///
+    /// # Errors
+    /// As [`Folder::open`]; also when it does not answer, and was never served before.
+    pub(crate) fn open_guarded(config: &FolderConfig, known: Option<&Trace>) -> Result<Self, FolderError> {
+        let root = absolute(config)?;
+        let sentinel = Sentinel::post(&root).map_err(FolderError::unseen(&root))?;
+        let folder = match (sentinel.answers_at_last(), known) {
+            (Answer::Yes, known) => Self::open(config, known)?,
+            (_, Some(known)) => Self::at(root, config, Err(known.clone())),
+            (_, None) => return Err(FolderError::Silent { root }),
+        };
+        // A new folder has none yet.
+        let _ = folder.sentinel.set(sentinel);
+        Ok(folder)
     }
 
     /// A folder that another daemon serves: it is away until that one lets go of it.
@@ -65,19 +79,41 @@ impl Folder {
 
     fn at(root: PathBuf, config: &FolderConfig, ground: Result<Ground, Trace>) -> Self {
         let FolderConfig { name, leave_originals, on_taken, .. } = config.clone();
-        Self { name, root, leave_originals, on_taken, alike: Alike::default(), ground: Mutex::new(ground) }
+        Self {
+            name,
+            root,
+            leave_originals,
+            on_taken,
+            alike: Alike::default(),
+            ground: Mutex::new(ground),
+            sentinel: OnceLock::new(),
+        }
     }
 
     fn ground(&self) -> MutexGuard<'_, Result<Ground, Trace>> {
         self.ground.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Asks whether it answers, before a look that nobody may wait for.
+    pub(crate) fn answers(&self) -> Answer {
+        self.sentinel.get().map_or(Answer::Yes, Sentinel::answers)
+    }
+
+    /// It has not answered for a long time, in words. Looks at nothing.
+    pub(crate) fn silence(&self) -> Option<String> {
+        let is_silent = self.sentinel.get().is_some_and(Sentinel::is_silent);
+        is_silent.then(|| FolderError::Silent { root: self.root.clone() }.to_string())
+    }
+
     /// Is the folder still the one that was opened? A path that leads elsewhere by now (renamed and made anew, a mount that came or went)
-    /// must not be believed: neither what is there, nor what is missing.
+    /// must not be believed: neither what is there, nor what is missing. One that does not answer is waited for no longer than a few seconds.
     ///
     /// # Errors
     /// A line for people.
     pub(crate) fn check(&self) -> Result<(), String> {
+        if self.sentinel.get().is_some_and(|sentinel| sentinel.answers_at_last() != Answer::Yes) {
+            return Err(FolderError::Silent { root: self.root.clone() }.to_string());
+        }
         match &*self.ground() {
             Ok(ground) => ground.check(&self.root),
             Err(trace) => Err(self.away(trace)),
@@ -98,7 +134,7 @@ impl Folder {
 
     /// Is the mount gone that the folder lay on? In words.
     pub(crate) fn missing(&self) -> Option<String> {
-        self.trace().missing(&self.root)
+        self.silence().or_else(|| self.trace().missing(&self.root))
     }
 
     /// Takes the folder again if it was away and is back: it has its own mark, whatever its device is by now.
@@ -106,6 +142,7 @@ impl Folder {
     /// # Errors
     /// A line for people: why it is not served.
     pub(crate) fn regain(&self) -> Result<(), String> {
+        self.silence().map_or(Ok(()), Err)?;
         let mut ground = self.ground();
         let trace = match &*ground {
             Ok(here) => {
@@ -171,6 +208,14 @@ impl Folder {
         let first = parts.next()?.as_os_str().to_string_lossy().into_owned();
         parts.next().is_some().then_some(first)
     }
+}
+
+/// Made once as an absolute path: the process may be asked to look again after hours.
+fn absolute(config: &FolderConfig) -> Result<PathBuf, FolderError> {
+    std::path::absolute(&config.path).map_err(|source| {
+        let path = config.path.clone();
+        FolderError::Io { path, action: "cannot be found", source }
+    })
 }
 
 /// Is a folder a hot one?

@@ -38,6 +38,8 @@ pub(crate) enum FolderError {
     Within { root: PathBuf, outer: PathBuf },
     #[error("{} and {} are one folder, or one lies in the other: results would be taken for drops", a.display(), b.display())]
     Mixed { a: PathBuf, b: PathBuf },
+    #[error("{}: does not answer: its server is gone or its disk hangs; see to its mount (`umount -f` gives it up)", root.display())]
+    Silent { root: PathBuf },
     #[error("{}: {action}: {source}", path.display())]
     Io { path: PathBuf, action: &'static str, source: io::Error },
 }
@@ -48,7 +50,7 @@ impl FolderError {
         match self {
             Self::Owned { .. } => true,
             Self::Io { source, .. } => ErrorClass::of(source) == ErrorClass::Shortage,
-            Self::Within { .. } | Self::Mixed { .. } => false,
+            Self::Within { .. } | Self::Mixed { .. } | Self::Silent { .. } => false,
         }
     }
 

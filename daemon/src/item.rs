@@ -7,6 +7,7 @@ use suture_core::{ErrorClass, Limits, Profile, Report};
 
 use crate::draft::Draft;
 use crate::exit::Exit;
+use crate::fence::Fence;
 use crate::fsx::{self, Identity};
 use crate::naming::Naming;
 use crate::protocol::Request;
@@ -129,7 +130,8 @@ impl Item {
         let Request { limits, shown_input: shown, .. } = &self.request;
         let mut running = match worker.take() {
             Some(worker) => worker,
-            None => Worker::spawn(limits.memory_bytes, limits.threads, many)
+            // A draft has no name but the number of a handle of this process, which a fenced worker could not open.
+            None => Worker::spawn(limits.memory_bytes, limits.threads, many, &Fence::default())
                 .map_err(|e| Failure::new(ErrorClass::Environment, format!("cannot start a worker process: {e}")))?,
         };
         let ended = running.run(&self.request, None, &|| stop.asked(), on_progress);

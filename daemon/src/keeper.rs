@@ -9,19 +9,20 @@ use std::time::{Duration, Instant, SystemTime};
 
 use crossbeam::channel::{Receiver, RecvTimeoutError};
 use suture_store::job::{Area, Kind};
-use suture_store::{Control, Job, JobId, Query, StoreError, crash_point};
+use suture_store::{Control, Job, JobId, Query, StoreError, Submission, crash_point};
 
 use crate::attempt::{Context, Event};
 use crate::deliver;
 use crate::event::Happening;
 use crate::folder::Folder;
 use crate::fsx;
-use crate::handed::Handed;
+use crate::handed::{Handed, Untaken};
 use crate::hints::{Watching, watcher};
 use crate::orders::Orders;
 use crate::past::each_job;
 use crate::publish_error::PublishError;
 use crate::scan::Reconciler;
+use crate::sentinel::Answer;
 use crate::settings::Reload;
 use crate::settle::Rest;
 use crate::signals::Stop;
@@ -164,7 +165,11 @@ impl Keeper {
             self.context.pulse.reloaded();
         }
         for handed in std::mem::take(&mut self.handed) {
-            if let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == handed.folder) {
+            let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == handed.folder) else { continue };
+            if kept.folder.answers() != Answer::Yes {
+                let why = kept.folder.silence().unwrap_or_else(|| "the folder is slow to answer; try again".into());
+                handed.answer(Err(Untaken::Unavailable(why)));
+            } else {
                 take(&self.context, &mut kept.reconciler, &mut kept.orders, handed)?;
             }
         }
@@ -356,31 +361,36 @@ impl Kept {
             };
         }
         let found = here.and_then(|()| self.reconciler.scan(now).map_err(|error| self.unreadable(&error)));
-        let away = match &found {
-            Ok(_) => self.reconciler.left_out(),
-            Err(error) => vec![error.clone()],
+        let gone = match found {
+            Ok(gone) => gone,
+            Err(error) => return self.is_away(context, now, error),
         };
+        self.looked_at(context, now, self.reconciler.left_out());
+        if std::mem::take(&mut self.unavailable) {
+            let (name, root) = (&self.folder.name, &self.folder.root);
+            context.bus.tell(&Happening::FolderBack { name, root });
+        }
+        self.gone.extend(gone);
+        self.watch(context);
+        self.told.tell(context, &self.folder.name, None)
+    }
+
+    /// The folder is out of reach for this reason.
+    fn is_away(&mut self, context: &Context, now: Instant, why: String) -> Result<(), StoreError> {
+        self.watched = None;
+        if !std::mem::replace(&mut self.unavailable, true) {
+            let (name, root) = (&self.folder.name, &self.folder.root);
+            context.bus.tell(&Happening::FolderAway { name, root, why: &why });
+        }
+        self.told.tell(context, &self.folder.name, Some(&why))?;
+        self.looked_at(context, now, vec![why]);
+        Ok(())
+    }
+
+    /// It was looked at from `now` on; `away` of it is out of reach.
+    fn looked_at(&self, context: &Context, now: Instant, away: Vec<String>) {
         context.away.lock().unwrap_or_else(PoisonError::into_inner).insert(self.folder.name.clone(), away);
         context.pulse.scanned(&self.folder.name, context.world.steady().duration_since(now));
-        match found {
-            Ok(gone) => {
-                if std::mem::take(&mut self.unavailable) {
-                    let (name, root) = (&self.folder.name, &self.folder.root);
-                    context.bus.tell(&Happening::FolderBack { name, root });
-                }
-                self.gone.extend(gone);
-                self.watch(context);
-            }
-            Err(error) => {
-                self.watched = None;
-                if !std::mem::replace(&mut self.unavailable, true) {
-                    let (name, root) = (&self.folder.name, &self.folder.root);
-                    context.bus.tell(&Happening::FolderAway { name, root, why: &error });
-                }
-                return self.told.tell(context, &self.folder.name, Some(&error));
-            }
-        }
-        self.told.tell(context, &self.folder.name, None)
     }
 
     fn unreadable(&self, error: &io::Error) -> String {
@@ -395,6 +405,17 @@ impl Kept {
 
     /// Scans and looks, as far as either is due.
     fn turn(&mut self, context: &Context, now: Instant) -> Result<(), StoreError> {
+        match self.folder.answers() {
+            Answer::Yes => {}
+            // The other folders wait for no slow one.
+            Answer::NotYet => return Ok(()),
+            Answer::Silent => {
+                // Looked at in full once it answers.
+                self.dirty = true;
+                let why = self.folder.silence().unwrap_or_default();
+                return self.is_away(context, now, why);
+            }
+        }
         let since = self.scanned.map(|then| now.duration_since(then));
         let rescan = if self.unavailable { self.rescan.min(LOOK_FOR) } else { self.rescan };
         let due = since.is_none_or(|since| since >= rescan || (self.dirty && since >= self.scan_at_most_every()));
@@ -418,9 +439,11 @@ impl Kept {
         }
         self.looked = now;
         let ready = self.reconciler.look(now);
-        if ready.is_empty() {
-            return Ok(());
-        }
+        if ready.is_empty() { Ok(()) } else { self.submit(context, now, ready) }
+    }
+
+    /// Has jobs made of files that came to rest.
+    fn submit(&mut self, context: &Context, now: Instant, ready: Vec<(PathBuf, Submission)>) -> Result<(), StoreError> {
         let (paths, found): (Vec<_>, Vec<_>) = ready.into_iter().unzip();
         match context.store.submit(&found) {
             Ok(submitted) => {

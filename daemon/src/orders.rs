@@ -41,7 +41,8 @@ pub(crate) struct Orders {
 
 impl Orders {
     pub(crate) fn new(folder: Arc<Folder>, settings: Arc<Settings>) -> Self {
-        let mark = read_mark(&mark_of(&folder));
+        // Of a folder that is away, every order is summed up once more, and says the same.
+        let mark = folder.check().map_or(Seq(0), |()| read_mark(&mark_of(&folder)));
         let (members, pending) = (BTreeMap::new(), BTreeMap::new());
         Self { folder, settings, members, pending, stuck: BTreeSet::new(), mark, seen: mark }
     }

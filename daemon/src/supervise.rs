@@ -20,6 +20,7 @@ use suture_core::{ErrorClass, Report};
 
 use crate::create;
 use crate::exit::WORKER_CUT;
+use crate::fence::Fence;
 use crate::fsx::{self, Identity};
 use crate::protocol::{Message, Request};
 
@@ -164,16 +165,17 @@ pub(crate) struct Worker {
 
 impl Worker {
     /// Starts a worker that may hold `memory` bytes by its own count, with headroom for what it does not count. One for `many` small
-    /// files keeps the memory of one for the next.
+    /// files keeps the memory of one for the next. Beyond the fence it reaches nothing.
     ///
     /// # Errors
     /// When the process cannot be started.
-    pub(crate) fn spawn(memory: u64, threads: usize, many: bool) -> io::Result<Self> {
+    pub(crate) fn spawn(memory: u64, threads: usize, many: bool, fence: &Fence) -> io::Result<Self> {
         let data = room_of(memory, threads);
         // The running binary itself, even when a newer one has taken its name meanwhile.
         let mut command = Command::new("/proc/self/exe");
         command.arg0("suture").arg("worker").env("RUST_BACKTRACE", "0");
         command.args(["--parent", &std::process::id().to_string(), "--data", &data.to_string()]);
+        command.args(fence.arguments());
         if std::env::var_os(TUNABLES).is_none() {
             command.env(TUNABLES, if many { KEEP_MEMORY } else { GIVE_BACK });
         }

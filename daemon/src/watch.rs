@@ -81,6 +81,7 @@ pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew:
             return match &error {
                 FolderError::Owned { .. } => Exit::Owned,
                 FolderError::Within { .. } | FolderError::Mixed { .. } => Exit::Refused,
+                FolderError::Silent { .. } => Exit::TryAgain,
                 FolderError::Io { source, .. } => Exit::of_start(source),
             };
         }
@@ -118,13 +119,20 @@ fn open_folders(config: &Config) -> Result<Vec<Arc<Folder>>, FolderError> {
     let (mut folders, mut away, known) = (Vec::new(), None, read_traces(&config.state)?);
     let mut served = 0;
     for folder in &config.folders {
-        let opened = match Folder::open(folder, known.get(&folder.name)) {
+        let opened = match Folder::open_guarded(folder, known.get(&folder.name)) {
             Err(error) if error.passes() => {
                 away.get_or_insert(error);
                 Folder::of_other(folder)?
             }
-            opened => opened.inspect(|_| served += 1)?,
+            opened => opened?,
         };
+        // The job store cannot be opened there.
+        let holds_store = || config.state.starts_with(&opened.root);
+        match opened.silence() {
+            None => served += 1,
+            Some(_) if holds_store() => return Err(FolderError::Silent { root: opened.root }),
+            Some(_) => _ = away.get_or_insert(FolderError::Silent { root: opened.root.clone() }),
+        }
         folders.push(Arc::new(opened));
     }
     match away {

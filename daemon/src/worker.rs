@@ -26,7 +26,7 @@ const FIRST_AFTER: Duration = Duration::from_millis(100);
 pub(crate) fn serve(args: &WorkerArgs) -> io::Result<()> {
     orphan::listen()?;
     confine::bind(args)?;
-    confine::confine();
+    confine::confine(args, &[]);
     name_want_of_memory();
     let mut files = confine::Files::inherited();
     for line in io::stdin().lock().lines() {
@@ -210,7 +210,7 @@ mod orphan {
 }
 
 /// Faults on demand, for the tests of the supervisor and of the daemon: a build with the feature `crash-points` looks for
-/// `!abort!`, `!segv!`, `!hang!`, `!kill-parent!`, `!memory!`, `!panic!` or `!slow!` in the input's name. (The daemon looks for
+/// `!abort!`, `!segv!`, `!hang!`, `!reach!`, `!kill-parent!`, `!memory!`, `!panic!` or `!slow!` in the input's name. (The daemon looks for
 /// `!kill-daemon!`: it dies of the answer.)
 #[cfg(feature = "crash-points")]
 mod hook {
@@ -246,9 +246,24 @@ mod hook {
                 hog.push(vec![1; 16 << 20]);
             }
         }
+        if name.contains("!reach!") {
+            // Another customer's file, beside the folder of the work, and a program.
+            let inbox = request.input.ancestors().nth(4).map(|root| root.join("in").join("other.txt"));
+            let is_open = std::fs::read(inbox.unwrap_or_default()).is_ok() || std::fs::read("/proc/self/exe").is_ok();
+            if is_open {
+                std::process::abort();
+            }
+        }
         if name.contains("!hang!") {
             // Something that the worker started is to go with it.
-            let _ = std::process::Command::new("sleep").arg("10").status();
+            // SAFETY: the child only sleeps, and ends without running anything of this process.
+            if unsafe { libc::fork() } == 0 {
+                // SAFETY: as above.
+                unsafe {
+                    libc::sleep(10);
+                    libc::_exit(0);
+                }
+            }
             std::thread::sleep(Duration::from_secs(3600));
         }
         if name.contains("!slow!") {

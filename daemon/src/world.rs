@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use jiff::Zoned;
 use suture_store::{Clock, SystemClock, Time};
 
+use crate::fence::Fence;
 use crate::fsx;
 use crate::protocol::Request;
 use crate::supervise::{Ended, Worker};
@@ -49,11 +50,11 @@ pub(crate) trait World: Send + Sync {
     /// The same clock where the machine is.
     fn local(&self) -> Zoned;
 
-    /// Starts a worker.
+    /// Starts a worker that reaches no other folders.
     ///
     /// # Errors
     /// When the machine has none to give.
-    fn hire(&self, share: Share) -> io::Result<Box<dyn Hand>>;
+    fn hire(&self, share: Share, fence: &Fence) -> io::Result<Box<dyn Hand>>;
 
     /// Bytes that may still be written to a folder's file system, as [`fsx::free_space`].
     fn room(&self, folder: &Path, reserve: u64) -> u64;
@@ -79,8 +80,8 @@ impl World for Machine {
         Zoned::now()
     }
 
-    fn hire(&self, share: Share) -> io::Result<Box<dyn Hand>> {
-        Ok(Box::new(Worker::spawn(share.memory, share.threads, share.many)?))
+    fn hire(&self, share: Share, fence: &Fence) -> io::Result<Box<dyn Hand>> {
+        Ok(Box::new(Worker::spawn(share.memory, share.threads, share.many, fence)?))
     }
 
     fn room(&self, folder: &Path, reserve: u64) -> u64 {
@@ -125,8 +126,8 @@ mod tests {
             "fsx::needs_polling",
         ];
         // Command lines and workers, which no daemon decides by; locks of other processes; the room of an archive; a daemon's beginning and end;
-        // the thread that looks whether the others hang; and how long things took, and the web, which are told of and decide nothing.
-        const APART: [&str; 19] = [
+        // the threads that look whether others hang; and how long things took, and the web, which are told of and decide nothing.
+        const APART: [&str; 20] = [
             "bar.rs",
             "event_bus.rs",
             "event_store.rs",
@@ -136,6 +137,7 @@ mod tests {
             "reach.rs",
             "retention/archive.rs",
             "retention/command.rs",
+            "sentinel.rs",
             "supervise.rs",
             "uploads.rs",
             "watch.rs",

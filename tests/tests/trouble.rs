@@ -25,6 +25,8 @@ mod processes;
 mod refused;
 #[path = "trouble/room.rs"]
 mod room;
+#[path = "trouble/silent.rs"]
+mod silent;
 #[path = "trouble/stage.rs"]
 mod stage;
 #[path = "trouble/strangers.rs"]

@@ -1,13 +1,15 @@
 //! Room on the disks: a result needs some, and a half-full night is better than a broken one. A folder whose disk is nearly full waits; the others go on.
 
 use std::collections::BTreeSet;
-use std::sync::PoisonError;
+use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use suture_store::StoreError;
 
 use super::Keeper;
+use crate::folder::Folder;
 use crate::schedule::Hold;
+use crate::sentinel::Answer;
 
 /// Disks are looked at this often.
 const EVERY: Duration = Duration::from_secs(5);
@@ -21,7 +23,13 @@ impl Keeper {
         self.disk_looked = Some(now);
         let context = &self.context;
         context.store.check()?;
-        let folders: Vec<_> = self.folders.iter().map(|kept| &kept.folder).filter(|folder| context.room(folder) == 0).collect();
+        let is_full = |folder: &&Arc<Folder>| match folder.answers() {
+            Answer::Yes => context.room(folder) == 0,
+            // As it was.
+            Answer::NotYet => context.full.lock().unwrap_or_else(PoisonError::into_inner).contains(&folder.name),
+            Answer::Silent => false,
+        };
+        let folders: Vec<_> = self.folders.iter().map(|kept| &kept.folder).filter(is_full).collect();
         let all_are_full = folders.len() == self.folders.len();
         context.schedule.hold(Hold::Disk, folders.first().filter(|_| all_are_full).map(|folder| folder.nearly_full()));
         let full: BTreeSet<String> = folders.iter().map(|folder| folder.name.clone()).collect();

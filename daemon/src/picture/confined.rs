@@ -26,7 +26,7 @@ pub(crate) fn run(args: &DrawArgs) -> Exit {
         complain(&error);
         return Exit::Cut;
     }
-    confine::confine();
+    confine::confine(&args.worker, &args.inputs);
     match made(args) {
         Ok(()) => Exit::Good,
         Err((exit, line)) => {

@@ -10,6 +10,7 @@ use jiff::{Timestamp, Zoned};
 use suture_store::{Boot, Clock, Time};
 
 use super::stage;
+use crate::fence::Fence;
 use crate::protocol::Request;
 use crate::supervise::Ended;
 use crate::world::{Hand, Share, Telling, World};
@@ -152,7 +153,7 @@ impl World for Sky {
         Timestamp::from_millisecond(state.wall as i64).unwrap().to_zoned(state.zone.clone())
     }
 
-    fn hire(&self, share: Share) -> io::Result<Box<dyn Hand>> {
+    fn hire(&self, share: Share, _: &Fence) -> io::Result<Box<dyn Hand>> {
         let mut state = self.state();
         if state.strikes > 0 {
             state.strikes -= 1;

@@ -178,6 +178,7 @@ impl Task {
         // A text file becomes records in a file without a name, which is to lie where there is room.
         command.arg0("suture").arg("draw").env("RUST_BACKTRACE", "0").env("TMPDIR", fsx::folder_of(&self.path));
         command.args(["--parent", &std::process::id().to_string(), "--data", &room_of(MEMORY, THREADS).to_string()]);
+        command.arg("--within").arg(fsx::folder_of(&self.path));
         command.args(["--memory", &MEMORY.to_string(), "--threads", &THREADS.to_string()]);
         if self.what == What::Mesh {
             command.arg("--coarse");

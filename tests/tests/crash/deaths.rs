@@ -39,6 +39,19 @@ fn f03_a_worker_that_is_killed_costs_its_file_nothing() {
     assert_at_rest(&hot, "killed workers");
 }
 
+/// A worker that tries to read a file beside its work, and a program, and aborts if it can.
+#[test]
+fn a_worker_reaches_nothing_but_its_work() {
+    // SAFETY: asked for its version, the call reads no memory (landlock_create_ruleset(2)).
+    let version = unsafe { libc::syscall(libc::SYS_landlock_create_ruleset, std::ptr::null::<u8>(), 0_usize, 1_u32) };
+    let hot = Hot::new(with_crash_points());
+    hot.put("other.txt", b"another customer's");
+    hot.put("part!reach!.stl", &mesh(Case::Holes, 1));
+    let code = hot.watch(&["--once"]).status().unwrap().code();
+    assert_eq!(code, Some(i32::from(version <= 0)), "fences of version {version}");
+    assert_eq!(hot.tree("out").contains_key("part!reach!.stl"), version > 0);
+}
+
 /// A process: its number, its parent's, its group's.
 struct Process {
     pid: u32,

@@ -3,6 +3,7 @@
 use std::ffi::CString;
 use std::fs::File;
 use std::io::Write;
+use std::os::fd::AsRawFd;
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
@@ -20,6 +21,8 @@ pub(crate) fn is_root(scenario: &str) -> bool {
 /// A tmpfs; unmounted when dropped, even while something in it is open.
 pub(crate) struct Mount {
     at: PathBuf,
+    /// Its server, which answers nothing.
+    server: Option<File>,
 }
 
 fn c_string(bytes: &[u8]) -> CString {
@@ -35,7 +38,7 @@ impl Mount {
         // SAFETY: all pointers are to strings that outlive the call.
         let done = unsafe { libc::mount(tmpfs.as_ptr(), path.as_ptr(), tmpfs.as_ptr(), 0, data.as_ptr().cast()) };
         assert_eq!(done, 0, "mount: {}", std::io::Error::last_os_error());
-        Self { at: at.to_owned() }
+        Self { at: at.to_owned(), server: None }
     }
 
     /// Shows a folder at `at`, too, as a mount of its own.
@@ -44,7 +47,18 @@ impl Mount {
         // SAFETY: the pointers are to strings that outlive the call, or null where the call ignores them.
         let done = unsafe { libc::mount(from.as_ptr(), path.as_ptr(), std::ptr::null(), libc::MS_BIND, std::ptr::null()) };
         assert_eq!(done, 0, "mount: {}", std::io::Error::last_os_error());
-        Self { at: at.to_owned() }
+        Self { at: at.to_owned(), server: None }
+    }
+
+    /// A file system of a program that answers nothing, over a folder that is there: every call waits until this is dropped.
+    pub(crate) fn silent(at: &Path) -> Self {
+        let server = File::options().read(true).write(true).open("/dev/fuse").expect("file systems of programs");
+        let data = c_string(format!("fd={},rootmode=40000,user_id=0,group_id=0", server.as_raw_fd()).as_bytes());
+        let (path, fuse) = (c_string(at.as_os_str().as_bytes()), c_string(b"fuse"));
+        // SAFETY: all pointers are to strings that outlive the call.
+        let done = unsafe { libc::mount(fuse.as_ptr(), path.as_ptr(), fuse.as_ptr(), 0, data.as_ptr().cast()) };
+        assert_eq!(done, 0, "mount: {}", std::io::Error::last_os_error());
+        Self { at: at.to_owned(), server: Some(server) }
     }
 
     /// From now on nothing can be written to it.
@@ -59,6 +73,8 @@ impl Mount {
 
 impl Drop for Mount {
     fn drop(&mut self) {
+        // Whoever waits for it is told that it is gone.
+        self.server = None;
         let path = c_string(self.at.as_os_str().as_bytes());
         // SAFETY: the pointer is to a string that outlives the call.
         unsafe { libc::umount2(path.as_ptr(), libc::MNT_DETACH) };

@@ -24,6 +24,7 @@ mod event_metrics;
 mod event_store;
 mod exit;
 mod folder;
+mod force;
 mod fsx;
 mod glance;
 mod ground;

@@ -53,6 +53,7 @@ mod publish_error;
 mod pulse;
 mod reach;
 mod rebuild;
+mod rebuilt;
 mod receipt;
 mod remove;
 mod retention;

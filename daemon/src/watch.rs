@@ -37,7 +37,7 @@ use crate::settings::Settings;
 use crate::signals::{Hangup, Stop};
 use crate::web::Web;
 use crate::world::{Machine, World};
-use crate::{deliver, standstill, uploads, watchdog};
+use crate::{deliver, rebuilt, standstill, uploads, watchdog};
 
 mod notes;
 mod threads;
@@ -223,6 +223,7 @@ impl Daemon {
         };
         let bus = Arc::new(Bus::new(self.web.is_some()));
         tell_opening(&bus, self.store.opening());
+        rebuilt::tell(&self.settings.now().state, &bus);
         let store = Arc::clone(&self.store) as Arc<dyn JobStore>;
         let world: Arc<dyn World> = Arc::new(Machine);
         let context = Arc::new(Context {

@@ -1,36 +1,28 @@
 //! `suture completions` and `suture man`: both made of the command line itself, so that they say what it takes.
 
-use std::io::{self, Write};
-
 use clap::{Command, CommandFactory};
 
 use crate::cli::Cli;
 use crate::cli::service::{CompletionsArgs, ManArgs};
 use crate::exit::Exit;
-use crate::say::complain;
+use crate::say::{complain, print};
 
 /// Words for a shell that completes commands.
 pub(crate) fn completions(args: &CompletionsArgs) -> Exit {
     let mut text = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), "suture", &mut text);
-    print(&text)
+    print(&text, Exit::Good)
 }
 
 /// A page of the manual.
 pub(crate) fn man(args: &ManArgs) -> Exit {
     match page(&args.command) {
-        Ok(text) => print(&text),
+        Ok(text) => print(&text, Exit::Good),
         Err(line) => {
             complain(&line);
             Exit::Refused
         }
     }
-}
-
-fn print(text: &[u8]) -> Exit {
-    // A reader that has gone away has seen enough.
-    let _ = io::stdout().write_all(text);
-    Exit::Good
 }
 
 fn page(words: &[String]) -> Result<Vec<u8>, String> {

@@ -75,6 +75,7 @@ fn what_cannot_be_printed_is_not_passed_over() {
         &["status", "--json", "--dir", "hot"],
         &["config", "print"],
         &["completions", "bash"],
+        &["check", "--json", "hot/out/part.stl"],
     ] {
         let full = File::options().write(true).open("/dev/full").unwrap();
         let ran = place.command().args(words).stdout(full).output().unwrap();

@@ -23,6 +23,7 @@ use crate::create;
 use crate::event::Happening;
 use crate::event_bus::Bus;
 use crate::folder::Folder;
+use crate::force::is_forced;
 use crate::fsx::Identity;
 use crate::handed::Handed;
 use crate::past::Unread;
@@ -384,7 +385,8 @@ impl Slot {
         }
     }
 
-    /// Has a copy of an earlier result instead, where there is one for this file; after a person's retry, it is worked on in any case.
+    /// Has a copy of an earlier result instead, where there is one for this file; after a person's retry, or where it is forced, it is worked on in
+    /// any case.
     fn copied(
         &self,
         config: &Config,
@@ -394,7 +396,7 @@ impl Slot {
         claimed: &Claimed,
         profile: &Profile,
     ) -> Option<Worked> {
-        if !config.reuse || job.retried.is_some() {
+        if !config.reuse || job.retried.is_some() || is_forced(&job.source.path) {
             return None;
         }
         let (context, work) = (&self.context, folder.work(claim.token));

@@ -3,13 +3,14 @@
 //! One file shows its stage, its rate and the time left; several show how many are done. The engine tells how far a stage is, not
 //! how long the stages after it will take: for that, their usual shares of the time are known here.
 
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::say::{complain, plain};
+use crate::exit::Exit;
+use crate::say::{complain, plain, print};
 use crate::units::{show_count, show_seconds};
 
 /// Work that is done sooner shows no bar.
@@ -195,15 +196,16 @@ impl Bar {
         (share, text)
     }
 
-    /// Prints to standard output, and a line to standard error; the bar stands aside, since both may be the same terminal.
-    pub(crate) fn say(&self, text: &str, complaint: Option<&str>) {
+    /// Prints to standard output, and a line to standard error; the bar stands aside, since both may be the same terminal. Returns `exit`, or what
+    /// it means that nothing can be printed.
+    pub(crate) fn say(&self, text: &str, complaint: Option<&str>, exit: Exit) -> Exit {
         self.bar.suspend(|| {
-            // A reader that has gone away has seen enough.
-            let _ = std::io::stdout().write_all(text.as_bytes());
+            let exit = print(text.as_bytes(), exit);
             if let Some(line) = complaint {
                 complain(&line);
             }
-        });
+            exit
+        })
     }
 
     /// Takes the bar off the screen.

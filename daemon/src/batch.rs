@@ -300,8 +300,7 @@ impl<'a> Teller<'a> {
             }
             self.done += usize::from(result.is_ok());
             let (text, complaint, exit) = tell(input, &result, self.order);
-            self.bar.say(&text, complaint.as_deref());
-            self.worst = self.worst.max(exit);
+            self.worst = self.worst.max(self.bar.say(&text, complaint.as_deref(), exit));
         }
     }
 

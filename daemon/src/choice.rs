@@ -1,5 +1,5 @@
 //! Which settings count for a file: those of its folder in `in/`, or of the nearest one above it that has some, else those of the profile
-//! that its first sub-folder or the hot folder names.
+//! that its first sub-folder or the hot folder names. A sub-folder that forces work does not count ([`crate::force`]).
 
 use std::io;
 use std::path::PathBuf;
@@ -9,17 +9,20 @@ use suture_store::{Job, Priority, RelPath};
 
 use crate::config::Config;
 use crate::folder::Folder;
-use crate::fsx;
 use crate::profiles;
+use crate::{force, fsx};
 
 /// The nearest file of settings for a file of `in/`. One that cannot be looked at is no reason to take another.
 fn nearest(folder: &Folder, path: &RelPath) -> io::Result<Option<PathBuf>> {
     let inbox = folder.inbox();
-    let path = inbox.join(path.to_path());
-    for above in path.ancestors().skip(1).take_while(|above| above.starts_with(&inbox)) {
-        let own = above.join(profiles::FOLDER_FILE);
-        if fsx::is_file(&own)? {
-            return Ok(Some(own));
+    let path = path.to_path();
+    for above in path.ancestors().skip(1) {
+        let plain = force::without(above);
+        for folder in std::iter::once(above).chain((plain != above).then_some(&*plain)) {
+            let own = inbox.join(folder).join(profiles::FOLDER_FILE);
+            if fsx::is_file(&own)? {
+                return Ok(Some(own));
+            }
         }
     }
     Ok(None)
@@ -78,6 +81,9 @@ mod tests {
         assert_eq!(asked(&config, "rush/a.stl", "rush"), number(2), "its own settings take the place of the profile's");
         write("rush/now", "priority = 9\n");
         assert_eq!(asked(&config, "rush/now/deep/a.stl", "rush"), number(9), "the nearest");
+        assert_eq!(asked(&config, "!force/rush/now/a.stl", "rush"), number(9), "without the word, it would lie there");
+        write("!force/rush/now", "priority = 7\n");
+        assert_eq!(asked(&config, "!force/rush/now/a.stl", "rush"), number(7), "it lies here all the same");
         write("rush/now", "priority = 99\n");
         assert_eq!(asked(&config, "rush/now/a.stl", "rush"), number(2), "a mistake says nothing");
     }

@@ -48,6 +48,7 @@ pub(crate) enum Command {
     /// Repair files: write the repaired meshes, and say what was wrong and what was done
     Repair(RepairArgs),
     /// Diagnose files and write nothing
+    #[command(visible_alias = "check")]
     Inspect(InspectArgs),
     /// Serve a hot folder: repair whatever is dropped into DIR/in
     #[command(long_about = WATCH_HELP)]

@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 use suture_store::{Control, Decision, Ending, Job, JobId, JobStore, Kind, Priority, Query, StoreError, Verdict};
 
 use crate::attempt::Context;
+use crate::force::folder_for;
 use crate::fsx::Identity;
 use crate::glance::{Glance, standing};
 use crate::left::{area, result_path};
@@ -173,9 +174,10 @@ fn unless_done(job: &Job) -> Result<(), Refusal> {
     }
     let Some(output) = &publication.output else { return Ok(()) };
     let line = format!(
-        "job {id} is done, and its result is out/{output}; to have the file repaired anew, take that result out of out/, and drop a copy of {}/{original} \
-         (if it is not there, of the one in the archive) into in/ under a name of its own",
-        area(place)
+        "job {id} is done, and its result is out/{output}; to have the file repaired anew, drop a copy of {}/{original} (if it is not there, of the \
+         one in the archive) into in/{}/",
+        area(place),
+        folder_for(&job.source.path)
     );
     Err(Refusal { line, exit_code: 2 })
 }
@@ -438,9 +440,7 @@ mod tests {
         store.advance(&claim, Step::Placed).unwrap();
         let done = store.advance(&claim, Step::Finished).unwrap();
         let refused = answer(&store, &JobsWish::Retry(done.id)).unwrap_err();
-        for words in
-            ["job 1 is done, and its result is out/part.stl", "take that result out of out/", "drop a copy of done/part.stl"]
-        {
+        for words in ["job 1 is done, and its result is out/part.stl", "drop a copy of done/part.stl", "into in/!force/"] {
             assert!(refused.line.contains(words), "{}", refused.line);
         }
         assert_eq!((refused.exit_code, store.get(done.id).unwrap()), (2, Some(done)));

@@ -49,18 +49,21 @@ pub(crate) enum Recovery<'a> {
     Receipts { folder: &'a std::path::Path, jobs: usize },
     /// A daemon ended in the midst of so many jobs.
     Unfinished { jobs: usize },
+    /// `suture jobs rebuild` has put a new one in its place since the last daemon; the damaged one is here.
+    Rebuilt { aside: &'a std::path::Path },
 }
 
 impl Recovery<'_> {
-    const KINDS: [&'static str; 4] = ["torn_snapshot", "damage", "receipts", "unfinished"];
+    const KINDS: [&'static str; 5] = ["torn_snapshot", "damage", "receipts", "unfinished", "rebuilt"];
 
     fn kind(self) -> &'static str {
-        let [torn_snapshot, damage, receipts, unfinished] = Self::KINDS;
+        let [torn_snapshot, damage, receipts, unfinished, rebuilt] = Self::KINDS;
         match self {
             Self::TornSnapshot => torn_snapshot,
             Self::Damage => damage,
             Self::Receipts { .. } => receipts,
             Self::Unfinished { .. } => unfinished,
+            Self::Rebuilt { .. } => rebuilt,
         }
     }
 
@@ -72,6 +75,9 @@ impl Recovery<'_> {
                 tracing::info!(%folder, jobs, "The job store is a new one; what earlier ones knew was read from receipts.");
             }
             Self::Unfinished { jobs } => tracing::info!(jobs, "The daemon ended without finishing; its jobs go on."),
+            Self::Rebuilt { aside } => {
+                tracing::info!(aside = %aside.display(), "The job store was rebuilt since the last daemon; the damaged one is kept.");
+            }
         }
     }
 }

@@ -137,7 +137,7 @@ impl Folder {
         self.silence().or_else(|| self.trace().missing(&self.root))
     }
 
-    /// Takes the folder again if it was away and is back: it has its own mark, whatever its device is by now.
+    /// Takes the folder again if it was away and is back: it has its own mark, whatever its device is by now. One whose mount is gone is let go of.
     ///
     /// # Errors
     /// A line for people: why it is not served.
@@ -147,10 +147,18 @@ impl Folder {
         let trace = match &*ground {
             Ok(here) => {
                 let why = here.check(&self.root);
-                if why.is_ok() || !here.is_left(&self.root) || !here.trace().leads_here(&self.root).unwrap_or(false) {
+                if why.is_ok() || !here.is_left(&self.root) {
                     return why;
                 }
-                here.trace().clone()
+                let trace = here.trace().clone();
+                if !trace.leads_here(&self.root).unwrap_or(false) {
+                    if trace.is_unmounted(&self.root) {
+                        // With its lock goes what keeps the file system from being unmounted in truth.
+                        *ground = Err(trace);
+                    }
+                    return why;
+                }
+                trace
             }
             Err(trace) => trace.clone(),
         };

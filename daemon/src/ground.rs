@@ -104,6 +104,11 @@ impl Trace {
         self.gone(root).unwrap_or_else(|error| Some(format!("{}: the hot folder cannot be looked at: {error}", root.display())))
     }
 
+    /// Is it certain that the mount is gone?
+    pub(crate) fn is_unmounted(&self, root: &Path) -> bool {
+        self.gone(root).is_ok_and(|gone| gone.is_some())
+    }
+
     fn gone(&self, root: &Path) -> io::Result<Option<String>> {
         const DO: &str = "mount it, or remove the file `folders` beside the job store if this is another folder";
         if self.leads_here(root)? {

@@ -1,6 +1,5 @@
 //! `suture jobs`: what became of every dropped file, and what an operator may want of it.
 
-use std::io::Write;
 use std::path::Path;
 use std::time::Duration;
 
@@ -16,7 +15,7 @@ use crate::glance::Work;
 use crate::left::{area, report_path};
 use crate::reach::{self, Failure};
 use crate::rebuild::{Rebuilt, rebuild};
-use crate::say::{complain, plain};
+use crate::say::{complain, plain, print};
 use crate::schedule::Standing;
 use crate::shown::hint;
 use crate::units::show_when;
@@ -73,9 +72,7 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
         text.extend(untold.iter().map(|who| format!("not told yet: {}\n", plain(who))));
         text.extend(away.iter().map(|why| format!("out of reach: {}\n", plain(why))));
     }
-    // A reader that has gone away has seen enough.
-    let _ = std::io::stdout().write_all(text.as_bytes());
-    Exit::Good
+    print(text.as_bytes(), Exit::Good)
 }
 
 /// How far those of these jobs are that are in work, as far as a daemon says so.
@@ -149,8 +146,7 @@ fn rebuilt(dir: &Path) -> Exit {
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
 fn say(line: &str) -> Exit {
-    let _ = writeln!(std::io::stdout(), "{line}");
-    Exit::Good
+    print(format!("{line}\n").as_bytes(), Exit::Good)
 }
 
 fn fail(failure: &Failure) -> Exit {

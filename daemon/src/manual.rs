@@ -1,25 +1,23 @@
 //! `suture completions` and `suture man`: both made of the command line itself, so that they say what it takes.
 
-use std::io::{self, Write};
-
-use clap::CommandFactory;
+use clap::{Command, CommandFactory};
 
 use crate::cli::Cli;
 use crate::cli::service::{CompletionsArgs, ManArgs};
 use crate::exit::Exit;
-use crate::say::complain;
+use crate::say::{complain, print};
 
 /// Words for a shell that completes commands.
 pub(crate) fn completions(args: &CompletionsArgs) -> Exit {
     let mut text = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), "suture", &mut text);
-    print(&text)
+    print(&text, Exit::Good)
 }
 
 /// A page of the manual.
 pub(crate) fn man(args: &ManArgs) -> Exit {
     match page(&args.command) {
-        Ok(text) => print(&text),
+        Ok(text) => print(&text, Exit::Good),
         Err(line) => {
             complain(&line);
             Exit::Refused
@@ -27,24 +25,32 @@ pub(crate) fn man(args: &ManArgs) -> Exit {
     }
 }
 
-fn print(text: &[u8]) -> Exit {
-    // A reader that has gone away has seen enough.
-    let _ = io::stdout().write_all(text);
-    Exit::Good
-}
-
 fn page(words: &[String]) -> Result<Vec<u8>, String> {
     let mut command = Cli::command();
     command.build();
     let (mut name, mut found) = (String::from("suture"), command);
     for word in words {
-        let next = found.get_subcommands().find(|below| below.get_name() == word && !below.is_hide_set()).cloned();
+        let next = found.find_subcommand(word).filter(|below| !below.is_hide_set()).cloned();
         found = next.ok_or_else(|| format!("there is no command `{name} {word}`; `suture --help` names all"))?;
-        name += &format!("-{word}");
+        name += &format!("-{}", found.get_name());
     }
     let mut text = Vec::new();
-    clap_mangen::Man::new(found).render(&mut text).map_err(|error| format!("the page cannot be made: {error}"))?;
+    clap_mangen::Man::new(with_aliases(found).mut_subcommands(with_aliases))
+        .render(&mut text)
+        .map_err(|error| format!("the page cannot be made: {error}"))?;
     Ok(text)
+}
+
+/// Names a command's other names where it is told of, since pages leave them out.
+fn with_aliases(command: Command) -> Command {
+    let aliases: Vec<_> = command.get_visible_aliases().map(|alias| format!("`{alias}`")).collect();
+    match command.get_about() {
+        Some(about) if !aliases.is_empty() => {
+            let about = format!("{about} (also called {})", aliases.join(", "));
+            command.about(about)
+        }
+        _ => command,
+    }
 }
 
 #[cfg(test)]
@@ -56,7 +62,7 @@ mod tests {
 
     /// Names of commands that people see, as words behind `suture`.
     fn commands() -> Vec<Vec<String>> {
-        fn below(command: &clap::Command, before: &[String], all: &mut Vec<Vec<String>>) {
+        fn below(command: &Command, before: &[String], all: &mut Vec<Vec<String>>) {
             for next in command.get_subcommands().filter(|next| !next.is_hide_set()) {
                 let words = [before, &[next.get_name().to_owned()]].concat();
                 all.push(words.clone());
@@ -80,6 +86,21 @@ mod tests {
         }
         assert!(page(&["worker".into()]).is_err(), "it is nobody's");
         assert!(page(&["jobs".into(), "bogus".into()]).unwrap_err().contains("`suture-jobs bogus`"));
+    }
+
+    /// `check` is the name that people look for.
+    #[test]
+    fn another_name_of_a_command_leads_to_its_page() {
+        assert_eq!(page(&["check".into()]), page(&["inspect".into()]));
+        for words in [vec![], vec!["inspect".into()]] {
+            assert!(String::from_utf8(page(&words).unwrap()).unwrap().contains("(also called `check`)"), "{words:?}");
+        }
+        for shell in Shell::value_variants() {
+            let mut text = Vec::new();
+            clap_complete::generate(*shell, &mut Cli::command(), "suture", &mut text);
+            let text = String::from_utf8(text).unwrap();
+            assert!(text.split(|c: char| !c.is_alphanumeric()).any(|word| word == "check"), "{shell}");
+        }
     }
 
     #[test]

@@ -15,7 +15,7 @@ use suture_store::{Job, JobId, JobStore, RelPath, Seq, StoreError};
 
 use crate::folder::Folder;
 use crate::settings::Settings;
-use crate::{create, fsx};
+use crate::{create, force, fsx};
 use summary::Summary;
 
 pub(crate) mod summary;
@@ -49,7 +49,7 @@ impl Orders {
 
     /// The order of a file: the first sub-folder, or the second if the first one's name is a profile's.
     fn order_of(&self, path: &RelPath) -> Option<RelPath> {
-        let path = path.to_path();
+        let path = force::without(&path.to_path());
         let mut parts = path.parent()?.components();
         let first = Path::new(parts.next()?.as_os_str());
         let config = self.settings.now();

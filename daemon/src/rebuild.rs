@@ -14,6 +14,7 @@ use crate::ground::read_traces;
 use crate::past::{Which, fill};
 use crate::publish_error::PublishError;
 use crate::reach::{Failure, must_be_hot, state_of, unseen, watched};
+use crate::rebuilt;
 
 /// What came of it.
 pub(crate) struct Rebuilt {
@@ -40,6 +41,7 @@ pub(crate) fn rebuild(dir: &Path) -> Result<Rebuilt, Failure> {
         let line = format!("{}: the job store is sound; nothing was changed", state.display());
         return Err(Failure { line, exit: Exit::Refused });
     };
+    rebuilt::note(&state, &aside);
     let store = SledStore::open(&state)?;
     let jobs = fill(&store, &folder, Which::AtRest).map_err(|error| match error {
         PublishError::Store(error) => error.into(),

@@ -2,7 +2,9 @@
 //! through here, and a test searches the sources for other ways.
 
 use std::fmt::Display;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
+
+use crate::exit::Exit;
 
 /// One line in which every control character is spelled out, and nothing is done.
 pub(crate) fn plain(text: &str) -> String {
@@ -18,6 +20,18 @@ pub(crate) fn plain(text: &str) -> String {
 /// Says on standard error what stands in the way. A standard error that is closed is no reason to fail.
 pub(crate) fn complain(line: &dyn Display) {
     let _ = writeln!(std::io::stderr(), "suture: {}", plain(&line.to_string()));
+}
+
+/// Prints what was asked for, whole, and ends with `exit`. A reader that has gone away has seen enough, but a full disk is no reader.
+pub(crate) fn print(text: &[u8], exit: Exit) -> Exit {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            complain(&format_args!("standard output cannot be written: {error}; try again"));
+            Exit::TryAgain
+        }
+        _ => exit,
+    }
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ use suture_store::{JobId, RelPath, Source, Submission};
 use crate::choice;
 use crate::claim::Original;
 use crate::folder::{Folder, NameKind, is_hot, name_kind};
+use crate::force;
 use crate::fsx::{self, Identity};
 use crate::handed::{Handed, Untaken};
 use crate::profiles;
@@ -254,7 +255,7 @@ impl Reconciler {
     fn profile_name(&mut self, path: &RelPath) -> String {
         let config = self.settings.now();
         let default = config.folder_profile(&self.folder.name).to_owned();
-        let Some(name) = Folder::profile_folder(path) else { return default };
+        let Some(name) = Folder::profile_folder(&force::plain(path)) else { return default };
         if config.profile(&name).is_some() {
             return name;
         }

@@ -1,6 +1,5 @@
 //! `suture status`: how a hot folder's daemon stands, on one screen; [`top`] shows it anew each second.
 
-use std::io::Write;
 use std::path::Path;
 
 use suture_store::{Kind, Time};
@@ -10,7 +9,7 @@ use crate::exit::Exit;
 use crate::glance::{Glance, Work};
 use crate::jobs::line;
 use crate::reach;
-use crate::say::{complain, plain};
+use crate::say::{complain, plain, print};
 use crate::units::{show_size, show_when};
 
 pub(crate) mod top;
@@ -28,9 +27,7 @@ pub(crate) fn run(args: &StatusArgs) -> Exit {
         true => serde_json::to_string(&glance).unwrap_or_default() + "\n",
         false => screen(&args.dir, &glance),
     };
-    // A reader that has gone away has seen enough.
-    let _ = std::io::stdout().write_all(text.as_bytes());
-    if args.ready && !glance.ready { Exit::NotGood } else { Exit::Good }
+    print(text.as_bytes(), if args.ready && !glance.ready { Exit::NotGood } else { Exit::Good })
 }
 
 /// All of it, in lines.

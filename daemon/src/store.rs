@@ -1,6 +1,6 @@
 //! `suture store`: is every record of a job store as it must be, and all of its jobs as lines of JSON.
 
-use std::io::{ErrorKind, Write};
+use std::io::ErrorKind;
 use std::path::Path;
 
 use suture_store::{SledStore, StoreError, Verified};
@@ -8,7 +8,7 @@ use suture_store::{SledStore, StoreError, Verified};
 use crate::cli::service::{StoreArgs, StoreCommand};
 use crate::exit::Exit;
 use crate::reach::{Failure, must_be_hot, state_of, unseen, watched};
-use crate::say::{complain, plain};
+use crate::say::{complain, plain, print};
 use crate::units::show_count;
 use crate::{create, fsx, jobs};
 
@@ -32,15 +32,16 @@ fn verify(dir: &Path) -> Result<Exit, Failure> {
     let state = state_of(dir).map_err(|error| unseen(dir, &error))?;
     let place = plain(&state.display().to_string());
     if !fsx::is_folder(&state).map_err(|error| unseen(&state, &error))? {
-        return print(&format!("{place}: there is no job store yet; the next `suture watch` makes one\n"));
+        let none = format!("{place}: there is no job store yet; the next `suture watch` makes one\n");
+        return Ok(print(none.as_bytes(), Exit::Good));
     }
     watched()?;
     let found = SledStore::verify(&state).map_err(|error| match error {
         StoreError::Locked { pid, .. } => owned(dir, pid),
         error => error.into(),
     })?;
-    print(&said(&place, &found))?;
-    Ok(if found.wrong.is_empty() { Exit::Good } else { Exit::NotGood })
+    let exit = if found.wrong.is_empty() { Exit::Good } else { Exit::NotGood };
+    Ok(print(said(&place, &found).as_bytes(), exit))
 }
 
 fn owned(dir: &Path, pid: Option<u32>) -> Failure {
@@ -73,22 +74,11 @@ fn said(place: &str, found: &Verified) -> String {
 
 fn export(dir: &Path, output: Option<&Path>, force: bool) -> Result<Exit, Failure> {
     let text = jobs::all_as_json(dir)?;
-    let Some(path) = output else { return print(&text) };
+    let Some(path) = output else { return Ok(print(text.as_bytes(), Exit::Good)) };
     create::place(path, text.as_bytes(), force).map(|()| Exit::Good).map_err(|error| {
         let advice = if error.kind() == ErrorKind::AlreadyExists { " (--force replaces it)" } else { "" };
         Failure { line: format!("{}: cannot be written: {error}{advice}", path.display()), exit: Exit::Refused }
     })
-}
-
-/// Prints it whole; a reader that has gone away has seen enough, but a full disk is no reader.
-fn print(text: &str) -> Result<Exit, Failure> {
-    let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-            Err(Failure { line: format!("standard output cannot be written: {error}; try again"), exit: Exit::TryAgain })
-        }
-        _ => Ok(Exit::Good),
-    }
 }
 
 #[cfg(test)]

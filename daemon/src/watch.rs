@@ -36,8 +36,9 @@ use crate::schedule::{Hold, Schedule, Turn};
 use crate::settings::Settings;
 use crate::signals::{Hangup, Stop};
 use crate::web::Web;
+use crate::window::RunWindow;
 use crate::world::{Machine, World};
-use crate::{deliver, standstill, uploads, watchdog};
+use crate::{deliver, rebuilt, standstill, uploads, watchdog};
 
 mod notes;
 mod threads;
@@ -106,12 +107,21 @@ pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew:
             Err(error) => return store_failed(&error),
         }
     };
+    warn_of_hours(&config);
     note_state(&config, &folders);
     note_folders(&config, &folders);
     let settings = Arc::new(settings);
     let manager = Manager::of_environment();
     let daemon = Daemon { settings, folders, store, web, manager, once, lives, not_good, stop: stop.clone(), may_begin_anew };
     daemon.run()
+}
+
+/// Hours are those of a time zone, which a bare container does not have, or under a name that it does not know.
+fn warn_of_hours(config: &Config) {
+    if config.run_window != RunWindow::default() && Machine.local().time_zone().is_unknown() {
+        let run_window = config.run_window.to_string();
+        tracing::warn!(run_window, "The time zone cannot be told, by TZ or by the system: the hours of work are those of UTC.");
+    }
 }
 
 /// Takes the folders that are to be served. One that another daemon serves is away, as long as there is one that is not.
@@ -231,6 +241,7 @@ impl Daemon {
         };
         let bus = Arc::new(Bus::new(self.web.is_some()));
         tell_opening(&bus, self.store.opening());
+        rebuilt::tell(&self.settings.now().state, &bus);
         let store = Arc::clone(&self.store) as Arc<dyn JobStore>;
         let world: Arc<dyn World> = Arc::new(Machine);
         let context = Arc::new(Context {

@@ -1,12 +1,11 @@
 //! `suture config`: is a configuration file right, and what does it come to?
 
-use std::io::Write;
 use std::path::Path;
 
 use super::{Config, read, show};
 use crate::cli::ConfigCommand;
 use crate::exit::Exit;
-use crate::say::{complain, plain};
+use crate::say::{complain, plain, print};
 
 /// The folder that a configuration is shown for where no file is named.
 const EXAMPLE: &str = "prints";
@@ -19,11 +18,7 @@ pub(crate) fn run(command: &ConfigCommand) -> Exit {
         ConfigCommand::Print { file: None } => show::text(&Config::for_folder(Path::new(EXAMPLE))),
     };
     match text {
-        Ok(text) => {
-            // A reader that has gone away has seen enough.
-            let _ = std::io::stdout().write_all(text.as_bytes());
-            Exit::Good
-        }
+        Ok(text) => print(text.as_bytes(), Exit::Good),
         Err(line) => {
             complain(&line);
             Exit::Refused

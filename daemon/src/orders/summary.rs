@@ -12,7 +12,7 @@ use suture_store::{Job, RelPath, State, Time};
 use crate::folder::{Folder, make_parent};
 use crate::names::VERSIONS;
 use crate::receipt::REPORT;
-use crate::{create, fsx};
+use crate::{create, force, fsx};
 
 /// Its name, in the order's folder of `out/`. No result is called so: these are named after meshes.
 pub(crate) const SUMMARY: &str = "order.report.json";
@@ -95,7 +95,7 @@ impl Summary {
         let withdrawn =
             |job: &Job| matches!(&job.state, State::Cancelled { why } if *why != suture_store::job::Withdrawal::Operator);
         for job in jobs.iter().filter(|job| !withdrawn(job)) {
-            let latest = files.entry(&job.source.path).or_insert(job);
+            let latest = files.entry(force::plain(&job.source.path)).or_insert(job);
             if job.id > latest.id {
                 *latest = job;
             }
@@ -117,8 +117,9 @@ impl Summary {
 
     /// Takes over what an earlier summary says of files whose jobs the store has forgotten since.
     fn remember(&mut self, earlier: &Self, is_known: &dyn Fn(u64) -> bool) {
-        let known: Vec<_> = self.files.iter().map(|line| line.source.clone()).collect();
-        self.files.extend(earlier.files.iter().filter(|line| !is_known(line.job) && !known.contains(&line.source)).cloned());
+        let known: Vec<_> = self.files.iter().map(|line| force::plain(&line.source)).collect();
+        let is_new = |line: &&Line| !is_known(line.job) && !known.contains(&force::plain(&line.source));
+        self.files.extend(earlier.files.iter().filter(is_new).cloned());
         self.files.sort_by(|a, b| a.source.cmp(&b.source));
         self.count();
     }

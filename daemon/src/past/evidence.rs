@@ -8,6 +8,7 @@ use suture_store::{Attempt, JobId, Past, Publication, Reached, RelPath, Source, 
 
 use crate::claim::CLAIMED;
 use crate::folder::Folder;
+use crate::force;
 use crate::fsx::{self, Identity};
 use crate::names::best_of;
 use crate::place::{ASIDE, stage};
@@ -62,7 +63,7 @@ impl Evidence<'_> {
         let claimed = self.folder.work(token).join(CLAIMED);
         let Some(found) = named.map_or_else(|| self.content_at(&claimed), |found| Ok(Some(found)))? else { return Ok(None) };
         // Where it stays, its name only stands for those of report and receipt.
-        let Some(original) = self.told.original.clone().or_else(|| self.told.stays.then(|| source.clone())) else {
+        let Some(original) = self.told.original.clone().or_else(|| self.told.stays.then(|| force::plain(source))) else {
             return Ok(None);
         };
         let publication = Publication { original: Some(original), stays: self.told.stays, ..self.publication(ctime_ns) };

@@ -9,6 +9,7 @@ use suture_store::{Ending, Job, RelPath};
 use super::{Conclusion, Desk};
 use crate::alike::Alike;
 use crate::config::taken::OnTaken;
+use crate::force::{is_forced, plain};
 use crate::fsx;
 use crate::names::{BEST, COMPANION, Names, best_of, companions, first};
 use crate::place::{Item, Placed};
@@ -22,17 +23,18 @@ impl Desk<'_> {
         let here = |path: &RelPath| now_area == ending.area() && now_path == path;
         let original_free = |path: &RelPath| Ok(here(path) || is_free(&area, &path.to_path())?);
         let out = self.folder.out();
+        let dropped = plain(&job.source.path);
         if ending.is_for_want_of_a_name() && ending.is_good() {
             // Only a report and a receipt, named after the original, and not beside what is another's.
             let free = |path: &RelPath| Ok(original_free(path)? && is_free_for_result(&self.folder.alike, &out, path)?);
-            let original = first(&job.source.path, COMPANION, free)?;
+            let original = first(&dropped, COMPANION, free)?;
             return Ok(Names { output: None, original });
         }
         if ending.is_good() {
-            let result = first(&job.source.path, COMPANION, |path| is_free_for_result(&self.folder.alike, &out, path))?;
-            return Ok(Names { output: Some(result), original: first(&job.source.path, 0, original_free)? });
+            let result = first(&dropped, COMPANION, |path| is_free_for_result(&self.folder.alike, &out, path))?;
+            return Ok(Names { output: Some(result), original: first(&dropped, 0, original_free)? });
         }
-        let path = if now_area == ending.area() { now_path } else { &job.source.path };
+        let path = if now_area == ending.area() { now_path } else { &dropped };
         let original = first(path, COMPANION + BEST.len(), |path| {
             Ok(original_free(path)? && is_alone(&area, path)? && is_free(&area, &best_of(path).to_path())?)
         })?;
@@ -54,9 +56,11 @@ impl Desk<'_> {
         put().map_err(io_at(item.to))
     }
 
-    /// The end of a job whose result, report or receipt would have a name that is taken; `None` where it is free, or the next one will do.
+    /// The end of a job whose result, report or receipt would have a name that is taken; `None` where it is free, or the next one will do, as it
+    /// does for work that is forced.
     pub(crate) fn barred(&self, job: &Job) -> Result<Option<Conclusion>, PublishError> {
         let ending = match self.folder.on_taken {
+            _ if is_forced(&job.source.path) => return Ok(None),
             OnTaken::Version => return Ok(None),
             OnTaken::Fail => Ending::NameTaken,
             OnTaken::Skip => Ending::Skipped,

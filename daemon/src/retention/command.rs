@@ -1,7 +1,6 @@
 //! `suture retention`: what would go now, and why. Changes nothing.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::Path;
 
 use suture_store::{Clock, Job, SystemClock, Time};
@@ -15,7 +14,7 @@ use crate::config::{Config, FolderConfig, read};
 use crate::exit::Exit;
 use crate::fsx;
 use crate::remove::ours;
-use crate::say::{complain, plain};
+use crate::say::{complain, plain, print};
 use crate::units::show_size;
 
 /// Gets all jobs of the store of a hot folder, or a line for people and what it comes to.
@@ -42,9 +41,7 @@ pub(crate) fn run(file: &Path, jobs: Jobs) -> Exit {
     if text.is_empty() {
         text = "nothing would go\n".into();
     }
-    // A reader that has gone away has seen enough.
-    let _ = std::io::stdout().write_all(text.as_bytes());
-    Exit::Good
+    print(text.as_bytes(), Exit::Good)
 }
 
 fn fail(line: &str, exit: Exit) -> Exit {

@@ -102,7 +102,7 @@ fn metrics_and_the_log_agree() {
     assert!(!text.contains(".stl"), "no file's name");
 }
 
-/// The store comes back from half a snapshot, from its loss, and from a kill in the midst of work; a start after a good end counts nothing.
+/// The store comes back from half a snapshot, from its loss, from a kill in the midst of work, and by hand; a start after a good end counts nothing.
 #[test]
 fn f04_recoveries_of_the_store_are_counted() {
     let place = Place::new();
@@ -112,21 +112,21 @@ fn f04_recoveries_of_the_store_are_counted() {
             let name = format!("suture_store_recoveries_total{{kind=\"{kind}\"}} ");
             text.lines().find_map(|line| line.strip_prefix(&name)?.parse().ok()).unwrap_or_else(|| panic!("{kind}: {text}"))
         };
-        ["torn_snapshot", "damage", "receipts", "unfinished"].map(value)
+        ["torn_snapshot", "damage", "receipts", "unfinished", "rebuilt"].map(value)
     };
     let serve = || Served::start(&place, &LISTENING, "log");
     let daemon = serve();
     place.put("hot/in/part.stl", &holes(1));
     wait_until("it is done", || !daemon.lines("Done.").is_empty());
-    assert_eq!(recoveries(&daemon), [0, 0, 0, 0]);
+    assert_eq!(recoveries(&daemon), [0; 5]);
     daemon.signal(Signal::TERM);
     assert!(daemon.ended().success());
-    assert_eq!(recoveries(&serve()), [0, 0, 0, 0], "a good end");
+    assert_eq!(recoveries(&serve()), [0; 5], "a good end");
     place.put("hot/.suture/state/db/snap.0000000000000001.generating", b"half");
-    assert_eq!(recoveries(&serve()), [1, 0, 0, 0]);
+    assert_eq!(recoveries(&serve()), [1, 0, 0, 0, 0]);
     std::fs::remove_dir_all(place.at("hot/.suture/state")).unwrap();
     let daemon = serve();
-    assert_eq!(recoveries(&daemon), [0, 0, 1, 0]);
+    assert_eq!(recoveries(&daemon), [0, 0, 1, 0, 0]);
     // Killed while a worker has it, which is stopped over it.
     std::fs::rename(place.generate(Case::Mixed, 300_000, 1).0, place.at("hot/in/large.stl")).unwrap();
     let at_work = || worker_of(daemon.pid(), "/.suture/work/");
@@ -134,7 +134,12 @@ fn f04_recoveries_of_the_store_are_counted() {
     let worker = at_work().expect("it was stopped before it had an answer");
     drop(daemon);
     kill_process(worker, Signal::CONT).unwrap();
-    assert_eq!(recoveries(&serve()), [0, 0, 0, 1]);
+    assert_eq!(recoveries(&serve()), [0, 0, 0, 1, 0]);
+    // A person begins it anew: the next daemon counts that, and none after it.
+    std::fs::remove_dir_all(place.at("hot/.suture/state/db")).unwrap();
+    place.suture(["jobs", "rebuild", "--dir", "hot"]).expect(0);
+    assert_eq!(recoveries(&serve())[4], 1);
+    assert_eq!(recoveries(&serve())[4], 0);
 }
 
 #[test]

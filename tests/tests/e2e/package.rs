@@ -96,7 +96,8 @@ fn the_unit_lets_the_daemon_write_where_its_configuration_says_and_nowhere_else(
     assert!(!values(&unit, "WatchdogSec").is_empty() && !values(&unit, "MemoryMax").is_empty());
 }
 
-/// What each container is told is taken by the program, as far as it can be tried without one.
+/// What each container is told is taken by the program, as far as it can be tried without one. (That it can be built and run was tried by hand: see
+/// the README.)
 #[test]
 fn the_configuration_of_containers_is_taken() {
     let place = Place::new();
@@ -106,15 +107,35 @@ fn the_configuration_of_containers_is_taken() {
     let last = container.rsplit("\nFROM ").next().unwrap();
     let user = last.lines().find_map(|line| line.strip_prefix("USER ")).unwrap();
     assert!(!user.starts_with('0') && !user.starts_with("root"), "{user}");
-    for line in last.lines().filter(|line| line.starts_with("CMD [") || line.starts_with("HEALTHCHECK")) {
+    let words_of = |line: &str| -> Vec<String> {
         let words = line.split_once('[').unwrap().1.trim_end_matches(']');
-        let mut words: Vec<String> = serde_json::from_str(&format!("[{words}]")).unwrap();
-        words.retain(|word| word != "suture");
+        serde_json::from_str(&format!("[{words}]")).unwrap()
+    };
+    let program = words_of(last.lines().find(|line| line.starts_with("ENTRYPOINT [")).unwrap());
+    for line in last.lines().filter(|line| line.starts_with("CMD [") || line.starts_with("HEALTHCHECK")) {
+        let mut words = words_of(line);
+        words.retain(|word| *word != program[0]);
         let helped = place.suture(words.iter().map(String::as_str).chain(["--help"]));
         assert_eq!(helped.code(), 0, "{words:?}: {}", helped.stderr());
     }
+    // The image is empty but for what is put there: nothing runs in it that needs a shell, a library, or a folder that is not there.
+    let (build, [program]) = (container.strip_suffix(last).unwrap(), &program[..]) else { panic!("{program:?}") };
+    assert!(last.starts_with("scratch\n") && !last.contains("\nRUN "), "{last}");
+    for there in
+        [&format!(" /image{program} "), "+crt-static", "/usr/share/zoneinfo /image/usr/share/", " --mode=1777 /image/tmp "]
+    {
+        assert!(build.contains(there), "{there}");
+    }
+    // What builds it is what the sources are written for, and its context has what is copied.
+    let toolchain = std::fs::read_to_string(packaging().join("../rust-toolchain.toml")).unwrap();
+    let channel = toolchain.lines().find_map(|line| line.strip_prefix("channel = \"")?.strip_suffix('"')).unwrap();
+    assert!(build.contains(&format!("/rust:{channel}-slim-")), "{channel}");
+    let left_out = std::fs::read_to_string(packaging().join("../.dockerignore")).unwrap();
+    for name in build.split_whitespace().filter(|word| word.starts_with("LICENSE") || word.ends_with(".md")) {
+        assert!(packaging().join("..").join(name).exists() && !left_out.contains(name), "{name}");
+    }
     let compose = std::fs::read_to_string(packaging().join("compose.yaml")).unwrap();
-    for words in ["read_only: true", "cap_drop: [ALL]", "no-new-privileges:true", "127.0.0.1:7878:7878"] {
+    for words in ["read_only: true", "- /tmp", "TZ: ", "cap_drop: [ALL]", "no-new-privileges:true", "127.0.0.1:7878:7878"] {
         assert!(compose.contains(words), "{words}");
     }
 }

@@ -123,6 +123,58 @@ fn reused_id(place: &Place, name: &str) -> Value {
     jobs.find(|job| job["source"]["path"] == name).unwrap()["id"].clone()
 }
 
+/// `!force` is a word, not a place: all but the work is as it would be without it.
+#[test]
+fn what_is_forced_is_worked_on_anew_and_goes_where_it_would_go_anyway() {
+    let place = second_drop(Case::Holes, "!force/first.stl");
+    place.put("hot/in/scan/order/!force/a.stl", &mesh(Case::Holes, 1));
+    place.put("hot/in/!force/scan/order/b.stl", &mesh(Case::Holes, 1));
+    once(&place, 0);
+    for name in ["!force/first.stl", "scan/order/!force/a.stl", "!force/scan/order/b.stl"] {
+        assert_eq!(reused(&place, name), Value::Null, "{name}");
+    }
+    assert_eq!(place.read("hot/out/first~2.stl"), place.read("hot/out/first.stl"));
+    let receipt = json(&place, "hot/out/first~2.stl.suture.json");
+    assert_eq!((&receipt["source"], &receipt["profile"]), (&"!force/first.stl".into(), &"default".into()));
+    for name in ["a", "b"] {
+        assert_eq!(json(&place, &format!("hot/out/scan/order/{name}.stl.suture.json"))["profile"], "scan");
+    }
+    let order = json(&place, "hot/out/scan/order/order.report.json");
+    assert_eq!((&order["order"], &order["counts"]["done"]), (&"scan/order".into(), &2.into()), "{order}");
+    let names = ["out", "done", "in"].map(|part| place.names(&format!("hot/{part}")));
+    assert!(names.iter().flatten().all(|name| !name.contains("!force")), "{names:?}");
+
+    // Its result is one like any other.
+    place.put("hot/in/later.stl", &mesh(Case::Holes, 1));
+    once(&place, 0);
+    assert_eq!(reused(&place, "later.stl"), reused_id(&place, "!force/first.stl"));
+    // In an order, it takes the place of the file of that name.
+    place.put("hot/in/scan/!force/order/a.stl", &mesh(Case::Holes, 1));
+    once(&place, 0);
+    let order = json(&place, "hot/out/scan/order/order.report.json");
+    let mut results: Vec<_> = order["files"].as_array().unwrap().iter().filter_map(|file| file["result"].as_str()).collect();
+    results.sort_unstable();
+    assert_eq!(results, ["out/scan/order/a~2.stl", "out/scan/order/b.stl"], "{order}");
+}
+
+/// Where originals stay, a forced one is done once, also when the state is lost.
+#[test]
+fn what_is_forced_and_stays_is_worked_on_once() {
+    let place = Place::new();
+    place.put("suture.toml", b"settle = \"30ms\"\n[[folders]]\npath = \"hot\"\nleave_originals = true\n");
+    let once = || place.suture(["watch", "--once", "--config", "suture.toml"]).expect(0);
+    for name in ["a.stl", "!force/a.stl"] {
+        place.put(&format!("hot/in/{name}"), &mesh(Case::Holes, 1));
+        once();
+    }
+    let before = place.names("hot/out");
+    assert_eq!(before.iter().filter(|name| name.ends_with(".stl")).collect::<Vec<_>>(), ["a.stl", "a~2.stl"]);
+    once();
+    std::fs::remove_dir_all(place.at("hot/.suture/state")).unwrap();
+    once();
+    assert_eq!(place.names("hot/out"), before);
+}
+
 /// The same content after a failure is tried again, and so is what an operator wants retried.
 #[test]
 fn a_failure_is_never_reused() {

@@ -129,8 +129,15 @@ fn outside_of_the_hours_of_work_files_wait() {
         place.put("hot/in/part.stl", &holes(1));
         let text = format!("run_window = \"{window}\"\n{more}\nsettle = \"30ms\"\n[[folders]]\npath = \"hot\"\n");
         place.put("suture.toml", text.as_bytes());
-        let status = place.command().env("TZ", "UTC").args(["watch", "--once", "--config", "suture.toml"]).status().unwrap();
-        (status.code(), is_there(&place, "hot/out/part.stl"))
+        let ran = |zone: &str| {
+            let ran = place.command().env("TZ", zone).args(["watch", "--once", "--config", "suture.toml"]).output().unwrap();
+            (ran.status.code(), String::from_utf8_lossy(&ran.stderr).contains("The time zone cannot be told"))
+        };
+        let (code, warned) = ran("UTC");
+        assert!(!warned, "{window}");
+        let ended = (code, is_there(&place, "hot/out/part.stl"));
+        assert!(code == Some(2) || ran("Europe/Nowhere").1, "hours of another zone than was meant are told of: {window}");
+        ended
     };
     assert_eq!(once(&closed, ""), (Some(1), false));
     assert_eq!(once(&closed, "workers_outside = 1"), (Some(0), true));

@@ -43,6 +43,19 @@ fn f23_a_second_result_has_the_next_name_unless_the_folder_says_otherwise() {
     }
 }
 
+/// Whoever wants a file worked on anew wants its result.
+#[test]
+fn forced_work_has_the_next_name_whatever_the_folder_says() {
+    for on_taken in ["fail", "skip"] {
+        let place = taken(&format!("on_taken = \"{on_taken}\""), "part.stl");
+        place.put("hot/in/!force/part.stl", &holes(1));
+        std::fs::remove_file(place.at("hot/in/part.stl")).unwrap();
+        once(&place, 0);
+        assert_eq!((place.read("hot/out/part.stl"), only_job(&place)["kind"].as_str()), (b"theirs".to_vec(), Some("done")));
+        assert_eq!(read(&place, "hot/out/part~2.stl.suture.json")["output"], "part~2.stl", "{on_taken}");
+    }
+}
+
 /// Nothing is repaired and nothing replaced; the name free again, a retry goes through.
 #[test]
 fn f23_a_taken_name_is_a_persons_matter_where_the_folder_says_so() {

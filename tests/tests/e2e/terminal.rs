@@ -62,3 +62,28 @@ fn short_work_shows_nothing() {
     let (seen, took) = on_a_terminal(&place, &["repair", "part.stl", "-o", "out.stl"]);
     assert!(seen.is_empty() || took > Duration::from_secs(1), "{seen:?}");
 }
+
+/// What was asked for is printed whole, or that it is not is said; a reader that has seen enough is no failure.
+#[test]
+fn what_cannot_be_printed_is_not_passed_over() {
+    let place = Place::new();
+    place.put("hot/in/part.stl", &mesh(Case::Holes, 1));
+    place.suture(["watch", "hot", "--once", "--settle", "30ms"]).expect(0);
+    for words in [
+        &["jobs", "list", "--json", "--dir", "hot"][..],
+        &["store", "export", "--dir", "hot"],
+        &["status", "--json", "--dir", "hot"],
+        &["config", "print"],
+        &["completions", "bash"],
+        &["check", "--json", "hot/out/part.stl"],
+    ] {
+        let full = File::options().write(true).open("/dev/full").unwrap();
+        let ran = place.command().args(words).stdout(full).output().unwrap();
+        let said = String::from_utf8_lossy(&ran.stderr).into_owned();
+        assert!(ran.status.code() == Some(75) && said.contains("standard output cannot be written"), "{words:?}: {said}");
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let ran = place.command().args(words).stdout(writer).output().unwrap();
+        assert!(ran.status.success() && ran.stderr.is_empty(), "{words:?}: {}", String::from_utf8_lossy(&ran.stderr));
+    }
+}

@@ -125,16 +125,17 @@ fn a_retry_of_what_is_done_is_refused_and_says_what_to_do() {
     let client = Client::of(&daemon);
     place.put("hot/in/order/part.stl", &holes(1));
     wait_until("it is done", || client.get("/v1/jobs/1").json()["state"] == "done");
-    let words = ["is done, and its result is out/order/part.stl", "drop a copy of done/order/part.stl"];
+    let words = ["is done, and its result is out/order/part.stl", "drop a copy of done/order/part.stl", "into in/order/!force/"];
     let refused = client.send("POST", "/v1/jobs/1/retry", &[], b"").expect(409).json()["detail"].to_string();
     let said = place.suture(["jobs", "retry", "1", "--dir", "hot"]).expect(2).stderr();
     assert!(words.iter().all(|words| refused.contains(words) && said.contains(words)) && said.lines().count() == 1, "{said}");
     // Whoever does what it says has it repaired anew, not copied.
-    std::fs::rename(place.at("hot/out/order/part.stl"), place.at("earlier.stl")).unwrap();
-    std::fs::copy(place.at("hot/done/order/part.stl"), place.at("hot/in/order/anew.stl")).unwrap();
+    std::fs::create_dir_all(place.at("hot/in/order/!force")).unwrap();
+    std::fs::copy(place.at("hot/done/order/part.stl"), place.at("hot/in/order/!force/part.stl")).unwrap();
     wait_until("it is repaired anew", || client.get("/v1/jobs/2").json()["state"] == "done");
     let anew = client.get("/v1/jobs/2").json();
-    assert!(anew.get("reused").is_none() && place.read("hot/out/order/anew.stl") == place.read("earlier.stl"), "{anew}");
+    let [earlier, now] = ["part", "part~2"].map(|name| place.read(&format!("hot/out/order/{name}.stl")));
+    assert!(anew.get("reused").is_none() && now == earlier, "{anew}");
 }
 
 #[test]

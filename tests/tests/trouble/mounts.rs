@@ -111,6 +111,12 @@ fn kill_while_crossing(seed: u64) -> u64 {
     kills
 }
 
+/// Locks of hot folders that a process holds.
+fn locks_of(pid: u32) -> usize {
+    let open = std::fs::read_dir(format!("/proc/{pid}/fd")).unwrap().flatten();
+    open.filter_map(|entry| std::fs::read_link(entry.path()).ok()).filter(|path| path.ends_with(".suture/owner")).count()
+}
+
 /// The hot folder, with the job store in it, is unmounted while the daemon runs, and mounted again: nothing is made in the bare folder meanwhile.
 #[test]
 fn f25_unmounted_and_mounted_again() {
@@ -125,18 +131,20 @@ fn f25_unmounted_and_mounted_again() {
     stage.put("before.stl", &holes(600, 1));
     let mut daemon = stage.serve();
     stage.wait_done(30, &mut daemon);
+    assert_eq!(locks_of(daemon.pid()), 1, "its lock is what keeps a folder from being unmounted while it is served");
     drop(mount);
     let bare = || std::fs::read_dir(stage.at("hot")).unwrap().flatten().map(|entry| entry.file_name()).collect::<Vec<_>>();
     std::fs::write(stage.hot("in/stranger.stl"), holes(600, 3)).unwrap();
     std::thread::sleep(Duration::from_secs(12));
     daemon.tend();
     assert_eq!((bare(), stage.files("in").len()), (vec!["in".into()], 1), "{}", stage.log());
+    assert_eq!(locks_of(daemon.pid()), 0, "nothing holds the file system that is gone");
     std::fs::remove_file(stage.hot("in/stranger.stl")).unwrap();
     let _mount = Mount::bind(&disk, &stage.at("hot"));
     stage.put("after.stl", &holes(600, 2));
     let took = stage.wait_done(60, &mut daemon);
     stage.assert_done();
-    assert_eq!(daemon.restarts, 0, "{}", stage.log());
+    assert_eq!((daemon.restarts, locks_of(daemon.pid())), (0, 1), "{}", stage.log());
     daemon.stop();
     row(
         "mounts",

@@ -92,7 +92,7 @@ impl<'a> Batch<'a> {
         let bar = &mut self.teller.bar;
         bar.alone(entry.input, entry.size);
         let outcome = self.order.item(entry.input, entry.target.as_deref(), self.order.limits.clone()).and_then(|item| {
-            let report = item.work(&mut self.worker, false, self.stop, &mut |stage, done, total| bar.at(stage, done, total))?;
+            let report = item.work(&mut self.worker, false, self.stop, &mut |course| bar.at(course))?;
             Ok(Finished { report, item })
         });
         bar.done(entry.size);
@@ -216,7 +216,7 @@ impl<'a> Line<'a> {
         let mut limits = self.limits.clone();
         limits.defer_sync = entry.target.is_some() && entry.size <= self.deferred && !limits.list_edit;
         let item = self.order.item(entry.input, entry.target.as_deref(), limits)?;
-        let report = item.work(worker, true, self.stop, &mut |_, _, _| {})?;
+        let report = item.work(worker, true, self.stop, &mut |_| {})?;
         Ok(Finished { report, item })
     }
 }
@@ -249,7 +249,7 @@ struct Teller<'a> {
 impl<'a> Teller<'a> {
     fn new(order: &'a Order<'a>, entries: &[Entry]) -> Self {
         let sizes: Vec<u64> = entries.iter().map(|entry| entry.size).collect();
-        let bar = Bar::new(Scope { files: sizes.len(), bytes: sizes.iter().sum(), writes: order.naming.is_some() });
+        let bar = Bar::new(Scope { files: sizes.len(), bytes: sizes.iter().sum() });
         Self { order, sizes, bar, waiting: BTreeMap::new(), told: 0, done: 0, stopped: false, worst: Exit::Good }
     }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use suture_core::report::{Certificate, RuleOutcome, Task};
 use suture_core::{ErrorClass, Limits, Profile, Report};
 
+use crate::course::Course;
 use crate::draft::Draft;
 use crate::exit::Exit;
 use crate::fsx::{self, Identity};
@@ -124,7 +125,7 @@ impl Item {
         worker: &mut Option<Worker>,
         many: bool,
         stop: &Stop,
-        on_progress: &mut dyn FnMut(&str, u64, u64),
+        on_progress: &mut dyn FnMut(&Course),
     ) -> Result<Box<Report>, Failure> {
         let Request { limits, shown_input: shown, .. } = &self.request;
         let mut running = match worker.take() {

@@ -195,7 +195,8 @@ struct Shown<'a> {
 #[derive(serde::Serialize)]
 struct Far<'a> {
     stage: &'a str,
-    /// Of the stage.
+    doing: &'a str,
+    /// Of the whole.
     percent: u8,
     #[serde(skip_serializing_if = "Option::is_none")]
     seconds_left: Option<u64>,
@@ -203,8 +204,10 @@ struct Far<'a> {
 
 impl<'a> Shown<'a> {
     fn new(job: &'a Job, work: Option<&'a Work>) -> Self {
-        let far =
-            |work: &'a Work| Some(Far { stage: work.stage.as_ref()?, percent: work.percent?, seconds_left: work.seconds_left });
+        let far = |work: &'a Work| {
+            let Work { stage, doing, percent, seconds_left, .. } = work;
+            Some(Far { stage: stage.as_ref()?, doing: doing.as_ref()?, percent: (*percent)?, seconds_left: *seconds_left })
+        };
         Self { kind: job.kind().name(), reused: reused(job), progress: work.and_then(far), job }
     }
 }

@@ -107,6 +107,7 @@ mod tests {
             size: 84_000_000,
             seconds: 7,
             stage: Some("topology".into()),
+            doing: Some("looking for defects".into()),
             percent: Some(45),
             seconds_left: Some(12),
         };
@@ -139,7 +140,7 @@ mod tests {
             "waiting   3 queued\n",
             "in work   1 running\n",
             "9    big.stl",
-            "topology 45 %, for 7 s, about 12 s left\n",
+            "looking for defects, 45 %, for 7 s, about 12 s left\n",
             "ended     5 done\n",
             "nothing new is taken: an operator\n",
             "out of reach: a ",

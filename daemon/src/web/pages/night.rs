@@ -165,7 +165,7 @@ fn in_work(night: &Night, bus: &Bus) -> Markup {
         h2 { "In work" }
         @if night.in_work.is_empty() { p { "Nothing is in work." } } @else {
             div class="wide" { table {
-                thead { tr { th scope="col" { "File" } @if night.of_folders() { th scope="col" { "Folder" } } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Stage, and how far" } } }
+                thead { tr { th scope="col" { "File" } @if night.of_folders() { th scope="col" { "Folder" } } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "At what, and how far" } } }
                 tbody { @for job in &night.in_work { tr {
                     td class="file" { (link(job)) } @if night.of_folders() { td { (plain(&job.source.folder)) } } td { (mark(job)) } td class="time" { (time(job.changed)) } td { (progress(job, bus)) }
                 } } }
@@ -187,11 +187,16 @@ pub(super) fn place_of(context: &Context, name: &str) -> String {
 /// How far a job in work is; a script keeps it current.
 pub(super) fn progress(job: &Job, bus: &Bus) -> Markup {
     let far = bus.progress_of(job.id).filter(|_| job.kind() == Kind::Running);
-    let (stage, percent) = far.map_or((String::new(), 0), |far| (far.stage, far.percent));
+    let (doing, percent) = match far {
+        Some(far) => (far.doing, far.percent),
+        None if job.kind() == Kind::Running => ("begun", 0),
+        // What is held else is done, but for its way into place.
+        None => ("bringing the result into place", 100),
+    };
     html! {
         span data-progress=(job.id) {
             progress max="100" value=(percent) aria-label={ "Progress of job " (job.id) } {} " "
-            span { @if stage.is_empty() { "begun" } @else { (plain(&stage.replace('_', " "))) ", " (percent) " %" } }
+            span { (doing) @if (1..100).contains(&percent) { ", " (percent) " %" } }
         }
     }
 }

@@ -23,6 +23,7 @@ use crate::item::{Failure, Finished, Order, tell};
 use crate::say::complain;
 use crate::signals::Stop;
 use crate::supervise::Worker;
+use crate::units::show_count;
 
 /// Threads that wait for the disk. What waits together is committed together, so that more of them wait no longer.
 const SYNCERS: usize = 16;
@@ -313,7 +314,11 @@ impl<'a> Teller<'a> {
             return self.worst;
         }
         if all > 1 {
-            complain(&format_args!("interrupted; {} of {all} files are done, nothing was written of the others", self.done));
+            complain(&format_args!(
+                "interrupted; {} of {} files are done, nothing was written of the others",
+                show_count(self.done as u64),
+                show_count(all as u64)
+            ));
         }
         Exit::Interrupted
     }

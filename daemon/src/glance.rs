@@ -12,6 +12,7 @@ use crate::course::show_whole;
 use crate::folder::Folder;
 use crate::say::plain;
 use crate::schedule::{Hold, Standing};
+use crate::units::show_count;
 
 /// So many jobs of a sort are named.
 const NAMED: usize = 5;
@@ -189,7 +190,7 @@ pub(crate) fn standing(context: &Context) -> Result<Standing, StoreError> {
     let words = |(name, why): (String, String)| {
         let events = match context.store.backlog(&name)? {
             1 => "one event".to_owned(),
-            more => format!("{more} events"),
+            more => format!("{} events", show_count(more)),
         };
         Ok(format!("`{name}` has not heard of {events}: {why}"))
     };

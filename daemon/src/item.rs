@@ -15,6 +15,7 @@ use crate::rights::Rights;
 use crate::signals::Stop;
 use crate::supervise::{Cause, Ended, Worker};
 use crate::table;
+use crate::units::show_count;
 
 /// Why there is no result for a file.
 #[derive(Debug)]
@@ -254,7 +255,7 @@ fn check(input: &Path, certificate: &Certificate, report: &Report) -> (String, E
     if !contradictions.is_empty() {
         return (format!("{shown}: the certificate does not hold: {}", contradictions.join("; ")), Exit::NotGood);
     }
-    let of = format!("of these {} bytes with BLAKE3 {}", certificate.bytes, certificate.blake3);
+    let of = format!("of these {} bytes with BLAKE3 {}", show_count(certificate.bytes), certificate.blake3);
     if certificate.printable {
         let said = said_of_fidelity(certificate);
         return (format!("{shown}: the certificate holds: printable, {rules} of {rules} rules passed, {of}{said}"), Exit::Good);

@@ -19,7 +19,7 @@ use crate::rebuild::{Rebuilt, rebuild};
 use crate::say::{complain, plain};
 use crate::schedule::Standing;
 use crate::shown::hint;
-use crate::units::show_when;
+use crate::units::{show_count, show_when};
 use crate::{standstill, table};
 
 /// Does what the command line asks.
@@ -138,7 +138,8 @@ fn drained(dir: &Path) -> Exit {
 fn rebuilt(dir: &Path) -> Exit {
     match rebuild(dir) {
         Ok(Rebuilt { aside, jobs }) => say(&format!(
-            "{jobs} jobs came back from receipts; the damaged store is kept in {}. The next `suture watch` takes up what waits in in/",
+            "{} jobs came back from receipts; the damaged store is kept in {}. The next `suture watch` takes up what waits in in/",
+            show_count(jobs as u64),
             plain(&aside.display().to_string())
         )),
         Err(failure) => fail(&failure),
@@ -273,10 +274,11 @@ fn line_of(job: &Job, work: Option<&Work>) -> String {
 fn summary(jobs: &[Job]) -> String {
     let count =
         |kind: Kind, copied: bool| jobs.iter().filter(|job| job.kind() == kind && (!copied || reused(job).is_some())).count();
+    let show = |count: usize| show_count(count as u64);
     let words = |kind: Kind| match (count(kind, false), count(kind, true)) {
         (0, _) => None,
-        (all, 0) => Some(format!("{all} {}", kind.name())),
-        (all, copies) => Some(format!("{all} {} ({copies} reused)", kind.name())),
+        (all, 0) => Some(format!("{} {}", show(all), kind.name())),
+        (all, copies) => Some(format!("{} {} ({} reused)", show(all), kind.name(), show(copies))),
     };
     Kind::ALL.into_iter().filter_map(words).collect::<Vec<_>>().join(", ")
 }

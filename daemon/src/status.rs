@@ -11,7 +11,7 @@ use crate::glance::{Glance, Work};
 use crate::jobs::line;
 use crate::reach;
 use crate::say::{complain, plain};
-use crate::units::{show_size, show_when};
+use crate::units::{show_count, show_size, show_when};
 
 pub(crate) mod top;
 
@@ -45,7 +45,7 @@ fn screen(dir: &Path, glance: &Glance) -> String {
     };
     let counts = |of: fn(Kind) -> bool| {
         let some = glance.jobs.iter().filter(|(kind, count)| of(**kind) && **count > 0);
-        let all: Vec<String> = some.map(|(kind, count)| format!("{count} {kind}")).collect();
+        let all: Vec<String> = some.map(|(kind, count)| format!("{} {kind}", show_count(*count))).collect();
         if all.is_empty() { "none".into() } else { all.join(", ") }
     };
     text += &format!("  waiting   {}\n", counts(|kind| !kind.is_held() && !kind.is_at_rest()));

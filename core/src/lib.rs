@@ -49,6 +49,7 @@ pub use engine::mesh::{Mesh, MeshError, MeshView};
 pub use engine::operations;
 pub use io::read::ends_in_zeros;
 pub use io::{read, record};
+pub use util::words;
 
 use std::path::Path;
 

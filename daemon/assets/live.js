@@ -6,11 +6,11 @@ let waiting = false;
 let asked = false;
 let isBehind = false; // a part was left as it was, since someone stood in it
 
-function show({ job, stage, percent }) {
+function show({ job, doing, percent }) {
   const place = document.querySelector(`[data-progress="${Number(job)}"]`);
   if (!place) return;
   place.querySelector("progress").value = percent;
-  place.querySelector("span").textContent = `${stage.replaceAll("_", " ")}, ${percent} %`;
+  place.querySelector("span").textContent = percent > 0 ? `${doing}, ${percent} %` : doing;
 }
 
 async function renew() {

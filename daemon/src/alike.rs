@@ -136,7 +136,7 @@ fn digest(bytes: &[u8]) -> u64 {
 }
 
 /// The same for names that are alike. Of a name that is no text, only the letters of ASCII have a case.
-fn folded(name: &OsStr) -> Vec<u8> {
+pub(crate) fn folded(name: &OsStr) -> Vec<u8> {
     let Some(text) = name.to_str() else { return name.as_encoded_bytes().to_ascii_lowercase() };
     if text.is_ascii() {
         return text.to_ascii_lowercase().into_bytes();

@@ -364,8 +364,7 @@ impl Slot {
         };
         let limit = config.time_limit.of(job.source.size);
         tracing::debug!(worker = worker.pid(), attempt = job.attempts.0, "Work begins.");
-        let ended =
-            worker.run(&request, limit, &stop, &mut |stage, done, total| context.bus.progress(job.id, stage, done, total));
+        let ended = worker.run(&request, limit, &stop, &mut |course| context.bus.progress(job.id, course));
         crash_point("daemon.worked");
         self.staff.take_back(worker, &ended, turn);
         let changed = match claimed.is_unchanged() {

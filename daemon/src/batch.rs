@@ -23,6 +23,7 @@ use crate::item::{Failure, Finished, Order, tell};
 use crate::say::complain;
 use crate::signals::Stop;
 use crate::supervise::Worker;
+use crate::units::show_count;
 
 /// Threads that wait for the disk. What waits together is committed together, so that more of them wait no longer.
 const SYNCERS: usize = 16;
@@ -92,7 +93,7 @@ impl<'a> Batch<'a> {
         let bar = &mut self.teller.bar;
         bar.alone(entry.input, entry.size);
         let outcome = self.order.item(entry.input, entry.target.as_deref(), self.order.limits.clone()).and_then(|item| {
-            let report = item.work(&mut self.worker, false, self.stop, &mut |stage, done, total| bar.at(stage, done, total))?;
+            let report = item.work(&mut self.worker, false, self.stop, &mut |course| bar.at(course))?;
             Ok(Finished { report, item })
         });
         bar.done(entry.size);
@@ -216,7 +217,7 @@ impl<'a> Line<'a> {
         let mut limits = self.limits.clone();
         limits.defer_sync = entry.target.is_some() && entry.size <= self.deferred && !limits.list_edit;
         let item = self.order.item(entry.input, entry.target.as_deref(), limits)?;
-        let report = item.work(worker, true, self.stop, &mut |_, _, _| {})?;
+        let report = item.work(worker, true, self.stop, &mut |_| {})?;
         Ok(Finished { report, item })
     }
 }
@@ -249,7 +250,7 @@ struct Teller<'a> {
 impl<'a> Teller<'a> {
     fn new(order: &'a Order<'a>, entries: &[Entry]) -> Self {
         let sizes: Vec<u64> = entries.iter().map(|entry| entry.size).collect();
-        let bar = Bar::new(Scope { files: sizes.len(), bytes: sizes.iter().sum(), writes: order.naming.is_some() });
+        let bar = Bar::new(Scope { files: sizes.len(), bytes: sizes.iter().sum() });
         Self { order, sizes, bar, waiting: BTreeMap::new(), told: 0, done: 0, stopped: false, worst: Exit::Good }
     }
 
@@ -312,7 +313,11 @@ impl<'a> Teller<'a> {
             return self.worst;
         }
         if all > 1 {
-            complain(&format_args!("interrupted; {} of {all} files are done, nothing was written of the others", self.done));
+            complain(&format_args!(
+                "interrupted; {} of {} files are done, nothing was written of the others",
+                show_count(self.done as u64),
+                show_count(all as u64)
+            ));
         }
         Exit::Interrupted
     }

@@ -5,11 +5,12 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use serde::Serialize;
 use serde_json::{Value, json};
 use suture_store::{Clock, JobId, SystemClock};
 use tokio::sync::broadcast::{Receiver, Sender, channel};
 
-use crate::bar::Standing;
+use crate::course::Course;
 use crate::event::{self, Happening};
 use crate::event_metrics::{Metrics, Timing};
 
@@ -29,18 +30,26 @@ pub(crate) struct Message {
     pub data: String,
 }
 
-/// How far a job in work is.
-#[derive(Clone, Debug, PartialEq)]
+/// How far a job in work is, as it is shown.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Progress {
+    /// As the engine calls it.
     pub stage: String,
-    /// Of the stage.
+    /// For people.
+    pub doing: &'static str,
+    /// Of the whole.
     pub percent: u8,
+}
+
+impl Progress {
+    fn of(course: &Course) -> Self {
+        Self { stage: course.stage().to_owned(), doing: course.doing(), percent: course.percent() }
+    }
 }
 
 /// A job in work.
 struct Far {
-    progress: Progress,
-    whole: Standing,
+    course: Course,
     told: Instant,
 }
 
@@ -122,29 +131,28 @@ impl Bus {
     }
 
     /// So far is a job in work.
-    pub(crate) fn progress(&self, id: JobId, stage: &str, done: u64, total: u64) {
-        let percent = if total == 0 { 0 } else { (done.min(total) as u128 * 100 / total as u128).try_into().unwrap_or(100) };
+    pub(crate) fn progress(&self, id: JobId, course: &Course) {
         let mut all = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
-        let (told, mut whole) = all.remove(&id).map(|far| (far.told, far.whole)).unzip();
-        whole.get_or_insert_default().at(stage, done, total, true);
-        let is_due = told.is_none_or(|told| told.elapsed() >= PROGRESS_EVERY);
-        let when = if is_due { Instant::now() } else { told.unwrap_or_else(Instant::now) };
-        let progress = Progress { stage: stage.to_owned(), percent };
-        all.insert(id, Far { progress, whole: whole.unwrap_or_default(), told: when });
+        let last = all.get(&id).map(|far| far.told);
+        let is_due = last.is_none_or(|told| told.elapsed() >= PROGRESS_EVERY);
+        let told = last.filter(|_| !is_due).unwrap_or_else(Instant::now);
+        all.insert(id, Far { course: course.clone(), told });
         drop(all);
         if let (true, Some(listeners)) = (is_due, &self.listeners) {
-            self.send(listeners, "progress", &json!({"job": id, "stage": stage, "percent": percent}));
+            let Progress { stage, doing, percent } = Progress::of(course);
+            self.send(listeners, "progress", &json!({"job": id, "stage": stage, "doing": doing, "percent": percent}));
         }
     }
 
     /// How far a job is, if that is known.
     pub(crate) fn progress_of(&self, id: JobId) -> Option<Progress> {
-        self.progress.lock().unwrap_or_else(PoisonError::into_inner).get(&id).map(|far| far.progress.clone())
+        self.progress.lock().unwrap_or_else(PoisonError::into_inner).get(&id).map(|far| Progress::of(&far.course))
     }
 
     /// About how many seconds are left of a job that has been in work for so many.
     pub(crate) fn left(&self, id: JobId, seconds: u64) -> Option<u64> {
-        self.progress.lock().unwrap_or_else(PoisonError::into_inner).get(&id)?.whole.left(seconds)
+        let left = self.progress.lock().unwrap_or_else(PoisonError::into_inner).get(&id)?.course.left(seconds as f64)?;
+        Some(left as u64)
     }
 
     /// A job is not in work any more.
@@ -203,10 +211,16 @@ mod tests {
     #[test]
     fn progress_is_known_until_the_job_rests() {
         let bus = Bus::new(true);
-        for (done, total, percent) in [(0, 0, 0), (1, 3, 33), (7, 3, 100), (u64::MAX, u64::MAX, 100)] {
-            bus.progress(JobId(1), "topology", done, total);
-            assert_eq!(bus.progress_of(JobId(1)), Some(Progress { stage: "topology".into(), percent }));
+        let mut course = Course::new(true, false);
+        for (stage, done, doing) in
+            [("read", 0, "reading the file"), ("topology", 40, "looking for defects"), ("plan", 1, "sorting")]
+        {
+            course.at(stage, done, 100);
+            bus.progress(JobId(1), &course);
+            let told = bus.progress_of(JobId(1)).unwrap();
+            assert!(told.stage == stage && told.doing.starts_with(doing) && told.percent == course.percent(), "{told:?}");
         }
+        assert!(bus.left(JobId(1), 60).is_some_and(|left| left > 60));
         assert_eq!(bus.line().last, 1, "told once in a while");
         bus.rest(JobId(1));
         assert_eq!(bus.progress_of(JobId(1)), None);

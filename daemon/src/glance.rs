@@ -8,10 +8,11 @@ use serde::{Deserialize, Serialize};
 use suture_store::{Job, JobId, Kind, Look, Query, StoreError, Time};
 
 use crate::attempt::Context;
+use crate::course::show_whole;
 use crate::folder::Folder;
 use crate::say::plain;
 use crate::schedule::{Hold, Standing};
-use crate::units::show_seconds;
+use crate::units::show_count;
 
 /// So many jobs of a sort are named.
 const NAMED: usize = 5;
@@ -53,9 +54,13 @@ pub(crate) struct Work {
     /// Bytes of the file.
     pub size: u64,
     pub seconds: u64,
+    /// As the engine calls it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stage: Option<String>,
-    /// Of the stage.
+    /// What is being done, for people.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub doing: Option<String>,
+    /// Of the whole.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub percent: Option<u8>,
     /// About so many are left.
@@ -66,17 +71,13 @@ pub(crate) struct Work {
 impl Work {
     /// How far it is, in words.
     pub(crate) fn words(&self) -> String {
-        let stage = match (&self.stage, self.percent) {
-            (Some(stage), Some(percent)) => format!("{} {percent} %", plain(stage)),
+        let doing = match (&self.doing, self.percent) {
+            (Some(doing), Some(percent)) => format!("{}, {percent} %", plain(doing)),
             _ => self.kind.name().into(),
         };
-        let left = self.seconds_left.map(|left| format!(", about {} left", seconds(left))).unwrap_or_default();
-        format!("{stage}, for {}{left}", seconds(self.seconds))
+        let left = self.seconds_left.map(|left| format!(", about {} left", show_whole(left as f64))).unwrap_or_default();
+        format!("{doing}, for {}{left}", show_whole(self.seconds as f64))
     }
-}
-
-fn seconds(seconds: u64) -> String {
-    if seconds < 60 { format!("{seconds} s") } else { show_seconds(seconds as f64) }
 }
 
 /// A hot folder.
@@ -149,6 +150,7 @@ fn work(context: &Context, job: &Job) -> Work {
         size: job.source.size,
         seconds,
         stage: progress.as_ref().map(|progress| progress.stage.clone()),
+        doing: progress.as_ref().map(|progress| progress.doing.to_owned()),
         percent: progress.as_ref().map(|progress| progress.percent),
         seconds_left: progress.and_then(|_| context.bus.left(job.id, seconds)),
     }
@@ -188,7 +190,7 @@ pub(crate) fn standing(context: &Context) -> Result<Standing, StoreError> {
     let words = |(name, why): (String, String)| {
         let events = match context.store.backlog(&name)? {
             1 => "one event".to_owned(),
-            more => format!("{more} events"),
+            more => format!("{} events", show_count(more)),
         };
         Ok(format!("`{name}` has not heard of {events}: {why}"))
     };

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use suture_core::report::{Certificate, RuleOutcome, Task};
 use suture_core::{ErrorClass, Limits, Profile, Report};
 
+use crate::course::Course;
 use crate::draft::Draft;
 use crate::exit::Exit;
 use crate::fence::Fence;
@@ -15,6 +16,7 @@ use crate::rights::Rights;
 use crate::signals::Stop;
 use crate::supervise::{Cause, Ended, Worker};
 use crate::table;
+use crate::units::show_count;
 
 /// Why there is no result for a file.
 #[derive(Debug)]
@@ -125,7 +127,7 @@ impl Item {
         worker: &mut Option<Worker>,
         many: bool,
         stop: &Stop,
-        on_progress: &mut dyn FnMut(&str, u64, u64),
+        on_progress: &mut dyn FnMut(&Course),
     ) -> Result<Box<Report>, Failure> {
         let Request { limits, shown_input: shown, .. } = &self.request;
         let mut running = match worker.take() {
@@ -255,7 +257,7 @@ fn check(input: &Path, certificate: &Certificate, report: &Report) -> (String, E
     if !contradictions.is_empty() {
         return (format!("{shown}: the certificate does not hold: {}", contradictions.join("; ")), Exit::NotGood);
     }
-    let of = format!("of these {} bytes with BLAKE3 {}", certificate.bytes, certificate.blake3);
+    let of = format!("of these {} bytes with BLAKE3 {}", show_count(certificate.bytes), certificate.blake3);
     if certificate.printable {
         let said = said_of_fidelity(certificate);
         return (format!("{shown}: the certificate holds: printable, {rules} of {rules} rules passed, {of}{said}"), Exit::Good);

@@ -18,7 +18,7 @@ use crate::rebuild::{Rebuilt, rebuild};
 use crate::say::{complain, plain, print};
 use crate::schedule::Standing;
 use crate::shown::hint;
-use crate::units::show_when;
+use crate::units::{show_count, show_when};
 use crate::{standstill, table};
 
 /// Does what the command line asks.
@@ -135,7 +135,8 @@ fn drained(dir: &Path) -> Exit {
 fn rebuilt(dir: &Path) -> Exit {
     match rebuild(dir) {
         Ok(Rebuilt { aside, jobs }) => say(&format!(
-            "{jobs} jobs came back from receipts; the damaged store is kept in {}. The next `suture watch` takes up what waits in in/",
+            "{} jobs came back from receipts; the damaged store is kept in {}. The next `suture watch` takes up what waits in in/",
+            show_count(jobs as u64),
             plain(&aside.display().to_string())
         )),
         Err(failure) => fail(&failure),
@@ -191,7 +192,8 @@ struct Shown<'a> {
 #[derive(serde::Serialize)]
 struct Far<'a> {
     stage: &'a str,
-    /// Of the stage.
+    doing: &'a str,
+    /// Of the whole.
     percent: u8,
     #[serde(skip_serializing_if = "Option::is_none")]
     seconds_left: Option<u64>,
@@ -199,8 +201,10 @@ struct Far<'a> {
 
 impl<'a> Shown<'a> {
     fn new(job: &'a Job, work: Option<&'a Work>) -> Self {
-        let far =
-            |work: &'a Work| Some(Far { stage: work.stage.as_ref()?, percent: work.percent?, seconds_left: work.seconds_left });
+        let far = |work: &'a Work| {
+            let Work { stage, doing, percent, seconds_left, .. } = work;
+            Some(Far { stage: stage.as_ref()?, doing: doing.as_ref()?, percent: (*percent)?, seconds_left: *seconds_left })
+        };
         Self { kind: job.kind().name(), reused: reused(job), progress: work.and_then(far), job }
     }
 }
@@ -266,10 +270,11 @@ fn line_of(job: &Job, work: Option<&Work>) -> String {
 fn summary(jobs: &[Job]) -> String {
     let count =
         |kind: Kind, copied: bool| jobs.iter().filter(|job| job.kind() == kind && (!copied || reused(job).is_some())).count();
+    let show = |count: usize| show_count(count as u64);
     let words = |kind: Kind| match (count(kind, false), count(kind, true)) {
         (0, _) => None,
-        (all, 0) => Some(format!("{all} {}", kind.name())),
-        (all, copies) => Some(format!("{all} {} ({copies} reused)", kind.name())),
+        (all, 0) => Some(format!("{} {}", show(all), kind.name())),
+        (all, copies) => Some(format!("{} {} ({} reused)", show(all), kind.name(), show(copies))),
     };
     Kind::ALL.into_iter().filter_map(words).collect::<Vec<_>>().join(", ")
 }

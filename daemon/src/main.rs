@@ -14,6 +14,7 @@ mod cli;
 mod config;
 mod confine;
 mod control;
+mod course;
 mod create;
 mod deliver;
 mod demo;

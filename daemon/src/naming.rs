@@ -1,11 +1,13 @@
 //! Where `suture repair` may write, and under which names: never over an input, never over what is no file, over an existing file
-//! only by force. The names depend on the inputs' order alone, not on what is done first.
+//! only by force. The names depend on the inputs' order alone, not on what is done first. None is like another one for a system that does not
+//! tell upper from lower case, or how an accent is spelt.
 
 use std::collections::{HashMap, HashSet};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use crate::alike::{Alike, folded};
 use crate::cli::RepairArgs;
 use crate::fsx;
 use crate::receipt::REPORT;
@@ -29,9 +31,20 @@ pub(crate) struct Naming {
 /// Names given out in a folder.
 #[derive(Default)]
 struct Given {
-    names: HashSet<OsString>,
+    /// The same for names that are alike.
+    names: HashSet<Vec<u8>>,
     /// The last version tried for an input's name.
     versions: HashMap<OsString, u32>,
+    /// What is in the folder.
+    there: Alike,
+}
+
+impl Given {
+    /// Is there no such name yet, nor one like it? One that cannot be looked at is not free; where the folder cannot be read, only the very name counts.
+    fn is_free(&self, path: &Path) -> bool {
+        let name = path.file_name().unwrap_or_default();
+        !self.names.contains(&folded(name)) && is_free(path) && !self.there.has_twin(path).unwrap_or(false)
+    }
 }
 
 impl Naming {
@@ -100,7 +113,7 @@ impl Naming {
         Ok(())
     }
 
-    /// The name the result of `input` is to have: in a folder, the first that is neither there nor given out.
+    /// The name the result of `input` is to have: in a folder, the first that is neither there nor given out, nor like one that is.
     pub(crate) fn target(&self, input: &Path) -> PathBuf {
         if !self.folder {
             return self.output.clone();
@@ -110,10 +123,10 @@ impl Naming {
         let reserve = if self.report.is_some() { REPORT.len() } else { 0 };
         let from = given.versions.get(name).map_or(1, |last| last + 1);
         let mut candidates = (from..MAX_VERSIONS).map(|n| (n, fsx::versioned(name, n, reserve)));
-        let free = candidates.find(|(_, name)| !given.names.contains(name) && is_free(&self.output.join(name)));
+        let free = candidates.find(|(_, name)| given.is_free(&self.output.join(name)));
         let Some((version, target)) = free else { return self.output.join(name) };
         given.versions.insert(name.to_owned(), version);
-        given.names.insert(target.clone());
+        given.names.insert(folded(&target));
         self.output.join(target)
     }
 
@@ -235,6 +248,18 @@ mod tests {
         let names = ["a/part.stl", "part~3.stl", "b/part.stl"].map(|input| naming.target(Path::new(input)));
         assert_eq!(names, ["part~2.stl", "part~3.stl", "part~4.stl"].map(|name| dir.path().join(name)));
         assert_eq!(naming.report(&names[0]), Ok(Some(dir.path().join(format!("part~2.stl{REPORT}")))));
+    }
+
+    /// In the order in which they are asked for.
+    #[test]
+    fn names_that_look_the_same_elsewhere_are_kept_apart() {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("THERE.stl"), b"there").unwrap();
+        let naming = naming(&["a", "b", "-o", dir.path().to_str().unwrap()]).unwrap();
+        let asked = ["x/Part.stl", "y/part.stl", "z/PART.stl", "there.stl", "\u{e9}.stl", "E\u{301}.stl"];
+        let names = asked.map(|input| naming.target(Path::new(input)));
+        let wanted = ["Part.stl", "part~2.stl", "PART~3.stl", "there~2.stl", "\u{e9}.stl", "E\u{301}~2.stl"];
+        assert_eq!(names, wanted.map(|name| dir.path().join(name)));
     }
 
     #[test]

@@ -27,7 +27,7 @@ pub(crate) struct Shown {
     stopping: bool,
     /// How far a job in work is, once it says so.
     #[serde(skip_serializing_if = "Option::is_none")]
-    progress: Option<Far>,
+    progress: Option<Progress>,
     /// It is tried again then.
     #[serde(skip_serializing_if = "Option::is_none")]
     not_before: Option<String>,
@@ -60,14 +60,6 @@ impl From<&Decision> for Said {
     fn from(said: &Decision) -> Self {
         Self { verdict: said.verdict, by: said.by.clone(), note: said.note.clone(), at: when(said.at) }
     }
-}
-
-/// How far a job is.
-#[derive(Serialize)]
-struct Far {
-    stage: String,
-    /// Of the stage.
-    percent: u8,
 }
 
 /// The mesh that a job has left.
@@ -115,7 +107,7 @@ impl Shown {
     /// With what is known of work that goes on.
     pub(crate) fn now(job: &Job, bus: &Bus) -> Self {
         let progress = bus.progress_of(job.id).filter(|_| job.kind() == Kind::Running);
-        Self { progress: progress.map(|Progress { stage, percent }| Far { stage, percent }), ..Self::from(job) }
+        Self { progress, ..Self::from(job) }
     }
 }
 

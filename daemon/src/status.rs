@@ -10,7 +10,7 @@ use crate::glance::{Glance, Work};
 use crate::jobs::line;
 use crate::reach;
 use crate::say::{complain, plain, print};
-use crate::units::{show_size, show_when};
+use crate::units::{show_count, show_size, show_when};
 
 pub(crate) mod top;
 
@@ -42,7 +42,7 @@ fn screen(dir: &Path, glance: &Glance) -> String {
     };
     let counts = |of: fn(Kind) -> bool| {
         let some = glance.jobs.iter().filter(|(kind, count)| of(**kind) && **count > 0);
-        let all: Vec<String> = some.map(|(kind, count)| format!("{count} {kind}")).collect();
+        let all: Vec<String> = some.map(|(kind, count)| format!("{} {kind}", show_count(*count))).collect();
         if all.is_empty() { "none".into() } else { all.join(", ") }
     };
     text += &format!("  waiting   {}\n", counts(|kind| !kind.is_held() && !kind.is_at_rest()));
@@ -104,6 +104,7 @@ mod tests {
             size: 84_000_000,
             seconds: 7,
             stage: Some("topology".into()),
+            doing: Some("looking for defects".into()),
             percent: Some(45),
             seconds_left: Some(12),
         };
@@ -136,7 +137,7 @@ mod tests {
             "waiting   3 queued\n",
             "in work   1 running\n",
             "9    big.stl",
-            "topology 45 %, for 7 s, about 12 s left\n",
+            "looking for defects, 45 %, for 7 s, about 12 s left\n",
             "ended     5 done\n",
             "nothing new is taken: an operator\n",
             "out of reach: a ",

@@ -18,6 +18,7 @@ use crossbeam::channel::{Receiver, RecvTimeoutError, unbounded};
 use rustix::process::{Pid, Signal};
 use suture_core::{ErrorClass, Report};
 
+use crate::course::Course;
 use crate::create;
 use crate::exit::WORKER_CUT;
 use crate::fence::Fence;
@@ -108,9 +109,9 @@ impl Death {
                                more memory for the machine let it through"
                 .to_owned(),
             Cause::Time(limit) => {
-                let stage = if self.last_words.is_empty() { String::new() } else { format!(", {}", self.last_words) };
+                let reached = if self.last_words.is_empty() { String::new() } else { format!(", {}", self.last_words) };
                 let limit = crate::units::show_seconds(limit.as_secs_f64());
-                format!("stopped at its time limit of {limit}{stage}; a larger `time_limit` may let it through")
+                format!("stopped at its time limit of {limit}{reached}; a larger `time_limit` may let it through")
             }
             Cause::Killed(signal) => format!("the worker was killed from outside ({}); the file is not to blame", name_of(signal)),
         };
@@ -122,10 +123,10 @@ impl Death {
 }
 
 /// Where the work was when it was last heard of.
-fn how_far(stage: &str, done: u64, total: u64) -> String {
-    match (done * 100).checked_div(total) {
-        Some(percent @ 1..) => format!("with {percent} % of its stage `{stage}` done"),
-        _ => format!("in its stage `{stage}`"),
+fn how_far(course: &Course) -> String {
+    match course.percent() {
+        0 => format!("while {}", course.doing()),
+        percent => format!("with {percent} % done, while {}", course.doing()),
     }
 }
 
@@ -222,7 +223,7 @@ impl Worker {
         request: &Request,
         limit: Option<Duration>,
         stop: &dyn Fn() -> bool,
-        on_progress: &mut dyn FnMut(&str, u64, u64),
+        on_progress: &mut dyn FnMut(&Course),
     ) -> Ended {
         let start = Instant::now();
         if start.duration_since(self.oom_kills.1) >= COUNT_EVERY {
@@ -232,14 +233,16 @@ impl Worker {
             return Ended::Died(self.post_mortem(false));
         }
         let mut begun = false;
+        let mut course = Course::of(request);
         let mut reached = String::new();
         loop {
             match self.lines.recv_timeout(LOOK_EVERY) {
                 Ok(line) => match read_answer(&line, request) {
                     Ok(Message::Begun) => begun = true,
                     Ok(Message::Progress { stage, done, total }) => {
-                        on_progress(&stage, done, total);
-                        reached = how_far(&stage, done, total);
+                        course.at(&stage, done, total);
+                        on_progress(&course);
+                        reached = how_far(&course);
                     }
                     Ok(Message::Done { report, written }) => return Ended::Done { report, written },
                     Ok(Message::Failed { class, message }) => return Ended::Failed { class, message },
@@ -404,9 +407,12 @@ mod tests {
     #[test]
     fn f11_a_time_limit_says_how_far_the_work_was() {
         let line = |last_words| Death { cause: Cause::Time(Duration::from_secs(120)), last_words }.line();
-        assert!(line(how_far("topology", 43, 100)).contains(", with 43 % of its stage `topology` done; a larger `time_limit`"));
-        assert!(line(how_far("repair", 0, 7)).contains(", in its stage `repair`; a larger"));
-        assert!(line(how_far("plan", 0, 0)).contains("in its stage `plan`"));
+        let mut course = Course::new(true, false);
+        course.at("read", 0, 7);
+        assert!(line(how_far(&course)).contains(", while reading the file; a larger `time_limit`"));
+        // Of the whole, not of the stage.
+        course.at("topology", 50, 100);
+        assert!(line(how_far(&course)).contains(", with 31 % done, while looking for defects; a larger `time_limit`"));
         assert!(!line(String::new()).contains(','));
     }
 

@@ -7,7 +7,7 @@ use suture_core::Report;
 use suture_core::report::{Defects, Format, Outcome, SelfIntersections, Task};
 
 use crate::say::plain;
-use crate::units::{show_box, show_count, show_seconds, show_size};
+use crate::units::{show_box, show_count, show_number, show_point, show_seconds, show_size};
 
 /// Boundary loops, and pairs that intersect, listed before the table refers to the report.
 const LOOPS_SHOWN: usize = 5;
@@ -80,11 +80,15 @@ pub(crate) fn render(report: &Report) -> String {
         item(&mut out, "done", &format!("{}{times}{note}", repair.name.as_str().replace('_', " ")));
     }
     for left in report.loops_left.iter().take(LOOPS_SHOWN) {
-        let [x, y, z] = left.at;
-        item(&mut out, "left", &format!("loop of {} edges at ({x}, {y}, {z}): {}", show_count(left.edges), left.reason));
+        let what = format!("loop of {} edges at {}: {}", show_count(left.edges), show_point(&left.at), left.reason);
+        item(&mut out, "left", &what);
     }
     if report.loops_left.len() > LOOPS_SHOWN {
-        item(&mut out, "left", &format!("{} more loops, listed in the report", report.loops_left.len() - LOOPS_SHOWN));
+        item(
+            &mut out,
+            "left",
+            &format!("{} more loops, listed in the report", show_count((report.loops_left.len() - LOOPS_SHOWN) as u64)),
+        );
     }
     wraps(&mut out, report);
     pairs_left(&mut out, report);
@@ -97,7 +101,7 @@ pub(crate) fn render(report: &Report) -> String {
         item(&mut out, "", reason);
     }
     if let Some(certificate) = report.certificate.as_ref().filter(|c| report.verdict.good && !c.printable) {
-        item(&mut out, "", &format!("not certified, for want of: {}", certificate.missing.join(", ")));
+        item(&mut out, "", &format!("not certified, for want of: {}", certificate.missing.join(", ").replace('_', " ")));
     }
     hints(&mut out, report);
     item(&mut out, "cost", &rate(report));
@@ -126,11 +130,11 @@ fn wraps(out: &mut String, report: &Report) {
         );
         match &wrap.left {
             Some(reason) => item(out, "left", &format!("no solid: {what}: {reason}")),
-            None => item(out, "wrapped", &format!("{what}, moved by up to {:.3e}", wrap.moved)),
+            None => item(out, "wrapped", &format!("{what}, moved by up to {}", show_number(wrap.moved))),
         }
     }
     if report.wraps.len() > LOOPS_SHOWN {
-        item(out, "", &format!("{} more regions, listed in the report", report.wraps.len() - LOOPS_SHOWN));
+        item(out, "", &format!("{} more regions, listed in the report", show_count((report.wraps.len() - LOOPS_SHOWN) as u64)));
     }
 }
 
@@ -144,8 +148,8 @@ fn loops(out: &mut String, report: &Report) {
     item(out, "loops", &classes.join(", "));
     if report.task == Task::Inspect || !report.profile.repair {
         for l in loops.listed.iter().take(LOOPS_SHOWN) {
-            let [x, y, z] = l.at;
-            let what = format!("{} of {} edges at ({x}, {y}, {z}): {}", l.class.name(), show_count(l.vertices), l.rule);
+            let edges = show_count(l.vertices);
+            let what = format!("{} of {edges} edges at {}: {}", l.class.name(), show_point(&l.at), l.rule);
             item(out, "loop", &what);
         }
     }
@@ -223,7 +227,7 @@ fn edit(report: &Report) -> String {
         }
     }
     if e.max_move > 0.0 {
-        parts.push(format!("largest move {:.3e}", e.max_move));
+        parts.push(format!("largest move {}", show_number(e.max_move)));
     }
     parts.join(", ")
 }

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use jiff::Zoned;
 use suture_store::{Clock, SystemClock, Time};
 
+use crate::course::Course;
 use crate::fence::Fence;
 use crate::fsx;
 use crate::protocol::Request;
@@ -21,13 +22,13 @@ pub(crate) trait Hand {
     /// Is it there, waiting for a request?
     fn is_alive(&mut self) -> bool;
 
-    /// Works on one request, at most `limit` long, until `stop` says so, and tells `told` where the work stands: stage, done, total. After anything
+    /// Works on one request, at most `limit` long, until `stop` says so, and tells `told` where the work stands. After anything
     /// but an answer the worker is gone.
     fn run(&mut self, request: &Request, limit: Duration, stop: &dyn Fn() -> bool, told: Telling<'_>) -> Ended;
 }
 
 /// Hears where work stands.
-pub(crate) type Telling<'a> = &'a mut dyn FnMut(&str, u64, u64);
+pub(crate) type Telling<'a> = &'a mut dyn FnMut(&Course);
 
 /// What a worker gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -25,7 +25,7 @@ const WORD: u16 = 5;
 /// That of a job that ends for want of a name, an end that an earlier program does not know.
 const NAMELESS: u16 = 6;
 /// Largest record in bytes. The database would put values from a quarter of its segment on into files of their own.
-pub(crate) const MAX: usize = 4608;
+pub(crate) const MAX: usize = 7040;
 
 const MAGIC: &[u8; 4] = b"SUTR";
 const HEADER: usize = 10;

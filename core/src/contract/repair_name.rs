@@ -105,6 +105,39 @@ impl RepairName {
         Self::Wrap,
     ];
 
+    /// What is done, in words that follow "by".
+    pub fn doing(self) -> &'static str {
+        match self {
+            Self::Degenerate => "removing triangles of no area",
+            Self::Duplicate => "removing copies of triangles",
+            Self::CommonWall => "removing walls in common",
+            Self::Overlap => "removing surface that lay on other surface",
+            Self::Surplus => "removing surplus sheets",
+            Self::ToleranceWeld => "joining corners that nearly met",
+            Self::Sew => "sewing rims together",
+            Self::TJunction => "splitting edges",
+            Self::Zip => "closing narrow gaps",
+            Self::SlitSides => "taking slits apart",
+            Self::Debris => "dropping specks",
+            Self::Visibility => "turning what was seen from behind",
+            Self::Orient => "turning triangles",
+            Self::SheetSolids => "making solids of sheets",
+            Self::Skirt => "letting rims down to what they stand on",
+            Self::Fill => "closing holes",
+            Self::Sheets => "dropping sheets",
+            Self::Outward => "turning bodies outward",
+            Self::Hollow => "making bodies cavities",
+            Self::SelfIntersection => "cutting along crossings",
+            Self::Dust => "dropping dust",
+            Self::SelfIntersectionsLeft => "leaving crossings",
+            Self::Enclosed => "removing bodies within others",
+            Self::Hidden => "removing hidden surface",
+            Self::Separate => "separating surfaces that met",
+            Self::Rebuild => "cutting places out and closing them anew",
+            Self::Wrap => "wrapping regions",
+        }
+    }
+
     /// The name in a report.
     pub fn as_str(self) -> &'static str {
         match self {

@@ -5,6 +5,7 @@
 
 use crate::contract::report::{Certificate, Faithful, Fidelity, FileFacts, RuleOutcome, RuleResult};
 use crate::detect::rules::{self, Subject};
+use crate::util::words::Count;
 
 /// Of the file of these `facts`, whose bytes the counts of `subject` are of.
 pub(crate) fn certify(facts: &FileFacts, subject: &Subject<'_>) -> Certificate {
@@ -45,12 +46,15 @@ impl Certificate {
         if (&self.blake3, self.bytes) != (&found.blake3, found.bytes) {
             return vec![format!(
                 "these are not the bytes that it is of ({} bytes with BLAKE3 {}, not {} with {})",
-                found.bytes, found.blake3, self.bytes, self.blake3
+                Count(found.bytes),
+                found.blake3,
+                Count(self.bytes),
+                self.blake3
             )];
         }
         let mut all = Vec::new();
         if self.triangles != found.triangles {
-            all.push(format!("{} triangles, not {}", found.triangles, self.triangles));
+            all.push(format!("{} triangles, not {}", Count(found.triangles), Count(self.triangles)));
         }
         for now in &found.rules {
             match self.rules.iter().find(|then| then.rule == now.rule) {
@@ -81,7 +85,7 @@ impl Certificate {
 fn unfaithful(then: Option<&Faithful>, now: &Faithful) -> Vec<String> {
     let Some(then) = then else { return vec!["it does not say whether the file is faithful".into()] };
     if (&then.original, then.bytes) != (&now.original, now.bytes) {
-        return vec![format!("it is of a file that was made of {} bytes with BLAKE3 {}", then.bytes, then.original)];
+        return vec![format!("it is of a file that was made of {} bytes with BLAKE3 {}", Count(then.bytes), then.original)];
     }
     let of = |rule: &Fidelity| then.rules.iter().find(|then| then.rule == rule.rule);
     let differs = now.rules.iter().filter(|rule| of(rule) != Some(rule)).map(|rule| match of(rule) {
@@ -105,7 +109,7 @@ fn measured(rule: &Fidelity) -> String {
 
 fn told(result: &RuleResult) -> String {
     let word = result.outcome.word();
-    result.count.map_or_else(|| word.into(), |count| format!("{word} with {count}"))
+    result.count.map_or_else(|| word.into(), |count| format!("{word} with {}", Count(count)))
 }
 
 #[cfg(test)]
@@ -193,7 +197,7 @@ mod tests {
             let all = other.contradictions(&now);
             assert!(all.len() == 1 && all[0].contains(words), "{words}: {all:?}");
         };
-        contradicted(|half| half.original = "ef".into(), "made of 1000 bytes with BLAKE3 ef");
+        contradicted(|half| half.original = "ef".into(), "made of 1 000 bytes with BLAKE3 ef");
         contradicted(
             |half| half.rules[0].figure = Some(0.125),
             "`skin_lost`: passed with 0.25 of 0.5, not passed with 0.125 of 0.5",

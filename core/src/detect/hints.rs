@@ -3,7 +3,7 @@
 use crate::contract::hint::{Hint, HintKind};
 use crate::contract::report::{Defects, ThinWalls};
 use crate::contract::settings::Profile;
-use crate::util::words::{At, Short};
+use crate::util::words::{At, Count, Short};
 
 /// A part that encloses less, in mm³, may be drawn in inches; the bounds at which PrusaSlicer asks (`volume_threshold_inches`, a cube of about
 /// two, and `volume_threshold_meters`).
@@ -22,7 +22,7 @@ pub(crate) fn hints(defects: &Defects, profile: &Profile) -> Vec<Hint> {
         hints.extend(room(extents, profile.build_volume_mm));
     }
     if defects.triangles > MANY_TRIANGLES {
-        let text = format!("it has {} triangles: slicers are slow with more than a million", defects.triangles);
+        let text = format!("it has {} triangles: slicers are slow with more than a million", Count(defects.triangles));
         hints.push(Hint { kind: HintKind::ManyTriangles, text });
     }
     hints

@@ -7,7 +7,7 @@ use crate::contract::report::{Defects, Region, SheetDropped, Skin, SkinChange, V
 use crate::contract::settings::{Bodies, Profile};
 use crate::detect::fidelity::Measured;
 use crate::geometry::sums::Bounds;
-use crate::util::words::{Short, span};
+use crate::util::words::{Count, Short, span};
 
 /// What the repairs know and a person would want to, beside what can be counted in the result.
 #[derive(Clone, Debug, Default)]
@@ -154,7 +154,7 @@ fn counts(change: &Change<'_>, profile: &Profile) -> Vec<Measured> {
     let all = before.bodies + before.nested_positive;
     let gone = all.saturating_sub(after.bodies + after.nested_positive + enclosed.bodies);
     let bodies = measured("bodies", Some(gone as f64), f64::from(profile.max_bodies_lost), |gone| {
-        format!("{gone} of {all} bodies were lost")
+        format!("{} of {} bodies were lost", Count(gone), Count(all))
     });
     vec![volume(change, profile), swallowed, area(change, profile), outline(change, profile), bodies]
 }
@@ -221,7 +221,7 @@ fn volumes(volumes: Option<&Volumes>, profile: &Profile) -> [Measured; 2] {
         let largest = volumes
             .and_then(|v| v.listed.first())
             .map_or(String::new(), |body| format!(", the largest {} of {} units³", span(body.bounds), Short(body.volume)));
-        format!("{lost} of {} bodies are not inside the result{largest}", volumes.map_or(0, |v| v.bodies))
+        format!("{} of {} bodies are not inside the result{largest}", Count(lost), Count(volumes.map_or(0, |v| v.bodies)))
     });
     let volume = measured("volume_outside", outside, profile.max_volume_change, |share| {
         format!("about {:.1} % of what the bodies enclosed is outside of the result", share * 100.0)
@@ -246,7 +246,7 @@ fn cavities(change: &Change<'_>, profile: &Profile) -> Measured {
 /// The surface that can be seen, and was lost or invented.
 fn skin(skin: Option<&Skin>, profile: &Profile) -> [Measured; 2] {
     let words = |change: &SkinChange, what: &str, from: &str| {
-        let by: Vec<String> = change.causes.iter().take(3).map(|cause| cause.repair.as_str().replace('_', " ")).collect();
+        let by: Vec<&str> = change.causes.iter().take(3).map(|cause| cause.repair.doing()).collect();
         let place = change.places.first().map_or(String::new(), |place| format!(", most of it {}", span(place.bounds)));
         let share = change.share * 100.0;
         let (by, farthest) = (by.join(", "), Short(change.farthest));
@@ -272,7 +272,7 @@ fn sheets(before: &Defects, dropped: &[SheetDropped], profile: &Profile) -> [Mea
     // Nothing tells against one that crosses nothing and is not hidden but that it is open.
     let free: f64 = dropped.iter().filter(|sheet| !sheet.crosses && !sheet.hidden).map(|sheet| sheet.area).sum();
     let largest = dropped.first().map_or(String::new(), |sheet| format!(", the largest {}", span(sheet.bounds)));
-    let count = dropped.len();
+    let count = Count(dropped.len());
     let words =
         |share: f64| format!("open sheets dropped that bound nothing, {count} of {:.1} % of the area{largest}", share * 100.0);
     let of_all = measured("sheets", Some(share(all)), profile.max_sheets_share, words);

@@ -5,6 +5,7 @@
 //! certificate does not speak for a new rule. `core/REPORT.md` has the same table for readers; a test holds the two together.
 
 use crate::contract::report::{Defects, RuleOutcome, RuleResult};
+use crate::util::words::Count;
 
 /// What the rules look at: counts on the bytes of a file, and what is wrong with the file itself.
 pub(crate) struct Subject<'a> {
@@ -155,7 +156,7 @@ pub const RULES: [Rule; 15] = [
         find: |s| Finding::Count(s.defects.unbalanced_edges),
         words: Words::Own(|s| match s.defects {
             d if d.boundary_edges + d.inconsistent_edges > 0 => Vec::new(),
-            d => vec![format!("{} edges not used equally often in both directions", d.unbalanced_edges)],
+            d => vec![format!("{} edges not used equally often in both directions", Count(d.unbalanced_edges))],
         }),
     },
     Rule {
@@ -181,10 +182,10 @@ pub const RULES: [Rule; 15] = [
             vec![if found.given_up {
                 "too many triangles come close to each other to be compared pair by pair".into()
             } else {
-                let (crossing, overlapping) = (found.crossing_pairs, found.overlapping_pairs);
+                let [crossing, overlapping] = [found.crossing_pairs, found.overlapping_pairs].map(Count);
                 format!(
                     "{} self-intersecting triangles ({crossing} crossing and {overlapping} overlapping pairs)",
-                    found.triangles
+                    Count(found.triangles)
                 )
             }]
         }),
@@ -241,7 +242,7 @@ impl Found {
     pub(crate) fn reasons(&self, subject: &Subject<'_>) -> Vec<String> {
         match (&self.rule.words, self.finding) {
             (_, Finding::Count(0) | Finding::NotLookedFor) => Vec::new(),
-            (Words::Counted(what), Finding::Count(count)) => vec![format!("{count} {what}")],
+            (Words::Counted(what), Finding::Count(count)) => vec![format!("{} {what}", Count(count))],
             (Words::Counted(what), Finding::GivenUp) => vec![format!("too many {what} to count")],
             (Words::Own(say), _) => say(subject),
         }

@@ -6,6 +6,7 @@ use crate::io::read::MAX_TRIANGLES;
 use crate::io::record::{self, Record};
 use crate::topology::vertex_table::Weld;
 use crate::util::parallel;
+use crate::util::words::Count;
 
 /// Fewer records are made by one thread: starting more would take longer.
 const MADE_BY_ONE: usize = 1 << 16;
@@ -33,13 +34,13 @@ pub struct MeshView<'m> {
 #[allow(missing_docs, reason = "each variant says what its fields are")]
 pub enum MeshError {
     /// A face refers to a vertex that is not there.
-    #[error("face {face} refers to vertex {vertex}, and there are {vertices} vertices")]
+    #[error("face {face} refers to vertex {vertex}, and there are {} vertices", Count(.vertices))]
     NoVertex { face: usize, vertex: u32, vertices: usize },
     /// More faces than numbers of faces can tell apart.
-    #[error("{faces} faces; a mesh can have {MAX_TRIANGLES}")]
+    #[error("{} faces; a mesh can have {}", Count(.faces), Count(MAX_TRIANGLES))]
     TooManyFaces { faces: usize },
     /// More vertices than numbers of vertices can tell apart.
-    #[error("{vertices} vertices; a mesh can have 4294967295")]
+    #[error("{} vertices; a mesh can have 4 294 967 295", Count(.vertices))]
     TooManyVertices { vertices: usize },
 }
 

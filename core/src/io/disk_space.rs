@@ -4,6 +4,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use crate::contract::error::{Error, Result};
+use crate::util::words::Count;
 
 /// Something that will be written.
 #[derive(Clone, Debug)]
@@ -25,11 +26,12 @@ pub(crate) fn check(path: &Path, needs: &[Need]) -> Result<()> {
         let needed = same().fold(0u64, |sum, need| sum.saturating_add(need.bytes));
         let free = free_bytes(&first.folder).unwrap_or(u64::MAX);
         if is_first_of_device && needed > free {
-            let parts: Vec<String> = same().map(|need| format!("{} MiB for {}", mebibytes(need.bytes), need.what)).collect();
+            let parts: Vec<String> =
+                same().map(|need| format!("{} MiB for {}", Count(mebibytes(need.bytes)), need.what)).collect();
             return Err(Error::NoSpace {
                 path: path.into(),
-                reason: format!("the work needs {} MiB of disk ({})", mebibytes(needed), parts.join(", ")),
-                advice: format!("{} has {} MiB free", first.folder.display(), free >> 20),
+                reason: format!("the work needs {} MiB of disk ({})", Count(mebibytes(needed)), parts.join(", ")),
+                advice: format!("{} has {} MiB free", first.folder.display(), Count(free >> 20)),
             });
         }
     }
@@ -68,7 +70,7 @@ mod tests {
         let error = check(&[need(folder.path(), half, "the output"), need(&sub, half, "the spool")]).unwrap_err();
         assert_eq!(error.class(), ErrorClass::Shortage, "room can be made");
         let line = error.to_string();
-        for word in ["part.stl", &mebibytes(half * 2).to_string(), "for the output", "for the spool", "free"] {
+        for word in ["part.stl", &Count(mebibytes(half * 2)).to_string(), "for the output", "for the spool", "free"] {
             assert!(line.contains(word), "{word} in {line}");
         }
     }

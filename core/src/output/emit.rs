@@ -24,6 +24,7 @@ use crate::io::record::Record;
 use crate::io::write_behind::WriteBehind;
 use crate::output::edit::{Edit, Step};
 use crate::util::parallel::{self, Aside};
+use crate::util::words::Count;
 
 /// Smaller files are not copied ahead: it takes longer to start a thread.
 const COPIED_AHEAD: usize = 1 << 20;
@@ -206,8 +207,8 @@ impl<'a> Sink<'a> {
         let count = edit.output_records(records.len());
         let count = u32::try_from(count).map_err(|_| Error::Refused {
             path: self.mesh.path().into(),
-            reason: format!("the result has {count} triangles"),
-            advice: "an STL can hold 4294967295: split the file".into(),
+            reason: format!("the result has {} triangles", Count(count)),
+            advice: "an STL can hold 4 294 967 295: split the file".into(),
         })?;
         self.put(&self.mesh.output_header())?;
         self.put(&count.to_le_bytes())?;

@@ -21,7 +21,7 @@ use crate::geometry::sums::Bounds;
 use crate::repairs::holes::fill;
 use crate::repairs::shared::context::{Changes, Context, Done, Repair};
 use crate::repairs::wrap;
-use crate::util::words::Short;
+use crate::util::words::{Count, Short};
 use check::{Owners, Verdict};
 use places::Place;
 use regions::{Cut, Stays};
@@ -36,7 +36,10 @@ pub(crate) const REPAIR: Repair = Repair {
         let rebuilt = if is_wanted { rebuild(cx) } else { Rebuilt::default() };
         let (count, triangles) = (rebuilt.places, rebuilt.triangles);
         rebuilt.tell(cx);
-        Ok(Done::count(count, format!("places of {triangles} triangles that nothing else made valid, cut out and closed anew")))
+        Ok(Done::count(
+            count,
+            format!("places of {} triangles that nothing else made valid, cut out and closed anew", Count(triangles)),
+        ))
     },
 };
 
@@ -188,7 +191,7 @@ impl Rebuilt {
         if area.max(volume).max(moved) > cx.profile.wrap_review_share {
             cx.account.doubts.push(format!(
                 "{} places that nothing else made valid were cut out and closed anew: {:.2} % of the surface, which moved by up to {}, and {:.2} % of the volume",
-                self.places, area * 100.0, Short(self.moved), volume * 100.0
+                Count(self.places), area * 100.0, Short(self.moved), volume * 100.0
             ));
         }
     }

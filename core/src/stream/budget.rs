@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::contract::error::{Error, Result};
+use crate::util::words::Count;
 
 /// The purpose that memory is taken for.
 #[derive(Clone, Copy)]
@@ -61,16 +62,17 @@ impl Budget {
             return Ok(());
         }
         let mebibytes = |bytes: u64| bytes.div_ceil(1 << 20);
-        let [tables, surface, seams, defects] = [0, 1, 2, 3].map(|i: usize| mebibytes(self.taken[i].load(Ordering::Relaxed)));
+        let [tables, surface, seams, defects] =
+            [0, 1, 2, 3].map(|i: usize| Count(mebibytes(self.taken[i].load(Ordering::Relaxed))));
         Err(Error::Starved {
             path: path.into(),
             reason: format!(
                 "{}, which needs at least {} MiB of memory ({tables} for tables, {surface} for pieces of surface, then {seams} for seams \
                  or {defects} for defects)",
                 what(),
-                mebibytes(self.total())
+                Count(mebibytes(self.total()))
             ),
-            advice: format!("the budget is {} MiB: raise --memory", self.limit >> 20),
+            advice: format!("the budget is {} MiB: raise --memory", Count(self.limit >> 20)),
         })
     }
 }

@@ -16,6 +16,7 @@ use crate::topology::crossings::{self, Crossings};
 use crate::topology::intersect::Effort;
 use crate::topology::room;
 use crate::topology::star;
+use crate::util::words::Count;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -208,7 +209,11 @@ impl Solving<'_, '_> {
         loan.check(self.path, || "a large chunk has more than one vertex for two triangles".into())?;
         let [irregular_triangles, pieces] = [found.irregular_triangles, found.regions].map(AtomicU64::into_inner);
         self.budget.check(self.path, || {
-            format!("at least {irregular_triangles} triangles lie at defects, in {pieces} pieces of surface or more")
+            format!(
+                "at least {} triangles lie at defects, in {} pieces of surface or more",
+                Count(irregular_triangles),
+                Count(pieces)
+            )
         })?;
         refuse_more_than(self.path, MOST_SUSPECTS, irregular_triangles, "triangles lie at defects")?;
         refuse_more_than(self.path, chunk::MOST_REGIONS, pieces, "pieces of surface, counted by chunks, are there")
@@ -237,8 +242,8 @@ fn refuse_more_than(path: &Path, most: u64, there: u64, what: &str) -> Result<()
     if there <= most {
         return Ok(());
     }
-    let advice = format!("at most {most} can be worked on: split the file");
-    Err(Error::Refused { path: path.into(), reason: format!("{there} {what}"), advice })
+    let advice = format!("at most {} can be worked on: split the file", Count(most));
+    Err(Error::Refused { path: path.into(), reason: format!("{} {what}", Count(there)), advice })
 }
 
 /// Tables for chunks, one set a thread: bytes, and threads that they are for.
@@ -279,9 +284,9 @@ pub(crate) fn take_tables(
     let tables = Tables::fitting(&counts, budget, limits.threads, room::scratch_bytes);
     budget.take(Purpose::Tables, tables.bytes);
     let largest = counts.first().copied().unwrap_or(0);
-    budget.check(path, || format!("the largest chunk holds {largest} triangles"))?;
+    budget.check(path, || format!("the largest chunk holds {} triangles", Count(largest)))?;
     budget.take(Purpose::Defects, nonfinite * crate::stream::budget::BYTES_PER_NONFINITE);
-    budget.check(path, || format!("{nonfinite} triangles have coordinates that are no finite numbers"))?;
+    budget.check(path, || format!("{} triangles have coordinates that are no finite numbers", Count(nonfinite)))?;
     Ok(tables)
 }
 

@@ -31,6 +31,7 @@ use crate::topology::region_sums::RegionSums;
 use crate::topology::vertex_table::Weld;
 use crate::util::bits;
 use crate::util::ids::NONE;
+use crate::util::words::Count;
 
 /// Topology of the regular part of a file, and the list of what is not regular.
 #[derive(Debug)]
@@ -328,8 +329,9 @@ impl<'a> Survey<'a> {
         self.budget.take(Purpose::Defects, bytes);
         self.budget.check(path, || {
             format!(
-                "{} triangles lie at defects, with {boundary_edges} edges that only one triangle has",
-                self.irregular_triangles.len()
+                "{} triangles lie at defects, with {} edges that only one triangle has",
+                Count(self.irregular_triangles.len()),
+                Count(boundary_edges)
             )
         })
     }

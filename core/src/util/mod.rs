@@ -19,4 +19,4 @@ pub(crate) mod scatter;
 pub(crate) mod steps;
 pub(crate) mod union_find;
 pub(crate) mod varint;
-pub(crate) mod words;
+pub mod words;

@@ -6,7 +6,7 @@ use maud::{Markup, html};
 use suture_store::{Job, Kind, Time};
 
 use super::page;
-use super::words::{advice, how_many_need_you, mark, of_which_kind, state, time};
+use super::words::{advice, how_many_need_you, mark, of_which_kind, prose, state, time};
 use crate::cli::service::NightArgs;
 use crate::create;
 use crate::exit::Exit;
@@ -103,7 +103,7 @@ fn rows<'a>(jobs: impl IntoIterator<Item = &'a Job>, of_folders: bool, said: &st
                 @if is_advised { th scope="col" { "What to do" } }
             } }
             tbody { @for job in jobs { tr {
-                td class="n" { (job.id) } td class="file" { (plain(&job.source.path.to_string())) } @if of_folders { td { (plain(&job.source.folder)) } } td { (mark(job)) } td class="time" { (time(job.changed)) } td class="why" { (plain(&reason(job))) }
+                td class="n" { (job.id) } td class="file" { (plain(&job.source.path.to_string())) } @if of_folders { td { (plain(&job.source.folder)) } } td { (mark(job)) } td class="time" { (time(job.changed)) } td class="why" { (prose(&reason(job))) }
                 @if is_advised { td class="why" { (plain(&advice(job))) } }
             } } }
         } }

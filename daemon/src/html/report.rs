@@ -5,6 +5,7 @@ use suture_core::Report;
 use suture_core::report::{FileFacts, Outcome, RegionMethod, RuleOutcome, SkinChange, Task};
 
 use super::page;
+use super::words::prose;
 use crate::say::plain;
 use crate::table;
 use crate::units::{show_box, show_count, show_number, show_point, show_seconds, show_size};
@@ -80,7 +81,7 @@ pub(crate) fn verdict(report: &Report) -> Markup {
     html! {
         (statement(report))
         @if !report.verdict.reasons.is_empty() { (reasons(&report.verdict.reasons)) }
-        @for hint in &report.hints { p { "Note: " (plain(&hint.text)) "." } }
+        @for hint in &report.hints { p { "Note: " (prose(&hint.text)) "." } }
     }
 }
 
@@ -91,7 +92,7 @@ pub(crate) fn statement(report: &Report) -> Markup {
 
 /// Reasons, one below the other.
 pub(crate) fn reasons(reasons: &[String]) -> Markup {
-    html! { ul { @for reason in reasons { li { (plain(reason)) } } } }
+    html! { ul { @for reason in reasons { li { (prose(reason)) } } } }
 }
 
 /// The picture at that address. `is_pair`: it shows the file and its result side by side.
@@ -128,7 +129,7 @@ fn defects(report: &Report) -> Markup {
                 } } }
             }
         }
-        @for finding in &report.input.findings { p { "The file: " (plain(finding)) } }
+        @for finding in &report.input.findings { p { "The file: " (prose(finding)) } }
     }
 }
 
@@ -142,7 +143,7 @@ fn repairs(report: &Report) -> Markup {
                 tbody { @for repair in &report.repairs { tr {
                     th scope="row" { (repair.name.as_str().replace('_', " ")) }
                     td class="n" { (show_count(repair.count)) }
-                    td { (plain(&repair.note)) }
+                    td { (prose(&repair.note)) }
                 } } }
             }
             p { (show_count(edit.untouched)) " triangles are untouched, " (show_count(edit.deleted)) " deleted, " (show_count(edit.flipped)) " flipped, "
@@ -300,7 +301,7 @@ mod tests {
         let walls = r#"{"minimum": 0.8, "points": 100, "share": 0.03, "places": [{"at": [1.5, 2.5, 3.5], "thickness": 0.31}]}"#;
         report.thin_walls = serde_json::from_str(walls).unwrap();
         let text = whole(&report, None).into_string();
-        assert!(text.contains("Thin walls") && text.contains("0.31000") && text.contains("(1.5000, 2.5000, 3.5000)"), "{text}");
+        assert!(text.contains("Thin walls") && text.contains("0.31") && text.contains("[1.5, 2.5, 3.5]"), "{text}");
     }
 
     /// Names, headers and notes come from whoever sent the file.

@@ -6,6 +6,7 @@ use suture_store::{Ending, Job, Kind, State, Time};
 
 use crate::left::area;
 use crate::night::NEED_SOMEONE;
+use crate::say::plain;
 use crate::shown::{hint, when};
 use crate::units::{show_count, show_when};
 
@@ -118,6 +119,14 @@ fn ended(job: &Job, ending: Ending) -> String {
     }
 }
 
+/// Text as a page shows it: no line ends within a number.
+pub(crate) fn prose(text: &str) -> String {
+    let text: Vec<char> = plain(text).chars().collect();
+    let is_digit = |place: usize| text.get(place).is_some_and(char::is_ascii_digit);
+    let is_gap = |place: usize| place > 0 && is_digit(place - 1) && (place + 1..place + 4).all(is_digit) && !is_digit(place + 4);
+    (0..).zip(&text).map(|(place, &c)| if c == ' ' && is_gap(place) { '\u{a0}' } else { c }).collect()
+}
+
 /// A time, for people and for programs.
 pub(crate) fn time(time: Time) -> Markup {
     html! { time datetime=(when(time)) { (show_when(time.0)) } }
@@ -152,6 +161,14 @@ mod tests {
             decision: None,
         };
         Job { state: State::Ended { publication }, ..job() }
+    }
+
+    #[test]
+    fn no_line_ends_within_a_number() {
+        let text = "of 12 345 678 edges, 8 014 178 more; 2 bodies, 1 2345, 12 3";
+        let kept = "of 12\u{a0}345\u{a0}678 edges, 8\u{a0}014\u{a0}178 more; 2 bodies, 1 2345, 12 3";
+        assert_eq!(prose(text), kept);
+        assert_eq!(prose(" 123 \u{1b}"), plain(" 123 \u{1b}"));
     }
 
     /// Whoever comes in the morning knows of each file what to do with it.

@@ -12,6 +12,7 @@ use suture_store::{Job, RelPath, State, Time};
 use crate::folder::{Folder, make_parent};
 use crate::names::VERSIONS;
 use crate::receipt::REPORT;
+use crate::units::show_count;
 use crate::{create, force, fsx};
 
 /// Its name, in the order's folder of `out/`. No result is called so: these are named after meshes.
@@ -131,7 +132,7 @@ impl Summary {
 
     /// In words: `5 files: 4 done, 1 failed (b.stl: not closed)`.
     pub(crate) fn words(&self) -> String {
-        let counts: Vec<_> = self.counts.iter().map(|(kind, count)| format!("{count} {}", kind.name())).collect();
+        let counts: Vec<_> = self.counts.iter().map(|(kind, count)| format!("{} {}", show_count(*count), kind.name())).collect();
         let bad: Vec<_> = self.files.iter().filter(|line| !line.is_good()).collect();
         let mut named: Vec<_> = bad
             .iter()
@@ -142,10 +143,10 @@ impl Summary {
             })
             .collect();
         if bad.len() > NAMED {
-            named.push(format!("and {} more", bad.len() - NAMED));
+            named.push(format!("and {} more", show_count((bad.len() - NAMED) as u64)));
         }
         let named = if named.is_empty() { String::new() } else { format!(" ({})", named.join("; ")) };
-        format!("{} files: {}{named}", self.files.len(), counts.join(", "))
+        format!("{} files: {}{named}", show_count(self.files.len() as u64), counts.join(", "))
     }
 
     /// Puts it into the order's folder of `out/`, durably, in place of an earlier one of the same order; another file of that name stays,

@@ -15,7 +15,7 @@ use crate::exit::Exit;
 use crate::fsx;
 use crate::remove::ours;
 use crate::say::{complain, plain, print};
-use crate::units::show_size;
+use crate::units::{show_count, show_size};
 
 /// Gets all jobs of the store of a hot folder, or a line for people and what it comes to.
 type Jobs<'a> = &'a dyn Fn(&Path) -> Result<Vec<Job>, (String, Exit)>;
@@ -90,7 +90,7 @@ fn of_history(config: &Config, now: Time, jobs: Jobs) -> Result<String, (String,
         job.answers_for_source() && folder.is_none_or(there)
     };
     for past in past_of(&jobs, &config.keep, now, &is_needed) {
-        let _ = writeln!(text, "would forget {} jobs: {}", past.ids.len(), past.why);
+        let _ = writeln!(text, "would forget {} jobs: {}", show_count(past.ids.len() as u64), past.why);
     }
     Ok(text)
 }

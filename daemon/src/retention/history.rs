@@ -7,7 +7,7 @@ use suture_store::job::Kind;
 use suture_store::{Job, JobId, JobStore, Query, StoreError, Time};
 
 use crate::config::keep::Keep;
-use crate::units::write_duration;
+use crate::units::{show_count, write_duration};
 
 /// Jobs that are read at a time.
 const PAGE: usize = 1000;
@@ -77,7 +77,7 @@ fn choose(
         }
     }
     let why_old = keep.history.map(|age| format!("ended more than {} ago", write_duration(age))).unwrap_or_default();
-    let why_many = format!("more than {} jobs have ended", keep.history_jobs);
+    let why_many = format!("more than {} jobs have ended", show_count(keep.history_jobs));
     let past = [(old, why_old), (many, why_many)];
     Ok(past.into_iter().filter(|(ids, _)| !ids.is_empty()).map(|(ids, why)| Past { ids, why }).collect())
 }

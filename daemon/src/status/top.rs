@@ -69,15 +69,23 @@ fn size() -> (usize, usize) {
     (rows.into(), columns.into())
 }
 
-/// The text from the upper left corner on, cut to the terminal's size, over whatever stood there.
+/// The text from the upper left corner on, over whatever stood there: lines that are longer than the terminal is wide go on in the next row, and
+/// what does not fit below is left out.
 fn page(text: &str, rows: usize, columns: usize) -> String {
-    let mut page = String::from("\x1b[H");
-    for (n, line) in text.lines().take(rows).enumerate() {
-        let cut: String = line.chars().take(columns).collect();
-        page += if n == 0 { "" } else { "\n" };
-        page += &format!("{cut}\x1b[K");
-    }
-    page + "\x1b[J"
+    let wrapped = text.lines().flat_map(|line| {
+        let line: Vec<char> = line.chars().collect();
+        let pieces = line.chunks(columns.max(1)).map(|piece| piece.iter().collect()).collect::<Vec<String>>();
+        if pieces.is_empty() { vec![String::new()] } else { pieces }
+    });
+    // Behind a full row, the cursor stands on its last letter: nothing is wiped from there on.
+    let end = |row: &str| if row.chars().count() < columns { "\x1b[K" } else { "" };
+    let shown: Vec<String> = wrapped.take(rows).map(|row| format!("{row}{}", end(&row))).collect();
+    let below = match shown.len() {
+        0 => "\x1b[J",
+        fewer if fewer < rows => "\n\x1b[J",
+        _ => "",
+    };
+    format!("\x1b[H{}{below}", shown.join("\n"))
 }
 
 /// Waits a while for a key. Is it one that ends this, or is there no one any more?
@@ -123,7 +131,8 @@ mod tests {
 
     #[test]
     fn a_page_fits_its_terminal() {
-        assert_eq!(page("one\nzwölf\nthree\n", 2, 4), "\x1b[Hone\x1b[K\nzwöl\x1b[K\x1b[J");
+        assert_eq!(page("one\nzwölf\nthree\n", 2, 4), "\x1b[Hone\x1b[K\nzwöl");
+        assert_eq!(page("zwölf\n\nx", 9, 4), "\x1b[Hzwöl\nf\x1b[K\n\x1b[K\nx\x1b[K\n\x1b[J");
         assert_eq!(page("", 2, 4), "\x1b[H\x1b[J");
     }
 }

@@ -1,7 +1,7 @@
 //! Words for people, as they fit a record.
 
-/// Longest reason kept, in bytes.
-pub const MAX_REASON: usize = 200;
+/// Longest reason kept, in bytes: lists and pages show no other, so that all that a report commonly says fits (of real files, 170 to 700 bytes).
+pub const MAX_REASON: usize = 1000;
 
 const CUT: &str = "…";
 

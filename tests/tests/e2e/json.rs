@@ -1,6 +1,6 @@
 //! What `suture jobs list --json` says, held against its description.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
 use suture_bench::generate::{Case, write};
@@ -83,6 +83,7 @@ fn the_progress_of_work_is_listed() {
     place.put("suture.toml", b"settle = \"30ms\"\nreuse = false\n[[folders]]\npath = \"hot\"\n");
     let _daemon = Served::start(&place, &["--config", "suture.toml"], "log");
     let (mut dropped, mut listed, mut shown) = (0, None, String::new());
+    let mut reached = BTreeMap::new();
     // Its work may be over before anyone has looked: then there is another.
     wait_until("both are seen", || {
         let all = jobs(&place, "hot");
@@ -92,6 +93,11 @@ fn the_progress_of_work_is_listed() {
         }
         let far = all.iter().find(|job| job["kind"] == "running" && job.get("progress").is_some());
         listed = listed.take().or(far.cloned());
+        if let Some(far) = far {
+            let percent = far["progress"]["percent"].as_u64().expect("a share of the whole");
+            let before = reached.insert(far["id"].as_u64(), percent).unwrap_or(0);
+            assert!(percent >= before && percent < 100, "from {before} to {far}");
+        }
         let line = place.suture(["jobs", "list", "--dir", "hot"]).expect(0).stdout();
         let line = line.lines().find(|line| line.contains(" running ") && line.contains(" %, for "));
         shown = line.map_or(std::mem::take(&mut shown), str::to_owned);
@@ -99,7 +105,10 @@ fn the_progress_of_work_is_listed() {
     });
     let listed = listed.expect("a job in work");
     assert!(listed["progress"]["stage"].as_str().is_some_and(|stage| !stage.is_empty()), "{listed}");
-    assert!(listed["progress"]["percent"].as_u64().is_some_and(|percent| percent <= 100), "{listed}");
+    // For people there are words instead.
+    let (stage, doing) = (&listed["progress"]["stage"], listed["progress"]["doing"].as_str().expect("what is being done"));
+    assert!(doing.contains(' ') || *stage != doing, "{listed}");
+    assert!(["ing ", "repairing", "at work"].iter().any(|words| shown.contains(words)), "{shown}");
     let mut found = BTreeSet::new();
     fields(&listed, "", &mut found);
     assert_eq!(found.difference(&described(false)).collect::<Vec<_>>(), Vec::<&String>::new(), "not described");

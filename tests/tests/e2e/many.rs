@@ -147,3 +147,26 @@ fn one_input_may_be_given_twice() {
     assert_eq!(place.read("out/cube.stl"), place.read("cube.stl"));
     assert_eq!(place.read("out/cube~2.stl"), place.read("cube.stl"));
 }
+
+/// Names that Windows, macOS or a share take for the same: each result gets one of its own, in the order of the inputs; so does one whose twin is
+/// in the folder already.
+#[test]
+fn results_do_not_hide_each_other_on_other_systems() {
+    let place = Place::new();
+    let names = ["part.stl", "Part.stl", "K\u{f6}rper.stl", "KO\u{308}RPER.stl", "part~2.stl", "there.stl"];
+    let inputs: Vec<_> = (0u8..).zip(names).map(|(number, name)| (format!("{number}/{name}"), 1.0 + f32::from(number))).collect();
+    for (input, size) in &inputs {
+        place.put(input, &stl::mesh(&stl::cuboid([0.0; 3], [*size; 3])));
+    }
+    for (threads, folder) in [("1", "out1"), ("2", "out2")] {
+        place.put(&format!("{folder}/There.STL"), b"of someone else");
+        let options = ["repair", "--threads", threads, "-o", folder];
+        place.suture(options.into_iter().chain(inputs.iter().map(|(input, _)| input.as_str()))).expect(0);
+        let results = ["part.stl", "Part~2.stl", "K\u{f6}rper.stl", "KO\u{308}RPER~2.stl", "part~2~2.stl", "there~2.stl"];
+        for ((input, _), result) in inputs.iter().zip(results) {
+            assert_eq!(place.read(&format!("{folder}/{result}")), place.read(input), "{input}: {:?}", place.names(folder));
+        }
+        assert_eq!(place.names(folder).len(), names.len() + 1);
+        assert_eq!(place.read(&format!("{folder}/There.STL")), b"of someone else");
+    }
+}

@@ -4,6 +4,7 @@ use suture_tests::Place;
 use suture_tests::hot::{doubtful, holes};
 use suture_tests::http::{Answer, Client};
 use suture_tests::served::{Served, wait_until};
+use suture_tests::stl::{cuboid, mesh};
 
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 /// A name that would be markup.
@@ -115,6 +116,41 @@ fn long_lists_have_pages() {
     assert!(!second.text().contains("rel=\"next\"") && second.text().contains("<a href=\"/jobs?state=failed\">Latest</a>"));
     let night = client.browse("/").expect(200);
     assert!(night.text().contains("60 files need you.") && night.text().contains(">35 more</a>"), "{}", night.text());
+}
+
+/// A mesh of which there is much to say: boxes that cross, one inside out, copies, what is no triangle, a hole, and three triangles at an edge.
+fn all_sorts() -> Vec<u8> {
+    let mut triangles = [cuboid([0.0; 3], [9.0; 3]), cuboid([5.0; 3], [14.0; 3])].concat();
+    let mut inside_out = cuboid([30.0; 3], [40.0; 3]);
+    inside_out.iter_mut().for_each(|corners| corners.swap(0, 1));
+    triangles.extend(inside_out);
+    let first = triangles[0];
+    triangles.extend([first, first, [first[0], first[0], first[1]], [[50.0; 3], [51.0; 3], [52.0; 3]]]);
+    triangles.push([[f32::NAN; 3], [1.0; 3], [2.0, 1.0, 0.0]]);
+    triangles.push([first[0], first[1], [-20.0, -20.0, -30.0]]);
+    triangles.extend(&cuboid([60.0; 3], [70.0; 3])[..11]);
+    mesh(&triangles)
+}
+
+/// Why a file needs someone is whole wherever files are listed, however much there is to say.
+#[test]
+fn reasons_are_whole_in_lists() {
+    let place = Place::new();
+    place.put("hot/in/inspect-only/all.stl", &all_sorts());
+    let (_daemon, client) = begin(&place, &[]);
+    wait_for(&client, 1, "failed");
+    let report = client.get("/v1/jobs/1/report").expect(200).json();
+    let reasons = report["verdict"]["reasons"].as_array().expect("reasons");
+    let whole = reasons.iter().map(|reason| reason.as_str().expect("a text")).collect::<Vec<_>>().join("; ");
+    assert!(whole.len() > 300 && !whole.contains(['<', '&', '"']), "{whole}");
+    assert_eq!(client.get("/v1/jobs/1").json()["reason"], *whole);
+    for path in ["/", "/jobs"] {
+        let page = client.browse(path).expect(200);
+        assert!(page.text().contains(&whole) && !page.text().contains('…'), "{path}: {}", page.text());
+    }
+    place.suture(["night", "--dir", "hot", "-o", "night.html"]).expect(0);
+    assert!(String::from_utf8(place.read("night.html")).unwrap().contains(&whole));
+    assert!(place.suture(["jobs", "list", "--dir", "hot"]).expect(0).stdout().contains(&whole));
 }
 
 #[test]

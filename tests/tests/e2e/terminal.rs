@@ -34,7 +34,7 @@ fn on_a_terminal(place: &Place, arguments: &[&str]) -> (String, Duration) {
     (String::from_utf8_lossy(&seen).into_owned(), start.elapsed())
 }
 
-/// Long work shows its stage, its rate and the time left, and takes the bar away in the end; the same into a pipe says nothing.
+/// Long work shows what is being done, its rate and the time left, and takes the bar away in the end; the same into a pipe says nothing.
 #[test]
 fn long_work_shows_how_far_it_is() {
     // However fast the machine, some size takes a while.
@@ -45,7 +45,7 @@ fn long_work_shows_how_far_it_is() {
         if took < Duration::from_secs(3) {
             continue;
         }
-        for words in ["holes.stl", "topology", "triangles/s", " left", "verification: "] {
+        for words in ["holes.stl", "looking for defects", "triangles/s", " left", "checking the result"] {
             assert!(seen.contains(words), "no {words:?} in {seen:?}");
         }
         let ran = place.suture(["repair", "holes.stl", "-o", "unseen.stl", "--threads", "1"]).expect(0);

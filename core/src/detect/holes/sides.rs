@@ -13,6 +13,7 @@ use crate::geometry::distance::{cosine, nearest_of_segment};
 use crate::geometry::sums::Bounds;
 use crate::submesh::near::{self, Tolerance};
 use crate::submesh::{self, Submesh};
+use crate::util::words::Count;
 
 /// Cosine between a chain and the side across it, at most.
 const AGAINST: f64 = -0.5;
@@ -51,8 +52,9 @@ pub(super) struct Sides {
 impl Sides {
     pub(super) fn class(&self) -> Option<(LoopClass, String)> {
         let width = self.width?;
-        let Self { inner, across, near, touching, share, unevenness, .. } = self;
-        if touching == inner {
+        let Self { share, unevenness, .. } = self;
+        let [inner, across, near] = [self.inner, self.across, self.near].map(Count);
+        if self.touching == self.inner {
             let rule = format!("all {inner} vertices between its ends lie within the weld tolerance of the other side");
             return Some((LoopClass::Crack, rule));
         }
@@ -62,7 +64,7 @@ impl Sides {
             );
             return Some((LoopClass::Misaligned, rule));
         }
-        if most(*near, *inner) {
+        if most(self.near, self.inner) {
             let rule =
                 format!("{near} of {inner} vertices lie within {share} of their edges of the other side, which runs alike");
             return Some((LoopClass::Gap, rule));

@@ -161,7 +161,10 @@ fn the_edges_of_a_soup_are_counted_before_they_are_compared() {
     // 30,000 edges of 352 bytes are 10 MiB; what is kept of the triangles is 2 MiB.
     let error = inspected(12 << 20).unwrap_err();
     assert!(matches!(error, Error::Starved { .. }), "{error}");
-    assert!(error.to_string().contains("10000 triangles lie at defects, with 30000 edges that only one triangle has"), "{error}");
+    assert!(
+        error.to_string().contains("10 000 triangles lie at defects, with 30 000 edges that only one triangle has"),
+        "{error}"
+    );
 }
 
 /// As one facet after the other is exported by programs that transform each for itself.

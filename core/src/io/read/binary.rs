@@ -8,6 +8,7 @@
 use super::finding::{Finding, Rejection};
 use super::limits::{HEADER_BYTES, MAX_TRIANGLES, PREFIX_BYTES};
 use crate::io::record::{self, Record};
+use crate::util::words::Count;
 
 /// Records looked at when a file must prove that it holds triangles.
 const SAMPLES: usize = 1000;
@@ -67,15 +68,19 @@ pub(super) fn mismatched(bytes: &[u8]) -> Option<Result<Layout, Rejection>> {
             if !look_like_triangles(all, Normals::Checked) {
                 return (declared == 0 && is_blank(body.get(..1 << 20).unwrap_or(body))).then(|| Err(no_triangles()));
             }
-            findings
-                .push(Finding::flaw(format!("header leaves the count open ({declared}), file holds {} triangles", all.len())));
+            findings.push(Finding::flaw(format!(
+                "header leaves the count open ({}), file holds {} triangles",
+                Count(declared),
+                Count(all.len())
+            )));
             all.len()
         }
         _ if announced > all.len() => {
             if !look_like_triangles(all, Normals::Checked) {
                 return None;
             }
-            let text = format!("header says {declared} triangles, file holds {}: cut off or miscounted", all.len());
+            let text =
+                format!("header says {} triangles, file holds {}: cut off or miscounted", Count(declared), Count(all.len()));
             findings.push(if announced - all.len() > 1 { Finding::loss(text) } else { Finding::flaw(text) });
             all.len()
         }
@@ -87,10 +92,14 @@ pub(super) fn mismatched(bytes: &[u8]) -> Option<Result<Layout, Rejection>> {
             }
             if beyond.is_empty() || !look_like_triangles(beyond, Normals::Checked) {
                 let trailing = body.len() - counted.as_flattened().len();
-                findings.push(Finding::flaw(format!("{trailing} {} after the last triangle, ignored", bytes_word(trailing))));
+                findings.push(Finding::flaw(format!(
+                    "{} {} after the last triangle, ignored",
+                    Count(trailing),
+                    bytes_word(trailing)
+                )));
                 return Some(within_bounds(counted.len(), findings));
             }
-            findings.push(Finding::flaw(format!("header says {declared} triangles, file holds {}", all.len())));
+            findings.push(Finding::flaw(format!("header says {} triangles, file holds {}", Count(declared), Count(all.len()))));
             all.len()
         }
     };
@@ -98,7 +107,7 @@ pub(super) fn mismatched(bytes: &[u8]) -> Option<Result<Layout, Rejection>> {
         let what = if announced > all.len() && declared != u32::MAX { "a triangle that is cut off" } else { "trailing" };
         findings.push(Finding::flaw(format!(
             "{} {} after the last whole triangle ({what}), ignored",
-            rest.len(),
+            Count(rest.len()),
             bytes_word(rest.len())
         )));
     }

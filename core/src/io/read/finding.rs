@@ -2,6 +2,7 @@
 
 use super::limits::MAX_TRIANGLES;
 use crate::contract::error::Error;
+use crate::util::words::Count;
 use std::path::Path;
 
 /// Something odd about the file itself (not about its mesh).
@@ -52,7 +53,7 @@ impl Rejection {
             Self::Unreadable(reason) => Error::Unreadable { path: path.to_owned(), reason },
             Self::TooMany => Error::Refused {
                 path: path.to_owned(),
-                reason: format!("more than {MAX_TRIANGLES} triangles"),
+                reason: format!("more than {} triangles", Count(MAX_TRIANGLES)),
                 advice: "split it, for no binary STL can count them".into(),
             },
         }

@@ -6,6 +6,7 @@ use std::os::unix::fs::FileExt;
 
 use super::finding::{Finding, Loss};
 use crate::io::record::Record;
+use crate::util::words::Count;
 
 /// Fewer records of zeros at the end may be an exporter's. (None of 104 binary files from many makers ended in a single one.)
 const FEWEST_RECORDS: usize = 8;
@@ -44,7 +45,7 @@ pub(super) fn split(bytes: &[u8]) -> (&[u8], usize) {
 pub(super) fn of_records(records: &[Record]) -> Option<Finding> {
     let zeros = split(records.as_flattened()).1 / size_of::<Record>();
     (zeros >= FEWEST_RECORDS).then(|| {
-        let all = records.len();
+        let (zeros, all) = (Count(zeros), Count(records.len()));
         cut_off(format!("its last {zeros} of {all} records are zeros, as in a file that was cut off while it was copied"))
     })
 }
@@ -56,9 +57,9 @@ pub(super) fn of_text(text: &[u8], zeros: usize) -> Option<Finding> {
     }
     let end = text.get(text.len().saturating_sub(BLOCK)..).unwrap_or_default();
     Some(if zeros < BLOCK && is_complete_text(end) {
-        Finding { harmless: true, ..Finding::flaw(format!("padded with {zeros} zero bytes")) }
+        Finding { harmless: true, ..Finding::flaw(format!("padded with {} zero bytes", Count(zeros))) }
     } else {
-        cut_off(format!("its last {zeros} bytes are zeros, as in a file that was cut off while it was copied"))
+        cut_off(format!("its last {} bytes are zeros, as in a file that was cut off while it was copied", Count(zeros)))
     })
 }
 

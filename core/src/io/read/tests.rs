@@ -16,6 +16,7 @@ use super::*;
 use crate::contract::error::ErrorClass;
 use crate::contract::settings::Limits;
 use crate::io::record::{encode, flip};
+use crate::util::words::Count;
 
 /// A tetrahedron with its right angle at the origin.
 pub(super) fn tetrahedron() -> Vec<Record> {
@@ -83,7 +84,7 @@ fn the_length_is_believed_rather_than_the_count() {
     for count in [0, 3, 5, 1_000_000, u32::MAX] {
         let file = open(&binary_file(b"", count, &tetrahedron(), b"")).unwrap();
         assert_eq!(file.records(), tetrahedron(), "count {count}");
-        assert!(texts(&file)[0].contains(&count.to_string()) && texts(&file)[0].contains("holds 4"), "{:?}", texts(&file));
+        assert!(texts(&file)[0].contains(&Count(count).to_string()) && texts(&file)[0].contains("holds 4"), "{:?}", texts(&file));
         assert!(!file.is_flawless());
     }
 }
@@ -168,7 +169,7 @@ fn more_triangles_than_a_count_holds_are_refused() {
     let layout = binary::within_bounds(MAX_TRIANGLES as usize + 1, Vec::new());
     let error = layout.unwrap_err().at(Path::new("huge.stl"));
     assert_eq!(error.class(), ErrorClass::Refused);
-    assert!(error.to_string().contains("more than 4294967295 triangles"), "{error}");
+    assert!(error.to_string().contains("more than 4 294 967 295 triangles"), "{error}");
     assert!(binary::within_bounds(MAX_TRIANGLES as usize, Vec::new()).is_ok());
 }
 

@@ -20,6 +20,7 @@ use crate::contract::settings::Limits;
 use crate::io::disk_space::{self, Need};
 use crate::io::record::Record;
 use crate::io::write_behind::{self, WriteBehind};
+use crate::util::words::Count;
 
 /// Text parsed at a time by one thread.
 pub(super) const WINDOW: usize = 1 << 20;
@@ -111,7 +112,7 @@ impl<'a> Windows<'a> {
             let end = match facets::next_facet(self.text, self.at.saturating_add(WINDOW), limit) {
                 Some(end) => end,
                 None if limit < self.text.len() => {
-                    let reason = format!("{} MiB of text without a new facet, from byte {} on", LONGEST >> 20, self.at);
+                    let reason = format!("{} MiB of text without a new facet, from byte {} on", LONGEST >> 20, Count(self.at));
                     return Err(Rejection::Unreadable(reason));
                 }
                 None => self.text.len(),
@@ -164,7 +165,7 @@ fn judge(tally: &Tally, records: u64) -> std::result::Result<(), Rejection> {
         Err(Rejection::Unreadable("decimal commas and decimal points are mixed".into()))
     } else if tally.damaged > records / 2 && tally.damaged > 0 {
         let vertices = vertices_word(tally.damaged);
-        let reason = format!("{vertices} with coordinates that are no numbers, the first at byte {damage}");
+        let reason = format!("{vertices} with coordinates that are no numbers, the first at byte {}", Count(damage));
         Err(Rejection::Unreadable(reason))
     } else if records == 0 {
         Err(binary::no_triangles())
@@ -189,32 +190,36 @@ fn findings(tally: &Tally) -> Vec<Finding> {
     flaw(tally.solids == 0, &|| "does not begin with \"solid\"".into());
     flaw(tally.ends < tally.solids, &|| match tally.solids {
         1 => "no endsolid".into(),
-        solids => format!("{} of {solids} solids have no endsolid", solids - tally.ends),
+        solids => format!("{} of {} solids have no endsolid", Count(solids - tally.ends), Count(solids)),
     });
     flaw(tally.unclosed > 0, &|| format!("{} without endfacet", facets_word(tally.unclosed)));
     flaw(tally.short > 0, &|| format!("{} of fewer than three vertices, left out", facets_word(tally.short)));
     flaw(tally.polygons > 0, &|| format!("{} of more than three vertices, cut into triangles", facets_word(tally.polygons)));
     flaw(tally.damaged > 0, &|| {
         let at = tally.first_damage.unwrap_or_default();
-        format!("{} with a coordinate that is no number, read as NaN; the first at byte {at}", vertices_word(tally.damaged))
+        format!(
+            "{} with a coordinate that is no number, read as NaN; the first at byte {}",
+            vertices_word(tally.damaged),
+            Count(at)
+        )
     });
     flaw(tally.odd_names > 0, &|| "the name of a solid is not UTF-8".into());
     if tally.solids > 1 {
         // Every common slicer joins them.
         let names: Vec<_> = tally.names.iter().map(|name| String::from_utf8_lossy(name)).collect();
         let more = if tally.solids > names.len() as u64 { ", …" } else { "" };
-        let text = format!("{} solids ({}{more}), read as one mesh", tally.solids, names.join(", "));
+        let text = format!("{} solids ({}{more}), read as one mesh", Count(tally.solids), names.join(", "));
         found.push(Finding { harmless: true, ..Finding::flaw(text) });
     }
     found
 }
 
 fn facets_word(count: u64) -> String {
-    if count == 1 { "1 facet".into() } else { format!("{count} facets") }
+    if count == 1 { "1 facet".into() } else { format!("{} facets", Count(count)) }
 }
 
 fn vertices_word(count: u64) -> String {
-    if count == 1 { "1 vertex".into() } else { format!("{count} vertices") }
+    if count == 1 { "1 vertex".into() } else { format!("{} vertices", Count(count)) }
 }
 
 /// A binary header from the first solid's name, in ASCII since headers declare no encoding.

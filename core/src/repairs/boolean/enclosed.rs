@@ -27,7 +27,7 @@ use crate::submesh::components::{Component, Components, Reversed};
 use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
 use crate::util::ids::NONE;
-use crate::util::words::{Short, span};
+use crate::util::words::{Count, Short, span};
 
 /// Specks of which nothing is told are together no more than this share of all volume.
 const SPECK: f64 = 1e-3;
@@ -55,7 +55,7 @@ pub(crate) const REPAIR: Repair = Repair {
                 span([bounds.lo, bounds.hi])
             ));
         }
-        let note = format!("bodies in the material of others removed: {bodies}, of {} units³ together", Short(volume));
+        let note = format!("bodies in the material of others removed: {}, of {} units³ together", Count(bodies), Short(volume));
         Ok(Done { changed, ..Done::count(bodies, note) })
     },
 };

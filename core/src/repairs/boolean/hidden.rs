@@ -34,7 +34,7 @@ use crate::repairs::shared::work::Work;
 use crate::submesh::components::{Components, Reversed};
 use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
-use crate::util::words::Short;
+use crate::util::words::{Count, Short};
 
 /// Surface that other surface hides.
 pub(crate) const REPAIR: Repair = Repair {
@@ -82,7 +82,7 @@ pub(crate) struct Hidden {
 impl std::fmt::Display for Hidden {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let others = self.pieces - self.bodies - self.cavities;
-        let Self { bodies, cavities, .. } = self;
+        let (bodies, cavities, others) = (Count(self.bodies), Count(self.cavities), Count(others));
         let (volume, filled) = (Short(self.volume), Short(self.filled));
         write!(f, "pieces of surface removed that others hide in all six directions; bodies: {bodies}, of {volume} units³, ")?;
         write!(f, "cavities, which are filled thereby: {cavities}, of {filled} units³, sheets and others: {others}")

@@ -46,7 +46,7 @@ use crate::submesh::components::{Component, Components, Reversed};
 use crate::submesh::{Origin, Vertex};
 use crate::topology::survey::{Division, Survey};
 use crate::util::ids::NONE;
-use crate::util::words::Short;
+use crate::util::words::{Count, Short};
 
 /// Surfaces that cross each other, and the patches that were to be cut.
 pub(crate) const REPAIR: Repair = Repair { name: RepairName::SelfIntersection, changes: Changes::Surface, run: account_for };
@@ -69,13 +69,14 @@ fn account_for(cx: &mut Context<'_, '_>) -> Result<Done> {
     cx.account.enclose(resolved.bodies, resolved.volume);
     cx.handed.unsettled.append(&mut resolved.regions_left);
     cx.handed.may_cross |= !resolved.left.is_empty();
-    let left = resolved.left.iter().map(|(failure, pieces)| format!("of {pieces} pieces of surface: {failure}"));
+    let left = resolved.left.iter().map(|(failure, pieces)| format!("of {} pieces of surface: {failure}", Count(*pieces)));
     cx.handed.intersections_left.extend(left);
     let Resolved { pairs, rounds, displaced, bodies, volume, .. } = resolved;
     let note = format!(
         "pairs of triangles that crossed; rounds: {rounds}, vertices moved by at most {}, bodies that became part of others: \
-         {bodies}, with {} units³ of them",
+         {}, with {} units³ of them",
         Short(displaced),
+        Count(bodies),
         Short(volume)
     );
     Ok(Done { changed, ..Done::count(pairs, note) })
@@ -306,10 +307,14 @@ fn refused(means: &Means<'_>, needed: u64, triangles: usize) -> Error {
     let mebibytes = |bytes: u64| bytes.div_ceil(1 << 20);
     Error::Starved {
         path: means.path.into(),
-        reason: format!("cutting {triangles} triangles along what they cross needs about {} MiB of memory", mebibytes(needed)),
+        reason: format!(
+            "cutting {} triangles along what they cross needs about {} MiB of memory",
+            Count(triangles),
+            Count(mebibytes(needed))
+        ),
         advice: format!(
             "the budget is {} MiB: raise --memory, or leave crossings (resolve_crossings)",
-            means.limits.memory_bytes >> 20
+            Count(means.limits.memory_bytes >> 20)
         ),
     }
 }

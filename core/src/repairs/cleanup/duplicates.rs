@@ -13,6 +13,7 @@ use crate::repairs::shared::work::{Pass, Work};
 use crate::submesh::edges::Edges;
 use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
+use crate::util::words::Count;
 
 /// Walls that may have been surface that is drawn twice are told of from this share of all area.
 const SPECK: f64 = 1e-3;
@@ -31,7 +32,7 @@ pub(crate) const DUPLICATE: Repair = Repair {
         if dropped.unsure > 0 {
             cx.account.doubts.push(format!(
                 "{} triangles of walls in common were removed, many of which face the same way: they may have been the wall of a cavity, drawn twice",
-                dropped.unsure
+                Count(dropped.unsure)
             ));
         }
         Ok(Done { changed: dropped.all > 0, ..Done::count(dropped.all - dropped.walls, NOTE) })

@@ -334,6 +334,6 @@ mod tests {
     #[test]
     fn a_surface_that_is_bent_by_more_than_rounding_is_continued() {
         // The hole's middle is 0.01 off its rim.
-        assert_eq!(closed(0.00125), BTreeMap::from([("planar (shaped)".into(), 1)]));
+        assert_eq!(closed(0.00125), BTreeMap::from([("planar (shaped like what is around)".into(), 1)]));
     }
 }

@@ -31,6 +31,7 @@ use crate::detect::holes::{
     owners::Owners,
 };
 use crate::repairs::holes::fair;
+use crate::repairs::holes::patches::in_words;
 use crate::repairs::shared::admission::Admission;
 use crate::repairs::shared::work::Work;
 use crate::submesh::components::Reversed;
@@ -38,6 +39,7 @@ use crate::submesh::near::Tolerance;
 use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
 use crate::util::parallel;
+use crate::util::words::Count;
 
 /// Loops. Hands over what no patch closes.
 pub(crate) const REPAIR: Repair = Repair {
@@ -46,7 +48,8 @@ pub(crate) const REPAIR: Repair = Repair {
     run: |cx| {
         let closed =
             fill_loops(cx.survey, &mut cx.work, &cx.reversed, cx.tolerance, (cx.profile, cx.handed.only_loop), cx.limits.threads);
-        let parts: Vec<String> = closed.by_method.iter().map(|(name, count)| format!("{count} {name}")).collect();
+        let parts: Vec<String> =
+            closed.by_method.iter().map(|(method, count)| format!("{} {}", Count(*count), in_words(method))).collect();
         cx.account.loops_left = closed.left;
         (cx.handed.kept_open, cx.handed.kept_sheets) = (closed.kept_open, closed.kept_sheets);
         cx.handed.sheets = closed.sheets;

@@ -14,6 +14,26 @@ pub(crate) const EXTENDED: &str = "planes to where they meet";
 /// Name of the method that closes a hole around its islands.
 pub(crate) const ISLANDS: &str = "islands";
 
+/// How loops were closed, for people; what stands in brackets after the method stays.
+pub(crate) fn in_words(method: &str) -> String {
+    const WORDS: [(&str, &str); 11] = [
+        ("triangle", "by one triangle"),
+        ("planar", "in their plane"),
+        ("minimum_weight", "with the least bend"),
+        ("least_area", "with the least area"),
+        ("front", "inwards from the rim"),
+        ("projected", "as seen from one side"),
+        ("search", "by search"),
+        ("zipped", "side to side"),
+        ("annular", "by a strip between two rims"),
+        ("slit", "as slits"),
+        (ISLANDS, "around islands"),
+    ];
+    let (name, more) = method.split_at(method.find(" (").unwrap_or(method.len()));
+    let words = WORDS.iter().find(|(known, _)| *known == name).map_or(name, |(_, words)| words);
+    format!("{words}{more}")
+}
+
 /// How much of a guess a patch of planes is.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Planes {
@@ -107,4 +127,22 @@ pub(crate) fn of_submesh(rim: &Loop, patch: &triangulate::Patch) -> Vec<[Vertex;
 /// The vertices of some loops, one loop after the other.
 pub(crate) fn concatenated(group: &[&Loop]) -> Vec<Vertex> {
     group.iter().flat_map(|rim| rim.vertices.iter().copied()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::algorithms::triangulate::Method;
+
+    #[test]
+    fn no_name_of_a_method_is_told_to_people() {
+        use Method::{Front, LeastArea, MinimumWeight, Planar, Projected, Search, Triangle, Zipped};
+        let methods = [Front, LeastArea, MinimumWeight, Planar, Projected, Search, Triangle, Zipped].map(Method::name);
+        for name in methods.into_iter().chain(["annular", "slit", ISLANDS]) {
+            let words = in_words(name);
+            assert!(words != name && words.contains(' ') && !words.contains('_'), "{words}");
+            assert_eq!(in_words(&format!("{name} (shaped)")), format!("{words} (shaped)"));
+        }
+        assert_eq!(in_words(EXTENDED), EXTENDED);
+    }
 }

@@ -9,6 +9,7 @@ use crate::repairs::shared::work::Work;
 use crate::submesh::components::nonmanifold_vertices;
 use crate::submesh::{Submesh, Vertex};
 use crate::topology::survey::Survey;
+use crate::util::words::{Count, Short};
 use std::fmt;
 
 /// Counts and distances of the surfaces that were taken apart.
@@ -54,15 +55,16 @@ impl Separated {
 
 impl fmt::Display for Separated {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { vertices, edges, removed, left, farthest, .. } = self;
+        let [vertices, edges, removed, left] = [self.vertices, self.edges, self.removed, self.left].map(Count);
+        let farthest = Short(self.farthest);
         write!(
             f,
-            "surfaces that met given a vertex of their own: {vertices} at vertices, {edges} on edges, moved by at most {farthest:e}"
+            "surfaces that met given a vertex of their own: {vertices} at vertices, {edges} on edges, moved by at most {farthest}"
         )?;
-        if *removed > 0 {
+        if self.removed > 0 {
             write!(f, "; closed without it: {removed}")?;
         }
-        if *left > 0 {
+        if self.left > 0 {
             write!(f, "; vertices where surfaces still meet: {left}")?;
         }
         Ok(())

@@ -17,6 +17,7 @@ use crate::repairs::stitch::weld::{self, Welded};
 use crate::repairs::stitch::zip;
 use crate::submesh::near::{Tolerance, nearest_edge};
 use crate::topology::survey::Survey;
+use crate::util::words::{Count, Short};
 
 mod clusters;
 mod rims;
@@ -29,8 +30,9 @@ pub(crate) const REPAIR: Repair = Repair {
     run: |cx| {
         let sewn = sew(cx.survey, &mut cx.work, cx.tolerance, cx.profile);
         let note = format!(
-            "vertices of rims that run along each other, joined beyond the weld tolerance, and edges split for that ({}); the farthest lay {:.3e} apart",
-            sewn.splits, sewn.widest
+            "vertices of rims that run along each other, joined beyond the weld tolerance, and edges split for that ({}); the farthest lay {} apart",
+            Count(sewn.splits),
+            Short(sewn.widest)
         );
         Ok(Done::count(sewn.vertices + sewn.splits, note))
     },

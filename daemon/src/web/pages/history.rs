@@ -10,7 +10,7 @@ use maud::{Markup, html};
 use suture_store::{Job, JobId, Kind};
 
 use super::frame::Frame;
-use crate::html::words::{mark, time};
+use crate::html::words::{mark, prose, time};
 use crate::say::plain;
 use crate::shown::reason;
 use crate::units::show_count;
@@ -105,10 +105,16 @@ fn table(jobs: &[Job], of_folders: bool) -> Markup {
                 @if of_folders { td { (plain(&job.source.folder)) } }
                 td { (mark(job)) }
                 td class="time" { (time(job.changed)) }
-                td class="why" { (plain(&reason(job))) @if let Some(other) = job.publication().and_then(|publication| publication.reused) { " Copy of the result of " a href={ "/jobs/" (other) } { "job " (other) } "." } }
+                td class="why" { (why(job)) @if let Some(other) = job.publication().and_then(|publication| publication.reused) { " Copy of the result of " a href={ "/jobs/" (other) } { "job " (other) } "." } }
             } } }
         } }
     }
+}
+
+/// Why a job stands where it stands. What was too long to be kept is whole on its page.
+pub(super) fn why(job: &Job) -> Markup {
+    let reason = prose(&reason(job));
+    html! { (reason) @if reason.ends_with('…') { " " a href={ "/jobs/" (job.id) } { "All of it" } } }
 }
 
 /// The file's name, which leads to its job.

@@ -15,7 +15,7 @@ use super::frame::Frame;
 use super::night::{self, progress};
 use super::places;
 use crate::html::report;
-use crate::html::words::{advice, state, time};
+use crate::html::words::{advice, prose, state, time};
 use crate::left::area;
 use crate::say::plain;
 use crate::shown::{hint, reason};
@@ -71,7 +71,7 @@ fn standing(job: &Job, reasons: &[String]) -> Markup {
     html! {
         div class={ "outcome " (class) } role="status" {
             strong { (words) }
-            @if !reasons.is_empty() { p { "Why:" } (report::reasons(reasons)) } @else if !why.is_empty() { p { (if hint(job).is_some() { "Note: " } else { "Why: " }) (plain(&why)) } }
+            @if !reasons.is_empty() { p { "Why:" } (report::reasons(reasons)) } @else if !why.is_empty() { p { (if hint(job).is_some() { "Note: " } else { "Why: " }) (prose(&why)) } }
             @if !advice.is_empty() { p { "What to do: " (plain(&advice)) } }
         }
     }

@@ -9,13 +9,12 @@ use maud::{Markup, html};
 use suture_store::{Job, Kind, Look};
 
 use super::frame::Frame;
-use super::history::{link, list_of};
+use super::history::{link, list_of, why};
 use crate::attempt::Context;
 use crate::event_bus::Bus;
 use crate::html::words::{brief_advice, how_many_need_you, mark, of_which_kind, time};
 use crate::night::NEED_SOMEONE;
 use crate::say::plain;
-use crate::shown::reason;
 use crate::units::{show_count, show_size};
 use crate::web::ask::ask;
 use crate::web::problem::Problem;
@@ -136,7 +135,7 @@ fn advised(jobs: &[Job], of_folders: bool, said: &str) -> Markup {
         div class="wide" { table {
             thead { tr { th scope="col" { "File" } @if of_folders { th scope="col" { "Folder" } } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { (said) } th scope="col" { "What to do" } } }
             tbody { @for job in jobs { tr {
-                td class="file" { (link(job)) } @if of_folders { td { (plain(&job.source.folder)) } } td { (mark(job)) } td class="time" { (time(job.changed)) } td class="why" { (plain(&reason(job))) } td class="why" { (plain(&brief_advice(job))) }
+                td class="file" { (link(job)) } @if of_folders { td { (plain(&job.source.folder)) } } td { (mark(job)) } td class="time" { (time(job.changed)) } td class="why" { (why(job)) } td class="why" { (plain(&brief_advice(job))) }
             } } }
         } }
     }
@@ -151,7 +150,7 @@ fn put_off(night: &Night) -> Markup {
             div class="wide" { table {
                 thead { tr { th scope="col" { "File" } @if night.of_folders() { th scope="col" { "Folder" } } th scope="col" { "Since" } th scope="col" { "Why" } th scope="col" { "Tried again" } } }
                 tbody { @for job in &night.put_off { tr {
-                    td class="file" { (link(job)) } @if night.of_folders() { td { (plain(&job.source.folder)) } } td class="time" { (time(job.changed)) } td class="why" { (plain(&reason(job))) } td class="time" { @if let Some(pause) = job.pause() { (time(pause)) } }
+                    td class="file" { (link(job)) } @if night.of_folders() { td { (plain(&job.source.folder)) } } td class="time" { (time(job.changed)) } td class="why" { (why(job)) } td class="time" { @if let Some(pause) = job.pause() { (time(pause)) } }
                 } } }
             } }
             @if more > 0 { p { a href=(list_of(&[Kind::Waiting])) { (show_count(more)) " more" } } }
@@ -165,7 +164,7 @@ fn in_work(night: &Night, bus: &Bus) -> Markup {
         h2 { "In work" }
         @if night.in_work.is_empty() { p { "Nothing is in work." } } @else {
             div class="wide" { table {
-                thead { tr { th scope="col" { "File" } @if night.of_folders() { th scope="col" { "Folder" } } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Stage, and how far" } } }
+                thead { tr { th scope="col" { "File" } @if night.of_folders() { th scope="col" { "Folder" } } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "At what, and how far" } } }
                 tbody { @for job in &night.in_work { tr {
                     td class="file" { (link(job)) } @if night.of_folders() { td { (plain(&job.source.folder)) } } td { (mark(job)) } td class="time" { (time(job.changed)) } td { (progress(job, bus)) }
                 } } }
@@ -187,11 +186,16 @@ pub(super) fn place_of(context: &Context, name: &str) -> String {
 /// How far a job in work is; a script keeps it current.
 pub(super) fn progress(job: &Job, bus: &Bus) -> Markup {
     let far = bus.progress_of(job.id).filter(|_| job.kind() == Kind::Running);
-    let (stage, percent) = far.map_or((String::new(), 0), |far| (far.stage, far.percent));
+    let (doing, percent) = match far {
+        Some(far) => (far.doing, far.percent),
+        None if job.kind() == Kind::Running => ("begun", 0),
+        // What is held else is done, but for its way into place.
+        None => ("bringing the result into place", 100),
+    };
     html! {
         span data-progress=(job.id) {
             progress max="100" value=(percent) aria-label={ "Progress of job " (job.id) } {} " "
-            span { @if stage.is_empty() { "begun" } @else { (plain(&stage.replace('_', " "))) ", " (percent) " %" } }
+            span { (doing) @if (1..100).contains(&percent) { ", " (percent) " %" } }
         }
     }
 }

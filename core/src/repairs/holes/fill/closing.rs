@@ -219,7 +219,7 @@ impl Closing<'_> {
             let loops = patch.rims.len() as u64;
             closed.loops += loops;
             let shaped = match patch {
-                _ if !patch.coarse.is_empty() => " (shaped)",
+                _ if !patch.coarse.is_empty() => " (shaped like what is around)",
                 _ if patch.across => " (across a body met already)",
                 _ if patch.to_be_cut => " (to be cut along what it crosses)",
                 _ => "",

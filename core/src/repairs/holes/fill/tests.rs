@@ -66,7 +66,7 @@ fn a_patch_continues_the_globe() {
         (closed, new.into_iter().map(|r| (r - 10.0).abs()).fold(0.0, f64::max))
     });
     assert!(got.verdict.good, "{:?}", got.verdict);
-    assert_eq!(got.result.0.by_method, BTreeMap::from([("planar (shaped)".into(), 1)]));
+    assert_eq!(got.result.0.by_method, BTreeMap::from([("planar (shaped like what is around)".into(), 1)]));
     // A flat cap would leave 1.3 of height out; the facets of the globe leave 0.021.
     assert!(got.result.1 < 0.03, "{}", got.result.1);
     let flat = Profile { patch_shape: PatchShape::Flat, ..Profile::default() };
@@ -106,7 +106,7 @@ fn holes_of_two_bodies_that_face_each_other_are_closed_each() {
     // Turned over around the x axis, above the other.
     let other: Vec<Corners> = open_globe().iter().map(|t| t.map(|[x, y, z]| [x, -y, 24.0 - z])).collect();
     let got = after(&[open_globe(), other].concat(), |d, _| fill(d, &Profile::default()));
-    assert_eq!(got.result.by_method, BTreeMap::from([("planar (shaped)".into(), 2)]));
+    assert_eq!(got.result.by_method, BTreeMap::from([("planar (shaped like what is around)".into(), 2)]));
     assert_eq!(got.defects.components, 2);
     assert!(got.verdict.good, "{:?}", got.verdict);
 }

@@ -3,7 +3,7 @@
 use std::ffi::OsStr;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use suture_store::job::Area;
 use suture_store::{RelPath, Token};
@@ -32,7 +32,8 @@ pub(crate) struct Folder {
     /// Names of results that other systems take for the same.
     pub alike: Alike,
     ground: Mutex<Result<Ground, Trace>>,
-    sentinel: OnceLock<Sentinel>,
+    /// `None`: whoever looks waits as long as it takes.
+    sentinel: Option<Sentinel>,
 }
 
 impl Folder {
@@ -62,9 +63,7 @@ impl Folder {
             (_, Some(known)) => Self::at(root, config, Err(known.clone())),
             (_, None) => return Err(FolderError::Silent { root }),
         };
-        // A new folder has none yet.
-        let _ = folder.sentinel.set(sentinel);
-        Ok(folder)
+        Ok(Self { sentinel: Some(sentinel), ..folder })
     }
 
     /// A folder that another daemon serves: it is away until that one lets go of it.
@@ -74,20 +73,13 @@ impl Folder {
     pub(crate) fn of_other(config: &FolderConfig) -> Result<Self, FolderError> {
         let root = std::path::absolute(&config.path).map_err(FolderError::unseen(&config.path))?;
         let trace = Trace::of_other(&root).map_err(FolderError::unseen(&root))?;
-        Ok(Self::at(root, config, Err(trace)))
+        let sentinel = Sentinel::post(&root).map_err(FolderError::unseen(&root))?;
+        Ok(Self { sentinel: Some(sentinel), ..Self::at(root, config, Err(trace)) })
     }
 
     fn at(root: PathBuf, config: &FolderConfig, ground: Result<Ground, Trace>) -> Self {
         let FolderConfig { name, leave_originals, on_taken, .. } = config.clone();
-        Self {
-            name,
-            root,
-            leave_originals,
-            on_taken,
-            alike: Alike::default(),
-            ground: Mutex::new(ground),
-            sentinel: OnceLock::new(),
-        }
+        Self { name, root, leave_originals, on_taken, alike: Alike::default(), ground: Mutex::new(ground), sentinel: None }
     }
 
     fn ground(&self) -> MutexGuard<'_, Result<Ground, Trace>> {
@@ -96,12 +88,12 @@ impl Folder {
 
     /// Asks whether it answers, before a look that nobody may wait for.
     pub(crate) fn answers(&self) -> Answer {
-        self.sentinel.get().map_or(Answer::Yes, Sentinel::answers)
+        self.sentinel.as_ref().map_or(Answer::Yes, Sentinel::answers)
     }
 
     /// It has not answered for a long time, in words. Looks at nothing.
     pub(crate) fn silence(&self) -> Option<String> {
-        let is_silent = self.sentinel.get().is_some_and(Sentinel::is_silent);
+        let is_silent = self.sentinel.as_ref().is_some_and(Sentinel::is_silent);
         is_silent.then(|| FolderError::Silent { root: self.root.clone() }.to_string())
     }
 
@@ -111,7 +103,7 @@ impl Folder {
     /// # Errors
     /// A line for people.
     pub(crate) fn check(&self) -> Result<(), String> {
-        if self.sentinel.get().is_some_and(|sentinel| sentinel.answers_at_last() != Answer::Yes) {
+        if self.sentinel.as_ref().is_some_and(|sentinel| sentinel.answers_at_last() != Answer::Yes) {
             return Err(FolderError::Silent { root: self.root.clone() }.to_string());
         }
         match &*self.ground() {

@@ -134,15 +134,21 @@ fn open_folders(config: &Config) -> Result<Vec<Arc<Folder>>, FolderError> {
                 away.get_or_insert(error);
                 Folder::of_other(folder)?
             }
-            opened => opened?,
+            opened => {
+                let opened = opened?;
+                if opened.silence().is_none() {
+                    served += 1;
+                } else {
+                    let silent = FolderError::Silent { root: opened.root.clone() };
+                    // The job store cannot be opened there.
+                    if config.state.starts_with(&opened.root) {
+                        return Err(silent);
+                    }
+                    away.get_or_insert(silent);
+                }
+                opened
+            }
         };
-        // The job store cannot be opened there.
-        let holds_store = || config.state.starts_with(&opened.root);
-        match opened.silence() {
-            None => served += 1,
-            Some(_) if holds_store() => return Err(FolderError::Silent { root: opened.root }),
-            Some(_) => _ = away.get_or_insert(FolderError::Silent { root: opened.root.clone() }),
-        }
         folders.push(Arc::new(opened));
     }
     match away {

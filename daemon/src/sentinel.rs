@@ -16,8 +16,9 @@ use crate::ground::PARTS;
 
 /// An answer comes within this time, or is asked for later.
 const AT_ONCE: Duration = Duration::from_millis(20);
-/// For who works in a folder for a while, an answer holds so long.
-const HOLDS: Duration = Duration::from_millis(100);
+/// For who works in a folder for a while, an answer holds so long, as long as no other is owed. The folders are asked more often than that all the
+/// time, so that such a thread hardly ever waits.
+const HOLDS: Duration = Duration::from_millis(500);
 /// A folder that does not answer for so long is silent.
 const PATIENCE: Duration = Duration::from_secs(10);
 

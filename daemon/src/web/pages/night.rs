@@ -164,7 +164,7 @@ fn in_work(night: &Night, bus: &Bus) -> Markup {
         h2 { "In work" }
         @if night.in_work.is_empty() { p { "Nothing is in work." } } @else {
             div class="wide" { table {
-                thead { tr { th scope="col" { "File" } @if night.of_folders() { th scope="col" { "Folder" } } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "At what, and how far" } } }
+                thead { tr { th scope="col" { "File" } @if night.of_folders() { th scope="col" { "Folder" } } th scope="col" { "State" } th scope="col" { "Since" } th scope="col" { "Step, and how far" } } }
                 tbody { @for job in &night.in_work { tr {
                     td class="file" { (link(job)) } @if night.of_folders() { td { (plain(&job.source.folder)) } } td { (mark(job)) } td class="time" { (time(job.changed)) } td { (progress(job, bus)) }
                 } } }

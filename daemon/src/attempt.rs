@@ -324,7 +324,13 @@ impl Slot {
                         Err(reason) => Step::Environment { reason },
                     },
                     Worked::None(ending, reason) => return desk.intend(job, &Conclusion::None { ending, reason }).map(Some),
-                    Worked::Step(step) => step,
+                    Worked::Step(step) => {
+                        if matches!(step, Step::Withdrawn(_)) {
+                            // Of the right folder: where a mount is gone, the file is not to be seen, and has not changed.
+                            folder.check().map_err(PublishError::Folder)?;
+                        }
+                        step
+                    }
                     Worked::Lost => return Ok(None),
                 }
             }

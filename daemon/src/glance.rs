@@ -86,8 +86,9 @@ pub(crate) struct Served {
     pub name: String,
     pub path: PathBuf,
     pub reachable: bool,
-    /// Bytes that results may still fill.
-    pub free_bytes: u64,
+    /// Bytes that results may still fill; of a folder out of reach nobody knows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub free_bytes: Option<u64>,
 }
 
 impl Glance {
@@ -166,11 +167,11 @@ pub(crate) fn counts(context: &Context) -> Result<BTreeMap<Kind, u64>, StoreErro
 
 /// The hot folders, as they are now.
 pub(crate) fn folders(context: &Context) -> Vec<Served> {
-    let served = |folder: &Arc<Folder>| Served {
-        name: folder.name.clone(),
-        path: std::path::absolute(&folder.root).unwrap_or_else(|_| folder.root.clone()),
-        reachable: folder.check().is_ok(),
-        free_bytes: context.room(folder),
+    let served = |folder: &Arc<Folder>| {
+        let reachable = folder.check().is_ok();
+        let free_bytes = reachable.then(|| context.room(folder)).filter(|room| *room < u64::MAX);
+        let path = std::path::absolute(&folder.root).unwrap_or_else(|_| folder.root.clone());
+        Served { name: folder.name.clone(), path, reachable, free_bytes }
     };
     context.folders.iter().map(served).collect()
 }
@@ -192,7 +193,7 @@ pub(crate) fn standing(context: &Context) -> Result<Standing, StoreError> {
             1 => "one event".to_owned(),
             more => format!("{} events", show_count(more)),
         };
-        Ok(format!("`{name}` has not heard of {events}: {why}"))
+        Ok(format!("the webhook `{name}` has not heard of {events}: {why}"))
     };
     let untold = context.pulse.all_troubles().into_iter().map(words).collect::<Result<_, StoreError>>()?;
     Ok(Standing { away, untold, ..context.schedule.standing() })

@@ -215,7 +215,7 @@ impl Ground {
         let same_lock = matches!((&lock, &held), (Ok(lock), Ok(held)) if (lock.dev, lock.ino) == *held);
         if id(&there) != self.id || !same_lock {
             return Err(format!(
-                "{shown}: is another folder than at the start (moved, removed or made anew); put it back, or start again"
+                "{shown}: is another folder than at the start (moved, removed or made anew); put it back, or restart the daemon to serve this one"
             ));
         }
         Ok(())

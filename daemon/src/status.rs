@@ -54,7 +54,11 @@ fn screen(dir: &Path, glance: &Glance) -> String {
     let untold = glance.standing.untold.iter().map(|who| ("not told yet", who));
     text.extend(held.chain(away).chain(untold).map(|(what, why)| format!("  {what}: {}\n", plain(why))));
     for folder in &glance.folders {
-        let room = if folder.reachable { format!("{} free", show_size(folder.free_bytes)) } else { "out of reach".into() };
+        let room = match folder.free_bytes {
+            _ if !folder.reachable => "out of reach".to_owned(),
+            Some(free) => format!("{} free", show_size(free)),
+            None => "in reach".to_owned(),
+        };
         let path = plain(&folder.path.display().to_string());
         text += &format!("  folder    {}: {room}  {path}\n", plain(&folder.name));
     }
@@ -122,7 +126,7 @@ mod tests {
             work: vec![work],
             last: vec![job(b"last.stl")],
             review: vec![job(b"odd\x1b.stl")],
-            folders: vec![Served { name: "hot".into(), path: "/srv/hot".into(), reachable: true, free_bytes: 1 << 30 }],
+            folders: vec![Served { name: "hot".into(), path: "/srv/hot".into(), reachable: true, free_bytes: Some(1 << 30) }],
             store_bytes: 4096,
             ..Glance::default()
         }

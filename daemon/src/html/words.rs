@@ -114,7 +114,7 @@ fn ended(job: &Job, ending: Ending) -> String {
         Ending::Refused => "It needs more than this machine allows (see the reason). Raise that limit and try again, or ask for a simpler file.".into(),
         Ending::Environment => "The file is not to blame. Remove the reason (disk, rights), then try again.".into(),
         Ending::Quarantined => {
-            "It crashed or blocked the repair each time. Release it to try once more, for example after an update; else ask for another file.".into()
+            "It crashed the repair each time, or took longer than `time_limit` allows (see the reason). Release it to try once more, for example after an update or with a longer limit; else ask for another file.".into()
         }
     }
 }

@@ -74,7 +74,8 @@ fn folders(text: &mut String, context: &Context) {
     let config = context.settings.now();
     let free = |path: &Path| fsx::free_space(path, 0) as f64;
     // Results may lie on a disk of their own.
-    let of_folders = context.folders.iter().flat_map(|folder| {
+    // One that answers nothing would be waited for without end.
+    let of_folders = context.folders.iter().filter(|folder| folder.check().is_ok()).flat_map(|folder| {
         let of = |role, path: &Path| (vec![("role", role), ("folder", folder.name.as_str())], free(path));
         [of("folder", &folder.root), of("results", &folder.out())]
     });

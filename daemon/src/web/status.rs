@@ -39,8 +39,9 @@ pub(super) struct Status {
 pub(super) struct Served {
     pub name: String,
     pub reachable: bool,
-    /// Bytes that results may still fill.
-    pub free_bytes: u64,
+    /// Bytes that results may still fill; of a folder out of reach nobody knows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub free_bytes: Option<u64>,
 }
 
 /// `GET /v1/status`.

@@ -103,7 +103,7 @@ fn f30_a_dead_receiver_slows_no_job_and_hears_all_when_it_is_back() {
     let client = Client::of(&daemon);
     wait_until("it is said", || client.get("/v1/status").json()["untold"].to_string().contains("`farm` has not heard of "));
     let listed = place.suture(["jobs", "list", "--dir", "hot"]).expect(0).stdout();
-    assert!(listed.contains("not told yet: `farm` has not heard of ") && listed.contains("refused"), "{listed}");
+    assert!(listed.contains("not told yet: the webhook `farm` has not heard of ") && listed.contains("refused"), "{listed}");
     let metrics = String::from_utf8(client.get("/metrics").body).unwrap();
     assert!(!metrics.contains("suture_webhook_pending{target=\"farm\"} 0"), "{metrics}");
     let done: Vec<_> = jobs(&place, "hot").iter().filter(|job| job["kind"] == "done").map(|job| job["id"].to_string()).collect();

@@ -228,7 +228,7 @@ fn folders(status: &Status, context: &Context) -> Markup {
                 th scope="row" { (plain(&folder.name)) }
                 td class="file" { (place_of(context, &folder.name)) }
                 td { @if folder.reachable { "yes" } @else { span class="state bad" { "no" } } }
-                td class="n" { (show_size(folder.free_bytes)) }
+                td class="n" { (folder.free_bytes.map_or_else(|| "–".to_owned(), show_size)) }
             } } }
         } }
         p class="soft" { "Suture " (status.version) }

@@ -81,8 +81,26 @@ pub(crate) fn conclude_unchanged(report: &mut Report, facts: &FileFacts, finding
     if report.task == Task::Repair && !report.verdict.good && !report.profile.repair {
         report.verdict.reasons.push(format!("nothing was repaired: the profile `{}` says `repair = false`", report.profile.name));
     }
+    tell_missing_first(report, findings);
     report.certificate = Some(certify(facts, &report.before, &flaws(findings)));
     report.hints = hints::hints(&report.before, &report.profile);
+}
+
+/// What a file lacks that it once had.
+fn missing(before: &Defects, findings: &[Finding]) -> Vec<String> {
+    let is_open = before.boundary_edges > 0;
+    let lost = findings.iter().filter(|f| f.loss == Loss::Certain || f.loss == Loss::IfOpen && is_open);
+    lost.map(|f| format!("a part is missing: {}", f.text)).collect()
+}
+
+/// Of a file that is not good, whoever reads why is to know first that a part of it never came: no other settings bring that back.
+fn tell_missing_first(report: &mut Report, findings: &[Finding]) {
+    if !report.verdict.good {
+        let missing = missing(&report.before, findings);
+        // Some of it is a flaw of the file as well.
+        report.verdict.reasons.retain(|reason| !missing.iter().any(|missing| missing.ends_with(reason.as_str())));
+        report.verdict.reasons.splice(0..0, missing);
+    }
 }
 
 /// Repairs what was diagnosed by these steps, if there is anything to be repaired: what is to be edited, and what a
@@ -146,15 +164,14 @@ pub(crate) fn conclude(report: &mut Report, input: &[Finding], (surface, evidenc
     let flaws = flaws(findings);
     report.verdict = verdict::judge(&defects, &flaws).under(report.profile.guarantee);
     report.outcome = if report.verdict.good { Outcome::Repaired } else { Outcome::NotGood };
+    tell_missing_first(report, input);
     let mut faithful = None;
     if report.verdict.good {
         let mut surface = *surface;
         surface.add(&evidence.asked.bounds);
         let before = Defects { area: report.before.area + evidence.asked.area, ..report.before.clone() };
         // What was closed had to be guessed: nobody knows what stood in the part that is missing.
-        let is_open = report.before.boundary_edges > 0;
-        let lost = input.iter().filter(|f| f.loss == Loss::Certain || f.loss == Loss::IfOpen && is_open);
-        let missing: Vec<String> = lost.map(|f| format!("a part is missing: {}", f.text)).collect();
+        let missing = missing(&report.before, input);
         let change = review::Change {
             before: &before,
             surface: &surface,

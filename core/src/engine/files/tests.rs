@@ -94,7 +94,9 @@ fn a_file_whose_last_records_are_zeros_is_never_good() {
         std::fs::write(&input, bytes).unwrap();
         let inspected = inspect(&input, &profile, &limits, &Quiet).unwrap();
         assert_eq!(inspected.outcome, Outcome::NotGood);
-        assert!(inspected.verdict.reasons.iter().any(|reason| reason.contains(said)), "{:?}", inspected.verdict);
+        let told: Vec<_> = inspected.verdict.reasons.iter().map(|reason| reason.contains(said)).collect();
+        assert!(told[0] && told.iter().filter(|told| **told).count() == 1, "first, and once: {:?}", inspected.verdict);
+        assert!(inspected.verdict.reasons[0].starts_with("a part is missing: "), "{:?}", inspected.verdict);
         let output = folder.path().join(&said[..9]);
         let repaired = repair(&input, &output, &profile, &limits, &Quiet).unwrap();
         assert_eq!((repaired.outcome, repaired.verdict.good), (Outcome::NeedsReview, true), "the half itself is closed");

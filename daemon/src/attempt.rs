@@ -296,11 +296,7 @@ impl Slot {
         // The token is new: a folder of that name was left by the daemon of another store, which had the hot folder before.
         remove_work(&work);
         let step = match claim(folder, job, &work, context.world.room(&folder.root, 0)) {
-            Err(Unclaimed::Withdrawn(why)) => {
-                // Of the right folder.
-                folder.check().map_err(PublishError::Folder)?;
-                Step::Withdrawn(why)
-            }
+            Err(Unclaimed::Withdrawn(why)) => Step::Withdrawn(why),
             Err(Unclaimed::Environment(reason)) => Step::Environment { reason },
             Err(Unclaimed::Shortage(reason)) => Step::Wait { reason },
             Ok(claimed) => {
@@ -324,17 +320,15 @@ impl Slot {
                         Err(reason) => Step::Environment { reason },
                     },
                     Worked::None(ending, reason) => return desk.intend(job, &Conclusion::None { ending, reason }).map(Some),
-                    Worked::Step(step) => {
-                        if matches!(step, Step::Withdrawn(_)) {
-                            // Of the right folder: where a mount is gone, the file is not to be seen, and has not changed.
-                            folder.check().map_err(PublishError::Folder)?;
-                        }
-                        step
-                    }
+                    Worked::Step(step) => step,
                     Worked::Lost => return Ok(None),
                 }
             }
         };
+        if matches!(step, Step::Withdrawn(_)) {
+            // Of the right folder: where a mount is gone, the file is not to be seen, and has not changed.
+            folder.check().map_err(PublishError::Folder)?;
+        }
         Ok(Some(context.store.advance(token, step)?))
     }
 

@@ -26,7 +26,7 @@ fn short(name: &str) -> String {
     if name.chars().count() <= MOST { name.to_owned() } else { name.chars().take(MOST - 1).chain(['…']).collect() }
 }
 
-/// What the bar says beside itself of one file after so many seconds.
+/// The words beside the bar of one file after so many seconds.
 fn message(course: &Course, seconds: f64) -> String {
     let mut text = course.doing().to_owned();
     if course.triangles() > 0 && course.share() > 0.0 && seconds > 0.0 {

@@ -132,7 +132,7 @@ impl Course {
         STEPS.iter().enumerate().find(|(_, step)| may_be(step))
     }
 
-    /// What some of the steps that are reckoned with weigh.
+    /// The weight of some of the steps that are reckoned with.
     fn weight(&self, which: impl Fn(usize) -> bool) -> f64 {
         let is_usual = |step: &Step| match step.comes {
             Comes::Always => true,
@@ -149,7 +149,7 @@ impl Course {
         &self.stage
     }
 
-    /// What is being done, for people.
+    /// The work of this moment, for people.
     pub(crate) fn doing(&self) -> &'static str {
         self.step.and_then(|step| STEPS.get(step)).map_or("at work", |step| step.doing)
     }

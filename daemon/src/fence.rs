@@ -79,7 +79,7 @@ pub(crate) fn keep_within(folders: &[PathBuf], reads: &[PathBuf]) -> Result<Rule
     Ok(rules.restrict_self()?.ruleset)
 }
 
-/// What is not there, or out of reach, stays so.
+/// A path that is not there, or out of reach, stays so.
 fn allow(rules: RulesetCreated, path: &Path, access: BitFlags<AccessFs>) -> Result<RulesetCreated, RulesetError> {
     match PathFd::new(path) {
         Ok(there) => rules.add_rule(PathBeneath::new(there, access)),

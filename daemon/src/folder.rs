@@ -93,8 +93,12 @@ impl Folder {
 
     /// It has not answered for a long time, in words. Looks at nothing.
     pub(crate) fn silence(&self) -> Option<String> {
-        let is_silent = self.sentinel.as_ref().is_some_and(Sentinel::is_silent);
-        is_silent.then(|| FolderError::Silent { root: self.root.clone() }.to_string())
+        self.sentinel.as_ref().is_some_and(Sentinel::is_silent).then(|| self.silent())
+    }
+
+    /// The words for a folder that does not answer.
+    pub(crate) fn silent(&self) -> String {
+        FolderError::Silent { root: self.root.clone() }.to_string()
     }
 
     /// Is the folder still the one that was opened? A path that leads elsewhere by now (renamed and made anew, a mount that came or went)
@@ -104,7 +108,7 @@ impl Folder {
     /// A line for people.
     pub(crate) fn check(&self) -> Result<(), String> {
         if self.sentinel.as_ref().is_some_and(|sentinel| sentinel.answers_at_last() != Answer::Yes) {
-            return Err(FolderError::Silent { root: self.root.clone() }.to_string());
+            return Err(self.silent());
         }
         match &*self.ground() {
             Ok(ground) => ground.check(&self.root),

@@ -57,7 +57,7 @@ pub(crate) struct Work {
     /// As the engine calls it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stage: Option<String>,
-    /// What is being done, for people.
+    /// The work of this moment, for people.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub doing: Option<String>,
     /// Of the whole.

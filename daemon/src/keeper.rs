@@ -363,7 +363,7 @@ impl Kept {
         let found = here.and_then(|()| self.reconciler.scan(now).map_err(|error| self.unreadable(&error)));
         let gone = match found {
             Ok(gone) => gone,
-            Err(error) => return self.is_away(context, now, error),
+            Err(error) => return self.tell_away(context, now, error),
         };
         self.looked_at(context, now, self.reconciler.left_out());
         if std::mem::take(&mut self.unavailable) {
@@ -376,7 +376,7 @@ impl Kept {
     }
 
     /// The folder is out of reach for this reason.
-    fn is_away(&mut self, context: &Context, now: Instant, why: String) -> Result<(), StoreError> {
+    fn tell_away(&mut self, context: &Context, now: Instant, why: String) -> Result<(), StoreError> {
         self.watched = None;
         if !std::mem::replace(&mut self.unavailable, true) {
             let (name, root) = (&self.folder.name, &self.folder.root);
@@ -412,8 +412,8 @@ impl Kept {
             Answer::Silent => {
                 // Looked at in full once it answers.
                 self.dirty = true;
-                let why = self.folder.silence().unwrap_or_default();
-                return self.is_away(context, now, why);
+                let why = self.folder.silent();
+                return self.tell_away(context, now, why);
             }
         }
         let since = self.scanned.map(|then| now.duration_since(then));

@@ -35,7 +35,7 @@ struct Given {
     names: HashSet<Vec<u8>>,
     /// The last version tried for an input's name.
     versions: HashMap<OsString, u32>,
-    /// What is in the folder.
+    /// Names that are in the folder.
     there: Alike,
 }
 

@@ -105,7 +105,7 @@ impl RepairName {
         Self::Wrap,
     ];
 
-    /// What is done, in words that follow "by".
+    /// Words for its work, which follow "by".
     pub fn doing(self) -> &'static str {
         match self {
             Self::Degenerate => "removing triangles of no area",

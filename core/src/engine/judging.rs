@@ -86,7 +86,7 @@ pub(crate) fn conclude_unchanged(report: &mut Report, facts: &FileFacts, finding
     report.hints = hints::hints(&report.before, &report.profile);
 }
 
-/// What a file lacks that it once had.
+/// Parts that a file once had and lacks, in words.
 fn missing(before: &Defects, findings: &[Finding]) -> Vec<String> {
     let is_open = before.boundary_edges > 0;
     let lost = findings.iter().filter(|f| f.loss == Loss::Certain || f.loss == Loss::IfOpen && is_open);

@@ -64,7 +64,8 @@ fn targets(text: &mut String, context: &Context) -> Result<(), Problem> {
 
 fn folders(text: &mut String, context: &Context) {
     let all = || context.folders.iter().map(|folder| (vec![("folder", folder.name.as_str())], folder));
-    let up = all().map(|(labels, folder)| (labels, f64::from(u8::from(folder.check().is_ok()))));
+    let reached: Vec<bool> = context.folders.iter().map(|folder| folder.check().is_ok()).collect();
+    let up = all().zip(&reached).map(|((labels, _), reached)| (labels, f64::from(u8::from(*reached))));
     gauge(text, ("suture_folder_up", "Is the hot folder within reach?"), up);
     let scans = || all().filter_map(|(labels, folder)| Some((labels, context.pulse.scan_of(&folder.name)?)));
     let took = scans().map(|(labels, scan)| (labels, scan.took.as_secs_f64()));
@@ -75,7 +76,7 @@ fn folders(text: &mut String, context: &Context) {
     let free = |path: &Path| fsx::free_space(path, 0) as f64;
     // Results may lie on a disk of their own.
     // One that answers nothing would be waited for without end.
-    let of_folders = context.folders.iter().filter(|folder| folder.check().is_ok()).flat_map(|folder| {
+    let of_folders = context.folders.iter().zip(&reached).filter(|(_, reached)| **reached).flat_map(|(folder, _)| {
         let of = |role, path: &Path| (vec![("role", role), ("folder", folder.name.as_str())], free(path));
         [of("folder", &folder.root), of("results", &folder.out())]
     });

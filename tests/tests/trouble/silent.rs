@@ -1,7 +1,5 @@
 //! A hot folder whose server is gone: no call there is ever answered.
 
-use std::fs::File;
-use std::path::Path;
 use std::process::Command;
 
 use crate::stage::{Daemon, Stage, holes, row};
@@ -13,12 +11,7 @@ fn watch(stage: &Stage) -> Command {
     for name in ["hot", "other"] {
         text += &format!("[[folders]]\npath = {:?}\n", stage.at(name));
     }
-    let file = stage.at("suture.toml");
-    std::fs::write(&file, text).unwrap();
-    let mut command = stage.command([Path::new("watch"), Path::new("--config"), &file]);
-    let log = File::options().create(true).append(true).open(stage.at("log")).unwrap();
-    command.stdout(std::process::Stdio::null()).stderr(log);
-    command
+    stage.watch_by(&text, &[])
 }
 
 fn is_done(stage: &Stage, folder: &str, name: &str) -> bool {

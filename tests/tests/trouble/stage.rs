@@ -119,8 +119,12 @@ impl Stage {
 
     /// `suture watch` by the configuration; its log goes to a file.
     pub(crate) fn watch(&self, options: &[&str]) -> Command {
+        self.watch_by(&format!("{}[[folders]]\npath = {:?}\n", self.lines, self.at("hot")), options)
+    }
+
+    /// `suture watch` by this configuration.
+    pub(crate) fn watch_by(&self, text: &str, options: &[&str]) -> Command {
         let file = self.at("suture.toml");
-        let text = format!("{}[[folders]]\npath = {:?}\n", self.lines, self.at("hot"));
         std::fs::write(&file, text).expect("the configuration can be written");
         let mut command = self.command(["watch", "--config"]);
         command.arg(file).args(options).stdout(Stdio::null());

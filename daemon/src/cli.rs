@@ -204,7 +204,7 @@ pub(crate) struct RepairArgs {
     /// List every deleted, flipped, moved and added triangle in the report
     #[arg(long)]
     pub list_edit: bool,
-    /// Replace OUT and the report if they exist (an input is never replaced)
+    /// Replace the result and the report if they exist, in a folder too (an input is never replaced)
     #[arg(long)]
     pub force: bool,
 }

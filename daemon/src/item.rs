@@ -204,7 +204,7 @@ impl Finished {
 
 fn place_result(draft: &Draft, mut target: PathBuf, rights: Rights, input: &Path, naming: &Naming) -> Result<PathBuf, Failure> {
     loop {
-        match draft.place(&target, rights, naming.force && !naming.is_folder()) {
+        match draft.place(&target, rights, naming.force) {
             Ok(()) => return Ok(target),
             Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => match naming.next(input) {
                 Some(next) => target = next,

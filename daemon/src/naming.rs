@@ -40,10 +40,14 @@ struct Given {
 }
 
 impl Given {
+    /// Was this name given out, or one like it?
+    fn has(&self, path: &Path) -> bool {
+        self.names.contains(&folded(path.file_name().unwrap_or_default()))
+    }
+
     /// Is there no such name yet, nor one like it? One that cannot be looked at is not free; where the folder cannot be read, only the very name counts.
     fn is_free(&self, path: &Path) -> bool {
-        let name = path.file_name().unwrap_or_default();
-        !self.names.contains(&folded(name)) && is_free(path) && !self.there.has_twin(path).unwrap_or(false)
+        !self.has(path) && is_free(path) && !self.there.has_twin(path).unwrap_or(false)
     }
 }
 
@@ -113,7 +117,8 @@ impl Naming {
         Ok(())
     }
 
-    /// The name the result of `input` is to have: in a folder, the first that is neither there nor given out, nor like one that is.
+    /// The name the result of `input` is to have: in a folder, the first that is neither there nor given out, nor like one that is. By force, a
+    /// file may be there that can be replaced, so that the same command gives the same names again.
     pub(crate) fn target(&self, input: &Path) -> PathBuf {
         if !self.folder {
             return self.output.clone();
@@ -123,11 +128,17 @@ impl Naming {
         let reserve = if self.report.is_some() { REPORT.len() } else { 0 };
         let from = given.versions.get(name).map_or(1, |last| last + 1);
         let mut candidates = (from..MAX_VERSIONS).map(|n| (n, fsx::versioned(name, n, reserve)));
-        let free = candidates.find(|(_, name)| given.is_free(&self.output.join(name)));
+        let mut may_have = |path: PathBuf| given.is_free(&path) || (!given.has(&path) && self.replaces(&path));
+        let free = candidates.find(|(_, name)| may_have(self.output.join(name)));
         let Some((version, target)) = free else { return self.output.join(name) };
         given.versions.insert(name.to_owned(), version);
         given.names.insert(folded(&target));
         self.output.join(target)
+    }
+
+    /// Is a file there, and is it to be replaced?
+    fn replaces(&self, path: &Path) -> bool {
+        self.force && !is_free(path) && self.check(path).is_ok()
     }
 
     /// The next name when `target` has been taken by someone else meanwhile; `None` where only one name will do.
@@ -248,6 +259,21 @@ mod tests {
         let names = ["a/part.stl", "part~3.stl", "b/part.stl"].map(|input| naming.target(Path::new(input)));
         assert_eq!(names, ["part~2.stl", "part~3.stl", "part~4.stl"].map(|name| dir.path().join(name)));
         assert_eq!(naming.report(&names[0]), Ok(Some(dir.path().join(format!("part~2.stl{REPORT}")))));
+    }
+
+    /// What is there is replaced, once; an input and what is no file are not.
+    #[test]
+    fn by_force_what_is_there_is_replaced() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+        for name in ["part.stl", "part~2.stl", "own.stl", "LIKE.stl"] {
+            std::fs::write(at(name), b"there").unwrap();
+        }
+        std::fs::create_dir(at("folder.stl")).unwrap();
+        let naming = naming(&["a", &at("own.stl"), "-o", &at(""), "--force"]).unwrap();
+        let asked = ["a/part.stl", "b/part.stl", "c/part.stl", "own.stl", "folder.stl", "like.stl"];
+        let wanted = ["part.stl", "part~2.stl", "part~3.stl", "own~2.stl", "folder~2.stl", "like~2.stl"];
+        assert_eq!(asked.map(|input| naming.target(Path::new(input))), wanted.map(|name| dir.path().join(name)));
     }
 
     /// In the order in which they are asked for.

@@ -2,10 +2,12 @@
 
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read, Write};
-use std::net::{TcpListener, TcpStream};
+use std::net::{Ipv4Addr, SocketAddrV4, TcpListener, TcpStream};
+use std::os::fd::OwnedFd;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use hmac::{Hmac, KeyInit, Mac};
+use rustix::net::{AddressFamily, SocketType, bind, getsockname, socket, sockopt};
 use serde_json::Value;
 use sha2::Sha256;
 
@@ -48,6 +50,36 @@ impl Message {
 struct Shared {
     came: Mutex<Vec<Message>>,
     answers: Mutex<VecDeque<String>>,
+}
+
+/// A port on which no one listens, and which is given to no one else as long as this lives. Tests run side by side: a port that was let go is soon
+/// another daemon's.
+pub struct Port {
+    /// Where it is: `127.0.0.1:PORT`.
+    pub address: SocketAddrV4,
+    /// Bound, and never listening. A second socket may listen at the same address, if it asks for the address by name and for `SO_REUSEADDR`, as
+    /// `TcpListener` and Python do; the system itself chooses a bound port for no one (`inet_csk_find_open_port` of Linux).
+    _held: OwnedFd,
+}
+
+impl Port {
+    /// A port of the system's choice.
+    ///
+    /// # Panics
+    /// When there is none to be had.
+    pub fn new() -> Self {
+        let held = socket(AddressFamily::INET, SocketType::STREAM, None).expect("a socket");
+        sockopt::set_socket_reuseaddr(&held, true).expect("a socket that shares its address");
+        bind(&held, &SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0)).expect("a port is free");
+        let address = getsockname(&held).ok().and_then(|address| address.try_into().ok()).expect("an address");
+        Self { address, _held: held }
+    }
+}
+
+impl Default for Port {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 /// A receiver that answers until the test ends.

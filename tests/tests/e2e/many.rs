@@ -148,6 +148,25 @@ fn one_input_may_be_given_twice() {
     assert_eq!(place.read("out/cube~2.stl"), place.read("cube.stl"));
 }
 
+/// A second run of one command gives the same names as the first one, by force; without it nothing that is there is replaced.
+#[test]
+fn by_force_results_in_a_folder_are_replaced() {
+    let place = Place::new();
+    place.put("a/part.stl", &stl::mesh(&stl::cuboid([0.0; 3], [1.0; 3])));
+    place.put("b/part.stl", &stl::mesh(&stl::cuboid([0.0; 3], [2.0; 3])));
+    std::fs::create_dir(place.at("out")).unwrap();
+    let command = ["repair", "a/part.stl", "b/part.stl", "-o", "out", "--report", "out"];
+    place.suture(command).expect(0);
+    let names = place.names("out");
+    assert_eq!((names.len(), place.read("out/part~2.stl")), (4, place.read("b/part.stl")));
+    place.put("a/part.stl", &stl::mesh(&stl::cuboid([0.0; 3], [3.0; 3])));
+    place.suture(command.into_iter().chain(["--force"])).expect(0);
+    assert_eq!(place.names("out"), names);
+    assert_eq!(["part.stl", "part~2.stl"].map(|name| place.read(&format!("out/{name}"))), [place.read("a/part.stl"), place.read("b/part.stl")]);
+    place.suture(command).expect(0);
+    assert_eq!(place.names("out").len(), 8);
+}
+
 /// Names that Windows, macOS or a share take for the same: each result gets one of its own, in the order of the inputs; so does one whose twin is
 /// in the folder already.
 #[test]

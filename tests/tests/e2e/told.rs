@@ -1,7 +1,6 @@
 //! Others hear of the ends of jobs: webhooks, and the command of `[on_done]`.
 
 use std::collections::BTreeSet;
-use std::net::TcpListener;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use rustix::process::Signal;
@@ -9,7 +8,7 @@ use suture_bench::generate::Case;
 use suture_tests::Place;
 use suture_tests::hot::{holes, mesh};
 use suture_tests::http::Client;
-use suture_tests::receiver::Receiver;
+use suture_tests::receiver::{Port, Receiver};
 use suture_tests::served::{Served, jobs, wait_until};
 
 const SECRET: &str = "0123456789abcdef0123456789abcdef";
@@ -91,8 +90,8 @@ fn messages_come_signed_and_once_each() {
 #[test]
 fn f30_a_dead_receiver_slows_no_job_and_hears_all_when_it_is_back() {
     let place = Place::new();
-    // No one listens there, and no one else will.
-    let address = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    let port = Port::new();
+    let address = port.address.to_string();
     configure(&place, &(hook(&address) + "events = [\"finished\"]\n"));
     let daemon = start(&place, "log");
     for n in 0..5 {
@@ -283,7 +282,8 @@ fn the_receiver_of_the_recipes_takes_what_is_signed_and_nothing_else() {
         return;
     }
     let place = Place::new();
-    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port().to_string();
+    let held = Port::new();
+    let port = held.address.port().to_string();
     let [program] = recipes("python").try_into().unwrap();
     assert!(program.contains("9000") && program.contains("/etc/suture/webhook-secret"), "{program}");
     place.put("receiver.py", program.replace("9000", &port).replace("/etc/suture/webhook-secret", "secret").as_bytes());

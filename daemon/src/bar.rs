@@ -33,12 +33,12 @@ fn message(course: &Course, seconds: f64) -> String {
         let rate = course.triangles() as f64 * course.share() / seconds;
         text += &format!(", {} triangles/s", show_count(round(rate)));
     }
-    text + &shown_left(seconds, course.share())
+    text + &shown_left(course.left(seconds))
 }
 
-/// The time that is left when `seconds` were needed for this share, once that can be told.
-fn shown_left(seconds: f64, share: f64) -> String {
-    left(seconds, share).map(|left| format!(", {} left", show_whole(left))).unwrap_or_default()
+/// The seconds that are left, if that can be told.
+fn shown_left(seconds: Option<f64>) -> String {
+    seconds.map(|left| format!(", {} left", show_whole(left))).unwrap_or_default()
 }
 
 /// To three digits: more would only flicker.
@@ -136,7 +136,7 @@ impl Bar {
             None if self.files as f64 >= seconds => text += &format!(", {:.0} files/s", self.files as f64 / seconds),
             _ => {}
         }
-        (share, text + &shown_left(seconds, share))
+        (share, text + &shown_left(left(seconds, share)))
     }
 
     /// Prints to standard output, and a line to standard error; the bar stands aside, since both may be the same terminal. Returns `exit`, or what
@@ -165,10 +165,11 @@ mod tests {
     fn beside_the_bar_stands_what_is_done_how_fast_and_how_long_yet() {
         let mut course = Course::new(false, false);
         assert_eq!(message(&course, 1.0), "at work");
-        course.at("topology", 50, 100);
+        course.at("topology", 0, 100, 0.5);
+        course.at("topology", 50, 100, 2.0);
         assert_eq!(message(&course, 2.0), "looking for defects, 28 triangles/s, 2 s left");
-        course.at("hash", 100, 100);
-        assert_eq!(message(&course, 0.0), "taking the checksum of the file, 0 s left");
+        course.at("hash", 100, 100, 4.0);
+        assert_eq!(message(&course, 4.0), "taking the checksum of the file, 25 triangles/s");
     }
 
     #[test]

@@ -414,6 +414,9 @@ pub(crate) enum JobsCommand {
         /// Only jobs in this state, e.g. queued, running, failed, needs-review
         #[arg(long, value_name = "STATE", value_parser = parse_kind)]
         state: Option<Kind>,
+        /// Only jobs of this hot folder, by name, where a daemon serves several
+        #[arg(long, value_name = "NAME")]
+        folder: Option<String>,
         /// Only the newest N of them
         #[arg(long, value_name = "N")]
         newest: Option<usize>,

@@ -2,14 +2,16 @@
 //!
 //! The engine tells how far a stage is, not how long the stages after it will take: for that, their usual shares of the time are known
 //! here. Some stages come only with some files, and some come again: what such a stage takes is taken from what was left, so that the share
-//! never falls.
+//! never falls. The seconds that are left are reckoned apart from the share: from the pace of the stage itself, and for what follows from that of the
+//! stages before.
 
 use suture_core::report::Task;
 
 use crate::protocol::Request;
 use crate::units::show_seconds;
 
-/// Time left is said from this share of the work on; before, it would be a wild guess.
+/// Time left is said from this share of the work on, and reckoned from a stage's own pace from this share of the stage on; before, it would be a wild
+/// guess.
 const FORESEEN: f64 = 0.02;
 /// Nothing more is said of work that has not ended.
 const MOST_PERCENT: u8 = 99;
@@ -52,12 +54,16 @@ const fn step(part: Part, stage: &'static str, weight: f64, comes: Comes, doing:
     Step { part, stage, weight, comes, doing }
 }
 
+/// What the repair of a file weighs of which every triangle is at a defect.
+const DEFECTS: f64 = 200.0;
+
 /// In the words for people of all that comes after the result was written.
 const CHECKING: &str = "checking the result";
 const LOOKING: &str = "looking for defects";
 
 /// All stages, in order. The result is surveyed only where its difference from the input does not tell all: the weights are those of a mean.
 /// (Self-intersections are looked for chunk by chunk, as part of the topology.)
+/// A repair's weight is that of a file with few defects; [`DEFECTS`] is added for the part of the triangles that are at defects.
 const STEPS: [Step; 12] = [
     step(Part::Look, "read", 4.0, Comes::Always, "reading the file"),
     step(Part::Look, "weld", 20.0, Comes::Sometimes, "joining corners that nearly meet"),
@@ -87,12 +93,26 @@ pub(crate) struct Course {
     /// Of the whole, from 0 to 1; never falls.
     share: f64,
     triangles: u64,
+    /// Of them, the part at defects, once that is known.
+    at_defects: f64,
+    pace: Pace,
+}
+
+/// When the work moved on, in seconds since it began.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pace {
+    /// The step began.
+    began: f64,
+    /// The step was so far, from 0 to 1, and told so last.
+    fraction: f64,
+    told: f64,
 }
 
 impl Course {
     /// Of work that has just begun. `writes`: something is repaired and written; `walls`: thin walls are looked for.
     pub(crate) fn new(writes: bool, walls: bool) -> Self {
-        Self { writes, walls, written: false, stage: String::new(), step: None, base: 0.0, share: 0.0, triangles: 0 }
+        let (stage, pace) = (String::new(), Pace::default());
+        Self { writes, walls, written: false, stage, step: None, base: 0.0, share: 0.0, triangles: 0, at_defects: 0.0, pace }
     }
 
     /// Of what this asks for.
@@ -100,24 +120,34 @@ impl Course {
         Self::new(*task == Task::Repair && profile.repair, profile.thin_wall_mm > 0.0)
     }
 
-    /// As the engine tells it.
-    pub(crate) fn at(&mut self, stage: &str, done: u64, total: u64) {
+    /// As the engine tells it, so many seconds after the work has begun.
+    pub(crate) fn at(&mut self, stage: &str, done: u64, total: u64, seconds: f64) {
         if stage != self.stage {
             stage.clone_into(&mut self.stage);
         }
-        if stage != "read" {
-            self.triangles = self.triangles.max(total);
+        match stage {
+            "read" => {}
+            "repair" => self.at_defects = (total as f64 / self.triangles.max(1) as f64).min(1.0),
+            _ => self.triangles = self.triangles.max(total),
         }
         // A repair looks at parts of the file anew, which brings it no nearer to its end.
         let Some((place, step)) = self.find(stage) else { return };
         if self.step != Some(place) {
             self.base = self.share.max(self.weight(|other| other < place) / self.weight(|_| true));
             self.step = Some(place);
+            self.pace = Pace { began: seconds, fraction: 0.0, told: seconds };
             self.written |= step.part == Part::Write;
         }
-        let rest = self.weight(|other| other > place);
+        let (own, rest) = (self.weight_of(step), self.weight(|other| other > place));
         let fraction = if total == 0 { 0.0 } else { (done as f64 / total as f64).clamp(0.0, 1.0) };
-        self.share = self.share.max(self.base + (1.0 - self.base) * fraction * step.weight / (step.weight + rest));
+        if fraction > self.pace.fraction {
+            self.pace = Pace { fraction, told: seconds, ..self.pace };
+        }
+        self.share = self.share.max(self.base + (1.0 - self.base) * fraction * own / (own + rest));
+    }
+
+    fn weight_of(&self, step: &Step) -> f64 {
+        step.weight + if step.part == Part::Repair { DEFECTS * self.at_defects } else { 0.0 }
     }
 
     /// The step that a stage is, by where the work is already.
@@ -141,7 +171,12 @@ impl Course {
             Comes::IfWallsMatter => self.walls,
             Comes::Sometimes => false,
         };
-        STEPS.iter().enumerate().filter(|(place, step)| which(*place) && is_usual(step)).map(|(_, step)| step.weight).sum()
+        STEPS
+            .iter()
+            .enumerate()
+            .filter(|(place, step)| which(*place) && is_usual(step))
+            .map(|(_, step)| self.weight_of(step))
+            .sum()
     }
 
     /// The stage, as the engine calls it.
@@ -169,15 +204,24 @@ impl Course {
         self.triangles
     }
 
-    /// About how many seconds are left after so many, once that can be told.
+    /// About how many seconds are left after so many, as long as that can be told: of a stage that takes longer than was foreseen, nobody knows.
     pub(crate) fn left(&self, seconds: f64) -> Option<f64> {
-        left(seconds, self.share)
+        let place = self.step.filter(|_| self.share >= FORESEEN)?;
+        let own = STEPS.get(place).map_or(0.0, |step| self.weight_of(step));
+        let (before, rest) = (self.weight(|other| other < place), self.weight(|other| other > place));
+        let Pace { began, fraction, told } = self.pace;
+        let by_itself = (fraction >= FORESEEN).then(|| (told - began) / fraction);
+        // Seconds for each weight: of what came before, or else of this.
+        let pace = if before > 0.0 { began / before } else { by_itself? / own };
+        let step_left = (1.0 - fraction) * by_itself.unwrap_or(own * pace);
+        let left = step_left + rest * pace - (seconds - told);
+        (left > 0.0).then(|| left.ceil())
     }
 }
 
 /// About how many seconds are left of work when so many were needed for this share of it, once that can be told.
 pub(crate) fn left(seconds: f64, share: f64) -> Option<f64> {
-    (share >= FORESEEN).then(|| (seconds * (1.0 - share) / share).ceil())
+    (FORESEEN..1.0).contains(&share).then(|| (seconds * (1.0 - share) / share).ceil())
 }
 
 /// Seconds as they are said of work that goes on: whole ones, as more would only flicker.
@@ -199,7 +243,7 @@ mod tests {
         for stage in stages {
             for done in [0, 50, 100] {
                 let before = course.share();
-                course.at(stage, done, 100);
+                course.at(stage, done, 100, 0.0);
                 assert!(course.share() >= before && course.share() <= 1.0 + 1e-9, "{stage} {done}: {before} {}", course.share());
             }
         }
@@ -214,13 +258,19 @@ mod tests {
         assert_eq!((course.doing(), course.percent(), course.left(9.0)), ("at work", 0, None));
         through(&mut course, &REPAIR[..2]);
         assert!((course.share() - 14.0 / 115.0).abs() < 1e-9);
-        through(&mut course, &REPAIR[2..5]);
-        assert!((course.share() - 95.0 / 115.0).abs() < 1e-9);
+        through(&mut course, &REPAIR[2..3]);
+        assert!((course.share() - 59.0 / 115.0).abs() < 1e-9);
+        // All of the file is at defects.
+        through(&mut course, &REPAIR[3..4]);
+        let repaired = 59.0 / 115.0 + 56.0 / 115.0 * (8.0 + DEFECTS) / (56.0 + DEFECTS);
+        assert!((course.share() - repaired).abs() < 1e-9);
+        through(&mut course, &REPAIR[4..5]);
+        assert!((course.share() - repaired - (1.0 - repaired) * 28.0 / 48.0).abs() < 1e-9);
         assert_eq!((course.doing(), course.stage(), course.triangles()), ("writing the result", "emit", 100));
         through(&mut course, &REPAIR[5..]);
         assert!((course.share() - 1.0).abs() < 1e-9);
         assert_eq!((course.doing(), course.stage(), course.percent()), (CHECKING, "topology", 99));
-        assert_eq!(course.left(2.0), Some(0.0));
+        assert_eq!(course.left(2.0), None);
     }
 
     /// Stages that only some files have, and such as come again, move it on, and leave room for what follows.
@@ -228,34 +278,34 @@ mod tests {
     fn what_comes_unforeseen_takes_of_what_is_left() {
         let mut course = Course::new(true, false);
         through(&mut course, &["read", "plan", "weld", "plan"]);
-        course.at("topology", 30, 100);
+        course.at("topology", 30, 100, 0.0);
         let early = course.share();
         through(&mut course, &["plan", "everywhere"]);
         assert_eq!(course.doing(), "setting right what is wrong everywhere");
         assert!(course.share() > early + 0.05);
-        course.at("topology", 0, 100);
+        course.at("topology", 0, 100, 0.0);
         let begun = course.share();
-        course.at("topology", 100, 100);
+        course.at("topology", 100, 100, 0.0);
         assert!(course.share() > begun + 0.1 && course.share() < 0.8, "{} {}", begun, course.share());
         // In a repair, the survey of a part is a part of the repair.
-        course.at("repair", 0, 100);
+        course.at("repair", 0, 100, 0.0);
         let at_repair = course.share();
         through(&mut course, &["plan", "topology"]);
         assert_eq!((course.doing(), course.stage()), ("repairing", "topology"));
         assert!((course.share() - at_repair).abs() < 1e-9);
         through(&mut course, &["emit", "read", "hash"]);
         assert_eq!(course.doing(), CHECKING);
-        assert!(course.share() < 0.96);
+        assert!(course.share() < 0.99);
     }
 
     /// An inspection ends with the checksum, or with thin walls where these are asked for; a stage that is unknown moves nothing.
     #[test]
     fn shares_are_of_what_is_to_be_done() {
         let mut course = Course::new(false, false);
-        course.at("topology", 5, 10);
+        course.at("topology", 5, 10, 0.0);
         let half = course.share();
         assert!((half - (4.0 + 10.0 + 22.5) / 63.0).abs() < 1e-9);
-        course.at("unheard_of", 9, 10);
+        course.at("unheard_of", 9, 10, 0.0);
         assert!((course.share() - half).abs() < 1e-9);
         assert_eq!((course.doing(), course.stage()), (LOOKING, "unheard_of"));
         through(&mut course, &["topology", "hash"]);
@@ -268,6 +318,27 @@ mod tests {
         let mut course = Course::new(false, false);
         through(&mut course, &["plan", "topology", "emit", "hash"]);
         assert_eq!(course.doing(), CHECKING);
+    }
+
+    /// Seconds count down, whatever the share does: by the pace of what came before, then by that of the stage itself.
+    #[test]
+    fn what_is_left_is_reckoned_from_the_pace() {
+        let mut course = Course::new(true, false);
+        course.at("read", 0, 100, 0.0);
+        course.at("plan", 0, 100, 4.0);
+        course.at("topology", 0, 100, 14.0);
+        course.at("topology", 100, 100, 59.0);
+        // All of the file is at defects: a second for each weight so far.
+        course.at("repair", 0, 100, 59.0);
+        let rest = 28.0 + 9.0 + 2.0 + 9.0;
+        assert_eq!(course.left(59.0), Some(8.0 + DEFECTS + rest + 4.0 - 4.0));
+        assert_eq!(course.left(69.0), Some(8.0 + DEFECTS + rest - 10.0));
+        // It is twice as fast as was foreseen; the rest keeps its pace.
+        course.at("repair", 50, 100, 59.0 + (8.0 + DEFECTS) / 4.0);
+        assert_eq!(course.left(59.0 + (8.0 + DEFECTS) / 4.0), Some((8.0 + DEFECTS) / 4.0 + rest));
+        let shown = [20.0, 40.0, 60.0, 80.0, 99.0].map(|later| course.left(111.0 + later).unwrap());
+        assert!(shown.is_sorted_by(|a, b| a > b), "{shown:?}");
+        assert_eq!(course.left(300.0), None, "it takes longer, and nobody knows how long");
     }
 
     /// All stages that the engine told.

@@ -181,12 +181,13 @@ pub(crate) fn folders(context: &Context) -> Vec<Served> {
 /// # Errors
 /// When the store failed.
 pub(crate) fn standing(context: &Context) -> Result<Standing, StoreError> {
-    let mut away: Vec<String> = context.away.lock().unwrap_or_else(PoisonError::into_inner).values().flatten().cloned().collect();
+    let away: Vec<String> = context.away.lock().unwrap_or_else(PoisonError::into_inner).values().flatten().cloned().collect();
+    let mut full = Vec::new();
     // Where every disk is full, that is said already.
     if context.schedule.held(Hold::Disk).is_none() {
-        let full = context.full.lock().unwrap_or_else(PoisonError::into_inner);
-        let full = context.folders.iter().filter(|folder| full.contains(&folder.name));
-        away.extend(full.map(|folder| format!("{}; nothing new is taken there", folder.nearly_full())));
+        let names = context.full.lock().unwrap_or_else(PoisonError::into_inner);
+        let folders = context.folders.iter().filter(|folder| names.contains(&folder.name));
+        full.extend(folders.map(|folder| format!("{}; nothing new is taken there", folder.nearly_full())));
     }
     let words = |(name, why): (String, String)| {
         let events = match context.store.backlog(&name)? {
@@ -196,7 +197,7 @@ pub(crate) fn standing(context: &Context) -> Result<Standing, StoreError> {
         Ok(format!("the webhook `{name}` has not heard of {events}: {why}"))
     };
     let untold = context.pulse.all_troubles().into_iter().map(words).collect::<Result<_, StoreError>>()?;
-    Ok(Standing { away, untold, ..context.schedule.standing() })
+    Ok(Standing { away, full, untold, ..context.schedule.standing() })
 }
 
 /// Why the daemon is not ready for files, in words.

@@ -71,6 +71,9 @@ pub(crate) struct Trace {
     /// Parts of it that are on other file systems.
     #[serde(default)]
     apart: Vec<String>,
+    /// The file that it was read from.
+    #[serde(skip)]
+    noted: Option<PathBuf>,
 }
 
 impl Trace {
@@ -87,7 +90,7 @@ impl Trace {
                 apart.push(part.to_owned());
             }
         }
-        Ok(Self { mark: read_mark(root)?.unwrap_or_default(), mount: mount_of(root)?, apart })
+        Ok(Self { mark: read_mark(root)?.unwrap_or_default(), mount: mount_of(root)?, apart, noted: None })
     }
 
     /// Is it this folder that the path leads to?
@@ -110,21 +113,22 @@ impl Trace {
     }
 
     fn gone(&self, root: &Path) -> io::Result<Option<String>> {
-        const DO: &str = "mount it, or remove the file `folders` beside the job store if this is another folder";
+        let noted = self.noted.as_ref().map_or("`folders` beside the job store".into(), |noted| noted.display().to_string());
+        let todo = format!("mount it, or remove the file {noted} if this is another folder");
         if self.leads_here(root)? {
             let here = device(root)?;
             for part in &self.apart {
                 let part = root.join(part);
                 let there = device(&part)?;
                 if there.is_none() || there == here {
-                    return Ok(Some(format!("{}: the file system is not there that it was; {DO}", part.display())));
+                    return Ok(Some(format!("{}: the file system is not there that it was; {todo}", part.display())));
                 }
             }
             return Ok(None);
         }
         let gone = mount_of(root)? != self.mount;
         let (shown, was) = (root.display(), self.mount.display());
-        Ok(gone.then(|| format!("{shown}: the mount {was} is not there that it lay on; {DO}")))
+        Ok(gone.then(|| format!("{shown}: the mount {was} is not there that it lay on; {todo}")))
     }
 }
 
@@ -170,7 +174,7 @@ impl Ground {
         let path = root.join(PRIVATE).join(MARK);
         let mark = mark(root, id).map_err(io(&path, "cannot be written"))?;
         let apart = PARTS.iter().zip(devices).filter(|(_, device)| *device != id.0).map(|(part, _)| (*part).to_owned());
-        Ok(Self { id, devices, trace: Trace { mark, mount, apart: apart.collect() }, lock })
+        Ok(Self { id, devices, trace: Trace { mark, mount, apart: apart.collect(), noted: None }, lock })
     }
 
     /// What tells it again.
@@ -354,7 +358,10 @@ pub(crate) fn read_traces(state: &Path) -> Result<Traces, FolderError> {
     let path = traces_of(state);
     let io = |action| move |source| FolderError::Io { path: traces_of(state), action, source };
     let Some(text) = fsx::text_if_there(&path).map_err(io("cannot be read"))? else { return Ok(Traces::new()) };
-    serde_json::from_str(&text).map_err(|error| io("is damaged; remove it once all hot folders are mounted")(error.into()))
+    let mut traces: Traces = serde_json::from_str(&text)
+        .map_err(|error| io("is damaged; remove it once all hot folders are mounted")(error.into()))?;
+    traces.values_mut().for_each(|trace| trace.noted = Some(path.clone()));
+    Ok(traces)
 }
 
 /// Notes them beside a job store.
@@ -363,10 +370,11 @@ pub(crate) fn read_traces(state: &Path) -> Result<Traces, FolderError> {
 /// As the file system's.
 pub(crate) fn note_traces(state: &Path, traces: &Traces) -> io::Result<()> {
     let path = traces_of(state);
-    if read_traces(state).is_ok_and(|noted| noted == *traces) {
+    let text = serde_json::to_string_pretty(traces)?;
+    if fsx::text_if_there(&path).is_ok_and(|noted| noted.as_ref() == Some(&text)) {
         return Ok(());
     }
-    create::replace(&path, &serde_json::to_vec_pretty(traces)?)?;
+    create::replace(&path, text.as_bytes())?;
     fsx::sync_dir(fsx::folder_of(&path))
 }
 
@@ -418,8 +426,9 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let state = dir.path().join("state");
         assert!(read_traces(&state).unwrap().is_empty());
-        let trace = Trace { mark: "m".into(), mount: "/mnt".into(), apart: vec!["out".into()] };
-        let traces = Traces::from([("hot".to_owned(), trace)]);
+        let trace = Trace { mark: "m".into(), mount: "/mnt".into(), apart: vec!["out".into()], noted: None };
+        // Read back, it knows where it was noted.
+        let traces = Traces::from([("hot".to_owned(), Trace { noted: Some(traces_of(&state)), ..trace })]);
         note_traces(&state, &traces).unwrap();
         assert_eq!(read_traces(&state).unwrap(), traces);
         std::fs::write(traces_of(&state), "{").unwrap();

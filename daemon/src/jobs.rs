@@ -1,5 +1,6 @@
 //! `suture jobs`: what became of every dropped file, and what an operator may want of it.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::Duration;
 
@@ -47,8 +48,13 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
         Err(failure) => return fail(&failure),
     };
     let summary = summary(&jobs);
-    if let JobsCommand::List { state, newest } = &args.command {
+    let folders = Folders::of(&jobs);
+    if let JobsCommand::List { state, folder, newest } = &args.command {
+        if let Some(name) = folder.as_ref().filter(|name| !jobs.is_empty() && !folders.0.contains(*name)) {
+            return fail(&Failure { line: folders.has_no(name), exit: Exit::Refused });
+        }
         jobs.retain(|job| state.is_none_or(|state| job.kind() == state));
+        jobs.retain(|job| folder.as_ref().is_none_or(|name| job.source.folder == *name));
         jobs.drain(..jobs.len().saturating_sub(newest.unwrap_or(usize::MAX)));
     }
     let work = at_work(&args.dir, &jobs);
@@ -58,7 +64,7 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
         text += &match &args.command {
             _ if args.json => as_json(job, work),
             JobsCommand::Show { .. } => show(&args.dir, job, work),
-            _ => line_of(job, work),
+            _ => folders.line(job, work),
         };
     }
     if jobs.is_empty() && !args.json {
@@ -67,10 +73,11 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
         text += &format!("{summary}\n");
     }
     if let (JobsCommand::List { .. }, false) = (&args.command, args.json) {
-        let Standing { held, away, untold, .. } = standing(&args.dir);
+        let Standing { held, away, full, untold, .. } = standing(&args.dir);
         text.extend(held.iter().map(|why| format!("nothing new is taken: {why}\n")));
         text.extend(untold.iter().map(|who| format!("not told yet: {}\n", plain(who))));
         text.extend(away.iter().map(|why| format!("out of reach: {}\n", plain(why))));
+        text.extend(full.iter().map(|why| format!("disk full: {}\n", plain(why))));
     }
     print(text.as_bytes(), Exit::Good)
 }
@@ -249,20 +256,37 @@ fn decision(job: &Job) -> String {
     job.decision().map(word).unwrap_or_default()
 }
 
-/// A job in one line.
-pub(crate) fn line(job: &Job) -> String {
-    line_of(job, None)
+/// The hot folders of jobs, by name. Of several, each line says its own.
+pub(crate) struct Folders(BTreeSet<String>);
+
+impl Folders {
+    pub(crate) fn of<'a>(jobs: impl IntoIterator<Item = &'a Job>) -> Self {
+        Self(jobs.into_iter().map(|job| job.source.folder.clone()).collect())
+    }
+
+    /// A job in one line, with how far it is.
+    pub(crate) fn line(&self, job: &Job, work: Option<&Work>) -> String {
+        let width = self.0.iter().map(|name| name.chars().count()).max().filter(|_| self.0.len() > 1);
+        line_of(job, &width.map(|width| format!("{:<width$}  ", job.source.folder)).unwrap_or_default(), work)
+    }
+
+    fn has_no(&self, name: &str) -> String {
+        let names = self.0.iter().map(|name| format!("`{}`", plain(name))).collect::<Vec<_>>().join(", ");
+        format!("no job is of a folder `{name}`; there are jobs of {names}")
+    }
 }
 
-/// The same, with how far it is.
-fn line_of(job: &Job, work: Option<&Work>) -> String {
+fn line_of(job: &Job, folder: &str, work: Option<&Work>) -> String {
     let (id, kind, since) = (job.id.0, job.kind().name(), show_when(job.changed.0));
     let priority = if job.priority.is_default() { String::new() } else { format!("priority {}  ", job.priority) };
     let words = [work.map(Work::words).unwrap_or_default(), note(job)];
     let note = words.iter().filter(|words| !words.is_empty()).map(String::as_str).collect::<Vec<_>>().join(", ");
     let said = job.decision().map(|said| format!("{}{said}", if note.is_empty() { "" } else { ", " }));
-    let line =
-        format!("{id:>6}  {since}  {kind:<12} {:<32} {priority}{note}{}", job.source.path.to_string(), said.unwrap_or_default());
+    let line = format!(
+        "{id:>6}  {since}  {kind:<12} {folder}{:<32} {priority}{note}{}",
+        job.source.path.to_string(),
+        said.unwrap_or_default()
+    );
     line.trim_end().to_owned() + "\n"
 }
 

@@ -128,7 +128,7 @@ impl Naming {
         let reserve = if self.report.is_some() { REPORT.len() } else { 0 };
         let from = given.versions.get(name).map_or(1, |last| last + 1);
         let mut candidates = (from..MAX_VERSIONS).map(|n| (n, fsx::versioned(name, n, reserve)));
-        let mut may_have = |path: PathBuf| given.is_free(&path) || (!given.has(&path) && self.replaces(&path));
+        let may_have = |path: PathBuf| given.is_free(&path) || (!given.has(&path) && self.replaces(&path));
         let free = candidates.find(|(_, name)| may_have(self.output.join(name)));
         let Some((version, target)) = free else { return self.output.join(name) };
         given.versions.insert(name.to_owned(), version);

@@ -69,6 +69,9 @@ pub(crate) struct Standing {
     /// Why folders are out of reach, in words.
     #[serde(default)]
     pub away: Vec<String>,
+    /// Of which folders nothing new is taken because a disk of theirs is nearly full, in words. Where all are, `held` says so.
+    #[serde(default)]
+    pub full: Vec<String>,
     /// Who could not be told of ends of jobs yet, in words.
     #[serde(default)]
     pub untold: Vec<String>,

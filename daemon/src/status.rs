@@ -7,7 +7,7 @@ use suture_store::{Kind, Time};
 use crate::cli::service::StatusArgs;
 use crate::exit::Exit;
 use crate::glance::{Glance, Work};
-use crate::jobs::line;
+use crate::jobs::Folders;
 use crate::reach;
 use crate::say::{complain, plain, print};
 use crate::units::{show_count, show_size, show_when};
@@ -47,12 +47,13 @@ fn screen(dir: &Path, glance: &Glance) -> String {
     };
     text += &format!("  waiting   {}\n", counts(|kind| !kind.is_held() && !kind.is_at_rest()));
     text += &format!("  in work   {}\n", counts(Kind::is_held));
-    text.extend(glance.work.iter().map(at_work));
+    text.extend(glance.work.iter().map(|work| at_work(work, glance.folders.len() > 1)));
     text += &format!("  ended     {}\n", counts(Kind::is_at_rest));
     let held = glance.standing.held.iter().map(|why| ("nothing new is taken", why));
     let away = glance.standing.away.iter().map(|why| ("out of reach", why));
+    let full = glance.standing.full.iter().map(|why| ("disk full", why));
     let untold = glance.standing.untold.iter().map(|who| ("not told yet", who));
-    text.extend(held.chain(away).chain(untold).map(|(what, why)| format!("  {what}: {}\n", plain(why))));
+    text.extend(held.chain(away).chain(full).chain(untold).map(|(what, why)| format!("  {what}: {}\n", plain(why))));
     for folder in &glance.folders {
         let room = match folder.free_bytes {
             _ if !folder.reachable => "out of reach".to_owned(),
@@ -63,17 +64,20 @@ fn screen(dir: &Path, glance: &Glance) -> String {
         text += &format!("  folder    {}: {room}  {path}\n", plain(&folder.name));
     }
     text += &format!("  job store {}\n", show_size(glance.store_bytes));
+    let folders = Folders::of(glance.last.iter().chain(&glance.review));
     for (head, jobs) in [("ended last", &glance.last), ("to be looked at", &glance.review)] {
         if !jobs.is_empty() {
             text += &format!("\n{head}\n");
-            text.extend(jobs.iter().map(line));
+            text.extend(jobs.iter().map(|job| folders.line(job, None)));
         }
     }
     text
 }
 
-fn at_work(work: &Work) -> String {
-    format!("{:>6}    {:<32} {:>9}  {}\n", work.job.0, plain(&work.file), show_size(work.size), work.words())
+fn at_work(work: &Work, of_several: bool) -> String {
+    let folder = if of_several { format!("{}: ", plain(&work.folder)) } else { String::new() };
+    let file = folder + &plain(&work.file);
+    format!("{:>6}    {file:<32} {:>9}  {}\n", work.job.0, show_size(work.size), work.words())
 }
 
 /// Nothing is known: for whoever shows it again and again.
@@ -120,6 +124,7 @@ mod tests {
                 running: 1,
                 held: vec!["an operator".into()],
                 away: vec!["a \u{1b}[2J mount".into()],
+                full: vec!["the disk of b".into()],
                 untold: vec!["`farm` has not heard of 3".into()],
             },
             jobs: [(Kind::Queued, 3), (Kind::Running, 1), (Kind::Done, 5), (Kind::Failed, 0)].into(),
@@ -145,6 +150,7 @@ mod tests {
             "ended     5 done\n",
             "nothing new is taken: an operator\n",
             "out of reach: a ",
+            "disk full: the disk of b\n",
             "not told yet: `farm` has not heard of 3\n",
             "folder    hot: 1.1 GB free  /srv/hot\n",
             "ended last\n",

@@ -240,7 +240,7 @@ impl Worker {
                 Ok(line) => match read_answer(&line, request) {
                     Ok(Message::Begun) => begun = true,
                     Ok(Message::Progress { stage, done, total }) => {
-                        course.at(&stage, done, total);
+                        course.at(&stage, done, total, start.elapsed().as_secs_f64());
                         on_progress(&course);
                         reached = how_far(&course);
                     }
@@ -408,10 +408,10 @@ mod tests {
     fn f11_a_time_limit_says_how_far_the_work_was() {
         let line = |last_words| Death { cause: Cause::Time(Duration::from_secs(120)), last_words }.line();
         let mut course = Course::new(true, false);
-        course.at("read", 0, 7);
+        course.at("read", 0, 7, 0.0);
         assert!(line(how_far(&course)).contains(", while reading the file; a larger `time_limit`"));
         // Of the whole, not of the stage.
-        course.at("topology", 50, 100);
+        course.at("topology", 50, 100, 0.0);
         assert!(line(how_far(&course)).contains(", with 31 % done, while looking for defects; a larger `time_limit`"));
         assert!(!line(String::new()).contains(','));
     }

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 
 use suture_core::Report;
 use suture_core::report::{Defects, Format, Outcome, SelfIntersections, Task};
+use suture_core::words::triangles;
 
 use crate::say::plain;
 use crate::units::{show_box, show_count, show_number, show_point, show_seconds, show_size};
@@ -29,7 +30,7 @@ const ROWS: [Row; 19] = [
     ("T-junctions", |d| d.noncommon_vertices),
     ("non-manifold edges", |d| d.nonmanifold_edges),
     ("non-manifold vertices", |d| d.nonmanifold_vertices),
-    ("disagreeing edges", |d| d.inconsistent_edges),
+    ("edges whose triangles face opposite ways", |d| d.inconsistent_edges),
     ("inside-out components", |d| d.inverted_components),
     ("enclosed bodies", |d| d.nested_positive),
     ("self-intersecting triangles", |d| found(d).map_or(0, |s| if s.given_up { TOO_MANY } else { s.triangles })),
@@ -123,8 +124,8 @@ fn hints(out: &mut String, report: &Report) {
 fn wraps(out: &mut String, report: &Report) {
     for wrap in report.wraps.iter().take(LOOPS_SHOWN) {
         let what = format!(
-            "{} triangles from {}, {:.1} % of the surface",
-            show_count(wrap.replaced),
+            "{} from {}, {:.1} % of the surface",
+            triangles(wrap.replaced),
             show_box(&wrap.bounds),
             wrap.area_share * 100.0
         );
@@ -203,7 +204,7 @@ fn size(report: &Report) -> String {
         // The command line reads files only.
         _ => "no file",
     };
-    format!("{} triangles, {}, {format}", show_count(report.input.triangles), show_size(report.input.bytes))
+    format!("{}, {}, {format}", triangles(report.input.triangles), show_size(report.input.bytes))
 }
 
 fn rate(report: &Report) -> String {
@@ -220,7 +221,7 @@ fn rate(report: &Report) -> String {
 
 fn edit(report: &Report) -> String {
     let e = &report.edit;
-    let mut parts = vec![format!("{} triangles untouched", show_count(e.untouched))];
+    let mut parts = vec![format!("{} untouched", triangles(e.untouched))];
     for (count, what) in [(e.deleted, "deleted"), (e.flipped, "flipped"), (e.moved, "moved"), (e.added, "added")] {
         if count > 0 {
             parts.push(format!("{} {what}", show_count(count)));

@@ -97,6 +97,12 @@ impl Measured {
     }
 }
 
+/// Why a person must look, in the order of the table; but a wrap first, as it explains what else was lost or invented.
+pub(crate) fn concerns(mut all: Vec<Measured>) -> Vec<String> {
+    all.sort_by_key(|measured| measured.rule != "wrapped");
+    all.into_iter().flat_map(Measured::concerns).collect()
+}
+
 /// The second half of the certificate of what was made of a file with this hash and length.
 pub(crate) fn certify((original, bytes): (&str, u64), measured: &[Measured]) -> Faithful {
     let version = |id: &str| FIDELITY_RULES.iter().find(|rule| rule.id == id).map_or(0, |rule| rule.version);

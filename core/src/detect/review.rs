@@ -7,7 +7,7 @@ use crate::contract::report::{Defects, Region, SheetDropped, Skin, SkinChange, V
 use crate::contract::settings::{Bodies, Profile};
 use crate::detect::fidelity::Measured;
 use crate::geometry::sums::Bounds;
-use crate::util::words::{Count, Short, span};
+use crate::util::words::{Count, Counted, Short, span};
 
 /// What the repairs know and a person would want to, beside what can be counted in the result.
 #[derive(Clone, Debug, Default)]
@@ -67,8 +67,9 @@ impl Default for Asked {
 /// Words on lone sheets that keep a file from being good.
 pub(crate) fn open_sheets(count: u64) -> Option<String> {
     (count > 0).then(|| {
+        let rims = Counted(count, "open rim", "open rims");
         format!(
-            "{count} rims of lone sheets, which bound no material, are open; `sheets` in the profile makes solids of them: \"thicken\" walls, \"base\" blocks"
+            "{rims} of surface without thickness (lone sheets), which bounds no material; `sheets` in the profile makes solids of it: \"thicken\" walls, \"base\" blocks"
         )
     })
 }
@@ -153,9 +154,12 @@ fn counts(change: &Change<'_>, profile: &Profile) -> Vec<Measured> {
     });
     let all = before.bodies + before.nested_positive;
     let gone = all.saturating_sub(after.bodies + after.nested_positive + enclosed.bodies);
-    let bodies = measured("bodies", Some(gone as f64), f64::from(profile.max_bodies_lost), |gone| {
+    let mut bodies = measured("bodies", Some(gone as f64), f64::from(profile.max_bodies_lost), |gone| {
         format!("{} of {} bodies were lost", Count(gone), Count(all))
     });
+    // The other rule counts more of them, and says where the largest was: two numbers would only puzzle.
+    let is_told = volumes(change.volumes, profile).iter().any(|rule| rule.rule == "bodies_outside" && !rule.words.is_empty());
+    bodies.words.retain(|_| !is_told);
     vec![volume(change, profile), swallowed, area(change, profile), outline(change, profile), bodies]
 }
 

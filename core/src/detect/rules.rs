@@ -5,7 +5,7 @@
 //! certificate does not speak for a new rule. `core/REPORT.md` has the same table for readers; a test holds the two together.
 
 use crate::contract::report::{Defects, RuleOutcome, RuleResult};
-use crate::util::words::Count;
+use crate::util::words::{Count, Counted};
 
 /// What the rules look at: counts on the bytes of a file, and what is wrong with the file itself.
 pub(crate) struct Subject<'a> {
@@ -47,8 +47,8 @@ enum Finding {
 
 /// How a violation is told to people.
 enum Words {
-    /// After its count.
-    Counted(&'static str),
+    /// After its count: of one, and of several.
+    Counted(&'static str, &'static str),
     /// In words of its own; in none where others have said so already.
     Own(fn(&Subject<'_>) -> Vec<String>),
 }
@@ -82,7 +82,7 @@ pub const RULES: [Rule; 15] = [
         counts: "Triangles with a NaN or infinite coordinate.",
         aspect: Aspect::Other,
         find: |s| Finding::Count(s.defects.nonfinite),
-        words: Words::Counted("triangles with NaN or infinite coordinates"),
+        words: Words::Counted("triangle with NaN or infinite coordinates", "triangles with NaN or infinite coordinates"),
     },
     Rule {
         id: "distinct_corners",
@@ -90,7 +90,7 @@ pub const RULES: [Rule; 15] = [
         counts: "Triangles with two or three equal corners.",
         aspect: Aspect::Other,
         find: |s| Finding::Count(s.defects.degenerate_index),
-        words: Words::Counted("triangles with a repeated vertex"),
+        words: Words::Counted("triangle with a repeated vertex", "triangles with a repeated vertex"),
     },
     Rule {
         id: "area",
@@ -98,7 +98,7 @@ pub const RULES: [Rule; 15] = [
         counts: "Triangles of three distinct corners exactly on one line.",
         aspect: Aspect::Other,
         find: |s| Finding::Count(s.defects.degenerate_area),
-        words: Words::Counted("triangles of no area"),
+        words: Words::Counted("triangle of no area", "triangles of no area"),
     },
     Rule {
         id: "duplicates",
@@ -106,7 +106,7 @@ pub const RULES: [Rule; 15] = [
         counts: "Triangles on the three vertices, and in the direction, of an earlier one.",
         aspect: Aspect::Other,
         find: |s| Finding::Count(s.defects.duplicates_same),
-        words: Words::Counted("duplicate triangles"),
+        words: Words::Counted("duplicate triangle", "duplicate triangles"),
     },
     Rule {
         id: "back_to_back",
@@ -114,7 +114,7 @@ pub const RULES: [Rule; 15] = [
         counts: "Triangles on the three vertices of earlier ones, none of which runs in their direction.",
         aspect: Aspect::Other,
         find: |s| Finding::Count(s.defects.duplicates_opposite),
-        words: Words::Counted("pairs of triangles back to back"),
+        words: Words::Counted("pair of triangles back to back", "pairs of triangles back to back"),
     },
     Rule {
         id: "closed",
@@ -122,7 +122,7 @@ pub const RULES: [Rule; 15] = [
         counts: "Edges of one triangle.",
         aspect: Aspect::Closed,
         find: |s| Finding::Count(s.defects.boundary_edges),
-        words: Words::Counted("boundary edges"),
+        words: Words::Counted("boundary edge", "boundary edges"),
     },
     Rule {
         id: "manifold_edges",
@@ -130,7 +130,7 @@ pub const RULES: [Rule; 15] = [
         counts: "Edges of three or more triangles.",
         aspect: Aspect::Manifold,
         find: |s| Finding::Count(s.defects.nonmanifold_edges),
-        words: Words::Counted("non-manifold edges"),
+        words: Words::Counted("non-manifold edge", "non-manifold edges"),
     },
     Rule {
         id: "manifold_vertices",
@@ -138,7 +138,7 @@ pub const RULES: [Rule; 15] = [
         counts: "Vertices whose triangles do not form one fan, and ends of non-manifold edges.",
         aspect: Aspect::Manifold,
         find: |s| Finding::Count(s.defects.nonmanifold_vertices),
-        words: Words::Counted("non-manifold vertices"),
+        words: Words::Counted("non-manifold vertex", "non-manifold vertices"),
     },
     Rule {
         id: "coherent",
@@ -146,7 +146,7 @@ pub const RULES: [Rule; 15] = [
         counts: "Edges that both of their triangles run through in the same direction.",
         aspect: Aspect::Oriented,
         find: |s| Finding::Count(s.defects.inconsistent_edges),
-        words: Words::Counted("edges whose triangles disagree"),
+        words: Words::Counted("edge whose triangles face opposite ways", "edges whose triangles face opposite ways"),
     },
     Rule {
         id: "balanced",
@@ -156,7 +156,10 @@ pub const RULES: [Rule; 15] = [
         find: |s| Finding::Count(s.defects.unbalanced_edges),
         words: Words::Own(|s| match s.defects {
             d if d.boundary_edges + d.inconsistent_edges > 0 => Vec::new(),
-            d => vec![format!("{} edges not used equally often in both directions", Count(d.unbalanced_edges))],
+            d => {
+                let what = Counted(d.unbalanced_edges, "edge", "edges");
+                vec![format!("{what} that triangles do not use equally often in both directions")]
+            }
         }),
     },
     Rule {
@@ -165,7 +168,7 @@ pub const RULES: [Rule; 15] = [
         counts: "Closed components of negative volume inside no body: inside out.",
         aspect: Aspect::Other,
         find: |s| Finding::Count(s.defects.inverted_components),
-        words: Words::Counted("components inside out"),
+        words: Words::Counted("component inside out", "components inside out"),
     },
     Rule {
         id: "self_intersection",
@@ -183,10 +186,8 @@ pub const RULES: [Rule; 15] = [
                 "too many triangles come close to each other to be compared pair by pair".into()
             } else {
                 let [crossing, overlapping] = [found.crossing_pairs, found.overlapping_pairs].map(Count);
-                format!(
-                    "{} self-intersecting triangles ({crossing} crossing and {overlapping} overlapping pairs)",
-                    Count(found.triangles)
-                )
+                let triangles = Counted(found.triangles, "self-intersecting triangle", "self-intersecting triangles");
+                format!("{triangles} ({crossing} crossing and {overlapping} overlapping pairs)")
             }]
         }),
     },
@@ -242,8 +243,8 @@ impl Found {
     pub(crate) fn reasons(&self, subject: &Subject<'_>) -> Vec<String> {
         match (&self.rule.words, self.finding) {
             (_, Finding::Count(0) | Finding::NotLookedFor) => Vec::new(),
-            (Words::Counted(what), Finding::Count(count)) => vec![format!("{} {what}", Count(count))],
-            (Words::Counted(what), Finding::GivenUp) => vec![format!("too many {what} to count")],
+            (Words::Counted(one, many), Finding::Count(count)) => vec![Counted(count, one, many).to_string()],
+            (Words::Counted(_, many), Finding::GivenUp) => vec![format!("too many {many} to count")],
             (Words::Own(say), _) => say(subject),
         }
     }

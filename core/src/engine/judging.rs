@@ -11,7 +11,6 @@ use crate::contract::report::{
 use crate::contract::settings::{Bodies, Hollow, Limits, Profile};
 use crate::detect::certificate;
 use crate::detect::fidelity;
-use crate::detect::fidelity::Measured;
 use crate::detect::hints;
 use crate::detect::review;
 use crate::detect::review::Evidence;
@@ -122,7 +121,6 @@ pub(crate) fn repair_diagnosed(
     if !profile.repair || report.verdict.good && !holds_more {
         return Ok(None);
     }
-    progress.at("repair", 0, diagnosis.survey.records.len() as u64);
     let repaired = repairs::run(diagnosis, steps, input.path, profile, limits, progress)?;
     let edit = Edit::of(&diagnosis.survey, &diagnosis.submesh, &repaired.reversed, &repaired.wrapped);
     Ok(Some((edit, take_account(report, repaired))))
@@ -148,7 +146,11 @@ fn take_account(report: &mut Report, repaired: Repaired) -> Evidence {
 pub(crate) fn conclude_empty(report: &mut Report) {
     report.outcome = Outcome::NotGood;
     report.verdict.good = false;
-    report.verdict.reasons.push("no triangle was left after the repair".into());
+    // Of the defects that were there, none is left either.
+    report
+        .verdict
+        .reasons
+        .insert(0, "no triangle was left after the repair: the file has no surface that encloses anything".into());
 }
 
 /// The file or mesh that is written, or returned.
@@ -185,7 +187,7 @@ pub(crate) fn conclude(report: &mut Report, input: &[Finding], (surface, evidenc
         };
         let measured = review::measure(&change, &report.profile);
         faithful = Some(fidelity::certify((&report.input.blake3, report.input.bytes), &measured));
-        let concerns: Vec<String> = measured.into_iter().flat_map(Measured::concerns).collect();
+        let concerns = fidelity::concerns(measured);
         if !concerns.is_empty() {
             report.outcome = Outcome::NeedsReview;
             report.verdict.reasons = concerns;

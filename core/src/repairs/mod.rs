@@ -86,7 +86,7 @@ pub(crate) fn run(
     if let Steps::Fill(only_loop) = steps {
         cx.handed.only_loop = only_loop;
     }
-    pipeline::take(steps.list(), &mut cx)?;
+    pipeline::take_all(steps.list(), &mut cx)?;
     let Context { reversed, mut account, mut handed, .. } = cx;
     let mut all = std::mem::take(&mut account.regions);
     all.extend(account.sheets.iter().map(Region::from));

@@ -184,6 +184,20 @@ pub(crate) fn take(steps: &[Step], cx: &mut Context<'_, '_>) -> Result<u64> {
     Ok(all)
 }
 
+/// Takes the steps as the stage `repair`, whose unit are triangles at defects: each step is told as an equal part of them.
+///
+/// # Errors
+/// As [`take`].
+pub(crate) fn take_all(steps: &[Step], cx: &mut Context<'_, '_>) -> Result<()> {
+    let at_defects = cx.work.triangles.len() as u64;
+    for (begun, step) in (0..).zip(steps) {
+        cx.progress.at("repair", at_defects * begun / steps.len() as u64, at_defects);
+        take(std::slice::from_ref(step), cx)?;
+    }
+    cx.progress.at("repair", at_defects, at_defects);
+    Ok(())
+}
+
 fn carry_out(repair: &Repair, cx: &mut Context<'_, '_>) -> Result<u64> {
     let span = tracing::debug_span!("repair", name = repair.name.as_str()).entered();
     let start = Instant::now();

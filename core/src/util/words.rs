@@ -18,6 +18,28 @@ impl<T: Display> Display for Count<T> {
     }
 }
 
+/// So many of a thing: its word for one, and for any other number.
+///
+/// ```
+/// # use suture_core::words::Counted;
+/// assert_eq!(Counted(1, "body", "bodies").to_string(), "1 body");
+/// assert_eq!(Counted(2000, "body", "bodies").to_string(), "2 000 bodies");
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Counted<'a>(pub u64, pub &'a str, pub &'a str);
+
+impl Display for Counted<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        let Self(count, one, many) = *self;
+        write!(f, "{} {}", Count(count), if count == 1 { one } else { many })
+    }
+}
+
+/// So many triangles.
+pub fn triangles(count: u64) -> Counted<'static> {
+    Counted(count, "triangle", "triangles")
+}
+
 /// A decimal number with a gap after each third digit before its point, which every terminal can show, if these are at least `long`.
 fn apart(number: &str, long: usize) -> String {
     let digits = number.len() - number.trim_start_matches(|c: char| !c.is_ascii_digit()).len();

@@ -1,8 +1,9 @@
 //! The page of one file: what became of it, for a person who decides what to do with it.
 
 use maud::{Markup, html};
-use suture_core::Report;
 use suture_core::report::{Certificate, FileFacts, Outcome, RegionMethod, RuleOutcome, SkinChange, Task};
+use suture_core::words::{Counted, triangles};
+use suture_core::{FIDELITY_RULES, RULES, Report};
 
 use super::page;
 use super::words::prose;
@@ -141,12 +142,12 @@ fn repairs(report: &Report) -> Markup {
             table {
                 thead { tr { th scope="col" { "Repair" } th scope="col" class="n" { "times" } th scope="col" { "How" } } }
                 tbody { @for repair in &report.repairs { tr {
-                    th scope="row" { (repair.name.as_str().replace('_', " ")) }
+                    th scope="row" { (repair.name.as_str().replace('_', " ")) (meaning(repair.name.doing())) }
                     td class="n" { (show_count(repair.count)) }
                     td { (prose(&repair.note)) }
                 } } }
             }
-            p { (show_count(edit.untouched)) " triangles are untouched, " (show_count(edit.deleted)) " deleted, " (show_count(edit.flipped)) " flipped, "
+            p { (show_count(edit.untouched)) (if edit.untouched == 1 { " triangle is" } else { " triangles are" }) " untouched, " (show_count(edit.deleted)) " deleted, " (show_count(edit.flipped)) " flipped, "
                 (show_count(edit.moved)) " moved, " (show_count(edit.added)) " added." }
         }
         @if let Some(skin) = &report.skin { (skin_of("Surface that was lost", &skin.lost)) (skin_of("Surface that was invented", &skin.invented)) }
@@ -179,7 +180,7 @@ fn places(report: &Report) -> Markup {
         }
         @if !regions.listed.is_empty() {
             details {
-                summary { (show_count(regions.total)) " regions were changed or left" }
+                summary { (Counted(regions.total, "region was", "regions were")) " changed or left" }
                 table {
                     thead { tr { th scope="col" { "Method" } th scope="col" { "Box" } th scope="col" class="n" { "triangles" } th scope="col" class="n" { "moved" } } }
                     tbody { @for region in regions.listed.iter().take(MOST_ROWS) { tr {
@@ -235,17 +236,30 @@ fn rules(report: &Report) -> Markup {
                 thead { tr { th scope="col" { "Rule" } th scope="col" { "Outcome" } th scope="col" class="n" { "count or figure" } th scope="col" class="n" { "limit" } } }
                 tbody {
                     @for rule in &certificate.rules { tr {
-                        th scope="row" { (rule.rule.replace('_', " ")) } td { (words(rule.outcome)) }
+                        th scope="row" { (rule.rule.replace('_', " ")) (meaning(counted(&rule.rule))) } td { (words(rule.outcome)) }
                         td class="n" { @if let Some(count) = rule.count { (show_count(count)) } } td class="n" { "0" }
                     } }
                     @for rule in certificate.faithful.iter().flat_map(|faithful| &faithful.rules) { tr {
-                        th scope="row" { (rule.rule.replace('_', " ")) } td { (words(rule.outcome)) }
+                        th scope="row" { (rule.rule.replace('_', " ")) (meaning(measured(&rule.rule))) } td { (words(rule.outcome)) }
                         td class="n" { @if let Some(figure) = rule.figure { (show_number(figure)) } } td class="n" { (show_number(rule.limit)) }
                     } }
                 }
             }
         }
     }
+}
+
+/// The quantity behind a rule's name, below it.
+fn meaning(sentence: &str) -> Markup {
+    html! { @if !sentence.is_empty() { br; small { (sentence) } } }
+}
+
+fn counted(rule: &str) -> &'static str {
+    RULES.iter().find(|known| known.id == rule).map_or("", |known| known.counts)
+}
+
+fn measured(rule: &str) -> &'static str {
+    FIDELITY_RULES.iter().find(|known| known.id == rule).map_or("", |known| known.measures)
 }
 
 /// How many of the rules passed, and how many did not.
@@ -263,7 +277,7 @@ fn facts(report: &Report) -> Markup {
     let file = |title: &str, facts: &FileFacts| {
         html! { tr {
             th scope="row" { (title) }
-            td class="file" { (plain(&facts.path.to_string_lossy())) br; (show_count(facts.triangles)) " triangles, " (show_size(facts.bytes)) br; "BLAKE3 " code { (facts.blake3) } }
+            td class="file" { (plain(&facts.path.to_string_lossy())) br; (triangles(facts.triangles)) ", " (show_size(facts.bytes)) br; "BLAKE3 " code { (facts.blake3) } }
         } }
     };
     let measure = report.after.as_ref().unwrap_or(&report.before);

@@ -6,6 +6,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use suture_core::words::Counted;
 use suture_store::job::{Area, Kind};
 use suture_store::{Job, RelPath, State, Time};
 
@@ -38,8 +39,10 @@ pub(crate) struct Summary {
 /// What became of one file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Line {
-    /// Its latest job.
     job: u64,
+    /// The latest job of a file of the same name that was dropped later, if one was: that one counts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    later: Option<u64>,
     /// Below `in/`.
     source: RelPath,
     kind: Kind,
@@ -55,9 +58,9 @@ struct Line {
 }
 
 impl Line {
-    /// Good, or of a format that is not ours to judge.
+    /// Good, or of a format that is not ours to judge, or not what is wanted any more.
     fn is_good(&self) -> bool {
-        matches!(self.kind, Kind::Done | Kind::Noticed)
+        self.later.is_some() || matches!(self.kind, Kind::Done | Kind::Noticed)
     }
 
     fn of(job: &Job) -> Self {
@@ -75,7 +78,8 @@ impl Line {
             _ => {}
         }
         let original = format!("{}/{original}", name(area));
-        Self { job: job.id.0, source: job.source.path.clone(), kind: job.kind(), reason, result, report, original }
+        let source = job.source.path.clone();
+        Self { job: job.id.0, later: None, source, kind: job.kind(), reason, result, report, original }
     }
 }
 
@@ -89,39 +93,41 @@ fn name(area: Area) -> &'static str {
 }
 
 impl Summary {
-    /// Of all jobs of an order that are known, each at rest or left alone. Of files of one name the latest counts, and a file that went
-    /// away counts for nothing. `None`: nothing was worked on.
+    /// Of all jobs of an order that are known, each at rest or left alone. All files of one name are told of, and the latest counts; a file that
+    /// went away is not told of. `None`: nothing was worked on.
     pub(crate) fn of(folder: &str, order: &RelPath, jobs: &[Job]) -> Option<Self> {
-        let mut files = BTreeMap::new();
         let withdrawn =
             |job: &Job| matches!(&job.state, State::Cancelled { why } if *why != suture_store::job::Withdrawal::Operator);
-        for job in jobs.iter().filter(|job| !withdrawn(job)) {
-            let latest = files.entry(force::plain(&job.source.path)).or_insert(job);
-            if job.id > latest.id {
-                *latest = job;
-            }
-        }
-        let changed = files.values().filter(|job| matches!(job.state, State::Ended { .. })).map(|job| job.changed).max()?;
-        let files = files.into_values().map(Line::of).collect();
+        let jobs: Vec<_> = jobs.iter().filter(|job| !withdrawn(job)).collect();
+        let changed = jobs.iter().filter(|job| matches!(job.state, State::Ended { .. })).map(|job| job.changed).max()?;
+        let files = jobs.into_iter().map(Line::of).collect();
         let mut summary =
             Self { order_version: VERSION, folder: folder.into(), order: order.clone(), changed, counts: BTreeMap::new(), files };
         summary.count();
         Some(summary)
     }
 
+    /// Files of one name one after the other, the latest last, which alone is counted.
     fn count(&mut self) {
-        self.counts.clear();
+        self.files.sort_by_cached_key(|line| (force::plain(&line.source), line.job));
+        let mut latest = BTreeMap::new();
         for line in &self.files {
-            *self.counts.entry(line.kind).or_default() += 1;
+            latest.insert(force::plain(&line.source), line.job);
+        }
+        self.counts.clear();
+        for line in &mut self.files {
+            line.later = latest.get(&force::plain(&line.source)).copied().filter(|job| *job != line.job);
+            if line.later.is_none() {
+                *self.counts.entry(line.kind).or_default() += 1;
+            }
         }
     }
 
     /// Takes over what an earlier summary says of files whose jobs the store has forgotten since.
     fn remember(&mut self, earlier: &Self, is_known: &dyn Fn(u64) -> bool) {
-        let known: Vec<_> = self.files.iter().map(|line| force::plain(&line.source)).collect();
-        let is_new = |line: &&Line| !is_known(line.job) && !known.contains(&force::plain(&line.source));
+        let known: Vec<_> = self.files.iter().map(|line| line.job).collect();
+        let is_new = |line: &&Line| !is_known(line.job) && !known.contains(&line.job);
         self.files.extend(earlier.files.iter().filter(is_new).cloned());
-        self.files.sort_by(|a, b| a.source.cmp(&b.source));
         self.count();
     }
 
@@ -146,7 +152,7 @@ impl Summary {
             named.push(format!("and {} more", show_count((bad.len() - NAMED) as u64)));
         }
         let named = if named.is_empty() { String::new() } else { format!(" ({})", named.join("; ")) };
-        format!("{} files: {}{named}", show_count(self.files.len() as u64), counts.join(", "))
+        format!("{}: {}{named}", Counted(self.counts.values().sum(), "file", "files"), counts.join(", "))
     }
 
     /// Puts it into the order's folder of `out/`, durably, in place of an earlier one of the same order; another file of that name stays,
@@ -232,7 +238,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn each_file_is_told_of_once() {
+    fn each_file_is_told_of_and_the_latest_of_a_name_counts() {
         let jobs = [
             job(1, "order/a.stl", Some(Ending::NotGood)),
             job(2, "order/b.stl", Some(Ending::NotGood)),
@@ -243,9 +249,15 @@ pub(super) mod tests {
         assert_eq!(summary.words(), "3 files: 1 noticed, 1 done, 1 failed (order/b.stl: not closed)");
         assert_eq!((summary.changed, summary.is_good()), (Time(4), false));
         let places: Vec<_> = summary.files.iter().map(|line| (line.result.as_deref(), line.original.as_str())).collect();
-        let expected = [(Some("out/order/a.stl"), "done/order/a.stl"), (None, "failed/order/b.stl"), (None, "in/order/x.obj")];
+        let expected = [
+            (None, "failed/order/a.stl"),
+            (Some("out/order/a.stl"), "done/order/a.stl"),
+            (None, "failed/order/b.stl"),
+            (None, "in/order/x.obj"),
+        ];
         assert_eq!(places, expected);
-        assert_eq!(summary.files[1].report.as_deref(), Some("failed/order/b.stl.report.json"));
+        assert_eq!(summary.files.iter().map(|line| line.later).collect::<Vec<_>>(), [Some(4), None, None, None]);
+        assert_eq!(summary.files[2].report.as_deref(), Some("failed/order/b.stl.report.json"));
         assert_eq!(Summary::of("hot", &order(), &jobs[2..3]), None, "nothing was worked on");
     }
 
@@ -267,6 +279,14 @@ pub(super) mod tests {
         // The store has forgotten the first job since.
         let (summary, path, new) = put(&[job(2, "order/b.stl", Some(Ending::Clean))], &[2]);
         assert!(new && summary.files.len() == 2 && read(&path) == Some(summary));
+        // And a file of the same name came later.
+        let (summary, ..) =
+            put(&[job(2, "order/b.stl", Some(Ending::Clean)), job(3, "order/a.stl", Some(Ending::NotGood))], &[2, 3]);
+        assert_eq!(summary.words(), "2 files: 1 done, 1 failed (order/a.stl: not closed)");
+        assert_eq!(
+            summary.files.iter().map(|line| (line.job, line.later)).collect::<Vec<_>>(),
+            [(1, Some(3)), (3, None), (2, None)]
+        );
         assert_eq!(std::fs::read(&mine).unwrap(), b"{\"mine\": true}");
     }
 }

@@ -28,6 +28,8 @@ pub(super) struct Status {
     pub held: Vec<String>,
     /// All that is out of reach, in words.
     pub away: Vec<String>,
+    /// Folders whose disk is nearly full while others have room, in words.
+    pub full: Vec<String>,
     /// Who could not be told of ends of jobs yet, in words.
     pub untold: Vec<String>,
     /// How many jobs there are in each state.
@@ -54,7 +56,7 @@ pub(super) async fn status(State(shared): State<Arc<Shared>>) -> Result<Json<Sta
 /// # Errors
 /// When the store does not answer.
 pub(super) fn of(context: &Context) -> Result<Status, Problem> {
-    let Standing { running, held, away, untold } = glance::standing(context)?;
+    let Standing { running, held, away, full, untold } = glance::standing(context)?;
     let served =
         |folder: glance::Served| Served { name: folder.name, reachable: folder.reachable, free_bytes: folder.free_bytes };
     let reason = glance::unready(context);
@@ -65,6 +67,7 @@ pub(super) fn of(context: &Context) -> Result<Status, Problem> {
         running,
         held,
         away,
+        full,
         untold,
         jobs: glance::counts(context)?.into_iter().map(|(kind, count)| (kind.name(), count)).collect(),
         folders: glance::folders(context).into_iter().map(served).collect(),

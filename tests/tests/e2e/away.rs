@@ -36,6 +36,7 @@ fn f25_a_folder_whose_mount_is_missing_is_not_taken_for_an_empty_one() {
     wait_until("the other folder is served", || place.at("hot/done/d.stl").exists());
     let list = listed(&place);
     assert!(list.contains("out of reach: ") && list.contains("scans: the mount /mnt/disk is not there"), "{list}");
+    assert!(list.contains("remove the file ") && list.contains("state/folders if this is another folder"), "{list}");
     assert_eq!(place.names("scans"), ["in/c.stl"], "nothing is made, taken or moved there");
 
     std::fs::remove_dir_all(place.at("scans")).unwrap();
@@ -45,6 +46,14 @@ fn f25_a_folder_whose_mount_is_missing_is_not_taken_for_an_empty_one() {
     assert!(!listed(&place).contains("out of reach"), "{}", listed(&place));
     wait_until("it answers, too", || place.suture(["jobs", "list", "--dir", "scans"]).code() == 0);
     assert_eq!(place.names("scans/out").iter().filter(|name| name.ends_with(".stl")).count(), 2);
+    // Each line says its folder, and those of one can be had.
+    let of = |folder: &str| place.suture(["jobs", "list", "--dir", "hot", "--folder", folder]);
+    let line = |name: &str| listed(&place).lines().find(|line| line.contains(name)).map(str::to_owned).unwrap();
+    assert!(line("b.stl").contains(" scans  b.stl") && line("d.stl").contains(" hot    d.stl"), "{}", listed(&place));
+    let scans = of("scans").expect(0).stdout();
+    assert!(scans.contains("b.stl") && !scans.contains("d.stl"), "{scans}");
+    let refused = of("scan").expect(2).stderr();
+    assert!(refused.contains("no job is of a folder `scan`") && refused.contains("`hot`, `scans`"), "{refused}");
 }
 
 /// `in/` that is made anew is seen at once, not with the next full scan.

@@ -162,7 +162,10 @@ fn by_force_results_in_a_folder_are_replaced() {
     place.put("a/part.stl", &stl::mesh(&stl::cuboid([0.0; 3], [3.0; 3])));
     place.suture(command.into_iter().chain(["--force"])).expect(0);
     assert_eq!(place.names("out"), names);
-    assert_eq!(["part.stl", "part~2.stl"].map(|name| place.read(&format!("out/{name}"))), [place.read("a/part.stl"), place.read("b/part.stl")]);
+    assert_eq!(
+        ["part.stl", "part~2.stl"].map(|name| place.read(&format!("out/{name}"))),
+        [place.read("a/part.stl"), place.read("b/part.stl")]
+    );
     place.suture(command).expect(0);
     assert_eq!(place.names("out").len(), 8);
 }

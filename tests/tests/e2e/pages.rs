@@ -99,6 +99,12 @@ fn pages_say_what_became_of_every_file() {
         assert!(night.text().to_lowercase().contains(&words.to_lowercase()), "{words}: {}", night.text());
     }
     assert!(client.browse("/jobs/4").expect(200).text().contains("action=\"/jobs/4/cancel\""));
+    // It is another file when its turn comes.
+    place.put("hot/in/later.stl", &holes(3));
+    place.suture(["jobs", "resume", "--dir", "hot"]).expect(0);
+    wait_for(&client, 4, "cancelled");
+    let link = "It was dropped anew as <a href=\"/jobs/5\">job 5</a>";
+    wait_until("the new job is named", || client.browse("/jobs/4").expect(200).text().contains(link));
 }
 
 #[test]

@@ -115,7 +115,10 @@ fn full_beside() {
     let mut daemon = stage.serve();
     let [filler, more] = ["filler", "more"].map(|name| other.join(name));
     std::fs::write(&filler, vec![1; 8_000_000]).unwrap();
-    stage.wait("it is said", 20, || said(&stage, "hot").contains("other is nearly full; nothing new is taken there"));
+    stage.wait("it is said", 20, || {
+        said(&stage, "hot").contains("other is nearly full; nothing new is taken there")
+            && said(&stage, "hot").contains("disk full: the disk of ")
+    });
     std::fs::write(other.join("in/waits.stl"), large()).unwrap();
     stage.put("part.stl", &large());
     let beside = stage.wait_done(30, &mut daemon);

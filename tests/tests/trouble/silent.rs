@@ -47,6 +47,13 @@ fn f25_a_folder_that_does_not_answer_keeps_no_other_from_being_served() {
     is_served(&stage, "other", "b.stl");
     stage.wait("the silence to be told of", 60, || told(&stage, "does not answer") > 0);
     is_served(&stage, "other", "c.stl");
+    // Whoever asks by the silent folder is told so, soon; by the other one all is known.
+    let ask = |folder: &str| stage.run(["status", "--dir", stage.at(folder).to_str().unwrap()]);
+    let (asked, silent) = (std::time::Instant::now(), ask("hot"));
+    let said = String::from_utf8_lossy(&silent.stderr).into_owned();
+    assert!(silent.status.code() == Some(75) && said.contains("does not answer") && said.lines().count() == 1, "{said}");
+    assert!(asked.elapsed() < std::time::Duration::from_secs(20), "{:?}", asked.elapsed());
+    assert!(String::from_utf8_lossy(&ask("other").stdout).contains("out of reach: "));
     drop(silence);
     is_served(&stage, "hot", "d.stl");
     daemon.stop();

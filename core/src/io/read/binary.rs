@@ -8,7 +8,7 @@
 use super::finding::{Finding, Rejection};
 use super::limits::{HEADER_BYTES, MAX_TRIANGLES, PREFIX_BYTES};
 use crate::io::record::{self, Record};
-use crate::util::words::Count;
+use crate::util::words::{Count, Counted, triangles as triangles_of};
 
 /// Records looked at when a file must prove that it holds triangles.
 const SAMPLES: usize = 1000;
@@ -47,7 +47,7 @@ fn length_of(triangles: u64) -> u64 {
 pub(super) fn exact(bytes: &[u8]) -> Option<Result<Layout, Rejection>> {
     let declared = declared_count(bytes)?;
     (bytes.len() as u64 == length_of(declared.into())).then(|| match declared {
-        0 => Err(no_triangles()),
+        0 => Err(Rejection::Unreadable("no triangles: the header says 0, and the file ends there".into())),
         _ => Ok(Layout { triangles: declared as usize, findings: header_findings(bytes) }),
     })
 }
@@ -60,18 +60,18 @@ pub(super) fn mismatched(bytes: &[u8]) -> Option<Result<Layout, Rejection>> {
     let announced = usize::try_from(declared).unwrap_or(usize::MAX);
     if all.is_empty() {
         // Too short for a single record: a binary STL only if the count does not say otherwise.
-        return (declared == 0).then(|| Err(no_triangles()));
+        return (declared == 0).then(|| Err(none_of(body.len())));
     }
     let mut findings = header_findings(bytes);
     let triangles = match declared {
         0 | u32::MAX => {
             if !look_like_triangles(all, Normals::Checked) {
-                return (declared == 0 && is_blank(body.get(..1 << 20).unwrap_or(body))).then(|| Err(no_triangles()));
+                return (declared == 0 && is_blank(body.get(..1 << 20).unwrap_or(body))).then(|| Err(none_of(body.len())));
             }
             findings.push(Finding::flaw(format!(
-                "header leaves the count open ({}), file holds {} triangles",
+                "header leaves the count open ({}), file holds {}",
                 Count(declared),
-                Count(all.len())
+                triangles_of(all.len() as u64)
             )));
             all.len()
         }
@@ -80,7 +80,7 @@ pub(super) fn mismatched(bytes: &[u8]) -> Option<Result<Layout, Rejection>> {
                 return None;
             }
             let text =
-                format!("header says {} triangles, file holds {}: cut off or miscounted", Count(declared), Count(all.len()));
+                format!("header says {}, file holds {}: cut off or miscounted", triangles_of(declared.into()), Count(all.len()));
             findings.push(if announced - all.len() > 1 { Finding::loss(text) } else { Finding::flaw(text) });
             all.len()
         }
@@ -99,7 +99,11 @@ pub(super) fn mismatched(bytes: &[u8]) -> Option<Result<Layout, Rejection>> {
                 )));
                 return Some(within_bounds(counted.len(), findings));
             }
-            findings.push(Finding::flaw(format!("header says {} triangles, file holds {}", Count(declared), Count(all.len()))));
+            findings.push(Finding::flaw(format!(
+                "header says {}, file holds {}",
+                triangles_of(declared.into()),
+                Count(all.len())
+            )));
             all.len()
         }
     };
@@ -120,6 +124,12 @@ pub(super) fn within_bounds(triangles: usize, findings: Vec<Finding>) -> Result<
         many if many > MAX_TRIANGLES => Err(Rejection::TooMany),
         _ => Ok(Layout { triangles, findings }),
     }
+}
+
+/// The header announces none, and these bytes are none.
+fn none_of(bytes: usize) -> Rejection {
+    let (what, follow) = (Counted(bytes as u64, "byte", "bytes"), if bytes == 1 { "follows" } else { "follow" });
+    Rejection::Unreadable(format!("no triangles: the header says 0, and {what} without any {follow}"))
 }
 
 pub(super) fn no_triangles() -> Rejection {

@@ -27,7 +27,7 @@ pub(crate) enum NotAdmitted {
     #[error("only another loop was to be closed")]
     NotAsked,
     #[error(
-        "the rim of a lone sheet, which bounds no material; `sheets` in the profile makes a solid of it: \"thicken\" a wall, \"base\" a block"
+        "the rim of surface without thickness (a lone sheet), which bounds no material; `sheets` in the profile makes a solid of it: \"thicken\" a wall, \"base\" a block"
     )]
     Sheet,
 }

@@ -8,12 +8,14 @@ use axum::response::Response;
 use maud::{Markup, html};
 use suture_core::Report;
 use suture_core::report::Outcome;
-use suture_store::{Job, State as JobState};
+use suture_store::job::Withdrawal;
+use suture_store::{Job, JobId, Query, State as JobState, StoreError};
 
 use super::actions::forms;
 use super::frame::Frame;
 use super::night::{self, progress};
 use super::places;
+use crate::attempt::Context;
 use crate::html::report;
 use crate::html::words::{advice, prose, state, time};
 use crate::left::area;
@@ -26,6 +28,9 @@ use crate::web::problem::Problem;
 use crate::web::reported::report_of;
 use crate::web::shared::Shared;
 
+/// A file that changed is dropped anew at once: its next job is looked for among so many.
+const LATER: usize = 500;
+
 /// `GET /jobs/{id}`.
 pub(super) async fn job(
     State(shared): State<Arc<Shared>>,
@@ -36,7 +41,8 @@ pub(super) async fn job(
     let job = ask(&shared.context, move |context| job_of(context, id)).await?;
     let has_ended = matches!(job.state, JobState::Ended { .. });
     // A report that is gone, or speaks of no mesh, is no reason to say nothing.
-    let report = if has_ended { report_of(&shared, id).await.ok().flatten() } else { None };
+    let report = if has_ended { report_of(&shared, id).await.ok().flatten().map(by_name) } else { None };
+    let anew = if is_changed(&job) { ask(&shared.context, move |context| Ok(drop_after(context, id)?)).await? } else { None };
     let frame = Frame::of(&shared, &headers);
     let name = plain(&job.source.path.to_string());
     let reasons = whole_reasons(&job, report.as_ref());
@@ -45,6 +51,7 @@ pub(super) async fn job(
         h1 { (name) }
         div id="job" data-live {
             (standing(&job, reasons))
+            @if let Some(anew) = anew { p { "It was dropped anew as " a href={ "/jobs/" (anew) } { "job " (anew) } "." } }
             @if job.kind().is_held() { p { (progress(&job, &shared.context.bus)) } }
             ul class="actions" { (forms(&frame, &job)) (downloads(&job)) }
         }
@@ -54,6 +61,26 @@ pub(super) async fn job(
         script type="module" src="/assets/view.js" {}
     };
     Ok(frame.page("", &format!("{name}: {}", state(&job).0), &body))
+}
+
+/// The report with the files' names alone: they have gone elsewhere since, and [`facts`] says where.
+fn by_name(mut report: Report) -> Report {
+    let files = std::iter::once(&mut report.input).chain(&mut report.output);
+    files.for_each(|file| file.path = file.path.file_name().map(Into::into).unwrap_or_default());
+    report
+}
+
+/// Was the file another one before it was worked on?
+fn is_changed(job: &Job) -> bool {
+    matches!(job.state, JobState::Cancelled { why: Withdrawal::Changed })
+}
+
+/// The job of the same path that came next, if it came soon.
+fn drop_after(context: &Context, id: JobId) -> Result<Option<JobId>, StoreError> {
+    let Some(job) = context.store.get(id)? else { return Ok(None) };
+    let later = context.store.list(&Query { after: id, limit: LATER, ..Query::default() })?;
+    let is_same = |other: &&Job| (&other.source.folder, &other.source.path) == (&job.source.folder, &job.source.path);
+    Ok(later.iter().find(is_same).map(|other| other.id))
 }
 
 /// The reasons of a report, if they are why the job stands where it stands: the job's own line holds the begin of them only.

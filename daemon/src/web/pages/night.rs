@@ -84,8 +84,8 @@ pub(super) async fn night(State(shared): State<Arc<Shared>>, headers: HeaderMap)
 /// In a line: does anything need a person?
 fn standing(night: &Night) -> Markup {
     let count = night.count(&NEED_SOMEONE);
-    let Status { held, away, untold, reason, .. } = &night.status;
-    let is_held = !held.is_empty() || !away.is_empty() || !untold.is_empty() || reason.is_some();
+    let Status { held, away, full, untold, reason, .. } = &night.status;
+    let is_held = !held.is_empty() || !away.is_empty() || !full.is_empty() || !untold.is_empty() || reason.is_some();
     let (class, words) = match (count, is_held) {
         (0, false) => ("good", how_many_need_you(0)),
         (0, true) => ("review", "No file needs you, but the daemon does not do all of its work.".to_owned()),
@@ -98,6 +98,7 @@ fn standing(night: &Night) -> Markup {
             @if is_held { ul {
                 @for why in held { li { "Nothing new is taken: " (plain(why)) "." } }
                 @for why in away { li { "Out of reach: " (plain(why)) ". Suture goes on with it by itself when that is mended." } }
+                @for why in full { li { "Disk full: " (plain(why)) ". Suture goes on by itself when there is room again." } }
                 @for who in untold { li { (plain(who)) ". Suture tells it again by itself." } }
                 @if let (Some(why), true) = (reason, held.is_empty() && away.is_empty()) { li { "Not ready: " (plain(why)) "." } }
             } }

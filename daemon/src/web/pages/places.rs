@@ -4,6 +4,7 @@
 use maud::{Markup, html};
 use suture_core::Report;
 use suture_core::report::{LoopClass, RegionMethod};
+use suture_core::words::triangles;
 use suture_store::JobId;
 
 use crate::html::report::{key, method};
@@ -35,7 +36,7 @@ fn groups(report: &Report, is_pair: bool) -> [Group; 6] {
     let regions = |left: bool| {
         report.regions.listed.iter().filter(move |region| is_left(region.method) == left).map(|region| {
             let why = region.reason.as_ref().map(|why| format!(": {why}")).unwrap_or_default();
-            (region.bounds, format!("{}, {} triangles{why}", method(region.method), show_count(region.count)))
+            (region.bounds, format!("{}, {}{why}", method(region.method), triangles(region.count)))
         })
     };
     let open =

@@ -92,11 +92,7 @@ pub(super) fn mismatched(bytes: &[u8]) -> Option<Result<Layout, Rejection>> {
             }
             if beyond.is_empty() || !look_like_triangles(beyond, Normals::Checked) {
                 let trailing = body.len() - counted.as_flattened().len();
-                findings.push(Finding::flaw(format!(
-                    "{} {} after the last triangle, ignored",
-                    Count(trailing),
-                    bytes_word(trailing)
-                )));
+                findings.push(ignored(trailing, "triangle"));
                 return Some(within_bounds(counted.len(), findings));
             }
             findings.push(Finding::flaw(format!(
@@ -109,11 +105,7 @@ pub(super) fn mismatched(bytes: &[u8]) -> Option<Result<Layout, Rejection>> {
     };
     if !rest.is_empty() {
         let what = if announced > all.len() && declared != u32::MAX { "a triangle that is cut off" } else { "trailing" };
-        findings.push(Finding::flaw(format!(
-            "{} {} after the last whole triangle ({what}), ignored",
-            Count(rest.len()),
-            bytes_word(rest.len())
-        )));
+        findings.push(ignored(rest.len(), &format!("whole triangle ({what})")));
     }
     Some(within_bounds(triangles, findings))
 }
@@ -126,6 +118,11 @@ pub(super) fn within_bounds(triangles: usize, findings: Vec<Finding>) -> Result<
     }
 }
 
+/// Bytes behind the last triangle.
+fn ignored(bytes: usize, last: &str) -> Finding {
+    Finding::flaw(format!("{} after the last {last}, ignored", Counted(bytes as u64, "byte", "bytes")))
+}
+
 /// The header announces none, and these bytes are none.
 fn none_of(bytes: usize) -> Rejection {
     let (what, follow) = (Counted(bytes as u64, "byte", "bytes"), if bytes == 1 { "follows" } else { "follow" });
@@ -134,10 +131,6 @@ fn none_of(bytes: usize) -> Rejection {
 
 pub(super) fn no_triangles() -> Rejection {
     Rejection::Unreadable("no triangles".into())
-}
-
-fn bytes_word(count: usize) -> &'static str {
-    if count == 1 { "byte" } else { "bytes" }
 }
 
 /// Nothing but zero bytes.

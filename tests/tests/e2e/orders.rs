@@ -60,10 +60,7 @@ fn an_order_is_summed_up_when_it_is_done_and_when_a_file_comes_later() {
     expected.insert(3, row("order-123/c.stl", "done", "out/order-123/c.stl"));
     let second = summary(&place, SUMMARY);
     assert_eq!(files(&second), expected);
-    assert_eq!(
-        (&second["files"][1]["later"], &second["files"][2]["later"]),
-        (&second["files"][2]["job"], &serde_json::Value::Null)
-    );
+    assert_eq!((&second["files"][1]["later"], &second["files"][2]["later"]), (&second["files"][2]["job"], &Value::Null));
     assert_eq!(second["counts"], serde_json::json!({"noticed": 1, "done": 4}));
     assert_eq!(place.names("hot/out").iter().filter(|name| name.contains("order.report")).count(), 1);
     let told = |ran: &Ran| ran.stderr().contains("An order is done");

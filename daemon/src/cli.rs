@@ -337,6 +337,9 @@ pub(crate) struct DrawArgs {
     /// One mesh with few triangles, instead of a picture
     #[arg(long)]
     pub coarse: bool,
+    /// Seen from the opposite side
+    #[arg(long)]
+    pub behind: bool,
     /// The file to write
     #[arg(long)]
     pub output: PathBuf,

@@ -204,9 +204,14 @@ impl Course {
         self.triangles
     }
 
-    /// About how many seconds are left after so many, as long as that can be told: of a stage that takes longer than was foreseen, nobody knows.
+    /// About how many seconds are left after so many, as long as that can be told: of a repair nobody knows before it is done, nor of a stage that takes longer
+    /// than was foreseen.
     pub(crate) fn left(&self, seconds: f64) -> Option<f64> {
         let place = self.step.filter(|_| self.share >= FORESEEN)?;
+        let is_open = |step: &Step| self.writes && !self.written && step.part <= Part::Repair;
+        if STEPS.get(place).is_some_and(is_open) {
+            return None;
+        }
         let own = STEPS.get(place).map_or(0.0, |step| self.weight_of(step));
         let (before, rest) = (self.weight(|other| other < place), self.weight(|other| other > place));
         let Pace { began, fraction, told } = self.pace;
@@ -323,22 +328,27 @@ mod tests {
     /// Seconds count down, whatever the share does: by the pace of what came before, then by that of the stage itself.
     #[test]
     fn what_is_left_is_reckoned_from_the_pace() {
-        let mut course = Course::new(true, false);
+        let mut course = Course::new(false, false);
         course.at("read", 0, 100, 0.0);
         course.at("plan", 0, 100, 4.0);
+        // A second for each weight so far.
         course.at("topology", 0, 100, 14.0);
-        course.at("topology", 100, 100, 59.0);
-        // All of the file is at defects: a second for each weight so far.
-        course.at("repair", 0, 100, 59.0);
-        let rest = 28.0 + 9.0 + 2.0 + 9.0;
-        assert_eq!(course.left(59.0), Some(8.0 + DEFECTS + rest + 4.0 - 4.0));
-        assert_eq!(course.left(69.0), Some(8.0 + DEFECTS + rest - 10.0));
+        assert_eq!(course.left(20.0), Some(45.0 - 6.0 + 4.0));
         // It is twice as fast as was foreseen; the rest keeps its pace.
-        course.at("repair", 50, 100, 59.0 + (8.0 + DEFECTS) / 4.0);
-        assert_eq!(course.left(59.0 + (8.0 + DEFECTS) / 4.0), Some((8.0 + DEFECTS) / 4.0 + rest));
-        let shown = [20.0, 40.0, 60.0, 80.0, 99.0].map(|later| course.left(111.0 + later).unwrap());
+        course.at("topology", 50, 100, 14.0 + 11.25);
+        assert_eq!(course.left(14.0 + 11.25), Some((11.25_f64 + 4.0).ceil()));
+        let shown = [1.0, 4.0, 8.0, 12.0].map(|later| course.left(25.25 + later).unwrap());
         assert!(shown.is_sorted_by(|a, b| a > b), "{shown:?}");
-        assert_eq!(course.left(300.0), None, "it takes longer, and nobody knows how long");
+        assert_eq!(course.left(60.0), None, "it takes longer, and nobody knows how long");
+        // Nor does anybody before a repair is done; after that it is known well.
+        let mut course = Course::new(true, false);
+        for stage in ["read", "plan", "topology", "repair"] {
+            course.at(stage, 50, 100, 50.0);
+            assert_eq!(course.left(50.0), None, "{stage}");
+        }
+        course.at("emit", 50, 100, 80.0);
+        course.at("emit", 75, 100, 110.0);
+        assert!(course.left(110.0).is_some());
     }
 
     /// All stages that the engine told.

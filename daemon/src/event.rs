@@ -118,7 +118,7 @@ impl Happening<'_> {
                 }
             }
             Self::FolderAway { root, why, .. } => {
-                tracing::error!(folder = %root.display(), error = why, "The folder cannot be served; the others go on.");
+                tracing::error!(folder = %root.display(), error = why, "The folder cannot be served for now.");
             }
             Self::StoreRecovered(how) => how.log(),
             Self::FolderBack { root, .. } => tracing::info!(folder = %root.display(), "The folder is back."),

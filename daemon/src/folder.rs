@@ -36,6 +36,17 @@ pub(crate) struct Folder {
     sentinel: Option<Sentinel>,
 }
 
+/// Waits for a folder on a hung mount no longer than a few seconds.
+///
+/// # Errors
+/// When it does not answer, or no thread can be started that asks it.
+pub(crate) fn must_answer(root: &Path) -> Result<(), FolderError> {
+    match Sentinel::post(root).map_err(FolderError::unseen(root))?.answers_at_last() {
+        Answer::Yes => Ok(()),
+        Answer::NotYet | Answer::Silent => Err(FolderError::Silent { root: root.to_owned() }),
+    }
+}
+
 impl Folder {
     /// Makes the parts that are missing and takes the folder's lock, which the system releases when the process ends. `known`: what told the
     /// folder of that name when it was served last. If its mount is gone, nothing is made, and it is away until it is back.

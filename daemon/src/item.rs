@@ -32,6 +32,15 @@ impl Failure {
         Self { class, line: line.into(), stopped: false }
     }
 
+    /// What it tells the caller: where the machine runs short, trying again may help.
+    fn exit(&self) -> Exit {
+        match self.class {
+            _ if self.stopped => Exit::Interrupted,
+            ErrorClass::Shortage => Exit::TryAgain,
+            _ => Exit::Refused,
+        }
+    }
+
     /// More memory may help, so that the file is to be tried again with all of the budget.
     pub(crate) fn is_starved(&self) -> bool {
         self.class == ErrorClass::Starved
@@ -243,7 +252,7 @@ pub(crate) fn tell(input: &Path, result: &Result<Box<Report>, Failure>, order: &
             } else {
                 String::new()
             };
-            (text, Some(line), if failure.stopped { Exit::Interrupted } else { Exit::Refused })
+            (text, Some(line), failure.exit())
         }
     }
 }

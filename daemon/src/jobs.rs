@@ -47,14 +47,14 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
         Ok(jobs) => jobs,
         Err(failure) => return fail(&failure),
     };
-    let summary = summary(&jobs);
-    let folders = Folders::of(&jobs);
+    let (folders, mut summary) = (Folders::of(&jobs), String::new());
     if let JobsCommand::List { state, folder, newest } = &args.command {
         if let Some(name) = folder.as_ref().filter(|name| !jobs.is_empty() && !folders.0.contains(*name)) {
             return fail(&Failure { line: folders.has_no(name), exit: Exit::Refused });
         }
-        jobs.retain(|job| state.is_none_or(|state| job.kind() == state));
         jobs.retain(|job| folder.as_ref().is_none_or(|name| job.source.folder == *name));
+        summary = summary_of(&jobs);
+        jobs.retain(|job| state.is_none_or(|state| job.kind() == state));
         jobs.drain(..jobs.len().saturating_sub(newest.unwrap_or(usize::MAX)));
     }
     let work = at_work(&args.dir, &jobs);
@@ -291,7 +291,7 @@ fn line_of(job: &Job, folder: &str, work: Option<&Work>) -> String {
 }
 
 /// How many jobs are in which state, and of how many of them the result is a copy.
-fn summary(jobs: &[Job]) -> String {
+fn summary_of(jobs: &[Job]) -> String {
     let count =
         |kind: Kind, copied: bool| jobs.iter().filter(|job| job.kind() == kind && (!copied || reused(job).is_some())).count();
     let show = |count: usize| show_count(count as u64);

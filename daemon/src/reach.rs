@@ -15,11 +15,10 @@ use suture_store::{Job, SledStore, StoreError};
 use crate::config::default_state;
 use crate::control::{DaemonWish, GlanceWish, JobsWish, Refusal, Wish, answer, ask};
 use crate::exit::Exit;
+use crate::folder::must_answer;
 use crate::fsx;
 use crate::glance::{Glance, Work};
-use crate::ground::FolderError;
 use crate::schedule::Standing;
-use crate::sentinel::{Answer, Sentinel};
 use crate::{standstill, watch, watchdog};
 
 /// How long a store that is held while no one answers is waited for.
@@ -166,25 +165,15 @@ pub(crate) fn unseen(path: &Path, error: &io::Error) -> Failure {
     Failure::try_again(format!("{}: cannot be looked at: {error}; try again", path.display()))
 }
 
-/// Waits for a folder on a hung mount no longer than a few seconds.
-///
-/// # Errors
-/// When it does not answer, or no thread can be started that asks it.
-fn must_answer(dir: &Path) -> Result<(), Failure> {
-    let sentinel = Sentinel::post(dir).map_err(|error| unseen(dir, &error))?;
-    if sentinel.answers_at_last() == Answer::Yes {
-        return Ok(());
-    }
-    let silent = FolderError::Silent { root: dir.to_owned() };
-    Err(Failure::try_again(format!("{silent}. If its daemon serves other folders, ask by one of those")))
-}
-
 /// Refuses what is no hot folder.
 ///
 /// # Errors
 /// When it is none, or cannot be looked at.
 pub(crate) fn must_be_hot(dir: &Path) -> Result<(), Failure> {
-    must_answer(dir)?;
+    must_answer(dir).map_err(|error| {
+        let line = format!("{error}. If its daemon serves other folders, ask by one of those");
+        Failure::try_again(line)
+    })?;
     if fsx::is_folder(&dir.join(".suture")).map_err(|error| unseen(dir, &error))? {
         return Ok(());
     }

@@ -126,6 +126,10 @@ fn warn_of_hours(config: &Config) {
 
 /// Takes the folders that are to be served. One that another daemon serves is away, as long as there is one that is not.
 fn open_folders(config: &Config) -> Result<Vec<Arc<Folder>>, FolderError> {
+    // Before anything is read there: the job store may lie in a folder that answers nothing.
+    if let Some(folder) = config.folders.iter().find(|folder| config.state.starts_with(&folder.path)) {
+        crate::folder::must_answer(&folder.path)?;
+    }
     let (mut folders, mut away, known) = (Vec::new(), None, read_traces(&config.state)?);
     let mut served = 0;
     for folder in &config.folders {

@@ -91,15 +91,27 @@ impl Measured {
         }
     }
 
+    /// How much of the model it is about: nearly all rules measure a share. A part that the file itself lacks comes before all, a wrap before what it
+    /// explains; bodies stand among the larger shares, guesses behind all.
+    fn weight(&self) -> f64 {
+        match (self.rule, self.figure) {
+            (_, None) | ("guesses", _) => 0.0,
+            ("missing", _) => 3.0,
+            ("wrapped", Some(share)) => 1.0 + share,
+            ("bodies" | "bodies_outside", _) => 0.25,
+            (_, Some(share)) => share.min(1.0),
+        }
+    }
+
     /// Why a person must look; none within the limit.
     pub(crate) fn concerns(self) -> Vec<String> {
         if self.outcome() == RuleOutcome::Failed { self.words } else { Vec::new() }
     }
 }
 
-/// Why a person must look, in the order of the table; but a wrap first, as it explains what else was lost or invented.
+/// Why a person must look, the chief reason first.
 pub(crate) fn concerns(mut all: Vec<Measured>) -> Vec<String> {
-    all.sort_by_key(|measured| measured.rule != "wrapped");
+    all.sort_by(|a, b| b.weight().total_cmp(&a.weight()));
     all.into_iter().flat_map(Measured::concerns).collect()
 }
 

@@ -235,7 +235,8 @@ pub(crate) fn add_first(report: &mut Report, name: RepairName, count: u64, note:
 /// Says of a result that is not good what would make it so.
 pub(crate) fn advise(report: &mut Report, evidence: &Evidence) {
     if report.outcome == Outcome::NotGood {
-        report.verdict.reasons.extend(review::open_sheets(evidence.open_sheets));
+        // It explains the edges that are open.
+        report.verdict.reasons.splice(0..0, review::open_sheets(evidence.open_sheets));
     }
 }
 

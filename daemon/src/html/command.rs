@@ -61,7 +61,7 @@ fn pictured(args: &ReportArgs, files: &[PathBuf]) -> Result<Option<String>, Stri
     let limits = args.spend.limits(false);
     let meshes = files.iter().map(|path: &PathBuf| picture::open(path, &limits)).collect::<Result<Vec<MeshFile>, _>>()?;
     let records: Vec<_> = meshes.iter().map(MeshFile::records).collect();
-    let options = Options { size: SIZE, eye: None, threads: limits.threads, memory: limits.memory_bytes };
+    let options = Options { size: SIZE, eye: None, behind: false, threads: limits.threads, memory: limits.memory_bytes };
     let Some(drawn) = picture::draw(&records, &options) else { return Ok(None) };
     let png = drawn.png().map_err(|error| format!("the picture cannot be made: {error}"))?;
     // The bytes that were drawn were those of one state of the files.

@@ -88,7 +88,9 @@ pub(crate) fn verdict(report: &Report) -> Markup {
 
 /// The statement of the verdict.
 pub(crate) fn statement(report: &Report) -> Markup {
-    html! { p { "The file that was judged is " (report.verdict.statement) "." } }
+    let is_there =
+        report.task == Task::Inspect || report.outcome != Outcome::NotGood || report.output.is_some() || !report.profile.repair;
+    html! { @if is_there { p { "The file that was judged is " (report.verdict.statement) "." } } @else { p { "There is no result to judge." } } }
 }
 
 /// Reasons, one below the other.
@@ -107,6 +109,16 @@ pub(crate) fn figure(address: &str, is_pair: bool) -> Markup {
                 (key("outside", "outside")) (key("inside", "inside")) (key("edge", "open edge"))
                 @if is_pair { (key("goes", "removed")) (key("new", "added")) }
             }
+        }
+    }
+}
+
+/// The same from the opposite side, in a place of its own, which is drawn when it is opened.
+pub(crate) fn behind(address: &str) -> Markup {
+    html! {
+        details {
+            summary { "From the opposite side" }
+            figure { img alt="The same, seen from the opposite side" loading="lazy" src=(address); }
         }
     }
 }

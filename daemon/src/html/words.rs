@@ -109,12 +109,12 @@ fn ended(job: &Job, ending: Ending) -> String {
         }
         Ending::Skipped => "Use what is there. If that is not it, take it out of out/, and drop this file again.".into(),
         Ending::NameTaken => "Look at what has that name in out/. Take it away, then try again; or give the file another name, and drop it again.".into(),
-        Ending::NotGood => "Do not print it. Its report says what is wrong, and where. Ask for another file, or drop it again into the folder of another profile.".into(),
+        Ending::NotGood => "Do not print it. Its report says what is wrong, and where. Ask for another file, or repair it under other settings, if a reason names one.".into(),
         Ending::Unreadable => "It is not a mesh that Suture can read. Open the file, or ask for it again.".into(),
         Ending::Refused => "It needs more than this machine allows (see the reason). Raise that limit and try again, or ask for a simpler file.".into(),
         Ending::Environment => "The file is not to blame. Remove the reason (disk, rights), then try again.".into(),
         Ending::Quarantined => {
-            "It crashed the repair each time, or took longer than `time_limit` allows (see the reason). Release it to try once more, for example after an update or with a longer limit; else ask for another file.".into()
+            "Its repair came to no end (see the reason). Release it to try once more, for example after an update or with a longer limit; else ask for another file.".into()
         }
     }
 }

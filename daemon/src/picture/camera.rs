@@ -15,6 +15,11 @@ impl Eye {
     /// From the front, the right and above, as slicers show a plate.
     pub(crate) const USUAL: Self = Self { around: -60.0, above: 30.0 };
 
+    /// On the other side of the model.
+    pub(super) fn opposite(self) -> Self {
+        Self { around: self.around + 180.0, above: -self.above }
+    }
+
     /// The directions from which changes are looked for: the usual one first, four from above, four from below.
     pub(super) fn all() -> [Self; 8] {
         std::array::from_fn(|i| Self {

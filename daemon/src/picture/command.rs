@@ -28,7 +28,7 @@ fn picture(args: &PictureArgs) -> Result<(), String> {
     let meshes = args.inputs.iter().map(|path| open(path, &limits)).collect::<Result<Vec<_>, _>>()?;
     let records: Vec<&[Record]> = meshes.iter().map(MeshFile::records).collect();
     let eye = args.eye.map(|(around, above)| Eye { around, above });
-    let options = Options { size: args.size, eye, threads: limits.threads, memory: limits.memory_bytes };
+    let options = Options { size: args.size, eye, behind: false, threads: limits.threads, memory: limits.memory_bytes };
     let picture = draw(&records, &options).ok_or("no triangle has finite coordinates: there is nothing to draw")?;
     // What was drawn was one state of the file.
     meshes.iter().try_for_each(MeshFile::check_unchanged).map_err(|error| error.to_string())?;

@@ -51,7 +51,8 @@ fn made(args: &DrawArgs) -> Result<(), (Exit, String)> {
         (false, meshes) => {
             let is_large = meshes.iter().map(|mesh| mesh.len()).sum::<usize>() > MOST_TO_CHOOSE;
             let eye = is_large.then_some(Eye::USUAL);
-            let options = Options { size: SIZE, eye, threads: limits.threads, memory: limits.memory_bytes };
+            let (threads, memory, behind) = (limits.threads, limits.memory_bytes, args.behind);
+            let options = Options { size: SIZE, eye, behind, threads, memory };
             draw(meshes, &options).ok_or_else(nothing).map_err(fault)?.png().map_err(|error| fault(error.to_string()))?
         }
     };

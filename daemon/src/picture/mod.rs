@@ -44,6 +44,8 @@ pub(crate) struct Options {
     pub size: (usize, usize),
     /// `None`: where most changes are seen.
     pub eye: Option<Eye>,
+    /// Seen from the side opposite to that.
+    pub behind: bool,
     pub threads: usize,
     /// Bytes for what is optional.
     pub memory: u64,
@@ -101,6 +103,7 @@ pub(crate) fn draw(meshes: &[&[Record]], options: &Options) -> Option<Picture> {
         .map(|(i, (records, others))| Panel { records, others: others.as_ref(), is_after: i > 0 })
         .collect();
     let eye = options.eye.unwrap_or_else(|| choose(&panels, threads));
+    let eye = if options.behind { eye.opposite() } else { eye };
     let (width, height) = options.size;
     let camera = Camera::fitted(eye, meshes, threads, width * SAMPLES, height * SAMPLES)?;
     let mut picture =

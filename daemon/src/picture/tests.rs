@@ -9,7 +9,7 @@ fn faces() -> Vec<Record> {
 }
 
 fn options(threads: usize) -> Options {
-    Options { size: (64, 48), eye: Some(Eye { around: 45.0, above: 35.0 }), threads, memory: 1 << 20 }
+    Options { size: (64, 48), eye: Some(Eye { around: 45.0, above: 35.0 }), behind: false, threads, memory: 1 << 20 }
 }
 
 /// How many pixels are about of a colour.
@@ -107,7 +107,7 @@ fn no_numbers_break_it() {
 #[test]
 fn very_much_to_fill_is_bounded() {
     let records = vec![encode([[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [0.0, 9.0, 0.0]], 0); 60_000];
-    let large = Options { size: (800, 600), eye: Some(Eye { around: 0.0, above: 90.0 }), threads: 2, memory: 0 };
+    let large = Options { size: (800, 600), eye: Some(Eye { around: 0.0, above: 90.0 }), behind: false, threads: 2, memory: 0 };
     assert!(draw(&[&records], &large).unwrap().one_in > 10);
 }
 
@@ -119,4 +119,14 @@ fn a_png_is_read_back() {
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     reader.next_frame(&mut pixels).unwrap();
     assert_eq!(pixels, picture.pixels.as_flattened());
+}
+
+/// Without the face that looks to (1, 1, 1): from there one looks into it, from behind one does not.
+#[test]
+fn from_the_opposite_side_one_sees_the_other_faces() {
+    let open = &faces()[1..];
+    let of = |behind: bool| draw(&[open], &Options { behind, ..options(1) }).unwrap();
+    let seen = [false, true].map(|behind| count(&of(behind), is_orange));
+    assert!(seen[0] > 300 && seen[1] < 30, "{seen:?}");
+    assert!(count(&of(true), is_grey) > 300);
 }

@@ -9,6 +9,7 @@
 use std::io;
 use std::path::Path;
 
+use suture_store::job::one_line;
 use suture_store::{Decision, Ending, Hash, Job, Publication, Step, crash_point};
 
 use super::{Desk, OUTPUT, REPORT_FILE, base, read_json, rewrite};
@@ -34,6 +35,12 @@ pub(crate) fn unfit(path: &Path, hash: Hash) -> io::Result<Option<&'static str>>
     })
 }
 
+/// The notes of a report, as a good result of it keeps them.
+fn notes(report: &serde_json::Value) -> String {
+    let hints = report["hints"].as_array().map_or(&[][..], Vec::as_slice);
+    hints.iter().filter_map(|hint| hint["text"].as_str()).collect::<Vec<_>>().join("; ")
+}
+
 impl Desk<'_> {
     /// Makes the intent to publish what a person approved durable, or says that it is not what was judged.
     pub(crate) fn intend_approved(&self, job: &Job, judged: &Publication) -> Result<Job, PublishError> {
@@ -55,7 +62,7 @@ impl Desk<'_> {
         let input_hash = report.pointer("/input/blake3").and_then(|v| v.as_str()).and_then(|text| text.parse().ok());
         let publication = Publication {
             ending: Ending::Repaired,
-            reason: String::new(),
+            reason: one_line(&notes(&report)),
             output: names.output,
             report_hash: Some(rewrite(&path, &report)?),
             // Nobody has a copy of it without a person's word.

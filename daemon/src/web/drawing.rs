@@ -37,6 +37,8 @@ const KEPT: u64 = 256 << 20;
 pub(super) enum What {
     /// A PNG of one mesh or two.
     Picture,
+    /// The same from the opposite side.
+    Behind,
     /// One mesh with few triangles.
     Mesh,
 }
@@ -108,7 +110,11 @@ fn name(what: What, of: &[Known]) -> String {
     for known in of {
         hasher.update(&known.hash.0);
     }
-    let ending = if what == What::Picture { "png" } else { "mesh" };
+    let ending = match what {
+        What::Picture => "png",
+        What::Behind => "behind.png",
+        What::Mesh => "mesh",
+    };
     format!("{}.{ending}", &hasher.finalize().to_hex()[..32])
 }
 
@@ -180,8 +186,10 @@ impl Task {
         command.args(["--parent", &std::process::id().to_string(), "--data", &room_of(MEMORY, THREADS).to_string()]);
         command.arg("--within").arg(fsx::folder_of(&self.path));
         command.args(["--memory", &MEMORY.to_string(), "--threads", &THREADS.to_string()]);
-        if self.what == What::Mesh {
-            command.arg("--coarse");
+        match self.what {
+            What::Picture => {}
+            What::Behind => drop(command.arg("--behind")),
+            What::Mesh => drop(command.arg("--coarse")),
         }
         command.arg("--output").arg(&self.path).arg("--").args(self.found.iter().map(|(path, _)| path));
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).process_group(0);

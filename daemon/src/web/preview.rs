@@ -34,6 +34,18 @@ enum Side {
 #[serde(deny_unknown_fields)]
 struct Asked {
     side: Option<Side>,
+    /// Only of a picture.
+    from: Option<From>,
+}
+
+/// Where the eye is.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+enum From {
+    /// Where most of what changed is seen.
+    Front,
+    /// Opposite to that.
+    Behind,
 }
 
 /// `GET /v1/jobs/{id}/preview`: a picture.
@@ -43,8 +55,9 @@ pub(super) async fn preview(
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let Asked { side } = parameters(&uri)?;
-    show(&shared, &id, What::Picture, side, &headers).await
+    let Asked { side, from } = parameters(&uri)?;
+    let what = if from == Some(From::Behind) { What::Behind } else { What::Picture };
+    show(&shared, &id, what, side, &headers).await
 }
 
 /// `GET /v1/jobs/{id}/view`: a mesh with few triangles, as [`crate::picture`] writes it.
@@ -54,7 +67,10 @@ pub(super) async fn view(
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let Asked { side } = parameters(&uri)?;
+    let Asked { side, from } = parameters(&uri)?;
+    if from.is_some() {
+        return Err(Problem::bad("a view can be turned: `from` is for pictures"));
+    }
     if side == Some(Side::Both) {
         return Err(Problem::bad("a view is of one mesh: `side` is `before` or `after`"));
     }
@@ -67,7 +83,7 @@ async fn show(shared: &Shared, id: &str, what: What, side: Option<Side>, headers
     let after = after(shared, &job)?;
     let usual = match (&after, what) {
         (None, _) => Side::Before,
-        (Some(_), What::Picture) => Side::Both,
+        (Some(_), What::Picture | What::Behind) => Side::Both,
         (Some(_), What::Mesh) => Side::After,
     };
     let missing = || Problem::missing(format!("job {id} has left no mesh"));
@@ -77,7 +93,7 @@ async fn show(shared: &Shared, id: &str, what: What, side: Option<Side>, headers
         Side::Both => vec![before(shared, &job).await?, after.ok_or_else(missing)?],
     };
     let (opened, name) = drawing(shared, id, what, &of).await?;
-    let kind = if what == What::Picture { "image/png" } else { "application/octet-stream" };
+    let kind = if what == What::Mesh { "application/octet-stream" } else { "image/png" };
     Ok(answer(opened, format!("\"{name}\""), kind, None, headers))
 }
 

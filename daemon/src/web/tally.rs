@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::Builder;
 use std::time::{Duration, Instant};
 
-use suture_store::{Ending, Job, Look, State, StoreError};
+use suture_store::{Ending, Job, Kind, Look, State, StoreError};
 
 use crate::attempt::Context;
 use crate::shown::hint;
@@ -34,6 +34,8 @@ pub(super) struct Ended {
     /// Of those that are clean or repaired: copies of earlier results.
     pub reused: u64,
     pub needs_review: u64,
+    /// By a person, after a review.
+    pub rejected: u64,
     pub failed: u64,
     pub quarantined: u64,
     /// Good results of which a person may want to know something before they print them; and the latest of these.
@@ -49,6 +51,7 @@ impl Ended {
             Ending::Clean => &mut self.clean,
             Ending::Repaired => &mut self.repaired,
             Ending::Skipped => &mut self.skipped,
+            Ending::NeedsReview if job.kind() == Kind::Rejected => &mut self.rejected,
             Ending::NeedsReview => &mut self.needs_review,
             Ending::Quarantined => &mut self.quarantined,
             Ending::NotGood | Ending::Unreadable | Ending::Refused | Ending::NameTaken | Ending::Environment => &mut self.failed,

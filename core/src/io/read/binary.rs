@@ -60,13 +60,13 @@ pub(super) fn mismatched(bytes: &[u8]) -> Option<Result<Layout, Rejection>> {
     let announced = usize::try_from(declared).unwrap_or(usize::MAX);
     if all.is_empty() {
         // Too short for a single record: a binary STL only if the count does not say otherwise.
-        return (declared == 0).then(|| Err(none_of(body.len())));
+        return (declared == 0).then(|| Err(none_of(body)));
     }
     let mut findings = header_findings(bytes);
     let triangles = match declared {
         0 | u32::MAX => {
             if !look_like_triangles(all, Normals::Checked) {
-                return (declared == 0 && is_blank(body.get(..1 << 20).unwrap_or(body))).then(|| Err(none_of(body.len())));
+                return (declared == 0 && is_blank(body.get(..1 << 20).unwrap_or(body))).then(|| Err(none_of(body)));
             }
             findings.push(Finding::flaw(format!(
                 "header leaves the count open ({}), file holds {}",
@@ -124,7 +124,11 @@ fn ignored(bytes: usize, last: &str) -> Finding {
 }
 
 /// The header announces none, and these bytes are none.
-fn none_of(bytes: usize) -> Rejection {
+fn none_of(bytes: &[u8]) -> Rejection {
+    if bytes.len() >= size_of::<Record>() && is_blank(bytes.get(..1 << 20).unwrap_or(bytes)) {
+        return Rejection::Unreadable("no triangles: the file is all zeros, as a copy that was interrupted leaves it".into());
+    }
+    let bytes = bytes.len();
     let (what, follow) = (Counted(bytes as u64, "byte", "bytes"), if bytes == 1 { "follows" } else { "follow" });
     Rejection::Unreadable(format!("no triangles: the header says 0, and {what} without any {follow}"))
 }

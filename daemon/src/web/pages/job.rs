@@ -50,7 +50,7 @@ pub(super) async fn job(
         p { a href="/jobs" { "All jobs" } }
         h1 { (name) }
         div id="job" data-live {
-            (standing(&job, reasons))
+            (standing(&job, reasons, report.as_ref()))
             @if let Some(anew) = anew { p { "It was dropped anew as " a href={ "/jobs/" (anew) } { "job " (anew) } "." } }
             @if job.kind().is_held() { p { (progress(&job, &shared.context.bus)) } }
             ul class="actions" { (forms(&frame, &job)) (downloads(&job)) }
@@ -91,14 +91,16 @@ fn whole_reasons<'a>(job: &Job, report: Option<&'a Report>) -> &'a [String] {
     if !begin.is_empty() && reasons.join("; ").starts_with(begin) { reasons } else { &[] }
 }
 
-/// Where it stands, why, and what to do.
-fn standing(job: &Job, reasons: &[String]) -> Markup {
+/// Where it stands, why, and what to do. Whoever decides on a result is to know its notes before.
+fn standing(job: &Job, reasons: &[String], report: Option<&Report>) -> Markup {
     let (words, class) = state(job);
     let (why, advice) = (reason(job), advice(job));
+    let notes = report.filter(|_| hint(job).is_none()).map_or(&[][..], |report| &report.hints);
     html! {
         div class={ "outcome " (class) } role="status" {
             strong { (words) }
             @if !reasons.is_empty() { p { "Why:" } (report::reasons(reasons)) } @else if !why.is_empty() { p { (if hint(job).is_some() { "Note: " } else { "Why: " }) (prose(&why)) } }
+            @for note in notes { p { "Note: " (prose(&note.text)) "." } }
             @if !advice.is_empty() { p { "What to do: " (plain(&advice)) } }
         }
     }
@@ -154,7 +156,10 @@ fn reported(job: &Job, report: &Report, is_explained: bool) -> Markup {
         h2 { "The verdict" }
         @if is_explained { (report::statement(report)) } @else { (report::verdict(report)) }
         h2 { "Pictures" }
-        (report::figure(&format!("/v1/jobs/{}/preview?side={side}", job.id), is_pair))
+        @if report.before.triangles > 0 {
+            (report::figure(&format!("/v1/jobs/{}/preview?side={side}", job.id), is_pair))
+            (report::behind(&format!("/v1/jobs/{}/preview?side={side}&from=behind", job.id)))
+        } @else { p { "There is nothing to draw." } }
         (places::view(job.id, report, is_pair))
         (report::details(report))
     }

@@ -6,6 +6,7 @@ use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Response;
 use maud::{Markup, html};
+use suture_core::words::Counted;
 use suture_store::{Job, Kind, Look};
 
 use super::frame::Frame;
@@ -202,7 +203,7 @@ pub(super) fn progress(job: &Job, bus: &Bus) -> Markup {
 }
 
 fn last_day(night: &Night) -> Markup {
-    let Ended { clean, repaired, skipped, reused, needs_review, failed, quarantined, .. } = night.ended;
+    let Ended { clean, repaired, skipped, reused, needs_review, rejected, failed, quarantined, .. } = night.ended;
     let entry = |count: u64, class: &str, words: &str, kind: Kind| {
         html! { li class=[(count > 0).then_some(class)] { b { (show_count(count)) } @if count > 0 { a href=(list_of(&[kind])) { (words) } } @else { (words) } } }
     };
@@ -213,10 +214,11 @@ fn last_day(night: &Night) -> Markup {
             (entry(repaired, "good", "repaired", Kind::Done))
             @if skipped > 0 { (entry(skipped, "good", "skipped", Kind::Done)) }
             (entry(needs_review, "review", "need review", Kind::NeedsReview))
+            @if rejected > 0 { (entry(rejected, "", "rejected", Kind::Rejected)) }
             (entry(failed, "bad", "failed", Kind::Failed))
             (entry(quarantined, "bad", "in quarantine", Kind::Quarantined))
         }
-        @if reused > 0 { p { (show_count(reused)) " of them are copies of earlier results." } }
+        @if reused > 0 { p { (Counted(reused, "result is a copy", "results are copies")) " of earlier ones." } }
     }
 }
 

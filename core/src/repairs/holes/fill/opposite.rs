@@ -14,7 +14,7 @@ use crate::repairs::holes::patches::Placed;
 use crate::submesh::Submesh;
 use crate::submesh::components::Components;
 use crate::topology::survey::Survey;
-use crate::util::words::At;
+use crate::util::words::{At, Counted};
 
 /// The largest holes are looked at, so many of them.
 const MOST_HOLES: usize = 256;
@@ -100,8 +100,9 @@ pub(super) fn doubt(submesh: &Submesh, holes: &[Hole<'_>]) -> Option<String> {
         count += 1;
     }
     let [a, b] = first.filter(|_| share > GOES_ON)?;
+    let pairs = Counted(count, "pair", "pairs");
     Some(format!(
-        "holes lie opposite each other, {count} × two, and were closed each for itself: {:.1} % of the body lies between them, a way through or a pin that \
+        "{pairs} of holes that lie opposite each other were closed one by one: {:.1} % of the body lies between them, a way through or a pin that \
          may have lost its walls, as between {} and {}",
         share * 100.0,
         At(a),

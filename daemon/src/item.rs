@@ -334,6 +334,14 @@ mod tests {
         );
     }
 
+    /// Where the machine has no room, trying again may help; a file that cannot be read stays so.
+    #[test]
+    fn a_shortage_is_no_fault_of_the_call() {
+        let exit = |class| Failure::new(class, "x").exit();
+        assert_eq!([ErrorClass::Shortage, ErrorClass::Unreadable].map(exit), [Exit::TryAgain, Exit::Refused]);
+        assert_eq!(Failure { stopped: true, ..Failure::new(ErrorClass::Shortage, "x") }.exit(), Exit::Interrupted);
+    }
+
     /// One line each, and only what is certified and the same is good.
     #[test]
     fn a_certificate_holds_contradicts_or_certifies_nothing() {

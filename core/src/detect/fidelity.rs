@@ -145,6 +145,22 @@ mod tests {
         assert!(include_str!("../../REPORT.md").contains(&table), "core/REPORT.md should have:\n{table}");
     }
 
+    /// The larger share first, whatever the table's order; a part that is missing before all, guesses behind all.
+    #[test]
+    fn the_chief_reason_comes_first() {
+        let of = |rule: &'static str, figure: f64| Measured { rule, figure: Some(figure), limit: 0.0, words: vec![rule.into()] };
+        let all = [
+            ("guesses", 9.0),
+            ("skin_lost", 0.006),
+            ("bodies_outside", 144.0),
+            ("skin_invented", 0.75),
+            ("wrapped", 0.1),
+            ("missing", 1.0),
+        ];
+        let told = concerns(all.map(|(rule, figure)| of(rule, figure)).into());
+        assert_eq!(told, ["missing", "wrapped", "skin_invented", "bodies_outside", "skin_lost", "guesses"]);
+    }
+
     #[test]
     fn a_figure_at_its_limit_passes_and_none_is_unchecked() {
         let of = |figure: Option<f64>| {

@@ -269,6 +269,8 @@ fn pictures_are_of_the_bytes_that_were_published() {
     let after = client.get("/v1/jobs/1/preview?side=after").expect(200);
     assert_eq!((width(&before), width(&after)), (640, 640));
     assert_ne!(before.body, after.body);
+    let behind = client.get("/v1/jobs/1/preview?from=behind").expect(200);
+    assert!(width(&behind) == 1280 && behind.body != picture.body, "from the opposite side");
     let tag = picture.header("etag").expect("a tag").to_owned();
     assert!(client.send("GET", "/v1/jobs/1/preview?side=both", &[("If-None-Match", &tag)], b"").expect(304).body.is_empty());
     let view = client.get("/v1/jobs/1/view").expect(200);
@@ -277,7 +279,8 @@ fn pictures_are_of_the_bytes_that_were_published() {
     let report = client.get("/v1/jobs/1/report").expect(200).json();
     assert_eq!(report["output"]["triangles"], number(3), "of so many triangles, and all of them");
     assert_eq!(number(2), number(3));
-    for (path, status) in [("preview?side=up", 400), ("preview?size=9", 400), ("view?side=both", 400)] {
+    for (path, status) in [("preview?side=up", 400), ("preview?size=9", 400), ("view?side=both", 400), ("view?from=behind", 400)]
+    {
         client.get(&format!("/v1/jobs/1/{path}")).expect(status);
     }
     // Another file in its place is not shown; what was drawn before, is.
@@ -347,5 +350,9 @@ fn a_person_decides_on_the_page_of_a_job() {
     let page = client.browse("/jobs/2").expect(200);
     assert!(page.text().contains("Ask for a better file.") && page.text().contains("/jobs/2/approve"), "{}", page.text());
     assert!(!page.text().contains("/jobs/2/reject"));
-    assert!(client.browse("/").text().contains("Nothing needs you."), "whoever rejected it knows");
+    let night = client.browse("/");
+    assert!(night.text().contains("Nothing needs you."), "whoever rejected it knows");
+    for words in ["<b>0</b>need review", "<b>1</b><a href=\"/jobs?state=rejected\">rejected</a>"] {
+        assert!(night.text().contains(words), "{words}: {}", night.text());
+    }
 }

@@ -170,7 +170,7 @@ impl Judged {
         profile: &Profile,
     ) -> Option<String> {
         if breaks_off(submesh, rim, body) {
-            return Some("the surface ends in a ragged edge there, and was closed along it: more of it may be missing".into());
+            return Some("the surface ends in a ragged edge, and was closed along it: more of it may be missing".into());
         }
         if patch.coarse.is_empty() || area(submesh, patch) < WIDE * body.area {
             self.flat(survey, submesh, (patch, rim), body, profile)

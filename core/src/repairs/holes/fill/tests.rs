@@ -267,5 +267,5 @@ fn an_end_that_breaks_off_is_a_guess_however_long_the_tube_is() {
     let ragged: Vec<Corners> = whole.iter().copied().filter(points_up).collect();
     assert_eq!(ragged.len() + 24, whole.len());
     let of_ragged = judged(&ragged);
-    assert!(of_ragged.doubts.len() == 1 && of_ragged.doubts[0].contains("breaks off"), "{:?}", of_ragged.doubts);
+    assert!(of_ragged.doubts.len() == 1 && of_ragged.doubts[0].contains("ragged edge"), "{:?}", of_ragged.doubts);
 }

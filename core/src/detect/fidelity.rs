@@ -109,10 +109,15 @@ impl Measured {
     }
 }
 
-/// Why a person must look, the chief reason first.
-pub(crate) fn concerns(mut all: Vec<Measured>) -> Vec<String> {
-    all.sort_by(|a, b| b.weight().total_cmp(&a.weight()));
-    all.into_iter().flat_map(Measured::concerns).collect()
+/// Why a person must look, the chief reason first. If there is any, `beside` is told as well, in the place of its share.
+pub(crate) fn concerns(all: Vec<Measured>, beside: Option<(f64, String)>) -> Vec<String> {
+    let weighed = |measured: Measured| (measured.weight(), measured.concerns());
+    let mut all: Vec<_> = all.into_iter().map(weighed).filter(|(_, lines)| !lines.is_empty()).collect();
+    if !all.is_empty() {
+        all.extend(beside.map(|(share, line)| (share, vec![line])));
+    }
+    all.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+    all.into_iter().flat_map(|(_, lines)| lines).collect()
 }
 
 /// The second half of the certificate of what was made of a file with this hash and length.
@@ -157,8 +162,9 @@ mod tests {
             ("wrapped", 0.1),
             ("missing", 1.0),
         ];
-        let told = concerns(all.map(|(rule, figure)| of(rule, figure)).into());
-        assert_eq!(told, ["missing", "wrapped", "skin_invented", "bodies_outside", "skin_lost", "guesses"]);
+        let told = concerns(all.map(|(rule, figure)| of(rule, figure)).into(), Some((0.3, "openings".into())));
+        assert_eq!(told, ["missing", "wrapped", "skin_invented", "openings", "bodies_outside", "skin_lost", "guesses"]);
+        assert!(concerns(Vec::new(), Some((0.3, "openings".into()))).is_empty(), "it is no reason by itself");
     }
 
     #[test]

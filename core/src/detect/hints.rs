@@ -33,16 +33,19 @@ fn scale(defects: &Defects, extents: [f64; 3]) -> Option<Hint> {
     let of_box = extents.iter().product::<f64>();
     // An open surface encloses nothing certain, but no more than its box.
     let volume = if defects.boundary_edges == 0 { defects.volume.abs() } else { of_box };
-    let (kind, unit, factor) = match volume {
+    const METRES: (&str, f64) = ("metres", 1000.0);
+    const INCHES: (&str, f64) = ("inches", 25.4);
+    let (kind, (unit, factor), (other, other_factor)) = match volume {
         v if v <= 0.0 || v.is_nan() => return None,
-        v if v < MAY_BE_METRES => (HintKind::Metres, "metres", 1000.0),
-        v if v < MAY_BE_INCHES => (HintKind::Inches, "inches", 25.4),
+        v if v < MAY_BE_METRES => (HintKind::Metres, METRES, INCHES),
+        v if v < MAY_BE_INCHES => (HintKind::Inches, INCHES, METRES),
         _ => return None,
     };
-    let [x, y, z] = extents.map(Short);
-    let [far_x, far_y, far_z] = extents.map(|extent| Short(extent * factor));
+    let size = |factor: f64| extents.map(|extent| Short(extent * factor).to_string()).join(" × ");
+    let (now, then, otherwise) = (size(1.0), size(factor), size(other_factor));
+    // Of parts of one model, a small one may look like inches where all are in metres.
     let text = format!(
-        "it is {x} × {y} × {z} mm; was it drawn in {unit}? Then it is {far_x} × {far_y} × {far_z} mm, and has to be scaled by {factor}"
+        "it is {now} mm; was it drawn in {unit}? Then it is {then} mm, and has to be scaled by {factor} (drawn in {other}: {otherwise} mm, by {other_factor}); nothing is scaled here"
     );
     Some(Hint { kind, text })
 }

@@ -29,6 +29,8 @@ pub(crate) struct Evidence {
 pub(crate) struct Explained {
     /// Area of patches that nothing speaks against.
     pub(crate) area: f64,
+    /// The area of the largest of them, and the box around it.
+    pub(crate) largest: Option<(f64, Bounds)>,
     /// Around such as reach beyond their loops.
     pub(crate) reached: Bounds,
     /// Around the surface that was left when specks were dropped; `None` if none were.
@@ -58,10 +60,28 @@ pub(crate) struct Asked {
     pub(crate) area: f64,
 }
 
+/// A smaller share of new surface is not told of.
+const TOLD_SHARE: f64 = 0.01;
+
 impl Default for Asked {
     fn default() -> Self {
         Self { bounds: Bounds::EMPTY, area: 0.0 }
     }
+}
+
+/// Words on openings that were closed where nothing speaks against that, and the share of the surface that is new: no reason to ask a person, but if one is asked for another
+/// reason, they are to know.
+pub(crate) fn closed_openings(explained: &Explained, after: &Defects) -> Option<(f64, String)> {
+    let share = if after.area > 0.0 { explained.area / after.area } else { 0.0 };
+    let (largest, bounds) = explained.largest.filter(|_| share > TOLD_SHARE)?;
+    let (percent, of_largest) = (share * 100.0, largest / after.area * 100.0);
+    let place = span([bounds.lo, bounds.hi]);
+    Some((
+        share,
+        format!(
+            "openings were closed by new surface, {percent:.1} % of all: the largest by {of_largest:.1} %, {place}; is it meant to be open there?"
+        ),
+    ))
 }
 
 /// Words on lone sheets that keep a file from being good.

@@ -187,7 +187,7 @@ pub(crate) fn conclude(report: &mut Report, input: &[Finding], (surface, evidenc
         };
         let measured = review::measure(&change, &report.profile);
         faithful = Some(fidelity::certify((&report.input.blake3, report.input.bytes), &measured));
-        let concerns = fidelity::concerns(measured);
+        let concerns = fidelity::concerns(measured, review::closed_openings(&evidence.explained, &defects));
         if !concerns.is_empty() {
             report.outcome = Outcome::NeedsReview;
             report.verdict.reasons = concerns;

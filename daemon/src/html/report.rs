@@ -107,18 +107,18 @@ pub(crate) fn figure(address: &str, is_pair: bool) -> Markup {
             figcaption {
                 (words)
                 (key("outside", "outside")) (key("inside", "inside")) (key("edge", "open edge"))
-                @if is_pair { (key("goes", "removed")) (key("new", "added")) }
+                @if is_pair { (key("goes", "removed, or drawn in other triangles")) (key("new", "added, or drawn in other triangles")) }
             }
         }
     }
 }
 
-/// The same from the opposite side, in a place of its own, which is drawn when it is opened.
+/// The same from the opposite side.
 pub(crate) fn behind(address: &str) -> Markup {
     html! {
-        details {
-            summary { "From the opposite side" }
-            figure { img alt="The same, seen from the opposite side" loading="lazy" src=(address); }
+        figure {
+            img alt="The same, seen from the opposite side" loading="lazy" src=(address);
+            figcaption { "From the opposite side" }
         }
     }
 }

@@ -58,6 +58,7 @@ pub(crate) const REPAIR: Repair = Repair {
         cx.account.doubts.extend(closed.judged.doubts);
         cx.handed.explained = closed.judged.explained;
         cx.account.explained.area += closed.judged.area;
+        cx.account.explained.largest = closed.judged.largest;
         cx.account.explained.reached.add(&closed.judged.reached);
         if let Some(meant) = &mut cx.account.enclosed.meant {
             *meant += closed.judged.volume - closed.not_meant;

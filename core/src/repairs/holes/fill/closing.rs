@@ -46,6 +46,8 @@ pub(crate) struct Judged {
     pub(crate) doubts: Vec<String>,
     /// Area of the patches that nothing speaks against.
     pub(crate) area: f64,
+    /// The area of the largest of them, and the box around it; of several as large, the first.
+    pub(crate) largest: Option<(f64, Bounds)>,
     /// Their triangles.
     pub(crate) explained: Vec<u32>,
     /// Around those of them that reach beyond their loops.

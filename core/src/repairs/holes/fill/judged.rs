@@ -15,6 +15,7 @@ use crate::contract::settings::Profile;
 use crate::detect::holes::loops::Loop;
 use crate::detect::holes::owners;
 use crate::geometry::flatness;
+use crate::geometry::sums::Bounds;
 use crate::repairs::holes::fair::{Beyond, Gathered};
 use crate::repairs::holes::patches::{EXTENDED, ISLANDS, Placed, Planes};
 use crate::repairs::shared::unsaid;
@@ -156,8 +157,18 @@ impl Judged {
     /// One that nothing speaks against: it is small against its body, or of planes that are known.
     fn explain(&mut self, submesh: &Submesh, patch: &Placed) {
         patch.living(submesh).for_each(|t| self.reached.include(&submesh.points(t)));
-        self.area += area(submesh, patch);
+        self.count(submesh, patch, area(submesh, patch));
+    }
+
+    /// Adds a patch of this area to those that nothing speaks against.
+    fn count(&mut self, submesh: &Submesh, patch: &Placed, area: f64) {
+        self.area += area;
         self.explained.extend(patch.triangles());
+        if self.largest.is_none_or(|(largest, _)| area > largest) {
+            let mut bounds = Bounds::EMPTY;
+            patch.living(submesh).for_each(|t| bounds.include(&submesh.points(t)));
+            self.largest = Some((area, bounds));
+        }
     }
 
     /// A patch over a hole, around its islands if there are any.
@@ -219,8 +230,7 @@ impl Judged {
         if flatness::is_ragged(height(submesh, rim, across), across.length()) {
             return None;
         }
-        self.area += size;
-        self.explained.extend(patch.triangles());
+        self.count(submesh, patch, size);
         None
     }
 

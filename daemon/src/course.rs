@@ -54,7 +54,7 @@ const fn step(part: Part, stage: &'static str, weight: f64, comes: Comes, doing:
     Step { part, stage, weight, comes, doing }
 }
 
-/// What the repair of a file weighs of which every triangle is at a defect.
+/// The weight that a repair has beyond that of its step when every triangle of the file is at a defect.
 const DEFECTS: f64 = 200.0;
 
 /// In the words for people of all that comes after the result was written.

@@ -32,7 +32,7 @@ impl Failure {
         Self { class, line: line.into(), stopped: false }
     }
 
-    /// What it tells the caller: where the machine runs short, trying again may help.
+    /// The exit status: where the machine runs short, trying again may help.
     fn exit(&self) -> Exit {
         match self.class {
             _ if self.stopped => Exit::Interrupted,

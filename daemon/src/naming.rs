@@ -261,7 +261,7 @@ mod tests {
         assert_eq!(naming.report(&names[0]), Ok(Some(dir.path().join(format!("part~2.stl{REPORT}")))));
     }
 
-    /// What is there is replaced, once; an input and what is no file are not.
+    /// A file that is there is replaced, once; an input and what is no file are not.
     #[test]
     fn by_force_what_is_there_is_replaced() {
         let dir = tempfile::tempdir().unwrap();

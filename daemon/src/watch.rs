@@ -21,7 +21,7 @@ use crate::event::{Happening, Recovery};
 use crate::event_bus::Bus;
 use crate::event_store::Heard;
 use crate::exit::Exit;
-use crate::folder::{Folder, FolderError, is_fading};
+use crate::folder::{Folder, FolderError, is_fading, must_answer};
 use crate::fsx;
 use crate::ground::read_traces;
 use crate::keeper::Keeper;
@@ -128,7 +128,7 @@ fn warn_of_hours(config: &Config) {
 fn open_folders(config: &Config) -> Result<Vec<Arc<Folder>>, FolderError> {
     // Before anything is read there: the job store may lie in a folder that answers nothing.
     if let Some(folder) = config.folders.iter().find(|folder| config.state.starts_with(&folder.path)) {
-        crate::folder::must_answer(&folder.path)?;
+        must_answer(&folder.path)?;
     }
     let (mut folders, mut away, known) = (Vec::new(), None, read_traces(&config.state)?);
     let mut served = 0;

@@ -60,14 +60,14 @@ pub(crate) struct Asked {
     pub(crate) area: f64,
 }
 
-/// A smaller share of new surface is not told of.
-const TOLD_SHARE: f64 = 0.01;
-
 impl Default for Asked {
     fn default() -> Self {
         Self { bounds: Bounds::EMPTY, area: 0.0 }
     }
 }
+
+/// A smaller share of new surface is not told of.
+const TOLD_SHARE: f64 = 0.01;
 
 /// Words on openings that were closed where nothing speaks against that, and the share of the surface that is new: no reason to ask a person, but if one is asked for another
 /// reason, they are to know.
@@ -133,7 +133,12 @@ pub(crate) struct Change<'a> {
 pub(crate) fn measure(change: &Change<'_>, profile: &Profile) -> Vec<Measured> {
     let mut all = counts(change, profile);
     all.push(noted("guesses", &change.evidence.doubts));
-    all.extend(volumes(change.volumes, profile));
+    let volumes = volumes(change.volumes, profile);
+    // Of the two rules on bodies, this one counts more of them, and says where the largest was: two numbers would only puzzle.
+    if volumes.iter().any(|measured| measured.rule == "bodies_outside" && !measured.words.is_empty()) {
+        all.iter_mut().filter(|measured| measured.rule == "bodies").for_each(|measured| measured.words.clear());
+    }
+    all.extend(volumes);
     all.push(cavities(change, profile));
     all.extend(skin(change.skin, profile));
     all.extend(sheets(change.before, change.sheets, profile));
@@ -174,12 +179,9 @@ fn counts(change: &Change<'_>, profile: &Profile) -> Vec<Measured> {
     });
     let all = before.bodies + before.nested_positive;
     let gone = all.saturating_sub(after.bodies + after.nested_positive + enclosed.bodies);
-    let mut bodies = measured("bodies", Some(gone as f64), f64::from(profile.max_bodies_lost), |gone| {
+    let bodies = measured("bodies", Some(gone as f64), f64::from(profile.max_bodies_lost), |gone| {
         format!("{} of {} bodies were lost", Count(gone), Count(all))
     });
-    // The other rule counts more of them, and says where the largest was: two numbers would only puzzle.
-    let is_told = volumes(change.volumes, profile).iter().any(|rule| rule.rule == "bodies_outside" && !rule.words.is_empty());
-    bodies.words.retain(|_| !is_told);
     vec![volume(change, profile), swallowed, area(change, profile), outline(change, profile), bodies]
 }
 

@@ -75,7 +75,7 @@ fn folders(text: &mut String, context: &Context) {
     let config = context.settings.now();
     let free = |path: &Path| fsx::free_space(path, 0) as f64;
     // Results may lie on a disk of their own.
-    // One that answers nothing would be waited for without end.
+    // A folder that answers nothing would be waited for without end.
     let of_folders = context.folders.iter().zip(&reached).filter(|(_, reached)| **reached).flat_map(|(folder, _)| {
         let of = |role, path: &Path| (vec![("role", role), ("folder", folder.name.as_str())], free(path));
         [of("folder", &folder.root), of("results", &folder.out())]

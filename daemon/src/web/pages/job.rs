@@ -42,7 +42,12 @@ pub(super) async fn job(
     let has_ended = matches!(job.state, JobState::Ended { .. });
     // A report that is gone, or speaks of no mesh, is no reason to say nothing.
     let report = if has_ended { report_of(&shared, id).await.ok().flatten().map(by_name) } else { None };
-    let anew = if is_changed(&job) { ask(&shared.context, move |context| Ok(drop_after(context, id)?)).await? } else { None };
+    let anew = if is_changed(&job) {
+        let changed = job.clone();
+        ask(&shared.context, move |context| Ok(drop_after(context, &changed)?)).await?
+    } else {
+        None
+    };
     let frame = Frame::of(&shared, &headers);
     let name = plain(&job.source.path.to_string());
     let reasons = whole_reasons(&job, report.as_ref());
@@ -76,9 +81,8 @@ fn is_changed(job: &Job) -> bool {
 }
 
 /// The job of the same path that came next, if it came soon.
-fn drop_after(context: &Context, id: JobId) -> Result<Option<JobId>, StoreError> {
-    let Some(job) = context.store.get(id)? else { return Ok(None) };
-    let later = context.store.list(&Query { after: id, limit: LATER, ..Query::default() })?;
+fn drop_after(context: &Context, job: &Job) -> Result<Option<JobId>, StoreError> {
+    let later = context.store.list(&Query { after: job.id, limit: LATER, ..Query::default() })?;
     let is_same = |other: &&Job| (&other.source.folder, &other.source.path) == (&job.source.folder, &job.source.path);
     Ok(later.iter().find(is_same).map(|other| other.id))
 }

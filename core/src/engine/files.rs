@@ -16,6 +16,7 @@ use crate::detect::walls::Surface;
 use crate::diagnosis::Diagnosis;
 use crate::engine::clock::Clock;
 use crate::engine::everywhere;
+use crate::engine::formats::{self, Target};
 use crate::engine::judging::{self, Input, Written};
 use crate::engine::welding;
 use crate::geometry::sums::Bounds;
@@ -64,7 +65,7 @@ pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress
     clock.close(report, mesh.path(), mesh.records().len())
 }
 
-/// Repairs `input` into the new file `output`.
+/// Repairs `input` into the new file `output`, in the format of its name's ending, or else in the input's.
 ///
 /// # Errors
 /// [`Error`], any of them; [`Error::Profile`] before the file is opened.
@@ -72,16 +73,37 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     let mut clock = Clock::start();
     judging::validate(input, profile)?;
     let limits = &limits.spooling_beside(output);
+    let mesh = open(input, limits, progress)?;
+    let triangles = mesh.records().len();
+    let target = formats::target(mesh.format(), output);
+    let report = match target.layout {
+        None => make(mesh, output, target, (profile, limits), progress, &mut clock)?,
+        Some(layout) => {
+            let make = |mesh, spool: &Path, clock: &mut Clock| make(mesh, spool, target, (profile, limits), progress, clock);
+            formats::through_a_spool((mesh, input), output, (target, layout), limits, progress, &mut clock, make)?
+        }
+    };
+    clock.close(report, input, triangles)
+}
+
+/// Makes `mesh` the new STL `output`, or a copy of its file where that is good and of the `target`.
+fn make(
+    mesh: MeshFile,
+    output: &Path,
+    target: Target,
+    (profile, limits): (&Profile, &Limits),
+    progress: &dyn Progress,
+    clock: &mut Clock,
+) -> Result<Report> {
     if !profile.repair {
-        return pass_on(input, output, profile, limits, progress, clock);
+        return pass_on(&mesh, output, target, (profile, limits), progress, clock);
     }
-    let (mesh, welded) = welding::in_the_stream(open(input, limits, progress)?, profile, limits, progress)?;
+    let (mesh, welded) = welding::in_the_stream(mesh, profile, limits, progress)?;
     clock.stage("read");
     check_space(&mesh, output, limits)?;
     emit::draft(&mesh, output, limits, progress, |draft| {
-        let mended = mend(draft, (&mesh, welded.as_ref()), output, profile, limits, progress, &mut clock);
-        let report = mended.map_err(|error| or_changed(error, &mesh, progress))?;
-        clock.close(report, mesh.path(), mesh.records().len())
+        let mended = mend(draft, (&mesh, welded.as_ref()), (output, target), profile, limits, progress, clock);
+        mended.map_err(|error| or_changed(error, &mesh, progress))
     })
 }
 
@@ -101,51 +123,58 @@ fn or_changed(error: Error, mesh: &MeshFile, progress: &dyn Progress) -> Error {
     }
 }
 
-/// For a profile that repairs nothing: copies `input` into the new file `output` if it is good, and writes nothing if it is not.
+/// For a profile that repairs nothing: makes `mesh` the new file `output` if it is good, and writes nothing if it is not.
 fn pass_on(
-    input: &Path,
+    mesh: &MeshFile,
     output: &Path,
-    profile: &Profile,
-    limits: &Limits,
+    target: Target,
+    (profile, limits): (&Profile, &Limits),
     progress: &dyn Progress,
-    mut clock: Clock,
+    clock: &mut Clock,
 ) -> Result<Report> {
-    let mesh = open(input, limits, progress)?;
     clock.stage("read");
-    check_space(&mesh, output, limits)?;
-    let mut diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
+    check_space(mesh, output, limits)?;
+    let mut diagnosis = Diagnosis::of(mesh.path(), mesh.records(), profile, limits, progress)?;
     clock.stage("topology");
-    let mut report = judging::begin(Task::Repair, &subject(&mesh, String::new()), &diagnosis, profile, limits);
+    let mut report = judging::begin(Task::Repair, &subject(mesh, String::new()), &diagnosis, profile, limits);
     if report.verdict.good {
         drop(diagnosis);
-        copy(&mesh, output, &mut report, limits, progress, &mut clock).map_err(|error| or_changed(error, &mesh, progress))?;
+        let passed = copy((mesh, target), output, &mut report, limits, progress, clock);
+        passed.map_err(|error| or_changed(error, mesh, progress))?;
     } else {
-        report.input.blake3 = hash(&mesh, limits, progress);
+        report.input.blake3 = hash(mesh, limits, progress);
         clock.stage("hash");
         let facts = report.input.clone();
         judging::conclude_unchanged(&mut report, &facts, mesh.findings());
         report.loops = repairs::recognise(&mut diagnosis, mesh.path(), profile, limits, progress)?;
     }
     mesh.check_unchanged()?;
-    clock.close(report, mesh.path(), mesh.records().len())
+    Ok(report)
 }
 
-/// Copies a good file, and reads the copy back.
+/// Copies a good file, or its triangles where it is not of the `target`, and reads the copy back.
 fn copy(
-    mesh: &MeshFile,
+    (mesh, target): (&MeshFile, Target),
     output: &Path,
     report: &mut Report,
     limits: &Limits,
     progress: &dyn Progress,
     clock: &mut Clock,
 ) -> Result<()> {
-    let (written, digest) = emit::draft(mesh, output, limits, progress, |draft| draft.finish(&Content::Input))?;
+    let edit = Edit::default();
+    let content = if target.is_input { Content::Input } else { Content::Edited(&edit) };
+    let (written, digest) = emit::draft(mesh, output, limits, progress, |draft| draft.finish(&content))?;
     report.input.blake3 = digest::hash(mesh.bytes(), &digest);
     clock.stage("emit");
-    let edit = Edit::default();
     report.edit = edit.summary(mesh.records().len());
     report.edit_records = limits.list_edit.then(|| edit.listed());
-    confirm_copy(report, mesh, output, limits, progress)?;
+    if target.is_input {
+        confirm_copy(report, mesh, output, limits, progress)?;
+    } else {
+        let surface = report.before.bounds.map_or(Bounds::EMPTY, |[lo, hi]| Bounds { lo, hi });
+        let known = Some((Expectation::of(mesh.records(), &edit), Digest::new(), Some(report.before.clone())));
+        verify(report, mesh, (&surface, &Evidence::default()), known, output, limits, progress)?;
+    }
     written.durable()?;
     clock.stage("verify");
     Ok(())
@@ -155,7 +184,7 @@ fn copy(
 fn mend(
     draft: Draft<'_, '_>,
     (mesh, welded): (&MeshFile, Option<&Counts>),
-    output: &Path,
+    (output, target): (&Path, Target),
     profile: &Profile,
     limits: &Limits,
     progress: &dyn Progress,
@@ -179,7 +208,7 @@ fn mend(
         None => edit,
     };
     let survey = Some(survey).filter(|_| set_right.is_none());
-    let mended = Mended { edit, evidence, surface, is_welded: welded.is_some() };
+    let mended = Mended { edit, evidence, surface, may_be_copied: welded.is_none() && target.is_input };
     let written = write(draft, mesh, &mended, survey, &mut report, (output, limits, progress), clock)?;
     judging::advise(&mut report, &mended.evidence);
     if let Some(counts) = welded {
@@ -200,22 +229,22 @@ struct Mended {
     evidence: Evidence,
     /// The box of the input's surface.
     surface: Bounds,
-    /// The records are not those of the file.
-    is_welded: bool,
+    /// The records are those of the file, which is of the output's format.
+    may_be_copied: bool,
 }
 
 /// Makes `draft` what the edit says, and judges it. `survey`: of the records that the edit is of, if it was made of them.
 fn write(
     draft: Draft<'_, '_>,
     mesh: &MeshFile,
-    Mended { edit, evidence, surface, is_welded }: &Mended,
+    Mended { edit, evidence, surface, may_be_copied }: &Mended,
     survey: Option<Survey<'_>>,
     report: &mut Report,
     (output, limits, progress): (&Path, &Limits, &dyn Progress),
     clock: &mut Clock,
 ) -> Result<emit::Written> {
     // Good as it came, or nothing in it could be repaired.
-    let same = edit.is_empty() && !is_welded && judging::flaws(mesh.findings()).is_empty();
+    let same = edit.is_empty() && *may_be_copied && judging::flaws(mesh.findings()).is_empty();
     let expected = survey
         .as_ref()
         .filter(|_| !same)
@@ -228,7 +257,7 @@ fn write(
     let (written, mut digest) = written?;
     report.input.blake3 = digest::hash(mesh.bytes(), &digest);
     if !mesh.is_in_place() {
-        // Of a text.
+        // The records stand elsewhere.
         digest.clear();
     }
     clock.stage("emit");
@@ -341,7 +370,7 @@ fn subject(mesh: &MeshFile, blake3: String) -> Input<'_> {
     Input { path: mesh.path(), facts: facts(mesh, blake3), findings: mesh.findings() }
 }
 
-fn facts(mesh: &MeshFile, blake3: String) -> FileFacts {
+pub(crate) fn facts(mesh: &MeshFile, blake3: String) -> FileFacts {
     FileFacts {
         path: mesh.path().into(),
         bytes: mesh.byte_len(),
@@ -352,7 +381,7 @@ fn facts(mesh: &MeshFile, blake3: String) -> FileFacts {
     }
 }
 
-fn hash(mesh: &MeshFile, limits: &Limits, progress: &dyn Progress) -> String {
+pub(crate) fn hash(mesh: &MeshFile, limits: &Limits, progress: &dyn Progress) -> String {
     progress.at("hash", 0, mesh.records().len() as u64);
     hash_of(mesh.bytes(), limits)
 }

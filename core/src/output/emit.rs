@@ -380,7 +380,7 @@ impl Drop for Written {
 }
 
 /// A new file; or the empty one without a name that the caller holds open.
-fn create(path: &Path) -> io::Result<File> {
+pub(crate) fn create(path: &Path) -> io::Result<File> {
     let nameless = is_nameless(path);
     let file = OpenOptions::new().write(true).create_new(!nameless).open(path)?;
     if nameless && file.metadata()?.len() > 0 {

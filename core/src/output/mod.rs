@@ -8,5 +8,7 @@
 
 pub(crate) mod edit;
 pub(crate) mod emit;
+pub(crate) mod encode;
 pub(crate) mod incremental;
+pub(crate) mod indexed;
 pub(crate) mod readback;

@@ -27,6 +27,15 @@ pub(super) fn header(bytes: &[u8]) -> [u8; HEADER_BYTES] {
     bytes.first_chunk().copied().unwrap_or([0; HEADER_BYTES])
 }
 
+/// The header of an output that is made of a file with this name of its own, in ASCII since headers declare no encoding.
+pub(super) fn header_of(name: &[u8]) -> [u8; HEADER_BYTES] {
+    let mut header = [0; HEADER_BYTES];
+    let name = if name.is_empty() { "Suture".into() } else { String::from_utf8_lossy(name) };
+    let printable = name.chars().map(|c| if c.is_ascii_graphic() || c == ' ' { c as u8 } else { b'?' });
+    header.iter_mut().zip(printable).for_each(|(byte, c)| *byte = c);
+    safe_header(header)
+}
+
 /// The first `triangles` records, as many of them as there are.
 pub(super) fn records(bytes: &[u8], triangles: usize) -> &[Record] {
     let whole = bytes.get(PREFIX_BYTES..).unwrap_or_default().as_chunks().0;

@@ -2,6 +2,8 @@
 
 use super::finding::{Finding, Rejection};
 use super::limits::HEADER_BYTES;
+use super::rounding::Rounding;
+use super::spool::{Context, Items, Parsed};
 use super::{access, binary, sniff, tail, text};
 use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
@@ -42,7 +44,7 @@ enum Source {
     /// In the input itself, this many after its prefix.
     InPlace(usize),
     /// All of a spool.
-    Spooled(Mmap),
+    Spooled(Items<50>),
     /// All of a spool of what these became by a weld.
     Welded(Box<Self>, Mmap),
 }
@@ -59,6 +61,43 @@ pub struct MeshFile {
     format: Format,
     findings: Vec<Finding>,
     header: [u8; HEADER_BYTES],
+    rounding: Option<Rounding>,
+}
+
+/// What the bytes of a file hold.
+struct Content {
+    source: Source,
+    format: Format,
+    findings: Vec<Finding>,
+    header: [u8; HEADER_BYTES],
+    rounding: Option<Rounding>,
+}
+
+impl Content {
+    fn of(kind: sniff::Kind, input: &Mmap, context: &Context<'_>) -> Result<Self> {
+        match kind {
+            sniff::Kind::Binary(sniff::Layout { triangles, mut findings }) => {
+                findings.extend(tail::of_records(binary::records(input, triangles)));
+                let header = binary::safe_header(binary::header(input));
+                Ok(Self { source: Source::InPlace(triangles), format: Format::BinaryStl, findings, header, rounding: None })
+            }
+            sniff::Kind::Text(sniff::Text { start, mut findings }) => {
+                // Advice; without it reading ahead is only less bold.
+                let _ = input.advise(memmap2::Advice::Sequential);
+                let (content, zeros) = tail::split(input);
+                let parsed = parallel::in_pool(context.limits.threads, || text::read(content, start, context))?;
+                findings.extend(tail::of_text(content, zeros));
+                Ok(Self::parsed(parsed, Format::AsciiStl, findings))
+            }
+        }
+    }
+
+    /// `findings`: those of the bytes themselves.
+    fn parsed(parsed: Parsed, format: Format, findings: Vec<Finding>) -> Self {
+        let Parsed { records, findings: mut found, header, rounding } = parsed;
+        found.extend(rounding.map(Rounding::finding));
+        Self { source: Source::Spooled(records), format, findings: [findings, found].concat(), header, rounding }
+    }
 }
 
 impl MeshFile {
@@ -78,40 +117,10 @@ impl MeshFile {
         // As long as the identity says, whatever happened in between.
         let length = usize::try_from(identity.size).map_err(|_| Rejection::TooMany.at(path))?;
         let (input, file) = access::Foreign { path, file, length, spool, limits, progress }.bytes()?;
-        match sniff::sniff(&input).map_err(|rejection| rejection.at(path))? {
-            sniff::Kind::Binary(sniff::Layout { triangles, mut findings }) => {
-                findings.extend(tail::of_records(binary::records(&input, triangles)));
-                Ok(Self {
-                    path: path.to_owned(),
-                    identity,
-                    file,
-                    header: binary::safe_header(binary::header(&input)),
-                    source: Source::InPlace(triangles),
-                    input,
-                    format: Format::BinaryStl,
-                    findings,
-                })
-            }
-            sniff::Kind::Text(sniff::Text { start, mut findings }) => {
-                // Advice; without it reading ahead is only less bold.
-                let _ = input.advise(memmap2::Advice::Sequential);
-                let context = text::Context { path, spool, limits, progress };
-                let (content, zeros) = tail::split(&input);
-                let parsed = parallel::in_pool(limits.threads, || text::read(content, start, &context))?;
-                findings.extend(parsed.findings);
-                findings.extend(tail::of_text(content, zeros));
-                Ok(Self {
-                    path: path.to_owned(),
-                    identity,
-                    file,
-                    header: parsed.header,
-                    source: Source::Spooled(parsed.spool),
-                    input,
-                    format: Format::AsciiStl,
-                    findings,
-                })
-            }
-        }
+        let kind = sniff::sniff(&input).map_err(|rejection| rejection.at(path))?;
+        let content = Content::of(kind, &input, &Context { path, spool, limits, progress })?;
+        let Content { source, format, findings, header, rounding } = content;
+        Ok(Self { path: path.to_owned(), identity, file, input, source, format, findings, header, rounding })
     }
 
     /// The triangles in input order, those with NaN or infinite coordinates included.
@@ -122,7 +131,8 @@ impl MeshFile {
     fn records_of<'s>(&'s self, source: &'s Source) -> &'s [Record] {
         match source {
             Source::InPlace(triangles) => binary::records(&self.input, *triangles),
-            Source::Spooled(spool) | Source::Welded(_, spool) => spool.as_chunks().0,
+            Source::Spooled(spool) => spool.all(),
+            Source::Welded(_, spool) => spool.as_chunks().0,
         }
     }
 

@@ -9,17 +9,22 @@
 
 mod access;
 mod binary;
+mod faces;
 mod facets;
 mod finding;
 mod foreign;
 mod limits;
 mod mesh_file;
 mod number;
+mod polygon;
+mod rounding;
 mod sniff;
+mod spool;
 mod tail;
 #[cfg(test)]
 mod tests;
 mod text;
+mod vertices;
 
 pub use finding::{Finding, Loss};
 pub use limits::{HEADER_BYTES, MAX_TRIANGLES, PREFIX_BYTES};

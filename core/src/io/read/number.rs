@@ -14,6 +14,8 @@ pub(super) const COMMA: u8 = 2;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Number {
     pub(super) value: f32,
+    /// The nearest `f64`.
+    pub(super) wide: f64,
     /// Bytes it takes.
     pub(super) length: usize,
     /// [`POINT`], [`COMMA`] or neither.
@@ -89,8 +91,8 @@ fn plain(text: &[u8]) -> Option<Number> {
     if exact.to_bits() & 0x1fff_ffff == 0x1000_0000 {
         return None;
     }
-    let value = if byte(0) == b'-' { -exact } else { exact } as f32;
-    Some(Number { value, length: at, separator })
+    let wide = if byte(0) == b'-' { -exact } else { exact };
+    Some(Number { value: wide as f32, wide, length: at, separator })
 }
 
 /// Everything else that means a number: any length, decimal comma between digits, exponent written with a Fortran `D`, `nan` and
@@ -105,7 +107,8 @@ fn unusual(text: &[u8]) -> Option<Number> {
         _ => (false, token.as_slice()),
     };
     if let Some(value) = not_a_finite_number(magnitude) {
-        return Some(Number { value: if negative { -value } else { value }, length, separator: 0 });
+        let value = if negative { -value } else { value };
+        return Some(Number { value, wide: value.into(), length, separator: 0 });
     }
     let mut separator = 0;
     for at in 0..token.len() {
@@ -125,8 +128,8 @@ fn unusual(text: &[u8]) -> Option<Number> {
         };
         *token.get_mut(at)? = replaced;
     }
-    let value = std::str::from_utf8(&token).ok()?.parse().ok()?;
-    Some(Number { value, length, separator })
+    let text = std::str::from_utf8(&token).ok()?;
+    Some(Number { value: text.parse().ok()?, wide: text.parse().ok()?, length, separator })
 }
 
 /// `nan`, `nan(ind)`, `inf`, `infinity`, `1.#inf`, `1.#qnan0`, and `1.#j`, which is `1.#inf` rounded to two places. No sign.

@@ -1,81 +1,39 @@
 //! Text STL into a spool of records: cut before facets into windows of about a megabyte, parsed in parallel, written in order.
-//!
-//! Memory: the records of a batch and of the batch before it, so some megabytes for each thread, whatever the file's length; the
-//! spool's dirty pages are written back step by step, since the kernel would otherwise let a share of all memory fill with them.
-
-use std::fs::File;
-use std::path::Path;
-
-use memmap2::Mmap;
-use rayon::prelude::*;
 
 use super::binary;
 use super::facets::{self, Tally};
 use super::finding::{Finding, Rejection};
-use super::limits::{HEADER_BYTES, MAX_TRIANGLES};
+use super::limits::HEADER_BYTES;
 use super::number::{COMMA, POINT};
-use crate::contract::error::{Error, Result};
-use crate::contract::progress::Progress;
-use crate::contract::settings::Limits;
-use crate::io::disk_space::{self, Need};
+use super::spool::{Context, Parsed};
+use crate::contract::error::Result;
 use crate::io::record::Record;
-use crate::io::write_behind::{self, WriteBehind};
-use crate::util::words::Count;
+use crate::util::words::{Count, Counted};
 
 /// Text parsed at a time by one thread.
 pub(super) const WINDOW: usize = 1 << 20;
 /// A window grows up to this to reach the next facet; beyond that the text is no mesh.
 const LONGEST: usize = 8 * WINDOW;
 
-/// A text file's triangles.
-#[derive(Debug)]
-pub(super) struct Parsed {
-    /// The records, in a file without a name.
-    pub(super) spool: Mmap,
-    pub(super) findings: Vec<Finding>,
-    pub(super) header: [u8; HEADER_BYTES],
-}
-
-/// Paths, limits and progress of reading a text.
-pub(super) struct Context<'a> {
-    pub(super) path: &'a Path,
-    pub(super) spool: &'a Path,
-    pub(super) limits: &'a Limits,
-    pub(super) progress: &'a dyn Progress,
-}
-
 /// Parses `text` from byte `start` on.
 pub(super) fn read(text: &[u8], start: usize, context: &Context<'_>) -> Result<Parsed> {
     let reject = |rejection: Rejection| rejection.at(context.path);
-    let bytes = expected_bytes(text, start).map_err(reject)?;
-    disk_space::check(context.path, &[Need { folder: context.spool.into(), bytes, what: "the triangles of the text" }])?;
-    let mut spool = Spool::new(context)?;
+    context.make_room(expected_bytes(text, start).map_err(reject)?, "the triangles of the text")?;
+    let mut spool = context.records()?;
     let mut tally = Tally::default();
     let mut windows = Windows { text, at: start };
-    let mut parsed: Vec<Vec<Record>> = Vec::new();
-    loop {
+    let next = || {
         let batch = windows.batch(rayon::current_num_threads() * 2 * WINDOW).map_err(reject)?;
-        // The previous batch is written while this one is parsed.
-        let (written, pieces) = rayon::join(
-            || spool.append(&parsed),
-            || batch.par_iter().map(|piece| facets::parse(piece.text, piece.at as u64, piece.last)).collect::<Vec<_>>(),
-        );
-        written?;
-        if pieces.is_empty() {
-            break;
-        }
-        parsed.clear();
-        for (records, piece) in pieces {
-            parsed.push(records);
-            tally.append(piece);
-        }
-        context.progress.at("read", windows.at as u64, text.len() as u64);
-        if context.progress.cancelled() {
-            return Err(Error::cancelled(context.path, "reading"));
-        }
-    }
-    judge(&tally, spool.records).map_err(reject)?;
-    Ok(Parsed { spool: spool.map()?, findings: findings(&tally), header: header(&tally) })
+        Ok((batch, windows.at as u64))
+    };
+    let parse = |piece: &Piece<'_>| facets::parse(piece.text, piece.at as u64, piece.last);
+    let take = |(records, piece): (Vec<Record>, Tally)| {
+        tally.append(piece);
+        spool.append(&records)
+    };
+    context.in_order(text.len() as u64, next, parse, take)?;
+    judge(&tally, spool.count()).map_err(reject)?;
+    Ok(Parsed { records: spool.map()?, findings: findings(&tally), header: header(&tally), rounding: None })
 }
 
 /// Bytes of records that a text will make, if it goes on as it begins.
@@ -122,39 +80,6 @@ impl<'a> Windows<'a> {
             self.at = end;
         }
         Ok(pieces)
-    }
-}
-
-/// Records on their way into a file without a name.
-struct Spool<'a> {
-    folder: &'a Path,
-    path: &'a Path,
-    file: File,
-    behind: WriteBehind,
-    records: u64,
-}
-
-impl<'a> Spool<'a> {
-    fn new(context: &Context<'a>) -> Result<Self> {
-        let (file, behind) = write_behind::nameless(context.spool, context.limits)?;
-        Ok(Self { folder: context.spool, path: context.path, file, behind, records: 0 })
-    }
-
-    fn append(&mut self, pieces: &[Vec<Record>]) -> Result<()> {
-        for records in pieces {
-            self.records += records.len() as u64;
-            if self.records > MAX_TRIANGLES {
-                return Err(Rejection::TooMany.at(self.path));
-            }
-            self.behind.append(records.as_flattened()).map_err(Error::io(self.folder, "spooling"))?;
-        }
-        Ok(())
-    }
-
-    fn map(self) -> Result<Mmap> {
-        self.behind.finish().map_err(Error::io(self.folder, "spooling"))?;
-        // SAFETY: the file has no name and this was its only handle that writes: nobody changes or truncates it.
-        unsafe { Mmap::map(&self.file) }.map_err(Error::io(self.folder, "mapping"))
     }
 }
 
@@ -214,19 +139,15 @@ fn findings(tally: &Tally) -> Vec<Finding> {
     found
 }
 
-fn facets_word(count: u64) -> String {
-    if count == 1 { "1 facet".into() } else { format!("{} facets", Count(count)) }
+fn facets_word(count: u64) -> Counted<'static> {
+    Counted(count, "facet", "facets")
 }
 
-fn vertices_word(count: u64) -> String {
-    if count == 1 { "1 vertex".into() } else { format!("{} vertices", Count(count)) }
+fn vertices_word(count: u64) -> Counted<'static> {
+    Counted(count, "vertex", "vertices")
 }
 
-/// A binary header from the first solid's name, in ASCII since headers declare no encoding.
+/// A binary header from the first solid's name.
 fn header(tally: &Tally) -> [u8; HEADER_BYTES] {
-    let mut header = [0; HEADER_BYTES];
-    let name = tally.names.first().filter(|name| !name.is_empty()).map_or("Suture".into(), |name| String::from_utf8_lossy(name));
-    let printable = name.chars().map(|c| if c.is_ascii_graphic() || c == ' ' { c as u8 } else { b'?' });
-    header.iter_mut().zip(printable).for_each(|(byte, c)| *byte = c);
-    binary::safe_header(header)
+    binary::header_of(tally.names.first().map_or(&[], Vec::as_slice))
 }

@@ -1,0 +1,150 @@
+//! Faces by their vertices become records.
+
+use super::finding::{Finding, Rejection};
+use super::polygon;
+use super::vertices::Vertices;
+use crate::io::record::{self, Point, Record};
+use crate::util::words::{Count, Counted};
+
+/// Most corners of one face. Cutting a polygon takes memory and time by its corners, and no program writes such a face of a mesh.
+const MOST_CORNERS: usize = 1 << 20;
+
+/// Counts of faces, by what became of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Tally {
+    /// All that were pushed.
+    pub(super) faces: u64,
+    /// Of fewer than three corners, which give no triangle.
+    pub(super) short: u64,
+    /// Of more than three corners, which were cut into triangles.
+    pub(super) polygons: u64,
+    /// With an index that no vertex has, or of more corners than a face can have; left out.
+    pub(super) astray: u64,
+    /// The number of the first of them among all faces, from 1.
+    pub(super) first_astray: Option<u64>,
+}
+
+impl Tally {
+    /// Joins the counts of the faces behind these.
+    pub(super) fn append(&mut self, behind: Self) {
+        self.first_astray = self.first_astray.or(behind.first_astray.map(|first| self.faces + first));
+        self.faces += behind.faces;
+        self.short += behind.short;
+        self.polygons += behind.polygons;
+        self.astray += behind.astray;
+    }
+
+    /// Refuses faces that are lost for the most part.
+    pub(super) fn judge(&self) -> Result<(), Rejection> {
+        if self.astray > self.faces / 2 {
+            let faces = Counted(self.faces, "face", "faces");
+            let reason = format!("{} of {faces} refer to vertices that are not there", Count(self.astray));
+            return Err(Rejection::Unreadable(reason));
+        }
+        Ok(())
+    }
+
+    /// What is odd about these faces.
+    pub(super) fn findings(&self) -> Vec<Finding> {
+        let mut found = Vec::new();
+        if self.astray > 0 {
+            let faces = Counted(self.astray, "face refers", "faces refer");
+            let first = self.first_astray.unwrap_or_default();
+            found.push(Finding::loss(format!(
+                "{faces} to vertices that are not there, left out; the first is face {}",
+                Count(first)
+            )));
+        }
+        if self.short > 0 {
+            found.push(Finding::flaw(format!("{} of fewer than three corners, left out", Counted(self.short, "face", "faces"))));
+        }
+        if self.polygons > 0 {
+            let text = format!("{} of more than three corners, cut into triangles", Counted(self.polygons, "face", "faces"));
+            found.push(Finding { harmless: true, ..Finding::flaw(text) });
+        }
+        found
+    }
+}
+
+/// Makes records of the faces of one piece of a file.
+pub(super) struct Faces<'v> {
+    vertices: Vertices<'v>,
+    pub(super) records: Vec<Record>,
+    pub(super) tally: Tally,
+    corners: Vec<Point>,
+}
+
+impl<'v> Faces<'v> {
+    /// For faces of these vertices.
+    pub(super) fn of(vertices: Vertices<'v>) -> Self {
+        Self { vertices, records: Vec::new(), tally: Tally::default(), corners: Vec::new() }
+    }
+
+    /// Appends a face that is a triangle, by the indices of its vertices.
+    #[inline]
+    pub(super) fn triangle(&mut self, indices: [u64; 3]) {
+        self.tally.faces += 1;
+        match indices.map(|index| self.vertices.get(index)) {
+            [Some(a), Some(b), Some(c)] => self.records.push(record::encode([a, b, c], 0)),
+            _ => self.astray(),
+        }
+    }
+
+    /// Appends a face of any number of corners, by the indices of its vertices. O(corners log corners) for the polygons of real files.
+    pub(super) fn polygon(&mut self, indices: impl ExactSizeIterator<Item = u64>) {
+        self.tally.faces += 1;
+        if indices.len() > MOST_CORNERS {
+            return self.astray();
+        }
+        self.corners.clear();
+        for index in indices {
+            match self.vertices.get(index) {
+                Some(corner) => self.corners.push(corner),
+                None => return self.astray(),
+            }
+        }
+        match *self.corners.as_slice() {
+            [] | [_] | [_, _] => self.tally.short += 1,
+            [a, b, c] => self.records.push(record::encode([a, b, c], 0)),
+            ref corners => {
+                self.tally.polygons += 1;
+                let (records, at) = (&mut self.records, |place: usize| corners.get(place).copied().unwrap_or_default());
+                polygon::cut(corners, |triangle| records.push(record::encode(triangle.map(at), 0)));
+            }
+        }
+    }
+
+    /// Counts a face that was pushed, and cannot be made.
+    #[cold]
+    fn astray(&mut self) {
+        self.tally.astray += 1;
+        self.tally.first_astray = self.tally.first_astray.or(Some(self.tally.faces));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::vertices::packed;
+    use super::*;
+
+    #[test]
+    fn triangles_polygons_and_what_is_neither() {
+        let points = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        let packed = points.map(packed);
+        let mut faces = Faces::of(Vertices::spooled(&packed));
+        faces.triangle([0, 1, 2]);
+        faces.polygon([0, 1, 2, 3].into_iter());
+        faces.polygon([3, 2].into_iter());
+        faces.triangle([0, 1, 4]);
+        faces.polygon([0, u64::MAX, 1].into_iter());
+        let corners: Vec<_> = faces.records.iter().map(record::corners).collect();
+        assert_eq!(corners.len(), 3);
+        assert_eq!(corners[0], [points[0], points[1], points[2]]);
+        let expected = Tally { faces: 5, short: 1, polygons: 1, astray: 2, first_astray: Some(4) };
+        assert_eq!(faces.tally, expected);
+        let mut all = expected;
+        all.append(expected);
+        assert_eq!(all, Tally { faces: 10, short: 2, polygons: 2, astray: 4, first_astray: Some(4) });
+        assert!(all.judge().is_ok() && Tally { faces: 3, astray: 2, ..Tally::default() }.judge().is_err());
+    }
+}

@@ -1,0 +1,268 @@
+//! Records as a file of an indexed format.
+//!
+//! **In:** an [`Indexed`] mesh.
+//! **Out:** binary PLY, or text in OFF, OBJ or AMF; coordinates as the shortest decimal that reads back as the same `f32`.
+//! **Promise:** vertices and faces in the order of their numbers, the same bytes for any memory and any threads.
+//!
+//! Forms: PLY 1.0 (G. Turk, "The PLY Polygon File Format", 1994), OFF (Geomview's manual, section "OFF Files"), OBJ (Wavefront, "Object Files",
+//! Advanced Visualizer manual, appendix B1), AMF (ISO/ASTM 52915:2020).
+
+use std::io::Write;
+use std::ops::Range;
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use crate::contract::error::{Error, Result};
+use crate::contract::progress::Progress;
+use crate::contract::settings::Limits;
+use crate::io::record::Point;
+use crate::io::write_behind::WriteBehind;
+use crate::output::emit;
+use crate::output::indexed::Indexed;
+use crate::util::parallel;
+
+/// Records whose text one thread makes at a time.
+const PIECE: usize = 16 << 10;
+
+/// A format that vertices and faces are written in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Layout {
+    /// Binary PLY, little-endian.
+    Ply,
+    /// Text.
+    Off,
+    /// Text.
+    Obj,
+    /// XML; coordinates are in units of this name.
+    Amf(&'static str),
+}
+
+/// Text before, between and behind vertices and faces.
+struct Frame {
+    head: String,
+    between: &'static str,
+    tail: &'static str,
+}
+
+impl Layout {
+    /// Around so many vertices and faces of a mesh of this name.
+    fn frame(self, vertices: u32, faces: usize, name: &str) -> Frame {
+        match self {
+            Self::Ply => {
+                // Most readers take indices as signed.
+                let index = if i32::try_from(vertices).is_ok() { "int" } else { "uint" };
+                let head = format!(
+                    "ply\nformat binary_little_endian 1.0\ncomment {name}\nelement vertex {vertices}\nproperty float x\nproperty float y\n\
+                     property float z\nelement face {faces}\nproperty list uchar {index} vertex_indices\nend_header\n"
+                );
+                Frame { head, between: "", tail: "" }
+            }
+            Self::Off => Frame { head: format!("OFF\n# {name}\n{vertices} {faces} 0\n"), between: "", tail: "" },
+            Self::Obj => Frame { head: format!("# {name}\n# {vertices} vertices, {faces} faces\n"), between: "", tail: "" },
+            Self::Amf(unit) => {
+                let name = name.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+                let head = format!(
+                    "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<amf unit=\"{unit}\" version=\"1.2\">\n<metadata type=\"name\">{name}</metadata>\n\
+                     <object id=\"0\">\n<mesh>\n<vertices>\n"
+                );
+                Frame { head, between: "</vertices>\n<volume>\n", tail: "</volume>\n</mesh>\n</object>\n</amf>\n" }
+            }
+        }
+    }
+
+    /// Bytes of a file for each triangle of a closed mesh, about.
+    pub(crate) fn bytes_a_triangle(self) -> u64 {
+        match self {
+            Self::Ply => 20,
+            Self::Off | Self::Obj => 50,
+            Self::Amf(_) => 120,
+        }
+    }
+
+    fn vertex(self, point: Point, out: &mut Vec<u8>) {
+        let [x, y, z] = point;
+        let (a, b, c) = match self {
+            Self::Ply => return out.extend(point.iter().flat_map(|value| value.to_le_bytes())),
+            Self::Off => ("", " ", " "),
+            Self::Obj => ("v ", " ", " "),
+            Self::Amf(_) => ("<vertex><coordinates><x>", "</x><y>", "</y><z>"),
+        };
+        for (before, value) in [(a, x), (b, y), (c, z)] {
+            out.extend_from_slice(before.as_bytes());
+            decimal(value, out);
+        }
+        out.extend_from_slice(if matches!(self, Self::Amf(_)) { b"</z></coordinates></vertex>\n" } else { b"\n" });
+    }
+
+    fn face(self, face: [u32; 3], out: &mut Vec<u8>) {
+        let ([a, b, c], from) = match self {
+            Self::Ply => {
+                out.push(3);
+                return out.extend(face.iter().flat_map(|vertex| vertex.to_le_bytes()));
+            }
+            Self::Off => (["3 ", " ", " "], 0),
+            Self::Obj => (["f ", " ", " "], 1),
+            Self::Amf(_) => (["<triangle><v1>", "</v1><v2>", "</v2><v3>"], 0),
+        };
+        for (before, vertex) in [a, b, c].into_iter().zip(face) {
+            out.extend_from_slice(before.as_bytes());
+            integer(u64::from(vertex) + from, out);
+        }
+        out.extend_from_slice(if matches!(self, Self::Amf(_)) { b"</v3></triangle>\n" } else { b"\n" });
+    }
+}
+
+/// The shortest decimal that reads back as the same number.
+fn decimal(value: f32, out: &mut Vec<u8>) {
+    let size = value.abs();
+    // Writing to a vector cannot fail.
+    let _ = if size == 0.0 || (1e-5..1e9).contains(&size) { write!(out, "{value}") } else { write!(out, "{value:e}") };
+}
+
+fn integer(mut value: u64, out: &mut Vec<u8>) {
+    let mut digits = [0; 20];
+    let mut at = digits.len();
+    loop {
+        at -= 1;
+        digits[at] = b'0' + (value % 10) as u8;
+        value /= 10;
+        if value == 0 {
+            break;
+        }
+    }
+    out.extend_from_slice(&digits[at..]);
+}
+
+/// Writes `mesh`, of so many records, to the new file `output`, and syncs it unless that is deferred. `name` stands in it as a comment.
+///
+/// # Errors
+/// [`Error::Io`], cancellation among them.
+pub(crate) fn write(
+    (mesh, records): (&Indexed<'_>, usize),
+    (layout, name): (Layout, &str),
+    output: &Path,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> Result<()> {
+    let file = emit::create(output).map_err(Error::io(output, "creating"))?;
+    let behind = WriteBehind::new(&file, limits).map_err(Error::io(output, "creating"))?;
+    let append = |bytes: &[u8]| behind.append(bytes).map_err(Error::io(output, "writing"));
+    let Frame { head, between, tail } = layout.frame(mesh.vertices(), records, name);
+    append(head.as_bytes())?;
+    let steps = Steps { records, output, progress };
+    parallel::in_pool(limits.threads, || {
+        let vertices = |range: Range<usize>| {
+            let mut text = Vec::new();
+            mesh.positions(range).for_each(|point| layout.vertex(point, &mut text));
+            text
+        };
+        steps.each(0, |pieces| pieces.into_par_iter().map(vertices).collect(), append)?;
+        append(between.as_bytes())?;
+        let mut cursor = mesh.cursor();
+        let faces = |pieces: Vec<Range<usize>>| {
+            // Numbers are read in order; their text is made side by side.
+            let numbers: Vec<_> = pieces.into_iter().map(|range| mesh.faces(range, &mut cursor)).collect();
+            let text = |faces: Vec<[u32; 3]>| {
+                let mut text = Vec::new();
+                faces.into_iter().for_each(|face| layout.face(face, &mut text));
+                text
+            };
+            numbers.into_par_iter().map(text).collect()
+        };
+        steps.each(1, faces, append)
+    })?;
+    append(tail.as_bytes())?;
+    behind.finish().map_err(Error::io(output, "syncing"))?;
+    if limits.defer_sync { Ok(()) } else { file.sync_all().map_err(Error::io(output, "syncing")) }
+}
+
+/// The way through all records, twice.
+struct Steps<'a> {
+    records: usize,
+    output: &'a Path,
+    progress: &'a dyn Progress,
+}
+
+impl Steps<'_> {
+    /// Makes bytes of all records, some pieces at a time, and takes them in their order.
+    fn each(
+        &self,
+        round: usize,
+        mut make: impl FnMut(Vec<Range<usize>>) -> Vec<Vec<u8>> + Send,
+        take: impl Fn(&[u8]) -> Result<()> + Sync,
+    ) -> Result<()> {
+        let at_once = 2 * PIECE * rayon::current_num_threads();
+        let mut waiting: Vec<Vec<u8>> = Vec::new();
+        for from in (0..self.records).step_by(at_once) {
+            let to = self.records.min(from + at_once);
+            let pieces = (from..to).step_by(PIECE).map(|first| first..to.min(first + PIECE)).collect();
+            // Written while the next ones are made.
+            let (taken, made) = rayon::join(|| waiting.iter().try_for_each(|bytes| take(bytes)), || make(pieces));
+            taken?;
+            waiting = made;
+            self.progress.at("encode", (round * self.records + from) as u64, 2 * self.records as u64);
+            if self.progress.cancelled() {
+                return Err(Error::cancelled(self.output, "writing"));
+            }
+        }
+        waiting.iter().try_for_each(|bytes| take(bytes))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::contract::progress::Quiet;
+    use crate::io::record::{self, Record};
+
+    fn written(records: &[Record], layout: Layout) -> Vec<u8> {
+        let folder = tempfile::tempdir().unwrap();
+        let output = folder.path().join("out");
+        let limits = Limits { threads: 2, spool: Some(folder.path().into()), ..Limits::default() };
+        let mesh = Indexed::of(Path::new("a"), records, &limits, &Quiet).unwrap();
+        write((&mesh, records.len()), (layout, "a & b"), &output, &limits, &Quiet).unwrap();
+        std::fs::read(output).unwrap()
+    }
+
+    fn two_triangles() -> Vec<Record> {
+        let [a, b, c, d] = [[0.0, 0.0, 0.0], [1.5, 0.0, 0.0], [0.0, 1e-7, 0.0], [0.0, 0.0, 2e20]];
+        vec![record::encode([a, b, c], 0), record::encode([c, b, d], 0)]
+    }
+
+    #[test]
+    fn text_holds_each_position_once() {
+        let off = written(&two_triangles(), Layout::Off);
+        let expected = "OFF\n# a & b\n4 2 0\n0 0 0\n1.5 0 0\n0 1e-7 0\n0 0 2e20\n3 0 1 2\n3 2 1 3\n";
+        assert_eq!(String::from_utf8(off).unwrap(), expected);
+        let obj = String::from_utf8(written(&two_triangles(), Layout::Obj)).unwrap();
+        assert!(obj.ends_with("v 0 0 2e20\nf 1 2 3\nf 3 2 4\n"), "{obj}");
+        let amf = String::from_utf8(written(&two_triangles(), Layout::Amf("inch"))).unwrap();
+        assert!(amf.contains("<amf unit=\"inch\"") && amf.contains(">a &amp; b<"), "{amf}");
+        assert!(amf.contains("<y>1e-7</y>") && amf.contains("<v1>2</v1><v2>1</v2><v3>3</v3>"), "{amf}");
+    }
+
+    #[test]
+    fn ply_is_binary() {
+        let ply = written(&two_triangles(), Layout::Ply);
+        let head = b"property list uchar int vertex_indices\nend_header\n";
+        let body = ply.windows(head.len()).position(|window| window == head).unwrap() + head.len();
+        assert_eq!(ply.len() - body, 4 * 12 + 2 * 13);
+        assert_eq!(ply[body + 12..body + 16], 1.5f32.to_le_bytes());
+        assert_eq!(ply[ply.len() - 13..], [3, 2, 0, 0, 0, 1, 0, 0, 0, 3, 0, 0, 0]);
+    }
+
+    proptest! {
+        #[test]
+        fn decimals_read_back_as_the_same_number(bits: u32) {
+            let value = f32::from_bits(bits);
+            prop_assume!(value.is_finite());
+            let mut text = Vec::new();
+            decimal(value, &mut text);
+            let back: f32 = std::str::from_utf8(&text).unwrap().parse().unwrap();
+            prop_assert_eq!(back.to_bits(), bits);
+        }
+    }
+}

@@ -40,7 +40,7 @@ pub use contract::error::{Error, ErrorClass};
 pub use contract::progress::{Progress, Quiet};
 pub use contract::ranges::ProfileError;
 pub use contract::report::{FaceOrigin, RepairName, Report};
-pub use contract::settings::{Bodies, Guarantee, Hollow, Limits, PatchShape, Profile, Sheets, Spill};
+pub use contract::settings::{Bodies, Guarantee, Hollow, Limits, OutputFormat, PatchShape, Profile, Sheets, Spill};
 pub use contract::{error, report, settings};
 pub use detect::fidelity::{FIDELITY_RULES, FidelityRule};
 pub use detect::rules::{RULES, Rule};
@@ -73,6 +73,23 @@ pub fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress: &dyn 
 /// [`Error`]; what then stands at `output` is incomplete and to be removed.
 pub fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> error::Result<Report> {
     engine::files::repair(input, output, profile, limits, progress)
+}
+
+/// Writes the triangles of the file `input` to the new file `output` in this format, and changes nothing of them; the written file is read back and
+/// compared. A file that has the format already is copied byte for byte.
+///
+/// O(n) in its triangles, within the memory of `limits`.
+///
+/// # Errors
+/// [`Error`]; what then stands at `output` is incomplete and to be removed.
+pub fn convert(
+    input: &Path,
+    output: &Path,
+    format: OutputFormat,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> error::Result<report::Converted> {
+    engine::formats::convert(input, output, format, limits, progress)
 }
 
 /// Diagnoses a mesh in memory.

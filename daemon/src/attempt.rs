@@ -302,7 +302,7 @@ impl Slot {
             Ok(claimed) => {
                 crash_point("daemon.linked");
                 let desk = Desk::new(&*context.store, folder, token, &self.committed);
-                if let Some(barred) = desk.barred(job)? {
+                if let Some(barred) = desk.barred(job, None)? {
                     return desk.intend(job, &barred).map(Some);
                 }
                 let worked = self.work(folder, token, job, &claimed, turn);

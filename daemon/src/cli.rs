@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use suture_core::OutputFormat;
 use suture_store::Priority;
 use suture_store::job::Kind;
 
@@ -50,6 +51,8 @@ pub(crate) enum Command {
     /// Diagnose files and write nothing
     #[command(visible_alias = "check")]
     Inspect(InspectArgs),
+    /// Write a mesh in another format, and change nothing of it
+    Convert(ConvertArgs),
     /// Serve a hot folder: repair whatever is dropped into DIR/in
     #[command(long_about = WATCH_HELP)]
     Watch(WatchArgs),
@@ -178,12 +181,15 @@ impl Spend {
 
 #[derive(Args, Debug)]
 pub(crate) struct RepairArgs {
-    /// Mesh files (binary or ASCII STL)
+    /// Mesh files: STL, PLY, OFF, OBJ, AMF
     #[arg(required = true, value_name = "IN")]
     pub inputs: Vec<PathBuf>,
     /// Where to write: a file name, or a folder (needed for several inputs; part.stl, then part~2.stl)
     #[arg(short, long, value_name = "OUT|DIR")]
     pub output: PathBuf,
+    /// Format of the result: stl, ply, off, obj or amf [default: that of OUT's ending, or else of IN]
+    #[arg(long, value_name = "FORMAT", value_parser = parse_format)]
+    pub format: Option<OutputFormat>,
     /// Write the full report as JSON to this file (for several inputs: into this folder)
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
@@ -211,7 +217,7 @@ pub(crate) struct RepairArgs {
 
 #[derive(Args, Debug)]
 pub(crate) struct InspectArgs {
-    /// Mesh files (binary or ASCII STL)
+    /// Mesh files: STL, PLY, OFF, OBJ, AMF
     #[arg(required = true, value_name = "IN")]
     pub inputs: Vec<PathBuf>,
     /// Profile: default, fast, strict, cautious, scan, inspect-only, or a TOML file of settings
@@ -231,6 +237,21 @@ pub(crate) struct InspectArgs {
     /// Print reports as JSON, one a line, instead of tables
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct ConvertArgs {
+    /// A mesh file: STL, PLY, OFF, OBJ, AMF
+    #[arg(value_name = "IN")]
+    pub input: PathBuf,
+    /// The file to write; its ending says the format
+    #[arg(value_name = "OUT")]
+    pub output: PathBuf,
+    /// Replace OUT if it exists
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub spend: Spend,
 }
 
 #[derive(Args, Debug)]
@@ -271,6 +292,11 @@ pub(crate) struct PictureArgs {
     pub eye: Option<(f64, f64)>,
     #[command(flatten)]
     pub spend: Spend,
+}
+
+fn parse_format(text: &str) -> Result<OutputFormat, String> {
+    let names = || suture_core::read::ENDINGS.join(", ");
+    OutputFormat::of_ending(text).ok_or_else(|| format!("one of {}", names()))
 }
 
 fn parse_pixels(text: &str) -> Result<(usize, usize), String> {

@@ -5,6 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use suture_core::read::ENDINGS;
 use suture_store::job::Area;
 use suture_store::{RelPath, Token};
 
@@ -310,6 +311,11 @@ pub(crate) fn is_meant(name: &OsStr) -> bool {
     lower.rsplit_once('.').is_some_and(|(_, extension)| FORMATS.contains(&extension))
 }
 
+/// Endings of names of meshes, for people.
+pub(crate) fn endings() -> String {
+    ENDINGS.map(|ending| format!(".{ending}")).join(", ")
+}
+
 /// Tells names apart. Temporary names are those of browsers, copy programs, editors, office programs and file servers.
 pub(crate) fn name_kind(name: &OsStr) -> NameKind {
     let lossy = name.to_string_lossy();
@@ -322,7 +328,8 @@ pub(crate) fn name_kind(name: &OsStr) -> NameKind {
     if hidden || ours || ENDINGS.iter().any(|ending| lower.ends_with(ending)) || LITTER.contains(&lower.as_str()) {
         return NameKind::Ignored;
     }
-    if lower.ends_with(".stl") { NameKind::Mesh } else { NameKind::Foreign }
+    let is_mesh = lower.rsplit_once('.').is_some_and(|(_, ending)| ENDINGS.contains(&ending));
+    if is_mesh { NameKind::Mesh } else { NameKind::Foreign }
 }
 
 #[cfg(test)]
@@ -331,7 +338,7 @@ mod tests {
 
     #[test]
     fn meshes_litter_and_the_rest() {
-        for mesh in ["part.stl", "PART.STL", "a b$.Stl", "CON.stl"] {
+        for mesh in ["part.stl", "PART.STL", "a b$.Stl", "CON.stl", "scan.ply", "a.OBJ", "b.off", "c.amf"] {
             assert_eq!(name_kind(OsStr::new(mesh)), NameKind::Mesh, "{mesh}");
         }
         for ignored in [
@@ -348,7 +355,7 @@ mod tests {
         ] {
             assert_eq!(name_kind(OsStr::new(ignored)), NameKind::Ignored, "{ignored}");
         }
-        for foreign in ["part.obj", "notes.txt", "stl"] {
+        for foreign in ["part.step", "notes.txt", "stl", "obj"] {
             assert_eq!(name_kind(OsStr::new(foreign)), NameKind::Foreign, "{foreign}");
         }
     }

@@ -14,6 +14,7 @@ mod cli;
 mod config;
 mod confine;
 mod control;
+mod convert;
 mod course;
 mod create;
 mod deliver;
@@ -111,6 +112,7 @@ fn main() -> ExitCode {
     let exit = match &cli.command {
         Command::Repair(args) => single::repair(args),
         Command::Inspect(args) => single::inspect(args),
+        Command::Convert(args) => convert::run(args),
         Command::Worker(args) => match worker::serve(args) {
             Ok(()) => Exit::Good,
             Err(error) => {

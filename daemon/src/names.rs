@@ -1,5 +1,6 @@
 //! The names of what a job leaves: of each the first version that is free, `part.stl`, `part~2.stl`, ….
 
+use std::ffi::{OsStr, OsString};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -72,10 +73,31 @@ pub(crate) fn best_of(path: &RelPath) -> RelPath {
     RelPath::from_path(&full.with_file_name(name)).unwrap_or_else(|_| path.clone())
 }
 
+/// The name of a result whose format has this ending: with it, if the name has another one.
+pub(crate) fn with_ending(path: &RelPath, ending: &OsStr) -> RelPath {
+    let full = path.to_path();
+    if full.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending)) {
+        return path.clone();
+    }
+    RelPath::from_path(&full.with_extension(ending)).unwrap_or_else(|_| path.clone())
+}
+
+/// The ending of a name, which may be none.
+pub(crate) fn ending_of_name(path: &RelPath) -> OsString {
+    path.to_path().extension().unwrap_or_default().to_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use suture_store::path::MAX_SOURCE;
+
+    #[test]
+    fn a_result_has_the_ending_of_its_format() {
+        let of = |name: &str| with_ending(&RelPath::new(name.as_bytes()).unwrap(), OsStr::new("stl")).to_path();
+        let names = ["a/part.stl", "PART.STL", "a.b/part.v2.obj", "part"].map(of);
+        assert_eq!(names, ["a/part.stl", "PART.STL", "a.b/part.v2.stl", "part.stl"].map(PathBuf::from));
+    }
 
     /// D2: the longest path that is taken, dropped again and again, finds a name each time; so does one of another encoding.
     #[test]

@@ -7,6 +7,8 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use suture_core::OutputFormat;
+
 use crate::alike::{Alike, folded};
 use crate::cli::RepairArgs;
 use crate::fsx;
@@ -18,6 +20,8 @@ const MAX_VERSIONS: u32 = 100_000;
 /// Where results and reports go.
 pub(crate) struct Naming {
     output: PathBuf,
+    /// The ending of results' names in a folder; `None`: that of their inputs.
+    ending: Option<&'static str>,
     /// `output` is a folder, and so is `report` if there are several inputs.
     folder: bool,
     report: Option<PathBuf>,
@@ -72,7 +76,8 @@ impl Naming {
         }
         let inputs = ids_of(&args.inputs, args.force)?;
         let (report, force) = (args.report.clone(), args.force);
-        let naming = Self { output, folder, report, several, inputs, force, given: Mutex::default() };
+        let ending = args.format.and_then(OutputFormat::ending);
+        let naming = Self { output, ending, folder, report, several, inputs, force, given: Mutex::default() };
         if !folder {
             naming.check(&naming.output)?;
         }
@@ -86,6 +91,7 @@ impl Naming {
     pub(crate) fn of_file(output: PathBuf) -> Self {
         Self {
             output,
+            ending: None,
             folder: false,
             report: None,
             several: false,
@@ -123,6 +129,7 @@ impl Naming {
         if !self.folder {
             return self.output.clone();
         }
+        let input = self.ending.map_or_else(|| input.to_owned(), |ending| input.with_extension(ending));
         let name = input.file_name().unwrap_or_default();
         let mut given = self.given.lock().unwrap_or_else(PoisonError::into_inner);
         let reserve = if self.report.is_some() { REPORT.len() } else { 0 };

@@ -8,6 +8,7 @@
 //! intent. Each step looks at what is there before it acts, so that the same code finishes what a killed daemon began.
 
 use std::cell::Cell;
+use std::ffi::OsStr;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -21,7 +22,7 @@ use crate::claim::{CLAIMED, Original, is_source};
 use crate::create;
 use crate::folder::{Folder, make_parent};
 use crate::fsx::{self, Identity};
-use crate::names::{VERSIONS, first, no_free_name, with_suffix};
+use crate::names::{VERSIONS, ending_of_name, first, no_free_name, with_suffix};
 use crate::place::{Item, Move, Placed, stage};
 use crate::publish_error::{PublishError, io_at};
 use crate::receipt::{NoReport, RECEIPT, RECEIPT_VERSION, REPORT, Receipt, ReusedFrom, ReusedReport};
@@ -47,6 +48,14 @@ impl Conclusion {
     /// Is there a result for `out/`?
     fn is_good(&self) -> bool {
         matches!(self, Self::Report { report, .. } if ending_of(report).is_good())
+    }
+
+    /// The ending of names of its output's format.
+    fn ending(&self) -> Option<&'static OsStr> {
+        match self {
+            Self::Report { report, .. } => report.output.as_ref()?.format.ending().map(OsStr::new),
+            Self::None { .. } => None,
+        }
     }
 }
 
@@ -82,7 +91,7 @@ impl<'a> Desk<'a> {
         self.begin(job)?;
         superseded::clear(self.folder, job);
         crash_point("daemon.superseded");
-        let barred = if result.is_good() { self.barred(job)? } else { None };
+        let barred = if result.is_good() { self.barred(job, result.ending())? } else { None };
         let publication = self.prepare(job, barred.as_ref().unwrap_or(result))?;
         self.intend_durably(job, publication)
     }
@@ -123,7 +132,7 @@ impl<'a> Desk<'a> {
             }
         };
         let reason = suture_store::job::one_line(&reason);
-        let names = self.names(job, ending, output_hash.is_some())?;
+        let names = self.names(job, ending, output_hash.and(result.ending()))?;
         let target = if ending.is_good() { self.folder.out() } else { self.folder.area(ending.area()) };
         let shown_source = self.folder.inbox().join(job.source.path.to_path()).display().to_string();
         let report_path = work.join(REPORT_FILE);
@@ -311,16 +320,17 @@ impl<'a> Desk<'a> {
     /// Someone took the name of the intent: another one, said in a new intent, or no result where the folder wants no second one. Report and
     /// receipt are written anew, since they name it. What a person approved is published in any case.
     fn choose_again(&self, job: &Job, old: &Publication) -> Result<Job, PublishError> {
+        let ending = old.output.as_ref().map(ending_of_name);
         if old.ending.is_good()
             && old.output.is_some()
             && old.decision.is_none()
-            && let Some(barred) = self.barred(job)?
+            && let Some(barred) = self.barred(job, ending.as_deref())?
         {
             discard(self.folder, job);
             let publication = self.prepare(job, &barred)?;
             return self.intend_durably(job, publication);
         }
-        let names = self.names(job, old.ending, old.output.is_some())?;
+        let names = self.names(job, old.ending, ending.as_deref())?;
         let work = self.work(job);
         let path = work.join(REPORT_FILE);
         let mut report = match read_json(&path) {

@@ -13,7 +13,7 @@ use suture_store::{JobId, RelPath, Source, Submission};
 
 use crate::choice;
 use crate::claim::Original;
-use crate::folder::{Folder, NameKind, is_hot, name_kind};
+use crate::folder::{Folder, NameKind, endings, is_hot, name_kind};
 use crate::force;
 use crate::fsx::{self, Identity};
 use crate::handed::{Handed, Untaken};
@@ -360,8 +360,10 @@ fn what_else(meta: &Metadata, kind: NameKind, name: &str) -> Option<String> {
         return Some(words);
     }
     (kind == NameKind::Foreign).then(|| match name.rsplit_once('.') {
-        Some((_, extension)) => format!("a .{} file; only STL is repaired", extension.to_ascii_lowercase()),
-        None => "a file of unknown format; only STL is repaired".into(),
+        Some((_, extension)) => {
+            format!("a .{} file, which is not read; meshes end in {}", extension.to_ascii_lowercase(), endings())
+        }
+        None => format!("a file of unknown format; meshes end in {}", endings()),
     })
 }
 

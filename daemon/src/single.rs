@@ -3,12 +3,13 @@
 
 use std::path::Path;
 
-use suture_core::Profile;
 use suture_core::report::Certificate;
+use suture_core::{OutputFormat, Profile};
 
 use crate::batch::Batch;
 use crate::cli::{InspectArgs, RepairArgs};
 use crate::exit::Exit;
+use crate::fsx;
 use crate::item::Order;
 use crate::naming::Naming;
 use crate::profiles;
@@ -19,6 +20,9 @@ use crate::signals::Stop;
 pub(crate) fn repair(args: &RepairArgs) -> Exit {
     let order = profiles::of_command(&args.profile, args.no_self_intersections).and_then(|mut profile| {
         profile.guarantee = args.guarantee.map_or(profile.guarantee, Into::into);
+        let of_name = || args.output.extension().and_then(|ending| OutputFormat::of_ending(ending.to_str()?));
+        let is_folder = fsx::is_folder(&args.output).unwrap_or(false);
+        profile.format = args.format.or_else(|| of_name().filter(|_| !is_folder)).unwrap_or(profile.format);
         let naming = Some(Naming::new(args)?);
         let limits = args.spend.limits(args.list_edit);
         Ok(Order { inputs: &args.inputs, profile, limits, naming, certificate: None, json: args.json })

@@ -198,13 +198,18 @@ fn headline(report: &Report) -> &'static str {
 }
 
 fn size(report: &Report) -> String {
-    let format = match report.input.format {
+    let facts = &report.input;
+    format!("{}, {}, {}", triangles(facts.triangles), show_size(facts.bytes), format_name(facts.format))
+}
+
+/// The name of a format, for people.
+pub(crate) fn format_name(format: Format) -> &'static str {
+    match format {
         Format::BinaryStl => "binary STL",
         Format::AsciiStl => "ASCII STL",
         // The command line reads files only.
         _ => "no file",
-    };
-    format!("{}, {}, {format}", triangles(report.input.triangles), show_size(report.input.bytes))
+    }
 }
 
 fn rate(report: &Report) -> String {

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use suture_store::{Hash, RelPath, crash_point};
 
 use crate::create;
-use crate::folder::{Folder, NameKind, make_parent, name_kind};
+use crate::folder::{Folder, NameKind, endings, make_parent, name_kind};
 use crate::fsx::{self, Identity};
 
 /// How long a key is remembered.
@@ -169,7 +169,7 @@ pub(crate) fn destination(text: &str) -> Result<RelPath, String> {
     }
     match parts().next_back().map(name_kind) {
         Some(NameKind::Mesh) => Ok(path),
-        _ => Err("`name`: only STL is repaired; the name must end in .stl".into()),
+        _ => Err(format!("`name`: it must end as those of meshes do: {}", endings())),
     }
 }
 
@@ -268,7 +268,7 @@ mod tests {
             "a.stl/",
             "a\\..\0.stl",
             "a\n.stl",
-            "a.obj",
+            "a.step",
             "a.stl.part",
             "stl",
         ] {

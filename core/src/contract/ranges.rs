@@ -97,6 +97,7 @@ impl Profile {
             build_volume_mm: _,
             // Choices.
             repair: _,
+            format: _,
             leave_open: _,
             close_sheets: _,
             fill_holes: _,

@@ -145,6 +145,16 @@ pub struct FileFacts {
     pub findings: Vec<String>,
 }
 
+/// A file that was written in another format.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Converted {
+    /// The file read.
+    pub input: FileFacts,
+    /// The file written.
+    pub output: FileFacts,
+}
+
 fn lossy<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&path.to_string_lossy())
 }
@@ -160,6 +170,16 @@ pub enum Format {
     AsciiStl,
     /// No file: a mesh that a program handed over in memory.
     Memory,
+}
+
+impl Format {
+    /// The ending of names of this format, without a point; `None` for a mesh in memory.
+    pub fn ending(self) -> Option<&'static str> {
+        match self {
+            Self::BinaryStl | Self::AsciiStl => Some("stl"),
+            Self::Memory => None,
+        }
+    }
 }
 
 /// Counts after the exact weld. Definitions: `core/DEFECTS.md`.

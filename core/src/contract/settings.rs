@@ -19,6 +19,8 @@ pub struct Profile {
     pub name: String,
     /// Repair at all. Without, a file that is good as it comes counts as clean, and of any other nothing is written.
     pub repair: bool,
+    /// The format of the result.
+    pub format: OutputFormat,
     /// Boundary vertices closer than this fraction of the diagonal are one vertex. Never below what f32 can tell apart at the
     /// model's coordinates, never above [`Profile::weld_max_edge_share`] of the edges around. 0 switches the weld off.
     pub weld_relative: f64,
@@ -150,6 +152,53 @@ pub enum Hollow {
     Keep,
 }
 
+/// The format of a result.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum OutputFormat {
+    /// The input's; of a text STL, binary STL.
+    #[default]
+    Input,
+    /// Binary STL.
+    Stl,
+    /// Binary PLY, little-endian.
+    Ply,
+    /// OFF, text.
+    Off,
+    /// OBJ, text.
+    Obj,
+    /// AMF, not compressed.
+    Amf,
+}
+
+impl OutputFormat {
+    /// The format that names with this ending have, in any case; `None` for a format that is not written.
+    ///
+    /// ```
+    /// # use suture_core::OutputFormat;
+    /// assert_eq!(OutputFormat::of_ending("PLY"), Some(OutputFormat::Ply));
+    /// assert_eq!(OutputFormat::of_ending("step"), None);
+    /// ```
+    pub fn of_ending(ending: &str) -> Option<Self> {
+        [Self::Stl, Self::Ply, Self::Off, Self::Obj, Self::Amf]
+            .into_iter()
+            .find(|format| format.ending().is_some_and(|own| own.eq_ignore_ascii_case(ending)))
+    }
+
+    /// The ending of names of this format, without a point; `None` for the input's.
+    pub fn ending(self) -> Option<&'static str> {
+        match self {
+            Self::Input => None,
+            Self::Stl => Some("stl"),
+            Self::Ply => Some("ply"),
+            Self::Off => Some("off"),
+            Self::Obj => Some("obj"),
+            Self::Amf => Some("amf"),
+        }
+    }
+}
+
 /// What to do with a lone sheet: open surface that bounds no material, such as terrain, or a Möbius strip.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -188,6 +237,7 @@ impl Default for Profile {
         Self {
             name: "default".into(),
             repair: true,
+            format: OutputFormat::Input,
             weld_relative: 1e-5,
             weld_max_edge_share: 0.25,
             sew_relative: 0.01,

@@ -65,7 +65,7 @@ pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress
     clock.close(report, mesh.path(), mesh.records().len())
 }
 
-/// Repairs `input` into the new file `output`, in the format of its name's ending, or else in the input's.
+/// Repairs `input` into the new file `output`, in the format that the profile names.
 ///
 /// # Errors
 /// [`Error`], any of them; [`Error::Profile`] before the file is opened.
@@ -75,7 +75,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     let limits = &limits.spooling_beside(output);
     let mesh = open(input, limits, progress)?;
     let triangles = mesh.records().len();
-    let target = formats::target(mesh.format(), output);
+    let target = formats::target(mesh.format(), profile.format);
     let report = match target.layout {
         None => make(mesh, output, target, (profile, limits), progress, &mut clock)?,
         Some(layout) => {

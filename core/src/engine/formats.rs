@@ -10,19 +10,21 @@ use rayon::prelude::*;
 
 use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
-use crate::contract::report::{Format, Report};
-use crate::contract::settings::{Limits, folder_of};
+use crate::contract::report::{Converted, Format, Report};
+use crate::contract::settings::{Limits, OutputFormat, folder_of};
 use crate::engine::clock::Clock;
 use crate::engine::files;
 use crate::geometry::position;
 use crate::io::disk_space::{self, Need};
 use crate::io::read::MeshFile;
-use crate::io::record::Record;
+use crate::io::record::{self, Record};
 use crate::io::write_behind;
+use crate::output::edit::Edit;
 use crate::output::emit::{self, Content};
 use crate::output::encode::{self, Layout};
 use crate::output::indexed::Indexed;
 use crate::util::parallel;
+use crate::util::words::triangles;
 
 /// The format of an output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,17 +35,16 @@ pub(crate) struct Target {
     pub(crate) is_input: bool,
 }
 
-/// The format that `output` is to have: that of its name's ending; a name without a known one takes the input's.
-pub(crate) fn target(input: Format, output: &Path) -> Target {
-    let ending = output.extension().map(|ending| ending.to_ascii_lowercase());
+/// The format of the result of an input of this format, where the profile wants `wanted`.
+pub(crate) fn target(input: Format, wanted: OutputFormat) -> Target {
     let own = layout_of(input);
-    let layout = match ending.as_deref().and_then(|ending| ending.to_str()) {
-        Some("stl") => None,
-        Some("ply") => Some(Layout::Ply),
-        Some("off") => Some(Layout::Off),
-        Some("obj") => Some(Layout::Obj),
-        Some("amf") => Some(Layout::Amf("millimeter")),
-        _ => own,
+    let layout = match wanted {
+        OutputFormat::Input => own,
+        OutputFormat::Stl => None,
+        OutputFormat::Ply => Some(Layout::Ply),
+        OutputFormat::Off => Some(Layout::Off),
+        OutputFormat::Obj => Some(Layout::Obj),
+        OutputFormat::Amf => Some(Layout::Amf("millimeter")),
     };
     Target { layout, is_input: layout == own }
 }
@@ -67,7 +68,7 @@ pub(crate) fn through_a_spool(
     clock: &mut Clock,
     make: impl FnOnce(MeshFile, &Path, &mut Clock) -> Result<Report>,
 ) -> Result<Report> {
-    check_space(&mesh, output, layout, limits)?;
+    check_space(&mesh, output, Some(layout), limits)?;
     let (file, _) = write_behind::nameless(&limits.spool_folder(), limits)?;
     let spool = PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()));
     let mut report = make(mesh, &spool, clock)?;
@@ -94,10 +95,62 @@ pub(crate) fn through_a_spool(
     Ok(report)
 }
 
+/// Writes the triangles of the file `input` to the new file `output` in another format, and changes nothing of them. A file that has this format is
+/// copied.
+///
+/// # Errors
+/// [`Error`], any of them; [`Error::Refused`] for a triangle that no format but STL can hold.
+pub(crate) fn convert(
+    input: &Path,
+    output: &Path,
+    format: OutputFormat,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> Result<Converted> {
+    let limits = &limits.spooling_beside(output);
+    let mesh = files::open(input, limits, progress)?;
+    let target = target(mesh.format(), format);
+    check_space(&mesh, output, target.layout, limits)?;
+    let written = match target.layout {
+        Some(layout) if !target.is_input => {
+            refuse_infinite(&mesh)?;
+            let written = encode(&mesh, output, layout, limits, progress)?;
+            confirm(&mesh, &written, limits)?;
+            written
+        }
+        None if !target.is_input => {
+            let edit = Edit::default();
+            let made = emit::draft(&mesh, output, limits, progress, |draft| draft.finish(&Content::Edited(&edit)));
+            made?.0.durable()?;
+            let written = files::open(output, limits, progress)?;
+            confirm(&mesh, &written, limits)?;
+            written
+        }
+        _ => copy(input, output, limits, progress)?,
+    };
+    mesh.check_unchanged()?;
+    let facts = |mesh: &MeshFile| files::facts(mesh, files::hash(mesh, limits, progress));
+    Ok(Converted { input: facts(&mesh), output: facts(&written) })
+}
+
+/// No decimal number is infinite, nor none at all.
+fn refuse_infinite(mesh: &MeshFile) -> Result<()> {
+    let count = mesh.records().iter().filter(|record| !record::all_finite(record)).count();
+    if count == 0 {
+        return Ok(());
+    }
+    Err(Error::Refused {
+        path: mesh.path().into(),
+        reason: format!("{} with coordinates that are no finite numbers", triangles(count as u64)),
+        advice: "`suture repair` leaves them out".into(),
+    })
+}
+
 /// Is there room for the output? (That for the STL is looked at when it is written.)
-fn check_space(mesh: &MeshFile, output: &Path, layout: Layout, limits: &Limits) -> Result<()> {
+fn check_space(mesh: &MeshFile, output: &Path, layout: Option<Layout>, limits: &Limits) -> Result<()> {
     let folder = if emit::is_nameless(output) { limits.spool_folder() } else { folder_of(output).into() };
-    let bytes = (mesh.records().len() as u64 * layout.bytes_a_triangle()).max(mesh.byte_len());
+    let each = layout.map_or(size_of::<Record>() as u64, Layout::bytes_a_triangle);
+    let bytes = (mesh.records().len() as u64 * each).max(mesh.byte_len());
     disk_space::check(mesh.path(), &[Need { folder, bytes, what: "the output" }])
 }
 
@@ -135,10 +188,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_ending_of_a_name_decides_and_else_the_input() {
-        let of = |name: &str| target(Format::BinaryStl, Path::new(name));
-        assert_eq!(of("a.PLY"), Target { layout: Some(Layout::Ply), is_input: false });
-        assert_eq!(of("a.b.stl"), Target { layout: None, is_input: true });
-        assert_eq!([of("part"), of("/proc/self/fd/7"), of("a.bin")], [of("a.stl"); 3]);
+    fn the_profile_decides_and_else_the_input() {
+        let of = |wanted| target(Format::AsciiStl, wanted);
+        assert_eq!(of(OutputFormat::Ply), Target { layout: Some(Layout::Ply), is_input: false });
+        assert_eq!([of(OutputFormat::Input), of(OutputFormat::Stl)], [Target { layout: None, is_input: true }; 2]);
     }
 }

@@ -9,7 +9,7 @@ mod clock;
 mod edited_mesh;
 mod everywhere;
 pub(crate) mod files;
-mod formats;
+pub(crate) mod formats;
 mod judging;
 pub(crate) mod memory;
 pub(crate) mod mesh;

@@ -76,7 +76,7 @@ pub(crate) fn advice(job: &Job) -> String {
     match (&job.state, job.kind()) {
         (_, Kind::Rejected) => "Ask for a better file. Choose “Approve” if you want the result after all.".into(),
         (State::Ended { publication }, _) => ended(job, publication.ending),
-        (_, Kind::Noticed) => "Suture repairs STL files only. Move this file out of in/, or export it as STL and drop it again.".into(),
+        (_, Kind::Noticed) => "Suture does not read this format. Move the file out of in/, or export it as STL or 3MF and drop it again.".into(),
         (_, Kind::Parked) => {
             "The result is ready, but cannot be put in its place. Remove the reason (free space, rights of the folder); Suture tries again by itself.".into()
         }

@@ -16,7 +16,7 @@ use super::{Desk, OUTPUT, REPORT_FILE, base, read_json, rewrite};
 use crate::claim::Original;
 use crate::create;
 use crate::fsx;
-use crate::names::with_suffix;
+use crate::names::{ending_of_name, with_suffix};
 use crate::publish_error::{PublishError, io_at};
 use crate::receipt::REPORT;
 use crate::remove::ours;
@@ -55,7 +55,8 @@ impl Desk<'_> {
         crash_point("daemon.superseded");
         let path = work.join(REPORT_FILE);
         let mut report = read_json(&path)?;
-        let names = self.names(job, Ending::Repaired, true)?;
+        let ending = ending_of_name(judged.output.as_ref().unwrap_or(&job.source.path));
+        let names = self.names(job, Ending::Repaired, Some(&ending))?;
         if let (Some(shown), Some(name)) = (report.pointer_mut("/output/path"), &names.output) {
             *shown = self.folder.out().join(name.to_path()).display().to_string().into();
         }

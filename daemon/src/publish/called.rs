@@ -1,6 +1,7 @@
 //! What a result and its original are to be called; and its end where its name is taken, and the hot folder wants no second one (`on_taken`): then
 //! the file is not repaired at all, or, where the name was taken meanwhile, its result is given up before anything of it is in place.
 
+use std::ffi::OsStr;
 use std::io;
 use std::path::Path;
 
@@ -11,13 +12,13 @@ use crate::alike::Alike;
 use crate::config::taken::OnTaken;
 use crate::force::{is_forced, plain};
 use crate::fsx;
-use crate::names::{BEST, COMPANION, Names, best_of, companions, first};
+use crate::names::{BEST, COMPANION, Names, best_of, companions, first, with_ending};
 use crate::place::{Item, Placed};
 use crate::publish_error::{PublishError, io_at};
 
 impl Desk<'_> {
-    /// The first free names for a result.
-    pub(super) fn names(&self, job: &Job, ending: Ending, output: bool) -> Result<Names, PublishError> {
+    /// The first free names for a result whose format has this ending, if there is one.
+    pub(super) fn names(&self, job: &Job, ending: Ending, output: Option<&OsStr>) -> Result<Names, PublishError> {
         let (now_area, now_path) = job.original();
         let area = self.folder.area(ending.area());
         let here = |path: &RelPath| now_area == ending.area() && now_path == path;
@@ -31,14 +32,16 @@ impl Desk<'_> {
             return Ok(Names { output: None, original });
         }
         if ending.is_good() {
-            let result = first(&dropped, COMPANION, |path| is_free_for_result(&self.folder.alike, &out, path))?;
+            let wanted = output.map_or_else(|| dropped.clone(), |ending| with_ending(&dropped, ending));
+            let result = first(&wanted, COMPANION, |path| is_free_for_result(&self.folder.alike, &out, path))?;
             return Ok(Names { output: Some(result), original: first(&dropped, 0, original_free)? });
         }
+        let best = |path: &RelPath| best_of(&output.map_or_else(|| path.clone(), |ending| with_ending(path, ending)));
         let path = if now_area == ending.area() { now_path } else { &dropped };
         let original = first(path, COMPANION + BEST.len(), |path| {
-            Ok(original_free(path)? && is_alone(&area, path)? && is_free(&area, &best_of(path).to_path())?)
+            Ok(original_free(path)? && is_alone(&area, path)? && is_free(&area, &best(path).to_path())?)
         })?;
-        Ok(Names { output: output.then(|| best_of(&original)), original })
+        Ok(Names { output: output.map(|_| best(&original)), original })
     }
 
     /// Gives a file its name; a result none that other systems take for another one.
@@ -57,16 +60,18 @@ impl Desk<'_> {
     }
 
     /// The end of a job whose result, report or receipt would have a name that is taken; `None` where it is free, or the next one will do, as it
-    /// does for work that is forced.
-    pub(crate) fn barred(&self, job: &Job) -> Result<Option<Conclusion>, PublishError> {
-        let ending = match self.folder.on_taken {
+    /// does for work that is forced. `ending`: that of the result's format, once it is known.
+    pub(crate) fn barred(&self, job: &Job, ending: Option<&OsStr>) -> Result<Option<Conclusion>, PublishError> {
+        let end = match self.folder.on_taken {
             _ if is_forced(&job.source.path) => return Ok(None),
             OnTaken::Version => return Ok(None),
             OnTaken::Fail => Ending::NameTaken,
             OnTaken::Skip => Ending::Skipped,
         };
         let out = self.folder.out();
-        let wanted = first(&job.source.path, COMPANION, |_| Ok(true))?;
+        let dropped = &job.source.path;
+        let wanted =
+            first(&ending.map_or_else(|| dropped.clone(), |ending| with_ending(dropped, ending)), COMPANION, |_| Ok(true))?;
         let [report, receipt] = companions(&wanted);
         for name in [wanted.to_path(), report, receipt] {
             let (path, shown) = (out.join(&name), name.display());
@@ -77,14 +82,14 @@ impl Desk<'_> {
             } else {
                 continue;
             };
-            let reason = match ending {
+            let reason = match end {
                 Ending::Skipped => format!("skipped: {there}"),
                 _ => format!(
                     "{there}; take it away, then `suture jobs retry {}`, or drop the file again under another name",
                     job.id
                 ),
             };
-            return Ok(Some(Conclusion::None { ending, reason }));
+            return Ok(Some(Conclusion::None { ending: end, reason }));
         }
         Ok(None)
     }

@@ -31,16 +31,16 @@ fn f24_meshes_settle_foreign_files_are_noticed_links_are_not_followed() {
     mesh(&inbox.join("a.stl"));
     mesh(&inbox.join("scan/B.STL"));
     mesh(&inbox.join(".hidden.stl"));
-    std::fs::write(inbox.join("x.obj"), "v").unwrap();
+    std::fs::write(inbox.join("x.step"), "v").unwrap();
     std::os::unix::fs::symlink("/etc/passwd", inbox.join("link.stl")).unwrap();
     let found = settle(&mut r, Instant::now());
     let said: BTreeMap<String, (String, Option<String>)> =
         found.into_iter().map(|(path, s)| (path.display().to_string(), (s.source.profile, s.foreign))).collect();
-    assert_eq!(said.keys().collect::<Vec<_>>(), ["a.stl", "link.stl", "scan/B.STL", "x.obj"]);
+    assert_eq!(said.keys().collect::<Vec<_>>(), ["a.stl", "link.stl", "scan/B.STL", "x.step"]);
     assert_eq!(said["a.stl"], ("default".into(), None));
     assert_eq!(said["scan/B.STL"], ("scan".into(), None));
     assert!(said["link.stl"].1.as_ref().unwrap().contains("symbolic link"));
-    assert!(said["x.obj"].1.as_ref().unwrap().contains(".obj"));
+    assert!(said["x.step"].1.as_ref().unwrap().contains(".step"));
 }
 
 #[test]

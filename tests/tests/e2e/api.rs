@@ -143,7 +143,7 @@ fn uploads_that_cannot_be_taken_leave_nothing() {
     let daemon = Served::start(&place, &["--config", "suture.toml"], "log");
     let client = Client::of(&daemon);
     let mesh = vec![0; 5000];
-    for (query, status) in [("name=a.stl", 413), ("name=../a.stl", 400), ("name=a.obj", 400), ("", 400), ("name=a.stl&x=1", 400)]
+    for (query, status) in [("name=a.stl", 413), ("name=../a.stl", 400), ("name=a.step", 400), ("", 400), ("name=a.stl&x=1", 400)]
     {
         upload(&client, query, &[], &mesh).expect(status);
     }

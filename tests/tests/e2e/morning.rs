@@ -92,7 +92,7 @@ fn what_waits_says_why() {
 fn a_file_that_is_gone_cannot_be_tried_again() {
     let place = Place::new();
     let (_daemon, client) = served(&place, "[[folders]]\npath = \"hot\"");
-    let note = place.put("hot/in/part.3mf", b"PK");
+    let note = place.put("hot/in/part.step", b"PK");
     wait_until("it is noticed", || client.get("/v1/jobs").json()["jobs"][0]["state"] == "noticed");
     std::fs::remove_file(note).unwrap();
     wait_until("it is forgotten", || client.get("/v1/jobs/1").json()["state"] == "cancelled");

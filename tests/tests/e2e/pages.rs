@@ -58,7 +58,7 @@ fn pages_say_what_became_of_every_file() {
     wait_for(&client, 1, "done");
     place.put("hot/in/picture.stl", b"\x89PNG\r\n\x1a\nendsolid");
     wait_for(&client, 2, "failed");
-    place.put("hot/in/part.3mf", b"PK");
+    place.put("hot/in/part.step", b"PK");
     wait_for(&client, 3, "noticed");
     let night = client.browse("/").expect(200);
     assert_is_page(&night);
@@ -66,9 +66,9 @@ fn pages_say_what_became_of_every_file() {
         "2 files need you.",
         "Failed: 1; Not taken: 1.",
         "picture.stl",
-        "part.3mf",
+        "part.step",
         "<b>1</b><a href=\"/jobs?state=failed\">failed</a>",
-        "only STL",
+        "which is not read",
     ] {
         assert!(night.text().contains(words), "{words}: {}", night.text());
     }

@@ -54,7 +54,7 @@ fn each_file_ends_in_its_place() {
     place.put("hot/in/scan/holes.stl", &holes);
     place.put("hot/in/sheet.stl", &sheet);
     place.put("hot/in/picture.stl", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR");
-    let left = ["copying.stl.part", "download.stl.crdownload", "x.tmp", ".hidden.stl", "~$part.stl", "notes.txt", "part.obj"];
+    let left = ["copying.stl.part", "download.stl.crdownload", "x.tmp", ".hidden.stl", "~$part.stl", "notes.txt", "part.iges"];
     for name in left {
         place.put(&format!("hot/in/{name}"), &holes);
     }
@@ -91,13 +91,13 @@ fn each_file_ends_in_its_place() {
         ("clean.stl", "done"),
         ("holes.STL", "done"),
         ("notes.txt", "noticed"),
-        ("part.obj", "noticed"),
+        ("part.iges", "noticed"),
         ("picture.stl", "failed"),
         ("scan/holes.stl", "done"),
         ("sheet.stl", "failed"),
     ];
     assert_eq!(kinds, expected.map(|(name, kind)| (name.to_owned(), kind.to_owned())));
-    assert_eq!(ran.stderr().matches("part.obj").count(), 1, "named once: {}", ran.stderr());
+    assert_eq!(ran.stderr().matches("part.iges").count(), 1, "named once: {}", ran.stderr());
 }
 
 #[test]
@@ -250,12 +250,12 @@ fn meshes_that_are_left_are_code_1() {
     place.put("hot/in/d/d/d/d/d/d/d/d/d/d/d/d/part.stl", &mesh(Case::Holes, 1));
     once(&place).expect(0);
     assert!(place.at("hot/done/d/d/d/d/d/d/d/d/d/d/d/d/part.stl").exists());
-    place.put("hot/in/part.3mf", b"PK");
+    place.put("hot/in/part.step", b"PK");
     for _ in 0..2 {
         let ran = once(&place).expect(1);
         assert!(ran.stderr().contains("Files are left where they are"), "{}", ran.stderr());
     }
-    std::fs::remove_file(place.at("hot/in/part.3mf")).unwrap();
+    std::fs::remove_file(place.at("hot/in/part.step")).unwrap();
     once(&place).expect(0);
     let long = format!("hot/in/{}", format!("{}/", "n".repeat(200)).repeat(4));
     place.put(&format!("{long}part.stl"), &mesh(Case::Holes, 1));

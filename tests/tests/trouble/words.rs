@@ -55,7 +55,7 @@ fn f23_no_name_steers_a_terminal() {
     let stage = Stage::new();
     let mesh = holes(600, 1);
     stage.put(EVIL, &mesh);
-    std::fs::write(stage.hot("in").join(EVIL.replace(".stl", ".obj")), b"v").unwrap();
+    std::fs::write(stage.hot("in").join(EVIL.replace(".stl", ".step")), b"v").unwrap();
     let broken = EVIL.replace("evil", "broken");
     std::fs::write(stage.hot("in").join(&broken), b"\x89PNG\r\n\x1a\n").unwrap();
     std::fs::create_dir(stage.hot("in/sub\x1b[31m\n")).unwrap();

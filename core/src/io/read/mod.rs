@@ -26,6 +26,9 @@ mod tests;
 mod text;
 mod vertices;
 
+/// Endings of names of the formats that are read, in lower case, without a point.
+pub const ENDINGS: [&str; 5] = ["stl", "ply", "off", "obj", "amf"];
+
 pub use finding::{Finding, Loss};
 pub use limits::{HEADER_BYTES, MAX_TRIANGLES, PREFIX_BYTES};
 pub use mesh_file::MeshFile;

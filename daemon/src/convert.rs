@@ -1,0 +1,57 @@
+//! `suture convert`: one mesh in another format.
+
+use std::path::Path;
+
+use suture_core::report::{Converted, FileFacts};
+use suture_core::{OutputFormat, Quiet, words};
+
+use crate::cli::ConvertArgs;
+use crate::draft::Draft;
+use crate::exit::Exit;
+use crate::fsx;
+use crate::naming;
+use crate::rights::Rights;
+use crate::say::{complain, plain, print};
+use crate::table::format_name;
+use crate::units::show_size;
+
+/// Writes what the command line asks for.
+pub(crate) fn run(args: &ConvertArgs) -> Exit {
+    match convert(args) {
+        Ok(Converted { input, output, .. }) => {
+            let of = |facts: &FileFacts| format!("{}, {}", show_size(facts.bytes), format_name(facts.format));
+            let (from, to) = (args.input.display(), args.output.display());
+            let first = format!("{from}: {}, {} -> {to}: {}", words::triangles(input.triangles), of(&input), of(&output));
+            let lines = std::iter::once(first).chain(input.findings.iter().map(|finding| format!("  {finding}")));
+            let text: String = lines.map(|line| plain(&line) + "\n").collect();
+            print(text.as_bytes(), Exit::Good)
+        }
+        Err(line) => {
+            complain(&line);
+            Exit::Refused
+        }
+    }
+}
+
+fn convert(args: &ConvertArgs) -> Result<Converted, String> {
+    let (input, output) = (&args.input, &args.output);
+    let shown = output.display();
+    let ending = output.extension().and_then(|ending| OutputFormat::of_ending(ending.to_str()?));
+    let format = ending.ok_or_else(|| {
+        format!("{shown}: its ending says no format that is written; one of {}", suture_core::read::ENDINGS.join(", "))
+    })?;
+    naming::check_one(std::slice::from_ref(input), output, args.force)?;
+    let failed = |error: std::io::Error| format!("{shown}: cannot be written: {error}");
+    let draft = Draft::new(fsx::folder_of(output)).map_err(failed)?;
+    let mut limits = args.spend.limits(false);
+    limits.spool.get_or_insert_with(|| fsx::folder_of(output).to_owned());
+    let converted = suture_core::convert(input, &draft.path(), format, &limits, &Quiet).map_err(|error| error.to_string())?;
+    place(&draft, input, output, args.force).map_err(failed)?;
+    Ok(converted)
+}
+
+fn place(draft: &Draft, input: &Path, output: &Path, force: bool) -> std::io::Result<()> {
+    draft.sync()?;
+    draft.place(output, Rights::of(&std::fs::metadata(input)?), force)?;
+    fsx::sync_dir(fsx::folder_of(output))
+}

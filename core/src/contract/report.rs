@@ -86,6 +86,10 @@ pub struct Report {
     /// Notes for people, of good files, too.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub hints: Vec<Hint>,
+    /// Of a package, each of its objects, in order (at most 1000 listed); empty for a file that is one mesh. Then all counts above are of all objects
+    /// together, and an outcome is the worst of theirs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub objects: Vec<ObjectReport>,
     /// Walls thinner than the profile's minimum; `None` if there is no minimum, or a hint says why it was not looked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub thin_walls: Option<ThinWalls>,
@@ -93,6 +97,34 @@ pub struct Report {
     pub stages: Vec<Stage>,
     /// Where the time went and what it cost.
     pub cost: Cost,
+}
+
+/// One object of a package.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct ObjectReport {
+    /// Its number in the package.
+    pub id: u32,
+    /// Its name; empty if it has none.
+    pub name: String,
+    /// The part of the package that holds it.
+    pub part: String,
+    /// How it came out.
+    pub outcome: Outcome,
+    /// Triangles in the file.
+    pub triangles: u64,
+    /// Defects as it came.
+    pub before: Defects,
+    /// Defects as it was written; `None` where it stays as it came.
+    pub after: Option<Defects>,
+    /// The repairs that were made, in order.
+    pub repairs: Vec<Repair>,
+    /// The edit in numbers.
+    pub edit: EditSummary,
+    /// What it is as it was written, or as it came.
+    pub verdict: Verdict,
+    /// What every rule found. Its hash and length are of a binary STL of the object.
+    pub certificate: Option<Certificate>,
 }
 
 /// Which of the two entry points wrote a report.

@@ -77,34 +77,47 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     let triangles = mesh.records().len();
     let target = formats::target(mesh.format(), profile.format);
     let report = match target.layout {
-        None => make(mesh, output, target, (profile, limits), progress, &mut clock)?,
+        None => make(mesh, output, target, (profile, limits), progress, &mut clock)?.report,
         Some(layout) => {
-            let make = |mesh, spool: &Path, clock: &mut Clock| make(mesh, spool, target, (profile, limits), progress, clock);
+            let make = |mesh, spool: &Path, clock: &mut Clock| {
+                make(mesh, spool, target, (profile, limits), progress, clock).map(|made| made.report)
+            };
             formats::through_a_spool((mesh, input), output, (target, layout), limits, progress, &mut clock, make)?
         }
     };
     clock.close(report, input, triangles)
 }
 
+/// A mesh that was repaired into an STL.
+pub(crate) struct Made {
+    pub(crate) report: Report,
+    /// As it was repaired: maybe welded first.
+    pub(crate) mesh: MeshFile,
+    /// Of its records.
+    pub(crate) edit: Edit,
+}
+
 /// Makes `mesh` the new STL `output`, or a copy of its file where that is good and of the `target`.
-fn make(
+pub(crate) fn make(
     mesh: MeshFile,
     output: &Path,
     target: Target,
     (profile, limits): (&Profile, &Limits),
     progress: &dyn Progress,
     clock: &mut Clock,
-) -> Result<Report> {
+) -> Result<Made> {
     if !profile.repair {
-        return pass_on(&mesh, output, target, (profile, limits), progress, clock);
+        let report = pass_on(&mesh, output, target, (profile, limits), progress, clock)?;
+        return Ok(Made { report, mesh, edit: Edit::default() });
     }
     let (mesh, welded) = welding::in_the_stream(mesh, profile, limits, progress)?;
     clock.stage("read");
     check_space(&mesh, output, limits)?;
-    emit::draft(&mesh, output, limits, progress, |draft| {
+    let (report, edit) = emit::draft(&mesh, output, limits, progress, |draft| {
         let mended = mend(draft, (&mesh, welded.as_ref()), (output, target), profile, limits, progress, clock);
         mended.map_err(|error| or_changed(error, &mesh, progress))
-    })
+    })?;
+    Ok(Made { report, mesh, edit })
 }
 
 /// Is there room for the output of `mesh`, and for what is spooled?
@@ -189,7 +202,7 @@ fn mend(
     limits: &Limits,
     progress: &dyn Progress,
     clock: &mut Clock,
-) -> Result<Report> {
+) -> Result<(Report, Edit)> {
     let (survey, set_right) = everywhere::survey(mesh, profile, limits, progress)?;
     let mut diagnosis = everywhere::diagnose((survey, set_right.as_ref()), mesh, profile, limits, progress)?;
     clock.stage("topology");
@@ -220,7 +233,7 @@ fn mend(
     written.durable()?;
     clock.stage("verify");
     mesh.check_unchanged()?;
-    Ok(report)
+    Ok((report, mended.edit))
 }
 
 /// What the repairs come to.

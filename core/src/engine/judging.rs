@@ -68,6 +68,7 @@ pub(crate) fn begin(task: Task, input: &Input<'_>, diagnosis: &Diagnosis<'_>, pr
         verdict: verdict::judge(&diagnosis.defects, &flaws(input.findings)).under(profile.guarantee),
         certificate: None,
         hints: Vec::new(),
+        objects: Vec::new(),
         thin_walls: None,
         stages: Vec::new(),
         cost: Cost::default(),

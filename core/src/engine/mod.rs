@@ -14,4 +14,5 @@ mod judging;
 pub(crate) mod memory;
 pub(crate) mod mesh;
 pub mod operations;
+mod together;
 mod welding;

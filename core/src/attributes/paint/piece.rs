@@ -63,7 +63,7 @@ impl Paint {
             if depth == QUARTERINGS || cells.good(share) {
                 return Piece { paint, exact: cells.misplaced <= ROUNDING, misplaced: cells.misplaced * share };
             }
-            depth += 1;
+            depth = cells.enough(share, depth);
         }
     }
 
@@ -135,6 +135,32 @@ fn push(state: u32, outline: Vec<Weights>, found: &mut Vec<Region>) {
     }
 }
 
+impl Region {
+    /// The part in a quarter of the cell.
+    fn in_quarter(&self, quarter: usize, found: &mut Vec<Region>) {
+        let moved = || self.outline.iter().map(|place| in_quarter(quarter, *place));
+        let outside = (0..3).any(|corner| moved().all(|place| place[corner] <= 0.0));
+        if !outside {
+            push(self.state, moved().collect(), found);
+        }
+    }
+}
+
+/// Areas by state, in the order of states.
+type Areas = Vec<(u32, f64)>;
+
+fn areas_of(regions: &[Region]) -> Areas {
+    let mut areas = Areas::new();
+    for region in regions {
+        let area = clip::area(&region.outline);
+        match areas.binary_search_by_key(&region.state, |(state, _)| *state) {
+            Ok(at) => areas.iter_mut().skip(at).take(1).for_each(|(_, sum)| *sum += area),
+            Err(at) => areas.insert(at, (region.state, area)),
+        }
+    }
+    areas
+}
+
 /// Cells of a part, and the errors made in them so far, as shares of the part.
 #[derive(Default)]
 struct Cells {
@@ -149,13 +175,24 @@ impl Cells {
         self.lacks.values().all(|lack| lack.abs() <= SMALL) && (self.misplaced <= ROUNDING || self.misplaced * share <= SMALL)
     }
 
+    /// The next depth to try after this one. The misplaced area lies along borders, and halves with each quartering.
+    fn enough(&self, share: f64, depth: u32) -> u32 {
+        let (mut next, mut misplaced) = (depth + 1, self.misplaced * share / 2.0);
+        while misplaced > SMALL && next < QUARTERINGS {
+            (next, misplaced) = (next + 1, misplaced / 2.0);
+        }
+        next
+    }
+
     /// A cell's paint. It may be quartered `depth` times; `size` is its share of the part, and `around` its state if no region is in it.
     fn paint(&mut self, regions: &[Region], depth: u32, size: f64, around: u32) -> Paint {
-        let mut areas = BTreeMap::new();
-        regions.iter().for_each(|region| *areas.entry(region.state).or_insert(0.0) += clip::area(&region.outline));
-        let all: f64 = areas.values().sum();
-        let (most, largest) =
-            areas.iter().fold((around, 0.0), |best, (state, area)| if *area > best.1 { (*state, *area) } else { best });
+        let Some(first) = regions.first() else { return Paint::Uniform(around) };
+        if regions.iter().all(|region| region.state == first.state) {
+            return Paint::Uniform(first.state);
+        }
+        let areas = areas_of(regions);
+        let all: f64 = areas.iter().map(|(_, area)| area).sum();
+        let (most, largest) = areas.iter().fold((around, 0.0), |best, next| if next.1 > best.1 { *next } else { best });
         if all <= ROUNDING {
             return Paint::Uniform(around);
         }
@@ -166,12 +203,11 @@ impl Cells {
             let chosen = self.neediest(&areas, size / all);
             return Paint::Uniform(self.fill(chosen, &areas, size / all));
         }
+        let mut inside = Vec::new();
         let children: Vec<Paint> = (0..Way::Three.points().len())
             .map(|quarter| {
-                let mut inside = Vec::new();
-                for region in regions {
-                    push(region.state, region.outline.iter().map(|place| in_quarter(quarter, *place)).collect(), &mut inside);
-                }
+                inside.clear();
+                regions.iter().for_each(|region| region.in_quarter(quarter, &mut inside));
                 self.paint(&inside, depth - 1, size / 4.0, most)
             })
             .collect();
@@ -182,7 +218,7 @@ impl Cells {
     }
 
     /// The state that lacks most area with this cell's areas, of which 1 is `unit` in shares of the part.
-    fn neediest(&self, areas: &BTreeMap<u32, f64>, unit: f64) -> u32 {
+    fn neediest(&self, areas: &Areas, unit: f64) -> u32 {
         let mut best = (0, f64::NEG_INFINITY);
         for (state, area) in areas {
             let lack = area * unit + self.lacks.get(state).copied().unwrap_or(0.0);
@@ -194,7 +230,7 @@ impl Cells {
     }
 
     /// Gives the cell to this state.
-    fn fill(&mut self, chosen: u32, areas: &BTreeMap<u32, f64>, unit: f64) -> u32 {
+    fn fill(&mut self, chosen: u32, areas: &Areas, unit: f64) -> u32 {
         for (state, area) in areas.iter().map(|(state, area)| (*state, area * unit)) {
             if state != chosen {
                 *self.lacks.entry(state).or_default() += area;

@@ -17,8 +17,8 @@ const FIRST_TWO_SWAPPED: Order = [1, 0, 2];
 pub(super) const ORDERS: [Order; 6] = [AS_IT_IS, [1, 2, 0], [2, 0, 1], [0, 2, 1], REVERSED, FIRST_TWO_SWAPPED];
 
 impl Paint {
-    /// The same paint, second and third corner swapped. The same again gives the first paint back, node by node but for children of
-    /// one cut that could be one node of two cuts, and become it.
+    /// The same paint, second and third corner swapped. Twice gives the same paint again; the same tree, too, unless a node of one cut has
+    /// a second child that is cut through the same middle. (That can be written as a node of two cuts as well.)
     ///
     /// O(n).
     pub(crate) fn mirrored(&self) -> Paint {

@@ -14,7 +14,8 @@
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 mod algorithms;
-#[allow(dead_code)] // Until readers and writers carry paint.
+// Until readers and writers carry paint.
+#[allow(dead_code, unused_imports)]
 mod attributes;
 mod contract;
 mod detect;

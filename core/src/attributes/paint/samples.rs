@@ -21,7 +21,7 @@ pub(super) fn paint() -> impl Strategy<Value = Paint> {
     })
 }
 
-/// A place in a triangle that is on no cut of a few splits: its weights are odd multiples of 1/(3·2³⁰), nearly.
+/// A place in a triangle. Hardly one of 2³⁰ is on a cut, where two states meet.
 pub(super) fn place() -> impl Strategy<Value = Weights> {
     (1_u32..1 << 30, 1_u32..1 << 30, 1_u32..1 << 30).prop_map(|weights| {
         let weights: [u32; 3] = weights.into();

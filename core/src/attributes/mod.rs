@@ -1,4 +1,4 @@
-//! What a triangle carries beside its corners.
+//! Attributes of triangles, which they carry beside their corners.
 //!
 //! **In:** the text that a file attaches to a triangle.
 //! **Out:** its meaning ([`paint`]), carried over to turned triangles and to pieces of triangles, and text again.

@@ -38,7 +38,7 @@ const CORNERS: [Weights; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]
 impl Paint {
     /// The paint of a triangle that is a part of this one, either side up; its corners are given as weights of this one's corners.
     /// Its share of each state is right to 10⁻⁴. Not more than 10⁻⁴ of the whole is misplaced, unless cells of 4⁻⁸ of the part are too
-    /// large for that: then it is a strip of half a cell's width along the borders of states.
+    /// large for that: then it lies in the cells along the borders of states.
     ///
     /// O(n) in the tree, plus O(c) in cells with a border, of which there are about 2⁹ for a straight line.
     pub(crate) fn piece(&self, corners: [Weights; 3]) -> Piece {
@@ -89,7 +89,7 @@ impl Paint {
         }
     }
 
-    /// What of the leaves is in the triangle with these corners. Empty if it has no area.
+    /// The parts of leaves in the triangle with these corners. Empty if it has no area.
     fn regions(&self, corners: [Weights; 3]) -> Vec<Region> {
         let mut found = Vec::new();
         if let [Some(a), Some(b), Some(c)] = CORNERS.map(|corner| clip::weights_of(corners, corner)) {
@@ -164,7 +164,7 @@ fn areas_of(regions: &[Region]) -> Areas {
 /// Cells of a part, and the errors made in them so far, as shares of the part.
 #[derive(Default)]
 struct Cells {
-    /// What each state lacks.
+    /// The area that each state lacks.
     lacks: BTreeMap<u32, f64>,
     misplaced: f64,
 }

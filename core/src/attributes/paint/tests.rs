@@ -26,7 +26,7 @@ fn states_are_written_in_as_many_digits_as_they_need() {
 
 #[test]
 fn the_root_is_the_last_digit_and_the_first_child_the_first_one() {
-    // One side cut, corner 0; then the second child (8: state 2), then the first one (4: state 1).
+    // A node of one cut, corner 0; then the second child (8: state 2), then the first one (4: state 1).
     let one = Paint::parse("481").expect("a tree");
     assert_eq!(one, numbered(Way::One, 0));
     // The side opposite to corner 0 is cut, and the first child has corner 1.

@@ -1,6 +1,6 @@
 //! The same paint on the same triangle, whose corners are counted in another order.
 //!
-//! One and three cuts have mirror images of their kind. Two cuts have none: they leave a trapezium, which is always cut along the same
+//! Nodes of one and of three cuts have mirror images of their kind. Nodes of two cuts have none: they leave a trapezium, which is always cut along the same
 //! diagonal. But two cuts are the same as one, and one more of the child opposite; mirrored, they are that, and that becomes them.
 
 use super::split::Way;

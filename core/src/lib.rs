@@ -14,6 +14,9 @@
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 mod algorithms;
+// Until readers and writers carry paint.
+#[allow(dead_code, unused_imports)]
+mod attributes;
 mod contract;
 mod detect;
 mod diagnosis;

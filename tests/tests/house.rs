@@ -18,6 +18,7 @@ use imports::Imports;
 const ROOMS: [&str; 13] = [
     "util",
     "contract",
+    "attributes",
     "io",
     "geometry",
     "stream",
